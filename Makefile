@@ -9,7 +9,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := build
-.PHONY: setup runtime models readers aligner browser blender validator vrm driver loader build check test prove prove-rule prove-people prove-study demo demo-study clean-demo
+.PHONY: setup runtime models readers aligner browser blender validator vrm driver loader build check test prove prove-rule prove-people prove-cluster prove-study demo demo-study clean-demo
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 ORATOR := $(TARGET)/release/orator
@@ -53,7 +53,7 @@ test: build models readers aligner browser blender validator vrm driver
 	@if [ -s $(SKIPPED) ]; then echo 'skipped tests:'; sort -u $(SKIPPED); else echo 'no test was skipped'; fi
 	@echo 'make test: all passed'
 
-prove prove-rule prove-people: build models aligner loader
+prove prove-rule prove-people prove-cluster: build models aligner loader
 	.ci/$@
 
 # Simulated studies through the analysis: coverage of its intervals, errors of its tests, power.

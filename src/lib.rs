@@ -36,6 +36,7 @@
 //! | 6 | `pipeline` | the five stages, their order, the files in which they meet, their processes; batches of speech to motion | `types math stage config external audio motion formats nn generate animate dataset` |
 //! | 6 | `train` | optimiser, GAN, lifters, body network, synthetic scenes, spaces of movement | `types math stage config external audio motion formats nn mocap dataset metrics generate` |
 //! | 6 | `demo` | synthetic speakers: drawn, rendered, with a known rule, and the checks against them | `types math stage audio motion formats external mocap render animate dataset metrics generate` |
+//! | 7 | `cluster` | many machines on one work folder: sealed plan, times of the stages, claims, workers, the scripts that start them | `types stage config external formats pipeline` |
 //! | 7 | `evaluate` | clips, baselines, table, verdict; the lifters' errors | `types math stage config external audio motion formats nn mocap metrics generate animate dataset pipeline train` |
 //! | 8 | `report` | pages for people | `types stage config external formats metrics animate dataset pipeline train evaluate` |
 //! | 9 | `study` | user studies: films built and sealed, served, responses analysed | `types math stage config external audio motion formats mocap metrics generate animate dataset evaluate report` |
@@ -59,6 +60,8 @@
 pub mod animate;
 #[doc(hidden)]
 pub mod audio;
+#[doc(hidden)]
+pub mod cluster;
 #[doc(hidden)]
 pub mod config;
 #[doc(hidden)]

@@ -35,6 +35,7 @@ pub fn log_mel(samples: &[f32]) -> Array2<f32> {
     let fft = RealFftPlanner::<f32>::new().plan_fft_forward(FFT);
     let (mut frame, mut spectrum) = (fft.make_input_vec(), fft.make_output_vec());
     let mut work = fft.make_scratch_vec();
+    let mut magnitudes = vec![0.0f32; spectrum.len()];
     let mut mels = Array2::zeros((n_frames(samples.len()), N_MELS));
     for (k, mut row) in mels.outer_iter_mut().enumerate() {
         frame.fill(0.0);
@@ -42,8 +43,9 @@ pub fn log_mel(samples: &[f32]) -> Array2<f32> {
         frame.iter_mut().zip(sound).zip(&window).for_each(|((y, x), w)| *y = x * w);
         // The lengths are the transform's own, so it cannot refuse.
         let _ = fft.process_with_scratch(&mut frame, &mut spectrum, &mut work);
+        magnitudes.iter_mut().zip(&spectrum).for_each(|(magnitude, bin)| *magnitude = bin.norm());
         for (mel, band) in row.iter_mut().zip(BANDS.iter()) {
-            let sum: f32 = band.weights.iter().zip(&spectrum[band.first..]).map(|(w, bin)| w * bin.norm()).sum();
+            let sum: f32 = band.weights.iter().zip(&magnitudes[band.first..]).map(|(w, bin)| w * bin).sum();
             *mel = (sum + FLOOR).ln();
         }
     }

@@ -3,6 +3,7 @@
 //! 130 and 143 stopped by Ctrl-C or SIGTERM.
 
 pub mod animate;
+mod cluster;
 pub mod config_args;
 pub mod confine;
 pub mod dataset;

@@ -2,11 +2,13 @@
 //! `--help`. Exit codes: 0 all done; 1 usage, configuration, or a check that did not pass; 2 some units failed, the others are done;
 //! 130 and 143 stopped by Ctrl-C or SIGTERM.
 
+use super::cluster::{plan, submit, work};
 use super::dataset::{align, forget, import, verify as dataset};
 use super::motion::{lift, sheet};
 use super::outcome::Outcome;
 use super::pipeline::{init, report, run, status};
 use super::setup::{completions, doctor, guide, models, words};
+use super::signals;
 use super::{animate, demo, evaluate, generate, study, train, ui};
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use orator::pipeline::process::{VERB, serve};
@@ -29,6 +31,9 @@ enum Verb {
     Init(init::Args),
     Run(run::Args),
     Status(status::Args),
+    Plan(plan::Args),
+    Work(work::Args),
+    Submit(submit::Args),
     Models(models::Args),
     Words(words::Args),
     Doctor(doctor::Args),
@@ -54,6 +59,7 @@ enum Verb {
 pub fn main() -> ExitCode {
     // Before anything else: the process of a unit restricts itself while it has one thread.
     if std::env::args_os().nth(1).is_some_and(|verb| verb == VERB) {
+        signals::leave_to_parent();
         let ended = serve().inspect_err(|error| ui::note(&format!("error: {error:#}")));
         return if ended.is_ok() { ExitCode::SUCCESS } else { ExitCode::from(1) };
     }
@@ -73,6 +79,9 @@ pub fn main() -> ExitCode {
         Verb::Init(args) => init::run(args, &ui),
         Verb::Run(args) => run::run(args, &ui),
         Verb::Status(args) => status::run(args, &ui),
+        Verb::Plan(args) => plan::run(args, &ui),
+        Verb::Work(args) => work::run(args, &ui),
+        Verb::Submit(args) => submit::run(args, &ui),
         Verb::Models(args) => models::run(args, &ui),
         Verb::Words(args) => words::run(args, &ui),
         Verb::Doctor(args) => doctor::run(args, &ui),

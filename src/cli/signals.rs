@@ -15,6 +15,15 @@ pub fn prepare() {
     LazyLock::force(&RUNTIME);
 }
 
+/// From here on Ctrl-C and SIGTERM do nothing. For a process that ends with the one that started it: terminals and schedulers
+/// send them to both, and the other one decides what is finished first. It starts no thread.
+pub fn leave_to_parent() {
+    let Some(runtime) = &*RUNTIME else { return };
+    let _guard = runtime.enter();
+    // A signal that was listened for once has lost its own effect for good.
+    let _ = (signal(SignalKind::interrupt()), signal(SignalKind::terminate()));
+}
+
 /// From here on Ctrl-C or SIGTERM ends the program (exit code 130 or 143) and says what is kept: `kept`, and how to go on.
 pub fn tell_when_stopped(kept: &'static str) {
     listen(move |code| end(code, kept));

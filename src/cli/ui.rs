@@ -59,9 +59,14 @@ impl Ui {
     }
 
     /// From here on the first Ctrl-C or SIGTERM asks for an end (`is_to_stop`); the second ends the program and says what
-    /// is kept.
-    pub fn listens_for_stop(&self, kept: &'static str) {
-        self.stop.listen("stopping after this step, with a checkpoint; the next signal ends at once", kept);
+    /// is kept. Of the first `stopping` is said.
+    pub fn listens_for_stop(&self, stopping: &'static str, kept: &'static str) {
+        self.stop.listen(stopping, kept);
+    }
+
+    /// Whether an end was asked for.
+    pub fn was_stopped(&self) -> bool {
+        self.stop.code().is_some()
     }
 
     /// Exit code of what ended by request.

@@ -31,10 +31,9 @@ pub struct GanConfig {
     pub adversarial: AdversarialLoss,
     /// Weights of the losses.
     pub lambda_l1: f64,
-    /// Of the mean squared error, under which a pose that the sound leaves open comes out as the mean of what it may be; under
-    /// the absolute one as the median, which for a hand that mostly rests is rest.
-    pub lambda_mse: f64,
     pub lambda_velocity: f64,
+    /// Of the squared error of the joints' speeds: how much they move, wherever they go.
+    pub lambda_speed: f64,
     pub lambda_gan: Auto<f64>,
     pub lambda_bone: f64,
     /// Step from which there is an adversarial loss, and steps in which its weight then rises from 0.
@@ -91,7 +90,7 @@ impl Default for GanConfig {
             fade_to: number,
             adversarial: AdversarialLoss::LeastSquares,
             lambda_l1: 1.0,
-            lambda_mse: 0.0,
+            lambda_speed: 0.0,
             lambda_velocity: 0.0,
             lambda_gan: number,
             lambda_bone: 0.1,

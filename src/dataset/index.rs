@@ -1,9 +1,27 @@
 //! Index file `index.jsonl`: a line for each sample with its location in a shard and its BLAKE3 hash, for random access
 //! and checks. Shards are listed in `info.json`.
 
+use crate::formats::wav;
 use crate::types::file_name::FileName;
 use crate::types::split::Split;
-use serde::{Deserialize, Serialize};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
+
+/// Most samples or frames that a record may speak of: years of motion, and sums of them fit into any integer here.
+const MOST: usize = u32::MAX as usize;
+
+/// Reads a number of samples or frames.
+///
+/// # Errors
+///
+/// Where it is more than any dataset has, so that the record is damaged.
+pub fn count<'de, D: Deserializer<'de>>(from: D) -> Result<usize, D::Error> {
+    let count = usize::deserialize(from)?;
+    if count > MOST {
+        return Err(D::Error::custom(format!("{count} samples or frames, {MOST} at most: the file is damaged")));
+    }
+    Ok(count)
+}
 
 /// Tar file of samples.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -13,6 +31,7 @@ pub struct ShardRef {
     /// Size.
     pub bytes: u64,
     /// Samples in it.
+    #[serde(deserialize_with = "count")]
     pub n_samples: usize,
     /// Hash of its content, in hex.
     pub blake3: String,
@@ -32,6 +51,7 @@ pub struct SampleRef {
     /// Bytes from `offset` on.
     pub size: u64,
     /// Frames of motion.
+    #[serde(deserialize_with = "count")]
     pub n_frames: usize,
     /// Hash of the `size` bytes at `offset`.
     pub blake3: String,
@@ -66,6 +86,11 @@ pub struct ByteRange {
 }
 
 impl SampleRef {
+    /// Samples of sound.
+    pub fn n_sound_samples(&self) -> usize {
+        (self.wav.size.saturating_sub(wav::HEADER_BYTES as u64) / 2) as usize
+    }
+
     /// Whether every member lies inside the sample, and the sample inside its shard.
     pub fn fits(&self, shard_bytes: u64) -> bool {
         let end = |offset: u64, size: u64| offset.checked_add(size);

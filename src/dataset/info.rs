@@ -1,5 +1,6 @@
 //! Description file `info.json`: the meaning of all numbers, for readers without this program.
 
+use super::index;
 use super::index::ShardRef;
 use super::sample::{N_KEYPOINTS, OPTIONAL_EXTENSIONS, WORDS_EXTENSION};
 use super::split::{Split, SplitBy, SplitRule, TimeBlock};
@@ -107,7 +108,9 @@ pub struct ModelUsed {
 pub struct SplitInfo {
     pub shards: Vec<ShardRef>,
     pub videos: Vec<String>,
+    #[serde(deserialize_with = "index::count")]
     pub samples: usize,
+    #[serde(deserialize_with = "index::count")]
     pub frames: usize,
     pub secs: f64,
 }

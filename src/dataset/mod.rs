@@ -16,6 +16,7 @@ pub mod layout;
 pub mod leakage;
 pub mod read;
 pub mod sample;
+pub mod shard_files;
 pub mod shared_sound;
 pub mod split;
 pub mod stats;

@@ -4,6 +4,7 @@
 use super::index::{ByteRange, SampleRef};
 use super::info::DatasetInfo;
 use super::sample::{N_KEYPOINTS, Sample, WORDS_EXTENSION};
+use super::shard_files::ShardFiles;
 use super::split::Split;
 use super::stats::DatasetStats;
 use super::{CHECKSUMS, INDEX, INFO, STATS};
@@ -12,7 +13,6 @@ use crate::formats::npy_slice::{Element, Layout};
 use crate::formats::transcript::Word;
 use crate::formats::wav;
 use crate::stage::workdir::FolderLock;
-use crate::types::file_name::FileName;
 use crate::types::pose3d::Motion;
 use crate::types::posture::Posture;
 use crate::types::skeleton::N_JOINTS;
@@ -32,7 +32,7 @@ pub struct Dataset {
     info: DatasetInfo,
     stats: DatasetStats,
     samples: Vec<SampleRef>,
-    shards: BTreeMap<FileName, File>,
+    shards: ShardFiles,
     /// Keeps the folder from being replaced, and its videos from being forgotten.
     _lock: FolderLock,
 }
@@ -71,19 +71,18 @@ impl Dataset {
         let mut shards = BTreeMap::new();
         for shard in info.shards() {
             let path = dir.join(&shard.file);
-            let file = File::open(&path).with_context(|| format!("opening the shard {}", path.display()))?;
-            let bytes = file.metadata().with_context(|| format!("looking at {}", path.display()))?.len();
+            let bytes = fs::metadata(&path).with_context(|| format!("looking at the shard {}", path.display()))?.len();
             ensure!(
                 bytes == shard.bytes,
                 "{} has {bytes} bytes, {} were written: the file is damaged; run the dataset stage again with --force",
                 path.display(),
                 shard.bytes
             );
-            shards.insert(shard.file.clone(), (file, bytes));
+            shards.insert(shard.file.clone(), bytes);
         }
         let samples = read_index(&dir.join(INDEX))?;
         for sample in &samples {
-            let fits = shards.get(&sample.shard).is_some_and(|(_, bytes)| sample.fits(*bytes));
+            let fits = shards.get(&sample.shard).is_some_and(|bytes| sample.fits(*bytes));
             ensure!(fits, "{}: {} lies outside its shard", dir.join(INDEX).display(), sample.key);
         }
         let n_samples: usize = info.splits.values().map(|split| split.samples).sum();
@@ -94,7 +93,7 @@ impl Dataset {
             samples.len(),
             dir.join(INFO).display()
         );
-        let shards = shards.into_iter().map(|(name, (file, _))| (name, file)).collect();
+        let shards = ShardFiles::new(&dir, shards.into_keys().collect());
         Ok(Dataset { dir, info, stats, samples, shards, _lock: lock })
     }
 
@@ -140,9 +139,9 @@ impl Dataset {
         let pose2d =
             npy_slice::floats(&self.rows(sample, sample.pose2d, Element::F32, &[N_KEYPOINTS, 3], frames.clone())?);
         let pose2d = Array3::from_shape_vec((frames.len(), N_KEYPOINTS, 3), pose2d).context("shaping keypoints")?;
-        let n_samples = (sample.wav.size.saturating_sub(wav::HEADER_BYTES as u64) / 2) as usize;
-        let sound = self.sound(sample, 0..n_samples)?;
-        let (key, words, posture) = (sample.key.to_string(), self.words(sample)?, self.posture(sample)?);
+        let sound = self.sound(sample, 0..sample.n_sound_samples())?;
+        let posture = self.posture(sample, frames.clone())?;
+        let (key, words) = (sample.key.to_string(), self.words(sample)?);
         let motion = self.motion(sample, frames)?;
         Ok(Sample { key, motion, pose2d, sound, words, posture, meta })
     }
@@ -154,17 +153,18 @@ impl Dataset {
         words.with_context(|| format!("reading {}.{WORDS_EXTENSION} in {}", sample.key, sample.shard))
     }
 
-    fn posture(&self, sample: &SampleRef) -> Result<Option<Posture>> {
+    /// Posture of these frames of a sample; only these are read, no hash is checked. `None`: the dataset has none.
+    pub fn posture(&self, sample: &SampleRef, frames: Range<usize>) -> Result<Option<Posture>> {
         let (Some(head), Some(trunk)) = (sample.head, sample.trunk) else { return Ok(None) };
         let angles = |range: ByteRange| -> Result<Array2<f32>> {
-            let bytes = self.rows(sample, range, Element::F32, &[3], 0..sample.n_frames)?;
-            Array2::from_shape_vec((sample.n_frames, 3), npy_slice::floats(&bytes)).context("shaping angles")
+            let bytes = self.rows(sample, range, Element::F32, &[3], frames.clone())?;
+            Array2::from_shape_vec((frames.len(), 3), npy_slice::floats(&bytes)).context("shaping angles")
         };
         Ok(Some(Posture { head: angles(head)?, trunk: angles(trunk)? }))
     }
 
     /// Motion of the frames `frames` of a sample; only these are read, no hash is checked.
-    fn motion(&self, sample: &SampleRef, frames: Range<usize>) -> Result<Motion> {
+    pub fn motion(&self, sample: &SampleRef, frames: Range<usize>) -> Result<Motion> {
         let n_frames = frames.len();
         let joints =
             npy_slice::floats(&self.rows(sample, sample.pose3d, Element::F32, &[N_JOINTS, 3], frames.clone())?);
@@ -177,7 +177,8 @@ impl Dataset {
         motion.in_range().with_context(|| format!("{} in {}", sample.key, self.dir.join(&sample.shard).display()))
     }
 
-    fn sound(&self, sample: &SampleRef, range: Range<usize>) -> Result<Sound> {
+    /// These samples of the sound of a sample; only these are read, no hash is checked.
+    pub fn sound(&self, sample: &SampleRef, range: Range<usize>) -> Result<Sound> {
         let place = || format!("reading {}.wav in {}", sample.key, self.dir.join(&sample.shard).display());
         let (rate, at) = (self.info.sound_rate, sample.wav.offset + wav::HEADER_BYTES as u64);
         let head = ByteRange { offset: sample.wav.offset, size: sample.wav.size.min(wav::HEADER_BYTES as u64) };
@@ -213,7 +214,7 @@ impl Dataset {
 
     fn bytes(&self, sample: &SampleRef, span: ByteRange) -> Result<Vec<u8>> {
         let place = || format!("reading {} in {}", sample.key, self.dir.join(&sample.shard).display());
-        let file = self.shards.get(&sample.shard).with_context(|| format!("{}: no such shard", place()))?;
+        let file = self.shards.get(&sample.shard).with_context(place)?;
         // Ranges lie inside the file (checked on opening and by the array headers), which bounds the allocation.
         ensure!(span.size <= sample.size, "{}: {} bytes of a smaller sample were asked for", place(), span.size);
         let mut bytes = vec![0; span.size as usize];

@@ -5,6 +5,7 @@ use super::baseline::baselines::Predictor;
 use super::clips::checkpoint::EvaluatedCheckpoint;
 use super::clips::clips;
 use super::clips::clips::EvalClips;
+use super::clips::motion_store::MotionStore;
 use super::clips::{of_speaker, pairs};
 use super::table::table;
 use super::table::table::Table;
@@ -25,7 +26,8 @@ pub struct Evaluation {
 
 impl Evaluation {
     /// Reads files of motion: `truth` and `prediction` are two files, or two folders whose files have the same names;
-    /// `audio` is a sound or a folder of sounds. `fps` is the rate of files that do not state one.
+    /// `audio` is a sound or a folder of sounds. `fps` is the rate of files that do not state one. `store` keeps
+    /// the motions.
     ///
     /// # Errors
     /// Files that do not belong together or cannot be read.
@@ -34,18 +36,19 @@ impl Evaluation {
         prediction: &Path,
         audio: Option<&Path>,
         fps: Option<FrameRate>,
+        store: &MotionStore,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let task = progress.begin("evaluating", 0);
         task.detail("reading");
         let found = pairs::find(truth, prediction, audio)?;
-        let mut clips = clips::read(&found.pairs, fps)?;
+        let mut clips = clips::read(&found.pairs, fps, store)?;
         if let Some(audio) = audio {
             ensure!(clips.have_sound() || audio.is_dir(), "{} holds no sound", audio.display());
         }
         clips.notes.splice(0..0, found.notes);
         let mut predictors = vec![Predictor::prediction(&clips, "the motion under test")];
-        let (others, left_out) = baselines::from_files(&clips)?;
+        let (others, left_out) = baselines::from_files(&clips, store)?;
         predictors.extend(others);
         clips.notes.extend(left_out);
         Ok(Self { clips, predictors })
@@ -57,15 +60,16 @@ impl Evaluation {
     ///
     /// # Errors
     /// No checkpoint, a split without samples, a dataset of another rate than a checkpoint's (that of a captured skeleton
-    /// is resampled).
+    /// is resampled). `store` keeps the motions.
     pub fn of_generators(
         dataset: &Dataset,
         checkpoints: &[EvaluatedCheckpoint],
         split: Split,
+        store: &MotionStore,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let task = progress.begin("evaluating", 0);
-        let (clips, predictors) = of_speaker::prepare(dataset, checkpoints, split, &*task)?;
+        let (clips, predictors) = of_speaker::prepare(dataset, checkpoints, split, store, &*task)?;
         Ok(Self { clips, predictors })
     }
 

@@ -1,10 +1,11 @@
 //! `timeline.npz`: the frames of a video at the dataset rate, one value each. Arrays: `source_secs` f64 [T], `repeated`
-//! bool [T], `shot_score` f64 [T], `restart` bool [T], `still` f32 [T].
+//! bool [T], `shot_score` f64 [T], `restart` bool [T], `still` f32 [T]; for a long video `span` bool [T].
 
 use super::npz;
 use super::npz::Npz;
 use anyhow::Result;
 use ndarray::aview1;
+use std::ops::Range;
 use std::path::Path;
 
 /// The frames of a video, one value each; all of the same length T.
@@ -18,6 +19,9 @@ pub struct Timeline {
     pub shot_score: Vec<f64>,
     /// Whether the score is high enough for tracking to begin anew.
     pub restart: Vec<bool>,
+    /// Whether a span begins that is worked on apart: tracking begins anew, and reading can begin at this frame. Never the
+    /// first one.
+    pub span: Vec<bool>,
     /// Mean change of the picture since the frame before, in steps of 8-bit colour; 0 where it is repeated.
     pub frame_difference: Vec<f32>,
 }
@@ -26,6 +30,13 @@ impl Timeline {
     /// Number of frames T.
     pub fn n_frames(&self) -> usize {
         self.repeated.len()
+    }
+
+    /// The spans of frames that are worked on apart, in order: all frames together.
+    pub fn spans(&self) -> Vec<Range<usize>> {
+        let starts = self.span.iter().enumerate().filter(|(idx, starts)| **starts && *idx > 0).map(|(idx, _)| idx);
+        let bounds: Vec<usize> = std::iter::once(0).chain(starts).chain([self.n_frames()]).collect();
+        bounds.windows(2).map(|pair| pair[0]..pair[1]).collect()
     }
 
     /// Reads `timeline.npz`. Errors name the file and the array that is missing or of another length.
@@ -38,6 +49,11 @@ impl Timeline {
             shot_score: npz.numbers("shot_score", &length)?.into_iter().collect(),
             restart: npz.bools("restart", &length)?.into_iter().collect(),
             frame_difference: npz.floats("still", &length)?.into_iter().collect(),
+            // Earlier versions had none.
+            span: match npz.has("span") {
+                true => npz.bools("span", &length)?.into_iter().collect(),
+                false => vec![false; repeated.len()],
+            },
             repeated,
         })
     }
@@ -49,6 +65,9 @@ impl Timeline {
             npz.add_array("repeated", &aview1(&self.repeated))?;
             npz.add_array("shot_score", &aview1(&self.shot_score))?;
             npz.add_array("restart", &aview1(&self.restart))?;
+            if self.span.contains(&true) {
+                npz.add_array("span", &aview1(&self.span))?;
+            }
             npz.add_array("still", &aview1(&self.frame_difference))
         })
     }
@@ -67,6 +86,7 @@ mod tests {
             repeated: vec![false, true],
             shot_score: vec![0.0, 0.75],
             restart: vec![false, true],
+            span: vec![false, true],
             frame_difference: vec![0.0, 2.5],
         };
         timeline.write(&path).unwrap();

@@ -28,13 +28,17 @@ pub enum Representation {
 impl Representation {
     /// `bones`, with mean and deviation of the unit directions of these poses (as [`Normalisation::numbers`] gives them)
     /// over the frames where both ends of the bone are seen.
-    pub fn bones<'a>(
+    ///
+    /// # Errors
+    /// The first of the poses.
+    pub fn bones(
         normal: &Normalisation,
-        poses: impl Iterator<Item = (ArrayView2<'a, f32>, ArrayView2<'a, bool>)>,
-    ) -> Self {
+        poses: impl Iterator<Item = anyhow::Result<(Array2<f32>, Array2<bool>)>>,
+    ) -> anyhow::Result<Self> {
         let (mut n, mut sum, mut squares) = ([0.0f64; N_BONES], [0.0f64; N_FEATURES], [0.0f64; N_FEATURES]);
-        for (features, mask) in poses {
-            let joints = normal.joints(features);
+        for pose in poses {
+            let (features, mask) = pose?;
+            let joints = normal.joints(features.view());
             for (t, joints) in joints.outer_iter().enumerate() {
                 let seen = |joint: usize| joint == NECK || mask[[joint - 1, t]];
                 for joint in (1..N_JOINTS).filter(|joint| !is_duplicate(*joint) && seen(*joint)) {
@@ -58,7 +62,7 @@ impl Representation {
             n => (sum[i] / n, (squares[i] / n - (sum[i] / n).powi(2)).max(0.0).sqrt().max(LEAST_STD)),
         };
         let (mean, std) = (0..N_FEATURES).map(of).map(|(mean, std)| (mean as f32, std as f32)).unzip();
-        Self::Bones { mean, std }
+        Ok(Self::Bones { mean, std })
     }
 
     /// The name in the configuration.
@@ -235,7 +239,7 @@ mod tests {
     fn gradients_are_right() -> anyhow::Result<()> {
         let normal = normal();
         let (features, mask) = poses(&normal);
-        let bones = Representation::bones(&normal, [(features.view(), mask.view())].into_iter());
+        let bones = Representation::bones(&normal, [Ok((features.clone(), mask.clone()))].into_iter())?;
         let decoder = bones.decoder(&normal, DType::F64, &Device::Cpu)?;
         for n_channels in [0, 2] {
             let numbers = pattern(&[2, N_FEATURES + 3 * n_channels, 2], 0.0)?;
@@ -251,7 +255,7 @@ mod tests {
     fn tensors_and_arrays_agree_and_bones_keep_their_lengths() -> anyhow::Result<()> {
         let normal = normal();
         let (features, mask) = poses(&normal);
-        let bones = Representation::bones(&normal, [(features.view(), mask.view())].into_iter());
+        let bones = Representation::bones(&normal, [Ok((features.clone(), mask.clone()))].into_iter())?;
         bones.check()?;
         let raw = pattern(&[1, N_FEATURES, 50], 0.0)?.affine(6.0, 0.0)?.to_dtype(DType::F32)?;
         let decoded = bones.decoder(&normal, DType::F32, &Device::Cpu)?.poses(&raw)?.flatten_all()?.to_vec1::<f32>()?;
@@ -273,7 +277,7 @@ mod tests {
     fn directions_of_the_data_give_the_data_back() -> anyhow::Result<()> {
         let normal = normal();
         let (features, mask) = poses(&normal);
-        let bones = Representation::bones(&normal, [(features.view(), mask.view())].into_iter());
+        let bones = Representation::bones(&normal, [Ok((features.clone(), mask.clone()))].into_iter())?;
         let Representation::Bones { mean, std } = &bones else { anyhow::bail!("not bones") };
         let joints = normal.joints(features.view());
         let raw = Array2::from_shape_fn((N_FEATURES, features.ncols()), |(i, t)| {

@@ -22,6 +22,8 @@ pub mod study {}
 pub mod models {}
 #[doc = include_str!("configuration.md")]
 pub mod configuration {}
+#[doc = include_str!("cluster.md")]
+pub mod cluster {}
 #[doc = include_str!("security.md")]
 pub mod security {}
 #[doc = include_str!("architecture.md")]

@@ -18,7 +18,7 @@ macro_rules! topic {
 }
 
 /// Every page, in reading order.
-pub const TOPICS: [Topic; 12] = [
+pub const TOPICS: [Topic; 13] = [
     topic!("dataset", "files of a dataset, splits, the account of every second, import and removal"),
     topic!("lifting", "2D keypoints to 3D joints: input, output, errors, a lifter of your own"),
     topic!("keypoints", "keypoints of OpenPose, MMPose, AlphaPose, MediaPipe and PATS in place of videos"),
@@ -28,6 +28,7 @@ pub const TOPICS: [Topic; 12] = [
     topic!("study", "user studies: the study file, clips and films, the page, the answers and what they say"),
     topic!("models", "the pose models: origin, licences, fetching, adding one"),
     topic!("configuration", "pipeline.toml, --set, the work folder, exit codes, JSON output"),
+    topic!("cluster", "many machines on one work folder: plan, workers, Slurm, Kubernetes, ssh"),
     topic!("security", "what is trusted: the sandbox of videos, files, network, forgetting, locks"),
     topic!("architecture", "the rooms of the source, and the way of a frame through them"),
     topic!("contributing", "building, tests, real data, rules of the source"),

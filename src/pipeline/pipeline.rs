@@ -1,9 +1,13 @@
 //! The pipeline as a value: a configuration with the videos it names, to be run and asked how it stands.
 
+use super::process::SeparateStage;
+use super::stages;
 use crate::config::videos::Videos;
 use crate::config::{Config, videos};
 use crate::stage::artifacts;
+use crate::stage::artifacts::StageName;
 use crate::stage::fingerprint::HashCache;
+use crate::stage::{Stage, Unit};
 use anyhow::{Result, ensure};
 use std::path::{Path, PathBuf};
 
@@ -30,6 +34,24 @@ impl Pipeline {
     /// no: `program` is the program `orator`. Without it a run reads them in this process.
     pub fn with_processes(self, program: PathBuf) -> Self {
         Self { program: Some(program), ..self }
+    }
+
+    /// This pipeline with the program of another.
+    pub fn like(self, other: &Self) -> Self {
+        Self { program: other.program.clone(), ..self }
+    }
+
+    /// Another configuration and other videos with the same program.
+    pub(super) fn with(&self, config: Config, videos: Vec<Videos>) -> Self {
+        Self { config, videos, program: self.program.clone() }
+    }
+
+    /// Videos worked on side by side: so many as asked for, else as the configuration says; 0 is one a processor core.
+    pub fn jobs(&self, asked: Option<usize>) -> usize {
+        match asked.unwrap_or(self.config.settings.work.jobs) {
+            0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
+            n => n,
+        }
     }
 
     /// The configuration.
@@ -60,8 +82,19 @@ impl Pipeline {
         self.program.as_deref().filter(|_| self.config.settings.work.sandbox)
     }
 
+    /// The stage; one that hands foreign files to foreign libraries does so in processes of their own, where the pipeline
+    /// has a program for them. The last two stages read what the first three wrote, in Rust alone.
+    pub(super) fn stage(&self, name: StageName, ready: &[Unit]) -> Result<Box<dyn Stage + '_>> {
+        let (config, videos) = (self.config(), self.all_videos());
+        let stage = stages::build(name, config, videos, ready)?;
+        Ok(match self.program() {
+            Some(program) if name < StageName::Lift => Box::new(SeparateStage { stage, program, config, videos }),
+            _ => stage,
+        })
+    }
+
     /// The hashes of files that are known from earlier runs.
-    pub(super) fn hashes(&self) -> HashCache {
+    pub fn hashes(&self) -> HashCache {
         HashCache::open(&artifacts::hashes(&self.config.settings.work.dir))
     }
 }

@@ -2,10 +2,11 @@
 
 use super::pipeline::Pipeline;
 use super::pose2d::models;
-use super::process::SeparateStage;
 use super::segment::speech_rule::SpeechListener;
 use super::selection::Selection;
 use super::stages;
+use super::timing::{StageClock, StageTime};
+use super::watched_stage::{UnitWork, WatchedStage};
 use crate::config::videos::Videos;
 use crate::external::onnx::ModelStore;
 use crate::stage::artifacts::{StageName, speaker_dir};
@@ -31,6 +32,9 @@ pub struct RunReport {
     pub units: Vec<UnitReport>,
     /// Folders of the datasets that stand.
     pub datasets: Vec<PathBuf>,
+    /// How long each stage worked on each unit.
+    #[serde(skip)]
+    pub times: Vec<StageTime>,
     /// Number of speakers chosen.
     #[serde(skip)]
     pub n_speakers: usize,
@@ -114,10 +118,7 @@ impl Pipeline {
             // What is on record of a dataset counts before its turn comes.
             workdir::recover_folder(&speaker_dir(&settings.work.dir, StageName::Dataset, &videos.speaker))?;
         }
-        let jobs = match selection.jobs.unwrap_or(settings.work.jobs) {
-            0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
-            n => n,
-        };
+        let jobs = self.jobs(selection.jobs);
         if let Some(line) = SpeechListener::advice(settings)?.filter(|_| selection.has(StageName::Segment)) {
             progress.event(&Event::Advice { line });
         }
@@ -162,28 +163,21 @@ struct StageRun<'a> {
     report: RunReport,
 }
 
-impl<'a> StageRun<'a> {
-    /// The stage; one that hands foreign files to foreign libraries does so in processes of their own, where the pipeline
-    /// has a program for them. The last two stages read what the first three wrote, in Rust alone.
-    fn stage(&self, name: StageName, ready: &[Unit]) -> Result<Box<dyn Stage + 'a>> {
-        let (config, videos) = (self.pipeline.config(), self.pipeline.all_videos());
-        let stage = stages::build(name, config, videos, ready)?;
-        Ok(match self.pipeline.program() {
-            Some(program) if name < StageName::Lift => Box::new(SeparateStage { stage, program, config, videos }),
-            _ => stage,
-        })
-    }
-
+impl StageRun<'_> {
     /// Runs stages that have the same units, for everything alive; what fails is not alive for later ones. Gives the
     /// speakers of what failed.
     fn stages(&mut self, names: &[StageName], ready: &[Unit], alive: &mut [Videos]) -> Result<Vec<String>> {
         let Some(&first) = names.first() else { return Ok(Vec::new()) };
         let config = self.pipeline.config();
         let units: Vec<Unit> = alive.iter().flat_map(|videos| stages::units(first, config, videos)).collect();
-        let stages = names.iter().map(|name| self.stage(*name, ready)).collect::<Result<Vec<_>>>()?;
-        let stages: Vec<&dyn Stage> = stages.iter().map(|stage| &**stage).collect();
+        let clock = StageClock::default();
+        let around = |stage: &'static str, unit: &Unit, work: UnitWork<'_>| clock.time(stage, unit, work);
+        let timed = |name: &StageName| Ok(WatchedStage { stage: self.pipeline.stage(*name, ready)?, around: &around });
+        let stages = names.iter().map(timed).collect::<Result<Vec<_>>>()?;
+        let stages: Vec<&dyn Stage> = stages.iter().map(|stage| stage as &dyn Stage).collect();
         let work = &config.settings.work.dir;
         let ended = runner::run_stages(&stages, &units, work, self.hashes, self.limits, self.progress);
+        self.report.times.extend(clock.take());
         self.hashes.save()?;
         for name in names {
             self.report.stages.entry(*name).or_default();

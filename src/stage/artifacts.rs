@@ -82,6 +82,8 @@ pub enum Artifact {
     /// The folder of the frames as PNG, if asked for.
     Frames,
     Keypoints,
+    /// What was seen in a part of a long video, until all parts are there.
+    PoseSpan,
     /// Shape of the face and colours of the person; absent where no face was seen. So is the next.
     Portrait,
     /// The face, seen from the front.
@@ -104,7 +106,7 @@ impl Artifact {
     pub const fn stage(self) -> StageName {
         match self {
             Self::Sound | Self::Timeline | Self::MediaInfo | Self::Frames => StageName::Extract,
-            Self::Keypoints | Self::Portrait | Self::FacePicture => StageName::Pose2d,
+            Self::Keypoints | Self::PoseSpan | Self::Portrait | Self::FacePicture => StageName::Pose2d,
             Self::Measures | Self::SoundOffset | Self::SegmentIntervals | Self::SegmentLedger => StageName::Segment,
             Self::Joints | Self::Bones | Self::Camera | Self::BoneChange | Self::LiftIntervals | Self::LiftLedger => {
                 StageName::Lift
@@ -120,6 +122,7 @@ impl Artifact {
             Self::MediaInfo => "media.json",
             Self::Frames => "frames",
             Self::Keypoints => "keypoints.npz",
+            Self::PoseSpan => "span.msgpack",
             Self::Portrait => "portrait.json",
             Self::FacePicture => "face.png",
             Self::Measures => "measures.npz",

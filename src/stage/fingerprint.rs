@@ -65,8 +65,7 @@ struct KnownHash {
 impl HashCache {
     /// Reads what is known from `file`; a missing or damaged file knows nothing.
     pub fn open(file: &Path) -> Self {
-        let known = fs::read(file).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default();
-        Self { file: file.to_owned(), known: Mutex::new(known), saved: Mutex::new(Instant::now()) }
+        Self { file: file.to_owned(), known: Mutex::new(read_known(file)), saved: Mutex::new(Instant::now()) }
     }
 
     /// BLAKE3 of the content of `path`, in hex; of a folder as `hash_file` says.
@@ -85,10 +84,11 @@ impl HashCache {
         Ok(hash)
     }
 
-    /// Keeps what is known for the next run.
+    /// Keeps what is known for the next run, beside what other programs have kept meanwhile.
     pub fn save(&self) -> Result<()> {
-        let bytes = serde_json::to_vec(&*self.known())?;
-        workdir::write_file(&self.file, &bytes)
+        let mut kept = read_known(&self.file);
+        kept.extend(self.known().clone());
+        workdir::write_file(&self.file, &serde_json::to_vec(&kept)?)
     }
 
     /// Saves once a minute at most, so that a long run that is killed has not hashed for nothing.
@@ -104,6 +104,10 @@ impl HashCache {
     fn known(&self) -> std::sync::MutexGuard<'_, BTreeMap<String, KnownHash>> {
         self.known.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     }
+}
+
+fn read_known(file: &Path) -> BTreeMap<String, KnownHash> {
+    fs::read(file).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default()
 }
 
 /// Bytes of a file, and its time of change in ns; of a folder the sum over its files, and a digest of their names and

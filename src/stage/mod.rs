@@ -2,15 +2,18 @@
 //! `record::Record` written last. `artifacts` has the names of the five stages and of their files.
 
 pub mod artifacts;
+pub mod attempt;
 pub mod fingerprint;
 pub mod ledger;
 pub mod overall;
+pub mod parts;
 pub mod progress;
 pub mod record;
 pub mod refusal;
 pub mod runner;
 pub mod unit;
 pub mod workdir;
+pub mod wrapper;
 
 pub use unit::Input;
 pub use unit::Report;
@@ -18,3 +21,4 @@ pub use unit::Stage;
 pub use unit::Unit;
 pub use unit::counted;
 pub use unit::write_json;
+pub use wrapper::StageWrapper;

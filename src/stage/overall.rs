@@ -35,6 +35,12 @@ impl<'a> OverallProgress<'a> {
         UnitProgress { overall: self, label, left: Mutex::new(work(stage, unit)) }
     }
 
+    /// What the stage reports its work on a part of the unit to.
+    pub fn of_part(&'a self, stage: &dyn Stage, unit: &Unit, part: usize, n_parts: usize) -> UnitProgress<'a> {
+        let label = format!("{} {unit} {} of {n_parts}", stage.name(), part + 1);
+        UnitProgress { overall: self, label, left: Mutex::new(work(stage, unit) / n_parts.max(1) as f64) }
+    }
+
     /// The unit needs no work at these stages, or gets none.
     pub fn skip(&self, stages: &[&dyn Stage], unit: &Unit) {
         self.count(stages.iter().map(|stage| work(*stage, unit)).sum(), |task, steps| task.skip(steps));
@@ -69,6 +75,12 @@ pub struct UnitProgress<'a> {
 }
 
 impl UnitProgress<'_> {
+    /// No work is needed.
+    pub fn skip(&self) {
+        let Ok(mut left) = self.left.lock() else { return };
+        self.overall.count(std::mem::take(&mut *left), |task, steps| task.skip(steps));
+    }
+
     fn count(&self, work: f64) {
         let Ok(mut left) = self.left.lock() else { return };
         let work = work.min(*left);

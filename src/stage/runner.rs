@@ -1,14 +1,15 @@
 //! Runs stages over units: what is fresh is skipped, the rest is worked on by several workers, a failed unit does not
 //! stop the others. What a unit makes does not depend on who made it.
 
+use super::attempt::{attempt, guarded};
 use super::fingerprint::{Fingerprint, HashCache};
 use super::overall::OverallProgress;
+use super::parts::{AtUnits, Crew, PartedWork, remove_parts};
 use super::progress::{Event, Progress};
-use super::record::{DirtyReason, Failure, Output, Record};
+use super::record::{DirtyReason, Failure, Record};
 use super::workdir::FolderLock;
-use super::{Report, Stage, Unit, workdir};
-use anyhow::{Context, Result, anyhow};
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use super::{Report, Stage, Unit};
+use anyhow::{Result, anyhow};
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
@@ -20,6 +21,11 @@ pub enum State {
     Stale(DirtyReason),
     Failed(String),
 }
+
+/// Work that was laid aside since somebody else has it now: no failure of the unit.
+#[derive(Clone, Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct Abandoned(pub String);
 
 /// How a unit came out of a run.
 #[derive(Clone, Debug)]
@@ -78,12 +84,15 @@ pub fn run_stages(
     let ended: Vec<Mutex<Vec<StageOutcome>>> = units.iter().map(|_| Mutex::new(Vec::new())).collect();
     let overall = OverallProgress::begin(stages, units, progress);
     let order = largest_first(units);
+    let crew = Crew::new(jobs.max(1));
     std::thread::scope(|scope| {
-        for _ in 0..jobs.clamp(1, units.len().max(1)) {
+        for _ in 0..jobs.max(1) {
             scope.spawn(|| {
+                let at_units = AtUnits(&crew);
                 while let Some(&at) = order.get(next.fetch_add(1, Ordering::SeqCst)) {
                     for (idx, stage) in stages.iter().enumerate() {
-                        let answer = run_unit(*stage, &units[at], work, hashes, force, &overall);
+                        let place = (work, hashes, force);
+                        let answer = run_unit(*stage, &units[at], place, &crew, &overall);
                         report(&answer, *stage, &units[at], progress);
                         let has_failed = matches!(answer, StageOutcome::Failed(_));
                         if let Ok(mut answers) = ended[at].lock() {
@@ -96,6 +105,8 @@ pub fn run_stages(
                     }
                     hashes.save_now_and_then();
                 }
+                drop(at_units);
+                crew.help();
             });
         }
     });
@@ -107,6 +118,34 @@ pub fn run_stages(
         answers
     };
     answers.map(whole).collect()
+}
+
+/// Does share `idx` of `of` of the unit's parts, those that are not done; nothing where the stage has no parts or the unit
+/// is fresh.
+///
+/// # Errors
+/// An input that cannot be read; the first part that fails.
+pub fn run_parts(
+    stage: &dyn Stage,
+    unit: &Unit,
+    (idx, of): (usize, usize),
+    work: &Path,
+    hashes: &HashCache,
+    progress: &dyn Progress,
+) -> Result<()> {
+    if matches!(state(stage, unit, work, hashes), State::Fresh(_)) {
+        return Ok(());
+    }
+    let fingerprint = Fingerprint::now(stage, unit, hashes)?;
+    let n_parts = stage.n_parts(unit)?;
+    if n_parts < 2 {
+        return Ok(());
+    }
+    let overall = OverallProgress::begin(&[stage], std::slice::from_ref(unit), progress);
+    let folder = unit.dir(&work.join(stage.name()));
+    let parts = PartedWork { stage, unit, n_parts, fingerprint, folder, overall: &overall };
+    let bound = |idx: usize| idx * n_parts / of.max(1);
+    (bound(idx)..bound(idx + 1)).try_for_each(|part| guarded(|| parts.work_on(part)))
 }
 
 /// Indices of the units, those of large files first.
@@ -128,13 +167,12 @@ fn report(answer: &StageOutcome, stage: &dyn Stage, unit: &Unit, progress: &dyn 
     }
 }
 
-fn run_unit(
-    stage: &dyn Stage,
-    unit: &Unit,
-    work: &Path,
-    hashes: &HashCache,
-    force: bool,
-    overall: &OverallProgress,
+fn run_unit<'a>(
+    stage: &'a dyn Stage,
+    unit: &'a Unit,
+    (work, hashes, force): (&Path, &HashCache, bool),
+    crew: &Crew<'a>,
+    overall: &'a OverallProgress<'a>,
 ) -> StageOutcome {
     let folder = unit.dir(&work.join(stage.name()));
     let fingerprint = match guarded(|| Fingerprint::now(stage, unit, hashes)) {
@@ -149,58 +187,45 @@ fn run_unit(
         && record.dirty(&fingerprint, stage.common_folder().unwrap_or(&folder)).is_none()
     {
         overall.skip(&[stage], unit);
-        // An earlier program may have left one that is over; where it cannot be removed, the record still counts.
-        let _ = Failure::forget(&folder);
+        // An earlier program may have left one that is over, a killed one the parts; where they cannot be removed, the
+        // record still counts.
+        let _ = Failure::forget(&folder).and_then(|()| remove_parts(&folder));
         return StageOutcome::Skipped(Report { line: record.line, facts: record.facts });
     }
-    match guarded(|| attempt(stage, unit, &folder, &fingerprint, &overall.of(stage, unit))) {
+    let work = || {
+        if force {
+            remove_parts(&folder)?;
+        }
+        let n_parts = stage.n_parts(unit)?;
+        if n_parts < 2 {
+            let _lock = stage.is_read_long().then(|| FolderLock::exclusive(&folder)).transpose()?;
+            let progress = overall.of(stage, unit);
+            return attempt(&folder, stage.common_folder(), &fingerprint, |out| stage.run(unit, out, &progress));
+        }
+        let (fingerprint, folder) = (fingerprint.clone(), folder.clone());
+        let parts = crew.work(PartedWork {
+            stage,
+            unit,
+            n_parts,
+            fingerprint: fingerprint.clone(),
+            folder: folder.clone(),
+            overall,
+        })?;
+        let report = attempt(&folder, None, &fingerprint, |out| stage.join(unit, &parts, out))?;
+        // What cannot be removed now is removed by the next run.
+        let _ = remove_parts(&folder);
+        Ok(report)
+    };
+    match guarded(work) {
         Ok(report) => StageOutcome::Done(report),
         Err(error) => failed(&folder, Some(fingerprint), error),
     }
 }
 
-/// Runs a stage's code. A panic is a defect, but one video must not take the night's run with it.
-pub fn guarded<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
-    let caught = catch_unwind(AssertUnwindSafe(work));
-    caught.unwrap_or_else(|panic| Err(anyhow!("internal error: {}", panic_text(&*panic))))
-}
-
-fn attempt(
-    stage: &dyn Stage,
-    unit: &Unit,
-    folder: &Path,
-    fingerprint: &Fingerprint,
-    progress: &dyn Progress,
-) -> Result<Report> {
-    let _lock = stage.is_read_long().then(|| FolderLock::exclusive(folder)).transpose()?;
-    let attempt = workdir::attempt_folder(folder)?;
-    let finish = || -> Result<Report> {
-        let report = stage.run(unit, &attempt, progress).map_err(workdir::full_disk)?;
-        let outputs = Output::list(&attempt)?;
-        // An old record must not speak for new files, should this run be killed before it writes its own.
-        Record::forget(folder)?;
-        match stage.common_folder() {
-            Some(common) => workdir::move_files(&attempt, common, outputs.iter().map(|output| output.file.as_str()))?,
-            None => workdir::replace_folder(&attempt, folder)?,
-        }
-        let Report { line, facts } = report.clone();
-        Record { fingerprint: fingerprint.clone(), outputs, line, facts }.write(folder).context("cannot record it")?;
-        Ok(report)
-    };
-    let finished = finish();
-    if finished.is_err() {
-        let _ = std::fs::remove_dir_all(&attempt);
-    }
-    finished
-}
-
 fn failed(folder: &Path, fingerprint: Option<Fingerprint>, error: anyhow::Error) -> StageOutcome {
-    // The failure is shown either way; where even this cannot be written the work folder itself is the trouble.
-    let _ = Failure { fingerprint, error: format!("{error:#}") }.write(folder);
+    if !error.is::<Abandoned>() {
+        // The failure is shown either way; where even this cannot be written the work folder itself is the trouble.
+        let _ = Failure { fingerprint, error: format!("{error:#}") }.write(folder);
+    }
     StageOutcome::Failed(Arc::new(error))
-}
-
-fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {
-    let text = panic.downcast_ref::<String>().cloned();
-    text.or_else(|| panic.downcast_ref::<&str>().map(|s| (*s).to_owned())).unwrap_or_else(|| "no message".to_owned())
 }

@@ -71,6 +71,19 @@ pub trait Stage: Sync {
     }
     /// Does the work: writes its files into the empty folder `out` and nowhere else.
     fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> anyhow::Result<Report>;
+    /// The number of parts in which the work on `unit` can be done, in any order and by anybody; with `join` that gives the
+    /// bytes of `run`.
+    fn n_parts(&self, _unit: &Unit) -> anyhow::Result<usize> {
+        Ok(1)
+    }
+    /// Does a part of the work, from 0: writes its files into the empty folder `out` and nowhere else.
+    fn run_part(&self, unit: &Unit, part: usize, _out: &Path, _progress: &dyn Progress) -> anyhow::Result<()> {
+        anyhow::bail!("{} of {unit} has no part {part}", self.name())
+    }
+    /// Makes the unit's files in the empty folder `out` of the folders of all `parts`, in order.
+    fn join(&self, unit: &Unit, parts: &[PathBuf], _out: &Path) -> anyhow::Result<Report> {
+        anyhow::bail!("{} of {unit} has no {} parts", self.name(), parts.len())
+    }
 }
 
 /// Writes a file of a stage into its `out` folder as JSON for people.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// 8-bit RGB, rows from the top without padding: `data.len() == 3 * width * height`.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Image {
     pub width: usize,
     pub height: usize,

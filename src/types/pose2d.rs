@@ -2,6 +2,7 @@
 
 use super::time::FrameRate;
 use ndarray::Array3;
+use serde::{Deserialize, Serialize};
 
 /// Points of a body, COCO-17: nose, left/right eye, ear, shoulder, elbow, wrist, hip, knee, ankle (odd = left).
 pub const N_BODY: usize = 17;
@@ -40,7 +41,7 @@ pub struct Keypoint {
 }
 
 /// A box of the picture in pixels, top left corner and size, with the detector's score.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PersonBox {
     pub x: f32,
     pub y: f32,
@@ -71,7 +72,7 @@ pub struct Pose2d {
 }
 
 /// What is seen of a face.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FaceSeen {
     /// How sure it is that there is a face, 0..1.
     pub score: f32,

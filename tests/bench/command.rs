@@ -3,7 +3,7 @@
 use super::bodies::{animate, render};
 use super::report::{Bars, Report};
 use super::training::{lifter, seq2seq, train};
-use super::{dataset, evaluate, generate, lift, pose2d, run, scale, spaces, study};
+use super::{claims, cluster, dataset, evaluate, generate, lift, pose2d, run, scale, spaces, study};
 use anyhow::{Context, Result};
 use clap::{CommandFactory, Parser, Subcommand};
 use orator::stage::progress::Progress;
@@ -27,6 +27,8 @@ pub struct Cli {
 #[derive(Subcommand)]
 enum Part {
     Animate(animate::Args),
+    Claims(claims::Args),
+    Cluster(cluster::Args),
     Pose2d(pose2d::Args),
     Dataset(dataset::Args),
     Evaluate(evaluate::Args),
@@ -46,6 +48,8 @@ impl Part {
     fn measure(&self, progress: &dyn Progress) -> Result<Report> {
         match self {
             Part::Animate(args) => animate::run(args, progress),
+            Part::Claims(args) => claims::run(args, progress),
+            Part::Cluster(args) => cluster::run(args, progress),
             Part::Pose2d(args) => pose2d::run(args, progress),
             Part::Dataset(args) => dataset::run(args, progress),
             Part::Evaluate(args) => evaluate::run(args, progress),

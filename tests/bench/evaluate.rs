@@ -7,7 +7,8 @@ use ndarray::{Array2, Array3};
 use orator::demo::rule::dataset::{RULE, SpokenClip as Rule};
 use orator::evaluate::baseline::baselines;
 use orator::evaluate::baseline::baselines::Predictor;
-use orator::evaluate::clips::clips::{ClipAudio, EvalClip, EvalClips, compared, pcm};
+use orator::evaluate::clips::clips::{EvalClip, EvalClips, compared};
+use orator::evaluate::clips::motion_store::{MotionStore, StoredMotion};
 use orator::evaluate::clips::sound_features;
 use orator::evaluate::table::{result, table};
 use orator::evaluate::verdict::text;
@@ -129,14 +130,14 @@ fn evaluate(speaker: Vec<Unheard>, watch: &Stopwatch) -> Result<(table::Table, S
         let Unheard { ground_truth, mask, mut predicted, sound } = unheard;
         let features = Some(sound_features::from_samples(&sound.samples, FPS, ground_truth.shape()[0]));
         let (mask, _) = compared(&ground_truth, &mask, &mut predicted);
-        let audio = Some(ClipAudio::Kept(sound.samples.into_iter().map(pcm).collect()));
-        EvalClip { name: format!("clip {number}"), ground_truth, predicted, mask, features, audio }
+        let (ground_truth, predicted) = (StoredMotion::Held(ground_truth), StoredMotion::Held(predicted));
+        EvalClip { name: format!("clip {number}"), ground_truth, predicted, mask, features, audio: None }
     };
     let clips = speaker.into_par_iter().enumerate().map(clip).collect();
     let clips = EvalClips { fps: FPS, clips, notes: Vec::new(), learnt: false, channels: Vec::new() };
     watch.detail("making the baselines");
     let mut predictors = vec![Predictor::prediction(&clips, "what the rule alone would do")];
-    predictors.extend(baselines::from_files(&clips)?.0);
+    predictors.extend(baselines::from_files(&clips, &MotionStore::in_memory())?.0);
     let table = table::measure(&clips, &MetricSettings::default(), &predictors, watch)?;
     watch.detail("the verdict and the JSON");
     let length = text::text(&table, true).len() + result::json(&table).to_string().len();

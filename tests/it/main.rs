@@ -5,10 +5,11 @@
 
 mod animate;
 /// The benchmark's own modules, so that its parts are tested without a release build.
-#[path = "../bench/main.rs"]
+#[path = "../bench/mod.rs"]
 #[allow(dead_code)]
 mod bench;
 mod cli;
+mod cluster;
 mod convert;
 mod dataset;
 mod evaluate;

@@ -276,6 +276,12 @@ fn measure(dir: &Path, ui: &Ui) -> Result<Outcome> {
         m.n_drawn,
         100.0 * m.joints
     );
+    text += &m.more_secs.map_or(String::new(), |more| {
+        format!(
+            "to train on: {:.0} s that came through the videos, {more:.0} s of the same figure without video\n",
+            m.train_secs
+        )
+    });
     let good = m.good();
     let met = if good { "met" } else { "MISSED" };
     let generator =
@@ -298,7 +304,7 @@ fn measure(dir: &Path, ui: &Ui) -> Result<Outcome> {
         "mm": mm(&m.lifted), "mean_pose_mm": mm(&m.mean_pose), "mean_depth_mm": mm(&m.mean_depth),
         "bone_depth_mm": mm(&m.bone_depth), "joints": m.joints, "shoulders_px": m.shoulders_px,
         "generator": generator,
-        "n_frames": m.n_frames, "n_drawn": m.n_drawn, "good": good,
+        "n_frames": m.n_frames, "n_drawn": m.n_drawn, "good": good, "train_secs": m.train_secs, "more_secs": m.more_secs,
     });
     ui.summary(&text, None, facts);
     Ok(if good { Outcome::Done } else { Outcome::SomeFailed })

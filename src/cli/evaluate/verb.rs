@@ -9,6 +9,7 @@ use anyhow::{Result, bail, ensure};
 use orator::dataset::{Dataset, Split};
 use orator::evaluate::Evaluation;
 use orator::evaluate::clips::checkpoint::EvaluatedCheckpoint;
+use orator::evaluate::clips::motion_store::{HELD_BYTES, MotionStore};
 use orator::evaluate::table::result;
 use orator::evaluate::verdict::text;
 use orator::metrics::settings::Convention;
@@ -116,6 +117,9 @@ fn check_report(args: &MotionArgs) -> Result<()> {
 
 fn motion(args: &MotionArgs, ui: &Ui) -> Result<Outcome> {
     check_report(args)?;
+    // The folder of a dataset is one that this process writes in (its lock is there).
+    let in_dataset = |folder: &PathBuf| MotionStore::in_folder(folder, HELD_BYTES);
+    let store = args.dataset.as_ref().map_or_else(MotionStore::in_memory, in_dataset);
     let settings = MetricSettings {
         convention: args.convention,
         alphas: args.alpha.clone(),
@@ -125,7 +129,7 @@ fn motion(args: &MotionArgs, ui: &Ui) -> Result<Outcome> {
     // The page names what was read, so that nothing of it is forgotten before the page is written.
     let _dataset = args.dataset.as_deref().map(FolderLock::shared).transpose()?;
     let _models: Vec<FolderLock> = args.checkpoint.iter().map(|path| model_lock(path)).collect::<Result<_>>()?;
-    let evaluation = evaluation(args, ui)?;
+    let evaluation = evaluation(args, &store, ui)?;
     let table = evaluation.measure(&settings, ui)?;
     let mut facts: Value = result::json(&table);
     let mut text = text::text(&table, args.all);
@@ -153,14 +157,14 @@ fn title(args: &MotionArgs) -> String {
 }
 
 /// What is measured, from files or from a dataset.
-fn evaluation(args: &MotionArgs, ui: &Ui) -> Result<Evaluation> {
+fn evaluation(args: &MotionArgs, store: &MotionStore, ui: &Ui) -> Result<Evaluation> {
     if let Some(dataset) = &args.dataset {
         let dataset = Dataset::open(dataset)?;
         let checkpoints = EvaluatedCheckpoint::open_all(&args.checkpoint, &dataset.info().speaker)?;
-        return Evaluation::of_generators(&dataset, &checkpoints, args.split, ui);
+        return Evaluation::of_generators(&dataset, &checkpoints, args.split, store, ui);
     }
     let (Some(truth), Some(prediction)) = (&args.truth, &args.prediction) else {
         bail!("nothing to measure: give --truth and --prediction, or --dataset and --checkpoint")
     };
-    Evaluation::from_files(truth, prediction, args.audio.as_deref(), args.fps, ui)
+    Evaluation::from_files(truth, prediction, args.audio.as_deref(), args.fps, store, ui)
 }

@@ -8,6 +8,7 @@ use crate::cli::signals;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use orator::cluster::timing;
 use orator::config::Settings;
 use orator::external::onnx::{ModelError, ModelStore};
 use orator::pipeline::pose2d::models::wanted;
@@ -77,6 +78,11 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     };
     let mut lines: Vec<String> = report.stages.iter().map(counts).collect();
     lines.extend(report.datasets.iter().map(|dir| format!("dataset  {}", dir.display())));
+    let predicted = timing::planned_and_taken(&pipeline, &this_program(), &report.times);
+    lines.extend(predicted.map(|(planned, took)| {
+        let off = 100.0 * (took / planned - 1.0);
+        format!("work     {took:.0} s; `orator plan` said {planned:.0} s ({off:+.0} %)")
+    }));
     let n_failed = report.failures.len();
     if n_failed > 0 {
         lines.push(format!("{n_failed} failed; `orator status --why` says each error again"));
@@ -90,6 +96,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     };
     let mut facts = json!(report);
     facts["next"] = json!(next);
+    facts["work_secs"] = json!(report.times.iter().map(|time| time.secs).sum::<f64>());
+    facts["planned_work_secs"] = json!(predicted.map(|(planned, _)| planned));
     ui.summary(&lines.join("\n"), Some(&next), facts);
     Ok(if n_failed == 0 { Outcome::Done } else { Outcome::SomeFailed })
 }

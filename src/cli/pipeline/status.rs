@@ -1,6 +1,7 @@
 //! `orator status`.
 
 use crate::cli::Outcome;
+use crate::cli::cluster::progress;
 use crate::cli::config_args::ConfigArgs;
 use crate::cli::confine::confine;
 use crate::cli::ui::Ui;
@@ -10,6 +11,7 @@ use orator::stage::artifacts;
 use orator::stage::artifacts::StageName;
 use orator::stage::ledger::longest_first;
 use serde_json::json;
+use std::path::PathBuf;
 
 /// Reasons of a stage's plan that are written out; `--json` has all.
 const REASONS_SHOWN: usize = 3;
@@ -23,12 +25,18 @@ pub struct Args {
     /// Only this speaker; may be given several times.
     #[arg(long, value_name = "NAME")]
     speaker: Vec<String>,
+    /// Show how far the workers of this plan are instead: who is at work, how fast, the time left, failures by reason.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["config", "set", "speaker", "why"])]
+    plan: Option<PathBuf>,
     /// Say why a stage is stale, what the error was, what a stage that is up to date reported, and what a run would do.
     #[arg(long)]
     why: bool,
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    if let Some(plan) = &args.plan {
+        return progress::run(plan, ui);
+    }
     let pipeline = Pipeline::open(args.config.load()?)?;
     let work = &pipeline.config().settings.work.dir;
     confine([artifacts::hashes(work).as_path()], [&**work]);

@@ -5,6 +5,7 @@ use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
 use crate::cli::ui::Ui;
 use anyhow::Result;
+use orator::config::Config;
 use orator::dataset::Dataset;
 use orator::evaluate::baseline::predictor;
 use orator::evaluate::clips::held_out;
@@ -12,17 +13,20 @@ use orator::evaluate::clips::held_out::HeldOutInterval;
 use orator::generate::GestureGenerator;
 use orator::generate::model::GenerationChoice;
 use orator::report::training::strip::HeldOutPair;
+use orator::stage::progress::Progress;
+use orator::stage::workdir::BusyFolder;
 use orator::train::epochs::ValidatedStep;
 use orator::train::gan::score::{Validation, ValidationMetrics, below_mean_pose};
 use orator::train::gan::train;
+use orator::train::stopped::StoppedTraining;
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::Instant;
 
 /// Train a speaker's speech-to-gesture generator.
 ///
-/// Reads the dataset that `orator run` made and trains with the settings of `[gan]`, one model a speaker, or one of several
-/// speakers (`--speaker all`, several `--dataset`), who are told apart by an embedding. Checkpoints,
+/// Reads the dataset that `orator run` made and trains with the settings of `[gan]`, one model a speaker (`--all`: for each of
+/// them), or one of several speakers (`--speaker all`, several `--dataset`), who are told apart by an embedding. Checkpoints,
 /// `metrics.jsonl`, TensorBoard events and a page of curves go to the output folder; started again, it goes on from the
 /// newest checkpoint there, with that checkpoint's settings, and ends with the same bytes as a training that was never
 /// interrupted.
@@ -33,6 +37,10 @@ pub struct Args {
     /// The speaker, or `all` of the configuration; may be left out when it names one only.
     #[arg(long, value_name = "NAME")]
     speaker: Option<String>,
+    /// A model for each speaker, one after the other. Speakers that are trained by another program at this moment, on any
+    /// machine, are left to it; one that fails does not stop the others.
+    #[arg(long, conflicts_with_all = ["speaker", "out", "dataset"])]
+    all: bool,
     /// Steps to train altogether, instead of `gan.steps`.
     #[arg(long, value_name = "N")]
     steps: Option<usize>,
@@ -50,11 +58,56 @@ pub struct Args {
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let config = if args.dataset.is_empty() { args.config.load()? } else { args.config.load_or_default()? };
-    let Args { speaker, out, .. } = &args;
-    let places =
-        Places { config: &config, speaker: speaker.as_ref(), dataset: args.dataset.first(), out: out.as_ref() };
+    if args.all {
+        return run_all(&args, &config, ui);
+    }
+    let trained = train_one(&args, args.speaker.as_ref(), &config, ui)?;
+    ui.summary(&trained.text, Some(&trained.next), trained.facts);
+    Ok(if trained.has_page { Outcome::Done } else { Outcome::SomeFailed })
+}
+
+/// A model for each speaker of the configuration.
+fn run_all(args: &Args, config: &Config, ui: &Ui) -> Result<Outcome> {
+    let (mut text, mut facts, mut next, mut n_failed) = (String::new(), Vec::new(), None, 0);
+    for speaker in config.settings.speaker.iter().map(|speaker| &speaker.name) {
+        if ui.is_to_stop() {
+            break;
+        }
+        match train_one(args, Some(speaker), config, ui) {
+            Ok(trained) => {
+                text += &format!("{}\n", trained.text);
+                n_failed += usize::from(!trained.has_page);
+                facts.push(trained.facts);
+                next.get_or_insert(trained.next);
+            }
+            Err(error) if error.is::<StoppedTraining>() => return Err(error),
+            Err(error) => {
+                let is_busy = error.is::<BusyFolder>();
+                n_failed += usize::from(!is_busy);
+                let word = if is_busy { "left to" } else { "failed" };
+                text += &format!("{speaker}: {word}: {error:#}\n");
+                facts.push(json!({ "speaker": speaker, "busy": is_busy, "error": format!("{error:#}") }));
+            }
+        }
+    }
+    ui.summary(&text, next.as_deref(), json!({ "speakers": facts, "next": next }));
+    Ok(if n_failed == 0 { Outcome::Done } else { Outcome::SomeFailed })
+}
+
+/// A training as it ended.
+struct TrainedModel {
+    text: String,
+    next: String,
+    facts: serde_json::Value,
+    /// Whether its page could be written.
+    has_page: bool,
+}
+
+fn train_one(args: &Args, speaker: Option<&String>, config: &Config, ui: &Ui) -> Result<TrainedModel> {
+    let out = &args.out;
+    let places = Places { config, speaker, dataset: args.dataset.first(), out: out.as_ref() };
     let is_named = |name: &String| config.settings.speaker.iter().any(|of| of.name == *name);
-    let are_all = args.dataset.is_empty() && speaker.as_ref().is_some_and(|name| name == ALL && !is_named(name));
+    let are_all = args.dataset.is_empty() && speaker.is_some_and(|name| name == ALL && !is_named(name));
     let (datasets, out) = if are_all || args.dataset.len() > 1 {
         places.open_several("gan", &args.dataset)?
     } else {
@@ -117,8 +170,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         "page": page,
         "next": next,
     });
-    ui.summary(&text, Some(&next), facts);
-    Ok(if page.is_some() { Outcome::Done } else { Outcome::SomeFailed })
+    Ok(TrainedModel { text, next, facts, has_page: page.is_some() })
 }
 
 /// The last validation as a table, with the warnings that are due.

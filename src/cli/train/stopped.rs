@@ -4,6 +4,7 @@ use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator::StoppedTraining;
+use orator::cluster::shell::shell;
 use serde_json::json;
 
 /// The closing words of a training that ended by request; any other error stays one.
@@ -34,27 +35,6 @@ pub fn told(error: anyhow::Error, ui: &Ui) -> Result<Outcome> {
 
 /// The command as it was typed, for a shell.
 fn same_command() -> String {
-    let words = std::env::args_os().skip(1).map(|word| quoted(&word.to_string_lossy()));
-    std::iter::once("orator".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
-}
-
-/// A word as a shell reads it.
-fn quoted(word: &str) -> String {
-    let is_plain = |letter: char| letter.is_alphanumeric() || "-_./=:,+@%".contains(letter);
-    if !word.is_empty() && word.chars().all(is_plain) {
-        word.to_owned()
-    } else {
-        format!("'{}'", word.replace('\'', r"'\''"))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::quoted;
-
-    #[test]
-    fn words_are_quoted_for_a_shell() {
-        let words = ["--set", "gan.steps=5", "my data", "it's", ""].map(quoted);
-        assert_eq!(words, ["--set", "gan.steps=5", "'my data'", r"'it'\''s'", "''"]);
-    }
+    let words = std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned());
+    shell(&std::iter::once("orator".to_owned()).chain(words).collect::<Vec<_>>())
 }

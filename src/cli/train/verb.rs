@@ -24,10 +24,11 @@ enum Network {
 }
 
 pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
+    const STOPPING: &str = "stopping after this step, with a checkpoint; the next signal ends at once";
     const KEPT: &str = "the newest checkpoint is kept, and the same command goes on from it";
     match args.network {
         Network::Basis(_) | Network::Noise(_) => signals::tell_when_stopped("nothing is kept of what was begun"),
-        _ => ui.listens_for_stop(KEPT),
+        _ => ui.listens_for_stop(STOPPING, KEPT),
     }
     let ended = match args.network {
         Network::Basis(args) => basis::run(args, ui),

@@ -8,6 +8,7 @@ use crate::dataset::write::part::VideoEntry;
 use crate::stage::artifacts;
 use crate::stage::artifacts::{StageName, speaker_dir};
 use crate::stage::fingerprint::hash_file;
+use crate::stage::parts::PARTS;
 use crate::stage::record::Record;
 use anyhow::{Result, bail, ensure};
 use std::collections::BTreeSet;
@@ -177,7 +178,7 @@ fn content(work: &Path, speaker: &str, video: &str) -> Option<String> {
 fn folders(dir: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(dir).into_iter().flatten().flatten().filter(|entry| entry.path().is_dir());
     let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
-    let mut names: Vec<String> = names.filter(|name| !name.starts_with('.')).collect();
+    let mut names: Vec<String> = names.filter(|name| !name.starts_with('.') && !name.ends_with(PARTS)).collect();
     names.sort();
     names
 }
@@ -187,7 +188,7 @@ fn entries(dir: &Path) -> BTreeSet<String> {
     let entries = std::fs::read_dir(dir).into_iter().flatten().flatten();
     let name = |name: String| {
         let name = name.trim_start_matches('.');
-        let end = [".record.", ".failed.", ".attempt", ".old"].iter().filter_map(|mark| name.find(mark)).min();
+        let end = [".record.", ".failed.", ".attempt", ".old", PARTS].iter().filter_map(|mark| name.find(mark)).min();
         name[..end.unwrap_or(name.len())].to_owned()
     };
     let names = entries.map(|entry| name(entry.file_name().to_string_lossy().into_owned()));

@@ -67,6 +67,9 @@ pub struct PipelineCheck {
     /// Number of frames in the dataset, and in the videos.
     pub n_frames: usize,
     pub n_drawn: usize,
+    /// Seconds to train on that came through the videos, and those of `demo draw --speech`, where there are some.
+    pub train_secs: f64,
+    pub more_secs: Option<f64>,
     /// Share of the dataset's joints that have a number, 0..1; distances are measured on these alone.
     pub joints: f64,
     pub lifted: Millimetres,
@@ -118,6 +121,11 @@ pub fn measure(dir: &Path) -> Result<PipelineCheck> {
     let mut measured = measure_keypoints(dir)?;
     let (mut lifted, mut true_joints) = (Vec::new(), Vec::new());
     let dataset = Dataset::open(speaker_dir(&dir.join("work"), StageName::Dataset, "host"))?;
+    measured.train_secs = train_secs(&dataset);
+    let more = dir.join("speech");
+    if more.is_dir() {
+        measured.more_secs = Some(train_secs(&Dataset::open(more)?));
+    }
     for sample in Split::ALL.into_iter().flat_map(|split| dataset.samples(split)) {
         let sample = dataset.read(&sample)?;
         let (video, first) = sample.key.rsplit_once('-').with_context(|| format!("odd key {}", sample.key))?;
@@ -150,6 +158,10 @@ pub fn measure(dir: &Path) -> Result<PipelineCheck> {
     measured.mean_depth = distances(&where_known(flat, &lifted), &truth);
     measured.bone_depth = distances(&where_known(with_bone_depth(&truth), &lifted), &truth);
     Ok(measured)
+}
+
+fn train_secs(dataset: &Dataset) -> f64 {
+    dataset.info().splits.get(Split::Train.name()).map_or(0.0, |split| split.secs)
 }
 
 /// Compares the keypoints alone.

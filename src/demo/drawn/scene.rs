@@ -5,7 +5,7 @@ use super::figure::DrawnFigure;
 use super::gesture::DrawnGestures;
 use super::paint;
 use super::speech::Speech;
-use crate::external::ffmpeg::encode::VideoWriter;
+use crate::external::ffmpeg::write::encode::VideoWriter;
 use crate::stage::progress::Progress;
 use crate::types::image::Image;
 use crate::types::sound::Sound;

@@ -10,7 +10,7 @@ use super::truth;
 use super::truth::{FrameTruth, PointOwners};
 use super::view;
 use super::voice::Voice;
-use crate::external::ffmpeg::encode::{GOOD_CRF, VideoWriter};
+use crate::external::ffmpeg::write::encode::{GOOD_CRF, VideoWriter};
 use crate::formats::rendered_truth::RenderedTruth;
 use crate::render::{Background, Light, Mesh, PinholeCamera, Renderer};
 use crate::stage::progress::Progress;

@@ -6,6 +6,7 @@ use super::constant_pose::ConstantPoses;
 use super::neighbour;
 use super::neighbour::{Library, Query};
 use crate::evaluate::clips::clips::{EvalClip, EvalClips};
+use crate::evaluate::clips::motion_store::{MotionStore, StoredMotion};
 use anyhow::Result;
 use ndarray::{Array2, Array3, ArrayView3, s};
 use serde::Serialize;
@@ -89,7 +90,7 @@ pub enum ClipMotion {
     /// Constant pose [49, 3].
     Constant(Array2<f32>),
     /// Joints [T, 49, 3].
-    Motion(Array3<f32>),
+    Motion(StoredMotion),
 }
 
 /// Motion for every clip.
@@ -122,16 +123,22 @@ impl Predictor {
     }
 
     /// With the poses of `still` in place of missing values.
-    #[must_use]
-    pub fn filled(mut self, still: &Self) -> Self {
+    ///
+    /// # Errors
+    /// The disk of temporary files is full.
+    pub fn filled(mut self, still: &Self, store: &MotionStore) -> Result<Self> {
         for (predicted, still) in self.motions.iter_mut().zip(&still.motions) {
-            if let (ClipMotion::Motion(joints), ClipMotion::Constant(pose)) = (predicted, still) {
+            if let (ClipMotion::Motion(motion), ClipMotion::Constant(pose)) = (predicted, still)
+                && motion.view().iter().any(|v| !v.is_finite())
+            {
+                let mut joints = motion.view().to_owned();
                 for mut frame in joints.outer_iter_mut() {
                     frame.zip_mut_with(pose, |v, still| *v = if v.is_finite() { *v } else { *still });
                 }
+                *motion = store.keep(joints)?;
             }
         }
-        self
+        Ok(self)
     }
 
     pub fn prediction(clips: &EvalClips, description: &str) -> Self {
@@ -147,9 +154,9 @@ impl Predictor {
 }
 
 /// Baselines that files alone allow, and a sentence for each that is left out.
-pub fn from_files(clips: &EvalClips) -> Result<(Vec<Predictor>, Vec<String>)> {
+pub fn from_files(clips: &EvalClips, store: &MotionStore) -> Result<(Vec<Predictor>, Vec<String>)> {
     let (mut all, mut left_out) = (constant_poses(clips), Vec::new());
-    match neighbours(clips, &all[0])? {
+    match neighbours(clips, &all[0], store)? {
         Some(predictor) => all.push(predictor),
         None => left_out.push(format!(
             "{}: left out, since {}",
@@ -163,12 +170,12 @@ pub fn from_files(clips: &EvalClips) -> Result<(Vec<Predictor>, Vec<String>)> {
         )),
     }
     for kind in [PredictorKind::MismatchedPrediction, PredictorKind::MismatchedTruth] {
-        match mismatched(clips, kind, &all[0]) {
+        match mismatched(clips, kind, &all[0], store)? {
             Some(predictor) => all.push(predictor),
             None => left_out.push(too_short(kind)),
         }
         if kind == PredictorKind::MismatchedPrediction && clips.clips.len() > 1 {
-            all.push(late(clips, &all[0]));
+            all.push(late(clips, &all[0], store)?);
         }
     }
     Ok((all, left_out))
@@ -176,14 +183,15 @@ pub fn from_files(clips: &EvalClips) -> Result<(Vec<Predictor>, Vec<String>)> {
 
 /// Each clip's own prediction, shifted by half of the clip with wrap-around. The posture of the clip is right, unlike
 /// in another clip's motion; only the moment of the sound is wrong.
-fn late(clips: &EvalClips, still: &Predictor) -> Predictor {
+fn late(clips: &EvalClips, still: &Predictor, store: &MotionStore) -> Result<Predictor> {
     let of = |clip: &EvalClip| {
         let n_frames = clip.n_frames();
-        ClipMotion::Motion(taken(&clip.predicted, (0..n_frames).map(|t| (t + n_frames / 2) % n_frames)))
+        let later = (0..n_frames).map(|t| (t + n_frames / 2) % n_frames);
+        Ok(ClipMotion::Motion(store.keep(taken(&clip.predicted, later))?))
     };
     let description = "the clip's own prediction half of the clip later, and from the beginning again".to_owned();
-    let motions = clips.clips.iter().map(of).collect();
-    Predictor::new(PredictorKind::LatePrediction, description, motions).filled(still)
+    let motions = clips.clips.iter().map(of).collect::<Result<_>>()?;
+    Predictor::new(PredictorKind::LatePrediction, description, motions).filled(still, store)
 }
 
 /// Reason why a mismatched motion is left out.
@@ -229,7 +237,7 @@ fn complete(pose: &mut Array2<f32>, from: impl FnOnce() -> Array2<f32>) {
     }
 }
 
-fn neighbours(clips: &EvalClips, still: &Predictor) -> Result<Option<Predictor>> {
+fn neighbours(clips: &EvalClips, still: &Predictor, store: &MotionStore) -> Result<Option<Predictor>> {
     let query: Option<Vec<Query>> = clips
         .clips
         .iter()
@@ -243,17 +251,25 @@ fn neighbours(clips: &EvalClips, still: &Predictor) -> Result<Option<Predictor>>
             let clip = &clips.clips[entry];
             Ok(clip.features.as_ref().map(|features| (features.rows.clone(), clip.n_frames())))
         },
-        joints: &|entry| Ok(clips.clips[entry].ground_truth.clone()),
+        joints: &|entry, frames| Ok(clips.clips[entry].ground_truth.view().slice_move(s![frames, .., ..]).to_owned()),
     };
-    let Some(predicted) = neighbour::motions(&query, &library, clips.fps)? else { return Ok(None) };
+    let Some(predicted) = neighbour::motions(&query, &library, clips.fps, store)? else { return Ok(None) };
     let description = "for each 4 s of sound the motion of the part of another clip that sounds most alike".to_owned();
     let motions = predicted.into_iter().map(ClipMotion::Motion).collect();
-    Ok(Some(Predictor::new(PredictorKind::NearestNeighbour, description, motions).filled(still)))
+    Ok(Some(Predictor::new(PredictorKind::NearestNeighbour, description, motions).filled(still, store)?))
 }
 
 /// For each clip the motion (`Prediction` or `Truth`) of another, played back and forth where it is shorter; for a
 /// single clip its own, shifted by half of it with wrap-around. `still` fills missing values.
-pub fn mismatched(clips: &EvalClips, kind: PredictorKind, still: &Predictor) -> Option<Predictor> {
+///
+/// # Errors
+/// The disk of temporary files is full.
+pub fn mismatched(
+    clips: &EvalClips,
+    kind: PredictorKind,
+    still: &Predictor,
+    store: &MotionStore,
+) -> Result<Option<Predictor>> {
     let of = |clip: usize| match kind {
         PredictorKind::MismatchedTruth => &clips.clips[clip].ground_truth,
         _ => &clips.clips[clip].predicted,
@@ -263,22 +279,28 @@ pub fn mismatched(clips: &EvalClips, kind: PredictorKind, still: &Predictor) -> 
     let (motions, description): (Vec<ClipMotion>, String) = if n > 1 {
         let motions = lengths.enumerate().map(|(i, n_frames)| {
             let from = of((i + n / 2) % n);
-            ClipMotion::Motion(taken(from, (0..n_frames).map(|t| back_and_forth(t, from.shape()[0]))))
+            let motion = taken(from, (0..n_frames).map(|t| back_and_forth(t, from.n_frames())));
+            Ok(ClipMotion::Motion(store.keep(motion)?))
         });
-        (motions.collect(), "the same of another clip, played back and forth where that is shorter".to_owned())
+        (
+            motions.collect::<Result<_>>()?,
+            "the same of another clip, played back and forth where that is shorter".to_owned(),
+        )
     } else {
         let n_frames = lengths.sum::<usize>();
         let shift = n_frames / 2;
         if clips.fps.secs(shift) < LEAST_SHIFT_SECS {
-            return None;
+            return Ok(None);
         }
         let description = format!("the same {:.1} s later, and from the beginning again", clips.fps.secs(shift));
-        (vec![ClipMotion::Motion(taken(of(0), (0..n_frames).map(|t| (t + shift) % n_frames)))], description)
+        let motion = store.keep(taken(of(0), (0..n_frames).map(|t| (t + shift) % n_frames)))?;
+        (vec![ClipMotion::Motion(motion)], description)
     };
-    Some(Predictor::new(kind, description, motions).filled(still))
+    Ok(Some(Predictor::new(kind, description, motions).filled(still, store)?))
 }
 
-fn taken(from: &Array3<f32>, frames: impl Iterator<Item = usize>) -> Array3<f32> {
+fn taken(from: &StoredMotion, frames: impl Iterator<Item = usize>) -> Array3<f32> {
+    let from = from.view();
     let frames: Vec<usize> = frames.collect();
     let mut to = Array3::zeros((frames.len(), from.shape()[1], 3));
     for (mut to, frame) in to.outer_iter_mut().zip(frames) {

@@ -2,7 +2,9 @@
 //! nearest.
 
 use crate::audio::mel;
+use crate::evaluate::clips::motion_store::{MotionStore, StoredMotion};
 use crate::evaluate::clips::sound_features::POOLED;
+use crate::types::skeleton::N_JOINTS;
 use crate::types::time::FrameRate;
 use anyhow::Result;
 use ndarray::{Array3, s};
@@ -30,22 +32,27 @@ pub struct Library<'a> {
     pub asks_itself: bool,
     /// Pooled spectrogram of an entry and its number of motion frames; `None`: no sound.
     pub features: &'a (dyn Fn(usize) -> Result<Option<(Vec<f32>, usize)>> + Sync),
-    /// Joints of an entry [T, 49, 3], angles of head and trunk behind them where they are compared.
-    pub joints: &'a dyn Fn(usize) -> Result<Array3<f32>>,
+    /// Joints of these frames of an entry [T, 49, 3], angles of head and trunk behind them where they are compared.
+    pub joints: &'a dyn Fn(usize, Range<usize>) -> Result<Array3<f32>>,
 }
 
 /// Window of a query.
-struct QueryWindow {
+struct QueryWindow<'a> {
     query: usize,
     frames: Range<usize>,
-    rows: Vec<f32>,
+    rows: &'a [f32],
 }
 
 /// Best match so far: squared distance, entry of the library, first frame.
 type NearestMatch = (f32, usize, usize);
 
 /// Motion [T, 49, 3] for each query, NaN where the library's is; `None` where a window finds nothing long enough.
-pub fn motions(queries: &[Query], library: &Library, fps: FrameRate) -> Result<Option<Vec<Array3<f32>>>> {
+pub fn motions(
+    queries: &[Query],
+    library: &Library,
+    fps: FrameRate,
+    store: &MotionStore,
+) -> Result<Option<Vec<StoredMotion>>> {
     let windows: Vec<QueryWindow> =
         queries.iter().enumerate().flat_map(|(i, query)| query_windows(i, query, fps)).collect();
     let Library { n, asks_itself, features, joints } = *library;
@@ -63,36 +70,30 @@ pub fn motions(queries: &[Query], library: &Library, fps: FrameRate) -> Result<O
             || vec![None; windows.len()],
             |a, b| Ok(a.into_iter().zip(b).map(|(a, b)| nearer(a, b)).collect()),
         )?;
-    let mut predicted: Vec<Array3<f32>> = Vec::new();
-    // Ordered by entry, so that each is read once.
-    let mut places: Vec<(usize, usize, &QueryWindow)> = Vec::with_capacity(windows.len());
-    for (window, found) in windows.iter().zip(best) {
-        let Some((_, entry, first)) = found else { return Ok(None) };
-        places.push((entry, first, window));
-    }
-    places.sort_by_key(|(entry, _, _)| *entry);
-    for of_entry in places.chunk_by(|a, b| a.0 == b.0) {
-        let joints = joints(of_entry[0].0)?;
-        if predicted.is_empty() {
-            let n_rows = joints.shape()[1];
-            predicted = queries.iter().map(|query| Array3::zeros((query.n_frames, n_rows, 3))).collect();
+    let mut predicted = Vec::new();
+    // The windows stand in the order of the queries.
+    let mut found = windows.iter().zip(best).peekable();
+    for (number, query) in queries.iter().enumerate() {
+        let mut motion: Option<Array3<f32>> = None;
+        while let Some((window, best)) = found.next_if(|(window, _)| window.query == number) {
+            let Some((_, entry, first)) = best else { return Ok(None) };
+            let from = joints(entry, first..first + window.frames.len())?;
+            let to = motion.get_or_insert_with(|| Array3::zeros((query.n_frames, from.shape()[1], 3)));
+            to.slice_mut(s![window.frames.clone(), .., ..]).assign(&from);
         }
-        for (_, first, window) in of_entry {
-            let from = joints.slice(s![*first..first + window.frames.len(), .., ..]);
-            predicted[window.query].slice_mut(s![window.frames.clone(), .., ..]).assign(&from);
-        }
+        predicted.push(store.keep(motion.unwrap_or_else(|| Array3::zeros((0, N_JOINTS, 3))))?);
     }
     Ok(Some(predicted))
 }
 
 /// Windows of a query, the last one shorter.
-fn query_windows(query: usize, sound: &Query, fps: FrameRate) -> Vec<QueryWindow> {
+fn query_windows<'a>(query: usize, sound: &Query<'a>, fps: FrameRate) -> Vec<QueryWindow<'a>> {
     let window = (((WINDOW_SECS * fps.per_sec()) as usize) / POOLED * POOLED).max(POOLED);
     let stretch = |first: usize| {
         let frames = first..(first + window).min(sound.n_frames);
         let from = first / POOLED * mel::N_MELS;
         let to = (from + frames.len().div_ceil(POOLED) * mel::N_MELS).min(sound.rows.len());
-        QueryWindow { query, frames, rows: sound.rows.get(from..to).unwrap_or_default().to_vec() }
+        QueryWindow { query, frames, rows: sound.rows.get(from..to).unwrap_or_default() }
     };
     (0..sound.n_frames).step_by(window).map(stretch).collect()
 }
@@ -102,7 +103,7 @@ fn nearest(rows: &[f32], n_frames: usize, window: &QueryWindow, entry: usize) ->
     let places = (0..).step_by(STRIDE).take_while(|row| row * POOLED + window.frames.len() <= n_frames);
     let of_place = |row: usize| {
         let sound = rows.get(row * mel::N_MELS..)?.get(..window.rows.len())?;
-        Some((distance(sound, &window.rows), entry, row * POOLED))
+        Some((distance(sound, window.rows), entry, row * POOLED))
     };
     places.map(of_place).fold(None, nearer)
 }

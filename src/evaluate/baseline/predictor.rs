@@ -23,19 +23,27 @@ pub fn motion(speaker: &GestureGenerator, sound: &Sound, n_frames: usize) -> Res
 
 /// Mismatched sound for sound `which`, as long as it: what follows half of all sounds later, with wrap-around, and so
 /// most often another video.
-pub fn turned(sounds: &[&Sound], which: usize) -> Sound {
-    let parts = turned_parts(sounds, which).into_iter();
-    let samples = parts.flat_map(|(sound, range)| sounds[sound].samples.get(range).unwrap_or_default());
-    Sound { rate: sounds[which].rate, samples: samples.copied().collect() }
+///
+/// `lengths`: samples of each sound; `read` gives samples of one.
+///
+/// # Errors
+/// Those of `read`.
+pub fn turned(
+    lengths: &[usize],
+    which: usize,
+    read: impl Fn(usize, Range<usize>) -> Result<Vec<f32>>,
+) -> Result<Vec<f32>> {
+    let parts = turned_parts(lengths, which).into_iter();
+    Ok(parts.map(|(sound, range)| read(sound, range)).collect::<Result<Vec<_>>>()?.concat())
 }
 
 /// Words said in the mismatched sound for sound `which`, each at its time there; `words` of each sound count from its
 /// beginning. A word that a seam cuts is left out.
-pub fn turned_words(sounds: &[&Sound], words: &[&[Word]], which: usize) -> Vec<Word> {
-    let secs = |n_samples: usize, of: usize| n_samples as f64 / f64::from(sounds[of].rate);
+pub fn turned_words(lengths: &[usize], rate: u32, words: &[Vec<Word>], which: usize) -> Vec<Word> {
+    let secs = |n_samples: usize| n_samples as f64 / f64::from(rate);
     let (mut said, mut n_before) = (Vec::new(), 0);
-    for (of, range) in turned_parts(sounds, which) {
-        let (start, end, later) = (secs(range.start, of), secs(range.end, of), secs(n_before, of));
+    for (of, range) in turned_parts(lengths, which) {
+        let (start, end, later) = (secs(range.start), secs(range.end), secs(n_before));
         let inside = words[of].iter().filter(|word| word.start_secs >= start && word.end_secs <= end);
         let moved = |secs: f64| secs - start + later;
         said.extend(inside.map(|word| Word {
@@ -49,17 +57,15 @@ pub fn turned_words(sounds: &[&Sound], words: &[&[Word]], which: usize) -> Vec<W
 }
 
 /// Sounds and their samples that make up the mismatched sound for sound `which`.
-fn turned_parts(sounds: &[&Sound], which: usize) -> Vec<(usize, Range<usize>)> {
-    let length = |sounds: &[&Sound]| sounds.iter().map(|sound| sound.samples.len()).sum::<usize>();
-    let (all, before) = (length(sounds), length(&sounds[..which]));
-    let mut wanted = sounds[which].samples.len();
+fn turned_parts(lengths: &[usize], which: usize) -> Vec<(usize, Range<usize>)> {
+    let (all, before) = (lengths.iter().sum::<usize>(), lengths[..which].iter().sum::<usize>());
+    let mut wanted = lengths[which];
     let mut skipped = (before + all / 2) % all.max(1);
     let mut parts = Vec::new();
     if wanted == 0 {
         return parts;
     }
-    for (at, sound) in sounds.iter().enumerate().cycle() {
-        let n = sound.samples.len();
+    for (at, &n) in lengths.iter().enumerate().cycle() {
         let start = skipped.min(n);
         let end = n.min(start + wanted);
         skipped -= start;
@@ -81,17 +87,16 @@ mod tests {
 
     #[test]
     fn every_sound_becomes_another_one_of_its_length() {
-        let sound = |samples: &[f32]| Sound { rate: SAMPLE_RATE, samples: samples.to_vec() };
-        let all = [sound(&[1.0, 2.0, 3.0]), sound(&[]), sound(&[4.0, 5.0, 6.0, 7.0])];
-        let all: Vec<&Sound> = all.iter().collect();
-        let turned: Vec<Sound> = (0..3).map(|i| turned(&all, i)).collect();
-        assert_eq!(turned, [sound(&[4.0, 5.0, 6.0]), sound(&[]), sound(&[7.0, 1.0, 2.0, 3.0])]);
-        assert_eq!(super::turned(&[&sound(&[])], 0), sound(&[]));
+        let all = [vec![1.0, 2.0, 3.0], vec![], vec![4.0, 5.0, 6.0, 7.0]];
+        let lengths = all.each_ref().map(Vec::len);
+        let read = |at: usize, range: Range<usize>| Ok(all[at][range].to_vec());
+        let turned: Vec<Vec<f32>> = (0..3).map(|i| turned(&lengths, i, read).unwrap()).collect();
+        assert_eq!(turned, [vec![4.0, 5.0, 6.0], vec![], vec![7.0, 1.0, 2.0, 3.0]]);
+        assert!(super::turned(&[0], 0, read).unwrap().is_empty());
     }
 
     #[test]
     fn words_go_with_their_sound() {
-        let sound = |secs: usize| Sound { rate: SAMPLE_RATE, samples: vec![0.0; secs * SAMPLE_RATE as usize] };
         let word = |text: &str, start_secs: f64| Word {
             word: text.into(),
             start_secs,
@@ -99,12 +104,10 @@ mod tests {
             source: WordSource::Given,
             confidence: None,
         };
-        let sounds = [sound(4), sound(2)];
+        let lengths = [4, 2].map(|secs| secs * SAMPLE_RATE as usize);
         let words = [vec![word("a", 0.2), word("cut", 0.8), word("b", 3.2)], vec![word("c", 1.0)]];
-        let (sounds, words): (Vec<_>, Vec<&[Word]>) =
-            (sounds.iter().collect(), words.iter().map(Vec::as_slice).collect());
         // 3 s later: the last second of the first, the second, the first second of the first
-        let said = turned_words(&sounds, &words, 0);
+        let said = turned_words(&lengths, SAMPLE_RATE, &words, 0);
         let said: Vec<(&str, f64)> =
             said.iter().map(|word| (word.word.as_str(), (100.0 * word.start_secs).round() / 100.0)).collect();
         assert_eq!(said, [("b", 0.2), ("c", 2.0), ("a", 3.2)]);

@@ -1,10 +1,14 @@
 //! Evaluation clips of one frame rate: ground truth, prediction of the same frames, and sound features. This file reads
 //! them from files; `of_speaker` makes them from a dataset and a checkpoint.
 
+use super::motion_store::{MotionStore, StoredMotion};
 use super::pairs::FilePair;
 use super::sound_features;
 use super::sound_features::SoundFeatures;
+use crate::dataset::Dataset;
+use crate::dataset::index::SampleRef;
 use crate::external::ffmpeg::sound_stream::SoundStream;
+use crate::formats::wav;
 use crate::mocap::motion_file;
 use crate::motion::bones;
 use crate::motion::resample;
@@ -17,6 +21,8 @@ use crate::types::time::FrameRate;
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array2, Array3, s};
 use rayon::prelude::*;
+use std::fs::File;
+use std::os::unix::fs::FileExt as _;
 use std::path::PathBuf;
 
 /// Largest difference in length of one clip's files: a second, or this share of the longer.
@@ -35,8 +41,8 @@ pub struct EvalClip {
     pub name: String,
     /// Joints [T, 49, 3], metres, the neck at the origin; behind them, where the clips have channels, head and trunk as rows
     /// 49 and 50: yaw, pitch, roll in radians, NaN where not seen.
-    pub ground_truth: Array3<f32>,
-    pub predicted: Array3<f32>,
+    pub ground_truth: StoredMotion,
+    pub predicted: StoredMotion,
     /// Mask [T, 49] of the compared joints, those seen in the ground truth.
     pub mask: Array2<bool>,
     pub features: Option<SoundFeatures>,
@@ -48,17 +54,37 @@ pub struct EvalClip {
 #[derive(Clone, Debug)]
 pub enum ClipAudio {
     File(PathBuf),
-    /// Samples at 16 kHz.
-    Kept(Vec<i16>),
+    /// 16-bit samples at 16 kHz in a file, from a byte on.
+    Within {
+        path: PathBuf,
+        offset: u64,
+        n_samples: usize,
+    },
 }
 
 impl ClipAudio {
+    /// The sound of a sample, in its shard.
+    pub fn of_sample(dataset: &Dataset, sample: &SampleRef) -> Self {
+        Self::Within {
+            path: dataset.dir().join(&sample.shard),
+            offset: sample.wav.offset + wav::HEADER_BYTES as u64,
+            n_samples: sample.n_sound_samples(),
+        }
+    }
+
     /// Samples at 16 kHz from second `start` to `end`, fewer where the sound ends before.
     pub fn samples(&self, start: f64, end: f64) -> Result<Vec<i16>> {
         let at = |secs: f64| (secs.max(0.0) * f64::from(SAMPLE_RATE)).round() as usize;
         let (from, to) = (at(start), at(end));
         match self {
-            Self::Kept(samples) => Ok(samples.get(from..to.min(samples.len())).unwrap_or_default().to_vec()),
+            Self::Within { path, offset, n_samples } => {
+                let (from, to) = (from.min(*n_samples), to.min(*n_samples));
+                let reading = || format!("reading {}", path.display());
+                let mut bytes = vec![0; 2 * to.saturating_sub(from)];
+                let file = File::open(path).with_context(reading)?;
+                file.read_exact_at(&mut bytes, offset + 2 * from as u64).with_context(reading)?;
+                Ok(bytes.chunks_exact(2).map(|pair| i16::from_le_bytes([pair[0], pair[1]])).collect())
+            }
             Self::File(path) => {
                 let (mut n, mut samples) = (0, Vec::new());
                 for piece in SoundStream::open(path, SAMPLE_RATE) {
@@ -77,7 +103,7 @@ impl ClipAudio {
 }
 
 /// Sample as a 16-bit integer.
-pub fn pcm(sample: f32) -> i16 {
+fn pcm(sample: f32) -> i16 {
     (sample * 32_768.0).round().clamp(-32_768.0, 32_767.0) as i16
 }
 
@@ -119,7 +145,7 @@ impl EvalClips {
                     hasher.update(&clip.ground_truth[[t, joint, k]].to_le_bytes());
                 }
             }
-            for angle in clip.ground_truth.slice(s![.., N_JOINTS.., ..]) {
+            for angle in clip.ground_truth.view().slice(s![.., N_JOINTS.., ..]) {
                 hasher.update(&angle.to_le_bytes());
             }
             hasher.update(&clip.n_frames().to_le_bytes());
@@ -144,10 +170,10 @@ impl EvalClips {
 /// # Errors
 /// A file without motion; a prediction much longer or shorter than its ground truth, or with many missing joints. The
 /// message names the clip and what to do.
-pub fn read(pairs: &[FilePair], fps: Option<FrameRate>) -> Result<EvalClips> {
+pub fn read(pairs: &[FilePair], fps: Option<FrameRate>, store: &MotionStore) -> Result<EvalClips> {
     let first = pairs.first().context("there is no pair to measure")?;
     let rate = motion_file::read(&first.truth, fps)?.motion.fps;
-    let clip = |pair: &FilePair| clip(pair, fps, rate).with_context(|| format!("clip {}", pair.name));
+    let clip = |pair: &FilePair| clip(pair, fps, rate, store).with_context(|| format!("clip {}", pair.name));
     let read: Vec<(EvalClip, Vec<String>)> = pairs.par_iter().map(clip).collect::<Result<_>>()?;
     let (clips, notes): (Vec<EvalClip>, Vec<Vec<String>>) = read.into_iter().unzip();
     Ok(EvalClips {
@@ -159,7 +185,12 @@ pub fn read(pairs: &[FilePair], fps: Option<FrameRate>) -> Result<EvalClips> {
     })
 }
 
-fn clip(pair: &FilePair, given: Option<FrameRate>, fps: FrameRate) -> Result<(EvalClip, Vec<String>)> {
+fn clip(
+    pair: &FilePair,
+    given: Option<FrameRate>,
+    fps: FrameRate,
+    store: &MotionStore,
+) -> Result<(EvalClip, Vec<String>)> {
     let mut notes = Vec::new();
     let mut side = |path: &PathBuf, what: &str| -> Result<Motion> {
         let read = motion_file::read(path, given)?;
@@ -237,8 +268,8 @@ fn clip(pair: &FilePair, given: Option<FrameRate>, fps: FrameRate) -> Result<(Ev
     Ok((
         EvalClip {
             name: pair.name.clone(),
-            ground_truth: ground_truth_joints,
-            predicted: predicted_joints,
+            ground_truth: store.keep(ground_truth_joints)?,
+            predicted: store.keep(predicted_joints)?,
             mask,
             features,
             audio,

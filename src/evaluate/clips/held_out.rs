@@ -43,17 +43,41 @@ pub fn samples(dataset: &Dataset, split: Split) -> Result<Vec<SampleRef>> {
     Ok(samples)
 }
 
+/// Joints [T, 49, 3] of some frames of a sample, with the speaker's bone lengths and, where they are compared, the angles
+/// of head and trunk behind them.
+///
+/// # Errors
+/// A sample that cannot be read; no hash is checked.
+pub fn joints(
+    dataset: &Dataset,
+    sample: &SampleRef,
+    normal: &Normalisation,
+    frames: Range<usize>,
+    has_channels: bool,
+) -> Result<Array3<f32>> {
+    let mut motion = dataset.motion(sample, frames.clone())?;
+    bones::with_lengths(&mut motion, &lengths(normal));
+    match has_channels {
+        true => Ok(with_posture(&motion.joints, dataset.posture(sample, frames)?.as_ref())),
+        false => Ok(motion.joints),
+    }
+}
+
+/// Reads a sample.
+///
+/// # Errors
+/// A sample that cannot be read, or is damaged.
+pub fn interval(dataset: &Dataset, sample: &SampleRef, normal: &Normalisation) -> Result<HeldOutInterval> {
+    let mut sample = dataset.read(sample)?;
+    bones::with_lengths(&mut sample.motion, &lengths(normal));
+    let words = sample.words.take().unwrap_or_default();
+    let Sample { key, motion: ground_truth, posture, sound, .. } = sample;
+    Ok(HeldOutInterval { key, ground_truth, posture, sound, words })
+}
+
 /// Reads the samples.
 pub fn read(dataset: &Dataset, samples: &[SampleRef], normal: &Normalisation) -> Result<Vec<HeldOutInterval>> {
-    let lengths = lengths(normal);
-    let interval = |sample| -> Result<HeldOutInterval> {
-        let mut sample = dataset.read(sample)?;
-        bones::with_lengths(&mut sample.motion, &lengths);
-        let words = sample.words.take().unwrap_or_default();
-        let Sample { key, motion: ground_truth, posture, sound, .. } = sample;
-        Ok(HeldOutInterval { key, ground_truth, posture, sound, words })
-    };
-    samples.par_iter().map(interval).collect()
+    samples.par_iter().map(|sample| interval(dataset, sample, normal)).collect()
 }
 
 /// Joints [T, 49, 3] with the angles of head and trunk behind them as rows 49 and 50, NaN where there are none.

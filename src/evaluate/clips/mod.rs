@@ -3,6 +3,7 @@
 pub mod checkpoint;
 pub mod clips;
 pub mod held_out;
+pub mod motion_store;
 pub mod notes;
 pub mod of_speaker;
 pub mod pairs;

@@ -2,18 +2,17 @@
 
 use super::checkpoint::EvaluatedCheckpoint;
 use super::clips::EvalClips;
-use super::held_out::HeldOutInterval;
 use crate::dataset::{Dataset, Split};
 use crate::stage::counted;
 use crate::types::skeleton;
 use crate::types::skeleton::{L_HAND, N_JOINTS, NECK, is_duplicate};
 use crate::types::sound::SAMPLE_RATE;
 
-/// How the data of the checkpoints differ from the split that they are measured on.
+/// How the data of the checkpoints differ from the split that they are measured on, which `has_words` or none.
 pub fn of_checkpoints(
     dataset: &Dataset,
     checkpoints: &[EvaluatedCheckpoint],
-    held_out: &[HeldOutInterval],
+    has_words: bool,
     split: Split,
 ) -> Vec<String> {
     let mut notes = Vec::new();
@@ -48,7 +47,7 @@ pub fn of_checkpoints(
                 SAMPLE_RATE / 2
             ));
         }
-        if speaker.n_words() > 0 && held_out.iter().all(|interval| interval.words.is_empty()) {
+        if speaker.n_words() > 0 && !has_words {
             notes.push(format!("{name} reads words, and this split has none: it hears the sound alone"));
         }
     }

@@ -2,12 +2,14 @@
 //! from sound and words alone, and baselines know the training split only.
 
 use super::checkpoint::EvaluatedCheckpoint;
-use super::clips::{ClipAudio, EvalClip, EvalClips, compared, pcm};
+use super::clips::{ClipAudio, EvalClip, EvalClips, compared};
 use super::held_out;
 use super::held_out::HeldOutInterval;
+use super::motion_store::{MotionStore, StoredMotion};
 use super::notes;
 use super::sound_features;
 use super::sound_features::SoundFeatureExtractor;
+use crate::dataset::index::SampleRef;
 use crate::dataset::{Dataset, Split};
 use crate::evaluate::baseline::baselines;
 use crate::evaluate::baseline::baselines::{ClipMotion, NumberedCheckpoint, Predictor, PredictorKind};
@@ -23,10 +25,8 @@ use crate::train::gan::begin::normalisation;
 use crate::types::posture::{Posture, PostureChannel};
 use crate::types::skeleton::N_JOINTS;
 use crate::types::sound::Sound;
-use crate::types::time::FrameRate;
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array2, Array3, Axis, s};
-use rayon::prelude::*;
 
 /// Clips and predictors of checkpoints on a split of `dataset`, the motion of the checkpoints first. Bones have the
 /// lengths of the first checkpoint that learnt from a dataset, else those of this one.
@@ -37,6 +37,7 @@ pub fn prepare(
     dataset: &Dataset,
     checkpoints: &[EvaluatedCheckpoint],
     split: Split,
+    store: &MotionStore,
     task: &dyn Task,
 ) -> Result<(EvalClips, Vec<Predictor>)> {
     let fps = dataset.info().fps;
@@ -52,27 +53,26 @@ pub fn prepare(
     let own_normal = if learnt_with.is_none() { Some(normalisation(dataset)?) } else { None };
     let normal = learnt_with.or(own_normal.as_ref()).context("there is no checkpoint to measure")?;
     task.detail("reading the intervals");
-    let held_out = held_out::read(dataset, &held_out::samples(dataset, split)?, normal)?;
-    let channels = channels(checkpoints, &held_out);
+    let samples = held_out::samples(dataset, split)?;
+    let channels = channels(dataset, &samples, checkpoints)?;
+    let held_out = HeldOutSplit::new(dataset, samples, normal, !channels.is_empty())?;
     task.detail("generating motion");
     let mut generated = checkpoints
         .iter()
-        .map(|of| speak(of, &held_out, normal, !channels.is_empty()).with_context(|| of.name.clone()))
+        .map(|of| held_out.speak(of, store).with_context(|| of.name.clone()))
         .collect::<Result<Vec<SpokenIntervals>>>()?;
     task.detail("listening");
-    let notes = notes::of_checkpoints(dataset, checkpoints, &held_out, split);
+    let has_words = held_out.words.iter().any(|words| !words.is_empty());
+    let notes = notes::of_checkpoints(dataset, checkpoints, has_words, split);
     let first = std::mem::take(&mut generated.first_mut().context("there is no checkpoint to measure")?.matched);
+    let clips =
+        first.into_iter().enumerate().map(|(at, made)| held_out.clip(at, &made, store)).collect::<Result<Vec<_>>>()?;
     let channels = &channels;
-    let clips: Vec<EvalClip> = held_out
-        .into_par_iter()
-        .zip(first)
-        .map(|(held_out, predicted)| clip(held_out, predicted, fps, !channels.is_empty()))
-        .collect();
     let mut clips = EvalClips { fps, clips, notes, learnt: split == Split::Train, channels: channels.clone() };
     if checkpoints.iter().any(|of| of.speaker.normalisation().is_none()) {
         let is_known = |joint: usize| generated.iter().all(|spoken| spoken.joints[joint]);
         let common: Vec<usize> = (0..N_JOINTS).filter(|joint| is_known(*joint)).collect();
-        restrict(&mut clips, &common);
+        restrict(&mut clips, &common, store)?;
         clips.notes.push(notes::of_joints(&clips, &common));
     }
     task.detail("what the training split knows");
@@ -94,12 +94,13 @@ pub fn prepare(
     let still = all.len();
     let mean_posture = checkpoints.iter().filter_map(|of| of.speaker.normalisation()).find_map(mean_posture);
     all.extend(constant_poses(dataset, normal, (clips.clips.len(), mean_posture.filter(|_| !channels.is_empty())))?);
-    match copied(dataset, normal, &clips, split)? {
+    match copied(dataset, normal, &clips, split, store)? {
         Some(motions) => {
             let description =
                 "for each 4 s of sound the motion of the part of the training split that sounds most alike";
             let copied = Predictor::new(PredictorKind::NearestNeighbour, description.to_owned(), motions);
-            all.push(copied.filled(&all[still]));
+            let copied = copied.filled(&all[still], store)?;
+            all.push(copied);
         }
         None => clips.notes.push(format!(
             "{}: left out, since no interval of the training split is long enough to copy from",
@@ -113,7 +114,7 @@ pub fn prepare(
         let predictor = Predictor::new(PredictorKind::MismatchedPrediction, description, motions);
         all.push(Predictor { checkpoint: several(at), ..predictor });
     }
-    match baselines::mismatched(&clips, PredictorKind::MismatchedTruth, &all[still]) {
+    match baselines::mismatched(&clips, PredictorKind::MismatchedTruth, &all[still], store)? {
         Some(predictor) => all.push(predictor),
         None => clips.notes.push(baselines::too_short(PredictorKind::MismatchedTruth)),
     }
@@ -123,75 +124,128 @@ pub fn prepare(
 /// Motion of a network for every interval.
 struct SpokenIntervals {
     /// For the interval's own sound and words: joints [T, 49, 3], metres, and angles behind them as in a clip.
-    matched: Vec<Array3<f32>>,
+    matched: Vec<StoredMotion>,
     /// For those of half of the split later.
-    mismatched: Vec<Array3<f32>>,
+    mismatched: Vec<StoredMotion>,
     /// Whether each of the 49 joints has a number in every frame.
     joints: Vec<bool>,
 }
 
-fn speak(
-    checkpoint: &EvaluatedCheckpoint,
-    held_out: &[HeldOutInterval],
-    normal: &Normalisation,
+/// The intervals of a split, of which one at a time is in memory.
+struct HeldOutSplit<'d> {
+    dataset: &'d Dataset,
+    samples: Vec<SampleRef>,
+    normal: &'d Normalisation,
     has_channels: bool,
-) -> Result<SpokenIntervals> {
-    let sounds: Vec<&Sound> = held_out.iter().map(|interval| &interval.sound).collect();
-    let words: Vec<&[Word]> = held_out.iter().map(|interval| interval.words.as_slice()).collect();
-    let other_bones = checkpoint.speaker.normalisation().is_none_or(|own| own.bone_lengths != normal.bone_lengths);
-    let motion = |at: usize, sound: &Sound, words: &[Word]| -> Result<Array3<f32>> {
-        let HeldOutInterval { key, ground_truth, .. } = &held_out[at];
-        let made = checkpoint.motion(sound, words, ground_truth.n_frames(), ground_truth.fps);
-        let (mut made, posture) = made.with_context(|| format!("no motion for {key}"))?;
-        if other_bones {
-            bones::with_lengths(&mut made, &held_out::lengths(normal));
+    /// Samples of sound, and words, of every interval.
+    n_sound_samples: Vec<usize>,
+    words: Vec<Vec<Word>>,
+}
+
+impl<'d> HeldOutSplit<'d> {
+    fn new(
+        dataset: &'d Dataset,
+        samples: Vec<SampleRef>,
+        normal: &'d Normalisation,
+        has_channels: bool,
+    ) -> Result<Self> {
+        let n_sound_samples = samples.iter().map(SampleRef::n_sound_samples).collect();
+        let words = |sample| Ok(dataset.words(sample)?.unwrap_or_default());
+        let words = samples.iter().map(words).collect::<Result<_>>()?;
+        Ok(Self { dataset, samples, normal, has_channels, n_sound_samples, words })
+    }
+
+    fn interval(&self, at: usize) -> Result<HeldOutInterval> {
+        held_out::interval(self.dataset, &self.samples[at], self.normal)
+    }
+
+    fn speak(&self, checkpoint: &EvaluatedCheckpoint, store: &MotionStore) -> Result<SpokenIntervals> {
+        let (mut matched, mut mismatched, mut joints) = (Vec::new(), Vec::new(), vec![true; N_JOINTS]);
+        for at in 0..self.samples.len() {
+            let HeldOutInterval { sound, words, .. } = self.interval(at)?;
+            let made = self.motion(checkpoint, at, &sound, &words)?;
+            for (joint, is_known) in joints.iter_mut().enumerate() {
+                *is_known &= made.slice(s![.., joint, ..]).iter().all(|v| v.is_finite());
+            }
+            matched.push(store.keep(made)?);
+            let read = |of: usize, range| Ok(self.dataset.sound(&self.samples[of], range)?.samples);
+            let samples = predictor::turned(&self.n_sound_samples, at, read)?;
+            let words = predictor::turned_words(&self.n_sound_samples, sound.rate, &self.words, at);
+            let other = Sound { rate: sound.rate, samples };
+            mismatched.push(store.keep(self.motion(checkpoint, at, &other, &words)?)?);
         }
-        Ok(if has_channels { held_out::with_posture(&made.joints, posture.as_ref()) } else { made.joints })
-    };
-    let all = 0..held_out.len();
-    let matched = all.clone().map(|at| motion(at, sounds[at], words[at])).collect::<Result<Vec<_>>>()?;
-    let mismatched = all
-        .map(|at| motion(at, &predictor::turned(&sounds, at), &predictor::turned_words(&sounds, &words, at)))
-        .collect::<Result<Vec<_>>>()?;
-    let is_known =
-        |joint: usize| matched.iter().all(|made| made.slice(s![.., joint, ..]).iter().all(|v| v.is_finite()));
-    let joints = (0..N_JOINTS).map(is_known).collect();
-    Ok(SpokenIntervals { matched, mismatched, joints })
+        Ok(SpokenIntervals { matched, mismatched, joints })
+    }
+
+    /// What a network makes of a sound and words, for the frames of an interval.
+    fn motion(
+        &self,
+        checkpoint: &EvaluatedCheckpoint,
+        at: usize,
+        sound: &Sound,
+        words: &[Word],
+    ) -> Result<Array3<f32>> {
+        let (sample, own) = (&self.samples[at], checkpoint.speaker.normalisation());
+        let made = checkpoint.motion(sound, words, sample.n_frames, self.dataset.info().fps);
+        let (mut made, posture) = made.with_context(|| format!("no motion for {}", sample.key))?;
+        if own.is_none_or(|own| own.bone_lengths != self.normal.bone_lengths) {
+            bones::with_lengths(&mut made, &held_out::lengths(self.normal));
+        }
+        Ok(if self.has_channels { held_out::with_posture(&made.joints, posture.as_ref()) } else { made.joints })
+    }
+
+    /// The interval beside what was made for it.
+    fn clip(&self, at: usize, made: &StoredMotion, store: &MotionStore) -> Result<EvalClip> {
+        let HeldOutInterval { key, mut ground_truth, posture, sound, .. } = self.interval(at)?;
+        if self.has_channels {
+            ground_truth.joints = held_out::with_posture(&ground_truth.joints, posture.as_ref());
+        }
+        let fps = self.dataset.info().fps;
+        let features = Some(sound_features::from_samples(&sound.samples, fps, ground_truth.n_frames()));
+        let mut predicted = made.view().to_owned();
+        let (mask, n_missing) = compared(&ground_truth.joints, &ground_truth.mask, &mut predicted);
+        let predicted = if n_missing == 0 { made.clone() } else { store.keep(predicted)? };
+        let audio = Some(ClipAudio::of_sample(self.dataset, &self.samples[at]));
+        Ok(EvalClip { name: key, ground_truth: store.keep(ground_truth.joints)?, predicted, mask, features, audio })
+    }
 }
 
 /// Leaves the joints `common` to be compared; the others of the prediction are missing.
-fn restrict(clips: &mut EvalClips, common: &[usize]) {
+fn restrict(clips: &mut EvalClips, common: &[usize], store: &MotionStore) -> Result<()> {
     for clip in &mut clips.clips {
+        let mut predicted = clip.predicted.view().to_owned();
         for joint in (0..N_JOINTS).filter(|joint| !common.contains(joint)) {
             clip.mask.column_mut(joint).fill(false);
-            clip.predicted.slice_mut(s![.., joint, ..]).fill(f32::NAN);
+            predicted.slice_mut(s![.., joint, ..]).fill(f32::NAN);
         }
+        clip.predicted = store.keep(predicted)?;
     }
-}
-
-fn clip(held_out: HeldOutInterval, predicted: Array3<f32>, fps: FrameRate, has_channels: bool) -> EvalClip {
-    let HeldOutInterval { key, mut ground_truth, posture, sound, .. } = held_out;
-    if has_channels {
-        ground_truth.joints = held_out::with_posture(&ground_truth.joints, posture.as_ref());
-    }
-    let features = Some(sound_features::from_samples(&sound.samples, fps, ground_truth.n_frames()));
-    let mut predicted = predicted;
-    let (mask, _) = compared(&ground_truth.joints, &ground_truth.mask, &mut predicted);
-    let audio = Some(ClipAudio::Kept(sound.samples.into_iter().map(pcm).collect()));
-    EvalClip { name: key, ground_truth: ground_truth.joints, predicted, mask, features, audio }
+    Ok(())
 }
 
 /// What is measured beside the joints: channels that a checkpoint makes and that the split shows.
-fn channels(checkpoints: &[EvaluatedCheckpoint], held_out: &[HeldOutInterval]) -> Vec<PostureChannel> {
-    let learnt = |channel: PostureChannel| {
-        let of = |normal: &Normalisation| normal.channels.iter().any(|own| own.channel == channel);
+fn channels(
+    dataset: &Dataset,
+    samples: &[SampleRef],
+    checkpoints: &[EvaluatedCheckpoint],
+) -> Result<Vec<PostureChannel>> {
+    let learnt = |channel: &PostureChannel| {
+        let of = |normal: &Normalisation| normal.channels.iter().any(|own| own.channel == *channel);
         checkpoints.iter().filter_map(|of| of.speaker.normalisation()).any(of)
     };
-    let is_seen = |channel: PostureChannel| {
-        let mut postures = held_out.iter().filter_map(|interval| interval.posture.as_ref());
-        postures.any(|posture| posture.channel(channel).iter().any(|v| v.is_finite()))
-    };
-    PostureChannel::ALL.into_iter().filter(|channel| learnt(*channel) && is_seen(*channel)).collect()
+    let learnt: Vec<PostureChannel> = PostureChannel::ALL.into_iter().filter(learnt).collect();
+    let mut seen = Vec::new();
+    for sample in samples {
+        if seen.len() == learnt.len() {
+            break;
+        }
+        let Some(posture) = dataset.posture(sample, 0..sample.n_frames)? else { continue };
+        let is_new = |channel: &&PostureChannel| !seen.contains(*channel);
+        let new = learnt.iter().filter(is_new).filter(|of| posture.channel(**of).iter().any(|v| v.is_finite()));
+        let new: Vec<PostureChannel> = new.copied().collect();
+        seen.extend(new);
+    }
+    Ok(learnt.into_iter().filter(|channel| seen.contains(channel)).collect())
 }
 
 /// The mean posture of a checkpoint's training split, one frame; `None`: it learns none.
@@ -207,7 +261,7 @@ fn constant_poses(
 ) -> Result<Vec<Predictor>> {
     let mut constant_poses = ConstantPoses::default();
     for sample in dataset.samples(Split::Train) {
-        let interval = held_out::read(dataset, &[sample], normal)?.remove(0);
+        let interval = held_out::interval(dataset, &sample, normal)?;
         constant_poses.add(interval.ground_truth.joints.view(), interval.ground_truth.mask.view());
     }
     let mean: Array2<f32> = normal.joints(Array2::zeros((N_FEATURES, 1)).view()).slice(s![0, .., ..]).to_owned();
@@ -231,33 +285,26 @@ pub fn copied(
     normal: &Normalisation,
     clips: &EvalClips,
     split: Split,
+    store: &MotionStore,
 ) -> Result<Option<Vec<ClipMotion>>> {
-    let rows = |clip: &EvalClip| clip.features.as_ref().map(|features| features.rows.clone()).unwrap_or_default();
-    let rows: Vec<Vec<f32>> = clips.clips.iter().map(rows).collect();
-    let query: Vec<Query> =
-        clips.clips.iter().zip(&rows).map(|(clip, rows)| Query { rows, n_frames: clip.n_frames() }).collect();
+    let mut query = Vec::new();
+    for clip in &clips.clips {
+        let rows: &[f32] = clip.features.as_ref().map_or(&[], |features| &features.rows);
+        query.push(Query { rows, n_frames: clip.n_frames() });
+    }
     let samples = dataset.samples(Split::Train);
-    let read = |entry: usize| -> Result<HeldOutInterval> {
-        held_out::read(dataset, &samples[entry..=entry], normal)?.pop().context("no such interval")
-    };
     let library = Library {
         n: samples.len(),
         asks_itself: split == Split::Train,
         features: &|entry| {
-            let interval = read(entry)?;
+            let interval = held_out::interval(dataset, &samples[entry], normal)?;
             let mut listener = SoundFeatureExtractor::new(interval.ground_truth.fps, None);
             listener.push(&interval.sound.samples);
             let n_frames = interval.ground_truth.n_frames();
             Ok(Some((listener.finish(n_frames).rows, n_frames)))
         },
-        joints: &|entry| {
-            let HeldOutInterval { ground_truth, posture, .. } = read(entry)?;
-            Ok(match clips.channels.is_empty() {
-                true => ground_truth.joints,
-                false => held_out::with_posture(&ground_truth.joints, posture.as_ref()),
-            })
-        },
+        joints: &|entry, frames| held_out::joints(dataset, &samples[entry], normal, frames, !clips.channels.is_empty()),
     };
-    let predicted = neighbour::motions(&query, &library, clips.fps)?;
+    let predicted = neighbour::motions(&query, &library, clips.fps, store)?;
     Ok(predicted.map(|predicted| predicted.into_iter().map(ClipMotion::Motion).collect()))
 }

@@ -34,7 +34,7 @@ pub fn measure(catalogue: &Catalogue, clips: &EvalClips, predictor: &Predictor, 
             });
             let interval = MotionPair {
                 predicted: predicted.slice(s![frames.clone(), .., ..]),
-                ground_truth: of.ground_truth.slice(s![frames.clone(), .., ..]),
+                ground_truth: of.ground_truth.view().slice_move(s![frames.clone(), .., ..]),
                 mask: of.mask.slice(s![frames, ..]),
                 fps: clips.fps,
                 onsets: onsets.as_deref(),
@@ -93,7 +93,7 @@ pub fn halves(catalogue: &Catalogue, clips: &EvalClips) -> IntervalSums {
     let beside = |pair: &[(usize, usize)]| {
         let part = |(clip, start): (usize, usize)| {
             let (clip, frames) = (&clips.clips[clip], start..start + length);
-            (clip.ground_truth.slice(s![frames.clone(), .., ..]), clip.mask.slice(s![frames, ..]))
+            (clip.ground_truth.view().slice_move(s![frames.clone(), .., ..]), clip.mask.slice(s![frames, ..]))
         };
         let ((ground_truth, seen), (predicted, also)) = (part(pair[0]), part(pair[1]));
         let mut mask = seen.to_owned();

@@ -82,6 +82,27 @@ impl StreamDecoder {
         }
     }
 
+    /// Goes back or forth to the last place at or before `ticks` of the stream's clock from which decoding can begin, as far
+    /// as the container knows. The frames that come next may be those of another place, or flawed.
+    pub fn seek(&mut self, ticks: i64) -> Result<()> {
+        // SAFETY: the context is ours alone, and the stream is one of its streams.
+        let code = unsafe {
+            ffmpeg::ffi::av_seek_frame(
+                self.input.as_mut_ptr(),
+                self.stream_idx as i32,
+                ticks,
+                ffmpeg::ffi::AVSEEK_FLAG_BACKWARD,
+            )
+        };
+        if code < 0 {
+            let error = ffmpeg::Error::from(code);
+            return Err(error).with_context(|| format!("cannot go to another place of {}", self.path.display()));
+        }
+        self.decoder.flush();
+        self.draining = false;
+        Ok(())
+    }
+
     /// Passes the next packet to the decoder, or the end of the stream.
     fn feed(&mut self) -> Result<()> {
         let mut packet = Packet::empty();

@@ -14,12 +14,15 @@ use super::source::{LONGEST_GAP_SECS, UnreadableMedia};
 use super::tone_map::HdrTransfer;
 use crate::types::image::{Image, PictureOptions};
 use crate::types::time::FrameRate;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use ffmpeg_next::frame;
 use std::path::{Path, PathBuf};
 
 /// Largest number of sizes whose conversion is kept ready.
 const MOST_CONVERTERS: usize = 8;
+/// Time before a place at which decoding begins at the latest to get there, seconds: pictures at a place to begin may refer
+/// to earlier ones.
+const LEAD_SECS: f64 = 1.0;
 /// Shapes whose sides' ratios differ by less than this share are one.
 const SAME_SHAPE: f64 = 0.01;
 
@@ -80,6 +83,8 @@ pub struct FrameReader {
     shown: SourceFrame,
     following: Option<SourceFrame>,
     next_idx: usize,
+    /// Output frame that is not read, nor those after it.
+    end_idx: usize,
     last_shown: Option<i64>,
     last_size: [usize; 2],
     /// Latest plausible time, seconds.
@@ -128,6 +133,7 @@ impl FrameReader {
             shown,
             following: None,
             next_idx: 0,
+            end_idx: usize::MAX,
             last_shown: None,
             last_size: image_size,
             latest_secs,
@@ -136,6 +142,37 @@ impl FrameReader {
         };
         reader.following = reader.decode_after(0)?;
         Ok(reader)
+    }
+
+    /// Goes to output frame `frame_idx`, which shows the source frame at `source_secs` as an earlier reading from the start
+    /// told: `advance` gives it next, as not repeated. Decoding begins where the container says that it can, at least
+    /// `LEAD_SECS` earlier, so that few frames are decoded in vain.
+    ///
+    /// # Errors
+    /// A container that cannot go there; no source frame of exactly that time.
+    pub fn go_to(&mut self, frame_idx: usize, source_secs: f64) -> Result<()> {
+        let ticks = (source_secs / f64::from(self.decode.time_base())).round() as i64;
+        let lead = (LEAD_SECS / f64::from(self.decode.time_base())).round() as i64;
+        self.decode.seek(self.origin.saturating_add(ticks - lead))?;
+        let mut frame = frame::Video::empty();
+        loop {
+            let found = if self.decode.next(&mut frame)? { frame.timestamp() } else { None };
+            match found.map(|at| at.saturating_sub(self.origin)) {
+                Some(at) if at < ticks => {}
+                Some(at) if at == ticks => break,
+                _ => bail!("{} shows no picture at {source_secs:.3} s when begun nearby", self.path.display()),
+            }
+        }
+        self.shown = SourceFrame { frame, ticks };
+        self.following = self.decode_after(ticks)?;
+        (self.next_idx, self.last_shown) = (frame_idx, None);
+        Ok(())
+    }
+
+    /// Ends before output frame `frame_idx`, if not earlier.
+    #[must_use]
+    pub fn until(self, frame_idx: usize) -> Self {
+        Self { end_idx: frame_idx, ..self }
     }
 
     /// Reads the pictures by `options` from now on.
@@ -196,6 +233,9 @@ impl FrameReader {
     /// Times of the next output frame, whose picture `picture` then returns; `None` at the end.
     pub fn advance(&mut self) -> Result<Option<FrameTime>> {
         let frame_idx = self.next_idx;
+        if frame_idx >= self.end_idx {
+            return Ok(None);
+        }
         while let Some(following) = &self.following {
             if self.is_before_middle(frame_idx, self.shown.ticks, following.ticks) {
                 break;

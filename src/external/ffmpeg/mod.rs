@@ -1,5 +1,5 @@
 //! The only folder that uses ffmpeg: `probe` (headers), `frames` (pictures at a chosen rate; `ahead` in parallel),
-//! `audio` (sound on the same clock; `sound_stream` on demand), `encode` (mp4), `jpeg`. Below them: `source` opens
+//! `audio` (sound on the same clock; `sound_stream` on demand), `write` (mp4, excerpts), `jpeg`. Below them: `source` opens
 //! files, `decode` decodes one stream, `picture` converts to upright RGB by `orientation`, `deinterlace` and `tone_map`.
 //! Time 0 is the first picture that decodes (`origin`); without pictures it is the first sample.
 
@@ -7,7 +7,6 @@ pub mod ahead;
 pub mod audio;
 pub mod decode;
 pub mod deinterlace;
-pub mod encode;
 pub mod frames;
 pub mod jpeg;
 pub mod library;
@@ -19,6 +18,7 @@ pub mod resample;
 pub mod sound_stream;
 pub mod source;
 pub mod tone_map;
+pub mod write;
 
 pub use library::version;
 pub use source::UnreadableMedia;

@@ -3,6 +3,7 @@
 
 use super::tensor::{GRAIN, LANES, OutputStart, Scalar, written};
 use super::thread_team::{parallel_for, parallel_map};
+use super::vectorised::vectorised;
 use rayon::prelude::*;
 
 /// Numbers summed before the sum goes on in f64, and numbers one task takes.
@@ -23,17 +24,10 @@ impl ChannelMoments {
         let mut all = Self::default();
         for block in values.chunks(whole_rows(BLOCK, n_channels)) {
             let n = (block.len() / n_channels) as f64;
-            let mean: Vec<T> = block_sums(block, n_channels).iter().map(|s| T::from_f64(s.to_f64() / n)).collect();
-            let (mut squares, mut first) = (vec![T::zero(); n_channels], 0);
-            let (wide, rest) = squares.as_chunks_mut::<LANES>();
-            for (sums, mean) in wide.iter_mut().zip(mean.as_chunks().0) {
-                *sums = sums_of_squares(block, n_channels, first, mean);
-                first += LANES;
-            }
-            for (sum, mean) in rest.iter_mut().zip(&mean[first..]) {
-                [*sum] = sums_of_squares(block, n_channels, first, &[*mean]);
-                first += 1;
-            }
+            let (mut mean, mut squares) = (vec![T::zero(); n_channels], vec![T::zero(); n_channels]);
+            block_sums(block, &mut mean);
+            mean.iter_mut().for_each(|sum| *sum = T::from_f64(sum.to_f64() / n));
+            block_squares(block, &mean, &mut squares);
             let f64s = |values: Vec<T>| values.into_iter().map(|v| v.to_f64()).collect();
             all = all.and(&Self { n, mean: f64s(mean), squares: f64s(squares) });
         }
@@ -59,13 +53,22 @@ fn whole_rows(n: usize, n_channels: usize) -> usize {
     (n / n_channels).max(1) * n_channels
 }
 
-fn block_sums<T: Scalar>(block: &[T], n_channels: usize) -> Vec<T> {
+vectorised!(
+    /// The sum of each channel over some rows.
+    block_sums = block_sums_body(block: &[T], sums: &mut [T])
+);
+
+#[inline(always)]
+fn block_sums_body<T: Scalar>(block: &[T], sums: &mut [T]) {
+    #[inline(always)]
     fn some<T: Scalar, const N: usize>(block: &[T], n_channels: usize, first: usize) -> [T; N] {
         let mut sums = [T::zero(); N];
-        rows(block, n_channels, first).for_each(|row: &[T; N]| (0..N).for_each(|i| sums[i] += row[i]));
+        for row in rows::<T, N>(block, n_channels, first) {
+            (0..N).for_each(|i| sums[i] += row[i]);
+        }
         sums
     }
-    let (mut sums, mut first) = (vec![T::zero(); n_channels], 0);
+    let (n_channels, mut first) = (sums.len(), 0);
     let (wide, rest) = sums.as_chunks_mut::<LANES>();
     for sums in wide {
         *sums = some(block, n_channels, first);
@@ -75,14 +78,34 @@ fn block_sums<T: Scalar>(block: &[T], n_channels: usize) -> Vec<T> {
         [*sum] = some(block, n_channels, first);
         first += 1;
     }
-    sums
+}
+
+vectorised!(
+    /// The sum of each channel's squared distances to `mean` over some rows.
+    block_squares = block_squares_body(block: &[T], mean: &[T], squares: &mut [T])
+);
+
+#[inline(always)]
+fn block_squares_body<T: Scalar>(block: &[T], mean: &[T], squares: &mut [T]) {
+    let (n_channels, mut first) = (mean.len(), 0);
+    let (wide, rest) = squares.as_chunks_mut::<LANES>();
+    for (sums, mean) in wide.iter_mut().zip(mean.as_chunks().0) {
+        *sums = sums_of_squares(block, n_channels, first, mean);
+        first += LANES;
+    }
+    for (sum, mean) in rest.iter_mut().zip(&mean[first..]) {
+        [*sum] = sums_of_squares(block, n_channels, first, &[*mean]);
+        first += 1;
+    }
 }
 
 /// `N` channels from `first` on of every row.
+#[inline(always)]
 fn rows<T, const N: usize>(block: &[T], n_channels: usize, first: usize) -> impl Iterator<Item = &[T; N]> {
     block.chunks_exact(n_channels).filter_map(move |row| row.get(first..)?.first_chunk())
 }
 
+#[inline(always)]
 fn sums_of_squares<T: Scalar, const N: usize>(block: &[T], n_channels: usize, first: usize, mean: &[T; N]) -> [T; N] {
     let mut sums = [T::zero(); N];
     for row in rows::<T, N>(block, n_channels, first) {
@@ -97,10 +120,10 @@ fn sums_of_squares<T: Scalar, const N: usize>(block: &[T], n_channels: usize, fi
 /// The sum of each channel.
 pub fn sums<T: Scalar>(values: &[T], n_channels: usize) -> Vec<f64> {
     let of_task = |task: &[T]| {
-        let mut sums = vec![0.0; n_channels];
+        let (mut sums, mut of_block) = (vec![0.0; n_channels], vec![T::zero(); n_channels]);
         for block in task.chunks(whole_rows(BLOCK, n_channels)) {
-            let of_block = block_sums(block, n_channels);
-            sums.iter_mut().zip(of_block).for_each(|(sum, value)| *sum += value.to_f64());
+            block_sums(block, &mut of_block);
+            sums.iter_mut().zip(&of_block).for_each(|(sum, value)| *sum += value.to_f64());
         }
         sums
     };
@@ -126,17 +149,7 @@ pub struct Norm<T> {
 impl<T: Scalar> Norm<T> {
     /// `z` overwritten with the result.
     pub fn apply(&self, z: &mut [T]) {
-        let (scale, scale_rest) = self.scale.as_chunks::<LANES>();
-        let (shift, shift_rest) = self.shift.as_chunks::<LANES>();
-        for row in z.chunks_exact_mut(self.scale.len()) {
-            let (wide, rest) = row.as_chunks_mut::<LANES>();
-            for ((z, scale), shift) in wide.iter_mut().zip(scale).zip(shift) {
-                *z = self.result(z, scale, shift);
-            }
-            for ((z, scale), shift) in rest.iter_mut().zip(scale_rest).zip(shift_rest) {
-                [*z] = self.result(&[*z], &[*scale], &[*shift]);
-            }
-        }
+        apply_rows(self, z);
     }
 
     /// Rows of `z` that one task takes, as numbers.
@@ -195,12 +208,7 @@ impl<T: Scalar> Norm<T> {
         let of_task = |(z, grad): (&[T], &[T])| {
             let mut sums = vec![0.0; 2 * n];
             for (z, grad) in z.chunks(whole_rows(BLOCK, n)).zip(grad.chunks(whole_rows(BLOCK, n))) {
-                let mut first = 0;
-                while first + LANES <= n {
-                    self.add_sums::<LANES>(z, grad, first, &mut sums);
-                    first += LANES;
-                }
-                (first..n).for_each(|first| self.add_sums::<1>(z, grad, first, &mut sums));
+                sum_gradient(self, z, grad, &mut sums);
             }
             sums
         };
@@ -212,6 +220,7 @@ impl<T: Scalar> Norm<T> {
     }
 
     /// Adds both sums of `N` channels over a block to `sums`.
+    #[inline(always)]
     fn add_sums<const N: usize>(&self, z: &[T], grad: &[T], first: usize, sums: &mut [f64]) {
         let n = self.scale.len();
         let some = |values: &[T]| std::array::from_fn::<T, N, _>(|i| values[first + i]);
@@ -239,30 +248,82 @@ impl<T: Scalar> Norm<T> {
         let chunk = whole_rows(TASK, n);
         let channels = |i: usize| (self.scale[i], self.shift[i], offset[i], linear[i]);
         let n_wide = n / LANES;
-        let wide: Vec<NormGradient<T, LANES>> =
-            (0..n_wide).map(|i| NormGradient::new(|lane| channels(i * LANES + lane))).collect();
-        let rest: Vec<NormGradient<T, 1>> = (n_wide * LANES..n).map(|i| NormGradient::new(|_| channels(i))).collect();
+        let turns = NormGradients {
+            wide: (0..n_wide).map(|i| NormGradient::new(|lane| channels(i * LANES + lane))).collect(),
+            rest: (n_wide * LANES..n).map(|i| NormGradient::new(|_| channels(i))).collect(),
+        };
         let (n_all, start) = (z.len(), OutputStart::new(z));
         parallel_for(n_all.div_ceil(chunk), |task| {
             let part = task * chunk..n_all.min((task + 1) * chunk);
             // SAFETY: every task's part of `z` is its own.
             let z = unsafe { std::slice::from_raw_parts_mut(start.at(part.start), part.len()) };
-            let grad = &grad[part];
-            for (z, grad) in z.chunks_exact_mut(n).zip(grad.chunks_exact(n)) {
-                let ((z, z_rest), (grad, grad_rest)) = (z.as_chunks_mut(), grad.as_chunks());
-                for ((z, grad), turn) in z.iter_mut().zip(grad).zip(&wide) {
-                    *z = turn.turned(self, z, grad);
-                }
-                for ((z, grad), turn) in z_rest.iter_mut().zip(grad_rest).zip(&rest) {
-                    [*z] = turn.turned(self, &[*z], &[*grad]);
-                }
-            }
+            turn_rows(self, &turns, z, &grad[part]);
         });
     }
 }
 
+vectorised!(
+    /// [`Norm::apply`].
+    apply_rows = apply_rows_body(norm: &Norm<T>, z: &mut [T])
+);
+
+#[inline(always)]
+fn apply_rows_body<T: Scalar>(norm: &Norm<T>, z: &mut [T]) {
+    let (scale, scale_rest) = norm.scale.as_chunks::<LANES>();
+    let (shift, shift_rest) = norm.shift.as_chunks::<LANES>();
+    for row in z.chunks_exact_mut(norm.scale.len()) {
+        let (wide, rest) = row.as_chunks_mut::<LANES>();
+        for ((z, scale), shift) in wide.iter_mut().zip(scale).zip(shift) {
+            *z = norm.result(z, scale, shift);
+        }
+        for ((z, scale), shift) in rest.iter_mut().zip(scale_rest).zip(shift_rest) {
+            [*z] = norm.result(&[*z], &[*scale], &[*shift]);
+        }
+    }
+}
+
+vectorised!(
+    /// Adds the sums of [`Norm::sums_of_gradient`] over some rows, one kind after the other.
+    sum_gradient = sum_gradient_body(norm: &Norm<T>, z: &[T], grad: &[T], sums: &mut [f64])
+);
+
+#[inline(always)]
+fn sum_gradient_body<T: Scalar>(norm: &Norm<T>, z: &[T], grad: &[T], sums: &mut [f64]) {
+    let (n, mut first) = (norm.scale.len(), 0);
+    while first + LANES <= n {
+        norm.add_sums::<LANES>(z, grad, first, sums);
+        first += LANES;
+    }
+    (first..n).for_each(|first| norm.add_sums::<1>(z, grad, first, sums));
+}
+
+vectorised!(
+    /// [`Norm::backward`] of some rows.
+    turn_rows = turn_rows_body(norm: &Norm<T>, turns: &NormGradients<T>, z: &mut [T], grad: &[T])
+);
+
+#[inline(always)]
+fn turn_rows_body<T: Scalar>(norm: &Norm<T>, turns: &NormGradients<T>, z: &mut [T], grad: &[T]) {
+    let n = norm.scale.len();
+    for (z, grad) in z.chunks_exact_mut(n).zip(grad.chunks_exact(n)) {
+        let ((z, z_rest), (grad, grad_rest)) = (z.as_chunks_mut(), grad.as_chunks());
+        for ((z, grad), turn) in z.iter_mut().zip(grad).zip(&turns.wide) {
+            *z = turn.turned(norm, z, grad);
+        }
+        for ((z, grad), turn) in z_rest.iter_mut().zip(grad_rest).zip(&turns.rest) {
+            [*z] = turn.turned(norm, &[*z], &[*grad]);
+        }
+    }
+}
+
+/// The channels of a [`Norm::backward`], some at once and those left over.
+pub struct NormGradients<T> {
+    wide: Vec<NormGradient<T, LANES>>,
+    rest: Vec<NormGradient<T, 1>>,
+}
+
 /// What turns `z` of `N` channels into its gradient.
-struct NormGradient<T, const N: usize> {
+pub struct NormGradient<T, const N: usize> {
     scale: [T; N],
     shift: [T; N],
     offset: [T; N],

@@ -5,6 +5,7 @@ pub mod axis;
 pub mod channel_stats;
 pub mod direct_conv;
 pub mod exponential;
+pub mod frames;
 pub mod kernel;
 pub mod packed_matrix;
 pub mod packed_weights;

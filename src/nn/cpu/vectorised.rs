@@ -35,6 +35,8 @@ macro_rules! vectorised {
     };
 }
 
+pub(super) use vectorised;
+
 vectorised!(
     /// Gates of a GRU. Rows of `sums` hold, each `width` long, what goes into the candidate from the input, into the reset
     /// gate, into the update gate, and into the candidate from the state; they become candidate n, reset r, update z, and

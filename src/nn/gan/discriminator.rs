@@ -3,6 +3,7 @@
 
 use super::conv_block::{ConvBlock, MOMENTUM, SLOPE};
 use crate::nn::ops::conv2d::Conv;
+use crate::nn::ops::resize;
 use crate::nn::params::Params;
 use candle_core::{Result, Tensor};
 
@@ -31,11 +32,11 @@ impl Discriminator {
 
     /// Differences [B, n_in, T - 1] to scores [B, 1, about T / 4]; 1 means real, 0 generated.
     pub fn forward(&self, motion: &Tensor, train: bool) -> Result<Tensor> {
-        let mut x = candle_nn::ops::leaky_relu(&self.first.forward(&motion.t()?)?, SLOPE)?;
+        let mut x = candle_nn::ops::leaky_relu(&self.first.forward(&resize::transposed(motion)?)?, SLOPE)?;
         for block in &self.blocks {
             x = block.forward(&x, train)?;
         }
-        self.last.forward(&x)?.t()?.contiguous()
+        resize::transposed(&self.last.forward(&x)?)
     }
 }
 

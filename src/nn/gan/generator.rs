@@ -131,46 +131,46 @@ impl Generator {
         self.decode(&resize::linear(&self.encode(mels, speakers, train)?, n_frames)?, train)
     }
 
-    /// `mels` [B, n_mels, T_mel] to encoded sound [B, width, about T_mel / 8]. `speakers`: the number of each sound's
+    /// `mels` [B, n_mels, T_mel] to encoded sound [B, about T_mel / 8, width]. `speakers`: the number of each sound's
     /// speaker, which a network of one does not ask for.
     pub fn encode(&self, mels: &Tensor, speakers: &[u32], train: bool) -> Result<Tensor> {
+        let mels = resize::transposed(mels)?;
         let encoded = match self.preset {
-            Preset::Light => through(&self.audio_encoder, mels.t()?, train)?,
-            Preset::Paper => through(&self.audio_encoder, mels.t()?.unsqueeze(3)?, train)?.squeeze(2)?,
+            Preset::Light => through(&self.audio_encoder, mels, train)?,
+            Preset::Paper => through(&self.audio_encoder, mels.unsqueeze(3)?, train)?.squeeze(2)?,
         };
-        let encoded = encoded.t()?.contiguous()?;
         match &self.embedding {
             None => Ok(encoded),
             Some(table) => encoded.broadcast_add(&of_speakers(table, speakers, encoded.dim(0)?)?),
         }
     }
 
-    /// Encoded sound at every pose frame, [B, width, T], to poses [B, n_out, T]; T is a multiple of
+    /// Encoded sound at every pose frame, [B, T, width], to poses [B, n_out, T]; T is a multiple of
     /// [`FRAMES_MULTIPLE`].
     pub fn decode(&self, x: &Tensor, train: bool) -> Result<Tensor> {
-        let mut x = through(&self.enter, x.t()?, train)?;
+        let mut x = through(&self.enter, x.clone(), train)?;
         let mut skips = Vec::new();
         for block in &self.downs {
             let down = block.forward(&x, train)?;
             skips.push(std::mem::replace(&mut x, down));
         }
         for (block, skip) in self.ups.iter().zip(skips.iter().rev()) {
-            x = block.forward(&(resize::twice(&x)? + skip)?, train)?;
+            x = block.forward(&resize::twice_plus(&x, skip)?, train)?;
         }
-        self.last.forward(&through(&self.decoder, x, train)?)?.t()?.contiguous()
+        resize::transposed(&self.last.forward(&through(&self.decoder, x, train)?)?)
     }
 }
 
-/// Vectors [`n_sounds` or 1, width, 1] of the speakers of so many sounds.
+/// Vectors [`n_sounds` or 1, 1, width] of the speakers of so many sounds.
 fn of_speakers(table: &Tensor, speakers: &[u32], n_sounds: usize) -> Result<Tensor> {
     let n_speakers = table.dim(0)?;
     if n_speakers == 1 {
-        return table.i(0)?.reshape((1, (), 1));
+        return table.i(0)?.reshape((1, 1, ()));
     }
     if speakers.len() != n_sounds || speakers.iter().any(|speaker| *speaker as usize >= n_speakers) {
         candle_core::bail!("{n_sounds} sounds are of speakers {speakers:?}; the network knows {n_speakers}");
     }
-    table.index_select(&Tensor::new(speakers, table.device())?, 0)?.unsqueeze(2)
+    table.index_select(&Tensor::new(speakers, table.device())?, 0)?.unsqueeze(1)
 }
 
 /// One block after the other.
@@ -243,7 +243,7 @@ mod tests {
         let difference = (added(&[2, 1])? - added(&[0, 1])?)?;
         let table = &params.tensors()?[SPEAKER_EMBEDDING];
         let expected =
-            (table.i(2)? - table.i(0)?)?.reshape((1, 8, 1))?.broadcast_as(difference.narrow(0, 0, 1)?.shape())?;
+            (table.i(2)? - table.i(0)?)?.reshape((1, 1, 8))?.broadcast_as(difference.narrow(0, 0, 1)?.shape())?;
         let worst_of = |a: &Tensor| a.abs()?.flatten_all()?.max(0)?.to_scalar::<f64>();
         assert!(worst_of(&(difference.narrow(0, 0, 1)? - expected)?)? < 1e-12);
         assert_eq!(worst_of(&difference.narrow(0, 1, 1)?)?, 0.0);

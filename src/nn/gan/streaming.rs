@@ -49,7 +49,7 @@ pub struct StreamingGenerator<'a, M> {
     chunk: usize,
     /// First frame that is not generated yet.
     next: usize,
-    /// Results of the audio encoder that later chunks need, [1, width, n], and which is the first of them.
+    /// Results of the audio encoder that later chunks need, [1, n, width], and which is the first of them.
     encoded: Option<Tensor>,
     first_encoded: usize,
 }
@@ -83,7 +83,7 @@ impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> StreamingGenerator<'a, M> {
         let needed = part.needed();
         self.encode_until(needed.clone(), n_encoded)?;
         let Some(encoded) = &self.encoded else { candle_core::bail!("nothing was heard") };
-        let encoded = encoded.narrow(2, needed.start - self.first_encoded, needed.len())?;
+        let encoded = encoded.narrow(1, needed.start - self.first_encoded, needed.len())?;
         let poses = self.generator.decode(&resize::linear_part(&encoded, &part)?, false)?;
         poses.narrow(2, frames.start - first, frames.len())
     }
@@ -93,8 +93,8 @@ impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> StreamingGenerator<'a, M> {
         let mut parts = Vec::new();
         let mut end = needed.start;
         if let Some(encoded) = self.encoded.take() {
-            end = self.first_encoded + encoded.dim(2)?;
-            parts.push(encoded.narrow(2, needed.start - self.first_encoded, end - needed.start)?);
+            end = self.first_encoded + encoded.dim(1)?;
+            parts.push(encoded.narrow(1, needed.start - self.first_encoded, end - needed.start)?);
         }
         self.first_encoded = needed.start;
         while end < needed.end {
@@ -103,7 +103,7 @@ impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> StreamingGenerator<'a, M> {
             parts.push(self.encode(piece, n_encoded)?);
         }
         // A copy, so that what is let go of is freed.
-        self.encoded = Some(Tensor::cat(&parts, 2)?.force_contiguous()?);
+        self.encoded = Some(Tensor::cat(&parts, 1)?.force_contiguous()?);
         Ok(())
     }
 
@@ -115,7 +115,7 @@ impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> StreamingGenerator<'a, M> {
             end => ((end - 1) * HOPS + heard_behind(self.preset) + 1).min(self.n_mel_frames),
         };
         let encoded = self.generator.encode(&(self.mels)(first * HOPS..end)?, &[], false)?;
-        encoded.narrow(2, piece.start - first, piece.len())
+        encoded.narrow(1, piece.start - first, piece.len())
     }
 }
 

@@ -1,23 +1,36 @@
-//! Changing the number of frames: twice as many by repetition, any number by linear interpolation.
+//! Changing the number of frames, channels last: twice as many by repetition, any number by linear interpolation; and
+//! channels first made channels last.
 
-use candle_core::{Result, Tensor};
+use super::operator::{CpuOperator, CustomOperator, Operand};
+use crate::nn::cpu::frames::{FrameMixture, transpose};
+use crate::nn::cpu::tensor::Scalar;
+use crate::nn::device;
+use candle_core::{Result, Shape, Tensor};
 use std::ops::Range;
 
-/// Every frame twice: [B, T, C] to [B, 2T, C]. By index: the stock resize overwrites the gradient where `x` is used again.
+/// Every frame twice: [B, T, C] to [B, 2T, C].
 pub fn twice(x: &Tensor) -> Result<Tensor> {
-    let frames = Tensor::from_iter((0..2 * x.dim(1)? as u32).map(|i| i / 2), x.device())?;
-    x.contiguous()?.index_select(&frames, 1)
+    mix(x, None, doubled(x.dim(1)?))
 }
 
-/// Linear interpolation to `n_out` frames, [B, C, T] to [B, C, n_out], as TensorFlow 1 does without aligned corners:
+/// Every frame of `x` [B, T, C] twice, plus `skip` [B, 2T, C].
+pub fn twice_plus(x: &Tensor, skip: &Tensor) -> Result<Tensor> {
+    mix(x, Some(skip), doubled(x.dim(1)?))
+}
+
+fn doubled(n_in: usize) -> FrameMixture {
+    FrameMixture { n_in, of: (0..2 * n_in).map(|i| (i / 2, i / 2, 0.0)).collect() }
+}
+
+/// Linear interpolation to `n_out` frames, [B, T, C] to [B, n_out, C], as TensorFlow 1 does without aligned corners:
 /// frame i of the result lies at i * T / n_out, the last frame is held.
 pub fn linear(x: &Tensor, n_out: usize) -> Result<Tensor> {
-    let n_in = x.dim(2)?;
+    let n_in = x.dim(1)?;
     if n_in == n_out {
         return Ok(x.clone());
     }
     let part = ResizedPart { frames: 0..n_out, n_in, n_out };
-    linear_part(&x.narrow(2, 0, part.needed().end)?, &part)
+    linear_part(&x.narrow(1, 0, part.needed().end)?, &part)
 }
 
 /// Some frames of a linear interpolation of `n_in` frames to `n_out`.
@@ -42,27 +55,97 @@ impl ResizedPart {
     }
 }
 
-/// A part of what [`linear`] makes, from the frames that it needs, [B, C, `part.needed()`].
+/// A part of what [`linear`] makes, from the frames that it needs, [B, `part.needed()`, C].
 pub fn linear_part(x: &Tensor, part: &ResizedPart) -> Result<Tensor> {
     let needed = part.needed();
-    if x.dim(2)? != needed.len() || needed.is_empty() || part.frames.is_empty() {
-        candle_core::bail!("cannot interpolate frames {:?} from {} of {needed:?}", part.frames, x.dim(2)?);
+    if x.dim(1)? != needed.len() || needed.is_empty() || part.frames.is_empty() {
+        candle_core::bail!("cannot interpolate frames {:?} from {} of {needed:?}", part.frames, x.dim(1)?);
     }
-    let places = part.frames.clone().map(|i| part.place(i));
-    let before: Vec<u32> = places.clone().map(|(before, _)| (before - needed.start) as u32).collect();
-    let after: Vec<u32> = before.iter().map(|before| (before + 1).min(needed.len() as u32 - 1)).collect();
-    let share: Vec<f64> = places.map(|(_, share)| share).collect();
+    let of = part.frames.clone().map(|i| {
+        let (before, share) = part.place(i);
+        (before - needed.start, (before - needed.start + 1).min(needed.len() - 1), share)
+    });
+    mix(x, None, FrameMixture { n_in: needed.len(), of: of.collect() })
+}
+
+/// `x` with its last two axes exchanged, [B, C, T] to [B, T, C], in memory too.
+pub fn transposed(x: &Tensor) -> Result<Tensor> {
+    if device::needs_fallback(x) || x.rank() != 3 {
+        return x.t()?.contiguous();
+    }
+    let none = Tensor::zeros(0, x.dtype(), x.device())?;
+    x.contiguous()?.apply_op3(&none, &none, CustomOperator(TransposeOp))
+}
+
+fn mix(x: &Tensor, skip: Option<&Tensor>, mixture: FrameMixture) -> Result<Tensor> {
+    if device::needs_fallback(x) {
+        return fallback_mix(x, skip, &mixture);
+    }
     let x = x.contiguous()?;
-    let select = |indices: Vec<u32>| x.index_select(&Tensor::new(indices, x.device())?, 2);
-    let (before, after) = (select(before)?, select(after)?);
-    let share = Tensor::new(share, x.device())?.to_dtype(x.dtype())?;
-    &before + (after - &before)?.broadcast_mul(&share)?
+    let skip = skip.map(Tensor::contiguous).transpose()?;
+    let none = Tensor::zeros(0, x.dtype(), x.device())?;
+    let op = MixOp { mixture, plus: skip.is_some() };
+    x.apply_op3(skip.as_ref().unwrap_or(&none), &none, CustomOperator(op))
+}
+
+/// [`mix`] with the framework's operators, on any device.
+fn fallback_mix(x: &Tensor, skip: Option<&Tensor>, mixture: &FrameMixture) -> Result<Tensor> {
+    let select = |of: Vec<u32>| x.contiguous()?.index_select(&Tensor::new(of, x.device())?, 1);
+    let frames = |which: fn(&(usize, usize, f64)) -> usize| mixture.of.iter().map(|of| which(of) as u32).collect();
+    let (a, b) = (select(frames(|of| of.0))?, select(frames(|of| of.1))?);
+    let share: Vec<f64> = mixture.of.iter().map(|of| of.2).collect();
+    let share = Tensor::new(share, x.device())?.to_dtype(x.dtype())?.reshape((1, (), 1))?;
+    let mixed = (&a + (b - &a)?.broadcast_mul(&share)?)?;
+    skip.map_or(Ok(mixed.clone()), |skip| &mixed + skip)
+}
+
+struct MixOp {
+    mixture: FrameMixture,
+    /// The second operand is added.
+    plus: bool,
+}
+
+impl CpuOperator for MixOp {
+    const NAME: &'static str = "frames as mixtures of two";
+
+    fn forward<T: Scalar>(&self, [x, skip, _]: [Operand<T>; 3]) -> Result<(Vec<T>, Shape)> {
+        let (&[batch, n_in, n_channels], n_out) = (x.dims, self.mixture.n_out()) else {
+            candle_core::bail!("frames [B, T, C] are resized, not {:?}", x.dims);
+        };
+        if n_in != self.mixture.n_in || (self.plus && skip.dims != [batch, n_out, n_channels]) {
+            candle_core::bail!("{:?} does not resize to {n_out} frames plus {:?}", x.dims, skip.dims);
+        }
+        let skip = self.plus.then_some(skip.values);
+        Ok((self.mixture.mix(x.values, skip, n_channels), Shape::from((batch, n_out, n_channels))))
+    }
+
+    fn backward<T: Scalar>(&self, [x, skip, _]: [Operand<T>; 3], _: &[T], grad: &[T]) -> Result<[Option<Vec<T>>; 3]> {
+        let of_x = x.tracked.then(|| self.mixture.gradient(grad, x.dims[2]));
+        Ok([of_x, (self.plus && skip.tracked).then(|| grad.to_vec()), None])
+    }
+}
+
+struct TransposeOp;
+
+impl CpuOperator for TransposeOp {
+    const NAME: &'static str = "transposition in memory";
+
+    fn forward<T: Scalar>(&self, [x, ..]: [Operand<T>; 3]) -> Result<(Vec<T>, Shape)> {
+        let &[batch, rows, columns] = x.dims else {
+            candle_core::bail!("{:?} has no two axes to exchange", x.dims);
+        };
+        Ok((transpose(x.values, rows, columns), Shape::from((batch, columns, rows))))
+    }
+
+    fn backward<T: Scalar>(&self, [x, ..]: [Operand<T>; 3], _: &[T], grad: &[T]) -> Result<[Option<Vec<T>>; 3]> {
+        Ok([x.tracked.then(|| transpose(grad, x.dims[2], x.dims[1])), None, None])
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nn::ops::gradcheck::{pattern, worst};
+    use crate::nn::ops::gradcheck::{apart, pattern, worst};
     use candle_core::Device;
 
     #[test]
@@ -73,24 +156,37 @@ mod tests {
         }
         let skip = |v: &[Tensor]| {
             let early = v[0].sqr()?;
-            twice(&early)? * twice(&early.sin()?)? + twice(&early)?
+            twice_plus(&early.sin()?, &(twice(&early)? * twice(&early.sin()?)?)?)
         };
-        assert!(worst(&[x], skip)? < 1e-7);
+        assert!(worst(std::slice::from_ref(&x), skip)? < 1e-7);
+        assert!(worst(&[x], |v| transposed(&v[0].sqr()?)? * transposed(&v[0])?)? < 1e-7);
+        Ok(())
+    }
+
+    #[test]
+    fn the_frameworks_operators_give_the_same() -> Result<()> {
+        let (x, skip) = (pattern(&[2, 3, 5], 0.0)?, pattern(&[2, 7, 5], 1.0)?);
+        let of = vec![(0, 1, 0.25), (1, 2, 0.5), (2, 2, 0.0), (0, 0, 0.0), (2, 1, 0.9), (1, 1, 0.3), (0, 2, 0.7)];
+        let mixture = FrameMixture { n_in: 3, of };
+        let own = |v: &[Tensor]| mix(&v[0], Some(&v[1]), mixture.clone());
+        let off = apart(&[x, skip], own, |v| fallback_mix(&v[0], Some(&v[1]), &mixture))?;
+        assert!(off < 1e-12, "{off:e}");
+        assert!(twice_plus(&pattern(&[2, 3, 5], 0.0)?, &pattern(&[2, 5, 5], 0.0)?).is_err());
         Ok(())
     }
 
     #[test]
     fn positions_are_tensorflows() -> Result<()> {
-        let x = Tensor::new(&[[[0.0f64, 1.0, 2.0, 3.0]]], &Device::Cpu)?;
+        let x = transposed(&Tensor::new(&[[[0.0f64, 1.0, 2.0, 3.0]]], &Device::Cpu)?)?;
         let at = |n_out| linear(&x, n_out)?.flatten_all()?.to_vec1::<f64>();
         assert_eq!(at(8)?, [0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.0]);
         assert_eq!(at(2)?, [0.0, 2.0]);
         let part = ResizedPart { frames: 3..6, n_in: 4, n_out: 8 };
         assert_eq!(part.needed(), 1..4);
-        let some = linear_part(&x.narrow(2, 1, 3)?, &part)?.flatten_all()?.to_vec1::<f64>()?;
+        let some = linear_part(&x.narrow(1, 1, 3)?, &part)?.flatten_all()?.to_vec1::<f64>()?;
         assert_eq!(some, [1.5, 2.0, 2.5]);
         assert!(linear_part(&x, &part).is_err());
-        assert_eq!(twice(&x.t()?)?.flatten_all()?.to_vec1::<f64>()?, [0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0]);
+        assert_eq!(twice(&x)?.flatten_all()?.to_vec1::<f64>()?, [0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0]);
         Ok(())
     }
 }

@@ -11,12 +11,17 @@ use crate::types::image::{Image, PixelArea};
 use crate::types::time::FrameRate;
 use anyhow::{Context, Result};
 use std::fs;
+use std::hash::{DefaultHasher, Hasher as _};
 use std::path::Path;
 
-/// Timeline of a video and the number of times its pictures change their size.
+/// What a pass tells.
 pub struct PictureReading {
+    /// Of one span.
     pub timeline: Timeline,
+    /// Number of times the pictures change their size.
     pub n_resizes: usize,
+    /// Checksums of the thumbnails, one a frame.
+    pub checksums: Vec<u64>,
 }
 
 /// Reads the pictures once; of each only a thumbnail of `area` (all of it without) is looked at, unless the survey wants
@@ -30,7 +35,7 @@ pub fn read(
 ) -> Result<PictureReading> {
     let (mut timeline, mut n_resizes) = (Timeline::default(), 0);
     let (mut shots, mut before) = (ShotFinder::new(rate), None);
-    let mut resizes = Vec::new();
+    let (mut resizes, mut checksums) = (Vec::new(), Vec::new());
     let task = progress.begin("frames", reader.expected_frames().unwrap_or(0) as u64);
     while let Some(time) = reader.advance()? {
         timeline.source_secs.push(time.source_secs);
@@ -40,6 +45,7 @@ pub fn read(
             let whole = survey.wants_picture().then(|| reader.picture(None)).transpose()?;
             survey.push(whole, reader.is_flagged_interlaced());
         }
+        checksums.push(picture.as_ref().map_or_else(|| checksums.last().copied().unwrap_or(0), checksum));
         shots.push(picture.clone());
         let pair = before.as_ref().zip(picture.as_ref());
         timeline.frame_difference.push(pair.map_or(0.0, |(a, b)| mean_change(a, b)));
@@ -54,11 +60,19 @@ pub fn read(
     }
     let frames = timeline.shot_score.iter().zip(&resizes);
     timeline.restart = frames.map(|(score, resize)| *score >= RESTART || *resize != Resize::None).collect();
-    Ok(PictureReading { timeline, n_resizes })
+    timeline.span = vec![false; timeline.n_frames()];
+    Ok(PictureReading { timeline, n_resizes, checksums })
+}
+
+/// Checksum of a picture.
+pub fn checksum(picture: &Image) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    hasher.write(&picture.data);
+    hasher.finish()
 }
 
 /// Small picture of `area`: the whole is scaled so that the area has the size of a thumbnail.
-fn thumbnail(reader: &mut FrameReader, area: Option<PixelArea>) -> Result<Image> {
+pub fn thumbnail(reader: &mut FrameReader, area: Option<PixelArea>) -> Result<Image> {
     let Some(area) = area else { return reader.picture(Some(THUMBNAIL)) };
     let scales = [(0, area.width), (1, area.height)].map(|(axis, px)| THUMBNAIL[axis] as f64 / px.max(1) as f64);
     let whole = reader.image_size();

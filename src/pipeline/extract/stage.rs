@@ -2,6 +2,7 @@
 //! `Timeline` at the dataset rate, `MediaInfo`, and, only if asked, the pictures as PNG.
 
 use super::reading;
+use super::spans;
 use super::survey::PictureSurvey;
 use crate::config;
 use crate::config::{Config, videos};
@@ -50,7 +51,7 @@ impl Stage for ExtractStage {
     }
 
     fn version(&self) -> u32 {
-        3
+        4
     }
 
     fn settings(&self, unit: &Unit) -> serde_json::Value {
@@ -85,6 +86,9 @@ impl Stage for ExtractStage {
         }
         if self.settings.keep_frames {
             reading::write_pictures(&mut open(pictures)?, &Artifact::Frames.within(out), progress)?;
+        }
+        if reader.damage().is_none() {
+            spans::mark(&mut read, || open(pictures), active_area, rate)?;
         }
         let timeline = read.timeline;
         timeline.write(&Artifact::Timeline.within(out))?;

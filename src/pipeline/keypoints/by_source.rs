@@ -3,11 +3,8 @@
 use super::stage::{KeypointExtractStage, KeypointPose2dStage};
 use crate::config::Settings;
 use crate::config::videos::Videos;
-use crate::stage::progress::Progress;
-use crate::stage::{Input, Report, Stage, Unit};
-use anyhow::Result;
+use crate::stage::{Stage, StageWrapper, Unit};
 use std::collections::BTreeSet;
-use std::path::Path;
 
 /// Both ways of a stage, and the units that are keypoints.
 pub struct StageBySource {
@@ -36,36 +33,13 @@ impl StageBySource {
         let keypoints: BTreeSet<(String, String)> = all.iter().flat_map(names).collect();
         if keypoints.is_empty() { of_videos } else { Box::new(Self { of_videos, of_keypoints, keypoints }) }
     }
-
-    fn of(&self, unit: &Unit) -> &dyn Stage {
-        let is_keypoints = self.keypoints.contains(&(unit.speaker.clone(), unit.video.clone()));
-        if is_keypoints { &*self.of_keypoints } else { &*self.of_videos }
-    }
 }
 
-impl Stage for StageBySource {
-    fn name(&self) -> &'static str {
-        self.of_videos.name()
-    }
-
-    /// Of the way of videos; that of keypoints has its own in the settings.
-    fn version(&self) -> u32 {
-        self.of_videos.version()
-    }
-
-    fn cost(&self) -> u32 {
-        self.of_videos.cost()
-    }
-
-    fn settings(&self, unit: &Unit) -> serde_json::Value {
-        self.of(unit).settings(unit)
-    }
-
-    fn inputs(&self, unit: &Unit) -> Result<Vec<Input>> {
-        self.of(unit).inputs(unit)
-    }
-
-    fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> Result<Report> {
-        self.of(unit).run(unit, out, progress)
+impl StageWrapper for StageBySource {
+    /// Version and cost are those of the way of videos; that of keypoints has its own version in the settings.
+    fn inner(&self, unit: Option<&Unit>) -> &dyn Stage {
+        let is_keypoints =
+            unit.is_some_and(|unit| self.keypoints.contains(&(unit.speaker.clone(), unit.video.clone())));
+        if is_keypoints { &*self.of_keypoints } else { &*self.of_videos }
     }
 }

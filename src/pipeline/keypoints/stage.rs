@@ -124,6 +124,7 @@ fn without_pictures(source_secs: Vec<f64>) -> Timeline {
         repeated: vec![false; n_frames],
         shot_score: vec![f64::NAN; n_frames],
         restart: vec![false; n_frames],
+        span: vec![false; n_frames],
         frame_difference: vec![f32::NAN; n_frames],
     }
 }

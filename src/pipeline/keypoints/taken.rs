@@ -4,7 +4,7 @@ use super::follow::{FollowedPerson, follow};
 use super::resample::person_at;
 use crate::formats::keypoints::{FoundKeypoints, FoundPerson};
 use crate::formats::keypoints_npz::Extras;
-use crate::pipeline::pose2d::store::KeypointFrames;
+use crate::pipeline::pose2d::span::keypoint_frames::KeypointFrames;
 use crate::types::pose2d::{Keypoints, Pose2d};
 use crate::types::time::FrameRate;
 use anyhow::Result;

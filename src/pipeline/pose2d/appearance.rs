@@ -5,6 +5,7 @@ use super::decode::ScoredPoint;
 use super::patch;
 use crate::types::image::Image;
 use crate::types::pose2d::coco;
+use serde::{Deserialize, Serialize};
 
 /// Bins of a channel.
 const BINS: usize = 16;
@@ -14,7 +15,7 @@ const CHANNELS: usize = 9;
 const BAND: [usize; 2] = [10, 6];
 
 /// Distributions of colour over the body, cumulated: how much of each channel lies at or below each bin.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BodyColours(Vec<f32>);
 
 impl BodyColours {

@@ -10,7 +10,7 @@ use super::hands::{self, HandTracker, SeenHands};
 use super::model_input::ModelInput;
 use super::palm::PalmDetector;
 use super::person::Detector;
-use super::speaker::SpeakerTracker;
+use super::speaker::{SeenPerson, SpeakerTracker};
 use super::talker::TalkerPath;
 use crate::config;
 use crate::external::onnx::{ModelRole, ModelStore, Runtime};
@@ -88,6 +88,11 @@ impl Chain {
     /// Points of the face that was seen in the last frame.
     pub fn face_points(&self) -> Option<&[FacePoint]> {
         self.face.as_ref()?.points()
+    }
+
+    /// The number of people taken so far, the first of them as first recognised, and the one followed now.
+    pub fn people(&self) -> (i64, [Option<SeenPerson>; 2]) {
+        self.speaker.people()
     }
 
     /// Seconds inside ONNX Runtime so far, over all models.

@@ -2,7 +2,7 @@
 //! `decode` reads the models' outputs, one file a kind; `person`, `body`, `hand` and `palm` ask one model each; `speaker`
 //! says who is tracked, with `tracker` (the choice), `liveness` and `appearance` (on a `patch` of the picture); `region`
 //! and `hands` say where to look for a hand and when; `face` sees the mouth, `talker` finds whose mouth the voice is of;
-//! `chain` is the way of one frame; `stage` the way of a video.
+//! `chain` is the way of one frame, `span` that of a part of a video; `stage` joins the parts.
 
 pub mod appearance;
 pub mod body;
@@ -18,9 +18,9 @@ pub mod palm;
 pub mod patch;
 pub mod person;
 pub mod region;
+pub mod span;
 pub mod speaker;
 pub mod stage;
-pub mod store;
 pub mod talker;
 pub mod tracker;
 

@@ -12,6 +12,7 @@ use crate::config;
 use crate::types::image::Image;
 use crate::types::pose2d::PersonBox;
 use anyhow::{Context, Result};
+use serde::{Deserialize, Serialize};
 
 /// Frames of a shot at which people are looked for beside the regular ones, so that a wrong choice is soon mended.
 const EARLY: [usize; 3] = [2, 5, 10];
@@ -32,6 +33,18 @@ const SAME_BOX: f32 = 0.5;
 /// Weight of a frame's colours in the speaker's.
 const FOLLOW_COLOURS: f32 = 0.05;
 
+/// A person, and where he or she is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SeenPerson {
+    place: PersonBox,
+    colours: BodyColours,
+}
+
+/// Whether the one seen before tracking began anew is the one seen after.
+pub fn is_same_person(before: &SeenPerson, after: &SeenPerson) -> bool {
+    boxes::overlap(&before.place, &after.place) >= SAME_BOX && before.colours.distance(&after.colours) <= SAME_COLOURS
+}
+
 /// Follows one person.
 pub struct SpeakerTracker {
     pub detector: Option<Detector>,
@@ -44,8 +57,10 @@ pub struct SpeakerTracker {
     n_strange: i32,
     /// More than one person was in view in this shot.
     several: bool,
-    /// Whom the shot before showed, and where.
-    before: Option<(PersonBox, BodyColours)>,
+    /// Whom the shot before showed.
+    before: Option<SeenPerson>,
+    /// Whom the first shot showed, when first recognised.
+    first: Option<SeenPerson>,
     /// The way of the one who speaks in this shot, where that is known, and the frame of the shot.
     talker: Option<TalkerPath>,
     idx: usize,
@@ -63,6 +78,7 @@ impl SpeakerTracker {
             n_strange: 0,
             several: false,
             before: None,
+            first: None,
             talker: None,
             idx: 0,
         }
@@ -81,8 +97,8 @@ impl SpeakerTracker {
     /// Ends the track; `talker`: the way of the one to follow next, where it is known.
     pub fn begin_anew(&mut self, talker: Option<TalkerPath>) {
         self.talker = talker;
-        let place = self.track.place.map(|_| self.track.person());
-        self.before = place.zip(self.colours.take());
+        self.before = self.last();
+        self.colours = None;
         self.track.begin_anew();
         self.tracks = LivenessTracks::default();
         (self.n_strange, self.several) = (0, false);
@@ -128,11 +144,12 @@ impl SpeakerTracker {
         settings: &config::Pose2dConfig,
     ) -> Result<bool> {
         let Some(seen) = BodyColours::measure(image, points, settings.joint_score) else { return Ok(false) };
-        if let Some((place, colours)) = self.before.take()
-            && boxes::overlap(&place, &self.track.person()) >= SAME_BOX
-            && colours.distance(&seen) <= SAME_COLOURS
-        {
+        let here = SeenPerson { place: self.track.person(), colours: seen.clone() };
+        if self.before.take().is_some_and(|before| is_same_person(&before, &here)) {
             self.track.is_the_same();
+        }
+        if self.first.is_none() && self.track.n_taken() <= 1 {
+            self.first = Some(here);
         }
         let Some(colours) = self.colours.as_mut() else {
             self.colours = Some(seen);
@@ -157,6 +174,17 @@ impl SpeakerTracker {
         (self.n_strange, self.colours) = (0, None);
         self.track.choose(&found, image.width);
         Ok(true)
+    }
+
+    /// The number of people taken, the first of them as first recognised, and the one followed now.
+    pub fn people(&self) -> (i64, [Option<SeenPerson>; 2]) {
+        (self.track.n_taken(), [self.first.clone(), self.last()])
+    }
+
+    /// Whom is followed now.
+    fn last(&self) -> Option<SeenPerson> {
+        let place = self.track.place.map(|_| self.track.person());
+        place.zip(self.colours.clone()).map(|(place, colours)| SeenPerson { place, colours })
     }
 
     /// Everybody in the picture; `None` without a detector.

@@ -145,6 +145,11 @@ impl PersonTrack {
         self.n_taken = (self.n_taken - 1).max(1);
     }
 
+    /// The number of people taken so far.
+    pub fn n_taken(&self) -> i64 {
+        self.n_taken
+    }
+
     /// The number of the person followed, from 0.
     pub fn identity(&self) -> i64 {
         (self.n_taken - 1).max(0)

@@ -22,6 +22,25 @@ pub enum Request {
     Restrict,
     /// To work on a unit.
     Unit(Box<UnitRequest>),
+    /// To say how long a video is, or to copy an excerpt of it.
+    Media(MediaRequest),
+}
+
+/// What is wanted of a video before any stage.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MediaRequest {
+    pub source: PathBuf,
+    /// The excerpt to copy; without it the length is asked for.
+    pub excerpt: Option<ExcerptRequest>,
+}
+
+/// An excerpt to copy.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ExcerptRequest {
+    pub start_secs: f64,
+    pub secs: f64,
+    /// The file to write, in a folder that is there.
+    pub to: PathBuf,
 }
 
 /// A unit at a stage, with all that the stage is built of.
@@ -32,6 +51,8 @@ pub struct UnitRequest {
     pub speaker: String,
     pub video: String,
     pub source: OsString,
+    /// The part to work on; none: the unit as a whole.
+    pub part: Option<usize>,
     /// Settings with the unit's speaker alone.
     pub settings: Settings,
     /// The configuration file, which is not read.
@@ -48,13 +69,33 @@ pub struct UnitRequest {
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Message {
     Restricted(Restriction),
-    Begin { task: u32, total: u64 },
-    Advance { task: u32, steps: u64 },
-    Detail { task: u32, text: String },
-    End { task: u32 },
-    Say { line: String },
-    Estimate { line: String },
-    Done { line: String, facts: Map<String, Value> },
+    Begin {
+        task: u32,
+        total: u64,
+    },
+    Advance {
+        task: u32,
+        steps: u64,
+    },
+    Detail {
+        task: u32,
+        text: String,
+    },
+    End {
+        task: u32,
+    },
+    Say {
+        line: String,
+    },
+    Estimate {
+        line: String,
+    },
+    Done {
+        line: String,
+        facts: Map<String, Value>,
+    },
+    /// Answer to `Request::Media`.
+    Secs(Option<f64>),
     Failed(SentFailure),
 }
 
@@ -88,6 +129,7 @@ mod tests {
             speaker: "host".into(),
             video: "a".into(),
             source: source.clone(),
+            part: Some(3),
             settings: settings.clone(),
             config_file: "pipeline.toml".into(),
             keypoints: Some(KeypointSource { fps: None, image_size: Some([4, 3]), sound: Err("none".into()) }),

@@ -1,14 +1,14 @@
 //! A stage whose units are worked on by processes of their own. To a run it is the stage itself.
 
 use super::failure::plain;
-use super::message::{Message, Request, UnitRequest, receive, send};
+use super::message::{MediaRequest, Message, Request, UnitRequest, receive, send};
 use super::unit::VERB;
 use crate::config::Config;
 use crate::config::videos::Videos;
 use crate::external::onnx::find_library;
 use crate::external::sandbox::Restriction;
 use crate::stage::progress::{Event, Progress, Task};
-use crate::stage::{Input, Report, Stage, Unit};
+use crate::stage::{Report, Stage, StageWrapper, Unit};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use std::collections::BTreeMap;
 use std::io::{BufReader, Read};
@@ -28,43 +28,31 @@ pub struct SeparateStage<'a> {
     pub videos: &'a [Videos],
 }
 
-impl Stage for SeparateStage<'_> {
-    fn name(&self) -> &'static str {
-        self.stage.name()
-    }
-
-    fn version(&self) -> u32 {
-        self.stage.version()
-    }
-
-    fn cost(&self) -> u32 {
-        self.stage.cost()
-    }
-
-    fn settings(&self, unit: &Unit) -> serde_json::Value {
-        self.stage.settings(unit)
-    }
-
-    fn inputs(&self, unit: &Unit) -> Result<Vec<Input>> {
-        self.stage.inputs(unit)
-    }
-
-    fn is_read_long(&self) -> bool {
-        self.stage.is_read_long()
+impl StageWrapper for SeparateStage<'_> {
+    fn inner(&self, _unit: Option<&Unit>) -> &dyn Stage {
+        &*self.stage
     }
 
     fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> Result<Report> {
+        self.work(unit, None, out, progress)
+    }
+
+    fn run_part(&self, unit: &Unit, part: usize, out: &Path, progress: &dyn Progress) -> Result<()> {
+        self.work(unit, Some(part), out, progress).map(drop)
+    }
+}
+
+impl SeparateStage<'_> {
+    fn work(&self, unit: &Unit, part: Option<usize>, out: &Path, progress: &dyn Progress) -> Result<Report> {
         let mut process = UnitProcess::start(self.program)?;
-        process.ask(&Request::Unit(Box::new(self.request(unit, out)?)));
+        process.ask(&Request::Unit(Box::new(self.request(unit, part, out)?)));
         match process.follow(progress) {
             Ok(ended) => ended,
             Err(death) => Err(anyhow!("{}: the process that read it {death}", unit.source.display())),
         }
     }
-}
 
-impl SeparateStage<'_> {
-    fn request(&self, unit: &Unit, out: &Path) -> Result<UnitRequest> {
+    fn request(&self, unit: &Unit, part: Option<usize>, out: &Path) -> Result<UnitRequest> {
         let mut settings = self.config.settings.clone();
         settings.speaker.retain(|speaker| speaker.name == unit.speaker);
         let mut reads: Vec<_> = self.stage.inputs(unit)?.into_iter().map(|input| input.path.into()).collect();
@@ -80,6 +68,7 @@ impl SeparateStage<'_> {
             speaker: unit.speaker.clone(),
             video: unit.video.clone(),
             source: unit.source.clone().into(),
+            part,
             settings,
             config_file: self.config.file.clone(),
             keypoints: of_speaker.and_then(|videos| videos.keypoints.get(&unit.video)).cloned(),
@@ -100,6 +89,21 @@ pub fn probe(program: &Path) -> Result<Restriction> {
     match answer.context("no answer")?? {
         Message::Restricted(restriction) => Ok(restriction),
         other => bail!("{other:?} is no answer"),
+    }
+}
+
+/// What a restricted process that `program` starts finds of a video: see `media`.
+///
+/// # Errors
+/// Those of `media::answer`; a process that is lost.
+pub fn ask_media(program: &Path, request: &MediaRequest) -> Result<Option<f64>> {
+    let mut process = UnitProcess::start(program)?;
+    process.ask(&Request::Media(request.clone()));
+    let answer = process.child.stdout.take().map(|mut out| receive(&mut out));
+    match answer.context("no answer")? {
+        Ok(Message::Secs(secs)) => Ok(secs),
+        Ok(Message::Failed(failure)) => Err(failure.into_error()),
+        _ => bail!("{}: the process that read it gave no answer", request.source.display()),
     }
 }
 
@@ -176,7 +180,7 @@ fn relay(from: &mut impl Read, progress: &dyn Progress) -> Result<Result<Report>
             Message::Estimate { line } => progress.event(&Event::Estimate { line: &plain(&line) }),
             Message::Done { line, facts } => return Ok(Ok(Report { line: plain(&line), facts })),
             Message::Failed(failure) => return Ok(Err(failure.into_error())),
-            Message::Restricted(_) => bail!("no answer to the request"),
+            Message::Restricted(_) | Message::Secs(_) => bail!("no answer to the request"),
         }
     }
 }

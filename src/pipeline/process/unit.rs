@@ -2,13 +2,14 @@
 //! with the run that started it.
 
 use super::failure::SentFailure;
+use super::media;
 use super::message::{Message, Request, UnitRequest, receive, send};
 use crate::config::Config;
 use crate::config::videos::Videos;
 use crate::external::sandbox::{FileAccess, restrict};
 use crate::pipeline::stages;
 use crate::stage::progress::{Event, Progress, Task};
-use crate::stage::{Report, Unit, runner, workdir};
+use crate::stage::{Report, Unit, attempt, workdir};
 use anyhow::{Context, Result};
 use std::io::{Read, Stdout, Write};
 use std::path::PathBuf;
@@ -38,8 +39,18 @@ pub fn serve() -> Result<()> {
             let paths = |paths: &[std::ffi::OsString]| paths.iter().map(PathBuf::from).collect();
             restrict(&FileAccess { reads: Some(paths(&unit.reads)), writes: vec![(&unit.out).into()] });
             std::thread::spawn(end_with_parent);
-            let message = match runner::guarded(|| work(*unit, &out)) {
+            let message = match attempt::guarded(|| work(*unit, &out)) {
                 Ok(Report { line, facts }) => Message::Done { line, facts },
+                Err(error) => Message::Failed(SentFailure::of(&workdir::full_disk(error))),
+            };
+            out.send(&message)
+        }
+        Request::Media(media) => {
+            let writes = media.excerpt.iter().filter_map(|excerpt| excerpt.to.parent().map(Into::into)).collect();
+            restrict(&FileAccess { reads: Some(vec![media.source.clone()]), writes });
+            std::thread::spawn(end_with_parent);
+            let message = match attempt::guarded(|| media::answer(&media)) {
+                Ok(secs) => Message::Secs(secs),
                 Err(error) => Message::Failed(SentFailure::of(&workdir::full_disk(error))),
             };
             out.send(&message)
@@ -55,14 +66,19 @@ fn end_with_parent() {
 }
 
 fn work(request: UnitRequest, out: &Messages) -> Result<Report> {
-    let UnitRequest { stage, speaker, video, source, settings, config_file, keypoints, out: folder, .. } = request;
+    let UnitRequest { stage, speaker, video, source, part, settings, config_file, keypoints, out: folder, .. } =
+        request;
     let unit = Unit { speaker: speaker.clone(), video: video.clone(), source: source.into() };
     let keypoints = keypoints.map(|source| (video, source)).into_iter().collect();
     let videos = Videos { speaker, units: vec![unit.clone()], keypoints, ..Videos::default() };
     let config = Config { settings, file: config_file, notes: Vec::new() };
     let stage = stages::build(stage.parse()?, &config, &[videos], &[])?;
     let progress = SentProgress { out, next: AtomicU32::new(0) };
-    stage.run(&unit, &PathBuf::from(folder), &progress)
+    let folder = PathBuf::from(folder);
+    match part {
+        Some(part) => stage.run_part(&unit, part, &folder, &progress).map(|()| Report::default()),
+        None => stage.run(&unit, &folder, &progress),
+    }
 }
 
 /// Standard output.

@@ -32,6 +32,17 @@ pub fn parent(path: &Path) -> PathBuf {
     }
 }
 
+/// Bytes of the files in a folder and all folders beneath it, as far as they can be seen.
+pub fn bytes_under(folder: &Path) -> u64 {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let bytes = |entry: fs::DirEntry| match entry.metadata() {
+        Ok(meta) if meta.is_dir() => bytes_under(&entry.path()),
+        Ok(meta) => meta.len(),
+        Err(_) => 0,
+    };
+    entries.map(bytes).sum()
+}
+
 /// Waits until a file, or the list of a folder, is on the disk.
 pub fn flush(path: &Path) -> Result<()> {
     Ok(File::open(path)?.sync_all()?)

@@ -50,6 +50,14 @@ pub fn lock(folder: &Path) -> Result<FolderLock> {
     Ok(FolderLock { file: Some(file), path: None })
 }
 
+/// Several programs write in `folder`, made if missing, who share the work among themselves; none has it alone. Errors as
+/// those of `lock`.
+pub fn lock_with_others(folder: &Path) -> Result<FolderLock> {
+    let path = folder.join(".lock");
+    fs::create_dir_all(folder).with_context(|| format!("cannot write in {}", folder.display()))?;
+    Ok(FolderLock { file: take(folder, &path, false)?, path: None })
+}
+
 impl FolderLock {
     /// For who replaces, changes or removes the folder.
     ///

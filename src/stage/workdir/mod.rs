@@ -7,9 +7,9 @@ mod file;
 mod folder;
 mod lock;
 
-pub use attempt::{left_over, remove};
-pub use disk::NoSpace;
+pub use attempt::{is_alive, left_over, remove};
 pub(crate) use disk::full_disk;
+pub use disk::{NoSpace, bytes_under};
 pub use file::{has_files, move_files, remove_file, replace, write_file};
 pub use folder::{attempt_folder, build_folder, recover_folder, replace_folder, restore_folder};
-pub use lock::{BusyFolder, FolderLock, announce, are_kept_apart, lock};
+pub use lock::{BusyFolder, FolderLock, announce, are_kept_apart, lock, lock_with_others};

@@ -3,7 +3,7 @@
 
 use crate::animate::Performance;
 use crate::animate::export::film_avatar::{AvatarStage, AvatarView, FilmCamera};
-use crate::external::ffmpeg::encode::{VideoWriter, has_h264};
+use crate::external::ffmpeg::write::encode::{VideoWriter, has_h264};
 use crate::external::opencv::draw;
 use crate::types::image::Image;
 use crate::types::sound::Sound;

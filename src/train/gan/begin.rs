@@ -35,6 +35,9 @@ pub fn normalisation_with_channels(dataset: &Dataset, wanted: &[PostureChannel])
     Ok(Normalisation { channels: channels(dataset, wanted)?, ..normalisation(dataset)? })
 }
 
+/// Frames read at a time, for statistics of all poses.
+const PART_FRAMES: usize = 4096;
+
 /// What a training of so many speakers learns of one of them.
 pub fn metadata(
     dataset: &Dataset,
@@ -45,7 +48,7 @@ pub fn metadata(
 ) -> Result<SpeakerMetadata> {
     let representation = match settings.representation {
         MotionRepresentation::Positions => Representation::Positions,
-        MotionRepresentation::Bones => Representation::bones(normal, loader.poses()),
+        MotionRepresentation::Bones => Representation::bones(normal, loader.poses(PART_FRAMES))?,
     };
     let network = Config::from_preset(preset(settings.preset), normal.n_numbers());
     let network = Config { n_speakers: if n_speakers > 1 { n_speakers } else { 0 }, ..network };

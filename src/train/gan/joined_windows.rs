@@ -7,11 +7,11 @@ use anyhow::{Context, Result};
 use candle_core::Tensor;
 
 /// Windows of one speaker behind those of the other.
-pub struct JoinedWindows(Vec<WindowLoader>);
+pub struct JoinedWindows<'d>(Vec<WindowLoader<'d>>);
 
-impl JoinedWindows {
+impl<'d> JoinedWindows<'d> {
     /// Loaders by the numbers of their speakers, one at least.
-    pub fn new(loaders: Vec<WindowLoader>) -> Self {
+    pub fn new(loaders: Vec<WindowLoader<'d>>) -> Self {
         Self(loaders)
     }
 

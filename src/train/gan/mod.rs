@@ -1,10 +1,12 @@
 //! Training of the speech-to-gesture GAN: `windows` (data) -> `step` (networks, `losses`, optimiser) -> `validate` and
-//! `score` (which checkpoint is best); `train` is the loop.
+//! `score` (which checkpoint is best); `train` is the loop, to which `batches` are read ahead.
 
 pub mod augment;
 pub mod average;
+pub mod batches;
 pub mod begin;
 pub mod block_metrics;
+pub mod interval_rows;
 pub mod joined_windows;
 pub mod losses;
 pub mod recipe;

@@ -48,7 +48,7 @@ pub struct Losses {
     pub l1: f64,
     /// Not measured where it has no weight.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub mse: Option<f64>,
+    pub speed: Option<f64>,
     pub velocity: f64,
     pub bone: f64,
     pub adversarial: f64,
@@ -141,7 +141,7 @@ impl GanTrainer {
     /// `step`, with a call at the end of each phase, by its name: for measuring where the time goes.
     pub fn step_in_phases(&mut self, batch: &WindowBatch, phase: &mut dyn FnMut(&'static str)) -> Result<Losses> {
         let batch = batch.on(self.device())?;
-        let GanSettings { lambda_l1, lambda_mse, lambda_velocity, lambda_bone, .. } = self.settings;
+        let GanSettings { lambda_l1, lambda_speed, lambda_velocity, lambda_bone, .. } = self.settings;
         let (lambda_gan, learning_rate) = (self.settings.adversarial_weight(self.step), self.settings.rate(self.step));
         let raw = self.predict(&batch)?;
         let generated = self.speakers.poses(&raw, &batch.speakers)?;
@@ -169,9 +169,9 @@ impl GanTrainer {
             total = (&total + (&loss * weight)?)?;
             number(&loss)
         };
-        let mut mse = None;
-        if lambda_mse > 0.0 {
-            mse = Some(add(losses::mse(&generated, &batch.poses, &batch.mask)?, lambda_mse)?);
+        let mut speed = None;
+        if lambda_speed > 0.0 {
+            speed = Some(add(losses::speed(&generated, &batch.poses, &batch.mask)?, lambda_speed)?);
         }
         if lambda_velocity > 0.0 {
             velocity = add(losses::velocity(&generated, &batch.poses, &batch.mask)?, lambda_velocity)?;
@@ -195,7 +195,7 @@ impl GanTrainer {
         }
         self.step += 1;
         let l1 = number(&l1)?;
-        Ok(Losses { l1, mse, velocity, bone, adversarial, discriminator: of_discriminator, gradient_norm })
+        Ok(Losses { l1, speed, velocity, bone, adversarial, discriminator: of_discriminator, gradient_norm })
     }
 
     /// Raw poses of a batch while training: channels of the encoded sound are dropped.
@@ -205,11 +205,11 @@ impl GanTrainer {
             return Ok(self.generator.forward(&batch.mels, &batch.speakers, n_frames, true)?);
         }
         let encoded = resize::linear(&self.generator.encode(&batch.mels, &batch.speakers, true)?, n_frames)?;
-        let (n_windows, n_channels, _) = encoded.dims3()?;
+        let (n_windows, _, n_channels) = encoded.dims3()?;
         let mut rng = resume::stream(self.settings.seed ^ DROPOUT, self.step);
         let of = |_| if rng.random_bool(dropout) { 0.0 } else { 1.0 / (1.0 - dropout) as f32 };
         let kept: Vec<f32> = (0..n_windows * n_channels).map(of).collect();
-        let kept = Tensor::from_vec(kept, (n_windows, n_channels, 1), encoded.device())?;
+        let kept = Tensor::from_vec(kept, (n_windows, 1, n_channels), encoded.device())?;
         Ok(self.generator.decode(&encoded.broadcast_mul(&kept)?, true)?)
     }
 

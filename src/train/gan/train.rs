@@ -3,6 +3,8 @@
 //! and the step alone (the place of the loader is the step), everything else is in the checkpoint.
 
 use super::augment;
+use super::batches;
+use super::batches::BatchesAhead;
 use super::begin;
 use super::joined_windows::JoinedWindows;
 use super::recipe::account;
@@ -104,10 +106,12 @@ pub fn train_watched(
         }
     };
     let spoken: Vec<(&Dataset, Normalisation)> = datasets.iter().copied().zip(normals).collect();
-    let load = |(dataset, normal): &(&Dataset, Normalisation)| {
-        WindowLoader::load(dataset, Split::Train, normal, settings.window_frames, settings.stride_frames)
-    };
-    let loaders: Vec<WindowLoader> = spoken.iter().map(load).collect::<Result<_>>()?;
+    let loaders: Vec<WindowLoader> = spoken
+        .iter()
+        .map(|(dataset, normal)| {
+            WindowLoader::load(dataset, Split::Train, normal, settings.window_frames, settings.stride_frames)
+        })
+        .collect::<Result<_>>()?;
     let n_windows: usize = loaders.iter().map(WindowLoader::len).sum();
     let places: Vec<String> = datasets.iter().map(|dataset| dataset.dir().display().to_string()).collect();
     let places = places.join(", ");
@@ -137,17 +141,24 @@ pub fn train_watched(
         let secs_a_step = secs_a_step(&trainer, &loader)?;
         account::lines(&trainer.settings, &material, secs_a_step).iter().for_each(|line| progress.say(line));
     }
-    let mut training = GanTraining {
-        names: trainer.speakers.names(),
-        has_learnt: start.is_some(),
-        trainer: &mut trainer,
-        loader: &loader,
-        held_out: &held_out,
-        stepping: Duration::ZERO,
-        waiting: Duration::ZERO,
+    let settings = trainer.settings.clone();
+    let batch = |step: usize| {
+        let which = sample_windows(settings.seed, step, settings.batch, loader.len());
+        loader.batch_changed(&which, &augment::changes(&settings, step, loader.fps()))
     };
-    let end = with_spinning_workers(|| epochs::run(&mut training, folder, progress, validated))?;
-    let waiting = training.waiting.as_secs_f64() / training.stepping.as_secs_f64().max(1e-9);
+    let (end, waiting) = batches::read_ahead(settings.steps, &batch, |batches| {
+        let mut training = GanTraining {
+            names: trainer.speakers.names(),
+            has_learnt: start.is_some(),
+            trainer: &mut trainer,
+            batches,
+            held_out: &held_out,
+            stepping: Duration::ZERO,
+            waiting: Duration::ZERO,
+        };
+        let end = with_spinning_workers(|| epochs::run(&mut training, folder, progress, validated))?;
+        Ok((end, training.waiting.as_secs_f64() / training.stepping.as_secs_f64().max(1e-9)))
+    })?;
     Ok(TrainingOutcome {
         steps: trainer.step,
         began_at: end.began_at,
@@ -181,19 +192,19 @@ fn secs_a_step(trainer: &GanTrainer, loader: &JoinedWindows) -> Result<Option<f6
 }
 
 /// A trainer with its windows.
-struct GanTraining<'a> {
+struct GanTraining<'a, 'b> {
     names: String,
     /// Whether it begins with another model.
     has_learnt: bool,
     trainer: &'a mut GanTrainer,
-    loader: &'a JoinedWindows,
+    batches: &'a mut BatchesAhead<'b>,
     held_out: &'a ValidationIntervals,
     /// Time of the steps, and of it until their batches were there.
     stepping: Duration,
     waiting: Duration,
 }
 
-impl ValidatedTraining for GanTraining<'_> {
+impl ValidatedTraining for GanTraining<'_, '_> {
     type Validation = Validation;
 
     fn names(&self) -> (&str, &'static str) {
@@ -218,12 +229,8 @@ impl ValidatedTraining for GanTraining<'_> {
     }
 
     fn step(&mut self) -> Result<StepReport> {
-        let GanSettings { seed, batch, .. } = self.trainer.settings;
         let before = Instant::now();
-        let step = self.trainer.step;
-        let which = sample_windows(seed, step, batch, self.loader.len());
-        let changes = augment::changes(&self.trainer.settings, step, self.loader.fps());
-        let batch = self.loader.batch_changed(&which, &changes)?;
+        let batch = self.batches.take(self.trainer.step)?;
         self.waiting += before.elapsed();
         let losses = self.trainer.step(&batch)?;
         self.stepping += before.elapsed();

@@ -1,12 +1,11 @@
-//! What training reads: the intervals of a split as normalised poses and log-mels in memory, and windows of them as
-//! batches. The spectrogram of an interval is computed once; a window takes the frames of its own seconds.
+//! What training reads: windows of the intervals of a split as batches of normalised poses and log-mels.
 
 use super::augment::{self, WindowChange, WindowRows};
+use super::interval_rows::{IntervalRows, TrainingIntervals};
 use crate::audio::mel;
 use crate::dataset::{Dataset, Split};
 use crate::generate::mel_stream::mel_frames;
 use crate::generate::normalisation::{N_FEATURES, Normalisation};
-use crate::motion::bones;
 use crate::nn::gan::generator::FRAMES_MULTIPLE;
 use crate::train::no_window::NeededFrames;
 use crate::types::interval::Interval as Span;
@@ -15,28 +14,21 @@ use crate::types::sound::SAMPLE_RATE;
 use crate::types::time::FrameRate;
 use anyhow::{Result, ensure};
 use candle_core::{Device, Tensor};
-use ndarray::{Array2, ArrayView2, Axis, Slice};
+use ndarray::{Array2, Axis, Slice};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// One interval.
-struct TrainingInterval {
-    /// [numbers, T]: 144 and those of the channels.
-    features: Array2<f32>,
-    /// [48 + 3 x channels, T]: whether the joint (all but the neck), or the angle, is to be learnt there.
-    mask: Array2<bool>,
-    /// [64, at least the mel frames of T]
-    mels: Array2<f32>,
-}
+/// Bytes of intervals that are held in memory.
+pub const HELD_BYTES: usize = 384 << 20;
 
 /// All windows of a split.
-pub struct WindowLoader {
+pub struct WindowLoader<'d> {
     fps: FrameRate,
     n_frames: usize,
     /// Numbers of a pose.
     n_numbers: usize,
     normal: Normalisation,
-    intervals: Vec<TrainingInterval>,
+    intervals: TrainingIntervals<'d>,
     /// Interval and first frame of every window.
     starts: Vec<(usize, usize)>,
 }
@@ -67,10 +59,22 @@ impl WindowBatch {
     }
 }
 
-impl WindowLoader {
-    /// Reads the intervals of `split` that hold a window of `n_frames`; one begins every `stride` frames.
+impl<'d> WindowLoader<'d> {
+    /// Opens the intervals of `split` that hold a window of `n_frames`; one begins every `stride` frames.
     pub fn load(
-        dataset: &Dataset,
+        dataset: &'d Dataset,
+        split: Split,
+        normal: &Normalisation,
+        n_frames: usize,
+        stride: usize,
+    ) -> Result<Self> {
+        Self::load_within(HELD_BYTES, dataset, split, normal, n_frames, stride)
+    }
+
+    /// `load`, which holds no more than so many bytes of intervals in memory.
+    pub fn load_within(
+        most_bytes: usize,
+        dataset: &'d Dataset,
         split: Split,
         normal: &Normalisation,
         n_frames: usize,
@@ -78,52 +82,49 @@ impl WindowLoader {
     ) -> Result<Self> {
         ensure!(n_frames > 0 && stride > 0, "a window needs at least one frame, and a stride of at least one");
         let fps = dataset.info().fps;
-        let long: Vec<_> = dataset.samples(split).into_iter().filter(|sample| sample.n_frames >= n_frames).collect();
-        let lengths = std::array::from_fn(|bone| normal.bone_lengths.get(bone).copied().unwrap_or(0.0));
-        let read = |sample| -> Result<TrainingInterval> {
-            let mut sample = dataset.read(sample)?;
-            // Every video has its own constant lengths; the generator learns one body.
-            bones::with_lengths(&mut sample.motion, &lengths);
-            let (features, mask) = normal.features_with_channels(&sample.motion, sample.posture.as_ref());
-            // Rounding may ask for one spectrogram frame more than the sound has windows for.
-            let enough = mel::n_samples(mel_frames(fps, sample.motion.n_frames()) + 1);
-            let mut samples = sample.sound.samples;
-            samples.resize(enough.max(samples.len()), 0.0);
-            let mels = mel::log_mel(&samples).reversed_axes().as_standard_layout().into_owned();
-            Ok(TrainingInterval { features, mask, mels })
+        let long = dataset.samples(split).into_iter().filter(|sample| sample.n_frames >= n_frames).collect();
+        let intervals = TrainingIntervals::open(dataset, long, normal, most_bytes)?;
+        let of_interval = |i: usize| {
+            let n_windows = Span { start: 0, end: intervals.n_frames(i) }.n_windows(n_frames, stride);
+            (0..n_windows).map(move |window| (i, window * stride))
         };
-        let intervals: Vec<TrainingInterval> = long.par_iter().map(read).collect::<Result<_>>()?;
-        let of_interval = |(i, interval): (usize, &TrainingInterval)| {
-            let n_windows = Span { start: 0, end: interval.features.ncols() }.n_windows(n_frames, stride);
-            (0..n_windows).map(move |window| (i, window * stride)).collect::<Vec<_>>()
-        };
-        let starts = intervals.iter().enumerate().flat_map(of_interval).collect();
+        let starts = (0..intervals.n_intervals()).flat_map(of_interval).collect();
         Ok(Self { fps, n_frames, n_numbers: normal.n_numbers(), normal: normal.clone(), intervals, starts })
     }
 
-    /// All poses as normalised numbers [144 or more, T] with the joints seen [48 or more, T], interval by interval.
-    pub fn poses(&self) -> impl Iterator<Item = (ArrayView2<'_, f32>, ArrayView2<'_, bool>)> {
-        self.intervals.iter().map(|interval| (interval.features.view(), interval.mask.view()))
+    /// Poses as normalised numbers [144 or more, T] with the joints seen [48 or more, T], in the order of the intervals, the
+    /// long ones in parts of `longest` frames.
+    pub fn poses(&self, longest: usize) -> impl Iterator<Item = Result<(Array2<f32>, Array2<bool>)>> {
+        self.parts(longest).into_iter().map(|(interval, frames)| {
+            let rows = self.intervals.rows(interval, frames.clone(), 0..0)?;
+            let columns = Slice::from(frames.start - rows.first_frame..frames.end - rows.first_frame);
+            let features = rows.features.slice_axis(Axis(1), columns).to_owned();
+            Ok((features, rows.mask.slice_axis(Axis(1), columns).to_owned()))
+        })
     }
 
     /// Intervals, each with its frames, the long ones in parts of `longest` frames.
     pub fn parts(&self, longest: usize) -> Vec<(usize, Range<usize>)> {
-        let of_interval = |(i, interval): (usize, &TrainingInterval)| {
-            let n = interval.features.ncols();
-            (0..n).step_by(longest).map(move |start| (i, start..(start + longest).min(n))).collect::<Vec<_>>()
+        let of_interval = |i: usize| {
+            let n = self.intervals.n_frames(i);
+            (0..n).step_by(longest).map(move |start| (i, start..(start + longest).min(n)))
         };
-        self.intervals.iter().enumerate().flat_map(of_interval).collect()
+        (0..self.intervals.n_intervals()).flat_map(of_interval).collect()
     }
 
     /// These frames of an interval as a batch of one. The sound goes on to a multiple of 32 frames, behind the interval's
     /// end by its mirror image.
     pub fn part(&self, interval: usize, frames: Range<usize>) -> Result<WindowBatch> {
-        let TrainingInterval { features, mask, mels } = &self.intervals[interval];
         let (first, n_mels) = (mel_frames(self.fps, frames.start), mel_frames(self.fps, frames.len()));
-        let n_heard = mel_frames(self.fps, frames.len().next_multiple_of(FRAMES_MULTIPLE));
-        let last = mels.ncols() - 1;
+        let n_heard = mel_frames(self.fps, frames.len().next_multiple_of(FRAMES_MULTIPLE)).max(n_mels);
+        let last = self.intervals.n_mels(interval) - 1;
         let heard = |k: usize| if first + k <= last { first + k } else { (2 * last).saturating_sub(first + k) };
-        let sound = Array2::from_shape_fn((mel::N_MELS, n_heard.max(n_mels)), |(band, k)| mels[[band, heard(k)]]);
+        let lowest = (0..n_heard).map(heard).min().unwrap_or(first);
+        let rows = self.intervals.rows(interval, frames.clone(), lowest..(first + n_heard).min(last + 1))?;
+        let IntervalRows { features, mask, mels, first_frame, first_mel } = &*rows;
+        let heard = |k: usize| heard(k) - first_mel;
+        let frames = frames.start - first_frame..frames.end - first_frame;
+        let sound = Array2::from_shape_fn((mel::N_MELS, n_heard), |(band, k)| mels[[band, heard(k)]]);
         let shape = (self.n_numbers, frames.len());
         let poses = Array2::from_shape_fn(shape, |(number, t)| features[[number, frames.start + t]]);
         let mask = Array2::from_shape_fn(shape, |(number, t)| f32::from(mask[[row_of(number), frames.start + t]]));
@@ -155,7 +156,8 @@ impl WindowLoader {
         }
         ensure!(which.len() == changes.len() && which.iter().all(|i| *i < self.len()), "windows {which:?}");
         let both: Vec<_> = which.iter().zip(changes).collect();
-        let rows: Vec<WindowRows> = both.par_iter().map(|(i, change)| self.changed(self.starts[**i], change)).collect();
+        let changed = |(i, change): &(&usize, &WindowChange)| self.changed(self.starts[**i], change);
+        let rows: Vec<WindowRows> = both.par_iter().map(changed).collect::<Result<_>>()?;
         let tensor = |of: fn(&WindowRows) -> &Array2<f32>| {
             let values: Vec<f32> = rows.iter().flat_map(|rows| of(rows).iter().copied()).collect();
             let (n_rows, n_columns) = of(&rows[0]).dim();
@@ -170,19 +172,26 @@ impl WindowLoader {
     }
 
     /// A window that begins about frame `start` of an interval, changed.
-    fn changed(&self, (interval, start): (usize, usize), change: &WindowChange) -> WindowRows {
-        let TrainingInterval { features, mask, mels } = &self.intervals[interval];
-        let last = features.ncols() - 1;
+    fn changed(&self, (interval, start): (usize, usize), change: &WindowChange) -> Result<WindowRows> {
+        let (last, last_mel) = (self.intervals.n_frames(interval) - 1, self.intervals.n_mels(interval) - 1);
         let n = self.n_frames;
         // As much of the interval as it has.
         let speed = change.speed.min(last as f64 / (n - 1).max(1) as f64);
         let latest = last as f64 - (n - 1) as f64 * speed;
         let first = (start as f64 + change.shift_secs * self.fps.per_sec()).clamp(0.0, latest);
         let at = |t: usize| first + t as f64 * speed;
+        let first_mel = first * (f64::from(SAMPLE_RATE) / mel::HOP as f64) / self.fps.per_sec();
+        let n_mels = mel_frames(self.fps, n);
+        let mel_at = |t: usize| first_mel + t as f64 * speed;
+        let frames = between(at(0), last).0..between(at(n - 1), last).1 + 1;
+        let heard = between(mel_at(0), last_mel).0..between(mel_at(n_mels.max(1) - 1), last_mel).1 + 1;
+        let rows = self.intervals.rows(interval, frames, heard)?;
+        let IntervalRows { features, mask, mels, .. } = &*rows;
         let mut poses = Array2::zeros((self.n_numbers, n));
         let mut seen = Array2::zeros((self.n_numbers, n));
         for t in 0..n {
             let (low, high, share) = between(at(t), last);
+            let (low, high) = (low - rows.first_frame, high - rows.first_frame);
             for number in 0..self.n_numbers {
                 let row = row_of(number);
                 if mask[[row, low]] && (share == 0.0 || mask[[row, high]]) {
@@ -192,12 +201,10 @@ impl WindowLoader {
                 }
             }
         }
-        let mel_rate = f64::from(SAMPLE_RATE) / mel::HOP as f64;
-        let first_mel = first * mel_rate / self.fps.per_sec();
-        let n_mels = mel_frames(self.fps, n);
         let mut sound = Array2::zeros((mel::N_MELS, n_mels));
         for t in 0..n_mels {
-            let (low, high, share) = between(first_mel + t as f64 * speed, mels.ncols() - 1);
+            let (low, high, share) = between(mel_at(t), last_mel);
+            let (low, high) = (low - rows.first_mel, high - rows.first_mel);
             for band in 0..mel::N_MELS {
                 sound[[band, t]] = mels[[band, low]] + share * (mels[[band, high]] - mels[[band, low]]);
             }
@@ -206,7 +213,7 @@ impl WindowLoader {
         if change.is_mirrored {
             augment::mirror(&mut poses, &mut seen, &self.normal);
         }
-        WindowRows { mels: sound, poses, mask: seen }
+        Ok(WindowRows { mels: sound, poses, mask: seen })
     }
 
     /// The windows of these numbers (each below `len`) as one batch.
@@ -214,12 +221,17 @@ impl WindowLoader {
         ensure!(!which.is_empty() && which.iter().all(|i| *i < self.len()), "windows {which:?} of {}", self.len());
         let n_mels = mel_frames(self.fps, self.n_frames);
         let (mut mels, mut poses, mut mask) = (Vec::new(), Vec::new(), Vec::new());
-        for (interval, start) in which.iter().map(|i| self.starts[*i]) {
-            let interval = &self.intervals[interval];
+        let read = |i: &usize| {
+            let (interval, start) = self.starts[*i];
             let first_mel = mel_frames(self.fps, start);
-            take(&mut mels, &interval.mels, first_mel, n_mels);
-            take(&mut poses, &interval.features, start, self.n_frames);
-            let seen = interval.mask.slice_axis(Axis(1), Slice::from(start..start + self.n_frames));
+            let rows = self.intervals.rows(interval, start..start + self.n_frames, first_mel..first_mel + n_mels)?;
+            anyhow::Ok((rows, start, first_mel))
+        };
+        for (rows, start, first_mel) in which.par_iter().map(read).collect::<Result<Vec<_>>>()? {
+            let start = start - rows.first_frame;
+            take(&mut mels, &rows.mels, first_mel - rows.first_mel, n_mels);
+            take(&mut poses, &rows.features, start, self.n_frames);
+            let seen = rows.mask.slice_axis(Axis(1), Slice::from(start..start + self.n_frames));
             for (row, seen) in seen.outer_iter().enumerate() {
                 let n_numbers = if row < N_BONES { 3 } else { 1 };
                 (0..n_numbers).for_each(|_| mask.extend(seen.iter().map(|seen| f32::from(*seen))));

@@ -75,8 +75,8 @@ impl TrainingSource<'_> {
                 let features = |sample: &SampleRef| Ok(normalisation.features(&dataset.read(sample)?.motion));
                 let samples = dataset.samples(Split::Train);
                 let all = samples.par_iter().map(features).collect::<Result<Vec<_>>>()?;
-                let views = all.iter().map(|(numbers, seen)| (numbers.view(), seen.view()));
-                let representation = Representation::bones(&normalisation, views);
+                let poses = all.into_iter().map(Ok);
+                let representation = Representation::bones(&normalisation, poses)?;
                 Ok(PoseNumbers::Joints { normalisation, representation })
             }
             Self::Captures(captures) => Ok(PoseNumbers::Captured(captures.exponential_maps()?)),

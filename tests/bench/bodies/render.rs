@@ -8,7 +8,7 @@ use orator::animate::export::film_panel::FilmBody;
 use orator::animate::{AnimationOptions, perform};
 use orator::demo::drawn::speech::Speech;
 use orator::demo::rule::rule::RuleGestures;
-use orator::external::ffmpeg::encode::VideoWriter;
+use orator::external::ffmpeg::write::encode::VideoWriter;
 use orator::render::{Background, Light, Mesh, PinholeCamera};
 use orator::stage::progress::{Progress, Silent};
 use orator::types::image::Image;

@@ -179,6 +179,9 @@ pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
 
 fn measure(args: &Args, folder: &Path, progress: &dyn Progress) -> Result<Report> {
     let n_threads = rayon::current_num_threads();
+    // Of a training alone, without what is handed to the reference.
+    Fixed::new(args)?.train(args.steps)?;
+    let peak = own_peak_mib();
     let mut ours = Fixed::new(args)?;
     let start =
         |script| Reference::start(script, n_threads, &ours.contents(folder)?, &folder.join("given.safetensors"));
@@ -195,7 +198,6 @@ fn measure(args: &Args, folder: &Path, progress: &dyn Progress) -> Result<Report
         task.advance(1);
     }
     drop(task);
-    let peak = own_peak_mib();
     let phases = ours.phases()?;
 
     let secs = median(own.clone());

@@ -67,3 +67,12 @@ fn the_renderer_is_measured() {
     assert!(facts["triangles"].as_u64().unwrap() > 10_000, "{facts}");
     fails("render --rounds 0", "nothing to measure");
 }
+
+#[test]
+fn claims_are_measured() {
+    let facts = facts("claims --units 300 --workers 3");
+    // A claim and an end, and those that came second.
+    let created = facts["created"].as_f64().unwrap();
+    assert!((2.0..4.0).contains(&created), "{facts}");
+    fails("claims --units 0", "more than 0");
+}

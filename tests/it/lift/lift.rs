@@ -272,6 +272,7 @@ fn the_stage_writes_joints_and_bones() {
         repeated: (0..70).map(|t| t % 3 == 2).collect(),
         shot_score: vec![0.0; 70],
         restart: vec![false; 70],
+        span: vec![false; 70],
         frame_difference: vec![1.0; 70],
     };
     timeline.write(&extract.join("timeline.npz")).unwrap();

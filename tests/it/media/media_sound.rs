@@ -3,9 +3,9 @@
 use crate::fixtures::clips::{ffmpeg, tone, write_numbered};
 use crate::fixtures::skip::real_data;
 use orator::external::ffmpeg::audio::read_mono;
-use orator::external::ffmpeg::encode::VideoWriter;
 use orator::external::ffmpeg::frames::FrameReader;
 use orator::external::ffmpeg::sound_stream::SoundStream;
+use orator::external::ffmpeg::write::encode::VideoWriter;
 use orator::formats::wav;
 use orator::pipeline::extract::audio_file::extract_wav;
 use orator::types::image::Image;

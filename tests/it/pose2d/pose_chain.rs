@@ -80,6 +80,7 @@ fn write_timeline(settings: &Settings, unit: &Unit, restart: Vec<bool>) {
         repeated: vec![false; n_frames],
         shot_score: vec![0.0; n_frames],
         restart,
+        span: vec![false; n_frames],
         frame_difference: vec![1.0; n_frames],
     };
     timeline.write(&folder.join("timeline.npz")).unwrap();

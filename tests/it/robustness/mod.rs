@@ -8,6 +8,7 @@ pub mod hostile_files;
 pub mod kill;
 pub mod memory;
 pub mod output;
+pub mod parts;
 pub mod privacy;
 pub mod runner;
 pub mod sandbox;

@@ -7,6 +7,7 @@ use orator::Evaluation;
 use orator::config::{GanConfig, GanRecipe, MotionRepresentation};
 use orator::dataset::{Dataset, Split};
 use orator::evaluate::clips::checkpoint::EvaluatedCheckpoint;
+use orator::evaluate::clips::motion_store::MotionStore;
 use orator::evaluate::table::result;
 use orator::formats::checkpoint;
 use orator::generate::GestureGenerator;
@@ -59,7 +60,9 @@ fn head_and_trunk_follow_a_sound_that_was_not_trained_on() {
     assert!(posture.head.iter().chain(&posture.trunk).all(|v| v.is_finite()));
 
     let checkpoints = [EvaluatedCheckpoint::from(speaker)];
-    let evaluation = Evaluation::of_generators(&dataset, &checkpoints, Split::Validation, &Silent).unwrap();
+    let evaluation =
+        Evaluation::of_generators(&dataset, &checkpoints, Split::Validation, &MotionStore::in_memory(), &Silent)
+            .unwrap();
     let table = evaluation.measure(&MetricSettings::default(), &Silent).unwrap();
     let result = result::json(&table);
     for channel in ["head", "trunk"] {

@@ -6,6 +6,7 @@ use crate::fixtures::clips;
 use crate::fixtures::gesture_dataset::{FPS, sample};
 use crate::fixtures::write_dataset::write_dataset;
 use orator::dataset::Split;
+use orator::stage::workdir;
 use rustix::process::{Pid, Signal, kill_process};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -124,4 +125,24 @@ fn a_page_that_cannot_be_written_is_told_by_the_exit_code() {
     std::fs::remove_dir_all(dir.join("out/training.html")).unwrap();
     assert_eq!(train(2), Some(0));
     assert!(dir.join("out/training.html").is_file());
+}
+
+#[test]
+fn each_speaker_gets_a_model_and_one_in_other_hands_is_left_to_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    project(dir);
+    let all = || orator(dir, "train gan --all --steps 4").status().unwrap().code();
+    let model = |speaker: &str| std::fs::read(dir.join("work/gan").join(speaker).join("step-0000004.safetensors")).ok();
+    let busy = workdir::lock(&dir.join("work/gan/ben")).unwrap();
+    assert_eq!(all(), Some(0));
+    let anna = model("anna");
+    assert!(anna.is_some() && model("ben").is_none());
+    drop(busy);
+    assert_eq!(all(), Some(0));
+    assert!(model("ben").is_some() && model("anna") == anna);
+    std::fs::remove_dir_all(dir.join("work/gan")).unwrap();
+    std::fs::remove_file(dir.join("work/dataset/anna/info.json")).unwrap();
+    assert_eq!(all(), Some(2));
+    assert!(model("ben").is_some(), "one that fails does not stop the others");
 }

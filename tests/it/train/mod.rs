@@ -13,3 +13,4 @@ pub mod seq2seq;
 pub mod seq2seq_program;
 pub mod several_speakers;
 pub mod watched;
+pub mod windows_from_shards;

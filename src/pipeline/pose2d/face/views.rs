@@ -11,6 +11,7 @@ use crate::pipeline::pose2d::appearance;
 use crate::pipeline::pose2d::patch;
 use crate::types::image::Image;
 use anyhow::Result;
+use serde::{Deserialize, Serialize};
 
 /// A face turned no further than this (`landmarks::turn`) is seen from the front, than the second nearly so; the shape
 /// of one turned further is not known well enough.
@@ -26,6 +27,7 @@ const PICTURE_PX: usize = 128;
 const PICTURE_ROOM: f64 = 1.15;
 
 /// One frame of a face.
+#[derive(Serialize, Deserialize)]
 struct FaceView {
     /// `FRONTAL`: seen from the front; more: from the side.
     turn: f64,
@@ -35,8 +37,15 @@ struct FaceView {
     hair: Vec<f32>,
 }
 
+impl FaceView {
+    /// Numbers of points and colours: views of one video agree in them.
+    fn sizes(&self) -> [usize; 3] {
+        [self.face.len(), self.skin.len(), self.hair.len()]
+    }
+}
+
 /// Views of a video so far.
-#[derive(Default)]
+#[derive(Default, Serialize, Deserialize)]
 pub struct PortraitViews {
     views: Vec<FaceView>,
     /// Time between two views, s: it doubles when there are too many frontal ones.
@@ -59,9 +68,42 @@ impl PortraitViews {
             }
         }
         let turn = turn.max(FRONTAL);
+        if self.makes_room(turn, secs) {
+            let [skin, hair] = regions(points).map(|region| colours(image, region));
+            self.views.push(FaceView { turn, secs, face, skin, hair });
+        }
+        Ok(())
+    }
+
+    /// Whether all views have as many numbers, and the picture its size.
+    pub fn is_sound(&self) -> bool {
+        let is_whole = |image: &Image| {
+            [image.width, image.height] == [PICTURE_PX; 2] && image.data.len() == 3 * PICTURE_PX * PICTURE_PX
+        };
+        self.views.len() <= N_VIEWS
+            && self.views.windows(2).all(|pair| pair[0].sizes() == pair[1].sizes())
+            && self.picture.iter().all(|(_, picture)| is_whole(picture))
+    }
+
+    /// Adds the views of what follows, as far as they have the points of those before.
+    pub fn append(&mut self, next: Self) {
+        let sizes = self.views.first().map(FaceView::sizes);
+        for view in next.views.into_iter().filter(|view| sizes.is_none_or(|sizes| sizes == view.sizes())) {
+            if self.makes_room(view.turn, view.secs) {
+                self.views.push(view);
+            }
+        }
+        let best = |picture: &Option<(f64, Image)>| picture.as_ref().map_or(f64::INFINITY, |(turn, _)| *turn);
+        if best(&next.picture) < best(&self.picture) {
+            self.picture = next.picture;
+        }
+    }
+
+    /// Whether a view of that turn and time is kept; another one goes for it where there are enough.
+    fn makes_room(&mut self, turn: f64, secs: f64) -> bool {
         if let Some(last) = self.views.last().filter(|last| secs - last.secs < self.apart_secs) {
             if last.turn <= turn {
-                return Ok(());
+                return false;
             }
             self.views.pop();
         }
@@ -70,14 +112,12 @@ impl PortraitViews {
             if most.turn > turn {
                 self.views.remove(at);
             } else if turn > FRONTAL {
-                return Ok(());
+                return false;
             } else {
                 self.thin_out();
             }
         }
-        let [skin, hair] = regions(points).map(|region| colours(image, region));
-        self.views.push(FaceView { turn, secs, face, skin, hair });
-        Ok(())
+        true
     }
 
     /// Drops every other view; those to come stand as far apart.

@@ -93,7 +93,7 @@ async function participate(browser, seed) {
   const seeTogether = async () => {
     await hands.press("main form button[type=button]");
     if (position === at("away-at")) {
-      await page.waitForFunction(() => document.querySelector("video").currentTime > 0.5);
+      await page.waitForFunction(() => document.querySelector("video").currentTime > 0);
       await lookAway(1000);
     }
     await isOpen("main form fieldset");

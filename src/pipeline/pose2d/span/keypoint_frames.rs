@@ -5,9 +5,10 @@ use crate::types::pose2d::{FaceSeen, Keypoint, Keypoints, N_BODY, N_HAND, Person
 use crate::types::time::FrameRate;
 use anyhow::Result;
 use ndarray::{Array1, Array2, Array3};
+use serde::{Deserialize, Serialize};
 
 /// What was seen so far: plain numbers, 1 kB a frame.
-#[derive(Default)]
+#[derive(Default, Serialize, Deserialize)]
 pub struct KeypointFrames {
     body: Vec<f32>,
     left_hand: Vec<f32>,
@@ -34,6 +35,19 @@ impl KeypointFrames {
         self.other_hand.extend(pose.other_hand);
         self.face.push(pose.face);
         self.time_secs.push(source_secs);
+    }
+
+    /// Adds the frames that follow, whose first person has the number `n_before`.
+    pub fn append(&mut self, next: Self, n_before: i64) {
+        self.body.extend(next.body);
+        self.left_hand.extend(next.left_hand);
+        self.right_hand.extend(next.right_hand);
+        self.person.extend(next.person);
+        self.n_people.extend(next.n_people);
+        self.identity.extend(next.identity.into_iter().map(|identity| identity.saturating_add(n_before)));
+        self.other_hand.extend(next.other_hand);
+        self.face.extend(next.face);
+        self.time_secs.extend(next.time_secs);
     }
 
     /// Number of frames T.

@@ -1,0 +1,144 @@
+//! `orator plan`.
+
+use crate::cli::Outcome;
+use crate::cli::config_args::ConfigArgs;
+use crate::cli::confine::this_program;
+use crate::cli::ui::Ui;
+use anyhow::{Result, bail};
+use orator::cluster::plan::{ClusterPlan, PIECE_SECS, PlannedUnit};
+use orator::cluster::stage_times::StageTimes;
+use orator::cluster::timing;
+use orator::pipeline::Pipeline;
+use orator::pipeline::process::message::MediaRequest;
+use orator::stage::artifacts::StageName;
+use orator::stage::counted;
+use serde_json::{Value, json};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// Write a sealed plan of all videos, and say what it takes to work on them.
+///
+/// The stages are timed on excerpts of the videos, on this machine, which should be idle; the times are kept until
+/// program, settings, models or machine change. The plan is what `orator work` and `orator submit` go by.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    config: ConfigArgs,
+    /// The plan; default: plan.json in the work folder.
+    #[arg(short, long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Say how long so many workers take.
+    #[arg(long, value_name = "N")]
+    workers: Option<usize>,
+    /// Say how many workers are done within so many hours.
+    #[arg(long, value_name = "H")]
+    hours: Option<f64>,
+    /// Length of the pieces in which workers share a long video.
+    #[arg(long, value_name = "MINUTES", default_value_t = PIECE_SECS / 60.0)]
+    piece: f64,
+    /// Take no time, and say no hours.
+    #[arg(long, conflicts_with_all = ["workers", "hours"])]
+    untimed: bool,
+}
+
+pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    if args.workers == Some(0) || args.hours.is_some_and(|hours| !hours.is_finite() || hours <= 0.0) {
+        bail!("--workers takes a number from 1 on, --hours one above 0");
+    }
+    if !args.piece.is_finite() || args.piece < 1.0 {
+        bail!("--piece takes minutes, 1 or more");
+    }
+    let pipeline = Pipeline::open(args.config.load()?)?.with_processes(this_program());
+    let work = &pipeline.config().settings.work.dir;
+    let out = std::path::absolute(args.out.unwrap_or_else(|| work.join("plan.json")))?;
+    let secs = |path: &Path| {
+        let request = MediaRequest { source: path.to_owned(), excerpt: None };
+        pipeline.ask_media(&request).ok().flatten()
+    };
+    let plan = ClusterPlan::new(&pipeline, &args.config.set, &this_program(), &secs, 60.0 * args.piece)?;
+    plan.write(&out)?;
+    let videos = plan.videos();
+    let lengths: Vec<f64> = videos.iter().filter_map(|unit| unit.secs).collect();
+    let hours: f64 = lengths.iter().sum::<f64>() / 3600.0;
+    let mut lines =
+        vec![format!("{} of {} with {hours:.2} h", counted(plan.units.len(), "unit"), counted(videos.len(), "video"))];
+    let next = format!("orator work --plan {}", out.display());
+    let mut facts = json!({ "plan": out, "units": plan.units.len(), "hours": hours, "next": next });
+    if !args.untimed && !lengths.is_empty() {
+        let times = times(&pipeline, &videos, ui)?;
+        lines.extend(told(&times, &lengths));
+        facts["stages"] = stages(&times, &lengths);
+        facts["peak_mib"] = json!(times.peak_mib);
+        facts["menu"] = json!(times.menu);
+        let mut wall = |workers: usize| {
+            let secs = times.wall_secs(&lengths, workers);
+            lines.push(format!("{:<13}done in {}", counted(workers, "worker"), length(secs)));
+            facts["wall_secs"][workers.to_string()] = json!(secs);
+        };
+        let workers: BTreeSet<usize> = [1, times.jobs].into_iter().chain(args.workers).collect();
+        workers.into_iter().for_each(&mut wall);
+        if let Some(hours) = args.hours {
+            let needed = times.workers_within(&lengths, 3600.0 * hours);
+            facts["workers_needed"] = json!(needed);
+            lines.push(match needed {
+                Some(n) => format!("within {hours} h {} are done", counted(n, "worker")),
+                None => format!(
+                    "within {hours} h no number of workers is done: the longest piece alone takes {}",
+                    length(times.wall_secs(&lengths, usize::MAX))
+                ),
+            });
+        }
+    }
+    lines.push(format!("plan     {}", out.display()));
+    ui.summary(&lines.join("\n"), Some(&next), facts);
+    Ok(Outcome::Done)
+}
+
+/// The times on record where they count for this program, these settings and this machine, else new ones.
+fn times(pipeline: &Pipeline, units: &[PlannedUnit], ui: &Ui) -> Result<StageTimes> {
+    let (work, jobs) = (&pipeline.config().settings.work.dir, pipeline.jobs(None));
+    let made_with = timing::made_with(pipeline, &this_program(), jobs)?;
+    if let Some(known) = StageTimes::read(work).filter(|known| known.made_with == made_with) {
+        return Ok(known);
+    }
+    let times = timing::measure(pipeline, &this_program(), units, jobs, ui)?;
+    times.write(work)?;
+    Ok(times)
+}
+
+fn told(times: &StageTimes, lengths: &[f64]) -> Vec<String> {
+    let whole: f64 = lengths.iter().sum();
+    let stage = |stage: StageName| {
+        let gib = times.cost(stage).bytes_per_sec * whole / f64::from(1 << 30);
+        format!("{stage:9}{:>10} of work{gib:8.2} GiB of files", length(times.stage_secs(stage, lengths)))
+    };
+    let mut lines: Vec<String> = StageName::ALL.map(stage).into();
+    lines.push(format!(
+        "timed on {} of {:.0} s in all, {} side by side, {}",
+        counted(times.n_excerpts, "excerpt"),
+        times.excerpt_secs,
+        times.jobs,
+        times.processor
+    ));
+    lines.extend(times.peak_mib.map(|mib| format!("memory   {mib:.0} MiB a worker")));
+    lines.extend(times.menu.iter().map(|other| format!("--set {:40} {:.2} x the time", other.set, other.times)));
+    lines
+}
+
+fn stages(times: &StageTimes, lengths: &[f64]) -> Value {
+    let whole: f64 = lengths.iter().sum();
+    let stage = |stage: StageName| {
+        let bytes = times.cost(stage).bytes_per_sec * whole;
+        (stage.to_string(), json!({ "work_secs": times.stage_secs(stage, lengths), "bytes": bytes }))
+    };
+    StageName::ALL.map(stage).into_iter().collect::<serde_json::Map<String, Value>>().into()
+}
+
+/// A length of time as people say it.
+fn length(secs: f64) -> String {
+    match secs {
+        ..100.0 => format!("{secs:.0} s"),
+        ..6000.0 => format!("{:.0} min", secs / 60.0),
+        _ => format!("{:.1} h", secs / 3600.0),
+    }
+}

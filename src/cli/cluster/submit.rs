@@ -1,0 +1,265 @@
+//! `orator submit`.
+
+use super::open::open;
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
+use anyhow::{Context, Result, bail, ensure};
+use orator::cluster::job::JobRequest;
+use orator::cluster::kubernetes::{KubernetesTarget, manifests};
+use orator::cluster::plan::ClusterPlan;
+use orator::cluster::shell::shell;
+use orator::cluster::slurm;
+use orator::cluster::stage_times::StageTimes;
+use orator::stage::workdir;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// Start workers on a cluster: write the jobs, and send them.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    to: To,
+}
+
+#[derive(clap::Subcommand)]
+enum To {
+    Slurm(SlurmArgs),
+    Kubernetes(KubernetesArgs),
+    Ssh(SshArgs),
+}
+
+/// Longest time of a worker where nothing is known of the work, hours.
+const UNKNOWN_HOURS: f64 = 12.0;
+
+/// What every kind of job needs.
+#[derive(clap::Args)]
+struct JobArgs {
+    /// The plan, of `orator plan`.
+    #[arg(long, value_name = "FILE")]
+    plan: PathBuf,
+    /// Number of workers.
+    #[arg(long, value_name = "N", default_value_t = 16)]
+    tasks: usize,
+    /// Most workers at a time; default: all.
+    #[arg(long, value_name = "N")]
+    at_once: Option<usize>,
+    /// Processor cores of a worker, each with a video of its own.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    cores: usize,
+    /// Memory of a worker, GiB; default: 1.5 for each core.
+    #[arg(long, value_name = "GIB")]
+    memory: Option<f64>,
+    /// Longest time of a worker, hours; default: twice what the plan foretells for so many workers, and half an hour; 12
+    /// where it was not timed.
+    #[arg(long, value_name = "HOURS")]
+    hours: Option<f64>,
+    /// The program, where the machines of the cluster see it; default: this one.
+    #[arg(long, value_name = "FILE")]
+    program: Option<PathBuf>,
+    /// Write and print the jobs, and send nothing.
+    #[arg(long)]
+    dry_run: bool,
+}
+
+/// An array of workers, and a job after it that makes the datasets and verifies them.
+#[derive(clap::Args)]
+struct SlurmArgs {
+    #[command(flatten)]
+    job: JobArgs,
+    /// Longest array; default: what `scontrol show config` says.
+    #[arg(long, value_name = "N")]
+    max_array: Option<usize>,
+    /// One more line for `#SBATCH`, like --partition=long; may be given several times.
+    #[arg(long = "sbatch", value_name = "OPTION", allow_hyphen_values = true)]
+    options: Vec<String>,
+}
+
+/// An Indexed Job of workers, and a Job that makes the datasets and verifies them.
+#[derive(clap::Args)]
+struct KubernetesArgs {
+    #[command(flatten)]
+    job: JobArgs,
+    /// Image that holds the program.
+    #[arg(long, value_name = "IMAGE")]
+    image: String,
+    /// Namespace of the jobs.
+    #[arg(long, value_name = "NAME", default_value = "default")]
+    namespace: String,
+    /// Claim of the volume that holds the project, writable by every node.
+    #[arg(long, value_name = "NAME")]
+    claim: String,
+    /// Make the claim too, of so many GiB.
+    #[arg(long, value_name = "GIB")]
+    claim_size: Option<u64>,
+    /// Where the volume is mounted, a folder above plan, videos and work.
+    #[arg(long, value_name = "DIR")]
+    mount: String,
+}
+
+/// A worker on each machine, over ssh. This waits for all of them.
+#[derive(clap::Args)]
+struct SshArgs {
+    #[command(flatten)]
+    job: JobArgs,
+    /// The machines, as ssh names them.
+    #[arg(required = true, value_name = "HOST")]
+    hosts: Vec<String>,
+}
+
+pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    match args.to {
+        To::Slurm(args) => to_slurm(&args, ui),
+        To::Kubernetes(args) => to_kubernetes(&args, ui),
+        To::Ssh(args) => to_ssh(&args, ui),
+    }
+}
+
+impl JobArgs {
+    /// The plan, its work folder, and what its jobs are made of.
+    fn request(&self) -> Result<(ClusterPlan, PathBuf, JobRequest)> {
+        let (plan, pipeline) = open(&self.plan)?;
+        let work = pipeline.config().settings.work.dir.to_path_buf();
+        ensure!(self.tasks > 0 && self.cores > 0, "tasks and cores must be more than 0");
+        let n_at_once = self.at_once.unwrap_or(self.tasks);
+        let lengths: Vec<f64> = plan.videos().iter().filter_map(|video| video.secs).collect();
+        let foretold = StageTimes::read(&work).map(|times| times.limit_hours(&lengths, n_at_once * self.cores));
+        let hours = self.hours.or(foretold).unwrap_or(UNKNOWN_HOURS);
+        ensure!(hours > 0.0, "hours must be more than 0");
+        let program = match &self.program {
+            Some(program) => program.clone(),
+            None => std::env::current_exe().context("this program's own file is not known; give --program")?,
+        };
+        let request = JobRequest {
+            program,
+            plan: std::path::absolute(&self.plan)?,
+            n_tasks: self.tasks.min(plan.units.len().max(1)),
+            n_at_once,
+            cores: self.cores,
+            memory_gib: self.memory.unwrap_or(1.5 * self.cores as f64),
+            hours,
+        };
+        Ok((plan, work, request))
+    }
+
+    fn jobs_folder(&self, plan: &ClusterPlan) -> Result<PathBuf> {
+        Ok(std::path::absolute(plan.folder(&self.plan))?.join("jobs"))
+    }
+
+    fn next(&self) -> String {
+        format!("orator status --plan {}", self.plan.display())
+    }
+}
+
+fn to_slurm(args: &SlurmArgs, ui: &Ui) -> Result<Outcome> {
+    let (plan, work, request) = args.job.request()?;
+    let folder = args.job.jobs_folder(&plan)?;
+    let max_array = match args.max_array {
+        Some(most) => most,
+        None => max_array_size().unwrap_or(1001),
+    };
+    std::fs::create_dir_all(&folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    let made = slurm::scripts(&request, &plan, &work, &folder, max_array, &args.options);
+    let mut files = Vec::new();
+    for (name, script) in made.arrays.iter().enumerate().map(|(n, script)| (format!("array-{n}.sh"), script)) {
+        workdir::write_file(&folder.join(&name), script.as_bytes())?;
+        files.push(folder.join(name));
+    }
+    let last = folder.join("last.sh");
+    workdir::write_file(&last, made.last.as_bytes())?;
+    let mut ids = Vec::new();
+    if !args.job.dry_run {
+        for file in &files {
+            ids.push(sbatch(&[], file)?);
+        }
+        // After a task that was cancelled or lost too: what it had is in the last job's hands then.
+        let after = format!("--dependency=afterany:{}", ids.join(":"));
+        ids.push(sbatch(&[&after], &last)?);
+    }
+    files.push(last);
+    let text = match args.job.dry_run {
+        true => made.arrays.iter().chain([&made.last]).cloned().collect::<Vec<_>>().join("\n"),
+        false => format!("sent {} workers and a last job: {}", request.n_tasks, ids.join(", ")),
+    };
+    let next = args.job.next();
+    ui.summary(&text, Some(&next), json!({ "scripts": files, "jobs": ids, "next": next }));
+    Ok(Outcome::Done)
+}
+
+/// MaxArraySize of the cluster: indices are below it.
+fn max_array_size() -> Option<usize> {
+    let out = Command::new("scontrol").args(["show", "config"]).output().ok()?;
+    let text = String::from_utf8_lossy(&out.stdout).into_owned();
+    let line = text.lines().find(|line| line.trim_start().starts_with("MaxArraySize"))?;
+    line.split('=').nth(1)?.trim().parse().ok()
+}
+
+/// Sends a script; the number of its job.
+fn sbatch(options: &[&str], script: &Path) -> Result<String> {
+    let out = Command::new("sbatch").arg("--parsable").args(options).arg(script).output();
+    let out = out.context("cannot start sbatch; --dry-run writes the scripts without it")?;
+    if !out.status.success() {
+        bail!("sbatch refused {}: {}", script.display(), String::from_utf8_lossy(&out.stderr).trim());
+    }
+    // JOB, or JOB;CLUSTER.
+    let id = String::from_utf8_lossy(&out.stdout).trim().split(';').next().unwrap_or_default().to_owned();
+    Ok(id)
+}
+
+fn to_kubernetes(args: &KubernetesArgs, ui: &Ui) -> Result<Outcome> {
+    let (plan, work, request) = args.job.request()?;
+    let target = KubernetesTarget {
+        image: args.image.clone(),
+        namespace: args.namespace.clone(),
+        claim: args.claim.clone(),
+        claim_gib: args.claim_size,
+        mount: args.mount.clone(),
+    };
+    let file = args.job.jobs_folder(&plan)?.join("kubernetes.json");
+    let manifests = manifests(&request, &plan, &work, &target);
+    let text = serde_json::to_string_pretty(&manifests)?;
+    workdir::write_file(&file, text.as_bytes())?;
+    let next = args.job.next();
+    if args.job.dry_run {
+        ui.summary(&text, Some(&next), json!({ "manifests": file, "next": next }));
+        return Ok(Outcome::Done);
+    }
+    let status = Command::new("kubectl").args(["apply", "-f"]).arg(&file).stdout(Stdio::null()).status();
+    let status = status.context("cannot start kubectl; --dry-run writes the manifests without it")?;
+    ensure!(status.success(), "kubectl did not take {}", file.display());
+    let text = format!("sent {} workers: {}", request.n_tasks, file.display());
+    ui.summary(&text, Some(&next), json!({ "manifests": file, "next": next }));
+    Ok(Outcome::Done)
+}
+
+fn to_ssh(args: &SshArgs, ui: &Ui) -> Result<Outcome> {
+    let (_, _, request) = args.job.request()?;
+    let line = shell(&request.last_worker());
+    let next = args.job.next();
+    if args.job.dry_run {
+        let lines: Vec<String> =
+            args.hosts.iter().map(|host| format!("ssh {host} {}", shell(std::slice::from_ref(&line)))).collect();
+        ui.summary(&lines.join("\n"), Some(&next), json!({ "commands": lines, "next": next }));
+        return Ok(Outcome::Done);
+    }
+    let start = |host: &String| {
+        // Without a terminal, a worker whose connection is lost works on; its end is seen in the plan's folder.
+        let child = Command::new("ssh")
+            .args(["-o", "BatchMode=yes", host, &line])
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .spawn();
+        child.with_context(|| format!("cannot start ssh to {host}"))
+    };
+    let workers = args.hosts.iter().map(|host| Ok((host, start(host)?))).collect::<Result<Vec<_>>>()?;
+    let mut bad = Vec::new();
+    for (host, mut worker) in workers {
+        let status = worker.wait().with_context(|| format!("ssh to {host} is lost"))?;
+        // 2: some units failed, of which the status tells.
+        if !matches!(status.code(), Some(0 | 2)) {
+            bad.push(format!("{host}: {status}"));
+        }
+    }
+    ui.summary(&bad.join("\n"), Some(&next), json!({ "lost": bad, "next": next }));
+    Ok(if bad.is_empty() { Outcome::Done } else { Outcome::SomeFailed })
+}

@@ -1,0 +1,106 @@
+//! `orator work`.
+
+use super::open::open;
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
+use anyhow::Result;
+use orator::cluster::heartbeat::DEAD_AFTER;
+use orator::cluster::worker::{WorkReport, WorkerOptions, work};
+use orator::stage::counted;
+use serde_json::json;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Work on a plan, beside other workers on any machine that sees the same folders.
+///
+/// Each worker claims one video after the other. What a dead worker had in its hands is taken over; a slow one keeps it.
+/// SIGTERM or Ctrl-C ends a worker after the unit at hand, a second one at once; the same command goes on from there.
+/// Exit code 2 says that some units failed.
+#[derive(clap::Args)]
+pub struct Args {
+    /// The plan, of `orator plan`.
+    #[arg(long, value_name = "FILE")]
+    plan: PathBuf,
+    /// Units worked on side by side; 0: one a processor core.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    jobs: usize,
+    /// Only this share of the units, for arrays with fixed shares: I of N, from 0.
+    #[arg(long, value_name = "I/N", value_parser = shard)]
+    shard: Option<(usize, usize)>,
+    /// Work on units again that had failed.
+    #[arg(long)]
+    retry: bool,
+    /// End when the rest is in the hands of others, and do not wait whether they die.
+    #[arg(long)]
+    no_wait: bool,
+    /// Begin no unit later than so many hours after the start.
+    #[arg(long, value_name = "HOURS")]
+    begin_within: Option<f64>,
+    /// Seconds between two signs of life.
+    #[arg(long, value_name = "SECONDS", default_value_t = 15.0)]
+    beat: f64,
+    /// Seconds without a sign of life after which another worker is dead. More than a network file system caches.
+    #[arg(long, value_name = "SECONDS", default_value_t = DEAD_AFTER.as_secs_f64())]
+    dead_after: f64,
+}
+
+fn shard(text: &str) -> Result<(usize, usize), String> {
+    let parsed = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+    let shard = parsed.filter(|(i, n): &(usize, usize)| i < n);
+    shard.ok_or_else(|| "expected I/N with I from 0 to N - 1".to_owned())
+}
+
+pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    let (plan, pipeline) = open(&args.plan)?;
+    pipeline.check()?;
+    let cores = || std::thread::available_parallelism().map_or(1, |n| n.get());
+    let secs = |secs: f64| Duration::try_from_secs_f64(secs.max(0.1)).unwrap_or(Duration::MAX);
+    let options = WorkerOptions {
+        jobs: if args.jobs == 0 { cores() } else { args.jobs },
+        shard: args.shard,
+        retry: args.retry,
+        wait: !args.no_wait,
+        beat: secs(args.beat),
+        dead_after: secs(args.dead_after),
+        begin_within: args.begin_within.map(|hours| secs(3600.0 * hours)),
+    };
+    ui.listens_for_stop(
+        "stopping after this unit; the next signal ends at once",
+        "every stage of a video that is done is kept, and the same command goes on from there",
+    );
+    let report = work(&plan, &args.plan, &pipeline, &options, ui)?;
+    let path = args.plan.display();
+    let has_failed = !report.failed.is_empty();
+    let next = match report.all_ended {
+        true if has_failed => format!("orator work --plan {path} --retry"),
+        true => plan.datasets_command("orator"),
+        false => format!("orator status --plan {path}"),
+    };
+    let mut facts = json!(report);
+    facts["next"] = json!(next);
+    ui.summary(&text(&report), Some(&next), facts);
+    Ok(match (ui.was_stopped() && !report.all_ended, has_failed) {
+        (true, _) => Outcome::Stopped,
+        (false, true) => Outcome::SomeFailed,
+        (false, false) => Outcome::Done,
+    })
+}
+
+fn text(report: &WorkReport) -> String {
+    let mut lines = vec![format!(
+        "{} done ({} up to date before), {} failed",
+        counted(report.done, "unit"),
+        report.fresh,
+        report.failed.len()
+    )];
+    if report.taken_over + report.laid_aside > 0 {
+        lines.push(format!(
+            "{} taken over from dead workers, {} laid aside since others had taken them over",
+            report.taken_over, report.laid_aside
+        ));
+    }
+    lines.extend(report.failed.iter().map(|(unit, error)| format!("failed  {unit}: {error}")));
+    lines
+        .push(if report.all_ended { "every unit has ended" } else { "others have the rest, or it is left" }.to_owned());
+    lines.join("\n")
+}

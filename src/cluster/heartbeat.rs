@@ -1,0 +1,112 @@
+//! Who is at work: every worker counts on in a file of its own. Whether one is dead is seen from its count alone, by the
+//! watcher's own clock, so that the clocks of machines may differ by minutes.
+
+use super::shared_folder::SharedFolder;
+use crate::stage::workdir::is_alive;
+use anyhow::Result;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+/// Folder of the workers' files.
+pub const WORKERS: &str = "workers";
+
+/// Time without a beat after which a worker is dead, unless another is asked for.
+pub const DEAD_AFTER: Duration = Duration::from_secs(180);
+
+/// What a worker says of itself.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Heartbeat {
+    /// Goes up with every beat.
+    pub beat: u64,
+    /// The machine's name.
+    pub host: String,
+    /// Tells machines, and containers on one machine, apart; empty: not known.
+    pub machine: String,
+    /// The process on that machine.
+    pub pid: u32,
+    /// Start by the machine's clock, seconds since 1970; for people.
+    pub started: u64,
+    /// Whether the worker ended by itself, with nothing in its hands.
+    pub ended: bool,
+    /// Units that it has done, and that failed in its hands.
+    pub n_done: usize,
+    /// Units that failed.
+    pub n_failed: usize,
+    /// Seconds of video in the units done.
+    pub media_secs: f64,
+    /// Seconds since its start, by its own clock.
+    pub secs: f64,
+    /// Unit in its hands.
+    pub unit: Option<String>,
+}
+
+impl Heartbeat {
+    /// The file of a worker.
+    pub fn name(worker: &str) -> String {
+        format!("{WORKERS}/{worker}.json")
+    }
+
+    /// What a worker said last; `None`: nothing yet, or half of it.
+    pub fn read(folder: &impl SharedFolder, worker: &str) -> Result<Option<Self>> {
+        let bytes = folder.read(&Self::name(worker))?;
+        Ok(bytes.and_then(|bytes| serde_json::from_slice(&bytes).ok()))
+    }
+
+    /// Whether it is known without waiting that the worker is gone: it said so, or it was a process of this machine that
+    /// is no more.
+    pub fn is_over(&self, machine: &str) -> bool {
+        self.ended || (!machine.is_empty() && self.machine == machine && !is_alive(self.pid))
+    }
+}
+
+/// The name of the machine that this program is on, and a word that tells machines and containers apart.
+pub fn this_machine() -> (String, String) {
+    let text = |path: &str| std::fs::read_to_string(path).unwrap_or_default().trim().to_owned();
+    let host = rustix::system::uname().nodename().to_string_lossy().into_owned();
+    let boot = text("/proc/sys/kernel/random/boot_id");
+    // Process numbers count anew in a container.
+    let processes = std::fs::read_link("/proc/self/ns/pid").unwrap_or_default();
+    let machine = match boot.is_empty() {
+        true => String::new(),
+        false => blake3::hash(format!("{boot} {}", processes.display()).as_bytes()).to_hex()[..16].to_owned(),
+    };
+    (host, machine)
+}
+
+/// Watches the beats of other workers.
+pub struct BeatWatch {
+    /// More than a network file system keeps what it knows.
+    dead_after: Duration,
+    machine: String,
+    /// Last beat of each worker, and when it was seen first.
+    seen: BTreeMap<String, (Option<u64>, Duration)>,
+}
+
+impl BeatWatch {
+    /// A watcher on `machine`.
+    pub fn new(dead_after: Duration, machine: &str) -> Self {
+        Self { dead_after, machine: machine.to_owned(), seen: BTreeMap::new() }
+    }
+
+    /// Time without a beat after which a worker is dead.
+    pub fn dead_after(&self) -> Duration {
+        self.dead_after
+    }
+
+    /// Whether the worker is dead at the time `now` of the watcher's clock. One seen for the first time is not, unless that
+    /// is known.
+    pub fn is_dead(&mut self, folder: &impl SharedFolder, worker: &str, now: Duration) -> Result<bool> {
+        let heartbeat = Heartbeat::read(folder, worker)?;
+        if heartbeat.as_ref().is_some_and(|heartbeat| heartbeat.is_over(&self.machine)) {
+            return Ok(true);
+        }
+        let beat = heartbeat.map(|heartbeat| heartbeat.beat);
+        let seen = self.seen.entry(worker.to_owned()).or_insert((beat, now));
+        // A cache may show an older beat again: only more is news.
+        if beat > seen.0 {
+            *seen = (beat, now);
+        }
+        Ok(now.saturating_sub(seen.1) >= self.dead_after)
+    }
+}

@@ -1,0 +1,53 @@
+//! What is the same in the jobs of every scheduler: the commands of a worker, and of the end.
+
+use super::plan::ClusterPlan;
+use crate::stage::artifacts::{StageName, speaker_dir};
+use std::path::{Path, PathBuf};
+
+/// What jobs are made of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JobRequest {
+    /// The program on the machines of the cluster.
+    pub program: PathBuf,
+    /// The plan there.
+    pub plan: PathBuf,
+    /// Number of workers, each a task of its own.
+    pub n_tasks: usize,
+    /// Most tasks at a time.
+    pub n_at_once: usize,
+    /// Processor cores and memory (GiB) of a task.
+    pub cores: usize,
+    pub memory_gib: f64,
+    /// Longest time of a task, hours.
+    pub hours: f64,
+}
+
+impl JobRequest {
+    /// Arguments of a task's worker: it leaves what is in the hands of others.
+    pub fn worker(&self) -> Vec<String> {
+        let mut words = self.last_worker();
+        words.push("--no-wait".to_owned());
+        words
+    }
+
+    /// Arguments of the last worker, which waits for all others and takes over what the dead have left.
+    pub fn last_worker(&self) -> Vec<String> {
+        let [program, plan] = [&self.program, &self.plan].map(|path| path.display().to_string());
+        [program.as_str(), "work", "--plan", plan.as_str(), "--jobs", &self.cores.to_string()]
+            .map(str::to_owned)
+            .to_vec()
+    }
+
+    /// The command lines that verify the datasets of a work folder.
+    pub fn verify(&self, plan: &ClusterPlan, work: &Path) -> Vec<Vec<String>> {
+        let mut speakers: Vec<&str> = plan.units.iter().map(|unit| unit.speaker.as_str()).collect();
+        speakers.sort_unstable();
+        speakers.dedup();
+        let dataset = |speaker| speaker_dir(work, StageName::Dataset, speaker);
+        let words = |speaker| {
+            let dir = dataset(speaker).display().to_string();
+            vec![self.program.display().to_string(), "dataset".into(), "verify".into(), dir]
+        };
+        speakers.into_iter().map(words).collect()
+    }
+}

@@ -1,0 +1,119 @@
+//! Jobs for Kubernetes: an Indexed Job of workers and a Job that makes the datasets, on the volumes that hold the project.
+
+use super::job::JobRequest;
+use super::plan::ClusterPlan;
+use super::shell::shell;
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// Where jobs run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KubernetesTarget {
+    /// Image that holds the program.
+    pub image: String,
+    pub namespace: String,
+    /// Claim of the volume with the project, which every node can write, and its size (GiB) where it is to be made.
+    pub claim: String,
+    pub claim_gib: Option<u64>,
+    /// Where the volume is mounted: a folder above plan, videos and work.
+    pub mount: String,
+}
+
+/// The manifests, as one List that `kubectl apply -f` takes. The job of the datasets waits for the units by itself.
+pub fn manifests(job: &JobRequest, plan: &ClusterPlan, work: &Path, target: &KubernetesTarget) -> Value {
+    let name = |suffix: &str| format!("orator-{}{suffix}", &plan.seal[..8.min(plan.seal.len())]);
+    let meta =
+        |suffix: &str| json!({ "name": name(suffix), "namespace": target.namespace, "labels": { "app": "orator" } });
+    let resources = json!({
+        "requests": { "cpu": job.cores.to_string(), "memory": format!("{}Mi", (job.memory_gib * 1024.0).ceil()) },
+        "limits": { "memory": format!("{}Mi", (job.memory_gib * 1024.0).ceil()) },
+    });
+    let pod = |command: Vec<String>| {
+        json!({
+            "metadata": { "labels": { "app": "orator" } },
+            "spec": {
+                "restartPolicy": "Never",
+                // Time for the unit at hand, when a node is emptied.
+                "terminationGracePeriodSeconds": 120,
+                "containers": [{
+                    "name": "orator", "image": target.image, "command": command, "resources": resources,
+                    "volumeMounts": [{ "name": "project", "mountPath": target.mount }],
+                }],
+                "volumes": [{ "name": "project", "persistentVolumeClaim": { "claimName": target.claim } }],
+            },
+        })
+    };
+    // A lost node is no failure of the task; a program that fails three times is.
+    let of_nodes = json!({ "rules": [{ "action": "Ignore", "onPodConditions": [{ "type": "DisruptionTarget", "status": "True" }] }] });
+    let of_index = json!({
+        "rules": [
+            { "action": "Ignore", "onPodConditions": [{ "type": "DisruptionTarget", "status": "True" }] },
+            { "action": "FailJob", "onExitCodes": { "containerName": "orator", "operator": "In", "values": [1] } },
+        ],
+    });
+    let seconds = (job.hours * 3600.0).ceil() as i64;
+    let script = |lines: Vec<String>| vec!["/bin/sh".to_owned(), "-c".to_owned(), lines.join("\n")];
+    let mut last = vec!["code=0".to_owned(), format!("{} || code=$?", shell(&job.last_worker()))];
+    last.push(format!("{} || code=$?", plan.datasets_command(&job.program.display().to_string())));
+    last.extend(job.verify(plan, work).iter().map(|words| format!("{} || code=$?", shell(words))));
+    last.push("exit $code".to_owned());
+    let mut items = Vec::new();
+    if let Some(gib) = target.claim_gib {
+        items.push(json!({
+            "apiVersion": "v1", "kind": "PersistentVolumeClaim",
+            "metadata": { "name": target.claim, "namespace": target.namespace },
+            "spec": { "accessModes": ["ReadWriteMany"], "resources": { "requests": { "storage": format!("{gib}Gi") } } },
+        }));
+    }
+    items.push(json!({
+        "apiVersion": "batch/v1", "kind": "Job", "metadata": meta(""),
+        "spec": {
+            "completionMode": "Indexed", "completions": job.n_tasks, "parallelism": job.n_at_once.min(job.n_tasks),
+            "backoffLimit": 3 * job.n_tasks, "activeDeadlineSeconds": seconds, "podFailurePolicy": of_index,
+            "template": pod(script(ended_with_its_pod(&shell(&job.worker())))),
+        },
+    }));
+    items.push(json!({
+        "apiVersion": "batch/v1", "kind": "Job", "metadata": meta("-last"),
+        "spec": {
+            "backoffLimit": 3, "activeDeadlineSeconds": seconds, "podFailurePolicy": of_nodes,
+            "template": pod(script(last)),
+        },
+    }));
+    json!({ "apiVersion": "v1", "kind": "List", "items": items })
+}
+
+/// Lines of a shell that runs a worker and hands SIGTERM on to it, which the shell as the pod's first process would keep to
+/// itself; videos that failed (exit code 2) do not fail the pod.
+fn ended_with_its_pod(worker: &str) -> Vec<String> {
+    let lines = [
+        &format!("{worker} & worker=$!"),
+        "trap 'kill -TERM $worker 2>/dev/null' TERM",
+        "wait $worker; code=$?",
+        // A signal ends the wait, not the worker.
+        "while kill -0 $worker 2>/dev/null; do wait $worker; code=$?; done",
+        "[ $code -eq 0 ] || [ $code -eq 2 ]",
+    ];
+    lines.map(str::to_owned).to_vec()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rustix::process::{Pid, Signal, kill_process};
+    use std::process::Command;
+    use std::time::Duration;
+
+    #[test]
+    fn a_worker_hears_that_its_pod_is_to_end() {
+        let code = |worker: &str, signal: Option<Signal>| {
+            let mut pod = Command::new("/bin/sh").args(["-c", &ended_with_its_pod(worker).join("\n")]).spawn().unwrap();
+            std::thread::sleep(Duration::from_millis(300));
+            signal.iter().for_each(|signal| kill_process(Pid::from_child(&pod), *signal).unwrap());
+            pod.wait().unwrap().code()
+        };
+        let listens = |code: u8| format!("sh -c 'trap \"sleep 0.2; exit {code}\" TERM; while :; do sleep 0.05; done'");
+        assert_eq!([0, 2, 1].map(|n| code(&listens(n), Some(Signal::TERM))), [Some(0), Some(0), Some(1)]);
+        assert_eq!([0, 2, 3].map(|n| code(&format!("sh -c 'exit {n}'"), None)), [Some(0), Some(0), Some(1)]);
+    }
+}

@@ -1,0 +1,180 @@
+//! What workers on many machines ask of the folder that they share: to create a file once, to read, list and replace.
+//! Nothing else is needed, and no lock, so that NFS with its caches will do.
+
+use crate::stage::workdir;
+use anyhow::{Context, Result};
+use std::fs;
+use std::io::{ErrorKind, Write};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// A folder of small files that several machines see. Names have `/` between folders.
+pub trait SharedFolder {
+    /// Makes the file with these bytes; `false`: there is one of that name. Of several that try, one succeeds. The bytes must
+    /// be no one else's.
+    fn create(&self, name: &str, bytes: &[u8]) -> Result<bool>;
+    /// The bytes of a file, maybe not the newest; `None`: not there, or not seen yet.
+    fn read(&self, name: &str) -> Result<Option<Vec<u8>>>;
+    /// Names of the files of a folder, maybe without the newest.
+    fn list(&self, folder: &str) -> Result<Vec<String>>;
+    /// Puts the bytes in the place of a file that this worker alone writes.
+    fn replace(&self, name: &str, bytes: &[u8]) -> Result<()>;
+}
+
+/// A folder of a file system.
+#[derive(Clone, Debug)]
+pub struct DiskFolder(pub PathBuf);
+
+impl SharedFolder for DiskFolder {
+    /// By a hard link to a file that is whole, which every network file system does at once or not at all.
+    fn create(&self, name: &str, bytes: &[u8]) -> Result<bool> {
+        static NEXT: AtomicU64 = AtomicU64::new(0);
+        let path = self.0.join(name);
+        let folder = path.parent().context("a file without a folder")?;
+        fs::create_dir_all(folder).with_context(|| format!("cannot write in {}", folder.display()))?;
+        let token = blake3::hash(bytes).to_hex();
+        let draft =
+            folder.join(format!(".{}-{}-{}", &token[..16], std::process::id(), NEXT.fetch_add(1, Ordering::Relaxed)));
+        let written = fs::File::create_new(&draft).and_then(|mut file| {
+            file.write_all(bytes)?;
+            file.sync_all()
+        });
+        let linked = written.and_then(|()| fs::hard_link(&draft, &path));
+        let removed = fs::remove_file(&draft);
+        match linked {
+            Ok(()) => {
+                removed.with_context(|| format!("cannot remove {}", draft.display()))?;
+                Ok(true)
+            }
+            // A link whose answer was lost is asked for again by the system, and then there already.
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => Ok(self.read(name)?.as_deref() == Some(bytes)),
+            Err(error) => Err(workdir::full_disk(error.into()))
+                .with_context(|| format!("cannot link {}: workers need a file system with hard links", path.display())),
+        }
+    }
+
+    fn read(&self, name: &str) -> Result<Option<Vec<u8>>> {
+        let path = self.0.join(name);
+        match fs::read(&path) {
+            Ok(bytes) => Ok(Some(bytes)),
+            Err(error) if is_gone(&error) => Ok(None),
+            Err(error) => Err(error).with_context(|| format!("cannot read {}", path.display())),
+        }
+    }
+
+    fn list(&self, folder: &str) -> Result<Vec<String>> {
+        let path = self.0.join(folder);
+        let entries = match fs::read_dir(&path) {
+            Ok(entries) => entries,
+            Err(error) if is_gone(&error) => return Ok(Vec::new()),
+            Err(error) => return Err(error).with_context(|| format!("cannot list {}", path.display())),
+        };
+        let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+        Ok(names.filter(|name| !name.starts_with('.')).collect())
+    }
+
+    fn replace(&self, name: &str, bytes: &[u8]) -> Result<()> {
+        workdir::write_file(&self.0.join(name), bytes)
+    }
+}
+
+/// The file is not there, or was removed on another machine while this one had it open.
+fn is_gone(error: &std::io::Error) -> bool {
+    error.kind() == ErrorKind::NotFound || error.kind() == ErrorKind::StaleNetworkFileHandle
+}
+
+/// A folder in memory that shows what was written late, as a network file system does; for tests.
+#[cfg(test)]
+pub mod delayed {
+    use super::*;
+    use rand::Rng;
+    use rand_chacha::ChaCha8Rng;
+    use std::cell::RefCell;
+    use std::collections::BTreeMap;
+    use std::rc::Rc;
+    use std::time::Duration;
+
+    /// The server's files: each with its versions and their times.
+    type Files = BTreeMap<String, Vec<(Duration, Vec<u8>)>>;
+
+    /// One machine's view of the server: reads and lists may be as old as `delay`.
+    #[derive(Clone)]
+    pub struct DelayedFolder {
+        pub files: Rc<RefCell<Files>>,
+        pub now: Rc<RefCell<Duration>>,
+        pub delay: Duration,
+        pub rng: Rc<RefCell<ChaCha8Rng>>,
+        /// Operations so far.
+        pub n_asked: Rc<RefCell<u64>>,
+    }
+
+    impl DelayedFolder {
+        fn seen_at(&self) -> Duration {
+            *self.n_asked.borrow_mut() += 1;
+            let late = self.rng.borrow_mut().random_range(0.0..=1.0);
+            self.now.borrow().saturating_sub(self.delay.mul_f64(late))
+        }
+    }
+
+    impl SharedFolder for DelayedFolder {
+        fn create(&self, name: &str, bytes: &[u8]) -> Result<bool> {
+            *self.n_asked.borrow_mut() += 3;
+            let mut files = self.files.borrow_mut();
+            if let Some(versions) = files.get(name) {
+                return Ok(versions[0].1 == bytes);
+            }
+            files.insert(name.to_owned(), vec![(*self.now.borrow(), bytes.to_vec())]);
+            Ok(true)
+        }
+
+        fn read(&self, name: &str) -> Result<Option<Vec<u8>>> {
+            let at = self.seen_at();
+            let files = self.files.borrow();
+            let version = files.get(name).and_then(|versions| versions.iter().rev().find(|(time, _)| *time <= at));
+            Ok(version.map(|(_, bytes)| bytes.clone()))
+        }
+
+        fn list(&self, folder: &str) -> Result<Vec<String>> {
+            let at = self.seen_at();
+            let files = self.files.borrow();
+            let seen = files.iter().filter(|(_, versions)| versions[0].0 <= at);
+            Ok(seen.filter_map(|(name, _)| Some(name.strip_prefix(folder)?.strip_prefix('/')?.to_owned())).collect())
+        }
+
+        fn replace(&self, name: &str, bytes: &[u8]) -> Result<()> {
+            *self.n_asked.borrow_mut() += 2;
+            let version = (*self.now.borrow(), bytes.to_vec());
+            self.files.borrow_mut().entry(name.to_owned()).or_default().push(version);
+            Ok(())
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_many_that_create_a_file_one_succeeds() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = DiskFolder(dir.path().to_owned());
+        let created: usize = std::thread::scope(|scope| {
+            let tries: Vec<_> = (0..8)
+                .map(|worker| {
+                    let folder = &folder;
+                    scope.spawn(move || {
+                        let made =
+                            |unit: i32| folder.create(&format!("a/{unit}"), format!("worker {worker}").as_bytes());
+                        (0..50).filter(|unit| made(*unit).unwrap()).count()
+                    })
+                })
+                .collect();
+            tries.into_iter().map(|one| one.join().unwrap()).sum()
+        });
+        assert_eq!(created, 50);
+        assert_eq!(folder.list("a").unwrap().len(), 50);
+        assert_eq!(fs::read_dir(dir.path().join("a")).unwrap().count(), 50, "no draft is left");
+        assert_eq!(folder.list("b").unwrap(), Vec::<String>::new());
+        assert_eq!(folder.read("b/c").unwrap(), None);
+    }
+}

@@ -1,0 +1,236 @@
+//! Takes the time of every stage on this machine: excerpts from all over the videos are worked on as videos are, as many
+//! side by side.
+
+use super::menu;
+use super::plan::{PlannedUnit, settings_hash};
+use super::process_memory::MemoryWatch;
+use super::stage_times::{Alternative, StageCost, StageTimes};
+use crate::config::Config;
+use crate::formats::media_json::MediaInfo;
+use crate::pipeline::process::message::{ExcerptRequest, MediaRequest};
+use crate::pipeline::timing::StageTime;
+use crate::pipeline::{Pipeline, Selection};
+use crate::stage::artifacts::{Artifact, StageName};
+use crate::stage::fingerprint::hash_file;
+use crate::stage::progress::{Progress, Silent, Task};
+use crate::stage::{Unit, workdir};
+use anyhow::{Context, Result, ensure};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Share of all video that is timed, and within what bounds, seconds.
+const SHARE: f64 = 0.1;
+const LEAST_SECS: f64 = 30.0;
+const MOST_SECS: f64 = 120.0;
+/// Length of an excerpt, and of two short ones that tell what a stage takes whatever the video.
+const LONG_SECS: f64 = 10.0;
+const SHORT_SECS: f64 = 2.5;
+/// Folder of excerpts in the work folder, while they are timed.
+const FOLDER: &str = "timing";
+
+/// A piece of a unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimedExcerpt {
+    pub unit: usize,
+    pub start_secs: f64,
+    pub secs: f64,
+}
+
+/// Pieces of videos of these lengths: a tenth of all, evenly spread over it, and two short ones.
+pub fn excerpts(lengths: &[f64]) -> Vec<TimedExcerpt> {
+    let whole: f64 = lengths.iter().sum();
+    let budget = (SHARE * whole).clamp(LEAST_SECS, MOST_SECS).min(whole);
+    let n = (((budget - 2.0 * SHORT_SECS) / LONG_SECS).floor() as usize).max(1);
+    let at = |share: f64, secs: f64| {
+        let mut left = share * whole;
+        for (unit, length) in lengths.iter().enumerate() {
+            if left < *length {
+                let secs = secs.min(*length);
+                return Some(TimedExcerpt { unit, start_secs: (left - secs / 2.0).clamp(0.0, length - secs), secs });
+            }
+            left -= length;
+        }
+        None
+    };
+    let long = (0..n).map(|k| at((k as f64 + 0.5) / n as f64, LONG_SECS));
+    long.chain([1.0 / 3.0, 2.0 / 3.0].map(|share| at(share, SHORT_SECS))).flatten().collect()
+}
+
+/// What the times count for: program, settings, models, machine and workers.
+///
+/// # Errors
+/// A program or models that cannot be read.
+pub fn made_with(pipeline: &Pipeline, program: &Path, jobs: usize) -> Result<String> {
+    let made_with = (
+        hash_file(program)?,
+        settings_hash(pipeline.config())?,
+        pipeline.model_hashes()?,
+        processor(),
+        std::thread::available_parallelism().map_or(1, |n| n.get()),
+        jobs,
+    );
+    Ok(blake3::hash(&serde_json::to_vec(&made_with)?).to_hex().to_string())
+}
+
+/// Seconds that `orator plan` said the videos of a run take at the stages they went through, and those they took; none where
+/// it timed another program, other settings or another machine, or no length of a video is known.
+pub fn planned_and_taken(pipeline: &Pipeline, program: &Path, taken: &[StageTime]) -> Option<(f64, f64)> {
+    let work = &pipeline.config().settings.work.dir;
+    let known = StageTimes::read(work)?;
+    if made_with(pipeline, program, known.jobs).ok()? != known.made_with {
+        return None;
+    }
+    // A unit that was worked on in parts has several times.
+    let mut of_videos: BTreeMap<(StageName, &Unit), f64> = BTreeMap::new();
+    for time in taken.iter().filter(|time| time.stage != StageName::Dataset) {
+        *of_videos.entry((time.stage, &time.unit)).or_default() += time.secs;
+    }
+    let pair = |((stage, unit), secs): ((StageName, &Unit), f64)| {
+        let media = MediaInfo::read(&Artifact::MediaInfo.path(work, unit)).ok()?;
+        Some((known.cost(stage).secs(media.duration_secs), secs))
+    };
+    let sum = of_videos.into_iter().filter_map(pair).fold((0.0, 0.0), |sum, pair| (sum.0 + pair.0, sum.1 + pair.1));
+    (sum.0 > 0.0).then_some(sum)
+}
+
+/// Times the stages on excerpts of the units whose length is known, `jobs` side by side. The excerpts and what is made of
+/// them are removed.
+///
+/// # Errors
+/// No excerpt could be copied or worked on; a work folder that cannot be written.
+pub fn measure(
+    pipeline: &Pipeline,
+    program: &Path,
+    units: &[PlannedUnit],
+    jobs: usize,
+    progress: &dyn Progress,
+) -> Result<StageTimes> {
+    let made_with = made_with(pipeline, program, jobs)?;
+    let folder = pipeline.config().settings.work.dir.join(FOLDER);
+    let timed = Timing { pipeline, units, jobs, folder: &folder }.measure(progress);
+    let removed = std::fs::remove_dir_all(&folder);
+    let times = timed?;
+    removed.with_context(|| format!("cannot remove {}", folder.display()))?;
+    Ok(StageTimes { made_with, processor: processor(), jobs, ..times })
+}
+
+struct Timing<'a> {
+    pipeline: &'a Pipeline,
+    units: &'a [PlannedUnit],
+    jobs: usize,
+    folder: &'a Path,
+}
+
+impl Timing<'_> {
+    fn measure(&self, progress: &dyn Progress) -> Result<StageTimes> {
+        let _ = std::fs::remove_dir_all(self.folder);
+        std::fs::create_dir_all(self.folder)
+            .with_context(|| format!("cannot make the folder {}", self.folder.display()))?;
+        let lengths: Vec<f64> = self.units.iter().map(|unit| unit.secs.unwrap_or(0.0)).collect();
+        let (mut files, mut secs) = (Vec::new(), BTreeMap::new());
+        for (number, excerpt) in excerpts(&lengths).iter().enumerate() {
+            let unit = &self.units[excerpt.unit];
+            let to = self.folder.join(format!("{number:02}.mkv"));
+            let wanted = ExcerptRequest { start_secs: excerpt.start_secs, secs: excerpt.secs, to: to.clone() };
+            let request = MediaRequest { source: unit.source.clone(), excerpt: Some(wanted) };
+            // A video that cannot be read is told of when it is worked on.
+            if let Ok(Some(copied)) = self.pipeline.ask_media(&request) {
+                secs.insert(to.clone(), copied);
+                files.push((unit.speaker.clone(), to));
+            }
+        }
+        ensure!(!files.is_empty(), "of no video an excerpt can be copied: no time is taken");
+        let memory = MemoryWatch::begin();
+        let work = self.folder.join("work");
+        let sets = menu::changes(self.pipeline.config())?;
+        let task = progress.begin("timing the stages", sets.len() as u64 + 2);
+        let times = self.run(self.pipeline, &files, &work, StageName::Dataset)?;
+        task.advance(1);
+        let peak_mib = memory.end();
+        let excerpt_secs: f64 = secs.values().sum();
+        let cost = |stage: StageName| {
+            let own = times.iter().filter(|time| time.stage == stage);
+            let length = |time: &StageTime| match stage {
+                StageName::Dataset => excerpt_secs,
+                _ => secs.get(&time.unit.source).copied().unwrap_or(0.0),
+            };
+            let pairs: Vec<(f64, f64)> = own.map(|time| (length(time), time.secs)).collect();
+            let bytes_per_sec = workdir::bytes_under(&work.join(stage.as_str())) as f64 / excerpt_secs;
+            (stage.as_str().to_owned(), StageCost { bytes_per_sec, ..StageCost::fit(&pairs) })
+        };
+        let mut timed = StageTimes {
+            n_excerpts: files.len(),
+            excerpt_secs,
+            stages: StageName::ALL.map(cost).into(),
+            peak_mib,
+            ..StageTimes::default()
+        };
+        timed.menu = self.menu(&files, sets, &*task)?;
+        Ok(timed)
+    }
+
+    /// Times of the stages up to this one on some excerpts.
+    fn run(
+        &self,
+        pipeline: &Pipeline,
+        files: &[(String, PathBuf)],
+        work: &Path,
+        to: StageName,
+    ) -> Result<Vec<StageTime>> {
+        let selection = Selection { to, jobs: Some(self.jobs), force: true, ..Selection::default() };
+        let report = pipeline.on_excerpts(files, work).run(&selection, &Silent)?;
+        Ok(report.times)
+    }
+
+    /// What other settings take for the first excerpts, over what these take.
+    fn menu(
+        &self,
+        files: &[(String, PathBuf)],
+        sets: Vec<(String, Config)>,
+        task: &dyn Task,
+    ) -> Result<Vec<Alternative>> {
+        let some = &files[..files.len().min(self.jobs.max(2))];
+        let secs = |pipeline: &Pipeline, number: usize| -> Result<f64> {
+            let work = self.folder.join(format!("menu-{number}"));
+            let times = self.run(pipeline, some, &work, StageName::Pose2d)?;
+            Ok(times.iter().map(|time| time.secs).sum())
+        };
+        let own = secs(self.pipeline, 0)?;
+        task.advance(1);
+        let mut menu = Vec::new();
+        for (number, (set, config)) in sets.into_iter().enumerate() {
+            let other = secs(&Pipeline::open(config)?.like(self.pipeline), number + 1)?;
+            menu.push(Alternative { set, times: other / own.max(1e-9) });
+            task.advance(1);
+        }
+        Ok(menu)
+    }
+}
+
+/// The processor's name, where the system says it.
+fn processor() -> String {
+    let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let name = info.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
+    name.map_or_else(|| "unknown".to_owned(), |(_, name)| name.trim().to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn excerpts_are_a_tenth_from_all_over_and_lie_inside() {
+        let lengths = [600.0, 2.0, 300.0, 298.0];
+        let some = excerpts(&lengths);
+        assert!(some.iter().map(|one| one.secs).sum::<f64>() <= 0.1 * lengths.iter().sum::<f64>());
+        assert_eq!(some.len(), 13);
+        assert!(some.iter().all(|one| one.start_secs >= 0.0 && one.start_secs + one.secs <= lengths[one.unit] + 1e-9));
+        let of = |unit: usize| some.iter().filter(|one| one.unit == unit && one.secs > SHORT_SECS).count();
+        assert_eq!((of(0), of(2), of(3)), (5, 2, 3));
+        // Of little video at least half a minute.
+        let few = excerpts(&[60.0]);
+        assert_eq!((few.len(), few[0].secs), (4, LONG_SECS));
+        assert_eq!(excerpts(&[1.5]), [TimedExcerpt { unit: 0, start_secs: 0.0, secs: 1.5 }; 3]);
+        assert!(excerpts(&[]).is_empty());
+    }
+}

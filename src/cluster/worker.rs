@@ -1,0 +1,335 @@
+//! A worker: it claims units of a plan, one after the other, and runs their stages, until every unit has ended or it is
+//! asked to stop. Any number of workers on any machines share a plan.
+
+use super::claim_files::{Claim, UnitEnd};
+use super::claims::{Claims, NextUnit};
+use super::heartbeat::{BeatWatch, Heartbeat, this_machine};
+use super::plan::{ClusterPlan, PlannedUnit, UnitShare};
+use super::shared_folder::{DiskFolder, SharedFolder};
+use crate::pipeline::Pipeline;
+use crate::stage::artifacts::StageName;
+use crate::stage::fingerprint::HashCache;
+use crate::stage::progress::Progress;
+use crate::stage::runner::{Abandoned, StageOutcome};
+use crate::stage::workdir;
+use crate::stage::workdir::NoSpace;
+use anyhow::{Context, Result, anyhow, bail};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Condvar, Mutex, MutexGuard};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+/// File that stops every worker of a plan, with the reason in it.
+pub const STOP: &str = "stop.txt";
+
+/// How a worker works.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WorkerOptions {
+    /// Units at a time, each under a claim of its own.
+    pub jobs: usize,
+    /// The share `i` of `n`, from 0, of an array without claims by chance; none: any unit.
+    pub shard: Option<(usize, usize)>,
+    /// Takes units again that had failed.
+    pub retry: bool,
+    /// Waits for the units in the hands of others, to take over those of the dead.
+    pub wait: bool,
+    /// Time between two beats.
+    pub beat: Duration,
+    /// Time without a beat after which another worker is dead.
+    pub dead_after: Duration,
+    /// No unit is begun later than this after the start.
+    pub begin_within: Option<Duration>,
+}
+
+/// What workers of one process did.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct WorkReport {
+    /// Units done, those that were fresh among them.
+    pub done: usize,
+    /// Of those, fresh at every stage before.
+    pub fresh: usize,
+    /// Units that failed, each with its error.
+    pub failed: Vec<(String, String)>,
+    /// Units taken over from dead workers.
+    pub taken_over: usize,
+    /// Units laid aside since others had taken them over.
+    pub laid_aside: usize,
+    /// Whether every unit of the plan, or of the share, has ended.
+    pub all_ended: bool,
+}
+
+/// Works on the plan at `path`.
+///
+/// # Errors
+/// Another program, configuration or models than the plan's; a folder that cannot be written; a full disk, of which
+/// every worker of the plan is told.
+pub fn work(
+    plan: &ClusterPlan,
+    path: &Path,
+    pipeline: &Pipeline,
+    options: &WorkerOptions,
+    progress: &dyn Progress,
+) -> Result<WorkReport> {
+    let folder = DiskFolder(plan.folder(path));
+    begin_after_stop(&folder)?;
+    let dir = &pipeline.config().settings.work.dir;
+    let _lock = workdir::lock_with_others(dir).context("no work now")?;
+    let (host, machine) = this_machine();
+    let hashes = pipeline.hashes();
+    let session = Session {
+        plan,
+        folder,
+        pipeline,
+        options,
+        progress,
+        hashes: &hashes,
+        begun: Instant::now(),
+        machine: &machine,
+        report: Mutex::default(),
+        broken: Mutex::default(),
+    };
+    let started = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs());
+    let first = Heartbeat {
+        host: host.clone(),
+        machine: machine.clone(),
+        pid: std::process::id(),
+        started,
+        ..Heartbeat::default()
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..options.jobs.max(1) {
+            scope.spawn(|| {
+                if let Err(error) = session.run(&worker_name(&host), first.clone()) {
+                    session.broken().get_or_insert(error);
+                }
+            });
+        }
+    });
+    // What cannot be kept is hashed again.
+    let _ = hashes.save();
+    if let Some(error) = session.broken().take() {
+        return Err(error);
+    }
+    drop(session.broken);
+    Ok(session.report.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner()))
+}
+
+/// A name that no other worker has: the machine's, the process and a number by chance.
+fn worker_name(host: &str) -> String {
+    static NEXT: AtomicU64 = AtomicU64::new(0);
+    let host: String = host.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).take(40).collect();
+    let nonce = rand::random::<u32>();
+    format!("{host}-{}-{}-{nonce:08x}", std::process::id(), NEXT.fetch_add(1, Ordering::Relaxed))
+}
+
+/// Goes on where a full disk had stopped all workers, if there is room again.
+fn begin_after_stop(folder: &DiskFolder) -> Result<()> {
+    let Some(reason) = folder.read(STOP)? else { return Ok(()) };
+    let probe = folder.0.join(format!(".room-{}", std::process::id()));
+    let has_room = std::fs::write(&probe, vec![0; 64 << 20]).is_ok();
+    let _ = std::fs::remove_file(&probe);
+    if !has_room {
+        bail!("{}: all workers have stopped; make room and start them again", String::from_utf8_lossy(&reason));
+    }
+    workdir::remove_file(&folder.0.join(STOP))
+}
+
+/// Workers of one process on one plan.
+struct Session<'a> {
+    plan: &'a ClusterPlan,
+    folder: DiskFolder,
+    pipeline: &'a Pipeline,
+    options: &'a WorkerOptions,
+    progress: &'a dyn Progress,
+    hashes: &'a HashCache,
+    begun: Instant,
+    machine: &'a str,
+    report: Mutex<WorkReport>,
+    /// What stopped the workers.
+    broken: Mutex<Option<anyhow::Error>>,
+}
+
+impl Session<'_> {
+    /// One worker, with its heart.
+    fn run(&self, name: &str, first: Heartbeat) -> Result<()> {
+        let heart = Heart {
+            folder: &self.folder,
+            name,
+            said: Mutex::new(first),
+            begun: self.begun,
+            over: (Mutex::new(false), Condvar::new()),
+        };
+        heart.beat()?;
+        let ended = std::thread::scope(|scope| {
+            scope.spawn(|| {
+                while heart.rests(self.options.beat) {
+                    // One beat that cannot be written is no death.
+                    let _ = heart.beat();
+                }
+            });
+            let ended = self.work(name, &heart);
+            heart.stop();
+            ended
+        });
+        // After an error too: what it had in hand is free for others at once.
+        heart.said().ended = true;
+        ended.and(heart.beat())
+    }
+
+    fn work(&self, name: &str, heart: &Heart) -> Result<()> {
+        let watch = BeatWatch::new(self.options.dead_after, self.machine);
+        let order = self.order();
+        let mut claims = Claims::new(&self.folder, name, self.plan.needs(), order, watch, self.options.retry);
+        while !self.is_to_stop()? {
+            match claims.next(self.begun.elapsed())? {
+                NextUnit::Claimed(claim) => self.work_on(name, claim, &mut claims, heart)?,
+                NextUnit::Wait(time) if self.options.wait => self.rest(time),
+                NextUnit::Wait(_) => return Ok(()),
+                NextUnit::AllEnded => {
+                    self.report().all_ended = true;
+                    return Ok(());
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Waits so long, or until the program is asked to stop.
+    fn rest(&self, time: Duration) {
+        let begun = Instant::now();
+        while let Some(left) = time.checked_sub(begun.elapsed()).filter(|_| !self.progress.is_to_stop()) {
+            std::thread::sleep(left.min(Duration::from_millis(500)));
+        }
+    }
+
+    /// The units this worker takes, in the order of the plan. All units of a video are of one share.
+    fn order(&self) -> Vec<usize> {
+        let mut videos: BTreeMap<(&str, &str), usize> = BTreeMap::new();
+        let mut number = |unit: &usize| {
+            let PlannedUnit { speaker, video, .. } = &self.plan.units[*unit];
+            let next = videos.len();
+            *videos.entry((speaker, video)).or_insert(next)
+        };
+        let of_shard = |unit: &usize| self.options.shard.is_none_or(|(i, n)| number(unit) % n == i);
+        (0..self.plan.units.len()).filter(of_shard).collect()
+    }
+
+    /// Errors with what stopped all workers.
+    fn is_to_stop(&self) -> Result<bool> {
+        if let Some(reason) = self.folder.read(STOP)? {
+            bail!("{}: all workers stop; make room and start them again", String::from_utf8_lossy(&reason));
+        }
+        let is_late = self.options.begin_within.is_some_and(|within| self.begun.elapsed() >= within);
+        Ok(is_late || self.progress.is_to_stop() || self.broken().is_some())
+    }
+
+    fn work_on(&self, name: &str, claim: Claim, claims: &mut Claims<DiskFolder>, heart: &Heart) -> Result<()> {
+        let planned = &self.plan.units[claim.unit];
+        let unit = planned.unit();
+        heart.said().unit = Some(planned.to_string());
+        let begun = Instant::now();
+        let still_mine = || match claims.is_mine(claim)? {
+            true => Ok(()),
+            false => Err(Abandoned(format!("{} was taken over by another worker", planned.video)).into()),
+        };
+        let run =
+            |stages: &[StageName]| self.pipeline.run_video(stages, &unit, self.hashes, &still_mine, self.progress);
+        let ended = match planned.share {
+            UnitShare::Whole => run(&StageName::OF_VIDEOS)?,
+            UnitShare::Extract => run(&[StageName::Extract])?,
+            UnitShare::Parts { idx, of } => {
+                self.pipeline.run_parts(&unit, (idx, of), self.hashes, &still_mine, self.progress)?
+            }
+        };
+        let failed = ended.iter().find_map(|outcome| match outcome {
+            StageOutcome::Failed(error) => Some(error.clone()),
+            _ => None,
+        });
+        heart.said().unit = None;
+        if let Some(error) = &failed {
+            if error.is::<Abandoned>() {
+                self.report().laid_aside += 1;
+                return Ok(());
+            }
+            if error.is::<NoSpace>() {
+                self.folder.create(STOP, format!("{}: {error:#}", host_of(name)).as_bytes()).ok();
+                return Err(anyhow!("{error:#}").context("the disk is full: all workers stop"));
+            }
+        }
+        // What fails before the whole video's turn fails once more with it, and is told then.
+        let is_whole = planned.share == UnitShare::Whole;
+        let error = failed.filter(|_| is_whole).map(|error| format!("{error:#}"));
+        let secs = begun.elapsed().as_secs_f64();
+        let is_mine = claims.end(claim, &UnitEnd { worker: name.to_owned(), error: error.clone(), secs })?;
+        let mut report = self.report();
+        report.taken_over += usize::from(claim.epoch > 1);
+        report.laid_aside += usize::from(!is_mine);
+        let mut said = heart.said();
+        match error {
+            Some(error) => {
+                said.n_failed += 1;
+                report.failed.push((planned.to_string(), error));
+            }
+            None => {
+                said.n_done += 1;
+                said.media_secs += planned.media_secs().unwrap_or(0.0);
+                report.done += 1;
+                let is_fresh = is_whole && ended.iter().all(|one| matches!(one, StageOutcome::Skipped(_)));
+                report.fresh += usize::from(is_fresh);
+            }
+        }
+        Ok(())
+    }
+
+    fn report(&self) -> MutexGuard<'_, WorkReport> {
+        self.report.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+    }
+
+    fn broken(&self) -> MutexGuard<'_, Option<anyhow::Error>> {
+        self.broken.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+    }
+}
+
+fn host_of(worker: &str) -> &str {
+    worker.rsplitn(4, '-').last().unwrap_or(worker)
+}
+
+/// What beats for one worker.
+struct Heart<'a> {
+    folder: &'a DiskFolder,
+    name: &'a str,
+    said: Mutex<Heartbeat>,
+    begun: Instant,
+    over: (Mutex<bool>, Condvar),
+}
+
+impl Heart<'_> {
+    fn beat(&self) -> Result<()> {
+        let bytes = {
+            let mut said = self.said();
+            said.beat += 1;
+            said.secs = self.begun.elapsed().as_secs_f64();
+            serde_json::to_vec(&*said)?
+        };
+        self.folder.replace(&Heartbeat::name(self.name), &bytes)
+    }
+
+    fn said(&self) -> MutexGuard<'_, Heartbeat> {
+        self.said.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+    }
+
+    /// Waits for the next beat; `false`: it is over.
+    fn rests(&self, beat: Duration) -> bool {
+        let (over, told) = &self.over;
+        let over = over.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let waited = told.wait_timeout_while(over, beat, |over| !*over);
+        !*waited.unwrap_or_else(|poisoned| poisoned.into_inner()).0
+    }
+
+    fn stop(&self) {
+        *self.over.0.lock().unwrap_or_else(|poisoned| poisoned.into_inner()) = true;
+        self.over.1.notify_all();
+    }
+}

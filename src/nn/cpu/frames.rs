@@ -1,0 +1,112 @@
+//! Plain memory of sequences: frames as mixtures of two frames each (interpolation over time) with their gradient, and
+//! the change between channels first and channels last. Every number is made by one thread in one order.
+
+use super::tensor::{OutputStart, Scalar, written};
+use super::thread_team::parallel_for;
+
+/// Side of the square blocks of a transposition, which stay in the cache.
+const BLOCK: usize = 32;
+
+/// What every frame of a result is made of: frame i is `a + share * (b - a)`, a and b being frames of the input.
+#[derive(Clone, Debug)]
+pub struct FrameMixture {
+    pub n_in: usize,
+    /// First and second frame, and the share of the second.
+    pub of: Vec<(usize, usize, f64)>,
+}
+
+impl FrameMixture {
+    /// Frames of the result.
+    pub fn n_out(&self) -> usize {
+        self.of.len()
+    }
+
+    /// `x` [B, `n_in`, C] to [B, `n_out`, C], plus `skip` of that shape where there is one.
+    pub fn mix<T: Scalar>(&self, x: &[T], skip: Option<&[T]>, n_channels: usize) -> Vec<T> {
+        let (of_x, of_y) = (self.n_in * n_channels, self.n_out() * n_channels);
+        let batch = x.len() / of_x;
+        assert!(batch * of_x == x.len() && skip.is_none_or(|skip| skip.len() == batch * of_y));
+        assert!(self.of.iter().all(|(a, b, _)| *a.max(b) < self.n_in));
+        // SAFETY: every sample writes its own frames, all of them.
+        unsafe {
+            written(batch * of_y, |start: OutputStart<T>| {
+                parallel_for(batch, |sample| {
+                    let x = &x[sample * of_x..][..of_x];
+                    for (i, (a, b, share)) in self.of.iter().enumerate() {
+                        let at = sample * of_y + i * n_channels;
+                        let (a, b) = (&x[a * n_channels..][..n_channels], &x[b * n_channels..][..n_channels]);
+                        let skip = skip.map(|skip| &skip[at..][..n_channels]);
+                        let share = T::from_f64(*share);
+                        for c in 0..n_channels {
+                            let mixed = a[c] + (b[c] - a[c]) * share;
+                            start.at(at + c).write(skip.map_or(mixed, |skip| mixed + skip[c]));
+                        }
+                    }
+                });
+            })
+        }
+    }
+
+    /// The gradient of the input, from that of the result.
+    pub fn gradient<T: Scalar>(&self, grad: &[T], n_channels: usize) -> Vec<T> {
+        let (of_x, of_y) = (self.n_in * n_channels, self.n_out() * n_channels);
+        let batch = grad.len() / of_y;
+        // SAFETY: every sample writes its own frames, all of them first with zeros.
+        unsafe {
+            written(batch * of_x, |start: OutputStart<T>| {
+                parallel_for(batch, |sample| {
+                    let to = start.at(sample * of_x);
+                    (0..of_x).for_each(|i| to.add(i).write(T::zero()));
+                    let to = std::slice::from_raw_parts_mut(to, of_x);
+                    for (i, (a, b, share)) in self.of.iter().enumerate() {
+                        let grad = &grad[sample * of_y + i * n_channels..][..n_channels];
+                        for (frame, share) in [(a, 1.0 - share), (b, *share)] {
+                            let share = T::from_f64(share);
+                            let to = &mut to[frame * n_channels..][..n_channels];
+                            to.iter_mut().zip(grad).for_each(|(to, grad)| *to += *grad * share);
+                        }
+                    }
+                });
+            })
+        }
+    }
+}
+
+/// [batch, rows, columns] to [batch, columns, rows].
+pub fn transpose<T: Scalar>(x: &[T], rows: usize, columns: usize) -> Vec<T> {
+    let n = rows * columns;
+    let (batch, blocks) = (x.len() / n, columns.div_ceil(BLOCK));
+    assert!(batch * n == x.len());
+    // SAFETY: every task writes its own columns of its own sample, all of them.
+    unsafe {
+        written(x.len(), |start: OutputStart<T>| {
+            parallel_for(batch * blocks, |task| {
+                let (sample, first) = (task / blocks * n, task % blocks * BLOCK);
+                for row in (0..rows).step_by(BLOCK) {
+                    for column in first..columns.min(first + BLOCK) {
+                        for row in row..rows.min(row + BLOCK) {
+                            start.at(sample + column * rows + row).write(x[sample + row * columns + column]);
+                        }
+                    }
+                }
+            });
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_transposition_is_the_definition() {
+        for (batch, rows, columns) in [(1, 1, 1), (2, 3, 70), (3, 65, 33), (1, 1, 40)] {
+            let x: Vec<f64> = (0..batch * rows * columns).map(|i| i as f64).collect();
+            let y = transpose(&x, rows, columns);
+            for (i, value) in x.iter().enumerate() {
+                let (sample, row, column) = (i / (rows * columns), i / columns % rows, i % columns);
+                assert_eq!(y[(sample * columns + column) * rows + row], *value);
+            }
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! One video through its stages, for a worker that shares the work folder with workers on other machines: it has claimed
+//! the video, and looks once more whether the claim still is its own before a stage's work is put in its place.
+
+use super::pipeline::Pipeline;
+use super::pose2d::Pose2dStage;
+use super::stages;
+use super::watched_stage::{UnitWork, WatchedStage};
+use crate::stage::artifacts::StageName;
+use crate::stage::fingerprint::HashCache;
+use crate::stage::progress::Progress;
+use crate::stage::runner::StageOutcome;
+use crate::stage::{Report, Stage, Unit, runner};
+use anyhow::Result;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Whether the video still is the worker's own: `Err` of `runner::Abandoned` where it is not.
+pub type StillMine<'a> = &'a (dyn Fn() -> Result<()> + Sync);
+
+/// Does the work if the video is the worker's before and after.
+fn around(is_mine: StillMine, work: UnitWork) -> Result<Report> {
+    is_mine()?;
+    let report = work()?;
+    is_mine()?;
+    Ok(report)
+}
+
+impl Pipeline {
+    /// These stages of videos for one video of the pipeline; fresh ones are skipped. The answers end with the first failure.
+    ///
+    /// # Errors
+    /// What no video can be worked on without: weights, the manifest.
+    pub fn run_video(
+        &self,
+        names: &[StageName],
+        unit: &Unit,
+        hashes: &HashCache,
+        is_mine: StillMine,
+        progress: &dyn Progress,
+    ) -> Result<Vec<StageOutcome>> {
+        let while_mine = |_: &'static str, _: &Unit, work: UnitWork| around(is_mine, work);
+        let stage = |name: &StageName| Ok(WatchedStage { stage: self.stage(*name, &[])?, around: &while_mine });
+        let stages = names.iter().map(stage).collect::<Result<Vec<_>>>()?;
+        let stages: Vec<&dyn Stage> = stages.iter().map(|stage| stage as &dyn Stage).collect();
+        let work = &self.config().settings.work.dir;
+        let ended = runner::run_stages(&stages, std::slice::from_ref(unit), work, hashes, (1, false), progress);
+        Ok(ended.into_iter().flatten().collect())
+    }
+
+    /// Share `idx` of `of` of the parts of a video that has begun; nothing where its stage has no parts. An answer is a
+    /// failure.
+    ///
+    /// # Errors
+    /// Those of `run_video`.
+    pub fn run_parts(
+        &self,
+        unit: &Unit,
+        share: (usize, usize),
+        hashes: &HashCache,
+        is_mine: StillMine,
+        progress: &dyn Progress,
+    ) -> Result<Vec<StageOutcome>> {
+        let while_mine = |_: &'static str, _: &Unit, work: UnitWork| around(is_mine, work);
+        let stage = WatchedStage { stage: self.stage(StageName::Pose2d, &[])?, around: &while_mine };
+        let ended = runner::run_parts(&stage, unit, share, &self.config().settings.work.dir, hashes, progress);
+        Ok(ended.err().map(|error| StageOutcome::Failed(Arc::new(error))).into_iter().collect())
+    }
+
+    /// BLAKE3 of the weights that the stages of videos ask, by the names of their files.
+    ///
+    /// # Errors
+    /// Weights that cannot be read.
+    pub fn model_hashes(&self) -> Result<BTreeMap<String, String>> {
+        let settings = &self.config().settings;
+        let (stage, hashes) = (Pose2dStage::new(settings)?, self.hashes());
+        let used = stage.used()?;
+        let hash = |(_, entry): &(_, &crate::external::onnx::ModelEntry)| {
+            Ok((entry.file.clone(), hashes.hash(&settings.models.dir.join(&entry.file))?))
+        };
+        used.iter().map(hash).collect()
+    }
+
+    /// Looks whether the stages have what they need: models, the manifest, weights.
+    ///
+    /// # Errors
+    /// What is missing, and where it comes from.
+    pub fn check(&self) -> Result<()> {
+        if self.all_videos().iter().any(crate::config::videos::Videos::have_pictures) {
+            stages::check_models(&self.config().settings)?;
+        }
+        StageName::OF_VIDEOS.into_iter().try_for_each(|name| self.stage(name, &[]).map(drop))
+    }
+}

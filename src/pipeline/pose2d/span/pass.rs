@@ -1,0 +1,98 @@
+//! The way of a span: its frames at the dataset rate, one after the other, through a `Chain` that begins anew at each shot.
+//! A frame that repeats the one before is not looked at again. To follow who speaks, a `TalkerSearch` sees the whole span
+//! first.
+
+use super::PoseSpan;
+use super::video_frames::VideoFrames;
+use crate::pipeline::pose2d::Chain;
+use crate::pipeline::pose2d::talker::TalkerSearch;
+use crate::pipeline::pose2d::talker::choice::ShotVoice;
+use crate::pipeline::pose2d::talker::search::ShotTalker;
+use crate::pipeline::{lips, sound};
+use crate::stage::progress::{Event, Progress, Task};
+use crate::types::pose2d::Pose2d;
+use anyhow::{Context, Result};
+use std::path::Path;
+use std::time::Instant;
+
+/// Frames after which the time that a video takes is told.
+const N_MEASURED: usize = 150;
+
+/// Looks at the frames of `video`. `talkers` are those found in its shots, if they were looked for.
+///
+/// # Errors
+/// A video that cannot be read; a model that fails.
+pub fn look(
+    video: &VideoFrames,
+    mut chain: Chain,
+    talkers: Option<&[ShotTalker]>,
+    progress: &dyn Progress,
+    task: &dyn Task,
+) -> Result<PoseSpan> {
+    let mut ways = talkers.unwrap_or_default().iter().map(|shot| shot.path.clone());
+    let corner = video.media.active_area.map_or([0; 2], |area| [area.x, area.y]);
+    let (begun, n_frames) = (Instant::now(), video.timeline.n_frames());
+    let mut span = PoseSpan::default();
+    let mut pose = Pose2d::default();
+    span.image_size = video.each(|time, begins_shot, picture| {
+        let idx = time.frame_idx;
+        if begins_shot {
+            chain.begin_shot_of(ways.next().flatten());
+        }
+        if let Some(picture) = picture {
+            let seen = chain.frame(&picture).with_context(|| format!("frame {idx}"))?;
+            if let Some(points) = chain.face_points() {
+                span.portrait.look(&picture, points, time.source_secs)?;
+            }
+            pose = seen.moved(corner);
+        }
+        if idx + 1 == N_MEASURED && n_frames >= 6 * N_MEASURED {
+            let hours = begun.elapsed().as_secs_f64() / (N_MEASURED as f64 / video.fps.per_sec());
+            let line = format!("an hour of video takes about {hours:.1} h here, one at a time");
+            progress.event(&Event::Estimate { line: &line });
+        }
+        span.counts.count(&pose);
+        span.frames.push(&pose, time.source_secs);
+        task.advance(1);
+        Ok(())
+    })?;
+    (span.n_taken, [span.first, span.last]) = chain.people();
+    span.counts.followed = talkers.map(|shots| {
+        let n_several = shots.iter().filter(|shot| shot.several).count();
+        [n_several, shots.iter().filter(|shot| shot.path.is_some()).count()]
+    });
+    Ok(span)
+}
+
+/// Who speaks in each shot of `video`, by its sound at `sound`.
+///
+/// # Errors
+/// A video or sound that cannot be read; a model that fails.
+pub fn talkers(
+    video: &VideoFrames,
+    sound: &Path,
+    mut search: TalkerSearch,
+    task: &dyn Task,
+) -> Result<Vec<ShotTalker>> {
+    let (_, sound_db) = sound::levels(sound, video.fps, video.timeline.n_frames())?;
+    let is_speech: Vec<bool> = sound_db.iter().map(|&db| lips::is_speech(f32::NAN, db)).collect();
+    let voice = sound::openness(sound)?;
+    let (mut talkers, mut time_secs) = (Vec::new(), Vec::new());
+    let mut end_shot = |search: &mut TalkerSearch, time_secs: &mut Vec<f64>, end: usize| {
+        let is_speech = &is_speech[end - time_secs.len()..end];
+        talkers.push(search.end_shot(&ShotVoice { voice: &voice, fps: video.fps, time_secs, is_speech }));
+        time_secs.clear();
+    };
+    video.each(|time, begins_shot, picture| {
+        let idx = time.frame_idx;
+        if begins_shot && idx > video.span.start {
+            end_shot(&mut search, &mut time_secs, idx);
+        }
+        search.frame(picture.as_ref()).with_context(|| format!("frame {idx}"))?;
+        time_secs.push(time.source_secs);
+        task.advance(1);
+        Ok(())
+    })?;
+    end_shot(&mut search, &mut time_secs, video.span.end);
+    Ok(talkers)
+}

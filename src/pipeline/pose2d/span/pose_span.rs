@@ -1,0 +1,78 @@
+//! What was seen in a span of a video, in a file, and how the spans of a video become one. Tracking begins anew at a span;
+//! whether it shows whom the one before showed is told as at a cut, by box and colours.
+
+use super::detection_counts::DetectionCounts;
+use super::keypoint_frames::KeypointFrames;
+use crate::external::opencv::png;
+use crate::formats::keypoints_npz;
+use crate::pipeline::pose2d::face::views::PortraitViews;
+use crate::pipeline::pose2d::speaker::{SeenPerson, is_same_person};
+use crate::stage::artifacts::Artifact;
+use crate::stage::{Report, workdir};
+use crate::types::time::FrameRate;
+use anyhow::{Context, Result, ensure};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// The frames of one span, or of several joined.
+#[derive(Default, Serialize, Deserialize)]
+pub struct PoseSpan {
+    pub frames: KeypointFrames,
+    pub counts: DetectionCounts,
+    pub portrait: PortraitViews,
+    /// Width and height of the picture, px.
+    pub image_size: [u32; 2],
+    /// People taken so far.
+    pub n_taken: i64,
+    /// The first person taken, as first recognised, and the one at the end.
+    pub first: Option<SeenPerson>,
+    pub last: Option<SeenPerson>,
+}
+
+impl PoseSpan {
+    /// Reads the file of a span of `n_frames` in `folder`. The process that wrote it may have been taken over by a video.
+    ///
+    /// # Errors
+    /// No such file, or one that holds no such span.
+    pub fn read(folder: &Path, n_frames: usize) -> Result<Self> {
+        let path = Artifact::PoseSpan.within(folder);
+        let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
+        let no_span = || format!("{} holds no keypoints of a span of {n_frames} frames", path.display());
+        let span: Self = rmp_serde::from_slice(&bytes).with_context(no_span)?;
+        ensure!(span.frames.n_frames() == n_frames && span.portrait.is_sound(), no_span());
+        Ok(span)
+    }
+
+    /// Writes the file of a span into `folder`.
+    pub fn write(&self, folder: &Path) -> Result<()> {
+        workdir::write_file(&Artifact::PoseSpan.within(folder), &rmp_serde::to_vec(self)?)
+    }
+
+    /// Adds the span that follows.
+    pub fn append(&mut self, next: Self) {
+        let pair = self.last.as_ref().zip(next.first.as_ref());
+        let is_same = pair.is_some_and(|(last, first)| is_same_person(last, first));
+        let n_before = self.n_taken.saturating_sub(i64::from(is_same));
+        self.frames.append(next.frames, n_before);
+        self.n_taken = n_before.saturating_add(next.n_taken);
+        self.counts.add(&next.counts);
+        self.portrait.append(next.portrait);
+        self.image_size = next.image_size;
+        self.first = self.first.take().or(next.first);
+        self.last = next.last;
+    }
+
+    /// Writes the files of the whole video into `out`.
+    ///
+    /// # Errors
+    /// Arrays of unequal lengths; a folder that cannot be written.
+    pub fn finish(self, fps: FrameRate, out: &Path) -> Result<Report> {
+        let (keypoints, extras) = self.frames.finish(fps, self.image_size)?;
+        keypoints_npz::write(&Artifact::Keypoints.within(out), &keypoints, &extras)?;
+        if let Some((portrait, picture)) = self.portrait.finish() {
+            workdir::write_file(&Artifact::Portrait.within(out), &serde_json::to_vec(&portrait)?)?;
+            png::write(&Artifact::FacePicture.within(out), &picture)?;
+        }
+        Ok(self.counts.report())
+    }
+}

@@ -1,0 +1,73 @@
+//! The frames of a span of a video, in the order of its timeline.
+
+use crate::external::ffmpeg::ahead;
+use crate::external::ffmpeg::frames::{FrameReader, FrameTime};
+use crate::formats::media_json::MediaInfo;
+use crate::formats::timeline_npz::Timeline;
+use crate::stage::Unit;
+use crate::types::image::Image;
+use crate::types::time::FrameRate;
+use anyhow::{Context, Result, ensure};
+use std::ops::Range;
+use std::path::Path;
+
+/// A video that was extracted, and a span of it.
+pub struct VideoFrames<'a> {
+    pub unit: &'a Unit,
+    pub timeline: &'a Timeline,
+    pub media: &'a MediaInfo,
+    pub fps: FrameRate,
+    /// One of the timeline's spans, frames.
+    pub span: Range<usize>,
+}
+
+impl VideoFrames<'_> {
+    /// Calls `work` with each frame's time, whether it begins a shot (as the first of the span does), and its picture if
+    /// that is not the one before again. Returns the width and height of the whole picture in px.
+    ///
+    /// # Errors
+    /// A video that cannot be read or does not have the frames of the timeline.
+    pub fn each(&self, mut work: impl FnMut(FrameTime, bool, Option<Image>) -> Result<()>) -> Result<[u32; 2]> {
+        let (source, n_expected) = (&self.unit.source, self.timeline.n_frames());
+        let mut reader = FrameReader::open(source, self.fps)?.with_options(self.media.pictures);
+        let [width, height] = reader.image_size();
+        if self.span.start > 0 {
+            reader.go_to(self.span.start, self.timeline.source_secs[self.span.start])?;
+        }
+        if self.span.end < n_expected {
+            reader = reader.until(self.span.end);
+        }
+        let begins_shot = |time: FrameTime| {
+            let restart = self.timeline.restart.get(time.frame_idx).copied();
+            let restart = restart.with_context(|| frame_count_mismatch(source, time.frame_idx + 1, n_expected))?;
+            Ok::<_, anyhow::Error>(restart || time.frame_idx == self.span.start)
+        };
+        let pick = |reader: &mut FrameReader, time: FrameTime| {
+            let is_new = begins_shot(time)? || !time.repeated;
+            let whole = is_new.then(|| reader.picture(None)).transpose()?;
+            Ok(match (whole, self.media.active_area) {
+                (Some(whole), Some(area)) => Some(whole.cropped(area)),
+                (whole, _) => whole,
+            })
+        };
+        let mut end = self.span.start;
+        ahead::for_each(reader, pick, |time, picture| {
+            end = time.frame_idx + 1;
+            // Reading that began in the middle shows what reading from the start showed.
+            let known = self.timeline.source_secs.get(time.frame_idx);
+            ensure!(
+                self.span.start == 0 || known.is_some_and(|known| known.total_cmp(&time.source_secs).is_eq()),
+                "{}, frame {}: not at the time of the timeline: run extract again",
+                source.display(),
+                time.frame_idx
+            );
+            work(time, begins_shot(time)?, picture)
+        })?;
+        ensure!(end == self.span.end, frame_count_mismatch(source, end, n_expected));
+        Ok([u32::try_from(width)?, u32::try_from(height)?])
+    }
+}
+
+fn frame_count_mismatch(video: &Path, found: usize, expected: usize) -> String {
+    format!("{} gave {found} frames, its timeline has {expected}: run extract again", video.display())
+}

@@ -1,0 +1,75 @@
+//! How long stages take: the time of every unit that a run works on, and the same pipeline on excerpts of its videos.
+
+use super::pipeline::Pipeline;
+use super::process::message::MediaRequest;
+use super::process::{ask_media, media};
+use super::watched_stage::UnitWork;
+use crate::config::videos::Videos;
+use crate::stage::artifacts::StageName;
+use crate::stage::{Report, Unit};
+use anyhow::Result;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+
+/// How long a stage worked on a unit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StageTime {
+    pub stage: StageName,
+    pub unit: Unit,
+    pub secs: f64,
+}
+
+/// Takes the times of units.
+#[derive(Default)]
+pub struct StageClock(Mutex<Vec<StageTime>>);
+
+impl StageClock {
+    /// Does the work on a unit; that of one that fails is timed too.
+    pub fn time(&self, stage: &str, unit: &Unit, work: UnitWork) -> Result<Report> {
+        let begun = Instant::now();
+        let report = work();
+        if let Ok(stage) = stage.parse() {
+            let time = StageTime { stage, unit: unit.clone(), secs: begun.elapsed().as_secs_f64() };
+            self.0.lock().unwrap_or_else(PoisonError::into_inner).push(time);
+        }
+        report
+    }
+
+    /// The times, in the order in which the work ended; the clock begins anew.
+    pub fn take(&self) -> Vec<StageTime> {
+        std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+impl Pipeline {
+    /// The length of a video in seconds, where a header says it, or what was copied of it: see `media::answer`. The video is
+    /// read in a process of its own where the pipeline has a program for it.
+    ///
+    /// # Errors
+    /// A video that cannot be read.
+    pub fn ask_media(&self, request: &MediaRequest) -> Result<Option<f64>> {
+        match self.program() {
+            Some(program) => ask_media(program, request),
+            None => media::answer(request),
+        }
+    }
+
+    /// This pipeline with these files, each with the name of its speaker, in place of all videos, and another work
+    /// folder.
+    pub fn on_excerpts(&self, files: &[(String, PathBuf)], work: &Path) -> Self {
+        let mut config = self.config().clone();
+        config.settings.work.dir = work.to_owned().into();
+        let speakers = self.all_videos().iter().map(|videos| &videos.speaker);
+        let videos = speakers.filter(|speaker| files.iter().any(|(of, _)| of == *speaker)).map(|speaker| {
+            let own = files.iter().filter(|(of, _)| of == speaker);
+            let unit = |(number, (_, path)): (usize, &(String, PathBuf))| Unit {
+                speaker: speaker.clone(),
+                video: format!("excerpt-{number:02}"),
+                source: path.clone(),
+            };
+            Videos { speaker: speaker.clone(), units: own.enumerate().map(unit).collect(), ..Videos::default() }
+        });
+        self.with(config, videos.collect())
+    }
+}

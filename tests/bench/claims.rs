@@ -1,0 +1,100 @@
+//! `cargo bench -- claims`.
+
+use super::report::Report;
+use anyhow::{Result, ensure};
+use orator::cluster::claim_files::UnitEnd;
+use orator::cluster::claims::{Claims, NextUnit};
+use orator::cluster::heartbeat::BeatWatch;
+use orator::cluster::shared_folder::{DiskFolder, SharedFolder};
+use orator::stage::progress::Progress;
+use serde_json::json;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+/// The claims of a plan alone: workers share tiny units that take no time. Units a second, and operations on the shared
+/// folder a unit.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Units of the plan.
+    #[arg(long, default_value_t = 100_000, value_name = "N")]
+    units: usize,
+    /// Workers at a time.
+    #[arg(long, default_value_t = 8, value_name = "N")]
+    workers: usize,
+}
+
+/// A folder that counts what it is asked.
+struct Counted {
+    folder: DiskFolder,
+    created: AtomicUsize,
+    read: AtomicUsize,
+    listed: AtomicUsize,
+}
+
+impl SharedFolder for Counted {
+    fn create(&self, name: &str, bytes: &[u8]) -> Result<bool> {
+        self.created.fetch_add(1, Ordering::Relaxed);
+        self.folder.create(name, bytes)
+    }
+    fn read(&self, name: &str) -> Result<Option<Vec<u8>>> {
+        self.read.fetch_add(1, Ordering::Relaxed);
+        self.folder.read(name)
+    }
+    fn list(&self, folder: &str) -> Result<Vec<String>> {
+        self.listed.fetch_add(1, Ordering::Relaxed);
+        self.folder.list(folder)
+    }
+    fn replace(&self, name: &str, bytes: &[u8]) -> Result<()> {
+        self.folder.replace(name, bytes)
+    }
+}
+
+pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
+    ensure!(args.units > 0 && args.workers > 0, "units and workers must be more than 0");
+    let dir = tempfile::tempdir()?;
+    let folder = Counted {
+        folder: DiskFolder(dir.path().to_owned()),
+        created: AtomicUsize::new(0),
+        read: AtomicUsize::new(0),
+        listed: AtomicUsize::new(0),
+    };
+    let task = progress.begin("claims", args.units as u64);
+    let begun = Instant::now();
+    let work = |worker: usize| -> Result<usize> {
+        let watch = BeatWatch::new(Duration::from_secs(180), "");
+        let name = format!("worker-{worker}");
+        let order = (0..args.units).collect();
+        let mut claims = Claims::new(&folder, &name, vec![Vec::new(); args.units], order, watch, false);
+        let mut n_done = 0;
+        loop {
+            match claims.next(begun.elapsed())? {
+                NextUnit::Claimed(claim) => {
+                    let end = UnitEnd { worker: name.clone(), error: None, secs: 0.0 };
+                    ensure!(claims.end(claim, &end)?, "nobody takes over from the living");
+                    task.advance(1);
+                    n_done += 1;
+                }
+                NextUnit::Wait(_) => std::thread::sleep(Duration::from_millis(20)),
+                NextUnit::AllEnded => return Ok(n_done),
+            }
+        }
+    };
+    let done: Vec<usize> = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..args.workers).map(|worker| scope.spawn(move || work(worker))).collect();
+        let ended =
+            workers.into_iter().map(|worker| worker.join().unwrap_or_else(|_| anyhow::bail!("a worker is lost")));
+        ended.collect::<Result<_>>()
+    })?;
+    ensure!(done.iter().sum::<usize>() == args.units, "{done:?} units done of {}", args.units);
+    let secs = begun.elapsed().as_secs_f64();
+    let of = |counter: &AtomicUsize| counter.load(Ordering::Relaxed) as f64 / args.units as f64;
+    let (created, read, listed) = (of(&folder.created), of(&folder.read), of(&folder.listed));
+    let rate = args.units as f64 / secs;
+    let text = format!(
+        "{} units by {} workers in {secs:.1} s: {rate:.0} a second; a unit takes {created:.2} files to create (a draft, its flush, a \
+         link, a removal each), {read:.2} to read, {listed:.4} listings\n",
+        args.units, args.workers
+    );
+    let facts = json!({ "units": args.units, "workers": args.workers, "secs": secs, "created": created, "read": read, "listed": listed });
+    Ok(Report { text, facts })
+}

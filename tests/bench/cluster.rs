@@ -1,0 +1,243 @@
+//! `cargo bench -- cluster`.
+
+use super::report::Report;
+use anyhow::{Result, ensure};
+use orator::cluster::claim_files::{Claim, UnitEnd};
+use orator::cluster::claims::{Claims, NextUnit};
+use orator::cluster::heartbeat::{BeatWatch, DEAD_AFTER, Heartbeat, WORKERS};
+use orator::cluster::plan::{PIECE_SECS, PlannedUnit, UnitShare, in_order};
+use orator::cluster::shared_folder::SharedFolder;
+use orator::stage::progress::Progress;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde_json::json;
+use std::cell::{Cell, RefCell};
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BinaryHeap};
+use std::time::Duration;
+
+/// A simulation of many workers on one plan, in which time is only counted: how well they are used, and what they ask of
+/// the shared folder. The claims are the program's own. Videos of 2 minutes to 3 hours; of every hundred units two fail
+/// and two take their worker with them, which comes back ten minutes later; every twentieth worker is three times slower.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Hours of video.
+    #[arg(long, default_value_t = 1000.0, value_name = "HOURS")]
+    hours: f64,
+    /// Numbers of workers.
+    #[arg(long, default_value = "64,256,1024", value_delimiter = ',', value_name = "N,N,...")]
+    workers: Vec<usize>,
+    /// Time that an operation on the shared folder takes.
+    #[arg(long, default_value_t = 2.0, value_name = "MILLISECONDS")]
+    latency: f64,
+    /// Seconds of work for a second of video.
+    #[arg(long, default_value_t = 0.4, value_name = "SECONDS")]
+    cost: f64,
+}
+
+/// Time between two beats.
+const BEAT: Duration = Duration::from_secs(15);
+const BACK_AFTER: Duration = Duration::from_secs(600);
+const SLOW: f64 = 3.0;
+
+/// A folder in memory that counts what it is asked.
+#[derive(Default)]
+struct SimulatedFolder {
+    files: RefCell<BTreeMap<String, BTreeMap<String, Vec<u8>>>>,
+    /// Start and end of every worker, by its number.
+    lives: RefCell<Vec<(Duration, Option<Duration>)>>,
+    now: Cell<Duration>,
+    /// Files created, read and folders listed.
+    asked: [Cell<u64>; 3],
+}
+
+impl SimulatedFolder {
+    fn count(&self, what: usize) {
+        self.asked[what].set(self.asked[what].get() + 1);
+    }
+
+    fn n_asked(&self) -> u64 {
+        self.asked.iter().map(Cell::get).sum()
+    }
+}
+
+fn split(name: &str) -> (&str, &str) {
+    name.rsplit_once('/').unwrap_or(("", name))
+}
+
+impl SharedFolder for SimulatedFolder {
+    fn create(&self, name: &str, bytes: &[u8]) -> Result<bool> {
+        self.count(0);
+        let (folder, file) = split(name);
+        let mut files = self.files.borrow_mut();
+        let folder = files.entry(folder.to_owned()).or_default();
+        let is_new = !folder.contains_key(file);
+        folder.entry(file.to_owned()).or_insert_with(|| bytes.to_vec());
+        Ok(is_new)
+    }
+
+    fn read(&self, name: &str) -> Result<Option<Vec<u8>>> {
+        self.count(1);
+        let (folder, file) = split(name);
+        if folder != WORKERS {
+            return Ok(self.files.borrow().get(folder).and_then(|files| files.get(file)).cloned());
+        }
+        // A worker that lives has beaten every so often.
+        let number: usize = file.trim_end_matches(".json").parse()?;
+        let (begun, ended) = self.lives.borrow()[number];
+        let beaten = ended.unwrap_or(self.now.get()).saturating_sub(begun).as_secs() / BEAT.as_secs();
+        Ok(Some(serde_json::to_vec(&Heartbeat { beat: 1 + beaten, ..Heartbeat::default() })?))
+    }
+
+    fn list(&self, folder: &str) -> Result<Vec<String>> {
+        self.count(2);
+        Ok(self.files.borrow().get(folder).map(|files| files.keys().cloned().collect()).unwrap_or_default())
+    }
+
+    fn replace(&self, _name: &str, _bytes: &[u8]) -> Result<()> {
+        Ok(())
+    }
+}
+
+/// Videos of `secs` in all: most of some ten minutes, a few of hours.
+fn videos(secs: f64, rng: &mut ChaCha8Rng) -> Vec<PlannedUnit> {
+    let (mut videos, mut left) = (Vec::new(), secs);
+    while left > 0.0 {
+        let normal: f64 = (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
+        let length = (900.0 * normal.exp()).clamp(120.0, 10_800.0).min(left.max(120.0));
+        left -= length;
+        let name = format!("video-{:06}", videos.len());
+        videos.push(PlannedUnit {
+            speaker: "host".to_owned(),
+            source: (&name).into(),
+            video: name,
+            bytes: 0,
+            secs: Some(length),
+            share: UnitShare::Whole,
+            needs: Vec::new(),
+        });
+    }
+    videos
+}
+
+/// Seconds of work on a unit: a twentieth of a video's is for the first stage, another for those behind `pose2d`.
+fn work_secs(unit: &PlannedUnit, cost: f64) -> f64 {
+    let whole = cost * unit.secs.unwrap_or(0.0);
+    match unit.share {
+        UnitShare::Extract => 0.05 * whole,
+        UnitShare::Parts { of, .. } => 0.9 * whole / of as f64,
+        UnitShare::Whole if unit.needs.is_empty() => whole,
+        UnitShare::Whole => 0.05 * whole,
+    }
+}
+
+struct SimulatedWorker<'a> {
+    claims: Claims<'a, SimulatedFolder>,
+    number: usize,
+    slowness: f64,
+    /// The unit in its hands, and whether it takes the worker with it.
+    hands: Option<(Claim, bool)>,
+}
+
+/// How a simulation came out.
+struct Simulated {
+    secs: f64,
+    efficiency: f64,
+    twice: usize,
+    asked: [f64; 3],
+    /// Operations a second: over the whole, and in the busiest ten seconds.
+    rate: [f64; 2],
+}
+
+fn simulate(units: &[PlannedUnit], n_workers: usize, args: &Args) -> Result<Simulated> {
+    let mut rng = ChaCha8Rng::seed_from_u64(n_workers as u64);
+    let folder = SimulatedFolder::default();
+    let needs: Vec<Vec<usize>> = units.iter().map(|unit| unit.needs.clone()).collect();
+    let begin = |at: Duration, slowness: f64| {
+        let number = folder.lives.borrow().len();
+        folder.lives.borrow_mut().push((at, None));
+        let watch = BeatWatch::new(DEAD_AFTER, "");
+        let claims = Claims::new(&folder, &number.to_string(), needs.clone(), (0..units.len()).collect(), watch, false);
+        SimulatedWorker { claims, number, slowness, hands: None }
+    };
+    let mut workers: Vec<SimulatedWorker> =
+        (0..n_workers).map(|at| begin(Duration::ZERO, if at % 20 == 19 { SLOW } else { 1.0 })).collect();
+    let mut events: BinaryHeap<Reverse<(Duration, usize)>> =
+        (0..n_workers).map(|at| Reverse((Duration::from_millis(37 * at as u64), at))).collect();
+    let mut ended = vec![false; units.len()];
+    let (mut twice, mut last_end, mut buckets) = (0, Duration::ZERO, BTreeMap::<u64, u64>::new());
+    while let Some(Reverse((now, at))) = events.pop() {
+        folder.now.set(now);
+        let before = folder.n_asked();
+        let one = &mut workers[at];
+        if let Some((claim, is_fatal)) = one.hands.take() {
+            if is_fatal {
+                folder.lives.borrow_mut()[one.number].1 = Some(now);
+                let slowness = one.slowness;
+                workers[at] = begin(now + BACK_AFTER, slowness);
+                events.push(Reverse((now + BACK_AFTER, at)));
+                continue;
+            }
+            let error = rng.random_bool(0.02).then(|| "it failed".to_owned());
+            one.claims.end(claim, &UnitEnd { worker: one.number.to_string(), error, secs: 0.0 })?;
+            twice += usize::from(std::mem::replace(&mut ended[claim.unit], true));
+            last_end = last_end.max(now);
+        }
+        let next = one.claims.next(now)?;
+        let n_asked = folder.n_asked() - before;
+        *buckets.entry(now.as_secs() / 10).or_default() += n_asked;
+        let asked = Duration::from_secs_f64(n_asked as f64 * args.latency / 1000.0);
+        match next {
+            NextUnit::Claimed(claim) => {
+                let spread = 0.7 + 0.6 * rng.random::<f64>();
+                let mut secs = work_secs(&units[claim.unit], args.cost) * one.slowness * spread;
+                let is_fatal = rng.random_bool(0.02);
+                secs *= if is_fatal { rng.random::<f64>() } else { 1.0 };
+                one.hands = Some((claim, is_fatal));
+                events.push(Reverse((now + asked + Duration::from_secs_f64(secs), at)));
+            }
+            NextUnit::Wait(time) => events.push(Reverse((now + asked + time, at))),
+            NextUnit::AllEnded => {}
+        }
+    }
+    ensure!(ended.iter().all(|ended| *ended), "a unit is lost");
+    let work: f64 = units.iter().map(|unit| work_secs(unit, args.cost)).sum();
+    let speed: f64 = workers.iter().map(|worker| 1.0 / worker.slowness).sum();
+    let secs = last_end.as_secs_f64();
+    let per_unit = |what: usize| folder.asked[what].get() as f64 / units.len() as f64;
+    let beats = n_workers as f64 / BEAT.as_secs_f64();
+    let most = buckets.values().copied().max().unwrap_or(0) as f64 / 10.0;
+    Ok(Simulated {
+        secs,
+        efficiency: work / speed / secs,
+        twice,
+        asked: [0, 1, 2].map(per_unit),
+        rate: [folder.n_asked() as f64 / secs + beats, most + beats],
+    })
+}
+
+pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
+    ensure!(args.hours > 0.0 && args.workers.iter().all(|n| *n > 0), "hours and workers must be more than 0");
+    let videos = videos(3600.0 * args.hours, &mut ChaCha8Rng::seed_from_u64(0));
+    let n_videos = videos.len();
+    let units = in_order(videos, PIECE_SECS);
+    let mut text = format!("{:.0} h in {n_videos} videos, {} units\n", args.hours, units.len());
+    text += "workers   hours  efficiency  twice  created / read / listed a unit   operations a second, most\n";
+    let task = progress.begin("cluster", args.workers.len() as u64);
+    let mut rows = Vec::new();
+    for &n in &args.workers {
+        let Simulated { secs, efficiency, twice, asked: [created, read, listed], rate: [mean, most] } =
+            simulate(&units, n, args)?;
+        let hours = secs / 3600.0;
+        text += &format!(
+            "{n:7} {hours:7.2} {:9.1} % {twice:6}  {created:7.2} {read:7.1} {listed:7.2}             {mean:12.0} {most:9.0}\n",
+            100.0 * efficiency
+        );
+        rows.push(json!({
+            "workers": n, "hours": hours, "efficiency": efficiency, "twice": twice, "created": created, "read": read,
+            "listed": listed, "operations_a_second": mean, "most_a_second": most,
+        }));
+        task.advance(1);
+    }
+    Ok(Report { text, facts: json!({ "videos": n_videos, "units": units.len(), "rows": rows }) })
+}

@@ -1,0 +1,67 @@
+//! A long video is worked on in spans, by one worker, by two of a run, and by two of a plan: the same bytes each time.
+
+use crate::fixtures::clips;
+use crate::fixtures::faults::plan_workers::{epochs, worker, written};
+use crate::fixtures::support::{Project, files_under};
+use orator::formats::timeline_npz::Timeline;
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+/// A project with one video of 190 s: a clip of 10 s over and over.
+fn project(name: &str) -> Option<Project> {
+    let project = Project::with_clips(name, 1, 10.0);
+    let clip = project.clips().remove(0);
+    let list = project.dir().join("list.txt");
+    std::fs::write(&list, format!("file '{}'\n", clip.display()).repeat(19)).unwrap();
+    if !clips::ffmpeg(project.dir(), "-f concat -safe 0 -i list.txt -c copy long.mp4") {
+        return None;
+    }
+    std::fs::rename(project.dir().join("long.mp4"), clip).unwrap();
+    Some(project)
+}
+
+fn spans(project: &Project) -> usize {
+    let timeline = files_under(&project.work()).into_iter().find(|(name, _)| name.ends_with("timeline.npz")).unwrap().1;
+    Timeline::read(&timeline).unwrap().spans().len()
+}
+
+#[test]
+fn a_long_video_is_shared_and_its_bytes_are_those_of_one_worker() {
+    let Some(alone) = project("alone") else { return };
+    assert_eq!(alone.run(&["--jobs", "1"]).code, 0);
+    assert_eq!(spans(&alone), 2);
+    let expected = written(&alone.work());
+    let compare = |made: BTreeMap<String, Vec<u8>>| {
+        assert_eq!(made.keys().collect::<Vec<_>>(), expected.keys().collect::<Vec<_>>());
+        let differing: Vec<&String> =
+            made.iter().filter(|(name, of)| expected[*name] != **of).map(|(n, _)| n).collect();
+        assert!(differing.is_empty(), "{differing:?}");
+    };
+    let Some(two) = project("two") else { return };
+    // Killed in the middle of a span, the run goes on after those that are done.
+    let mut killed = two.start(&["run", "--jobs", "1"]);
+    let done =
+        |project: &Project| files_under(&project.work()).iter().any(|(name, _)| name.ends_with(".parts/0.record.json"));
+    while !done(&two) {
+        assert!(killed.try_wait().unwrap().is_none(), "it ended before it was killed");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    killed.kill().unwrap();
+    killed.wait().unwrap();
+    assert_eq!(two.run(&["--jobs", "2"]).code, 0);
+    compare(written(&two.work()));
+
+    let Some(planned) = project("planned") else { return };
+    let plan = planned.answer(&["plan", "--untimed", "--piece", "2"]);
+    assert_eq!((plan.code, &plan.json["units"]), (0, &json!(4)), "{}", plan.errors);
+    let workers = [worker(&planned), worker(&planned)];
+    for mut worker in workers {
+        assert!(worker.wait().unwrap().success());
+    }
+    assert_eq!(epochs(&planned.work(), "end").len(), 4);
+    let status = planned.answer(&["status", "--plan", "work/plan.json"]).json;
+    assert!((status["ended_media_secs"].as_f64().unwrap() - status["media_secs"].as_f64().unwrap()).abs() < 1e-6);
+    assert_eq!(planned.run(&["--only", "dataset"]).code, 0);
+    compare(written(&planned.work()));
+}

@@ -1,0 +1,152 @@
+//! Workers on one plan are killed, stand still and are started again: the datasets are those of one undisturbed run.
+//! `ORATOR_KILLS` says how often (`make prove`: 200, by eight workers). Where libfaketime is installed their clocks are
+//! minutes apart.
+
+use crate::fixtures::faults::plan_workers::{epochs, faketime, worker, worker_off, written};
+use crate::fixtures::support::Project;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rustix::process::{Pid, Signal, kill_process};
+use std::process::Child;
+use std::time::{Duration, Instant};
+
+fn signal(child: &Child, signal: Signal) {
+    kill_process(Pid::from_child(child), signal).unwrap();
+}
+
+/// Processes that a process has started.
+fn children(of: u32) -> Vec<Pid> {
+    let processes = std::fs::read_dir("/proc").unwrap().flatten();
+    let numbers = processes.filter_map(|entry| entry.file_name().to_string_lossy().parse::<i32>().ok());
+    let is_child = |process: &i32| {
+        let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
+        // Behind the name, which may hold anything: state, parent.
+        let parent = stat.rsplit_once(')').and_then(|(_, rest)| rest.split_whitespace().nth(1)?.parse().ok());
+        parent == Some(of)
+    };
+    numbers.filter(is_child).filter_map(Pid::from_raw).collect()
+}
+
+#[test]
+fn killed_and_lost_workers_leave_the_bytes_of_one_run() {
+    let n_kills: usize = std::env::var("ORATOR_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(4);
+    let (n_clips, n_workers) = (6, if n_kills > 20 { 8 } else { 4 });
+    let calm = Project::with_clips("calm", n_clips, 4.6);
+    assert_eq!(calm.run(&[]).code, 0);
+    let expected = written(&calm.work());
+    assert!(expected.keys().any(|name| name.ends_with(".tar")));
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    let (mut n_killed, mut n_lost, mut n_taken_over, mut n_plans) = (0, 0, 0, 0);
+    while n_killed + n_lost < n_kills {
+        n_plans += 1;
+        let project = Project::with_clips("crowd", n_clips, 4.6);
+        let plan = project.answer(&["plan", "--untimed"]);
+        assert_eq!((plan.code, &plan.json["units"]), (0, &serde_json::json!(n_clips)), "{}", plan.errors);
+        let mut off = || rng.random_range(-900..900);
+        let mut workers: Vec<Child> = (0..n_workers).map(|_| worker_off(&project, off())).collect();
+        let mut still: Vec<Child> = Vec::new();
+        let begun = Instant::now();
+        while epochs(&project.work(), "end").len() < n_clips {
+            assert!(
+                begun.elapsed() < Duration::from_secs(240),
+                "{} of {n_clips}",
+                epochs(&project.work(), "end").len()
+            );
+            std::thread::sleep(Duration::from_millis(rng.random_range(50..400)));
+            let at = rng.random_range(0..workers.len());
+            if n_killed + n_lost < n_kills && workers[at].try_wait().unwrap().is_none() {
+                let next = worker_off(&project, rng.random_range(-900..900));
+                let mut old = std::mem::replace(&mut workers[at], next);
+                // Its processes of units go with it.
+                if rng.random_bool(0.7) {
+                    old.kill().unwrap();
+                    old.wait().unwrap();
+                    n_killed += 1;
+                } else {
+                    signal(&old, Signal::STOP);
+                    still.push(old);
+                    n_lost += 1;
+                }
+            }
+        }
+        // Those that stood still come back late, find their units in the hands of others, and end well.
+        for mut late in still {
+            signal(&late, Signal::CONT);
+            assert!(late.wait().unwrap().success());
+        }
+        for mut worker in workers {
+            assert!(worker.wait().unwrap().success());
+        }
+        let made = project.run(&["--only", "dataset"]);
+        assert_eq!(made.code, 0, "{}", made.errors);
+        let (made, claims) = (written(&project.work()), epochs(&project.work(), "claim"));
+        assert_eq!(made.keys().collect::<Vec<_>>(), expected.keys().collect::<Vec<_>>());
+        let differing: Vec<&String> =
+            made.iter().filter(|(name, bytes)| expected[*name] != **bytes).map(|(name, _)| name).collect();
+        assert!(differing.is_empty(), "{differing:?}");
+        n_taken_over += claims.values().map(|epoch| *epoch as usize - 1).sum::<usize>();
+    }
+    assert!(n_taken_over <= n_killed + n_lost, "{n_taken_over} taken over of {n_killed} killed and {n_lost} lost");
+    eprintln!(
+        "{n_plans} plans of {n_clips} units, {n_workers} workers at a time, clocks {}: {n_killed} workers killed, {n_lost} lost \
+         and late, {n_taken_over} units taken over; the bytes are those of one run",
+        if faketime().is_some() { "up to 15 minutes off" } else { "as they are" }
+    );
+}
+
+#[test]
+fn a_bad_video_fails_alone_and_a_plan_is_kept() {
+    let project = Project::with_clips("cluster", 2, 4.6);
+    std::fs::write(project.video("broken.mp4"), b"no video").unwrap();
+    assert_eq!(project.answer(&["plan", "--untimed"]).code, 0);
+    // An exclusive run is refused while workers have the folder.
+    let first = project.answer(&["work", "--plan", "work/plan.json", "--shard", "0/2"]);
+    let second = project.answer(&["work", "--plan", "work/plan.json", "--shard", "1/2"]);
+    assert_eq!(first.json["done"].as_u64().unwrap() + second.json["done"].as_u64().unwrap(), 2, "{}", first.errors);
+    assert_eq!(first.code + second.code, 2, "one of them had the broken one");
+    let status = project.answer(&["status", "--plan", "work/plan.json"]);
+    assert_eq!((status.json["n_done"].as_u64(), status.json["n_failed"].as_u64()), (Some(2), Some(1)));
+    assert_eq!(status.json["failures"].as_object().unwrap().len(), 1);
+    // Nothing is left to do; the failed one is taken again when that is asked for.
+    let again = project.answer(&["work", "--plan", "work/plan.json"]);
+    assert_eq!((again.code, again.json["done"].as_u64()), (0, Some(0)));
+    std::fs::copy(project.clips().pop().unwrap(), project.video("broken.mp4")).unwrap();
+    let retried = project.answer(&["work", "--plan", "work/plan.json", "--retry"]);
+    assert_eq!((retried.code, retried.json["done"].as_u64()), (0, Some(1)), "{}", retried.errors);
+    assert_eq!(project.answer(&["status", "--plan", "work/plan.json"]).json["n_failed"].as_u64(), Some(0));
+
+    let plan = project.work().join("plan.json");
+    let text = std::fs::read_to_string(&plan).unwrap();
+    std::fs::write(&plan, text.replace("clip-1", "clip-7")).unwrap();
+    let changed = project.answer(&["work", "--plan", "work/plan.json"]);
+    assert!(changed.code == 1 && changed.errors.contains("was changed since"), "{}", changed.errors);
+    std::fs::write(&plan, &text).unwrap();
+    let file = project.dir().join("pipeline.toml");
+    let settings = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(&file, settings.replace("lambda_gan = 0.15", "lambda_gan = 0.2")).unwrap();
+    assert_eq!(project.answer(&["work", "--plan", "work/plan.json"]).code, 0, "a training's setting is not the plan's");
+    std::fs::write(&file, settings.replace("[pose2d]", "[pose2d]\nperson_every = 7")).unwrap();
+    let other = project.answer(&["work", "--plan", "work/plan.json"]);
+    assert!(other.code == 1 && other.errors.contains("changed since the plan was written"), "{}", other.errors);
+}
+
+#[test]
+fn a_worker_that_is_asked_to_end_with_all_its_processes_finishes_its_unit() {
+    let project = Project::with_clips("asked", 2, 4.6);
+    assert_eq!(project.answer(&["plan", "--untimed"]).code, 0);
+    let worker = worker(&project);
+    while epochs(&project.work(), "claim").is_empty() {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    std::thread::sleep(Duration::from_millis(300));
+    // As a scheduler does: the worker and whatever it has started.
+    let started = children(worker.id());
+    signal(&worker, Signal::TERM);
+    for child in started {
+        // One may have ended meanwhile.
+        let _ = kill_process(child, Signal::TERM);
+    }
+    assert_eq!(worker.wait_with_output().unwrap().status.code(), Some(143));
+    let status = project.answer(&["status", "--plan", "work/plan.json"]).json;
+    assert_eq!((status["n_done"].as_u64(), status["n_failed"].as_u64()), (Some(1), Some(0)), "{status}");
+}
