@@ -3,7 +3,7 @@
 use crate::fixtures::clips;
 use crate::fixtures::clips::{ffmpeg, number_of, write_numbered, write_sized};
 use crate::fixtures::skip::real_data;
-use orator::external::ffmpeg::frames::FrameReader;
+use orator::external::ffmpeg::frames::{FrameReader, TimedFrame};
 use orator::external::ffmpeg::probe::probe;
 use orator::types::time::FrameRate;
 use std::path::Path;
@@ -228,6 +228,28 @@ fn flawed_bytes_in_the_middle_are_reported_and_the_rest_kept() {
     let n = reader.by_ref().map(Result::unwrap).count();
     let damage = reader.damage().expect("damage");
     assert!(n >= 45, "{n} frames, {damage}");
+}
+
+#[test]
+fn a_reading_that_begins_inside_goes_on_as_one_from_the_start() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = write_numbered(dir.path(), "long.mp4", 240, FrameRate::new(30, 1), None);
+    let read = |reader: FrameReader| {
+        let frame = |frame: TimedFrame| (frame.frame_idx, number_of(&frame.image), frame.source_secs, frame.repeated);
+        reader.map(|one| frame(one.unwrap())).collect::<Vec<_>>()
+    };
+    let fps = FrameRate::new(20, 1);
+    let whole = read(FrameReader::open(&path, fps).unwrap());
+    for from in [0, 1, 77, 158, 159] {
+        let mut reader = FrameReader::open(&path, fps).unwrap();
+        reader.go_to(from, whole[from].2).unwrap();
+        assert_eq!(read(reader), whole[from..], "from {from}");
+    }
+    let mut reader = FrameReader::open(&path, fps).unwrap();
+    for between in [whole[77].2 + 0.011, 8.5] {
+        let error = reader.go_to(77, between).unwrap_err().to_string();
+        assert!(error.contains("long.mp4 shows no picture at"), "{error}");
+    }
 }
 
 #[test]
