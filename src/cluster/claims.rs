@@ -72,7 +72,7 @@ impl<'a, F: SharedFolder> Claims<'a, F> {
         retries: bool,
     ) -> Self {
         let states = vec![ClaimState::Free; needs.len()];
-        let mut chance = ChaCha8Rng::from_seed(*blake3::hash(worker.as_bytes()).as_bytes());
+        let chance = ChaCha8Rng::from_seed(*blake3::hash(worker.as_bytes()).as_bytes());
         Self {
             folder,
             worker: worker.to_owned(),
@@ -80,7 +80,7 @@ impl<'a, F: SharedFolder> Claims<'a, F> {
             needs,
             order,
             n_passed: 0,
-            takeover: Takeover::new(watch, chance.next_u64()),
+            takeover: Takeover::new(watch, worker),
             waited: Duration::ZERO,
             is_read: false,
             retries,

@@ -267,17 +267,20 @@ fn has(videos: &Videos, unit: &PlannedUnit) -> bool {
     videos.speaker == unit.speaker && videos.units.iter().any(|known| known.video == unit.video)
 }
 
-/// BLAKE3 of the settings of videos and datasets; how many work side by side has no say in what they make.
+/// BLAKE3 of the settings of videos and datasets: training comes after the plan, and how many work side by side has no
+/// say in what they make.
 pub fn settings_hash(config: &Config) -> Result<String> {
     let mut settings = config.settings.clone();
     settings.work.jobs = 0;
     settings.gan = Default::default();
+    settings.seq2seq = Default::default();
     Ok(blake3::hash(&serde_json::to_vec(&settings)?).to_hex().to_string())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::load;
 
     fn video(name: &str, secs: f64) -> PlannedUnit {
         PlannedUnit {
@@ -307,5 +310,17 @@ mod tests {
         );
         let media: f64 = units.iter().filter_map(PlannedUnit::media_secs).sum();
         assert!((media - 2899.0).abs() < 1e-9);
+    }
+    #[test]
+    fn settings_of_training_are_no_part_of_it() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("pipeline.toml");
+        std::fs::write(&file, "[[speaker]]\nname = \"host\"\nvideos = [\"host/*.mp4\"]\n").unwrap();
+        let hash = |set: &str| settings_hash(&load(&file, &[set.to_owned()]).unwrap()).unwrap();
+        let plain = hash("work.jobs=2");
+        for set in ["work.jobs=3", "gan.steps=7", "seq2seq.steps=7"] {
+            assert_eq!(hash(set), plain, "{set}");
+        }
+        assert_ne!(hash("lift.smooth_arms=0.5"), plain);
     }
 }

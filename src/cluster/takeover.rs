@@ -5,6 +5,8 @@ use super::claim_files::Claim;
 use super::heartbeat::BeatWatch;
 use super::shared_folder::SharedFolder;
 use anyhow::Result;
+use rand::{RngCore, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::time::Duration;
@@ -15,6 +17,8 @@ const MOST: usize = 32;
 /// Looks for units whose worker is dead.
 pub struct Takeover {
     watch: BeatWatch,
+    /// Name of the worker that looks.
+    worker: String,
     /// Which units this worker looks at among many: those that come first in an order of its own.
     order: u64,
     /// Earliest time of the next look.
@@ -26,9 +30,17 @@ pub struct Takeover {
 }
 
 impl Takeover {
-    /// For a worker whose order of units comes from the number `order`.
-    pub fn new(watch: BeatWatch, order: u64) -> Self {
-        Self { watch, order, next_look: Duration::ZERO, owners: BTreeMap::new(), found: Vec::new() }
+    /// For the worker of that name.
+    pub fn new(watch: BeatWatch, worker: &str) -> Self {
+        let order = ChaCha8Rng::from_seed(*blake3::hash(worker.as_bytes()).as_bytes()).next_u64();
+        Self {
+            watch,
+            worker: worker.to_owned(),
+            order,
+            next_look: Duration::ZERO,
+            owners: BTreeMap::new(),
+            found: Vec::new(),
+        }
     }
 
     /// Time between two looks: the dead are found a twelfth later than they are known to be dead.
@@ -67,7 +79,7 @@ impl Takeover {
         Ok(None)
     }
 
-    /// Whether the claim's worker is dead, or has ended without it.
+    /// Whether the claim's worker is another one, and dead, or has ended without it.
     fn is_left(&mut self, folder: &impl SharedFolder, claim: Claim, now: Duration) -> Result<bool> {
         let owner = match self.owners.entry((claim.unit, claim.epoch)) {
             Entry::Occupied(known) => known.into_mut(),
@@ -76,6 +88,6 @@ impl Takeover {
                 None => return Ok(false),
             },
         };
-        self.watch.is_dead(folder, owner, now)
+        Ok(*owner != self.worker && self.watch.is_dead(folder, owner, now)?)
     }
 }
