@@ -4,6 +4,24 @@ use super::plan::ClusterPlan;
 use crate::stage::artifacts::{StageName, speaker_dir};
 use std::path::{Path, PathBuf};
 
+/// What one task may use.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TaskLimits {
+    /// Processor cores.
+    pub cores: usize,
+    /// Memory, GiB.
+    pub memory_gib: f64,
+    /// Longest time, hours.
+    pub hours: f64,
+}
+
+impl TaskLimits {
+    /// The memory in MiB, rounded up.
+    pub fn memory_mib(&self) -> u64 {
+        (self.memory_gib * 1024.0).ceil() as u64
+    }
+}
+
 /// What jobs are made of.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JobRequest {
@@ -15,11 +33,8 @@ pub struct JobRequest {
     pub n_tasks: usize,
     /// Most tasks at a time.
     pub n_at_once: usize,
-    /// Processor cores and memory (GiB) of a task.
-    pub cores: usize,
-    pub memory_gib: f64,
-    /// Longest time of a task, hours.
-    pub hours: f64,
+    /// What a worker may use.
+    pub worker_limits: TaskLimits,
 }
 
 impl JobRequest {
@@ -33,21 +48,18 @@ impl JobRequest {
     /// Arguments of the last worker, which waits for all others and takes over what the dead have left.
     pub fn last_worker(&self) -> Vec<String> {
         let [program, plan] = [&self.program, &self.plan].map(|path| path.display().to_string());
-        [program.as_str(), "work", "--plan", plan.as_str(), "--jobs", &self.cores.to_string()]
+        [program.as_str(), "work", "--plan", plan.as_str(), "--jobs", &self.worker_limits.cores.to_string()]
             .map(str::to_owned)
             .to_vec()
     }
 
     /// The command lines that verify the datasets of a work folder.
     pub fn verify(&self, plan: &ClusterPlan, work: &Path) -> Vec<Vec<String>> {
-        let mut speakers: Vec<&str> = plan.units.iter().map(|unit| unit.speaker.as_str()).collect();
-        speakers.sort_unstable();
-        speakers.dedup();
         let dataset = |speaker| speaker_dir(work, StageName::Dataset, speaker);
         let words = |speaker| {
             let dir = dataset(speaker).display().to_string();
             vec![self.program.display().to_string(), "dataset".into(), "verify".into(), dir]
         };
-        speakers.into_iter().map(words).collect()
+        plan.speakers().into_iter().map(words).collect()
     }
 }

@@ -24,9 +24,10 @@ pub fn manifests(job: &JobRequest, plan: &ClusterPlan, work: &Path, target: &Kub
     let name = |suffix: &str| format!("orator-{}{suffix}", &plan.seal[..8.min(plan.seal.len())]);
     let meta =
         |suffix: &str| json!({ "name": name(suffix), "namespace": target.namespace, "labels": { "app": "orator" } });
+    let limits = job.worker_limits;
     let resources = json!({
-        "requests": { "cpu": job.cores.to_string(), "memory": format!("{}Mi", (job.memory_gib * 1024.0).ceil()) },
-        "limits": { "memory": format!("{}Mi", (job.memory_gib * 1024.0).ceil()) },
+        "requests": { "cpu": limits.cores.to_string(), "memory": format!("{}Mi", limits.memory_mib()) },
+        "limits": { "memory": format!("{}Mi", limits.memory_mib()) },
     });
     let pod = |command: Vec<String>| {
         json!({
@@ -51,7 +52,7 @@ pub fn manifests(job: &JobRequest, plan: &ClusterPlan, work: &Path, target: &Kub
             { "action": "FailJob", "onExitCodes": { "containerName": "orator", "operator": "In", "values": [1] } },
         ],
     });
-    let seconds = (job.hours * 3600.0).ceil() as i64;
+    let seconds = (limits.hours * 3600.0).ceil() as i64;
     let script = |lines: Vec<String>| vec!["/bin/sh".to_owned(), "-c".to_owned(), lines.join("\n")];
     let mut last = vec!["code=0".to_owned(), format!("{} || code=$?", shell(&job.last_worker()))];
     last.push(format!("{} || code=$?", plan.datasets_command(&job.program.display().to_string())));

@@ -9,7 +9,7 @@ use crate::stage::fingerprint::hash_file;
 use crate::stage::{Unit, workdir};
 use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -224,11 +224,28 @@ impl ClusterPlan {
         self.units.iter().filter(|unit| unit.share == UnitShare::Whole).cloned().collect()
     }
 
+    /// Names of the speakers, sorted.
+    pub fn speakers(&self) -> Vec<&str> {
+        let names: BTreeSet<&str> = self.units.iter().map(|unit| unit.speaker.as_str()).collect();
+        names.into_iter().collect()
+    }
+
     /// The command line by which `program` makes the datasets when all units have ended.
     pub fn datasets_command(&self, program: &str) -> String {
-        let mut words = vec![program.to_owned(), "run".to_owned(), "-c".to_owned(), self.config.display().to_string()];
+        format!("{} --only dataset", self.command(program, &["run"]))
+    }
+
+    /// The command line by which `program` trains a model; the speaker's name comes behind it.
+    pub fn training_command(&self, program: &str) -> String {
+        format!("{} --speaker", self.command(program, &["train", "gan"]))
+    }
+
+    /// A command line of `program` with the configuration of the plan.
+    fn command(&self, program: &str, verb: &[&str]) -> String {
+        let mut words = vec![program.to_owned()];
+        words.extend(verb.iter().map(|&word| word.to_owned()));
+        words.extend(["-c".to_owned(), self.config.display().to_string()]);
         words.extend(self.sets.iter().flat_map(|set| ["--set".to_owned(), set.clone()]));
-        words.extend(["--only".to_owned(), "dataset".to_owned()]);
         shell(&words)
     }
 

@@ -1,6 +1,6 @@
-//! Jobs for Slurm: an array of workers, and a last job after all of them.
+//! Jobs for Slurm: an array of workers, a last job after all of them, and trainings after that.
 
-use super::job::JobRequest;
+use super::job::{JobRequest, TaskLimits};
 use super::plan::ClusterPlan;
 use super::shell::shell;
 use std::path::Path;
@@ -15,43 +15,59 @@ pub struct SlurmScripts {
     pub arrays: Vec<String>,
     /// The job after all arrays, however they ended: it works on what they left, makes the datasets and verifies them.
     pub last: String,
+    /// Arrays after the last job, a training a speaker; none where none is asked for.
+    pub trainings: Vec<String>,
 }
 
-/// Writes the scripts. `max_array` is the cluster's MaxArraySize; `logs` the folder of the outputs; `options` are more
-/// lines for `#SBATCH` (a partition, an account).
-pub fn scripts(
-    job: &JobRequest,
-    plan: &ClusterPlan,
-    work: &Path,
-    logs: &Path,
-    max_array: usize,
-    options: &[String],
-) -> SlurmScripts {
-    let head = |name: &str, array: Option<usize>| {
+/// What all scripts have in common.
+pub struct SlurmSettings<'a> {
+    /// The cluster's MaxArraySize.
+    pub max_array: usize,
+    /// Folder of the outputs.
+    pub logs: &'a Path,
+    /// More lines for `#SBATCH` (a partition, an account).
+    pub options: &'a [String],
+}
+
+impl SlurmSettings<'_> {
+    /// What stands before a script's commands; of an array, how many tasks it has and how many at once.
+    fn head(&self, name: &str, limits: TaskLimits, array: Option<[usize; 2]>) -> String {
         let output = if array.is_some() { "%A_%a.out" } else { "%j.out" };
         let mut lines = vec![
             "#!/bin/sh".to_owned(),
             format!("#SBATCH --job-name={name}"),
-            format!("#SBATCH --output={}", logs.join(output).display()),
+            format!("#SBATCH --output={}", self.logs.join(output).display()),
             "#SBATCH --open-mode=append".to_owned(),
             "#SBATCH --requeue".to_owned(),
             "#SBATCH --ntasks=1".to_owned(),
-            format!("#SBATCH --cpus-per-task={}", job.cores),
-            format!("#SBATCH --mem={}M", (job.memory_gib * 1024.0).ceil()),
-            format!("#SBATCH --time={}", clock(job.hours)),
+            format!("#SBATCH --cpus-per-task={}", limits.cores),
+            format!("#SBATCH --mem={}M", limits.memory_mib()),
+            format!("#SBATCH --time={}", clock(limits.hours)),
             format!("#SBATCH --signal=B:TERM@{NOTICE_SECS}"),
         ];
-        lines.extend(array.map(|n| format!("#SBATCH --array=0-{}%{}", n - 1, job.n_at_once.clamp(1, n))));
-        lines.extend(options.iter().map(|option| format!("#SBATCH {option}")));
-        lines.join("\n")
-    };
-    let most = max_array.max(1);
+        lines.extend(array.map(|[n, at_once]| format!("#SBATCH --array=0-{}%{}", n - 1, at_once.clamp(1, n))));
+        lines.extend(self.options.iter().map(|option| format!("#SBATCH {option}")));
+        lines.join("\n") + "\n\n"
+    }
+}
+
+/// Writes the scripts; `training` is what the training of a speaker may use, where one is asked for.
+pub fn scripts(
+    job: &JobRequest,
+    plan: &ClusterPlan,
+    work: &Path,
+    settings: &SlurmSettings,
+    training: Option<TaskLimits>,
+) -> SlurmScripts {
+    let (most, program) = (settings.max_array.max(1), job.program.display().to_string());
+    // Units that failed are the last job's matter.
+    let worker = until_done(&shell(&job.worker())) + "[ \"$code\" -ne 2 ] || code=0\nexit \"$code\"\n";
     let arrays = (0..job.n_tasks.max(1)).step_by(most).map(|first| {
         let n = most.min(job.n_tasks.max(1) - first);
-        format!("{}\n\n{}", head("orator", Some(n)), until_done(&shell(&job.worker())))
+        settings.head("orator", job.worker_limits, Some([n, job.n_at_once])) + &worker
     });
-    let mut last = format!("{}\n\n{}", head("orator-last", None), until_done(&shell(&job.last_worker())));
-    last += &format!("{} || code=$?\n", plan.datasets_command(&job.program.display().to_string()));
+    let mut last = settings.head("orator-last", job.worker_limits, None) + &until_done(&shell(&job.last_worker()));
+    last += &format!("{} || code=$?\n", plan.datasets_command(&program));
     for words in job.verify(plan, work) {
         last += &format!("{} || code=$?\n", shell(&words));
     }
@@ -62,12 +78,24 @@ pub fn scripts(
         shell(&["some units failed; when what ails them is mended:".to_owned()]),
         shell(&[shell(&retry)])
     );
-    SlurmScripts { arrays: arrays.map(|script| script + "exit \"$code\"\n").collect(), last }
+    let of_speakers = |speakers: &[&str], limits: TaskLimits| {
+        let names: Vec<String> = speakers.iter().map(|&name| name.to_owned()).collect();
+        let training = until_done(&format!("{} \"$1\"", plan.training_command(&program)));
+        settings.head("orator-train", limits, Some([names.len(), names.len()]))
+            + &format!("set -- {}\nshift \"$SLURM_ARRAY_TASK_ID\"\n{training}exit \"$code\"\n", shell(&names))
+    };
+    let speakers = plan.speakers();
+    let trainings = training.into_iter().flat_map(|limits| speakers.chunks(most).map(move |some| (some, limits)));
+    SlurmScripts {
+        arrays: arrays.collect(),
+        last,
+        trainings: trainings.map(|(some, limits)| of_speakers(some, limits)).collect(),
+    }
 }
 
-/// Runs the worker beside the shell, which hears the signal before the end of the time and passes it on: the worker ends
-/// after its unit, or at once when the time is nearly over. A worker that was stopped (code 143) is queued again; failed
-/// units (code 2) are the last job's matter.
+/// Runs a worker or a training beside the shell, which hears the signal before the end of the time and passes it on: it ends
+/// after its unit, or with a checkpoint, or at once when the time is nearly over. What was stopped (code 143) is queued
+/// again.
 fn until_done(worker: &str) -> String {
     let patience = NOTICE_SECS.saturating_sub(20);
     format!(
@@ -82,8 +110,7 @@ fn until_done(worker: &str) -> String {
          if [ \"$code\" -eq 143 ]; then\n    \
              scontrol requeue \"${{SLURM_ARRAY_JOB_ID:-$SLURM_JOB_ID}}${{SLURM_ARRAY_TASK_ID:+_$SLURM_ARRAY_TASK_ID}}\"\n    \
              exit 0\n\
-         fi\n\
-         [ \"$code\" -ne 2 ] || [ -z \"${{SLURM_ARRAY_TASK_ID:-}}\" ] || code=0\n"
+         fi\n"
     )
 }
 
@@ -95,6 +122,7 @@ fn clock(hours: f64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::plan::{PlannedUnit, UnitShare};
     use super::*;
 
     #[test]
@@ -104,9 +132,16 @@ mod tests {
             plan: "/w/plan's.json".into(),
             n_tasks: 2500,
             n_at_once: 40,
-            cores: 4,
-            memory_gib: 3.5,
-            hours: 1.01,
+            worker_limits: TaskLimits { cores: 4, memory_gib: 3.5, hours: 1.01 },
+        };
+        let of_speaker = |speaker: &str| PlannedUnit {
+            speaker: speaker.to_owned(),
+            video: "talk".to_owned(),
+            source: "talk.mp4".into(),
+            bytes: 1,
+            secs: None,
+            share: UnitShare::Whole,
+            needs: Vec::new(),
         };
         let plan = ClusterPlan {
             version: 1,
@@ -115,16 +150,18 @@ mod tests {
             sets: vec!["extract.fps=15".to_owned()],
             settings: String::new(),
             models: Default::default(),
-            units: Vec::new(),
+            units: ["guest's", "host"].map(of_speaker).to_vec(),
             seal: String::new(),
         };
         let options = ["--partition=long".to_owned()];
-        let made = scripts(&job, &plan, Path::new("/w/work"), Path::new("/w/logs"), 1001, &options);
+        let settings = SlurmSettings { max_array: 1001, logs: Path::new("/w/logs"), options: &options };
+        let training = TaskLimits { cores: 8, ..job.worker_limits };
+        let made = scripts(&job, &plan, Path::new("/w/work"), &settings, Some(training));
         let array =
             |script: &String| script.lines().find_map(|line| line.strip_prefix("#SBATCH --array=").map(str::to_owned));
         let arrays: Vec<String> = made.arrays.iter().filter_map(array).collect();
         assert_eq!(arrays, ["0-1000%40", "0-1000%40", "0-497%40"]);
-        for text in made.arrays.iter().chain([&made.last]) {
+        for text in made.arrays.iter().chain([&made.last]).chain(&made.trainings) {
             assert!(text.contains("#SBATCH --time=1:01:00\n") && text.contains("#SBATCH --mem=3584M\n"), "{text}");
             assert!(text.contains("#SBATCH --partition=long\n"), "{text}");
             let mut shell = std::process::Command::new("sh");
@@ -137,5 +174,13 @@ mod tests {
             "{}",
             made.last
         );
+        assert_eq!(made.trainings.len(), 1);
+        let commands = [
+            "#SBATCH --array=0-1%2\n",
+            "#SBATCH --cpus-per-task=8\n",
+            "set -- 'guest'\\''s' host\nshift \"$SLURM_ARRAY_TASK_ID\"\n",
+            "'/opt/or ator' train gan -c /w/pipeline.toml --set extract.fps=15 --speaker \"$1\" &\n",
+        ];
+        commands.iter().for_each(|line| assert!(made.trainings[0].contains(line), "{}", made.trainings[0]));
     }
 }

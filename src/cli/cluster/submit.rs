@@ -4,11 +4,12 @@ use super::open::open;
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::{Context, Result, bail, ensure};
-use orator::cluster::job::JobRequest;
+use orator::cluster::job::{JobRequest, TaskLimits};
 use orator::cluster::kubernetes::{KubernetesTarget, manifests};
 use orator::cluster::plan::ClusterPlan;
 use orator::cluster::shell::shell;
 use orator::cluster::slurm;
+use orator::cluster::slurm::SlurmSettings;
 use orator::cluster::stage_times::StageTimes;
 use orator::stage::workdir;
 use serde_json::json;
@@ -62,11 +63,24 @@ struct JobArgs {
     dry_run: bool,
 }
 
-/// An array of workers, and a job after it that makes the datasets and verifies them.
+/// An array of workers, a job after it that makes the datasets and verifies them, and with --train a training of each
+/// speaker after that.
 #[derive(clap::Args)]
 struct SlurmArgs {
     #[command(flatten)]
     job: JobArgs,
+    /// Train a model of each speaker when the datasets are made: `orator train gan`, queued again until it has ended.
+    #[arg(long)]
+    train: bool,
+    /// Processor cores of a training.
+    #[arg(long, value_name = "N", default_value_t = 4, requires = "train")]
+    train_cores: usize,
+    /// Memory of a training, GiB.
+    #[arg(long, value_name = "GIB", default_value_t = 4.0, requires = "train")]
+    train_memory: f64,
+    /// Time after which a training writes a checkpoint and is queued again, hours.
+    #[arg(long, value_name = "HOURS", default_value_t = 12.0, requires = "train")]
+    train_hours: f64,
     /// Longest array; default: what `scontrol show config` says.
     #[arg(long, value_name = "N")]
     max_array: Option<usize>,
@@ -135,9 +149,11 @@ impl JobArgs {
             plan: std::path::absolute(&self.plan)?,
             n_tasks: self.tasks.min(plan.units.len().max(1)),
             n_at_once,
-            cores: self.cores,
-            memory_gib: self.memory.unwrap_or(1.5 * self.cores as f64),
-            hours,
+            worker_limits: TaskLimits {
+                cores: self.cores,
+                memory_gib: self.memory.unwrap_or(1.5 * self.cores as f64),
+                hours,
+            },
         };
         Ok((plan, work, request))
     }
@@ -151,6 +167,15 @@ impl JobArgs {
     }
 }
 
+impl SlurmArgs {
+    /// What a training may use; none: there is none.
+    fn training(&self) -> Result<Option<TaskLimits>> {
+        let limits = TaskLimits { cores: self.train_cores, memory_gib: self.train_memory, hours: self.train_hours };
+        ensure!(limits.cores > 0 && limits.hours > 0.0, "cores and hours of a training must be more than 0");
+        Ok(self.train.then_some(limits))
+    }
+}
+
 fn to_slurm(args: &SlurmArgs, ui: &Ui) -> Result<Outcome> {
     let (plan, work, request) = args.job.request()?;
     let folder = args.job.jobs_folder(&plan)?;
@@ -159,27 +184,40 @@ fn to_slurm(args: &SlurmArgs, ui: &Ui) -> Result<Outcome> {
         None => max_array_size().unwrap_or(1001),
     };
     std::fs::create_dir_all(&folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
-    let made = slurm::scripts(&request, &plan, &work, &folder, max_array, &args.options);
-    let mut files = Vec::new();
-    for (name, script) in made.arrays.iter().enumerate().map(|(n, script)| (format!("array-{n}.sh"), script)) {
-        workdir::write_file(&folder.join(&name), script.as_bytes())?;
-        files.push(folder.join(name));
-    }
-    let last = folder.join("last.sh");
-    workdir::write_file(&last, made.last.as_bytes())?;
+    let settings = SlurmSettings { max_array, logs: &folder, options: &args.options };
+    let made = slurm::scripts(&request, &plan, &work, &settings, args.training()?);
+    let write = |name: String, script: &String| -> Result<PathBuf> {
+        let file = folder.join(name);
+        workdir::write_file(&file, script.as_bytes())?;
+        Ok(file)
+    };
+    let numbered = |name: &str, scripts: &[String]| -> Result<Vec<PathBuf>> {
+        scripts.iter().enumerate().map(|(n, script)| write(format!("{name}-{n}.sh"), script)).collect()
+    };
+    let arrays = numbered("array", &made.arrays)?;
+    let last = write("last.sh".to_owned(), &made.last)?;
+    let trainings = numbered("train", &made.trainings)?;
     let mut ids = Vec::new();
     if !args.job.dry_run {
-        for file in &files {
+        for file in &arrays {
             ids.push(sbatch(&[], file)?);
         }
         // After a task that was cancelled or lost too: what it had is in the last job's hands then.
-        let after = format!("--dependency=afterany:{}", ids.join(":"));
-        ids.push(sbatch(&[&after], &last)?);
+        let after = |ids: &[String]| format!("--dependency=afterany:{}", ids.join(":"));
+        ids.push(sbatch(&[&after(&ids)], &last)?);
+        // Some videos may have failed: a dataset that is not there or not sound stops a training.
+        let datasets = after(&ids[arrays.len()..]);
+        for file in &trainings {
+            ids.push(sbatch(&[&datasets], file)?);
+        }
     }
-    files.push(last);
+    let files: Vec<PathBuf> = arrays.into_iter().chain([last]).chain(trainings).collect();
     let text = match args.job.dry_run {
-        true => made.arrays.iter().chain([&made.last]).cloned().collect::<Vec<_>>().join("\n"),
-        false => format!("sent {} workers and a last job: {}", request.n_tasks, ids.join(", ")),
+        true => made.arrays.iter().chain([&made.last]).chain(&made.trainings).cloned().collect::<Vec<_>>().join("\n"),
+        false => {
+            let trainings = if args.train { ", a training of each speaker" } else { "" };
+            format!("sent {} workers, a last job{trainings}: {}", request.n_tasks, ids.join(", "))
+        }
     };
     let next = args.job.next();
     ui.summary(&text, Some(&next), json!({ "scripts": files, "jobs": ids, "next": next }));

@@ -16,7 +16,7 @@ fn jobs_are_written_for_slurm_kubernetes_and_ssh() {
     let project = Project::with_clips("jobs", 2, 1.0);
     assert_eq!(project.answer(&["plan", "--untimed"]).code, 0);
     let job = ["--plan", "work/plan.json", "--tasks", "2", "--hours", "1.5", "--dry-run"];
-    let slurm = project.answer(&[&["submit", "slurm"], &job[..]].concat());
+    let slurm = project.answer(&[&["submit", "slurm", "--train", "--train-hours", "2"], &job[..]].concat());
     assert_eq!(slurm.code, 0, "{}", slurm.errors);
     let scripts: Vec<&str> =
         slurm.json["scripts"].as_array().unwrap().iter().filter_map(|file| file.as_str()).collect();
@@ -24,6 +24,8 @@ fn jobs_are_written_for_slurm_kubernetes_and_ssh() {
     assert!(array.contains("#SBATCH --array=0-1%2\n") && array.contains("#SBATCH --time=1:30:00\n"), "{array}");
     let last = std::fs::read_to_string(scripts[1]).unwrap();
     assert!(last.contains("dataset verify") && !last.contains("--array"), "{last}");
+    let training = std::fs::read_to_string(scripts[2]).unwrap();
+    assert!(training.contains(" train gan -c ") && training.contains("#SBATCH --time=2:00:00\n"), "{training}");
 
     let volume = ["--image", "registry/orator:1", "--claim", "project", "--claim-size", "100", "--mount", "/project"];
     let kubernetes = project.answer(&[&["submit", "kubernetes"], &job[..], &volume].concat());
