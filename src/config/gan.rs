@@ -32,8 +32,8 @@ pub struct GanConfig {
     /// Weights of the losses.
     pub lambda_l1: f64,
     pub lambda_velocity: f64,
-    /// Of the squared error of the joints' speeds: how much they move, wherever they go.
-    pub lambda_speed: f64,
+    /// Of the distance of the joints' mean squared speeds from the data's.
+    pub lambda_energy: Auto<f64>,
     pub lambda_gan: Auto<f64>,
     pub lambda_bone: f64,
     /// Step from which there is an adversarial loss, and steps in which its weight then rises from 0.
@@ -90,7 +90,7 @@ impl Default for GanConfig {
             fade_to: number,
             adversarial: AdversarialLoss::LeastSquares,
             lambda_l1: 1.0,
-            lambda_speed: 0.0,
+            lambda_energy: number,
             lambda_velocity: 0.0,
             lambda_gan: number,
             lambda_bone: 0.1,

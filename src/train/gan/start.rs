@@ -1,14 +1,20 @@
 //! A training that begins with another speaker's model: the network's weights are taken over, normalisation and skeleton
 //! are the new speaker's.
 
+use super::joined_windows::JoinedWindows;
 use super::recipe::settings::GanSettings;
 use super::step::GanTrainer;
 use crate::dataset::Dataset;
 use crate::formats::checkpoint;
 use crate::formats::checkpoint::Contents;
-use crate::generate::model::{self, BEST, SpeakerMetadata, TrainedVideo};
+use crate::generate::model::{self, BEST, GENERATOR, SpeakerMetadata, TrainedVideo};
+use crate::nn::gan::generator::SPEAKER_EMBEDDING;
 use anyhow::{Context, Result, bail, ensure};
+use candle_core::Tensor;
 use std::path::{Path, PathBuf};
+
+/// Windows by which the vector of a new speaker is chosen, at most.
+const NEAREST_WINDOWS: usize = 128;
 
 /// Model that a training begins with.
 pub struct StartingModel {
@@ -34,11 +40,17 @@ impl StartingModel {
         format!("what {} learnt of {}", self.path.display(), names.join(", "))
     }
 
-    /// A trainer of these speakers, with the weights of this model and its videos in their lists.
+    /// A trainer of these speakers, with the weights of this model and its videos in their lists. One speaker who begins with a
+    /// model of several gets the vector of the one by whose its first error on `windows` is least, or the mean of all.
     ///
     /// # Errors
     /// Networks of another shape.
-    pub fn begin(&self, mut speakers: Vec<SpeakerMetadata>, settings: GanSettings) -> Result<GanTrainer> {
+    pub fn begin(
+        &self,
+        mut speakers: Vec<SpeakerMetadata>,
+        settings: GanSettings,
+        windows: &JoinedWindows,
+    ) -> Result<GanTrainer> {
         let (Some(own), Some(other)) = (speakers.first(), self.speakers.first()) else { bail!("there is no speaker") };
         let (own, other) = (&own.network, &other.network);
         ensure!(
@@ -56,9 +68,36 @@ impl StartingModel {
         let earlier = self.speakers.iter().flat_map(|speaker| speaker.videos.iter().cloned());
         let earlier: Vec<TrainedVideo> = earlier.collect();
         speakers.iter_mut().for_each(|speaker| speaker.add_videos(earlier.clone()));
+        let vectors = self.contents.part(GENERATOR).remove(SPEAKER_EMBEDDING).filter(|_| speakers.len() == 1);
+        if vectors.is_some() {
+            speakers[0].network.n_speakers = 1;
+        }
         let trainer = GanTrainer::new(speakers, settings)?;
-        trainer.begin_with(&self.contents).with_context(|| format!("cannot begin with {}", self.path.display()))?;
+        let begin = || match &vectors {
+            None => trainer.begin_with(&self.contents, None),
+            Some(vectors) => self.begin_as_the_nearest(&trainer, vectors, windows),
+        };
+        begin().with_context(|| format!("cannot begin with {}", self.path.display()))?;
         Ok(trainer)
+    }
+
+    /// Takes over the weights with the vector [1, width] of least error, of the rows of `vectors` and their mean.
+    fn begin_as_the_nearest(&self, trainer: &GanTrainer, vectors: &Tensor, windows: &JoinedWindows) -> Result<()> {
+        let rows = (0..vectors.dim(0)?).map(|row| vectors.narrow(0, row, 1));
+        let candidates =
+            rows.chain(std::iter::once(vectors.mean_keepdim(0))).collect::<candle_core::Result<Vec<_>>>()?;
+        let n = windows.len();
+        let which: Vec<usize> = (0..n.min(NEAREST_WINDOWS)).map(|i| i * n / n.min(NEAREST_WINDOWS)).collect();
+        let batch = windows.batch_changed(&which, &[])?;
+        let mut least = None;
+        for candidate in candidates {
+            trainer.begin_with(&self.contents, Some(&candidate))?;
+            let error = trainer.error(&batch)?;
+            if least.as_ref().is_none_or(|(least, _)| error < *least) {
+                least = Some((error, candidate));
+            }
+        }
+        trainer.begin_with(&self.contents, least.as_ref().map(|(_, vector)| vector))
     }
 }
 

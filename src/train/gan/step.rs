@@ -48,7 +48,7 @@ pub struct Losses {
     pub l1: f64,
     /// Not measured where it has no weight.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub speed: Option<f64>,
+    pub energy: Option<f64>,
     pub velocity: f64,
     pub bone: f64,
     pub adversarial: f64,
@@ -141,7 +141,7 @@ impl GanTrainer {
     /// `step`, with a call at the end of each phase, by its name: for measuring where the time goes.
     pub fn step_in_phases(&mut self, batch: &WindowBatch, phase: &mut dyn FnMut(&'static str)) -> Result<Losses> {
         let batch = batch.on(self.device())?;
-        let GanSettings { lambda_l1, lambda_speed, lambda_velocity, lambda_bone, .. } = self.settings;
+        let GanSettings { lambda_l1, lambda_energy, lambda_velocity, lambda_bone, .. } = self.settings;
         let (lambda_gan, learning_rate) = (self.settings.adversarial_weight(self.step), self.settings.rate(self.step));
         let raw = self.predict(&batch)?;
         let generated = self.speakers.poses(&raw, &batch.speakers)?;
@@ -169,9 +169,9 @@ impl GanTrainer {
             total = (&total + (&loss * weight)?)?;
             number(&loss)
         };
-        let mut speed = None;
-        if lambda_speed > 0.0 {
-            speed = Some(add(losses::speed(&generated, &batch.poses, &batch.mask)?, lambda_speed)?);
+        let mut energy = None;
+        if lambda_energy > 0.0 {
+            energy = Some(add(losses::energy(&generated, &batch.poses, &batch.mask)?, lambda_energy)?);
         }
         if lambda_velocity > 0.0 {
             velocity = add(losses::velocity(&generated, &batch.poses, &batch.mask)?, lambda_velocity)?;
@@ -195,7 +195,14 @@ impl GanTrainer {
         }
         self.step += 1;
         let l1 = number(&l1)?;
-        Ok(Losses { l1, speed, velocity, bone, adversarial, discriminator: of_discriminator, gradient_norm })
+        Ok(Losses { l1, energy, velocity, bone, adversarial, discriminator: of_discriminator, gradient_norm })
+    }
+
+    /// L1 error of the generator that generates on a batch of windows.
+    pub fn error(&self, batch: &WindowBatch) -> Result<f64> {
+        let batch = batch.on(self.device())?;
+        let raw = self.listener().forward(&batch.mels, &batch.speakers, self.settings.window_frames, false)?.detach();
+        number(&losses::l1(&self.speakers.poses(&raw, &batch.speakers)?, &batch.poses, &batch.mask)?)
     }
 
     /// Raw poses of a batch while training: channels of the encoded sound are dropped.
@@ -265,12 +272,12 @@ impl GanTrainer {
     }
 
     /// Takes over the weights of another speaker's generator, and of the discriminator where its checkpoint has one.
-    /// Vectors of speakers stay this training's own.
-    pub fn begin_with(&self, other: &Contents) -> Result<()> {
+    /// `vectors`: the embedding of this training's speakers, [speakers, width]; `None`: as it is.
+    pub fn begin_with(&self, other: &Contents, vectors: Option<&Tensor>) -> Result<()> {
         let mut generator = other.part(GENERATOR);
         generator.remove(SPEAKER_EMBEDDING);
         if let Some(own) = self.generator_params.tensors()?.remove(SPEAKER_EMBEDDING) {
-            generator.insert(SPEAKER_EMBEDDING.to_owned(), own);
+            generator.insert(SPEAKER_EMBEDDING.to_owned(), vectors.cloned().unwrap_or(own));
         }
         self.generator_params.load(&generator)?;
         if let Some((_, mean)) = &self.mean {

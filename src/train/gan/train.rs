@@ -117,20 +117,20 @@ pub fn train_watched(
     let places = places.join(", ");
     progress.say(&format!("{n_windows} windows of {places}; what is learnt goes to {}", folder.display()));
     let held_out = ValidationIntervals::load(&spoken, &settings, progress)?;
-    let mut trainer = match &resumed {
-        Some((stored, _)) => GanTrainer::new(stored.speakers(), settings)?,
-        None => {
-            let both = spoken.iter().zip(&loaders);
-            let speakers: Vec<SpeakerMetadata> = both
-                .map(|((dataset, normal), loader)| begin::metadata(dataset, normal, loader, &settings, datasets.len()))
-                .collect::<Result<_>>()?;
-            match &start {
-                None => GanTrainer::new(speakers, settings)?,
-                Some(start) => start.begin(speakers, settings)?,
-            }
-        }
+    let metadata = |loaders: &[WindowLoader]| -> Result<Vec<SpeakerMetadata>> {
+        let both = spoken.iter().zip(loaders);
+        both.map(|((dataset, normal), loader)| begin::metadata(dataset, normal, loader, &settings, datasets.len()))
+            .collect()
+    };
+    let speakers = match &resumed {
+        Some((stored, _)) => stored.speakers(),
+        None => metadata(&loaders)?,
     };
     let loader = JoinedWindows::new(loaders);
+    let mut trainer = match &start {
+        None => GanTrainer::new(speakers, settings)?,
+        Some(start) => start.begin(speakers, settings, &loader)?,
+    };
     if let Some((stored, contents)) = &resumed {
         trainer.load(stored, contents)?;
         // One too many is left by a kill before the oldest was removed.

@@ -8,12 +8,20 @@ use crate::fixtures::write_dataset::write_dataset;
 use ndarray::Array3;
 use orator::config::GanConfig;
 use orator::dataset::{Dataset, Split};
+use orator::formats::checkpoint::Contents;
 use orator::formats::{checkpoint, wav};
 use orator::generate::GestureGenerator;
-use orator::generate::model::GenerationChoice;
+use orator::generate::model::{BEST, GENERATOR, GenerationChoice};
+use orator::nn::gan::generator::SPEAKER_EMBEDDING;
 use orator::stage::progress::Silent;
 use orator::train::epochs::ValidatedStep;
+use orator::train::gan::begin;
+use orator::train::gan::joined_windows::JoinedWindows;
+use orator::train::gan::recipe::material::TrainingMaterial;
+use orator::train::gan::recipe::settings::GanSettings;
+use orator::train::gan::start::StartingModel;
 use orator::train::gan::train::{train, train_watched};
+use orator::train::gan::windows::WindowLoader;
 use orator::types::skeleton::{L_WRIST, parent};
 use orator::types::sound::Sound;
 use std::path::Path;
@@ -105,7 +113,7 @@ fn each_speaks_with_a_body_of_its_own() {
     let of_carl = dir.join("carl-gan");
     train_watched(&[&carl], &settings(), Some(&both), &of_carl, &Silent, ignore).unwrap();
     let model = GestureGenerator::open(&of_carl).unwrap().metadata;
-    assert_eq!((model.name.as_str(), model.network.n_speakers), ("carl", 0));
+    assert_eq!((model.name.as_str(), model.network.n_speakers), ("carl", 1));
     let learnt: Vec<&str> = model.videos.iter().map(|video| video.speaker.as_str()).collect();
     assert!(["anna", "ben", "carl"].iter().all(|name| learnt.contains(name)), "{learnt:?}");
     // And the other way round.
@@ -114,6 +122,31 @@ fn each_speaks_with_a_body_of_its_own() {
 
     let error = train_watched(&[&anna, &anna], &settings(), None, &dir.join("twice"), &Silent, ignore).unwrap_err();
     assert!(format!("{error:#}").contains("both of anna"), "{error:#}");
+}
+
+/// A new speaker who moves like one of those a model knows begins with the vector of that one.
+#[test]
+fn a_new_speaker_begins_as_the_nearest() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let known = [speaker(dir, "anna", 0.0, 1.0), speaker(dir, "ben", 1.5, 1.2)];
+    let settings = GanConfig { steps: 40.into(), epoch_steps: 20.into(), dropout: 0.0.into(), ..settings() };
+    let both = dir.join("both");
+    train_watched(&known.each_ref(), &settings, None, &both, &Silent, &mut |_| ()).unwrap();
+    let vectors = |file: &Path| Contents::read(file).unwrap().part(GENERATOR).remove(SPEAKER_EMBEDDING).unwrap();
+    let table = vectors(&both.join(BEST)).to_vec2::<f32>().unwrap();
+    let start = StartingModel::read(&both).unwrap();
+    for (number, known) in known.iter().enumerate() {
+        let normal = begin::normalisation(known).unwrap();
+        let loader = WindowLoader::load(known, Split::Train, &normal, 32, 5).unwrap();
+        let of = GanSettings::new(&settings, &TrainingMaterial::measure(&[known], 32), true);
+        let metadata = begin::metadata(known, &normal, &loader, &of, 1).unwrap();
+        let trainer = start.begin(vec![metadata], of, &JoinedWindows::new(vec![loader])).unwrap();
+        let out = dir.join(format!("new-{number}"));
+        std::fs::create_dir(&out).unwrap();
+        trainer.save(&out).unwrap();
+        assert_eq!(vectors(&checkpoint::path(&out, 0)).to_vec2::<f32>().unwrap(), [table[number].clone()]);
+    }
 }
 
 #[test]

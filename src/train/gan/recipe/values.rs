@@ -12,6 +12,7 @@ pub struct RecipeValues {
     pub learning_rate: f64,
     pub warmup_steps: f64,
     pub fade_to: f64,
+    pub lambda_energy: f64,
     pub lambda_gan: f64,
     /// Step of the first adversarial loss and length of its ramp, as shares of the steps.
     pub adversarial_from: f64,
@@ -37,6 +38,7 @@ pub const PAPER: RecipeValues = RecipeValues {
     learning_rate: 1e-4,
     warmup_steps: 0.0,
     fade_to: 1.0,
+    lambda_energy: 0.0,
     lambda_gan: 1.0,
     adversarial_from: 0.0,
     adversarial_ramp: 0.0,
@@ -62,6 +64,7 @@ const TEN_MINUTES: RecipeValues = RecipeValues {
     learning_rate: 1e-3,
     warmup_steps: 50.0,
     fade_to: 0.02,
+    lambda_energy: 0.1,
     lambda_gan: 0.15,
     adversarial_from: 0.0,
     adversarial_ramp: 0.0,
@@ -144,6 +147,7 @@ fn auto(minutes: f64) -> RecipeValues {
         // Whole epochs.
         steps: (between(|row| row.steps) / high.1.epoch_steps as f64).round() * high.1.epoch_steps as f64,
         learning_rate: between(|row| row.learning_rate),
+        lambda_energy: between(|row| row.lambda_energy),
         lambda_gan: between(|row| row.lambda_gan),
         ema_decay: between(|row| row.ema_decay),
         dropout: between(|row| row.dropout),
