@@ -32,6 +32,8 @@ pub struct GanConfig {
     /// Weights of the losses.
     pub lambda_l1: f64,
     pub lambda_velocity: f64,
+    /// Of the squared error of the joints' speeds: when they move, wherever they go.
+    pub lambda_speed: Auto<f64>,
     /// Of the distance of the joints' mean squared speeds from the data's.
     pub lambda_energy: Auto<f64>,
     pub lambda_gan: Auto<f64>,
@@ -90,6 +92,7 @@ impl Default for GanConfig {
             fade_to: number,
             adversarial: AdversarialLoss::LeastSquares,
             lambda_l1: 1.0,
+            lambda_speed: number,
             lambda_energy: number,
             lambda_velocity: 0.0,
             lambda_gan: number,

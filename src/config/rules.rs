@@ -54,6 +54,7 @@ pub fn check(settings: &Settings, locations: &BTreeMap<String, SourceLocation>) 
     rules.count("gan.steps", s.gan.steps, 1.0, 1e9, "steps");
     rules.number("gan.learning_rate", s.gan.learning_rate, 1e-9, 1.0, "");
     rules.within("gan.lambda_l1", s.gan.lambda_l1, 0.0, 1e4, "");
+    rules.number("gan.lambda_speed", s.gan.lambda_speed, 0.0, 1e4, "");
     rules.number("gan.lambda_energy", s.gan.lambda_energy, 0.0, 1e4, "");
     rules.within("gan.lambda_velocity", s.gan.lambda_velocity, 0.0, 1e4, "");
     rules.count("gan.epoch_steps", s.gan.epoch_steps, 1.0, 1e9, "steps");

@@ -18,10 +18,22 @@ pub fn velocity(made: &Tensor, real: &Tensor, mask: &Tensor) -> Result<Tensor> {
     l1(&motion(made)?, &motion(real)?, &both_seen(mask)?)
 }
 
+/// Mean squared difference of the joints' speeds, as a share of the mean squared real speed: how much a joint moves, wherever
+/// it goes. All three [B, C, T] with the three coordinates of each joint in the first 144 rows; a joint counts where all its
+/// coordinates do, in both frames.
+pub fn speed(made: &Tensor, real: &Tensor, mask: &Tensor) -> Result<Tensor> {
+    let mask = per_joint(&both_seen(mask)?)?.min(2)?;
+    // The root has no slope at 0; a thousandth of a deviation a frame is rest.
+    let speeds = |poses: &Tensor| (per_joint(&motion(poses)?)?.sqr()?.sum(2)? + 1e-6)?.sqrt();
+    let real = speeds(real)?;
+    let scale = (real.sqr()? * &mask)?.sum_all()?.maximum(1e-6)?;
+    ((speeds(made)? - real)?.sqr()? * mask)?.sum_all()? / scale
+}
+
 /// How far the mean squared speed of each joint is from the real one's, |ln(generated / real)|, mean over the joints: absolute
 /// errors alone give motion that is too slow, since it is not known when exactly a hand will move. The mean is
 /// over all windows and frames in which a joint is seen, as a statistic that generator and data share (feature matching,
-/// Salimans et al. 2016). All three [B, C, T] with the three coordinates of each joint in the first 144 rows.
+/// Salimans et al. 2016). Tensors as in [`speed`].
 pub fn energy(made: &Tensor, real: &Tensor, mask: &Tensor) -> Result<Tensor> {
     let mask = per_joint(&both_seen(mask)?)?.min(2)?;
     // A thousandth of a deviation a frame is rest.
@@ -153,6 +165,7 @@ mod tests {
         let shape = [2, N_FEATURES + 2, 4];
         let (poses, real) = (pattern(&shape, 1.0)?, pattern(&shape, 5.0)?);
         let mask = pattern(&shape, 9.0)?.gt(-0.8)?.to_dtype(DType::F64)?;
+        assert!(worst(std::slice::from_ref(&poses), |v| speed(&v[0], &real, &mask))? < 1e-6);
         assert!(worst(&[poses], |v| energy(&v[0], &real, &mask))? < 1e-6);
         let bones = BoneConstancy::new(&normal(), DType::F64, &Device::Cpu)?;
         assert!(worst(&[pattern(&[2, N_FEATURES, 3], 0.0)?], |v| bones.loss(&v[0]))? < 1e-6);
@@ -182,6 +195,24 @@ mod tests {
         // Speeds 1, -2 against 0, 3, of which the second is not seen.
         let loss = velocity(&row([1.0, 2.0, 0.0])?, &row([1.0, 1.0, 4.0])?, &row([1.0, 1.0, 0.0])?);
         assert_eq!(number(loss)?, 1.0);
+        Ok(())
+    }
+
+    #[test]
+    fn speeds_count_and_not_where_they_lead() -> Result<()> {
+        // One joint moves by (3, 4, 0), another by (0, 0, 2), a third is not seen.
+        let moved = |by: &[(usize, f64)]| -> Result<Tensor> {
+            let mut numbers = vec![0.0; 2 * (N_FEATURES + 1)];
+            by.iter().for_each(|(number, value)| numbers[2 * number + 1] = *value);
+            Tensor::from_vec(numbers, (1, N_FEATURES + 1, 2), &Device::Cpu)
+        };
+        let made = moved(&[(0, 3.0), (1, 4.0), (6, 9.0), (N_FEATURES, 9.0)])?;
+        let seen = (moved(&[(7, -1.0)])? + 1.0)?;
+        let of = |real: &[(usize, f64)]| -> Result<f64> { speed(&made, &moved(real)?, &seen)?.to_scalar() };
+        let close = |loss: f64, expected: f64| assert!((loss - expected).abs() < 5e-3, "{loss}, expected {expected}");
+        close(of(&[(5, 2.0)])?, (25.0 + 4.0) / 4.0);
+        close(of(&[(2, 5.0), (5, 2.0)])?, 4.0 / 29.0);
+        close(of(&[(2, -5.0)])?, 0.0);
         Ok(())
     }
 

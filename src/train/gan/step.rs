@@ -48,6 +48,8 @@ pub struct Losses {
     pub l1: f64,
     /// Not measured where it has no weight.
     #[serde(skip_serializing_if = "Option::is_none")]
+    pub speed: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub energy: Option<f64>,
     pub velocity: f64,
     pub bone: f64,
@@ -141,7 +143,7 @@ impl GanTrainer {
     /// `step`, with a call at the end of each phase, by its name: for measuring where the time goes.
     pub fn step_in_phases(&mut self, batch: &WindowBatch, phase: &mut dyn FnMut(&'static str)) -> Result<Losses> {
         let batch = batch.on(self.device())?;
-        let GanSettings { lambda_l1, lambda_energy, lambda_velocity, lambda_bone, .. } = self.settings;
+        let GanSettings { lambda_l1, lambda_speed, lambda_energy, lambda_velocity, lambda_bone, .. } = self.settings;
         let (lambda_gan, learning_rate) = (self.settings.adversarial_weight(self.step), self.settings.rate(self.step));
         let raw = self.predict(&batch)?;
         let generated = self.speakers.poses(&raw, &batch.speakers)?;
@@ -169,7 +171,10 @@ impl GanTrainer {
             total = (&total + (&loss * weight)?)?;
             number(&loss)
         };
-        let mut energy = None;
+        let (mut speed, mut energy) = (None, None);
+        if lambda_speed > 0.0 {
+            speed = Some(add(losses::speed(&generated, &batch.poses, &batch.mask)?, lambda_speed)?);
+        }
         if lambda_energy > 0.0 {
             energy = Some(add(losses::energy(&generated, &batch.poses, &batch.mask)?, lambda_energy)?);
         }
@@ -195,7 +200,7 @@ impl GanTrainer {
         }
         self.step += 1;
         let l1 = number(&l1)?;
-        Ok(Losses { l1, energy, velocity, bone, adversarial, discriminator: of_discriminator, gradient_norm })
+        Ok(Losses { l1, speed, energy, velocity, bone, adversarial, discriminator: of_discriminator, gradient_norm })
     }
 
     /// L1 error of the generator that generates on a batch of windows.

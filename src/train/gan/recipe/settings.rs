@@ -28,6 +28,8 @@ pub struct GanSettings {
     pub adversarial: AdversarialLoss,
     pub lambda_l1: f64,
     #[serde(default)]
+    pub lambda_speed: f64,
+    #[serde(default)]
     pub lambda_energy: f64,
     pub lambda_velocity: f64,
     pub lambda_gan: f64,
@@ -100,6 +102,7 @@ impl GanSettings {
             fade_to: asked.fade_to.or(values.fade_to),
             adversarial: asked.adversarial,
             lambda_l1: asked.lambda_l1,
+            lambda_speed: asked.lambda_speed.or(values.lambda_speed),
             lambda_energy: asked.lambda_energy.or(values.lambda_energy),
             lambda_velocity: asked.lambda_velocity,
             lambda_gan: asked.lambda_gan.or(values.lambda_gan),

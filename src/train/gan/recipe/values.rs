@@ -12,6 +12,7 @@ pub struct RecipeValues {
     pub learning_rate: f64,
     pub warmup_steps: f64,
     pub fade_to: f64,
+    pub lambda_speed: f64,
     pub lambda_energy: f64,
     pub lambda_gan: f64,
     /// Step of the first adversarial loss and length of its ramp, as shares of the steps.
@@ -38,6 +39,7 @@ pub const PAPER: RecipeValues = RecipeValues {
     learning_rate: 1e-4,
     warmup_steps: 0.0,
     fade_to: 1.0,
+    lambda_speed: 0.0,
     lambda_energy: 0.0,
     lambda_gan: 1.0,
     adversarial_from: 0.0,
@@ -64,6 +66,7 @@ const TEN_MINUTES: RecipeValues = RecipeValues {
     learning_rate: 1e-3,
     warmup_steps: 50.0,
     fade_to: 0.02,
+    lambda_speed: 0.3,
     lambda_energy: 0.1,
     lambda_gan: 0.15,
     adversarial_from: 0.0,
@@ -109,6 +112,7 @@ pub const AUTO: [(f64, RecipeValues); 4] = [
         120.0,
         RecipeValues {
             steps: 4_500.0,
+            lambda_energy: 0.2,
             dropout: 0.1,
             weight_decay: 0.05,
             augment_pitch: 1.0,
@@ -147,6 +151,7 @@ fn auto(minutes: f64) -> RecipeValues {
         // Whole epochs.
         steps: (between(|row| row.steps) / high.1.epoch_steps as f64).round() * high.1.epoch_steps as f64,
         learning_rate: between(|row| row.learning_rate),
+        lambda_speed: between(|row| row.lambda_speed),
         lambda_energy: between(|row| row.lambda_energy),
         lambda_gan: between(|row| row.lambda_gan),
         ema_decay: between(|row| row.ema_decay),
