@@ -117,14 +117,12 @@ pub fn train_watched(
     let places = places.join(", ");
     progress.say(&format!("{n_windows} windows of {places}; what is learnt goes to {}", folder.display()));
     let held_out = ValidationIntervals::load(&spoken, &settings, progress)?;
-    let metadata = |loaders: &[WindowLoader]| -> Result<Vec<SpeakerMetadata>> {
-        let both = spoken.iter().zip(loaders);
-        both.map(|((dataset, normal), loader)| begin::metadata(dataset, normal, loader, &settings, datasets.len()))
-            .collect()
+    let metadata = |((dataset, normal), loader): (&(&Dataset, Normalisation), &WindowLoader)| {
+        begin::metadata(dataset, normal, loader, &settings, datasets.len())
     };
-    let speakers = match &resumed {
+    let speakers: Vec<SpeakerMetadata> = match &resumed {
         Some((stored, _)) => stored.speakers(),
-        None => metadata(&loaders)?,
+        None => spoken.iter().zip(&loaders).map(metadata).collect::<Result<_>>()?,
     };
     let loader = JoinedWindows::new(loaders);
     let mut trainer = match &start {

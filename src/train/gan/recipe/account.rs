@@ -21,7 +21,7 @@ pub fn lines(settings: &GanSettings, material: &TrainingMaterial, secs_a_step: O
         format!("recipe {name} for {train} of speech, {held_out} held out"),
         format!("  {steps}{}", ending(of)),
         format!("  learning rate {}{}{}", of.learning_rate, schedule(of), average(of)),
-        format!("  {}", adversary(of)),
+        format!("  {}{}", adversary(of), motion(of)),
         format!("  {}", regularisation(of)),
     ]
 }
@@ -60,6 +60,13 @@ fn adversary(of: &GanSettings) -> String {
         (from, ramp) => format!(" from step {from} on, whole at step {}: the network hears first", from + ramp),
     };
     format!("adversarial weight {}{from}", of.lambda_gan)
+}
+
+/// What holds the motion to the data's beside the position of each joint.
+fn motion(of: &GanSettings) -> String {
+    let weights = [("speed", of.lambda_speed), ("energy", of.lambda_energy)];
+    let used = weights.into_iter().filter(|(_, weight)| *weight > 0.0);
+    used.map(|(name, weight)| format!(", {name} {weight:.2}")).collect()
 }
 
 fn regularisation(of: &GanSettings) -> String {
