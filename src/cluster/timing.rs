@@ -73,7 +73,8 @@ pub fn made_with(pipeline: &Pipeline, program: &Path, jobs: usize) -> Result<Str
 }
 
 /// Seconds that `orator plan` said the videos of a run take at the stages they went through, and those they took; none where
-/// it timed another program, other settings or another machine, or no length of a video is known.
+/// it timed another program, other settings or another machine, or no length of a video is known. A unit that an earlier
+/// run had begun has no say.
 pub fn planned_and_taken(pipeline: &Pipeline, program: &Path, taken: &[StageTime]) -> Option<(f64, f64)> {
     let work = &pipeline.config().settings.work.dir;
     let known = StageTimes::read(work)?;
@@ -82,7 +83,7 @@ pub fn planned_and_taken(pipeline: &Pipeline, program: &Path, taken: &[StageTime
     }
     // A unit that was worked on in parts has several times.
     let mut of_videos: BTreeMap<(StageName, &Unit), f64> = BTreeMap::new();
-    for time in taken.iter().filter(|time| time.stage != StageName::Dataset) {
+    for time in taken.iter().filter(|time| time.stage != StageName::Dataset && !time.is_rest) {
         *of_videos.entry((time.stage, &time.unit)).or_default() += time.secs;
     }
     let pair = |((stage, unit), secs): ((StageName, &Unit), f64)| {

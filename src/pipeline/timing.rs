@@ -18,6 +18,8 @@ pub struct StageTime {
     pub stage: StageName,
     pub unit: Unit,
     pub secs: f64,
+    /// Whether parts of the unit had been done before, whose time is not in it.
+    pub is_rest: bool,
 }
 
 /// Takes the times of units.
@@ -30,7 +32,8 @@ impl StageClock {
         let begun = Instant::now();
         let report = work();
         if let Ok(stage) = stage.parse() {
-            let time = StageTime { stage, unit: unit.clone(), secs: begun.elapsed().as_secs_f64() };
+            let secs = begun.elapsed().as_secs_f64();
+            let time = StageTime { stage, unit: unit.clone(), secs, is_rest: false };
             self.0.lock().unwrap_or_else(PoisonError::into_inner).push(time);
         }
         report
