@@ -9,16 +9,15 @@ use super::timing::{StageClock, StageTime};
 use super::watched_stage::{UnitWork, WatchedStage};
 use crate::config::videos::Videos;
 use crate::external::onnx::ModelStore;
-use crate::stage::artifacts::{self, StageName, speaker_dir};
+use crate::stage::artifacts::{StageName, speaker_dir};
 use crate::stage::fingerprint::HashCache;
-use crate::stage::parts::folder_of_parts;
 use crate::stage::progress::{Event, Progress};
 use crate::stage::runner::StageOutcome;
 use crate::stage::{Stage, Unit, runner, workdir};
 use anyhow::{Context, Result, ensure};
 use serde::Serialize;
 use serde_json::{Map, Value};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -171,19 +170,14 @@ impl StageRun<'_> {
         let Some(&first) = names.first() else { return Ok(Vec::new()) };
         let config = self.pipeline.config();
         let units: Vec<Unit> = alive.iter().flat_map(|videos| stages::units(first, config, videos)).collect();
-        let clock = StageClock::default();
+        let work = &config.settings.work.dir;
+        let clock = StageClock::new(work, names, &units);
         let around = |stage: &'static str, unit: &Unit, work: UnitWork<'_>| clock.time(stage, unit, work);
         let timed = |name: &StageName| Ok(WatchedStage { stage: self.pipeline.stage(*name, ready)?, around: &around });
         let stages = names.iter().map(timed).collect::<Result<Vec<_>>>()?;
         let stages: Vec<&dyn Stage> = stages.iter().map(|stage| stage as &dyn Stage).collect();
-        let work = &config.settings.work.dir;
-        let all = names.iter().flat_map(|name| units.iter().map(move |unit| (*name, unit)));
-        let begun: BTreeSet<(StageName, &Unit)> =
-            all.filter(|(name, unit)| folder_of_parts(&artifacts::dir(work, *name, unit)).is_dir()).collect();
         let ended = runner::run_stages(&stages, &units, work, self.hashes, self.limits, self.progress);
-        let times = clock.take().into_iter();
-        let is_rest = |time: &StageTime| begun.contains(&(time.stage, &time.unit));
-        self.report.times.extend(times.map(|time| StageTime { is_rest: is_rest(&time), ..time }));
+        self.report.times.extend(clock.take());
         self.hashes.save()?;
         for name in names {
             self.report.stages.entry(*name).or_default();
