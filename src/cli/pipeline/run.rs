@@ -8,7 +8,7 @@ use crate::cli::signals;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use orator::cluster::timing;
+use orator::cluster::estimate::timing;
 use orator::config::Settings;
 use orator::external::onnx::{ModelError, ModelStore};
 use orator::pipeline::pose2d::models::wanted;

@@ -2,9 +2,9 @@
 //! side by side.
 
 use super::menu;
-use super::plan::{PlannedUnit, settings_hash};
 use super::process_memory::MemoryWatch;
 use super::stage_times::{Alternative, StageCost, StageTimes};
+use crate::cluster::plan::{PlannedUnit, settings_hash};
 use crate::config::Config;
 use crate::formats::media_json::MediaInfo;
 use crate::pipeline::process::message::{ExcerptRequest, MediaRequest};

@@ -1,5 +1,6 @@
 //! How long the stages take on a machine, from times of excerpts, and what that means for whole videos.
 
+use super::wall::{self, VideoWork};
 use crate::pipeline::extract::spans;
 use crate::stage::artifacts::StageName;
 use crate::stage::workdir;
@@ -113,30 +114,32 @@ impl StageTimes {
         lengths.iter().map(|length| self.cost(stage).secs(*length)).sum()
     }
 
-    /// Seconds until `workers` have worked on videos of these lengths, whoever is free taking the longest piece that is
-    /// left.
+    /// Seconds until `workers` have worked on videos of these lengths.
     pub fn wall_secs(&self, lengths: &[f64], workers: usize) -> f64 {
-        let mut pieces: Vec<f64> = lengths.iter().flat_map(|length| self.pieces(*length)).collect();
-        pieces.sort_by(|a, b| b.total_cmp(a));
-        let mut free_at = vec![0.0f64; workers.clamp(1, pieces.len().max(1))];
-        for secs in pieces {
-            if let Some(first) = free_at.iter_mut().min_by(|a, b| a.total_cmp(b)) {
-                *first += secs;
-            }
-        }
-        free_at.into_iter().fold(0.0, f64::max)
+        wall::wall_secs(&self.video_work(lengths), workers)
     }
 
-    /// Seconds of work on the pieces of a video that workers share: the spans at the stage that has parts, and all else.
-    fn pieces(&self, length_secs: f64) -> Vec<f64> {
+    /// The work on videos of these lengths in the order of a run, the longest first.
+    fn video_work(&self, lengths: &[f64]) -> Vec<VideoWork> {
+        let mut lengths = lengths.to_vec();
+        lengths.sort_by(|a, b| b.total_cmp(a));
+        lengths.into_iter().map(|length| self.work(length)).collect()
+    }
+
+    /// The work on a video, with the spans of the stage that has parts.
+    fn work(&self, length_secs: f64) -> VideoWork {
+        let secs = |stages: &[StageName]| stages.iter().map(|stage| self.cost(*stage).secs(length_secs)).sum();
         let n_spans = spans::count(length_secs);
-        if n_spans < 2 {
-            return vec![self.video_secs(length_secs)];
+        let stages = StageName::OF_VIDEOS;
+        match stages.iter().position(|stage| *stage == StageName::Pose2d).filter(|_| n_spans > 1) {
+            None => VideoWork { before: secs(&stages), span: 0.0, n_spans: 0, after: 0.0 },
+            Some(parted) => VideoWork {
+                before: secs(&stages[..parted]),
+                span: self.cost(StageName::Pose2d).secs(length_secs / n_spans as f64),
+                n_spans,
+                after: secs(&stages[parted + 1..]),
+            },
         }
-        let parted = self.cost(StageName::Pose2d);
-        let rest = self.video_secs(length_secs) - parted.secs(length_secs);
-        let span = parted.secs(length_secs / n_spans as f64);
-        std::iter::once(rest).chain(std::iter::repeat_n(span, n_spans)).collect()
     }
 
     /// Hours after which a worker of so many may be ended: twice what the work takes, since machines differ, and half an
@@ -145,11 +148,13 @@ impl StageTimes {
         0.5 + 2.0 * self.wall_secs(lengths, workers) / 3600.0
     }
 
-    /// The fewest workers that are done with videos of these lengths within so many seconds; none: the longest piece alone
-    /// takes longer.
+    /// The fewest workers that are done with videos of these lengths within so many seconds; none: the longest video with a
+    /// worker for each of its spans takes longer.
     pub fn workers_within(&self, lengths: &[f64], secs: f64) -> Option<usize> {
-        let n_pieces: usize = lengths.iter().map(|length| spans::count(*length) + 1).sum();
-        (1..=n_pieces).find(|workers| self.wall_secs(lengths, *workers) <= secs)
+        let videos = self.video_work(lengths);
+        let most: usize = videos.iter().map(|video| video.n_spans.max(1)).sum();
+        let least = (wall::wall_secs(&videos, 1) / secs).floor().max(1.0) as usize;
+        (least..=most).find(|workers| wall::wall_secs(&videos, *workers) <= secs)
     }
 }
 
