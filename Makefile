@@ -40,15 +40,15 @@ QUICK := house:: wording:: lift:: segment::segment cli::guide cli::completions a
 
 check:
 	cargo fmt --check
-	cargo clippy --locked --all-targets -- -D warnings
-	cargo test --locked --lib --bins
-	cargo test --locked --test it -- $(QUICK)
+	cargo clippy --release --locked --all-targets -- -D warnings
+	cargo test --release --locked --lib --bins
+	cargo test --release --locked --test it -- $(QUICK)
 
 test: build models readers aligner browser blender validator vrm driver
 	@rm -f $(SKIPPED)
 	cargo fmt --check
-	cargo clippy --locked --all-targets -- -D warnings
-	cargo test --locked
+	cargo clippy --release --locked --all-targets -- -D warnings
+	cargo test --release --locked
 	$(MAKE) demo DEMO=$(TARGET)/demo-test DRAW= STEPS=30 SPEECH=1
 	@if [ -s $(SKIPPED) ]; then echo 'skipped tests:'; sort -u $(SKIPPED); else echo 'no test was skipped'; fi
 	@echo 'make test: all passed'

@@ -5,7 +5,7 @@ use serde_json::json;
 
 #[test]
 fn a_plan_says_what_the_work_takes_and_a_run_what_it_took() {
-    let project = Project::with_clips("timed", 3, 12.0);
+    let project = Project::with_clips("timed", 3, 5.0);
     let untimed = project.answer(&["plan", "--untimed"]);
     assert_eq!((untimed.code, untimed.json.get("stages")), (0, None), "{}", untimed.errors);
     let plan = project.answer(&["plan", "--workers", "3", "--hours", "100"]);
