@@ -8,12 +8,12 @@ use serde_json::json;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// A project with one video of 190 s at 5 pictures a second: a clip of 10 s over and over.
+/// A project with one video of 190 s at 2 pictures a second: a clip of 10 s over and over.
 fn project(name: &str) -> Option<Project> {
     let project = Project::with_clips(name, 1, 10.0);
     let file = project.dir().join("pipeline.toml");
     let settings = std::fs::read_to_string(&file).unwrap();
-    std::fs::write(&file, format!("{settings}\n[extract]\nfps = 5\n")).unwrap();
+    std::fs::write(&file, format!("{settings}\n[extract]\nfps = 2\n")).unwrap();
     let clip = project.clips().remove(0);
     let list = project.dir().join("list.txt");
     std::fs::write(&list, format!("file '{}'\n", clip.display()).repeat(19)).unwrap();

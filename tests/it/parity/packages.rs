@@ -11,7 +11,7 @@ const MOST_APART: [f32; 2] = [0.05, 0.2];
 
 fn keypoints(project: &Project, set: [&str; 2]) -> Keypoints {
     let sets = [format!("pose2d.person={}", set[0]), format!("pose2d.body={}", set[1])];
-    let answer = project.run(&["--to", "pose2d", "--set", &sets[0], "--set", &sets[1]]);
+    let answer = project.run(&["--to", "pose2d", "--set", "extract.fps=10", "--set", &sets[0], "--set", &sets[1]]);
     assert_eq!(answer.code, 0, "{}", answer.errors);
     let found = files_under(&project.work().join("pose2d")).into_iter();
     let (_, path) = found.into_iter().find(|(name, _)| name.ends_with("keypoints.npz")).unwrap();

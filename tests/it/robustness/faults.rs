@@ -189,11 +189,6 @@ fn in_parallel<T: Send>(n: usize, work: impl Fn(usize, usize) -> T + Sync) -> Ve
 }
 
 #[test]
-fn a_failed_write_is_told_and_the_next_try_ends_in_the_same_bytes() {
-    sweep(&[Fault::InputOutput, Fault::NoSpace], 32);
-}
-
-#[test]
-fn killed_at_any_write_the_next_try_ends_in_the_same_bytes() {
-    sweep(&[Fault::Kill], 24);
+fn a_write_that_fails_or_is_the_last_is_told_and_the_next_try_ends_in_the_same_bytes() {
+    sweep(&[Fault::InputOutput, Fault::NoSpace, Fault::Kill], 54);
 }
