@@ -27,6 +27,8 @@ const DEFAULT_FINGERS: [[f64; 4]; 5] = [
 ];
 /// Default direction of a finger's base: degrees from the hand's axis towards the thumb's side.
 const SPREAD_DEGREES: [f64; 5] = [50.0, 16.0, 5.0, -6.0, -17.0];
+/// Least cosine between a metacarpal and the hand's axis: 60 degrees; those of the default palm are within 17.
+const LEAST_ALONG: f64 = 0.5;
 /// Direction of the left thumb at rest and of its flexion, close to the medians of speaking hands.
 const THUMB_ALONG: Vec3 = [0.74, -0.35, 0.57];
 const THUMB_BENDS: Vec3 = [0.0, -0.5, -0.87];
@@ -62,7 +64,8 @@ pub struct Rig {
 }
 
 impl Rig {
-    /// Rig for a motion: bone lengths and palms are medians over its frames.
+    /// Rig for a motion: bone lengths and palms are medians over its frames. A palm that is no hand's
+    /// is that of the other hand, else a flat one with metacarpals of the same lengths.
     pub fn from_motion(motion: &Motion) -> Self {
         let (positions, metres) = (JointPositions::from_motion(motion), bone_metres(motion));
         let [left, right] = [median_palm(&positions), median_palm(&positions.mirrored())];
@@ -149,7 +152,8 @@ pub fn finger_hinge(finger: usize) -> Hinge {
     Hinge::new(along, scale(cross(along, bends), 1.0 / norm(bends)))
 }
 
-/// Medians over the frames of the finger bases in the left hand's frame; `None` if never seen.
+/// Medians over the frames of the finger bases in the left hand's frame; `None` if never seen, or where they are no
+/// hand's.
 fn median_palm(positions: &JointPositions) -> Option<[Vec3; 5]> {
     let seen: Vec<_> = (0..positions.n_frames()).filter_map(|t| positions.palm(t)).collect();
     let middle = |finger: usize, axis: usize| upper_median(seen.iter().filter_map(|palm| Some(palm[finger]?[axis])));
@@ -161,7 +165,13 @@ fn median_palm(positions: &JointPositions) -> Option<[Vec3; 5]> {
     }
     // Result in the frame of its own knuckles, like every frame's palm.
     let out_of_palm = palm_frame(&palm)?.inverse();
-    Some(palm.map(|base| out_of_palm.turn(base)))
+    Some(palm.map(|base| out_of_palm.turn(base))).filter(is_palm)
+}
+
+/// Whether the four metacarpals beside the thumb point along the hand. Those of a network that has hardly learnt may
+/// point anywhere, and a body of them would come apart.
+fn is_palm(palm: &[Vec3; 5]) -> bool {
+    palm[1..].iter().all(|base| base[0] >= LEAST_ALONG * norm(*base))
 }
 
 /// Flat palm with metacarpals of these lengths.
@@ -192,5 +202,25 @@ fn default_metres(joint: usize) -> f64 {
         L_SHOULDER | L_ELBOW | L_WRIST => DEFAULT_ARM[left - L_SHOULDER],
         _ if left > L_HAND => DEFAULT_FINGERS[(left - L_HAND - 1) / 4][(left - L_HAND - 1) % 4],
         _ => 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_palm_points_along_the_hand() {
+        let metres: [f64; N_JOINTS] = std::array::from_fn(default_metres);
+        assert!(is_palm(&default_palm(&metres)));
+        // Medians of what a network gave after 30 steps: the little finger begins behind the wrist.
+        let star = [
+            [0.021, -0.029, 0.002],
+            [0.064, -0.019, 0.061],
+            [0.085, 0.002, -0.024],
+            [0.080, -0.002, 0.024],
+            [-0.040, -0.019, -0.063],
+        ];
+        assert!(!is_palm(&star));
     }
 }

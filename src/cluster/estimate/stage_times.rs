@@ -132,7 +132,7 @@ impl StageTimes {
         let n_spans = spans::count(length_secs);
         let stages = StageName::OF_VIDEOS;
         match stages.iter().position(|stage| *stage == StageName::Pose2d).filter(|_| n_spans > 1) {
-            None => VideoWork { before: secs(&stages), span: 0.0, n_spans: 0, after: 0.0 },
+            None => VideoWork { before: self.video_secs(length_secs), span: 0.0, n_spans: 0, after: 0.0 },
             Some(parted) => VideoWork {
                 before: secs(&stages[..parted]),
                 span: self.cost(StageName::Pose2d).secs(length_secs / n_spans as f64),

@@ -7,6 +7,7 @@ pub struct VideoWork {
     pub before: f64,
     /// On each span.
     pub span: f64,
+    /// How many of them; 0: workers share nothing of it.
     pub n_spans: usize,
     /// After the last span.
     pub after: f64,
