@@ -24,6 +24,9 @@ pub struct GanConfig {
     pub steps: Auto<usize>,
     /// Highest learning rate.
     pub learning_rate: Auto<f64>,
+    /// Of a new speaker in a model of several: share of the learning rate at which the weights move that all speakers have in
+    /// common; 0: only its own layer is learnt.
+    pub shared_rate: Auto<f64>,
     /// Steps in which the learning rate rises from 0.
     pub warmup_steps: Auto<usize>,
     /// Share of the learning rate that is left at the last step, along half a cosine; 1: it stays.
@@ -88,6 +91,7 @@ impl Default for GanConfig {
             batch: count,
             steps: count,
             learning_rate: number,
+            shared_rate: number,
             warmup_steps: count,
             fade_to: number,
             adversarial: AdversarialLoss::LeastSquares,

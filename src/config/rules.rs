@@ -60,6 +60,7 @@ pub fn check(settings: &Settings, locations: &BTreeMap<String, SourceLocation>) 
     rules.count("gan.epoch_steps", s.gan.epoch_steps, 1.0, 1e9, "steps");
     rules.number("gan.lambda_gan", s.gan.lambda_gan, 0.0, 1e4, "");
     rules.within("gan.lambda_bone", s.gan.lambda_bone, 0.0, 1e4, "");
+    rules.number("gan.shared_rate", s.gan.shared_rate, 0.0, 1.0, "");
     rules.count("gan.warmup_steps", s.gan.warmup_steps, 0.0, 1e9, "steps");
     rules.number("gan.fade_to", s.gan.fade_to, 0.0, 1.0, "");
     rules.count("gan.adversarial_from", s.gan.adversarial_from, 0.0, 1e9, "steps");

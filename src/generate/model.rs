@@ -7,7 +7,8 @@ use super::variant;
 use crate::audio::mel;
 use crate::formats::checkpoint::Contents;
 use crate::motion::bones;
-use crate::nn::gan::generator::{Config, Generator, SPEAKER_EMBEDDING};
+use crate::nn::gan::generator::{Config, Generator};
+use crate::nn::gan::speaker_layer::SPEAKER;
 use crate::nn::params::Params;
 use crate::types::pose3d::Motion;
 use crate::types::sound::SAMPLE_RATE;
@@ -166,9 +167,10 @@ fn choose(contents: &mut Contents, name: Option<&str>) -> Result<()> {
         let mut chosen = all[number].clone();
         chosen.network.n_speakers = 1;
         contents.facts["speaker"] = serde_json::to_value(chosen)?;
-        let key = format!("{GENERATOR}{SPEAKER_EMBEDDING}");
-        let table = contents.tensors.get_mut(&key).with_context(|| format!("tensor {key} is missing"))?;
-        *table = table.narrow(0, number, 1)?;
+        let prefix = format!("{GENERATOR}{SPEAKER}");
+        for (name, table) in contents.tensors.iter_mut().filter(|(name, _)| name.starts_with(&prefix)) {
+            *table = table.narrow(0, number, 1).with_context(|| format!("tensor {name}"))?;
+        }
     }
     Ok(())
 }

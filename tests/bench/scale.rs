@@ -38,13 +38,17 @@ const CLIP_SECS: f64 = 6.0;
 const VIDEOS_AN_HOUR: usize = 6;
 
 /// What is measured, in the order in which it can be.
-const VERBS: [(&str, &[&str]); 6] = [
+const VERBS: [(&str, &[&str]); 10] = [
     ("segment", &["run", "--only", "segment"]),
     ("lift", &["run", "--only", "lift"]),
     ("dataset", &["run", "--only", "dataset"]),
     ("segment again", &["run", "--only", "segment", "--force"]),
     ("run, all fresh", &["run"]),
     ("status", &["status", "--why"]),
+    ("verify", &["dataset", "verify", "work/dataset/host"]),
+    ("verify --deep", &["dataset", "verify", "--deep", "work/dataset/host"]),
+    ("report", &["report", "--pictures", "0"]),
+    ("forget", &["forget", "--video", "talk-00000.mp4"]),
 ];
 
 pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {

@@ -43,7 +43,8 @@ use std::time::Instant;
 /// folder.
 ///
 /// Head and trunk turn with face, shoulders and hips where keypoints are known: of a dataset and of a run by themselves,
-/// else with --keypoints; otherwise they rest. Bones have the lengths, palms the shape that are the motion's medians.
+/// else with --keypoints; otherwise they rest. Bones have the lengths, palms the shape that are the motion's medians; a
+/// palm that points anywhere but along its hand is replaced by the other hand's, else by a common one.
 ///
 /// What is smoothed away is noise: its amount is measured for every bone, and where there is none a motion changes by no
 /// more than a few millimetres. Limits of elbow, forearm, wrist and every finger joint are those of captured people; every

@@ -3,10 +3,11 @@
 //! into motion. Fully convolutional: any number of frames that is a multiple of [`FRAMES_MULTIPLE`].
 
 use super::conv_block::ConvBlock;
+use super::speaker_layer::SpeakerLayer;
 use crate::nn::ops::conv2d::Conv;
 use crate::nn::ops::resize;
-use crate::nn::params::{Init, Params};
-use candle_core::{IndexOp, Result, Tensor};
+use crate::nn::params::Params;
+use candle_core::{Result, Tensor};
 use serde::{Deserialize, Serialize};
 
 /// The UNet halves time five times.
@@ -14,10 +15,6 @@ pub const FRAMES_MULTIPLE: usize = 32;
 const N_ENTER: usize = 2;
 const N_LEVELS: usize = 5;
 const N_DECODER: usize = 4;
-/// Table [speakers, width] of a network of several speakers, and bound of its first values: as large as what is heard, so that
-/// the first layers tell the speakers apart from the first step on.
-pub const SPEAKER_EMBEDDING: &str = "speaker.embedding";
-const EMBEDDING_BOUND: f64 = 1.5;
 
 /// How the spectrogram is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -54,10 +51,12 @@ pub struct Config {
     /// Weight of a new batch in the running statistics of the batch norms (PyTorch's convention).
     #[serde(default = "before_it_was_stated")]
     pub norm_momentum: f64,
-    /// Speakers that a vector each tells apart, which is added to the encoded sound (speaker embedding); 0: the network
-    /// knows one speaker and has none.
+    /// Speakers that a layer each tells apart (`SpeakerLayer`); 0: the network knows one speaker and has none.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub n_speakers: usize,
+    /// Whether these layers multiply, or only add, as those of earlier versions do.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub speaker_weights: bool,
 }
 
 fn is_zero(n: &usize) -> bool {
@@ -73,7 +72,7 @@ impl Config {
     /// steps on a CPU never catches up with: `light` takes 0.1.
     pub fn from_preset(preset: Preset, n_out: usize) -> Self {
         let norm_momentum = if preset == Preset::Paper { 0.01 } else { 0.1 };
-        Self { preset, n_mels: 64, width: 256, n_out, norm_momentum, n_speakers: 0 }
+        Self { preset, n_mels: 64, width: 256, n_out, norm_momentum, n_speakers: 0, speaker_weights: false }
     }
 }
 
@@ -82,8 +81,7 @@ impl Config {
 pub struct Generator {
     preset: Preset,
     audio_encoder: Vec<ConvBlock>,
-    /// [speakers, width]
-    embedding: Option<Tensor>,
+    speakers: Option<SpeakerLayer>,
     enter: Vec<ConvBlock>,
     downs: Vec<ConvBlock>,
     ups: Vec<ConvBlock>,
@@ -100,11 +98,9 @@ impl Generator {
     pub fn new(params: &mut Params, config: &Config) -> Result<Self> {
         let (n, momentum) = (config.width, config.norm_momentum);
         let audio_encoder = audio_encoder(params, config)?;
-        let embedding = match config.n_speakers {
+        let speakers = match config.n_speakers {
             0 => None,
-            n_speakers => {
-                Some(params.trainable(SPEAKER_EMBEDDING, &[n_speakers, n], Init::Uniform(EMBEDDING_BOUND))?)
-            }
+            n_speakers => Some(SpeakerLayer::new(params, n_speakers, n, config.speaker_weights)?),
         };
         let mut row = |name: &str, n_blocks: usize, (kernel, stride): (usize, usize)| {
             let block = |i| ConvBlock::new(params, &format!("{name}.{i}"), &[n, n, kernel], stride, momentum);
@@ -113,7 +109,7 @@ impl Generator {
         Ok(Self {
             preset: config.preset,
             audio_encoder,
-            embedding,
+            speakers,
             enter: row("enter", N_ENTER, PLAIN)?,
             downs: row("down", N_LEVELS, DOWN)?,
             ups: row("up", N_LEVELS, PLAIN)?,
@@ -139,9 +135,9 @@ impl Generator {
             Preset::Light => through(&self.audio_encoder, mels, train)?,
             Preset::Paper => through(&self.audio_encoder, mels.unsqueeze(3)?, train)?.squeeze(2)?,
         };
-        match &self.embedding {
+        match &self.speakers {
             None => Ok(encoded),
-            Some(table) => encoded.broadcast_add(&of_speakers(table, speakers, encoded.dim(0)?)?),
+            Some(layer) => layer.forward(&encoded, speakers),
         }
     }
 
@@ -159,18 +155,6 @@ impl Generator {
         }
         resize::transposed(&self.last.forward(&through(&self.decoder, x, train)?)?)
     }
-}
-
-/// Vectors [`n_sounds` or 1, 1, width] of the speakers of so many sounds.
-fn of_speakers(table: &Tensor, speakers: &[u32], n_sounds: usize) -> Result<Tensor> {
-    let n_speakers = table.dim(0)?;
-    if n_speakers == 1 {
-        return table.i(0)?.reshape((1, 1, ()));
-    }
-    if speakers.len() != n_sounds || speakers.iter().any(|speaker| *speaker as usize >= n_speakers) {
-        candle_core::bail!("{n_sounds} sounds are of speakers {speakers:?}; the network knows {n_speakers}");
-    }
-    table.index_select(&Tensor::new(speakers, table.device())?, 0)?.unsqueeze(1)
 }
 
 /// One block after the other.
@@ -230,26 +214,6 @@ mod tests {
         }
         let mels = pattern(&[2, 64, 100], 0.0)?.to_dtype(DType::F32)?;
         assert!(net.forward(&mels, &[], 15, false).is_err());
-        Ok(())
-    }
-
-    #[test]
-    fn a_speakers_vector_is_added_to_what_is_heard() -> Result<()> {
-        let mut params = Params::with_dtype(0, DType::F64);
-        let config = Config { n_mels: 5, width: 8, n_speakers: 3, ..Config::from_preset(Preset::Light, 3) };
-        let net = Generator::new(&mut params, &config)?;
-        let mels = pattern(&[2, 5, 41], 0.0)?;
-        let added = |speakers: &[u32]| net.encode(&mels, speakers, false);
-        let difference = (added(&[2, 1])? - added(&[0, 1])?)?;
-        let table = &params.tensors()?[SPEAKER_EMBEDDING];
-        let expected =
-            (table.i(2)? - table.i(0)?)?.reshape((1, 1, 8))?.broadcast_as(difference.narrow(0, 0, 1)?.shape())?;
-        let worst_of = |a: &Tensor| a.abs()?.flatten_all()?.max(0)?.to_scalar::<f64>();
-        assert!(worst_of(&(difference.narrow(0, 0, 1)? - expected)?)? < 1e-12);
-        assert_eq!(worst_of(&difference.narrow(0, 1, 1)?)?, 0.0);
-        assert!(added(&[0]).is_err() && added(&[0, 3]).is_err() && added(&[]).is_err());
-        let error = worst(std::slice::from_ref(table), |v| of_speakers(&v[0], &[1, 2, 1], 3)?.sqr())?;
-        assert!(error < 1e-7, "{error}");
         Ok(())
     }
 

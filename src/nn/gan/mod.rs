@@ -1,7 +1,8 @@
-//! The networks of the speech-to-gesture GAN: audio encoder and motion UNet (`generator`), motion discriminator, and
+//! The networks of the speech-to-gesture GAN: audio encoder and motion UNet (`generator`), with what it has of each speaker (`speaker_layer`), motion discriminator, and
 //! the generator run in chunks (`streaming`).
 
 pub mod conv_block;
 pub mod discriminator;
 pub mod generator;
+pub mod speaker_layer;
 pub mod streaming;

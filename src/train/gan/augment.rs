@@ -167,10 +167,15 @@ mod tests {
     use super::*;
     use crate::config::GanConfig;
     use crate::train::gan::recipe::material::TrainingMaterial;
+    use crate::train::gan::recipe::start::TrainingStart;
     use crate::types::skeleton::{L_WRIST, R_WRIST};
 
     fn settings() -> GanSettings {
-        GanSettings::new(&GanConfig::default(), &TrainingMaterial { train_secs: 600.0, validation_secs: 0.0 }, false)
+        GanSettings::new(
+            &GanConfig::default(),
+            &TrainingMaterial { train_secs: 600.0, validation_secs: 0.0 },
+            TrainingStart::Nothing,
+        )
     }
 
     fn still() -> WindowChange {
@@ -203,7 +208,11 @@ mod tests {
             assert!(last - first <= of.augment_mask_bands && last <= mel::N_MELS);
         }
         let paper = GanConfig { recipe: crate::config::GanRecipe::Paper, ..GanConfig::default() };
-        let paper = GanSettings::new(&paper, &TrainingMaterial { train_secs: 600.0, validation_secs: 0.0 }, false);
+        let paper = GanSettings::new(
+            &paper,
+            &TrainingMaterial { train_secs: 600.0, validation_secs: 0.0 },
+            TrainingStart::Nothing,
+        );
         assert!(changes(&paper, 3, fps).is_empty());
     }
 

@@ -51,7 +51,8 @@ pub fn metadata(
         MotionRepresentation::Bones => Representation::bones(normal, loader.poses(PART_FRAMES))?,
     };
     let network = Config::from_preset(preset(settings.preset), normal.n_numbers());
-    let network = Config { n_speakers: if n_speakers > 1 { n_speakers } else { 0 }, ..network };
+    let several = n_speakers > 1;
+    let network = Config { n_speakers: if several { n_speakers } else { 0 }, speaker_weights: several, ..network };
     let (info, hash) = (dataset.info(), dataset.hash()?);
     let mut metadata = SpeakerMetadata::new(&info.speaker, info.fps, &hash, network, normal.clone(), representation);
     metadata.add_videos(start::videos(dataset));

@@ -3,17 +3,20 @@
 
 use super::joined_windows::JoinedWindows;
 use super::recipe::settings::GanSettings;
+use super::recipe::start::TrainingStart;
 use super::step::GanTrainer;
 use crate::dataset::Dataset;
 use crate::formats::checkpoint;
 use crate::formats::checkpoint::Contents;
 use crate::generate::model::{self, BEST, GENERATOR, SpeakerMetadata, TrainedVideo};
-use crate::nn::gan::generator::SPEAKER_EMBEDDING;
+use crate::nn::gan::generator::Config;
+use crate::nn::gan::speaker_layer::SPEAKER;
 use anyhow::{Context, Result, bail, ensure};
 use candle_core::Tensor;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Windows by which the vector of a new speaker is chosen, at most.
+/// Windows by which the layer of a new speaker is chosen, at most.
 const NEAREST_WINDOWS: usize = 128;
 
 /// Model that a training begins with.
@@ -36,12 +39,24 @@ impl StartingModel {
 
     /// The file and its speakers.
     pub fn account(&self) -> String {
+        format!("what {} learnt of {}", self.path.display(), self.names())
+    }
+
+    fn names(&self) -> String {
         let names: Vec<&str> = self.speakers.iter().map(|speaker| speaker.name.as_str()).collect();
-        format!("what {} learnt of {}", self.path.display(), names.join(", "))
+        names.join(", ")
+    }
+
+    /// What this model is for a training of so many speakers.
+    pub fn kind(&self, n_speakers: usize) -> TrainingStart {
+        match n_speakers == 1 && self.speakers.iter().any(|speaker| speaker.network.speaker_weights) {
+            true => TrainingStart::SeveralSpeakers,
+            false => TrainingStart::AnotherSpeaker,
+        }
     }
 
     /// A trainer of these speakers, with the weights of this model and its videos in their lists. One speaker who begins with a
-    /// model of several gets the vector of the one by whose its first error on `windows` is least, or the mean of all.
+    /// model of several gets the layer of the one by whose its first error on `windows` is least, or the mean of all.
     ///
     /// # Errors
     /// Networks of another shape.
@@ -68,36 +83,47 @@ impl StartingModel {
         let earlier = self.speakers.iter().flat_map(|speaker| speaker.videos.iter().cloned());
         let earlier: Vec<TrainedVideo> = earlier.collect();
         speakers.iter_mut().for_each(|speaker| speaker.add_videos(earlier.clone()));
-        let vectors = self.contents.part(GENERATOR).remove(SPEAKER_EMBEDDING).filter(|_| speakers.len() == 1);
-        if vectors.is_some() {
-            speakers[0].network.n_speakers = 1;
+        let mut layers = self.contents.part(GENERATOR);
+        layers.retain(|name, _| name.starts_with(SPEAKER));
+        let begins_with_several = speakers.len() == 1 && !layers.is_empty();
+        if begins_with_several {
+            let speaker_weights = self.speakers[0].network.speaker_weights;
+            speakers[0].network = Config { n_speakers: 1, speaker_weights, ..speakers[0].network.clone() };
         }
         let trainer = GanTrainer::new(speakers, settings)?;
-        let begin = || match &vectors {
-            None => trainer.begin_with(&self.contents, None),
-            Some(vectors) => self.begin_as_the_nearest(&trainer, vectors, windows),
+        let begin = || match begins_with_several {
+            false => trainer.begin_with(&self.contents, None),
+            true => self.begin_as_the_nearest(&trainer, &layers, windows),
         };
         begin().with_context(|| format!("cannot begin with {}", self.path.display()))?;
         Ok(trainer)
     }
 
-    /// Takes over the weights with the vector [1, width] of least error, of the rows of `vectors` and their mean.
-    fn begin_as_the_nearest(&self, trainer: &GanTrainer, vectors: &Tensor, windows: &JoinedWindows) -> Result<()> {
-        let rows = (0..vectors.dim(0)?).map(|row| vectors.narrow(0, row, 1));
-        let candidates =
-            rows.chain(std::iter::once(vectors.mean_keepdim(0))).collect::<candle_core::Result<Vec<_>>>()?;
+    /// Takes over the weights with the layer of least error, of those of all speakers (tensors with a row each) and their mean.
+    fn begin_as_the_nearest(
+        &self,
+        trainer: &GanTrainer,
+        layers: &BTreeMap<String, Tensor>,
+        windows: &JoinedWindows,
+    ) -> Result<()> {
+        let layer = |of: &dyn Fn(&Tensor) -> candle_core::Result<Tensor>| -> Result<BTreeMap<String, Tensor>> {
+            layers.iter().map(|(name, table)| Ok((name.clone(), of(table)?))).collect()
+        };
+        let rows = (0..self.speakers.len()).map(|row| layer(&|table| table.narrow(0, row, 1)));
+        let candidates = rows.chain(std::iter::once_with(|| layer(&|table| table.mean_keepdim(0))));
         let n = windows.len();
         let which: Vec<usize> = (0..n.min(NEAREST_WINDOWS)).map(|i| i * n / n.min(NEAREST_WINDOWS)).collect();
         let batch = windows.batch_changed(&which, &[])?;
         let mut least = None;
         for candidate in candidates {
+            let candidate = candidate?;
             trainer.begin_with(&self.contents, Some(&candidate))?;
             let error = trainer.error(&batch)?;
             if least.as_ref().is_none_or(|(least, _)| error < *least) {
                 least = Some((error, candidate));
             }
         }
-        trainer.begin_with(&self.contents, least.as_ref().map(|(_, vector)| vector))
+        trainer.begin_with(&self.contents, least.as_ref().map(|(_, layer)| layer))
     }
 }
 

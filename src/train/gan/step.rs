@@ -14,7 +14,8 @@ use crate::generate::model::BEST;
 use crate::generate::model::{GENERATOR, SpeakerMetadata};
 use crate::nn::device;
 use crate::nn::gan::discriminator::{Discriminator, motion};
-use crate::nn::gan::generator::{Generator, SPEAKER_EMBEDDING};
+use crate::nn::gan::generator::Generator;
+use crate::nn::gan::speaker_layer::SPEAKER;
 use crate::nn::ops::resize;
 use crate::nn::params::Params;
 use crate::train::optim::adam;
@@ -110,8 +111,9 @@ impl GanTrainer {
         let discriminator = Discriminator::new(&mut discriminator_params, speakers.n_numbers())?;
         let adam = adam::Config { max_norm: Some(MAX_NORM), ..adam::Config::default() };
         let decaying = adam::Config { weight_decay: settings.weight_decay, ..adam };
+        let share = |name: &str| if name.starts_with(SPEAKER) { 1.0 } else { settings.shared_rate };
         Ok(Self {
-            adam_g: Adam::new(&generator_params, decaying)?,
+            adam_g: Adam::with_rates(&generator_params, decaying, share)?,
             adam_d: Adam::new(&discriminator_params, adam)?,
             generator_params,
             generator,
@@ -277,13 +279,13 @@ impl GanTrainer {
     }
 
     /// Takes over the weights of another speaker's generator, and of the discriminator where its checkpoint has one.
-    /// `vectors`: the embedding of this training's speakers, [speakers, width]; `None`: as it is.
-    pub fn begin_with(&self, other: &Contents, vectors: Option<&Tensor>) -> Result<()> {
+    /// `layer`: the speaker's layer, tensors by name; `None`: as it is.
+    pub fn begin_with(&self, other: &Contents, layer: Option<&BTreeMap<String, Tensor>>) -> Result<()> {
+        let is_of_speakers = |name: &String| name.starts_with(SPEAKER);
         let mut generator = other.part(GENERATOR);
-        generator.remove(SPEAKER_EMBEDDING);
-        if let Some(own) = self.generator_params.tensors()?.remove(SPEAKER_EMBEDDING) {
-            generator.insert(SPEAKER_EMBEDDING.to_owned(), vectors.cloned().unwrap_or(own));
-        }
+        generator.retain(|name, _| !is_of_speakers(name));
+        generator.extend(self.generator_params.tensors()?.into_iter().filter(|(name, _)| is_of_speakers(name)));
+        generator.extend(layer.into_iter().flatten().map(|(name, tensor)| (name.clone(), tensor.clone())));
         self.generator_params.load(&generator)?;
         if let Some((_, mean)) = &self.mean {
             mean.load(&generator)?;

@@ -10,13 +10,13 @@ use super::joined_windows::JoinedWindows;
 use super::recipe::account;
 use super::recipe::material::TrainingMaterial;
 use super::recipe::settings::GanSettings;
+use super::recipe::start::TrainingStart;
 use super::score::Validation;
 use super::start::StartingModel;
 use super::step::{GanTrainer, Losses, TrainerState};
 use super::validate::ValidationIntervals;
 use super::windows::{WindowLoader, needed};
-use crate::config::ComputeDevice;
-use crate::config::GanConfig;
+use crate::config::{ComputeDevice, GanConfig};
 use crate::dataset::{Dataset, Split};
 use crate::formats::checkpoint;
 use crate::formats::checkpoint::Contents;
@@ -100,7 +100,8 @@ pub fn train_watched(
         }
         None => {
             let material = TrainingMaterial::measure(datasets, window_frames);
-            let settings = GanSettings::new(requested, &material, start.is_some());
+            let begins_with = start.as_ref().map_or(TrainingStart::Nothing, |start| start.kind(datasets.len()));
+            let settings = GanSettings::new(requested, &material, begins_with);
             let normal = |dataset: &&Dataset| begin::normalisation_with_channels(dataset, &requested.channels);
             (settings, datasets.iter().map(normal).collect::<Result<Vec<_>>>()?)
         }

@@ -46,6 +46,8 @@ pub struct Adam {
 struct AdamSlot {
     name: String,
     var: Var,
+    /// Of the learning rate.
+    share: f64,
     moments: MomentStorage,
 }
 
@@ -67,6 +69,11 @@ struct AdamMoments {
 impl Adam {
     /// Moments of zero for every trainable tensor (f32).
     pub fn new(params: &Params, config: Config) -> Result<Self> {
+        Self::with_rates(params, config, |_| 1.0)
+    }
+
+    /// As `new`, with a share of the learning rate for each tensor by its name; one of 0 stays as it is.
+    pub fn with_rates(params: &Params, config: Config, share: impl Fn(&str) -> f64) -> Result<Self> {
         let moments = |var: &Var| -> Result<MomentStorage> {
             if !var.device().is_cpu() {
                 return Ok(MomentStorage::Device(adam_fallback::DeviceMoments::zeros(var, config.amsgrad)?));
@@ -76,7 +83,7 @@ impl Adam {
             Ok(MomentStorage::Cpu(RefCell::new(AdamMoments { first: zeros.clone(), second: zeros, largest })))
         };
         let slot = |(name, var): (&str, &Var)| -> Result<AdamSlot> {
-            Ok(AdamSlot { name: name.to_owned(), var: var.clone(), moments: moments(var)? })
+            Ok(AdamSlot { name: name.to_owned(), var: var.clone(), share: share(name), moments: moments(var)? })
         };
         Ok(Self { config, step: 0, slots: params.trainables().map(slot).collect::<Result<_>>()? })
     }
@@ -109,14 +116,15 @@ impl Adam {
             beta2: beta2 as f32,
             eps: eps as f32,
             scale: scale as f32,
-            rate: (learning_rate / (1.0 - beta1.powi(age))) as f32,
+            rate: 0.0,
             correction: (1.0 / (1.0 - beta2.powi(age))).sqrt() as f32,
             keep: 1.0,
         };
-        let keep = (1.0 - learning_rate * weight_decay) as f32;
         for (slot, gradient) in self.slots.iter_mut().zip(&gradients) {
-            let Some(gradient) = gradient else { continue };
-            let scalars = AdamScalars { keep: if slot.var.rank() > 1 { keep } else { 1.0 }, ..scalars };
+            let Some(gradient) = gradient.as_ref().filter(|_| slot.share > 0.0) else { continue };
+            let keep = if slot.var.rank() > 1 { 1.0 - learning_rate * slot.share * weight_decay } else { 1.0 };
+            let rate = learning_rate * slot.share / (1.0 - beta1.powi(age));
+            let scalars = AdamScalars { rate: rate as f32, keep: keep as f32, ..scalars };
             match &mut slot.moments {
                 MomentStorage::Cpu(moments) => slot.var.inplace_op2(gradient, &AdamUpdate { moments, scalars })?,
                 MomentStorage::Device(moments) => moments.update(&slot.var, gradient, &scalars)?,
@@ -286,6 +294,26 @@ mod tests {
             let w = descend(config, &gradients, None)?;
             assert!((f64::from(w) - by_the_book(&gradients, 0.1, amsgrad)).abs() < 1e-5);
             assert_eq!(w.to_bits(), descend(config, &gradients, Some(3))?.to_bits());
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn a_tensor_has_its_share_of_the_rate() -> anyhow::Result<()> {
+        let mut params = Params::new(0);
+        let shares = [("all", 1.0), ("some", 0.25), ("none", 0.0)];
+        let tensors = shares.map(|(name, _)| params.trainable(name, &[2, 1], Init::Constant(1.0)));
+        let tensors = tensors.into_iter().collect::<Result<Vec<_>>>()?;
+        let share = |name: &str| shares.iter().find(|(of, _)| *of == name).map_or(f64::NAN, |(_, share)| *share);
+        let mut adam = Adam::with_rates(&params, Config::default(), share)?;
+        let gradients = [1.0, -3.0, 0.2, 0.1];
+        for gradient in gradients {
+            let sum = tensors.iter().try_fold(Tensor::new(0f32, &Device::Cpu)?, |sum, w| sum + w.sum_all()?)?;
+            adam.step(&(sum * gradient)?.backward()?, 0.1)?;
+        }
+        for (w, (name, share)) in tensors.iter().zip(shares) {
+            let w = f64::from(w.flatten_all()?.to_vec1::<f32>()?[1]);
+            assert!((w - by_the_book(&gradients, 0.1 * share, false)).abs() < 1e-5, "{name}: {w}");
         }
         Ok(())
     }

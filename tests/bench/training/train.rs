@@ -18,6 +18,7 @@ use orator::nn::gan::generator::Config;
 use orator::stage::progress::Progress;
 use orator::train::gan::recipe::material::TrainingMaterial;
 use orator::train::gan::recipe::settings::GanSettings;
+use orator::train::gan::recipe::start::TrainingStart;
 use orator::train::gan::step::{GanTrainer, Losses, MAX_NORM};
 use orator::train::gan::windows::WindowBatch;
 use orator::types::skeleton::{N_BONES, N_JOINTS, NECK, is_duplicate, parent};
@@ -66,7 +67,11 @@ impl Fixed {
     fn new(args: &Args) -> Result<Self> {
         let preset = serde_json::from_value(json!(args.preset))?;
         let asked = GanConfig { recipe: GanRecipe::Paper, preset, batch: args.batch.into(), ..GanConfig::default() };
-        let settings = GanSettings::new(&asked, &TrainingMaterial { train_secs: 0.0, validation_secs: 0.0 }, false);
+        let settings = GanSettings::new(
+            &asked,
+            &TrainingMaterial { train_secs: 0.0, validation_secs: 0.0 },
+            TrainingStart::Nothing,
+        );
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let table = |value: f32| ndarray::Array2::from_elem((N_JOINTS, 3), value);
         let length = |joint: usize| if is_duplicate(joint) { 0.0 } else { 0.1 };

@@ -5,6 +5,7 @@ use crate::fixtures::faults::stop::bytes;
 use crate::fixtures::gesture_dataset::{FPS, sample};
 use crate::fixtures::support::Answer;
 use crate::fixtures::write_dataset::write_dataset;
+use candle_core::Tensor;
 use ndarray::Array3;
 use orator::config::GanConfig;
 use orator::dataset::{Dataset, Split};
@@ -12,13 +13,14 @@ use orator::formats::checkpoint::Contents;
 use orator::formats::{checkpoint, wav};
 use orator::generate::GestureGenerator;
 use orator::generate::model::{BEST, GENERATOR, GenerationChoice};
-use orator::nn::gan::generator::SPEAKER_EMBEDDING;
+use orator::nn::gan::speaker_layer::{SPEAKER, SPEAKER_EMBEDDING, SPEAKER_WEIGHT};
 use orator::stage::progress::Silent;
 use orator::train::epochs::ValidatedStep;
 use orator::train::gan::begin;
 use orator::train::gan::joined_windows::JoinedWindows;
 use orator::train::gan::recipe::material::TrainingMaterial;
 use orator::train::gan::recipe::settings::GanSettings;
+use orator::train::gan::recipe::start::TrainingStart;
 use orator::train::gan::start::StartingModel;
 use orator::train::gan::train::{train, train_watched};
 use orator::train::gan::windows::WindowLoader;
@@ -117,6 +119,7 @@ fn each_speaks_with_a_body_of_its_own() {
     assert_eq!((model.name.as_str(), model.network.n_speakers), ("carl", 1));
     let learnt: Vec<&str> = model.videos.iter().map(|video| video.speaker.as_str()).collect();
     assert!(["anna", "ben", "carl"].iter().all(|name| learnt.contains(name)), "{learnt:?}");
+    learns_its_layer_alone(&both, &carl, &dir.join("layer"));
     // And the other way round.
     train_watched(&[&anna, &ben], &settings(), Some(&of_carl), &dir.join("all"), &Silent, ignore).unwrap();
     assert_eq!(as_speaker(&dir.join("all"), "ben").unwrap().metadata.network.n_speakers, 1);
@@ -125,11 +128,24 @@ fn each_speaks_with_a_body_of_its_own() {
     assert!(format!("{error:#}").contains("both of anna"), "{error:#}");
 }
 
-/// A new speaker begins with that vector of those a model knows, or their mean, by which the error is least.
+/// What all speakers share stays as it was where it has no rate.
+fn learns_its_layer_alone(both: &Path, new: &Dataset, out: &Path) {
+    let settings = GanConfig { shared_rate: 0.0.into(), ..settings() };
+    train_watched(&[new], &settings, Some(both), out, &Silent, &mut |_| ()).unwrap();
+    let begun = Contents::read(&both.join(BEST)).unwrap().part(GENERATOR);
+    let learnt = Contents::read(&checkpoint::path(out, 6)).unwrap().part("training.generator.");
+    let values = |tensor: &Tensor| tensor.flatten_all().unwrap().to_vec1::<f32>().unwrap();
+    for (name, tensor) in learnt.iter().filter(|(name, _)| name.contains(".conv.") || name.starts_with("last")) {
+        assert_eq!(values(tensor), values(&begun[name]), "{name}");
+    }
+    assert!(values(&learnt[SPEAKER_WEIGHT]) != values(&begun[SPEAKER_WEIGHT].narrow(0, 0, 1).unwrap()));
+}
+
+/// A new speaker begins with that layer of those a model knows, or their mean, by which the error is least.
 fn begins_as_the_nearest(both: &Path, new: &Dataset) {
     let normal = begin::normalisation(new).unwrap();
     let loader = WindowLoader::load(new, Split::Train, &normal, 32, 5).unwrap();
-    let of = GanSettings::new(&settings(), &TrainingMaterial::measure(&[new], 32), true);
+    let of = GanSettings::new(&settings(), &TrainingMaterial::measure(&[new], 32), TrainingStart::SeveralSpeakers);
     let metadata = begin::metadata(new, &normal, &loader, &of, 1).unwrap();
     let windows = JoinedWindows::new(vec![loader]);
     let trainer = StartingModel::read(both).unwrap().begin(vec![metadata], of, &windows).unwrap();
@@ -137,10 +153,14 @@ fn begins_as_the_nearest(both: &Path, new: &Dataset) {
     let begun = trainer.error(&batch).unwrap();
 
     let model = Contents::read(&both.join(BEST)).unwrap();
-    let vectors = model.part(GENERATOR).remove(SPEAKER_EMBEDDING).unwrap();
-    let candidates = [vectors.narrow(0, 0, 1), vectors.narrow(0, 1, 1), vectors.mean_keepdim(0)];
-    let errors = candidates.map(|vector| {
-        trainer.begin_with(&model, Some(&vector.unwrap())).unwrap();
+    let mut layers = model.part(GENERATOR);
+    layers.retain(|name, _| name.starts_with(SPEAKER));
+    assert_eq!(layers.keys().collect::<Vec<_>>(), [SPEAKER_EMBEDDING, SPEAKER_WEIGHT]);
+    let of: [fn(&Tensor) -> candle_core::Result<Tensor>; 3] =
+        [|table| table.narrow(0, 0, 1), |table| table.narrow(0, 1, 1), |table| table.mean_keepdim(0)];
+    let errors = of.map(|of| {
+        let layer = layers.iter().map(|(name, table)| (name.clone(), of(table).unwrap())).collect();
+        trainer.begin_with(&model, Some(&layer)).unwrap();
         trainer.error(&batch).unwrap()
     });
     let least = errors.into_iter().fold(f64::INFINITY, f64::min);

@@ -7,6 +7,7 @@ use orator::train::gan::augment::changes;
 use orator::train::gan::begin::normalisation_with_channels;
 use orator::train::gan::recipe::material::TrainingMaterial;
 use orator::train::gan::recipe::settings::GanSettings;
+use orator::train::gan::recipe::start::TrainingStart;
 use orator::train::gan::windows::{WindowBatch, WindowLoader};
 use orator::types::posture::PostureChannel;
 
@@ -34,7 +35,7 @@ fn windows_from_shards_are_those_from_memory() {
         augment_mirror: 0.5,
         ..GanConfig::default()
     };
-    let settings = GanSettings::new(&config, &material, false);
+    let settings = GanSettings::new(&config, &material, TrainingStart::Nothing);
     for step in 0..20 {
         let changes = changes(&settings, step, dataset.info().fps);
         // First, last and others.

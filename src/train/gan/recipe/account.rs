@@ -20,7 +20,7 @@ pub fn lines(settings: &GanSettings, material: &TrainingMaterial, secs_a_step: O
     vec![
         format!("recipe {name} for {train} of speech, {held_out} held out"),
         format!("  {steps}{}", ending(of)),
-        format!("  learning rate {}{}{}", of.learning_rate, schedule(of), average(of)),
+        format!("  learning rate {}{}{}{}", of.learning_rate, shared(of), schedule(of), average(of)),
         format!("  {}{}", adversary(of), motion(of)),
         format!("  {}", regularisation(of)),
     ]
@@ -32,6 +32,14 @@ fn ending(of: &GanSettings) -> String {
         epochs => {
             format!("; ends after {epochs} validations without a better score, when more training no longer helps")
         }
+    }
+}
+
+fn shared(of: &GanSettings) -> String {
+    match of.shared_rate {
+        1.0 => String::new(),
+        0.0 => " of the new speaker's layer alone".to_owned(),
+        share => format!(" of the new speaker's layer, {:.1} % of it for what all speakers share", 100.0 * share),
     }
 }
 

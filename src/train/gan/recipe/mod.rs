@@ -4,4 +4,5 @@
 pub mod account;
 pub mod material;
 pub mod settings;
+pub mod start;
 pub mod values;

@@ -1,6 +1,7 @@
 //! Every number of a training, as it was asked for and as the recipe chose the rest. Checkpoints keep them.
 
 use super::material::TrainingMaterial;
+use super::start::TrainingStart;
 use super::values::RecipeValues;
 use crate::config::{AdversarialLoss, ComputeDevice, GanConfig, GanRecipe, MotionRepresentation, NetworkPreset};
 use crate::types::posture::PostureChannel;
@@ -21,6 +22,8 @@ pub struct GanSettings {
     pub batch: usize,
     pub steps: usize,
     pub learning_rate: f64,
+    #[serde(default = "one")]
+    pub shared_rate: f64,
     #[serde(default)]
     pub warmup_steps: usize,
     #[serde(default = "one")]
@@ -82,9 +85,9 @@ fn silence() -> f64 {
 
 impl GanSettings {
     /// What was asked for, and what its recipe chooses for this much speech. The adversarial loss and the fade follow the
-    /// number of steps that counts. `has_start`: the training begins with another speaker's model.
-    pub fn new(asked: &GanConfig, material: &TrainingMaterial, has_start: bool) -> Self {
-        let values = RecipeValues::of(asked.recipe, material, has_start);
+    /// number of steps that counts. `start`: what the training begins with.
+    pub fn new(asked: &GanConfig, material: &TrainingMaterial, start: TrainingStart) -> Self {
+        let values = RecipeValues::of(asked.recipe, material, start);
         let steps = asked.steps.or(values.steps as usize);
         let of_steps = |share: f64| (share * steps as f64).round() as usize;
         let epoch_steps = asked.epoch_steps.or(values.epoch_steps);
@@ -98,6 +101,7 @@ impl GanSettings {
             batch: asked.batch.or(values.batch),
             steps,
             learning_rate: asked.learning_rate.or(values.learning_rate),
+            shared_rate: asked.shared_rate.or(values.shared_rate),
             warmup_steps: asked.warmup_steps.or(values.warmup_steps as usize),
             fade_to: asked.fade_to.or(values.fade_to),
             adversarial: asked.adversarial,
@@ -154,7 +158,7 @@ mod tests {
     use super::*;
 
     fn settings(asked: GanConfig) -> GanSettings {
-        GanSettings::new(&asked, &TrainingMaterial { train_secs: 600.0, validation_secs: 60.0 }, false)
+        GanSettings::new(&asked, &TrainingMaterial { train_secs: 600.0, validation_secs: 60.0 }, TrainingStart::Nothing)
     }
 
     #[test]
@@ -202,8 +206,16 @@ mod tests {
         let mut stored =
             serde_json::to_value(settings(GanConfig { recipe: GanRecipe::Paper, ..GanConfig::default() })).unwrap();
         let written = stored.clone();
-        for key in ["recipe", "warmup_steps", "fade_to", "adversarial_from", "adversarial_ramp", "ema_decay", "dropout"]
-        {
+        for key in [
+            "recipe",
+            "shared_rate",
+            "warmup_steps",
+            "fade_to",
+            "adversarial_from",
+            "adversarial_ramp",
+            "ema_decay",
+            "dropout",
+        ] {
             stored.as_object_mut().unwrap().remove(key);
         }
         let read: GanSettings = serde_json::from_value(stored).unwrap();
