@@ -126,12 +126,14 @@ pub const AUTO: [(f64, RecipeValues); 4] = [
     (120.0, RecipeValues { steps: 4_500.0, lambda_energy: 0.2, ..LITTLE_HIDDEN }),
 ];
 
-/// The layer of a new speaker in a network of others. It is one part in sixty of the weights, learnt within a hundred steps and
-/// hardly by heart, so that little need be hidden of the sound; and the network has the others' energy already.
+/// A new speaker in a network of several. Its layer is one part in sixty of the weights, learnt within a hundred steps and hardly
+/// by heart, so that little need be hidden of the sound, and the network has the others' energy already. Of two minutes were
+/// learnt, PCK and correlations of the wrists' speeds: with the layer alone 76.1 %, .90 / .85; with 0.006 of the rate for the rest
+/// 77.0 %, .89 / .86; with 0.017 76.5 %, .88 / .86; with all weights at one rate 72.5 %, .73 / .80.
 const NEW_LAYER: RecipeValues = RecipeValues {
     steps: 200.0,
     learning_rate: 3e-3,
-    shared_rate: 1.0 / 60.0,
+    shared_rate: 0.006,
     lambda_energy: 0.0,
     lambda_gan: 0.05,
     ema_decay: 0.98,
