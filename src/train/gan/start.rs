@@ -39,12 +39,8 @@ impl StartingModel {
 
     /// The file and its speakers.
     pub fn account(&self) -> String {
-        format!("what {} learnt of {}", self.path.display(), self.names())
-    }
-
-    fn names(&self) -> String {
         let names: Vec<&str> = self.speakers.iter().map(|speaker| speaker.name.as_str()).collect();
-        names.join(", ")
+        format!("what {} learnt of {}", self.path.display(), names.join(", "))
     }
 
     /// What this model is for a training of so many speakers.

@@ -101,7 +101,11 @@ impl GanSettings {
             batch: asked.batch.or(values.batch),
             steps,
             learning_rate: asked.learning_rate.or(values.learning_rate),
-            shared_rate: asked.shared_rate.or(values.shared_rate),
+            shared_rate: match start {
+                TrainingStart::SeveralSpeakers => asked.shared_rate.or(values.shared_rate),
+                // All weights are to be learnt; with 0 none would be.
+                TrainingStart::Nothing | TrainingStart::AnotherSpeaker => 1.0,
+            },
             warmup_steps: asked.warmup_steps.or(values.warmup_steps as usize),
             fade_to: asked.fade_to.or(values.fade_to),
             adversarial: asked.adversarial,
@@ -169,6 +173,15 @@ mod tests {
         assert!((of.rate(of.steps) - of.learning_rate * of.fade_to).abs() < 1e-12);
         let chosen = settings(GanConfig::default());
         assert!(chosen.steps > 400 && chosen.dropout > 0.0);
+    }
+
+    #[test]
+    fn what_speakers_share_may_stand_still_only_where_it_has_been_learnt() {
+        let asked = GanConfig { shared_rate: 0.0.into(), ..GanConfig::default() };
+        let material = TrainingMaterial { train_secs: 120.0, validation_secs: 60.0 };
+        let rate = |start| GanSettings::new(&asked, &material, start).shared_rate;
+        let starts = [TrainingStart::Nothing, TrainingStart::AnotherSpeaker, TrainingStart::SeveralSpeakers];
+        assert_eq!(starts.map(rate), [1.0, 1.0, 0.0]);
     }
 
     #[test]

@@ -4,8 +4,8 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TrainingStart {
     Nothing,
-    /// The weights of another speaker's network, or one of several begun with one.
+    /// Another speaker's motion.
     AnotherSpeaker,
-    /// What several speakers have in common: a new one's layer (`SpeakerLayer`) is what there is to learn.
+    /// What several speakers have in common; the layer of one new speaker (`SpeakerLayer`) is what there is to learn.
     SeveralSpeakers,
 }
