@@ -106,10 +106,10 @@ impl Catalogue {
         let row = |all: &mut [BlockSums], block| all.iter_mut().flat_map(|blocks| blocks.row(block).to_vec()).collect();
         let mut measured = IntervalSums::default();
         for block in 0..n {
-            let (cheap, costly): (Vec<f64>, Vec<f64>) = (row(&mut cheap, block), row(&mut costly, block));
-            let short = CostlySums::Block(costly.iter().map(|v| *v as f32).collect());
-            measured.whole += &MetricSums { cheap: cheap.clone(), costly: CostlySums::Added(costly) };
-            measured.blocks.push(MetricSums { cheap, costly: short });
+            let costly = CostlySums::Added(row(&mut costly, block));
+            let sums = MetricSums { cheap: row(&mut cheap, block), costly };
+            measured.whole += &sums;
+            measured.blocks.push(sums.into_block());
         }
         measured
     }

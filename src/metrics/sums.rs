@@ -55,6 +55,14 @@ impl CostlySums {
     }
 }
 
+impl MetricSums {
+    /// These sums as one block's, the costly ones rounded to f32.
+    pub fn into_block(self) -> Self {
+        let costly = CostlySums::Block(self.costly.row().into_iter().map(|v| v as f32).collect());
+        Self { costly, ..self }
+    }
+}
+
 impl AddAssign<&Self> for MetricSums {
     fn add_assign(&mut self, other: &Self) {
         add(&mut self.cheap, &other.cheap);

@@ -3,13 +3,15 @@
 
 use crate::evaluate::baseline::baselines::Predictor;
 use crate::evaluate::clips::clips::EvalClips;
-use crate::metrics::catalogue::{Catalogue, IntervalSums, MotionPair, n_blocks};
+use crate::metrics::catalogue::{Catalogue, IntervalSums, MetricSums, MotionPair, n_blocks};
 use ndarray::{Array2, s};
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// Length of the blocks of the truth's halves, seconds, whatever is compared with it.
 const HALVES_SECS: f64 = 4.0;
+/// Most pairs of them, those of an hour, that are drawn one by one; of more, neighbours are added up, which bounds memory.
+const MOST_PAIRS: usize = 450;
 /// Length, seconds, of the pieces in which longer clips are measured in parallel and in bounded memory; differences
 /// across a border are not counted.
 const PIECE_SECS: f64 = 600.0;
@@ -98,10 +100,15 @@ pub fn halves(catalogue: &Catalogue, clips: &EvalClips) -> IntervalSums {
         let ((ground_truth, seen), (predicted, also)) = (part(pair[0]), part(pair[1]));
         let mut mask = seen.to_owned();
         mask.zip_mut_with(&also, |seen, also| *seen &= also);
-        let interval = MotionPair { predicted, ground_truth, mask: mask.view(), fps: clips.fps, onsets: None };
-        catalogue.measure_blocks(&interval, length)
+        catalogue.measure(&MotionPair { predicted, ground_truth, mask: mask.view(), fps: clips.fps, onsets: None })
     };
-    together(all.par_chunks_exact(2).map(beside).collect())
+    let n_joined = (all.len() / 2).div_ceil(MOST_PAIRS).max(1);
+    let joined = |neighbours: &[(usize, usize)]| {
+        let mut whole = MetricSums::default();
+        neighbours.chunks_exact(2).for_each(|pair| whole += &beside(pair));
+        IntervalSums { blocks: vec![whole.clone().into_block()], whole }
+    };
+    together(all[..all.len() / 2 * 2].par_chunks(2 * n_joined).map(joined).collect())
 }
 
 /// Sum of measurements in their order.
