@@ -176,12 +176,15 @@ impl ConvPass {
                     (left, (to_row * columns.n_to + columns.to_first + column * columns.to_step) * self.n_to)
                 })
                 .collect();
-            for (_, place) in &places {
-                // SAFETY: the caller's.
-                unsafe { to.at(*place).copy_from_nonoverlapping(begin.as_ptr(), self.n_to) };
-            }
             // Steps of one row tap lie side by side in the padded copy.
             let run = columns.kernel_offsets.len() * n_from;
+            if rows.kernel_offsets.len() * run == 0 {
+                for (_, place) in &places {
+                    // SAFETY: the caller's.
+                    unsafe { to.at(*place).copy_from_nonoverlapping(begin.as_ptr(), self.n_to) };
+                }
+                return;
+            }
             let n_runs = (DEPTH / run.max(1)).max(1);
             let n_parts = run.div_ceil(DEPTH);
             for panel in &panels.panels {
@@ -195,8 +198,9 @@ impl ConvPass {
                             outer: TileSteps { n: outer, left: per_row, right: run * panel.columns },
                             inner: TileSteps { n: part.len(), left: 1, right: panel.columns },
                         };
+                        let begin = (row == 0 && part.start == 0).then_some(begin);
                         // SAFETY: places lie inside the padded copy and `to`; the caller sees to the rest.
-                        unsafe { panel.multiply(&panels.data, padded, &places, to, &at) };
+                        unsafe { panel.multiply(&panels.data, padded, &places, to, begin, &at) };
                     }
                 }
             }

@@ -5,11 +5,12 @@
 /// Rows of a tile at most.
 pub const MOST_ROWS: usize = 6;
 
-/// What a tile is made of: for all steps k, an outer and an inner loop,
-/// `to[row][column] += rows[row][at(k)] * right[at(k)][column]`.
+/// What a tile is made of: summed over all steps k, an outer and an inner loop,
+/// `to[row][column] = from[row][column] + rows[row][at(k)] * right[at(k)][column]`.
 pub struct TileJob<T> {
-    /// Where each row's left factors and its sums begin.
+    /// Where each row's left factors begin, what its sums begin with, and where they go.
     pub rows: [*const T; MOST_ROWS],
+    pub from: [*const T; MOST_ROWS],
     pub to: [*mut T; MOST_ROWS],
     /// Where the right factors begin: vectors of columns.
     pub right: *const T,
@@ -35,7 +36,7 @@ pub struct TileKernel<T> {
     /// Runs a job of so many rows and so many vectors (1, 2 or 4).
     ///
     /// # Safety
-    /// Every address the job names is readable, those of `to` writable by this thread alone.
+    /// Every address the job reads from is readable, those of `to` writable by this thread alone.
     pub run: unsafe fn(&TileJob<T>, usize, usize),
 }
 
@@ -63,9 +64,9 @@ macro_rules! kernel {
             // SAFETY: the caller's.
             unsafe {
                 let mut sums = [[$zero(); VECTORS]; ROWS];
-                for (sums, to) in sums.iter_mut().zip(&job.to) {
+                for (sums, from) in sums.iter_mut().zip(&job.from) {
                     for (v, sum) in sums.iter_mut().enumerate() {
-                        *sum = $load(to.add(v * $lanes));
+                        *sum = $load(from.add(v * $lanes));
                     }
                 }
                 let mut rows = [std::ptr::null(); ROWS];
@@ -225,9 +226,11 @@ mod tests {
                 let right: Vec<f64> = (0..2000).map(|i| f64::from(i % 17)).collect();
                 let mut sums = vec![1.0; MOST_ROWS * n_columns];
                 let start = sums.as_mut_ptr();
+                let to = std::array::from_fn(|row| start.wrapping_add(row * n_columns));
                 let job = TileJob {
                     rows: std::array::from_fn(|row| &raw const left[row * 20]),
-                    to: std::array::from_fn(|row| start.wrapping_add(row * n_columns)),
+                    from: to.map(<*mut f64>::cast_const),
+                    to,
                     right: right.as_ptr(),
                     outer: TileSteps { n: 2, left: 10, right: 400 },
                     inner: TileSteps { n: n_steps, left: 2, right: 60 },

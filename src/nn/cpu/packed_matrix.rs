@@ -59,9 +59,11 @@ impl<T: Scalar> PackedMatrix<T> {
             let right = self.data[self.depth * first..].as_ptr();
             for row in (0..n_rows).step_by(MOST_ROWS) {
                 let n = MOST_ROWS.min(n_rows - row);
+                let to = std::array::from_fn(|i| to.wrapping_add((row + i.min(n - 1)) * to_stride + first));
                 let job = TileJob {
                     rows: std::array::from_fn(|i| left.wrapping_add((row + i.min(n - 1)) * left_stride)),
-                    to: std::array::from_fn(|i| to.wrapping_add((row + i.min(n - 1)) * to_stride + first)),
+                    from: to.map(<*mut T>::cast_const),
+                    to,
                     right,
                     outer: none,
                     inner: TileSteps { n: self.depth, left: 1, right: columns },

@@ -2,7 +2,7 @@
 //! padded copy.
 
 use super::kernel::{MOST_ROWS, TileJob, TileSteps, panels};
-use super::tensor::{OutputStart, Scalar, written};
+use super::tensor::{LANES, OutputStart, Scalar, aligned, written};
 use super::thread_team::parallel_for;
 use std::ops::Range;
 
@@ -49,38 +49,38 @@ impl<T: Scalar> PackedWeights<T> {
             start += columns * kernel_offsets.len() * n_channels;
             panel
         });
-        let panels: Vec<WeightPanel> = panels.collect();
+        let mut panels: Vec<WeightPanel> = panels.collect();
         let most = kernel_offsets.iter().copied().max().unwrap_or(0);
         let n_at_once = (AT_ONCE / kernel_offsets.len().max(1)).max(1);
+        // What lies side by side in memory is fetched at once: channels of a column, or columns of a channel.
+        let of_columns = per_column < per_channel;
+        let (per_line, per_place) = if of_columns { (*per_channel, *per_column) } else { (*per_column, *per_channel) };
         let pack = |data: OutputStart<T>, panel: &WeightPanel, channels: Range<usize>| {
-            let mut rows = vec![T::zero(); n_at_once * kernel_offsets.len() * panel.columns];
-            let mut line = Vec::new();
+            let mut lines = Vec::new();
             for first in channels.clone().step_by(n_at_once) {
                 let some = first..channels.end.min(first + n_at_once);
-                // What lies side by side in memory is fetched at once, then scattered.
-                let of_columns = per_column < per_channel;
                 let (n_lines, in_line) = if of_columns { (some.len(), panel.n) } else { (panel.n, some.len()) };
-                let (per_line, per_place) =
-                    if of_columns { (per_channel, per_column) } else { (per_column, per_channel) };
                 let corner = panel.first * per_column + first * per_channel;
+                let length = (in_line - 1) * per_place + most + 1;
+                lines.clear();
                 for n in 0..n_lines {
-                    line.clear();
-                    line.extend_from_slice(&weight[corner + n * per_line..][..(in_line - 1) * per_place + most + 1]);
-                    for place in 0..in_line {
-                        let (channel, column) = if of_columns { (n, place) } else { (place, n) };
-                        for (i, kernel_offset) in kernel_offsets.iter().enumerate() {
-                            rows[(channel * kernel_offsets.len() + i) * panel.columns + column] =
-                                line[place * per_place + kernel_offset];
-                        }
-                    }
+                    lines.extend_from_slice(&weight[corner + n * per_line..][..length]);
                 }
-                let steps = some
-                    .flat_map(|c| (0..kernel_offsets.len()).map(move |kernel_offset| kernel_offset * n_channels + c));
-                for (row, step) in rows.chunks_exact(panel.columns).zip(steps) {
-                    // SAFETY: a step's row of this panel, which only this task writes.
-                    unsafe {
-                        let to = data.at(panel.start + step * panel.columns);
-                        to.copy_from_nonoverlapping(row.as_ptr(), panel.columns);
+                let (from_channel, from_column) = if of_columns { (length, per_place) } else { (per_place, length) };
+                for channel in some.clone() {
+                    for (i, kernel_offset) in kernel_offsets.iter().enumerate() {
+                        let row = &lines[(channel - first) * from_channel + kernel_offset..];
+                        let step = i * n_channels + channel;
+                        // SAFETY: a step's row of this panel, which only this task writes.
+                        let to = unsafe {
+                            std::slice::from_raw_parts_mut(data.at(panel.start + step * panel.columns), panel.columns)
+                        };
+                        let (inside, outside) = to.split_at_mut(panel.n);
+                        let row = &row[..(panel.n - 1) * from_column + 1];
+                        for (column, to) in inside.iter_mut().enumerate() {
+                            *to = row[column * from_column];
+                        }
+                        outside.fill(T::zero());
                     }
                 }
             }
@@ -93,18 +93,25 @@ impl<T: Scalar> PackedWeights<T> {
                 starts.map(move |start| (panel, start..(*n_channels).min(start + CHANNELS)))
             })
             .collect();
-        // SAFETY: the tasks together write every row of every panel.
+        let n_numbers = start;
+        let mut first = 0;
+        // SAFETY: the tasks together write every row of every panel, this thread what lies before and behind them.
         let data = unsafe {
-            written(start, |data: OutputStart<T>| {
+            written(n_numbers + LANES, |data: OutputStart<T>| {
+                first = aligned(data.at(0));
+                (0..first).chain(first + n_numbers..n_numbers + LANES).for_each(|i| data.at(i).write(T::zero()));
+                let data = data.from(first);
                 parallel_for(tasks.len(), |task| pack(data, tasks[task].0, tasks[task].1.clone()));
             })
         };
+        panels.iter_mut().for_each(|panel| panel.start += first);
         Self { data, panels }
     }
 }
 
 impl WeightPanel {
-    /// Adds the products of one block of steps to the sums at every place.
+    /// Adds the products of one block of steps to the sums at every place or, where it is the first, to `begin`, one number
+    /// a column.
     ///
     /// # Safety
     /// Places lie inside `left` (with the block's reach) and `to`, which no other thread writes to there.
@@ -114,16 +121,20 @@ impl WeightPanel {
         left: &[T],
         places: &[(usize, usize)],
         to: OutputStart<T>,
+        begin: Option<&[T]>,
         block: &StepBlock,
     ) {
         let kernel = T::kernel();
+        let begin = begin.map(|begin| begin[self.first..][..self.n].as_ptr());
         let right = right[self.start + block.right..].as_ptr();
         for tile in places.chunks(MOST_ROWS) {
             let of = |row: usize| tile[row.min(tile.len() - 1)];
+            // SAFETY: the caller's.
+            let to: [*mut T; MOST_ROWS] = std::array::from_fn(|row| unsafe { to.at(of(row).1 + self.first) });
             let mut job = TileJob {
                 rows: std::array::from_fn(|row| left.as_ptr().wrapping_add(of(row).0 + block.left)),
-                // SAFETY: the caller's.
-                to: std::array::from_fn(|row| unsafe { to.at(of(row).1 + self.first) }),
+                from: to.map(|to| begin.unwrap_or(to)),
+                to,
                 right,
                 outer: block.outer,
                 inner: block.inner,
@@ -135,13 +146,13 @@ impl WeightPanel {
                     continue;
                 }
                 let mut aside = [[T::zero(); 64]; MOST_ROWS];
-                let places = job.to;
-                for (aside, place) in aside.iter_mut().zip(&places).take(tile.len()) {
-                    aside.as_mut_ptr().copy_from_nonoverlapping(*place, self.n);
+                for (aside, from) in aside.iter_mut().zip(&job.from).take(tile.len()) {
+                    aside.as_mut_ptr().copy_from_nonoverlapping(*from, self.n);
                 }
                 job.to = aside.each_mut().map(|row| row.as_mut_ptr());
+                job.from = job.to.map(<*mut T>::cast_const);
                 (kernel.run)(&job, tile.len(), self.n_vectors);
-                for (aside, place) in aside.iter().zip(&places).take(tile.len()) {
+                for (aside, place) in aside.iter().zip(&to).take(tile.len()) {
                     place.copy_from_nonoverlapping(aside.as_ptr(), self.n);
                 }
             }

@@ -3,13 +3,14 @@
 
 use super::direct_conv::ConvSizes;
 use super::kernel::{MOST_ROWS, TileJob, TileSteps, panels};
-use super::tensor::{OutputStart, Scalar, written};
+use super::tensor::{OutputStart, Scalar, scratch, written};
 use super::thread_team::{parallel_for, parallel_map};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Places of a piece, whose gradients stay in the first-level cache.
-const PLACES: usize = 128;
+/// Places of a piece, whose gradients are laid side by side: where they lie in memory, a power of two apart, few of them
+/// fit into the first-level cache at once.
+const PLACES: usize = 256;
 /// Numbers of an output's weights that are written at once: whole lines of memory.
 const AT_ONCE: usize = 32;
 /// Input channels of a task.
@@ -99,38 +100,57 @@ fn sum_products<T: Scalar>(
     let mut sums = vec![T::zero(); columns.kernel * channels.len() * width];
     let start = sums.as_mut_ptr();
     let inside = rows.inside(row_offset);
-    let n_rows = (PLACES / columns.n_out).max(1);
-    for b in 0..s.batch {
-        for row in inside.clone().step_by(n_rows) {
-            let n = n_rows.min(inside.end - row);
-            let x_row = b * rows.n_in + row * rows.stride + row_offset - rows.pad;
-            for column_offset in 0..columns.kernel {
-                let across = columns.inside(column_offset);
-                // A row longer than a piece is cut.
-                for across in across.clone().step_by(PLACES).map(|at| at..across.end.min(at + PLACES)) {
-                    let x_at =
-                        (x_row * columns.n_in + across.start * columns.stride + column_offset - columns.pad) * s.n_in;
-                    let grad_at = ((b * rows.n_out + row) * columns.n_out + across.start) * n_columns + first;
-                    let outer =
-                        TileSteps { n, left: rows.stride * columns.n_in * s.n_in, right: columns.n_out * n_columns };
-                    let inner = TileSteps { n: across.len(), left: columns.stride * s.n_in, right: n_columns };
+    // A piece is some rows of a sample or, where a sample has one row, some samples; a row longer than a piece is cut.
+    let n_places = PLACES.min(columns.n_out);
+    let n_lines = (PLACES / columns.n_out).max(1);
+    let x_at =
+        |b: usize, row: usize| (b * rows.n_in + row * rows.stride + row_offset - rows.pad) * columns.n_in * s.n_in;
+    let grad_at = |b: usize, row: usize| (b * rows.n_out + row) * columns.n_out * n_columns;
+    let one_row = inside.len() == 1;
+    let (samples, lines) = if one_row { (0..1, 0..s.batch) } else { (0..s.batch, inside.clone()) };
+    let of_line = |b: usize, line: usize| if one_row { (line, inside.start) } else { (b, line) };
+    let x_per_line = if one_row { rows.n_in } else { rows.stride } * columns.n_in * s.n_in;
+    let grad_per_line = if one_row { rows.n_out } else { 1 } * columns.n_out * n_columns;
+    let pieces = || (0..columns.n_out).step_by(n_places).map(|at| at..columns.n_out.min(at + n_places));
+    scratch(n_lines * n_places * width, |packed: &mut [T]| {
+        for (b, line) in samples.flat_map(|b| lines.clone().step_by(n_lines).map(move |line| (b, line))) {
+            let n = n_lines.min(lines.end - line);
+            let (b, row) = of_line(b, line);
+            for piece in pieces() {
+                for (line, packed) in packed.chunks_exact_mut(piece.len() * width).take(n).enumerate() {
+                    let grad = &grad[grad_at(b, row) + line * grad_per_line + first..];
+                    for (place, packed) in piece.clone().zip(packed.chunks_exact_mut(width)) {
+                        packed.copy_from_slice(&grad[place * n_columns..][..width]);
+                    }
+                }
+                for column_offset in 0..columns.kernel {
+                    let across = columns.inside(column_offset);
+                    let across = across.start.max(piece.start)..across.end.min(piece.end);
+                    if across.is_empty() {
+                        continue;
+                    }
+                    let x_at = x_at(b, row) + (across.start * columns.stride + column_offset - columns.pad) * s.n_in;
+                    let outer = TileSteps { n, left: x_per_line, right: piece.len() * width };
+                    let inner = TileSteps { n: across.len(), left: columns.stride * s.n_in, right: width };
                     for channel in channels.clone().step_by(MOST_ROWS) {
                         let n_rows = MOST_ROWS.min(channels.end - channel);
                         let of = |row: usize| row.min(n_rows - 1);
                         let at = column_offset * channels.len() + channel - channels.start;
+                        let to = std::array::from_fn(|row| start.wrapping_add((at + of(row)) * width));
                         let job = TileJob {
                             rows: std::array::from_fn(|row| &raw const x[x_at + channel + of(row)]),
-                            to: std::array::from_fn(|row| start.wrapping_add((at + of(row)) * width)),
-                            right: &raw const grad[grad_at],
+                            from: to.map(<*mut T>::cast_const),
+                            to,
+                            right: &raw const packed[(across.start - piece.start) * width],
                             outer,
                             inner,
                         };
-                        // SAFETY: `inside` keeps all steps inside `x` and `grad`; `sums` is this task's.
+                        // SAFETY: `inside` keeps all steps inside `x` and `packed`; `sums` is this task's.
                         unsafe { (kernel.run)(&job, n_rows, n_vectors) };
                     }
                 }
             }
         }
-    }
+    });
     sums
 }
