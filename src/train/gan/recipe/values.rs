@@ -62,9 +62,11 @@ pub const PAPER: RecipeValues = RecipeValues {
 };
 
 /// Ten minutes of speech. Ten times the paper's rate, since there is no time for 90,000 steps; the mean of the weights and
-/// the changes of the windows keep the network from learning them by heart, which it otherwise does within 400 steps.
+/// the changes of the windows keep the network from learning them by heart. More hidden of the sound, it does not find the words
+/// that move a hand (22 examples each, `demo speaker --speech`), and it finds them after a thousand steps, with errors that rise
+/// before: hence the patience.
 const TEN_MINUTES: RecipeValues = RecipeValues {
-    steps: 1_200.0,
+    steps: 2_400.0,
     batch: 32,
     learning_rate: 1e-3,
     shared_rate: 1.0,
@@ -76,28 +78,17 @@ const TEN_MINUTES: RecipeValues = RecipeValues {
     adversarial_from: 0.0,
     adversarial_ramp: 0.0,
     ema_decay: 0.99,
-    dropout: 0.3,
-    weight_decay: 0.1,
-    augment_speed: 0.06,
-    augment_pitch: 1.5,
-    augment_gain_db: 4.0,
-    augment_noise_db: -20.0,
-    augment_mask_bands: 12.0,
-    augment_mask_secs: 0.15,
-    augment_pose_noise: 0.0,
-    epoch_steps: 100,
-    patience: 4,
-};
-
-/// As ten minutes, where little has to be hidden of the sound.
-const LITTLE_HIDDEN: RecipeValues = RecipeValues {
     dropout: 0.1,
     weight_decay: 0.05,
+    augment_speed: 0.06,
     augment_pitch: 1.0,
+    augment_gain_db: 4.0,
     augment_noise_db: -25.0,
     augment_mask_bands: 8.0,
     augment_mask_secs: 0.1,
-    ..TEN_MINUTES
+    augment_pose_noise: 0.0,
+    epoch_steps: 100,
+    patience: 8,
 };
 
 /// Values at so many minutes of training speech, from few to many.
@@ -122,8 +113,8 @@ pub const AUTO: [(f64, RecipeValues); 4] = [
         },
     ),
     (10.0, TEN_MINUTES),
-    (30.0, RecipeValues { steps: 1_800.0, dropout: 0.25, ..TEN_MINUTES }),
-    (120.0, RecipeValues { steps: 4_500.0, lambda_energy: 0.2, ..LITTLE_HIDDEN }),
+    (30.0, RecipeValues { steps: 3_000.0, patience: 6, ..TEN_MINUTES }),
+    (120.0, RecipeValues { steps: 4_500.0, lambda_energy: 0.2, patience: 4, ..TEN_MINUTES }),
 ];
 
 /// A new speaker in a network of several. Its layer is one part in sixty of the weights, learnt within a hundred steps and hardly
@@ -138,7 +129,8 @@ const NEW_LAYER: RecipeValues = RecipeValues {
     lambda_gan: 0.05,
     ema_decay: 0.98,
     epoch_steps: 25,
-    ..LITTLE_HIDDEN
+    patience: 4,
+    ..TEN_MINUTES
 };
 
 /// Minutes of a new speaker up to which what others taught is not to be learnt anew: ten minutes were learnt to PCK 75.5 % by
@@ -202,8 +194,8 @@ mod tests {
             assert_eq!(of(minutes), row, "{minutes} minutes");
         }
         assert_eq!((of(0.1), of(10_000.0)), (AUTO[0].1, AUTO[3].1));
-        let (few, some, many) = (of(10.0), of(17.32), of(30.0));
-        assert_eq!(some.steps, 1_500.0);
+        let (few, some, many) = (of(2.0), of(4.472), of(10.0));
+        assert_eq!(some.steps, 1_400.0);
         assert!(few.dropout > some.dropout && some.dropout > many.dropout);
         for minutes in [0.5, 3.0, 5.0, 17.0, 60.0, 90.0] {
             let row = of(minutes);
