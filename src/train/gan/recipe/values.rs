@@ -158,7 +158,8 @@ fn auto(minutes: f64) -> RecipeValues {
     let after = AUTO.iter().position(|(row, _)| *row >= minutes).unwrap_or(AUTO.len() - 1);
     let (low, high) = (&AUTO[after.saturating_sub(1)], &AUTO[after]);
     let share = if high.0 > low.0 { ((minutes / low.0).ln() / (high.0 / low.0).ln()).clamp(0.0, 1.0) } else { 0.0 };
-    let between = |of: fn(&RecipeValues) -> f64| of(&low.1) + share * (of(&high.1) - of(&low.1));
+    // From the row above, so that it is met to the last bit.
+    let between = |of: fn(&RecipeValues) -> f64| of(&high.1) - (1.0 - share) * (of(&high.1) - of(&low.1));
     RecipeValues {
         // Whole epochs.
         steps: (between(|row| row.steps) / high.1.epoch_steps as f64).round() * high.1.epoch_steps as f64,
