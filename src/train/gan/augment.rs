@@ -173,7 +173,7 @@ mod tests {
     fn settings() -> GanSettings {
         GanSettings::new(
             &GanConfig::default(),
-            &TrainingMaterial { train_secs: 600.0, validation_secs: 0.0 },
+            &TrainingMaterial { train_secs: 600.0, validation_secs: 0.0, n_speakers: 1 },
             TrainingStart::Nothing,
         )
     }
@@ -210,7 +210,7 @@ mod tests {
         let paper = GanConfig { recipe: crate::config::GanRecipe::Paper, ..GanConfig::default() };
         let paper = GanSettings::new(
             &paper,
-            &TrainingMaterial { train_secs: 600.0, validation_secs: 0.0 },
+            &TrainingMaterial { train_secs: 600.0, validation_secs: 0.0, n_speakers: 1 },
             TrainingStart::Nothing,
         );
         assert!(changes(&paper, 3, fps).is_empty());

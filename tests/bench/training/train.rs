@@ -69,7 +69,7 @@ impl Fixed {
         let asked = GanConfig { recipe: GanRecipe::Paper, preset, batch: args.batch.into(), ..GanConfig::default() };
         let settings = GanSettings::new(
             &asked,
-            &TrainingMaterial { train_secs: 0.0, validation_secs: 0.0 },
+            &TrainingMaterial { train_secs: 0.0, validation_secs: 0.0, n_speakers: 1 },
             TrainingStart::Nothing,
         );
         let mut rng = ChaCha8Rng::seed_from_u64(3);

@@ -14,11 +14,12 @@ pub fn lines(settings: &GanSettings, material: &TrainingMaterial, secs_a_step: O
         GanRecipe::Paper => "paper",
     };
     let (train, held_out) = (minutes(material.train_secs), minutes(material.validation_secs));
+    let whose = if material.n_speakers > 1 { format!(" of {} speakers", material.n_speakers) } else { String::new() };
     let time = secs_a_step.map(|secs| format!(", about {} here", minutes(secs * of.steps as f64))).unwrap_or_default();
     let steps =
         format!("{} steps of {} windows{time}, with a validation each {} steps", of.steps, of.batch, of.epoch_steps);
     vec![
-        format!("recipe {name} for {train} of speech, {held_out} held out"),
+        format!("recipe {name} for {train} of speech{whose}, {held_out} held out"),
         format!("  {steps}{}", ending(of)),
         format!("  learning rate {}{}{}{}", of.learning_rate, shared(of), schedule(of), average(of)),
         format!("  {}{}", adversary(of), motion(of)),

@@ -9,6 +9,8 @@ pub struct TrainingMaterial {
     pub train_secs: f64,
     /// Seconds held out for validation, likewise.
     pub validation_secs: f64,
+    /// Speakers, a dataset each; at least 1.
+    pub n_speakers: usize,
 }
 
 impl TrainingMaterial {
@@ -20,11 +22,20 @@ impl TrainingMaterial {
             samples.filter(|sample| sample.n_frames >= window_frames).map(|sample| fps.secs(sample.n_frames)).sum()
         };
         let secs = |split: Split| datasets.iter().map(|dataset| of_dataset(dataset, split)).sum();
-        Self { train_secs: secs(Split::Train), validation_secs: secs(Split::Validation) }
+        Self {
+            train_secs: secs(Split::Train),
+            validation_secs: secs(Split::Validation),
+            n_speakers: datasets.len().max(1),
+        }
     }
 
     /// Minutes to train on.
     pub fn minutes(&self) -> f64 {
         self.train_secs / 60.0
+    }
+
+    /// Mean minutes of a speaker to train on.
+    pub fn minutes_each(&self) -> f64 {
+        self.minutes() / self.n_speakers as f64
     }
 }

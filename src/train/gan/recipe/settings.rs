@@ -162,7 +162,11 @@ mod tests {
     use super::*;
 
     fn settings(asked: GanConfig) -> GanSettings {
-        GanSettings::new(&asked, &TrainingMaterial { train_secs: 600.0, validation_secs: 60.0 }, TrainingStart::Nothing)
+        GanSettings::new(
+            &asked,
+            &TrainingMaterial { train_secs: 600.0, validation_secs: 60.0, n_speakers: 1 },
+            TrainingStart::Nothing,
+        )
     }
 
     #[test]
@@ -178,7 +182,7 @@ mod tests {
     #[test]
     fn what_speakers_share_may_stand_still_only_where_it_has_been_learnt() {
         let asked = GanConfig { shared_rate: 0.0.into(), ..GanConfig::default() };
-        let material = TrainingMaterial { train_secs: 120.0, validation_secs: 60.0 };
+        let material = TrainingMaterial { train_secs: 120.0, validation_secs: 60.0, n_speakers: 1 };
         let rate = |start| GanSettings::new(&asked, &material, start).shared_rate;
         let starts = [TrainingStart::Nothing, TrainingStart::AnotherSpeaker, TrainingStart::SeveralSpeakers];
         assert_eq!(starts.map(rate), [1.0, 1.0, 0.0]);
