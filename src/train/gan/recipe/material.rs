@@ -33,9 +33,4 @@ impl TrainingMaterial {
     pub fn minutes(&self) -> f64 {
         self.train_secs / 60.0
     }
-
-    /// Mean minutes of a speaker to train on.
-    pub fn minutes_each(&self) -> f64 {
-        self.minutes() / self.n_speakers as f64
-    }
 }
