@@ -139,7 +139,7 @@ fn train_one(args: &Args, speaker: Option<&String>, config: &Config, ui: &Ui) ->
     let page = page.finish(ValidatedStep { step: outcome.steps, best_step: outcome.best_step });
     let text = format!(
         "{}: {} steps{} ({steps_per_sec:.2} a second, {:.1} % of it waiting for data) on {} windows, {} parameters\n\
-         {}\nnewest checkpoint  {}\nbest (step {})  {}{}",
+         {}\nnewest checkpoint  {}\nbest (step {}{})  {}{}",
         names,
         outcome.steps,
         if outcome.stopped_early { ", ended early: the score had stopped falling" } else { "" },
@@ -149,6 +149,8 @@ fn train_one(args: &Args, speaker: Option<&String>, config: &Config, ui: &Ui) ->
         metrics(&outcome.validation),
         outcome.newest.display(),
         outcome.best_step,
+        // Judged before the first step only where a training begins with a model.
+        if outcome.best_step == 0 { ", the model it began with: this speech did not make it better" } else { "" },
         outcome.best.display(),
         page.as_ref().map(|page| format!("\ncurves and poses  {}", page.display())).unwrap_or_default(),
     );

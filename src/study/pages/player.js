@@ -10,6 +10,8 @@ const MOST_RESTARTS = 2;
 const FAR = 0.12;
 const TICK_MS = 40;
 const LOAD_MS = 60_000;
+// Time in which films that somebody sees do not go on, after which they are taken for broken.
+const STAND_MS = 30_000;
 
 // Sum of the times in which something was the case.
 class Stopwatch {
@@ -38,6 +40,9 @@ export class Screening {
   #stalled = new Stopwatch();
   #unfocused = new Stopwatch();
   #settle = null;
+  // Position of the film that is behind, when it last moved, and whether it stood for too long.
+  #progress = { at: 0, since: 0 };
+  #hasStood = false;
 
   constructor(urls) {
     // Told when the films stand still for want of data and when they go on, and when they begin.
@@ -83,6 +88,8 @@ export class Screening {
 
   // Waits until every film can be played through. Rejects where one cannot be loaded.
   load() {
+    if (this.#hasStood) for (const video of this.videos) video.load();
+    this.#hasStood = false;
     return Promise.all(this.videos.map((video) => this.#loaded(video)));
   }
 
@@ -101,16 +108,18 @@ export class Screening {
     });
   }
 
-  // Plays the films from their beginning to their end. Rejects where they cannot be loaded or the browser refuses.
+  // Plays the films from their beginning to their end. Rejects where they cannot be loaded, the browser refuses, or they
+  // stand still for too long.
   async play() {
     await this.load();
     this.plays += 1;
     this.onbegin();
     this.#restarts = 0;
-    await this.#start();
+    this.#progress = { at: 0, since: performance.now() };
     return new Promise((resolve, reject) => {
       this.#settle = { resolve: () => this.#stop(resolve), reject: (error) => this.#stop(() => reject(error)) };
       this.#timer = setInterval(() => this.#tick(), TICK_MS);
+      this.#start().catch((error) => this.#settle?.reject(error));
       this.#look();
     });
   }
@@ -127,8 +136,20 @@ export class Screening {
         return new Promise((resolve) => video.addEventListener("seeked", resolve, { once: true }));
       }),
     );
-    await Promise.all(this.videos.map((video) => video.play()));
+    // A film that is stopped meanwhile, as while the other waits for data, goes on later.
+    const isStopped = (error) => error.name === "AbortError";
+    const begin = (video) => video.play().catch((error) => isStopped(error) || Promise.reject(error));
+    await Promise.all(this.videos.map(begin));
     this.#starting = false;
+  }
+
+  // Whether the films have not gone on for too long, though the page is seen.
+  #stands() {
+    const at = Math.min(...this.videos.filter((video) => !video.ended).map((video) => video.currentTime));
+    const now = performance.now();
+    if (at !== this.#progress.at || document.hidden) this.#progress = { at, since: now };
+    this.#hasStood = now - this.#progress.since > STAND_MS;
+    return this.#hasStood;
   }
 
   #stop(after) {
@@ -176,6 +197,8 @@ export class Screening {
     if (!this.playing) return;
     // The page shows something else by now.
     if (!this.videos[0].isConnected) return this.close();
+    if (this.#stands()) return this.#settle.reject(new Error("film"));
+    if (this.#starting) return;
     if (this.videos.every((video) => video.ended)) return this.#settle.resolve();
     const hasWaited = this.#waiting.size > 0;
     for (const video of this.#waiting) if (video.readyState >= 3) this.#waiting.delete(video);

@@ -84,7 +84,7 @@ fn a_session_by_keys_and_one_by_touch_are_stored_as_they_were_answered() {
     }
     let made = every_design(3);
     let served = made.serve(&[]);
-    let by_keys = take_part(&made, &served.address, &driver, "--width 1280 --language en --away-at 1");
+    let by_keys = take_part(&made, &served.address, &driver, "--width 1280 --language en --away-at 1 --interrupt-at 5");
     let dark = "--width 360 --height 640 --touch --scheme dark --language ar --reload-at 1 --offline-at 2";
     let by_touch = take_part(&made, &served.address, &driver, dark);
     for report in [&by_keys, &by_touch] {

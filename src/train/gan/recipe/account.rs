@@ -97,6 +97,6 @@ fn regularisation(of: &GanSettings) -> String {
     part(of.weight_decay > 0.0, format!("weight decay {:.2}", of.weight_decay));
     match parts.is_empty() {
         true => "nothing against learning by heart".to_owned(),
-        false => format!("against learning by heart, the more the less speech there is: {}", parts.join(", ")),
+        false => format!("against learning by heart: {}", parts.join(", ")),
     }
 }

@@ -7,7 +7,8 @@
 // An attention check is answered with the number of its film. One line of JSON a participant is printed.
 //
 // For tests of the page: --touch, --width, --height, --scheme dark, --language CODE, --audit (axe-core at every step),
-// --pictures DIR, --reload-at POSITION, --offline-at POSITION, --away-at POSITION, --withdraw-at POSITION.
+// --pictures DIR, --reload-at POSITION, --offline-at POSITION, --away-at POSITION, --interrupt-at POSITION,
+// --withdraw-at POSITION.
 
 import { mkdirSync, readFileSync } from "node:fs";
 import { join } from "node:path";
@@ -19,7 +20,7 @@ const { values: options } = parseArgs({
   options: {
     url: text, answers: text, seed: text, participants: text, "at-once": text, width: text, height: text, scheme: text,
     language: text, pictures: text, "reload-at": text, "offline-at": text, "withdraw-at": text,
-    "away-at": text,
+    "away-at": text, "interrupt-at": text,
     touch: { type: "boolean" }, audit: { type: "boolean" },
   },
 });
@@ -52,6 +53,18 @@ const look = (page) =>
     const options = [...document.querySelectorAll(".choices input")].map((input) => input.value);
     const heading = document.querySelector("h1")?.textContent;
     return { kind, films, options, heading, inTurn: has(".films.stack") };
+  });
+
+// What the page says and how its films stand, for who asks why it does not go on.
+const describe = (page) =>
+  page.evaluate(() => {
+    const { hidden, activeElement } = document;
+    const films = [...document.querySelectorAll("main video")].map((video) => {
+      const { readyState, networkState, paused, ended, seeking, currentTime, duration, playbackRate } = video;
+      return { readyState, networkState, paused, ended, seeking, currentTime, duration, playbackRate, error: video.error?.message };
+    });
+    const words = (selector) => [...document.querySelectorAll(selector)].map((node) => node.textContent);
+    return { hidden, focus: activeElement?.outerHTML.slice(0, 120), status: words("#status"), buttons: words("main button"), films };
   });
 
 // Index of the option that the rule chooses.
@@ -90,7 +103,17 @@ async function participate(browser, seed) {
     const isNew = (selector) => document.querySelector("h1")?.dataset.isOld !== "yes" && document.querySelector(selector);
     await page.waitForFunction(isNew, {}, shown);
   };
+  // The mute film is stopped by the browser as it begins.
+  const interrupt = () =>
+    page.evaluate(() => {
+      const mute = document.querySelectorAll("main video")[1];
+      mute.play = () => {
+        delete mute.play;
+        return Promise.reject(new DOMException("stopped", "AbortError"));
+      };
+    });
   const seeTogether = async () => {
+    if (position === at("interrupt-at")) await interrupt();
     await hands.press("main form button[type=button]");
     if (position === at("away-at")) {
       await page.waitForFunction(() => document.querySelector("video").currentTime > 0);
@@ -151,24 +174,31 @@ async function participate(browser, seed) {
     report.trials += 1;
     return true;
   };
-  await page.waitForSelector("main .main");
-  for (;;) {
-    const view = await look(page);
-    await step(view.kind);
-    if (view.kind === "consent") {
-      await hands.press("#agree");
-      await isOpen("main .main");
-      await leave(() => hands.press("main .main"));
-    } else if (view.kind === "sound") {
-      await hands.press("main button[type=button]");
-      await isOpen("main fieldset");
-      await hands.type("#tones", "3");
-      await leave(() => hands.submit());
-    } else if (view.kind === "end") {
-      report.code = await page.$eval("#code", (input) => input.value);
-      break;
-    } else if (view.kind === "text") await leave(() => hands.press("main .main"));
-    else if (!(await answer(view))) break;
+  const session = async () => {
+    await page.waitForSelector("main .main");
+    for (;;) {
+      const view = await look(page);
+      await step(view.kind);
+      if (view.kind === "consent") {
+        await hands.press("#agree");
+        await isOpen("main .main");
+        await leave(() => hands.press("main .main"));
+      } else if (view.kind === "sound") {
+        await hands.press("main button[type=button]");
+        await isOpen("main fieldset");
+        await hands.type("#tones", "3");
+        await leave(() => hands.submit());
+      } else if (view.kind === "end") {
+        report.code = await page.$eval("#code", (input) => input.value);
+        break;
+      } else if (view.kind === "text") await leave(() => hands.press("main .main"));
+      else if (!(await answer(view))) break;
+    }
+  };
+  try {
+    await session();
+  } catch (error) {
+    throw new Error(`${error.message}; steps: ${report.steps.join(", ")}; ${JSON.stringify(await describe(page))}`, { cause: error });
   }
   await context.close();
   return report;
