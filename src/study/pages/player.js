@@ -136,6 +136,7 @@ export class Screening {
         return new Promise((resolve) => video.addEventListener("seeked", resolve, { once: true }));
       }),
     );
+    if (!this.playing) return;
     // A film that is stopped meanwhile, as while the other waits for data, goes on later.
     const isStopped = (error) => error.name === "AbortError";
     const begin = (video) => video.play().catch((error) => isStopped(error) || Promise.reject(error));
