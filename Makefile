@@ -2,17 +2,19 @@
 # make demo-study   a user study of that speaker: films, server, scripted participants in a browser, analysis
 # make check   format, clippy and the quick tests: no root, no other program, a few minutes
 # make test    everything CI runs
+# make test-data   the tests that the last `make test` skipped, with the real data and the models that ORATOR_DATA names
 # make prove   the long proofs and the speeds
-# make build   target/release/orator
+# make build   target/release/orator, and orator-lab beside it
 # Needs Debian 12 (x86-64) and Rust. The rest is installed by the scripts in .ci/setup.
 
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := build
-.PHONY: setup runtime models readers aligner browser blender validator vrm driver loader build check test prove prove-rule prove-people prove-cluster prove-study demo demo-study clean-demo
+.PHONY: test-data setup runtime models readers aligner browser blender validator vrm driver loader build check test prove prove-rule prove-people prove-cluster prove-study demo demo-study clean-demo
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 ORATOR := $(TARGET)/release/orator
+LAB := $(TARGET)/release/orator-lab
 SKIPPED := $(abspath $(TARGET))/skipped-tests.txt
 export ORATOR_READERS ?= $(abspath $(TARGET)/readers)
 export ORATOR_ALIGNER ?= $(abspath $(TARGET)/aligner)
@@ -31,7 +33,7 @@ readers aligner browser blender validator vrm driver loader: ; @.ci/setup/$@.sh
 models: build ; @.ci/setup/models.sh
 
 build: setup runtime
-	cargo build --release --locked
+	cargo build --release --locked --workspace
 
 # Integration tests that start no other program, load no ONNX Runtime and end within seconds.
 QUICK := house:: wording:: lift:: segment::segment cli::guide cli::completions animate::animate:: animate::bvh animate::motion_files \
@@ -40,18 +42,23 @@ QUICK := house:: wording:: lift:: segment::segment cli::guide cli::completions a
 
 check:
 	cargo fmt --check
-	cargo clippy --release --locked --all-targets -- -D warnings
-	cargo test --release --locked --lib --bins
+	cargo clippy --release --locked --workspace --all-targets -- -D warnings
+	cargo test --release --locked --workspace --lib --bins
 	cargo test --release --locked --test it -- $(QUICK)
 
 test: build models readers aligner browser blender validator vrm driver
 	@rm -f $(SKIPPED)
 	cargo fmt --check
-	cargo clippy --release --locked --all-targets -- -D warnings
-	cargo test --release --locked
+	cargo clippy --release --locked --workspace --all-targets -- -D warnings
+	cargo test --release --locked --workspace
 	$(MAKE) demo DEMO=$(TARGET)/demo-test DRAW= STEPS=30 SPEECH=1
 	@if [ -s $(SKIPPED) ]; then echo 'skipped tests:'; sort -u $(SKIPPED); else echo 'no test was skipped'; fi
 	@echo 'make test: all passed'
+
+test-data: export ORATOR_MODELS := $(abspath $(TARGET))/models-with-data
+test-data: build
+	@.ci/setup/models.sh
+	cargo test --release --locked --workspace -- --exact $$(sed 's/: .*//' $(SKIPPED) | sort -u)
 
 prove prove-rule prove-people prove-cluster: build models aligner loader
 	.ci/$@
@@ -73,20 +80,20 @@ SPOKEN_STEPS := 1200
 
 demo: build
 	@if $(ORATOR) models fetch --models-dir $(ORATOR_MODELS); then \
-		$(ORATOR) demo draw $(DEMO) --rendered --speech $(SPEECH) $(DRAW) && \
+		$(LAB) demo draw $(DEMO) --rendered --speech $(SPEECH) $(DRAW) && \
 		$(ORATOR) run -c $(DEMO)/pipeline.toml --set models.dir=$(ORATOR_MODELS); \
 	else \
 		echo 'The models for real people cannot be had (no network, or no npm): the speaker wears a suit of markers.'; \
-		$(ORATOR) demo draw $(DEMO) --speech $(SPEECH) $(DRAW) && $(ORATOR) run -c $(DEMO)/pipeline.toml; \
+		$(LAB) demo draw $(DEMO) --speech $(SPEECH) $(DRAW) && $(ORATOR) run -c $(DEMO)/pipeline.toml; \
 	fi
 	$(ORATOR) train gan --dataset $(DEMO)/speech --out $(DEMO)/work/gan/spoken --steps $(or $(STEPS),$(SPOKEN_STEPS))
 	$(ORATOR) train gan -c $(DEMO)/pipeline.toml --from $(DEMO)/work/gan/spoken $(if $(STEPS),--steps $(STEPS))
 	$(ORATOR) generate --checkpoint $(DEMO)/work/gan/host --audio $(DEMO)/speech.wav \
 		--out $(addprefix $(DEMO)/motion.,npy bvh glb mp4)
-	$(ORATOR) demo sheet $(DEMO) --motion $(DEMO)/motion.npy --out $(DEMO)/contact_sheet.png
+	$(LAB) demo sheet $(DEMO) --motion $(DEMO)/motion.npy --out $(DEMO)/contact_sheet.png
 	$(ORATOR) evaluate --dataset $(DEMO)/work/dataset/host --checkpoint $(DEMO)/work/gan/host --split test \
 		--report $(DEMO)/evaluation.html
-	@echo; $(ORATOR) demo measure $(DEMO)
+	@echo; $(LAB) demo measure $(DEMO)
 	@printf '\nfiles:\n'; ls -d $(addprefix $(DEMO)/,videos/host work/dataset/host work/gan/host/best.safetensors \
 		motion.npy motion.bvh motion.glb motion.mp4 contact_sheet.png evaluation.html)
 

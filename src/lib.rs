@@ -1,152 +1,96 @@
 //! Videos of one speaker to a 3D speech-gesture dataset, and to a model that gestures like that speaker
-//! (Rebol, Guetl, Pietroszek 2021; FineMotion's entry to GENEA 2020). This file is the map.
+//! (Rebol, Guetl, Pietroszek 2021; FineMotion's entry to GENEA 2020).
 //!
 //! The items below are the public interface. A [`Pipeline`] is opened with a [`Config`] and does all that `orator run`
 //! does; [`Lifter`], [`GestureGenerator`], [`perform`], [`Dataset`] and [`Evaluation`] do one thing each. Errors are
-//! [`anyhow::Error`]s that name file, place and remedy; those a program handles apart are found by `downcast_ref`:
-//! [`ConfigError`], [`ModelError`], [`UnreadableMedia`], [`NothingKept`], [`BusyFolder`], [`NoSpace`],
-//! [`StoppedTraining`]. The rooms themselves are public for the program, tests and benchmarks, and may change.
+//! [`anyhow::Error`]s that name file, position and remedy; those that a program handles separately are found by
+//! `downcast_ref`: [`ConfigError`], [`ModelError`], [`UnreadableMedia`], [`NothingKept`], [`BusyFolder`], [`NoSpace`],
+//! [`StoppedTraining`].
 //!
-//! A frame: `external::ffmpeg` -> `external::opencv` (crop, warp) -> `external::onnx` -> `pipeline::pose2d` (decode,
-//! track) -> *keypoints* -> `pipeline::segment` -> `pipeline::lift` -> *joints* -> `dataset::write` -> *shard* ->
-//! `dataset::read` -> `train::gan`.
+//! The workspace, from the lowest layer up; Cargo enforces that a crate depends only on those its manifest names:
 //!
-//! A sample of sound: `external::ffmpeg` -> *audio file* -> `dataset::write` -> *shard* -> `dataset::read` ->
-//! `audio::mel` -> `nn::gan`. Sound and frames meet by time in seconds (`types::sync`).
+//! | crate | contents |
+//! |---|---|
+//! | `orator-base` | plain values, mathematics, the body as numbers, sound features, stage records; no foreign library |
+//! | `orator-formats` | every file format, read and written; captured motion read into our skeleton |
+//! | `orator-media` | FFmpeg, OpenCV, the word aligner, the sandbox |
+//! | `orator-onnx` | ONNX Runtime, the model store, model conversion |
+//! | `orator-nn` | operators with their kernels, and the networks (candle) |
+//! | `orator-avatar` | rigs, retargeting, export, the software renderer |
+//! | `orator-dataset` | `pipeline.toml`, and the dataset on disk: write, read, verify, import, forget |
+//! | `orator-pipeline` | the five stages, their order, and their processes |
+//! | `orator-gesture` | training, generation, metrics, evaluation |
+//! | `orator-report` | HTML pages and contact sheets |
+//! | `orator-study` | user studies: films, server, statistics |
+//! | `orator-cluster` | many machines on one work folder |
+//! | `orator` | this library and the program |
+//! | `orator-test-support` | inputs with known truth for tests |
+//! | `orator-lab` | synthetic speakers, training and evaluation of the shipped lifters; its own program |
 //!
-//! A room imports only from the rooms that its row names, all of them on lower floors:
+//! Data flow. A frame: `media::ffmpeg` -> `media::opencv` (crop, warp) -> `onnx` -> `pipeline::pose2d` (decode, track) ->
+//! *keypoints* -> `pipeline::segment` -> `pipeline::lift` -> *joints* -> `dataset::write` -> *shard* -> `dataset::read` ->
+//! `gesture::train`. A sample of sound: `media::ffmpeg` -> *audio file* -> `dataset::write` -> *shard* -> `dataset::read`
+//! -> `base::audio::mel` -> `nn::gan`. Sound and frames meet by time in seconds (`base::types::sync`).
 //!
-//! | floor | room | what lives there | may import |
-//! |---|---|---|---|
-//! | 1 | `types` | plain values: time, sync of sound and frames, picture, keypoints, joints, sound, interval, split | nothing |
-//! | 1 | `math` | vectors, rotations, Procrustes, eigenvalues, filters, median and quantiles | nothing |
-//! | 1 | `stage` | how any step runs, is recorded and resumes; the ledger | nothing |
-//! | 2 | `config` | `pipeline.toml`, as written and resolved | `types stage` |
-//! | 2 | `external` | one door each for the foreign libraries: ffmpeg, OpenCV, ONNX Runtime; the aligner of words; the sandbox of processes | `types stage` |
-//! | 2 | `audio` | sound to features | `types` |
-//! | 2 | `motion` | the body as numbers: bones, forward kinematics, resampling, what the lifters look at | `types math` |
-//! | 3 | `formats` | every file format, read and written | `types math stage motion` |
-//! | 3 | `nn` | operators, their kernels, the networks | `types motion` |
-//! | 3 | `render` | software renderer: posed meshes seen by a camera | `types math` |
-//! | 4 | `mocap` | motion that others captured, read into our skeleton | `types math motion formats` |
-//! | 4 | `metrics` | how good predicted motion is, as pure sums | `types math nn` |
-//! | 4 | `generate` | what a trained speaker is, and speech to motion with it | `types audio motion formats nn` |
-//! | 4 | `animate` | joints to rotations on a rig, avatar, export, drawing | `types math stage motion formats external render` |
-//! | 5 | `dataset` | the dataset on disk: write, read, verify, import, forget | `types math stage config audio motion formats external mocap` |
-//! | 6 | `pipeline` | the five stages, their order, the files in which they meet, their processes; batches of speech to motion | `types math stage config external audio motion formats nn generate animate dataset` |
-//! | 6 | `train` | optimiser, GAN, lifters, body network, synthetic scenes, spaces of movement | `types math stage config external audio motion formats nn mocap dataset metrics generate` |
-//! | 6 | `demo` | synthetic speakers: drawn, rendered, with a known rule, and the checks against them | `types math stage audio motion formats external mocap render animate dataset metrics generate` |
-//! | 7 | `cluster` | many machines on one work folder: sealed plan, times of the stages, claims, workers, the scripts that start them | `types stage config external formats pipeline` |
-//! | 7 | `evaluate` | clips, baselines, table, verdict; the lifters' errors | `types math stage config external audio motion formats nn mocap metrics generate animate dataset pipeline train` |
-//! | 8 | `report` | pages for people | `types stage config external formats metrics animate dataset pipeline train evaluate` |
-//! | 9 | `study` | user studies: films built and sealed, served, responses analysed | `types math stage config external audio motion formats mocap metrics generate animate dataset evaluate report` |
-//! | - | `guide` | the pages of the guide, in Markdown | nothing |
-//!
-//! `cli` (in the program only) imports everything and is the one place that prints. `tests/it/house.rs` holds the code to
-//! this table.
-//!
-//! Invariants: the same input, configuration and seed give the same bytes, whatever the number of workers. A write is
-//! an attempt, flushed, renamed (`stage::workdir`), and its record comes last. What reads a dataset or a model shares its
-//! lock, what replaces or forgets one has it alone; locks are taken in the order work folder, dataset, model, and none is
-//! waited for: who comes second is told who is at work. Memory does not grow with the length of
-//! a video, except for its keypoints. No user input panics.
+//! Invariants: the same input, configuration and seed give the same bytes, whatever the number of workers. Writes are
+//! atomic: attempt file, fsync, rename (`base::stage::workdir`), record last. Readers of a dataset or a model hold its
+//! shared lock, writers the exclusive one; locks are taken in the order work folder, dataset, model, and a lock that is
+//! held is reported at once instead of awaited. Memory does not grow with the length of a video, except for its keypoints.
+//! No user input panics.
 
 #![warn(missing_docs)]
-#![cfg_attr(not(test), deny(clippy::print_stderr))]
-// `[T, 49, 3]` in a comment is a shape, no link.
-#![allow(rustdoc::broken_intra_doc_links)]
 
 #[doc(hidden)]
-pub mod animate;
-#[doc(hidden)]
-pub mod audio;
-#[doc(hidden)]
-pub mod cluster;
-#[doc(hidden)]
-pub mod config;
-#[doc(hidden)]
-pub mod dataset;
-#[doc(hidden)]
-pub mod demo;
-#[doc(hidden)]
-pub mod evaluate;
-#[doc(hidden)]
-pub mod external;
-#[doc(hidden)]
-pub mod formats;
-#[doc(hidden)]
-pub mod generate;
+pub mod cli;
 pub mod guide;
 #[doc(hidden)]
-pub mod math;
-#[doc(hidden)]
-pub mod metrics;
-#[doc(hidden)]
-pub mod mocap;
-#[doc(hidden)]
-pub mod motion;
-#[doc(hidden)]
-pub mod nn;
-#[doc(hidden)]
-pub mod pipeline;
-#[doc(hidden)]
-pub mod render;
-#[doc(hidden)]
-pub mod report;
-#[doc(hidden)]
-pub mod stage;
-#[doc(hidden)]
-pub mod study;
-#[doc(hidden)]
-pub mod train;
-#[doc(hidden)]
-pub mod types;
+pub mod process;
 
 // Videos to datasets.
-pub use config::{Config, load as load_config};
-pub use pipeline::{Pipeline, RunReport, Selection, StatusReport, TimeAccount};
-pub use stage::artifacts::StageName;
-pub use stage::progress::{Event, Progress, Silent, Task};
+pub use orator_base::stage::artifacts::StageName;
+pub use orator_base::stage::progress::{Event, Progress, Silent, Task};
+pub use orator_dataset::config::{Config, load as load_config};
+pub use orator_pipeline::{Pipeline, RunReport, Selection, StatusReport, TimeAccount};
 
 // Values.
-pub use types::pose2d::Keypoints;
-pub use types::pose3d::Motion;
-pub use types::sound::Sound;
-pub use types::time::FrameRate;
+pub use orator_base::types::pose2d::Keypoints;
+pub use orator_base::types::pose3d::Motion;
+pub use orator_base::types::sound::Sound;
+pub use orator_base::types::time::FrameRate;
 
 // Keypoints to motion.
-pub use config::LiftConfig;
-pub use formats::keypoints_npz::read as read_keypoints;
-pub use pipeline::lift::{Lifted, Lifter};
+pub use orator_dataset::config::LiftConfig;
+pub use orator_formats::keypoints_npz::read as read_keypoints;
+pub use orator_pipeline::lift::{Lifted, Lifter};
 
 // Datasets.
-pub use dataset::index::SampleRef;
-pub use dataset::{Dataset, Sample, Split};
+pub use orator_dataset::index::SampleRef;
+pub use orator_dataset::{Dataset, Sample, Split};
 
 // Speech to motion.
-pub use external::ffmpeg::audio::read_sound;
-pub use generate::GestureGenerator;
-pub use generate::seq2seq::SequenceGenerator;
-pub use nn::seq2seq::predict::StateAtSeams;
-pub use pipeline::batch::{BatchReport, SpeechBatch};
+pub use orator_gesture::batch::{BatchReport, SpeechBatch};
+pub use orator_gesture::generate::GestureGenerator;
+pub use orator_gesture::generate::seq2seq::SequenceGenerator;
+pub use orator_media::ffmpeg::audio::read_sound;
+pub use orator_nn::seq2seq::predict::StateAtSeams;
 
 // Motion to files for animation programs.
-pub use animate::export::file::{ExportContent, ExportFormat, FigureOptions};
-pub use animate::{AnimationOptions, Performance, perform};
+pub use orator_avatar::animate::export::file::{ExportContent, ExportFormat, FigureOptions};
+pub use orator_avatar::animate::{AnimationOptions, Performance, perform};
 
 // Predicted motion against ground truth.
-pub use evaluate::Evaluation;
-pub use evaluate::clips::checkpoint::EvaluatedCheckpoint;
-pub use generate::trained::TrainedSpeaker;
-pub use metrics::settings::MetricSettings;
+pub use orator_gesture::evaluate::Evaluation;
+pub use orator_gesture::evaluate::clips::checkpoint::EvaluatedCheckpoint;
+pub use orator_gesture::generate::trained::TrainedSpeaker;
+pub use orator_gesture::metrics::settings::MetricSettings;
 
 // Models that look at pictures.
-pub use external::onnx::{ModelState, ModelStore};
+pub use orator_onnx::{ModelState, ModelStore};
 
 // Errors to be matched.
-pub use config::ConfigError;
-pub use external::ffmpeg::UnreadableMedia;
-pub use external::onnx::ModelError;
-pub use pipeline::dataset::NothingKept;
-pub use stage::workdir::{BusyFolder, NoSpace};
-pub use train::stopped::StoppedTraining;
+pub use orator_base::stage::workdir::{BusyFolder, NoSpace};
+pub use orator_dataset::config::ConfigError;
+pub use orator_gesture::train::stopped::StoppedTraining;
+pub use orator_media::ffmpeg::UnreadableMedia;
+pub use orator_onnx::ModelError;
+pub use orator_pipeline::dataset::NothingKept;

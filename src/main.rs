@@ -1,11 +1,6 @@
-//! The `orator` program: parse, run the verb, print the error, set the exit code.
-
-#![cfg_attr(not(test), deny(clippy::print_stderr))]
-
-mod cli;
-mod process;
+//! The `orator` program.
 
 fn main() -> std::process::ExitCode {
-    process::prepare();
-    cli::main()
+    orator::process::prepare();
+    orator::cli::main()
 }

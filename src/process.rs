@@ -6,7 +6,7 @@ pub fn prepare() {
     keep_freed_memory();
     // ONNX Runtime reports its use to its maker unless this is set before it is loaded.
     // SAFETY: no other thread has been started yet.
-    unsafe { std::env::set_var(orator::external::onnx::TELEMETRY_OFF, "1") };
+    unsafe { std::env::set_var(orator_onnx::TELEMETRY_OFF, "1") };
     // The tensor library's own threads spin while they wait, which costs more than they help beside rayon's.
     if std::env::var_os("CANDLE_NUM_THREADS").is_none() {
         // SAFETY: no other thread has been started yet.

@@ -1,6 +1,6 @@
 //! Arguments several verbs share.
 
-use orator::Split;
+use crate::Split;
 use std::path::PathBuf;
 
 /// Where the configuration is, and what the command line changes in it.
@@ -23,18 +23,18 @@ impl ConfigArgs {
     }
 
     /// Reads the configuration; where the usual file is not there, the defaults count.
-    pub fn load_or_default(&self) -> anyhow::Result<orator::config::Config> {
+    pub fn load_or_default(&self) -> anyhow::Result<orator_dataset::config::Config> {
         let is_usual = self.config == std::path::Path::new("pipeline.toml");
         if is_usual && !self.config.exists() {
-            orator::config::load_default(&self.config, &self.set)
+            orator_dataset::config::load_default(&self.config, &self.set)
         } else {
             self.load()
         }
     }
 
     /// Reads the configuration, with every problem at once; a key under a former name is noted on standard error.
-    pub fn load(&self) -> anyhow::Result<orator::config::Config> {
-        let config = orator::config::load(&self.config, &self.set)?;
+    pub fn load(&self) -> anyhow::Result<orator_dataset::config::Config> {
+        let config = orator_dataset::config::load(&self.config, &self.set)?;
         config.notes.iter().for_each(|note| crate::cli::ui::note(&format!("note    {note}")));
         Ok(config)
     }

@@ -2,7 +2,7 @@
 //! socket and starts no program.
 
 use super::signals;
-use orator::external::sandbox::{FileAccess, restrict};
+use orator_media::sandbox::{FileAccess, restrict};
 use std::path::{Path, PathBuf};
 
 /// Restricts this process for good, as far as the kernel can: it writes beneath the folders that hold `outputs`, and where

@@ -2,9 +2,9 @@
 
 use super::outputs::OutputFiles;
 use anyhow::{Result, ensure};
-use orator::animate::export::file::{ExportFormat, FigureOptions};
-use orator::animate::rig::names::Names;
-use orator::types::time::FrameRate;
+use orator_avatar::animate::export::file::{ExportFormat, FigureOptions};
+use orator_avatar::animate::rig::names::Names;
+use orator_base::types::time::FrameRate;
 
 #[derive(clap::Args)]
 pub struct FigureArgs {

@@ -7,11 +7,11 @@ mod cluster;
 pub mod config_args;
 pub mod confine;
 pub mod dataset;
-pub mod demo;
 pub mod evaluate;
 mod figure_args;
 pub mod generate;
 pub mod motion;
+pub mod moved;
 pub mod outcome;
 pub mod outputs;
 pub mod pipeline;
@@ -24,4 +24,4 @@ pub mod train;
 pub mod ui;
 
 pub use outcome::Outcome;
-pub use program::main;
+pub use program::{main, run_program};

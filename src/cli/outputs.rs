@@ -1,8 +1,8 @@
 //! The files that verbs of motion write.
 
 use anyhow::{Result, bail, ensure};
-use orator::animate::export::file::ExportFormat;
-use orator::formats::joints::description;
+use orator_avatar::animate::export::file::ExportFormat;
+use orator_formats::joints::description;
 use std::path::{Path, PathBuf};
 
 /// Files to write, with their formats.

@@ -5,14 +5,17 @@
 use super::cluster::{plan, submit, work};
 use super::dataset::{align, forget, import, verify as dataset};
 use super::motion::{lift, sheet};
+use super::moved::MovedVerb;
 use super::outcome::Outcome;
 use super::pipeline::{init, report, run, status};
 use super::setup::{completions, doctor, guide, models, words};
 use super::signals;
-use super::{animate, demo, evaluate, generate, study, train, ui};
+use super::ui::Ui;
+use super::{animate, evaluate, generate, study, train, ui};
+use anyhow::Result;
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
-use orator::pipeline::process::{VERB, serve};
-use orator::stage::workdir;
+use orator_base::stage::workdir;
+use orator_pipeline::process::{VERB, serve};
 use std::process::ExitCode;
 
 /// Videos of one speaker to a 3D speech-gesture dataset, and to a model that gestures like that speaker.
@@ -49,10 +52,11 @@ enum Verb {
     Generate(generate::Args),
     Animate(animate::Args),
     Study(study::Args),
-    Demo(demo::Args),
     Guide(guide::Args),
     Completions(completions::Args),
     Man(completions::ManArgs),
+    #[command(hide = true)]
+    Demo(MovedVerb),
 }
 
 /// Parses the command line, runs the verb, reports an error, and gives the exit code.
@@ -63,9 +67,50 @@ pub fn main() -> ExitCode {
         let ended = serve().inspect_err(|error| ui::note(&format!("error: {error:#}")));
         return if ended.is_ok() { ExitCode::SUCCESS } else { ExitCode::from(1) };
     }
-    let parsed = Cli::command().try_get_matches().and_then(|matches| {
-        workdir::announce(words(&matches));
-        Cli::from_arg_matches(&matches)
+    run_program(|cli: &Cli| cli.json, run)
+}
+
+fn run(cli: Cli, ui: &Ui) -> Result<Outcome> {
+    match cli.verb {
+        Verb::Init(args) => init::run(args, ui),
+        Verb::Run(args) => run::run(args, ui),
+        Verb::Status(args) => status::run(args, ui),
+        Verb::Plan(args) => plan::run(args, ui),
+        Verb::Work(args) => work::run(args, ui),
+        Verb::Submit(args) => submit::run(args, ui),
+        Verb::Models(args) => models::run(args, ui),
+        Verb::Words(args) => words::run(args, ui),
+        Verb::Doctor(args) => doctor::run(args, ui),
+        Verb::Lift(args) => lift::run(args, ui),
+        Verb::Sheet(args) => sheet::run(args, ui),
+        Verb::Report(args) => report::run(args, ui),
+        Verb::Dataset(args) => dataset::run(args, ui),
+        Verb::Import(args) => import::run(args, ui),
+        Verb::Align(args) => align::run(args, ui),
+        Verb::Forget(args) => forget::run(args, ui),
+        Verb::Train(args) => train::run(args, ui),
+        Verb::Evaluate(args) => evaluate::run(args, ui),
+        Verb::Generate(args) => generate::run(args, ui),
+        Verb::Animate(args) => animate::run(args, ui),
+        Verb::Study(args) => study::run(args, ui),
+        Verb::Guide(args) => guide::run(&args, ui),
+        Verb::Completions(args) => completions::run(&args, Cli::command(), ui),
+        Verb::Man(args) => completions::run_man(&args, Cli::command(), ui),
+        Verb::Demo(args) => args.refuse("demo"),
+    }
+}
+
+/// Parses the command line into `C`, runs it, reports an error, and returns the exit code. `json` reads the flag of that
+/// name.
+pub fn run_program<C: CommandFactory + FromArgMatches>(
+    json: impl FnOnce(&C) -> bool,
+    run: impl FnOnce(C, &Ui) -> Result<Outcome>,
+) -> ExitCode {
+    let command = C::command();
+    let name = command.get_name().to_owned();
+    let parsed = command.try_get_matches().and_then(|matches| {
+        workdir::announce(words(&name, &matches));
+        C::from_arg_matches(&matches)
     });
     let cli = match parsed {
         Ok(cli) => cli,
@@ -74,35 +119,8 @@ pub fn main() -> ExitCode {
             return if error.use_stderr() { ExitCode::from(1) } else { ExitCode::SUCCESS };
         }
     };
-    let ui = ui::Ui::new(cli.json);
-    let outcome = match cli.verb {
-        Verb::Init(args) => init::run(args, &ui),
-        Verb::Run(args) => run::run(args, &ui),
-        Verb::Status(args) => status::run(args, &ui),
-        Verb::Plan(args) => plan::run(args, &ui),
-        Verb::Work(args) => work::run(args, &ui),
-        Verb::Submit(args) => submit::run(args, &ui),
-        Verb::Models(args) => models::run(args, &ui),
-        Verb::Words(args) => words::run(args, &ui),
-        Verb::Doctor(args) => doctor::run(args, &ui),
-        Verb::Lift(args) => lift::run(args, &ui),
-        Verb::Sheet(args) => sheet::run(args, &ui),
-        Verb::Report(args) => report::run(args, &ui),
-        Verb::Dataset(args) => dataset::run(args, &ui),
-        Verb::Import(args) => import::run(args, &ui),
-        Verb::Align(args) => align::run(args, &ui),
-        Verb::Forget(args) => forget::run(args, &ui),
-        Verb::Train(args) => train::run(args, &ui),
-        Verb::Evaluate(args) => evaluate::run(args, &ui),
-        Verb::Generate(args) => generate::run(args, &ui),
-        Verb::Animate(args) => animate::run(args, &ui),
-        Verb::Study(args) => study::run(args, &ui),
-        Verb::Demo(args) => demo::run(args, &ui),
-        Verb::Guide(args) => guide::run(&args, &ui),
-        Verb::Completions(args) => completions::run(&args, Cli::command(), &ui),
-        Verb::Man(args) => completions::run_man(&args, Cli::command(), &ui),
-    };
-    match outcome {
+    let ui = Ui::new(json(&cli));
+    match run(cli, &ui) {
         Ok(_) if ui.has_lost_output() => ExitCode::from(1),
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::SomeFailed) => ExitCode::from(2),
@@ -116,8 +134,8 @@ pub fn main() -> ExitCode {
 }
 
 /// The program and its verb, like `orator train gan`.
-fn words(matches: &ArgMatches) -> String {
-    let (mut words, mut next) = ("orator".to_owned(), matches.subcommand());
+fn words(program: &str, matches: &ArgMatches) -> String {
+    let (mut words, mut next) = (program.to_owned(), matches.subcommand());
     while let Some((word, matches)) = next {
         words += &format!(" {word}");
         next = matches.subcommand();

@@ -4,7 +4,7 @@ use super::signals::StopRequest;
 pub use super::stderr::note;
 use super::stderr::shown;
 use indicatif::{HumanDuration, MultiProgress, ProgressBar, ProgressState, ProgressStyle};
-use orator::stage::progress::{PARTS, Progress, Task};
+use orator_base::stage::progress::{PARTS, Progress, Task};
 use std::fmt;
 use std::io::{ErrorKind, IsTerminal, Write};
 use std::sync::Arc;

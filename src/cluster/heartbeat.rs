@@ -2,8 +2,8 @@
 //! watcher's own clock, so that the clocks of machines may differ by minutes.
 
 use super::shared_folder::SharedFolder;
-use crate::stage::workdir::is_alive;
 use anyhow::Result;
+use orator_base::stage::workdir::is_alive;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::time::Duration;

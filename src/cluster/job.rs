@@ -1,7 +1,7 @@
 //! What is the same in the jobs of every scheduler: the commands of a worker, and of the end.
 
 use super::plan::ClusterPlan;
-use crate::stage::artifacts::{StageName, speaker_dir};
+use orator_base::stage::artifacts::{StageName, speaker_dir};
 use std::path::{Path, PathBuf};
 
 /// What one task may use.

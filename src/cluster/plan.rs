@@ -2,12 +2,12 @@
 //! program, configuration and models before they claim a unit.
 
 use super::shell::shell;
-use crate::config::Config;
-use crate::config::videos::Videos;
-use crate::pipeline::Pipeline;
-use crate::stage::fingerprint::hash_file;
-use crate::stage::{Unit, workdir};
 use anyhow::{Context, Result, bail, ensure};
+use orator_base::stage::fingerprint::hash_file;
+use orator_base::stage::{Unit, workdir};
+use orator_dataset::config::Config;
+use orator_dataset::config::videos::Videos;
+use orator_pipeline::Pipeline;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -297,7 +297,7 @@ pub fn settings_hash(config: &Config) -> Result<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::load;
+    use orator_dataset::config::load;
 
     fn video(name: &str, secs: f64) -> PlannedUnit {
         PlannedUnit {

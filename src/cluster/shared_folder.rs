@@ -1,8 +1,8 @@
 //! What workers on many machines ask of the folder that they share: to create a file once, to read, list and replace.
 //! Nothing else is needed, and no lock, so that NFS with its caches will do.
 
-use crate::stage::workdir;
 use anyhow::{Context, Result};
+use orator_base::stage::workdir;
 use std::fs;
 use std::io::{ErrorKind, Write};
 use std::path::PathBuf;

@@ -1,11 +1,11 @@
 //! Word times of a transcript that has none, by forced alignment with its sound.
 
-use crate::external::aligner::{AlignedWord, Aligner, SpokenWord};
-use crate::external::ffmpeg::UnreadableMedia;
-use crate::external::ffmpeg::sound_stream::SoundStream;
-use crate::formats::transcript::{Transcript, Word, WordSource};
-use crate::types::sound::SAMPLE_RATE;
 use anyhow::{Result, ensure};
+use orator_base::types::sound::SAMPLE_RATE;
+use orator_formats::transcript::{Transcript, Word, WordSource};
+use orator_media::aligner::{AlignedWord, Aligner, SpokenWord};
+use orator_media::ffmpeg::UnreadableMedia;
+use orator_media::ffmpeg::sound_stream::SoundStream;
 use std::path::Path;
 
 /// Fewest words that fit, as a share of all: with fewer it is the text of another sound.

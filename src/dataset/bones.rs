@@ -1,9 +1,9 @@
 //! Bone lengths: constant within a video's shards (`bones.json`, written by the lift stage), and one set for the
 //! speaker, the frame-weighted median over the videos.
 
-use crate::math::order::weighted_median;
-use crate::types::skeleton::N_BONES;
 use anyhow::{Context, Result, ensure};
+use orator_base::math::order::weighted_median;
+use orator_base::types::skeleton::N_BONES;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

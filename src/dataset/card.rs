@@ -5,7 +5,7 @@ use super::leakage::Leakage;
 use super::split::{Split, SplitRule};
 use super::stats::DatasetStats;
 use crate::config::choices::SplitUnit;
-use crate::stage::ledger::WordCount;
+use orator_base::stage::ledger::WordCount;
 use std::fmt::Write;
 
 /// Text of the card.

@@ -1,9 +1,9 @@
 //! Index file `index.jsonl`: a line for each sample with its location in a shard and its BLAKE3 hash, for random access
 //! and checks. Shards are listed in `info.json`.
 
-use crate::formats::wav;
-use crate::types::file_name::FileName;
-use crate::types::split::Split;
+use orator_base::types::file_name::FileName;
+use orator_base::types::split::Split;
+use orator_formats::wav;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 

@@ -4,9 +4,9 @@ use super::index;
 use super::index::ShardRef;
 use super::sample::{N_KEYPOINTS, OPTIONAL_EXTENSIONS, WORDS_EXTENSION};
 use super::split::{Split, SplitBy, SplitRule, TimeBlock};
-use crate::types::skeleton;
-use crate::types::skeleton::{N_JOINTS, Side};
-use crate::types::time::FrameRate;
+use orator_base::types::skeleton;
+use orator_base::types::skeleton::{N_JOINTS, Side};
+use orator_base::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -158,7 +158,7 @@ impl DatasetInfo {
             speaker,
             tool,
             fps,
-            sound_rate: crate::types::sound::SAMPLE_RATE,
+            sound_rate: orator_base::types::sound::SAMPLE_RATE,
             members: members(),
             axes: JointAxes {
                 x: "image right".into(),

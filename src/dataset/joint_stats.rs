@@ -1,10 +1,10 @@
 //! Mean, deviation and range of a video's joints, mergeable over videos without reading joints again (Chan, Golub,
 //! LeVeque 1979).
 
-use crate::types::pose3d::Motion;
-use crate::types::posture::{Posture, PostureChannel};
-use crate::types::skeleton::N_JOINTS;
 use ndarray::{ArrayView1, aview1};
+use orator_base::types::pose3d::Motion;
+use orator_base::types::posture::{Posture, PostureChannel};
+use orator_base::types::skeleton::N_JOINTS;
 use serde::{Deserialize, Serialize};
 
 /// Moments over the frames in which a joint was seen; rows are joints, columns x, y, z in metres. Of a posture rows are
@@ -101,8 +101,8 @@ impl JointMoments {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::time::FrameRate;
     use ndarray::{Array2, Array3, s};
+    use orator_base::types::time::FrameRate;
 
     fn motion(xs: &[f32], masked: &[usize]) -> Motion {
         let mut joints = Array3::<f32>::zeros((xs.len(), N_JOINTS, 3));

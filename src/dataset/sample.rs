@@ -1,16 +1,16 @@
 //! Sample of the dataset: motion, keypoints, sound and metadata of an interval, and its members as bytes.
 
 use super::words;
-use crate::formats::transcript::Word;
-use crate::formats::{npy_slice, wav};
-use crate::types::pose2d::{N_BODY, N_HAND};
-use crate::types::pose3d::Motion;
-use crate::types::posture::{Posture, PostureChannel};
-use crate::types::skeleton::N_JOINTS;
-use crate::types::sound::{SAMPLE_RATE, Sound};
-use crate::types::sync;
 use anyhow::{Context, Result, ensure};
 use ndarray::Array3;
+use orator_base::types::pose2d::{N_BODY, N_HAND};
+use orator_base::types::pose3d::Motion;
+use orator_base::types::posture::{Posture, PostureChannel};
+use orator_base::types::skeleton::N_JOINTS;
+use orator_base::types::sound::{SAMPLE_RATE, Sound};
+use orator_base::types::sync;
+use orator_formats::transcript::Word;
+use orator_formats::{npy_slice, wav};
 
 /// Keypoints of a frame: 17 of the body, 21 of the left hand, 21 of the right hand.
 pub const N_KEYPOINTS: usize = N_BODY + 2 * N_HAND;

@@ -1,7 +1,7 @@
 //! The shards of a dataset, open while they are used: a dataset may have more of them than a program may have open files.
 
-use crate::types::file_name::FileName;
 use anyhow::{Context, Result};
+use orator_base::types::file_name::FileName;
 use std::collections::{BTreeSet, VecDeque};
 use std::fs::File;
 use std::path::{Path, PathBuf};

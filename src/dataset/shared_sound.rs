@@ -4,8 +4,8 @@
 //!
 //! Memory: one code in four of every video, 12 bytes each (0.3 MB an hour), and the codes of two videos.
 
-use crate::audio::fingerprint::PER_SEC;
 use anyhow::Result;
+use orator_base::audio::fingerprint::PER_SEC;
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 

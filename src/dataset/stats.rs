@@ -4,12 +4,12 @@
 use super::joint_stats::JointMoments;
 use super::write::part::VideoEntry;
 use super::{STRIDE_FRAMES, WINDOW_FRAMES};
-use crate::stage::ledger::WordCount;
-use crate::types::interval::Interval;
-use crate::types::posture::PostureChannel;
-use crate::types::skeleton::N_JOINTS;
-use crate::types::split::Split;
 use ndarray::Array2;
+use orator_base::stage::ledger::WordCount;
+use orator_base::types::interval::Interval;
+use orator_base::types::posture::PostureChannel;
+use orator_base::types::skeleton::N_JOINTS;
+use orator_base::types::split::Split;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

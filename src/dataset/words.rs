@@ -1,9 +1,9 @@
 //! Words of a video in its samples: a word belongs to the sample that holds its middle, so that each stands in one at
 //! most, and its times count from that sample's beginning.
 
-use crate::formats::transcript::{Transcript, Word};
-use crate::stage::ledger::{TranscriptAccount, WordCount};
 use anyhow::{Result, ensure};
+use orator_base::stage::ledger::{TranscriptAccount, WordCount};
+use orator_formats::transcript::{Transcript, Word};
 use std::path::Path;
 
 /// Words that may lie after the end of the sound, and their share; more of both, and it is the transcript of another.

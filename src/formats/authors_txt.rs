@@ -3,11 +3,11 @@
 //! are written as numpy's `savetxt` writes them. Values are taken as they are, rounded to f32: in the
 //! authors' predictions the hand roots (7, 28) lie some mm beside the wrists.
 
-use crate::types::pose3d::Motion;
-use crate::types::skeleton::{N_JOINTS, authors_from_house};
-use crate::types::time::FrameRate;
 use anyhow::{Context as _, bail, ensure};
 use ndarray::Array3;
+use orator_base::types::pose3d::Motion;
+use orator_base::types::skeleton::{N_JOINTS, authors_from_house};
+use orator_base::types::time::FrameRate;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -83,7 +83,7 @@ fn push_number(text: &mut String, number: f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::skeleton::NECK;
+    use orator_base::types::skeleton::NECK;
 
     const FPS: FrameRate = FrameRate::new(15, 1);
 

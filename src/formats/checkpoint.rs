@@ -1,10 +1,10 @@
 //! Weights and everything beside them in one file: safetensors whose metadata holds one JSON object under `orator`.
 //! Written atomically; the same contents give the same bytes.
 
-use crate::stage::workdir;
 use anyhow::{Context, ensure};
 use candle_core::safetensors::Load;
 use candle_core::{DType, Device, Tensor};
+use orator_base::stage::workdir;
 use serde_json::Value;
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};

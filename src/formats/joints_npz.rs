@@ -4,10 +4,10 @@
 
 use super::npz;
 use super::npz::Npz;
-use crate::types::pose3d::Motion;
-use crate::types::skeleton::N_JOINTS;
 use anyhow::{Context, Result};
 use ndarray::{Array3, Ix2, Ix3};
+use orator_base::types::pose3d::Motion;
+use orator_base::types::skeleton::N_JOINTS;
 use std::path::Path;
 
 /// Reads the motion. Errors: unreadable, an array missing or of a wrong shape.
@@ -50,8 +50,8 @@ fn write_with(path: &Path, motion: &Motion, extra: Option<&Array3<f32>>) -> Resu
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::time::FrameRate;
     use ndarray::{Array2, Array3};
+    use orator_base::types::time::FrameRate;
 
     #[test]
     fn nose_and_hips_lie_beside_the_joints() {

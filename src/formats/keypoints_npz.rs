@@ -8,10 +8,10 @@
 use super::keypoints::range;
 use super::npz;
 use super::npz::Npz;
-use crate::types::pose2d::{Keypoints, N_BODY, N_HAND};
-use crate::types::time::FrameRate;
 use anyhow::{Result, bail, ensure};
 use ndarray::{Array1, Array2, Array3, ArrayD, Ix1, Ix2, Ix3, aview1};
+use orator_base::types::pose2d::{Keypoints, N_BODY, N_HAND};
+use orator_base::types::time::FrameRate;
 use std::path::Path;
 
 /// Arrays of the file beside the keypoints.

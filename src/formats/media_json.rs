@@ -1,9 +1,9 @@
 //! `media.json`: what a video is, as far as the stages after the first need it and people want to know.
 
-use crate::types::image::{PictureOptions, PixelArea};
-use crate::types::sound::AudioTracks;
-use crate::types::time::FrameRate;
 use anyhow::{Context, Result, ensure};
+use orator_base::types::image::{PictureOptions, PixelArea};
+use orator_base::types::sound::AudioTracks;
+use orator_base::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

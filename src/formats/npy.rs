@@ -1,12 +1,12 @@
 //! Motion as a plain `.npy` array [T, 49, 3] in house order, a missing joint NaN. The file does not hold the rate.
 
-use crate::types::pose3d::Motion;
-use crate::types::skeleton::N_JOINTS;
-use crate::types::time::FrameRate;
 use anyhow::{Context as _, ensure};
 use ndarray::{Array, Array3, Dimension, IxDyn};
 use ndarray_npy::npy::header::Header;
 use ndarray_npy::{ReadNpyError, ReadNpyExt as _, ReadableElement, WriteNpyExt as _};
+use orator_base::types::pose3d::Motion;
+use orator_base::types::skeleton::N_JOINTS;
+use orator_base::types::time::FrameRate;
 use std::fs::File;
 use std::io::{BufWriter, Write as _};
 use std::path::Path;

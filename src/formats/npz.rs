@@ -3,10 +3,10 @@
 
 use super::npy;
 use super::npz_output::NpzOutput;
-use crate::types::time::FrameRate;
 use anyhow::{Context, Result, bail, ensure};
 use ndarray::{Array1, ArrayD, IxDyn, array};
 use ndarray_npy::{NpzWriter, ReadNpyError, ReadableElement, WriteNpzError};
+use orator_base::types::time::FrameRate;
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Read as _};
 use std::path::{Path, PathBuf};

@@ -1,26 +1,24 @@
 //! `sound_offset.json`: how much later the sound of a video is than its picture.
 
-use crate::types::sync::SoundOffset;
 use anyhow::{Context, Result, ensure};
+use orator_base::types::sync::SoundOffset;
 use std::io::ErrorKind;
 use std::path::Path;
 
-impl SoundOffset {
-    /// Reads the file; `None` where it is not there.
-    ///
-    /// # Errors
-    /// A file that is not as the segment stage writes it.
-    pub fn read(path: &Path) -> Result<Option<Self>> {
-        let bytes = match std::fs::read(path) {
-            Ok(bytes) => bytes,
-            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-            Err(error) => return Err(error).with_context(|| format!("cannot read {}", path.display())),
-        };
-        let offset: Self = serde_json::from_slice(&bytes)
-            .with_context(|| format!("{} is not as the segment stage writes it", path.display()))?;
-        ensure!(offset.secs.abs() < 60.0, "{}: an offset of {} s", path.display(), offset.secs);
-        Ok(Some(offset))
-    }
+/// Reads the file; `None` where it is not there.
+///
+/// # Errors
+/// A file that is not as the segment stage writes it.
+pub fn read(path: &Path) -> Result<Option<SoundOffset>> {
+    let bytes = match std::fs::read(path) {
+        Ok(bytes) => bytes,
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(error).with_context(|| format!("cannot read {}", path.display())),
+    };
+    let offset: SoundOffset = serde_json::from_slice(&bytes)
+        .with_context(|| format!("{} is not as the segment stage writes it", path.display()))?;
+    ensure!(offset.secs.abs() < 60.0, "{}: an offset of {} s", path.display(), offset.secs);
+    Ok(Some(offset))
 }
 
 #[cfg(test)]
@@ -31,13 +29,13 @@ mod tests {
     fn an_offset_that_is_missing_or_damaged_is_told_apart() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("offset.json");
-        assert_eq!(SoundOffset::read(&path).unwrap(), None);
+        assert_eq!(read(&path).unwrap(), None);
         let offset = SoundOffset { secs: 0.1, correlation: 0.4, confidence: 1.0, compared_secs: 9.0 };
         std::fs::write(&path, serde_json::to_vec(&offset).unwrap()).unwrap();
-        assert_eq!(SoundOffset::read(&path).unwrap(), Some(offset));
+        assert_eq!(read(&path).unwrap(), Some(offset));
         for text in ["{", r#"{"secs":1e9,"correlation":0,"confidence":1,"compared_secs":1}"#] {
             std::fs::write(&path, text).unwrap();
-            assert!(SoundOffset::read(&path).is_err());
+            assert!(read(&path).is_err());
         }
     }
 }

@@ -1,9 +1,9 @@
 //! Sound as 16-bit mono WAV with the plain 44-byte header, written to memory or to a file; and where the samples of such
 //! a file lie, so that a part of it can be read. Sound files of others are read by `external::ffmpeg`.
 
-use crate::types::sound::Sound;
 use anyhow::{Context, Result, ensure};
 use hound::{SampleFormat, WavReader, WavSpec};
+use orator_base::types::sound::Sound;
 use std::fs::File;
 use std::io::{BufWriter, Cursor, Seek, Write};
 use std::path::{Path, PathBuf};

@@ -30,7 +30,7 @@ pub const TOPICS: [Topic; 13] = [
     topic!("configuration", "pipeline.toml, --set, the work folder, exit codes, JSON output"),
     topic!("cluster", "many machines on one work folder: plan, workers, Slurm, Kubernetes, ssh"),
     topic!("security", "what is trusted: the sandbox of videos, files, network, forgetting, locks"),
-    topic!("architecture", "the rooms of the source, and the way of a frame through them"),
+    topic!("architecture", "the crates of the workspace, and the way of a frame through them"),
     topic!("contributing", "building, tests, real data, rules of the source"),
 ];
 

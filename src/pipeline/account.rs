@@ -1,12 +1,13 @@
 //! The account of seconds: of every video what was kept, refused for which reason, lost to a failed stage or is not
 //! judged yet, and whether that adds up to its duration.
 
-use crate::external::ffmpeg::probe::probe;
-use crate::formats::media_json::MediaInfo;
-use crate::stage::Unit;
-use crate::stage::artifacts::{Artifact, StageName};
-use crate::stage::ledger::Ledger;
-use crate::types::sync::SoundOffset;
+use orator_base::stage::Unit;
+use orator_base::stage::artifacts::{Artifact, StageName};
+use orator_base::stage::ledger::Ledger;
+use orator_base::types::sync::SoundOffset;
+use orator_formats::media_json::MediaInfo;
+use orator_formats::sound_offset_json;
+use orator_media::ffmpeg::probe::probe;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -85,7 +86,7 @@ impl TimeAccount {
         let account = Self { of: unit.to_string(), kind: AccountKind::Video, ..Self::default() };
         let media = if is_extracted { MediaInfo::read(&Artifact::MediaInfo.path(work, unit)).ok() } else { None };
         let not_judged = media.as_ref().and_then(MediaInfo::not_judged);
-        let offset = SoundOffset::read(&Artifact::SoundOffset.path(work, unit)).ok().flatten();
+        let offset = sound_offset_json::read(&Artifact::SoundOffset.path(work, unit)).ok().flatten();
         let account = Self { not_judged, sound_offset: offset.filter(SoundOffset::is_told), ..account };
         let Some(duration) = media.as_ref().map(|media| media.duration_secs).or_else(|| probed(&unit.source)) else {
             return Self { n_unknown: 1, ..account };

@@ -5,12 +5,12 @@ use super::pipeline::Pipeline;
 use super::pose2d::Pose2dStage;
 use super::stages;
 use super::watched_stage::{UnitWork, WatchedStage};
-use crate::stage::artifacts::StageName;
-use crate::stage::fingerprint::HashCache;
-use crate::stage::progress::Progress;
-use crate::stage::runner::StageOutcome;
-use crate::stage::{Report, Stage, Unit, runner};
 use anyhow::Result;
+use orator_base::stage::artifacts::StageName;
+use orator_base::stage::fingerprint::HashCache;
+use orator_base::stage::progress::Progress;
+use orator_base::stage::runner::StageOutcome;
+use orator_base::stage::{Report, Stage, Unit, runner};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -74,7 +74,7 @@ impl Pipeline {
         let settings = &self.config().settings;
         let (stage, hashes) = (Pose2dStage::new(settings)?, self.hashes());
         let used = stage.used()?;
-        let hash = |(_, entry): &(_, &crate::external::onnx::ModelEntry)| {
+        let hash = |(_, entry): &(_, &orator_onnx::ModelEntry)| {
             Ok((entry.file.clone(), hashes.hash(&settings.models.dir.join(&entry.file))?))
         };
         used.iter().map(hash).collect()
@@ -85,7 +85,7 @@ impl Pipeline {
     /// # Errors
     /// What is missing, and where it comes from.
     pub fn check(&self) -> Result<()> {
-        if self.all_videos().iter().any(crate::config::videos::Videos::have_pictures) {
+        if self.all_videos().iter().any(orator_dataset::config::videos::Videos::have_pictures) {
             stages::check_models(&self.config().settings)?;
         }
         StageName::OF_VIDEOS.into_iter().try_for_each(|name| self.stage(name, &[]).map(drop))

@@ -1,9 +1,9 @@
 //! Whether the voice is that of the mouth that is seen, and by how much sound and picture are apart: the opening of the
 //! lips beside how open the voice sounds, both without what changes slowly, correlated at every lag.
 
-use crate::audio::openness::Openness;
-use crate::types::sync::SoundOffset;
-use crate::types::time::FrameRate;
+use orator_base::audio::openness::Openness;
+use orator_base::types::sync::SoundOffset;
+use orator_base::types::time::FrameRate;
 
 /// Lags that are tried, in steps of `LAG_STEP_SECS` on either side of none.
 const N_LAGS: i32 = 22;
@@ -168,7 +168,7 @@ impl PairSums {
 #[cfg(test)]
 pub mod tests {
     use super::*;
-    use crate::audio::openness::OpennessMeter;
+    use orator_base::audio::openness::OpennessMeter;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use std::f64::consts::TAU;

@@ -1,9 +1,9 @@
 //! How the pictures of a run's videos are to be read, for whoever shows them beside what was found in them.
 
-use crate::formats::media_json::MediaInfo;
-use crate::stage::Unit;
-use crate::stage::artifacts::Artifact;
-use crate::types::image::PictureOptions;
+use orator_base::stage::Unit;
+use orator_base::stage::artifacts::Artifact;
+use orator_base::types::image::PictureOptions;
+use orator_formats::media_json::MediaInfo;
 use std::path::Path;
 
 /// How `extract` found that the pictures of `unit` are to be read; as they are where it has not run.

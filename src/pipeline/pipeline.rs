@@ -2,13 +2,13 @@
 
 use super::process::SeparateStage;
 use super::stages;
-use crate::config::videos::Videos;
-use crate::config::{Config, videos};
-use crate::stage::artifacts;
-use crate::stage::artifacts::StageName;
-use crate::stage::fingerprint::HashCache;
-use crate::stage::{Stage, Unit};
 use anyhow::{Result, ensure};
+use orator_base::stage::artifacts;
+use orator_base::stage::artifacts::StageName;
+use orator_base::stage::fingerprint::HashCache;
+use orator_base::stage::{Stage, Unit};
+use orator_dataset::config::videos::Videos;
+use orator_dataset::config::{Config, videos};
 use std::path::{Path, PathBuf};
 
 /// Videos to datasets, by one configuration. `run` does the work, `status` says how far it is.

@@ -1,9 +1,9 @@
 //! What tells the person of a video from another: the shape of the face, and the colours of skin and hair. It lies beside
 //! the keypoints; no dataset holds any of it.
 
-use crate::math::procrustes::similarity;
-use crate::math::vec3::{self, Vec3};
 use anyhow::{Context, Result};
+use orator_base::math::procrustes::similarity;
+use orator_base::math::vec3::{self, Vec3};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

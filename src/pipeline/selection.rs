@@ -1,6 +1,6 @@
 //! What a run of the pipeline does: which stages, of which speakers, how many videos side by side.
 
-use crate::stage::artifacts::StageName;
+use orator_base::stage::artifacts::StageName;
 
 /// The part of the pipeline to run; by default every stage for every speaker.
 #[derive(Clone, Debug, PartialEq, Eq)]

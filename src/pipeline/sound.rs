@@ -1,8 +1,8 @@
 //! How loud a video is at each frame, and how open its voice sounds, from its wav file read as a stream.
 
-use crate::audio::openness::{Openness, OpennessMeter};
-use crate::types::time::FrameRate;
 use anyhow::{Context, Result};
+use orator_base::audio::openness::{Openness, OpennessMeter};
+use orator_base::types::time::FrameRate;
 use std::path::Path;
 
 /// Loudness is taken over this many seconds around a frame: syllables and short pauses even out.

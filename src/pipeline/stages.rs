@@ -8,16 +8,16 @@ use super::lift::lifter::reach_secs;
 use super::pose2d::Pose2dStage;
 use super::segment::SegmentStage;
 use super::segment::speech_rule::SpeechListener;
-use crate::config::videos::Videos;
-use crate::config::{Config, Settings};
-use crate::dataset::info::ModelUsed;
-use crate::external::onnx::{Model, ModelEntry, Runtime};
-use crate::stage::artifacts::StageName;
-use crate::stage::fingerprint::HashCache;
-use crate::stage::runner;
-use crate::stage::runner::State;
-use crate::stage::{Stage, Unit};
 use anyhow::Result;
+use orator_base::stage::artifacts::StageName;
+use orator_base::stage::fingerprint::HashCache;
+use orator_base::stage::runner;
+use orator_base::stage::runner::State;
+use orator_base::stage::{Stage, Unit};
+use orator_dataset::config::videos::Videos;
+use orator_dataset::config::{Config, Settings};
+use orator_dataset::info::ModelUsed;
+use orator_onnx::{Model, ModelEntry, Runtime};
 
 /// The stage, ready to run on `all` videos. `ready` are those the dataset is made of.
 ///

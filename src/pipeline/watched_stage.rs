@@ -1,8 +1,8 @@
 //! A stage with something around every run of it: a claim is looked at, the time is taken.
 
-use crate::stage::progress::Progress;
-use crate::stage::{Report, Stage, StageWrapper, Unit};
 use anyhow::Result;
+use orator_base::stage::progress::Progress;
+use orator_base::stage::{Report, Stage, StageWrapper, Unit};
 use std::path::Path;
 
 /// The work on one unit.

@@ -1,11 +1,11 @@
 //! Splits of the videos, from the datasets that were made of them.
 
-use crate::config::Settings;
-use crate::config::videos::Videos;
-use crate::dataset::INFO;
-use crate::dataset::info::{DatasetInfo, DatasetVideo};
-use crate::stage::artifacts::{StageName, speaker_dir};
-use crate::types::split::Split;
+use orator_base::stage::artifacts::{StageName, speaker_dir};
+use orator_base::types::split::Split;
+use orator_dataset::INFO;
+use orator_dataset::config::Settings;
+use orator_dataset::config::videos::Videos;
+use orator_dataset::info::{DatasetInfo, DatasetVideo};
 use std::collections::BTreeMap;
 
 /// The splits of a video in words, by `speaker/video`.

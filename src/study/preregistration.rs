@@ -3,8 +3,8 @@
 
 use super::file::{AnalysisSettings, ExclusionRules, HypothesisKind, StudyFile, StudyHypothesis};
 use super::plan::TaskDesign;
-use crate::stage::workdir;
 use anyhow::{Context, Result, ensure};
+use orator_base::stage::workdir;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -143,7 +143,7 @@ fn statistic(claim: &StudyHypothesis, design: Option<TaskDesign>, alpha: f64) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::file::EXAMPLE;
+    use crate::file::EXAMPLE;
 
     #[test]
     fn it_holds_what_the_file_says_and_comes_back() {

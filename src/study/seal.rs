@@ -2,9 +2,9 @@
 //! what a researcher publishes beforehand.
 
 use super::folder::StudyFolder;
-use crate::stage::fingerprint::hash_file;
-use crate::stage::workdir;
 use anyhow::{Context, Result, bail, ensure};
+use orator_base::stage::fingerprint::hash_file;
+use orator_base::stage::workdir;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;

@@ -2,11 +2,11 @@
 
 use super::report::Report;
 use anyhow::{Result, ensure};
-use orator::cluster::claim_files::UnitEnd;
-use orator::cluster::claims::{Claims, NextUnit};
-use orator::cluster::heartbeat::BeatWatch;
-use orator::cluster::shared_folder::{DiskFolder, SharedFolder};
-use orator::stage::progress::Progress;
+use orator_base::stage::progress::Progress;
+use orator_cluster::claim_files::UnitEnd;
+use orator_cluster::claims::{Claims, NextUnit};
+use orator_cluster::heartbeat::BeatWatch;
+use orator_cluster::shared_folder::{DiskFolder, SharedFolder};
 use serde_json::json;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};

@@ -2,12 +2,12 @@
 
 use super::report::Report;
 use anyhow::{Result, ensure};
-use orator::cluster::claim_files::{Claim, UnitEnd};
-use orator::cluster::claims::{Claims, NextUnit};
-use orator::cluster::heartbeat::{BeatWatch, DEAD_AFTER, Heartbeat, WORKERS};
-use orator::cluster::plan::{PIECE_SECS, PlannedUnit, UnitShare, in_order};
-use orator::cluster::shared_folder::SharedFolder;
-use orator::stage::progress::Progress;
+use orator_base::stage::progress::Progress;
+use orator_cluster::claim_files::{Claim, UnitEnd};
+use orator_cluster::claims::{Claims, NextUnit};
+use orator_cluster::heartbeat::{BeatWatch, DEAD_AFTER, Heartbeat, WORKERS};
+use orator_cluster::plan::{PIECE_SECS, PlannedUnit, UnitShare, in_order};
+use orator_cluster::shared_folder::SharedFolder;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::json;

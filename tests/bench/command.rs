@@ -6,7 +6,7 @@ use super::training::{lifter, seq2seq, train};
 use super::{claims, cluster, dataset, evaluate, generate, lift, pose2d, run, scale, spaces, study};
 use anyhow::{Context, Result};
 use clap::{CommandFactory, Parser, Subcommand};
-use orator::stage::progress::Progress;
+use orator_base::stage::progress::Progress;
 use std::ffi::OsString;
 use std::process::ExitCode;
 

@@ -3,20 +3,20 @@
 use super::report::{Report, median};
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array2, Array3};
-use orator::config;
-use orator::dataset::info::About;
-use orator::dataset::split::SplitBy;
-use orator::dataset::write::part::VideoSource;
-use orator::dataset::write::writer::DatasetWriter;
-use orator::dataset::{Dataset, Sample, Split};
-use orator::stage::progress::{Progress, Silent, Task};
-use orator::train::gan::train;
-use orator::train::gan::windows::WindowLoader;
-use orator::types::pose3d::Motion;
-use orator::types::skeleton::N_JOINTS;
-use orator::types::sound::{SAMPLE_RATE, Sound};
-use orator::types::sync;
-use orator::types::time::FrameRate;
+use orator_base::stage::progress::{Progress, Silent, Task};
+use orator_base::types::pose3d::Motion;
+use orator_base::types::skeleton::N_JOINTS;
+use orator_base::types::sound::{SAMPLE_RATE, Sound};
+use orator_base::types::sync;
+use orator_base::types::time::FrameRate;
+use orator_dataset::config;
+use orator_dataset::info::About;
+use orator_dataset::split::SplitBy;
+use orator_dataset::write::part::VideoSource;
+use orator_dataset::write::writer::DatasetWriter;
+use orator_dataset::{Dataset, Sample, Split};
+use orator_gesture::train::gan::train;
+use orator_gesture::train::gan::windows::WindowLoader;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::json;
@@ -217,8 +217,13 @@ fn loader(args: &Args, dir: &Path, out: &Path) -> Result<Loaded> {
     };
     let dataset = Dataset::open(dir)?;
     let start = Instant::now();
-    let examples =
-        WindowLoader::load(&dataset, Split::Train, &orator::train::gan::begin::normalisation(&dataset)?, 64, 5)?;
+    let examples = WindowLoader::load(
+        &dataset,
+        Split::Train,
+        &orator_gesture::train::gan::begin::normalisation(&dataset)?,
+        64,
+        5,
+    )?;
     let load_secs = start.elapsed().as_secs_f64();
     let mut rng = ChaCha8Rng::seed_from_u64(1337);
     let (mut n_loaded, start) = (0, Instant::now());

@@ -4,17 +4,17 @@ use super::report::{Report, median};
 use anyhow::{Result, ensure};
 use candle_core::{DType, Device, Tensor};
 use ndarray::{Array3, s};
-use orator::config;
-use orator::motion::upper_body::{COCO, L_WRIST, R_WRIST};
-use orator::nn::Mode;
-use orator::nn::lifter::body::BodyLifter;
-use orator::nn::lifter::hand::HandLifter;
-use orator::pipeline::lift::{Lifter, weights};
-use orator::stage::progress::Progress;
-use orator::train::scene::body::{FilmedScene, Filming};
-use orator::train::scene::hand_shape;
-use orator::types::pose2d::Keypoints;
-use orator::types::time::FrameRate;
+use orator_base::motion::upper_body::{COCO, L_WRIST, R_WRIST};
+use orator_base::stage::progress::Progress;
+use orator_base::types::pose2d::Keypoints;
+use orator_base::types::time::FrameRate;
+use orator_dataset::config;
+use orator_lab::train::scene::body::{FilmedScene, Filming};
+use orator_lab::train::scene::hand_shape;
+use orator_nn::Mode;
+use orator_nn::lifter::body::BodyLifter;
+use orator_nn::lifter::hand::HandLifter;
+use orator_pipeline::lift::{Lifter, weights};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::json;
@@ -32,10 +32,10 @@ pub struct Args {
     /// Rounds; each measures every variant once.
     #[arg(long, default_value_t = 7, value_name = "N")]
     rounds: usize,
-    /// Weights of `orator train lifter --part body`; without: the built-in ones.
+    /// Weights of `orator-lab train lifter --part body`; without: the built-in ones.
     #[arg(long, value_name = "FILE")]
     body_weights: Option<PathBuf>,
-    /// Weights of `orator train lifter --part hands`; without: the built-in ones.
+    /// Weights of `orator-lab train lifter --part hands`; without: the built-in ones.
     #[arg(long, value_name = "FILE")]
     hand_weights: Option<PathBuf>,
 }

@@ -1,8 +1,8 @@
 //! What a part gives back, and progress bars on standard error while it is measured.
 
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
-use orator::math::order;
-use orator::stage::progress::{Progress, Task};
+use orator_base::math::order;
+use orator_base::stage::progress::{Progress, Task};
 
 /// A measurement: as text for people and as one JSON object.
 pub struct Report {

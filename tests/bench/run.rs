@@ -3,8 +3,8 @@
 use super::child::{Child, measure};
 use super::report::{Report, median};
 use anyhow::{Context, Result, ensure};
-use orator::config;
-use orator::stage::progress::Progress;
+use orator_base::stage::progress::Progress;
+use orator_dataset::config;
 use serde_json::json;
 use std::fs;
 use std::path::PathBuf;

@@ -1,61 +1,26 @@
-//! Rules of the source tree: who may import whom, where types and foreign libraries live, what a file and a comment
-//! look like. `FLOORS` is the table of `src/lib.rs`.
+//! Rules of the source tree that Cargo cannot check: which crate owns a foreign library, where unsafe code is, and how
+//! files and types are divided. The layers themselves are the dependencies in the manifests of the crates.
 
-use crate::fixtures::imports::{SourceFile, Sources, rust_files, scan, tokens, without_comments, without_tests};
-use orator::stage::refusal::Refusal;
+use crate::fixtures::sources::{rust_files, scan, tokens, without_comments, without_tests};
+use orator_base::stage::refusal::Refusal;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Floor, room, and the rooms it may import.
-const FLOORS: [(u8, &str, &str); 22] = [
-    (1, "types", ""),
-    (1, "math", ""),
-    (1, "stage", ""),
-    (2, "config", "types stage"),
-    (2, "external", "types stage"),
-    (2, "audio", "types"),
-    (2, "motion", "types math"),
-    (3, "formats", "types math stage motion"),
-    (3, "nn", "types motion"),
-    (3, "render", "types math"),
-    (4, "mocap", "types math motion formats"),
-    (4, "metrics", "types math nn"),
-    (4, "generate", "types audio motion formats nn"),
-    (4, "animate", "types math stage motion formats external render"),
-    (5, "dataset", "types math stage config audio motion formats external mocap"),
-    (6, "pipeline", "types math stage config external audio motion formats nn generate animate dataset"),
-    (6, "train", "types math stage config external audio motion formats nn mocap dataset metrics generate"),
-    (6, "demo", "types math stage audio motion formats external mocap render animate dataset metrics generate"),
-    (7, "cluster", "types stage config external formats pipeline"),
-    (
-        7,
-        "evaluate",
-        "types math stage config external audio motion formats nn mocap metrics generate animate dataset pipeline train",
-    ),
-    (8, "report", "types stage config external formats metrics animate dataset pipeline train evaluate"),
-    (
-        9,
-        "study",
-        "types math stage config external audio motion formats mocap metrics generate animate dataset evaluate report",
-    ),
+/// Modules of a crate that must not import each other.
+const SIBLINGS: [(&str, &[&str]); 2] = [
+    ("src/pipeline", &["extract", "pose2d", "segment", "lift", "dataset"]),
+    ("src/media", &["ffmpeg", "opencv", "aligner"]),
 ];
 
-/// Folders that import nothing of each other: pairwise siblings under a room.
-const APART: [(&str, &[&str]); 2] = [
-    ("pipeline", &["extract", "pose2d", "segment", "lift", "shard", "dataset"]),
-    ("external", &["ffmpeg", "opencv", "onnx", "aligner"]),
-];
+/// Crates whose code is not part of the product.
+const NOT_PRODUCT: [&str; 2] = ["src/lab/", "src/test-support/"];
 
 /// Names that several types may carry.
-const COMMON_NAMES: [&str; 2] = ["Args", "Config"];
+const COMMON_NAMES: [&str; 3] = ["Args", "Config", "Cli"];
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-}
-
-fn library() -> Sources {
-    Sources::read(&root().join("src/lib.rs"))
 }
 
 /// Rust files of `src` and `tests` with their path below the repository and their text.
@@ -72,145 +37,78 @@ fn none(wrong: &[String]) {
     assert!(wrong.is_empty(), "{} places:\n{}", wrong.len(), wrong.join("\n"));
 }
 
-/// Pairs of importing and imported file.
-fn imports(sources: &Sources) -> Vec<(&SourceFile, &SourceFile)> {
-    let pairs = |from: usize| sources.imports(from).into_iter().map(move |to| (from, to));
-    let all = (0..sources.files.len()).flat_map(pairs);
-    all.map(|(from, to)| (&sources.files[from], &sources.files[to])).collect()
+/// Manifests of the root package and of all members: path below the repository, and the names of its dependencies.
+fn manifests() -> Vec<(String, BTreeSet<String>)> {
+    let members = fs::read_dir(root().join("src")).unwrap().map(|entry| entry.unwrap().path().join("Cargo.toml"));
+    let files = std::iter::once(root().join("Cargo.toml")).chain(members).filter(|file| file.is_file());
+    let read = |file: PathBuf| {
+        let manifest: toml::Table = fs::read_to_string(&file).unwrap().parse().unwrap();
+        let dependencies = manifest.get("dependencies").and_then(toml::Value::as_table);
+        (below_root(&file), dependencies.into_iter().flat_map(toml::Table::keys).cloned().collect())
+    };
+    files.map(read).collect()
 }
 
 #[test]
-fn the_map_in_lib_rs_is_the_table() {
-    let text = fs::read_to_string(root().join("src/lib.rs")).unwrap();
-    let rows = text.lines().filter_map(|line| line.strip_prefix("//! | "));
-    let cells = rows.map(|row| row.trim_end_matches('|').split(" | ").map(str::trim).collect::<Vec<_>>());
-    let shown: Vec<Vec<&str>> = cells.filter(|row| row[0].parse::<u8>().is_ok()).collect();
-    assert_eq!(shown.len(), FLOORS.len(), "rows of the map");
-    for (row, (floor, room, may_import)) in shown.into_iter().zip(FLOORS) {
-        assert_eq!(row.len(), 4, "{room}");
-        assert_eq!(row[0], floor.to_string(), "floor of {room}");
-        assert_eq!(row[1], format!("`{room}`"), "room");
-        assert!(!row[2].is_empty(), "{room} has no account");
-        let expected = if may_import.is_empty() { "nothing".to_owned() } else { format!("`{may_import}`") };
-        assert_eq!(row[3], expected, "imports of {room}");
-    }
-}
-
-#[test]
-fn every_folder_is_a_room() {
-    let folders = fs::read_dir(root().join("src")).unwrap().map(|entry| entry.unwrap().path());
-    let folders: BTreeSet<String> = folders
-        .filter(|path| path.is_dir())
-        .map(|path| path.file_name().unwrap().to_str().unwrap().to_owned())
-        .collect();
-    // `cli` belongs to the program; `guide` holds texts alone.
-    let rooms = FLOORS.iter().map(|(_, room, _)| *room).chain(["cli"]);
-    let known: BTreeSet<String> = rooms.map(str::to_owned).collect();
-    let missing: Vec<_> = known.difference(&folders).collect();
-    assert!(missing.is_empty(), "no folder: {missing:?}");
-    let unknown: Vec<_> = folders.difference(&known).filter(|name| *name != "guide").collect();
-    assert!(unknown.is_empty(), "not in the table: {unknown:?}");
-}
-
-#[test]
-fn imports_run_downwards_only() {
-    let sources = library();
+fn foreign_libraries_have_one_owner_each() {
+    let owners = [
+        ("ffmpeg-next", "src/media/Cargo.toml"),
+        ("opencv", "src/media/Cargo.toml"),
+        ("ort", "src/onnx/Cargo.toml"),
+        ("indicatif", "Cargo.toml"),
+        ("axum", "src/study/Cargo.toml"),
+        ("rusqlite", "src/study/Cargo.toml"),
+    ];
+    let manifests = manifests();
+    assert!(manifests.len() >= 11, "{manifests:?}");
     let mut wrong = Vec::new();
-    let all = imports(&sources);
-    for (from, to) in &all {
-        let (room, other) = (from.room(), to.room());
-        let Some((floor, _, allowed)) = FLOORS.iter().find(|(_, name, _)| *name == room) else { continue };
-        if room == other {
-            continue;
-        }
-        let below = FLOORS.iter().any(|(lower, name, _)| *name == other && lower < floor);
-        if !below || !allowed.split(' ').any(|name| name == other) {
-            wrong.push(format!("{} imports {}", from.name, to.name));
+    for (manifest, dependencies) in &manifests {
+        let foreign = owners.iter().filter(|(library, owner)| dependencies.contains(*library) && owner != manifest);
+        wrong.extend(foreign.map(|(library, owner)| format!("{manifest} names {library}, which belongs to {owner}")));
+    }
+    none(&wrong);
+}
+
+#[test]
+fn no_product_crate_depends_on_the_lab_or_on_test_support() {
+    let apart = ["orator-lab", "orator-test-support"];
+    let product =
+        manifests().into_iter().filter(|(name, _)| !NOT_PRODUCT.iter().any(|folder| name.starts_with(folder)));
+    let wrong = product.filter(|(_, dependencies)| apart.iter().any(|name| dependencies.contains(*name)));
+    none(&wrong.map(|(name, _)| name).collect::<Vec<_>>());
+}
+
+#[test]
+fn only_the_command_line_prints() {
+    let mut wrong = Vec::new();
+    for (name, text) in rust_texts().into_iter().filter(|(name, _)| name.starts_with("src/") && !name.contains("/cli/"))
+    {
+        let tokens = tokens(without_tests(&without_comments(&text)));
+        if tokens.windows(2).any(|pair| ["print", "println"].contains(&pair[0].as_str()) && pair[1] == "!") {
+            wrong.push(name);
         }
     }
     none(&wrong);
 }
 
 #[test]
-fn siblings_stay_apart() {
-    let sources = library();
+fn siblings_do_not_import_each_other() {
     let mut wrong = Vec::new();
-    for (from, to) in imports(&sources) {
-        for (room, siblings) in APART {
-            let sibling = |file: &SourceFile| {
-                let rest = file.name.strip_prefix(room)?.strip_prefix('/')?;
-                siblings.iter().find(|name| rest.starts_with(&format!("{name}/"))).copied()
-            };
-            if let (Some(here), Some(there)) = (sibling(from), sibling(to))
-                && here != there
-            {
-                wrong.push(format!("{} imports {}", from.name, to.name));
-            }
+    for (name, text) in rust_texts() {
+        let code = without_comments(&text);
+        let code = without_tests(&code);
+        for (folder, siblings) in SIBLINGS {
+            let sibling = name.strip_prefix(folder).and_then(|rest| rest[1..].split('/').next());
+            let Some(here) = sibling.filter(|here| siblings.contains(here)) else { continue };
+            let others = siblings.iter().filter(|other| **other != here);
+            let imported = others.filter(|other| code.contains(&format!("crate::{other}::")));
+            wrong.extend(imported.map(|other| format!("{name} imports {other}")));
         }
-        if from.name.starts_with("report/html/") && !to.name.starts_with("report/html/") {
-            wrong.push(format!("{} imports {}", from.name, to.name));
+        if name.starts_with("src/report/html/") && code.replace("crate::html::", "").contains("crate::") {
+            wrong.push(format!("{name} imports from outside of html"));
         }
     }
     none(&wrong);
-}
-
-/// Groups of files that import each other, by Tarjan's strongly connected components.
-fn circles(sources: &Sources) -> Vec<Vec<String>> {
-    struct Search<'a> {
-        next: &'a dyn Fn(usize) -> Vec<usize>,
-        index: BTreeMap<usize, usize>,
-        low: BTreeMap<usize, usize>,
-        stack: Vec<usize>,
-        found: Vec<Vec<usize>>,
-    }
-    fn visit(search: &mut Search, file: usize) {
-        let number = search.index.len();
-        search.index.insert(file, number);
-        search.low.insert(file, number);
-        search.stack.push(file);
-        for next in (search.next)(file) {
-            if !search.index.contains_key(&next) {
-                visit(search, next);
-                search.low.insert(file, search.low[&file].min(search.low[&next]));
-            } else if search.stack.contains(&next) {
-                search.low.insert(file, search.low[&file].min(search.index[&next]));
-            }
-        }
-        if search.low[&file] == search.index[&file] {
-            let begin = search.stack.iter().position(|other| *other == file).unwrap();
-            let group = search.stack.split_off(begin);
-            if group.len() > 1 {
-                search.found.push(group);
-            }
-        }
-    }
-    // Maps re-export their folder's files and have no code of their own.
-    let is_code = |file: &usize| !sources.files[*file].is_map();
-    let next = |file: usize| sources.imports(file).into_iter().filter(is_code).collect();
-    let mut search =
-        Search { next: &next, index: BTreeMap::new(), low: BTreeMap::new(), stack: Vec::new(), found: Vec::new() };
-    for file in (0..sources.files.len()).filter(is_code) {
-        if !search.index.contains_key(&file) {
-            visit(&mut search, file);
-        }
-    }
-    search.found.iter().map(|group| group.iter().map(|file| sources.files[*file].name.clone()).collect()).collect()
-}
-
-#[test]
-fn no_files_import_each_other_in_a_circle() {
-    for root_file in ["src/lib.rs", "tests/it/main.rs"] {
-        let circles = circles(&Sources::read(&root().join(root_file)));
-        assert!(circles.is_empty(), "{root_file}: {circles:#?}");
-    }
-}
-
-#[test]
-fn tests_import_helpers_from_fixtures_alone() {
-    let sources = Sources::read(&root().join("tests/it/main.rs"));
-    let code = imports(&sources).into_iter().filter(|(from, to)| !from.is_map() && !to.is_map());
-    let wrong = code.filter(|(_, to)| to.room() != "fixtures");
-    none(&wrong.map(|(from, to)| format!("{} imports {}", from.name, to.name)).collect::<Vec<_>>());
 }
 
 #[test]
@@ -222,7 +120,7 @@ fn a_folder_holds_at_most_16_files_and_its_map_no_code() {
         if root().join(name.trim_end_matches(".rs")).is_dir() {
             wrong.push(format!("{name} stands beside a folder of that name"));
         }
-        if file != "mod.rs" {
+        if !["mod.rs", "lib.rs"].contains(&file) {
             *n_files.entry(folder.to_owned()).or_default() += 1;
             continue;
         }
@@ -244,14 +142,21 @@ fn a_folder_holds_at_most_16_files_and_its_map_no_code() {
     none(&wrong);
 }
 
+/// Names of the structs, enums and traits that `text` defines outside of its tests.
+fn types(text: &str) -> Vec<String> {
+    let tokens = tokens(without_tests(&without_comments(text)));
+    let defines = |pair: &[String]| ["struct", "enum", "trait"].contains(&pair[0].as_str());
+    tokens.windows(2).filter(|pair| defines(pair)).map(|pair| pair[1].clone()).collect()
+}
+
 #[test]
-fn a_type_name_stands_once() {
-    let sources = library();
-    let mut files: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
-    for file in &sources.files {
-        file.types().into_iter().for_each(|name| files.entry(name).or_default().push(&file.name));
+fn a_type_name_is_defined_once() {
+    let mut files: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for (name, text) in rust_texts().into_iter().filter(|(name, _)| name.starts_with("src/") && !name.contains("/cli/"))
+    {
+        types(&text).into_iter().for_each(|defined| _ = files.entry(defined).or_default().insert(name.clone()));
     }
-    files.retain(|name, files| files.len() > 1 && !COMMON_NAMES.contains(name));
+    files.retain(|name, files| files.len() > 1 && !COMMON_NAMES.contains(&name.as_str()));
     assert!(files.is_empty(), "{files:#?}");
 }
 
@@ -261,7 +166,7 @@ fn stages_and_their_files_are_spelt_in_one_file() {
     let files = ["audio.wav", "timeline.npz", "media.json", "keypoints.npz", "measures.npz", "joints.npz"];
     let files = [&files[..], &["bones.json", "camera.json", "bone_change.npz", "hashes.json"]].concat();
     // The settings of a stage are a section of the fingerprint: a key of JSON.
-    none(&spelt_outside("stage/artifacts.rs", |string, is_key| {
+    none(&spelt_outside("base/stage/artifacts.rs", |string, is_key| {
         files.contains(&string) || names.contains(&string) && !is_key
     }));
 }
@@ -272,7 +177,7 @@ fn reasons_of_refusals_are_worded_in_one_file() {
     let common = ["quiet", "still", "face", "arms", "bones", "hands", "cut", "open", "jump", "no sound"];
     let reasons = Refusal::JUDGED.map(Refusal::reason);
     let is_reason = |string: &str| reasons.contains(&string) && !common.contains(&string);
-    none(&spelt_outside("stage/refusal.rs", |string, _| is_reason(string)));
+    none(&spelt_outside("base/stage/refusal.rs", |string, _| is_reason(string)));
 }
 
 /// Strings in code of the library and the program, outside `home` and outside tests, for which `is_wrong` holds; its
@@ -292,34 +197,8 @@ fn spelt_outside(home: &str, is_wrong: impl Fn(&str, bool) -> bool) -> Vec<Strin
 }
 
 #[test]
-fn foreign_libraries_have_one_door_each() {
-    let doors = [
-        ("ffmpeg_next", "external/ffmpeg/"),
-        ("opencv", "external/opencv/"),
-        ("ort", "external/onnx/"),
-        ("clap", "cli/"),
-        ("indicatif", "cli/"),
-    ];
-    let mut wrong = Vec::new();
-    for file in &library().files {
-        let libraries = file.libraries();
-        for (library, door) in doors {
-            if libraries.contains(library) && !file.name.starts_with(door) {
-                wrong.push(format!("{} names {library}, whose door is {door}", file.name));
-            }
-        }
-        let prints =
-            file.tokens.windows(2).any(|pair| ["print", "println"].contains(&pair[0].as_str()) && pair[1] == "!");
-        if prints && file.room() != "cli" {
-            wrong.push(format!("{} prints", file.name));
-        }
-    }
-    none(&wrong);
-}
-
-#[test]
 fn unsafe_code_stays_in_four_places() {
-    let homes = ["src/nn/cpu/", "src/external/ffmpeg/", "src/external/file_memory.rs", "src/process.rs"];
+    let homes = ["src/nn/cpu/", "src/media/ffmpeg/", "src/media/file_memory.rs", "src/process.rs"];
     let texts = rust_texts().into_iter().filter(|(name, _)| !homes.iter().any(|home| name.starts_with(home)));
     let names = texts.filter(|(_, text)| tokens(&without_comments(text)).iter().any(|token| token == "unsafe"));
     none(&names.map(|(name, _)| name).collect::<Vec<_>>());
@@ -332,5 +211,5 @@ fn media_are_opened_in_one_file() {
         |text: &str| ["format::input", "avformat_open_input"].iter().any(|call| without_comments(text).contains(call));
     let sources = rust_texts().into_iter().filter(|(name, text)| name.starts_with("src/") && opens(text));
     let names: Vec<String> = sources.map(|(name, _)| name).collect();
-    assert_eq!(names, ["src/external/ffmpeg/source.rs"]);
+    assert_eq!(names, ["src/media/ffmpeg/source.rs"]);
 }

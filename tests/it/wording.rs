@@ -1,7 +1,7 @@
 //! Rules of the texts: length of a file, its `//!`, the first words of a doc comment, and no reference to anything
 //! outside the repository.
 
-use crate::fixtures::imports::rust_files;
+use crate::fixtures::sources::rust_files;
 use std::fs;
 use std::path::{Path, PathBuf};
 

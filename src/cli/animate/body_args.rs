@@ -1,9 +1,9 @@
 //! Options of `orator animate` about trunk, head and legs.
 
 use super::input::InputMotion;
-use orator::animate::solve::legs::Legs;
-use orator::animate::{AnimationOptions, Yaw};
-use orator::types::posture::Posture;
+use orator_avatar::animate::solve::legs::Legs;
+use orator_avatar::animate::{AnimationOptions, Yaw};
+use orator_base::types::posture::Posture;
 
 #[derive(clap::Args)]
 pub struct BodyArgs {

@@ -1,8 +1,8 @@
 //! Options of `orator animate` that say how a film shows bodies.
 
 use anyhow::{Result, ensure};
-use orator::animate::export::film_avatar::FilmCamera;
-use orator::animate::export::film_panel::FilmStyle;
+use orator_avatar::animate::export::film_avatar::FilmCamera;
+use orator_avatar::animate::export::film_panel::FilmStyle;
 
 #[derive(clap::Args)]
 pub struct FilmArgs {

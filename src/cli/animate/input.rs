@@ -2,20 +2,20 @@
 
 use anyhow::{Context as _, Result, bail, ensure};
 use ndarray::{Array3, ArrayView3};
-use orator::dataset::index::SampleRef;
-use orator::dataset::{Dataset, Split};
-use orator::formats::{joints_npz, keypoints_npz};
-use orator::mocap::motion_file;
-use orator::mocap::motion_file::MotionFile;
-use orator::motion::posture;
-use orator::motion::posture::LiftedBody;
-use orator::motion::units;
-use orator::stage::artifacts::{Artifact, StageName};
-use orator::types::pose2d::{Keypoints, N_BODY};
-use orator::types::pose3d::Motion;
-use orator::types::posture::Posture;
-use orator::types::sound::Sound;
-use orator::types::time::FrameRate;
+use orator_base::motion::posture;
+use orator_base::motion::posture::LiftedBody;
+use orator_base::motion::units;
+use orator_base::stage::artifacts::{Artifact, StageName};
+use orator_base::types::pose2d::{Keypoints, N_BODY};
+use orator_base::types::pose3d::Motion;
+use orator_base::types::posture::Posture;
+use orator_base::types::sound::Sound;
+use orator_base::types::time::FrameRate;
+use orator_dataset::index::SampleRef;
+use orator_dataset::{Dataset, Split};
+use orator_formats::mocap::motion_file;
+use orator_formats::mocap::motion_file::MotionFile;
+use orator_formats::{joints_npz, keypoints_npz};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 

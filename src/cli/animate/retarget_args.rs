@@ -3,11 +3,11 @@
 use crate::cli::outputs::OutputFiles;
 use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, ensure};
-use orator::animate::Performance;
-use orator::animate::retarget::bone_map::BoneMap;
-use orator::animate::retarget::retargeted::RetargetRig;
-use orator::stage::progress::Progress as _;
-use orator::stage::workdir;
+use orator_avatar::animate::Performance;
+use orator_avatar::animate::retarget::bone_map::BoneMap;
+use orator_avatar::animate::retarget::retargeted::RetargetRig;
+use orator_base::stage::progress::Progress as _;
+use orator_base::stage::workdir;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]

@@ -1,9 +1,9 @@
 //! Options of smoothing.
 
 use anyhow::{Result, ensure};
-use orator::animate::Smoothing;
-use orator::animate::solve::smoothing::ONE_EURO;
-use orator::math::one_euro::OneEuro;
+use orator_avatar::animate::Smoothing;
+use orator_avatar::animate::solve::smoothing::ONE_EURO;
+use orator_base::math::one_euro::OneEuro;
 
 #[derive(clap::Args)]
 pub struct SmoothingArgs {

@@ -1,6 +1,6 @@
 //! Report of an animation in words.
 
-use orator::animate::performance::{AnimationReport, Jerk, SeenFrames};
+use orator_avatar::animate::performance::{AnimationReport, Jerk, SeenFrames};
 
 /// Lines on jerk, head, what was seen and what was clamped.
 pub fn words(report: &AnimationReport) -> String {

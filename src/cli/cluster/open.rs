@@ -2,9 +2,9 @@
 
 use crate::cli::confine::this_program;
 use anyhow::Result;
-use orator::cluster::plan::ClusterPlan;
-use orator::config;
-use orator::pipeline::Pipeline;
+use orator_cluster::plan::ClusterPlan;
+use orator_dataset::config;
+use orator_pipeline::Pipeline;
 use std::path::Path;
 
 /// Reads a plan and the pipeline it is of, and checks that they still belong together.

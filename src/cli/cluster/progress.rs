@@ -3,9 +3,9 @@
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::Result;
-use orator::cluster::heartbeat::DEAD_AFTER;
-use orator::cluster::plan::ClusterPlan;
-use orator::cluster::progress::{PlanProgress, WorkerProgress, progress};
+use orator_cluster::heartbeat::DEAD_AFTER;
+use orator_cluster::plan::ClusterPlan;
+use orator_cluster::progress::{PlanProgress, WorkerProgress, progress};
 use serde_json::json;
 use std::path::Path;
 

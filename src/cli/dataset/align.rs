@@ -4,11 +4,11 @@ use crate::cli::Outcome;
 use crate::cli::confine::confine;
 use crate::cli::ui::Ui;
 use anyhow::{Context, Result, ensure};
-use orator::dataset::align::{Alignment, align};
-use orator::external::aligner::Aligner;
-use orator::formats::transcript::Transcript;
-use orator::stage::progress::Progress;
-use orator::stage::workdir;
+use orator_base::stage::progress::Progress;
+use orator_base::stage::workdir;
+use orator_dataset::align::{Alignment, align};
+use orator_formats::transcript::Transcript;
+use orator_media::aligner::Aligner;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 

@@ -5,11 +5,11 @@ use crate::cli::Outcome;
 use crate::cli::confine::confine;
 use crate::cli::ui::Ui;
 use anyhow::Result;
-use orator::config::SplitUnit;
-use orator::dataset::split::SplitRule;
-use orator::dataset::verify::verify;
-use orator::dataset::verify::verify::accounts;
-use orator::dataset::{Dataset, Split};
+use orator_dataset::config::SplitUnit;
+use orator_dataset::split::SplitRule;
+use orator_dataset::verify::verify;
+use orator_dataset::verify::verify::accounts;
+use orator_dataset::{Dataset, Split};
 use serde_json::json;
 use std::path::PathBuf;
 

@@ -3,8 +3,8 @@
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::{Result, bail};
-use orator::evaluate::table::compare;
-use orator::evaluate::table::result::StoredResult;
+use orator_gesture::evaluate::table::compare;
+use orator_gesture::evaluate::table::result::StoredResult;
 use serde_json::json;
 use std::path::PathBuf;
 

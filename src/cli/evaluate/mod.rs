@@ -1,8 +1,6 @@
 //! `orator evaluate`.
 
 pub mod compare;
-pub mod lifter;
-pub mod people;
 pub mod verb;
 
 pub use verb::{Args, run};

@@ -1,23 +1,24 @@
 //! `orator evaluate`.
 
-use super::{compare, lifter, people};
+use super::compare;
 use crate::cli::Outcome;
 use crate::cli::config_args::split;
 use crate::cli::confine::confine;
+use crate::cli::moved::MovedVerb;
 use crate::cli::ui::Ui;
 use anyhow::{Result, bail, ensure};
-use orator::dataset::{Dataset, Split};
-use orator::evaluate::Evaluation;
-use orator::evaluate::clips::checkpoint::EvaluatedCheckpoint;
-use orator::evaluate::clips::motion_store::{HELD_BYTES, MotionStore};
-use orator::evaluate::table::result;
-use orator::evaluate::verdict::text;
-use orator::metrics::settings::Convention;
-use orator::metrics::settings::MetricSettings;
-use orator::pipeline::batch::motion_files::model_lock;
-use orator::report::evaluation::page;
-use orator::stage::workdir::{self, FolderLock};
-use orator::types::time::FrameRate;
+use orator_base::stage::workdir::{self, FolderLock};
+use orator_base::types::time::FrameRate;
+use orator_dataset::{Dataset, Split};
+use orator_gesture::batch::motion_files::model_lock;
+use orator_gesture::evaluate::Evaluation;
+use orator_gesture::evaluate::clips::checkpoint::EvaluatedCheckpoint;
+use orator_gesture::evaluate::clips::motion_store::{HELD_BYTES, MotionStore};
+use orator_gesture::evaluate::table::result;
+use orator_gesture::evaluate::verdict::text;
+use orator_gesture::metrics::settings::Convention;
+use orator_gesture::metrics::settings::MetricSettings;
+use orator_report::evaluation::page;
 use serde::Deserialize as _;
 use serde::de::IntoDeserializer as _;
 use serde_json::{Value, json};
@@ -39,9 +40,11 @@ pub struct Args {
 
 #[derive(clap::Subcommand)]
 enum What {
-    Lifter(lifter::Args),
     Compare(compare::Args),
-    People(people::Args),
+    #[command(hide = true)]
+    Lifter(MovedVerb),
+    #[command(hide = true)]
+    People(MovedVerb),
 }
 
 #[derive(clap::Args)]
@@ -88,15 +91,11 @@ struct MotionArgs {
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let MotionArgs { report, dataset, checkpoint, .. } = &args.motion;
-    let report = match &args.what {
-        Some(What::People(people)) => people.report.as_deref(),
-        _ => report.as_deref(),
-    };
-    confine(report, dataset.iter().chain(checkpoint).map(PathBuf::as_path));
+    confine(report.as_deref(), dataset.iter().chain(checkpoint).map(PathBuf::as_path));
     match args.what {
-        Some(What::Lifter(args)) => lifter::run(args, ui),
+        Some(What::Lifter(args)) => args.refuse("evaluate lifter"),
         Some(What::Compare(args)) => compare::run(&args, ui),
-        Some(What::People(args)) => people::run(&args, ui),
+        Some(What::People(args)) => args.refuse("evaluate people"),
         None => motion(&args.motion, ui),
     }
 }

@@ -5,8 +5,8 @@ use crate::cli::confine::confine;
 use crate::cli::signals;
 use crate::cli::ui::Ui;
 use anyhow::Result;
-use orator::pipeline::batch::{BatchReport, BatchState, SpeechBatch};
-use orator::stage::counted;
+use orator_base::stage::counted;
+use orator_gesture::batch::{BatchReport, BatchState, SpeechBatch};
 use serde_json::json;
 
 /// Sounds of the closing table at most, failures not counted.

@@ -4,19 +4,19 @@ use crate::cli::Outcome;
 use crate::cli::confine::confine;
 use crate::cli::ui::Ui;
 use anyhow::{Context, Result, bail, ensure};
-use orator::animate::export::file::ExportFormat;
-use orator::config;
-use orator::formats::joints::description;
-use orator::formats::keypoints;
-use orator::formats::keypoints::{CoordinateUnit, range};
-use orator::formats::npz::Npz;
-use orator::formats::{keypoints_npz, npy};
-use orator::pipeline::keypoints::take_in;
-use orator::pipeline::lift::Lifter;
-use orator::stage::progress::Progress;
-use orator::types::pose2d::Keypoints;
-use orator::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST};
-use orator::types::time::FrameRate;
+use orator_avatar::animate::export::file::ExportFormat;
+use orator_base::stage::progress::Progress;
+use orator_base::types::pose2d::Keypoints;
+use orator_base::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST};
+use orator_base::types::time::FrameRate;
+use orator_dataset::config;
+use orator_formats::joints::description;
+use orator_formats::keypoints;
+use orator_formats::keypoints::{CoordinateUnit, range};
+use orator_formats::npz::Npz;
+use orator_formats::{keypoints_npz, npy};
+use orator_pipeline::keypoints::take_in;
+use orator_pipeline::lift::Lifter;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -51,10 +51,10 @@ pub struct Args {
     /// Turn the motion as if the camera had been level and the speaker's torso upright on average.
     #[arg(long)]
     level: bool,
-    /// Weights of `orator train lifter --part body`; without: the built-in ones.
+    /// Weights of `orator-lab train lifter --part body`; without: the built-in ones.
     #[arg(long, value_name = "FILE")]
     body_weights: Option<PathBuf>,
-    /// Weights of `orator train lifter --part hands`; without: the built-in ones.
+    /// Weights of `orator-lab train lifter --part hands`; without: the built-in ones.
     #[arg(long, value_name = "FILE")]
     hand_weights: Option<PathBuf>,
     /// Width of the Gaussian that smooths arms, in frames at 15 fps; 0: none.
@@ -139,7 +139,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let started = Instant::now();
     let lifted = lifter.lift_all(&keypoints).with_context(|| format!("cannot lift {}", args.keypoints.display()))?;
     let secs = started.elapsed().as_secs_f64();
-    notes.extend(orator::pipeline::lift::notes(&keypoints, &lifted));
+    notes.extend(orator_pipeline::lift::notes(&keypoints, &lifted));
     notes.iter().for_each(|note| ui.say(&format!("{}: {note}", args.keypoints.display())));
     let (motion, camera) = (&lifted.motion, lifted.cameras.first());
     format.write_joints(&args.out, motion)?;

@@ -3,8 +3,8 @@
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::{Context, Result};
-use orator::config::DEFAULT_FILE;
-use orator::stage::workdir;
+use orator_base::stage::workdir;
+use orator_dataset::config::DEFAULT_FILE;
 use serde_json::json;
 use std::path::PathBuf;
 

@@ -5,12 +5,12 @@ use crate::cli::config_args::ConfigArgs;
 use crate::cli::confine::confine;
 use crate::cli::ui::Ui;
 use anyhow::Result;
-use orator::pipeline::Pipeline;
-use orator::report;
-use orator::report::ReportRequest;
-use orator::report::html::numbers::{length, percent};
-use orator::stage::artifacts;
-use orator::stage::workdir::{self, FolderLock};
+use orator_base::stage::artifacts;
+use orator_base::stage::workdir::{self, FolderLock};
+use orator_pipeline::Pipeline;
+use orator_report as report;
+use orator_report::ReportRequest;
+use orator_report::html::numbers::{length, percent};
 use serde_json::json;
 use std::path::PathBuf;
 

@@ -8,13 +8,13 @@ use crate::cli::signals;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use orator::cluster::estimate::timing;
-use orator::config::Settings;
-use orator::external::onnx::{ModelError, ModelStore};
-use orator::pipeline::pose2d::models::wanted;
-use orator::pipeline::segment::speech_rule::SpeechListener;
-use orator::pipeline::{Pipeline, Selection};
-use orator::stage::artifacts::StageName;
+use orator_base::stage::artifacts::StageName;
+use orator_cluster::estimate::timing;
+use orator_dataset::config::Settings;
+use orator_onnx::{ModelError, ModelStore};
+use orator_pipeline::pose2d::models::wanted;
+use orator_pipeline::segment::speech_rule::SpeechListener;
+use orator_pipeline::{Pipeline, Selection};
 use serde_json::json;
 
 /// Run the stages extract, pose2d, segment, lift, dataset for every video of every speaker.
@@ -73,7 +73,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         ended => ended?,
     };
 
-    let counts = |(stage, n): (&StageName, &orator::pipeline::StageCounts)| {
+    let counts = |(stage, n): (&StageName, &orator_pipeline::StageCounts)| {
         format!("{stage:8} {} done, {} up to date, {} failed", n.done, n.fresh, n.failed)
     };
     let mut lines: Vec<String> = report.stages.iter().map(counts).collect();

@@ -6,10 +6,10 @@ use crate::cli::config_args::ConfigArgs;
 use crate::cli::confine::confine;
 use crate::cli::ui::Ui;
 use anyhow::Result;
-use orator::pipeline::{Pipeline, StagePlan, StatusReport, TimeAccount, UnitState, UnitStatus};
-use orator::stage::artifacts;
-use orator::stage::artifacts::StageName;
-use orator::stage::ledger::longest_first;
+use orator_base::stage::artifacts;
+use orator_base::stage::artifacts::StageName;
+use orator_base::stage::ledger::longest_first;
+use orator_pipeline::{Pipeline, StagePlan, StatusReport, TimeAccount, UnitState, UnitStatus};
 use serde_json::json;
 use std::path::PathBuf;
 

@@ -7,14 +7,14 @@ use crate::cli::confine::this_program;
 use crate::cli::dataset::align::default_python;
 use crate::cli::ui::Ui;
 use anyhow::Result;
-use orator::config::{Config, Settings};
-use orator::external::aligner::Aligner;
-use orator::external::onnx::{ModelStore, Runtime};
-use orator::formats::word_vectors::WordVectors;
-use orator::pipeline::pose2d::models;
-use orator::pipeline::process::probe;
-use orator::pipeline::segment::speech_rule::SpeechListener;
-use orator::stage::workdir;
+use orator_base::stage::workdir;
+use orator_dataset::config::{Config, Settings};
+use orator_formats::word_vectors::WordVectors;
+use orator_media::aligner::Aligner;
+use orator_onnx::{ModelStore, Runtime};
+use orator_pipeline::pose2d::models;
+use orator_pipeline::process::probe;
+use orator_pipeline::segment::speech_rule::SpeechListener;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -40,8 +40,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let config =
         if args.config.config.exists() || !args.config.set.is_empty() { args.config.load() } else { defaults() };
     let mut checks = vec![
-        ok("ffmpeg libraries", orator::external::ffmpeg::version()),
-        ok("OpenCV", orator::external::opencv::version()),
+        ok("ffmpeg libraries", orator_media::ffmpeg::version()),
+        ok("OpenCV", orator_media::opencv::version()),
         ok("processor cores", std::thread::available_parallelism().map_or(1, |n| n.get()).to_string()),
     ];
     match config {

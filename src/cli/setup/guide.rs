@@ -2,9 +2,9 @@
 
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
+use crate::guide::TOPICS;
 use anyhow::Result;
 use clap::builder::PossibleValuesParser;
-use orator::guide::TOPICS;
 use serde_json::json;
 
 /// Print a page of the guide, or the list of its pages.
@@ -18,7 +18,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
-    let facts = |topic: &orator::guide::Topic| json!({ "topic": topic.name, "summary": topic.summary });
+    let facts = |topic: &crate::guide::Topic| json!({ "topic": topic.name, "summary": topic.summary });
     match TOPICS.iter().find(|topic| Some(topic.name) == args.topic.as_deref()) {
         Some(topic) => {
             let mut page = facts(topic);

@@ -3,13 +3,13 @@
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::Result;
-use orator::config;
-use orator::config::Settings;
-use orator::external::onnx::{Fetched, MANIFEST_FILE, ModelEntry, ModelError, ModelOrigin, ModelState, ModelStore};
-use orator::external::onnx::{Runtime, Wanted, find_library};
-use orator::pipeline::pose2d::models;
-use orator::pipeline::segment::speech_rule::SpeechListener;
-use orator::stage::progress::Progress as _;
+use orator_base::stage::progress::Progress as _;
+use orator_dataset::config;
+use orator_dataset::config::Settings;
+use orator_onnx::{Fetched, MANIFEST_FILE, ModelEntry, ModelError, ModelOrigin, ModelState, ModelStore};
+use orator_onnx::{Runtime, Wanted, find_library};
+use orator_pipeline::pose2d::models;
+use orator_pipeline::segment::speech_rule::SpeechListener;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 

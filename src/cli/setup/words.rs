@@ -3,11 +3,11 @@
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::{Context, Result, ensure};
-use orator::config::{self, Settings};
-use orator::external::onnx::{ModelStore, sha256_of};
-use orator::formats::transcript::Transcript;
-use orator::formats::word_vectors::{WordVectors, glove, wink};
-use orator::stage::workdir;
+use orator_base::stage::workdir;
+use orator_dataset::config::{self, Settings};
+use orator_formats::transcript::Transcript;
+use orator_formats::word_vectors::{WordVectors, glove, wink};
+use orator_onnx::{ModelStore, sha256_of};
 use serde_json::{Value, json};
 use std::fs::File;
 use std::io::BufReader;

@@ -5,11 +5,11 @@ use crate::cli::confine::confine;
 use crate::cli::signals;
 use crate::cli::ui::Ui;
 use anyhow::Result;
-use orator::stage::counted;
-use orator::study::build::{BuiltSpeaker, BuiltStudy, build};
-use orator::study::file::{ConditionSource, StudyFile, filled};
-use orator::study::pages::page_texts::text_keys;
-use orator::study::stimuli::film::SIZE;
+use orator_base::stage::counted;
+use orator_study::build::{BuiltSpeaker, BuiltStudy, build};
+use orator_study::file::{ConditionSource, StudyFile, filled};
+use orator_study::pages::page_texts::text_keys;
+use orator_study::stimuli::film::SIZE;
 use serde_json::json;
 use std::path::PathBuf;
 

@@ -3,8 +3,8 @@
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::Result;
-use orator::study::export::{TableForm, export, export_posts};
-use orator::study::folder::StudyFolder;
+use orator_study::export::{TableForm, export, export_posts};
+use orator_study::folder::StudyFolder;
 use serde_json::json;
 use std::path::PathBuf;
 

@@ -3,8 +3,8 @@
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::Result;
-use orator::study::folder::StudyFolder;
-use orator::study::server::start::StudyServer;
+use orator_study::folder::StudyFolder;
+use orator_study::server::start::StudyServer;
 use serde_json::json;
 use std::net::{IpAddr, SocketAddr};
 use std::path::PathBuf;

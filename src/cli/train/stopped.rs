@@ -1,11 +1,12 @@
 //! What is said of a training that was asked to end, and did.
 
+use crate::StoppedTraining;
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::Result;
-use orator::StoppedTraining;
-use orator::cluster::shell::shell;
+use orator_cluster::shell::shell;
 use serde_json::json;
+use std::path::Path;
 
 /// The closing words of a training that ended by request; any other error stays one.
 pub fn told(error: anyhow::Error, ui: &Ui) -> Result<Outcome> {
@@ -35,6 +36,7 @@ pub fn told(error: anyhow::Error, ui: &Ui) -> Result<Outcome> {
 
 /// The command as it was typed, for a shell.
 fn same_command() -> String {
-    let words = std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned());
-    shell(&std::iter::once("orator".to_owned()).chain(words).collect::<Vec<_>>())
+    let mut words = std::env::args_os().map(|word| word.to_string_lossy().into_owned());
+    let program = words.next().and_then(|path| Some(Path::new(&path).file_name()?.to_string_lossy().into_owned()));
+    shell(&std::iter::once(program.unwrap_or_else(|| "orator".to_owned())).chain(words).collect::<Vec<_>>())
 }

@@ -1,11 +1,11 @@
 //! `orator train`: one file a network.
 
-use super::{basis, embedding, gan, lifter, noise, pose, seq2seq, stopped};
+use super::{gan, seq2seq, stopped};
 use crate::cli::Outcome;
-use crate::cli::signals;
+use crate::cli::moved::MovedVerb;
 use crate::cli::ui::Ui;
 
-/// Train the lifters, a model of bodies, a speaker's generator, or the spaces that `evaluate` compares motion in.
+/// Train a speaker's generator on a dataset.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(subcommand)]
@@ -14,30 +14,29 @@ pub struct Args {
 
 #[derive(clap::Subcommand)]
 enum Network {
-    Basis(basis::Args),
-    Embedding(embedding::Args),
     Gan(gan::Args),
-    Lifter(lifter::Args),
-    Noise(noise::Args),
-    Pose(pose::Args),
     Seq2seq(seq2seq::Args),
+    #[command(hide = true)]
+    Basis(MovedVerb),
+    #[command(hide = true)]
+    Embedding(MovedVerb),
+    #[command(hide = true)]
+    Lifter(MovedVerb),
+    #[command(hide = true)]
+    Noise(MovedVerb),
 }
 
 pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
     const STOPPING: &str = "stopping after this step, with a checkpoint; the next signal ends at once";
     const KEPT: &str = "the newest checkpoint is kept, and the same command goes on from it";
-    match args.network {
-        Network::Basis(_) | Network::Noise(_) => signals::tell_when_stopped("nothing is kept of what was begun"),
-        _ => ui.listens_for_stop(STOPPING, KEPT),
-    }
+    ui.listens_for_stop(STOPPING, KEPT);
     let ended = match args.network {
-        Network::Basis(args) => basis::run(args, ui),
-        Network::Embedding(args) => embedding::run(args, ui),
         Network::Gan(args) => gan::run(args, ui),
-        Network::Lifter(args) => lifter::run(args, ui),
-        Network::Noise(args) => noise::run(&args, ui),
-        Network::Pose(args) => pose::run(&args, ui),
         Network::Seq2seq(args) => seq2seq::run(args, ui),
+        Network::Basis(args) => args.refuse("train basis"),
+        Network::Embedding(args) => args.refuse("train embedding"),
+        Network::Lifter(args) => args.refuse("train lifter"),
+        Network::Noise(args) => args.refuse("train noise"),
     };
     ended.or_else(|error| stopped::told(error, ui))
 }

@@ -2,14 +2,14 @@
 
 use crate::cli::ui::Ui;
 use anyhow::{Context, Result, bail};
-use orator::config::Config;
-use orator::dataset::index::SampleRef;
-use orator::dataset::{Dataset, Split};
-use orator::report::training::live::{LivePage, PosesOfBest};
-use orator::stage::progress::Progress as _;
-use orator::train::epochs::ValidatedStep;
-use orator::types::file_name::FileName;
-use orator::types::time::FrameRate;
+use orator_base::stage::progress::Progress as _;
+use orator_base::types::file_name::FileName;
+use orator_base::types::time::FrameRate;
+use orator_dataset::config::Config;
+use orator_dataset::index::SampleRef;
+use orator_dataset::{Dataset, Split};
+use orator_gesture::train::epochs::ValidatedStep;
+use orator_report::training::live::{LivePage, PosesOfBest};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 

@@ -1,9 +1,9 @@
 //! Settings that would make a run cheaper or better, each as a changed configuration.
 
-use crate::config::Config;
-use crate::external::onnx::{ModelRole, ModelState, ModelStore};
-use crate::pipeline::pose2d::models;
 use anyhow::Result;
+use orator_dataset::config::Config;
+use orator_onnx::{ModelRole, ModelState, ModelStore};
+use orator_pipeline::pose2d::models;
 
 /// The changes that can be timed here, each as `--set` takes it, with the configuration so changed: body models that are
 /// there, the rate, how often people are looked for, no face.

@@ -1,10 +1,10 @@
 //! How long the stages take on a machine, from times of excerpts, and what that means for whole videos.
 
 use super::wall::{self, VideoWork};
-use crate::pipeline::extract::spans;
-use crate::stage::artifacts::StageName;
-use crate::stage::workdir;
 use anyhow::Result;
+use orator_base::stage::artifacts::StageName;
+use orator_base::stage::workdir;
+use orator_pipeline::extract::spans;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

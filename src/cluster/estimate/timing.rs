@@ -4,17 +4,17 @@
 use super::menu;
 use super::process_memory::MemoryWatch;
 use super::stage_times::{Alternative, StageCost, StageTimes};
-use crate::cluster::plan::{PlannedUnit, settings_hash};
-use crate::config::Config;
-use crate::formats::media_json::MediaInfo;
-use crate::pipeline::process::message::{ExcerptRequest, MediaRequest};
-use crate::pipeline::timing::StageTime;
-use crate::pipeline::{Pipeline, Selection};
-use crate::stage::artifacts::{Artifact, StageName};
-use crate::stage::fingerprint::hash_file;
-use crate::stage::progress::{Progress, Silent, Task};
-use crate::stage::{Unit, workdir};
+use crate::plan::{PlannedUnit, settings_hash};
 use anyhow::{Context, Result, ensure};
+use orator_base::stage::artifacts::{Artifact, StageName};
+use orator_base::stage::fingerprint::hash_file;
+use orator_base::stage::progress::{Progress, Silent, Task};
+use orator_base::stage::{Unit, workdir};
+use orator_dataset::config::Config;
+use orator_formats::media_json::MediaInfo;
+use orator_pipeline::process::message::{ExcerptRequest, MediaRequest};
+use orator_pipeline::timing::StageTime;
+use orator_pipeline::{Pipeline, Selection};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

@@ -2,15 +2,15 @@
 //! to the forgotten ones are removed from them, the common files are assembled again, and the new folder replaces the
 //! old one.
 
-use crate::dataset::info::DatasetInfo;
-use crate::dataset::leakage::Leakage;
-use crate::dataset::split::SplitBy;
-use crate::dataset::write::assemble::assemble;
-use crate::dataset::write::part;
-use crate::dataset::write::part::VideoEntry;
-use crate::dataset::{INFO, LEAKAGE};
-use crate::stage::workdir;
+use crate::info::DatasetInfo;
+use crate::leakage::Leakage;
+use crate::split::SplitBy;
+use crate::write::assemble::assemble;
+use crate::write::part;
+use crate::write::part::VideoEntry;
+use crate::{INFO, LEAKAGE};
 use anyhow::{Context, Result, ensure};
+use orator_base::stage::workdir;
 use std::collections::BTreeSet;
 use std::path::Path;
 

@@ -2,15 +2,15 @@
 //! name or work name.
 
 use crate::config::{Config, videos};
-use crate::dataset::split::SplitRecord;
-use crate::dataset::write::part;
-use crate::dataset::write::part::VideoEntry;
-use crate::stage::artifacts;
-use crate::stage::artifacts::{StageName, speaker_dir};
-use crate::stage::fingerprint::hash_file;
-use crate::stage::parts::PARTS;
-use crate::stage::record::Record;
+use crate::split::SplitRecord;
+use crate::write::part;
+use crate::write::part::VideoEntry;
 use anyhow::{Result, bail, ensure};
+use orator_base::stage::artifacts;
+use orator_base::stage::artifacts::{StageName, speaker_dir};
+use orator_base::stage::fingerprint::hash_file;
+use orator_base::stage::parts::PARTS;
+use orator_base::stage::record::Record;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 

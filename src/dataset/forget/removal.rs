@@ -5,13 +5,13 @@
 use super::dataset;
 use super::known::KnownVideo;
 use super::search::SearchTerm;
-use crate::dataset::split::SplitRecord;
-use crate::formats::checkpoint;
-use crate::stage::artifacts;
-use crate::stage::artifacts::{StageName, speaker_dir};
-use crate::stage::fingerprint::hash_file;
-use crate::stage::{record, workdir};
+use crate::split::SplitRecord;
 use anyhow::{Context, Result};
+use orator_base::stage::artifacts;
+use orator_base::stage::artifacts::{StageName, speaker_dir};
+use orator_base::stage::fingerprint::hash_file;
+use orator_base::stage::{record, workdir};
+use orator_formats::checkpoint;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -287,7 +287,7 @@ fn terms(videos: &[&KnownVideo], others: &[&KnownVideo]) -> Vec<SearchTerm> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::formats::checkpoint::Contents;
+    use orator_formats::checkpoint::Contents;
     use std::collections::BTreeMap;
 
     #[test]

@@ -1,12 +1,12 @@
 //! Motion files below the sources by content, each with the sound and transcript of its name in its own folder or in a
 //! neighbouring one (`bvh/`, `wav/`, `tsv/`).
 
-use crate::dataset::INFO;
-use crate::dataset::write::part;
-use crate::formats::npz::Npz;
-use crate::formats::{search, transcript};
-use crate::mocap::captured::MotionKind;
+use crate::INFO;
+use crate::write::part;
 use anyhow::{Context, Result, ensure};
+use orator_formats::mocap::captured::MotionKind;
+use orator_formats::npz::Npz;
+use orator_formats::{search, transcript};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};

@@ -1,9 +1,9 @@
 //! Request and outcome of an import.
 
 use crate::config;
-use crate::dataset::import::take::TakeLimits;
-use crate::dataset::info::About;
-use crate::mocap::captured::MotionKind;
+use crate::import::take::TakeLimits;
+use crate::info::About;
+use orator_formats::mocap::captured::MotionKind;
 use serde::Serialize;
 use std::path::PathBuf;
 

@@ -1,20 +1,20 @@
 //! Tar shards outside a dataset folder: members are found by name, in any order and any tar; other files are left out
 //! and noted. Bytes of members stay unchanged wherever a dataset can hold them.
 
-use crate::dataset::Split;
-use crate::dataset::sample::{EXTENSIONS, N_KEYPOINTS, OPTIONAL_EXTENSIONS, Sample, WORDS_EXTENSION};
-use crate::formats::npy_slice;
-use crate::formats::npy_slice::{Element, Layout};
-use crate::formats::wav;
-use crate::stage::ledger::{Kept, Ledger, Refused};
-use crate::stage::refusal::{FrameRefusal, Refusal};
-use crate::types::pose3d::Motion;
-use crate::types::posture::Posture;
-use crate::types::skeleton::N_JOINTS;
-use crate::types::sound::{SAMPLE_RATE, Sound};
-use crate::types::time::FrameRate;
+use crate::Split;
+use crate::sample::{EXTENSIONS, N_KEYPOINTS, OPTIONAL_EXTENSIONS, Sample, WORDS_EXTENSION};
 use anyhow::{Context, Result, bail, ensure};
 use ndarray::{Array2, Array3};
+use orator_base::stage::ledger::{Kept, Ledger, Refused};
+use orator_base::stage::refusal::{FrameRefusal, Refusal};
+use orator_base::types::pose3d::Motion;
+use orator_base::types::posture::Posture;
+use orator_base::types::skeleton::N_JOINTS;
+use orator_base::types::sound::{SAMPLE_RATE, Sound};
+use orator_base::types::time::FrameRate;
+use orator_formats::npy_slice;
+use orator_formats::npy_slice::{Element, Layout};
+use orator_formats::wav;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};

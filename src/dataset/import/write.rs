@@ -7,19 +7,19 @@ use super::plan::{ImportOutcome, ImportPlan};
 use super::source::{ImportItem, InspectedItem};
 use crate::config;
 use crate::config::SplitUnit;
-use crate::dataset::info::DatasetInfo;
-use crate::dataset::leakage::SoundComparison;
-use crate::dataset::split;
-use crate::dataset::split::{Assignment, RecordedSplit, SplitBy, SplitPlan, SplitRule, Unassigned, blocks};
-use crate::dataset::stats::DatasetStats;
-use crate::dataset::write::part;
-use crate::dataset::write::writer::DatasetWriter;
-use crate::dataset::{INFO, shared_sound};
-use crate::mocap::captured::MotionKind;
-use crate::stage::counted;
-use crate::stage::ledger::Ledger;
-use crate::stage::progress::Progress;
+use crate::info::DatasetInfo;
+use crate::leakage::SoundComparison;
+use crate::split;
+use crate::split::{Assignment, RecordedSplit, SplitBy, SplitPlan, SplitRule, Unassigned, blocks};
+use crate::stats::DatasetStats;
+use crate::write::part;
+use crate::write::writer::DatasetWriter;
+use crate::{INFO, shared_sound};
 use anyhow::{Context, Result, ensure};
+use orator_base::stage::counted;
+use orator_base::stage::ledger::Ledger;
+use orator_base::stage::progress::Progress;
+use orator_formats::mocap::captured::MotionKind;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -34,7 +34,7 @@ pub struct Imported {
 }
 
 /// Frame rate of the first dataset folder among the sources, the default rate of an import.
-pub fn rate_of(sources: &[PathBuf]) -> Option<crate::types::time::FrameRate> {
+pub fn rate_of(sources: &[PathBuf]) -> Option<orator_base::types::time::FrameRate> {
     let info = sources.iter().find_map(|source| std::fs::read(source.join(INFO)).ok())?;
     serde_json::from_slice::<DatasetInfo>(&info).ok().map(|info| info.fps)
 }

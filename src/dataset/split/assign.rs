@@ -7,8 +7,8 @@ use super::blocks::Span;
 use super::fill::Fill;
 use super::record::{RecordedSplit, SplitBy};
 use crate::config::choices::SplitUnit;
-use crate::dataset::shared_sound::SharedSound;
-use crate::types::split::{Split, TimeBlock};
+use crate::shared_sound::SharedSound;
+use orator_base::types::split::{Split, TimeBlock};
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 

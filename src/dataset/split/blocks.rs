@@ -1,9 +1,9 @@
 //! A video in blocks of time, each of one split. Between blocks of different splits lies a guard gap, which is cut off
 //! both of them when samples are cut, so that a longer gap moves no block.
 
-use crate::types::interval::Interval;
-use crate::types::split::{Split, TimeBlock};
-use crate::types::time::FrameRate;
+use orator_base::types::interval::Interval;
+use orator_base::types::split::{Split, TimeBlock};
+use orator_base::types::time::FrameRate;
 
 /// Kept seconds after which a long video has another block of every split.
 const CYCLE_SECS: f64 = 600.0;

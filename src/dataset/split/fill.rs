@@ -1,6 +1,6 @@
 //! Filling of splits toward their shares by seconds.
 
-use crate::types::split::Split;
+use orator_base::types::split::Split;
 
 /// Seconds in each split beside those it should have.
 #[derive(Clone, Debug, PartialEq)]

@@ -6,6 +6,6 @@ pub mod blocks;
 pub mod fill;
 pub mod record;
 
-pub use crate::types::split::{Split, TimeBlock};
 pub use assign::{Assignment, SplitPlan, Unassigned, assign};
+pub use orator_base::types::split::{Split, TimeBlock};
 pub use record::{RecordedSplit, SplitBy, SplitRecord, SplitRule};

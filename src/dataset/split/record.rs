@@ -2,9 +2,9 @@
 //! folder, which is replaced as a whole.
 
 use crate::config::choices::SplitUnit;
-use crate::stage::workdir;
-use crate::types::split::{Split, TimeBlock};
 use anyhow::{Context, Result, ensure};
+use orator_base::stage::workdir;
+use orator_base::types::split::{Split, TimeBlock};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -2,10 +2,10 @@
 //! split, and samples of different splits are as far apart as the dataset states.
 
 use crate::config::choices::SplitUnit;
-use crate::dataset::info::DatasetInfo;
-use crate::dataset::write::part::VideoEntry;
-use crate::types::split::Split;
+use crate::info::DatasetInfo;
+use crate::write::part::VideoEntry;
 use anyhow::{Context, Result, ensure};
+use orator_base::types::split::Split;
 use std::ops::Range;
 
 /// Checks the splits of a video.

@@ -1,9 +1,9 @@
 //! Consistency of a sample: matching shapes, joints present where the mask says so, constant bones, keypoints in range.
 
-use crate::dataset::sample::Sample;
-use crate::types::posture::PostureChannel;
-use crate::types::skeleton::{L_HAND, N_JOINTS, NECK, R_HAND, parent};
+use crate::sample::Sample;
 use anyhow::{Result, ensure};
+use orator_base::types::posture::PostureChannel;
+use orator_base::types::skeleton::{L_HAND, N_JOINTS, NECK, R_HAND, parent};
 
 /// Largest deviation of a bone from its length, metres: the rounding of float32 half a metre from the neck.
 const BONE_TOLERANCE: f64 = 1e-5;

@@ -6,18 +6,18 @@
 
 use super::blocks;
 use super::sample::check_sample;
-use crate::dataset::info::DatasetInfo;
-use crate::dataset::leakage::Leakage;
-use crate::dataset::read::Dataset;
-use crate::dataset::write::assemble::{LedgerLine, assemble_into};
-use crate::dataset::write::part;
-use crate::dataset::write::part::VideoEntry;
-use crate::dataset::{CHECKSUMS, INFO, LEAKAGE, README};
-use crate::stage::fingerprint::hash_file;
-use crate::stage::progress::Progress;
-use crate::stage::workdir::FolderLock;
-use crate::types::time::FrameRate;
+use crate::info::DatasetInfo;
+use crate::leakage::Leakage;
+use crate::read::Dataset;
+use crate::write::assemble::{LedgerLine, assemble_into};
+use crate::write::part;
+use crate::write::part::VideoEntry;
+use crate::{CHECKSUMS, INFO, LEAKAGE, README};
 use anyhow::{Context, Result, ensure};
+use orator_base::stage::fingerprint::hash_file;
+use orator_base::stage::progress::Progress;
+use orator_base::stage::workdir::FolderLock;
+use orator_base::types::time::FrameRate;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
@@ -297,7 +297,7 @@ fn read_json<T: serde::de::DeserializeOwned>(dir: &Path, name: &str) -> Result<T
 
 /// Ledgers of all videos of the dataset in `dir`.
 pub fn accounts(dir: &Path) -> Result<Vec<LedgerLine>> {
-    let path = dir.join(crate::dataset::LEDGER);
+    let path = dir.join(crate::LEDGER);
     let text = std::fs::read_to_string(&path).with_context(|| format!("reading {}", path.display()))?;
     let parse = |line: &str| serde_json::from_str(line).with_context(|| format!("{} is damaged", path.display()));
     text.lines().map(parse).collect()

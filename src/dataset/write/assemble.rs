@@ -5,14 +5,14 @@
 
 use super::part;
 use super::part::VideoEntry;
-use crate::dataset::bones::{VideoBones, of_speaker};
-use crate::dataset::info::{About, DatasetInfo, DatasetVideo, SplitInfo};
-use crate::dataset::leakage::{Leakage, SoundComparison};
-use crate::dataset::split::{Split, TimeBlock};
-use crate::dataset::stats::{DatasetStats, StatsCollector};
-use crate::dataset::{CHECKSUMS, INDEX, INFO, LEAKAGE, LEDGER, README, STATS, card};
-use crate::stage::ledger::Ledger;
+use crate::bones::{VideoBones, of_speaker};
+use crate::info::{About, DatasetInfo, DatasetVideo, SplitInfo};
+use crate::leakage::{Leakage, SoundComparison};
+use crate::split::{Split, TimeBlock};
+use crate::stats::{DatasetStats, StatsCollector};
+use crate::{CHECKSUMS, INDEX, INFO, LEAKAGE, LEDGER, README, STATS, card};
 use anyhow::{Context, Result};
+use orator_base::stage::ledger::Ledger;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -64,7 +64,7 @@ pub fn assemble_into(
         let path = VideoEntry::path(dir, &name);
         let part = VideoEntry::read(&path)?;
         checksums.extend(part.files());
-        checksums.insert(format!("{}/{name}.json", part::FOLDER), crate::stage::fingerprint::hash_file(&path)?);
+        checksums.insert(format!("{}/{name}.json", part::FOLDER), orator_base::stage::fingerprint::hash_file(&path)?);
         gatherer.push(&part);
         part.samples.iter().try_for_each(|sample| index.line(sample))?;
         let n_frames: usize = part.samples.iter().map(|sample| sample.n_frames).sum();

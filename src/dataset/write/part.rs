@@ -3,16 +3,16 @@
 //! video is added or forgotten without touching another.
 
 use super::tar::ShardWriter;
-use crate::dataset::bones::VideoBones;
-use crate::dataset::index::{SampleRef, ShardRef};
-use crate::dataset::joint_stats::JointMoments;
-use crate::dataset::sample::Sample;
-use crate::dataset::split::SplitBy;
-use crate::stage::fingerprint::hash_file;
-use crate::stage::ledger::Ledger;
-use crate::types::file_name::FileName;
-use crate::types::split::{Split, TimeBlock};
+use crate::bones::VideoBones;
+use crate::index::{SampleRef, ShardRef};
+use crate::joint_stats::JointMoments;
+use crate::sample::Sample;
+use crate::split::SplitBy;
 use anyhow::{Context, Result, bail, ensure};
+use orator_base::stage::fingerprint::hash_file;
+use orator_base::stage::ledger::Ledger;
+use orator_base::types::file_name::FileName;
+use orator_base::types::split::{Split, TimeBlock};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs;
@@ -97,7 +97,7 @@ impl EntryWriter {
             "two videos would be called {name} in the dataset; rename the file {file} or leave it out"
         );
         let part = VideoEntry {
-            schema: crate::dataset::SCHEMA,
+            schema: crate::SCHEMA,
             name: FileName::new(name)?,
             file,
             content,
@@ -189,7 +189,7 @@ impl VideoEntry {
         let bytes = fs::read(path).with_context(|| format!("reading {}", path.display()))?;
         let wrong = || format!("{} is not as the dataset stage writes it; run the stage again", path.display());
         let part: Self = serde_json::from_slice(&bytes).with_context(wrong)?;
-        ensure!(part.schema == crate::dataset::SCHEMA, "{} has layout version {}", path.display(), part.schema);
+        ensure!(part.schema == crate::SCHEMA, "{} has layout version {}", path.display(), part.schema);
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         ensure!(part.name == *stem, "{} speaks of the video {:?}", path.display(), part.name);
         let is_own = |shard: &&ShardRef| {
@@ -261,7 +261,7 @@ impl VideoEntry {
 
 /// Hashes by path from `checksums.b3` of the dataset in `dir`; empty where it cannot be read.
 pub fn stated_hashes(dir: &Path) -> BTreeMap<String, String> {
-    let text = fs::read_to_string(dir.join(crate::dataset::CHECKSUMS)).unwrap_or_default();
+    let text = fs::read_to_string(dir.join(crate::CHECKSUMS)).unwrap_or_default();
     text.lines().filter_map(|line| line.split_once("  ")).map(|(hash, file)| (file.into(), hash.into())).collect()
 }
 

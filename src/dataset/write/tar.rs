@@ -1,11 +1,11 @@
 //! Tar shards with reproducible bytes (ustar, no times, no owners). A sample is never divided; its location and hash
 //! are recorded while writing.
 
-use crate::dataset::index::{ByteRange, SampleRef, ShardRef};
-use crate::dataset::sample::{EXTENSIONS, OPTIONAL_EXTENSIONS, Sample};
-use crate::dataset::split::Split;
-use crate::types::file_name::FileName;
+use crate::index::{ByteRange, SampleRef, ShardRef};
+use crate::sample::{EXTENSIONS, OPTIONAL_EXTENSIONS, Sample};
+use crate::split::Split;
 use anyhow::{Context, Result};
+use orator_base::types::file_name::FileName;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};

@@ -2,10 +2,10 @@
 
 use super::assemble::assemble;
 use super::part::{EntryWriter, VideoSource};
-use crate::dataset::info::{About, DatasetInfo};
-use crate::dataset::leakage::SoundComparison;
-use crate::dataset::split::{Split, SplitBy, TimeBlock};
-use crate::dataset::stats::DatasetStats;
+use crate::info::{About, DatasetInfo};
+use crate::leakage::SoundComparison;
+use crate::split::{Split, SplitBy, TimeBlock};
+use crate::stats::DatasetStats;
 use anyhow::Result;
 use std::path::{Path, PathBuf};
 

@@ -3,13 +3,13 @@
 
 use super::read::{Bvh, Channel};
 use super::skeleton::BvhSkeleton;
-use crate::math::rotation::Rotation;
-use crate::math::savitzky_golay::SavitzkyGolay;
-use crate::math::vec3::Vec3;
-use crate::motion::exponential_map::make_continuous;
-use crate::types::time::FrameRate;
 use anyhow::{Context, Result, bail, ensure};
 use ndarray::{Array2, ArrayView2};
+use orator_base::math::rotation::Rotation;
+use orator_base::math::savitzky_golay::SavitzkyGolay;
+use orator_base::math::vec3::Vec3;
+use orator_base::motion::exponential_map::make_continuous;
+use orator_base::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -261,7 +261,7 @@ pub fn smooth(features: &mut Array2<f32>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::vec3::{norm, sub};
+    use orator_base::math::vec3::{norm, sub};
 
     /// A skeleton with the joints of GENEA and hips, legs and fingers beside them, whose angles swing; the captures' own order
     /// of channels. `legs` moves what is not learnt.

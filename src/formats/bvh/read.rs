@@ -1,10 +1,10 @@
 //! Reads BVH: any hierarchy, channels in any order and number, and the positions of all joints in a frame. What the
 //! joints mean is `mocap`'s.
 
-use crate::math::rotation::Rotation;
-use crate::math::vec3;
-use crate::math::vec3::Vec3;
 use anyhow::{Context, Result, anyhow, bail, ensure};
+use orator_base::math::rotation::Rotation;
+use orator_base::math::vec3;
+use orator_base::math::vec3::Vec3;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

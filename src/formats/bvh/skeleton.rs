@@ -1,10 +1,10 @@
 //! The skeleton of a BVH file, kept so that other motion can be written in it: joints, offsets and channels as they were.
 
 use super::read::{Bvh, Channel};
-use crate::math::rotation::Rotation;
-use crate::math::vec3::{self, Vec3};
-use crate::types::time::FrameRate;
 use anyhow::{Result, ensure};
+use orator_base::math::rotation::Rotation;
+use orator_base::math::vec3::{self, Vec3};
+use orator_base::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 
@@ -157,7 +157,7 @@ fn channel_name(channel: &Channel) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::formats::bvh::read::Positions;
+    use crate::bvh::read::Positions;
 
     const TEXT: &str = include_str!("../../../fixtures/reference/bvh_take.bvh");
 

@@ -1,10 +1,10 @@
 //! Writes BVH: a skeleton with local rotations over time. The root has six channels, every other joint three, in the
 //! order Z X Y; an end of a bone is an `End Site`. Which skeleton, and in which axes and units, is the caller's.
 
-use crate::math::rotation::Rotation;
-use crate::math::vec3::{Vec3, add, scale};
-use crate::motion::fk::{Joint, Skeleton};
-use crate::types::time::FrameRate;
+use orator_base::math::rotation::Rotation;
+use orator_base::math::vec3::{Vec3, add, scale};
+use orator_base::motion::fk::{Joint, Skeleton};
+use orator_base::types::time::FrameRate;
 use std::fmt::Write as _;
 use std::io;
 
@@ -201,14 +201,14 @@ mod tests {
             let spine = skeleton.push("Spine", Some(hips), offsets, false);
             skeleton.push("", Some(spine), [0.0, 10.0, 1.0], true);
             let turn = |(axis, angle): ([f64; 3], f64)| {
-                let axis = crate::math::vec3::unit(axis, 1e-3).unwrap_or([0.0, 1.0, 0.0]);
+                let axis = orator_base::math::vec3::unit(axis, 1e-3).unwrap_or([0.0, 1.0, 0.0]);
                 Rotation::about(axis, angle)
             };
             let local = turns.chunks(2).map(|t| vec![turn(t[0]), turn(t[1]), Rotation::IDENTITY]).collect();
             let clip = BvhClip { skeleton, fps: FrameRate::new(30, 1), root: [1.0, 90.0, -2.0], travel: Vec::new(), local };
-            let read = crate::formats::bvh::read::Bvh::parse(&clip.to_bvh()).unwrap();
+            let read = crate::bvh::read::Bvh::parse(&clip.to_bvh()).unwrap();
             proptest::prop_assert_eq!(read.n_frames, clip.n_frames());
-            let positions = read.positions(crate::formats::bvh::read::Positions::Replace);
+            let positions = read.positions(crate::bvh::read::Positions::Replace);
             for (frame, found) in positions.iter().enumerate() {
                 for (a, b) in found.iter().zip(clip.positions(frame)) {
                     proptest::prop_assert!((0..3).all(|k| (a[k] - b[k]).abs() < 1e-4), "{a:?} {b:?}");

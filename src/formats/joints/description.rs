@@ -2,9 +2,9 @@
 //! beside `motion.txt`. One object: `format` "orator joints", `version` 1, `fps` [numerator, denominator] (a number is
 //! read too), `n_frames`, `shape`, `units`, `axes`.
 
-use crate::stage::workdir;
-use crate::types::time::FrameRate;
 use anyhow::{Context as _, Result, bail, ensure};
+use orator_base::stage::workdir;
+use orator_base::types::time::FrameRate;
 use serde::Deserialize;
 use serde_json::json;
 use std::io::ErrorKind;

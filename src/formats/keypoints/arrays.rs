@@ -4,14 +4,14 @@
 use super::entry::point;
 use super::found::{FoundKeypoints, FoundPerson, NamedArrays};
 use super::{mediapipe, pats};
-use crate::formats::keypoints_npz;
-use crate::formats::npy;
-use crate::formats::npz::Npz;
-use crate::types::pose2d::Keypoint;
-use crate::types::time::FrameRate;
+use crate::keypoints_npz;
+use crate::npy;
+use crate::npz::Npz;
 use anyhow::{Context, Result, bail};
 use ndarray::{Array3, ArrayD, ArrayView2, Axis, IxDyn};
 use ndarray_npy::ReadNpyError;
+use orator_base::types::pose2d::Keypoint;
+use orator_base::types::time::FrameRate;
 use std::path::Path;
 
 /// Reads the one array of a `.npy` file.

@@ -4,8 +4,8 @@
 use super::found::FoundPerson;
 use super::layout::PointLayout;
 use super::numbers::PointNumbers;
-use crate::types::pose2d::{Keypoint, N_HAND};
-use crate::types::skeleton::Side;
+use orator_base::types::pose2d::{Keypoint, N_HAND};
+use orator_base::types::skeleton::Side;
 use serde::Deserialize;
 
 /// Keys of all formats together; each file has some of them.

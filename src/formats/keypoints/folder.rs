@@ -3,7 +3,7 @@
 use super::document::{self, FramePeople};
 use super::entry::JsonEntry;
 use super::found::FoundKeypoints;
-use crate::formats::joints::description::is_one;
+use crate::joints::description::is_one;
 use anyhow::{Context, Result, bail, ensure};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,9 +1,9 @@
 //! Keypoints as another program found them: everybody in every frame, at the program's own rate and in its own unit.
 
 use super::range::{MOST_LOOKED_AT, UPPER_BODY, are_shares};
-use crate::types::pose2d::{Keypoint, N_BODY, N_HAND, PersonBox};
-use crate::types::time::FrameRate;
 use ndarray::ArrayD;
+use orator_base::types::pose2d::{Keypoint, N_BODY, N_HAND, PersonBox};
+use orator_base::types::time::FrameRate;
 
 /// Arrays of a file by their names; the only one of a `.npy` file has none.
 pub type NamedArrays = Vec<(String, ArrayD<f32>)>;

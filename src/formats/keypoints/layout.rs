@@ -2,7 +2,7 @@
 //! wrist, then thumb to little finger, each base to tip.
 
 use super::found::FoundPerson;
-use crate::types::pose2d::{Keypoint, N_BODY, N_HAND};
+use orator_base::types::pose2d::{Keypoint, N_BODY, N_HAND};
 
 /// A point that the format does not have.
 const NONE: usize = usize::MAX;

@@ -6,9 +6,9 @@
 use super::entry::point;
 use super::found::{FoundKeypoints, FoundPerson, NamedArrays};
 use super::layout::MEDIAPIPE;
-use crate::types::pose2d::{Keypoint, N_HAND};
 use anyhow::{Result, ensure};
 use ndarray::{Array3, ArrayView3, Ix2, Ix3, s};
+use orator_base::types::pose2d::{Keypoint, N_HAND};
 
 const N_POSE: usize = 33;
 /// Face landmarks, without and with irises.

@@ -5,9 +5,9 @@
 use super::entry::point;
 use super::found::{CoordinateUnit, FoundKeypoints, NamedArrays};
 use super::layout::PATS;
-use crate::types::pose2d::Keypoint;
-use crate::types::time::FrameRate;
 use anyhow::{Result, ensure};
+use orator_base::types::pose2d::Keypoint;
+use orator_base::types::time::FrameRate;
 
 const N: usize = PATS.n_points;
 const RATE: FrameRate = FrameRate::new(15, 1);

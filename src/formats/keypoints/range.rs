@@ -1,8 +1,8 @@
 //! Where keypoints lie: in pixels, in shares of the picture, or where no picture is.
 
-use crate::math::order::Ordered;
-use crate::types::pose2d::Keypoints;
 use anyhow::{Result, ensure};
+use orator_base::math::order::Ordered;
+use orator_base::types::pose2d::Keypoints;
 
 /// Points of the body that every format shows and every camera sees: face and arms.
 pub const UPPER_BODY: usize = 11;

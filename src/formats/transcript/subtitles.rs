@@ -97,7 +97,7 @@ fn plain(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::formats::transcript::WordSource;
+    use crate::transcript::WordSource;
 
     #[test]
     fn cues_of_both_formats_become_words() {

@@ -1,10 +1,10 @@
 //! The brick of generator and discriminator: convolution (padding "same", with bias), batch norm (eps 1e-3), leaky
 //! ReLU 0.2; over time, or over time and frequency. Channels come last.
 
-use crate::nn::ops::batch_norm::BatchNorm;
-use crate::nn::ops::conv_norm::conv_norm;
-use crate::nn::ops::conv2d;
-use crate::nn::params::{Init, Params};
+use crate::ops::batch_norm::BatchNorm;
+use crate::ops::conv_norm::conv_norm;
+use crate::ops::conv2d;
+use crate::params::{Init, Params};
 use candle_core::{Result, Tensor};
 
 const EPS: f64 = 1e-3;
@@ -58,7 +58,7 @@ impl ConvBlock {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nn::ops::gradcheck::{pattern, worst};
+    use crate::ops::gradcheck::{pattern, worst};
     use candle_core::DType;
 
     #[test]

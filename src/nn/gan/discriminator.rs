@@ -2,9 +2,9 @@
 //! about every fourth frame as real or generated (Ginosar et al. 2019).
 
 use super::conv_block::{ConvBlock, MOMENTUM, SLOPE};
-use crate::nn::ops::conv2d::Conv;
-use crate::nn::ops::resize;
-use crate::nn::params::Params;
+use crate::ops::conv2d::Conv;
+use crate::ops::resize;
+use crate::params::Params;
 use candle_core::{Result, Tensor};
 
 const KERNEL: usize = 4;
@@ -49,7 +49,7 @@ pub fn motion(poses: &Tensor) -> Result<Tensor> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nn::ops::gradcheck::{pattern, worst};
+    use crate::ops::gradcheck::{pattern, worst};
     use candle_core::DType;
 
     #[test]

@@ -4,9 +4,9 @@
 
 use super::conv_block::ConvBlock;
 use super::speaker_layer::SpeakerLayer;
-use crate::nn::ops::conv2d::Conv;
-use crate::nn::ops::resize;
-use crate::nn::params::Params;
+use crate::ops::conv2d::Conv;
+use crate::ops::resize;
+use crate::params::Params;
 use candle_core::{Result, Tensor};
 use serde::{Deserialize, Serialize};
 
@@ -186,7 +186,7 @@ fn audio_encoder(params: &mut Params, config: &Config) -> Result<Vec<ConvBlock>>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nn::ops::gradcheck::{pattern, worst};
+    use crate::ops::gradcheck::{pattern, worst};
     use candle_core::DType;
 
     fn size(preset: Preset, n_out: usize) -> Result<usize> {

@@ -2,7 +2,7 @@
 //! hidden network; Gemello et al. 2007). Encoder and UNet are common to all: what is heard and how arms move; the layer
 //! says what this speaker answers to what is heard.
 
-use crate::nn::params::{Init, Params};
+use crate::params::{Init, Params};
 use candle_core::{IndexOp, Result, Tensor};
 
 /// Begins the name of each tensor that has a row a speaker.
@@ -60,7 +60,7 @@ fn of_speakers(table: &Tensor, speakers: &[u32], n_sounds: usize) -> Result<Tens
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nn::ops::gradcheck::{pattern, worst};
+    use crate::ops::gradcheck::{pattern, worst};
     use candle_core::DType;
 
     #[test]

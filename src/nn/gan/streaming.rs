@@ -4,7 +4,7 @@
 //! the result is that of one pass.
 
 use super::generator::{FRAMES_MULTIPLE, Generator, Preset};
-use crate::nn::ops::resize;
+use crate::ops::resize;
 use candle_core::{Result, Tensor};
 use std::ops::Range;
 
@@ -139,9 +139,9 @@ impl<M: FnMut(Range<usize>) -> Result<Tensor>> Iterator for StreamingGenerator<'
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nn::gan::generator::Config;
-    use crate::nn::ops::gradcheck::pattern;
-    use crate::nn::params::Params;
+    use crate::gan::generator::Config;
+    use crate::ops::gradcheck::pattern;
+    use crate::params::Params;
     use candle_core::DType;
     use std::collections::BTreeMap;
 

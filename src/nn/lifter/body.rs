@@ -2,11 +2,11 @@
 //! poses over time.
 
 use super::temporal::{Config, TemporalLifter};
-use crate::motion::upper_body::{Pose, SeenBody};
-use crate::motion::view::body::{BodyView, N_IN, N_OUT, mirror_mean};
-use crate::nn::Mode;
-use crate::nn::params::Params;
+use crate::Mode;
+use crate::params::Params;
 use candle_core::{Device, Result, Tensor};
+use orator_base::motion::upper_body::{Pose, SeenBody};
+use orator_base::motion::view::body::{BodyView, N_IN, N_OUT, mirror_mean};
 
 /// Windows that go through the network together.
 const BATCH: usize = 256;

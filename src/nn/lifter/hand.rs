@@ -1,13 +1,13 @@
 //! The hand lifter: the 21 keypoints of one hand in one frame to 21 joints. A plain perceptron on coordinates, which
 //! carry all that heat-maps drawn at the same points would (Zimmermann & Brox 2017 used such maps).
 
-use crate::motion::view::hand::{HandJoints, HandView, SeenHand};
-use crate::nn::Mode;
-use crate::nn::ops::dropout::dropout;
-use crate::nn::ops::linear::Linear;
-use crate::nn::params::Params;
-use crate::types::skeleton::Side;
+use crate::Mode;
+use crate::ops::dropout::dropout;
+use crate::ops::linear::Linear;
+use crate::params::Params;
 use candle_core::{Device, Module, Result, Tensor};
+use orator_base::motion::view::hand::{HandJoints, HandView, SeenHand};
+use orator_base::types::skeleton::Side;
 use serde::{Deserialize, Serialize};
 
 /// Prefix of the network's tensors in a weights file.
@@ -78,7 +78,7 @@ impl HandLifter {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nn::ops::gradcheck::{pattern, worst};
+    use crate::ops::gradcheck::{pattern, worst};
     use candle_core::DType;
 
     #[test]

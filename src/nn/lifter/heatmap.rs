@@ -3,15 +3,15 @@
 //! `hand_lifter`; not built into the program.
 
 use super::hand;
-use crate::motion::view::hand::{HandJoints, SeenHand};
-use crate::motion::view::heatmaps::{Crop, N_MAPS, PLACES, assembled, score_maps};
-use crate::nn::Mode;
-use crate::nn::ops::conv3x3::Conv3x3;
-use crate::nn::ops::dropout::dropout;
-use crate::nn::ops::linear::Linear;
-use crate::nn::params::{Init, Params};
-use crate::types::skeleton::Side;
+use crate::Mode;
+use crate::ops::conv3x3::Conv3x3;
+use crate::ops::dropout::dropout;
+use crate::ops::linear::Linear;
+use crate::params::{Init, Params};
 use candle_core::{D, Device, Module, Result, Tensor};
+use orator_base::motion::view::hand::{HandJoints, SeenHand};
+use orator_base::motion::view::heatmaps::{Crop, N_MAPS, PLACES, assembled, score_maps};
+use orator_base::types::skeleton::Side;
 
 /// Prefix of the network's tensors in a weights file.
 pub const NAME: &str = hand::NAME;
@@ -149,10 +149,10 @@ pub fn rotation(vectors: &Tensor) -> Result<Tensor> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::rotation::Rotation;
-    use crate::math::vec3;
-    use crate::nn::ops::gradcheck::{pattern, worst};
+    use crate::ops::gradcheck::{pattern, worst};
     use candle_core::{DType, Device};
+    use orator_base::math::rotation::Rotation;
+    use orator_base::math::vec3;
 
     #[test]
     fn the_layers_have_the_published_sizes() -> anyhow::Result<()> {

@@ -1,11 +1,11 @@
 //! The temporal-convolution lifter of VideoPose3D (Pavllo et al. 2019): 2D keypoints over time to 3D joints of the
 //! middle frame, in its strided form: windows of exactly one receptive field, without wasted work.
 
-use crate::nn::Mode;
-use crate::nn::ops::batch_norm::BatchNorm;
-use crate::nn::ops::conv1d::Conv1d;
-use crate::nn::ops::dropout::dropout;
-use crate::nn::params::Params;
+use crate::Mode;
+use crate::ops::batch_norm::BatchNorm;
+use crate::ops::conv1d::Conv1d;
+use crate::ops::dropout::dropout;
+use crate::params::Params;
 use candle_core::{Module, Result, Tensor};
 use serde::{Deserialize, Serialize};
 
@@ -122,7 +122,7 @@ impl TemporalLifter {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nn::ops::gradcheck::{pattern, worst};
+    use crate::ops::gradcheck::{pattern, worst};
     use candle_core::DType;
 
     #[test]

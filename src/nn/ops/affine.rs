@@ -2,10 +2,10 @@
 //! piece of rows by one thread, results independent of the number of threads.
 
 use super::operator::{CpuOperator, CustomOperator, Operand};
-use crate::nn::cpu::packed_matrix::PackedMatrix;
-use crate::nn::cpu::tensor::{Matrix, Scalar, add_product};
-use crate::nn::cpu::thread_team::parallel_each;
-use crate::nn::params::{Init, Params};
+use crate::cpu::packed_matrix::PackedMatrix;
+use crate::cpu::tensor::{Matrix, Scalar, add_product};
+use crate::cpu::thread_team::parallel_each;
+use crate::params::{Init, Params};
 use candle_core::{D, Module, Result, Shape, Tensor};
 
 /// Rows that are multiplied before their sums are stored.
@@ -166,7 +166,7 @@ impl CpuOperator for AffineOp {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nn::ops::gradcheck::{any_threads_give_the_same, apart, pattern, worst};
+    use crate::ops::gradcheck::{any_threads_give_the_same, apart, pattern, worst};
     use candle_core::{DType, Var};
 
     #[test]

@@ -4,9 +4,9 @@
 
 use super::fallback;
 use super::operator::{CpuOperator, CustomOperator, Operand};
-use crate::nn::cpu::tensor::{GRAIN, LANES, Scalar, sum};
-use crate::nn::cpu::vectorised::{DropMask, drop_out};
-use crate::nn::params::{Init, Params};
+use crate::cpu::tensor::{GRAIN, LANES, Scalar, sum};
+use crate::cpu::vectorised::{DropMask, drop_out};
+use crate::params::{Init, Params};
 use candle_core::{Device, Result, Shape, Tensor, Var};
 use rayon::prelude::*;
 use std::sync::{Arc, OnceLock};
@@ -255,7 +255,7 @@ impl CpuOperator for BatchNormOp {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nn::ops::gradcheck::{apart, pattern, worst};
+    use crate::ops::gradcheck::{apart, pattern, worst};
     use candle_core::DType;
 
     #[test]

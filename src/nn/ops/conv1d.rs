@@ -3,9 +3,9 @@
 //! is one matrix product; sums run in a fixed order, so results do not depend on the number of threads.
 
 use super::operator::{CpuOperator, CustomOperator, Operand};
-use crate::nn::cpu::axis::ConvAxis;
-use crate::nn::cpu::tensor::{GRAIN, Matrix, Scalar, matmul, scratch, sum};
-use crate::nn::params::{Init, Params};
+use crate::cpu::axis::ConvAxis;
+use crate::cpu::tensor::{GRAIN, Matrix, Scalar, matmul, scratch, sum};
+use crate::params::{Init, Params};
 use candle_core::{Module, Result, Shape, Tensor};
 use rayon::prelude::*;
 
@@ -197,9 +197,9 @@ impl CpuOperator for Conv1dOp {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nn::cpu::direct_conv::ConvSizes;
-    use crate::nn::ops::conv2d;
-    use crate::nn::ops::gradcheck::{any_threads_give_the_same, apart, pattern, worst};
+    use crate::cpu::direct_conv::ConvSizes;
+    use crate::ops::conv2d;
+    use crate::ops::gradcheck::{any_threads_give_the_same, apart, pattern, worst};
     use candle_core::{DType, Var};
 
     #[test]

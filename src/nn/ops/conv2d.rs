@@ -3,13 +3,13 @@
 
 use super::fallback;
 use super::operator::{CpuOperator, CustomOperator, Operand};
-use crate::nn::cpu::axis::ConvAxis;
-use crate::nn::cpu::channel_stats;
-use crate::nn::cpu::direct_conv;
-use crate::nn::cpu::direct_conv::ConvSizes;
-use crate::nn::cpu::tensor::Scalar;
-use crate::nn::cpu::weight_gradient;
-use crate::nn::params::{Init, Params};
+use crate::cpu::axis::ConvAxis;
+use crate::cpu::channel_stats;
+use crate::cpu::direct_conv;
+use crate::cpu::direct_conv::ConvSizes;
+use crate::cpu::tensor::Scalar;
+use crate::cpu::weight_gradient;
+use crate::params::{Init, Params};
 use candle_core::{Result, Shape, Tensor};
 
 /// The sizes of a convolution of `x` with `weight` [O, C, K] or [O, C, K, K'], padding "same".
@@ -78,7 +78,7 @@ impl Conv {
 
 /// The convolution of these sizes, on any device.
 pub fn conv(x: &Tensor, weight: &Tensor, bias: &Tensor, sizes: ConvSizes) -> Result<Tensor> {
-    if crate::nn::device::needs_fallback(x) {
+    if crate::device::needs_fallback(x) {
         return fallback::conv(x, weight, bias, &sizes);
     }
     x.contiguous()?.apply_op3(weight, bias, CustomOperator(ConvOp { sizes }))
@@ -106,7 +106,7 @@ impl CpuOperator for ConvOp {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nn::ops::gradcheck::{any_threads_give_the_same, apart, pattern, worst};
+    use crate::ops::gradcheck::{any_threads_give_the_same, apart, pattern, worst};
     use candle_core::{DType, Var};
 
     /// Input, weight and bias of a batch of two.

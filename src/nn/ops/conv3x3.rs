@@ -1,8 +1,8 @@
 //! Convolution of pictures with kernels of 3 x 3, padding "same", channels last: every output place's patch becomes a
 //! row, and the layer one matrix product.
 
-use crate::nn::cpu::axis::ConvAxis;
-use crate::nn::params::{Init, Params};
+use crate::cpu::axis::ConvAxis;
+use crate::params::{Init, Params};
 use candle_core::{Result, Tensor};
 
 /// `<name>.weight` [O, C, 3, 3] (Glorot uniform) and `<name>.bias` [O] (1e-4).
@@ -50,7 +50,7 @@ fn places(batch: usize, down: ConvAxis, across: ConvAxis) -> Vec<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nn::ops::gradcheck::{pattern, worst};
+    use crate::ops::gradcheck::{pattern, worst};
     use candle_core::DType;
 
     #[test]

@@ -6,10 +6,10 @@ use super::batch_norm::{BatchNorm, Statistics};
 use super::conv2d;
 use super::fallback;
 use super::operator::{CpuOperator, CustomOperator, Operand};
-use crate::nn::cpu::channel_stats::{ChannelMoments, Norm};
-use crate::nn::cpu::direct_conv;
-use crate::nn::cpu::direct_conv::ConvSizes;
-use crate::nn::cpu::tensor::Scalar;
+use crate::cpu::channel_stats::{ChannelMoments, Norm};
+use crate::cpu::direct_conv;
+use crate::cpu::direct_conv::ConvSizes;
+use crate::cpu::tensor::Scalar;
 use candle_core::{CpuStorage, Result, Shape, Tensor};
 use std::sync::{Arc, Mutex, OnceLock};
 
@@ -23,7 +23,7 @@ pub fn conv_norm(
     sizes: ConvSizes,
     train: bool,
 ) -> Result<Tensor> {
-    if crate::nn::device::needs_fallback(x) {
+    if crate::device::needs_fallback(x) {
         return fallback_conv_norm(x, weight, bias, norm, &sizes, train);
     }
     let x = x.contiguous()?;
@@ -156,8 +156,8 @@ pub fn fallback_conv_norm(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nn::ops::gradcheck::{any_threads_give_the_same, apart, pattern};
-    use crate::nn::params::Params;
+    use crate::ops::gradcheck::{any_threads_give_the_same, apart, pattern};
+    use crate::params::Params;
     use candle_core::{DType, Var};
 
     /// Inputs and kernels of the networks' layers, small: over time, over time and frequency, even and odd.

@@ -1,6 +1,6 @@
 //! Dropout with masks from a seeded generator (the framework's cannot be seeded on the CPU).
 
-use crate::nn::Mode;
+use crate::Mode;
 use candle_core::{Result, Tensor};
 use rand::Rng;
 

@@ -2,8 +2,8 @@
 //! a gradient that finite differences confirm, and runs wherever the framework does. On the CPU they are only tested:
 //! they give what the room's own operators give.
 
-use crate::nn::cpu::axis::ConvAxis;
-use crate::nn::cpu::direct_conv::ConvSizes;
+use crate::cpu::axis::ConvAxis;
+use crate::cpu::direct_conv::ConvSizes;
 use candle_core::{D, Result, Tensor};
 
 /// Pads axis `dim` of `x` by `before`, and on the other side pads or cuts it to `reach` places in all, so that a kernel

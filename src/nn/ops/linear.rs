@@ -1,6 +1,6 @@
 //! A fully connected layer.
 
-use crate::nn::params::{Init, Params};
+use crate::params::{Init, Params};
 use candle_core::{Module, Result, Tensor};
 
 /// `<name>.weight` [out, in] and `<name>.bias` [out].

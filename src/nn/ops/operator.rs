@@ -1,7 +1,7 @@
 //! Operators of this room as the framework runs them: forward and backward, written once for f32 and f64, on contiguous
 //! memory of the CPU.
 
-use crate::nn::cpu::tensor::{Scalar, is_f64, read, slice};
+use crate::cpu::tensor::{Scalar, is_f64, read, slice};
 use candle_core::backend::BackendStorage;
 use candle_core::{CpuStorage, CustomOp3, Layout, Result, Shape, Tensor};
 

@@ -2,9 +2,9 @@
 //! channels first made channels last.
 
 use super::operator::{CpuOperator, CustomOperator, Operand};
-use crate::nn::cpu::frames::{FrameMixture, transpose};
-use crate::nn::cpu::tensor::Scalar;
-use crate::nn::device;
+use crate::cpu::frames::{FrameMixture, transpose};
+use crate::cpu::tensor::Scalar;
+use crate::device;
 use candle_core::{Result, Shape, Tensor};
 use std::ops::Range;
 
@@ -145,7 +145,7 @@ impl CpuOperator for TransposeOp {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nn::ops::gradcheck::{apart, pattern, worst};
+    use crate::ops::gradcheck::{apart, pattern, worst};
     use candle_core::Device;
 
     #[test]

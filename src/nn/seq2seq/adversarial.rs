@@ -1,10 +1,10 @@
 //! The discriminator of network C: whether a segment of poses is real, without sound or words.
 
 use super::config::Config;
-use crate::nn::ops::affine::Affine;
-use crate::nn::ops::batch_norm::BatchNorm;
-use crate::nn::ops::conv1d::Conv1d;
-use crate::nn::params::Params;
+use crate::ops::affine::Affine;
+use crate::ops::batch_norm::BatchNorm;
+use crate::ops::conv1d::Conv1d;
+use crate::params::Params;
 use candle_core::{Module, Result, Tensor};
 
 /// Kernel of each convolution; both take every second frame.

@@ -3,10 +3,10 @@
 
 use super::config::{Config, Segment};
 use super::context::ContextEncoder;
-use crate::nn::Mode;
-use crate::nn::ops::affine::Affine;
-use crate::nn::ops::dropout::dropout;
-use crate::nn::params::Params;
+use crate::Mode;
+use crate::ops::affine::Affine;
+use crate::ops::dropout::dropout;
+use crate::params::Params;
 use candle_core::{Module, Result, Tensor, Var};
 
 /// Under `<name>`: `encoder.0`, `encoder.2`, `decoder.0`, `decoder.2`, a pose to its code and back, ReLU within, tanh behind.

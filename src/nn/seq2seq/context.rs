@@ -2,11 +2,11 @@
 //! GRU over them, and its last output, normalised.
 
 use super::config::{Config, windows};
-use crate::nn::Mode;
-use crate::nn::ops::affine::Affine;
-use crate::nn::ops::batch_norm::BatchNorm;
-use crate::nn::ops::recurrent::gru::{Gru, drop_mask};
-use crate::nn::params::Params;
+use crate::Mode;
+use crate::ops::affine::Affine;
+use crate::ops::batch_norm::BatchNorm;
+use crate::ops::recurrent::gru::{Gru, drop_mask};
+use crate::params::Params;
 use candle_core::{Module, Result, Tensor};
 
 /// PyTorch's defaults.

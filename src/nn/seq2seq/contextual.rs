@@ -5,10 +5,10 @@ use super::context::ContextEncoder;
 use super::decoder::Decoder;
 use super::embedding::WordEncoder;
 use super::predict::GesturePredictor;
-use crate::nn::Mode;
-use crate::nn::ops::affine::Affine;
-use crate::nn::ops::recurrent::gru::Gru;
-use crate::nn::params::Params;
+use crate::Mode;
+use crate::ops::affine::Affine;
+use crate::ops::recurrent::gru::Gru;
+use crate::params::Params;
 use candle_core::{Module, Result, Tensor};
 
 /// `audio_encoder`, `word_encoder`, `linear` over both side by side, `gru` over the frames, `decoder`.

@@ -1,11 +1,11 @@
 //! The decoder that all sequence-to-sequence networks share.
 
 use super::config::{Config, Segment};
-use crate::nn::Mode;
-use crate::nn::ops::affine::Affine;
-use crate::nn::ops::recurrent::decoder::{DecoderInputs, DecoderWeights, decode};
-use crate::nn::ops::recurrent::gru::{Gru, drop_mask};
-use crate::nn::params::Params;
+use crate::Mode;
+use crate::ops::affine::Affine;
+use crate::ops::recurrent::decoder::{DecoderInputs, DecoderWeights, decode};
+use crate::ops::recurrent::gru::{Gru, drop_mask};
+use crate::params::Params;
 use candle_core::{Module, Result, Tensor};
 
 /// Under `<name>.`: `init` from the encoder's last states to the first state, `gru`, `attention` (and `word_attention`)
@@ -80,7 +80,7 @@ impl Decoder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nn::ops::gradcheck::pattern;
+    use crate::ops::gradcheck::pattern;
 
     #[test]
     fn a_carried_state_is_that_of_all_poses_since_the_first_state() -> Result<()> {

@@ -1,7 +1,7 @@
 //! Words as vectors that are trained with the network, and the GRU that reads them.
 
-use crate::nn::ops::recurrent::gru::Gru;
-use crate::nn::params::{Init, Params};
+use crate::ops::recurrent::gru::Gru;
+use crate::params::{Init, Params};
 use candle_core::{Result, Tensor};
 
 /// `<name>.embedding.weight` [vocabulary, word], first values of variance 1, and the GRU `<name>.gru` in both directions.
@@ -20,7 +20,7 @@ impl WordEncoder {
 
     /// States [B, W, 2 hidden] of words [B, W].
     pub fn states(&self, words: &Tensor) -> Result<Tensor> {
-        self.gru.forward(&self.vectors(words)?, 0.0, &mut crate::nn::Mode::Eval)
+        self.gru.forward(&self.vectors(words)?, 0.0, &mut crate::Mode::Eval)
     }
 
     /// Output at the last word, [B, 2 hidden]: words before it reach the forward direction alone; padding is read as words

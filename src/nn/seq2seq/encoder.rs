@@ -1,10 +1,10 @@
 //! The encoder of sound frame by frame: two layers, then a GRU of one or two layers in both directions.
 
 use super::config::{Config, windows};
-use crate::nn::Mode;
-use crate::nn::ops::affine::Affine;
-use crate::nn::ops::recurrent::gru::Gru;
-use crate::nn::params::Params;
+use crate::Mode;
+use crate::ops::affine::Affine;
+use crate::ops::recurrent::gru::Gru;
+use crate::params::Params;
 use candle_core::{Module, Result, Tensor};
 
 /// Under `<name>.`: `context` (a GRU over the audio around a frame, where asked for), `linear.0` and `linear.2` with

@@ -2,7 +2,7 @@
 
 use super::autoencoder::AudioBaseline;
 use super::config::{Config, Segment};
-use crate::nn::Mode;
+use crate::Mode;
 use candle_core::{Result, Tensor};
 use serde::Serialize;
 
@@ -87,9 +87,9 @@ pub fn generate(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nn::ops::gradcheck::pattern;
-    use crate::nn::params::Params;
-    use crate::nn::seq2seq::words::WordsSeq2Seq;
+    use crate::ops::gradcheck::pattern;
+    use crate::params::Params;
+    use crate::seq2seq::words::WordsSeq2Seq;
     use candle_core::Device;
 
     /// Adds 1 to the last pose, step by step, 100 where its word is 1, and counts segments in its state.

@@ -6,8 +6,8 @@ use super::decoder::Decoder;
 use super::embedding::WordEncoder;
 use super::encoder::FrameEncoder;
 use super::predict::GesturePredictor;
-use crate::nn::Mode;
-use crate::nn::params::Params;
+use crate::Mode;
+use crate::params::Params;
 use candle_core::{Result, Tensor};
 
 /// `encoder`, `word_encoder` where words are read, `decoder`.

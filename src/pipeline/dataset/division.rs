@@ -3,21 +3,21 @@
 //! before the first frame of a sample of another.
 
 use super::video::LiftedVideo;
-use crate::config;
-use crate::config::{Settings, SplitUnit};
-use crate::dataset::info::DatasetInfo;
-use crate::dataset::shared_sound::SharedSound;
-use crate::dataset::split::{
+use anyhow::{Result, ensure};
+use orator_base::stage::artifacts::{self, StageName, dir};
+use orator_base::stage::ledger::{Kept, Ledger, Refused};
+use orator_base::stage::refusal::{FrameRefusal, Refusal};
+use orator_base::stage::{Unit, counted};
+use orator_base::types::interval::{Interval, Intervals};
+use orator_base::types::time::FrameRate;
+use orator_dataset::config;
+use orator_dataset::config::{Settings, SplitUnit};
+use orator_dataset::info::DatasetInfo;
+use orator_dataset::shared_sound::SharedSound;
+use orator_dataset::split::{
     Assignment, RecordedSplit, Split, SplitBy, SplitPlan, SplitRecord, SplitRule, TimeBlock, Unassigned, assign, blocks,
 };
-use crate::dataset::{INFO, WINDOW_FRAMES};
-use crate::stage::artifacts::{self, StageName, dir};
-use crate::stage::ledger::{Kept, Ledger, Refused};
-use crate::stage::refusal::{FrameRefusal, Refusal};
-use crate::stage::{Unit, counted};
-use crate::types::interval::{Interval, Intervals};
-use crate::types::time::FrameRate;
-use anyhow::{Result, ensure};
+use orator_dataset::{INFO, WINDOW_FRAMES};
 use std::collections::BTreeMap;
 use std::path::Path;
 

@@ -1,11 +1,11 @@
 //! Picture of one face a video, each person's videos in rows of their own.
 
 use super::people::PersonSeen;
-use crate::external::opencv::{draw, png};
-use crate::stage::artifacts::Artifact;
-use crate::stage::workdir;
-use crate::types::image::Image;
 use anyhow::Result;
+use orator_base::stage::artifacts::Artifact;
+use orator_base::stage::workdir;
+use orator_base::types::image::Image;
+use orator_media::opencv::{draw, png};
 use std::path::Path;
 
 /// Width and height of a cell, px: the face, and below it the name of the video.

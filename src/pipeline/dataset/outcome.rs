@@ -1,16 +1,16 @@
 //! The report on a dataset just written: how much there is, and what to mend.
 
 use super::video::LiftedVideo;
-use crate::config;
-use crate::config::SplitUnit;
-use crate::dataset::info::DatasetInfo;
-use crate::dataset::leakage::Leakage;
-use crate::dataset::split::{Split, SplitRule};
-use crate::dataset::stats::DatasetStats;
-use crate::dataset::{INFO, LEAKAGE};
-use crate::stage::ledger::WordCount;
-use crate::stage::{Report, counted};
 use anyhow::{Context, Result};
+use orator_base::stage::ledger::WordCount;
+use orator_base::stage::{Report, counted};
+use orator_dataset::config;
+use orator_dataset::config::SplitUnit;
+use orator_dataset::info::DatasetInfo;
+use orator_dataset::leakage::Leakage;
+use orator_dataset::split::{Split, SplitRule};
+use orator_dataset::stats::DatasetStats;
+use orator_dataset::{INFO, LEAKAGE};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -2,11 +2,11 @@
 //! pair by pair, the bones where a face is not seen from the front. Videos that are near to each other on the whole are
 //! one person's. It is a guess for the user to look at: clothes change, light changes colours, and relatives are alike.
 
-use crate::dataset::bones::VideoBones;
-use crate::pipeline::portrait::Portrait;
-use crate::stage::Unit;
-use crate::stage::artifacts::Artifact;
-use crate::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST, R_ELBOW, R_SHOULDER, R_WRIST};
+use crate::portrait::Portrait;
+use orator_base::stage::Unit;
+use orator_base::stage::artifacts::Artifact;
+use orator_base::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST, R_ELBOW, R_SHOULDER, R_WRIST};
+use orator_dataset::bones::VideoBones;
 use std::path::Path;
 
 /// Videos that are compared; of more, so many evenly spread.

@@ -2,18 +2,18 @@
 
 use super::division::Division;
 use super::video::LiftedVideo;
-use crate::config;
-use crate::dataset::leakage::SoundComparison;
-use crate::dataset::shared_sound;
-use crate::dataset::split::{Split, SplitBy, TimeBlock};
-use crate::dataset::write::part;
-use crate::dataset::write::part::{VideoEntry, VideoSource};
-use crate::dataset::write::writer::DatasetWriter;
-use crate::stage::ledger::{Ledger, Refused};
-use crate::stage::progress::Progress;
-use crate::stage::refusal::{FrameRefusal, Refusal};
-use crate::types::interval::Interval;
 use anyhow::Result;
+use orator_base::stage::ledger::{Ledger, Refused};
+use orator_base::stage::progress::Progress;
+use orator_base::stage::refusal::{FrameRefusal, Refusal};
+use orator_base::types::interval::Interval;
+use orator_dataset::config;
+use orator_dataset::leakage::SoundComparison;
+use orator_dataset::shared_sound;
+use orator_dataset::split::{Split, SplitBy, TimeBlock};
+use orator_dataset::write::part;
+use orator_dataset::write::part::{VideoEntry, VideoSource};
+use orator_dataset::write::writer::DatasetWriter;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -77,7 +77,7 @@ impl<'a> DatasetRun<'a> {
         sounds: &Sounds,
     ) -> Result<()> {
         let made_from = made_from(&serde_json::json!([
-            crate::dataset::SCHEMA,
+            orator_dataset::SCHEMA,
             video.file,
             video.files_hash,
             split,
@@ -109,7 +109,7 @@ impl<'a> DatasetRun<'a> {
         sounds: &Sounds,
     ) -> Result<()> {
         let made_from = made_from(&serde_json::json!([
-            crate::dataset::SCHEMA,
+            orator_dataset::SCHEMA,
             video.file,
             video.files_hash,
             blocks,

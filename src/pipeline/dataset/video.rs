@@ -1,28 +1,29 @@
 //! One video of a speaker on its way into the dataset: the files of the stages before, and the samples cut from them.
 
-use crate::audio::fingerprint::Fingerprinter;
-use crate::config::videos::slug;
-use crate::dataset::bones::VideoBones;
-use crate::dataset::sample::Sample;
-use crate::dataset::words::VideoWords;
-use crate::formats::{joints_npz, keypoints_npz};
-use crate::motion::posture;
-use crate::motion::posture::LiftedBody;
-use crate::stage::Unit;
-use crate::stage::artifacts::{Artifact, StageName, dir};
-use crate::stage::fingerprint::hash_file;
-use crate::stage::ledger::{Ledger, TranscriptAccount};
-use crate::stage::record::Record;
-use crate::types::interval::{Interval, Intervals};
-use crate::types::pose2d::Keypoints;
-use crate::types::pose3d::Motion;
-use crate::types::posture::Posture;
-use crate::types::skeleton::{L_HAND, N_HAND_JOINTS, R_HAND};
-use crate::types::sound::{SAMPLE_RATE, Sound};
-use crate::types::sync;
-use crate::types::sync::SoundOffset;
 use anyhow::{Context, Result, ensure};
 use ndarray::{Axis, concatenate, s};
+use orator_base::audio::fingerprint::Fingerprinter;
+use orator_base::motion::posture;
+use orator_base::motion::posture::LiftedBody;
+use orator_base::stage::Unit;
+use orator_base::stage::artifacts::{Artifact, StageName, dir};
+use orator_base::stage::fingerprint::hash_file;
+use orator_base::stage::ledger::{Ledger, TranscriptAccount};
+use orator_base::stage::record::Record;
+use orator_base::types::interval::{Interval, Intervals};
+use orator_base::types::pose2d::Keypoints;
+use orator_base::types::pose3d::Motion;
+use orator_base::types::posture::Posture;
+use orator_base::types::skeleton::{L_HAND, N_HAND_JOINTS, R_HAND};
+use orator_base::types::sound::{SAMPLE_RATE, Sound};
+use orator_base::types::sync;
+use orator_base::types::sync::SoundOffset;
+use orator_dataset::bones::VideoBones;
+use orator_dataset::config::videos::slug;
+use orator_dataset::sample::Sample;
+use orator_dataset::words::VideoWords;
+use orator_formats::sound_offset_json;
+use orator_formats::{joints_npz, keypoints_npz};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -99,7 +100,7 @@ impl LiftedVideo {
                 hasher.update(line.as_bytes());
             }
         }
-        let offset = if fixes_offset { SoundOffset::read(&path_of(Artifact::SoundOffset))? } else { None };
+        let offset = if fixes_offset { sound_offset_json::read(&path_of(Artifact::SoundOffset))? } else { None };
         let shift = offset.filter(SoundOffset::is_sure).map_or(0, |o| (o.secs * f64::from(SAMPLE_RATE)).round() as i64);
         if shift != 0 {
             hasher.update(format!("sound shifted by {shift} samples\n").as_bytes());

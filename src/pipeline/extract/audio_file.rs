@@ -1,9 +1,9 @@
 //! Writes the sound of a video to a WAV file piece by piece, so that memory does not grow with its length.
 
-use crate::external::ffmpeg::audio::stream_mono;
-use crate::formats::wav::WavWriter;
-use crate::types::sound::AudioTracks;
 use anyhow::Result;
+use orator_base::types::sound::AudioTracks;
+use orator_formats::wav::WavWriter;
+use orator_media::ffmpeg::audio::stream_mono;
 use std::path::Path;
 
 /// The sound that `extract_wav` wrote.

@@ -2,7 +2,7 @@
 //! the outer columns, or rows, on both sides alike, that are black or without detail in the whole video and end at a
 //! straight seam. Dark or plain walls end at no seam.
 
-use crate::types::image::{Image, PixelArea};
+use orator_base::types::image::{Image, PixelArea};
 
 /// Bands across an axis, in each of which a position has one mean, and pixels of a position that are looked at.
 const BANDS: usize = 32;

@@ -123,7 +123,7 @@ impl PictureBlock {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::extract::thumbnail;
+    use crate::extract::thumbnail;
 
     fn scene(seed: usize, shift: usize, light: f64) -> Thumbnail {
         Thumbnail::new(thumbnail::scene(seed, shift, light))

@@ -5,8 +5,8 @@ use super::block_match;
 use super::dissolves;
 use super::dissolves::{LEAST_TURNED, WINDOWS, ramp};
 use super::thumbnail::Thumbnail;
-use crate::types::image::Image;
-use crate::types::time::FrameRate;
+use orator_base::types::image::Image;
+use orator_base::types::time::FrameRate;
 use std::collections::VecDeque;
 
 /// Score from which on tracking begins anew, whatever counts as a shot later on.
@@ -196,7 +196,7 @@ fn tightest(windows: &[Transition]) -> Option<Transition> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::extract::thumbnail::{THUMBNAIL, scene};
+    use crate::extract::thumbnail::{THUMBNAIL, scene};
 
     fn dim(seed: usize, light: f64) -> Option<Image> {
         Some(scene(seed, 0, light))

@@ -2,10 +2,10 @@
 //! time, at a cut where one comes soon, and only where reading that begins there gives the same pictures.
 
 use super::reading::{PictureReading, checksum, thumbnail};
-use crate::external::ffmpeg::frames::FrameReader;
-use crate::types::image::PixelArea;
-use crate::types::time::FrameRate;
 use anyhow::Result;
+use orator_base::types::image::PixelArea;
+use orator_base::types::time::FrameRate;
+use orator_media::ffmpeg::frames::FrameReader;
 
 /// A mark stands at every multiple of so many seconds.
 const APART_SECS: f64 = 120.0;

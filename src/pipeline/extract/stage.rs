@@ -4,17 +4,17 @@
 use super::reading;
 use super::spans;
 use super::survey::PictureSurvey;
-use crate::config;
-use crate::config::{Config, videos};
-use crate::external::ffmpeg;
-use crate::external::ffmpeg::frames::FrameReader;
-use crate::formats::media_json::MediaInfo;
-use crate::stage::artifacts::{Artifact, StageName};
-use crate::stage::progress::Progress;
-use crate::stage::{Input, Report, Stage, Unit, counted};
-use crate::types::image::PictureOptions;
-use crate::types::sound::SAMPLE_RATE;
 use anyhow::Result;
+use orator_base::stage::artifacts::{Artifact, StageName};
+use orator_base::stage::progress::Progress;
+use orator_base::stage::{Input, Report, Stage, Unit, counted};
+use orator_base::types::image::PictureOptions;
+use orator_base::types::sound::SAMPLE_RATE;
+use orator_dataset::config;
+use orator_dataset::config::{Config, videos};
+use orator_formats::media_json::MediaInfo;
+use orator_media::ffmpeg;
+use orator_media::ffmpeg::frames::FrameReader;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 

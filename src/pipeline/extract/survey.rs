@@ -2,9 +2,9 @@
 //! stand beside the picture proper.
 
 use super::bars::BarFinder;
-use crate::external::ffmpeg::deinterlace::comb_share;
-use crate::types::image::{Image, PixelArea};
-use crate::types::time::FrameRate;
+use orator_base::types::image::{Image, PixelArea};
+use orator_base::types::time::FrameRate;
+use orator_media::ffmpeg::deinterlace::comb_share;
 
 /// Frames between two looks at the beginning, and the number of those looks.
 const EARLY_STEP: usize = 5;

@@ -1,7 +1,7 @@
 //! A frame as the search for shots keeps it: small, in colour and in gray, and as a coarse grid. `block_match`
 //! compares two of them; their mean change from frame to frame is what `segment` knows of movement.
 
-use crate::types::image::Image;
+use orator_base::types::image::Image;
 
 /// Width and height of the pictures to compare, in cells: fine enough that a person who moves is seen to.
 pub const THUMBNAIL: [usize; 2] = [64, 64];

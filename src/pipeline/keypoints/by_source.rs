@@ -1,9 +1,9 @@
 //! A stage that works on videos in one way and on keypoints of other programs in another.
 
 use super::stage::{KeypointExtractStage, KeypointPose2dStage};
-use crate::config::Settings;
-use crate::config::videos::Videos;
-use crate::stage::{Stage, StageWrapper, Unit};
+use orator_base::stage::{Stage, StageWrapper, Unit};
+use orator_dataset::config::Settings;
+use orator_dataset::config::videos::Videos;
 use std::collections::BTreeSet;
 
 /// Both ways of a stage, and the units that are keypoints.

@@ -1,9 +1,9 @@
 //! Of several people the one to follow: people of neighbouring frames are joined to tracks by overlap, else by nearness; then
 //! the heaviest track (large, sure, central, long) is taken, and what it leaves of the video goes to the next.
 
-use crate::formats::keypoints::FoundPerson;
-use crate::pipeline::pose2d::decode::boxes::overlap;
-use crate::types::pose2d::PersonBox;
+use crate::pose2d::decode::boxes::overlap;
+use orator_base::types::pose2d::PersonBox;
+use orator_formats::keypoints::FoundPerson;
 
 /// Least overlap of two boxes of the same person.
 const SAME_PERSON: f32 = 0.2;
@@ -115,7 +115,7 @@ fn weight(area: &PersonBox, image_width: f32) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::pose2d::Keypoint;
+    use orator_base::types::pose2d::Keypoint;
 
     /// A body between two corners.
     fn at(x: f32, size: f32) -> FoundPerson {

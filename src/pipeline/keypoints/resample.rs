@@ -1,8 +1,8 @@
 //! Keypoints between frames: a point lies on the line between its places in the two frames around a moment, where both show
 //! it; else where the nearer frame shows it.
 
-use crate::formats::keypoints::FoundPerson;
-use crate::types::pose2d::Keypoint;
+use orator_base::types::pose2d::Keypoint;
+use orator_formats::keypoints::FoundPerson;
 
 /// Moments this near to a frame, in frames, are that frame's.
 const SAME: f64 = 1e-4;

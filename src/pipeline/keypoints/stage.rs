@@ -2,18 +2,18 @@
 //! a video, and the keypoints at the dataset rate; `pose2d` hands these on. What pictures alone tell is NaN, not known.
 
 use super::taken::{TakenKeypoints, take_in};
-use crate::config::videos::Videos;
-use crate::config::{ExtractConfig, KeypointSource};
-use crate::formats::media_json::MediaInfo;
-use crate::formats::timeline_npz::Timeline;
-use crate::formats::{keypoints, keypoints_npz};
-use crate::pipeline::extract::audio_file::extract_wav;
-use crate::stage::artifacts::{Artifact, StageName, dir};
-use crate::stage::progress::Progress;
-use crate::stage::{Input, Report, Stage, Unit};
-use crate::types::sound::SAMPLE_RATE;
+use crate::extract::audio_file::extract_wav;
 use anyhow::{Context, Result, anyhow, bail};
 use ndarray::{Array3, s};
+use orator_base::stage::artifacts::{Artifact, StageName, dir};
+use orator_base::stage::progress::Progress;
+use orator_base::stage::{Input, Report, Stage, Unit};
+use orator_base::types::sound::SAMPLE_RATE;
+use orator_dataset::config::videos::Videos;
+use orator_dataset::config::{ExtractConfig, KeypointSource};
+use orator_formats::media_json::MediaInfo;
+use orator_formats::timeline_npz::Timeline;
+use orator_formats::{keypoints, keypoints_npz};
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::fs::File;

@@ -2,12 +2,12 @@
 
 use super::follow::{FollowedPerson, follow};
 use super::resample::person_at;
-use crate::formats::keypoints::{FoundKeypoints, FoundPerson};
-use crate::formats::keypoints_npz::Extras;
-use crate::pipeline::pose2d::span::keypoint_frames::KeypointFrames;
-use crate::types::pose2d::{Keypoints, Pose2d};
-use crate::types::time::FrameRate;
+use crate::pose2d::span::keypoint_frames::KeypointFrames;
 use anyhow::Result;
+use orator_base::types::pose2d::{Keypoints, Pose2d};
+use orator_base::types::time::FrameRate;
+use orator_formats::keypoints::{FoundKeypoints, FoundPerson};
+use orator_formats::keypoints_npz::Extras;
 
 /// Seconds for which a person may be gone and still be the same.
 const MAX_GAP_SECS: f64 = 1.0;

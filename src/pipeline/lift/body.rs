@@ -3,16 +3,16 @@
 use super::gaps::long_gaps;
 use super::interval_view::IntervalView;
 use super::observed::ObservedBody;
-use crate::math::order::lower_median;
-use crate::motion::upper_body::{
-    ARMS, L_HIP, L_SHOULDER, NOSE, Pose, R_HIP, R_SHOULDER, REFERENCE_SIZE, SeenBody, size,
-};
-use crate::nn::lifter::body::BodyLifter;
-use crate::types::interval::Interval;
-use crate::types::pose2d::Keypoints;
-use crate::types::skeleton::NECK;
 use anyhow::Result;
 use ndarray::{Array2, s};
+use orator_base::math::order::lower_median;
+use orator_base::motion::upper_body::{
+    ARMS, L_HIP, L_SHOULDER, NOSE, Pose, R_HIP, R_SHOULDER, REFERENCE_SIZE, SeenBody, size,
+};
+use orator_base::types::interval::Interval;
+use orator_base::types::pose2d::Keypoints;
+use orator_base::types::skeleton::NECK;
+use orator_nn::lifter::body::BodyLifter;
 
 /// Frames a second that the lifter was trained on.
 pub const TRAINED_FPS: f64 = 15.0;

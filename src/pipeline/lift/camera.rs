@@ -5,13 +5,13 @@
 //! leaned 1.8 after levelling. Guessed hips tell no more than no estimate at all.
 
 use super::interval_view::IntervalView;
-use crate::math::order::lower_median;
-use crate::math::rotation::Rotation;
-use crate::math::vec3;
-use crate::math::vec3::Vec3;
-use crate::types::interval::Interval;
-use crate::types::skeleton::{L_SHOULDER, R_SHOULDER};
 use ndarray::{ArrayViewMut3, Axis};
+use orator_base::math::order::lower_median;
+use orator_base::math::rotation::Rotation;
+use orator_base::math::vec3;
+use orator_base::math::vec3::Vec3;
+use orator_base::types::interval::Interval;
+use orator_base::types::skeleton::{L_SHOULDER, R_SHOULDER};
 use serde::Serialize;
 
 /// Hips must be there in this share of an interval's frames to tell which way is up.

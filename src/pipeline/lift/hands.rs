@@ -3,13 +3,13 @@
 
 use super::hand_depth;
 use super::observed::FARTHEST_PX;
-use crate::math::vec3;
-use crate::motion::view::hand::{HandJoints, SeenHand, parent};
-use crate::nn::lifter::hand::HandLifter;
-use crate::types::pose2d::{HAND_SEEN_SCORE, N_HAND};
-use crate::types::skeleton::Side;
 use anyhow::Result;
 use ndarray::{ArrayView3, ArrayViewMut2, ArrayViewMut3, Axis, s};
+use orator_base::math::vec3;
+use orator_base::motion::view::hand::{HandJoints, SeenHand, parent};
+use orator_base::types::pose2d::{HAND_SEEN_SCORE, N_HAND};
+use orator_base::types::skeleton::Side;
+use orator_nn::lifter::hand::HandLifter;
 
 /// A hand with fewer points seen is not lifted.
 const LEAST_POINTS: usize = 12;

@@ -1,12 +1,14 @@
 //! The bone lengths of a video: one set over all its intervals, from what was lifted and smoothed. Sizes are a convention,
 //! as no picture tells them: the body is of the reference size, a hand has the size its forearm sets.
 
-use crate::math::order::{lower_median, lower_quantile};
-use crate::motion::upper_body::REFERENCE_SIZE;
-use crate::motion::view::hand::parent;
-use crate::types::pose2d::N_HAND;
-use crate::types::pose3d::Motion;
-use crate::types::skeleton::{L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, N_BONES, R_ELBOW, R_HAND, R_SHOULDER, R_WRIST};
+use orator_base::math::order::{lower_median, lower_quantile};
+use orator_base::motion::upper_body::REFERENCE_SIZE;
+use orator_base::motion::view::hand::parent;
+use orator_base::types::pose2d::N_HAND;
+use orator_base::types::pose3d::Motion;
+use orator_base::types::skeleton::{
+    L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, N_BONES, R_ELBOW, R_HAND, R_SHOULDER, R_WRIST,
+};
 
 /// Quantile of a bone's lifted lengths that counts: bones that point at the
 /// camera come out short. Chosen on bodies of known proportions with an earlier body lifter, where it came nearer than

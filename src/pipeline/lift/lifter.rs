@@ -4,18 +4,18 @@ use super::body::{SIZE_FRAMES, STRAY_FRAMES, TRAINED_FPS};
 use super::camera::CameraTilt;
 use super::interval_view::IntervalView;
 use super::{body, gaps, hands, lengths, rest, weights};
-use crate::config;
-use crate::math::gaussian;
-use crate::motion::bones;
-use crate::nn::lifter::body::BodyLifter;
-use crate::nn::lifter::hand::HandLifter;
-use crate::types::interval::Interval;
-use crate::types::pose2d::{Keypoints, N_HAND};
-use crate::types::pose3d::Motion;
-use crate::types::skeleton;
-use crate::types::skeleton::{L_HAND, N_BONES, N_JOINTS, R_HAND, Side};
 use anyhow::{Result, ensure};
 use ndarray::{Array2, Array3, s};
+use orator_base::math::gaussian;
+use orator_base::motion::bones;
+use orator_base::types::interval::Interval;
+use orator_base::types::pose2d::{Keypoints, N_HAND};
+use orator_base::types::pose3d::Motion;
+use orator_base::types::skeleton;
+use orator_base::types::skeleton::{L_HAND, N_BONES, N_JOINTS, R_HAND, Side};
+use orator_dataset::config;
+use orator_nn::lifter::body::BodyLifter;
+use orator_nn::lifter::hand::HandLifter;
 
 /// A gap up to this long is filled; a longer one stays open. `config` lets `[segment]` keep no longer ones.
 pub(crate) const MAX_GAP_SECS: f64 = 1.0;
@@ -197,8 +197,8 @@ impl Lifted {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::pose2d::coco;
-    use crate::types::time::FrameRate;
+    use orator_base::types::pose2d::coco;
+    use orator_base::types::time::FrameRate;
 
     /// A body that sways; from frame `change` on it moves otherwise and is larger.
     fn keypoints(n_frames: usize, change: usize) -> Keypoints {

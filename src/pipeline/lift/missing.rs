@@ -1,7 +1,7 @@
 //! What was lifted and what was not, in sentences for the user.
 
 use super::lifter::{Lifted, MAX_GAP_SECS};
-use crate::types::pose2d::{Keypoints, SEEN_SCORE, coco};
+use orator_base::types::pose2d::{Keypoints, SEEN_SCORE, coco};
 
 /// Why joints are missing (NaN), in a sentence; nothing when all are there.
 pub fn notes(keypoints: &Keypoints, lifted: &Lifted) -> Option<String> {

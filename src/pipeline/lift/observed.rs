@@ -2,14 +2,14 @@
 //! gaps bridged.
 
 use super::gaps;
-use crate::math::order::{lower_median, median};
-use crate::motion::upper_body::{
+use ndarray::{Array2, Array3, s};
+use orator_base::math::order::{lower_median, median};
+use orator_base::motion::upper_body::{
     COCO, L_HIP, L_SHOULDER, L_WRIST, N_POINTS, NOSE, R_HIP, R_SHOULDER, R_WRIST, SeenBody,
 };
-use crate::types::interval::Interval;
-use crate::types::pose2d::{Keypoints, SEEN_SCORE, coco};
-use crate::types::skeleton::BODY_BONES;
-use ndarray::{Array2, Array3, s};
+use orator_base::types::interval::Interval;
+use orator_base::types::pose2d::{Keypoints, SEEN_SCORE, coco};
+use orator_base::types::skeleton::BODY_BONES;
 
 /// A coordinate beyond this many px is none.
 pub const FARTHEST_PX: f32 = 1e6;
@@ -152,8 +152,8 @@ fn largest_bone(points: &Array3<f32>, t: usize) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::upper_body::R_ELBOW;
-    use crate::types::time::FrameRate;
+    use orator_base::motion::upper_body::R_ELBOW;
+    use orator_base::types::time::FrameRate;
 
     /// A speaker whose right wrist swings 120 px wide at `hertz`, 15 frames a second.
     fn beating(n_frames: usize, hertz: f32) -> Keypoints {

@@ -4,13 +4,13 @@
 
 use super::lengths::bone;
 use super::refuse::{bone_refusals, exceeds};
-use crate::math::order::lower_median;
-use crate::stage::refusal::{FrameRefusal, Refusal};
-use crate::types::interval::Interval;
-use crate::types::pose2d::{Keypoints, coco};
-use crate::types::pose3d::Motion;
-use crate::types::skeleton::BODY_BONES;
 use ndarray::{Array2, s};
+use orator_base::math::order::lower_median;
+use orator_base::stage::refusal::{FrameRefusal, Refusal};
+use orator_base::types::interval::Interval;
+use orator_base::types::pose2d::{Keypoints, coco};
+use orator_base::types::pose3d::Motion;
+use orator_base::types::skeleton::BODY_BONES;
 
 /// The keypoints of the ends of `BODY_BONES`.
 const POINTS: [(usize, usize); 5] = [

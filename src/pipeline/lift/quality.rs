@@ -2,12 +2,12 @@
 //! whether the pose agrees with the picture it was lifted from. A forearm that looks longer in the picture than it is
 //! in 3D was shortened; the ratio of the two lengths says so (perspective alone makes it 0.8 to 0.9 at arm's length).
 
-use crate::math::order::{self, Ordered};
-use crate::types::pose2d::{Keypoints, SEEN_SCORE, coco};
-use crate::types::pose3d::Motion;
-use crate::types::skeleton;
-use crate::types::skeleton::{L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, N_HAND_JOINTS};
 use anyhow::{Result, ensure};
+use orator_base::math::order::{self, Ordered};
+use orator_base::types::pose2d::{Keypoints, SEEN_SCORE, coco};
+use orator_base::types::pose3d::Motion;
+use orator_base::types::skeleton;
+use orator_base::types::skeleton::{L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, N_HAND_JOINTS};
 
 const MM: f64 = 1000.0;
 
@@ -218,8 +218,8 @@ fn median(values: impl IntoIterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::time::FrameRate;
     use ndarray::Array3;
+    use orator_base::types::time::FrameRate;
 
     /// Arms of 0.3 and 0.25 m hanging, forearms pointing `forward` (0..1 of their length) at the camera; the left wrist
     /// shakes by 2 mm from frame 20 on. Seen at 500 px a metre without perspective.

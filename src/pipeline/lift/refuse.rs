@@ -2,12 +2,12 @@
 //! sliders decide by the same functions.
 
 use super::gaps::long_gaps;
-use crate::config;
-use crate::stage::ledger::{Kept, Ledger, Refused};
-use crate::stage::refusal::{FrameRefusal, Refusal};
-use crate::types::interval::{Interval, Intervals};
-use crate::types::time::FrameRate;
 use anyhow::{Result, ensure};
+use orator_base::stage::ledger::{Kept, Ledger, Refused};
+use orator_base::stage::refusal::{FrameRefusal, Refusal};
+use orator_base::types::interval::{Interval, Intervals};
+use orator_base::types::time::FrameRate;
+use orator_dataset::config;
 
 /// Whole frames of the longest gap of the body that is filled.
 pub fn max_gap_frames(rules: &config::SegmentConfig, fps: FrameRate) -> usize {

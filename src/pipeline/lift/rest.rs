@@ -2,10 +2,10 @@
 //! the same rest; one that is not seen in it at all has the mirrored shape of the other.
 
 use super::gaps;
-use crate::types::interval::Interval;
-use crate::types::pose2d::N_HAND;
-use crate::types::skeleton::{L_HAND, R_HAND};
 use ndarray::{ArrayViewMut3, s};
+use orator_base::types::interval::Interval;
+use orator_base::types::pose2d::N_HAND;
+use orator_base::types::skeleton::{L_HAND, R_HAND};
 
 /// Fills the hands of `joints` [T, 49, 3], those of `interval`, in the stretches `resting` of the video. Each hand has its
 /// wrist at 0; a missing one is NaN, and stays so in a rest in which neither is seen.

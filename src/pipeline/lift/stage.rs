@@ -6,17 +6,17 @@ use super::outliers;
 use super::outliers::BoneChange;
 use super::refuse::{exclude_frames, max_gap_frames};
 use super::{Lifted, Lifter};
-use crate::config;
-use crate::formats::timeline_npz::Timeline;
-use crate::formats::{joints_npz, keypoints_npz, npz};
-use crate::stage::artifacts::{Artifact, StageName};
-use crate::stage::ledger::Ledger;
-use crate::stage::progress::Progress;
-use crate::stage::{Input, Report, Stage, Unit, write_json};
-use crate::types::interval::Intervals;
-use crate::types::pose2d::Keypoints;
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array1, s};
+use orator_base::stage::artifacts::{Artifact, StageName};
+use orator_base::stage::ledger::Ledger;
+use orator_base::stage::progress::Progress;
+use orator_base::stage::{Input, Report, Stage, Unit, write_json};
+use orator_base::types::interval::Intervals;
+use orator_base::types::pose2d::Keypoints;
+use orator_dataset::config;
+use orator_formats::timeline_npz::Timeline;
+use orator_formats::{joints_npz, keypoints_npz, npz};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -173,11 +173,11 @@ fn unsee(keypoints: &mut Keypoints, repeated: &[bool]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::lift::Lifter;
-    use crate::types::pose2d::coco::{L_ELBOW, L_SHOULDER, L_WRIST, NOSE, R_ELBOW, R_SHOULDER, R_WRIST};
-    use crate::types::skeleton;
-    use crate::types::time::FrameRate;
+    use crate::lift::Lifter;
     use ndarray::Array3;
+    use orator_base::types::pose2d::coco::{L_ELBOW, L_SHOULDER, L_WRIST, NOSE, R_ELBOW, R_SHOULDER, R_WRIST};
+    use orator_base::types::skeleton;
+    use orator_base::types::time::FrameRate;
 
     /// An arm that rises steadily, filmed at 10 frames a second and shown at 15: every third frame is the one before.
     #[test]

@@ -1,12 +1,12 @@
-//! The lifters' weights: built into the program, or from files of `orator train lifter`.
+//! The lifters' weights: built into the program, or from files of `orator-lab train lifter`.
 
-use crate::formats::checkpoint::Contents;
-use crate::nn::lifter::body::BodyLifter;
-use crate::nn::lifter::hand;
-use crate::nn::lifter::hand::HandLifter;
-use crate::nn::lifter::temporal;
-use crate::nn::params::Params;
 use anyhow::{Context, Result, ensure};
+use orator_formats::checkpoint::Contents;
+use orator_nn::lifter::body::BodyLifter;
+use orator_nn::lifter::hand;
+use orator_nn::lifter::hand::HandLifter;
+use orator_nn::lifter::temporal;
+use orator_nn::params::Params;
 use serde::de::DeserializeOwned;
 use std::path::Path;
 
@@ -59,7 +59,7 @@ fn load<T>(
     }
     let bytes = std::fs::read(path).with_context(|| format!("cannot read the weights {}", path.display()))?;
     parse(&bytes, kind, make)
-        .with_context(|| format!("{} does not hold weights of `orator train lifter --part {part}`", path.display()))
+        .with_context(|| format!("{} does not hold weights of `orator-lab train lifter --part {part}`", path.display()))
 }
 
 fn parse<T>(bytes: &[u8], kind: &str, make: impl Fn(&Contents, &mut Params) -> Result<T>) -> Result<T> {

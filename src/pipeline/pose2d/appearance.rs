@@ -3,8 +3,8 @@
 
 use super::decode::ScoredPoint;
 use super::patch;
-use crate::types::image::Image;
-use crate::types::pose2d::coco;
+use orator_base::types::image::Image;
+use orator_base::types::pose2d::coco;
 use serde::{Deserialize, Serialize};
 
 /// Bins of a channel.
@@ -87,7 +87,7 @@ fn cumulated(values: impl Iterator<Item = f32>) -> [f32; BINS] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::external::opencv::draw;
+    use orator_media::opencv::draw;
 
     fn person(shirt: [u8; 3], light: f32, x: f64) -> (Image, [ScoredPoint; 17]) {
         let lit = |rgb: [u8; 3]| rgb.map(|part| (f32::from(part) * light) as u8);

@@ -2,11 +2,11 @@
 
 use super::decode::{ScoredPoint, heatmap, simcc};
 use super::model_input::ModelInput;
-use crate::external::onnx::{Decode, KeypointOutputs, ModelEntry, Outputs, PictureFit, Refine, Runtime};
-use crate::external::opencv::blur::GaussianBlur;
-use crate::external::opencv::warp::SrcFromDst;
-use crate::types::image::Image;
 use anyhow::{Result, bail};
+use orator_base::types::image::Image;
+use orator_media::opencv::blur::GaussianBlur;
+use orator_media::opencv::warp::SrcFromDst;
+use orator_onnx::{Decode, KeypointOutputs, ModelEntry, Outputs, PictureFit, Refine, Runtime};
 use std::path::Path;
 
 /// Reads the outputs that give one place a keypoint: heat-maps or SimCC.

@@ -12,11 +12,11 @@ use super::palm::PalmDetector;
 use super::person::Detector;
 use super::speaker::{SeenPerson, SpeakerTracker};
 use super::talker::TalkerPath;
-use crate::config;
-use crate::external::onnx::{ModelRole, ModelStore, Runtime};
-use crate::types::image::Image;
-use crate::types::pose2d::{Keypoint, Pose2d};
 use anyhow::{Context, Result, ensure};
+use orator_base::types::image::Image;
+use orator_base::types::pose2d::{Keypoint, Pose2d};
+use orator_dataset::config;
+use orator_onnx::{ModelRole, ModelStore, Runtime};
 
 /// The models that look at a frame, and what is followed from frame to frame. One a worker: it runs on one thread.
 pub struct Chain {

@@ -5,10 +5,10 @@ use super::body::{PointReader, placed};
 use super::decode::{ScoredPoint, regression};
 use super::model_input::ModelInput;
 use super::region;
-use crate::external::onnx::{Decode, ModelEntry, Runtime};
-use crate::external::opencv::warp::Region;
-use crate::types::image::Image;
 use anyhow::Result;
+use orator_base::types::image::Image;
+use orator_media::opencv::warp::Region;
+use orator_onnx::{Decode, ModelEntry, Runtime};
 use std::path::Path;
 
 /// One hand in px of the picture.

@@ -4,8 +4,8 @@
 
 use super::decode::boxes;
 use super::patch;
-use crate::types::image::Image;
-use crate::types::pose2d::PersonBox;
+use orator_base::types::image::Image;
+use orator_base::types::pose2d::PersonBox;
 
 /// Overlap of two boxes of one track.
 const SAME_TRACK: f32 = 0.5;

@@ -1,12 +1,12 @@
 //! A model with the picture it is fed: the crop or letterbox goes into a canvas that is kept, and from there, made
 //! numbers as the manifest says, into the model's input.
 
-use crate::external::onnx::{Anchor, Channels, Model, ModelEntry, Outputs, PictureFit, Runtime, TensorAxes};
-use crate::external::opencv::tensor::Normaliser;
-use crate::external::opencv::warp;
-use crate::external::opencv::warp::SrcFromDst;
-use crate::types::image::Image;
 use anyhow::Result;
+use orator_base::types::image::Image;
+use orator_media::opencv::tensor::Normaliser;
+use orator_media::opencv::warp;
+use orator_media::opencv::warp::SrcFromDst;
+use orator_onnx::{Anchor, Channels, Model, ModelEntry, Outputs, PictureFit, Runtime, TensorAxes};
 use std::path::Path;
 
 pub struct ModelInput {

@@ -1,8 +1,8 @@
 //! Which models look at a frame: the ids of the configuration, with `auto` answered by the folder of models.
 
-use crate::config::{FollowRule, Pose2dConfig};
-use crate::external::onnx::{AUTO, ModelRole, ModelStore, Wanted};
 use anyhow::{Context, Result, ensure};
+use orator_dataset::config::{FollowRule, Pose2dConfig};
+use orator_onnx::{AUTO, ModelRole, ModelStore, Wanted};
 
 /// The keys of `[pose2d]` that name a model, with the role of each and what the configuration says.
 pub fn keys(config: &Pose2dConfig) -> [(&'static str, ModelRole, &String); 5] {

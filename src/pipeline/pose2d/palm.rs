@@ -3,10 +3,10 @@
 use super::decode::ssd_anchors;
 use super::model_input::ModelInput;
 use super::region;
-use crate::external::onnx::{Decode, ModelEntry, Runtime};
-use crate::external::opencv::warp::Region;
-use crate::types::image::Image;
 use anyhow::{Result, bail};
+use orator_base::types::image::Image;
+use orator_media::opencv::warp::Region;
+use orator_onnx::{Decode, ModelEntry, Runtime};
 use std::path::Path;
 
 pub struct PalmDetector {

@@ -1,7 +1,7 @@
 //! A part of a picture as a few colours: the mean of each cell of a grid laid over a box. What the colours say of the
 //! person in the box is known to `liveness` and `appearance`.
 
-use crate::types::image::Image;
+use orator_base::types::image::Image;
 
 /// Points a side that are looked at in each cell.
 const POINTS: usize = 4;

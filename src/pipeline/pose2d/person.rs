@@ -2,10 +2,10 @@
 
 use super::decode::{detections, yolox_grid};
 use super::model_input::ModelInput;
-use crate::external::onnx::{Decode, ModelEntry, Runtime};
-use crate::types::image::Image;
-use crate::types::pose2d::PersonBox;
 use anyhow::{Result, bail};
+use orator_base::types::image::Image;
+use orator_base::types::pose2d::PersonBox;
+use orator_onnx::{Decode, ModelEntry, Runtime};
 use std::path::Path;
 
 /// Finds people in a picture.

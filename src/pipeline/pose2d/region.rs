@@ -2,7 +2,7 @@
 //! from a palm. The numbers are MediaPipe's (hand_landmark_landmarks_to_roi, palm_detection_detection_to_roi) and, for
 //! the arm, measured on it.
 
-use crate::external::opencv::warp::Region;
+use orator_media::opencv::warp::Region;
 use std::f64::consts::{PI, TAU};
 
 /// Points of a hand that say where it is: wrist, thumb to its first joint, and the two lower joints of each finger.

@@ -8,10 +8,10 @@ use super::liveness::LivenessTracks;
 use super::person::Detector;
 use super::talker::TalkerPath;
 use super::tracker::{Candidate, PersonTrack, TrackerStep};
-use crate::config;
-use crate::types::image::Image;
-use crate::types::pose2d::PersonBox;
 use anyhow::{Context, Result};
+use orator_base::types::image::Image;
+use orator_base::types::pose2d::PersonBox;
+use orator_dataset::config;
 use serde::{Deserialize, Serialize};
 
 /// Frames of a shot at which people are looked for beside the regular ones, so that a wrong choice is soon mended.

@@ -5,7 +5,7 @@
 
 use super::decode::boxes;
 use super::liveness::Movement;
-use crate::types::pose2d::PersonBox;
+use orator_base::types::pose2d::PersonBox;
 
 /// Least overlap of a found box with the followed one to be the same person.
 const SAME_PERSON: f32 = 0.2;

@@ -1,10 +1,10 @@
 //! An error on its way from a unit's process to the run: its texts, without what would steer a terminal, and the type that
 //! a program may match.
 
-use crate::external::ffmpeg::UnreadableMedia;
-use crate::external::onnx::ModelError;
-use crate::stage::workdir::NoSpace;
 use anyhow::{Error, anyhow};
+use orator_base::stage::workdir::NoSpace;
+use orator_media::ffmpeg::UnreadableMedia;
+use orator_onnx::ModelError;
 use serde::{Deserialize, Serialize};
 
 /// An error as it is sent.
@@ -71,8 +71,8 @@ pub fn plain(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stage::workdir;
     use anyhow::Context as _;
+    use orator_base::stage::workdir;
 
     /// There and back.
     fn sent(error: &Error) -> Error {

@@ -1,9 +1,9 @@
 //! What is asked of a video before any stage works on it: its length, and excerpts that are timed.
 
 use super::message::MediaRequest;
-use crate::external::ffmpeg::probe::probe;
-use crate::external::ffmpeg::write::excerpt;
 use anyhow::Result;
+use orator_media::ffmpeg::probe::probe;
+use orator_media::ffmpeg::write::excerpt;
 
 /// The length of a video in seconds, where a header says it; of an excerpt, what was copied.
 ///

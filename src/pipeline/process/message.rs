@@ -2,9 +2,9 @@
 //! bounded.
 
 use super::failure::SentFailure;
-use crate::config::{KeypointSource, Settings};
-use crate::external::sandbox::Restriction;
 use anyhow::{Context, Result};
+use orator_dataset::config::{KeypointSource, Settings};
+use orator_media::sandbox::Restriction;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};

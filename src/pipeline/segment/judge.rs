@@ -4,12 +4,12 @@
 
 use super::measure::Measures;
 use super::table::{FrameRule, Gap, frame_rules, piece_rules};
-use crate::config;
-use crate::formats::media_json::MediaInfo;
-use crate::stage::ledger::{Kept, Ledger, Refused};
-use crate::stage::refusal::{FrameRefusal, Refusal};
-use crate::types::interval::{Interval, Intervals};
-use crate::types::time::FrameRate;
+use orator_base::stage::ledger::{Kept, Ledger, Refused};
+use orator_base::stage::refusal::{FrameRefusal, Refusal};
+use orator_base::types::interval::{Interval, Intervals};
+use orator_base::types::time::FrameRate;
+use orator_dataset::config;
+use orator_formats::media_json::MediaInfo;
 
 /// Judges a whole video.
 pub fn judge(measures: &Measures, video: &MediaInfo, rules: &config::SegmentConfig) -> (Intervals, Ledger) {

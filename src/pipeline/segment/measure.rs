@@ -2,8 +2,8 @@
 //! thresholds can be judged anew without looking at the video or the keypoints again.
 
 use super::rest;
-use crate::types::pose2d::{Keypoints, SEEN_SCORE, coco};
 use ndarray::{ArrayView2, ArrayView3};
+use orator_base::types::pose2d::{Keypoints, SEEN_SCORE, coco};
 
 /// `facing` and `nose_off` are cut off here; they divide by lengths that may vanish.
 const FARTHEST: f32 = 10.0;

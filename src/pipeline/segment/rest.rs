@@ -1,9 +1,9 @@
 //! Hands that rest on each other, the commonest rest: one of them is mostly hidden, and yet nothing of the motion is
 //! missing. They are told by the wrists, which lie together and keep still; `table` lets such hands be unseen.
 
-use crate::math::order::lower_median;
-use crate::types::pose2d::{Keypoints, SEEN_SCORE, coco};
 use ndarray::ArrayView2;
+use orator_base::math::order::lower_median;
+use orator_base::types::pose2d::{Keypoints, SEEN_SCORE, coco};
 
 /// Wrists that are nearer than this, in shoulder widths, lie together. Of three real people at rest they are 0.3 to 0.55
 /// apart.
@@ -49,8 +49,8 @@ fn spread(now: Option<[f32; 4]>, around: &[Option<[f32; 4]>]) -> Option<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::time::FrameRate;
     use ndarray::{Array3, arr1, s};
+    use orator_base::types::time::FrameRate;
 
     /// Shoulders 100 px apart; wrists `apart` px, the left one moved by `dx(t)`.
     fn seated(apart: f32, dx: impl Fn(usize) -> f32) -> Keypoints {

@@ -1,9 +1,9 @@
 //! How much of the sound around each frame is speech: probabilities of the speech model, window by window, made into
 //! stretches of speech, and their share in the seconds around a frame. Memory: a number a window of 32 ms.
 
-use crate::external::onnx::speech::{SpeechModel, WINDOW};
-use crate::types::time::FrameRate;
 use anyhow::{Context, Result, ensure};
+use orator_base::types::time::FrameRate;
+use orator_onnx::speech::{SpeechModel, WINDOW};
 use std::path::Path;
 
 /// Seconds around a frame that are looked at: a sentence with the pauses in it.
@@ -15,7 +15,7 @@ const ENDS: f32 = 0.35;
 const HANGOVER_SECS: f64 = 0.1;
 const SHORTEST_SECS: f64 = 0.25;
 /// Samples a second.
-const RATE: u32 = crate::types::sound::SAMPLE_RATE;
+const RATE: u32 = orator_base::types::sound::SAMPLE_RATE;
 
 /// Share of speech, 0..1, in the 4 s around each frame of the sound in the file at `path`; NaN for frames without sound.
 ///

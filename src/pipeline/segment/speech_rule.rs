@@ -1,12 +1,12 @@
 //! Whether the speech model listens: what the configuration asks, and whether the model is there.
 
 use super::speech_activity;
-use crate::config::{Settings, SpeechRule};
-use crate::dataset::info::ModelUsed;
-use crate::external::onnx::speech::SpeechModel;
-use crate::external::onnx::{ModelEntry, ModelError, ModelRole, ModelState, ModelStore, Runtime, Wanted};
-use crate::types::time::FrameRate;
 use anyhow::{Context, Result};
+use orator_base::types::time::FrameRate;
+use orator_dataset::config::{Settings, SpeechRule};
+use orator_dataset::info::ModelUsed;
+use orator_onnx::speech::SpeechModel;
+use orator_onnx::{ModelEntry, ModelError, ModelRole, ModelState, ModelStore, Runtime, Wanted};
 use std::path::{Path, PathBuf};
 
 /// The speech model of a configuration, found but not opened.

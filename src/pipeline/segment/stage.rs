@@ -5,18 +5,18 @@ use super::judge::judge;
 use super::measure;
 use super::measure::Measures;
 use super::speech_rule::SpeechListener;
-use crate::config;
-use crate::formats::keypoints_npz;
-use crate::formats::media_json::MediaInfo;
-use crate::formats::timeline_npz::Timeline;
-use crate::pipeline::{lips, sound};
-use crate::stage::artifacts::{Artifact, StageName};
-use crate::stage::ledger::{Ledger, longest_first};
-use crate::stage::progress::Progress;
-use crate::stage::{Input, Report, Stage, Unit, counted, write_json};
-use crate::types::interval::Intervals;
-use crate::types::sync::SoundOffset;
+use crate::{lips, sound};
 use anyhow::{Result, ensure};
+use orator_base::stage::artifacts::{Artifact, StageName};
+use orator_base::stage::ledger::{Ledger, longest_first};
+use orator_base::stage::progress::Progress;
+use orator_base::stage::{Input, Report, Stage, Unit, counted, write_json};
+use orator_base::types::interval::Intervals;
+use orator_base::types::sync::SoundOffset;
+use orator_dataset::config;
+use orator_formats::keypoints_npz;
+use orator_formats::media_json::MediaInfo;
+use orator_formats::timeline_npz::Timeline;
 use std::path::{Path, PathBuf};
 
 /// Keypoints to intervals worth keeping.
@@ -163,7 +163,7 @@ fn report(intervals: &Intervals, ledger: &Ledger) -> Report {
     if !refused.is_empty() {
         line += &format!("; refused: {}", longest_first(&refused));
     }
-    let length = |r: &crate::stage::ledger::Refused| r.end_secs - r.start_secs;
+    let length = |r: &orator_base::stage::ledger::Refused| r.end_secs - r.start_secs;
     let worst = ledger.refused.iter().max_by(|a, b| length(a).total_cmp(&length(b)));
     if let (true, Some(worst)) = (intervals.intervals.is_empty(), worst) {
         line += &format!(" ({})", worst.message);

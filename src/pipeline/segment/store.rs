@@ -1,10 +1,10 @@
 //! `measures.npz`: every array of `Measures` by its name, float32 [T].
 
 use super::measure::Measures;
-use crate::formats::npz;
-use crate::formats::npz::Npz;
 use anyhow::Result;
 use ndarray::aview1;
+use orator_formats::npz;
+use orator_formats::npz::Npz;
 use std::path::Path;
 
 impl Measures {

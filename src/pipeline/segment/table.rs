@@ -2,8 +2,8 @@
 //! Rows stand in the order in which they have their say. Thresholds come from `[segment]` of the configuration.
 
 use super::measure::Measures;
-use crate::config;
-use crate::stage::refusal::Refusal;
+use orator_base::stage::refusal::Refusal;
+use orator_dataset::config;
 
 /// Share of the frames of a gap of a hand from which on it is called the other hand's.
 const MOST_OTHER: f64 = 0.3;

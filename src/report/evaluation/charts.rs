@@ -1,16 +1,16 @@
 //! Charts of an evaluation: share of correct keypoints by joint, drawn on a body and two hands, and distributions of
 //! speed and jerk of prediction and ground truth.
 
-use crate::evaluate::clips::clips::{EvalClip, EvalClips};
-use crate::evaluate::table::table::Table;
-use crate::report::html::chart::dots::{ChartDot, dots};
-use crate::report::html::chart::histogram::Counts;
-use crate::report::html::chart::profile;
-use crate::report::html::numbers::number;
-use crate::report::html::{Node, legend, node};
-use crate::types::skeleton;
-use crate::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_SHOULDER, is_duplicate};
+use crate::html::chart::dots::{ChartDot, dots};
+use crate::html::chart::histogram::Counts;
+use crate::html::chart::profile;
+use crate::html::numbers::number;
+use crate::html::{Node, legend, node};
 use ndarray::ArrayView3;
+use orator_base::types::skeleton;
+use orator_base::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_SHOULDER, is_duplicate};
+use orator_gesture::evaluate::clips::clips::{EvalClip, EvalClips};
+use orator_gesture::evaluate::table::table::Table;
 
 /// Charts of the share of correct frames of every joint, on a body and two hands.
 pub fn joints(table: &Table, clips: &EvalClips) -> Vec<Node> {

@@ -5,14 +5,14 @@ use super::charts::{joints, speeds};
 use super::player;
 use super::player::Excerpt;
 use super::table;
-use crate::evaluate::clips::clips::EvalClips;
-use crate::evaluate::table::table::{PredictorRow, Table};
-use crate::evaluate::verdict::text;
-use crate::evaluate::verdict::verdict::{Answer, Verdict, better_than_nothing, hears};
-use crate::report::html::numbers::length;
-use crate::report::html::{Node, Page, Section, node};
-use crate::stage::counted;
+use crate::html::numbers::length;
+use crate::html::{Node, Page, Section, node};
 use anyhow::Result;
+use orator_base::stage::counted;
+use orator_gesture::evaluate::clips::clips::EvalClips;
+use orator_gesture::evaluate::table::table::{PredictorRow, Table};
+use orator_gesture::evaluate::verdict::text;
+use orator_gesture::evaluate::verdict::verdict::{Answer, Verdict, better_than_nothing, hears};
 use serde_json::json;
 
 /// Whole page.

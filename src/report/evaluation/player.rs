@@ -3,20 +3,20 @@
 //! millimetres, which bounds the page's size.
 
 use super::charts::colours;
-use crate::evaluate::clips::clips::{EvalClip, EvalClips};
-use crate::evaluate::table::table::Table;
-use crate::formats::wav;
-use crate::metrics::beat::consistency;
-use crate::report::html::chart::tracks::{Lane, lanes};
-use crate::report::html::numbers::clock;
-use crate::report::html::{Node, node};
-use crate::types::skeleton;
-use crate::types::skeleton::{L_WRIST, N_JOINTS, R_WRIST, is_duplicate};
-use crate::types::sound::{SAMPLE_RATE, Sound};
+use crate::html::chart::tracks::{Lane, lanes};
+use crate::html::numbers::clock;
+use crate::html::{Node, node};
 use anyhow::Result;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use ndarray::ArrayView3;
+use orator_base::types::skeleton;
+use orator_base::types::skeleton::{L_WRIST, N_JOINTS, R_WRIST, is_duplicate};
+use orator_base::types::sound::{SAMPLE_RATE, Sound};
+use orator_formats::wav;
+use orator_gesture::evaluate::clips::clips::{EvalClip, EvalClips};
+use orator_gesture::evaluate::table::table::Table;
+use orator_gesture::metrics::beat::consistency;
 use serde_json::{Value, json};
 use std::ops::Range;
 

@@ -1,12 +1,12 @@
 //! Metrics of an evaluation as a table, and their exact definitions.
 
-use crate::evaluate::baseline::baselines::PredictorKind;
-use crate::evaluate::table::table::{N_COSTLY_DRAWS, N_DRAWS, Table};
-use crate::evaluate::verdict::labels;
-use crate::evaluate::verdict::verdict::{Answer, against_nothing};
-use crate::metrics::catalogue::Definition;
-use crate::report::html;
-use crate::report::html::{Node, node};
+use crate::html;
+use crate::html::{Node, node};
+use orator_gesture::evaluate::baseline::baselines::PredictorKind;
+use orator_gesture::evaluate::table::table::{N_COSTLY_DRAWS, N_DRAWS, Table};
+use orator_gesture::evaluate::verdict::labels;
+use orator_gesture::evaluate::verdict::verdict::{Answer, against_nothing};
+use orator_gesture::metrics::catalogue::Definition;
 
 /// Groups of metrics by the prefixes of their names; the last takes the rest.
 const GROUPS: [(&str, &[&str]); 4] = [

@@ -1,12 +1,12 @@
 //! A few seconds of a kept interval as a figure that moves: joints from the front in whole millimetres, which bounds the
 //! page's size.
 
-use crate::report::evaluation::player::bones;
-use crate::report::html::{Node, node};
-use crate::types::interval::Interval;
-use crate::types::pose3d::Motion;
+use crate::evaluation::player::bones;
+use crate::html::{Node, node};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
+use orator_base::types::interval::Interval;
+use orator_base::types::pose3d::Motion;
 use serde_json::{Value, json};
 
 /// Longest preview, seconds, and its highest frame rate.
@@ -82,8 +82,8 @@ pub fn section(previews: &[MotionPreview]) -> Vec<Node> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::time::FrameRate;
     use ndarray::{Array2, Array3};
+    use orator_base::types::time::FrameRate;
 
     #[test]
     fn the_longest_interval_is_shown_from_its_beginning() {

@@ -1,15 +1,15 @@
 //! Cells of a contact sheet: the video frame under its keypoints, and the 3D pose on a decimetre grid from the front or
 //! from the left, at constant scale.
 
-use crate::animate::draw::figure::{FigureView, INK, PAPER, draw_pose, mix};
-use crate::animate::draw::overlay;
-use crate::animate::draw::overlay::ImageTransform;
-use crate::external::ffmpeg::frames::FrameReader;
-use crate::external::opencv::{draw, warp};
-use crate::types::image::Image;
-use crate::types::pose2d::Keypoints;
 use anyhow::{Context, Result};
 use ndarray::ArrayView2;
+use orator_avatar::animate::draw::figure::{FigureView, INK, PAPER, draw_pose, mix};
+use orator_avatar::animate::draw::overlay;
+use orator_avatar::animate::draw::overlay::ImageTransform;
+use orator_base::types::image::Image;
+use orator_base::types::pose2d::Keypoints;
+use orator_media::ffmpeg::frames::FrameReader;
+use orator_media::opencv::{draw, warp};
 
 /// Side of a cell, px.
 pub const CELL_PX: usize = 340;
@@ -116,10 +116,10 @@ fn draw_head(cell: &mut Image, from: CellView) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::animate::draw::figure::{LEFT, RIGHT};
-    use crate::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST, N_JOINTS};
-    use crate::types::time::FrameRate;
     use ndarray::{Array2, Array3, s};
+    use orator_avatar::animate::draw::figure::{LEFT, RIGHT};
+    use orator_base::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST, N_JOINTS};
+    use orator_base::types::time::FrameRate;
 
     #[test]
     fn forward_is_left_in_the_side_view_and_the_left_arm_is_in_its_colour() {

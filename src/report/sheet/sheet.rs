@@ -4,17 +4,17 @@
 
 use super::cells::{CELL_PX, CellView, SheetCrop, pose_cell};
 use super::strip::{STRIP_PX, draw_strip};
-use crate::animate::draw::figure::{INK, LEFT, PAPER, RIGHT};
-use crate::external::ffmpeg::frames::FrameReader;
-use crate::external::opencv::draw;
-use crate::pipeline::lift::quality::jitter_around;
-use crate::stage::progress::Progress;
-use crate::types::image::{Image, PictureOptions};
-use crate::types::pose2d::{Keypoints, coco};
-use crate::types::pose3d::Motion;
-use crate::types::skeleton::{L_HAND, L_WRIST, N_HAND_JOINTS, R_HAND, R_WRIST};
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array3, Axis};
+use orator_avatar::animate::draw::figure::{INK, LEFT, PAPER, RIGHT};
+use orator_base::stage::progress::Progress;
+use orator_base::types::image::{Image, PictureOptions};
+use orator_base::types::pose2d::{Keypoints, coco};
+use orator_base::types::pose3d::Motion;
+use orator_base::types::skeleton::{L_HAND, L_WRIST, N_HAND_JOINTS, R_HAND, R_WRIST};
+use orator_media::ffmpeg::frames::FrameReader;
+use orator_media::opencv::draw;
+use orator_pipeline::lift::quality::jitter_around;
 use std::path::Path;
 
 /// Rows of moments on a page.

@@ -1,11 +1,11 @@
 //! Chart under a contact sheet: height and depth of both wrists over time, filled frames paler than seen ones.
 
-use crate::animate::draw::figure::{INK, LEFT, PAPER, RIGHT, mix};
-use crate::external::opencv::draw;
-use crate::types::image::Image;
-use crate::types::pose3d::Motion;
-use crate::types::skeleton::{L_WRIST, R_WRIST};
 use anyhow::Result;
+use orator_avatar::animate::draw::figure::{INK, LEFT, PAPER, RIGHT, mix};
+use orator_base::types::image::Image;
+use orator_base::types::pose3d::Motion;
+use orator_base::types::skeleton::{L_WRIST, R_WRIST};
+use orator_media::opencv::draw;
 use std::ops::Range;
 
 /// Height of the chart, px.

@@ -1,6 +1,6 @@
 //! Curves of a training from the lines of its log.
 
-use crate::report::html::chart::lines::{ChartLevel, ChartLine, LineChart};
+use crate::html::chart::lines::{ChartLevel, ChartLine, LineChart};
 use serde_json::Value;
 
 /// Largest number of points of a curve; neighbours of a longer one are averaged.

@@ -2,8 +2,8 @@
 
 use super::page;
 use super::strip::HeldOutPair;
-use crate::train::epochs::ValidatedStep;
 use anyhow::Result;
+use orator_gesture::train::epochs::ValidatedStep;
 use std::path::{Path, PathBuf};
 
 /// Makes true and generated poses of held-out intervals, with the best checkpoint of a training.

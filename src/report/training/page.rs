@@ -4,16 +4,16 @@
 use super::charts::{TrainingLog, metrics};
 use super::picture::picture;
 use super::strip::{HeldOutPair, strip};
-use crate::external::ffmpeg::jpeg;
-use crate::external::opencv::png;
-use crate::report::html::numbers::number;
-use crate::report::html::picture as page_picture;
-use crate::report::html::{Node, Page, Section, node};
-use crate::stage::counted;
-use crate::stage::workdir;
-use crate::train::gan::score::below_mean_pose;
-use crate::train::log;
+use crate::html::numbers::number;
+use crate::html::picture as page_picture;
+use crate::html::{Node, Page, Section, node};
 use anyhow::{Context, Result};
+use orator_base::stage::counted;
+use orator_base::stage::workdir;
+use orator_gesture::train::gan::score::below_mean_pose;
+use orator_gesture::train::log;
+use orator_media::ffmpeg::jpeg;
+use orator_media::opencv::png;
 use serde_json::Value;
 use std::path::Path;
 

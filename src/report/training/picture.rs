@@ -1,12 +1,12 @@
 //! Page of a training as one picture: the curves in rows, the poses below.
 
 use super::strip::WIDTH;
-use crate::animate::draw::figure::{INK, LEFT, PAPER, RIGHT, mix};
-use crate::external::opencv::draw;
-use crate::report::html::chart::lines::LineChart;
-use crate::report::html::numbers::number;
-use crate::types::image::Image;
+use crate::html::chart::lines::LineChart;
+use crate::html::numbers::number;
 use anyhow::Result;
+use orator_avatar::animate::draw::figure::{INK, LEFT, PAPER, RIGHT, mix};
+use orator_base::types::image::Image;
+use orator_media::opencv::draw;
 
 const N_COLUMNS: usize = 4;
 const CELL: [usize; 2] = [WIDTH / N_COLUMNS, 180];

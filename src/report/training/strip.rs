@@ -1,13 +1,13 @@
 //! Generated against true poses of held-out intervals: the figure at a few moments, true above generated, and the
 //! height of both wrists over time.
 
-use crate::animate::draw::figure::{FigureView, INK, LEFT, PAPER, RIGHT, draw_pose, mix};
-use crate::external::opencv::draw;
-use crate::types::image::Image;
-use crate::types::pose3d::Motion;
-use crate::types::skeleton::{L_WRIST, R_WRIST};
 use anyhow::Result;
 use ndarray::Axis;
+use orator_avatar::animate::draw::figure::{FigureView, INK, LEFT, PAPER, RIGHT, draw_pose, mix};
+use orator_base::types::image::Image;
+use orator_base::types::pose3d::Motion;
+use orator_base::types::skeleton::{L_WRIST, R_WRIST};
+use orator_media::opencv::draw;
 use std::ops::Range;
 
 /// Ground truth and generated motion of a held-out interval, of one rate and, up to rounding, one length.
@@ -104,9 +104,9 @@ fn range(pair: &HeldOutPair, joint: usize, frames: Range<usize>) -> [f32; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::skeleton::N_JOINTS;
-    use crate::types::time::FrameRate;
     use ndarray::Array3;
+    use orator_base::types::skeleton::N_JOINTS;
+    use orator_base::types::time::FrameRate;
 
     #[test]
     fn any_length_is_drawn() {

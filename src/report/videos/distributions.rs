@@ -1,11 +1,11 @@
 //! Histograms of every measure with its threshold.
 
 use super::spread::{Measure, MeasureCounts};
-use crate::config::Settings;
-use crate::report::html::chart::histogram::{Counts, ThresholdLine, histogram};
-use crate::report::html::numbers::percent;
-use crate::report::html::{Node, node};
-use crate::stage::counted;
+use crate::html::chart::histogram::{Counts, ThresholdLine, histogram};
+use crate::html::numbers::percent;
+use crate::html::{Node, node};
+use orator_base::stage::counted;
+use orator_dataset::config::Settings;
 
 /// Card for each measure.
 pub fn distributions(spread: &MeasureCounts, settings: &Settings, per_sec: f64) -> Vec<Node> {

@@ -4,9 +4,9 @@ use super::pictures::MomentThumbnail;
 use super::reasons;
 use super::video::VideoSummary;
 use super::worst::{Moment, Worst};
-use crate::report::html::numbers::clock;
-use crate::report::html::{Node, node, picture};
-use crate::stage::counted;
+use crate::html::numbers::clock;
+use crate::html::{Node, node, picture};
+use orator_base::stage::counted;
 use std::collections::BTreeMap;
 
 /// Pictures by video and by the frames of their moment.

@@ -7,19 +7,19 @@ use super::thresholds::THRESHOLDS;
 use super::video::VideoSummary;
 use super::what_if::{JudgedVideo, KeptByThreshold, open_frames};
 use super::worst::Worst;
-use crate::config::Settings;
-use crate::config::videos::Videos;
-use crate::formats::joints_npz;
-use crate::formats::media_json::MediaInfo;
-use crate::formats::npz::Npz;
-use crate::pipeline::segment::Measures;
-use crate::report::preview::MotionPreview;
-use crate::report::preview::motion::MOST_PREVIEWS;
-use crate::stage::Unit;
-use crate::stage::artifacts::Artifact;
-use crate::stage::progress::Progress;
-use crate::types::interval::Intervals;
+use crate::preview::MotionPreview;
+use crate::preview::motion::MOST_PREVIEWS;
 use anyhow::{Context, Result, ensure};
+use orator_base::stage::Unit;
+use orator_base::stage::artifacts::Artifact;
+use orator_base::stage::progress::Progress;
+use orator_base::types::interval::Intervals;
+use orator_dataset::config::Settings;
+use orator_dataset::config::videos::Videos;
+use orator_formats::joints_npz;
+use orator_formats::media_json::MediaInfo;
+use orator_formats::npz::Npz;
+use orator_pipeline::segment::Measures;
 use std::path::Path;
 
 /// Data of a report.
@@ -141,7 +141,7 @@ fn bone_change(work: &Path, unit: &Unit) -> Result<Vec<f32>> {
     Ok(values.into_iter().collect())
 }
 
-fn motion(work: &Path, unit: &Unit) -> Result<(crate::types::pose3d::Motion, Intervals)> {
+fn motion(work: &Path, unit: &Unit) -> Result<(orator_base::types::pose3d::Motion, Intervals)> {
     let path = Artifact::LiftIntervals.path(work, unit);
     let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
     let intervals = serde_json::from_slice(&bytes).with_context(|| format!("{} holds no intervals", path.display()))?;

@@ -1,11 +1,11 @@
 //! Charts of joint positions and speeds.
 
 use super::movement::{MovementCounts, PAIRS};
-use crate::report::html::chart::profile;
-use crate::report::html::chart::ranges::{ValueRange, ranges};
-use crate::report::html::numbers::number;
-use crate::report::html::{Node, legend, node};
-use crate::stage::counted;
+use crate::html::chart::profile;
+use crate::html::chart::ranges::{ValueRange, ranges};
+use crate::html::numbers::number;
+use crate::html::{Node, legend, node};
+use orator_base::stage::counted;
 
 /// Axis with the labels of its ends.
 const AXES: [(&str, [&str; 2]); 3] = [

@@ -1,9 +1,9 @@
 //! Positions and speeds of joints in the kept frames. Arms are measured from the neck, finger tips from their wrist.
 
-use crate::report::html::chart::histogram::Counts;
-use crate::types::interval::Interval;
-use crate::types::pose3d::Motion;
-use crate::types::skeleton::{L_ELBOW, L_HAND, L_WRIST, NECK, R_ELBOW, R_HAND, R_WRIST};
+use crate::html::chart::histogram::Counts;
+use orator_base::types::interval::Interval;
+use orator_base::types::pose3d::Motion;
+use orator_base::types::skeleton::{L_ELBOW, L_HAND, L_WRIST, NECK, R_ELBOW, R_HAND, R_WRIST};
 
 /// Largest distance of a joint from its reference, metres.
 const REACH: f64 = 1.2;
@@ -112,9 +112,9 @@ impl JointMovement {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::skeleton::N_JOINTS;
-    use crate::types::time::FrameRate;
     use ndarray::Array3;
+    use orator_base::types::skeleton::N_JOINTS;
+    use orator_base::types::time::FrameRate;
 
     #[test]
     fn a_wrist_that_goes_one_metre_a_second_is_measured_so() {

@@ -5,14 +5,14 @@ use super::gather::{ReportData, gather};
 use super::summary;
 use super::summary::ReportTotals;
 use super::{distributions, motion, pictures, sliders, timelines};
-use crate::config::Settings;
-use crate::config::videos::Videos;
-use crate::report::html::{Page, Section};
-use crate::report::people::faces;
-use crate::report::preview;
-use crate::report::splits;
-use crate::stage::counted;
-use crate::stage::progress::Progress;
+use crate::faces;
+use crate::html::{Page, Section};
+use crate::preview;
+use crate::splits;
+use orator_base::stage::counted;
+use orator_base::stage::progress::Progress;
+use orator_dataset::config::Settings;
+use orator_dataset::config::videos::Videos;
 use serde_json::json;
 
 /// Request for a report.

@@ -2,19 +2,19 @@
 //! moment. Keypoints of other programs stand on an empty picture.
 
 use super::worst::Worst;
-use crate::animate::draw::overlay;
-use crate::animate::draw::overlay::ImageTransform;
-use crate::external::ffmpeg::frames::FrameReader;
-use crate::external::ffmpeg::jpeg;
-use crate::external::opencv::draw;
-use crate::formats::keypoints_npz;
-use crate::formats::media_json::MediaInfo;
-use crate::pipeline::pictures;
-use crate::stage::Unit;
-use crate::stage::artifacts::Artifact;
-use crate::types::image::Image;
-use crate::types::pose2d::Keypoints;
 use anyhow::{Context, Result, ensure};
+use orator_avatar::animate::draw::overlay;
+use orator_avatar::animate::draw::overlay::ImageTransform;
+use orator_base::stage::Unit;
+use orator_base::stage::artifacts::Artifact;
+use orator_base::types::image::Image;
+use orator_base::types::pose2d::Keypoints;
+use orator_formats::keypoints_npz;
+use orator_formats::media_json::MediaInfo;
+use orator_media::ffmpeg::frames::FrameReader;
+use orator_media::ffmpeg::jpeg;
+use orator_media::opencv::draw;
+use orator_pipeline::pictures;
 use std::collections::BTreeMap;
 use std::path::Path;
 

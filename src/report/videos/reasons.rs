@@ -1,7 +1,7 @@
 //! The reasons of a ledger as the page shows them: their order, and the class of each one's colour. One colour is one kind of
 //! thing; of two reasons of a kind one is striped (`page.css`).
 
-use crate::stage::refusal::Refusal;
+use orator_base::stage::refusal::Refusal;
 
 /// Label of a video that no stage has finished.
 pub const WAITING: &str = "not done";

@@ -3,10 +3,10 @@
 use super::thresholds::{THRESHOLDS, ThresholdGrid};
 use super::video::VideoSummary;
 use super::what_if::KeptByThreshold;
-use crate::config::SegmentConfig;
-use crate::report::html::chart::curve::curve;
-use crate::report::html::numbers::{length, with_unit};
-use crate::report::html::{Node, node};
+use crate::html::chart::curve::curve;
+use crate::html::numbers::{length, with_unit};
+use crate::html::{Node, node};
+use orator_dataset::config::SegmentConfig;
 use serde_json::{Value, json};
 
 /// Seconds kept of all videos, by threshold and value.

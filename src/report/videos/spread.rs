@@ -1,10 +1,10 @@
 //! Distributions of every measure over all frames of all videos, and of the lengths of kept intervals.
 
 use super::thresholds::THRESHOLDS;
-use crate::config::Settings;
-use crate::pipeline::segment::Measures;
-use crate::report::html::chart::histogram::{Counts, ThresholdLine};
-use crate::stage::ledger::Ledger;
+use crate::html::chart::histogram::{Counts, ThresholdLine};
+use orator_base::stage::ledger::Ledger;
+use orator_dataset::config::Settings;
+use orator_pipeline::segment::Measures;
 
 /// Measure of a frame, or of a kept interval.
 pub struct Measure {
@@ -111,7 +111,7 @@ impl MeasureCounts {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stage::ledger::Kept;
+    use orator_base::stage::ledger::Kept;
 
     #[test]
     fn every_measure_is_counted_but_those_that_are_yes_or_no() {

@@ -3,12 +3,12 @@
 use super::reasons;
 use super::reasons::WAITING;
 use super::video::VideoSummary;
-use crate::report::html;
-use crate::report::html::chart::bars::{StackedBar, bars};
-use crate::report::html::numbers::{length, percent};
-use crate::report::html::{Node, legend, node};
-use crate::report::splits::VideoSplits;
-use crate::stage::counted;
+use crate::html;
+use crate::html::chart::bars::{StackedBar, bars};
+use crate::html::numbers::{length, percent};
+use crate::html::{Node, legend, node};
+use crate::splits::VideoSplits;
+use orator_base::stage::counted;
 use std::collections::BTreeMap;
 
 /// Seconds of all videos together.

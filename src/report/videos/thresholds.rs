@@ -1,6 +1,6 @@
 //! Thresholds of `[segment]` with sliders: meaning, and grid of values.
 
-use crate::config::SegmentConfig;
+use orator_dataset::config::SegmentConfig;
 
 /// Steps between the ends of a grid.
 const N_STEPS: u32 = 20;
@@ -108,7 +108,7 @@ impl ThresholdGrid {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config;
+    use orator_dataset::config;
 
     #[test]
     fn every_threshold_can_be_tried_and_every_value_can_be_written() {

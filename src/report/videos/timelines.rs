@@ -3,12 +3,12 @@
 use super::reasons;
 use super::reasons::WAITING;
 use super::video::VideoSummary;
-use crate::report::html;
-use crate::report::html::chart::timeline::{TimelineSpan, timeline};
-use crate::report::html::numbers::{clock, length, number, with_unit};
-use crate::report::html::{Node, node};
-use crate::stage::counted;
-use crate::stage::ledger::Kept;
+use crate::html;
+use crate::html::chart::timeline::{TimelineSpan, timeline};
+use crate::html::numbers::{clock, length, number, with_unit};
+use crate::html::{Node, node};
+use orator_base::stage::counted;
+use orator_base::stage::ledger::Kept;
 use std::collections::BTreeSet;
 
 /// Largest number of parts of all timelines together, which bounds the page, and smallest number of each.

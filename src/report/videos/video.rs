@@ -1,12 +1,12 @@
 //! State of a video: its ledger after the last finished stage, or the reason why there is none.
 
 use super::reasons::WAITING;
-use crate::formats::media_json::MediaInfo;
-use crate::stage::Unit;
-use crate::stage::artifacts::{Artifact, StageName, dir};
-use crate::stage::ledger::Ledger;
-use crate::stage::record::Failure;
-use crate::types::sync::SoundOffset;
+use orator_base::stage::Unit;
+use orator_base::stage::artifacts::{Artifact, StageName, dir};
+use orator_base::stage::ledger::Ledger;
+use orator_base::stage::record::Failure;
+use orator_formats::media_json::MediaInfo;
+use orator_formats::sound_offset_json;
 use std::path::Path;
 
 /// Video of the report.
@@ -51,7 +51,7 @@ impl VideoSummary {
                 video.note(&format!("Made {said}."));
             }
         }
-        if let Some(offset) = SoundOffset::read(&Artifact::SoundOffset.path(work, unit)).ok().flatten()
+        if let Some(offset) = sound_offset_json::read(&Artifact::SoundOffset.path(work, unit)).ok().flatten()
             && offset.is_told()
         {
             video.note(&format!("By the lips, the {offset}."));

@@ -3,13 +3,13 @@
 //! frames that were never lifted count as good ones.
 
 use super::thresholds::THRESHOLDS;
-use crate::config::SegmentConfig;
-use crate::formats::media_json::MediaInfo;
-use crate::pipeline::lift::refuse::{bone_refusals, exclude_frames, max_gap_frames};
-use crate::pipeline::segment;
-use crate::pipeline::segment::Measures;
-use crate::stage::ledger::Ledger;
-use crate::stage::refusal::{FrameRefusal, Refusal};
+use orator_base::stage::ledger::Ledger;
+use orator_base::stage::refusal::{FrameRefusal, Refusal};
+use orator_dataset::config::SegmentConfig;
+use orator_formats::media_json::MediaInfo;
+use orator_pipeline::lift::refuse::{bone_refusals, exclude_frames, max_gap_frames};
+use orator_pipeline::segment;
+use orator_pipeline::segment::Measures;
 use rayon::prelude::*;
 
 /// Seconds kept of one video: by threshold, by value of its grid.
@@ -74,8 +74,8 @@ pub fn open_frames(ledger: &Ledger, video: &MediaInfo) -> Vec<Option<FrameRefusa
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stage::ledger::Refused;
-    use crate::types::time::FrameRate;
+    use orator_base::stage::ledger::Refused;
+    use orator_base::types::time::FrameRate;
 
     /// 300 good frames but for a jump at 200.
     fn measures() -> Measures {

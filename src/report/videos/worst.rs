@@ -2,13 +2,13 @@
 //! the worst spans. Ties follow the order of the videos, so the choice is deterministic.
 
 use super::reasons;
-use crate::config::SegmentConfig;
-use crate::formats::media_json::MediaInfo;
-use crate::pipeline::segment::Measures;
-use crate::pipeline::segment::table::{Bound, frame_rules, piece_rules};
-use crate::report::html::numbers::number;
-use crate::stage::ledger::{Ledger, Refused};
-use crate::stage::refusal::Refusal;
+use crate::html::numbers::number;
+use orator_base::stage::ledger::{Ledger, Refused};
+use orator_base::stage::refusal::Refusal;
+use orator_dataset::config::SegmentConfig;
+use orator_formats::media_json::MediaInfo;
+use orator_pipeline::segment::Measures;
+use orator_pipeline::segment::table::{Bound, frame_rules, piece_rules};
 use std::collections::BTreeMap;
 
 /// Moment with a picture.
@@ -170,8 +170,8 @@ fn said(refusal: Refusal, value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stage::refusal::FrameRefusal;
-    use crate::types::time::FrameRate;
+    use orator_base::stage::refusal::FrameRefusal;
+    use orator_base::types::time::FrameRate;
 
     #[test]
     fn the_worst_frame_of_the_worst_stretches_is_taken() {

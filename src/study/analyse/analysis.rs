@@ -6,9 +6,9 @@ use super::registration::{Registration, judged, register};
 use super::result::{FigureSettings, StudyAnalysis, TaskAnalysis};
 use super::task::task;
 use super::votes::read::VotesRead;
-use crate::study::file::{HypothesisKind, StudyHypothesis};
-use crate::study::preregistration::RegisteredHypothesis;
-use crate::study::vote::StudyVote;
+use crate::file::{HypothesisKind, StudyHypothesis};
+use crate::preregistration::RegisteredHypothesis;
+use crate::vote::StudyVote;
 use anyhow::{Result, ensure};
 
 /// Analysis of the votes of `source`, which is called `title`.

@@ -1,9 +1,9 @@
 //! Whose votes are left out, by rules that were fixed before, and how many each rule leaves out by itself.
 
 use super::votes::read::VotesRead;
-use crate::study::file::ExclusionRules;
-use crate::study::plan::TrialPhase;
-use crate::study::vote::StudyVote;
+use crate::file::ExclusionRules;
+use crate::plan::TrialPhase;
+use crate::vote::StudyVote;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -125,7 +125,7 @@ impl ExclusionAccount {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::analyse::votes::columns::ColumnNames;
+    use crate::analyse::votes::columns::ColumnNames;
 
     #[test]
     fn each_rule_is_counted_by_itself() {

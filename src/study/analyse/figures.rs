@@ -1,10 +1,10 @@
 //! Intervals and tests of one number by several methods, with what could not be computed.
 
 use super::figure::{EquivalenceFigure, FigureMethod, FigureOrigin, IntervalFigure, TestFigure};
-use crate::study::stats::equivalence::Equivalence;
-use crate::study::stats::error::StatisticsError;
-use crate::study::stats::estimate::{ConfidenceInterval, StudentEstimate};
-use crate::study::stats::holm::holm;
+use crate::stats::equivalence::Equivalence;
+use crate::stats::error::StatisticsError;
+use crate::stats::estimate::{ConfidenceInterval, StudentEstimate};
+use crate::stats::holm::holm;
 use serde::Serialize;
 
 /// Figures about one number, the first of each kind the one to look at first.

@@ -3,7 +3,7 @@
 use super::figure::FigureMethod;
 use super::result::{ShareMeasure, StudyAnalysis, TaskAnalysis};
 use super::words::{count, list, p_value, percent, percents, points};
-use crate::study::plan::TaskDesign;
+use crate::plan::TaskDesign;
 
 /// Sources by the method that cites them.
 const SOURCES: [(&str, &str); 13] = [

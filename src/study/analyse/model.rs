@@ -3,9 +3,9 @@
 use super::figure::{FigureMethod, TestFigure};
 use super::figures::FigureSet;
 use super::result::ModelFigure;
-use crate::study::stats::cluster::votes::ClipVote;
-use crate::study::stats::error::StatisticsError;
-use crate::study::stats::glmm::fit::MixedLogit;
+use crate::stats::cluster::votes::ClipVote;
+use crate::stats::error::StatisticsError;
+use crate::stats::glmm::fit::MixedLogit;
 
 /// Fits the model of an intercept with random participants and clips to votes with scores 0 and 1. Its interval is of
 /// the share over all participants and clips, its test of the intercept against log odds of 0, with one degree of
@@ -40,7 +40,7 @@ pub fn fitted(votes: &[ClipVote], found: &mut FigureSet, confidence: f64) -> Opt
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::simulate::{CrossedDesign, CrossedEffects, crossed_votes};
+    use crate::simulate::{CrossedDesign, CrossedEffects, crossed_votes};
 
     #[test]
     fn the_share_of_a_simulated_study_is_found() {

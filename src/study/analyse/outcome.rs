@@ -1,10 +1,10 @@
 //! Votes of a task as numbers: participants and clips numbered, answers turned to scores.
 
 use super::result::ShareMeasure;
-use crate::study::plan::TaskDesign;
-use crate::study::response::{Response, ScreenSide};
-use crate::study::stats::cluster::votes::ClipVote;
-use crate::study::vote::StudyVote;
+use crate::plan::TaskDesign;
+use crate::response::{Response, ScreenSide};
+use crate::stats::cluster::votes::ClipVote;
+use crate::vote::StudyVote;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Numbers of participants and clips by their names, the same for all votes of a task.

@@ -5,16 +5,16 @@ use super::figure::{FigureMethod, TestFigure};
 use super::figures::{FigureSet, adjust};
 use super::outcome::{Numbering, differences, scores};
 use super::result::{Conclusion, FigureSettings, PairAnalysis, ScoreAnalysis};
-use crate::math::order::Ordered;
-use crate::study::plan::TaskDesign;
-use crate::study::stats::cluster::crossed::crossed_estimate;
-use crate::study::stats::cluster::participants::participant_means;
-use crate::study::stats::cluster::votes::ClipVote;
-use crate::study::stats::error::StatisticsError;
-use crate::study::stats::median::median_estimate;
-use crate::study::stats::permutation::crossed_flip::crossed_sign_flip;
-use crate::study::stats::rank::{ZeroDifferences, friedman, signed_rank};
-use crate::study::vote::StudyVote;
+use crate::plan::TaskDesign;
+use crate::stats::cluster::crossed::crossed_estimate;
+use crate::stats::cluster::participants::participant_means;
+use crate::stats::cluster::votes::ClipVote;
+use crate::stats::error::StatisticsError;
+use crate::stats::median::median_estimate;
+use crate::stats::permutation::crossed_flip::crossed_sign_flip;
+use crate::stats::rank::{ZeroDifferences, friedman, signed_rank};
+use crate::vote::StudyVote;
+use orator_base::math::order::Ordered;
 use std::collections::BTreeSet;
 
 /// Draws of sign flips for one of many pairs.

@@ -5,10 +5,10 @@ use super::figure::FigureMethod;
 use super::figures::FigureSet;
 use super::result::{JudgedClaim, JudgedHypothesis, PairAnalysis, ShareAnalysis, TaskAnalysis};
 use super::verdict::scope;
-use crate::study::file::{AnalysisSettings, ExclusionRules, HypothesisKind, StudyHypothesis};
-use crate::study::folder::StudyFolder;
-use crate::study::preregistration::{Preregistration, RegisteredHypothesis};
-use crate::study::seal::StudySeal;
+use crate::file::{AnalysisSettings, ExclusionRules, HypothesisKind, StudyHypothesis};
+use crate::folder::StudyFolder;
+use crate::preregistration::{Preregistration, RegisteredHypothesis};
+use crate::seal::StudySeal;
 use anyhow::Result;
 
 /// What was fixed before the data were seen.

@@ -5,8 +5,8 @@ use super::exclusion::ExclusionAccount;
 use super::figure::{FigureOrigin, IntervalFigure, TestFigure};
 use super::figures::FigureSet;
 use super::votes::read::RefusedRow;
-use crate::study::file::AnalysisSettings;
-use crate::study::plan::TaskDesign;
+use crate::file::AnalysisSettings;
+use crate::plan::TaskDesign;
 use serde::Serialize;
 
 /// Analysis of a study.

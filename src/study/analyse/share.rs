@@ -5,14 +5,14 @@ use super::figures::FigureSet;
 use super::model::fitted;
 use super::outcome::BinaryVote;
 use super::result::{Conclusion, FigureSettings, ShareAnalysis, ShareMeasure};
-use crate::study::stats::cluster::bootstrap::CrossedBootstrap;
-use crate::study::stats::cluster::crossed::crossed_estimate;
-use crate::study::stats::cluster::participants::participant_estimate;
-use crate::study::stats::cluster::votes::ClipVote;
-use crate::study::stats::equivalence::Equivalence;
-use crate::study::stats::permutation::crossed_flip::crossed_sign_flip;
-use crate::study::stats::permutation::sides::{SideBlock, side_test};
-use crate::study::stats::proportion::BinomialCount;
+use crate::stats::cluster::bootstrap::CrossedBootstrap;
+use crate::stats::cluster::crossed::crossed_estimate;
+use crate::stats::cluster::participants::participant_estimate;
+use crate::stats::cluster::votes::ClipVote;
+use crate::stats::equivalence::Equivalence;
+use crate::stats::permutation::crossed_flip::crossed_sign_flip;
+use crate::stats::permutation::sides::{SideBlock, side_test};
+use crate::stats::proportion::BinomialCount;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Share where nothing is known.

@@ -3,12 +3,12 @@
 use super::figure::{FigureMethod, FigureOrigin, IntervalFigure};
 use super::outcome::Numbering;
 use super::result::{FigureSettings, StrengthFigure};
-use crate::study::response::Response;
-use crate::study::stats::error::StatisticsError;
-use crate::study::stats::paired::bradley_terry::{BradleyTerry, participant_intervals};
-use crate::study::stats::paired::elo::EloSettings;
-use crate::study::stats::paired::votes::PairedVote;
-use crate::study::vote::StudyVote;
+use crate::response::Response;
+use crate::stats::error::StatisticsError;
+use crate::stats::paired::bradley_terry::{BradleyTerry, participant_intervals};
+use crate::stats::paired::elo::EloSettings;
+use crate::stats::paired::votes::PairedVote;
+use crate::vote::StudyVote;
 
 /// Draws of participants for the intervals.
 const MOST_DRAWS: usize = 2000;
@@ -65,7 +65,7 @@ fn paired(vote: &StudyVote, numbering: &Numbering, conditions: &[String]) -> Vec
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::plan::{TaskDesign, TrialPhase};
+    use crate::plan::{TaskDesign, TrialPhase};
 
     fn vote(participant: usize, conditions: &[&str], response: Response) -> StudyVote {
         StudyVote {

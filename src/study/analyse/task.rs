@@ -8,13 +8,13 @@ use super::result::{Conclusion, FigureSettings, PairAnalysis, ShareAnalysis, Sha
 use super::share::{ShareCell, conclude, share};
 use super::strength::strengths;
 use super::verdict::verdicts;
-use crate::study::plan::TaskDesign;
-use crate::study::stats::cluster::crossed::crossed_difference;
-use crate::study::stats::cluster::participants::participant_differences;
-use crate::study::stats::cluster::votes::ClipVote;
-use crate::study::stats::krippendorff::{MeasurementScale, alpha};
-use crate::study::stats::rank::{ZeroDifferences, signed_rank};
-use crate::study::vote::StudyVote;
+use crate::plan::TaskDesign;
+use crate::stats::cluster::crossed::crossed_difference;
+use crate::stats::cluster::participants::participant_differences;
+use crate::stats::cluster::votes::ClipVote;
+use crate::stats::krippendorff::{MeasurementScale, alpha};
+use crate::stats::rank::{ZeroDifferences, signed_rank};
+use crate::vote::StudyVote;
 use anyhow::{Context, Result, bail};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -158,7 +158,7 @@ fn agreement(
     votes: &[&StudyVote],
     numbering: &Numbering,
     analysis: &TaskAnalysis,
-) -> Result<f64, crate::study::stats::error::StatisticsError> {
+) -> Result<f64, crate::stats::error::StatisticsError> {
     let names = &analysis.conditions;
     let (scale, groups): (_, Vec<Vec<ClipVote>>) = match analysis.design {
         TaskDesign::Sliders => {

@@ -3,7 +3,7 @@
 use super::figure::FigureMethod;
 use super::result::{Conclusion, FigureSettings, PairAnalysis, ShareAnalysis, ShareMeasure, TaskAnalysis};
 use super::words::{count, p_value, percent, percents, points};
-use crate::study::plan::TaskDesign;
+use crate::plan::TaskDesign;
 
 /// Pairs that have a sentence of their own.
 const MOST_PAIRS: usize = 6;

@@ -1,13 +1,13 @@
 //! Static files of a study: the page with its texts, sessions made before under opaque names, and the films.
 
 use super::address::origin;
-use crate::stage::workdir;
-use crate::study::file::StudyFile;
-use crate::study::folder::StudyFolder;
-use crate::study::pages::assets::{ASSETS, PARTICIPANT_PAGE};
-use crate::study::pages::page_texts::page_texts;
-use crate::study::plan::{StudyPlan, Trial};
+use crate::file::StudyFile;
+use crate::folder::StudyFolder;
+use crate::pages::assets::{ASSETS, PARTICIPANT_PAGE};
+use crate::pages::page_texts::page_texts;
+use crate::plan::{StudyPlan, Trial};
 use anyhow::{Context, Result, ensure};
+use orator_base::stage::workdir;
 use serde_json::json;
 use std::collections::BTreeSet;
 use std::fs;

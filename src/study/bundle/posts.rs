@@ -2,8 +2,8 @@
 //! fits no session of the plan is dropped and counted.
 
 use super::files::BundledPlan;
-use crate::study::server::answer::check;
-use crate::study::store::answers::GivenAnswer;
+use crate::server::answer::check;
+use crate::store::answers::GivenAnswer;
 use anyhow::{Context, Result};
 use serde::Deserialize;
 use serde_json::Value;
@@ -128,8 +128,8 @@ fn fitting(bundled: &BundledPlan, session: usize, rest: serde_json::Map<String, 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::plan::{PlannedSession, PlannedTask, StudyPlan, TaskDesign, Trial, TrialPhase};
-    use crate::study::response::{Response, ScreenSide};
+    use crate::plan::{PlannedSession, PlannedTask, StudyPlan, TaskDesign, Trial, TrialPhase};
+    use crate::response::{Response, ScreenSide};
 
     fn bundled() -> BundledPlan {
         let task =

@@ -1,6 +1,6 @@
 //! How many clips of each speaker a design needs so that no participant hears one twice.
 
-use crate::study::file::{ClipReuse, StudyFile};
+use crate::file::{ClipReuse, StudyFile};
 use anyhow::{Result, ensure};
 use std::collections::BTreeMap;
 

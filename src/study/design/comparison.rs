@@ -1,8 +1,8 @@
 //! Which conditions the trials of a task set beside each other, and which response is right.
 
-use crate::study::file::{StudyCondition, StudyFile, StudyTask};
-use crate::study::plan::TaskDesign;
-use crate::study::response::{Response, ScreenSide};
+use crate::file::{StudyCondition, StudyFile, StudyTask};
+use crate::plan::TaskDesign;
+use crate::response::{Response, ScreenSide};
 
 /// Conditions of one trial.
 pub type ComparedConditions<'a> = Vec<&'a StudyCondition>;

@@ -9,8 +9,8 @@ use super::latin_square::SquareRows;
 use super::shared_clips::SharedClips;
 use super::stream::stream;
 use super::task_design::TaskDesigner;
-use crate::study::file::StudyFile;
-use crate::study::plan::{FilmContent, PlannedTask, StudyPlan};
+use crate::file::StudyFile;
+use crate::plan::{FilmContent, PlannedTask, StudyPlan};
 use anyhow::Result;
 use rand::seq::SliceRandom;
 use std::collections::BTreeMap;
@@ -72,9 +72,9 @@ pub fn design(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::file::ClipReuse;
-    use crate::study::plan::{PlannedSession, TaskDesign, Trial, TrialPhase};
-    use crate::study::response::{Response, ScreenSide};
+    use crate::file::ClipReuse;
+    use crate::plan::{PlannedSession, TaskDesign, Trial, TrialPhase};
+    use crate::response::{Response, ScreenSide};
     use std::collections::BTreeSet;
     use std::path::Path;
 

@@ -1,7 +1,7 @@
 //! Clips of one speaker shared out: each to one purpose, so that none comes twice in a session.
 
 use super::clip_needs::ClipNeeds;
-use crate::study::file::ClipReuse;
+use crate::file::ClipReuse;
 
 /// Clips of one speaker by purpose.
 #[derive(Clone, Debug)]

@@ -5,7 +5,7 @@ use super::comparison::{ComparedConditions, comparisons};
 use super::latin_square::SquareRows;
 use super::shared_clips::SharedClips;
 use super::stream::stream;
-use crate::study::file::{StudyFile, StudyTask};
+use crate::file::{StudyFile, StudyTask};
 use std::collections::{BTreeMap, VecDeque};
 
 /// Clip of a speaker with what it is shown in.

@@ -3,7 +3,7 @@
 use super::condition::ConditionSource;
 use super::hypothesis::{HypothesisKind, StudyHypothesis};
 use super::study_file::{StudyFile, StudyTask};
-use crate::study::plan::TaskDesign;
+use crate::plan::TaskDesign;
 
 /// Drops tasks without trials, and fills in mismatched conditions, conditions of tasks and hypotheses where there are none.
 pub fn fill_in(file: &mut StudyFile) {

@@ -3,10 +3,10 @@
 use super::layers::{self, StudyPreset};
 use super::study_file::StudyFile;
 use super::{defaults, rules};
-use crate::config::file::{line_of, nearest, refused};
-use crate::config::{ConfigError, Problem, SourceLocation};
-use crate::stage::workdir;
 use anyhow::{Context, Result};
+use orator_base::stage::workdir;
+use orator_dataset::config::file::{line_of, nearest, refused};
+use orator_dataset::config::{ConfigError, Problem, SourceLocation};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -141,7 +141,7 @@ fn paths_of(study: &mut StudyFile) -> impl Iterator<Item = &mut PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::file::{ConditionSource, HypothesisKind, TaskOrder};
+    use crate::file::{ConditionSource, HypothesisKind, TaskOrder};
 
     const SMALLEST: &str = "title = \"t\"\npreset = \"rebol\"\n[[speaker]]\nname = \"ellen\"\ndataset = \"data\"\n\
                             [[condition]]\nname = \"model\"\nkind = \"checkpoint\"\ncheckpoint = \"models/{speaker}\"\n";

@@ -3,8 +3,8 @@
 use super::condition::{ConditionSource, StudyCondition};
 use super::hypothesis::{HypothesisKind, StudyHypothesis};
 use super::study_file::{StudyFile, StudyTask};
-use crate::config::file::nearest;
-use crate::study::plan::TaskDesign;
+use crate::plan::TaskDesign;
+use orator_dataset::config::file::nearest;
 use std::collections::BTreeSet;
 
 /// Keys of a file that break a rule, with what was expected and what to do.

@@ -3,8 +3,8 @@
 use super::condition::StudyCondition;
 use super::hypothesis::StudyHypothesis;
 use super::layers::StudyPreset;
-use crate::study::plan::TaskDesign;
-use crate::types::split::Split;
+use crate::plan::TaskDesign;
+use orator_base::types::split::Split;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;

@@ -1,9 +1,9 @@
 //! Whether an answer fits its trial: its form, its numbers, and whether it passes a check.
 
 use super::reply::ApiError;
-use crate::study::plan::{PlannedTask, TaskDesign, Trial, TrialPhase};
-use crate::study::response::Response;
-use crate::study::store::answers::GivenAnswer;
+use crate::plan::{PlannedTask, TaskDesign, Trial, TrialPhase};
+use crate::response::Response;
+use crate::store::answers::GivenAnswer;
 
 /// Seconds that a page may report: a day.
 const MOST_SECS: f64 = 86_400.0;
@@ -56,7 +56,7 @@ pub fn feedback(trial: &Trial) -> Option<&Response> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::response::ScreenSide;
+    use crate::response::ScreenSide;
 
     #[test]
     fn each_design_takes_its_own_form_of_response() {

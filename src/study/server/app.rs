@@ -3,7 +3,7 @@
 use super::limits::RateLimits;
 use super::secret::StudySecret;
 use super::served::ServedStudy;
-use crate::study::store::writer::ResponseStore;
+use crate::store::writer::ResponseStore;
 use std::time::SystemTime;
 
 /// The study, where its responses go, and who may ask how often.

@@ -3,8 +3,8 @@
 use super::app::{App, now_ms};
 use super::body::{bearer, unauthorized};
 use super::reply::{ApiError, json_reply};
-use crate::study::store::answers;
-use crate::study::store::participants::{self, Participant};
+use crate::store::answers;
+use crate::store::participants::{self, Participant};
 use axum::extract::State;
 use axum::http::HeaderMap;
 use axum::response::Response as HttpResponse;

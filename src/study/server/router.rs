@@ -3,7 +3,7 @@
 use super::app::App;
 use super::reply::{guard, not_found, text_reply, wrong_method};
 use super::{api, operator};
-use crate::study::pages::assets::ASSETS;
+use crate::pages::assets::ASSETS;
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
 use axum::middleware::from_fn;

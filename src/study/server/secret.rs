@@ -1,9 +1,9 @@
 //! The secret of a study's server: a key that signs the tokens of participants, and the operator's token.
 
-use crate::stage::workdir;
 use anyhow::{Context, Result, ensure};
 use base64::Engine;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD;
+use orator_base::stage::workdir;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File, Permissions};
 use std::io::Read;

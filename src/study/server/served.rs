@@ -1,12 +1,12 @@
 //! What a server serves: the plan's sessions and films, and the texts of the page.
 
-use crate::external::ffmpeg::probe::probe;
-use crate::study::file::StudyFile;
-use crate::study::folder::StudyFolder;
-use crate::study::pages::page_texts::page_texts;
-use crate::study::plan::{PlannedTask, StudyPlan, TaskDesign, Trial, TrialPhase};
-use crate::study::store::participants::Quota;
+use crate::file::StudyFile;
+use crate::folder::StudyFolder;
+use crate::pages::page_texts::page_texts;
+use crate::plan::{PlannedTask, StudyPlan, TaskDesign, Trial, TrialPhase};
+use crate::store::participants::Quota;
 use anyhow::{Context, Result, ensure};
+use orator_media::ffmpeg::probe::probe;
 use serde_json::json;
 use std::collections::{BTreeSet, HashMap};
 use std::fs;

@@ -3,7 +3,7 @@
 
 use super::error::{StatisticsError, at_least, finite, tail};
 use super::estimate::ConfidenceInterval;
-use crate::math::order::Ordered;
+use orator_base::math::order::Ordered;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;

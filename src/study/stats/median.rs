@@ -2,7 +2,7 @@
 
 use super::error::{StatisticsError, finite, tail};
 use super::estimate::ConfidenceInterval;
-use crate::math::order::median;
+use orator_base::math::order::median;
 use serde::Serialize;
 use statrs::distribution::{Binomial, DiscreteCDF};
 

@@ -2,15 +2,15 @@
 //! the same moments, head and trunk only where all conditions have them, the same smoothing.
 
 use super::condition_motion::ShownMotion;
-use crate::animate::performance::perform_on;
-use crate::animate::rig::rig::Rig;
-use crate::animate::{AnimationOptions, Performance};
-use crate::mocap::motion_file::USUAL_FPS;
-use crate::motion::bones;
-use crate::types::pose3d::Motion;
-use crate::types::posture::{Posture, PostureChannel};
-use crate::types::skeleton::{N_BONES, N_JOINTS};
 use ndarray::{Array2, Array3, Axis, Zip, s};
+use orator_avatar::animate::performance::perform_on;
+use orator_avatar::animate::rig::rig::Rig;
+use orator_avatar::animate::{AnimationOptions, Performance};
+use orator_base::motion::bones;
+use orator_base::types::pose3d::Motion;
+use orator_base::types::posture::{Posture, PostureChannel};
+use orator_base::types::skeleton::{N_BONES, N_JOINTS};
+use orator_formats::mocap::motion_file::USUAL_FPS;
 
 /// Sight that all films of one speech share.
 #[derive(Clone, Debug)]

@@ -2,17 +2,17 @@
 
 use super::cut::StudyClip;
 use super::speaker_source::{SpeakerSource, SpokenPiece};
-use crate::dataset::Dataset;
-use crate::evaluate::clips::checkpoint::EvaluatedCheckpoint;
-use crate::mocap::motion_file;
-use crate::motion::{resample, units};
-use crate::study::file::{ConditionSource, StudyCondition, filled};
-use crate::types::pose3d::Motion;
-use crate::types::posture::{Posture, PostureChannel};
-use crate::types::sync;
-use crate::types::time::FrameRate;
+use crate::file::{ConditionSource, StudyCondition, filled};
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array2, Array3, Axis, s};
+use orator_base::motion::{resample, units};
+use orator_base::types::pose3d::Motion;
+use orator_base::types::posture::{Posture, PostureChannel};
+use orator_base::types::sync;
+use orator_base::types::time::FrameRate;
+use orator_dataset::Dataset;
+use orator_formats::mocap::motion_file;
+use orator_gesture::evaluate::clips::checkpoint::EvaluatedCheckpoint;
 use std::collections::BTreeMap;
 use std::path::Path;
 

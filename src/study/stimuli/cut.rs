@@ -2,10 +2,10 @@
 //! Better ones come first; those that no choice of ends makes good are refused with the reason.
 
 use super::speaker_source::{SpeakerSource, SpokenPiece};
-use crate::audio::pauses::SpeechLevel;
-use crate::types::skeleton::{N_JOINTS, NECK, is_duplicate};
-use crate::types::time::FrameRate;
 use anyhow::Result;
+use orator_base::audio::pauses::SpeechLevel;
+use orator_base::types::skeleton::{N_JOINTS, NECK, is_duplicate};
+use orator_base::types::time::FrameRate;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;

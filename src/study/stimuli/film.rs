@@ -1,13 +1,13 @@
 //! One film: the faceless avatar alone before a plain backdrop, with the sound of its clip, and in an attention check a
 //! number. Every film of a study has the same size, rate and length; its mouth does not move.
 
-use crate::animate::Performance;
-use crate::animate::export::film_avatar::{AvatarStage, AvatarView, FilmCamera};
-use crate::external::ffmpeg::write::encode::{VideoWriter, has_h264};
-use crate::external::opencv::draw;
-use crate::types::image::Image;
-use crate::types::sound::Sound;
 use anyhow::{Result, ensure};
+use orator_avatar::animate::Performance;
+use orator_avatar::animate::export::film_avatar::{AvatarStage, AvatarView, FilmCamera};
+use orator_base::types::image::Image;
+use orator_base::types::sound::Sound;
+use orator_media::ffmpeg::write::encode::{VideoWriter, has_h264};
+use orator_media::opencv::draw;
 use std::path::Path;
 
 /// Width and height of the pictures of a study, px.

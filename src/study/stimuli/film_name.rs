@@ -1,6 +1,6 @@
 //! Names of films that tell nothing: 16 hexadecimal digits of a keyed hash of what a film shows.
 
-use crate::study::plan::{FilmContent, FilmSound};
+use crate::plan::{FilmContent, FilmSound};
 
 /// What the keys of names are made for.
 const CONTEXT: &str = "orator study 2026 names of films";

@@ -1,16 +1,16 @@
 //! Speech of a speaker: intervals of a dataset, or sound files. What is read is kept only as long as it is looked at.
 
-use crate::config::patterns::{OF_SOUNDS, OF_TRANSCRIPTS, SearchRoot, expand};
-use crate::dataset::Dataset;
-use crate::dataset::index::SampleRef;
-use crate::external::ffmpeg::audio;
-use crate::formats::transcript::{Transcript, Word};
-use crate::types::pose3d::Motion;
-use crate::types::posture::Posture;
-use crate::types::sound::Sound;
-use crate::types::split::Split;
-use crate::types::time::FrameRate;
 use anyhow::{Context, Result, bail, ensure};
+use orator_base::types::pose3d::Motion;
+use orator_base::types::posture::Posture;
+use orator_base::types::sound::Sound;
+use orator_base::types::split::Split;
+use orator_base::types::time::FrameRate;
+use orator_dataset::Dataset;
+use orator_dataset::config::patterns::{OF_SOUNDS, OF_TRANSCRIPTS, SearchRoot, expand};
+use orator_dataset::index::SampleRef;
+use orator_formats::transcript::{Transcript, Word};
+use orator_media::ffmpeg::audio;
 use std::path::{Path, PathBuf};
 
 /// Where the speech of one speaker comes from.

@@ -1,6 +1,6 @@
 //! Sound of the sound check: tones that a participant counts.
 
-use crate::types::sound::Sound;
+use orator_base::types::sound::Sound;
 use std::f64::consts::{PI, TAU};
 
 /// Frequency in Hz, which small loudspeakers play too, and amplitude.

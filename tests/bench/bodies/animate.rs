@@ -2,14 +2,14 @@
 
 use super::super::report::{Report, median};
 use anyhow::{Result, ensure};
-use orator::animate::avatar::{Appearance, Avatar};
-use orator::animate::export::glb_scene;
-use orator::animate::rig::names::Names;
-use orator::animate::{AnimationOptions, perform};
-use orator::demo::drawn::speech::Speech;
-use orator::demo::rule::rule::RuleGestures;
-use orator::stage::progress::Progress;
-use orator::types::time::FrameRate;
+use orator_avatar::animate::avatar::{Appearance, Avatar};
+use orator_avatar::animate::export::glb_scene;
+use orator_avatar::animate::rig::names::Names;
+use orator_avatar::animate::{AnimationOptions, perform};
+use orator_base::stage::progress::Progress;
+use orator_base::types::time::FrameRate;
+use orator_test_support::drawn::speech::Speech;
+use orator_test_support::rule::rule::RuleGestures;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::json;

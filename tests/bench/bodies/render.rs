@@ -2,17 +2,17 @@
 
 use super::super::report::{Report, median};
 use anyhow::{Context, Result, ensure};
-use orator::animate::export::film::{Film, SecondPanel, write as write_film};
-use orator::animate::export::film_avatar::{AvatarView, FilmCamera};
-use orator::animate::export::film_panel::FilmBody;
-use orator::animate::{AnimationOptions, perform};
-use orator::demo::drawn::speech::Speech;
-use orator::demo::rule::rule::RuleGestures;
-use orator::external::ffmpeg::write::encode::VideoWriter;
-use orator::render::{Background, Light, Mesh, PinholeCamera};
-use orator::stage::progress::{Progress, Silent};
-use orator::types::image::Image;
-use orator::types::time::FrameRate;
+use orator_avatar::animate::export::film::{Film, SecondPanel, write as write_film};
+use orator_avatar::animate::export::film_avatar::{AvatarView, FilmCamera};
+use orator_avatar::animate::export::film_panel::FilmBody;
+use orator_avatar::animate::{AnimationOptions, perform};
+use orator_avatar::render::{Background, Light, Mesh, PinholeCamera};
+use orator_base::stage::progress::{Progress, Silent};
+use orator_base::types::image::Image;
+use orator_base::types::time::FrameRate;
+use orator_media::ffmpeg::write::encode::VideoWriter;
+use orator_test_support::drawn::speech::Speech;
+use orator_test_support::rule::rule::RuleGestures;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::json;

@@ -3,19 +3,19 @@
 
 use crate::fixtures::figures::swinging;
 use ndarray::{Array3, s};
-use orator::animate::rig::constraints::ClampTally;
-use orator::animate::rig::limits::{CURL_COHERENCE, ELBOW, FINGERS, Limit, SUPINATION, WRIST};
-use orator::animate::solve::arm_pose::ArmPose;
-use orator::animate::{AnimationOptions, Constraints, Legs, Performance, Smoothing, Yaw, perform};
-use orator::formats::bvh::write::BvhClip;
-use orator::math::one_euro::OneEuro;
-use orator::math::rotation::Rotation;
-use orator::motion::posture;
-use orator::motion::posture::LiftedBody;
-use orator::types::pose3d::Motion;
-use orator::types::skeleton;
-use orator::types::skeleton::{L_HAND, L_SHOULDER, N_JOINTS, R_SHOULDER};
-use orator::types::time::FrameRate;
+use orator_avatar::animate::rig::constraints::ClampTally;
+use orator_avatar::animate::rig::limits::{CURL_COHERENCE, ELBOW, FINGERS, Limit, SUPINATION, WRIST};
+use orator_avatar::animate::solve::arm_pose::ArmPose;
+use orator_avatar::animate::{AnimationOptions, Constraints, Legs, Performance, Smoothing, Yaw, perform};
+use orator_base::math::one_euro::OneEuro;
+use orator_base::math::rotation::Rotation;
+use orator_base::motion::posture;
+use orator_base::motion::posture::LiftedBody;
+use orator_base::types::pose3d::Motion;
+use orator_base::types::skeleton;
+use orator_base::types::skeleton::{L_HAND, L_SHOULDER, N_JOINTS, R_SHOULDER};
+use orator_base::types::time::FrameRate;
+use orator_formats::bvh::write::BvhClip;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -36,7 +36,7 @@ fn random_rotation(random: &mut ChaCha8Rng) -> Rotation {
 
 fn is_within(pose: &ArmPose) -> bool {
     let inside = |[low, high]: [f64; 2], angle: f64| (low - 1e-6..=high + 1e-6).contains(&angle);
-    let bend = |limit: Limit, bend: orator::animate::rig::hinge::Bend| {
+    let bend = |limit: Limit, bend: orator_avatar::animate::rig::hinge::Bend| {
         inside(limit.flexion, bend.flexion) && inside(limit.side, bend.side)
     };
     let fingers = FINGERS.iter().zip(&pose.fingers).all(|(limits, bends)| (0..3).all(|k| bend(limits[k], bends[k])));
@@ -193,7 +193,7 @@ fn untouched_joints_with_rigid_palms_come_back_and_performing_twice_is_performin
 fn smoothing_calms_and_bones_keep_their_length() {
     let motion = with_gaps(1, 150);
     let Performance { report, clip, rig } = perform(&motion, None, &AnimationOptions::default());
-    let fall = |jerk: orator::animate::performance::Jerk| jerk.after.unwrap() / jerk.before.unwrap();
+    let fall = |jerk: orator_avatar::animate::performance::Jerk| jerk.after.unwrap() / jerk.before.unwrap();
     assert!(fall(report.arms) < 0.4 && fall(report.hands) < 0.5, "{report:?}");
     for frame in 0..clip.n_frames() {
         let places = clip.positions(frame);

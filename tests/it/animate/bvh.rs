@@ -3,16 +3,16 @@
 
 use crate::fixtures::animation::bvh::{Bvh, worst_mm};
 use crate::fixtures::figures::{FPS, swinging};
-use crate::fixtures::skip::real_data;
 use ndarray::{Array3, s};
-use orator::animate::rig::rig::Rig;
-use orator::animate::{AnimationOptions, Constraints, Performance, Smoothing, perform};
-use orator::formats::authors_txt;
-use orator::formats::bvh::write::BvhClip;
-use orator::math::rotation::Rotation;
-use orator::types::pose3d::Motion;
-use orator::types::skeleton;
-use orator::types::skeleton::{L_HAND, N_JOINTS, R_HAND};
+use orator_avatar::animate::rig::rig::Rig;
+use orator_avatar::animate::{AnimationOptions, Constraints, Performance, Smoothing, perform};
+use orator_base::math::rotation::Rotation;
+use orator_base::types::pose3d::Motion;
+use orator_base::types::skeleton;
+use orator_base::types::skeleton::{L_HAND, N_JOINTS, R_HAND};
+use orator_formats::authors_txt;
+use orator_formats::bvh::write::BvhClip;
+use orator_test_support::skip::real_data;
 
 fn performed(motion: &Motion) -> Performance {
     perform(motion, None, &AnimationOptions::default())

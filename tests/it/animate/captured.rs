@@ -1,17 +1,17 @@
 //! Captured motion through the default animation: fingers and arms stay where they were, with noise and without.
 
 use crate::fixtures::figures::swinging;
-use crate::fixtures::skip::real_data;
 use ndarray::{Array2, Array3};
-use orator::animate::rig::rig::Rig;
-use orator::animate::{AnimationOptions, Constraints, Performance, Smoothing, perform};
-use orator::formats::bvh::write::BvhClip;
-use orator::formats::npz::Npz;
-use orator::math::rotation::Rotation;
-use orator::math::vec3::{norm, scale};
-use orator::types::pose3d::Motion;
-use orator::types::skeleton::{L_HAND, L_WRIST, R_HAND, R_WRIST};
-use orator::types::time::FrameRate;
+use orator_avatar::animate::rig::rig::Rig;
+use orator_avatar::animate::{AnimationOptions, Constraints, Performance, Smoothing, perform};
+use orator_base::math::rotation::Rotation;
+use orator_base::math::vec3::{norm, scale};
+use orator_base::types::pose3d::Motion;
+use orator_base::types::skeleton::{L_HAND, L_WRIST, R_HAND, R_WRIST};
+use orator_base::types::time::FrameRate;
+use orator_formats::bvh::write::BvhClip;
+use orator_formats::npz::Npz;
+use orator_test_support::skip::real_data;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;

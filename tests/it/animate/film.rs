@@ -3,21 +3,21 @@
 use crate::fixtures::figures::{FPS, swinging};
 use crate::fixtures::media::sync_clips::{Kind, PLAIN, chirp, chirp_begins, make};
 use ndarray::{Array3, s};
-use orator::animate::draw::figure::{LEFT, PAPER, RIGHT};
-use orator::animate::export::film;
-use orator::animate::export::film::{Film, SIZE, SecondPanel};
-use orator::animate::export::film_avatar::FilmCamera;
-use orator::animate::export::film_panel::FilmBody;
-use orator::animate::export::film_source::SourceCamera;
-use orator::animate::{AnimationOptions, Constraints, Smoothing, perform};
-use orator::external::ffmpeg::frames::FrameReader;
-use orator::external::ffmpeg::{audio, probe};
-use orator::formats::npy;
-use orator::stage::progress::Silent;
-use orator::types::image::Image;
-use orator::types::pose2d::Keypoints;
-use orator::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST, R_ELBOW, R_SHOULDER, R_WRIST};
-use orator::types::sound::Sound;
+use orator_avatar::animate::draw::figure::{LEFT, PAPER, RIGHT};
+use orator_avatar::animate::export::film;
+use orator_avatar::animate::export::film::{Film, SIZE, SecondPanel};
+use orator_avatar::animate::export::film_avatar::FilmCamera;
+use orator_avatar::animate::export::film_panel::FilmBody;
+use orator_avatar::animate::export::film_source::SourceCamera;
+use orator_avatar::animate::{AnimationOptions, Constraints, Smoothing, perform};
+use orator_base::stage::progress::Silent;
+use orator_base::types::image::Image;
+use orator_base::types::pose2d::Keypoints;
+use orator_base::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST, R_ELBOW, R_SHOULDER, R_WRIST};
+use orator_base::types::sound::Sound;
+use orator_formats::npy;
+use orator_media::ffmpeg::frames::FrameReader;
+use orator_media::ffmpeg::{audio, probe};
 use std::path::Path;
 use std::process::Command;
 
@@ -85,7 +85,7 @@ fn the_mp4_has_every_frame_and_the_sound() {
     assert!((secs - 15.0 / FPS.per_sec()).abs() < 0.1, "{secs} s");
     let sound = audio::read_mono(&path, 16_000).unwrap().expect("a sound track");
     assert!((sound.secs() - 1.0).abs() < 0.1);
-    let frames = orator::external::ffmpeg::frames::FrameReader::open(&path, FPS).unwrap().count();
+    let frames = orator_media::ffmpeg::frames::FrameReader::open(&path, FPS).unwrap().count();
     assert_eq!(frames, 15);
 }
 
@@ -181,7 +181,7 @@ fn the_video_beside_the_figure_is_in_step() {
 #[test]
 fn another_motion_is_drawn_beside_in_the_same_size_until_it_ends() {
     let (motion, mut other) = (swinging(6, 30), swinging(7, 20));
-    other.fps = orator::types::time::FrameRate::new(30, 1);
+    other.fps = orator_base::types::time::FrameRate::new(30, 1);
     let mut film = Film::new(
         FilmBody::Figure(&motion, None),
         None,

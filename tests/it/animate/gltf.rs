@@ -3,13 +3,13 @@
 
 use crate::fixtures::animation::gltf::{Glb, vec3, written};
 use crate::fixtures::figures::swinging;
-use crate::fixtures::skip::gltf_validator;
-use orator::animate::export::file::{ExportContent, ExportFormat};
-use orator::animate::rig::names::Names;
-use orator::animate::{AnimationOptions, perform};
-use orator::math::rotation::Rotation;
-use orator::math::vec3::{Vec3, add, norm, scale, sub};
-use orator::stage::progress::Silent;
+use orator_avatar::animate::export::file::{ExportContent, ExportFormat};
+use orator_avatar::animate::rig::names::Names;
+use orator_avatar::animate::{AnimationOptions, perform};
+use orator_base::math::rotation::Rotation;
+use orator_base::math::vec3::{Vec3, add, norm, scale, sub};
+use orator_base::stage::progress::Silent;
+use orator_test_support::skip::gltf_validator;
 use serde_json::Value;
 use std::path::PathBuf;
 use std::process::Command;

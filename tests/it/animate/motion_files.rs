@@ -2,14 +2,14 @@
 
 use crate::fixtures::animation::bvh::Bvh;
 use crate::fixtures::figures::{FPS, swinging};
-use orator::animate::export::file::{ExportContent, ExportFormat};
-use orator::animate::rig::names::Names;
-use orator::animate::{AnimationOptions, Performance, perform};
-use orator::formats::bvh::read::Positions;
-use orator::formats::{authors_txt, npy};
-use orator::math::rotation::Rotation;
-use orator::math::vec3::{Vec3, add, norm, sub};
-use orator::stage::progress::Silent;
+use orator_avatar::animate::export::file::{ExportContent, ExportFormat};
+use orator_avatar::animate::rig::names::Names;
+use orator_avatar::animate::{AnimationOptions, Performance, perform};
+use orator_base::math::rotation::Rotation;
+use orator_base::math::vec3::{Vec3, add, norm, sub};
+use orator_base::stage::progress::Silent;
+use orator_formats::bvh::read::Positions;
+use orator_formats::{authors_txt, npy};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -92,7 +92,7 @@ fn a_preset_changes_the_names_of_a_bvh_and_nothing_else() {
     };
     let own = text(Names::Own);
     let places = |text: &str| {
-        let bvh = orator::formats::bvh::read::Bvh::parse(text).unwrap();
+        let bvh = orator_formats::bvh::read::Bvh::parse(text).unwrap();
         (bvh.positions(Positions::Auto), bvh)
     };
     let (own_places, own_bvh) = places(&own);

@@ -4,21 +4,21 @@
 use crate::fixtures::animation::bvh::Bvh;
 use crate::fixtures::figures::swinging;
 use ndarray::{Array2, Array3};
-use orator::animate::{AnimationOptions, Constraints, Legs, Performance, Smoothing, perform};
-use orator::math::rotation::Rotation;
-use orator::math::vec3::{Vec3, add, dot, norm, scale, sub, unit};
-use orator::motion::posture;
-use orator::motion::posture::LiftedBody;
-use orator::types::pose3d::Motion;
-use orator::types::posture::Posture;
-use orator::types::skeleton::N_JOINTS;
-use orator::types::time::FrameRate;
+use orator_avatar::animate::{AnimationOptions, Constraints, Legs, Performance, Smoothing, perform};
+use orator_base::math::rotation::Rotation;
+use orator_base::math::vec3::{Vec3, add, dot, norm, scale, sub, unit};
+use orator_base::motion::posture;
+use orator_base::motion::posture::LiftedBody;
+use orator_base::types::pose3d::Motion;
+use orator_base::types::posture::Posture;
+use orator_base::types::skeleton::N_JOINTS;
+use orator_base::types::time::FrameRate;
 
 const N_FRAMES: usize = 90;
 const UNTOUCHED: AnimationOptions = AnimationOptions {
     smoothing: Smoothing::None,
     constraints: Constraints::NONE,
-    yaw: orator::animate::Yaw::Spine,
+    yaw: orator_avatar::animate::Yaw::Spine,
     legs: Legs::Standing,
     breath: false,
     fps: None,

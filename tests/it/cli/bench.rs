@@ -3,7 +3,7 @@
 use crate::bench::child::{high_water_mib, n_running, ticks};
 use crate::bench::command::{Cli, measure};
 use clap::CommandFactory;
-use orator::stage::progress::Silent;
+use orator_base::stage::progress::Silent;
 use serde_json::Value;
 
 fn facts(words: &str) -> Value {

@@ -11,7 +11,7 @@ fn its_packages_are_those_of_the_libraries_that_the_program_links() {
         Some(String::from_utf8_lossy(&output.stdout).into_owned())
     };
     let (Some(linked), Some(_)) = (output("ldd", env!("CARGO_BIN_EXE_orator")), output("dpkg", "libc.so.6")) else {
-        return crate::fixtures::skip::skip("no ldd and dpkg");
+        return orator_test_support::skip::skip("no ldd and dpkg");
     };
     let ours = |line: &&str| ["libav", "libsw", "libopencv"].iter().any(|name| line.trim_start().starts_with(name));
     let paths: Vec<&str> = linked.lines().filter(ours).filter_map(|line| line.split_whitespace().nth(2)).collect();

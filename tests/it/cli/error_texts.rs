@@ -1,10 +1,10 @@
 //! Error texts that users meet, as they stand in `tests/it/snapshots`: each names the place, what is expected, and
 //! what to do. Paths of the test are redacted.
 
-use crate::fixtures::support::Project;
 use crate::fixtures::untrained::write_untrained_speaker;
 use ndarray::Array3;
 use ndarray_npy::NpzWriter;
+use orator_test_support::project::Project;
 use std::fs;
 use std::fs::File;
 

@@ -2,9 +2,9 @@
 
 use crate::fixtures::untrained::write_untrained_speaker;
 use crate::fixtures::{clips, footage, gesture_dataset};
-use orator::formats::wav;
-use orator::stage::Unit;
-use orator::stage::artifacts::Artifact;
+use orator_base::stage::Unit;
+use orator_base::stage::artifacts::Artifact;
+use orator_formats::wav;
 
 #[allow(dead_code)]
 #[path = "../../examples/generate_motion.rs"]

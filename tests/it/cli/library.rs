@@ -1,9 +1,9 @@
 //! The pipeline as another program uses it: run, looked at and refused without the command line.
 
 use crate::fixtures::footage;
-use orator::pipeline::{RunState, UnitState};
-use orator::stage::workdir;
 use orator::{BusyFolder, Event, Pipeline, Progress, Selection, Silent, StageName, Task, load_config};
+use orator_base::stage::workdir;
+use orator_pipeline::{RunState, UnitState};
 use std::sync::Mutex;
 
 /// Keeps the events of a run.

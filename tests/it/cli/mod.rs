@@ -3,10 +3,8 @@
 pub mod bench;
 pub mod completions;
 pub mod container;
-pub mod demo;
 pub mod error_texts;
 pub mod examples;
 pub mod guide;
 pub mod library;
 pub mod models_verb;
-pub mod people;

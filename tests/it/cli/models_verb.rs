@@ -1,8 +1,8 @@
 //! `orator models` as a user meets it: list, fetch from a folder, check, add, and what goes wrong.
 
 use crate::fixtures::onnx_models::models;
-use crate::fixtures::skip::real_data;
-use orator::external::onnx::{Manifest, sha256_of};
+use orator_onnx::{Manifest, sha256_of};
+use orator_test_support::skip::real_data;
 use std::path::Path;
 use std::process::{Command, Output};
 

@@ -1,8 +1,8 @@
 //! Jobs for schedulers, written without sending them.
 
-use crate::fixtures::support::Project;
 use k8s_openapi::api::batch::v1::Job;
 use k8s_openapi::api::core::v1::PersistentVolumeClaim;
+use orator_test_support::project::Project;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 

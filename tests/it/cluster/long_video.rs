@@ -2,8 +2,8 @@
 
 use crate::fixtures::clips;
 use crate::fixtures::faults::plan_workers::{epochs, worker, written};
-use crate::fixtures::support::{Project, files_under};
-use orator::formats::timeline_npz::Timeline;
+use orator_formats::timeline_npz::Timeline;
+use orator_test_support::project::{Project, files_under};
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::time::Duration;

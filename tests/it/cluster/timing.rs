@@ -1,6 +1,6 @@
 //! `orator plan` says what the work takes, and a run how far that was off.
 
-use crate::fixtures::support::Project;
+use orator_test_support::project::Project;
 use serde_json::json;
 
 #[test]

@@ -3,7 +3,7 @@
 //! minutes apart.
 
 use crate::fixtures::faults::plan_workers::{epochs, faketime, worker, worker_off, written};
-use crate::fixtures::support::Project;
+use orator_test_support::project::Project;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rustix::process::{Pid, Signal, kill_process};

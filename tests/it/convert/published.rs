@@ -1,8 +1,8 @@
 //! Published files whose ONNX form is known.
 
-use crate::fixtures::skip::real_data;
 use crate::fixtures::source_models::run::{SourceModel, assert_close, run};
-use orator::external::onnx::convert::SourceFormat;
+use orator_onnx::convert::SourceFormat;
+use orator_test_support::skip::real_data;
 use sha2::{Digest as _, Sha256};
 
 #[test]

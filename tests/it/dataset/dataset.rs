@@ -1,11 +1,11 @@
 //! The dataset's folder: round trip, the same bytes twice, damage is an error, and what others read in it.
 
 use crate::fixtures::samples::random_sample;
-use crate::fixtures::skip::python;
 use crate::fixtures::write_dataset::write_dataset;
-use orator::dataset::{Dataset, Sample, Split};
-use orator::types::pose3d::Motion;
-use orator::types::time::FrameRate;
+use orator_base::types::pose3d::Motion;
+use orator_base::types::time::FrameRate;
+use orator_dataset::{Dataset, Sample, Split};
+use orator_test_support::skip::python;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;
@@ -55,7 +55,7 @@ fn folder_bytes(dir: &Path) -> Vec<(String, Vec<u8>)> {
 
 #[test]
 fn shards_are_plain_ustar_of_bounded_size_and_the_same_twice() {
-    use orator::dataset::write::tar::ShardWriter;
+    use orator_dataset::write::tar::ShardWriter;
     let (one, two) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let samples: Vec<_> = (0..5).map(|n| random_sample(&format!("talk-0a1b2c3d-{n:06}"), 64, n)).collect();
     for dir in [&one, &two] {

@@ -2,12 +2,12 @@
 //! makes it panic.
 
 use crate::fixtures::samples::constant_sample;
-use crate::fixtures::support::files_under;
 use crate::fixtures::write_dataset::write_dataset;
-use orator::dataset::verify::verify::verify;
-use orator::dataset::{Sample, Split};
-use orator::stage::progress::Silent;
-use orator::types::time::FrameRate;
+use orator_base::stage::progress::Silent;
+use orator_base::types::time::FrameRate;
+use orator_dataset::verify::verify::verify;
+use orator_dataset::{Sample, Split};
+use orator_test_support::project::files_under;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::fs;

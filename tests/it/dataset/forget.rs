@@ -1,10 +1,10 @@
 //! `orator forget`: what was derived from a video is gone, the others' stays byte for byte, and a kill is finished by the
 //! next forget.
 
-use crate::fixtures::support::{Project, files_under};
-use orator::dataset::forget::removal::PENDING;
-use orator::dataset::verify::verify::verify;
-use orator::stage::progress::Silent;
+use orator_base::stage::progress::Silent;
+use orator_dataset::forget::removal::PENDING;
+use orator_dataset::verify::verify::verify;
+use orator_test_support::project::{Project, files_under};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;

@@ -1,23 +1,23 @@
 //! `orator import`: datasets from captured motion and from other datasets, and what becomes of what cannot come in.
 
-use crate::fixtures::skip::real_data;
-use crate::fixtures::support::files_under;
-use orator::dataset::import::plan::ImportPlan;
-use orator::dataset::import::take::TakeLimits;
-use orator::dataset::import::{Imported, import, shards};
-use orator::dataset::info::About;
-use orator::dataset::verify::verify::{accounts, verify};
-use orator::dataset::{Dataset, Sample};
-use orator::mocap::captured;
-use orator::mocap::captured::MotionKind;
-use orator::mocap::take::CapturedMotion;
-use orator::motion::bones;
-use orator::motion::resample;
-use orator::stage::progress::Silent;
-use orator::types::pose3d::Motion;
-use orator::types::skeleton::{L_HAND, R_HAND};
-use orator::types::sound::Sound;
-use orator::types::time::FrameRate;
+use orator_base::motion::bones;
+use orator_base::motion::resample;
+use orator_base::stage::progress::Silent;
+use orator_base::types::pose3d::Motion;
+use orator_base::types::skeleton::{L_HAND, R_HAND};
+use orator_base::types::sound::Sound;
+use orator_base::types::time::FrameRate;
+use orator_dataset::import::plan::ImportPlan;
+use orator_dataset::import::take::TakeLimits;
+use orator_dataset::import::{Imported, import, shards};
+use orator_dataset::info::About;
+use orator_dataset::verify::verify::{accounts, verify};
+use orator_dataset::{Dataset, Sample};
+use orator_formats::mocap::captured;
+use orator_formats::mocap::captured::MotionKind;
+use orator_formats::mocap::take::CapturedMotion;
+use orator_test_support::project::files_under;
+use orator_test_support::skip::real_data;
 use rand::{Rng, SeedableRng};
 use std::collections::BTreeMap;
 use std::fs;
@@ -41,7 +41,7 @@ fn wav(path: &Path, secs: f64, seed: u64) {
     let mut noise = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
     let samples = (0..(secs * 22_050.0) as usize).map(|_| noise.random_range(-0.5f32..0.5)).collect();
     fs::create_dir_all(path.parent().unwrap()).unwrap();
-    orator::formats::wav::write(path, &Sound { rate: 22_050, samples }).unwrap();
+    orator_formats::wav::write(path, &Sound { rate: 22_050, samples }).unwrap();
 }
 
 fn write(path: PathBuf, text: &str) {
@@ -55,7 +55,7 @@ fn plan(sources: &[&Path]) -> ImportPlan {
         kind: None,
         about: About::new("host", FPS),
         limits: TakeLimits { fps: FPS, min_frames: 64, max_apart_secs: 0.5, no_sound: false },
-        dataset: orator::config::DatasetConfig { validation: 0.0, test: 0.0, ..Default::default() },
+        dataset: orator_dataset::config::DatasetConfig { validation: 0.0, test: 0.0, ..Default::default() },
     }
 }
 
@@ -177,7 +177,7 @@ fn datasets_are_merged_byte_for_byte_and_come_back_from_other_hands() {
     let mut tar = tar::Builder::new(fs::File::create(path("loose/train-000007.tar")).unwrap());
     let mut members: Vec<(String, Vec<u8>)> = Vec::new();
     for (key, (sample, json)) in samples(&path("merged")) {
-        let endings = orator::dataset::sample::EXTENSIONS.iter();
+        let endings = orator_dataset::sample::EXTENSIONS.iter();
         members.extend(endings.zip(sample.members().unwrap()).map(|(e, bytes)| (format!("./{key}.{e}"), bytes)));
         members.iter_mut().rev().find(|(name, _)| name.ends_with("json")).unwrap().1 = json;
         members.push((format!("{key}.txt"), b"a note of theirs".to_vec()));
@@ -299,9 +299,9 @@ fn silent_captures_become_a_dataset_that_no_speech_is_learnt_from() {
     assert_eq!(verify(&out, true, &Silent).unwrap().problems, []);
     assert!(samples(&out).values().all(|(sample, _)| sample.sound.samples.iter().all(|s| *s == 0.0)));
     assert!(fs::read_to_string(out.join("README.md")).unwrap().contains("There is no sound"));
-    let dataset = orator::dataset::Dataset::open(&out).unwrap();
-    let settings = orator::config::Settings::default().gan;
+    let dataset = orator_dataset::Dataset::open(&out).unwrap();
+    let settings = orator_dataset::config::Settings::default().gan;
     let refused =
-        orator::train::gan::train::train(&dataset, &settings, &dir.path().join("gan"), &Silent).err().unwrap();
+        orator_gesture::train::gan::train::train(&dataset, &settings, &dir.path().join("gan"), &Silent).err().unwrap();
     assert!(refused.to_string().contains("imported without sound"), "{refused:#}");
 }

@@ -1,12 +1,12 @@
 //! Readers of captured motion: joints as the source has them, in house axes.
 
-use crate::fixtures::skip::real_data;
-use orator::formats::authors_txt;
-use orator::mocap::bvh;
-use orator::mocap::captured;
-use orator::mocap::captured::MotionKind;
-use orator::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_SHOULDER, R_WRIST, authors_from_house};
-use orator::types::time::FrameRate;
+use orator_base::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_SHOULDER, R_WRIST, authors_from_house};
+use orator_base::types::time::FrameRate;
+use orator_formats::authors_txt;
+use orator_formats::mocap::bvh;
+use orator_formats::mocap::captured;
+use orator_formats::mocap::captured::MotionKind;
+use orator_test_support::skip::real_data;
 use std::path::Path;
 
 fn reference(name: &str) -> std::path::PathBuf {
@@ -97,7 +97,7 @@ fn what_is_no_speaker_is_an_error_that_says_why() {
 fn ted_joints_stay_where_they_are() {
     let Some(folder) = real_data("data/speech_motion/ted_expressive") else { return };
     let take = captured::read(MotionKind::Ted, &folder.join("_3IOjpSGFqY_164_0_12.npz")).unwrap();
-    let mut npz = orator::formats::npz::Npz::open(&folder.join("_3IOjpSGFqY_164_0_12.npz")).unwrap();
+    let mut npz = orator_formats::npz::Npz::open(&folder.join("_3IOjpSGFqY_164_0_12.npz")).unwrap();
     let theirs = npz.numbers("human_joints", &[None, Some(43), Some(3)]).unwrap();
     // (ours, theirs): arms, then base and inter of the left index, left little, right thumb
     let pairs = [(1, 3), (2, 5), (3, 7), (4, 2), (5, 4), (6, 6), (12, 8), (13, 9), (24, 14), (29, 35), (31, 37)];

@@ -1,12 +1,12 @@
 //! Several people in the videos of one speaker: a warning with a picture, until the user says that they are one.
 
 use crate::fixtures::media::lifted_videos::{settings, shard_as, video};
-use orator::config::SpeakerConfig;
-use orator::dataset::Split;
-use orator::external::opencv::png;
-use orator::stage::Unit;
-use orator::stage::artifacts::{self, Artifact};
-use orator::types::image::Image;
+use orator_base::stage::Unit;
+use orator_base::stage::artifacts::{self, Artifact};
+use orator_base::types::image::Image;
+use orator_dataset::Split;
+use orator_dataset::config::SpeakerConfig;
+use orator_media::opencv::png;
 use serde_json::json;
 use std::path::Path;
 
@@ -29,7 +29,7 @@ fn a_second_person_is_told_until_the_user_knows_better() {
     let work = settings.work.dir.to_path_buf();
     let splits = [(&units[0], Split::Train), (&units[1], Split::Validation), (&units[2], Split::Test)];
     let picture = artifacts::faces(&work, &units[0].speaker);
-    let facts = |settings: &orator::config::Settings, name: &str| {
+    let facts = |settings: &orator_dataset::config::Settings, name: &str| {
         let report = shard_as(settings, &units, &splits, name).0.unwrap();
         assert_eq!(report.line.contains("seem to show 2 people"), picture.is_file(), "{}", report.line);
         report.facts["several_people"].clone()

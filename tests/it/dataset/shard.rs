@@ -2,17 +2,17 @@
 
 use crate::fixtures::footage::{FPS, good};
 use crate::fixtures::media::lifted_videos::{settings, shard, shard_as, shard_with, unit, video, video_with};
-use crate::fixtures::support::files_under;
 use ndarray::s;
-use orator::config::SplitUnit;
-use orator::dataset::split::SplitBy;
-use orator::dataset::verify::verify::{accounts, verify};
-use orator::dataset::{Dataset, Split};
-use orator::stage::Unit;
-use orator::stage::artifacts::Artifact;
-use orator::stage::progress::Silent;
-use orator::types::skeleton::{L_HAND, parent};
-use orator::types::sync;
+use orator_base::stage::Unit;
+use orator_base::stage::artifacts::Artifact;
+use orator_base::stage::progress::Silent;
+use orator_base::types::skeleton::{L_HAND, parent};
+use orator_base::types::sync;
+use orator_dataset::config::SplitUnit;
+use orator_dataset::split::SplitBy;
+use orator_dataset::verify::verify::{accounts, verify};
+use orator_dataset::{Dataset, Split};
+use orator_test_support::project::files_under;
 use std::fs;
 use std::path::Path;
 

@@ -2,11 +2,11 @@
 //! speech of the same voice is not taken for it.
 
 use crate::fixtures::clips::ffmpeg;
-use crate::fixtures::skip::real_data;
-use crate::fixtures::support::speaker_clip;
-use orator::audio::fingerprint::Fingerprinter;
-use orator::dataset::shared_sound::find;
-use orator::external::ffmpeg::audio::read_mono;
+use orator_base::audio::fingerprint::Fingerprinter;
+use orator_dataset::shared_sound::find;
+use orator_media::ffmpeg::audio::read_mono;
+use orator_test_support::project::speaker_clip;
+use orator_test_support::skip::real_data;
 use std::path::{Path, PathBuf};
 
 fn codes(path: &Path) -> Vec<u32> {

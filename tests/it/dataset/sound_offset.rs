@@ -1,10 +1,10 @@
 //! `[extract] fix_offset`: the sound of samples is taken as much later, or earlier, as the lips surely show.
 
 use crate::fixtures::media::lifted_videos::{settings, shard_as, video};
-use orator::config::Settings;
-use orator::dataset::{Dataset, Split};
-use orator::stage::artifacts::Artifact;
-use orator::types::sync::SoundOffset;
+use orator_base::stage::artifacts::Artifact;
+use orator_base::types::sync::SoundOffset;
+use orator_dataset::config::Settings;
+use orator_dataset::{Dataset, Split};
 use std::path::Path;
 
 /// The sound of the only video's samples, in the order of time.

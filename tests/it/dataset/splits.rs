@@ -1,11 +1,11 @@
 //! Splits by whole videos: filled toward their shares, kept on record, and never moved.
 
 use crate::fixtures::media::lifted_videos::{settings, shard, shard_as, video};
-use crate::fixtures::support::files_under;
-use orator::config::{Settings, SplitUnit};
-use orator::dataset::split::{Assignment, SplitBy, SplitPlan, SplitRecord, Unassigned, assign};
-use orator::dataset::{Dataset, Split};
-use orator::stage::Unit;
+use orator_base::stage::Unit;
+use orator_dataset::config::{Settings, SplitUnit};
+use orator_dataset::split::{Assignment, SplitBy, SplitPlan, SplitRecord, Unassigned, assign};
+use orator_dataset::{Dataset, Split};
+use orator_test_support::project::files_under;
 use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -2,20 +2,20 @@
 //! transcript is said and costs no video.
 
 use crate::fixtures::media::lifted_videos::{settings, shard_with_words, video};
-use crate::fixtures::support::files_under;
-use orator::config::DatasetConfig;
-use orator::dataset::forget::dataset::without;
-use orator::dataset::import::import;
-use orator::dataset::import::plan::ImportPlan;
-use orator::dataset::import::take::TakeLimits;
-use orator::dataset::info::About;
-use orator::dataset::verify::verify::{accounts, verify};
-use orator::dataset::{Dataset, Split};
-use orator::formats::transcript::Word;
-use orator::stage::Unit;
-use orator::stage::ledger::{TranscriptAccount, WordCount};
-use orator::stage::progress::Silent;
-use orator::types::time::FrameRate;
+use orator_base::stage::Unit;
+use orator_base::stage::ledger::{TranscriptAccount, WordCount};
+use orator_base::stage::progress::Silent;
+use orator_base::types::time::FrameRate;
+use orator_dataset::config::DatasetConfig;
+use orator_dataset::forget::dataset::without;
+use orator_dataset::import::import;
+use orator_dataset::import::plan::ImportPlan;
+use orator_dataset::import::take::TakeLimits;
+use orator_dataset::info::About;
+use orator_dataset::verify::verify::{accounts, verify};
+use orator_dataset::{Dataset, Split};
+use orator_formats::transcript::Word;
+use orator_test_support::project::files_under;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -2,13 +2,13 @@
 //! comparable is compared.
 
 use crate::fixtures::motion_folders::{folders, spoken, write_npy};
-use crate::fixtures::skip::real_data;
-use crate::fixtures::support::{Answer, Project};
 use ndarray::{Array3, s};
-use orator::formats::wav;
-use orator::formats::{authors_txt, joints_npz};
-use orator::types::pose3d::Motion;
-use orator::types::time::FrameRate;
+use orator_base::types::pose3d::Motion;
+use orator_base::types::time::FrameRate;
+use orator_formats::wav;
+use orator_formats::{authors_txt, joints_npz};
+use orator_test_support::project::{Answer, Project};
+use orator_test_support::skip::real_data;
 use serde_json::Value;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};

@@ -3,18 +3,18 @@
 
 use crate::fixtures::browser::Browser;
 use crate::fixtures::gesture_dataset::{dataset, sample};
-use crate::fixtures::support::Project;
 use crate::fixtures::write_dataset::write_dataset;
 use ndarray::s;
-use orator::dataset::{Dataset, Split};
-use orator::evaluate::baseline::baselines::ClipMotion;
-use orator::evaluate::clips::clips::{EvalClip, EvalClips};
-use orator::evaluate::clips::held_out;
-use orator::evaluate::clips::motion_store::{MotionStore, StoredMotion};
-use orator::evaluate::clips::of_speaker::copied;
-use orator::evaluate::clips::sound_features::from_samples;
-use orator::train::gan::begin::normalisation;
-use orator::types::time::FrameRate;
+use orator_base::types::time::FrameRate;
+use orator_dataset::{Dataset, Split};
+use orator_gesture::evaluate::baseline::baselines::ClipMotion;
+use orator_gesture::evaluate::clips::clips::{EvalClip, EvalClips};
+use orator_gesture::evaluate::clips::held_out;
+use orator_gesture::evaluate::clips::motion_store::{MotionStore, StoredMotion};
+use orator_gesture::evaluate::clips::of_speaker::copied;
+use orator_gesture::evaluate::clips::sound_features::from_samples;
+use orator_gesture::train::gan::begin::normalisation;
+use orator_test_support::project::Project;
 use std::path::Path;
 
 #[test]

@@ -1,14 +1,14 @@
 //! The metrics on the authors' released clips give the numbers measured there with numpy, to every
 //! digit that is printed.
 
-use crate::fixtures::skip::real_data;
 use ndarray::{Array2, Array3, Axis, concatenate, s};
-use orator::formats::authors_txt;
-use orator::metrics::catalogue::{Catalogue, MotionPair};
-use orator::metrics::position::pck::{CorrectKeypoints, PckAxes};
-use orator::metrics::settings::MetricSettings;
-use orator::types::skeleton::{L_SHOULDER, N_JOINTS, R_SHOULDER};
-use orator::types::time::FrameRate;
+use orator_base::types::skeleton::{L_SHOULDER, N_JOINTS, R_SHOULDER};
+use orator_base::types::time::FrameRate;
+use orator_formats::authors_txt;
+use orator_gesture::metrics::catalogue::{Catalogue, MotionPair};
+use orator_gesture::metrics::position::pck::{CorrectKeypoints, PckAxes};
+use orator_gesture::metrics::settings::MetricSettings;
+use orator_test_support::skip::real_data;
 use std::path::{Path, PathBuf};
 
 const CLIPS: [&str; 4] = ["1845", "3821", "3838", "102571"];
@@ -248,12 +248,12 @@ fn the_released_sounds_have_the_measured_onsets() {
     let Some(folder) = folder() else { return };
     for (clip, n) in [("1845", 92), ("3821", 98), ("3838", 120)] {
         let sound =
-            orator::external::ffmpeg::audio::read_mono(&folder.join(format!("{clip}.wav")), 44_100).unwrap().unwrap();
+            orator_media::ffmpeg::audio::read_mono(&folder.join(format!("{clip}.wav")), 44_100).unwrap().unwrap();
         let mut at_16_khz = Vec::new();
         let mut resampler = crate::fixtures::media::librosa_resampler::Resampler::new(44_100, 16_000);
         resampler.push(&sound.samples, &mut at_16_khz);
         resampler.finish(&mut at_16_khz);
-        let onsets = orator::audio::onset::onsets(&at_16_khz);
+        let onsets = orator_base::audio::onset::onsets(&at_16_khz);
         assert_eq!(onsets.len(), n, "{clip}");
     }
 }

@@ -1,9 +1,9 @@
 //! The metrics on the authors' released clips: the share of correct keypoints in the picture's axes, as it was published.
 
-use crate::fixtures::skip::real_data;
-use orator::formats::authors_txt;
-use orator::metrics::position::pck::{CorrectKeypoints, PckAxes};
-use orator::types::time::FrameRate;
+use orator_base::types::time::FrameRate;
+use orator_formats::authors_txt;
+use orator_gesture::metrics::position::pck::{CorrectKeypoints, PckAxes};
+use orator_test_support::skip::real_data;
 
 #[test]
 fn the_released_predictions_have_their_published_share_of_correct_keypoints() {

@@ -1,6 +1,5 @@
 //! Metrics and evaluation.
 
-pub mod evaluate;
 pub mod evaluate_checkpoints;
 pub mod evaluate_files;
 pub mod evaluate_speaker;

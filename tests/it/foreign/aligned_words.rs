@@ -1,8 +1,8 @@
 //! `orator align` on speech of espeak-ng, whose word times are known, with the Python package pocketsphinx (`make
 //! aligner`). `ORATOR_LONG=1` (`make prove`): more than eight minutes; otherwise half a minute.
 
-use crate::fixtures::skip::{aligner, skip};
-use orator::formats::transcript::{Transcript, WordSource};
+use orator_formats::transcript::{Transcript, WordSource};
+use orator_test_support::skip::{aligner, skip};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

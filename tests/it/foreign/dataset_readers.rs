@@ -3,10 +3,10 @@
 
 use crate::fixtures::gesture_dataset::with_posture;
 use crate::fixtures::samples::constant_sample;
-use crate::fixtures::skip::readers;
 use crate::fixtures::write_dataset::write_dataset;
-use orator::dataset::{Sample, Split};
-use orator::types::time::FrameRate;
+use orator_base::types::time::FrameRate;
+use orator_dataset::{Sample, Split};
+use orator_test_support::skip::readers;
 use std::path::Path;
 use std::process::Command;
 

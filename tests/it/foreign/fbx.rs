@@ -2,11 +2,11 @@
 
 use crate::fixtures::animation::truth::worst_joint_mm;
 use crate::fixtures::figures::swinging;
-use orator::animate::export::file::{ExportContent, ExportFormat};
-use orator::animate::rig::names::Names;
-use orator::animate::{AnimationOptions, Performance, perform};
-use orator::stage::progress::Silent;
-use orator::types::time::FrameRate;
+use orator_avatar::animate::export::file::{ExportContent, ExportFormat};
+use orator_avatar::animate::rig::names::Names;
+use orator_avatar::animate::{AnimationOptions, Performance, perform};
+use orator_base::stage::progress::Silent;
+use orator_base::types::time::FrameRate;
 
 fn written(performance: &Performance, names: Names) -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();

@@ -4,7 +4,6 @@ pub mod aligned_words;
 pub mod blender;
 pub mod dataset_readers;
 pub mod fbx;
-pub mod label_readers;
 pub mod retargeted;
 pub mod training_readers;
 pub mod vrm;

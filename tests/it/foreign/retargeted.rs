@@ -3,13 +3,13 @@
 
 use crate::fixtures::animation::gltf::{Glb, written};
 use crate::fixtures::figures::{FPS, swinging};
-use crate::fixtures::skip::blender;
-use orator::animate::retarget::bone_map::BoneMap;
-use orator::animate::retarget::retargeted::RetargetRig;
-use orator::animate::rig::names::Names;
-use orator::animate::{AnimationOptions, Performance, perform};
-use orator::math::rotation::Rotation;
-use orator::math::vec3::{Vec3, add, norm, scale, sub};
+use orator_avatar::animate::retarget::bone_map::BoneMap;
+use orator_avatar::animate::retarget::retargeted::RetargetRig;
+use orator_avatar::animate::rig::names::Names;
+use orator_avatar::animate::{AnimationOptions, Performance, perform};
+use orator_base::math::rotation::Rotation;
+use orator_base::math::vec3::{Vec3, add, norm, scale, sub};
+use orator_test_support::skip::blender;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 

@@ -1,11 +1,11 @@
 //! What programs of others read in a training folder: the numbers of the log in TensorBoard's own package, and a
 //! checkpoint's tensors in Python's `safetensors`. Both come from PyPI (`make readers`).
 
-use crate::fixtures::skip::readers;
 use candle_core::{Device, Tensor};
-use orator::formats::checkpoint::Contents;
-use orator::train::log;
-use orator::train::log::MetricsLog;
+use orator_formats::checkpoint::Contents;
+use orator_gesture::train::log;
+use orator_gesture::train::log::MetricsLog;
+use orator_test_support::skip::readers;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;

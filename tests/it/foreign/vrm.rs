@@ -3,11 +3,11 @@
 
 use crate::fixtures::animation::truth::worst_joint_mm;
 use crate::fixtures::figures::{FPS, swinging};
-use crate::fixtures::skip::three_vrm;
-use orator::animate::export::file::{ExportContent, ExportFormat};
-use orator::animate::rig::names::Names;
-use orator::animate::{AnimationOptions, perform};
-use orator::stage::progress::Silent;
+use orator_avatar::animate::export::file::{ExportContent, ExportFormat};
+use orator_avatar::animate::rig::names::Names;
+use orator_avatar::animate::{AnimationOptions, perform};
+use orator_base::stage::progress::Silent;
+use orator_test_support::skip::three_vrm;
 use serde_json::Value;
 use std::path::Path;
 use std::process::Command;

@@ -1,16 +1,16 @@
 //! Arrays: `.npy` and `.npz` of every kind.
 
 use crate::fixtures::fuzzing::harness::{corpus, fuzz_bytes, fuzz_file};
-use orator::dataset::sample::N_KEYPOINTS;
-use orator::formats::npy_slice::{Element, Layout};
-use orator::formats::npz::Npz;
-use orator::formats::timeline_npz::Timeline;
-use orator::formats::{joints_npz, keypoints, keypoints_npz, npy};
-use orator::mocap::fingers::files as fingers;
-use orator::mocap::motion_file;
-use orator::mocap::upper_body;
-use orator::pipeline::segment::Measures;
-use orator::types::time::FrameRate;
+use orator_base::types::time::FrameRate;
+use orator_dataset::sample::N_KEYPOINTS;
+use orator_formats::mocap::motion_file;
+use orator_formats::npy_slice::{Element, Layout};
+use orator_formats::npz::Npz;
+use orator_formats::timeline_npz::Timeline;
+use orator_formats::{joints_npz, keypoints, keypoints_npz, npy};
+use orator_lab::mocap::fingers::files as fingers;
+use orator_lab::mocap::upper_body;
+use orator_pipeline::segment::Measures;
 
 #[test]
 fn npy() {
@@ -54,6 +54,6 @@ fn npz_of_the_pipeline() {
 fn npz_of_captures() {
     let files = corpus("arrays", "capture");
     fuzz_file("npz_of_captures", &files, "a.npz", |path| {
-        let _ = (orator::mocap::ted::read(path), upper_body::read(path), fingers::read(path));
+        let _ = (orator_formats::mocap::ted::read(path), upper_body::read(path), fingers::read(path));
     });
 }

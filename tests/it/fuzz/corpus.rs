@@ -9,21 +9,21 @@ use crate::fixtures::samples::constant_sample;
 use crate::fixtures::write_dataset::write_dataset;
 use ndarray::{Array1, Array2, Array3, arr1};
 use ndarray_npy::{NpzWriter, write_npy};
-use orator::dataset::Split;
-use orator::dataset::split::{RecordedSplit, SplitBy, SplitRecord};
-use orator::external::onnx::Manifest;
-use orator::formats::checkpoint::Contents;
-use orator::formats::{authors_txt, joints_npz, npy, npy_slice, wav};
-use orator::generate::model::{GENERATOR, SpeakerMetadata};
-use orator::generate::normalisation::{N_FEATURES, Normalisation};
-use orator::generate::representation::Representation;
-use orator::nn::gan::generator::{Config, Generator, Preset};
-use orator::nn::lifter::body::BodyLifter;
-use orator::nn::lifter::hand;
-use orator::nn::params::Params;
-use orator::types::skeleton::N_BONES;
-use orator::types::sound::Sound;
-use orator::types::time::FrameRate;
+use orator_base::types::skeleton::N_BONES;
+use orator_base::types::sound::Sound;
+use orator_base::types::time::FrameRate;
+use orator_dataset::Split;
+use orator_dataset::split::{RecordedSplit, SplitBy, SplitRecord};
+use orator_formats::checkpoint::Contents;
+use orator_formats::{authors_txt, joints_npz, npy, npy_slice, wav};
+use orator_gesture::generate::model::{GENERATOR, SpeakerMetadata};
+use orator_gesture::generate::normalisation::{N_FEATURES, Normalisation};
+use orator_gesture::generate::representation::Representation;
+use orator_nn::gan::generator::{Config, Generator, Preset};
+use orator_nn::lifter::body::BodyLifter;
+use orator_nn::lifter::hand;
+use orator_nn::params::Params;
+use orator_onnx::Manifest;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fs;
@@ -55,7 +55,7 @@ fn write() {
     write_dataset(&fixtures("dataset"), "host", FPS, &samples).unwrap();
     let sound = Sound { rate: 16_000, samples: (0..800).map(|n| (n as f32 / 9.0).sin() / 2.0).collect() };
     wav::write(&at("media", "a.wav"), &sound).unwrap();
-    let files = crate::fixtures::support::files_under(&fixtures("dataset").join(".."));
+    let files = orator_test_support::project::files_under(&fixtures("dataset").join(".."));
     let n_bytes: u64 = files.iter().map(|(_, path)| fs::metadata(path).unwrap().len()).sum();
     assert!(n_bytes < 300_000, "{n_bytes} bytes");
 }
@@ -124,7 +124,7 @@ fn texts() {
         write_text("texts", &format!("words.{ending}"), text);
     }
     let speaker = "\n[[speaker]]\nname = \"host\"\nvideos = [\"*.mp4\", \"**/a.mov\"]\ntrain = [\"a.mp4\"]\n";
-    write_text("texts", "pipeline.toml", &format!("{}{speaker}", orator::config::DEFAULT_FILE));
+    write_text("texts", "pipeline.toml", &format!("{}{speaker}", orator_dataset::config::DEFAULT_FILE));
     let builtin = Manifest::builtin().unwrap();
     let models = ["body-marker", "hand-marker", "person-marker"];
     let models = models.iter().filter_map(|id| builtin.get(id).ok().cloned()).collect();
@@ -137,7 +137,7 @@ fn texts() {
         let to = at("texts", &format!("stage-{file}"));
         fs::copy(before.join(stage).join("host/clip-1-f39adeef").join(file), to).unwrap();
     }
-    let mut record = SplitRecord::new(orator::config::SplitUnit::Video, "by default".to_owned());
+    let mut record = SplitRecord::new(orator_dataset::config::SplitUnit::Video, "by default".to_owned());
     let split = RecordedSplit { name: "a".into(), split: Some(Split::Test), by: SplitBy::Share, blocks: Vec::new() };
     record.videos.insert("00aa".into(), split);
     record.write(&at("texts", "stage-splits.json")).unwrap();

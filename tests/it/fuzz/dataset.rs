@@ -1,14 +1,14 @@
 //! A dataset's folder, loose shards, and the files beside them.
 
 use crate::fixtures::fuzzing::harness::{corpus, fixtures, fuzz_file, fuzz_folder};
-use orator::dataset::import::shards;
-use orator::dataset::split::SplitRecord;
-use orator::dataset::verify::verify::verify;
-use orator::dataset::write::part;
-use orator::dataset::write::part::VideoEntry;
-use orator::dataset::{Dataset, Split};
-use orator::stage::ledger::Ledger;
-use orator::stage::progress::Silent;
+use orator_base::stage::ledger::Ledger;
+use orator_base::stage::progress::Silent;
+use orator_dataset::import::shards;
+use orator_dataset::split::SplitRecord;
+use orator_dataset::verify::verify::verify;
+use orator_dataset::write::part;
+use orator_dataset::write::part::VideoEntry;
+use orator_dataset::{Dataset, Split};
 
 #[test]
 fn folder() {
@@ -44,6 +44,6 @@ fn loose_shards() {
 fn ledgers_and_records() {
     fuzz_file("ledgers_and_records", &corpus("texts", "stage"), "a.json", |path| {
         let _ = (Ledger::read(path), SplitRecord::read(path));
-        let _ = orator::formats::media_json::MediaInfo::read(path);
+        let _ = orator_formats::media_json::MediaInfo::read(path);
     });
 }

@@ -1,9 +1,9 @@
 //! Sound files: the header that the project writes, and any through ffmpeg.
 
 use crate::fixtures::fuzzing::harness::{corpus, fuzz_bytes, fuzz_file};
-use orator::external::ffmpeg::{audio, probe};
-use orator::formats::wav;
-use orator::types::sound::SAMPLE_RATE;
+use orator_base::types::sound::SAMPLE_RATE;
+use orator_formats::wav;
+use orator_media::ffmpeg::{audio, probe};
 
 #[test]
 fn wav_header() {

@@ -1,14 +1,15 @@
 //! Captured motion: BVH, the authors' text, labels of hands, and a take as an import reads it.
 
 use crate::fixtures::fuzzing::harness::{corpus, fixtures, folder, fuzz_bytes, fuzz_file};
-use orator::dataset::import::find::TakeFiles;
-use orator::dataset::import::take::{ImportedTake, TakeLimits};
-use orator::formats::authors_txt;
-use orator::formats::bvh::read::{Bvh, Positions};
-use orator::mocap::captured::MotionKind;
-use orator::mocap::fingers::files as fingers;
-use orator::mocap::{motion_file, upper_body};
-use orator::types::time::FrameRate;
+use orator_base::types::time::FrameRate;
+use orator_dataset::import::find::TakeFiles;
+use orator_dataset::import::take::{ImportedTake, TakeLimits};
+use orator_formats::authors_txt;
+use orator_formats::bvh::read::{Bvh, Positions};
+use orator_formats::mocap::captured::MotionKind;
+use orator_formats::mocap::motion_file;
+use orator_lab::mocap::fingers::files as fingers;
+use orator_lab::mocap::upper_body;
 
 const FPS: FrameRate = FrameRate::new(15, 1);
 

@@ -1,11 +1,11 @@
 //! Texts: transcripts, keypoints as JSON, configuration, manifest, tables, results, logs.
 
 use crate::fixtures::fuzzing::harness::{corpus, folder, fuzz_bytes, fuzz_file};
-use orator::evaluate::table::result::StoredResult;
-use orator::external::onnx::Manifest;
-use orator::formats::keypoints;
-use orator::formats::transcript::Transcript;
-use orator::pipeline::batch::sounds;
+use orator_formats::keypoints;
+use orator_formats::transcript::Transcript;
+use orator_gesture::batch::sounds;
+use orator_gesture::evaluate::table::result::StoredResult;
+use orator_onnx::Manifest;
 
 #[test]
 fn transcripts() {
@@ -32,7 +32,7 @@ fn keypoints_of_others() {
 #[test]
 fn configuration() {
     fuzz_file("configuration", &corpus("texts", "pipeline"), "pipeline.toml", |path| {
-        let _ = orator::config::load(path, &[]);
+        let _ = orator_dataset::config::load(path, &[]);
     });
 }
 
@@ -43,7 +43,7 @@ fn settings_on_the_command_line() {
     let file = dir.path().join("pipeline.toml");
     std::fs::write(&file, "[[speaker]]\nname = \"host\"\nvideos = []\n").unwrap();
     fuzz_bytes("settings_on_the_command_line", &files, |bytes| {
-        let _ = orator::config::load(&file, &[String::from_utf8_lossy(bytes).into_owned()]);
+        let _ = orator_dataset::config::load(&file, &[String::from_utf8_lossy(bytes).into_owned()]);
     });
 }
 
@@ -73,6 +73,6 @@ fn result_of_an_evaluation() {
 #[test]
 fn log_of_a_training() {
     fuzz_file("log_of_a_training", &corpus("texts", "log"), "log.jsonl", |path| {
-        let _ = orator::train::log::read(path.parent().unwrap());
+        let _ = orator_gesture::train::log::read(path.parent().unwrap());
     });
 }

@@ -1,10 +1,10 @@
 //! Weights: checkpoints of a speaker, lifters, spaces of movement.
 
 use crate::fixtures::fuzzing::harness::{corpus, fuzz_bytes, fuzz_file};
-use orator::formats::checkpoint::Contents;
-use orator::generate::model::{self, GenerationChoice};
-use orator::metrics::space::{basis::Basis, embedding};
-use orator::pipeline::lift::weights;
+use orator_formats::checkpoint::Contents;
+use orator_gesture::generate::model::{self, GenerationChoice};
+use orator_gesture::metrics::space::{basis::Basis, embedding};
+use orator_pipeline::lift::weights;
 
 #[test]
 fn checkpoint() {

@@ -8,20 +8,20 @@ use crate::fixtures::networks::value;
 use crate::fixtures::untrained::{generate, write_untrained_speaker};
 use candle_core::{Device, Tensor};
 use ndarray::{Axis, s};
-use orator::animate::{AnimationOptions, perform};
-use orator::audio::mel;
-use orator::external::ffmpeg::probe;
-use orator::formats::checkpoint;
-use orator::formats::{authors_txt, npy};
-use orator::generate::GestureGenerator;
-use orator::generate::mel_stream::mel_frames;
-use orator::generate::model::SpeakerMetadata;
-use orator::generate::normalisation::{N_FEATURES, Normalisation};
-use orator::generate::representation::Representation;
-use orator::mocap::motion_file;
-use orator::nn::gan::generator::{Config, Generator, Preset};
-use orator::nn::params::Params;
-use orator::types::sound::Sound;
+use orator_avatar::animate::{AnimationOptions, perform};
+use orator_base::audio::mel;
+use orator_base::types::sound::Sound;
+use orator_formats::checkpoint;
+use orator_formats::mocap::motion_file;
+use orator_formats::{authors_txt, npy};
+use orator_gesture::generate::GestureGenerator;
+use orator_gesture::generate::mel_stream::mel_frames;
+use orator_gesture::generate::model::SpeakerMetadata;
+use orator_gesture::generate::normalisation::{N_FEATURES, Normalisation};
+use orator_gesture::generate::representation::Representation;
+use orator_media::ffmpeg::probe;
+use orator_nn::gan::generator::{Config, Generator, Preset};
+use orator_nn::params::Params;
 
 #[test]
 fn one_sound_becomes_every_kind_of_file() {
@@ -29,7 +29,7 @@ fn one_sound_becomes_every_kind_of_file() {
     let dir = folder.path();
     std::fs::create_dir(dir.join("training")).unwrap();
     write_untrained_speaker(&checkpoint::path(&dir.join("training"), 20));
-    orator::formats::wav::write(&dir.join("speech.wav"), &clips::tone(16_000, 2.05, 220.0)).unwrap();
+    orator_formats::wav::write(&dir.join("speech.wav"), &clips::tone(16_000, 2.05, 220.0)).unwrap();
 
     let outs = "--out made/a.npy made/a.txt --out made/a.bvh --out made/a.mp4";
     let output = generate(dir, &format!("--json --checkpoint training --audio speech.wav {outs}"));
@@ -72,8 +72,8 @@ fn wrong_input_is_named_and_nothing_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     write_untrained_speaker(&dir.join("host.safetensors"));
-    orator::formats::wav::write(&dir.join("speech.wav"), &clips::tone(16_000, 0.5, 220.0)).unwrap();
-    orator::formats::wav::write(&dir.join("click.wav"), &clips::tone(16_000, 0.03, 220.0)).unwrap();
+    orator_formats::wav::write(&dir.join("speech.wav"), &clips::tone(16_000, 0.5, 220.0)).unwrap();
+    orator_formats::wav::write(&dir.join("click.wav"), &clips::tone(16_000, 0.03, 220.0)).unwrap();
     clips::write_numbered(dir, "silent.mp4", 4, FPS, None);
     std::fs::write(dir.join("broken.safetensors"), "no weights").unwrap();
     std::fs::write(dir.join("notes.mp3"), "no sound").unwrap();
@@ -121,7 +121,7 @@ fn a_checkpoint_alone_generates_wherever_it_lies() {
     std::fs::create_dir(&training).unwrap();
     std::fs::create_dir(&elsewhere).unwrap();
     write_untrained_speaker(&checkpoint::path(&training, 20));
-    orator::formats::wav::write(&training.join("speech.wav"), &clips::tone(16_000, 1.0, 220.0)).unwrap();
+    orator_formats::wav::write(&training.join("speech.wav"), &clips::tone(16_000, 1.0, 220.0)).unwrap();
     let output = generate(&training, "--checkpoint step-0000020.safetensors --audio speech.wav --out made.npy");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let made = std::fs::read(training.join("made.npy")).unwrap();

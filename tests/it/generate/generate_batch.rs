@@ -3,7 +3,7 @@
 
 use crate::fixtures::clips;
 use crate::fixtures::untrained::{generate, write_untrained_speaker};
-use orator::formats::wav;
+use orator_formats::wav;
 use serde_json::Value;
 use std::path::Path;
 

@@ -3,13 +3,13 @@
 
 use crate::fixtures::animation::captures::{tone, write_stereo};
 use crate::fixtures::untrained::{generate, write_untrained_sequence, write_untrained_speaker};
-use orator::formats::bvh::read::Bvh;
-use orator::formats::transcript::{Word, WordSource};
-use orator::formats::wav;
-use orator::generate::seq2seq::SequenceGenerator;
-use orator::generate::seq2seq::architecture::Architecture;
-use orator::nn::seq2seq::predict::StateAtSeams;
-use orator::types::sound::Sound;
+use orator_base::types::sound::Sound;
+use orator_formats::bvh::read::Bvh;
+use orator_formats::transcript::{Word, WordSource};
+use orator_formats::wav;
+use orator_gesture::generate::seq2seq::SequenceGenerator;
+use orator_gesture::generate::seq2seq::architecture::Architecture;
+use orator_nn::seq2seq::predict::StateAtSeams;
 use serde_json::Value;
 use std::path::Path;
 

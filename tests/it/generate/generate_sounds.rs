@@ -4,13 +4,13 @@
 use crate::fixtures::clips;
 use crate::fixtures::figures::FPS;
 use crate::fixtures::untrained::{generate, write_untrained_speaker};
-use orator::external::ffmpeg::audio::read_mono;
-use orator::external::ffmpeg::sound_stream::{SoundStream, n_samples};
-use orator::formats::npy;
-use orator::formats::wav;
-use orator::generate::GestureGenerator;
-use orator::generate::generator::CHUNK;
-use orator::types::sound::Sound;
+use orator_base::types::sound::Sound;
+use orator_formats::npy;
+use orator_formats::wav;
+use orator_gesture::generate::GestureGenerator;
+use orator_gesture::generate::generator::CHUNK;
+use orator_media::ffmpeg::audio::read_mono;
+use orator_media::ffmpeg::sound_stream::{SoundStream, n_samples};
 
 #[test]
 fn a_streamed_sound_gives_the_motion_of_the_whole_one() {

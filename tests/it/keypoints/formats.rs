@@ -3,11 +3,11 @@
 use crate::fixtures::media::foreign_keypoints as foreign;
 use crate::fixtures::media::foreign_keypoints::{HolisticOrder, OpenPoseOrder};
 use ndarray::Array3;
-use orator::formats::keypoints::{CoordinateUnit, FoundKeypoints, read};
-use orator::formats::keypoints_npz;
-use orator::pipeline::keypoints::{TakenKeypoints, take_in};
-use orator::types::pose2d::Keypoints;
-use orator::types::time::FrameRate;
+use orator_base::types::pose2d::Keypoints;
+use orator_base::types::time::FrameRate;
+use orator_formats::keypoints::{CoordinateUnit, FoundKeypoints, read};
+use orator_formats::keypoints_npz;
+use orator_pipeline::keypoints::{TakenKeypoints, take_in};
 use std::path::Path;
 
 const RATE: FrameRate = FrameRate::new(15, 1);

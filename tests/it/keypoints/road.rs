@@ -3,12 +3,12 @@
 
 use crate::fixtures::media::foreign_keypoints as foreign;
 use crate::fixtures::media::foreign_keypoints::OpenPoseOrder;
-use crate::fixtures::support::Project;
 use orator::Dataset;
-use orator::formats::{joints_npz, keypoints_npz};
-use orator::pipeline::keypoints::take_in;
-use orator::types::pose3d::Motion;
-use orator::types::time::FrameRate;
+use orator_base::types::pose3d::Motion;
+use orator_base::types::time::FrameRate;
+use orator_formats::{joints_npz, keypoints_npz};
+use orator_pipeline::keypoints::take_in;
+use orator_test_support::project::Project;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -93,7 +93,7 @@ fn keypoints_lead_to_nearly_the_joints_of_their_video() {
     assert!(changed.contains("the video changed"), "{changed}");
 
     // Twice the rate on the way and back again: the same within what lies between two frames.
-    let found = orator::formats::keypoints::read(&dir.path().join("kp/clip")).unwrap();
+    let found = orator_formats::keypoints::read(&dir.path().join("kp/clip")).unwrap();
     let twice = take_in(found, RATE, keypoints.image_size, FrameRate::new(30, 1)).unwrap().keypoints;
     foreign::openpose(&dir.path().join("fast/clip"), &twice, OpenPoseOrder::Coco18);
     configure(dir.path(), &format!("keypoints = [\"fast\"]\naudio = [\"sound/*.wav\"]\nfps = 30\nsize = \"{size}\""));

@@ -3,8 +3,8 @@
 use crate::fixtures::keypoints::keypoints;
 use ndarray::{Array1, Array3, s};
 use ndarray_npy::{NpzWriter, read_npy};
-use orator::train::scene::body::{FilmedScene, Filming};
-use orator::types::pose2d::{Keypoints, coco};
+use orator_base::types::pose2d::{Keypoints, coco};
+use orator_lab::train::scene::body::{FilmedScene, Filming};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::path::PathBuf;

@@ -2,14 +2,14 @@
 
 use crate::fixtures::keypoints::POINTS;
 use ndarray::{Array3, s};
-use orator::config;
-use orator::math::rotation::Rotation;
-use orator::motion::upper_body::{L_HIP, Pose, R_HIP};
-use orator::pipeline::lift::Lifter;
-use orator::train::scene::body_motion;
-use orator::types::interval::Interval;
-use orator::types::pose2d::Keypoints;
-use orator::types::time::FrameRate;
+use orator_base::math::rotation::Rotation;
+use orator_base::motion::upper_body::{L_HIP, Pose, R_HIP};
+use orator_base::types::interval::Interval;
+use orator_base::types::pose2d::Keypoints;
+use orator_base::types::time::FrameRate;
+use orator_dataset::config;
+use orator_lab::train::scene::body_motion;
+use orator_pipeline::lift::Lifter;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

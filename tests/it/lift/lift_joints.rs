@@ -2,14 +2,14 @@
 
 use crate::fixtures::keypoints::{keypoints, lifter};
 use ndarray::{Array3, s};
-use orator::motion::upper_body::{L_WRIST, R_WRIST, metres_per_unit};
-use orator::train::scene::body::{FilmedScene, Filming};
-use orator::train::scene::hand_shape;
-use orator::types::interval::Interval;
-use orator::types::pose2d::Keypoints;
-use orator::types::pose3d::Motion;
-use orator::types::skeleton;
-use orator::types::skeleton::{L_HAND, N_JOINTS, R_HAND};
+use orator_base::motion::upper_body::{L_WRIST, R_WRIST, metres_per_unit};
+use orator_base::types::interval::Interval;
+use orator_base::types::pose2d::Keypoints;
+use orator_base::types::pose3d::Motion;
+use orator_base::types::skeleton;
+use orator_base::types::skeleton::{L_HAND, N_JOINTS, R_HAND};
+use orator_lab::train::scene::body::{FilmedScene, Filming};
+use orator_lab::train::scene::hand_shape;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 

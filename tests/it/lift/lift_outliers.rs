@@ -3,18 +3,18 @@
 
 use crate::fixtures::footage::{FPS, Footage, good, write};
 use ndarray::s;
-use orator::config;
-use orator::formats::joints_npz;
-use orator::pipeline::lift::LiftStage;
-use orator::pipeline::segment::SegmentStage;
-use orator::stage::artifacts::{self, StageName};
-use orator::stage::ledger::Ledger;
-use orator::stage::progress::Silent;
-use orator::stage::{Stage, Unit};
-use orator::types::interval::Intervals;
-use orator::types::pose2d::coco;
-use orator::types::pose3d::Motion;
-use orator::types::skeleton::{L_WRIST, R_WRIST};
+use orator_base::stage::artifacts::{self, StageName};
+use orator_base::stage::ledger::Ledger;
+use orator_base::stage::progress::Silent;
+use orator_base::stage::{Stage, Unit};
+use orator_base::types::interval::Intervals;
+use orator_base::types::pose2d::coco;
+use orator_base::types::pose3d::Motion;
+use orator_base::types::skeleton::{L_WRIST, R_WRIST};
+use orator_dataset::config;
+use orator_formats::joints_npz;
+use orator_pipeline::lift::LiftStage;
+use orator_pipeline::segment::SegmentStage;
 
 /// Judged and lifted: intervals, ledger and joints.
 fn lifted(footage: &Footage) -> (Vec<(usize, usize)>, Ledger, Motion) {

@@ -3,8 +3,8 @@
 use crate::fixtures::keypoints::keypoints;
 use ndarray::{Array3, arr1, s};
 use ndarray_npy::{NpzWriter, read_npy, write_npy};
-use orator::train::scene::body::{FilmedScene, Filming};
-use orator::types::pose2d::Keypoints;
+use orator_base::types::pose2d::Keypoints;
+use orator_lab::train::scene::body::{FilmedScene, Filming};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::fs::File;

@@ -2,15 +2,15 @@
 
 use crate::fixtures::clips;
 use crate::fixtures::clips::write_numbered;
-use crate::fixtures::skip::real_data;
-use crate::fixtures::support::files_under;
 use ndarray::Array1;
 use ndarray_npy::NpzReader;
-use orator::config;
-use orator::pipeline::extract::ExtractStage;
-use orator::stage::progress::Silent;
-use orator::stage::{Report, Stage, Unit};
-use orator::types::time::FrameRate;
+use orator_base::stage::progress::Silent;
+use orator_base::stage::{Report, Stage, Unit};
+use orator_base::types::time::FrameRate;
+use orator_dataset::config;
+use orator_pipeline::extract::ExtractStage;
+use orator_test_support::project::files_under;
+use orator_test_support::skip::real_data;
 use std::fs::{self, File};
 use std::path::Path;
 

@@ -2,10 +2,10 @@
 
 use crate::fixtures::clips;
 use crate::fixtures::clips::{ffmpeg, number_of, write_numbered, write_sized};
-use crate::fixtures::skip::real_data;
-use orator::external::ffmpeg::frames::{FrameReader, TimedFrame};
-use orator::external::ffmpeg::probe::probe;
-use orator::types::time::FrameRate;
+use orator_base::types::time::FrameRate;
+use orator_media::ffmpeg::frames::{FrameReader, TimedFrame};
+use orator_media::ffmpeg::probe::probe;
+use orator_test_support::skip::real_data;
 use std::path::Path;
 
 const DATASET: FrameRate = FrameRate::new(15, 1);
@@ -173,7 +173,7 @@ fn bad_files_are_named_with_what_was_expected() {
     clips::write_numbered(dir.path(), "in.mp4", 60, FrameRate::new(30, 1), None);
     let bytes = std::fs::read(at("in.mp4")).unwrap();
     std::fs::write(at("no_index.mp4"), &bytes[..200]).unwrap();
-    orator::formats::wav::write(&at("sound.wav"), &clips::tone(16_000, 0.5, 440.0)).unwrap();
+    orator_formats::wav::write(&at("sound.wav"), &clips::tone(16_000, 0.5, 440.0)).unwrap();
     for (name, words) in [
         ("empty.mp4", "is empty (0 bytes)"),
         ("text.mp4", "is not a media file"),

@@ -1,16 +1,16 @@
 //! Sound on the pictures' clock: rates, channels, offsets, gaps, and a flash with its beep.
 
 use crate::fixtures::clips::{ffmpeg, tone, write_numbered};
-use crate::fixtures::skip::real_data;
-use orator::external::ffmpeg::audio::read_mono;
-use orator::external::ffmpeg::frames::FrameReader;
-use orator::external::ffmpeg::sound_stream::SoundStream;
-use orator::external::ffmpeg::write::encode::VideoWriter;
-use orator::formats::wav;
-use orator::pipeline::extract::audio_file::extract_wav;
-use orator::types::image::Image;
-use orator::types::sound::Sound;
-use orator::types::time::FrameRate;
+use orator_base::types::image::Image;
+use orator_base::types::sound::Sound;
+use orator_base::types::time::FrameRate;
+use orator_formats::wav;
+use orator_media::ffmpeg::audio::read_mono;
+use orator_media::ffmpeg::frames::FrameReader;
+use orator_media::ffmpeg::sound_stream::SoundStream;
+use orator_media::ffmpeg::write::encode::VideoWriter;
+use orator_pipeline::extract::audio_file::extract_wav;
+use orator_test_support::skip::real_data;
 use std::path::Path;
 
 const RATE: u32 = 16_000;

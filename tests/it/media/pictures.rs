@@ -1,20 +1,20 @@
 //! Pictures that are not plain: other sizes inside a file, HDR, interlaced fields; and that plain ones are left alone.
 
 use crate::fixtures::clips::{ffmpeg, number_of, write_numbered, write_sized};
-use crate::fixtures::skip::real_data;
-use crate::fixtures::support::files_under;
-use orator::config;
-use orator::external::ffmpeg::deinterlace::comb_share;
-use orator::external::ffmpeg::frames::FrameReader;
-use orator::external::opencv::png;
-use orator::formats::media_json::MediaInfo;
-use orator::formats::timeline_npz::Timeline;
-use orator::pipeline::extract::ExtractStage;
-use orator::pipeline::extract::survey::PictureSurvey;
-use orator::stage::progress::Silent;
-use orator::stage::{Stage, Unit};
-use orator::types::image::{Image, PictureOptions};
-use orator::types::time::FrameRate;
+use orator_base::stage::progress::Silent;
+use orator_base::stage::{Stage, Unit};
+use orator_base::types::image::{Image, PictureOptions};
+use orator_base::types::time::FrameRate;
+use orator_dataset::config;
+use orator_formats::media_json::MediaInfo;
+use orator_formats::timeline_npz::Timeline;
+use orator_media::ffmpeg::deinterlace::comb_share;
+use orator_media::ffmpeg::frames::FrameReader;
+use orator_media::opencv::png;
+use orator_pipeline::extract::ExtractStage;
+use orator_pipeline::extract::survey::PictureSurvey;
+use orator_test_support::project::files_under;
+use orator_test_support::skip::real_data;
 use std::path::Path;
 
 const DATASET: FrameRate = FrameRate::new(15, 1);
@@ -49,7 +49,7 @@ fn another_size_inside_a_file_is_brought_to_the_first() {
     assert!((44..=46).contains(&frames.len()), "{}", frames.len());
     assert!(frames.iter().all(|image| [image.width, image.height] == [128, 64]));
     let middle = |image: &Image| {
-        let cut = orator::types::image::PixelArea { x: 32, y: 0, width: 64, height: 64 };
+        let cut = orator_base::types::image::PixelArea { x: 32, y: 0, width: 64, height: 64 };
         number_of(&image.cropped(cut))
     };
     for n in 0..15 {

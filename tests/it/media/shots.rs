@@ -2,14 +2,14 @@
 //! and what does not.
 
 use crate::fixtures::clips::ffmpeg;
-use crate::fixtures::skip::real_data;
-use crate::fixtures::support::speaker_clip;
 use ndarray::Array1;
 use ndarray_npy::NpzReader;
-use orator::config;
-use orator::pipeline::extract::ExtractStage;
-use orator::stage::progress::Silent;
-use orator::stage::{Stage, Unit};
+use orator_base::stage::progress::Silent;
+use orator_base::stage::{Stage, Unit};
+use orator_dataset::config;
+use orator_pipeline::extract::ExtractStage;
+use orator_test_support::project::speaker_clip;
+use orator_test_support::skip::real_data;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 

@@ -8,14 +8,14 @@
 use crate::fixtures::media::sync_clips::{Clip, Kind, PLAIN, Pace, chirp_begins, make, read_picture};
 use ndarray::Array1;
 use ndarray_npy::NpzReader;
-use orator::config;
-use orator::external::ffmpeg::frames::FrameReader;
-use orator::pipeline::extract::ExtractStage;
-use orator::stage::progress::Silent;
-use orator::stage::{Stage, Unit};
-use orator::types::sound::SAMPLE_RATE;
-use orator::types::sync::sample_at;
-use orator::types::time::FrameRate;
+use orator_base::stage::progress::Silent;
+use orator_base::stage::{Stage, Unit};
+use orator_base::types::sound::SAMPLE_RATE;
+use orator_base::types::sync::sample_at;
+use orator_base::types::time::FrameRate;
+use orator_dataset::config;
+use orator_media::ffmpeg::frames::FrameReader;
+use orator_pipeline::extract::ExtractStage;
 use std::fs::{self, File};
 use std::path::Path;
 

@@ -1,12 +1,12 @@
 //! Which of several sound tracks is taken.
 
 use crate::fixtures::clips::{ffmpeg, write_numbered};
-use orator::config;
-use orator::external::ffmpeg::audio;
-use orator::pipeline::extract::ExtractStage;
-use orator::stage::progress::Silent;
-use orator::stage::{Report, Stage, Unit};
-use orator::types::time::FrameRate;
+use orator_base::stage::progress::Silent;
+use orator_base::stage::{Report, Stage, Unit};
+use orator_base::types::time::FrameRate;
+use orator_dataset::config;
+use orator_media::ffmpeg::audio;
+use orator_pipeline::extract::ExtractStage;
 use std::path::Path;
 
 fn run(video: &Path, out: &Path, audio_track: usize) -> anyhow::Result<Report> {

@@ -4,11 +4,11 @@
 
 use crate::fixtures::networks::{phase, value};
 use candle_core::{DType, Result, Tensor, Var};
-use orator::nn::cpu::axis::ConvAxis;
-use orator::nn::gan::discriminator::Discriminator;
-use orator::nn::gan::generator::{Config, Generator, Preset};
-use orator::nn::ops::gradcheck::pattern;
-use orator::nn::params::Params;
+use orator_nn::cpu::axis::ConvAxis;
+use orator_nn::gan::discriminator::Discriminator;
+use orator_nn::gan::generator::{Config, Generator, Preset};
+use orator_nn::ops::gradcheck::pattern;
+use orator_nn::params::Params;
 use std::collections::BTreeMap;
 
 #[derive(serde::Deserialize)]
@@ -184,7 +184,7 @@ fn the_discriminator_trains_and_evaluates_as_in_pytorch() -> anyhow::Result<()> 
 
 #[test]
 fn sizes_on_the_way_are_the_published_ones() -> anyhow::Result<()> {
-    assert_eq!(orator::audio::mel::n_frames(67_267), 418);
+    assert_eq!(orator_base::audio::mel::n_frames(67_267), 418);
     let halved = |n: usize| ConvAxis::same(n, 4, 2).n_out;
     assert_eq!([halved(418), halved(209), halved(105)], [209, 105, 53]);
     assert_eq!([halved(64), halved(32), halved(16)], [32, 16, 8]);

@@ -1,8 +1,8 @@
 //! Every ONNX model gives the numbers written down for it.
 
 use crate::fixtures::onnx_models::models;
-use crate::fixtures::skip::real_data;
-use orator::external::onnx::{Manifest, Model, ModelRole, TensorAxes};
+use orator_onnx::{Manifest, Model, ModelRole, TensorAxes};
+use orator_test_support::skip::real_data;
 use std::path::Path;
 
 /// Models whose numbers were written down from files of other names, of the same weights.
@@ -77,7 +77,7 @@ fn a_model_that_is_missing_wrong_or_different_says_so() {
     assert!(wrong.contains("sha256") && wrong.contains(&entry.sha256), "{wrong}");
 
     let mut junk = entry.clone();
-    junk.sha256 = orator::external::onnx::sha256_of(&empty.path().join(&entry.file)).unwrap();
+    junk.sha256 = orator_onnx::sha256_of(&empty.path().join(&entry.file)).unwrap();
     assert!(said(&junk, empty.path()).contains("no ONNX model"));
 
     let mut narrow = entry.clone();

@@ -3,10 +3,10 @@
 
 use crate::fixtures::networks::fill;
 use candle_core::{DType, Device, Tensor};
-use orator::nn::Mode;
-use orator::nn::lifter::heatmap::{HeatmapLifter, NAME};
-use orator::nn::ops::gradcheck::pattern;
-use orator::nn::params::Params;
+use orator_nn::Mode;
+use orator_nn::lifter::heatmap::{HeatmapLifter, NAME};
+use orator_nn::ops::gradcheck::pattern;
+use orator_nn::params::Params;
 
 #[derive(serde::Deserialize)]
 struct Golden {

@@ -4,12 +4,12 @@
 
 use crate::fixtures::networks::{every_window, fill};
 use candle_core::{DType, Device, Result, Tensor};
-use orator::nn::Mode;
-use orator::nn::lifter::hand;
-use orator::nn::lifter::hand::HandLifter;
-use orator::nn::lifter::temporal::{Config, TemporalLifter};
-use orator::nn::ops::gradcheck::pattern;
-use orator::nn::params::Params;
+use orator_nn::Mode;
+use orator_nn::lifter::hand;
+use orator_nn::lifter::hand::HandLifter;
+use orator_nn::lifter::temporal::{Config, TemporalLifter};
+use orator_nn::ops::gradcheck::pattern;
+use orator_nn::params::Params;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;

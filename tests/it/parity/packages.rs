@@ -1,10 +1,10 @@
 //! A real clip through the models that come from packages alone, beside those of the default.
 
-use crate::fixtures::skip::{fetched_models, real_data};
-use crate::fixtures::support::{Project, files_under};
 use ndarray::s;
-use orator::formats::keypoints_npz;
-use orator::types::pose2d::{Keypoints, coco};
+use orator_base::types::pose2d::{Keypoints, coco};
+use orator_formats::keypoints_npz;
+use orator_test_support::project::{Project, files_under};
+use orator_test_support::skip::{fetched_models, real_data};
 
 /// Median and 95th percentile of a wrist's distance, shares of the shoulders' width.
 const MOST_APART: [f32; 2] = [0.05, 0.2];

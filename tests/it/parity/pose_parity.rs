@@ -3,13 +3,13 @@
 //! names one).
 
 use crate::fixtures::onnx_models::models;
-use crate::fixtures::skip::{python, real_data};
-use orator::config;
-use orator::external::ffmpeg::frames::FrameReader;
-use orator::formats::keypoints_npz;
-use orator::formats::npz::Npz;
-use orator::pipeline::pose2d::Chain;
-use orator::types::pose2d::{Keypoint, Pose2d};
+use orator_base::types::pose2d::{Keypoint, Pose2d};
+use orator_dataset::config;
+use orator_formats::keypoints_npz;
+use orator_formats::npz::Npz;
+use orator_media::ffmpeg::frames::FrameReader;
+use orator_pipeline::pose2d::Chain;
+use orator_test_support::skip::{python, real_data};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -61,7 +61,7 @@ fn compare(name: &str, secs: u32) {
         ..config::Pose2dConfig::default()
     };
     let mut chain = Chain::new(&runtime, &store, &settings).unwrap();
-    let rate = FrameReader::open(&clip, orator::types::time::FrameRate::new(1, 1)).unwrap();
+    let rate = FrameReader::open(&clip, orator_base::types::time::FrameRate::new(1, 1)).unwrap();
     let rate = rate.info().video.as_ref().and_then(|video| video.fps).unwrap();
     let wanted: Vec<usize> = times.iter().map(|secs| (secs * rate.per_sec()).round() as usize).collect();
     let frames = FrameReader::open(&clip, rate).unwrap().map(Result::unwrap);

@@ -2,10 +2,10 @@
 //! reason, one of two people is followed, HEVC works.
 
 use crate::fixtures::clips::ffmpeg;
-use crate::fixtures::skip::{fetched_models, real_data};
-use crate::fixtures::support::{Project, files_under};
-use orator::formats::keypoints_npz;
-use orator::formats::keypoints_npz::Extras;
+use orator_formats::keypoints_npz;
+use orator_formats::keypoints_npz::Extras;
+use orator_test_support::project::{Project, files_under};
+use orator_test_support::skip::{fetched_models, real_data};
 use std::path::Path;
 
 /// A project on the real models with the clips given.

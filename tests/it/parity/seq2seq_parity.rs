@@ -3,16 +3,16 @@
 
 use crate::fixtures::networks::{phase, value};
 use candle_core::{DType, Device, Result, Tensor, Var};
-use orator::nn::Mode;
-use orator::nn::ops::gradcheck::pattern;
-use orator::nn::params::Params;
-use orator::nn::seq2seq::adversarial::SegmentDiscriminator;
-use orator::nn::seq2seq::autoencoder::{PoseAutoencoder, SpeechEncoder};
-use orator::nn::seq2seq::config::{Config, Segment};
-use orator::nn::seq2seq::contextual::ContextSeq2Seq;
-use orator::nn::seq2seq::predict::GesturePredictor;
-use orator::nn::seq2seq::words::WordsSeq2Seq;
-use orator::train::seq2seq::losses;
+use orator_gesture::train::seq2seq::losses;
+use orator_nn::Mode;
+use orator_nn::ops::gradcheck::pattern;
+use orator_nn::params::Params;
+use orator_nn::seq2seq::adversarial::SegmentDiscriminator;
+use orator_nn::seq2seq::autoencoder::{PoseAutoencoder, SpeechEncoder};
+use orator_nn::seq2seq::config::{Config, Segment};
+use orator_nn::seq2seq::contextual::ContextSeq2Seq;
+use orator_nn::seq2seq::predict::GesturePredictor;
+use orator_nn::seq2seq::words::WordsSeq2Seq;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;

@@ -2,18 +2,18 @@
 //! is held against the truth of the drawing.
 
 use crate::fixtures::clips::ffmpeg;
-use crate::fixtures::support::Project;
 use ndarray::{Array3, Axis};
-use orator::demo::drawn::folder::DemoPlan;
-use orator::demo::drawn::truth::DrawnTruth;
-use orator::formats::keypoints_npz;
-use orator::formats::media_json::MediaInfo;
-use orator::pipeline::pose2d::Pose2dStage;
-use orator::stage::ledger::Ledger;
-use orator::stage::progress::Silent;
-use orator::stage::{Stage, Unit};
-use orator::types::pose2d::Keypoints;
-use orator::types::time::FrameRate;
+use orator_base::stage::ledger::Ledger;
+use orator_base::stage::progress::Silent;
+use orator_base::stage::{Stage, Unit};
+use orator_base::types::pose2d::Keypoints;
+use orator_base::types::time::FrameRate;
+use orator_formats::keypoints_npz;
+use orator_formats::media_json::MediaInfo;
+use orator_pipeline::pose2d::Pose2dStage;
+use orator_test_support::drawn::folder::DemoPlan;
+use orator_test_support::drawn::truth::DrawnTruth;
+use orator_test_support::project::Project;
 use std::path::Path;
 
 fn plan(secs: f64, fps: u32, size: [usize; 2]) -> DemoPlan {

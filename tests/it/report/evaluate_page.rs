@@ -2,7 +2,7 @@
 
 use crate::fixtures::browser::Browser;
 use crate::fixtures::motion_folders::folders;
-use crate::fixtures::support::Project;
+use orator_test_support::project::Project;
 
 #[test]
 fn the_page_opens_plays_and_is_scrubbed_by_keys() {

@@ -2,7 +2,7 @@
 //! and a slider says what a run with that threshold then keeps.
 
 use crate::fixtures::browser::Browser;
-use crate::fixtures::support::{Answer, Project};
+use orator_test_support::project::{Answer, Project};
 use serde_json::Value;
 use std::path::Path;
 

@@ -3,18 +3,18 @@
 
 use crate::fixtures::clips::write_sized;
 use crate::fixtures::figures::{FPS, swinging};
-use crate::fixtures::support::Project;
 use ndarray::{Array1, Array2, Array3, s};
-use orator::formats::keypoints_npz;
-use orator::formats::keypoints_npz::Extras;
-use orator::formats::{joints_npz, npy};
-use orator::pipeline::lift::quality;
-use orator::report::sheet::sheet::SheetClip;
-use orator::stage::progress::Silent;
-use orator::types::image::Image;
-use orator::types::pose2d::Keypoints;
-use orator::types::pose3d::Motion;
-use orator::types::time::FrameRate;
+use orator_base::stage::progress::Silent;
+use orator_base::types::image::Image;
+use orator_base::types::pose2d::Keypoints;
+use orator_base::types::pose3d::Motion;
+use orator_base::types::time::FrameRate;
+use orator_formats::keypoints_npz;
+use orator_formats::keypoints_npz::Extras;
+use orator_formats::{joints_npz, npy};
+use orator_pipeline::lift::quality;
+use orator_report::sheet::sheet::SheetClip;
+use orator_test_support::project::Project;
 use std::path::Path;
 
 const SIZE: [usize; 2] = [320, 240];

@@ -3,18 +3,18 @@
 
 use crate::fixtures::footage::{Footage, good, write};
 use ndarray::s;
-use orator::config::{self, SegmentConfig};
-use orator::formats::media_json::MediaInfo;
-use orator::formats::npz::Npz;
-use orator::pipeline::lift::LiftStage;
-use orator::pipeline::segment::{Measures, SegmentStage};
-use orator::report::videos::thresholds::THRESHOLDS;
-use orator::report::videos::what_if::{JudgedVideo, open_frames};
-use orator::stage::artifacts::Artifact;
-use orator::stage::ledger::Ledger;
-use orator::stage::progress::Silent;
-use orator::stage::{Stage, Unit};
-use orator::types::pose2d::coco;
+use orator_base::stage::artifacts::Artifact;
+use orator_base::stage::ledger::Ledger;
+use orator_base::stage::progress::Silent;
+use orator_base::stage::{Stage, Unit};
+use orator_base::types::pose2d::coco;
+use orator_dataset::config::{self, SegmentConfig};
+use orator_formats::media_json::MediaInfo;
+use orator_formats::npz::Npz;
+use orator_pipeline::lift::LiftStage;
+use orator_pipeline::segment::{Measures, SegmentStage};
+use orator_report::videos::thresholds::THRESHOLDS;
+use orator_report::videos::what_if::{JudgedVideo, open_frames};
 use std::path::Path;
 
 /// Half a minute with a cut, a small step aside, a quiet part, a hand that leaves the picture for a while, and a wrist

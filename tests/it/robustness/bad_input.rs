@@ -2,11 +2,11 @@
 //! the others go on, the exit code tells, and nothing made is lost.
 
 use crate::fixtures::clips::ffmpeg;
-use crate::fixtures::skip::skip;
-use crate::fixtures::support::{Answer, Project, files_under};
-use orator::external::onnx::{Manifest, ModelEntry};
-use orator::formats::keypoints_npz;
-use orator::types::pose2d::Keypoints;
+use orator_base::types::pose2d::Keypoints;
+use orator_formats::keypoints_npz;
+use orator_onnx::{Manifest, ModelEntry};
+use orator_test_support::project::{Answer, Project, files_under};
+use orator_test_support::skip::skip;
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};

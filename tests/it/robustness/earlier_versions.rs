@@ -1,15 +1,15 @@
 //! Files of an earlier version of the program (`fixtures/before`) open: a dataset, a work folder, and a GAN checkpoint,
 //! whose header alone is kept; a formula fills it with numbers.
 
-use crate::fixtures::support::{Project, files_under};
 use crate::fixtures::untrained::generate;
-use orator::dataset::verify::verify::verify;
-use orator::dataset::{Dataset, Split};
+use orator_dataset::verify::verify::verify;
+use orator_dataset::{Dataset, Split};
+use orator_test_support::project::{Project, files_under};
 
-use orator::formats::{npy, wav};
-use orator::stage::progress::Silent;
-use orator::types::sound::Sound;
-use orator::types::time::FrameRate;
+use orator_base::stage::progress::Silent;
+use orator_base::types::sound::Sound;
+use orator_base::types::time::FrameRate;
+use orator_formats::{npy, wav};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fs;

@@ -3,7 +3,7 @@
 
 use crate::fixtures::faults::scenes::{SCENES, Scene, content, copy, prepare, set_up};
 use crate::fixtures::faults::shim::{Call, Fault, Shim, orator};
-use crate::fixtures::skip::skip;
+use orator_test_support::skip::skip;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Output;

@@ -3,16 +3,16 @@
 
 use crate::fixtures::clips::ffmpeg;
 use crate::fixtures::samples::constant_sample;
-use crate::fixtures::support::files_under;
 use crate::fixtures::write_dataset::write_dataset;
 use ndarray::Array3;
-use orator::dataset::{Dataset, Split};
-use orator::external::ffmpeg::frames::FrameReader;
-use orator::external::ffmpeg::{audio, probe};
-use orator::formats::{npy, wav};
-use orator::types::pose3d::Motion;
-use orator::types::sound::Sound;
-use orator::types::time::FrameRate;
+use orator_base::types::pose3d::Motion;
+use orator_base::types::sound::Sound;
+use orator_base::types::time::FrameRate;
+use orator_dataset::{Dataset, Split};
+use orator_formats::{npy, wav};
+use orator_media::ffmpeg::frames::FrameReader;
+use orator_media::ffmpeg::{audio, probe};
+use orator_test_support::project::files_under;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -228,7 +228,7 @@ fn folders_that_lead_to_themselves_end() {
         std::os::unix::fs::symlink(".", folder.join(name)).unwrap();
     }
     let far = Array3::<f32>::zeros((4, 49, 3));
-    let text = orator::formats::authors_txt::format(&Motion::from_joints(FPS, far));
+    let text = orator_formats::authors_txt::format(&Motion::from_joints(FPS, far));
     fs::write(folder.join("a.txt"), text).unwrap();
     let (code, errors) = run(dir.path(), &["import", "takes", "--out", "out", "--speaker", "host"]);
     assert!(code == 1 && errors.contains("a.txt"), "{code} {errors}");

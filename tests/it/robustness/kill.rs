@@ -1,7 +1,7 @@
 //! A run that is killed anywhere and resumed ends in the same bytes, and does nothing twice. `ORATOR_KILLS` says how
 //! often it is killed (`make prove`: 20).
 
-use crate::fixtures::support::{Project, files_under};
+use orator_test_support::project::{Project, files_under};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::{Duration, Instant, SystemTime};

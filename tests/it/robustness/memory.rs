@@ -5,12 +5,12 @@
 use crate::fixtures::clips;
 use crate::fixtures::clips::ffmpeg;
 use crate::fixtures::keypoints::keypoints;
-use crate::fixtures::support::Project;
 use crate::fixtures::untrained::write_untrained_speaker;
 use ndarray::{Array3, s};
 use ndarray_npy::NpzWriter;
-use orator::formats::wav;
-use orator::train::scene::body::{FilmedScene, Filming};
+use orator_formats::wav;
+use orator_lab::train::scene::body::{FilmedScene, Filming};
+use orator_test_support::project::Project;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::process::{Child, Command, Stdio};

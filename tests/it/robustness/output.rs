@@ -1,6 +1,6 @@
 //! Output that cannot be written neither stops work nor panics.
 
-use crate::fixtures::support::{Project, files_under};
+use orator_test_support::project::{Project, files_under};
 use std::fs::OpenOptions;
 use std::process::{Command, Stdio};
 

@@ -1,10 +1,10 @@
 //! The runner with a toy stage whose units have parts: who has no unit helps, what is done is kept, what fails is told.
 
-use orator::stage::fingerprint::HashCache;
-use orator::stage::parts::folder_of_parts;
-use orator::stage::progress::{Progress, Silent};
-use orator::stage::runner::{StageOutcome, run, run_parts};
-use orator::stage::{Input, Report, Stage, Unit};
+use orator_base::stage::fingerprint::HashCache;
+use orator_base::stage::parts::folder_of_parts;
+use orator_base::stage::progress::{Progress, Silent};
+use orator_base::stage::runner::{StageOutcome, run, run_parts};
+use orator_base::stage::{Input, Report, Stage, Unit};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;

@@ -2,7 +2,7 @@
 //! `orator study serve` is the one verb that listens, which is its purpose; it connects to nobody.
 
 use crate::fixtures::faults::scenes::{SCENES, copy, prepare, set_up};
-use crate::fixtures::skip::skip;
+use orator_test_support::skip::skip;
 use std::path::{Component, Path};
 use std::process::{Command, Stdio};
 

@@ -1,10 +1,10 @@
 //! The runner with a toy stage: fresh is skipped, why it is not is said, a failed or panicking unit stops no other.
 
-use orator::stage::fingerprint::{Fingerprint, HashCache};
-use orator::stage::progress::{Progress, Silent};
-use orator::stage::record::{Failure, failure_path};
-use orator::stage::runner::{StageOutcome, State, run, state};
-use orator::stage::{Input, Report, Stage, Unit};
+use orator_base::stage::fingerprint::{Fingerprint, HashCache};
+use orator_base::stage::progress::{Progress, Silent};
+use orator_base::stage::record::{Failure, failure_path};
+use orator_base::stage::runner::{StageOutcome, State, run, state};
+use orator_base::stage::{Input, Report, Stage, Unit};
 use std::path::{Path, PathBuf};
 
 /// Copies the source in upper case.

@@ -1,12 +1,12 @@
 //! Videos are read in processes of their own: what these may not do fails, what they make is the same to the byte, and when
 //! one dies, or the run that started it, nothing else is lost.
 
-use crate::fixtures::skip::skip;
-use crate::fixtures::support::{Project, files_under};
-use orator::external::sandbox::restrict::restrict_thread;
-use orator::external::sandbox::{FileAccess, restrict};
-use orator::pipeline::process::{VERB, probe};
 use orator::{Pipeline, Selection, Silent, StageName, UnreadableMedia, load_config};
+use orator_media::sandbox::restrict::restrict_thread;
+use orator_media::sandbox::{FileAccess, restrict};
+use orator_pipeline::process::{VERB, probe};
+use orator_test_support::project::{Project, files_under};
+use orator_test_support::skip::skip;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::ErrorKind;

@@ -2,15 +2,15 @@
 
 use crate::fixtures::figures::swinging;
 use crate::fixtures::gesture_dataset::{FPS, sample};
-use crate::fixtures::skip::skip;
-use crate::fixtures::support::{Project, files_under};
 use crate::fixtures::write_dataset::write_dataset;
-use orator::dataset::verify::verify::verify;
-use orator::dataset::{Dataset, Split};
-use orator::external::ffmpeg::probe;
-use orator::formats::npy;
-use orator::stage::fingerprint::HashCache;
-use orator::stage::progress::Silent;
+use orator_base::stage::fingerprint::HashCache;
+use orator_base::stage::progress::Silent;
+use orator_dataset::verify::verify::verify;
+use orator_dataset::{Dataset, Split};
+use orator_formats::npy;
+use orator_media::ffmpeg::probe;
+use orator_test_support::project::{Project, files_under};
+use orator_test_support::skip::skip;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
@@ -66,7 +66,7 @@ fn a_video_is_not_forgotten_while_it_is_trained_on() {
     assert!(said.contains("nothing was forgotten") && said.contains(&who), "{said}");
     assert!(bytes_under(&dir.join("work/dataset/host")) == before);
     // Others may listen to what is learnt so far.
-    orator::formats::wav::write(&dir.join("a.wav"), &sample("a-00000000-000000", 30, 0.0).sound).unwrap();
+    orator_formats::wav::write(&dir.join("a.wav"), &sample("a-00000000-000000", 30, 0.0).sound).unwrap();
     let (code, said) = ended(&mut orator(dir, "generate --checkpoint work/gan/host --audio a.wav --out a.npy"));
     assert_eq!(code, 0, "{said}");
     training.kill().unwrap();

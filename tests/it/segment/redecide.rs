@@ -1,7 +1,7 @@
 //! Thresholds changed after a run: `status --why` names the key and says which stages would run, `run` runs those and
 //! never pose2d; and the account of seconds in `status` adds up, with failures in it.
 
-use crate::fixtures::support::{Answer, Project, files_under};
+use orator_test_support::project::{Answer, Project, files_under};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;

@@ -4,13 +4,13 @@
 
 use crate::fixtures::clips::ffmpeg;
 use crate::fixtures::media::voices::{TalkingClip, WINDOW_SECS, area};
-use crate::fixtures::skip::{fetched_model, fetched_models};
-use crate::fixtures::support::{Project, files_under};
-use orator::demo::people::condition::Condition;
-use orator::demo::people::scene::{ClipSeeds, PeopleScene};
-use orator::formats::keypoints_npz;
-use orator::stage::progress::Silent;
-use orator::types::time::FrameRate;
+use orator_base::stage::progress::Silent;
+use orator_base::types::time::FrameRate;
+use orator_formats::keypoints_npz;
+use orator_lab::demo::people::condition::Condition;
+use orator_lab::demo::people::scene::{ClipSeeds, PeopleScene};
+use orator_test_support::project::{Project, files_under};
+use orator_test_support::skip::{fetched_model, fetched_models};
 use std::path::Path;
 
 const FPS: FrameRate = FrameRate::new(15, 1);

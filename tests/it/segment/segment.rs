@@ -2,15 +2,15 @@
 
 use crate::fixtures::footage::{FPS, Footage, good, write};
 use ndarray::s;
-use orator::config;
-use orator::formats::media_json::MediaInfo;
-use orator::pipeline::segment::{Measures, SegmentStage, judge};
-use orator::stage::ledger::Ledger;
-use orator::stage::progress::Silent;
-use orator::stage::refusal::Refusal;
-use orator::stage::{Stage, Unit};
-use orator::types::interval::{Interval, Intervals};
-use orator::types::pose2d::{Keypoints, coco};
+use orator_base::stage::ledger::Ledger;
+use orator_base::stage::progress::Silent;
+use orator_base::stage::refusal::Refusal;
+use orator_base::stage::{Stage, Unit};
+use orator_base::types::interval::{Interval, Intervals};
+use orator_base::types::pose2d::{Keypoints, coco};
+use orator_dataset::config;
+use orator_formats::media_json::MediaInfo;
+use orator_pipeline::segment::{Measures, SegmentStage, judge};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -2,9 +2,9 @@
 //! prove`): all clips; otherwise two of them. Clips whose lips a model made are measured apart.
 
 use crate::fixtures::media::voices::{TalkingClip, WINDOW_SECS, area, openness};
-use crate::fixtures::skip::{fetched_model, fetched_models, real_data};
-use crate::fixtures::support::{Project, files_under};
-use orator::audio::openness::Openness;
+use orator_base::audio::openness::Openness;
+use orator_test_support::project::{Project, files_under};
+use orator_test_support::skip::{fetched_model, fetched_models, real_data};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

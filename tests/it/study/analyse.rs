@@ -3,14 +3,14 @@
 
 use crate::fixtures::browser::Browser;
 use crate::fixtures::study::votes::{Rng32, counted_votes, votes_of_all_designs};
-use crate::fixtures::support::Project;
-use orator::study::analyse::figure::FigureMethod;
-use orator::study::analyse::result::FigureSettings;
-use orator::study::analyse::votes::columns::ColumnNames;
-use orator::study::analyse::votes::read::VotesRead;
-use orator::study::analyse::{Registration, analyse};
-use orator::study::file::{AnalysisSettings, ExclusionRules, HypothesisKind, StudyHypothesis};
-use orator::study::preregistration::RegisteredHypothesis;
+use orator_study::analyse::figure::FigureMethod;
+use orator_study::analyse::result::FigureSettings;
+use orator_study::analyse::votes::columns::ColumnNames;
+use orator_study::analyse::votes::read::VotesRead;
+use orator_study::analyse::{Registration, analyse};
+use orator_study::file::{AnalysisSettings, ExclusionRules, HypothesisKind, StudyHypothesis};
+use orator_study::preregistration::RegisteredHypothesis;
+use orator_test_support::project::Project;
 use serde_json::Value;
 
 fn near(found: &Value, expected: f64, within: f64) {

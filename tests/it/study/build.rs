@@ -2,13 +2,13 @@
 
 use crate::fixtures::faults::stop::{Shared, Stop};
 use crate::fixtures::study::films::{SIZE, speaker};
-use orator::stage::progress::{Progress, Silent};
-use orator::study::build::build;
-use orator::study::file::StudyFile;
-use orator::study::folder::StudyFolder;
-use orator::study::pages::assets::SOUND_CHECK_TONES;
-use orator::study::plan::{FilmSound, StudyKey, StudyPlan};
-use orator::study::seal::StudySeal;
+use orator_base::stage::progress::{Progress, Silent};
+use orator_study::build::build;
+use orator_study::file::StudyFile;
+use orator_study::folder::StudyFolder;
+use orator_study::pages::assets::SOUND_CHECK_TONES;
+use orator_study::plan::{FilmSound, StudyKey, StudyPlan};
+use orator_study::seal::StudySeal;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -193,7 +193,7 @@ fn what_is_missing_is_said() {
             "has no interval in the validation split",
             say(&|file| {
                 fs::rename(dir.join("moved"), dir.join("models")).unwrap();
-                file.speaker[0].split = orator::types::split::Split::Validation;
+                file.speaker[0].split = orator_base::types::split::Split::Validation;
             }),
         ),
     ];

@@ -1,7 +1,7 @@
 //! A bundle of static files, and the responses collected from its pages.
 
 use crate::fixtures::served_study::{MadeStudy, fitting};
-use orator::study::bundle::files::BundledPlan;
+use orator_study::bundle::files::BundledPlan;
 use serde_json::json;
 use std::fs;
 use std::process::Command;

@@ -1,12 +1,12 @@
 //! Long run: simulated studies with known truth through the very analysis. Coverage of intervals, errors of tests,
 //! power against the plan, and how far the naive binomial test is off.
 
-use orator::study::analyse::figure::FigureMethod;
-use orator::study::analyse::outcome::BinaryVote;
-use orator::study::analyse::result::{FigureSettings, ShareAnalysis, ShareMeasure};
-use orator::study::analyse::share::{ShareCell, share};
-use orator::study::power::{PowerQuestion, power, simulated};
-use orator::study::simulate::{CrossedDesign, CrossedEffects, crossed_votes};
+use orator_study::analyse::figure::FigureMethod;
+use orator_study::analyse::outcome::BinaryVote;
+use orator_study::analyse::result::{FigureSettings, ShareAnalysis, ShareMeasure};
+use orator_study::analyse::share::{ShareCell, share};
+use orator_study::power::{PowerQuestion, power, simulated};
+use orator_study::simulate::{CrossedDesign, CrossedEffects, crossed_votes};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;

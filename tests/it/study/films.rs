@@ -2,16 +2,16 @@
 
 use crate::fixtures::study::films::{SIZE, speaker};
 use crate::fixtures::study::mp4;
-use orator::demo::rule::dataset::{RULE, SpokenClip};
-use orator::external::ffmpeg::frames::FrameReader;
-use orator::external::ffmpeg::probe::probe;
-use orator::stage::progress::Silent;
-use orator::study::file::StudyFile;
-use orator::study::plan::{FilmContent, FilmSound};
-use orator::study::stimuli::film_size::{common_bytes, padded};
-use orator::study::stimuli::filmed::{CutSpeaker, equally_loud};
-use orator::types::split::Split;
-use orator::types::time::FrameRate;
+use orator_base::stage::progress::Silent;
+use orator_base::types::split::Split;
+use orator_base::types::time::FrameRate;
+use orator_media::ffmpeg::frames::FrameReader;
+use orator_media::ffmpeg::probe::probe;
+use orator_study::file::StudyFile;
+use orator_study::plan::{FilmContent, FilmSound};
+use orator_study::stimuli::film_size::{common_bytes, padded};
+use orator_study::stimuli::filmed::{CutSpeaker, equally_loud};
+use orator_test_support::rule::dataset::{RULE, SpokenClip};
 
 const STUDY: &str = r#"
 title = "Kinds of motion"
@@ -70,7 +70,7 @@ fn films_of_all_conditions_differ_in_motion_alone() {
     for (number, clip) in clips.iter().enumerate() {
         let motion = SpokenClip { rule: RULE, seed: 6, split: Split::Test, number, n_frames: 30, habits: 0 }.motion();
         std::fs::create_dir_all(dir.join("theirs")).unwrap();
-        orator::animate::export::file::ExportFormat::Npy
+        orator_avatar::animate::export::file::ExportFormat::Npy
             .write_joints(&dir.join(format!("theirs/{}.npy", clip.name)), &motion)
             .unwrap();
     }

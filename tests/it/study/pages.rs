@@ -2,10 +2,10 @@
 //! dark, with a reload, a lost network, a look away and a withdrawal; axe-core looks at every step.
 
 use crate::fixtures::served_study::MadeStudy;
-use crate::fixtures::skip::{browser_driver, skip};
-use orator::study::plan::{PlannedTask, StudyPlan, TaskDesign, Trial, TrialPhase};
-use orator::study::response::{Response, ScreenSide};
-use orator::study::seal::StudySeal;
+use orator_study::plan::{PlannedTask, StudyPlan, TaskDesign, Trial, TrialPhase};
+use orator_study::response::{Response, ScreenSide};
+use orator_study::seal::StudySeal;
+use orator_test_support::skip::{browser_driver, skip};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fs;

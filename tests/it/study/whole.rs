@@ -1,7 +1,7 @@
 //! `make demo-study` in small: built, served, answered in Chromium by participants with a known preference, analysed.
 
-use crate::fixtures::skip::{browser_driver, skip};
 use crate::fixtures::study::films::speaker;
+use orator_test_support::skip::{browser_driver, skip};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;

@@ -1,7 +1,7 @@
 //! The best checkpoint is one that hears: over logged trainings of the synthetic speaker, whose hidden truth was measured at
 //! each validation (`.ci/log-checkpoints`), the score chooses one within 5 % of the best.
 
-use orator::train::gan::score::{ValidationMetrics, score};
+use orator_gesture::train::gan::score::{ValidationMetrics, score};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 

@@ -4,18 +4,18 @@ use crate::fixtures::faults::stop::bytes;
 use crate::fixtures::gesture_dataset::{FPS, dataset, dataset_of, sample, with_posture};
 use crate::fixtures::write_dataset::write_dataset;
 use orator::Evaluation;
-use orator::config::{GanConfig, GanRecipe, MotionRepresentation};
-use orator::dataset::{Dataset, Split};
-use orator::evaluate::clips::checkpoint::EvaluatedCheckpoint;
-use orator::evaluate::clips::motion_store::MotionStore;
-use orator::evaluate::table::result;
-use orator::formats::checkpoint;
-use orator::generate::GestureGenerator;
-use orator::generate::model::BEST;
-use orator::metrics::settings::MetricSettings;
-use orator::stage::progress::Silent;
-use orator::train::gan::train::train;
-use orator::types::posture::PostureChannel;
+use orator_base::stage::progress::Silent;
+use orator_base::types::posture::PostureChannel;
+use orator_dataset::config::{GanConfig, GanRecipe, MotionRepresentation};
+use orator_dataset::{Dataset, Split};
+use orator_formats::checkpoint;
+use orator_gesture::evaluate::clips::checkpoint::EvaluatedCheckpoint;
+use orator_gesture::evaluate::clips::motion_store::MotionStore;
+use orator_gesture::evaluate::table::result;
+use orator_gesture::generate::GestureGenerator;
+use orator_gesture::generate::model::BEST;
+use orator_gesture::metrics::settings::MetricSettings;
+use orator_gesture::train::gan::train::train;
 
 /// Settings that learn in seconds.
 fn settings(channels: &[PostureChannel]) -> GanConfig {

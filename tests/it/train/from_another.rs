@@ -4,14 +4,14 @@
 use crate::fixtures::faults::stop::{Shared, Stop, bytes};
 use crate::fixtures::gesture_dataset::{FPS, sample};
 use crate::fixtures::write_dataset::write_dataset;
-use orator::config::{GanConfig, NetworkPreset};
-use orator::dataset::{Dataset, Split};
-use orator::formats::checkpoint;
-use orator::generate::GestureGenerator;
-use orator::generate::model::BEST;
-use orator::stage::progress::Silent;
-use orator::train::epochs::ValidatedStep;
-use orator::train::gan::train::{train, train_watched};
+use orator_base::stage::progress::Silent;
+use orator_dataset::config::{GanConfig, NetworkPreset};
+use orator_dataset::{Dataset, Split};
+use orator_formats::checkpoint;
+use orator_gesture::generate::GestureGenerator;
+use orator_gesture::generate::model::BEST;
+use orator_gesture::train::epochs::ValidatedStep;
+use orator_gesture::train::gan::train::{train, train_watched};
 use std::path::Path;
 
 fn speaker(folder: &Path, name: &str, phase: f64) -> Dataset {

@@ -4,16 +4,16 @@
 use crate::fixtures::faults::stop::{Shared, Stop, bytes};
 use crate::fixtures::gesture_dataset::{FPS, dataset, dataset_of, sample, with_posture};
 use crate::fixtures::write_dataset::write_dataset;
-use orator::config::GanConfig;
-use orator::config::{AdversarialLoss, GanRecipe, MotionRepresentation, NetworkPreset};
-use orator::dataset::{Dataset, Split};
-use orator::generate::GestureGenerator;
-use orator::generate::model::BEST;
-use orator::stage::progress::Silent;
-use orator::train::gan::train::train;
-use orator::types::posture::PostureChannel;
-use orator::types::skeleton::{R_HAND, R_WRIST};
-use orator::types::sound::Sound;
+use orator_base::stage::progress::Silent;
+use orator_base::types::posture::PostureChannel;
+use orator_base::types::skeleton::{R_HAND, R_WRIST};
+use orator_base::types::sound::Sound;
+use orator_dataset::config::GanConfig;
+use orator_dataset::config::{AdversarialLoss, GanRecipe, MotionRepresentation, NetworkPreset};
+use orator_dataset::{Dataset, Split};
+use orator_gesture::generate::GestureGenerator;
+use orator_gesture::generate::model::BEST;
+use orator_gesture::train::gan::train::train;
 use std::panic::AssertUnwindSafe;
 use std::path::Path;
 
@@ -90,7 +90,7 @@ fn the_checkpoints_settings_win_and_differences_are_told() {
     }
     let whole = folder.path().join("whole");
     train(&dataset, &settings(), &whole, &Silent).unwrap();
-    let last = |folder: &Path| std::fs::read(orator::formats::checkpoint::path(folder, 6)).unwrap();
+    let last = |folder: &Path| std::fs::read(orator_formats::checkpoint::path(folder, 6)).unwrap();
     assert!(last(&out) == last(&whole), "the checkpoint's settings did not count");
 
     // Another speaker's dataset is refused, a grown one of the same speaker is told.
@@ -197,7 +197,7 @@ fn a_checkpoint_that_a_kill_left_over_goes_when_the_training_goes_on() {
     let dataset = dataset(&folder.path().join("dataset"));
     let out = folder.path().join("out");
     train(&dataset, &settings(), &out, &Silent).unwrap();
-    let path = |step| orator::formats::checkpoint::path(&out, step);
+    let path = |step| orator_formats::checkpoint::path(&out, step);
     assert!(path(4).exists() && path(6).exists());
     std::fs::copy(path(4), path(2)).unwrap();
     train(&dataset, &settings(), &out, &Silent).unwrap();

@@ -5,8 +5,8 @@
 use crate::fixtures::clips;
 use crate::fixtures::gesture_dataset::{FPS, sample};
 use crate::fixtures::write_dataset::write_dataset;
-use orator::dataset::Split;
-use orator::stage::workdir;
+use orator_base::stage::workdir;
+use orator_dataset::Split;
 use rustix::process::{Pid, Signal, kill_process};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -106,7 +106,7 @@ fn each_speaker_has_a_model_that_needs_only_its_file() {
     // Far from its project, the one file generates.
     let elsewhere = tempfile::tempdir().unwrap();
     std::fs::write(elsewhere.path().join("ben.safetensors"), &models[1]).unwrap();
-    orator::formats::wav::write(&elsewhere.path().join("speech.wav"), &clips::tone(16_000, 2.0, 220.0)).unwrap();
+    orator_formats::wav::write(&elsewhere.path().join("speech.wav"), &clips::tone(16_000, 2.0, 220.0)).unwrap();
     drop(folder);
     let generate = "generate --checkpoint ben.safetensors --audio speech.wav --out motion.npy";
     assert!(orator(elsewhere.path(), generate).status().unwrap().success());

@@ -7,8 +7,6 @@ pub mod gan;
 pub mod gan_program;
 pub mod networks;
 pub mod operators;
-pub mod pose;
-pub mod rule;
 pub mod seq2seq;
 pub mod seq2seq_program;
 pub mod several_speakers;

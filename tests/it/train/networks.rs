@@ -3,16 +3,16 @@
 
 use crate::fixtures::networks::{every_window, fill};
 use candle_core::{DType, Device, Tensor};
-use orator::nn::Mode;
-use orator::nn::gan::discriminator::Discriminator;
-use orator::nn::gan::generator;
-use orator::nn::gan::generator::{Config, Generator, Preset};
-use orator::nn::lifter::temporal;
-use orator::nn::lifter::temporal::TemporalLifter;
-use orator::nn::motion_encoder;
-use orator::nn::motion_encoder::AutoEncoder;
-use orator::nn::ops::gradcheck::pattern;
-use orator::nn::params::Params;
+use orator_nn::Mode;
+use orator_nn::gan::discriminator::Discriminator;
+use orator_nn::gan::generator;
+use orator_nn::gan::generator::{Config, Generator, Preset};
+use orator_nn::lifter::temporal;
+use orator_nn::lifter::temporal::TemporalLifter;
+use orator_nn::motion_encoder;
+use orator_nn::motion_encoder::AutoEncoder;
+use orator_nn::ops::gradcheck::pattern;
+use orator_nn::params::Params;
 use std::collections::BTreeMap;
 
 #[derive(serde::Deserialize)]

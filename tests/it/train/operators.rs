@@ -2,7 +2,7 @@
 //! that are known to be wrong or without gradient stay out of the source.
 
 use candle_core::{DType, Device, Result, Tensor};
-use orator::nn::ops::gradcheck::{pattern, worst};
+use orator_nn::ops::gradcheck::{pattern, worst};
 use std::fs;
 use std::path::{Path, PathBuf};
 

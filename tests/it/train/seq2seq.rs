@@ -4,17 +4,17 @@
 use crate::fixtures::animation::captures::{bvh, tone, write_capture, write_stereo};
 use crate::fixtures::faults::stop::{Shared, Stop, bytes};
 use crate::fixtures::gesture_dataset::{dataset, sample};
-use orator::config::{Seq2seqConfig, SequenceNetwork};
-use orator::formats::bvh::exponential_maps::JointMapping;
-use orator::formats::bvh::read::Bvh;
-use orator::formats::transcript::Transcript;
-use orator::formats::word_vectors::{WordVectors, glove};
-use orator::generate::model::BEST;
-use orator::generate::seq2seq::SequenceGenerator;
-use orator::stage::progress::Silent;
-use orator::train::seq2seq::captures::CaptureFolder;
-use orator::train::seq2seq::source::TrainingSource;
-use orator::train::seq2seq::train::train;
+use orator_base::stage::progress::Silent;
+use orator_dataset::config::{Seq2seqConfig, SequenceNetwork};
+use orator_formats::bvh::exponential_maps::JointMapping;
+use orator_formats::bvh::read::Bvh;
+use orator_formats::transcript::Transcript;
+use orator_formats::word_vectors::{WordVectors, glove};
+use orator_gesture::generate::model::BEST;
+use orator_gesture::generate::seq2seq::SequenceGenerator;
+use orator_gesture::train::seq2seq::captures::CaptureFolder;
+use orator_gesture::train::seq2seq::source::TrainingSource;
+use orator_gesture::train::seq2seq::train::train;
 use std::panic::AssertUnwindSafe;
 use std::path::Path;
 
@@ -106,7 +106,7 @@ fn the_loss_falls_and_the_dataset_is_spoken() {
     assert_eq!((motion.n_frames(), poses.numbers.dim()), (99, (99, 144)));
     assert!(motion.joints.iter().all(|v| v.is_finite()) && poses.seam_jump.iter().all(|jump| jump.is_finite()));
     assert!(speaker.bvh(&poses).is_err());
-    assert!(speaker.poses(&orator::types::sound::Sound { rate: 8_000, samples: vec![0.0; 8_000] }, &[]).is_err());
+    assert!(speaker.poses(&orator_base::types::sound::Sound { rate: 8_000, samples: vec![0.0; 8_000] }, &[]).is_err());
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use crate::fixtures::animation::captures::write_capture;
 use crate::fixtures::gesture_dataset::{FPS, sample};
 use crate::fixtures::write_dataset::write_dataset;
-use orator::dataset::Split;
+use orator_dataset::Split;
 use std::path::Path;
 use std::process::{Command, Output};
 

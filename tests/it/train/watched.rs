@@ -4,9 +4,9 @@
 
 use crate::fixtures::gesture_dataset::{FPS, sample};
 use crate::fixtures::write_dataset::write_dataset;
-use orator::dataset::{Dataset, Sample, Split};
-use orator::stage::progress::Silent;
-use orator::train::seq2seq::source::TrainingSource;
+use orator_base::stage::progress::Silent;
+use orator_dataset::{Dataset, Sample, Split};
+use orator_gesture::train::seq2seq::source::TrainingSource;
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Read};
@@ -147,11 +147,12 @@ fn a_sequence_network_without_a_held_out_split_says_why() {
     let folder = tempfile::tempdir().unwrap();
     anna(folder.path(), &[(Split::Train, sample("a-00000000-000000", 99, 0.0))]);
     let dataset = Dataset::open(folder.path().join("data/anna")).unwrap();
-    let needed = orator::train::no_window::NeededFrames { name: "window", n_frames: 64, key: None };
-    let cause = orator::train::no_window::cause(&dataset, Split::Validation, needed).unwrap();
+    let needed = orator_gesture::train::no_window::NeededFrames { name: "window", n_frames: 64, key: None };
+    let cause = orator_gesture::train::no_window::cause(&dataset, Split::Validation, needed).unwrap();
     assert!(cause.starts_with("the validation split is empty (train 1 interval of 6.6 s, test 0 intervals"), "{cause}");
-    let settings = orator::config::Seq2seqConfig { steps: 0, batch: 3, hidden: 8, ..Default::default() };
+    let settings = orator_dataset::config::Seq2seqConfig { steps: 0, batch: 3, hidden: 8, ..Default::default() };
     let out = folder.path().join("out");
-    let ended = orator::train::seq2seq::train::train(TrainingSource::Dataset(&dataset), None, &settings, &out, &Silent);
+    let ended =
+        orator_gesture::train::seq2seq::train::train(TrainingSource::Dataset(&dataset), None, &settings, &out, &Silent);
     assert!(format!("{:#}", ended.unwrap_err()).contains("nothing to train"));
 }

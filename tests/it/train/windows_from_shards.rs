@@ -1,15 +1,15 @@
 //! Windows that are read from the shards one by one are those of intervals held in memory, to the bit.
 
 use crate::fixtures::gesture_dataset::{dataset_of, with_posture};
-use orator::config::{GanConfig, GanRecipe};
-use orator::dataset::Split;
-use orator::train::gan::augment::changes;
-use orator::train::gan::begin::normalisation_with_channels;
-use orator::train::gan::recipe::material::TrainingMaterial;
-use orator::train::gan::recipe::settings::GanSettings;
-use orator::train::gan::recipe::start::TrainingStart;
-use orator::train::gan::windows::{WindowBatch, WindowLoader};
-use orator::types::posture::PostureChannel;
+use orator_base::types::posture::PostureChannel;
+use orator_dataset::Split;
+use orator_dataset::config::{GanConfig, GanRecipe};
+use orator_gesture::train::gan::augment::changes;
+use orator_gesture::train::gan::begin::normalisation_with_channels;
+use orator_gesture::train::gan::recipe::material::TrainingMaterial;
+use orator_gesture::train::gan::recipe::settings::GanSettings;
+use orator_gesture::train::gan::recipe::start::TrainingStart;
+use orator_gesture::train::gan::windows::{WindowBatch, WindowLoader};
 
 fn values(batch: &WindowBatch) -> Vec<Vec<f32>> {
     let of = |tensor: &candle_core::Tensor| tensor.flatten_all().unwrap().to_vec1().unwrap();

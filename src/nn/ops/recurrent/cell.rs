@@ -2,9 +2,9 @@
 //! filled up with zeros to whole vectors, and gates stand in the order candidate from the input, reset, update,
 //! candidate from the state: the first three come from the input, the last three from the state.
 
-use crate::nn::cpu::packed_matrix::{COLUMNS, PackedMatrix};
-use crate::nn::cpu::tensor::{Matrix, Scalar, add_product};
-use crate::nn::cpu::vectorised::{gates_backward, gates_forward};
+use crate::cpu::packed_matrix::{COLUMNS, PackedMatrix};
+use crate::cpu::tensor::{Matrix, Scalar, add_product};
+use crate::cpu::vectorised::{gates_backward, gates_forward};
 
 /// Rows of the largest piece of a batch.
 const PIECE: usize = 64;

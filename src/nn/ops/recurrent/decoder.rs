@@ -6,10 +6,10 @@
 use super::cell::{GruSizes, rows_of_a_piece, sum_of_pieces};
 use super::decoder_pass::{BackwardDecoder, DecoderSizes, ForwardDecoder};
 use super::saved::SavedPieces;
-use crate::nn::cpu::tensor::Scalar;
-use crate::nn::cpu::thread_team::parallel_each;
-use crate::nn::cpu::vectorised::DropMask;
-use crate::nn::ops::operator::{CpuOperator, CustomOperator, Operand};
+use crate::cpu::tensor::Scalar;
+use crate::cpu::thread_team::parallel_each;
+use crate::cpu::vectorised::DropMask;
+use crate::ops::operator::{CpuOperator, CustomOperator, Operand};
 use candle_core::{Result, Shape, Tensor};
 
 /// What a decoder starts from.
@@ -117,8 +117,8 @@ impl CpuOperator for DecoderOp {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nn::ops::gradcheck::{any_threads_give_the_same, apart, pattern, worst};
-    use crate::nn::ops::recurrent::gru::{GruOptions, gru};
+    use crate::ops::gradcheck::{any_threads_give_the_same, apart, pattern, worst};
+    use crate::ops::recurrent::gru::{GruOptions, gru};
     use candle_core::{DType, Var};
 
     const CELL: GruSizes = GruSizes { input: 3, hidden: 4 };

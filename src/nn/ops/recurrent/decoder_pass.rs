@@ -1,9 +1,9 @@
 //! The decoder's loop over one piece of a batch, forward and backward.
 
 use super::cell::{BackwardCell, ForwardCell, GruSizes, widen};
-use crate::nn::cpu::packed_matrix::PackedMatrix;
-use crate::nn::cpu::tensor::{Matrix, Scalar, add_product};
-use crate::nn::cpu::vectorised::{Attended, DropMask, attend, attend_backward, drop_out};
+use crate::cpu::packed_matrix::PackedMatrix;
+use crate::cpu::tensor::{Matrix, Scalar, add_product};
+use crate::cpu::vectorised::{Attended, DropMask, attend, attend_backward, drop_out};
 use candle_core::Result;
 
 /// Sizes of a decoder and its batch.

@@ -4,12 +4,12 @@
 
 use super::cell::{BackwardCell, ForwardCell, GruSizes, rows_of_a_piece, sum_of_pieces, widen};
 use super::saved::SavedPieces;
-use crate::nn::Mode;
-use crate::nn::cpu::tensor::Scalar;
-use crate::nn::cpu::thread_team::parallel_each;
-use crate::nn::cpu::vectorised::{DropMask, drop_out};
-use crate::nn::ops::operator::{CpuOperator, CustomOperator, Operand};
-use crate::nn::params::{Init, Params};
+use crate::Mode;
+use crate::cpu::tensor::Scalar;
+use crate::cpu::thread_team::parallel_each;
+use crate::cpu::vectorised::{DropMask, drop_out};
+use crate::ops::operator::{CpuOperator, CustomOperator, Operand};
+use crate::params::{Init, Params};
 use candle_core::{Result, Shape, Tensor};
 use rand::Rng;
 
@@ -280,7 +280,7 @@ impl CpuOperator for GruOp {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nn::ops::gradcheck::{any_threads_give_the_same, apart, pattern, worst};
+    use crate::ops::gradcheck::{any_threads_give_the_same, apart, pattern, worst};
     use candle_core::{DType, Var};
 
     /// A GRU of the framework's operators, one way.

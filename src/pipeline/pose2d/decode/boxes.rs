@@ -1,6 +1,6 @@
 //! Boxes with scores, and which of several that overlap stays.
 
-use crate::types::pose2d::PersonBox;
+use orator_base::types::pose2d::PersonBox;
 
 /// Shared area over joint area of two boxes, 0..1; 0 where either has none.
 pub fn overlap(a: &PersonBox, b: &PersonBox) -> f32 {

@@ -1,7 +1,7 @@
 //! Detectors that give finished boxes: rows of x0, y0, x1, y1, score, with a class label each (RTMDet and the like).
 
 use super::boxes;
-use crate::types::pose2d::PersonBox;
+use orator_base::types::pose2d::PersonBox;
 
 /// The boxes in `rows` (5 numbers each) scoring above `min_score` whose label is `person`; no labels: all of them.
 pub fn decode(rows: &[f32], labels: Option<&[i64]>, person: i64, min_score: f32, max_overlap: f32) -> Vec<PersonBox> {

@@ -3,9 +3,9 @@
 //! Estimation", section 3.2: blur, then one Newton step on the logarithm.
 
 use super::point::{LARGEST, ScoredPoint, finite, peak};
-use crate::external::onnx::Refine;
-use crate::external::opencv::blur::GaussianBlur;
 use anyhow::{Result, ensure};
+use orator_media::opencv::blur::GaussianBlur;
+use orator_onnx::Refine;
 
 /// A Newton step further than this many cells is not believed.
 const MAX_STEP: f64 = 1.5;

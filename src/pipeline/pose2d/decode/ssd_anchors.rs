@@ -2,8 +2,8 @@
 //! overlap are averaged by their scores, not dropped.
 
 use super::boxes;
-use crate::types::pose2d::PersonBox;
 use anyhow::{Result, ensure};
+use orator_base::types::pose2d::PersonBox;
 
 /// A detection in pixels of the input: two corners of its box, then its points.
 #[derive(Clone, Debug, PartialEq)]

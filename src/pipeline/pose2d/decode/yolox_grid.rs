@@ -2,8 +2,8 @@
 //! objectness, class probabilities (class 0 is a person).
 
 use super::boxes;
-use crate::types::pose2d::PersonBox;
 use anyhow::{Result, ensure};
+use orator_base::types::pose2d::PersonBox;
 
 /// The people in `rows` of `row_len` numbers, for an input of `width` x `height` px.
 ///

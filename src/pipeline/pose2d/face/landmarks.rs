@@ -1,8 +1,8 @@
 //! What the 468 points of a face say, as MediaPipe's face mesh counts them. Every distance is one in space, so that a
 //! turned or nodding head measures as a frontal one does.
 
-use crate::external::opencv::warp::Region;
-use crate::math::vec3;
+use orator_base::math::vec3;
+use orator_media::opencv::warp::Region;
 
 /// Points of a face.
 pub const N_LANDMARKS: usize = 468;

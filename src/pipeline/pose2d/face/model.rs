@@ -1,12 +1,12 @@
 //! The face model: 468 points of the face in a rotated square, and how sure it is that there is one.
 
 use super::landmarks::{FacePoint, N_LANDMARKS};
-use crate::external::onnx::{Decode, ModelEntry, Runtime};
-use crate::external::opencv::warp::Region;
-use crate::pipeline::pose2d::decode::regression;
-use crate::pipeline::pose2d::model_input::ModelInput;
-use crate::types::image::Image;
+use crate::pose2d::decode::regression;
+use crate::pose2d::model_input::ModelInput;
 use anyhow::{Result, bail, ensure};
+use orator_base::types::image::Image;
+use orator_media::opencv::warp::Region;
+use orator_onnx::{Decode, ModelEntry, Runtime};
 use std::path::Path;
 
 /// One face.

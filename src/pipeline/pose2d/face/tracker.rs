@@ -3,11 +3,11 @@
 use super::landmarks;
 use super::landmarks::FacePoint;
 use super::model::{DetectedFace, FaceModel};
-use crate::external::opencv::warp::Region;
-use crate::pipeline::pose2d::decode::ScoredPoint;
-use crate::types::image::Image;
-use crate::types::pose2d::{FaceSeen, coco};
+use crate::pose2d::decode::ScoredPoint;
 use anyhow::Result;
+use orator_base::types::image::Image;
+use orator_base::types::pose2d::{FaceSeen, coco};
+use orator_media::opencv::warp::Region;
 
 /// A face is one from this score on.
 const LEAST_SCORE: f64 = 0.5;

@@ -2,15 +2,15 @@
 //! memory that does not grow with the video.
 
 use super::landmarks::{self, FacePoint};
-use crate::external::opencv::warp::{self, Region};
-use crate::math::order::median;
-use crate::math::procrustes::similarity;
-use crate::math::vec3;
-use crate::pipeline::portrait::Portrait;
-use crate::pipeline::pose2d::appearance;
-use crate::pipeline::pose2d::patch;
-use crate::types::image::Image;
+use crate::portrait::Portrait;
+use crate::pose2d::appearance;
+use crate::pose2d::patch;
 use anyhow::Result;
+use orator_base::math::order::median;
+use orator_base::math::procrustes::similarity;
+use orator_base::math::vec3;
+use orator_base::types::image::Image;
+use orator_media::opencv::warp::{self, Region};
 use serde::{Deserialize, Serialize};
 
 /// A face turned no further than this (`landmarks::turn`) is seen from the front, than the second nearly so; the shape

@@ -3,15 +3,15 @@
 //! vain is searched more rarely.
 
 use super::sight::middle;
-use crate::config::Pose2dConfig;
-use crate::external::opencv::warp::Region;
-use crate::pipeline::pose2d::decode::ScoredPoint;
-use crate::pipeline::pose2d::hand::{DetectedHand, HandModel};
-use crate::pipeline::pose2d::palm::PalmDetector;
-use crate::pipeline::pose2d::region;
-use crate::types::image::Image;
-use crate::types::pose2d::coco;
+use crate::pose2d::decode::ScoredPoint;
+use crate::pose2d::hand::{DetectedHand, HandModel};
+use crate::pose2d::palm::PalmDetector;
+use crate::pose2d::region;
 use anyhow::Result;
+use orator_base::types::image::Image;
+use orator_base::types::pose2d::coco;
+use orator_dataset::config::Pose2dConfig;
+use orator_media::opencv::warp::Region;
 
 /// Elbow and wrist of the left and the right arm.
 const ARMS: [(usize, usize); 2] = [(coco::L_ELBOW, coco::L_WRIST), (coco::R_ELBOW, coco::R_WRIST)];

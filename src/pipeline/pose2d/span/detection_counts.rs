@@ -1,7 +1,7 @@
 //! How often each part of the speaker was found.
 
-use crate::stage::Report;
-use crate::types::pose2d::{Keypoint, Pose2d};
+use orator_base::stage::Report;
+use orator_base::types::pose2d::{Keypoint, Pose2d};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
@@ -72,7 +72,7 @@ impl DetectionCounts {
 fn tell_followed([several, speaking]: [usize; 2], report: &mut Report) {
     report.facts.insert("followed".to_owned(), json!({ "several": several, "speaking": speaking }));
     if several > speaking {
-        let shots = crate::stage::counted(several, "shot");
+        let shots = orator_base::stage::counted(several, "shot");
         let rest = several - speaking;
         report.line += &format!(
             "; several people in {shots}: in {rest} nobody's mouth clearly follows the voice, so the largest is followed"

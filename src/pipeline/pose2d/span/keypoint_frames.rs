@@ -1,10 +1,10 @@
 //! The keypoints of a video as they are gathered, frame by frame.
 
-use crate::formats::keypoints_npz::{Extras, FaceFrames};
-use crate::types::pose2d::{FaceSeen, Keypoint, Keypoints, N_BODY, N_HAND, PersonBox, Pose2d};
-use crate::types::time::FrameRate;
 use anyhow::Result;
 use ndarray::{Array1, Array2, Array3};
+use orator_base::types::pose2d::{FaceSeen, Keypoint, Keypoints, N_BODY, N_HAND, PersonBox, Pose2d};
+use orator_base::types::time::FrameRate;
+use orator_formats::keypoints_npz::{Extras, FaceFrames};
 use serde::{Deserialize, Serialize};
 
 /// What was seen so far: plain numbers, 1 kB a frame.

@@ -4,14 +4,14 @@
 
 use super::PoseSpan;
 use super::video_frames::VideoFrames;
-use crate::pipeline::pose2d::Chain;
-use crate::pipeline::pose2d::talker::TalkerSearch;
-use crate::pipeline::pose2d::talker::choice::ShotVoice;
-use crate::pipeline::pose2d::talker::search::ShotTalker;
-use crate::pipeline::{lips, sound};
-use crate::stage::progress::{Event, Progress, Task};
-use crate::types::pose2d::Pose2d;
+use crate::pose2d::Chain;
+use crate::pose2d::talker::TalkerSearch;
+use crate::pose2d::talker::choice::ShotVoice;
+use crate::pose2d::talker::search::ShotTalker;
+use crate::{lips, sound};
 use anyhow::{Context, Result};
+use orator_base::stage::progress::{Event, Progress, Task};
+use orator_base::types::pose2d::Pose2d;
 use std::path::Path;
 use std::time::Instant;
 

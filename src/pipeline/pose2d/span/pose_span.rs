@@ -3,14 +3,14 @@
 
 use super::detection_counts::DetectionCounts;
 use super::keypoint_frames::KeypointFrames;
-use crate::external::opencv::png;
-use crate::formats::keypoints_npz;
-use crate::pipeline::pose2d::face::views::PortraitViews;
-use crate::pipeline::pose2d::speaker::{SeenPerson, is_same_person};
-use crate::stage::artifacts::Artifact;
-use crate::stage::{Report, workdir};
-use crate::types::time::FrameRate;
+use crate::pose2d::face::views::PortraitViews;
+use crate::pose2d::speaker::{SeenPerson, is_same_person};
 use anyhow::{Context, Result, ensure};
+use orator_base::stage::artifacts::Artifact;
+use orator_base::stage::{Report, workdir};
+use orator_base::types::time::FrameRate;
+use orator_formats::keypoints_npz;
+use orator_media::opencv::png;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

@@ -1,13 +1,13 @@
 //! The frames of a span of a video, in the order of its timeline.
 
-use crate::external::ffmpeg::ahead;
-use crate::external::ffmpeg::frames::{FrameReader, FrameTime};
-use crate::formats::media_json::MediaInfo;
-use crate::formats::timeline_npz::Timeline;
-use crate::stage::Unit;
-use crate::types::image::Image;
-use crate::types::time::FrameRate;
 use anyhow::{Context, Result, ensure};
+use orator_base::stage::Unit;
+use orator_base::types::image::Image;
+use orator_base::types::time::FrameRate;
+use orator_formats::media_json::MediaInfo;
+use orator_formats::timeline_npz::Timeline;
+use orator_media::ffmpeg::ahead;
+use orator_media::ffmpeg::frames::{FrameReader, FrameTime};
 use std::ops::Range;
 use std::path::Path;
 

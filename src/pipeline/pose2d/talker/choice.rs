@@ -1,8 +1,8 @@
 //! Which mouth of a shot the voice is of: the one whose opening agrees best with it, where that is no chance.
 
-use crate::audio::openness::Openness;
-use crate::pipeline::lips::LipVoiceMatch;
-use crate::types::time::FrameRate;
+use crate::lips::LipVoiceMatch;
+use orator_base::audio::openness::Openness;
+use orator_base::types::time::FrameRate;
 
 /// Confidence from which an agreement is none of chance; lower than for an offset, as one of few people it is.
 const CLEAR: f64 = 0.9;
@@ -68,7 +68,7 @@ pub fn speaking<'a>(mouths: impl Iterator<Item = &'a MouthOpening>, heard: &Shot
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::lips::tests::{FPS, Mouth};
+    use crate::lips::tests::{FPS, Mouth};
 
     const SECS: f64 = 12.0;
 

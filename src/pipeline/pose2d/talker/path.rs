@@ -1,7 +1,7 @@
 //! Where in a shot a person is: the boxes of the looks at which the person was found.
 
-use crate::pipeline::pose2d::decode::boxes;
-use crate::types::pose2d::PersonBox;
+use crate::pose2d::decode::boxes;
+use orator_base::types::pose2d::PersonBox;
 
 /// Least overlap of a found box with the nearest of the way to be the same person.
 pub const SAME_WAY: f32 = 0.3;

@@ -4,16 +4,16 @@
 
 use super::choice::{self, MouthOpening, ShotVoice};
 use super::path::{SAME_WAY, TalkerPath};
-use crate::config::Pose2dConfig;
-use crate::external::onnx::{ModelRole, ModelStore, Runtime};
-use crate::pipeline::pose2d::body::BodyModel;
-use crate::pipeline::pose2d::decode::boxes;
-use crate::pipeline::pose2d::face::model::FaceModel;
-use crate::pipeline::pose2d::face::tracker::FaceTrack;
-use crate::pipeline::pose2d::person::Detector;
-use crate::types::image::Image;
-use crate::types::pose2d::PersonBox;
+use crate::pose2d::body::BodyModel;
+use crate::pose2d::decode::boxes;
+use crate::pose2d::face::model::FaceModel;
+use crate::pose2d::face::tracker::FaceTrack;
+use crate::pose2d::person::Detector;
 use anyhow::Result;
+use orator_base::types::image::Image;
+use orator_base::types::pose2d::PersonBox;
+use orator_dataset::config::Pose2dConfig;
+use orator_onnx::{ModelRole, ModelStore, Runtime};
 
 /// Frames of a shot at which people are looked for beside the regular ones.
 const EARLY: [usize; 3] = [2, 5, 10];

@@ -1,7 +1,7 @@
 //! Parts of a whole as bars in a table.
 
-use crate::report::html::node::{Node, node};
-use crate::report::html::numbers::{length, percent};
+use crate::html::node::{Node, node};
+use crate::html::numbers::{length, percent};
 
 /// Part of a whole.
 pub struct StackedBar {

@@ -1,7 +1,7 @@
 //! Line over a few steps with one step marked: what each value of a threshold would keep.
 
 use super::scale::{Scale, circle, drawing, line, px, stroke, through};
-use crate::report::html::node::{Node, node};
+use crate::html::node::{Node, node};
 
 const WIDTH: f64 = 300.0;
 const HEIGHT: f64 = 56.0;

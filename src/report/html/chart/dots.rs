@@ -1,7 +1,7 @@
 //! Dots on a line drawing, each coloured by a share.
 
 use super::scale::{circle, drawing, line, words};
-use crate::report::html::node::{Node, node};
+use crate::html::node::{Node, node};
 
 /// Dot of the drawing.
 #[derive(Clone, Debug)]

@@ -2,8 +2,8 @@
 //! differences that count as none.
 
 use super::scale::{Scale, circle, drawing, line, rect, words};
-use crate::report::html::node::{Node, node};
-use crate::report::html::numbers::number;
+use crate::html::node::{Node, node};
+use crate::html::numbers::number;
 
 /// Row of the chart.
 #[derive(Clone, Debug)]

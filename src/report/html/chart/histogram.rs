@@ -1,8 +1,8 @@
 //! Histogram with a threshold; the side that fails has another colour.
 
 use super::scale::{Scale, drawing, line, px, rect, words};
-use crate::report::html::node::Node;
-use crate::report::html::numbers::{number, with_unit};
+use crate::html::node::Node;
+use crate::html::numbers::{number, with_unit};
 
 /// Counts in bins of equal width from `low` to `high`; the outer bins include values beyond.
 #[derive(Clone, Debug)]

@@ -1,8 +1,8 @@
 //! Lines over the steps of a training, with constant levels for comparison and one step marked.
 
 use super::scale::{Scale, circle, drawing, line, stroke, words};
-use crate::report::html::node::{Node, legend, node};
-use crate::report::html::numbers::number;
+use crate::html::node::{Node, legend, node};
+use crate::html::numbers::number;
 
 const WIDTH: f64 = 360.0;
 const HEIGHT: f64 = 190.0;

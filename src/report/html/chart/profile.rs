@@ -2,8 +2,8 @@
 
 use super::histogram::Counts;
 use super::scale::{Scale, drawing, line, stroke, words};
-use crate::report::html::node::{Node, node};
-use crate::report::html::numbers::number;
+use crate::html::node::{Node, node};
+use crate::html::numbers::number;
 
 const WIDTH: f64 = 340.0;
 const HEIGHT: f64 = 130.0;

@@ -1,8 +1,8 @@
 //! Ranges on one scale: thin from minimum to maximum, thick for the middle nine tenths, a tick at the median.
 
 use super::scale::{Scale, drawing, line, rect, words};
-use crate::report::html::node::Node;
-use crate::report::html::numbers::number;
+use crate::html::node::Node;
+use crate::html::numbers::number;
 
 /// Row of the chart.
 pub struct ValueRange {

@@ -1,6 +1,6 @@
 //! Linear scales, round tick values, and SVG elements.
 
-use crate::report::html::node::{Node, node};
+use crate::html::node::{Node, node};
 
 /// Linear scale: `low` is drawn at `from`, `high` at `to` (units of the drawing).
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,7 @@
 //! Parts of a video side by side with widths by duration: an HTML list, so that it can be read out, navigated by keys
 //! (`page.js`) and drawn at any width.
 
-use crate::report::html::node::{Node, node};
+use crate::html::node::{Node, node};
 
 /// Part of a timeline.
 #[derive(Clone, Debug)]

@@ -2,8 +2,8 @@
 //! over them (`data-left`, `data-right`: positions of the first and last second).
 
 use super::scale::{Scale, drawing, line, px, through, words};
-use crate::report::html::node::{Node, node};
-use crate::report::html::numbers::number;
+use crate::html::node::{Node, node};
+use crate::html::numbers::number;
 
 const WIDTH: f64 = 720.0;
 const LANE: f64 = 66.0;

@@ -1,12 +1,12 @@
 //! Charts of a task: shares and differences with their intervals, scores, steps of preference, strengths.
 
-use crate::report::html::chart::forest::{ForestRow, ForestScale, forest};
-use crate::report::html::{Node, legend, node, table};
-use crate::study::analyse::figure::FigureMethod;
-use crate::study::analyse::result::{PairAnalysis, ShareAnalysis, ShareMeasure, StudyAnalysis, TaskAnalysis};
-use crate::study::analyse::verdict::scope;
-use crate::study::analyse::words::bare_p;
-use crate::study::plan::TaskDesign;
+use crate::analyse::figure::FigureMethod;
+use crate::analyse::result::{PairAnalysis, ShareAnalysis, ShareMeasure, StudyAnalysis, TaskAnalysis};
+use crate::analyse::verdict::scope;
+use crate::analyse::words::bare_p;
+use crate::plan::TaskDesign;
+use orator_report::html::chart::forest::{ForestRow, ForestScale, forest};
+use orator_report::html::{Node, legend, node, table};
 
 /// Names of the five steps, from the second condition to the first.
 const STEPS: [&str; 5] = ["second clearly", "second", "neither", "first", "first clearly"];

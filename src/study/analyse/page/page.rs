@@ -1,9 +1,9 @@
 //! Whole page. Its bytes depend on the analysis alone.
 
 use super::{charts, tables};
-use crate::report::html::{Node, Page, Section, node};
-use crate::study::analyse::result::{Conclusion, StudyAnalysis, TaskAnalysis};
-use crate::study::analyse::words::{count, list};
+use crate::analyse::result::{Conclusion, StudyAnalysis, TaskAnalysis};
+use crate::analyse::words::{count, list};
+use orator_report::html::{Node, Page, Section, node};
 use serde_json::Value;
 
 /// Text of the page.

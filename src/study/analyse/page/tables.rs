@@ -1,11 +1,11 @@
 //! Every figure of a task in a table with its mark, and the account of exclusions.
 
-use crate::report::html::{Node, node, table};
-use crate::study::analyse::figure::{FigureMethod, FigureOrigin, TestFigure};
-use crate::study::analyse::figures::FigureSet;
-use crate::study::analyse::result::{ShareAnalysis, ShareMeasure, StudyAnalysis, TaskAnalysis};
-use crate::study::analyse::verdict::scope;
-use crate::study::analyse::words::{bare_p, count, percent};
+use crate::analyse::figure::{FigureMethod, FigureOrigin, TestFigure};
+use crate::analyse::figures::FigureSet;
+use crate::analyse::result::{ShareAnalysis, ShareMeasure, StudyAnalysis, TaskAnalysis};
+use crate::analyse::verdict::scope;
+use crate::analyse::words::{bare_p, count, percent};
+use orator_report::html::{Node, node, table};
 
 /// Columns of the table of figures.
 const COLUMNS: [&str; 6] = ["Method", "Interval", "Statistic", "p", "p after Holm", "Mark"];

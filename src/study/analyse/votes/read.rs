@@ -4,9 +4,9 @@
 use super::columns::{ColumnNames, FIELDS};
 use super::row::{check, vote};
 use super::{delimited, json_lines};
-use crate::study::plan::TaskDesign;
-use crate::study::response::Response;
-use crate::study::vote::StudyVote;
+use crate::plan::TaskDesign;
+use crate::response::Response;
+use crate::vote::StudyVote;
 use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -141,8 +141,8 @@ fn number_trials(votes: &mut [StudyVote]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::plan::TrialPhase;
-    use crate::study::response::ScreenSide;
+    use crate::plan::TrialPhase;
+    use crate::response::ScreenSide;
 
     fn read(text: &str) -> Result<VotesRead> {
         VotesRead::of_bytes(text.as_bytes(), false, &ColumnNames::default(), None)

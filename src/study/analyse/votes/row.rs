@@ -1,8 +1,8 @@
 //! Row of a table to a vote.
 
-use crate::study::plan::{TaskDesign, TrialPhase};
-use crate::study::response::{Response, ScreenSide};
-use crate::study::vote::StudyVote;
+use crate::plan::{TaskDesign, TrialPhase};
+use crate::response::{Response, ScreenSide};
+use crate::vote::StudyVote;
 use serde::Deserialize;
 use serde::de::IntoDeserializer as _;
 use std::collections::BTreeMap;

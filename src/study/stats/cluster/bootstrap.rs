@@ -7,7 +7,7 @@ use super::super::equivalence::Equivalence;
 use super::super::error::{StatisticsError, at_least, tail, within};
 use super::super::estimate::ConfidenceInterval;
 use super::votes::{CLIP, ClipVote, PARTICIPANT, VoteGroups};
-use crate::math::order::Ordered;
+use orator_base::math::order::Ordered;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;

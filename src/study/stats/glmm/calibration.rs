@@ -2,10 +2,10 @@
 //! `ORATOR_LONG` makes them 2,000 with narrow ones.
 
 use super::fit::MixedLogit;
-use crate::study::stats::cluster::crossed::crossed_estimate;
-use crate::study::stats::cluster::votes::ClipVote;
-use crate::study::stats::estimate::ConfidenceInterval;
-use crate::study::stats::proportion::BinomialCount;
+use crate::stats::cluster::crossed::crossed_estimate;
+use crate::stats::cluster::votes::ClipVote;
+use crate::stats::estimate::ConfidenceInterval;
+use crate::stats::proportion::BinomialCount;
 use ndarray::Array2;
 use rand::seq::index::sample;
 use rand::{Rng, SeedableRng};

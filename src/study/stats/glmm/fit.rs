@@ -4,11 +4,11 @@
 
 use super::laplace::Laplace;
 use super::minimum::{curvature, minimum};
-use crate::math::cholesky;
-use crate::study::stats::cluster::votes::{CLIP, ClipVote, PARTICIPANT, VoteGroups, scores};
-use crate::study::stats::error::{StatisticsError, at_least, finite, tail, within};
-use crate::study::stats::estimate::{ConfidenceInterval, StudentEstimate};
+use crate::stats::cluster::votes::{CLIP, ClipVote, PARTICIPANT, VoteGroups, scores};
+use crate::stats::error::{StatisticsError, at_least, finite, tail, within};
+use crate::stats::estimate::{ConfidenceInterval, StudentEstimate};
 use ndarray::{Array1, Array2, Axis, concatenate, s};
+use orator_base::math::cholesky;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Standard deviation, in log odds, from which the search starts.

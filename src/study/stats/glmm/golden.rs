@@ -1,8 +1,8 @@
 //! Fits beside those of lme4 (`fixtures/reference/study_glmm.R`), and votes that have none.
 
 use super::fit::MixedLogit;
-use crate::study::stats::cluster::votes::ClipVote;
-use crate::study::stats::error::StatisticsError;
+use crate::stats::cluster::votes::ClipVote;
+use crate::stats::error::StatisticsError;
 use ndarray::{Array2, array};
 use serde_json::Value;
 

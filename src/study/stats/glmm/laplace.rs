@@ -2,7 +2,7 @@
 //! the random intercepts, in units of their standard deviations, at their most probable values, found by penalised
 //! iteratively reweighted least squares, and the curvature there.
 
-use crate::study::stats::cluster::votes::{CLIP, PARTICIPANT, VoteGroups};
+use crate::stats::cluster::votes::{CLIP, PARTICIPANT, VoteGroups};
 
 /// Most iterations for the random intercepts.
 const MOST: usize = 50;

@@ -3,10 +3,10 @@
 //! where wins lead from each condition to each other one (Ford 1957): no prior makes up for votes that are missing.
 
 use super::votes::{Ballots, PairedVote, percentiles};
-use crate::math::cholesky;
-use crate::study::stats::error::{StatisticsError, at_least, tail, within};
-use crate::study::stats::estimate::{ConfidenceInterval, StudentEstimate};
+use crate::stats::error::{StatisticsError, at_least, tail, within};
+use crate::stats::estimate::{ConfidenceInterval, StudentEstimate};
 use ndarray::{Array1, Array2, Axis};
+use orator_base::math::cholesky;
 use rayon::prelude::*;
 
 /// Most Newton steps.

@@ -2,8 +2,8 @@
 //! result hangs on the order of votes, so it is the mean over many random orders (Chiang et al. 2024).
 
 use super::votes::{Ballots, PairedVote, percentiles};
-use crate::study::stats::error::{StatisticsError, at_least, tail, within};
-use crate::study::stats::estimate::ConfidenceInterval;
+use crate::stats::error::{StatisticsError, at_least, tail, within};
+use crate::stats::estimate::ConfidenceInterval;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;

@@ -3,7 +3,7 @@
 use super::bradley_terry::{BradleyTerry, participant_intervals};
 use super::elo::EloSettings;
 use super::votes::PairedVote;
-use crate::study::stats::error::StatisticsError;
+use crate::stats::error::StatisticsError;
 use serde_json::Value;
 
 fn sets() -> Vec<(Vec<PairedVote>, Value)> {

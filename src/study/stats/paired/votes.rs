@@ -1,7 +1,7 @@
 //! Votes between two conditions, and draws of their participants.
 
-use crate::study::stats::error::{StatisticsError, at_least, finite, tail, within};
-use crate::study::stats::estimate::ConfidenceInterval;
+use crate::stats::error::{StatisticsError, at_least, finite, tail, within};
+use crate::stats::estimate::ConfidenceInterval;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;

@@ -1,0 +1,140 @@
+//! What is worn over the shirt's field: collar and lapels, given point by point, and the colours of the cloth.
+
+use super::appearance::{Appearance, Reflectance, Top, Weave};
+use super::body::BodyForm;
+use super::jaw::rise;
+use super::surface::Surface;
+use orator_base::math::vec3::{Vec3, dot, sub};
+
+/// Height above the hips at which a jacket is buttoned, and at which its lapels begin, cm.
+const BUTTON: f64 = 13.0;
+const THROAT: f64 = 53.0;
+/// Largest half width of the shirt that a jacket shows, cm.
+const OPEN: f64 = 6.2;
+/// Length of a stripe with its space, and of a check, cm.
+const STRIPE: f64 = 10.0;
+const CHECK: f64 = 10.0;
+
+/// Half width of the jacket's opening at a height above the hips, cm.
+fn opening(y: f64) -> f64 {
+    OPEN * ((y - BUTTON) / (THROAT - BUTTON)).clamp(0.0, 1.0).powf(0.85)
+}
+
+/// Width of a lapel at a share of its length: widest below the notch, narrow as a collar above, cm.
+fn lapel(share: f64) -> f64 {
+    if share < 0.74 { 0.6 + 7.6 * share } else { 3.6 }
+}
+
+impl BodyForm<'_> {
+    /// Point of the shirt in front of the hips' (x, y), `over` cm above the cloth, in the stance.
+    fn on_chest(&self, shirt: &dyn Fn(Vec3) -> f64, [x, y]: [f64; 2], over: f64) -> Vec3 {
+        let mut z = 22.0;
+        for _ in 0..60 {
+            let d = shirt(self.stance.at(self.trunk.hips, [x, y, z])) / self.stance.scale;
+            if d < 1e-3 || z < -8.0 {
+                break;
+            }
+            z -= 0.8 * d;
+        }
+        self.stance.at(self.trunk.hips, [x, y, z + over])
+    }
+
+    /// Lapels of a jacket, left and right.
+    pub fn lapels(&self, shirt: &dyn Fn(Vec3) -> f64) -> Surface {
+        let side = |sign: f64| {
+            let mut rows: Vec<Vec<Vec3>> = Vec::new();
+            for k in 0..=16 {
+                let t = f64::from(k) / 16.0;
+                let y = BUTTON - 1.0 + t * (THROAT - 2.5 - BUTTON);
+                let width = lapel(t);
+                let inner = opening(y) - 0.4;
+                let place = |share: f64, over: f64| {
+                    self.on_chest(shirt, [sign * (inner + share * width), y + 1.2 * share * t], over)
+                };
+                rows.push(vec![
+                    place(0.0, 0.05),
+                    place(0.06, 0.55),
+                    place(0.5, 0.6),
+                    place(0.94, 0.5),
+                    place(1.0, -0.1),
+                ]);
+            }
+            if sign < 0.0 {
+                rows.iter_mut().for_each(|row| row.reverse());
+            }
+            Surface::net(&rows)
+        };
+        let mut both = side(1.0);
+        both.extend(side(-1.0));
+        both
+    }
+
+    /// Collar of a shirt, folded over, open in front.
+    pub fn collar(&self) -> Surface {
+        let neck = self.trunk.neck;
+        let size = self.looks.neck.max(0.9) * self.looks.head[0].max(1.0);
+        let mut rows: Vec<Vec<Vec3>> = vec![Vec::new(); 5];
+        for k in -18..=18 {
+            // 0 is the nape; the ends nearly meet at the throat.
+            let share = f64::from(k) / 18.0;
+            let (sin, cos) = (share * 172.0_f64.to_radians()).sin_cos();
+            let front = (0.5 - 0.5 * cos).powi(2);
+            let base = 4.7 - 2.9 * front;
+            let point = (share.abs() - 0.72).max(0.0) / 0.28;
+            let fold = [
+                (5.75, base + 0.5),
+                (5.95, base + 3.3 - 0.6 * front),
+                (6.35, base + 3.5 - 0.6 * front),
+                (6.9, base + 2.2 - 0.8 * front),
+                (7.35 + 0.5 * front, base + 0.4 - 2.6 * point),
+            ];
+            for (row, (radius, y)) in rows.iter_mut().zip(fold) {
+                let r = radius * size;
+                row.push(self.stance.at(neck, [-sin * r, y, -cos * r - 1.1 + 0.9 * front]));
+            }
+        }
+        rows.reverse();
+        Surface::net(&rows)
+    }
+
+    /// Colours of the shirt's points.
+    pub fn cloth(&self, points: &[Vec3], normals: &[Vec3]) -> Vec<Reflectance> {
+        let looks = self.looks;
+        let trunk = self.trunk();
+        let sleeves = [0, 1].map(|side| self.sleeve(side));
+        let stance = self.stance;
+        let colour = |(&at, normal): (&Vec3, &Vec3)| {
+            let local = sub(at, stance.positions[self.trunk.hips]).map(|v| v / stance.scale);
+            if looks.top == Top::Jacket {
+                // Above the lapels the jacket lies on the shoulders, at the side of the neck.
+                let narrow = 0.8 * (local[1] - THROAT + 5.0).max(0.0);
+                // The colours meet below the lapel, a cell away from its outer edge.
+                let under = (lapel((local[1] - BUTTON) / (THROAT - BUTTON)) - 2.4).min(0.9);
+                let shown =
+                    normal[2] > 0.15 && local[1] > BUTTON + 1.0 && local[0].abs() < opening(local[1]) + under - narrow;
+                return if shown { looks.second_colour } else { looks.top_colour };
+            }
+            // Along the trunk, or along the arm whose sleeve is nearer; and around.
+            let on_trunk = trunk.distance(at);
+            let arm = (0..2).find(|&side| sleeves[side].distance(at) < on_trunk);
+            let [along, around] = arm.map_or([local[1], local[0]], |side| {
+                let arm = &self.rig.arms[side];
+                let from = sub(at, stance.positions[arm.upper]).map(|v| v / stance.scale);
+                [dot(from, stance.direction(arm.upper, arm.fore)) + 0.5 * STRIPE, from[2]]
+            });
+            woven(looks, along, around)
+        };
+        points.iter().zip(normals).map(colour).collect()
+    }
+}
+
+/// Colour of the cloth at a place along and around the body, cm.
+fn woven(looks: &Appearance, along: f64, around: f64) -> Reflectance {
+    let wave = |at: f64, period: f64| rise(1.5 * (at / period * std::f64::consts::TAU).sin());
+    let share = match looks.weave {
+        Weave::Plain => 0.0,
+        Weave::Stripes => wave(along, STRIPE),
+        Weave::Checks => (wave(along, CHECK) + wave(around, CHECK)) / 2.0,
+    };
+    std::array::from_fn(|k| looks.top_colour[k] + share as f32 * (looks.second_colour[k] - looks.top_colour[k]))
+}

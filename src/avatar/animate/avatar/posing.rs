@@ -1,0 +1,240 @@
+//! Avatar in a pose: linear blend skinning into the world, and the points of head and hips that picture datasets name.
+
+use super::avatar::{Avatar, AvatarMesh};
+use crate::animate::rig::rig::Rig;
+use crate::render::Mesh;
+use orator_base::math::rotation::Rotation;
+use orator_base::math::vec3::{Vec3, add, sub};
+
+/// Affine map of a joint from the T-pose into the world: the matrix's columns and the shift.
+type JointMap = [[f32; 3]; 4];
+
+/// Number of maps along a forearm.
+const TWISTS: usize = 9;
+
+/// Maps of a forearm that turns with the hand, from the elbow, where it does not, to the wrist.
+struct TwistedForearm {
+    joint: usize,
+    maps: [JointMap; TWISTS],
+}
+
+impl TwistedForearm {
+    fn new(rig: &Rig, local: &[Rotation], side: usize, maps: &[JointMap], rest: &[Vec3]) -> Self {
+        let arm = &rig.arms[side];
+        let (_, angle) = local[arm.hand].swing_twist([1.0, 0.0, 0.0]);
+        let [x, y, z, shift] = maps[arm.fore];
+        let elbow = rest[arm.fore].map(|v| v as f32);
+        let turned = |step: usize| {
+            // The bone lies along x: y and z turn about the line through the elbow.
+            let (sin, cos) = (angle as f32 * step as f32 / (TWISTS - 1) as f32).sin_cos();
+            let (u, v): ([f32; 3], [f32; 3]) =
+                (std::array::from_fn(|k| cos * y[k] + sin * z[k]), std::array::from_fn(|k| cos * z[k] - sin * y[k]));
+            let moved = |k: usize| (y[k] - u[k]) * elbow[1] + (z[k] - v[k]) * elbow[2];
+            [x, u, v, std::array::from_fn(|k| shift[k] + moved(k))]
+        };
+        Self { joint: arm.fore, maps: std::array::from_fn(turned) }
+    }
+
+    /// Map at a place along the forearm, 0 .. 1.
+    fn at(&self, place: f32) -> JointMap {
+        let at = place.clamp(0.0, 1.0) * (TWISTS - 1) as f32;
+        let (low, share) = ((at as usize).min(TWISTS - 2), at - (at as usize).min(TWISTS - 2) as f32);
+        let (a, b) = (&self.maps[low], &self.maps[low + 1]);
+        std::array::from_fn(|c| std::array::from_fn(|k| a[c][k] + share * (b[c][k] - a[c][k])))
+    }
+}
+
+impl Avatar {
+    /// Meshes in a pose, in world axes (cm, y up): the hips at `root`, a local rotation for every joint of the rig, the
+    /// mouth open by `mouth` (0 closed .. 1).
+    pub fn posed(&self, rig: &Rig, root: Vec3, local: &[Rotation], mouth: f64) -> Vec<Mesh> {
+        let mut meshes = Vec::new();
+        self.pose_into(rig, root, local, mouth, &mut meshes);
+        meshes
+    }
+
+    /// Writes the meshes of a pose into `meshes`, whose memory is used again.
+    pub fn pose_into(&self, rig: &Rig, root: Vec3, local: &[Rotation], mouth: f64, meshes: &mut Vec<Mesh>) {
+        let (turns, places) = (rig.skeleton.world(local), rig.skeleton.positions(root, local));
+        let rest = rig.skeleton.positions(rig.root, &vec![Rotation::IDENTITY; local.len()]);
+        let maps: Vec<JointMap> = (0..turns.len())
+            .map(|joint| {
+                let [x, y, z] = turns[joint].axes();
+                [x, y, z, sub(places[joint], turns[joint].turn(rest[joint]))].map(|column| column.map(|v| v as f32))
+            })
+            .collect();
+        let forearms = [0, 1].map(|side| TwistedForearm::new(rig, local, side, &maps, &rest));
+        meshes.resize_with(self.parts.len(), Mesh::default);
+        for (part, mesh) in self.parts.iter().zip(meshes) {
+            part.pose_into(&maps, &forearms, mouth as f32, mesh);
+        }
+    }
+
+    /// Nose, left eye, right eye, left ear, right ear (the order of COCO) on the surface in a pose, world cm; they move
+    /// with the rig's head joint.
+    pub fn face_points(&self, rig: &Rig, root: Vec3, local: &[Rotation]) -> [Vec3; 5] {
+        on_head(rig, root, local, self.face)
+    }
+
+    /// Middles of the upper and the lower lip's inner edges in a pose, world cm.
+    pub fn lip_points(&self, rig: &Rig, root: Vec3, local: &[Rotation], mouth: f64) -> [Vec3; 2] {
+        let [upper, lower, open] = self.inner_lips;
+        on_head(rig, root, local, [upper, add(lower, open.map(|v| v * mouth))])
+    }
+}
+
+/// Points of the head's axes in a pose, world cm.
+fn on_head<const N: usize>(rig: &Rig, root: Vec3, local: &[Rotation], points: [Vec3; N]) -> [Vec3; N] {
+    let turn = rig.skeleton.world(local)[rig.head];
+    let place = rig.skeleton.positions(root, local)[rig.head];
+    points.map(|point| add(place, turn.turn(point)))
+}
+
+/// Hip joints, left and right, in a pose, world cm.
+pub fn hip_points(rig: &Rig, root: Vec3, local: &[Rotation]) -> [Vec3; 2] {
+    let places = rig.skeleton.positions(root, local);
+    ["LeftUpLeg", "RightUpLeg"].map(|name| places[rig.skeleton.find(name).unwrap_or_default()])
+}
+
+impl AvatarMesh {
+    fn pose_into(&self, maps: &[JointMap], forearms: &[TwistedForearm; 2], mouth: f32, mesh: &mut Mesh) {
+        mesh.colours.clone_from(&self.colours);
+        mesh.triangles.clone_from(&self.triangles);
+        (mesh.gloss, mesh.n_closed) = (self.material.gloss(), self.n_closed);
+        mesh.labels.clear();
+        mesh.labels.extend(self.weights.iter().map(|weights| weights[0].0 as u16));
+        mesh.points.clear();
+        mesh.normals.clear();
+        for (n, weights) in self.weights.iter().enumerate() {
+            let mut at = self.points[n].map(|v| v as f32);
+            if let Some(open) = self.mouth.get(n) {
+                (0..3).for_each(|k| at[k] += mouth * open[k] as f32);
+            }
+            let normal = self.normals[n].map(|v| v as f32);
+            let (mut place, mut out) = ([0.0; 3], [0.0; 3]);
+            for &(joint, weight) in weights.iter().take_while(|(_, weight)| *weight > 0.0) {
+                let twisted = self.twist.get(n).zip(forearms.iter().find(|forearm| forearm.joint == joint));
+                let turned;
+                let [x, y, z, shift] = match twisted {
+                    None => &maps[joint],
+                    Some((&place, forearm)) => {
+                        turned = forearm.at(place);
+                        &turned
+                    }
+                };
+                let weight = weight as f32;
+                for k in 0..3 {
+                    place[k] += weight * (x[k] * at[0] + y[k] * at[1] + z[k] * at[2] + shift[k]);
+                    out[k] += weight * (x[k] * normal[0] + y[k] * normal[1] + z[k] * normal[2]);
+                }
+            }
+            let length = (out[0] * out[0] + out[1] * out[1] + out[2] * out[2]).sqrt().max(1e-12);
+            mesh.points.push(place);
+            mesh.normals.push(out.map(|v| v / length));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::animate::avatar::appearance::{Appearance, Top};
+    use crate::animate::avatar::avatar::tests::rig;
+    use crate::animate::avatar::material::Material;
+    use orator_base::math::vec3::norm;
+
+    #[test]
+    fn at_rest_the_pose_is_the_avatar_and_a_turned_head_turns_its_points() {
+        let rig = rig();
+        let avatar = Avatar::new(&rig, &Appearance::plain());
+        let mut local = vec![Rotation::IDENTITY; rig.skeleton.joints.len()];
+        let mut meshes = avatar.posed(&rig, rig.root, &local, 0.0);
+        for (part, mesh) in avatar.parts.iter().zip(&meshes) {
+            assert_eq!((part.triangles.len(), part.points.len()), (mesh.triangles.len(), mesh.points.len()));
+            for (point, posed) in part.points.iter().zip(&mesh.points) {
+                assert!(norm(sub(*point, posed.map(f64::from))) < 1e-3);
+            }
+        }
+        let [nose, left, right, left_ear, right_ear] = avatar.face_points(&rig, rig.root, &local);
+        assert!(left[0] > 0.0 && left_ear[0] > left[0] && nose[2] > left[2] && left[2] > left_ear[2]);
+        assert!((left[0] + right[0]).abs() < 1e-9 && (left_ear[0] + right_ear[0]).abs() < 1e-9);
+        // Every point of the face lies on the skin or the eyes.
+        for point in [nose, left, right, left_ear, right_ear] {
+            let all = meshes.iter().flat_map(|mesh| &mesh.points);
+            let near = all.map(|at| norm(sub(at.map(f64::from), point))).fold(f64::INFINITY, f64::min);
+            assert!(near < 0.6, "{point:?} is {near} cm off the surface");
+        }
+        // The head turned to its left; the same memory holds the new pose.
+        local[rig.head] = Rotation::about([0.0, 1.0, 0.0], 0.5);
+        avatar.pose_into(&rig, rig.root, &local, 0.0, &mut meshes);
+        assert_eq!(meshes, avatar.posed(&rig, rig.root, &local, 0.0));
+        assert!(avatar.face_points(&rig, rig.root, &local)[0][0] > nose[0] + 2.0);
+        // The mouth opens about the jaw's hinge, by what the lips' points say.
+        let gap = |mouth: f64| {
+            let [upper, lower] = avatar.lip_points(&rig, rig.root, &local, mouth);
+            norm(sub(upper, lower))
+        };
+        let gaps: Vec<f64> = (0..=10).map(|n| gap(f64::from(n) / 10.0)).collect();
+        assert!(gaps[0] < 0.01 && gaps.windows(2).all(|pair| pair[1] > pair[0] + 0.1) && gaps[10] < 4.0, "{gaps:?}");
+        let open = avatar.posed(&rig, rig.root, &local, 1.0);
+        let lowered = meshes.iter().zip(&open).flat_map(|(a, b)| a.points.iter().zip(&b.points));
+        let most = lowered.map(|(a, b)| a[1] - b[1]).fold(0.0, f32::max);
+        assert!((f64::from(most) - gaps[10]).abs() < 0.5, "{most}");
+        let [left, right] = hip_points(&rig, rig.root, &local);
+        assert!(left[0] > 5.0 && right[0] < -5.0 && (left[1] - right[1]).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_seed_gives_the_same_bytes_and_the_plain_face_is_the_same_on_both_sides() {
+        let rig = rig();
+        let local = vec![Rotation::IDENTITY; rig.skeleton.joints.len()];
+        let of = |seed: u64| Avatar::new(&rig, &Appearance::from_seed(seed)).posed(&rig, rig.root, &local, 0.3);
+        let first = of(4);
+        assert_eq!(first, of(4));
+        assert_ne!(first, of(5));
+        for mesh in &first {
+            let n = mesh.points.len();
+            assert!(mesh.triangles.iter().flatten().all(|&v| (v as usize) < n) && mesh.colours.len() == n);
+            assert!(mesh.points.iter().flatten().chain(mesh.normals.iter().flatten()).all(|v| v.is_finite()));
+        }
+        assert!((20_000..46_000).contains(&first.iter().map(|mesh| mesh.triangles.len()).sum::<usize>()));
+        let plain = Avatar::new(&rig, &Appearance::plain());
+        for material in [Material::Face, Material::Eyes] {
+            let part = plain.parts.iter().find(|part| part.material == material).unwrap();
+            for point in part.points.iter().step_by(37) {
+                let mirror = [-point[0], point[1], point[2]];
+                let near = part.points.iter().map(|at| norm(sub(*at, mirror))).fold(f64::INFINITY, f64::min);
+                assert!(near < 0.02, "{material:?}: {point:?} has no mirror image, by {near} cm");
+            }
+        }
+    }
+
+    #[test]
+    fn a_bare_forearm_keeps_its_girth_when_the_hand_turns_and_bends() {
+        let rig = rig();
+        let looks = Appearance { top: Top::ShortSleeves, ..Appearance::plain() };
+        let avatar = Avatar::new(&rig, &looks);
+        let arm = &rig.arms[0];
+        // Mean distance from the forearm's axis of the skin in slices from its middle to the wrist.
+        let girth = |turn: Rotation| {
+            let mut local = vec![Rotation::IDENTITY; rig.skeleton.joints.len()];
+            local[arm.hand] = turn;
+            let places = rig.skeleton.positions(rig.root, &local);
+            let (elbow, wrist) = (places[arm.fore], places[arm.hand]);
+            let long = norm(sub(wrist, elbow));
+            let meshes = avatar.posed(&rig, rig.root, &local, 0.0);
+            [0.5, 0.6, 0.7, 0.8, 0.9].map(|share| {
+                let at = |point: &[f32; 3]| sub(point.map(f64::from), elbow);
+                let slice = meshes[0].points.iter().map(at).filter(|at| (at[0] / long - share).abs() < 0.04);
+                let radii: Vec<f64> = slice.map(|at| at[1].hypot(at[2])).filter(|r| *r < 6.0).collect();
+                radii.iter().sum::<f64>() / radii.len() as f64
+            })
+        };
+        let straight = girth(Rotation::IDENTITY);
+        for (axis, degrees) in [([1.0, 0.0, 0.0], 85.0), ([1.0, 0.0, 0.0], -85.0), ([0.0, 0.0, -1.0], 60.0)] {
+            let bent = girth(Rotation::about(axis, f64::to_radians(degrees)));
+            let worst = straight.iter().zip(bent).map(|(a, b)| b / a).fold(1.0, f64::min);
+            assert!(worst > 0.9, "{degrees} degrees about {axis:?}: {straight:?} cm become {bent:?}");
+        }
+    }
+}

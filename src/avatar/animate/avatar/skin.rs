@@ -1,0 +1,217 @@
+//! Skinning weights. Along a chain of joints a vertex passes smoothly from one joint to the next where the bone bends,
+//! between chains it belongs to the nearer one; all weights are smoothed over the surface.
+
+use super::body::BodyForm;
+use super::jaw::rise;
+use super::stance::finger_joints;
+use super::surface::Surface;
+use orator_base::math::vec3::{Vec3, dot, norm, sub};
+
+/// Joints of a vertex with their weights, which sum to 1.
+pub type Weights = [(usize, f64); 4];
+
+/// Weights of a vertex that follows one joint.
+pub fn rigid(joint: usize) -> Weights {
+    [(joint, 1.0), (0, 0.0), (0, 0.0), (0, 0.0)]
+}
+
+/// Sparse weights of one vertex by joint.
+type Shares = Vec<(usize, f64)>;
+
+/// Joints of a chain and the transitions between them.
+struct WeightChain {
+    joints: Vec<usize>,
+    /// For each joint but the first: position, normal of the transition plane, half the width of the transition (cm).
+    passes: Vec<(Vec3, Vec3, f64)>,
+}
+
+impl WeightChain {
+    fn shares(&self, at: Vec3, whole: f64, into: &mut Shares) {
+        let mut left = whole;
+        for (k, &joint) in self.joints.iter().enumerate() {
+            let on = self.passes.get(k).map_or(0.0, |(place, normal, half)| rise(dot(sub(at, *place), *normal) / half));
+            add_share(into, joint, left * (1.0 - on));
+            left *= on;
+        }
+    }
+}
+
+fn add_share(into: &mut Shares, joint: usize, share: f64) {
+    if share > 1e-6 {
+        match into.iter_mut().find(|(known, _)| *known == joint) {
+            Some((_, sum)) => *sum += share,
+            None => into.push((joint, share)),
+        }
+    }
+}
+
+impl BodyForm<'_> {
+    /// Chain whose transition planes bisect the bones at each joint; `halves` in cm of the rig.
+    fn chain(&self, before: usize, joints: &[usize], after: usize, halves: &[f64]) -> WeightChain {
+        let stance = self.stance;
+        let at = |k: usize| joints.get(k).copied().unwrap_or(after);
+        let passes = (1..joints.len()).map(|k| {
+            let previous = if stance.positions[at(k)] == stance.positions[at(k - 1)] { before } else { at(k - 1) };
+            let (a, b) = (stance.direction(previous, at(k)), stance.direction(at(k), at(k + 1)));
+            let normal = [0, 1, 2].map(|i| a[i] + b[i]);
+            let length = norm(normal).max(1e-6);
+            (stance.positions[at(k)], normal.map(|v| v / length), halves[k - 1])
+        });
+        WeightChain { joints: joints.to_vec(), passes: passes.collect() }
+    }
+
+    /// Hips, spine, chest; up to the head.
+    fn spine(&self) -> WeightChain {
+        let t = &self.trunk;
+        let cm = self.stance.scale;
+        let up = |joint: usize, higher: f64, half: f64| {
+            (self.stance.at(joint, [0.0, higher, 0.0]), [0.0, 1.0, 0.0], half * cm)
+        };
+        // The plane between head and neck rises from below the chin to the nape.
+        let jaw = (self.stance.at(t.head, [0.0, -1.0, 0.0]), [0.0, 0.876, 0.482], 3.2 * cm);
+        WeightChain {
+            joints: vec![t.hips, t.spine, t.chest, t.neck, t.head],
+            passes: vec![up(t.spine, 0.0, 7.0), up(t.chest, 0.0, 8.0), up(t.neck, 5.0, 3.5), jaw],
+        }
+    }
+
+    /// Weights of the head and the neck.
+    pub fn head_weights(&self, surface: &Surface) -> Vec<Weights> {
+        let spine = self.spine();
+        settled(surface, 2, |at, shares| spine.shares(at, 1.0, shares))
+    }
+
+    /// Weights of the shirt.
+    pub fn shirt_weights(&self, surface: &Surface) -> Vec<Weights> {
+        let cm = self.stance.scale;
+        let mut spine = self.spine();
+        // The collar stays with the chest.
+        spine.joints.truncate(3);
+        spine.passes.truncate(2);
+        let trunk = self.trunk();
+        let arms = [0, 1].map(|side| {
+            let arm = &self.rig.arms[side];
+            let chain = self.chain(arm.clavicle, &[arm.upper, arm.fore], arm.hand, &[4.2 * cm]);
+            (arm, self.sleeve(side), chain)
+        });
+        settled(surface, 14, |at, shares| {
+            let mut left = 1.0;
+            let on_trunk = trunk.distance(at);
+            for (arm, sleeve, chain) in &arms {
+                let shoulder = self.stance.positions[arm.upper];
+                let out = arm.sign * (at[0] - shoulder[0]) / cm;
+                let on_arm = rise((on_trunk - sleeve.distance(at)) / (1.5 * cm) - 0.6) * rise((out + 1.0) / 3.0);
+                // The clavicle carries the top of the trunk, increasingly towards the shoulder.
+                let high = rise((at[1] - shoulder[1] + 9.0 * cm) / (9.0 * cm));
+                let on_shoulder = high * rise((out + 7.0) / 6.0);
+                chain.shares(at, left * on_arm, shares);
+                add_share(shares, arm.clavicle, left * (1.0 - on_arm) * on_shoulder);
+                left *= (1.0 - on_arm) * (1.0 - on_shoulder);
+            }
+            spine.shares(at, left, shares);
+        })
+    }
+
+    /// Weights of trousers and shoes.
+    pub fn leg_weights(&self, surface: &Surface) -> Vec<Weights> {
+        let cm = self.stance.scale;
+        let chains = self.trunk.legs.map(|[upper, lower, foot, end]| {
+            self.chain(self.trunk.hips, &[self.trunk.hips, upper, lower, foot], end, &[6.0 * cm, 5.0 * cm, 2.5 * cm])
+        });
+        settled(surface, 3, |at, shares| {
+            let side = usize::from(at[0] < 0.0);
+            chains[side].shares(at, 1.0, shares);
+        })
+    }
+
+    /// Weights of a skirt: the hips', towards the hem the nearer thigh's.
+    pub fn skirt_weights(&self, surface: &Surface) -> Vec<Weights> {
+        let cm = self.stance.scale;
+        let top = self.stance.positions[self.trunk.hips];
+        settled(surface, 10, |at, shares| {
+            let thigh = self.trunk.legs[usize::from(at[0] < 0.0)][0];
+            let low = 0.75 * rise((top[1] - at[1] - 22.0 * cm) / (18.0 * cm));
+            add_share(shares, thigh, low);
+            add_share(shares, self.trunk.hips, 1.0 - low);
+        })
+    }
+
+    /// Weights of one of the fingers beside the thumb; `scale` is the hand's size.
+    pub fn finger_weights(&self, side: usize, finger: usize, scale: f64, surface: &Surface) -> Vec<Weights> {
+        let chain = self.finger(side, finger, scale);
+        settled(surface, 1, |at, shares| chain.shares(at, 1.0, shares))
+    }
+
+    fn finger(&self, side: usize, finger: usize, scale: f64) -> WeightChain {
+        let arm = &self.rig.arms[side];
+        let [a, b, c, tip] = finger_joints(self.rig, side, finger);
+        let halves = if finger == 0 { [1.5, 0.9, 0.8] } else { [0.9, 0.75, 0.65] };
+        self.chain(arm.fore, &[arm.hand, a, b, c], tip, &halves.map(|half| half * scale))
+    }
+
+    /// Weights of a palm with its thumb, the wrist and a bare arm; `scale` is the hand's size.
+    pub fn palm_weights(&self, side: usize, scale: f64, surface: &Surface) -> Vec<Weights> {
+        let arm = &self.rig.arms[side];
+        let thumb = self.finger(side, 0, scale);
+        let knuckles: [usize; 5] = std::array::from_fn(|finger| finger_joints(self.rig, side, finger)[0]);
+        let bends = [4.0 * self.stance.scale, 2.6 * scale];
+        let wrist = self.chain(arm.clavicle, &[arm.upper, arm.fore, arm.hand], knuckles[2], &bends);
+        let positions = &self.stance.positions;
+        let thumb_line = finger_joints(self.rig, side, 0).map(|joint| positions[joint]);
+        settled(surface, 4, |at, shares| {
+            let on_thumb = thumb_line.windows(2).map(|ends| to_segment(at, ends[0], ends[1]));
+            let on_thumb = on_thumb.fold(f64::INFINITY, f64::min);
+            let on_palm = knuckles[1..].iter().map(|&knuckle| to_segment(at, positions[arm.hand], positions[knuckle]));
+            let on_palm = on_palm.fold(f64::INFINITY, f64::min);
+            let mut on_hand = Shares::new();
+            wrist.shares(at, 1.0, &mut on_hand);
+            for (joint, share) in on_hand {
+                if joint == arm.hand && on_thumb < on_palm {
+                    thumb.shares(at, share, shares);
+                } else {
+                    add_share(shares, joint, share);
+                }
+            }
+        })
+    }
+}
+
+fn to_segment(at: Vec3, a: Vec3, b: Vec3) -> f64 {
+    let along = sub(b, a);
+    let share = (dot(sub(at, a), along) / dot(along, along).max(1e-12)).clamp(0.0, 1.0);
+    norm([0, 1, 2].map(|k| at[k] - a[k] - share * along[k]))
+}
+
+/// Weights of every vertex, smoothed `rounds` times over its neighbours, the four largest kept.
+fn settled(surface: &Surface, rounds: usize, of: impl Fn(Vec3, &mut Shares)) -> Vec<Weights> {
+    let mut all: Vec<Shares> = surface
+        .points
+        .iter()
+        .map(|&at| {
+            let mut shares = Shares::new();
+            of(at, &mut shares);
+            shares
+        })
+        .collect();
+    let near = surface.neighbours();
+    for _ in 0..rounds {
+        let smoothed = all.iter().zip(&near).map(|(own, near)| {
+            let mut sum = Shares::new();
+            own.iter().for_each(|&(joint, share)| add_share(&mut sum, joint, 0.5 * share));
+            for &other in near {
+                let part = 0.5 / near.len() as f64;
+                all[other as usize].iter().for_each(|&(joint, share)| add_share(&mut sum, joint, part * share));
+            }
+            sum
+        });
+        all = smoothed.collect();
+    }
+    all.into_iter()
+        .map(|mut shares| {
+            shares.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+            shares.resize(4, (0, 0.0));
+            let sum: f64 = shares.iter().map(|share| share.1).sum();
+            std::array::from_fn(|k| (shares[k].0, shares[k].1 / sum))
+        })
+        .collect()
+}

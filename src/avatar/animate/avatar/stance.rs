@@ -1,0 +1,93 @@
+//! Stance in which the avatar's shape is built: arms down beside the body, elbows and fingers half bent. Poses of
+//! speakers lie around it, so skinning deforms the shape little.
+
+use crate::animate::rig::rig::Rig;
+use orator_base::math::rotation::Rotation;
+use orator_base::math::vec3::{Vec3, add, scale, sub, unit};
+use orator_base::types::skeleton::{L_HAND, R_HAND};
+
+/// Degrees: upper arm below the horizontal, elbow flexion, flexion of a finger's joints from knuckle to tip.
+const ARM: f64 = 54.0;
+const ELBOW: f64 = 35.0;
+const FINGER: [f64; 3] = [22.0, 28.0, 18.0];
+const THUMB: [f64; 3] = [0.0, 8.0, 10.0];
+/// Degrees by which the fingers are spread towards the thumb, thumb to little finger.
+const FAN: [f64; 5] = [0.0, 4.0, 1.0, -2.0, -5.0];
+
+/// Joint positions (cm) and world rotations of the rig in the stance.
+pub struct Stance {
+    pub positions: Vec<Vec3>,
+    pub world: Vec<Rotation>,
+    /// Positions in the T-pose, cm.
+    pub rest: Vec<Vec3>,
+    /// Trunk length relative to the shape's reference body.
+    pub scale: f64,
+}
+
+/// Indices of the rig's joints outside its arms.
+pub struct Trunk {
+    pub hips: usize,
+    pub spine: usize,
+    pub chest: usize,
+    pub neck: usize,
+    pub head: usize,
+    /// Left, right: upper leg, leg, foot, the end of the foot.
+    pub legs: [[usize; 4]; 2],
+}
+
+impl Trunk {
+    pub fn find(rig: &Rig) -> Self {
+        let bones = &rig.skeleton;
+        let find = |name: &str| bones.find(name).unwrap_or_default();
+        let legs = ["Left", "Right"].map(|side| {
+            let [upper, lower, foot] = ["UpLeg", "Leg", "Foot"].map(|part| find(&format!("{side}{part}")));
+            [upper, lower, foot, bones.children(foot).next().unwrap_or(foot)]
+        });
+        Self { hips: 0, spine: rig.spine, chest: rig.chest, neck: rig.positions[0], head: find("Head"), legs }
+    }
+}
+
+/// Joints of a finger of the arm, knuckle to tip.
+pub fn finger_joints(rig: &Rig, side: usize, finger: usize) -> [usize; 4] {
+    let base = [L_HAND, R_HAND][side] + 1 + 4 * finger;
+    std::array::from_fn(|k| rig.positions[base + k])
+}
+
+impl Stance {
+    pub fn new(rig: &Rig) -> Self {
+        let still = vec![Rotation::IDENTITY; rig.skeleton.joints.len()];
+        let mut local = still.clone();
+        for (side, arm) in rig.arms.iter().enumerate() {
+            let curl = [0.0, 0.0, -arm.sign];
+            local[arm.upper] = Rotation::about(curl, ARM.to_radians());
+            local[arm.fore] = Rotation::about([0.0, -arm.sign, 0.0], ELBOW.to_radians());
+            for (finger, fan) in FAN.into_iter().enumerate() {
+                let degrees = if finger == 0 { THUMB } else { FINGER };
+                let joints = finger_joints(rig, side, finger);
+                for (&joint, degrees) in joints.iter().zip(degrees) {
+                    local[joint] = Rotation::about(curl, degrees.to_radians());
+                }
+                let fan = Rotation::about([0.0, -arm.sign, 0.0], f64::to_radians(fan));
+                local[joints[0]] = fan * local[joints[0]];
+            }
+        }
+        let trunk = Trunk::find(rig);
+        let rest = rig.skeleton.positions(rig.root, &still);
+        Self {
+            positions: rig.skeleton.positions(rig.root, &local),
+            world: rig.skeleton.world(&local),
+            scale: (rest[trunk.neck][1] - rest[trunk.hips][1]) / 50.0,
+            rest,
+        }
+    }
+
+    /// Point `cm` away from a joint, in the joint's axes and the shape's size.
+    pub fn at(&self, joint: usize, cm: Vec3) -> Vec3 {
+        add(self.positions[joint], self.world[joint].turn(scale(cm, self.scale)))
+    }
+
+    /// Unit vector from one joint to another.
+    pub fn direction(&self, from: usize, to: usize) -> Vec3 {
+        unit(sub(self.positions[to], self.positions[from]), 1e-6).unwrap_or([0.0, 1.0, 0.0])
+    }
+}

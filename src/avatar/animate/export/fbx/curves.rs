@@ -1,0 +1,126 @@
+//! Rotations over time as FBX curves, and the way of the hips: angles about x, y and z in degrees, a key a frame, linear between. Of the two triples
+//! of angles that give a rotation, and their whole turns, the one nearest to the frame before is taken, so that the curves
+//! have no jumps.
+
+use super::binary::{FbxNode, FbxValue};
+use super::document::{FbxObjects, properties, property, ticks};
+use orator_base::math::rotation::Rotation;
+use orator_base::math::vec3::Vec3;
+use orator_formats::bvh::write::BvhClip;
+
+/// Name of the animation.
+pub const TAKE: &str = "Gesture";
+/// Largest change of the angles of a joint that does not turn, degrees; it has one key.
+const STILL: f64 = 1e-5;
+/// Linear interpolation, the same at every key.
+const LINEAR: i32 = 4;
+const KEY_VERSION: i32 = 4008;
+
+/// Adds the animation of a clip whose joints are these models.
+pub fn add(objects: &mut FbxObjects, clip: &BvhClip, models: &[i64]) {
+    let last = ticks(clip.fps, clip.n_frames().saturating_sub(1));
+    let span = [("LocalStart", 0), ("LocalStop", last), ("ReferenceStart", 0), ("ReferenceStop", last)]
+        .map(|(name, time)| property(name, ["KTime", "Time", ""], vec![time.into()]));
+    let stack = objects.add("AnimationStack", (TAKE, "AnimStack", ""), [properties(span)]);
+    let layer = objects.add("AnimationLayer", ("BaseLayer", "AnimLayer", ""), [properties([])]);
+    objects.connect(layer, stack);
+    let times: Vec<i64> = (0..clip.n_frames()).map(|frame| ticks(clip.fps, frame)).collect();
+    for (joint, &model) in models.iter().enumerate() {
+        if clip.skeleton.joints[joint].end {
+            continue;
+        }
+        let angles = degrees(clip.local.iter().map(|local| local[joint]));
+        let Some(&first) = angles.first() else { continue };
+        let moves = angles.iter().any(|now| (0..3).any(|k| (now[k] - first[k]).abs() > STILL));
+        let angles = if moves { &angles[..] } else { &angles[..1] };
+        drive(objects, (layer, model), ("R", "Lcl Rotation"), angles, &times);
+    }
+    if let Some(&hips) = models.first().filter(|_| !clip.travel.is_empty()) {
+        let places: Vec<Vec3> = (0..clip.n_frames()).map(|frame| clip.root_at(frame)).collect();
+        drive(objects, (layer, hips), ("T", "Lcl Translation"), &places, &times);
+    }
+}
+
+/// Adds the curves of three values over time, of which one stands for all times, to a model.
+fn drive(
+    objects: &mut FbxObjects,
+    (layer, model): (i64, i64),
+    (name, of_model): (&'static str, &'static str),
+    track: &[Vec3],
+    times: &[i64],
+) {
+    let Some(&first) = track.first() else { return };
+    let channels: Vec<FbxNode> = ["d|X", "d|Y", "d|Z"]
+        .into_iter()
+        .zip(first)
+        .map(|(channel, value)| property(channel, ["Number", "", "A"], vec![value.into()]))
+        .collect();
+    let node = objects.add("AnimationCurveNode", (name, "AnimCurveNode", ""), [properties(channels)]);
+    objects.connect(node, layer);
+    objects.drive(node, model, of_model);
+    for (axis, channel) in ["d|X", "d|Y", "d|Z"].into_iter().enumerate() {
+        let values: Vec<f32> = track.iter().map(|now| now[axis] as f32).collect();
+        let keys = [
+            FbxNode::one("Default", first[axis]),
+            FbxNode::one("KeyVer", KEY_VERSION),
+            FbxNode::one("KeyTime", FbxValue::Longs(times[..values.len()].to_vec())),
+            FbxNode::one("KeyAttrFlags", FbxValue::Ints(vec![LINEAR])),
+            FbxNode::one("KeyAttrDataFloat", FbxValue::Floats(vec![0.0; 4])),
+            FbxNode::one("KeyAttrRefCount", FbxValue::Ints(vec![values.len() as i32])),
+            FbxNode::one("KeyValueFloat", FbxValue::Floats(values)),
+        ];
+        let curve = objects.add("AnimationCurve", ("", "AnimCurve", ""), keys);
+        objects.drive(curve, node, channel);
+    }
+}
+
+/// Angles about x, y and z, degrees, such that a rotation is that about z after y after x.
+pub fn angles(rotation: Rotation) -> Vec3 {
+    let [z, y, x] = rotation.euler([2, 1, 0]);
+    [x, y, z].map(f64::to_degrees)
+}
+
+/// Angles over time, without jumps.
+fn degrees(rotations: impl Iterator<Item = Rotation>) -> Vec<Vec3> {
+    let mut before: Option<Vec3> = None;
+    let next = |rotation: Rotation| {
+        let [x, y, z] = angles(rotation);
+        let Some(last) = before else {
+            before = Some([x, y, z]);
+            return [x, y, z];
+        };
+        let near = |given: Vec3| std::array::from_fn(|k| given[k] + 360.0 * ((last[k] - given[k]) / 360.0).round());
+        let apart = |given: &Vec3| (0..3).map(|k| (given[k] - last[k]).abs()).fold(0.0, f64::max);
+        let (one, other): (Vec3, Vec3) = (near([x, y, z]), near([x + 180.0, 180.0 - y, z + 180.0]));
+        let nearest = if apart(&other) < apart(&one) { other } else { one };
+        before = Some(nearest);
+        nearest
+    };
+    rotations.map(next).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_run_on_through_a_half_turn_and_through_the_pole() {
+        let given: Vec<Rotation> = (0..60)
+            .map(|t| {
+                let share = f64::from(t) / 59.0;
+                let turned = Rotation::about([0.0, 0.0, 1.0], 7.0 * share);
+                turned * Rotation::about([0.0, 1.0, 0.0], 3.0 * share) * Rotation::about([1.0, 0.0, 0.0], 0.3)
+            })
+            .collect();
+        let found = degrees(given.iter().copied());
+        for (t, (angles, rotation)) in found.iter().zip(&given).enumerate() {
+            let [x, y, z] = angles.map(f64::to_radians);
+            let again = Rotation::from_euler([2, 1, 0], [z, y, x]);
+            assert!((again.inverse() * *rotation).angle() < 1e-6);
+            let step =
+                found.get(t + 1).map_or(0.0, |next| (0..3).map(|k| (next[k] - angles[k]).abs()).fold(0.0, f64::max));
+            assert!(step < 8.0, "{t}: {step}");
+        }
+        assert!(found[59][2] > 390.0);
+    }
+}

@@ -1,0 +1,180 @@
+//! Motion file of any kind, chosen by its name's extension, written atomically.
+
+use super::film_panel::{FilmBody, FilmStyle};
+use super::{fbx, film, glb_scene, json, vrm};
+use crate::animate::avatar::{Appearance, Avatar};
+use crate::animate::performance::Performance;
+use crate::animate::rig::file_skeleton::{FileSkeleton, RestAxes};
+use crate::animate::rig::names::Names;
+use orator_base::stage::progress::Progress;
+use orator_base::stage::workdir;
+use orator_base::types::pose3d::Motion;
+use orator_base::types::posture::Posture;
+use orator_base::types::sound::Sound;
+use orator_base::types::time::FrameRate;
+use orator_formats::joints::description;
+use orator_formats::{authors_txt, joints_npz, npy};
+use std::fs::File;
+use std::io::{self, BufWriter, Write as _};
+use std::path::Path;
+
+/// Content of a file beside the performance.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ExportContent<'a> {
+    /// The sound of a film.
+    pub sound: Option<&'a Sound>,
+    /// Bone names, in formats that have names.
+    pub names: Names,
+    /// What a film shows beside the body.
+    pub beside: film::SecondPanel<'a>,
+    /// How a film shows the body.
+    pub style: FilmStyle,
+    /// Frames a second of a film; `None`: interpolated to 30 or more (`film::smooth_rate`).
+    pub film_fps: Option<FrameRate>,
+    /// Angles of head and trunk that a speaker generated, at their rate, for JSON.
+    pub posture: Option<(FrameRate, &'a Posture)>,
+}
+
+/// What a user chooses of the figure in a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FigureOptions {
+    /// Bone names, in formats that have names.
+    pub names: Names,
+    /// Frame rate; `None`: that of the motion.
+    pub fps: Option<FrameRate>,
+}
+
+/// Format of a motion file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ExportFormat {
+    /// Joints [T, 49, 3] f32, their rate beside them (`formats::joints::description`).
+    Npy,
+    /// Joints with rate and mask.
+    Npz,
+    /// Text layout of Rebol et al. (2021): 147 numbers a line, their rate beside them.
+    AuthorsTxt,
+    /// Bone rotations of the whole rig.
+    Bvh,
+    /// The skinned avatar with its motion.
+    Glb,
+    /// The skinned avatar with its motion, binary FBX 7.4.
+    Fbx,
+    /// The skinned avatar as a humanoid of VRM 1.0, without motion.
+    Vrm,
+    /// The motion for humanoids of VRM 1.0.
+    Vrma,
+    /// Joints and rotations as JSON (`export::json`).
+    Json,
+    /// A film of the body with the sound.
+    Mp4,
+}
+
+impl ExportFormat {
+    /// The format of a file by its extension, upper or lower case.
+    pub fn from_path(path: &Path) -> anyhow::Result<Self> {
+        let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        match extension.as_str() {
+            "npy" => Ok(Self::Npy),
+            "npz" => Ok(Self::Npz),
+            "txt" => Ok(Self::AuthorsTxt),
+            "bvh" => Ok(Self::Bvh),
+            "glb" => Ok(Self::Glb),
+            "fbx" => Ok(Self::Fbx),
+            "vrm" => Ok(Self::Vrm),
+            "vrma" => Ok(Self::Vrma),
+            "json" => Ok(Self::Json),
+            "mp4" => Ok(Self::Mp4),
+            _ => anyhow::bail!(
+                "{}: motion is written as .npy (joints), .txt (the authors' layout), .npz (joints with rate and mask), \
+                 .json, .bvh, .fbx, .glb, .vrm, .vrma or .mp4; \
+                 give the file one of these endings",
+                path.display()
+            ),
+        }
+    }
+
+    /// Whether the format has bones that other programs call by other names.
+    pub fn has_names(self) -> bool {
+        matches!(self, Self::Bvh | Self::Glb | Self::Fbx | Self::Json)
+    }
+
+    /// Whether the format holds joints and no rig.
+    pub fn holds_joints(self) -> bool {
+        matches!(self, Self::Npy | Self::Npz | Self::AuthorsTxt)
+    }
+
+    /// Writes a performance; only a film uses the sound.
+    pub fn write(
+        self,
+        path: &Path,
+        performance: &Performance,
+        sources: &ExportContent,
+        progress: &dyn Progress,
+    ) -> anyhow::Result<()> {
+        match self {
+            Self::Npy | Self::Npz | Self::AuthorsTxt => self.write_joints(path, &performance.motion()),
+            Self::Bvh => {
+                let skeleton = FileSkeleton::new(&performance.rig.skeleton, sources.names, RestAxes::World);
+                let clip = skeleton.clip(&performance.clip);
+                streamed(path, |text| clip.write_bvh(text))
+            }
+            Self::Glb | Self::Fbx | Self::Vrm => {
+                let (rig, clip) = (&performance.rig, &performance.clip);
+                let avatar = Avatar::new(rig, &Appearance::plain());
+                let bytes = match self {
+                    Self::Fbx => fbx::scene::file(rig, clip, &avatar, sources.names),
+                    Self::Vrm => vrm::avatar(rig, &avatar),
+                    _ => glb_scene::file(rig, clip, &avatar, sources.names),
+                };
+                workdir::write_file(path, &bytes)
+            }
+            Self::Vrma => workdir::write_file(path, &vrm::motion(&performance.rig, &performance.clip)),
+            Self::Json => streamed(path, |text| json::write(text, performance, sources.names, sources.posture)),
+            Self::Mp4 => {
+                let fps = sources.film_fps.unwrap_or_else(|| film::smooth_rate(performance.clip.fps));
+                let resampled = (fps != performance.clip.fps).then(|| performance.resampled(fps));
+                let performance = resampled.as_ref().unwrap_or(performance);
+                let motion = (sources.style == FilmStyle::Figure).then(|| performance.motion());
+                let body = FilmBody::new(sources.style, performance, motion.as_ref());
+                workdir::replace(path, |attempt| film::write(attempt, body, sources.sound, sources.beside, progress))
+            }
+        }
+    }
+
+    /// Writes joints unchanged, which only the joint formats can hold, with their rate.
+    pub fn write_joints(self, path: &Path, motion: &Motion) -> anyhow::Result<()> {
+        let (fps, shape) = (motion.fps, motion.joints.shape());
+        match self {
+            Self::Npz => workdir::replace(path, |attempt| joints_npz::write(attempt, motion)),
+            Self::Npy => description::with(path, fps, shape, |attempt| npy::write(attempt, motion)),
+            Self::AuthorsTxt => {
+                description::with(path, fps, shape, |attempt| Ok(std::fs::write(attempt, authors_txt::format(motion))?))
+            }
+            _ => anyhow::bail!("{} holds more than joints", path.display()),
+        }
+    }
+}
+
+/// Writes a text through a buffered writer.
+fn streamed(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> anyhow::Result<()> {
+    workdir::replace(path, |attempt| {
+        let mut text = BufWriter::new(File::create(attempt)?);
+        write(&mut text)?;
+        Ok(text.flush()?)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_extension_chooses() {
+        assert_eq!(ExportFormat::from_path(Path::new("a/b.BVH")).unwrap(), ExportFormat::Bvh);
+        assert_eq!(ExportFormat::from_path(Path::new("a.Glb")).unwrap(), ExportFormat::Glb);
+        assert_eq!(ExportFormat::from_path(Path::new("a.b/c.npy")).unwrap(), ExportFormat::Npy);
+        for wrong in ["a.mov", "mp4", "a", ""] {
+            assert!(ExportFormat::from_path(Path::new(wrong)).unwrap_err().to_string().contains(".vrma or .mp4"));
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! Performance as one JSON object: `format` "orator motion", `version` 1, `fps` [numerator, denominator], `n_frames`,
+//! `units`, `axes`; `names`, `parents` (index or null) and `offsets` (from the parent in T-pose) of the joints, bone
+//! ends included; `joints49`, the joint for each of the 49 joints of a motion; `positions` [frame][joint][x, y, z] to
+//! 1e-6 m, the soles at y = 0; `rotations` [frame][joint][x, y, z, w], unit quaternions relative to the parent, to
+//! 1e-7. Of a speaker who learnt head or trunk, `posture` has their angles as learnt, before they turn the figure: `fps`, and
+//! `head` and `trunk` [frame][yaw, pitch, roll] in radians, null for what was not learnt.
+
+use crate::animate::performance::Performance;
+use crate::animate::rig::names::Names;
+use orator_base::math::rotation::Rotation;
+use orator_base::math::vec3::Vec3;
+use orator_base::types::posture::{Posture, PostureChannel};
+use orator_base::types::time::FrameRate;
+use serde_json::json;
+use std::io::{self, Write};
+
+/// Writes the file's text.
+pub fn write(
+    text: &mut impl Write,
+    performance: &Performance,
+    names: Names,
+    posture: Option<(FrameRate, &Posture)>,
+) -> io::Result<()> {
+    let (clip, bones) = (&performance.clip, &performance.clip.skeleton.joints);
+    let mut head = json!({
+        "format": "orator motion",
+        "version": 1,
+        "fps": [clip.fps.num, clip.fps.den],
+        "n_frames": clip.n_frames(),
+        "units": "metres",
+        "axes": "x to the figure's left, y up, z forward",
+        "names": names.of(&clip.skeleton),
+        "parents": bones.iter().map(|bone| bone.parent).collect::<Vec<_>>(),
+        "offsets": bones.iter().map(|bone| bone.offset.map(|cm| (cm * 1e4).round() / 1e6)).collect::<Vec<_>>(),
+        "joints49": performance.rig.positions.to_vec(),
+    });
+    if let Some((fps, posture)) = posture {
+        let channel = |channel: PostureChannel| {
+            let rows = posture.channel(channel).outer_iter();
+            json!(rows.map(|angles| angles.to_vec()).collect::<Vec<_>>())
+        };
+        head["posture"] = json!({ "fps": [fps.num, fps.den] });
+        PostureChannel::ALL.into_iter().for_each(|of| head["posture"][of.name()] = channel(of));
+    }
+    let head = head.to_string();
+    write!(text, "{},\n\"positions\":[", head.strip_suffix('}').unwrap_or(&head))?;
+    rows(text, (0..clip.n_frames()).map(|frame| clip.positions(frame)), |_, place: Vec3| {
+        let [x, y, z] = place.map(|cm| cm / 100.0);
+        format!("[{x:.6},{y:.6},{z:.6}]")
+    })?;
+    text.write_all(b"],\n\"rotations\":[")?;
+    rows(text, clip.local.iter().cloned(), |joint, rotation: Rotation| {
+        let Rotation { w, v: [x, y, z] } = if bones[joint].end { Rotation::IDENTITY } else { rotation };
+        format!("[{x:.7},{y:.7},{z:.7},{w:.7}]")
+    })?;
+    text.write_all(b"]}\n")
+}
+
+/// Writes a line a frame of what `shown` makes of every joint.
+fn rows<T>(
+    text: &mut impl Write,
+    frames: impl Iterator<Item = Vec<T>>,
+    shown: impl Fn(usize, T) -> String,
+) -> io::Result<()> {
+    for (n, frame) in frames.enumerate() {
+        let joints: Vec<String> = frame.into_iter().enumerate().map(|(joint, value)| shown(joint, value)).collect();
+        write!(text, "{}\n[{}]", if n == 0 { "" } else { "," }, joints.join(","))?;
+    }
+    Ok(())
+}

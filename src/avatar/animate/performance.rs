@@ -1,0 +1,217 @@
+//! Pipeline from joints to animation: motion is smoothed, solved as rotations of a rig, resampled to the requested rate
+//! and held within the joint limits. Every exported file is written from its result.
+
+use super::rig::constraints::{ClampTally, Clamps, Constraints};
+use super::rig::rig::{CM, Rig};
+use super::solve::arm::SolveFilters;
+use super::solve::head;
+use super::solve::legs::Legs;
+use super::solve::positions::JointPositions;
+use super::solve::rotations::rotations;
+use super::solve::smoothing::Smoothing;
+use super::solve::track::RotationTrack;
+use super::solve::trunk;
+use ndarray::{Array2, Array3};
+use orator_base::math::rotation::Rotation;
+use orator_base::math::vec3::{Vec3, scale};
+use orator_base::motion::jerk;
+use orator_base::types::pose3d::Motion;
+use orator_base::types::posture::Posture;
+use orator_base::types::skeleton::{L_HAND, L_SHOULDER, N_HAND_JOINTS, N_JOINTS, NECK, R_HAND, R_SHOULDER};
+use orator_base::types::time::FrameRate;
+use orator_formats::bvh::write::BvhClip;
+use serde::Serialize;
+use std::ops::Range;
+
+/// Settings of the animation.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AnimationOptions {
+    /// The filter over time.
+    pub smoothing: Smoothing,
+    /// Which joint limits hold.
+    pub constraints: Constraints,
+    /// The turn of the shoulders.
+    pub yaw: Yaw,
+    /// Lower body.
+    pub legs: Legs,
+    /// Whether the chest breathes; no joint of a motion moves against the neck by it.
+    pub breath: bool,
+    /// Frame rate of the output; `None`: that of the motion.
+    pub fps: Option<FrameRate>,
+}
+
+/// Treatment of the shoulders' yaw.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Yaw {
+    /// Yaw turns spine and chest.
+    #[default]
+    Spine,
+    /// Yaw is removed: the rig always faces +z.
+    Removed,
+}
+
+/// Account of what was done to the motion.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct AnimationReport {
+    /// Frames of the motion.
+    pub n_frames: usize,
+    /// Jerk of the arms at the motion's own rate, over the frames that were seen.
+    pub arms: Jerk,
+    /// Jerk of the fingers relative to their wrist.
+    pub hands: Jerk,
+    /// Clamps by kind of the unsmoothed joints, at the motion's own rate.
+    pub clamps: Vec<Clamps>,
+    /// Number of frames in which the head was seen; `None` without a posture.
+    pub face_frames: Option<usize>,
+    /// Frames in which each limb was seen.
+    pub seen: SeenFrames,
+}
+
+/// Number of frames, at the motion's own rate, in which a part of the body was seen; in the others it is interpolated
+/// or held.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct SeenFrames {
+    /// Shoulder, elbow and wrist.
+    pub left_arm: usize,
+    /// Shoulder, elbow and wrist.
+    pub right_arm: usize,
+    /// At least half of the hand's joints.
+    pub left_hand: usize,
+    /// At least half of the hand's joints.
+    pub right_hand: usize,
+}
+
+impl SeenFrames {
+    fn count(motion: &Motion) -> Self {
+        let there = seen(motion);
+        let is_seen =
+            |t: usize, joint: usize| there[[t, joint]] && motion.mask.get([t, joint]).is_none_or(|&seen| seen);
+        let frames = |joints: Range<usize>, least: usize| {
+            let enough = |t: &usize| joints.clone().filter(|&joint| is_seen(*t, joint)).count() >= least;
+            (0..motion.n_frames()).filter(enough).count()
+        };
+        let arm = |shoulder: usize| frames(shoulder..shoulder + 3, 3);
+        let hand = |root: usize| frames(root + 1..root + N_HAND_JOINTS, N_HAND_JOINTS / 2);
+        Self {
+            left_arm: arm(L_SHOULDER),
+            right_arm: arm(R_SHOULDER),
+            left_hand: hand(L_HAND),
+            right_hand: hand(R_HAND),
+        }
+    }
+}
+
+/// Mean norm of the third derivative, m/s^3; `None` where no four consecutive frames are seen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Jerk {
+    /// Of the motion as it came.
+    pub before: Option<f64>,
+    /// Of the motion on the rig.
+    pub after: Option<f64>,
+}
+
+/// Motion on its rig.
+#[derive(Clone, Debug)]
+pub struct Performance {
+    /// The skeleton with its bone lengths.
+    pub rig: Rig,
+    /// The rotations of its joints.
+    pub clip: BvhClip,
+    /// What was done to the motion.
+    pub report: AnimationReport,
+}
+
+/// Animates a motion on a rig of its own bone lengths; a `posture` turns head and trunk, which moves no joint against the
+/// neck.
+///
+/// Joint limits are applied before smoothing, so that a joint found on the wrong side does not pull its neighbours in
+/// time, and again after smoothing and at the output rate, so that they hold in every written frame.
+pub fn perform(motion: &Motion, posture: Option<&Posture>, options: &AnimationOptions) -> Performance {
+    perform_on(Rig::from_motion(motion), motion, posture, options)
+}
+
+/// Animates a motion on a given rig, as several motions of one person share it.
+pub fn perform_on(rig: Rig, motion: &Motion, posture: Option<&Posture>, options: &AnimationOptions) -> Performance {
+    let clip_of = |tracks: &[RotationTrack]| {
+        let local = (0..motion.n_frames()).map(|t| tracks.iter().map(|track| track[t]).collect()).collect();
+        BvhClip { root: rig.root, travel: Vec::new(), skeleton: rig.skeleton.clone(), fps: motion.fps, local }
+    };
+    let constrained = |mut clip: BvhClip, tally: &mut ClampTally| {
+        clip.local.iter_mut().for_each(|frame| options.constraints.apply(&rig, frame, tally));
+        clip
+    };
+    let mut tally = ClampTally::default();
+    let mut positions = JointPositions::from_motion(motion);
+    if options.constraints != Constraints::NONE {
+        let as_it_is = rotations(&positions, &rig, &SolveFilters::new(Smoothing::None, motion.fps));
+        let within = constrained(clip_of(&as_it_is), &mut tally);
+        let frames: Vec<Vec<Vec3>> = (0..within.n_frames()).map(|t| within.positions(t)).collect();
+        positions = positions.moved(|t, joint| scale(frames[t][rig.positions[joint]], 1.0 / CM));
+    }
+    let filters = SolveFilters::new(options.smoothing, motion.fps);
+    let mut tracks = rotations(&positions, &rig, &filters);
+    let face_frames = posture.map(|posture| head::turn(posture, &rig, &filters, &mut tracks));
+    if options.yaw == Yaw::Removed {
+        for joint in [rig.spine, rig.chest] {
+            tracks[joint].fill(Rotation::IDENTITY);
+        }
+    }
+    let mut free = clip_of(&tracks);
+    trunk::turn(posture, options.legs, options.breath, &rig, &filters, &mut free);
+    let resampled = options.fps.filter(|&fps| fps != motion.fps).map(|fps| free.resampled(fps));
+    let planted = |clip: BvhClip| {
+        let mut clip = constrained(clip, &mut ClampTally::default());
+        options.legs.plant(&rig, &mut clip);
+        clip
+    };
+    let (resampled, clip) = (resampled.map(planted), planted(free));
+
+    let after = joints(&rig, &clip);
+    let jerk = |joints: &[(usize, usize)]| {
+        let of =
+            |positions: &Array3<f32>| jerk::mean(positions.view(), seen(motion).view(), motion.fps.per_sec(), joints);
+        Jerk { before: of(&motion.joints), after: of(&after) }
+    };
+    let arms = [R_SHOULDER, L_SHOULDER].into_iter().flat_map(|shoulder| (shoulder..shoulder + 3).map(|j| (j, NECK)));
+    let hands = [R_HAND, L_HAND].into_iter().flat_map(|root| (root + 1..root + 21).map(move |j| (j, root)));
+    let report = AnimationReport {
+        n_frames: motion.n_frames(),
+        arms: jerk(&arms.collect::<Vec<_>>()),
+        hands: jerk(&hands.collect::<Vec<_>>()),
+        clamps: if options.constraints == Constraints::NONE { Vec::new() } else { tally.clamps() },
+        face_frames,
+        seen: SeenFrames::count(motion),
+    };
+    Performance { clip: resampled.unwrap_or(clip), rig, report }
+}
+
+impl Performance {
+    /// Performance at another rate: rotations between the frames are interpolated on the sphere, the frames themselves stay.
+    pub fn resampled(&self, fps: FrameRate) -> Self {
+        Self { rig: self.rig.clone(), clip: self.clip.resampled(fps), report: self.report.clone() }
+    }
+
+    /// Joints [T, 49, 3] of the rig (metres, axes of `types::skeleton`, the neck at the origin) at the clip's rate.
+    pub fn motion(&self) -> Motion {
+        Motion::from_joints(self.clip.fps, joints(&self.rig, &self.clip))
+    }
+}
+
+fn joints(rig: &Rig, clip: &BvhClip) -> Array3<f32> {
+    let mut joints = Array3::zeros((clip.n_frames(), N_JOINTS, 3));
+    for (frame_idx, mut frame) in joints.outer_iter_mut().enumerate() {
+        let positions = clip.positions(frame_idx);
+        let neck = positions[rig.positions[NECK]];
+        for (joint, &place) in rig.positions.iter().enumerate() {
+            for (axis, sign) in [1.0, -1.0, -1.0].into_iter().enumerate() {
+                frame[[joint, axis]] = (sign * (positions[place][axis] - neck[axis]) / 100.0) as f32;
+            }
+        }
+    }
+    joints
+}
+
+/// Mask [T, 49] of the joints with finite coordinates, seen or filled.
+fn seen(motion: &Motion) -> Array2<bool> {
+    motion.joints.map_axis(ndarray::Axis(2), |place| place.iter().all(|v| v.is_finite()))
+}

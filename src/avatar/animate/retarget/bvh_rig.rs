@@ -1,0 +1,89 @@
+//! A user's skeleton in a BVH file, and motion written in it: joints, offsets, channels and their order stay.
+
+use super::user_rig::{UserJoint, UserRig};
+use anyhow::{Result, ensure};
+use orator_base::math::rotation::Rotation;
+use orator_base::types::time::FrameRate;
+use orator_formats::bvh::read::{Bvh, Channel};
+use orator_formats::bvh::skeleton::{BvhSkeleton, JointChannels};
+
+/// Skeleton of a BVH file with the positions that it has channels for.
+#[derive(Clone, Debug)]
+pub struct BvhRig {
+    skeleton: BvhSkeleton,
+    /// Channels of the first frame: the place of the root, and of joints that have one.
+    first: Vec<f64>,
+}
+
+impl BvhRig {
+    /// The skeleton of a file.
+    ///
+    /// # Errors
+    /// A joint whose rotation channels are not three about different axes.
+    pub fn new(bvh: &Bvh) -> Result<Self> {
+        let skeleton = BvhSkeleton::of(bvh);
+        skeleton.check()?;
+        for joint in skeleton.joints.iter().filter(|joint| !joint.channels.is_empty()) {
+            ensure!(
+                joint.rotation_order().is_some(),
+                "joint {} has no three rotation channels about different axes; give the skeleton with them",
+                joint.name
+            );
+        }
+        let first = bvh.frames().next().map_or_else(|| vec![0.0; skeleton.n_channels()], <[f64]>::to_vec);
+        Ok(Self { skeleton, first })
+    }
+
+    /// The skeleton at rest: no rotations, joints at their offsets.
+    pub fn rig(&self) -> UserRig {
+        let joint = |joint: &JointChannels| UserJoint {
+            name: joint.name.clone(),
+            parent: joint.parent,
+            offset: joint.offset,
+            rest: Rotation::IDENTITY,
+            scale: 1.0,
+            moves: !joint.channels.is_empty(),
+        };
+        UserRig { joints: self.skeleton.joints.iter().map(joint).collect(), standing: self.first_frame() }
+    }
+
+    /// Text of the file with this motion, local rotations a frame.
+    pub fn text(&self, fps: FrameRate, frames: &[Vec<Rotation>]) -> String {
+        let frames: Vec<Vec<f64>> = frames.iter().map(|local| self.channels(local)).collect();
+        self.skeleton.to_bvh(fps, frames.iter().map(Vec::as_slice))
+    }
+
+    /// Local rotations of the first frame.
+    fn first_frame(&self) -> Vec<Rotation> {
+        let mut values = self.first.iter();
+        let turn = |joint: &JointChannels| {
+            let angles: Vec<f64> = joint
+                .channels
+                .iter()
+                .zip(values.by_ref())
+                .filter(|(channel, _)| matches!(channel, Channel::Rotation(_)))
+                .map(|(_, degrees)| degrees.to_radians())
+                .collect();
+            match (joint.rotation_order(), angles[..].try_into()) {
+                (Some(order), Ok(angles)) => Rotation::from_euler(order, angles),
+                _ => Rotation::IDENTITY,
+            }
+        };
+        self.skeleton.joints.iter().map(turn).collect()
+    }
+
+    fn channels(&self, local: &[Rotation]) -> Vec<f64> {
+        let mut values = self.first.clone();
+        let mut next = 0;
+        for (joint, &turn) in self.skeleton.joints.iter().zip(local) {
+            let mut angles = joint.rotation_order().map(|order| turn.euler(order)).into_iter().flatten();
+            for channel in &joint.channels {
+                if matches!(channel, Channel::Rotation(_)) {
+                    values[next] = angles.next().map_or(0.0, f64::to_degrees);
+                }
+                next += 1;
+            }
+        }
+        values
+    }
+}

@@ -1,0 +1,135 @@
+//! A user's skeleton in a GLB file, and the file with an animation added: nodes, meshes and animations stay.
+
+use super::user_rig::{UserJoint, UserRig};
+use crate::animate::export::glb::{BufferUse, GlbBuffer};
+use crate::animate::export::glb_scene::signed;
+use anyhow::{Context as _, Result, bail, ensure};
+use orator_base::math::rotation::Rotation;
+use orator_base::types::time::FrameRate;
+use serde_json::{Value, json};
+
+/// Largest relative difference of the three scales of a node.
+const UNEVEN: f64 = 1e-3;
+
+/// A GLB file taken apart.
+#[derive(Clone, Debug)]
+pub struct GlbRig {
+    scene: Value,
+    bytes: Vec<u8>,
+    /// Node of each joint.
+    nodes: Vec<usize>,
+    rig: UserRig,
+}
+
+impl GlbRig {
+    /// Reads the bytes of a file.
+    ///
+    /// # Errors
+    /// No GLB, buffers in other files, nodes that are no tree, scaled unevenly or given as a matrix.
+    pub fn new(file: &[u8]) -> Result<Self> {
+        let (scene, bytes) = chunks(file).context("no binary glTF 2.0 (.glb)")?;
+        let buffers = scene["buffers"].as_array().map_or(0, Vec::len);
+        let is_outside = scene["buffers"].as_array().into_iter().flatten().any(|buffer| buffer.get("uri").is_some());
+        ensure!(buffers <= 1 && !is_outside, "its data lie in other files; export it as one .glb");
+        let empty = Vec::new();
+        let nodes = scene["nodes"].as_array().unwrap_or(&empty);
+        let of_skin = |node: usize| {
+            let skins = scene["skins"].as_array().into_iter().flatten();
+            skins
+                .flat_map(|skin| skin["joints"].as_array().into_iter().flatten())
+                .any(|joint| joint.as_u64() == Some(node as u64))
+        };
+        let has_skin = scene["skins"].as_array().is_some_and(|skins| !skins.is_empty());
+        let children = |node: usize| nodes[node]["children"].as_array().into_iter().flatten().filter_map(Value::as_u64);
+        let mut is_child = vec![false; nodes.len()];
+        for child in (0..nodes.len()).flat_map(children) {
+            let known = is_child.get_mut(child as usize).context("a node has a child that is not there")?;
+            ensure!(!*known, "node {child} has two parents");
+            *known = true;
+        }
+        let mut ahead: Vec<(usize, Option<usize>)> =
+            (0..nodes.len()).rev().filter(|&node| !is_child[node]).map(|node| (node, None)).collect();
+        let (mut order, mut joints) = (Vec::new(), Vec::new());
+        while let Some((node, parent)) = ahead.pop() {
+            let at = joints.len();
+            joints.push(joint(&nodes[node], node, parent, !has_skin || of_skin(node))?);
+            order.push(node);
+            let below: Vec<usize> = children(node).map(|child| child as usize).collect();
+            ahead.extend(below.into_iter().rev().map(|child| (child, Some(at))));
+        }
+        ensure!(joints.len() == nodes.len(), "its nodes are no tree");
+        Ok(Self { nodes: order, rig: UserRig { joints, standing: Vec::new() }, scene, bytes })
+    }
+
+    /// The skeleton at rest.
+    pub fn rig(&self) -> &UserRig {
+        &self.rig
+    }
+
+    /// Bytes of the file with an animation: local rotations a frame, of the joints that move.
+    pub fn file(&self, fps: FrameRate, frames: &[Vec<Rotation>], moves: impl Fn(usize) -> bool) -> Vec<u8> {
+        let mut scene = self.scene.clone();
+        let mut buffer = GlbBuffer::reopened(&scene, self.bytes.clone());
+        if !frames.is_empty() {
+            let times: Vec<[f32; 1]> = (0..frames.len()).map(|frame| [fps.secs(frame) as f32]).collect();
+            let input = buffer.floats(&times, "SCALAR", BufferUse::Other);
+            let (mut samplers, mut channels) = (Vec::new(), Vec::new());
+            for joint in (0..self.rig.joints.len()).filter(|&joint| moves(joint)) {
+                let output = buffer.floats(&signed(frames.iter().map(|local| local[joint])), "VEC4", BufferUse::Other);
+                let target = json!({ "node": self.nodes[joint], "path": "rotation" });
+                channels.push(json!({ "sampler": samplers.len(), "target": target }));
+                samplers.push(json!({ "input": input, "output": output, "interpolation": "LINEAR" }));
+            }
+            let animation = json!({ "name": "Gesture", "samplers": samplers, "channels": channels });
+            match scene["animations"].as_array_mut() {
+                Some(animations) => animations.push(animation),
+                None => scene["animations"] = json!([animation]),
+            }
+        }
+        buffer.file(scene)
+    }
+}
+
+/// The scene and the data of a GLB file.
+fn chunks(file: &[u8]) -> Option<(Value, Vec<u8>)> {
+    let word = |at: usize| Some(u32::from_le_bytes(file.get(at..at + 4)?.try_into().ok()?) as usize);
+    if file.get(..4)? != b"glTF" || word(4)? != 2 || file.get(16..20)? != b"JSON" {
+        return None;
+    }
+    let length = word(12)?;
+    let scene: Value = serde_json::from_slice(file.get(20..20 + length)?).ok()?;
+    let bytes = match file.get(20 + length..) {
+        None | Some([]) => Vec::new(),
+        Some(_) => file.get(28 + length..28 + length + word(20 + length)?)?.to_vec(),
+    };
+    scene.is_object().then_some((scene, bytes))
+}
+
+fn joint(node: &Value, number: usize, parent: Option<usize>, moves: bool) -> Result<UserJoint> {
+    let name = node["name"].as_str().map_or_else(|| format!("node {number}"), str::to_owned);
+    let numbers = |key: &str| -> Option<Vec<f64>> { node[key].as_array()?.iter().map(Value::as_f64).collect() };
+    if node.get("matrix").is_some() {
+        bail!("{name} is placed by a matrix; export the file with translation, rotation and scale");
+    }
+    let offset = match numbers("translation").as_deref() {
+        Some(&[x, y, z]) => [x, y, z],
+        _ => [0.0; 3],
+    };
+    let rest = match numbers("rotation").as_deref() {
+        Some(&[x, y, z, w]) => {
+            let length = (x * x + y * y + z * z + w * w).sqrt();
+            ensure!(length > 1e-6, "the rotation of {name} is none");
+            Rotation { w: w / length, v: [x / length, y / length, z / length] }
+        }
+        _ => Rotation::IDENTITY,
+    };
+    let scale = match numbers("scale").as_deref() {
+        Some(&[x, y, z]) => {
+            let is_even = (x - y).abs().max((x - z).abs()) <= UNEVEN * x.abs();
+            ensure!(is_even && x > 0.0, "{name} is scaled by {x}, {y}, {z}; apply its scale and export it again");
+            x
+        }
+        _ => 1.0,
+    };
+    Ok(UserJoint { name, parent, offset, rest, scale, moves })
+}

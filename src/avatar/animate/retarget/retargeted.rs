@@ -1,0 +1,83 @@
+//! Motion onto the skeleton of a user's file: what `--retarget` does.
+
+use super::bone_map::BoneMap;
+use super::bvh_rig::BvhRig;
+use super::glb_rig::GlbRig;
+use super::transfer::Transfer;
+use super::user_rig::UserRig;
+use crate::animate::performance::Performance;
+use anyhow::{Context as _, Result, bail, ensure};
+use orator_base::math::rotation::Rotation;
+use orator_base::stage::workdir;
+use orator_formats::bvh::read::Bvh;
+use std::path::Path;
+
+/// The skeleton of a user's file, with the map of its bones.
+#[derive(Clone, Debug)]
+pub struct RetargetRig {
+    file: RigFile,
+    rig: UserRig,
+}
+
+#[derive(Clone, Debug)]
+enum RigFile {
+    Bvh(BvhRig),
+    Glb(GlbRig),
+}
+
+impl RetargetRig {
+    /// Reads a .bvh or .glb file.
+    pub fn open(path: &Path) -> Result<Self> {
+        let no_rig = || format!("{} gives no skeleton", path.display());
+        let file = match ending(path).as_str() {
+            "bvh" => RigFile::Bvh(BvhRig::new(&Bvh::read(path)?).with_context(no_rig)?),
+            "glb" => {
+                let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+                RigFile::Glb(GlbRig::new(&bytes).with_context(no_rig)?)
+            }
+            _ => bail!("{}: the skeleton to move is given as .bvh or .glb", path.display()),
+        };
+        let rig = match &file {
+            RigFile::Bvh(bvh) => bvh.rig(),
+            RigFile::Glb(glb) => glb.rig().clone(),
+        };
+        Ok(Self { file, rig })
+    }
+
+    /// Its joints at rest.
+    pub fn rig(&self) -> &UserRig {
+        &self.rig
+    }
+
+    /// Errors unless `path` ends like the skeleton's own file.
+    pub fn check_output(&self, path: &Path) -> Result<()> {
+        let own = match self.file {
+            RigFile::Bvh(_) => "bvh",
+            RigFile::Glb(_) => "glb",
+        };
+        ensure!(ending(path) == own, "{}: a skeleton from a .{own} is written as .{own}", path.display());
+        Ok(())
+    }
+
+    /// Local rotations of its joints in every frame of a performance, and which joints move.
+    pub fn moved(&self, performance: &Performance, map: &BoneMap) -> Result<(Vec<Vec<Rotation>>, Vec<bool>)> {
+        let transfer = Transfer::new(&performance.rig, &self.rig, map)?;
+        let frames = (0..performance.clip.n_frames()).map(|frame| transfer.frame(&performance.clip, frame)).collect();
+        Ok((frames, (0..self.rig.joints.len()).map(|joint| transfer.moves(joint)).collect()))
+    }
+
+    /// Writes a performance on this skeleton.
+    pub fn write(&self, path: &Path, performance: &Performance, map: &BoneMap) -> Result<()> {
+        self.check_output(path)?;
+        let (frames, moves) = self.moved(performance, map)?;
+        let fps = performance.clip.fps;
+        match &self.file {
+            RigFile::Bvh(bvh) => workdir::write_file(path, bvh.text(fps, &frames).as_bytes()),
+            RigFile::Glb(glb) => workdir::write_file(path, &glb.file(fps, &frames, |joint| moves[joint])),
+        }
+    }
+}
+
+fn ending(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
+}

@@ -1,0 +1,186 @@
+//! Plausibility constraints (Rebol et al. 2021): joint limits, and neighbouring fingers that curl together. Each frame
+//! is changed by itself; angles within the limits stay, changed ones are counted by kind, and a continuous motion stays
+//! continuous. The limits are in `limits`.
+
+use super::hinge::Bend;
+use super::limits;
+use super::limits::{CURL_COHERENCE, Limit, turn, within};
+use super::rig::Rig;
+use crate::animate::solve::arm_pose::ArmPose;
+use crate::animate::solve::track::smoothstep;
+use orator_base::math::rotation::Rotation;
+use serde::Serialize;
+
+/// Constraints that are applied.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Constraints {
+    /// Limits of every joint.
+    pub limits: bool,
+    /// Fingers within 10 degrees of the mean curl of the four; a pointing finger is bent with the others, so
+    /// that it is not the default.
+    pub curl_coherence: bool,
+}
+
+impl Default for Constraints {
+    fn default() -> Self {
+        Self { limits: true, curl_coherence: false }
+    }
+}
+
+impl Constraints {
+    pub const NONE: Self = Self { limits: false, curl_coherence: false };
+
+    /// Constrains one frame of local rotations.
+    pub fn apply(self, rig: &Rig, local: &mut [Rotation], tally: &mut ClampTally) {
+        if self == Self::NONE {
+            return;
+        }
+        tally.n_frames += 1;
+        for arm in &rig.arms {
+            let mut pose = ArmPose::from_rotations(arm, local);
+            if self.limits {
+                limit(&mut pose, tally);
+            }
+            if self.curl_coherence {
+                cohere(&mut pose, tally);
+            }
+            pose.write(arm, local);
+        }
+    }
+}
+
+/// Kinds of clamps, with the number of such angles in both arms.
+const KINDS: [(&str, usize); 14] = [
+    ("elbow flexion", 2),
+    ("elbow to the side", 2),
+    ("forearm turn", 2),
+    ("wrist flexion", 2),
+    ("wrist deviation", 2),
+    ("knuckle flexion", 8),
+    ("knuckle spread", 8),
+    ("middle joint flexion", 8),
+    ("middle joint to the side", 8),
+    ("end joint flexion", 8),
+    ("end joint to the side", 8),
+    ("thumb flexion", 6),
+    ("thumb to the side", 6),
+    ("curl coherence", 24),
+];
+const ELBOW: usize = 0;
+const TURN: usize = 2;
+const WRIST: usize = 3;
+const FINGER: usize = 5;
+const THUMB: usize = 11;
+const COHERENCE: usize = 13;
+/// Smallest change that counts as a clamp, degrees; less is rounding.
+const LEAST_DEGREES: f64 = 1e-6;
+
+/// Clamps of one kind.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Clamps {
+    pub kind: &'static str,
+    /// Number of clamped angles, and their share of all angles of this kind.
+    pub joint_frames: usize,
+    pub share: f64,
+    /// Mean amount by which the clamped angles exceeded their limit.
+    pub mean_excess_degrees: f64,
+    pub largest_excess_degrees: f64,
+}
+
+/// Counter of clamps.
+#[derive(Clone, Debug, Default)]
+pub struct ClampTally {
+    n_frames: usize,
+    /// Count, sum and maximum of the excess by kind.
+    kinds: [(usize, f64, f64); KINDS.len()],
+}
+
+impl ClampTally {
+    fn changed(&mut self, kind: usize, from: f64, to: f64) -> f64 {
+        let excess = turn(from - to).abs();
+        if excess > LEAST_DEGREES {
+            let (n, sum, largest) = &mut self.kinds[kind];
+            *n += 1;
+            *sum += excess;
+            *largest = largest.max(excess);
+        }
+        to
+    }
+
+    /// Counts of every kind, zero counts included.
+    pub fn clamps(&self) -> Vec<Clamps> {
+        let kinds = KINDS.into_iter().zip(self.kinds);
+        kinds
+            .map(|((kind, n_angles), (joint_frames, sum, largest_excess_degrees))| Clamps {
+                kind,
+                joint_frames,
+                share: joint_frames as f64 / (n_angles * self.n_frames).max(1) as f64,
+                mean_excess_degrees: sum / joint_frames.max(1) as f64,
+                largest_excess_degrees,
+            })
+            .collect()
+    }
+}
+
+fn limit(pose: &mut ArmPose, tally: &mut ClampTally) {
+    pose.elbow = bend(pose.elbow, limits::ELBOW, ELBOW, tally);
+    // An angle tracked beyond half a turn is still beyond the same end.
+    let [pronated, supinated] = limits::SUPINATION;
+    let turned = pose.supination.clamp(pronated, supinated);
+    // A hand bent across the forearm: turn and flexion are not distinguishable.
+    let turned = turned * certainty(pose.wrist.side);
+    pose.supination = tally.changed(TURN, pose.supination, turned);
+    pose.wrist = bend(pose.wrist, limits::WRIST, WRIST, tally);
+    for (finger, limits) in limits::FINGERS.iter().enumerate() {
+        for (k, &limit) in limits.iter().enumerate() {
+            let kind = if finger == 0 { THUMB } else { FINGER + 2 * k };
+            pose.fingers[finger][k] = bend(pose.fingers[finger][k], limit, kind, tally);
+        }
+    }
+}
+
+/// Bend clamped to its limits; `kind` counts the flexion, the next one the side.
+fn bend(given: Bend, limit: Limit, kind: usize, tally: &mut ClampTally) -> Bend {
+    let middle = (limit.flexion[0] + limit.flexion[1]) / 2.0;
+    let flexion = middle + certainty(given.side) * (within(limit.flexion, given.flexion) - middle);
+    Bend {
+        flexion: tally.changed(kind, given.flexion, flexion),
+        side: tally.changed(kind + 1, given.side, given.side.clamp(limit.side[0], limit.side[1])),
+    }
+}
+
+/// Certainty of a flexion: 1, falling from 60 degrees of sideways bend on to 0 at 90.
+fn certainty(side: f64) -> f64 {
+    1.0 - smoothstep([60.0, 90.0], side.abs())
+}
+
+/// Brings the four fingers' flexion, level by level, within reach of their mean; the mean is that of the result, so a
+/// second application changes nothing.
+fn cohere(pose: &mut ArmPose, tally: &mut ClampTally) {
+    for k in 0..3 {
+        let given = [1, 2, 3, 4].map(|finger: usize| pose.fingers[finger][k].flexion);
+        let mean = coherent_mean(given);
+        for (finger, flexion) in (1..).zip(given) {
+            let to = flexion.clamp(mean - CURL_COHERENCE, mean + CURL_COHERENCE);
+            pose.fingers[finger][k].flexion = tally.changed(COHERENCE, flexion, to);
+        }
+    }
+}
+
+/// Mean of four angles that is also the mean of them clamped around it; of several the one nearest to the plain mean.
+/// `rise(m)`, the mean of the clamped angles minus m, decreases with m and is bisected from the plain mean on.
+fn coherent_mean(given: [f64; 4]) -> f64 {
+    let rise = |m: f64| given.iter().map(|f| (f - m).clamp(-CURL_COHERENCE, CURL_COHERENCE)).sum::<f64>() / 4.0;
+    let mean = given.iter().sum::<f64>() / 4.0;
+    let sign = rise(mean);
+    if sign.abs() < 1e-12 {
+        return mean;
+    }
+    let reach = given.iter().fold(0.0f64, |reach, f| reach.max((f - mean).abs()));
+    let (mut near, mut far) = (mean, mean + reach.copysign(sign));
+    for _ in 0..60 {
+        let middle = (near + far) / 2.0;
+        if rise(middle) * sign > 1e-12 { near = middle } else { far = middle }
+    }
+    (near + far) / 2.0
+}

@@ -1,0 +1,243 @@
+//! Skeleton of a file: the rig's bones under a convention's names, with the bones that only the convention has, and the
+//! axes that its joints have at rest. Positions are those of the rig in every frame.
+
+use super::names::Names;
+use orator_base::math::rotation::Rotation;
+use orator_base::math::vec3::{Vec3, scale, unit};
+use orator_base::motion::fk::{Joint, Skeleton};
+use orator_formats::bvh::write::BvhClip;
+
+/// Axes of the joints at rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RestAxes {
+    /// Parallel to the world's.
+    World,
+    /// Those of the convention where it has its own: of Mixamo's y runs along the bone, so that rotations transfer as
+    /// they are. Other conventions: the world's.
+    Convention,
+}
+
+/// Skeleton of a file with its joints' axes at rest.
+#[derive(Clone, Debug)]
+pub struct FileSkeleton {
+    /// Joints with the names of the file, bone ends included; offsets in cm in the parent's axes at rest.
+    pub skeleton: Skeleton,
+    /// World axes of each joint at rest.
+    pub rest: Vec<Rotation>,
+    /// For each joint of the rig its joint here.
+    pub of_rig: Vec<usize>,
+    /// For each joint that of the rig; `None`: the bone is the convention's alone and moves with its parent.
+    source: Vec<Option<usize>>,
+}
+
+/// A joint of the file before it has its place in the list.
+struct Planned {
+    joint: Joint,
+    source: Option<usize>,
+}
+
+impl FileSkeleton {
+    /// Skeleton of `rig` under the names of a convention.
+    pub fn new(rig: &Skeleton, names: Names, axes: RestAxes) -> Self {
+        let (planned, of_rig) = match names {
+            Names::Mixamo => all_of_mixamo(rig),
+            _ => (rig.joints.iter().enumerate().map(|(n, joint)| taken(n, joint.clone())).collect(), identity(rig)),
+        };
+        let (joints, source): (Vec<Joint>, Vec<_>) = planned.into_iter().map(|p| (p.joint, p.source)).unzip();
+        let mut skeleton = Skeleton { joints };
+        let rest = match (axes, names) {
+            (RestAxes::Convention, Names::Mixamo) => bone_axes(&skeleton),
+            _ => vec![Rotation::IDENTITY; skeleton.joints.len()],
+        };
+        let called = names.of(&skeleton);
+        for (joint, name) in skeleton.joints.iter_mut().zip(called) {
+            joint.name = name;
+            if let Some(parent) = joint.parent {
+                joint.offset = rest[parent].inverse().turn(joint.offset);
+            }
+        }
+        Self { skeleton, rest, of_rig, source }
+    }
+
+    /// Rotation of every joint at rest in its parent's axes.
+    pub fn rest_local(&self) -> Vec<Rotation> {
+        let own = |(joint, &rest): (&Joint, &Rotation)| {
+            joint.parent.map_or(rest, |parent| self.rest[parent].inverse() * rest)
+        };
+        self.skeleton.joints.iter().zip(&self.rest).map(own).collect()
+    }
+
+    /// The rig's clip on this skeleton.
+    pub fn clip(&self, clip: &BvhClip) -> BvhClip {
+        let turned = |local: &Vec<Rotation>| -> Vec<Rotation> {
+            let joint = |(n, joint): (usize, &Joint)| {
+                let before = joint.parent.map_or(Rotation::IDENTITY, |parent| self.rest[parent]);
+                let moved = self.source[n].filter(|_| !joint.end).map_or(Rotation::IDENTITY, |rig| local[rig]);
+                let is_plain = before == Rotation::IDENTITY && self.rest[n] == Rotation::IDENTITY;
+                // no product, so that not even the sign of a zero changes
+                if is_plain { moved } else { before.inverse() * moved * self.rest[n] }
+            };
+            self.skeleton.joints.iter().enumerate().map(joint).collect()
+        };
+        BvhClip {
+            skeleton: self.skeleton.clone(),
+            fps: clip.fps,
+            root: clip.root,
+            travel: clip.travel.clone(),
+            local: clip.local.iter().map(turned).collect(),
+        }
+    }
+
+    /// Positions of the joints at rest, the root at `root`.
+    pub fn rest_positions(&self, root: Vec3) -> Vec<Vec3> {
+        self.skeleton.positions(root, &self.rest_local())
+    }
+}
+
+fn identity(rig: &Skeleton) -> Vec<usize> {
+    (0..rig.joints.len()).collect()
+}
+
+fn taken(source: usize, joint: Joint) -> Planned {
+    Planned { joint, source: Some(source) }
+}
+
+/// The rig's joints with the two bones that Mixamo's have beside them: `Spine2`, half way from our chest to the neck,
+/// which carries neck and shoulders, and the toes' end.
+fn all_of_mixamo(rig: &Skeleton) -> (Vec<Planned>, Vec<usize>) {
+    let (chest, neck) = (rig.find("Chest"), rig.find("Neck"));
+    let mut planned: Vec<Planned> = Vec::with_capacity(rig.joints.len() + 3);
+    let mut of_rig = Vec::with_capacity(rig.joints.len());
+    let mut upper_chest: Option<(usize, Vec3)> = None;
+    for (n, joint) in rig.joints.iter().enumerate() {
+        let mut joint = joint.clone();
+        let foot = joint.parent.filter(|_| joint.end).map(|parent| rig.joints[parent].name.clone());
+        joint.parent = joint.parent.map(|parent| of_rig[parent]);
+        if let (Some(chest), Some(neck)) = (chest, neck)
+            && rig.joints[n].parent == Some(chest)
+        {
+            let (at, half) = *upper_chest.get_or_insert_with(|| {
+                let half = scale(rig.joints[neck].offset, 0.5);
+                let spine = Joint { name: "Spine2".to_owned(), parent: Some(of_rig[chest]), offset: half, end: false };
+                planned.push(Planned { joint: spine, source: None });
+                (planned.len() - 1, half)
+            });
+            joint.parent = Some(at);
+            joint.offset = orator_base::math::vec3::sub(joint.offset, half);
+        }
+        of_rig.push(planned.len());
+        let side = foot.as_deref().and_then(|foot| foot.strip_suffix("Foot")).map(str::to_owned);
+        let Some(side) = side else {
+            planned.push(taken(n, joint));
+            continue;
+        };
+        let [_, _, ahead] = joint.offset;
+        let base = Joint { name: format!("{side}ToeBase"), end: false, ..joint };
+        planned.push(taken(n, base));
+        let end = Joint { name: String::new(), parent: Some(of_rig[n]), offset: [0.0, 0.0, 0.4 * ahead], end: true };
+        planned.push(Planned { joint: end, source: None });
+    }
+    (planned, of_rig)
+}
+
+/// World axes of Mixamo's joints in T-pose. y runs along the bone; the turn about it is that of the trunk's, the arms'
+/// and the legs' axes: x to the back in the left arm and to the front in the right one, to the figure's right in the
+/// legs (pre-rotations of Mixamo's skeleton as in the walkTools of D. Wooldridge, 2014).
+fn bone_axes(skeleton: &Skeleton) -> Vec<Rotation> {
+    let mut axes: Vec<Rotation> = Vec::with_capacity(skeleton.joints.len());
+    for (n, joint) in skeleton.joints.iter().enumerate() {
+        if let (true, Some(parent)) = (joint.end, joint.parent) {
+            axes.push(axes[parent]);
+            continue;
+        }
+        let part = limb_axes(&joint.name);
+        let mut children = skeleton.children(n);
+        let along = match (children.next(), children.next()) {
+            (Some(child), None) if part != Rotation::IDENTITY => unit(skeleton.joints[child].offset, 1e-9),
+            _ => None,
+        };
+        let [_, y, _] = part.axes();
+        axes.push(along.map_or(part, |along| Rotation::between(y, along) * part));
+    }
+    axes
+}
+
+/// Axes of a limb that hangs or reaches straight.
+fn limb_axes(own: &str) -> Rotation {
+    let is_of = |parts: &[&str]| parts.iter().any(|part| own.contains(part));
+    let left = own.starts_with("Left");
+    if is_of(&["UpLeg", "Leg", "Foot", "Toe"]) {
+        return Rotation::from_axes([-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]);
+    }
+    if is_of(&["Shoulder", "Arm", "Hand"]) {
+        let sign = if left { 1.0 } else { -1.0 };
+        return Rotation::from_axes([0.0, 0.0, -sign], [sign, 0.0, 0.0], [0.0, -1.0, 0.0]);
+    }
+    Rotation::IDENTITY
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::animate::rig::rig::Rig;
+    use orator_base::math::vec3::{dot, norm, sub};
+
+    fn rig() -> Rig {
+        let motion = orator_base::types::pose3d::Motion::from_joints(
+            orator_base::types::time::FrameRate::new(15, 1),
+            ndarray::Array3::from_elem((1, orator_base::types::skeleton::N_JOINTS, 3), f32::NAN),
+        );
+        Rig::from_motion(&motion)
+    }
+
+    #[test]
+    fn every_convention_moves_the_same_joints() {
+        let rig = rig();
+        let turn = |n: usize| Rotation::about([0.6, 0.0, 0.8], 0.1 * n as f64);
+        let clip = BvhClip {
+            skeleton: rig.skeleton.clone(),
+            fps: orator_base::types::time::FrameRate::new(15, 1),
+            root: rig.root,
+            travel: Vec::new(),
+            local: vec![(0..rig.skeleton.joints.len()).map(turn).collect()],
+        };
+        let expected = clip.positions(0);
+        for (names, axes) in Names::ALL.into_iter().flat_map(|n| [(n, RestAxes::World), (n, RestAxes::Convention)]) {
+            let file = FileSkeleton::new(&rig.skeleton, names, axes);
+            let found = file.clip(&clip).positions(0);
+            for (n, place) in expected.iter().enumerate() {
+                assert!(norm(sub(found[file.of_rig[n]], *place)) < 1e-9, "{names:?} {axes:?} {n}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_bones_of_mixamo_run_along_y_and_are_65() {
+        let rig = rig();
+        let file = FileSkeleton::new(&rig.skeleton, Names::Mixamo, RestAxes::Convention);
+        assert_eq!(file.skeleton.joints.len(), 65);
+        let at = |name: &str| file.skeleton.find(&format!("mixamorig:{name}")).unwrap();
+        let places = file.rest_positions(rig.root);
+        for (bone, child) in [
+            ("Spine1", "Spine2"),
+            ("Spine2", "Neck"),
+            ("LeftArm", "LeftForeArm"),
+            ("RightForeArm", "RightHand"),
+            ("LeftHandThumb1", "LeftHandThumb2"),
+            ("RightHandPinky3", "RightHandPinky4"),
+            ("LeftUpLeg", "LeftLeg"),
+            ("RightFoot", "RightToeBase"),
+            ("LeftToeBase", "LeftToe_End"),
+        ] {
+            let along = unit(sub(places[at(child)], places[at(bone)]), 1e-9).unwrap();
+            assert!(dot(along, file.rest[at(bone)].axes()[1]) > 1.0 - 1e-9, "{bone}");
+            assert_eq!(file.skeleton.joints[at(child)].parent, Some(at(bone)));
+        }
+        let [x, _, z] = file.rest[at("LeftForeArm")].axes();
+        assert!(x[2] < -0.999 && z[1] < -0.999);
+        let [x, _, z] = file.rest[at("RightUpLeg")].axes();
+        assert!(x[0] < -0.999 && z[2] > 0.999);
+        let [x, _, z] = file.rest[at("RightToeBase")].axes();
+        assert!(x[0] < -0.999 && z[1] > 0.999);
+    }
+}

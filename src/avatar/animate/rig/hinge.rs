@@ -1,0 +1,82 @@
+//! Hinge joint: the direction of a bone as two angles, flexion about an axis of the parent and lean to the side across
+//! it. Every direction has such angles; only at 90 degrees to the side flexion is undefined.
+
+use orator_base::math::rotation::Rotation;
+use orator_base::math::vec3::{Vec3, cross, scale};
+
+/// Direction of a bone, degrees.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bend {
+    /// Flexion, -180..=180; 0: straight.
+    pub flexion: f64,
+    /// Sideways bend, -90..=90, positive towards the hinge's own side (the thumb's, in a hand).
+    pub side: f64,
+}
+
+/// Rest direction of a bone with its flexion axis.
+#[derive(Clone, Copy, Debug)]
+pub struct Hinge {
+    /// Rotation from x to the resting bone and from -z to the axis.
+    rest: Rotation,
+}
+
+impl Hinge {
+    /// Hinge of two unit vectors at right angles in the parent's axes; flexion turns `along` about `axis`.
+    pub fn new(along: Vec3, axis: Vec3) -> Self {
+        let side = scale(axis, -1.0);
+        Self { rest: Rotation::from_axes(along, cross(side, along), side) }
+    }
+
+    /// Angles of a bone with the direction `direction`, a unit vector in the parent's axes.
+    pub fn bend(&self, direction: Vec3) -> Bend {
+        let [x, y, z] = self.rest.inverse().turn(direction);
+        Bend { flexion: (-y).atan2(x).to_degrees(), side: z.clamp(-1.0, 1.0).asin().to_degrees() }
+    }
+
+    /// Rotation with these angles and no twist.
+    pub fn rotation(&self, bend: Bend) -> Rotation {
+        self.rest * flexed(bend.flexion) * sideways(bend.side) * self.rest.inverse()
+    }
+
+    /// Direction of the bone at rest.
+    pub fn along(&self) -> Vec3 {
+        self.rest.turn([1.0, 0.0, 0.0])
+    }
+}
+
+/// Rotation about -z.
+pub fn flexed(degrees: f64) -> Rotation {
+    Rotation::about([0.0, 0.0, -1.0], degrees.to_radians())
+}
+
+/// Rotation about -y, from x towards z.
+pub fn sideways(degrees: f64) -> Rotation {
+    Rotation::about([0.0, -1.0, 0.0], degrees.to_radians())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use orator_base::math::vec3::{norm, sub, unit};
+
+    #[test]
+    fn every_direction_is_two_angles_and_back() {
+        let elbow = Hinge::new([1.0, 0.0, 0.0], [0.0, -1.0, 0.0]);
+        // The left forearm bends forward.
+        let forward = elbow.rotation(Bend { flexion: 90.0, side: 0.0 }).turn([1.0, 0.0, 0.0]);
+        assert!(norm(sub(forward, [0.0, 0.0, 1.0])) < 1e-12);
+        let along = unit([0.7, -0.4, 0.5], 0.0).unwrap();
+        let thumb = Hinge::new(along, unit(cross(along, [0.0, -0.5, -0.87]), 0.0).unwrap());
+        for hinge in [elbow, thumb] {
+            let rest = hinge.bend(hinge.along());
+            assert!(rest.side.abs() + rest.flexion.abs() < 1e-5);
+            for flexion in [-170.0, -90.0, -5.0, 0.0, 60.0, 100.0, 179.0] {
+                for side in [-80.0, -20.0, 0.0, 45.0] {
+                    let bend = Bend { flexion, side };
+                    let again = hinge.bend(hinge.rotation(bend).turn(hinge.along()));
+                    assert!((again.flexion - flexion).abs() < 1e-6 && (again.side - side).abs() < 1e-6);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,211 @@
+//! Bone names in files: our own, Mixamo's, Unity's humanoid, VRM 1.0, Unreal's. What else a convention has is in `file_skeleton`.
+
+use orator_base::motion::fk::Skeleton;
+
+/// Naming convention.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Names {
+    /// `Hips`, `LeftForeArm`, `LeftHandIndex1`: Mixamo's names without prefix, and `Chest`.
+    #[default]
+    Own,
+    /// `mixamorig:Hips` and so on; our chest is `Spine1`.
+    Mixamo,
+    /// Unity's `HumanBodyBones`.
+    UnityHumanoid,
+    /// Humanoid bones of VRM 1.0 (`VRMC_vrm`).
+    Vrm,
+    /// Body of Unreal's Manny and of MetaHumans; our chest is `spine_05`, the spines between and `neck_02` do not occur.
+    Unreal,
+}
+
+impl Names {
+    pub const ALL: [Self; 5] = [Self::Own, Self::Mixamo, Self::UnityHumanoid, Self::Vrm, Self::Unreal];
+
+    /// Name on the command line.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Own => "own",
+            Self::Mixamo => "mixamo",
+            Self::UnityHumanoid => "unity-humanoid",
+            Self::Vrm => "vrm",
+            Self::Unreal => "unreal",
+        }
+    }
+
+    /// Names of all joints of a skeleton, bone ends included (a finger's fourth, `HeadEnd`, `LeftFootEnd`).
+    pub fn of(self, skeleton: &Skeleton) -> Vec<String> {
+        let own = |joint: usize| -> String {
+            let bone = &skeleton.joints[joint];
+            match bone.parent.map(|parent| skeleton.joints[parent].name.as_str()) {
+                Some(before) if bone.end => match before.strip_suffix('3') {
+                    Some(finger) => format!("{finger}4"),
+                    None => format!("{before}End"),
+                },
+                _ => bone.name.clone(),
+            }
+        };
+        (0..skeleton.joints.len()).map(|joint| self.translated(&own(joint))).collect()
+    }
+
+    fn translated(self, own: &str) -> String {
+        match self {
+            Self::Own => own.to_owned(),
+            Self::Mixamo => {
+                let name = match own {
+                    "Chest" => "Spine1".to_owned(),
+                    "HeadEnd" => "HeadTop_End".to_owned(),
+                    _ => own.replace("ToeBaseEnd", "Toe_End").replace("FootEnd", "ToeBase"),
+                };
+                format!("mixamorig:{name}")
+            }
+            Self::Unreal => unreal(own),
+            Self::UnityHumanoid => humanoid(own, ["Proximal", "Intermediate", "Distal"]),
+            Self::Vrm => {
+                let name = humanoid(own, ["Metacarpal", "Proximal", "Distal"]);
+                let mut letters = name.chars();
+                letters.next().map(|first| first.to_lowercase().chain(letters).collect()).unwrap_or_default()
+            }
+        }
+    }
+}
+
+/// Name in Unreal's convention.
+fn unreal(own: &str) -> String {
+    let (part, side) = match (own.strip_prefix("Left"), own.strip_prefix("Right")) {
+        (Some(part), _) => (part, "_l"),
+        (_, Some(part)) => (part, "_r"),
+        _ => (own, ""),
+    };
+    let name = match part {
+        "Hips" => "pelvis",
+        "Spine" => "spine_01",
+        "Chest" => "spine_05",
+        "Neck" => "neck_01",
+        "Head" => "head",
+        "HeadEnd" => "head_end",
+        "Shoulder" => "clavicle",
+        "Arm" => "upperarm",
+        "ForeArm" => "lowerarm",
+        "Hand" => "hand",
+        "UpLeg" => "thigh",
+        "Leg" => "calf",
+        "Foot" => "foot",
+        "FootEnd" => "ball",
+        _ => "",
+    };
+    let finger = part.strip_prefix("Hand").and_then(|finger| finger.split_at_checked(finger.len().saturating_sub(1)));
+    match (name, finger) {
+        ("", Some((finger, digit))) => format!("{}_0{digit}{side}", finger.to_lowercase()),
+        ("", None) => own.to_owned(),
+        _ => format!("{name}{side}"),
+    }
+}
+
+/// Name in Unity's convention; `thumb` names the thumb's bones from base to tip.
+fn humanoid(own: &str, thumb: [&str; 3]) -> String {
+    let Some((side, part)) = ["Left", "Right"].iter().find_map(|side| Some((*side, own.strip_prefix(side)?))) else {
+        return own.to_owned();
+    };
+    let part = match part {
+        "Arm" => "UpperArm".to_owned(),
+        "ForeArm" => "LowerArm".to_owned(),
+        "UpLeg" => "UpperLeg".to_owned(),
+        "Leg" => "LowerLeg".to_owned(),
+        _ => match part.strip_prefix("Hand").and_then(|finger| finger.split_at_checked(finger.len().saturating_sub(1)))
+        {
+            Some((finger, digit)) if !finger.is_empty() => {
+                let bones = if finger == "Thumb" { thumb } else { ["Proximal", "Intermediate", "Distal"] };
+                let bone = ["1", "2", "3"].iter().position(|known| *known == digit).map_or("Tip", |k| bones[k]);
+                format!("{}{bone}", if finger == "Pinky" { "Little" } else { finger })
+            }
+            _ => part.to_owned(),
+        },
+    };
+    format!("{side}{part}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::animate::rig::file_skeleton::{FileSkeleton, RestAxes};
+    use crate::animate::rig::rig::Rig;
+    use std::collections::BTreeSet;
+
+    const FINGERS: [&str; 5] = ["Thumb", "Index", "Middle", "Ring", "Little"];
+
+    fn skeleton() -> Skeleton {
+        let motion = orator_base::types::pose3d::Motion::from_joints(
+            orator_base::types::time::FrameRate::new(15, 1),
+            ndarray::Array3::from_elem((1, orator_base::types::skeleton::N_JOINTS, 3), f32::NAN),
+        );
+        Rig::from_motion(&motion).skeleton
+    }
+
+    #[test]
+    fn unreals_names_have_their_side_at_the_end() {
+        let called = Names::Unreal.of(&skeleton());
+        let trunk = "pelvis spine_01 spine_05 neck_01 head".split(' ').map(String::from);
+        let limbs = ["clavicle", "upperarm", "lowerarm", "hand", "thigh", "calf", "foot", "ball"].map(String::from);
+        let fingers = ["thumb", "index", "middle", "ring", "pinky"];
+        let fingers = fingers.iter().flat_map(|finger| (1..=3).map(move |k| format!("{finger}_0{k}")));
+        let parts: Vec<String> = limbs.into_iter().chain(fingers).collect();
+        let both = ["l", "r"].into_iter().flat_map(|side| parts.iter().map(move |part| format!("{part}_{side}")));
+        for name in trunk.chain(both) {
+            assert_eq!(called.iter().filter(|known| **known == name).count(), 1, "{name}");
+        }
+        assert_eq!(called.iter().collect::<BTreeSet<_>>().len(), called.len());
+    }
+
+    #[test]
+    fn the_bones_of_every_convention_are_all_there() {
+        let limbs = ["UpperLeg", "LowerLeg", "Foot", "Shoulder", "UpperArm", "LowerArm", "Hand"];
+        let bones = ["Proximal", "Intermediate", "Distal"];
+        let thumb = ["ThumbMetacarpal", "ThumbProximal", "ThumbDistal"].map(String::from);
+        let fingers = |names: &[&str]| names.iter().flat_map(|f| bones.map(|b| format!("{f}{b}"))).collect::<Vec<_>>();
+        let mixamo = ["UpLeg", "Leg", "Foot", "ToeBase", "Toe_End", "Shoulder", "Arm", "ForeArm", "Hand"];
+        let mixamos_fingers = ["Thumb", "Index", "Middle", "Ring", "Pinky"];
+        let mixamos_fingers = mixamos_fingers.iter().flat_map(|f| (1..=4).map(move |k| format!("Hand{f}{k}")));
+        for (names, n, start, trunk, sides, limbs, fingers) in [
+            // HumanBodyBones without those it calls optional and we have nothing for: eyes, jaw, toes, UpperChest.
+            (
+                Names::UnityHumanoid,
+                49,
+                "",
+                "Hips Spine Chest Neck Head",
+                ["Left", "Right"],
+                &limbs[..],
+                fingers(&FINGERS),
+            ),
+            // VRM 1.0, humanoid.md, without upperChest, eyes, jaw and toes, which it does not require.
+            (
+                Names::Vrm,
+                49,
+                "",
+                "hips spine chest neck head",
+                ["left", "right"],
+                &limbs[..],
+                [&thumb[..], &fingers(&FINGERS[1..])].concat(),
+            ),
+            // X Bot and Y Bot.
+            (
+                Names::Mixamo,
+                65,
+                "mixamorig:",
+                "Hips Spine Spine1 Spine2 Neck Head HeadTop_End",
+                ["Left", "Right"],
+                &mixamo[..],
+                mixamos_fingers.collect(),
+            ),
+        ] {
+            let all = FileSkeleton::new(&skeleton(), names, RestAxes::World).skeleton.joints;
+            let called: BTreeSet<&String> = all.iter().map(|joint| &joint.name).collect();
+            assert_eq!(called.len(), all.len(), "a name is given twice");
+            let parts: Vec<String> = limbs.iter().map(ToString::to_string).chain(fingers).collect();
+            let both = sides.iter().flat_map(|side| parts.iter().map(move |part| format!("{side}{part}")));
+            let expected: Vec<String> = trunk.split(' ').map(String::from).chain(both).collect();
+            let expected = expected.into_iter().map(|name| format!("{start}{name}"));
+            let missing: Vec<String> = expected.clone().filter(|name| !called.contains(name)).collect();
+            assert_eq!((expected.len(), missing), (n, vec![]), "{names:?}");
+        }
+    }
+}

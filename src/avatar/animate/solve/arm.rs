@@ -1,0 +1,137 @@
+//! Rotations of a left arm from its joints, shoulder to finger tips. Bones take their smoothed directions; the upper
+//! arm's roll puts the elbow's axis across upper arm and forearm and is interpolated where the arm is straight; the
+//! hand's frame comes from its knuckles, and half of its turn about the forearm belongs to the forearm. Fingers bend
+//! without twist.
+
+use super::arm_pose::{ArmPose, elbow};
+use super::positions::JointPositions;
+use super::roll::elbow_axes;
+use super::smoothing::{Filter, Smoothing};
+use super::track::{ObservedTrack, RotationTrack, filled, world};
+use crate::animate::rig::hinge::Bend;
+use crate::animate::rig::rig::{RigArm, finger_hinge};
+use orator_base::math::rotation::Rotation;
+use orator_base::math::vec3::Vec3;
+use orator_base::types::skeleton::{L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, NECK};
+use orator_base::types::time::FrameRate;
+
+const X: Vec3 = [1.0, 0.0, 0.0];
+/// Time in which a missing hand relaxes, seconds.
+const RELAX_SECS: f64 = 0.5;
+/// Flexion of the relaxed hand's joints, degrees, thumb first.
+const RELAXED: [[f64; 3]; 5] =
+    [[8.0, 10.0, 10.0], [20.0, 26.0, 16.0], [20.0, 26.0, 16.0], [20.0, 26.0, 16.0], [20.0, 26.0, 16.0]];
+/// Degrees beyond half a turn from the middle of its range up to which a hand's turn is tracked before it counts as a
+/// turn the other way.
+const FOLLOWED: f64 = 60.0;
+
+/// Frame rate and the filters for it.
+pub struct SolveFilters {
+    pub fps: f64,
+    pub arms: Filter,
+    pub hands: Filter,
+    pub fingers: Filter,
+}
+
+impl SolveFilters {
+    pub fn new(smoothing: Smoothing, fps: FrameRate) -> Self {
+        let (arms, hands, fingers) = (smoothing.arms(fps), smoothing.hands(fps), smoothing.fingers(fps));
+        Self { fps: fps.per_sec(), arms, hands, fingers }
+    }
+}
+
+type Directions = Vec<Option<Vec3>>;
+
+/// Solves the arm as a left arm, whichever `arm` is, and writes its tracks into `local` (one a joint of the skeleton).
+pub fn solve(
+    positions: &JointPositions,
+    arm: &RigArm,
+    chest: &RotationTrack,
+    filters: &SolveFilters,
+    local: &mut [RotationTrack],
+) {
+    let n_frames = positions.n_frames();
+    let relax_frames = Some(RELAX_SECS * filters.fps);
+    let smooth = |parent: &RotationTrack, from: usize, to: usize| -> Directions {
+        let seen = |t: usize| Some(parent[t].inverse().turn(positions.direction(t, from, to)?));
+        let mut track: Directions = (0..n_frames).map(seen).collect();
+        filters.arms.directions(&mut track, &[]);
+        track
+    };
+    let clavicle = smooth(chest, NECK, L_SHOULDER).into_iter().map(|to| Some(Rotation::between(X, to?)));
+    local[arm.clavicle] = filled(clavicle.collect(), Rotation::IDENTITY, None);
+    let clavicle = world(chest, &local[arm.clavicle]);
+
+    let (along, fore) = (smooth(&clavicle, L_SHOULDER, L_ELBOW), smooth(&clavicle, L_ELBOW, L_WRIST));
+    let upper: ObservedTrack = elbow_axes(&along, &fore);
+    let hanging = Rotation::between(X, [0.17, -0.985, 0.0]);
+    local[arm.upper] = filled(upper, hanging, None);
+    let bent = |(upper, fore): (&Rotation, &Option<Vec3>)| {
+        Some(elbow().rotation(elbow().bend(upper.inverse().turn((*fore)?))))
+    };
+    let bent: ObservedTrack = local[arm.upper].iter().zip(&fore).map(bent).collect();
+    let relaxed_elbow = elbow().rotation(Bend { flexion: 17.0, side: 0.0 });
+    let fore = filled(bent, relaxed_elbow, None);
+    let forearm = world(&world(&clavicle, &local[arm.upper]), &fore);
+
+    let frames: ObservedTrack = (0..n_frames).map(|t| positions.hand_frame(t)).collect();
+    let hand = filled(
+        smooth_hand(&forearm, &frames, &filters.hands, positions.hand_error()),
+        Rotation::IDENTITY,
+        relax_frames,
+    );
+    let mut followed = 0.0;
+    for t in 0..n_frames {
+        let (supination, wrist) = ArmPose::hand_angles(hand[t], followed, FOLLOWED);
+        followed = supination;
+        (local[arm.fore][t], local[arm.hand][t]) = ArmPose::shared(fore[t], supination, wrist);
+    }
+    for (finger, joints) in arm.fingers.iter().enumerate() {
+        let bones = solve_finger(positions, &frames, finger, &filters.fingers);
+        for ((&joint, bone), relaxed) in joints.iter().zip(bones).zip(RELAXED[finger]) {
+            let rest = finger_hinge(finger).rotation(Bend { flexion: relaxed, side: 0.0 });
+            local[joint] = filled(bone, rest, relax_frames);
+        }
+    }
+}
+
+/// Hand rotations relative to the untwisted forearm, smoothed by their three angles: within the limits these are
+/// unique, while directions would cancel out between palm up and palm down.
+fn smooth_hand(forearm: &RotationTrack, frames: &ObservedTrack, filter: &Filter, error: &[f64]) -> ObservedTrack {
+    let mut followed = 0.0;
+    let mut angle = |(hand, fore): (&Option<Rotation>, &Rotation)| {
+        let (supination, wrist) = ArmPose::hand_angles(fore.inverse() * (*hand)?, followed, FOLLOWED);
+        followed = supination;
+        Some([supination, wrist.flexion, wrist.side].map(f64::to_radians))
+    };
+    let mut angles: Vec<Option<Vec3>> = frames.iter().zip(forearm).map(&mut angle).collect();
+    filter.runs(&mut angles, error);
+    let rotation = |angles: Vec3| {
+        let [supination, flexion, side] = angles.map(f64::to_degrees);
+        ArmPose::hand(supination, Bend { flexion, side })
+    };
+    angles.into_iter().map(|angles| angles.map(rotation)).collect()
+}
+
+/// Local rotations of a finger's three joints. Bones are smoothed in the axes of the observed hand, so that noise of
+/// the whole hand does not reach them.
+fn solve_finger(
+    positions: &JointPositions,
+    frames: &ObservedTrack,
+    finger: usize,
+    filter: &Filter,
+) -> [ObservedTrack; 3] {
+    let (hinge, base) = (finger_hinge(finger), L_HAND + 1 + 4 * finger);
+    let mut parent: ObservedTrack = vec![Some(Rotation::IDENTITY); frames.len()];
+    [0, 1, 2].map(|k| {
+        let seen = |t: usize| Some(frames[t]?.inverse().turn(positions.direction(t, base + k, base + k + 1)?));
+        let mut track: Directions = (0..frames.len()).map(seen).collect();
+        filter.directions(&mut track, positions.hand_error());
+        let bone = |(parent, to): (&Option<Rotation>, Option<Vec3>)| {
+            Some(hinge.rotation(hinge.bend((*parent)?.inverse().turn(to?))))
+        };
+        let bones: ObservedTrack = parent.iter().zip(track).map(bone).collect();
+        parent = parent.iter().zip(&bones).map(|(parent, bone)| Some((*parent)? * (*bone)?)).collect();
+        bones
+    })
+}

@@ -1,0 +1,91 @@
+//! Angles of a left arm below its upper arm, and their conversion to and from local rotations of the rig. Half of the
+//! hand's turn about the forearm belongs to the forearm.
+
+use crate::animate::rig::hinge::{Bend, Hinge, flexed, sideways};
+use crate::animate::rig::limits::turn;
+use crate::animate::rig::rig::{RigArm, finger_hinge};
+use orator_base::math::rotation::Rotation;
+use orator_base::math::vec3::Vec3;
+
+const X: Vec3 = [1.0, 0.0, 0.0];
+
+/// Angles of an arm, degrees.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ArmPose {
+    pub elbow: Bend,
+    /// Turn of the hand about the forearm; 0: palm along the elbow's axis, positive: supination.
+    pub supination: f64,
+    /// Wrist; positive flexion: towards the palm, positive side: radial.
+    pub wrist: Bend,
+    /// Fingers, thumb to little finger, knuckle to end joint.
+    pub fingers: [[Bend; 3]; 5],
+}
+
+/// Hinge of the left elbow, which bends forward.
+pub fn elbow() -> Hinge {
+    Hinge::new(X, [0.0, -1.0, 0.0])
+}
+
+impl ArmPose {
+    /// Angles of the arm in a frame's local rotations. Twist of the fingers, which no joint shows, is left out.
+    pub fn from_rotations(arm: &RigArm, local: &[Rotation]) -> Self {
+        let of = |joint: usize| on_left(arm, local[joint]);
+        let (fore, hand) = (of(arm.fore), of(arm.hand));
+        let elbow_bend = elbow().bend(fore.turn(X));
+        let untwisted = elbow().rotation(elbow_bend).inverse() * fore;
+        let (_, half) = untwisted.swing_twist(X);
+        let (supination, wrist) = Self::hand_angles(untwisted * hand, -2.0 * half.to_degrees(), 0.0);
+        let fingers = std::array::from_fn(|finger| {
+            let hinge = finger_hinge(finger);
+            arm.fingers[finger].map(|joint| hinge.bend(of(joint).turn(hinge.along())))
+        });
+        Self { elbow: elbow_bend, supination, wrist, fingers }
+    }
+
+    /// Writes the angles into a frame's local rotations.
+    pub fn write(&self, arm: &RigArm, local: &mut [Rotation]) {
+        let mut put = |joint: usize, rotation: Rotation| local[joint] = on_left(arm, rotation);
+        let (fore, hand) = Self::shared(elbow().rotation(self.elbow), self.supination, self.wrist);
+        put(arm.fore, fore);
+        put(arm.hand, hand);
+        for (finger, bends) in self.fingers.iter().enumerate() {
+            for (&joint, &bend) in arm.fingers[finger].iter().zip(bends) {
+                put(joint, finger_hinge(finger).rotation(bend));
+            }
+        }
+    }
+
+    /// Supination and wrist angles of a hand relative to the untwisted forearm. The turn is the one nearest to
+    /// `followed`, unless that exceeds half a turn plus `leave` from the palm along the elbow's axis.
+    pub fn hand_angles(hand: Rotation, followed: f64, leave: f64) -> (f64, Bend) {
+        // hand = about x (supination) * sideways * flexed: the flexion's axis -z gives the first two.
+        let [x, y, z] = hand.turn([0.0, 0.0, 1.0]);
+        let pronation = (-y).atan2(z).to_degrees();
+        let along = (about_x(pronation).inverse() * hand).turn(X);
+        let side = (-x).clamp(-1.0, 1.0).asin().to_degrees();
+        let [x, y, _] = sideways(side).inverse().turn(along);
+        let near = followed + turn(-pronation - followed);
+        let supination = if leave > 0.0 && near.abs() > 180.0 + leave { -pronation } else { near };
+        (supination, Bend { flexion: (-y).atan2(x).to_degrees(), side })
+    }
+
+    /// Hand rotation of these angles relative to the untwisted forearm.
+    pub fn hand(supination: f64, wrist: Bend) -> Rotation {
+        about_x(-supination) * sideways(wrist.side) * flexed(wrist.flexion)
+    }
+
+    /// Local rotations of forearm and hand; `bent` is the untwisted forearm.
+    pub fn shared(bent: Rotation, supination: f64, wrist: Bend) -> (Rotation, Rotation) {
+        let half = about_x(-supination / 2.0);
+        (bent * half, half * sideways(wrist.side) * flexed(wrist.flexion))
+    }
+}
+
+fn about_x(degrees: f64) -> Rotation {
+    Rotation::about(X, degrees.to_radians())
+}
+
+/// Rotation mirrored between this arm and a left arm, in either direction.
+fn on_left(arm: &RigArm, rotation: Rotation) -> Rotation {
+    if arm.sign < 0.0 { rotation.mirrored() } else { rotation }
+}

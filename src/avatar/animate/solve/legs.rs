@@ -1,0 +1,109 @@
+//! Legs under hips that turn: feet stay planted on the floor, thighs and shins reach them with two bones, and who stands
+//! moves the hips against the lean, so that the weight stays above the feet.
+
+use crate::animate::rig::rig::Rig;
+use orator_base::math::rotation::Rotation;
+use orator_base::math::vec3::{Vec3, add, cross, norm, scale, sub, unit};
+use orator_formats::bvh::write::BvhClip;
+
+/// Lower body of a figure.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Legs {
+    /// Upright, the feet under the hips. Without a posture the legs are straight and rest.
+    #[default]
+    Standing,
+    /// Thighs level, shins upright.
+    Seated,
+    /// Hips and legs rest, whatever the trunk does.
+    None,
+}
+
+/// Share of its length to which a standing leg is stretched at most, so that no knee snaps straight.
+const STRETCH: f64 = 0.99;
+/// Way of the hips against the way of the trunk's top: the trunk is half of the weight, its middle half as far out.
+const BALANCE: f64 = 0.25;
+const DOWN: Vec3 = [0.0, -1.0, 0.0];
+const ACROSS: Vec3 = [1.0, 0.0, 0.0];
+const AHEAD: Vec3 = [0.0, 0.0, 1.0];
+
+/// Joints of a leg.
+struct Leg {
+    upper: usize,
+    lower: usize,
+    foot: usize,
+}
+
+impl Leg {
+    fn both(rig: &Rig) -> Option<[Self; 2]> {
+        let find = |side: &str| {
+            let joint = |name: &str| rig.skeleton.find(&format!("{side}{name}"));
+            Some(Self { upper: joint("UpLeg")?, lower: joint("Leg")?, foot: joint("Foot")? })
+        };
+        Some([find("Left")?, find("Right")?])
+    }
+
+    /// Lengths of thigh and shin, cm.
+    fn lengths(&self, rig: &Rig) -> [f64; 2] {
+        [self.lower, self.foot].map(|joint| norm(rig.skeleton.joints[joint].offset))
+    }
+
+    /// Turns the leg so that it reaches from its socket to the ankle, the knee ahead, the foot level.
+    fn reach(&self, rig: &Rig, hips: Rotation, way: Vec3, local: &mut [Rotation]) {
+        let [thigh, shin] = self.lengths(rig);
+        let far = norm(way).clamp((thigh - shin).abs() + 1e-6, thigh + shin - 1e-6);
+        let along = unit(way, 1e-9).unwrap_or(DOWN);
+        let hinge = unit(cross(AHEAD, along), 1e-6).unwrap_or(ACROSS);
+        let bends = cross(along, hinge);
+        let cos = ((thigh * thigh + far * far - shin * shin) / (2.0 * thigh * far)).clamp(-1.0, 1.0);
+        let to_knee = add(scale(along, cos), scale(bends, (1.0 - cos * cos).sqrt()));
+        let from_knee = sub(scale(along, far), scale(to_knee, thigh));
+        let bone = |to: Vec3| Rotation::between_frames((DOWN, ACROSS), (scale(to, 1.0 / norm(to)), hinge));
+        let (thigh, shin) = (bone(to_knee), bone(from_knee));
+        local[self.upper] = hips.inverse() * thigh;
+        local[self.lower] = thigh.inverse() * shin;
+        local[self.foot] = shin.inverse();
+    }
+}
+
+impl Legs {
+    /// Plants the feet of a clip under its hips, whose travel follows.
+    pub fn plant(self, rig: &Rig, clip: &mut BvhClip) {
+        let still = clip.local.iter().all(|local| local[0] == Rotation::IDENTITY);
+        let Some(legs) = Leg::both(rig).filter(|_| self == Self::Seated || (self == Self::Standing && !still)) else {
+            return;
+        };
+        let rest = rig.skeleton.positions(clip.root, &vec![Rotation::IDENTITY; rig.skeleton.joints.len()]);
+        let trunk = rest[rig.neck][1] - rest[0][1];
+        let ankles = legs.each_ref().map(|leg| {
+            let [thigh, _] = leg.lengths(rig);
+            let ahead = if self == Self::Seated { thigh } else { 0.0 };
+            add(rest[leg.foot], [0.0, 0.0, ahead])
+        });
+        let travel = clip.local.iter_mut().map(|local| {
+            let hips = local[0];
+            let sockets = legs.each_ref().map(|leg| hips.turn(rig.skeleton.joints[leg.upper].offset));
+            let root = match self {
+                Self::Seated => {
+                    let [_, shin] = legs[0].lengths(rig);
+                    let level = rig.skeleton.joints[legs[0].upper].offset[1];
+                    [clip.root[0], ankles[0][1] + shin - level, clip.root[2]]
+                }
+                _ => {
+                    let [x, _, z] = scale(hips.turn([0.0, 1.0, 0.0]), BALANCE * trunk);
+                    let aside = [clip.root[0] - x, 0.0, clip.root[2] - z];
+                    let height = |n: usize| {
+                        let [dx, _, dz] = sub(ankles[n], add(aside, sockets[n]));
+                        let reach = STRETCH * legs[n].lengths(rig).iter().sum::<f64>();
+                        ankles[n][1] - sockets[n][1] + (reach * reach - dx * dx - dz * dz).max(0.0).sqrt()
+                    };
+                    [aside[0], height(0).min(height(1)), aside[2]]
+                }
+            };
+            for n in 0..2 {
+                legs[n].reach(rig, hips, sub(ankles[n], add(root, sockets[n])), local);
+            }
+            sub(root, clip.root)
+        });
+        clip.travel = travel.collect();
+    }
+}

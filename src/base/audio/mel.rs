@@ -1,0 +1,135 @@
+//! Log-mel spectrograms as speech2gesture computes them (TensorFlow's `stft` and `linear_to_mel_weight_matrix`):
+//! magnitudes, 64 triangular bands on the HTK mel scale, natural logarithm. No padding and no normalisation.
+
+use crate::types::sound::SAMPLE_RATE;
+use ndarray::Array2;
+use realfft::RealFftPlanner;
+use std::ops::RangeInclusive;
+use std::sync::LazyLock;
+
+/// Samples of a window, between the starts of two windows, and of the Fourier transform: 25 ms, 10 ms, 32 ms.
+pub const WINDOW: usize = 400;
+pub const HOP: usize = 160;
+pub const FFT: usize = 512;
+/// Mel bands, and the lowest and highest frequency they reach, in Hz.
+pub const N_MELS: usize = 64;
+pub const LOWEST_HZ: f64 = 125.0;
+pub const HIGHEST_HZ: f64 = 7500.0;
+/// Added before the logarithm.
+pub const FLOOR: f32 = 1e-6;
+
+/// Spectrogram frames of `n_samples` samples: only whole windows count.
+pub const fn n_frames(n_samples: usize) -> usize {
+    if n_samples < WINDOW { 0 } else { (n_samples - WINDOW) / HOP + 1 }
+}
+
+/// Samples that give exactly `n_frames` spectrogram frames.
+pub const fn n_samples(n_frames: usize) -> usize {
+    if n_frames == 0 { 0 } else { (n_frames - 1) * HOP + WINDOW }
+}
+
+/// ln(mel + 1e-6) of mono sound at 16 kHz, samples in -1..1: [`n_frames`, 64]. Frame k is the sound from k * 10 ms on.
+pub fn log_mel(samples: &[f32]) -> Array2<f32> {
+    let window: Vec<f32> =
+        (0..WINDOW).map(|i| (0.5 - 0.5 * (std::f64::consts::TAU * i as f64 / WINDOW as f64).cos()) as f32).collect();
+    let fft = RealFftPlanner::<f32>::new().plan_fft_forward(FFT);
+    let (mut frame, mut spectrum) = (fft.make_input_vec(), fft.make_output_vec());
+    let mut work = fft.make_scratch_vec();
+    let mut magnitudes = vec![0.0f32; spectrum.len()];
+    let mut mels = Array2::zeros((n_frames(samples.len()), N_MELS));
+    for (k, mut row) in mels.outer_iter_mut().enumerate() {
+        frame.fill(0.0);
+        let sound = &samples[k * HOP..][..WINDOW];
+        frame.iter_mut().zip(sound).zip(&window).for_each(|((y, x), w)| *y = x * w);
+        // The lengths are the transform's own, so it cannot refuse.
+        let _ = fft.process_with_scratch(&mut frame, &mut spectrum, &mut work);
+        magnitudes.iter_mut().zip(&spectrum).for_each(|(magnitude, bin)| *magnitude = bin.norm());
+        for (mel, band) in row.iter_mut().zip(BANDS.iter()) {
+            let sum: f32 = band.weights.iter().zip(&magnitudes[band.first..]).map(|(w, bin)| w * bin).sum();
+            *mel = (sum + FLOOR).ln();
+        }
+    }
+    mels
+}
+
+/// Lower corner of a band's triangle in Hz.
+pub fn lowest_hz(band: usize) -> f64 {
+    let (low, high) = (mel_of(LOWEST_HZ), mel_of(HIGHEST_HZ));
+    let corner = low + (high - low) * band as f64 / (N_MELS + 1) as f64;
+    700.0 * ((corner / 1127.0).exp() - 1.0)
+}
+
+fn mel_of(hz: f64) -> f64 {
+    1127.0 * (1.0 + hz / 700.0).ln()
+}
+
+static BANDS: LazyLock<Vec<Band>> = LazyLock::new(bands);
+
+/// The bins of one band that have a weight.
+pub struct Band {
+    pub first: usize,
+    pub weights: Vec<f32>,
+}
+
+impl Band {
+    /// Of those of `bins` whose `weight` is above 0.
+    pub fn new(bins: RangeInclusive<usize>, weight: impl Fn(usize) -> f64) -> Self {
+        let inside: Vec<(usize, f64)> =
+            bins.map(|bin| (bin, weight(bin))).filter(|(_, weight)| *weight > 0.0).collect();
+        let first = inside.first().map_or(0, |(bin, _)| *bin);
+        Self { first, weights: inside.into_iter().map(|(_, weight)| weight as f32).collect() }
+    }
+}
+
+/// Triangles with corners equally spaced in mel; the zero bin belongs to none.
+fn bands() -> Vec<Band> {
+    let (low, high) = (mel_of(LOWEST_HZ), mel_of(HIGHEST_HZ));
+    let corner = |i: usize| low + (high - low) * i as f64 / (N_MELS + 1) as f64;
+    let weight = |band: usize, bin: usize| {
+        let at = mel_of(bin as f64 * f64::from(SAMPLE_RATE) / FFT as f64);
+        let (left, middle, right) = (corner(band), corner(band + 1), corner(band + 2));
+        ((at - left) / (middle - left)).min((right - at) / (right - middle)).max(0.0)
+    };
+    (0..N_MELS).map(|band| Band::new(1..=FFT / 2, |bin| weight(band, bin))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(serde::Deserialize)]
+    struct Golden {
+        n_frames: usize,
+        rows: Vec<(usize, Vec<f32>)>,
+    }
+
+    /// The signal of `fixtures/reference/mel_reference.py`: a rising tone, a steady one, and a hash as noise.
+    fn signal(n: usize) -> Vec<f32> {
+        let tau = std::f64::consts::TAU;
+        let value = |i: usize| {
+            let t = i as f64 / 16_000.0;
+            let noise = ((i * 7919) % 1009) as f64 / 1009.0 - 0.5;
+            0.4 * (tau * (200.0 + 700.0 * t) * t).sin() + 0.2 * (tau * 440.0 * t).sin() + 0.05 * noise
+        };
+        (0..n).map(|i| value(i) as f32).collect()
+    }
+
+    #[test]
+    fn agrees_with_the_reference() -> anyhow::Result<()> {
+        let golden: Golden = serde_json::from_str(include_str!("../../../fixtures/reference/mel_golden.json"))?;
+        let mels = log_mel(&signal(67_267));
+        assert_eq!((mels.nrows(), golden.n_frames), (418, 418));
+        for (row, expected) in golden.rows {
+            let worst = mels.row(row).iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            assert!(worst < 1e-3, "row {row}: {worst}");
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn silence_and_short_sound() {
+        assert_eq!(log_mel(&[0.0; 399]).nrows(), 0);
+        assert!(log_mel(&[0.0; 800]).iter().all(|v| (*v - FLOOR.ln()).abs() < 1e-6));
+        assert_eq!(n_frames(n_samples(427)), 427);
+    }
+}

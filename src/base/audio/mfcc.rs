@@ -1,0 +1,174 @@
+//! Mel-frequency cepstra as FineMotion computes them (Korzun et al. 2020, with the library python_speech_features): 26
+//! cepstra of 26 bands every 10 ms, the first replaced by the log energy; their means over poses, and the context of these.
+
+use ndarray::Array2;
+use realfft::RealFftPlanner;
+use std::f64::consts::PI;
+
+/// Cepstra, and mel bands.
+pub const N_CEPSTRA: usize = 26;
+const FFT: usize = 1024;
+/// Seconds of a window, and between the starts of two.
+const WINDOW_SECS: f64 = 0.02;
+const STEP_SECS: f64 = 0.01;
+const PRE_EMPHASIS: f64 = 0.97;
+const LIFTER: f64 = 22.0;
+/// The scale of 16-bit samples, which the log energy shows.
+const FULL: f64 = 32_768.0;
+
+/// Of mono sound at `rate` samples a second (at most 51.2 kHz: a window is one transform), samples in -1..1: [n, 26], row
+/// k the 20 ms from k * 10 ms on; the last window is filled up with zeros.
+pub fn mfcc(samples: &[f32], rate: u32) -> Array2<f64> {
+    let length = ((WINDOW_SECS * f64::from(rate)).round() as usize).clamp(1, FFT);
+    let step = ((STEP_SECS * f64::from(rate)).round() as usize).max(1);
+    let n = match samples.len() {
+        0 => 0,
+        n if n <= length => 1,
+        n => 1 + (n - length).div_ceil(step),
+    };
+    let fft = RealFftPlanner::<f64>::new().plan_fft_forward(FFT);
+    let (mut frame, mut spectrum) = (fft.make_input_vec(), fft.make_output_vec());
+    let mut work = fft.make_scratch_vec();
+    let (bands, cosines) = (bands(rate), cosines());
+    let sample = |i: usize| samples.get(i).map_or(0.0, |v| FULL * f64::from(*v));
+    // past the end python_speech_features has zeros, not what pre-emphasis makes of the step down to zero
+    let emphasised = |i: usize| match i {
+        0 => sample(0),
+        _ if i >= samples.len() => 0.0,
+        _ => sample(i) - PRE_EMPHASIS * sample(i - 1),
+    };
+    let mut cepstra = Array2::zeros((n, N_CEPSTRA));
+    for (k, mut row) in cepstra.outer_iter_mut().enumerate() {
+        frame.fill(0.0);
+        (0..length).for_each(|i| frame[i] = emphasised(k * step + i));
+        // the lengths are the transform's own, so it cannot refuse
+        let _ = fft.process_with_scratch(&mut frame, &mut spectrum, &mut work);
+        let power: Vec<f64> = spectrum.iter().map(|bin| bin.norm_sqr() / FFT as f64).collect();
+        let log = |v: f64| if v == 0.0 { f64::EPSILON.ln() } else { v.ln() };
+        let mels: Vec<f64> =
+            bands.iter().map(|band| log(band.iter().zip(&power).map(|(weight, power)| weight * power).sum())).collect();
+        for (c, value) in row.iter_mut().enumerate() {
+            let lift = 1.0 + LIFTER / 2.0 * (PI * c as f64 / LIFTER).sin();
+            *value = lift * mels.iter().zip(cosines.row(c)).map(|(mel, cosine)| mel * cosine).sum::<f64>();
+        }
+        row[0] = log(power.iter().sum());
+    }
+    cepstra
+}
+
+/// Cepstra of `n` poses [n, 26], `fps` a second: the mean of the rows of [`mfcc`] over the time of each pose, those at its
+/// edges in part (at 20 a second five whole rows); past the sound its last row is held. Zeros of no sound.
+pub fn of_poses(samples: &[f32], rate: u32, fps: f64, n: usize) -> Array2<f64> {
+    let rows = mfcc(samples, rate);
+    let per_pose = 1.0 / (fps * STEP_SECS);
+    let mut means = Array2::zeros((n, N_CEPSTRA));
+    let Some(last) = rows.nrows().checked_sub(1) else { return means };
+    for (t, mut mean) in means.outer_iter_mut().enumerate() {
+        let (start, end) = (t as f64 * per_pose, (t + 1) as f64 * per_pose);
+        let mut at = start;
+        while end - at > 1e-9 {
+            // whole rows but for what rounding leaves of them
+            let row = (at + 1e-9).floor();
+            let next = (row + 1.0).min(end);
+            mean.scaled_add((next - at) / per_pose, &rows.row(last.min(row as usize)));
+            at = next;
+        }
+    }
+    means
+}
+
+/// Poses that whole rows of a sound of so many samples are there for.
+pub fn n_poses(n_samples: usize, rate: u32, fps: f64) -> usize {
+    (n_samples as f64 / f64::from(rate) * fps + 1e-6) as usize
+}
+
+/// Rows [n, 26] with half a context (an odd number of rows) of `silence` before and behind: [n + context - 1, 26].
+pub fn with_context(rows: &Array2<f64>, context: usize, silence: &[f64; N_CEPSTRA]) -> Array2<f32> {
+    let half = context / 2;
+    Array2::from_shape_fn((rows.nrows() + 2 * half, N_CEPSTRA), |(t, c)| {
+        let inside = t.checked_sub(half).filter(|&t| t < rows.nrows());
+        inside.map_or(silence[c], |t| rows[[t, c]]) as f32
+    })
+}
+
+/// Cepstra of silence: FineMotion pads with the first row of a silent recording, this with that of zeros.
+pub fn silence(rate: u32) -> [f64; N_CEPSTRA] {
+    let rows = mfcc(&[0.0; 1], rate);
+    std::array::from_fn(|c| rows[[0, c]])
+}
+
+/// Weights of each band over the bins [26][513]: triangles between bins equally spaced in mel.
+fn bands(rate: u32) -> Vec<Vec<f64>> {
+    let most = 2595.0 * (1.0 + f64::from(rate) / 2.0 / 700.0).log10();
+    let corner = |i: usize| {
+        let hz = 700.0 * (10f64.powf(most * i as f64 / (N_CEPSTRA + 1) as f64 / 2595.0) - 1.0);
+        ((FFT + 1) as f64 * hz / f64::from(rate)).floor()
+    };
+    let weights = |band: usize| {
+        let (left, middle, right) = (corner(band), corner(band + 1), corner(band + 2));
+        let weight = |bin: usize| match bin as f64 {
+            at if at >= left && at < middle => (at - left) / (middle - left),
+            at if at >= middle && at < right => (right - at) / (right - middle),
+            _ => 0.0,
+        };
+        (0..=FFT / 2).map(weight).collect()
+    };
+    (0..N_CEPSTRA).map(weights).collect()
+}
+
+/// The orthonormal cosine transform [cepstrum, band].
+fn cosines() -> Array2<f64> {
+    let n = N_CEPSTRA as f64;
+    Array2::from_shape_fn((N_CEPSTRA, N_CEPSTRA), |(c, band)| {
+        let scale = if c == 0 { 1.0 / n } else { 2.0 / n };
+        scale.sqrt() * (PI * c as f64 * (band as f64 + 0.5) / n).cos()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cepstra_are_those_of_python_speech_features() {
+        let golden: serde_json::Value =
+            serde_json::from_str(include_str!("../../../fixtures/reference/audio_features_golden.json")).unwrap();
+        for case in golden["mfcc"].as_array().unwrap() {
+            let rate = case["rate"].as_u64().unwrap() as u32;
+            let sample = |i: usize| {
+                let t = i as f64 / f64::from(rate);
+                (0.4 * (2.0 * PI * (200.0 + 300.0 * t) * t).sin() * (1.0 + (11.0 * t).cos()) / 2.0
+                    + 0.05 * (2.0 * PI * 2900.0 * t).sin()) as f32
+            };
+            let sound: Vec<f32> = (0..case["n_samples"].as_u64().unwrap() as usize).map(sample).collect();
+            let check = |found: Array2<f64>, name: &str| {
+                let known: Vec<Vec<f64>> = serde_json::from_value(case[name].clone()).unwrap();
+                assert_eq!(found.nrows(), known.len());
+                for (found, known) in found.iter().zip(known.iter().flatten()) {
+                    assert!((found - known).abs() < 1e-3 * (1.0 + known.abs()), "{name} {rate}: {found} {known}");
+                }
+            };
+            check(mfcc(&sound, rate), "cepstra");
+            check(of_poses(&sound, rate, 20.0, case["at_20_fps"].as_array().unwrap().len()), "at_20_fps");
+        }
+        assert_eq!(mfcc(&[], 16_000).nrows(), 0);
+        assert!(of_poses(&[], 16_000, 20.0, 3).iter().all(|v| *v == 0.0));
+        assert!(mfcc(&[0.0; 10], 16_000).iter().all(|v| v.is_finite()));
+    }
+
+    #[test]
+    fn poses_of_another_rate_share_the_rows_at_their_edges() {
+        let sound: Vec<f32> = (0..16_000).map(|i| 0.3 * (i as f32 * 0.2).sin() * (i as f32 * 0.0007).cos()).collect();
+        let (rows, poses) = (mfcc(&sound, 16_000), of_poses(&sound, 16_000, 15.0, n_poses(16_000, 16_000, 15.0)));
+        assert_eq!(poses.nrows(), 15);
+        // pose 1 lasts from row 6 2/3 to 13 1/3
+        let whole: f64 = (7..13).map(|row| rows[[row, 3]]).sum();
+        let known = (whole + rows[[6, 3]] / 3.0 + rows[[13, 3]] / 3.0) * 3.0 / 20.0;
+        assert!((poses[[1, 3]] - known).abs() < 1e-9, "{} {known}", poses[[1, 3]]);
+        let silence = silence(16_000);
+        let padded = with_context(&poses, 7, &silence);
+        assert_eq!(padded.dim(), (21, N_CEPSTRA));
+        assert!(padded[[2, 0]] == silence[0] as f32 && padded[[3, 0]] == poses[[0, 0]] as f32);
+        assert!(padded[[20, 5]] == silence[5] as f32 && silence.iter().all(|v| v.is_finite()));
+    }
+}

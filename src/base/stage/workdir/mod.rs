@@ -1,0 +1,15 @@
+//! Writing so that a kill at any moment leaves either the old or the new, whole: write an attempt beside the target,
+//! flush it to disk, rename. The only renames of the project are here, and the locks that keep programs apart.
+
+mod attempt;
+mod disk;
+mod file;
+mod folder;
+mod lock;
+
+pub use attempt::{is_alive, left_over, remove};
+pub use disk::full_disk;
+pub use disk::{NoSpace, bytes_under};
+pub use file::{has_files, move_files, remove_file, replace, write_file};
+pub use folder::{attempt_folder, build_folder, recover_folder, replace_folder, restore_folder};
+pub use lock::{BusyFolder, FolderLock, announce, are_kept_apart, lock, lock_with_others};

@@ -1,6 +1,0 @@
-//! `orator demo`.
-
-pub mod learned;
-pub mod verb;
-
-pub use verb::{Args, run};

@@ -1,0 +1,20 @@
+//! Verbs that are part of `orator-lab`: what `orator` answers to their old names.
+
+use super::outcome::Outcome;
+use anyhow::{Result, bail};
+
+/// A verb that `orator` had before version 0.2; its arguments are accepted and ignored.
+#[derive(clap::Args)]
+#[command(disable_help_flag = true)]
+pub struct MovedVerb {
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
+    rest: Vec<String>,
+}
+
+impl MovedVerb {
+    /// Fails with the command that replaces `orator VERB`.
+    pub fn refuse(self, verb: &str) -> Result<Outcome> {
+        let words = self.rest.iter().map(|word| format!(" {word}")).collect::<String>();
+        bail!("`orator {verb}` moved to another program, installed beside this one: run `orator-lab {verb}{words}`")
+    }
+}

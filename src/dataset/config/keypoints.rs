@@ -1,0 +1,177 @@
+//! From the `keypoints` of a speaker to files and folders, each one video's, with what stands beside them: rate, size of the
+//! picture, sound. A folder of frames (OpenPose) is one video; other folders hold a file or a folder for each.
+
+use super::SpeakerConfig;
+use super::patterns::{self, OF_SOUNDS, OF_VIDEOS, SearchRoot};
+use orator_base::types::time::FrameRate;
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
+const ENDINGS: [&str; 3] = ["json", "npz", "npy"];
+/// Bytes at the beginning of a JSON file that tell whether it is one frame.
+const HEAD_BYTES: u64 = 4096;
+/// Keys of JSON files that hold many frames.
+const OF_MANY_FRAMES: [&str; 6] =
+    ["\"instance_info\"", "\"meta_info\"", "\"frame_id\"", "\"image_id\"", "\"annotations\"", "\"images\""];
+/// What programs add to the name of the video.
+const PREFIXES: [&str; 2] = ["results_", "alphapose-"];
+const SUFFIXES: [&str; 5] = ["_keypoints", "-keypoints", "_openpose", "_pose", "_landmarks"];
+
+/// What the configuration says of the keypoints of a video.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct KeypointSource {
+    /// Frames a second; `None`: the file must say.
+    pub fps: Option<FrameRate>,
+    /// Width and height of the picture in px; `None`: the file must say.
+    pub image_size: Option<[u32; 2]>,
+    /// The sound, or why there is none.
+    pub sound: Result<PathBuf, String>,
+}
+
+/// The speaker's keypoints, each path once. Entries that lead to nothing are `missing`.
+pub fn of_speaker(
+    speaker: &SpeakerConfig,
+    root: &SearchRoot,
+    missing: &mut Vec<String>,
+) -> BTreeMap<PathBuf, KeypointSource> {
+    let mut paths = BTreeSet::new();
+    for entry in &speaker.keypoints {
+        match of_entry(entry, root, missing) {
+            Ok(found) => paths.extend(found),
+            Err(message) => missing.push(message),
+        }
+    }
+    let endings = [&OF_SOUNDS[..], &OF_VIDEOS].concat();
+    let mut sounds = BTreeSet::new();
+    for entry in &speaker.audio {
+        match patterns::expand(entry, root, ("sound", &endings), missing) {
+            Ok(found) => sounds.extend(found),
+            Err(message) => missing.push(format!("audio: {message}")),
+        }
+    }
+    let is_one = paths.len() == 1 && sounds.len() == 1;
+    let source = |path: PathBuf| {
+        let name = name_of(&path);
+        let sound = sounds.iter().find(|sound| is_one || name_of(sound) == name).cloned();
+        let sound = sound.ok_or_else(|| match speaker.audio.is_empty() {
+            true => {
+                "keypoints have no sound; write `audio = [\"FOLDER\"]` beside `keypoints` (a folder, a pattern or a \
+                     file; a sound is found by the name of its keypoints)"
+                    .to_owned()
+            }
+            false => format!("no sound called {name} is in `audio`; name it like the keypoints, as in {name}.wav"),
+        });
+        let fps = FrameRate::nearest(speaker.fps).filter(|_| speaker.fps > 0.0);
+        (path, KeypointSource { fps, image_size: speaker.image_size(), sound })
+    };
+    paths.into_iter().map(source).collect()
+}
+
+fn of_entry(entry: &str, root: &SearchRoot, missing: &mut Vec<String>) -> Result<Vec<PathBuf>, String> {
+    let mut found = Vec::new();
+    let mut frames_in: BTreeMap<PathBuf, bool> = BTreeMap::new();
+    for path in patterns::matches(entry, root, missing)? {
+        if path.is_dir() {
+            found.extend(of_folder(&path).map_err(|error| format!("{entry}: cannot list the folder: {error}"))?);
+            continue;
+        }
+        // A pattern may match every frame of a folder.
+        let parent = path.parent().unwrap_or(&root.folder).to_owned();
+        let has_frames = || is_json(&path) && entry.contains(['*', '?', '[']) && is_frame(&path);
+        match *frames_in.entry(parent.clone()).or_insert_with(has_frames) {
+            true => found.push(parent),
+            false => found.push(path),
+        }
+    }
+    let nothing = || format!("{entry}: no keypoints are there ({}, or folders of frames)", ENDINGS.join(", "));
+    if found.is_empty() { Err(nothing()) } else { Ok(found) }
+}
+
+/// The folder itself where its files are frames, else the files and folders of frames in it.
+fn of_folder(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
+    let paths = patterns::list(folder)?;
+    if holds_frames(&paths) {
+        return Ok(vec![folder.to_owned()]);
+    }
+    let is_one = |path: &PathBuf| match path.is_dir() {
+        true => patterns::list(path).is_ok_and(|paths| holds_frames(&paths)),
+        false => patterns::has_ending(path, &ENDINGS),
+    };
+    Ok(paths.into_iter().filter(is_one).collect())
+}
+
+fn holds_frames(paths: &[PathBuf]) -> bool {
+    paths.iter().find(|path| is_json(path)).is_some_and(|path| is_frame(path))
+}
+
+fn is_json(path: &Path) -> bool {
+    patterns::has_ending(path, &ENDINGS[..1])
+}
+
+/// Whether a JSON file holds the people of one frame; one that cannot be read does not.
+fn is_frame(path: &Path) -> bool {
+    let mut head = Vec::new();
+    let read = std::fs::File::open(path).and_then(|file| file.take(HEAD_BYTES).read_to_end(&mut head));
+    let head = String::from_utf8_lossy(&head);
+    read.is_ok() && (head.contains("\"people\"") || !OF_MANY_FRAMES.iter().any(|key| head.contains(key)))
+}
+
+/// Name of the video that keypoints or a sound belong to: without ending and what programs add, in small letters.
+fn name_of(path: &Path) -> String {
+    let name = if path.is_dir() { path.file_name() } else { path.file_stem() };
+    let name = name.unwrap_or_default().to_string_lossy().to_lowercase();
+    let name = PREFIXES.iter().fold(&*name, |name, prefix| name.strip_prefix(prefix).unwrap_or(name));
+    SUFFIXES.iter().fold(name, |name, suffix| name.strip_suffix(suffix).unwrap_or(name)).to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn speaker(keypoints: &[&str], audio: &[&str]) -> SpeakerConfig {
+        let list = |entries: &[&str]| entries.iter().map(|entry| (*entry).to_owned()).collect();
+        SpeakerConfig { keypoints: list(keypoints), audio: list(audio), fps: 29.97, ..SpeakerConfig::default() }
+    }
+
+    #[test]
+    fn folders_of_frames_and_files_find_their_sounds_by_name() {
+        let dir = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| {
+            let path = dir.path().join(name);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, text).unwrap();
+        };
+        for frame in 0..3 {
+            write(&format!("op/talk/talk_{frame:012}_keypoints.json"), "{\"version\":1.3,\"people\":[]}");
+        }
+        write("op/notes.txt", "");
+        write("mm/results_b.json", "{\"meta_info\": {}, \"instance_info\": []}");
+        write("mm/c.json", "[{\"image_id\": \"0.jpg\"}]");
+        write("sound/TALK.wav", "");
+        write("sound/b.m4a", "");
+        for entries in [&["op", "mm"][..], &["op/talk", "mm/*"], &["op/*/*.json", "mm/*.json"]] {
+            let mut missing = Vec::new();
+            let found = of_speaker(&speaker(entries, &["sound"]), &SearchRoot::new(dir.path(), &[]), &mut missing);
+            let found: Vec<(String, Result<PathBuf, String>)> =
+                found.into_iter().map(|(path, source)| (name_of(&path), source.sound)).collect();
+            assert_eq!(missing, Vec::<String>::new());
+            let sound = |name: &str| Ok(dir.path().join("sound").join(name));
+            let none = Err("no sound called c is in `audio`; name it like the keypoints, as in c.wav".to_owned());
+            let expected = [("c", none), ("b", sound("b.m4a")), ("talk", sound("TALK.wav"))];
+            assert_eq!(found, expected.map(|(name, sound)| (name.to_owned(), sound)), "{entries:?}");
+        }
+        let mut missing = Vec::new();
+        let found =
+            of_speaker(&speaker(&["mm/c.json", "none/*.npz"], &[]), &SearchRoot::new(dir.path(), &[]), &mut missing);
+        let source = &found[&dir.path().join("mm/c.json")];
+        assert_eq!((source.fps, source.image_size), (Some(FrameRate::new(30_000, 1001)), None));
+        assert!(source.sound.as_ref().unwrap_err().contains("write `audio = "));
+        assert!(missing.len() == 1 && missing[0].contains("none/*.npz: no file matches"), "{missing:?}");
+        // One of each belongs together, whatever they are called.
+        let found =
+            of_speaker(&speaker(&["mm/c.json"], &["sound/b.m4a"]), &SearchRoot::new(dir.path(), &[]), &mut missing);
+        assert!(found.values().all(|source| source.sound.is_ok()));
+    }
+}

@@ -1,0 +1,244 @@
+//! `pipeline.toml`, twice: as written (`file`: a table with the line of every key) and resolved (`Settings`:
+//! defaults in, paths absolute, every value in its range). Each section is one small struct whose defaults are the
+//! documented ones; the top level `pipeline.toml` documents them and a test holds the two together.
+
+use super::file::{Folders, Problem};
+use super::sections::Settings;
+use super::{file, rules};
+use anyhow::{Context, Result};
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// The documented default, embedded: what `orator init` writes.
+pub const DEFAULT_FILE: &str = include_str!("../../../pipeline.toml");
+
+/// A configuration ready to use.
+#[derive(Clone, Debug)]
+pub struct Config {
+    /// Resolved: paths absolute, values in range.
+    pub settings: Settings,
+    /// The file it was read from, absolute.
+    pub file: PathBuf,
+    /// Keys given under a former name, a line each.
+    pub notes: Vec<String>,
+}
+
+/// Everything wrong with a configuration, one line a problem.
+#[derive(Debug, thiserror::Error)]
+pub struct ConfigError {
+    /// The file with the problems.
+    pub file: PathBuf,
+    /// Every problem, in the order of its lines.
+    pub problems: Vec<Problem>,
+}
+
+impl fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let plural = if self.problems.len() == 1 { "problem" } else { "problems" };
+        write!(f, "{} {plural} in {}", self.problems.len(), self.file.display())?;
+        self.problems.iter().try_for_each(|problem| write!(f, "\n  {problem}"))
+    }
+}
+
+/// Reads `file` and lays the `--set` changes over it. Paths in the file are relative to its folder, paths given by
+/// `--set` to the current folder.
+///
+/// # Errors
+/// A file that cannot be read, or `ConfigError` with every problem at once.
+pub fn load(file: &Path, sets: &[String]) -> Result<Config> {
+    let text = std::fs::read_to_string(file).with_context(|| {
+        format!("cannot read the configuration {}; `orator init DIR` writes one, -c FILE names another", file.display())
+    })?;
+    let file = std::path::absolute(file)?;
+    let (settings, notes) = resolve(&text, sets, &file)?;
+    Ok(Config { settings, file, notes })
+}
+
+/// The configuration of an empty file in the place of `file`, with the `--set` changes.
+///
+/// # Errors
+/// `ConfigError` with every problem at once.
+pub fn load_default(file: &Path, sets: &[String]) -> Result<Config> {
+    let file = std::path::absolute(file)?;
+    let (settings, notes) = resolve("", sets, &file)?;
+    Ok(Config { settings, file, notes })
+}
+
+/// The settings that the text of `file` gives, and notes on former keys.
+fn resolve(text: &str, sets: &[String], file: &Path) -> Result<(Settings, Vec<String>)> {
+    let current = std::env::current_dir()?;
+    let unicode = |folder: &Path| -> Result<String> {
+        Ok(folder
+            .to_str()
+            .with_context(|| format!("the folder {} has a name that is no text", folder.display()))?
+            .into())
+    };
+    let folder = unicode(file.parent().unwrap_or(Path::new("")))?;
+    let given = file::read(text, sets, &Folders { file: &folder, current: &unicode(&current)? });
+    let mut problems = given.problems;
+    problems.extend(rules::check(&given.settings, &given.locations));
+    problems.sort_by(|a, b| (a.location, &a.key).cmp(&(b.location, &b.key)));
+    if problems.is_empty() {
+        Ok((given.settings, given.notes))
+    } else {
+        Err(ConfigError { file: file.to_owned(), problems }.into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    fn problems(text: &str, sets: &[&str]) -> Vec<String> {
+        let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
+        match resolve(text, &sets, Path::new("pipeline.toml")) {
+            Ok(_) => Vec::new(),
+            Err(error) => error.to_string().lines().skip(1).map(|line| line.trim().to_owned()).collect(),
+        }
+    }
+
+    #[test]
+    fn the_documented_file_is_the_default() {
+        let settings = resolve(DEFAULT_FILE, &[], Path::new("pipeline.toml")).unwrap().0;
+        assert_eq!(Settings { speaker: Vec::new(), ..settings }, Settings::default());
+        let one_speaker = Settings { speaker: vec![crate::config::SpeakerConfig::default()], ..Settings::default() };
+        let defaults = toml::Table::try_from(one_speaker).unwrap();
+        assert_eq!(keys(&DEFAULT_FILE.parse().unwrap()), keys(&defaults));
+    }
+
+    /// `section.key` of all that a file holds.
+    fn keys(file: &toml::Table) -> BTreeSet<String> {
+        let tables = |value: &toml::Value| match value {
+            toml::Value::Array(entries) => entries.iter().filter_map(|entry| entry.as_table().cloned()).collect(),
+            value => value.as_table().cloned().into_iter().collect::<Vec<_>>(),
+        };
+        let of = |(section, value): (&String, &toml::Value)| {
+            let names = tables(value).into_iter().flat_map(|table| table.into_iter().map(|(key, _)| key));
+            names.map(|key| format!("{section}.{key}")).collect::<Vec<_>>()
+        };
+        file.iter().flat_map(of).collect()
+    }
+
+    #[test]
+    fn a_number_too_large_for_its_type_is_named() {
+        let text = "[extract]\nfps = 5000000000\n[dataset]\ntest = 7.0\n";
+        assert_eq!(
+            problems(text, &["dataset.max_mb=4294967296"]),
+            [
+                "line 2: extract.fps: 5000000000 is too large",
+                "line 4: dataset.test: 7 is out of range: expected 0 to 0.9",
+                "line 4: dataset.test: validation and test together leave less than 5 % to train on",
+                "--set: dataset.max_mb: 4294967296 is too large",
+            ]
+        );
+    }
+
+    #[test]
+    fn the_smallest_file_works() {
+        let text = "[[speaker]]\nname = \"host\"\nvideos = [\"videos/host/*.mp4\"]\n";
+        let settings = resolve(text, &["extract.fps=10".into()], Path::new("p.toml")).unwrap().0;
+        assert_eq!((settings.speaker[0].name.as_str(), settings.extract.fps), ("host", 10));
+    }
+
+    #[test]
+    fn former_keys_are_read_with_a_note() {
+        let text = "[segment]\nmax_bone_change = 0.3\n[lift]\nlevel = true\n[shard]\ntest = 0.2\n";
+        let (settings, notes) = resolve(text, &["shard.validation=0.1".into()], Path::new("p.toml")).unwrap();
+        assert_eq!((settings.lift.max_bone_change, settings.lift.level), (0.3, true));
+        assert_eq!((settings.dataset.validation, settings.dataset.test), (0.1, 0.2));
+        assert_eq!(
+            notes,
+            [
+                "line 5: shard is called dataset now; it is read as that",
+                "line 2: segment.max_bone_change is called lift.max_bone_change now; it is read as that",
+                "--set: shard is called dataset now; it is read as that",
+            ]
+        );
+        assert_eq!(
+            problems("[shard]\ntest = 7\n", &[])[0],
+            "line 2: dataset.test: 7 is out of range: expected 0 to 0.9"
+        );
+    }
+
+    #[test]
+    fn all_problems_are_reported_at_once_with_key_and_line() {
+        let text =
+            "[segment]\nshot_threshold = 7\n[extract]\nfsp = 15\n[work]\njobs = \"two\"\n[[speaker]]\nname = \"a b\"\n";
+        assert_eq!(
+            problems(text, &["gan.batch=0", "nothing=1", "lift.smooth_arms"]),
+            [
+                "line 2: segment.shot_threshold: 7 is out of range: expected 0 to 1",
+                "line 4: extract.fsp: unknown key (did you mean fps?)",
+                "line 6: work.jobs: expected a whole number, found string",
+                "line 7: speaker[0]: the key videos is missing",
+                "line 8: speaker[0].name: \"a b\": expected letters, digits, - and _ (it names folders)",
+                "--set: lift.smooth_arms: expected KEY=VALUE, like extract.fps=15",
+                "--set: gan.batch: 0 is out of range: expected 2 to 4096 windows",
+                "--set: nothing: unknown key",
+            ]
+        );
+    }
+
+    #[test]
+    fn a_value_that_is_not_known_is_refused_with_those_that_are() {
+        for (set, expected) in [
+            ("gan.preset=ligth", "\"ligth\" is not known: expected \"light\" or \"paper\" (did you mean light?)"),
+            ("gan.representation=anything", "\"anything\" is not known: expected \"bones\" or \"positions\""),
+            ("gan.adversarial=hinge", "\"hinge\" is not known: expected \"least-squares\" or \"log\""),
+            ("gan.device=`gpu`", "\"`gpu`\" is not known: expected \"cpu\" or \"cuda\""),
+        ] {
+            let (key, _) = set.split_once('=').unwrap();
+            assert_eq!(problems("", &[set]), [format!("--set: {key}: {expected}")]);
+        }
+        let text = "[gan]\nrepresentation = \"position\"\npreset = 3\n";
+        let found = problems(text, &[]);
+        assert!(found[0].starts_with("line 2: gan.representation") && found[0].ends_with("(did you mean positions?)"));
+        assert_eq!(found[1], "line 3: gan.preset: expected a string, found integer");
+    }
+
+    #[test]
+    fn paths_count_from_the_file_or_the_current_folder() {
+        let text = "[models]\nonnxruntime = \"lib/ort.so\"\n[lift]\nbody_weights = \"/abs.safetensors\"\n\
+                    [[speaker]]\nname = \"work\"\nvideos = [\"a.mp4\"]\nreference = \"face.jpg\"\nsource = \"disk\"\n";
+        let file = Path::new("/project/pipeline.toml");
+        let settings = resolve(text, &["lift.hand_weights=hands.safetensors".into()], file).unwrap().0;
+        assert_eq!(&*settings.work.dir, Path::new("/project/work"));
+        assert_eq!(&*settings.models.onnxruntime, Path::new("/project/lib/ort.so"));
+        assert_eq!(&*settings.lift.body_weights, Path::new("/abs.safetensors"));
+        assert_eq!(&*settings.lift.hand_weights, std::env::current_dir().unwrap().join("hands.safetensors"));
+        let speaker = &settings.speaker[0];
+        assert_eq!((&*speaker.reference, speaker.source.as_str()), (Path::new("/project/face.jpg"), "disk"));
+        assert_eq!((speaker.name.as_str(), settings.pose2d.person.as_str()), ("work", "auto"));
+        assert!(settings.speaker[0].licence.is_empty());
+    }
+
+    #[test]
+    fn no_gap_is_kept_that_lift_leaves_open() {
+        let said = problems("", &["segment.max_body_gap_secs=1.5", "segment.max_hand_gap_secs=60"]).join("\n");
+        for key in ["segment.max_body_gap_secs: 1.5", "segment.max_hand_gap_secs: 60"] {
+            assert!(
+                said.contains(&format!("{key} is out of range: expected 0 to 1 seconds, all that lift fills")),
+                "{said}"
+            );
+        }
+    }
+
+    #[test]
+    fn broken_toml_says_where() {
+        assert!(problems("[extract\nfps = 15", &[])[0].starts_with("line 1: not valid TOML"));
+        assert!(problems("extract = 3", &[])[0].contains("expected a table"));
+        assert!(problems("speaker = 3", &[])[0].contains("[[speaker]]"));
+    }
+
+    proptest::proptest! {
+        #![proptest_config(proptest::test_runner::Config::with_cases(128))]
+        #[test]
+        fn no_text_panics(
+            text in "(\\[?\\[?(gan|speaker|extract|work|shard|[a-z]{1,4})[\\].=]?[a-z_]{0,6} ?=? ?[\"0-9a-z.\\[\\]{}-]{0,8}\n){0,8}|.{0,60}",
+            set in "(gan|work|lift|speaker)\\.[a-z]{1,8}=.{0,8}|.{0,20}",
+        ) {
+            let _ = resolve(&text, &[set], Path::new("pipeline.toml"));
+        }
+    }
+}

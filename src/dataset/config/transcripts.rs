@@ -1,0 +1,90 @@
+//! From the `transcripts` of a speaker to the video of each: the file is called like its video, with or without more behind
+//! a dot (`talk.srt`, `talk.en.vtt`).
+
+use super::SpeakerConfig;
+use super::patterns::{self, OF_TRANSCRIPTS, SearchRoot};
+use orator_base::stage::Unit;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// The transcript of each video that has one, by its work name. Entries that lead to nothing, transcripts of no video and
+/// second ones of a video are `missing`.
+pub fn of_speaker(
+    speaker: &SpeakerConfig,
+    units: &[Unit],
+    root: &SearchRoot,
+    missing: &mut Vec<String>,
+) -> BTreeMap<String, PathBuf> {
+    let mut paths = BTreeSet::new();
+    for entry in &speaker.transcripts {
+        match patterns::expand(entry, root, ("transcript", &OF_TRANSCRIPTS), missing) {
+            Ok(found) => paths.extend(found),
+            Err(message) => missing.push(format!("transcripts: {message}")),
+        }
+    }
+    let mut found: BTreeMap<String, PathBuf> = BTreeMap::new();
+    for path in &paths {
+        let named =
+            || units.iter().filter(|unit| is_of(path, &unit.source)).max_by_key(|unit| unit.source.as_os_str().len());
+        let unit = if paths.len() == 1 && units.len() == 1 { units.first() } else { named() };
+        let file = path.display();
+        match unit {
+            _ if !path.is_file() => missing.push(format!("transcripts: {file} is no file")),
+            None => missing.push(format!("transcripts: no video is called like {file}; name it like its video")),
+            Some(unit) => {
+                let first = found.entry(unit.video.clone()).or_insert_with(|| path.clone());
+                if first != path {
+                    let (first, video) = (first.display(), unit.source.display());
+                    missing.push(format!("transcripts: {first} and {file} are both of {video}; leave one out"));
+                }
+            }
+        }
+    }
+    found
+}
+
+/// Whether a transcript has the name of a video or of its keypoints, in small letters or large.
+fn is_of(transcript: &Path, video: &Path) -> bool {
+    let stem = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
+    let (name, video) = (stem(transcript), if video.is_dir() { folder_name(video) } else { stem(video) });
+    name == video || name.strip_prefix(&video).is_some_and(|more| more.starts_with('.'))
+}
+
+fn folder_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().to_lowercase()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn transcripts_find_their_videos_by_name() {
+        let dir = tempfile::tempdir().unwrap();
+        let files =
+            ["a.mp4", "a.b.mp4", "c.mp4", "t/A.en.srt", "t/a.b.json", "t/c.vtt", "t/c.txt", "t/d.srt", "t/x.pdf"];
+        for file in files {
+            let path = dir.path().join(file);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, "").unwrap();
+        }
+        let unit = |file: &str| Unit { speaker: "host".into(), video: file.into(), source: dir.path().join(file) };
+        let units = ["a.mp4", "a.b.mp4", "c.mp4"].map(unit);
+        let find = |entries: &[&str], units: &[Unit]| {
+            let transcripts = entries.iter().map(|entry| (*entry).to_owned()).collect();
+            let speaker = SpeakerConfig { transcripts, ..SpeakerConfig::default() };
+            let mut missing = Vec::new();
+            let found = of_speaker(&speaker, units, &SearchRoot::new(dir.path(), &[]), &mut missing);
+            let name = |path: PathBuf| path.file_name().unwrap().to_string_lossy().into_owned();
+            (found.into_iter().map(|(video, path)| format!("{video} {}", name(path))).collect::<Vec<_>>(), missing)
+        };
+        let (found, missing) = find(&["t"], &units);
+        assert_eq!(found, ["a.b.mp4 a.b.json", "a.mp4 A.en.srt", "c.mp4 c.txt"]);
+        assert!(missing[0].contains("c.txt and ") && missing[1].contains("d.srt"), "{missing:?}");
+        // One of each belongs together, whatever they are called.
+        assert_eq!(find(&["t/d.srt"], &units[..1]).0, ["a.mp4 d.srt"]);
+        let (found, missing) = find(&["gone.srt", "t/*.ctm"], &units);
+        assert!(found.is_empty() && missing.len() == 2, "{missing:?}");
+        assert!(missing.iter().any(|said| said.contains("gone.srt is no file")), "{missing:?}");
+    }
+}

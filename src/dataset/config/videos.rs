@@ -1,0 +1,274 @@
+//! From the `videos` of the speakers to units: patterns are expanded, folders listed, and every video gets its work
+//! name. What names no video is a unit too, so that its failure is reported and the others go on.
+
+use super::keypoints::{self, KeypointSource};
+use super::patterns::{self, SearchRoot};
+use super::transcripts;
+use super::{Config, SpeakerConfig};
+use orator_base::stage::Unit;
+use orator_base::types::split::Split;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// The videos of one speaker.
+#[derive(Clone, Debug, Default)]
+pub struct Videos {
+    pub speaker: String,
+    /// Sorted by their work names, each once.
+    pub units: Vec<Unit>,
+    /// The videos that are keypoints of other programs, by their work names.
+    pub keypoints: BTreeMap<String, KeypointSource>,
+    /// The transcript of each video that has one, by its work name.
+    pub transcripts: BTreeMap<String, PathBuf>,
+    /// The split of each video that the configuration puts into one, by its work name.
+    pub splits: BTreeMap<String, Split>,
+    /// Entries of the configuration that lead to no video, each with what to do.
+    pub missing: Vec<String>,
+}
+
+impl Videos {
+    /// Whether the models have pictures to look at: not all are keypoints.
+    pub fn have_pictures(&self) -> bool {
+        self.keypoints.is_empty() || self.units.len() > self.keypoints.len()
+    }
+}
+
+/// The videos of every speaker of the configuration.
+pub fn of(config: &Config) -> Vec<Videos> {
+    let settings = &config.settings;
+    let folder = config.file.parent().unwrap_or(Path::new("."));
+    let root = SearchRoot::new(folder, &[&settings.work.dir, &settings.models.dir]);
+    settings.speaker.iter().map(|speaker| of_speaker(speaker, &root)).collect()
+}
+
+fn of_speaker(speaker: &SpeakerConfig, root: &SearchRoot) -> Videos {
+    let folder = root.folder.as_path();
+    let mut found = BTreeMap::new();
+    let mut missing = Vec::new();
+    for entry in &speaker.videos {
+        let videos = ("video", &patterns::OF_VIDEOS[..]);
+        let paths = patterns::expand(entry, root, videos, &mut missing).unwrap_or_else(|message| {
+            missing.push(message);
+            Vec::new()
+        });
+        for path in paths {
+            missing.extend(add(&mut found, &speaker.name, path, folder).err());
+        }
+    }
+    let mut given = BTreeMap::new();
+    for (path, source) in keypoints::of_speaker(speaker, root, &mut missing) {
+        match add(&mut found, &speaker.name, path, folder) {
+            Ok(video) => drop(given.insert(video, source)),
+            Err(message) => missing.push(message),
+        }
+    }
+    found.retain(|_, unit: &mut Unit| !speaker.exclude.iter().any(|entry| names(entry, &unit.source, folder)));
+    for entry in speaker.mirrored.iter().filter(|entry| !entry.contains(['*', '?', '['])) {
+        if !found.values().any(|unit| names(entry, &unit.source, folder)) {
+            missing
+                .push(format!("mirrored = [{entry:?}]: none of the videos is called so; correct or remove the entry"));
+        }
+    }
+    let mut splits = BTreeMap::new();
+    let lists = [&speaker.train, &speaker.validation, &speaker.test];
+    for (split, entries) in Split::ALL.into_iter().zip(lists) {
+        for entry in entries {
+            let named = found.values().filter(|unit| names(entry, &unit.source, folder));
+            let before: Vec<(String, Option<Split>)> =
+                named.map(|unit| (unit.video.clone(), splits.insert(unit.video.clone(), split))).collect();
+            let list = split.name();
+            if before.is_empty() && !entry.contains(['*', '?', '[']) {
+                missing.push(format!(
+                    "{list} = [{entry:?}]: none of the videos is called so; correct or remove the entry"
+                ));
+            }
+            for other in before.iter().filter_map(|(_, was)| was.filter(|was| *was != split)) {
+                missing.push(format!("{entry:?} is named in {} and in {list}; take it out of one", other.name()));
+            }
+        }
+    }
+    given.retain(|video, _| found.contains_key(video));
+    let units: Vec<Unit> = found.into_values().collect();
+    let transcripts = transcripts::of_speaker(speaker, &units, root, &mut missing);
+    Videos { speaker: speaker.name.clone(), units, keypoints: given, transcripts, splits, missing }
+}
+
+/// Adds a video under its work name, which is returned. Errors where its path is no text, or another has the name.
+fn add(found: &mut BTreeMap<String, Unit>, speaker: &str, path: PathBuf, folder: &Path) -> Result<String, String> {
+    if path.to_str().is_none() {
+        return Err(patterns::no_text(&path));
+    }
+    let video = work_name(&path, folder);
+    let new = || Unit { speaker: speaker.to_owned(), video: video.clone(), source: path.clone() };
+    let unit = found.entry(video.clone()).or_insert_with(new);
+    if unit.source == path {
+        return Ok(video);
+    }
+    let (first, second) = (unit.source.display(), path.display());
+    Err(format!("{first} and {second} would both be called {video} in the work folder; rename the second"))
+}
+
+/// Whether an entry means the video: its path, its file name, or a pattern of one of them.
+pub fn names(entry: &str, video: &Path, folder: &Path) -> bool {
+    let file_name = video.file_name().unwrap_or_default().to_string_lossy();
+    if folder.join(entry) == video || *entry == *file_name {
+        return true;
+    }
+    let relative = video.strip_prefix(folder).unwrap_or(video).to_string_lossy();
+    glob::Pattern::new(entry).is_ok_and(|pattern| pattern.matches(&relative) || pattern.matches(&file_name))
+}
+
+/// `<slug of the stem>-<8 hex of BLAKE3 of the path relative to the configuration>`: stable when other videos come,
+/// different for equal names in two folders.
+fn work_name(path: &Path, folder: &Path) -> String {
+    let relative = path.strip_prefix(folder).unwrap_or(path).to_string_lossy().replace('\\', "/");
+    let hash = blake3::hash(relative.as_bytes()).to_hex();
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    format!("{}-{}", slug(&stem), &hash[..8])
+}
+
+/// Lower case letters, digits and single dashes, at most 40 of them; `video` where nothing is left.
+pub fn slug(text: &str) -> String {
+    let mut slug = String::new();
+    for c in text.chars().flat_map(char::to_lowercase) {
+        if c.is_ascii_alphanumeric() {
+            slug.push(c);
+        } else if !slug.is_empty() && !slug.ends_with('-') {
+            slug.push('-');
+        }
+        if slug.len() == 40 {
+            break;
+        }
+    }
+    let slug = slug.trim_end_matches('-');
+    if slug.is_empty() { "video".to_owned() } else { slug.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn root(folder: &Path) -> SearchRoot {
+        SearchRoot::new(folder, &[])
+    }
+
+    #[test]
+    fn equal_names_in_two_folders_differ_and_no_dot_is_left() {
+        let folder = Path::new("/data");
+        let a = work_name(Path::new("/data/a/My Talk.v2.mp4"), folder);
+        let b = work_name(Path::new("/data/b/My Talk.v2.mp4"), folder);
+        assert!(a.starts_with("my-talk-v2-") && a.len() == "my-talk-v2-".len() + 8 && a != b);
+        assert_eq!(slug("Ünï"), "n");
+        assert_eq!(slug("..."), "video");
+    }
+
+    #[test]
+    fn a_pattern_a_folder_and_a_missing_file() {
+        let dir = tempfile::tempdir().unwrap();
+        for name in ["b.mp4", "a.MKV", "notes.txt"] {
+            std::fs::write(dir.path().join(name), "").unwrap();
+        }
+        std::fs::create_dir(dir.path().join("empty")).unwrap();
+        let videos = ["*.mp4", ".", "empty", "none-*.mp4", "gone.mp4"].map(str::to_owned).to_vec();
+        let videos =
+            of_speaker(&SpeakerConfig { name: "host".into(), videos, ..SpeakerConfig::default() }, &root(dir.path()));
+        let names: Vec<&str> = videos.units.iter().map(|unit| unit.video.split('-').next().unwrap()).collect();
+        assert_eq!(names, ["a", "b", "gone"]);
+        assert_eq!(videos.missing.len(), 2);
+    }
+
+    #[test]
+    fn the_folder_of_the_configuration_is_no_pattern() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path().join("talks [2024] *");
+        std::fs::create_dir(&folder).unwrap();
+        std::fs::write(folder.join("a.mp4"), "").unwrap();
+        let videos = of_speaker(&host(&["*.mp4"]), &root(&folder));
+        assert_eq!((videos.units.len(), videos.missing.len()), (1, 0));
+    }
+
+    fn host(videos: &[&str]) -> SpeakerConfig {
+        SpeakerConfig {
+            name: "host".into(),
+            videos: videos.iter().map(|v| (*v).to_owned()).collect(),
+            ..SpeakerConfig::default()
+        }
+    }
+
+    #[test]
+    fn videos_are_left_out_and_put_into_splits_by_name() {
+        let dir = tempfile::tempdir().unwrap();
+        for name in ["a.mp4", "b [1].mp4", "c.mp4", "d.mp4"] {
+            std::fs::write(dir.path().join(name), "").unwrap();
+        }
+        let list = |entries: &[&str]| entries.iter().map(|e| (*e).to_owned()).collect::<Vec<_>>();
+        let mut speaker = SpeakerConfig { exclude: list(&["c.*", "gone.mp4"]), ..host(&["*.mp4"]) };
+        (speaker.test, speaker.train) = (list(&["b [1].mp4"]), list(&[&dir.path().join("a.mp4").to_string_lossy()]));
+        let videos = of_speaker(&speaker, &root(dir.path()));
+        let split = |name: &str| videos.splits.iter().find(|(video, _)| video.starts_with(name)).map(|(_, s)| *s);
+        assert_eq!((videos.units.len(), videos.missing.len()), (3, 0));
+        assert_eq!((split("a-"), split("b-1-"), split("d-")), (Some(Split::Train), Some(Split::Test), None));
+        (speaker.validation, speaker.test) = (list(&["a.mp4", "none.mp4"]), list(&[]));
+        let said = of_speaker(&speaker, &root(dir.path())).missing;
+        assert!(said[0].contains("in train and in validation") && said[1].contains("none.mp4"), "{said:?}");
+    }
+
+    #[test]
+    fn two_videos_never_become_one_without_a_word() {
+        // Names of which nothing is left in the work name, until two have the same eight digits.
+        let mut known = BTreeMap::new();
+        let stem = |n: u32| (0..20).map(|bit| if n >> bit & 1 == 0 { 'é' } else { 'è' }).collect::<String>();
+        let collides = |n: u32| {
+            let file = format!("{}.mp4", stem(n));
+            Some((known.insert(work_name(Path::new(&file), Path::new("")), file.clone())?, file))
+        };
+        let (first, second) = (0..1 << 20).find_map(collides).unwrap();
+        let dir = tempfile::tempdir().unwrap();
+        for file in [&first, &second] {
+            std::fs::write(dir.path().join(file), "").unwrap();
+        }
+        for entries in [&[&*first, &*second][..], &["*.mp4"]] {
+            let videos = of_speaker(&host(entries), &root(dir.path()));
+            assert_eq!((videos.units.len(), videos.missing.len()), (1, 1), "{:?}", videos.missing);
+            assert!(videos.missing[0].contains("would both be called video-"), "{:?}", videos.missing);
+        }
+        assert_eq!(of_speaker(&host(&[&first, &first]), &root(dir.path())).missing, [""; 0]);
+    }
+
+    #[test]
+    fn a_name_that_is_no_text_is_an_error() {
+        use std::os::unix::ffi::OsStrExt as _;
+        let dir = tempfile::tempdir().unwrap();
+        for name in [&b"a.mp4"[..], b"b\xfe.mp4", b"b\xff.mp4", b"b\xff.txt"] {
+            std::fs::write(dir.path().join(std::ffi::OsStr::from_bytes(name)), "").unwrap();
+        }
+        for entry in [".", "*.mp4"] {
+            let videos = of_speaker(&host(&[entry]), &root(dir.path()));
+            assert_eq!((videos.units.len(), videos.missing.len()), (1, 2), "{:?}", videos.missing);
+            assert!(videos.missing.iter().all(|said| said.contains("no text")), "{:?}", videos.missing);
+        }
+    }
+
+    #[test]
+    fn a_pattern_passes_over_what_the_program_wrote() {
+        let dir = tempfile::tempdir().unwrap();
+        for file in ["a.mp4", "talks/b.mp4", "work/extract/host/a-1/audio.wav", "work/report.html", "models/m.onnx"] {
+            let path = dir.path().join(file);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, "").unwrap();
+        }
+        let own = ["work", "models"].map(|name| dir.path().join(name));
+        let own: Vec<&Path> = own.iter().map(PathBuf::as_path).collect();
+        let files = |entry: &str, own: &[&Path]| {
+            let videos = of_speaker(&host(&[entry]), &SearchRoot::new(dir.path(), own)).units;
+            let mut files: Vec<PathBuf> = videos.into_iter().map(|unit| unit.source).filter(|p| p.is_file()).collect();
+            files.sort();
+            files.iter().map(|path| path.strip_prefix(dir.path()).unwrap().to_owned()).collect::<Vec<_>>()
+        };
+        let expected = ["a.mp4", "talks/b.mp4"].map(PathBuf::from);
+        assert_eq!(files("**/*", &own), expected);
+        assert_eq!(files("**/*", &[dir.path()]).len(), 5, "videos inside the work folder itself");
+        // What is named is meant.
+        assert_eq!(files("work/report.html", &own).len(), 1);
+    }
+}

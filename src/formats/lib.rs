@@ -1,0 +1,22 @@
+//! File formats, read and written. Every reader names the file, the place and what was expected.
+
+pub mod authors_txt;
+pub mod bvh;
+pub mod checkpoint;
+pub mod joints;
+pub mod joints_npz;
+pub mod keypoints;
+pub mod keypoints_npz;
+pub mod media_json;
+pub mod mocap;
+pub mod npy;
+pub mod npy_slice;
+pub mod npz;
+pub mod npz_output;
+pub mod search;
+pub mod sound_offset_json;
+pub mod tfevents;
+pub mod timeline_npz;
+pub mod transcript;
+pub mod wav;
+pub mod word_vectors;

@@ -1,0 +1,195 @@
+//! Captured fingers in BVH files: finds the joints of each finger by their names, whatever the rig calls them, and
+//! which of them are which by their order in the hierarchy.
+
+use super::take::{FingerTake, Fingers, Size};
+use crate::bvh::read::{Bvh, Positions};
+use anyhow::{Result, bail};
+use orator_base::math::vec3;
+use orator_base::types::pose2d::N_HAND;
+use orator_base::types::skeleton::Side;
+use std::path::Path;
+
+/// Words for the fingers, thumb first.
+const FINGERS: [&[&str]; 5] = [&["thumb"], &["index"], &["middle", "mid"], &["ring"], &["pinky", "little", "pinkie"]];
+
+/// Both hands of a file, as far as it has their fingers. Errors: unreadable, or no finger joints (names what is known).
+pub fn read(path: &Path) -> Result<Vec<FingerTake>> {
+    let bvh = Bvh::read(path)?;
+    let name = path.file_stem().unwrap_or_default().to_string_lossy();
+    let found: Vec<(Side, [Option<usize>; N_HAND])> =
+        [Side::Left, Side::Right].into_iter().filter_map(|side| Some((side, hand(&bvh, side)?))).collect();
+    if found.is_empty() {
+        let names: Vec<&str> = bvh.joints.iter().map(|j| j.name.as_str()).take(40).collect();
+        bail!(
+            "{}: no finger joints; names must tell the side (left, right, l, r) and the finger (thumb, index, middle, \
+             ring, pinky or little), like LeftHandIndex1, b_l_index1 or thumb_01_r; it has: {}",
+            path.display(),
+            names.join(" ")
+        );
+    }
+    let positions = bvh.positions(Positions::Auto);
+    let take = |(side, joints): (Side, [Option<usize>; N_HAND])| {
+        let frames: Vec<Fingers> = positions.iter().map(|p| joints.map(|j| j.map(|j| p[j]))).collect();
+        let size = if joints[9].is_some() && joints[10].is_some() { Size::Phalanx } else { Size::Palm };
+        FingerTake::whole(&name, side, frames, size)
+    };
+    Ok(found.into_iter().map(take).collect())
+}
+
+/// The joints of a side's hand, wrist first, then thumb to little finger, each base to tip; `None` where there are no
+/// two fingers to hang on one wrist.
+pub fn hand(bvh: &Bvh, side: Side) -> Option<[Option<usize>; N_HAND]> {
+    let chains: Vec<Vec<usize>> = (0..5).map(|finger| chain(bvh, side, finger)).collect();
+    let firsts: Vec<usize> = chains.iter().filter_map(|c| c.first().copied()).collect();
+    let wrist = common_parent(bvh, &firsts)?;
+    let mut joints = [None; N_HAND];
+    joints[0] = Some(wrist);
+    for (finger, chain) in chains.iter().enumerate() {
+        let chain = &chain[usize::from(begins_in_the_palm(bvh, wrist, finger, chain))..];
+        let bones = chain.iter().zip(0..4).take_while(|(joint, k)| *k == 0 || length(bvh, **joint) > 0.0);
+        bones.for_each(|(&joint, k)| joints[1 + 4 * finger + k] = Some(joint));
+    }
+    Some(joints)
+}
+
+/// The joints of that finger from its base on, with the end of its last bone.
+fn chain(bvh: &Bvh, side: Side, finger: usize) -> Vec<usize> {
+    let mut chain: Vec<usize> = Vec::new();
+    for (i, joint) in bvh.joints.iter().enumerate() {
+        let follows = chain.last().is_none_or(|last| joint.parent == Some(*last));
+        if follows && meaning(&joint.name) == Some((side, finger)) {
+            chain.push(i);
+        }
+    }
+    if chain.len() > 1 { chain } else { Vec::new() }
+}
+
+/// The side and the finger a joint's name speaks of.
+fn meaning(name: &str) -> Option<(Side, usize)> {
+    let words = words(name.rsplit(':').next().unwrap_or(name));
+    let all = words.concat();
+    if ["foot", "toe", "eye", "brow", "lip"].iter().any(|w| all.contains(w)) {
+        return None;
+    }
+    // "lthumb" is one word to begin with: the side is what is left of it
+    let (finger, rest) = words.iter().enumerate().find_map(|(i, word)| {
+        FINGERS.iter().enumerate().find_map(|(finger, names)| {
+            let (before, after) = names.iter().find_map(|name| word.split_once(name))?;
+            let ends = after.is_empty() || ["finger", "end", "tip", "l", "r", "left", "right"].contains(&after);
+            let others = words.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, w)| w.as_str());
+            ends.then(|| (finger, [before, after].into_iter().chain(others).map(str::to_owned).collect::<Vec<_>>()))
+        })
+    })?;
+    let says = |side: &str| rest.iter().any(|word| word == &side[..1] || word.contains(side));
+    match (says("left"), says("right")) {
+        (true, false) => Some((Side::Left, finger)),
+        (false, true) => Some((Side::Right, finger)),
+        _ => None,
+    }
+}
+
+/// The words of a name in small letters: apart at signs, digits, and where small letters turn to a capital.
+fn words(name: &str) -> Vec<String> {
+    let letters: Vec<char> = name.chars().collect();
+    let mut words = vec![String::new()];
+    for (i, c) in letters.iter().enumerate() {
+        let small = |k: usize| letters.get(k).is_some_and(|c| c.is_lowercase());
+        let begins = c.is_uppercase() && (i > 0 && small(i - 1) || small(i + 1));
+        if begins || !c.is_alphabetic() {
+            words.push(String::new());
+        }
+        if let (true, Some(word)) = (c.is_alphabetic(), words.last_mut()) {
+            word.extend(c.to_lowercase());
+        }
+    }
+    words.retain(|w| !w.is_empty());
+    words
+}
+
+/// The deepest joint all of them hang on.
+fn common_parent(bvh: &Bvh, joints: &[usize]) -> Option<usize> {
+    let above = |joint: usize| std::iter::successors(bvh.joints[joint].parent, |&j| bvh.joints[j].parent);
+    let (first, others) = joints.split_first()?;
+    let shared = |candidate: &usize| others.iter().all(|&j| above(j).any(|a| a == *candidate));
+    above(*first).find(shared).filter(|_| !others.is_empty())
+}
+
+fn length(bvh: &Bvh, joint: usize) -> f64 {
+    vec3::norm(bvh.joints[joint].offset)
+}
+
+/// Whether a chain's first joint is no knuckle but lies between wrist and knuckle: of a finger, a first joint nearer
+/// to the wrist than to the next; of the thumb, one more joint than a thumb has, counted from 0.
+fn begins_in_the_palm(bvh: &Bvh, wrist: usize, finger: usize, chain: &[usize]) -> bool {
+    let [first, second, ..] = chain else { return false };
+    if finger == 0 {
+        return chain.len() > 4 && bvh.joints[*first].name.contains('0') && !bvh.joints[*second].name.contains("02");
+    }
+    let to_wrist = std::iter::successors(Some(*first), |&j| bvh.joints[j].parent).take_while(|&j| j != wrist);
+    chain.len() > 4 && to_wrist.map(|j| length(bvh, j)).sum::<f64>() < length(bvh, *second)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_many_rigs_are_understood() {
+        let left = |finger| Some((Side::Left, finger));
+        for (name, meant) in [
+            ("mixamorig:LeftHandThumb1", left(0)),
+            ("LeftHandIndex3_end", left(1)),
+            ("LeftInHandMiddle", left(2)),
+            ("b_l_ring0", left(3)),
+            ("l_pinky_1", left(4)),
+            ("LThumb1", left(0)),
+            ("lthumb1", left(0)),
+            ("lMid1", left(2)),
+            ("CC_Base_L_Index1", left(1)),
+            ("thumb_01_l", left(0)),
+            ("Left Little Proximal", left(4)),
+            ("RightHandPinky", Some((Side::Right, 4))),
+            ("r.ring.2", Some((Side::Right, 3))),
+            ("LeftHand", None),
+            ("LeftToeIndex", None),
+            ("SpineMiddle", None),
+            ("String", None),
+            ("Thumb", None),
+        ] {
+            assert_eq!(meaning(name), meant, "{name}");
+        }
+    }
+
+    /// A left hand: thumb of three joints; index with a joint in the palm; middle of four joints, the last without
+    /// length; fingers without end sites.
+    const HAND: &str = "HIERARCHY ROOT Hips { OFFSET 0 0 0 CHANNELS 3 Zrotation Xrotation Yrotation
+        JOINT LeftHand { OFFSET 50 0 0 CHANNELS 0
+          JOINT LeftHandThumb1 { OFFSET 3 0 2 CHANNELS 0 JOINT LeftHandThumb2 { OFFSET 4 0 1 CHANNELS 0
+            JOINT LeftHandThumb3 { OFFSET 3 0 0 CHANNELS 0 End Site { OFFSET 2 0 0 } } } }
+          JOINT LeftHandIndex { OFFSET 3 0 1 CHANNELS 0 JOINT LeftHandIndex1 { OFFSET 6 0 1 CHANNELS 0
+            JOINT LeftHandIndex2 { OFFSET 4 0 0 CHANNELS 0 JOINT LeftHandIndex3 { OFFSET 2 0 0 CHANNELS 0
+            End Site { OFFSET 2 0 0 } } } } }
+          JOINT LeftHandMiddle1 { OFFSET 9 0 0 CHANNELS 0 JOINT LeftHandMiddle2 { OFFSET 4.5 0 0 CHANNELS 0
+            JOINT LeftHandMiddle3 { OFFSET 2.5 0 0 CHANNELS 0 JOINT LeftHandMiddle4 { OFFSET 0 0 0 CHANNELS 0
+            End Site { OFFSET 0 0 0 } } } } } } }
+        MOTION Frames: 2 Frame Time: 0.04 0 0 0 90 0 0";
+
+    #[test]
+    fn joints_find_their_places_in_the_hand() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.bvh");
+        std::fs::write(&path, HAND).unwrap();
+        let takes = read(&path).unwrap();
+        assert_eq!(takes.len(), 1);
+        let frame = takes[0].frames[0];
+        assert_eq!(frame[0], Some([50.0, 0.0, 0.0]));
+        assert_eq!(frame[4], Some([62.0, 0.0, 3.0]));
+        assert_eq!(frame[5], Some([59.0, 0.0, 2.0]), "the joint in the palm is no knuckle");
+        assert_eq!((frame[11], frame[12]), (Some([66.0, 0.0, 0.0]), None), "a bone without length ends nowhere");
+        assert!(frame[13].is_none());
+        let truths = takes[0].truths().unwrap();
+        assert!((truths[0].hand[9][0] + 0.096).abs() < 1e-6, "mirrored, the phalanx 48 mm");
+        std::fs::write(&path, HAND.replace("LeftHand", "Tail")).unwrap();
+        assert!(format!("{:#}", read(&path).unwrap_err()).contains("TailIndex1"));
+    }
+}

@@ -1,0 +1,9 @@
+//! Motion that others captured, read into this program's skeleton.
+
+pub mod bvh;
+pub mod captured;
+pub mod facing;
+pub mod fingers;
+pub mod motion_file;
+pub mod take;
+pub mod ted;

@@ -1,0 +1,153 @@
+//! One sound to motion to files. The sound is streamed, so that its length takes no memory but for its motion; only a film,
+//! which holds the sound, reads it whole.
+
+use super::spoken::{SpeechSource, SpokenMotion};
+use crate::generate::GestureGenerator;
+use crate::generate::generator::CHUNK;
+use crate::generate::model::BEST;
+use anyhow::{Context as _, Result, ensure};
+use orator_avatar::animate::export::file::{ExportContent, ExportFormat};
+use orator_avatar::animate::{AnimationOptions, perform};
+use orator_base::audio::mel;
+use orator_base::stage::progress::Progress;
+use orator_base::stage::workdir::FolderLock;
+use orator_base::types::pose3d::Motion;
+use orator_base::types::posture::Posture;
+use orator_base::types::sound::SAMPLE_RATE;
+use orator_formats::checkpoint;
+use orator_media::ffmpeg::UnreadableMedia;
+use orator_media::ffmpeg::sound_stream;
+use orator_media::ffmpeg::sound_stream::SoundStream;
+use orator_media::ffmpeg::{audio, probe};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// The checkpoint file meant by a file or a training's folder: its best, else its newest.
+///
+/// # Errors
+/// A path that is not there, a folder without checkpoints.
+pub fn checkpoint_file(path: &Path) -> Result<PathBuf> {
+    ensure!(path.exists(), "{} is not there; `orator train gan` makes checkpoints", path.display());
+    if !path.is_dir() {
+        return Ok(path.to_owned());
+    }
+    let best = path.join(BEST);
+    if best.is_file() {
+        return Ok(best);
+    }
+    let newest = checkpoint::list(path)?.pop();
+    newest
+        .map(|(_, file)| file)
+        .with_context(|| format!("{} holds no checkpoint (best.safetensors or step-*.safetensors)", path.display()))
+}
+
+/// Keeps the model of a checkpoint, a file or a training's folder, from being forgotten while it is in use.
+pub fn model_lock(checkpoint: &Path) -> Result<FolderLock> {
+    FolderLock::shared(if checkpoint.is_dir() { checkpoint } else { checkpoint.parent().unwrap_or(checkpoint) })
+}
+
+/// Writes the motion of `speaker` for a sound to `outputs`. Errors name the sound.
+pub fn write_motion(
+    speaker: &GestureGenerator,
+    speech: &SpeechSource,
+    outputs: &[(PathBuf, ExportFormat)],
+    progress: &dyn Progress,
+) -> Result<SpokenMotion> {
+    let audio = speech.audio;
+    let started = Instant::now();
+    let task = progress.begin("speech to motion", 0);
+    task.detail("listening");
+    let (n_samples, note) = measure(audio)?;
+    let secs = n_samples as f64 / f64::from(SAMPLE_RATE);
+    let no_motion = || format!("no motion for {}", audio.display());
+    let n_frames = speaker.n_frames(n_samples).with_context(no_motion)?;
+    drop(task);
+    let task = progress.begin("speech to motion", n_frames as u64);
+    task.detail(&format!("{secs:.1} s of sound"));
+    let pieces = SoundStream::open(audio, SAMPLE_RATE);
+    let (motion, posture) =
+        speaker.motion_of_pieces(pieces, n_samples, CHUNK, &mut |n| task.advance(n as u64)).with_context(no_motion)?;
+    drop(task);
+    let motion_secs = started.elapsed().as_secs_f64();
+    write_outputs((motion, posture), speech, outputs, progress)?;
+    Ok(SpokenMotion { secs, n_frames, motion_secs, note, segments: None })
+}
+
+/// Writes motion for a sound to files of all formats.
+pub(super) fn write_outputs(
+    (motion, posture): (Motion, Option<Posture>),
+    &SpeechSource { audio, figure, .. }: &SpeechSource,
+    outputs: &[(PathBuf, ExportFormat)],
+    progress: &dyn Progress,
+) -> Result<()> {
+    // Files of joints hold what the network gave, before it is put on a figure.
+    let (joints, figures): (Vec<_>, Vec<_>) = outputs.iter().partition(|(_, format)| format.holds_joints());
+    for (path, format) in joints {
+        format.write_joints(path, &motion)?;
+    }
+    if !figures.is_empty() {
+        let performance =
+            perform(&motion, posture.as_ref(), &AnimationOptions { fps: figure.fps, ..AnimationOptions::default() });
+        let posture = posture.as_ref().map(|posture| (motion.fps, posture));
+        drop(motion);
+        let is_film = figures.iter().any(|(_, format)| *format == ExportFormat::Mp4);
+        let sound = if is_film { audio::read_mono(audio, SAMPLE_RATE)? } else { None };
+        let sources = ExportContent {
+            sound: sound.as_ref(),
+            names: figure.names,
+            film_fps: figure.fps,
+            posture,
+            ..ExportContent::default()
+        };
+        for (path, format) in figures {
+            format.write(path, &performance, &sources, progress)?;
+        }
+    }
+    Ok(())
+}
+
+/// Number of samples of the sound at 16 kHz, and what a user should know of it.
+pub(super) fn measure(path: &Path) -> Result<(usize, Option<String>)> {
+    ensure!(path.exists(), "{} is not there", path.display());
+    ensure!(path.is_file(), "{} is no file", path.display());
+    let info = probe::probe(path)?;
+    let name = path.display();
+    let Some(track) = info.audio else {
+        return Err(UnreadableMedia(format!("{name} has no sound track; give a file with speech")).into());
+    };
+    match sound_stream::n_samples(path, SAMPLE_RATE)? {
+        Some(n) if n > 0 => Ok((n, narrow_band_note(track.rate))),
+        _ => {
+            let problem =
+                format!("{name}: its sound track ({}) holds no samples; give a file with speech", track.codec);
+            Err(UnreadableMedia(problem).into())
+        }
+    }
+}
+
+/// The note on a sample rate too low for the spectrogram.
+fn narrow_band_note(rate: u32) -> Option<String> {
+    let highest_hz = f64::from(rate) / 2.0;
+    if rate == 0 || highest_hz >= mel::HIGHEST_HZ {
+        return None;
+    }
+    let n_empty = (0..mel::N_MELS).filter(|band| mel::lowest_hz(*band) >= highest_hz).count();
+    Some(format!(
+        "the sound has {rate} samples a second, so nothing above {highest_hz:.0} Hz: {n_empty} of the {} mel bands a speaker \
+         listens to are empty, and it gestures as to muffled speech",
+        mel::N_MELS
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::narrow_band_note;
+
+    #[test]
+    fn a_telephone_gives_a_note() {
+        assert_eq!(narrow_band_note(16_000), None);
+        assert_eq!(narrow_band_note(44_100), None);
+        let text = narrow_band_note(8000).unwrap();
+        assert!(text.contains("4000 Hz") && text.contains("of the 64 mel bands"), "{text}");
+    }
+}

@@ -1,0 +1,92 @@
+//! One sound, and where there is one its transcript, to motion by a sequence-to-sequence network, to files.
+
+use super::motion_files::{measure, write_outputs};
+use super::spoken::{SegmentFacts, SpeechSource, SpokenMotion};
+use crate::generate::seq2seq::SequenceGenerator;
+use anyhow::{Context as _, Result, bail, ensure};
+use orator_avatar::animate::export::file::{ExportFormat, FigureOptions};
+use orator_base::stage::progress::Progress;
+use orator_base::stage::workdir;
+use orator_formats::transcript::{Transcript, after_end};
+use orator_media::ffmpeg::audio;
+use orator_nn::seq2seq::predict::StateAtSeams;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Motion of a speaker for one sound, written to `outputs`. A network that learnt captures writes its own skeleton, as .bvh
+/// alone.
+///
+/// # Errors
+/// A sound or transcript that cannot be read, a sound shorter than a frame, another format for a captured skeleton.
+pub fn write_sequence(
+    speaker: &SequenceGenerator,
+    speech: &SpeechSource,
+    outputs: &[(PathBuf, ExportFormat)],
+    progress: &dyn Progress,
+) -> Result<SpokenMotion> {
+    let &SpeechSource { audio, transcript, seams, figure } = speech;
+    let started = Instant::now();
+    let is_captured = speaker.is_captured();
+    if let Some((path, _)) = outputs.iter().find(|(_, format)| is_captured && *format != ExportFormat::Bvh) {
+        bail!(
+            "{}: this network moves the skeleton of the BVH files it was trained on, which is written as .bvh alone",
+            path.display()
+        );
+    }
+    ensure!(
+        !is_captured || figure == FigureOptions::default(),
+        "this network moves the skeleton of the BVH files it was trained on, whose names and rate are kept: leave out \
+         --names and --fps"
+    );
+    let said = transcript.map(Transcript::read).transpose()?;
+    let task = progress.begin("speech to motion", 0);
+    measure(audio)?;
+    let sound = audio::read_mono(audio, speaker.metadata.rate)?;
+    let sound = sound.with_context(|| format!("{} has no sound", audio.display()))?;
+    let words = said.as_ref().map_or(&[][..], |said| &said.words);
+    let no_motion = || format!("no motion for {}", audio.display());
+    let heard = speaker.hear(&sound, words).with_context(no_motion)?;
+    let poses = speaker.speak(&heard, seams).with_context(no_motion)?;
+    let motion_secs = started.elapsed().as_secs_f64();
+    let other = match seams {
+        StateAtSeams::Renewed => StateAtSeams::Carried,
+        StateAtSeams::Carried => StateAtSeams::Renewed,
+    };
+    let other_seam_jump = speaker.speak(&heard, other).with_context(no_motion)?.seam_jump;
+    drop((task, heard));
+    if is_captured {
+        let text = speaker.bvh(&poses)?;
+        outputs.iter().try_for_each(|(path, _)| workdir::write_file(path, text.as_bytes()))?;
+    } else {
+        write_outputs((speaker.motion(&poses)?, None), speech, outputs, progress)?;
+    }
+    let known = said.as_ref().map(|said| [said.words.len(), speaker.metadata.vocabulary.n_known(&said.words)]);
+    let notes = transcript.zip(said).map(|(path, said)| notes(speaker, path, &said, sound.secs()));
+    Ok(SpokenMotion {
+        secs: sound.secs(),
+        n_frames: poses.numbers.nrows(),
+        motion_secs,
+        note: notes.filter(|notes| !notes.is_empty()).map(|notes| notes.join("; ")),
+        segments: Some(SegmentFacts {
+            state: seams,
+            seam_jump: poses.seam_jump,
+            other_seam_jump,
+            words: known.filter(|_| speaker.reads_words()),
+        }),
+    })
+}
+
+/// What a user should know of a transcript.
+fn notes(speaker: &SequenceGenerator, path: &Path, said: &Transcript, sound_secs: f64) -> Vec<String> {
+    if !speaker.reads_words() {
+        return vec![format!("the network reads no words: {} was not used", path.display())];
+    }
+    let is_unknown = !said.words.is_empty() && speaker.metadata.vocabulary.n_known(&said.words) == 0;
+    let unknown = is_unknown.then(|| {
+        format!(
+            "none of the {} words was trained with: is the transcript in the language of the training?",
+            said.words.len()
+        )
+    });
+    said.notes.iter().cloned().chain(after_end(&said.words, sound_secs)).chain(unknown).collect()
+}

@@ -1,0 +1,209 @@
+//! Which sounds a batch has and what each motion is called: from a folder, or from a table of comma-separated values (RFC 4180;
+//! semicolons and tabs are understood too).
+
+use anyhow::{Context, Result, bail, ensure};
+use orator_avatar::animate::export::file::ExportFormat;
+use orator_formats::search;
+use std::collections::BTreeMap;
+use std::path::{Component, Path, PathBuf};
+
+/// Endings of files that have sound.
+const SOUNDS: [&str; 18] = [
+    "wav", "flac", "mp3", "ogg", "oga", "opus", "m4a", "aac", "aif", "aiff", "wma", "caf", "mp4", "m4v", "mov", "mkv",
+    "webm", "avi",
+];
+
+/// A sound of a batch.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BatchSound {
+    /// A file with sound.
+    pub audio: PathBuf,
+    /// The motion's name below the folder of outputs, `/` between folders, without an ending.
+    pub name: String,
+    /// The checkpoint, if it is not that of the command.
+    pub checkpoint: Option<PathBuf>,
+    /// What is said in it, for a network that reads words.
+    pub transcript: Option<PathBuf>,
+}
+
+/// All that sounds below `folder`, each called as its file; where two would be called the same, with their endings. What is
+/// below `out`, where motions go, is none of it: films sound too.
+pub fn of_folder(folder: &Path, out: &Path) -> Result<Vec<BatchSound>> {
+    ensure!(folder.is_dir(), "{} is no folder", folder.display());
+    let out = out.canonicalize().ok();
+    ensure!(
+        out != folder.canonicalize().ok(),
+        "motions would lie among the sounds in {}; choose another --out-folder, say {}",
+        folder.display(),
+        folder.join("motions").display()
+    );
+    let mut enter = |folder: &Path| folder.canonicalize().ok() != out;
+    let sounds = |path: &PathBuf| {
+        let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        SOUNDS.contains(&ending.as_str())
+    };
+    let named = |path: PathBuf| (path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().into_owned(), path);
+    let files: Vec<(String, PathBuf)> =
+        search::files(folder, &mut enter)?.into_iter().filter(sounds).map(named).collect();
+    ensure!(!files.is_empty(), "{} holds no file that sounds ({})", folder.display(), SOUNDS.join(", "));
+    let stem = |file: &str| file.rsplit_once('.').map_or(file, |(stem, _)| stem).to_owned();
+    let mut called = BTreeMap::<String, usize>::new();
+    files.iter().for_each(|(file, _)| *called.entry(stem(file).to_lowercase()).or_default() += 1);
+    let rows = files.into_iter().map(|(file, audio)| {
+        let alone = called.get(&stem(&file).to_lowercase()) == Some(&1);
+        BatchSound {
+            audio,
+            name: if alone { stem(&file) } else { file.replacen('.', "_", usize::MAX) },
+            checkpoint: None,
+            transcript: None,
+        }
+    });
+    distinct(rows.collect())
+}
+
+/// The rows of the table `path`: columns `audio`, and if they are there `out`, `checkpoint` (or `speaker`) and `transcript`. Paths count
+/// from the table's folder. Errors name the line.
+pub fn of_table(path: &Path) -> Result<Vec<BatchSound>> {
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let text = std::str::from_utf8(&bytes).with_context(|| format!("{} is no text in UTF-8", path.display()))?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    parse(text, folder).and_then(distinct).with_context(|| format!("the table {}", path.display()))
+}
+
+fn parse(text: &str, folder: &Path) -> Result<Vec<BatchSound>> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let heads = text.lines().next().unwrap_or_default();
+    let comma = [',', ';', '\t'].into_iter().max_by_key(|c| heads.matches(*c).count()).filter(|c| heads.contains(*c));
+    let mut lines = fields(text, comma.unwrap_or(','))?.into_iter();
+    let (_, heads) =
+        lines.next().context("it is empty; its first line names the columns: audio,out,checkpoint,transcript")?;
+    let heads: Vec<String> = heads.iter().map(|head| head.trim().to_lowercase()).collect();
+    for head in &heads {
+        let known = ["audio", "out", "checkpoint", "speaker", "transcript"].contains(&head.as_str());
+        ensure!(known, "line 1: column `{head}` is unknown; expected audio, out, checkpoint, transcript");
+    }
+    let column = |names: &[&str]| heads.iter().position(|head| names.contains(&head.as_str()));
+    let audio = column(&["audio"]).context("line 1: there is no column `audio`")?;
+    let (out, checkpoint, transcript) = (column(&["out"]), column(&["checkpoint", "speaker"]), column(&["transcript"]));
+    let mut rows = Vec::new();
+    for (line, fields) in lines {
+        let field = |at: Option<usize>| at.and_then(|at| fields.get(at)).map(|f| f.trim()).filter(|f| !f.is_empty());
+        let n = (fields.len(), heads.len());
+        ensure!(n.0 <= n.1, "line {line}: {} fields under {} columns", n.0, n.1);
+        let Some(file) = field(Some(audio)) else { bail!("line {line}: no audio is named") };
+        let name = match field(out) {
+            Some(out) => named(out).with_context(|| format!("line {line}"))?,
+            None => named(&Path::new(file).file_stem().unwrap_or_default().to_string_lossy())
+                .with_context(|| format!("line {line}"))?,
+        };
+        rows.push(BatchSound {
+            audio: folder.join(file),
+            name,
+            checkpoint: field(checkpoint).map(|path| folder.join(path)),
+            transcript: field(transcript).map(|path| folder.join(path)),
+        });
+    }
+    ensure!(!rows.is_empty(), "it names no sound");
+    Ok(rows)
+}
+
+/// A motion's name as given: relative, below the folder of outputs, without the ending of a format.
+fn named(out: &str) -> Result<String> {
+    let path = Path::new(out);
+    let path = if ExportFormat::from_path(path).is_ok() { path.with_extension("") } else { path.to_owned() };
+    let parts: Option<Vec<String>> = path
+        .components()
+        .filter(|part| *part != Component::CurDir)
+        .map(|part| if let Component::Normal(part) = part { part.to_str().map(str::to_owned) } else { None })
+        .collect();
+    let parts = parts.filter(|parts| !parts.is_empty() && !parts.iter().any(|part| part.starts_with('.')));
+    let parts = parts.with_context(|| format!("out `{out}` is no name below the folder of outputs"))?;
+    Ok(parts.join("/"))
+}
+
+/// Errors where two motions would be one file, upper and lower case being the same on many disks.
+fn distinct(rows: Vec<BatchSound>) -> Result<Vec<BatchSound>> {
+    let mut seen = BTreeMap::new();
+    for row in &rows {
+        if let Some(other) = seen.insert(row.name.to_lowercase(), &row.audio) {
+            bail!("{} and {} would both be written to `{}`", other.display(), row.audio.display(), row.name);
+        }
+    }
+    Ok(rows)
+}
+
+/// Fields of each line with something on it, and its number.
+fn fields(text: &str, comma: char) -> Result<Vec<(usize, Vec<String>)>> {
+    let mut table =
+        csv::ReaderBuilder::new().delimiter(comma as u8).has_headers(false).flexible(true).from_reader(text.as_bytes());
+    let (mut rows, mut last) = (Vec::new(), (1, ""));
+    for record in table.records() {
+        let record = record?;
+        // The position is before the empty lines that lead to the record.
+        let (line, rest) = record.position().map_or((1, text), |at| (at.line() as usize, &text[at.byte() as usize..]));
+        let body = rest.trim_start_matches(['\r', '\n']);
+        let line = line + rest[..rest.len() - body.len()].matches('\n').count();
+        rows.push((line, record.iter().map(str::to_owned).collect::<Vec<_>>()));
+        last = (line, body);
+    }
+    // An open quotation mark reaches to the end of the table.
+    ensure!(last.1.matches('"').count() % 2 == 0, "line {}: a quotation mark is not closed", last.0);
+    rows.retain(|(_, fields)| fields.iter().any(|field| !field.trim().is_empty()));
+    Ok(rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tables_of_every_kind_are_read() {
+        let row = |audio: &str, name: &str, checkpoint: Option<&str>| BatchSound {
+            audio: PathBuf::from(audio),
+            name: name.into(),
+            checkpoint: checkpoint.map(PathBuf::from),
+            transcript: None,
+        };
+        let read = |text: &str| parse(text, Path::new("t")).unwrap();
+        assert_eq!(read("audio\na.wav\n\nsub/b.mp3"), [row("t/a.wav", "a", None), row("t/sub/b.mp3", "b", None)]);
+        let text = "\u{feff}Out;Audio;speaker\r\n\"take \"\"1\"\".bvh\";\"a;b.wav\";host\r\nx/y;/c.wav;\r\n";
+        assert_eq!(read(text), [row("t/a;b.wav", "take \"1\"", Some("t/host")), row("/c.wav", "x/y", None)]);
+        let said = read("audio,transcript\na.wav,said.srt\nb.wav,\n").into_iter().map(|row| row.transcript);
+        assert_eq!(said.collect::<Vec<_>>(), [Some(PathBuf::from("t/said.srt")), None]);
+    }
+
+    #[test]
+    fn what_is_wrong_is_named_with_its_line() {
+        for (text, words) in [
+            ("", "empty"),
+            ("out\na", "no column `audio`"),
+            ("audio,loud\na.wav,1", "`loud` is unknown"),
+            ("audio\n", "names no sound"),
+            ("audio,out\na.wav,../b", "line 2"),
+            ("audio,out\na.wav,/b", "line 2"),
+            ("audio,out\n\n,b", "line 3: no audio"),
+            ("audio\na.wav,b", "line 2: 2 fields under 1"),
+            ("audio\n\"a.wav", "line 2: a quotation mark"),
+            ("audio,out\na.wav,Same\nb.wav,same.bvh", "a.wav and t/b.wav would both be written to `same`"),
+        ] {
+            let error = parse(text, Path::new("t")).and_then(distinct).unwrap_err();
+            assert!(format!("{error:#}").contains(words), "{text:?}: {error:#}");
+        }
+    }
+
+    #[test]
+    fn a_folders_sounds_keep_apart() {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::create_dir(dir.path().join("sub")).unwrap();
+        for file in ["a.wav", "A.mp3", "b.WAV", "notes.txt", ".hidden.wav", "sub/a.wav"] {
+            std::fs::write(dir.path().join(file), "").unwrap();
+        }
+        let names = |out: &str| -> Vec<String> {
+            of_folder(dir.path(), &dir.path().join(out)).unwrap().into_iter().map(|row| row.name).collect()
+        };
+        assert_eq!(names("elsewhere"), ["A_mp3", "a_wav", "b", "sub/a"]);
+        assert_eq!(names("sub"), ["A_mp3", "a_wav", "b"]);
+        assert!(of_folder(dir.path(), dir.path()).unwrap_err().to_string().contains("--out-folder"));
+        assert!(of_folder(&dir.path().join("none"), dir.path()).is_err());
+    }
+}

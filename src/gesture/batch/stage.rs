@@ -1,0 +1,168 @@
+//! The stage: one unit a sound, whose motion goes into the common folder in each of the formats.
+
+use super::motion_files::{checkpoint_file, model_lock};
+use super::sounds::BatchSound;
+use super::speaker;
+use super::spoken::SpeechSource;
+use crate::generate::seq2seq::metadata::is_sequence;
+use crate::generate::trained::TrainedSpeaker;
+use anyhow::{Context, Result, bail, ensure};
+use orator_avatar::animate::AnimationOptions;
+use orator_avatar::animate::export::file::{ExportFormat, FigureOptions};
+use orator_base::stage::progress::Progress;
+use orator_base::stage::workdir::FolderLock;
+use orator_base::stage::{Input, Report, Stage, Unit};
+use orator_nn::seq2seq::predict::StateAtSeams;
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+
+/// Sounds to motion files.
+pub struct BatchStage {
+    sounds: BTreeMap<String, BatchSound>,
+    /// Endings with their formats.
+    formats: Vec<(String, ExportFormat)>,
+    folder: PathBuf,
+    /// Of the sounds that name none.
+    checkpoint: Option<PathBuf>,
+    /// What sequence-to-sequence networks begin a segment with.
+    seams: StateAtSeams,
+    figure: FigureOptions,
+    /// The models in use, with the locks of their folders.
+    speakers: Mutex<BTreeMap<PathBuf, (Arc<TrainedSpeaker>, FolderLock)>>,
+}
+
+impl BatchStage {
+    /// Writes into `folder` in the formats of those endings. `checkpoint`, a file or a training's folder, is for sounds
+    /// that name none.
+    ///
+    /// # Errors
+    /// An ending that is unknown or named twice, a sound without a checkpoint, a `checkpoint` that cannot be read.
+    pub fn new(
+        sounds: &[BatchSound],
+        endings: &[String],
+        folder: &Path,
+        checkpoint: Option<&Path>,
+        seams: StateAtSeams,
+        figure: FigureOptions,
+    ) -> Result<Self> {
+        let checkpoint = checkpoint.map(checkpoint_file).transpose()?;
+        if checkpoint.is_none()
+            && let Some(sound) = sounds.iter().find(|sound| sound.checkpoint.is_none())
+        {
+            bail!("the table names no checkpoint for {}; give --checkpoint", sound.audio.display());
+        }
+        let stage = Self {
+            sounds: sounds.iter().map(|sound| (sound.name.clone(), sound.clone())).collect(),
+            formats: formats(endings)?,
+            folder: folder.to_owned(),
+            checkpoint,
+            seams,
+            figure,
+            speakers: Mutex::default(),
+        };
+        // A common checkpoint that cannot be read fails all sounds, and does so before any.
+        stage.checkpoint.as_deref().map(|path| stage.speaker(path)).transpose()?;
+        Ok(stage)
+    }
+
+    /// The unit of a sound.
+    pub fn unit(sound: &BatchSound) -> Unit {
+        Unit { speaker: String::new(), video: sound.name.clone(), source: sound.audio.clone() }
+    }
+
+    fn sound(&self, unit: &Unit) -> Result<&BatchSound> {
+        self.sounds.get(&unit.video).with_context(|| format!("{unit} is no sound of this batch"))
+    }
+
+    /// The transcript of a sound, which a sequence-to-sequence network alone reads.
+    fn transcript_of(&self, unit: &Unit) -> Result<Option<&Path>> {
+        let transcript = self.sound(unit)?.transcript.as_deref();
+        Ok(transcript.filter(|_| self.checkpoint_of(unit).and_then(|path| is_sequence(&path)).unwrap_or(false)))
+    }
+
+    fn checkpoint_of(&self, unit: &Unit) -> Result<PathBuf> {
+        let sound = self.sound(unit)?;
+        let own = sound.checkpoint.as_deref().map(checkpoint_file).transpose()?;
+        own.or_else(|| self.checkpoint.clone()).context("no checkpoint is named")
+    }
+
+    fn speaker(&self, checkpoint: &Path) -> Result<Arc<TrainedSpeaker>> {
+        let mut speakers = self.speakers.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        if let Some((speaker, _)) = speakers.get(checkpoint) {
+            return Ok(speaker.clone());
+        }
+        let lock = model_lock(checkpoint)?;
+        let speaker = Arc::new(TrainedSpeaker::open(checkpoint)?);
+        speakers.insert(checkpoint.to_owned(), (speaker.clone(), lock));
+        Ok(speaker)
+    }
+}
+
+impl Stage for BatchStage {
+    fn name(&self) -> &'static str {
+        "generate"
+    }
+
+    fn version(&self) -> u32 {
+        2
+    }
+
+    fn settings(&self, _unit: &Unit) -> serde_json::Value {
+        let endings: Vec<&str> = self.formats.iter().map(|(ending, _)| ending.as_str()).collect();
+        let mut settings = json!({ "formats": endings, "animation": format!("{:?}", AnimationOptions::default()) });
+        if self.seams != StateAtSeams::default() {
+            settings["state"] = json!(self.seams);
+        }
+        if self.figure != FigureOptions::default() {
+            settings["figure"] = json!({ "names": self.figure.names.label(), "fps": self.figure.fps });
+        }
+        settings
+    }
+
+    fn inputs(&self, unit: &Unit) -> Result<Vec<Input>> {
+        let input = |role: &str, path| Input { role: role.to_owned(), path };
+        let transcript = self.transcript_of(unit)?.map(|path| input("transcript", path.to_owned()));
+        let needed = [input("sound", unit.source.clone()), input("checkpoint", self.checkpoint_of(unit)?)];
+        Ok(needed.into_iter().chain(transcript).collect())
+    }
+
+    fn common_folder(&self) -> Option<&Path> {
+        Some(&self.folder)
+    }
+
+    fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> Result<Report> {
+        let speaker = self.speaker(&self.checkpoint_of(unit)?)?;
+        let file = |ending: &str| format!("{}.{ending}", unit.video);
+        for (ending, _) in &self.formats {
+            let path = self.folder.join(file(ending));
+            let is_sound = path.canonicalize().is_ok_and(|p| unit.source.canonicalize().is_ok_and(|s| s == p));
+            ensure!(!is_sound, "{} is the speech itself; choose another --out-folder", path.display());
+        }
+        let outputs: Vec<(PathBuf, ExportFormat)> =
+            self.formats.iter().map(|(ending, format)| (out.join(file(ending)), *format)).collect();
+        let (transcript, seams, figure) = (self.transcript_of(unit)?, self.seams, self.figure);
+        let source = SpeechSource { audio: &unit.source, transcript, seams, figure };
+        let written = speaker::write(&speaker, &source, &outputs, progress)?;
+        let mut facts = json!({
+            "secs": written.secs, "n_frames": written.n_frames, "speaker": speaker.name(), "note": written.note,
+        });
+        if let Some(segments) = &written.segments {
+            facts["segments"] = json!(segments);
+        }
+        Ok(Report { line: String::new(), facts: facts.as_object().cloned().unwrap_or_default() })
+    }
+}
+
+/// The formats by their endings.
+fn formats(endings: &[String]) -> Result<Vec<(String, ExportFormat)>> {
+    let mut formats: Vec<(String, ExportFormat)> = Vec::new();
+    for ending in endings {
+        let ending = ending.trim().trim_start_matches('.').to_lowercase();
+        let format = ExportFormat::from_path(Path::new(&format!("motion.{ending}"))).context("--format")?;
+        ensure!(formats.iter().all(|(known, _)| *known != ending), "--format names {ending} twice");
+        formats.push((ending, format));
+    }
+    Ok(formats)
+}

@@ -1,0 +1,116 @@
+//! Constant poses: mean and median of many poses, joint by joint. Values are counted in fine bins, so that memory does
+//! not grow with the data and the contribution of one clip can be subtracted again.
+
+use ndarray::{Array2, ArrayView2, ArrayView3};
+use orator_base::types::skeleton::N_JOINTS;
+
+const N_NUMBERS: usize = 3 * N_JOINTS;
+/// Range of the bins on either side, metres, and their number: 0.25 mm each.
+const REACH: f64 = 1.5;
+const N_BINS: usize = 12_000;
+
+/// Counts of poses.
+#[derive(Clone)]
+pub struct ConstantPoses {
+    n: Vec<u64>,
+    sum: Vec<f64>,
+    /// Counts [147, `N_BINS`].
+    bins: Vec<u32>,
+}
+
+impl Default for ConstantPoses {
+    fn default() -> Self {
+        Self { n: vec![0; N_NUMBERS], sum: vec![0.0; N_NUMBERS], bins: vec![0; N_NUMBERS * N_BINS] }
+    }
+}
+
+impl ConstantPoses {
+    /// Adds the joints [T, 49, 3], metres, whose mask [T, 49] is true.
+    pub fn add(&mut self, joints: ArrayView3<f32>, mask: ArrayView2<bool>) {
+        self.count(joints, mask, true);
+    }
+
+    /// Subtracts joints that were added before.
+    pub fn take_away(&mut self, joints: ArrayView3<f32>, mask: ArrayView2<bool>) {
+        self.count(joints, mask, false);
+    }
+
+    fn count(&mut self, joints: ArrayView3<f32>, mask: ArrayView2<bool>, adds: bool) {
+        for (frame, seen) in joints.outer_iter().zip(mask.outer_iter()) {
+            for (i, value) in frame.iter().enumerate().filter(|(i, value)| seen[i / 3] && value.is_finite()) {
+                let value = f64::from(*value);
+                let bin = &mut self.bins[i * N_BINS + bin_of(value)];
+                if adds {
+                    self.n[i] += 1;
+                    self.sum[i] += value;
+                    *bin += 1;
+                } else {
+                    self.n[i] = self.n[i].saturating_sub(1);
+                    self.sum[i] -= value;
+                    *bin = bin.saturating_sub(1);
+                }
+            }
+        }
+    }
+
+    /// Mean pose [49, 3], metres; NaN where nothing was seen.
+    pub fn mean(&self) -> Array2<f32> {
+        pose(|i| if self.n[i] > 0 { self.sum[i] / self.n[i] as f64 } else { f64::NAN })
+    }
+
+    /// Median pose [49, 3], metres, to 0.25 mm; NaN where nothing was seen.
+    pub fn median(&self) -> Array2<f32> {
+        // For an even count the mean of the two values in the middle.
+        pose(|i| (self.ranked(i, self.n[i].saturating_sub(1) / 2) + self.ranked(i, self.n[i] / 2)) / 2.0)
+    }
+
+    /// Value of coordinate `i` with rank `rank`, spread evenly within its bin.
+    fn ranked(&self, i: usize, rank: u64) -> f64 {
+        let mut before = 0;
+        for (bin, count) in self.bins[i * N_BINS..(i + 1) * N_BINS].iter().enumerate() {
+            let count = u64::from(*count);
+            if before + count > rank {
+                let inside = (rank - before) as f64 + 0.5;
+                return (bin as f64 + inside / count as f64) / N_BINS as f64 * 2.0 * REACH - REACH;
+            }
+            before += count;
+        }
+        f64::NAN
+    }
+}
+
+fn bin_of(value: f64) -> usize {
+    (((value + REACH) / (2.0 * REACH) * N_BINS as f64).max(0.0) as usize).min(N_BINS - 1)
+}
+
+fn pose(number: impl Fn(usize) -> f64) -> Array2<f32> {
+    Array2::from_shape_fn((N_JOINTS, 3), |(joint, k)| number(3 * joint + k) as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::{Array3, s};
+
+    #[test]
+    fn mean_and_median_are_those_of_what_is_left() {
+        let joints = Array3::from_shape_fn((101, N_JOINTS, 3), |(t, joint, k)| {
+            ((t * 37 % 101) as f32).powi(2) * 1e-4 + (joint + k) as f32 * 0.001
+        });
+        let mut mask = Array2::from_elem((101, N_JOINTS), true);
+        mask.column_mut(9).fill(false);
+        let mut constant_poses = ConstantPoses::default();
+        constant_poses.add(joints.view(), mask.view());
+        let (mean, median) = (constant_poses.mean(), constant_poses.median());
+        let values: Vec<f64> = (0..101).map(|t| f64::from(t * t) * 1e-4 + 0.005).collect();
+        assert!((f64::from(mean[[5, 0]]) - values.iter().sum::<f64>() / 101.0).abs() < 1e-6);
+        assert!((f64::from(median[[5, 0]]) - values[50]).abs() < 3e-4, "{}", median[[5, 0]]);
+        assert!(mean[[9, 0]].is_nan() && median[[9, 2]].is_nan());
+        let part = s![40.., .., ..];
+        constant_poses.take_away(joints.slice(part), mask.slice(s![40.., ..]));
+        let mut rest = ConstantPoses::default();
+        rest.add(joints.slice(s![..40, .., ..]), mask.slice(s![..40, ..]));
+        assert!((&constant_poses.mean() - &rest.mean()).iter().all(|v| v.is_nan() || v.abs() < 1e-6));
+        assert!((&constant_poses.median() - &rest.median()).iter().all(|v| v.is_nan() || v.abs() < 1e-6));
+    }
+}

@@ -1,0 +1,318 @@
+//! Evaluation clips of one frame rate: ground truth, prediction of the same frames, and sound features. This file reads
+//! them from files; `of_speaker` makes them from a dataset and a checkpoint.
+
+use super::motion_store::{MotionStore, StoredMotion};
+use super::pairs::FilePair;
+use super::sound_features;
+use super::sound_features::SoundFeatures;
+use anyhow::{Context, Result, ensure};
+use ndarray::{Array2, Array3, s};
+use orator_base::motion::bones;
+use orator_base::motion::resample;
+use orator_base::motion::units;
+use orator_base::types::pose3d::Motion;
+use orator_base::types::posture::PostureChannel;
+use orator_base::types::skeleton::{L_HAND, N_JOINTS, NECK, is_duplicate};
+use orator_base::types::sound::SAMPLE_RATE;
+use orator_base::types::time::FrameRate;
+use orator_dataset::Dataset;
+use orator_dataset::index::SampleRef;
+use orator_formats::mocap::motion_file;
+use orator_formats::wav;
+use orator_media::ffmpeg::sound_stream::SoundStream;
+use rayon::prelude::*;
+use std::fs::File;
+use std::os::unix::fs::FileExt as _;
+use std::path::PathBuf;
+
+/// Largest difference in length of one clip's files: a second, or this share of the longer.
+const MOST_APART_SECS: f64 = 1.0;
+const MOST_APART: f64 = 0.05;
+/// Largest share of the ground-truth joints that a prediction may miss.
+const MOST_MISSING: f64 = 0.05;
+/// Largest distance of a neck from the origin, metres, that is left as it is.
+const NECK_METRES: f32 = 1e-3;
+/// Ratio of median bone lengths from which another unit is assumed.
+const OTHER_UNIT: f64 = 2.5;
+
+/// Clip with ground truth and prediction.
+#[derive(Clone, Debug)]
+pub struct EvalClip {
+    pub name: String,
+    /// Joints [T, 49, 3], metres, the neck at the origin; behind them, where the clips have channels, head and trunk as rows
+    /// 49 and 50: yaw, pitch, roll in radians, NaN where not seen.
+    pub ground_truth: StoredMotion,
+    pub predicted: StoredMotion,
+    /// Mask [T, 49] of the compared joints, those seen in the ground truth.
+    pub mask: Array2<bool>,
+    pub features: Option<SoundFeatures>,
+    /// Sound for the player of the report.
+    pub audio: Option<ClipAudio>,
+}
+
+/// Sound that can be read again.
+#[derive(Clone, Debug)]
+pub enum ClipAudio {
+    File(PathBuf),
+    /// 16-bit samples at 16 kHz in a file, from a byte on.
+    Within {
+        path: PathBuf,
+        offset: u64,
+        n_samples: usize,
+    },
+}
+
+impl ClipAudio {
+    /// The sound of a sample, in its shard.
+    pub fn of_sample(dataset: &Dataset, sample: &SampleRef) -> Self {
+        Self::Within {
+            path: dataset.dir().join(&sample.shard),
+            offset: sample.wav.offset + wav::HEADER_BYTES as u64,
+            n_samples: sample.n_sound_samples(),
+        }
+    }
+
+    /// Samples at 16 kHz from second `start` to `end`, fewer where the sound ends before.
+    pub fn samples(&self, start: f64, end: f64) -> Result<Vec<i16>> {
+        let at = |secs: f64| (secs.max(0.0) * f64::from(SAMPLE_RATE)).round() as usize;
+        let (from, to) = (at(start), at(end));
+        match self {
+            Self::Within { path, offset, n_samples } => {
+                let (from, to) = (from.min(*n_samples), to.min(*n_samples));
+                let reading = || format!("reading {}", path.display());
+                let mut bytes = vec![0; 2 * to.saturating_sub(from)];
+                let file = File::open(path).with_context(reading)?;
+                file.read_exact_at(&mut bytes, offset + 2 * from as u64).with_context(reading)?;
+                Ok(bytes.chunks_exact(2).map(|pair| i16::from_le_bytes([pair[0], pair[1]])).collect())
+            }
+            Self::File(path) => {
+                let (mut n, mut samples) = (0, Vec::new());
+                for piece in SoundStream::open(path, SAMPLE_RATE) {
+                    let piece = piece?;
+                    let range = from.saturating_sub(n).min(piece.len())..to.saturating_sub(n).min(piece.len());
+                    samples.extend(piece[range].iter().copied().map(pcm));
+                    n += piece.len();
+                    if n >= to {
+                        break;
+                    }
+                }
+                Ok(samples)
+            }
+        }
+    }
+}
+
+/// Sample as a 16-bit integer.
+fn pcm(sample: f32) -> i16 {
+    (sample * 32_768.0).round().clamp(-32_768.0, 32_767.0) as i16
+}
+
+impl EvalClip {
+    pub fn n_frames(&self) -> usize {
+        self.mask.nrows()
+    }
+}
+
+/// Clips of one frame rate.
+#[derive(Clone, Debug)]
+pub struct EvalClips {
+    pub fps: FrameRate,
+    pub clips: Vec<EvalClip>,
+    /// Assumptions, changes and omissions, in sentences.
+    pub notes: Vec<String>,
+    /// Whether the model was trained on these clips, so that they prove nothing.
+    pub learnt: bool,
+    /// What is compared beside the joints.
+    pub channels: Vec<PostureChannel>,
+}
+
+impl EvalClips {
+    pub fn n_frames(&self) -> usize {
+        self.clips.iter().map(EvalClip::n_frames).sum()
+    }
+
+    pub fn secs(&self) -> f64 {
+        self.fps.secs(self.n_frames())
+    }
+
+    /// Hash of the ground truth and of its compared joints.
+    pub fn truth(&self) -> String {
+        let mut hasher = blake3::Hasher::new();
+        for clip in &self.clips {
+            let seen = clip.mask.indexed_iter().filter(|(_, seen)| **seen).map(|(place, _)| place);
+            for (t, joint) in seen {
+                for k in 0..3 {
+                    hasher.update(&clip.ground_truth[[t, joint, k]].to_le_bytes());
+                }
+            }
+            for angle in clip.ground_truth.view().slice(s![.., N_JOINTS.., ..]) {
+                hasher.update(&angle.to_le_bytes());
+            }
+            hasher.update(&clip.n_frames().to_le_bytes());
+        }
+        hasher.finalize().to_hex().as_str()[..16].to_owned()
+    }
+
+    /// Whether any finger joint is compared in any frame.
+    pub fn have_fingers(&self) -> bool {
+        let is_finger = |joint: usize| joint > L_HAND && !is_duplicate(joint);
+        let seen = |clip: &EvalClip| clip.mask.indexed_iter().any(|((_, joint), seen)| *seen && is_finger(joint));
+        self.clips.iter().any(seen)
+    }
+
+    pub fn have_sound(&self) -> bool {
+        self.clips.iter().any(|clip| clip.features.is_some())
+    }
+}
+
+/// Reads pairs of files at the frame rate of the first ground truth. `fps` is for files without a rate.
+///
+/// # Errors
+/// A file without motion; a prediction much longer or shorter than its ground truth, or with many missing joints. The
+/// message names the clip and what to do.
+pub fn read(pairs: &[FilePair], fps: Option<FrameRate>, store: &MotionStore) -> Result<EvalClips> {
+    let first = pairs.first().context("there is no pair to measure")?;
+    let rate = motion_file::read(&first.truth, fps)?.motion.fps;
+    let clip = |pair: &FilePair| clip(pair, fps, rate, store).with_context(|| format!("clip {}", pair.name));
+    let read: Vec<(EvalClip, Vec<String>)> = pairs.par_iter().map(clip).collect::<Result<_>>()?;
+    let (clips, notes): (Vec<EvalClip>, Vec<Vec<String>>) = read.into_iter().unzip();
+    Ok(EvalClips {
+        fps: rate,
+        clips,
+        notes: notes.into_iter().flatten().collect(),
+        learnt: false,
+        channels: Vec::new(),
+    })
+}
+
+fn clip(
+    pair: &FilePair,
+    given: Option<FrameRate>,
+    fps: FrameRate,
+    store: &MotionStore,
+) -> Result<(EvalClip, Vec<String>)> {
+    let mut notes = Vec::new();
+    let mut side = |path: &PathBuf, what: &str| -> Result<Motion> {
+        let read = motion_file::read(path, given)?;
+        units::check(&read.motion).with_context(|| path.display().to_string())?;
+        notes.extend(read.notes);
+        if let Some(given) = given.filter(|given| read.says_rate && *given != read.motion.fps) {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            notes.push(format!("{name} says {}: {given} (--fps) is not for it", read.motion.fps));
+        }
+        let mut motion = read.motion;
+        if motion.fps != fps {
+            notes.push(format!("{}: the {what} at {} was resampled to {fps}", pair.name, motion.fps));
+            motion = resample::at_rate(&motion, fps);
+        }
+        if let Some(far) = neck_to_origin(&mut motion) {
+            notes.push(format!("{}: the {what}'s neck stands {far:.2} m from the origin: moved there", pair.name));
+        }
+        Ok(motion)
+    };
+    let (mut ground_truth, predicted) = (side(&pair.truth, "truth")?, side(&pair.prediction, "prediction")?);
+    let (n_ground_truth, n_predicted) = (ground_truth.n_frames(), predicted.n_frames());
+    let (real_secs, made_secs) = (fps.secs(n_ground_truth), fps.secs(n_predicted));
+    let apart = (real_secs - made_secs).abs();
+    ensure!(
+        apart <= MOST_APART_SECS.max(MOST_APART * real_secs.max(made_secs)),
+        "the truth lasts {real_secs:.2} s ({n_ground_truth} frames at {fps}) and the prediction {made_secs:.2} s ({n_predicted} frames): \
+         more than a second and 5 % apart, so they are not of the same sound, or a rate is wrong (--fps)"
+    );
+    let n_frames = n_ground_truth.min(n_predicted);
+    if n_ground_truth != n_predicted {
+        notes.push(format!(
+            "{}: {n_ground_truth} frames of truth, {n_predicted} of prediction: cut to {n_frames}",
+            pair.name
+        ));
+    }
+    notes.extend(other_unit(&ground_truth, &predicted).map(|note| format!("{}: {note}", pair.name)));
+    ground_truth.mask = ground_truth.mask.slice(s![..n_frames, ..]).to_owned();
+    let [ground_truth_joints, mut predicted_joints] =
+        [ground_truth.joints, predicted.joints].map(|joints| joints.slice_move(s![..n_frames, .., ..]));
+    let (mask, n_missing) = compared(&ground_truth_joints, &ground_truth.mask, &mut predicted_joints);
+    let n_seen = ground_truth.mask.iter().filter(|seen| **seen).count().max(1);
+    let share = n_missing as f64 / n_seen as f64;
+    ensure!(
+        share <= MOST_MISSING,
+        "the prediction {} has no number (NaN) for {:.1} % of the joints that the truth has: at most {:.0} % can be \
+         held over, or a prediction could leave out what it cannot do",
+        pair.prediction.display(),
+        100.0 * share,
+        100.0 * MOST_MISSING
+    );
+    if n_missing > 0 {
+        notes.push(format!(
+            "{}: the prediction has no number (NaN) for {n_missing} of {n_seen} joints: each counts as where it was last",
+            pair.name
+        ));
+    }
+    let mut features = None;
+    if let Some(path) = &pair.sound {
+        features = sound_features::extract(path, fps, n_frames)?;
+        let secs = fps.secs(n_frames);
+        match &features {
+            None => {
+                let name = path.file_name().unwrap_or_default().to_string_lossy();
+                notes.push(format!("{name} holds no sound: {} is not part of what needs sound", pair.name));
+            }
+            Some(features) => ensure!(
+                features.secs >= secs - MOST_APART_SECS.max(MOST_APART * secs),
+                "{} lasts {:.2} s, the motion {secs:.2} s: is it the sound of another clip?",
+                path.display(),
+                features.secs
+            ),
+        }
+    }
+    let audio = pair.sound.clone().filter(|_| features.is_some()).map(ClipAudio::File);
+    Ok((
+        EvalClip {
+            name: pair.name.clone(),
+            ground_truth: store.keep(ground_truth_joints)?,
+            predicted: store.keep(predicted_joints)?,
+            mask,
+            features,
+            audio,
+        },
+        notes,
+    ))
+}
+
+/// Mask of the compared joints, those seen in the ground truth, and the number of them that the prediction misses.
+/// Missing predictions keep their last position (the neck's before the first one).
+pub fn compared(ground_truth: &Array3<f32>, seen: &Array2<bool>, predicted: &mut Array3<f32>) -> (Array2<bool>, usize) {
+    let there = |joints: &Array3<f32>, t: usize, joint: usize| (0..3).all(|k| joints[[t, joint, k]].is_finite());
+    let mask = Array2::from_shape_fn(seen.raw_dim(), |(t, joint)| seen[[t, joint]] && there(ground_truth, t, joint));
+    let mut n_missing = 0;
+    for ((t, joint), range) in mask.indexed_iter() {
+        if !there(predicted, t, joint) {
+            n_missing += usize::from(*range);
+            (0..3).for_each(|k| predicted[[t, joint, k]] = if t > 0 { predicted[[t - 1, joint, k]] } else { 0.0 });
+        }
+    }
+    (mask, n_missing)
+}
+
+/// Moves the neck to the origin; returns its largest distance from there where it matters.
+fn neck_to_origin(motion: &mut Motion) -> Option<f32> {
+    let mut far = 0.0f32;
+    for mut frame in motion.joints.outer_iter_mut() {
+        let neck: [f32; 3] = std::array::from_fn(|k| frame[[NECK, k]]);
+        let length = neck.iter().map(|v| v * v).sum::<f32>().sqrt();
+        if length.is_finite() && length > NECK_METRES {
+            far = far.max(length);
+            for joint in 0..N_JOINTS {
+                (0..3).for_each(|k| frame[[joint, k]] -= neck[k]);
+            }
+        }
+    }
+    (far > 0.0).then_some(far)
+}
+
+/// Note where the bone lengths of the prediction indicate another unit.
+fn other_unit(ground_truth: &Motion, predicted: &Motion) -> Option<String> {
+    let size = |motion: &Motion| bones::measure(motion).iter().take(6).map(|v| f64::from(*v)).sum::<f64>();
+    let times = size(predicted) / size(ground_truth);
+    (times.is_finite() && times > 0.0 && !(1.0 / OTHER_UNIT..OTHER_UNIT).contains(&times))
+        .then(|| format!("the prediction's arms are {times:.2} times as long as the truth's: are both in metres?"))
+}

@@ -1,0 +1,310 @@
+//! Clips and baselines of trained speakers on a split of a dataset. Ground truth comes from the dataset, predictions
+//! from sound and words alone, and baselines know the training split only.
+
+use super::checkpoint::EvaluatedCheckpoint;
+use super::clips::{ClipAudio, EvalClip, EvalClips, compared};
+use super::held_out;
+use super::held_out::HeldOutInterval;
+use super::motion_store::{MotionStore, StoredMotion};
+use super::notes;
+use super::sound_features;
+use super::sound_features::SoundFeatureExtractor;
+use crate::evaluate::baseline::baselines;
+use crate::evaluate::baseline::baselines::{ClipMotion, NumberedCheckpoint, Predictor, PredictorKind};
+use crate::evaluate::baseline::constant_pose::ConstantPoses;
+use crate::evaluate::baseline::neighbour;
+use crate::evaluate::baseline::neighbour::{Library, Query};
+use crate::evaluate::baseline::predictor;
+use crate::generate::normalisation::{N_FEATURES, Normalisation};
+use crate::train::gan::begin::normalisation;
+use anyhow::{Context, Result, ensure};
+use ndarray::{Array2, Array3, Axis, s};
+use orator_base::motion::bones;
+use orator_base::stage::progress::Task;
+use orator_base::types::posture::{Posture, PostureChannel};
+use orator_base::types::skeleton::N_JOINTS;
+use orator_base::types::sound::Sound;
+use orator_dataset::index::SampleRef;
+use orator_dataset::{Dataset, Split};
+use orator_formats::transcript::Word;
+
+/// Clips and predictors of checkpoints on a split of `dataset`, the motion of the checkpoints first. Bones have the
+/// lengths of the first checkpoint that learnt from a dataset, else those of this one.
+///
+/// # Errors
+/// No checkpoint; a dataset of another frame rate, captured skeletons aside; a split without intervals.
+pub fn prepare(
+    dataset: &Dataset,
+    checkpoints: &[EvaluatedCheckpoint],
+    split: Split,
+    store: &MotionStore,
+    task: &dyn Task,
+) -> Result<(EvalClips, Vec<Predictor>)> {
+    let fps = dataset.info().fps;
+    for EvaluatedCheckpoint { speaker, .. } in checkpoints {
+        let of_network = speaker.fps();
+        ensure!(
+            speaker.normalisation().is_none() || fps == of_network,
+            "{} moves at {fps}, the checkpoint's speaker at {of_network}: it was trained on another dataset",
+            dataset.dir().display()
+        );
+    }
+    let learnt_with = checkpoints.iter().find_map(|of| of.speaker.normalisation());
+    let own_normal = if learnt_with.is_none() { Some(normalisation(dataset)?) } else { None };
+    let normal = learnt_with.or(own_normal.as_ref()).context("there is no checkpoint to measure")?;
+    task.detail("reading the intervals");
+    let samples = held_out::samples(dataset, split)?;
+    let channels = channels(dataset, &samples, checkpoints)?;
+    let held_out = HeldOutSplit::new(dataset, samples, normal, !channels.is_empty())?;
+    task.detail("generating motion");
+    let mut generated = checkpoints
+        .iter()
+        .map(|of| held_out.speak(of, store).with_context(|| of.name.clone()))
+        .collect::<Result<Vec<SpokenIntervals>>>()?;
+    task.detail("listening");
+    let has_words = held_out.words.iter().any(|words| !words.is_empty());
+    let notes = notes::of_checkpoints(dataset, checkpoints, has_words, split);
+    let first = std::mem::take(&mut generated.first_mut().context("there is no checkpoint to measure")?.matched);
+    let clips =
+        first.into_iter().enumerate().map(|(at, made)| held_out.clip(at, &made, store)).collect::<Result<Vec<_>>>()?;
+    let channels = &channels;
+    let mut clips = EvalClips { fps, clips, notes, learnt: split == Split::Train, channels: channels.clone() };
+    if checkpoints.iter().any(|of| of.speaker.normalisation().is_none()) {
+        let is_known = |joint: usize| generated.iter().all(|spoken| spoken.joints[joint]);
+        let common: Vec<usize> = (0..N_JOINTS).filter(|joint| is_known(*joint)).collect();
+        restrict(&mut clips, &common, store)?;
+        clips.notes.push(notes::of_joints(&clips, &common));
+    }
+    task.detail("what the training split knows");
+    let several = |at: usize| {
+        let name = checkpoints[at].name.clone();
+        (checkpoints.len() > 1).then_some(NumberedCheckpoint { number: at + 1, name })
+    };
+    let mut all = Vec::new();
+    for (at, (of, spoken)) in checkpoints.iter().zip(&mut generated).enumerate() {
+        let heard = if of.speaker.n_words() > 0 { "sound and the words" } else { "sound" };
+        let description =
+            format!("the speaker {} of the checkpoint, hearing the {heard} of each interval", of.speaker.name());
+        let mut predictor = Predictor::prediction(&clips, &description);
+        if at > 0 {
+            predictor.motions = std::mem::take(&mut spoken.matched).into_iter().map(ClipMotion::Motion).collect();
+        }
+        all.push(Predictor { checkpoint: several(at), ..predictor });
+    }
+    let still = all.len();
+    let mean_posture = checkpoints.iter().filter_map(|of| of.speaker.normalisation()).find_map(mean_posture);
+    all.extend(constant_poses(dataset, normal, (clips.clips.len(), mean_posture.filter(|_| !channels.is_empty())))?);
+    match copied(dataset, normal, &clips, split, store)? {
+        Some(motions) => {
+            let description =
+                "for each 4 s of sound the motion of the part of the training split that sounds most alike";
+            let copied = Predictor::new(PredictorKind::NearestNeighbour, description.to_owned(), motions);
+            let copied = copied.filled(&all[still], store)?;
+            all.push(copied);
+        }
+        None => clips.notes.push(format!(
+            "{}: left out, since no interval of the training split is long enough to copy from",
+            PredictorKind::NearestNeighbour.name()
+        )),
+    }
+    for (at, (of, spoken)) in checkpoints.iter().zip(generated).enumerate() {
+        let said = if of.speaker.n_words() > 0 { " with its words" } else { "" };
+        let description = format!("the same speaker hearing another sound{said}: what is said half of the split later");
+        let motions = spoken.mismatched.into_iter().map(ClipMotion::Motion).collect();
+        let predictor = Predictor::new(PredictorKind::MismatchedPrediction, description, motions);
+        all.push(Predictor { checkpoint: several(at), ..predictor });
+    }
+    match baselines::mismatched(&clips, PredictorKind::MismatchedTruth, &all[still], store)? {
+        Some(predictor) => all.push(predictor),
+        None => clips.notes.push(baselines::too_short(PredictorKind::MismatchedTruth)),
+    }
+    Ok((clips, all))
+}
+
+/// Motion of a network for every interval.
+struct SpokenIntervals {
+    /// For the interval's own sound and words: joints [T, 49, 3], metres, and angles behind them as in a clip.
+    matched: Vec<StoredMotion>,
+    /// For those of half of the split later.
+    mismatched: Vec<StoredMotion>,
+    /// Whether each of the 49 joints has a number in every frame.
+    joints: Vec<bool>,
+}
+
+/// The intervals of a split, of which one at a time is in memory.
+struct HeldOutSplit<'d> {
+    dataset: &'d Dataset,
+    samples: Vec<SampleRef>,
+    normal: &'d Normalisation,
+    has_channels: bool,
+    /// Samples of sound, and words, of every interval.
+    n_sound_samples: Vec<usize>,
+    words: Vec<Vec<Word>>,
+}
+
+impl<'d> HeldOutSplit<'d> {
+    fn new(
+        dataset: &'d Dataset,
+        samples: Vec<SampleRef>,
+        normal: &'d Normalisation,
+        has_channels: bool,
+    ) -> Result<Self> {
+        let n_sound_samples = samples.iter().map(SampleRef::n_sound_samples).collect();
+        let words = |sample| Ok(dataset.words(sample)?.unwrap_or_default());
+        let words = samples.iter().map(words).collect::<Result<_>>()?;
+        Ok(Self { dataset, samples, normal, has_channels, n_sound_samples, words })
+    }
+
+    fn interval(&self, at: usize) -> Result<HeldOutInterval> {
+        held_out::interval(self.dataset, &self.samples[at], self.normal)
+    }
+
+    fn speak(&self, checkpoint: &EvaluatedCheckpoint, store: &MotionStore) -> Result<SpokenIntervals> {
+        let (mut matched, mut mismatched, mut joints) = (Vec::new(), Vec::new(), vec![true; N_JOINTS]);
+        for at in 0..self.samples.len() {
+            let HeldOutInterval { sound, words, .. } = self.interval(at)?;
+            let made = self.motion(checkpoint, at, &sound, &words)?;
+            for (joint, is_known) in joints.iter_mut().enumerate() {
+                *is_known &= made.slice(s![.., joint, ..]).iter().all(|v| v.is_finite());
+            }
+            matched.push(store.keep(made)?);
+            let read = |of: usize, range| Ok(self.dataset.sound(&self.samples[of], range)?.samples);
+            let samples = predictor::turned(&self.n_sound_samples, at, read)?;
+            let words = predictor::turned_words(&self.n_sound_samples, sound.rate, &self.words, at);
+            let other = Sound { rate: sound.rate, samples };
+            mismatched.push(store.keep(self.motion(checkpoint, at, &other, &words)?)?);
+        }
+        Ok(SpokenIntervals { matched, mismatched, joints })
+    }
+
+    /// What a network makes of a sound and words, for the frames of an interval.
+    fn motion(
+        &self,
+        checkpoint: &EvaluatedCheckpoint,
+        at: usize,
+        sound: &Sound,
+        words: &[Word],
+    ) -> Result<Array3<f32>> {
+        let (sample, own) = (&self.samples[at], checkpoint.speaker.normalisation());
+        let made = checkpoint.motion(sound, words, sample.n_frames, self.dataset.info().fps);
+        let (mut made, posture) = made.with_context(|| format!("no motion for {}", sample.key))?;
+        if own.is_none_or(|own| own.bone_lengths != self.normal.bone_lengths) {
+            bones::with_lengths(&mut made, &held_out::lengths(self.normal));
+        }
+        Ok(if self.has_channels { held_out::with_posture(&made.joints, posture.as_ref()) } else { made.joints })
+    }
+
+    /// The interval beside what was made for it.
+    fn clip(&self, at: usize, made: &StoredMotion, store: &MotionStore) -> Result<EvalClip> {
+        let HeldOutInterval { key, mut ground_truth, posture, sound, .. } = self.interval(at)?;
+        if self.has_channels {
+            ground_truth.joints = held_out::with_posture(&ground_truth.joints, posture.as_ref());
+        }
+        let fps = self.dataset.info().fps;
+        let features = Some(sound_features::from_samples(&sound.samples, fps, ground_truth.n_frames()));
+        let mut predicted = made.view().to_owned();
+        let (mask, n_missing) = compared(&ground_truth.joints, &ground_truth.mask, &mut predicted);
+        let predicted = if n_missing == 0 { made.clone() } else { store.keep(predicted)? };
+        let audio = Some(ClipAudio::of_sample(self.dataset, &self.samples[at]));
+        Ok(EvalClip { name: key, ground_truth: store.keep(ground_truth.joints)?, predicted, mask, features, audio })
+    }
+}
+
+/// Leaves the joints `common` to be compared; the others of the prediction are missing.
+fn restrict(clips: &mut EvalClips, common: &[usize], store: &MotionStore) -> Result<()> {
+    for clip in &mut clips.clips {
+        let mut predicted = clip.predicted.view().to_owned();
+        for joint in (0..N_JOINTS).filter(|joint| !common.contains(joint)) {
+            clip.mask.column_mut(joint).fill(false);
+            predicted.slice_mut(s![.., joint, ..]).fill(f32::NAN);
+        }
+        clip.predicted = store.keep(predicted)?;
+    }
+    Ok(())
+}
+
+/// What is measured beside the joints: channels that a checkpoint makes and that the split shows.
+fn channels(
+    dataset: &Dataset,
+    samples: &[SampleRef],
+    checkpoints: &[EvaluatedCheckpoint],
+) -> Result<Vec<PostureChannel>> {
+    let learnt = |channel: &PostureChannel| {
+        let of = |normal: &Normalisation| normal.channels.iter().any(|own| own.channel == *channel);
+        checkpoints.iter().filter_map(|of| of.speaker.normalisation()).any(of)
+    };
+    let learnt: Vec<PostureChannel> = PostureChannel::ALL.into_iter().filter(learnt).collect();
+    let mut seen = Vec::new();
+    for sample in samples {
+        if seen.len() == learnt.len() {
+            break;
+        }
+        let Some(posture) = dataset.posture(sample, 0..sample.n_frames)? else { continue };
+        let is_new = |channel: &&PostureChannel| !seen.contains(*channel);
+        let new = learnt.iter().filter(is_new).filter(|of| posture.channel(**of).iter().any(|v| v.is_finite()));
+        let new: Vec<PostureChannel> = new.copied().collect();
+        seen.extend(new);
+    }
+    Ok(learnt.into_iter().filter(|channel| seen.contains(channel)).collect())
+}
+
+/// The mean posture of a checkpoint's training split, one frame; `None`: it learns none.
+fn mean_posture(normal: &Normalisation) -> Option<Posture> {
+    normal.posture(Array2::zeros((normal.n_numbers(), 1)).view())
+}
+
+/// Mean and median pose of the training split, both with the mean posture.
+fn constant_poses(
+    dataset: &Dataset,
+    normal: &Normalisation,
+    (n_clips, mean_posture): (usize, Option<Posture>),
+) -> Result<Vec<Predictor>> {
+    let mut constant_poses = ConstantPoses::default();
+    for sample in dataset.samples(Split::Train) {
+        let interval = held_out::interval(dataset, &sample, normal)?;
+        constant_poses.add(interval.ground_truth.joints.view(), interval.ground_truth.mask.view());
+    }
+    let mean: Array2<f32> = normal.joints(Array2::zeros((N_FEATURES, 1)).view()).slice(s![0, .., ..]).to_owned();
+    let mut median = constant_poses.median();
+    median.zip_mut_with(&mean, |v, mean| *v = if v.is_finite() { *v } else { *mean });
+    let predictor = |kind: PredictorKind, mut pose: Array2<f32>| {
+        if mean_posture.is_some() {
+            let frame = held_out::with_posture(&pose.insert_axis(Axis(0)), mean_posture.as_ref());
+            pose = frame.index_axis_move(Axis(0), 0);
+        }
+        let description = format!("the {} of the training split in every frame, which never moves", kind.name());
+        Predictor::new(kind, description, vec![ClipMotion::Constant(pose); n_clips])
+    };
+    Ok(vec![predictor(PredictorKind::MeanPose, mean), predictor(PredictorKind::MedianPose, median)])
+}
+
+/// Motion of the nearest neighbours in the training split, which is read again for every query, so that memory does not
+/// grow with its length; NaN where the copied motion is missing.
+pub fn copied(
+    dataset: &Dataset,
+    normal: &Normalisation,
+    clips: &EvalClips,
+    split: Split,
+    store: &MotionStore,
+) -> Result<Option<Vec<ClipMotion>>> {
+    let mut query = Vec::new();
+    for clip in &clips.clips {
+        let rows: &[f32] = clip.features.as_ref().map_or(&[], |features| &features.rows);
+        query.push(Query { rows, n_frames: clip.n_frames() });
+    }
+    let samples = dataset.samples(Split::Train);
+    let library = Library {
+        n: samples.len(),
+        asks_itself: split == Split::Train,
+        features: &|entry| {
+            let interval = held_out::interval(dataset, &samples[entry], normal)?;
+            let mut listener = SoundFeatureExtractor::new(interval.ground_truth.fps, None);
+            listener.push(&interval.sound.samples);
+            let n_frames = interval.ground_truth.n_frames();
+            Ok(Some((listener.finish(n_frames).rows, n_frames)))
+        },
+        joints: &|entry, frames| held_out::joints(dataset, &samples[entry], normal, frames, !clips.channels.is_empty()),
+    };
+    let predicted = neighbour::motions(&query, &library, clips.fps, store)?;
+    Ok(predicted.map(|predicted| predicted.into_iter().map(ClipMotion::Motion).collect()))
+}

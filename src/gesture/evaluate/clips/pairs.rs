@@ -1,0 +1,230 @@
+//! Pairs of files by name: ground truth, prediction and sound of a clip. No file is opened here.
+
+use anyhow::{Context, Result, bail, ensure};
+use orator_formats::mocap::motion_file;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Prefixes that name the side of a file; the rest is the clip's name.
+const TRUTH: [&str; 7] = ["gt_interval_", "ground_truth_", "truth_", "real_", "gt_", "true_", "natural_"];
+const PREDICTION: [&str; 8] =
+    ["prediction_interval_", "prediction_", "predicted_", "generated_", "pred_", "made_", "output_", "synthetic_"];
+const SOUND: [&str; 11] = ["wav", "flac", "mp3", "m4a", "ogg", "opus", "aac", "mp4", "mov", "mkv", "webm"];
+
+/// Files of a clip.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FilePair {
+    pub name: String,
+    pub truth: PathBuf,
+    pub prediction: PathBuf,
+    pub sound: Option<PathBuf>,
+}
+
+/// Pairs in the order of their names, and a sentence for each file without a partner.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct FilePairs {
+    pub pairs: Vec<FilePair>,
+    pub notes: Vec<String>,
+}
+
+/// Pairs the files of both sides: two files, or two folders (which may be one: `gt_interval_7.txt` belongs to
+/// `prediction_interval_7.txt`). `audio` is a file for all of them, or a folder.
+///
+/// # Errors
+/// A path that is not there, a file beside a folder, two files of one name, or no pair at all.
+pub fn find(truth: &Path, prediction: &Path, audio: Option<&Path>) -> Result<FilePairs> {
+    for path in [Some(truth), Some(prediction), audio].into_iter().flatten() {
+        ensure!(path.exists(), "{} is not there", path.display());
+    }
+    let mut found = match (truth.is_dir(), prediction.is_dir()) {
+        (false, false) => {
+            ensure!(
+                !same(truth, prediction),
+                "{} is given as truth and as prediction: a motion beside itself says nothing",
+                truth.display()
+            );
+            let pair =
+                FilePair { name: key(truth), truth: truth.to_owned(), prediction: prediction.to_owned(), sound: None };
+            FilePairs { pairs: vec![pair], notes: Vec::new() }
+        }
+        (true, true) => folders(truth, prediction)?,
+        (is_folder, _) => {
+            let (folder, file) = if is_folder { (truth, prediction) } else { (prediction, truth) };
+            bail!("{} is a folder and {} a file: give two files or two folders", folder.display(), file.display())
+        }
+    };
+    match audio {
+        None => {}
+        Some(audio) if audio.is_dir() => by_name(&mut found, audio)?,
+        Some(audio) => {
+            ensure!(
+                found.pairs.len() == 1,
+                "{} is one sound for {} clips: give a folder with a sound of each name",
+                audio.display(),
+                found.pairs.len()
+            );
+            found.pairs.iter_mut().for_each(|pair| pair.sound = Some(audio.to_owned()));
+        }
+    }
+    Ok(found)
+}
+
+fn same(a: &Path, b: &Path) -> bool {
+    a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b))
+}
+
+fn folders(truth: &Path, prediction: &Path) -> Result<FilePairs> {
+    let one = same(truth, prediction);
+    let side = |folder: &Path, own: &[&str]| -> Result<BTreeMap<String, PathBuf>> {
+        let files = files(folder, &motion_file::ENDINGS)?;
+        let files = files.into_iter().filter(|file| !one || own.iter().any(|start| stem(file).starts_with(start)));
+        by_key(files)
+    };
+    let (truths, mut predictions) = (side(truth, &TRUTH)?, side(prediction, &PREDICTION)?);
+    let mut found = FilePairs::default();
+    for (name, truth) in truths {
+        match predictions.remove(&name) {
+            Some(prediction) => found.pairs.push(FilePair { name, truth, prediction, sound: None }),
+            None => found.notes.push(format!("{} has no prediction of its name: left out", told_share(&truth))),
+        }
+    }
+    found
+        .notes
+        .extend(predictions.values().map(|path| format!("{} has no truth of its name: left out", told_share(path))));
+    ensure!(
+        !found.pairs.is_empty(),
+        "no motion file of {} has a partner of its name in {}{}: expected for instance {}",
+        truth.display(),
+        prediction.display(),
+        match found.notes.len() {
+            0 => " (there is none at all)".to_owned(),
+            n => format!(" ({n} without, like {})", found.notes[0]),
+        },
+        if one { "gt_interval_7.txt and prediction_interval_7.txt" } else { "a.npy in both" }
+    );
+    Ok(found)
+}
+
+fn by_name(found: &mut FilePairs, audio: &Path) -> Result<()> {
+    let mut sounds = by_key(files(audio, &SOUND)?)?;
+    for pair in &mut found.pairs {
+        pair.sound = sounds.remove(&pair.name);
+        if pair.sound.is_none() {
+            found.notes.push(format!("{} has no sound of its name: not part of what needs sound", pair.name));
+        }
+    }
+    ensure!(
+        found.pairs.iter().any(|pair| pair.sound.is_some()),
+        "no file of {} is the sound of a clip: expected a name like {}.wav",
+        audio.display(),
+        found.pairs.first().map_or("", |pair| pair.name.as_str())
+    );
+    Ok(())
+}
+
+/// Files of a folder with one of these endings, hidden ones left out, in the order of their names.
+fn files(folder: &Path, endings: &[&str]) -> Result<Vec<PathBuf>> {
+    let looking = || format!("cannot look into {}", folder.display());
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).with_context(looking)? {
+        let path = entry.with_context(looking)?.path();
+        let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+        if path.is_file() && !stem(&path).starts_with('.') && endings.contains(&ending.as_str()) {
+            files.push(path);
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+fn by_key(files: impl IntoIterator<Item = PathBuf>) -> Result<BTreeMap<String, PathBuf>> {
+    let mut named = BTreeMap::new();
+    for file in files {
+        if let Some(other) = named.insert(key(&file), file.clone()) {
+            bail!("{} and {} both are clip {}: keep one of them", other.display(), file.display(), key(&file));
+        }
+    }
+    Ok(named)
+}
+
+/// Clip of a file: its name without the ending and the prefix of its side.
+fn key(path: &Path) -> String {
+    let stem = stem(path);
+    let start = TRUTH.iter().chain(&PREDICTION).find(|start| stem.starts_with(**start) && stem.len() > start.len());
+    start.map_or(stem.as_str(), |start| &stem[start.len()..]).to_owned()
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+fn told_share(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn folder(names: &[&str]) -> tempfile::TempDir {
+        let dir = tempfile::tempdir().unwrap();
+        for name in names {
+            std::fs::create_dir_all(dir.path().join(name).parent().unwrap()).unwrap();
+            std::fs::write(dir.path().join(name), "").unwrap();
+        }
+        dir
+    }
+
+    #[test]
+    fn files_meet_by_their_names() {
+        let dir = folder(&[
+            "t/a.npy",
+            "t/gt_b.txt",
+            "t/c.bvh",
+            "t/notes.md",
+            "t/.hidden.npy",
+            "p/a.bvh",
+            "p/pred_b.npy",
+            "p/d.npy",
+            "s/a.wav",
+        ]);
+        let at = |name: &str| dir.path().join(name);
+        let found = find(&at("t"), &at("p"), Some(&at("s"))).unwrap();
+        let names: Vec<&str> = found.pairs.iter().map(|pair| pair.name.as_str()).collect();
+        assert_eq!(names, ["a", "b"]);
+        assert_eq!((&found.pairs[0].sound, &found.pairs[1].sound), (&Some(at("s/a.wav")), &None));
+        let notes = found.notes.join("|");
+        assert!(notes.contains("c.bvh has no prediction") && notes.contains("d.npy has no truth"), "{notes}");
+        assert!(notes.contains("b has no sound"), "{notes}");
+        let alone = find(&at("t/a.npy"), &at("p/d.npy"), Some(&at("s/a.wav"))).unwrap();
+        assert_eq!(alone.pairs[0].sound, Some(at("s/a.wav")));
+    }
+
+    #[test]
+    fn one_folder_may_hold_both_sides() {
+        let dir =
+            folder(&["gt_interval_7.txt", "prediction_interval_7.txt", "gt_interval_8.txt", "7.wav", "README.txt"]);
+        let found = find(dir.path(), dir.path(), Some(dir.path())).unwrap();
+        assert_eq!((found.pairs.len(), found.pairs[0].name.as_str()), (1, "7"));
+        assert_eq!(found.pairs[0].sound, Some(dir.path().join("7.wav")));
+        assert_eq!(found.notes, ["gt_interval_8.txt has no prediction of its name: left out"]);
+    }
+
+    #[test]
+    fn what_cannot_be_paired_is_refused() {
+        let dir =
+            folder(&["t/a.npy", "t/b.npy", "p/c.npy", "q/a.npy", "q/a.bvh", "e/x.md", "s/z.wav", "r/a.npy", "r/b.npy"]);
+        let said = |truth: &str, prediction: &str, audio: Option<&str>| {
+            let at = |name: &str| dir.path().join(name);
+            format!("{:#}", find(&at(truth), &at(prediction), audio.map(at).as_deref()).unwrap_err())
+        };
+        assert!(said("t", "p", None).contains("without, like a.npy has no prediction"));
+        assert!(said("t", "q", None).contains("keep one of them"));
+        assert!(said("e", "e", None).contains("none at all"));
+        assert!(said("t", "p/c.npy", None).contains("two files or two folders"));
+        assert!(said("t/a.npy", "t/a.npy", None).contains("beside itself"));
+        assert!(said("gone", "p", None).contains("not there"));
+        assert!(said("t", "r", Some("s")).contains("expected a name like a.wav"));
+        assert!(said("t", "r", Some("s/z.wav")).contains("one sound for 2 clips"));
+    }
+}

@@ -1,0 +1,183 @@
+//! Sound features for evaluation, computed in a stream: onsets for the beat metrics, a pooled spectrogram for the
+//! nearest neighbour. Samples are not kept.
+
+use crate::generate::mel_stream::mel_frames;
+use anyhow::{Context, Result};
+use orator_base::audio::mel;
+use orator_base::audio::onset::{Loudest, Onsets};
+use orator_base::types::sound::SAMPLE_RATE;
+use orator_base::types::time::FrameRate;
+use orator_media::ffmpeg::sound_stream::SoundStream;
+use std::path::Path;
+
+/// Motion frames whose spectrogram is averaged into one row.
+pub const POOLED: usize = 2;
+/// Number of buffered samples that triggers a spectrogram.
+const PIECE: usize = 10 * SAMPLE_RATE as usize;
+
+/// Features of one sound.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SoundFeatures {
+    pub secs: f64,
+    /// Onset times, seconds from the start.
+    pub onsets: Vec<f64>,
+    /// Mean of the log-mel spectrogram over every `POOLED` motion frames: rows of `mel::N_MELS` numbers.
+    pub rows: Vec<f32>,
+}
+
+/// Extractor for sound of 16 kHz.
+pub struct SoundFeatureExtractor {
+    fps: FrameRate,
+    n_samples: usize,
+    onsets: Option<Onsets>,
+    /// Buffered samples, starting with spectrogram frame `n_mels`.
+    waiting: Vec<f32>,
+    n_mels: usize,
+    /// Sum of the spectrogram over the current row, and its number of frames.
+    row: [f32; mel::N_MELS],
+    n_in_row: usize,
+    rows: Vec<f32>,
+}
+
+impl SoundFeatureExtractor {
+    /// Extractor for motion of `fps`. Onsets are found only with a known peak level (`onset::Loudest`).
+    pub fn new(fps: FrameRate, loudest_db: Option<f32>) -> Self {
+        Self {
+            fps,
+            n_samples: 0,
+            onsets: loudest_db.map(Onsets::new),
+            waiting: Vec::new(),
+            n_mels: 0,
+            row: [0.0; mel::N_MELS],
+            n_in_row: 0,
+            rows: Vec::new(),
+        }
+    }
+
+    /// Adds samples.
+    pub fn push(&mut self, samples: &[f32]) {
+        self.n_samples += samples.len();
+        if let Some(onsets) = &mut self.onsets {
+            onsets.push(samples);
+        }
+        self.waiting.extend_from_slice(samples);
+        if self.waiting.len() >= PIECE {
+            self.pool();
+        }
+    }
+
+    /// Features of a sound cut or padded with silence to `n_frames` of motion.
+    pub fn finish(mut self, n_frames: usize) -> SoundFeatures {
+        let secs = self.n_samples as f64 / f64::from(SAMPLE_RATE);
+        let n_rows = n_frames.div_ceil(POOLED);
+        let range = mel::n_samples(mel_frames(self.fps, n_rows * POOLED) + 1);
+        let more = range.saturating_sub(self.n_mels * mel::HOP + self.waiting.len());
+        self.waiting.resize(self.waiting.len() + more, 0.0);
+        self.pool();
+        self.rows.truncate(n_rows * mel::N_MELS);
+        let until = self.fps.secs(n_frames);
+        let mut onsets = self.onsets.map(Onsets::finish).unwrap_or_default();
+        onsets.retain(|onset| *onset < until);
+        SoundFeatures { secs, onsets, rows: self.rows }
+    }
+
+    fn pool(&mut self) {
+        let mels = mel::log_mel(&self.waiting);
+        for frame in mels.outer_iter() {
+            self.row.iter_mut().zip(frame).for_each(|(sum, v)| *sum += v);
+            self.n_in_row += 1;
+            self.n_mels += 1;
+            // Several rows where motion has more frames a second than the spectrogram.
+            while self.n_mels >= mel_frames(self.fps, (self.rows.len() / mel::N_MELS + 1) * POOLED) {
+                match self.n_in_row {
+                    0 => self.rows.extend_from_within(self.rows.len() - mel::N_MELS..),
+                    n => self.rows.extend(self.row.iter().map(|sum| sum / n as f32)),
+                }
+                self.row.fill(0.0);
+                self.n_in_row = 0;
+            }
+        }
+        self.waiting.drain(..(mels.nrows() * mel::HOP).min(self.waiting.len()));
+    }
+}
+
+/// Features of a sound of 16 kHz for `n_frames` of motion.
+pub fn from_samples(samples: &[f32], fps: FrameRate, n_frames: usize) -> SoundFeatures {
+    let mut loudest = Loudest::default();
+    loudest.push(samples);
+    let mut listener = SoundFeatureExtractor::new(fps, Some(loudest.finish()));
+    listener.push(samples);
+    listener.finish(n_frames)
+}
+
+/// Features of a file for `n_frames` of motion, read twice; later sound is not decoded. `None`: no sound.
+pub fn extract(path: &Path, fps: FrameRate, n_frames: usize) -> Result<Option<SoundFeatures>> {
+    // One second more, so that an onset at the end stands out from what follows.
+    let n_wanted = ((fps.secs(n_frames) + 1.0) * f64::from(SAMPLE_RATE)).ceil() as usize;
+    let listen = |sink: &mut dyn FnMut(&[f32])| -> Result<usize> {
+        let mut n = 0;
+        for piece in SoundStream::open(path, SAMPLE_RATE) {
+            let piece = piece.with_context(|| format!("the sound {}", path.display()))?;
+            n += piece.len();
+            sink(&piece);
+            if n >= n_wanted {
+                break;
+            }
+        }
+        Ok(n)
+    };
+    let mut loudest = Loudest::default();
+    if listen(&mut |samples| loudest.push(samples))? == 0 {
+        return Ok(None);
+    }
+    let mut listener = SoundFeatureExtractor::new(fps, Some(loudest.finish()));
+    listen(&mut |samples| listener.push(samples))?;
+    Ok(Some(listener.finish(n_frames)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pieces_of_any_length_are_heard_as_the_whole() {
+        let fps = FrameRate::new(15, 1);
+        let sound: Vec<f32> =
+            (0..400_000).map(|i| (i as f32 * 0.05).sin() * if i % 16_000 < 2000 { 0.5 } else { 0.001 }).collect();
+        let mut loudest = Loudest::default();
+        loudest.push(&sound);
+        let loudest = loudest.finish();
+        let features = |piece: usize| {
+            let mut listener = SoundFeatureExtractor::new(fps, Some(loudest));
+            sound.chunks(piece).for_each(|samples| listener.push(samples));
+            listener.finish(375)
+        };
+        let whole = features(sound.len());
+        assert_eq!(whole.rows.len(), 188 * mel::N_MELS);
+        assert_eq!(whole, from_samples(&sound, fps, 375));
+        assert!(whole.secs == 25.0 && whole.onsets.len() > 15, "{:?}", whole.onsets);
+        for piece in [701, 16_000, 160_001] {
+            let pieces = features(piece);
+            assert_eq!(pieces.onsets, whole.onsets);
+            let apart = pieces.rows.iter().zip(&whole.rows).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            assert!(pieces.rows.len() == whole.rows.len() && apart < 1e-4, "{piece}: {apart}");
+        }
+        // Spectrogram of the whole sound, averaged over two motion frames.
+        let mels = mel::log_mel(&sound);
+        let frames = mel_frames(fps, 20)..mel_frames(fps, 22);
+        let mean = mels.slice(ndarray::s![frames, 5]).mean().unwrap();
+        assert!((whole.rows[10 * mel::N_MELS + 5] - mean).abs() < 1e-4);
+    }
+
+    #[test]
+    fn sound_that_ends_early_is_silence_and_sound_that_goes_on_is_cut() {
+        let fps = FrameRate::new(15, 1);
+        let mut listener = SoundFeatureExtractor::new(fps, None);
+        listener.push(&[0.1; 16_000]);
+        assert_eq!(listener.finish(60).rows.len(), 30 * mel::N_MELS);
+        let mut listener = SoundFeatureExtractor::new(fps, None);
+        listener.push(&[0.1; 64_000]);
+        assert_eq!(listener.finish(15).rows.len(), 8 * mel::N_MELS);
+        assert_eq!(SoundFeatureExtractor::new(fps, None).finish(0), SoundFeatures::default());
+    }
+}

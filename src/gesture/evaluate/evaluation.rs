@@ -1,0 +1,83 @@
+//! An evaluation as a value: motions beside their ground truth, with the simple predictors measured beside them.
+
+use super::baseline::baselines;
+use super::baseline::baselines::Predictor;
+use super::clips::checkpoint::EvaluatedCheckpoint;
+use super::clips::clips;
+use super::clips::clips::EvalClips;
+use super::clips::motion_store::MotionStore;
+use super::clips::{of_speaker, pairs};
+use super::table::table;
+use super::table::table::Table;
+use crate::metrics::settings::MetricSettings;
+use anyhow::{Result, ensure};
+use orator_base::stage::progress::Progress;
+use orator_base::types::time::FrameRate;
+use orator_dataset::{Dataset, Split};
+use std::path::Path;
+
+/// Motions to be measured beside their ground truth.
+pub struct Evaluation {
+    /// The ground truth, cut into clips, with its sound.
+    pub clips: EvalClips,
+    /// The motions under test first, then the simple predictors.
+    pub predictors: Vec<Predictor>,
+}
+
+impl Evaluation {
+    /// Reads files of motion: `truth` and `prediction` are two files, or two folders whose files have the same names;
+    /// `audio` is a sound or a folder of sounds. `fps` is the rate of files that do not state one. `store` keeps
+    /// the motions.
+    ///
+    /// # Errors
+    /// Files that do not belong together or cannot be read.
+    pub fn from_files(
+        truth: &Path,
+        prediction: &Path,
+        audio: Option<&Path>,
+        fps: Option<FrameRate>,
+        store: &MotionStore,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let task = progress.begin("evaluating", 0);
+        task.detail("reading");
+        let found = pairs::find(truth, prediction, audio)?;
+        let mut clips = clips::read(&found.pairs, fps, store)?;
+        if let Some(audio) = audio {
+            ensure!(clips.have_sound() || audio.is_dir(), "{} holds no sound", audio.display());
+        }
+        clips.notes.splice(0..0, found.notes);
+        let mut predictors = vec![Predictor::prediction(&clips, "the motion under test")];
+        let (others, left_out) = baselines::from_files(&clips, store)?;
+        predictors.extend(others);
+        clips.notes.extend(left_out);
+        Ok(Self { clips, predictors })
+    }
+
+    /// Generates motion with each checkpoint for the sounds and words of a split of the dataset, whose own motion is the
+    /// ground truth: joints [T, 49, 3] in metres at the dataset's rate. Where a checkpoint moves a captured skeleton, all
+    /// predictors are measured on the joints that it has, and a note says which.
+    ///
+    /// # Errors
+    /// No checkpoint, a split without samples, a dataset of another rate than a checkpoint's (that of a captured skeleton
+    /// is resampled). `store` keeps the motions.
+    pub fn of_generators(
+        dataset: &Dataset,
+        checkpoints: &[EvaluatedCheckpoint],
+        split: Split,
+        store: &MotionStore,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let task = progress.begin("evaluating", 0);
+        let (clips, predictors) = of_speaker::prepare(dataset, checkpoints, split, store, &*task)?;
+        Ok(Self { clips, predictors })
+    }
+
+    /// Measures every predictor.
+    ///
+    /// # Errors
+    /// Settings that fit no clip.
+    pub fn measure(&self, settings: &MetricSettings, progress: &dyn Progress) -> Result<Table> {
+        table::measure(&self.clips, settings, &self.predictors, &*progress.begin("evaluating", 0))
+    }
+}

@@ -1,0 +1,149 @@
+//! Test whether paired differences of blocks are symmetric about 0, by flipping the signs of whole blocks (Fisher 1935;
+//! for dependent data in blocks: Canay, Romano and Shaikh 2017). Several metrics are flipped together, and each is held
+//! against the largest of all (Westfall and Young 1993), so that the level is that of all of them at once.
+
+use super::bootstrap::Estimate;
+use rand::{RngCore, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Level of a test. Half of 5 %, since the decorrelation time is an estimate and leaves some dependence: simulated rates
+/// of false verdicts stay below 5 % with it.
+pub const LEVEL: f64 = 0.025;
+/// Fewest blocks with which a test can reject: of all flips, the observed one and its negative are 2 of 2^n.
+pub const FEWEST_BLOCKS: usize = 7;
+/// Most blocks whose flips are all counted.
+const MOST_EXACT: usize = 16;
+/// Random flips of more blocks; the observed one is added to them (Phipson and Smyth 2010).
+const N_RANDOM: usize = 9999;
+const SEED: u64 = 1;
+/// Rounding up to which two statistics are equal.
+const ROUNDING: f64 = 1e-9;
+
+/// Mean difference with what a test says of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TestedDifference {
+    /// Mean with the simultaneous interval: 0 lies outside where `p` is at most [`LEVEL`]. Infinite where no mean could
+    /// be rejected.
+    pub mean: Estimate,
+    /// Two-sided p value, adjusted for the number of metrics.
+    pub p: f64,
+}
+
+/// Tests metrics together. `differences`: one number a block for each metric, all of one length. `inflation` (at least
+/// 1): how much more the mean of the blocks varies than that of independent ones. Metrics with numbers that are not
+/// finite have p = 1 and no interval.
+pub fn test(differences: &[Vec<f64>], inflation: f64) -> Vec<TestedDifference> {
+    let n = differences.iter().map(Vec::len).min().unwrap_or(0);
+    let units: Vec<Option<Vec<f64>>> = differences.iter().map(|metric| unit(&metric[..n])).collect();
+    let mut largest = largest_sums(&units.iter().flatten().collect::<Vec<_>>(), n);
+    largest.sort_by(f64::total_cmp);
+    let n_flips = largest.len();
+    let n_beyond = |size: f64| n_flips - largest.partition_point(|other| *other < size - ROUNDING);
+    let n_rejected = (LEVEL * n_flips as f64 + ROUNDING) as usize;
+    // Sums above this one are rejected.
+    let critical = largest.len().checked_sub(n_rejected + 1).map_or(f64::INFINITY, |k| largest[k] + ROUNDING);
+    let of_metric = |(metric, unit): (&Vec<f64>, &Option<Vec<f64>>)| {
+        let blocks = n as f64;
+        let mean = metric[..n].iter().sum::<f64>() / blocks;
+        let Some(unit) = unit else {
+            let none = if mean == 0.0 { 0.0 } else { f64::NAN };
+            return TestedDifference { mean: Estimate { value: mean, low: none, high: none }, p: 1.0 };
+        };
+        // The sum of unit length is a function of Student's t, which is what the inflation divides.
+        let size = unit.iter().sum::<f64>().abs();
+        let rest = (1.0 - size * size / blocks).max(0.0);
+        let deflated = size / (rest * inflation + size * size / blocks).sqrt();
+        let p = n_beyond(deflated) as f64 / n_flips as f64;
+        let spread: f64 = metric[..n].iter().map(|value| (value - mean).powi(2)).sum();
+        let room = blocks - critical * critical;
+        let half = if room > 0.0 { critical * (inflation * spread / (blocks * room)).sqrt() } else { f64::INFINITY };
+        TestedDifference { mean: Estimate { value: mean, low: mean - half, high: mean + half }, p }
+    };
+    differences.iter().zip(&units).map(of_metric).collect()
+}
+
+/// Numbers scaled to a sum of squares of 1; `None` where there is none, or one is not finite.
+fn unit(values: &[f64]) -> Option<Vec<f64>> {
+    let largest = values.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
+    if !(largest > 0.0 && values.iter().all(|value| value.is_finite())) {
+        return None;
+    }
+    let length = values.iter().map(|value| (value / largest).powi(2)).sum::<f64>().sqrt();
+    Some(values.iter().map(|value| value / largest / length).collect())
+}
+
+/// Largest magnitude of the metrics' sums for every flip of the signs, or for the observed signs and random ones.
+fn largest_sums(units: &[&Vec<f64>], n: usize) -> Vec<f64> {
+    let largest = |is_negative: &dyn Fn(usize) -> bool| {
+        let sum = |unit: &&Vec<f64>| {
+            let signed = unit.iter().enumerate().map(|(i, value)| if is_negative(i) { -value } else { *value });
+            signed.sum::<f64>().abs()
+        };
+        units.iter().map(sum).fold(0.0, f64::max)
+    };
+    if n <= MOST_EXACT {
+        // Flips and their negatives have one magnitude: the last sign stays.
+        let half = (0..1_u64 << n.saturating_sub(1)).map(|flip| largest(&|i| flip >> i & 1 == 1));
+        return half.flat_map(|sum| [sum; 2]).collect();
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+    let mut bits = vec![0_u64; n.div_ceil(64)];
+    let mut sums = vec![largest(&|_| false)];
+    for _ in 0..N_RANDOM {
+        bits.fill_with(|| rng.next_u64());
+        sums.push(largest(&|i| bits[i / 64] >> (i % 64) & 1 == 1));
+    }
+    sums
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn p_values_are_those_of_scipy() {
+        let golden: serde_json::Value =
+            serde_json::from_str(include_str!("../../../../fixtures/reference/verdict_golden.json")).unwrap();
+        for case in golden["sign_flips"].as_array().unwrap() {
+            let differences: Vec<Vec<f64>> = serde_json::from_value(case["differences"].clone()).unwrap();
+            let expected: Vec<f64> = serde_json::from_value(case["p"].clone()).unwrap();
+            let exact = differences[0].len() <= MOST_EXACT;
+            for (found, p) in test(&differences, 1.0).iter().zip(expected) {
+                // Four standard deviations of the random flips.
+                let bound = if exact { 1e-12 } else { 4.0 * (p * (1.0 - p) / 1e4).sqrt() + 1e-4 };
+                assert!((found.p - p).abs() <= bound, "{} {p}", found.p);
+            }
+        }
+    }
+
+    #[test]
+    fn the_interval_agrees_with_the_test() {
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let mut number = || f64::from(rng.next_u32()) / f64::from(u32::MAX) - 0.5;
+        let mut n_rejected = 0;
+        for case in 0..300 {
+            let (n, shift) = (5 + case % 9, f64::from(case as u32 % 7) * 0.1);
+            let metrics: Vec<Vec<f64>> = (0..3).map(|_| (0..n).map(|_| number() + shift).collect()).collect();
+            for tested in test(&metrics, 1.0 + f64::from(case as u32 % 4) * 0.2) {
+                assert!(tested.mean.low <= tested.mean.value && tested.mean.value <= tested.mean.high);
+                assert_eq!(tested.p <= LEVEL, tested.mean.is_apart_from_zero(), "{tested:?}");
+                assert!(n >= FEWEST_BLOCKS || tested.p > LEVEL, "{tested:?}");
+                n_rejected += usize::from(tested.p <= LEVEL);
+            }
+        }
+        assert!((100..800).contains(&n_rejected), "{n_rejected}");
+    }
+
+    #[test]
+    fn extremes() {
+        let alike = test(&[vec![0.2; FEWEST_BLOCKS]], 1.0)[0];
+        assert!(alike.p == 2.0 / 128.0 && alike.mean.is_apart_from_zero(), "{alike:?}");
+        assert!(!test(&[vec![0.2; FEWEST_BLOCKS - 1]], 1.0)[0].mean.is_apart_from_zero());
+        assert_eq!(test(&[vec![0.0; 9]], 1.0)[0].p, 1.0);
+        let broken = test(&[vec![f64::NAN; 9], vec![1e300; 9], vec![]], 1.0);
+        assert!(broken.iter().all(|tested| tested.p == 1.0), "{broken:?}");
+        assert!(test(&[], 1.0).is_empty());
+        let many = test(&[vec![1.0; 40]], 1.0)[0];
+        assert_eq!((many.p, many.mean.low), (1e-4, 1.0));
+    }
+}

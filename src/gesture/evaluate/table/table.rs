@@ -1,0 +1,265 @@
+//! Table of every metric of every predictor with its interval, on the same clips and the same draws.
+
+use super::block_length::BlockLength;
+use super::blocks;
+use super::bootstrap::{Estimate, draws};
+use super::left_out::BlockGroups;
+use super::sign_flips;
+use super::sign_flips::TestedDifference;
+use crate::evaluate::baseline::baselines::{NumberedCheckpoint, Predictor, PredictorKind};
+use crate::evaluate::clips::clips::EvalClips;
+use crate::metrics::catalogue::{Better, Catalogue, Definition, IntervalSums};
+use crate::metrics::settings::MetricSettings;
+use anyhow::{Result, ensure};
+use ndarray::{Array2, s};
+use orator_base::stage::progress::Task;
+
+/// Number of draws behind an interval; costly metrics (Frechet distances, correlations) take fewer.
+pub const N_DRAWS: usize = 1000;
+pub const N_COSTLY_DRAWS: usize = 100;
+/// Number of blocks below which bootstrap intervals say little.
+pub const FEW_BLOCKS: usize = 10;
+
+/// Metrics of one predictor.
+#[derive(Clone, Debug)]
+pub struct PredictorRow {
+    pub kind: PredictorKind,
+    /// Whose motion it is, where several checkpoints are measured.
+    pub checkpoint: Option<NumberedCheckpoint>,
+    /// Description in a sentence.
+    pub description: String,
+    /// One estimate a definition.
+    pub values: Vec<Estimate>,
+    /// Reasons of missing values; empty where there is a value.
+    pub reasons: Vec<String>,
+    /// Values without each group of blocks [groups, definitions]. Empty where blocks are missing.
+    left_out: Array2<f64>,
+}
+
+/// Metrics of all predictors.
+#[derive(Clone, Debug)]
+pub struct Table {
+    pub settings: MetricSettings,
+    pub definitions: Vec<Definition>,
+    /// For a metric that should match the ground truth's: index of the ground truth's value.
+    pub truth_of: Vec<Option<usize>>,
+    pub n_clips: usize,
+    pub n_blocks: usize,
+    /// Approximate length of the blocks; a clip has the number of equal blocks that fits best.
+    pub block_length: BlockLength,
+    groups: BlockGroups,
+    pub n_frames: usize,
+    pub secs: f64,
+    pub with_sound: bool,
+    /// Whether the model was trained on these clips.
+    pub learnt: bool,
+    /// Hash of the ground truth and of its compared joints.
+    pub truth: String,
+    /// Rows, the predictions first, the ground truth last.
+    pub rows: Vec<PredictorRow>,
+    pub notes: Vec<String>,
+}
+
+/// Measures the prediction, the baselines and the ground truth itself, one predictor at a time to bound memory; results
+/// are independent of the number of threads.
+///
+/// # Errors
+/// Settings that the catalogue rejects; no frame to measure.
+pub fn measure(
+    clips: &EvalClips,
+    settings: &MetricSettings,
+    predictors: &[Predictor],
+    task: &dyn Task,
+) -> Result<Table> {
+    let (has_fingers, channels) = (clips.have_fingers(), clips.channels.clone());
+    let settings = MetricSettings { fps: clips.fps, has_fingers, channels, ..settings.clone() };
+    let catalogue = Catalogue::new(&settings)?;
+    ensure!(clips.n_frames() > 0, "there is no frame to measure");
+    let fps = clips.fps.per_sec();
+    let block_length = BlockLength::new(clips.secs(), fps, &differences(clips, predictors));
+    let frames = blocks::frames(clips, block_length.frames(fps));
+    let groups = BlockGroups::new(&frames);
+    let mut rows = Vec::new();
+    for predictor in predictors {
+        task.detail(&NumberedCheckpoint::name_of(predictor.kind, predictor.checkpoint.as_ref()));
+        let measured = blocks::measure(&catalogue, clips, predictor, block_length.frames(fps));
+        let row = row(&catalogue, predictor.kind, &predictor.description, &measured);
+        let left_out = match measured.blocks.len() == frames.len() {
+            true => {
+                let counts = groups.counts_without();
+                let mut values = catalogue.draw_cheap(&measured.blocks, counts.view());
+                let costly = catalogue.draw_costly(&measured.blocks, counts.view());
+                for index in (0..values.ncols()).filter(|index| catalogue.is_costly(*index)) {
+                    values.column_mut(index).assign(&costly.column(index));
+                }
+                values
+            }
+            false => Array2::default((0, 0)),
+        };
+        rows.push(PredictorRow { checkpoint: predictor.checkpoint.clone(), left_out, ..row });
+        task.advance(1);
+    }
+    task.detail("truth");
+    rows.extend(halves(&catalogue, clips));
+    let truth = Predictor::truth(clips);
+    // Without blocks, since the ground truth has no draws.
+    let whole = blocks::measure(&catalogue, clips, &truth, usize::MAX).whole;
+    rows.push(row(&catalogue, PredictorKind::Truth, &truth.description, &IntervalSums { whole, blocks: Vec::new() }));
+    task.advance(1);
+    let definitions = catalogue.definitions().to_vec();
+    let truth_of = (0..definitions.len()).map(|index| catalogue.truth_of(index)).collect();
+    Ok(Table {
+        settings,
+        definitions,
+        truth_of,
+        n_clips: clips.clips.len(),
+        n_blocks: frames.len(),
+        block_length,
+        groups,
+        n_frames: clips.n_frames(),
+        secs: clips.secs(),
+        with_sound: clips.have_sound(),
+        learnt: clips.learnt,
+        truth: clips.truth(),
+        rows,
+        notes: clips.notes.clone(),
+    })
+}
+
+/// Differences between the errors of a prediction and of what verdicts compare it with, metres, of every frame of every
+/// clip.
+fn differences(clips: &EvalClips, predictors: &[Predictor]) -> Vec<Vec<Vec<f64>>> {
+    use PredictorKind::{LatePrediction, MeanPose, MedianPose, MismatchedPrediction, Prediction};
+    let errors: Vec<_> = predictors.iter().map(|predictor| blocks::frame_errors(clips, predictor)).collect();
+    let is_compared = |own: &Predictor, other: &Predictor| match other.kind {
+        MeanPose | MedianPose => true,
+        LatePrediction | MismatchedPrediction => own.checkpoint == other.checkpoint,
+        _ => false,
+    };
+    let less = |(own, other): (&Vec<f64>, &Vec<f64>)| own.iter().zip(other).map(|(a, b)| a - b).collect();
+    let mut differences = Vec::new();
+    for (own, of_own) in predictors.iter().zip(&errors).filter(|(own, _)| own.kind == Prediction) {
+        let others = predictors.iter().zip(&errors).filter(|(other, _)| is_compared(own, other));
+        differences.extend(others.map(|(_, of_other)| of_own.iter().zip(of_other).map(less).collect()));
+    }
+    differences
+}
+
+/// One half of the ground truth against the other, for metrics of whole sets only, since frames have no partner.
+fn halves(catalogue: &Catalogue, clips: &EvalClips) -> Option<PredictorRow> {
+    let measured = blocks::halves(catalogue, clips);
+    if measured.blocks.is_empty() {
+        return None;
+    }
+    let description = "every second block of the truth beside the others: how far apart two sets of real motion are that have half \
+                the frames; only for figures of whole sets";
+    let mut row = row(catalogue, PredictorKind::TruthHalves, description, &measured);
+    for (index, definition) in catalogue.definitions().iter().enumerate().filter(|(_, d)| !is_of_sets(d)) {
+        row.values[index] = Estimate { value: f64::NAN, low: f64::NAN, high: f64::NAN };
+        row.reasons[index] = format!("{} needs two motions of the same seconds", definition.name);
+    }
+    Some(row)
+}
+
+/// Whether a metric compares two sets of frames regardless of their order.
+fn is_of_sets(definition: &Definition) -> bool {
+    ["frechet", "hellinger"].iter().any(|start| definition.name.starts_with(start))
+}
+
+fn row(catalogue: &Catalogue, kind: PredictorKind, description: &str, measured: &IntervalSums) -> PredictorRow {
+    let values = catalogue.values(&measured.whole);
+    let n_blocks = measured.blocks.len();
+    let drawn = if n_blocks == 0 {
+        Array2::from_elem((0, values.len()), f64::NAN)
+    } else {
+        let counts = blocks::counts(&draws(n_blocks, N_DRAWS), n_blocks);
+        let mut drawn = catalogue.draw_cheap(&measured.blocks, counts.view());
+        // A prefix of the same draws.
+        let costly = catalogue.draw_costly(&measured.blocks, counts.slice(s![..N_COSTLY_DRAWS, ..]));
+        for index in (0..values.len()).filter(|index| catalogue.is_costly(*index)) {
+            drawn.column_mut(index).fill(f64::NAN);
+            drawn.slice_mut(s![..N_COSTLY_DRAWS, index]).assign(&costly.column(index));
+        }
+        drawn
+    };
+    let estimate = |(index, value): (usize, &f64)| {
+        let estimate = Estimate::from_draws(*value, &drawn.column(index).to_vec());
+        // Metrics are never below 0.
+        Estimate { low: estimate.low.max(0.0 * estimate.low), ..estimate }
+    };
+    let reason = |(index, value): (usize, &f64)| match value.is_finite() {
+        true => String::new(),
+        false => catalogue.reason(&measured.whole, index),
+    };
+    PredictorRow {
+        kind,
+        checkpoint: None,
+        description: description.to_owned(),
+        reasons: values.iter().enumerate().map(reason).collect(),
+        values: values.iter().enumerate().map(estimate).collect(),
+        left_out: Array2::default((0, 0)),
+    }
+}
+
+impl PredictorRow {
+    /// Name for people.
+    pub fn name(&self) -> String {
+        NumberedCheckpoint::name_of(self.kind, self.checkpoint.as_ref())
+    }
+
+    /// Key in a result file.
+    pub fn key(&self) -> String {
+        NumberedCheckpoint::key_of(self.kind, self.checkpoint.as_ref())
+    }
+}
+
+impl Table {
+    /// Rows of the motions under test, one of each checkpoint.
+    pub fn predictions(&self) -> impl Iterator<Item = &PredictorRow> {
+        self.rows.iter().filter(|row| row.kind == PredictorKind::Prediction)
+    }
+
+    /// Row of a predictor, if it was measured; of several checkpoints the first one's.
+    pub fn row(&self, kind: PredictorKind) -> Option<&PredictorRow> {
+        self.rows.iter().find(|row| row.kind == kind)
+    }
+
+    /// Whether a metric of the prediction has a value in any row.
+    pub fn is_shown(&self, index: usize) -> bool {
+        let has_value = self.rows.iter().any(|row| row.values[index].value.is_finite());
+        self.definitions[index].better != Better::Neither && has_value
+    }
+
+    /// Gain of `a` over `b` in a metric, in its unit, positive where `a` is better. NaN where neither direction of the
+    /// metric is better.
+    pub fn gain(&self, a: &PredictorRow, b: &PredictorRow, index: usize) -> f64 {
+        let value = |row: &PredictorRow, index: usize| row.values[index].value;
+        self.good(index, |index| value(a, index)) - self.good(index, |index| value(b, index))
+    }
+
+    /// Gains of `a` over other rows in metrics, `(index, row)`, tested together: the level is that of all of them.
+    pub fn tested_gains(&self, a: &PredictorRow, others: &[(usize, &PredictorRow)]) -> Vec<TestedDifference> {
+        let n = self.groups.len();
+        let contributions = |(index, b): &(usize, &PredictorRow)| {
+            if a.left_out.nrows() != n || b.left_out.nrows() != n {
+                return vec![f64::NAN; n];
+            }
+            let good = |row: &PredictorRow, group: usize| self.good(*index, |index| row.left_out[[group, index]]);
+            let without: Vec<f64> = (0..n).map(|group| good(a, group) - good(b, group)).collect();
+            self.groups.contributions(self.gain(a, b, *index), &without)
+        };
+        let inflation = self.block_length.variance_inflation(self.secs / n.max(1) as f64);
+        sign_flips::test(&others.iter().map(contributions).collect::<Vec<_>>(), inflation)
+    }
+
+    /// How good values are in a metric: more is better.
+    fn good(&self, index: usize, value: impl Fn(usize) -> f64) -> f64 {
+        let truth = self.truth_of.get(index).copied().flatten().unwrap_or(index);
+        match self.definitions.get(index).map(|definition| definition.better) {
+            Some(Better::Higher) => value(index),
+            Some(Better::Lower) => -value(index),
+            Some(Better::NearerTruth) => -(value(index) - value(truth)).abs(),
+            Some(Better::Neither) | None => f64::NAN,
+        }
+    }
+}

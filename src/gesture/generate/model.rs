@@ -1,0 +1,249 @@
+//! What a checkpoint of the generator means: the metadata that generation needs, and the network itself.
+
+use super::normalisation::Normalisation;
+use super::representation::Representation;
+use super::seq2seq::metadata::is_sequence_kind;
+use super::variant;
+use anyhow::{Context, Result, bail, ensure};
+use ndarray::ArrayView2;
+use orator_base::audio::mel;
+use orator_base::motion::bones;
+use orator_base::types::pose3d::Motion;
+use orator_base::types::sound::SAMPLE_RATE;
+use orator_base::types::time::FrameRate;
+use orator_formats::checkpoint::Contents;
+use orator_nn::gan::generator::{Config, Generator};
+use orator_nn::gan::speaker_layer::SPEAKER;
+use orator_nn::params::Params;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Tensors of the generator in a checkpoint begin with this.
+pub const GENERATOR: &str = "generator.";
+/// Name and version of the layout; another is refused.
+const KIND: &str = "orator speaker 2";
+const SKELETON: &str = "49 joints, house order";
+/// Most channels of a network that is believed; the published one has 256.
+const MOST_WIDTH: usize = 1024;
+
+/// Everything beside the tensors that generation needs. Stored under `speaker` in a checkpoint's metadata.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SpeakerMetadata {
+    pub kind: String,
+    /// The speaker's name.
+    pub name: String,
+    pub fps: FrameRate,
+    pub skeleton: String,
+    pub network: Config,
+    pub audio: SpectrogramSettings,
+    pub normalisation: Normalisation,
+    pub representation: Representation,
+    /// Hash of the dataset it learnt from.
+    pub dataset: String,
+    /// Videos it learnt from, those of the models that it began from among them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub videos: Vec<TrainedVideo>,
+}
+
+/// A video that a model learnt from.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct TrainedVideo {
+    pub speaker: String,
+    /// BLAKE3 of the file, as the dataset has it.
+    pub content: String,
+}
+
+/// Parameters of the spectrogram.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SpectrogramSettings {
+    pub rate: u32,
+    pub window: usize,
+    pub hop: usize,
+    pub fft: usize,
+    pub n_mels: usize,
+    pub lowest_hz: f64,
+    pub highest_hz: f64,
+}
+
+impl SpectrogramSettings {
+    /// Parameters of [`mel::log_mel`].
+    pub fn current() -> Self {
+        Self {
+            rate: SAMPLE_RATE,
+            window: mel::WINDOW,
+            hop: mel::HOP,
+            fft: mel::FFT,
+            n_mels: mel::N_MELS,
+            lowest_hz: mel::LOWEST_HZ,
+            highest_hz: mel::HIGHEST_HZ,
+        }
+    }
+}
+
+impl SpeakerMetadata {
+    /// Metadata with the current skeleton and spectrogram; `name` and `fps` of the speaker, `dataset` as its hash.
+    pub fn new(
+        name: &str,
+        fps: FrameRate,
+        dataset: &str,
+        network: Config,
+        normalisation: Normalisation,
+        representation: Representation,
+    ) -> Self {
+        Self {
+            kind: KIND.to_owned(),
+            name: name.to_owned(),
+            fps,
+            skeleton: SKELETON.to_owned(),
+            network,
+            audio: SpectrogramSettings::current(),
+            normalisation,
+            representation,
+            dataset: dataset.to_owned(),
+            videos: Vec::new(),
+        }
+    }
+
+    /// Adds videos to those it learnt from.
+    pub fn add_videos(&mut self, videos: Vec<TrainedVideo>) {
+        self.videos.extend(videos);
+        self.videos.sort();
+        self.videos.dedup();
+    }
+
+    /// The generator's numbers [144 or more, T] as motion whose bones have the speaker's lengths in every frame.
+    pub fn motion(&self, raw: ArrayView2<f32>) -> Motion {
+        let mut motion = Motion::from_joints(self.fps, self.representation.joints(raw, &self.normalisation));
+        let lengths = &self.normalisation.bone_lengths;
+        bones::with_lengths(&mut motion, &std::array::from_fn(|bone| lengths.get(bone).copied().unwrap_or(0.0)));
+        motion
+    }
+}
+
+/// What generates where a checkpoint leaves a choice.
+#[derive(Clone, Debug, Default)]
+pub struct GenerationChoice {
+    /// Name of the speaker; needed where a network knows several.
+    pub speaker: Option<String>,
+    /// Which take of a speech (`variant`); `None`: the network as it was trained.
+    pub seed: Option<u64>,
+}
+
+/// Reads a checkpoint of `orator train gan`, as a network of one speaker. Errors name the file and what is wrong with it.
+pub fn load(path: &Path, choice: &GenerationChoice) -> Result<(SpeakerMetadata, Generator)> {
+    let mut contents = Contents::read(path)?;
+    let is_none = || format!("{} is no checkpoint of `orator train gan`", path.display());
+    check(&contents.facts["speaker"]).with_context(is_none)?;
+    choose(&mut contents, choice.speaker.as_deref()).with_context(|| path.display().to_string())?;
+    if let Some(seed) = choice.seed {
+        variant::vary(&mut contents, GENERATOR, seed).with_context(|| format!("{} has no takes", path.display()))?;
+    }
+    build(&contents).with_context(is_none)
+}
+
+/// The speakers that a checkpoint of `orator train gan` knows, in the order of their numbers.
+pub fn speakers(facts: &serde_json::Value) -> Result<Vec<SpeakerMetadata>> {
+    check(&facts["speaker"])?;
+    let first = [facts["speaker"].clone()];
+    let others = facts["other_speakers"].as_array().cloned().unwrap_or_default();
+    let all = first.into_iter().chain(others).map(serde_json::from_value);
+    let all: Vec<SpeakerMetadata> = all.collect::<serde_json::Result<_>>().context("its facts are incomplete")?;
+    let n_speakers = all[0].network.n_speakers.max(1);
+    ensure!(n_speakers == all.len(), "it names {} speakers of {n_speakers}", all.len());
+    Ok(all)
+}
+
+/// Leaves one speaker of a network of several.
+fn choose(contents: &mut Contents, name: Option<&str>) -> Result<()> {
+    let all = speakers(&contents.facts)?;
+    let names = || all.iter().map(|speaker| speaker.name.as_str()).collect::<Vec<_>>().join(", ");
+    let number = match name {
+        None if all.len() == 1 => return Ok(()),
+        None => bail!("it knows several speakers; say with --speaker which of them is to speak: {}", names()),
+        Some(name) => all.iter().position(|speaker| speaker.name == name),
+    };
+    let number = number.with_context(|| format!("it does not know {:?} but {}", name.unwrap_or_default(), names()))?;
+    if all.len() > 1 {
+        let mut chosen = all[number].clone();
+        chosen.network.n_speakers = 1;
+        contents.facts["speaker"] = serde_json::to_value(chosen)?;
+        let prefix = format!("{GENERATOR}{SPEAKER}");
+        for (name, table) in contents.tensors.iter_mut().filter(|(name, _)| name.starts_with(&prefix)) {
+            *table = table.narrow(0, number, 1).with_context(|| format!("tensor {name}"))?;
+        }
+    }
+    Ok(())
+}
+
+/// Errors unless these facts of a speaker are of a checkpoint that this program reads.
+fn check(facts: &serde_json::Value) -> Result<()> {
+    let kind = &facts["kind"];
+    ensure!(!is_sequence_kind(kind), "it is one of `orator train seq2seq`, with which `orator generate` speaks");
+    ensure!(kind == KIND, "its kind is {kind}, this program reads {KIND:?}");
+    Ok(())
+}
+
+fn build(contents: &Contents) -> Result<(SpeakerMetadata, Generator)> {
+    check(&contents.facts["speaker"])?;
+    let metadata: SpeakerMetadata =
+        serde_json::from_value(contents.facts["speaker"].clone()).context("its facts are incomplete")?;
+    ensure!(metadata.skeleton == SKELETON, "its skeleton is {:?}, expected {SKELETON:?}", metadata.skeleton);
+    ensure!(
+        metadata.audio == SpectrogramSettings::current(),
+        "its audio settings are others than this program's: {:?}",
+        metadata.audio
+    );
+    let (n_out, n_numbers) = (metadata.network.n_out, metadata.normalisation.n_numbers());
+    ensure!(n_out == n_numbers, "it makes {n_out} numbers a pose, not {n_numbers}");
+    let (network, fps) = (&metadata.network, metadata.fps);
+    ensure!(network.n_mels == mel::N_MELS, "it reads {} mel bands, not {}", network.n_mels, mel::N_MELS);
+    ensure!((4..=MOST_WIDTH).contains(&network.width), "its width is {}, expected 4 to {MOST_WIDTH}", network.width);
+    ensure!(network.n_speakers <= 1, "it knows {} speakers", network.n_speakers);
+    contents.expect_numbers(network.width * network.width)?;
+    ensure!(fps.is_plausible(), "it moves at {fps}, expected 1 to 1000 frames a second");
+    metadata.normalisation.check()?;
+    metadata.representation.check()?;
+    let mut params = Params::frozen();
+    let generator = Generator::new(&mut params, &metadata.network)?;
+    params.load(&contents.part(GENERATOR))?;
+    Ok((metadata, generator))
+}
+
+/// The best checkpoint by the validation's score: the generator alone, to generate with.
+pub const BEST: &str = "best.safetensors";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::generate::normalisation::N_FEATURES;
+    use orator_base::types::skeleton::N_BONES;
+    use orator_nn::gan::generator::Preset;
+    use std::collections::BTreeMap;
+
+    #[test]
+    fn facts_that_no_training_writes_are_refused() {
+        let table = vec![1.0; N_FEATURES];
+        let normal =
+            Normalisation { mean: table.clone(), std: table, bone_lengths: vec![0.1; N_BONES], channels: Vec::new() };
+        let network = Config { width: 8, ..Config::from_preset(Preset::Light, N_FEATURES) };
+        let facts =
+            SpeakerMetadata::new("host", FrameRate::new(15, 1), "", network.clone(), normal, Representation::Positions);
+        let mut params = Params::new(0);
+        Generator::new(&mut params, &network).unwrap();
+        let mut contents = Contents { facts: serde_json::json!({ "speaker": facts }), tensors: BTreeMap::new() };
+        contents.add(GENERATOR, params.tensors().unwrap());
+        build(&contents).unwrap();
+        for (place, value) in [
+            ("/speaker/network/width", 1_000_000),
+            ("/speaker/network/width", 0),
+            ("/speaker/network/n_mels", 1_000_000),
+            ("/speaker/fps/num", 4_000_000_000u32),
+            ("/speaker/representation", 7),
+        ] {
+            let mut facts = contents.facts.clone();
+            *facts.pointer_mut(place).unwrap() = value.into();
+            let wrong = Contents { facts, tensors: contents.tensors.clone() };
+            assert!(build(&wrong).is_err(), "{place} {value}");
+        }
+    }
+}

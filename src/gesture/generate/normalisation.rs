@@ -1,0 +1,222 @@
+//! The numbers the generator and the discriminator see: 48 joints (all but the neck) x 3, and where they are learnt the
+//! angles of head and trunk, each with mean 0 and deviation 1 over the training split; and the way back to metres and
+//! radians.
+
+use anyhow::ensure;
+use ndarray::{Array2, Array3, ArrayView2};
+use orator_base::types::pose3d::Motion;
+use orator_base::types::posture::{Posture, PostureChannel};
+use orator_base::types::skeleton::{L_HAND, L_WRIST, N_BONES, N_JOINTS, NECK, R_HAND, R_WRIST, is_duplicate};
+use serde::{Deserialize, Serialize};
+
+/// Numbers of the joints of a pose, before those of channels. Number `3 * (joint - 1) + k` is coordinate k of a joint.
+pub const N_FEATURES: usize = 3 * N_BONES;
+/// Least deviation a coordinate is divided by, metres: what hardly moves is not blown up.
+const LEAST_STD: f32 = 0.01;
+/// Least deviation of an angle, radians.
+const LEAST_STD_RADIANS: f32 = 0.01;
+
+/// Mean and deviation of every number, metres, and the speaker's bone lengths.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Normalisation {
+    pub mean: Vec<f32>,
+    pub std: Vec<f32>,
+    /// Bone of joint `n + 1` to its parent, metres; 0 where it was never measured.
+    pub bone_lengths: Vec<f32>,
+    /// What is learnt beside the joints: three numbers each, behind theirs.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub channels: Vec<ChannelNormalisation>,
+}
+
+/// Mean and deviation of the angles of a channel, radians; deviation 0 of one that was never seen and is not learnt. Angles are taken as they are, not as sine and cosine: those of
+/// a speaker before a camera stay far from half a turn, where they would jump.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ChannelNormalisation {
+    pub channel: PostureChannel,
+    pub mean: [f32; 3],
+    pub std: [f32; 3],
+}
+
+impl ChannelNormalisation {
+    /// From mean and deviation, radians, of angles seen in so many frames.
+    pub fn new(channel: PostureChannel, n_seen: [u64; 3], mean: [f64; 3], std: [f64; 3]) -> Self {
+        let std = |k: usize| if n_seen[k] > 0 { (std[k] as f32).max(LEAST_STD_RADIANS) } else { 0.0 };
+        Self { channel, mean: mean.map(|v| v as f32), std: std::array::from_fn(std) }
+    }
+}
+
+impl Normalisation {
+    /// From the statistics of a dataset, [49, 3] each.
+    pub fn new(mean: &Array2<f32>, std: &Array2<f32>, bone_lengths: Vec<f32>) -> Self {
+        let features = |table: &Array2<f32>| table.iter().skip(3).copied().collect::<Vec<f32>>();
+        let std = features(std).into_iter().map(|v| v.max(LEAST_STD)).collect();
+        Self { mean: features(mean), std, bone_lengths, channels: Vec::new() }
+    }
+
+    /// Errors unless the tables have the lengths they should.
+    pub fn check(&self) -> anyhow::Result<()> {
+        let lengths = [self.mean.len(), self.std.len(), self.bone_lengths.len()];
+        ensure!(lengths == [N_FEATURES, N_FEATURES, N_BONES], "its normalisation has {lengths:?} numbers");
+        let mut metres = self.mean.iter().chain(&self.std).chain(&self.bone_lengths);
+        ensure!(metres.all(|v| v.abs() <= 100.0), "its normalisation has numbers beyond 100 m");
+        let mut radians = self.channels.iter().flat_map(|channel| channel.mean.into_iter().chain(channel.std));
+        ensure!(radians.all(|v| v.abs() <= 100.0), "its normalisation has angles beyond 100 radians");
+        let is_once = self.channels.is_sorted_by(|a, b| a.channel < b.channel);
+        ensure!(is_once, "its channels stand twice or in another order than head, trunk");
+        Ok(())
+    }
+
+    /// Numbers of a pose with those of the channels.
+    pub fn n_numbers(&self) -> usize {
+        N_FEATURES + 3 * self.channels.len()
+    }
+
+    /// Motion [T, 49, 3] to numbers [144, T], and which joints but the neck to learn from [48, T]: those that are seen,
+    /// without the hand roots. A number that is missing is 0.
+    pub fn features(&self, motion: &Motion) -> (Array2<f32>, Array2<bool>) {
+        let n_frames = motion.n_frames();
+        let mut features = Array2::zeros((N_FEATURES, n_frames));
+        let mut mask = Array2::from_elem((N_BONES, n_frames), false);
+        for (joint, t) in (1..N_JOINTS).flat_map(|joint| (0..n_frames).map(move |t| (joint, t))) {
+            let value = |k: usize| {
+                let i = 3 * (joint - 1) + k;
+                (motion.joints[[t, joint, k]] - self.mean[i]) / self.std[i]
+            };
+            let values = [value(0), value(1), value(2)];
+            if values.iter().all(|v| v.is_finite()) {
+                (0..3).for_each(|k| features[[3 * (joint - 1) + k, t]] = values[k]);
+                mask[[joint - 1, t]] = motion.mask[[t, joint]] && !is_duplicate(joint);
+            }
+        }
+        (features, mask)
+    }
+
+    /// `features` with the channels of `posture` behind the joints: numbers [`n_numbers`, T], and which joints and angles to
+    /// learn from [48 + 3 x channels, T].
+    pub fn features_with_channels(&self, motion: &Motion, posture: Option<&Posture>) -> (Array2<f32>, Array2<bool>) {
+        let (mut features, mut mask) = self.features(motion);
+        let n_frames = motion.n_frames();
+        for of in &self.channels {
+            let angles = posture.map(|posture| posture.channel(of.channel));
+            let value = |k: usize, t: usize| match of.std[k] {
+                0.0 => f32::NAN,
+                std => angles.map_or(f32::NAN, |angles| (angles[[t, k]] - of.mean[k]) / std),
+            };
+            let numbers = Array2::from_shape_fn((3, n_frames), |(k, t)| value(k, t));
+            features = stacked(&features, &numbers.mapv(|v| if v.is_finite() { v } else { 0.0 }));
+            mask = stacked(&mask, &numbers.mapv(f32::is_finite));
+        }
+        (features, mask)
+    }
+
+    /// Angles of the channels in numbers [`n_numbers`, T], NaN for those that are not learnt; `None`: none is.
+    pub fn posture(&self, features: ArrayView2<f32>) -> Option<Posture> {
+        if self.channels.is_empty() {
+            return None;
+        }
+        let mut posture = Posture::unseen(features.ncols());
+        for (of, n) in self.channels.iter().zip((N_FEATURES..).step_by(3)) {
+            let angle = |(t, k): (usize, usize)| match of.std[k] {
+                0.0 => f32::NAN,
+                std => features[[n + k, t]] * std + of.mean[k],
+            };
+            let angles = Array2::from_shape_fn((features.ncols(), 3), angle);
+            *posture.channel_mut(of.channel) = angles;
+        }
+        Some(posture)
+    }
+
+    /// Numbers [144, T] to joints [T, 49, 3] in metres: the neck at 0, the hand roots at the wrists.
+    pub fn joints(&self, features: ArrayView2<f32>) -> Array3<f32> {
+        Array3::from_shape_fn((features.ncols(), N_JOINTS, 3), |(t, joint, k)| {
+            let joint = match joint {
+                NECK => return 0.0,
+                L_HAND => L_WRIST,
+                R_HAND => R_WRIST,
+                other => other,
+            };
+            let i = 3 * (joint - 1) + k;
+            features[[i, t]] * self.std[i] + self.mean[i]
+        })
+    }
+}
+
+/// Rows of both, of as many columns.
+fn stacked<T: Clone>(above: &Array2<T>, below: &Array2<T>) -> Array2<T> {
+    let (n, n_below, n_frames) = (above.nrows(), below.nrows(), above.ncols());
+    Array2::from_shape_fn((n + n_below, n_frames), |(i, t)| {
+        if i < n { above[[i, t]].clone() } else { below[[i - n, t]].clone() }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use orator_base::types::time::FrameRate;
+
+    #[test]
+    fn there_and_back() {
+        let value = |t: usize, joint: usize, k: usize| (t + 3 * joint + 7 * k) as f32 * 0.01;
+        let mut joints = Array3::from_shape_fn((5, N_JOINTS, 3), |(t, joint, k)| value(t, joint, k));
+        for t in 0..5 {
+            for k in 0..3 {
+                joints[[t, NECK, k]] = 0.0;
+                joints[[t, L_HAND, k]] = joints[[t, L_WRIST, k]];
+                joints[[t, R_HAND, k]] = joints[[t, R_WRIST, k]];
+            }
+        }
+        let whole = joints.clone();
+        joints[[2, 5, 1]] = f32::NAN;
+        let mut motion = Motion::from_joints(FrameRate::new(15, 1), joints);
+        motion.mask[[3, 9]] = false;
+        let table = |value| Array2::from_elem((N_JOINTS, 3), value);
+        let normal = Normalisation::new(&table(0.1), &table(0.0), vec![0.0; N_BONES]);
+        normal.check().unwrap();
+        let (features, mask) = normal.features(&motion);
+        assert_eq!((features[[12, 2]], features[[13, 2]]), (0.0, 0.0));
+        assert_eq!((mask[[4, 2]], mask[[8, 3]], mask[[8, 2]], mask[[L_HAND - 1, 0]]), (false, false, true, false));
+        let back = normal.joints(features.view());
+        for ((t, joint, k), expected) in whole.indexed_iter() {
+            if (t, joint) != (2, 5) {
+                assert!((back[[t, joint, k]] - expected).abs() < 1e-5);
+            }
+        }
+    }
+
+    #[test]
+    fn channels_go_there_and_back_masked() {
+        let table = |value| Array2::from_elem((N_JOINTS, 3), value);
+        let mut normal = Normalisation::new(&table(0.1), &table(0.2), vec![0.0; N_BONES]);
+        let motion = Motion::from_joints(FrameRate::new(15, 1), Array3::from_elem((5, N_JOINTS, 3), 0.1));
+        let mut posture = Posture::unseen(5);
+        posture.trunk = Array2::from_shape_fn((5, 3), |(t, k)| 0.1 * t as f32 - 0.2 * k as f32);
+        posture.trunk[[2, 1]] = f32::NAN;
+        assert_eq!(normal.features_with_channels(&motion, Some(&posture)), normal.features(&motion));
+        assert_eq!(normal.posture(normal.features(&motion).0.view()), None);
+
+        let (head, trunk) = (PostureChannel::Head, PostureChannel::Trunk);
+        normal.channels = vec![
+            ChannelNormalisation::new(head, [9; 3], [0.0; 3], [0.0; 3]),
+            ChannelNormalisation::new(trunk, [9, 9, 0], [0.1, 0.2, 0.0], [0.2, 0.1, 0.0]),
+        ];
+        normal.check().unwrap();
+        let (features, mask) = normal.features_with_channels(&motion, Some(&posture));
+        assert_eq!((features.dim(), mask.dim(), normal.n_numbers()), ((150, 5), (54, 5), 150));
+        // The head was not seen, roll of the trunk never in training.
+        assert!([48, 49, 50, 53].iter().all(|row| mask.row(*row).iter().all(|seen| !seen)));
+        assert_eq!(mask.row(51).to_vec(), [true; 5]);
+        assert_eq!(mask.row(52).to_vec(), [true, true, false, true, true]);
+        assert!(features.iter().all(|v| v.is_finite()) && features[[148, 2]] == 0.0);
+        let back = normal.posture(features.view()).unwrap();
+        for t in [0, 1, 3, 4] {
+            for k in 0..2 {
+                assert!((back.trunk[[t, k]] - posture.trunk[[t, k]]).abs() < 1e-6);
+            }
+            assert!(back.trunk[[t, 2]].is_nan());
+        }
+        let (none, unseen) = normal.features_with_channels(&motion, None);
+        assert!(none.row(149).iter().all(|v| *v == 0.0) && unseen.row(51).iter().all(|seen| !seen));
+        normal.channels.reverse();
+        assert!(normal.check().is_err());
+    }
+}

@@ -1,0 +1,302 @@
+//! What the generator's numbers mean, and the way from them to joints: the positions themselves (Rebol et al. 2021), or
+//! directions of the bones, which forward kinematics turns into joints with the speaker's own lengths. The second way
+//! exists twice: on tensors, to train through, and on arrays, to generate with.
+
+use super::normalisation::{N_FEATURES, Normalisation};
+use anyhow::{bail, ensure};
+use candle_core::{DType, Device, Result, Tensor};
+use ndarray::{Array2, Array3, ArrayView2};
+use orator_base::types::pose3d::Motion;
+use orator_base::types::skeleton::{N_BONES, N_JOINTS, NECK, is_duplicate, parent};
+use serde::{Deserialize, Serialize};
+
+/// Least deviation of a direction's coordinate: what hardly turns is not blown up.
+const LEAST_STD: f64 = 0.05;
+/// Added to a direction's squared length: the root has no slope at 0.
+const EPS: f64 = 1e-12;
+
+/// What the 144 numbers of a pose are.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Representation {
+    /// Joints but the neck, normalised: mean 0, deviation 1.
+    Positions,
+    /// Number `3 * bone + k` times `std` plus `mean` is coordinate k of the bone's direction, of any length.
+    Bones { mean: Vec<f32>, std: Vec<f32> },
+}
+
+impl Representation {
+    /// `bones`, with mean and deviation of the unit directions of these poses (as [`Normalisation::numbers`] gives them)
+    /// over the frames where both ends of the bone are seen.
+    ///
+    /// # Errors
+    /// The first of the poses.
+    pub fn bones(
+        normal: &Normalisation,
+        poses: impl Iterator<Item = anyhow::Result<(Array2<f32>, Array2<bool>)>>,
+    ) -> anyhow::Result<Self> {
+        let (mut n, mut sum, mut squares) = ([0.0f64; N_BONES], [0.0f64; N_FEATURES], [0.0f64; N_FEATURES]);
+        for pose in poses {
+            let (features, mask) = pose?;
+            let joints = normal.joints(features.view());
+            for (t, joints) in joints.outer_iter().enumerate() {
+                let seen = |joint: usize| joint == NECK || mask[[joint - 1, t]];
+                for joint in (1..N_JOINTS).filter(|joint| !is_duplicate(*joint) && seen(*joint)) {
+                    let from = real_parent(joint);
+                    let bone: [f64; 3] = std::array::from_fn(|k| f64::from(joints[[joint, k]] - joints[[from, k]]));
+                    let length = bone.iter().map(|v| v * v).sum::<f64>().sqrt();
+                    if !seen(from) || length < 1e-6 {
+                        continue;
+                    }
+                    n[joint - 1] += 1.0;
+                    for (k, v) in bone.into_iter().enumerate() {
+                        sum[3 * (joint - 1) + k] += v / length;
+                        squares[3 * (joint - 1) + k] += (v / length).powi(2);
+                    }
+                }
+            }
+        }
+        let of = |i: usize| match n[i / 3] {
+            // never seen: straight down, as good as any
+            0.0 => (f64::from(u8::from(i % 3 == 1)), LEAST_STD),
+            n => (sum[i] / n, (squares[i] / n - (sum[i] / n).powi(2)).max(0.0).sqrt().max(LEAST_STD)),
+        };
+        let (mean, std) = (0..N_FEATURES).map(of).map(|(mean, std)| (mean as f32, std as f32)).unzip();
+        Ok(Self::Bones { mean, std })
+    }
+
+    /// The name in the configuration.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Positions => "positions",
+            Self::Bones { .. } => "bones",
+        }
+    }
+
+    /// Whether bones keep their lengths whatever the numbers.
+    pub fn keeps_lengths(&self) -> bool {
+        matches!(self, Self::Bones { .. })
+    }
+
+    /// Errors unless the tables have the lengths they should and hold finite numbers.
+    pub fn check(&self) -> anyhow::Result<()> {
+        if let Self::Bones { mean, std } = self {
+            let lengths = [mean.len(), std.len()];
+            ensure!(lengths == [N_FEATURES; 2], "its table of directions has {lengths:?} numbers");
+            if mean.iter().chain(std).any(|v| !v.is_finite()) {
+                bail!("its table of directions holds a number that is not finite");
+            }
+        }
+        Ok(())
+    }
+
+    /// Raw numbers [144, T] to joints [T, 49, 3] in metres: the neck at 0, the hand roots at the wrists; with `bones`
+    /// every bone has its length of `normal` in every frame.
+    pub fn joints(&self, raw: ArrayView2<f32>, normal: &Normalisation) -> Array3<f32> {
+        let Self::Bones { mean, std } = self else { return normal.joints(raw) };
+        let mut joints = Array3::<f32>::zeros((raw.ncols(), N_JOINTS, 3));
+        for (t, mut joints) in joints.outer_iter_mut().enumerate() {
+            for joint in 1..N_JOINTS {
+                let direction: [f64; 3] = std::array::from_fn(|k| {
+                    let i = 3 * (joint - 1) + k;
+                    f64::from(raw[[i, t]]) * f64::from(std[i]) + f64::from(mean[i])
+                });
+                let length = f64::from(length_of(joint, normal));
+                let scale = length / (direction.iter().map(|v| v * v).sum::<f64>() + EPS).sqrt();
+                let from = real_parent(joint);
+                for k in 0..3 {
+                    joints[[joint, k]] = joints[[from, k]] + (direction[k] * scale) as f32;
+                }
+            }
+        }
+        joints
+    }
+
+    /// Directions of the bones of motion as raw numbers [T, 144], and which of them are known: both ends of the bone are
+    /// seen. The others are 0, and so are those of the hand roots, which are known. All unknown for `positions`.
+    pub fn directions(&self, motion: &Motion) -> (Array2<f32>, Array2<bool>) {
+        let shape = (motion.n_frames(), N_FEATURES);
+        let (mut numbers, mut known) = (Array2::zeros(shape), Array2::from_elem(shape, false));
+        let Self::Bones { mean, std } = self else { return (numbers, known) };
+        for (t, joint) in (0..motion.n_frames()).flat_map(|t| (1..N_JOINTS).map(move |joint| (t, joint))) {
+            let columns = 3 * (joint - 1)..3 * joint;
+            let from = real_parent(joint);
+            let bone: [f32; 3] = std::array::from_fn(|k| motion.joints[[t, joint, k]] - motion.joints[[t, from, k]]);
+            let length = bone.iter().map(|v| v * v).sum::<f32>().sqrt();
+            let is_known = motion.mask[[t, joint]] && motion.mask[[t, from]] && length.is_finite() && length > 1e-6;
+            for (k, i) in columns.enumerate() {
+                known[[t, i]] = is_known || is_duplicate(joint);
+                if is_known && !is_duplicate(joint) {
+                    numbers[[t, i]] = (bone[k] / length - mean[i]) / std[i];
+                }
+            }
+        }
+        (numbers, known)
+    }
+
+    /// The way from raw features to normalised positions on tensors.
+    pub fn decoder(&self, normal: &Normalisation, dtype: DType, device: &Device) -> Result<PoseDecoder> {
+        let Self::Bones { mean, std } = self else { return Ok(PoseDecoder { kinematics: None }) };
+        let table = |values: Vec<f64>, shape: &[usize]| Tensor::from_vec(values, shape, device)?.to_dtype(dtype);
+        let column = |values: &[f32]| table(values.iter().map(|v| f64::from(*v)).collect(), &[1, N_FEATURES, 1]);
+        let lengths = (1..N_JOINTS).map(|joint| f64::from(length_of(joint, normal))).collect();
+        // Row `joint`: 1 at every bone on the way from the neck to it.
+        let mut way = vec![0.0; N_BONES * N_BONES];
+        for joint in 1..N_JOINTS {
+            let mut at = joint;
+            while at != NECK {
+                way[(joint - 1) * N_BONES + at - 1] = 1.0;
+                at = parent(at).unwrap_or(NECK);
+            }
+        }
+        Ok(PoseDecoder {
+            kinematics: Some(Kinematics {
+                direction_mean: column(mean)?,
+                direction_std: column(std)?,
+                lengths: table(lengths, &[1, N_BONES, 1, 1])?,
+                way: table(way, &[1, N_BONES, N_BONES])?,
+                mean: column(&normal.mean)?,
+                std: column(&normal.std)?,
+            }),
+        })
+    }
+}
+
+/// The joint a bone begins at; a finger begins at the wrist, whose copy the hand root is.
+fn real_parent(joint: usize) -> usize {
+    let from = parent(joint).unwrap_or(NECK);
+    if is_duplicate(from) { parent(from).unwrap_or(NECK) } else { from }
+}
+
+fn length_of(joint: usize, normal: &Normalisation) -> f32 {
+    if is_duplicate(joint) { 0.0 } else { normal.bone_lengths.get(joint - 1).copied().unwrap_or(0.0) }
+}
+
+/// Raw numbers to normalised positions, differentiable.
+pub struct PoseDecoder {
+    kinematics: Option<Kinematics>,
+}
+
+struct Kinematics {
+    direction_mean: Tensor,
+    direction_std: Tensor,
+    /// [1, 48, 1, 1]
+    lengths: Tensor,
+    /// [1, 48, 48]
+    way: Tensor,
+    mean: Tensor,
+    std: Tensor,
+}
+
+impl PoseDecoder {
+    /// Raw numbers [B, 144, T] to normalised positions [B, 144, T]; those of channels behind them stay as they are.
+    pub fn poses(&self, raw: &Tensor) -> Result<Tensor> {
+        let Some(k) = &self.kinematics else { return Ok(raw.clone()) };
+        let (batch, n_numbers, n_frames) = raw.dims3()?;
+        if n_numbers > N_FEATURES {
+            let channels = raw.narrow(1, N_FEATURES, n_numbers - N_FEATURES)?;
+            return Tensor::cat(&[self.poses(&raw.narrow(1, 0, N_FEATURES)?)?, channels], 1);
+        }
+        let directions = raw.broadcast_mul(&k.direction_std)?.broadcast_add(&k.direction_mean)?;
+        let directions = directions.reshape((batch, N_BONES, 3, n_frames))?;
+        let norms = (directions.sqr()?.sum_keepdim(2)? + EPS)?.sqrt()?;
+        let bones = directions.broadcast_div(&norms)?.broadcast_mul(&k.lengths)?;
+        let way = k.way.broadcast_as((batch, N_BONES, N_BONES))?.contiguous()?;
+        let joints = way.matmul(&bones.reshape((batch, N_BONES, 3 * n_frames))?)?;
+        joints.reshape((batch, N_FEATURES, n_frames))?.broadcast_sub(&k.mean)?.broadcast_div(&k.std)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use orator_base::motion::bones;
+    use orator_base::types::skeleton::{L_HAND, R_HAND};
+    use orator_base::types::time::FrameRate;
+    use orator_nn::ops::gradcheck::{pattern, worst};
+
+    fn normal() -> Normalisation {
+        let table = |value: f32| Array2::from_shape_fn((N_JOINTS, 3), |(j, k)| value + 0.003 * (j + 2 * k) as f32);
+        let length =
+            |bone: usize| if bone + 1 == L_HAND || bone + 1 == R_HAND { 0.0 } else { 0.05 + 0.004 * bone as f32 };
+        Normalisation::new(&table(0.1), &table(0.1), (0..N_BONES).map(length).collect())
+    }
+
+    /// Numbers of a pose in motion, seen but for a few.
+    fn poses(normal: &Normalisation) -> (Array2<f32>, Array2<bool>) {
+        let value = |i: usize, t: usize| (i as f32 * 1.7 + t as f32 * 0.3).sin();
+        let mut motion = Motion::from_joints(
+            FrameRate::new(15, 1),
+            normal.joints(Array2::from_shape_fn((N_FEATURES, 40), |(i, t)| value(i, t)).view()),
+        );
+        let lengths = std::array::from_fn(|bone| normal.bone_lengths[bone]);
+        bones::with_lengths(&mut motion, &lengths);
+        motion.mask[[3, 9]] = false;
+        normal.features(&motion)
+    }
+
+    #[test]
+    fn gradients_are_right() -> anyhow::Result<()> {
+        let normal = normal();
+        let (features, mask) = poses(&normal);
+        let bones = Representation::bones(&normal, [Ok((features.clone(), mask.clone()))].into_iter())?;
+        let decoder = bones.decoder(&normal, DType::F64, &Device::Cpu)?;
+        for n_channels in [0, 2] {
+            let numbers = pattern(&[2, N_FEATURES + 3 * n_channels, 2], 0.0)?;
+            let error = worst(std::slice::from_ref(&numbers), |v| decoder.poses(&v[0]))?;
+            assert!(error < 1e-6, "{error}");
+            let channels = |x: &Tensor| x.narrow(1, N_FEATURES, 3 * n_channels)?.flatten_all()?.to_vec1::<f64>();
+            assert_eq!(channels(&decoder.poses(&numbers)?)?, channels(&numbers)?);
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn tensors_and_arrays_agree_and_bones_keep_their_lengths() -> anyhow::Result<()> {
+        let normal = normal();
+        let (features, mask) = poses(&normal);
+        let bones = Representation::bones(&normal, [Ok((features.clone(), mask.clone()))].into_iter())?;
+        bones.check()?;
+        let raw = pattern(&[1, N_FEATURES, 50], 0.0)?.affine(6.0, 0.0)?.to_dtype(DType::F32)?;
+        let decoded = bones.decoder(&normal, DType::F32, &Device::Cpu)?.poses(&raw)?.flatten_all()?.to_vec1::<f32>()?;
+        let tensors = normal.joints(ArrayView2::from_shape((N_FEATURES, 50), &decoded)?);
+        let raw = raw.flatten_all()?.to_vec1::<f32>()?;
+        let arrays = bones.joints(ArrayView2::from_shape((N_FEATURES, 50), &raw)?, &normal);
+        for (a, b) in tensors.iter().zip(&arrays) {
+            assert!((a - b).abs() < 2e-6, "{a} {b}");
+        }
+        for (t, joint) in (0..50).flat_map(|t| (1..N_JOINTS).map(move |joint| (t, joint))) {
+            let bone = |k: usize| arrays[[t, joint, k]] - arrays[[t, parent(joint).unwrap(), k]];
+            let length = (0..3).map(|k| bone(k).powi(2)).sum::<f32>().sqrt();
+            assert!((length - normal.bone_lengths[joint - 1]).abs() < 2e-6, "joint {joint}: {length}");
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn directions_of_the_data_give_the_data_back() -> anyhow::Result<()> {
+        let normal = normal();
+        let (features, mask) = poses(&normal);
+        let bones = Representation::bones(&normal, [Ok((features.clone(), mask.clone()))].into_iter())?;
+        let Representation::Bones { mean, std } = &bones else { anyhow::bail!("not bones") };
+        let joints = normal.joints(features.view());
+        let raw = Array2::from_shape_fn((N_FEATURES, features.ncols()), |(i, t)| {
+            let joint = i / 3 + 1;
+            let bone = |k: usize| joints[[t, joint, k]] - joints[[t, real_parent(joint), k]];
+            let length = (0..3).map(|k| bone(k).powi(2)).sum::<f32>().sqrt().max(1e-9);
+            (bone(i % 3) / length - mean[i]) / std[i]
+        });
+        for (a, b) in bones.joints(raw.view(), &normal).iter().zip(&joints) {
+            assert!((a - b).abs() < 1e-5);
+        }
+        let (numbers, known) = bones.directions(&Motion::from_joints(FrameRate::new(15, 1), joints.clone()));
+        assert!(known.iter().all(|known| *known));
+        for ((t, i), number) in numbers.indexed_iter().filter(|((_, i), _)| !is_duplicate(i / 3 + 1)) {
+            assert!((number - raw[[i, t]]).abs() < 1e-4, "{number} {}", raw[[i, t]]);
+        }
+        // Number 0 is seen in all 40 frames: mean 0, deviation 1.
+        let row = raw.row(0);
+        assert!((row.sum() / 40.0).abs() < 1e-4 && (row.mapv(|v| v * v).sum() / 40.0 - 1.0).abs() < 1e-3);
+        Ok(())
+    }
+}

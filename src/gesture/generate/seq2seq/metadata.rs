@@ -1,0 +1,109 @@
+//! What a checkpoint of a sequence-to-sequence network says beside its tensors, and the network it describes.
+
+use super::architecture::{AROUND_SEGMENT_SECS, Architecture, network_config};
+use super::poses::PoseNumbers;
+use super::sound::RATES;
+use super::vocabulary::{NumberedWord, Vocabulary};
+use anyhow::{Context, Result, ensure};
+use orator_base::types::time::FrameRate;
+use orator_formats::checkpoint::Contents;
+use orator_nn::params::Params;
+use orator_nn::seq2seq::config::Config;
+use orator_nn::seq2seq::predict::GesturePredictor;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Tensors of the network in a checkpoint begin with this.
+pub const NETWORK: &str = "network.";
+/// Name and version of the layout; another is refused.
+const KIND: &str = "orator sequence 1";
+/// Most numbers of a state or a word that are believed.
+const MOST_WIDTH: usize = 4096;
+
+/// Everything beside the tensors that generation needs. Stored under `speaker` in a checkpoint's metadata.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SequenceMetadata {
+    pub kind: String,
+    /// Name of the speaker, or of the folder of captures.
+    pub name: String,
+    pub fps: FrameRate,
+    /// Samples a second of the sound that is heard.
+    pub rate: u32,
+    pub architecture: Architecture,
+    pub network: Config,
+    pub poses: PoseNumbers,
+    pub vocabulary: Vocabulary,
+    /// Seconds on either side of a segment whose words `words` reads.
+    #[serde(default = "around_segment_secs")]
+    pub words_around_secs: f64,
+    /// Hash of the data it learnt from.
+    pub dataset: String,
+}
+
+impl SequenceMetadata {
+    /// Name of the current layout.
+    pub fn kind() -> String {
+        KIND.to_owned()
+    }
+
+    /// Words that the network reads of a segment whose first predicted pose is `first`, of those in order of beginnings.
+    pub fn words_of_segment(&self, said: &[NumberedWord], first: usize) -> Vec<Vec<u32>> {
+        self.architecture.words(said, [first, self.network.predicted], self.fps, self.words_around_secs)
+    }
+
+    /// Errors unless the facts fit each other and this program.
+    fn check(&self) -> Result<()> {
+        let (fps, network) = (self.fps, &self.network);
+        ensure!(fps.is_plausible(), "it moves at {fps}, expected 1 to 1000 frames a second");
+        ensure!(RATES.contains(&self.rate), "it hears sound at {} Hz, expected {RATES:?}", self.rate);
+        ensure!(
+            (1..=MOST_WIDTH).contains(&network.hidden) && (1..=MOST_WIDTH).contains(&network.word),
+            "its states have {} numbers and its words {}, expected 1 to {MOST_WIDTH}",
+            network.hidden,
+            network.word
+        );
+        let around = self.words_around_secs;
+        ensure!((0.0..=60.0).contains(&around), "it reads words {around} s around a segment, expected 0 to 60");
+        self.poses.check(fps)?;
+        ensure!(self.vocabulary.is_sorted(), "its vocabulary is not sorted");
+        let (pose, words) = (self.poses.n_numbers(), self.vocabulary.n_numbers());
+        let sizes = network_config(fps, pose, words, [network.hidden, network.word]);
+        let expected = Config { hears_context: network.hears_context, ..sizes };
+        ensure!(*network == expected, "its network has other sizes than this program's: {network:?}");
+        Ok(())
+    }
+}
+
+const fn around_segment_secs() -> f64 {
+    AROUND_SEGMENT_SECS
+}
+
+/// Whether a file is a checkpoint of a sequence-to-sequence network. Errors: it cannot be read, or is no checkpoint.
+pub fn is_sequence(path: &Path) -> Result<bool> {
+    let facts = orator_formats::checkpoint::facts(path)?;
+    Ok(is_sequence_kind(&facts["speaker"]["kind"]))
+}
+
+/// Whether a kind is that of these checkpoints, of whatever version.
+pub fn is_sequence_kind(kind: &serde_json::Value) -> bool {
+    kind.as_str().is_some_and(|kind| kind.starts_with("orator sequence"))
+}
+
+/// Reads a checkpoint of `orator train seq2seq`. Errors name the file and what is wrong with it.
+pub fn load(path: &Path) -> Result<(SequenceMetadata, Box<dyn GesturePredictor>)> {
+    let contents = Contents::read(path)?;
+    build(&contents).with_context(|| format!("{} is no checkpoint of `orator train seq2seq`", path.display()))
+}
+
+fn build(contents: &Contents) -> Result<(SequenceMetadata, Box<dyn GesturePredictor>)> {
+    let kind = &contents.facts["speaker"]["kind"];
+    ensure!(kind == KIND, "its kind is {kind}, this program reads {KIND:?}");
+    let metadata: SequenceMetadata =
+        serde_json::from_value(contents.facts["speaker"].clone()).context("its facts are incomplete")?;
+    metadata.check()?;
+    contents.expect_numbers(metadata.network.hidden * metadata.network.hidden)?;
+    let mut params = Params::frozen();
+    let network = metadata.architecture.network(&mut params, &metadata.network)?;
+    params.load(&contents.part(NETWORK))?;
+    Ok((metadata, network))
+}

@@ -1,0 +1,132 @@
+//! A trained speaker of either kind: sound, and where it reads them words, to motion of the 49 joints.
+
+use super::GestureGenerator;
+use super::model::{BEST, GenerationChoice};
+use super::normalisation::Normalisation;
+use super::seq2seq::SequenceGenerator;
+use super::seq2seq::architecture::Architecture;
+use super::seq2seq::metadata::is_sequence_kind;
+use anyhow::{Result, bail, ensure};
+use orator_base::types::pose3d::Motion;
+use orator_base::types::sound::{SAMPLE_RATE, Sound};
+use orator_base::types::time::FrameRate;
+use orator_formats::checkpoint;
+use orator_formats::transcript::Word;
+use std::path::Path;
+
+/// Checkpoint of `orator train gan` or of `orator train seq2seq`.
+pub enum TrainedSpeaker {
+    Gan(Box<GestureGenerator>),
+    Sequence(Box<SequenceGenerator>),
+}
+
+impl TrainedSpeaker {
+    /// Opens a checkpoint of one speaker, or the best one of a folder. Errors name the file.
+    pub fn open(path: &Path) -> Result<Self> {
+        Self::open_as(path, &GenerationChoice::default())
+    }
+
+    /// Opens a checkpoint as `open` does, as this speaker and take. Errors where a network does not know the speaker, or has one
+    /// take only.
+    pub fn open_as(path: &Path, choice: &GenerationChoice) -> Result<Self> {
+        let file = if path.is_dir() { path.join(BEST) } else { path.to_owned() };
+        let gan = || Ok(Self::Gan(Box::new(GestureGenerator::open_as(path, choice)?)));
+        if !file.is_file() {
+            return gan();
+        }
+        let kind = &checkpoint::facts(&file)?["speaker"]["kind"];
+        ensure!(
+            kind.is_string(),
+            "{} is a checkpoint of neither `orator train gan` nor `orator train seq2seq`",
+            file.display()
+        );
+        if !is_sequence_kind(kind) {
+            return gan();
+        }
+        let speaker = SequenceGenerator::open(path)?;
+        ensure!(
+            choice.seed.is_none(),
+            "{} is of `orator train seq2seq`, which has one take of a speech: leave out --seed and --variants",
+            path.display()
+        );
+        if let Some(name) = choice.speaker.as_ref().filter(|name| **name != speaker.metadata.name) {
+            bail!("{} is of {}, not of {name:?}: leave out --speaker", path.display(), speaker.metadata.name);
+        }
+        Ok(Self::Sequence(Box::new(speaker)))
+    }
+
+    /// Opens a checkpoint as `open` does; of a network of several speakers the one of this name.
+    pub fn open_for(path: &Path, speaker: &str) -> Result<Self> {
+        let file = if path.is_dir() { path.join(BEST) } else { path.to_owned() };
+        let is_of_several = file.is_file() && checkpoint::facts(&file)?["other_speakers"].is_array();
+        let speaker = is_of_several.then(|| speaker.to_owned());
+        Self::open_as(path, &GenerationChoice { speaker, seed: None })
+    }
+
+    /// The speaker's name.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Gan(speaker) => speaker.name(),
+            Self::Sequence(speaker) => &speaker.metadata.name,
+        }
+    }
+
+    /// Whether it moves a captured skeleton, which is written as .bvh alone.
+    pub fn is_captured(&self) -> bool {
+        matches!(self, Self::Sequence(speaker) if speaker.is_captured())
+    }
+
+    /// Rate of the motion it makes.
+    pub fn fps(&self) -> FrameRate {
+        match self {
+            Self::Gan(speaker) => speaker.fps(),
+            Self::Sequence(speaker) => speaker.fps(),
+        }
+    }
+
+    /// Samples a second of the sound that it hears.
+    pub fn rate(&self) -> u32 {
+        match self {
+            Self::Gan(_) => SAMPLE_RATE,
+            Self::Sequence(speaker) => speaker.metadata.rate,
+        }
+    }
+
+    /// Number of the words that it knows; 0: it reads none.
+    pub fn n_words(&self) -> usize {
+        match self {
+            Self::Gan(_) => 0,
+            Self::Sequence(speaker) => speaker.metadata.vocabulary.words().len(),
+        }
+    }
+
+    /// Normalisation of the dataset that it learnt from; `None`: it learnt a captured skeleton.
+    pub fn normalisation(&self) -> Option<&Normalisation> {
+        match self {
+            Self::Gan(speaker) => Some(&speaker.metadata.normalisation),
+            Self::Sequence(speaker) => speaker.metadata.poses.normalisation(),
+        }
+    }
+
+    /// Network of a sequence-to-sequence checkpoint.
+    pub fn architecture(&self) -> Option<Architecture> {
+        match self {
+            Self::Gan(_) => None,
+            Self::Sequence(speaker) => Some(speaker.metadata.architecture),
+        }
+    }
+
+    /// Whether it reads words.
+    pub fn reads_words(&self) -> bool {
+        self.architecture().is_some_and(|architecture| architecture.word_encoder().is_some())
+    }
+
+    /// Motion for a sound and what is said in it. Errors: sound too short or of another rate, or a speaker that moves a
+    /// captured skeleton.
+    pub fn motion(&self, sound: &Sound, words: &[Word]) -> Result<Motion> {
+        match self {
+            Self::Gan(speaker) => speaker.motion(sound),
+            Self::Sequence(speaker) => speaker.motion(&speaker.poses(sound, words)?),
+        }
+    }
+}

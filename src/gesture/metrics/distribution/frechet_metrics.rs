@@ -1,0 +1,146 @@
+//! Frechet distances of the catalogue: the normal distributions of predicted and of ground-truth rows as packed moments. A row is a
+//! single pose, or a window as numbers of a fixed space.
+
+use super::frechet::between;
+use super::moments;
+use crate::metrics::body_part::BodyPart;
+use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::pair::PairedFrames;
+use crate::metrics::space::fixed_rate;
+use crate::metrics::space::fixed_rate::Frames;
+use crate::metrics::space::{basis, embedding};
+use crate::metrics::sums::BlockSums;
+use ndarray::{Array2, ArrayView2, ArrayView3};
+use orator_base::math::vec3::Vec3;
+use orator_base::types::skeleton::N_JOINTS;
+use orator_base::types::time::FrameRate;
+use serde_json::json;
+
+const CM: f64 = 100.0;
+
+/// A family of one distance of rows of `n_numbers`.
+fn family(
+    definition: Definition,
+    n_numbers: usize,
+    measure: impl Fn(&PairedFrames, &mut BlockSums) + Send + Sync + 'static,
+) -> MetricFamily {
+    let n_sums = 2 * moments::packed_len(n_numbers);
+    let values = move |sums: &[f64]| vec![distance(sums, n_numbers)];
+    MetricFamily { is_costly: true, ..MetricFamily::new(vec![definition], n_sums, measure, values) }
+}
+
+/// Distance of single poses, of all 48 joints (144 numbers) or of the body (18).
+pub(crate) fn poses(part: BodyPart) -> MetricFamily {
+    let joints = part.joints();
+    let d = 3 * joints.len();
+    let definition = Definition {
+        name: "frechet_pose",
+        part: part.name(),
+        unit: "cm^2",
+        better: Better::Lower,
+        formula: "|m_p - m_g|^2 + trace(C_p + C_g - 2 sqrt(C_p C_g)), m and C mean and unbiased covariance of the rows; a \
+                  row is the pose of one frame, x, y, z of all joints of the part in centimetres from the neck; frames \
+                  in which not all of them are seen are left out",
+        undefined: "fewer than 2 frames have all joints of the part",
+        parameters: json!({"n_numbers": d}),
+    };
+    family(definition, d, move |pair, blocks| {
+        let rows = |poses: &[[Vec3; N_JOINTS]], frames: &[usize]| {
+            Array2::from_shape_fn((frames.len(), d), |(row, i)| CM * poses[frames[row]][joints[i / 3]][i % 3])
+        };
+        for (block, frames) in pair.whole_frames(&joints, blocks).iter().enumerate() {
+            let (predicted, ground_truth) = blocks.row(block).split_at_mut(moments::packed_len(d));
+            moments::add(rows(&pair.predicted, frames).view(), predicted);
+            moments::add(rows(&pair.ground_truth, frames).view(), ground_truth);
+        }
+    })
+}
+
+/// Windows in a fixed space.
+struct FixedSpace {
+    name: &'static str,
+    formula: &'static str,
+    hash: String,
+    /// Rows of windows of joints, mask and frame rate.
+    windows: fn(ArrayView3<f32>, ArrayView2<bool>, FrameRate) -> Array2<f64>,
+    n_frames: usize,
+    stride: usize,
+    n_numbers: usize,
+}
+
+/// Of windows of 15 frames in the fixed basis.
+pub(crate) fn basis() -> MetricFamily {
+    in_space(FixedSpace {
+        name: "frechet_window",
+        formula: "|m_p - m_g|^2 + trace(C_p + C_g - 2 sqrt(C_p C_g)), m and C mean and unbiased covariance of the rows; a row \
+                  is a window of wholly seen frames at 15 a second (46 joints, weighted centimetres, fingers from their \
+                  wrist) as its 64 numbers in the fixed basis (models/motion_basis.md)",
+        hash: basis::hash(),
+        windows: basis::windows,
+        n_frames: basis::WINDOW,
+        stride: basis::STRIDE,
+        n_numbers: basis::N,
+    })
+}
+
+/// Of windows in the embedding that is shipped.
+pub(crate) fn embedding() -> MetricFamily {
+    in_space(FixedSpace {
+        name: "frechet_embedding",
+        formula: "|m_p - m_g|^2 + trace(C_p + C_g - 2 sqrt(C_p C_g)), m and C mean and unbiased covariance of the rows; a row \
+                  is what the shipped encoder (models/motion_embedding.md) makes of a window of wholly seen frames at 15 \
+                  a second",
+        hash: embedding::hash(),
+        windows: embedding::windows,
+        n_frames: embedding::WINDOW,
+        stride: embedding::STRIDE,
+        n_numbers: embedding::N,
+    })
+}
+
+fn in_space(space: FixedSpace) -> MetricFamily {
+    let FixedSpace { name, formula, hash, windows, n_frames, stride, n_numbers } = space;
+    let definition = Definition {
+        name,
+        part: "all",
+        unit: "1",
+        better: Better::Lower,
+        formula,
+        undefined: "fewer than 2 windows are wholly seen",
+        parameters: json!({"n_frames": n_frames, "stride": stride, "n_numbers": n_numbers, "space": hash}),
+    };
+    family(definition, n_numbers, move |pair, blocks| {
+        let interval = &pair.interval;
+        // what one of both lacks is left out of both
+        let mut mask = interval.mask.to_owned();
+        for ((t, joint), seen) in mask.indexed_iter_mut() {
+            *seen &= pair.seen.get(t).is_some_and(|seen| seen.get(joint) == Some(&true));
+        }
+        let starts = Frames::new(interval.ground_truth, mask.view(), interval.fps).starts(n_frames, stride);
+        let length = moments::packed_len(n_numbers);
+        for (i, joints) in [interval.predicted, interval.ground_truth].into_iter().enumerate() {
+            let rows = windows(joints, mask.view(), interval.fps);
+            if rows.nrows() != starts.len() {
+                // a predicted joint that is not finite breaks its window
+                blocks.at(0)[i * length] = f64::NAN;
+                continue;
+            }
+            for (row, start) in rows.outer_iter().zip(&starts) {
+                let t = (*start as f64 / fixed_rate::FPS.per_sec() * pair.fps) as usize;
+                let own = &mut blocks.at(t)[i * length..(i + 1) * length];
+                moments::add(row.insert_axis(ndarray::Axis(0)), own);
+            }
+        }
+    })
+}
+
+/// Of two packed moments of rows of `d` numbers, one after the other.
+fn distance(sums: &[f64], d: usize) -> f64 {
+    let (predicted, ground_truth) = sums.split_at(moments::packed_len(d));
+    match (moments::read(predicted, d), moments::read(ground_truth, d)) {
+        (Some((_, of_made, predicted)), Some((_, of_real, ground_truth))) => {
+            between((&of_made, &predicted), (&of_real, &ground_truth))
+        }
+        _ => f64::NAN,
+    }
+}

@@ -1,0 +1,166 @@
+//! First canonical correlation of predicted and ground-truth poses over time: the largest correlation that a weighted sum of all predicted
+//! coordinates has with one of all ground-truth coordinates. With few frames for many coordinates it is near 1 for anything.
+
+use crate::metrics::body_part::BodyPart;
+use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::distribution::moments;
+use crate::metrics::pair::PairedFrames;
+use crate::metrics::sums::BlockSums;
+use ndarray::{Array2, ArrayView2, s};
+use orator_base::math::eigen;
+use serde_json::json;
+
+/// A coordinate with less standard deviation, metres, is constant.
+const CONSTANT: f64 = 1e-8;
+/// A coordinate that the others determine up to this share of its variance is left out.
+const DETERMINED: f64 = 1e-10;
+
+pub(crate) fn metric(part: BodyPart) -> MetricFamily {
+    let joints = part.joints();
+    let d = 3 * joints.len();
+    let definition = Definition {
+        name: "cca",
+        part: part.name(),
+        unit: "1",
+        better: Better::Higher,
+        formula: "first canonical correlation (one component) of the poses of made and real motion in the same frames, all \
+                  intervals together: x, y, z of all joints of the part, frames in which all are seen; coordinates \
+                  with a standard deviation of at most 1e-8 m are dropped, and those that the others determine up to \
+                  1e-10 of their variance (which changes nothing)",
+        undefined: "fewer frames with all joints of the part than there are coordinates, or nothing in one motion moves",
+        parameters: json!({"n_numbers": d, "n_components": 1}),
+    };
+    let measure = move |pair: &PairedFrames, blocks: &mut BlockSums| {
+        for (block, frames) in pair.whole_frames(&joints, blocks).iter().enumerate() {
+            let rows = Array2::from_shape_fn((frames.len(), 2 * d), |(row, i)| {
+                let poses = if i < d { &pair.predicted } else { &pair.ground_truth };
+                poses[frames[row]][joints[i % d / 3]][i % 3]
+            });
+            moments::add(rows.view(), blocks.row(block));
+        }
+    };
+    let values = move |sums: &[f64]| {
+        let value = moments::read(sums, 2 * d).filter(|(n, ..)| *n > d as f64);
+        vec![value.map_or(f64::NAN, |(_, _, covariance)| correlation(covariance.view(), d))]
+    };
+    let family = MetricFamily::new(vec![definition], moments::packed_len(2 * d), measure, values);
+    MetricFamily { is_costly: true, ..family }
+}
+
+/// First canonical correlation of the first `d` dimensions with the others; NaN where nothing varies on one side.
+pub(crate) fn correlation(covariance: ArrayView2<f64>, d: usize) -> f64 {
+    if covariance.iter().any(|v| !v.is_finite()) {
+        return f64::NAN;
+    }
+    let (a, b) = (
+        IndependentDimensions::select(covariance, 0..d),
+        IndependentDimensions::select(covariance, d..covariance.nrows()),
+    );
+    if a.which.is_empty() || b.which.is_empty() {
+        return f64::NAN;
+    }
+    let cross = Array2::from_shape_fn((a.which.len(), b.which.len()), |(i, j)| {
+        covariance[[a.which[i], b.which[j]]] / (a.scale[i] * b.scale[j])
+    });
+    // La^-1 C Lb^-T
+    let whitened = b.solve(a.solve(cross).reversed_axes());
+    let smaller = if a.which.len() < b.which.len() { whitened.t().dot(&whitened) } else { whitened.dot(&whitened.t()) };
+    eigen::eigenvalues(smaller).into_iter().fold(0.0, f64::max).sqrt().min(1.0)
+}
+
+/// Dimensions that say all, with the Cholesky factor of their correlation.
+struct IndependentDimensions {
+    which: Vec<usize>,
+    /// Standard deviation of each.
+    scale: Vec<f64>,
+    /// Lower triangle [n, n].
+    factor: Array2<f64>,
+}
+
+impl IndependentDimensions {
+    /// Of a range of dimensions: Cholesky's with pivots, ended where what is left is determined.
+    fn select(covariance: ArrayView2<f64>, range: std::ops::Range<usize>) -> Self {
+        let mut left: Vec<usize> = range.filter(|i| covariance[[*i, *i]].max(0.0).sqrt() > CONSTANT).collect();
+        let scale_of = |i: usize| covariance[[i, i]].sqrt();
+        let mut rest: Vec<f64> = vec![1.0; left.len()];
+        let mut rows: Vec<Vec<f64>> = vec![Vec::new(); left.len()];
+        let (mut which, mut factor) = (Vec::new(), Vec::new());
+        while let Some((pivot, most)) = rest.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1)) {
+            if most <= DETERMINED {
+                break;
+            }
+            let (chosen, mut row) = (left.swap_remove(pivot), rows.swap_remove(pivot));
+            rest.swap_remove(pivot);
+            let root = most.sqrt();
+            for ((own, rest), other) in rows.iter_mut().zip(&mut rest).zip(&left) {
+                let correlation = covariance[[chosen, *other]] / (scale_of(chosen) * scale_of(*other));
+                let entry = (correlation - row.iter().zip(own.iter()).map(|(a, b)| a * b).sum::<f64>()) / root;
+                *rest -= entry * entry;
+                own.push(entry);
+            }
+            row.push(root);
+            which.push(chosen);
+            factor.push(row);
+        }
+        let n = which.len();
+        let lower = Array2::from_shape_fn((n, n), |(i, j)| factor[i].get(j).copied().unwrap_or(0.0));
+        Self { scale: which.iter().map(|i| scale_of(*i)).collect(), which, factor: lower }
+    }
+
+    /// `factor^-1 right`.
+    fn solve(&self, mut right: Array2<f64>) -> Array2<f64> {
+        for i in 0..self.which.len() {
+            let (done, mut rest) = right.view_mut().split_at(ndarray::Axis(0), i);
+            let known = self.factor.slice(s![i, ..i]).dot(&done);
+            let mut row = rest.row_mut(0);
+            row -= &known;
+            row /= self.factor[[i, i]];
+        }
+        right
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Signal of the reference script: rows [n, 2 d], the second half following the first in part.
+    fn rows(n: usize, d: usize, constant: bool) -> Array2<f64> {
+        let hash =
+            |i: usize, j: usize| ((12.9898 * i as f64 + 78.233 * j as f64).sin().abs() * 43_758.545_3).fract() - 0.5;
+        let mut rows = Array2::from_shape_fn((n, 2 * d), |(i, j)| match j < d {
+            true => hash(i, j) + 0.3 * hash(i, 1000),
+            false => hash(i, j - d + 500) + 0.4 * hash(i, j - d) - 0.2 * hash(i, 1000),
+        });
+        if constant {
+            rows.column_mut(2).fill(0.7);
+            let twice = rows.column(d).mapv(|v| 2.0 * v + 1.0);
+            rows.column_mut(d + 1).assign(&twice);
+        }
+        rows
+    }
+
+    #[test]
+    fn the_correlation_is_that_of_scikit_learn() {
+        let golden: serde_json::Value =
+            serde_json::from_str(include_str!("../../../../fixtures/reference/metrics_golden.json")).unwrap();
+        for case in golden["cca"].as_array().unwrap() {
+            let [n, d] = ["n", "d"].map(|name| case[name].as_u64().unwrap() as usize);
+            let rows = rows(n, d, case["constant"].as_bool().unwrap());
+            let mut packed = vec![0.0; moments::packed_len(2 * d)];
+            moments::add(rows.view(), &mut packed);
+            let found = correlation(moments::read(&packed, 2 * d).unwrap().2.view(), d);
+            let expected = case["correlation"].as_f64().unwrap();
+            assert!((found - expected).abs() < 1e-5, "{case}: {found}");
+        }
+    }
+
+    #[test]
+    fn what_does_not_move_has_no_correlation() {
+        let mut covariance = Array2::<f64>::zeros((4, 4));
+        covariance[[2, 2]] = 1.0;
+        assert!(correlation(covariance.view(), 2).is_nan());
+        covariance[[0, 0]] = f64::NAN;
+        assert!(correlation(covariance.view(), 2).is_nan());
+    }
+}

@@ -1,0 +1,104 @@
+//! How fast, how accelerated and how jerky a motion is: mean norms of its first three differences over time, of the made
+//! and of the ground truth. A predicted motion that stands still has the least error of a poor one; here it shows.
+
+use crate::metrics::body_part::BodyPart;
+use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::per_frame::windows;
+use orator_base::math::vec3;
+use orator_base::math::vec3::Vec3;
+use serde_json::json;
+
+/// How often positions are differentiated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum DerivativeOrder {
+    Speed,
+    Acceleration,
+    Jerk,
+}
+
+impl DerivativeOrder {
+    pub const ALL: [Self; 3] = [Self::Speed, Self::Acceleration, Self::Jerk];
+
+    /// Weights of the frames, first to last.
+    const fn weights(self) -> &'static [f64] {
+        match self {
+            Self::Speed => &[-1.0, 1.0],
+            Self::Acceleration => &[1.0, -2.0, 1.0],
+            Self::Jerk => &[-1.0, 3.0, -3.0, 1.0],
+        }
+    }
+
+    const fn names(self) -> [&'static str; 2] {
+        match self {
+            Self::Speed => ["speed", "speed_of_real"],
+            Self::Acceleration => ["acceleration", "acceleration_of_real"],
+            Self::Jerk => ["jerk", "jerk_of_real"],
+        }
+    }
+}
+
+/// Mean over frames and joints.
+pub(crate) fn metric(order: DerivativeOrder, part: BodyPart) -> MetricFamily {
+    let (unit, formula) = match order {
+        DerivativeOrder::Speed => ("m/s", "mean over t and j of |x(t+1) - x(t)| * fps, x seen in both frames"),
+        DerivativeOrder::Acceleration => {
+            ("m/s^2", "mean over t and j of |x(t+2) - 2 x(t+1) + x(t)| * fps^2, x seen in all three frames")
+        }
+        DerivativeOrder::Jerk => {
+            ("m/s^3", "mean over t and j of |x(t+3) - 3 x(t+2) + 3 x(t+1) - x(t)| * fps^3, x seen in all four frames")
+        }
+    };
+    family(order, part, unit, formula, false)
+}
+
+/// Mean over intervals of the means of each (GENEA): every interval weighs the same, in centimetres.
+pub(crate) fn by_interval(order: DerivativeOrder) -> MetricFamily {
+    let unit = ["cm/s", "cm/s^2", "cm/s^3"][order.weights().len() - 2];
+    let formula = "|n-th difference of x| * fps^n (n = 2 acceleration, 3 jerk) in centimetres, mean over the frames \
+                   and joints of an interval, then mean over intervals, long or short alike; 49 joints, the neck that \
+                   stands still among them";
+    family(order, BodyPart::WithNeck, unit, formula, true)
+}
+
+fn family(
+    order: DerivativeOrder,
+    part: BodyPart,
+    unit: &'static str,
+    formula: &'static str,
+    by_interval: bool,
+) -> MetricFamily {
+    let (points, weights) = (part.points(), order.weights());
+    let [name, of_real] = order.names();
+    let definition = Definition {
+        name,
+        part: part.name(),
+        unit,
+        better: Better::NearerTruth,
+        formula,
+        undefined: "no joint of the part is seen in enough frames in a row (2 for speed, 3 for acceleration, 4 for \
+                    jerk)",
+        parameters: json!({}),
+    };
+    let family = MetricFamily::mean_of_both(definition.with_truth(of_real), move |pair, blocks| {
+        let windows = || windows(pair, &points, weights.len(), 0);
+        let n = if by_interval { windows().count() as f64 } else { 1.0 };
+        let scale = pair.fps.powi(weights.len() as i32 - 1);
+        let norm = |at: &dyn Fn(usize) -> Vec3| {
+            let mut sum = [0.0; 3];
+            for (frame, weight) in weights.iter().enumerate() {
+                let at = at(frame);
+                (0..3).for_each(|k| sum[k] += weight * at[k]);
+            }
+            vec3::norm(sum) * scale
+        };
+        for window in windows() {
+            let sums = blocks.at(window.t);
+            sums[0] += norm(&|frame| window.predicted(frame)) / n;
+            sums[1] += norm(&|frame| window.ground_truth(frame)) / n;
+            sums[2] += 1.0 / n;
+        }
+    });
+    let unit = if by_interval { 100.0 } else { 1.0 };
+    let values = move |sums: &[f64]| vec![unit * sums[0] / sums[2], unit * sums[1] / sums[2]];
+    MetricFamily { values: Box::new(values), ..family }
+}

@@ -1,0 +1,101 @@
+//! Errors of positions and of accelerations, each the mean of a number of one point in one or three frames; among them
+//! the two of the trimodal convention (Yoon et al. 2020, `train.py` of their repository).
+
+use crate::metrics::body_part::BodyPart;
+use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::per_frame;
+use crate::metrics::per_frame::PointWindow;
+use orator_base::math::vec3;
+use orator_base::math::vec3::Vec3;
+use serde_json::json;
+
+/// Mean absolute difference of coordinates, metres: what the L1 loss of training measures.
+pub(crate) fn l1(part: BodyPart) -> MetricFamily {
+    let definition = Definition {
+        name: "l1",
+        part: part.name(),
+        unit: "m",
+        better: Better::Lower,
+        formula: "mean over t, j and the coordinates x, y, z of |p - g|",
+        undefined: "no joint of the part is seen",
+        parameters: json!({}),
+    };
+    per_frame::mean(definition, part, 1, 0, |window| mean_size(window.apart(0)))
+}
+
+/// Mean per-joint position error, millimetres, from the neck, or from the own wrist.
+pub(crate) fn mpjpe(part: BodyPart) -> MetricFamily {
+    let definition = Definition {
+        name: "mpjpe",
+        part: part.name(),
+        unit: "mm",
+        better: Better::Lower,
+        formula: "1000 times the mean over t and j of the distance |p - g|, positions from the neck (part \
+                  fingers_from_wrist: from the wrist of the same side)",
+        undefined: "no joint of the part is seen",
+        parameters: json!({}),
+    };
+    per_frame::mean(definition, part, 1, 0, |window| 1000.0 * vec3::norm(window.apart(0)))
+}
+
+/// How far the accelerations of the predicted motion are from the ground truth.
+pub(crate) fn acceleration(part: BodyPart) -> MetricFamily {
+    let definition = Definition {
+        name: "acceleration_error",
+        part: part.name(),
+        unit: "m/s^2",
+        better: Better::Lower,
+        formula: "mean over t and j of |a_p - a_g| with a(t) = (x(t) - 2 x(t+1) + x(t+2)) * fps^2, where the joint is seen \
+                  in all three frames",
+        undefined: "no joint of the part is seen in 3 frames in a row",
+        parameters: json!({}),
+    };
+    let of = |window: &PointWindow| vec3::norm(second_difference(window)) * window.fps() * window.fps();
+    per_frame::mean(definition, part, 3, 0, of)
+}
+
+/// Trimodal: per coordinate and frame.
+pub(crate) fn acceleration_by_coordinate() -> MetricFamily {
+    let definition = Definition {
+        name: "acceleration_error",
+        part: BodyPart::All.name(),
+        unit: "m/frame^2",
+        better: Better::Lower,
+        formula: "mean over t, j and the coordinates x, y, z of |d2 p - d2 g|, d2 the second difference from frame to frame, \
+                  not multiplied with the frame rate (so another figure at another rate)",
+        undefined: "no joint is seen in 3 frames in a row",
+        parameters: json!({}),
+    };
+    per_frame::mean(definition, BodyPart::All, 3, 0, |window| mean_size(second_difference(window)))
+}
+
+/// Frames given as a seed, of the trimodal convention's 15 a second.
+const N_SEED: f64 = 4.0;
+const SEED_FPS: f64 = 15.0;
+
+/// Trimodal: L1 without the seed, for data of this frame rate.
+pub(crate) fn maje(fps: f64) -> MetricFamily {
+    let n_seed = (N_SEED / SEED_FPS * fps).round() as usize;
+    let definition = Definition {
+        name: "maje",
+        part: BodyPart::All.name(),
+        unit: "m",
+        better: Better::Lower,
+        formula: "mean over t, j and the coordinates x, y, z of |p - g| without the first frames of every interval, \
+                  which their generator is given (4 at 15 frames a second)",
+        undefined: "no joint is seen after the seed",
+        parameters: json!({"n_seed_frames": n_seed}),
+    };
+    per_frame::mean(definition, BodyPart::All, 1, n_seed, |window| mean_size(window.apart(0)))
+}
+
+/// Mean absolute coordinate.
+fn mean_size(v: Vec3) -> f64 {
+    v.iter().map(|v| v.abs()).sum::<f64>() / 3.0
+}
+
+/// Second difference of prediction minus ground truth over three frames.
+fn second_difference(window: &PointWindow) -> Vec3 {
+    let [a, b, c] = [0, 1, 2].map(|k| window.apart(k));
+    std::array::from_fn(|k| a[k] - 2.0 * b[k] + c[k])
+}

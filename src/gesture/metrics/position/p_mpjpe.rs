@@ -1,0 +1,60 @@
+//! Position error after the best turn, scale and shift of every frame's predicted pose: what is wrong with the pose itself,
+//! not with where it looks.
+
+use crate::metrics::body_part::BodyPart;
+use crate::metrics::definition::{Better, Definition, MetricFamily};
+use orator_base::math::procrustes::similarity;
+use orator_base::math::vec3;
+use orator_base::math::vec3::Vec3;
+use orator_base::types::skeleton::{L_HAND, N_HAND_JOINTS, R_HAND};
+use serde_json::json;
+
+/// All, body, or each hand (its 21 joints) for itself.
+pub(crate) fn metric(part: BodyPart) -> MetricFamily {
+    // what is laid onto the real joints together
+    let groups: Vec<Vec<usize>> = match part {
+        BodyPart::Hands => [L_HAND, R_HAND].map(|root| (root..root + N_HAND_JOINTS).collect()).to_vec(),
+        _ => vec![part.joints()],
+    };
+    let definition = Definition {
+        name: "p_mpjpe",
+        part: part.name(),
+        unit: "mm",
+        better: Better::Lower,
+        formula: "1000 times the mean over t and j of |S_t p - g|, S_t the turn, uniform scale and shift without \
+                  reflection that bring the seen joints of the part in frame t nearest to those of g (least \
+                  squares); part hands: each hand for itself, all its 21 joints, the wrist among them",
+        undefined: "no frame has 3 seen joints of the part",
+        parameters: json!({"scale": true, "reflection": false}),
+    };
+    MetricFamily::mean(definition, move |pair, blocks| {
+        for t in 0..pair.n_frames() {
+            for group in &groups {
+                let seen = group.iter().copied().filter(|joint| pair.seen[t][*joint]);
+                let (predicted, ground_truth): (Vec<Vec3>, Vec<Vec3>) =
+                    seen.map(|joint| (pair.predicted[t][joint], pair.ground_truth[t][joint])).unzip();
+                if predicted.len() >= 3 {
+                    let sums = blocks.at(t);
+                    sums[0] += 1000.0 * error(&predicted, &ground_truth);
+                    sums[1] += predicted.len() as f64;
+                }
+            }
+        }
+    })
+}
+
+/// Sum of the distances after the best similarity; NaN where a predicted point is not finite.
+fn error(predicted: &[Vec3], ground_truth: &[Vec3]) -> f64 {
+    if predicted.iter().flatten().any(|v| !v.is_finite()) {
+        return f64::NAN;
+    }
+    match similarity(predicted, ground_truth) {
+        Some(best) => predicted.iter().zip(ground_truth).map(|(p, g)| vec3::norm(vec3::sub(best.apply(*p), *g))).sum(),
+        // all predicted points in one place: the best is the middle of the ground truth
+        None => {
+            let n = ground_truth.len() as f64;
+            let middle: Vec3 = std::array::from_fn(|k| ground_truth.iter().map(|g| g[k]).sum::<f64>() / n);
+            ground_truth.iter().map(|g| vec3::norm(vec3::sub(middle, *g))).sum()
+        }
+    }
+}

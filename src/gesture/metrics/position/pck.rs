@@ -1,0 +1,241 @@
+//! Share of correct keypoints (Ginosar et al. 2019, section 5; Rebol et al. 2021): a joint is correct when it lies within
+//! a share of the real pose's largest extent from the ground truth. `CorrectKeypoints` counts at a fifth, for training; the metric has any
+//! share, in the plane and in space.
+
+use crate::metrics::body_part::BodyPart;
+use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::pair::PairedFrames;
+use crate::metrics::sums::BlockSums;
+use ndarray::{ArrayView2, ArrayView3, NdFloat};
+use orator_base::types::skeleton::{L_WRIST, N_JOINTS, NECK, R_SHOULDER, is_duplicate};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use std::ops::AddAssign;
+
+/// A joint is correct up to this share of the pose's largest extent.
+pub const ALPHA: f32 = 0.2;
+
+/// Correct and counted keypoints of one part of the body.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct KeypointCount {
+    pub n_correct: usize,
+    pub n: usize,
+}
+
+/// Correct and counted keypoints.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct CorrectKeypoints {
+    /// The published metric: every joint but the neck, the two hand roots (the wrists again) included.
+    pub all: KeypointCount,
+    /// Shoulders, elbows and wrists.
+    pub body: KeypointCount,
+    /// The joints of both hands but their roots.
+    pub hands: KeypointCount,
+}
+
+/// In how many of the axes x, y, z distances and extents are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PckAxes {
+    /// The picture's: as in the first publication.
+    Xy,
+    /// Space.
+    Xyz,
+}
+
+impl KeypointCount {
+    /// Share of correct keypoints, 0..1; 0 of none.
+    pub fn share(&self) -> f64 {
+        self.n_correct as f64 / self.n.max(1) as f64
+    }
+
+    fn add(&mut self, correct: bool) {
+        self.n_correct += usize::from(correct);
+        self.n += 1;
+    }
+}
+
+/// For each of `axes`, each alpha and each of `parts` one share.
+pub(crate) fn metric(axes: &[PckAxes], parts: &[BodyPart], alphas: &[f64]) -> MetricFamily {
+    let mut variants = Vec::new();
+    for axes in axes {
+        for alpha in alphas {
+            variants.extend(parts.iter().map(|part| (*axes, *part, *alpha)));
+        }
+    }
+    family(variants, false, false)
+}
+
+/// PCK of speech2gesture (Ginosar et al. 2019, `common/evaluation.py` of their repository): every frame weighs the same,
+/// however many joints are seen.
+pub(crate) fn by_frame(alphas: &[f64]) -> MetricFamily {
+    family(alphas.iter().map(|alpha| (PckAxes::Xy, BodyPart::All, *alpha)).collect(), false, true)
+}
+
+/// In space, of all joints, with the neck in the box.
+pub(crate) fn neck_in_box(alphas: &[f64]) -> MetricFamily {
+    family(alphas.iter().map(|alpha| (PckAxes::Xyz, BodyPart::All, *alpha)).collect(), true, false)
+}
+
+/// One share of each variant.
+fn family(variants: Vec<(PckAxes, BodyPart, f64)>, neck_in_box: bool, by_frame: bool) -> MetricFamily {
+    let definition = |(axes, part, alpha): &(PckAxes, BodyPart, f64)| {
+        let (name, formula) = match axes {
+            PckAxes::Xy if by_frame => (
+                "pck_2d",
+                "mean over frames of the share of the 48 joints without the neck with |p - g| <= alpha * max(width, \
+                 height) of the box around those of g in the frame; x and y alone; metres, not scaled to another \
+                 speaker (a scale cancels); not seen joints left out",
+            ),
+            PckAxes::Xyz if neck_in_box => (
+                "pck_3d_neck_in_box",
+                "share of all seen joints of the part in all frames with |p - g| <= alpha * the largest of the sides \
+                 x, y, z of the box around all seen joints of g in the frame, the neck among them; a made joint that \
+                 is not finite is wrong",
+            ),
+            PckAxes::Xyz => (
+                "pck_3d",
+                "share of all seen joints of the part in all frames with |p - g| <= alpha * the largest of the sides \
+                 x, y, z of the box around all seen joints of g in the frame but the neck, whatever the part; a made \
+                 joint that is not finite is wrong",
+            ),
+            PckAxes::Xy => (
+                "pck_2d",
+                "share of all seen joints of the part in all frames with |p - g| <= alpha * the larger of the sides \
+                 x, y of the box around all seen joints of g in the frame but the neck, whatever the part; distances \
+                 in x and y alone; a made joint that is not finite is wrong",
+            ),
+        };
+        let (part, undefined) = (part.name(), "no joint of the part is seen");
+        let parameters = json!({"alpha": alpha});
+        Definition { name, part, unit: "1", better: Better::Higher, formula, undefined, parameters }
+    };
+    let definitions: Vec<Definition> = variants.iter().map(definition).collect();
+    let variants: Vec<_> = variants.into_iter().map(|(axes, part, alpha)| (axes, part.joints(), alpha)).collect();
+    let first_boxed = if neck_in_box { NECK } else { NECK + 1 };
+    let measure = move |pair: &PairedFrames, blocks: &mut BlockSums| {
+        for t in 0..pair.n_frames() {
+            let (predicted, ground_truth, seen) = (&pair.predicted[t], &pair.ground_truth[t], &pair.seen[t]);
+            for (row, (axes, joints, alpha)) in blocks.at(t).chunks_exact_mut(2).zip(&variants) {
+                let boxed = (first_boxed..N_JOINTS).filter(|joint| seen[*joint]);
+                let radius = alpha * extent(*axes, boxed, |joint, k| ground_truth[joint][k]);
+                let n_seen = joints.iter().filter(|joint| seen[**joint]).count();
+                let weight = if by_frame { 1.0 / n_seen as f64 } else { 1.0 };
+                for &joint in joints.iter().filter(|joint| seen[**joint]) {
+                    let correct = distance(*axes, |k| predicted[joint][k], |k| ground_truth[joint][k]) <= radius;
+                    row[0] += if correct { weight } else { 0.0 };
+                    row[1] += weight;
+                }
+            }
+        }
+    };
+    let values = |sums: &[f64]| sums.chunks_exact(2).map(|row| row[0] / row[1]).collect();
+    MetricFamily::new(definitions.clone(), 2 * definitions.len(), measure, values)
+}
+
+impl PckAxes {
+    fn n(self) -> usize {
+        match self {
+            Self::Xy => 2,
+            Self::Xyz => 3,
+        }
+    }
+}
+
+/// Largest side of the box around these joints of a pose.
+fn extent<F: NdFloat>(
+    axes: PckAxes,
+    joints: impl Iterator<Item = usize> + Clone,
+    pose: impl Fn(usize, usize) -> F,
+) -> F {
+    let side = |k: usize| {
+        let values = joints.clone().map(|joint| pose(joint, k));
+        let (low, high) = values.fold((F::infinity(), F::neg_infinity()), |(low, high), v| (low.min(v), high.max(v)));
+        high - low
+    };
+    (0..axes.n()).map(side).fold(F::zero(), F::max)
+}
+
+/// Distance of two points, whose coordinates `a` and `b` give.
+fn distance<F: NdFloat>(axes: PckAxes, a: impl Fn(usize) -> F, b: impl Fn(usize) -> F) -> F {
+    (0..axes.n()).map(|k| (a(k) - b(k)).powi(2)).fold(F::zero(), |sum, square| sum + square).sqrt()
+}
+
+impl CorrectKeypoints {
+    /// Share of correct keypoints of all joints, 0..1.
+    pub fn share(&self) -> f64 {
+        self.all.share()
+    }
+
+    /// Counts the joints of `predicted` [T, 49, 3] beside `ground_truth` [T, 49, 3], both metres, where `mask` [T, 49] is
+    /// true: correct when the distance is at most `ALPHA` of the largest side of the box around all real joints of
+    /// the frame that are seen, the neck left out, both in these axes. The radius is the same for every part. A
+    /// predicted joint that is not finite is wrong.
+    pub fn count(
+        &mut self,
+        axes: PckAxes,
+        predicted: ArrayView3<f32>,
+        ground_truth: ArrayView3<f32>,
+        mask: ArrayView2<bool>,
+    ) {
+        for ((predicted, ground_truth), mask) in
+            predicted.outer_iter().zip(ground_truth.outer_iter()).zip(mask.outer_iter())
+        {
+            let seen: Vec<usize> = (NECK + 1..N_JOINTS).filter(|joint| mask[*joint]).collect();
+            let radius = ALPHA * extent(axes, seen.iter().copied(), |joint, k| ground_truth[[joint, k]]);
+            for joint in seen {
+                let correct = distance(axes, |k| predicted[[joint, k]], |k| ground_truth[[joint, k]]) <= radius;
+                self.all.add(correct);
+                match joint {
+                    R_SHOULDER..=L_WRIST => self.body.add(correct),
+                    _ if !is_duplicate(joint) => self.hands.add(correct),
+                    _ => {}
+                }
+            }
+        }
+    }
+}
+
+impl AddAssign for KeypointCount {
+    fn add_assign(&mut self, other: Self) {
+        self.n_correct += other.n_correct;
+        self.n += other.n;
+    }
+}
+
+impl AddAssign for CorrectKeypoints {
+    fn add_assign(&mut self, other: Self) {
+        self.all += other.all;
+        self.body += other.body;
+        self.hands += other.hands;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::{Array2, Array3};
+
+    #[test]
+    fn the_radius_is_a_fifth_of_the_largest_extent() {
+        let mut ground_truth = Array3::<f32>::zeros((1, N_JOINTS, 3));
+        ground_truth[[0, 1, 2]] = 1.0;
+        let mut predicted = ground_truth.clone();
+        predicted[[0, 2, 0]] = 0.19;
+        predicted[[0, 3, 0]] = 0.21;
+        predicted[[0, 4, 0]] = 9.0;
+        predicted[[0, 20, 1]] = f32::NAN;
+        let mut mask = Array2::from_elem((1, N_JOINTS), true);
+        mask[[0, 4]] = false;
+        let mut correct = CorrectKeypoints::default();
+        correct.count(PckAxes::Xyz, predicted.view(), ground_truth.view(), mask.view());
+        let count = |n_correct, n| KeypointCount { n_correct, n };
+        assert_eq!(correct, CorrectKeypoints { all: count(45, 47), body: count(4, 5), hands: count(39, 40) });
+        // without z, the box is a point
+        let mut flat = CorrectKeypoints::default();
+        flat.count(PckAxes::Xy, predicted.view(), ground_truth.view(), mask.view());
+        assert_eq!(flat.body, count(3, 5));
+        let mut twice = correct;
+        twice += correct;
+        assert_eq!((twice.all, twice.share()), (count(90, 94), correct.share()));
+    }
+}

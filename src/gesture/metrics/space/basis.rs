@@ -1,0 +1,160 @@
+//! Windows of 15 poses as rows of 64 numbers in a fixed orthonormal basis: the principal components of free captured
+//! motion and motion made by rule (`models/motion_basis.md`). No network: a row is one matrix product.
+//!
+//! A pose is 46 joints in centimetres, arms from the neck and fingers from their own wrist, each joint times a fixed
+//! weight, which makes the fingers' variance over the corpus that of the arms: else hands would be lost among
+//! the principal components.
+
+use super::fixed_rate::{Frames, N_JOINTS_USED, N_NUMBERS, joints_used};
+use anyhow::{Context, Result, ensure};
+use ndarray::{Array1, Array2, ArrayView2, ArrayView3, s};
+use orator_base::types::skeleton::{L_HAND, L_WRIST, NECK, R_HAND, R_WRIST};
+use orator_base::types::time::FrameRate;
+use safetensors::{Dtype, SafeTensors};
+use std::sync::LazyLock;
+
+/// Frames of a window, at 15 a second: one second.
+pub const WINDOW: usize = 15;
+/// Frames between the starts of two windows.
+pub const STRIDE: usize = 4;
+/// Numbers of a row.
+pub const N: usize = 64;
+
+const FILE: &[u8] = include_bytes!("../../../../models/motion_basis.safetensors");
+const CM: f32 = 100.0;
+/// Windows multiplied at once.
+const ROWS: usize = 256;
+
+/// Directions in the space of windows.
+pub struct Basis {
+    /// Of each joint.
+    weights: Array1<f32>,
+    /// [window x numbers, N], a direction a column.
+    directions: Array2<f32>,
+}
+
+static BUILT_IN: LazyLock<Option<Basis>> = LazyLock::new(|| Basis::parse(FILE).ok());
+
+/// Rows [n, 64] of the wholly seen windows of `joints` [T, 49, 3] (metres), `mask` [T, 49]; weighted centimetres. For
+/// a predicted motion the mask is that of the ground truth beside it.
+pub fn windows(joints: ArrayView3<f32>, mask: ArrayView2<bool>, fps: FrameRate) -> Array2<f64> {
+    // a test holds that the built-in file is whole
+    BUILT_IN.as_ref().map_or_else(|| Array2::zeros((0, N)), |basis| basis.rows(&Frames::new(joints, mask, fps)))
+}
+
+/// Hash of the basis' numbers, hex: values of another basis are not comparable.
+pub fn hash() -> String {
+    blake3::hash(FILE).to_hex().to_string()
+}
+
+impl Basis {
+    /// From the bytes of a file of `orator-lab train basis`. Errors on tensors that are missing or of another shape.
+    pub fn parse(bytes: &[u8]) -> Result<Self> {
+        let file = SafeTensors::deserialize(bytes)?;
+        let numbers = |name: &str, shape: &[usize]| -> Result<Vec<f32>> {
+            let tensor = file.tensor(name).with_context(|| format!("tensor {name} is missing"))?;
+            ensure!(
+                tensor.shape() == shape && tensor.dtype() == Dtype::F32,
+                "tensor {name} is {:?} {:?}, expected F32 {shape:?}",
+                tensor.dtype(),
+                tensor.shape()
+            );
+            let bytes = tensor.data().chunks_exact(4);
+            Ok(bytes.map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
+        };
+        let weights = Array1::from_vec(numbers("weights", &[N_JOINTS_USED])?);
+        let rows = Array2::from_shape_vec((N, WINDOW * N_NUMBERS), numbers("basis", &[N, WINDOW * N_NUMBERS])?)?;
+        Ok(Self { weights, directions: rows.reversed_axes().as_standard_layout().into_owned() })
+    }
+
+    fn rows(&self, frames: &Frames) -> Array2<f64> {
+        let mut poses = poses(frames.joints.view());
+        for mut pose in poses.outer_iter_mut() {
+            pose.iter_mut().enumerate().for_each(|(i, v)| *v *= self.weights[i / 3]);
+        }
+        let starts = frames.starts(WINDOW, STRIDE);
+        let mut rows = Array2::zeros((starts.len(), N));
+        let mut windows = Array2::zeros((ROWS.min(starts.len()), WINDOW * N_NUMBERS));
+        for (first, starts) in starts.chunks(ROWS).enumerate() {
+            for (&start, mut window) in starts.iter().zip(windows.outer_iter_mut()) {
+                let part = poses.slice(s![start..start + WINDOW, ..]);
+                window.iter_mut().zip(part).for_each(|(to, from)| *to = *from);
+            }
+            let product = windows.slice(s![..starts.len(), ..]).dot(&self.directions);
+            rows.slice_mut(s![first * ROWS..first * ROWS + starts.len(), ..]).assign(&product.mapv(f64::from));
+        }
+        rows
+    }
+}
+
+/// Poses [T, 138] of joints [T, 49, 3] in metres: centimetres, arms from the neck, fingers from their wrist, not
+/// weighted yet.
+pub fn poses(joints: ArrayView3<f32>) -> Array2<f32> {
+    let mut poses = Array2::zeros((joints.shape()[0], N_NUMBERS));
+    for (mut pose, frame) in poses.outer_iter_mut().zip(joints.outer_iter()) {
+        for (i, joint) in joints_used().enumerate() {
+            let from = origin(joint);
+            (0..3).for_each(|k| pose[3 * i + k] = CM * (frame[[joint, k]] - frame[[from, k]]));
+        }
+    }
+    poses
+}
+
+/// Whether the joint is a finger's.
+pub fn is_finger(joint: usize) -> bool {
+    joint > L_HAND
+}
+
+fn origin(joint: usize) -> usize {
+    match joint {
+        _ if !is_finger(joint) => NECK,
+        _ if joint < R_HAND => L_WRIST,
+        _ => R_WRIST,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metrics::space::fixed_rate::{FPS, moving};
+    use orator_base::types::skeleton::N_JOINTS;
+
+    #[test]
+    fn the_built_in_basis_is_orthonormal() {
+        let basis = Basis::parse(FILE).unwrap();
+        let gram = basis.directions.t().dot(&basis.directions);
+        for ((i, j), v) in gram.indexed_iter() {
+            assert!((v - f32::from(u8::from(i == j))).abs() < 1e-4, "{i} {j}: {v}");
+        }
+        assert!(basis.weights.iter().all(|w| *w > 0.0));
+        let cut = format!("{:#}", Basis::parse(&FILE[..FILE.len() / 2]).err().unwrap());
+        assert!(!cut.is_empty());
+    }
+
+    #[test]
+    fn rows_are_the_products_of_their_windows() {
+        let (joints, mask) = (moving(1200), Array2::from_elem((1200, N_JOINTS), true));
+        let rows = windows(joints.view(), mask.view(), FPS);
+        assert_eq!(rows.dim(), ((1200 - 15) / 4 + 1, N));
+        let basis = Basis::parse(FILE).unwrap();
+        for n in [0, 1, 255, 256, 296] {
+            let window = poses(joints.slice(s![4 * n..4 * n + 15, .., ..]));
+            for k in [0, 17, 63] {
+                let number = |(i, v): (usize, &f32)| {
+                    f64::from(*v) * f64::from(basis.weights[i % N_NUMBERS / 3] * basis.directions[[i, k]])
+                };
+                let sum: f64 = window.iter().enumerate().map(number).sum();
+                assert!((sum - rows[[n, k]]).abs() < 1e-3 * (1.0 + sum.abs()), "{n} {k}: {sum} {}", rows[[n, k]]);
+            }
+        }
+    }
+
+    #[test]
+    fn an_offset_of_the_whole_body_changes_nothing() {
+        let (joints, mask) = (moving(40), Array2::from_elem((40, N_JOINTS), true));
+        let there = windows(joints.view(), mask.view(), FPS);
+        let elsewhere = windows((joints + 2.0).view(), mask.view(), FPS);
+        assert!(there.iter().zip(&elsewhere).all(|(a, b)| (a - b).abs() < 1e-2));
+        assert_eq!(there.nrows(), 7);
+    }
+}

@@ -1,0 +1,144 @@
+//! Windows of 34 poses as rows of 32 numbers of a fixed trained encoder (`nn::motion_encoder`,
+//! `models/motion_embedding.md`), after Yoon et al. 2020. It looks at the directions of the bones, so a speaker's size
+//! says nothing and every bone of a finger as much as an upper arm.
+
+use super::fixed_rate::{FPS, Frames, N_NUMBERS, joints_used};
+use anyhow::{Context, Result, ensure};
+use candle_core::safetensors::load_buffer;
+use candle_core::{Device, Tensor};
+use ndarray::{Array2, ArrayView2, ArrayView3, concatenate, s};
+use orator_base::types::skeleton::parent;
+use orator_base::types::time::FrameRate;
+use orator_nn::motion_encoder;
+use orator_nn::motion_encoder::{Config, MotionEncoder};
+use orator_nn::params::Params;
+use std::collections::BTreeMap;
+use std::sync::LazyLock;
+
+/// Frames of a window, at 15 a second: 2.3 s.
+pub const WINDOW: usize = motion_encoder::WINDOW;
+/// Frames between the starts of two windows.
+pub const STRIDE: usize = 4;
+/// Numbers of a row.
+pub const N: usize = motion_encoder::N_CODE;
+/// Kind of the weights file.
+pub const KIND: &str = "motion-embedding";
+
+const FILE: &[u8] = include_bytes!("../../../../models/motion_embedding.safetensors");
+/// Windows that go through the network together.
+const TOGETHER: usize = 256;
+
+static BUILT_IN: LazyLock<Option<MotionEncoder>> = LazyLock::new(|| parse(FILE).ok());
+
+/// Rows [n, 32] of the wholly seen windows of `joints` [T, 49, 3] (metres), `mask` [T, 49]. For a predicted motion the mask is
+/// that of the ground truth beside it. Where numbers are beyond all sense the row is NaN.
+pub fn windows(joints: ArrayView3<f32>, mask: ArrayView2<bool>, fps: FrameRate) -> Array2<f64> {
+    // a test holds that the built-in file is whole
+    BUILT_IN.as_ref().map_or_else(|| Array2::zeros((0, N)), |encoder| rows(encoder, &Frames::new(joints, mask, fps)))
+}
+
+/// Hash of the encoder's numbers, hex: values of another encoder are not comparable.
+pub fn hash() -> String {
+    blake3::hash(FILE).to_hex().to_string()
+}
+
+/// The encoder of a file of `orator-lab train embedding`.
+pub fn parse(bytes: &[u8]) -> Result<MotionEncoder> {
+    let (_, header) = safetensors::SafeTensors::read_metadata(bytes)?;
+    let facts = header.metadata().as_ref().and_then(|m| m.get("orator")).context("it was not written by orator")?;
+    let facts: serde_json::Value = serde_json::from_str(facts)?;
+    ensure!(facts["kind"] == KIND, "it is of kind {}, expected {KIND}", facts["kind"]);
+    let config: Config = serde_json::from_value(facts["lesson"]["config"].clone()).context("its network is unknown")?;
+    ensure!(config == Config::default(), "its network is {config:?}, expected {:?}", Config::default());
+    let mut params = Params::frozen();
+    let encoder = MotionEncoder::new(&mut params, &config)?;
+    let tensors = load_buffer(bytes, &Device::Cpu)?;
+    let tensors: BTreeMap<String, Tensor> =
+        tensors.into_iter().filter(|(name, _)| name.starts_with(motion_encoder::NAME)).collect();
+    params.load(&tensors)?;
+    Ok(encoder)
+}
+
+/// Rows [n, 32] of these frames by this encoder.
+pub fn rows(encoder: &MotionEncoder, frames: &Frames) -> Array2<f64> {
+    let directions = directions(frames.joints.view());
+    let mut parts = Vec::new();
+    for whole in &frames.whole {
+        let n = (whole.len() + 1).saturating_sub(WINDOW).div_ceil(STRIDE);
+        for first in (0..n).step_by(TOGETHER) {
+            let n = TOGETHER.min(n - first);
+            let start = whole.start + first * STRIDE;
+            let part = directions.slice(s![start..start + (n - 1) * STRIDE + WINDOW, ..]);
+            let codes = encoder.codes(part, STRIDE).unwrap_or_else(|_| Array2::from_elem((n, N), f32::NAN));
+            parts.push(codes.mapv(f64::from));
+        }
+    }
+    let views: Vec<_> = parts.iter().map(|part| part.view()).collect();
+    concatenate(ndarray::Axis(0), &views).unwrap_or_else(|_| Array2::zeros((0, N)))
+}
+
+/// Unit vectors [T, 138] of the bones that end in the joints that say something; a bone without length is 0.
+pub fn directions(joints: ArrayView3<f32>) -> Array2<f32> {
+    let bones: Vec<(usize, usize)> = joints_used().filter_map(|joint| Some((parent(joint)?, joint))).collect();
+    let mut directions = Array2::zeros((joints.shape()[0], N_NUMBERS));
+    for (mut row, frame) in directions.outer_iter_mut().zip(joints.outer_iter()) {
+        for (i, &(from, to)) in bones.iter().enumerate() {
+            let bone: [f32; 3] = std::array::from_fn(|k| frame[[to, k]] - frame[[from, k]]);
+            let length = bone.iter().map(|v| v * v).sum::<f32>().sqrt().max(1e-6);
+            (0..3).for_each(|k| row[3 * i + k] = bone[k] / length);
+        }
+    }
+    directions
+}
+
+const _: () = assert!(FPS.num == 15 && FPS.den == 1 && STRIDE.is_multiple_of(motion_encoder::STEP));
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metrics::space::fixed_rate::moving;
+    use orator_base::types::skeleton::N_JOINTS;
+
+    #[test]
+    fn rows_do_not_depend_on_what_lies_beside_their_window_nor_on_size() {
+        let joints = moving(1100);
+        let mut mask = Array2::from_elem((1100, N_JOINTS), true);
+        let rows = windows(joints.view(), mask.view(), FPS);
+        assert_eq!(rows.dim(), ((1100 - 34) / 4 + 1, N));
+        for n in [0, 3, 255, 256, 266] {
+            let at = 4 * n..4 * n + 34;
+            let own = windows(joints.slice(s![at.clone(), .., ..]), mask.slice(s![at, ..]), FPS);
+            assert!(own.row(0).iter().zip(rows.row(n)).all(|(a, b)| (a - b).abs() < 1e-4), "{n}");
+        }
+        let larger = windows((&joints * 1.3).view(), mask.view(), FPS);
+        assert!(larger.iter().zip(&rows).all(|(a, b)| (a - b).abs() < 1e-3));
+        mask[[50, 12]] = false;
+        assert_eq!(windows(joints.view(), mask.view(), FPS).nrows(), (50 - 34) / 4 + 1 + (1049 - 34) / 4 + 1);
+        assert_eq!(windows(joints.slice(s![..33, .., ..]), mask.slice(s![..33, ..]), FPS).dim(), (0, N));
+    }
+
+    #[test]
+    fn the_bits_do_not_depend_on_threads() {
+        let joints = moving(700);
+        let mask = Array2::from_elem((700, N_JOINTS), true);
+        let with = |n: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
+            pool.install(|| {
+                (
+                    windows(joints.view(), mask.view(), FPS),
+                    crate::metrics::space::basis::windows(joints.view(), mask.view(), FPS),
+                )
+            })
+        };
+        assert_eq!(with(1), with(4));
+    }
+
+    #[test]
+    fn the_built_in_weights_fit() {
+        parse(FILE).unwrap();
+        assert!(FILE.len() < 1_000_000);
+        let says = |bytes: &[u8]| format!("{:#}", parse(bytes).err().unwrap());
+        assert!(says(include_bytes!("../../../../models/hand_lifter.safetensors")).contains("motion-embedding"));
+        says(&FILE[..1000]);
+    }
+}

@@ -1,0 +1,256 @@
+//! Random changes of a training window that a speaker's gestures do not depend on, so that little speech is not learnt by
+//! heart: other moments and speeds, other loudness and pitch, room noise, hidden bands and moments (Park et al. 2019),
+//! the body in a mirror.
+
+use super::recipe::settings::GanSettings;
+use crate::generate::mel_stream::mel_frames;
+use crate::generate::normalisation::Normalisation;
+use crate::train::resume;
+use ndarray::{Array2, Axis, s};
+use orator_base::audio::mel;
+use orator_base::types::skeleton::{self, N_JOINTS};
+use orator_base::types::time::FrameRate;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// Spectrogram frames a second.
+const MEL_RATE: f64 = 100.0;
+/// Tells the random numbers of changes from those that choose windows.
+const CHANGES: u64 = 0x6368_616e_6765;
+/// Numbers the noise's spectrum has along the bands, between which it is linear.
+const NOISE_KNOTS: usize = 5;
+
+/// A window's change.
+#[derive(Clone, Debug)]
+pub struct WindowChange {
+    /// Seconds by which the window begins later, or earlier, than the one drawn.
+    pub shift_secs: f64,
+    /// Seconds of the interval that a second of the window holds.
+    pub speed: f64,
+    pub is_mirrored: bool,
+    pitch_bands: f64,
+    gain: f32,
+    /// Mean magnitude of the noise as a share of the window's; 0: none.
+    noise: f32,
+    masked_bands: [usize; 2],
+    masked_frames: [usize; 2],
+    seed: u64,
+}
+
+/// A window in rows: spectrogram [64, mel frames], poses [numbers, T], mask of the numbers [numbers, T].
+pub struct WindowRows {
+    pub mels: Array2<f32>,
+    pub poses: Array2<f32>,
+    pub mask: Array2<f32>,
+}
+
+/// Changes of the windows of the step after `step` steps; empty where nothing is to be changed.
+pub fn changes(settings: &GanSettings, step: usize, fps: FrameRate) -> Vec<WindowChange> {
+    let of = settings;
+    let is_changing = of.augment_speed > 0.0
+        || of.augment_pitch > 0.0
+        || of.augment_gain_db > 0.0
+        || of.augment_noise_db > -120.0
+        || of.augment_mask_bands > 0
+        || of.augment_mask_secs > 0.0
+        || of.augment_mirror > 0.0;
+    if !is_changing {
+        return Vec::new();
+    }
+    let mut rng = resume::stream(settings.seed ^ CHANGES, step);
+    let reach = 0.5 * fps.secs(settings.stride_frames);
+    let n_mels = mel_frames(fps, settings.window_frames);
+    (0..settings.batch).map(|_| WindowChange::draw(settings, reach, n_mels, &mut rng)).collect()
+}
+
+impl WindowChange {
+    fn draw(of: &GanSettings, reach: f64, n_mels: usize, rng: &mut ChaCha8Rng) -> Self {
+        let mut within = |reach: f64| (2.0 * rng.random::<f64>() - 1.0) * reach;
+        let shift_secs = within(reach);
+        let speed = within(of.augment_speed).exp();
+        let pitch_bands = within(of.augment_pitch);
+        let gain = (within(of.augment_gain_db) * std::f64::consts::LN_10 / 20.0) as f32;
+        let noise_db = of.augment_noise_db - 15.0 * (1.0 + within(1.0));
+        let noise = if of.augment_noise_db > -120.0 { 10f64.powf(noise_db / 20.0) as f32 } else { 0.0 };
+        let mut span = |most: usize, n: usize| {
+            let length = rng.random_range(0..=most.min(n) as u64) as usize;
+            let first = rng.random_range(0..=(n - length) as u64) as usize;
+            [first, first + length]
+        };
+        let masked_bands = span(of.augment_mask_bands, mel::N_MELS);
+        let masked_frames = span((of.augment_mask_secs * MEL_RATE) as usize, n_mels);
+        let is_mirrored = rng.random_bool(of.augment_mirror.clamp(0.0, 1.0));
+        let seed = rng.random();
+        Self { shift_secs, speed, is_mirrored, pitch_bands, gain, noise, masked_bands, masked_frames, seed }
+    }
+
+    /// Changes the sound of a window in place, [64, mel frames].
+    pub fn change_sound(&self, mels: &mut Array2<f32>) {
+        let silence = mel::FLOOR.ln();
+        if self.pitch_bands != 0.0 {
+            let source = mels.clone();
+            let last = (mels.nrows() - 1) as f64;
+            for (band, mut row) in mels.outer_iter_mut().enumerate() {
+                let at = (band as f64 - self.pitch_bands).clamp(0.0, last);
+                let (low, share) = (at as usize, at.fract() as f32);
+                let high = (low + 1).min(source.nrows() - 1);
+                row.assign(&source.row(low));
+                row.zip_mut_with(&source.row(high), |own, next| *own += share * (next - *own));
+            }
+        }
+        if self.gain != 0.0 {
+            mels.mapv_inplace(|x| (x + self.gain).max(silence));
+        }
+        if self.noise > 0.0 {
+            self.add_noise(mels);
+        }
+        let mean = mels.mean().unwrap_or(silence);
+        let [first, last] = self.masked_bands;
+        mels.slice_mut(s![first..last, ..]).fill(mean);
+        let n = mels.ncols();
+        let [first, last] = self.masked_frames.map(|frame| frame.min(n));
+        mels.slice_mut(s![.., first..last]).fill(mean);
+    }
+
+    /// Magnitudes of noise with a random, smooth spectrum.
+    fn add_noise(&self, mels: &mut Array2<f32>) {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        let level = self.noise * mels.iter().map(|x| x.exp()).sum::<f32>() / mels.len().max(1) as f32;
+        let knots: [f32; NOISE_KNOTS] = std::array::from_fn(|_| rng.random_range(-1.0f32..1.0).exp());
+        let n = mels.nrows();
+        for (band, mut row) in mels.axis_iter_mut(Axis(0)).enumerate() {
+            let at = band as f32 * (NOISE_KNOTS - 1) as f32 / n as f32;
+            let (low, share) = (at as usize, at.fract());
+            let height = level * (knots[low] + share * (knots[(low + 1).min(NOISE_KNOTS - 1)] - knots[low]));
+            row.mapv_inplace(|x| {
+                // Magnitudes of a band of noise vary little beside their mean.
+                let magnitude = height * (0.75 + 0.5 * rng.random::<f32>());
+                (x.exp() + magnitude).ln()
+            });
+        }
+    }
+}
+
+/// Poses [144 or more, T] and their mask of a body in a mirror: left and right change places, x its sign.
+pub fn mirror(poses: &mut Array2<f32>, mask: &mut Array2<f32>, normal: &Normalisation) {
+    let (own, seen) = (poses.clone(), mask.clone());
+    for joint in 1..N_JOINTS {
+        for k in 0..3 {
+            let (to, from) = (3 * (joint - 1) + k, 3 * (skeleton::mirror(joint) - 1) + k);
+            let sign = if k == 0 { -1.0 } else { 1.0 };
+            let (mean, std) = (normal.mean[to], normal.std[to].max(1e-6));
+            let metres = own.row(from).mapv(|x| sign * (x * normal.std[from] + normal.mean[from]));
+            poses.row_mut(to).assign(&metres.mapv(|x| (x - mean) / std));
+            mask.row_mut(to).assign(&seen.row(from));
+        }
+    }
+    // Of angles yaw and roll change their sign.
+    for (n, of) in normal.channels.iter().enumerate() {
+        for k in [0, 2] {
+            let row = 3 * (N_JOINTS - 1) + 3 * n + k;
+            let (mean, std) = (of.mean[k], of.std[k].max(1e-6));
+            poses.row_mut(row).mapv_inplace(|x| (-(x * std + mean) - mean) / std);
+        }
+    }
+    poses.zip_mut_with(mask, |x, seen| *x *= seen);
+}
+
+/// Noise of this deviation on `x`, from the stream of a step.
+pub fn gaussian(n: usize, std: f64, seed: u64, step: usize) -> Vec<f32> {
+    let mut rng = resume::stream(seed ^ !CHANGES, step);
+    (0..n).map(|_| (std * <StandardNormal as Distribution<f64>>::sample(&StandardNormal, &mut rng)) as f32).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::train::gan::recipe::material::TrainingMaterial;
+    use crate::train::gan::recipe::start::TrainingStart;
+    use orator_base::types::skeleton::{L_WRIST, R_WRIST};
+    use orator_dataset::config::GanConfig;
+
+    fn settings() -> GanSettings {
+        GanSettings::new(
+            &GanConfig::default(),
+            &TrainingMaterial { train_secs: 600.0, validation_secs: 0.0, n_speakers: 1 },
+            TrainingStart::Nothing,
+        )
+    }
+
+    fn still() -> WindowChange {
+        WindowChange {
+            shift_secs: 0.0,
+            speed: 1.0,
+            is_mirrored: false,
+            pitch_bands: 0.0,
+            gain: 0.0,
+            noise: 0.0,
+            masked_bands: [0; 2],
+            masked_frames: [0; 2],
+            seed: 1,
+        }
+    }
+
+    fn sound() -> Array2<f32> {
+        Array2::from_shape_fn((mel::N_MELS, 100), |(band, t)| (0.1 * band as f32 + 0.05 * t as f32).sin() - 3.0)
+    }
+
+    #[test]
+    fn a_step_always_has_the_same_changes_within_their_bounds() {
+        let (of, fps) = (settings(), FrameRate::new(15, 1));
+        let text = |step| format!("{:?}", changes(&of, step, fps));
+        assert!(text(3) == text(3) && text(3) != text(4));
+        for change in (0..50).flat_map(|step| changes(&of, step, fps)) {
+            assert!(change.speed.ln().abs() <= of.augment_speed && change.pitch_bands.abs() <= of.augment_pitch);
+            assert!(change.shift_secs.abs() <= 0.5 * fps.secs(of.stride_frames));
+            let [first, last] = change.masked_bands;
+            assert!(last - first <= of.augment_mask_bands && last <= mel::N_MELS);
+        }
+        let paper = GanConfig { recipe: orator_dataset::config::GanRecipe::Paper, ..GanConfig::default() };
+        let paper = GanSettings::new(
+            &paper,
+            &TrainingMaterial { train_secs: 600.0, validation_secs: 0.0, n_speakers: 1 },
+            TrainingStart::Nothing,
+        );
+        assert!(changes(&paper, 3, fps).is_empty());
+    }
+
+    #[test]
+    fn each_change_does_what_it_says() {
+        let changed = |change: WindowChange| {
+            let mut mels = sound();
+            change.change_sound(&mut mels);
+            mels
+        };
+        assert_eq!(changed(still()), sound());
+        let louder = changed(WindowChange { gain: 0.5, ..still() });
+        assert!((&louder - &sound()).iter().all(|gain| (gain - 0.5).abs() < 1e-6));
+        let higher = changed(WindowChange { pitch_bands: 2.0, ..still() });
+        assert_eq!(higher.row(10), sound().row(8));
+        let noisy = changed(WindowChange { noise: 0.1, ..still() });
+        assert!(noisy.iter().zip(&sound()).all(|(noisy, own)| noisy > own && noisy - own < 3.0));
+        let masked = changed(WindowChange { masked_bands: [4, 9], masked_frames: [10, 20], ..still() });
+        let mean = sound().mean().unwrap();
+        assert!(masked.slice(s![4..9, ..]).iter().all(|x| *x == mean) && masked[[30, 15]] == mean);
+        assert_eq!(masked[[3, 9]], sound()[[3, 9]]);
+    }
+
+    #[test]
+    fn a_mirror_swaps_the_hands_and_twice_is_none() {
+        let mean = Array2::from_shape_fn((N_JOINTS, 3), |(joint, k)| 0.01 * joint as f32 - 0.1 * k as f32);
+        let std = Array2::from_shape_fn((N_JOINTS, 3), |(joint, k)| 0.1 + 0.001 * (joint + k) as f32);
+        let normal = Normalisation::new(&mean, &std, vec![0.1; N_JOINTS - 1]);
+        let before = Array2::from_shape_fn((3 * (N_JOINTS - 1), 4), |(i, t)| (i as f32 * 0.3 + t as f32).sin());
+        let (mut poses, mut mask) = (before.clone(), Array2::ones(before.dim()));
+        mirror(&mut poses, &mut mask, &normal);
+        let metres = |of: &Array2<f32>, joint: usize, k: usize| {
+            let row = 3 * (joint - 1) + k;
+            of[[row, 2]] * normal.std[row] + normal.mean[row]
+        };
+        assert!((metres(&poses, L_WRIST, 0) + metres(&before, R_WRIST, 0)).abs() < 1e-5);
+        assert!((metres(&poses, L_WRIST, 1) - metres(&before, R_WRIST, 1)).abs() < 1e-5);
+        mirror(&mut poses, &mut mask, &normal);
+        assert!(poses.iter().zip(&before).all(|(a, b)| (a - b).abs() < 1e-4));
+    }
+}

@@ -1,0 +1,120 @@
+//! What a training knows of its speakers before its first step: statistics of the datasets, or what a checkpoint says of them.
+
+use super::recipe::settings::GanSettings;
+use super::start;
+use super::windows::WindowLoader;
+use crate::generate::model::SpeakerMetadata;
+use crate::generate::normalisation::{ChannelNormalisation, Normalisation};
+use crate::generate::representation::Representation;
+use anyhow::{Context, Result, bail, ensure};
+use orator_base::motion::bones;
+use orator_base::types::posture::PostureChannel;
+use orator_base::types::skeleton::N_BONES;
+use orator_dataset::config::{MotionRepresentation, NetworkPreset};
+use orator_dataset::{Dataset, Split};
+use orator_nn::gan::generator::{Config, Preset};
+
+/// Errors unless each dataset has sound and is of another speaker.
+pub fn check(datasets: &[&Dataset]) -> Result<()> {
+    for (n, dataset) in datasets.iter().enumerate() {
+        let (info, dir) = (dataset.info(), dataset.dir().display());
+        ensure!(
+            !info.no_sound,
+            "{dir} was imported without sound, so that there is no speech to learn from; import it with its sound files"
+        );
+        let earlier = datasets[..n].iter().find(|other| other.info().speaker == info.speaker);
+        if let Some(other) = earlier {
+            bail!("{} and {dir} are both of {}; give one dataset a speaker", other.dir().display(), info.speaker);
+        }
+    }
+    Ok(())
+}
+
+/// Normalisation of a dataset's training split, with these channels.
+pub fn normalisation_with_channels(dataset: &Dataset, wanted: &[PostureChannel]) -> Result<Normalisation> {
+    Ok(Normalisation { channels: channels(dataset, wanted)?, ..normalisation(dataset)? })
+}
+
+/// Frames read at a time, for statistics of all poses.
+const PART_FRAMES: usize = 4096;
+
+/// What a training of so many speakers learns of one of them.
+pub fn metadata(
+    dataset: &Dataset,
+    normal: &Normalisation,
+    loader: &WindowLoader,
+    settings: &GanSettings,
+    n_speakers: usize,
+) -> Result<SpeakerMetadata> {
+    let representation = match settings.representation {
+        MotionRepresentation::Positions => Representation::Positions,
+        MotionRepresentation::Bones => Representation::bones(normal, loader.poses(PART_FRAMES))?,
+    };
+    let network = Config::from_preset(preset(settings.preset), normal.n_numbers());
+    let several = n_speakers > 1;
+    let network = Config { n_speakers: if several { n_speakers } else { 0 }, speaker_weights: several, ..network };
+    let (info, hash) = (dataset.info(), dataset.hash()?);
+    let mut metadata = SpeakerMetadata::new(&info.speaker, info.fps, &hash, network, normal.clone(), representation);
+    metadata.add_videos(start::videos(dataset));
+    Ok(metadata)
+}
+
+/// Takes up a speaker of a checkpoint with the dataset as it is now.
+pub fn go_on(metadata: &mut SpeakerMetadata, dataset: &Dataset, differences: &mut Vec<String>) -> Result<()> {
+    let info = dataset.info();
+    ensure!(
+        metadata.name == info.speaker && metadata.fps == info.fps,
+        "it is of {} at {}, the dataset of {} at {}; choose another --out",
+        metadata.name,
+        metadata.fps,
+        info.speaker,
+        info.fps
+    );
+    let hash = dataset.hash()?;
+    if metadata.dataset != hash {
+        differences.push(
+            "the dataset is another now: its windows are trained on, with the checkpoint's mean, deviation and bones"
+                .to_owned(),
+        );
+        metadata.dataset = hash;
+        metadata.add_videos(start::videos(dataset));
+    }
+    Ok(())
+}
+
+/// The network of a preset of the configuration.
+pub const fn preset(preset: NetworkPreset) -> Preset {
+    match preset {
+        NetworkPreset::Light => Preset::Light,
+        NetworkPreset::Paper => Preset::Paper,
+    }
+}
+
+/// Statistics of the channels that are to be learnt.
+fn channels(dataset: &Dataset, wanted: &[PostureChannel]) -> Result<Vec<ChannelNormalisation>> {
+    let posture = dataset.stats().posture.as_ref();
+    let of = |channel: PostureChannel| -> Result<ChannelNormalisation> {
+        let stats = posture.and_then(|posture| posture.get(&channel)).filter(|stats| stats.n_seen != [0; 3]);
+        let stats = stats.with_context(|| {
+            let (name, dir) = (channel.name(), dataset.dir().display());
+            format!(
+                "gan.channels asks for \"{name}\", which {dir} does not show in any frame to train on: set posture = true \
+                 under [dataset] and make the dataset again, or leave it out"
+            )
+        })?;
+        Ok(ChannelNormalisation::new(channel, stats.n_seen, stats.mean, stats.std))
+    };
+    PostureChannel::ALL.into_iter().filter(|channel| wanted.contains(channel)).map(of).collect()
+}
+
+/// Statistics of the training split; bone lengths where the dataset does not state them are measured.
+pub fn normalisation(dataset: &Dataset) -> Result<Normalisation> {
+    let stated = &dataset.info().bone_lengths_metres;
+    let mut lengths: Vec<f32> = (0..N_BONES).map(|bone| stated.get(bone).map_or(0.0, |v| *v as f32)).collect();
+    if lengths.iter().all(|length| *length == 0.0) {
+        let longest = dataset.samples(Split::Train).into_iter().max_by_key(|sample| sample.n_frames);
+        let longest = longest.context("the training split of the dataset is empty")?;
+        lengths = bones::measure(&dataset.read(&longest)?.motion).to_vec();
+    }
+    Ok(Normalisation::new(&dataset.stats().mean(), &dataset.stats().std(), lengths))
+}

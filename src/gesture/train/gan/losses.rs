@@ -1,0 +1,249 @@
+//! What the networks are trained to make small: pure functions of tensors.
+
+use crate::generate::normalisation::{N_FEATURES, Normalisation};
+use candle_core::{DType, Device, Result, Tensor};
+use orator_base::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_WRIST, is_duplicate, parent};
+use orator_dataset::config::AdversarialLoss;
+use orator_nn::gan::discriminator::motion;
+
+/// Mean absolute difference over the numbers whose mask is 1; all three of one shape.
+pub fn l1(made: &Tensor, real: &Tensor, mask: &Tensor) -> Result<Tensor> {
+    let n = mask.sum_all()?.maximum(1.0)?;
+    ((made - real)?.abs()? * mask)?.sum_all()? / n
+}
+
+/// Mean absolute difference of the frame-to-frame differences, over the numbers whose mask is 1 in both frames; all
+/// three [B, C, T].
+pub fn velocity(made: &Tensor, real: &Tensor, mask: &Tensor) -> Result<Tensor> {
+    l1(&motion(made)?, &motion(real)?, &both_seen(mask)?)
+}
+
+/// Mean squared difference of the joints' speeds, as a share of the mean squared real speed: how much a joint moves, wherever
+/// it goes. All three [B, C, T] with the three coordinates of each joint in the first 144 rows; a joint counts where all its
+/// coordinates do, in both frames.
+pub fn speed(made: &Tensor, real: &Tensor, mask: &Tensor) -> Result<Tensor> {
+    let mask = per_joint(&both_seen(mask)?)?.min(2)?;
+    // The root has no slope at 0; a thousandth of a deviation a frame is rest.
+    let speeds = |poses: &Tensor| (per_joint(&motion(poses)?)?.sqr()?.sum(2)? + 1e-6)?.sqrt();
+    let real = speeds(real)?;
+    let scale = (real.sqr()? * &mask)?.sum_all()?.maximum(1e-6)?;
+    ((speeds(made)? - real)?.sqr()? * mask)?.sum_all()? / scale
+}
+
+/// How far the mean squared speed of each joint is from the real one's, |ln(generated / real)|, mean over the joints: absolute
+/// errors alone give motion that is too slow, since it is not known when exactly a hand will move. The mean is
+/// over all windows and frames in which a joint is seen, as a statistic that generator and data share (feature matching,
+/// Salimans et al. 2016). Tensors as in [`speed`].
+pub fn energy(made: &Tensor, real: &Tensor, mask: &Tensor) -> Result<Tensor> {
+    let mask = per_joint(&both_seen(mask)?)?.min(2)?;
+    // A thousandth of a deviation a frame is rest.
+    let energies = |poses: &Tensor| {
+        let squares = (per_joint(&motion(poses)?)?.sqr()?.sum(2)? * &mask)?;
+        (squares.sum(2)?.sum(0)? / mask.sum(2)?.sum(0)?.maximum(1.0)?)? + 1e-6
+    };
+    (energies(made)?.log()? - energies(real)?.log()?)?.abs()?.mean_all()
+}
+
+/// [B, C, T] to [B, joints, 3, T], without what follows the joints.
+fn per_joint(rows: &Tensor) -> Result<Tensor> {
+    let (batch, _, n_frames) = rows.dims3()?;
+    rows.narrow(1, 0, N_FEATURES)?.reshape((batch, N_FEATURES / 3, 3, n_frames))
+}
+
+/// 1 where the mask is 1 in a frame and in the one before: [B, C, T] to [B, C, T - 1].
+pub fn both_seen(mask: &Tensor) -> Result<Tensor> {
+    let n = mask.dim(2)?.saturating_sub(1);
+    mask.narrow(2, 1, n)? * mask.narrow(2, 0, n)?
+}
+
+/// Loss of the discriminator on its scores of real and of generated motion, of any shape; a scalar.
+pub fn discriminator_loss(loss: AdversarialLoss, real_scores: &Tensor, generated_scores: &Tensor) -> Result<Tensor> {
+    match loss {
+        AdversarialLoss::LeastSquares => {
+            (real_scores - 1.0)?.sqr()?.mean_all()? + generated_scores.sqr()?.mean_all()?
+        }
+        AdversarialLoss::Log => softplus(&real_scores.neg()?)?.mean_all()? + softplus(generated_scores)?.mean_all()?,
+    }
+}
+
+/// Adversarial loss of the generator on the discriminator's scores of generated motion, of any shape; a scalar.
+pub fn generator_loss(loss: AdversarialLoss, generated_scores: &Tensor) -> Result<Tensor> {
+    match loss {
+        AdversarialLoss::LeastSquares => (generated_scores - 1.0)?.sqr()?.mean_all(),
+        AdversarialLoss::Log => softplus(&generated_scores.neg()?)?.mean_all(),
+    }
+}
+
+/// log(1 + e^x), without overflow.
+fn softplus(x: &Tensor) -> Result<Tensor> {
+    x.relu()? + (x.abs()?.neg()?.exp()? + 1.0)?.log()?
+}
+
+/// Constancy of bone lengths (Rebol et al. 2021, eq. 1): how much each bone changes its length from frame to frame,
+/// as a share of the speaker's length of that bone. Holds the tables it needs.
+pub struct BoneConstancy {
+    mean: Tensor,
+    std: Tensor,
+    /// Rows of joint coordinates (the neck's included) at the two ends of the bones.
+    children: Tensor,
+    parents: Tensor,
+    /// 1 / length, [1, n_bones, 1].
+    inverse_lengths: Tensor,
+}
+
+impl BoneConstancy {
+    /// For the bones that were measured, without those to the hand roots, which are the wrists.
+    pub fn new(normal: &Normalisation, dtype: DType, device: &Device) -> Result<Self> {
+        let (mut children, mut parents, mut inverse) = (Vec::new(), Vec::new(), Vec::new());
+        for joint in 1..N_JOINTS {
+            let length = f64::from(normal.bone_lengths.get(joint - 1).copied().unwrap_or(0.0));
+            if is_duplicate(joint) || length < 1e-3 {
+                continue;
+            }
+            let from = match parent(joint).unwrap_or(NECK) {
+                L_HAND => L_WRIST,
+                R_HAND => R_WRIST,
+                other => other,
+            };
+            children.extend((0..3).map(|k| (3 * joint + k) as u32));
+            parents.extend((0..3).map(|k| (3 * from + k) as u32));
+            inverse.push(1.0 / length);
+        }
+        let column = |values: &[f32]| Tensor::new(values, device)?.to_dtype(dtype)?.reshape((1, (), 1));
+        Ok(Self {
+            mean: column(&normal.mean)?,
+            std: column(&normal.std)?,
+            children: Tensor::new(children, device)?,
+            parents: Tensor::new(parents, device)?,
+            inverse_lengths: Tensor::new(inverse, device)?.to_dtype(dtype)?.reshape((1, (), 1))?,
+        })
+    }
+
+    /// The loss of normalised poses [B, 144, T]; channels behind them have no say.
+    pub fn loss(&self, poses: &Tensor) -> Result<Tensor> {
+        let (batch, n_numbers, n_frames) = poses.dims3()?;
+        let n_bones = self.inverse_lengths.dim(1)?;
+        if n_bones == 0 || n_frames < 2 || n_numbers < N_FEATURES {
+            return poses.zeros_like()?.mean_all();
+        }
+        let poses = poses.narrow(1, 0, N_FEATURES)?;
+        let metres = poses.broadcast_mul(&self.std)?.broadcast_add(&self.mean)?;
+        let neck = Tensor::zeros((batch, 3, n_frames), poses.dtype(), poses.device())?;
+        let joints = Tensor::cat(&[neck, metres], 1)?;
+        let bones = (joints.index_select(&self.children, 1)? - joints.index_select(&self.parents, 1)?)?;
+        let squares = bones.reshape((batch, n_bones, 3, n_frames))?.sqr()?.sum(2)?;
+        // The root has no slope at 0; a bone of 0.1 mm is as good as none.
+        let lengths = (squares + 1e-8)?.sqrt()?.broadcast_mul(&self.inverse_lengths)?;
+        let change = (lengths.narrow(2, 1, n_frames - 1)? - lengths.narrow(2, 0, n_frames - 1)?)?;
+        change.abs()?.mean_all()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::Array2;
+    use orator_nn::ops::gradcheck::{pattern, worst};
+
+    fn normal() -> Normalisation {
+        let table = |value: f32| Array2::from_shape_fn((N_JOINTS, 3), |(j, k)| value + 0.01 * (j + 2 * k) as f32);
+        Normalisation::new(&table(0.1), &table(0.3), vec![0.2; N_JOINTS - 1])
+    }
+
+    #[test]
+    fn gradients_are_right() -> Result<()> {
+        let shape = [2, 3, 4];
+        let (made, real) = (pattern(&shape, 0.0)?, pattern(&shape, 3.0)?);
+        let mask = pattern(&shape, 9.0)?.gt(0.0)?.to_dtype(DType::F64)?;
+        assert!(worst(std::slice::from_ref(&made), |v| l1(&v[0], &real, &mask))? < 1e-7);
+        assert!(worst(std::slice::from_ref(&made), |v| velocity(&v[0], &real, &mask))? < 1e-7);
+        for game in [AdversarialLoss::LeastSquares, AdversarialLoss::Log] {
+            assert!(worst(&[made.clone(), real.clone()], |v| discriminator_loss(game, &v[0], &v[1]))? < 1e-7);
+            assert!(worst(std::slice::from_ref(&made), |v| generator_loss(game, &v[0]))? < 1e-7);
+        }
+        let shape = [2, N_FEATURES + 2, 4];
+        let (poses, real) = (pattern(&shape, 1.0)?, pattern(&shape, 5.0)?);
+        let mask = pattern(&shape, 9.0)?.gt(-0.8)?.to_dtype(DType::F64)?;
+        assert!(worst(std::slice::from_ref(&poses), |v| speed(&v[0], &real, &mask))? < 1e-6);
+        assert!(worst(&[poses], |v| energy(&v[0], &real, &mask))? < 1e-6);
+        let bones = BoneConstancy::new(&normal(), DType::F64, &Device::Cpu)?;
+        assert!(worst(&[pattern(&[2, N_FEATURES, 3], 0.0)?], |v| bones.loss(&v[0]))? < 1e-6);
+        Ok(())
+    }
+
+    #[test]
+    fn masked_numbers_have_no_say() -> Result<()> {
+        let row = |values: [f64; 4]| Tensor::new(&values, &Device::Cpu);
+        let (made, real) = (row([1.0, 2.0, 3.0, 4.0])?, row([1.0, 4.0, 100.0, 5.0])?);
+        let loss = |mask| -> Result<f64> { l1(&made, &real, &row(mask)?)?.to_scalar() };
+        assert_eq!(loss([1.0, 1.0, 0.0, 1.0])?, 1.0);
+        assert_eq!(loss([0.0; 4])?, 0.0);
+        Ok(())
+    }
+
+    #[test]
+    fn losses_are_what_their_formulas_say() -> Result<()> {
+        let row = |values: [f64; 3]| Tensor::new(&[[values]], &Device::Cpu);
+        let number = |loss: Result<Tensor>| loss?.to_scalar::<f64>();
+        let (real, made) = (row([0.5, -1.0, 90.0])?, row([2.0, 0.0, -90.0])?);
+        let log = |x: f64| -(1.0 / (1.0 + (-x).exp())).ln();
+        let expected = (log(0.5) + log(-1.0)) / 3.0 + (log(-2.0) + log(0.0)) / 3.0;
+        assert!((number(discriminator_loss(AdversarialLoss::Log, &real, &made))? - expected).abs() < 1e-12);
+        assert!(
+            (number(generator_loss(AdversarialLoss::Log, &made))? - (log(2.0) + log(0.0) + 90.0) / 3.0).abs() < 1e-12
+        );
+        assert_eq!(number(generator_loss(AdversarialLoss::LeastSquares, &row([2.0, 0.0, 1.0])?))?, 2.0 / 3.0);
+        // Speeds 1, -2 against 0, 3, of which the second is not seen.
+        let loss = velocity(&row([1.0, 2.0, 0.0])?, &row([1.0, 1.0, 4.0])?, &row([1.0, 1.0, 0.0])?);
+        assert_eq!(number(loss)?, 1.0);
+        Ok(())
+    }
+
+    #[test]
+    fn speeds_count_and_not_where_they_lead() -> Result<()> {
+        // One joint moves by (3, 4, 0), another by (0, 0, 2), a third is not seen.
+        let moved = |by: &[(usize, f64)]| -> Result<Tensor> {
+            let mut numbers = vec![0.0; 2 * (N_FEATURES + 1)];
+            by.iter().for_each(|(number, value)| numbers[2 * number + 1] = *value);
+            Tensor::from_vec(numbers, (1, N_FEATURES + 1, 2), &Device::Cpu)
+        };
+        let made = moved(&[(0, 3.0), (1, 4.0), (6, 9.0), (N_FEATURES, 9.0)])?;
+        let seen = (moved(&[(7, -1.0)])? + 1.0)?;
+        let of = |real: &[(usize, f64)]| -> Result<f64> { speed(&made, &moved(real)?, &seen)?.to_scalar() };
+        let close = |loss: f64, expected: f64| assert!((loss - expected).abs() < 5e-3, "{loss}, expected {expected}");
+        close(of(&[(5, 2.0)])?, (25.0 + 4.0) / 4.0);
+        close(of(&[(2, 5.0), (5, 2.0)])?, 4.0 / 29.0);
+        close(of(&[(2, -5.0)])?, 0.0);
+        Ok(())
+    }
+
+    #[test]
+    fn energy_is_that_of_all_windows() -> Result<()> {
+        let real = pattern(&[2, N_FEATURES, 5], 0.0)?;
+        let of = |made: &Tensor, mask: &Tensor| -> Result<f64> { energy(made, &real, mask)?.to_scalar() };
+        let all = real.ones_like()?;
+        assert!(of(&real, &all)? < 1e-12);
+        // Twice as fast is four times the energy; the other direction and another offset are the same.
+        assert!((of(&(&real * 2.0)?, &all)? - 4.0f64.ln()).abs() < 1e-4);
+        assert!(of(&(real.neg()? + 3.0)?, &all)? < 1e-9);
+        // A window as slow as the other is fast, and a joint that is not seen.
+        let swapped = Tensor::cat(&[real.narrow(0, 1, 1)?, real.narrow(0, 0, 1)?], 0)?;
+        assert!(of(&swapped, &all)? < 1e-9);
+        let hidden = Tensor::cat(&[all.narrow(1, 0, 3)?.zeros_like()?, all.narrow(1, 3, N_FEATURES - 3)?], 1)?;
+        let wild = Tensor::cat(&[(real.narrow(1, 0, 3)? * 9.0)?, real.narrow(1, 3, N_FEATURES - 3)?], 1)?;
+        assert!(of(&wild, &hidden)? < 1e-12 && of(&wild, &all)? > 0.05);
+        Ok(())
+    }
+
+    #[test]
+    fn only_changing_bones_cost() -> Result<()> {
+        let bones = BoneConstancy::new(&normal(), DType::F64, &Device::Cpu)?;
+        let still = pattern(&[1, N_FEATURES, 1], 0.0)?.broadcast_as((1, N_FEATURES, 5))?.contiguous()?;
+        assert!(bones.loss(&still)?.to_scalar::<f64>()? < 1e-12);
+        let moving = pattern(&[1, N_FEATURES, 5], 0.0)?;
+        let loss = bones.loss(&moving)?.to_scalar::<f64>()?;
+        let with_channels = Tensor::cat(&[&moving, &pattern(&[1, 6, 5], 7.0)?], 1)?;
+        assert!(loss > 0.01 && loss == bones.loss(&with_channels)?.to_scalar::<f64>()?);
+        Ok(())
+    }
+}

@@ -1,0 +1,163 @@
+//! The speakers of a training, one or several: what the network's numbers mean of each, and the way from them to poses.
+
+use super::losses::BoneConstancy;
+use crate::generate::model::SpeakerMetadata;
+use crate::generate::representation::PoseDecoder;
+use anyhow::{Result, ensure};
+use candle_core::{DType, Device, Tensor};
+use orator_nn::gan::generator::Config;
+
+/// Speakers by their numbers in the network's table.
+pub struct LearntSpeakers {
+    of: Vec<SpeakerMetadata>,
+    decoders: Vec<PoseDecoder>,
+    bones: Vec<BoneConstancy>,
+}
+
+impl LearntSpeakers {
+    /// Speakers of one network.
+    ///
+    /// # Errors
+    /// None, or as many as the network does not know; other channels, rates or representations than the first one's.
+    pub fn new(of: Vec<SpeakerMetadata>, device: &Device) -> Result<Self> {
+        ensure!(!of.is_empty(), "there is no speaker to learn");
+        let first = &of[0];
+        ensure!(first.network.n_speakers.max(1) == of.len(), "a network of {} speakers", first.network.n_speakers);
+        for other in &of[1..] {
+            let channels = |speaker: &SpeakerMetadata| -> Vec<_> {
+                speaker.normalisation.channels.iter().map(|channel| channel.channel).collect()
+            };
+            ensure!(
+                other.fps == first.fps && channels(other) == channels(first) && other.network == first.network,
+                "{} moves at {}, {} at {}, and one network learns one rate: set [video] fps and make both datasets anew",
+                first.name,
+                first.fps,
+                other.name,
+                other.fps
+            );
+        }
+        let decoder = |of: &SpeakerMetadata| of.representation.decoder(&of.normalisation, DType::F32, device);
+        Ok(Self {
+            decoders: of.iter().map(decoder).collect::<candle_core::Result<_>>()?,
+            bones: of
+                .iter()
+                .map(|of| BoneConstancy::new(&of.normalisation, DType::F32, device))
+                .collect::<candle_core::Result<_>>()?,
+            of,
+        })
+    }
+
+    /// Every one of them.
+    pub fn all(&self) -> &[SpeakerMetadata] {
+        &self.of
+    }
+
+    /// Shape of the network.
+    pub fn network(&self) -> &Config {
+        &self.of[0].network
+    }
+
+    /// Their names.
+    pub fn names(&self) -> String {
+        self.of.iter().map(|of| of.name.as_str()).collect::<Vec<_>>().join(", ")
+    }
+
+    /// Numbers of a pose.
+    pub fn n_numbers(&self) -> usize {
+        self.of[0].normalisation.n_numbers()
+    }
+
+    /// The network's numbers [B, numbers, T] to normalised poses [B, numbers, T]; `speakers` has the number of each window's.
+    pub fn poses(&self, raw: &Tensor, speakers: &[u32]) -> Result<Tensor> {
+        if let [decoder] = &self.decoders[..] {
+            return Ok(decoder.poses(raw)?);
+        }
+        let of_run = |run: Run| Ok(self.decoders[run.speaker].poses(&raw.narrow(0, run.first, run.n)?)?);
+        let poses: Vec<Tensor> = runs(speakers).into_iter().map(of_run).collect::<Result<_>>()?;
+        Ok(Tensor::cat(&poses, 0)?)
+    }
+
+    /// Mean change of the bones' lengths (`BoneConstancy`) of normalised poses [B, numbers, T]; `None` where the
+    /// representation keeps the lengths.
+    pub fn bone_loss(&self, poses: &Tensor, speakers: &[u32]) -> Result<Option<Tensor>> {
+        if self.of[0].representation.keeps_lengths() {
+            return Ok(None);
+        }
+        if let [bones] = &self.bones[..] {
+            return Ok(Some(bones.loss(poses)?));
+        }
+        let mut sum = Tensor::zeros((), poses.dtype(), poses.device())?;
+        for run in runs(speakers) {
+            let loss = self.bones[run.speaker].loss(&poses.narrow(0, run.first, run.n)?)?;
+            sum = (sum + (loss * (run.n as f64 / speakers.len() as f64))?)?;
+        }
+        Ok(Some(sum))
+    }
+}
+
+/// Windows of one speaker that stand side by side in a batch.
+struct Run {
+    speaker: usize,
+    first: usize,
+    n: usize,
+}
+
+fn runs(speakers: &[u32]) -> Vec<Run> {
+    let mut first = 0;
+    let run = |same: &[u32]| {
+        let run = Run { speaker: same[0] as usize, first, n: same.len() };
+        first += same.len();
+        run
+    };
+    speakers.chunk_by(|a, b| a == b).map(run).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::generate::normalisation::Normalisation;
+    use crate::generate::representation::Representation;
+    use ndarray::Array2;
+    use orator_base::types::skeleton::{N_BONES, N_JOINTS};
+    use orator_base::types::time::FrameRate;
+    use orator_nn::gan::generator::Preset;
+    use orator_nn::ops::gradcheck::pattern;
+
+    fn speaker(mean: f32, representation: Representation, n_speakers: usize) -> SpeakerMetadata {
+        let table = |value: f32| Array2::from_shape_fn((N_JOINTS, 3), |(j, k)| value + 0.01 * (j + 2 * k) as f32);
+        let normal = Normalisation::new(&table(mean), &table(0.3), vec![0.1 + mean; N_BONES]);
+        let network = Config { n_speakers, ..Config::from_preset(Preset::Light, normal.n_numbers()) };
+        SpeakerMetadata::new("host", FrameRate::new(15, 1), "", network, normal, representation)
+    }
+
+    /// Each window of a batch comes out as it would alone.
+    #[test]
+    fn every_speaker_has_a_body_of_its_own() -> Result<()> {
+        let bones = || Representation::Bones { mean: vec![0.1; 3 * N_BONES], std: vec![0.5; 3 * N_BONES] };
+        for representation in [bones, || Representation::Positions] {
+            let two = |n_speakers| [0.1, 0.4].map(|mean| speaker(mean, representation(), n_speakers));
+            let both = LearntSpeakers::new(two(2).to_vec(), &Device::Cpu)?;
+            let alone: Vec<LearntSpeakers> =
+                two(0).into_iter().map(|of| LearntSpeakers::new(vec![of], &Device::Cpu)).collect::<Result<_>>()?;
+            let raw = pattern(&[4, 3 * N_BONES, 6], 0.0)?.to_dtype(DType::F32)?;
+            let speakers = [0, 1, 1, 0];
+            let poses = both.poses(&raw, &speakers)?;
+            let mut losses = 0.0;
+            for (i, speaker) in speakers.into_iter().enumerate() {
+                let of = &alone[speaker as usize];
+                let expected = of.poses(&raw.narrow(0, i, 1)?, &[0])?;
+                let own = poses.narrow(0, i, 1)?;
+                assert_eq!(own.flatten_all()?.to_vec1::<f32>()?, expected.flatten_all()?.to_vec1::<f32>()?);
+                let loss = of.bone_loss(&expected, &[0])?;
+                losses += loss.map_or(Ok(0.0), |loss| loss.to_scalar::<f32>())? / 4.0;
+            }
+            let loss = both.bone_loss(&poses, &speakers)?.map_or(Ok(0.0), |loss| loss.to_scalar::<f32>())?;
+            assert!((loss - losses).abs() <= 1e-5 * losses, "{loss} {losses}");
+        }
+        assert!(LearntSpeakers::new(Vec::new(), &Device::Cpu).is_err());
+        let other = SpeakerMetadata { fps: FrameRate::new(25, 1), ..speaker(0.1, bones(), 2) };
+        let error = LearntSpeakers::new(vec![speaker(0.1, bones(), 2), other], &Device::Cpu).err();
+        assert!(error.is_some_and(|error| error.to_string().contains("25")));
+        Ok(())
+    }
+}

@@ -1,0 +1,368 @@
+//! A generator and its discriminator in training: one step, and all of it to a checkpoint and back.
+
+use super::augment;
+use super::average;
+use super::losses;
+use super::recipe::settings::GanSettings;
+use super::score::Validation;
+use super::speakers::LearntSpeakers;
+use super::windows::WindowBatch;
+use crate::generate::model::BEST;
+use crate::generate::model::{GENERATOR, SpeakerMetadata};
+use crate::train::optim::adam;
+use crate::train::optim::adam::Adam;
+use crate::train::resume;
+use anyhow::{Context, Result, ensure};
+use candle_core::{Device, Tensor};
+use orator_dataset::config::{ComputeDevice, GanConfig};
+use orator_formats::checkpoint;
+use orator_formats::checkpoint::Contents;
+use orator_nn::device;
+use orator_nn::gan::discriminator::{Discriminator, motion};
+use orator_nn::gan::generator::Generator;
+use orator_nn::gan::speaker_layer::SPEAKER;
+use orator_nn::ops::resize;
+use orator_nn::params::Params;
+use rand::Rng;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// The generator of the last step, where the generator of the checkpoint is a mean over steps.
+const LAST_STEP: &str = "training.generator.";
+const DISCRIMINATOR: &str = "discriminator.";
+const ADAM_G: &str = "adam.generator.";
+const ADAM_D: &str = "adam.discriminator.";
+/// Tells the random numbers of dropout from the others of a step.
+const DROPOUT: u64 = 0x6472_6f70;
+/// Norm to which the gradient of each network is clipped.
+pub const MAX_NORM: f64 = 10.0;
+/// Loss beyond which a training has exploded.
+const LOSS_LIMIT: f64 = 1e4;
+
+/// Settings that may change between two runs of one training; of the others the checkpoint's count.
+const FREE: [&str; 5] = ["steps", "patience", "checkpoint_every", "keep_checkpoints", "device"];
+
+/// Losses of one step, unweighted, and the norm of the generator's gradient.
+#[derive(Clone, Copy, Debug, serde::Serialize)]
+pub struct Losses {
+    pub l1: f64,
+    /// Not measured where it has no weight.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub speed: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub energy: Option<f64>,
+    pub velocity: f64,
+    pub bone: f64,
+    pub adversarial: f64,
+    pub discriminator: f64,
+    pub gradient_norm: f64,
+}
+
+/// What a checkpoint says beside its tensors.
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+pub struct TrainerState {
+    pub speaker: SpeakerMetadata,
+    /// The others of a training of several.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub other_speakers: Vec<SpeakerMetadata>,
+    pub settings: GanSettings,
+    /// Steps done.
+    pub step: usize,
+    /// Step and score of the best validation so far.
+    pub best: Option<(usize, f32)>,
+}
+
+/// Networks, optimisers and where they are.
+pub struct GanTrainer {
+    pub speakers: LearntSpeakers,
+    pub settings: GanSettings,
+    pub generator: Generator,
+    generator_params: Params,
+    /// Mean of the generator over the steps, where the settings want one.
+    mean: Option<(Generator, Params)>,
+    discriminator: Discriminator,
+    discriminator_params: Params,
+    adam_g: Adam,
+    adam_d: Adam,
+    /// Steps done.
+    pub step: usize,
+    /// Step and score of the best validation so far.
+    pub best: Option<(usize, f32)>,
+}
+
+impl GanTrainer {
+    /// Networks as the seed makes them, for one speaker or several.
+    pub fn new(speakers: Vec<SpeakerMetadata>, settings: GanSettings) -> Result<Self> {
+        let device = device::open(settings.device == ComputeDevice::Cuda)?;
+        let mut generator_params = Params::new(settings.seed).on(&device);
+        let speakers = LearntSpeakers::new(speakers, &device)?;
+        let generator = Generator::new(&mut generator_params, speakers.network())?;
+        let mean = if settings.ema_decay > 0.0 {
+            let mut params = Params::frozen().on(&device);
+            let mean = Generator::new(&mut params, speakers.network())?;
+            params.load(&generator_params.tensors()?)?;
+            Some((mean, params))
+        } else {
+            None
+        };
+        // Another seed, or tensors of the same name would begin alike.
+        let mut discriminator_params = Params::new(!settings.seed).on(&device);
+        let discriminator = Discriminator::new(&mut discriminator_params, speakers.n_numbers())?;
+        let adam = adam::Config { max_norm: Some(MAX_NORM), ..adam::Config::default() };
+        let decaying = adam::Config { weight_decay: settings.weight_decay, ..adam };
+        let share = |name: &str| if name.starts_with(SPEAKER) { 1.0 } else { settings.shared_rate };
+        Ok(Self {
+            adam_g: Adam::with_rates(&generator_params, decaying, share)?,
+            adam_d: Adam::new(&discriminator_params, adam)?,
+            generator_params,
+            generator,
+            mean,
+            discriminator_params,
+            discriminator,
+            speakers,
+            settings,
+            step: 0,
+            best: None,
+        })
+    }
+
+    /// Numbers the optimiser moves in the generator.
+    pub fn n_parameters(&self) -> usize {
+        self.generator_params.n_parameters()
+    }
+
+    /// Where the tensors are.
+    pub fn device(&self) -> &Device {
+        self.generator_params.device()
+    }
+
+    /// One step of the discriminator, then one of the generator, on the same windows.
+    pub fn step(&mut self, batch: &WindowBatch) -> Result<Losses> {
+        self.step_in_phases(batch, &mut |_| ())
+    }
+
+    /// `step`, with a call at the end of each phase, by its name: for measuring where the time goes.
+    pub fn step_in_phases(&mut self, batch: &WindowBatch, phase: &mut dyn FnMut(&'static str)) -> Result<Losses> {
+        let batch = batch.on(self.device())?;
+        let GanSettings { lambda_l1, lambda_speed, lambda_energy, lambda_velocity, lambda_bone, .. } = self.settings;
+        let (lambda_gan, learning_rate) = (self.settings.adversarial_weight(self.step), self.settings.rate(self.step));
+        let raw = self.predict(&batch)?;
+        let generated = self.speakers.poses(&raw, &batch.speakers)?;
+        // Differences count where both frames do, so that a missing joint looks the same in both.
+        let mask = losses::both_seen(&batch.mask)?;
+        let generated_motion = (motion(&generated)? * &mask)?;
+        phase("generator forward");
+
+        let mut of_discriminator = 0.0;
+        let generated_motion = if lambda_gan > 0.0 { self.with_noise(generated_motion, 0)? } else { generated_motion };
+        if lambda_gan > 0.0 {
+            let real_motion = self.with_noise((motion(&batch.poses)? * &mask)?, 1)?;
+            let real_scores = self.discriminator.forward(&real_motion, true)?;
+            let generated_scores = self.discriminator.forward(&generated_motion.detach(), true)?;
+            let loss = losses::discriminator_loss(self.settings.adversarial, &real_scores, &generated_scores)?;
+            of_discriminator = number(&loss)?;
+            self.adam_d.step(&loss.backward()?, learning_rate)?;
+        }
+        phase("discriminator's step");
+
+        let l1 = losses::l1(&generated, &batch.poses, &batch.mask)?;
+        let mut total = (&l1 * lambda_l1)?;
+        let (mut velocity, mut bone, mut adversarial) = (0.0, 0.0, 0.0);
+        let mut add = |loss: Tensor, weight: f64| -> Result<f64> {
+            total = (&total + (&loss * weight)?)?;
+            number(&loss)
+        };
+        let (mut speed, mut energy) = (None, None);
+        if lambda_speed > 0.0 {
+            speed = Some(add(losses::speed(&generated, &batch.poses, &batch.mask)?, lambda_speed)?);
+        }
+        if lambda_energy > 0.0 {
+            energy = Some(add(losses::energy(&generated, &batch.poses, &batch.mask)?, lambda_energy)?);
+        }
+        if lambda_velocity > 0.0 {
+            velocity = add(losses::velocity(&generated, &batch.poses, &batch.mask)?, lambda_velocity)?;
+        }
+        if lambda_bone > 0.0
+            && let Some(loss) = self.speakers.bone_loss(&generated, &batch.speakers)?
+        {
+            bone = add(loss, lambda_bone)?;
+        }
+        if lambda_gan > 0.0 {
+            let scores = self.discriminator.forward(&generated_motion, true)?;
+            adversarial = add(losses::generator_loss(self.settings.adversarial, &scores)?, lambda_gan)?;
+        }
+        phase("generator's losses");
+        let gradients = total.backward()?;
+        phase("generator backward");
+        let gradient_norm = self.adam_g.step(&gradients, learning_rate)?;
+        phase("generator's Adam");
+        if let Some((_, mean)) = &self.mean {
+            average::update(mean, &self.generator_params, self.settings.ema_decay, self.step)?;
+        }
+        self.step += 1;
+        let l1 = number(&l1)?;
+        Ok(Losses { l1, speed, energy, velocity, bone, adversarial, discriminator: of_discriminator, gradient_norm })
+    }
+
+    /// L1 error of the generator that generates on a batch of windows.
+    pub fn error(&self, batch: &WindowBatch) -> Result<f64> {
+        let batch = batch.on(self.device())?;
+        let raw = self.listener().forward(&batch.mels, &batch.speakers, self.settings.window_frames, false)?.detach();
+        number(&losses::l1(&self.speakers.poses(&raw, &batch.speakers)?, &batch.poses, &batch.mask)?)
+    }
+
+    /// Raw poses of a batch while training: channels of the encoded sound are dropped.
+    fn predict(&self, batch: &WindowBatch) -> Result<Tensor> {
+        let (n_frames, dropout) = (self.settings.window_frames, self.settings.dropout);
+        if dropout == 0.0 {
+            return Ok(self.generator.forward(&batch.mels, &batch.speakers, n_frames, true)?);
+        }
+        let encoded = resize::linear(&self.generator.encode(&batch.mels, &batch.speakers, true)?, n_frames)?;
+        let (n_windows, _, n_channels) = encoded.dims3()?;
+        let mut rng = resume::stream(self.settings.seed ^ DROPOUT, self.step);
+        let of = |_| if rng.random_bool(dropout) { 0.0 } else { 1.0 / (1.0 - dropout) as f32 };
+        let kept: Vec<f32> = (0..n_windows * n_channels).map(of).collect();
+        let kept = Tensor::from_vec(kept, (n_windows, 1, n_channels), encoded.device())?;
+        Ok(self.generator.decode(&encoded.broadcast_mul(&kept)?, true)?)
+    }
+
+    /// Motion as the discriminator sees it: noise keeps it from learning the windows by heart (Arjovsky & Bottou 2017).
+    fn with_noise(&self, motion: Tensor, which: u64) -> Result<Tensor> {
+        let std = self.settings.augment_pose_noise;
+        if std == 0.0 {
+            return Ok(motion);
+        }
+        let noise = augment::gaussian(motion.elem_count(), std, self.settings.seed ^ which, self.step);
+        Ok((&motion + Tensor::from_vec(noise, motion.shape(), motion.device())?)?)
+    }
+
+    /// The generator that is validated and generates: the mean over the steps, where there is one.
+    pub fn listener(&self) -> &Generator {
+        self.mean.as_ref().map_or(&self.generator, |(mean, _)| mean)
+    }
+
+    /// Its numbers.
+    fn listener_tensors(&self) -> Result<BTreeMap<String, Tensor>> {
+        Ok(self.mean.as_ref().map_or(&self.generator_params, |(_, params)| params).tensors()?)
+    }
+
+    /// Writes the checkpoint of this step; old ones go.
+    pub fn save(&self, folder: &Path) -> Result<()> {
+        let mut contents = Contents { facts: self.stored()?, tensors: BTreeMap::new() };
+        contents.add(GENERATOR, self.listener_tensors()?);
+        if self.mean.is_some() {
+            contents.add(LAST_STEP, self.generator_params.tensors()?);
+        }
+        contents.add(DISCRIMINATOR, self.discriminator_params.tensors()?);
+        contents.add("", self.adam_g.tensors(ADAM_G)?);
+        contents.add("", self.adam_d.tensors(ADAM_D)?);
+        contents.write(&checkpoint::path(folder, self.step))?;
+        checkpoint::prune(folder, self.settings.keep_checkpoints)
+    }
+
+    /// Writes the generator of this step as the best.
+    pub fn save_best(&self, folder: &Path, validation: &Validation) -> Result<()> {
+        let mut facts = self.stored()?;
+        facts["validation"] = serde_json::to_value(validation)?;
+        let mut contents = Contents { facts, tensors: BTreeMap::new() };
+        contents.add(GENERATOR, self.listener_tensors()?);
+        contents.write(&folder.join(BEST))
+    }
+
+    fn stored(&self) -> Result<Value> {
+        let settings = self.settings.clone();
+        let mut speakers = self.speakers.all().iter().cloned();
+        let speaker = speakers.next().context("a training without a speaker")?;
+        let other_speakers = speakers.collect();
+        Ok(serde_json::to_value(TrainerState { speaker, other_speakers, settings, step: self.step, best: self.best })?)
+    }
+
+    /// Takes over the weights of another speaker's generator, and of the discriminator where its checkpoint has one.
+    /// `layer`: the speaker's layer, tensors by name; `None`: as it is.
+    pub fn begin_with(&self, other: &Contents, layer: Option<&BTreeMap<String, Tensor>>) -> Result<()> {
+        let is_of_speakers = |name: &String| name.starts_with(SPEAKER);
+        let mut generator = other.part(GENERATOR);
+        generator.retain(|name, _| !is_of_speakers(name));
+        generator.extend(self.generator_params.tensors()?.into_iter().filter(|(name, _)| is_of_speakers(name)));
+        generator.extend(layer.into_iter().flatten().map(|(name, tensor)| (name.clone(), tensor.clone())));
+        self.generator_params.load(&generator)?;
+        if let Some((_, mean)) = &self.mean {
+            mean.load(&generator)?;
+        }
+        let discriminator = other.part(DISCRIMINATOR);
+        if !discriminator.is_empty() {
+            self.discriminator_params.load(&discriminator)?;
+        }
+        Ok(())
+    }
+
+    /// Takes up the tensors and the place of a checkpoint.
+    pub fn load(&mut self, stored: &TrainerState, contents: &Contents) -> Result<()> {
+        match &self.mean {
+            Some((_, mean)) => {
+                mean.load(&contents.part(GENERATOR))?;
+                self.generator_params.load(&contents.part(LAST_STEP))?;
+            }
+            None => self.generator_params.load(&contents.part(GENERATOR))?,
+        }
+        self.discriminator_params.load(&contents.part(DISCRIMINATOR))?;
+        self.adam_g.load(ADAM_G, &contents.tensors)?;
+        self.adam_d.load(ADAM_D, &contents.tensors)?;
+        (self.step, self.best) = (stored.step, stored.best);
+        Ok(())
+    }
+}
+
+impl TrainerState {
+    /// What a checkpoint of a training says. Errors when it is none, or of another program's version.
+    pub fn from_checkpoint(contents: &Contents) -> Result<Self> {
+        ensure!(
+            contents.facts["settings"].is_object(),
+            "it is no checkpoint that this version can go on from; choose another --out, or move that folder away"
+        );
+        serde_json::from_value(contents.facts.clone()).context("its facts are not those of this program's version")
+    }
+
+    /// All speakers, in the order of their numbers.
+    pub fn speakers(&self) -> Vec<SpeakerMetadata> {
+        std::iter::once(&self.speaker).chain(&self.other_speakers).cloned().collect()
+    }
+
+    /// The settings to go on with: the checkpoint's, but for those that may change; and a line for each difference.
+    pub fn settings(&self, asked: &GanConfig) -> Result<(GanSettings, Vec<String>)> {
+        resume::settings(&self.settings, asked, "gan", &FREE)
+    }
+}
+
+impl Losses {
+    /// Errors, saying all of them, when one is not finite or has exploded.
+    pub fn check(&self, step: usize) -> Result<()> {
+        let all = [self.l1, self.velocity, self.bone, self.adversarial, self.discriminator];
+        ensure!(
+            all.iter().all(|loss| loss.is_finite() && loss.abs() < LOSS_LIMIT) && self.gradient_norm.is_finite(),
+            "the training broke at step {step}: L1 {}, velocity {}, bone {}, adversarial {}, discriminator {}, norm of the \
+             gradient {}",
+            self.l1,
+            self.velocity,
+            self.bone,
+            self.adversarial,
+            self.discriminator,
+            self.gradient_norm
+        );
+        Ok(())
+    }
+
+    /// A line of the log.
+    pub fn line(&self, step: usize) -> Value {
+        let mut line = json!({ "step": step });
+        if let (Some(line), Ok(Value::Object(losses))) = (line.as_object_mut(), serde_json::to_value(self)) {
+            line.extend(losses);
+        }
+        line
+    }
+}
+
+fn number(scalar: &Tensor) -> Result<f64> {
+    Ok(f64::from(scalar.to_scalar::<f32>()?))
+}

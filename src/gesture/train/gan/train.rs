@@ -1,0 +1,303 @@
+//! Training a speaker's generator against the motion discriminator. The same dataset, settings and
+//! seed give the same checkpoints, also when the training was interrupted: the windows of a step depend on the seed
+//! and the step alone (the place of the loader is the step), everything else is in the checkpoint.
+
+use super::augment;
+use super::batches;
+use super::batches::BatchesAhead;
+use super::begin;
+use super::joined_windows::JoinedWindows;
+use super::recipe::account;
+use super::recipe::material::TrainingMaterial;
+use super::recipe::settings::GanSettings;
+use super::recipe::start::TrainingStart;
+use super::score::Validation;
+use super::start::StartingModel;
+use super::step::{GanTrainer, Losses, TrainerState};
+use super::validate::ValidationIntervals;
+use super::windows::{WindowLoader, needed};
+pub use crate::generate::model::BEST;
+use crate::generate::model::SpeakerMetadata;
+use crate::generate::normalisation::Normalisation;
+use crate::train::epochs::{self, EpochSchedule, StepReport, ValidatedStep, ValidatedTraining};
+use crate::train::no_window;
+use crate::train::resume::{self, sample_windows};
+use anyhow::{Result, ensure};
+use orator_base::stage::progress::Progress;
+use orator_base::stage::workdir::{self, FolderLock};
+use orator_dataset::config::{ComputeDevice, GanConfig};
+use orator_dataset::{Dataset, Split};
+use orator_formats::checkpoint;
+use orator_formats::checkpoint::Contents;
+use orator_nn::cpu::thread_team::with_spinning_workers;
+use orator_nn::device;
+use orator_nn::gan::generator::FRAMES_MULTIPLE;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// How a training ended.
+#[derive(Clone, Debug)]
+pub struct TrainingOutcome {
+    /// Steps of this training altogether, and the step this run began at.
+    pub steps: usize,
+    pub began_at: usize,
+    /// Whether it ended before its last step since the score had not become better for `gan.patience` epochs.
+    pub stopped_early: bool,
+    pub n_windows: usize,
+    pub n_parameters: usize,
+    /// Of the newest checkpoint.
+    pub validation: Validation,
+    pub newest: PathBuf,
+    /// Best by the validation's score.
+    pub best: PathBuf,
+    pub best_step: usize,
+    /// Share of the time of the steps that they waited for their batch, 0..1; validation and checkpoints do not count.
+    pub waiting: f64,
+}
+
+/// Trains on `dataset` until `wanted.steps`, going on from the newest checkpoint in `folder`; what the settings of that
+/// checkpoint say counts, and differences are reported.
+///
+/// # Errors
+/// No window to train on; a checkpoint of another speaker or version; another training at work in `folder`; a loss that
+/// is not finite or explodes (the last good checkpoint stays); `StoppedTraining` where `progress` asks for an end.
+pub fn train(
+    dataset: &Dataset,
+    requested: &GanConfig,
+    folder: &Path,
+    progress: &dyn Progress,
+) -> Result<TrainingOutcome> {
+    train_watched(&[dataset], requested, None, folder, progress, &mut |_| ())
+}
+
+/// [`train`] of one speaker or several, a dataset each, with a call behind each validation, when log and checkpoints are
+/// written. `from`: the checkpoint of another speaker, or its folder, that a training begins with; one that goes on has
+/// begun.
+pub fn train_watched(
+    datasets: &[&Dataset],
+    requested: &GanConfig,
+    from: Option<&Path>,
+    folder: &Path,
+    progress: &dyn Progress,
+    validated: &mut dyn FnMut(ValidatedStep),
+) -> Result<TrainingOutcome> {
+    check(requested)?;
+    begin::check(datasets)?;
+    // Others may listen to the model while it learns, and nobody may forget it.
+    let _model = FolderLock::shared(folder)?;
+    let _lock = workdir::lock(folder)?;
+    let resumed = resume(datasets, requested, folder, progress)?;
+    let start = from.filter(|_| resumed.is_none()).map(StartingModel::read).transpose()?;
+    if let Some(start) = &start {
+        progress.say(&format!("beginning with {}", start.account()));
+    }
+    let window_frames = resumed.as_ref().map_or(requested.window_frames, |(stored, _)| stored.settings.window_frames);
+    // Before the statistics, of which an empty split has none.
+    datasets.iter().try_for_each(|dataset| no_window::ensure_window(dataset, needed(window_frames)))?;
+    let (settings, normals) = match &resumed {
+        Some((stored, _)) => {
+            (stored.settings.clone(), stored.speakers().into_iter().map(|of| of.normalisation).collect())
+        }
+        None => {
+            let material = TrainingMaterial::measure(datasets, window_frames);
+            let begins_with = start.as_ref().map_or(TrainingStart::Nothing, |start| start.kind(datasets.len()));
+            let settings = GanSettings::new(requested, &material, begins_with);
+            let normal = |dataset: &&Dataset| begin::normalisation_with_channels(dataset, &requested.channels);
+            (settings, datasets.iter().map(normal).collect::<Result<Vec<_>>>()?)
+        }
+    };
+    let spoken: Vec<(&Dataset, Normalisation)> = datasets.iter().copied().zip(normals).collect();
+    let loaders: Vec<WindowLoader> = spoken
+        .iter()
+        .map(|(dataset, normal)| {
+            WindowLoader::load(dataset, Split::Train, normal, settings.window_frames, settings.stride_frames)
+        })
+        .collect::<Result<_>>()?;
+    let n_windows: usize = loaders.iter().map(WindowLoader::len).sum();
+    let places: Vec<String> = datasets.iter().map(|dataset| dataset.dir().display().to_string()).collect();
+    let places = places.join(", ");
+    progress.say(&format!("{n_windows} windows of {places}; what is learnt goes to {}", folder.display()));
+    let held_out = ValidationIntervals::load(&spoken, &settings, progress)?;
+    let metadata = |((dataset, normal), loader): (&(&Dataset, Normalisation), &WindowLoader)| {
+        begin::metadata(dataset, normal, loader, &settings, datasets.len())
+    };
+    let speakers: Vec<SpeakerMetadata> = match &resumed {
+        Some((stored, _)) => stored.speakers(),
+        None => spoken.iter().zip(&loaders).map(metadata).collect::<Result<_>>()?,
+    };
+    let loader = JoinedWindows::new(loaders);
+    let mut trainer = match &start {
+        None => GanTrainer::new(speakers, settings)?,
+        Some(start) => start.begin(speakers, settings, &loader)?,
+    };
+    if let Some((stored, contents)) = &resumed {
+        trainer.load(stored, contents)?;
+        // One too many is left by a kill before the oldest was removed.
+        checkpoint::prune(folder, trainer.settings.keep_checkpoints)?;
+    }
+    if resumed.is_none() {
+        let material = TrainingMaterial::measure(datasets, window_frames);
+        let secs_a_step = secs_a_step(&trainer, &loader)?;
+        account::lines(&trainer.settings, &material, secs_a_step).iter().for_each(|line| progress.say(line));
+    }
+    let settings = trainer.settings.clone();
+    let batch = |step: usize| {
+        let which = sample_windows(settings.seed, step, settings.batch, loader.len());
+        loader.batch_changed(&which, &augment::changes(&settings, step, loader.fps()))
+    };
+    let (end, waiting) = batches::read_ahead(settings.steps, &batch, |batches| {
+        let mut training = GanTraining {
+            names: trainer.speakers.names(),
+            has_learnt: start.is_some(),
+            trainer: &mut trainer,
+            batches,
+            held_out: &held_out,
+            stepping: Duration::ZERO,
+            waiting: Duration::ZERO,
+        };
+        let end = with_spinning_workers(|| epochs::run(&mut training, folder, progress, validated))?;
+        Ok((end, training.waiting.as_secs_f64() / training.stepping.as_secs_f64().max(1e-9)))
+    })?;
+    Ok(TrainingOutcome {
+        steps: trainer.step,
+        began_at: end.began_at,
+        stopped_early: end.stopped_early,
+        n_windows: loader.len(),
+        n_parameters: trainer.n_parameters(),
+        validation: end.validation,
+        newest: end.newest,
+        best: folder.join(BEST),
+        best_step: end.best_step,
+        waiting,
+    })
+}
+
+/// Seconds of a step on this machine, measured on networks that are dropped; `None` of a training of few steps.
+fn secs_a_step(trainer: &GanTrainer, loader: &JoinedWindows) -> Result<Option<f64>> {
+    const FEW: usize = 100;
+    if trainer.settings.steps < FEW {
+        return Ok(None);
+    }
+    let mut trial = GanTrainer::new(trainer.speakers.all().to_vec(), trainer.settings.clone())?;
+    let which = sample_windows(trial.settings.seed, 0, trial.settings.batch, loader.len());
+    let batch = loader.batch_changed(&which, &[])?;
+    with_spinning_workers(|| {
+        trial.step(&batch)?;
+        let start = Instant::now();
+        trial.step(&batch)?;
+        trial.step(&batch)?;
+        Ok(Some(start.elapsed().as_secs_f64() / 2.0))
+    })
+}
+
+/// A trainer with its windows.
+struct GanTraining<'a, 'b> {
+    names: String,
+    /// Whether it begins with another model.
+    has_learnt: bool,
+    trainer: &'a mut GanTrainer,
+    batches: &'a mut BatchesAhead<'b>,
+    held_out: &'a ValidationIntervals,
+    /// Time of the steps, and of it until their batches were there.
+    stepping: Duration,
+    waiting: Duration,
+}
+
+impl ValidatedTraining for GanTraining<'_, '_> {
+    type Validation = Validation;
+
+    fn names(&self) -> (&str, &'static str) {
+        (&self.names, "gan")
+    }
+
+    fn schedule(&self) -> EpochSchedule {
+        let GanSettings { steps, epoch_steps, checkpoint_every, patience, .. } = self.trainer.settings;
+        EpochSchedule { steps, epoch_steps, checkpoint_every, patience }
+    }
+
+    fn has_learnt(&self) -> bool {
+        self.has_learnt
+    }
+
+    fn n_done(&self) -> usize {
+        self.trainer.step
+    }
+
+    fn best(&mut self) -> &mut Option<(usize, f32)> {
+        &mut self.trainer.best
+    }
+
+    fn step(&mut self) -> Result<StepReport> {
+        let before = Instant::now();
+        let batch = self.batches.take(self.trainer.step)?;
+        self.waiting += before.elapsed();
+        let losses = self.trainer.step(&batch)?;
+        self.stepping += before.elapsed();
+        losses.check(self.trainer.step)?;
+        let Losses { l1, adversarial, discriminator, .. } = losses;
+        let words = format!("L1 {l1:.3} adv {adversarial:.3} D {discriminator:.3}");
+        Ok(StepReport { line: losses.line(self.trainer.step), words })
+    }
+
+    fn validate(&self) -> Result<Validation> {
+        self.held_out.validate(self.trainer)
+    }
+
+    fn judged(validation: &Validation) -> (f64, Option<&str>) {
+        (validation.score, validation.alarm.as_deref())
+    }
+
+    fn words(validation: &Validation) -> String {
+        validation.words()
+    }
+
+    fn save(&self, folder: &Path) -> Result<()> {
+        self.trainer.save(folder)
+    }
+
+    fn save_best(&self, folder: &Path, validation: &Validation) -> Result<()> {
+        self.trainer.save_best(folder, validation)
+    }
+}
+
+/// The newest checkpoint, and what it says with the settings that count now. Tells where these differ from `requested`.
+fn resume(
+    datasets: &[&Dataset],
+    requested: &GanConfig,
+    folder: &Path,
+    progress: &dyn Progress,
+) -> Result<Option<(TrainerState, Contents)>> {
+    resume::newest(folder, progress, |contents| {
+        let mut stored = TrainerState::from_checkpoint(contents)?;
+        let (settings, mut differences) = stored.settings(requested)?;
+        stored.settings = settings;
+        let n_stored = 1 + stored.other_speakers.len();
+        ensure!(
+            n_stored == datasets.len(),
+            "it is of {n_stored} speakers, and this training has {}; choose another --out",
+            datasets.len()
+        );
+        let speakers = std::iter::once(&mut stored.speaker).chain(&mut stored.other_speakers);
+        for (metadata, dataset) in speakers.zip(datasets) {
+            begin::go_on(metadata, dataset, &mut differences)?;
+        }
+        Ok((stored, differences))
+    })
+}
+
+fn check(settings: &GanConfig) -> Result<()> {
+    ensure!(
+        settings.window_frames > 0 && settings.window_frames.is_multiple_of(FRAMES_MULTIPLE),
+        "gan.window_frames is {}: it must be a multiple of {FRAMES_MULTIPLE}",
+        settings.window_frames
+    );
+    if let Some(batch) = settings.batch.given() {
+        ensure!(batch > 1, "gan.batch is {batch}: batch norm needs at least 2 windows");
+    }
+    ensure!(
+        settings.checkpoint_every > 0 && settings.epoch_steps.given() != Some(0) && settings.stride_frames > 0,
+        "gan.checkpoint_every, gan.epoch_steps and gan.stride_frames must be at least 1"
+    );
+    device::open(settings.device == ComputeDevice::Cuda)?;
+    Ok(())
+}

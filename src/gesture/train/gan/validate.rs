@@ -1,0 +1,199 @@
+//! The generator on held-out intervals, each heard whole as in generation and judged in blocks of a window's length,
+//! beside the pose that never moves from the mean.
+
+use super::block_metrics::{
+    AngleSums, BlockErrors, BlockSettings, BlockSpread, HeldOutBlock, NormalisedBlock, PredictorSums, RunningMean,
+    bone_changes, mean_error, reduction,
+};
+use super::recipe::settings::GanSettings;
+use super::score;
+use super::score::Validation;
+use super::step::GanTrainer;
+use super::windows::{WindowBatch, WindowLoader, needed};
+use crate::generate::normalisation::{N_FEATURES, Normalisation};
+use crate::metrics::distribution::frechet;
+use crate::train::no_window;
+use anyhow::{Context, Result};
+use candle_core::Tensor;
+use ndarray::{Array2, Array3, ArrayView2};
+use orator_base::stage::progress::Progress;
+use orator_base::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_WRIST};
+use orator_dataset::{Dataset, Split};
+use orator_nn::gan::generator::FRAMES_MULTIPLE;
+
+/// Most frames a validation looks at (18 minutes at 15 fps), and most that are heard at once.
+const MOST_FRAMES: usize = 16_384;
+const PIECE: usize = 2_048;
+
+/// The intervals to validate on.
+pub struct ValidationIntervals {
+    split: Split,
+    /// Frames of a block.
+    n_frames: usize,
+    /// One interval, or a part of a long one, each: [1, ...], the sound longer than the poses by less than 32 frames.
+    pieces: Vec<WindowBatch>,
+    settings: BlockSettings,
+}
+
+impl ValidationIntervals {
+    /// Intervals of the validation splits, evenly chosen where they are many, or where one has none of its training split,
+    /// which is said. The speakers have their numbers in the order of `datasets`.
+    pub fn load(
+        datasets: &[(&Dataset, Normalisation)],
+        settings: &GanSettings,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let mut all: Option<Self> = None;
+        for (speaker, (dataset, normal)) in (0..).zip(datasets) {
+            let most = MOST_FRAMES / datasets.len();
+            let own = Self::of_speaker(dataset, settings, normal, speaker, most, progress)?;
+            all = Some(match all {
+                None => own,
+                Some(mut all) => {
+                    all.pieces.extend(own.pieces);
+                    all.settings.joints.retain(|joint| own.settings.joints.contains(joint));
+                    all.split = if own.split == Split::Train { own.split } else { all.split };
+                    all
+                }
+            });
+        }
+        all.context("there is no speaker to validate on")
+    }
+
+    fn of_speaker(
+        dataset: &Dataset,
+        settings: &GanSettings,
+        normal: &Normalisation,
+        speaker: u32,
+        most_frames: usize,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let n_frames = settings.window_frames;
+        let mut split = Split::Validation;
+        let mut loader = WindowLoader::load(dataset, split, normal, n_frames, n_frames)?;
+        if loader.is_empty() {
+            let cause = no_window::cause(dataset, split, needed(n_frames)).unwrap_or_default();
+            progress.say(&format!("no window is held out, the figures below are on those to train on: {cause}"));
+            split = Split::Train;
+            loader = WindowLoader::load(dataset, split, normal, n_frames, n_frames)?;
+        }
+        let longest = PIECE.max(n_frames);
+        let parts: Vec<_> = loader.parts(longest).into_iter().filter(|part| part.1.len() >= n_frames).collect();
+        let all: usize = parts.iter().map(|part| part.1.len()).sum();
+        let n = (parts.len() * most_frames).div_ceil(all.max(most_frames)).min(parts.len());
+        let chosen = (0..n).map(|i| parts[i * parts.len() / n].clone());
+        let piece =
+            |(interval, frames)| anyhow::Ok(WindowBatch { speakers: vec![speaker], ..loader.part(interval, frames)? });
+        let pieces: Vec<WindowBatch> = chosen.map(piece).collect::<Result<_>>()?;
+        let mut masks = Vec::new();
+        for piece in &pieces {
+            masks.push(joints_seen(features(&piece.mask, 0)?.view()));
+        }
+        let joints = frechet::joints(masks.iter().map(|mask| mask.view()));
+        Ok(Self { split, n_frames, pieces, settings: BlockSettings { fps: dataset.info().fps, joints } })
+    }
+
+    /// Both predictors on the same blocks.
+    pub fn validate(&self, trainer: &GanTrainer) -> Result<Validation> {
+        let (generator, speakers) = (trainer.listener(), trainer.speakers.all());
+        let (mut predicted, mut mean_pose, mut ground_truth) =
+            (PredictorSums::default(), PredictorSums::default(), PredictorSums::default());
+        let (mut change, mut spread) = (RunningMean::default(), BlockSpread::default());
+        let mut errors: Vec<BlockErrors> = speakers.iter().map(|_| BlockErrors::default()).collect();
+        let channels = &speakers[0].normalisation.channels;
+        let mut angles: Vec<AngleSums> = channels.iter().map(|_| AngleSums::default()).collect();
+        let mut n_windows = 0;
+        for piece in &self.pieces {
+            let piece = &piece.on(trainer.device())?;
+            let n_heard = piece.poses.dim(2)?.next_multiple_of(FRAMES_MULTIPLE);
+            let Some(speaker) = piece.speakers.first().map(|speaker| *speaker as usize) else { continue };
+            let normal = &speakers[speaker].normalisation;
+            let raw = generator.forward(&piece.mels, &piece.speakers, n_heard, false)?.detach();
+            let poses = trainer.speakers.poses(&raw, &piece.speakers)?;
+            let batch = &WindowBatch {
+                mels: piece.mels.clone(),
+                poses: self.blocks(&piece.poses)?,
+                mask: self.blocks(&piece.mask)?,
+                speakers: piece.speakers.clone(),
+            };
+            let poses = self.blocks(&poses.narrow(2, 0, piece.poses.dim(2)?)?)?;
+            for (n, (of, sums)) in normal.channels.iter().zip(&mut angles).enumerate() {
+                sums.add(&poses, batch, N_FEATURES + 3 * n, of.std)?;
+            }
+            let mean_pose_block = joints(&poses.zeros_like()?, 0, normal)?;
+            for i in 0..poses.dim(0)? {
+                let block = block(&poses, batch, i, normal)?;
+                predicted.add(block.predicted.view(), &block, &self.settings);
+                mean_pose.add(mean_pose_block.view(), &block, &self.settings);
+                ground_truth.add(block.ground_truth.view(), &block, &self.settings);
+                change.add(bone_changes(block.predicted.view()));
+                spread.add(&block);
+                errors[speaker].push(NormalisedBlock {
+                    predicted: features(&poses, i)?,
+                    ground_truth: features(&batch.poses, i)?,
+                    mask: features(&batch.mask, i)?,
+                });
+                n_windows += 1;
+            }
+        }
+        // Another sound is one of the same speaker.
+        let [own, still, other] = errors.iter().map(BlockErrors::by_block).fold([const { Vec::new() }; 3], joined);
+        let generator = predicted.metrics(&ground_truth, mean_error(&own));
+        let mean_pose = mean_pose.metrics(&ground_truth, mean_error(&still));
+        let other_sound = mean_error(&other);
+        Ok(Validation {
+            split: self.split.name().to_owned(),
+            n_windows,
+            n_poses: ground_truth.poses.n,
+            generator,
+            mean_pose,
+            other_sound,
+            below_mean_pose: Some(reduction(&own, &still)),
+            below_other_sound: Some(reduction(&own, &other)),
+            channels: channels.iter().zip(&angles).map(|(of, sums)| (of.channel, sums.error())).collect(),
+            bone_change_mm: 1e3 * change.mean(),
+            spread: spread.share(),
+            score: score::score(&generator, &mean_pose, other_sound),
+            alarm: score::alarm(generator.energy, spread.share()),
+        })
+    }
+
+    /// Numbers [1, numbers, T] as blocks [n, numbers, frames of a block]; what is left at the end has no say.
+    fn blocks(&self, numbers: &Tensor) -> Result<Tensor> {
+        let (_, n_numbers, n_frames) = numbers.dims3()?;
+        let n = n_frames / self.n_frames;
+        let whole = numbers.narrow(2, 0, n * self.n_frames)?.reshape((n_numbers, n, self.n_frames))?;
+        Ok(whole.transpose(0, 1)?.contiguous()?)
+    }
+}
+
+/// Figures by block of one speaker behind those of others.
+fn joined(mut all: [Vec<[f64; 2]>; 3], own: [Vec<[f64; 2]>; 3]) -> [Vec<[f64; 2]>; 3] {
+    all.iter_mut().zip(own).for_each(|(all, own)| all.extend(own));
+    all
+}
+
+fn block(predicted: &Tensor, batch: &WindowBatch, i: usize, normal: &Normalisation) -> Result<HeldOutBlock> {
+    let mask = joints_seen(features(&batch.mask, i)?.view());
+    Ok(HeldOutBlock { predicted: joints(predicted, i, normal)?, ground_truth: joints(&batch.poses, i, normal)?, mask })
+}
+
+fn joints(poses: &Tensor, i: usize, normal: &Normalisation) -> Result<Array3<f32>> {
+    Ok(normal.joints(features(poses, i)?.view()))
+}
+
+fn features(x: &Tensor, i: usize) -> Result<Array2<f32>> {
+    let values = x.get(i)?.flatten_all()?.to_vec1::<f32>()?;
+    let n_numbers = x.dim(1)?;
+    Ok(Array2::from_shape_vec((n_numbers, values.len() / n_numbers), values)?)
+}
+
+/// Mask of numbers [144 or more, T] to mask of joints [T, 49]; the hand roots are seen where the wrists are.
+fn joints_seen(mask: ArrayView2<f32>) -> Array2<bool> {
+    Array2::from_shape_fn((mask.ncols(), N_JOINTS), |(t, joint)| match joint {
+        NECK => true,
+        L_HAND => mask[[3 * (L_WRIST - 1), t]] > 0.0,
+        R_HAND => mask[[3 * (R_WRIST - 1), t]] > 0.0,
+        _ => mask[[3 * (joint - 1), t]] > 0.0,
+    })
+}

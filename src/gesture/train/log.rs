@@ -1,0 +1,118 @@
+//! The log of a training: `metrics.jsonl`, one JSON object a line, each with its `step`, and the same numbers as an event
+//! file for TensorBoard. A resumed training drops the lines that its checkpoint has not seen, so that both files are
+//! those of an undisturbed training.
+
+use anyhow::{Context, Result};
+use orator_base::stage::workdir;
+use orator_formats::tfevents;
+use serde_json::Value;
+use std::fs::{File, OpenOptions};
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+/// The lines, in the folder of a training.
+pub const FILE: &str = "metrics.jsonl";
+
+/// The open log.
+pub struct MetricsLog {
+    lines: AppendedFile,
+    events: Option<AppendedFile>,
+}
+
+impl MetricsLog {
+    /// Opens the log in `folder`, made if missing, with the lines up to `step`.
+    pub fn open(folder: &Path, step: usize) -> Result<Self> {
+        let mut log = Self::lines_alone(&folder.join(FILE), step)?;
+        let records = read(folder)?.iter().filter_map(tfevents::record).collect();
+        let start = [vec![tfevents::first()], records].concat().concat();
+        log.events = Some(AppendedFile::open(&folder.join(tfevents::FILE), &start)?);
+        Ok(log)
+    }
+
+    /// Opens the file `path` as a log without events.
+    pub fn lines_alone(path: &Path, step: usize) -> Result<Self> {
+        let text = text(path)?;
+        // A training without a checkpoint begins anew, with its validation before the first step.
+        let seen = |line: &&str| step > 0 && parsed(line).is_some_and(|line| step_of(&line) <= step as u64);
+        let kept: String = text.lines().filter(seen).map(|line| format!("{line}\n")).collect();
+        Ok(Self { lines: AppendedFile::open(path, kept.as_bytes())?, events: None })
+    }
+
+    /// Adds a line.
+    pub fn write(&mut self, line: &Value) -> Result<()> {
+        let text = line.to_string();
+        self.lines.add(format!("{text}\n").as_bytes())?;
+        // From the text, as on resuming: a number read back may differ in its last digit.
+        match (&mut self.events, parsed(&text).as_ref().and_then(tfevents::record)) {
+            (Some(events), Some(record)) => events.add(&record),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The whole lines of the log in `folder`, none where there is no log.
+pub fn read(folder: &Path) -> Result<Vec<Value>> {
+    Ok(text(&folder.join(FILE))?.lines().filter_map(parsed).collect())
+}
+
+fn text(path: &Path) -> Result<String> {
+    match std::fs::read_to_string(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(String::new()),
+        text => text.with_context(|| format!("cannot read {}", path.display())),
+    }
+}
+
+/// A line of a log; `None` of half a line.
+fn parsed(line: &str) -> Option<Value> {
+    serde_json::from_str::<Value>(line).ok().filter(|line| line["step"].is_u64())
+}
+
+fn step_of(line: &Value) -> u64 {
+    line["step"].as_u64().unwrap_or(u64::MAX)
+}
+
+/// A file that only grows.
+struct AppendedFile {
+    path: PathBuf,
+    file: File,
+}
+
+impl AppendedFile {
+    fn open(path: &Path, start: &[u8]) -> Result<Self> {
+        workdir::write_file(path, start)?;
+        let file = OpenOptions::new().append(true).open(path);
+        Ok(Self { file: file.with_context(|| format!("cannot write {}", path.display()))?, path: path.to_owned() })
+    }
+
+    fn add(&mut self, bytes: &[u8]) -> Result<()> {
+        self.file.write_all(bytes).with_context(|| format!("cannot write {}", self.path.display()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn resuming_drops_what_the_checkpoint_has_not_seen() -> Result<()> {
+        let (folder, other) = (tempfile::tempdir()?, tempfile::tempdir()?);
+        let mut log = MetricsLog::open(folder.path(), 0)?;
+        for step in [10, 20, 30] {
+            log.write(&json!({"step": step, "l1": 0.1 + 0.2}))?;
+        }
+        log.lines.add(b"{\"step\": 40, \"l")?;
+        if let Some(events) = &mut log.events {
+            events.add(&[1, 2, 3])?;
+        }
+        MetricsLog::open(folder.path(), 20)?.write(&json!({"step": 30, "l1": 0.25}))?;
+        let bytes = |folder: &Path, file: &str| std::fs::read(folder.join(file));
+        let text = bytes(folder.path(), FILE)?;
+        let expected = "{\"step\":10,\"l1\":0.30000000000000004}\n{\"step\":20,\"l1\":0.30000000000000004}\n{\"step\":30,\"l1\":0.25}\n";
+        assert_eq!(text, expected.as_bytes());
+        let mut undisturbed = MetricsLog::open(other.path(), 0)?;
+        read(folder.path())?.iter().try_for_each(|line| undisturbed.write(line))?;
+        assert_eq!(bytes(folder.path(), tfevents::FILE)?, bytes(other.path(), tfevents::FILE)?);
+        Ok(())
+    }
+}

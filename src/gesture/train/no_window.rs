@@ -1,0 +1,77 @@
+//! Why a split of a dataset gives no window to train or validate on, and what mends it.
+
+use anyhow::{Result, bail};
+use orator_base::stage::counted;
+use orator_dataset::info::DatasetInfo;
+use orator_dataset::{Dataset, Split};
+
+/// What is cut out of the intervals of a dataset.
+#[derive(Clone, Copy, Debug)]
+pub struct NeededFrames {
+    /// What it is called: "a window".
+    pub name: &'static str,
+    pub n_frames: usize,
+    /// Key of the configuration that says how long it is, and what its values are multiples of.
+    pub key: Option<(&'static str, usize)>,
+}
+
+/// Errors where the training split has no interval that is long enough, with cause and remedy.
+pub fn ensure_window(dataset: &Dataset, needed: NeededFrames) -> Result<()> {
+    match cause(dataset, Split::Train, needed) {
+        Some(cause) => bail!("{}: nothing to train on: {cause}", dataset.dir().display()),
+        None => Ok(()),
+    }
+}
+
+/// Why `split` has no interval that is long enough, with the numbers and what mends it; `None`: it has one.
+pub fn cause(dataset: &Dataset, split: Split, needed: NeededFrames) -> Option<String> {
+    let samples = dataset.samples(split);
+    let Some(longest) = samples.iter().map(|sample| sample.n_frames).max() else {
+        return Some(empty(dataset.info(), split));
+    };
+    if longest >= needed.n_frames {
+        return None;
+    }
+    let fps = dataset.info().fps;
+    let long = |n_frames| format!("{n_frames} frames ({:.1} s)", fps.secs(n_frames));
+    let NeededFrames { name, n_frames, key } = needed;
+    let shorter = key.map(|(key, multiple)| (key, longest / multiple * multiple)).filter(|(_, frames)| *frames > 0);
+    let remedy = match shorter {
+        Some((key, frames)) => format!("`--set {key}={frames}` asks for shorter ones"),
+        None => {
+            "footage with longer stretches of speech mends it, and `orator report` shows what ended these".to_owned()
+        }
+    };
+    let found = match samples.len() {
+        1 => format!("the only interval of the {} split has {}", split.name(), long(longest)),
+        n => format!("the longest of the {n} intervals of the {} split has {}", split.name(), long(longest)),
+    };
+    Some(format!("{found}, {name} needs {}; {remedy}", long(n_frames)))
+}
+
+/// That a split is empty, what the others hold, and the line that fills it.
+fn empty(info: &DatasetInfo, split: Split) -> String {
+    let (mut others, mut is_all_empty) = (Vec::new(), true);
+    for other in Split::ALL.into_iter().filter(|other| *other != split) {
+        let (n, secs) = info.splits.get(other.name()).map_or((0, 0.0), |split| (split.samples, split.secs));
+        is_all_empty &= n == 0;
+        others.push(format!("{} {} of {secs:.1} s", other.name(), counted(n, "interval")));
+    }
+    let name = split.name();
+    // What the models of `orator run` saw comes from videos; imports and captures have none.
+    let remedy = if is_all_empty {
+        "add footage, and `orator report` shows what was refused".to_owned()
+    } else if info.models.is_empty() {
+        "import it again with other shares (`--validation`, `--test`), or more of it".to_owned()
+    } else {
+        let longest = info.videos.iter().filter(|video| video.samples > 0).max_by(|a, b| a.secs.total_cmp(&b.secs));
+        let named = longest.map_or(String::new(), |video| format!("{name} = [{:?}]", video.file));
+        match split {
+            Split::Train => format!(
+                "write  {named}  under [[speaker]], or  split_by = \"time\"  under [dataset], then `orator run` again"
+            ),
+            _ => "write  split_by = \"time\"  under [dataset] and `orator run` again, or add videos".to_owned(),
+        }
+    };
+    format!("the {name} split is empty ({}); {remedy}", others.join(", "))
+}

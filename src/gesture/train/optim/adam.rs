@@ -1,0 +1,360 @@
+//! Adam (Kingma & Ba 2015), optionally AMSGrad (Reddi 2018), with moments that can be saved, and clipping of the
+//! gradient's norm. One pass over the memory of each tensor; the same bits for any number of threads.
+
+use super::adam_fallback;
+use super::adam_fallback::AdamScalars;
+use anyhow::{Context, ensure};
+use candle_core::backprop::GradStore;
+use candle_core::{CpuStorage, Device, InplaceOp2, Layout, Result, Tensor, Var};
+use orator_nn::cpu::thread_team::{parallel_for, parallel_map};
+use orator_nn::params::Params;
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+
+/// Numbers one task updates.
+const GRAIN: usize = 32 * 1024;
+
+/// The optimiser's settings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Config {
+    pub beta1: f64,
+    pub beta2: f64,
+    pub eps: f64,
+    /// Divide by the largest second moment seen so far instead of the present one.
+    pub amsgrad: bool,
+    /// Gradients with a larger Euclidean norm, over all tensors together, are scaled down to it.
+    pub max_norm: Option<f64>,
+    /// Share of each weight (a tensor of two axes or more) that a step of rate 1 takes away (Loshchilov & Hutter 2019).
+    pub weight_decay: f64,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self { beta1: 0.9, beta2: 0.999, eps: 1e-8, amsgrad: false, max_norm: None, weight_decay: 0.0 }
+    }
+}
+
+/// Moves the trainable tensors of one [`Params`].
+pub struct Adam {
+    config: Config,
+    /// Updates done.
+    step: u64,
+    slots: Vec<AdamSlot>,
+}
+
+struct AdamSlot {
+    name: String,
+    var: Var,
+    /// Of the learning rate.
+    share: f64,
+    moments: MomentStorage,
+}
+
+/// Where the moments are.
+enum MomentStorage {
+    Cpu(RefCell<AdamMoments>),
+    /// Elsewhere, beside their tensor.
+    Device(adam_fallback::DeviceMoments),
+}
+
+/// First moment, second moment, largest second moment (empty without AMSGrad).
+#[derive(Clone, Default)]
+struct AdamMoments {
+    first: Vec<f32>,
+    second: Vec<f32>,
+    largest: Vec<f32>,
+}
+
+impl Adam {
+    /// Moments of zero for every trainable tensor (f32).
+    pub fn new(params: &Params, config: Config) -> Result<Self> {
+        Self::with_rates(params, config, |_| 1.0)
+    }
+
+    /// As `new`, with a share of the learning rate for each tensor by its name; one of 0 stays as it is.
+    pub fn with_rates(params: &Params, config: Config, share: impl Fn(&str) -> f64) -> Result<Self> {
+        let moments = |var: &Var| -> Result<MomentStorage> {
+            if !var.device().is_cpu() {
+                return Ok(MomentStorage::Device(adam_fallback::DeviceMoments::zeros(var, config.amsgrad)?));
+            }
+            let zeros = vec![0.0; var.elem_count()];
+            let largest = if config.amsgrad { zeros.clone() } else { Vec::new() };
+            Ok(MomentStorage::Cpu(RefCell::new(AdamMoments { first: zeros.clone(), second: zeros, largest })))
+        };
+        let slot = |(name, var): (&str, &Var)| -> Result<AdamSlot> {
+            Ok(AdamSlot { name: name.to_owned(), var: var.clone(), share: share(name), moments: moments(var)? })
+        };
+        Ok(Self { config, step: 0, slots: params.trainables().map(slot).collect::<Result<_>>()? })
+    }
+
+    /// One update at this learning rate. A tensor without gradient stays. Returns the gradient's norm before
+    /// clipping; when that is not finite nothing is changed.
+    pub fn step(&mut self, gradients: &GradStore, learning_rate: f64) -> Result<f64> {
+        let gradients: Vec<Option<Tensor>> = self
+            .slots
+            .iter()
+            .map(|slot| gradients.get(&slot.var).map(Tensor::contiguous).transpose())
+            .collect::<Result<_>>()?;
+        let mut squares = 0.0;
+        for gradient in gradients.iter().flatten() {
+            squares += match gradient.device().is_cpu() {
+                true => orator_nn::cpu::tensor::read::<f32, _>(gradient, |g| Ok(sum_of_squares(g)))?,
+                false => adam_fallback::sum_of_squares(gradient)?,
+            };
+        }
+        let norm = squares.sqrt();
+        if !norm.is_finite() {
+            return Ok(norm);
+        }
+        self.step += 1;
+        let Config { beta1, beta2, eps, max_norm, weight_decay, .. } = self.config;
+        let age = self.step.min(i32::MAX as u64) as i32;
+        let scale = max_norm.map_or(1.0, |max| if norm > max { max / norm } else { 1.0 });
+        let scalars = AdamScalars {
+            beta1: beta1 as f32,
+            beta2: beta2 as f32,
+            eps: eps as f32,
+            scale: scale as f32,
+            rate: 0.0,
+            correction: (1.0 / (1.0 - beta2.powi(age))).sqrt() as f32,
+            keep: 1.0,
+        };
+        for (slot, gradient) in self.slots.iter_mut().zip(&gradients) {
+            let Some(gradient) = gradient.as_ref().filter(|_| slot.share > 0.0) else { continue };
+            let keep = if slot.var.rank() > 1 { 1.0 - learning_rate * slot.share * weight_decay } else { 1.0 };
+            let rate = learning_rate * slot.share / (1.0 - beta1.powi(age));
+            let scalars = AdamScalars { rate: rate as f32, keep: keep as f32, ..scalars };
+            match &mut slot.moments {
+                MomentStorage::Cpu(moments) => slot.var.inplace_op2(gradient, &AdamUpdate { moments, scalars })?,
+                MomentStorage::Device(moments) => moments.update(&slot.var, gradient, &scalars)?,
+            }
+        }
+        Ok(norm)
+    }
+
+    /// Moments and step count, to save: `<prefix><tensor>.first`, `.second`, `.largest`, and `<prefix>step`.
+    pub fn tensors(&self, prefix: &str) -> Result<BTreeMap<String, Tensor>> {
+        let mut tensors = BTreeMap::new();
+        // Two halves of 24 bits are exact in f32, the one type of a checkpoint.
+        let halves = [(self.step >> 24) as f32, (self.step & 0xff_ffff) as f32];
+        tensors.insert(format!("{prefix}step"), Tensor::new(&halves, &Device::Cpu)?);
+        for slot in &self.slots {
+            for (kind, tensor) in slot.kinds()? {
+                tensors.insert(format!("{prefix}{}.{kind}", slot.name), tensor);
+            }
+        }
+        Ok(tensors)
+    }
+
+    /// Takes up where [`Adam::tensors`] left off. Errors, naming the tensor, when one is missing or does not fit.
+    pub fn load(&mut self, prefix: &str, tensors: &BTreeMap<String, Tensor>) -> anyhow::Result<()> {
+        let values = |name: String, n: usize| -> anyhow::Result<Vec<f32>> {
+            let tensor = tensors.get(&name).with_context(|| format!("tensor {name} is missing"))?;
+            ensure!(tensor.elem_count() == n, "tensor {name} has {} numbers, expected {n}", tensor.elem_count());
+            Ok(tensor.flatten_all()?.to_vec1()?)
+        };
+        let halves = values(format!("{prefix}step"), 2)?;
+        for slot in &mut self.slots {
+            let of_kind = |kind: &str, n: usize| match n {
+                0 => Ok(Vec::new()),
+                n => values(format!("{prefix}{}.{kind}", slot.name), n),
+            };
+            match &mut slot.moments {
+                MomentStorage::Cpu(moments) => {
+                    let moments = moments.get_mut();
+                    *moments = AdamMoments {
+                        first: of_kind("first", moments.first.len())?,
+                        second: of_kind("second", moments.second.len())?,
+                        largest: of_kind("largest", moments.largest.len())?,
+                    };
+                }
+                MomentStorage::Device(moments) => moments.load(of_kind)?,
+            }
+        }
+        self.step = ((halves[0] as u64) << 24) + halves[1] as u64;
+        Ok(())
+    }
+}
+
+impl AdamSlot {
+    /// The moments that there are, by kind, on the CPU.
+    fn kinds(&self) -> Result<Vec<(&'static str, Tensor)>> {
+        let moments = match &self.moments {
+            MomentStorage::Cpu(moments) => moments.borrow(),
+            MomentStorage::Device(moments) => return moments.tensors(),
+        };
+        let kinds = [("first", &moments.first), ("second", &moments.second), ("largest", &moments.largest)];
+        let there = kinds.into_iter().filter(|(_, values)| !values.is_empty());
+        there.map(|(kind, values)| Ok((kind, Tensor::from_slice(values, self.var.shape(), &Device::Cpu)?))).collect()
+    }
+}
+
+/// In pieces of fixed size, so that the order of summing does not depend on the threads.
+fn sum_of_squares(values: &[f32]) -> f64 {
+    let of_piece = |piece: &[f32]| {
+        let mut lanes = [0.0f32; 16];
+        for chunk in piece.chunks(16) {
+            lanes.iter_mut().zip(chunk).for_each(|(lane, v)| *lane += v * v);
+        }
+        lanes.iter().map(|lane| f64::from(*lane)).sum::<f64>()
+    };
+    let pieces: Vec<&[f32]> = values.chunks(GRAIN).collect();
+    parallel_map(pieces.len(), |piece| of_piece(pieces[piece])).into_iter().sum()
+}
+
+struct AdamUpdate<'a> {
+    moments: &'a RefCell<AdamMoments>,
+    scalars: AdamScalars,
+}
+
+impl InplaceOp2 for AdamUpdate<'_> {
+    fn name(&self) -> &'static str {
+        "adam"
+    }
+
+    fn cpu_fwd(&self, values: &mut CpuStorage, layout: &Layout, grad: &CpuStorage, grad_layout: &Layout) -> Result<()> {
+        let CpuStorage::F32(values) = values else { candle_core::bail!("adam moves f32 tensors only") };
+        let Some((start, end)) = layout.contiguous_offsets() else { candle_core::bail!("adam: variable in pieces") };
+        let grad = orator_nn::cpu::tensor::slice::<f32>(grad, grad_layout)?;
+        let moments = &mut *self.moments.borrow_mut();
+        let AdamScalars { beta1, beta2, eps, scale, rate, correction, keep } = self.scalars;
+        let update = |value: &mut f32, grad: &f32, first: &mut f32, second: &mut f32, largest: Option<&mut f32>| {
+            let grad = grad * scale;
+            *first = beta1 * *first + (1.0 - beta1) * grad;
+            *second = beta2 * *second + (1.0 - beta2) * grad * grad;
+            let spread = match largest {
+                Some(largest) => {
+                    *largest = largest.max(*second);
+                    *largest
+                }
+                None => *second,
+            };
+            *value = keep * *value - rate * *first / (spread.sqrt() * correction + eps);
+        };
+        let values = values[start..end].chunks_mut(GRAIN).zip(grad.chunks(GRAIN));
+        let both = values.zip(moments.first.chunks_mut(GRAIN)).zip(moments.second.chunks_mut(GRAIN));
+        let mut largest = moments.largest.chunks_mut(GRAIN);
+        let pieces: Vec<_> = both.map(|piece| Mutex::new((piece, largest.next()))).collect();
+        parallel_for(pieces.len(), |piece| {
+            // Every piece is taken once: the lock is free.
+            let Ok(mut piece) = pieces[piece].lock() else { return };
+            let piece = &mut *piece;
+            let (((values, grad), first), second) = &mut piece.0;
+            let scalars = values.iter_mut().zip(grad.iter()).zip(first.iter_mut().zip(second.iter_mut()));
+            match &mut piece.1 {
+                Some(largest) => {
+                    scalars.zip(largest.iter_mut()).for_each(|(((v, g), (f, s)), l)| update(v, g, f, s, Some(l)));
+                }
+                None => scalars.for_each(|((v, g), (f, s))| update(v, g, f, s, None)),
+            }
+        });
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use orator_nn::params::Init;
+
+    /// The update as written in the papers, one number, f64.
+    fn by_the_book(gradients: &[f64], rate: f64, amsgrad: bool) -> f64 {
+        let (mut x, mut m, mut v, mut largest) = (1.0, 0.0, 0.0, 0.0f64);
+        for (t, g) in (1..).zip(gradients) {
+            m = 0.9 * m + 0.1 * g;
+            v = 0.999 * v + 0.001 * g * g;
+            largest = largest.max(v);
+            let spread: f64 = if amsgrad { largest } else { v };
+            x -= rate * (m / (1.0 - 0.9f64.powi(t))) / ((spread / (1.0 - 0.999f64.powi(t))).sqrt() + 1e-8);
+        }
+        x
+    }
+
+    fn descend(config: Config, gradients: &[f64], resume_at: Option<usize>) -> anyhow::Result<f32> {
+        let mut params = Params::new(0);
+        let w = params.trainable("w", &[3], Init::Constant(1.0))?;
+        let mut adam = Adam::new(&params, config)?;
+        for (i, gradient) in gradients.iter().enumerate() {
+            if resume_at == Some(i) {
+                let saved = adam.tensors("adam.")?;
+                adam = Adam::new(&params, config)?;
+                adam.load("adam.", &saved)?;
+            }
+            adam.step(&(&w * *gradient)?.sum_all()?.backward()?, 0.1)?;
+        }
+        Ok(w.to_vec1::<f32>()?[1])
+    }
+
+    #[test]
+    fn agrees_with_the_papers_and_resumes_exactly() -> anyhow::Result<()> {
+        let gradients = [1.0, -3.0, 0.2, 0.1, 0.4, -0.3];
+        for amsgrad in [false, true] {
+            let config = Config { amsgrad, ..Config::default() };
+            let w = descend(config, &gradients, None)?;
+            assert!((f64::from(w) - by_the_book(&gradients, 0.1, amsgrad)).abs() < 1e-5);
+            assert_eq!(w.to_bits(), descend(config, &gradients, Some(3))?.to_bits());
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn a_tensor_has_its_share_of_the_rate() -> anyhow::Result<()> {
+        let mut params = Params::new(0);
+        let shares = [("all", 1.0), ("some", 0.25), ("none", 0.0)];
+        let tensors = shares.map(|(name, _)| params.trainable(name, &[2, 1], Init::Constant(1.0)));
+        let tensors = tensors.into_iter().collect::<Result<Vec<_>>>()?;
+        let share = |name: &str| shares.iter().find(|(of, _)| *of == name).map_or(f64::NAN, |(_, share)| *share);
+        let mut adam = Adam::with_rates(&params, Config::default(), share)?;
+        let gradients = [1.0, -3.0, 0.2, 0.1];
+        for gradient in gradients {
+            let sum = tensors.iter().try_fold(Tensor::new(0f32, &Device::Cpu)?, |sum, w| sum + w.sum_all()?)?;
+            adam.step(&(sum * gradient)?.backward()?, 0.1)?;
+        }
+        for (w, (name, share)) in tensors.iter().zip(shares) {
+            let w = f64::from(w.flatten_all()?.to_vec1::<f32>()?[1]);
+            assert!((w - by_the_book(&gradients, 0.1 * share, false)).abs() < 1e-5, "{name}: {w}");
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn the_composed_update_is_the_own_one() -> anyhow::Result<()> {
+        for amsgrad in [false, true] {
+            let config = Config { amsgrad, max_norm: Some(2.0), ..Config::default() };
+            let descend_through = |by_fallback: bool| -> anyhow::Result<Vec<f32>> {
+                let mut params = Params::new(3);
+                let w = params.trainable("w", &[5, 4], Init::Glorot)?;
+                let mut adam = Adam::new(&params, config)?;
+                for step in 0..6 {
+                    if by_fallback && step % 3 == 0 {
+                        // Elsewhere from the beginning, and again from what was saved.
+                        let saved = adam.tensors("")?;
+                        adam.slots[0].moments =
+                            MomentStorage::Device(adam_fallback::DeviceMoments::zeros(&w, amsgrad)?);
+                        adam.load("", &saved)?;
+                    }
+                    adam.step(&(&w * (f64::from(step) - 2.5))?.sqr()?.sum_all()?.backward()?, 0.1)?;
+                }
+                Ok(w.flatten_all()?.to_vec1()?)
+            };
+            let (own, by_fallback) = (descend_through(false)?, descend_through(true)?);
+            assert!(own.iter().zip(&by_fallback).all(|(a, b)| (a - b).abs() < 1e-6), "{own:?} {by_fallback:?}");
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn large_gradients_are_clipped_and_broken_ones_change_nothing() -> anyhow::Result<()> {
+        let mut params = Params::new(0);
+        let w = params.trainable("w", &[4], Init::Constant(1.0))?;
+        let mut adam = Adam::new(&params, Config { max_norm: Some(1.0), ..Config::default() })?;
+        let norm = adam.step(&(&w * 5.0)?.sum_all()?.backward()?, 0.1)?;
+        assert!((norm - 10.0).abs() < 1e-5);
+        assert!((adam.tensors("")?["w.first"].to_vec1::<f32>()?[0] - 0.05).abs() < 1e-6);
+        let before = w.to_vec1::<f32>()?;
+        assert!(adam.step(&(&w * f64::NAN)?.sum_all()?.backward()?, 0.1)?.is_nan());
+        assert_eq!(w.to_vec1::<f32>()?, before);
+        Ok(())
+    }
+}

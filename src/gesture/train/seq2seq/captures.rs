@@ -1,0 +1,151 @@
+//! A folder of captures: of each `NAME.bvh` with its sound `NAME.wav`, and where there is one a transcript of that name.
+
+use super::sequence::{PoseSequence, SequenceSplits};
+use crate::generate::seq2seq::sound;
+use anyhow::{Context, Result, bail, ensure};
+use ndarray::{Array2, s};
+use orator_base::audio::mfcc;
+use orator_base::stage::fingerprint::hash_file;
+use orator_base::types::sound::Sound;
+use orator_formats::bvh::exponential_maps::{ExponentialMaps, FPS, JointMapping};
+use orator_formats::bvh::read::Bvh;
+use orator_formats::transcript::{ENDINGS, Transcript, after_end};
+use orator_media::ffmpeg::{audio, probe};
+use rayon::prelude::*;
+use std::path::{Path, PathBuf};
+
+/// Captures, some of which are held out for validation.
+#[derive(Clone, Debug)]
+pub struct CaptureFolder {
+    dir: PathBuf,
+    /// Samples a second of the sound that is heard: those of the first capture's, within what is possible.
+    pub rate: u32,
+    mapping: JointMapping,
+    captures: Vec<Capture>,
+}
+
+#[derive(Clone, Debug)]
+struct Capture {
+    bvh: PathBuf,
+    wav: PathBuf,
+    transcript: Option<PathBuf>,
+    is_held_out: bool,
+}
+
+impl CaptureFolder {
+    /// Lists a folder. `hold_out`: names of captures (without ending) to validate on.
+    ///
+    /// # Errors
+    /// Motion without sound, sound without motion, no capture, none left to train on, a name to hold out that is not there.
+    pub fn open(dir: &Path, hold_out: &[String], mapping: JointMapping) -> Result<Self> {
+        let entries = std::fs::read_dir(dir).with_context(|| format!("cannot list {}", dir.display()))?;
+        let paths = entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<PathBuf>>>()?;
+        let of_kind = |kind: &'static str| paths.iter().filter(move |path| has_ending(path, kind));
+        if let Some(wav) = of_kind("wav").find(|wav| !paths.contains(&wav.with_extension("bvh"))) {
+            bail!("{} has no motion: {} is not there", wav.display(), wav.with_extension("bvh").display());
+        }
+        let capture = |bvh: &PathBuf| -> Result<Capture> {
+            let wav = bvh.with_extension("wav");
+            ensure!(paths.contains(&wav), "{} has no sound: {} is not there", bvh.display(), wav.display());
+            let transcript = ENDINGS.iter().map(|ending| bvh.with_extension(ending)).find(|path| paths.contains(path));
+            let is_held_out = hold_out.contains(&stem(bvh));
+            Ok(Capture { bvh: bvh.clone(), wav, transcript, is_held_out })
+        };
+        let mut captures = of_kind("bvh").map(capture).collect::<Result<Vec<Capture>>>()?;
+        captures.sort_by(|a, b| a.bvh.cmp(&b.bvh));
+        let first = captures.first().with_context(|| format!("{} holds no NAME.bvh with NAME.wav", dir.display()))?;
+        if let Some(name) = hold_out.iter().find(|name| !captures.iter().any(|capture| stem(&capture.bvh) == **name)) {
+            bail!("{} is to be held out, but {} holds no {name}.bvh", name, dir.display());
+        }
+        ensure!(
+            captures.iter().any(|capture| !capture.is_held_out),
+            "{}: all captures are held out, none is left to train on",
+            dir.display()
+        );
+        let rate = probe::probe(&first.wav)?.audio.map_or(0, |audio| audio.rate);
+        let rate = rate.clamp(*sound::RATES.start(), *sound::RATES.end());
+        Ok(Self { dir: dir.to_owned(), rate, mapping, captures })
+    }
+
+    /// Name of the folder.
+    pub fn name(&self) -> String {
+        let dir = self.dir.canonicalize().unwrap_or_else(|_| self.dir.clone());
+        dir.file_name().map_or_else(|| "captures".to_owned(), |name| name.to_string_lossy().into_owned())
+    }
+
+    /// The folder.
+    pub fn dir(&self) -> &Path {
+        &self.dir
+    }
+
+    /// Hash of the names, contents and parts of the files.
+    pub fn hash(&self) -> Result<String> {
+        let line = |capture: &Capture| -> Result<String> {
+            let files = [Some(&capture.bvh), Some(&capture.wav), capture.transcript.as_ref()].into_iter().flatten();
+            let line = |path: &PathBuf| {
+                let name = path.file_name().unwrap_or_default().to_string_lossy();
+                Ok(format!("{name} {} {}\n", hash_file(path)?, capture.is_held_out))
+            };
+            files.map(line).collect()
+        };
+        let lines = self.captures.par_iter().map(line).collect::<Result<String>>()?;
+        Ok(blake3::hash(lines.as_bytes()).to_hex().to_string())
+    }
+
+    /// The way from the motion of these captures to numbers, from those to train on.
+    pub fn exponential_maps(&self) -> Result<ExponentialMaps> {
+        let trained = self.captures.iter().filter(|capture| !capture.is_held_out);
+        let read = |capture: &Capture| Ok((capture.bvh.display().to_string(), Bvh::read(&capture.bvh)?));
+        ExponentialMaps::of(trained.map(read), &self.mapping)
+    }
+
+    /// All captures as sequences, heard in contexts of so many frames.
+    pub fn sequences(&self, maps: &ExponentialMaps, context: usize) -> Result<SequenceSplits> {
+        let read = |capture: &Capture| Ok((capture.is_held_out, self.sequence(capture, maps, context)?));
+        let all = self.captures.par_iter().map(read).collect::<Result<Vec<_>>>()?;
+        let (held_out, train): (Vec<_>, Vec<_>) = all.into_iter().partition(|(is_held_out, _)| *is_held_out);
+        let mut notes = Vec::new();
+        let mut plain = |part: Vec<(bool, (PoseSequence, Vec<String>))>| {
+            let (part, of_files): (Vec<_>, Vec<_>) = part.into_iter().map(|(_, sequence)| sequence).unzip();
+            notes.extend(of_files.concat());
+            part
+        };
+        let (train, held_out) = (plain(train), plain(held_out));
+        Ok(SequenceSplits { train, held_out, notes })
+    }
+
+    /// A capture, and what is doubtful about its transcript.
+    fn sequence(
+        &self,
+        capture: &Capture,
+        maps: &ExponentialMaps,
+        context: usize,
+    ) -> Result<(PoseSequence, Vec<String>)> {
+        let poses = maps.features(&Bvh::read(&capture.bvh)?).with_context(|| capture.bvh.display().to_string())?;
+        let sound = read_sound(&capture.wav, self.rate)?;
+        let n = poses.nrows().min(mfcc::n_poses(sound.samples.len(), sound.rate, FPS.per_sec()));
+        let audio = sound::features(&sound, FPS, n, n, context);
+        let Transcript { words, mut notes, .. } =
+            capture.transcript.as_deref().map(Transcript::read).transpose()?.unwrap_or_default();
+        notes.extend(after_end(&words, sound.secs()));
+        let named = |note: String| match &capture.transcript {
+            Some(path) => format!("{}: {note}", path.display()),
+            None => note,
+        };
+        let notes = notes.into_iter().map(named).collect();
+        let poses = poses.slice(s![..n, ..]).to_owned();
+        Ok((PoseSequence::new(poses, Array2::from_elem((n, maps.n_columns()), true), audio, words), notes))
+    }
+}
+
+fn read_sound(path: &Path, rate: u32) -> Result<Sound> {
+    audio::read_mono(path, rate)?.with_context(|| format!("{} has no sound", path.display()))
+}
+
+fn has_ending(path: &Path, kind: &str) -> bool {
+    path.extension().is_some_and(|ending| ending == kind)
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}

@@ -1,0 +1,286 @@
+//! A sequence-to-sequence network in training: one step, and all of it to a checkpoint and back.
+
+use super::losses::{self, SequenceLoss};
+use super::segments::SegmentBatch;
+use super::validate::SequenceValidation;
+use crate::generate::model::BEST;
+use crate::generate::seq2seq::architecture::Architecture;
+use crate::generate::seq2seq::metadata::{NETWORK, SequenceMetadata};
+use crate::generate::seq2seq::vocabulary::{PADDING, UNKNOWN};
+use crate::train::optim::adam;
+use crate::train::optim::adam::Adam;
+use crate::train::resume;
+use anyhow::{Context, Result, ensure};
+use candle_core::Tensor;
+use orator_dataset::config::Seq2seqConfig;
+use orator_formats::checkpoint;
+use orator_formats::checkpoint::Contents;
+use orator_nn::Mode;
+use orator_nn::params::Params;
+use orator_nn::seq2seq::adversarial::SegmentDiscriminator;
+use orator_nn::seq2seq::config::Segment;
+use orator_nn::seq2seq::predict::GesturePredictor;
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+const DISCRIMINATOR: &str = "discriminator.";
+const ADAM: &str = "adam.network.";
+const ADAM_D: &str = "adam.discriminator.";
+/// Loss beyond which a training has exploded.
+const LOSS_LIMIT: f64 = 1e4;
+/// Settings that may change between two runs of one training; of the others the checkpoint's count.
+const FREE: [&str; 4] = ["steps", "patience", "checkpoint_every", "keep_checkpoints"];
+
+/// Losses of one step: the weighted sum, parts of it unweighted, and the norm of the network's gradient.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct SequenceLosses {
+    pub total: f64,
+    /// `None`: no pose was made, as the audio baseline learns codes.
+    pub l1: Option<f64>,
+    pub discriminator: f64,
+    pub gradient_norm: f64,
+}
+
+/// What a checkpoint says beside its tensors.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct SequenceState {
+    pub speaker: SequenceMetadata,
+    pub settings: Seq2seqConfig,
+    /// Steps done.
+    pub step: usize,
+    /// Step and score of the best validation so far.
+    pub best: Option<(usize, f32)>,
+}
+
+/// The discriminator of the adversarial network.
+struct Adversary {
+    network: SegmentDiscriminator,
+    params: Params,
+    adam: Adam,
+}
+
+/// Networks, optimisers and where they are.
+pub struct SequenceTrainer {
+    pub metadata: SequenceMetadata,
+    pub settings: Seq2seqConfig,
+    pub network: Box<dyn GesturePredictor>,
+    params: Params,
+    adam: Adam,
+    adversary: Option<Adversary>,
+    loss: SequenceLoss,
+    /// Steps done.
+    pub step: usize,
+    /// Step and score of the best validation so far.
+    pub best: Option<(usize, f32)>,
+}
+
+impl SequenceTrainer {
+    /// Networks as the seed makes them.
+    pub fn new(metadata: SequenceMetadata, settings: Seq2seqConfig) -> Result<Self> {
+        let mut params = Params::new(settings.seed);
+        let network = metadata.architecture.network(&mut params, &metadata.network)?;
+        let is_adversarial = metadata.architecture == Architecture::Adversarial;
+        let beta1 = if is_adversarial { 0.5 } else { 0.9 };
+        let of_adam =
+            adam::Config { beta1, beta2: if is_adversarial { 0.9 } else { 0.999 }, ..adam::Config::default() };
+        let adversary = |seed: u64| -> Result<Adversary> {
+            let mut params = Params::new(seed);
+            let network = SegmentDiscriminator::new(&mut params, &metadata.network)?;
+            Ok(Adversary { network, adam: Adam::new(&params, of_adam)?, params })
+        };
+        let readings = SequenceLoss {
+            distance: settings.distance,
+            continuity: settings.continuity,
+            reach: settings.reach,
+            continuity_weight: settings.lambda_continuity,
+            reach_weight: settings.lambda_reach,
+            adversarial_weight: settings.lambda_adversarial,
+        };
+        let loss = if is_adversarial { readings.of_adversarial() } else { readings };
+        Ok(Self {
+            adam: Adam::new(&params, of_adam)?,
+            // Another seed, or tensors of the same name would begin alike.
+            adversary: is_adversarial.then(|| adversary(!settings.seed)).transpose()?,
+            params,
+            network,
+            loss,
+            metadata,
+            settings,
+            step: 0,
+            best: None,
+        })
+    }
+
+    /// Tensors of the network.
+    pub fn params(&self) -> &Params {
+        &self.params
+    }
+
+    /// One step, the discriminator's first where there is one.
+    pub fn step(&mut self, batch: &SegmentBatch) -> Result<SequenceLosses> {
+        let rate = self.settings.rate(self.step);
+        // Another seed than that of the windows.
+        let mut rng = resume::stream(!self.settings.seed, self.step);
+        if let Some(baseline) = self.network.audio_baseline() {
+            let total = match self.step < self.settings.autoencoder_steps {
+                true => baseline.loss_of_poses(&batch.real, &normal_like(&batch.real, &mut rng)?)?,
+                false => baseline.loss_of_speech(&batch.segment.audio, &batch.real, &mut Mode::Train(&mut rng))?,
+            };
+            let gradient_norm = self.adam.step(&total.backward()?, rate)?;
+            self.step += 1;
+            let total = number(&total)?;
+            return Ok(SequenceLosses { total, l1: None, discriminator: 0.0, gradient_norm });
+        }
+        let words = batch.segment.words.as_ref();
+        let words = words.map(|words| drop_words(words, self.settings.word_dropout, &mut rng)).transpose()?;
+        let segment = Segment { words, ..batch.segment.clone() };
+        let made = batch.completed(&self.network.forward(&segment, &mut Mode::Train(&mut rng))?)?;
+        let (mut discriminator, mut logits) = (0.0, None);
+        if let Some(Adversary { network, adam, .. }) = &mut self.adversary {
+            let of_made = network.forward(&made.detach(), true)?;
+            let loss = losses::discriminator(&of_made, &network.forward(&batch.real, true)?)?;
+            discriminator = number(&loss)?;
+            adam.step(&loss.backward()?, rate)?;
+            logits = Some(network.forward(&made, true)?);
+        }
+        let total = self.loss.total(&made, &batch.real, logits.as_ref())?;
+        let gradient_norm = self.adam.step(&total.backward()?, rate)?;
+        self.step += 1;
+        let l1 = Some(number(&losses::l1(&made, &batch.real)?)?);
+        Ok(SequenceLosses { total: number(&total)?, l1, discriminator, gradient_norm })
+    }
+
+    /// Writes the checkpoint of this step; old ones go.
+    pub fn save(&self, folder: &Path) -> Result<()> {
+        let mut contents = Contents { facts: self.stored()?, tensors: BTreeMap::new() };
+        contents.add(NETWORK, self.params.tensors()?);
+        contents.add("", self.adam.tensors(ADAM)?);
+        if let Some(Adversary { params, adam, .. }) = &self.adversary {
+            contents.add(DISCRIMINATOR, params.tensors()?);
+            contents.add("", adam.tensors(ADAM_D)?);
+        }
+        contents.write(&checkpoint::path(folder, self.step))?;
+        checkpoint::prune(folder, self.settings.keep_checkpoints)
+    }
+
+    /// Writes the network of this step as the best.
+    pub fn save_best(&self, folder: &Path, validation: &SequenceValidation) -> Result<()> {
+        let mut facts = self.stored()?;
+        facts["validation"] = serde_json::to_value(validation)?;
+        let mut contents = Contents { facts, tensors: BTreeMap::new() };
+        contents.add(NETWORK, self.params.tensors()?);
+        contents.write(&folder.join(BEST))
+    }
+
+    fn stored(&self) -> Result<Value> {
+        let (speaker, settings) = (self.metadata.clone(), self.settings.clone());
+        Ok(serde_json::to_value(SequenceState { speaker, settings, step: self.step, best: self.best })?)
+    }
+
+    /// Takes up the tensors and the place of a checkpoint.
+    pub fn load(&mut self, stored: &SequenceState, contents: &Contents) -> Result<()> {
+        self.params.load(&contents.part(NETWORK))?;
+        self.adam.load(ADAM, &contents.tensors)?;
+        if let Some(Adversary { params, adam, .. }) = &mut self.adversary {
+            params.load(&contents.part(DISCRIMINATOR))?;
+            adam.load(ADAM_D, &contents.tensors)?;
+        }
+        (self.step, self.best) = (stored.step, stored.best);
+        Ok(())
+    }
+}
+
+impl SequenceState {
+    /// What a checkpoint of a training says. Errors when it is none, or of another program's version.
+    pub fn from_checkpoint(contents: &Contents) -> Result<Self> {
+        let kind = SequenceMetadata::kind();
+        ensure!(
+            contents.facts["settings"].is_object() && contents.facts["speaker"]["kind"] == kind,
+            "it is no checkpoint of `orator train seq2seq` that this version can go on from; choose another --out, or move \
+             that folder away"
+        );
+        serde_json::from_value(contents.facts.clone()).context("its facts are not those of this program's version")
+    }
+
+    /// The settings to go on with, and a line for each difference.
+    pub fn settings(&self, requested: &Seq2seqConfig) -> Result<(Seq2seqConfig, Vec<String>)> {
+        resume::settings(&self.settings, requested, "seq2seq", &FREE)
+    }
+}
+
+impl SequenceLosses {
+    /// Errors, saying all of them, when one is not finite or has exploded.
+    pub fn check(&self, step: usize) -> Result<()> {
+        let Self { total, l1, discriminator, gradient_norm } = *self;
+        ensure!(
+            [total, l1.unwrap_or(0.0), discriminator].iter().all(|loss| loss.is_finite() && loss.abs() < LOSS_LIMIT)
+                && gradient_norm.is_finite(),
+            "the training broke at step {step}: loss {total}, L1 {l1:?}, discriminator {discriminator}, norm of the gradient \
+             {gradient_norm}"
+        );
+        Ok(())
+    }
+
+    /// A line of the log.
+    pub fn line(&self, step: usize) -> Value {
+        let Self { total, l1, discriminator, gradient_norm } = *self;
+        json!({ "step": step, "total": total, "l1": l1, "discriminator": discriminator, "gradient_norm": gradient_norm })
+    }
+}
+
+/// Words [B, ...] with a share of those of each segment replaced by the unknown one, a word wherever it stands in the
+/// segment.
+fn drop_words(words: &Tensor, share: f64, rng: &mut ChaCha8Rng) -> Result<Tensor> {
+    if share == 0.0 {
+        return Ok(words.clone());
+    }
+    let mut numbers = words.flatten_all()?.to_vec1::<u32>()?;
+    let n_words = numbers.len() / words.dim(0)?.max(1);
+    for segment in numbers.chunks_mut(n_words.max(1)) {
+        let mut is_dropped = BTreeMap::new();
+        for number in segment.iter_mut().filter(|number| **number != PADDING) {
+            if *is_dropped.entry(*number).or_insert_with(|| rng.random_bool(share)) {
+                *number = UNKNOWN;
+            }
+        }
+    }
+    Ok(Tensor::from_vec(numbers, words.shape(), words.device())?)
+}
+
+/// Normal random numbers in the shape of a tensor.
+fn normal_like(tensor: &Tensor, rng: &mut ChaCha8Rng) -> Result<Tensor> {
+    let numbers: Vec<f32> = (0..tensor.elem_count()).map(|_| StandardNormal.sample(rng)).collect();
+    Ok(Tensor::from_vec(numbers, tensor.shape(), tensor.device())?)
+}
+
+fn number(scalar: &Tensor) -> Result<f64> {
+    Ok(f64::from(scalar.to_scalar::<f32>()?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use candle_core::Device;
+    use rand::SeedableRng;
+
+    #[test]
+    fn a_share_of_the_words_becomes_unknown_wherever_it_stands() {
+        let numbers: Vec<u32> = (0..64 * 10 * 4).map(|i| [0, 2, 3, 4 + (i / 40) % 5][i as usize % 4]).collect();
+        let words = Tensor::from_vec(numbers, (64, 10, 4), &Device::Cpu).unwrap();
+        let rng = &mut ChaCha8Rng::seed_from_u64(1);
+        let same = drop_words(&words, 0.0, rng).unwrap();
+        assert_eq!(same.to_vec3::<u32>().unwrap(), words.to_vec3::<u32>().unwrap());
+        let dropped = drop_words(&words, 0.3, rng).unwrap().to_vec3::<u32>().unwrap();
+        let mut n_unknown = 0;
+        for segment in &dropped {
+            assert!(segment.iter().all(|row| row[0] == PADDING && *row == segment[0]));
+            n_unknown += segment[0].iter().filter(|number| **number == UNKNOWN).count();
+        }
+        assert!((35..80).contains(&n_unknown), "{n_unknown} of 192");
+    }
+}

@@ -1,0 +1,6 @@
+//! `orator-lab demo`.
+
+pub mod learned;
+pub mod verb;
+
+pub use verb::{Args, run};

@@ -1,0 +1,313 @@
+//! `orator-lab demo`.
+
+use super::learned;
+use crate::demo::GENERATOR;
+use crate::demo::check::pipeline;
+use crate::demo::check::pipeline::{LEAST_FRAMES, LEAST_JOINTS, Millimetres};
+use crate::demo::check::sheet;
+use crate::demo::host;
+use crate::demo::more_speech;
+use crate::demo::people;
+use crate::demo::people::condition::Condition;
+use crate::demo::people::folder::PeoplePlan;
+use anyhow::{Context, Result, bail, ensure};
+use orator::cli::Outcome;
+use orator::cli::ui::Ui;
+use orator_base::stage::workdir::{self, FolderLock};
+use orator_base::types::time::FrameRate;
+use orator_dataset::Dataset;
+use orator_dataset::config;
+use orator_dataset::info::DatasetInfo;
+use orator_formats::mocap::motion_file;
+use orator_media::opencv::png;
+use orator_test_support::drawn::folder;
+use orator_test_support::drawn::folder::DemoPlan;
+use orator_test_support::rule::{dataset, speech_dataset};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// Seconds of a clip of rendered people, if not given.
+const PEOPLE_SECS: f64 = 8.0;
+
+/// A synthetic speaker with known joints: draw its videos, measure what a run made of them.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    part: DemoVerb,
+}
+
+#[derive(clap::Subcommand)]
+enum DemoVerb {
+    /// Draw videos of the speaker with sound, their truth, the marker models and a pipeline.toml into DIR; with --people,
+    /// render people in rooms for the models that know real people.
+    Draw {
+        /// The demo's folder; created if it is not there.
+        dir: PathBuf,
+        /// How many videos.
+        #[arg(long, default_value_t = DemoPlan::default().n_videos, conflicts_with = "people")]
+        videos: usize,
+        /// Render people: N clips for each condition, a multiple of 3 (a third each for training, choosing and testing).
+        #[arg(long, value_name = "N")]
+        people: Option<usize>,
+        /// Conditions to render, by commas (front, standing, crossing ...); without it all.
+        #[arg(long, value_name = "NAMES", value_delimiter = ',', requires = "people")]
+        conditions: Vec<String>,
+        /// Write the truth of the rendered people alone, no videos: motion for `orator-lab train lifter --mocap DIR/truth`.
+        #[arg(long, requires = "people")]
+        truth_only: bool,
+        /// Captured motion for the rendered people, a file or a folder; the sound is the .wav beside it.
+        #[arg(long, value_name = "FILE|FOLDER", requires = "people")]
+        motion: Option<PathBuf>,
+        /// Render the speaker as a person for the models that know real people (`orator models fetch`), in place of the
+        /// figure in a marker suit for the marker models.
+        #[arg(long, conflicts_with = "people")]
+        rendered: bool,
+        /// Minutes of more speech of the same figure, without video: a dataset DIR/speech of sound and joints, for `orator
+        /// train gan --from`.
+        #[arg(long, value_name = "MIN", conflicts_with = "people", value_parser = clap::value_parser!(u32).range(1..=6000))]
+        speech: Option<u32>,
+        /// Seconds of each video; 30, of rendered people 8.
+        #[arg(long)]
+        secs: Option<f64>,
+        /// Frames a second.
+        #[arg(long, default_value_t = 30)]
+        fps: u32,
+        /// Another seed is another speech with other gestures.
+        #[arg(long, default_value_t = DemoPlan::default().seed)]
+        seed: u64,
+    },
+    /// Hold the keypoints and the dataset of a run in DIR against the truth; exit code 2 where a target is missed.
+    Measure {
+        /// The demo's folder.
+        dir: PathBuf,
+    },
+    /// Write hours of a synthetic speaker that gestures by a known rule, as a dataset into DIR: sound and motion, no video.
+    Speaker {
+        /// The dataset's folder; must not be there, or be empty.
+        dir: PathBuf,
+        /// Hours of the training split; validation and test have ten minutes each, with --words the test thirty.
+        #[arg(long, default_value_t = 2.0)]
+        hours: f64,
+        /// Words that the sound does not tell apart: some send a hand to a place of their own (version 2 of the rule).
+        #[arg(long)]
+        words: bool,
+        /// Another speaker by the rule: other vowels send the hands to its places, after other delays. 0: the rule's own.
+        #[arg(long, value_name = "N", default_value_t = 0)]
+        habits: u64,
+        /// Speech in place of the rule's own: a folder of NAME.wav with NAME.tsv (start, end, word), in the split that NAME
+        /// begins with; the gestures follow another rule (version 3), of loud syllables, phrases and eight words.
+        #[arg(long, value_name = "DIR", conflicts_with_all = ["hours", "words", "habits"])]
+        speech: Option<PathBuf>,
+        /// Seed of the speech and of the speaker's variation.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+    },
+    /// Measure on the test split of `orator-lab demo speaker` how much of the rule a trained speaker has learnt; exit code 2
+    /// where a target is missed.
+    Learned {
+        /// The dataset.
+        #[arg(long, value_name = "DIR")]
+        dataset: PathBuf,
+        /// A checkpoint of `orator train gan` or `seq2seq`, or its folder; without it the simple predictors alone are measured.
+        #[arg(long, value_name = "FILE|FOLDER")]
+        checkpoint: Option<PathBuf>,
+        /// A picture to write, .png: wrist speeds and poses over the first test sound, of rule, speaker and checkpoint.
+        #[arg(long, value_name = "FILE", requires = "checkpoint")]
+        picture: Option<PathBuf>,
+    },
+    /// Draw a contact sheet of a run in DIR: video, keypoints, 3D figure, generated motion.
+    Sheet {
+        /// The demo's folder.
+        dir: PathBuf,
+        /// The picture to write, .png.
+        #[arg(long, value_name = "FILE")]
+        out: PathBuf,
+        /// A generated motion, .npy, to show beside the clip.
+        #[arg(long, value_name = "FILE")]
+        motion: Option<PathBuf>,
+    },
+}
+
+pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    match args.part {
+        DemoVerb::Draw {
+            dir,
+            videos,
+            people,
+            conditions,
+            truth_only,
+            motion,
+            rendered,
+            speech,
+            secs,
+            fps,
+            seed,
+            ..
+        } => {
+            let fps = FrameRate::new(fps.clamp(1, 120), 1);
+            if let Some(n_clips) = people {
+                let conditions = Condition::of_names(&conditions)?;
+                let secs = secs.unwrap_or(PEOPLE_SECS);
+                return render(&dir, &PeoplePlan { conditions, n_clips, secs, fps, seed, motion, truth_only }, ui);
+            }
+            let usual = DemoPlan::default();
+            let plan = DemoPlan { n_videos: videos, secs: secs.unwrap_or(usual.secs), fps, seed, ..usual };
+            draw(&dir, &plan, rendered, speech, ui)
+        }
+        DemoVerb::Measure { dir } => measure(&dir, ui),
+        DemoVerb::Speaker { dir, speech: Some(folder), seed, .. } => {
+            let speech = speech_dataset::speech_of(&folder)?;
+            let write = |attempt: &Path| speech_dataset::write(attempt, &speech, seed, ui);
+            speak(&dir, speech.len(), speech_dataset::RULE_OF_SPEECH, ui, write)
+        }
+        DemoVerb::Speaker { dir, hours, words, habits, seed, speech: None } => {
+            let rule = if words { dataset::RULE_OF_WORDS } else { dataset::RULE };
+            let clips = dataset::clips(hours, seed, rule, habits)?;
+            speak(&dir, clips.len(), rule, ui, |attempt| dataset::write(attempt, &clips, ui))
+        }
+        DemoVerb::Learned { dataset, checkpoint, picture } => {
+            learned::run(&dataset, checkpoint.as_deref(), picture.as_deref(), ui)
+        }
+        DemoVerb::Sheet { dir, out, motion } => draw_sheet(&dir, &out, motion.as_deref(), ui),
+    }
+}
+
+fn draw(dir: &Path, plan: &DemoPlan, rendered: bool, speech: Option<u32>, ui: &Ui) -> Result<Outcome> {
+    let more = speech.map(|minutes| say_more(dir, plan, rendered, 60.0 * f64::from(minutes), ui)).transpose()?;
+    let videos = if rendered { host::draw(dir, plan, ui)? } else { folder::draw(dir, plan, ui)? };
+    let next = format!("orator run -c {}", dir.join("pipeline.toml").display());
+    let mut text =
+        format!("drew {} videos of {} s into {}", videos.len(), plan.secs, dir.join("videos/host").display());
+    if let Some((secs, dataset)) = &more {
+        text += &format!("\nand {secs:.0} s of the same figure without video into {}", dataset.display());
+    }
+    let more = more.map(|(_, dataset)| dataset);
+    ui.summary(&text, Some(&next), json!({ "videos": videos, "speech": more, "next": next }));
+    Ok(Outcome::Done)
+}
+
+/// Speech of the demo's figure without video: seconds to train on, and the dataset. What is there already stays.
+fn say_more(dir: &Path, plan: &DemoPlan, rendered: bool, secs: f64, ui: &Ui) -> Result<(f64, PathBuf)> {
+    let out = dir.join("speech");
+    let folder = std::path::absolute(&out)?;
+    if workdir::has_files(&folder) {
+        let made = Dataset::open(&folder)?;
+        ensure!(
+            made.info().notes.contains(&more_speech::note(plan, rendered, secs)),
+            "{} holds other speech than that of this figure; choose another folder, or remove it",
+            out.display()
+        );
+    } else {
+        let _lock = FolderLock::exclusive(&folder)?;
+        workdir::build_folder(&folder, |attempt| more_speech::write(attempt, plan, rendered, secs, ui))?;
+    }
+    Ok((secs, out))
+}
+
+fn render(dir: &Path, plan: &PeoplePlan, ui: &Ui) -> Result<Outcome> {
+    let clips = people::folder::draw(dir, plan, ui)?;
+    let next = format!("orator run -c {} --to pose2d", dir.join("pipeline.toml").display());
+    let text = format!(
+        "rendered {} clips of people under {} conditions into {}",
+        clips.len(),
+        plan.conditions.len(),
+        dir.join("videos").display()
+    );
+    ui.summary(&text, Some(&next), json!({ "clips": clips, "next": next }));
+    Ok(Outcome::Done)
+}
+
+fn measure(dir: &Path, ui: &Ui) -> Result<Outcome> {
+    let m = pipeline::measure(dir)?;
+    let row = |name: &str, mm: &Millimetres| {
+        format!("{name:34}{:>8.1}{:>8.1}{:>8.1}{:>9.1}\n", mm.all, mm.body, mm.wrists, mm.fingers)
+    };
+    let px = |name: &str, px: &pipeline::Pixels| {
+        format!("{name:34}{:>8.2}{:>8.2}{:>7.1} %\n", px.median, px.p90, 100.0 * px.found)
+    };
+    let targets = m.targets();
+    let mut text = format!("{:34}{:>8}{:>8}{:>9}\n", "2D, px from the truth", "median", "90 %", "found");
+    text += &px("body (13 points)", &m.body);
+    text += &px("hands (2 x 21 points)", &m.hands);
+    text += &m.shoulders_px.map_or(String::new(), |shoulders| {
+        let [body, hands] = [m.body.median, m.hands.median].map(|px| 100.0 * px / shoulders);
+        format!("of points that can be seen; the shoulders are {shoulders:.0} px wide: {body:.1} % and {hands:.1} % of them\n")
+    });
+    text +=
+        &format!("{:34}{:>8}{:>8}{:>8}{:>9}\n", "3D, mean mm from the truth", "joints", "body", "wrists", "fingers");
+    text += &row("this run", &m.lifted);
+    text += &row("trivial: the mean pose", &m.mean_pose);
+    text += &row("trivial: true x, y and mean depth", &m.mean_depth);
+    text += &row("trivial: true x, y and bone lengths", &m.bone_depth);
+    text += &format!(
+        "{} of {} frames are in the dataset, {:.1} % of their joints have a number; all rows count these. joints: 48 from the neck; fingers: from their wrist; no rotation,\n\
+         segments of 60 frames scaled to 0.90 m of shoulders, upper arm and forearm.\n",
+        m.n_frames,
+        m.n_drawn,
+        100.0 * m.joints
+    );
+    text += &m.more_secs.map_or(String::new(), |more| {
+        format!(
+            "to train on: {:.0} s that came through the videos, {more:.0} s of the same figure without video\n",
+            m.train_secs
+        )
+    });
+    let good = m.good();
+    let met = if good { "met" } else { "MISSED" };
+    let generator =
+        if m.shoulders_px.is_some() { "a rendered person, seen by the models for real people" } else { GENERATOR };
+    text += &format!("generator: {generator}\n");
+    text += &format!(
+        "3D error against the known truth: {:.1} mm; targets: {:.1} px, {:.0} mm, {:.0} % of points found, {:.0} % \
+         of frames, {:.0} % of joints: {met}",
+        m.lifted.all,
+        targets.most_px,
+        targets.most_mm,
+        100.0 * targets.least_found,
+        100.0 * LEAST_FRAMES,
+        100.0 * LEAST_JOINTS
+    );
+    let mm = |mm: &Millimetres| json!({ "all": mm.all, "body": mm.body, "wrists": mm.wrists, "fingers": mm.fingers });
+    let facts = json!({
+        "body_px": { "median": m.body.median, "p90": m.body.p90, "found": m.body.found },
+        "hands_px": { "median": m.hands.median, "p90": m.hands.p90, "found": m.hands.found },
+        "mm": mm(&m.lifted), "mean_pose_mm": mm(&m.mean_pose), "mean_depth_mm": mm(&m.mean_depth),
+        "bone_depth_mm": mm(&m.bone_depth), "joints": m.joints, "shoulders_px": m.shoulders_px,
+        "generator": generator,
+        "n_frames": m.n_frames, "n_drawn": m.n_drawn, "good": good, "train_secs": m.train_secs, "more_secs": m.more_secs,
+    });
+    ui.summary(&text, None, facts);
+    Ok(if good { Outcome::Done } else { Outcome::SomeFailed })
+}
+
+fn speak(
+    dir: &Path,
+    n_clips: usize,
+    rule: u32,
+    ui: &Ui,
+    write: impl FnOnce(&Path) -> Result<DatasetInfo>,
+) -> Result<Outcome> {
+    let out = std::path::absolute(dir)?;
+    let _lock = FolderLock::exclusive(&out)?;
+    ensure!(!workdir::has_files(&out), "{} is not empty; choose another folder", dir.display());
+    let info = workdir::build_folder(&out, write)?;
+    let secs: Vec<String> = info.splits.iter().map(|(name, split)| format!("{name} {:.0} s", split.secs)).collect();
+    let text = format!("{n_clips} clips by version {rule} of the rule: {}", secs.join(", "));
+    let next = format!("orator-lab demo learned --dataset {}", dir.display());
+    ui.summary(&text, Some(&next), json!({ "dataset": dir, "clips": n_clips, "next": next }));
+    Ok(Outcome::Done)
+}
+
+fn draw_sheet(dir: &Path, out: &Path, generated: Option<&Path>, ui: &Ui) -> Result<Outcome> {
+    let config = config::load(&dir.join("pipeline.toml"), &[])?;
+    let units = config::videos::of(&config);
+    let Some(unit) = units.iter().flat_map(|videos| &videos.units).next() else {
+        bail!("{} names no video", dir.join("pipeline.toml").display());
+    };
+    let generated = generated.map(|path| motion_file::read(path, Some(folder::DATASET_FPS))).transpose()?;
+    let image = sheet::draw_sheet(&config.settings.work.dir, unit, generated.as_ref().map(|read| &read.motion))
+        .with_context(|| format!("drawing a contact sheet of {}", unit.source.display()))?;
+    workdir::replace(out, |attempt| png::write(attempt, &image))?;
+    ui.summary(&format!("wrote {}", out.display()), None, json!({ "sheet": out }));
+    Ok(Outcome::Done)
+}

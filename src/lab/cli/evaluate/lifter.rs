@@ -1,0 +1,72 @@
+//! `orator-lab evaluate lifter`.
+
+use crate::cli::train::lifter::LifterPart;
+use crate::evaluate::lifter::{bodies, hands};
+use crate::mocap::fingers::files;
+use crate::mocap::upper_body;
+use anyhow::{Context, Result, ensure};
+use orator::cli::Outcome;
+use orator::cli::ui::Ui;
+use orator_dataset::config;
+use std::path::PathBuf;
+
+/// Print the errors of a lifter on captured motion seen by random cameras, beside those of trivial methods.
+#[derive(clap::Args)]
+pub struct Args {
+    /// body or hands.
+    #[arg(long, value_enum, default_value = "body")]
+    part: LifterPart,
+    /// Captured motion, files or folders of them. body: .bvh, CMU or TED .npz; hands: .bvh with fingers, SMPL-X or TED
+    /// .npz, ICVL or NYU label .txt.
+    #[arg(long, value_name = "PATH", num_args = 1.., required = true)]
+    mocap: Vec<PathBuf>,
+    /// body: measure the takes of these names apart, and no others: patterns like 'test_*' or 'walk#1' (a file's second
+    /// take) [default: all as one set]
+    #[arg(long, value_name = "PATTERN", num_args = 1..)]
+    takes: Vec<String>,
+    /// body: scenes of 4 s a set.
+    #[arg(long, value_name = "N", default_value_t = bodies::SCENES)]
+    scenes: usize,
+    /// Weights of `orator-lab train lifter --part body` [default: the built-in ones]
+    #[arg(long, value_name = "FILE")]
+    body_weights: Option<PathBuf>,
+    /// Weights of `orator-lab train lifter --part hands` [default: the built-in ones]
+    #[arg(long, value_name = "FILE")]
+    hand_weights: Option<PathBuf>,
+}
+
+pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    match args.part {
+        LifterPart::Body => body(args, ui),
+        LifterPart::Hands => hands(args, ui),
+    }
+}
+
+fn body(args: Args, ui: &Ui) -> Result<Outcome> {
+    ensure!((1..=100_000).contains(&args.scenes), "--scenes must lie between 1 and 100000");
+    let settings = config::LiftConfig {
+        body_weights: args.body_weights.unwrap_or_default().into(),
+        hand_weights: args.hand_weights.unwrap_or_default().into(),
+        ..Default::default()
+    };
+    let takes = upper_body::read_all(&args.mocap).context("reading --mocap")?;
+    let sets = if args.takes.is_empty() {
+        vec![("all takes".to_owned(), takes)]
+    } else {
+        upper_body::divide(takes, &args.takes)?.0
+    };
+    let rows = bodies::table(&bodies::Lifters::new(&settings)?, &sets, args.scenes)?;
+    ui.summary(&bodies::text(&rows), None, serde_json::json!({ "body": rows }));
+    Ok(Outcome::Done)
+}
+
+fn hands(args: Args, ui: &Ui) -> Result<Outcome> {
+    let rows = hands::evaluate(
+        &*hands::lifter_of(&args.hand_weights.unwrap_or_default())?,
+        &files::read_all(&args.mocap)?,
+        hands::MEASURED,
+        1,
+    )?;
+    ui.summary(&hands::text(&rows), None, serde_json::json!({ "hands": rows }));
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,50 @@
+//! `orator-lab evaluate people`.
+
+use crate::evaluate::people::page;
+use crate::evaluate::people::{gap, grid, table};
+use anyhow::Result;
+use orator::cli::Outcome;
+use orator::cli::ui::Ui;
+use orator_base::stage::workdir;
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Print the errors of a run on rendered people, by condition, beside the truth.
+///
+/// 2D keypoints, hands (missed, stolen, swapped, invented), what was kept and refused wrongly, and lifted joints beside the
+/// clip's mean pose and beside the same lifter with exact keypoints.
+#[derive(clap::Args)]
+pub struct Args {
+    /// A folder of `orator-lab demo draw --people`.
+    #[arg(value_name = "DIR")]
+    dir: PathBuf,
+    /// Configurations whose runs are measured, each a model set [default: DIR/pipeline.toml]
+    #[arg(short, long, value_name = "FILE", num_args = 1..)]
+    config: Vec<PathBuf>,
+    /// Only clips of this part: first, middle or last.
+    #[arg(long, value_name = "PART")]
+    part: Option<String>,
+    /// Configurations of runs on real clips, to lay the keypoints of rendered ones beside: scores, jitter, hands found.
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    beside: Vec<PathBuf>,
+    /// Also write one HTML page.
+    #[arg(long, value_name = "PAGE.html")]
+    pub report: Option<PathBuf>,
+}
+
+pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
+    let default = [args.dir.join("pipeline.toml")];
+    let config: &[PathBuf] = if args.config.is_empty() { &default } else { &args.config };
+    let rows = table::table(&args.dir, config, args.part.as_deref())?;
+    let looked_at: Vec<&PathBuf> =
+        if args.beside.is_empty() { Vec::new() } else { config.iter().chain(&args.beside).collect() };
+    let looks = looked_at.into_iter().map(|file| gap::look(file)).collect::<Result<Vec<_>>>()?;
+    let last = (!looks.is_empty()).then(|| gap::grid(&looks));
+    let mut text = grid::text(&rows, last.as_ref());
+    if let Some(path) = &args.report {
+        workdir::write_file(path, page::html(&rows, last.as_ref()).as_bytes())?;
+        text += &format!("\nwrote {}", path.display());
+    }
+    ui.summary(&text, None, json!({ "people": rows, "keypoints": looks, "report": args.report }));
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,30 @@
+//! `orator-lab evaluate`.
+
+use super::{lifter, people};
+use anyhow::Result;
+use orator::cli::Outcome;
+use orator::cli::confine::confine;
+use orator::cli::ui::Ui;
+
+/// Measure the lifters on motion with known truth, and the whole pipeline on rendered people.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    subject: Subject,
+}
+
+#[derive(clap::Subcommand)]
+enum Subject {
+    Lifter(lifter::Args),
+    People(people::Args),
+}
+
+pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    match args.subject {
+        Subject::Lifter(args) => lifter::run(args, ui),
+        Subject::People(args) => {
+            confine(args.report.as_deref(), []);
+            people::run(&args, ui)
+        }
+    }
+}

@@ -1,0 +1,8 @@
+//! The command line of `orator-lab`, on the terminal, signals and exit codes of `orator`.
+
+pub mod demo;
+pub mod evaluate;
+pub mod program;
+pub mod train;
+
+pub use program::main;

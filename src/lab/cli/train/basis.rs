@@ -1,0 +1,46 @@
+//! `orator-lab train basis`.
+
+use super::corpus;
+use crate::train::space::basis;
+use orator::cli::Outcome;
+use orator::cli::ui::Ui;
+use orator_base::stage::progress::Progress as _;
+use std::path::PathBuf;
+
+/// Find the fixed basis in which `evaluate` compares windows of motion.
+///
+/// The 64 principal components of windows of one second, of captured motion (--mocap, with hands made by rule) and of motion
+/// made by rule. The program has one built in; values by another are not comparable with its own.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    corpus: corpus::CorpusArgs,
+    /// The file to write (safetensors).
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
+    let corpus = corpus::gather(&args.corpus, ui)?;
+    let fitted = {
+        let _task = ui.begin("principal components", 0);
+        basis::fit(&corpus, args.corpus.seed, &args.out)?
+    };
+    let mut text = format!(
+        "{} written: {} windows, fingers weigh {:.2}\nvariance that the 64 directions hold: {:.1} %",
+        args.out.display(),
+        fitted.n_windows,
+        fitted.finger_weight,
+        100.0 * fitted.share
+    );
+    for (set, share) in &fitted.held_out {
+        text += &format!("\n  held out, {set}: {:.1} %", 100.0 * share);
+    }
+    let held_out: Vec<_> = fitted.held_out.iter().map(|(set, share)| serde_json::json!([set, share])).collect();
+    let facts = serde_json::json!({
+        "out": args.out, "windows": fitted.n_windows, "finger_weight": fitted.finger_weight, "share": fitted.share,
+        "held_out": held_out,
+    });
+    ui.summary(&text, None, facts);
+    Ok(Outcome::Done)
+}

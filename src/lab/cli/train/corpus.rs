@@ -1,0 +1,72 @@
+//! The motion that the two fixed spaces are learnt from, as `orator-lab train basis` and `orator-lab train embedding` gather it.
+
+use crate::mocap::upper_body;
+use crate::train::space::corpus::Corpus;
+use anyhow::{Context, Result, ensure};
+use orator::cli::ui::Ui;
+use orator_base::math::vec3;
+use orator_base::stage::progress::Progress as _;
+use orator_base::types::pose3d::Motion;
+use orator_base::types::skeleton::{N_JOINTS, NECK};
+use orator_base::types::time::FrameRate;
+use orator_test_support::drawn::figure::DrawnFigure;
+use orator_test_support::drawn::gesture;
+use orator_test_support::drawn::speech::Speech;
+use orator_test_support::rule::dataset;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use std::path::PathBuf;
+
+/// Clips of a minute of each kind of speaker made by rule, and how many more are only measured on.
+const CLIPS: usize = 12;
+const HELD_OUT: usize = 2;
+const FPS: FrameRate = FrameRate::new(15, 1);
+const CLIP_SECS: f64 = 60.0;
+
+/// Where the motion comes from.
+#[derive(clap::Args)]
+pub struct CorpusArgs {
+    /// Captured motion: .bvh or .npz files, or folders of them; may be given several times.
+    #[arg(long, value_name = "PATH", num_args = 1.., required = true)]
+    mocap: Vec<PathBuf>,
+    /// Takes to measure on and not to learn from, by their names: patterns like 'test_*'.
+    #[arg(long, value_name = "PATTERN", num_args = 1..)]
+    hold_out: Vec<String>,
+    /// Seed of the random numbers; equal seeds give equal results.
+    #[arg(long, default_value_t = 1337)]
+    pub seed: u64,
+}
+
+pub fn gather(args: &CorpusArgs, ui: &Ui) -> Result<Corpus> {
+    let task = ui.begin("gathering motion", 0);
+    let takes = upper_body::read_all(&args.mocap).context("reading --mocap")?;
+    let (held_out, mut takes) = upper_body::divide(takes, &args.hold_out)?;
+    ensure!(!takes.is_empty(), "--hold-out leaves nothing to learn from");
+    takes.sort_by(|a, b| a.name.cmp(&b.name));
+    task.detail("speakers made by rule");
+    let mut speakers = Vec::new();
+    for seed in 0..CLIPS + HELD_OUT {
+        let number = args.seed.wrapping_add(seed as u64);
+        let clip = dataset::clips(CLIP_SECS / 3600.0, number, dataset::RULE, 0)?
+            .into_iter()
+            .next()
+            .context("no clip of the rule")?;
+        speakers.push((format!("speaker {number}"), clip.motion()));
+        speakers.push((format!("gestures {number}"), gestures(number)));
+    }
+    let others = speakers.split_off(2 * CLIPS);
+    Corpus::new(&takes, &held_out, &speakers, &others, args.seed)
+}
+
+/// A minute of the demo's figure.
+fn gestures(seed: u64) -> Motion {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let speech = Speech::new(CLIP_SECS, &mut rng);
+    let gestures = gesture::DrawnGestures::new(&speech, &mut rng);
+    let figures: Vec<DrawnFigure> =
+        (0..FPS.frames_in(CLIP_SECS)).map(|t| DrawnFigure::new(&gestures.controls(FPS.secs(t)))).collect();
+    let joints = ndarray::Array3::from_shape_fn((figures.len(), N_JOINTS, 3), |(t, joint, k)| {
+        vec3::sub(figures[t].joints[joint], figures[t].joints[NECK])[k] as f32
+    });
+    Motion::from_joints(FPS, joints)
+}

@@ -1,0 +1,61 @@
+//! `orator-lab train embedding`.
+
+use super::corpus;
+use crate::train::space::embedding::EmbeddingTask;
+use crate::train::supervised::{Schedule, start_from, train};
+use anyhow::ensure;
+use orator::cli::Outcome;
+use orator::cli::ui::Ui;
+use std::path::PathBuf;
+
+/// Train the encoder in whose space `evaluate` measures the Frechet gesture distance.
+///
+/// An auto-encoder of windows of 34 frames learns captured motion (--mocap, with hands made by rule) and motion made by
+/// rule. The program has one built in; values by another are not comparable with its own. An interrupted training goes
+/// on when the same command is given again. At the end the errors of held-out windows are printed beside those of
+/// the mean pose.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    corpus: corpus::CorpusArgs,
+    /// The weights file to write (safetensors).
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Start from these weights instead of the seed's; with `--steps 0` their errors are measured, nothing is written.
+    #[arg(long, value_name = "FILE")]
+    start: Option<PathBuf>,
+    /// Training steps.
+    #[arg(long, default_value_t = 6000)]
+    steps: usize,
+    /// Windows a step.
+    #[arg(long, default_value_t = 64)]
+    batch: usize,
+    /// The highest learning rate.
+    #[arg(long, default_value_t = 2e-3)]
+    learning_rate: f64,
+    /// Steps between two checkpoints.
+    #[arg(long, default_value_t = 500)]
+    checkpoint_every: usize,
+}
+
+pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
+    ensure!(args.learning_rate > 0.0 && args.learning_rate < 1.0, "--learning-rate must lie between 0 and 1");
+    let corpus = corpus::gather(&args.corpus, ui)?;
+    let n_frames = corpus.n_frames();
+    let mut training_task = EmbeddingTask::new(corpus, args.corpus.seed)?;
+    let started_from = args.start.as_deref().map(|path| start_from(&training_task, path)).transpose()?;
+    let schedule = Schedule {
+        steps: args.steps,
+        batch: args.batch,
+        learning_rate: args.learning_rate,
+        seed: args.corpus.seed,
+        checkpoint_every: args.checkpoint_every,
+        started_from,
+    };
+    let errors = train(&mut training_task, &schedule, &args.out, ui)?;
+    let written = if args.steps == 0 { String::new() } else { format!("{} written\n", args.out.display()) };
+    let text =
+        format!("{written}{n_frames} frames to learn from; of held-out windows came back\n{}", errors.join("\n"));
+    ui.summary(&text, None, serde_json::json!({ "out": args.out, "frames": n_frames, "errors": errors }));
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,126 @@
+//! `orator-lab train lifter`.
+
+use crate::mocap::upper_body;
+use crate::train::lifter::body::BodyLifterTask;
+use crate::train::lifter::hands::HandLifterTask;
+use crate::train::lifter::heatmaps::HeatmapLifterTask;
+use crate::train::supervised::{Schedule, TrainingTask, start_from, train};
+use anyhow::{Context, ensure};
+use orator::cli::Outcome;
+use orator::cli::ui::Ui;
+use orator_nn::lifter::body::BodyLifter;
+use std::path::PathBuf;
+
+/// Train the networks that lift 2D keypoints to 3D joints.
+///
+/// The body lifter learns from captured motion (--mocap) and from gestures made by rule, filmed by random cameras;
+/// the hand lifter from hands made by rule. An interrupted training goes on when the same command is given again.
+/// At the end the errors on held-out motion are printed beside those of trivial methods.
+#[derive(clap::Args)]
+pub struct Args {
+    /// body or hands.
+    #[arg(long, value_enum)]
+    part: LifterPart,
+    /// hands: the network.
+    #[arg(long, value_enum, default_value = "coordinates")]
+    network: HandNetwork,
+    /// Captured motion to learn from (body): .bvh or .npz files, or folders of them; may be given several times.
+    #[arg(long, value_name = "PATH", num_args = 1..)]
+    mocap: Vec<PathBuf>,
+    /// Takes to measure the errors on and not to learn from, by their names: patterns like 'test_*' or 'walk#1' (a
+    /// file's second take).
+    #[arg(long, value_name = "PATTERN", num_args = 1..)]
+    hold_out: Vec<String>,
+    /// The weights file to write (safetensors).
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Start from these weights instead of the seed's; with `--steps 0` their errors are measured, nothing is written.
+    #[arg(long, value_name = "FILE")]
+    start: Option<PathBuf>,
+    /// Training steps.
+    #[arg(long, default_value_t = 9000)]
+    steps: usize,
+    /// Samples a step.
+    #[arg(long, default_value_t = 512)]
+    batch: usize,
+    /// The highest learning rate.
+    #[arg(long, default_value_t = 2e-3)]
+    learning_rate: f64,
+    /// Kernel widths of the body lifter, odd; their product is the frames it looks at (at 15 a second).
+    #[arg(long, value_name = "N", num_args = 1.., default_values_t = [3, 3, 3])]
+    widths: Vec<usize>,
+    /// Channels of the network [default: 256 body, 896 hands]
+    #[arg(long, hide_default_value = true)]
+    width: Option<usize>,
+    /// Seed of the random numbers; equal seeds give equal weights.
+    #[arg(long, default_value_t = 1337)]
+    seed: u64,
+    /// Steps between two checkpoints.
+    #[arg(long, default_value_t = 250)]
+    checkpoint_every: usize,
+}
+
+/// Whose networks.
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+pub enum LifterPart {
+    Body,
+    Hands,
+}
+
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+enum HandNetwork {
+    /// A perceptron on the points' coordinates; what `lift` uses.
+    Coordinates,
+    /// Convolutions over score maps (Zimmermann & Brox 2017), for comparison; slow.
+    Heatmap,
+}
+
+pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
+    ensure!(args.learning_rate > 0.0 && args.learning_rate < 1.0, "--learning-rate must lie between 0 and 1");
+    ensure!((1..=4096).contains(&args.width.unwrap_or(256)), "--width must lie between 1 and 4096");
+    let mut training_task: Box<dyn TrainingTask> = match args.part {
+        LifterPart::Body => {
+            ensure!(!args.mocap.is_empty(), "the body lifter learns from captured motion: give --mocap PATH");
+            ensure!(
+                args.widths.iter().all(|w| w % 2 == 1) && args.widths.iter().product::<usize>() <= 729,
+                "--widths are odd, and their product is at most 729 frames"
+            );
+            let takes = upper_body::read_all(&args.mocap).context("reading --mocap")?;
+            let (held_out, takes) = upper_body::divide(takes, &args.hold_out)?;
+            ensure!(!takes.is_empty(), "--hold-out leaves nothing to learn from");
+            let config = BodyLifter::config(args.width.unwrap_or(256), &args.widths);
+            Box::new(BodyLifterTask::new(takes, held_out, &config, args.seed)?)
+        }
+        LifterPart::Hands => {
+            ensure!(
+                args.mocap.is_empty() && args.hold_out.is_empty(),
+                "the hand lifter learns from hands made by rule: no --mocap"
+            );
+            match args.network {
+                HandNetwork::Coordinates => Box::new(HandLifterTask::new(args.width.unwrap_or(896), args.seed)?),
+                HandNetwork::Heatmap => Box::new(HeatmapLifterTask::new(args.seed)?),
+            }
+        }
+    };
+    let started_from = args.start.as_deref().map(|path| start_from(&*training_task, path)).transpose()?;
+    let schedule = Schedule {
+        steps: args.steps,
+        batch: args.batch,
+        learning_rate: args.learning_rate,
+        seed: args.seed,
+        checkpoint_every: args.checkpoint_every,
+        started_from,
+    };
+    let errors = train(&mut *training_task, &schedule, &args.out, ui)?;
+    if schedule.steps == 0 {
+        ui.summary(&errors.join("\n"), None, serde_json::json!({ "errors": errors }));
+        return Ok(Outcome::Done);
+    }
+    let text = format!("{} written\n{}", args.out.display(), errors.join("\n"));
+    let key = if args.part == LifterPart::Body { "--body-weights" } else { "--hand-weights" };
+    let next = format!("orator lift KEYPOINTS.npz --out JOINTS.npy {key} {}", args.out.display());
+    let facts =
+        serde_json::json!({ "out": args.out, "parameters": training_task.params().n_parameters(), "errors": errors });
+    ui.summary(&text, Some(&next), facts);
+    Ok(Outcome::Done)
+}

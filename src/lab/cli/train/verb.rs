@@ -1,0 +1,39 @@
+//! `orator-lab train`: one file a network.
+
+use super::{basis, embedding, lifter, noise};
+use anyhow::Result;
+use orator::cli::Outcome;
+use orator::cli::signals;
+use orator::cli::train::stopped;
+use orator::cli::ui::Ui;
+
+/// Train the lifters, fit keypoint noise, or make the spaces that `orator evaluate` compares motion in.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    network: Network,
+}
+
+#[derive(clap::Subcommand)]
+enum Network {
+    Basis(basis::Args),
+    Embedding(embedding::Args),
+    Lifter(lifter::Args),
+    Noise(noise::Args),
+}
+
+pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    const STOPPING: &str = "stopping after this step, with a checkpoint; the next signal ends at once";
+    const RETAINED: &str = "the newest checkpoint is retained, and the same command continues from it";
+    match args.network {
+        Network::Basis(_) | Network::Noise(_) => signals::tell_when_stopped("unfinished work is discarded"),
+        _ => ui.listens_for_stop(STOPPING, RETAINED),
+    }
+    let ended = match args.network {
+        Network::Basis(args) => basis::run(args, ui),
+        Network::Embedding(args) => embedding::run(args, ui),
+        Network::Lifter(args) => lifter::run(args, ui),
+        Network::Noise(args) => noise::run(&args, ui),
+    };
+    ended.or_else(|error| stopped::told(error, ui))
+}

@@ -1,0 +1,298 @@
+//! Check of a speaker trained on the rule: its motion for the sound of the test split against the synthetic speaker's
+//! motion and the rule's predictable part, beside simpler predictors.
+
+use super::places::{self, PlaceShare, WordPlaces};
+use super::traces;
+use anyhow::{Result, ensure};
+use ndarray::{Array1, Array2, Array3, ArrayView3};
+use orator_base::stage::progress::Progress;
+use orator_base::types::skeleton::{NECK, is_duplicate};
+use orator_base::types::time::FrameRate;
+use orator_dataset::{Dataset, Sample, Split};
+use orator_formats::transcript::Word;
+use orator_gesture::generate::seq2seq::architecture::Architecture;
+use orator_gesture::generate::trained::TrainedSpeaker;
+use orator_gesture::metrics::movement::energy::MotionEnergy;
+use orator_gesture::metrics::position::pck::{CorrectKeypoints, PckAxes};
+use orator_test_support::rule::baselines::{RuleBaselines, sound_of_frames};
+use orator_test_support::rule::dataset::{RULE_OF_WORDS, SpokenClip};
+use orator_test_support::rule::ridge::correlation;
+use orator_test_support::rule::rule::RuleGestures;
+use orator_test_support::rule::speech_dataset::{is_by_speech, predictable};
+use orator_test_support::rule::wrists::wrist_speeds;
+use serde::Serialize;
+
+/// Metrics of a predictor on the whole test split.
+#[derive(Clone, Debug, Serialize)]
+pub struct LearnedRow {
+    pub predictor: &'static str,
+    /// Pearson correlation of the left and of the right wrist's speed with the predictable part's, over all frames of
+    /// all clips in which no word moves the hand, without smoothing.
+    pub speed_correlation: [f64; 2],
+    /// Pose metrics; `None`: no poses are predicted.
+    pub poses: Option<PoseQuality>,
+    /// Places to which words send the hands; `None`: the rule has no words, or no poses are predicted.
+    pub places: Option<WordPlaces>,
+}
+
+/// Agreement of the poses with the speaker's.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct PoseQuality {
+    /// Share of keypoints within 0.2 of the pose's extent, 48 joints.
+    pub pck: f64,
+    /// Mean squared speed of the joints, as a share of the data's.
+    pub energy: f64,
+    /// Energy over the frames in which the rule holds both wrists still, where only variation moves that no sound
+    /// predicts; a predictor that regresses to the mean loses this first.
+    pub pauses: f64,
+    /// Mean absolute error of coordinates, each in standard deviations of the training split (of 1 cm at least).
+    pub l1: f64,
+}
+
+/// Metrics of all predictors.
+#[derive(Clone, Debug, Serialize)]
+pub struct Learned {
+    pub n_clips: usize,
+    pub secs: f64,
+    pub rows: Vec<LearnedRow>,
+    /// Penalties of the ridge regressions of the frame and of a second, to speeds and to poses.
+    pub ridge_strengths: [[f64; 2]; 2],
+    /// Whether the generator reaches the targets; `None`: no generator.
+    pub good: Option<bool>,
+    /// First clip, for the picture.
+    #[serde(skip)]
+    pub first: Option<traces::TraceClip>,
+}
+
+/// Targets of the generator: correlation of each wrist's speed, PCK as a multiple of the mean pose's and of the
+/// mismatched prediction's, motion energy as a share of the data's.
+pub const LEAST_CORRELATION: f64 = 0.7;
+pub const LEAST_PCK: f64 = 1.5;
+pub const ENERGY: std::ops::RangeInclusive<f64> = 0.7..=1.3;
+
+/// Targets where words send hands to places: share of right places of all words, of lone words for the network that reads
+/// the words of a segment; most that one which is not told the words may differ from chance; correlation on beats.
+pub const LEAST_PLACES: f64 = 0.8;
+pub const LEAST_LONE_PLACES: f64 = 0.7;
+pub const MOST_FROM_CHANCE: f64 = 0.1;
+pub const LEAST_BEATS: f64 = 0.6;
+
+/// Row of the generator with the words of another clip.
+const OTHER_WORDS: &str = "generator, another text";
+/// Speed below which a wrist of the rule is held, m/s.
+const HELD: f64 = 0.05;
+
+/// Clip of the test split.
+struct TestClip {
+    sample: Sample,
+    /// `None` of the second rule.
+    clip: Option<SpokenClip>,
+    predictable: Array3<f32>,
+    sound: Array2<f64>,
+    /// Steps [T - 1, 2] in which no word moves the left and the right hand.
+    of_beats: Array2<bool>,
+}
+
+/// Measures `speaker` on the test split of the synthetic speaker's `dataset`; without one, the baselines alone.
+pub fn measure(dataset: &Dataset, speaker: Option<&TrainedSpeaker>, progress: &dyn Progress) -> Result<Learned> {
+    let tests: Vec<TestClip> =
+        dataset.samples(Split::Test).iter().map(|s| TestClip::new(dataset.read(s)?)).collect::<Result<_>>()?;
+    ensure!(tests.len() > 1, "{}: the test split needs two clips at least", dataset.dir().display());
+    let fps = dataset.info().fps;
+    let judge = Judge { tests: &tests, std: dataset.stats().std(), fps };
+    let task = progress.begin("listen", 0);
+    let baselines = RuleBaselines::learn(dataset)?;
+    let row = |predictor, predicted: Vec<Array3<f32>>| judge.row(predictor, &predicted);
+    let each = |predict: &dyn Fn(&TestClip) -> Array3<f32>| tests.iter().map(predict).collect::<Vec<_>>();
+    let (mut rows, mut first) = (Vec::new(), None);
+    if let Some(speaker) = speaker {
+        task.detail("generating");
+        let with_words = |shift: Option<usize>| -> Result<Vec<Array3<f32>>> {
+            let one = |n: usize| {
+                let said = shift.map(|shift| tests[(n + shift) % tests.len()].said());
+                Ok(speaker.motion(&tests[n].sample.sound, said.unwrap_or_default())?.joints)
+            };
+            (0..tests.len()).map(one).collect()
+        };
+        let predicted = with_words(Some(0))?;
+        for (predicted, test) in predicted.iter().zip(&tests) {
+            ensure!(
+                predicted.shape() == test.predictable.shape(),
+                "the speaker has another frame rate than the dataset"
+            );
+        }
+        first = predicted.first().zip(tests.first()).map(|(predicted, test)| traces::TraceClip {
+            rule: test.predictable.clone(),
+            data: test.sample.motion.joints.clone(),
+            predicted: predicted.clone(),
+        });
+        rows.push(row("generator", predicted.clone()));
+        let mut other = predicted;
+        other.rotate_left(1);
+        rows.push(row("generator, another test sound", other));
+        if speaker.reads_words() {
+            rows.push(row(OTHER_WORDS, with_words(Some(1))?));
+            rows.push(row("generator, no words", with_words(None)?));
+        }
+    }
+    rows.push(row("mean pose", each(&|test| baselines.still(test.sample.n_frames()))));
+    let names = [
+        ["ridge of the frame, to poses", "ridge of the frame, to speeds"],
+        ["ridge of a second, to poses", "ridge of a second, to speeds"],
+    ];
+    for (ridge, [to_poses, to_speeds]) in baselines.ridges.iter().zip(names) {
+        rows.push(row(to_poses, each(&|test| ridge.poses(&test.sound))));
+        let speeds: Vec<Array2<f64>> = tests.iter().map(|test| ridge.speeds(&test.sound)).collect();
+        let speed_correlation = judge.correlation(&speeds);
+        rows.push(LearnedRow { predictor: to_speeds, speed_correlation, poses: None, places: None });
+    }
+    rows.push(row("nearest training window by sound", each(&|test| baselines.nearest(&test.sound))));
+    rows.push(row("the data itself", each(&|test| test.sample.motion.joints.clone())));
+    rows.push(row("the rule without variation", each(&|test| test.predictable.clone())));
+    if judge.has_words() {
+        rows.push(row("the rule without its words", each(&|test| test.without_words(fps))));
+    }
+    let n_frames: usize = tests.iter().map(|test| test.sample.n_frames()).sum();
+    Ok(Learned {
+        n_clips: tests.len(),
+        secs: fps.secs(n_frames),
+        good: speaker.map(|speaker| if judge.has_words() { good_words(&rows, speaker) } else { good(&rows) }),
+        rows,
+        ridge_strengths: baselines.ridges.each_ref().map(|ridge| ridge.strengths),
+        first,
+    })
+}
+
+/// Whether the first row (the generator) reaches the targets against the second (mismatched) and the third (mean pose).
+fn good(rows: &[LearnedRow]) -> bool {
+    let [predicted, others @ ..] = rows else { return false };
+    let Some(poses) = predicted.poses else { return false };
+    let beats = |other: &LearnedRow| other.poses.is_some_and(|other| poses.pck >= LEAST_PCK * other.pck);
+    predicted.speed_correlation.iter().all(|correlation| *correlation >= LEAST_CORRELATION)
+        && others.iter().take(2).all(beats)
+        && ENERGY.contains(&poses.energy)
+}
+
+/// Whether the generator's row reaches the targets for words.
+fn good_words(rows: &[LearnedRow], speaker: &TrainedSpeaker) -> bool {
+    let Some((row, places)) = rows.first().and_then(|row| Some((row, row.places?))) else { return false };
+    let is_chance = |share: PlaceShare| (share.share() - PlaceShare::CHANCE).abs() <= MOST_FROM_CHANCE;
+    let others = rows.iter().find(|row| row.predictor == OTHER_WORDS).and_then(|row| row.places);
+    let is_told = match speaker.architecture() {
+        Some(Architecture::Contextual) => places.all.share() >= LEAST_PLACES,
+        Some(Architecture::Words) => places.alone.share() >= LEAST_LONE_PLACES,
+        _ => return is_chance(places.all),
+    };
+    is_told
+        && others.is_some_and(|others| is_chance(others.all))
+        && row.speed_correlation.iter().all(|correlation| *correlation >= LEAST_BEATS)
+}
+
+impl TestClip {
+    fn new(sample: Sample) -> Result<Self> {
+        let clip = (!is_by_speech(&sample)).then(|| SpokenClip::from_sample(&sample)).transpose()?;
+        let predictable = clip.map_or_else(|| predictable(&sample), |clip| clip.predictable()).joints;
+        let sound = sound_of_frames(&sample.sound, sample.n_frames(), sample.motion.fps);
+        let all = || Array2::from_elem((sample.n_frames().saturating_sub(1), 2), true);
+        let of_beats = clip.map_or_else(all, |clip| places::of_beats(&clip, sample.motion.fps));
+        Ok(Self { sample, clip, predictable, sound, of_beats })
+    }
+
+    fn said(&self) -> &[Word] {
+        self.sample.words.as_deref().unwrap_or_default()
+    }
+
+    /// The rule as if nothing were said with these sounds.
+    fn without_words(&self, fps: FrameRate) -> Array3<f32> {
+        let of_clip = |clip: SpokenClip| {
+            RuleGestures::of_habits(&clip.habits(), &clip.speech(), &[]).motion(clip.n_frames, fps).joints
+        };
+        self.clip.map_or_else(|| self.predictable.clone(), of_clip)
+    }
+}
+
+struct Judge<'a> {
+    tests: &'a [TestClip],
+    /// Standard deviations [49, 3], metres.
+    std: Array2<f32>,
+    fps: FrameRate,
+}
+
+impl Judge<'_> {
+    fn has_words(&self) -> bool {
+        self.tests.iter().filter_map(|test| test.clip).any(|clip| clip.rule == RULE_OF_WORDS)
+    }
+
+    fn places(&self, predicted: &[Array3<f32>]) -> WordPlaces {
+        let mut places = WordPlaces::default();
+        for (joints, test) in predicted.iter().zip(self.tests) {
+            test.clip.iter().for_each(|clip| places.count(clip, joints.view(), self.fps));
+        }
+        places
+    }
+
+    fn row(&self, predictor: &'static str, predicted: &[Array3<f32>]) -> LearnedRow {
+        let mut correct = CorrectKeypoints::default();
+        let (mut energy, mut reference_energy) = (MotionEnergy::default(), MotionEnergy::default());
+        let (mut pauses, mut reference_pauses) = (MotionEnergy::default(), MotionEnergy::default());
+        let mut errors = (0.0, 0.0);
+        for (predicted, test) in predicted.iter().zip(self.tests) {
+            let ground_truth = &test.sample.motion;
+            correct.count(PckAxes::Xyz, predicted.view(), ground_truth.joints.view(), ground_truth.mask.view());
+            energy.add(predicted.view(), ground_truth.mask.view(), self.fps);
+            reference_energy.add(ground_truth.joints.view(), ground_truth.mask.view(), self.fps);
+            let held = held(test, self.fps);
+            pauses.add(predicted.view(), held.view(), self.fps);
+            reference_pauses.add(ground_truth.joints.view(), held.view(), self.fps);
+            let of_clip = self.error(predicted.view(), ground_truth.joints.view());
+            errors = (errors.0 + of_clip.0, errors.1 + of_clip.1);
+        }
+        let speeds: Vec<Array2<f64>> =
+            predicted.iter().map(|predicted| wrist_speeds(predicted.view(), self.fps)).collect();
+        LearnedRow {
+            predictor,
+            speed_correlation: self.correlation(&speeds),
+            poses: Some(PoseQuality {
+                pck: correct.share(),
+                energy: energy.relative_to(&reference_energy),
+                pauses: pauses.relative_to(&reference_pauses),
+                l1: errors.0 / f64::max(errors.1, 1.0),
+            }),
+            places: self.has_words().then(|| self.places(predicted)),
+        }
+    }
+
+    fn correlation(&self, speeds: &[Array2<f64>]) -> [f64; 2] {
+        let truth: Vec<Array2<f64>> =
+            self.tests.iter().map(|test| wrist_speeds(test.predictable.view(), self.fps)).collect();
+        std::array::from_fn(|hand| {
+            let of_beats = |parts: &[Array2<f64>]| -> Array1<f64> {
+                let steps = parts.iter().zip(self.tests).flat_map(|(part, test)| {
+                    part.column(hand).into_iter().zip(test.of_beats.column(hand)).filter(|(_, is_beat)| **is_beat)
+                });
+                steps.map(|(speed, _)| *speed).collect()
+            };
+            correlation(of_beats(speeds).view(), of_beats(&truth).view())
+        })
+    }
+
+    /// Sum and number of normalised errors.
+    fn error(&self, predicted: ArrayView3<f32>, ground_truth: ArrayView3<f32>) -> (f64, f64) {
+        let mut sum = (0.0, 0.0);
+        for ((t, joint, k), ground_truth) in ground_truth.indexed_iter() {
+            if joint != NECK && !is_duplicate(joint) {
+                sum.0 += f64::from((predicted[[t, joint, k]] - ground_truth).abs() / self.std[[joint, k]].max(0.01));
+                sum.1 += 1.0;
+            }
+        }
+        sum
+    }
+}
+
+/// Mask of the frames with wrist speeds of the rule below `HELD` on both sides.
+fn held(test: &TestClip, fps: FrameRate) -> Array2<bool> {
+    let speeds = wrist_speeds(test.predictable.view(), fps);
+    let still = |t: usize| speeds.row(t.min(speeds.nrows() - 1)).iter().all(|speed| *speed < HELD);
+    let mask = &test.sample.motion.mask;
+    Array2::from_shape_fn(mask.dim(), |(t, joint)| mask[[t, joint]] && still(t.saturating_sub(1)) && still(t))
+}

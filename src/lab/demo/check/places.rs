@@ -1,0 +1,123 @@
+//! Whether words with gestures send their hand to their place, and which frames belong to them.
+
+use ndarray::{Array2, ArrayView3};
+use orator_base::types::time::FrameRate;
+use orator_test_support::rule::dataset::SpokenClip;
+use orator_test_support::rule::rule::{HOLD, RETURN, RuleGestures, STROKE, WORD_DELAY};
+use orator_test_support::rule::words::{N_PLACES, WordGesture, gesture};
+use orator_test_support::rule::wrists::WRISTS;
+use serde::Serialize;
+
+/// Seconds to the next word with a gesture from which on a word is alone.
+const ALONE_SECS: f64 = 5.0;
+/// Two-sided normal quantile of a 95 % interval.
+const Z: f64 = 1.96;
+
+/// Words whose hand is nearer to their place than to the hand's other places at the end of the stroke.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct PlaceShare {
+    pub n_words: usize,
+    pub n_right: usize,
+}
+
+/// Right places of all words with gestures, and of those with no other such word within 5 s.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct WordPlaces {
+    pub all: PlaceShare,
+    pub alone: PlaceShare,
+}
+
+impl PlaceShare {
+    /// Share of right places when nothing is known of the word.
+    pub const CHANCE: f64 = 1.0 / N_PLACES as f64;
+
+    fn add(&mut self, is_right: bool) {
+        self.n_words += 1;
+        self.n_right += usize::from(is_right);
+    }
+
+    /// Share of right places; 0 of no words.
+    pub fn share(&self) -> f64 {
+        self.n_right as f64 / self.n_words.max(1) as f64
+    }
+
+    /// 95 % interval of the share (Wilson 1927).
+    pub fn interval(&self) -> [f64; 2] {
+        let (n, share) = (self.n_words.max(1) as f64, self.share());
+        let centre = share + Z * Z / (2.0 * n);
+        let half = Z * (share * (1.0 - share) / n + Z * Z / (4.0 * n * n)).sqrt();
+        [-half, half].map(|half| (centre + half) / (1.0 + Z * Z / n))
+    }
+}
+
+impl WordPlaces {
+    /// Counts the words of a clip for predicted joints [T, 49, 3] from the neck, metres.
+    pub fn count(&mut self, clip: &SpokenClip, predicted: ArrayView3<f32>, fps: FrameRate) {
+        let (speech, said) = (clip.speech(), clip.words());
+        let rule = RuleGestures::of_habits(&clip.habits(), &speech, &said);
+        let strokes: Vec<(f64, WordGesture)> =
+            said.iter().filter_map(|word| gesture(&word.word).map(|gesture| (word.start_secs, gesture))).collect();
+        for (n, (start, own)) in strokes.iter().enumerate() {
+            let end = start + WORD_DELAY + STROKE;
+            let t = (end * fps.per_sec()).round() as usize;
+            if t >= predicted.shape()[0] {
+                continue;
+            }
+            let wrist: [f64; 3] = std::array::from_fn(|k| f64::from(predicted[[t, WRISTS[own.hand], k]]));
+            let distance = |place: &usize| -> f64 {
+                let at = rule.wrist_at(WordGesture { place: *place, ..*own }, fps.secs(t));
+                (0..3).map(|k| (wrist[k] - at[k]).powi(2)).sum()
+            };
+            let nearest = (0..N_PLACES).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+            let is_right = nearest == Some(own.place);
+            self.all.add(is_right);
+            let is_near = |m: usize| strokes.get(m).is_some_and(|(other, _)| (other - start).abs() <= ALONE_SECS);
+            if !is_near(n + 1) && !n.checked_sub(1).is_some_and(is_near) {
+                self.alone.add(is_right);
+            }
+        }
+    }
+}
+
+/// Steps between frames [T - 1, 2] in which no word moves the left and the right hand: those of beats.
+pub fn of_beats(clip: &SpokenClip, fps: FrameRate) -> Array2<bool> {
+    let mut steps = Array2::from_elem((clip.n_frames.saturating_sub(1), 2), true);
+    for word in clip.words() {
+        let Some(WordGesture { hand, .. }) = gesture(&word.word) else { continue };
+        let start = word.start_secs + WORD_DELAY;
+        let of_word = |t: usize| (start - fps.secs(1)..start + STROKE + HOLD + RETURN).contains(&fps.secs(t));
+        steps.column_mut(hand).iter_mut().enumerate().for_each(|(t, is_beat)| *is_beat &= !of_word(t));
+    }
+    steps
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use orator_base::types::split::Split;
+    use orator_test_support::rule::dataset::RULE_OF_WORDS;
+
+    #[test]
+    fn the_rule_is_right_and_rest_is_chance() {
+        let fps = FrameRate::new(15, 1);
+        let (mut of_rule, mut of_beats) = (WordPlaces::default(), WordPlaces::default());
+        for number in 0..12 {
+            let clip =
+                SpokenClip { rule: RULE_OF_WORDS, seed: 1, split: Split::Test, number, n_frames: 900, habits: 0 };
+            of_rule.count(&clip, clip.predictable().joints.view(), fps);
+            let beats = RuleGestures::of_habits(&clip.habits(), &clip.speech(), &[]).motion(clip.n_frames, fps);
+            of_beats.count(&clip, beats.joints.view(), fps);
+        }
+        assert!(of_rule.all.n_words > 80 && of_rule.alone.n_words > 10, "{of_rule:?}");
+        assert!(of_rule.all.share() == 1.0 && of_rule.alone.share() == 1.0, "{of_rule:?}");
+        let [low, high] = of_beats.all.interval();
+        assert!(low < PlaceShare::CHANCE && PlaceShare::CHANCE < high, "{of_beats:?}");
+    }
+
+    #[test]
+    fn an_interval_is_wilsons() {
+        // Wilson's interval of 8 of 10, as published tables give it.
+        let [low, high] = PlaceShare { n_words: 10, n_right: 8 }.interval();
+        assert!((low - 0.490).abs() < 1e-3 && (high - 0.943).abs() < 1e-3, "{low} {high}");
+    }
+}

@@ -1,0 +1,203 @@
+//! Folder of rendered people: videos by condition, their truth, a list of the clips, and a configuration for `orator
+//! run` with the models for real people.
+
+use super::condition::Condition;
+use super::scene::{CapturedClip, PeopleScene};
+
+pub use super::scene::ClipSeeds;
+use crate::rendered_truth::LIST;
+use anyhow::{Context, Result, bail, ensure};
+use orator_base::motion::units;
+use orator_base::stage::progress::Progress;
+use orator_base::stage::workdir;
+use orator_base::types::pose3d::Motion;
+use orator_base::types::time::FrameRate;
+use orator_formats::mocap::motion_file;
+use orator_media::ffmpeg::audio::read_sound;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Part of a set: each has bodies, clothes, cameras and motions of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SetPart {
+    First,
+    Middle,
+    Last,
+}
+
+impl SetPart {
+    /// All, in order.
+    pub const ALL: [Self; 3] = [Self::First, Self::Middle, Self::Last];
+}
+
+/// Clip of a set; paths are relative to its folder.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PeopleClip {
+    pub video: PathBuf,
+    pub truth: PathBuf,
+    /// Name of the condition.
+    pub condition: String,
+    pub part: SetPart,
+    pub seeds: ClipSeeds,
+    /// Width and height, px.
+    pub size: [usize; 2],
+    pub focal_px: f64,
+    /// Frames a second, as a fraction.
+    pub fps: [u32; 2],
+    pub secs: f64,
+    /// File of the captured motion, where one was given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<PathBuf>,
+}
+
+/// What to render.
+#[derive(Clone, Debug)]
+pub struct PeoplePlan {
+    pub conditions: Vec<Condition>,
+    /// Clips of each condition, a multiple of 3.
+    pub n_clips: usize,
+    pub secs: f64,
+    pub fps: FrameRate,
+    pub seed: u64,
+    /// File of a captured motion, or a folder of them.
+    pub motion: Option<PathBuf>,
+    /// Write the truth alone, without pictures: motion for lifters to learn from.
+    pub truth_only: bool,
+}
+
+const PIPELINE: &str = r#"# Rendered people of `orator-lab demo draw --people`: one speaker for each condition, seen by the models for real people.
+[segment]
+speech = "loudness"                # its speech is made of tones, which the speech model rightly takes for none
+"#;
+
+const SPEAKER: &str = r#"
+[[speaker]]
+name = "NAME"
+videos = ["videos/NAME/*.mp4"]
+SPLITS
+licence = "cc0-1.0"
+consent = "none needed: nobody is shown"
+source = "rendered by orator demo"
+"#;
+
+/// Renders the clips of a plan into `dir`; returns their list.
+pub fn draw(dir: &Path, plan: &PeoplePlan, progress: &dyn Progress) -> Result<Vec<PeopleClip>> {
+    let n = plan.n_clips;
+    ensure!(n > 0 && n.is_multiple_of(3), "--people takes 3, 6, 9 ... clips for each condition, not {n}");
+    ensure!((1.0..=600.0).contains(&plan.secs), "a clip of a person lasts 1 to 600 seconds, not {}", plan.secs);
+    let motions = plan.motion.as_deref().map(motions).transpose()?.unwrap_or_default();
+    let (mut clips, mut configuration) = (Vec::new(), PIPELINE.to_owned());
+    for &condition in &plan.conditions {
+        let name = condition.name();
+        let mut files = [const { Vec::new() }; 3];
+        for number in 0..n {
+            let part = SetPart::ALL[3 * number / n];
+            let seeds = seeds(plan.seed, condition, number, part);
+            let motion = (!motions.is_empty()).then(|| motions[clips.len() % motions.len()].clone());
+            let captured = motion.as_deref().map(captured).transpose()?;
+            let secs = captured.as_ref().map_or(plan.secs, |clip| plan.secs.min(secs_of(&clip.motion)));
+            let scene = PeopleScene::new(condition, seeds, secs, plan.fps, captured.as_ref());
+            let stem = format!("{name}-{}", number + 1);
+            let video = PathBuf::from(format!("videos/{name}/{stem}.mp4"));
+            let truth = PathBuf::from(format!("truth/{name}/{stem}.npz"));
+            let mut known = plan.truth_only.then(|| scene.truth_without_pictures());
+            if !plan.truth_only {
+                workdir::replace(&dir.join(&video), |attempt| {
+                    known = Some(scene.film(attempt, progress)?);
+                    Ok(())
+                })?;
+            }
+            known.context("a rendered clip has no truth")?.write(&dir.join(&truth))?;
+            files[3 * number / n].push(format!("\"{stem}.mp4\""));
+            clips.push(PeopleClip {
+                video,
+                truth,
+                condition: name.to_owned(),
+                part,
+                seeds,
+                size: scene.camera.size,
+                focal_px: scene.camera.focal_px,
+                fps: [plan.fps.num, plan.fps.den],
+                secs: plan.fps.secs(scene.n_frames),
+                motion,
+            });
+        }
+        let [train, validation, test] = files.map(|files| files.join(", "));
+        let splits = format!("train = [{train}]\nvalidation = [{validation}]\ntest = [{test}]");
+        configuration += &SPEAKER.replace("NAME", name).replace("SPLITS", &splits);
+    }
+    workdir::write_file(&dir.join(LIST), &serde_json::to_vec_pretty(&clips)?)?;
+    workdir::write_file(&dir.join("pipeline.toml"), configuration.as_bytes())?;
+    Ok(clips)
+}
+
+/// Reads the list of a folder of `draw`.
+pub fn read(dir: &Path) -> Result<Vec<PeopleClip>> {
+    let path = dir.join(LIST);
+    let text = std::fs::read_to_string(&path).with_context(|| {
+        format!("{} cannot be read; `orator-lab demo draw {} --people 3` writes it", path.display(), dir.display())
+    })?;
+    serde_json::from_str(&text).with_context(|| format!("{} is no list of rendered people", path.display()))
+}
+
+/// Seeds of a clip. Those of the three parts lie in ranges of their own, so that no body, camera, suit of clothes or
+/// motion of one part comes in another.
+fn seeds(seed: u64, condition: Condition, number: usize, part: SetPart) -> ClipSeeds {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(1000 * condition as u64 + number as u64);
+    let range = (part as u64) << 32;
+    let mut next = || range + u64::from(rng.random::<u32>());
+    ClipSeeds { body: next(), clothes: next(), camera: next(), motion: next(), voice: None }
+}
+
+/// Files of motion of a folder in the order of their names, or the file itself.
+fn motions(path: &Path) -> Result<Vec<PathBuf>> {
+    if !path.is_dir() {
+        return Ok(vec![path.to_owned()]);
+    }
+    let entries = std::fs::read_dir(path).with_context(|| format!("{} cannot be read", path.display()))?;
+    let mut files = entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<_>>>()?;
+    files.retain(|file| file.is_file() && motion_file::has_ending(file));
+    files.sort();
+    if files.is_empty() {
+        bail!("{} holds no motion: expected files ending in {}", path.display(), motion_file::ENDINGS.join(", "));
+    }
+    Ok(files)
+}
+
+fn secs_of(motion: &Motion) -> f64 {
+    motion.fps.secs(motion.n_frames())
+}
+
+fn captured(path: &Path) -> Result<CapturedClip> {
+    let motion = motion_file::read(path, None)?.motion;
+    units::check(&motion).with_context(|| path.display().to_string())?;
+    ensure!(secs_of(&motion) >= 1.0, "{} lasts less than a second", path.display());
+    let beside = path.with_extension("wav");
+    let sound = beside.is_file().then(|| read_sound(&beside)).transpose()?;
+    Ok(CapturedClip { motion, sound })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeMap;
+
+    #[test]
+    fn no_seed_is_in_two_parts_or_in_two_clips() {
+        let mut parts = BTreeMap::new();
+        for condition in Condition::ALL {
+            for number in 0..30 {
+                let part = SetPart::ALL[number / 10];
+                let ClipSeeds { body, clothes, camera, motion, .. } = seeds(7, condition, number, part);
+                for (kind, seed) in [("body", body), ("clothes", clothes), ("camera", camera), ("motion", motion)] {
+                    assert_eq!(parts.insert((kind, seed), part), None, "{kind} {seed}");
+                    assert_eq!(seed >> 32, part as u64);
+                }
+            }
+        }
+    }
+}

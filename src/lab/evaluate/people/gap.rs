@@ -1,0 +1,169 @@
+//! What can be told of keypoints without a truth, so that rendered clips can be laid beside real ones: scores, jitter,
+//! hands found, and how far the hand model's wrist lies from the body model's.
+
+use super::grid::{Grid, number, percent};
+use super::points::{GROUPS, share};
+use anyhow::{Result, ensure};
+use ndarray::ArrayView3;
+use orator_base::math::order::{Ordered, median};
+use orator_base::stage::artifacts::Artifact;
+use orator_base::types::pose2d::{HAND_SEEN_SCORE, Keypoints, SEEN_SCORE, coco};
+use orator_dataset::config;
+use orator_formats::keypoints_npz;
+use serde::Serialize;
+use std::path::Path;
+
+/// Groups of `points::GROUPS` that are looked at: face, shoulders, elbows, wrists.
+const N_GROUPS: usize = 4;
+
+/// Look of keypoints over clips. Lengths are shares of a clip's median distance of the shoulders in the picture.
+#[derive(Clone, Debug, Serialize)]
+pub struct KeypointLook {
+    /// Name of the configuration, and the clips whose keypoints it has.
+    pub name: String,
+    pub n_clips: usize,
+    /// Median score, 0..1, and median second difference in time, of face, shoulders, elbows and wrists.
+    pub scores: [f64; N_GROUPS],
+    pub jitter: [f64; N_GROUPS],
+    /// Share of the frames with a hand, a side, 0..1, and the median second difference of its points about its wrist.
+    pub hands: f64,
+    pub hand_jitter: f64,
+    /// Median distance of the hand's wrist from the body's.
+    pub wrists_apart: f64,
+}
+
+/// Look of the keypoints of a configuration's videos; a video without keypoints is left out. Errors: there are none.
+pub fn look(config_file: &Path) -> Result<KeypointLook> {
+    let config = config::load(config_file, &[])?;
+    let units = config::videos::of(&config).into_iter().flat_map(|videos| videos.units);
+    let files =
+        units.map(|unit| Artifact::Keypoints.path(&config.settings.work.dir, &unit)).filter(|path| path.is_file());
+    let clips = files.map(|path| keypoints_npz::read(&path)).collect::<Result<Vec<_>>>()?;
+    ensure!(
+        !clips.is_empty(),
+        "{}: no video has keypoints; run `orator run -c {} --to pose2d`",
+        config_file.display(),
+        config_file.display()
+    );
+    let name = config_file.file_stem().unwrap_or_default().to_string_lossy();
+    Ok(measure(&name, &clips))
+}
+
+fn measure(name: &str, clips: &[Keypoints]) -> KeypointLook {
+    let mut scores: [Vec<f64>; N_GROUPS] = Default::default();
+    let mut jitter: [Vec<f64>; N_GROUPS] = Default::default();
+    let (mut hand_jitter, mut apart) = (Vec::new(), Vec::new());
+    let (mut n_hands, mut n_frames) = (0, 0);
+    for clip in clips {
+        let width = |t: usize| {
+            let at = |point: usize, k: usize| clip.body[[t, point, k]];
+            let found = at(coco::L_SHOULDER, 2).min(at(coco::R_SHOULDER, 2)) > SEEN_SCORE;
+            let [dx, dy] = [0, 1].map(|k| at(coco::L_SHOULDER, k) - at(coco::R_SHOULDER, k));
+            found.then(|| f64::from(dx.hypot(dy)))
+        };
+        let Some(shoulders) = median((0..clip.n_frames()).filter_map(width)).filter(|width| *width > 1.0) else {
+            continue;
+        };
+        for (group, (_, points)) in GROUPS.iter().take(N_GROUPS).enumerate() {
+            for &point in *points {
+                scores[group].extend((0..clip.n_frames()).map(|t| f64::from(clip.body[[t, point, 2]])));
+                jitter[group]
+                    .extend(second_differences(clip.body.view(), point, None, SEEN_SCORE).map(|d| d / shoulders));
+            }
+        }
+        for (hand, wrist) in [(&clip.left_hand, coco::L_WRIST), (&clip.right_hand, coco::R_WRIST)] {
+            n_frames += clip.n_frames();
+            for t in 0..clip.n_frames() {
+                if hand[[t, 0, 2]] < HAND_SEEN_SCORE {
+                    continue;
+                }
+                n_hands += 1;
+                if clip.body[[t, wrist, 2]] > SEEN_SCORE {
+                    let [dx, dy] = [0, 1].map(|k| hand[[t, 0, k]] - clip.body[[t, wrist, k]]);
+                    apart.push(f64::from(dx.hypot(dy)) / shoulders);
+                }
+            }
+            for point in 1..hand.shape()[1] {
+                let differences = second_differences(hand.view(), point, Some(0), HAND_SEEN_SCORE);
+                hand_jitter.extend(differences.map(|d| d / shoulders));
+            }
+        }
+    }
+    let middle = |values: Vec<f64>| Ordered::new(values).quantile(0.5).unwrap_or(f64::NAN);
+    KeypointLook {
+        name: name.to_owned(),
+        n_clips: clips.len(),
+        scores: scores.map(middle),
+        jitter: jitter.map(middle),
+        hands: share(n_hands, n_frames),
+        hand_jitter: middle(hand_jitter),
+        wrists_apart: middle(apart),
+    }
+}
+
+/// Lengths of the second differences of a point, about another where one is given, where three frames have it.
+fn second_differences(
+    points: ArrayView3<f32>,
+    point: usize,
+    about: Option<usize>,
+    least: f32,
+) -> impl Iterator<Item = f64> {
+    let at = move |t: usize, k: usize| points[[t, point, k]] - about.map_or(0.0, |root| points[[t, root, k]]);
+    let found = move |t: usize| points[[t, point, 2]] > least && about.is_none_or(|root| points[[t, root, 2]] > least);
+    let middle = 1..points.shape()[0].saturating_sub(1).max(1);
+    let lengths: Vec<f64> = middle
+        .filter(|&t| found(t - 1) && found(t) && found(t + 1))
+        .map(|t| {
+            let [dx, dy] = [0, 1].map(|k| at(t - 1, k) - 2.0 * at(t, k) + at(t + 1, k));
+            f64::from(dx.hypot(dy))
+        })
+        .collect();
+    lengths.into_iter()
+}
+
+/// Grid of looks, a row each.
+pub fn grid(looks: &[KeypointLook]) -> Grid {
+    let names = |what: &str| GROUPS.iter().take(N_GROUPS).map(|(name, _)| format!("{what} {name}")).collect::<Vec<_>>();
+    let mut heads = vec!["clips".to_owned()];
+    heads.extend(names("score"));
+    heads.extend(names("jitter"));
+    heads.extend(["hands", "jitter fingers", "wrists apart"].map(str::to_owned));
+    let row = |look: &KeypointLook| {
+        let mut cells = vec![look.n_clips.to_string()];
+        cells.extend(look.scores.map(|score| number(score, 2)));
+        cells.extend(look.jitter.map(percent));
+        cells.extend([look.hands, look.hand_jitter, look.wrists_apart].map(percent));
+        (look.name.clone(), cells)
+    };
+    Grid {
+        title: "without truth",
+        note: "Median scores; jitter: median second difference, % of the shoulders in the picture; % of hands found; distance of the hand's wrist from the body's, % of the shoulders.",
+        heads,
+        rows: looks.iter().map(row).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluate::people::clips::tests::exact;
+
+    #[test]
+    fn a_shake_is_jitter_and_a_shifted_hand_is_apart() {
+        let mut clip = exact().keypoints;
+        let still = measure("still", std::slice::from_ref(&clip));
+        for t in 0..clip.n_frames() {
+            clip.body[[t, coco::L_ELBOW, 0]] += if t % 2 == 0 { 2.0 } else { -2.0 };
+            clip.body[[t, coco::R_ELBOW, 0]] += if t % 2 == 0 { 2.0 } else { -2.0 };
+        }
+        let wrist = clip.right_hand[[0, 0, 0]] - clip.body[[0, coco::R_WRIST, 0]];
+        assert!(wrist.abs() < 1e-3);
+        clip.left_hand.slice_mut(ndarray::s![.., .., 0]).mapv_inplace(|x| x + 30.0);
+        clip.right_hand.slice_mut(ndarray::s![.., .., 0]).mapv_inplace(|x| x + 30.0);
+        let shaken = measure("shaken", &[clip]);
+        let shoulders = 800.0 * 0.36 / 2.0;
+        assert!((shaken.jitter[2] - 8.0 / shoulders).abs() < 0.01, "{shaken:?}");
+        assert!((shaken.wrists_apart - 30.0 / shoulders).abs() < 0.01 && still.wrists_apart < 1e-3);
+        assert!((shaken.hand_jitter - still.hand_jitter).abs() < 1e-4 && shaken.hands == 1.0);
+    }
+}

@@ -1,0 +1,40 @@
+//! Page of the errors on rendered people: for each model set its grids.
+
+use crate::evaluate::people::grid::{Grid, grids};
+use crate::evaluate::people::table::PeopleRow;
+use orator_report::html::{Node, Page, Section, node, table};
+use serde_json::Value;
+
+/// Text of the page; `last`: a grid of its own section.
+pub fn html(rows: &[PeopleRow], last: Option<&Grid>) -> String {
+    let sets: Vec<&[PeopleRow]> = rows.chunk_by(|a, b| a.set == b.set).collect();
+    let n_clips: usize = sets.iter().map(|rows| rows.last().map_or(0, |all| all.n_clips)).max().unwrap_or(0);
+    let names: Vec<&str> = sets.iter().map(|rows| rows[0].set.as_str()).collect();
+    let body = sets.iter().flat_map(|rows| {
+        let title = node("h3").text(format!("Model set {}", rows[0].set));
+        std::iter::once(title).chain(grids(rows).iter().flat_map(shown).collect::<Vec<_>>())
+    });
+    let mut sections = vec![Section { id: "sets", title: "By condition", body: body.collect() }];
+    sections.extend(last.map(|grid| Section { id: "gap", title: "Without truth", body: shown(grid).into() }));
+    let page = Page {
+        title: "Errors on rendered people".to_owned(),
+        lead: format!("{n_clips} clips of rendered people whose truth is known; model sets: {}.", names.join(", ")),
+        sections,
+        style: "",
+        script: "",
+        data: Value::Null,
+    };
+    page.html()
+}
+
+fn shown(grid: &Grid) -> [Node; 2] {
+    let head = |text: &str| node("th").attr("scope", "col").class("num").text(text);
+    let first = node("th").attr("scope", "col").text(grid.title);
+    let heads = std::iter::once(first).chain(grid.heads.iter().map(|text| head(text)));
+    let rows = grid.rows.iter().map(|(name, cells)| {
+        let cells = cells.iter().map(|cell| node("td").class("num").text(cell));
+        node("tr").child(node("th").attr("scope", "row").text(name.trim())).children(cells)
+    });
+    let table = node("div").class("scroll").attr("tabindex", "0").child(table("figures", heads, rows));
+    [table, node("p").class("small").text(grid.note)]
+}

@@ -1,0 +1,122 @@
+//! Errors of 2D keypoints in shares of the shoulder width (as seen from ahead at the neck's distance). Models define a
+//! shoulder or a hip differently from a skeleton, so the error is parted: `bias` is its mean over a clip, `scatter`
+//! what is left of it. Only points that can be seen count, and of those the found ones.
+
+use super::clips::RenderedClip;
+use crate::rendered_truth::Visibility;
+use orator_base::math::order::Ordered;
+use orator_base::types::pose2d::{SEEN_SCORE, coco};
+use serde::Serialize;
+
+/// Points that are told together, with the name of each group.
+pub const GROUPS: [(&str, &[usize]); 6] = [
+    ("face", &[coco::NOSE, coco::L_EYE, coco::R_EYE, coco::L_EAR, coco::R_EAR]),
+    ("shoulders", &[coco::L_SHOULDER, coco::R_SHOULDER]),
+    ("elbows", &[coco::L_ELBOW, coco::R_ELBOW]),
+    ("wrists", &[coco::L_WRIST, coco::R_WRIST]),
+    ("hips", &[coco::L_HIP, coco::R_HIP]),
+    ("legs", &[13, 14, 15, 16]),
+];
+
+/// Errors of one group of points.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct PointErrors {
+    pub points: &'static str,
+    /// Points that can be seen, in all frames.
+    pub n_seen: usize,
+    /// Share of them that were found, 0..1.
+    pub found: f64,
+    /// Points that cannot be seen and were found nevertheless, share of those 0..1.
+    pub invented: f64,
+    /// Distance from the truth, shares of the shoulder width: half of the points are nearer, 95 % are nearer.
+    pub median: f64,
+    pub p95: f64,
+    /// Length of a clip's mean error, mean over clips and points.
+    pub bias: f64,
+    /// Median distance from the clip's mean error.
+    pub scatter: f64,
+}
+
+/// Errors of the groups over clips.
+pub fn errors(clips: &[&RenderedClip]) -> Vec<PointErrors> {
+    GROUPS.iter().map(|(name, points)| of_group(name, points, clips)).collect()
+}
+
+fn of_group(name: &'static str, points: &[usize], clips: &[&RenderedClip]) -> PointErrors {
+    let (mut distances, mut scatters, mut biases) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut n_seen, mut n_found, mut n_hidden, mut n_invented) = (0, 0, 0, 0);
+    for clip in clips {
+        for &point in points {
+            let mut errors: Vec<[f64; 2]> = Vec::new();
+            for t in 0..clip.n_frames() {
+                let is_found = clip.keypoints.body[[t, point, 2]] > SEEN_SCORE;
+                if clip.truth.body_seen[[t, point]] != Visibility::Seen {
+                    n_hidden += 1;
+                    n_invented += usize::from(is_found);
+                    continue;
+                }
+                n_seen += 1;
+                if is_found {
+                    n_found += 1;
+                    errors.push(error(clip, t, point));
+                }
+            }
+            let n = errors.len() as f64;
+            let bias = [0, 1].map(|k| errors.iter().map(|e| e[k]).sum::<f64>() / n.max(1.0));
+            if !errors.is_empty() {
+                biases.push(bias[0].hypot(bias[1]));
+            }
+            distances.extend(errors.iter().map(|e| e[0].hypot(e[1])));
+            scatters.extend(errors.iter().map(|e| (e[0] - bias[0]).hypot(e[1] - bias[1])));
+        }
+    }
+    let distances = Ordered::new(distances);
+    PointErrors {
+        points: name,
+        n_seen,
+        found: share(n_found, n_seen),
+        invented: share(n_invented, n_hidden),
+        median: distances.quantile(0.5).unwrap_or(f64::NAN),
+        p95: distances.quantile(0.95).unwrap_or(f64::NAN),
+        bias: biases.iter().sum::<f64>() / (biases.len() as f64).max(1.0),
+        scatter: Ordered::new(scatters).quantile(0.5).unwrap_or(f64::NAN),
+    }
+}
+
+/// Error of a body point in a frame, shares of the shoulder width: x to the right in the picture, y down.
+pub fn error(clip: &RenderedClip, t: usize, point: usize) -> [f64; 2] {
+    let shoulders = f64::from(clip.shoulders_px(t)).max(1e-6);
+    [0, 1].map(|k| f64::from(clip.keypoints.body[[t, point, k]] - clip.truth.body[[t, point, k]]) / shoulders)
+}
+
+/// Part of a whole, 0 of nothing.
+pub fn share(part: usize, whole: usize) -> f64 {
+    part as f64 / whole.max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluate::people::clips::tests::exact;
+
+    #[test]
+    fn a_steady_shift_is_bias_and_a_shake_is_scatter() {
+        let mut clip = exact();
+        let shoulders = clip.shoulders_px(0);
+        for t in 0..clip.n_frames() {
+            let shake = if t % 2 == 0 { 0.02 } else { -0.02 };
+            clip.keypoints.body[[t, coco::L_SHOULDER, 0]] += 0.1 * shoulders;
+            clip.keypoints.body[[t, coco::L_WRIST, 1]] += shake * shoulders;
+        }
+        clip.keypoints.body[[5, coco::R_WRIST, 2]] = 0.0;
+        clip.truth.body_seen[[7, coco::R_WRIST]] = Visibility::BehindBody;
+        let errors = errors(&[&clip]);
+        let of = |name: &str| errors.iter().find(|e| e.points == name).unwrap();
+        let (shoulders, wrists, elbows) = (of("shoulders"), of("wrists"), of("elbows"));
+        assert!((shoulders.bias - 0.05).abs() < 1e-3 && shoulders.scatter < 1e-3, "{shoulders:?}");
+        assert!(wrists.bias < 1e-3 && (wrists.p95 - 0.02).abs() < 1e-3, "{wrists:?}");
+        assert_eq!((wrists.n_seen, wrists.invented), (79, 1.0));
+        assert!((wrists.found - 78.0 / 79.0).abs() < 1e-9);
+        assert!(elbows.median < 1e-3 && elbows.found == 1.0);
+    }
+}

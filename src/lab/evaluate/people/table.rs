@@ -1,0 +1,70 @@
+//! The table of rendered people: a row for each condition, model set and all conditions together.
+
+use super::clips::{self, RenderedClip};
+use super::hands::HandCounts;
+use super::head::HeadErrors;
+use super::joints::{self, LiftedErrors};
+use super::kept::{KeptSeconds, MaskCounts};
+use super::points::{self, PointErrors};
+use anyhow::Result;
+use orator_dataset::config;
+use orator_pipeline::lift::Lifter;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Name of the row of all conditions together.
+const ALL: &str = "all";
+
+/// Row of the table.
+#[derive(Clone, Debug, Serialize)]
+pub struct PeopleRow {
+    /// Model set: the name of its configuration without ending.
+    pub set: String,
+    pub condition: String,
+    pub n_clips: usize,
+    pub points: Vec<PointErrors>,
+    pub hands: HandCounts,
+    pub head: HeadErrors,
+    pub seconds: KeptSeconds,
+    pub mask: MaskCounts,
+    pub joints: LiftedErrors,
+}
+
+/// Rows of the clips in `dir` for each configuration (a model set), by condition in the order of the list, all of them
+/// together last; only clips of `part` where one is named.
+pub fn table(dir: &Path, config_files: &[PathBuf], part: Option<&str>) -> Result<Vec<PeopleRow>> {
+    let mut rows = Vec::new();
+    for file in config_files {
+        let settings = config::load(file, &[])?.settings;
+        let lifter = Lifter::new(&config::LiftConfig { level: false, ..settings.lift })?;
+        let clips = clips::read(dir, file, part)?;
+        let set = file.file_stem().unwrap_or_default().to_string_lossy();
+        let mut conditions: Vec<&str> = Vec::new();
+        for clip in &clips {
+            if !conditions.contains(&clip.condition.as_str()) {
+                conditions.push(&clip.condition);
+            }
+        }
+        for condition in conditions {
+            let of_it: Vec<&RenderedClip> = clips.iter().filter(|clip| clip.condition == condition).collect();
+            rows.push(row(&set, condition, &of_it, &lifter)?);
+        }
+        rows.push(row(&set, ALL, &clips.iter().collect::<Vec<_>>(), &lifter)?);
+    }
+    Ok(rows)
+}
+
+fn row(set: &str, condition: &str, clips: &[&RenderedClip], lifter: &Lifter) -> Result<PeopleRow> {
+    let (motions, joints) = joints::measure(lifter, clips)?;
+    Ok(PeopleRow {
+        set: set.to_owned(),
+        condition: condition.to_owned(),
+        n_clips: clips.len(),
+        points: points::errors(clips),
+        hands: HandCounts::measure(clips),
+        head: HeadErrors::measure(clips),
+        seconds: KeptSeconds::measure(clips),
+        mask: MaskCounts::measure(clips.iter().copied().zip(&motions)),
+        joints,
+    })
+}

@@ -1,0 +1,10 @@
+//! Tools for developing and validating orator itself: synthetic speakers (`demo`), training of the body and hand lifters
+//! that the program ships (`train`), their evaluation on rendered people (`evaluate`), and the motion-capture readers that
+//! feed both (`mocap`, `rendered_truth`). No other crate depends on this one; its binary is `orator-lab`.
+
+pub mod cli;
+pub mod demo;
+pub mod evaluate;
+pub mod mocap;
+pub mod rendered_truth;
+pub mod train;

@@ -1,0 +1,172 @@
+//! Labelled hands in text files, one frame a line of u px, v px, depth mm a point: the test labels of NYU (14 points,
+//! a right hand, no knuckles) and of ICVL (16 points, a left hand), told apart by how many numbers a line holds.
+
+use anyhow::{Context, Result, bail, ensure};
+use orator_base::math::order::{lower_median, lower_quantile};
+use orator_base::math::vec3;
+use orator_base::math::vec3::Vec3;
+use orator_base::motion::hand_bones::BONES;
+use orator_base::types::pose2d::N_HAND;
+use orator_base::types::skeleton::Side;
+use orator_formats::mocap::fingers::take::{FingerTake, Fingers, Size};
+use std::path::Path;
+
+/// fx, fy, cx, cy of a depth camera, px.
+type CameraIntrinsics = [f64; 4];
+const NYU_CAMERA: CameraIntrinsics = [588.04, 587.08, 320.0, 240.0];
+const ICVL_CAMERA: CameraIntrinsics = [241.42, 241.42, 160.0, 120.0];
+
+/// House points of NYU's: tip and middle joint of little, ring, middle and index finger, then the thumb's last three.
+const NYU: [usize; 11] = [20, 18, 16, 14, 12, 10, 8, 6, 4, 3, 2];
+/// NYU's palm point lies this share of the way from the wrist to the middle knuckle (its fingers, when straight, put
+/// the knuckle there for a first phalanx of the length that goes with their other bones).
+const NYU_PALM: f64 = 0.75;
+
+/// Reads a file. Errors: unreadable, a word that is no number, lines of another length.
+pub fn read(path: &Path) -> Result<FingerTake> {
+    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    parse(&text, name).with_context(|| format!("{} holds no hand labels", path.display()))
+}
+
+fn parse(text: &str, name: String) -> Result<FingerTake> {
+    let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
+    let number = |n: usize, word: &str| {
+        word.parse::<f64>().ok().filter(|v| v.is_finite()).with_context(|| format!("line {}: `{word}`", n + 1))
+    };
+    let rows: Vec<Vec<f64>> = lines
+        .map(|(n, line)| line.split_ascii_whitespace().map(|word| number(n, word)).collect())
+        .collect::<Result<_>>()?;
+    let width = rows.first().context("it is empty")?.len();
+    if let Some(n) = rows.iter().position(|row| row.len() != width) {
+        bail!("frame {} has {} numbers, those before it {width}", n + 1, rows[n].len());
+    }
+    match width {
+        42 => Ok(nyu(&rows, name)),
+        48 => icvl(&rows, name),
+        _ => bail!("{width} numbers a line; known are 42 (NYU, 14 points) and 48 (ICVL, 16 points)"),
+    }
+}
+
+/// The points of a line in mm, axes of the camera (x right, y down, z away).
+fn points(row: &[f64], [fx, fy, cx, cy]: CameraIntrinsics) -> Vec<Vec3> {
+    let (uvds, _) = row.as_chunks::<3>();
+    uvds.iter().map(|&[u, v, d]| [(u - cx) * d / fx, (v - cy) * d / fy, d]).collect()
+}
+
+/// The wrist is the middle of its two sides. The middle knuckle is guessed from the palm's point, to be seen only.
+fn nyu(rows: &[Vec<f64>], name: String) -> FingerTake {
+    let frames = rows.iter().map(|row| {
+        let p = points(row, NYU_CAMERA);
+        let mut fingers: Fingers = [None; N_HAND];
+        NYU.iter().zip(&p).for_each(|(&house, &point)| fingers[house] = Some(point));
+        let wrist = vec3::scale(vec3::add(p[11], p[12]), 0.5);
+        fingers[0] = Some(wrist);
+        fingers[9] = Some(vec3::add(wrist, vec3::scale(vec3::sub(p[13], wrist), 1.0 / NYU_PALM)));
+        fingers
+    });
+    let counted = std::array::from_fn(|j| j == 0 || NYU.contains(&j));
+    FingerTake { name, side: Side::Right, frames: frames.collect(), counted, size: Size::MiddleEnd }
+}
+
+/// ICVL's finger points are the middles of the three last bones, not joints: their distances are in the ratios of
+/// such middles, shrink when the finger bends, and the palm's point is the palm's middle. The joints follow from
+/// them: the two bones about a joint, of known lengths, meet at the side away from where the finger bends. The wrist
+/// is put behind the palm so that the palm has its share of the hand.
+fn icvl(rows: &[Vec<f64>], name: String) -> Result<FingerTake> {
+    let frames: Vec<Vec<Vec3>> = rows.iter().map(|row| points(row, ICVL_CAMERA)).collect();
+    let mut hands: Vec<Fingers> = vec![[None; N_HAND]; frames.len()];
+    for (finger, [_, one, two, _]) in BONES.into_iter().enumerate() {
+        let [first, second, third] = [1, 2, 3].map(|k| 3 * finger + k);
+        let apart = frames.iter().map(|p| vec3::norm(vec3::sub(p[second], p[first])));
+        // half the two bones together: most frames are of straight fingers, and labels err to both sides
+        let together = lower_quantile(apart, 0.7).context("no frame")?;
+        let a = together * one / (one + two);
+        for (p, hand) in frames.iter().zip(&mut hands) {
+            let joint = meeting(p[first], p[second], p[third], a, together - a);
+            let last = vec3::sub(vec3::scale(p[second], 2.0), joint);
+            let root = 1 + 4 * finger;
+            hand[root] = Some(vec3::sub(vec3::scale(p[first], 2.0), joint));
+            hand[root + 1] = Some(joint);
+            hand[root + 2] = Some(last);
+            hand[root + 3] = Some(vec3::sub(vec3::scale(p[third], 2.0), last));
+        }
+    }
+    let size = |hand: &Fingers| Some(vec3::norm(vec3::sub(hand[10]?, hand[9]?)) as f32);
+    let phalanx = f64::from(lower_median(hands.iter().filter_map(size)).context("no frame")?);
+    ensure!(phalanx > 1e-3, "all points of the middle finger lie in one place");
+    let palm = phalanx * BONES[2][0] / BONES[2][1];
+    for (p, hand) in frames.iter().zip(&mut hands) {
+        let knuckles = [5, 9, 13, 17].map(|j| hand[j].unwrap_or_default());
+        let middle = vec3::scale(knuckles.into_iter().fold([0.0; 3], vec3::add), 0.25);
+        let back = vec3::unit(vec3::sub(p[0], middle), 1e-9).unwrap_or_default();
+        hand[0] = Some(vec3::add(middle, vec3::scale(back, palm)));
+    }
+    Ok(FingerTake { name, side: Side::Left, frames: hands, counted: [true; N_HAND], size: Size::Phalanx })
+}
+
+/// The joint between two bones whose middles are `first` and `second`, `a` and `b` from it; `third` lies where the
+/// finger bends to.
+fn meeting(first: Vec3, second: Vec3, third: Vec3, a: f64, b: f64) -> Vec3 {
+    let along = vec3::sub(second, first);
+    let apart = vec3::norm(along).min(a + b).max((a - b).abs() + 1e-9);
+    let along = vec3::unit(along, 1e-9).unwrap_or([0.0, 1.0, 0.0]);
+    let foot = (a * a - b * b + apart * apart) / (2.0 * apart);
+    let height = (a * a - foot * foot).max(0.0).sqrt();
+    let bent = vec3::across(vec3::sub(third, second), along);
+    let side = vec3::unit(bent, 1e-9).unwrap_or_default();
+    vec3::add(first, vec3::sub(vec3::scale(along, foot), vec3::scale(side, height)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use orator_base::motion::hand_bones::relaxed;
+
+    fn line(points: &[Vec3], [fx, fy, cx, cy]: CameraIntrinsics) -> String {
+        let numbers = points.iter().flat_map(|&[x, y, z]| [fx * x / z + cx, fy * y / z + cy, z]);
+        numbers.map(|v| format!("{v} ")).collect::<String>() + "\n"
+    }
+
+    fn far(left: f64) -> Vec<Vec3> {
+        relaxed().iter().map(|&[x, y, z]| [left * 1000.0 * x, 1000.0 * y, 600.0 + 1000.0 * z]).collect()
+    }
+
+    #[test]
+    fn nyu_points_find_their_places() {
+        let hand = far(1.0);
+        let wrist = hand[0];
+        let mut p: Vec<Vec3> = NYU.iter().map(|&j| hand[j]).collect();
+        p.extend([vec3::add(wrist, [9.0, 0.0, 0.0]), vec3::sub(wrist, [9.0, 0.0, 0.0])]);
+        p.push(vec3::add(wrist, vec3::scale(vec3::sub(hand[9], wrist), 0.75)));
+        let take = parse(&line(&p, NYU_CAMERA).repeat(2), "n".into()).unwrap();
+        assert!(!take.has_knuckles() && !take.counted[9] && take.side == Side::Right);
+        let truth = &take.truths().unwrap()[1];
+        let off = |j: usize| vec3::norm(vec3::sub(truth.hand[j], relaxed()[j]));
+        assert!(NYU.iter().all(|&j| off(j) < 3e-3) && off(9) < 3e-3 && !truth.there[5]);
+    }
+
+    #[test]
+    fn icvl_joints_follow_from_the_middles_of_bones() {
+        let hand = far(-1.0);
+        let middle = |a: usize, b: usize| vec3::scale(vec3::add(hand[a], hand[b]), 0.5);
+        let mut p = vec![vec3::scale(vec3::add(hand[0], hand[9]), 0.5)];
+        for root in [1, 5, 9, 13, 17] {
+            p.extend([0, 1, 2].map(|k| middle(root + k, root + k + 1)));
+        }
+        let take = parse(&line(&p, ICVL_CAMERA).repeat(3), "i".into()).unwrap();
+        let truth = &take.truths().unwrap()[0];
+        // the file's own straight fingers give the lengths; here all are bent, hence the millimetres
+        let off: Vec<f64> = (1..N_HAND).map(|j| vec3::norm(vec3::sub(truth.hand[j], relaxed()[j]))).collect();
+        assert!(off.iter().all(|o| *o < 0.02), "{off:?}");
+    }
+
+    #[test]
+    fn other_files_say_what_is_known() {
+        for (text, says) in [("", "empty"), ("1 2 3", "42"), ("1 x", "`x`"), ("1 2\n1", "frame 2"), ("NaN", "line 1")] {
+            let text = format!("{:#}", parse(text, String::new()).unwrap_err());
+            assert!(text.contains(says), "{text}");
+        }
+        assert!(parse(&"0 ".repeat(48), String::new()).is_err());
+    }
+}

@@ -1,0 +1,117 @@
+//! What the heat-map lifter learns (Zimmermann & Brox 2017): score maps of hands made by rule to the hand in its own
+//! frame and that frame's turn. The same hands as the coordinate network's, all of them right ones.
+
+use crate::train::scene::hand::{errors, sample_hand};
+use crate::train::scene::hand_shape::normal;
+use crate::train::supervised::TrainingTask;
+use anyhow::Result;
+use candle_core::Tensor;
+use orator_base::motion::view::heatmaps::{Crop, PLACES, canonical, score_maps};
+use orator_base::types::pose2d::N_HAND;
+use orator_base::types::skeleton::Side;
+use orator_nn::Mode;
+use orator_nn::lifter::heatmap::{HeatmapLifter, NAME, right_sides};
+use orator_nn::params::Params;
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+use serde_json::{Value, json};
+
+/// Kind of the weights file.
+pub const KIND: &str = "hand-heatmap-lifter";
+/// What comes out, three numbers each: the points, then the rows of the turn.
+const N_ROWS: usize = N_HAND + 3;
+
+/// Hands that errors are measured on, few since each takes long.
+const MEASURED: usize = 300;
+
+/// Training task of the network.
+pub struct HeatmapLifterTask {
+    params: Params,
+    lifter: HeatmapLifter,
+}
+
+impl HeatmapLifterTask {
+    /// The networks with first values from `seed`.
+    pub fn new(seed: u64) -> Result<Self> {
+        let mut params = Params::new(seed);
+        let lifter = HeatmapLifter::new(&mut params, NAME)?;
+        Ok(Self { params, lifter })
+    }
+
+    pub fn lifter(&self) -> &HeatmapLifter {
+        &self.lifter
+    }
+}
+
+impl TrainingTask for HeatmapLifterTask {
+    fn kind(&self) -> &'static str {
+        KIND
+    }
+
+    fn metadata(&self) -> Value {
+        json!({ "config": { "places": PLACES, "points": N_HAND } })
+    }
+
+    fn params(&self) -> &Params {
+        &self.params
+    }
+
+    fn shape_in(&self) -> Vec<usize> {
+        vec![PLACES, PLACES, N_HAND]
+    }
+
+    fn weights(&self) -> Vec<f32> {
+        vec![1.0; N_ROWS]
+    }
+
+    /// The crop is up to 1.2 times as large as it need be and its centre off by 10 px (sd) of its 256.
+    fn sample(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]) {
+        let (drawn, crop, (own, axes)) = loop {
+            let drawn = sample_hand(rng);
+            if let (Some(crop), Some(target)) = (Crop::around(&drawn.seen), canonical(&drawn.truth)) {
+                break (drawn, crop, target);
+            }
+        };
+        let side = crop.side * rng.random_range(1.0..1.2);
+        let centre = crop.centre.map(|c| c + 10.0 / 256.0 * side * normal(rng));
+        score_maps(&drawn.seen, Crop { centre, side }, x);
+        let numbers = own.iter().chain(&axes).flatten();
+        y.iter_mut().zip(numbers).for_each(|(y, v)| *y = *v as f32);
+    }
+
+    fn forward(&self, x: &Tensor, mode: &mut Mode) -> candle_core::Result<Tensor> {
+        self.lifter.forward(x, &right_sides(x.dim(0)?, x)?, mode)
+    }
+
+    /// Mean squared error of the points plus that of the turn.
+    fn loss(&self, out: &Tensor, wanted: &Tensor, _weights: &Tensor) -> candle_core::Result<Tensor> {
+        let off = (out.reshape(wanted.shape())? - wanted)?.sqr()?;
+        off.narrow(1, 0, N_HAND)?.mean_all()? + off.narrow(1, N_HAND, 3)?.mean_all()?
+    }
+
+    fn errors(&self, brief: bool) -> Result<Vec<String>> {
+        errors(|seen| Ok(self.lifter.lift(seen, Side::Right)?), MEASURED, brief)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use candle_core::Device;
+    use orator_base::motion::view::heatmaps::N_MAPS;
+    use rand::SeedableRng;
+
+    #[test]
+    fn targets_are_hands_in_their_own_frame_and_a_right_answer_costs_nothing() -> Result<()> {
+        let training_task = HeatmapLifterTask::new(1)?;
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let (mut x, mut y) = (vec![0.0; N_MAPS], vec![0.0; 3 * N_ROWS]);
+        training_task.sample(&mut rng, &mut x, &mut y);
+        assert!(x.iter().all(|v| (0.0..=1.0).contains(v)) && x.iter().any(|v| *v > 0.9));
+        assert!(y[3 * 9].abs() + y[3 * 9 + 2].abs() + y[3 * 17 + 2].abs() < 1e-6 && y[3 * 9 + 1] > 0.5);
+        let y = Tensor::from_vec(y, (1, N_ROWS, 3), &Device::Cpu)?;
+        let weights = Tensor::from_vec(training_task.weights(), (1, N_ROWS), &Device::Cpu)?;
+        assert_eq!(training_task.loss(&y, &y, &weights)?.to_scalar::<f32>()?, 0.0);
+        Ok(())
+    }
+}

@@ -1,0 +1,109 @@
+//! Errors of real hand models as they were measured on rendered people, to be made again on keypoints without error: a
+//! bias that hangs on how the bones lie in the picture, and noise of the whole hand, of a finger and of a point, more of
+//! it where a finger is hidden. All is relative to the wrist, in lengths of the palm (wrist to middle knuckle).
+
+use super::hand_shape::normal;
+use orator_base::motion::view::hand::parent;
+use orator_base::types::pose2d::N_HAND;
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+/// Points beside the wrist.
+pub const N_POINTS: usize = N_HAND - 1;
+/// Fingers, and points of each.
+pub const N_FINGERS: usize = 5;
+pub const N_OF_FINGER: usize = 4;
+/// Vectors that a bias hangs on.
+pub const N_BASIS: usize = 3;
+
+/// Noise of one model set.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HandNoise {
+    /// Name of the model set.
+    pub set: String,
+    /// Bias of each point but the wrist: weights of the vectors of `basis`.
+    pub bias: [[f64; N_BASIS]; N_POINTS],
+    /// Standard deviation, on each axis, of what all points have in common (the wrist's own error).
+    pub hand: f64,
+    /// Noise of fingers that can be seen, and of hidden ones.
+    pub seen: FingerNoise,
+    pub hidden: FingerNoise,
+    /// Share of the fingers that are hidden, 0..1.
+    pub hides: f64,
+}
+
+/// Noise of a finger, an axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FingerNoise {
+    /// Standard deviation of what its points have in common, of most fingers and of the others, and the others' share.
+    pub finger: f64,
+    pub stray_finger: f64,
+    pub strays: f64,
+    /// Standard deviation of the rest of a point.
+    pub point: f64,
+}
+
+/// Vectors of the picture that the bias of point `j` (1..21) hangs on: the palm, the palm's width, the bone to the point.
+pub fn basis(hand: &[[f64; 2]; N_HAND], j: usize) -> [[f64; 2]; N_BASIS] {
+    let between = |a: usize, b: usize| [0, 1].map(|k| hand[b][k] - hand[a][k]);
+    [between(0, 9), between(17, 5), between(parent(j), j)]
+}
+
+impl HandNoise {
+    /// Keypoints with noise: `hand` in px, `palm_px` the length of its palm seen from the side; `much` scales all of it.
+    /// With `with_bias` the measured bias is added.
+    pub fn apply(&self, hand: &mut [[f64; 2]; N_HAND], palm_px: f64, much: f64, with_bias: bool, rng: &mut ChaCha8Rng) {
+        let exact = *hand;
+        let size = palm_px * much;
+        let whole = [0, 1].map(|_| self.hand * normal(rng));
+        for finger in 0..N_FINGERS {
+            let noise = if rng.random_bool(self.hides.clamp(0.0, 1.0)) { self.hidden } else { self.seen };
+            let is_stray = rng.random_bool(noise.strays.clamp(0.0, 1.0));
+            let much = if is_stray { noise.stray_finger } else { noise.finger };
+            let of_finger = [0, 1].map(|_| much * normal(rng));
+            let first = 1 + N_OF_FINGER * finger;
+            for (j, point) in hand.iter_mut().enumerate().skip(first).take(N_OF_FINGER) {
+                let bias = basis(&exact, j);
+                for k in 0..2 {
+                    let own = noise.point * normal(rng);
+                    point[k] += size * (whole[k] + of_finger[k] + own);
+                    if with_bias {
+                        point[k] += bias.iter().zip(self.bias[j - 1]).map(|(v, weight)| weight * v[k]).sum::<f64>();
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+
+    #[test]
+    fn noise_has_its_size_and_the_wrist_stays() {
+        let noise = HandNoise {
+            set: String::new(),
+            bias: [[0.0; N_BASIS]; N_POINTS],
+            hand: 0.03,
+            seen: FingerNoise { finger: 0.04, point: 0.02, ..FingerNoise::default() },
+            hidden: FingerNoise::default(),
+            hides: 0.0,
+        };
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let mut sum = 0.0;
+        for _ in 0..2000 {
+            let mut hand = [[0.0; 2]; N_HAND];
+            noise.apply(&mut hand, 100.0, 1.0, true, &mut rng);
+            assert_eq!(hand[0], [0.0; 2]);
+            sum += hand[7][0].powi(2);
+        }
+        let deviation = (sum / 2000.0).sqrt();
+        assert!(
+            (deviation - 100.0 * (0.03f64.powi(2) + 0.04f64.powi(2) + 0.02f64.powi(2)).sqrt()).abs() < 0.4,
+            "{deviation}"
+        );
+    }
+}

@@ -1,0 +1,211 @@
+//! Errors of real 2D models as they were measured on rendered people, to be made again on keypoints without error: a
+//! bias that hangs on how the bones lie in the picture, a bias of the clip, noise that lasts over frames, more of it
+//! where a point is hidden, and gaps. Lengths are shares of the shoulder width, frames those of 15 a second.
+
+use super::hand_noise::HandNoise;
+use super::hand_shape::normal;
+use anyhow::{Context, Result};
+use orator_base::motion::upper_body::{
+    L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, N_POINTS, NOSE, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST, SeenBody,
+};
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+use std::sync::OnceLock;
+
+/// Measured errors of the known model sets.
+const MEASURED: &str = include_str!("../../../../models/keypoint_noise.json");
+/// Points alike on both sides of the body: nose, shoulder, elbow, wrist, hip.
+pub const N_KINDS: usize = 5;
+/// Vectors that a bias hangs on, with the picture's downward direction last.
+pub const N_BASIS: usize = 4;
+
+/// Noise of one model set.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct KeypointNoise {
+    /// Name of the model set.
+    pub set: String,
+    /// Nose, shoulder, elbow, wrist, hip.
+    pub points: [PointNoise; N_KINDS],
+}
+
+/// Noise of a point.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PointNoise {
+    /// Bias: weights of the vectors of `basis`.
+    pub bias: [f64; N_BASIS],
+    /// Standard deviation, on each axis, of the rest of a clip's mean error.
+    pub clip: f64,
+    /// Noise of frames in which the point can be seen, and in which it is hidden.
+    pub seen: FrameNoise,
+    pub hidden: FrameNoise,
+    /// Runs of hidden frames, and of frames in which the point is not found.
+    pub hides: Runs,
+    pub gaps: Runs,
+}
+
+/// Noise of single frames about the mean of the clip, an axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FrameNoise {
+    /// Standard deviation of most frames, and of the others.
+    pub deviation: f64,
+    pub stray_deviation: f64,
+    /// Share of the others, 0..1.
+    pub strays: f64,
+    /// Correlation from frame to frame, 0..1.
+    pub correlation: f64,
+}
+
+/// Runs of frames in a state that comes and goes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Runs {
+    /// Probability that a run begins in a frame outside one, and that it ends in a frame of one.
+    pub begin: f64,
+    pub end: f64,
+}
+
+impl Runs {
+    /// Whether each of `n` frames is in a run.
+    pub fn sample(&self, n: usize, rng: &mut ChaCha8Rng) -> Vec<bool> {
+        let share = self.begin / (self.begin + self.end).max(1e-9);
+        let mut inside = rng.random_bool(share.clamp(0.0, 1.0));
+        (0..n)
+            .map(|_| {
+                let now = inside;
+                let change = if inside { self.end } else { self.begin };
+                inside ^= rng.random_bool(change.clamp(0.0, 1.0));
+                now
+            })
+            .collect()
+    }
+}
+
+/// Noise of model sets, as `orator-lab train noise` writes it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MeasuredNoise {
+    pub bodies: Vec<KeypointNoise>,
+    pub hands: Vec<HandNoise>,
+}
+
+/// Noise of all measured model sets, built into the program.
+pub fn measured() -> &'static MeasuredNoise {
+    static PARSED: OnceLock<MeasuredNoise> = OnceLock::new();
+    // A test reads the built-in file; without it lifters would learn from keypoints with the assumed noise alone.
+    PARSED.get_or_init(|| parse(MEASURED).unwrap_or(MeasuredNoise { bodies: Vec::new(), hands: Vec::new() }))
+}
+
+fn parse(text: &str) -> Result<MeasuredNoise> {
+    serde_json::from_str(text).context("the built-in keypoint noise")
+}
+
+/// Kind of a point.
+pub fn kind(point: usize) -> usize {
+    match point {
+        NOSE => 0,
+        R_SHOULDER | L_SHOULDER => 1,
+        R_ELBOW | L_ELBOW => 2,
+        R_WRIST | L_WRIST => 3,
+        _ => 4,
+    }
+}
+
+/// Vectors of the picture, in shoulder widths, that the bias of a point hangs on: bones beside it, then down. They turn
+/// with the picture and change sides with the body, so that both sides share their weights. `None`: a point is missing.
+pub fn basis(body: &SeenBody, point: usize, shoulders_px: f64) -> Option<[[f64; 2]; N_BASIS]> {
+    let at = |joint: usize| body[joint].map(|p| p.map(|v| f64::from(v) / shoulders_px));
+    let between = |a: [f64; 2], b: [f64; 2]| [b[0] - a[0], b[1] - a[1]];
+    let (right, left) = (at(R_SHOULDER)?, at(L_SHOULDER)?);
+    let neck = [0, 1].map(|k| (right[k] + left[k]) / 2.0);
+    let to_nose = between(neck, at(NOSE)?);
+    let [shoulder, elbow, wrist, hip] = if (L_SHOULDER..=L_WRIST).contains(&point) || point == L_HIP {
+        [left, at(L_ELBOW)?, at(L_WRIST)?, at(L_HIP).unwrap_or(left)]
+    } else {
+        [right, at(R_ELBOW)?, at(R_WRIST)?, at(R_HIP).unwrap_or(right)]
+    };
+    let [out, upper, fore] = [between(neck, shoulder), between(shoulder, elbow), between(elbow, wrist)];
+    let vectors = match kind(point) {
+        0 => [to_nose, [0.0; 2], [0.0; 2]],
+        1 => [out, upper, to_nose],
+        2 => [upper, fore, out],
+        3 => [fore, upper, out],
+        _ => [between(shoulder, hip), out, [0.0; 2]],
+    };
+    Some([vectors[0], vectors[1], vectors[2], [0.0, 1.0]])
+}
+
+impl KeypointNoise {
+    /// Noise on keypoints without error; `much` scales all of it but the gaps. With `with_bias` the measured bias is
+    /// added, else one of its size in any direction, steady over the clip.
+    pub fn apply(&self, body: &mut [SeenBody], shoulders_px: f64, much: f64, with_bias: bool, rng: &mut ChaCha8Rng) {
+        let exact = body.to_vec();
+        for point in 0..N_POINTS {
+            let noise = &self.points[kind(point)];
+            let any_way = [normal(rng), normal(rng)];
+            let hidden = noise.hides.sample(body.len(), rng);
+            let gone = noise.gaps.sample(body.len(), rng);
+            let clip = [0, 1].map(|_| noise.clip * normal(rng));
+            let mut lasting = [normal(rng), normal(rng)];
+            for (t, frame) in body.iter_mut().enumerate() {
+                let of_frame = if hidden[t] { noise.hidden } else { noise.seen };
+                let keep = of_frame.correlation.clamp(0.0, 0.99);
+                lasting = lasting.map(|v| keep * v + (1.0 - keep * keep).sqrt() * normal(rng));
+                let is_stray = rng.random_bool(of_frame.strays.clamp(0.0, 1.0));
+                let stray = [0, 1].map(|_| if is_stray { of_frame.stray_deviation * normal(rng) } else { 0.0 });
+                let Some(place) = frame[point].as_mut() else { continue };
+                let bias = basis(&exact[t], point, shoulders_px).map_or([0.0; 2], |basis| {
+                    [0, 1].map(|k| basis.iter().zip(noise.bias).map(|(vector, weight)| weight * vector[k]).sum::<f64>())
+                });
+                let bias = if with_bias { bias } else { any_way.map(|v| 0.7 * v * bias[0].hypot(bias[1])) };
+                for k in 0..2 {
+                    let off = bias[k] + clip[k] + of_frame.deviation * lasting[k] + stray[k];
+                    place[k] += (shoulders_px * much * off) as f32;
+                }
+                if gone[t] {
+                    frame[point] = None;
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+
+    #[test]
+    fn what_is_measured_can_be_read_and_runs_have_their_shares() {
+        assert_eq!(measured(), &parse(MEASURED).unwrap());
+        assert!(!measured().bodies.is_empty() && !measured().hands.is_empty());
+        let runs = Runs { begin: 0.05, end: 0.2 };
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let inside = runs.sample(100_000, &mut rng);
+        let share = inside.iter().filter(|v| **v).count() as f64 / 1e5;
+        assert!((share - 0.2).abs() < 0.01, "{share}");
+        assert!(Runs::default().sample(50, &mut rng).iter().all(|v| !v));
+    }
+
+    #[test]
+    fn the_bias_goes_with_the_bones_and_changes_sides_with_the_body() {
+        let body: SeenBody = [
+            [0.0, -60.0],
+            [-50.0, 0.0],
+            [-60.0, 80.0],
+            [-20.0, 120.0],
+            [50.0, 0.0],
+            [60.0, 80.0],
+            [20.0, 120.0],
+            [-30.0, 150.0],
+            [30.0, 150.0],
+        ]
+        .map(Some);
+        let mut noise = KeypointNoise { set: String::new(), points: Default::default() };
+        noise.points[3].bias = [0.1, 0.0, 0.0, 0.0];
+        let mut moved = [body];
+        noise.apply(&mut moved, 100.0, 1.0, true, &mut ChaCha8Rng::seed_from_u64(2));
+        let off = |point: usize| [0, 1].map(|k| moved[0][point].unwrap()[k] - body[point].unwrap()[k]);
+        assert_eq!(off(R_ELBOW), [0.0; 2]);
+        assert!((off(R_WRIST)[0] - 4.0).abs() < 1e-4 && (off(L_WRIST)[0] + 4.0).abs() < 1e-4);
+        assert!((off(R_WRIST)[1] - 4.0).abs() < 1e-4);
+    }
+}

@@ -1,0 +1,224 @@
+//! What the fixed spaces of motion (`metrics::basis`, `metrics::embedding`) are learnt from: captured bodies with hands
+//! made by rule, bodies made by rule, and whole speakers made by rule that the caller brings. 15 frames a second, all 49
+//! joints, every other piece in the mirror.
+
+use crate::mocap::upper_body::{BodyTake, Set};
+use crate::train::scene::body_motion;
+use crate::train::scene::hand_motion::HandMotion;
+use anyhow::{Context, Result, ensure};
+use ndarray::{Array2, Array3};
+use orator_base::math::vec3;
+use orator_base::math::vec3::Vec3;
+use orator_base::motion::upper_body::{ARMS, L_SHOULDER, Pose, R_SHOULDER};
+use orator_base::types::pose3d::Motion;
+use orator_base::types::skeleton::{L_HAND, N_JOINTS, R_HAND, mirror};
+use orator_base::types::time::FrameRate;
+use orator_gesture::metrics::space::fixed_rate::{FPS, Frames};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::f64::consts::PI;
+
+/// Times each captured take is used, each with other hands.
+const COPIES: usize = 4;
+/// Pieces of bodies made by rule, and frames of one.
+const RULES: usize = 120;
+const RULE_FRAMES: usize = 300;
+/// Share of pairs of hands that do nearly the same.
+const TOGETHER: f64 = 0.4;
+/// A captured person is turned to the front over so many seconds.
+const FACING_SECS: f64 = 1.5;
+
+/// One continuous stretch.
+pub struct CorpusPiece {
+    pub name: String,
+    /// [T, 49, 3], metres, the neck at the origin, 15 frames a second.
+    pub joints: Array3<f32>,
+}
+
+/// Everything that is learnt from, and sets that are only measured on.
+pub struct Corpus {
+    pub pieces: Vec<CorpusPiece>,
+    pub held_out: Vec<(String, Vec<CorpusPiece>)>,
+    metadata: serde_json::Value,
+}
+
+impl Corpus {
+    /// Of captured `takes`, bodies made by rule, and `speakers` made by rule; `held_out` takes and `other_speakers` are only
+    /// measured on.
+    pub fn new(
+        takes: &[BodyTake],
+        held_out: &[Set],
+        speakers: &[(String, Motion)],
+        other_speakers: &[(String, Motion)],
+        seed: u64,
+    ) -> Result<Self> {
+        let mut pieces = Vec::new();
+        for copy in 0..COPIES {
+            for take in takes {
+                let piece = captured(take, copy, seed)?;
+                pieces.push(if copy % 2 == 1 { piece.mirrored() } else { piece });
+            }
+        }
+        pieces.extend((0..RULES).map(|n| by_rule(n, seed)));
+        pieces.extend(speakers.iter().enumerate().map(|(n, (name, motion))| {
+            let piece = CorpusPiece::new(name.clone(), motion);
+            if n / 2 % 2 == 1 { piece.mirrored() } else { piece }
+        }));
+        let mut sets = Vec::new();
+        for (set, takes) in held_out {
+            let takes: Result<Vec<CorpusPiece>> = takes.iter().map(|take| captured(take, COPIES, seed)).collect();
+            sets.push((set.clone(), takes?));
+        }
+        sets.push(("bodies made by rule".into(), (RULES..RULES + RULES / 6).map(|n| by_rule(n, seed)).collect()));
+        if !other_speakers.is_empty() {
+            let pieces = other_speakers.iter().map(|(name, motion)| CorpusPiece::new(name.clone(), motion)).collect();
+            sets.push(("speakers made by rule".into(), pieces));
+        }
+        let metadata = metadata(&pieces, &sets, seed);
+        Ok(Self { pieces, held_out: sets, metadata })
+    }
+
+    /// Frames to learn from.
+    pub fn n_frames(&self) -> usize {
+        self.pieces.iter().map(|piece| piece.joints.shape()[0]).sum()
+    }
+
+    /// What says of a file what it was learnt from.
+    pub fn metadata(&self) -> &serde_json::Value {
+        &self.metadata
+    }
+}
+
+fn metadata(pieces: &[CorpusPiece], held_out: &[(String, Vec<CorpusPiece>)], seed: u64) -> serde_json::Value {
+    let mut hash = blake3::Hasher::new();
+    for piece in pieces {
+        hash.update(piece.name.as_bytes());
+        hash.update(&piece.joints.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>());
+    }
+    serde_json::json!({
+        "pieces": pieces.len(), "frames": pieces.iter().map(|piece| piece.joints.shape()[0]).sum::<usize>(), "seed": seed,
+        "held_out": held_out.iter().map(|(set, _)| set).collect::<Vec<_>>(),
+        "motion": hash.finalize().to_hex().as_str(),
+    })
+}
+
+impl CorpusPiece {
+    fn new(name: String, motion: &Motion) -> Self {
+        let whole = Array2::from_elem((motion.n_frames(), N_JOINTS), true);
+        Self { name, joints: Frames::new(motion.joints.view(), whole.view(), motion.fps).joints }
+    }
+
+    fn mirrored(self) -> Self {
+        let at = |(t, joint, k): (usize, usize, usize)| {
+            let value = self.joints[[t, mirror(joint), k]];
+            if k == 0 { -value } else { value }
+        };
+        Self { joints: Array3::from_shape_fn(self.joints.raw_dim(), at), name: format!("{} mirrored", self.name) }
+    }
+}
+
+/// Dice of each piece's own.
+fn dice(seed: u64, name: &str, n: usize) -> ChaCha8Rng {
+    ChaCha8Rng::from_seed(*blake3::hash(format!("{seed} {n} {name}").as_bytes()).as_bytes())
+}
+
+fn captured(take: &BodyTake, copy: usize, seed: u64) -> Result<CorpusPiece> {
+    ensure!(!take.poses.is_empty(), "{} has no frame", take.name);
+    let (num, den) = ((take.fps * 1000.0).round() as u32, 1000);
+    let poses = faced(&take.poses, take.fps);
+    let motion = with_hands(&poses, FrameRate::new(num, den), &mut dice(seed, &take.name, copy))
+        .with_context(|| format!("giving hands to {}", take.name))?;
+    Ok(CorpusPiece::new(format!("{} {copy}", take.name), &motion))
+}
+
+fn by_rule(n: usize, seed: u64) -> CorpusPiece {
+    let mut dice = dice(seed, "rule", n);
+    let poses = body_motion::gesture(&mut dice, RULE_FRAMES, FPS.secs(1));
+    let motion =
+        with_hands(&poses, FPS, &mut dice).unwrap_or(Motion::from_joints(FPS, Array3::zeros((0, N_JOINTS, 3))));
+    let piece = CorpusPiece::new(format!("rule {n}"), &motion);
+    if n % 2 == 1 { piece.mirrored() } else { piece }
+}
+
+/// Poses turned about the vertical so that the shoulders face the camera, but for what they turn within seconds.
+fn faced(poses: &[Pose], fps: f64) -> Vec<Pose> {
+    let side = |p: &Pose| vec3::sub(p[L_SHOULDER], p[R_SHOULDER]);
+    let mut turned = 0.0;
+    let mut last = 0.0;
+    // counted on beyond a full turn, so that the mean is one
+    let yaws: Vec<f64> = poses
+        .iter()
+        .map(|pose| {
+            let [x, _, z] = side(pose);
+            let yaw = z.atan2(x);
+            turned += (yaw - last + PI).rem_euclid(2.0 * PI) - PI;
+            last = yaw;
+            turned
+        })
+        .collect();
+    let reach = (FACING_SECS * fps).ceil() as usize;
+    let mean = |t: usize| {
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for (s, yaw) in yaws.iter().enumerate().take(t + reach + 1).skip(t.saturating_sub(reach)) {
+            let weight = 1.0 + (PI * (s as f64 - t as f64) / (reach as f64 + 1.0)).cos();
+            (sum, weights) = (sum + weight * yaw, weights + weight);
+        }
+        sum / weights
+    };
+    let turn = |(t, pose): (usize, &Pose)| {
+        let (sin, cos) = mean(t).sin_cos();
+        pose.map(|[x, y, z]| [cos * x + sin * z, y, cos * z - sin * x])
+    };
+    poses.iter().enumerate().map(turn).collect()
+}
+
+/// The 49 joints of a body of nine points, with hands that do something.
+fn with_hands(poses: &[Pose], fps: FrameRate, dice: &mut ChaCha8Rng) -> Result<Motion> {
+    let secs = fps.secs(poses.len());
+    let left = HandMotion::sample(dice, secs);
+    let right = if dice.random_bool(TOGETHER) { left.copied(dice) } else { HandMotion::sample(dice, secs) };
+    let mut joints = Array3::zeros((poses.len(), N_JOINTS, 3));
+    let mut put = |t: usize, joint: usize, place: Vec3| (0..3).for_each(|k| joints[[t, joint, k]] = place[k] as f32);
+    for (t, pose) in poses.iter().enumerate() {
+        ARMS.for_each(|joint| put(t, joint, pose[joint]));
+    }
+    for (hand, is_left, shoulder, root) in [(&left, true, L_SHOULDER, L_HAND), (&right, false, R_SHOULDER, R_HAND)] {
+        let arm: Vec<[Vec3; 3]> = poses.iter().map(|p| [p[shoulder], p[shoulder + 1], p[shoulder + 2]]).collect();
+        for (t, hand) in hand.along(&arm, is_left, fps.secs(1)).into_iter().enumerate() {
+            hand.into_iter().enumerate().for_each(|(k, place)| put(t, root + k, place));
+        }
+    }
+    ensure!(joints.iter().all(|v| v.is_finite()), "a joint is not finite");
+    Ok(Motion::from_joints(fps, joints))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use orator_base::types::skeleton::{L_WRIST, R_WRIST};
+
+    #[test]
+    fn bodies_face_the_camera_and_have_hands_on_their_wrists() {
+        // somebody who turns round twice in ten seconds
+        let still = body_motion::gesture(&mut ChaCha8Rng::seed_from_u64(1), 1, 0.1)[0];
+        let turning = |t: usize| {
+            let (sin, cos) = (4.0 * PI * t as f64 / 300.0).sin_cos();
+            still.map(|[x, y, z]| [cos * x - sin * z, y, cos * z + sin * x])
+        };
+        let take =
+            BodyTake { name: "turn#0".into(), fps: 30.0, poses: (0..300).map(turning).collect(), rendered: false };
+        let corpus = Corpus::new(&[take], &[], &[], &[], 7).unwrap();
+        assert_eq!(corpus.pieces.len(), COPIES + RULES);
+        for piece in &corpus.pieces {
+            for frame in piece.joints.outer_iter() {
+                assert!(frame[[L_SHOULDER, 0]] > 0.0, "{}", piece.name);
+                assert_eq!(frame.row(L_HAND), frame.row(L_WRIST));
+                assert_eq!(frame.row(R_HAND), frame.row(R_WRIST));
+            }
+        }
+        assert_eq!(corpus.pieces[0].joints.shape(), [150, N_JOINTS, 3]);
+        let again = Corpus::new(&[], &[], &[], &[], 7).unwrap();
+        assert_eq!(again.pieces[3].joints, corpus.pieces[COPIES + 3].joints);
+        assert_ne!(again.metadata()["motion"], Corpus::new(&[], &[], &[], &[], 8).unwrap().metadata()["motion"]);
+    }
+}

@@ -1,0 +1,280 @@
+//! The sound of a file as mono at one rate, on the clock of its pictures: sample k belongs to second k / rate after
+//! the first picture. Sound before that is cut, a late start and gaps in the container are silence. A file without
+//! pictures starts with its first sample. Sound more than ten minutes after the sound before it, or beyond a day, is
+//! left out as damage.
+
+use super::decode::StreamDecoder;
+use super::origin;
+use super::resample::{Resampler, first_not_finite, format_of};
+use super::source;
+use super::source::{LONGEST_GAP_SECS, LONGEST_SECS, UnreadableMedia};
+use anyhow::{Context, Result, bail};
+use ffmpeg_next::format::{Sample, sample};
+use ffmpeg_next::{ChannelLayout, frame};
+use orator_base::types::sound::{AudioTracks, SAMPLE_RATE, Sound};
+use std::path::Path;
+
+/// Difference between timestamp and sample count that is a gap, seconds: less than a lost frame of any codec, more than
+/// the rounding of any container.
+const GAP_SECS: f64 = 0.015;
+/// Timestamps that wander away from the count of samples, as where a clock ran slow, are followed: where their mean
+/// distance over `MEAN_SECS` is more than the rounding of a container, the next `STRETCH_SECS` are stretched by it.
+const MEAN_SECS: f64 = 1.0;
+const ROUNDING_SECS: f64 = 0.0005;
+const STRETCH_SECS: f64 = 1.0;
+/// Samples that are brought to another rate at once.
+const PIECE: usize = 65_536;
+
+/// The whole sound of `path` (wav, flac, mp3, a video, ...) as mono at `rate` samples a second; `None` when it has no
+/// sound.
+pub fn read_mono(path: &Path, rate: u32) -> Result<Option<Sound>> {
+    let mut samples = Vec::new();
+    let streamed = stream_mono(path, 0, rate, &mut |piece| {
+        samples.extend_from_slice(piece);
+        Ok(())
+    })?;
+    Ok(streamed.map(|_| Sound { rate, samples }))
+}
+
+/// A sound at another rate, as long as before. What lies above half the lower rate is not in it.
+pub fn at_rate(sound: &Sound, rate: u32) -> Result<Sound> {
+    if sound.rate == rate {
+        return Ok(sound.clone());
+    }
+    let format = Sample::F32(sample::Type::Packed);
+    let mut resampler = Resampler::new((format, ChannelLayout::MONO, sound.rate), rate)?;
+    let mut samples = Vec::new();
+    for piece in sound.samples.chunks(PIECE) {
+        let mut frame = frame::Audio::new(format, piece.len(), ChannelLayout::MONO);
+        frame.set_rate(sound.rate);
+        frame.plane_mut::<f32>(0).copy_from_slice(piece);
+        resampler.push(&frame, &mut samples)?;
+    }
+    resampler.finish(&mut samples)?;
+    Ok(Sound { rate, samples })
+}
+
+/// The whole sound of `path` as mono at 16 kHz.
+///
+/// # Errors
+/// `UnreadableMedia` where there is none, or none that decodes.
+pub fn read_sound(path: &Path) -> Result<Sound> {
+    let name = path.display();
+    let unreadable = |problem| Err(UnreadableMedia(problem).into());
+    if !path.is_file() {
+        return unreadable(format!("{name} is no file"));
+    }
+    match read_mono(path, SAMPLE_RATE)? {
+        Some(sound) if !sound.samples.is_empty() => Ok(sound),
+        _ => unreadable(format!("{name} has no sound")),
+    }
+}
+
+/// Totals of `stream_mono`.
+pub struct StreamedSound {
+    /// Number of samples handed on.
+    pub n_samples: u64,
+    /// Track that was read, and the others.
+    pub tracks: AudioTracks,
+    n_misplaced: u64,
+}
+
+impl StreamedSound {
+    /// Sentence about what was left out.
+    pub fn damage(&self) -> Option<String> {
+        (self.n_misplaced > 0).then(|| format!("{} pieces of sound with impossible times", self.n_misplaced))
+    }
+}
+
+/// Decodes the sound track `track` of `path` (from 1; 0: the automatic choice) and hands it to `sink` piece by piece;
+/// `None` without sound. A sample that is no number is an error that names its second.
+pub fn stream_mono(
+    path: &Path,
+    track: usize,
+    rate: u32,
+    sink: &mut dyn FnMut(&[f32]) -> Result<()>,
+) -> Result<Option<StreamedSound>> {
+    let input = source::open(path)?;
+    let chosen = source::audio_track(&input, track).with_context(|| path.display().to_string())?;
+    let Some((stream, tracks)) = chosen else { return Ok(None) };
+    let stream_idx = stream.index();
+    let latest_secs = source::latest_secs(&input, &stream);
+    let mut zero_secs = origin::first_picture_secs(path)?;
+    let mut decode = StreamDecoder::new(path, input, stream_idx, 1)?;
+    let secs_per_tick = f64::from(decode.time_base());
+    let mut timeline = SoundTimeline {
+        rate,
+        n_written: 0,
+        n_skip: 0,
+        run: None,
+        ahead: ClockDrift::default(),
+        ready: Vec::new(),
+        sink,
+    };
+    let mut frame = frame::Audio::empty();
+    let (mut n_frames, mut n_misplaced) = (0u64, 0u64);
+    while decode.next(&mut frame)? {
+        if frame.samples() == 0 || frame.rate() == 0 {
+            continue;
+        }
+        source::check_rate(path, frame.rate())?;
+        let at = frame.timestamp().map(|ticks| ticks as f64 * secs_per_tick);
+        let zero = *zero_secs.get_or_insert(at.unwrap_or(0.0));
+        // A time far beyond the file's stated end is broken; the sound continues without a gap.
+        let at = at.map(|at| at - zero).filter(|at| *at < latest_secs);
+        if timeline.reaches(at) {
+            n_frames += 1;
+            if let Some(sample_idx) = first_not_finite(&frame) {
+                let secs = at.unwrap_or(timeline.end_secs()) + sample_idx as f64 / f64::from(frame.rate());
+                bail!(
+                    "the sound of {} is damaged: a sample that is no number at second {secs:.2}; convert or record it again",
+                    path.display()
+                );
+            }
+            timeline.push(at, &frame).with_context(|| format!("the sound of {}", path.display()))?;
+        } else {
+            n_misplaced += 1;
+        }
+    }
+    if n_frames == 0 {
+        let misplaced = StreamedSound { n_samples: 0, tracks: AudioTracks::default(), n_misplaced }.damage();
+        let Some(damage) = misplaced.or_else(|| decode.damage()) else { return Ok(None) };
+        let name = path.display();
+        let problem = format!("no sound of {name} can be decoded ({damage}): copy or download it again");
+        return Err(UnreadableMedia(problem).into());
+    }
+    timeline.end_run()?;
+    Ok(Some(StreamedSound { n_samples: timeline.n_written, tracks, n_misplaced }))
+}
+
+/// Difference of timestamps and sample count.
+#[derive(Default)]
+struct ClockDrift {
+    sum: f64,
+    secs: f64,
+}
+
+impl ClockDrift {
+    /// Adds a frame of `secs` whose timestamp is `ahead` seconds late; returns the mean at the end of each `MEAN_SECS`.
+    fn mean(&mut self, ahead: f64, secs: f64) -> Option<f64> {
+        self.sum += ahead * secs;
+        self.secs += secs;
+        let mean = (self.secs >= MEAN_SECS).then(|| self.sum / self.secs);
+        if mean.is_some() {
+            *self = Self::default();
+        }
+        mean
+    }
+}
+
+/// Placement of continuous runs of sound in time.
+struct SoundTimeline<'a> {
+    rate: u32,
+    n_written: u64,
+    /// Samples at the start of the run that are before time 0 or repeated.
+    n_skip: u64,
+    /// Current run, and its start in seconds.
+    run: Option<(Resampler, f64)>,
+    ahead: ClockDrift,
+    ready: Vec<f32>,
+    sink: &'a mut dyn FnMut(&[f32]) -> Result<()>,
+}
+
+impl SoundTimeline<'_> {
+    /// Second at which the sound so far ends.
+    fn end_secs(&self) -> f64 {
+        let written = self.n_written as f64 / f64::from(self.rate);
+        self.run.as_ref().map_or(written, |(run, start)| start + run.secs())
+    }
+
+    /// Whether sound at second `at` is close enough to the sound before it, and before the last plausible second.
+    fn reaches(&self, at: Option<f64>) -> bool {
+        let end = self.end_secs();
+        let at = at.unwrap_or(end);
+        at - end.max(0.0) <= LONGEST_GAP_SECS && at < LONGEST_SECS
+    }
+
+    /// Sound that starts at second `at`; without a time it goes on where the sound before it ended.
+    fn push(&mut self, at: Option<f64>, frame: &frame::Audio) -> Result<()> {
+        let format = format_of(frame);
+        let end = self.end_secs();
+        let at = at.unwrap_or(end);
+        let goes_on = self.run.is_some() && (at - end).abs() <= GAP_SECS;
+        if !goes_on || self.run.as_ref().is_none_or(|(run, _)| run.format() != format) {
+            self.end_run()?;
+            self.begin_run(Resampler::new(format, self.rate)?, at)?;
+        }
+        if let Some((run, _)) = &mut self.run {
+            if goes_on
+                && run.is_even()
+                && let Some(mean) = self.ahead.mean(at - end, frame.samples() as f64 / f64::from(frame.rate()))
+                && mean.abs() > ROUNDING_SECS
+            {
+                run.stretch(mean, STRETCH_SECS)?;
+            }
+            run.push(frame, &mut self.ready)?;
+        }
+        self.deliver()
+    }
+
+    fn begin_run(&mut self, run: Resampler, at: f64) -> Result<()> {
+        let place = (at * f64::from(self.rate)).round() as i64;
+        let late = place.saturating_sub(i64::try_from(self.n_written)?);
+        self.n_skip = late.min(0).unsigned_abs();
+        self.run = Some((run, at));
+        self.ahead = ClockDrift::default();
+        const SILENCE: [f32; 4096] = [0.0; 4096];
+        let mut n_silent = late.max(0) as u64;
+        while n_silent > 0 {
+            let n = n_silent.min(SILENCE.len() as u64);
+            (self.sink)(&SILENCE[..n as usize])?;
+            self.n_written += n;
+            n_silent -= n;
+        }
+        Ok(())
+    }
+
+    fn end_run(&mut self) -> Result<()> {
+        if let Some((run, _)) = self.run.take() {
+            run.finish(&mut self.ready)?;
+        }
+        self.deliver()
+    }
+
+    fn deliver(&mut self) -> Result<()> {
+        let n_skip = self.n_skip.min(self.ready.len() as u64);
+        self.n_skip -= n_skip;
+        let streamed = &self.ready[n_skip as usize..];
+        if !streamed.is_empty() {
+            (self.sink)(streamed)?;
+            self.n_written += streamed.len() as u64;
+        }
+        self.ready.clear();
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_jump_in_time_is_believed_up_to_ten_minutes_and_a_day() {
+        let mut sink = |_: &[f32]| Ok(());
+        let mut timeline = SoundTimeline {
+            rate: 10,
+            n_written: 50,
+            n_skip: 0,
+            run: None,
+            ahead: ClockDrift::default(),
+            ready: Vec::new(),
+            sink: &mut sink,
+        };
+        let reaches =
+            |timeline: &SoundTimeline| [None, Some(-1e12), Some(604.0), Some(606.0)].map(|at| timeline.reaches(at));
+        assert_eq!(reaches(&timeline), [true, true, true, false]);
+        timeline.n_written = 864_000;
+        assert_eq!(reaches(&timeline), [false, true, true, true]);
+        assert!(!timeline.reaches(Some(f64::NAN)));
+    }
+}

@@ -1,0 +1,362 @@
+//! Pictures of a video as a stream at the dataset's rate by presentation time: output frame n shows the source frame
+//! nearest n / rate, the earlier one of two equally near. Only shown frames are converted. Time 0 is the first source
+//! frame that decodes. The last frame lasts as long as its packet says (else one source frame, ten minutes at most),
+//! which gives `duration_secs`; there are `FrameRate::frames_in(duration_secs)` output frames. All pictures have the size
+//! of the first; those of another shape stand in black bars.
+
+use super::decode::StreamDecoder;
+use super::orientation::Orientation;
+use super::picture::Converter;
+use super::probe;
+use super::probe::ProbedMedia;
+use super::source;
+use super::source::{LONGEST_GAP_SECS, UnreadableMedia};
+use super::tone_map::HdrTransfer;
+use anyhow::{Context, Result, bail};
+use ffmpeg_next::frame;
+use orator_base::types::image::{Image, PictureOptions};
+use orator_base::types::time::FrameRate;
+use std::path::{Path, PathBuf};
+
+/// Largest number of sizes whose conversion is kept ready.
+const MOST_CONVERTERS: usize = 8;
+/// Time before a place at which decoding begins at the latest to get there, seconds: pictures at a place to begin may refer
+/// to earlier ones.
+const LEAD_SECS: f64 = 1.0;
+/// Shapes whose sides' ratios differ by less than this share are one.
+const SAME_SHAPE: f64 = 0.01;
+
+/// One picture at the dataset rate.
+#[derive(Clone, Debug)]
+pub struct TimedFrame {
+    pub frame_idx: usize,
+    /// RGB, upright.
+    pub image: Image,
+    /// Presentation time of the source frame shown, seconds from the first one.
+    pub source_secs: f64,
+    /// Whether it is the source frame of the previous output frame.
+    pub repeated: bool,
+}
+
+/// Times of one output frame, without its picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrameTime {
+    pub frame_idx: usize,
+    pub source_secs: f64,
+    pub repeated: bool,
+    /// How the size of the file's picture differs from that of the previous output frame.
+    pub resize: Resize,
+}
+
+/// Change of the picture's size inside a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Resize {
+    /// The size is that of the frame before.
+    #[default]
+    None,
+    /// The shape is the same: what is seen stays in its place.
+    Scaled,
+    /// The shape is another one.
+    Reshaped,
+}
+
+/// A source frame and its time in ticks from the first one.
+struct SourceFrame {
+    frame: frame::Video,
+    ticks: i64,
+}
+
+/// Stream of a video's pictures at one rate. As an iterator it yields full-size pictures; `advance` and `picture` give
+/// times alone and pictures on demand.
+pub struct FrameReader {
+    path: PathBuf,
+    fps: FrameRate,
+    decode: StreamDecoder,
+    info: ProbedMedia,
+    orientation: Orientation,
+    options: PictureOptions,
+    image_size: [usize; 2],
+    converters: Vec<([usize; 2], Converter)>,
+    /// Ticks of the stream's clock at the first frame.
+    origin: i64,
+    /// Shown frame and the one after it.
+    shown: SourceFrame,
+    following: Option<SourceFrame>,
+    next_idx: usize,
+    /// Output frame that is not read, nor those after it.
+    end_idx: usize,
+    last_shown: Option<i64>,
+    last_size: [usize; 2],
+    /// Latest plausible time, seconds.
+    latest_secs: f64,
+    n_misplaced: usize,
+    failed: bool,
+}
+
+impl FrameReader {
+    /// Opens the video `path` with one decoder thread and decodes its first frames; errors if none decodes.
+    pub fn open(path: &Path, fps: FrameRate) -> Result<Self> {
+        Self::open_with(path, fps, 1)
+    }
+
+    /// Opens with `threads` decoder threads (0: one a core), which do not change the frames.
+    pub fn open_with(path: &Path, fps: FrameRate, threads: usize) -> Result<Self> {
+        let input = source::open(path)?;
+        let info = probe::describe(&input);
+        let stream = source::video_stream(&input).ok_or_else(|| {
+            UnreadableMedia(format!("{} has no pictures: expected a video, not sound alone", path.display()))
+        })?;
+        let orientation = Orientation::from_stream(&stream);
+        let latest_secs = source::latest_secs(&input, &stream);
+        let stream_idx = stream.index();
+        let mut decode = StreamDecoder::new(path, input, stream_idx, threads)?;
+        let mut first = frame::Video::empty();
+        if !decode.next(&mut first)? {
+            let why = decode.damage().unwrap_or_else(|| "it holds no complete one".to_owned());
+            let name = path.display();
+            let problem = format!("no picture of {name} can be decoded ({why}): copy or download it again");
+            return Err(UnreadableMedia(problem).into());
+        }
+        let image_size = upright_size(&first, orientation);
+        let origin = first.timestamp().unwrap_or(0);
+        let shown = SourceFrame { frame: first, ticks: 0 };
+        let mut reader = Self {
+            path: path.to_owned(),
+            fps,
+            decode,
+            info,
+            orientation,
+            options: PictureOptions::default(),
+            image_size,
+            converters: Vec::new(),
+            origin,
+            shown,
+            following: None,
+            next_idx: 0,
+            end_idx: usize::MAX,
+            last_shown: None,
+            last_size: image_size,
+            latest_secs,
+            n_misplaced: 0,
+            failed: false,
+        };
+        reader.following = reader.decode_after(0)?;
+        Ok(reader)
+    }
+
+    /// Goes to output frame `frame_idx`, which shows the source frame at `source_secs` as an earlier reading from the start
+    /// told: `advance` gives it next, as not repeated. Decoding begins where the container says that it can, at least
+    /// `LEAD_SECS` earlier, so that few frames are decoded in vain.
+    ///
+    /// # Errors
+    /// A container that cannot go there; no source frame of exactly that time.
+    pub fn go_to(&mut self, frame_idx: usize, source_secs: f64) -> Result<()> {
+        let ticks = (source_secs / f64::from(self.decode.time_base())).round() as i64;
+        let lead = (LEAD_SECS / f64::from(self.decode.time_base())).round() as i64;
+        self.decode.seek(self.origin.saturating_add(ticks - lead))?;
+        let mut frame = frame::Video::empty();
+        loop {
+            let found = if self.decode.next(&mut frame)? { frame.timestamp() } else { None };
+            match found.map(|at| at.saturating_sub(self.origin)) {
+                Some(at) if at < ticks => {}
+                Some(at) if at == ticks => break,
+                _ => bail!("{} shows no picture at {source_secs:.3} s when begun nearby", self.path.display()),
+            }
+        }
+        self.shown = SourceFrame { frame, ticks };
+        self.following = self.decode_after(ticks)?;
+        (self.next_idx, self.last_shown) = (frame_idx, None);
+        Ok(())
+    }
+
+    /// Ends before output frame `frame_idx`, if not earlier.
+    #[must_use]
+    pub fn until(self, frame_idx: usize) -> Self {
+        Self { end_idx: frame_idx, ..self }
+    }
+
+    /// Reads the pictures by `options` from now on.
+    #[must_use]
+    pub fn with_options(mut self, options: PictureOptions) -> Self {
+        if options.mirrored != self.options.mirrored {
+            self.orientation = self.orientation.mirrored();
+        }
+        self.options = options;
+        self.converters.clear();
+        self
+    }
+
+    /// Name of the HDR transfer function of the shown frame, `PQ` or `HLG`; `None` for SDR.
+    pub fn hdr(&self) -> Option<&'static str> {
+        HdrTransfer::of(&self.shown.frame).map(HdrTransfer::name)
+    }
+
+    /// Whether the shown frame says that it is interlaced.
+    pub fn is_flagged_interlaced(&self) -> bool {
+        self.shown.frame.is_interlaced()
+    }
+
+    /// Information of the headers.
+    pub fn info(&self) -> &ProbedMedia {
+        &self.info
+    }
+
+    /// Width and height in px of the upright pictures.
+    pub fn image_size(&self) -> [usize; 2] {
+        self.image_size
+    }
+
+    /// Expected number of frames by the headers, for progress bars.
+    pub fn expected_frames(&self) -> Option<usize> {
+        self.info.duration_secs.map(|secs| self.fps.frames_in(secs))
+    }
+
+    /// Seconds of pictures read so far; once the frames are at their end, the length of the video.
+    pub fn duration_secs(&self) -> f64 {
+        let last = self.following.as_ref().unwrap_or(&self.shown);
+        self.secs(last.ticks) + self.secs_of(last).min(LONGEST_GAP_SECS)
+    }
+
+    /// Description of damage although frames came; complete at the end of the frames.
+    pub fn damage(&self) -> Option<String> {
+        let misplaced = (self.n_misplaced > 0).then(|| format!("{} frames with impossible times", self.n_misplaced));
+        let last = self.secs_of(self.following.as_ref().unwrap_or(&self.shown));
+        let endless = (last > LONGEST_GAP_SECS).then(|| format!("the last picture claims to last {last:.0} s"));
+        let read = self.duration_secs();
+        let stated = self.info.duration_secs.filter(|stated| self.following.is_none() && *stated > read + 1.0);
+        let short = stated.map(|stated| format!("pictures end at {read:.2} s of {stated:.2} s"));
+        let parts: Vec<String> =
+            self.decode.damage().into_iter().chain(misplaced).chain(endless).chain(short).collect();
+        (!parts.is_empty()).then(|| parts.join(", "))
+    }
+
+    /// Times of the next output frame, whose picture `picture` then returns; `None` at the end.
+    pub fn advance(&mut self) -> Result<Option<FrameTime>> {
+        let frame_idx = self.next_idx;
+        if frame_idx >= self.end_idx {
+            return Ok(None);
+        }
+        while let Some(following) = &self.following {
+            if self.is_before_middle(frame_idx, self.shown.ticks, following.ticks) {
+                break;
+            }
+            let ticks = following.ticks;
+            let after = self.decode_after(ticks)?;
+            if let Some(shown) = std::mem::replace(&mut self.following, after) {
+                self.shown = shown;
+            }
+        }
+        if self.following.is_none() && frame_idx >= self.fps.frames_in(self.duration_secs()) {
+            return Ok(None);
+        }
+        self.next_idx += 1;
+        let repeated = self.last_shown.replace(self.shown.ticks) == Some(self.shown.ticks);
+        let resize = self.resize();
+        Ok(Some(FrameTime { frame_idx, source_secs: self.secs(self.shown.ticks), repeated, resize }))
+    }
+
+    /// Shown picture, upright: in full, or scaled to `size` (width, height in px).
+    pub fn picture(&mut self, size: Option<[usize; 2]>) -> Result<Image> {
+        let size = size.unwrap_or(self.image_size);
+        let fitted = self.fitted(size);
+        let at = self.converters.iter().position(|(of, _)| *of == fitted).unwrap_or_else(|| {
+            if self.converters.len() == MOST_CONVERTERS {
+                self.converters.clear();
+            }
+            self.converters.push((fitted, Converter::new(fitted, self.orientation, self.options)));
+            self.converters.len() - 1
+        });
+        let picture = self.converters[at].1.picture(&self.shown.frame);
+        let picture =
+            picture.with_context(|| format!("{}, at {:.3} s", self.path.display(), self.secs(self.shown.ticks)))?;
+        Ok(if fitted == size { picture } else { picture.framed(size) })
+    }
+
+    /// Size of the shown frame within a picture of `size`: all of it, unless its shape is not that of the first frame.
+    fn fitted(&self, size: [usize; 2]) -> [usize; 2] {
+        let shown = upright_size(&self.shown.frame, self.orientation);
+        if is_one_shape(shown, self.image_size) {
+            return size;
+        }
+        let shares = [0, 1].map(|axis| shown[axis].max(1) as f64 / self.image_size[axis].max(1) as f64);
+        let most = shares[0].max(shares[1]);
+        [0, 1].map(|axis| ((size[axis] as f64 * shares[axis] / most).round() as usize).clamp(1, size[axis].max(1)))
+    }
+
+    /// Change of size since the previous output frame.
+    fn resize(&mut self) -> Resize {
+        let size = upright_size(&self.shown.frame, self.orientation);
+        let before = std::mem::replace(&mut self.last_size, size);
+        match (before == size, is_one_shape(before, size)) {
+            (true, _) => Resize::None,
+            (false, true) => Resize::Scaled,
+            (false, false) => Resize::Reshaped,
+        }
+    }
+
+    /// Whether output frame `frame_idx` is at most as far from `early` as from `late` (ticks), exactly.
+    fn is_before_middle(&self, frame_idx: usize, early: i64, late: i64) -> bool {
+        let base = self.decode.time_base();
+        let (num, den) = (i128::from(base.numerator().max(1)), i128::from(base.denominator().max(1)));
+        // 2 n den_fps / num_fps <= (early + late) num / den
+        let twice_target = 2 * frame_idx as i128 * i128::from(self.fps.den) * den;
+        twice_target <= (i128::from(early) + i128::from(late)) * num * i128::from(self.fps.num)
+    }
+
+    /// The next source frame later than `ticks`.
+    fn decode_after(&mut self, ticks: i64) -> Result<Option<SourceFrame>> {
+        let mut frame = frame::Video::empty();
+        while self.decode.next(&mut frame)? {
+            // A frame without a time follows the previous one by that one's duration.
+            let own = frame.timestamp().map(|at| at.saturating_sub(self.origin));
+            let at = own.unwrap_or_else(|| ticks.saturating_add(frame.packet().duration.max(1)));
+            let is_near = self.secs(at.saturating_sub(ticks)) <= LONGEST_GAP_SECS;
+            if at > ticks && is_near && self.secs(at) < self.latest_secs {
+                return Ok(Some(SourceFrame { frame, ticks: at }));
+            }
+            self.n_misplaced += 1;
+        }
+        Ok(None)
+    }
+
+    fn secs(&self, ticks: i64) -> f64 {
+        ticks as f64 * f64::from(self.decode.time_base())
+    }
+
+    /// Duration of a source frame by the file.
+    fn secs_of(&self, source: &SourceFrame) -> f64 {
+        let stated = self.secs(source.frame.packet().duration);
+        if stated > 0.0 {
+            return stated;
+        }
+        let video = self.info.video.as_ref();
+        video.and_then(|video| video.fps).unwrap_or(self.fps).secs(1)
+    }
+}
+
+/// Width and height of a frame, upright and with square pixels.
+fn upright_size(frame: &frame::Video, orientation: Orientation) -> [usize; 2] {
+    let size = [frame.width() as usize, frame.height() as usize];
+    orientation.upright_size(probe::square_pixels(size, frame.aspect_ratio()))
+}
+
+fn is_one_shape(a: [usize; 2], b: [usize; 2]) -> bool {
+    let [a, b] = [a, b].map(|[width, height]| width.max(1) as f64 / height.max(1) as f64);
+    (a / b - 1.0).abs() < SAME_SHAPE
+}
+
+impl Iterator for FrameReader {
+    type Item = Result<TimedFrame>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.failed {
+            return None;
+        }
+        let frame = self.advance().and_then(|time| {
+            let Some(FrameTime { frame_idx, source_secs, repeated, .. }) = time else { return Ok(None) };
+            Ok(Some(TimedFrame { frame_idx, image: self.picture(None)?, source_secs, repeated }))
+        });
+        self.failed = frame.is_err();
+        frame.transpose()
+    }
+}

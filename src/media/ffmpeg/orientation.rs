@@ -1,0 +1,112 @@
+//! Rotation and mirroring between the coded picture and the upright one.
+
+use ffmpeg_next::codec::packet::side_data::Type as SideData;
+use ffmpeg_next::format::stream::Stream;
+use orator_base::types::image::Image;
+
+/// Rotation of the coded picture to the upright one: its x axis points along `x` and its y axis along `y` of the
+/// upright picture, each a unit step (right and down are positive). Mirroring is possible, other angles are not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Orientation {
+    x: [i8; 2],
+    y: [i8; 2],
+}
+
+impl Orientation {
+    pub const UPRIGHT: Self = Self { x: [1, 0], y: [0, 1] };
+
+    /// Orientation by the display matrix of a stream (nine 16.16 numbers; the first two rows are the images of the
+    /// axes), snapped to right angles.
+    pub fn from_stream(stream: &Stream) -> Self {
+        let matrix = stream.side_data().find(|side| side.kind() == SideData::DisplayMatrix);
+        let Some(numbers) = matrix.filter(|side| side.data().len() >= 36).map(|side| {
+            side.data().as_chunks::<4>().0.iter().map(|bytes| i32::from_ne_bytes(*bytes)).collect::<Vec<i32>>()
+        }) else {
+            return Self::UPRIGHT;
+        };
+        let [a, b, c, d] = [numbers[0], numbers[1], numbers[3], numbers[4]];
+        let unit = |v: i32| v.signum() as i8;
+        let turned = b.unsigned_abs() > a.unsigned_abs();
+        let (x, y) = if turned { ([0, unit(b)], [unit(c), 0]) } else { ([unit(a), 0], [0, unit(d)]) };
+        if x == [0, 0] || y == [0, 0] { Self::UPRIGHT } else { Self { x, y } }
+    }
+
+    /// Orientation whose upright picture has left and right exchanged.
+    pub fn mirrored(self) -> Self {
+        Self { x: [-self.x[0], self.x[1]], y: [-self.y[0], self.y[1]] }
+    }
+
+    /// Degrees clockwise from coded to upright: 0, 90, 180 or 270.
+    pub fn degrees(self) -> u32 {
+        match self.x {
+            [1, _] => 0,
+            [_, 1] => 90,
+            [-1, _] => 180,
+            _ => 270,
+        }
+    }
+
+    /// Width and height after rotation.
+    pub fn upright_size(self, [width, height]: [usize; 2]) -> [usize; 2] {
+        if self.x[0] == 0 { [height, width] } else { [width, height] }
+    }
+
+    /// Upright picture of a coded one.
+    pub fn apply(self, coded: Image) -> Image {
+        if self == Self::UPRIGHT {
+            return coded;
+        }
+        let [width, height] = self.upright_size([coded.width, coded.height]);
+        let mut upright = Image::filled(width, height, [0; 3]);
+        // Position of coded pixel 0, 0: at the far side of every reversed axis.
+        let origin = |back: bool, n: usize| if back { n as isize - 1 } else { 0 };
+        let x0 = origin(self.x[0] + self.y[0] < 0, width);
+        let y0 = origin(self.x[1] + self.y[1] < 0, height);
+        let at = |step: [i8; 2]| 3 * (isize::from(step[0]) + isize::from(step[1]) * width as isize);
+        let (dx, dy, start) = (at(self.x), at(self.y), 3 * (x0 + y0 * width as isize));
+        for (row_idx, row) in coded.data.chunks_exact(3 * coded.width).enumerate() {
+            let row_start = start + row_idx as isize * dy;
+            for (column, pixel) in row.as_chunks::<3>().0.iter().enumerate() {
+                let to = (row_start + column as isize * dx) as usize;
+                upright.data[to..to + 3].copy_from_slice(pixel);
+            }
+        }
+        upright
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn two_by_three() -> Image {
+        Image { width: 2, height: 3, data: (0..6u8).flat_map(|v| [v; 3]).collect() }
+    }
+
+    fn reds(image: &Image) -> Vec<u8> {
+        image.data.iter().step_by(3).copied().collect()
+    }
+
+    #[test]
+    fn turns_and_mirrors() {
+        // 0 1        4 2 0        5 4        1 3 5        1 0
+        // 2 3  cw->  5 3 1   180  3 2   ccw  0 2 4  flip  3 2
+        // 4 5                     1 0                     5 4
+        let cases = [
+            (Orientation { x: [0, 1], y: [-1, 0] }, 90, [3, 2], [4, 2, 0, 5, 3, 1]),
+            (Orientation { x: [-1, 0], y: [0, -1] }, 180, [2, 3], [5, 4, 3, 2, 1, 0]),
+            (Orientation { x: [0, -1], y: [1, 0] }, 270, [3, 2], [1, 3, 5, 0, 2, 4]),
+            (Orientation { x: [-1, 0], y: [0, 1] }, 180, [2, 3], [1, 0, 3, 2, 5, 4]),
+            (Orientation::UPRIGHT, 0, [2, 3], [0, 1, 2, 3, 4, 5]),
+        ];
+        for (orientation, degrees, size, expected) in cases {
+            let upright = orientation.apply(two_by_three());
+            assert_eq!(orientation.degrees(), degrees);
+            assert_eq!([upright.width, upright.height], size);
+            assert_eq!(reds(&upright), expected);
+            let mirrored = orientation.mirrored().apply(two_by_three());
+            let reversed = expected.chunks(size[0]).flat_map(|row| row.iter().rev().copied()).collect::<Vec<_>>();
+            assert_eq!(reds(&mirrored), reversed);
+        }
+    }
+}

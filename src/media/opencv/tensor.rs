@@ -1,0 +1,60 @@
+//! Pixels to network input: channel order, layout, scale, mean and standard deviation in one pass, by a table of 256
+//! values for each channel.
+
+use orator_base::types::image::Image;
+
+/// Conversion of bytes to numbers.
+pub struct Normaliser {
+    /// Channels in the tensor's order: index of a pixel's byte, and its 256 values.
+    channels: [(usize, Box<[f32; 256]>); 3],
+    planar: bool,
+}
+
+impl Normaliser {
+    /// `(byte * scale - mean) / std`, `mean` and `std` in the tensor's channel order. `bgr`: the tensor's order is blue,
+    /// green, red. `planar`: one plane a channel (NCHW), else the channels of a pixel side by side (NHWC).
+    pub fn new(bgr: bool, planar: bool, scale: f64, mean: [f64; 3], std: [f64; 3]) -> Self {
+        let channel = |c: usize| {
+            let table = std::array::from_fn(|byte| ((byte as f64 * scale - mean[c]) / std[c]) as f32);
+            (if bgr { 2 - c } else { c }, Box::new(table))
+        };
+        Self { channels: [channel(0), channel(1), channel(2)], planar }
+    }
+
+    /// Writes the picture into `tensor` (3 * width * height numbers; what is beyond either stays).
+    pub fn fill(&self, image: &Image, tensor: &mut [f32]) {
+        let [(i0, t0), (i1, t1), (i2, t2)] = &self.channels;
+        let pixels = image.data.chunks_exact(3);
+        if self.planar {
+            let plane = tensor.len() / 3;
+            let (first, rest) = tensor.split_at_mut(plane);
+            let (second, third) = rest.split_at_mut(plane);
+            for (((pixel, a), b), c) in pixels.zip(first).zip(second).zip(third) {
+                *a = t0[usize::from(pixel[*i0])];
+                *b = t1[usize::from(pixel[*i1])];
+                *c = t2[usize::from(pixel[*i2])];
+            }
+        } else {
+            for (pixel, out) in pixels.zip(tensor.chunks_exact_mut(3)) {
+                out[0] = t0[usize::from(pixel[*i0])];
+                out[1] = t1[usize::from(pixel[*i1])];
+                out[2] = t2[usize::from(pixel[*i2])];
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn order_axes_and_numbers() {
+        let image = Image { width: 2, height: 1, data: vec![10, 20, 30, 40, 50, 60] };
+        let mut tensor = [0.0; 6];
+        Normaliser::new(true, true, 1.0, [1.0, 2.0, 3.0], [2.0, 1.0, 1.0]).fill(&image, &mut tensor);
+        assert_eq!(tensor, [14.5, 29.5, 18.0, 48.0, 7.0, 37.0]);
+        Normaliser::new(false, false, 0.1, [0.0; 3], [1.0; 3]).fill(&image, &mut tensor);
+        assert_eq!(tensor, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+    }
+}

@@ -1,0 +1,228 @@
+//! Warps to pictures of another size: affine maps, boxes, rotated squares, letterboxes. Every warp is bilinear and
+//! returns the transform back to the source.
+
+use anyhow::{Result, ensure};
+use opencv::boxed_ref::{BoxedRef, BoxedRefMut};
+use opencv::core::{BORDER_CONSTANT, Mat, Scalar, Size, Vec3b};
+use opencv::imgproc::{self, INTER_LINEAR, WARP_INVERSE_MAP};
+use orator_base::types::image::Image;
+use std::sync::Once;
+
+/// Largest plausible coordinate, px.
+const FAR_PX: f64 = 1e6;
+
+/// Rows of the 2x3 matrix from a point (x, y, 1) of the warped picture to the source.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SrcFromDst(pub [[f64; 3]; 2]);
+
+impl SrcFromDst {
+    /// Point of the source for a point of the warped picture.
+    pub fn apply(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        self.0.map(|[a, b, c]| a * x + b * y + c)
+    }
+
+    fn is_sound(&self) -> bool {
+        self.0.iter().flatten().all(|number| number.abs() < FAR_PX)
+    }
+}
+
+/// A rotated square of the picture: centre and side in px, rotation in radians (clockwise on the screen).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Region {
+    pub centre: [f64; 2],
+    pub side: f64,
+    pub rotation: f64,
+}
+
+impl Region {
+    /// Transform of a crop of `size` x `size` pixels; `None` for an implausible square (not finite, smaller than a
+    /// pixel, far away).
+    pub fn src_from_dst(&self, size: usize) -> Option<SrcFromDst> {
+        let (sin, cos) = self.rotation.sin_cos();
+        let scale = self.side / size as f64;
+        let half = size as f64 / 2.0 * scale;
+        let [x, y] = self.centre;
+        let transform = SrcFromDst([
+            [cos * scale, -sin * scale, x - (cos - sin) * half],
+            [sin * scale, cos * scale, y - (sin + cos) * half],
+        ]);
+        (self.side >= 1.0 && transform.is_sound()).then_some(transform)
+    }
+}
+
+/// Fills `dst` with `src` under the transform; outside of `src` is black.
+///
+/// # Errors
+/// An empty picture, one wider or higher than 32766 px, a transform that is not finite.
+pub fn warp(src: &Image, src_from_dst: &SrcFromDst, dst: &mut Image) -> Result<()> {
+    ensure!(src_from_dst.is_sound(), "a picture cannot be warped by {src_from_dst:?}");
+    let size = Size::new(side(dst.width)?, side(dst.height)?);
+    let matrix = Mat::from_slice_2d(&src_from_dst.0)?;
+    let flags = INTER_LINEAR | WARP_INVERSE_MAP;
+    read_ahead(src, src_from_dst, [dst.width, dst.height]);
+    imgproc::warp_affine(
+        &borrow(src)?,
+        &mut borrow_mut(dst)?,
+        &matrix,
+        size,
+        flags,
+        BORDER_CONSTANT,
+        Scalar::default(),
+    )?;
+    Ok(())
+}
+
+/// Bytes of a cache line.
+const CACHE_LINE: usize = 64;
+/// Source pixels for a target pixel above which `read_ahead` does not help.
+const DENSE: usize = 4;
+
+/// Touches the source rows of a crop in order, since a rotated crop reads them in an order that hardware prefetching
+/// misses (0.2 ms instead of 0.4 ms for a hand in an uncached picture of 1280x720).
+fn read_ahead(src: &Image, src_from_dst: &SrcFromDst, [width, height]: [usize; 2]) {
+    let corners = [[0, 0], [width, 0], [0, height], [width, height]];
+    let corners = corners.map(|corner| src_from_dst.apply(corner.map(|px| px as f64)));
+    let range = |axis: usize, size: usize| {
+        let along = corners.map(|corner| corner[axis].clamp(0.0, size as f64) as usize);
+        along.iter().copied().min().unwrap_or(0)..along.iter().copied().max().unwrap_or(0)
+    };
+    let (columns, rows) = (range(0, src.width), range(1, src.height));
+    if columns.len() * rows.len() > DENSE * width * height {
+        return;
+    }
+    let touched = rows.flat_map(|y| {
+        let row = src.data.get(3 * (y * src.width + columns.start)..3 * (y * src.width + columns.end));
+        row.unwrap_or_default().iter().step_by(CACHE_LINE)
+    });
+    std::hint::black_box(touched.fold(0_u8, |sum, byte| sum ^ byte));
+}
+
+/// Fills `dst` with the whole of `src`, stretched.
+pub fn resize(src: &Image, dst: &mut Image) -> Result<()> {
+    let size = Size::new(side(dst.width)?, side(dst.height)?);
+    imgproc::resize(&borrow(src)?, &mut borrow_mut(dst)?, size, 0.0, 0.0, INTER_LINEAR)?;
+    Ok(())
+}
+
+/// Fills `dst` with the whole of `src` at the top left, its shape kept, grey level `pad` right of it or below.
+pub fn letterbox_top_left(src: &Image, dst: &mut Image, pad: u8) -> Result<SrcFromDst> {
+    let (source, canvas) = ([side(src.width)?, side(src.height)?], [side(dst.width)?, side(dst.height)?]);
+    let scale = (f64::from(canvas[0]) / f64::from(source[0])).min(f64::from(canvas[1]) / f64::from(source[1]));
+    let inner = |axis: usize| ((f64::from(source[axis]) * scale) as i32).clamp(1, canvas[axis]);
+    let size = Size::new(inner(0), inner(1));
+    dst.data.fill(pad);
+    let mut canvas = borrow_mut(dst)?;
+    let mut part = Mat::roi_mut(&mut canvas, opencv::core::Rect::new(0, 0, size.width, size.height))?;
+    imgproc::resize(&borrow(src)?, &mut part, size, 0.0, 0.0, INTER_LINEAR)?;
+    Ok(SrcFromDst([[1.0 / scale, 0.0, 0.0], [0.0, 1.0 / scale, 0.0]]))
+}
+
+/// Fills `dst` with the whole of `src` in the middle, its shape kept, grey level `pad` around it.
+pub fn letterbox_centre(src: &Image, dst: &mut Image, pad: u8) -> Result<SrcFromDst> {
+    let (source, canvas) = ([side(src.width)?, side(src.height)?], [side(dst.width)?, side(dst.height)?]);
+    let step = (f64::from(source[0]) / f64::from(canvas[0])).max(f64::from(source[1]) / f64::from(canvas[1]));
+    let shift = |axis: usize| (f64::from(source[axis]) - f64::from(canvas[axis]) * step) / 2.0;
+    let transform = SrcFromDst([[step, 0.0, shift(0)], [0.0, step, shift(1)]]);
+    let size = Size::new(canvas[0], canvas[1]);
+    let matrix = Mat::from_slice_2d(&transform.0)?;
+    let flags = INTER_LINEAR | WARP_INVERSE_MAP;
+    let grey = Scalar::all(f64::from(pad));
+    imgproc::warp_affine(&borrow(src)?, &mut borrow_mut(dst)?, &matrix, size, flags, BORDER_CONSTANT, grey)?;
+    Ok(transform)
+}
+
+/// Picture as OpenCV's matrix without copying. Also turns off OpenCV's own threads, since workers run in parallel
+/// already.
+fn borrow(image: &Image) -> Result<BoxedRef<'_, Mat>> {
+    static ONE_THREAD: Once = Once::new();
+    ONE_THREAD.call_once(|| {
+        let _ = opencv::core::set_num_threads(0);
+    });
+    let (rows, cols) = (side(image.height)?, side(image.width)?);
+    check_size(image)?;
+    Ok(Mat::new_rows_cols_with_bytes::<Vec3b>(rows, cols, &image.data)?)
+}
+
+fn borrow_mut(image: &mut Image) -> Result<BoxedRefMut<'_, Mat>> {
+    let (rows, cols) = (side(image.height)?, side(image.width)?);
+    check_size(image)?;
+    Ok(Mat::new_rows_cols_with_bytes_mut::<Vec3b>(rows, cols, &mut image.data)?)
+}
+
+fn check_size(image: &Image) -> Result<()> {
+    let expected = image.width * image.height * 3;
+    ensure!(image.data.len() == expected, "a picture has {} bytes, expected {expected}", image.data.len());
+    Ok(())
+}
+
+/// OpenCV counts a warp's pixels in 16 bits.
+fn side(px: usize) -> Result<i32> {
+    ensure!((1..32767).contains(&px), "a picture's side is {px} px, expected 1 to 32766");
+    Ok(px as i32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A smooth picture, so that bilinear sampling is nearly exact.
+    fn smooth(width: usize, height: usize) -> Image {
+        let mut image = Image::filled(width, height, [0; 3]);
+        for (at, pixel) in image.data.chunks_exact_mut(3).enumerate() {
+            let (x, y) = ((at % width) as f64, (at / width) as f64);
+            let wave = |a: f64, b: f64| (127.0 + 100.0 * (a * x + b * y).sin()) as u8;
+            pixel.copy_from_slice(&[wave(0.05, 0.02), wave(-0.03, 0.06), wave(0.02, -0.04)]);
+        }
+        image
+    }
+
+    #[test]
+    fn a_rotated_crop_shows_the_pixels_its_transform_names() {
+        let src = smooth(160, 121);
+        let region = Region { centre: [80.3, 60.1], side: 70.0, rotation: 0.7 };
+        let transform = region.src_from_dst(64).unwrap();
+        let mut dst = Image::filled(64, 64, [0; 3]);
+        warp(&src, &transform, &mut dst).unwrap();
+        for (u, v) in [(0, 0), (63, 0), (5, 60), (32, 32)] {
+            let [x, y] = transform.apply([u as f64, v as f64]);
+            let seen = dst.pixel(u, v);
+            let near = src.pixel(x.round() as usize, y.round() as usize);
+            assert!(seen.iter().zip(near).all(|(a, b)| a.abs_diff(b) <= 8), "{seen:?} {near:?}");
+        }
+        let centre = transform.apply([32.0, 32.0]);
+        assert!((centre[0] - 80.3).abs() < 1e-9 && (centre[1] - 60.1).abs() < 1e-9);
+    }
+
+    #[test]
+    fn outside_is_black_and_nonsense_is_no_place() {
+        let src = Image::filled(7, 5, [200; 3]);
+        let mut dst = Image::filled(8, 8, [9; 3]);
+        let away = Region { centre: [-5000.0, 900.0], side: 50.0, rotation: 0.3 };
+        warp(&src, &away.src_from_dst(8).unwrap(), &mut dst).unwrap();
+        assert!(dst.data.iter().all(|byte| *byte == 0));
+        for (x, side) in [(f64::NAN, 5.0), (0.0, 0.0), (1e12, 5.0), (0.0, f64::INFINITY), (0.0, -3.0)] {
+            assert_eq!(Region { centre: [x, 0.0], side, rotation: 0.0 }.src_from_dst(8), None);
+        }
+        let nan = SrcFromDst([[f64::NAN; 3]; 2]);
+        assert!(warp(&src, &nan, &mut dst).is_err());
+        assert!(warp(&Image::filled(0, 5, [0; 3]), &SrcFromDst([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), &mut dst).is_err());
+    }
+
+    #[test]
+    fn letterboxes_keep_the_shape_and_lead_back() {
+        for (width, height) in [(160, 90), (91, 160), (64, 64), (3, 200), (1, 1)] {
+            let src = Image::filled(width, height, [250, 10, 30]);
+            let mut dst = Image::filled(64, 64, [0; 3]);
+            let corner = letterbox_top_left(&src, &mut dst, 114).unwrap();
+            assert_eq!(dst.pixel(0, 0), [250, 10, 30]);
+            if width != height {
+                assert_eq!(dst.pixel(63, 63), [114; 3]);
+            }
+            let longest = width.max(height) as f64;
+            assert!((corner.apply([64.0, 64.0])[usize::from(height > width)] - longest).abs() < 1e-9);
+            let middle = letterbox_centre(&src, &mut dst, 0).unwrap();
+            let centre = middle.apply([32.0, 32.0]);
+            assert!((centre[0] - width as f64 / 2.0).abs() < 1e-9 && (centre[1] - height as f64 / 2.0).abs() < 1e-9);
+        }
+    }
+}

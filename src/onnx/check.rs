@@ -1,0 +1,156 @@
+//! What makes the description of a model sound: names that exist, a role that fits the decoding, keypoint maps that are
+//! complete. The file itself is checked in `model`.
+
+use super::{Decode, KeypointOutputs, ModelEntry, ModelRole, ModelSource, PictureFit, TensorAxes};
+use anyhow::{Result, bail, ensure};
+use orator_base::types::file_name::FileName;
+
+impl ModelEntry {
+    /// Height and width of the picture it is fed.
+    pub fn input_size(&self) -> Result<[usize; 2]> {
+        let shape = self.inputs.first().map(|port| port.shape.as_slice());
+        let (size, channels) = match (self.picture.axes, shape) {
+            (TensorAxes::Nchw, Some([1, channels, height, width])) => ([*height, *width], *channels),
+            (TensorAxes::Nhwc, Some([1, height, width, channels])) => ([*height, *width], *channels),
+            _ => {
+                bail!("the input's shape must be [1, 3, height, width] or [1, height, width, 3], as picture.axes says")
+            }
+        };
+        let in_range = channels == 3 && size.iter().all(|side| (1..=4096).contains(side));
+        ensure!(
+            in_range,
+            "the input must have 3 channels and sides of 1 to 4096, not {size:?} with {channels} channels"
+        );
+        Ok(size.map(|side| side as usize))
+    }
+
+    /// Number of outputs a keypoint map may name, where the shape of the output says it.
+    fn n_points(&self) -> Option<usize> {
+        let named = |name: &String| self.outputs.iter().find(|port| port.name == *name);
+        let (name, axis, share) = match &self.decode {
+            Decode::Heatmap { heatmap, .. } => (heatmap, 1, 1),
+            Decode::Simcc { x, .. } => (x, 1, 1),
+            Decode::Regression { landmarks, .. } => (landmarks, 1, 2),
+            _ => return None,
+        };
+        let size = *named(name)?.shape.get(axis)?;
+        usize::try_from(size).ok().map(|size| size / share)
+    }
+
+    /// Says what is wrong with the file's name and pin.
+    pub(crate) fn check_file(&self) -> Result<()> {
+        ensure!(
+            plain(&self.file),
+            "file must be the plain name of a file in the folder of the models: {:?}",
+            self.file
+        );
+        let hex = self.sha256.len() == 64 && self.sha256.bytes().all(|byte| byte.is_ascii_hexdigit());
+        ensure!(hex, "sha256 must be 64 hex digits, not {:?}", self.sha256);
+        self.sources.iter().try_for_each(ModelSource::check)?;
+        ensure!(!self.origin.licence.is_empty(), "origin must name repository, commit, path and licence");
+        Ok(())
+    }
+
+    /// Says what is wrong with the description, before any file is opened.
+    pub(crate) fn check(&self) -> Result<()> {
+        ensure!(plain(&self.id), "id must be a plain name");
+        if self.role == ModelRole::Speech {
+            return super::speech::check(self);
+        }
+        ensure!(self.inputs.len() == 1, "it must have exactly one input, not {}", self.inputs.len());
+        let [height, width] = self.input_size()?;
+        let numbers = [self.picture.scale].into_iter().chain(self.picture.mean).chain(self.picture.std);
+        let sound = numbers.clone().all(f64::is_finite) && !self.picture.std.contains(&0.0);
+        ensure!(sound, "picture: scale, mean and std must be finite, std not 0");
+        for name in self.decode.names() {
+            ensure!(
+                self.outputs.iter().any(|port| port.name == name),
+                "decode names the output {name:?}, which is not there"
+            );
+        }
+        self.decode.check()?;
+        let fits = match (self.role, &self.fit, &self.decode) {
+            (ModelRole::Person, PictureFit::Letterbox { .. }, Decode::Detections { .. } | Decode::YoloxGrid { .. }) => {
+                true
+            }
+            (ModelRole::Body, PictureFit::Box { margin }, Decode::Heatmap { .. } | Decode::Simcc { .. }) => {
+                *margin > 0.0
+            }
+            (
+                ModelRole::Hand,
+                PictureFit::Region,
+                Decode::Heatmap { .. } | Decode::Simcc { .. } | Decode::Regression { .. },
+            ) => height == width,
+            (ModelRole::Palm, PictureFit::Letterbox { .. }, Decode::SsdAnchors { .. }) => height == width,
+            (ModelRole::Face, PictureFit::Region, Decode::Regression { .. }) => height == width,
+            (ModelRole::Other, _, _) => true,
+            _ => false,
+        };
+        ensure!(
+            fits,
+            "role, fit and decode do not go together: person: letterbox + detections or yolox-grid; body: box (margin > 0) + \
+             heatmap or simcc; hand: region (a square input) + heatmap, simcc or regression; palm: letterbox (a square \
+             input) + ssd-anchors; face: region (a square input) + regression"
+        );
+        let whole = |points: &[usize], n: usize| points.len() == n;
+        let maps = match self.role {
+            ModelRole::Body => {
+                let hands = [&self.points.left_hand, &self.points.right_hand];
+                let none = hands.iter().all(|points| points.is_empty());
+                whole(&self.points.body, 17) && (none || hands.iter().all(|points| whole(points, 21)))
+            }
+            ModelRole::Hand => whole(&self.points.hand, 21),
+            _ => true,
+        };
+        ensure!(
+            maps,
+            "points: a body model names 17 `body` points (and 21 `left_hand` and `right_hand`, or neither), a hand model 21 `hand` points"
+        );
+        if let Some(n_points) = self.n_points() {
+            let KeypointOutputs { body, hand, left_hand, right_hand } = &self.points;
+            let all = [body, hand, left_hand, right_hand].into_iter().flatten();
+            if let Some(beyond) = all.clone().find(|point| **point >= n_points) {
+                bail!("points: there is no output {beyond}, the model gives {n_points}");
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Decode {
+    /// Names of the outputs it reads.
+    fn names(&self) -> Vec<&str> {
+        match self {
+            Self::Detections { boxes, labels, .. } => {
+                [Some(boxes), labels.as_ref()].into_iter().flatten().map(String::as_str).collect()
+            }
+            Self::YoloxGrid { predictions, .. } => vec![predictions],
+            Self::Heatmap { heatmap, .. } => vec![heatmap],
+            Self::Simcc { x, y, .. } => vec![x, y],
+            Self::Regression { landmarks, score, right, .. } => {
+                [Some(landmarks), Some(score), right.as_ref()].into_iter().flatten().map(String::as_str).collect()
+            }
+            Self::SsdAnchors { regressors, scores, .. } => vec![regressors, scores],
+            Self::None => Vec::new(),
+        }
+    }
+
+    fn check(&self) -> Result<()> {
+        match self {
+            Self::Heatmap { blur, .. } => {
+                ensure!(blur % 2 == 1 && *blur <= 31, "decode.blur must be odd and at most 31");
+            }
+            Self::Simcc { split, .. } => ensure!(split.is_finite() && *split > 0.0, "decode.split must be above 0"),
+            Self::YoloxGrid { strides, .. } | Self::SsdAnchors { strides, .. } => {
+                ensure!(!strides.is_empty() && !strides.contains(&0), "decode.strides must be numbers from 1");
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+}
+
+/// Whether the name stays in its folder.
+fn plain(name: &str) -> bool {
+    FileName::new(name).is_ok()
+}

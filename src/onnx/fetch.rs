@@ -1,0 +1,282 @@
+//! Getting the file of one model: from a folder that has it or what it is made of, else from its sources in their order.
+//! Every file is pinned by its SHA-256 before it is converted, and the result after it.
+
+use super::convert::{ConversionOptions, convert};
+use super::{ModelEntry, ModelSource, PinnedFile, SourceKind, package, sha256_of};
+use anyhow::{Context, Result, anyhow, bail, ensure};
+use orator_base::stage::workdir;
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::fmt;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Most bytes of a file, 1 GiB.
+const MAX_BYTES: u64 = 1 << 30;
+/// Folders beneath a mirror that are looked into.
+const MAX_DEPTH: usize = 3;
+
+/// Where the file of a model was had from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum FetchSource {
+    /// The folder of models had it.
+    Present,
+    /// A file of the mirror.
+    Mirror(PathBuf),
+    /// Files of the mirror that this source names.
+    MirrorOf(ModelSource),
+    /// The address of the manifest.
+    Url(String),
+    /// A source of the manifest.
+    Source(ModelSource),
+}
+
+impl fmt::Display for FetchSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Present => write!(f, "there already"),
+            Self::Mirror(path) => write!(f, "copied from {}", path.display()),
+            Self::MirrorOf(source) => write!(f, "made from files of the mirror, those of {source}"),
+            Self::Url(url) => write!(f, "downloaded from {url}"),
+            Self::Source(source) => write!(f, "made from {source}"),
+        }
+    }
+}
+
+/// A file that was had, with what its source says of its licence.
+struct Obtained {
+    bytes: Vec<u8>,
+    licence: Option<String>,
+    source: FetchSource,
+}
+
+/// Gets files of models into a folder. A package is downloaded once.
+pub(super) struct Fetcher<'a> {
+    /// SHA-256 and path of every file of the mirror.
+    offered: Vec<(String, PathBuf)>,
+    /// Where packages are downloaded to.
+    downloads: &'a Path,
+    /// File of each package by its pinned SHA-256, or why it could not be had.
+    packages: BTreeMap<String, Result<PathBuf, String>>,
+}
+
+impl<'a> Fetcher<'a> {
+    /// Looks at the files of the mirror, whatever their names.
+    pub fn new(mirror: Option<&Path>, downloads: &'a Path) -> Result<Self> {
+        let mut offered = Vec::new();
+        if let Some(mirror) = mirror {
+            offer(mirror, MAX_DEPTH, &mut offered)?;
+            offered.sort();
+        }
+        Ok(Self { offered, downloads, packages: BTreeMap::new() })
+    }
+
+    /// Writes the file of the model to `path`, and what its source says of its licence beside it.
+    ///
+    /// # Errors
+    /// No source that has it; the message says why of each.
+    pub fn get(&mut self, entry: &ModelEntry, path: &Path) -> Result<FetchSource> {
+        if let Some(found) = self.offered(&entry.sha256) {
+            let bytes = std::fs::read(found).with_context(|| format!("cannot read {}", found.display()))?;
+            let source = FetchSource::Mirror(found.to_owned());
+            return write(entry, path, &bytes, None, source);
+        }
+        let mut refused = String::new();
+        if let Some(url) = &entry.url {
+            match download(url).and_then(|bytes| pinned(&bytes, &entry.sha256, url).map(|()| bytes)) {
+                Ok(bytes) => return write(entry, path, &bytes, None, FetchSource::Url(url.clone())),
+                Err(error) => _ = write!(refused, "\n      {url}: {error:#}"),
+            }
+        }
+        match self.first_of(&entry.sources, |files| made(entry, files)) {
+            Ok(Obtained { bytes, licence, source }) => return write(entry, path, &bytes, licence, source),
+            Err(reasons) => refused += &reasons,
+        }
+        if refused.is_empty() {
+            let steps = entry.conversion.as_deref().unwrap_or("no conversion is written down");
+            let _ = write!(
+                refused,
+                "\n      no place serves it. It was made from {} @ {} : {} by: {steps}",
+                entry.origin.repository, entry.origin.commit, entry.origin.path
+            );
+        }
+        bail!("it could not be had:{refused}\n      a folder that has the file (sha256 {}): --mirror DIR", entry.sha256)
+    }
+
+    /// Writes a file that is no model to `path`.
+    ///
+    /// # Errors
+    /// No source that has it; the message says why of each.
+    pub fn get_file(&mut self, file: &PinnedFile, path: &Path) -> Result<FetchSource> {
+        let whole = |files: &[Vec<u8>]| {
+            let bytes = files.concat();
+            pinned(&bytes, &file.sha256, &file.file).map(|()| bytes)
+        };
+        let obtained = self.first_of(&file.sources, whole);
+        let Obtained { bytes, source, .. } =
+            obtained.map_err(|refused| anyhow!("{} could not be had:{refused}", file.file))?;
+        workdir::write_file(path, &bytes)?;
+        Ok(source)
+    }
+
+    /// What `make` gives of the files of the first source that has them; those in the mirror come first. An error says why
+    /// of each source.
+    fn first_of(
+        &mut self,
+        sources: &[ModelSource],
+        make: impl Fn(&[Vec<u8>]) -> Result<Vec<u8>>,
+    ) -> Result<Obtained, String> {
+        let mut refused = String::new();
+        let (mirrored, others): (Vec<_>, Vec<_>) = sources.iter().partition(|source| self.has_mirrored(source));
+        let of_mirror = mirrored.into_iter().map(|source| (source, FetchSource::MirrorOf(source.clone())));
+        let of_others = others.into_iter().map(|source| (source, FetchSource::Source(source.clone())));
+        for (source, from) in of_mirror.chain(of_others) {
+            let files = match from {
+                FetchSource::MirrorOf(_) => self.mirrored(source),
+                _ => self.files(source),
+            };
+            match files.and_then(|(files, licence)| Ok((make(&files)?, licence))) {
+                Ok((bytes, licence)) => return Ok(Obtained { bytes, licence, source: from }),
+                Err(error) if source.from == SourceKind::Address => _ = write!(refused, "\n      {error:#}"),
+                Err(error) => _ = write!(refused, "\n      {source}: {error:#}"),
+            }
+        }
+        Err(refused)
+    }
+
+    fn offered(&self, sha256: &str) -> Option<&Path> {
+        let found = self.offered.iter().find(|(hash, _)| hash.eq_ignore_ascii_case(sha256))?;
+        Some(&found.1)
+    }
+
+    fn has_mirrored(&self, source: &ModelSource) -> bool {
+        let has_package = !source.sha256.is_empty() && self.offered(&source.sha256).is_some();
+        has_package || source.files.iter().all(|file| self.offered(&file.sha256).is_some())
+    }
+
+    fn mirrored(&self, source: &ModelSource) -> Result<(Vec<Vec<u8>>, Option<String>)> {
+        if let Some(package) = self.offered(&source.sha256).filter(|_| !source.sha256.is_empty()) {
+            return unpacked(source, package);
+        }
+        let read = |file: &super::SourceFile| {
+            let path = self.offered(&file.sha256).with_context(|| format!("the mirror has no {}", file.path))?;
+            Ok(std::fs::read(path)?)
+        };
+        Ok((source.files.iter().map(read).collect::<Result<_>>()?, None))
+    }
+
+    /// The files of a source, and the text of its licence where it has one.
+    fn files(&mut self, source: &ModelSource) -> Result<(Vec<Vec<u8>>, Option<String>)> {
+        if source.from == SourceKind::Address {
+            let get = |file: &super::SourceFile| {
+                let url = format!("{}{}", source.name, file.path);
+                part(file, download(&url).with_context(|| url.clone())?)
+            };
+            let licence = source.licence.as_ref().and_then(|path| download(&format!("{}{path}", source.name)).ok());
+            let text = licence.map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+            return Ok((source.files.iter().map(get).collect::<Result<_>>()?, text));
+        }
+        let n = self.packages.len();
+        let package = self.packages.entry(source.sha256.clone()).or_insert_with(|| {
+            let dir = self.downloads.join(n.to_string());
+            let downloaded = std::fs::create_dir_all(&dir).map_err(Into::into);
+            let downloaded = downloaded.and_then(|()| package::download(source, &dir)).and_then(|file| {
+                let found = sha256_of(&file)?;
+                ensure!(
+                    found.eq_ignore_ascii_case(&source.sha256),
+                    "it has sha256 {found}, expected {}",
+                    source.sha256
+                );
+                Ok(file)
+            });
+            downloaded.map_err(|error| format!("{error:#}"))
+        });
+        unpacked(source, package.as_ref().map_err(|error| anyhow!("{error}"))?)
+    }
+}
+
+/// Adds hash and path of every file of a folder that may be one of a model.
+fn offer(folder: &Path, depth: usize, offered: &mut Vec<(String, PathBuf)>) -> Result<()> {
+    let cannot = || format!("cannot read the folder {}", folder.display());
+    for file in std::fs::read_dir(folder).with_context(cannot)? {
+        let file = file.with_context(cannot)?;
+        let (path, kind) = (file.path(), file.file_type()?);
+        if kind.is_dir() && depth > 0 {
+            offer(&path, depth - 1, offered)?;
+        } else if path.metadata().is_ok_and(|meta| meta.is_file() && meta.len() <= MAX_BYTES) {
+            offered.push((sha256_of(&path)?, path));
+        }
+    }
+    Ok(())
+}
+
+/// The members of a package that a source names, each checked, and the text of its licence.
+fn unpacked(source: &ModelSource, package: &Path) -> Result<(Vec<Vec<u8>>, Option<String>)> {
+    let paths: Vec<&str> =
+        source.files.iter().map(|file| &file.path).chain(&source.licence).map(String::as_str).collect();
+    let mut members = package::members(source.from, package, &paths)?.into_iter();
+    let files =
+        source.files.iter().zip(members.by_ref()).map(|(file, bytes)| part(file, bytes)).collect::<Result<_>>()?;
+    Ok((files, members.next().map(|bytes| String::from_utf8_lossy(&bytes).into_owned())))
+}
+
+/// What counts of a file, checked against its pin.
+fn part(file: &super::SourceFile, bytes: Vec<u8>) -> Result<Vec<u8>> {
+    let bytes = match file.range {
+        None => bytes,
+        Some([start, end]) => {
+            let range = usize::try_from(start)?..usize::try_from(end)?;
+            bytes.get(range).with_context(|| format!("{} has only {} bytes", file.path, bytes.len()))?.to_vec()
+        }
+    };
+    pinned(&bytes, &file.sha256, &file.path)?;
+    Ok(bytes)
+}
+
+fn pinned(bytes: &[u8], sha256: &str, name: &str) -> Result<()> {
+    let found = format!("{:x}", Sha256::digest(bytes));
+    ensure!(found.eq_ignore_ascii_case(sha256), "{name} has sha256 {found}, expected {sha256}");
+    Ok(())
+}
+
+/// The file of a model, made from those of a source.
+fn made(entry: &ModelEntry, files: &[Vec<u8>]) -> Result<Vec<u8>> {
+    let files: Vec<&[u8]> = files.iter().map(Vec::as_slice).collect();
+    let bytes = match &entry.convert {
+        Some(conversion) => {
+            let [input] = entry.inputs.as_slice() else {
+                bail!("a model that is converted has one input, not {}", entry.inputs.len())
+            };
+            let named = || entry.outputs.iter().map(|port| port.name.clone()).collect();
+            let outputs = if conversion.outputs.is_empty() { named() } else { conversion.outputs.clone() };
+            convert(conversion.format, &files, &ConversionOptions { input: input.clone(), outputs })?
+        }
+        None => files.concat(),
+    };
+    pinned(&bytes, &entry.sha256, &entry.file)?;
+    Ok(bytes)
+}
+
+fn download(url: &str) -> Result<Vec<u8>> {
+    let limits = ureq::Agent::config_builder()
+        .timeout_connect(Some(Duration::from_secs(15)))
+        .timeout_global(Some(Duration::from_secs(600)));
+    let agent: ureq::Agent = limits.build().into();
+    Ok(agent.get(url).call()?.body_mut().with_config().limit(MAX_BYTES).read_to_vec()?)
+}
+
+/// Puts the file in its place, and a text with its origin and licence beside it.
+fn write(
+    entry: &ModelEntry,
+    path: &Path,
+    bytes: &[u8],
+    licence: Option<String>,
+    source: FetchSource,
+) -> Result<FetchSource> {
+    pinned(bytes, &entry.sha256, &entry.file)?;
+    let text = licence.map(|text| format!("\n{}\n", text.trim_end())).unwrap_or_default();
+    workdir::write_file(&path.with_extension("licence.txt"), (entry.terms() + &text).as_bytes())?;
+    workdir::write_file(path, bytes)?;
+    Ok(source)
+}

@@ -1,0 +1,140 @@
+//! `manifest.toml`: the models known, built in and beside the model files. One model's description is in `entry`, what
+//! makes it sound in `check`; `model` opens what is described here.
+
+use super::{ModelEntry, ModelRole, ModelSource, PinnedFile};
+use anyhow::{Context, Result, ensure};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// The file's name inside the folder of the models.
+pub const MANIFEST_FILE: &str = "manifest.toml";
+
+const BUILTIN: &str = include_str!("../../models/manifest.toml");
+
+/// All models known, in the order of the file.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    #[serde(default, rename = "model", skip_serializing_if = "Vec::is_empty")]
+    pub models: Vec<ModelEntry>,
+    /// The ONNX Runtime library, for machines that have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub runtime: Option<PinnedFile>,
+    /// Word vectors, as they are published.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub words: Option<PinnedFile>,
+    /// Descriptions without a file: forms to register other models by.
+    #[serde(default, rename = "layout", skip_serializing_if = "Vec::is_empty")]
+    pub layouts: Vec<ModelEntry>,
+}
+
+impl Manifest {
+    /// The models described inside the program.
+    pub fn builtin() -> Result<Self> {
+        Self::parse(BUILTIN).context("the built-in manifest of models")
+    }
+
+    /// The built-in models with `manifest.toml` of `dir` laid over them, where there is one.
+    pub fn load(dir: &Path) -> Result<Self> {
+        let mut manifest = Self::builtin()?;
+        let path = dir.join(MANIFEST_FILE);
+        match std::fs::read_to_string(&path) {
+            Ok(text) => {
+                let own = Self::parse(&text).with_context(|| format!("in {}", path.display()))?;
+                manifest.runtime = own.runtime.or(manifest.runtime);
+                manifest.words = own.words.or(manifest.words);
+                own.models.into_iter().for_each(|entry| put(&mut manifest.models, entry));
+                own.layouts.into_iter().for_each(|entry| put(&mut manifest.layouts, entry));
+            }
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+            Err(error) => return Err(error).with_context(|| format!("cannot read {}", path.display())),
+        }
+        Ok(manifest)
+    }
+
+    /// Reads the text of a manifest and checks every entry.
+    pub fn parse(text: &str) -> Result<Self> {
+        let manifest: Self = toml::from_str(text).context("not a manifest of models")?;
+        for (idx, entry) in manifest.models.iter().enumerate() {
+            entry.check_file().and_then(|()| entry.check()).with_context(|| format!("model {:?}", entry.id))?;
+            let known = manifest.models[..idx].iter().any(|other| other.id == entry.id);
+            ensure!(!known, "model {:?} stands in it twice", entry.id);
+        }
+        let files = manifest.runtime.iter().chain(&manifest.words);
+        files.flat_map(|file| &file.sources).try_for_each(ModelSource::check)?;
+        for entry in &manifest.layouts {
+            entry.check().with_context(|| format!("layout {:?}", entry.id))?;
+        }
+        Ok(manifest)
+    }
+
+    /// The model of that id.
+    pub fn get(&self, id: &str) -> Result<&ModelEntry> {
+        self.models.iter().find(|entry| entry.id == id).with_context(|| {
+            let known: Vec<_> = self.models.iter().map(|entry| entry.id.as_str()).collect();
+            format!("there is no model {id:?}; known are {} (`orator models add` registers others)", known.join(", "))
+        })
+    }
+
+    /// The description, with or without a file, of that id.
+    pub fn like(&self, id: &str) -> Result<&ModelEntry> {
+        self.layouts.iter().find(|entry| entry.id == id).map_or_else(|| self.get(id), Ok)
+    }
+
+    /// The model of that id, which must have the role.
+    pub fn get_as(&self, id: &str, role: ModelRole) -> Result<&ModelEntry> {
+        let entry = self.get(id)?;
+        ensure!(entry.role == role, "the model {id:?} is a {:?} model; a {role:?} model is wanted here", entry.role);
+        Ok(entry)
+    }
+}
+
+/// Replaces the entry of the same id by `entry`, which else comes at the end.
+fn put(entries: &mut Vec<ModelEntry>, entry: ModelEntry) {
+    match entries.iter_mut().find(|known| known.id == entry.id) {
+        Some(known) => *known = entry,
+        None => entries.push(entry),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_builtin_manifest_reads_and_writes_itself() {
+        let manifest = Manifest::builtin().unwrap();
+        assert_eq!((manifest.models.len(), manifest.layouts.len()), (16, 5));
+        assert_eq!(Manifest::parse(&toml::to_string(&manifest).unwrap()).unwrap(), manifest);
+        for entry in &manifest.models {
+            assert!(entry.is_served() != entry.conversion.is_some(), "{}: served, or how it was made", entry.id);
+        }
+    }
+
+    #[test]
+    fn mistakes_are_named() {
+        let message =
+            |from: &str, to: &str| format!("{:#}", Manifest::parse(&BUILTIN.replacen(from, to, 1)).unwrap_err());
+        assert!(message("role = \"person\"", "rolle = \"person\"").contains("rolle"));
+        assert!(message("min_score = 0.3", "min_scores = 0.3").contains("min_score"));
+        assert!(message("boxes = \"dets\"", "boxes = \"det\"").contains("output \"det\""));
+        assert!(message("sha256 = \"4720", "sha256 = \"x720").contains("64 hex"));
+        assert!(message("[1, 3, 320, 320]", "[1, 320, 320]").contains("shape"));
+        assert!(message("body = [0, ", "body = [99, ").contains("no output 99"));
+        assert!(message("margin = 1.25", "margin = 0.0").contains("go together"));
+        assert!(message("person-yolox-nano", "person-rtmdet-nano").contains("twice"));
+    }
+
+    #[test]
+    fn a_manifest_beside_the_models_is_laid_over_the_builtin_one() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut own = Manifest::builtin().unwrap().get("person-rtmdet-nano").unwrap().clone();
+        own.id = "person-mine".into();
+        let text = toml::to_string(&Manifest { models: vec![own.clone()], ..Manifest::default() }).unwrap();
+        std::fs::write(dir.path().join(MANIFEST_FILE), text).unwrap();
+        let manifest = Manifest::load(dir.path()).unwrap();
+        assert_eq!((manifest.models.len(), manifest.get("person-mine").unwrap()), (17, &own));
+        assert!(manifest.get("nobody").unwrap_err().to_string().contains("known are"));
+        assert!(manifest.get_as("person-mine", ModelRole::Hand).is_err());
+    }
+}

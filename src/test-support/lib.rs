@@ -1,0 +1,8 @@
+//! Inputs with known truth for tests and benchmarks: a drawn speaker in a suit of coloured markers with the three small
+//! models that detect them (`drawn`), and speakers whose gestures follow a known rule (`rule`).
+
+pub mod drawn;
+pub mod project;
+pub mod rule;
+pub mod skip;
+pub mod spoken_video;

@@ -1,0 +1,236 @@
+//! Hours of the synthetic speaker without video: a dataset of sound and motion by `rule`, laid out as by the pipeline.
+//! Each clip follows from seed, split and number alone, so splits share neither speech nor variation, and its
+//! predictable part can be computed again.
+
+use super::habits::Habits;
+use super::rule::RuleGestures;
+use super::words;
+use crate::drawn::speech::Speech;
+use crate::spoken_video::SpokenVideo;
+use anyhow::{Context, Result, ensure};
+use orator_base::stage::progress::Progress;
+use orator_base::types::pose3d::Motion;
+use orator_base::types::sound::{SAMPLE_RATE, Sound};
+use orator_base::types::split::Split;
+use orator_base::types::sync;
+use orator_base::types::time::FrameRate;
+use orator_dataset::info::{About, DatasetInfo};
+use orator_dataset::sample::Sample;
+use orator_dataset::write::writer::DatasetWriter;
+use orator_formats::transcript::Word;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use std::path::Path;
+
+/// Versions of the rule and of its speech: by the sound alone, and with words. Others are refused where the predictable
+/// part is needed.
+pub const RULE: u32 = 1;
+pub const RULE_OF_WORDS: u32 = 2;
+pub const NAME: &str = "synthetic";
+const FPS: FrameRate = FrameRate::new(15, 1);
+/// Frames of a clip (a minute).
+const CLIP_FRAMES: usize = 900;
+/// Clips of the validation and the test split (minutes), and of the test split where the rule has words.
+const HELD_OUT_CLIPS: usize = 10;
+const TEST_CLIPS_OF_WORDS: usize = 30;
+/// Amplitude of the room noise.
+const ROOM: f32 = 0.001;
+const SHARD_BYTES: u64 = 256 << 20;
+
+/// Parameters of a clip, stored in its sample's JSON under `rule`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SpokenClip {
+    pub rule: u32,
+    pub seed: u64,
+    pub split: Split,
+    pub number: usize,
+    pub n_frames: usize,
+    /// Number of the speaker's habits.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub habits: u64,
+}
+
+fn is_zero(number: &u64) -> bool {
+    *number == 0
+}
+
+impl SpokenClip {
+    fn secs(&self) -> f64 {
+        FPS.secs(self.n_frames)
+    }
+
+    fn name(&self) -> String {
+        format!("{NAME}-{}-{:04}", self.split.name(), self.number)
+    }
+
+    /// Random generator for one purpose.
+    fn rng(&self, purpose: &str) -> ChaCha8Rng {
+        let Self { rule, seed, split, number, .. } = self;
+        let hash = blake3::hash(format!("{rule} {seed} {} {number} {purpose}", split.name()).as_bytes());
+        ChaCha8Rng::from_seed(*hash.as_bytes())
+    }
+
+    /// Habits of its speaker.
+    pub fn habits(&self) -> Habits {
+        Habits::numbered(self.habits)
+    }
+
+    /// Speech of the clip.
+    pub fn speech(&self) -> Speech {
+        Speech::free(self.secs(), &mut self.rng("speech"))
+    }
+
+    /// Words of the clip; none where the rule has none.
+    pub fn words(&self) -> Vec<Word> {
+        match self.rule {
+            RULE_OF_WORDS => words::words(&self.speech(), self.split, &mut self.rng("words")),
+            _ => Vec::new(),
+        }
+    }
+
+    /// Sound of the clip with room noise.
+    pub fn sound(&self) -> Sound {
+        let mut rng = self.rng("sound");
+        let mut sound = self.speech().sound(self.secs(), &mut rng);
+        sound.samples.resize(sync::sample_at(FPS, SAMPLE_RATE, self.n_frames), 0.0);
+        sound.samples.iter_mut().for_each(|sample| *sample += ROOM * rng.random_range(-1.0..1.0));
+        sound
+    }
+
+    /// Motion of the clip: rule and variation.
+    pub fn motion(&self) -> Motion {
+        let rng = &mut self.rng("whims");
+        let (speech, words) = (self.speech(), self.words());
+        RuleGestures::varied(&self.habits(), &speech, &words, self.secs(), rng).motion(self.n_frames, FPS)
+    }
+
+    /// Predictable part of the motion: the rule alone.
+    pub fn predictable(&self) -> Motion {
+        RuleGestures::of_habits(&self.habits(), &self.speech(), &self.words()).motion(self.n_frames, FPS)
+    }
+
+    /// BLAKE3 of the clip's parameters; the text is fixed by existing datasets.
+    fn content_hash(&self) -> String {
+        let Self { rule, seed, split, number, n_frames, habits } = self;
+        let habits = if *habits == 0 { String::new() } else { format!(", habits: {habits}") };
+        let text = format!(
+            "Clip {{ rule: {rule}, seed: {seed}, split: {split:?}, number: {number}, n_frames: {n_frames}{habits} }}"
+        );
+        blake3::hash(text.as_bytes()).to_hex().to_string()
+    }
+
+    /// Clip that a sample of the dataset was made from.
+    pub fn from_sample(sample: &Sample) -> Result<Self> {
+        let clip: Self =
+            serde_json::from_value(sample.meta.get("rule").cloned().unwrap_or_default()).with_context(|| {
+                format!("{} is not of the synthetic speaker; `orator-lab demo speaker` writes one", sample.key)
+            })?;
+        ensure!(
+            [RULE, RULE_OF_WORDS].contains(&clip.rule),
+            "{} follows version {} of the rule, this program knows {RULE} and {RULE_OF_WORDS}",
+            sample.key,
+            clip.rule
+        );
+        ensure!(clip.n_frames == sample.n_frames(), "{} has {} frames", sample.key, sample.n_frames());
+        Ok(clip)
+    }
+
+    fn spoken(&self) -> SpokenVideo {
+        SpokenVideo {
+            name: self.name(),
+            content: self.content_hash(),
+            motion: self.motion(),
+            sound: self.sound(),
+            posture: None,
+            words: (self.rule == RULE_OF_WORDS).then(|| self.words()),
+            meta: json!({ "rule": self }),
+        }
+    }
+}
+
+/// Clips of `hours` of training, ten minutes of validation, and ten of test, thirty where the rule has words.
+pub fn clips(hours: f64, seed: u64, rule: u32, habits: u64) -> Result<Vec<SpokenClip>> {
+    ensure!((0.01..=100.0).contains(&hours), "--hours {hours}: expected 0.01 to 100");
+    let n_train = (hours * 3600.0 / FPS.secs(CLIP_FRAMES)).ceil() as usize;
+    let of =
+        |split, n| (0..n).map(move |number| SpokenClip { rule, seed, split, number, n_frames: CLIP_FRAMES, habits });
+    let n_test = if rule == RULE_OF_WORDS { TEST_CLIPS_OF_WORDS } else { HELD_OUT_CLIPS };
+    let parts = [(Split::Train, n_train), (Split::Validation, HELD_OUT_CLIPS), (Split::Test, n_test)];
+    Ok(parts.into_iter().flat_map(|(split, n)| of(split, n)).collect())
+}
+
+/// Writes `clips` as a dataset into the existing, empty folder `dir`.
+pub fn write(dir: &Path, clips: &[SpokenClip], progress: &dyn Progress) -> Result<DatasetInfo> {
+    let rule = clips.first().map_or(RULE, |clip| clip.rule);
+    let name = match clips.first().map_or(0, |clip| clip.habits) {
+        0 => NAME.to_owned(),
+        habits => format!("{NAME}-{habits}"),
+    };
+    let about = About {
+        licence: "cc0-1.0".to_owned(),
+        consent: "none needed: nobody is shown".to_owned(),
+        source: "made by orator demo speaker".to_owned(),
+        notes: vec![format!("Gestures follow version {rule} of a known rule; pose2d is 0 everywhere.")],
+        ..About::new(&name, FPS)
+    };
+    let writer = DatasetWriter::new(dir, about, SHARD_BYTES);
+    let task = progress.begin("speak", clips.len() as u64);
+    for some in clips.chunks(16) {
+        let spoken: Vec<SpokenVideo> = some.par_iter().map(SpokenClip::spoken).collect();
+        for (clip, spoken) in some.iter().zip(spoken) {
+            spoken.write(&writer, clip.split)?;
+            task.advance(1);
+        }
+    }
+    Ok(writer.finish()?.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use orator_base::stage::progress::Silent;
+    use orator_dataset::Dataset;
+    use orator_dataset::verify::verify::verify;
+
+    #[test]
+    fn a_dataset_is_sound_and_its_predictable_part_is_made_again() {
+        verify_rule(RULE);
+        verify_rule(RULE_OF_WORDS);
+    }
+
+    fn verify_rule(rule: u32) {
+        let dir = tempfile::tempdir().unwrap();
+        let two =
+            |split| (0..2).map(move |number| SpokenClip { rule, seed: 7, split, number, n_frames: 90, habits: 3 });
+        let clips: Vec<SpokenClip> = Split::ALL.into_iter().flat_map(two).collect();
+        let info = write(dir.path(), &clips, &Silent).unwrap();
+        assert_eq!(info.splits.values().map(|split| split.samples).collect::<Vec<_>>(), [2, 2, 2]);
+        let verified = verify(dir.path(), true, &Silent).unwrap();
+        assert!(verified.problems.is_empty(), "{:?}", verified.problems);
+        let dataset = Dataset::open(dir.path()).unwrap();
+        for sample in dataset.samples(Split::Test) {
+            let sample = dataset.read(&sample).unwrap();
+            let clip = SpokenClip::from_sample(&sample).unwrap();
+            assert_eq!(clip.motion(), sample.motion);
+            assert_ne!(clip.predictable(), sample.motion);
+            assert_eq!(sample.words.is_some_and(|words| !words.is_empty()), rule == RULE_OF_WORDS);
+        }
+        let again = tempfile::tempdir().unwrap();
+        write(again.path(), &clips, &Silent).unwrap();
+        let sums = |dir: &Path| std::fs::read(dir.join(orator_dataset::CHECKSUMS)).unwrap();
+        assert_eq!(sums(dir.path()), sums(again.path()));
+    }
+
+    #[test]
+    fn no_two_clips_share_speech() {
+        let clips = clips(0.1, 3, RULE, 0).unwrap();
+        assert_eq!(clips.len(), 6 + 2 * HELD_OUT_CLIPS);
+        let said: Vec<_> = clips.iter().map(|clip| format!("{:?}", clip.speech().syllables)).collect();
+        let different: std::collections::BTreeSet<&String> = said.iter().collect();
+        assert_eq!(different.len(), said.len());
+        assert!(super::clips(f64::NAN, 1, RULE, 0).is_err() && super::clips(0.0, 1, RULE, 0).is_err());
+    }
+}

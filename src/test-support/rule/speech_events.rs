@@ -1,0 +1,129 @@
+//! What the second rule hears in any speech: loud syllables, phrases, and words of its list.
+
+use orator_base::types::sound::Sound;
+use orator_formats::transcript::Word;
+
+/// Seconds between two values of the envelope, and over which each is taken.
+const STEP: f64 = 0.01;
+const WINDOW: f64 = 0.05;
+/// Shares of the speech's loud level (90 % of the envelope lies below) above which a peak is a loud syllable, and below which
+/// there is a pause.
+const LOUD: f64 = 0.85;
+const SILENT: f64 = 0.08;
+/// Seconds between two loud syllables, and of a pause between two phrases, at least.
+const BEATS_APART: f64 = 0.45;
+const PAUSE: f64 = 0.22;
+
+/// Words that send the left hand to each of four places.
+pub const WORDS: [[&str; 2]; 4] =
+    [["river", "mountain"], ["garden", "window"], ["letter", "money"], ["morning", "city"]];
+
+/// Events of a speech, seconds, in order of time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SpeechEvents {
+    /// Peaks of loud syllables, with their height over the loud level.
+    pub beats: Vec<(f64, f64)>,
+    /// Begin and end of the phrases.
+    pub phrases: Vec<[f64; 2]>,
+    /// Begins of words of [`WORDS`], with their place.
+    pub words: Vec<(f64, usize)>,
+}
+
+impl SpeechEvents {
+    /// Events of a sound and what is said in it.
+    pub fn hear(sound: &Sound, said: &[Word]) -> Self {
+        let envelope = envelope(sound);
+        let mut sorted = envelope.clone();
+        sorted.sort_by(f64::total_cmp);
+        let level = sorted.get(sorted.len() * 9 / 10).copied().unwrap_or(0.0).max(1e-6);
+        let place = |word: &Word| {
+            let own = word.word.trim_matches(|c: char| !c.is_alphabetic()).to_lowercase();
+            let place = WORDS.iter().position(|words| words.contains(&own.as_str()))?;
+            Some((word.start_secs, place))
+        };
+        Self {
+            beats: beats(&envelope, level),
+            phrases: phrases(&envelope, level),
+            words: said.iter().filter_map(place).collect(),
+        }
+    }
+}
+
+/// Root mean square of the sound about each hundredth of a second.
+fn envelope(sound: &Sound) -> Vec<f64> {
+    let rate = f64::from(sound.rate);
+    let n = (sound.secs() / STEP) as usize;
+    let at = |i: usize| {
+        let middle = i as f64 * STEP;
+        let first = ((middle - WINDOW / 2.0).max(0.0) * rate) as usize;
+        let last = (((middle + WINDOW / 2.0) * rate) as usize).min(sound.samples.len());
+        let part = &sound.samples[first.min(last)..last];
+        (part.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>() / part.len().max(1) as f64).sqrt()
+    };
+    (0..n).map(at).collect()
+}
+
+fn beats(envelope: &[f64], level: f64) -> Vec<(f64, f64)> {
+    let mut beats: Vec<(f64, f64)> = Vec::new();
+    for (i, three) in envelope.windows(3).enumerate() {
+        let now = (i + 1) as f64 * STEP;
+        let is_peak = three[1] >= LOUD * level && three[1] > three[0] && three[1] >= three[2];
+        if is_peak && beats.last().is_none_or(|last| now - last.0 >= BEATS_APART) {
+            beats.push((now, (three[1] / level).min(1.5)));
+        }
+    }
+    beats
+}
+
+fn phrases(envelope: &[f64], level: f64) -> Vec<[f64; 2]> {
+    let mut phrases: Vec<[f64; 2]> = Vec::new();
+    for (i, _) in envelope.iter().enumerate().filter(|(_, value)| **value >= SILENT * level) {
+        let now = i as f64 * STEP;
+        match phrases.last_mut() {
+            Some(last) if now - last[1] < PAUSE => last[1] = now,
+            _ => phrases.push([now, now]),
+        }
+    }
+    phrases
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use orator_formats::transcript::WordSource;
+
+    #[test]
+    fn loud_syllables_phrases_and_words_are_heard() {
+        // Bursts of 0.1 s: two phrases of 1 s with a burst each 0.2 s, every third loud.
+        let loudness = |secs: f64| match secs % 1.5 {
+            of_phrase if of_phrase < 1.0 && of_phrase % 0.2 < 0.1 => {
+                if (of_phrase / 0.2) as usize % 3 == 1 {
+                    0.8
+                } else {
+                    0.2
+                }
+            }
+            _ => 0.0,
+        };
+        let samples = (0..48_000).map(|n| f64::from(n) / 16_000.0);
+        let samples = samples.map(|t| (loudness(t) * (t * 2_000.0).sin()) as f32).collect();
+        let word = |word: &str, start_secs: f64| Word {
+            word: word.to_owned(),
+            start_secs,
+            end_secs: start_secs + 0.2,
+            source: WordSource::Given,
+            confidence: None,
+        };
+        let said = [word("The", 0.0), word("River,", 0.2), word("city", 1.7)];
+        let heard = SpeechEvents::hear(&Sound { rate: 16_000, samples }, &said);
+        let times: Vec<f64> = heard.beats.iter().map(|beat| (beat.0 * 10.0).round() / 10.0).collect();
+        assert_eq!(times.len(), 4, "{heard:?}");
+        for (time, expected) in times.iter().zip([0.25, 0.85, 1.75, 2.35]) {
+            assert!((time - expected).abs() <= 0.1, "{heard:?}");
+        }
+        assert_eq!(heard.phrases.len(), 2, "{heard:?}");
+        assert!((heard.phrases[0][1] - 0.92).abs() < 0.05 && (heard.phrases[1][0] - 1.48).abs() < 0.05, "{heard:?}");
+        assert_eq!(heard.words, [(0.2, 0), (1.7, 3)]);
+        assert_eq!(SpeechEvents::hear(&Sound { rate: 16_000, samples: Vec::new() }, &[]), SpeechEvents::default());
+    }
+}
