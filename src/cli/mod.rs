@@ -12,16 +12,13 @@ mod figure_args;
 pub mod generate;
 pub mod motion;
 pub mod moved;
-pub mod outcome;
 pub mod outputs;
 pub mod pipeline;
 pub mod program;
 pub mod setup;
 pub mod signals;
-pub mod stderr;
 pub mod study;
 pub mod train;
 pub mod ui;
 
-pub use outcome::Outcome;
-pub use program::{main, run_program};
+pub use program::{Outcome, main, run_program};

@@ -1,6 +1,6 @@
 //! Verbs that are part of `orator-lab`: what `orator` answers to their old names.
 
-use super::outcome::Outcome;
+use super::program::Outcome;
 use anyhow::{Result, bail};
 
 /// A verb that `orator` had before version 0.2; its arguments are accepted and ignored.

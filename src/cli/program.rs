@@ -6,7 +6,6 @@ use super::cluster::{plan, submit, work};
 use super::dataset::{align, forget, import, verify as dataset};
 use super::motion::{lift, sheet};
 use super::moved::MovedVerb;
-use super::outcome::Outcome;
 use super::pipeline::{init, report, run, status};
 use super::setup::{completions, doctor, guide, models, words};
 use super::signals;
@@ -17,6 +16,19 @@ use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use orator_base::stage::workdir;
 use orator_pipeline::process::{VERB, serve};
 use std::process::ExitCode;
+
+/// How a verb ended, when it ended well enough to say so itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// Everything asked for is done.
+    Done,
+    /// Some units failed (each was reported); the others are done.
+    SomeFailed,
+    /// Ended early by request (Ctrl-C, SIGTERM), at a place from which the same command goes on.
+    Stopped,
+    /// What was looked at (the set-up, a dataset) is not as it must be; what is wrong was printed.
+    Wrong,
+}
 
 /// Videos of one speaker to a 3D speech-gesture dataset, and to a model that gestures like that speaker.
 #[derive(Parser)]

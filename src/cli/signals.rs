@@ -1,7 +1,7 @@
 //! Ctrl-C and SIGTERM: work ends at once and says what is kept, or is asked to end where it can go on from, and at once
 //! when asked again.
 
-use super::stderr::note;
+use super::ui::note;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::{Arc, LazyLock};
 use tokio::runtime::{Builder, Runtime};

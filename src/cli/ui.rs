@@ -1,10 +1,9 @@
 //! What a verb prints: progress bars on standard error, a closing summary (or one JSON object) on standard output.
 
 use super::signals::StopRequest;
-pub use super::stderr::note;
-use super::stderr::shown;
 use indicatif::{HumanDuration, MultiProgress, ProgressBar, ProgressState, ProgressStyle};
 use orator_base::stage::progress::{PARTS, Progress, Task};
+use std::borrow::Cow;
 use std::fmt;
 use std::io::{ErrorKind, IsTerminal, Write};
 use std::sync::Arc;
@@ -157,4 +156,15 @@ impl Drop for Bar {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
     }
+}
+
+/// Writes a line on standard error, where that can still be written.
+pub fn note(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{}", shown(line));
+}
+
+/// Text without control characters: words of a damaged file must not command the terminal.
+pub fn shown(text: &str) -> Cow<'_, str> {
+    let commands = |letter: char| letter.is_control() && !matches!(letter, '\n' | '\t');
+    if text.contains(commands) { text.replace(commands, "\u{fffd}").into() } else { text.into() }
 }

@@ -1,6 +1,6 @@
 //! `orator submit`.
 
-use super::open::open;
+use super::work::open;
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::{Context, Result, bail, ensure};

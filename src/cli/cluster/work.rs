@@ -1,14 +1,17 @@
 //! `orator work`.
 
-use super::open::open;
 use crate::cli::Outcome;
+use crate::cli::confine::this_program;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator_base::stage::counted;
 use orator_cluster::heartbeat::DEAD_AFTER;
+use orator_cluster::plan::ClusterPlan;
 use orator_cluster::worker::{WorkReport, WorkerOptions, work};
+use orator_dataset::config;
+use orator_pipeline::Pipeline;
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Work on a plan, beside other workers on any machine that sees the same folders.
@@ -103,4 +106,13 @@ fn text(report: &WorkReport) -> String {
     lines
         .push(if report.all_ended { "every unit has ended" } else { "others have the rest, or it is left" }.to_owned());
     lines.join("\n")
+}
+
+/// Reads a plan and its pipeline, and checks that the plan was made from this configuration.
+pub fn open(path: &Path) -> Result<(ClusterPlan, Pipeline)> {
+    let plan = ClusterPlan::read(path)?;
+    let config = config::load(&plan.config, &plan.sets)?;
+    let pipeline = Pipeline::open(config)?.with_processes(this_program());
+    plan.check(&pipeline, &this_program())?;
+    Ok((plan, pipeline))
 }

@@ -10,4 +10,3 @@ pub mod speech_dataset;
 pub mod speech_events;
 pub mod speech_gestures;
 pub mod words;
-pub mod wrists;

@@ -1,7 +1,7 @@
 //! Ridge regressions from the sound about a frame to its pose and to the speeds of its wrists.
 
 use super::ridge::{Ridge, RidgeSums};
-use super::wrists::wrist_speeds;
+use super::rule::wrist_speeds;
 use ndarray::{Array2, Array3, s};
 use orator_base::types::skeleton::N_JOINTS;
 use orator_base::types::time::FrameRate;

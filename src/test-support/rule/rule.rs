@@ -6,7 +6,7 @@ use super::words::{self, N_PLACES, WordGesture};
 use crate::drawn::figure::{ArmControls, Controls, DrawnFigure};
 use crate::drawn::gesture::minimum_jerk;
 use crate::drawn::speech::{Speech, Syllable};
-use ndarray::Array3;
+use ndarray::{Array2, Array3, ArrayView3};
 use orator_base::math::vec3::{Vec3, sub};
 use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::{L_WRIST, N_JOINTS, NECK, R_WRIST};
@@ -252,11 +252,21 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(rng)
 }
 
+/// Left and right wrist.
+pub const WRISTS: [usize; 2] = [L_WRIST, R_WRIST];
+
+/// Speed of each wrist from each frame to the next, [T - 1, 2], m/s, no smoothing.
+pub fn wrist_speeds(joints: ArrayView3<f32>, fps: FrameRate) -> Array2<f64> {
+    Array2::from_shape_fn((joints.shape()[0].saturating_sub(1), 2), |(t, hand)| {
+        let step = |k: usize| f64::from(joints[[t + 1, WRISTS[hand], k]] - joints[[t, WRISTS[hand], k]]);
+        (0..3).map(|k| step(k).powi(2)).sum::<f64>().sqrt() * fps.per_sec()
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::rule::ridge::correlation;
-    use crate::rule::wrists::wrist_speeds;
     use ndarray::{Array1, s};
     use rand::SeedableRng;
 

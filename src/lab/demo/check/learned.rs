@@ -18,8 +18,8 @@ use orator_test_support::rule::baselines::{RuleBaselines, sound_of_frames};
 use orator_test_support::rule::dataset::{RULE_OF_WORDS, SpokenClip};
 use orator_test_support::rule::ridge::correlation;
 use orator_test_support::rule::rule::RuleGestures;
+use orator_test_support::rule::rule::wrist_speeds;
 use orator_test_support::rule::speech_dataset::{is_by_speech, predictable};
-use orator_test_support::rule::wrists::wrist_speeds;
 use serde::Serialize;
 
 /// Metrics of a predictor on the whole test split.

@@ -3,9 +3,9 @@
 use ndarray::{Array2, ArrayView3};
 use orator_base::types::time::FrameRate;
 use orator_test_support::rule::dataset::SpokenClip;
+use orator_test_support::rule::rule::WRISTS;
 use orator_test_support::rule::rule::{HOLD, RETURN, RuleGestures, STROKE, WORD_DELAY};
 use orator_test_support::rule::words::{N_PLACES, WordGesture, gesture};
-use orator_test_support::rule::wrists::WRISTS;
 use serde::Serialize;
 
 /// Seconds to the next word with a gesture from which on a word is alone.

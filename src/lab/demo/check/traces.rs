@@ -7,7 +7,7 @@ use orator_avatar::animate::draw::figure::{FigureView, INK, LEFT, PAPER, RIGHT, 
 use orator_base::types::image::Image;
 use orator_base::types::time::FrameRate;
 use orator_media::opencv::draw;
-use orator_test_support::rule::wrists::{WRISTS, wrist_speeds};
+use orator_test_support::rule::rule::{WRISTS, wrist_speeds};
 
 const WIDTH: usize = 1600;
 const LANE_PX: f32 = 220.0;
