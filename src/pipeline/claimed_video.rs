@@ -2,7 +2,7 @@
 //! the video, and looks once more whether the claim still is its own before a stage's work is put in its place.
 
 use super::pipeline::Pipeline;
-use super::pose2d::Pose2dStage;
+use super::pose2d::models::ChosenModels;
 use super::stages;
 use super::watched_stage::{UnitWork, WatchedStage};
 use anyhow::Result;
@@ -72,8 +72,8 @@ impl Pipeline {
     /// Weights that cannot be read.
     pub fn model_hashes(&self) -> Result<BTreeMap<String, String>> {
         let settings = &self.config().settings;
-        let (stage, hashes) = (Pose2dStage::new(settings)?, self.hashes());
-        let used = stage.used()?;
+        let (chosen, hashes) = (ChosenModels::find(settings)?, self.hashes());
+        let used = chosen.used()?;
         let hash = |(_, entry): &(_, &orator_onnx::ModelEntry)| {
             Ok((entry.file.clone(), hashes.hash(&settings.models.dir.join(&entry.file))?))
         };

@@ -1,11 +1,12 @@
 //! The stages by their names, ready to run, and the units each works on.
 
-use super::dataset::stage::DatasetStage;
+use super::dataset::stage::{DatasetInputs, DatasetStage};
 use super::extract::ExtractStage;
 use super::keypoints::by_source::StageBySource;
 use super::lift::LiftStage;
 use super::lift::lifter::reach_secs;
 use super::pose2d::Pose2dStage;
+use super::pose2d::models::ChosenModels;
 use super::segment::SegmentStage;
 use super::segment::speech_rule::SpeechListener;
 use anyhow::Result;
@@ -32,12 +33,16 @@ pub fn build(name: StageName, config: &Config, all: &[Videos], ready: &[Unit]) -
             SegmentStage::new(&settings.segment, &settings.work.dir).with_speech(SpeechListener::find(settings)?),
         ),
         StageName::Lift => Box::new(LiftStage::new(&settings.lift, &settings.segment, &settings.work.dir)?),
-        StageName::Dataset => Box::new(
-            DatasetStage::new(settings, ready, reach_secs(&settings.lift))
-                .with_videos(all.to_vec())
-                .with_models(models_used(settings)?)
-                .with_note(SpeechListener::note(settings)?),
-        ),
+        StageName::Dataset => {
+            let inputs = DatasetInputs {
+                ready: ready.to_vec(),
+                all: all.to_vec(),
+                models: models_used(settings)?,
+                notes: vec![SpeechListener::note(settings)?],
+                reach_secs: reach_secs(&settings.lift),
+            };
+            Box::new(DatasetStage::new(settings, inputs))
+        }
     })
 }
 
@@ -69,15 +74,15 @@ pub fn ready(config: &Config, videos: &Videos, hashes: &HashCache) -> Result<Vec
 /// No ONNX Runtime; a model that is missing or not what the manifest says.
 pub fn check_models(settings: &Settings) -> Result<()> {
     let runtime = Runtime::load(&settings.models.onnxruntime, &settings.models.dir)?;
-    for (_, entry) in Pose2dStage::new(settings)?.used()? {
+    for (_, entry) in ChosenModels::find(settings)?.used()? {
         Model::open(&runtime, entry, &settings.models.dir)?;
     }
     Ok(())
 }
 
 fn models_used(settings: &Settings) -> Result<Vec<ModelUsed>> {
-    let stage = Pose2dStage::new(settings)?;
-    let named = stage.used()?.into_iter().map(|(role, entry)| {
+    let chosen = ChosenModels::find(settings)?;
+    let named = chosen.used()?.into_iter().map(|(role, entry)| {
         let ModelEntry { id, sha256, origin, .. } = entry.clone();
         ModelUsed { role: role.into(), id, sha256, licence: origin.licence }
     });

@@ -5,7 +5,7 @@
 use super::outliers;
 use super::outliers::BoneChange;
 use super::refuse::{exclude_frames, max_gap_frames};
-use super::{Lifted, Lifter};
+use super::{Lifted, Lifter, weights};
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array1, s};
 use orator_base::stage::artifacts::{Artifact, StageName};
@@ -26,6 +26,8 @@ pub struct LiftStage {
     settings: config::LiftConfig,
     rules: config::SegmentConfig,
     work: PathBuf,
+    /// Hashes of the built-in weights of body and hands; `file` for those of a file, which is an input.
+    weights: [String; 2],
 }
 
 impl LiftStage {
@@ -33,7 +35,12 @@ impl LiftStage {
     /// Errors: weights that cannot be loaded.
     pub fn new(settings: &config::LiftConfig, rules: &config::SegmentConfig, work: &Path) -> Result<Self> {
         let lifter = Lifter::new(settings)?;
-        Ok(Self { lifter, settings: settings.clone(), rules: rules.clone(), work: work.to_owned() })
+        let hash = |file: &Path, builtin: &[u8]| {
+            let is_builtin = file.as_os_str().is_empty();
+            if is_builtin { blake3::hash(builtin).to_hex().to_string() } else { "file".to_owned() }
+        };
+        let weights = [hash(&settings.body_weights, weights::BODY), hash(&settings.hand_weights, weights::HANDS)];
+        Ok(Self { lifter, settings: settings.clone(), rules: rules.clone(), work: work.to_owned(), weights })
     }
 
     fn file(&self, file: Artifact, unit: &Unit) -> PathBuf {
@@ -51,15 +58,10 @@ impl Stage for LiftStage {
     }
 
     fn settings(&self, _unit: &Unit) -> serde_json::Value {
-        // the weights of a file are an input; of the built-in ones the hash stands here
-        let hash = |file: &Path, builtin: &[u8]| match file.as_os_str().is_empty() {
-            true => json!(blake3::hash(builtin).to_hex().as_str()),
-            false => json!("file"),
-        };
         json!({
             "lift": {
-                "body_weights": hash(&self.settings.body_weights, super::weights::BODY),
-                "hand_weights": hash(&self.settings.hand_weights, super::weights::HANDS),
+                "body_weights": self.weights[0],
+                "hand_weights": self.weights[1],
                 "smooth_arms": self.settings.smooth_arms,
                 "smooth_hands": self.settings.smooth_hands,
                 "level": self.settings.level,
