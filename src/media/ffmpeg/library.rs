@@ -15,9 +15,10 @@ pub fn version() -> String {
     use ffmpeg_next::software::{resampling, scaling};
     let dotted = |v: u32| format!("{}.{}.{}", v >> 16, (v >> 8) & 255, v & 255);
     format!(
-        "libavformat {}, libavcodec {}, libswscale {}, libswresample {}",
+        "libavformat {}, libavcodec {}, libavfilter {}, libswscale {}, libswresample {}",
         dotted(ffmpeg_next::format::version()),
         dotted(ffmpeg_next::codec::version()),
+        dotted(ffmpeg_next::filter::version()),
         dotted(scaling::version()),
         dotted(resampling::version())
     )

@@ -51,7 +51,7 @@ impl Stage for ExtractStage {
     }
 
     fn version(&self) -> u32 {
-        4
+        5
     }
 
     fn settings(&self, unit: &Unit) -> serde_json::Value {
