@@ -291,14 +291,13 @@ impl Stage for DatasetStage {
         for (video, assignment) in kept.iter().zip(assigned) {
             task.detail(&video.name);
             match assignment {
-                Assignment::In(split, by) => run.write(&writer, video, split, by, &sounds)?,
-                Assignment::Blocks(blocks) => run.write_blocks(&writer, video, blocks, &division, &sounds)?,
                 Assignment::Nowhere(with) => {
                     part::remove_sound(out, &video.name)?;
                     let secs = with.first().map_or(0.0, |shared| shared.secs);
                     let others: Vec<&str> = with.iter().filter_map(|shared| shared.other(&video.name)).collect();
                     left_out.push((video, run.duplicate(video, &others.join(" and "), secs)));
                 }
+                placed => run.write(&writer, video, placed, &division, &sounds)?,
             }
             task.advance(1);
         }
