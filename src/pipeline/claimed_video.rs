@@ -4,7 +4,7 @@
 use super::pipeline::Pipeline;
 use super::pose2d::models::ChosenModels;
 use super::stages;
-use super::watched_stage::{UnitWork, WatchedStage};
+use super::stages::{HookedStage, UnitWork};
 use anyhow::Result;
 use orator_base::stage::artifacts::StageName;
 use orator_base::stage::fingerprint::HashCache;
@@ -39,7 +39,7 @@ impl Pipeline {
         progress: &dyn Progress,
     ) -> Result<Vec<StageOutcome>> {
         let while_mine = |_: &'static str, _: &Unit, work: UnitWork| around(is_mine, work);
-        let stage = |name: &StageName| Ok(WatchedStage { stage: self.stage(*name, &[])?, around: &while_mine });
+        let stage = |name: &StageName| Ok(HookedStage { stage: self.stage(*name, &[])?, hook: &while_mine });
         let stages = names.iter().map(stage).collect::<Result<Vec<_>>>()?;
         let stages: Vec<&dyn Stage> = stages.iter().map(|stage| stage as &dyn Stage).collect();
         let work = &self.config().settings.work.dir;
@@ -61,7 +61,7 @@ impl Pipeline {
         progress: &dyn Progress,
     ) -> Result<Vec<StageOutcome>> {
         let while_mine = |_: &'static str, _: &Unit, work: UnitWork| around(is_mine, work);
-        let stage = WatchedStage { stage: self.stage(StageName::Pose2d, &[])?, around: &while_mine };
+        let stage = HookedStage { stage: self.stage(StageName::Pose2d, &[])?, hook: &while_mine };
         let ended = runner::run_parts(&stage, unit, share, &self.config().settings.work.dir, hashes, progress);
         Ok(ended.err().map(|error| StageOutcome::Failed(Arc::new(error))).into_iter().collect())
     }

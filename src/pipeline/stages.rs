@@ -12,13 +12,15 @@ use super::segment::speech_rule::SpeechListener;
 use anyhow::Result;
 use orator_base::stage::artifacts::StageName;
 use orator_base::stage::fingerprint::HashCache;
+use orator_base::stage::progress::Progress;
 use orator_base::stage::runner;
 use orator_base::stage::runner::State;
-use orator_base::stage::{Stage, Unit};
+use orator_base::stage::{Report, Stage, StageWrapper, Unit};
 use orator_dataset::config::videos::Videos;
 use orator_dataset::config::{Config, Settings};
 use orator_dataset::info::ModelUsed;
 use orator_onnx::{Model, ModelEntry, Runtime};
+use std::path::Path;
 
 /// The stage, ready to run on `all` videos. `ready` are those the dataset is made of.
 ///
@@ -87,4 +89,31 @@ fn models_used(settings: &Settings) -> Result<Vec<ModelUsed>> {
         ModelUsed { role: role.into(), id, sha256, licence: origin.licence }
     });
     Ok(named.chain(SpeechListener::find(settings)?.map(|listener| listener.used())).collect())
+}
+
+/// The work on one unit.
+pub type UnitWork<'a> = &'a mut dyn FnMut() -> Result<Report>;
+
+/// Called in place of the work on a unit of the stage of this name, which it does.
+pub type StageHook<'a> = &'a (dyn Fn(&'static str, &Unit, UnitWork<'_>) -> Result<Report> + Sync);
+
+/// A stage with a hook around every run of it: a claim is checked, the time is taken.
+pub struct HookedStage<'a> {
+    pub stage: Box<dyn Stage + 'a>,
+    pub hook: StageHook<'a>,
+}
+
+impl StageWrapper for HookedStage<'_> {
+    fn inner(&self, _unit: Option<&Unit>) -> &dyn Stage {
+        &*self.stage
+    }
+
+    fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> Result<Report> {
+        (self.hook)(self.name(), unit, &mut || self.stage.run(unit, out, progress))
+    }
+
+    fn run_part(&self, unit: &Unit, part: usize, out: &Path, progress: &dyn Progress) -> Result<()> {
+        let mut work = || self.stage.run_part(unit, part, out, progress).map(|()| Report::default());
+        (self.hook)(self.name(), unit, &mut work).map(drop)
+    }
 }

@@ -16,9 +16,9 @@ use orator_formats::keypoints_npz;
 use orator_formats::mocap::motion_file;
 use orator_media::opencv::png;
 use orator_pipeline::Pipeline;
+use orator_pipeline::extract::picture_options;
 use orator_pipeline::lift::quality;
 use orator_pipeline::lift::quality::{ArmStatistics, ClipStatistics};
-use orator_pipeline::pictures;
 use orator_report::sheet::sheet::SheetClip;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -132,7 +132,7 @@ fn of_run(pipeline: &Pipeline, args: &Args) -> Result<Vec<SheetFiles>> {
         if is_chosen(&unit) {
             clips.push(SheetFiles {
                 title: unit.to_string(),
-                pictures: pictures::options(work, &unit),
+                pictures: picture_options(work, &unit),
                 keypoints: Artifact::Keypoints.path(work, &unit),
                 joints: Artifact::Joints.path(work, &unit),
                 out: folder.join(&unit.speaker).join(format!("{}.png", unit.video)),

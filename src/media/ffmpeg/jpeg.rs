@@ -18,7 +18,7 @@ pub fn encode(image: &Image) -> Result<Vec<u8>> {
 
 /// Bytes of a JPEG file of this quality, 1 (best) to 31.
 pub fn encode_at(image: &Image, quality: i32) -> Result<Vec<u8>> {
-    super::library::init();
+    super::source::init();
     let [width, height] = [u32::try_from(image.width)?, u32::try_from(image.height)?];
     ensure!(width > 0 && height > 0 && image.data.len() == 3 * image.width * image.height, "a picture without pixels");
     let jpeg = encoder::find(Id::MJPEG).context("this ffmpeg has no JPEG encoder")?;
@@ -58,7 +58,7 @@ const MOST_PIXELS: i64 = 1 << 26;
 
 /// Picture of a JPEG file's bytes. Errors: no JPEG, a damaged one, one of more than 67 million pixels.
 pub fn decode(bytes: &[u8]) -> Result<Image> {
-    super::library::init();
+    super::source::init();
     let jpeg = decoder::find(Id::MJPEG).context("this ffmpeg has no JPEG decoder")?;
     let mut context = codec::Context::new_with_codec(jpeg);
     context.set_threading(codec::threading::Config::count(1));

@@ -2,9 +2,8 @@
 
 pub mod blur;
 pub mod draw;
-pub mod library;
 pub mod png;
 pub mod tensor;
 pub mod warp;
 
-pub use library::version;
+pub use warp::version;

@@ -116,7 +116,8 @@ impl DatasetStage {
 
     /// The videos of which nothing can come, as parts with their failures.
     fn failures(&self, speaker: &Unit, ready: &[&Unit]) -> Vec<VideoSource> {
-        let mut failed: Vec<&Unit> = self.inputs.ready.iter().filter(|video| video.speaker == speaker.speaker).collect();
+        let mut failed: Vec<&Unit> =
+            self.inputs.ready.iter().filter(|video| video.speaker == speaker.speaker).collect();
         failed.extend(self.videos(speaker).into_iter().flat_map(|videos| &videos.units));
         failed.retain(|unit| !ready.contains(unit));
         failed.sort_by(|a, b| a.video.cmp(&b.video));
@@ -280,7 +281,8 @@ impl Stage for DatasetStage {
         let compared = run.compare(&kept, &sounds)?;
         let Some(first) = kept.first() else { anyhow::bail!("no video of {unit} is ready") };
         let fps = first.intervals.fps;
-        let named = self.inputs.all.iter().flat_map(|videos| &videos.splits).map(|(video, split)| (video.as_str(), *split));
+        let named =
+            self.inputs.all.iter().flat_map(|videos| &videos.splits).map(|(video, split)| (video.as_str(), *split));
         let assigned = division.assign(&kept, &named.collect(), &compared.shared, &self.settings);
         // From here on the videos stay where they are, also when the run ends before the dataset is in its place.
         division.record.write(&artifacts::splits(&self.work, &unit.speaker))?;

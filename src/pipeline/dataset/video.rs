@@ -1,5 +1,6 @@
 //! One video of a speaker on its way into the dataset: the files of the stages before, and the samples cut from them.
 
+use crate::sound;
 use anyhow::{Context, Result, ensure};
 use ndarray::{Axis, concatenate, s};
 use orator_base::audio::fingerprint::Fingerprinter;
@@ -164,18 +165,11 @@ impl LiftedVideo {
         if !self.sound.exists() {
             return Ok(None);
         }
-        let reading = || format!("cannot read {}", self.sound.display());
-        let mut wav = hound::WavReader::open(&self.sound).with_context(reading)?;
         let mut fingerprinter = Fingerprinter::default();
-        let mut piece = Vec::with_capacity(PIECE);
-        for sample in wav.samples::<i16>() {
-            piece.push(f32::from(sample.with_context(reading)?) / 32_768.0);
-            if piece.len() == PIECE {
-                fingerprinter.push(&piece);
-                piece.clear();
-            }
-        }
-        fingerprinter.push(&piece);
+        sound::pieces(&self.sound, PIECE, |piece| {
+            fingerprinter.push(piece);
+            Ok(())
+        })?;
         Ok(Some(fingerprinter.finish()))
     }
 

@@ -2,7 +2,7 @@
 //! a video, and the keypoints at the dataset rate; `pose2d` hands these on. What pictures alone tell is NaN, not known.
 
 use super::taken::{TakenKeypoints, take_in};
-use crate::extract::audio_file::extract_wav;
+use crate::sound::extract_wav;
 use anyhow::{Context, Result, anyhow, bail};
 use ndarray::{Array3, s};
 use orator_base::stage::artifacts::{Artifact, StageName, dir};

@@ -2,14 +2,13 @@
 
 use super::body::{SIZE_FRAMES, STRAY_FRAMES, TRAINED_FPS};
 use super::camera::CameraTilt;
-use super::interval_view::IntervalView;
 use super::{body, gaps, hands, lengths, rest, weights};
 use anyhow::{Result, ensure};
-use ndarray::{Array2, Array3, s};
+use ndarray::{Array2, Array3, ArrayViewMut2, ArrayViewMut3, s};
 use orator_base::math::gaussian;
 use orator_base::motion::bones;
 use orator_base::types::interval::Interval;
-use orator_base::types::pose2d::{Keypoints, N_HAND};
+use orator_base::types::pose2d::{Keypoints, N_HAND, SEEN_SCORE, coco};
 use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton;
 use orator_base::types::skeleton::{L_HAND, N_BONES, N_JOINTS, R_HAND, Side};
@@ -54,6 +53,13 @@ pub struct Lifted {
     pub cameras: Vec<CameraTilt>,
     /// Frames that have arms.
     pub n_frames: usize,
+}
+
+/// The frames of one interval of a `Lifted`.
+pub struct IntervalView<'a> {
+    pub joints: ArrayViewMut3<'a, f32>,
+    pub extra: ArrayViewMut3<'a, f32>,
+    pub mask: ArrayViewMut2<'a, bool>,
 }
 
 impl Lifter {
@@ -194,10 +200,27 @@ impl Lifted {
     }
 }
 
+/// Why joints are missing (NaN), in a sentence; nothing when all are there.
+pub fn notes(keypoints: &Keypoints, lifted: &Lifted) -> Option<String> {
+    let n_frames = keypoints.n_frames();
+    let unseen = |j: usize| {
+        let scores = keypoints.body.slice(s![.., j, 2]);
+        scores.iter().filter(|score| score.is_nan() || **score < SEEN_SCORE).count()
+    };
+    (lifted.n_frames < n_frames).then(|| {
+        format!(
+            "no body in {} of {n_frames} frames (NaN): it is lifted where both shoulders are seen within {MAX_GAP_SECS} s; \
+             the right shoulder is not seen in {} frames, the left in {}",
+            n_frames - lifted.n_frames,
+            unseen(coco::R_SHOULDER),
+            unseen(coco::L_SHOULDER)
+        )
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use orator_base::types::pose2d::coco;
     use orator_base::types::time::FrameRate;
 
     /// A body that sways; from frame `change` on it moves otherwise and is larger.

@@ -1,6 +1,6 @@
 //! The body model: the keypoints of the person in a box, and those of both hands where the model gives them.
 
-use super::decode::{ScoredPoint, heatmap, simcc};
+use super::decode::{ScoredPoint, heatmap, points};
 use super::model_input::ModelInput;
 use anyhow::{Result, bail};
 use orator_base::types::image::Image;
@@ -28,7 +28,7 @@ impl PointReader {
                 let (shape, maps) = outputs.floats(name)?;
                 heatmap::decode(shape, maps, size, *refine, &self.gaussian)
             }
-            Decode::Simcc { x, y, split } => simcc::decode(outputs.floats(x)?, outputs.floats(y)?, *split),
+            Decode::Simcc { x, y, split } => points::simcc(outputs.floats(x)?, outputs.floats(y)?, *split),
             other => bail!("keypoints cannot be read as {other:?}"),
         }
     }

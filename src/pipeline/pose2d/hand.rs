@@ -2,7 +2,7 @@
 //! where the model says so.
 
 use super::body::{PointReader, placed};
-use super::decode::{ScoredPoint, regression};
+use super::decode::{ScoredPoint, points};
 use super::model_input::ModelInput;
 use super::region;
 use anyhow::Result;
@@ -59,9 +59,9 @@ impl HandModel {
         let outputs = self.feed.part(image, &src_from_dst)?;
         let single = |name: &str| -> Result<f32> { Ok(outputs.floats(name)?.1.first().copied().unwrap_or(0.0)) };
         let hand = if let Decode::Regression { landmarks, score, logit, right } = &self.decode {
-            let score = regression::score(single(score)?, *logit);
+            let score = points::regression_score(single(score)?, *logit);
             let n_points = self.map.iter().max().map_or(0, |largest| largest + 1);
-            let points = regression::decode(outputs.floats(landmarks)?.1, score, n_points.max(21))?;
+            let points = points::regression(outputs.floats(landmarks)?.1, score, n_points.max(21))?;
             let right = right.as_ref().map(|name| single(name)).transpose()?.map(f64::from);
             DetectedHand { points: placed(&points, &self.map, &src_from_dst), score: f64::from(score), right }
         } else {

@@ -1,6 +1,6 @@
 //! The person detector: all people of a picture. `tracker` chooses the speaker among them.
 
-use super::decode::{detections, yolox_grid};
+use super::decode::{boxes, yolox_grid};
 use super::model_input::ModelInput;
 use anyhow::{Result, bail};
 use orator_base::types::image::Image;
@@ -24,13 +24,13 @@ impl Detector {
         let size = self.feed.size();
         let (src_from_dst, outputs) = self.feed.whole(image)?;
         let found = match &self.decode {
-            Decode::Detections { boxes, labels, person, min_score, max_overlap } => {
-                let (shape, rows) = outputs.floats(boxes)?;
+            Decode::Detections { boxes: output, labels, person, min_score, max_overlap } => {
+                let (shape, rows) = outputs.floats(output)?;
                 if shape.last() != Some(&5) {
-                    bail!("the output {boxes:?} of a detector must have rows of 5 numbers, its shape is {shape:?}");
+                    bail!("the output {output:?} of a detector must have rows of 5 numbers, its shape is {shape:?}");
                 }
                 let labels = labels.as_ref().map(|name| outputs.integers(name)).transpose()?.map(|(_, labels)| labels);
-                detections::decode(rows, labels, *person, *min_score, *max_overlap)
+                boxes::detections(rows, labels, *person, *min_score, *max_overlap)
             }
             Decode::YoloxGrid { predictions, strides, min_score, max_overlap } => {
                 let (shape, rows) = outputs.floats(predictions)?;

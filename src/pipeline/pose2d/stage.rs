@@ -77,8 +77,13 @@ impl Stage for Pose2dStage {
                 "decode": entry.decode, "points": entry.points, "sha256": entry.sha256,
             })
         };
-        let models: serde_json::Map<String, Value> =
-            self.chosen.used().unwrap_or_default().into_iter().map(|(key, entry)| (key.to_owned(), read(entry))).collect();
+        let models: serde_json::Map<String, Value> = self
+            .chosen
+            .used()
+            .unwrap_or_default()
+            .into_iter()
+            .map(|(key, entry)| (key.to_owned(), read(entry)))
+            .collect();
         let mut pose2d = json!(self.chosen.settings);
         // The largest was followed before there was a choice: what was made then is what would be made now.
         if let Some(keys) = pose2d.as_object_mut().filter(|_| !self.follows_talker()) {

@@ -92,10 +92,10 @@ pub fn probe(program: &Path) -> Result<Restriction> {
     }
 }
 
-/// What a restricted process that `program` starts finds of a video: see `media`.
+/// What a restricted process that `program` starts finds of a video: see `answer_media`.
 ///
 /// # Errors
-/// Those of `media::answer`; a process that is lost.
+/// Those of `answer_media`; a process that is lost.
 pub fn ask_media(program: &Path, request: &MediaRequest) -> Result<Option<f64>> {
     let mut process = UnitProcess::start(program)?;
     process.ask(&Request::Media(request.clone()));

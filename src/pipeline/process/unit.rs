@@ -2,14 +2,15 @@
 //! with the run that started it.
 
 use super::failure::SentFailure;
-use super::media;
-use super::message::{Message, Request, UnitRequest, receive, send};
+use super::message::{MediaRequest, Message, Request, UnitRequest, receive, send};
 use crate::stages;
 use anyhow::{Context, Result};
 use orator_base::stage::progress::{Event, Progress, Task};
 use orator_base::stage::{Report, Unit, attempt, workdir};
 use orator_dataset::config::Config;
 use orator_dataset::config::videos::Videos;
+use orator_media::ffmpeg::probe::probe;
+use orator_media::ffmpeg::write::excerpt;
 use orator_media::sandbox::{FileAccess, restrict};
 use std::io::{Read, Stdout, Write};
 use std::path::PathBuf;
@@ -49,7 +50,7 @@ pub fn serve() -> Result<()> {
             let writes = media.excerpt.iter().filter_map(|excerpt| excerpt.to.parent().map(Into::into)).collect();
             restrict(&FileAccess { reads: Some(vec![media.source.clone()]), writes });
             std::thread::spawn(end_with_parent);
-            let message = match attempt::guarded(|| media::answer(&media)) {
+            let message = match attempt::guarded(|| answer_media(&media)) {
                 Ok(secs) => Message::Secs(secs),
                 Err(error) => Message::Failed(SentFailure::of(&workdir::full_disk(error))),
             };
@@ -78,6 +79,17 @@ fn work(request: UnitRequest, out: &Messages) -> Result<Report> {
     match part {
         Some(part) => stage.run_part(&unit, part, &folder, &progress).map(|()| Report::default()),
         None => stage.run(&unit, &folder, &progress),
+    }
+}
+
+/// The length of a video in seconds, where a header says it; of an excerpt, what was copied.
+///
+/// # Errors
+/// A video that cannot be read, an excerpt that cannot be copied.
+pub fn answer_media(request: &MediaRequest) -> Result<Option<f64>> {
+    match &request.excerpt {
+        None => Ok(probe(&request.source)?.duration_secs),
+        Some(wanted) => excerpt::copy(&request.source, &wanted.to, wanted.start_secs, wanted.secs).map(Some),
     }
 }
 

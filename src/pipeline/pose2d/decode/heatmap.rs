@@ -2,7 +2,7 @@
 //! the cells. `dark` is the decoding of Zhang et al. 2020, "Distribution-Aware Coordinate Representation for Human Pose
 //! Estimation", section 3.2: blur, then one Newton step on the logarithm.
 
-use super::point::{LARGEST, ScoredPoint, finite, peak};
+use super::points::{LARGEST, ScoredPoint, finite, peak};
 use anyhow::{Result, ensure};
 use orator_media::opencv::blur::GaussianBlur;
 use orator_onnx::Refine;
