@@ -3,8 +3,7 @@
 
 use super::pipeline::Pipeline;
 use super::pose2d::models::ChosenModels;
-use super::stages;
-use super::stages::{HookedStage, UnitWork};
+use super::stages::{self, HookedStage, UnitWork};
 use anyhow::Result;
 use orator_base::stage::artifacts::StageName;
 use orator_base::stage::fingerprint::HashCache;

@@ -18,6 +18,8 @@ pub mod segment;
 pub mod sound;
 pub mod stages;
 pub mod status;
+#[cfg(test)]
+mod test_keypoints;
 pub mod timing;
 
 pub use account::{AccountKind, TimeAccount};

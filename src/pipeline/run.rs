@@ -3,8 +3,7 @@
 use super::pipeline::Pipeline;
 use super::pose2d::models;
 use super::segment::speech_rule::SpeechListener;
-use super::stages;
-use super::stages::{HookedStage, UnitWork};
+use super::stages::{self, HookedStage, UnitWork};
 use super::timing::{StageClock, StageTime};
 use anyhow::{Context, Result, ensure};
 use orator_base::stage::artifacts::{StageName, speaker_dir};

@@ -6,8 +6,7 @@
 use super::decode::StreamDecoder;
 use super::origin;
 use super::resample::{Resampler, first_not_finite, format_of};
-use super::source;
-use super::source::{LONGEST_GAP_SECS, LONGEST_SECS, UnreadableMedia};
+use super::source::{self, LONGEST_GAP_SECS, LONGEST_SECS, UnreadableMedia};
 use anyhow::{Context, Result, bail};
 use ffmpeg_next::format::{Sample, sample};
 use ffmpeg_next::{ChannelLayout, frame};

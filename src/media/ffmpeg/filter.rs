@@ -22,8 +22,8 @@ impl FilterGraph {
             // SAFETY: the graph is ours and has no filter yet.
             unsafe { (*graph.as_mut_ptr()).nb_threads = 1 };
             let [source, sink] = ["buffer", "buffersink"].map(|name| filter::find(name).ok_or(Error::FilterNotFound));
-            let name = format.descriptor().map_or("none", |format| format.name());
-            let frames = format!("video_size={width}x{height}:pix_fmt={name}:time_base=1/25");
+            let number = ffi::AVPixelFormat::from(format) as i32;
+            let frames = format!("video_size={width}x{height}:pix_fmt={number}:time_base=1/25");
             graph.add(&source?, "in", &frames)?;
             graph.add(&sink?, "out", "")?;
             graph.output("in", 0)?.input("out", 0)?.parse(chain)?;

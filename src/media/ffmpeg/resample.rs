@@ -33,9 +33,10 @@ pub(crate) fn first_not_finite(frame: &frame::Audio) -> Option<usize> {
         // values of its format.
         let value = unsafe {
             let values = *(*frame.as_ptr()).extended_data.add(plane);
-            match is_double {
-                true => std::slice::from_raw_parts(values.cast::<f64>(), n_values).iter().position(|v| !v.is_finite()),
-                false => std::slice::from_raw_parts(values.cast::<f32>(), n_values).iter().position(|v| !v.is_finite()),
+            if is_double {
+                std::slice::from_raw_parts(values.cast::<f64>(), n_values).iter().position(|v| !v.is_finite())
+            } else {
+                std::slice::from_raw_parts(values.cast::<f32>(), n_values).iter().position(|v| !v.is_finite())
             }
         };
         value.map(|at| at / n_each)

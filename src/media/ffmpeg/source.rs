@@ -99,11 +99,10 @@ pub(crate) fn open_with(path: &Path, options: &[(&str, &str)]) -> Result<Input> 
     for stream in input.streams().filter(|stream| stream.parameters().medium() == ffmpeg::media::Type::Audio) {
         check_rate(path, sound_numbers(&stream)[0])?;
     }
-    match video_stream(&input).is_none() && automatic_track(&input).is_none() {
-        false => Ok(input),
-        true if is_mp4 => unreadable(cut_short()),
-        true => unreadable(format!("{name} holds neither pictures nor sound: {EXPECTED}")),
+    if video_stream(&input).is_some() || automatic_track(&input).is_some() {
+        return Ok(input);
     }
+    unreadable(if is_mp4 { cut_short() } else { format!("{name} holds neither pictures nor sound: {EXPECTED}") })
 }
 
 /// `path` as ffmpeg wants it: text, and marked as a file so that a colon in its name is not taken for a protocol.

@@ -1,29 +1,24 @@
 //! The stage: all videos of a speaker, as `extract`, `pose2d`, `segment` and `lift` left them, become one dataset.
 //! What the dataset that was there has of a video already is taken over as it is, so that a new video costs itself alone.
 
-use super::division;
-use super::division::Division;
+use super::division::{self, Division};
 use super::faces;
 use super::outcome::{DatasetOutcome, SeveralPeople};
-use super::people;
-use super::people::PersonSeen;
+use super::people::{self, PersonSeen};
 use super::run::DatasetRun;
 use super::video::{FILES, LiftedVideo, POSTURE_VERSION};
 use anyhow::{Result, ensure};
-use orator_base::stage::artifacts;
-use orator_base::stage::artifacts::{Artifact, StageName, dir, speaker_dir};
+use orator_base::stage::artifacts::{self, Artifact, StageName, dir, speaker_dir};
 use orator_base::stage::ledger::{Ledger, longest_first};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::record::Failure;
 use orator_base::stage::{Input, Report, Stage, Unit, counted, workdir};
 use orator_base::types::time::FrameRate;
-use orator_dataset::config;
-use orator_dataset::config::Settings;
 use orator_dataset::config::videos::Videos;
+use orator_dataset::config::{self, Settings};
 use orator_dataset::info::{About, ModelUsed};
 use orator_dataset::split::{Assignment, Split, SplitBy, SplitRule};
-use orator_dataset::write::part;
-use orator_dataset::write::part::VideoSource;
+use orator_dataset::write::part::{self, VideoSource};
 use orator_dataset::write::writer::DatasetWriter;
 use orator_formats::media_json::MediaInfo;
 use std::collections::{BTreeMap, BTreeSet};
@@ -224,9 +219,10 @@ impl Stage for DatasetStage {
             settings.insert("fix_offset".to_owned(), true.into());
         }
         // Of datasets without angles the settings are those of the versions that knew none.
-        match self.settings.posture {
-            true => settings["estimator"] = POSTURE_VERSION.into(),
-            false => drop(settings["dataset"].as_object_mut().and_then(|dataset| dataset.shift_remove("posture"))),
+        if self.settings.posture {
+            settings["estimator"] = POSTURE_VERSION.into();
+        } else {
+            drop(settings["dataset"].as_object_mut().and_then(|dataset| dataset.shift_remove("posture")));
         }
         if let (false, Some(settings)) = (said.transcripts.is_empty(), settings.as_object_mut()) {
             settings.insert("words".to_owned(), true.into());

@@ -5,8 +5,7 @@ use anyhow::{Result, ensure};
 use orator_base::math::order;
 use orator_base::types::pose2d::{Keypoints, SEEN_SCORE, coco};
 use orator_base::types::pose3d::Motion;
-use orator_base::types::skeleton;
-use orator_base::types::skeleton::{L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, N_HAND_JOINTS};
+use orator_base::types::skeleton::{self, L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, N_HAND_JOINTS};
 
 const MM: f64 = 1000.0;
 

@@ -12,6 +12,7 @@ use orator_media::sandbox::Restriction;
 use orator_onnx::find_library;
 use std::collections::BTreeMap;
 use std::io::{BufReader, Read};
+use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
 use std::path::Path;
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 
@@ -83,10 +84,7 @@ impl SeparateStage<'_> {
 /// # Errors
 /// The program cannot be started, or does not answer.
 pub fn probe(program: &Path) -> Result<Restriction> {
-    let mut process = UnitProcess::start(program)?;
-    process.ask(&Request::Restrict);
-    let answer = process.child.stdout.take().map(|mut out| receive(&mut out));
-    match answer.context("no answer")?? {
+    match UnitProcess::start(program)?.answer(&Request::Restrict)? {
         Message::Restricted(restriction) => Ok(restriction),
         other => bail!("{other:?} is no answer"),
     }
@@ -97,10 +95,7 @@ pub fn probe(program: &Path) -> Result<Restriction> {
 /// # Errors
 /// Those of `answer_media`; a process that is lost.
 pub fn ask_media(program: &Path, request: &MediaRequest) -> Result<Option<f64>> {
-    let mut process = UnitProcess::start(program)?;
-    process.ask(&Request::Media(request.clone()));
-    let answer = process.child.stdout.take().map(|mut out| receive(&mut out));
-    match answer.context("no answer")? {
+    match UnitProcess::start(program)?.answer(&Request::Media(request.clone())) {
         Ok(Message::Secs(secs)) => Ok(secs),
         Ok(Message::Failed(failure)) => Err(failure.into_error()),
         _ => bail!("{}: the process that read it gave no answer", request.source.display()),
@@ -119,8 +114,7 @@ impl UnitProcess {
         let mut command = Command::new(program);
         command.arg(VERB).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         // Ctrl-C is for the run alone, which ends its processes.
-        #[cfg(unix)]
-        std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        command.process_group(0);
         let mut child = command.spawn().with_context(|| format!("cannot start {}", program.display()))?;
         let stdin = child.stdin.take();
         Ok(Self { child, stdin })
@@ -129,6 +123,12 @@ impl UnitProcess {
     /// Sends the request. A process that is gone already is noticed by its silence.
     fn ask(&mut self, request: &Request) {
         let _ = self.stdin.as_mut().map(|stdin| send(stdin, request));
+    }
+
+    /// The one message that the process sends in answer to a request.
+    fn answer(mut self, request: &Request) -> Result<Message> {
+        self.ask(request);
+        receive(&mut self.child.stdout.take().context("no pipe")?)
     }
 
     /// Follows the process to the stage's result and ends it, so that nothing is written after; or says how it was lost.
@@ -197,8 +197,7 @@ fn last_bytes(mut from: impl Read) -> Vec<u8> {
 
 /// How a process ended before it had a result.
 fn death(status: ExitStatus) -> String {
-    #[cfg(unix)]
-    if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
+    if let Some(signal) = status.signal() {
         let why = match signal {
             6 => " (it gave up)",
             7 | 11 => " (it reached for memory that is not its own): the file may be damaged, or made to do harm",

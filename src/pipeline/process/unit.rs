@@ -14,8 +14,8 @@ use orator_media::ffmpeg::write::excerpt;
 use orator_media::sandbox::{FileAccess, restrict};
 use std::io::{Read, Stdout, Write};
 use std::path::PathBuf;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// The argument by which the program becomes the process of a unit. It stands in no help text.
@@ -29,7 +29,6 @@ const PACE: Duration = Duration::from_millis(50);
 /// # Errors
 /// No request, or nobody who reads the answer.
 pub fn serve() -> Result<()> {
-    #[cfg(target_os = "linux")]
     rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL))?;
     let out = Messages(Mutex::new(std::io::stdout()));
     match receive(&mut std::io::stdin().lock()).context("this is started by `orator run` alone")? {
@@ -98,7 +97,7 @@ struct Messages(Mutex<Stdout>);
 
 impl Messages {
     fn send(&self, message: &Message) -> Result<()> {
-        let mut out = self.0.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let mut out = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         send(&mut *out, message)?;
         Ok(out.flush()?)
     }

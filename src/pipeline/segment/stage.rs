@@ -2,8 +2,7 @@
 //! `measures.npz` and `sound_offset.json`.
 
 use super::judge::judge;
-use super::measure;
-use super::measure::Measures;
+use super::measure::{self, Measures};
 use super::speech_rule::SpeechListener;
 use crate::{lips, sound};
 use anyhow::{Result, ensure};
@@ -17,6 +16,7 @@ use orator_dataset::config;
 use orator_formats::keypoints_npz;
 use orator_formats::media_json::MediaInfo;
 use orator_formats::timeline_npz::Timeline;
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 /// Keypoints to intervals worth keeping.
@@ -158,15 +158,15 @@ fn report(intervals: &Intervals, ledger: &Ledger) -> Report {
         )
     };
     if intervals.resting_secs() >= 0.05 {
-        line += &format!("; hands at rest {:.1} s of it", intervals.resting_secs());
+        let _ = write!(line, "; hands at rest {:.1} s of it", intervals.resting_secs());
     }
     if !refused.is_empty() {
-        line += &format!("; refused: {}", longest_first(&refused));
+        let _ = write!(line, "; refused: {}", longest_first(&refused));
     }
     let length = |r: &orator_base::stage::ledger::Refused| r.end_secs - r.start_secs;
     let worst = ledger.refused.iter().max_by(|a, b| length(a).total_cmp(&length(b)));
     if let (true, Some(worst)) = (intervals.intervals.is_empty(), worst) {
-        line += &format!(" ({})", worst.message);
+        let _ = write!(line, " ({})", worst.message);
     }
     let facts = serde_json::json!({
         "duration_secs": ledger.duration_secs,

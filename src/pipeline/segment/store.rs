@@ -3,8 +3,7 @@
 use super::measure::Measures;
 use anyhow::Result;
 use ndarray::aview1;
-use orator_formats::npz;
-use orator_formats::npz::Npz;
+use orator_formats::npz::{self, Npz};
 use std::path::Path;
 
 /// Arrays that files of earlier versions lack: speech, mouths, and hands at rest.

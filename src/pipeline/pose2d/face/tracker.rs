@@ -1,7 +1,6 @@
 //! The face of the person followed from frame to frame: looked for where the body's eyes and nose are, then where it was.
 
-use super::landmarks;
-use super::landmarks::FacePoint;
+use super::landmarks::{self, FacePoint};
 use super::model::{DetectedFace, FaceModel};
 use crate::pose2d::decode::ScoredPoint;
 use anyhow::Result;

@@ -106,7 +106,7 @@ pub fn middle(hand: &DetectedHand) -> ScoredPoint {
     [sum[0] / 21.0, sum[1] / 21.0, 0.0]
 }
 
-fn distance(a: ScoredPoint, b: ScoredPoint) -> f64 {
+pub fn distance(a: ScoredPoint, b: ScoredPoint) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 

@@ -13,6 +13,7 @@ use orator_formats::keypoints_npz;
 use orator_media::opencv::png;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
+use std::fmt::Write as _;
 use std::path::Path;
 
 /// The frames of one span, or of several joined.
@@ -100,7 +101,8 @@ impl PoseSpan {
             facts["followed"] = json!({ "several": several, "speaking": speaking });
             if several > speaking {
                 let (shots, rest) = (counted(several, "shot"), several - speaking);
-                line += &format!(
+                let _ = write!(
+                    line,
                     "; several people in {shots}: in {rest} nobody's mouth clearly follows the voice, so the largest is \
                      followed"
                 );
