@@ -2,7 +2,7 @@
 
 use super::dataset::stage::{DatasetInputs, DatasetStage};
 use super::extract::ExtractStage;
-use super::keypoints::by_source::StageBySource;
+use super::keypoints::stage::StageBySource;
 use super::lift::LiftStage;
 use super::lift::lifter::reach_secs;
 use super::pose2d::Pose2dStage;

@@ -5,7 +5,7 @@
 
 use super::decode::StreamDecoder;
 use super::origin;
-use super::resample::{Resampler, first_not_finite, format_of};
+use super::resample::{Resampler, SoundFormat, first_not_finite, format_of};
 use super::source::{self, LONGEST_GAP_SECS, LONGEST_SECS, UnreadableMedia};
 use anyhow::{Context, Result, bail};
 use ffmpeg_next::format::{Sample, sample};
@@ -40,11 +40,11 @@ pub fn at_rate(sound: &Sound, rate: u32) -> Result<Sound> {
     if sound.rate == rate {
         return Ok(sound.clone());
     }
-    let format = Sample::F32(sample::Type::Packed);
-    let mut resampler = Resampler::new((format, ChannelLayout::MONO, sound.rate), rate)?;
+    let sample = Sample::F32(sample::Type::Packed);
+    let mut resampler = Resampler::new(SoundFormat { sample, layout: ChannelLayout::MONO, rate: sound.rate }, rate)?;
     let mut samples = Vec::new();
     for piece in sound.samples.chunks(PIECE) {
-        let mut frame = frame::Audio::new(format, piece.len(), ChannelLayout::MONO);
+        let mut frame = frame::Audio::new(sample, piece.len(), ChannelLayout::MONO);
         frame.set_rate(sound.rate);
         frame.plane_mut::<f32>(0).copy_from_slice(piece);
         resampler.push(&frame, &mut samples)?;

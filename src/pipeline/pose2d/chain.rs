@@ -2,14 +2,13 @@
 
 use super::body::{BodyModel, DetectedBody};
 use super::decode::ScoredPoint;
+use super::detector::{Detector, PalmDetector};
 use super::face::FaceTrack;
 use super::face::landmarks::FacePoint;
 use super::face::model::FaceModel;
 use super::hand::{DetectedHand, HandModel};
 use super::hands::{self, HandTracker, SeenHands};
 use super::model_input::ModelInput;
-use super::palm::PalmDetector;
-use super::person::Detector;
 use super::speaker::{SeenPerson, SpeakerTracker};
 use super::talker::TalkerPath;
 use anyhow::{Context, Result, ensure};

@@ -4,8 +4,8 @@
 use super::appearance::BodyColours;
 use super::body::BodyModel;
 use super::decode::{ScoredPoint, boxes};
+use super::detector::Detector;
 use super::liveness::LivenessTracks;
-use super::person::Detector;
 use super::talker::TalkerPath;
 use super::tracker::{Candidate, PersonTrack, TrackerStep};
 use anyhow::{Context, Result};

@@ -4,8 +4,8 @@
 
 use super::sight::{distance, middle};
 use crate::pose2d::decode::ScoredPoint;
+use crate::pose2d::detector::PalmDetector;
 use crate::pose2d::hand::{DetectedHand, HandModel};
-use crate::pose2d::palm::PalmDetector;
 use crate::pose2d::region;
 use anyhow::Result;
 use orator_base::types::image::Image;

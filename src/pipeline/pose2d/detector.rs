@@ -1,14 +1,17 @@
-//! The person detector: all people of a picture. `tracker` chooses the speaker among them.
+//! The detectors: all persons of a picture, among whom `tracker` chooses the speaker, and squares where hands may be, asked
+//! for when a hand is lost.
 
-use super::decode::{boxes, yolox_grid};
+use super::decode::{boxes, ssd_anchors, yolox_grid};
 use super::model_input::ModelInput;
+use super::region;
 use anyhow::{Result, bail};
 use orator_base::types::image::Image;
 use orator_base::types::pose2d::PersonBox;
+use orator_media::opencv::warp::Region;
 use orator_onnx::{Decode, ModelEntry, Runtime};
 use std::path::Path;
 
-/// Finds people in a picture.
+/// Finds persons in a picture.
 pub struct Detector {
     pub feed: ModelInput,
     decode: Decode,
@@ -46,5 +49,39 @@ impl Detector {
             PersonBox { x, y, width: right - x, height: bottom - y, score: person.score }
         };
         Ok(found.into_iter().map(place).collect())
+    }
+}
+
+/// Finds palms in a picture.
+pub struct PalmDetector {
+    pub feed: ModelInput,
+    decode: Decode,
+    anchors: Vec<[f64; 2]>,
+}
+
+impl PalmDetector {
+    pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self> {
+        let feed = ModelInput::open(runtime, entry, dir)?;
+        let anchors = match &entry.decode {
+            Decode::SsdAnchors { strides, .. } => ssd_anchors::anchors(feed.size()[0], strides),
+            _ => Vec::new(),
+        };
+        Ok(Self { feed, decode: entry.decode.clone(), anchors })
+    }
+
+    /// The squares around the palms of the picture, surest first.
+    pub fn find(&mut self, image: &Image) -> Result<Vec<Region>> {
+        let size = self.feed.size()[0];
+        let (src_from_dst, outputs) = self.feed.whole(image)?;
+        let Decode::SsdAnchors { regressors, scores, min_score, max_overlap, wrist, middle, .. } = &self.decode else {
+            bail!("a palm detector cannot be read as {:?}", self.decode)
+        };
+        let (rows, logits) = (outputs.floats(regressors)?.1, outputs.floats(scores)?.1);
+        let found = ssd_anchors::decode(rows, logits, &self.anchors, size, *min_score, *max_overlap)?;
+        let region = |palm: ssd_anchors::Detection| {
+            let place = |at: usize| palm.places.get(at).map(|place| src_from_dst.apply(*place));
+            Some(region::around_palm(place(0)?, place(1)?, place(2 + wrist)?, place(2 + middle)?))
+        };
+        Ok(found.into_iter().filter_map(region).collect())
     }
 }
