@@ -13,11 +13,11 @@ use orator_base::stage::{Report, Stage, Unit, runner};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Whether the video still is the worker's own: `Err` of `runner::Abandoned` where it is not.
-pub type StillMine<'a> = &'a (dyn Fn() -> Result<()> + Sync);
+/// Checks that the worker still holds its claim on the video: `Err` of `runner::Abandoned` where it does not.
+pub type ClaimCheck<'a> = &'a (dyn Fn() -> Result<()> + Sync);
 
 /// Does the work if the video is the worker's before and after.
-fn around(is_mine: StillMine, work: UnitWork) -> Result<Report> {
+fn around(is_mine: ClaimCheck, work: UnitWork) -> Result<Report> {
     is_mine()?;
     let report = work()?;
     is_mine()?;
@@ -34,7 +34,7 @@ impl Pipeline {
         names: &[StageName],
         unit: &Unit,
         hashes: &HashCache,
-        is_mine: StillMine,
+        is_mine: ClaimCheck,
         progress: &dyn Progress,
     ) -> Result<Vec<StageOutcome>> {
         let while_mine = |_: &'static str, _: &Unit, work: UnitWork| around(is_mine, work);
@@ -56,7 +56,7 @@ impl Pipeline {
         unit: &Unit,
         share: (usize, usize),
         hashes: &HashCache,
-        is_mine: StillMine,
+        is_mine: ClaimCheck,
         progress: &dyn Progress,
     ) -> Result<Vec<StageOutcome>> {
         let while_mine = |_: &'static str, _: &Unit, work: UnitWork| around(is_mine, work);

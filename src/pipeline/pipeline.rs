@@ -1,6 +1,6 @@
 //! The pipeline as a value: a configuration with the videos it names, to be run and asked how it stands.
 
-use super::process::SeparateStage;
+use super::process::SubprocessStage;
 use super::stages;
 use anyhow::{Result, ensure};
 use orator_base::stage::artifacts::{self, StageName};
@@ -88,7 +88,7 @@ impl Pipeline {
         let (config, videos) = (self.config(), self.all_videos());
         let stage = stages::build(name, config, videos, ready)?;
         Ok(match self.program() {
-            Some(program) if name < StageName::Lift => Box::new(SeparateStage { stage, program, config, videos }),
+            Some(program) if name < StageName::Lift => Box::new(SubprocessStage { stage, program, config, videos }),
             _ => stage,
         })
     }

@@ -2,7 +2,7 @@
 
 use super::pipeline::Pipeline;
 use super::pose2d::models;
-use super::segment::speech_rule::SpeechListener;
+use super::segment::speech_rule::SpeechDetector;
 use super::stages::{self, HookedStage, UnitWork};
 use super::timing::{StageClock, StageTime};
 use anyhow::{Context, Result, ensure};
@@ -151,7 +151,7 @@ impl Pipeline {
             workdir::recover_folder(&speaker_dir(&settings.work.dir, StageName::Dataset, &videos.speaker))?;
         }
         let jobs = self.jobs(selection.jobs);
-        if let Some(line) = SpeechListener::advice(settings)?.filter(|_| selection.has(StageName::Segment)) {
+        if let Some(line) = SpeechDetector::advice(settings)?.filter(|_| selection.has(StageName::Segment)) {
             progress.event(&Event::Advice { line });
         }
         let advice = models::advice(&settings.pose2d, &ModelStore::open(&settings.models.dir)?);

@@ -8,7 +8,7 @@ use super::lift::lifter::reach_secs;
 use super::pose2d::Pose2dStage;
 use super::pose2d::models::ChosenModels;
 use super::segment::SegmentStage;
-use super::segment::speech_rule::SpeechListener;
+use super::segment::speech_rule::SpeechDetector;
 use anyhow::Result;
 use orator_base::stage::artifacts::StageName;
 use orator_base::stage::fingerprint::HashCache;
@@ -31,7 +31,7 @@ pub fn build(name: StageName, config: &Config, all: &[Videos], ready: &[Unit]) -
         StageName::Extract => StageBySource::extract(Box::new(ExtractStage::of_config(config)), settings, all),
         StageName::Pose2d => StageBySource::pose2d(Box::new(Pose2dStage::new(settings)?), settings, all),
         StageName::Segment => Box::new(
-            SegmentStage::new(&settings.segment, &settings.work.dir).with_speech(SpeechListener::find(settings)?),
+            SegmentStage::new(&settings.segment, &settings.work.dir).with_speech(SpeechDetector::find(settings)?),
         ),
         StageName::Lift => Box::new(LiftStage::new(&settings.lift, &settings.segment, &settings.work.dir)?),
         StageName::Dataset => {
@@ -39,7 +39,7 @@ pub fn build(name: StageName, config: &Config, all: &[Videos], ready: &[Unit]) -
                 ready: ready.to_vec(),
                 all: all.to_vec(),
                 models: models_used(settings)?,
-                notes: vec![SpeechListener::note(settings)?],
+                notes: vec![SpeechDetector::note(settings)?],
                 reach_secs: reach_secs(&settings.lift),
             };
             Box::new(DatasetStage::new(settings, inputs))
@@ -87,7 +87,7 @@ fn models_used(settings: &Settings) -> Result<Vec<ModelUsed>> {
         let ModelEntry { id, sha256, origin, .. } = entry.clone();
         ModelUsed { role: role.into(), id, sha256, licence: origin.licence }
     });
-    Ok(named.chain(SpeechListener::find(settings)?.map(|listener| listener.used())).collect())
+    Ok(named.chain(SpeechDetector::find(settings)?.map(|listener| listener.used())).collect())
 }
 
 /// The work on one unit.

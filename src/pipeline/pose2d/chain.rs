@@ -150,7 +150,7 @@ impl Chain {
             }
             (None, None) => [None, None],
         };
-        // Sight comes last: what is followed from frame to frame is what was found.
+        // Visibility is judged last: tracking continues from all that was found.
         let SeenHands { hands: [left, right], others } = SeenHands::judge(hands, &mut body.points, image);
         pose.other_hand = others;
         if let Some(face) = &mut self.face {

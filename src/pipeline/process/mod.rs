@@ -7,5 +7,5 @@ pub mod message;
 pub mod stage;
 pub mod unit;
 
-pub use stage::{SeparateStage, ask_media, probe};
+pub use stage::{SubprocessStage, ask_media, probe};
 pub use unit::{VERB, answer_media, serve};

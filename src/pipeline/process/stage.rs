@@ -1,4 +1,4 @@
-//! A stage whose units are worked on by processes of their own. To a run it is the stage itself.
+//! A stage that works on each unit in a subprocess. To a run it is the stage itself.
 
 use super::failure::plain;
 use super::message::{MediaRequest, Message, Request, UnitRequest, receive, send};
@@ -22,14 +22,14 @@ const MAX_TASKS: usize = 16;
 const MAX_COMPLAINT: usize = 2000;
 
 /// A stage of videos, with the program that works on its units.
-pub struct SeparateStage<'a> {
+pub struct SubprocessStage<'a> {
     pub stage: Box<dyn Stage>,
     pub program: &'a Path,
     pub config: &'a Config,
     pub videos: &'a [Videos],
 }
 
-impl StageWrapper for SeparateStage<'_> {
+impl StageWrapper for SubprocessStage<'_> {
     fn inner(&self, _unit: Option<&Unit>) -> &dyn Stage {
         &*self.stage
     }
@@ -43,7 +43,7 @@ impl StageWrapper for SeparateStage<'_> {
     }
 }
 
-impl SeparateStage<'_> {
+impl SubprocessStage<'_> {
     fn work(&self, unit: &Unit, part: Option<usize>, out: &Path, progress: &dyn Progress) -> Result<Report> {
         let mut process = UnitProcess::start(self.program)?;
         process.ask(&Request::Unit(Box::new(self.request(unit, part, out)?)));

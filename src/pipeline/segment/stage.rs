@@ -3,7 +3,7 @@
 
 use super::judge::judge;
 use super::measure::{self, Measures};
-use super::speech_rule::SpeechListener;
+use super::speech_rule::SpeechDetector;
 use crate::{lips, sound};
 use anyhow::{Result, ensure};
 use orator_base::stage::artifacts::{Artifact, StageName};
@@ -24,7 +24,7 @@ pub struct SegmentStage {
     rules: config::SegmentConfig,
     work: PathBuf,
     /// The speech model; `None`: loudness alone tells speech.
-    speech: Option<SpeechListener>,
+    speech: Option<SpeechDetector>,
 }
 
 impl SegmentStage {
@@ -34,7 +34,7 @@ impl SegmentStage {
     }
 
     /// Listens for speech with this model.
-    pub fn with_speech(self, speech: Option<SpeechListener>) -> Self {
+    pub fn with_speech(self, speech: Option<SpeechDetector>) -> Self {
         Self { speech, ..self }
     }
 
@@ -53,7 +53,7 @@ impl Stage for SegmentStage {
     }
 
     fn settings(&self, _unit: &Unit) -> serde_json::Value {
-        let model = self.speech.as_ref().map(SpeechListener::used);
+        let model = self.speech.as_ref().map(SpeechDetector::used);
         serde_json::json!({ "segment": self.rules, "speech_model": model })
     }
 

@@ -2,7 +2,7 @@
 //! against the other hand, one hand found twice and hands that look like one of the other side. What was searched in
 //! vain is searched more rarely.
 
-use super::sight::{distance, middle};
+use super::visibility::{distance, middle};
 use crate::pose2d::decode::ScoredPoint;
 use crate::pose2d::detector::PalmDetector;
 use crate::pose2d::hand::{DetectedHand, HandModel};
