@@ -2,9 +2,8 @@
 //! the video, and looks once more whether the claim still is its own before a stage's work is put in its place.
 
 use super::pipeline::Pipeline;
-use super::pose2d::Pose2dStage;
-use super::stages;
-use super::watched_stage::{UnitWork, WatchedStage};
+use super::pose2d::models::ChosenModels;
+use super::stages::{self, HookedStage, UnitWork};
 use anyhow::Result;
 use orator_base::stage::artifacts::StageName;
 use orator_base::stage::fingerprint::HashCache;
@@ -14,11 +13,11 @@ use orator_base::stage::{Report, Stage, Unit, runner};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Whether the video still is the worker's own: `Err` of `runner::Abandoned` where it is not.
-pub type StillMine<'a> = &'a (dyn Fn() -> Result<()> + Sync);
+/// Checks that the worker still holds its claim on the video: `Err` of `runner::Abandoned` where it does not.
+pub type ClaimCheck<'a> = &'a (dyn Fn() -> Result<()> + Sync);
 
 /// Does the work if the video is the worker's before and after.
-fn around(is_mine: StillMine, work: UnitWork) -> Result<Report> {
+fn around(is_mine: ClaimCheck, work: UnitWork) -> Result<Report> {
     is_mine()?;
     let report = work()?;
     is_mine()?;
@@ -35,11 +34,11 @@ impl Pipeline {
         names: &[StageName],
         unit: &Unit,
         hashes: &HashCache,
-        is_mine: StillMine,
+        is_mine: ClaimCheck,
         progress: &dyn Progress,
     ) -> Result<Vec<StageOutcome>> {
         let while_mine = |_: &'static str, _: &Unit, work: UnitWork| around(is_mine, work);
-        let stage = |name: &StageName| Ok(WatchedStage { stage: self.stage(*name, &[])?, around: &while_mine });
+        let stage = |name: &StageName| Ok(HookedStage { stage: self.stage(*name, &[])?, hook: &while_mine });
         let stages = names.iter().map(stage).collect::<Result<Vec<_>>>()?;
         let stages: Vec<&dyn Stage> = stages.iter().map(|stage| stage as &dyn Stage).collect();
         let work = &self.config().settings.work.dir;
@@ -57,11 +56,11 @@ impl Pipeline {
         unit: &Unit,
         share: (usize, usize),
         hashes: &HashCache,
-        is_mine: StillMine,
+        is_mine: ClaimCheck,
         progress: &dyn Progress,
     ) -> Result<Vec<StageOutcome>> {
         let while_mine = |_: &'static str, _: &Unit, work: UnitWork| around(is_mine, work);
-        let stage = WatchedStage { stage: self.stage(StageName::Pose2d, &[])?, around: &while_mine };
+        let stage = HookedStage { stage: self.stage(StageName::Pose2d, &[])?, hook: &while_mine };
         let ended = runner::run_parts(&stage, unit, share, &self.config().settings.work.dir, hashes, progress);
         Ok(ended.err().map(|error| StageOutcome::Failed(Arc::new(error))).into_iter().collect())
     }
@@ -72,8 +71,8 @@ impl Pipeline {
     /// Weights that cannot be read.
     pub fn model_hashes(&self) -> Result<BTreeMap<String, String>> {
         let settings = &self.config().settings;
-        let (stage, hashes) = (Pose2dStage::new(settings)?, self.hashes());
-        let used = stage.used()?;
+        let (chosen, hashes) = (ChosenModels::find(settings)?, self.hashes());
+        let used = chosen.used()?;
         let hash = |(_, entry): &(_, &orator_onnx::ModelEntry)| {
             Ok((entry.file.clone(), hashes.hash(&settings.models.dir.join(&entry.file))?))
         };

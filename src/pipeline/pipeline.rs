@@ -1,14 +1,14 @@
 //! The pipeline as a value: a configuration with the videos it names, to be run and asked how it stands.
 
-use super::process::SeparateStage;
+use super::process::SubprocessStage;
 use super::stages;
 use anyhow::{Result, ensure};
-use orator_base::stage::artifacts;
-use orator_base::stage::artifacts::StageName;
+use orator_base::stage::artifacts::{self, StageName};
 use orator_base::stage::fingerprint::HashCache;
 use orator_base::stage::{Stage, Unit};
 use orator_dataset::config::videos::Videos;
 use orator_dataset::config::{Config, videos};
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 /// Videos to datasets, by one configuration. `run` does the work, `status` says how far it is.
@@ -49,7 +49,7 @@ impl Pipeline {
     /// Videos worked on side by side: so many as asked for, else as the configuration says; 0 is one a processor core.
     pub fn jobs(&self, asked: Option<usize>) -> usize {
         match asked.unwrap_or(self.config.settings.work.jobs) {
-            0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
+            0 => std::thread::available_parallelism().map_or(1, NonZeroUsize::get),
             n => n,
         }
     }
@@ -88,7 +88,7 @@ impl Pipeline {
         let (config, videos) = (self.config(), self.all_videos());
         let stage = stages::build(name, config, videos, ready)?;
         Ok(match self.program() {
-            Some(program) if name < StageName::Lift => Box::new(SeparateStage { stage, program, config, videos }),
+            Some(program) if name < StageName::Lift => Box::new(SubprocessStage { stage, program, config, videos }),
             _ => stage,
         })
     }

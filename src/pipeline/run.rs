@@ -1,12 +1,10 @@
-//! A run of the pipeline: the stages of videos, video by video, then the datasets of the speakers.
+//! A run of the pipeline, or of a part of it: the stages of videos, video by video, then the datasets of the speakers.
 
 use super::pipeline::Pipeline;
 use super::pose2d::models;
-use super::segment::speech_rule::SpeechListener;
-use super::selection::Selection;
-use super::stages;
+use super::segment::speech_rule::SpeechDetector;
+use super::stages::{self, HookedStage, UnitWork};
 use super::timing::{StageClock, StageTime};
-use super::watched_stage::{UnitWork, WatchedStage};
 use anyhow::{Context, Result, ensure};
 use orator_base::stage::artifacts::{StageName, speaker_dir};
 use orator_base::stage::fingerprint::HashCache;
@@ -20,6 +18,40 @@ use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
+
+/// The part of the pipeline to run; by default every stage for every speaker.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Selection {
+    /// First stage.
+    pub from: StageName,
+    /// Last stage.
+    pub to: StageName,
+    /// Names of speakers; empty: all.
+    pub speakers: Vec<String>,
+    /// Videos worked on side by side, 0: one a processor core; none: `work.jobs` of the configuration.
+    pub jobs: Option<usize>,
+    /// Whether fresh units are worked on again.
+    pub force: bool,
+}
+
+impl Default for Selection {
+    fn default() -> Self {
+        let [from, .., to] = StageName::ALL;
+        Self { from, to, speakers: Vec::new(), jobs: None, force: false }
+    }
+}
+
+impl Selection {
+    /// One stage alone, for every speaker.
+    pub fn only(stage: StageName) -> Self {
+        Self { from: stage, to: stage, ..Self::default() }
+    }
+
+    /// Whether the stage is one of those to run.
+    pub fn has(&self, stage: StageName) -> bool {
+        (self.from..=self.to).contains(&stage)
+    }
+}
 
 /// How a run ended.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -119,7 +151,7 @@ impl Pipeline {
             workdir::recover_folder(&speaker_dir(&settings.work.dir, StageName::Dataset, &videos.speaker))?;
         }
         let jobs = self.jobs(selection.jobs);
-        if let Some(line) = SpeechListener::advice(settings)?.filter(|_| selection.has(StageName::Segment)) {
+        if let Some(line) = SpeechDetector::advice(settings)?.filter(|_| selection.has(StageName::Segment)) {
             progress.event(&Event::Advice { line });
         }
         let advice = models::advice(&settings.pose2d, &ModelStore::open(&settings.models.dir)?);
@@ -172,8 +204,8 @@ impl StageRun<'_> {
         let units: Vec<Unit> = alive.iter().flat_map(|videos| stages::units(first, config, videos)).collect();
         let work = &config.settings.work.dir;
         let clock = StageClock::new(work, names, &units);
-        let around = |stage: &'static str, unit: &Unit, work: UnitWork<'_>| clock.time(stage, unit, work);
-        let timed = |name: &StageName| Ok(WatchedStage { stage: self.pipeline.stage(*name, ready)?, around: &around });
+        let hook = |stage: &'static str, unit: &Unit, work: UnitWork<'_>| clock.time(stage, unit, work);
+        let timed = |name: &StageName| Ok(HookedStage { stage: self.pipeline.stage(*name, ready)?, hook: &hook });
         let stages = names.iter().map(timed).collect::<Result<Vec<_>>>()?;
         let stages: Vec<&dyn Stage> = stages.iter().map(|stage| stage as &dyn Stage).collect();
         let ended = runner::run_stages(&stages, &units, work, self.hashes, self.limits, self.progress);

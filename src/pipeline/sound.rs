@@ -1,8 +1,11 @@
-//! How loud a video is at each frame, and how open its voice sounds, from its wav file read as a stream.
+//! The sound of a video: extracted to a wav file, and from that, read as a stream, its loudness at each frame and how open
+//! the voice sounds. Memory does not grow with the length.
 
 use anyhow::{Context, Result};
 use orator_base::audio::openness::{Openness, OpennessMeter};
 use orator_base::types::time::FrameRate;
+use orator_formats::wav::WavWriter;
+use orator_media::ffmpeg::audio::{StreamedSound, stream_mono};
 use std::path::Path;
 
 /// Loudness is taken over this many seconds around a frame: syllables and short pauses even out.
@@ -11,6 +14,20 @@ const AROUND_SECS: f64 = 1.0;
 const NOTHING_DB: f64 = -120.0;
 /// Samples read at a time.
 const PIECE: usize = 1 << 14;
+
+/// Writes the sound track `track` of the video `path` (from 1; 0: the automatic choice) to the 16-bit mono wav `out`; `None`
+/// (and no file) when there is no sound.
+pub fn extract_wav(path: &Path, track: usize, out: &Path, rate: u32) -> Result<Option<StreamedSound>> {
+    let mut wav = None;
+    let streamed = stream_mono(path, track, rate, &mut |piece| {
+        if wav.is_none() {
+            wav = Some(WavWriter::create(out, rate)?);
+        }
+        wav.as_mut().map_or(Ok(()), |wav: &mut WavWriter| wav.push(piece))
+    })?;
+    wav.map_or(Ok(()), WavWriter::finish)?;
+    Ok(streamed)
+}
 
 /// Whether each frame has sound (1 or 0), and its loudness: the root mean square of the second around it in dB
 /// of full scale, -120 where there is none. A file that is not there has no sound.
@@ -45,19 +62,27 @@ pub fn levels(path: &Path, fps: FrameRate, n_frames: usize) -> Result<(Vec<f32>,
 pub fn openness(path: &Path) -> Result<Openness> {
     let mut meter = OpennessMeter::default();
     if path.exists() {
-        let reading = || format!("cannot read {}", path.display());
-        let mut wav = hound::WavReader::open(path).with_context(reading)?;
-        let mut piece = Vec::with_capacity(PIECE);
-        for sample in wav.samples::<i16>() {
-            piece.push(f32::from(sample.with_context(reading)?) / 32_768.0);
-            if piece.len() == PIECE {
-                meter.push(&piece);
-                piece.clear();
-            }
-        }
-        meter.push(&piece);
+        pieces(path, PIECE, |piece| {
+            meter.push(piece);
+            Ok(())
+        })?;
     }
     Ok(meter.finish())
+}
+
+/// Passes the samples of a 16-bit mono wav file, -1..1, to `work` in pieces of `n`, the last of which may be shorter.
+pub fn pieces(path: &Path, n: usize, mut work: impl FnMut(&[f32]) -> Result<()>) -> Result<()> {
+    let reading = || format!("cannot read {}", path.display());
+    let mut wav = hound::WavReader::open(path).with_context(reading)?;
+    let mut piece = Vec::with_capacity(n);
+    for sample in wav.samples::<i16>() {
+        piece.push(f32::from(sample.with_context(reading)?) / 32_768.0);
+        if piece.len() == n {
+            work(&piece)?;
+            piece.clear();
+        }
+    }
+    if piece.is_empty() { Ok(()) } else { work(&piece) }
 }
 
 #[cfg(test)]

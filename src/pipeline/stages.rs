@@ -1,23 +1,25 @@
 //! The stages by their names, ready to run, and the units each works on.
 
-use super::dataset::stage::DatasetStage;
+use super::dataset::stage::{DatasetInputs, DatasetStage};
 use super::extract::ExtractStage;
-use super::keypoints::by_source::StageBySource;
+use super::keypoints::stage::StageBySource;
 use super::lift::LiftStage;
 use super::lift::lifter::reach_secs;
 use super::pose2d::Pose2dStage;
+use super::pose2d::models::ChosenModels;
 use super::segment::SegmentStage;
-use super::segment::speech_rule::SpeechListener;
+use super::segment::speech_rule::SpeechDetector;
 use anyhow::Result;
 use orator_base::stage::artifacts::StageName;
 use orator_base::stage::fingerprint::HashCache;
-use orator_base::stage::runner;
-use orator_base::stage::runner::State;
-use orator_base::stage::{Stage, Unit};
+use orator_base::stage::progress::Progress;
+use orator_base::stage::runner::{self, State};
+use orator_base::stage::{Report, Stage, StageWrapper, Unit};
 use orator_dataset::config::videos::Videos;
 use orator_dataset::config::{Config, Settings};
 use orator_dataset::info::ModelUsed;
 use orator_onnx::{Model, ModelEntry, Runtime};
+use std::path::Path;
 
 /// The stage, ready to run on `all` videos. `ready` are those the dataset is made of.
 ///
@@ -29,15 +31,19 @@ pub fn build(name: StageName, config: &Config, all: &[Videos], ready: &[Unit]) -
         StageName::Extract => StageBySource::extract(Box::new(ExtractStage::of_config(config)), settings, all),
         StageName::Pose2d => StageBySource::pose2d(Box::new(Pose2dStage::new(settings)?), settings, all),
         StageName::Segment => Box::new(
-            SegmentStage::new(&settings.segment, &settings.work.dir).with_speech(SpeechListener::find(settings)?),
+            SegmentStage::new(&settings.segment, &settings.work.dir).with_speech(SpeechDetector::find(settings)?),
         ),
         StageName::Lift => Box::new(LiftStage::new(&settings.lift, &settings.segment, &settings.work.dir)?),
-        StageName::Dataset => Box::new(
-            DatasetStage::new(settings, ready, reach_secs(&settings.lift))
-                .with_videos(all.to_vec())
-                .with_models(models_used(settings)?)
-                .with_note(SpeechListener::note(settings)?),
-        ),
+        StageName::Dataset => {
+            let inputs = DatasetInputs {
+                ready: ready.to_vec(),
+                all: all.to_vec(),
+                models: models_used(settings)?,
+                notes: vec![SpeechDetector::note(settings)?],
+                reach_secs: reach_secs(&settings.lift),
+            };
+            Box::new(DatasetStage::new(settings, inputs))
+        }
     })
 }
 
@@ -69,17 +75,44 @@ pub fn ready(config: &Config, videos: &Videos, hashes: &HashCache) -> Result<Vec
 /// No ONNX Runtime; a model that is missing or not what the manifest says.
 pub fn check_models(settings: &Settings) -> Result<()> {
     let runtime = Runtime::load(&settings.models.onnxruntime, &settings.models.dir)?;
-    for (_, entry) in Pose2dStage::new(settings)?.used()? {
+    for (_, entry) in ChosenModels::find(settings)?.used()? {
         Model::open(&runtime, entry, &settings.models.dir)?;
     }
     Ok(())
 }
 
 fn models_used(settings: &Settings) -> Result<Vec<ModelUsed>> {
-    let stage = Pose2dStage::new(settings)?;
-    let named = stage.used()?.into_iter().map(|(role, entry)| {
+    let chosen = ChosenModels::find(settings)?;
+    let named = chosen.used()?.into_iter().map(|(role, entry)| {
         let ModelEntry { id, sha256, origin, .. } = entry.clone();
         ModelUsed { role: role.into(), id, sha256, licence: origin.licence }
     });
-    Ok(named.chain(SpeechListener::find(settings)?.map(|listener| listener.used())).collect())
+    Ok(named.chain(SpeechDetector::find(settings)?.map(|listener| listener.used())).collect())
+}
+
+/// The work on one unit.
+pub type UnitWork<'a> = &'a mut dyn FnMut() -> Result<Report>;
+
+/// Called in place of the work on a unit of the stage of this name, which it does.
+pub type StageHook<'a> = &'a (dyn Fn(&'static str, &Unit, UnitWork<'_>) -> Result<Report> + Sync);
+
+/// A stage with a hook around every run of it: a claim is checked, the time is taken.
+pub struct HookedStage<'a> {
+    pub stage: Box<dyn Stage + 'a>,
+    pub hook: StageHook<'a>,
+}
+
+impl StageWrapper for HookedStage<'_> {
+    fn inner(&self, _unit: Option<&Unit>) -> &dyn Stage {
+        &*self.stage
+    }
+
+    fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> Result<Report> {
+        (self.hook)(self.name(), unit, &mut || self.stage.run(unit, out, progress))
+    }
+
+    fn run_part(&self, unit: &Unit, part: usize, out: &Path, progress: &dyn Progress) -> Result<()> {
+        let mut work = || self.stage.run_part(unit, part, out, progress).map(|()| Report::default());
+        (self.hook)(self.name(), unit, &mut work).map(drop)
+    }
 }

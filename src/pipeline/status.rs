@@ -10,6 +10,7 @@ use orator_base::stage::record::DirtyReason;
 use orator_base::stage::runner::State;
 use orator_base::stage::workdir::FolderLock;
 use orator_base::stage::{Stage, Unit, runner};
+use orator_dataset::config::videos::Videos;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -112,7 +113,7 @@ impl Pipeline {
                 why: message.clone(),
             }));
             let ready = stages::ready(self.config(), &videos, &hashes).unwrap_or_default();
-            let check = StatusCheck { pipeline: self, hashes: &hashes, ready: &ready };
+            let check = StatusCheck { pipeline: self, hashes: &hashes, videos: &videos, ready: &ready };
             let of_videos = StageName::OF_VIDEOS.map(|name| (name, check.stage(name)));
             let mut speaker_waits_for = None;
             let mut total = TimeAccount::of_speaker(&videos.speaker);
@@ -161,13 +162,14 @@ impl Pipeline {
 struct StatusCheck<'a> {
     pipeline: &'a Pipeline,
     hashes: &'a HashCache,
-    /// The videos the dataset is made of.
+    /// All videos of the speaker, and those the dataset is made of.
+    videos: &'a Videos,
     ready: &'a [Unit],
 }
 
 impl StatusCheck<'_> {
     fn stage(&self, name: StageName) -> Result<Box<dyn Stage>> {
-        stages::build(name, self.pipeline.config(), self.pipeline.all_videos(), self.ready)
+        stages::build(name, self.pipeline.config(), std::slice::from_ref(self.videos), self.ready)
     }
 
     /// How `unit` stands at a stage, given the first stage before it that is not fresh.

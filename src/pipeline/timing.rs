@@ -2,8 +2,8 @@
 
 use super::pipeline::Pipeline;
 use super::process::message::MediaRequest;
-use super::process::{ask_media, media};
-use super::watched_stage::UnitWork;
+use super::process::{answer_media, ask_media};
+use super::stages::UnitWork;
 use anyhow::Result;
 use orator_base::stage::artifacts::{self, StageName};
 use orator_base::stage::parts::folder_of_parts;
@@ -60,7 +60,7 @@ impl StageClock {
 }
 
 impl Pipeline {
-    /// The length of a video in seconds, where a header says it, or what was copied of it: see `media::answer`. The video is
+    /// The length of a video in seconds, where a header says it, or what was copied of it: see `answer_media`. The video is
     /// read in a process of its own where the pipeline has a program for it.
     ///
     /// # Errors
@@ -68,7 +68,7 @@ impl Pipeline {
     pub fn ask_media(&self, request: &MediaRequest) -> Result<Option<f64>> {
         match self.program() {
             Some(program) => ask_media(program, request),
-            None => media::answer(request),
+            None => answer_media(request),
         }
     }
 

@@ -68,7 +68,7 @@ impl Bench<'_> {
 
     /// Frames that are in memory already, through one chain.
     fn decoded(&self, chain: &mut Chain) -> Result<Run> {
-        chain.begin_shot();
+        chain.begin_shot(None);
         let (start, before) = (Instant::now(), chain.secs_inside());
         for image in &self.images {
             chain.frame(image)?;
@@ -78,7 +78,7 @@ impl Bench<'_> {
 
     /// Frames decoded from the file.
     fn streamed(&self, chain: &mut Chain) -> Result<Run> {
-        chain.begin_shot();
+        chain.begin_shot(None);
         let (start, before) = (Instant::now(), chain.secs_inside());
         for frame in FrameReader::open(self.video, rate(&self.settings))?.take(self.images.len()) {
             chain.frame(&frame?.image)?;

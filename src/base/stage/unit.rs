@@ -57,7 +57,8 @@ pub trait Stage: Sync {
     fn cost(&self) -> u32 {
         1
     }
-    /// Every setting that has a say in the bytes made of `unit`, and the versions of the tools that have.
+    /// Every setting that influences the bytes made of `unit`, and the versions of the tools that do. Reads nothing from
+    /// disk: what depends on files is determined when the stage is constructed.
     fn settings(&self, unit: &Unit) -> serde_json::Value;
     /// The files it reads for `unit`; their contents are part of the fingerprint.
     fn inputs(&self, unit: &Unit) -> anyhow::Result<Vec<Input>>;

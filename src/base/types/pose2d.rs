@@ -33,7 +33,7 @@ pub mod coco {
 
 /// A point of the picture in pixels (x right, y down, the centre of the top left pixel is 0, 0) and how sure the
 /// detector is, 0..1; score 0 means missing.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Keypoint {
     pub x: f32,
     pub y: f32,
@@ -51,7 +51,7 @@ pub struct PersonBox {
 }
 
 /// Person and keypoints of one frame. A hand or body not found is all zeros.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pose2d {
     /// The followed person.
     pub person: PersonBox,

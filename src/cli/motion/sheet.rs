@@ -16,9 +16,9 @@ use orator_formats::keypoints_npz;
 use orator_formats::mocap::motion_file;
 use orator_media::opencv::png;
 use orator_pipeline::Pipeline;
+use orator_pipeline::extract::picture_options;
 use orator_pipeline::lift::quality;
-use orator_pipeline::lift::quality::{ArmFigures, ClipFigures};
-use orator_pipeline::pictures;
+use orator_pipeline::lift::quality::{ArmStatistics, ClipStatistics};
 use orator_report::sheet::sheet::SheetClip;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -132,7 +132,7 @@ fn of_run(pipeline: &Pipeline, args: &Args) -> Result<Vec<SheetFiles>> {
         if is_chosen(&unit) {
             clips.push(SheetFiles {
                 title: unit.to_string(),
-                pictures: pictures::options(work, &unit),
+                pictures: picture_options(work, &unit),
                 keypoints: Artifact::Keypoints.path(work, &unit),
                 joints: Artifact::Joints.path(work, &unit),
                 out: folder.join(&unit.speaker).join(format!("{}.png", unit.video)),
@@ -152,7 +152,7 @@ fn of_run(pipeline: &Pipeline, args: &Args) -> Result<Vec<SheetFiles>> {
 }
 
 /// Draws one clip; the pictures written, and its figures.
-fn draw(files: &SheetFiles, every_secs: f64, figure: bool, ui: &Ui) -> Result<(Vec<PathBuf>, ClipFigures)> {
+fn draw(files: &SheetFiles, every_secs: f64, figure: bool, ui: &Ui) -> Result<(Vec<PathBuf>, ClipStatistics)> {
     let (keypoints, notes) = keypoints_npz::read_noting(&files.keypoints)?;
     notes.iter().for_each(|note| ui.say(&format!("{}: {note}", files.keypoints.display())));
     // A file without a rate is taken to run as the keypoints do.
@@ -177,22 +177,13 @@ fn numbered(path: &Path, number: usize) -> PathBuf {
     path.with_file_name(format!("{stem}_{number:03}.png"))
 }
 
-type Row = (&'static str, &'static str, fn(&ArmFigures) -> f64);
+type Row = (&'static str, &'static str, fn(&ArmStatistics) -> f64);
 
 /// Name in the table, name in JSON, value.
-const ROWS: [Row; 17] = [
+const ROWS: [Row; 8] = [
     ("upper arm, m", "upper_arm_metres", |a| a.upper_arm_metres),
     ("forearm, m", "forearm_metres", |a| a.forearm_metres),
-    ("upper arm, std of its length, %", "upper_arm_spread_percent", |a| a.upper_arm_spread),
-    ("forearm, std of its length, %", "forearm_spread_percent", |a| a.forearm_spread),
     ("wrist shake, mm", "jitter_mm", |a| a.jitter_mm),
-    ("wrist shake in its stillest second, mm", "still_jitter_mm", |a| a.still_jitter_mm),
-    ("elbow behind its shoulder, mm", "elbow_z_mm", |a| a.elbow_z_mm),
-    ("wrist behind its shoulder, mm", "wrist_z_mm", |a| a.wrist_z_mm),
-    ("upper arm 3D / picture, median", "upper_arm_ratio", |a| a.upper_arm_ratio[0]),
-    ("upper arm 3D / picture, lowest 5 %", "upper_arm_ratio_low", |a| a.upper_arm_ratio[1]),
-    ("forearm 3D / picture, median", "forearm_ratio", |a| a.forearm_ratio[0]),
-    ("forearm 3D / picture, lowest 5 %", "forearm_ratio_low", |a| a.forearm_ratio[1]),
     ("wrist off the picture's, mm", "wrist_off_mm", |a| a.wrist_off_mm),
     ("frames without the wrist, %", "missing_percent", |a| 100.0 * a.missing),
     ("frames that did not see the wrist, %", "masked_percent", |a| 100.0 * a.masked),
@@ -200,7 +191,7 @@ const ROWS: [Row; 17] = [
     ("hand joints seen, %", "hand_seen_percent", |a| 100.0 * a.hand_seen),
 ];
 
-fn table(figures: &ClipFigures) -> String {
+fn table(figures: &ClipStatistics) -> String {
     if figures.left.missing + figures.right.missing >= 2.0 {
         return "  no frame is lifted (`orator status --why` says why; `orator lift` takes any keypoints)\n".to_owned();
     }
@@ -211,8 +202,8 @@ fn table(figures: &ClipFigures) -> String {
     })
 }
 
-fn as_json(figures: &ClipFigures) -> Value {
-    let arm = |arm: &ArmFigures| -> serde_json::Map<String, Value> {
+fn as_json(figures: &ClipStatistics) -> Value {
+    let arm = |arm: &ArmStatistics| -> serde_json::Map<String, Value> {
         ROWS.iter().map(|(_, name, of)| ((*name).to_owned(), json!(of(arm)))).collect()
     };
     json!({ "left": arm(&figures.left), "right": arm(&figures.right) })

@@ -13,7 +13,7 @@ use orator_cluster::estimate::timing;
 use orator_dataset::config::Settings;
 use orator_onnx::{ModelError, ModelStore};
 use orator_pipeline::pose2d::models::wanted;
-use orator_pipeline::segment::speech_rule::SpeechListener;
+use orator_pipeline::segment::speech_rule::SpeechDetector;
 use orator_pipeline::{Pipeline, Selection};
 use serde_json::json;
 
@@ -66,7 +66,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         Err(error) if is_missing_model(&error) && ui.asks(&format!("{error:#}\nget the models now?")) => {
             let settings = &pipeline.config().settings;
             let Settings { models, pose2d, .. } = settings;
-            let wanted: Vec<_> = wanted(pose2d).into_iter().chain(SpeechListener::wanted(settings)).collect();
+            let wanted: Vec<_> = wanted(pose2d).into_iter().chain(SpeechDetector::wanted(settings)).collect();
             fetch(&ModelStore::open(&models.dir)?, &wanted, None, ui)?;
             pipeline.run(&selection, ui)?
         }

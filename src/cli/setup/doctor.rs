@@ -14,7 +14,7 @@ use orator_media::aligner::Aligner;
 use orator_onnx::{ModelStore, Runtime};
 use orator_pipeline::pose2d::models;
 use orator_pipeline::process::probe;
-use orator_pipeline::segment::speech_rule::SpeechListener;
+use orator_pipeline::segment::speech_rule::SpeechDetector;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -140,7 +140,7 @@ fn model_checks(settings: &Settings) -> Vec<Check> {
     if let Some(advice) = models::advice(&settings.pose2d, &store) {
         checks.push(wrong("face model", advice.to_owned(), "orator models fetch"));
     }
-    match SpeechListener::advice(settings) {
+    match SpeechDetector::advice(settings) {
         Ok(None) => {}
         Ok(Some(advice)) => checks.push(wrong("speech model", advice.to_owned(), "orator models fetch")),
         Err(error) => checks.push(wrong("speech model", format!("{error:#}"), "orator models fetch")),

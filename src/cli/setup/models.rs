@@ -9,7 +9,7 @@ use orator_dataset::config::Settings;
 use orator_onnx::{Fetched, MANIFEST_FILE, ModelEntry, ModelError, ModelOrigin, ModelState, ModelStore};
 use orator_onnx::{Runtime, Wanted, find_library};
 use orator_pipeline::pose2d::models;
-use orator_pipeline::segment::speech_rule::SpeechListener;
+use orator_pipeline::segment::speech_rule::SpeechDetector;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -83,7 +83,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
                     let entries = store.manifest().models.iter().filter(can_be_had);
                     entries.map(|entry| Wanted::Id(entry.id.clone())).collect()
                 }
-                (false, []) => models::wanted(pose2d).into_iter().chain(SpeechListener::wanted(&settings)).collect(),
+                (false, []) => models::wanted(pose2d).into_iter().chain(SpeechDetector::wanted(&settings)).collect(),
                 (false, ids) => ids.iter().cloned().map(Wanted::Id).collect(),
             };
             if find_library(&place.onnxruntime, &place.dir).is_err() {

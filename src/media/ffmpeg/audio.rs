@@ -5,9 +5,8 @@
 
 use super::decode::StreamDecoder;
 use super::origin;
-use super::resample::{Resampler, first_not_finite, format_of};
-use super::source;
-use super::source::{LONGEST_GAP_SECS, LONGEST_SECS, UnreadableMedia};
+use super::resample::{Resampler, SoundFormat, first_not_finite, format_of};
+use super::source::{self, LONGEST_GAP_SECS, LONGEST_SECS, UnreadableMedia};
 use anyhow::{Context, Result, bail};
 use ffmpeg_next::format::{Sample, sample};
 use ffmpeg_next::{ChannelLayout, frame};
@@ -41,11 +40,11 @@ pub fn at_rate(sound: &Sound, rate: u32) -> Result<Sound> {
     if sound.rate == rate {
         return Ok(sound.clone());
     }
-    let format = Sample::F32(sample::Type::Packed);
-    let mut resampler = Resampler::new((format, ChannelLayout::MONO, sound.rate), rate)?;
+    let sample = Sample::F32(sample::Type::Packed);
+    let mut resampler = Resampler::new(SoundFormat { sample, layout: ChannelLayout::MONO, rate: sound.rate }, rate)?;
     let mut samples = Vec::new();
     for piece in sound.samples.chunks(PIECE) {
-        let mut frame = frame::Audio::new(format, piece.len(), ChannelLayout::MONO);
+        let mut frame = frame::Audio::new(sample, piece.len(), ChannelLayout::MONO);
         frame.set_rate(sound.rate);
         frame.plane_mut::<f32>(0).copy_from_slice(piece);
         resampler.push(&frame, &mut samples)?;
@@ -71,19 +70,14 @@ pub fn read_sound(path: &Path) -> Result<Sound> {
 }
 
 /// Totals of `stream_mono`.
+#[derive(Clone, Debug, PartialEq)]
 pub struct StreamedSound {
-    /// Number of samples handed on.
-    pub n_samples: u64,
+    /// Length in seconds.
+    pub secs: f64,
     /// Track that was read, and the others.
     pub tracks: AudioTracks,
-    n_misplaced: u64,
-}
-
-impl StreamedSound {
     /// Sentence about what was left out.
-    pub fn damage(&self) -> Option<String> {
-        (self.n_misplaced > 0).then(|| format!("{} pieces of sound with impossible times", self.n_misplaced))
-    }
+    pub damage: Option<String>,
 }
 
 /// Decodes the sound track `track` of `path` (from 1; 0: the automatic choice) and hands it to `sink` piece by piece;
@@ -136,15 +130,15 @@ pub fn stream_mono(
             n_misplaced += 1;
         }
     }
+    let damage = (n_misplaced > 0).then(|| format!("{n_misplaced} pieces of sound with impossible times"));
     if n_frames == 0 {
-        let misplaced = StreamedSound { n_samples: 0, tracks: AudioTracks::default(), n_misplaced }.damage();
-        let Some(damage) = misplaced.or_else(|| decode.damage()) else { return Ok(None) };
+        let Some(damage) = damage.or_else(|| decode.damage()) else { return Ok(None) };
         let name = path.display();
         let problem = format!("no sound of {name} can be decoded ({damage}): copy or download it again");
         return Err(UnreadableMedia(problem).into());
     }
     timeline.end_run()?;
-    Ok(Some(StreamedSound { n_samples: timeline.n_written, tracks, n_misplaced }))
+    Ok(Some(StreamedSound { secs: timeline.n_written as f64 / f64::from(rate), tracks, damage }))
 }
 
 /// Difference of timestamps and sample count.

@@ -40,7 +40,7 @@ impl StreamDecoder {
         let kind = if medium == media::Type::Audio { "sound" } else { "pictures" };
         let open = || -> Result<decoder::Opened, ffmpeg::Error> {
             let mut context = codec::Context::from_parameters(parameters)?;
-            context.set_threading(codec::threading::Config { count: threads, ..Default::default() });
+            context.set_threading(codec::threading::Config::count(threads));
             // SAFETY: the context is ours and not open yet.
             unsafe { (*context.as_mut_ptr()).max_pixels = MOST_PIXELS };
             let mut decoder = context.decoder();

@@ -5,13 +5,11 @@
 //! of the first; those of another shape stand in black bars.
 
 use super::decode::StreamDecoder;
+use super::filter::{HdrTransfer, deinterlaced};
 use super::orientation::Orientation;
 use super::picture::Converter;
-use super::probe;
-use super::probe::ProbedMedia;
-use super::source;
-use super::source::{LONGEST_GAP_SECS, UnreadableMedia};
-use super::tone_map::HdrTransfer;
+use super::probe::{self, ProbedMedia};
+use super::source::{self, LONGEST_GAP_SECS, UnreadableMedia};
 use anyhow::{Context, Result, bail};
 use ffmpeg_next::frame;
 use orator_base::types::image::{Image, PictureOptions};
@@ -79,7 +77,8 @@ pub struct FrameReader {
     converters: Vec<([usize; 2], Converter)>,
     /// Ticks of the stream's clock at the first frame.
     origin: i64,
-    /// Shown frame and the one after it.
+    /// Shown frame, the one before it and the one after it.
+    before: Option<frame::Video>,
     shown: SourceFrame,
     following: Option<SourceFrame>,
     next_idx: usize,
@@ -130,6 +129,7 @@ impl FrameReader {
             image_size,
             converters: Vec::new(),
             origin,
+            before: None,
             shown,
             following: None,
             next_idx: 0,
@@ -154,16 +154,16 @@ impl FrameReader {
         let ticks = (source_secs / f64::from(self.decode.time_base())).round() as i64;
         let lead = (LEAD_SECS / f64::from(self.decode.time_base())).round() as i64;
         self.decode.seek(self.origin.saturating_add(ticks - lead))?;
-        let mut frame = frame::Video::empty();
+        let (mut before, mut frame) = (None, frame::Video::empty());
         loop {
             let found = if self.decode.next(&mut frame)? { frame.timestamp() } else { None };
             match found.map(|at| at.saturating_sub(self.origin)) {
-                Some(at) if at < ticks => {}
+                Some(at) if at < ticks => before = Some(std::mem::replace(&mut frame, frame::Video::empty())),
                 Some(at) if at == ticks => break,
                 _ => bail!("{} shows no picture at {source_secs:.3} s when begun nearby", self.path.display()),
             }
         }
-        self.shown = SourceFrame { frame, ticks };
+        (self.before, self.shown) = (before, SourceFrame { frame, ticks });
         self.following = self.decode_after(ticks)?;
         (self.next_idx, self.last_shown) = (frame_idx, None);
         Ok(())
@@ -243,7 +243,7 @@ impl FrameReader {
             let ticks = following.ticks;
             let after = self.decode_after(ticks)?;
             if let Some(shown) = std::mem::replace(&mut self.following, after) {
-                self.shown = shown;
+                self.before = Some(std::mem::replace(&mut self.shown, shown).frame);
             }
         }
         if self.following.is_none() && frame_idx >= self.fps.frames_in(self.duration_secs()) {
@@ -263,10 +263,16 @@ impl FrameReader {
             if self.converters.len() == MOST_CONVERTERS {
                 self.converters.clear();
             }
-            self.converters.push((fitted, Converter::new(fitted, self.orientation, self.options)));
+            self.converters.push((fitted, Converter::new(fitted, self.orientation)));
             self.converters.len() - 1
         });
-        let picture = self.converters[at].1.picture(&self.shown.frame);
+        let (shown, after) = (&self.shown.frame, self.following.as_ref().map(|following| &following.frame));
+        let picture = if self.options.deinterlace {
+            let frame = deinterlaced(self.before.as_ref(), shown, after);
+            frame.and_then(|frame| self.converters[at].1.picture(&frame))
+        } else {
+            self.converters[at].1.picture(shown)
+        };
         let picture =
             picture.with_context(|| format!("{}, at {:.3} s", self.path.display(), self.secs(self.shown.ticks)))?;
         Ok(if fitted == size { picture } else { picture.framed(size) })

@@ -1,20 +1,18 @@
 //! Conversion of a decoded frame to an upright RGB `Image`: colour conversion and scaling by swscale, tone mapping of
-//! HDR, deinterlacing, rotation.
+//! HDR, rotation.
 
-use super::deinterlace;
+use super::filter::{HdrTransfer, ToneMapper};
 use super::orientation::Orientation;
-use super::tone_map::{HdrTransfer, ToneMapper};
 use anyhow::{Context, Result, bail};
 use ffmpeg_next as ffmpeg;
 use ffmpeg_next::format::Pixel;
 use ffmpeg_next::software::scaling;
 use ffmpeg_next::{color, frame};
-use orator_base::types::image::{Image, PictureOptions};
+use orator_base::types::image::Image;
 
 /// Converter of one stream's frames to pictures of one size; swscale's tables are kept between frames.
 pub(crate) struct Converter {
     orientation: Orientation,
-    deinterlace: bool,
     /// Size of the pictures before rotation.
     coded_size: [usize; 2],
     scaler: Option<Scaler>,
@@ -22,38 +20,18 @@ pub(crate) struct Converter {
 
 impl Converter {
     /// Pictures of `size` (width, height in px, upright).
-    pub fn new(size: [usize; 2], orientation: Orientation, options: PictureOptions) -> Self {
-        let coded_size = orientation.upright_size(size);
-        Self { orientation, deinterlace: options.deinterlace, coded_size, scaler: None }
+    pub fn new(size: [usize; 2], orientation: Orientation) -> Self {
+        Self { orientation, coded_size: orientation.upright_size(size), scaler: None }
     }
 
-    /// `frame`, upright, in the size this converter was made for. Of an interlaced frame at its full height both fields
-    /// are converted by themselves, so that their colours do not mix; any other height is scaled from the first field.
+    /// `frame`, upright, in the size this converter was made for.
     pub fn picture(&mut self, frame: &frame::Video) -> Result<Image> {
-        let [width, height] = self.coded_size;
-        let fields = if self.deinterlace { deinterlace::fields(frame) } else { None };
-        let coded = match fields {
-            None => self.convert(frame, [width, height])?,
-            Some([top, bottom]) => {
-                let keeps_top = frame.is_top_first() || !frame.is_interlaced();
-                if height == frame.height() as usize {
-                    let fields =
-                        [self.convert(&top, [width, height / 2])?, self.convert(&bottom, [width, height / 2])?];
-                    deinterlace::interpolate(&deinterlace::woven(&fields), keeps_top)
-                } else {
-                    self.convert(if keeps_top { &top } else { &bottom }, [width, height])?
-                }
-            }
-        };
-        Ok(self.orientation.apply(coded))
-    }
-
-    fn convert(&mut self, frame: &frame::Video, size: [usize; 2]) -> Result<Image> {
         let source = FrameFormat::of(frame);
-        if self.scaler.as_ref().is_none_or(|scaler| scaler.source != source || scaler.size != size) {
-            self.scaler = Some(Scaler::new(source, size)?);
+        if self.scaler.as_ref().is_none_or(|scaler| scaler.source != source) {
+            self.scaler = Some(Scaler::new(source, self.coded_size)?);
         }
-        self.scaler.as_mut().context("the scaler was just made")?.convert(frame)
+        let coded = self.scaler.as_mut().context("the scaler was just made")?.convert(frame)?;
+        Ok(self.orientation.apply(coded))
     }
 }
 
@@ -101,8 +79,8 @@ impl Scaler {
         if w == 0 || h == 0 {
             bail!("a picture of {w} x {h} px was asked for");
         }
-        let tones = source.hdr.map(|transfer| ToneMapper::new(transfer, source.has_wide_gamut));
-        let rgb = if tones.is_some() { Pixel::RGB48LE } else { Pixel::RGB24 };
+        let tones = source.hdr.map(|transfer| ToneMapper::new(transfer, source.has_wide_gamut, [w, h])).transpose()?;
+        let rgb = if tones.is_some() { ToneMapper::FORMAT } else { Pixel::RGB24 };
         let mut context = scaling::Context::get(source.format, width, height, rgb, w, h, flags)
             .with_context(|| format!("cannot turn {:?} pictures into RGB", source.format))?;
         // SAFETY: the context is live, the tables are swscale's own static ones; one = 1.0 in 16.16.
@@ -117,15 +95,11 @@ impl Scaler {
     fn convert(&mut self, frame: &frame::Video) -> Result<Image> {
         let [width, height] = self.size;
         self.context.run(frame, &mut self.rgb).context("swscale failed")?;
-        let mut data = Vec::with_capacity(3 * width * height);
+        let toned = self.tones.as_mut().map(|tones| tones.map(&self.rgb)).transpose()?;
+        let rgb = toned.as_ref().unwrap_or(&self.rgb);
         // Rows of the frame are padded to a multiple of 32 bytes.
-        for row in self.rgb.data(0).chunks(self.rgb.stride(0)).take(height) {
-            match &self.tones {
-                None => data.extend_from_slice(&row[..3 * width]),
-                Some(tones) => tones.push_row(&row[..6 * width], &mut data),
-            }
-        }
-        Ok(Image { width, height, data })
+        let rows = rgb.data(0).chunks(rgb.stride(0)).take(height);
+        Ok(Image { width, height, data: rows.flat_map(|row| &row[..3 * width]).copied().collect() })
     }
 }
 

@@ -7,14 +7,20 @@ use ffmpeg_next::format::{Sample, sample};
 use ffmpeg_next::software::resampling;
 use ffmpeg_next::{ChannelLayout, Dictionary, frame};
 
-/// Format of a sound frame: sample format, channel layout, rate.
-pub(crate) type Format = (Sample, ChannelLayout, u32);
+/// Format of a sound frame.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) struct SoundFormat {
+    pub sample: Sample,
+    pub layout: ChannelLayout,
+    /// Samples a second.
+    pub rate: u32,
+}
 
 /// The format of `frame`; a layout that the file does not name is the usual one for its number of channels.
-pub(crate) fn format_of(frame: &frame::Audio) -> Format {
+pub(crate) fn format_of(frame: &frame::Audio) -> SoundFormat {
     let named = frame.channel_layout();
-    let usual = || ChannelLayout::default(i32::from(frame.channels()));
-    (frame.format(), if named.is_empty() { usual() } else { named }, frame.rate())
+    let layout = if named.is_empty() { ChannelLayout::default(i32::from(frame.channels())) } else { named };
+    SoundFormat { sample: frame.format(), layout, rate: frame.rate() }
 }
 
 /// First sample of `frame` that is NaN or infinite in any channel; such a sample would make every derived value NaN.
@@ -33,9 +39,10 @@ pub(crate) fn first_not_finite(frame: &frame::Audio) -> Option<usize> {
         // values of its format.
         let value = unsafe {
             let values = *(*frame.as_ptr()).extended_data.add(plane);
-            match is_double {
-                true => std::slice::from_raw_parts(values.cast::<f64>(), n_values).iter().position(|v| !v.is_finite()),
-                false => std::slice::from_raw_parts(values.cast::<f32>(), n_values).iter().position(|v| !v.is_finite()),
+            if is_double {
+                std::slice::from_raw_parts(values.cast::<f64>(), n_values).iter().position(|v| !v.is_finite())
+            } else {
+                std::slice::from_raw_parts(values.cast::<f32>(), n_values).iter().position(|v| !v.is_finite())
             }
         };
         value.map(|at| at / n_each)
@@ -46,7 +53,7 @@ pub(crate) fn first_not_finite(frame: &frame::Audio) -> Option<usize> {
 /// Resampler of one continuous run to mono f32.
 pub(crate) struct Resampler {
     context: resampling::Context,
-    format: Format,
+    format: SoundFormat,
     rate: u32,
     n_in: u64,
     n_out: u64,
@@ -56,8 +63,8 @@ pub(crate) struct Resampler {
 }
 
 impl Resampler {
-    pub fn new(format: Format, rate: u32) -> Result<Self> {
-        let (sample, layout, source_rate) = format;
+    pub fn new(format: SoundFormat, rate: u32) -> Result<Self> {
+        let SoundFormat { sample, layout, rate: source_rate } = format;
         ensure!(source_rate > 0 && rate > 0, "sound at {source_rate} Hz cannot be brought to {rate} Hz");
         let mono = ChannelLayout::MONO;
         let packed = Sample::F32(sample::Type::Packed);
@@ -70,13 +77,13 @@ impl Resampler {
         Ok(Self { context, format, rate, n_in: 0, n_out: 0, n_stretched: 0, even_at: 0 })
     }
 
-    pub fn format(&self) -> Format {
+    pub fn format(&self) -> SoundFormat {
         self.format
     }
 
     /// Seconds of input, stretched.
     pub fn secs(&self) -> f64 {
-        self.n_in as f64 / f64::from(self.format.2) + self.n_stretched as f64 / f64::from(self.rate)
+        self.n_in as f64 / f64::from(self.format.rate) + self.n_stretched as f64 / f64::from(self.rate)
     }
 
     /// Whether no stretch is active.
@@ -92,7 +99,7 @@ impl Resampler {
         let done = unsafe { ffmpeg::ffi::swr_set_compensation(self.context.as_mut_ptr(), n, over) };
         ensure!(done >= 0, "swresample cannot stretch ({})", ffmpeg::Error::from(done));
         self.n_stretched += i64::from(n);
-        self.even_at = self.n_in + (over_secs * f64::from(self.format.2)) as u64;
+        self.even_at = self.n_in + (over_secs * f64::from(self.format.rate)) as u64;
         Ok(())
     }
 
@@ -109,7 +116,7 @@ impl Resampler {
         let start = out.len();
         // SAFETY: null input means flush.
         unsafe { self.convert(std::ptr::null_mut(), 0, out)? };
-        let n_all = (self.n_in * u64::from(self.rate) + u64::from(self.format.2) / 2) / u64::from(self.format.2);
+        let n_all = (self.n_in * u64::from(self.rate) + u64::from(self.format.rate) / 2) / u64::from(self.format.rate);
         let n_all = n_all.saturating_add_signed(self.n_stretched);
         let n_extra = usize::try_from(self.n_out.saturating_sub(n_all)).unwrap_or(usize::MAX);
         out.truncate(out.len().saturating_sub(n_extra).max(start));

@@ -1,4 +1,5 @@
-//! Opening of a media file: its streams, or an error that names the file, the defect and what was expected.
+//! The ffmpeg libraries, and opening of a media file: its streams, or an error that names the file, the defect and what was
+//! expected.
 
 use anyhow::{Context, Result, bail};
 use ffmpeg_next as ffmpeg;
@@ -18,6 +19,30 @@ const SOUND_RATES: RangeInclusive<u32> = 4_000..=768_000;
 
 const EXPECTED: &str = "expected a video or sound file (mp4, mov, mkv, webm, avi, wav, flac, mp3, ...)";
 
+/// Starts ffmpeg once and silences its log lines, since every error is reported by this crate.
+pub(crate) fn init() {
+    static ONCE: std::sync::Once = std::sync::Once::new();
+    ONCE.call_once(|| {
+        // Registers nothing since ffmpeg 4 and cannot fail there; a failure would show at the first file opened.
+        let _ = ffmpeg::init();
+        ffmpeg::log::set_level(ffmpeg::log::Level::Quiet);
+    });
+}
+
+/// Versions of the ffmpeg libraries linked, for instance `libavformat 59.27.100, libavcodec 59.37.100, ...`.
+pub fn version() -> String {
+    use ffmpeg::software::{resampling, scaling};
+    let dotted = |v: u32| format!("{}.{}.{}", v >> 16, (v >> 8) & 255, v & 255);
+    format!(
+        "libavformat {}, libavcodec {}, libavfilter {}, libswscale {}, libswresample {}",
+        dotted(ffmpeg::format::version()),
+        dotted(ffmpeg::codec::version()),
+        dotted(ffmpeg::filter::version()),
+        dotted(scaling::version()),
+        dotted(resampling::version())
+    )
+}
+
 /// A file that gives no picture or sound. The message names the file, what is wrong with it and what to do.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
@@ -36,7 +61,7 @@ pub(crate) fn open(path: &Path) -> Result<Input> {
 
 /// Opens `path` with options for the container's reader. Every file of pictures or sound is opened here.
 pub(crate) fn open_with(path: &Path, options: &[(&str, &str)]) -> Result<Input> {
-    super::library::init();
+    init();
     let name = path.display();
     let cannot = || UnreadableMedia(format!("cannot read {name}"));
     let mut file =
@@ -74,11 +99,10 @@ pub(crate) fn open_with(path: &Path, options: &[(&str, &str)]) -> Result<Input> 
     for stream in input.streams().filter(|stream| stream.parameters().medium() == ffmpeg::media::Type::Audio) {
         check_rate(path, sound_numbers(&stream)[0])?;
     }
-    match video_stream(&input).is_none() && automatic_track(&input).is_none() {
-        false => Ok(input),
-        true if is_mp4 => unreadable(cut_short()),
-        true => unreadable(format!("{name} holds neither pictures nor sound: {EXPECTED}")),
+    if video_stream(&input).is_some() || automatic_track(&input).is_some() {
+        return Ok(input);
     }
+    unreadable(if is_mp4 { cut_short() } else { format!("{name} holds neither pictures nor sound: {EXPECTED}") })
 }
 
 /// `path` as ffmpeg wants it: text, and marked as a file so that a colon in its name is not taken for a protocol.

@@ -161,6 +161,12 @@ fn side(px: usize) -> Result<i32> {
     Ok(px as i32)
 }
 
+/// Version of the OpenCV library linked.
+pub fn version() -> String {
+    use opencv::core::{get_version_major, get_version_minor, get_version_revision};
+    format!("{}.{}.{}", get_version_major(), get_version_minor(), get_version_revision())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

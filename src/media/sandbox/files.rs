@@ -1,6 +1,6 @@
 //! Landlock: files are read and written as the rules say, TCP and signals to other processes end at the process.
 
-use super::access::FileAccess;
+use super::FileAccess;
 use landlock::{
     ABI, Access, AccessFs, AccessNet, BitFlags, CompatLevel, Compatible, LandlockStatus, Ruleset, RulesetAttr,
     RulesetCreatedAttr, RulesetError, RulesetStatus, Scope, make_bitflags, path_beneath_rules,

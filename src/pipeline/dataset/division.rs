@@ -10,8 +10,7 @@ use orator_base::stage::refusal::{FrameRefusal, Refusal};
 use orator_base::stage::{Unit, counted};
 use orator_base::types::interval::{Interval, Intervals};
 use orator_base::types::time::FrameRate;
-use orator_dataset::config;
-use orator_dataset::config::{Settings, SplitUnit};
+use orator_dataset::config::{self, Settings, SplitUnit};
 use orator_dataset::info::DatasetInfo;
 use orator_dataset::shared_sound::SharedSound;
 use orator_dataset::split::{

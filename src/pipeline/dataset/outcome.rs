@@ -4,8 +4,7 @@ use super::video::LiftedVideo;
 use anyhow::{Context, Result};
 use orator_base::stage::ledger::WordCount;
 use orator_base::stage::{Report, counted};
-use orator_dataset::config;
-use orator_dataset::config::SplitUnit;
+use orator_dataset::config::{self, SplitUnit};
 use orator_dataset::info::DatasetInfo;
 use orator_dataset::leakage::Leakage;
 use orator_dataset::split::{Split, SplitRule};
@@ -13,6 +12,7 @@ use orator_dataset::stats::DatasetStats;
 use orator_dataset::{INFO, LEAKAGE};
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 /// Videos whose notes on words are told.
@@ -74,17 +74,18 @@ impl DatasetOutcome<'_> {
         let n_windows: usize = self.stats.windows.strided.values().sum();
         let mut line = format!("{}; {n_windows} windows of 64 frames", Split::ALL.map(part).join(", "));
         let SplitRule { unit, why, guard_secs } = self.rule;
-        line += &match unit {
+        let splits = match unit {
             SplitUnit::Time => format!("; splits by time, {guard_secs:.1} s apart ({why})"),
             SplitUnit::Video | SplitUnit::Auto => format!("; splits by video ({why})"),
         };
+        line += &splits;
         if self.n_taken_over > 0 {
-            line += &format!("; {} taken over as they were", counted(self.n_taken_over, "video"));
+            let _ = write!(line, "; {} taken over as they were", counted(self.n_taken_over, "video"));
         }
         if let Some(WordCount { n_words, n_kept, .. }) = self.stats.footage.words {
-            line += &format!("; {n_kept} of {n_words} words");
+            let _ = write!(line, "; {n_kept} of {n_words} words");
         }
-        warnings.iter().for_each(|warning| line += &format!("; warning: {warning}"));
+        line.extend(warnings.iter().map(|warning| format!("; warning: {warning}")));
         let secs: BTreeMap<_, _> = info.splits.iter().map(|(name, split)| (name, split.secs)).collect();
         let DatasetStats { windows, footage, .. } = self.stats;
         let facts = serde_json::json!({ "secs": secs, "windows": windows, "footage": footage, "warnings": warnings,

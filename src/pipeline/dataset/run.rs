@@ -1,6 +1,6 @@
 //! Writing of a speaker's dataset, video by video: what the dataset that was there has of a video already is taken over.
 
-use super::division::Division;
+use super::division::{DividedVideo, Division};
 use super::video::LiftedVideo;
 use anyhow::Result;
 use orator_base::stage::ledger::{Ledger, Refused};
@@ -10,10 +10,10 @@ use orator_base::types::interval::Interval;
 use orator_dataset::config;
 use orator_dataset::leakage::SoundComparison;
 use orator_dataset::shared_sound;
-use orator_dataset::split::{Split, SplitBy, TimeBlock};
-use orator_dataset::write::part;
-use orator_dataset::write::part::{VideoEntry, VideoSource};
+use orator_dataset::split::Assignment;
+use orator_dataset::write::part::{self, VideoEntry, VideoSource};
 use orator_dataset::write::writer::DatasetWriter;
+use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -67,63 +67,48 @@ impl<'a> DatasetRun<'a> {
         Ok(SoundComparison { duplicate_secs, shared })
     }
 
-    /// Writes a video as a whole, or takes it over from the old dataset.
+    /// Writes a video as a whole or in blocks of time, as it is `placed`, or takes it over from the old dataset.
     pub fn write(
         &mut self,
         writer: &DatasetWriter,
         video: &LiftedVideo,
-        split: Split,
-        by: SplitBy,
-        sounds: &Sounds,
-    ) -> Result<()> {
-        let made_from = made_from(&serde_json::json!([
-            orator_dataset::SCHEMA,
-            video.file,
-            video.files_hash,
-            split,
-            by,
-            self.settings.max_mb
-        ]));
-        if self.is_taken_over(video, &made_from)? {
-            return Ok(());
-        }
-        let words = video.account_of_words(video.intervals.intervals.iter().copied());
-        let ledger = Ledger { words, ..video.ledger.clone() };
-        let mut part = writer.video(source(video, made_from, ledger), split, by)?;
-        if let Some(mut samples) = video.samples(&video.intervals.intervals)? {
-            while let Some(cut) = samples.next_sample()? {
-                part.push(&cut.sample, cut.padded_secs)?;
-            }
-        }
-        part.finish(sounds.get(&video.name).cloned())?;
-        Ok(())
-    }
-
-    /// Writes a video in blocks of time, or takes it over from the old dataset.
-    pub fn write_blocks(
-        &mut self,
-        writer: &DatasetWriter,
-        video: &LiftedVideo,
-        blocks: Vec<TimeBlock>,
+        placed: Assignment,
         division: &Division,
         sounds: &Sounds,
     ) -> Result<()> {
-        let made_from = made_from(&serde_json::json!([
-            orator_dataset::SCHEMA,
-            video.file,
-            video.files_hash,
-            blocks,
-            [division.guard_frames, division.least_frames],
-            self.settings.max_mb
-        ]));
+        let (placement, rule, divided) = match &placed {
+            Assignment::In(split, by) => {
+                let pieces = video.intervals.intervals.iter().map(|interval| (*split, *interval)).collect();
+                (json!(split), json!(by), DividedVideo { pieces, ledger: video.ledger.clone() })
+            }
+            Assignment::Blocks(blocks) => {
+                let divided = division.divide(&video.intervals, &video.ledger, blocks)?;
+                (json!(blocks), json!([division.guard_frames, division.least_frames]), divided)
+            }
+            Assignment::Nowhere(_) => return Ok(()),
+        };
+        let inputs =
+            json!([orator_dataset::SCHEMA, video.file, video.files_hash, placement, rule, self.settings.max_mb]);
+        let made_from = blake3::hash(inputs.to_string().as_bytes()).to_hex().to_string();
         if self.is_taken_over(video, &made_from)? {
             return Ok(());
         }
-        let divided = division.divide(&video.intervals, &video.ledger, &blocks)?;
         let intervals: Vec<Interval> = divided.pieces.iter().map(|(_, interval)| *interval).collect();
         let words = video.account_of_words(intervals.iter().copied());
-        let ledger = Ledger { words, ..divided.ledger };
-        let mut part = writer.video_in_blocks(source(video, made_from, ledger), blocks)?;
+        let source = VideoSource {
+            name: video.name.clone(),
+            file: video.file.clone(),
+            content: video.content.clone(),
+            made_from,
+            ledger: Ledger { words, ..divided.ledger },
+            bones: video.bones.clone(),
+            failure: None,
+        };
+        let mut part = match placed {
+            Assignment::Blocks(blocks) => writer.video_in_blocks(source, blocks)?,
+            Assignment::In(split, by) => writer.video(source, split, by)?,
+            Assignment::Nowhere(_) => return Ok(()),
+        };
         if let Some(mut samples) = video.samples(&intervals)? {
             for (split, _) in divided.pieces {
                 let Some(cut) = samples.next_sample()? else { break };
@@ -158,23 +143,6 @@ impl<'a> DatasetRun<'a> {
         ledger.refused.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
         let (name, file, content) = (video.unit.video.clone(), video.file.clone(), video.content.clone());
         VideoSource { name, file, content, ledger, ..VideoSource::default() }
-    }
-}
-
-/// Hash of what a video's shards are made from.
-fn made_from(inputs: &serde_json::Value) -> String {
-    blake3::hash(inputs.to_string().as_bytes()).to_hex().to_string()
-}
-
-fn source(video: &LiftedVideo, made_from: String, ledger: Ledger) -> VideoSource {
-    VideoSource {
-        name: video.name.clone(),
-        file: video.file.clone(),
-        content: video.content.clone(),
-        made_from,
-        ledger,
-        bones: video.bones.clone(),
-        failure: None,
     }
 }
 

@@ -1,29 +1,24 @@
 //! The stage: all videos of a speaker, as `extract`, `pose2d`, `segment` and `lift` left them, become one dataset.
 //! What the dataset that was there has of a video already is taken over as it is, so that a new video costs itself alone.
 
-use super::division;
-use super::division::Division;
+use super::division::{self, Division};
 use super::faces;
 use super::outcome::{DatasetOutcome, SeveralPeople};
-use super::people;
-use super::people::PersonSeen;
+use super::people::{self, PersonSeen};
 use super::run::DatasetRun;
 use super::video::{FILES, LiftedVideo, POSTURE_VERSION};
 use anyhow::{Result, ensure};
-use orator_base::stage::artifacts;
-use orator_base::stage::artifacts::{Artifact, StageName, dir, speaker_dir};
+use orator_base::stage::artifacts::{self, Artifact, StageName, dir, speaker_dir};
 use orator_base::stage::ledger::{Ledger, longest_first};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::record::Failure;
 use orator_base::stage::{Input, Report, Stage, Unit, counted, workdir};
 use orator_base::types::time::FrameRate;
-use orator_dataset::config;
-use orator_dataset::config::Settings;
 use orator_dataset::config::videos::Videos;
+use orator_dataset::config::{self, Settings};
 use orator_dataset::info::{About, ModelUsed};
-use orator_dataset::split::{Assignment, Split, SplitBy};
-use orator_dataset::write::part;
-use orator_dataset::write::part::VideoSource;
+use orator_dataset::split::{Assignment, Split, SplitBy, SplitRule};
+use orator_dataset::write::part::{self, VideoSource};
 use orator_dataset::write::writer::DatasetWriter;
 use orator_formats::media_json::MediaInfo;
 use std::collections::{BTreeMap, BTreeSet};
@@ -32,73 +27,92 @@ use std::path::{Path, PathBuf};
 /// What the readers of a dataset whose sound was shifted should know.
 const FIXED: &str = "Where the lips showed surely that the sound of a video was late or early, it was shifted.";
 
+/// Inputs of a dataset beside the settings.
+#[derive(Default)]
+pub struct DatasetInputs {
+    /// Videos that came through the stages before, of one speaker or of several.
+    pub ready: Vec<Unit>,
+    /// All videos there are, with the splits that the configuration names; those not ready stand in the ledger as failed.
+    pub all: Vec<Videos>,
+    /// Models that looked at the videos, for `info.json`.
+    pub models: Vec<ModelUsed>,
+    /// Sentences for the readers of the dataset.
+    pub notes: Vec<String>,
+    /// Keypoints within so many seconds of a frame influence its joints.
+    pub reach_secs: f64,
+}
+
 /// A speaker's videos to shards. Its unit is the speaker.
 pub struct DatasetStage {
     settings: config::DatasetConfig,
     speakers: Vec<config::SpeakerConfig>,
     work: PathBuf,
-    /// Videos that came through the stages before.
-    ready: Vec<Unit>,
-    /// All videos of all speakers, with the splits that the configuration names.
-    all: Vec<Videos>,
-    models: Vec<ModelUsed>,
+    inputs: DatasetInputs,
     /// Whether sound that is surely late or early is shifted.
     fixes_offset: bool,
-    notes: Vec<String>,
     /// Frames between two splits of a video that is divided by time.
     guard_frames: usize,
     fps: FrameRate,
     /// Frames of the shortest sample of such a video.
     window_frames: usize,
+    /// State of the work folder at construction, by the name of the speaker.
+    states: BTreeMap<String, SpeakerState>,
+}
+
+/// State of a speaker's videos in the work folder.
+#[derive(Default)]
+struct SpeakerState {
+    /// Failures of the videos that are not ready, by name.
+    others: BTreeMap<String, Option<String>>,
+    /// `None`: the record of the splits is damaged, which is an error of the run.
+    rule: Option<SplitRule>,
 }
 
 impl DatasetStage {
-    /// `ready` are the units of videos that came through the stages before, of one speaker or of several; the keypoints
-    /// within `reach_secs` of a frame had a say in its joints.
-    pub fn new(settings: &Settings, ready: &[Unit], reach_secs: f64) -> Self {
-        Self {
+    /// Reads the failures of videos and the records of splits.
+    pub fn new(settings: &Settings, mut inputs: DatasetInputs) -> Self {
+        if settings.extract.fix_offset {
+            inputs.notes.insert(0, FIXED.to_owned());
+        }
+        let mut stage = Self {
             settings: settings.dataset.clone(),
             speakers: settings.speaker.clone(),
             work: settings.work.dir.to_path_buf(),
-            ready: ready.to_vec(),
-            all: Vec::new(),
-            models: Vec::new(),
             fixes_offset: settings.extract.fix_offset,
-            notes: settings.extract.fix_offset.then(|| FIXED.to_owned()).into_iter().collect(),
-            guard_frames: division::guard_frames(settings, reach_secs),
+            guard_frames: division::guard_frames(settings, inputs.reach_secs),
             fps: settings.extract.rate(),
             window_frames: division::window_frames(settings),
+            states: BTreeMap::new(),
+            inputs,
+        };
+        let speakers = stage.inputs.ready.iter().map(|video| video.speaker.clone());
+        let speakers: BTreeSet<_> = speakers.chain(stage.inputs.all.iter().map(|all| all.speaker.clone())).collect();
+        stage.states = speakers.into_iter().map(|speaker| (speaker.clone(), stage.state(speaker))).collect();
+        stage
+    }
+
+    fn state(&self, speaker: String) -> SpeakerState {
+        let unit = Unit { speaker, video: String::new(), source: PathBuf::new() };
+        let others = self.failures(&unit, &self.ready(&unit));
+        SpeakerState {
+            others: others.into_iter().map(|source| (source.name, source.failure)).collect(),
+            rule: self.division(&unit).ok().map(|division| division.rule(self.fps)),
         }
-    }
-
-    /// Names all videos there are: those not ready stand in the ledger as failed.
-    pub fn with_videos(self, all: Vec<Videos>) -> Self {
-        Self { all, ..self }
-    }
-
-    /// Names the models that looked at the videos in `info.json`.
-    pub fn with_models(self, models: Vec<ModelUsed>) -> Self {
-        Self { models, ..self }
-    }
-
-    /// Adds a sentence for the readers of the dataset.
-    pub fn with_note(mut self, note: String) -> Self {
-        self.notes.push(note);
-        self
     }
 
     fn ready(&self, speaker: &Unit) -> Vec<&Unit> {
         let lifted = |video: &&Unit| Artifact::Joints.path(&self.work, video).exists();
-        self.ready.iter().filter(|video| video.speaker == speaker.speaker).filter(lifted).collect()
+        self.inputs.ready.iter().filter(|video| video.speaker == speaker.speaker).filter(lifted).collect()
     }
 
     fn videos(&self, speaker: &Unit) -> Option<&Videos> {
-        self.all.iter().find(|videos| videos.speaker == speaker.speaker)
+        self.inputs.all.iter().find(|videos| videos.speaker == speaker.speaker)
     }
 
     /// The videos of which nothing can come, as parts with their failures.
     fn failures(&self, speaker: &Unit, ready: &[&Unit]) -> Vec<VideoSource> {
-        let mut failed: Vec<&Unit> = self.ready.iter().filter(|video| video.speaker == speaker.speaker).collect();
+        let mut failed: Vec<&Unit> =
+            self.inputs.ready.iter().filter(|video| video.speaker == speaker.speaker).collect();
         failed.extend(self.videos(speaker).into_iter().flat_map(|videos| &videos.units));
         failed.retain(|unit| !ready.contains(unit));
         failed.sort_by(|a, b| a.video.cmp(&b.video));
@@ -143,7 +157,7 @@ impl DatasetStage {
     }
 
     fn transcript(&self, video: &Unit) -> Option<&Path> {
-        Some(self.all.iter().find(|videos| videos.speaker == video.speaker)?.transcripts.get(&video.video)?)
+        Some(self.inputs.all.iter().find(|videos| videos.speaker == video.speaker)?.transcripts.get(&video.video)?)
     }
 
     fn about(&self, speaker: &Unit, first: &LiftedVideo) -> About {
@@ -152,7 +166,7 @@ impl DatasetStage {
         let ready = self.ready(speaker);
         let media = ready.iter().filter_map(|video| MediaInfo::read(&Artifact::MediaInfo.path(&self.work, video)).ok());
         let not_judged: Vec<String> = media.filter_map(|media| media.not_judged()).collect();
-        let (mut models, mut notes) = (self.models.clone(), self.notes.clone());
+        let (mut models, mut notes) = (self.inputs.models.clone(), self.inputs.notes.clone());
         if not_judged.len() == ready.len() {
             // No model has looked at pictures.
             models.retain(|model| model.role == "speech");
@@ -192,15 +206,12 @@ impl Stage for DatasetStage {
     fn settings(&self, unit: &Unit) -> serde_json::Value {
         let said = self.speakers.iter().find(|said| said.name == unit.speaker).cloned().unwrap_or_default();
         let videos = self.videos(unit);
-        // What became of the videos that are not ready stands in the ledger.
-        let others = self.failures(unit, &self.ready(unit));
-        let others: BTreeMap<String, Option<String>> = others.into_iter().map(|s| (s.name, s.failure)).collect();
-        // A damaged record is an error of the run.
-        let rule = self.division(unit).ok().map(|division| division.rule(self.fps));
+        let nothing = SpeakerState::default();
+        let SpeakerState { others, rule } = self.states.get(&unit.speaker).unwrap_or(&nothing);
         let guard_secs = rule.as_ref().map_or(0.0, |rule| rule.guard_secs);
         let mut settings = serde_json::json!({
-            "unit": rule.map(|rule| rule.unit), "guard_secs": guard_secs,
-            "dataset": self.settings, "models": self.models, "notes": self.notes, "tool": env!("CARGO_PKG_VERSION"),
+            "unit": rule.as_ref().map(|rule| rule.unit), "guard_secs": guard_secs,
+            "dataset": self.settings, "models": self.inputs.models, "notes": self.inputs.notes, "tool": env!("CARGO_PKG_VERSION"),
             "speaker": { "licence": said.licence, "consent": said.consent, "source": said.source },
             "splits": videos.map(|videos| &videos.splits), "others": others,
         });
@@ -208,9 +219,10 @@ impl Stage for DatasetStage {
             settings.insert("fix_offset".to_owned(), true.into());
         }
         // Of datasets without angles the settings are those of the versions that knew none.
-        match self.settings.posture {
-            true => settings["estimator"] = POSTURE_VERSION.into(),
-            false => drop(settings["dataset"].as_object_mut().and_then(|dataset| dataset.shift_remove("posture"))),
+        if self.settings.posture {
+            settings["estimator"] = POSTURE_VERSION.into();
+        } else {
+            drop(settings["dataset"].as_object_mut().and_then(|dataset| dataset.shift_remove("posture")));
         }
         if let (false, Some(settings)) = (said.transcripts.is_empty(), settings.as_object_mut()) {
             settings.insert("words".to_owned(), true.into());
@@ -265,7 +277,8 @@ impl Stage for DatasetStage {
         let compared = run.compare(&kept, &sounds)?;
         let Some(first) = kept.first() else { anyhow::bail!("no video of {unit} is ready") };
         let fps = first.intervals.fps;
-        let named = self.all.iter().flat_map(|videos| &videos.splits).map(|(video, split)| (video.as_str(), *split));
+        let named =
+            self.inputs.all.iter().flat_map(|videos| &videos.splits).map(|(video, split)| (video.as_str(), *split));
         let assigned = division.assign(&kept, &named.collect(), &compared.shared, &self.settings);
         // From here on the videos stay where they are, also when the run ends before the dataset is in its place.
         division.record.write(&artifacts::splits(&self.work, &unit.speaker))?;
@@ -276,14 +289,13 @@ impl Stage for DatasetStage {
         for (video, assignment) in kept.iter().zip(assigned) {
             task.detail(&video.name);
             match assignment {
-                Assignment::In(split, by) => run.write(&writer, video, split, by, &sounds)?,
-                Assignment::Blocks(blocks) => run.write_blocks(&writer, video, blocks, &division, &sounds)?,
                 Assignment::Nowhere(with) => {
                     part::remove_sound(out, &video.name)?;
                     let secs = with.first().map_or(0.0, |shared| shared.secs);
                     let others: Vec<&str> = with.iter().filter_map(|shared| shared.other(&video.name)).collect();
                     left_out.push((video, run.duplicate(video, &others.join(" and "), secs)));
                 }
+                placed => run.write(&writer, video, placed, &division, &sounds)?,
             }
             task.advance(1);
         }

@@ -1,10 +1,10 @@
 //! One video of a speaker on its way into the dataset: the files of the stages before, and the samples cut from them.
 
+use crate::sound;
 use anyhow::{Context, Result, ensure};
 use ndarray::{Axis, concatenate, s};
 use orator_base::audio::fingerprint::Fingerprinter;
-use orator_base::motion::posture;
-use orator_base::motion::posture::LiftedBody;
+use orator_base::motion::posture::{self, LiftedBody};
 use orator_base::stage::Unit;
 use orator_base::stage::artifacts::{Artifact, StageName, dir};
 use orator_base::stage::fingerprint::hash_file;
@@ -16,8 +16,7 @@ use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::Posture;
 use orator_base::types::skeleton::{L_HAND, N_HAND_JOINTS, R_HAND};
 use orator_base::types::sound::{SAMPLE_RATE, Sound};
-use orator_base::types::sync;
-use orator_base::types::sync::SoundOffset;
+use orator_base::types::sync::{self, SoundOffset};
 use orator_dataset::bones::VideoBones;
 use orator_dataset::config::videos::slug;
 use orator_dataset::sample::Sample;
@@ -164,18 +163,11 @@ impl LiftedVideo {
         if !self.sound.exists() {
             return Ok(None);
         }
-        let reading = || format!("cannot read {}", self.sound.display());
-        let mut wav = hound::WavReader::open(&self.sound).with_context(reading)?;
         let mut fingerprinter = Fingerprinter::default();
-        let mut piece = Vec::with_capacity(PIECE);
-        for sample in wav.samples::<i16>() {
-            piece.push(f32::from(sample.with_context(reading)?) / 32_768.0);
-            if piece.len() == PIECE {
-                fingerprinter.push(&piece);
-                piece.clear();
-            }
-        }
-        fingerprinter.push(&piece);
+        sound::pieces(&self.sound, PIECE, |piece| {
+            fingerprinter.push(piece);
+            Ok(())
+        })?;
         Ok(Some(fingerprinter.finish()))
     }
 

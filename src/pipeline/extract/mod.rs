@@ -3,7 +3,6 @@
 //! transitions, all on `thumbnail`s by `block_match`; `survey` finds interlaced pictures and `bars`; `spans` cuts
 //! a long video into what several workers share; `stage` writes the files.
 
-pub mod audio_file;
 pub mod bars;
 pub mod block_match;
 pub mod dissolves;
@@ -14,4 +13,4 @@ pub mod stage;
 pub mod survey;
 pub mod thumbnail;
 
-pub use stage::ExtractStage;
+pub use stage::{ExtractStage, picture_options};

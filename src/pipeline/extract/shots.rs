@@ -2,8 +2,7 @@
 //! score: how much it looks like the first one of a shot.
 
 use super::block_match;
-use super::dissolves;
-use super::dissolves::{LEAST_TURNED, WINDOWS, ramp};
+use super::dissolves::{self, LEAST_TURNED, WINDOWS, ramp};
 use super::thumbnail::Thumbnail;
 use orator_base::types::image::Image;
 use orator_base::types::time::FrameRate;

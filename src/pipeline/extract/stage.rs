@@ -4,14 +4,14 @@
 use super::reading;
 use super::spans;
 use super::survey::PictureSurvey;
+use crate::sound::extract_wav;
 use anyhow::Result;
 use orator_base::stage::artifacts::{Artifact, StageName};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::{Input, Report, Stage, Unit, counted};
 use orator_base::types::image::PictureOptions;
 use orator_base::types::sound::SAMPLE_RATE;
-use orator_dataset::config;
-use orator_dataset::config::{Config, videos};
+use orator_dataset::config::{self, Config, videos};
 use orator_formats::media_json::MediaInfo;
 use orator_media::ffmpeg;
 use orator_media::ffmpeg::frames::FrameReader;
@@ -51,7 +51,7 @@ impl Stage for ExtractStage {
     }
 
     fn version(&self) -> u32 {
-        4
+        5
     }
 
     fn settings(&self, unit: &Unit) -> serde_json::Value {
@@ -93,7 +93,7 @@ impl Stage for ExtractStage {
         let timeline = read.timeline;
         timeline.write(&Artifact::Timeline.within(out))?;
         let sound = Artifact::Sound.within(out);
-        let sound = super::audio_file::extract_wav(&unit.source, self.settings.audio_track, &sound, SAMPLE_RATE)?;
+        let sound = extract_wav(&unit.source, self.settings.audio_track, &sound, SAMPLE_RATE)?;
         let audio_secs = sound.as_ref().map(|sound| sound.secs);
         let audio_tracks = sound.as_ref().map(|sound| sound.tracks.clone()).filter(|tracks| tracks.n_tracks > 1);
 
@@ -131,4 +131,10 @@ impl Stage for ExtractStage {
         let remarks: String = media.remarks().iter().map(|remark| format!("; {remark}")).collect();
         Ok(Report { line: format!("{n_frames} frames at {rate}, {cuts}, {sound}{remarks}{damage}"), facts })
     }
+}
+
+/// How `extract` found that the pictures of `unit` are to be read; as they are where it has not run.
+pub fn picture_options(work: &Path, unit: &Unit) -> PictureOptions {
+    MediaInfo::read(&Artifact::MediaInfo.path(work, unit))
+        .map_or_else(|_| PictureOptions::default(), |media| media.pictures)
 }

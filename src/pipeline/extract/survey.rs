@@ -4,7 +4,6 @@
 use super::bars::BarFinder;
 use orator_base::types::image::{Image, PixelArea};
 use orator_base::types::time::FrameRate;
-use orator_media::ffmpeg::deinterlace::comb_share;
 
 /// Frames between two looks at the beginning, and the number of those looks.
 const EARLY_STEP: usize = 5;
@@ -14,6 +13,9 @@ const FLAGGED: f64 = 5e-5;
 const NOT_FLAGGED: f64 = 5e-4;
 /// Least share of the looks that show combs where the frames do not say that they are interlaced.
 const MOST_LOOKS: f64 = 0.25;
+
+/// Least difference of neighbouring lines in a comb, 8-bit steps of green.
+const STEP: i32 = 10;
 
 /// Looks at a video.
 pub struct PictureSurvey {
@@ -82,5 +84,57 @@ impl PictureSurvey {
     /// Area between the bars; `None` without bars.
     pub fn active_area(&self) -> Option<PixelArea> {
         self.bars.finish()
+    }
+}
+
+/// Share of the pixels of `image` that are in a comb and have changed in the picture `after` it: lines that alternate
+/// four times, by more than what stands still like a striped cloth explains. Every fourth column is looked at.
+pub fn comb_share(image: &Image, after: &Image) -> f64 {
+    let [width, height] = [image.width, image.height];
+    if height < 5 || width == 0 || [after.width, after.height] != [width, height] {
+        return 0.0;
+    }
+    let row = |y: usize| &image.data[3 * y * width..3 * (y + 1) * width];
+    let mut n_combed = 0usize;
+    for y in 2..height - 2 {
+        let lines = [row(y - 2), row(y - 1), row(y), row(y + 1), row(y + 2)];
+        let next = &after.data[3 * y * width..3 * (y + 1) * width];
+        for at in (1..3 * width).step_by(12) {
+            let [a, b, c, d, e] = lines.map(|line| i32::from(line[at]));
+            let steps = [b - a, b - c, d - c, d - e];
+            let alternates = steps.iter().all(|step| *step > STEP) || steps.iter().all(|step| *step < -STEP);
+            n_combed += usize::from(alternates && (c - i32::from(next[at])).abs() > STEP);
+        }
+    }
+    n_combed as f64 / (width.div_ceil(4) * (height - 4)) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A bright disc on a wall with a thin line, 120 x 80; `x`: its centre on even and on odd lines.
+    fn disc(x: [f64; 2]) -> Image {
+        let mut image = Image::filled(120, 80, [40; 3]);
+        for (at, pixel) in image.data.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+            let (column, line) = ((at % 120) as f64, at / 120);
+            let value = (20.5 - (column - x[line % 2]).hypot(line as f64 - 40.0)).clamp(0.0, 1.0);
+            *pixel = [if line == 7 { 200 } else { (40.0 + 180.0 * value) as u8 }; 3];
+        }
+        image
+    }
+
+    #[test]
+    fn moving_combs_are_measured_and_nothing_else() {
+        assert!(comb_share(&disc([50.0, 62.0]), &disc([74.0, 86.0])) > 0.01);
+        let still = disc([50.0; 2]);
+        assert_eq!(comb_share(&still, &disc([62.0; 2])), 0.0);
+        let mut striped = still;
+        striped.data.chunks_exact_mut(3 * 120).step_by(2).for_each(|line| line.fill(90));
+        assert_eq!(comb_share(&striped, &striped), 0.0);
+        for size in [[0, 0], [1, 1], [3, 4], [1, 9]] {
+            let tiny = Image::filled(size[0], size[1], [7; 3]);
+            assert_eq!(comb_share(&tiny, &tiny), 0.0);
+        }
     }
 }

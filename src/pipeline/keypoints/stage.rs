@@ -2,20 +2,20 @@
 //! a video, and the keypoints at the dataset rate; `pose2d` hands these on. What pictures alone tell is NaN, not known.
 
 use super::taken::{TakenKeypoints, take_in};
-use crate::extract::audio_file::extract_wav;
+use crate::sound::extract_wav;
 use anyhow::{Context, Result, anyhow, bail};
 use ndarray::{Array3, s};
 use orator_base::stage::artifacts::{Artifact, StageName, dir};
 use orator_base::stage::progress::Progress;
-use orator_base::stage::{Input, Report, Stage, Unit};
+use orator_base::stage::{Input, Report, Stage, StageWrapper, Unit};
 use orator_base::types::sound::SAMPLE_RATE;
 use orator_dataset::config::videos::Videos;
-use orator_dataset::config::{ExtractConfig, KeypointSource};
+use orator_dataset::config::{ExtractConfig, KeypointSource, Settings};
 use orator_formats::media_json::MediaInfo;
 use orator_formats::timeline_npz::Timeline;
 use orator_formats::{keypoints, keypoints_npz};
 use serde_json::json;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -180,5 +180,43 @@ impl Stage for KeypointPose2dStage {
             "several_people": several,
         });
         Ok(Report { line, facts: facts.as_object().cloned().unwrap_or_default() })
+    }
+}
+
+/// A stage that works on videos in one way and on keypoints of other programs in another, and the units that are keypoints.
+pub struct StageBySource {
+    of_videos: Box<dyn Stage>,
+    of_keypoints: Box<dyn Stage>,
+    keypoints: BTreeSet<(String, String)>,
+}
+
+impl StageBySource {
+    /// The stage `extract`.
+    pub fn extract(of_videos: Box<dyn Stage>, settings: &Settings, all: &[Videos]) -> Box<dyn Stage> {
+        let of_keypoints = KeypointExtractStage::new(&settings.extract, all);
+        Self::both(of_videos, Box::new(of_keypoints), all)
+    }
+
+    /// The stage `pose2d`.
+    pub fn pose2d(of_videos: Box<dyn Stage>, settings: &Settings, all: &[Videos]) -> Box<dyn Stage> {
+        Self::both(of_videos, Box::new(KeypointPose2dStage::new(&settings.work.dir)), all)
+    }
+
+    /// The way of videos alone where there are no keypoints.
+    fn both(of_videos: Box<dyn Stage>, of_keypoints: Box<dyn Stage>, all: &[Videos]) -> Box<dyn Stage> {
+        let names = |videos: &Videos| {
+            videos.keypoints.keys().map(|video| (videos.speaker.clone(), video.clone())).collect::<Vec<_>>()
+        };
+        let keypoints: BTreeSet<(String, String)> = all.iter().flat_map(names).collect();
+        if keypoints.is_empty() { of_videos } else { Box::new(Self { of_videos, of_keypoints, keypoints }) }
+    }
+}
+
+impl StageWrapper for StageBySource {
+    /// Version and cost are those of the way of videos; that of keypoints has its own version in the settings.
+    fn inner(&self, unit: Option<&Unit>) -> &dyn Stage {
+        let is_keypoints =
+            unit.is_some_and(|unit| self.keypoints.contains(&(unit.speaker.clone(), unit.video.clone())));
+        if is_keypoints { &*self.of_keypoints } else { &*self.of_videos }
     }
 }

@@ -45,7 +45,7 @@ pub fn take_in(
         let below = place as usize;
         let is_one = followed.identity.get(below) == followed.identity.get(below + 1);
         let place = if is_one || below + 1 >= people.len() { place } else { nearest as f64 };
-        gathered.push(&pose(person_at(&people, place), &followed, nearest), fps.secs(t));
+        gathered.push(pose(person_at(&people, place), &followed, nearest), fps.secs(t));
     }
     let (keypoints, extras) = gathered.finish(fps, image_size)?;
     let mut notes = found.notes;

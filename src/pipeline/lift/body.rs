@@ -1,7 +1,7 @@
 //! Arms in 3D: what is seen of the upper body, through the body lifter, to joints of about the reference size.
 
 use super::gaps::long_gaps;
-use super::interval_view::IntervalView;
+use super::lifter::IntervalView;
 use super::observed::ObservedBody;
 use anyhow::Result;
 use ndarray::{Array2, s};

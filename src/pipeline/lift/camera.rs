@@ -4,12 +4,11 @@
 //! was 2.4 and pitch 7.8 degrees off (median, `tests/it/lift/lift_camera.rs`); torsos that leaned 15.2 degrees as seen
 //! leaned 1.8 after levelling. Guessed hips tell no more than no estimate at all.
 
-use super::interval_view::IntervalView;
+use super::lifter::IntervalView;
 use ndarray::{ArrayViewMut3, Axis};
 use orator_base::math::order::lower_median;
 use orator_base::math::rotation::Rotation;
-use orator_base::math::vec3;
-use orator_base::math::vec3::Vec3;
+use orator_base::math::vec3::{self, Vec3};
 use orator_base::types::interval::Interval;
 use orator_base::types::skeleton::{L_SHOULDER, R_SHOULDER};
 use serde::Serialize;

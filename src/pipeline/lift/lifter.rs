@@ -2,17 +2,15 @@
 
 use super::body::{SIZE_FRAMES, STRAY_FRAMES, TRAINED_FPS};
 use super::camera::CameraTilt;
-use super::interval_view::IntervalView;
 use super::{body, gaps, hands, lengths, rest, weights};
 use anyhow::{Result, ensure};
-use ndarray::{Array2, Array3, s};
+use ndarray::{Array2, Array3, ArrayViewMut2, ArrayViewMut3, s};
 use orator_base::math::gaussian;
 use orator_base::motion::bones;
 use orator_base::types::interval::Interval;
-use orator_base::types::pose2d::{Keypoints, N_HAND};
+use orator_base::types::pose2d::{Keypoints, N_HAND, SEEN_SCORE, coco};
 use orator_base::types::pose3d::Motion;
-use orator_base::types::skeleton;
-use orator_base::types::skeleton::{L_HAND, N_BONES, N_JOINTS, R_HAND, Side};
+use orator_base::types::skeleton::{self, L_HAND, N_BONES, N_JOINTS, R_HAND, Side};
 use orator_dataset::config;
 use orator_nn::lifter::body::BodyLifter;
 use orator_nn::lifter::hand::HandLifter;
@@ -54,6 +52,13 @@ pub struct Lifted {
     pub cameras: Vec<CameraTilt>,
     /// Frames that have arms.
     pub n_frames: usize,
+}
+
+/// The frames of one interval of a `Lifted`.
+pub struct IntervalView<'a> {
+    pub joints: ArrayViewMut3<'a, f32>,
+    pub extra: ArrayViewMut3<'a, f32>,
+    pub mask: ArrayViewMut2<'a, bool>,
 }
 
 impl Lifter {
@@ -194,11 +199,28 @@ impl Lifted {
     }
 }
 
+/// Why joints are missing (NaN), in a sentence; nothing when all are there.
+pub fn notes(keypoints: &Keypoints, lifted: &Lifted) -> Option<String> {
+    let n_frames = keypoints.n_frames();
+    let unseen = |j: usize| {
+        let scores = keypoints.body.slice(s![.., j, 2]);
+        scores.iter().filter(|score| score.is_nan() || **score < SEEN_SCORE).count()
+    };
+    (lifted.n_frames < n_frames).then(|| {
+        format!(
+            "no body in {} of {n_frames} frames (NaN): it is lifted where both shoulders are seen within {MAX_GAP_SECS} s; \
+             the right shoulder is not seen in {} frames, the left in {}",
+            n_frames - lifted.n_frames,
+            unseen(coco::R_SHOULDER),
+            unseen(coco::L_SHOULDER)
+        )
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use orator_base::types::pose2d::coco;
-    use orator_base::types::time::FrameRate;
+    use crate::test_keypoints::bodies;
 
     /// A body that sways; from frame `change` on it moves otherwise and is larger.
     fn keypoints(n_frames: usize, change: usize) -> Keypoints {
@@ -215,19 +237,18 @@ mod tests {
             let (size, pace) = if t < change { (1.0, 0.3) } else { (1.6, 0.9) };
             [320.0 + size * (x - 320.0) + 9.0 * (pace * t as f32).sin(), size * y + 5.0 * (pace * t as f32).cos(), 0.9]
         };
-        let mut body = Array3::zeros((n_frames, 17, 3));
-        for t in 0..n_frames {
-            for (joint, x, y) in places {
-                body.slice_mut(s![t, joint, ..]).assign(&ndarray::arr1(&at(t, x, y)));
-            }
-        }
         let hand = |x: f32| {
             Array3::from_shape_fn((n_frames, N_HAND, 3), |(t, point, k)| {
                 at(t, x + (point % 4) as f32 * 7.0, 340.0 + point as f32 * 4.0)[k]
             })
         };
-        let fps = FrameRate::new(15, 1);
-        Keypoints { fps, image_size: [640, 480], body, left_hand: hand(360.0), right_hand: hand(280.0) }
+        let bodies = bodies(n_frames, [640, 480], |t| {
+            places.map(|(joint, x, y)| {
+                let [x, y, _] = at(t, x, y);
+                (joint, x, y)
+            })
+        });
+        Keypoints { left_hand: hand(360.0), right_hand: hand(280.0), ..bodies }
     }
 
     #[test]

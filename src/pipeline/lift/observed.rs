@@ -152,15 +152,14 @@ fn largest_bone(points: &Array3<f32>, t: usize) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::test_keypoints::bodies;
     use orator_base::motion::upper_body::R_ELBOW;
-    use orator_base::types::time::FrameRate;
 
     /// A speaker whose right wrist swings 120 px wide at `hertz`, 15 frames a second.
     fn beating(n_frames: usize, hertz: f32) -> Keypoints {
-        let mut body = Array3::zeros((n_frames, 17, 3));
-        for t in 0..n_frames {
+        bodies(n_frames, [1280, 720], |t| {
             let swing = 60.0 * (std::f32::consts::TAU * hertz * t as f32 / 15.0).sin();
-            let points = [
+            [
                 (coco::NOSE, 640.0, 180.0),
                 (coco::R_SHOULDER, 560.0, 260.0),
                 (coco::R_ELBOW, 540.0, 380.0),
@@ -170,14 +169,8 @@ mod tests {
                 (coco::L_WRIST, 700.0, 440.0),
                 (coco::L_EYE, 660.0, 160.0),
                 (coco::R_EYE, 620.0, 160.0),
-            ];
-            for (j, x, y) in points {
-                body.slice_mut(s![t, j, ..]).assign(&ndarray::arr1(&[x, y, 0.9]));
-            }
-        }
-        let hand = Array3::zeros((n_frames, 21, 3));
-        let fps = FrameRate::new(15, 1);
-        Keypoints { fps, image_size: [1280, 720], body, left_hand: hand.clone(), right_hand: hand }
+            ]
+        })
     }
 
     fn sight(keypoints: &Keypoints) -> ObservedBody {

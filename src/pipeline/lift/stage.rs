@@ -2,10 +2,9 @@
 //! `bones.json` and `camera.json` (roll and pitch of each interval), what `outliers` looked at
 //! (`bone_change.npz`), and the final `intervals.json` and `ledger.json`.
 
-use super::outliers;
-use super::outliers::BoneChange;
+use super::outliers::{self, BoneChange};
 use super::refuse::{exclude_frames, max_gap_frames};
-use super::{Lifted, Lifter};
+use super::{Lifted, Lifter, weights};
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array1, s};
 use orator_base::stage::artifacts::{Artifact, StageName};
@@ -26,6 +25,8 @@ pub struct LiftStage {
     settings: config::LiftConfig,
     rules: config::SegmentConfig,
     work: PathBuf,
+    /// Hashes of the built-in weights of body and hands; `file` for those of a file, which is an input.
+    weights: [String; 2],
 }
 
 impl LiftStage {
@@ -33,7 +34,12 @@ impl LiftStage {
     /// Errors: weights that cannot be loaded.
     pub fn new(settings: &config::LiftConfig, rules: &config::SegmentConfig, work: &Path) -> Result<Self> {
         let lifter = Lifter::new(settings)?;
-        Ok(Self { lifter, settings: settings.clone(), rules: rules.clone(), work: work.to_owned() })
+        let hash = |file: &Path, builtin: &[u8]| {
+            let is_builtin = file.as_os_str().is_empty();
+            if is_builtin { blake3::hash(builtin).to_hex().to_string() } else { "file".to_owned() }
+        };
+        let weights = [hash(&settings.body_weights, weights::BODY), hash(&settings.hand_weights, weights::HANDS)];
+        Ok(Self { lifter, settings: settings.clone(), rules: rules.clone(), work: work.to_owned(), weights })
     }
 
     fn file(&self, file: Artifact, unit: &Unit) -> PathBuf {
@@ -51,15 +57,10 @@ impl Stage for LiftStage {
     }
 
     fn settings(&self, _unit: &Unit) -> serde_json::Value {
-        // the weights of a file are an input; of the built-in ones the hash stands here
-        let hash = |file: &Path, builtin: &[u8]| match file.as_os_str().is_empty() {
-            true => json!(blake3::hash(builtin).to_hex().as_str()),
-            false => json!("file"),
-        };
         json!({
             "lift": {
-                "body_weights": hash(&self.settings.body_weights, super::weights::BODY),
-                "hand_weights": hash(&self.settings.hand_weights, super::weights::HANDS),
+                "body_weights": self.weights[0],
+                "hand_weights": self.weights[1],
                 "smooth_arms": self.settings.smooth_arms,
                 "smooth_hands": self.settings.smooth_hands,
                 "level": self.settings.level,
@@ -174,20 +175,18 @@ fn unsee(keypoints: &mut Keypoints, repeated: &[bool]) {
 mod tests {
     use super::*;
     use crate::lift::Lifter;
-    use ndarray::Array3;
+    use crate::test_keypoints::bodies;
     use orator_base::types::pose2d::coco::{L_ELBOW, L_SHOULDER, L_WRIST, NOSE, R_ELBOW, R_SHOULDER, R_WRIST};
     use orator_base::types::skeleton;
-    use orator_base::types::time::FrameRate;
 
     /// An arm that rises steadily, filmed at 10 frames a second and shown at 15: every third frame is the one before.
     #[test]
     fn repeated_frames_are_masked_and_do_not_stutter() {
         let n_frames = 45;
         let repeated: Vec<bool> = (0..n_frames).map(|t| t % 3 == 1).collect();
-        let mut body = Array3::zeros((n_frames, 17, 3));
-        for (t, is_repeated) in repeated.iter().enumerate() {
-            let filmed = (t - usize::from(*is_repeated)) as f32;
-            let points = [
+        let mut keypoints = bodies(n_frames, [640, 480], |t| {
+            let filmed = (t - usize::from(repeated[t])) as f32;
+            [
                 (NOSE, 320.0, 130.0),
                 (L_SHOULDER, 390.0, 200.0),
                 (R_SHOULDER, 250.0, 200.0),
@@ -195,14 +194,8 @@ mod tests {
                 (R_ELBOW, 230.0, 310.0),
                 (L_WRIST, 400.0, 390.0 - 4.0 * filmed),
                 (R_WRIST, 240.0, 390.0),
-            ];
-            for (point, x, y) in points {
-                body.slice_mut(s![t, point, ..]).assign(&ndarray::arr1(&[x, y, 1.0]));
-            }
-        }
-        let none = Array3::zeros((n_frames, 21, 3));
-        let (fps, image_size) = (FrameRate::new(15, 1), [640, 480]);
-        let mut keypoints = Keypoints { fps, image_size, body, left_hand: none.clone(), right_hand: none };
+            ]
+        });
         unsee(&mut keypoints, &repeated);
         let motion = Lifter::new(&config::LiftConfig::default()).unwrap().lift(&keypoints).unwrap();
         let wrist = skeleton::L_WRIST;

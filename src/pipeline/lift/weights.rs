@@ -3,8 +3,7 @@
 use anyhow::{Context, Result, ensure};
 use orator_formats::checkpoint::Contents;
 use orator_nn::lifter::body::BodyLifter;
-use orator_nn::lifter::hand;
-use orator_nn::lifter::hand::HandLifter;
+use orator_nn::lifter::hand::{self, HandLifter};
 use orator_nn::lifter::temporal;
 use orator_nn::params::Params;
 use serde::de::DeserializeOwned;
@@ -40,7 +39,7 @@ pub fn body(path: &Path) -> Result<BodyLifter> {
 pub fn hands(path: &Path) -> Result<HandLifter> {
     load(path, HANDS, "hand-lifter", "hands", |contents, params| {
         let config: hand::Config = config(contents)?;
-        let own = hand::Config { hidden: config.hidden.clamp(1, MOST_WIDTH), ..Default::default() };
+        let own = hand::Config { hidden: config.hidden.clamp(1, MOST_WIDTH), ..hand::Config::default() };
         ensure!(config == own, "its network is {config:?}, expected {own:?}");
         contents.expect_numbers(config.hidden * config.hidden)?;
         Ok(HandLifter::new(params, hand::NAME, &config)?)

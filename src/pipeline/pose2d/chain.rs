@@ -2,14 +2,13 @@
 
 use super::body::{BodyModel, DetectedBody};
 use super::decode::ScoredPoint;
-use super::face::FaceTracker;
+use super::detector::{Detector, PalmDetector};
+use super::face::FaceTrack;
 use super::face::landmarks::FacePoint;
 use super::face::model::FaceModel;
 use super::hand::{DetectedHand, HandModel};
 use super::hands::{self, HandTracker, SeenHands};
 use super::model_input::ModelInput;
-use super::palm::PalmDetector;
-use super::person::Detector;
 use super::speaker::{SeenPerson, SpeakerTracker};
 use super::talker::TalkerPath;
 use anyhow::{Context, Result, ensure};
@@ -24,7 +23,8 @@ pub struct Chain {
     speaker: SpeakerTracker,
     body: BodyModel,
     hands: Option<HandTracker>,
-    face: Option<FaceTracker>,
+    face: Option<FaceModel>,
+    face_track: FaceTrack,
     body_seen: bool,
     /// Frames since the shot began.
     n_frames: usize,
@@ -36,20 +36,16 @@ impl Chain {
     /// # Errors
     /// An id that is not in the manifest or has another role; a model that cannot be opened (`onnx::OpenError`).
     pub fn new(runtime: &Runtime, store: &ModelStore, settings: &config::Pose2dConfig) -> Result<Self> {
-        let models_dir = store.dir();
-        let entry =
-            |key: &str, id: &str, role: ModelRole| store.choose(id, role).with_context(|| format!("pose2d.{key}"));
-        let named = |id: &str| !id.is_empty();
-        let body = BodyModel::open(runtime, entry("body", &settings.body, ModelRole::Body)?, models_dir)?;
-        let person = named(&settings.person)
-            .then(|| Detector::open(runtime, entry("person", &settings.person, ModelRole::Person)?, models_dir));
-        let hand = named(&settings.hand)
-            .then(|| HandModel::open(runtime, entry("hand", &settings.hand, ModelRole::Hand)?, models_dir));
-        let palm = (named(&settings.palm) && named(&settings.hand))
-            .then(|| PalmDetector::open(runtime, entry("palm", &settings.palm, ModelRole::Palm)?, models_dir));
-        let palm = palm.transpose()?;
-        let face = named(&settings.face)
-            .then(|| FaceModel::open(runtime, entry("face", &settings.face, ModelRole::Face)?, models_dir));
+        let dir = store.dir();
+        let named = |key: &str, id: &str, role| store.choose(id, role).with_context(|| format!("pose2d.{key}"));
+        let entry = |key: &str, id: &str, role| (!id.is_empty()).then(|| named(key, id, role)).transpose();
+        let body = BodyModel::open(runtime, named("body", &settings.body, ModelRole::Body)?, dir)?;
+        let person = entry("person", &settings.person, ModelRole::Person)?;
+        let hand = entry("hand", &settings.hand, ModelRole::Hand)?;
+        let palm = entry("palm", &settings.palm, ModelRole::Palm)?.filter(|_| hand.is_some());
+        let face = entry("face", &settings.face, ModelRole::Face)?;
+        let hand = hand.map(|hand| HandModel::open(runtime, hand, dir)).transpose()?;
+        let palm = palm.map(|palm| PalmDetector::open(runtime, palm, dir)).transpose()?;
         ensure!(
             hand.is_some() || body.gives_hands(),
             "pose2d.hand is empty, but the model {:?} gives no hands: name a hand model",
@@ -57,10 +53,11 @@ impl Chain {
         );
         Ok(Self {
             settings: settings.clone(),
-            speaker: SpeakerTracker::new(person.transpose()?),
+            speaker: SpeakerTracker::new(person.map(|person| Detector::open(runtime, person, dir)).transpose()?),
             body,
-            hands: hand.transpose()?.map(|hand| HandTracker::new(hand, palm)),
-            face: face.transpose()?.map(FaceTracker::new),
+            hands: hand.map(|hand| HandTracker::new(hand, palm)),
+            face: face.map(|face| FaceModel::open(runtime, face, dir)).transpose()?,
+            face_track: FaceTrack::default(),
             body_seen: false,
             n_frames: 0,
         })
@@ -72,13 +69,8 @@ impl Chain {
         self.speaker.set_reference(image, &mut self.body, self.settings.joint_score)
     }
 
-    /// A new shot begins: nothing of the one before is followed.
-    pub fn begin_shot(&mut self) {
-        self.begin_shot_of(None);
-    }
-
-    /// A new shot begins, in which the one who goes this way is followed, if it is known.
-    pub fn begin_shot_of(&mut self, talker: Option<TalkerPath>) {
+    /// A new shot begins, in which the one who goes this way is followed, if it is known; nothing of the shot before is.
+    pub fn begin_shot(&mut self, talker: Option<TalkerPath>) {
         self.speaker.begin_anew(talker);
         self.body_seen = false;
         self.forget_details();
@@ -87,7 +79,7 @@ impl Chain {
 
     /// Points of the face that was seen in the last frame.
     pub fn face_points(&self) -> Option<&[FacePoint]> {
-        self.face.as_ref()?.points()
+        self.face_track.points()
     }
 
     /// The number of people taken so far, the first of them as first recognised, and the one followed now.
@@ -113,14 +105,14 @@ impl Chain {
             Some(&self.body.feed),
             hands.map(|hands| &hands.model.feed),
             hands.and_then(|hands| hands.palm.as_ref()).map(|palm| &palm.feed),
-            self.face.as_ref().map(|face| &face.model.feed),
+            self.face.as_ref().map(|face| &face.feed),
         ]
     }
 
     /// Hands and face are looked for anew.
     fn forget_details(&mut self) {
         self.hands.iter_mut().for_each(HandTracker::begin_anew);
-        self.face.iter_mut().for_each(FaceTracker::begin_anew);
+        self.face_track = FaceTrack::default();
     }
 
     /// What is seen of the speaker in the next frame of the shot.
@@ -158,11 +150,11 @@ impl Chain {
             }
             (None, None) => [None, None],
         };
-        // Sight comes last: what is followed from frame to frame is what was found.
+        // Visibility is judged last: tracking continues from all that was found.
         let SeenHands { hands: [left, right], others } = SeenHands::judge(hands, &mut body.points, image);
         pose.other_hand = others;
         if let Some(face) = &mut self.face {
-            pose.face = face.find(image, &body.points, self.settings.joint_score)?;
+            pose.face = self.face_track.find(face, image, &body.points, self.settings.joint_score)?;
         }
         pose.body = body.points.map(keypoint);
         pose.left_hand = left.map_or(pose.left_hand, |hand| hand.points.map(keypoint));

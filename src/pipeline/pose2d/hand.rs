@@ -1,8 +1,8 @@
 //! The hand model: 21 points of the hand in a rotated square, how sure it is that there is one, and which hand it is
 //! where the model says so.
 
-use super::body::{PointReader, placed};
-use super::decode::{ScoredPoint, regression};
+use super::body::{self, placed};
+use super::decode::{ScoredPoint, points};
 use super::model_input::ModelInput;
 use super::region;
 use anyhow::Result;
@@ -41,15 +41,14 @@ impl DetectedHand {
 /// The hand model with its way of reading.
 pub struct HandModel {
     pub feed: ModelInput,
-    reader: PointReader,
     decode: Decode,
     map: Vec<usize>,
 }
 
 impl HandModel {
     pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self> {
-        let (reader, map) = (PointReader::new(&entry.decode), entry.points.hand.clone());
-        Ok(Self { feed: ModelInput::open(runtime, entry, dir)?, reader, decode: entry.decode.clone(), map })
+        let (decode, map) = (entry.decode.clone(), entry.points.hand.clone());
+        Ok(Self { feed: ModelInput::open(runtime, entry, dir)?, decode, map })
     }
 
     /// The hand in the square; None where the square is no place in a picture or the model's numbers are none.
@@ -59,13 +58,14 @@ impl HandModel {
         let outputs = self.feed.part(image, &src_from_dst)?;
         let single = |name: &str| -> Result<f32> { Ok(outputs.floats(name)?.1.first().copied().unwrap_or(0.0)) };
         let hand = if let Decode::Regression { landmarks, score, logit, right } = &self.decode {
-            let score = regression::score(single(score)?, *logit);
+            let score = points::regression_score(single(score)?, *logit);
             let n_points = self.map.iter().max().map_or(0, |largest| largest + 1);
-            let points = regression::decode(outputs.floats(landmarks)?.1, score, n_points.max(21))?;
+            let points = points::regression(outputs.floats(landmarks)?.1, score, n_points.max(21))?;
             let right = right.as_ref().map(|name| single(name)).transpose()?.map(f64::from);
             DetectedHand { points: placed(&points, &self.map, &src_from_dst), score: f64::from(score), right }
         } else {
-            DetectedHand::from_points(placed(&self.reader.points(&outputs, size)?, &self.map, &src_from_dst))
+            let points = body::points(&self.decode, &outputs, size)?;
+            DetectedHand::from_points(placed(&points, &self.map, &src_from_dst))
         };
         Ok((hand.score > 0.0 && hand.score.is_finite()).then_some(hand))
     }

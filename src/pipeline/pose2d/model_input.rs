@@ -4,8 +4,7 @@
 use anyhow::Result;
 use orator_base::types::image::Image;
 use orator_media::opencv::tensor::Normaliser;
-use orator_media::opencv::warp;
-use orator_media::opencv::warp::SrcFromDst;
+use orator_media::opencv::warp::{self, SrcFromDst};
 use orator_onnx::{Anchor, Channels, Model, ModelEntry, Outputs, PictureFit, Runtime, TensorAxes};
 use std::path::Path;
 

@@ -1,8 +1,8 @@
 //! Which models look at a frame: the ids of the configuration, with `auto` answered by the folder of models.
 
 use anyhow::{Context, Result, ensure};
-use orator_dataset::config::{FollowRule, Pose2dConfig};
-use orator_onnx::{AUTO, ModelRole, ModelStore, Wanted};
+use orator_dataset::config::{FollowRule, Pose2dConfig, Settings};
+use orator_onnx::{AUTO, ModelEntry, ModelRole, ModelStore, Wanted};
 
 /// The keys of `[pose2d]` that name a model, with the role of each and what the configuration says.
 pub fn keys(config: &Pose2dConfig) -> [(&'static str, ModelRole, &String); 5] {
@@ -15,7 +15,7 @@ pub fn keys(config: &Pose2dConfig) -> [(&'static str, ModelRole, &String); 5] {
     ]
 }
 
-/// The configuration with a model's id in the place of every `auto`; a face model that is not there is none.
+/// The configuration with a model's id in place of every `auto`; a face model that is not there is none.
 ///
 /// # Errors
 /// An id that the manifest does not have, or of another role.
@@ -29,6 +29,30 @@ pub fn choose(config: &Pose2dConfig, store: &ModelStore) -> Result<Pose2dConfig>
     let [person, body, hand, palm, face] = keys(config).map(id);
     let face = if lacks_face(config, store) { String::new() } else { face? };
     Ok(Pose2dConfig { person: person?, body: body?, hand: hand?, palm: palm?, face, ..config.clone() })
+}
+
+/// The models that a configuration chooses.
+pub struct ChosenModels {
+    /// As `choose` returns them.
+    pub settings: Pose2dConfig,
+    pub store: ModelStore,
+}
+
+impl ChosenModels {
+    /// Reads the manifest and looks which models are there; opens none.
+    ///
+    /// # Errors
+    /// An invalid manifest; those of `choose`.
+    pub fn find(settings: &Settings) -> Result<Self> {
+        let store = ModelStore::open(&settings.models.dir)?;
+        Ok(Self { settings: choose(&settings.pose2d, &store)?, store })
+    }
+
+    /// The models with the key of `[pose2d]` that names each.
+    pub fn used(&self) -> Result<Vec<(&'static str, &ModelEntry)>> {
+        let named = keys(&self.settings).into_iter().filter(|(_, _, id)| !id.is_empty());
+        named.map(|(key, role, id)| Ok((key, self.store.choose(id, role)?))).collect()
+    }
 }
 
 /// What to say once of a run without the face model that might have it.

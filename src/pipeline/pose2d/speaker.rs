@@ -4,8 +4,8 @@
 use super::appearance::BodyColours;
 use super::body::BodyModel;
 use super::decode::{ScoredPoint, boxes};
+use super::detector::Detector;
 use super::liveness::LivenessTracks;
-use super::person::Detector;
 use super::talker::TalkerPath;
 use super::tracker::{Candidate, PersonTrack, TrackerStep};
 use anyhow::{Context, Result};
@@ -32,6 +32,12 @@ const SAME_COLOURS: f32 = 5.0;
 const SAME_BOX: f32 = 0.5;
 /// Weight of a frame's colours in the speaker's.
 const FOLLOW_COLOURS: f32 = 0.05;
+
+/// Whether people are looked for in frame `idx` of a shot: every so many frames, more often in a crowd, and early on.
+pub fn is_look(idx: usize, every: usize, is_crowd: bool) -> bool {
+    let every = if is_crowd { (every / CROWD_LOOKS).max(1) } else { every };
+    idx.is_multiple_of(every) || EARLY.contains(&idx)
+}
 
 /// A person, and where he or she is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -115,9 +121,8 @@ impl SpeakerTracker {
     ) -> Result<()> {
         self.idx = idx;
         let every = settings.person_every.max(1);
-        let crowd = self.track.n_people > 1 && idx.is_multiple_of((every / CROWD_LOOKS).max(1));
         let regular = idx.is_multiple_of(every);
-        if !regular && !crowd && self.track.place.is_some() && !EARLY.contains(&idx) {
+        if !regular && !is_look(idx, every, self.track.n_people > 1) && self.track.place.is_some() {
             return Ok(());
         }
         let Some(mut found) = self.find(image)? else { return Ok(()) };

@@ -1,7 +1,7 @@
 //! The stage: the spans of a video, each looked at by itself, and joined into `keypoints.npz` and the portrait.
 
 use super::chain::Chain;
-use super::models;
+use super::models::{ChosenModels, check_follow};
 use super::span::video_frames::VideoFrames;
 use super::span::{PoseSpan, pass};
 use super::talker::TalkerSearch;
@@ -10,14 +10,13 @@ use orator_base::stage::artifacts::{Artifact, StageName};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::{Input, Report, Stage, Unit};
 use orator_base::types::time::FrameRate;
-use orator_dataset::config;
-use orator_dataset::config::{FollowRule, Settings};
+use orator_dataset::config::{self, FollowRule, Settings};
 use orator_formats::media_json::MediaInfo;
 use orator_formats::timeline_npz::Timeline;
 use orator_media::ffmpeg;
 use orator_media::ffmpeg::frames::FrameReader;
 use orator_media::opencv;
-use orator_onnx::{ModelEntry, ModelError, ModelStore, Runtime};
+use orator_onnx::{ModelEntry, ModelError, Runtime};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -25,41 +24,31 @@ use std::path::{Path, PathBuf};
 
 /// Stage `pose2d`.
 pub struct Pose2dStage {
-    settings: config::Pose2dConfig,
+    chosen: ChosenModels,
     models: config::ModelsConfig,
     fps: FrameRate,
     work: PathBuf,
-    store: ModelStore,
     /// The picture that shows a speaker, by the speaker's name.
     references: BTreeMap<String, PathBuf>,
+    /// Version of ONNX Runtime, or `missing`.
+    onnxruntime: String,
 }
 
 impl Pose2dStage {
-    /// Reads the manifest and looks which models are there; opens none.
+    /// Loads ONNX Runtime, if it is there, and opens no model.
     ///
     /// # Errors
-    /// A manifest that is not sound; a model that is not in it; `follow = "speaking"` without the models that find who
-    /// speaks.
+    /// Those of `ChosenModels::find`; `follow = "speaking"` without the models that find who speaks.
     pub fn new(settings: &Settings) -> Result<Self> {
         let named = settings.speaker.iter().filter(|speaker| !speaker.reference.as_os_str().is_empty());
-        let references = named.map(|speaker| (speaker.name.clone(), speaker.reference.to_path_buf()));
-        let store = ModelStore::open(&settings.models.dir)?;
-        let chosen = models::choose(&settings.pose2d, &store)?;
-        models::check_follow(&chosen)?;
-        Ok(Self {
-            settings: chosen,
-            models: settings.models.clone(),
-            fps: settings.extract.rate(),
-            work: settings.work.dir.to_path_buf(),
-            store,
-            references: references.collect(),
-        })
-    }
-
-    /// The models it asks, with the key of `[pose2d]` that names each.
-    pub fn used(&self) -> Result<Vec<(&'static str, &ModelEntry)>> {
-        let named = models::keys(&self.settings).into_iter().filter(|(_, _, id)| !id.is_empty());
-        named.map(|(key, role, id)| Ok((key, self.store.choose(id, role)?))).collect()
+        let references = named.map(|speaker| (speaker.name.clone(), speaker.reference.to_path_buf())).collect();
+        let models = settings.models.clone();
+        let chosen = ChosenModels::find(settings)?;
+        check_follow(&chosen.settings)?;
+        let runtime = Runtime::load(&models.onnxruntime, &models.dir);
+        let onnxruntime = runtime.map_or_else(|_| "missing".to_owned(), |runtime| runtime.version());
+        let (fps, work) = (settings.extract.rate(), settings.work.dir.to_path_buf());
+        Ok(Self { chosen, models, fps, work, references, onnxruntime })
     }
 
     fn runtime(&self) -> Result<Runtime> {
@@ -73,7 +62,7 @@ impl Stage for Pose2dStage {
     }
 
     fn version(&self) -> u32 {
-        8
+        10
     }
 
     fn cost(&self) -> u32 {
@@ -87,9 +76,14 @@ impl Stage for Pose2dStage {
                 "decode": entry.decode, "points": entry.points, "sha256": entry.sha256,
             })
         };
-        let models: serde_json::Map<String, Value> =
-            self.used().unwrap_or_default().into_iter().map(|(key, entry)| (key.to_owned(), read(entry))).collect();
-        let mut pose2d = json!(self.settings);
+        let models: serde_json::Map<String, Value> = self
+            .chosen
+            .used()
+            .unwrap_or_default()
+            .into_iter()
+            .map(|(key, entry)| (key.to_owned(), read(entry)))
+            .collect();
+        let mut pose2d = json!(self.chosen.settings);
         // The largest was followed before there was a choice: what was made then is what would be made now.
         if let Some(keys) = pose2d.as_object_mut().filter(|_| !self.follows_talker()) {
             keys.remove("follow");
@@ -98,7 +92,7 @@ impl Stage for Pose2dStage {
             "pose2d": pose2d,
             "fps": [self.fps.num, self.fps.den],
             "models": models,
-            "onnxruntime": self.runtime().map_or_else(|_| "missing".to_owned(), |runtime| runtime.version()),
+            "onnxruntime": self.onnxruntime,
             "opencv": opencv::version(),
             "ffmpeg": ffmpeg::version(),
         })
@@ -118,7 +112,7 @@ impl Stage for Pose2dStage {
         if self.follows_talker() && sound.exists() {
             inputs.push(input("sound".into(), sound));
         }
-        for (key, entry) in self.used()? {
+        for (key, entry) in self.chosen.used()? {
             let path = self.models.dir.join(&entry.file);
             if !path.exists() {
                 return Err(ModelError::Missing { id: entry.id.clone(), path }.into());
@@ -160,7 +154,7 @@ impl Stage for Pose2dStage {
 
 impl Pose2dStage {
     fn follows_talker(&self) -> bool {
-        self.settings.follow == FollowRule::Speaking
+        self.chosen.settings.follow == FollowRule::Speaking
     }
 
     fn timeline(&self, unit: &Unit) -> Result<Timeline> {
@@ -173,7 +167,7 @@ impl Pose2dStage {
         let task = progress.begin(&unit.to_string(), n_passes * span.len() as u64);
         let video = VideoFrames { unit, timeline, media: &media, fps: self.fps, span };
         let talkers = self.follows_talker().then(|| {
-            let search = TalkerSearch::new(&self.runtime()?, &self.store, &self.settings)?;
+            let search = TalkerSearch::new(&self.runtime()?, &self.chosen.store, &self.chosen.settings)?;
             pass::talkers(&video, &Artifact::Sound.path(&self.work, unit), search, &*task)
         });
         pass::look(&video, self.chain(unit)?, talkers.transpose()?.as_deref(), progress, &*task)
@@ -181,7 +175,7 @@ impl Pose2dStage {
 
     /// The models, with the picture that shows the speaker.
     fn chain(&self, unit: &Unit) -> Result<Chain> {
-        let mut chain = Chain::new(&self.runtime()?, &self.store, &self.settings)?;
+        let mut chain = Chain::new(&self.runtime()?, &self.chosen.store, &self.chosen.settings)?;
         if let Some(path) = self.references.get(&unit.speaker) {
             let mut reference = FrameReader::open(path, FrameRate::new(1, 1))?;
             let picture = reference.next().with_context(|| format!("{} holds no picture", path.display()))??;

@@ -19,7 +19,7 @@ const ALIVE: f32 = 6.0;
 const TIMES_ALIVE: f32 = 2.0;
 /// Distance of appearances, in 8-bit steps, at which a person's weight is half.
 const DISTANCE_OF_HALF_WEIGHT: f32 = 5.0;
-/// Weight of the one who speaks among those who do not.
+/// Weight multiplier for a candidate known to be speaking.
 const SPEAKS: f32 = 1e6;
 /// People smaller than this share of the speaker's box are not counted.
 const RELEVANT: f32 = 0.2;
@@ -235,7 +235,7 @@ mod tests {
         let mut followed = PersonTrack::default();
         followed.look(&[large, small], look(300, false));
         assert_eq!(followed.person().x, 80.0);
-        // A person who stands still is no picture yet, and one who stands stiller than noise is.
+        // A motionless person still shows sensor noise; a box without any is a printed or on-screen picture.
         followed.look(&[moving(large, 5.0), moving(small, 30.0)], look(300, true));
         assert_eq!((followed.person().x, followed.identity()), (80.0, 0));
         followed.look(&[moving(large, 1.0), moving(small, 30.0)], look(300, true));

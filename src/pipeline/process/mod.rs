@@ -1,13 +1,11 @@
 //! Stages that hand foreign files to foreign libraries, each unit in a process of its own that is restricted before it
 //! reads: `stage` stands for the stage in the run and starts the process, `unit` is what happens in it, `message` goes
-//! between them as MessagePack, `failure` carries errors over with their types; `media` is what is asked of a
-//! video before any stage.
+//! between them as MessagePack, `failure` carries errors over with their types.
 
 pub mod failure;
-pub mod media;
 pub mod message;
 pub mod stage;
 pub mod unit;
 
-pub use stage::{SeparateStage, ask_media, probe};
-pub use unit::{VERB, serve};
+pub use stage::{SubprocessStage, ask_media, probe};
+pub use unit::{VERB, answer_media, serve};

@@ -1,4 +1,4 @@
-//! A stage whose units are worked on by processes of their own. To a run it is the stage itself.
+//! A stage that works on each unit in a subprocess. To a run it is the stage itself.
 
 use super::failure::plain;
 use super::message::{MediaRequest, Message, Request, UnitRequest, receive, send};
@@ -12,6 +12,7 @@ use orator_media::sandbox::Restriction;
 use orator_onnx::find_library;
 use std::collections::BTreeMap;
 use std::io::{BufReader, Read};
+use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
 use std::path::Path;
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 
@@ -21,14 +22,14 @@ const MAX_TASKS: usize = 16;
 const MAX_COMPLAINT: usize = 2000;
 
 /// A stage of videos, with the program that works on its units.
-pub struct SeparateStage<'a> {
+pub struct SubprocessStage<'a> {
     pub stage: Box<dyn Stage>,
     pub program: &'a Path,
     pub config: &'a Config,
     pub videos: &'a [Videos],
 }
 
-impl StageWrapper for SeparateStage<'_> {
+impl StageWrapper for SubprocessStage<'_> {
     fn inner(&self, _unit: Option<&Unit>) -> &dyn Stage {
         &*self.stage
     }
@@ -42,7 +43,7 @@ impl StageWrapper for SeparateStage<'_> {
     }
 }
 
-impl SeparateStage<'_> {
+impl SubprocessStage<'_> {
     fn work(&self, unit: &Unit, part: Option<usize>, out: &Path, progress: &dyn Progress) -> Result<Report> {
         let mut process = UnitProcess::start(self.program)?;
         process.ask(&Request::Unit(Box::new(self.request(unit, part, out)?)));
@@ -83,24 +84,18 @@ impl SeparateStage<'_> {
 /// # Errors
 /// The program cannot be started, or does not answer.
 pub fn probe(program: &Path) -> Result<Restriction> {
-    let mut process = UnitProcess::start(program)?;
-    process.ask(&Request::Restrict);
-    let answer = process.child.stdout.take().map(|mut out| receive(&mut out));
-    match answer.context("no answer")?? {
+    match UnitProcess::start(program)?.answer(&Request::Restrict)? {
         Message::Restricted(restriction) => Ok(restriction),
         other => bail!("{other:?} is no answer"),
     }
 }
 
-/// What a restricted process that `program` starts finds of a video: see `media`.
+/// What a restricted process that `program` starts finds of a video: see `answer_media`.
 ///
 /// # Errors
-/// Those of `media::answer`; a process that is lost.
+/// Those of `answer_media`; a process that is lost.
 pub fn ask_media(program: &Path, request: &MediaRequest) -> Result<Option<f64>> {
-    let mut process = UnitProcess::start(program)?;
-    process.ask(&Request::Media(request.clone()));
-    let answer = process.child.stdout.take().map(|mut out| receive(&mut out));
-    match answer.context("no answer")? {
+    match UnitProcess::start(program)?.answer(&Request::Media(request.clone())) {
         Ok(Message::Secs(secs)) => Ok(secs),
         Ok(Message::Failed(failure)) => Err(failure.into_error()),
         _ => bail!("{}: the process that read it gave no answer", request.source.display()),
@@ -119,8 +114,7 @@ impl UnitProcess {
         let mut command = Command::new(program);
         command.arg(VERB).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         // Ctrl-C is for the run alone, which ends its processes.
-        #[cfg(unix)]
-        std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        command.process_group(0);
         let mut child = command.spawn().with_context(|| format!("cannot start {}", program.display()))?;
         let stdin = child.stdin.take();
         Ok(Self { child, stdin })
@@ -129,6 +123,12 @@ impl UnitProcess {
     /// Sends the request. A process that is gone already is noticed by its silence.
     fn ask(&mut self, request: &Request) {
         let _ = self.stdin.as_mut().map(|stdin| send(stdin, request));
+    }
+
+    /// The one message that the process sends in answer to a request.
+    fn answer(mut self, request: &Request) -> Result<Message> {
+        self.ask(request);
+        receive(&mut self.child.stdout.take().context("no pipe")?)
     }
 
     /// Follows the process to the stage's result and ends it, so that nothing is written after; or says how it was lost.
@@ -197,8 +197,7 @@ fn last_bytes(mut from: impl Read) -> Vec<u8> {
 
 /// How a process ended before it had a result.
 fn death(status: ExitStatus) -> String {
-    #[cfg(unix)]
-    if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
+    if let Some(signal) = status.signal() {
         let why = match signal {
             6 => " (it gave up)",
             7 | 11 => " (it reached for memory that is not its own): the file may be damaged, or made to do harm",

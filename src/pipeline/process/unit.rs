@@ -2,19 +2,20 @@
 //! with the run that started it.
 
 use super::failure::SentFailure;
-use super::media;
-use super::message::{Message, Request, UnitRequest, receive, send};
+use super::message::{MediaRequest, Message, Request, UnitRequest, receive, send};
 use crate::stages;
 use anyhow::{Context, Result};
 use orator_base::stage::progress::{Event, Progress, Task};
 use orator_base::stage::{Report, Unit, attempt, workdir};
 use orator_dataset::config::Config;
 use orator_dataset::config::videos::Videos;
+use orator_media::ffmpeg::probe::probe;
+use orator_media::ffmpeg::write::excerpt;
 use orator_media::sandbox::{FileAccess, restrict};
 use std::io::{Read, Stdout, Write};
 use std::path::PathBuf;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// The argument by which the program becomes the process of a unit. It stands in no help text.
@@ -28,7 +29,6 @@ const PACE: Duration = Duration::from_millis(50);
 /// # Errors
 /// No request, or nobody who reads the answer.
 pub fn serve() -> Result<()> {
-    #[cfg(target_os = "linux")]
     rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL))?;
     let out = Messages(Mutex::new(std::io::stdout()));
     match receive(&mut std::io::stdin().lock()).context("this is started by `orator run` alone")? {
@@ -49,7 +49,7 @@ pub fn serve() -> Result<()> {
             let writes = media.excerpt.iter().filter_map(|excerpt| excerpt.to.parent().map(Into::into)).collect();
             restrict(&FileAccess { reads: Some(vec![media.source.clone()]), writes });
             std::thread::spawn(end_with_parent);
-            let message = match attempt::guarded(|| media::answer(&media)) {
+            let message = match attempt::guarded(|| answer_media(&media)) {
                 Ok(secs) => Message::Secs(secs),
                 Err(error) => Message::Failed(SentFailure::of(&workdir::full_disk(error))),
             };
@@ -81,12 +81,23 @@ fn work(request: UnitRequest, out: &Messages) -> Result<Report> {
     }
 }
 
+/// The length of a video in seconds, where a header says it; of an excerpt, what was copied.
+///
+/// # Errors
+/// A video that cannot be read, an excerpt that cannot be copied.
+pub fn answer_media(request: &MediaRequest) -> Result<Option<f64>> {
+    match &request.excerpt {
+        None => Ok(probe(&request.source)?.duration_secs),
+        Some(wanted) => excerpt::copy(&request.source, &wanted.to, wanted.start_secs, wanted.secs).map(Some),
+    }
+}
+
 /// Standard output.
 struct Messages(Mutex<Stdout>);
 
 impl Messages {
     fn send(&self, message: &Message) -> Result<()> {
-        let mut out = self.0.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let mut out = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         send(&mut *out, message)?;
         Ok(out.flush()?)
     }

@@ -49,31 +49,19 @@ fn spread(now: Option<[f32; 4]>, around: &[Option<[f32; 4]>]) -> Option<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ndarray::{Array3, arr1, s};
-    use orator_base::types::time::FrameRate;
+    use crate::test_keypoints::bodies;
+    use ndarray::s;
 
     /// Shoulders 100 px apart; wrists `apart` px, the left one moved by `dx(t)`.
     fn seated(apart: f32, dx: impl Fn(usize) -> f32) -> Keypoints {
-        let mut body = Array3::zeros((60, 17, 3));
-        for t in 0..60 {
-            let places = [
+        bodies(60, [400, 400], |t| {
+            [
                 (coco::L_SHOULDER, 200.0, 100.0),
                 (coco::R_SHOULDER, 100.0, 100.0),
                 (coco::L_WRIST, 150.0 + apart / 2.0 + dx(t), 220.0),
                 (coco::R_WRIST, 150.0 - apart / 2.0, 220.0),
-            ];
-            for (joint, x, y) in places {
-                body.slice_mut(s![t, joint, ..]).assign(&arr1(&[x, y, 0.9]));
-            }
-        }
-        let hand = Array3::zeros((60, 21, 3));
-        Keypoints {
-            fps: FrameRate::new(15, 1),
-            image_size: [400, 400],
-            body,
-            left_hand: hand.clone(),
-            right_hand: hand,
-        }
+            ]
+        })
     }
 
     #[test]

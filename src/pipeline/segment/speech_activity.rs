@@ -1,6 +1,7 @@
 //! How much of the sound around each frame is speech: probabilities of the speech model, window by window, made into
 //! stretches of speech, and their share in the seconds around a frame. Memory: a number a window of 32 ms.
 
+use crate::sound;
 use anyhow::{Context, Result, ensure};
 use orator_base::types::time::FrameRate;
 use orator_onnx::speech::{SpeechModel, WINDOW};
@@ -31,22 +32,14 @@ pub fn shares(path: &Path, model: &mut SpeechModel, fps: FrameRate, n_frames: us
 /// # Errors
 /// Those of `shares`.
 pub fn probabilities(path: &Path, model: &mut SpeechModel) -> Result<Vec<f32>> {
-    let reading = || format!("cannot read {}", path.display());
-    let mut wav = hound::WavReader::open(path).with_context(reading)?;
+    let wav = hound::WavReader::open(path).with_context(|| format!("cannot read {}", path.display()))?;
     let rate = wav.spec().sample_rate;
     ensure!(rate == RATE, "{}: sound at {rate} Hz, expected {RATE}: run the stage extract again", path.display());
     let mut probabilities = Vec::new();
-    let mut window = Vec::with_capacity(WINDOW);
-    for sample in wav.samples::<i16>() {
-        window.push(f32::from(sample.with_context(reading)?) / 32_768.0);
-        if window.len() == WINDOW {
-            probabilities.push(model.probability(&window)?);
-            window.clear();
-        }
-    }
-    if !window.is_empty() {
-        probabilities.push(model.probability(&window)?);
-    }
+    sound::pieces(path, WINDOW, |window| {
+        probabilities.push(model.probability(window)?);
+        Ok(())
+    })?;
     Ok(probabilities)
 }
 

@@ -1,4 +1,4 @@
-//! Whether the speech model listens: what the configuration asks, and whether the model is there.
+//! Whether a speech model detects speech: what the configuration asks for, and whether the model is there.
 
 use super::speech_activity;
 use anyhow::{Context, Result};
@@ -11,13 +11,13 @@ use std::path::{Path, PathBuf};
 
 /// The speech model of a configuration, found but not opened.
 #[derive(Clone, Debug)]
-pub struct SpeechListener {
+pub struct SpeechDetector {
     entry: ModelEntry,
     models: PathBuf,
     library: PathBuf,
 }
 
-impl SpeechListener {
+impl SpeechDetector {
     /// The model where it is asked for and there; `None`: loudness alone is the rule.
     ///
     /// # Errors
@@ -53,7 +53,7 @@ impl SpeechListener {
         ))
     }
 
-    /// What told speech, for the card of a dataset.
+    /// How speech was detected, for the card of a dataset.
     ///
     /// # Errors
     /// Those of `find`.

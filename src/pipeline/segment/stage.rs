@@ -2,9 +2,8 @@
 //! `measures.npz` and `sound_offset.json`.
 
 use super::judge::judge;
-use super::measure;
-use super::measure::Measures;
-use super::speech_rule::SpeechListener;
+use super::measure::{self, Measures};
+use super::speech_rule::SpeechDetector;
 use crate::{lips, sound};
 use anyhow::{Result, ensure};
 use orator_base::stage::artifacts::{Artifact, StageName};
@@ -17,6 +16,7 @@ use orator_dataset::config;
 use orator_formats::keypoints_npz;
 use orator_formats::media_json::MediaInfo;
 use orator_formats::timeline_npz::Timeline;
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 /// Keypoints to intervals worth keeping.
@@ -24,7 +24,7 @@ pub struct SegmentStage {
     rules: config::SegmentConfig,
     work: PathBuf,
     /// The speech model; `None`: loudness alone tells speech.
-    speech: Option<SpeechListener>,
+    speech: Option<SpeechDetector>,
 }
 
 impl SegmentStage {
@@ -34,7 +34,7 @@ impl SegmentStage {
     }
 
     /// Listens for speech with this model.
-    pub fn with_speech(self, speech: Option<SpeechListener>) -> Self {
+    pub fn with_speech(self, speech: Option<SpeechDetector>) -> Self {
         Self { speech, ..self }
     }
 
@@ -53,7 +53,7 @@ impl Stage for SegmentStage {
     }
 
     fn settings(&self, _unit: &Unit) -> serde_json::Value {
-        let model = self.speech.as_ref().map(SpeechListener::used);
+        let model = self.speech.as_ref().map(SpeechDetector::used);
         serde_json::json!({ "segment": self.rules, "speech_model": model })
     }
 
@@ -158,15 +158,15 @@ fn report(intervals: &Intervals, ledger: &Ledger) -> Report {
         )
     };
     if intervals.resting_secs() >= 0.05 {
-        line += &format!("; hands at rest {:.1} s of it", intervals.resting_secs());
+        let _ = write!(line, "; hands at rest {:.1} s of it", intervals.resting_secs());
     }
     if !refused.is_empty() {
-        line += &format!("; refused: {}", longest_first(&refused));
+        let _ = write!(line, "; refused: {}", longest_first(&refused));
     }
     let length = |r: &orator_base::stage::ledger::Refused| r.end_secs - r.start_secs;
     let worst = ledger.refused.iter().max_by(|a, b| length(a).total_cmp(&length(b)));
     if let (true, Some(worst)) = (intervals.intervals.is_empty(), worst) {
-        line += &format!(" ({})", worst.message);
+        let _ = write!(line, " ({})", worst.message);
     }
     let facts = serde_json::json!({
         "duration_secs": ledger.duration_secs,

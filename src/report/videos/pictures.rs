@@ -14,7 +14,7 @@ use orator_formats::media_json::MediaInfo;
 use orator_media::ffmpeg::frames::FrameReader;
 use orator_media::ffmpeg::jpeg;
 use orator_media::opencv::draw;
-use orator_pipeline::pictures;
+use orator_pipeline::extract::picture_options;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -45,7 +45,7 @@ pub fn thumbnails(
     let media = MediaInfo::read(&Artifact::MediaInfo.path(work, unit)).ok();
     let has_pictures = media.is_none_or(|media| media.keypoints_from.is_none());
     let open = || -> Result<FrameReader> {
-        Ok(FrameReader::open_with(&unit.source, keypoints.fps, 0)?.with_options(pictures::options(work, unit)))
+        Ok(FrameReader::open_with(&unit.source, keypoints.fps, 0)?.with_options(picture_options(work, unit)))
     };
     let mut reader = has_pictures.then(open).transpose()?;
     let n_wide = |frame: &usize| if moments.iter().any(|m| m.len() > 1 && m.contains(frame)) { 2 } else { 1 };

@@ -9,7 +9,7 @@ use orator_media::ffmpeg::audio::read_mono;
 use orator_media::ffmpeg::frames::FrameReader;
 use orator_media::ffmpeg::sound_stream::SoundStream;
 use orator_media::ffmpeg::write::encode::VideoWriter;
-use orator_pipeline::extract::audio_file::extract_wav;
+use orator_pipeline::sound::extract_wav;
 use orator_test_support::skip::real_data;
 use std::path::Path;
 

@@ -46,7 +46,7 @@ fn any_picture_gives_finite_numbers() {
                 assert!(person.is_empty() || pose.person.score.is_finite());
             }
         }
-        chain.begin_shot();
+        chain.begin_shot(None);
         assert!(chain.secs_inside() > 0.0);
     }
 }

@@ -2,8 +2,7 @@
 //! one dies, or the run that started it, nothing else is lost.
 
 use orator::{Pipeline, Selection, Silent, StageName, UnreadableMedia, load_config};
-use orator_media::sandbox::restrict::restrict_thread;
-use orator_media::sandbox::{FileAccess, restrict};
+use orator_media::sandbox::{FileAccess, restrict, restrict_thread};
 use orator_pipeline::process::{VERB, probe};
 use orator_test_support::project::{Project, files_under};
 use orator_test_support::skip::skip;

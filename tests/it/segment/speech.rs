@@ -12,7 +12,7 @@ use orator_dataset::config::{self, Settings, SpeechRule};
 use orator_formats::media_json::MediaInfo;
 use orator_onnx::ModelError;
 use orator_onnx::speech::SpeechModel;
-use orator_pipeline::segment::speech_rule::SpeechListener;
+use orator_pipeline::segment::speech_rule::SpeechDetector;
 use orator_pipeline::segment::{Measures, SegmentStage, judge, speech_activity};
 use orator_report::videos::thresholds::THRESHOLDS;
 use orator_test_support::project::{Project, files_under};
@@ -125,7 +125,7 @@ fn ledgers(sound: &[f32], settings: &Settings) -> [Ledger; 2] {
     let mut footage = good(sound.len() * 15 / RATE);
     footage.sound = Some(sound.iter().map(|sample| (sample.clamp(-1.0, 0.999) * 32_768.0) as i16).collect());
     write(dir.path(), &unit, &footage, "a");
-    let listener = SpeechListener::find(settings).unwrap();
+    let listener = SpeechDetector::find(settings).unwrap();
     [listener, None].map(|listener| {
         let stage = SegmentStage::new(&settings.segment, dir.path()).with_speech(listener);
         let out = unit.dir(&dir.path().join(stage.name()));
@@ -263,19 +263,19 @@ fn the_rule_follows_the_configuration_and_the_folder() {
     let dir = tempfile::tempdir().unwrap();
     let mut settings = Settings::default();
     settings.models.dir = dir.path().to_path_buf().into();
-    assert!(SpeechListener::find(&settings).unwrap().is_none());
-    assert!(SpeechListener::advice(&settings).unwrap().is_some_and(|line| line.contains("orator models fetch")));
+    assert!(SpeechDetector::find(&settings).unwrap().is_none());
+    assert!(SpeechDetector::advice(&settings).unwrap().is_some_and(|line| line.contains("orator models fetch")));
     settings.segment.speech = SpeechRule::Vad;
-    let error = SpeechListener::find(&settings).unwrap_err();
+    let error = SpeechDetector::find(&settings).unwrap_err();
     assert!(matches!(error.downcast_ref(), Some(ModelError::Missing { .. })), "{error:#}");
     settings.segment.speech = SpeechRule::Loudness;
-    assert!(SpeechListener::find(&settings).unwrap().is_none() && SpeechListener::advice(&settings).unwrap().is_none());
+    assert!(SpeechDetector::find(&settings).unwrap().is_none() && SpeechDetector::advice(&settings).unwrap().is_none());
     let Some((entry, models, _)) = speech_model() else { return };
     fs::copy(models.join(&entry.file), dir.path().join(&entry.file)).unwrap();
     settings.segment.speech = SpeechRule::Auto;
-    let found = SpeechListener::find(&settings).unwrap().unwrap();
+    let found = SpeechDetector::find(&settings).unwrap().unwrap();
     assert_eq!(found.used().id, "speech-silero");
-    assert!(SpeechListener::advice(&settings).unwrap().is_none());
+    assert!(SpeechDetector::advice(&settings).unwrap().is_none());
     // The model is in the fingerprint: with it segment runs again.
     let unit = Unit { speaker: "host".into(), video: "talk".into(), source: dir.path().join("talk.mp4") };
     let with = |speech| SegmentStage::new(&settings.segment, dir.path()).with_speech(speech).settings(&unit);

@@ -1,7 +1,7 @@
 //! Writing of an mp4: H.264 by libx264 where available, else MPEG-4 part 2, with AAC. The bytes are reproducible. The
 //! caller replaces the file atomically.
 
-use crate::ffmpeg::{library, source};
+use crate::ffmpeg::source;
 use anyhow::{Context, Result, ensure};
 use ffmpeg_next as ffmpeg;
 use ffmpeg_next::codec::{self, Id};
@@ -53,7 +53,7 @@ impl VideoWriter {
         sound: Option<&Sound>,
         crf: u32,
     ) -> Result<Self> {
-        library::init();
+        source::init();
         ensure!(width > 0 && height > 0, "{}: a video of {width} x {height} px cannot be written", path.display());
         let even = [width, height].map(|n| n.next_multiple_of(2));
         let what = || format!("cannot write the video {}", path.display());
@@ -204,7 +204,7 @@ impl SoundTrack {
 
 /// Whether films become H.264, which every browser plays, and not MPEG-4 part 2, which none does.
 pub fn has_h264() -> bool {
-    library::init();
+    source::init();
     encoder::find_by_name("libx264").is_some()
 }
 

@@ -2,12 +2,9 @@
 //! no model, no picture, nothing remembered. Numbers that are not finite are not found, never a panic.
 
 pub mod boxes;
-pub mod detections;
 pub mod heatmap;
-pub mod point;
-pub mod regression;
-pub mod simcc;
+pub mod points;
 pub mod ssd_anchors;
 pub mod yolox_grid;
 
-pub use point::ScoredPoint;
+pub use points::ScoredPoint;

@@ -7,4 +7,4 @@ pub mod model;
 pub mod tracker;
 pub mod views;
 
-pub use tracker::FaceTracker;
+pub use tracker::FaceTrack;

@@ -1,7 +1,7 @@
 //! The face model: 468 points of the face in a rotated square, and how sure it is that there is one.
 
 use super::landmarks::{FacePoint, N_LANDMARKS};
-use crate::pose2d::decode::regression;
+use crate::pose2d::decode::points;
 use crate::pose2d::model_input::ModelInput;
 use anyhow::{Result, bail, ensure};
 use orator_base::types::image::Image;
@@ -37,7 +37,7 @@ impl FaceModel {
             bail!("a face cannot be read as {:?}", self.decode)
         };
         let score = outputs.floats(score)?.1.first().copied().unwrap_or(f32::NAN);
-        let score = regression::score(score, *logit);
+        let score = points::regression_score(score, *logit);
         let numbers = outputs.floats(landmarks)?.1;
         ensure!(numbers.len() == 3 * N_LANDMARKS, "{} numbers are no {N_LANDMARKS} points of a face", numbers.len());
         if !score.is_finite() || numbers.iter().any(|number| !number.is_finite()) {

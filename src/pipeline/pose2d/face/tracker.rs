@@ -1,7 +1,6 @@
 //! The face of the person followed from frame to frame: looked for where the body's eyes and nose are, then where it was.
 
-use super::landmarks;
-use super::landmarks::FacePoint;
+use super::landmarks::{self, FacePoint};
 use super::model::{DetectedFace, FaceModel};
 use crate::pose2d::decode::ScoredPoint;
 use anyhow::Result;
@@ -14,33 +13,6 @@ const LEAST_SCORE: f64 = 0.5;
 /// A face whose nose is further from the body's, in sides of its square, is somebody else's.
 const SAME_NOSE: f64 = 0.15;
 
-/// Follows one face with a model of its own.
-pub struct FaceTracker {
-    pub model: FaceModel,
-    track: FaceTrack,
-}
-
-impl FaceTracker {
-    pub fn new(model: FaceModel) -> Self {
-        Self { model, track: FaceTrack::default() }
-    }
-
-    /// Ends the track.
-    pub fn begin_anew(&mut self) {
-        self.track = FaceTrack::default();
-    }
-
-    /// Points of the face in the last frame, where it was seen.
-    pub fn points(&self) -> Option<&[FacePoint]> {
-        self.track.points.as_deref()
-    }
-
-    /// As `FaceTrack::find`.
-    pub fn find(&mut self, image: &Image, body: &[ScoredPoint; 17], least: f64) -> Result<Option<FaceSeen>> {
-        self.track.find(&mut self.model, image, body, least)
-    }
-}
-
 /// Where a face was in the frame before.
 #[derive(Default)]
 pub struct FaceTrack {
@@ -49,6 +21,11 @@ pub struct FaceTrack {
 }
 
 impl FaceTrack {
+    /// Points of the face in the last frame, where it was seen.
+    pub fn points(&self) -> Option<&[FacePoint]> {
+        self.points.as_deref()
+    }
+
     /// The face of the body whose points are given, of which those that score `least` are seen.
     pub fn find(
         &mut self,

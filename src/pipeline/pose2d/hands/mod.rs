@@ -1,7 +1,7 @@
-//! Both hands of the speaker: `tracker` finds them from frame to frame, `sight` says what of the found points is seen.
+//! Both hands of the speaker: `tracker` finds them from frame to frame, `visibility` decides which of the found points are visible.
 
-pub mod sight;
 pub mod tracker;
+pub mod visibility;
 
-pub use sight::SeenHands;
 pub use tracker::{HandTracker, guard};
+pub use visibility::SeenHands;

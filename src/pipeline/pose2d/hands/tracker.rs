@@ -2,10 +2,10 @@
 //! against the other hand, one hand found twice and hands that look like one of the other side. What was searched in
 //! vain is searched more rarely.
 
-use super::sight::middle;
+use super::visibility::{distance, middle};
 use crate::pose2d::decode::ScoredPoint;
+use crate::pose2d::detector::PalmDetector;
 use crate::pose2d::hand::{DetectedHand, HandModel};
-use crate::pose2d::palm::PalmDetector;
 use crate::pose2d::region;
 use anyhow::Result;
 use orator_base::types::image::Image;
@@ -219,10 +219,6 @@ fn better(
 
 fn shoulder_px(body: &[ScoredPoint; 17]) -> f64 {
     distance(body[coco::L_SHOULDER], body[coco::R_SHOULDER])
-}
-
-fn distance(a: ScoredPoint, b: ScoredPoint) -> f64 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
 #[cfg(test)]

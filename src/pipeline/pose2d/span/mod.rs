@@ -1,7 +1,6 @@
 //! A video in spans, which several workers share: `video_frames` reads the frames of one, `pass` looks at them, into
-//! `keypoint_frames` and `detection_counts`; `pose_span` is what was seen, and how one span is joined to those before.
+//! `keypoint_frames`; `pose_span` is what was seen, and how one span is joined to those before.
 
-pub mod detection_counts;
 pub mod keypoint_frames;
 pub mod pass;
 pub mod pose_span;

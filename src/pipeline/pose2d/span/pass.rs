@@ -37,7 +37,7 @@ pub fn look(
     span.image_size = video.each(|time, begins_shot, picture| {
         let idx = time.frame_idx;
         if begins_shot {
-            chain.begin_shot_of(ways.next().flatten());
+            chain.begin_shot(ways.next().flatten());
         }
         if let Some(picture) = picture {
             let seen = chain.frame(&picture).with_context(|| format!("frame {idx}"))?;
@@ -51,13 +51,12 @@ pub fn look(
             let line = format!("an hour of video takes about {hours:.1} h here, one at a time");
             progress.event(&Event::Estimate { line: &line });
         }
-        span.counts.count(&pose);
-        span.frames.push(&pose, time.source_secs);
+        span.frames.push(pose.clone(), time.source_secs);
         task.advance(1);
         Ok(())
     })?;
     (span.n_taken, [span.first, span.last]) = chain.people();
-    span.counts.followed = talkers.map(|shots| {
+    span.followed = talkers.map(|shots| {
         let n_several = shots.iter().filter(|shot| shot.several).count();
         [n_several, shots.iter().filter(|shot| shot.path.is_some()).count()]
     });

@@ -1,24 +1,27 @@
 //! What was seen in a span of a video, in a file, and how the spans of a video become one. Tracking begins anew at a span;
 //! whether it shows whom the one before showed is told as at a cut, by box and colours.
 
-use super::detection_counts::DetectionCounts;
 use super::keypoint_frames::KeypointFrames;
 use crate::pose2d::face::views::PortraitViews;
 use crate::pose2d::speaker::{SeenPerson, is_same_person};
 use anyhow::{Context, Result, ensure};
 use orator_base::stage::artifacts::Artifact;
-use orator_base::stage::{Report, workdir};
+use orator_base::stage::{Report, counted, workdir};
+use orator_base::types::pose2d::Keypoint;
 use orator_base::types::time::FrameRate;
 use orator_formats::keypoints_npz;
 use orator_media::opencv::png;
 use serde::{Deserialize, Serialize};
+use serde_json::json;
+use std::fmt::Write as _;
 use std::path::Path;
 
 /// The frames of one span, or of several joined.
 #[derive(Default, Serialize, Deserialize)]
 pub struct PoseSpan {
     pub frames: KeypointFrames,
-    pub counts: DetectionCounts,
+    /// Shots with several people, and those of them where the one who speaks is followed; `None`: the largest is.
+    pub followed: Option<[usize; 2]>,
     pub portrait: PortraitViews,
     /// Width and height of the picture, px.
     pub image_size: [u32; 2],
@@ -55,7 +58,10 @@ impl PoseSpan {
         let n_before = self.n_taken.saturating_sub(i64::from(is_same));
         self.frames.append(next.frames, n_before);
         self.n_taken = n_before.saturating_add(next.n_taken);
-        self.counts.add(&next.counts);
+        if let Some(next) = next.followed {
+            let before = self.followed.unwrap_or_default();
+            self.followed = Some([0, 1].map(|at| before[at].saturating_add(next[at])));
+        }
         self.portrait.append(next.portrait);
         self.image_size = next.image_size;
         self.first = self.first.take().or(next.first);
@@ -67,12 +73,41 @@ impl PoseSpan {
     /// # Errors
     /// Arrays of unequal lengths; a folder that cannot be written.
     pub fn finish(self, fps: FrameRate, out: &Path) -> Result<Report> {
+        let report = self.report();
         let (keypoints, extras) = self.frames.finish(fps, self.image_size)?;
         keypoints_npz::write(&Artifact::Keypoints.within(out), &keypoints, &extras)?;
         if let Some((portrait, picture)) = self.portrait.finish() {
             workdir::write_file(&Artifact::Portrait.within(out), &serde_json::to_vec(&portrait)?)?;
             png::write(&Artifact::FacePicture.within(out), &picture)?;
         }
-        Ok(self.counts.report())
+        Ok(report)
+    }
+
+    /// How often each part of the speaker was found, for people and programs.
+    fn report(&self) -> Report {
+        let any = |points: &[Keypoint]| points.iter().any(|point| point.score > 0.0);
+        let n_frames = self.frames.n_frames();
+        let person = self.frames.share(|pose| any(&pose.body));
+        let left_hand = self.frames.share(|pose| any(&pose.left_hand));
+        let right_hand = self.frames.share(|pose| any(&pose.right_hand));
+        let [body, left, right] = [person, left_hand, right_hand].map(|share| format!("{:.0} %", 100.0 * share));
+        let mut line = format!("{n_frames} frames: person in {body}, left hand {left}, right hand {right}");
+        let mut facts = json!({
+            "n_frames": n_frames, "person": person, "left_hand": left_hand, "right_hand": right_hand,
+            "several_people": self.frames.share(|pose| pose.n_people > 1),
+            "mouth": self.frames.share(|pose| pose.face.is_some()),
+        });
+        if let Some([several, speaking]) = self.followed {
+            facts["followed"] = json!({ "several": several, "speaking": speaking });
+            if several > speaking {
+                let (shots, rest) = (counted(several, "shot"), several - speaking);
+                let _ = write!(
+                    line,
+                    "; several people in {shots}: in {rest} nobody's mouth clearly follows the voice, so the largest is \
+                     followed"
+                );
+            }
+        }
+        Report { line, facts: facts.as_object().cloned().unwrap_or_default() }
     }
 }

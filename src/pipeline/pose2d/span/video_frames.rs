@@ -6,10 +6,13 @@ use orator_base::types::image::Image;
 use orator_base::types::time::FrameRate;
 use orator_formats::media_json::MediaInfo;
 use orator_formats::timeline_npz::Timeline;
-use orator_media::ffmpeg::ahead;
 use orator_media::ffmpeg::frames::{FrameReader, FrameTime};
 use std::ops::Range;
 use std::path::Path;
+use std::sync::mpsc;
+
+/// Number of frames that may wait.
+const WAITING: usize = 3;
 
 /// A video that was extracted, and a span of it.
 pub struct VideoFrames<'a> {
@@ -51,7 +54,7 @@ impl VideoFrames<'_> {
             })
         };
         let mut end = self.span.start;
-        ahead::for_each(reader, pick, |time, picture| {
+        for_each_ahead(reader, pick, |time, picture| {
             end = time.frame_idx + 1;
             // Reading that began in the middle shows what reading from the start showed.
             let known = self.timeline.source_secs.get(time.frame_idx);
@@ -70,4 +73,31 @@ impl VideoFrames<'_> {
 
 fn frame_count_mismatch(video: &Path, found: usize, expected: usize) -> String {
     format!("{} gave {found} frames, its timeline has {expected}: run extract again", video.display())
+}
+
+/// Decoding in parallel with other work: reads all frames of `reader` in a thread, where `pick` selects what is needed of
+/// each, and passes the selections to `work` in order. Memory: five selections.
+fn for_each_ahead<T: Send>(
+    mut reader: FrameReader,
+    mut pick: impl FnMut(&mut FrameReader, FrameTime) -> Result<T> + Send,
+    mut work: impl FnMut(FrameTime, T) -> Result<()>,
+) -> Result<()> {
+    std::thread::scope(|scope| {
+        let (sender, picks) = mpsc::sync_channel(WAITING);
+        scope.spawn(move || {
+            loop {
+                let next = reader.advance().and_then(|time| {
+                    let Some(time) = time else { return Ok(None) };
+                    Ok(Some((time, pick(&mut reader, time)?)))
+                });
+                let Some(next) = next.transpose() else { break };
+                let has_failed = next.is_err();
+                // The receiver is gone once the work has failed.
+                if sender.send(next).is_err() || has_failed {
+                    break;
+                }
+            }
+        });
+        picks.into_iter().try_for_each(|next| next.and_then(|(time, picked)| work(time, picked)))
+    })
 }

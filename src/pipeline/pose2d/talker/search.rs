@@ -6,19 +6,16 @@ use super::choice::{self, MouthOpening, ShotVoice};
 use super::path::{SAME_WAY, TalkerPath};
 use crate::pose2d::body::BodyModel;
 use crate::pose2d::decode::boxes;
+use crate::pose2d::detector::Detector;
+use crate::pose2d::face::FaceTrack;
 use crate::pose2d::face::model::FaceModel;
-use crate::pose2d::face::tracker::FaceTrack;
-use crate::pose2d::person::Detector;
+use crate::pose2d::speaker;
 use anyhow::Result;
 use orator_base::types::image::Image;
 use orator_base::types::pose2d::PersonBox;
 use orator_dataset::config::Pose2dConfig;
 use orator_onnx::{ModelRole, ModelStore, Runtime};
 
-/// Frames of a shot at which people are looked for beside the regular ones.
-const EARLY: [usize; 3] = [2, 5, 10];
-/// With several people in view, looks come so many times as often.
-const CROWD_LOOKS: usize = 3;
 /// People smaller than this share of the largest are in the background.
 const RELEVANT: f32 = 0.2;
 /// A point of a body is seen from this score on, whatever the configuration says: between looks no point is known.
@@ -81,9 +78,7 @@ impl TalkerSearch {
             here.for_each(|one| one.mouth.repeat(idx));
             return Ok(());
         };
-        let every = self.settings.person_every.max(1);
-        let every = if self.is_crowd() { (every / CROWD_LOOKS).max(1) } else { every };
-        let is_look = idx.is_multiple_of(every) || EARLY.contains(&idx);
+        let is_look = speaker::is_look(idx, self.settings.person_every.max(1), self.is_crowd());
         if is_look {
             let found = self.detector.find(image)?;
             tie(&mut self.people, idx, &found);

@@ -1,6 +1,6 @@
-//! What of the found hands is seen: a hand model gives 21 points wherever it is asked, for a hand that is hidden or has
-//! left the picture as well. A hand found where the other one is, is that one; points outside the picture or behind the
-//! other hand are not seen, nor is a wrist that the body model put on the other hand.
+//! Visibility of the found hands: a hand model returns 21 points for any crop, also for a hand that is hidden or outside the
+//! picture. A hand found at the other hand is that other hand; points outside the picture or behind the other hand are
+//! not visible, nor is a wrist that the body model put on the other hand.
 
 use crate::pose2d::decode::ScoredPoint;
 use crate::pose2d::hand::DetectedHand;
@@ -106,7 +106,7 @@ pub fn middle(hand: &DetectedHand) -> ScoredPoint {
     [sum[0] / 21.0, sum[1] / 21.0, 0.0]
 }
 
-fn distance(a: ScoredPoint, b: ScoredPoint) -> f64 {
+pub fn distance(a: ScoredPoint, b: ScoredPoint) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 

@@ -1,4 +1,4 @@
-//! What a restricted process may still do with files, and what of its restriction the kernel enforces.
+//! The restriction as a whole: what a restricted process may still do with files, and what the kernel enforces of it.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -38,6 +38,23 @@ impl fmt::Display for Restriction {
             (Err(files), Err(calls)) => write!(f, "not active: {files}; {calls}"),
         }
     }
+}
+
+/// Restricts this process for good: files as `access` says; no socket, no other program, no other process, no change of
+/// the system. What the kernel cannot enforce is left out and named in the answer. A process that has several threads
+/// already is left as it is, since only the calling one could be restricted.
+pub fn restrict(access: &FileAccess) -> Restriction {
+    let n_threads = std::fs::read_dir("/proc/self/task").map_or(1, Iterator::count);
+    if n_threads > 1 {
+        let late = || format!("the process had {n_threads} threads already");
+        return Restriction { files: Err(late()), calls: Err(late()) };
+    }
+    restrict_thread(access)
+}
+
+/// Restricts this thread and those it starts, as `restrict` does a process; other threads of the process stay free.
+pub fn restrict_thread(access: &FileAccess) -> Restriction {
+    Restriction { files: super::files::restrict(access), calls: super::calls::restrict() }
 }
 
 #[cfg(test)]

@@ -1,0 +1,215 @@
+//! Filters of libavfilter, run on the caller's thread alone: deinterlacing (`yadif`, which leaves
+//! no combs of a drawn clip where `bwdif` leaves 5 %), and tone mapping of HDR (ITU-R BT.2100)
+//! to SDR by `zscale` and `tonemap`, with the reference white of BT.2408 as 1.
+
+use anyhow::{Context, Result, ensure};
+use ffmpeg_next::format::Pixel;
+use ffmpeg_next::{Error, color, ffi, filter, frame};
+
+/// Luminance of the reference white, cd/m2.
+const WHITE: f64 = 203.0;
+/// Share of the reference white up to which light is unchanged; brighter light is compressed toward 1.
+const KNEE: f64 = 0.8;
+/// Least side of a picture whose planes are all large enough for `yadif`.
+const LEAST_PX: u32 = 16;
+
+/// A chain of filters between a source and a sink of frames.
+struct FilterGraph(filter::Graph);
+
+impl FilterGraph {
+    fn new(format: Pixel, [width, height]: [u32; 2], chain: &str) -> Result<Self> {
+        let open = || -> Result<filter::Graph, Error> {
+            let mut graph = filter::Graph::new();
+            // SAFETY: the graph is ours and has no filter yet.
+            unsafe { (*graph.as_mut_ptr()).nb_threads = 1 };
+            let [source, sink] = ["buffer", "buffersink"].map(|name| filter::find(name).ok_or(Error::FilterNotFound));
+            let number = ffi::AVPixelFormat::from(format) as i32;
+            let frames = format!("video_size={width}x{height}:pix_fmt={number}:time_base=1/25");
+            graph.add(&source?, "in", &frames)?;
+            graph.add(&sink?, "out", "")?;
+            graph.output("in", 0)?.input("out", 0)?.parse(chain)?;
+            graph.validate()?;
+            Ok(graph)
+        };
+        Ok(Self(open().with_context(|| format!("libavfilter cannot run `{chain}` on {format:?} pictures"))?))
+    }
+
+    /// Passes a frame to the chain; `None`: the end.
+    fn push(&mut self, frame: Option<&frame::Video>) -> Result<()> {
+        let mut source = self.0.get("in").context("a filter graph without a source")?;
+        // SAFETY: the source belongs to the live graph and takes a reference of its own to a live frame; null is the end.
+        let code = unsafe {
+            let frame = frame.map_or(std::ptr::null(), |frame| frame.as_ptr());
+            ffi::av_buffersrc_write_frame(source.as_mut_ptr(), frame)
+        };
+        ensure!(code >= 0, "libavfilter refused a frame ({})", Error::from(code));
+        Ok(())
+    }
+
+    /// The next frame that comes out.
+    fn pull(&mut self) -> Result<frame::Video> {
+        let mut frame = frame::Video::empty();
+        let mut sink = self.0.get("out").context("a filter graph without a sink")?;
+        sink.sink().frame(&mut frame).context("libavfilter returned no frame")?;
+        Ok(frame)
+    }
+}
+
+/// An interlaced frame as the picture of its first field, by itself and its neighbours in the video.
+pub(crate) fn deinterlaced(
+    before: Option<&frame::Video>,
+    frame: &frame::Video,
+    after: Option<&frame::Video>,
+) -> Result<frame::Video> {
+    let shape = |frame: &frame::Video| (frame.format(), [frame.width(), frame.height()]);
+    let (format, size) = shape(frame);
+    if size[0].min(size[1]) < LEAST_PX {
+        return Ok(frame.clone());
+    }
+    let [before, after] = [before, after].map(|beside| beside.filter(|beside| shape(beside) == (format, size)));
+    let mut graph = FilterGraph::new(format, size, "yadif=mode=send_frame:parity=auto:deint=all")?;
+    for frame in [before, Some(frame), after].into_iter().flatten() {
+        graph.push(Some(frame))?;
+    }
+    graph.push(None)?;
+    if before.is_some() {
+        graph.pull()?;
+    }
+    graph.pull()
+}
+
+/// Transfer function of an HDR picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum HdrTransfer {
+    Pq,
+    Hlg,
+}
+
+impl HdrTransfer {
+    /// Transfer function of `frame`; `None` for SDR.
+    pub fn of(frame: &frame::Video) -> Option<Self> {
+        match frame.color_transfer_characteristic() {
+            color::TransferCharacteristic::SMPTE2084 => Some(Self::Pq),
+            color::TransferCharacteristic::ARIB_STD_B67 => Some(Self::Hlg),
+            _ => None,
+        }
+    }
+
+    /// Short name: `PQ` or `HLG`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pq => "PQ",
+            Self::Hlg => "HLG",
+        }
+    }
+}
+
+/// Tone mapping of HDR pictures of one size.
+pub(crate) struct ToneMapper(FilterGraph);
+
+impl ToneMapper {
+    /// Format of the pictures that `map` takes.
+    pub const FORMAT: Pixel = Pixel::GBRP16LE;
+
+    /// `has_wide_gamut`: the primaries are those of BT.2020, not BT.709.
+    pub fn new(transfer: HdrTransfer, has_wide_gamut: bool, size: [u32; 2]) -> Result<Self> {
+        let (transfer, peak) = match transfer {
+            HdrTransfer::Pq => ("smpte2084", 10_000.0 / WHITE),
+            HdrTransfer::Hlg => ("arib-std-b67", 1000.0 / WHITE),
+        };
+        let primaries = if has_wide_gamut { "2020" } else { "709" };
+        let chain = format!(
+            "zscale=min=gbr:rin=full:tin={transfer}:pin={primaries}:m=gbr:r=full:t=linear:p=709:npl={WHITE},\
+             format=gbrpf32le,tonemap=mobius:param={KNEE}:desat=0:peak={peak},\
+             zscale=min=gbr:rin=full:tin=linear:pin=709:m=gbr:r=full:t=709:p=709,format=gbrp,format=rgb24"
+        );
+        Ok(Self(FilterGraph::new(Self::FORMAT, size, &chain)?))
+    }
+
+    /// The picture as 8-bit RGB.
+    pub fn map(&mut self, frame: &frame::Video) -> Result<frame::Video> {
+        self.0.push(Some(frame))?;
+        self.0.pull()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A picture of one colour, through the tone mapping.
+    fn mapped(transfer: HdrTransfer, has_wide_gamut: bool, [r, g, b]: [f64; 3]) -> [u8; 3] {
+        let mut frame = frame::Video::new(ToneMapper::FORMAT, 16, 16);
+        for (plane, value) in [g, b, r].into_iter().enumerate() {
+            let value = ((value * 65535.0).round() as u16).to_le_bytes();
+            frame.data_mut(plane).as_chunks_mut::<2>().0.fill(value);
+        }
+        let rgb = ToneMapper::new(transfer, has_wide_gamut, [16, 16]).unwrap().map(&frame).unwrap();
+        [rgb.data(0)[0], rgb.data(0)[1], rgb.data(0)[2]]
+    }
+
+    fn gray(transfer: HdrTransfer, signal: f64) -> u8 {
+        let out = mapped(transfer, true, [signal; 3]);
+        assert!(out[0].abs_diff(out[1]) <= 1 && out[1].abs_diff(out[2]) <= 1, "{out:?}");
+        out[1]
+    }
+
+    #[test]
+    fn reference_levels_come_out_where_bt_2408_puts_them() {
+        // BT.2408, table 1: the reference white is 58 % PQ and 75 % HLG, an 18 % gray card 38 % of both.
+        for (transfer, white) in [(HdrTransfer::Pq, 0.58), (HdrTransfer::Hlg, 0.75)] {
+            assert!((240..=248).contains(&gray(transfer, white)), "{}", gray(transfer, white));
+            let card = 255.0 * (26.0f64 / 203.0).powf(1.0 / 2.4);
+            let got = f64::from(gray(transfer, 0.38));
+            assert!((got - card).abs() < 4.0, "{transfer:?}: {got}, expected {card}");
+            assert_eq!(gray(transfer, 0.0), 0);
+            assert!(gray(transfer, 1.0) >= 252);
+            let levels: Vec<u8> = (0..=50).map(|step| gray(transfer, f64::from(step) / 50.0)).collect();
+            assert!(levels.is_sorted(), "{levels:?}");
+        }
+    }
+
+    #[test]
+    fn compressed_light_keeps_its_hue() {
+        // PQ signals of 4, 2 and 1 reference whites.
+        let light = mapped(HdrTransfer::Pq, false, [0.7244, 0.6509, 0.5807]).map(|v| (f64::from(v) / 255.0).powf(2.4));
+        assert!((light[0] / light[1] - 2.0).abs() < 0.1 && (light[1] / light[2] - 2.0).abs() < 0.1, "{light:?}");
+    }
+
+    /// Lines of a disc at `x` px; the odd ones of a disc at `later` px.
+    fn disc(x: f64, later: f64) -> frame::Video {
+        let mut frame = frame::Video::new(Pixel::YUV420P, 128, 80);
+        (1..3).for_each(|plane| frame.data_mut(plane).fill(128));
+        let stride = frame.stride(0);
+        for (line, row) in frame.data_mut(0).chunks_mut(stride).enumerate() {
+            let centre = if line % 2 == 0 { x } else { later };
+            for (column, pixel) in row.iter_mut().enumerate() {
+                let inside = (20.5 - (column as f64 - centre).hypot(line as f64 - 40.0)).clamp(0.0, 1.0);
+                *pixel = (40.0 + 180.0 * inside) as u8;
+            }
+        }
+        frame
+    }
+
+    #[test]
+    fn a_deinterlaced_picture_is_that_of_the_first_field() {
+        let frames = [0.0, 12.0, 24.0].map(|step| disc(40.0 + step, 46.0 + step));
+        let (truth, before) = (disc(52.0, 52.0), &frames[0]);
+        let error = |a: &frame::Video| {
+            let off = a.data(0).iter().zip(truth.data(0)).map(|(a, b)| u64::from(a.abs_diff(*b)));
+            off.sum::<u64>() as f64
+        };
+        for after in [Some(&frames[2]), None] {
+            let found = deinterlaced(Some(before), &frames[1], after).unwrap();
+            assert!(error(&found) < 0.2 * error(&frames[1]), "{} of {}", error(&found), error(&frames[1]));
+        }
+        let still = disc(52.0, 52.0);
+        assert!(error(&deinterlaced(Some(&still), &still, Some(&still)).unwrap()) == 0.0);
+        let other = frame::Video::new(Pixel::YUV420P, 64, 48);
+        assert_eq!(deinterlaced(Some(&other), &still, None).unwrap().width(), 128);
+        for size in [[1, 1], [16, 15], [9, 40], [16, 16]] {
+            let tiny = frame::Video::new(Pixel::YUV420P, size[0], size[1]);
+            assert_eq!(deinterlaced(None, &tiny, None).unwrap().height(), size[1]);
+        }
+    }
+}

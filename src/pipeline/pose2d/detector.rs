@@ -1,0 +1,87 @@
+//! The detectors: all persons of a picture, among whom `tracker` chooses the speaker, and squares where hands may be, asked
+//! for when a hand is lost.
+
+use super::decode::{boxes, ssd_anchors, yolox_grid};
+use super::model_input::ModelInput;
+use super::region;
+use anyhow::{Result, bail};
+use orator_base::types::image::Image;
+use orator_base::types::pose2d::PersonBox;
+use orator_media::opencv::warp::Region;
+use orator_onnx::{Decode, ModelEntry, Runtime};
+use std::path::Path;
+
+/// Finds persons in a picture.
+pub struct Detector {
+    pub feed: ModelInput,
+    decode: Decode,
+}
+
+impl Detector {
+    pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self> {
+        Ok(Self { feed: ModelInput::open(runtime, entry, dir)?, decode: entry.decode.clone() })
+    }
+
+    /// The people in the picture, surest first, in px.
+    pub fn find(&mut self, image: &Image) -> Result<Vec<PersonBox>> {
+        let size = self.feed.size();
+        let (src_from_dst, outputs) = self.feed.whole(image)?;
+        let found = match &self.decode {
+            Decode::Detections { boxes: output, labels, person, min_score, max_overlap } => {
+                let (shape, rows) = outputs.floats(output)?;
+                if shape.last() != Some(&5) {
+                    bail!("the output {output:?} of a detector must have rows of 5 numbers, its shape is {shape:?}");
+                }
+                let labels = labels.as_ref().map(|name| outputs.integers(name)).transpose()?.map(|(_, labels)| labels);
+                boxes::detections(rows, labels, *person, *min_score, *max_overlap)
+            }
+            Decode::YoloxGrid { predictions, strides, min_score, max_overlap } => {
+                let (shape, rows) = outputs.floats(predictions)?;
+                let row_len = shape.last().map_or(0, |len| usize::try_from(*len).unwrap_or(0));
+                yolox_grid::decode(rows, row_len, size, strides, *min_score, *max_overlap)?
+            }
+            other => bail!("a person detector cannot be read as {other:?}"),
+        };
+        let place = |person: PersonBox| {
+            let at = |x: f32, y: f32| src_from_dst.apply([f64::from(x), f64::from(y)]).map(|px| px as f32);
+            let [x, y] = at(person.x, person.y);
+            let [right, bottom] = at(person.x + person.width, person.y + person.height);
+            PersonBox { x, y, width: right - x, height: bottom - y, score: person.score }
+        };
+        Ok(found.into_iter().map(place).collect())
+    }
+}
+
+/// Finds palms in a picture.
+pub struct PalmDetector {
+    pub feed: ModelInput,
+    decode: Decode,
+    anchors: Vec<[f64; 2]>,
+}
+
+impl PalmDetector {
+    pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self> {
+        let feed = ModelInput::open(runtime, entry, dir)?;
+        let anchors = match &entry.decode {
+            Decode::SsdAnchors { strides, .. } => ssd_anchors::anchors(feed.size()[0], strides),
+            _ => Vec::new(),
+        };
+        Ok(Self { feed, decode: entry.decode.clone(), anchors })
+    }
+
+    /// The squares around the palms of the picture, surest first.
+    pub fn find(&mut self, image: &Image) -> Result<Vec<Region>> {
+        let size = self.feed.size()[0];
+        let (src_from_dst, outputs) = self.feed.whole(image)?;
+        let Decode::SsdAnchors { regressors, scores, min_score, max_overlap, wrist, middle, .. } = &self.decode else {
+            bail!("a palm detector cannot be read as {:?}", self.decode)
+        };
+        let (rows, logits) = (outputs.floats(regressors)?.1, outputs.floats(scores)?.1);
+        let found = ssd_anchors::decode(rows, logits, &self.anchors, size, *min_score, *max_overlap)?;
+        let region = |palm: ssd_anchors::Detection| {
+            let place = |at: usize| palm.places.get(at).map(|place| src_from_dst.apply(*place));
+            Some(region::around_palm(place(0)?, place(1)?, place(2 + wrist)?, place(2 + middle)?))
+        };
+        Ok(found.into_iter().filter_map(region).collect())
+    }
+}
