@@ -15,7 +15,6 @@ use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, bail, ensure};
 use orator_avatar::animate::export::file::{ExportContent, ExportFormat};
 use orator_avatar::animate::export::film::{SecondPanel, smooth_rate};
-use orator_avatar::animate::export::film_panel::{FilmBody, FilmStyle};
 use orator_avatar::animate::export::film_source::SourceCamera;
 use orator_avatar::animate::{AnimationOptions, Constraints, Legs, Performance, perform};
 use orator_base::motion::units;
@@ -198,10 +197,8 @@ fn whole_folder(
 /// Errors on an option that changes nothing in these outputs.
 fn check_effect(args: &Args, outputs: &OutputFiles) -> Result<()> {
     let is_film = outputs.iter().any(|&(_, format)| format == ExportFormat::Mp4);
-    args.film.check()?;
-    let beside = [("--beside", args.beside.is_some()), ("--audio", args.audio.is_some())];
-    let given = beside.into_iter().chain(args.film.given());
-    for (option, is_given) in given {
+    let (beside, audio) = (args.beside.is_some(), args.audio.is_some());
+    for (option, is_given) in [("--beside", beside), ("--audio", audio), ("--camera", args.film.is_given())] {
         ensure!(is_film || !is_given, "{option} is for films: name an .mp4 at --out, or leave it away");
     }
     args.figure.check(outputs)?;
@@ -248,12 +245,11 @@ fn animate(
         Some([ours, other]) => [ours.clone(), other.clone()],
         _ => [input.name.clone(), args.beside.as_deref().map(stem).unwrap_or_default()],
     };
-    let style = args.film.style();
-    let other_motion = other.as_ref().filter(|_| style == FilmStyle::Figure).map(Performance::motion);
-    let other = other.as_ref().map(|other| FilmBody::new(style, other, other_motion.as_ref()));
-    let beside = match (&args.beside, other) {
+    let beside = match (&args.beside, &other) {
         (None, _) => SecondPanel::Itself,
-        (Some(_), Some(body)) => SecondPanel::Motion { body, labels: labels.each_ref().map(String::as_str) },
+        (Some(_), Some(performance)) => {
+            SecondPanel::Motion { performance, labels: labels.each_ref().map(String::as_str) }
+        }
         (Some(path), None) => match &source {
             Some(camera) => SecondPanel::Behind { path, from_secs: args.beside_from, camera },
             None => SecondPanel::Video { path, from_secs: args.beside_from },
@@ -283,7 +279,7 @@ fn animate(
         sound: sound.as_ref(),
         names: args.figure.options().names,
         beside,
-        style,
+        camera: args.film.camera(),
         film_fps: Some(film_fps),
         posture: None,
     };

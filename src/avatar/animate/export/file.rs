@@ -1,6 +1,6 @@
 //! Motion file of any kind, chosen by its name's extension, written atomically.
 
-use super::film_panel::{FilmBody, FilmStyle};
+use super::film_avatar::FilmCamera;
 use super::{fbx, film, glb_scene, json, vrm};
 use crate::animate::avatar::{Appearance, Avatar};
 use crate::animate::performance::Performance;
@@ -25,10 +25,10 @@ pub struct ExportContent<'a> {
     pub sound: Option<&'a Sound>,
     /// Bone names, in formats that have names.
     pub names: Names,
-    /// What a film shows beside the body.
+    /// What a film shows beside the avatar.
     pub beside: film::SecondPanel<'a>,
-    /// How a film shows the body.
-    pub style: FilmStyle,
+    /// Viewpoint of a film.
+    pub camera: FilmCamera,
     /// Frames a second of a film; `None`: interpolated to 30 or more (`film::smooth_rate`).
     pub film_fps: Option<FrameRate>,
     /// Angles of head and trunk that a speaker generated, at their rate, for JSON.
@@ -134,9 +134,9 @@ impl ExportFormat {
                 let fps = sources.film_fps.unwrap_or_else(|| film::smooth_rate(performance.clip.fps));
                 let resampled = (fps != performance.clip.fps).then(|| performance.resampled(fps));
                 let performance = resampled.as_ref().unwrap_or(performance);
-                let motion = (sources.style == FilmStyle::Figure).then(|| performance.motion());
-                let body = FilmBody::new(sources.style, performance, motion.as_ref());
-                workdir::replace(path, |attempt| film::write(attempt, body, sources.sound, sources.beside, progress))
+                let ExportContent { sound, beside, camera, .. } = *sources;
+                let content = film::FilmContent { performance, camera, sound, beside };
+                workdir::replace(path, |attempt| film::write(attempt, content, progress))
             }
         }
     }

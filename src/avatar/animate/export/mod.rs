@@ -4,7 +4,6 @@ pub mod fbx;
 pub mod file;
 pub mod film;
 pub mod film_avatar;
-pub mod film_panel;
 pub mod film_source;
 pub mod glb;
 pub mod glb_scene;
