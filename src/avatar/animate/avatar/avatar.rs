@@ -6,7 +6,6 @@ use super::assembly::{Assembly, PosedMesh};
 use super::body::BodyForm;
 use super::hand::HandForm;
 use super::head::{EAR, EYE, EYE_RADIUS, HeadForm};
-use super::jaw::{MOUTH_Y, opening};
 use super::material::Material;
 use super::skin::Weights;
 use super::stance::Stance;
@@ -40,9 +39,6 @@ pub struct Avatar {
     pub parts: Vec<AvatarMesh>,
     /// Nose, left eye, right eye, left ear, right ear, cm from the head joint in its axes.
     pub face: [Vec3; 5],
-    /// Middles of the upper and the lower lip's inner edges, cm from the head joint, and the way of the lower one to the
-    /// open mouth.
-    pub inner_lips: [Vec3; 3],
 }
 
 impl Avatar {
@@ -59,9 +55,7 @@ impl Avatar {
         let sides = |x: f64, y: f64, z: f64| [[x, y, z], [-x, y, z]];
         let ([left_eye, right_eye], [left_ear, right_ear]) = (sides(ex, ey, ez + EYE_RADIUS), sides(ax + 0.6, ay, az));
         let face = [at_front(0.0, 7.5), left_eye, right_eye, left_ear, right_ear].map(|at| head.scaled(at));
-        let lips = at_front(0.0, MOUTH_Y);
-        let inner_lips = [lips, lips, opening(lips, 1.0)].map(|at| head.scaled(at));
-        Self { parts, face, inner_lips }
+        Self { parts, face }
     }
 }
 
