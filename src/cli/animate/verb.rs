@@ -201,8 +201,7 @@ fn check_effect(args: &Args, outputs: &OutputFiles) -> Result<()> {
     for (option, is_given) in [("--beside", beside), ("--audio", audio), ("--camera", args.film.is_given())] {
         ensure!(is_film || !is_given, "{option} is for films: name an .mp4 at --out, or leave it away");
     }
-    args.figure.check(outputs)?;
-    args.smoothing.check()
+    args.figure.check(outputs)
 }
 
 /// The report on one animation, for people and for programs.

@@ -62,7 +62,7 @@ fn a_motion_becomes_files_and_what_was_done_is_told() {
     let same = npy::read(&dir.join("c.npy"), fps).unwrap();
     assert!((&same.joints - &joints.joints).iter().all(|v| v.abs() < 1e-4));
     for more in [
-        "--smoothing one-euro --one-euro-hz 2",
+        "--smoothing adaptive --smoothing-strength 2",
         "--shoulder-yaw removed --curl-coherence off",
         "--fps 30000/1001 --names mixamo --neutral-head",
     ] {
@@ -225,7 +225,7 @@ fn what_is_wrong_is_said_and_nothing_is_written() {
         ("good.npy --out x.bvh --fps 1001", "1 to 1000 frames"),
         ("good.npy --out x.bvh --fps fast", "1 to 1000 frames"),
         ("good.npy --out x.bvh --sample one", "is no dataset"),
-        ("good.npy --out x.bvh --smoothing one-euro --one-euro-hz 0", "expected 0.01 to 100"),
+        ("good.npy --out x.bvh --smoothing-strength 101", "expected 0 to 100"),
         ("good.npy --out x.mp4 --audio picture.png", "picture.png"),
         ("good.npy --out x.bvh --audio good.npy", "--audio is for films"),
         ("good.npy --out x.npy --names vrm", "--names is for .bvh"),

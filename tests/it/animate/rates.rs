@@ -6,7 +6,7 @@ use ndarray::arr1;
 use ndarray_npy::NpzWriter;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::time::FrameRate;
-use orator_formats::joints::description::path_of;
+use orator_formats::joints_description::path_of;
 use orator_formats::mocap::captured::{self, MotionKind};
 use orator_formats::mocap::motion_file;
 use orator_formats::{authors_txt, joints_npz, npy};
