@@ -3,7 +3,7 @@
 pub mod authors_txt;
 pub mod bvh;
 pub mod checkpoint;
-pub mod joints;
+pub mod joints_description;
 pub mod joints_npz;
 pub mod keypoints;
 pub mod keypoints_npz;

@@ -3,8 +3,7 @@
 
 use super::motion_file::USUAL_FPS;
 use super::{bvh, ted};
-use crate::authors_txt;
-use crate::joints::description;
+use crate::{authors_txt, joints_description};
 use anyhow::{Context, Result, bail};
 use orator_base::motion::units;
 use orator_base::types::pose3d::Motion;
@@ -51,7 +50,7 @@ pub fn read(kind: MotionKind, path: &Path) -> Result<CapturedMotion> {
     let captured = match kind {
         MotionKind::Authors => {
             let motion = authors_txt::read(path, USUAL_FPS)?;
-            let said = description::rate(path, motion.n_frames())?;
+            let said = joints_description::rate(path, motion.n_frames())?;
             let motion = Motion { fps: said.unwrap_or(USUAL_FPS), ..motion };
             CapturedMotion { motion, text: None, facts: Map::new() }
         }

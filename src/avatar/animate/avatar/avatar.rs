@@ -116,22 +116,14 @@ impl Blend {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
     use super::*;
+    use crate::animate::rig::rig::tests::default_rig;
     use orator_base::math::vec3::{norm, scale};
-    use orator_base::types::pose3d::Motion;
-    use orator_base::types::skeleton::N_JOINTS;
-    use orator_base::types::time::FrameRate;
-
-    /// Rig of the default bones.
-    pub fn rig() -> Rig {
-        let unseen = ndarray::Array3::from_elem((1, N_JOINTS, 3), f32::NAN);
-        Rig::from_motion(&Motion::from_joints(FrameRate::new(15, 1), unseen))
-    }
 
     #[test]
     fn skinning_brings_the_rest_into_the_stance_and_both_sides_are_alike() {
-        let rig = rig();
+        let rig = default_rig();
         let (avatar, stance) = (Avatar::new(&rig, &Appearance::plain()), Stance::new(&rig));
         let shirt = &avatar.parts[1];
         let hands = [0, 1].map(|side| HandForm::new(&rig, &stance, side).scale);
@@ -157,7 +149,7 @@ pub(super) mod tests {
     #[test]
     fn bent_joints_do_not_collapse() {
         // The thinnest place around a finger's middle joint and around an elbow, straight and bent by 90 degrees.
-        let rig = rig();
+        let rig = default_rig();
         let avatar = Avatar::new(&rig, &Appearance::plain());
         let arm = &rig.arms[0];
         let finger = super::super::stance::finger_joints(&rig, 0, 2);

@@ -122,13 +122,13 @@ impl AvatarMesh {
 mod tests {
     use super::*;
     use crate::animate::avatar::appearance::{Appearance, Top};
-    use crate::animate::avatar::avatar::tests::rig;
     use crate::animate::avatar::material::Material;
+    use crate::animate::rig::rig::tests::default_rig;
     use orator_base::math::vec3::norm;
 
     #[test]
     fn at_rest_the_pose_is_the_avatar_and_a_turned_head_turns_its_points() {
-        let rig = rig();
+        let rig = default_rig();
         let avatar = Avatar::new(&rig, &Appearance::plain());
         let mut local = vec![Rotation::IDENTITY; rig.skeleton.joints.len()];
         let mut meshes = avatar.posed(&rig, rig.root, &local, 0.0);
@@ -163,7 +163,7 @@ mod tests {
 
     #[test]
     fn the_plain_face_is_the_same_on_both_sides() {
-        let rig = rig();
+        let rig = default_rig();
         let plain = Avatar::new(&rig, &Appearance::plain());
         for material in [Material::Face, Material::Eyes] {
             let part = plain.parts.iter().find(|part| part.material == material).unwrap();
@@ -177,7 +177,7 @@ mod tests {
 
     #[test]
     fn a_bare_forearm_keeps_its_girth_when_the_hand_turns_and_bends() {
-        let rig = rig();
+        let rig = default_rig();
         let looks = Appearance { top: Top::ShortSleeves, ..Appearance::plain() };
         let avatar = Avatar::new(&rig, &looks);
         let arm = &rig.arms[0];

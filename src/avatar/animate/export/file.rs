@@ -12,8 +12,7 @@ use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::Posture;
 use orator_base::types::sound::Sound;
 use orator_base::types::time::FrameRate;
-use orator_formats::joints::description;
-use orator_formats::{authors_txt, joints_npz, npy};
+use orator_formats::{authors_txt, joints_description, joints_npz, npy};
 use std::fs::File;
 use std::io::{self, BufWriter, Write as _};
 use std::path::Path;
@@ -47,7 +46,7 @@ pub struct FigureOptions {
 /// Format of a motion file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExportFormat {
-    /// Joints [T, 49, 3] f32, their rate beside them (`formats::joints::description`).
+    /// Joints [T, 49, 3] f32, their rate beside them (`formats::joints_description`).
     Npy,
     /// Joints with rate and mask.
     Npz,
@@ -146,10 +145,10 @@ impl ExportFormat {
         let (fps, shape) = (motion.fps, motion.joints.shape());
         match self {
             Self::Npz => workdir::replace(path, |attempt| joints_npz::write(attempt, motion)),
-            Self::Npy => description::with(path, fps, shape, |attempt| npy::write(attempt, motion)),
-            Self::AuthorsTxt => {
-                description::with(path, fps, shape, |attempt| Ok(std::fs::write(attempt, authors_txt::format(motion))?))
-            }
+            Self::Npy => joints_description::with(path, fps, shape, |attempt| npy::write(attempt, motion)),
+            Self::AuthorsTxt => joints_description::with(path, fps, shape, |attempt| {
+                Ok(std::fs::write(attempt, authors_txt::format(motion))?)
+            }),
             _ => anyhow::bail!("{} holds more than joints", path.display()),
         }
     }

@@ -9,4 +9,3 @@ pub mod glb;
 pub mod glb_scene;
 pub mod json;
 pub mod vrm;
-pub mod vrm_humanoid;

@@ -206,8 +206,14 @@ fn default_metres(joint: usize) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
+
+    /// Rig of the default bones.
+    pub fn default_rig() -> Rig {
+        let unseen = ndarray::Array3::from_elem((1, N_JOINTS, 3), f32::NAN);
+        Rig::from_motion(&Motion::from_joints(orator_base::types::time::FrameRate::new(15, 1), unseen))
+    }
 
     #[test]
     fn a_palm_points_along_the_hand() {
