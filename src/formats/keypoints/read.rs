@@ -66,7 +66,7 @@ fn read_folder(folder: &Path) -> Result<FoundKeypoints> {
             .with_context(|| format!("{}: no digits in its name say which frame it is", file.display()))?;
         let bytes = std::fs::read(file).with_context(|| format!("cannot read {}", file.display()))?;
         let read = document::people(&bytes).with_context(|| file.display().to_string())?;
-        program = read.program();
+        program = read.program;
         let people = match read.people {
             FramePeople::Picture(people) => people,
             FramePeople::Frames(frames) => bail!(

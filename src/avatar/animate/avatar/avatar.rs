@@ -46,7 +46,7 @@ impl Avatar {
         let stance = Stance::new(rig);
         let hands = [0, 1].map(|side| HandForm::new(rig, &stance, side));
         let body = BodyForm::new(rig, &stance, hands.each_ref().map(|hand| hand.scale), looks);
-        let head = HeadForm::new(&stance, &body.trunk, looks);
+        let head = HeadForm::new(rig, &stance, looks);
         let meshes = Assembly::new(&body, &head, &hands).meshes;
         let parts = meshes.into_iter().map(|(material, mesh)| AvatarMesh::rested(material, mesh, &stance)).collect();
         let at_front = |x: f64, y: f64| [x, y, head.front(x, y)];
