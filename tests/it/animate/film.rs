@@ -150,7 +150,7 @@ fn the_video_beside_the_avatar_is_in_step() {
     let Some(clip) = make(folder.path(), &Kind { secs: 6.0, ..PLAIN }) else { return };
     let path = folder.path().join("beside.mp4");
     let performance = unchanged(&swinging(6, 30));
-    let beside = SecondPanel::Video { path: &clip.path, from_secs: 2.0 };
+    let beside = SecondPanel::Video { path: &clip.path, from_secs: 2.0, camera: None };
     film::write(&path, FilmContent { beside, ..alone(&performance) }, &Silent).unwrap();
     // A picture of the clip fills the left half: 64 x 48 px become 600 x 450.
     let read = |image: &Image| {
@@ -164,7 +164,7 @@ fn the_video_beside_the_avatar_is_in_step() {
     for (n, frame) in film.enumerate() {
         assert_eq!(read(&frame.unwrap().image), 60 + 2 * n, "frame {n}");
     }
-    let beside = SecondPanel::Video { path: &clip.path, from_secs: 60.0 };
+    let beside = SecondPanel::Video { path: &clip.path, from_secs: 60.0, camera: None };
     let late = FilmContent { beside, ..alone(&performance) };
     let error = format!("{:#}", film::write(&path, late, &Silent).unwrap_err());
     assert!(error.contains("lasts 6.0 s"), "{error}");
@@ -257,7 +257,7 @@ fn before_its_video_the_avatar_stands_where_the_person_is() {
     let keypoints = Keypoints { fps: FPS, image_size: [64, 48], body, left_hand: hand.clone(), right_hand: hand };
     let camera = SourceCamera::fit(&motion, &keypoints).unwrap();
     let performance = unchanged(&motion);
-    let beside = SecondPanel::Behind { path: &clip.path, from_secs: 0.0, camera: &camera };
+    let beside = SecondPanel::Video { path: &clip.path, from_secs: 0.0, camera: Some(&camera) };
     let mut film = Film::new(FilmContent { beside, ..alone(&performance) });
     let mut video = FrameReader::open(&clip.path, FPS).unwrap();
     for t in 0..4 {

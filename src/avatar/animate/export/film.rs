@@ -54,10 +54,9 @@ pub enum SecondPanel<'a> {
     /// None: the avatar fills the picture.
     #[default]
     Itself,
-    /// Frames of a video from this second of it on.
-    Video { path: &'a Path, from_secs: f64 },
-    /// Frames of a video from this second of it on, behind the avatar, which stands where the person does.
-    Behind { path: &'a Path, from_secs: f64, camera: &'a SourceCamera },
+    /// Frames of a video from this second of it on; with its camera they lie behind the avatar, which stands where the
+    /// person does.
+    Video { path: &'a Path, from_secs: f64, camera: Option<&'a SourceCamera> },
     /// Another avatar, drawn in the same size; the labels of the two, the other last.
     Motion { performance: &'a Performance, labels: [&'a str; 2] },
 }
@@ -101,16 +100,16 @@ impl<'a> Film<'a> {
         let FilmContent { performance, camera, sound, beside } = content;
         let panel = |shown: &[&'a Performance], area, label| LabelledPanel::new(shown, camera, area, label);
         let panels = match beside {
-            SecondPanel::Behind { .. } => Vec::new(),
+            SecondPanel::Video { camera: Some(_), .. } => Vec::new(),
             SecondPanel::Itself => vec![panel(&[performance], WHOLE, "")],
-            SecondPanel::Video { .. } => vec![panel(&[performance], HALVES[1], "")],
+            SecondPanel::Video { camera: None, .. } => vec![panel(&[performance], HALVES[1], "")],
             SecondPanel::Motion { performance: other, labels } => vec![
                 panel(&[performance, other], HALVES[0], labels[0]),
                 panel(&[other, performance], HALVES[1], labels[1]),
             ],
         };
         let over = match beside {
-            SecondPanel::Behind { path, from_secs, camera } => {
+            SecondPanel::Video { path, from_secs, camera: Some(camera) } => {
                 Some(OverVideo { performance, path, from_secs, camera, open: None })
             }
             _ => None,
@@ -167,7 +166,9 @@ pub fn write(path: &Path, content: FilmContent, progress: &dyn Progress) -> anyh
     let FilmContent { performance, sound, beside, .. } = content;
     let (fps, n_frames) = (performance.clip.fps, performance.clip.n_frames());
     let mut footage = match beside {
-        SecondPanel::Video { path, from_secs } => Some(FilmFootage::open(path, fps, from_secs, HALVES[0])?),
+        SecondPanel::Video { path, from_secs, camera: None } => {
+            Some(FilmFootage::open(path, fps, from_secs, HALVES[0])?)
+        }
         _ => None,
     };
     let task = progress.begin("drawing", n_frames as u64);
