@@ -2,7 +2,7 @@
 
 use anyhow::{Result, bail, ensure};
 use orator_avatar::animate::export::file::ExportFormat;
-use orator_formats::joints::description;
+use orator_formats::joints_description as description;
 use std::path::{Path, PathBuf};
 
 /// Files to write, with their formats.

@@ -15,8 +15,8 @@ use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::Posture;
 use orator_base::types::skeleton::N_JOINTS;
 use orator_base::types::sound::{SAMPLE_RATE, Sound};
-use orator_formats::npy_slice;
-use orator_formats::npy_slice::{Element, Layout};
+use orator_formats::npy;
+use orator_formats::npy::{Element, Layout};
 use orator_formats::transcript::Word;
 use orator_formats::wav;
 use std::collections::BTreeMap;
@@ -136,8 +136,7 @@ impl Dataset {
         let meta = serde_json::from_slice(&self.bytes(sample, sample.json)?)
             .with_context(|| format!("reading {}.json in {}", sample.key, sample.shard))?;
         let frames = 0..sample.n_frames;
-        let pose2d =
-            npy_slice::floats(&self.rows(sample, sample.pose2d, Element::F32, &[N_KEYPOINTS, 3], frames.clone())?);
+        let pose2d = npy::floats(&self.rows(sample, sample.pose2d, Element::F32, &[N_KEYPOINTS, 3], frames.clone())?);
         let pose2d = Array3::from_shape_vec((frames.len(), N_KEYPOINTS, 3), pose2d).context("shaping keypoints")?;
         let sound = self.sound(sample, 0..sample.n_sound_samples())?;
         let posture = self.posture(sample, frames.clone())?;
@@ -158,7 +157,7 @@ impl Dataset {
         let (Some(head), Some(trunk)) = (sample.head, sample.trunk) else { return Ok(None) };
         let angles = |range: ByteRange| -> Result<Array2<f32>> {
             let bytes = self.rows(sample, range, Element::F32, &[3], frames.clone())?;
-            Array2::from_shape_vec((frames.len(), 3), npy_slice::floats(&bytes)).context("shaping angles")
+            Array2::from_shape_vec((frames.len(), 3), npy::floats(&bytes)).context("shaping angles")
         };
         Ok(Some(Posture { head: angles(head)?, trunk: angles(trunk)? }))
     }
@@ -166,9 +165,8 @@ impl Dataset {
     /// Motion of the frames `frames` of a sample; only these are read, no hash is checked.
     pub fn motion(&self, sample: &SampleRef, frames: Range<usize>) -> Result<Motion> {
         let n_frames = frames.len();
-        let joints =
-            npy_slice::floats(&self.rows(sample, sample.pose3d, Element::F32, &[N_JOINTS, 3], frames.clone())?);
-        let mask = npy_slice::bools(&self.rows(sample, sample.mask, Element::Bool, &[N_JOINTS], frames)?);
+        let joints = npy::floats(&self.rows(sample, sample.pose3d, Element::F32, &[N_JOINTS, 3], frames.clone())?);
+        let mask = npy::bools(&self.rows(sample, sample.mask, Element::Bool, &[N_JOINTS], frames)?);
         let motion = Motion {
             fps: self.info.fps,
             joints: Array3::from_shape_vec((n_frames, N_JOINTS, 3), joints).context("shaping joints")?,
@@ -198,7 +196,7 @@ impl Dataset {
         frames: Range<usize>,
     ) -> Result<Vec<u8>> {
         let place = || format!("reading an array of {} in {}", sample.key, self.dir.join(&sample.shard).display());
-        let head = ByteRange { offset: span.offset, size: span.size.min(npy_slice::HEADER_BYTES as u64) };
+        let head = ByteRange { offset: span.offset, size: span.size.min(npy::HEADER_BYTES as u64) };
         let layout = Layout::parse(&self.bytes(sample, head)?, span.size, element, row).with_context(place)?;
         ensure!(
             frames.start <= frames.end && frames.end <= layout.n_rows,

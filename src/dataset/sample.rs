@@ -10,7 +10,7 @@ use orator_base::types::skeleton::N_JOINTS;
 use orator_base::types::sound::{SAMPLE_RATE, Sound};
 use orator_base::types::sync;
 use orator_formats::transcript::Word;
-use orator_formats::{npy_slice, wav};
+use orator_formats::{npy, wav};
 
 /// Keypoints of a frame: 17 of the body, 21 of the left hand, 21 of the right hand.
 pub const N_KEYPOINTS: usize = N_BODY + 2 * N_HAND;
@@ -67,9 +67,9 @@ impl Sample {
         json.push(b'\n');
         Ok([
             json,
-            npy_slice::write_bool(self.motion.mask.shape(), self.motion.mask.iter()),
-            npy_slice::write_f32(self.pose2d.shape(), self.pose2d.iter()),
-            npy_slice::write_f32(self.motion.joints.shape(), self.motion.joints.iter()),
+            npy::write_bool(self.motion.mask.shape(), self.motion.mask.iter()),
+            npy::write_f32(self.pose2d.shape(), self.pose2d.iter()),
+            npy::write_f32(self.motion.joints.shape(), self.motion.joints.iter()),
             wav::to_bytes(&self.sound)?,
         ])
     }
@@ -81,7 +81,7 @@ impl Sample {
             let Some(angles) = self.posture.as_ref().map(|posture| posture.channel(channel)) else { return Ok(None) };
             let (key, name) = (&self.key, channel.name());
             ensure!(angles.shape() == [n_frames, 3], "{key}: angles of the {name} are not [{n_frames}, 3]");
-            Ok(Some(npy_slice::write_f32(angles.shape(), angles.iter())))
+            Ok(Some(npy::write_f32(angles.shape(), angles.iter())))
         };
         Ok([self.words_member()?, angles(PostureChannel::Head)?, angles(PostureChannel::Trunk)?])
     }

@@ -3,16 +3,14 @@
 pub mod authors_txt;
 pub mod bvh;
 pub mod checkpoint;
-pub mod joints;
+pub mod joints_description;
 pub mod joints_npz;
 pub mod keypoints;
 pub mod keypoints_npz;
 pub mod media_json;
 pub mod mocap;
 pub mod npy;
-pub mod npy_slice;
 pub mod npz;
-pub mod npz_output;
 pub mod search;
 pub mod sound_offset_json;
 pub mod tfevents;

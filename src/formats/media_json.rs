@@ -19,39 +19,34 @@ pub struct MediaInfo {
     #[serde(default)]
     pub image_size: [usize; 2],
     /// Degrees clockwise from coded to upright: 0, 90, 180 or 270.
-    #[serde(default)]
     pub rotation: Option<u32>,
     /// ffmpeg's name: `h264`, `hevc`, `vp9`.
-    #[serde(default)]
     pub codec: Option<String>,
     /// Average frames a second of the file; `None` if no header says.
-    #[serde(default)]
     pub source_fps: Option<FrameRate>,
     #[serde(default)]
     pub has_audio: bool,
     /// Length of the sound, seconds.
-    #[serde(default)]
     pub audio_secs: Option<f64>,
     /// What could not be read of the file.
-    #[serde(default)]
     pub damage: Option<String>,
     /// How its pictures are to be read.
     #[serde(default, skip_serializing_if = "PictureOptions::is_plain")]
     pub pictures: PictureOptions,
     /// Part of the pictures between bars, px of the upright picture; `None` without bars.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub active_area: Option<PixelArea>,
     /// HDR transfer function, `PQ` or `HLG`; `None` for SDR.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub hdr: Option<String>,
     /// Number of times the size of the pictures changes.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub n_resizes: usize,
     /// The sound tracks, where there are several.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub audio_tracks: Option<AudioTracks>,
     /// Format of the keypoints that stand in for the pictures, `OpenPose, 25 points`; `None`: a video with pictures.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub keypoints_from: Option<String>,
 }
 

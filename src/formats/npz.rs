@@ -2,13 +2,12 @@
 //! The files of the pipeline (`keypoints_npz`, `joints_npz`) say what their arrays mean; this file does not.
 
 use super::npy;
-use super::npz_output::NpzOutput;
 use anyhow::{Context, Result, bail, ensure};
-use ndarray::{Array1, ArrayD, IxDyn, array};
-use ndarray_npy::{NpzWriter, ReadNpyError, ReadableElement, WriteNpzError};
+use ndarray::{Array1, ArrayD, array};
+use ndarray_npy::{NpzWriter, ReadNpyError, WriteNpzError};
 use orator_base::types::time::FrameRate;
 use std::fs::File;
-use std::io::{BufReader, BufWriter, Read as _};
+use std::io::{self, BufReader, BufWriter, Read as _, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use zip::ZipArchive;
 
@@ -63,18 +62,8 @@ impl Npz {
 
     /// A number array of any float or integer type as f64. Errors: missing, another shape, another type.
     pub fn numbers(&mut self, name: &str, shape: &[AxisLength]) -> Result<ArrayD<f64>> {
-        let bytes = self.bytes(name)?;
-        let array = if let Some(a) = self.typed::<f32>(name, &bytes)? {
-            a.mapv(f64::from)
-        } else if let Some(a) = self.typed::<f64>(name, &bytes)? {
-            a
-        } else if let Some(a) = self.typed::<i64>(name, &bytes)? {
-            a.mapv(|v| v as f64)
-        } else if let Some(a) = self.typed::<i32>(name, &bytes)? {
-            a.mapv(f64::from)
-        } else if let Some(a) = self.typed::<u32>(name, &bytes)? {
-            a.mapv(f64::from)
-        } else {
+        let found = npy::numbers(&self.bytes(name)?);
+        let Some(array) = self.readable(name, found)? else {
             bail!("{}: array `{name}` has an unknown number type; save it as float32 or float64", self.path.display());
         };
         self.check(name, array.shape(), shape)?;
@@ -84,7 +73,7 @@ impl Npz {
     /// A float array as f32. Errors as `numbers`.
     pub fn floats(&mut self, name: &str, shape: &[AxisLength]) -> Result<ArrayD<f32>> {
         let bytes = self.bytes(name)?;
-        if let Some(array) = self.typed::<f32>(name, &bytes)? {
+        if let Some(array) = self.readable(name, npy::typed(&bytes))? {
             self.check(name, array.shape(), shape)?;
             return Ok(array);
         }
@@ -93,8 +82,8 @@ impl Npz {
 
     /// An array of truth values. Errors: missing, another shape, another type.
     pub fn bools(&mut self, name: &str, shape: &[AxisLength]) -> Result<ArrayD<bool>> {
-        let bytes = self.bytes(name)?;
-        let Some(array) = self.typed::<bool>(name, &bytes)? else {
+        let found = npy::typed(&self.bytes(name)?);
+        let Some(array) = self.readable(name, found)? else {
             bail!("{}: array `{name}` must be of type bool", self.path.display());
         };
         self.check(name, array.shape(), shape)?;
@@ -156,13 +145,9 @@ impl Npz {
         Ok(bytes)
     }
 
-    /// The array if it is of type `T`; `None` if it is of another type.
-    fn typed<T: ReadableElement>(&self, name: &str, bytes: &[u8]) -> Result<Option<ArrayD<T>>> {
-        match npy::parse::<T, IxDyn>(bytes) {
-            Ok(array) => Ok(Some(array)),
-            Err(ReadNpyError::WrongDescriptor(_)) => Ok(None),
-            Err(error) => Err(error).with_context(|| format!("{}: array `{name}` cannot be read", self.path.display())),
-        }
+    /// What was read of an array; the error names the file and the array.
+    fn readable<T>(&self, name: &str, found: Result<T, ReadNpyError>) -> Result<T> {
+        found.with_context(|| format!("{}: array `{name}` cannot be read", self.path.display()))
     }
 
     /// An empty `expected` takes every shape.
@@ -179,16 +164,69 @@ impl Npz {
 }
 
 /// Writes a file of the arrays that `add` adds; the same arrays give the same bytes.
-pub fn write<F>(path: &Path, add: F) -> Result<()>
-where
-    F: FnOnce(&mut NpzWriter<NpzOutput>) -> Result<(), WriteNpzError>,
-{
+pub fn write(path: &Path, add: impl FnOnce(&mut NpzWriter<NpzOutput>) -> Result<(), WriteNpzError>) -> Result<()> {
     let attempt = || -> Result<()> {
         let mut npz = NpzWriter::new(NpzOutput::new(BufWriter::new(File::create(path)?)));
         add(&mut npz)?;
         npz.finish()?.finish()
     };
     attempt().with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// Writer that keeps its first error for `finish` and ignores what follows: an archive that is dropped after an error
+/// writes its end, and would print that it cannot.
+pub struct NpzOutput<W = BufWriter<File>> {
+    to: W,
+    at: u64,
+    error: Option<io::Error>,
+}
+
+impl<W: Write + Seek> NpzOutput<W> {
+    fn new(to: W) -> Self {
+        Self { to, at: 0, error: None }
+    }
+
+    /// Flushes what was written. Errors: the first one of any write.
+    fn finish(mut self) -> Result<()> {
+        let flushed = self.to.flush();
+        Ok(self.error.map_or(flushed, Err)?)
+    }
+
+    /// Result of a step; `otherwise` if it or one before failed.
+    fn step<T>(&mut self, otherwise: T, step: impl FnOnce(&mut W) -> io::Result<T>) -> T {
+        if self.error.is_some() {
+            return otherwise;
+        }
+        step(&mut self.to).unwrap_or_else(|error| {
+            self.error = Some(error);
+            otherwise
+        })
+    }
+}
+
+impl<W: Write + Seek> Write for NpzOutput<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.step((), |to| to.write_all(bytes));
+        self.at += bytes.len() as u64;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.step((), W::flush);
+        Ok(())
+    }
+}
+
+impl<W: Write + Seek> Seek for NpzOutput<W> {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        let otherwise = match to {
+            SeekFrom::Start(at) => at,
+            SeekFrom::Current(by) => self.at.saturating_add_signed(by),
+            SeekFrom::End(_) => self.at,
+        };
+        self.at = self.step(otherwise, |file| file.seek(to));
+        Ok(self.at)
+    }
 }
 
 /// Numerator and denominator, as [`Npz::frame_rate`] reads them.
@@ -200,6 +238,41 @@ pub fn rate(fps: FrameRate) -> Array1<f64> {
 mod tests {
     use super::*;
     use ndarray::arr0;
+
+    #[test]
+    fn a_full_disk_is_one_error_at_the_end() {
+        let write = |left: usize| {
+            let mut disk = vec![0; left];
+            let mut npz = NpzWriter::new(NpzOutput::new(io::Cursor::new(&mut disk[..])));
+            let added = npz
+                .add_array("a", &Array1::<f64>::zeros(100))
+                .and_then(|()| npz.add_array("b", &Array1::<f64>::zeros(9)));
+            (added.is_ok(), npz.finish().map_err(anyhow::Error::from).and_then(NpzOutput::finish))
+        };
+        assert!(write(10_000).1.is_ok());
+        for left in (0..1200).step_by(37) {
+            let (is_added, finished) = write(left);
+            let error = finished.unwrap_err();
+            let kind = error.downcast_ref::<io::Error>().map(io::Error::kind);
+            assert!(is_added && kind == Some(io::ErrorKind::WriteZero), "{left}: {error:?}");
+        }
+    }
+
+    /// An archive of `body.npy` with these bytes.
+    fn archive(path: &Path, bytes: &[u8], compression: zip::CompressionMethod) {
+        let options = zip::write::SimpleFileOptions::default().compression_method(compression);
+        let mut zip = zip::ZipWriter::new(File::create(path).unwrap());
+        zip.start_file("body.npy", options).unwrap();
+        zip.write_all(bytes).unwrap();
+        zip.finish().unwrap();
+    }
+
+    /// Bytes of an array of five numbers under the header of another shape.
+    fn promising(shape: &str) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        ndarray_npy::WriteNpyExt::write_npy(&Array1::<f32>::zeros(5), &mut bytes).unwrap();
+        npy::tests::with_shape(&bytes, "(5,)", shape)
+    }
 
     fn file_with(dir: &Path, add: impl FnOnce(&mut NpzWriter<NpzOutput>) -> Result<(), WriteNpzError>) -> PathBuf {
         let path = dir.join("a.npz");
@@ -240,29 +313,17 @@ mod tests {
     #[test]
     fn a_header_that_promises_too_much_is_an_error() {
         let dir = tempfile::tempdir().unwrap();
-        let path = file_with(dir.path(), |npz| npz.add_array("body", &Array1::<f32>::zeros(5)));
-        let mut bytes = Vec::new();
-        ndarray_npy::WriteNpyExt::write_npy(&Array1::<f32>::zeros(5), &mut bytes).unwrap();
-        let promising = npy::tests::with_shape(&bytes, "(5,)", "(1000000000000,)");
-        let mut zip = zip::ZipWriter::new(File::create(&path).unwrap());
-        zip.start_file("body.npy", zip::write::SimpleFileOptions::default()).unwrap();
-        std::io::Write::write_all(&mut zip, &promising).unwrap();
-        zip.finish().unwrap();
+        let path = dir.path().join("a.npz");
+        archive(&path, &promising("(1000000000000,)"), zip::CompressionMethod::Stored);
         let text = format!("{:#}", Npz::open(&path).unwrap().floats("body", &[]).unwrap_err());
         assert!(text.contains("a.npz") && text.contains("body"), "{text}");
     }
 
     /// An archive of one array whose `n_bytes` are zeros behind the header of another shape.
     fn packed(path: &Path, shape: &str, n_bytes: usize) {
-        let mut bytes = Vec::new();
-        ndarray_npy::WriteNpyExt::write_npy(&Array1::<f32>::zeros(5), &mut bytes).unwrap();
-        let mut bytes = npy::tests::with_shape(&bytes, "(5,)", shape);
+        let mut bytes = promising(shape);
         bytes.resize(n_bytes, 0);
-        let options = zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Deflated);
-        let mut zip = zip::ZipWriter::new(File::create(path).unwrap());
-        zip.start_file("body.npy", options).unwrap();
-        std::io::Write::write_all(&mut zip, &bytes).unwrap();
-        zip.finish().unwrap();
+        archive(path, &bytes, zip::CompressionMethod::Deflated);
     }
 
     #[test]

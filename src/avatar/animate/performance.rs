@@ -3,11 +3,10 @@
 
 use super::rig::constraints::{ClampTally, Clamps, Constraints};
 use super::rig::rig::{CM, Rig};
-use super::solve::arm::SolveFilters;
+use super::solve::arm::{SolveFilters, rotations};
 use super::solve::head;
 use super::solve::legs::Legs;
 use super::solve::positions::JointPositions;
-use super::solve::rotations::rotations;
 use super::solve::smoothing::Smoothing;
 use super::solve::track::RotationTrack;
 use super::solve::trunk;

@@ -2,11 +2,10 @@
 
 use super::camera::PinholeCamera;
 use super::light::Light;
-use super::mesh::Mesh;
 use super::pixel::{PixelLight, Shading, is_empty, nearest};
 use super::shadow::ShadowMap;
 use super::srgb::{Srgb, compressed};
-use super::surfaces::Surfaces;
+use super::surfaces::{Mesh, Surfaces};
 use super::visibility::VisibleTriangles;
 use orator_base::types::image::Image;
 use std::sync::Arc;

@@ -1,7 +1,7 @@
 //! Pinhole camera without distortion, in world axes (cm, y up).
 
 use orator_base::math::rotation::Rotation;
-use orator_base::math::vec3::{Vec3, across, cross, scale, sub, unit};
+use orator_base::math::vec3::{Vec3, across, cross, sub, unit};
 
 /// Nearest depth that is projected, cm.
 pub const NEAR_CM: f64 = 5.0;
@@ -43,14 +43,6 @@ impl PinholeCamera {
         let per_cm = self.focal_px / z.max(NEAR_CM);
         [cx + per_cm * x, cy + per_cm * y]
     }
-
-    /// Unit vector in world axes from the camera through a pixel.
-    pub fn ray(&self, [x, y]: [f64; 2]) -> Vec3 {
-        let [cx, cy] = self.size.map(|n| (n as f64 - 1.0) / 2.0);
-        let seen = [x - cx, y - cy, self.focal_px];
-        let along = self.axes.inverse().turn(seen);
-        scale(along, 1.0 / orator_base::math::vec3::norm(along))
-    }
 }
 
 #[cfg(test)]
@@ -66,9 +58,6 @@ mod tests {
         assert!((x - 319.5).abs() < 1e-9 && (y - 239.5).abs() < 1e-9);
         assert!(px([0.0, 160.0, 0.0])[1] < y - 50.0);
         assert!(px([20.0, 120.0, 0.0])[0] > x + 50.0);
-        let along = camera.ray(px([20.0, 120.0, 0.0]));
-        let to = unit(sub([20.0, 120.0, 0.0], camera.position), 0.0).unwrap();
-        assert!((0..3).all(|k| (along[k] - to[k]).abs() < 1e-9));
     }
 
     #[test]

@@ -3,7 +3,6 @@
 pub mod background;
 pub mod camera;
 pub mod light;
-pub mod mesh;
 mod pixel;
 pub mod renderer;
 mod samples;
@@ -15,6 +14,6 @@ mod visibility;
 pub use background::Background;
 pub use camera::PinholeCamera;
 pub use light::Light;
-pub use mesh::Mesh;
 pub use renderer::Renderer;
 pub use srgb::Srgb;
+pub use surfaces::Mesh;

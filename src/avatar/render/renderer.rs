@@ -4,11 +4,10 @@
 use super::background::{Background, StaticScene};
 use super::camera::PinholeCamera;
 use super::light::Light;
-use super::mesh::Mesh;
 use super::pixel::Shading;
 use super::samples::NO_TRIANGLE;
 use super::shadow::ShadowMap;
-use super::surfaces::Surfaces;
+use super::surfaces::{Mesh, Surfaces};
 use super::visibility::VisibleTriangles;
 use orator_base::types::image::Image;
 use std::sync::Arc;

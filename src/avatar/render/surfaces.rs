@@ -2,7 +2,6 @@
 
 use super::camera::{NEAR_CM, PinholeCamera};
 use super::light::{Light, direction, dot};
-use super::mesh::Mesh;
 use super::samples::{Extent, FlatTriangle, PARTS};
 use super::shadow::{self, ShadowMap};
 
@@ -15,6 +14,23 @@ pub const INNER_LIGHT: f32 = 0.45;
 
 /// Ratio of the depths within a triangle up to which it is even.
 const EVEN: f32 = 1.03;
+
+/// Triangle mesh in world axes (cm, y up), counter-clockwise seen from outside; all vertex lists are equally long.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mesh {
+    pub points: Vec<[f32; 3]>,
+    /// Unit outward normals.
+    pub normals: Vec<[f32; 3]>,
+    /// Linear RGB reflectance, 0..1.
+    pub colours: Vec<[f32; 3]>,
+    pub triangles: Vec<[u32; 3]>,
+    /// Number of the first triangles that enclose volumes, whose inner sides nobody sees.
+    pub n_closed: usize,
+    /// Label of each vertex, for instance the joint that moves it; a triangle has that of its first vertex.
+    pub labels: Vec<u16>,
+    /// Strength of the highlight, 0 (cloth) .. 1 (glass).
+    pub gloss: f32,
+}
 
 /// Light of its own, light of the key where that reaches it (linear RGB), and the point in the light's axes where to ask
 /// whether it does. The fourth numbers fill up registers.

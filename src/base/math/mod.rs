@@ -5,7 +5,6 @@ pub mod eigen;
 pub mod gaussian;
 pub mod local_fit;
 pub mod noise;
-pub mod one_euro;
 pub mod order;
 pub mod procrustes;
 pub mod rotation;

@@ -1,24 +1,16 @@
 //! Options of `orator animate` that say how a film shows bodies.
 
-use anyhow::{Result, ensure};
 use orator_avatar::animate::export::film_avatar::FilmCamera;
-use orator_avatar::animate::export::film_panel::FilmStyle;
 
 #[derive(clap::Args)]
 pub struct FilmArgs {
-    /// Body of a film: a clothed avatar, or the bones as a drawn figure with its sides in two colours.
-    #[arg(long, value_enum, default_value = "avatar")]
-    style: StyleName,
+    /// Removed: only its former default is accepted.
+    #[arg(long = "style", hide = true, value_parser = former_style)]
+    _style: Option<String>,
     /// Where a film sees the avatar from; `source`: from the camera of the video --beside that the motion was lifted
     /// from, before its picture.
     #[arg(long, value_enum, default_value = "front")]
     camera: CameraName,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum StyleName {
-    Avatar,
-    Figure,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -29,11 +21,10 @@ enum CameraName {
 }
 
 impl FilmArgs {
-    pub fn style(&self) -> FilmStyle {
-        match (self.style, self.camera) {
-            (StyleName::Figure, _) => FilmStyle::Figure,
-            (StyleName::Avatar, CameraName::Front | CameraName::Source) => FilmStyle::Avatar(FilmCamera::Front),
-            (StyleName::Avatar, CameraName::ThreeQuarter) => FilmStyle::Avatar(FilmCamera::ThreeQuarter),
+    pub fn camera(&self) -> FilmCamera {
+        match self.camera {
+            CameraName::Front | CameraName::Source => FilmCamera::Front,
+            CameraName::ThreeQuarter => FilmCamera::ThreeQuarter,
         }
     }
 
@@ -42,15 +33,15 @@ impl FilmArgs {
         self.camera == CameraName::Source
     }
 
-    /// Options and whether they were given another value than the plain one.
-    pub fn given(&self) -> [(&'static str, bool); 2] {
-        [("--style", self.style != StyleName::Avatar), ("--camera", self.camera != CameraName::Front)]
+    /// Whether a camera other than the default was named.
+    pub fn is_given(&self) -> bool {
+        self.camera != CameraName::Front
     }
+}
 
-    /// Errors on a camera without the avatar.
-    pub fn check(&self) -> Result<()> {
-        let both = self.given().iter().all(|(_, is_given)| *is_given);
-        ensure!(!both, "--camera is for the avatar: leave --style figure or --camera away");
-        Ok(())
+fn former_style(style: &str) -> Result<String, String> {
+    if style == "avatar" {
+        return Ok(style.to_owned());
     }
+    Err("--style was removed: films show the avatar, and `orator sheet` draws the joints as pictures".to_owned())
 }

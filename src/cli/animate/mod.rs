@@ -3,9 +3,9 @@
 mod body_args;
 mod film_args;
 pub mod input;
+mod report_text;
 mod retarget_args;
 mod smoothing_args;
-mod told;
 pub mod verb;
 
 pub use verb::{Args, run};

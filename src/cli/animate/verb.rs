@@ -3,9 +3,9 @@
 use super::body_args::BodyArgs;
 use super::film_args::FilmArgs;
 use super::input::{InputMotion, MotionInput, inputs};
+use super::report_text;
 use super::retarget_args::{OpenedRig, RetargetArgs};
 use super::smoothing_args::SmoothingArgs;
-use super::told;
 use crate::cli::Outcome;
 use crate::cli::config_args::split;
 use crate::cli::confine::confine;
@@ -13,9 +13,10 @@ use crate::cli::figure_args::FigureArgs;
 use crate::cli::outputs::{OutputFiles, names, next_output, outputs};
 use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, bail, ensure};
+use clap::ArgAction;
+use clap::builder::BoolishValueParser;
 use orator_avatar::animate::export::file::{ExportContent, ExportFormat};
 use orator_avatar::animate::export::film::{SecondPanel, smooth_rate};
-use orator_avatar::animate::export::film_panel::{FilmBody, FilmStyle};
 use orator_avatar::animate::export::film_source::SourceCamera;
 use orator_avatar::animate::{AnimationOptions, Constraints, Legs, Performance, perform};
 use orator_base::motion::units;
@@ -100,14 +101,9 @@ pub struct Args {
     no_constraints: bool,
     /// Whether the four fingers curl within 10 degrees of their mean, as Rebol et al. (2021) have it; a pointing finger is
     /// then bent with the others.
-    #[arg(long, value_enum, default_value = "off", conflicts_with = "no_constraints")]
-    curl_coherence: Switch,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Switch {
-    On,
-    Off,
+    #[arg(long, value_name = "on|off", default_value = "off", conflicts_with = "no_constraints", action = ArgAction::Set,
+          value_parser = BoolishValueParser::new())]
+    curl_coherence: bool,
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
@@ -198,14 +194,11 @@ fn whole_folder(
 /// Errors on an option that changes nothing in these outputs.
 fn check_effect(args: &Args, outputs: &OutputFiles) -> Result<()> {
     let is_film = outputs.iter().any(|&(_, format)| format == ExportFormat::Mp4);
-    args.film.check()?;
-    let beside = [("--beside", args.beside.is_some()), ("--audio", args.audio.is_some())];
-    let given = beside.into_iter().chain(args.film.given());
-    for (option, is_given) in given {
+    let (beside, audio) = (args.beside.is_some(), args.audio.is_some());
+    for (option, is_given) in [("--beside", beside), ("--audio", audio), ("--camera", args.film.is_given())] {
         ensure!(is_film || !is_given, "{option} is for films: name an .mp4 at --out, or leave it away");
     }
-    args.figure.check(outputs)?;
-    args.smoothing.check()
+    args.figure.check(outputs)
 }
 
 /// The report on one animation, for people and for programs.
@@ -248,16 +241,12 @@ fn animate(
         Some([ours, other]) => [ours.clone(), other.clone()],
         _ => [input.name.clone(), args.beside.as_deref().map(stem).unwrap_or_default()],
     };
-    let style = args.film.style();
-    let other_motion = other.as_ref().filter(|_| style == FilmStyle::Figure).map(Performance::motion);
-    let other = other.as_ref().map(|other| FilmBody::new(style, other, other_motion.as_ref()));
-    let beside = match (&args.beside, other) {
+    let beside = match (&args.beside, &other) {
         (None, _) => SecondPanel::Itself,
-        (Some(_), Some(body)) => SecondPanel::Motion { body, labels: labels.each_ref().map(String::as_str) },
-        (Some(path), None) => match &source {
-            Some(camera) => SecondPanel::Behind { path, from_secs: args.beside_from, camera },
-            None => SecondPanel::Video { path, from_secs: args.beside_from },
-        },
+        (Some(_), Some(performance)) => {
+            SecondPanel::Motion { performance, labels: labels.each_ref().map(String::as_str) }
+        }
+        (Some(path), None) => SecondPanel::Video { path, from_secs: args.beside_from, camera: source.as_ref() },
     };
     let is_film = outputs.iter().any(|&(_, format)| format == ExportFormat::Mp4);
     let motion_secs = motion.fps.secs(motion.n_frames());
@@ -265,9 +254,7 @@ fn animate(
         Ok(audio::read_mono(path, SAMPLE_RATE)?.map(|whole| part(&whole, from_secs, motion_secs)))
     };
     let sound = match (sound, beside) {
-        (None, SecondPanel::Video { path, from_secs } | SecondPanel::Behind { path, from_secs, .. }) if is_film => {
-            of_file(path, from_secs)?
-        }
+        (None, SecondPanel::Video { path, from_secs, .. }) if is_film => of_file(path, from_secs)?,
         (sound, _) => sound,
     };
     let sound = match (sound, input.sound_of_run()) {
@@ -283,7 +270,7 @@ fn animate(
         sound: sound.as_ref(),
         names: args.figure.options().names,
         beside,
-        style,
+        camera: args.film.camera(),
         film_fps: Some(film_fps),
         posture: None,
     };
@@ -302,7 +289,7 @@ fn animate(
         motion.fps,
         clip.n_frames(),
         clip.fps,
-        told::words(report)
+        report_text::text(report)
     );
     let facts = json!({
         "name": input.name,
@@ -313,7 +300,7 @@ fn animate(
         "written_frames": clip.n_frames(),
         "written_fps": clip.fps,
         "times_real_time": motion_secs / secs.max(1e-9),
-        "told": report,
+        "report": report,
         "film_has_sound": is_film.then_some(sound.is_some()),
         "outputs": names(outputs),
     });
@@ -337,7 +324,7 @@ fn options(args: &Args) -> Result<AnimationOptions> {
     let smoothing = args.smoothing.smoothing()?;
     let constraints = match args.no_constraints {
         true => Constraints::NONE,
-        false => Constraints { limits: true, curl_coherence: args.curl_coherence == Switch::On },
+        false => Constraints { limits: true, curl_coherence: args.curl_coherence },
     };
     let (yaw, breath) = (args.body.yaw(), args.body.has_breath());
     let fps = args.figure.options().fps;

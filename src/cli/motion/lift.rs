@@ -10,7 +10,7 @@ use orator_base::types::pose2d::Keypoints;
 use orator_base::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST};
 use orator_base::types::time::FrameRate;
 use orator_dataset::config;
-use orator_formats::joints::description;
+use orator_formats::joints_description as description;
 use orator_formats::keypoints;
 use orator_formats::keypoints::{CoordinateUnit, range};
 use orator_formats::npz::Npz;

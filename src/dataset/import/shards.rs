@@ -12,8 +12,8 @@ use orator_base::types::posture::Posture;
 use orator_base::types::skeleton::N_JOINTS;
 use orator_base::types::sound::{SAMPLE_RATE, Sound};
 use orator_base::types::time::FrameRate;
-use orator_formats::npy_slice;
-use orator_formats::npy_slice::{Element, Layout};
+use orator_formats::npy;
+use orator_formats::npy::{Element, Layout};
 use orator_formats::wav;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -189,12 +189,12 @@ impl LooseSample {
         };
         let (n_frames, at) = rows(pose3d, Element::F32, &[N_JOINTS, 3]).context("pose3d.npy")?;
         let joints =
-            Array3::from_shape_vec((n_frames, N_JOINTS, 3), npy_slice::floats(&pose3d[at..])).context("pose3d.npy")?;
+            Array3::from_shape_vec((n_frames, N_JOINTS, 3), npy::floats(&pose3d[at..])).context("pose3d.npy")?;
         let (n_rows, at) = rows(mask, Element::Bool, &[N_JOINTS]).context("mask.npy")?;
-        let mask = Array2::from_shape_vec((n_rows, N_JOINTS), npy_slice::bools(&mask[at..])).context("mask.npy")?;
+        let mask = Array2::from_shape_vec((n_rows, N_JOINTS), npy::bools(&mask[at..])).context("mask.npy")?;
         let (n_rows, at) = rows(pose2d, Element::F32, &[N_KEYPOINTS, 3]).context("pose2d.npy")?;
         let pose2d =
-            Array3::from_shape_vec((n_rows, N_KEYPOINTS, 3), npy_slice::floats(&pose2d[at..])).context("pose2d.npy")?;
+            Array3::from_shape_vec((n_rows, N_KEYPOINTS, 3), npy::floats(&pose2d[at..])).context("pose2d.npy")?;
         let sound = read_wav(sound).context("wav")?;
         fps.checked().context("json: fps")?;
         let motion = Motion { fps, joints, mask }.in_range().context("pose3d.npy")?;
@@ -208,7 +208,7 @@ impl LooseSample {
 fn angles(place: &MemberLocation) -> Result<Array2<f32>> {
     let bytes = read_place(place)?;
     let layout = Layout::parse(&bytes, bytes.len() as u64, Element::F32, &[3]).context("head.npy or trunk.npy")?;
-    Array2::from_shape_vec((layout.n_rows, 3), npy_slice::floats(&bytes[layout.data_at..])).context("shaping angles")
+    Array2::from_shape_vec((layout.n_rows, 3), npy::floats(&bytes[layout.data_at..])).context("shaping angles")
 }
 
 /// Sound of a 16-bit mono wav at the dataset's rate, with any header.

@@ -22,7 +22,7 @@ use orator_base::stage::fingerprint::hash_file;
 use orator_base::stage::ledger::{Kept, Ledger, Refused, TranscriptAccount, WordCount};
 use orator_base::stage::refusal::{FrameRefusal, Refusal};
 use orator_base::types::sound::Sound;
-use orator_formats::joints::description::path_of;
+use orator_formats::joints_description::path_of;
 use orator_formats::mocap::bvh;
 use std::path::{Path, PathBuf};
 

@@ -2,8 +2,6 @@
 //! without prefix, case and separators, so `mixamorig:LeftForeArm`, `CC_Base_L_Forearm`, `LowerArm_L` and
 //! `left_elbow` all are the left elbow.
 
-use anyhow::{Result, bail};
-
 /// The ten joints that place an upper body, in this order.
 pub const ROLES: [&str; 10] = [
     "neck",
@@ -56,26 +54,6 @@ pub fn find(names: &[&str]) -> [Option<usize>; 10] {
     ]
 }
 
-/// Index of the name, the root first, that plays each of the ten roles; the root stands for both hips where a skeleton has
-/// none. Errors: the roles nobody plays, and the names there are.
-pub fn upper_body(names: &[&str]) -> Result<[usize; 10]> {
-    let mut found = find(names);
-    if found[8..] == [None, None] {
-        found[8..].fill(Some(0));
-    }
-    let missing: Vec<&str> = ROLES.iter().zip(&found).filter_map(|(role, f)| f.is_none().then_some(*role)).collect();
-    if !missing.is_empty() {
-        let there: Vec<&str> = names.iter().copied().take(40).collect();
-        bail!(
-            "no joint is named like a {}; expected names like Neck, Head, LeftArm, LeftForeArm, LeftHand, LeftUpLeg \
-             (also l_shoulder, UpperArm_L, ...); its joints are: {}",
-            missing.join(", "),
-            there.join(" ")
-        );
-    }
-    Ok(std::array::from_fn(|role| found[role].unwrap_or_default()))
-}
-
 /// Without the skeleton's prefix, case and separators.
 pub fn plain(name: &str) -> String {
     let name = name.rsplit([':', '|']).next().unwrap_or(name);
@@ -118,7 +96,7 @@ mod tests {
         ];
         for kind in kinds {
             let names: Vec<&str> = kind.split_whitespace().collect();
-            let found = upper_body(&names).unwrap().map(|j| names[j].to_ascii_lowercase());
+            let found = find(&names).map(|j| names[j.unwrap()].to_ascii_lowercase());
             assert!(found[0].contains("neck") && found[1].contains("head"), "{found:?}");
             for (j, word) in [(2, "r"), (5, "l")] {
                 assert!(!found[j].contains("collar") && !found[j].contains("leg"), "{found:?}");
@@ -127,12 +105,5 @@ mod tests {
             }
             assert!(found[2..5].iter().all(|n| !plain(n).starts_with("left")), "{found:?}");
         }
-        let legless = "Pelvis Neck Head LeftArm LeftForeArm LeftHand RightArm RightForeArm RightHand";
-        let names: Vec<&str> = legless.split_whitespace().collect();
-        assert_eq!(upper_body(&names).unwrap()[8..], [0, 0]);
-        let names = ["Neck", "Head", "LeftShoulder", "LeftArm", "RightArm", "LeftLeg", "Tail"];
-        let text = upper_body(&names).unwrap_err().to_string();
-        assert!(text.contains("right elbow") && text.contains("right hip") && text.contains("Tail"), "{text}");
-        assert!(!text.contains("left shoulder,"), "{text}");
     }
 }

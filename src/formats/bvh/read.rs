@@ -1,9 +1,8 @@
 //! Reads BVH: any hierarchy, channels in any order and number, and the positions of all joints in a frame. What the
 //! joints mean is `mocap`'s.
 
+use super::skeleton::{JointChannels, placed};
 use anyhow::{Context, Result, anyhow, bail, ensure};
-use orator_base::math::rotation::Rotation;
-use orator_base::math::vec3;
 use orator_base::math::vec3::Vec3;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -11,23 +10,14 @@ use std::path::Path;
 /// A BVH file in memory, in its own units and axes.
 #[derive(Clone, Debug)]
 pub struct Bvh {
-    pub joints: Vec<BvhJoint>,
+    /// An `End Site` is named after its parent, with `_end`.
+    pub joints: Vec<JointChannels>,
     /// Seconds between two frames.
     pub frame_secs: f64,
     pub n_frames: usize,
     /// Frame by frame all channels in the order of the joints.
     pub(super) values: Vec<f64>,
     pub(super) n_channels: usize,
-}
-
-/// A joint, or the end of a bone (an `End Site`, named after its parent with `_end`).
-#[derive(Clone, Debug)]
-pub struct BvhJoint {
-    pub name: String,
-    pub parent: Option<usize>,
-    pub offset: Vec3,
-    pub(super) channels: Vec<Channel>,
-    pub(super) first_channel: usize,
 }
 
 /// Axis 0 x, 1 y, 2 z.
@@ -67,7 +57,7 @@ impl Bvh {
         let mut words = Words(text.split_ascii_whitespace());
         words.expect("HIERARCHY")?;
         words.expect("ROOT")?;
-        let mut joints: Vec<BvhJoint> = Vec::new();
+        let mut joints: Vec<JointChannels> = Vec::new();
         let mut n_channels = 0;
         let mut open: Vec<usize> = Vec::new();
         push(&mut joints, &mut open, words.next("the root's name")?.to_owned(), &mut words)?;
@@ -75,9 +65,10 @@ impl Bvh {
             match words.next("the rest of the hierarchy")? {
                 "OFFSET" => joints[current].offset = [words.number()?, words.number()?, words.number()?],
                 "CHANNELS" => {
+                    let is_first = current + 1 == joints.len() && joints[current].channels.is_empty();
+                    ensure!(is_first, "joint {}: CHANNELS must stand once, before its children", joints[current].name);
                     let count = words.number()?;
                     ensure!((0.0..=6.0).contains(&count), "a joint with {count} channels");
-                    joints[current].first_channel = n_channels;
                     joints[current].channels =
                         (0..count as usize).map(|_| channel(words.next("a channel")?)).collect::<Result<_>>()?;
                     n_channels += joints[current].channels.len();
@@ -134,13 +125,13 @@ impl Bvh {
             return positions;
         }
         let (mut to_offset, mut to_zero) = (0.0, 0.0);
-        for joint in self.joints.iter().filter(|j| j.parent.is_some()) {
-            for frame in self.frames().take(100) {
-                for (channel, value) in joint.channels.iter().zip(&frame[joint.first_channel..]) {
-                    if let Channel::Position(axis) = *channel {
-                        to_offset += (value - joint.offset[axis]).abs();
-                        to_zero += value.abs();
-                    }
+        for frame in self.frames().take(100) {
+            let channels =
+                self.joints.iter().flat_map(|joint| joint.channels.iter().map(move |channel| (joint, channel)));
+            for ((joint, channel), value) in channels.zip(frame).filter(|((joint, _), _)| joint.parent.is_some()) {
+                if let Channel::Position(axis) = *channel {
+                    to_offset += (value - joint.offset[axis]).abs();
+                    to_zero += value.abs();
                 }
             }
         }
@@ -150,49 +141,19 @@ impl Bvh {
     /// Positions of all joints in every frame, in the file's units and axes.
     pub fn positions(&self, positions: Positions) -> Vec<Vec<Vec3>> {
         let positions = self.settle(positions);
-        self.frames().map(|frame| self.pose(frame, positions)).collect()
+        self.frames().map(|frame| placed(&self.joints, frame, positions)).collect()
     }
 
     /// All channels of each frame, in the order of the joints.
     pub fn frames(&self) -> impl Iterator<Item = &[f64]> {
         (0..self.n_frames).map(|t| &self.values[t * self.n_channels..(t + 1) * self.n_channels])
     }
-
-    fn pose(&self, frame: &[f64], positions: Positions) -> Vec<Vec3> {
-        let mut turned = vec![Rotation::IDENTITY; self.joints.len()];
-        let mut placed = vec![[0.0; 3]; self.joints.len()];
-        for (i, joint) in self.joints.iter().enumerate() {
-            let (mut step, mut turn) = (joint.offset, Rotation::IDENTITY);
-            for (channel, &value) in joint.channels.iter().zip(&frame[joint.first_channel..]) {
-                match *channel {
-                    Channel::Position(axis) if positions == Positions::Replace => step[axis] = value,
-                    Channel::Position(axis) => step[axis] += value,
-                    Channel::Rotation(axis) => {
-                        let mut about = [0.0; 3];
-                        about[axis] = 1.0;
-                        turn = turn * Rotation::about(about, value.to_radians());
-                    }
-                }
-            }
-            (turned[i], placed[i]) = match joint.parent {
-                Some(p) => (turned[p] * turn, vec3::add(placed[p], turned[p].turn(step))),
-                None => (turn, step),
-            };
-        }
-        placed
-    }
 }
 
 /// Opens a joint below the innermost open one.
-fn push(joints: &mut Vec<BvhJoint>, open: &mut Vec<usize>, name: String, words: &mut Words) -> Result<()> {
+fn push(joints: &mut Vec<JointChannels>, open: &mut Vec<usize>, name: String, words: &mut Words) -> Result<()> {
     words.expect("{")?;
-    joints.push(BvhJoint {
-        name,
-        parent: open.last().copied(),
-        offset: [0.0; 3],
-        channels: Vec::new(),
-        first_channel: 0,
-    });
+    joints.push(JointChannels { name, parent: open.last().copied(), offset: [0.0; 3], channels: Vec::new() });
     open.push(joints.len() - 1);
     Ok(())
 }

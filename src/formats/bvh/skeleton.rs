@@ -1,6 +1,6 @@
 //! The skeleton of a BVH file, kept so that other motion can be written in it: joints, offsets and channels as they were.
 
-use super::read::{Bvh, Channel};
+use super::read::{Bvh, Channel, Positions};
 use anyhow::{Result, ensure};
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::{self, Vec3};
@@ -44,13 +44,7 @@ pub struct BvhSkeleton {
 impl BvhSkeleton {
     /// The skeleton of a file.
     pub fn of(bvh: &Bvh) -> Self {
-        let joint = |joint: &super::read::BvhJoint| JointChannels {
-            name: joint.name.clone(),
-            parent: joint.parent,
-            offset: joint.offset,
-            channels: joint.channels.clone(),
-        };
-        Self { joints: bvh.joints.iter().map(joint).collect() }
+        Self { joints: bvh.joints.clone() }
     }
 
     /// Numbers of a frame.
@@ -87,31 +81,22 @@ impl BvhSkeleton {
 
     /// Positions of all joints for the channels of a frame, in the file's unit; position channels are added to the offset.
     pub fn positions(&self, frame: &[f64]) -> Vec<Vec3> {
-        let mut turned = vec![Rotation::IDENTITY; self.joints.len()];
-        let mut placed = vec![[0.0; 3]; self.joints.len()];
-        let mut values = frame.iter();
-        for (at, joint) in self.joints.iter().enumerate() {
-            let (mut step, mut turn) = (joint.offset, Rotation::IDENTITY);
-            for (channel, value) in joint.channels.iter().zip(values.by_ref()) {
-                match *channel {
-                    Channel::Position(axis) => step[axis] += value,
-                    Channel::Rotation(axis) => {
-                        let mut about = [0.0; 3];
-                        about[axis] = 1.0;
-                        turn = turn * Rotation::about(about, value.to_radians());
-                    }
-                }
-            }
-            (turned[at], placed[at]) = match joint.parent {
-                Some(parent) => (turned[parent] * turn, vec3::add(placed[parent], turned[parent].turn(step))),
-                None => (turn, step),
-            };
-        }
-        placed
+        placed(&self.joints, frame, Positions::Add)
     }
 
     /// A BVH file of this skeleton; `frames`: all channels of each frame.
     pub fn to_bvh<'a>(&self, fps: FrameRate, frames: impl ExactSizeIterator<Item = &'a [f64]>) -> String {
+        let mut text = self.head(fps, frames.len());
+        for frame in frames {
+            let numbers: Vec<String> = frame.iter().map(|value| format!("{value:.6}")).collect();
+            text.push_str(&numbers.join(" "));
+            text.push('\n');
+        }
+        text
+    }
+
+    /// Text of a file up to the numbers of its first frame.
+    pub(super) fn head(&self, fps: FrameRate, n_frames: usize) -> String {
         let mut text = String::from("HIERARCHY\n");
         let mut open: Vec<usize> = Vec::new();
         for (at, joint) in self.joints.iter().enumerate() {
@@ -136,14 +121,35 @@ impl BvhSkeleton {
         while open.pop().is_some() {
             let _ = writeln!(text, "{}}}", "\t".repeat(open.len()));
         }
-        let _ = write!(text, "MOTION\nFrames: {}\nFrame Time: {:.8}\n", frames.len(), 1.0 / fps.per_sec());
-        for frame in frames {
-            let numbers: Vec<String> = frame.iter().map(|value| format!("{value:.6}")).collect();
-            text.push_str(&numbers.join(" "));
-            text.push('\n');
-        }
+        let _ = write!(text, "MOTION\nFrames: {n_frames}\nFrame Time: {:.8}\n", 1.0 / fps.per_sec());
         text
     }
+}
+
+/// Positions of joints, parents before children, for the channels of a frame, in the file's unit.
+pub(super) fn placed(joints: &[JointChannels], frame: &[f64], positions: Positions) -> Vec<Vec3> {
+    let mut turned = vec![Rotation::IDENTITY; joints.len()];
+    let mut placed = vec![[0.0; 3]; joints.len()];
+    let mut values = frame.iter();
+    for (at, joint) in joints.iter().enumerate() {
+        let (mut step, mut turn) = (joint.offset, Rotation::IDENTITY);
+        for (channel, &value) in joint.channels.iter().zip(values.by_ref()) {
+            match *channel {
+                Channel::Position(axis) if positions == Positions::Replace => step[axis] = value,
+                Channel::Position(axis) => step[axis] += value,
+                Channel::Rotation(axis) => {
+                    let mut about = [0.0; 3];
+                    about[axis] = 1.0;
+                    turn = turn * Rotation::about(about, value.to_radians());
+                }
+            }
+        }
+        (turned[at], placed[at]) = match joint.parent {
+            Some(parent) => (turned[parent] * turn, vec3::add(placed[parent], turned[parent].turn(step))),
+            None => (turn, step),
+        };
+    }
+    placed
 }
 
 fn channel_name(channel: &Channel) -> String {
@@ -157,7 +163,6 @@ fn channel_name(channel: &Channel) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bvh::read::Positions;
 
     const TEXT: &str = include_str!("../../../fixtures/reference/bvh_take.bvh");
 

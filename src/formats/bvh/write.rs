@@ -1,14 +1,14 @@
 //! Writes BVH: a skeleton with local rotations over time. The root has six channels, every other joint three, in the
 //! order Z X Y; an end of a bone is an `End Site`. Which skeleton, and in which axes and units, is the caller's.
 
+use super::read::Channel;
+use super::skeleton::{BvhSkeleton, JointChannels};
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::{Vec3, add, scale};
 use orator_base::motion::fk::{Joint, Skeleton};
 use orator_base::types::time::FrameRate;
 use std::fmt::Write as _;
 use std::io;
-
-const ROTATION_CHANNELS: &str = "Zrotation Xrotation Yrotation";
 
 /// Rotations of a skeleton over time.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,21 +72,14 @@ impl BvhClip {
 
     /// Writes the text of `to_bvh` frame by frame.
     pub fn write_bvh(&self, out: &mut dyn io::Write) -> io::Result<()> {
-        let mut text = String::from("HIERARCHY\n");
         let order = self.written_order();
-        let mut open: Vec<usize> = Vec::new();
-        for &joint in &order {
-            while open.last().is_some_and(|&last| Some(last) != self.skeleton.joints[joint].parent) {
-                open.pop();
-                let _ = writeln!(text, "{}}}", "\t".repeat(open.len()));
-            }
-            head(&mut text, &self.skeleton.joints[joint], open.len());
-            open.push(joint);
-        }
-        while open.pop().is_some() {
-            let _ = writeln!(text, "{}}}", "\t".repeat(open.len()));
-        }
-        let _ = write!(text, "MOTION\nFrames: {}\nFrame Time: {:.8}\n", self.n_frames(), 1.0 / self.fps.per_sec());
+        let place = |joint: usize| order.iter().position(|&written| written == joint);
+        let joint = |&joint: &usize| {
+            let Joint { name, parent, offset, end } = self.skeleton.joints[joint].clone();
+            JointChannels { name, parent: parent.and_then(place), offset, channels: channels(end, parent.is_none()) }
+        };
+        let written = BvhSkeleton { joints: order.iter().map(joint).collect() };
+        let mut text = written.head(self.fps, self.n_frames());
         let moving: Vec<usize> = order.into_iter().filter(|&joint| !self.skeleton.joints[joint].end).collect();
         for (frame_idx, local) in self.local.iter().enumerate() {
             let [x, y, z] = self.root_at(frame_idx);
@@ -115,19 +108,9 @@ impl BvhClip {
     }
 }
 
-/// Name, offset and channels of a joint, its brace left open.
-fn head(text: &mut String, joint: &Joint, depth: usize) {
-    let indent = "\t".repeat(depth);
-    let [x, y, z] = joint.offset;
-    let (kind, channels) = match (joint.end, joint.parent) {
-        (true, _) => ("End Site".to_owned(), String::new()),
-        (false, None) => (
-            format!("ROOT {}", joint.name),
-            format!("{indent}\tCHANNELS 6 Xposition Yposition Zposition {ROTATION_CHANNELS}\n"),
-        ),
-        (false, Some(_)) => (format!("JOINT {}", joint.name), format!("{indent}\tCHANNELS 3 {ROTATION_CHANNELS}\n")),
-    };
-    let _ = write!(text, "{indent}{kind}\n{indent}{{\n{indent}\tOFFSET {x:.6} {y:.6} {z:.6}\n{channels}");
+fn channels(is_end: bool, is_root: bool) -> Vec<Channel> {
+    let positions = if is_root { [0, 1, 2].map(Channel::Position).to_vec() } else { Vec::new() };
+    if is_end { Vec::new() } else { [positions, [2, 0, 1].map(Channel::Rotation).to_vec()].concat() }
 }
 
 #[cfg(test)]

@@ -8,18 +8,17 @@ use crate::keypoints_npz;
 use crate::npy;
 use crate::npz::Npz;
 use anyhow::{Context, Result, bail};
-use ndarray::{Array3, ArrayD, ArrayView2, Axis, IxDyn};
-use ndarray_npy::ReadNpyError;
+use ndarray::{Array3, ArrayView2, Axis};
 use orator_base::types::pose2d::Keypoint;
 use orator_base::types::time::FrameRate;
 use std::path::Path;
 
 /// Reads the one array of a `.npy` file.
 pub fn read_npy(path: &Path, bytes: &[u8]) -> Result<FoundKeypoints> {
-    let array = numbers(bytes).with_context(|| {
-        format!("{} is no .npy file of numbers (float32, float64 or integers; no objects)", path.display())
-    })?;
-    of_arrays(path, vec![(String::new(), array)])
+    let expected =
+        || format!("{} is no .npy file of numbers (float32, float64 or integers; no objects)", path.display());
+    let array = npy::numbers(bytes).with_context(expected)?.with_context(expected)?;
+    of_arrays(path, vec![(String::new(), array.mapv(|v| v as f32))])
 }
 
 /// Reads a `.npz` file; `fps` (one number, or numerator and denominator) and `image_size` (width, height) are read with
@@ -76,22 +75,4 @@ fn ours(path: &Path, fps: Option<FrameRate>) -> Result<FoundKeypoints> {
 
 fn triples(points: ArrayView2<f32>) -> Vec<Keypoint> {
     points.outer_iter().map(|p| point(p[0], p[1], p[2])).collect()
-}
-
-/// The array of a `.npy` file, of any usual type, as f32.
-fn numbers(bytes: &[u8]) -> Result<ArrayD<f32>, ReadNpyError> {
-    let other = |error: ReadNpyError| matches!(error, ReadNpyError::WrongDescriptor(_)).then_some(()).ok_or(error);
-    match npy::parse::<f32, IxDyn>(bytes).map_err(other) {
-        Ok(array) => return Ok(array),
-        Err(wrong) => wrong?,
-    }
-    match npy::parse::<f64, IxDyn>(bytes).map_err(other) {
-        Ok(array) => return Ok(array.mapv(|v| v as f32)),
-        Err(wrong) => wrong?,
-    }
-    match npy::parse::<i32, IxDyn>(bytes).map_err(other) {
-        Ok(array) => return Ok(array.mapv(|v| v as f32)),
-        Err(wrong) => wrong?,
-    }
-    Ok(npy::parse::<i64, IxDyn>(bytes)?.mapv(|v| v as f32))
 }

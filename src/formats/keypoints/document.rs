@@ -34,7 +34,7 @@ struct AnnotatedImage {
 /// People of a file.
 pub struct JsonPeople {
     /// The program in a word: `OpenPose`.
-    program: &'static str,
+    pub program: &'static str,
     image_size: Option<[u32; 2]>,
     pub people: FramePeople,
 }
@@ -98,11 +98,6 @@ pub fn people(bytes: &[u8]) -> Result<JsonPeople> {
 impl JsonPeople {
     fn new(program: &'static str, people: FramePeople) -> Self {
         Self { program, image_size: None, people }
-    }
-
-    /// The program in a word.
-    pub fn program(&self) -> &'static str {
-        self.program
     }
 }
 

@@ -3,10 +3,11 @@
 
 use super::found::FoundPerson;
 use super::layout::PointLayout;
-use super::numbers::PointNumbers;
 use orator_base::types::pose2d::{Keypoint, N_HAND};
 use orator_base::types::skeleton::Side;
 use serde::Deserialize;
+use serde::de::{DeserializeSeed, Deserializer, Error, SeqAccess, Visitor};
+use std::fmt;
 
 /// Keys of all formats together; each file has some of them.
 #[derive(Clone, Debug, Default, Deserialize)]
@@ -92,4 +93,57 @@ fn scored(numbers: &[f32], scores: &[f32]) -> Result<Vec<Keypoint>, String> {
         return Err(format!("`keypoints` holds {n} numbers for {n_scores} scores, expected x and y for each (2D)"));
     }
     Ok(pairs.iter().zip(scores).map(|(&[x, y], &score)| point(x, y, score)).collect())
+}
+
+/// Lists of numbers in JSON, however deep they are nested, as one flat list; `null` is NaN.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct PointNumbers(Vec<f32>);
+
+impl<'de> Deserialize<'de> for PointNumbers {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let mut numbers = Vec::new();
+        Flat(&mut numbers).deserialize(deserializer)?;
+        Ok(Self(numbers))
+    }
+}
+
+/// The list that numbers are put on.
+struct Flat<'a>(&'a mut Vec<f32>);
+
+impl<'de> DeserializeSeed<'de> for Flat<'_> {
+    type Value = ();
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
+        deserializer.deserialize_any(self)
+    }
+}
+
+impl<'de> Visitor<'de> for Flat<'_> {
+    type Value = ();
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "numbers or lists of numbers")
+    }
+
+    fn visit_f64<E: Error>(self, number: f64) -> Result<(), E> {
+        self.0.push(number as f32);
+        Ok(())
+    }
+
+    fn visit_u64<E: Error>(self, number: u64) -> Result<(), E> {
+        self.visit_f64(number as f64)
+    }
+
+    fn visit_i64<E: Error>(self, number: i64) -> Result<(), E> {
+        self.visit_f64(number as f64)
+    }
+
+    fn visit_unit<E: Error>(self) -> Result<(), E> {
+        self.visit_f64(f64::NAN)
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<(), A::Error> {
+        while list.next_element_seed(Flat(self.0))?.is_some() {}
+        Ok(())
+    }
 }

@@ -1,8 +1,8 @@
 //! A take from a BVH file: the joints of the 49 that its skeleton has, found by their names, at the file's own rate.
 
-use super::facing::{Bearings, House};
-use super::fingers::bvh;
-use super::take::CapturedMotion;
+use super::captured::CapturedMotion;
+use super::facing::{AxisAlignment, TorsoLandmarks};
+use super::fingers;
 use crate::bvh::joint_names;
 use crate::bvh::read::{Bvh, Positions};
 use anyhow::{Context, Result, ensure};
@@ -16,7 +16,7 @@ use orator_base::types::time::FrameRate;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
-/// The role (`joint_names::ROLES`) of each of the house's joints 0..7.
+/// The role (`joint_names::ROLES`) of each of joints 0..7 of `types::skeleton`.
 const BODY: [usize; 7] = [0, 2, 3, 4, 5, 6, 7];
 /// The rates of cameras and studios, whole, and in 1001sts of a thousand. Files round the seconds of a frame, so a rate this
 /// near (relative) is meant.
@@ -27,18 +27,18 @@ const RATE_ROUNDING: f64 = 1.1e-3;
 /// Reads a take, turned to face the camera. Errors: not BVH, a skeleton without neck or shoulders, no standing or
 /// sitting person.
 pub fn read(path: &Path) -> Result<CapturedMotion> {
-    take(path, |house| house)
+    take(path, |alignment| alignment)
 }
 
 /// Reads a take as it stands: y up, facing +z, as `orator animate` writes it, so that it lies beside the motion it came
 /// from. A file with other axes is turned as `read` does, and its facts say so.
 pub fn read_as_it_stands(path: &Path) -> Result<CapturedMotion> {
-    take(path, |house| house.as_it_stands().unwrap_or(house))
+    take(path, |alignment| alignment.as_it_stands().unwrap_or(alignment))
 }
 
 /// Reads a take from the text of a BVH file, turned as [`read`] does.
 pub fn of_text(text: &str) -> Result<CapturedMotion> {
-    of_bvh(&Bvh::parse(text)?, |house| house)
+    of_bvh(&Bvh::parse(text)?, |alignment| alignment)
 }
 
 /// Sentence on the unit of a take by its facts; `None` where it is the centimetre, BVH's usual one.
@@ -47,39 +47,39 @@ pub fn unit_note(facts: &Map<String, Value>) -> Option<String> {
     Some(format!("by the length of its arms its unit is the {unit}: brought to metres"))
 }
 
-fn take(path: &Path, placed: impl Fn(House) -> House) -> Result<CapturedMotion> {
+fn take(path: &Path, placed: impl Fn(AxisAlignment) -> AxisAlignment) -> Result<CapturedMotion> {
     let bvh = Bvh::read(path)?;
     of_bvh(&bvh, placed).with_context(|| format!("{} is no speaker's motion", path.display()))
 }
 
-fn of_bvh(bvh: &Bvh, placed: impl Fn(House) -> House) -> Result<CapturedMotion> {
+fn of_bvh(bvh: &Bvh, placed: impl Fn(AxisAlignment) -> AxisAlignment) -> Result<CapturedMotion> {
     let names: Vec<&str> = bvh.joints.iter().map(|joint| joint.name.as_str()).collect();
     let roles = joint_names::find(&names);
     let map = joint_map(bvh, &names, roles)?;
     let frames = bvh.positions(Positions::Auto);
-    let bearings: Vec<Bearings> = frames.iter().map(|frame| bearings(frame, &map, roles)).collect();
-    let house = placed(House::from_bearings(&bearings)?);
+    let landmarks: Vec<TorsoLandmarks> = frames.iter().map(|frame| landmarks(frame, &map, roles)).collect();
+    let alignment = placed(AxisAlignment::fit(&landmarks)?);
     let mut joints = Array3::from_elem((frames.len(), N_JOINTS, 3), f32::NAN);
-    for (t, (frame, bearings)) in frames.iter().zip(&bearings).enumerate() {
+    for (t, (frame, landmarks)) in frames.iter().zip(&landmarks).enumerate() {
         for (joint, at) in map.iter().enumerate() {
             let Some(&position) = at.and_then(|at| frame.get(at)) else { continue };
-            for (k, v) in house.place(position, bearings.neck).into_iter().enumerate() {
+            for (k, v) in alignment.place(position, landmarks.neck).into_iter().enumerate() {
                 joints[[t, joint, k]] = v as f32;
             }
         }
     }
     let missing: Vec<String> = (0..N_JOINTS).filter(|&joint| map[joint].is_none()).map(skeleton::name).collect();
     let facts = json!({
-        "source_unit": house.unit,
-        "source_up": house.up,
-        "turned_degrees": (house.turned_degrees * 100.0).round() / 100.0,
+        "source_unit": alignment.unit,
+        "source_up": alignment.up,
+        "turned_degrees": (alignment.turned_degrees * 100.0).round() / 100.0,
         "joints_missing": missing,
     });
     let motion = Motion::from_joints(rate(bvh.frame_secs), joints);
     Ok(CapturedMotion { motion, text: None, facts: facts.as_object().cloned().unwrap_or_else(Map::new) })
 }
 
-/// The file's joint for each of the house's.
+/// The file's joint for each joint of `types::skeleton`.
 fn joint_map(bvh: &Bvh, names: &[&str], roles: [Option<usize>; 10]) -> Result<[Option<usize>; N_JOINTS]> {
     let needed: Vec<&str> =
         [0, 2, 5].into_iter().filter(|&role| roles[role].is_none()).map(|role| joint_names::ROLES[role]).collect();
@@ -94,7 +94,7 @@ fn joint_map(bvh: &Bvh, names: &[&str], roles: [Option<usize>; 10]) -> Result<[O
         map[joint] = roles[role];
     }
     for (side, wrist, root) in [(Side::Left, L_WRIST, L_HAND), (Side::Right, R_WRIST, R_HAND)] {
-        let hand = bvh::hand(bvh, side).unwrap_or_default();
+        let hand = fingers::hand(bvh, side).unwrap_or_default();
         map[wrist] = map[wrist].or(hand[0]);
         map[root + 1..root + hand.len()].copy_from_slice(&hand[1..]);
         map[root] = map[wrist];
@@ -102,7 +102,7 @@ fn joint_map(bvh: &Bvh, names: &[&str], roles: [Option<usize>; 10]) -> Result<[O
     Ok(map)
 }
 
-fn bearings(frame: &[Vec3], map: &[Option<usize>; N_JOINTS], roles: [Option<usize>; 10]) -> Bearings {
+fn landmarks(frame: &[Vec3], map: &[Option<usize>; N_JOINTS], roles: [Option<usize>; 10]) -> TorsoLandmarks {
     let at = |joint: Option<usize>| joint.and_then(|j| frame.get(j).copied());
     let bone = |a: usize, b: usize| Some(vec3::norm(vec3::sub(at(map[a])?, at(map[b])?)));
     let arm = |shoulder: usize| Some(bone(shoulder, shoulder + 1)? + bone(shoulder + 1, shoulder + 2)?);
@@ -115,7 +115,7 @@ fn bearings(frame: &[Vec3], map: &[Option<usize>; N_JOINTS], roles: [Option<usiz
         _ => frame.first().copied(),
     };
     let nowhere = [f64::NAN; 3];
-    Bearings {
+    TorsoLandmarks {
         neck: at(map[skeleton::NECK]).unwrap_or(nowhere),
         right_shoulder: at(map[skeleton::R_SHOULDER]).unwrap_or(nowhere),
         left_shoulder: at(map[skeleton::L_SHOULDER]).unwrap_or(nowhere),

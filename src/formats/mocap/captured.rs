@@ -2,15 +2,24 @@
 //! bones; and which reader a file needs.
 
 use super::motion_file::USUAL_FPS;
-use super::take::CapturedMotion;
 use super::{bvh, ted};
-use crate::authors_txt;
-use crate::joints::description;
+use crate::{authors_txt, joints_description};
 use anyhow::{Context, Result, bail};
 use orator_base::motion::units;
 use orator_base::types::pose3d::Motion;
-use serde_json::Map;
+use serde_json::{Map, Value};
 use std::path::Path;
+
+/// One continuous take of captured motion.
+#[derive(Clone, Debug)]
+pub struct CapturedMotion {
+    /// At the source's rate; a joint that the source does not have is NaN.
+    pub motion: Motion,
+    /// Words that are spoken, where the motion's own file has them.
+    pub text: Option<String>,
+    /// Changes made to the joints, for the sample's metadata.
+    pub facts: Map<String, Value>,
+}
 
 /// Kind of a file of captured motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -41,7 +50,7 @@ pub fn read(kind: MotionKind, path: &Path) -> Result<CapturedMotion> {
     let captured = match kind {
         MotionKind::Authors => {
             let motion = authors_txt::read(path, USUAL_FPS)?;
-            let said = description::rate(path, motion.n_frames())?;
+            let said = joints_description::rate(path, motion.n_frames())?;
             let motion = Motion { fps: said.unwrap_or(USUAL_FPS), ..motion };
             CapturedMotion { motion, text: None, facts: Map::new() }
         }

@@ -1,6 +1,6 @@
-//! From the axes and the unit of a captured skeleton to the house's: metres, x image right, y down, z away, the neck
-//! at the origin, and the speaker turned about the vertical so that over the take they face the camera. Files say
-//! neither unit nor axes: the arms tell the unit, the spine the vertical, the shoulders the front.
+//! From the axes and the unit of a captured skeleton to those of `types::skeleton`: metres, x image right, y down, z away,
+//! the neck at the origin, and the speaker turned about the vertical so that over the take they face the camera. Files
+//! state neither unit nor axes: the arms define the unit, the spine the vertical, the shoulders the front.
 
 use anyhow::{Context, Result, bail, ensure};
 use orator_base::math::order::upper_median;
@@ -18,7 +18,7 @@ const ARM_RANGE: std::ops::Range<f64> = 0.33..0.85;
 
 /// Joints of a frame that define how a skeleton stands, in the source's unit and axes.
 #[derive(Clone, Copy, Debug)]
-pub struct Bearings {
+pub struct TorsoLandmarks {
     pub neck: Vec3,
     pub right_shoulder: Vec3,
     pub left_shoulder: Vec3,
@@ -28,9 +28,9 @@ pub struct Bearings {
     pub arm: Option<f64>,
 }
 
-/// Turn and scale of a skeleton.
+/// Rotation and scale from a captured skeleton to the axes and the unit of `types::skeleton`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct House {
+pub struct AxisAlignment {
     /// Directions of the axes x, y, z of `types::skeleton` in the source.
     axes: [Vec3; 3],
     pub metres: f64,
@@ -42,21 +42,22 @@ pub struct House {
     pub turned_degrees: f64,
 }
 
-impl House {
-    /// Looks at the frames of a take.
+impl AxisAlignment {
+    /// Alignment of a take by all of its frames.
     ///
     /// # Errors
     /// No frame with neck, shoulders and hips; arms that are no person's in any known unit; shoulders that lie above
     /// each other or turn so much that no side is the front.
-    pub fn from_bearings(frames: &[Bearings]) -> Result<Self> {
-        let frames: Vec<&Bearings> = frames.iter().filter(|f| f.is_finite()).collect();
+    pub fn fit(frames: &[TorsoLandmarks]) -> Result<Self> {
+        let frames: Vec<&TorsoLandmarks> = frames.iter().filter(|f| f.is_finite()).collect();
         ensure!(!frames.is_empty(), "no frame has a neck, shoulders and hips");
         let (unit, metres) = unit(frames.iter().filter_map(|f| f.arm).collect())?;
-        let sum = |of: &dyn Fn(&Bearings) -> Vec3| frames.iter().fold([0.0; 3], |sum, f| vec3::add(sum, of(f)));
+        let sum = |of: &dyn Fn(&TorsoLandmarks) -> Vec3| frames.iter().fold([0.0; 3], |sum, f| vec3::add(sum, of(f)));
         let spine = sum(&|f| vec3::sub(f.neck, f.hips));
         let (up_axis, up) = upright(spine)?;
         // the side of every frame counts the same, however wide the shoulders seem from above
-        let level = |f: &Bearings| vec3::unit(vec3::across(vec3::sub(f.left_shoulder, f.right_shoulder), up), 1e-9);
+        let level =
+            |f: &TorsoLandmarks| vec3::unit(vec3::across(vec3::sub(f.left_shoulder, f.right_shoulder), up), 1e-9);
         let side = sum(&|f| level(f).unwrap_or_default());
         let steadiness = vec3::norm(side) / frames.len() as f64;
         let x = vec3::unit(side, 1e-9).context("the shoulders lie above each other")?;
@@ -80,14 +81,14 @@ impl House {
         faces.then_some(Self { axes, turned_degrees: 0.0, ..*self })
     }
 
-    /// A joint of a frame in house axes and metres, seen from the neck.
+    /// A joint of a frame in the axes of `types::skeleton`, metres from the neck.
     pub fn place(&self, joint: Vec3, neck: Vec3) -> Vec3 {
         let from_neck = vec3::scale(vec3::sub(joint, neck), self.metres);
         self.axes.map(|axis| vec3::dot(axis, from_neck))
     }
 }
 
-impl Bearings {
+impl TorsoLandmarks {
     fn is_finite(&self) -> bool {
         [self.neck, self.right_shoulder, self.left_shoulder, self.hips].iter().flatten().all(|v| v.is_finite())
     }

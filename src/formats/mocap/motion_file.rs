@@ -1,11 +1,10 @@
 //! Reads any file that holds a motion: `.npy` [T, 49, 3] or [T, 147] of float32 or float64, `.npz` (`pose3d`), the
-//! authors' `.txt`, `.bvh`. Of .npy and .txt the description beside them names the rate (`formats::joints::description`);
+//! authors' `.txt`, `.bvh`. Of .npy and .txt the description beside them names the rate (`formats::joints_description`);
 //! without one they take the rate that the caller assumes.
 
 use super::bvh;
-use crate::joints::description;
 use crate::npz::{AxisLength, Npz};
-use crate::{authors_txt, npy};
+use crate::{authors_txt, joints_description, npy};
 use anyhow::{Context, Result, bail, ensure};
 use ndarray::{Ix2, Ix3};
 use orator_base::motion::units;
@@ -54,7 +53,7 @@ pub fn read(path: &Path, fps: Option<FrameRate>) -> Result<MotionFile> {
         "npy" | "txt" => {
             let read = if ending == "npy" { npy::read } else { authors_txt::read };
             let motion = read(path, assumed)?;
-            let said = description::rate(path, motion.n_frames())?;
+            let said = joints_description::rate(path, motion.n_frames())?;
             says_rate = said.is_some();
             Motion { fps: said.unwrap_or(assumed), ..motion }
         }

@@ -2,9 +2,10 @@
 //! times from `.txt`. Times that cannot be are errors with their place, doubtful ones are notes.
 
 use super::json::JsonTranscript;
-use super::word::{Word, WordSource};
-use super::{ctm, encoding, json, subtitles, textgrid, tsv};
-use anyhow::{Context, Result, ensure};
+use super::word::{self, Word, WordSource};
+use super::{encoding, json, subtitles, textgrid};
+use anyhow::{Context, Result, bail, ensure};
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Endings of transcripts, in the order in which one of several is chosen.
@@ -76,8 +77,8 @@ impl Transcript {
     /// The line or the word that is not as the format says.
     pub fn parse(text: &str, ending: &str, stem: &str) -> Result<Self> {
         let words = match ending {
-            "tsv" => tsv::read(text)?,
-            "ctm" => ctm::read(text, stem)?,
+            "tsv" => tsv(text)?,
+            "ctm" => ctm(text, stem)?,
             "srt" | "vtt" => subtitles::read(text)?,
             "textgrid" => textgrid::read(text)?,
             "json" => match json::read(text)? {
@@ -96,6 +97,59 @@ impl Transcript {
         }
         Self::of_words(self.words.iter().filter(|word| word.start_secs < end).cloned().collect())
     }
+}
+
+/// The words of a table with tabs, a row a word or a sentence: start, end and text in seconds (GENEA 2022 and 2023), or in
+/// milliseconds under the header `start end text` (Whisper).
+///
+/// # Errors
+/// The line of a row without times.
+fn tsv(text: &str) -> Result<Vec<Word>> {
+    let mut words = Vec::new();
+    let mut per_sec = 1.0;
+    for (line, n) in text.lines().zip(1..).filter(|(line, _)| !line.trim().is_empty()) {
+        let mut parts = line.splitn(3, '\t').map(str::trim);
+        let (Some(start), Some(end), Some(said)) = (parts.next(), parts.next(), parts.next()) else {
+            bail!("line {n}: expected start, end and word with tabs between, found `{line}`");
+        };
+        match (start.parse::<f64>(), end.parse::<f64>()) {
+            (Ok(start), Ok(end)) => word::push(&mut words, said, (start / per_sec, end / per_sec), None)
+                .with_context(|| format!("line {n}"))?,
+            // Header line.
+            _ if n == 1 => per_sec = if (start, end, said) == ("start", "end", "text") { 1000.0 } else { 1.0 },
+            _ => bail!("line {n}: `{start}` and `{end}` are no seconds"),
+        }
+    }
+    Ok(words)
+}
+
+/// The words of the recording `name`, or of the only one there is, in CTM of NIST's scoring tools and of Kaldi: recording,
+/// channel, start, duration, word and, where it is known, confidence.
+///
+/// # Errors
+/// The line that is no row; several recordings, none of which has the name.
+fn ctm(text: &str, name: &str) -> Result<Vec<Word>> {
+    let rows = text.lines().zip(1..).filter(|(line, _)| !line.trim().is_empty() && !line.starts_with(";;"));
+    let recordings: BTreeSet<&str> =
+        rows.clone().filter_map(|(line, _)| line.split_whitespace().next()).take(1 << 20).collect();
+    ensure!(
+        recordings.len() <= 1 || recordings.contains(name),
+        "it holds {} recordings ({}, ...), none of which is called {name}",
+        recordings.len(),
+        recordings.first().copied().unwrap_or_default()
+    );
+    let mut words = Vec::new();
+    for (line, n) in rows {
+        let parts: Vec<&str> = line.split_whitespace().collect();
+        let number = |at: usize| parts.get(at).and_then(|part| part.parse::<f64>().ok());
+        let (Some(start), Some(secs), Some(said)) = (number(2), number(3), parts.get(4)) else {
+            bail!("line {n}: expected recording, channel, start, duration and word, found `{line}`");
+        };
+        if recordings.len() == 1 || parts[0] == name {
+            word::push(&mut words, said, (start, start + secs), number(5)).with_context(|| format!("line {n}"))?;
+        }
+    }
+    Ok(words)
 }
 
 /// Note on words that begin after the end of a sound of `sound_secs`.

@@ -71,20 +71,6 @@ impl WordVectors {
         Ok(Self { path: path.to_owned(), file, at, dim, rows })
     }
 
-    /// Checks that the vectors have `dim` numbers.
-    ///
-    /// # Errors
-    /// Another length.
-    pub fn with_dim(self, dim: usize) -> Result<Self> {
-        ensure!(
-            self.dim == dim,
-            "{} has vectors of {} numbers, {dim} are needed: take the vectors that were trained with",
-            self.path.display(),
-            self.dim
-        );
-        Ok(self)
-    }
-
     /// Numbers of a vector.
     pub fn dim(&self) -> usize {
         self.dim
@@ -93,11 +79,6 @@ impl WordVectors {
     /// Number of words.
     pub fn n_words(&self) -> usize {
         self.rows.len()
-    }
-
-    /// Number of indices: padding, unknown, words.
-    pub fn n_indices(&self) -> usize {
-        N_SPECIAL + self.n_words()
     }
 
     /// Index of a word as a transcript writes it; `UNKNOWN` without a vector. A word that is unknown with the punctuation
@@ -149,7 +130,7 @@ mod tests {
     fn words_are_found_by_the_rules_of_the_paper() {
         let dir = tempfile::tempdir().unwrap();
         let table = table(dir.path(), "the 0.5 -1\nso 1e-3 2\n. 3 4\nu.s. 5 6\nthe 9 9\n").unwrap();
-        assert_eq!((table.dim(), table.n_words(), table.n_indices()), (2, 4, 6));
+        assert_eq!((table.dim(), table.n_words()), (2, 4));
         let vector = |word: &str| table.vector(table.index(word)).unwrap();
         assert_eq!(
             (vector("The"), vector("so."), vector("."), vector("So,")),
@@ -158,7 +139,6 @@ mod tests {
         assert_eq!((vector("Straße"), table.vector(PADDING).unwrap()), (vec![1.0, 1.0], vec![0.0, 0.0]));
         assert!(table.vector(6).is_err());
         assert_eq!(table.n_known(["the", "der", "so"]), 2);
-        assert!(table.with_dim(100).unwrap_err().to_string().contains("vectors of 2 numbers, 100 are needed"));
     }
 
     #[test]

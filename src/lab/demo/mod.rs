@@ -1,10 +1,12 @@
 //! Synthetic speakers with known joints, the embedded demo and the end-to-end test of the pipeline.
 //!
 //! `people`: rendered people in rooms, one of them the demo's `host`, with `more_speech` of that host without video.
+//! `looks`: random bodies, faces and clothes.
 //! `check`: the results of the pipeline and of trained models against the truth.
 
 pub mod check;
 pub mod host;
+pub mod looks;
 pub mod more_speech;
 pub mod people;
 

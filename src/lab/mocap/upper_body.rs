@@ -95,7 +95,7 @@ pub fn divide(mut takes: Vec<BodyTake>, patterns: &[String]) -> Result<(Vec<Set>
 fn read_bvh(path: &Path) -> Result<Vec<BodyTake>> {
     let bvh = Bvh::read(path)?;
     let names: Vec<&str> = bvh.joints.iter().map(|joint| joint.name.as_str()).collect();
-    let joints = joint_names::upper_body(&names).with_context(|| path.display().to_string())?;
+    let joints = named_joints(&names).with_context(|| path.display().to_string())?;
     let placed = bvh.positions(Positions::Auto);
     let mut bodies: Vec<[Vec3; 10]> = placed.iter().map(|p| joints.map(|j| p[j])).collect();
     ensure!(
@@ -107,6 +107,27 @@ fn read_bvh(path: &Path) -> Result<Vec<BodyTake>> {
     in_metres(&mut bodies).with_context(|| path.display().to_string())?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
     Ok(divided(&name, 1.0 / bvh.frame_secs, bodies.iter().map(|p| upper_body(p)).collect()))
+}
+
+/// Index of the name, the root first, of each joint of `joint_names::ROLES`; the root stands for both hips where a skeleton has
+/// none. Errors: the joints that are missing, and the names there are.
+fn named_joints(names: &[&str]) -> Result<[usize; 10]> {
+    let mut found = joint_names::find(names);
+    if found[8..] == [None, None] {
+        found[8..].fill(Some(0));
+    }
+    let missing: Vec<&str> =
+        joint_names::ROLES.iter().zip(&found).filter_map(|(role, f)| f.is_none().then_some(*role)).collect();
+    if !missing.is_empty() {
+        let there: Vec<&str> = names.iter().copied().take(40).collect();
+        bail!(
+            "no joint is named like a {}; expected names like Neck, Head, LeftArm, LeftForeArm, LeftHand, LeftUpLeg \
+             (also l_shoulder, UpperArm_L, ...); its joints are: {}",
+            missing.join(", "),
+            there.join(" ")
+        );
+    }
+    Ok(std::array::from_fn(|role| found[role].unwrap_or_default()))
 }
 
 /// Turns bodies whose heads are along z upright: y up.
@@ -253,6 +274,17 @@ mod tests {
                 None => 0.0,
             }
         })
+    }
+
+    #[test]
+    fn the_root_stands_for_missing_hips_and_other_missing_joints_are_named() {
+        let legless = "Pelvis Neck Head LeftArm LeftForeArm LeftHand RightArm RightForeArm RightHand";
+        let names: Vec<&str> = legless.split_whitespace().collect();
+        assert_eq!(named_joints(&names).unwrap()[8..], [0, 0]);
+        let names = ["Neck", "Head", "LeftShoulder", "LeftArm", "RightArm", "LeftLeg", "Tail"];
+        let text = named_joints(&names).unwrap_err().to_string();
+        assert!(text.contains("right elbow") && text.contains("right hip") && text.contains("Tail"), "{text}");
+        assert!(!text.contains("left shoulder,"), "{text}");
     }
 
     #[test]

@@ -5,7 +5,7 @@ use anyhow::{Context, Result, ensure};
 use candle_core::{DType, Device, Tensor};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir::FolderLock;
-use orator_formats::checkpoint::{Contents, expect_same};
+use orator_formats::checkpoint::Contents;
 use orator_gesture::train::log::MetricsLog;
 use orator_gesture::train::optim::adam;
 use orator_gesture::train::optim::adam::Adam;
@@ -226,7 +226,11 @@ fn resume(training_task: &dyn TrainingTask, schedule: &Schedule, out: &Path, ada
     let contents = Contents::read(&path)?;
     let fit = || -> Result<usize> {
         for (key, expected) in facts(training_task, schedule).as_object().into_iter().flatten() {
-            expect_same(&contents.facts, key, expected)?;
+            let found = &contents.facts[key];
+            ensure!(
+                found == expected,
+                "the checkpoint has {key} {found}, this training {expected}; choose another --out or move the old one away"
+            );
         }
         training_task.params().load(&contents.part("net."))?;
         Ok(contents.facts["step"].as_u64().context("it names no step")? as usize)

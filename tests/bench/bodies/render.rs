@@ -2,9 +2,8 @@
 
 use super::super::report::{Report, median};
 use anyhow::{Context, Result, ensure};
-use orator_avatar::animate::export::film::{Film, SecondPanel, write as write_film};
+use orator_avatar::animate::export::film::{Film, FilmContent, SecondPanel, write as write_film};
 use orator_avatar::animate::export::film_avatar::{AvatarView, FilmCamera};
-use orator_avatar::animate::export::film_panel::FilmBody;
 use orator_avatar::animate::{AnimationOptions, perform};
 use orator_avatar::render::{Background, Light, Mesh, PinholeCamera};
 use orator_base::stage::progress::{Progress, Silent};
@@ -46,8 +45,9 @@ pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     let mut view = AvatarView::new(&performance, &[&performance], SIZE, FilmCamera::Front);
     let folder = tempfile::tempdir()?;
     let task = progress.begin("render", args.rounds as u64);
-    let body = FilmBody::Avatar(&performance, FilmCamera::Front);
-    let mut film = Film::new(body, None, SecondPanel::Itself);
+    let (camera, beside) = (FilmCamera::Front, SecondPanel::Itself);
+    let content = FilmContent { performance: &performance, camera, sound: None, beside };
+    let mut film = Film::new(content);
     let films: Vec<Image> = (0..args.frames.min(N_KEPT)).map(|frame| film.frame(frame)).collect::<Result<_>>()?;
     let mut secs: [Vec<f64>; 4] = Default::default();
     for _ in 0..args.rounds {
@@ -68,7 +68,7 @@ pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
         secs[2].push(start.elapsed().as_secs_f64());
         let start = Instant::now();
         let path = folder.path().join("whole.mp4");
-        write_film(&path, body, None, SecondPanel::Itself, &Silent).context("the film")?;
+        write_film(&path, content, &Silent).context("the film")?;
         secs[3].push(start.elapsed().as_secs_f64());
         task.advance(1);
     }

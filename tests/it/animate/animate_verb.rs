@@ -39,12 +39,12 @@ fn a_motion_becomes_files_and_what_was_done_is_told() {
     npy::write(&dir.join("a.npy"), &motion).unwrap();
     let facts = done(dir, "a.npy --out made/a.bvh made/b.npy --out made/b.txt --fps 30");
     assert_eq!((facts["n_frames"].as_u64(), facts["written_frames"].as_u64()), (Some(45), Some(90)));
-    let told = &facts["told"];
+    let told = &facts["report"];
     let jerk = |told: &Value| ["before", "after"].map(|when| told["arms"][when].as_f64().unwrap());
     let [before, after] = jerk(told);
     assert!((after / before - 1.0).abs() < 0.2, "a motion without noise: {before} -> {after}");
     let fixed = done(dir, "a.npy --out fixed.bvh --smoothing savitzky-golay");
-    assert!(jerk(&fixed["told"])[1] < before);
+    assert!(jerk(&fixed["report"])[1] < before);
     let elbow = &told["clamps"][0];
     assert_eq!((elbow["kind"].as_str(), told["face_frames"].is_null()), (Some("elbow flexion"), true));
     assert!(elbow["share"].is_number() && elbow["largest_excess_degrees"].is_number());
@@ -62,7 +62,7 @@ fn a_motion_becomes_files_and_what_was_done_is_told() {
     let same = npy::read(&dir.join("c.npy"), fps).unwrap();
     assert!((&same.joints - &joints.joints).iter().all(|v| v.abs() < 1e-4));
     for more in [
-        "--smoothing one-euro --one-euro-hz 2",
+        "--smoothing adaptive --smoothing-strength 2",
         "--shoulder-yaw removed --curl-coherence off",
         "--fps 30000/1001 --names mixamo --neutral-head",
     ] {
@@ -100,7 +100,7 @@ fn how_much_of_the_body_was_seen_is_told_where_it_is_not_all() {
     let told = words(&motion);
     let expected = "seen, of 40 frames: arms in 30, left hand in 27, right hand in 25; the rest is bridged or held";
     assert!(told.contains(expected), "{told}");
-    let seen = &done(dir, "a.npz --out a.bvh")["told"]["seen"];
+    let seen = &done(dir, "a.npz --out a.bvh")["report"]["seen"];
     assert_eq!(*seen, serde_json::json!({ "left_arm": 30, "right_arm": 30, "left_hand": 27, "right_hand": 25 }));
 }
 
@@ -173,7 +173,7 @@ fn a_dataset_has_the_face_and_the_sound_of_its_samples() {
     write_dataset(&dir.join("host"), "host", FPS, &samples).unwrap();
 
     let facts = done(dir, "host --sample walk-99999999-000007 --out a.bvh --smoothing none");
-    assert_eq!(facts["told"]["face_frames"].as_u64(), Some(30));
+    assert_eq!(facts["report"]["face_frames"].as_u64(), Some(30));
     let bvh = Bvh::parse(&std::fs::read_to_string(dir.join("a.bvh")).unwrap());
     let head = bvh.names.iter().position(|name| name == "Head").unwrap();
     let nose = bvh.names.iter().position(|name| name == "HeadEnd").unwrap();
@@ -225,7 +225,7 @@ fn what_is_wrong_is_said_and_nothing_is_written() {
         ("good.npy --out x.bvh --fps 1001", "1 to 1000 frames"),
         ("good.npy --out x.bvh --fps fast", "1 to 1000 frames"),
         ("good.npy --out x.bvh --sample one", "is no dataset"),
-        ("good.npy --out x.bvh --smoothing one-euro --one-euro-hz 0", "expected 0.01 to 100"),
+        ("good.npy --out x.bvh --smoothing-strength 101", "expected 0 to 100"),
         ("good.npy --out x.mp4 --audio picture.png", "picture.png"),
         ("good.npy --out x.bvh --audio good.npy", "--audio is for films"),
         ("good.npy --out x.npy --names vrm", "--names is for .bvh"),

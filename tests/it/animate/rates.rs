@@ -6,7 +6,7 @@ use ndarray::arr1;
 use ndarray_npy::NpzWriter;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::time::FrameRate;
-use orator_formats::joints::description::path_of;
+use orator_formats::joints_description::path_of;
 use orator_formats::mocap::captured::{self, MotionKind};
 use orator_formats::mocap::motion_file;
 use orator_formats::{authors_txt, joints_npz, npy};
@@ -93,7 +93,7 @@ fn an_assumed_rate_is_said() {
         assert_eq!(done(dir, &format!("animate {bare} --out a.bvh"))["fps_assumed"], true);
         let (_, _, said) = orator(dir, &format!("animate {bare} --out a.bvh --in-fps 30"));
         assert!(said.contains("20 frames at 30 fps, 0.7 s"), "{said}");
-        let facts = done(dir, &format!("animate c.npz --out a.mp4 --style figure --beside {bare}"));
+        let facts = done(dir, &format!("animate c.npz --out a.mp4 --beside {bare}"));
         assert!(facts["notes"].to_string().contains("does not say its rate: taken for 15 fps"), "{facts}");
     }
     let (_, _, said) = orator(dir, "animate c.npz --out a.bvh");

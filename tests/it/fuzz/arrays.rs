@@ -4,7 +4,7 @@ use crate::fixtures::fuzzing::harness::{corpus, fuzz_bytes, fuzz_file};
 use orator_base::types::time::FrameRate;
 use orator_dataset::sample::N_KEYPOINTS;
 use orator_formats::mocap::motion_file;
-use orator_formats::npy_slice::{Element, Layout};
+use orator_formats::npy::{Element, Layout};
 use orator_formats::npz::Npz;
 use orator_formats::timeline_npz::Timeline;
 use orator_formats::{joints_npz, keypoints, keypoints_npz, npy};

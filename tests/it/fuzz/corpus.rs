@@ -15,7 +15,7 @@ use orator_base::types::time::FrameRate;
 use orator_dataset::Split;
 use orator_dataset::split::{RecordedSplit, SplitBy, SplitRecord};
 use orator_formats::checkpoint::Contents;
-use orator_formats::{authors_txt, joints_npz, npy, npy_slice, wav};
+use orator_formats::{authors_txt, joints_npz, npy, wav};
 use orator_gesture::generate::model::{GENERATOR, SpeakerMetadata};
 use orator_gesture::generate::normalisation::{N_FEATURES, Normalisation};
 use orator_gesture::generate::representation::Representation;
@@ -67,9 +67,9 @@ fn arrays() {
     let sample = foreign::sample(3, FPS);
     foreign::holistic(&at("arrays", "keypoints.npy"), &sample, foreign::HolisticOrder::NoFace);
     let points = Array3::<f32>::from_elem((2, 59, 3), 0.5);
-    fs::write(at("arrays", "slice.npy"), npy_slice::write_f32(points.shape(), points.iter())).unwrap();
+    fs::write(at("arrays", "slice.npy"), npy::write_f32(points.shape(), points.iter())).unwrap();
     let mask = Array2::from_elem((2, 49), true);
-    fs::write(at("arrays", "slice-mask.npy"), npy_slice::write_bool(mask.shape(), mask.iter())).unwrap();
+    fs::write(at("arrays", "slice-mask.npy"), npy::write_bool(mask.shape(), mask.iter())).unwrap();
     joints_npz::write(&at("arrays", "joints.npz"), &motion).unwrap();
     let before = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/before/work");
     for (stage, file) in [("pose2d", "keypoints.npz"), ("extract", "timeline.npz"), ("segment", "measures.npz")] {
@@ -79,9 +79,6 @@ fn arrays() {
     npz.add_array("fps", &arr1(&[15i64])).unwrap();
     let joint = |(t, j, k): (usize, usize, usize)| ((t + 7 * j + 3 * k) % 11) as f64 / 20.0;
     npz.add_array("human_joints", &Array3::from_shape_fn((20, 43, 3), joint)).unwrap();
-    npz.finish().unwrap();
-    let mut npz = NpzWriter::new_compressed(fs::File::create(at("arrays", "capture-smplx.npz")).unwrap());
-    npz.add_array("poses", &Array2::from_shape_fn((3, 165), |(t, k)| joint((t, k, 0)))).unwrap();
     npz.finish().unwrap();
     let mut npz = NpzWriter::new_compressed(fs::File::create(at("arrays", "capture-cmu.npz")).unwrap());
     npz.add_array("fps", &Array1::from_elem(1, 60.0)).unwrap();

@@ -172,7 +172,7 @@ impl<'a> Assembly<'a> {
             let hangs = n == 0 || material == Material::Hair;
             let surface = head.placed(surface);
             let weights =
-                if hangs { body.head_weights(&surface) } else { vec![rigid(body.trunk.head); surface.points.len()] };
+                if hangs { body.head_weights(&surface) } else { vec![rigid(body.rig.head); surface.points.len()] };
             let mesh = self.meshes.entry(material).or_default();
             if !ways.is_empty() {
                 mesh.mouth.resize(mesh.surface.points.len(), [0.0; 3]);

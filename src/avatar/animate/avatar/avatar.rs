@@ -6,7 +6,6 @@ use super::assembly::{Assembly, PosedMesh};
 use super::body::BodyForm;
 use super::hand::HandForm;
 use super::head::{EAR, EYE, EYE_RADIUS, HeadForm};
-use super::jaw::{MOUTH_Y, opening};
 use super::material::Material;
 use super::skin::Weights;
 use super::stance::Stance;
@@ -40,9 +39,6 @@ pub struct Avatar {
     pub parts: Vec<AvatarMesh>,
     /// Nose, left eye, right eye, left ear, right ear, cm from the head joint in its axes.
     pub face: [Vec3; 5],
-    /// Middles of the upper and the lower lip's inner edges, cm from the head joint, and the way of the lower one to the
-    /// open mouth.
-    pub inner_lips: [Vec3; 3],
 }
 
 impl Avatar {
@@ -50,7 +46,7 @@ impl Avatar {
         let stance = Stance::new(rig);
         let hands = [0, 1].map(|side| HandForm::new(rig, &stance, side));
         let body = BodyForm::new(rig, &stance, hands.each_ref().map(|hand| hand.scale), looks);
-        let head = HeadForm::new(&stance, &body.trunk, looks);
+        let head = HeadForm::new(rig, &stance, looks);
         let meshes = Assembly::new(&body, &head, &hands).meshes;
         let parts = meshes.into_iter().map(|(material, mesh)| AvatarMesh::rested(material, mesh, &stance)).collect();
         let at_front = |x: f64, y: f64| [x, y, head.front(x, y)];
@@ -59,9 +55,7 @@ impl Avatar {
         let sides = |x: f64, y: f64, z: f64| [[x, y, z], [-x, y, z]];
         let ([left_eye, right_eye], [left_ear, right_ear]) = (sides(ex, ey, ez + EYE_RADIUS), sides(ax + 0.6, ay, az));
         let face = [at_front(0.0, 7.5), left_eye, right_eye, left_ear, right_ear].map(|at| head.scaled(at));
-        let lips = at_front(0.0, MOUTH_Y);
-        let inner_lips = [lips, lips, opening(lips, 1.0)].map(|at| head.scaled(at));
-        Self { parts, face, inner_lips }
+        Self { parts, face }
     }
 }
 
@@ -122,22 +116,14 @@ impl Blend {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
     use super::*;
+    use crate::animate::rig::rig::tests::default_rig;
     use orator_base::math::vec3::{norm, scale};
-    use orator_base::types::pose3d::Motion;
-    use orator_base::types::skeleton::N_JOINTS;
-    use orator_base::types::time::FrameRate;
-
-    /// Rig of the default bones.
-    pub fn rig() -> Rig {
-        let unseen = ndarray::Array3::from_elem((1, N_JOINTS, 3), f32::NAN);
-        Rig::from_motion(&Motion::from_joints(FrameRate::new(15, 1), unseen))
-    }
 
     #[test]
     fn skinning_brings_the_rest_into_the_stance_and_both_sides_are_alike() {
-        let rig = rig();
+        let rig = default_rig();
         let (avatar, stance) = (Avatar::new(&rig, &Appearance::plain()), Stance::new(&rig));
         let shirt = &avatar.parts[1];
         let hands = [0, 1].map(|side| HandForm::new(&rig, &stance, side).scale);
@@ -163,7 +149,7 @@ pub(super) mod tests {
     #[test]
     fn bent_joints_do_not_collapse() {
         // The thinnest place around a finger's middle joint and around an elbow, straight and bent by 90 degrees.
-        let rig = rig();
+        let rig = default_rig();
         let avatar = Avatar::new(&rig, &Appearance::plain());
         let arm = &rig.arms[0];
         let finger = super::super::stance::finger_joints(&rig, 0, 2);

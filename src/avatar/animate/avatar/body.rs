@@ -3,7 +3,7 @@
 
 use super::appearance::{Appearance, Top};
 use super::field::{Form, RoundCone, around, joined};
-use super::stance::{Stance, Trunk};
+use super::stance::{HIPS, Stance};
 use crate::animate::rig::rig::{Rig, RigArm};
 use orator_base::math::vec3::{Vec3, add, dot, norm, scale, sub, unit};
 
@@ -17,7 +17,6 @@ const SLEEVE: f64 = 3.05;
 pub struct BodyForm<'a> {
     pub rig: &'a Rig,
     pub stance: &'a Stance,
-    pub trunk: Trunk,
     /// Shoulder width relative to the shape's.
     broad: f64,
     /// Sizes of the hands relative to the shape's.
@@ -30,7 +29,7 @@ impl<'a> BodyForm<'a> {
         let half = |arm: &RigArm| norm(rig.skeleton.joints[arm.upper].offset) / 2.0;
         let half: f64 = rig.arms.iter().map(half).sum();
         let broad = (half / SHOULDERS / stance.scale).clamp(0.75, 1.3);
-        Self { rig, stance, trunk: Trunk::find(rig), broad, hands, looks }
+        Self { rig, stance, broad, hands, looks }
     }
 
     /// Tapered limb between two points of the shape's size in the axes of `joint`.
@@ -44,7 +43,7 @@ impl<'a> BodyForm<'a> {
 
     /// The trunk of the shirt without its sleeves.
     pub fn trunk(&self) -> Form {
-        let (hips, neck, looks) = (self.trunk.hips, self.trunk.neck, self.looks);
+        let (hips, neck, looks) = (HIPS, self.rig.neck, self.looks);
         let girth = looks.trunk;
         let wide = |x: f64| x * self.broad;
         // A jacket lies over a shirt.
@@ -153,14 +152,14 @@ impl<'a> BodyForm<'a> {
     pub fn shirt(&self) -> impl Fn(Vec3) -> f64 + Sync + use<'_> {
         let trunk = self.trunk();
         let sleeves = [0, 1].map(|side| self.sleeve(side));
-        let collar = self.stance.at(self.trunk.neck, [0.0, 5.4, 0.0]);
+        let collar = self.stance.at(self.rig.neck, [0.0, 5.4, 0.0]);
         // A shirt is worn over trousers and inside a skirt.
         let low = match (self.looks.skirt, self.looks.top) {
             (_, Top::Jacket) => -10.0,
             (true, _) => 2.0,
             (false, _) => -7.5,
         };
-        let hem = self.stance.at(self.trunk.hips, [0.0, low, 0.0]);
+        let hem = self.stance.at(HIPS, [0.0, low, 0.0]);
         let tilt = unit([0.0, 1.0, 0.42], 0.0).unwrap_or([0.0, 1.0, 0.0]);
         let (armpit, edge) = (self.cm(2.6), self.cm(1.5));
         move |at| {
@@ -179,14 +178,14 @@ impl<'a> BodyForm<'a> {
 
     /// Trousers from the waist to the ankles; below a skirt the legs.
     pub fn trousers(&self) -> Form {
-        let (hips, looks) = (self.trunk.hips, self.looks);
+        let (hips, looks) = (HIPS, self.looks);
         let seat = looks.trunk * looks.hips;
         let x = 5.4 * seat;
         let mut form = Form::default().with(self.limb(hips, [[-x, -3.5, -0.5], [x, -3.5, -0.5]], [8.6 * seat; 2]), 0.0);
         // Thighs keep within narrow hips.
         let girth = looks.limbs.min(seat + 0.05) * if looks.skirt { 0.84 } else { 1.0 };
         let narrow = 9.0 * (1.0 - seat).max(0.0);
-        for (side, [upper, lower, foot, _]) in [1.0, -1.0].into_iter().zip(self.trunk.legs) {
+        for (side, [upper, lower, foot, _]) in [1.0, -1.0].into_iter().zip(self.rig.legs) {
             let knee = self.length(upper, lower);
             let ankle = self.length(lower, foot);
             let wide = |radii: [f64; 2]| radii.map(|r| r * girth);
@@ -199,15 +198,15 @@ impl<'a> BodyForm<'a> {
                 .with(self.limb(lower, [[0.0, -7.0, -1.6], [0.0, -18.0, -1.2]], wide([5.2, 4.8])), self.cm(4.0));
         }
         let waist = self.stance.at(hips, [0.0, 4.0, 0.0]);
-        let ankles = self.stance.at(self.trunk.legs[0][2], [0.0, -1.6, 0.0]);
+        let ankles = self.stance.at(self.rig.legs[0][2], [0.0, -1.6, 0.0]);
         form.cut(waist, [0.0, 1.0, 0.0], self.cm(0.8)).cut(ankles, [0.0, -1.0, 0.0], self.cm(0.8))
     }
 
     /// Skirt from the waist to above the knees.
     pub fn skirt(&self) -> Form {
-        let (hips, looks) = (self.trunk.hips, self.looks);
+        let (hips, looks) = (HIPS, self.looks);
         let seat = looks.trunk * looks.hips;
-        let long = 0.92 * self.length(self.trunk.legs[0][0], self.trunk.legs[0][1]);
+        let long = 0.92 * self.length(self.rig.legs[0][0], self.rig.legs[0][1]);
         let part = |y: f64, x: f64, r: f64| self.limb(hips, [[-x, y, -0.6], [x, y, -0.6]], [r, r]);
         let (waist, knees) = ([0.0, 4.0, 0.0], [0.0, -long, 0.0]);
         Form::default()
@@ -221,7 +220,7 @@ impl<'a> BodyForm<'a> {
 
     /// One shoe.
     pub fn shoe(&self, side: usize) -> Form {
-        let foot = self.trunk.legs[side][2];
+        let foot = self.rig.legs[side][2];
         let out = [0.6, -0.6][side];
         let ground = self.stance.at(foot, [0.0, -8.0, 0.0]);
         Form::default()

@@ -3,6 +3,7 @@
 use super::appearance::{Appearance, Reflectance, Top, Weave};
 use super::body::BodyForm;
 use super::jaw::rise;
+use super::stance::HIPS;
 use super::surface::Surface;
 use orator_base::math::vec3::{Vec3, dot, sub};
 
@@ -30,13 +31,13 @@ impl BodyForm<'_> {
     fn on_chest(&self, shirt: &dyn Fn(Vec3) -> f64, [x, y]: [f64; 2], over: f64) -> Vec3 {
         let mut z = 22.0;
         for _ in 0..60 {
-            let d = shirt(self.stance.at(self.trunk.hips, [x, y, z])) / self.stance.scale;
+            let d = shirt(self.stance.at(HIPS, [x, y, z])) / self.stance.scale;
             if d < 1e-3 || z < -8.0 {
                 break;
             }
             z -= 0.8 * d;
         }
-        self.stance.at(self.trunk.hips, [x, y, z + over])
+        self.stance.at(HIPS, [x, y, z + over])
     }
 
     /// Lapels of a jacket, left and right.
@@ -71,7 +72,7 @@ impl BodyForm<'_> {
 
     /// Collar of a shirt, folded over, open in front.
     pub fn collar(&self) -> Surface {
-        let neck = self.trunk.neck;
+        let neck = self.rig.neck;
         let size = self.looks.neck.max(0.9) * self.looks.head[0].max(1.0);
         let mut rows: Vec<Vec<Vec3>> = vec![Vec::new(); 5];
         for k in -18..=18 {
@@ -104,7 +105,7 @@ impl BodyForm<'_> {
         let sleeves = [0, 1].map(|side| self.sleeve(side));
         let stance = self.stance;
         let colour = |(&at, normal): (&Vec3, &Vec3)| {
-            let local = sub(at, stance.positions[self.trunk.hips]).map(|v| v / stance.scale);
+            let local = sub(at, stance.positions[HIPS]).map(|v| v / stance.scale);
             if looks.top == Top::Jacket {
                 // Above the lapels the jacket lies on the shoulders, at the side of the neck.
                 let narrow = 0.8 * (local[1] - THROAT + 5.0).max(0.0);

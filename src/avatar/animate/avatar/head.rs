@@ -4,8 +4,9 @@
 use super::appearance::{Appearance, Hairstyle};
 use super::field::{Form, RoundCone, joined};
 use super::jaw::{MOUTH_Y, rise};
-use super::stance::{Stance, Trunk};
+use super::stance::Stance;
 use super::surface::Surface;
+use crate::animate::rig::rig::Rig;
 use orator_base::math::vec3::{Vec3, add, dot, norm, sub, unit};
 
 /// Centre of the left eyeball and its radius.
@@ -44,10 +45,10 @@ fn carved(d: f64, hole: f64, blend: f64) -> f64 {
 }
 
 impl<'a> HeadForm<'a> {
-    pub fn new(stance: &'a Stance, trunk: &Trunk, looks: &'a Appearance) -> Self {
-        let joint = trunk.head;
+    pub fn new(rig: &Rig, stance: &'a Stance, looks: &'a Appearance) -> Self {
+        let joint = rig.head;
         let size = looks.head.map(|v| v * LARGE);
-        let down = sub(stance.positions[trunk.neck], stance.positions[joint]);
+        let down = sub(stance.positions[rig.neck], stance.positions[joint]);
         let neck_y = down[1] / stance.scale / size[1];
         let (jaw, nose) = (looks.jaw, looks.nose);
         let skull = Form::default()

@@ -21,5 +21,4 @@ pub mod surface;
 pub use appearance::Appearance;
 pub use avatar::{Avatar, AvatarMesh};
 pub use material::Material;
-pub use posing::hip_points;
 pub use skin::Weights;

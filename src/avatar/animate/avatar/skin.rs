@@ -3,7 +3,7 @@
 
 use super::body::BodyForm;
 use super::jaw::rise;
-use super::stance::finger_joints;
+use super::stance::{HIPS, finger_joints};
 use super::surface::Surface;
 use orator_base::math::vec3::{Vec3, dot, norm, sub};
 
@@ -62,16 +62,16 @@ impl BodyForm<'_> {
 
     /// Hips, spine, chest; up to the head.
     fn spine(&self) -> WeightChain {
-        let t = &self.trunk;
+        let rig = self.rig;
         let cm = self.stance.scale;
         let up = |joint: usize, higher: f64, half: f64| {
             (self.stance.at(joint, [0.0, higher, 0.0]), [0.0, 1.0, 0.0], half * cm)
         };
         // The plane between head and neck rises from below the chin to the nape.
-        let jaw = (self.stance.at(t.head, [0.0, -1.0, 0.0]), [0.0, 0.876, 0.482], 3.2 * cm);
+        let jaw = (self.stance.at(rig.head, [0.0, -1.0, 0.0]), [0.0, 0.876, 0.482], 3.2 * cm);
         WeightChain {
-            joints: vec![t.hips, t.spine, t.chest, t.neck, t.head],
-            passes: vec![up(t.spine, 0.0, 7.0), up(t.chest, 0.0, 8.0), up(t.neck, 5.0, 3.5), jaw],
+            joints: vec![HIPS, rig.spine, rig.chest, rig.neck, rig.head],
+            passes: vec![up(rig.spine, 0.0, 7.0), up(rig.chest, 0.0, 8.0), up(rig.neck, 5.0, 3.5), jaw],
         }
     }
 
@@ -115,8 +115,8 @@ impl BodyForm<'_> {
     /// Weights of trousers and shoes.
     pub fn leg_weights(&self, surface: &Surface) -> Vec<Weights> {
         let cm = self.stance.scale;
-        let chains = self.trunk.legs.map(|[upper, lower, foot, end]| {
-            self.chain(self.trunk.hips, &[self.trunk.hips, upper, lower, foot], end, &[6.0 * cm, 5.0 * cm, 2.5 * cm])
+        let chains = self.rig.legs.map(|[upper, lower, foot, end]| {
+            self.chain(HIPS, &[HIPS, upper, lower, foot], end, &[6.0 * cm, 5.0 * cm, 2.5 * cm])
         });
         settled(surface, 3, |at, shares| {
             let side = usize::from(at[0] < 0.0);
@@ -127,12 +127,12 @@ impl BodyForm<'_> {
     /// Weights of a skirt: the hips', towards the hem the nearer thigh's.
     pub fn skirt_weights(&self, surface: &Surface) -> Vec<Weights> {
         let cm = self.stance.scale;
-        let top = self.stance.positions[self.trunk.hips];
+        let top = self.stance.positions[HIPS];
         settled(surface, 10, |at, shares| {
-            let thigh = self.trunk.legs[usize::from(at[0] < 0.0)][0];
+            let thigh = self.rig.legs[usize::from(at[0] < 0.0)][0];
             let low = 0.75 * rise((top[1] - at[1] - 22.0 * cm) / (18.0 * cm));
             add_share(shares, thigh, low);
-            add_share(shares, self.trunk.hips, 1.0 - low);
+            add_share(shares, HIPS, 1.0 - low);
         })
     }
 

@@ -14,6 +14,9 @@ const THUMB: [f64; 3] = [0.0, 8.0, 10.0];
 /// Degrees by which the fingers are spread towards the thumb, thumb to little finger.
 const FAN: [f64; 5] = [0.0, 4.0, 1.0, -2.0, -5.0];
 
+/// Index of the rig's hips.
+pub const HIPS: usize = 0;
+
 /// Joint positions (cm) and world rotations of the rig in the stance.
 pub struct Stance {
     pub positions: Vec<Vec3>,
@@ -22,29 +25,6 @@ pub struct Stance {
     pub rest: Vec<Vec3>,
     /// Trunk length relative to the shape's reference body.
     pub scale: f64,
-}
-
-/// Indices of the rig's joints outside its arms.
-pub struct Trunk {
-    pub hips: usize,
-    pub spine: usize,
-    pub chest: usize,
-    pub neck: usize,
-    pub head: usize,
-    /// Left, right: upper leg, leg, foot, the end of the foot.
-    pub legs: [[usize; 4]; 2],
-}
-
-impl Trunk {
-    pub fn find(rig: &Rig) -> Self {
-        let bones = &rig.skeleton;
-        let find = |name: &str| bones.find(name).unwrap_or_default();
-        let legs = ["Left", "Right"].map(|side| {
-            let [upper, lower, foot] = ["UpLeg", "Leg", "Foot"].map(|part| find(&format!("{side}{part}")));
-            [upper, lower, foot, bones.children(foot).next().unwrap_or(foot)]
-        });
-        Self { hips: 0, spine: rig.spine, chest: rig.chest, neck: rig.positions[0], head: find("Head"), legs }
-    }
 }
 
 /// Joints of a finger of the arm, knuckle to tip.
@@ -71,12 +51,11 @@ impl Stance {
                 local[joints[0]] = fan * local[joints[0]];
             }
         }
-        let trunk = Trunk::find(rig);
         let rest = rig.skeleton.positions(rig.root, &still);
         Self {
             positions: rig.skeleton.positions(rig.root, &local),
             world: rig.skeleton.world(&local),
-            scale: (rest[trunk.neck][1] - rest[trunk.hips][1]) / 50.0,
+            scale: (rest[rig.neck][1] - rest[HIPS][1]) / 50.0,
             rest,
         }
     }

@@ -34,8 +34,6 @@ pub struct FigureView {
     pub camera_metres: f32,
     /// Size of trunk and head relative to an adult of 0.55 m from shoulder to wrist; 0: none.
     pub trunk: f32,
-    /// Unit vector in which the head looks; `None`: ahead of the shoulders.
-    pub looks: Option<[f32; 3]>,
     /// Colour of a seam that separates a limb from what is behind it.
     pub seam: Option<[u8; 3]>,
 }
@@ -43,7 +41,7 @@ pub struct FigureView {
 impl FigureView {
     /// A view on paper from the front with the neck in the middle of the picture's width.
     pub fn front(neck_px: [f32; 2], px_per_metre: f32) -> Self {
-        Self { neck_px, px_per_metre, yaw_degrees: 0.0, camera_metres: 3.0, trunk: 1.0, looks: None, seam: Some(PAPER) }
+        Self { neck_px, px_per_metre, yaw_degrees: 0.0, camera_metres: 3.0, trunk: 1.0, seam: Some(PAPER) }
     }
 
     /// Position in px and depth in metres (away from the camera, 0 at the neck) of a point in metres.
@@ -198,16 +196,11 @@ fn draw_trunk(image: &mut Image, view: &FigureView, left: [f32; 3], right: [f32;
         draw::capsule(image, neck, px(0.055), *shoulder, px(0.05), TRUNK)?;
     }
     draw::capsule(image, neck, px(0.052), throat, px(0.046), TRUNK)?;
-    let centre = ahead(0.03, -0.20);
-    let (head, head_depth) = view.project(centre);
-    let tip = |to: [f32; 3]| std::array::from_fn(|k| centre[k] + size * (0.098 * to[k] + [0.0, 0.01, 0.0][k]));
-    let (nose, nose_depth) = view.project(view.looks.map_or(ahead(0.128, -0.19), tip));
+    let (head, _) = view.project(ahead(0.03, -0.20));
+    let (nose, _) = view.project(ahead(0.128, -0.19));
     for (seam, rgb) in [(view.seam.map_or(0.0, |_| 0.006), view.seam.unwrap_or(HEAD)), (0.0, HEAD)] {
         draw::circle(image, nose, px(0.020 + seam), rgb)?;
         draw::circle(image, head, px(0.100 + seam), rgb)?;
-    }
-    if view.looks.is_some() && nose_depth < head_depth {
-        draw::circle(image, nose, px(0.018), mix(HEAD, INK, 0.3))?;
     }
     Ok(())
 }

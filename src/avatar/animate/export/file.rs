@@ -1,6 +1,6 @@
 //! Motion file of any kind, chosen by its name's extension, written atomically.
 
-use super::film_panel::{FilmBody, FilmStyle};
+use super::film_avatar::FilmCamera;
 use super::{fbx, film, glb_scene, json, vrm};
 use crate::animate::avatar::{Appearance, Avatar};
 use crate::animate::performance::Performance;
@@ -12,8 +12,7 @@ use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::Posture;
 use orator_base::types::sound::Sound;
 use orator_base::types::time::FrameRate;
-use orator_formats::joints::description;
-use orator_formats::{authors_txt, joints_npz, npy};
+use orator_formats::{authors_txt, joints_description, joints_npz, npy};
 use std::fs::File;
 use std::io::{self, BufWriter, Write as _};
 use std::path::Path;
@@ -25,10 +24,10 @@ pub struct ExportContent<'a> {
     pub sound: Option<&'a Sound>,
     /// Bone names, in formats that have names.
     pub names: Names,
-    /// What a film shows beside the body.
+    /// What a film shows beside the avatar.
     pub beside: film::SecondPanel<'a>,
-    /// How a film shows the body.
-    pub style: FilmStyle,
+    /// Viewpoint of a film.
+    pub camera: FilmCamera,
     /// Frames a second of a film; `None`: interpolated to 30 or more (`film::smooth_rate`).
     pub film_fps: Option<FrameRate>,
     /// Angles of head and trunk that a speaker generated, at their rate, for JSON.
@@ -47,7 +46,7 @@ pub struct FigureOptions {
 /// Format of a motion file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExportFormat {
-    /// Joints [T, 49, 3] f32, their rate beside them (`formats::joints::description`).
+    /// Joints [T, 49, 3] f32, their rate beside them (`formats::joints_description`).
     Npy,
     /// Joints with rate and mask.
     Npz,
@@ -134,9 +133,9 @@ impl ExportFormat {
                 let fps = sources.film_fps.unwrap_or_else(|| film::smooth_rate(performance.clip.fps));
                 let resampled = (fps != performance.clip.fps).then(|| performance.resampled(fps));
                 let performance = resampled.as_ref().unwrap_or(performance);
-                let motion = (sources.style == FilmStyle::Figure).then(|| performance.motion());
-                let body = FilmBody::new(sources.style, performance, motion.as_ref());
-                workdir::replace(path, |attempt| film::write(attempt, body, sources.sound, sources.beside, progress))
+                let ExportContent { sound, beside, camera, .. } = *sources;
+                let content = film::FilmContent { performance, camera, sound, beside };
+                workdir::replace(path, |attempt| film::write(attempt, content, progress))
             }
         }
     }
@@ -146,10 +145,10 @@ impl ExportFormat {
         let (fps, shape) = (motion.fps, motion.joints.shape());
         match self {
             Self::Npz => workdir::replace(path, |attempt| joints_npz::write(attempt, motion)),
-            Self::Npy => description::with(path, fps, shape, |attempt| npy::write(attempt, motion)),
-            Self::AuthorsTxt => {
-                description::with(path, fps, shape, |attempt| Ok(std::fs::write(attempt, authors_txt::format(motion))?))
-            }
+            Self::Npy => joints_description::with(path, fps, shape, |attempt| npy::write(attempt, motion)),
+            Self::AuthorsTxt => joints_description::with(path, fps, shape, |attempt| {
+                Ok(std::fs::write(attempt, authors_txt::format(motion))?)
+            }),
             _ => anyhow::bail!("{} holds more than joints", path.display()),
         }
     }

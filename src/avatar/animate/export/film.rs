@@ -1,10 +1,9 @@
-//! Motion as a film: a body, alone or beside the source video or another motion; below, the sound's waveform with a
-//! running mark. A drawn figure alone is shown from its left too.
+//! Motion as a film: the avatar, alone or beside the source video or another motion; below, the sound's waveform with a
+//! position marker.
 
 use super::film_avatar::{AvatarView, FilmCamera};
-use super::film_panel::{FilmArea, FilmBody, FilmPanel};
 use super::film_source::SourceCamera;
-use crate::animate::draw::figure::{INK, LEFT, PAPER, RIGHT, mix};
+use crate::animate::draw::figure::{INK, PAPER, mix};
 use crate::animate::performance::Performance;
 use anyhow::{Context as _, ensure};
 use orator_base::stage::progress::Progress;
@@ -17,10 +16,10 @@ use orator_media::opencv::draw;
 use std::path::Path;
 use std::sync::mpsc::sync_channel;
 
+/// Left, top, right, bottom of an area, px.
+type FilmArea = [f32; 4];
 /// Size of the picture in px.
 pub const SIZE: [usize; 2] = [1280, 720];
-const FRONT: FilmArea = [30.0, 24.0, 850.0, 610.0];
-const SIDE: FilmArea = [890.0, 90.0, 1250.0, 610.0];
 const WHOLE: FilmArea = [0.0, 0.0, 1280.0, 620.0];
 const HALVES: [FilmArea; 2] = [[30.0, 66.0, 630.0, 610.0], [650.0, 66.0, 1250.0, 610.0]];
 const WAVE: FilmArea = [40.0, 636.0, 1240.0, 684.0];
@@ -40,18 +39,26 @@ pub fn smooth_rate(fps: FrameRate) -> FrameRate {
     fps.num.checked_mul(times as u32).map_or(fps, |num| FrameRate::new(num, fps.den))
 }
 
+/// What a film shows.
+#[derive(Clone, Copy, Debug)]
+pub struct FilmContent<'a> {
+    pub performance: &'a Performance,
+    pub camera: FilmCamera,
+    pub sound: Option<&'a Sound>,
+    pub beside: SecondPanel<'a>,
+}
+
 /// Content of the picture's second half.
 #[derive(Clone, Copy, Debug, Default)]
 pub enum SecondPanel<'a> {
-    /// Nothing but the body, which has the whole picture.
+    /// None: the avatar fills the picture.
     #[default]
     Itself,
-    /// Frames of a video from this second of it on.
-    Video { path: &'a Path, from_secs: f64 },
-    /// Frames of a video from this second of it on, behind the avatar, which stands where the person does.
-    Behind { path: &'a Path, from_secs: f64, camera: &'a SourceCamera },
-    /// Another body, drawn in the same size; the labels of the two, the other last.
-    Motion { body: FilmBody<'a>, labels: [&'a str; 2] },
+    /// Frames of a video from this second of it on; with its camera they lie behind the avatar, which stands where the
+    /// person does.
+    Video { path: &'a Path, from_secs: f64, camera: Option<&'a SourceCamera> },
+    /// Another avatar, drawn in the same size; the labels of the two, the other last.
+    Motion { performance: &'a Performance, labels: [&'a str; 2] },
 }
 
 /// Renderer of a film's frames.
@@ -60,60 +67,58 @@ pub struct Film<'a> {
     n_frames: usize,
     panels: Vec<LabelledPanel<'a>>,
     over: Option<OverVideo<'a>>,
-    /// Whether left and right have colours.
-    has_colours: bool,
     /// Loudness of each column of the waveform, 0..1; empty without sound.
     wave: Vec<f32>,
     /// Loudness of each frame, 0..1; empty without sound.
     voice: Vec<f32>,
 }
 
-/// One body in the picture.
+/// One avatar in the picture.
 struct LabelledPanel<'a> {
-    body: FilmBody<'a>,
-    panel: FilmPanel<'a>,
+    performance: &'a Performance,
+    view: AvatarView<'a>,
+    /// Left top corner of the view, px.
+    corner: [usize; 2],
     label: &'a str,
     /// Left edge of the label, px.
     label_px: f32,
 }
 
+impl<'a> LabelledPanel<'a> {
+    /// Panel of the first of the `shown` performances, in which all of them fit.
+    fn new(shown: &[&'a Performance], camera: FilmCamera, area: FilmArea, label: &'a str) -> Self {
+        let [left, top, right, bottom] = area.map(|px| px as usize);
+        let view = AvatarView::new(shown[0], shown, [right - left, bottom - top], camera);
+        let label_px = (area[0] + area[2]) / 2.0 - 40.0;
+        Self { performance: shown[0], view, corner: [left, top], label, label_px }
+    }
+}
+
 impl<'a> Film<'a> {
     /// Film with one view in which every frame of the body fits.
-    pub fn new(body: FilmBody<'a>, sound: Option<&Sound>, beside: SecondPanel<'a>) -> Self {
-        let one = |area: FilmArea, yaw, label, label_px| LabelledPanel {
-            body,
-            panel: FilmPanel::new(body, &[], area, yaw),
-            label,
-            label_px,
-        };
-        let has_colours = matches!(body, FilmBody::Figure(..));
+    pub fn new(content: FilmContent<'a>) -> Self {
+        let FilmContent { performance, camera, sound, beside } = content;
+        let panel = |shown: &[&'a Performance], area, label| LabelledPanel::new(shown, camera, area, label);
         let panels = match beside {
-            SecondPanel::Behind { .. } if !has_colours => Vec::new(),
-            SecondPanel::Itself | SecondPanel::Behind { .. } if has_colours => {
-                vec![one(SIDE, 90.0, "from the left", SIDE[0] + 20.0), one(FRONT, 0.0, "", FRONT[0])]
-            }
-            SecondPanel::Itself | SecondPanel::Behind { .. } => vec![one(WHOLE, 0.0, "", 0.0)],
-            SecondPanel::Video { .. } => vec![one(HALVES[1], 0.0, "", HALVES[1][0])],
-            SecondPanel::Motion { body: other, labels } => {
-                let bodies = [body, other];
-                let half = |((body, label), area): ((FilmBody<'a>, _), FilmArea)| {
-                    let panel = FilmPanel::new(body, &bodies, area, 0.0);
-                    LabelledPanel { body, panel, label, label_px: (area[0] + area[2]) / 2.0 - 40.0 }
-                };
-                bodies.into_iter().zip(labels).zip(HALVES).map(half).collect()
-            }
+            SecondPanel::Video { camera: Some(_), .. } => Vec::new(),
+            SecondPanel::Itself => vec![panel(&[performance], WHOLE, "")],
+            SecondPanel::Video { camera: None, .. } => vec![panel(&[performance], HALVES[1], "")],
+            SecondPanel::Motion { performance: other, labels } => vec![
+                panel(&[performance, other], HALVES[0], labels[0]),
+                panel(&[other, performance], HALVES[1], labels[1]),
+            ],
         };
-        let over = match (beside, body) {
-            (SecondPanel::Behind { path, from_secs, camera }, FilmBody::Avatar(performance, _)) => {
+        let over = match beside {
+            SecondPanel::Video { path, from_secs, camera: Some(camera) } => {
                 Some(OverVideo { performance, path, from_secs, camera, open: None })
             }
             _ => None,
         };
-        let (fps, n_frames) = (body.fps(), body.n_frames());
+        let (fps, n_frames) = (performance.clip.fps, performance.clip.n_frames());
         let secs = fps.secs(n_frames);
         let loudness = |n_parts: usize| sound.map(|sound| loudness(sound, secs, n_parts)).unwrap_or_default();
         let wave = loudness(((WAVE[2] - WAVE[0]) / COLUMN_PX) as usize);
-        Self { fps, n_frames, panels, over, has_colours, wave, voice: loudness(n_frames) }
+        Self { fps, n_frames, panels, over, wave, voice: loudness(n_frames) }
     }
 
     /// Picture of one frame, `SIZE` px; an empty area in place of a video.
@@ -121,11 +126,12 @@ impl<'a> Film<'a> {
         let mut image = Image::filled(SIZE[0], SIZE[1], PAPER);
         let secs = self.fps.secs(frame_idx);
         let mouth = self.voice.get(frame_idx).map_or(0.0, |loudness| WIDEST_MOUTH * f64::from(*loudness));
-        for LabelledPanel { body, panel, label, label_px } in &mut self.panels {
-            // The other body's frame nearest in time, none after its end.
-            let shown = if body.fps() == self.fps { frame_idx } else { (secs * body.fps().per_sec()).round() as usize };
-            if shown < body.n_frames() {
-                panel.draw(&mut image, shown, mouth)?;
+        for LabelledPanel { performance, view, corner, label, label_px } in &mut self.panels {
+            // The other motion's frame nearest in time, none after its end.
+            let clip = &performance.clip;
+            let shown = if clip.fps == self.fps { frame_idx } else { (secs * clip.fps.per_sec()).round() as usize };
+            if shown < clip.n_frames() {
+                draw::paste(&mut image, &view.frame(shown, mouth), *corner);
             }
             draw::text(&mut image, label, [*label_px, 50.0], WORDS_PX, INK)?;
         }
@@ -133,12 +139,6 @@ impl<'a> Film<'a> {
             over.draw(&mut image, frame_idx, mouth)?;
         }
         self.draw_wave(&mut image, frame_idx)?;
-        if self.has_colours {
-            let legend_px =
-                self.panels.last().map_or(40.0, |last| if last.label.is_empty() { last.label_px + 10.0 } else { 40.0 });
-            draw::text(&mut image, "right", [legend_px, 50.0], WORDS_PX, RIGHT)?;
-            draw::text(&mut image, "left", [legend_px + 52.0, 50.0], WORDS_PX, LEFT)?;
-        }
         let clock = format!("{} / {}", clock(secs), clock(self.fps.secs(self.n_frames)));
         draw::text(&mut image, &clock, [WAVE[0], 706.0], WORDS_PX, INK)?;
         Ok(image)
@@ -162,16 +162,13 @@ impl<'a> Film<'a> {
 
 /// Writes the film as an mp4 with the sound, in place; callers wrap it in `stage::workdir::replace`. Frames are drawn on
 /// a thread of their own while those before are encoded.
-pub fn write(
-    path: &Path,
-    body: FilmBody,
-    sound: Option<&Sound>,
-    beside: SecondPanel,
-    progress: &dyn Progress,
-) -> anyhow::Result<()> {
-    let (fps, n_frames) = (body.fps(), body.n_frames());
+pub fn write(path: &Path, content: FilmContent, progress: &dyn Progress) -> anyhow::Result<()> {
+    let FilmContent { performance, sound, beside, .. } = content;
+    let (fps, n_frames) = (performance.clip.fps, performance.clip.n_frames());
     let mut footage = match beside {
-        SecondPanel::Video { path, from_secs } => Some(FilmFootage::open(path, fps, from_secs, HALVES[0])?),
+        SecondPanel::Video { path, from_secs, camera: None } => {
+            Some(FilmFootage::open(path, fps, from_secs, HALVES[0])?)
+        }
         _ => None,
     };
     let task = progress.begin("drawing", n_frames as u64);
@@ -179,7 +176,7 @@ pub fn write(
     let (sender, pictures) = sync_channel(N_AHEAD);
     std::thread::scope(|scope| -> anyhow::Result<()> {
         scope.spawn(move || {
-            let mut film = Film::new(body, sound, beside);
+            let mut film = Film::new(content);
             // A writer that failed takes no more.
             let _ = (0..n_frames).try_for_each(|frame_idx| sender.send(film.frame(frame_idx)));
         });

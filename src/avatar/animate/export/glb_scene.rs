@@ -2,7 +2,7 @@
 //! skinned meshes, the clip as one animation. Joints that do not turn have one key.
 
 use super::glb::{BufferUse, GlbBuffer};
-use super::vrm_humanoid;
+use super::vrm;
 use crate::animate::avatar::{Avatar, AvatarMesh, Weights};
 use crate::animate::rig::file_skeleton::{FileSkeleton, RestAxes};
 use crate::animate::rig::names::Names;
@@ -24,7 +24,7 @@ pub fn file(rig: &Rig, clip: &BvhClip, avatar: &Avatar, names: Names) -> Vec<u8>
         scene["animations"] = json!([animation(&mut buffer, &skeleton.clip(clip))]);
     }
     if names == Names::Vrm {
-        vrm_humanoid::make(&mut scene, &skeleton.skeleton);
+        vrm::make_humanoid(&mut scene, &skeleton.skeleton);
     }
     buffer.file(scene)
 }

@@ -2,20 +2,24 @@
 //! glTF under further rules: T-pose at rest, metres, y up, facing +z, no rotations at rest here.
 
 use super::glb::GlbBuffer;
-use super::{glb_scene, vrm_humanoid};
+use super::glb_scene;
 use crate::animate::avatar::Avatar;
 use crate::animate::rig::file_skeleton::{FileSkeleton, RestAxes};
 use crate::animate::rig::names::Names;
 use crate::animate::rig::rig::Rig;
+use orator_base::motion::fk::Skeleton;
 use orator_formats::bvh::write::BvhClip;
-use serde_json::json;
+use serde_json::{Map, Value, json};
+
+/// Licence address that the format requires.
+const LICENSE: &str = "https://vrm.dev/licenses/1.0/";
 
 /// Bytes of the `.vrm` file of the avatar on its rig, without motion.
 pub fn avatar(rig: &Rig, avatar: &Avatar) -> Vec<u8> {
     let skeleton = FileSkeleton::new(&rig.skeleton, Names::Vrm, RestAxes::Convention);
     let mut buffer = GlbBuffer::default();
     let mut scene = glb_scene::scene(&mut buffer, &skeleton, rig.root, avatar);
-    vrm_humanoid::make(&mut scene, &skeleton.skeleton);
+    make_humanoid(&mut scene, &skeleton.skeleton);
     buffer.file(scene)
 }
 
@@ -32,9 +36,46 @@ pub fn motion(rig: &Rig, clip: &BvhClip) -> Vec<u8> {
     if clip.n_frames() > 0 {
         scene["animations"] = json!([glb_scene::animation(&mut buffer, &skeleton.clip(clip))]);
     }
-    let extension =
-        json!({ "specVersion": "1.0", "humanoid": { "humanBones": vrm_humanoid::bones(&skeleton.skeleton) } });
+    let extension = json!({ "specVersion": "1.0", "humanoid": { "humanBones": bones(&skeleton.skeleton) } });
     scene["extensionsUsed"] = json!(["VRMC_vrm_animation"]);
     scene["extensions"] = json!({ "VRMC_vrm_animation": extension });
     buffer.file(scene)
+}
+
+/// Makes a scene of VRM's names a humanoid: its bones, the open mouth of the face, the avatar's author and what the licence
+/// allows: everything.
+pub fn make_humanoid(scene: &mut Value, named: &Skeleton) {
+    // The last node is the face.
+    let face = named.joints.len() + 1;
+    let extension = json!({
+        "specVersion": "1.0",
+        "meta": {
+            "name": "Avatar",
+            "version": env!("CARGO_PKG_VERSION"),
+            "authors": ["orator"],
+            "copyrightInformation": "made by a program; free for any use",
+            "licenseUrl": LICENSE,
+            "avatarPermission": "everyone",
+            "allowExcessivelyViolentUsage": true,
+            "allowExcessivelySexualUsage": true,
+            "commercialUsage": "corporation",
+            "allowPoliticalOrReligiousUsage": true,
+            "allowAntisocialOrHateUsage": false,
+            "creditNotation": "unnecessary",
+            "allowRedistribution": true,
+            "modification": "allowModificationRedistribution",
+        },
+        "humanoid": { "humanBones": bones(named) },
+        "expressions": {
+            "preset": { "aa": { "morphTargetBinds": [{ "node": face, "index": 0, "weight": 1.0 }] } },
+        },
+    });
+    scene["extensionsUsed"] = json!(["VRMC_vrm"]);
+    scene["extensions"] = json!({ "VRMC_vrm": extension });
+}
+
+/// Node of every bone of the humanoid.
+fn bones(named: &Skeleton) -> Map<String, Value> {
+    let moving = named.joints.iter().enumerate().filter(|(_, joint)| !joint.end);
+    moving.map(|(node, joint)| (joint.name.clone(), json!({ "node": node }))).collect()
 }

@@ -85,15 +85,11 @@ fn spelt(stem: &str, k: usize, bone: &str) -> [String; 7] {
 mod tests {
     use super::*;
     use crate::animate::rig::names::Names;
-    use crate::animate::rig::rig::Rig;
+    use crate::animate::rig::rig::tests::default_rig;
 
     #[test]
     fn every_convention_of_ours_is_found_whole() {
-        let motion = orator_base::types::pose3d::Motion::from_joints(
-            orator_base::types::time::FrameRate::new(15, 1),
-            ndarray::Array3::from_elem((1, orator_base::types::skeleton::N_JOINTS, 3), f32::NAN),
-        );
-        let rig = Rig::from_motion(&motion).skeleton;
+        let rig = default_rig().skeleton;
         for names in Names::ALL {
             let called = names.of(&rig);
             let called: Vec<&str> = called.iter().map(String::as_str).collect();

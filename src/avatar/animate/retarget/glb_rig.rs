@@ -3,10 +3,13 @@
 use super::user_rig::{UserJoint, UserRig};
 use crate::animate::export::glb::{BufferUse, GlbBuffer};
 use crate::animate::export::glb_scene::signed;
-use anyhow::{Context as _, Result, bail, ensure};
+use anyhow::{Context as _, Result, ensure};
 use orator_base::math::rotation::Rotation;
+use orator_base::math::vec3::Vec3;
 use orator_base::types::time::FrameRate;
+use serde::Deserialize;
 use serde_json::{Value, json};
+use std::collections::BTreeSet;
 
 /// Largest relative difference of the three scales of a node.
 const UNEVEN: f64 = 1e-3;
@@ -31,19 +34,18 @@ impl GlbRig {
         let buffers = scene["buffers"].as_array().map_or(0, Vec::len);
         let is_outside = scene["buffers"].as_array().into_iter().flatten().any(|buffer| buffer.get("uri").is_some());
         ensure!(buffers <= 1 && !is_outside, "its data lie in other files; export it as one .glb");
-        let empty = Vec::new();
-        let nodes = scene["nodes"].as_array().unwrap_or(&empty);
-        let of_skin = |node: usize| {
-            let skins = scene["skins"].as_array().into_iter().flatten();
-            skins
-                .flat_map(|skin| skin["joints"].as_array().into_iter().flatten())
-                .any(|joint| joint.as_u64() == Some(node as u64))
-        };
-        let has_skin = scene["skins"].as_array().is_some_and(|skins| !skins.is_empty());
-        let children = |node: usize| nodes[node]["children"].as_array().into_iter().flatten().filter_map(Value::as_u64);
+        let list = |key: &str| scene[key].as_array().into_iter().flatten();
+        let nodes = list("nodes").enumerate().map(|(n, node)| {
+            SceneNode::deserialize(node).with_context(|| format!("node {n} is not as glTF 2.0 describes nodes"))
+        });
+        let nodes: Vec<SceneNode> = nodes.collect::<Result<_>>()?;
+        let of_skins = list("skins").flat_map(|skin| skin["joints"].as_array().into_iter().flatten());
+        let of_skins: BTreeSet<u64> = of_skins.filter_map(Value::as_u64).collect();
+        let has_skin = list("skins").next().is_some();
         let mut is_child = vec![false; nodes.len()];
-        for child in (0..nodes.len()).flat_map(children) {
-            let known = is_child.get_mut(child as usize).context("a node has a child that is not there")?;
+        for &child in nodes.iter().flat_map(|node| &node.children) {
+            let known =
+                is_child.get_mut(child).with_context(|| format!("a node has the child {child}, which is missing"))?;
             ensure!(!*known, "node {child} has two parents");
             *known = true;
         }
@@ -52,10 +54,9 @@ impl GlbRig {
         let (mut order, mut joints) = (Vec::new(), Vec::new());
         while let Some((node, parent)) = ahead.pop() {
             let at = joints.len();
-            joints.push(joint(&nodes[node], node, parent, !has_skin || of_skin(node))?);
+            joints.push(nodes[node].joint(node, parent, !has_skin || of_skins.contains(&(node as u64)))?);
             order.push(node);
-            let below: Vec<usize> = children(node).map(|child| child as usize).collect();
-            ahead.extend(below.into_iter().rev().map(|child| (child, Some(at))));
+            ahead.extend(nodes[node].children.iter().rev().map(|&child| (child, Some(at))));
         }
         ensure!(joints.len() == nodes.len(), "its nodes are no tree");
         Ok(Self { nodes: order, rig: UserRig { joints, standing: Vec::new() }, scene, bytes })
@@ -105,31 +106,37 @@ fn chunks(file: &[u8]) -> Option<(Value, Vec<u8>)> {
     scene.is_object().then_some((scene, bytes))
 }
 
-fn joint(node: &Value, number: usize, parent: Option<usize>, moves: bool) -> Result<UserJoint> {
-    let name = node["name"].as_str().map_or_else(|| format!("node {number}"), str::to_owned);
-    let numbers = |key: &str| -> Option<Vec<f64>> { node[key].as_array()?.iter().map(Value::as_f64).collect() };
-    if node.get("matrix").is_some() {
-        bail!("{name} is placed by a matrix; export the file with translation, rotation and scale");
+/// Node of a glTF scene.
+#[derive(Debug, Deserialize)]
+#[serde(default)]
+struct SceneNode {
+    name: Option<String>,
+    children: Vec<usize>,
+    matrix: Option<Value>,
+    translation: Vec3,
+    rotation: [f64; 4],
+    scale: Vec3,
+}
+
+impl Default for SceneNode {
+    fn default() -> Self {
+        let (translation, rotation, scale) = ([0.0; 3], [0.0, 0.0, 0.0, 1.0], [1.0; 3]);
+        Self { name: None, children: Vec::new(), matrix: None, translation, rotation, scale }
     }
-    let offset = match numbers("translation").as_deref() {
-        Some(&[x, y, z]) => [x, y, z],
-        _ => [0.0; 3],
-    };
-    let rest = match numbers("rotation").as_deref() {
-        Some(&[x, y, z, w]) => {
-            let length = (x * x + y * y + z * z + w * w).sqrt();
-            ensure!(length > 1e-6, "the rotation of {name} is none");
-            Rotation { w: w / length, v: [x / length, y / length, z / length] }
-        }
-        _ => Rotation::IDENTITY,
-    };
-    let scale = match numbers("scale").as_deref() {
-        Some(&[x, y, z]) => {
-            let is_even = (x - y).abs().max((x - z).abs()) <= UNEVEN * x.abs();
-            ensure!(is_even && x > 0.0, "{name} is scaled by {x}, {y}, {z}; apply its scale and export it again");
-            x
-        }
-        _ => 1.0,
-    };
-    Ok(UserJoint { name, parent, offset, rest, scale, moves })
+}
+
+impl SceneNode {
+    fn joint(&self, number: usize, parent: Option<usize>, moves: bool) -> Result<UserJoint> {
+        let name = self.name.clone().unwrap_or_else(|| format!("node {number}"));
+        let is_plain = self.matrix.is_none();
+        ensure!(is_plain, "{name} is placed by a matrix; export the file with translation, rotation and scale");
+        let [x, y, z, w] = self.rotation;
+        let length = (x * x + y * y + z * z + w * w).sqrt();
+        ensure!(length > 1e-6, "the rotation of {name} is {:?}, expected a unit quaternion", self.rotation);
+        let rest = Rotation { w: w / length, v: [x / length, y / length, z / length] };
+        let [x, y, z] = self.scale;
+        let is_even = (x - y).abs().max((x - z).abs()) <= UNEVEN * x.abs();
+        ensure!(is_even && x > 0.0, "{name} is scaled by {x}, {y}, {z}; apply its scale and export it again");
+        Ok(UserJoint { name, parent, offset: self.translation, rest, scale: x, moves })
+    }
 }

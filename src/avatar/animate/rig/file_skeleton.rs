@@ -179,20 +179,12 @@ fn limb_axes(own: &str) -> Rotation {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::animate::rig::rig::Rig;
+    use crate::animate::rig::rig::tests::default_rig;
     use orator_base::math::vec3::{dot, norm, sub};
-
-    fn rig() -> Rig {
-        let motion = orator_base::types::pose3d::Motion::from_joints(
-            orator_base::types::time::FrameRate::new(15, 1),
-            ndarray::Array3::from_elem((1, orator_base::types::skeleton::N_JOINTS, 3), f32::NAN),
-        );
-        Rig::from_motion(&motion)
-    }
 
     #[test]
     fn every_convention_moves_the_same_joints() {
-        let rig = rig();
+        let rig = default_rig();
         let turn = |n: usize| Rotation::about([0.6, 0.0, 0.8], 0.1 * n as f64);
         let clip = BvhClip {
             skeleton: rig.skeleton.clone(),
@@ -213,7 +205,7 @@ mod tests {
 
     #[test]
     fn the_bones_of_mixamo_run_along_y_and_are_65() {
-        let rig = rig();
+        let rig = default_rig();
         let file = FileSkeleton::new(&rig.skeleton, Names::Mixamo, RestAxes::Convention);
         assert_eq!(file.skeleton.joints.len(), 65);
         let at = |name: &str| file.skeleton.find(&format!("mixamorig:{name}")).unwrap();

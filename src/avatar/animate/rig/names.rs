@@ -128,22 +128,14 @@ fn humanoid(own: &str, thumb: [&str; 3]) -> String {
 mod tests {
     use super::*;
     use crate::animate::rig::file_skeleton::{FileSkeleton, RestAxes};
-    use crate::animate::rig::rig::Rig;
+    use crate::animate::rig::rig::tests::default_rig;
     use std::collections::BTreeSet;
 
     const FINGERS: [&str; 5] = ["Thumb", "Index", "Middle", "Ring", "Little"];
 
-    fn skeleton() -> Skeleton {
-        let motion = orator_base::types::pose3d::Motion::from_joints(
-            orator_base::types::time::FrameRate::new(15, 1),
-            ndarray::Array3::from_elem((1, orator_base::types::skeleton::N_JOINTS, 3), f32::NAN),
-        );
-        Rig::from_motion(&motion).skeleton
-    }
-
     #[test]
     fn unreals_names_have_their_side_at_the_end() {
-        let called = Names::Unreal.of(&skeleton());
+        let called = Names::Unreal.of(&default_rig().skeleton);
         let trunk = "pelvis spine_01 spine_05 neck_01 head".split(' ').map(String::from);
         let limbs = ["clavicle", "upperarm", "lowerarm", "hand", "thigh", "calf", "foot", "ball"].map(String::from);
         let fingers = ["thumb", "index", "middle", "ring", "pinky"];
@@ -197,7 +189,7 @@ mod tests {
                 mixamos_fingers.collect(),
             ),
         ] {
-            let all = FileSkeleton::new(&skeleton(), names, RestAxes::World).skeleton.joints;
+            let all = FileSkeleton::new(&default_rig().skeleton, names, RestAxes::World).skeleton.joints;
             let called: BTreeSet<&String> = all.iter().map(|joint| &joint.name).collect();
             assert_eq!(called.len(), all.len(), "a name is given twice");
             let parts: Vec<String> = limbs.iter().map(ToString::to_string).chain(fingers).collect();

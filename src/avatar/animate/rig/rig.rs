@@ -59,6 +59,8 @@ pub struct Rig {
     pub head: usize,
     /// Left, right.
     pub arms: [RigArm; 2],
+    /// Left, right: upper leg, leg, foot, the end of the foot.
+    pub legs: [[usize; 4]; 2],
     /// For each of the 49 joints of a motion the joint of the skeleton at its position (bone ends included).
     pub positions: [usize; N_JOINTS],
 }
@@ -91,14 +93,14 @@ impl Rig {
         positions[NECK] = neck;
         let arms = [(1.0, &palms[0]), (-1.0, &palms[1])]
             .map(|(sign, palm)| push_arm(&mut bones, &mut positions, (metres, palm), chest, up(0.21), sign));
-        for (sign, side) in [(1.0, "Left"), (-1.0, "Right")] {
+        let legs = [(1.0, "Left"), (-1.0, "Right")].map(|(sign, side)| {
             let from_hips = [sign * 0.09 * body, -0.04 * body, 0.0];
             let upper = bones.push(&format!("{side}UpLeg"), Some(hips), from_hips, false);
             let lower = bones.push(&format!("{side}Leg"), Some(upper), up(-0.42), false);
             let foot = bones.push(&format!("{side}Foot"), Some(lower), up(-0.42), false);
-            bones.push("", Some(foot), [0.0, -0.08 * body, 0.16 * body], true);
-        }
-        Self { skeleton: bones, root: up(0.04 + 0.42 + 0.42 + 0.08), spine, chest, neck, head, arms, positions }
+            [upper, lower, foot, bones.push("", Some(foot), [0.0, -0.08 * body, 0.16 * body], true)]
+        });
+        Self { skeleton: bones, root: up(0.04 + 0.42 + 0.42 + 0.08), spine, chest, neck, head, arms, legs, positions }
     }
 }
 
@@ -206,8 +208,14 @@ fn default_metres(joint: usize) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
+
+    /// Rig of the default bones.
+    pub fn default_rig() -> Rig {
+        let unseen = ndarray::Array3::from_elem((1, N_JOINTS, 3), f32::NAN);
+        Rig::from_motion(&Motion::from_joints(orator_base::types::time::FrameRate::new(15, 1), unseen))
+    }
 
     #[test]
     fn a_palm_points_along_the_hand() {

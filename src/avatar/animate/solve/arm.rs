@@ -1,4 +1,5 @@
-//! Rotations of a left arm from its joints, shoulder to finger tips. Bones take their smoothed directions; the upper
+//! Joint positions to bone rotations: the shoulders' yaw goes half to the spine and half to the chest, and each arm is
+//! solved as a left arm, shoulder to finger tips. Bones take their smoothed directions; the upper
 //! arm's roll puts the elbow's axis across upper arm and forearm and is interpolated where the arm is straight; the
 //! hand's frame comes from its knuckles, and half of its turn about the forearm belongs to the forearm. Fingers bend
 //! without twist.
@@ -7,9 +8,9 @@ use super::arm_pose::{ArmPose, elbow};
 use super::positions::JointPositions;
 use super::roll::elbow_axes;
 use super::smoothing::{Filter, Smoothing};
-use super::track::{ObservedTrack, RotationTrack, filled, world};
+use super::track::{ObservedTrack, RotationTrack, filled, mirrored, world};
 use crate::animate::rig::hinge::Bend;
-use crate::animate::rig::rig::{RigArm, finger_hinge};
+use crate::animate::rig::rig::{Rig, RigArm, finger_hinge};
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::Vec3;
 use orator_base::types::skeleton::{L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, NECK};
@@ -42,8 +43,31 @@ impl SolveFilters {
 
 type Directions = Vec<Option<Vec3>>;
 
+/// Local rotations by joint of the rig. Hips, neck, head and legs rest.
+pub fn rotations(positions: &JointPositions, rig: &Rig, filters: &SolveFilters) -> Vec<RotationTrack> {
+    let n_frames = positions.n_frames();
+    let mut local: Vec<RotationTrack> = vec![vec![Rotation::IDENTITY; n_frames]; rig.skeleton.joints.len()];
+
+    let mut line: Vec<Option<Vec3>> = (0..n_frames).map(|t| positions.shoulder_line(t)).collect();
+    filters.arms.directions(&mut line, &[]);
+    let half_yaw = |[x, _, z]: Vec3| Rotation::about([0.0, 1.0, 0.0], (-z).atan2(x) / 2.0);
+    let half_yaw = filled(line.into_iter().map(|line| line.map(half_yaw)).collect(), Rotation::IDENTITY, None);
+    let chest: RotationTrack = half_yaw.iter().map(|&half| half * half).collect();
+    local[rig.spine].clone_from(&half_yaw);
+    local[rig.chest] = half_yaw;
+
+    let [left, right] = &rig.arms;
+    solve(positions, left, &chest, filters, &mut local);
+    solve(&positions.mirrored(), right, &mirrored(chest), filters, &mut local);
+    let fingers = right.fingers.iter().flatten();
+    for &joint in [right.clavicle, right.upper, right.fore, right.hand].iter().chain(fingers) {
+        local[joint] = mirrored(std::mem::take(&mut local[joint]));
+    }
+    local
+}
+
 /// Solves the arm as a left arm, whichever `arm` is, and writes its tracks into `local` (one a joint of the skeleton).
-pub fn solve(
+fn solve(
     positions: &JointPositions,
     arm: &RigArm,
     chest: &RotationTrack,

@@ -34,14 +34,6 @@ struct Leg {
 }
 
 impl Leg {
-    fn both(rig: &Rig) -> Option<[Self; 2]> {
-        let find = |side: &str| {
-            let joint = |name: &str| rig.skeleton.find(&format!("{side}{name}"));
-            Some(Self { upper: joint("UpLeg")?, lower: joint("Leg")?, foot: joint("Foot")? })
-        };
-        Some([find("Left")?, find("Right")?])
-    }
-
     /// Lengths of thigh and shin, cm.
     fn lengths(&self, rig: &Rig) -> [f64; 2] {
         [self.lower, self.foot].map(|joint| norm(rig.skeleton.joints[joint].offset))
@@ -69,9 +61,10 @@ impl Legs {
     /// Plants the feet of a clip under its hips, whose travel follows.
     pub fn plant(self, rig: &Rig, clip: &mut BvhClip) {
         let still = clip.local.iter().all(|local| local[0] == Rotation::IDENTITY);
-        let Some(legs) = Leg::both(rig).filter(|_| self == Self::Seated || (self == Self::Standing && !still)) else {
+        if self == Self::None || (self == Self::Standing && still) {
             return;
-        };
+        }
+        let legs = rig.legs.map(|[upper, lower, foot, _]| Leg { upper, lower, foot });
         let rest = rig.skeleton.positions(clip.root, &vec![Rotation::IDENTITY; rig.skeleton.joints.len()]);
         let trunk = rest[rig.neck][1] - rest[0][1];
         let ankles = legs.each_ref().map(|leg| {

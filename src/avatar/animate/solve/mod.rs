@@ -6,7 +6,6 @@ pub mod head;
 pub mod legs;
 pub mod positions;
 pub mod roll;
-pub mod rotations;
 pub mod smoothing;
 pub mod track;
 pub mod trunk;

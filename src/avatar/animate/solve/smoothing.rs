@@ -4,7 +4,6 @@
 //! is less noisy than if it were smoothed itself. Gaps separate runs.
 
 use orator_base::math::local_fit::LocalFit;
-use orator_base::math::one_euro::OneEuro;
 use orator_base::math::savitzky_golay::SavitzkyGolay;
 use orator_base::math::vec3::{Vec3, unit};
 use orator_base::types::time::FrameRate;
@@ -21,9 +20,6 @@ pub enum Smoothing {
     /// Cubic Savitzky-Golay filter over 0.6 s for arms (9 frames at 15 fps) and 1 s (15 frames) for hands, without
     /// delay.
     SavitzkyGolay,
-    /// One-Euro filter (causal); hands with half of the cut-off at rest. Speeds are those of directions, radians a
-    /// second.
-    OneEuro(OneEuro),
 }
 
 impl Default for Smoothing {
@@ -32,8 +28,6 @@ impl Default for Smoothing {
     }
 }
 
-/// Default parameters of the one-Euro filter.
-pub const ONE_EURO: OneEuro = OneEuro { rest_hz: 1.5, beta: 0.5 };
 /// Order of the polynomials.
 const ORDER: usize = 3;
 /// Half a window minus half a frame, seconds.
@@ -44,34 +38,31 @@ const HANDS_HALF_SECS: f64 = 7.0 / 15.0;
 const ARMS_RADIANS: f64 = 0.005;
 const HANDS_RADIANS: f64 = 0.006;
 const FINGERS_RADIANS: f64 = 0.015;
-/// One-Euro cut-off of hands relative to that of arms.
-const HANDS_SHARE: f64 = 0.5;
 
 /// Filter for tracks of one rate.
 pub enum Filter {
     None,
     Adaptive(LocalFit),
     Polynomial(SavitzkyGolay),
-    OneEuro(OneEuro, f64),
 }
 
 impl Smoothing {
     /// Filter for trunk, head and arms at this rate.
     pub fn arms(self, fps: FrameRate) -> Filter {
-        self.filter(fps, ARMS_HALF_SECS, 1.0, ARMS_RADIANS)
+        self.filter(fps, ARMS_HALF_SECS, ARMS_RADIANS)
     }
 
     /// Filter for the turns of hands against their forearms at this rate, radians.
     pub fn hands(self, fps: FrameRate) -> Filter {
-        self.filter(fps, HANDS_HALF_SECS, HANDS_SHARE, HANDS_RADIANS)
+        self.filter(fps, HANDS_HALF_SECS, HANDS_RADIANS)
     }
 
     /// Filter for fingers at this rate.
     pub fn fingers(self, fps: FrameRate) -> Filter {
-        self.filter(fps, HANDS_HALF_SECS, HANDS_SHARE, FINGERS_RADIANS)
+        self.filter(fps, HANDS_HALF_SECS, FINGERS_RADIANS)
     }
 
-    fn filter(self, fps: FrameRate, half_secs: f64, share: f64, tolerance: f64) -> Filter {
+    fn filter(self, fps: FrameRate, half_secs: f64, tolerance: f64) -> Filter {
         match self {
             Self::None => Filter::None,
             Self::Adaptive { strength } => {
@@ -80,9 +71,6 @@ impl Smoothing {
             Self::SavitzkyGolay => {
                 let half = (half_secs * fps.per_sec()).round().clamp(1.0, 1000.0) as usize;
                 Filter::Polynomial(SavitzkyGolay::new(half, ORDER))
-            }
-            Self::OneEuro(filter) => {
-                Filter::OneEuro(OneEuro { rest_hz: share * filter.rest_hz, ..filter }, fps.per_sec())
             }
         }
     }
@@ -105,7 +93,6 @@ impl Filter {
                 Self::None => return,
                 Self::Adaptive(filter) => filter.run(&run, known.get(start..).unwrap_or_default()),
                 Self::Polynomial(filter) => filter.run(&run),
-                Self::OneEuro(filter, fps) => filter.run(*fps, &run),
             };
             track[start..].iter_mut().zip(smooth).for_each(|(place, value)| *place = Some(value));
             start += run.len() + 1;

@@ -16,8 +16,8 @@ pub struct Args {
     /// body or hands.
     #[arg(long, value_enum, default_value = "body")]
     part: LifterPart,
-    /// Captured motion, files or folders of them. body: .bvh, CMU or TED .npz; hands: .bvh with fingers, SMPL-X or TED
-    /// .npz, ICVL or NYU label .txt.
+    /// Captured motion, files or folders of them. body: .bvh, CMU or TED .npz; hands: .bvh with fingers, TED .npz, ICVL
+    /// or NYU label .txt.
     #[arg(long, value_name = "PATH", num_args = 1.., required = true)]
     mocap: Vec<PathBuf>,
     /// body: measure the takes of these names apart, and no others: patterns like 'test_*' or 'walk#1' (a file's second

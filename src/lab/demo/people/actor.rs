@@ -8,7 +8,8 @@ use super::held::HeldThing;
 use super::trunk::SeatedRig;
 use super::vocabulary::{DESK_AHEAD, DESK_BELOW_NECK};
 use super::voice::Voice;
-use orator_avatar::animate::avatar::{Appearance, Avatar};
+use crate::demo::looks;
+use orator_avatar::animate::avatar::Avatar;
 use orator_avatar::animate::rig::rig::{CM, Rig};
 use orator_avatar::animate::{AnimationOptions, Constraints, Smoothing, Yaw, perform};
 use orator_avatar::render::Mesh;
@@ -131,7 +132,7 @@ impl Actor {
         let neck = add(turn.turn(seated.torso(&upright).neck), shift);
         let hips = add(turn.turn(seated.root(&upright)), shift);
         let unit = rig.skeleton.joints[rig.spine].offset[1] / 10.0;
-        let avatar = Avatar::new(&rig, &Appearance::from_seed(seeds.clothes));
+        let avatar = Avatar::new(&rig, &looks::random(seeds.clothes));
         let desk_ahead = DESK_AHEAD + acts.carriage.desk_ahead();
         Self { rig, avatar, held, poses, role, unit, neck, hips, desk_ahead }
     }

@@ -4,6 +4,7 @@
 //! length, since a picture shows no size. The wrist and points that a source lacks do not count.
 
 use crate::mocap::fingers::files::FingerSet;
+use crate::mocap::fingers::take::Truth;
 use crate::train::lifter::heatmaps;
 use crate::train::lifter::heatmaps::HeatmapLifterTask;
 use crate::train::scene::hand_shape::{normal, random_rotation};
@@ -17,7 +18,6 @@ use orator_base::motion::view::hand::{HandJoints, SeenHand, parent};
 use orator_base::types::pose2d::N_HAND;
 use orator_base::types::skeleton::Side;
 use orator_formats::checkpoint::Contents;
-use orator_formats::mocap::fingers::take::Truth;
 use orator_nn::lifter::hand::HandLifter;
 use orator_pipeline::lift::weights;
 use rand::{Rng, SeedableRng};
@@ -197,7 +197,7 @@ pub fn text(rows: &[HandRow]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use orator_formats::mocap::fingers::take::{FingerTake, Size};
+    use crate::mocap::fingers::take::{FingerTake, Size};
 
     fn resting(size: Size, known: impl Fn(usize) -> bool) -> FingerSet {
         let frame = std::array::from_fn(|j| known(j).then(|| relaxed()[j]));

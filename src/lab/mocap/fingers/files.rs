@@ -1,13 +1,16 @@
 //! Finds captured or labelled fingers in files and folders, each kind told apart by what it holds: `.bvh` by joint
-//! names (`bvh`); `.npz` with SMPL-X `poses` [T, 165] on an assumed rest hand, or with `human_joints` [T, 43, 3] of TED
-//! speakers, without tips (`npz`); `.txt` of 48 numbers a line, ICVL labels from the middles of bones, or of 42, NYU
+//! names; `.npz` with `human_joints` [T, 43, 3] of TED speakers, without tips; `.txt` of 48 numbers a line, ICVL labels from the middles of bones, or of 42, NYU
 //! labels without knuckles, whose errors are after alignment only (`labels`). Sizes: the middle proximal phalanx 48 mm;
 //! TED wrist to middle knuckle 93.2 mm; NYU the middle finger's last two bones 51.3 mm.
 
 use super::labels;
+use super::take::{FingerTake, Fingers, Size};
 use anyhow::{Result, bail, ensure};
-use orator_formats::mocap::fingers::take::FingerTake;
-use orator_formats::mocap::fingers::{bvh, npz};
+use orator_base::types::pose2d::N_HAND;
+use orator_base::types::skeleton::Side;
+use orator_formats::bvh::read::{Bvh, Positions};
+use orator_formats::mocap::{fingers, ted};
+use orator_formats::npz::Npz;
 use orator_formats::search;
 use std::path::{Path, PathBuf};
 
@@ -47,16 +50,93 @@ fn read_set(path: &Path) -> Result<FingerSet> {
 /// The hands of one file.
 pub fn read(path: &Path) -> Result<Vec<FingerTake>> {
     match path.extension().and_then(|e| e.to_str()) {
-        Some("bvh") => bvh::read(path),
-        Some("npz") => npz::read(path),
+        Some("bvh") => of_bvh(path),
+        Some("npz") => of_ted(path),
         Some("txt") => Ok(vec![labels::read(path)?]),
         _ => bail!("{}: fingers are read from .bvh, .npz and .txt files", path.display()),
     }
 }
 
+fn stem(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// Both hands of a file, as far as it has their fingers. Errors: unreadable, or no finger joints (names what is known).
+fn of_bvh(path: &Path) -> Result<Vec<FingerTake>> {
+    let bvh = Bvh::read(path)?;
+    let found: Vec<(Side, [Option<usize>; N_HAND])> =
+        [Side::Left, Side::Right].into_iter().filter_map(|side| Some((side, fingers::hand(&bvh, side)?))).collect();
+    if found.is_empty() {
+        let names: Vec<&str> = bvh.joints.iter().map(|j| j.name.as_str()).take(40).collect();
+        bail!(
+            "{}: no finger joints; names must tell the side (left, right, l, r) and the finger (thumb, index, middle, \
+             ring, pinky or little), like LeftHandIndex1, b_l_index1 or thumb_01_r; it has: {}",
+            path.display(),
+            names.join(" ")
+        );
+    }
+    let positions = bvh.positions(Positions::Auto);
+    let take = |(side, joints): (Side, [Option<usize>; N_HAND])| {
+        let frames: Vec<Fingers> = positions.iter().map(|p| joints.map(|j| j.map(|j| p[j]))).collect();
+        let size = if joints[9].is_some() && joints[10].is_some() { Size::Phalanx } else { Size::Palm };
+        FingerTake::whole(&stem(path), side, frames, size)
+    };
+    Ok(found.into_iter().map(take).collect())
+}
+
+/// Both hands of a TED speaker. The skeleton is a regressor's: its palm is three times its first phalanges, so the palm
+/// gives the size.
+fn of_ted(path: &Path) -> Result<Vec<FingerTake>> {
+    let joints = Npz::open(path)?.numbers("human_joints", &[None, Some(ted::N_TED), Some(3)])?;
+    let take = |side| {
+        let hand = ted::hand(side);
+        let point = |t: usize, j: usize| std::array::from_fn(|k| joints[[t, j, k]]);
+        let frames = (0..joints.shape()[0]).map(|t| hand.map(|j| Some(point(t, j?)))).collect();
+        FingerTake::whole(&stem(path), side, frames, Size::Palm)
+    };
+    Ok([Side::Left, Side::Right].map(take).into())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A left hand of a thumb and a middle finger.
+    const HAND: &str = "HIERARCHY ROOT Hips { OFFSET 0 0 0 CHANNELS 3 Zrotation Xrotation Yrotation
+        JOINT LeftHand { OFFSET 50 0 0 CHANNELS 0
+          JOINT LeftHandThumb1 { OFFSET 3 0 2 CHANNELS 0 JOINT LeftHandThumb2 { OFFSET 4 0 1 CHANNELS 0
+            JOINT LeftHandThumb3 { OFFSET 3 0 0 CHANNELS 0 End Site { OFFSET 2 0 0 } } } }
+          JOINT LeftHandMiddle1 { OFFSET 9 0 0 CHANNELS 0 JOINT LeftHandMiddle2 { OFFSET 4.5 0 0 CHANNELS 0
+            JOINT LeftHandMiddle3 { OFFSET 2.5 0 0 CHANNELS 0 End Site { OFFSET 2 0 0 } } } } } }
+        MOTION Frames: 2 Frame Time: 0.04 0 0 0 90 0 0";
+
+    #[test]
+    fn a_hand_of_a_bvh_gets_the_reference_size_and_a_rig_without_fingers_is_named() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.bvh");
+        std::fs::write(&path, HAND).unwrap();
+        let takes = read(&path).unwrap();
+        let frame = takes[0].frames[0];
+        assert_eq!((takes.len(), frame[0], frame[4]), (1, Some([50.0, 0.0, 0.0]), Some([62.0, 0.0, 3.0])));
+        let truths = takes[0].truths().unwrap();
+        assert!((truths[0].hand[9][0] + 0.096).abs() < 1e-6, "mirrored, the phalanx 48 mm");
+        std::fs::write(&path, HAND.replace("LeftHand", "Tail")).unwrap();
+        assert!(format!("{:#}", read(&path).unwrap_err()).contains("TailMiddle1"));
+    }
+
+    #[test]
+    fn hands_of_a_ted_speaker_are_both_read() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.npz");
+        let joints = ndarray::Array3::from_shape_fn((2, 43, 3), |(_, j, k)| (j * (k + 1)) as f32);
+        let write = |name: &str| orator_formats::npz::write(&path, |npz| npz.add_array(name, &joints)).unwrap();
+        write("human_joints");
+        let takes = read(&path).unwrap();
+        assert_eq!(takes[0].frames[0][17], Some([14.0, 28.0, 42.0]));
+        assert_eq!(takes[1].frames[1][1], Some([35.0, 70.0, 105.0]));
+        write("other");
+        assert!(format!("{:#}", read(&path).unwrap_err()).contains("other"));
+    }
 
     #[test]
     fn a_folder_without_fingers_says_why() {

@@ -1,6 +1,7 @@
 //! Labelled hands in text files, one frame a line of u px, v px, depth mm a point: the test labels of NYU (14 points,
 //! a right hand, no knuckles) and of ICVL (16 points, a left hand), told apart by how many numbers a line holds.
 
+use super::take::{FingerTake, Fingers, Size};
 use anyhow::{Context, Result, bail, ensure};
 use orator_base::math::order::{lower_median, lower_quantile};
 use orator_base::math::vec3;
@@ -8,7 +9,6 @@ use orator_base::math::vec3::Vec3;
 use orator_base::motion::hand_bones::BONES;
 use orator_base::types::pose2d::N_HAND;
 use orator_base::types::skeleton::Side;
-use orator_formats::mocap::fingers::take::{FingerTake, Fingers, Size};
 use std::path::Path;
 
 /// fx, fy, cx, cy of a depth camera, px.

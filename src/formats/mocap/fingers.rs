@@ -1,40 +1,13 @@
-//! Captured fingers in BVH files: finds the joints of each finger by their names, whatever the rig calls them, and
-//! which of them are which by their order in the hierarchy.
+//! Joints of the hands in a BVH skeleton: those of each finger are found by their names in any convention, and ordered by
+//! the hierarchy.
 
-use super::take::{FingerTake, Fingers, Size};
-use crate::bvh::read::{Bvh, Positions};
-use anyhow::{Result, bail};
+use crate::bvh::read::Bvh;
 use orator_base::math::vec3;
 use orator_base::types::pose2d::N_HAND;
 use orator_base::types::skeleton::Side;
-use std::path::Path;
 
 /// Words for the fingers, thumb first.
 const FINGERS: [&[&str]; 5] = [&["thumb"], &["index"], &["middle", "mid"], &["ring"], &["pinky", "little", "pinkie"]];
-
-/// Both hands of a file, as far as it has their fingers. Errors: unreadable, or no finger joints (names what is known).
-pub fn read(path: &Path) -> Result<Vec<FingerTake>> {
-    let bvh = Bvh::read(path)?;
-    let name = path.file_stem().unwrap_or_default().to_string_lossy();
-    let found: Vec<(Side, [Option<usize>; N_HAND])> =
-        [Side::Left, Side::Right].into_iter().filter_map(|side| Some((side, hand(&bvh, side)?))).collect();
-    if found.is_empty() {
-        let names: Vec<&str> = bvh.joints.iter().map(|j| j.name.as_str()).take(40).collect();
-        bail!(
-            "{}: no finger joints; names must tell the side (left, right, l, r) and the finger (thumb, index, middle, \
-             ring, pinky or little), like LeftHandIndex1, b_l_index1 or thumb_01_r; it has: {}",
-            path.display(),
-            names.join(" ")
-        );
-    }
-    let positions = bvh.positions(Positions::Auto);
-    let take = |(side, joints): (Side, [Option<usize>; N_HAND])| {
-        let frames: Vec<Fingers> = positions.iter().map(|p| joints.map(|j| j.map(|j| p[j]))).collect();
-        let size = if joints[9].is_some() && joints[10].is_some() { Size::Phalanx } else { Size::Palm };
-        FingerTake::whole(&name, side, frames, size)
-    };
-    Ok(found.into_iter().map(take).collect())
-}
 
 /// The joints of a side's hand, wrist first, then thumb to little finger, each base to tip; `None` where there are no
 /// two fingers to hang on one wrist.
@@ -176,20 +149,13 @@ mod tests {
 
     #[test]
     fn joints_find_their_places_in_the_hand() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("a.bvh");
-        std::fs::write(&path, HAND).unwrap();
-        let takes = read(&path).unwrap();
-        assert_eq!(takes.len(), 1);
-        let frame = takes[0].frames[0];
-        assert_eq!(frame[0], Some([50.0, 0.0, 0.0]));
-        assert_eq!(frame[4], Some([62.0, 0.0, 3.0]));
-        assert_eq!(frame[5], Some([59.0, 0.0, 2.0]), "the joint in the palm is no knuckle");
-        assert_eq!((frame[11], frame[12]), (Some([66.0, 0.0, 0.0]), None), "a bone without length ends nowhere");
-        assert!(frame[13].is_none());
-        let truths = takes[0].truths().unwrap();
-        assert!((truths[0].hand[9][0] + 0.096).abs() < 1e-6, "mirrored, the phalanx 48 mm");
-        std::fs::write(&path, HAND.replace("LeftHand", "Tail")).unwrap();
-        assert!(format!("{:#}", read(&path).unwrap_err()).contains("TailIndex1"));
+        let bvh = Bvh::parse(HAND).unwrap();
+        let named = hand(&bvh, Side::Left).unwrap().map(|joint| joint.map(|joint| bvh.joints[joint].name.as_str()));
+        assert_eq!((named[0], named[4]), (Some("LeftHand"), Some("LeftHandThumb3_end")));
+        assert_eq!(named[5], Some("LeftHandIndex1"), "the joint in the palm is no knuckle");
+        let ends = (named[11], named[12], named[13]);
+        assert_eq!(ends, (Some("LeftHandMiddle3"), None, None), "a bone without length ends nowhere");
+        assert_eq!(hand(&bvh, Side::Right), None);
+        assert_eq!(hand(&Bvh::parse(&HAND.replace("LeftHand", "Tail")).unwrap(), Side::Left), None);
     }
 }

@@ -1,5 +1,0 @@
-//! Captured finger motion and labelled hands, read as 21 joints a hand.
-
-pub mod bvh;
-pub mod npz;
-pub mod take;
