@@ -5,13 +5,11 @@
 //! channels first; generator and discriminator (`conv_block`) channels last, where nothing needs to be unfolded.
 
 pub mod cpu;
-pub mod device;
 pub mod gan;
 pub mod lifter;
-pub mod mode;
 pub mod motion_encoder;
 pub mod ops;
 pub mod params;
 pub mod seq2seq;
 
-pub use mode::Mode;
+pub use ops::dropout::Mode;
