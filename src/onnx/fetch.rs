@@ -72,10 +72,8 @@ impl<'a> Fetcher<'a> {
         Ok(Self { offered, downloads, packages: BTreeMap::new() })
     }
 
-    /// Writes the file of the model to `path`, and what its source says of its licence beside it.
-    ///
-    /// # Errors
-    /// No source that has it; the message says why of each.
+    /// Writes the file of the model to `path`, and what its source says of its licence beside it. Errors: no source
+    /// that has it; the message says why of each.
     pub fn get(&mut self, entry: &ModelEntry, path: &Path) -> Result<FetchSource> {
         if let Some(found) = self.offered(&entry.sha256) {
             let bytes = std::fs::read(found).with_context(|| format!("cannot read {}", found.display()))?;
@@ -104,10 +102,7 @@ impl<'a> Fetcher<'a> {
         bail!("it could not be had:{refused}\n      a folder that has the file (sha256 {}): --mirror DIR", entry.sha256)
     }
 
-    /// Writes a file that is no model to `path`.
-    ///
-    /// # Errors
-    /// No source that has it; the message says why of each.
+    /// Writes a file that is no model to `path`. Errors: no source that has it; the message says why of each.
     pub fn get_file(&mut self, file: &PinnedFile, path: &Path) -> Result<FetchSource> {
         let whole = |files: &[Vec<u8>]| {
             let bytes = files.concat();

@@ -26,10 +26,8 @@ pub struct Runtime {
 static LOADED: Mutex<Option<Runtime>> = Mutex::new(None);
 
 impl Runtime {
-    /// Loads the library `explicit` (empty: see `find_library`). Later calls give the library of the first.
-    ///
-    /// # Errors
-    /// No library, or one that cannot be loaded; the message says how to get it.
+    /// Loads the library `explicit` (empty: see `find_library`). Later calls give the library of the first. Errors: no
+    /// library, or one that cannot be loaded; the message says how to get it.
     pub fn load(explicit: &Path, models_dir: &Path) -> Result<Self> {
         let mut loaded = LOADED.lock().map_err(|_| anyhow!("loading ONNX Runtime failed before"))?;
         if let Some(runtime) = loaded.as_ref() {

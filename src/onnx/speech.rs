@@ -30,10 +30,7 @@ pub struct SpeechModel {
 }
 
 impl SpeechModel {
-    /// Opens the file of `entry` in the folder `dir`.
-    ///
-    /// # Errors
-    /// What is wrong with the file.
+    /// Opens the file of `entry` in the folder `dir`. Errors: what is wrong with the file.
     pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self, ModelError> {
         let session = open_session(runtime, entry, dir)?;
         let n_state: i64 = STATE.iter().product();
@@ -46,9 +43,7 @@ impl SpeechModel {
     }
 
     /// Probability of speech, 0..1, in the next window of the sound; one of fewer than 512 samples ends in silence.
-    ///
-    /// # Errors
-    /// A window that is too long; an answer of another shape.
+    /// Errors: a window that is too long; an answer of another shape.
     pub fn probability(&mut self, window: &[f32]) -> Result<f32> {
         ensure!(window.len() <= WINDOW, "a window of {} samples, expected {WINDOW}", window.len());
         let (sound, silence) = self.input[CONTEXT..].split_at_mut(window.len());

@@ -89,10 +89,8 @@ impl<'a> Crew<'a> {
         Self { state: Mutex::new(state), changed: Condvar::new() }
     }
 
-    /// Does all parts of a unit, together with who helps. Returns their folders in order.
-    ///
-    /// # Errors
-    /// The first error of a part; no part is begun after it.
+    /// Does all parts of a unit, together with who helps. Returns their folders in order. Errors: the first error of a
+    /// part; no part is begun after it.
     pub fn work(&self, work: PartedWork<'a>) -> Result<Vec<PathBuf>> {
         let folders = (0..work.n_parts).map(|part| work.folder_of(part)).collect();
         let number = {

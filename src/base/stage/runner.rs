@@ -120,11 +120,8 @@ pub fn run_stages(
     answers.map(whole).collect()
 }
 
-/// Does share `idx` of `of` of the unit's parts, those that are not done; nothing where the stage has no parts or the unit
-/// is fresh.
-///
-/// # Errors
-/// An input that cannot be read; the first part that fails.
+/// Does share `idx` of `of` of the unit's parts, those that are not done; nothing where the stage has no parts or the
+/// unit is fresh. Errors: an input that cannot be read; the first part that fails.
 pub fn run_parts(
     stage: &dyn Stage,
     unit: &Unit,

@@ -1,5 +1,6 @@
 //! Tables of a flatbuffer, read; every offset is checked against the end of the file.
 
+use super::layout::int32s;
 use anyhow::{Context, Result, ensure};
 
 /// The most entries of a list of tables.
@@ -59,14 +60,11 @@ impl<'a> FlatTable<'a> {
         (0..n_tables).map(|k| Self::at(self.file, target(self.file, start + 4 * k)?)).collect()
     }
 
-    /// A list of 32-bit numbers.
-    ///
-    /// # Errors
-    /// More than `max` of them.
+    /// A list of 32-bit numbers. Errors: more than `max` of them.
     pub fn ints(&self, field: usize, max: usize) -> Result<Vec<i32>> {
         let (n_ints, _, bytes) = self.list(field, 4)?;
         ensure!(n_ints <= max, "a list has at most {max} numbers, not {n_ints}");
-        Ok(bytes.chunks_exact(4).map(|int| i32::from_le_bytes([int[0], int[1], int[2], int[3]])).collect())
+        Ok(int32s(bytes).collect())
     }
 
     /// A list of bytes.

@@ -22,10 +22,7 @@ pub struct NcnnLayer<'a> {
 }
 
 impl NcnnLayer<'_> {
-    /// A whole number.
-    ///
-    /// # Errors
-    /// A list, or a fraction.
+    /// A whole number. Errors: a list, or a fraction.
     pub fn int(&self, key: i32, absent: i64) -> Result<i64> {
         let Some(numbers) = self.parameters.get(&key) else { return Ok(absent) };
         match numbers.as_slice() {
@@ -39,10 +36,7 @@ impl NcnnLayer<'_> {
         self.parameters.get(&key).map_or(&[], Vec::as_slice)
     }
 
-    /// Nothing may be said that is not read.
-    ///
-    /// # Errors
-    /// A parameter beyond `keys`.
+    /// Nothing may be said that is not read. Errors: a parameter beyond `keys`.
     pub fn knows(&self, keys: &[i32]) -> Result<()> {
         match self.parameters.keys().find(|key| !keys.contains(key)) {
             Some(key) => bail!("parameter {key} = {:?} is not known", self.list(*key)),
@@ -51,10 +45,8 @@ impl NcnnLayer<'_> {
     }
 }
 
-/// The layers of a `.param` file in the order in which they run.
-///
-/// # Errors
-/// Another first line, or a line that is no layer; the message has its number.
+/// The layers of a `.param` file in the order in which they run. Errors: another first line, or a line that is no
+/// layer; the message has its number.
 pub fn layers(file: &[u8]) -> Result<Vec<NcnnLayer<'_>>> {
     let text = std::str::from_utf8(file).context("the .param file is no text")?;
     let mut lines = text.lines().enumerate();
@@ -133,10 +125,7 @@ impl<'a> NcnnWeights<'a> {
         Ok(taken)
     }
 
-    /// `n` numbers, whose form is said before them.
-    ///
-    /// # Errors
-    /// Fewer, or in a form other than float16 and float32.
+    /// `n` numbers, whose form is said before them. Errors: fewer, or in a form other than float16 and float32.
     pub fn tagged(&mut self, n: usize) -> Result<NcnnWeight<'a>> {
         let tag = self.take(4)?;
         match u32::from_le_bytes([tag[0], tag[1], tag[2], tag[3]]) {

@@ -13,10 +13,7 @@ pub struct ConversionOptions {
 }
 
 impl ConversionOptions {
-    /// The sizes of the input.
-    ///
-    /// # Errors
-    /// A size below 1 or above any picture's.
+    /// The sizes of the input. Errors: a size below 1 or above any picture's.
     pub fn shape(&self) -> Result<Vec<usize>> {
         let size = |size: &i64| usize::try_from(*size).ok().filter(|size| (1..=1 << 14).contains(size));
         let sizes: Option<Vec<usize>> = self.input.shape.iter().map(size).collect();

@@ -32,11 +32,9 @@ impl Display for SourceFormat {
     }
 }
 
-/// The model in `files` as the bytes of an ONNX file; how many files, and in which order, the format says.
-///
-/// # Errors
-/// Another number of files, or one that is damaged, or that holds something unknown: the message names the layer and what
-/// was expected.
+/// The model in `files` as the bytes of an ONNX file; how many files, and in which order, the format says. Errors:
+/// another number of files, or one that is damaged, or that holds something unknown: the message names the layer and
+/// what was expected.
 pub fn convert(format: SourceFormat, files: &[&[u8]], options: &ConversionOptions) -> Result<Vec<u8>> {
     let expected = match format {
         SourceFormat::Onnx | SourceFormat::Tflite => 1,

@@ -1,6 +1,6 @@
 //! The two files of a TensorFlow.js graph model: nodes in JSON, and their constants one after the other.
 
-use super::layout::{MAX_SIZE, size};
+use super::layout::{MAX_SIZE, int32s, size};
 use anyhow::{Context, Result, bail, ensure};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -39,10 +39,8 @@ pub struct TfGraph<'a> {
 }
 
 impl<'a> TfGraph<'a> {
-    /// The graph in the JSON `topology`, its constants in `weights`.
-    ///
-    /// # Errors
-    /// No such JSON, or the constants have together another length than `weights`.
+    /// The graph in the JSON `topology`, its constants in `weights`. Errors: no such JSON, or the constants have
+    /// together another length than `weights`.
     pub fn read(topology: &[u8], weights: &'a [u8]) -> Result<Self> {
         let json: Value = serde_json::from_slice(topology).context("its first file is no JSON")?;
         let (mut tensors, mut rest) = (BTreeMap::new(), weights);
@@ -90,13 +88,10 @@ impl<'a> TfGraph<'a> {
 }
 
 impl TfTensor<'_> {
-    /// The numbers of a row of 32-bit integers, or of a single one.
-    ///
-    /// # Errors
-    /// Other numbers, or more than 64 of them.
+    /// The numbers of a row of 32-bit integers, or of a single one. Errors: other numbers, or more than 64 of them.
     pub fn integers(&self) -> Result<Vec<i64>> {
         ensure!(self.element == TfElement::I32 && self.raw.len() <= 256, "it holds a few 32-bit integers");
-        Ok(self.raw.chunks_exact(4).map(|int| i32::from_le_bytes([int[0], int[1], int[2], int[3]]).into()).collect())
+        Ok(int32s(self.raw).map(i64::from).collect())
     }
 }
 

@@ -59,20 +59,15 @@ pub fn lock_with_others(folder: &Path) -> Result<FolderLock> {
 }
 
 impl FolderLock {
-    /// For who replaces, changes or removes the folder.
-    ///
-    /// # Errors
-    /// `BusyFolder`; a link in the place of the lock file.
+    /// For who replaces, changes or removes the folder. Errors: `BusyFolder`; a link in the place of the lock file.
     pub fn exclusive(folder: &Path) -> Result<Self> {
         // Without a folder to lie in, there is no lock; making the folder itself fails for the same reason.
         let _ = fs::create_dir_all(parent(folder));
         Self::beside(folder, true)
     }
 
-    /// For who reads the folder, or writes what comes of it.
-    ///
-    /// # Errors
-    /// `BusyFolder`; a link in the place of the lock file.
+    /// For who reads the folder, or writes what comes of it. Errors: `BusyFolder`; a link in the place of the lock
+    /// file.
     pub fn shared(folder: &Path) -> Result<Self> {
         Self::beside(folder, false)
     }
