@@ -117,7 +117,7 @@ impl CpuOperator for AffineOp {
         let packed = PackedMatrix::new(n_out, n_in, |k, c| weight.values[k * n_in + c]);
         let (piece, zero) = (piece(n), T::zero());
         let mut of_x = vec![zero; if x.tracked { n * n_in } else { 0 }];
-        let mut none: Vec<&mut [T]> = (0..n.div_ceil(piece)).map(|_| Default::default()).collect();
+        let mut none: Vec<&mut [T]> = (0..n.div_ceil(piece)).map(|_| <&mut [T]>::default()).collect();
         if x.tracked {
             none = of_x.chunks_mut(piece * n_in).collect();
         }

@@ -69,9 +69,10 @@ impl BatchNorm {
 
     /// [`Self::forward`] with the framework's operators, on any device.
     pub fn forward_fallback(&self, x: &Tensor, train: bool) -> Result<Tensor> {
-        let (mean, variance) = match train {
-            true => fallback::statistics(x)?,
-            false => (self.running_mean.as_detached_tensor(), self.running_var.as_detached_tensor()),
+        let (mean, variance) = if train {
+            fallback::statistics(x)?
+        } else {
+            (self.running_mean.as_detached_tensor(), self.running_var.as_detached_tensor())
         };
         let y = fallback::normalise(x, (&mean, &variance), &self.weight, &self.bias, self.eps, self.slope)?;
         if train {
@@ -275,10 +276,8 @@ mod tests {
             };
             let by_fallback = |v: &[Tensor]| {
                 let of_fixed = |values: &[f64]| Tensor::new(values, &Device::Cpu);
-                let (mean, variance) = match train {
-                    true => fallback::statistics(&v[0])?,
-                    false => (of_fixed(&fixed.mean)?, of_fixed(&fixed.variance)?),
-                };
+                let known = || -> Result<_> { Ok((of_fixed(&fixed.mean)?, of_fixed(&fixed.variance)?)) };
+                let (mean, variance) = if train { fallback::statistics(&v[0])? } else { known()? };
                 fallback::normalise(&v[0], (&mean, &variance), &v[1], &v[2], 1e-3, slope)
             };
             let (off, error) = (apart(&inputs, own, by_fallback)?, worst(&inputs, own)?);

@@ -3,13 +3,13 @@
 
 use crate::fixtures::networks::{every_window, fill};
 use candle_core::{DType, Device, Tensor};
+use orator_lab::train::space::auto_encoder::AutoEncoder;
 use orator_nn::Mode;
 use orator_nn::gan::discriminator::Discriminator;
 use orator_nn::gan::generator;
 use orator_nn::gan::generator::{Config, Generator, Preset};
 use orator_nn::lifter::temporal;
 use orator_nn::lifter::temporal::TemporalLifter;
-use orator_lab::train::space::auto_encoder::AutoEncoder;
 use orator_nn::motion_encoder;
 use orator_nn::ops::gradcheck::pattern;
 use orator_nn::params::Params;

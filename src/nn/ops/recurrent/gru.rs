@@ -192,11 +192,8 @@ impl CpuOperator for GruOp {
             self.saved.put(saved);
         }
         let n_out = self.options.n_directions * hidden;
-        let shape = match self.options.last {
-            true => Shape::from((s.batch, n_out)),
-            false => Shape::from((s.batch, s.n_steps, n_out)),
-        };
-        Ok((y, shape))
+        let all = Shape::from((s.batch, s.n_steps, n_out));
+        Ok((y, if self.options.last { Shape::from((s.batch, n_out)) } else { all }))
     }
 
     fn backward<T: Scalar>(&self, [x, first, weights]: [Operand<T>; 3], _: &[T], grad: &[T]) -> Gradients<T> {
@@ -207,7 +204,7 @@ impl CpuOperator for GruOp {
         let cells: Vec<BackwardCell<T>> =
             weights.values.chunks_exact(s.cell.n_weights()).map(|weights| BackwardCell::new(s.cell, weights)).collect();
         let mut of_x = vec![T::zero(); if x.tracked { x.values.len() } else { 0 }];
-        let mut none = saved.iter().map(|_| Default::default());
+        let mut none = saved.iter().map(|_| <&mut [T]>::default());
         let pieces: Vec<&mut [T]> =
             if x.tracked { of_x.chunks_mut(s.piece * x_row).collect() } else { none.by_ref().collect() };
         let gradients = parallel_each(pieces.into_iter().zip(saved), |piece, (of_x, saved)| {
