@@ -128,10 +128,10 @@ impl ModelStore {
     /// and may be what the model is made of, else from its sources. One that fails does not stop the others. Errors: a
     /// mirror that cannot be read, a folder that cannot be written, another fetch into the same folder.
     pub fn fetch(&self, wanted: &[Wanted], mirror: Option<&Path>, progress: &dyn Progress) -> Result<Vec<Fetched<'_>>> {
-        let _lock = workdir::lock(&self.dir)?;
-        let downloads = self.dir.join(DOWNLOADS);
-        let _ = std::fs::remove_dir_all(&downloads);
-        let mut fetcher = Fetcher::new(mirror, &downloads)?;
+        self.with_downloads(|downloads| self.fetch_with(Fetcher::new(mirror, downloads)?, wanted, progress))
+    }
+
+    fn fetch_with(&self, mut fetcher: Fetcher, wanted: &[Wanted], progress: &dyn Progress) -> Result<Vec<Fetched<'_>>> {
         let task = progress.begin("models", wanted.len() as u64);
         let mut fetched = Vec::new();
         for one in wanted {
@@ -154,7 +154,6 @@ impl ModelStore {
             }
             task.advance(1);
         }
-        let _ = std::fs::remove_dir_all(&downloads);
         Ok(fetched)
     }
 
@@ -162,13 +161,9 @@ impl ModelStore {
     /// it. A file of the mirror serves as well. Errors: no place that has it.
     pub fn fetch_runtime(&self, mirror: Option<&Path>, progress: &dyn Progress) -> Result<FetchSource> {
         let runtime = self.manifest.runtime.as_ref().context("the manifest names no ONNX Runtime")?;
-        let _lock = workdir::lock(&self.dir)?;
         let _task = progress.begin("ONNX Runtime", 0);
-        let downloads = self.dir.join(DOWNLOADS);
-        let _ = std::fs::remove_dir_all(&downloads);
-        let had = Fetcher::new(mirror, &downloads)?.get_file(runtime, &self.dir.join("lib").join(&runtime.file));
-        let _ = std::fs::remove_dir_all(&downloads);
-        had
+        let path = self.dir.join("lib").join(&runtime.file);
+        self.with_downloads(|downloads| Fetcher::new(mirror, downloads)?.get_file(runtime, &path))
     }
 
     /// Gets the word vectors of the manifest, and gives what `convert` makes of the file as it is published. Errors: no
@@ -180,16 +175,22 @@ impl ModelStore {
         convert: impl FnOnce(&Path, &FetchSource) -> Result<T>,
     ) -> Result<T> {
         let words = self.manifest.words.as_ref().context("the manifest names no word vectors")?;
-        let _lock = workdir::lock(&self.dir)?;
         let _task = progress.begin("word vectors", 0);
+        self.with_downloads(|downloads| {
+            let file = downloads.join(&words.file);
+            let source = Fetcher::new(mirror, downloads)?.get_file(words, &file)?;
+            convert(&file, &source)
+        })
+    }
+
+    /// Runs `fetch` with an empty path for downloads, while no other fetch writes into the folder.
+    fn with_downloads<T>(&self, fetch: impl FnOnce(&Path) -> Result<T>) -> Result<T> {
+        let _lock = workdir::lock(&self.dir)?;
         let downloads = self.dir.join(DOWNLOADS);
         let _ = std::fs::remove_dir_all(&downloads);
-        let file = downloads.join(&words.file);
-        let had = Fetcher::new(mirror, &downloads)
-            .and_then(|mut fetcher| fetcher.get_file(words, &file))
-            .and_then(|source| convert(&file, &source));
+        let fetched = fetch(&downloads);
         let _ = std::fs::remove_dir_all(&downloads);
-        had
+        fetched
     }
 
     /// What `fetch` may get for `wanted`: every model that is asked for by its id or is a candidate for a role, and is

@@ -4,7 +4,6 @@ pub mod cholesky;
 pub mod eigen;
 pub mod gaussian;
 pub mod local_fit;
-pub mod noise;
 pub mod one_euro;
 pub mod order;
 pub mod procrustes;

@@ -4,7 +4,7 @@
 use super::graph::AttributeValue::{Int, Ints, Text};
 use super::graph::{ElementType, OnnxGraph};
 use super::layout::CHANNELS_FIRST;
-use super::options::ConversionOptions;
+use super::source::ConversionOptions;
 use super::tfjs::{TfConverter, TfValue};
 use super::tfjs_file::TfGraph;
 use anyhow::{Result, bail, ensure};
@@ -24,12 +24,12 @@ const N_POINTS: usize = 17;
 const CELL: usize = 4;
 
 /// Whether the graph has the nodes of a MoveNet.
-pub fn is_movenet(source: &TfGraph) -> bool {
+pub(crate) fn is_movenet(source: &TfGraph) -> bool {
     [HEATMAP, CENTRE, REGRESSION, OFFSET, PICTURE].iter().all(|node| source.nodes.contains_key(*node))
 }
 
 /// The model as ONNX: image [1, S, S, 3], RGB 0..255, to heat-maps [1, 17, S / 4, S / 4] of 0..1.
-pub fn convert(source: &TfGraph, mut graph: OnnxGraph, options: &ConversionOptions) -> Result<Vec<u8>> {
+pub(crate) fn convert(source: &TfGraph, mut graph: OnnxGraph, options: &ConversionOptions) -> Result<Vec<u8>> {
     let (shape, output) = (options.shape()?, options.only_output()?);
     let [1, side, width, 3] = shape[..] else { bail!("the input has the sizes 1, S, S, 3, not {shape:?}") };
     ensure!(side == width && source.input_shape()? == shape, "the input has the sizes {:?}", source.input_shape()?);

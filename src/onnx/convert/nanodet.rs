@@ -3,7 +3,7 @@
 
 use super::graph::AttributeValue::{Int, Ints};
 use super::graph::OnnxGraph;
-use super::options::ConversionOptions;
+use super::source::ConversionOptions;
 use super::tfjs::{TfConverter, TfValue};
 use super::tfjs_file::TfGraph;
 use anyhow::{Result, bail, ensure};
@@ -15,13 +15,13 @@ const HEADS: [(&str, usize); 3] =
 const N_CLASSES: usize = 80;
 
 /// Whether the graph has the nodes of a NanoDet.
-pub fn is_nanodet(source: &TfGraph) -> bool {
+pub(crate) fn is_nanodet(source: &TfGraph) -> bool {
     HEADS.iter().all(|(node, _)| source.nodes.contains_key(*node))
 }
 
 /// The model as ONNX: image [1, 3, S, S] to rows [1, cells, 5] of x0, y0, x1, y1 in pixels of the input and the score of
 /// a person, 0..1.
-pub fn convert(source: &TfGraph, graph: OnnxGraph, options: &ConversionOptions) -> Result<Vec<u8>> {
+pub(crate) fn convert(source: &TfGraph, graph: OnnxGraph, options: &ConversionOptions) -> Result<Vec<u8>> {
     let (shape, output) = (options.shape()?, options.only_output()?);
     let [1, 3, side, width] = shape[..] else { bail!("the input has the sizes 1, 3, S, S, not {shape:?}") };
     ensure!(side == width && source.input_shape()? == shape, "the input has the sizes {:?}", source.input_shape()?);

@@ -4,7 +4,7 @@ use super::graph::AttributeValue::{Int, Ints, Text};
 use super::graph::{ElementType, OnnxGraph};
 use super::layout::{SlidingWindow, size};
 use super::ncnn_file::{NcnnLayer, NcnnWeight, NcnnWeights, layers};
-use super::options::ConversionOptions;
+use super::source::ConversionOptions;
 use anyhow::{Context, Result, bail, ensure};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -27,7 +27,12 @@ struct NcnnConverter<'a> {
 }
 
 /// The model as ONNX; its outputs are the blobs that no layer reads.
-pub fn convert(parameters: &[u8], weights: &[u8], graph: OnnxGraph, options: &ConversionOptions) -> Result<Vec<u8>> {
+pub(crate) fn convert(
+    parameters: &[u8],
+    weights: &[u8],
+    graph: OnnxGraph,
+    options: &ConversionOptions,
+) -> Result<Vec<u8>> {
     let sizes = options.shape()?;
     let [1, channels, height, width] = sizes[..] else { bail!("the input has 1 picture, not the sizes {sizes:?}") };
     let layers = layers(parameters)?;

@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// What a node gives: its name in the result, its sizes in TensorFlow.
 #[derive(Clone, Debug)]
-pub struct TfValue {
+pub(crate) struct TfValue {
     pub name: String,
     pub shape: Vec<usize>,
     /// NHWC in TensorFlow, NCHW in the result.
@@ -18,7 +18,7 @@ pub struct TfValue {
 }
 
 /// A conversion under way.
-pub struct TfConverter<'a> {
+pub(crate) struct TfConverter<'a> {
     pub source: &'a TfGraph<'a>,
     pub graph: OnnxGraph,
     values: BTreeMap<String, TfValue>,
@@ -26,12 +26,17 @@ pub struct TfConverter<'a> {
 
 impl<'a> TfConverter<'a> {
     /// A conversion in which the node `name` is done already.
-    pub fn new(source: &'a TfGraph<'a>, graph: OnnxGraph, name: &str, value: TfValue) -> Self {
+    pub(crate) fn new(source: &'a TfGraph<'a>, graph: OnnxGraph, name: &str, value: TfValue) -> Self {
         Self { source, graph, values: BTreeMap::from([(name.to_owned(), value)]) }
     }
 
     /// A weight, its axes reordered, or with the sizes `dims` instead of its own.
-    pub fn weight(&mut self, tensor: &TfTensor, order: Option<[usize; 4]>, dims: Option<&[usize]>) -> Result<String> {
+    pub(crate) fn weight(
+        &mut self,
+        tensor: &TfTensor,
+        order: Option<[usize; 4]>,
+        dims: Option<&[usize]>,
+    ) -> Result<String> {
         let element = match tensor.element {
             TfElement::F16 => ElementType::F16,
             TfElement::F32 => ElementType::F32,
@@ -42,7 +47,7 @@ impl<'a> TfConverter<'a> {
 
     /// What the node `wanted` gives, after all that it needs. Errors: a node that is missing, needs itself, or is of an
     /// unknown kind.
-    pub fn value(&mut self, wanted: &str) -> Result<TfValue> {
+    pub(crate) fn value(&mut self, wanted: &str) -> Result<TfValue> {
         let source = self.source;
         let (mut waiting, mut begun) = (vec![wanted], BTreeSet::new());
         while let Some(name) = waiting.last().copied() {

@@ -5,7 +5,7 @@ use super::flatbuffer::FlatTable;
 use super::graph::AttributeValue::{Int, Ints, Text};
 use super::graph::{ElementType, OnnxGraph};
 use super::layout::{CHANNELS_FIRST, SlidingWindow, four, int32s, size};
-use super::options::ConversionOptions;
+use super::source::ConversionOptions;
 use anyhow::{Context, Result, bail, ensure};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -41,7 +41,7 @@ struct TfliteConverter<'a> {
 }
 
 /// The model as ONNX.
-pub fn convert(file: &[u8], graph: OnnxGraph, options: &ConversionOptions) -> Result<Vec<u8>> {
+pub(crate) fn convert(file: &[u8], graph: OnnxGraph, options: &ConversionOptions) -> Result<Vec<u8>> {
     let model = FlatTable::root(file)?;
     let code = |code: FlatTable| Ok(code.int(3, 0)?.max(i32::from(code.byte(0)?)));
     let codes: Vec<i32> = model.tables(1)?.into_iter().map(code).collect::<Result<_>>()?;

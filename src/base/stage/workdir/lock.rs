@@ -3,7 +3,7 @@
 //! who comes second is told who is at work. A lock goes with its process, however that ends.
 
 use super::attempt::is_alive;
-use super::disk::parent;
+use super::file::parent;
 use super::folder::{recover_folder, restore_folder};
 use anyhow::{Context, Result};
 use rustix::fs::OFlags;
