@@ -94,8 +94,8 @@ impl Model {
 
 /// What a run gave; borrowed from the model until the next run.
 pub struct Outputs<'m> {
-    id: &'m str,
-    outputs: SessionOutputs<'m>,
+    pub(super) id: &'m str,
+    pub(super) outputs: SessionOutputs<'m>,
 }
 
 impl Outputs<'_> {

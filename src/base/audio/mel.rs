@@ -46,9 +46,13 @@ pub fn log_mel(samples: &[f32]) -> Array2<f32> {
 
 /// Lower corner of a band's triangle in Hz.
 pub fn lowest_hz(band: usize) -> f64 {
+    700.0 * ((corner(band) / 1127.0).exp() - 1.0)
+}
+
+/// Corner `i` of the triangles, equally spaced in mel.
+fn corner(i: usize) -> f64 {
     let (low, high) = (mel_of(LOWEST_HZ), mel_of(HIGHEST_HZ));
-    let corner = low + (high - low) * band as f64 / (N_MELS + 1) as f64;
-    700.0 * ((corner / 1127.0).exp() - 1.0)
+    low + (high - low) * i as f64 / (N_MELS + 1) as f64
 }
 
 fn mel_of(hz: f64) -> f64 {
@@ -75,8 +79,6 @@ impl Band {
 
 /// Triangles with corners equally spaced in mel; the zero bin belongs to none.
 fn bands() -> Vec<Band> {
-    let (low, high) = (mel_of(LOWEST_HZ), mel_of(HIGHEST_HZ));
-    let corner = |i: usize| low + (high - low) * i as f64 / (N_MELS + 1) as f64;
     let weight = |band: usize, bin: usize| {
         let at = mel_of(bin as f64 * f64::from(SAMPLE_RATE) / FFT as f64);
         let (left, middle, right) = (corner(band), corner(band + 1), corner(band + 2));

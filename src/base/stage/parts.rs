@@ -61,14 +61,14 @@ impl PartedWork<'_> {
 }
 
 /// The workers of a run.
-pub struct Crew<'a> {
-    state: Mutex<CrewState<'a>>,
+pub struct WorkerPool<'a> {
+    state: Mutex<PoolState<'a>>,
     changed: Condvar,
 }
 
-struct CrewState<'a> {
+struct PoolState<'a> {
     /// Workers that go from unit to unit, and so may have parts to share.
-    n_at_units: usize,
+    n_busy: usize,
     open: Vec<SharedUnit<'a>>,
     n_shared: usize,
 }
@@ -82,10 +82,10 @@ struct SharedUnit<'a> {
     failed: Option<anyhow::Error>,
 }
 
-impl<'a> Crew<'a> {
+impl<'a> WorkerPool<'a> {
     /// Of `n` workers that all go from unit to unit; each says with `help` when it has none any more.
     pub fn new(n: usize) -> Self {
-        let state = CrewState { n_at_units: n, open: Vec::new(), n_shared: 0 };
+        let state = PoolState { n_busy: n, open: Vec::new(), n_shared: 0 };
         Self { state: Mutex::new(state), changed: Condvar::new() }
     }
 
@@ -118,7 +118,7 @@ impl<'a> Crew<'a> {
         loop {
             while self.work_on_one(None) {}
             let state = self.state();
-            if state.n_at_units == 0 {
+            if state.n_busy == 0 {
                 return;
             }
             if !state.open.iter().any(SharedUnit::has_parts) {
@@ -151,7 +151,7 @@ impl<'a> Crew<'a> {
         true
     }
 
-    fn state(&self) -> MutexGuard<'_, CrewState<'a>> {
+    fn state(&self) -> MutexGuard<'_, PoolState<'a>> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -163,11 +163,11 @@ impl SharedUnit<'_> {
 }
 
 /// A worker that goes from unit to unit, until it is dropped.
-pub struct AtUnits<'c, 'a>(pub &'c Crew<'a>);
+pub struct BusyGuard<'c, 'a>(pub &'c WorkerPool<'a>);
 
-impl Drop for AtUnits<'_, '_> {
+impl Drop for BusyGuard<'_, '_> {
     fn drop(&mut self) {
-        self.0.state().n_at_units -= 1;
+        self.0.state().n_busy -= 1;
         self.0.changed.notify_all();
     }
 }

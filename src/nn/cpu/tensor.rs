@@ -132,7 +132,7 @@ pub fn matmul<T: Scalar>(product: &mut [T], left: Matrix<T>, right: Matrix<T>, m
     let fits = product.len() == m * n && depth > 0 && left.holds(m, depth) && right.holds(depth, n);
     assert!(fits, "product of {m} x {n} over {depth}");
     let (tiles_down, tiles_across) = (m.div_ceil(TILE.0), n.div_ceil(TILE.1));
-    let start = OutputStart::new(product);
+    let start = SharedOutputPtr::new(product);
     (0..tiles_down * tiles_across).into_par_iter().for_each(|tile| {
         let (row, column) = (tile / tiles_across * TILE.0, tile % tiles_across * TILE.1);
         let sizes = [TILE.0.min(m - row), TILE.1.min(n - column), depth];
@@ -201,9 +201,9 @@ unsafe fn gemm_on_this_thread<T: Scalar>(
 ///
 /// # Safety
 /// `write` writes every one of the `len` numbers, and reads none that it has not written.
-pub unsafe fn written<T: Scalar>(len: usize, write: impl FnOnce(OutputStart<T>)) -> Vec<T> {
+pub unsafe fn written<T: Scalar>(len: usize, write: impl FnOnce(SharedOutputPtr<T>)) -> Vec<T> {
     let mut values = Vec::with_capacity(len);
-    write(OutputStart(values.as_mut_ptr()));
+    write(SharedOutputPtr(values.as_mut_ptr()));
     // SAFETY: all are written, as the caller promises.
     unsafe { values.set_len(len) };
     values
@@ -211,14 +211,14 @@ pub unsafe fn written<T: Scalar>(len: usize, write: impl FnOnce(OutputStart<T>))
 
 /// Where a result begins: tasks write disjoint parts of it.
 #[derive(Clone, Copy)]
-pub struct OutputStart<T>(*mut T);
+pub struct SharedOutputPtr<T>(*mut T);
 
 // SAFETY: callers of `at` write disjoint ranges and do not outlive the slice.
-unsafe impl<T: Send> Send for OutputStart<T> {}
+unsafe impl<T: Send> Send for SharedOutputPtr<T> {}
 // SAFETY: as above.
-unsafe impl<T: Send> Sync for OutputStart<T> {}
+unsafe impl<T: Send> Sync for SharedOutputPtr<T> {}
 
-impl<T> OutputStart<T> {
+impl<T> SharedOutputPtr<T> {
     /// Start of `values`, which nobody else uses meanwhile.
     pub fn new(values: &mut [T]) -> Self {
         Self(values.as_mut_ptr())

@@ -149,7 +149,7 @@ impl OnnxGraph {
 
     /// Convolution (`inputs`: image, weight and, if there is one, bias; `group`) or, without `group`, the maximum of
     /// windows over height and width. `pads`: zeros at the top, left, bottom and right.
-    pub fn windowed(
+    pub(crate) fn windowed(
         &mut self,
         inputs: &[String],
         windows: [SlidingWindow; 2],

@@ -1,7 +1,7 @@
 //! Nodes of a TensorFlow.js graph to ONNX operators: those that a wanted node needs, each once. A picture that is channels
 //! last in TensorFlow is channels first in the result; transpositions between the two cost nothing.
 
-use super::graph::AttributeValue::{Float, Int, Ints, Text};
+use super::graph::AttributeValue::{Float, Text};
 use super::graph::{ElementType, OnnxGraph};
 use super::layout::{CHANNELS_FIRST, SlidingWindow, four, size};
 use super::tfjs_file::{TfElement, TfGraph, TfNode, TfTensor};

@@ -137,7 +137,8 @@ fn card(shown: &Measure, counts: &Counts, threshold: ThresholdLine) -> Node {
     let beyond: u64 = beyond.map(|bin| counts.bins[bin]).sum();
     let beyond = percent(beyond as f64, total);
     let of_unknown = format!("; not known of {}", percent(unknown, total + unknown));
-    let description = format!("about {beyond} beyond the threshold{}", if unknown > 0.0 { &of_unknown } else { "" });
+    let description =
+        format!("about {beyond} beyond the threshold{}", if unknown > 0.0 { of_unknown.as_str() } else { "" });
     let what = counted(counts.total() as usize, shown.of());
     let label = format!("{}, {what}: {description}", shown.title);
     card.child(histogram(&label, counts, shown.unit, Some(threshold)))
