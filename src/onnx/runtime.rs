@@ -2,6 +2,7 @@
 
 use anyhow::{Result, anyhow, bail};
 use ort::environment::Environment;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
@@ -95,8 +96,7 @@ pub fn find_library(explicit: &Path, models_dir: &Path) -> Result<PathBuf> {
 /// The library in a folder; of several versions the last by name.
 fn library_in(folder: &Path) -> Option<PathBuf> {
     let files = std::fs::read_dir(folder).ok()?.flatten().map(|file| file.path());
-    let named =
-        |path: &PathBuf| path.file_name().and_then(|name| name.to_str()).is_some_and(|name| name.starts_with(LIBRARY));
+    let named = |path: &PathBuf| path.file_name().and_then(OsStr::to_str).is_some_and(|name| name.starts_with(LIBRARY));
     files.filter(|path| named(path) && path.is_file()).max()
 }
 

@@ -7,6 +7,7 @@ use anyhow::{Context, Result, bail};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir;
 use serde::Serialize;
+use std::ffi::OsStr;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -259,8 +260,7 @@ fn copy(from: &Path, to: &Path) -> Result<()> {
 
 /// The description of a new file that is fed and read like a known one.
 fn described(file: &Path, like: &ModelEntry, id: Option<&str>, licence: &str) -> Result<ModelEntry> {
-    let name =
-        file.file_name().and_then(|name| name.to_str()).with_context(|| format!("{} is no file", file.display()))?;
+    let name = file.file_name().and_then(OsStr::to_str).with_context(|| format!("{} is no file", file.display()))?;
     let bytes = std::fs::metadata(file).with_context(|| format!("cannot read {}", file.display()))?.len();
     let stem = name.strip_suffix(".onnx").unwrap_or(name);
     Ok(ModelEntry {

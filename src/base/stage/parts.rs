@@ -1,6 +1,6 @@
-//! Units whose work is done in parts: who has such a unit in hand shares its parts with the workers that have no unit any
-//! more. Each part has a folder and a record of its own under `NAME.parts` beside the unit's folder, so that what was done
-//! of a unit is not lost with its worker.
+//! Units whose work is done in parts: the worker of such a unit shares its parts with workers that have run out of units.
+//! Each part has a folder and a record of its own under `NAME.parts` beside the unit's folder, so that finished parts
+//! survive a worker that is killed.
 
 use super::attempt::{attempt, guarded};
 use super::fingerprint::Fingerprint;
@@ -60,20 +60,20 @@ impl PartedWork<'_> {
     }
 }
 
-/// The workers of a run.
+/// The workers of a run; `nn::cpu` lists the thread pools of the program.
 pub struct WorkerPool<'a> {
     state: Mutex<PoolState<'a>>,
     changed: Condvar,
 }
 
 struct PoolState<'a> {
-    /// Workers that go from unit to unit, and so may have parts to share.
+    /// Workers that still take units, and so may share parts.
     n_busy: usize,
     open: Vec<SharedUnit<'a>>,
     n_shared: usize,
 }
 
-/// A unit whose parts are under way.
+/// A unit whose parts are in progress.
 struct SharedUnit<'a> {
     number: usize,
     work: Arc<PartedWork<'a>>,
@@ -83,7 +83,7 @@ struct SharedUnit<'a> {
 }
 
 impl<'a> WorkerPool<'a> {
-    /// Of `n` workers that all go from unit to unit; each says with `help` when it has none any more.
+    /// A pool of `n` workers that all take units; each calls `help` when there is no unit left.
     pub fn new(n: usize) -> Self {
         let state = PoolState { n_busy: n, open: Vec::new(), n_shared: 0 };
         Self { state: Mutex::new(state), changed: Condvar::new() }
@@ -113,7 +113,7 @@ impl<'a> WorkerPool<'a> {
         }
     }
 
-    /// Helps with the parts of others, until no worker goes from unit to unit any more.
+    /// Does parts of other workers' units, until no worker takes units any more.
     pub fn help(&self) {
         loop {
             while self.work_on_one(None) {}
@@ -162,7 +162,7 @@ impl SharedUnit<'_> {
     }
 }
 
-/// A worker that goes from unit to unit, until it is dropped.
+/// Counts a worker as one that takes units, until it is dropped.
 pub struct BusyGuard<'c, 'a>(pub &'c WorkerPool<'a>);
 
 impl Drop for BusyGuard<'_, '_> {

@@ -28,7 +28,7 @@ impl ChannelMoments {
             block_sums(block, &mut mean);
             mean.iter_mut().for_each(|sum| *sum = T::from_f64(sum.to_f64() / n));
             block_squares(block, &mean, &mut squares);
-            let f64s = |values: Vec<T>| values.into_iter().map(|v| v.to_f64()).collect();
+            let f64s = |values: Vec<T>| values.into_iter().map(T::to_f64).collect();
             all = all.and(&Self { n, mean: f64s(mean), squares: f64s(squares) });
         }
         all

@@ -84,7 +84,7 @@ pub fn aligned<T>(start: *const T) -> usize {
 /// Lends a buffer of `len` numbers whose contents are arbitrary, from the start of a line of the cache on; the memory is kept
 /// for the next caller.
 pub fn scratch<T: Scalar, R>(len: usize, f: impl FnOnce(&mut [T]) -> R) -> R {
-    let mut buffer = T::pool().with_borrow_mut(|pool| pool.pop()).unwrap_or_default();
+    let mut buffer = T::pool().with_borrow_mut(Vec::pop).unwrap_or_default();
     if buffer.len() < len + LANES {
         buffer.resize(len + LANES, T::zero());
     }

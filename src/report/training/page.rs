@@ -3,6 +3,7 @@
 
 use super::charts::{TrainingLog, metrics};
 use super::strip::{HeldOutPair, strip};
+use crate::html::chart::lines::LineChart;
 use crate::html::numbers::number;
 use crate::html::{Node, Page, Section, jpeg, node};
 use anyhow::{Context, Result};
@@ -52,7 +53,7 @@ pub fn write(folder: &Path, speaker: &str, pairs: &[HeldOutPair]) -> Result<()> 
         lead: lead(&training_log),
         sections: vec![
             section("best", "Best epoch", best(&training_log)),
-            section("curves", "Curves", vec![node("div").class("grid").children(charts.iter().map(|c| c.card()))]),
+            section("curves", "Curves", vec![node("div").class("grid").children(charts.iter().map(LineChart::card))]),
             section("poses", "Generated against true poses", poses),
         ],
         style: include_str!("page.css"),
