@@ -1,6 +1,6 @@
-//! Operators with forward and backward passes: convolutions, batch norm, linear, dropout, resize, recurrent layers; `operator` is how the
-//! framework runs them, `fallback` what runs on a device without the kernels of `nn::cpu`, `gradcheck` the finite
-//! differences that prove the gradients.
+//! Operators with forward and backward passes: convolutions, batch norm, linear layers, dropout, resizing, recurrent
+//! layers. `operator` connects them to candle, `fallback` replaces them on devices without the kernels of `nn::cpu`,
+//! `gradcheck` has the finite differences that check gradients.
 
 pub mod affine;
 pub mod batch_norm;
