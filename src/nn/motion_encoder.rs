@@ -1,14 +1,14 @@
-//! The auto-encoder of motion windows: convolutions over time to a code of 32 numbers, and back, for training. After
-//! the embedding network of Yoon et al. 2020 (34 frames; 3, 3, 4 by twos, 3 wide; then 256, 128, 32), on all bones.
-//! Every layer has batch norm and leaky ReLU; the code itself is normalised without activation, so that its numbers have
-//! about unit variance over what was learnt from.
+//! The encoder of motion windows: convolutions over time to a code of 32 numbers, after the embedding network of Yoon et
+//! al. 2020 (34 frames; kernels 3, 3, 4 with stride 2, 3; then 256, 128, 32), on all bones. Every layer has batch norm
+//! and leaky ReLU; the code itself is normalised without activation, so that its numbers have about unit variance over
+//! the training data. The decoder it is trained with is in `orator-lab`.
 
 use super::Mode;
 use super::ops::batch_norm::BatchNorm;
 use super::ops::conv1d::Conv1d;
-use super::ops::linear::Linear;
-use super::params::Params;
+use super::params::{Init, Params};
 use candle_core::{Device, Module, Result, Tensor, Var};
+use candle_nn::Linear;
 use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 
@@ -18,14 +18,14 @@ pub const WINDOW: usize = 34;
 pub const N_CODE: usize = 32;
 /// Windows that share convolutions begin a multiple of this apart.
 pub const STEP: usize = 2;
-/// Prefixes of the two halves' tensors.
+/// Prefix of the tensors.
 pub const NAME: &str = "encoder.";
-const DECODER: &str = "decoder.";
 
-/// Channels of the last convolution, and how many places of it a window has.
-const LAST: usize = 32;
+/// Channels of the last convolution, and its positions in a window.
+pub const LAST: usize = 32;
 const PLACES: usize = 12;
-const SLOPE: f64 = 0.2;
+/// Slope of the leaky ReLUs.
+pub const SLOPE: f64 = 0.2;
 const MOMENTUM: f64 = 0.1;
 
 /// The network's shape.
@@ -54,23 +54,24 @@ pub struct MotionEncoder {
     dense: Vec<(Linear, BatchNorm)>,
 }
 
-fn norm(params: &mut Params, name: &str, n: usize, slope: f64) -> Result<BatchNorm> {
+/// Batch norm of a layer of `n` channels, with its activation.
+pub fn norm(params: &mut Params, name: &str, n: usize, slope: f64) -> Result<BatchNorm> {
     BatchNorm::new(params, &format!("{name}.norm"), n, 1e-5, MOMENTUM, slope)
 }
 
 /// Fully connected layers from each of `widths` to the next, with their norms; `last`: slope of the last one.
-fn dense(params: &mut Params, prefix: &str, widths: &[usize], last: f64) -> Result<Vec<(Linear, BatchNorm)>> {
+pub fn dense(params: &mut Params, prefix: &str, widths: &[usize], last: f64) -> Result<Vec<(Linear, BatchNorm)>> {
     let mut layers = Vec::new();
     for (i, pair) in widths.windows(2).enumerate() {
         let name = format!("{prefix}dense{i}");
         let slope = if i + 2 == widths.len() { last } else { SLOPE };
-        layers.push((Linear::new(params, &name, pair[0], pair[1])?, norm(params, &name, pair[1], slope)?));
+        layers.push((params.linear(&name, [pair[0], pair[1]], Init::He, 0.0)?, norm(params, &name, pair[1], slope)?));
     }
     Ok(layers)
 }
 
-/// Layer and norm, one pair after the other.
-fn through<L: Module>(layers: &[(L, BatchNorm)], x: &Tensor, mode: &Mode) -> Result<Tensor> {
+/// `x` through layers, each followed by its norm.
+pub fn through<L: Module>(layers: &[(L, BatchNorm)], x: &Tensor, mode: &Mode) -> Result<Tensor> {
     layers.iter().try_fold(x.clone(), |x, (layer, norm)| norm.forward(&layer.forward(&x)?, mode.trains()))
 }
 
@@ -137,46 +138,9 @@ impl MotionEncoder {
         Array2::from_shape_vec((n, N_CODE), codes).map_err(candle_core::Error::wrap)
     }
 
-    fn set_momentum(&mut self, momentum: f64) {
-        self.convs.iter_mut().for_each(|(_, norm)| norm.set_momentum(momentum));
-        self.dense.iter_mut().for_each(|(_, norm)| norm.set_momentum(momentum));
-    }
-}
-
-/// Encoder and decoder, to train with.
-pub struct AutoEncoder {
-    pub encoder: MotionEncoder,
-    dense: Vec<(Linear, BatchNorm)>,
-    /// From the last dense layer's numbers on, which are channels x 34 frames.
-    convs: Vec<(Conv1d, BatchNorm)>,
-    last: Conv1d,
-}
-
-impl AutoEncoder {
-    /// Makes both halves' tensors in `params`.
-    pub fn new(params: &mut Params, config: &Config) -> Result<Self> {
-        let encoder = MotionEncoder::new(params, config)?;
-        let dense = dense(params, DECODER, &[N_CODE, 128, LAST * WINDOW], SLOPE)?;
-        let mut convs = Vec::new();
-        for (i, (n_in, n_out)) in [(LAST, 64), (64, 64)].into_iter().enumerate() {
-            let name = format!("{DECODER}conv{i}");
-            convs.push((Conv1d::new(params, &name, n_in, n_out, 3)?, norm(params, &name, n_out, SLOPE)?));
-        }
-        let last = Conv1d::new(params, &format!("{DECODER}last"), 64, config.n_in, 3)?;
-        Ok(Self { encoder, dense, convs, last })
-    }
-
-    /// Windows [B, n_in, 34], normalised, to what is left of them after the code, the same shape.
-    pub fn forward(&self, x: &Tensor, mode: &Mode) -> Result<Tensor> {
-        let code = self.encoder.forward(x, mode)?;
-        let y = through(&self.dense, &code, mode)?.reshape((x.dim(0)?, LAST, WINDOW))?;
-        self.last.forward(&through(&self.convs, &y, mode)?)
-    }
-
-    /// How much a batch counts in the running statistics.
+    /// Changes the weight of a new batch in the running statistics.
     pub fn set_momentum(&mut self, momentum: f64) {
-        self.encoder.set_momentum(momentum);
-        self.dense.iter_mut().for_each(|(_, norm)| norm.set_momentum(momentum));
         self.convs.iter_mut().for_each(|(_, norm)| norm.set_momentum(momentum));
+        self.dense.iter_mut().for_each(|(_, norm)| norm.set_momentum(momentum));
     }
 }

@@ -1,13 +1,26 @@
-//! The numbers of a network: named tensors, made from a seed, kept in the order of their names. Each tensor's first
-//! values depend on the seed and its own name only, so adding a layer leaves the others as they were.
+//! The parameters of a network: named tensors, initialised from a seed, sorted by name, and the device they are on. The
+//! initial values of a tensor depend on the seed and its name only, so adding a layer leaves the others unchanged.
+//! (candle-nn's `VarMap` seeds one generator for all tensors and does not tell buffers from trainable tensors.)
 
 use anyhow::{Context, bail, ensure};
 use candle_core::{DType, Device, Result, Tensor, Var};
+use candle_nn::Linear;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
 
-/// How a tensor begins.
+/// The CPU, or the first NVIDIA card. Errors, with what to do: the program was built without CUDA, there is no card.
+pub fn open_device(on_card: bool) -> anyhow::Result<Device> {
+    if !on_card {
+        return Ok(Device::Cpu);
+    }
+    Device::new_cuda(0).context(
+        "no NVIDIA card can be used: gan.device = \"cuda\" needs a card and a program built with `cargo build --release \
+         --features cuda`; gan.device = \"cpu\" needs neither",
+    )
+}
+
+/// Initial values of a tensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Init {
     Constant(f64),
@@ -15,18 +28,18 @@ pub enum Init {
     Glorot,
     /// Uniform in +-sqrt(6 / fan in) (He 2015).
     He,
-    /// Uniform in plus or minus this.
+    /// Uniform in +- this bound.
     Uniform(f64),
 }
 
 /// Named tensors of one or more networks.
 pub struct Params {
-    /// None: for inference.
+    /// `None`: for inference.
     seed: Option<u64>,
     dtype: DType,
     device: Device,
     trainable: BTreeMap<String, Var>,
-    /// Savable, but not moved by the optimiser: running statistics.
+    /// Saved, but not updated by the optimiser: running statistics.
     buffers: BTreeMap<String, Var>,
 }
 
@@ -42,12 +55,12 @@ impl Params {
         Self { seed: Some(seed), dtype, device: Device::Cpu, trainable, buffers }
     }
 
-    /// Moves the tensors that follow to this device. First values do not depend on the device.
+    /// Puts the tensors that follow on this device. Initial values do not depend on the device.
     pub fn on(self, device: &Device) -> Self {
         Self { device: device.clone(), ..self }
     }
 
-    /// Where the tensors are.
+    /// Device of the tensors.
     pub fn device(&self) -> &Device {
         &self.device
     }
@@ -58,7 +71,7 @@ impl Params {
         Self { seed: None, ..Self::new(0) }
     }
 
-    /// A new tensor that the optimiser moves. Errors when the name is taken.
+    /// A new tensor that the optimiser updates. Errors when the name is taken.
     pub fn trainable(&mut self, name: &str, shape: &[usize], init: Init) -> Result<Tensor> {
         let var = self.make(name, shape, init)?;
         let tensor = if self.seed.is_some() { var.as_tensor().clone() } else { var.as_detached_tensor() };
@@ -66,7 +79,19 @@ impl Params {
         Ok(tensor)
     }
 
-    /// A new tensor that is saved with the others and moved by its owner alone.
+    /// A layer's `<name>.weight` of this shape [out, ...] and `<name>.bias` [out].
+    pub fn layer(&mut self, name: &str, shape: &[usize], weight: Init, bias: Init) -> Result<(Tensor, Tensor)> {
+        let weight = self.trainable(&format!("{name}.weight"), shape, weight)?;
+        Ok((weight, self.trainable(&format!("{name}.bias"), &shape[..1], bias)?))
+    }
+
+    /// A fully connected layer.
+    pub fn linear(&mut self, name: &str, [n_in, n_out]: [usize; 2], weight: Init, bias: f64) -> Result<Linear> {
+        let (weight, bias) = self.layer(name, &[n_out, n_in], weight, Init::Constant(bias))?;
+        Ok(Linear::new(weight, Some(bias)))
+    }
+
+    /// A new tensor that is saved with the others and changed by its owner only.
     pub fn buffer(&mut self, name: &str, shape: &[usize], value: f64) -> Result<Var> {
         let var = self.make(name, shape, Init::Constant(value))?;
         self.buffers.insert(name.to_owned(), var.clone());
@@ -92,7 +117,7 @@ impl Params {
         Var::from_tensor(&values.to_device(&self.device)?)
     }
 
-    /// What the optimiser moves, sorted by name.
+    /// The tensors that the optimiser updates, sorted by name.
     pub fn trainables(&self) -> impl Iterator<Item = (&str, &Var)> {
         self.trainable.iter().map(|(name, var)| (name.as_str(), var))
     }
@@ -102,7 +127,7 @@ impl Params {
         self.trainable.iter().chain(&self.buffers).map(|(name, var)| (name.as_str(), var))
     }
 
-    /// How many numbers the optimiser moves.
+    /// Number of values that the optimiser updates.
     pub fn n_parameters(&self) -> usize {
         self.trainable.values().map(|var| var.elem_count()).sum()
     }
@@ -143,6 +168,13 @@ fn uniform(seed: u64, name: &str, n: usize, bound: f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_device_that_is_missing_is_reported() {
+        assert!(open_device(false).unwrap().is_cpu());
+        #[cfg(not(feature = "cuda"))]
+        assert!(open_device(true).unwrap_err().to_string().contains("--features cuda"));
+    }
 
     #[test]
     fn the_first_values_depend_on_seed_and_name_only() -> anyhow::Result<()> {

@@ -1,7 +1,7 @@
 //! What makes the description of a model sound: names that exist, a role that fits the decoding, keypoint maps that are
 //! complete. The file itself is checked in `model`.
 
-use super::{Decode, KeypointOutputs, ModelEntry, ModelRole, ModelSource, PictureFit, TensorAxes};
+use super::{Decode, KeypointOutputs, ModelEntry, ModelRole as Role, ModelSource, PictureFit as Fit, TensorAxes};
 use anyhow::{Result, bail, ensure};
 use orator_base::types::file_name::FileName;
 
@@ -54,7 +54,7 @@ impl ModelEntry {
     /// Says what is wrong with the description, before any file is opened.
     pub(crate) fn check(&self) -> Result<()> {
         ensure!(plain(&self.id), "id must be a plain name");
-        if self.role == ModelRole::Speech {
+        if self.role == Role::Speech {
             return super::speech::check(self);
         }
         ensure!(self.inputs.len() == 1, "it must have exactly one input, not {}", self.inputs.len());
@@ -70,21 +70,12 @@ impl ModelEntry {
         }
         self.decode.check()?;
         let fits = match (self.role, &self.fit, &self.decode) {
-            (ModelRole::Person, PictureFit::Letterbox { .. }, Decode::Detections { .. } | Decode::YoloxGrid { .. }) => {
-                true
-            }
-            (ModelRole::Body, PictureFit::Box { margin }, Decode::Heatmap { .. } | Decode::Simcc { .. }) => {
-                *margin > 0.0
-            }
-            (
-                ModelRole::Hand,
-                PictureFit::Region,
-                Decode::Heatmap { .. } | Decode::Simcc { .. } | Decode::Regression { .. },
-            ) => height == width,
-            (ModelRole::Palm, PictureFit::Letterbox { .. }, Decode::SsdAnchors { .. }) => height == width,
-            (ModelRole::Face, PictureFit::Region, Decode::Regression { .. }) => height == width,
-            (ModelRole::Other, _, _) => true,
-            _ => false,
+            (Role::Person, Fit::Letterbox { .. }, Decode::Detections { .. } | Decode::YoloxGrid { .. }) => true,
+            (Role::Body, Fit::Box { margin }, Decode::Heatmap { .. } | Decode::Simcc { .. }) => *margin > 0.0,
+            (Role::Hand, Fit::Region, Decode::Heatmap { .. } | Decode::Simcc { .. } | Decode::Regression { .. })
+            | (Role::Palm, Fit::Letterbox { .. }, Decode::SsdAnchors { .. })
+            | (Role::Face, Fit::Region, Decode::Regression { .. }) => height == width,
+            (role, ..) => role == Role::Other,
         };
         ensure!(
             fits,
@@ -94,12 +85,12 @@ impl ModelEntry {
         );
         let whole = |points: &[usize], n: usize| points.len() == n;
         let maps = match self.role {
-            ModelRole::Body => {
+            Role::Body => {
                 let hands = [&self.points.left_hand, &self.points.right_hand];
                 let none = hands.iter().all(|points| points.is_empty());
                 whole(&self.points.body, 17) && (none || hands.iter().all(|points| whole(points, 21)))
             }
-            ModelRole::Hand => whole(&self.points.hand, 21),
+            Role::Hand => whole(&self.points.hand, 21),
             _ => true,
         };
         ensure!(

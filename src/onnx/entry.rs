@@ -1,7 +1,7 @@
 //! The description of one model: where it comes from, how its input is made and its outputs are read. Typed, strict (an
 //! unknown key is an error) and data only.
 
-use super::{Conversion, ModelSource, Port};
+use super::{Conversion, ModelSource};
 use serde::{Deserialize, Serialize};
 
 /// One model file: what it is, where it is from, how it is fed and read.
@@ -44,6 +44,14 @@ pub struct ModelEntry {
     pub points: KeypointOutputs,
     #[serde(default)]
     pub origin: ModelOrigin,
+}
+
+/// A named tensor; -1 stands for any size.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Port {
+    pub name: String,
+    pub shape: Vec<i64>,
 }
 
 /// What a model is asked for.

@@ -63,7 +63,7 @@ pub(super) struct Fetcher<'a> {
 
 impl<'a> Fetcher<'a> {
     /// Looks at the files of the mirror, whatever their names.
-    pub fn new(mirror: Option<&Path>, downloads: &'a Path) -> Result<Self> {
+    pub(crate) fn new(mirror: Option<&Path>, downloads: &'a Path) -> Result<Self> {
         let mut offered = Vec::new();
         if let Some(mirror) = mirror {
             offer(mirror, MAX_DEPTH, &mut offered)?;
@@ -72,25 +72,23 @@ impl<'a> Fetcher<'a> {
         Ok(Self { offered, downloads, packages: BTreeMap::new() })
     }
 
-    /// Writes the file of the model to `path`, and what its source says of its licence beside it.
-    ///
-    /// # Errors
-    /// No source that has it; the message says why of each.
-    pub fn get(&mut self, entry: &ModelEntry, path: &Path) -> Result<FetchSource> {
+    /// Writes the file of the model to `path`, and what its source says of its licence beside it. Errors: no source
+    /// that has it; the message says why of each.
+    pub(crate) fn get(&mut self, entry: &ModelEntry, path: &Path) -> Result<FetchSource> {
+        let alone = |bytes, source| Obtained { bytes, licence: None, source };
         if let Some(found) = self.offered(&entry.sha256) {
             let bytes = std::fs::read(found).with_context(|| format!("cannot read {}", found.display()))?;
-            let source = FetchSource::Mirror(found.to_owned());
-            return write(entry, path, &bytes, None, source);
+            return write(entry, path, alone(bytes, FetchSource::Mirror(found.to_owned())));
         }
         let mut refused = String::new();
         if let Some(url) = &entry.url {
             match download(url).and_then(|bytes| pinned(&bytes, &entry.sha256, url).map(|()| bytes)) {
-                Ok(bytes) => return write(entry, path, &bytes, None, FetchSource::Url(url.clone())),
+                Ok(bytes) => return write(entry, path, alone(bytes, FetchSource::Url(url.clone()))),
                 Err(error) => _ = write!(refused, "\n      {url}: {error:#}"),
             }
         }
         match self.first_of(&entry.sources, |files| made(entry, files)) {
-            Ok(Obtained { bytes, licence, source }) => return write(entry, path, &bytes, licence, source),
+            Ok(obtained) => return write(entry, path, obtained),
             Err(reasons) => refused += &reasons,
         }
         if refused.is_empty() {
@@ -104,11 +102,8 @@ impl<'a> Fetcher<'a> {
         bail!("it could not be had:{refused}\n      a folder that has the file (sha256 {}): --mirror DIR", entry.sha256)
     }
 
-    /// Writes a file that is no model to `path`.
-    ///
-    /// # Errors
-    /// No source that has it; the message says why of each.
-    pub fn get_file(&mut self, file: &PinnedFile, path: &Path) -> Result<FetchSource> {
+    /// Writes a file that is no model to `path`. Errors: no source that has it; the message says why of each.
+    pub(crate) fn get_file(&mut self, file: &PinnedFile, path: &Path) -> Result<FetchSource> {
         let whole = |files: &[Vec<u8>]| {
             let bytes = files.concat();
             pinned(&bytes, &file.sha256, &file.file).map(|()| bytes)
@@ -267,16 +262,11 @@ fn download(url: &str) -> Result<Vec<u8>> {
 }
 
 /// Puts the file in its place, and a text with its origin and licence beside it.
-fn write(
-    entry: &ModelEntry,
-    path: &Path,
-    bytes: &[u8],
-    licence: Option<String>,
-    source: FetchSource,
-) -> Result<FetchSource> {
-    pinned(bytes, &entry.sha256, &entry.file)?;
+fn write(entry: &ModelEntry, path: &Path, obtained: Obtained) -> Result<FetchSource> {
+    let Obtained { bytes, licence, source } = obtained;
+    pinned(&bytes, &entry.sha256, &entry.file)?;
     let text = licence.map(|text| format!("\n{}\n", text.trim_end())).unwrap_or_default();
     workdir::write_file(&path.with_extension("licence.txt"), (entry.terms() + &text).as_bytes())?;
-    workdir::write_file(path, bytes)?;
+    workdir::write_file(path, &bytes)?;
     Ok(source)
 }

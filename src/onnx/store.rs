@@ -7,6 +7,7 @@ use anyhow::{Context, Result, bail};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir;
 use serde::Serialize;
+use std::ffi::OsStr;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -65,10 +66,8 @@ impl fmt::Display for ModelState {
 }
 
 impl ModelStore {
-    /// Reads the manifest of the folder `dir`, which need not exist: the built-in models are known then.
-    ///
-    /// # Errors
-    /// A manifest that is not sound.
+    /// Reads the manifest of the folder `dir`, which need not exist: the built-in models are known then. Errors: a
+    /// manifest that is not sound.
     pub fn open(dir: &Path) -> Result<Self> {
         let dir = std::path::absolute(dir)?;
         Ok(Self { manifest: Manifest::load(&dir)?, dir })
@@ -84,10 +83,7 @@ impl ModelStore {
         &self.manifest
     }
 
-    /// The models of those ids; all where none is named.
-    ///
-    /// # Errors
-    /// An id the manifest does not have.
+    /// The models of those ids; all where none is named. Errors: an id the manifest does not have.
     pub fn entries(&self, ids: &[String]) -> Result<Vec<&ModelEntry>> {
         if ids.is_empty() {
             return Ok(self.manifest.models.iter().collect());
@@ -109,19 +105,13 @@ impl ModelStore {
         self.dir.join(&entry.file)
     }
 
-    /// Opens the file of a model: right bytes, right names and shapes.
-    ///
-    /// # Errors
-    /// What is wrong with it.
+    /// Opens the file of a model: right bytes, right names and shapes. Errors: what is wrong with it.
     pub fn check(&self, runtime: &Runtime, entry: &ModelEntry) -> Result<Model, ModelError> {
         Model::open(runtime, entry, &self.dir)
     }
 
     /// The model of that id and role. `auto` is the first of the role, in the order of the manifest, whose file is
-    /// there; where none is, the first.
-    ///
-    /// # Errors
-    /// An id the manifest does not have, or of another role.
+    /// there; where none is, the first. Errors: an id the manifest does not have, or of another role.
     pub fn choose(&self, id: &str, role: ModelRole) -> Result<&ModelEntry> {
         if id != AUTO {
             return self.manifest.get_as(id, role);
@@ -136,15 +126,13 @@ impl ModelStore {
     }
 
     /// Gets each model that is not there with the right bytes: from the folder `mirror`, whose files may have any name
-    /// and may be what the model is made of, else from its sources. One that fails does not stop the others.
-    ///
-    /// # Errors
-    /// A mirror that cannot be read, a folder that cannot be written, another fetch into the same folder.
+    /// and may be what the model is made of, else from its sources. One that fails does not stop the others. Errors: a
+    /// mirror that cannot be read, a folder that cannot be written, another fetch into the same folder.
     pub fn fetch(&self, wanted: &[Wanted], mirror: Option<&Path>, progress: &dyn Progress) -> Result<Vec<Fetched<'_>>> {
-        let _lock = workdir::lock(&self.dir)?;
-        let downloads = self.dir.join(DOWNLOADS);
-        let _ = std::fs::remove_dir_all(&downloads);
-        let mut fetcher = Fetcher::new(mirror, &downloads)?;
+        self.with_downloads(|downloads| self.fetch_with(Fetcher::new(mirror, downloads)?, wanted, progress))
+    }
+
+    fn fetch_with(&self, mut fetcher: Fetcher, wanted: &[Wanted], progress: &dyn Progress) -> Result<Vec<Fetched<'_>>> {
         let task = progress.begin("models", wanted.len() as u64);
         let mut fetched = Vec::new();
         for one in wanted {
@@ -167,30 +155,20 @@ impl ModelStore {
             }
             task.advance(1);
         }
-        let _ = std::fs::remove_dir_all(&downloads);
         Ok(fetched)
     }
 
-    /// Puts the ONNX Runtime library of the manifest into the folder `lib` of the models, where `Runtime::load` finds it.
-    /// A file of the mirror serves as well.
-    ///
-    /// # Errors
-    /// No place that has it.
+    /// Puts the ONNX Runtime library of the manifest into the folder `lib` of the models, where `Runtime::load` finds
+    /// it. A file of the mirror serves as well. Errors: no place that has it.
     pub fn fetch_runtime(&self, mirror: Option<&Path>, progress: &dyn Progress) -> Result<FetchSource> {
         let runtime = self.manifest.runtime.as_ref().context("the manifest names no ONNX Runtime")?;
-        let _lock = workdir::lock(&self.dir)?;
         let _task = progress.begin("ONNX Runtime", 0);
-        let downloads = self.dir.join(DOWNLOADS);
-        let _ = std::fs::remove_dir_all(&downloads);
-        let had = Fetcher::new(mirror, &downloads)?.get_file(runtime, &self.dir.join("lib").join(&runtime.file));
-        let _ = std::fs::remove_dir_all(&downloads);
-        had
+        let path = self.dir.join("lib").join(&runtime.file);
+        self.with_downloads(|downloads| Fetcher::new(mirror, downloads)?.get_file(runtime, &path))
     }
 
-    /// Gets the word vectors of the manifest, and gives what `convert` makes of the file as it is published.
-    ///
-    /// # Errors
-    /// No place that has it; an error of `convert`.
+    /// Gets the word vectors of the manifest, and gives what `convert` makes of the file as it is published. Errors: no
+    /// place that has it; an error of `convert`.
     pub fn fetch_words<T>(
         &self,
         mirror: Option<&Path>,
@@ -198,23 +176,26 @@ impl ModelStore {
         convert: impl FnOnce(&Path, &FetchSource) -> Result<T>,
     ) -> Result<T> {
         let words = self.manifest.words.as_ref().context("the manifest names no word vectors")?;
-        let _lock = workdir::lock(&self.dir)?;
         let _task = progress.begin("word vectors", 0);
+        self.with_downloads(|downloads| {
+            let file = downloads.join(&words.file);
+            let source = Fetcher::new(mirror, downloads)?.get_file(words, &file)?;
+            convert(&file, &source)
+        })
+    }
+
+    /// Runs `fetch` with an empty path for downloads, while no other fetch writes into the folder.
+    fn with_downloads<T>(&self, fetch: impl FnOnce(&Path) -> Result<T>) -> Result<T> {
+        let _lock = workdir::lock(&self.dir)?;
         let downloads = self.dir.join(DOWNLOADS);
         let _ = std::fs::remove_dir_all(&downloads);
-        let file = downloads.join(&words.file);
-        let had = Fetcher::new(mirror, &downloads)
-            .and_then(|mut fetcher| fetcher.get_file(words, &file))
-            .and_then(|source| convert(&file, &source));
+        let fetched = fetch(&downloads);
         let _ = std::fs::remove_dir_all(&downloads);
-        had
+        fetched
     }
 
     /// What `fetch` may get for `wanted`: every model that is asked for by its id or is a candidate for a role, and is
-    /// not there.
-    ///
-    /// # Errors
-    /// An id the manifest does not have.
+    /// not there. Errors: an id the manifest does not have.
     pub fn missing(&self, wanted: &[Wanted]) -> Result<Vec<&ModelEntry>> {
         let is_there = |entry: &&ModelEntry| self.state(entry) == ModelState::Present;
         let mut missing = Vec::new();
@@ -234,10 +215,8 @@ impl ModelStore {
     }
 
     /// Registers the ONNX file `file`, which is fed and read like the model or layout `like`: copies it into the folder
-    /// and writes its description into the folder's manifest. Without `id` it is called as its file.
-    ///
-    /// # Errors
-    /// Other inputs or outputs than `like` has, an id or a file name that is taken.
+    /// and writes its description into the folder's manifest. Without `id` it is called as its file. Errors: other
+    /// inputs or outputs than `like` has, an id or a file name that is taken.
     pub fn add(
         &mut self,
         runtime: &Runtime,
@@ -281,8 +260,7 @@ fn copy(from: &Path, to: &Path) -> Result<()> {
 
 /// The description of a new file that is fed and read like a known one.
 fn described(file: &Path, like: &ModelEntry, id: Option<&str>, licence: &str) -> Result<ModelEntry> {
-    let name =
-        file.file_name().and_then(|name| name.to_str()).with_context(|| format!("{} is no file", file.display()))?;
+    let name = file.file_name().and_then(OsStr::to_str).with_context(|| format!("{} is no file", file.display()))?;
     let bytes = std::fs::metadata(file).with_context(|| format!("cannot read {}", file.display()))?.len();
     let stem = name.strip_suffix(".onnx").unwrap_or(name);
     Ok(ModelEntry {

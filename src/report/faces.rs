@@ -1,11 +1,11 @@
 //! Section on whom the videos show: one face a video, side by side where the videos seem to show several people.
 
-use crate::html::{Node, node, picture};
+use crate::html::{Node, jpeg, node};
 use anyhow::Result;
 use orator_base::stage::artifacts::Artifact;
 use orator_dataset::config::Settings;
 use orator_dataset::config::videos::Videos;
-use orator_media::ffmpeg::jpeg;
+use orator_media::ffmpeg;
 use orator_media::opencv::png;
 use orator_pipeline::dataset::people;
 use orator_pipeline::dataset::people::PersonSeen;
@@ -55,6 +55,6 @@ fn card(work: &Path, video: &PersonSeen) -> Result<Option<Node>> {
         return Ok(None);
     }
     let face = png::read(&path)?;
-    let shown = picture::jpeg(&jpeg::encode(&face)?, [face.width, face.height], &format!("the face in {}", video.file));
+    let shown = jpeg(&ffmpeg::jpeg::encode(&face)?, [face.width, face.height], &format!("the face in {}", video.file));
     Ok(Some(node("figure").class("card shot").child(shown).child(node("figcaption").text(&video.file))))
 }

@@ -6,7 +6,6 @@ pub mod faces;
 pub mod html;
 pub mod preview;
 pub mod sheet;
-pub mod splits;
 pub mod training;
 pub mod videos;
 

@@ -5,9 +5,8 @@
 //! A window of 256 ms is divided into 33 bands from 300 to 3000 Hz, equally wide in pitch. Bit m of a code says whether
 //! the difference of the energies of bands m and m + 1 grew since the window before. Silence has the code 0.
 
+use super::spectrum::StreamedSpectra;
 use realfft::num_complex::Complex;
-use realfft::{RealFftPlanner, RealToComplex};
-use std::sync::Arc;
 
 /// Samples between two codes, at 16 kHz.
 pub const HOP: usize = 512;
@@ -23,13 +22,16 @@ const SILENCE: f64 = 1e-6;
 
 /// Makes the codes of a sound at 16 kHz that comes in pieces of any length.
 pub struct Fingerprinter {
-    fft: Arc<dyn RealToComplex<f32>>,
-    hann: Vec<f32>,
+    spectra: StreamedSpectra,
+    bands: BandDifferences,
+    codes: Vec<u32>,
+}
+
+/// Makes the code of a window from its bands and those of the window before.
+struct BandDifferences {
     /// First bin of each band, and the end of the last.
     edges: [usize; N_BANDS + 1],
-    waiting: Vec<f32>,
     before: [f64; N_BANDS],
-    codes: Vec<u32>,
 }
 
 impl Default for Fingerprinter {
@@ -40,44 +42,30 @@ impl Default for Fingerprinter {
         };
         let hann = |n: usize| (std::f64::consts::PI * n as f64 / WINDOW as f64).sin().powi(2) as f32;
         Self {
-            fft: RealFftPlanner::new().plan_fft_forward(WINDOW),
-            hann: (0..WINDOW).map(hann).collect(),
-            edges: std::array::from_fn(bin),
-            waiting: Vec::new(),
-            before: [0.0; N_BANDS],
+            spectra: StreamedSpectra::new((0..WINDOW).map(hann).collect(), HOP, Vec::new()),
+            bands: BandDifferences { edges: std::array::from_fn(bin), before: [0.0; N_BANDS] },
             codes: Vec::new(),
         }
     }
 }
 
 impl Fingerprinter {
-    /// Takes in the next samples, -1..1.
+    /// Takes the next samples, -1..1.
     pub fn push(&mut self, samples: &[f32]) {
-        self.waiting.extend_from_slice(samples);
-        let mut at = 0;
-        while at + WINDOW <= self.waiting.len() {
-            let code = self.code(at);
-            self.codes.push(code);
-            at += HOP;
-        }
-        self.waiting.drain(..at);
+        self.spectra.push(samples, |sound, bins| self.codes.push(self.bands.code(sound, bins)));
     }
 
     /// A code for every whole window.
     pub fn finish(self) -> Vec<u32> {
         self.codes
     }
+}
 
-    fn code(&mut self, at: usize) -> u32 {
-        let window = &self.waiting[at..at + WINDOW];
-        let silent = window.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>() < SILENCE * WINDOW as f64;
-        let mut input: Vec<f32> = window.iter().zip(&self.hann).map(|(sample, weight)| sample * weight).collect();
-        let mut spectrum = vec![Complex::new(0.0, 0.0); WINDOW / 2 + 1];
-        if self.fft.process(&mut input, &mut spectrum).is_err() {
-            return 0;
-        }
+impl BandDifferences {
+    fn code(&mut self, sound: &[f32], bins: &[Complex<f32>]) -> u32 {
+        let silent = sound.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>() < SILENCE * WINDOW as f64;
         let energy = |band: usize| {
-            spectrum[self.edges[band]..self.edges[band + 1]].iter().map(|bin| f64::from(bin.norm_sqr())).sum::<f64>()
+            bins[self.edges[band]..self.edges[band + 1]].iter().map(|bin| f64::from(bin.norm_sqr())).sum::<f64>()
         };
         let bands: [f64; N_BANDS] = std::array::from_fn(energy);
         let before = std::mem::replace(&mut self.before, bands);

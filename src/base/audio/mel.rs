@@ -1,9 +1,9 @@
 //! Log-mel spectrograms as speech2gesture computes them (TensorFlow's `stft` and `linear_to_mel_weight_matrix`):
 //! magnitudes, 64 triangular bands on the HTK mel scale, natural logarithm. No padding and no normalisation.
 
+use super::spectrum::{Spectrum, hann};
 use crate::types::sound::SAMPLE_RATE;
 use ndarray::Array2;
-use realfft::RealFftPlanner;
 use std::ops::RangeInclusive;
 use std::sync::LazyLock;
 
@@ -30,20 +30,12 @@ pub const fn n_samples(n_frames: usize) -> usize {
 
 /// ln(mel + 1e-6) of mono sound at 16 kHz, samples in -1..1: [`n_frames`, 64]. Frame k is the sound from k * 10 ms on.
 pub fn log_mel(samples: &[f32]) -> Array2<f32> {
-    let window: Vec<f32> =
-        (0..WINDOW).map(|i| (0.5 - 0.5 * (std::f64::consts::TAU * i as f64 / WINDOW as f64).cos()) as f32).collect();
-    let fft = RealFftPlanner::<f32>::new().plan_fft_forward(FFT);
-    let (mut frame, mut spectrum) = (fft.make_input_vec(), fft.make_output_vec());
-    let mut work = fft.make_scratch_vec();
-    let mut magnitudes = vec![0.0f32; spectrum.len()];
+    let mut spectrum = Spectrum::new(hann(WINDOW), FFT);
+    let mut magnitudes = vec![0.0f32; FFT / 2 + 1];
     let mut mels = Array2::zeros((n_frames(samples.len()), N_MELS));
     for (k, mut row) in mels.outer_iter_mut().enumerate() {
-        frame.fill(0.0);
-        let sound = &samples[k * HOP..][..WINDOW];
-        frame.iter_mut().zip(sound).zip(&window).for_each(|((y, x), w)| *y = x * w);
-        // The lengths are the transform's own, so it cannot refuse.
-        let _ = fft.process_with_scratch(&mut frame, &mut spectrum, &mut work);
-        magnitudes.iter_mut().zip(&spectrum).for_each(|(magnitude, bin)| *magnitude = bin.norm());
+        let bins = spectrum.of(&samples[k * HOP..][..WINDOW]);
+        magnitudes.iter_mut().zip(bins).for_each(|(magnitude, bin)| *magnitude = bin.norm());
         for (mel, band) in row.iter_mut().zip(BANDS.iter()) {
             let sum: f32 = band.weights.iter().zip(&magnitudes[band.first..]).map(|(w, bin)| w * bin).sum();
             *mel = (sum + FLOOR).ln();
@@ -54,9 +46,13 @@ pub fn log_mel(samples: &[f32]) -> Array2<f32> {
 
 /// Lower corner of a band's triangle in Hz.
 pub fn lowest_hz(band: usize) -> f64 {
+    700.0 * ((corner(band) / 1127.0).exp() - 1.0)
+}
+
+/// Corner `i` of the triangles, equally spaced in mel.
+fn corner(i: usize) -> f64 {
     let (low, high) = (mel_of(LOWEST_HZ), mel_of(HIGHEST_HZ));
-    let corner = low + (high - low) * band as f64 / (N_MELS + 1) as f64;
-    700.0 * ((corner / 1127.0).exp() - 1.0)
+    low + (high - low) * i as f64 / (N_MELS + 1) as f64
 }
 
 fn mel_of(hz: f64) -> f64 {
@@ -83,8 +79,6 @@ impl Band {
 
 /// Triangles with corners equally spaced in mel; the zero bin belongs to none.
 fn bands() -> Vec<Band> {
-    let (low, high) = (mel_of(LOWEST_HZ), mel_of(HIGHEST_HZ));
-    let corner = |i: usize| low + (high - low) * i as f64 / (N_MELS + 1) as f64;
     let weight = |band: usize, bin: usize| {
         let at = mel_of(bin as f64 * f64::from(SAMPLE_RATE) / FFT as f64);
         let (left, middle, right) = (corner(band), corner(band + 1), corner(band + 2));

@@ -7,3 +7,4 @@ pub mod mfcc;
 pub mod onset;
 pub mod openness;
 pub mod pauses;
+pub mod spectrum;

@@ -6,9 +6,8 @@
 //! take it in pieces; only the strength of each hop is kept, 4 bytes every 32 ms.
 
 use super::mel::Band;
+use super::spectrum::{StreamedSpectra, hann};
 use crate::types::sound::SAMPLE_RATE;
-use realfft::{RealFftPlanner, RealToComplex, num_complex::Complex};
-use std::sync::Arc;
 
 /// Samples between two frames, and of a window.
 pub const HOP: usize = 512;
@@ -136,48 +135,27 @@ fn peaks(strengths: &[f32]) -> Vec<usize> {
 /// Sound in pieces to mel bands in decibels, a frame every `HOP` samples, its window centred on the frame's time and filled
 /// up with zeros at the ends.
 struct Spectra {
-    samples: Vec<f32>,
-    window: Vec<f32>,
+    windows: StreamedSpectra,
     bands: Vec<Band>,
-    fft: Arc<dyn RealToComplex<f32>>,
-    frame: Vec<f32>,
-    spectrum: Vec<Complex<f32>>,
-    work: Vec<Complex<f32>>,
 }
 
 impl Spectra {
     fn new() -> Self {
-        let fft = RealFftPlanner::<f32>::new().plan_fft_forward(WINDOW);
-        let hann = |i: usize| (0.5 - 0.5 * (std::f64::consts::TAU * i as f64 / WINDOW as f64).cos()) as f32;
-        Self {
-            samples: vec![0.0; WINDOW / 2],
-            window: (0..WINDOW).map(hann).collect(),
-            bands: bands(),
-            frame: fft.make_input_vec(),
-            spectrum: fft.make_output_vec(),
-            work: fft.make_scratch_vec(),
-            fft,
-        }
+        Self { windows: StreamedSpectra::new(hann(WINDOW), HOP, vec![0.0; WINDOW / 2]), bands: bands() }
     }
 
     fn push(&mut self, samples: &[f32], mut each: impl FnMut(&[f32; N_MELS])) {
         for piece in samples.chunks(16 * WINDOW) {
-            self.samples.extend(piece.iter().map(|v| if v.is_finite() { *v } else { 0.0 }));
-            let mut start = 0;
-            while let Some(sound) = self.samples.get(start..start + WINDOW) {
-                self.frame.iter_mut().zip(sound).zip(&self.window).for_each(|((y, x), w)| *y = x * w);
-                // the lengths are the transform's own, so it cannot refuse
-                let _ = self.fft.process_with_scratch(&mut self.frame, &mut self.spectrum, &mut self.work);
+            let piece: Vec<f32> = piece.iter().map(|v| if v.is_finite() { *v } else { 0.0 }).collect();
+            self.windows.push(&piece, |_, spectrum| {
                 let mut decibels = [0.0; N_MELS];
                 for (db, band) in decibels.iter_mut().zip(&self.bands) {
-                    let bins = band.weights.iter().zip(self.spectrum.get(band.first..).unwrap_or_default());
+                    let bins = band.weights.iter().zip(spectrum.get(band.first..).unwrap_or_default());
                     let power: f32 = bins.map(|(weight, bin)| weight * bin.norm_sqr()).sum();
                     *db = 10.0 * power.max(LEAST_POWER).log10();
                 }
                 each(&decibels);
-                start += HOP;
-            }
-            self.samples.drain(..start);
+            });
         }
     }
 }

@@ -2,12 +2,10 @@
 //! (the first formant falls with the jaw: Stevens, Acoustic Phonetics, 1998, section 3.2), and hisses above are said with
 //! the teeth together. The contrast of the three, in dB, needs no gain: a softer voice sounds no more closed.
 
+use super::spectrum::{StreamedSpectra, hann};
 use crate::types::sound::SAMPLE_RATE;
-use realfft::num_complex::Complex;
-use realfft::{RealFftPlanner, RealToComplex};
 use std::f64::consts::TAU;
 use std::ops::Range;
-use std::sync::Arc;
 
 /// Samples of a window, and between the starts of two: 32 ms, 10 ms.
 const WINDOW: usize = 512;
@@ -24,13 +22,8 @@ const SMOOTH: usize = 5;
 
 /// Sound piece by piece to how open its voice sounds. Memory: 28 bytes for 10 ms of sound.
 pub struct OpennessMeter {
-    fft: Arc<dyn RealToComplex<f32>>,
-    window: Vec<f32>,
+    spectra: StreamedSpectra,
     bins: [Range<usize>; N_BANDS],
-    /// Samples that no whole window held yet.
-    waiting: Vec<f32>,
-    frame: Vec<f32>,
-    spectrum: Vec<Complex<f32>>,
     energies: Vec<[f32; N_BANDS]>,
 }
 
@@ -40,34 +33,22 @@ pub struct Openness(Vec<f32>);
 
 impl Default for OpennessMeter {
     fn default() -> Self {
-        let fft = RealFftPlanner::<f32>::new().plan_fft_forward(WINDOW);
         let bin = |hz: f64| (hz / f64::from(SAMPLE_RATE) * WINDOW as f64).ceil() as usize;
         Self {
-            window: (0..WINDOW).map(|i| (0.5 - 0.5 * (TAU * i as f64 / WINDOW as f64).cos()) as f32).collect(),
+            spectra: StreamedSpectra::new(hann(WINDOW), HOP, Vec::new()),
             bins: std::array::from_fn(|band| bin(EDGES_HZ[band])..bin(EDGES_HZ[band + 1])),
-            waiting: Vec::new(),
-            frame: fft.make_input_vec(),
-            spectrum: fft.make_output_vec(),
             energies: Vec::new(),
-            fft,
         }
     }
 }
 
 impl OpennessMeter {
-    /// Takes in the next samples, mono at 16 kHz, -1..1.
+    /// Takes the next samples, mono at 16 kHz, -1..1.
     pub fn push(&mut self, samples: &[f32]) {
-        self.waiting.extend_from_slice(samples);
-        let mut start = 0;
-        while let Some(sound) = self.waiting.get(start..start + WINDOW) {
-            self.frame.iter_mut().zip(sound).zip(&self.window).for_each(|((y, x), w)| *y = x * w);
-            // The lengths are the transform's own, so it cannot refuse.
-            let _ = self.fft.process(&mut self.frame, &mut self.spectrum);
-            let energy = |bins: &Range<usize>| self.spectrum[bins.clone()].iter().map(|bin| bin.norm_sqr()).sum();
+        self.spectra.push(samples, |_, spectrum| {
+            let energy = |bins: &Range<usize>| spectrum[bins.clone()].iter().map(|bin| bin.norm_sqr()).sum();
             self.energies.push(std::array::from_fn(|band| energy(&self.bins[band])));
-            start += HOP;
-        }
-        self.waiting.drain(..start);
+        });
     }
 
     /// The whole sound's.

@@ -2,9 +2,8 @@
 //! width, and the widest is taken whose result differs from those of all narrower ones by no more than noise and a
 //! tolerance explain (Lepski 1990): a still limb is smoothed over long, a stroke stays as it is. Nothing comes late.
 
-use super::noise;
-use super::order::lower_quantile;
-use super::vec3::{Vec3, add, norm, scale, sub};
+use super::order::{Ordered, lower_quantile};
+use super::vec3::{Vec3, add, dot, norm, scale, sub};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -65,7 +64,7 @@ impl LocalFit {
     /// The smoothed run. `known`: deviation of the noise that is known beforehand, frame by frame, for as many as there
     /// are.
     pub fn run(&self, values: &[Vec3], known: &[f64]) -> Vec<Vec3> {
-        let mut noise = noise::around(values, self.noise_half);
+        let mut noise = noise_around(values, self.noise_half);
         for (t, noise) in noise.iter_mut().enumerate() {
             let around = t.saturating_sub(self.even_half)..(t + self.even_half + 1);
             let known = around.filter_map(|u| known.get(u)).fold(0.0, |most: f64, &known| most.max(known));
@@ -147,6 +146,49 @@ fn evened(values: &[f64], t: usize, half: usize) -> f64 {
     let (sum, total) =
         (start..end).fold((0.0, 0.0), |(sum, total), u| (sum + weight(u) * values[u], total + weight(u)));
     sum / total
+}
+
+// White noise of a track beside its motion: differences of a high order carry noise far more than motion; how much of them
+// is motion shows in the ratio of two orders, which is lower for motion than for noise.
+
+/// Mean squares of the third and fourth differences of white noise of unit variance (sums of squared binomials).
+const THIRD: f64 = 20.0;
+const FOURTH: f64 = 70.0;
+/// Ratio of the two for motion: captured arms have 1.4 to 1.7 at 15 frames a second, less at 30.
+const MOTION: f64 = 1.7;
+/// Frames over which the differences are averaged.
+const MEAN_FRAMES: usize = 9;
+/// Quantile of those means, which strokes do not reach, and its ratio to the mean for white noise of three coordinates.
+const QUIET: f64 = 0.3;
+const QUIET_SHARE: f64 = 0.8;
+
+/// Standard deviation of the noise of one coordinate, by frame, from the frames up to `half` before and after it; 0 where
+/// the run is too short to tell.
+fn noise_around(values: &[Vec3], half: usize) -> Vec<f64> {
+    let n = values.len();
+    if n < MEAN_FRAMES + 4 {
+        return vec![0.0; n];
+    }
+    let (third, fourth) = (differences(values, 3), differences(values, 4));
+    let power = |values: &[Vec3]| values.iter().map(|v| dot(*v, *v)).sum::<f64>() / values.len() as f64;
+    let variance = |i: usize| {
+        let (third, fourth) = (power(&third[i..=i + MEAN_FRAMES]), power(&fourth[i..i + MEAN_FRAMES]));
+        (fourth - MOTION * third) / (FOURTH - MOTION * THIRD) / 3.0
+    };
+    let variances: Vec<f64> = (0..=fourth.len() - MEAN_FRAMES).map(variance).collect();
+    (0..n)
+        .map(|t| {
+            // The differences of mean `i` are centred on frame `i + MEAN_FRAMES / 2 + 2`.
+            let at = t.saturating_sub(MEAN_FRAMES / 2 + 2).min(variances.len() - 1);
+            let around = &variances[at.saturating_sub(half)..(at + half + 1).min(variances.len())];
+            let quiet = Ordered::new(around.iter().copied()).quantile(QUIET).unwrap_or(0.0);
+            (quiet / QUIET_SHARE).max(0.0).sqrt()
+        })
+        .collect()
+}
+
+fn differences(values: &[Vec3], order: usize) -> Vec<Vec3> {
+    (0..order).fold(values.to_vec(), |values, _| values.windows(2).map(|pair| sub(pair[1], pair[0])).collect())
 }
 
 #[cfg(test)]

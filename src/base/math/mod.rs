@@ -4,7 +4,6 @@ pub mod cholesky;
 pub mod eigen;
 pub mod gaussian;
 pub mod local_fit;
-pub mod noise;
 pub mod order;
 pub mod procrustes;
 pub mod rotation;

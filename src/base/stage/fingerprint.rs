@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 use std::time::{Instant, UNIX_EPOCH};
 
 /// The key of one unit at one stage, in its parts so that a difference can be named.
@@ -102,7 +102,7 @@ impl HashCache {
     }
 
     fn known(&self) -> std::sync::MutexGuard<'_, BTreeMap<String, KnownHash>> {
-        self.known.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+        self.known.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

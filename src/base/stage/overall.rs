@@ -135,9 +135,11 @@ impl Task for UnitTask<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stage::progress::Silent;
     use crate::stage::{Input, Report};
     use anyhow::Result;
     use std::path::Path;
+    use std::sync::Arc;
     use std::sync::atomic::AtomicU64;
 
     struct Costly(u32);
@@ -163,23 +165,17 @@ mod tests {
         }
     }
 
-    #[derive(Default)]
-    struct Counted([AtomicU64; 2]);
+    #[derive(Clone, Default)]
+    struct Counted(Arc<[AtomicU64; 2]>);
 
     impl Progress for Counted {
         fn begin(&self, label: &str, _total: u64) -> Box<dyn Task + '_> {
-            if label.contains(" of ") {
-                Box::new(CountedTask(&self.0))
-            } else {
-                Box::new(super::super::progress::Silent)
-            }
+            if label.contains(" of ") { Box::new(self.clone()) } else { Box::new(Silent) }
         }
         fn say(&self, _line: &str) {}
     }
 
-    struct CountedTask<'a>(&'a [AtomicU64; 2]);
-
-    impl Task for CountedTask<'_> {
+    impl Task for Counted {
         fn advance(&self, steps: u64) {
             self.0[0].fetch_add(steps, Ordering::Relaxed);
         }
@@ -196,7 +192,8 @@ mod tests {
         let stages = [&stages[0] as &dyn Stage, &stages[1]];
         let counted = Counted::default();
         let overall = OverallProgress::begin(&stages, &units, &counted);
-        let seen = || counted.0.each_ref().map(|n| n.load(Ordering::Relaxed) * 8 / PARTS);
+        let steps = || counted.0.each_ref().map(|n| n.load(Ordering::Relaxed));
+        let seen = || steps().map(|n| n * 8 / PARTS);
         overall.skip(&stages, &units[0]);
         drop(overall.of(stages[0], &units[1]));
         assert_eq!(seen(), [1, 4]);
@@ -207,6 +204,6 @@ mod tests {
         task.advance(5);
         drop(task);
         drop(costly);
-        assert_eq!(counted.0.each_ref().map(|n| n.load(Ordering::Relaxed)).iter().sum::<u64>(), PARTS);
+        assert_eq!(steps().iter().sum::<u64>(), PARTS);
     }
 }

@@ -1,6 +1,6 @@
-//! Units whose work is done in parts: who has such a unit in hand shares its parts with the workers that have no unit any
-//! more. Each part has a folder and a record of its own under `NAME.parts` beside the unit's folder, so that what was done
-//! of a unit is not lost with its worker.
+//! Units whose work is done in parts: the worker of such a unit shares its parts with workers that have run out of units.
+//! Each part has a folder and a record of its own under `NAME.parts` beside the unit's folder, so that finished parts
+//! survive a worker that is killed.
 
 use super::attempt::{attempt, guarded};
 use super::fingerprint::Fingerprint;
@@ -60,20 +60,20 @@ impl PartedWork<'_> {
     }
 }
 
-/// The workers of a run.
-pub struct Crew<'a> {
-    state: Mutex<CrewState<'a>>,
+/// The workers of a run; `nn::cpu` lists the thread pools of the program.
+pub struct WorkerPool<'a> {
+    state: Mutex<PoolState<'a>>,
     changed: Condvar,
 }
 
-struct CrewState<'a> {
-    /// Workers that go from unit to unit, and so may have parts to share.
-    n_at_units: usize,
+struct PoolState<'a> {
+    /// Workers that still take units, and so may share parts.
+    n_busy: usize,
     open: Vec<SharedUnit<'a>>,
     n_shared: usize,
 }
 
-/// A unit whose parts are under way.
+/// A unit whose parts are in progress.
 struct SharedUnit<'a> {
     number: usize,
     work: Arc<PartedWork<'a>>,
@@ -82,17 +82,15 @@ struct SharedUnit<'a> {
     failed: Option<anyhow::Error>,
 }
 
-impl<'a> Crew<'a> {
-    /// Of `n` workers that all go from unit to unit; each says with `help` when it has none any more.
+impl<'a> WorkerPool<'a> {
+    /// A pool of `n` workers that all take units; each calls `help` when there is no unit left.
     pub fn new(n: usize) -> Self {
-        let state = CrewState { n_at_units: n, open: Vec::new(), n_shared: 0 };
+        let state = PoolState { n_busy: n, open: Vec::new(), n_shared: 0 };
         Self { state: Mutex::new(state), changed: Condvar::new() }
     }
 
-    /// Does all parts of a unit, together with who helps. Returns their folders in order.
-    ///
-    /// # Errors
-    /// The first error of a part; no part is begun after it.
+    /// Does all parts of a unit, together with who helps. Returns their folders in order. Errors: the first error of a
+    /// part; no part is begun after it.
     pub fn work(&self, work: PartedWork<'a>) -> Result<Vec<PathBuf>> {
         let folders = (0..work.n_parts).map(|part| work.folder_of(part)).collect();
         let number = {
@@ -115,12 +113,12 @@ impl<'a> Crew<'a> {
         }
     }
 
-    /// Helps with the parts of others, until no worker goes from unit to unit any more.
+    /// Does parts of other workers' units, until no worker takes units any more.
     pub fn help(&self) {
         loop {
             while self.work_on_one(None) {}
             let state = self.state();
-            if state.n_at_units == 0 {
+            if state.n_busy == 0 {
                 return;
             }
             if !state.open.iter().any(SharedUnit::has_parts) {
@@ -153,7 +151,7 @@ impl<'a> Crew<'a> {
         true
     }
 
-    fn state(&self) -> MutexGuard<'_, CrewState<'a>> {
+    fn state(&self) -> MutexGuard<'_, PoolState<'a>> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -164,12 +162,12 @@ impl SharedUnit<'_> {
     }
 }
 
-/// A worker that goes from unit to unit, until it is dropped.
-pub struct AtUnits<'c, 'a>(pub &'c Crew<'a>);
+/// Counts a worker as one that takes units, until it is dropped.
+pub struct BusyGuard<'c, 'a>(pub &'c WorkerPool<'a>);
 
-impl Drop for AtUnits<'_, '_> {
+impl Drop for BusyGuard<'_, '_> {
     fn drop(&mut self) {
-        self.0.state().n_at_units -= 1;
+        self.0.state().n_busy -= 1;
         self.0.changed.notify_all();
     }
 }

@@ -1,93 +1,93 @@
-//! Why seconds of a video are not kept: the one list of reasons, each with its word for programs, the unit of what was
-//! measured, a heading and a sentence for people.
+//! Why seconds of a video are not kept: the list of reasons, each with its word for programs, the unit of the measured
+//! value, a heading and a sentence for people.
 
-/// A reason. Those of `JUDGED` come first, in the order in which they are looked for: a frame is refused for the first
-/// that holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Refusal {
+/// Defines the reasons: what is measured, then name, word in the ledger, unit and heading.
+macro_rules! refusals {
+    ($($(#[$doc:meta])* $name:ident: $reason:literal, $unit:literal, $heading:literal;)*) => {
+        /// A reason. Those of `JUDGED` come first, in the order in which they are checked: a frame is refused for the
+        /// first that holds.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+        pub enum Refusal {
+            $($(#[$doc])* $name,)*
+        }
+
+        impl Refusal {
+            const ALL: &[Self] = &[$(Self::$name),*];
+
+            const fn texts(self) -> [&'static str; 3] {
+                match self {
+                    $(Self::$name => [$reason, $unit, $heading],)*
+                }
+            }
+        }
+    };
+}
+
+refusals! {
     /// Share of the frames with sound.
-    NoSound,
+    NoSound: "no sound", "", "no sound track, or it has ended";
     /// Loudness, dB of full scale.
-    Quiet,
+    Quiet: "quiet", "dB", "the sound is too quiet for speech";
     /// Share of the sound that is speech.
-    NoSpeech,
+    NoSpeech: "no speech", "", "the sound is not speech";
     /// Correlation of the mouth that is seen with the voice that is heard.
-    OtherVoice,
+    OtherVoice: "voice of another", "", "the voice is not that of the person seen";
     /// Seconds for which the picture stands still.
-    Still,
+    Still: "still", "s", "the picture stands still";
     /// Best score of face and arms.
-    NoPerson,
+    NoPerson: "no person", "", "nobody is seen";
     /// Pixels between the shoulders.
-    Small,
+    Small: "too small", "px", "the speaker is too small in the picture";
     /// Score of nose and eyes.
-    Face,
+    Face: "face", "", "the face is not visible";
     /// Width of the shoulders in distances from neck to nose.
-    Turned,
+    Turned: "turned", "neck-nose distances", "the speaker is turned sideways or away";
     /// Half shoulder widths between nose and neck.
-    NoseOff,
+    NoseOff: "turned", "half shoulder widths", "the speaker is turned sideways or away";
     /// Lowest score of shoulders and elbows.
-    Arms,
+    Arms: "arms", "", "shoulders or elbows are not visible";
     /// Seconds for which a hand is missing, the other one having been found in its place.
-    OtherHand,
+    OtherHand: "other hand", "s", "one hand is found in the place of the other";
     /// Seconds for which a hand is missing.
-    HandGap,
+    HandGap: "hands", "s", "a hand is not visible for too long";
     /// Shoulder widths the neck moves within a frame.
-    Jump,
+    Jump: "jump", "shoulder widths", "the speaker jumps from frame to frame";
     /// Seconds that a shot boundary leaves of a stretch.
-    Cut,
+    Cut: "cut", "s", "a cut leaves too short an interval";
     /// Seconds that a change of the followed person leaves of a stretch.
-    Identity,
+    Identity: "other person", "s", "a change of person leaves too short an interval";
     /// Seconds of a stretch that other refusals leave.
-    TooShort,
+    TooShort: "too short", "s", "too short between other refusals";
     /// Share of the frames in which the less visible hand is seen.
-    HandShare,
+    HandShare: "hands", "", "a hand is not visible for too long";
     /// Share of the frames with too many people.
-    Crowd,
+    Crowd: "crowd", "", "too many people are in view";
     /// Share of its length that a lifted bone is off it.
-    Bones,
+    Bones: "bones", "bone lengths", "a lifted bone is far off its length";
     /// Joints that stay unseen for longer than lifting fills.
-    Open,
+    Open: "open", "joints", "joints stay unseen for too long";
     /// Seconds that another video of the dataset has as well.
-    Duplicate,
+    Duplicate: "duplicate", "s", "another video has it already";
     /// Seconds left out between two splits of a video.
-    Guard,
+    Guard: "between splits", "s", "left out between two splits";
     /// An imported take without a sound, or the rest of one behind the end of its sound.
-    NoSoundFile,
+    NoSoundFile: "no sound", "s", "no sound was found, or it has ended";
     /// An imported take that a model predicted.
-    Prediction,
+    Prediction: "prediction", "", "a model predicted it";
     /// Seconds by which sound and motion of an imported take differ in length.
-    OutOfStep,
+    OutOfStep: "out of step", "s", "sound and motion differ in length";
     /// Frames that motion and sound of an imported take have in common.
-    FewFrames,
+    FewFrames: "too short", "frames", "sound and motion have too few frames in common";
     /// Seconds that the imported shards leave out.
-    NotImported,
+    NotImported: "not here", "s", "the imported shards do not hold it";
 }
 
 impl Refusal {
     /// The reasons that `segment` and `lift` judge frames by.
-    pub const JUDGED: [Self; 21] = [
-        Self::NoSound,
-        Self::Quiet,
-        Self::NoSpeech,
-        Self::OtherVoice,
-        Self::Still,
-        Self::NoPerson,
-        Self::Small,
-        Self::Face,
-        Self::Turned,
-        Self::NoseOff,
-        Self::Arms,
-        Self::OtherHand,
-        Self::HandGap,
-        Self::Jump,
-        Self::Cut,
-        Self::Identity,
-        Self::TooShort,
-        Self::HandShare,
-        Self::Crowd,
-        Self::Bones,
-        Self::Open,
-    ];
+    pub const JUDGED: [Self; 21] = match Self::ALL.first_chunk() {
+        Some(judged) => *judged,
+        None => panic!("fewer reasons than judged ones"),
+    };
 
     /// The judged reason of a ledger's entry with this word and unit.
     pub fn find(reason: &str, unit: &str) -> Option<Self> {
@@ -96,98 +96,17 @@ impl Refusal {
 
     /// The reason in the ledger.
     pub const fn reason(self) -> &'static str {
-        match self {
-            Self::NoSound | Self::NoSoundFile => "no sound",
-            Self::Quiet => "quiet",
-            Self::NoSpeech => "no speech",
-            Self::OtherVoice => "voice of another",
-            Self::Still => "still",
-            Self::NoPerson => "no person",
-            Self::Small => "too small",
-            Self::Face => "face",
-            Self::Turned | Self::NoseOff => "turned",
-            Self::Arms => "arms",
-            Self::OtherHand => "other hand",
-            Self::HandGap | Self::HandShare => "hands",
-            Self::Jump => "jump",
-            Self::Cut => "cut",
-            Self::Identity => "other person",
-            Self::TooShort | Self::FewFrames => "too short",
-            Self::Crowd => "crowd",
-            Self::Bones => "bones",
-            Self::Open => "open",
-            Self::Duplicate => "duplicate",
-            Self::Guard => "between splits",
-            Self::Prediction => "prediction",
-            Self::OutOfStep => "out of step",
-            Self::NotImported => "not here",
-        }
+        self.texts()[0]
     }
 
-    /// What `measured` and `threshold` are given in; empty: scores and shares, 0 to 1, and a correlation, -1 to 1.
+    /// Unit of `measured` and `threshold`; empty: scores and shares, 0 to 1, and a correlation, -1 to 1.
     pub const fn unit(self) -> &'static str {
-        match self {
-            Self::Still
-            | Self::OtherHand
-            | Self::HandGap
-            | Self::Cut
-            | Self::Identity
-            | Self::TooShort
-            | Self::Duplicate
-            | Self::Guard
-            | Self::NoSoundFile
-            | Self::OutOfStep
-            | Self::NotImported => "s",
-            Self::Bones => "bone lengths",
-            Self::Open => "joints",
-            Self::FewFrames => "frames",
-            Self::Quiet => "dB",
-            Self::Small => "px",
-            Self::Turned => "neck-nose distances",
-            Self::NoseOff => "half shoulder widths",
-            Self::Jump => "shoulder widths",
-            Self::NoSound
-            | Self::NoSpeech
-            | Self::OtherVoice
-            | Self::NoPerson
-            | Self::Face
-            | Self::Arms
-            | Self::HandShare
-            | Self::Crowd
-            | Self::Prediction => "",
-        }
+        self.texts()[1]
     }
 
-    /// What the reason means, for a legend.
+    /// Meaning of the reason, for a legend.
     pub const fn heading(self) -> &'static str {
-        match self {
-            Self::NoSound => "no sound track, or it has ended",
-            Self::Quiet => "the sound is too quiet for speech",
-            Self::NoSpeech => "the sound is not speech",
-            Self::OtherVoice => "the voice is not that of the person seen",
-            Self::Still => "the picture stands still",
-            Self::NoPerson => "nobody is seen",
-            Self::Small => "the speaker is too small in the picture",
-            Self::Face => "the face is not visible",
-            Self::Turned | Self::NoseOff => "the speaker is turned sideways or away",
-            Self::Arms => "shoulders or elbows are not visible",
-            Self::OtherHand => "one hand is found in the place of the other",
-            Self::HandGap | Self::HandShare => "a hand is not visible for too long",
-            Self::Jump => "the speaker jumps from frame to frame",
-            Self::Cut => "a cut leaves too short an interval",
-            Self::Identity => "a change of person leaves too short an interval",
-            Self::TooShort => "too short between other refusals",
-            Self::Crowd => "too many people are in view",
-            Self::Bones => "a lifted bone is far off its length",
-            Self::Open => "joints stay unseen for too long",
-            Self::Duplicate => "another video has it already",
-            Self::Guard => "left out between two splits",
-            Self::NoSoundFile => "no sound was found, or it has ended",
-            Self::Prediction => "a model predicted it",
-            Self::OutOfStep => "sound and motion differ in length",
-            Self::FewFrames => "sound and motion have too few frames in common",
-            Self::NotImported => "the imported shards do not hold it",
-        }
+        self.texts()[2]
     }
 
     /// The sentence, with what was measured and the threshold.

@@ -4,7 +4,7 @@
 use super::attempt::{attempt, guarded};
 use super::fingerprint::{Fingerprint, HashCache};
 use super::overall::OverallProgress;
-use super::parts::{AtUnits, Crew, PartedWork, remove_parts};
+use super::parts::{BusyGuard, PartedWork, WorkerPool, remove_parts};
 use super::progress::{Event, Progress};
 use super::record::{DirtyReason, Failure, Record};
 use super::workdir::FolderLock;
@@ -84,15 +84,15 @@ pub fn run_stages(
     let ended: Vec<Mutex<Vec<StageOutcome>>> = units.iter().map(|_| Mutex::new(Vec::new())).collect();
     let overall = OverallProgress::begin(stages, units, progress);
     let order = largest_first(units);
-    let crew = Crew::new(jobs.max(1));
+    let pool = WorkerPool::new(jobs.max(1));
     std::thread::scope(|scope| {
         for _ in 0..jobs.max(1) {
             scope.spawn(|| {
-                let at_units = AtUnits(&crew);
+                let busy = BusyGuard(&pool);
                 while let Some(&at) = order.get(next.fetch_add(1, Ordering::SeqCst)) {
                     for (idx, stage) in stages.iter().enumerate() {
                         let place = (work, hashes, force);
-                        let answer = run_unit(*stage, &units[at], place, &crew, &overall);
+                        let answer = run_unit(*stage, &units[at], place, &pool, &overall);
                         report(&answer, *stage, &units[at], progress);
                         let has_failed = matches!(answer, StageOutcome::Failed(_));
                         if let Ok(mut answers) = ended[at].lock() {
@@ -105,8 +105,8 @@ pub fn run_stages(
                     }
                     hashes.save_now_and_then();
                 }
-                drop(at_units);
-                crew.help();
+                drop(busy);
+                pool.help();
             });
         }
     });
@@ -120,11 +120,8 @@ pub fn run_stages(
     answers.map(whole).collect()
 }
 
-/// Does share `idx` of `of` of the unit's parts, those that are not done; nothing where the stage has no parts or the unit
-/// is fresh.
-///
-/// # Errors
-/// An input that cannot be read; the first part that fails.
+/// Does share `idx` of `of` of the unit's parts, those that are not done; nothing where the stage has no parts or the
+/// unit is fresh. Errors: an input that cannot be read; the first part that fails.
 pub fn run_parts(
     stage: &dyn Stage,
     unit: &Unit,
@@ -171,7 +168,7 @@ fn run_unit<'a>(
     stage: &'a dyn Stage,
     unit: &'a Unit,
     (work, hashes, force): (&Path, &HashCache, bool),
-    crew: &Crew<'a>,
+    pool: &WorkerPool<'a>,
     overall: &'a OverallProgress<'a>,
 ) -> StageOutcome {
     let folder = unit.dir(&work.join(stage.name()));
@@ -203,7 +200,7 @@ fn run_unit<'a>(
             return attempt(&folder, stage.common_folder(), &fingerprint, |out| stage.run(unit, out, &progress));
         }
         let (fingerprint, folder) = (fingerprint.clone(), folder.clone());
-        let parts = crew.work(PartedWork {
+        let parts = pool.work(PartedWork {
             stage,
             unit,
             n_parts,

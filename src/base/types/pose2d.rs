@@ -51,7 +51,7 @@ pub struct PersonBox {
 }
 
 /// Person and keypoints of one frame. A hand or body not found is all zeros.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Pose2d {
     /// The followed person.
     pub person: PersonBox,
@@ -93,21 +93,6 @@ impl Pose2d {
             (self.person.x, self.person.y) = (self.person.x + x, self.person.y + y);
         }
         self
-    }
-}
-
-impl Default for Pose2d {
-    fn default() -> Self {
-        Self {
-            person: PersonBox::default(),
-            n_people: 0,
-            identity: 0,
-            body: [Keypoint::default(); N_BODY],
-            left_hand: [Keypoint::default(); N_HAND],
-            right_hand: [Keypoint::default(); N_HAND],
-            other_hand: [false; 2],
-            face: None,
-        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Statistics over the rows of a matrix whose columns are channels, and batch norm with the leaky ReLU behind it on
 //! such rows: plain memory in, plain memory out. Sums run over blocks of fixed size in one order.
 
-use super::tensor::{GRAIN, LANES, OutputStart, Scalar, written};
+use super::tensor::{GRAIN, LANES, Scalar, SharedOutputPtr, written};
 use super::thread_team::{parallel_for, parallel_map};
 use super::vectorised::vectorised;
 use rayon::prelude::*;
@@ -28,7 +28,7 @@ impl ChannelMoments {
             block_sums(block, &mut mean);
             mean.iter_mut().for_each(|sum| *sum = T::from_f64(sum.to_f64() / n));
             block_squares(block, &mean, &mut squares);
-            let f64s = |values: Vec<T>| values.into_iter().map(|v| v.to_f64()).collect();
+            let f64s = |values: Vec<T>| values.into_iter().map(T::to_f64).collect();
             all = all.and(&Self { n, mean: f64s(mean), squares: f64s(squares) });
         }
         all
@@ -159,7 +159,7 @@ impl<T: Scalar> Norm<T> {
 
     /// `apply` on all threads.
     pub fn apply_parallel(&self, z: &mut [T]) {
-        let (n, start, chunk) = (z.len(), OutputStart::new(z), self.chunk());
+        let (n, start, chunk) = (z.len(), SharedOutputPtr::new(z), self.chunk());
         // SAFETY: every piece is a part of `z` of its own.
         parallel_for(n.div_ceil(chunk), |i| unsafe {
             self.apply(std::slice::from_raw_parts_mut(start.at(i * chunk), chunk.min(n - i * chunk)));
@@ -171,7 +171,7 @@ impl<T: Scalar> Norm<T> {
         let chunk = self.chunk();
         // SAFETY: every chunk writes as many numbers of the result as it reads, at the same place.
         unsafe {
-            written(z.len(), |y: OutputStart<T>| {
+            written(z.len(), |y: SharedOutputPtr<T>| {
                 parallel_for(z.len().div_ceil(chunk), |i| {
                     let z = &z[i * chunk..z.len().min((i + 1) * chunk)];
                     let y = std::slice::from_raw_parts_mut(y.at(i * chunk), z.len());
@@ -252,7 +252,7 @@ impl<T: Scalar> Norm<T> {
             wide: (0..n_wide).map(|i| NormGradient::new(|lane| channels(i * LANES + lane))).collect(),
             rest: (n_wide * LANES..n).map(|i| NormGradient::new(|_| channels(i))).collect(),
         };
-        let (n_all, start) = (z.len(), OutputStart::new(z));
+        let (n_all, start) = (z.len(), SharedOutputPtr::new(z));
         parallel_for(n_all.div_ceil(chunk), |task| {
             let part = task * chunk..n_all.min((task + 1) * chunk);
             // SAFETY: every task's part of `z` is its own.

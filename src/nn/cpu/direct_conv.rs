@@ -7,7 +7,7 @@
 use super::axis::{AxisWindows, ConvAxis};
 use super::kernel::{MOST_ROWS, TileSteps};
 use super::packed_weights::{PackedWeights, StepBlock, WeightOrder};
-use super::tensor::{OutputStart, Scalar, scratch, written};
+use super::tensor::{Scalar, SharedOutputPtr, scratch, written};
 use super::thread_team::parallel_for;
 use std::ops::Range;
 
@@ -60,7 +60,7 @@ pub fn forward<T: Scalar>(
     let per_row = s.axes[1].n_out * s.n_out;
     // SAFETY: the pieces together write every row of every output, each its own.
     unsafe {
-        written(s.len_out(), |to: OutputStart<T>| {
+        written(s.len_out(), |to: SharedOutputPtr<T>| {
             let pieces = pass.pieces();
             parallel_for(pieces.len(), |number| {
                 let (b, rows) = pieces[number].clone();
@@ -94,7 +94,7 @@ pub fn gradient_of_input<T: Scalar>(s: &ConvSizes, weight: &[T], grad: &[T]) -> 
     let zeros = vec![T::zero(); s.n_in];
     // SAFETY: the pieces of the phases together write every place, each its own.
     unsafe {
-        written(s.len_in(), |to: OutputStart<T>| {
+        written(s.len_in(), |to: SharedOutputPtr<T>| {
             for rows in s.axes[0].backward() {
                 for columns in s.axes[1].backward() {
                     let pass = ConvPass {
@@ -159,7 +159,7 @@ impl ConvPass {
         from: &[T],
         panels: &PackedWeights<T>,
         begin: &[T],
-        to: OutputStart<T>,
+        to: SharedOutputPtr<T>,
         b: usize,
         piece: Range<usize>,
     ) {

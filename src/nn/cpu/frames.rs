@@ -1,7 +1,7 @@
 //! Plain memory of sequences: frames as mixtures of two frames each (interpolation over time) with their gradient, and
 //! the change between channels first and channels last. Every number is made by one thread in one order.
 
-use super::tensor::{OutputStart, Scalar, written};
+use super::tensor::{Scalar, SharedOutputPtr, written};
 use super::thread_team::parallel_for;
 
 /// Side of the square blocks of a transposition, which stay in the cache.
@@ -29,7 +29,7 @@ impl FrameMixture {
         assert!(self.of.iter().all(|(a, b, _)| *a.max(b) < self.n_in));
         // SAFETY: every sample writes its own frames, all of them.
         unsafe {
-            written(batch * of_y, |start: OutputStart<T>| {
+            written(batch * of_y, |start: SharedOutputPtr<T>| {
                 parallel_for(batch, |sample| {
                     let x = &x[sample * of_x..][..of_x];
                     for (i, (a, b, share)) in self.of.iter().enumerate() {
@@ -53,7 +53,7 @@ impl FrameMixture {
         let batch = grad.len() / of_y;
         // SAFETY: every sample writes its own frames, all of them first with zeros.
         unsafe {
-            written(batch * of_x, |start: OutputStart<T>| {
+            written(batch * of_x, |start: SharedOutputPtr<T>| {
                 parallel_for(batch, |sample| {
                     let to = start.at(sample * of_x);
                     (0..of_x).for_each(|i| to.add(i).write(T::zero()));
@@ -79,7 +79,7 @@ pub fn transpose<T: Scalar>(x: &[T], rows: usize, columns: usize) -> Vec<T> {
     assert!(batch * n == x.len());
     // SAFETY: every task writes its own columns of its own sample, all of them.
     unsafe {
-        written(x.len(), |start: OutputStart<T>| {
+        written(x.len(), |start: SharedOutputPtr<T>| {
             parallel_for(batch * blocks, |task| {
                 let (sample, first) = (task / blocks * n, task % blocks * BLOCK);
                 for row in (0..rows).step_by(BLOCK) {

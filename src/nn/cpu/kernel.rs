@@ -174,33 +174,26 @@ mod x86 {
     );
 }
 
-/// For f32.
-pub fn of_f32() -> TileKernel<f32> {
-    #[cfg(target_arch = "x86_64")]
-    {
-        if std::arch::is_x86_feature_detected!("avx512f") {
-            return TileKernel { lanes: 16, most_vectors: 4, run: x86::wide_f32 };
+/// A function that chooses the kernel of this processor for a type of number: the kernels with their lanes.
+macro_rules! choose_kernel {
+    ($choose:ident, $number:ty, $wide:ident: $wide_lanes:literal, $half:ident: $half_lanes:literal, $any:ident) => {
+        pub fn $choose() -> TileKernel<$number> {
+            #[cfg(target_arch = "x86_64")]
+            {
+                if std::arch::is_x86_feature_detected!("avx512f") {
+                    return TileKernel { lanes: $wide_lanes, most_vectors: 4, run: x86::$wide };
+                }
+                if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
+                    return TileKernel { lanes: $half_lanes, most_vectors: 2, run: x86::$half };
+                }
+            }
+            TileKernel { lanes: 4, most_vectors: 2, run: $any }
         }
-        if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
-            return TileKernel { lanes: 8, most_vectors: 2, run: x86::half_f32 };
-        }
-    }
-    TileKernel { lanes: 4, most_vectors: 2, run: any_f32 }
+    };
 }
 
-/// For f64.
-pub fn of_f64() -> TileKernel<f64> {
-    #[cfg(target_arch = "x86_64")]
-    {
-        if std::arch::is_x86_feature_detected!("avx512f") {
-            return TileKernel { lanes: 8, most_vectors: 4, run: x86::wide_f64 };
-        }
-        if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
-            return TileKernel { lanes: 4, most_vectors: 2, run: x86::half_f64 };
-        }
-    }
-    TileKernel { lanes: 4, most_vectors: 2, run: any_f64 }
-}
+choose_kernel!(of_f32, f32, wide_f32: 16, half_f32: 8, any_f32);
+choose_kernel!(of_f64, f64, wide_f64: 8, half_f64: 4, any_f64);
 
 /// Columns cut into panels as wide as tiles: (first column, vectors), widest first; the last may reach beyond.
 pub fn panels<T>(kernel: &TileKernel<T>, n_columns: usize) -> Vec<(usize, usize)> {

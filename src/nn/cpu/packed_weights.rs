@@ -2,7 +2,7 @@
 //! padded copy.
 
 use super::kernel::{MOST_ROWS, TileJob, TileSteps, panels};
-use super::tensor::{LANES, OutputStart, Scalar, aligned, written};
+use super::tensor::{LANES, Scalar, SharedOutputPtr, aligned, written};
 use super::thread_team::parallel_for;
 use std::ops::Range;
 
@@ -55,7 +55,7 @@ impl<T: Scalar> PackedWeights<T> {
         // What lies side by side in memory is fetched at once: channels of a column, or columns of a channel.
         let of_columns = per_column < per_channel;
         let (per_line, per_place) = if of_columns { (*per_channel, *per_column) } else { (*per_column, *per_channel) };
-        let pack = |data: OutputStart<T>, panel: &WeightPanel, channels: Range<usize>| {
+        let pack = |data: SharedOutputPtr<T>, panel: &WeightPanel, channels: Range<usize>| {
             let mut lines = Vec::new();
             for first in channels.clone().step_by(n_at_once) {
                 let some = first..channels.end.min(first + n_at_once);
@@ -97,7 +97,7 @@ impl<T: Scalar> PackedWeights<T> {
         let mut first = 0;
         // SAFETY: the tasks together write every row of every panel, this thread what lies before and behind them.
         let data = unsafe {
-            written(n_numbers + LANES, |data: OutputStart<T>| {
+            written(n_numbers + LANES, |data: SharedOutputPtr<T>| {
                 first = aligned(data.at(0));
                 (0..first).chain(first + n_numbers..n_numbers + LANES).for_each(|i| data.at(i).write(T::zero()));
                 let data = data.from(first);
@@ -120,7 +120,7 @@ impl WeightPanel {
         right: &[T],
         left: &[T],
         places: &[(usize, usize)],
-        to: OutputStart<T>,
+        to: SharedOutputPtr<T>,
         begin: Option<&[T]>,
         block: &StepBlock,
     ) {

@@ -2,9 +2,9 @@
 //! and the one matrix product. Everything here gives the same bits for any number of threads: work is cut into
 //! pieces of a fixed size and each number is summed by one thread in one order.
 
-use super::exponential;
 use super::kernel;
 use super::kernel::TileKernel;
+use super::vectorised::exp_f32;
 use candle_core::{CpuStorage, DType, Layout, Result, Storage, Tensor, WithDType};
 use rayon::prelude::*;
 use std::cell::RefCell;
@@ -45,7 +45,7 @@ macro_rules! real {
         }
     };
 }
-real!(f32, kernel::of_f32, exponential::exp_f32);
+real!(f32, kernel::of_f32, exp_f32);
 real!(f64, kernel::of_f64, f64::exp);
 
 /// The numbers of a contiguous tensor inside an operator. Errors when it is not contiguous (callers see to it).
@@ -84,7 +84,7 @@ pub fn aligned<T>(start: *const T) -> usize {
 /// Lends a buffer of `len` numbers whose contents are arbitrary, from the start of a line of the cache on; the memory is kept
 /// for the next caller.
 pub fn scratch<T: Scalar, R>(len: usize, f: impl FnOnce(&mut [T]) -> R) -> R {
-    let mut buffer = T::pool().with_borrow_mut(|pool| pool.pop()).unwrap_or_default();
+    let mut buffer = T::pool().with_borrow_mut(Vec::pop).unwrap_or_default();
     if buffer.len() < len + LANES {
         buffer.resize(len + LANES, T::zero());
     }
@@ -112,6 +112,16 @@ impl<'a, T> Matrix<'a, T> {
     pub fn transposed(self) -> Self {
         Self { data: self.data, row_stride: self.column_stride, column_stride: self.row_stride }
     }
+
+    /// The part from this row and column on.
+    fn at(self, row: usize, column: usize) -> Self {
+        Self { data: &self.data[row * self.row_stride + column * self.column_stride..], ..self }
+    }
+
+    /// Whether so many rows and columns, at least one of each, lie inside `data`.
+    fn holds(&self, rows: usize, columns: usize) -> bool {
+        (rows - 1) * self.row_stride + (columns - 1) * self.column_stride < self.data.len()
+    }
 }
 
 /// `product = left x right`, [m, depth] x [depth, n], row-major; `product` is overwritten.
@@ -119,44 +129,17 @@ pub fn matmul<T: Scalar>(product: &mut [T], left: Matrix<T>, right: Matrix<T>, m
     if m == 0 || n == 0 {
         return;
     }
-    let last_index = |matrix: Matrix<T>, rows: usize, columns: usize| {
-        (rows - 1) * matrix.row_stride + (columns - 1) * matrix.column_stride
-    };
-    assert!(product.len() == m * n && depth > 0, "product of {m} x {n} over {depth}");
-    assert!(last_index(left, m, depth) < left.data.len() && last_index(right, depth, n) < right.data.len());
-    let strides = |matrix: Matrix<T>| (matrix.row_stride as isize, matrix.column_stride as isize);
-    let (left_strides, right_strides) = (strides(left), strides(right));
+    let fits = product.len() == m * n && depth > 0 && left.holds(m, depth) && right.holds(depth, n);
+    assert!(fits, "product of {m} x {n} over {depth}");
     let (tiles_down, tiles_across) = (m.div_ceil(TILE.0), n.div_ceil(TILE.1));
-    let start = OutputStart(product.as_mut_ptr());
+    let start = SharedOutputPtr::new(product);
     (0..tiles_down * tiles_across).into_par_iter().for_each(|tile| {
         let (row, column) = (tile / tiles_across * TILE.0, tile % tiles_across * TILE.1);
-        let left = &left.data[row * left.row_stride..];
-        let right = &right.data[column * right.column_stride..];
-        // SAFETY: the asserts above bound every address gemm reads; it writes rows `row..` and columns `column..` of
-        // `product`, row-major, and no other task writes these.
+        let sizes = [TILE.0.min(m - row), TILE.1.min(n - column), depth];
+        // SAFETY: the assert bounds the factors; each tile writes its own rows and columns of `product`, row-major.
         unsafe {
-            gemm::gemm(
-                TILE.0.min(m - row),
-                TILE.1.min(n - column),
-                depth,
-                start.at(row * n + column),
-                1,
-                n as isize,
-                false,
-                left.as_ptr(),
-                left_strides.1,
-                left_strides.0,
-                right.as_ptr(),
-                right_strides.1,
-                right_strides.0,
-                T::zero(),
-                T::one(),
-                false,
-                false,
-                false,
-                gemm::Parallelism::None,
-            );
-        }
+            gemm_on_this_thread(start.at(row * n + column), n, false, left.at(row, 0), right.at(0, column), sizes)
+        };
     });
 }
 
@@ -165,33 +148,51 @@ pub fn add_product<T: Scalar>(sum: &mut [T], left: Matrix<T>, right: Matrix<T>, 
     if m == 0 || n == 0 || depth == 0 {
         return;
     }
-    let last_index = |matrix: Matrix<T>, rows: usize, columns: usize| {
-        (rows - 1) * matrix.row_stride + (columns - 1) * matrix.column_stride
-    };
-    assert!(sum.len() == m * n, "product of {m} x {n} over {depth}");
-    assert!(last_index(left, m, depth) < left.data.len() && last_index(right, depth, n) < right.data.len());
-    // SAFETY: the asserts bound every address gemm reads and writes.
+    let fits = sum.len() == m * n && left.holds(m, depth) && right.holds(depth, n);
+    assert!(fits, "product of {m} x {n} over {depth}");
+    // SAFETY: the assert bounds the factors and the sum.
+    unsafe { gemm_on_this_thread(sum.as_mut_ptr(), n, true, left, right, [m, n, depth]) };
+}
+
+/// `left x right`, [m, depth] x [depth, n], into rows at `to` that are `stride` apart: added to what is there, or
+/// overwriting it.
+///
+/// # Safety
+/// The factors hold so many rows and columns, `to` as many rows, which no other thread reads or writes.
+unsafe fn gemm_on_this_thread<T: Scalar>(
+    to: *mut T,
+    stride: usize,
+    adds: bool,
+    left: Matrix<T>,
+    right: Matrix<T>,
+    [m, n, depth]: [usize; 3],
+) {
+    let strides = |matrix: Matrix<T>| (matrix.column_stride as isize, matrix.row_stride as isize);
+    let ((left_column, left_row), (right_column, right_row)) = (strides(left), strides(right));
+    let (left, right) = (left.data.as_ptr(), right.data.as_ptr());
+    let (of_sum, one, alone) = (if adds { T::one() } else { T::zero() }, T::one(), gemm::Parallelism::None);
+    // SAFETY: the caller's.
     unsafe {
         gemm::gemm(
             m,
             n,
             depth,
-            sum.as_mut_ptr(),
+            to,
             1,
-            n as isize,
-            true,
-            left.data.as_ptr(),
-            left.column_stride as isize,
-            left.row_stride as isize,
-            right.data.as_ptr(),
-            right.column_stride as isize,
-            right.row_stride as isize,
-            T::one(),
-            T::one(),
+            stride as isize,
+            adds,
+            left,
+            left_column,
+            left_row,
+            right,
+            right_column,
+            right_row,
+            of_sum,
+            one,
             false,
             false,
             false,
-            gemm::Parallelism::None,
+            alone,
         );
     }
 }
@@ -200,9 +201,9 @@ pub fn add_product<T: Scalar>(sum: &mut [T], left: Matrix<T>, right: Matrix<T>, 
 ///
 /// # Safety
 /// `write` writes every one of the `len` numbers, and reads none that it has not written.
-pub unsafe fn written<T: Scalar>(len: usize, write: impl FnOnce(OutputStart<T>)) -> Vec<T> {
+pub unsafe fn written<T: Scalar>(len: usize, write: impl FnOnce(SharedOutputPtr<T>)) -> Vec<T> {
     let mut values = Vec::with_capacity(len);
-    write(OutputStart(values.as_mut_ptr()));
+    write(SharedOutputPtr(values.as_mut_ptr()));
     // SAFETY: all are written, as the caller promises.
     unsafe { values.set_len(len) };
     values
@@ -210,13 +211,14 @@ pub unsafe fn written<T: Scalar>(len: usize, write: impl FnOnce(OutputStart<T>))
 
 /// Where a result begins: tasks write disjoint parts of it.
 #[derive(Clone, Copy)]
-pub struct OutputStart<T>(*mut T);
+pub struct SharedOutputPtr<T>(*mut T);
 
-// SAFETY: only the address is shared; who writes where is the affair of those who call `at`.
-unsafe impl<T: Send> Send for OutputStart<T> {}
-unsafe impl<T: Send> Sync for OutputStart<T> {}
+// SAFETY: callers of `at` write disjoint ranges and do not outlive the slice.
+unsafe impl<T: Send> Send for SharedOutputPtr<T> {}
+// SAFETY: as above.
+unsafe impl<T: Send> Sync for SharedOutputPtr<T> {}
 
-impl<T> OutputStart<T> {
+impl<T> SharedOutputPtr<T> {
     /// Start of `values`, which nobody else uses meanwhile.
     pub fn new(values: &mut [T]) -> Self {
         Self(values.as_mut_ptr())
@@ -234,6 +236,7 @@ impl<T> OutputStart<T> {
     /// # Safety
     /// `offset` lies inside the result.
     pub unsafe fn at(self, offset: usize) -> *mut T {
+        // SAFETY: the caller's.
         unsafe { self.0.add(offset) }
     }
 }

@@ -3,7 +3,7 @@
 
 use super::direct_conv::ConvSizes;
 use super::kernel::{MOST_ROWS, TileJob, TileSteps, panels};
-use super::tensor::{OutputStart, Scalar, scratch, written};
+use super::tensor::{Scalar, SharedOutputPtr, scratch, written};
 use super::thread_team::{parallel_for, parallel_map};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -39,7 +39,7 @@ pub fn gradient_of_weight<T: Scalar>(s: &ConvSizes, x: &[T], grad: &[T]) -> Vec<
         let (panel, kernel_offset, of_chunk) = tasks[task];
         sum_products(s, x, grad, n_columns, panels[panel], kernel_offset, chunk(of_chunk))
     });
-    let spread = |gradient: OutputStart<T>, (panel, of_chunk): (usize, usize)| {
+    let spread = |gradient: SharedOutputPtr<T>, (panel, of_chunk): (usize, usize)| {
         let ((first, n_vectors), channels) = (panels[panel], chunk(of_chunk));
         let width = n_vectors * kernel.lanes;
         let of_row = tasks.iter().zip(&sums).filter(|((p, _, c), _)| (*p, *c) == (panel, of_chunk));
@@ -64,7 +64,7 @@ pub fn gradient_of_weight<T: Scalar>(s: &ConvSizes, x: &[T], grad: &[T]) -> Vec<
         (0..panels.len()).flat_map(|panel| (0..n_chunks).map(move |chunk| (panel, chunk))).collect();
     // SAFETY: the parts together write every number.
     unsafe {
-        written(s.len_weight(), |gradient: OutputStart<T>| {
+        written(s.len_weight(), |gradient: SharedOutputPtr<T>| {
             parallel_for(parts.len(), |part| spread(gradient, parts[part]));
         })
     }

@@ -27,13 +27,9 @@ impl ConvBlock {
     /// Weight of this `shape` [C', C, K] (over time) or [C', C, K, K'] (over time and frequency); `momentum`: weight of a
     /// new batch in the running statistics.
     pub fn new(params: &mut Params, name: &str, shape: &[usize], stride: usize, momentum: f64) -> Result<Self> {
-        Ok(Self {
-            weight: params.trainable(&format!("{name}.conv.weight"), shape, Init::Glorot)?,
-            bias: params.trainable(&format!("{name}.conv.bias"), &shape[..1], Init::Constant(0.0))?,
-            norm: BatchNorm::new(params, &format!("{name}.norm"), shape[0], EPS, momentum, SLOPE)?,
-            stride,
-            across: false,
-        })
+        let (weight, bias) = params.layer(&format!("{name}.conv"), shape, Init::Glorot, Init::Constant(0.0))?;
+        let norm = BatchNorm::new(params, &format!("{name}.norm"), shape[0], EPS, momentum, SLOPE)?;
+        Ok(Self { weight, bias, norm, stride, across: false })
     }
 
     /// Weight of this `shape` [C', C, K, F] without padding, stride 1, over all F frequencies of its input.

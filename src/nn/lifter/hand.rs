@@ -3,9 +3,9 @@
 
 use crate::Mode;
 use crate::ops::dropout::dropout;
-use crate::ops::linear::Linear;
-use crate::params::Params;
+use crate::params::{Init, Params};
 use candle_core::{Device, Module, Result, Tensor};
+use candle_nn::Linear;
 use orator_base::motion::view::hand::{HandJoints, HandView, SeenHand};
 use orator_base::types::skeleton::Side;
 use serde::{Deserialize, Serialize};
@@ -40,12 +40,9 @@ pub struct HandLifter {
 impl HandLifter {
     /// Makes the network's tensors under `<name>.`.
     pub fn new(params: &mut Params, name: &str, config: &Config) -> Result<Self> {
-        let hidden = config.hidden;
-        let layers = [
-            Linear::new(params, &format!("{name}.0"), config.n_in, hidden)?,
-            Linear::new(params, &format!("{name}.1"), hidden, hidden)?,
-            Linear::new(params, &format!("{name}.2"), hidden, config.n_out)?,
-        ];
+        let Config { n_in, n_out, hidden, .. } = *config;
+        let mut layer = |i: usize, n: [usize; 2]| params.linear(&format!("{name}.{i}"), n, Init::He, 0.0);
+        let layers = [layer(0, [n_in, hidden])?, layer(1, [hidden, hidden])?, layer(2, [hidden, n_out])?];
         Ok(Self { config: config.clone(), layers })
     }
 

@@ -1,7 +1,5 @@
-//! The networks that lift 2D to 3D: the temporal convolutions, the body lifter and the hand lifter on them, and the
-//! lifter of hand heat-maps.
+//! The networks that lift 2D to 3D: the temporal convolutions with the body lifter on them, and the hand lifter.
 
 pub mod body;
 pub mod hand;
-pub mod heatmap;
 pub mod temporal;

@@ -1,7 +1,7 @@
 //! A fully connected layer over the last axis, bias and ReLU included, as one operator: many rows by few columns, each
 //! piece of rows by one thread, results independent of the number of threads.
 
-use super::operator::{CpuOperator, CustomOperator, Operand};
+use super::operator::{CpuOperator, CustomOperator, Gradients, Operand};
 use crate::cpu::packed_matrix::PackedMatrix;
 use crate::cpu::tensor::{Matrix, Scalar, add_product};
 use crate::cpu::thread_team::parallel_each;
@@ -24,11 +24,8 @@ pub struct Affine {
 impl Affine {
     pub fn new(params: &mut Params, name: &str, n_in: usize, n_out: usize) -> Result<Self> {
         let init = Init::Uniform(1.0 / (n_in as f64).sqrt());
-        Ok(Self {
-            weight: params.trainable(&format!("{name}.weight"), &[n_out, n_in], init)?,
-            bias: params.trainable(&format!("{name}.bias"), &[n_out], init)?,
-            relu: false,
-        })
+        let (weight, bias) = params.layer(name, &[n_out, n_in], init, init)?;
+        Ok(Self { weight, bias, relu: false })
     }
 
     /// Adds a ReLU to the result.
@@ -115,17 +112,12 @@ impl CpuOperator for AffineOp {
         Ok((y, Shape::from((n, n_out))))
     }
 
-    fn backward<T: Scalar>(
-        &self,
-        [x, weight, bias]: [Operand<T>; 3],
-        y: &[T],
-        grad: &[T],
-    ) -> Result<[Option<Vec<T>>; 3]> {
+    fn backward<T: Scalar>(&self, [x, weight, bias]: [Operand<T>; 3], y: &[T], grad: &[T]) -> Gradients<T> {
         let (n, n_in, n_out) = sizes(x.dims, weight.dims, bias.values.len())?;
         let packed = PackedMatrix::new(n_out, n_in, |k, c| weight.values[k * n_in + c]);
         let (piece, zero) = (piece(n), T::zero());
         let mut of_x = vec![zero; if x.tracked { n * n_in } else { 0 }];
-        let mut none: Vec<&mut [T]> = (0..n.div_ceil(piece)).map(|_| Default::default()).collect();
+        let mut none: Vec<&mut [T]> = (0..n.div_ceil(piece)).map(|_| <&mut [T]>::default()).collect();
         if x.tracked {
             none = of_x.chunks_mut(piece * n_in).collect();
         }
@@ -167,7 +159,6 @@ impl CpuOperator for AffineOp {
 mod tests {
     use super::*;
     use crate::ops::gradcheck::{any_threads_give_the_same, apart, pattern, worst};
-    use candle_core::{DType, Var};
 
     #[test]
     fn it_is_the_composed_layer_and_gradients_are_right() -> Result<()> {
@@ -187,10 +178,7 @@ mod tests {
 
     #[test]
     fn any_number_of_threads_gives_the_same_bits() -> Result<()> {
-        let f32s = |shape: &[usize], phase| pattern(shape, phase)?.to_dtype(DType::F32);
-        let (x, bias) = (f32s(&[1500, 26], 0.0)?, f32s(&[50], 5.0)?);
-        let weight = Var::from_tensor(&f32s(&[50, 26], 1.0)?)?;
-        any_threads_give_the_same(&weight, || affine(&x, &weight, &bias, true))
+        any_threads_give_the_same(&[&[1500, 26], &[50, 26], &[50]], 1, |v| affine(&v[0], &v[1], &v[2], true))
     }
 
     #[test]

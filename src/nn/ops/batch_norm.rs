@@ -3,7 +3,7 @@
 //! evaluation uses the running ones.
 
 use super::fallback;
-use super::operator::{CpuOperator, CustomOperator, Operand};
+use super::operator::{CpuOperator, CustomOperator, Gradients, Operand};
 use crate::cpu::tensor::{GRAIN, LANES, Scalar, sum};
 use crate::cpu::vectorised::{DropMask, drop_out};
 use crate::params::{Init, Params};
@@ -34,15 +34,10 @@ impl BatchNorm {
     /// `momentum`: weight of a new batch in the running statistics (PyTorch's convention: TensorFlow's 0.99 is 0.01
     /// here). `slope`: what negative results are multiplied with afterwards; 1 for no activation, 0 for ReLU.
     pub fn new(params: &mut Params, name: &str, n: usize, eps: f64, momentum: f64, slope: f64) -> Result<Self> {
-        Ok(Self {
-            weight: params.trainable(&format!("{name}.weight"), &[n], Init::Constant(1.0))?,
-            bias: params.trainable(&format!("{name}.bias"), &[n], Init::Constant(0.0))?,
-            running_mean: params.buffer(&format!("{name}.running_mean"), &[n], 0.0)?,
-            running_var: params.buffer(&format!("{name}.running_var"), &[n], 1.0)?,
-            eps,
-            momentum,
-            slope,
-        })
+        let (weight, bias) = params.layer(name, &[n], Init::Constant(1.0), Init::Constant(0.0))?;
+        let running_mean = params.buffer(&format!("{name}.running_mean"), &[n], 0.0)?;
+        let running_var = params.buffer(&format!("{name}.running_var"), &[n], 1.0)?;
+        Ok(Self { weight, bias, running_mean, running_var, eps, momentum, slope })
     }
 
     /// Changes the weight of a new batch in the running statistics.
@@ -74,9 +69,10 @@ impl BatchNorm {
 
     /// [`Self::forward`] with the framework's operators, on any device.
     pub fn forward_fallback(&self, x: &Tensor, train: bool) -> Result<Tensor> {
-        let (mean, variance) = match train {
-            true => fallback::statistics(x)?,
-            false => (self.running_mean.as_detached_tensor(), self.running_var.as_detached_tensor()),
+        let (mean, variance) = if train {
+            fallback::statistics(x)?
+        } else {
+            (self.running_mean.as_detached_tensor(), self.running_var.as_detached_tensor())
         };
         let y = fallback::normalise(x, (&mean, &variance), &self.weight, &self.bias, self.eps, self.slope)?;
         if train {
@@ -211,7 +207,7 @@ impl CpuOperator for BatchNormOp {
         Ok((y, Shape::from(x.dims)))
     }
 
-    fn backward<T: Scalar>(&self, [x, weight, _]: [Operand<T>; 3], y: &[T], grad: &[T]) -> Result<[Option<Vec<T>>; 3]> {
+    fn backward<T: Scalar>(&self, [x, weight, _]: [Operand<T>; 3], y: &[T], grad: &[T]) -> Gradients<T> {
         let s = sizes(x.dims, weight.values.len())?;
         let x = x.values;
         let statistics = self.statistics.get_or_init(|| measure(x, s));
@@ -280,10 +276,8 @@ mod tests {
             };
             let by_fallback = |v: &[Tensor]| {
                 let of_fixed = |values: &[f64]| Tensor::new(values, &Device::Cpu);
-                let (mean, variance) = match train {
-                    true => fallback::statistics(&v[0])?,
-                    false => (of_fixed(&fixed.mean)?, of_fixed(&fixed.variance)?),
-                };
+                let known = || -> Result<_> { Ok((of_fixed(&fixed.mean)?, of_fixed(&fixed.variance)?)) };
+                let (mean, variance) = if train { fallback::statistics(&v[0])? } else { known()? };
                 fallback::normalise(&v[0], (&mean, &variance), &v[1], &v[2], 1e-3, slope)
             };
             let (off, error) = (apart(&inputs, own, by_fallback)?, worst(&inputs, own)?);

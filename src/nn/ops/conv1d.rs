@@ -2,7 +2,7 @@
 //! wrong for every batch larger than one). All frames of the whole batch become the columns of one matrix, so that a pass
 //! is one matrix product; sums run in a fixed order, so results do not depend on the number of threads.
 
-use super::operator::{CpuOperator, CustomOperator, Operand};
+use super::operator::{CpuOperator, CustomOperator, Gradients, Operand};
 use crate::cpu::axis::ConvAxis;
 use crate::cpu::tensor::{GRAIN, Matrix, Scalar, matmul, scratch, sum};
 use crate::params::{Init, Params};
@@ -21,8 +21,7 @@ pub struct Conv1d {
 impl Conv1d {
     /// `n_in` channels to `n_out`, as many frames as come in, with bias.
     pub fn new(params: &mut Params, name: &str, n_in: usize, n_out: usize, kernel: usize) -> Result<Self> {
-        let weight = params.trainable(&format!("{name}.weight"), &[n_out, n_in, kernel], Init::Glorot)?;
-        let bias = params.trainable(&format!("{name}.bias"), &[n_out], Init::Constant(0.0))?;
+        let (weight, bias) = params.layer(name, &[n_out, n_in, kernel], Init::Glorot, Init::Constant(0.0))?;
         Ok(Self { weight, bias, stride: None })
     }
 
@@ -33,7 +32,7 @@ impl Conv1d {
         Ok(Self { weight, bias, stride: Some(stride) })
     }
 
-    /// [`Self::valid`] with a bias, both uniform in +-1 / sqrt(fan in) as PyTorch's begin.
+    /// [`Self::valid`] with a bias, both initialised uniformly in +-1 / sqrt(fan in), as in PyTorch.
     pub fn valid_with_bias(
         params: &mut Params,
         name: &str,
@@ -42,8 +41,7 @@ impl Conv1d {
         stride: usize,
     ) -> Result<Self> {
         let init = Init::Uniform(1.0 / ((n[0] * kernel) as f64).sqrt());
-        let weight = params.trainable(&format!("{name}.weight"), &[n[1], n[0], kernel], init)?;
-        let bias = params.trainable(&format!("{name}.bias"), &[n[1]], init)?;
+        let (weight, bias) = params.layer(name, &[n[1], n[0], kernel], init, init)?;
         Ok(Self { weight, bias, stride: Some(stride) })
     }
 }
@@ -162,12 +160,7 @@ impl CpuOperator for Conv1dOp {
         Ok((y, Shape::from((s.batch, s.n_out, t_out))))
     }
 
-    fn backward<T: Scalar>(
-        &self,
-        [x, weight, bias]: [Operand<T>; 3],
-        _: &[T],
-        grad: &[T],
-    ) -> Result<[Option<Vec<T>>; 3]> {
+    fn backward<T: Scalar>(&self, [x, weight, bias]: [Operand<T>; 3], _: &[T], grad: &[T]) -> Gradients<T> {
         let s = &self.sizes(x.dims, weight.dims, bias.values.len())?;
         let t_out = self.axis.n_out;
         let zeros = |n| vec![T::zero(); n];
@@ -200,7 +193,6 @@ mod tests {
     use crate::cpu::direct_conv::ConvSizes;
     use crate::ops::conv2d;
     use crate::ops::gradcheck::{any_threads_give_the_same, apart, pattern, worst};
-    use candle_core::{DType, Var};
 
     #[test]
     fn it_is_the_convolution_with_channels_last_and_gradients_are_right() -> Result<()> {
@@ -231,10 +223,8 @@ mod tests {
 
     #[test]
     fn any_number_of_threads_gives_the_same_bits() -> Result<()> {
-        let f32s = |shape: &[usize], phase| pattern(shape, phase)?.to_dtype(DType::F32);
-        let (x, bias) = (f32s(&[5, 40, 61], 0.0)?, f32s(&[70], 5.0)?);
-        let weight = Var::from_tensor(&f32s(&[70, 40, 3], 1.0)?)?;
-        any_threads_give_the_same(&weight, || conv1d(&x, &weight, &bias, ConvAxis::same(61, 3, 1)))
+        let axis = ConvAxis::same(61, 3, 1);
+        any_threads_give_the_same(&[&[5, 40, 61], &[70, 40, 3], &[70]], 1, |v| conv1d(&v[0], &v[1], &v[2], axis))
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //! time and frequency. The sums are in `conv`; where a batch norm follows, `conv_norm` does both at once.
 
 use super::fallback;
-use super::operator::{CpuOperator, CustomOperator, Operand};
+use super::operator::{CpuOperator, CustomOperator, Gradients, Operand};
 use crate::cpu::axis::ConvAxis;
 use crate::cpu::channel_stats;
 use crate::cpu::direct_conv;
@@ -63,11 +63,8 @@ pub struct Conv {
 
 impl Conv {
     pub fn new(params: &mut Params, name: &str, shape: &[usize], stride: usize) -> Result<Self> {
-        Ok(Self {
-            weight: params.trainable(&format!("{name}.weight"), shape, Init::Glorot)?,
-            bias: params.trainable(&format!("{name}.bias"), &shape[..1], Init::Constant(0.0))?,
-            stride,
-        })
+        let (weight, bias) = params.layer(name, shape, Init::Glorot, Init::Constant(0.0))?;
+        Ok(Self { weight, bias, stride })
     }
 
     /// [B, T, C] to [B, T', O].
@@ -78,7 +75,7 @@ impl Conv {
 
 /// The convolution of these sizes, on any device.
 pub fn conv(x: &Tensor, weight: &Tensor, bias: &Tensor, sizes: ConvSizes) -> Result<Tensor> {
-    if crate::device::needs_fallback(x) {
+    if !x.device().is_cpu() {
         return fallback::conv(x, weight, bias, &sizes);
     }
     x.contiguous()?.apply_op3(weight, bias, CustomOperator(ConvOp { sizes }))
@@ -96,7 +93,7 @@ impl CpuOperator for ConvOp {
         Ok((y, shape_out(&self.sizes, x.dims.len())))
     }
 
-    fn backward<T: Scalar>(&self, [x, weight, _]: [Operand<T>; 3], _: &[T], grad: &[T]) -> Result<[Option<Vec<T>>; 3]> {
+    fn backward<T: Scalar>(&self, [x, weight, _]: [Operand<T>; 3], _: &[T], grad: &[T]) -> Gradients<T> {
         let [of_x, of_weight] = gradients(&self.sizes, &x, &weight, grad);
         let of_bias = channel_stats::sums(grad, self.sizes.n_out).into_iter().map(T::from_f64).collect();
         Ok([of_x, of_weight, Some(of_bias)])
@@ -107,7 +104,6 @@ impl CpuOperator for ConvOp {
 mod tests {
     use super::*;
     use crate::ops::gradcheck::{any_threads_give_the_same, apart, pattern, worst};
-    use candle_core::{DType, Var};
 
     /// Input, weight and bias of a batch of two.
     fn inputs(s: &ConvSizes) -> Result<[Tensor; 3]> {
@@ -158,11 +154,9 @@ mod tests {
 
     #[test]
     fn any_number_of_threads_gives_the_same_bits() -> Result<()> {
-        let f32s = |shape: &[usize], phase| pattern(shape, phase)?.to_dtype(DType::F32);
-        let (x, bias) = (f32s(&[3, 21, 10, 20], 0.0)?, f32s(&[70], 5.0)?);
-        let weight = Var::from_tensor(&f32s(&[70, 20, 4, 4], 1.0)?)?;
-        let s = same(&x, &weight, 2)?;
-        any_threads_give_the_same(&weight, || conv(&x, &weight, &bias, s))
+        any_threads_give_the_same(&[&[3, 21, 10, 20], &[70, 20, 4, 4], &[70]], 1, |v| {
+            conv(&v[0], &v[1], &v[2], same(&v[0], &v[1], 2)?)
+        })
     }
 
     #[test]

@@ -1,8 +1,19 @@
-//! Dropout with masks from a seeded generator (the framework's cannot be seeded on the CPU).
+//! Whether a network trains, and dropout with masks from a seeded generator (candle's cannot be seeded on the CPU).
 
-use crate::Mode;
 use candle_core::{Result, Tensor};
 use rand::Rng;
+
+/// Whether a forward pass trains (batch statistics, dropout masks drawn from the generator) or evaluates.
+pub enum Mode<'a> {
+    Train(&'a mut rand_chacha::ChaCha8Rng),
+    Eval,
+}
+
+impl Mode<'_> {
+    pub fn trains(&self) -> bool {
+        matches!(self, Mode::Train(_))
+    }
+}
 
 /// While training, zeroes each number with probability `p` and scales the others by 1 / (1 - p).
 pub fn dropout(x: &Tensor, p: f64, mode: &mut Mode) -> Result<Tensor> {

@@ -1,9 +1,9 @@
-//! The proof of a gradient: what backpropagation says against central differences in f64. Tests only; it is public
-//! so that the unit tests and the integration tests share it.
+//! Checks of operators for tests: gradients by backpropagation against central differences in f64, equality of two
+//! implementations, and equal bits for any number of threads. Public, so that the tests of other crates share it.
 
-use candle_core::{Device, Result, Tensor, Var};
+use candle_core::{DType, Device, Result, Tensor, Var};
 
-/// Numbers in -1..1 that look random and are the same everywhere.
+/// Pseudo-random numbers in -1..1, the same on every machine.
 pub fn pattern(shape: &[usize], phase: f64) -> Result<Tensor> {
     let n: usize = shape.iter().product();
     let values: Vec<f64> = (0..n).map(|i| ((i as f64 + phase) * 12.9898).sin() * 43758.5453 % 1.0).collect();
@@ -64,14 +64,23 @@ pub fn apart(
     Ok(worst)
 }
 
-/// Errors unless the result of `f` (f32) and the gradient of `weight` have the same bits for one and for three threads.
-pub fn any_threads_give_the_same(weight: &Var, f: impl Fn() -> Result<Tensor> + Sync) -> Result<()> {
+/// Errors unless the result of `f` on f32 inputs of these shapes and the gradient of input `which` have the same bits for
+/// one and for three threads.
+pub fn any_threads_give_the_same(
+    shapes: &[&[usize]],
+    which: usize,
+    f: impl Fn(&[Tensor]) -> Result<Tensor> + Sync,
+) -> Result<()> {
+    let f32s = |(i, shape): (usize, &&[usize])| pattern(shape, 11.0 * i as f64)?.to_dtype(DType::F32);
+    let mut inputs = shapes.iter().enumerate().map(f32s).collect::<Result<Vec<_>>>()?;
+    let weight = Var::from_tensor(&inputs[which])?;
+    inputs[which] = weight.as_tensor().clone();
     let run = |n_threads| -> Result<[Vec<f32>; 2]> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().map_err(candle_core::Error::wrap)?;
         pool.install(|| {
-            let y = f()?;
+            let y = f(&inputs)?;
             let gradients = y.sqr()?.sum_all()?.backward()?;
-            let Some(gradient) = gradients.get(weight) else { candle_core::bail!("no gradient") };
+            let Some(gradient) = gradients.get(&weight) else { candle_core::bail!("no gradient") };
             Ok([y.flatten_all()?.to_vec1()?, gradient.flatten_all()?.to_vec1()?])
         })
     };

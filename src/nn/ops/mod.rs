@@ -1,17 +1,15 @@
-//! Operators with forward and backward passes: convolutions, batch norm, linear, dropout, resize, recurrent layers; `operator` is how the
-//! framework runs them, `fallback` what runs on a device without the kernels of `nn::cpu`, `gradcheck` the finite
-//! differences that prove the gradients.
+//! Operators with forward and backward passes: convolutions, batch norm, linear layers, dropout, resizing, recurrent
+//! layers. `operator` connects them to candle, `fallback` replaces them on devices without the kernels of `nn::cpu`,
+//! `gradcheck` has the finite differences that check gradients.
 
 pub mod affine;
 pub mod batch_norm;
 pub mod conv1d;
 pub mod conv2d;
-pub mod conv3x3;
 pub mod conv_norm;
 pub mod dropout;
 pub mod fallback;
 pub mod gradcheck;
-pub mod linear;
 pub mod operator;
 pub mod recurrent;
 pub mod resize;

@@ -1,4 +1,4 @@
-//! Operators of this room as the framework runs them: forward and backward, written once for f32 and f64, on contiguous
+//! Own operators as custom operators of candle: forward and backward pass, written once for f32 and f64, on contiguous
 //! memory of the CPU.
 
 use crate::cpu::tensor::{Scalar, is_f64, read, slice};
@@ -9,9 +9,12 @@ use candle_core::{CpuStorage, CustomOp3, Layout, Result, Shape, Tensor};
 pub struct Operand<'a, T> {
     pub values: &'a [T],
     pub dims: &'a [usize],
-    /// Whether the gradient of this one is wanted.
+    /// Whether its gradient is wanted.
     pub tracked: bool,
 }
+
+/// Gradients of the three operands; `None`: not wanted.
+pub type Gradients<T> = Result<[Option<Vec<T>>; 3]>;
 
 /// An operator on three tensors.
 pub trait CpuOperator: Send + Sync {
@@ -20,8 +23,8 @@ pub trait CpuOperator: Send + Sync {
     /// The result and its shape. Errors when the shapes of the operands do not fit each other.
     fn forward<T: Scalar>(&self, operands: [Operand<T>; 3]) -> Result<(Vec<T>, Shape)>;
 
-    /// The gradients of the operands from `grad`, that of the result `y`; `None`: not wanted.
-    fn backward<T: Scalar>(&self, operands: [Operand<T>; 3], y: &[T], grad: &[T]) -> Result<[Option<Vec<T>>; 3]>;
+    /// The gradients of the operands from `grad`, that of the result `y`.
+    fn backward<T: Scalar>(&self, operands: [Operand<T>; 3], y: &[T], grad: &[T]) -> Gradients<T>;
 }
 
 /// An operator, for `Tensor::apply_op3`.

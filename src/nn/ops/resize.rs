@@ -1,10 +1,9 @@
 //! Changing the number of frames, channels last: twice as many by repetition, any number by linear interpolation; and
 //! channels first made channels last.
 
-use super::operator::{CpuOperator, CustomOperator, Operand};
+use super::operator::{CpuOperator, CustomOperator, Gradients, Operand};
 use crate::cpu::frames::{FrameMixture, transpose};
 use crate::cpu::tensor::Scalar;
-use crate::device;
 use candle_core::{Result, Shape, Tensor};
 use std::ops::Range;
 
@@ -70,7 +69,7 @@ pub fn linear_part(x: &Tensor, part: &ResizedPart) -> Result<Tensor> {
 
 /// `x` with its last two axes exchanged, [B, C, T] to [B, T, C], in memory too.
 pub fn transposed(x: &Tensor) -> Result<Tensor> {
-    if device::needs_fallback(x) || x.rank() != 3 {
+    if !x.device().is_cpu() || x.rank() != 3 {
         return x.t()?.contiguous();
     }
     let none = Tensor::zeros(0, x.dtype(), x.device())?;
@@ -78,7 +77,7 @@ pub fn transposed(x: &Tensor) -> Result<Tensor> {
 }
 
 fn mix(x: &Tensor, skip: Option<&Tensor>, mixture: FrameMixture) -> Result<Tensor> {
-    if device::needs_fallback(x) {
+    if !x.device().is_cpu() {
         return fallback_mix(x, skip, &mixture);
     }
     let x = x.contiguous()?;
@@ -119,7 +118,7 @@ impl CpuOperator for MixOp {
         Ok((self.mixture.mix(x.values, skip, n_channels), Shape::from((batch, n_out, n_channels))))
     }
 
-    fn backward<T: Scalar>(&self, [x, skip, _]: [Operand<T>; 3], _: &[T], grad: &[T]) -> Result<[Option<Vec<T>>; 3]> {
+    fn backward<T: Scalar>(&self, [x, skip, _]: [Operand<T>; 3], _: &[T], grad: &[T]) -> Gradients<T> {
         let of_x = x.tracked.then(|| self.mixture.gradient(grad, x.dims[2]));
         Ok([of_x, (self.plus && skip.tracked).then(|| grad.to_vec()), None])
     }
@@ -137,7 +136,7 @@ impl CpuOperator for TransposeOp {
         Ok((transpose(x.values, rows, columns), Shape::from((batch, columns, rows))))
     }
 
-    fn backward<T: Scalar>(&self, [x, ..]: [Operand<T>; 3], _: &[T], grad: &[T]) -> Result<[Option<Vec<T>>; 3]> {
+    fn backward<T: Scalar>(&self, [x, ..]: [Operand<T>; 3], _: &[T], grad: &[T]) -> Gradients<T> {
         Ok([x.tracked.then(|| transpose(grad, x.dims[2], x.dims[1])), None, None])
     }
 }

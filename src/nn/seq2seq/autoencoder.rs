@@ -2,7 +2,7 @@
 //! (Kucherenko et al. 2019, with the context encoder of network B).
 
 use super::config::{Config, Segment};
-use super::context::ContextEncoder;
+use super::encoders::ContextEncoder;
 use crate::Mode;
 use crate::ops::affine::Affine;
 use crate::ops::dropout::dropout;

@@ -89,7 +89,7 @@ mod tests {
     use super::*;
     use crate::ops::gradcheck::pattern;
     use crate::params::Params;
-    use crate::seq2seq::words::WordsSeq2Seq;
+    use crate::seq2seq::networks::WordsSeq2Seq;
     use candle_core::Device;
 
     /// Adds 1 to the last pose, step by step, 100 where its word is 1, and counts segments in its state.

@@ -1,5 +1,6 @@
 //! Tables of a flatbuffer, read; every offset is checked against the end of the file.
 
+use super::layout::int32s;
 use anyhow::{Context, Result, ensure};
 
 /// The most entries of a list of tables.
@@ -7,7 +8,7 @@ const MAX_TABLES: usize = 1 << 14;
 
 /// One table: fields by number, absent ones at their default.
 #[derive(Clone, Copy)]
-pub struct FlatTable<'a> {
+pub(crate) struct FlatTable<'a> {
     file: &'a [u8],
     position: usize,
     /// Offsets of the fields from `position`, two bytes each.
@@ -16,7 +17,7 @@ pub struct FlatTable<'a> {
 
 impl<'a> FlatTable<'a> {
     /// The table that the file begins with.
-    pub fn root(file: &'a [u8]) -> Result<Self> {
+    pub(crate) fn root(file: &'a [u8]) -> Result<Self> {
         Self::at(file, target(file, 0)?)
     }
 
@@ -37,40 +38,37 @@ impl<'a> FlatTable<'a> {
     }
 
     /// An 8-bit number; absent: 0.
-    pub fn byte(&self, field: usize) -> Result<i8> {
+    pub(crate) fn byte(&self, field: usize) -> Result<i8> {
         self.field(field).map_or(Ok(0), |at| Ok(i8::from_le_bytes(read(self.file, at)?)))
     }
 
     /// A 32-bit number.
-    pub fn int(&self, field: usize, absent: i32) -> Result<i32> {
+    pub(crate) fn int(&self, field: usize, absent: i32) -> Result<i32> {
         self.field(field).map_or(Ok(absent), |at| Ok(i32::from_le_bytes(read(self.file, at)?)))
     }
 
     /// A table.
-    pub fn table(&self, field: usize) -> Result<Option<Self>> {
+    pub(crate) fn table(&self, field: usize) -> Result<Option<Self>> {
         let Some(at) = self.field(field) else { return Ok(None) };
         Self::at(self.file, target(self.file, at)?).map(Some)
     }
 
     /// A list of tables.
-    pub fn tables(&self, field: usize) -> Result<Vec<Self>> {
+    pub(crate) fn tables(&self, field: usize) -> Result<Vec<Self>> {
         let (n_tables, start, _) = self.list(field, 4)?;
         ensure!(n_tables <= MAX_TABLES, "a list of tables has at most {MAX_TABLES} entries, not {n_tables}");
         (0..n_tables).map(|k| Self::at(self.file, target(self.file, start + 4 * k)?)).collect()
     }
 
-    /// A list of 32-bit numbers.
-    ///
-    /// # Errors
-    /// More than `max` of them.
-    pub fn ints(&self, field: usize, max: usize) -> Result<Vec<i32>> {
+    /// A list of 32-bit numbers. Errors: more than `max` of them.
+    pub(crate) fn ints(&self, field: usize, max: usize) -> Result<Vec<i32>> {
         let (n_ints, _, bytes) = self.list(field, 4)?;
         ensure!(n_ints <= max, "a list has at most {max} numbers, not {n_ints}");
-        Ok(bytes.chunks_exact(4).map(|int| i32::from_le_bytes([int[0], int[1], int[2], int[3]])).collect())
+        Ok(int32s(bytes).collect())
     }
 
     /// A list of bytes.
-    pub fn bytes(&self, field: usize) -> Result<&'a [u8]> {
+    pub(crate) fn bytes(&self, field: usize) -> Result<&'a [u8]> {
         Ok(self.list(field, 1)?.2)
     }
 

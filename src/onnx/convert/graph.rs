@@ -1,5 +1,6 @@
-//! An ONNX graph while it grows: operators in the order in which they run, weights beside them, equal ones once.
+//! An ONNX graph under construction: operators in the order in which they run, and weights, equal ones stored once.
 
+use super::layout::{SlidingWindow, four, transposed};
 use super::protobuf::{bytes, float, number};
 use anyhow::{Result, ensure};
 use std::collections::BTreeMap;
@@ -10,6 +11,16 @@ pub enum ElementType {
     F32 = 1,
     I64 = 7,
     F16 = 10,
+}
+
+impl ElementType {
+    const fn n_bytes(self) -> usize {
+        match self {
+            Self::F16 => 2,
+            Self::F32 => 4,
+            Self::I64 => 8,
+        }
+    }
 }
 
 /// The value of an operator's attribute.
@@ -69,16 +80,10 @@ impl OnnxGraph {
         bytes(&mut self.nodes, 1, &node);
     }
 
-    /// The name of a constant, as float32 where it is given as float16; equal ones share it.
-    ///
-    /// # Errors
-    /// `raw` (little-endian) has another length than `dims` says; the weights grow beyond the source's size.
+    /// The name of a constant, as float32 where it is given as float16; equal ones share it. Errors: `raw`
+    /// (little-endian) has another length than `dims` says; the weights grow beyond the source's size.
     pub fn constant(&mut self, element: ElementType, dims: &[usize], raw: &[u8]) -> Result<String> {
-        let size = match element {
-            ElementType::F16 => 2,
-            ElementType::F32 => 4,
-            ElementType::I64 => 8,
-        };
+        let size = element.n_bytes();
         let n_bytes = dims.iter().try_fold(size, |product: usize, dim| product.checked_mul(*dim));
         ensure!(
             n_bytes == Some(raw.len()),
@@ -108,9 +113,61 @@ impl OnnxGraph {
         Ok(name)
     }
 
+    /// A weight of the sizes `shape`, its axes reordered, or with the sizes `dims` instead of its own.
+    pub fn weight(
+        &mut self,
+        (element, shape, raw): (ElementType, &[usize], &[u8]),
+        order: Option<[usize; 4]>,
+        dims: Option<&[usize]>,
+    ) -> Result<String> {
+        let Some(order) = order else { return self.constant(element, dims.unwrap_or(shape), raw) };
+        let shape = four("the weight", shape)?;
+        let raw = transposed(raw, element.n_bytes(), shape, order)?;
+        self.constant(element, &order.map(|axis| shape[axis]), &raw)
+    }
+
     /// A constant of floats.
     pub fn floats(&mut self, dims: &[usize], values: &[f32]) -> Result<String> {
         self.constant(ElementType::F32, dims, &values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<_>>())
+    }
+
+    /// A constant row of sizes.
+    pub fn sizes(&mut self, sizes: &[usize]) -> Result<String> {
+        self.ints(&sizes.iter().map(|size| *size as i64).collect::<Vec<_>>())
+    }
+
+    /// The values side by side along an axis.
+    pub fn concat(&mut self, values: &[String], axis: i64) -> String {
+        self.op("Concat", &texts(values), &[("axis", AttributeValue::Int(axis))])
+    }
+
+    /// Values above 6 or below 0 cut off.
+    pub fn relu6(&mut self, value: &str) -> Result<String> {
+        let (low, high) = (self.floats(&[], &[0.0])?, self.floats(&[], &[6.0])?);
+        Ok(self.op("Clip", &[value, &low, &high], &[]))
+    }
+
+    /// Convolution (`inputs`: image, weight and, if there is one, bias; `group`) or, without `group`, the maximum of
+    /// windows over height and width. `pads`: zeros at the top, left, bottom and right.
+    pub(crate) fn windowed(
+        &mut self,
+        inputs: &[String],
+        windows: [SlidingWindow; 2],
+        pads: [i64; 4],
+        group: Option<usize>,
+        has_dilations: bool,
+    ) -> String {
+        let along = |of: fn(SlidingWindow) -> usize| windows.map(|window| of(window) as i64);
+        let [kernel, strides] = [along(|window| window.kernel), along(|window| window.stride)];
+        let dilations = along(|window| window.dilation);
+        let mut attributes = vec![
+            ("kernel_shape", AttributeValue::Ints(&kernel)),
+            ("strides", AttributeValue::Ints(&strides)),
+            ("pads", AttributeValue::Ints(&pads)),
+        ];
+        attributes.extend(group.map(|group| ("group", AttributeValue::Int(group as i64))));
+        attributes.extend(has_dilations.then_some(("dilations", AttributeValue::Ints(&dilations))));
+        self.op(if group.is_some() { "Conv" } else { "MaxPool" }, &texts(inputs), &attributes)
     }
 
     /// A constant row of integers.
@@ -135,6 +192,10 @@ impl OnnxGraph {
         bytes(&mut model, 8, &opset);
         model
     }
+}
+
+fn texts(values: &[String]) -> Vec<&str> {
+    values.iter().map(String::as_str).collect()
 }
 
 fn attribute(name: &str, value: AttributeValue) -> Vec<u8> {

@@ -4,33 +4,30 @@
 use anyhow::{Context, Result, ensure};
 
 /// The largest size of one axis; products of two stay far below an overflow.
-pub const MAX_SIZE: usize = 1 << 24;
+pub(crate) const MAX_SIZE: usize = 1 << 24;
 
 /// Where each axis of NCHW stands in NHWC.
-pub const CHANNELS_FIRST: [usize; 4] = [0, 3, 1, 2];
+pub(crate) const CHANNELS_FIRST: [usize; 4] = [0, 3, 1, 2];
 
-/// A size read from a file.
-///
-/// # Errors
-/// The number is not in 1..=`MAX_SIZE`.
-pub fn size(number: i64) -> Result<usize> {
+/// A size read from a file. Errors: the number is not in 1..=`MAX_SIZE`.
+pub(crate) fn size(number: i64) -> Result<usize> {
     let size = usize::try_from(number).ok().filter(|size| (1..=MAX_SIZE).contains(size));
     size.with_context(|| format!("a size is 1 to {MAX_SIZE}, not {number}"))
 }
 
-/// The four sizes of a 4-D tensor.
-///
-/// # Errors
-/// Another number of axes; the message names `what`.
-pub fn four(what: &str, dims: &[usize]) -> Result<[usize; 4]> {
+/// Little-endian 32-bit integers.
+pub(crate) fn int32s(raw: &[u8]) -> impl Iterator<Item = i32> {
+    raw.as_chunks().0.iter().map(|int| i32::from_le_bytes(*int))
+}
+
+/// The four sizes of a 4-D tensor. Errors: another number of axes; the message names `what`.
+pub(crate) fn four(what: &str, dims: &[usize]) -> Result<[usize; 4]> {
     dims.try_into().ok().with_context(|| format!("{what} has 4 axes, not the sizes {dims:?}"))
 }
 
-/// The bytes of a tensor with `dims` whose axis `k` comes from axis `order[k]`.
-///
-/// # Errors
-/// `raw` has another length than `dims` and `n_bytes` a number say.
-pub fn transposed(raw: &[u8], n_bytes: usize, dims: [usize; 4], order: [usize; 4]) -> Result<Vec<u8>> {
+/// The bytes of a tensor with `dims` whose axis `k` comes from axis `order[k]`. Errors: `raw` has another length than
+/// `dims` and `n_bytes` a number say.
+pub(crate) fn transposed(raw: &[u8], n_bytes: usize, dims: [usize; 4], order: [usize; 4]) -> Result<Vec<u8>> {
     let expected = dims.iter().try_fold(n_bytes, |product: usize, dim| product.checked_mul(*dim));
     ensure!(
         expected == Some(raw.len()) && !raw.is_empty(),
@@ -56,7 +53,7 @@ pub fn transposed(raw: &[u8], n_bytes: usize, dims: [usize; 4], order: [usize; 4
 
 /// A window that slides over one axis.
 #[derive(Clone, Copy, Debug)]
-pub struct SlidingWindow {
+pub(crate) struct SlidingWindow {
     pub kernel: usize,
     pub stride: usize,
     pub dilation: usize,
@@ -64,17 +61,14 @@ pub struct SlidingWindow {
 
 impl SlidingWindow {
     /// The numbers of zeros before and after an axis of `size`, so that the result has `size / stride` steps, rounded up.
-    pub fn same_padding(self, size: usize) -> (usize, usize) {
+    pub(crate) fn same_padding(self, size: usize) -> (usize, usize) {
         let reach = (size.div_ceil(self.stride) - 1) * self.stride + (self.kernel - 1) * self.dilation + 1;
         let total = reach.saturating_sub(size);
         (total / 2, total - total / 2)
     }
 
-    /// The number of steps over an axis of `size`, padding included.
-    ///
-    /// # Errors
-    /// The window does not fit in once.
-    pub fn n_steps(self, size: usize) -> Result<usize> {
+    /// The number of steps over an axis of `size`, padding included. Errors: the window does not fit in once.
+    pub(crate) fn n_steps(self, size: usize) -> Result<usize> {
         let reach = (self.kernel - 1) * self.dilation + 1;
         ensure!(reach <= size, "a window of {reach} cells does not fit into {size}");
         Ok((size - reach) / self.stride + 1)

@@ -9,7 +9,6 @@ mod movenet;
 mod nanodet;
 mod ncnn;
 mod ncnn_file;
-mod options;
 mod protobuf;
 mod source;
 mod tfjs;
@@ -17,5 +16,4 @@ mod tfjs_file;
 mod tflite;
 
 pub use graph::{AttributeValue, OnnxGraph};
-pub use options::ConversionOptions;
-pub use source::{SourceFormat, convert};
+pub use source::{ConversionOptions, SourceFormat, convert};

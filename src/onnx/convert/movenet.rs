@@ -4,7 +4,7 @@
 use super::graph::AttributeValue::{Int, Ints, Text};
 use super::graph::{ElementType, OnnxGraph};
 use super::layout::CHANNELS_FIRST;
-use super::options::ConversionOptions;
+use super::source::ConversionOptions;
 use super::tfjs::{TfConverter, TfValue};
 use super::tfjs_file::TfGraph;
 use anyhow::{Result, bail, ensure};
@@ -24,12 +24,12 @@ const N_POINTS: usize = 17;
 const CELL: usize = 4;
 
 /// Whether the graph has the nodes of a MoveNet.
-pub fn is_movenet(source: &TfGraph) -> bool {
+pub(crate) fn is_movenet(source: &TfGraph) -> bool {
     [HEATMAP, CENTRE, REGRESSION, OFFSET, PICTURE].iter().all(|node| source.nodes.contains_key(*node))
 }
 
 /// The model as ONNX: image [1, S, S, 3], RGB 0..255, to heat-maps [1, 17, S / 4, S / 4] of 0..1.
-pub fn convert(source: &TfGraph, mut graph: OnnxGraph, options: &ConversionOptions) -> Result<Vec<u8>> {
+pub(crate) fn convert(source: &TfGraph, mut graph: OnnxGraph, options: &ConversionOptions) -> Result<Vec<u8>> {
     let (shape, output) = (options.shape()?, options.only_output()?);
     let [1, side, width, 3] = shape[..] else { bail!("the input has the sizes 1, S, S, 3, not {shape:?}") };
     ensure!(side == width && source.input_shape()? == shape, "the input has the sizes {:?}", source.input_shape()?);
@@ -53,22 +53,22 @@ pub fn convert(source: &TfGraph, mut graph: OnnxGraph, options: &ConversionOptio
     // Held for completeness: heat-maps are refined by their reader, and ONNX Runtime drops what no output needs.
     head(&mut source, OFFSET, n_side, 2 * N_POINTS)?;
 
-    let side_cells = source.graph.ints(&[n_side as i64])?;
+    let side_cells = source.graph.sizes(&[n_side])?;
     let weight = source.source.tensor(CENTRE_WEIGHT)?;
     let weight = source.weight(weight, None, Some(&[1, 1, n_side, n_side]))?;
     let graph = &mut source.graph;
     // The cell of the person nearest to the middle, and from there the expected points: 17 rows and columns.
     let weighted = graph.op("Mul", &[&centre, &weight], &[]);
-    let all_cells = graph.ints(&[n_cells as i64])?;
+    let all_cells = graph.sizes(&[n_cells])?;
     let weighted = graph.op("Reshape", &[&weighted, &all_cells], &[]);
     let best = graph.op("ArgMax", &[&weighted], &[("axis", Int(0)), ("keepdims", Int(1))]);
     let row = graph.op("Div", &[&best, &side_cells], &[]);
     let before = graph.op("Mul", &[&row, &side_cells], &[]);
     let column = graph.op("Sub", &[&best, &before], &[]);
-    let points_of_cells = graph.ints(&[2 * N_POINTS as i64, n_cells as i64])?;
+    let points_of_cells = graph.sizes(&[2 * N_POINTS, n_cells])?;
     let regression = graph.op("Reshape", &[&regression, &points_of_cells], &[]);
     let offsets = graph.op("Gather", &[&regression, &best], &[("axis", Int(1))]);
-    let pairs = graph.ints(&[N_POINTS as i64, 2])?;
+    let pairs = graph.sizes(&[N_POINTS, 2])?;
     let offsets = graph.op("Reshape", &[&offsets, &pairs], &[]);
     let offsets = graph.ops(2, "Split", &[&offsets], &[("axis", Int(1))]);
 
@@ -92,7 +92,7 @@ pub fn convert(source: &TfGraph, mut graph: OnnxGraph, options: &ConversionOptio
     let sum = graph.op("Add", &[&scaled, &one], &[]);
     let near = graph.op("Reciprocal", &[&sum], &[]);
     let maps = [1, N_POINTS, n_side, n_side];
-    let map_shape = graph.ints(&maps.map(|size| size as i64))?;
+    let map_shape = graph.sizes(&maps)?;
     let near = graph.op("Reshape", &[&near, &map_shape], &[]);
     graph.output(output, "Mul", &[&heatmap, &near], &[]);
     Ok(source.graph.model(&[(&options.input.name, &shape)], &[(output, &maps)]))

@@ -3,7 +3,7 @@
 
 use super::graph::AttributeValue::{Int, Ints};
 use super::graph::OnnxGraph;
-use super::options::ConversionOptions;
+use super::source::ConversionOptions;
 use super::tfjs::{TfConverter, TfValue};
 use super::tfjs_file::TfGraph;
 use anyhow::{Result, bail, ensure};
@@ -15,13 +15,13 @@ const HEADS: [(&str, usize); 3] =
 const N_CLASSES: usize = 80;
 
 /// Whether the graph has the nodes of a NanoDet.
-pub fn is_nanodet(source: &TfGraph) -> bool {
+pub(crate) fn is_nanodet(source: &TfGraph) -> bool {
     HEADS.iter().all(|(node, _)| source.nodes.contains_key(*node))
 }
 
 /// The model as ONNX: image [1, 3, S, S] to rows [1, cells, 5] of x0, y0, x1, y1 in pixels of the input and the score of
 /// a person, 0..1.
-pub fn convert(source: &TfGraph, graph: OnnxGraph, options: &ConversionOptions) -> Result<Vec<u8>> {
+pub(crate) fn convert(source: &TfGraph, graph: OnnxGraph, options: &ConversionOptions) -> Result<Vec<u8>> {
     let (shape, output) = (options.shape()?, options.only_output()?);
     let [1, 3, side, width] = shape[..] else { bail!("the input has the sizes 1, 3, S, S, not {shape:?}") };
     ensure!(side == width && source.input_shape()? == shape, "the input has the sizes {:?}", source.input_shape()?);
@@ -42,11 +42,11 @@ pub fn convert(source: &TfGraph, graph: OnnxGraph, options: &ConversionOptions) 
         let n_cells = n_side * n_side;
         let graph = &mut source.graph;
         let person = slice(graph, &head.name, 1, [0, 1])?;
-        let flat = graph.ints(&[1, 1, n_cells as i64])?;
+        let flat = graph.sizes(&[1, 1, n_cells])?;
         scores.push(graph.op("Reshape", &[&person, &flat], &[]));
 
         let bins = slice(graph, &head.name, 1, [N_CLASSES, channels])?;
-        let by_side = graph.ints(&[1, 4, n_bins as i64, n_cells as i64])?;
+        let by_side = graph.sizes(&[1, 4, n_bins, n_cells])?;
         let bins = graph.op("Reshape", &[&bins, &by_side], &[]);
         let likely = graph.op("Softmax", &[&bins], &[("axis", Int(2))]);
         let lengths: Vec<f32> = (0..n_bins).map(|bin| (bin * stride) as f32).collect();
@@ -60,23 +60,20 @@ pub fn convert(source: &TfGraph, graph: OnnxGraph, options: &ConversionOptions) 
     }
     let n_cells = columns.len();
     let graph = &mut source.graph;
-    let join = |graph: &mut OnnxGraph, parts: &[String], axis: i64| {
-        graph.op("Concat", &parts.iter().map(String::as_str).collect::<Vec<_>>(), &[("axis", Int(axis))])
-    };
-    let scores = join(graph, &scores, 2);
+    let scores = graph.concat(&scores, 2);
     let scores = graph.op("Sigmoid", &[&scores], &[]);
-    let distances = join(graph, &distances, 2);
+    let distances = graph.concat(&distances, 2);
     let centres = graph.floats(&[1, 2, n_cells], &[columns, rows].concat())?;
     let (before, after) = (slice(graph, &distances, 1, [0, 2])?, slice(graph, &distances, 1, [2, 4])?);
     let low = graph.op("Sub", &[&centres, &before], &[]);
     let high = graph.op("Add", &[&centres, &after], &[]);
-    let boxes = join(graph, &[low, high, scores], 1);
+    let boxes = graph.concat(&[low, high, scores], 1);
     graph.output(output, "Transpose", &[&boxes], &[("perm", Ints(&[0, 2, 1]))]);
     Ok(source.graph.model(&[(&options.input.name, &shape)], &[(output, &[1, n_cells, 5])]))
 }
 
 /// Part of an axis.
 fn slice(graph: &mut OnnxGraph, value: &str, axis: i64, [start, end]: [usize; 2]) -> Result<String> {
-    let (start, end, axis) = (graph.ints(&[start as i64])?, graph.ints(&[end as i64])?, graph.ints(&[axis])?);
+    let (start, end, axis) = (graph.sizes(&[start])?, graph.sizes(&[end])?, graph.ints(&[axis])?);
     Ok(graph.op("Slice", &[value, &start, &end, &axis], &[]))
 }

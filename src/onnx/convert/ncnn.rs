@@ -4,7 +4,7 @@ use super::graph::AttributeValue::{Int, Ints, Text};
 use super::graph::{ElementType, OnnxGraph};
 use super::layout::{SlidingWindow, size};
 use super::ncnn_file::{NcnnLayer, NcnnWeight, NcnnWeights, layers};
-use super::options::ConversionOptions;
+use super::source::ConversionOptions;
 use anyhow::{Context, Result, bail, ensure};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -27,7 +27,12 @@ struct NcnnConverter<'a> {
 }
 
 /// The model as ONNX; its outputs are the blobs that no layer reads.
-pub fn convert(parameters: &[u8], weights: &[u8], graph: OnnxGraph, options: &ConversionOptions) -> Result<Vec<u8>> {
+pub(crate) fn convert(
+    parameters: &[u8],
+    weights: &[u8],
+    graph: OnnxGraph,
+    options: &ConversionOptions,
+) -> Result<Vec<u8>> {
     let sizes = options.shape()?;
     let [1, channels, height, width] = sizes[..] else { bail!("the input has 1 picture, not the sizes {sizes:?}") };
     let layers = layers(parameters)?;
@@ -102,7 +107,7 @@ impl<'a> NcnnConverter<'a> {
                 let NcnnBlob { name, shape } = first()?;
                 let new = [size(layer.int(2, 0)?)?, size(layer.int(1, 0)?)?, size(layer.int(0, 0)?)?];
                 ensure!(count(new) == count(shape), "the sizes {shape:?} cannot become {new:?}");
-                let sizes = self.graph.ints(&[1, new[0] as i64, new[1] as i64, new[2] as i64])?;
+                let sizes = self.graph.sizes(&[1, new[0], new[1], new[2]])?;
                 NcnnBlob { name: self.graph.op("Reshape", &[&name, &sizes], &[]), shape: new }
             }
             "Permute" => {
@@ -130,7 +135,7 @@ impl<'a> NcnnConverter<'a> {
             sizes.push(part);
         }
         ensure!(left == 0 && !sizes.is_empty(), "the parts {parts:?} leave {left} of {} over", shape[axis]);
-        let lengths = self.graph.ints(&sizes.iter().map(|size| *size as i64).collect::<Vec<_>>())?;
+        let lengths = self.graph.sizes(&sizes)?;
         let names = self.graph.ops(sizes.len(), "Split", &[&name, &lengths], &[("axis", Int(1 + axis as i64))]);
         let part = |(name, size): (String, usize)| {
             let mut shape = shape;
@@ -151,8 +156,8 @@ impl<'a> NcnnConverter<'a> {
             ensure!(others == shape, "the sizes of its inputs differ: {:?} and {:?}", parts[0].shape, part.shape);
             shape[axis] = size((shape[axis] + part.shape[axis]) as i64)?;
         }
-        let names: Vec<&str> = parts.iter().map(|part| part.name.as_str()).collect();
-        Ok(NcnnBlob { name: self.graph.op("Concat", &names, &[("axis", Int(1 + axis as i64))]), shape })
+        let names: Vec<String> = parts.iter().map(|part| part.name.clone()).collect();
+        Ok(NcnnBlob { name: self.graph.concat(&names, 1 + axis as i64), shape })
     }
 
     fn weight(&mut self, dims: &[usize], weight: NcnnWeight) -> Result<String> {
@@ -196,18 +201,7 @@ impl<'a> NcnnConverter<'a> {
             let bias = self.weights.plain(channels)?;
             inputs.push(self.weight(&[channels], bias)?);
         }
-        let inputs: Vec<&str> = inputs.iter().map(String::as_str).collect();
-        let mut name = self.graph.op(
-            "Conv",
-            &inputs,
-            &[
-                ("kernel_shape", Ints(&[down.kernel, along.kernel].map(|size| size as i64))),
-                ("strides", Ints(&[down.stride, along.stride].map(|size| size as i64))),
-                ("dilations", Ints(&[down.dilation, along.dilation].map(|size| size as i64))),
-                ("pads", Ints(&pads)),
-                ("group", Int(group as i64)),
-            ],
-        );
+        let mut name = self.graph.windowed(&inputs, [down, along], pads, Some(group), true);
         match layer.int(9, 0)? {
             0 => {}
             1 => name = self.graph.op("Relu", &[&name], &[]),
@@ -227,7 +221,7 @@ impl<'a> NcnnConverter<'a> {
             (kind, _, _) => bail!("nearest (1) by a factor, bilinear (2) to a size with the corners kept, not {kind}"),
         };
         let [height, width] = [size(sides[0] as i64)?, size(sides[1] as i64)?];
-        let sizes = self.graph.ints(&[1, shape[0] as i64, height as i64, width as i64])?;
+        let sizes = self.graph.sizes(&[1, shape[0], height, width])?;
         let [mode, corners] = mode;
         let mut attributes = vec![("mode", Text(mode)), ("coordinate_transformation_mode", Text(corners))];
         if mode == "nearest" {

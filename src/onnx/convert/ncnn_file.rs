@@ -12,7 +12,7 @@ const FLOAT16: u32 = 0x0130_6b47;
 
 /// A line of the text.
 #[derive(Debug)]
-pub struct NcnnLayer<'a> {
+pub(crate) struct NcnnLayer<'a> {
     pub kind: &'a str,
     pub name: &'a str,
     pub inputs: Vec<&'a str>,
@@ -22,11 +22,8 @@ pub struct NcnnLayer<'a> {
 }
 
 impl NcnnLayer<'_> {
-    /// A whole number.
-    ///
-    /// # Errors
-    /// A list, or a fraction.
-    pub fn int(&self, key: i32, absent: i64) -> Result<i64> {
+    /// A whole number. Errors: a list, or a fraction.
+    pub(crate) fn int(&self, key: i32, absent: i64) -> Result<i64> {
         let Some(numbers) = self.parameters.get(&key) else { return Ok(absent) };
         match numbers.as_slice() {
             [number] if number.fract() == 0.0 && number.abs() < 1e15 => Ok(*number as i64),
@@ -35,15 +32,12 @@ impl NcnnLayer<'_> {
     }
 
     /// The numbers of a list; absent: none.
-    pub fn list(&self, key: i32) -> &[f64] {
+    pub(crate) fn list(&self, key: i32) -> &[f64] {
         self.parameters.get(&key).map_or(&[], Vec::as_slice)
     }
 
-    /// Nothing may be said that is not read.
-    ///
-    /// # Errors
-    /// A parameter beyond `keys`.
-    pub fn knows(&self, keys: &[i32]) -> Result<()> {
+    /// Nothing may be said that is not read. Errors: a parameter beyond `keys`.
+    pub(crate) fn knows(&self, keys: &[i32]) -> Result<()> {
         match self.parameters.keys().find(|key| !keys.contains(key)) {
             Some(key) => bail!("parameter {key} = {:?} is not known", self.list(*key)),
             None => Ok(()),
@@ -51,11 +45,9 @@ impl NcnnLayer<'_> {
     }
 }
 
-/// The layers of a `.param` file in the order in which they run.
-///
-/// # Errors
-/// Another first line, or a line that is no layer; the message has its number.
-pub fn layers(file: &[u8]) -> Result<Vec<NcnnLayer<'_>>> {
+/// The layers of a `.param` file in the order in which they run. Errors: another first line, or a line that is no
+/// layer; the message has its number.
+pub(crate) fn layers(file: &[u8]) -> Result<Vec<NcnnLayer<'_>>> {
     let text = std::str::from_utf8(file).context("the .param file is no text")?;
     let mut lines = text.lines().enumerate();
     ensure!(
@@ -108,20 +100,20 @@ fn layer(line: &str) -> Result<NcnnLayer<'_>> {
 
 /// The numbers of a weight, little-endian.
 #[derive(Clone, Copy, Debug)]
-pub struct NcnnWeight<'a> {
+pub(crate) struct NcnnWeight<'a> {
     pub raw: &'a [u8],
     /// 2 or 4 bytes a number.
     pub half: bool,
 }
 
 /// What of a `.bin` file is not yet read.
-pub struct NcnnWeights<'a> {
+pub(crate) struct NcnnWeights<'a> {
     rest: &'a [u8],
 }
 
 impl<'a> NcnnWeights<'a> {
     /// All of it.
-    pub fn new(file: &'a [u8]) -> Self {
+    pub(crate) fn new(file: &'a [u8]) -> Self {
         Self { rest: file }
     }
 
@@ -133,11 +125,8 @@ impl<'a> NcnnWeights<'a> {
         Ok(taken)
     }
 
-    /// `n` numbers, whose form is said before them.
-    ///
-    /// # Errors
-    /// Fewer, or in a form other than float16 and float32.
-    pub fn tagged(&mut self, n: usize) -> Result<NcnnWeight<'a>> {
+    /// `n` numbers, whose form is said before them. Errors: fewer, or in a form other than float16 and float32.
+    pub(crate) fn tagged(&mut self, n: usize) -> Result<NcnnWeight<'a>> {
         let tag = self.take(4)?;
         match u32::from_le_bytes([tag[0], tag[1], tag[2], tag[3]]) {
             0 => self.plain(n),
@@ -151,12 +140,12 @@ impl<'a> NcnnWeights<'a> {
     }
 
     /// `n` 32-bit floats.
-    pub fn plain(&mut self, n: usize) -> Result<NcnnWeight<'a>> {
+    pub(crate) fn plain(&mut self, n: usize) -> Result<NcnnWeight<'a>> {
         Ok(NcnnWeight { raw: self.take(n.saturating_mul(4))?, half: false })
     }
 
     /// Nothing may be left.
-    pub fn end(&self) -> Result<()> {
+    pub(crate) fn end(&self) -> Result<()> {
         ensure!(self.rest.is_empty(), "{} bytes of the .bin file belong to no layer", self.rest.len());
         Ok(())
     }

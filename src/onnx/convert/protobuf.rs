@@ -1,7 +1,7 @@
 //! Fields of protobuf messages, written.
 
 /// Appends an unsigned number, seven bits a byte, the lowest first.
-pub fn varint(out: &mut Vec<u8>, mut number: u64) {
+pub(crate) fn varint(out: &mut Vec<u8>, mut number: u64) {
     while number > 127 {
         out.push(number as u8 & 127 | 128);
         number >>= 7;
@@ -10,20 +10,20 @@ pub fn varint(out: &mut Vec<u8>, mut number: u64) {
 }
 
 /// Appends a field with a number.
-pub fn number(out: &mut Vec<u8>, field: u64, number: i64) {
+pub(crate) fn number(out: &mut Vec<u8>, field: u64, number: i64) {
     varint(out, field << 3);
     varint(out, number as u64);
 }
 
 /// Appends a field with a text or a message.
-pub fn bytes(out: &mut Vec<u8>, field: u64, bytes: &[u8]) {
+pub(crate) fn bytes(out: &mut Vec<u8>, field: u64, bytes: &[u8]) {
     varint(out, field << 3 | 2);
     varint(out, bytes.len() as u64);
     out.extend_from_slice(bytes);
 }
 
 /// Appends a field with a 32-bit float.
-pub fn float(out: &mut Vec<u8>, field: u64, number: f32) {
+pub(crate) fn float(out: &mut Vec<u8>, field: u64, number: f32) {
     varint(out, field << 3 | 5);
     out.extend_from_slice(&number.to_le_bytes());
 }

@@ -1,16 +1,16 @@
 //! Nodes of a TensorFlow.js graph to ONNX operators: those that a wanted node needs, each once. A picture that is channels
 //! last in TensorFlow is channels first in the result; transpositions between the two cost nothing.
 
-use super::graph::AttributeValue::{Float, Int, Ints, Text};
+use super::graph::AttributeValue::{Float, Text};
 use super::graph::{ElementType, OnnxGraph};
-use super::layout::{CHANNELS_FIRST, SlidingWindow, four, size, transposed};
+use super::layout::{CHANNELS_FIRST, SlidingWindow, four, size};
 use super::tfjs_file::{TfElement, TfGraph, TfNode, TfTensor};
 use anyhow::{Context, Result, bail, ensure};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What a node gives: its name in the result, its sizes in TensorFlow.
 #[derive(Clone, Debug)]
-pub struct TfValue {
+pub(crate) struct TfValue {
     pub name: String,
     pub shape: Vec<usize>,
     /// NHWC in TensorFlow, NCHW in the result.
@@ -18,7 +18,7 @@ pub struct TfValue {
 }
 
 /// A conversion under way.
-pub struct TfConverter<'a> {
+pub(crate) struct TfConverter<'a> {
     pub source: &'a TfGraph<'a>,
     pub graph: OnnxGraph,
     values: BTreeMap<String, TfValue>,
@@ -26,30 +26,28 @@ pub struct TfConverter<'a> {
 
 impl<'a> TfConverter<'a> {
     /// A conversion in which the node `name` is done already.
-    pub fn new(source: &'a TfGraph<'a>, graph: OnnxGraph, name: &str, value: TfValue) -> Self {
+    pub(crate) fn new(source: &'a TfGraph<'a>, graph: OnnxGraph, name: &str, value: TfValue) -> Self {
         Self { source, graph, values: BTreeMap::from([(name.to_owned(), value)]) }
     }
 
     /// A weight, its axes reordered, or with the sizes `dims` instead of its own.
-    pub fn weight(&mut self, tensor: &TfTensor, order: Option<[usize; 4]>, dims: Option<&[usize]>) -> Result<String> {
-        let (element, n_bytes) = match tensor.element {
-            TfElement::F16 => (ElementType::F16, 2),
-            TfElement::F32 => (ElementType::F32, 4),
+    pub(crate) fn weight(
+        &mut self,
+        tensor: &TfTensor,
+        order: Option<[usize; 4]>,
+        dims: Option<&[usize]>,
+    ) -> Result<String> {
+        let element = match tensor.element {
+            TfElement::F16 => ElementType::F16,
+            TfElement::F32 => ElementType::F32,
             TfElement::I32 => bail!("a weight is float16 or float32, not int32"),
         };
-        let Some(order) = order else {
-            return self.graph.constant(element, dims.unwrap_or(&tensor.shape), tensor.raw);
-        };
-        let shape = four("the weight", &tensor.shape)?;
-        let raw = transposed(tensor.raw, n_bytes, shape, order)?;
-        self.graph.constant(element, &order.map(|axis| shape[axis]), &raw)
+        self.graph.weight((element, &tensor.shape, tensor.raw), order, dims)
     }
 
-    /// What the node `wanted` gives, after all that it needs.
-    ///
-    /// # Errors
-    /// A node that is missing, needs itself, or is of an unknown kind.
-    pub fn value(&mut self, wanted: &str) -> Result<TfValue> {
+    /// What the node `wanted` gives, after all that it needs. Errors: a node that is missing, needs itself, or is of an
+    /// unknown kind.
+    pub(crate) fn value(&mut self, wanted: &str) -> Result<TfValue> {
         let source = self.source;
         let (mut waiting, mut begun) = (vec![wanted], BTreeSet::new());
         while let Some(name) = waiting.last().copied() {
@@ -106,10 +104,7 @@ impl<'a> TfConverter<'a> {
                 let (value, [height, width, channels]) = self.picture(node)?;
                 let windows = windows(node, along_picture(&node.integers("ksize")?)?)?;
                 let (pads, height, width) = padding(node, windows, [height, width])?;
-                let kernel = windows.map(|window| window.kernel as i64);
-                let strides = windows.map(|window| window.stride as i64);
-                let attributes = [("kernel_shape", Ints(&kernel)), ("strides", Ints(&strides)), ("pads", Ints(&pads))];
-                let name = self.graph.op("MaxPool", &[&value.name], &attributes);
+                let name = self.graph.windowed(std::slice::from_ref(&value.name), windows, pads, None, false);
                 Ok(TfValue { name, shape: vec![value.shape[0], height, width, channels], ..value })
             }
             "Pad" | "PadV2" => self.pad(node),
@@ -152,17 +147,8 @@ impl<'a> TfConverter<'a> {
         for k in 2..node.inputs.len() {
             inputs.push(self.weight(self.constant(node, k)?, None, None)?);
         }
-        let inputs: Vec<&str> = inputs.iter().map(String::as_str).collect();
-        let mut name = self.graph.op(
-            "Conv",
-            &inputs,
-            &[
-                ("kernel_shape", Ints(&windows.map(|window| window.kernel as i64))),
-                ("strides", Ints(&windows.map(|window| window.stride as i64))),
-                ("pads", Ints(&pads)),
-                ("group", Int(if depthwise { channels as i64 } else { 1 })),
-            ],
-        );
+        let group = if depthwise { channels } else { 1 };
+        let mut name = self.graph.windowed(&inputs, windows, pads, Some(group), false);
         let fused = node.texts("fused_ops")?;
         let fused: Vec<&str> = fused.iter().map(String::as_str).collect();
         ensure!(
@@ -172,10 +158,7 @@ impl<'a> TfConverter<'a> {
         match fused.as_slice() {
             [] | ["BiasAdd"] => {}
             ["BiasAdd", "Relu"] => name = self.graph.op("Relu", &[&name], &[]),
-            ["BiasAdd", "Relu6"] => {
-                let (low, high) = (self.graph.floats(&[], &[0.0])?, self.graph.floats(&[], &[6.0])?);
-                name = self.graph.op("Clip", &[&name, &low, &high], &[]);
-            }
+            ["BiasAdd", "Relu6"] => name = self.graph.relu6(&name)?,
             _ => bail!("the fused operators are not known: {fused:?}"),
         }
         let channels = if depthwise { channels } else { n_outputs };
@@ -282,8 +265,8 @@ impl<'a> TfConverter<'a> {
         }
         result.shape[axis] = size(total as i64)?;
         let axis = if result.channels_first { [0, 2, 3, 1][axis] } else { axis as i64 };
-        let names: Vec<&str> = parts.iter().map(|part| part.name.as_str()).collect();
-        result.name = self.graph.op("Concat", &names, &[("axis", Int(axis))]);
+        let names: Vec<String> = parts.into_iter().map(|part| part.name).collect();
+        result.name = self.graph.concat(&names, axis);
         Ok(result)
     }
 }

@@ -1,6 +1,6 @@
 //! The two files of a TensorFlow.js graph model: nodes in JSON, and their constants one after the other.
 
-use super::layout::{MAX_SIZE, size};
+use super::layout::{MAX_SIZE, int32s, size};
 use anyhow::{Context, Result, bail, ensure};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 /// What the numbers of a constant are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TfElement {
+pub(crate) enum TfElement {
     F16,
     F32,
     I32,
@@ -17,7 +17,7 @@ pub enum TfElement {
 
 /// A constant: sizes and little-endian numbers.
 #[derive(Clone, Debug)]
-pub struct TfTensor<'a> {
+pub(crate) struct TfTensor<'a> {
     pub element: TfElement,
     pub shape: Vec<usize>,
     pub raw: &'a [u8],
@@ -25,7 +25,7 @@ pub struct TfTensor<'a> {
 
 /// A node that computes something.
 #[derive(Clone, Debug)]
-pub struct TfNode {
+pub(crate) struct TfNode {
     pub op: String,
     pub inputs: Vec<String>,
     attributes: Value,
@@ -33,17 +33,15 @@ pub struct TfNode {
 
 /// Nodes and constants by name.
 #[derive(Clone, Debug)]
-pub struct TfGraph<'a> {
+pub(crate) struct TfGraph<'a> {
     pub nodes: BTreeMap<String, TfNode>,
     pub tensors: BTreeMap<String, TfTensor<'a>>,
 }
 
 impl<'a> TfGraph<'a> {
-    /// The graph in the JSON `topology`, its constants in `weights`.
-    ///
-    /// # Errors
-    /// No such JSON, or the constants have together another length than `weights`.
-    pub fn read(topology: &[u8], weights: &'a [u8]) -> Result<Self> {
+    /// The graph in the JSON `topology`, its constants in `weights`. Errors: no such JSON, or the constants have
+    /// together another length than `weights`.
+    pub(crate) fn read(topology: &[u8], weights: &'a [u8]) -> Result<Self> {
         let json: Value = serde_json::from_slice(topology).context("its first file is no JSON")?;
         let (mut tensors, mut rest) = (BTreeMap::new(), weights);
         for tensor in list(&json, "/weightsManifest")?.iter().map(|group| list(group, "/weights")) {
@@ -68,19 +66,19 @@ impl<'a> TfGraph<'a> {
     }
 
     /// A constant.
-    pub fn tensor(&self, name: &str) -> Result<&TfTensor<'a>> {
+    pub(crate) fn tensor(&self, name: &str) -> Result<&TfTensor<'a>> {
         self.tensors.get(name).with_context(|| format!("there is no constant {name:?}"))
     }
 
     /// The sizes of the graph's only input.
-    pub fn input_shape(&self) -> Result<Vec<usize>> {
+    pub(crate) fn input_shape(&self) -> Result<Vec<usize>> {
         let (_, input) = self.input()?;
         let sizes = list(&input.attributes, "/shape/shape/dim")?;
         sizes.iter().map(|dim| size(integer(dim.get("size").unwrap_or(dim))?)).collect()
     }
 
     /// The node that stands for the graph's only input, with its name.
-    pub fn input(&self) -> Result<(&str, &TfNode)> {
+    pub(crate) fn input(&self) -> Result<(&str, &TfNode)> {
         let mut inputs = self.nodes.iter().filter(|(_, node)| node.op == "Placeholder");
         match (inputs.next(), inputs.next()) {
             (Some((name, node)), None) => Ok((name, node)),
@@ -90,42 +88,39 @@ impl<'a> TfGraph<'a> {
 }
 
 impl TfTensor<'_> {
-    /// The numbers of a row of 32-bit integers, or of a single one.
-    ///
-    /// # Errors
-    /// Other numbers, or more than 64 of them.
-    pub fn integers(&self) -> Result<Vec<i64>> {
+    /// The numbers of a row of 32-bit integers, or of a single one. Errors: other numbers, or more than 64 of them.
+    pub(crate) fn integers(&self) -> Result<Vec<i64>> {
         ensure!(self.element == TfElement::I32 && self.raw.len() <= 256, "it holds a few 32-bit integers");
-        Ok(self.raw.chunks_exact(4).map(|int| i32::from_le_bytes([int[0], int[1], int[2], int[3]]).into()).collect())
+        Ok(int32s(self.raw).map(i64::from).collect())
     }
 }
 
 impl TfNode {
     /// An attribute that is a list of integers.
-    pub fn integers(&self, name: &str) -> Result<Vec<i64>> {
+    pub(crate) fn integers(&self, name: &str) -> Result<Vec<i64>> {
         list(&self.attributes, &format!("/{name}/list/i"))?.iter().map(integer).collect()
     }
 
     /// An attribute that is a text.
-    pub fn text(&self, name: &str) -> Result<String> {
+    pub(crate) fn text(&self, name: &str) -> Result<String> {
         decoded(
             self.attributes.pointer(&format!("/{name}/s")).with_context(|| format!("it has no attribute {name:?}"))?,
         )
     }
 
     /// An attribute that is a list of texts; absent: none.
-    pub fn texts(&self, name: &str) -> Result<Vec<String>> {
+    pub(crate) fn texts(&self, name: &str) -> Result<Vec<String>> {
         let texts = self.attributes.pointer(&format!("/{name}/list/s")).and_then(Value::as_array);
         texts.map_or(&[][..], Vec::as_slice).iter().map(decoded).collect()
     }
 
     /// An attribute that is yes or no; absent: no.
-    pub fn is(&self, name: &str) -> bool {
+    pub(crate) fn is(&self, name: &str) -> bool {
         self.attributes.pointer(&format!("/{name}/b")).and_then(Value::as_bool).unwrap_or(false)
     }
 
     /// An attribute that is a number.
-    pub fn number(&self, name: &str) -> Result<f32> {
+    pub(crate) fn number(&self, name: &str) -> Result<f32> {
         let number = self.attributes.pointer(&format!("/{name}/f")).and_then(Value::as_f64);
         Ok(number.with_context(|| format!("it has no attribute {name:?}"))? as f32)
     }

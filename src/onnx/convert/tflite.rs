@@ -4,8 +4,8 @@
 use super::flatbuffer::FlatTable;
 use super::graph::AttributeValue::{Int, Ints, Text};
 use super::graph::{ElementType, OnnxGraph};
-use super::layout::{CHANNELS_FIRST, SlidingWindow, four, size, transposed};
-use super::options::ConversionOptions;
+use super::layout::{CHANNELS_FIRST, SlidingWindow, four, int32s, size};
+use super::source::ConversionOptions;
 use anyhow::{Context, Result, bail, ensure};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -41,7 +41,7 @@ struct TfliteConverter<'a> {
 }
 
 /// The model as ONNX.
-pub fn convert(file: &[u8], graph: OnnxGraph, options: &ConversionOptions) -> Result<Vec<u8>> {
+pub(crate) fn convert(file: &[u8], graph: OnnxGraph, options: &ConversionOptions) -> Result<Vec<u8>> {
     let model = FlatTable::root(file)?;
     let code = |code: FlatTable| Ok(code.int(3, 0)?.max(i32::from(code.byte(0)?)));
     let codes: Vec<i32> = model.tables(1)?.into_iter().map(code).collect::<Result<_>>()?;
@@ -161,25 +161,19 @@ impl<'a> TfliteConverter<'a> {
     /// A weight, its axes reordered, or with the sizes `dims` instead of its own.
     fn weight(&mut self, tensor: usize, order: Option<[usize; 4]>, dims: Option<&[usize]>) -> Result<String> {
         let Constant { raw, element } = self.constant_of(tensor)?;
-        let (element, n_bytes) = match element {
-            0 => (ElementType::F32, 4),
-            1 => (ElementType::F16, 2),
+        let element = match element {
+            0 => ElementType::F32,
+            1 => ElementType::F16,
             _ => bail!("weights are float32 or float16, not TFLite's type {element} (tensor {tensor})"),
         };
-        let shape = &self.tensors[tensor].shape;
-        let Some(order) = order else {
-            return self.graph.constant(element, dims.unwrap_or(shape), raw);
-        };
-        let shape = four("the weight", shape)?;
-        let raw = transposed(raw, n_bytes, shape, order)?;
-        self.graph.constant(element, &order.map(|axis| shape[axis]), &raw)
+        self.graph.weight((element, &self.tensors[tensor].shape, raw), order, dims)
     }
 
     /// The integers in a constant.
     fn integers(&self, tensor: usize) -> Result<Vec<i64>> {
         let Constant { raw, element } = self.constant_of(tensor)?;
         ensure!(element == 2 && raw.len() <= 8 * 2 * MAX_AXES, "tensor {tensor} holds a few 32-bit integers");
-        Ok(raw.chunks_exact(4).map(|int| i32::from_le_bytes([int[0], int[1], int[2], int[3]]).into()).collect())
+        Ok(int32s(raw).map(i64::from).collect())
     }
 
     /// The activation that is fused with an operator.
@@ -187,10 +181,7 @@ impl<'a> TfliteConverter<'a> {
         match activation {
             0 => Ok(value),
             1 => Ok(self.graph.op("Relu", &[&value], &[])),
-            3 => {
-                let (low, high) = (self.graph.floats(&[], &[0.0])?, self.graph.floats(&[], &[6.0])?);
-                Ok(self.graph.op("Clip", &[&value, &low, &high], &[]))
-            }
+            3 => self.graph.relu6(&value),
             _ => bail!("the activations known are none, RELU and RELU6, not {activation}"),
         }
     }
@@ -216,8 +207,7 @@ impl<'a> TfliteConverter<'a> {
                 let axis = options()?.int(0, 0)?.rem_euclid(output.len().max(1) as i32) as usize;
                 let axis = if output.len() == 4 { [0, 2, 3, 1][axis] } else { axis as i64 };
                 let parts = (0..operator.inputs.len()).map(|k| self.value(needed(k)?)).collect::<Result<Vec<_>>>()?;
-                let parts: Vec<&str> = parts.iter().map(String::as_str).collect();
-                self.graph.op("Concat", &parts, &[("axis", Int(axis))])
+                self.graph.concat(&parts, axis)
             }
             3 | 4 => self.convolution(operator.code == 4, first, needed(1)?, input(2), options()?)?,
             6 => {
@@ -259,8 +249,8 @@ impl<'a> TfliteConverter<'a> {
                     (0, _) => "half_pixel",
                     _ => "align_corners",
                 };
-                let [n, height, width, channels] = four("the output", &output)?.map(|size| size as i64);
-                let (value, sizes) = (self.value(first)?, self.graph.ints(&[n, channels, height, width])?);
+                let [n, height, width, channels] = four("the output", &output)?;
+                let (value, sizes) = (self.value(first)?, self.graph.sizes(&[n, channels, height, width])?);
                 let mode = [("mode", Text("linear")), ("coordinate_transformation_mode", Text(mode))];
                 self.graph.op("Resize", &[&value, "", "", &sizes], &mode)
             }
@@ -297,7 +287,7 @@ impl<'a> TfliteConverter<'a> {
     }
 
     fn reshaped(&mut self, value: &str, shape: &[usize]) -> Result<String> {
-        let shape = self.graph.ints(&shape.iter().map(|size| *size as i64).collect::<Vec<_>>())?;
+        let shape = self.graph.sizes(shape)?;
         Ok(self.graph.op("Reshape", &[value, &shape], &[]))
     }
 
@@ -323,18 +313,8 @@ impl<'a> TfliteConverter<'a> {
         if let Some(bias) = bias {
             inputs.push(self.weight(bias, None, None)?);
         }
-        let inputs: Vec<&str> = inputs.iter().map(String::as_str).collect();
-        let result = self.graph.op(
-            "Conv",
-            &inputs,
-            &[
-                ("kernel_shape", Ints(&[down.kernel, along.kernel].map(|size| size as i64))),
-                ("strides", Ints(&[down.stride, along.stride].map(|size| size as i64))),
-                ("dilations", Ints(&[down.dilation, along.dilation].map(|size| size as i64))),
-                ("pads", Ints(&pads)),
-                ("group", Int(if depthwise { channels as i64 } else { 1 })),
-            ],
-        );
+        let result =
+            self.graph.windowed(&inputs, [down, along], pads, Some(if depthwise { channels } else { 1 }), true);
         self.activated(result, options.byte(if depthwise { 4 } else { 3 })?)
     }
 
@@ -347,15 +327,7 @@ impl<'a> TfliteConverter<'a> {
         let [down, along] = [window(4, 2)?, window(3, 1)?];
         let pads = padding(options, [(down, height), (along, width)])?;
         let value = self.value(image)?;
-        let pooled = self.graph.op(
-            "MaxPool",
-            &[&value],
-            &[
-                ("kernel_shape", Ints(&[down.kernel, along.kernel].map(|size| size as i64))),
-                ("strides", Ints(&[down.stride, along.stride].map(|size| size as i64))),
-                ("pads", Ints(&pads)),
-            ],
-        );
+        let pooled = self.graph.windowed(&[value], [down, along], pads, None, false);
         self.activated(pooled, options.byte(5)?)
     }
 }

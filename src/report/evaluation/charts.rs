@@ -27,10 +27,8 @@ pub fn joints(table: &Table, clips: &EvalClips) -> Vec<Node> {
         if joint == NECK {
             continue;
         }
-        let description = match shares[joint].is_nan() {
-            true => format!("{}: never seen", skeleton::name(joint)),
-            false => format!("{}: {:.0} %", skeleton::name(joint), 100.0 * shares[joint]),
-        };
+        let share = if shares[joint].is_nan() { "never seen" } else { &format!("{:.0} %", 100.0 * shares[joint]) };
+        let description = format!("{}: {share}", skeleton::name(joint));
         let radius = if body(joint) { 9.0 } else { 6.0 };
         all.push(ChartDot { at: place(joint), share: shares[joint], radius, description });
     }

@@ -24,7 +24,7 @@ use std::ops::Range;
 const MOST_SECS: f64 = 20.0;
 const MOST_FPS: f64 = 30.0;
 /// Value of a missing joint.
-const MISSING: i16 = i16::MIN;
+pub const MISSING: i16 = i16::MIN;
 /// Half window of a motion beat, as in beat consistency: a local minimum of speed over 7 frames at 30 fps on either
 /// side.
 const BEAT_SECS: f64 = 7.0 / 30.0;
@@ -99,11 +99,14 @@ fn excerpt(word: &str, error: f64, clip: &EvalClip, frames: Range<usize>, fps: f
     })
 }
 
+/// A coordinate in whole millimetres.
+pub fn to_millimetres(metres: f32) -> i16 {
+    if metres.is_finite() { (1000.0 * metres).round().clamp(-32_000.0, 32_000.0) as i16 } else { MISSING }
+}
+
 fn millimetres(joints: ArrayView3<f32>, frames: &[usize]) -> Vec<u8> {
-    let mm = |v: f32| if v.is_finite() { (1000.0 * v).round().clamp(-32_000.0, 32_000.0) as i16 } else { MISSING };
-    let numbers =
-        frames.iter().flat_map(|t| joints.index_axis(ndarray::Axis(0), *t).iter().map(|v| mm(*v)).collect::<Vec<_>>());
-    numbers.flat_map(i16::to_le_bytes).collect()
+    let numbers = frames.iter().flat_map(|t| joints.index_axis_move(ndarray::Axis(0), *t));
+    numbers.flat_map(|v| to_millimetres(*v).to_le_bytes()).collect()
 }
 
 fn to_wav(samples: &[i16]) -> Result<Vec<u8>> {

@@ -2,6 +2,8 @@
 //! file, and its content security policy forbids loading any.
 
 use super::node::{Node, node};
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
 
 const STYLE: &str = include_str!("page.css");
@@ -61,6 +63,16 @@ impl Page {
             .child(node("script").verbatim(SCRIPT).verbatim(self.script));
         format!("<!doctype html>\n{}\n", node("html").attr("lang", "en").child(head).child(body))
     }
+}
+
+/// JPEG of `width` x `height` px, loaded when it comes into view, with `description` as its alternative text.
+pub fn jpeg(bytes: &[u8], [width, height]: [usize; 2], description: &str) -> Node {
+    node("img")
+        .attr("src", format!("data:image/jpeg;base64,{}", STANDARD.encode(bytes)))
+        .attr("width", width)
+        .attr("height", height)
+        .attr("alt", description)
+        .attr("loading", "lazy")
 }
 
 #[cfg(test)]

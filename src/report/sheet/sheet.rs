@@ -183,19 +183,19 @@ impl SheetClip<'_> {
             let names = parts.iter().filter(|part| !part.1 && part.2 == is_found).map(|part| part.0);
             names.collect::<Vec<_>>().join(", ")
         };
-        let mut words = format!("{:.1} s", self.motion.fps.secs(frame_idx));
+        let mut words = vec![format!("{:.1} s", self.motion.fps.secs(frame_idx))];
         let shakes =
             [("L", L_WRIST), ("R", R_WRIST)].map(|(side, at)| (side, jitter_around(self.motion, at, frame_idx)));
         let shakes = shakes.into_iter().filter(|(_, mm)| mm.is_finite()).map(|(side, mm)| format!(" {side} {mm:.1}"));
         let shakes: String = shakes.collect();
         if !shakes.is_empty() {
-            words += &format!("   wrists shake{shakes} mm");
+            words.push(format!("wrists shake{shakes} mm"));
         }
         for (why, parts) in [("refused", without(true)), ("not seen", without(false))] {
             if !parts.is_empty() {
-                words += &format!("   {why}: {parts}");
+                words.push(format!("{why}: {parts}"));
             }
         }
-        words
+        words.join("   ")
     }
 }

@@ -101,10 +101,10 @@ impl<'a> TrainingLog<'a> {
 
 /// A metric of the network and of the mean pose in a validation; those of sequences are in no group of their own.
 pub fn metrics<'v>(validation: &'v Value, of: &str) -> [&'v Value; 2] {
-    match validation["generator"].is_object() {
-        true => [&validation["generator"][of], &validation["mean_pose"][of]],
-        false => [&validation[of], &validation[format!("mean_pose_{of}")]],
+    if validation["generator"].is_object() {
+        return ["generator", "mean_pose"].map(|row| &validation[row][of]);
     }
+    [&validation[of], &validation[format!("mean_pose_{of}")]]
 }
 
 /// Curve of a value of lines.

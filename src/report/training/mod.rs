@@ -3,5 +3,4 @@
 pub mod charts;
 pub mod live;
 pub mod page;
-pub mod picture;
 pub mod strip;

@@ -2,24 +2,21 @@
 //! metrics beside the mean pose's, and generated against true poses.
 
 use super::charts::{TrainingLog, metrics};
-use super::picture::picture;
 use super::strip::{HeldOutPair, strip};
+use crate::html::chart::lines::LineChart;
 use crate::html::numbers::number;
-use crate::html::picture as page_picture;
-use crate::html::{Node, Page, Section, node};
+use crate::html::{Node, Page, Section, jpeg, node};
 use anyhow::{Context, Result};
 use orator_base::stage::counted;
 use orator_base::stage::workdir;
 use orator_gesture::train::gan::score::below_mean_pose;
 use orator_gesture::train::log;
-use orator_media::ffmpeg::jpeg;
-use orator_media::opencv::png;
+use orator_media::ffmpeg;
 use serde_json::Value;
 use std::path::Path;
 
-/// File names of the page and of its picture.
+/// File name of the page.
 pub const PAGE: &str = "training.html";
-pub const PICTURE: &str = "training.png";
 
 /// Metric of a validation: name, key, whether in percent.
 const FIGURES: [(&str, &str, bool); 6] = [
@@ -31,17 +28,12 @@ const FIGURES: [(&str, &str, bool); 6] = [
     ("Motion energy as a share of the data's", "energy", true),
 ];
 
-/// Writes `training.html` and `training.png` into the training's folder, from its log and poses of held-out intervals
-/// (possibly none). The bytes depend on log and poses alone.
+/// Writes `training.html` into the folder of a training, from its log and poses of held-out intervals (possibly none).
+/// The bytes depend on log and poses only.
 pub fn write(folder: &Path, speaker: &str, pairs: &[HeldOutPair]) -> Result<()> {
     let lines = log::read(folder)?;
     let training_log = TrainingLog::parse(&lines);
     let charts = training_log.charts();
-    let title = format!("Training of {speaker}");
-    let strip = strip(pairs)?;
-    let whole = picture(&title, &charts, &strip)?;
-    workdir::replace(&folder.join(PICTURE), |path| png::write(path, &whole))?;
-
     let mut poses = vec![node("p").text(
         "Intervals that were not trained on: what the speaker did, and under it what the best checkpoint makes of the \
          speech alone. The lines are the height of the wrists: grey the speaker's, in colour the generated one.",
@@ -49,18 +41,19 @@ pub fn write(folder: &Path, speaker: &str, pairs: &[HeldOutPair]) -> Result<()> 
     if pairs.is_empty() {
         poses = vec![node("p").class("empty").text("There is no interval of the 49 joints to show.")];
     } else {
+        let strip = strip(pairs)?;
         let names: Vec<&str> = pairs.iter().map(|pair| pair.name.as_str()).collect();
         let description = format!("True and generated poses of {}", names.join(", "));
-        let image = page_picture::jpeg(&jpeg::encode(&strip)?, [strip.width, strip.height], &description);
+        let image = jpeg(&ffmpeg::jpeg::encode(&strip)?, [strip.width, strip.height], &description);
         poses.push(node("div").class("scroll").child(image.class("strip")));
     }
     let section = |id, title, body| Section { id, title, body };
     let page = Page {
-        title,
+        title: format!("Training of {speaker}"),
         lead: lead(&training_log),
         sections: vec![
             section("best", "Best epoch", best(&training_log)),
-            section("curves", "Curves", vec![node("div").class("grid").children(charts.iter().map(|c| c.card()))]),
+            section("curves", "Curves", vec![node("div").class("grid").children(charts.iter().map(LineChart::card))]),
             section("poses", "Generated against true poses", poses),
         ],
         style: include_str!("page.css"),

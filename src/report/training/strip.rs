@@ -31,7 +31,7 @@ const PAIR_PX: usize = NAME_PX + 2 * CELL[1] + 2 * LANE_PX + 14;
 const LANE_METRES: f32 = 0.15;
 
 /// Width of the picture, px.
-pub const WIDTH: usize = MARGIN + N_MOMENTS * CELL[0];
+const WIDTH: usize = MARGIN + N_MOMENTS * CELL[0];
 
 /// Draws the pairs one below the other.
 pub fn strip(pairs: &[HeldOutPair]) -> Result<Image> {

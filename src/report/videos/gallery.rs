@@ -5,7 +5,7 @@ use super::reasons;
 use super::video::VideoSummary;
 use super::worst::{Moment, Worst};
 use crate::html::numbers::clock;
-use crate::html::{Node, node, picture};
+use crate::html::{Node, jpeg, node};
 use orator_base::stage::counted;
 use std::collections::BTreeMap;
 
@@ -35,7 +35,7 @@ pub fn gallery(worst: &Worst, pictures: &Pictures, videos: &[VideoSummary]) -> V
 fn card(moment: &Moment, video: &VideoSummary, pictures: &Pictures) -> Node {
     let at = format!("{} at {}", video.file, clock(moment.secs));
     let shown = match pictures.get(&(moment.video, moment.frames.clone())) {
-        Some(found) => picture::jpeg(&found.jpeg, found.size, &format!("{at}: {}", moment.description)),
+        Some(found) => jpeg(&found.jpeg, found.size, &format!("{at}: {}", moment.description)),
         None => node("p").class("empty nopicture").text("The picture cannot be read."),
     };
     let link = node("a").attr("href", format!("#{}", video.anchor())).text(at);

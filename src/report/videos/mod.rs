@@ -1,8 +1,7 @@
 //! Page of a speaker's videos. Data (`gather`, one pass over the videos): `video`, `what_if`, `spread`, `movement`,
-//! `worst`, `pictures`. Sections: `summary`, `timelines`, `gallery`, `distributions`, `sliders`, `motion`; `page` joins
+//! `worst`, `pictures`. Sections: `summary`, `timelines`, `gallery`, `spread`, `sliders`, `motion`; `page` joins
 //! them.
 
-pub mod distributions;
 pub mod gallery;
 pub mod gather;
 pub mod motion;

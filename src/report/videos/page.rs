@@ -2,13 +2,13 @@
 
 use super::gallery::{Pictures, gallery};
 use super::gather::{ReportData, gather};
+use super::spread::distributions;
 use super::summary;
 use super::summary::ReportTotals;
-use super::{distributions, motion, pictures, sliders, timelines};
+use super::{motion, pictures, sliders, timelines};
 use crate::faces;
 use crate::html::{Page, Section};
 use crate::preview;
-use crate::splits;
 use orator_base::stage::counted;
 use orator_base::stage::progress::Progress;
 use orator_dataset::config::Settings;
@@ -72,9 +72,9 @@ fn page(request: &ReportRequest, gathered: &ReportData, pictures: &Pictures, sum
     let rules = &request.settings.segment;
     let per_sec = request.settings.extract.rate().per_sec();
     let ReportData { videos, kept, spread, movement, worst, previews, missing, n_heard } = gathered;
-    let splits = splits::of_videos(request.settings, request.videos);
+    let splits = summary::video_splits(request.settings, request.videos);
     let mut data = sliders::data(kept, videos, rules);
-    data["previews"] = preview::motion::data(previews);
+    data["previews"] = preview::data(previews);
     let names: Vec<&str> = request.videos.iter().map(|videos| videos.speaker.as_str()).collect();
     let section = |id, title, body| Section { id, title, body };
     let mut reasons = summary::by_reason(sums);
@@ -93,11 +93,11 @@ fn page(request: &ReportRequest, gathered: &ReportData, pictures: &Pictures, sum
             section("totals", "Totals", summary::totals(sums, videos, missing)),
             section("reasons", "By reason", reasons),
             section("videos", "Videos", summary::table(videos, &splits)),
-            section("previews", "Kept motion", preview::motion::section(previews)),
+            section("previews", "Kept motion", preview::section(previews)),
             section("timelines", "Timelines", timelines::lines(videos)),
             section("thresholds", "Thresholds", sliders::sliders(kept, rules)),
             section("frames", "Worst frames", gallery(worst, pictures, videos)),
-            section("distributions", "Distributions", distributions::distributions(spread, request.settings, per_sec)),
+            section("distributions", "Distributions", distributions(spread, request.settings, per_sec)),
             section("motion", "Motion", motion::motion(movement)),
         ],
         style: include_str!("page.css"),

@@ -4,11 +4,15 @@ use super::reasons;
 use super::reasons::WAITING;
 use super::video::VideoSummary;
 use crate::html;
-use crate::html::chart::bars::{StackedBar, bars};
 use crate::html::numbers::{length, percent};
 use crate::html::{Node, legend, node};
-use crate::splits::VideoSplits;
+use orator_base::stage::artifacts::{StageName, speaker_dir};
 use orator_base::stage::counted;
+use orator_base::types::split::Split;
+use orator_dataset::INFO;
+use orator_dataset::config::Settings;
+use orator_dataset::config::videos::Videos;
+use orator_dataset::info::{DatasetInfo, DatasetVideo};
 use std::collections::BTreeMap;
 
 /// Seconds of all videos together.
@@ -79,26 +83,37 @@ pub fn speech((n_heard, n_videos): (usize, usize)) -> Node {
     node("p").class("note").text(text)
 }
 
+/// Part of all seconds: name, CSS class of its colour, seconds, and its meaning in a sentence, which may be empty.
+type Part<'a> = (&'a str, String, f64, &'static str);
+
 /// Bar for each reason, the longest first.
 pub fn by_reason(sums: &ReportTotals) -> Vec<Node> {
-    let bar = |name: &str, class: &str, secs: f64, description: &'static str| StackedBar {
-        name: name.to_owned(),
-        class: class.to_owned(),
-        secs,
-        description,
-    };
     let of_reason =
-        |(reason, secs): (&String, &f64)| bar(reason, &reasons::class(reason), *secs, reasons::heading(reason));
-    let mut parts: Vec<StackedBar> = sums.refused.iter().map(of_reason).collect();
-    parts.sort_by(|a, b| b.secs.total_cmp(&a.secs).then(a.name.cmp(&b.name)));
-    parts.insert(0, bar("kept", "kept", sums.kept, "worth learning from"));
+        |(reason, secs): (&'_ String, &f64)| (reason.clone(), reasons::class(reason), *secs, reasons::heading(reason));
+    let mut refused: Vec<_> = sums.refused.iter().map(of_reason).collect();
+    refused.sort_by(|a, b| b.2.total_cmp(&a.2).then(a.0.cmp(&b.0)));
+    let mut parts: Vec<Part> = vec![("kept", "kept".to_owned(), sums.kept, "worth learning from")];
+    parts.extend(refused.iter().map(|(name, class, secs, heading)| (name.as_str(), class.clone(), *secs, *heading)));
     if sums.failed > 0.0 {
-        parts.push(bar("failed", "failed", sums.failed, "a stage failed"));
+        parts.push(("failed", "failed".to_owned(), sums.failed, "a stage failed"));
     }
     if sums.waiting > 0.0 {
-        parts.push(bar(WAITING, "waiting", sums.waiting, "no verdict yet"));
+        parts.push((WAITING, "waiting".to_owned(), sums.waiting, "no verdict yet"));
     }
-    vec![bars("Seconds kept, refused by reason, and failed", &parts, sums.whole)]
+    let longest = parts.iter().map(|part| part.2).fold(0.0, f64::max).max(1e-9);
+    let caption = node("caption").class("unseen").text("Seconds kept, refused by reason, and failed");
+    let rows = parts.iter().map(|part| bar(part, longest, sums.whole));
+    vec![node("table").class("bars").child(caption).child(node("tbody").children(rows))]
+}
+
+/// Row of a part; its bar is relative to the `longest`, its share to the `whole`.
+fn bar((name, class, secs, description): &Part, longest: f64, whole: f64) -> Node {
+    let style = format!("width:{:.2}%", 100.0 * secs / longest);
+    let name = node("th").attr("scope", "row").text(name);
+    let name = if description.is_empty() { name } else { name.child(node("small").text(description)) };
+    let drawn = node("div").class(format!("bar {class}")).attr("style", style);
+    let cells = [length(*secs), percent(*secs, whole)].map(|text| node("td").class("num").text(text));
+    node("tr").child(name).child(node("td").class("barcell").child(drawn)).children(cells)
 }
 
 /// Table of the speakers, where there are several.
@@ -152,4 +167,27 @@ pub fn table(videos: &[VideoSummary], splits: &VideoSplits) -> Vec<Node> {
     };
     let around = node("div").class("scroll").attr("tabindex", "0").attr("role", "region").attr("aria-label", "Videos");
     vec![around.child(html::table("videos", heads.map(head), videos.iter().map(row)))]
+}
+
+/// The splits of each video in words, by `speaker/video`.
+pub type VideoSplits = BTreeMap<String, String>;
+
+/// Splits of all videos that are in a dataset; a speaker without a dataset has none.
+pub fn video_splits(settings: &Settings, videos: &[Videos]) -> VideoSplits {
+    let mut splits = VideoSplits::new();
+    for Videos { speaker, .. } in videos {
+        // One file, which is whole also while a run replaces the dataset.
+        let info = std::fs::read(speaker_dir(&settings.work.dir, StageName::Dataset, speaker).join(INFO));
+        let info: Option<DatasetInfo> = info.ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
+        let named = info.iter().flat_map(|info| &info.videos).filter(|video| video.samples > 0);
+        splits.extend(named.map(|video| (format!("{speaker}/{}", video.name), split_words(video))));
+    }
+    splits
+}
+
+/// Split of a video, or those of its blocks of time.
+fn split_words(video: &DatasetVideo) -> String {
+    let has =
+        |split: &Split| video.split == Some(*split) || video.blocks.iter().any(|block| block.split == Some(*split));
+    Split::ALL.into_iter().filter(has).map(Split::name).collect::<Vec<_>>().join(", ")
 }

@@ -100,9 +100,8 @@ impl VideoSummary {
 
     /// Adds a note without local folder names.
     pub fn note(&mut self, text: &str) {
-        let text = self.folders.iter().fold(text.to_owned(), |text, (folder, name)| match name.is_empty() {
-            true => text.replace(&format!("{folder}/"), ""),
-            false => text.replace(folder, name),
+        let text = self.folders.iter().fold(text.to_owned(), |text, (folder, name)| {
+            if name.is_empty() { text.replace(&format!("{folder}/"), "") } else { text.replace(folder, name) }
         });
         self.notes.push(text);
     }

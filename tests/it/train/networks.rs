@@ -3,6 +3,7 @@
 
 use crate::fixtures::networks::{every_window, fill};
 use candle_core::{DType, Device, Tensor};
+use orator_lab::train::space::auto_encoder::AutoEncoder;
 use orator_nn::Mode;
 use orator_nn::gan::discriminator::Discriminator;
 use orator_nn::gan::generator;
@@ -10,7 +11,6 @@ use orator_nn::gan::generator::{Config, Generator, Preset};
 use orator_nn::lifter::temporal;
 use orator_nn::lifter::temporal::TemporalLifter;
 use orator_nn::motion_encoder;
-use orator_nn::motion_encoder::AutoEncoder;
 use orator_nn::ops::gradcheck::pattern;
 use orator_nn::params::Params;
 use std::collections::BTreeMap;

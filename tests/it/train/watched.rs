@@ -91,11 +91,11 @@ fn stopped_twice(network: &str) {
     let said = first + &second;
     let validation = format!("step {}: validation L1 ", n_steps * 6 / 20);
     assert!(said.contains(&validation) && said.contains(", score ") && answer["best_step"].is_u64(), "{said}");
-    assert!(["html", "png"].iter().all(|kind| dir.join(format!("stopped/training.{kind}")).is_file()));
+    assert!(dir.join("stopped/training.html").is_file());
 
     assert!(train(dir, network, "stopped").output().unwrap().status.success());
     let last = format!("step-{n_steps:07}.safetensors");
-    for file in [&last, "best.safetensors", "metrics.jsonl", "training.html", "training.png"] {
+    for file in [&last, "best.safetensors", "metrics.jsonl", "training.html"] {
         let read = |out: &str| std::fs::read(dir.join(out).join(file)).unwrap();
         assert!(read("stopped") == read(&out_of_calm), "{network}: {file} differs");
     }

@@ -127,13 +127,8 @@ fn at(seen: &[SeenBody], place: f64) -> SeenBody {
     let share = place.fract() as f32;
     std::array::from_fn(|j| match (before[j], after[j]) {
         (Some(a), Some(b)) => Some([0, 1].map(|k| a[k] + share * (b[k] - a[k]))),
-        (a, b) => {
-            if share < 0.5 {
-                a
-            } else {
-                b
-            }
-        }
+        (a, _) if share < 0.5 => a,
+        (_, b) => b,
     })
 }
 
@@ -188,18 +183,9 @@ mod tests {
     }
 
     fn frame(shift: f32) -> SeenBody {
-        let points = [
-            [0., -40.],
-            [-50., 0.],
-            [-55., 60.],
-            [-40., 110.],
-            [50., 0.],
-            [55., 60.],
-            [40., 110.],
-            [-30., 120.],
-            [30., 120.],
-        ];
-        points.map(|[x, y]: [f32; 2]| Some([x + 300.0 + shift, y + 200.0]))
+        let xs: [f32; N_POINTS] = [0.0, -50.0, -55.0, -40.0, 50.0, 55.0, 40.0, -30.0, 30.0];
+        let ys: [f32; N_POINTS] = [-40.0, 0.0, 60.0, 110.0, 0.0, 60.0, 110.0, 120.0, 120.0];
+        std::array::from_fn(|j| Some([xs[j] + 300.0 + shift, ys[j] + 200.0]))
     }
 
     #[test]

@@ -1,5 +1,4 @@
-//! Inputs of the lifters: keypoints of body and hands, normalised, and hand heat-maps.
+//! Inputs of the lifters: normalised keypoints of body and hands.
 
 pub mod body;
 pub mod hand;
-pub mod heatmaps;

@@ -2,7 +2,7 @@
 //! alike (`.NAME.attempt-PROCESS-NUMBER.EXT`), so that programs that write the same file never share an attempt. What
 //! a killed program left is removed by the next attempt at the same target.
 
-use super::disk::parent;
+use super::file::parent;
 use rustix::io::Errno;
 use rustix::process::{Pid, test_kill_process};
 use std::ffi::OsString;
@@ -16,7 +16,7 @@ use std::time::{Duration, SystemTime};
 const RECENT: Duration = Duration::from_secs(60);
 
 /// Makes an attempt beside `target` by `create`, which must fail where something is, a link too.
-pub fn begin(target: &Path, create: impl Fn(&Path) -> Result<()>) -> Result<PathBuf> {
+pub(crate) fn begin(target: &Path, create: impl Fn(&Path) -> Result<()>) -> Result<PathBuf> {
     static NEXT: AtomicU64 = AtomicU64::new(1);
     sweep(target)?;
     let [start, end] = name_parts(target);
@@ -33,13 +33,13 @@ pub fn begin(target: &Path, create: impl Fn(&Path) -> Result<()>) -> Result<Path
 }
 
 /// Removes what killed programs left of their attempts at `target`.
-pub fn sweep(target: &Path) -> Result<()> {
+pub(crate) fn sweep(target: &Path) -> Result<()> {
     let mut stale = attempts(target).into_iter().filter(|(path, process)| is_stale(path, *process));
     stale.try_for_each(|(path, _)| remove(&path))
 }
 
 /// Where the folder `target` stands while two renames put another in its place.
-pub fn moved_aside(target: &Path) -> PathBuf {
+pub(crate) fn moved_aside(target: &Path) -> PathBuf {
     let mut name = OsString::from(".");
     name.push(target.file_name().unwrap_or_default());
     name.push(".old");

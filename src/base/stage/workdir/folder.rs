@@ -1,7 +1,7 @@
 //! A whole folder in the place of another: one exchange of names, or two renames where the file system has none.
 
 use super::attempt;
-use super::disk::{flush, flush_tree, full_disk, parent};
+use super::file::{flush, flush_tree, full_disk, parent};
 use anyhow::{Context, Result};
 use rustix::fs::{CWD, RenameFlags, renameat_with};
 use rustix::io::Errno;

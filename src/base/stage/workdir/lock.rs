@@ -3,7 +3,7 @@
 //! who comes second is told who is at work. A lock goes with its process, however that ends.
 
 use super::attempt::is_alive;
-use super::disk::parent;
+use super::file::parent;
 use super::folder::{recover_folder, restore_folder};
 use anyhow::{Context, Result};
 use rustix::fs::OFlags;
@@ -59,20 +59,15 @@ pub fn lock_with_others(folder: &Path) -> Result<FolderLock> {
 }
 
 impl FolderLock {
-    /// For who replaces, changes or removes the folder.
-    ///
-    /// # Errors
-    /// `BusyFolder`; a link in the place of the lock file.
+    /// For who replaces, changes or removes the folder. Errors: `BusyFolder`; a link in the place of the lock file.
     pub fn exclusive(folder: &Path) -> Result<Self> {
         // Without a folder to lie in, there is no lock; making the folder itself fails for the same reason.
         let _ = fs::create_dir_all(parent(folder));
         Self::beside(folder, true)
     }
 
-    /// For who reads the folder, or writes what comes of it.
-    ///
-    /// # Errors
-    /// `BusyFolder`; a link in the place of the lock file.
+    /// For who reads the folder, or writes what comes of it. Errors: `BusyFolder`; a link in the place of the lock
+    /// file.
     pub fn shared(folder: &Path) -> Result<Self> {
         Self::beside(folder, false)
     }

@@ -2,14 +2,11 @@
 //! flush it to disk, rename. The only renames of the project are here, and the locks that keep programs apart.
 
 mod attempt;
-mod disk;
 mod file;
 mod folder;
 mod lock;
 
 pub use attempt::{is_alive, left_over, remove};
-pub use disk::full_disk;
-pub use disk::{NoSpace, bytes_under};
-pub use file::{has_files, move_files, remove_file, replace, write_file};
+pub use file::{NoSpace, bytes_under, full_disk, has_files, move_files, remove_file, replace, write_file};
 pub use folder::{attempt_folder, build_folder, recover_folder, replace_folder, restore_folder};
 pub use lock::{BusyFolder, FolderLock, announce, are_kept_apart, lock, lock_with_others};

@@ -7,9 +7,8 @@ use orator_base::types::time::FrameRate;
 use orator_nn::params::Params;
 use orator_nn::seq2seq::autoencoder::AudioBaseline;
 use orator_nn::seq2seq::config::Config;
-use orator_nn::seq2seq::contextual::ContextSeq2Seq;
+use orator_nn::seq2seq::networks::{ContextSeq2Seq, WordsSeq2Seq};
 use orator_nn::seq2seq::predict::GesturePredictor;
-use orator_nn::seq2seq::words::WordsSeq2Seq;
 use serde::{Deserialize, Serialize};
 
 /// Seconds that are predicted at once, of the poses before them, and heard on either side of a pose.

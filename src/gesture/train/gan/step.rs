@@ -17,12 +17,11 @@ use candle_core::{Device, Tensor};
 use orator_dataset::config::{ComputeDevice, GanConfig};
 use orator_formats::checkpoint;
 use orator_formats::checkpoint::Contents;
-use orator_nn::device;
 use orator_nn::gan::discriminator::{Discriminator, motion};
 use orator_nn::gan::generator::Generator;
 use orator_nn::gan::speaker_layer::SPEAKER;
 use orator_nn::ops::resize;
-use orator_nn::params::Params;
+use orator_nn::params::{Params, open_device};
 use rand::Rng;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -94,7 +93,7 @@ pub struct GanTrainer {
 impl GanTrainer {
     /// Networks as the seed makes them, for one speaker or several.
     pub fn new(speakers: Vec<SpeakerMetadata>, settings: GanSettings) -> Result<Self> {
-        let device = device::open(settings.device == ComputeDevice::Cuda)?;
+        let device = open_device(settings.device == ComputeDevice::Cuda)?;
         let mut generator_params = Params::new(settings.seed).on(&device);
         let speakers = LearntSpeakers::new(speakers, &device)?;
         let generator = Generator::new(&mut generator_params, speakers.network())?;

@@ -30,8 +30,8 @@ use orator_dataset::{Dataset, Split};
 use orator_formats::checkpoint;
 use orator_formats::checkpoint::Contents;
 use orator_nn::cpu::thread_team::with_spinning_workers;
-use orator_nn::device;
 use orator_nn::gan::generator::FRAMES_MULTIPLE;
+use orator_nn::params::open_device;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -298,6 +298,6 @@ fn check(settings: &GanConfig) -> Result<()> {
         settings.checkpoint_every > 0 && settings.epoch_steps.given() != Some(0) && settings.stride_frames > 0,
         "gan.checkpoint_every, gan.epoch_steps and gan.stride_frames must be at least 1"
     );
-    device::open(settings.device == ComputeDevice::Cuda)?;
+    open_device(settings.device == ComputeDevice::Cuda)?;
     Ok(())
 }

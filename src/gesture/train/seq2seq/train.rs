@@ -27,7 +27,7 @@ use orator_formats::checkpoint::Contents;
 use orator_formats::word_vectors::WordVectors;
 use orator_nn::cpu::thread_team::with_spinning_workers;
 use orator_nn::seq2seq::config::Config;
-use orator_nn::seq2seq::embedding::set_word_vectors;
+use orator_nn::seq2seq::encoders::set_word_vectors;
 use std::path::{Path, PathBuf};
 
 /// Numbers of a word where no table of vectors is given.

@@ -1,16 +1,16 @@
 //! What the heat-map lifter learns (Zimmermann & Brox 2017): score maps of hands made by rule to the hand in its own
 //! frame and that frame's turn. The same hands as the coordinate network's, all of them right ones.
 
+use super::heatmap_network::{HeatmapLifter, NAME, right_sides};
+use super::score_maps::{Crop, PLACES, canonical, score_maps};
 use crate::train::scene::hand::{errors, sample_hand};
 use crate::train::scene::hand_shape::normal;
 use crate::train::supervised::TrainingTask;
 use anyhow::Result;
 use candle_core::Tensor;
-use orator_base::motion::view::heatmaps::{Crop, PLACES, canonical, score_maps};
 use orator_base::types::pose2d::N_HAND;
 use orator_base::types::skeleton::Side;
 use orator_nn::Mode;
-use orator_nn::lifter::heatmap::{HeatmapLifter, NAME, right_sides};
 use orator_nn::params::Params;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -97,8 +97,8 @@ impl TrainingTask for HeatmapLifterTask {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::train::lifter::score_maps::N_MAPS;
     use candle_core::Device;
-    use orator_base::motion::view::heatmaps::N_MAPS;
     use rand::SeedableRng;
 
     #[test]

@@ -1,6 +1,9 @@
-//! Training of the lifters: body, hands, hand heat-maps.
+//! Training of the lifters: body, hands, hand heat-maps (with their network).
 
 pub mod body;
+pub mod conv3x3;
 pub mod errors;
 pub mod hands;
+pub mod heatmap_network;
 pub mod heatmaps;
+pub mod score_maps;

@@ -2,6 +2,7 @@
 //! mean absolute error of the normalised bone directions plus that of their steps from frame to frame (as in the GENEA
 //! evaluation's auto-encoder), the six bones of arms and shoulders together counting as much as the forty of the fingers.
 
+use super::auto_encoder::AutoEncoder;
 use super::corpus::{Corpus, CorpusPiece};
 use crate::train::supervised::TrainingTask;
 use anyhow::Result;
@@ -12,7 +13,7 @@ use orator_base::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, R_HAND, R_WRIST, p
 use orator_gesture::metrics::space::embedding::{KIND, WINDOW, directions};
 use orator_gesture::metrics::space::fixed_rate::{N_JOINTS_USED, N_NUMBERS, joints_used};
 use orator_nn::Mode;
-use orator_nn::motion_encoder::{AutoEncoder, Config};
+use orator_nn::motion_encoder::Config;
 use orator_nn::params::Params;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;

@@ -5,6 +5,9 @@
 use crate::cpu::packed_matrix::{COLUMNS, PackedMatrix};
 use crate::cpu::tensor::{Matrix, Scalar, add_product};
 use crate::cpu::vectorised::{gates_backward, gates_forward};
+use candle_core::Result;
+use std::any::Any;
+use std::sync::OnceLock;
 
 /// Rows of the largest piece of a batch.
 const PIECE: usize = 64;
@@ -183,5 +186,23 @@ pub fn sum_of_pieces<T: Scalar>(pieces: &[Vec<T>]) -> Vec<T> {
 pub fn widen<T: Scalar>(rows: &[T], hidden: usize, to: &mut [T], width: usize) {
     for (from, to) in rows.chunks_exact(hidden).zip(to.chunks_exact_mut(width)) {
         to[..hidden].copy_from_slice(from);
+    }
+}
+
+/// What the forward pass of an operator leaves for its backward pass: numbers by pieces of the batch, written once.
+#[derive(Default)]
+pub struct SavedPieces(OnceLock<Box<dyn Any + Send + Sync>>);
+
+impl SavedPieces {
+    pub fn put<T: Send + Sync + 'static>(&self, pieces: Vec<Vec<T>>) {
+        let _ = self.0.set(Box::new(pieces));
+    }
+
+    /// Errors when no forward pass has left anything.
+    pub fn get<T: 'static>(&self) -> Result<&[Vec<T>]> {
+        match self.0.get().and_then(|pieces| pieces.downcast_ref::<Vec<Vec<T>>>()) {
+            Some(pieces) => Ok(pieces),
+            None => candle_core::bail!("backward was called without a forward pass"),
+        }
     }
 }

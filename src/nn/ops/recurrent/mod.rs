@@ -1,7 +1,6 @@
-//! Layers that go through a sequence step by step, the whole of it in one operator: GRU and the decoder that attends.
+//! Recurrent layers, each a single operator over the whole sequence: GRU, and decoder with attention.
 
 pub mod cell;
 pub mod decoder;
 pub mod decoder_pass;
 pub mod gru;
-pub mod saved;

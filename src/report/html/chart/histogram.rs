@@ -88,12 +88,10 @@ pub fn histogram(label: &str, counts: &Counts, unit: &str, threshold: Option<Thr
     svg = svg.child(line("axis", [LEFT, FLOOR], [RIGHT, FLOOR]));
     for tick in x.ticks(6) {
         let at = x.at(tick);
-        let anchor = if at < LEFT + 10.0 {
-            "start"
-        } else if at > RIGHT - 10.0 {
-            "end"
-        } else {
-            "middle"
+        let anchor = match at {
+            at if at < LEFT + 10.0 => "start",
+            at if at > RIGHT - 10.0 => "end",
+            _ => "middle",
         };
         svg = svg.child(line("axis", [at, FLOOR], [at, FLOOR + 4.0]));
         svg = svg.child(words("tick", [at, FLOOR + 17.0], anchor, &number(tick)));

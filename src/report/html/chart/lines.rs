@@ -49,7 +49,7 @@ impl LineChart {
     }
 
     /// Ranges of the axes: first to last step, and 0 (or the smallest value below it) to the largest value.
-    pub fn ranges(&self) -> [[f64; 2]; 2] {
+    fn ranges(&self) -> [[f64; 2]; 2] {
         let levels = self.levels.iter().map(|level| level.value).filter(|value| value.is_finite());
         let around = |values: &mut dyn Iterator<Item = f64>, low: f64| {
             values.fold([low, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
@@ -62,7 +62,7 @@ impl LineChart {
     }
 
     /// Round numbers for the value axis.
-    pub fn ticks(&self) -> Vec<f64> {
+    fn ticks(&self) -> Vec<f64> {
         let [_, [low, high]] = self.ranges();
         Scale { low, high, from: 0.0, to: 1.0 }.ticks(4)
     }

@@ -1,6 +1,5 @@
 //! Charts as SVG, drawn without a script.
 
-pub mod bars;
 pub mod curve;
 pub mod dots;
 pub mod forest;

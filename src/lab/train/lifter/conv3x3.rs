@@ -1,9 +1,9 @@
 //! Convolution of pictures with kernels of 3 x 3, padding "same", channels last: every output place's patch becomes a
 //! row, and the layer one matrix product.
 
-use crate::cpu::axis::ConvAxis;
-use crate::params::{Init, Params};
 use candle_core::{Result, Tensor};
+use orator_nn::cpu::axis::ConvAxis;
+use orator_nn::params::{Init, Params};
 
 /// `<name>.weight` [O, C, 3, 3] (Glorot uniform) and `<name>.bias` [O] (1e-4).
 pub struct Conv3x3 {
@@ -14,8 +14,7 @@ pub struct Conv3x3 {
 
 impl Conv3x3 {
     pub fn new(params: &mut Params, name: &str, n_in: usize, n_out: usize, stride: usize) -> Result<Self> {
-        let weight = params.trainable(&format!("{name}.weight"), &[n_out, n_in, 3, 3], Init::Glorot)?;
-        let bias = params.trainable(&format!("{name}.bias"), &[n_out], Init::Constant(1e-4))?;
+        let (weight, bias) = params.layer(name, &[n_out, n_in, 3, 3], Init::Glorot, Init::Constant(1e-4))?;
         Ok(Self { weight, bias, stride })
     }
 
@@ -50,8 +49,8 @@ fn places(batch: usize, down: ConvAxis, across: ConvAxis) -> Vec<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::gradcheck::{pattern, worst};
     use candle_core::DType;
+    use orator_nn::ops::gradcheck::{pattern, worst};
 
     #[test]
     fn gradients_are_right_at_even_and_odd_sizes() -> Result<()> {

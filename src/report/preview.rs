@@ -1,7 +1,7 @@
 //! A few seconds of a kept interval as a figure that moves: joints from the front in whole millimetres, which bounds the
 //! page's size.
 
-use crate::evaluation::player::bones;
+use crate::evaluation::player::{bones, to_millimetres};
 use crate::html::{Node, node};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -14,8 +14,6 @@ const MOST_SECS: f64 = 8.0;
 const MOST_FPS: f64 = 10.0;
 /// Most previews on a page: 12 of them take 0.5 MB.
 pub const MOST_PREVIEWS: usize = 12;
-/// Value of a missing joint.
-const MISSING: i16 = i16::MIN;
 
 /// Beginning of the longest kept interval of a video.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,14 +33,12 @@ impl MotionPreview {
         let step = (fps / MOST_FPS).ceil().max(1.0) as usize;
         let most = (MOST_SECS * fps) as usize;
         let end = longest.end.min(longest.start + most).min(motion.n_frames());
-        let millimetres =
-            |v: f32| if v.is_finite() { (1000.0 * v).round().clamp(-32_000.0, 32_000.0) as i16 } else { MISSING };
         let mut joints = Vec::new();
         for frame in (longest.start..end).step_by(step) {
             for (joint, seen) in
                 motion.joints.index_axis(ndarray::Axis(0), frame).outer_iter().zip(motion.mask.row(frame))
             {
-                let [x, y] = if *seen { [joint[0], joint[1]] } else { [f32::NAN; 2] }.map(millimetres);
+                let [x, y] = if *seen { [joint[0], joint[1]] } else { [f32::NAN; 2] }.map(to_millimetres);
                 joints.extend([x, y].map(i16::to_le_bytes).concat());
             }
         }
@@ -82,6 +78,7 @@ pub fn section(previews: &[MotionPreview]) -> Vec<Node> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::evaluation::player::MISSING;
     use ndarray::{Array2, Array3};
     use orator_base::types::time::FrameRate;
 

@@ -2,10 +2,10 @@
 //! middle knuckle, and the hand's own frame that its two networks meet in. House point order: the paper's points 11,
 //! 12 and 20 are 10, 9 and 17 here.
 
-use super::hand::{HandJoints, SeenHand};
-use crate::math::vec3;
-use crate::math::vec3::Vec3;
-use crate::types::pose2d::N_HAND;
+use orator_base::math::vec3;
+use orator_base::math::vec3::Vec3;
+use orator_base::motion::view::hand::{HandJoints, SeenHand};
+use orator_base::types::pose2d::N_HAND;
 
 /// Places of a score map across and down.
 pub const PLACES: usize = 32;
@@ -92,8 +92,8 @@ pub fn assembled(own: &HandJoints, axes: &[Vec3; 3]) -> HandJoints {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::rotation::Rotation;
-    use crate::motion::hand_bones::{PHALANX, relaxed};
+    use orator_base::math::rotation::Rotation;
+    use orator_base::motion::hand_bones::{PHALANX, relaxed};
 
     #[test]
     fn a_hand_comes_back_from_its_own_frame() {

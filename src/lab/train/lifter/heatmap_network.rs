@@ -1,17 +1,17 @@
 //! The hand lifter of Zimmermann & Brox 2017 (section 4.3): score maps of the 21 points and the hand's side to a hand
-//! in its own frame (`PosePrior`) and the turn of that frame (`ViewPoint`). Measured beside the coordinate network of
-//! `hand_lifter`; not built into the program.
+//! in its own frame (`PosePrior`) and the rotation of that frame (`ViewPoint`). The baseline that the coordinate network
+//! of the product (`orator_nn::lifter::hand`) is measured against.
 
-use super::hand;
-use crate::Mode;
-use crate::ops::conv3x3::Conv3x3;
-use crate::ops::dropout::dropout;
-use crate::ops::linear::Linear;
-use crate::params::{Init, Params};
+use super::conv3x3::Conv3x3;
+use super::score_maps::{Crop, N_MAPS, PLACES, assembled, score_maps};
 use candle_core::{D, Device, Module, Result, Tensor};
+use candle_nn::Linear;
 use orator_base::motion::view::hand::{HandJoints, SeenHand};
-use orator_base::motion::view::heatmaps::{Crop, N_MAPS, PLACES, assembled, score_maps};
 use orator_base::types::skeleton::Side;
+use orator_nn::Mode;
+use orator_nn::lifter::hand;
+use orator_nn::ops::dropout::dropout;
+use orator_nn::params::{Init, Params};
 
 /// Prefix of the network's tensors in a weights file.
 pub const NAME: &str = hand::NAME;
@@ -50,7 +50,7 @@ impl Tower {
         let mut n_in = (PLACES / 8) * (PLACES / 8) * n_in + 2;
         let mut layers = Vec::new();
         for (i, n_out) in widths.into_iter().enumerate() {
-            layers.push(Linear::with_init(params, &format!("{name}.dense{i}"), [n_in, n_out], Init::Glorot, 1e-4)?);
+            layers.push(params.linear(&format!("{name}.dense{i}"), [n_in, n_out], Init::Glorot, 1e-4)?);
             n_in = n_out;
         }
         Ok(Self { convolutions, layers, dropout })
@@ -149,10 +149,10 @@ pub fn rotation(vectors: &Tensor) -> Result<Tensor> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::gradcheck::{pattern, worst};
-    use candle_core::{DType, Device};
+    use candle_core::DType;
     use orator_base::math::rotation::Rotation;
     use orator_base::math::vec3;
+    use orator_nn::ops::gradcheck::{pattern, worst};
 
     #[test]
     fn the_layers_have_the_published_sizes() -> anyhow::Result<()> {

@@ -1,0 +1,135 @@
+//! The networks with encoders and the shared decoder: `WordsSeq2Seq` (network A) and `ContextSeq2Seq` (network B).
+
+use super::config::{Config, Segment};
+use super::decoder::Decoder;
+use super::encoders::{ContextEncoder, FrameEncoder, WordEncoder};
+use super::predict::GesturePredictor;
+use crate::Mode;
+use crate::ops::affine::Affine;
+use crate::ops::recurrent::gru::Gru;
+use crate::params::Params;
+use candle_core::{Module, Result, Tensor};
+
+/// A network of encoders and a decoder that attends to what they give.
+trait EncodesAndDecodes: Send + Sync {
+    fn parts(&self) -> (&Config, &Decoder);
+
+    /// Encoded sequences, the audio first.
+    fn encoded(&self, segment: &Segment, mode: &mut Mode) -> Result<Vec<Tensor>>;
+}
+
+impl<N: EncodesAndDecodes> GesturePredictor for N {
+    fn config(&self) -> &Config {
+        self.parts().0
+    }
+
+    fn forward(&self, segment: &Segment, mode: &mut Mode) -> Result<Tensor> {
+        let encoded = self.encoded(segment, mode)?;
+        self.parts().1.forward(segment, &encoded, mode)
+    }
+
+    fn go_on(&self, segment: &Segment, state: Option<&Tensor>) -> Result<(Tensor, Option<Tensor>)> {
+        let encoded = self.encoded(segment, &mut Mode::Eval)?;
+        let (poses, state) = self.parts().1.go_on(segment, &encoded, state)?;
+        Ok((poses, Some(state)))
+    }
+}
+
+/// Network A: the audio of a segment frame by frame and its words, with attention over each. Without words and with one
+/// layer it is the generator of the adversarial network. Tensors: `encoder`, `word_encoder` where words are read, `decoder`.
+pub struct WordsSeq2Seq {
+    encoder: FrameEncoder,
+    words: Option<WordEncoder>,
+    decoder: Decoder,
+    config: Config,
+}
+
+impl WordsSeq2Seq {
+    /// The published network: two attentions.
+    pub fn new(params: &mut Params, config: &Config) -> Result<Self> {
+        let n = [config.vocabulary, config.word, config.word_hidden];
+        let words = WordEncoder::new(params, "word_encoder", n)?;
+        Self::with(params, config, Some(words), &[2 * config.hidden, 2 * config.word_hidden])
+    }
+
+    /// The network without words, for the adversarial training of `adversarial`; its encoder has one layer.
+    pub fn without_words(params: &mut Params, config: &Config) -> Result<Self> {
+        let config = Config { encoder_layers: 1, dropout_read: 0.0, ..config.clone() };
+        Self::with(params, &config, None, &[2 * config.hidden])
+    }
+
+    fn with(params: &mut Params, config: &Config, words: Option<WordEncoder>, n_encoded: &[usize]) -> Result<Self> {
+        Ok(Self {
+            encoder: FrameEncoder::new(params, "encoder", config)?,
+            words,
+            decoder: Decoder::new(params, "decoder", config, n_encoded, config.dropout_read)?,
+            config: config.clone(),
+        })
+    }
+}
+
+impl EncodesAndDecodes for WordsSeq2Seq {
+    fn parts(&self) -> (&Config, &Decoder) {
+        (&self.config, &self.decoder)
+    }
+
+    /// States of the sound, and of the words where they are read.
+    fn encoded(&self, segment: &Segment, mode: &mut Mode) -> Result<Vec<Tensor>> {
+        self.config.check(segment)?;
+        let mut encoded = vec![self.encoder.forward(&segment.audio, mode)?];
+        match (&self.words, &segment.words) {
+            (Some(encoder), Some(words)) => encoded.push(encoder.states(words)?),
+            (None, None) => {}
+            (reads, _) => {
+                candle_core::bail!("this network reads {} words", if reads.is_some() { "a segment's" } else { "no" })
+            }
+        }
+        Ok(encoded)
+    }
+}
+
+/// Network B, which was submitted: audio and words around each frame, encoded over the frames of a segment. Tensors:
+/// `audio_encoder`, `word_encoder`, `linear` over both side by side, `gru` over the frames, `decoder`.
+pub struct ContextSeq2Seq {
+    audio: ContextEncoder,
+    words: WordEncoder,
+    linear: Affine,
+    gru: Gru,
+    decoder: Decoder,
+    config: Config,
+}
+
+impl ContextSeq2Seq {
+    pub fn new(params: &mut Params, config: &Config) -> Result<Self> {
+        let Config { hidden, vocabulary, word, word_hidden, .. } = *config;
+        Ok(Self {
+            audio: ContextEncoder::new(params, "audio_encoder", config)?,
+            words: WordEncoder::new(params, "word_encoder", [vocabulary, word, word_hidden])?,
+            linear: Affine::new(params, "linear", hidden + 2 * word_hidden, hidden)?,
+            gru: Gru::new(params, "gru", [hidden, hidden], 0, true)?,
+            decoder: Decoder::new(params, "decoder", config, &[2 * hidden], 0.0)?,
+            config: config.clone(),
+        })
+    }
+}
+
+impl EncodesAndDecodes for ContextSeq2Seq {
+    fn parts(&self) -> (&Config, &Decoder) {
+        (&self.config, &self.decoder)
+    }
+
+    /// States over the frames of the segment.
+    fn encoded(&self, segment: &Segment, mode: &mut Mode) -> Result<Vec<Tensor>> {
+        self.config.check(segment)?;
+        let Some(words) = &segment.words else { candle_core::bail!("this network reads the words around each pose") };
+        let (batch, n_frames, n_words) = words.dims3()?;
+        if n_frames != self.config.predicted {
+            candle_core::bail!("words of {n_frames} frames for {} poses", self.config.predicted);
+        }
+        let heard = self.audio.forward(&segment.audio, mode)?;
+        let said = self.words.last(&words.reshape((batch * n_frames, n_words))?)?.relu()?;
+        let frames = self.linear.forward(&Tensor::cat(&[heard, said], 1)?)?;
+        let frames = frames.reshape((batch, n_frames, self.config.hidden))?;
+        Ok(vec![self.gru.forward(&frames, self.config.dropout, mode)?])
+    }
+}
