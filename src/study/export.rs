@@ -1,7 +1,5 @@
 //! Responses as tables: each answer with what its films showed, and who took part.
 
-use super::bundle::files::BundledPlan;
-use super::bundle::posts::{CollectedParticipant, read_posts};
 use super::file::StudyFile;
 use super::folder::StudyFolder;
 use super::plan::{FilmContent, PlannedTask, StudyKey, StudyPlan, TaskDesign, Trial, TrialPhase};
@@ -67,8 +65,6 @@ pub struct Exported {
     pub participants: PathBuf,
     pub n_votes: usize,
     pub n_participants: usize,
-    /// Collected lines of a bundle that fit no session of the plan.
-    pub n_dropped: usize,
 }
 
 /// Writes the responses of a study into the folder `out`: `votes` and `participants`. Participants come in the order in
@@ -83,21 +79,6 @@ pub fn export(folder: &StudyFolder, form: TableForm, out: &Path) -> Result<Expor
     db.execute_batch("BEGIN")?;
     let all = participants::all(&db)?;
     write_tables(&joined, &all, |participant| Ok(answers::of(&db, &participant.id)?), form, out)
-}
-
-/// Writes the responses that an address has collected from the pages of a bundle, as [`export`] does.
-///
-/// # Errors
-/// Those of [`export`]; a file `posts` that cannot be read.
-pub fn export_posts(folder: &StudyFolder, posts: &Path, form: TableForm, out: &Path) -> Result<Exported> {
-    let joined = JoinedPlan::read(folder)?;
-    let collected = read_posts(&BundledPlan::read(folder)?, posts)?;
-    let all: Vec<Participant> = collected.participants.iter().map(|one| joined.participant(one)).collect();
-    let mut given: BTreeMap<String, Vec<GivenAnswer>> =
-        collected.participants.into_iter().map(|one| (one.id, one.answers)).collect();
-    let answers = |participant: &Participant| Ok(given.remove(&participant.id).unwrap_or_default());
-    let exported = write_tables(&joined, &all, answers, form, out)?;
-    Ok(Exported { n_dropped: collected.dropped, ..exported })
 }
 
 fn write_tables(
@@ -136,25 +117,15 @@ fn write_tables(
         }
         table.end()
     })?;
-    Ok(Exported { votes, participants: of_participants, n_votes, n_participants: all.len(), n_dropped: 0 })
+    Ok(Exported { votes, participants: of_participants, n_votes, n_participants: all.len() })
 }
 
-/// All votes of a study, in the order of [`export`]: of its own store, or of the file `posts` that an address has collected
-/// from the pages of a bundle.
+/// All votes of a study, in the order of [`export`].
 ///
 /// # Errors
-/// Those of [`export_posts`].
-pub fn votes(folder: &StudyFolder, posts: Option<&Path>) -> Result<Vec<StudyVote>> {
+/// Those of [`export`].
+pub fn votes(folder: &StudyFolder) -> Result<Vec<StudyVote>> {
     let joined = JoinedPlan::read(folder)?;
-    if let Some(posts) = posts {
-        let of = |one: CollectedParticipant| {
-            let participant = joined.participant(&one);
-            let votes = one.answers.into_iter().map(|answer| joined.vote(&participant, answer));
-            votes.collect::<Result<Vec<_>>>()
-        };
-        let collected = read_posts(&BundledPlan::read(folder)?, posts)?.participants;
-        return Ok(collected.into_iter().map(of).collect::<Result<Vec<_>>>()?.concat());
-    }
     let db = database::open_to_read(&folder.responses())?;
     db.execute_batch("BEGIN")?;
     let mut votes = Vec::new();
@@ -179,27 +150,6 @@ impl JoinedPlan {
         let file = StudyFile::read(&folder.study_file())?;
         let real = file.condition.into_iter().filter(|condition| condition.real).map(|condition| condition.name);
         Ok(Self { plan: read_json(&folder.plan())?, key: read_json(&folder.key())?, real: real.collect() })
-    }
-
-    /// Participant of a bundle, of whom the address has told neither language nor code.
-    fn participant(&self, collected: &CollectedParticipant) -> Participant {
-        let trials = &self.plan.sessions[collected.session].trials;
-        let is_failed = |(trial, answer): &(&Trial, &GivenAnswer)| {
-            let expected = trial.expected.as_ref().filter(|_| trial.phase == TrialPhase::AttentionCheck);
-            expected.is_some_and(|expected| *expected != answer.response)
-        };
-        Participant {
-            id: collected.id.clone(),
-            session: collected.session as u32,
-            language: String::new(),
-            parameters: BTreeMap::new(),
-            code: String::new(),
-            status: if collected.completed { Status::Completed } else { Status::Active },
-            begun_ms: 0,
-            position: collected.answers.len() as u32,
-            given_ms: 0,
-            failed_checks: trials.iter().zip(&collected.answers).filter(is_failed).count() as u32,
-        }
     }
 
     fn vote(&self, participant: &Participant, answer: GivenAnswer) -> Result<StudyVote> {

@@ -103,6 +103,13 @@ fn rows(task: &TaskAnalysis) -> String {
             let name = format!("{}{naive}", test.origin.method.name());
             let _ = writeln!(text, "    {name:<44} {:>16}  p {}{}", "", bare_p(test.p), mark(test.origin.exploratory));
         }
+        if let Some(model) = &share.model {
+            let _ = writeln!(
+                text,
+                "    mixed model: standard deviations of log odds: participants {:.2}, clips {:.2}",
+                model.sd_participants, model.sd_clips
+            );
+        }
         for test in &share.figures.equivalence {
             let naive = if test.origin.naive { ", naive" } else { "" };
             let name = format!("equivalence \u{b1}{} points{naive}", points(test.bound));
