@@ -89,9 +89,9 @@ impl BeatWatch {
         Self { dead_after, machine: machine.to_owned(), seen: BTreeMap::new() }
     }
 
-    /// Time without a beat after which a worker is dead.
-    pub fn dead_after(&self) -> Duration {
-        self.dead_after
+    /// Time between two checks: the dead are found a twelfth later than they are known to be dead.
+    pub fn interval(&self) -> Duration {
+        self.dead_after / 12
     }
 
     /// Whether the worker is dead at the time `now` of the watcher's clock. One seen for the first time is not, unless that

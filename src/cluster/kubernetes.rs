@@ -1,8 +1,7 @@
 //! Jobs for Kubernetes: an Indexed Job of workers and a Job that makes the datasets, on the volumes that hold the project.
 
-use super::job::JobRequest;
+use super::job::{JobRequest, shell};
 use super::plan::ClusterPlan;
-use super::shell::shell;
 use serde_json::{Value, json};
 use std::path::Path;
 

@@ -1,7 +1,7 @@
 //! A sealed plan: which units there are, and what they are made with. Workers on any machine check that they hold the same
 //! program, configuration and models before they claim a unit.
 
-use super::shell::shell;
+use super::job::shell;
 use anyhow::{Context, Result, bail, ensure};
 use orator_base::stage::fingerprint::hash_file;
 use orator_base::stage::{Unit, workdir};
@@ -212,11 +212,6 @@ impl ClusterPlan {
     pub fn folder(&self, path: &Path) -> PathBuf {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         path.with_file_name(format!("{stem}-{}", &self.seal[..12]))
-    }
-
-    /// What each unit needs to have ended before.
-    pub fn needs(&self) -> Vec<Vec<usize>> {
-        self.units.iter().map(|unit| unit.needs.clone()).collect()
     }
 
     /// The videos, one unit each.

@@ -1,8 +1,7 @@
 //! Jobs for Slurm: an array of workers, a last job after all of them, and trainings after that.
 
-use super::job::{JobRequest, TaskLimits};
+use super::job::{JobRequest, TaskLimits, shell};
 use super::plan::ClusterPlan;
-use super::shell::shell;
 use std::path::Path;
 
 /// Seconds before the end of its time in which a task is told to stop.

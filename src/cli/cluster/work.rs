@@ -1,6 +1,6 @@
 //! `orator work`.
 
-use super::open::open;
+use super::plan::open;
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::Result;
@@ -33,9 +33,6 @@ pub struct Args {
     /// End when the rest is in the hands of others, and do not wait whether they die.
     #[arg(long)]
     no_wait: bool,
-    /// Begin no unit later than so many hours after the start.
-    #[arg(long, value_name = "HOURS")]
-    begin_within: Option<f64>,
     /// Seconds between two signs of life.
     #[arg(long, value_name = "SECONDS", default_value_t = 15.0)]
     beat: f64,
@@ -62,7 +59,6 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         wait: !args.no_wait,
         beat: secs(args.beat),
         dead_after: secs(args.dead_after),
-        begin_within: args.begin_within.map(|hours| secs(3600.0 * hours)),
     };
     ui.listens_for_stop(
         "stopping after this unit; the next signal ends at once",
