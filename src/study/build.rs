@@ -3,13 +3,12 @@
 
 use super::design::{ClipNeeds, design};
 use super::file::{StudyFile, StudySpeaker};
-use super::folder::StudyFolder;
+use super::folder::{StudyFolder, read_json, write_json};
 use super::plan::{FilmContent, StudyKey, StudyPlan};
 use super::preregistration::Preregistration;
 use super::seal::StudySeal;
 use super::stimuli::cut::{RefusedPiece, StudyClip};
-use super::stimuli::film::check_encoder;
-use super::stimuli::film_name::film_name;
+use super::stimuli::film::{check_encoder, film_name};
 use super::stimuli::film_size::{common_bytes, padded};
 use super::stimuli::filmed::{CutSpeaker, FilmedSpeaker, equally_loud};
 use anyhow::{Context, Result, ensure};
@@ -17,7 +16,6 @@ use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir::{self, lock, write_file};
 use orator_formats::wav;
 use rayon::prelude::*;
-use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs;
@@ -219,18 +217,6 @@ fn publish(folder: &StudyFolder, films: &BTreeMap<String, PathBuf>) -> Result<()
         write_file(&folder.film(name), &padded(film, n_bytes)?)?;
     }
     Ok(())
-}
-
-fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
-    let mut json = serde_json::to_vec_pretty(value)?;
-    json.push(b'\n');
-    write_file(path, &json)
-}
-
-fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
-    let bytes = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
-    serde_json::from_slice(&bytes)
-        .with_context(|| format!("{} is not as `orator study build` writes it", path.display()))
 }
 
 fn remove(path: &Path) -> Result<()> {

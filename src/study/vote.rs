@@ -4,6 +4,25 @@ use super::plan::{TaskDesign, TrialPhase};
 use super::response::Response;
 use serde::{Deserialize, Serialize};
 
+/// Columns of a table of votes: the fields of [`StudyVote`] in their order.
+pub const VOTE_COLUMNS: [&str; 15] = [
+    "participant",
+    "task",
+    "design",
+    "phase",
+    "trial",
+    "clip",
+    "speaker",
+    "conditions",
+    "response",
+    "expected",
+    "stalled_secs",
+    "unfocused_secs",
+    "response_secs",
+    "plays",
+    "completed",
+];
+
 /// One answered trial with all that the analysis needs: a row of `orator study export`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StudyVote {
@@ -31,4 +50,28 @@ pub struct StudyVote {
     pub plays: u32,
     /// Whether the participant completed the session.
     pub completed: bool,
+}
+
+#[cfg(test)]
+impl StudyVote {
+    /// Vote of the main phase for tests.
+    pub fn example(design: TaskDesign, conditions: &[&str], response: Response) -> Self {
+        Self {
+            participant: "p".to_owned(),
+            task: "t".to_owned(),
+            design,
+            phase: TrialPhase::Main,
+            trial: 3,
+            clip: "ellen/4".to_owned(),
+            speaker: "ellen".to_owned(),
+            conditions: conditions.iter().map(|name| (*name).to_owned()).collect(),
+            response,
+            expected: None,
+            stalled_secs: 0.5,
+            unfocused_secs: 0.0,
+            response_secs: 4.25,
+            plays: 2,
+            completed: true,
+        }
+    }
 }

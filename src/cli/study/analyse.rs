@@ -123,7 +123,7 @@ fn analysis(args: &Args) -> Result<StudyAnalysis> {
     }
     let folder = StudyFolder::new(&args.source);
     let registration = Registration::of_folder(&folder)?;
-    let read = VotesRead::of_votes(export::votes(&folder)?);
+    let read = VotesRead::of_votes(export::responses(&folder)?.1);
     let settings = settings(FigureSettings::from(&registration.settings));
     analyse([&registration.title, &name], &read, Some(&registration), &settings)
         .with_context(|| args.source.display().to_string())

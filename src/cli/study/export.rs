@@ -20,28 +20,16 @@ pub struct Args {
     /// The study's folder.
     #[arg(value_name = "DIR")]
     dir: PathBuf,
-    /// Form of the tables.
-    #[arg(long, value_enum, default_value = "csv")]
-    format: TableFormat,
+    /// Form of the tables: columns with a header, or JSON Lines.
+    #[arg(long, value_parser = ["csv", "jsonl"], default_value = "csv")]
+    format: String,
     /// Folder to write them into; without: DIR/export.
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
 }
 
-/// Forms of tables.
-#[derive(Clone, Copy, clap::ValueEnum)]
-enum TableFormat {
-    /// Columns, with a header.
-    Csv,
-    /// JSON Lines.
-    Jsonl,
-}
-
 pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
-    let form = match args.format {
-        TableFormat::Csv => TableForm::Csv,
-        TableFormat::Jsonl => TableForm::Jsonl,
-    };
+    let form = if args.format == "csv" { TableForm::Csv } else { TableForm::Jsonl };
     let out = args.out.clone().unwrap_or_else(|| args.dir.join("export"));
     let exported = export(&StudyFolder::new(&args.dir), form, &out)?;
     let text = format!(

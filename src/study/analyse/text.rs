@@ -95,7 +95,12 @@ fn rows(task: &TaskAnalysis) -> String {
             let name = format!("{}{naive}", interval.origin.method.name());
             let test = share.figures.test(interval.origin.method);
             let p = test.map(|test| format!("  p {}", bare_p(test.p))).unwrap_or_default();
-            let _ = writeln!(text, "    {name:<44} {:>16}{p}{}", percents(interval), mark(interval.origin.exploratory));
+            let _ = writeln!(
+                text,
+                "    {name:<44} {:>16}{p}{}",
+                percents(interval.ends),
+                mark(interval.origin.exploratory)
+            );
         }
         let alone = |method| share.figures.interval(method).is_none();
         for test in share.figures.tests.iter().filter(|test| alone(test.origin.method)) {

@@ -2,17 +2,15 @@
 //! checks among the trials.
 
 mod balance;
-mod checks;
 mod clip_deck;
 mod clip_needs;
 mod comparison;
 mod design;
 mod designer;
 mod latin_square;
-mod shared_clips;
-mod stream;
 mod task_design;
 
 pub use balance::TaskBalance;
 pub use clip_needs::ClipNeeds;
+pub use comparison::right_response;
 pub use design::{DesignedStudy, design};

@@ -1,10 +1,9 @@
 //! One task over all sessions: its decks of clips and the order of its trials.
 
-use super::clip_deck::{ClipDeck, DealtClip};
+use super::clip_deck::{ClipDeck, DealtClip, stream};
+use super::clip_needs::SharedClips;
 use super::comparison::{ComparedConditions, comparisons};
 use super::latin_square::SquareRows;
-use super::shared_clips::SharedClips;
-use super::stream::stream;
 use crate::file::{StudyFile, StudyTask};
 use std::collections::{BTreeMap, VecDeque};
 

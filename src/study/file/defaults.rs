@@ -1,8 +1,7 @@
 //! Defaults that follow from the rest of the file: compared conditions of a task, hypotheses of a design.
 
 use super::condition::ConditionSource;
-use super::hypothesis::{HypothesisKind, StudyHypothesis};
-use super::study_file::{StudyFile, StudyTask};
+use super::study_file::{HypothesisKind, StudyFile, StudyHypothesis, StudyTask};
 use crate::plan::TaskDesign;
 
 /// Drops tasks without trials, and fills in mismatched conditions, conditions of tasks and hypotheses where there are none.

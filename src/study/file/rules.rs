@@ -1,8 +1,7 @@
 //! What a study file must hold beyond its types: a key and what was expected, for each rule that is broken.
 
 use super::condition::{ConditionSource, StudyCondition};
-use super::hypothesis::{HypothesisKind, StudyHypothesis};
-use super::study_file::{StudyFile, StudyTask};
+use super::study_file::{HypothesisKind, StudyFile, StudyHypothesis, StudyTask};
 use crate::plan::TaskDesign;
 use orator_dataset::config::file::nearest;
 use std::collections::BTreeSet;

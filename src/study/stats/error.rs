@@ -13,10 +13,6 @@ pub enum StatisticsError {
     OutOfRange { what: &'static str, value: f64, least: f64, most: f64 },
     #[error("{what} hold a number that is not finite")]
     NotFinite { what: &'static str },
-    #[error("{what} depend on each other: their effects cannot be told apart")]
-    Dependent { what: &'static str },
-    #[error("covariates tell successes from failures without error: their effects are not finite")]
-    Separated,
     #[error("{what} fall into groups of which one never loses to the other: their difference is not finite")]
     Unconnected { what: &'static str },
 }

@@ -52,7 +52,7 @@ fn shares(task: &TaskAnalysis, analysis: &StudyAnalysis) -> Vec<Node> {
     let percent = |share: f64| 100.0 * share;
     let row = |share: &ShareAnalysis, class: &'static str, more: &str, method: FigureMethod| {
         let interval = share.figures.interval(method);
-        let p = share.figures.test(method).map(|test| format!(", p {}", equal(test.adjusted_p.unwrap_or(test.p))));
+        let p = share.figures.test(method).map(|test| format!(", p {}", equal(test.final_p())));
         ForestRow {
             name: format!("{}{more}", scope(share)),
             class,
@@ -127,8 +127,7 @@ fn scores(task: &TaskAnalysis) -> Vec<Node> {
 fn pairs(task: &TaskAnalysis) -> Vec<Node> {
     let factor = if task.design == TaskDesign::TuringSingle { 100.0 } else { 1.0 };
     let row = |pair: &PairAnalysis| {
-        let test = pair.figures.test(FigureMethod::Crossed);
-        let p = test.map(|test| format!(", p {}", equal(test.adjusted_p.unwrap_or(test.p))));
+        let p = pair.figures.crossed_p().map(|p| format!(", p {}", equal(p)));
         ForestRow {
             name: format!("{} \u{2212} {}", pair.first, pair.second),
             class: "own",
@@ -185,7 +184,7 @@ fn strengths(task: &TaskAnalysis) -> Vec<Node> {
             name: row.condition.clone(),
             class: "own",
             value: row.log_strength,
-            interval: row.interval.as_ref().map(|interval| [interval.low, interval.high]),
+            interval: row.interval.as_ref().map(|interval| [interval.ends.low, interval.ends.high]),
             said: format!("{:+.2}, Elo {:.0}", row.log_strength, row.elo),
         })
         .collect();

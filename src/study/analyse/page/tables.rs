@@ -1,7 +1,6 @@
 //! Every figure of a task in a table with its mark, and the account of exclusions.
 
-use crate::analyse::figure::{FigureMethod, FigureOrigin, TestFigure};
-use crate::analyse::figures::FigureSet;
+use crate::analyse::figure::{FigureMethod, FigureOrigin, FigureSet, TestFigure};
 use crate::analyse::result::{ShareAnalysis, ShareMeasure, StudyAnalysis, TaskAnalysis};
 use crate::analyse::verdict::scope;
 use crate::analyse::words::{bare_p, count, percent};
@@ -108,7 +107,8 @@ fn figure_rows(set: &FigureSet, factor: f64, unit: &str) -> Vec<Node> {
         .into_iter()
         .filter_map(|method| {
             let (interval, test) = (set.interval(method), set.test(method));
-            let origin = interval.map(|interval| interval.origin).or(test.map(|test| test.origin))?;
+            let shown = set.intervals.iter().find(|interval| interval.origin.method == method);
+            let origin = shown.map(|interval| interval.origin).or(test.map(|test| test.origin))?;
             Some(figure_row(origin, interval.map(|interval| ends(interval.low, interval.high)), test, None))
         })
         .collect();
@@ -120,7 +120,7 @@ fn figure_rows(set: &FigureSet, factor: f64, unit: &str) -> Vec<Node> {
             100.0 * test.bound,
             test.origin.method.name()
         );
-        let interval = format!("90 %: {}", ends(test.low, test.high));
+        let interval = format!("90 %: {}", ends(test.ends.low, test.ends.high));
         figure_row(test.origin, Some(interval), Some(&shown), Some(name))
     }));
     rows

@@ -2,8 +2,7 @@
 //! clips, only that the plan drew sides at random. It tests the sharp hypothesis that nobody's choice depends on where
 //! the real film is, for any clip. Easy clips that hard ones outweigh contradict it and may lead to its rejection.
 
-use super::super::error::{StatisticsError, at_least};
-use serde::Serialize;
+use super::error::{StatisticsError, at_least};
 use statrs::distribution::{Discrete, Hypergeometric};
 
 /// Trials among which the plan fixed how often the real film is on the left and drew at random in which: those of a
@@ -19,7 +18,7 @@ pub struct SideBlock {
 }
 
 /// Outcome of a randomisation test.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SideTest {
     /// Trials in which the real film was chosen.
     pub correct: u64,
