@@ -53,6 +53,11 @@ impl Heartbeat {
         Ok(bytes.and_then(|bytes| serde_json::from_slice(&bytes).ok()))
     }
 
+    /// Seconds of video a second.
+    pub fn media_rate(&self) -> f64 {
+        self.media_secs / self.secs.max(1.0)
+    }
+
     /// Whether it is known without waiting that the worker is gone: it said so, or it was a process of this machine that
     /// is no more.
     pub fn is_over(&self, machine: &str) -> bool {

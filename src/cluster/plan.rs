@@ -290,20 +290,28 @@ pub fn settings_hash(config: &Config) -> Result<String> {
 }
 
 #[cfg(test)]
+impl PlannedUnit {
+    /// A video of unknown length for tests.
+    pub fn example(speaker: &str, video: &str) -> Self {
+        Self {
+            speaker: speaker.to_owned(),
+            video: video.to_owned(),
+            source: video.into(),
+            bytes: 1,
+            secs: None,
+            share: UnitShare::Whole,
+            needs: Vec::new(),
+        }
+    }
+}
+
+#[cfg(test)]
 mod tests {
     use super::*;
     use orator_dataset::config::load;
 
     fn video(name: &str, secs: f64) -> PlannedUnit {
-        PlannedUnit {
-            speaker: "host".to_owned(),
-            video: name.to_owned(),
-            source: PathBuf::from(name),
-            bytes: 1,
-            secs: Some(secs),
-            share: UnitShare::Whole,
-            needs: Vec::new(),
-        }
+        PlannedUnit { secs: Some(secs), ..PlannedUnit::example("host", name) }
     }
 
     #[test]

@@ -77,18 +77,11 @@ pub fn progress(plan: &ClusterPlan, path: &Path, dead_after: Duration) -> Result
             }
         }
     }
-    let rate: f64 = workers.iter().filter(|worker| worker.is_alive).map(|worker| worker.media_rate()).sum();
+    let rate: f64 = workers.iter().filter(|worker| worker.is_alive).map(|worker| worker.heartbeat.media_rate()).sum();
     told.secs_left = (rate > 0.0).then(|| (told.media_secs - told.ended_media_secs) / rate);
     told.stopped = folder.read(STOP)?.map(|reason| String::from_utf8_lossy(&reason).into_owned());
     told.workers = workers;
     Ok(told)
-}
-
-impl WorkerProgress {
-    /// Seconds of video a second.
-    fn media_rate(&self) -> f64 {
-        self.heartbeat.media_secs / self.heartbeat.secs.max(1.0)
-    }
 }
 
 /// The innermost cause of an error, which units of one trouble share.

@@ -106,65 +106,61 @@ pub fn measure(
 ) -> Result<StageTimes> {
     let made_with = made_with(pipeline, program, jobs)?;
     let folder = pipeline.config().settings.work.dir.join(FOLDER);
-    let timed = Timing { pipeline, units, jobs, folder: &folder }.measure(progress);
+    let timed = measured(pipeline, units, jobs, &folder, progress);
     let removed = std::fs::remove_dir_all(&folder);
     let times = timed?;
     removed.with_context(|| format!("cannot remove {}", folder.display()))?;
     Ok(StageTimes { made_with, processor: processor(), jobs, ..times })
 }
 
-struct Timing<'a> {
-    pipeline: &'a Pipeline,
-    units: &'a [PlannedUnit],
+/// Times the stages on excerpts in `folder`.
+fn measured(
+    pipeline: &Pipeline,
+    units: &[PlannedUnit],
     jobs: usize,
-    folder: &'a Path,
-}
-
-impl Timing<'_> {
-    fn measure(&self, progress: &dyn Progress) -> Result<StageTimes> {
-        let _ = std::fs::remove_dir_all(self.folder);
-        std::fs::create_dir_all(self.folder)
-            .with_context(|| format!("cannot make the folder {}", self.folder.display()))?;
-        let lengths: Vec<f64> = self.units.iter().map(|unit| unit.secs.unwrap_or(0.0)).collect();
-        let (mut files, mut secs) = (Vec::new(), BTreeMap::new());
-        for (number, excerpt) in excerpts(&lengths).iter().enumerate() {
-            let unit = &self.units[excerpt.unit];
-            let to = self.folder.join(format!("{number:02}.mkv"));
-            let wanted = ExcerptRequest { start_secs: excerpt.start_secs, secs: excerpt.secs, to: to.clone() };
-            let request = MediaRequest { source: unit.source.clone(), excerpt: Some(wanted) };
-            // A video that cannot be read is told of when it is worked on.
-            if let Ok(Some(copied)) = self.pipeline.ask_media(&request) {
-                secs.insert(to.clone(), copied);
-                files.push((unit.speaker.clone(), to));
-            }
+    folder: &Path,
+    progress: &dyn Progress,
+) -> Result<StageTimes> {
+    let _ = std::fs::remove_dir_all(folder);
+    std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    let lengths: Vec<f64> = units.iter().map(|unit| unit.secs.unwrap_or(0.0)).collect();
+    let (mut files, mut secs) = (Vec::new(), BTreeMap::new());
+    for (number, excerpt) in excerpts(&lengths).iter().enumerate() {
+        let unit = &units[excerpt.unit];
+        let to = folder.join(format!("{number:02}.mkv"));
+        let wanted = ExcerptRequest { start_secs: excerpt.start_secs, secs: excerpt.secs, to: to.clone() };
+        let request = MediaRequest { source: unit.source.clone(), excerpt: Some(wanted) };
+        // A video that cannot be read is told of when it is worked on.
+        if let Ok(Some(copied)) = pipeline.ask_media(&request) {
+            secs.insert(to.clone(), copied);
+            files.push((unit.speaker.clone(), to));
         }
-        ensure!(!files.is_empty(), "of no video an excerpt can be copied: no time is taken");
-        let work = self.folder.join("work");
-        let task = progress.begin("timing the stages", 1);
-        let selection =
-            Selection { to: StageName::Dataset, jobs: Some(self.jobs), force: true, ..Selection::default() };
-        let times = self.pipeline.on_excerpts(&files, &work).run(&selection, &Silent)?.times;
-        task.advance(1);
-        let peak_mib = peak_mib();
-        let excerpt_secs: f64 = secs.values().sum();
-        let cost = |stage: StageName| {
-            let own = times.iter().filter(|time| time.stage == stage);
-            let length = |time: &StageTime| match stage {
-                StageName::Dataset => excerpt_secs,
-                _ => secs.get(&time.unit.source).copied().unwrap_or(0.0),
-            };
-            let pairs: Vec<(f64, f64)> = own.map(|time| (length(time), time.secs)).collect();
-            let bytes_per_sec = workdir::bytes_under(&work.join(stage.as_str())) as f64 / excerpt_secs;
-            (stage.as_str().to_owned(), StageCost { bytes_per_sec, ..StageCost::fit(&pairs) })
-        };
-        Ok(StageTimes {
-            n_excerpts: files.len(),
-            excerpt_secs,
-            stages: StageName::ALL.map(cost).into(),
-            peak_mib,
-            ..StageTimes::default()
-        })
     }
+    ensure!(!files.is_empty(), "of no video an excerpt can be copied: no time is taken");
+    let work = folder.join("work");
+    let task = progress.begin("timing the stages", 1);
+    let selection = Selection { to: StageName::Dataset, jobs: Some(jobs), force: true, ..Selection::default() };
+    let times = pipeline.on_excerpts(&files, &work).run(&selection, &Silent)?.times;
+    task.advance(1);
+    let peak_mib = peak_mib();
+    let excerpt_secs: f64 = secs.values().sum();
+    let cost = |stage: StageName| {
+        let own = times.iter().filter(|time| time.stage == stage);
+        let length = |time: &StageTime| match stage {
+            StageName::Dataset => excerpt_secs,
+            _ => secs.get(&time.unit.source).copied().unwrap_or(0.0),
+        };
+        let pairs: Vec<(f64, f64)> = own.map(|time| (length(time), time.secs)).collect();
+        let bytes_per_sec = workdir::bytes_under(&work.join(stage.as_str())) as f64 / excerpt_secs;
+        (stage.as_str().to_owned(), StageCost { bytes_per_sec, ..StageCost::fit(&pairs) })
+    };
+    Ok(StageTimes {
+        n_excerpts: files.len(),
+        excerpt_secs,
+        stages: StageName::ALL.map(cost).into(),
+        peak_mib,
+        ..StageTimes::default()
+    })
 }
 
 /// Most memory of a process that this one has started and that has ended, MiB; none where there was none.

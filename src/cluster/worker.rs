@@ -16,7 +16,7 @@ use orator_pipeline::Pipeline;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -86,7 +86,7 @@ pub fn work(
         begun: Instant::now(),
         machine: &machine,
         report: Mutex::default(),
-        broken: Mutex::default(),
+        is_broken: AtomicBool::new(false),
     };
     let started = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs());
     let first = Heartbeat {
@@ -96,21 +96,18 @@ pub fn work(
         started,
         ..Heartbeat::default()
     };
-    std::thread::scope(|scope| {
-        for _ in 0..options.jobs.max(1) {
-            scope.spawn(|| {
-                if let Err(error) = session.run(&worker_name(&host), first.clone()) {
-                    session.broken().get_or_insert(error);
-                }
-            });
-        }
+    let run = || {
+        let ended = session.run(&worker_name(&host), first.clone());
+        session.is_broken.fetch_or(ended.is_err(), Ordering::Relaxed);
+        ended
+    };
+    let ended: Result<()> = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..options.jobs.max(1)).map(|_| scope.spawn(run)).collect();
+        workers.into_iter().try_for_each(|worker| worker.join().unwrap_or_else(|_| bail!("a worker has panicked")))
     });
     // What cannot be kept is hashed again.
     let _ = hashes.save();
-    if let Some(error) = session.broken().take() {
-        return Err(error);
-    }
-    drop(session.broken);
+    ended?;
     Ok(session.report.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 
@@ -145,8 +142,8 @@ struct Session<'a> {
     begun: Instant,
     machine: &'a str,
     report: Mutex<WorkReport>,
-    /// What stopped the workers.
-    broken: Mutex<Option<anyhow::Error>>,
+    /// Whether a worker ended with an error, so that all end.
+    is_broken: AtomicBool,
 }
 
 impl Session<'_> {
@@ -219,7 +216,7 @@ impl Session<'_> {
         if let Some(reason) = self.folder.read(STOP)? {
             bail!("{}: all workers stop; make room and start them again", String::from_utf8_lossy(&reason));
         }
-        Ok(self.progress.is_to_stop() || self.broken().is_some())
+        Ok(self.progress.is_to_stop() || self.is_broken.load(Ordering::Relaxed))
     }
 
     fn work_on(&self, name: &str, claim: Claim, claims: &mut Claims<DiskFolder>, heart: &HeartbeatFile) -> Result<()> {
@@ -282,10 +279,6 @@ impl Session<'_> {
 
     fn report(&self) -> MutexGuard<'_, WorkReport> {
         self.report.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn broken(&self) -> MutexGuard<'_, Option<anyhow::Error>> {
-        self.broken.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

@@ -12,7 +12,6 @@ pub mod pages;
 pub mod plan;
 pub mod power;
 pub mod preregistration;
-pub mod response;
 pub mod seal;
 pub mod server;
 pub mod simulate;

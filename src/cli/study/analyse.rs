@@ -39,7 +39,7 @@ pub struct Args {
     /// Points of percent on either side of chance that count as no difference; a registered bound goes before it.
     #[arg(long, value_name = "POINTS", default_value_t = 10.0)]
     bound: f64,
-    /// Draws of the bootstrap and of sign flips [default: as registered, else 10000]
+    /// Draws of sign flips and of participants [default: as registered, else 10000]
     #[arg(long, value_name = "N")]
     draws: Option<usize>,
     /// Seed of both [default: as registered, else 1]

@@ -2,8 +2,7 @@
 //! comes from, and what could not be computed.
 
 use crate::stats::equivalence::Equivalence;
-use crate::stats::error::StatisticsError;
-use crate::stats::estimate::{ConfidenceInterval, StudentEstimate, holm};
+use crate::stats::estimate::{ConfidenceInterval, StatisticsError, StudentEstimate, holm};
 use serde::Serialize;
 
 /// How a figure was got.
@@ -12,8 +11,6 @@ use serde::Serialize;
 pub enum FigureMethod {
     /// Crossed standard error, t distribution: holds for other participants and other clips.
     Crossed,
-    /// Bootstrap of participants and clips.
-    CrossedBootstrap,
     /// Sign flips of participants and clips.
     SignFlip,
     /// Exact test over the plan's own draw of sides.
@@ -48,7 +45,6 @@ impl FigureMethod {
     pub fn name(self) -> &'static str {
         match self {
             Self::Crossed => "participants and clips crossed",
-            Self::CrossedBootstrap => "bootstrap of participants and clips",
             Self::SignFlip => "sign flips of participants and clips",
             Self::Sides => "exact permutation of sides",
             Self::Participants => "t test of participants' shares",
@@ -166,6 +162,18 @@ impl FigureSet {
         self.equivalence.iter().find(|test| test.origin.method == method)
     }
 
+    /// Figures method by method, those with an interval first.
+    pub fn rows(&self) -> impl Iterator<Item = FigureRow<'_>> {
+        let of_interval = |&IntervalFigure { origin, ends }: &IntervalFigure| FigureRow {
+            origin,
+            interval: Some(ends),
+            test: self.test(origin.method),
+        };
+        let alone = self.tests.iter().filter(|test| self.interval(test.origin.method).is_none());
+        let alone = alone.map(|test| FigureRow { origin: test.origin, interval: None, test: Some(test) });
+        self.intervals.iter().map(of_interval).chain(alone)
+    }
+
     /// p value of the crossed test, adjusted where it is one of several.
     pub fn crossed_p(&self) -> Option<f64> {
         self.test(FigureMethod::Crossed).map(TestFigure::final_p)
@@ -221,6 +229,13 @@ impl FigureSet {
             *ends = ConfidenceInterval { low: ends.low.clamp(low, high), high: ends.high.clamp(low, high) };
         }
     }
+}
+
+/// Interval and test of one method.
+pub struct FigureRow<'s> {
+    pub origin: FigureOrigin,
+    pub interval: Option<ConfidenceInterval>,
+    pub test: Option<&'s TestFigure>,
 }
 
 /// Adjusts the tests of several sets, method by method, as one family each (Holm 1979). A single set is left alone.

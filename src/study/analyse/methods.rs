@@ -99,7 +99,6 @@ fn statistics(analysis: &StudyAnalysis) -> String {
     let settings = &analysis.settings;
     let is_used =
         |method: FigureMethod| analysis.tasks.iter().any(|task| task.origins().any(|origin| origin.method == method));
-    let draws = count(settings.n_draws);
     let mut text = format!(
         "Votes of one participant, and votes about one clip, are not independent (Clark 1973); estimates have standard \
          errors with participants and clips crossed (Cameron et al. 2011), judged by the t distribution with \
@@ -111,9 +110,6 @@ fn statistics(analysis: &StudyAnalysis) -> String {
             "Equivalence with chance within \u{b1}{} points was tested by two one-sided tests at 5 % (Schuirmann 1987). ",
             list(&bounds(analysis))
         );
-    }
-    if is_used(FigureMethod::CrossedBootstrap) {
-        text += &format!("Bootstrap intervals are of {draws} draws of participants and clips (Owen 2007). ");
     }
     if is_used(FigureMethod::SignFlip) {
         text += "Sign flips of whole participants or clips, whichever are fewer, test the same without a t distribution (MacKinnon et al. 2021). ";

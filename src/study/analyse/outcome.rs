@@ -2,9 +2,8 @@
 
 use super::result::ShareMeasure;
 use crate::plan::TaskDesign;
-use crate::response::{Response, ScreenSide};
 use crate::stats::cluster::votes::ClipVote;
-use crate::vote::StudyVote;
+use crate::vote::{Response, ScreenSide, StudyVote};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Numbers of participants and clips by their names, the same for all votes of a task.

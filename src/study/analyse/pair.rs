@@ -6,9 +6,9 @@ use super::outcome::{BinaryVote, Numbering, differences, distinct, mean_score, n
 use super::result::{Conclusion, FigureSettings, PairAnalysis, ScoreAnalysis};
 use crate::plan::TaskDesign;
 use crate::stats::cluster::crossed::{crossed_difference, crossed_estimate};
-use crate::stats::cluster::resampled::sign_flip_p;
+use crate::stats::cluster::sign_flips::sign_flip_p;
 use crate::stats::cluster::votes::{ClipVote, participant_differences, participant_means};
-use crate::stats::error::StatisticsError;
+use crate::stats::estimate::StatisticsError;
 use crate::stats::rank::{friedman, median_interval, signed_rank};
 use crate::vote::StudyVote;
 use orator_base::math::order::Ordered;

@@ -72,7 +72,7 @@ pub struct FigureSettings {
     pub confidence: f64,
     /// Largest difference that counts as none, a share: 0.1 is 10 points of percent.
     pub bound: f64,
-    /// Draws of bootstrap and sign flips; 0 leaves them out.
+    /// Draws of sign flips and of participants; 0 leaves them out.
     pub n_draws: usize,
     pub seed: u64,
     /// Whether mixed models are fitted.

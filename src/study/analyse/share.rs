@@ -4,12 +4,12 @@ use super::figure::{FigureMethod, FigureSet, TestFigure};
 use super::outcome::{BinaryVote, distinct};
 use super::result::{Conclusion, FigureSettings, ModelFigure, ShareAnalysis, ShareMeasure};
 use crate::stats::cluster::crossed::crossed_estimate;
-use crate::stats::cluster::resampled::{bootstrap_interval, sign_flip_p};
+use crate::stats::cluster::sign_flips::sign_flip_p;
 use crate::stats::cluster::votes::{ClipVote, participant_estimate};
 use crate::stats::equivalence::Equivalence;
 use crate::stats::glmm::fit::MixedLogit;
 use crate::stats::proportion::BinomialCount;
-use crate::stats::sides::{SideBlock, side_test};
+use crate::stats::sides::{SideBlock, side_p};
 use std::collections::BTreeMap;
 
 /// Share where nothing is known.
@@ -65,14 +65,12 @@ fn add_clustered(found: &mut FigureSet, cell: &ShareCell, votes: &[ClipVote], se
         let equivalence = Equivalence::of_estimate(&estimate, CHANCE, settings.bound);
         found.add_equivalence(FigureMethod::Crossed, equivalence);
         if settings.n_draws > 0 {
-            let FigureSettings { n_draws, seed, .. } = *settings;
-            let drawn = bootstrap_interval(votes, &estimate, confidence, n_draws, seed);
-            found.add_interval(FigureMethod::CrossedBootstrap, drawn);
-            found.add_test(FigureMethod::SignFlip, sign_flip_p(votes, CHANCE, n_draws, seed));
+            let flips = sign_flip_p(votes, CHANCE, settings.n_draws, settings.seed);
+            found.add_test(FigureMethod::SignFlip, flips);
         }
     }
     if let Some(blocks) = side_blocks(&cell.votes) {
-        found.add_test(FigureMethod::Sides, side_test(&blocks).map(|test| test.p));
+        found.add_test(FigureMethod::Sides, side_p(&blocks));
     }
     if let Some(estimate) = found.known(FigureMethod::Participants, participant_estimate(votes)) {
         found.add_estimate(FigureMethod::Participants, &estimate, CHANCE, confidence);

@@ -3,10 +3,9 @@
 use super::figure::{FigureMethod, FigureOrigin, IntervalFigure};
 use super::outcome::Numbering;
 use super::result::{FigureSettings, StrengthFigure};
-use crate::response::Response;
 use crate::stats::bradley_terry::{self, PairedVote, elo_ratings, strength_intervals};
-use crate::stats::error::StatisticsError;
-use crate::vote::StudyVote;
+use crate::stats::estimate::StatisticsError;
+use crate::vote::{Response, StudyVote};
 
 /// Draws of participants for the intervals.
 const MOST_DRAWS: usize = 2000;

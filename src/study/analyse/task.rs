@@ -9,7 +9,7 @@ use super::strength::strengths;
 use super::verdict::verdicts;
 use crate::plan::TaskDesign;
 use crate::stats::cluster::votes::ClipVote;
-use crate::stats::error::StatisticsError;
+use crate::stats::estimate::StatisticsError;
 use crate::stats::krippendorff::{MeasurementScale, alpha};
 use crate::vote::StudyVote;
 use anyhow::{Context, Result, bail};

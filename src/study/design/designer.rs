@@ -1,14 +1,12 @@
 //! Sessions one after the other: blocks of tasks, practice, training and main trials, attention checks among them.
 
-use super::balance::TaskBalance;
 use super::clip_deck::ClipDeck;
 use super::clip_needs::SharedClips;
-use super::comparison::right_response;
 use super::latin_square::SquareRows;
-use super::task_design::{DealtTrial, TaskDesigner, deal};
+use super::task_design::{DealtTrial, TaskBalance, TaskDesigner, deal, right_response};
 use crate::file::{StudyCondition, StudyFile, StudyTask, TaskOrder};
 use crate::plan::{FilmContent, FilmSound, PlannedSession, Trial, TrialPhase};
-use crate::response::Response;
+use crate::vote::Response;
 use anyhow::{Context, Result};
 use rand::Rng;
 use rand::seq::SliceRandom;

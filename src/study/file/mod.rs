@@ -1,7 +1,6 @@
 //! The study file: what a researcher writes, laid over a preset, with every default filled in and every rule held.
 
 mod condition;
-mod defaults;
 mod layers;
 mod read;
 mod rules;

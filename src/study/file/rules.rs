@@ -2,6 +2,7 @@
 
 use super::condition::{ConditionSource, StudyCondition};
 use super::study_file::{HypothesisKind, StudyFile, StudyHypothesis, StudyTask};
+use crate::pages::page_texts::text_keys;
 use crate::plan::TaskDesign;
 use orator_dataset::config::file::nearest;
 use std::collections::BTreeSet;
@@ -80,6 +81,12 @@ impl StudyRules<'_> {
         }
         for language in file.texts.keys().filter(|language| !file.languages.contains(language)) {
             self.say(format!("texts.{language}"), format!("{language:?} is not in languages: add it there"));
+        }
+        let known = text_keys(file.task.iter().map(|task| task.name.as_str()));
+        let keys = file.texts.iter().flat_map(|(language, texts)| texts.keys().map(move |key| (language, key)));
+        for (language, key) in keys.filter(|(_, key)| !known.contains(key)) {
+            let message = format!("the page has no such text{}", nearest(key, known.iter()));
+            self.say(format!("texts.{language}.{key}"), message);
         }
         if file.task.is_empty() {
             self.say("task", "no task is left: expected a [[task]], or a preset with its tasks");

@@ -15,7 +15,6 @@ use axum::extract::DefaultBodyLimit;
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::routing::{get, post};
 use std::net::SocketAddr;
-use std::path::Path;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, SystemTime};
@@ -51,15 +50,14 @@ pub struct StudyServer {
 
 impl StudyServer {
     /// Opens the study in `folder`, its responses and its secret. `abandoned_secs`: time without an answer after which a
-    /// place is given again. `operator_token`: file with the operator's token, in place of the one made.
+    /// place is given again.
     ///
     /// # Errors
     /// A study that is not as it was sealed, or whose secret or responses are not its own.
-    pub fn open(folder: &StudyFolder, abandoned_secs: f64, operator_token: Option<&Path>) -> Result<Self> {
+    pub fn open(folder: &StudyFolder, abandoned_secs: f64) -> Result<Self> {
         StudySeal::verify(folder)?;
         let study = ServedStudy::open(folder, abandoned_secs)?;
-        let mut secret = StudySecret::open(&folder.secret())?;
-        operator_token.map_or(Ok(()), |file| secret.set_operator_token(file))?;
+        let secret = StudySecret::open(&folder.secret())?;
         let (store, writer) = ResponseStore::open(&folder.responses(), &study.plan_hash)?;
         Ok(Self { app: App { study, store, secret, limits: RateLimits::new() }, writer })
     }

@@ -3,9 +3,8 @@
 //! win for each, a strength of preference as its share. Strengths are finite only where wins lead from each condition to
 //! each other one (Ford 1957): no prior makes up for votes that are missing.
 
-use super::cluster::resampled::rng_of_draw;
-use super::error::{StatisticsError, at_least, within};
-use super::estimate::ConfidenceInterval;
+use super::cluster::sign_flips::rng_of_draw;
+use super::estimate::{ConfidenceInterval, StatisticsError, at_least, within};
 use ndarray::{Array1, Array2, Axis};
 use orator_base::math::cholesky;
 use rand::Rng;
@@ -161,19 +160,16 @@ fn likelihood(wins: &Array2<f64>, strengths: &Array1<f64>) -> Likelihood {
 
 /// Whether wins lead from each condition to each other one.
 fn is_connected(wins: &Array2<f64>) -> bool {
-    let reaches_all = |won: &dyn Fn(usize, usize) -> f64| {
-        let n = wins.nrows();
-        let mut reached = vec![false; n];
-        let mut waiting = vec![0];
-        reached[0] = true;
-        while let Some(i) = waiting.pop() {
-            let next: Vec<usize> = (0..n).filter(|j| !reached[*j] && won(i, *j) > 0.0).collect();
-            next.iter().for_each(|j| reached[*j] = true);
-            waiting.extend(next);
+    let n = wins.nrows();
+    let mut leads = wins.mapv(|won| won > 0.0);
+    for via in 0..n {
+        for from in 0..n {
+            for to in 0..n {
+                leads[[from, to]] |= leads[[from, via]] && leads[[via, to]];
+            }
         }
-        reached.into_iter().all(|is| is)
-    };
-    reaches_all(&|i, j| wins[[i, j]]) && reaches_all(&|i, j| wins[[j, i]])
+    }
+    leads.iter().all(|leads| *leads)
 }
 
 #[cfg(test)]

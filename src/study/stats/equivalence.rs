@@ -1,8 +1,7 @@
 //! Two one-sided tests: whether a value lies within a stated bound of another (Schuirmann 1987). A test that finds no
 //! difference does not show that there is none; this one can. The bound is fixed before the data are seen.
 
-use super::error::{StatisticsError, within};
-use super::estimate::{ConfidenceInterval, StudentEstimate};
+use super::estimate::{ConfidenceInterval, StatisticsError, StudentEstimate, within};
 use super::proportion::BinomialCount;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal};

@@ -1,6 +1,6 @@
 //! Agreement of raters: Krippendorff's alpha (Krippendorff 2011), 1 for perfect agreement, 0 for chance.
 
-use super::error::{StatisticsError, at_least, finite};
+use super::estimate::{StatisticsError, at_least, finite};
 
 /// What differences of values mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,7 +6,6 @@
 pub mod bradley_terry;
 pub mod cluster;
 pub mod equivalence;
-pub mod error;
 pub mod estimate;
 pub mod glmm;
 pub mod krippendorff;

@@ -1,8 +1,7 @@
 //! A number of successes among independent trials: Wilson's and the exact interval, the exact binomial test. Votes of
 //! one participant, or about one clip, are not independent: `cluster` is for those.
 
-use super::error::{StatisticsError, at_least, tail, within};
-use super::estimate::ConfidenceInterval;
+use super::estimate::{ConfidenceInterval, StatisticsError, at_least, tail, within};
 use statrs::distribution::{Beta, Binomial, ContinuousCDF, Discrete, DiscreteCDF, Normal};
 
 /// Outcomes whose probability exceeds that of the observed one by less than this share count as equally likely

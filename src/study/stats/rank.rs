@@ -2,8 +2,7 @@
 //! blocks are participants, independent of each other), and a distribution-free interval of the median, as the GENEA
 //! challenges print their ratings (Kucherenko et al. 2021).
 
-use super::error::{StatisticsError, at_least, finite, tail};
-use super::estimate::ConfidenceInterval;
+use super::estimate::{ConfidenceInterval, StatisticsError, at_least, finite, tail};
 use statrs::distribution::{Binomial, ChiSquared, ContinuousCDF, DiscreteCDF, Normal};
 
 /// Outcome of a test by ranks.

@@ -5,8 +5,7 @@ use super::columns::ColumnNames;
 use super::row::{check, vote};
 use super::rows::{delimited_rows, json_rows};
 use crate::plan::TaskDesign;
-use crate::response::Response;
-use crate::vote::{StudyVote, VOTE_COLUMNS};
+use crate::vote::{Response, StudyVote, VOTE_COLUMNS};
 use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -141,7 +140,7 @@ fn number_trials(votes: &mut [StudyVote]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::response::ScreenSide;
+    use crate::vote::ScreenSide;
 
     fn read(text: &str) -> Result<VotesRead> {
         VotesRead::of_bytes(text.as_bytes(), false, &ColumnNames::default(), None)

@@ -4,5 +4,5 @@
 //! wherever some of the chosen clips happen to be easy, the second is not.
 
 pub mod crossed;
-pub mod resampled;
+pub mod sign_flips;
 pub mod votes;

@@ -4,8 +4,7 @@
 //! a sample, `crossed` is the test: with 100 participants, 20 votes each and 40 clips whose log odds vary by 0.3, a t test of
 //! participants' means rejects a true hypothesis in 14 % of studies instead of 5 %.
 
-use super::super::error::{StatisticsError, at_least, finite};
-use super::super::estimate::StudentEstimate;
+use super::super::estimate::{StatisticsError, StudentEstimate, at_least, finite};
 use std::collections::BTreeMap;
 
 /// Score of one participant in one trial about one clip: 1 and 0 for right and wrong, a rating, a signed preference.

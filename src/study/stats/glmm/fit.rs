@@ -5,8 +5,7 @@
 use super::laplace::Laplace;
 use super::minimum::{curvature, minimum};
 use crate::stats::cluster::votes::{CLIP, ClipVote, PARTICIPANT, VoteGroups, scores};
-use crate::stats::error::{StatisticsError, at_least};
-use crate::stats::estimate::{ConfidenceInterval, StudentEstimate};
+use crate::stats::estimate::{ConfidenceInterval, StatisticsError, StudentEstimate, at_least};
 use ndarray::{Array1, Array2, array};
 use orator_base::math::cholesky;
 

@@ -2,8 +2,7 @@
 
 use super::fit::MixedLogit;
 use crate::stats::cluster::votes::ClipVote;
-use crate::stats::error::StatisticsError;
-use crate::stats::estimate::StudentEstimate;
+use crate::stats::estimate::{StatisticsError, StudentEstimate};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
