@@ -53,6 +53,11 @@ impl Heartbeat {
         Ok(bytes.and_then(|bytes| serde_json::from_slice(&bytes).ok()))
     }
 
+    /// Seconds of video a second.
+    pub fn media_rate(&self) -> f64 {
+        self.media_secs / self.secs.max(1.0)
+    }
+
     /// Whether it is known without waiting that the worker is gone: it said so, or it was a process of this machine that
     /// is no more.
     pub fn is_over(&self, machine: &str) -> bool {
@@ -89,9 +94,9 @@ impl BeatWatch {
         Self { dead_after, machine: machine.to_owned(), seen: BTreeMap::new() }
     }
 
-    /// Time without a beat after which a worker is dead.
-    pub fn dead_after(&self) -> Duration {
-        self.dead_after
+    /// Time between two checks: the dead are found a twelfth later than they are known to be dead.
+    pub fn interval(&self) -> Duration {
+        self.dead_after / 12
     }
 
     /// Whether the worker is dead at the time `now` of the watcher's clock. One seen for the first time is not, unless that

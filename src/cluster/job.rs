@@ -1,4 +1,4 @@
-//! What is the same in the jobs of every scheduler: the commands of a worker, and of the end.
+//! What the jobs of every scheduler have in common: the commands of a worker and of the end, as a POSIX shell reads them.
 
 use super::plan::ClusterPlan;
 use orator_base::stage::artifacts::{StageName, speaker_dir};
@@ -61,5 +61,26 @@ impl JobRequest {
             vec![self.program.display().to_string(), "dataset".into(), "verify".into(), dir]
         };
         plan.speakers().into_iter().map(words).collect()
+    }
+}
+
+/// The words as a shell reads them, quoted where they must be.
+pub fn shell(words: &[String]) -> String {
+    let is_plain = |c: char| c.is_alphanumeric() || "-_./=:,+@%".contains(c);
+    let quoted = |word: &String| match !word.is_empty() && word.chars().all(is_plain) {
+        true => word.clone(),
+        false => format!("'{}'", word.replace('\'', r"'\''")),
+    };
+    words.iter().map(quoted).collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_quoted_for_a_shell() {
+        let words = ["--set", "gan.steps=5", "my data", "it's", ""].map(str::to_owned);
+        assert_eq!(shell(&words), r"--set gan.steps=5 'my data' 'it'\''s' ''");
     }
 }

@@ -1,8 +1,7 @@
 //! Jobs for Kubernetes: an Indexed Job of workers and a Job that makes the datasets, on the volumes that hold the project.
 
-use super::job::JobRequest;
+use super::job::{JobRequest, shell};
 use super::plan::ClusterPlan;
-use super::shell::shell;
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -45,13 +44,12 @@ pub fn manifests(job: &JobRequest, plan: &ClusterPlan, work: &Path, target: &Kub
         })
     };
     // A lost node is no failure of the task; a program that fails three times is.
-    let of_nodes = json!({ "rules": [{ "action": "Ignore", "onPodConditions": [{ "type": "DisruptionTarget", "status": "True" }] }] });
-    let of_index = json!({
-        "rules": [
-            { "action": "Ignore", "onPodConditions": [{ "type": "DisruptionTarget", "status": "True" }] },
-            { "action": "FailJob", "onExitCodes": { "containerName": "orator", "operator": "In", "values": [1] } },
-        ],
+    let lost_node =
+        json!({ "action": "Ignore", "onPodConditions": [{ "type": "DisruptionTarget", "status": "True" }] });
+    let failed = json!({
+        "action": "FailJob", "onExitCodes": { "containerName": "orator", "operator": "In", "values": [1] },
     });
+    let of_index = json!({ "rules": [lost_node, failed] });
     let seconds = (limits.hours * 3600.0).ceil() as i64;
     let script = |lines: Vec<String>| vec!["/bin/sh".to_owned(), "-c".to_owned(), lines.join("\n")];
     let mut last = vec!["code=0".to_owned(), format!("{} || code=$?", shell(&job.last_worker()))];
@@ -77,7 +75,7 @@ pub fn manifests(job: &JobRequest, plan: &ClusterPlan, work: &Path, target: &Kub
     items.push(json!({
         "apiVersion": "batch/v1", "kind": "Job", "metadata": meta("-last"),
         "spec": {
-            "backoffLimit": 3, "activeDeadlineSeconds": seconds, "podFailurePolicy": of_nodes,
+            "backoffLimit": 3, "activeDeadlineSeconds": seconds, "podFailurePolicy": { "rules": [lost_node] },
             "template": pod(script(last)),
         },
     }));

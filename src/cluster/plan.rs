@@ -1,7 +1,7 @@
 //! A sealed plan: which units there are, and what they are made with. Workers on any machine check that they hold the same
 //! program, configuration and models before they claim a unit.
 
-use super::shell::shell;
+use super::job::shell;
 use anyhow::{Context, Result, bail, ensure};
 use orator_base::stage::fingerprint::hash_file;
 use orator_base::stage::{Unit, workdir};
@@ -214,11 +214,6 @@ impl ClusterPlan {
         path.with_file_name(format!("{stem}-{}", &self.seal[..12]))
     }
 
-    /// What each unit needs to have ended before.
-    pub fn needs(&self) -> Vec<Vec<usize>> {
-        self.units.iter().map(|unit| unit.needs.clone()).collect()
-    }
-
     /// The videos, one unit each.
     pub fn videos(&self) -> Vec<PlannedUnit> {
         self.units.iter().filter(|unit| unit.share == UnitShare::Whole).cloned().collect()
@@ -295,20 +290,28 @@ pub fn settings_hash(config: &Config) -> Result<String> {
 }
 
 #[cfg(test)]
+impl PlannedUnit {
+    /// A video of unknown length for tests.
+    pub fn example(speaker: &str, video: &str) -> Self {
+        Self {
+            speaker: speaker.to_owned(),
+            video: video.to_owned(),
+            source: video.into(),
+            bytes: 1,
+            secs: None,
+            share: UnitShare::Whole,
+            needs: Vec::new(),
+        }
+    }
+}
+
+#[cfg(test)]
 mod tests {
     use super::*;
     use orator_dataset::config::load;
 
     fn video(name: &str, secs: f64) -> PlannedUnit {
-        PlannedUnit {
-            speaker: "host".to_owned(),
-            video: name.to_owned(),
-            source: PathBuf::from(name),
-            bytes: 1,
-            secs: Some(secs),
-            share: UnitShare::Whole,
-            needs: Vec::new(),
-        }
+        PlannedUnit { secs: Some(secs), ..PlannedUnit::example("host", name) }
     }
 
     #[test]

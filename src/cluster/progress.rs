@@ -1,8 +1,7 @@
 //! How far the workers of a plan are, from their files alone.
 
-use super::claim_files::Claim;
-use super::claims::{ClaimState, Claims};
-use super::heartbeat::{BeatWatch, Heartbeat, WORKERS, this_machine};
+use super::claims::{Claim, UnitState, read_states};
+use super::heartbeat::{Heartbeat, WORKERS, this_machine};
 use super::plan::ClusterPlan;
 use super::shared_folder::{DiskFolder, SharedFolder};
 use super::worker::STOP;
@@ -56,48 +55,33 @@ pub fn progress(plan: &ClusterPlan, path: &Path, dead_after: Duration) -> Result
     let folder = DiskFolder(plan.folder(path));
     let workers = workers(&folder, dead_after)?;
     let is_alive = |name: &str| workers.iter().any(|worker| worker.worker == name && worker.is_alive);
-    let watch = BeatWatch::new(dead_after, "");
-    let mut claims = Claims::new(&folder, "", plan.needs(), Vec::new(), watch, false);
-    claims.read()?;
+    let states = read_states(&folder, plan.units.len())?;
     let mut told = PlanProgress { n_units: plan.units.len(), ..PlanProgress::default() };
-    for (unit, (planned, state)) in plan.units.iter().zip(claims.states()).enumerate() {
-        let secs = planned.media_secs().unwrap_or(0.0);
+    for (unit, (planned, UnitState { epoch, has_ended })) in plan.units.iter().zip(states).enumerate() {
+        let (claim, secs) = (Claim { unit, epoch }, planned.media_secs().unwrap_or(0.0));
         told.media_secs += secs;
-        let claim = |epoch| Claim { unit, epoch };
-        match *state {
-            ClaimState::Free => {}
-            ClaimState::Claimed(epoch) => {
-                told.n_taken_over += usize::from(epoch > 1);
-                match claim(epoch).read_owner(&folder)?.is_some_and(|worker| is_alive(&worker)) {
-                    true => told.n_claimed += 1,
-                    false => told.n_left_by_dead += 1,
-                }
+        told.n_taken_over += usize::from(epoch > 1);
+        if !has_ended && epoch > 0 {
+            match claim.read_owner(&folder)?.is_some_and(|worker| is_alive(&worker)) {
+                true => told.n_claimed += 1,
+                false => told.n_left_by_dead += 1,
             }
-            ClaimState::Ended(epoch) => {
-                told.ended_media_secs += secs;
-                told.n_taken_over += usize::from(epoch > 1);
-                match claim(epoch).read_end(&folder)?.and_then(|end| end.error) {
-                    None => told.n_done += 1,
-                    Some(error) => {
-                        told.n_failed += 1;
-                        told.failures.entry(reason(&error)).or_default().push(planned.to_string());
-                    }
+        } else if has_ended {
+            told.ended_media_secs += secs;
+            match claim.read_end(&folder)?.and_then(|end| end.error) {
+                None => told.n_done += 1,
+                Some(error) => {
+                    told.n_failed += 1;
+                    told.failures.entry(reason(&error)).or_default().push(planned.to_string());
                 }
             }
         }
     }
-    let rate: f64 = workers.iter().filter(|worker| worker.is_alive).map(|worker| worker.media_rate()).sum();
+    let rate: f64 = workers.iter().filter(|worker| worker.is_alive).map(|worker| worker.heartbeat.media_rate()).sum();
     told.secs_left = (rate > 0.0).then(|| (told.media_secs - told.ended_media_secs) / rate);
     told.stopped = folder.read(STOP)?.map(|reason| String::from_utf8_lossy(&reason).into_owned());
     told.workers = workers;
     Ok(told)
-}
-
-impl WorkerProgress {
-    /// Seconds of video a second.
-    fn media_rate(&self) -> f64 {
-        self.heartbeat.media_secs / self.heartbeat.secs.max(1.0)
-    }
 }
 
 /// The innermost cause of an error, which units of one trouble share.

@@ -1,8 +1,7 @@
 //! Jobs for Slurm: an array of workers, a last job after all of them, and trainings after that.
 
-use super::job::{JobRequest, TaskLimits};
+use super::job::{JobRequest, TaskLimits, shell};
 use super::plan::ClusterPlan;
-use super::shell::shell;
 use std::path::Path;
 
 /// Seconds before the end of its time in which a task is told to stop.
@@ -122,7 +121,7 @@ fn clock(hours: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::plan::{PlannedUnit, UnitShare};
+    use super::super::plan::PlannedUnit;
     use super::*;
 
     #[test]
@@ -134,15 +133,6 @@ mod tests {
             n_at_once: 40,
             worker_limits: TaskLimits { cores: 4, memory_gib: 3.5, hours: 1.01 },
         };
-        let of_speaker = |speaker: &str| PlannedUnit {
-            speaker: speaker.to_owned(),
-            video: "talk".to_owned(),
-            source: "talk.mp4".into(),
-            bytes: 1,
-            secs: None,
-            share: UnitShare::Whole,
-            needs: Vec::new(),
-        };
         let plan = ClusterPlan {
             version: 1,
             program: String::new(),
@@ -150,7 +140,7 @@ mod tests {
             sets: vec!["extract.fps=15".to_owned()],
             settings: String::new(),
             models: Default::default(),
-            units: ["guest's", "host"].map(of_speaker).to_vec(),
+            units: ["guest's", "host"].map(|speaker| PlannedUnit::example(speaker, "talk")).to_vec(),
             seal: String::new(),
         };
         let options = ["--partition=long".to_owned()];

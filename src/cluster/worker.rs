@@ -1,8 +1,7 @@
 //! A worker: it claims units of a plan, one after the other, and runs their stages, until every unit has ended or it is
 //! asked to stop. Any number of workers on any machines share a plan.
 
-use super::claim_files::{Claim, UnitEnd};
-use super::claims::{Claims, NextUnit};
+use super::claims::{Claim, ClaimOptions, Claims, NextUnit, UnitEnd};
 use super::heartbeat::{BeatWatch, Heartbeat, this_machine};
 use super::plan::{ClusterPlan, PlannedUnit, UnitShare};
 use super::shared_folder::{DiskFolder, SharedFolder};
@@ -17,8 +16,9 @@ use orator_pipeline::Pipeline;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Condvar, Mutex, MutexGuard};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// File that stops every worker of a plan, with the reason in it.
@@ -39,8 +39,6 @@ pub struct WorkerOptions {
     pub beat: Duration,
     /// Time without a beat after which another worker is dead.
     pub dead_after: Duration,
-    /// No unit is begun later than this after the start.
-    pub begin_within: Option<Duration>,
 }
 
 /// What workers of one process did.
@@ -88,7 +86,7 @@ pub fn work(
         begun: Instant::now(),
         machine: &machine,
         report: Mutex::default(),
-        broken: Mutex::default(),
+        is_broken: AtomicBool::new(false),
     };
     let started = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs());
     let first = Heartbeat {
@@ -98,22 +96,19 @@ pub fn work(
         started,
         ..Heartbeat::default()
     };
-    std::thread::scope(|scope| {
-        for _ in 0..options.jobs.max(1) {
-            scope.spawn(|| {
-                if let Err(error) = session.run(&worker_name(&host), first.clone()) {
-                    session.broken().get_or_insert(error);
-                }
-            });
-        }
+    let run = || {
+        let ended = session.run(&worker_name(&host), first.clone());
+        session.is_broken.fetch_or(ended.is_err(), Ordering::Relaxed);
+        ended
+    };
+    let ended: Result<()> = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..options.jobs.max(1)).map(|_| scope.spawn(run)).collect();
+        workers.into_iter().try_for_each(|worker| worker.join().unwrap_or_else(|_| bail!("a worker has panicked")))
     });
     // What cannot be kept is hashed again.
     let _ = hashes.save();
-    if let Some(error) = session.broken().take() {
-        return Err(error);
-    }
-    drop(session.broken);
-    Ok(session.report.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner()))
+    ended?;
+    Ok(session.report.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 
 /// A name that no other worker has: the machine's, the process and a number by chance.
@@ -147,41 +142,41 @@ struct Session<'a> {
     begun: Instant,
     machine: &'a str,
     report: Mutex<WorkReport>,
-    /// What stopped the workers.
-    broken: Mutex<Option<anyhow::Error>>,
+    /// Whether a worker ended with an error, so that all end.
+    is_broken: AtomicBool,
 }
 
 impl Session<'_> {
-    /// One worker, with its heart.
+    /// One worker, with its heartbeat.
     fn run(&self, name: &str, first: Heartbeat) -> Result<()> {
-        let heart = Heart {
-            folder: &self.folder,
-            name,
-            said: Mutex::new(first),
-            begun: self.begun,
-            over: (Mutex::new(false), Condvar::new()),
-        };
+        let heart = HeartbeatFile { folder: &self.folder, name, content: Mutex::new(first), begun: self.begun };
         heart.beat()?;
+        let (stop, stopped) = channel::<()>();
         let ended = std::thread::scope(|scope| {
             scope.spawn(|| {
-                while heart.rests(self.options.beat) {
+                while stopped.recv_timeout(self.options.beat) == Err(RecvTimeoutError::Timeout) {
                     // One beat that cannot be written is no death.
                     let _ = heart.beat();
                 }
             });
             let ended = self.work(name, &heart);
-            heart.stop();
+            drop(stop);
             ended
         });
-        // After an error too: what it had in hand is free for others at once.
-        heart.said().ended = true;
+        // After an error too: other workers may take its unit at once.
+        heart.content().ended = true;
         ended.and(heart.beat())
     }
 
-    fn work(&self, name: &str, heart: &Heart) -> Result<()> {
+    fn work(&self, name: &str, heart: &HeartbeatFile) -> Result<()> {
+        let options = ClaimOptions {
+            worker: name.to_owned(),
+            needs: self.plan.units.iter().map(|unit| unit.needs.clone()).collect(),
+            order: self.order(),
+            retries: self.options.retry,
+        };
         let watch = BeatWatch::new(self.options.dead_after, self.machine);
-        let order = self.order();
-        let mut claims = Claims::new(&self.folder, name, self.plan.needs(), order, watch, self.options.retry);
+        let mut claims = Claims::new(&self.folder, options, watch);
         while !self.is_to_stop()? {
             match claims.next(self.begun.elapsed())? {
                 NextUnit::Claimed(claim) => self.work_on(name, claim, &mut claims, heart)?,
@@ -221,14 +216,13 @@ impl Session<'_> {
         if let Some(reason) = self.folder.read(STOP)? {
             bail!("{}: all workers stop; make room and start them again", String::from_utf8_lossy(&reason));
         }
-        let is_late = self.options.begin_within.is_some_and(|within| self.begun.elapsed() >= within);
-        Ok(is_late || self.progress.is_to_stop() || self.broken().is_some())
+        Ok(self.progress.is_to_stop() || self.is_broken.load(Ordering::Relaxed))
     }
 
-    fn work_on(&self, name: &str, claim: Claim, claims: &mut Claims<DiskFolder>, heart: &Heart) -> Result<()> {
+    fn work_on(&self, name: &str, claim: Claim, claims: &mut Claims<DiskFolder>, heart: &HeartbeatFile) -> Result<()> {
         let planned = &self.plan.units[claim.unit];
         let unit = planned.unit();
-        heart.said().unit = Some(planned.to_string());
+        heart.content().unit = Some(planned.to_string());
         let begun = Instant::now();
         let still_mine = || match claims.is_mine(claim)? {
             true => Ok(()),
@@ -247,7 +241,7 @@ impl Session<'_> {
             StageOutcome::Failed(error) => Some(error.clone()),
             _ => None,
         });
-        heart.said().unit = None;
+        heart.content().unit = None;
         if let Some(error) = &failed {
             if error.is::<Abandoned>() {
                 self.report().laid_aside += 1;
@@ -266,15 +260,15 @@ impl Session<'_> {
         let mut report = self.report();
         report.taken_over += usize::from(claim.epoch > 1);
         report.laid_aside += usize::from(!is_mine);
-        let mut said = heart.said();
+        let mut content = heart.content();
         match error {
             Some(error) => {
-                said.n_failed += 1;
+                content.n_failed += 1;
                 report.failed.push((planned.to_string(), error));
             }
             None => {
-                said.n_done += 1;
-                said.media_secs += planned.media_secs().unwrap_or(0.0);
+                content.n_done += 1;
+                content.media_secs += planned.media_secs().unwrap_or(0.0);
                 report.done += 1;
                 let is_fresh = is_whole && ended.iter().all(|one| matches!(one, StageOutcome::Skipped(_)));
                 report.fresh += usize::from(is_fresh);
@@ -284,11 +278,7 @@ impl Session<'_> {
     }
 
     fn report(&self) -> MutexGuard<'_, WorkReport> {
-        self.report.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
-    }
-
-    fn broken(&self) -> MutexGuard<'_, Option<anyhow::Error>> {
-        self.broken.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+        self.report.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -296,40 +286,26 @@ fn host_of(worker: &str) -> &str {
     worker.rsplitn(4, '-').last().unwrap_or(worker)
 }
 
-/// What beats for one worker.
-struct Heart<'a> {
+/// The heartbeat of one worker.
+struct HeartbeatFile<'a> {
     folder: &'a DiskFolder,
     name: &'a str,
-    said: Mutex<Heartbeat>,
+    content: Mutex<Heartbeat>,
     begun: Instant,
-    over: (Mutex<bool>, Condvar),
 }
 
-impl Heart<'_> {
+impl HeartbeatFile<'_> {
     fn beat(&self) -> Result<()> {
         let bytes = {
-            let mut said = self.said();
-            said.beat += 1;
-            said.secs = self.begun.elapsed().as_secs_f64();
-            serde_json::to_vec(&*said)?
+            let mut content = self.content();
+            content.beat += 1;
+            content.secs = self.begun.elapsed().as_secs_f64();
+            serde_json::to_vec(&*content)?
         };
         self.folder.replace(&Heartbeat::name(self.name), &bytes)
     }
 
-    fn said(&self) -> MutexGuard<'_, Heartbeat> {
-        self.said.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
-    }
-
-    /// Waits for the next beat; `false`: it is over.
-    fn rests(&self, beat: Duration) -> bool {
-        let (over, told) = &self.over;
-        let over = over.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-        let waited = told.wait_timeout_while(over, beat, |over| !*over);
-        !*waited.unwrap_or_else(|poisoned| poisoned.into_inner()).0
-    }
-
-    fn stop(&self) {
-        *self.over.0.lock().unwrap_or_else(|poisoned| poisoned.into_inner()) = true;
-        self.over.1.notify_all();
+    fn content(&self) -> MutexGuard<'_, Heartbeat> {
+        self.content.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -1,23 +1,21 @@
 //! A study folder from a study file: clips, motion, films, plan and key, and the seal last. A build that was stopped goes
-//! on from the films that are there; the same input gives the same bytes, whatever the number of workers.
+//! on from the films that are there; the same input gives the same bytes, whatever the number of workers. All films have
+//! one length in bytes: an mp4 is made longer by a `free` box at its end, which players skip.
 
 use super::design::{ClipNeeds, design};
 use super::file::{StudyFile, StudySpeaker};
-use super::folder::StudyFolder;
+use super::folder::{StudyFolder, read_json, write_json};
 use super::plan::{FilmContent, StudyKey, StudyPlan};
 use super::preregistration::Preregistration;
 use super::seal::StudySeal;
 use super::stimuli::cut::{RefusedPiece, StudyClip};
-use super::stimuli::film::check_encoder;
-use super::stimuli::film_name::film_name;
-use super::stimuli::film_size::{common_bytes, padded};
+use super::stimuli::film::{check_encoder, film_name};
 use super::stimuli::filmed::{CutSpeaker, FilmedSpeaker, equally_loud};
 use anyhow::{Context, Result, ensure};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir::{self, lock, write_file};
 use orator_formats::wav;
 use rayon::prelude::*;
-use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs;
@@ -221,18 +219,6 @@ fn publish(folder: &StudyFolder, films: &BTreeMap<String, PathBuf>) -> Result<()
     Ok(())
 }
 
-fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
-    let mut json = serde_json::to_vec_pretty(value)?;
-    json.push(b'\n');
-    write_file(path, &json)
-}
-
-fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
-    let bytes = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
-    serde_json::from_slice(&bytes)
-        .with_context(|| format!("{} is not as `orator study build` writes it", path.display()))
-}
-
 fn remove(path: &Path) -> Result<()> {
     workdir::remove(path).with_context(|| format!("cannot remove {}", path.display()))
 }
@@ -244,4 +230,49 @@ fn clips_folder(folder: &StudyFolder) -> PathBuf {
 /// Where films lie until all of them are made.
 fn made_films(folder: &StudyFolder) -> PathBuf {
     folder.dir().join(".films")
+}
+
+/// Least length of a box: its own length and its type.
+const HEADER_BYTES: usize = 8;
+/// Lengths are rounded up to a multiple of this.
+const STEP_BYTES: usize = 4096;
+
+/// Length that films of these lengths can all have.
+fn common_bytes(lengths: impl IntoIterator<Item = usize>) -> usize {
+    let longest = lengths.into_iter().max().unwrap_or(0);
+    (longest + HEADER_BYTES).next_multiple_of(STEP_BYTES)
+}
+
+/// Appends a box of zeros to an mp4, so that it has `n_bytes`.
+///
+/// # Errors
+/// A film that is longer, or shorter by less than a box or by more than 4 GB.
+fn padded(mut film: Vec<u8>, n_bytes: usize) -> Result<Vec<u8>> {
+    let missing = n_bytes.checked_sub(film.len()).filter(|missing| *missing >= HEADER_BYTES);
+    let size = missing.and_then(|missing| u32::try_from(missing).ok());
+    let size = size.with_context(|| format!("{} bytes cannot become {n_bytes}", film.len()))?;
+    film.extend(size.to_be_bytes());
+    film.extend(b"free");
+    film.resize(n_bytes, 0);
+    Ok(film)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn films_become_equally_long() {
+        let lengths = [4_080, 4_085, 12, 4_088];
+        let n_bytes = common_bytes(lengths);
+        assert_eq!((n_bytes, common_bytes([4_089]), common_bytes([])), (4_096, 8_192, 4_096));
+        for length in lengths {
+            let film = padded(vec![7; length], n_bytes).unwrap();
+            assert_eq!(film.len(), n_bytes);
+            let free = &film[length..];
+            assert_eq!((&free[..4], &free[4..8]), (&((n_bytes - length) as u32).to_be_bytes()[..], &b"free"[..]));
+            assert!(free[8..].iter().all(|byte| *byte == 0));
+            assert!(padded(film, n_bytes + 3).is_err());
+        }
+    }
 }

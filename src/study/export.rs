@@ -1,44 +1,22 @@
 //! Responses as tables: each answer with what its films showed, and who took part.
 
-use super::bundle::files::BundledPlan;
-use super::bundle::posts::{CollectedParticipant, read_posts};
+use super::design::right_response;
 use super::file::StudyFile;
-use super::folder::StudyFolder;
-use super::plan::{FilmContent, PlannedTask, StudyKey, StudyPlan, TaskDesign, Trial, TrialPhase};
-use super::response::{Response, ScreenSide};
+use super::folder::{StudyFolder, read_json};
+use super::plan::{FilmContent, StudyKey, StudyPlan, TaskDesign};
 use super::store::answers::{self, GivenAnswer};
 use super::store::database;
 use super::store::participants::{self, PARAMETERS, Participant, Status};
-use super::vote::StudyVote;
+use super::vote::{Response, StudyVote, VOTE_COLUMNS};
 use anyhow::{Context, Result};
 use orator_base::stage::workdir;
 use serde::Serialize;
-use serde::de::DeserializeOwned;
-use serde_json::json;
-use std::collections::BTreeMap;
-use std::fs::{self, File};
+use serde_json::{Map, Value, json};
+use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// Columns of the table of votes, in the order of [`StudyVote`].
-const VOTE_COLUMNS: [&str; 15] = [
-    "participant",
-    "task",
-    "design",
-    "phase",
-    "trial",
-    "clip",
-    "speaker",
-    "conditions",
-    "response",
-    "expected",
-    "stalled_secs",
-    "unfocused_secs",
-    "response_secs",
-    "plays",
-    "completed",
-];
-
+/// Columns of the table of participants, before those of what recruiting sites give along.
 const PARTICIPANT_COLUMNS: [&str; 8] =
     ["participant", "place", "language", "status", "answers", "failed_checks", "begun_ms", "code"];
 
@@ -67,8 +45,6 @@ pub struct Exported {
     pub participants: PathBuf,
     pub n_votes: usize,
     pub n_participants: usize,
-    /// Collected lines of a bundle that fit no session of the plan.
-    pub n_dropped: usize,
 }
 
 /// Writes the responses of a study into the folder `out`: `votes` and `participants`. Participants come in the order in
@@ -77,129 +53,55 @@ pub struct Exported {
 /// # Errors
 /// A study without responses, a file of it that cannot be read, a folder that cannot be written.
 pub fn export(folder: &StudyFolder, form: TableForm, out: &Path) -> Result<Exported> {
-    let joined = JoinedPlan::read(folder)?;
-    let db = database::open_to_read(&folder.responses())?;
-    // One moment of the database for both tables.
-    db.execute_batch("BEGIN")?;
-    let all = participants::all(&db)?;
-    write_tables(&joined, &all, |participant| Ok(answers::of(&db, &participant.id)?), form, out)
-}
-
-/// Writes the responses that an address has collected from the pages of a bundle, as [`export`] does.
-///
-/// # Errors
-/// Those of [`export`]; a file `posts` that cannot be read.
-pub fn export_posts(folder: &StudyFolder, posts: &Path, form: TableForm, out: &Path) -> Result<Exported> {
-    let joined = JoinedPlan::read(folder)?;
-    let collected = read_posts(&BundledPlan::read(folder)?, posts)?;
-    let all: Vec<Participant> = collected.participants.iter().map(|one| joined.participant(one)).collect();
-    let mut given: BTreeMap<String, Vec<GivenAnswer>> =
-        collected.participants.into_iter().map(|one| (one.id, one.answers)).collect();
-    let answers = |participant: &Participant| Ok(given.remove(&participant.id).unwrap_or_default());
-    let exported = write_tables(&joined, &all, answers, form, out)?;
-    Ok(Exported { n_dropped: collected.dropped, ..exported })
-}
-
-fn write_tables(
-    joined: &JoinedPlan,
-    all: &[Participant],
-    mut answers_of: impl FnMut(&Participant) -> Result<Vec<GivenAnswer>>,
-    form: TableForm,
-    out: &Path,
-) -> Result<Exported> {
+    let (participants, votes) = responses(folder)?;
     let path = |name: &str| out.join(name).with_extension(form.extension());
-    let (votes, of_participants) = (path("votes"), path("participants"));
-    let mut n_votes = 0;
-    workdir::replace(&votes, |attempt| {
-        let mut table = TableFile::create(attempt, form, &VOTE_COLUMNS)?;
-        for participant in all {
-            for answer in answers_of(participant)? {
-                let vote = joined.vote(participant, answer)?;
-                table.add(&vote, || vote_cells(&vote))?;
-                n_votes += 1;
-            }
-        }
-        table.end()
-    })?;
-    let columns = [&PARTICIPANT_COLUMNS[..], &PARAMETERS].concat();
-    workdir::replace(&of_participants, |attempt| {
-        let mut table = TableFile::create(attempt, form, &columns)?;
-        for participant in all {
-            let cells = participant_cells(participant);
-            let mut row: serde_json::Map<_, _> =
-                columns.iter().zip(&cells).map(|(name, cell)| ((*name).to_owned(), json!(cell))).collect();
-            row.insert("place".to_owned(), json!(participant.session + 1));
-            row.insert("answers".to_owned(), json!(participant.position));
-            row.insert("failed_checks".to_owned(), json!(participant.failed_checks));
-            row.insert("begun_ms".to_owned(), json!(participant.begun_ms));
-            table.add(&row, || cells)?;
-        }
-        table.end()
-    })?;
-    Ok(Exported { votes, participants: of_participants, n_votes, n_participants: all.len(), n_dropped: 0 })
+    let (votes_file, participants_file) = (path("votes"), path("participants"));
+    write_table(&votes_file, form, &VOTE_COLUMNS, &votes)?;
+    let rows: Vec<Map<String, Value>> = participants.iter().map(participant_row).collect();
+    write_table(&participants_file, form, &[&PARTICIPANT_COLUMNS[..], &PARAMETERS].concat(), &rows)?;
+    Ok(Exported {
+        votes: votes_file,
+        participants: participants_file,
+        n_votes: votes.len(),
+        n_participants: participants.len(),
+    })
 }
 
-/// All votes of a study, in the order of [`export`]: of its own store, or of the file `posts` that an address has collected
-/// from the pages of a bundle.
+/// Participants of a study in the order in which they began, and all of their votes.
 ///
 /// # Errors
-/// Those of [`export_posts`].
-pub fn votes(folder: &StudyFolder, posts: Option<&Path>) -> Result<Vec<StudyVote>> {
+/// A study without responses, a file of it that cannot be read.
+pub fn responses(folder: &StudyFolder) -> Result<(Vec<Participant>, Vec<StudyVote>)> {
     let joined = JoinedPlan::read(folder)?;
-    if let Some(posts) = posts {
-        let of = |one: CollectedParticipant| {
-            let participant = joined.participant(&one);
-            let votes = one.answers.into_iter().map(|answer| joined.vote(&participant, answer));
-            votes.collect::<Result<Vec<_>>>()
-        };
-        let collected = read_posts(&BundledPlan::read(folder)?, posts)?.participants;
-        return Ok(collected.into_iter().map(of).collect::<Result<Vec<_>>>()?.concat());
-    }
     let db = database::open_to_read(&folder.responses())?;
+    // One moment of the database for participants and answers.
     db.execute_batch("BEGIN")?;
-    let mut votes = Vec::new();
-    for participant in participants::all(&db)? {
+    let (all, mut votes) = (participants::all(&db)?, Vec::new());
+    for participant in &all {
         for answer in answers::of(&db, &participant.id)? {
-            votes.push(joined.vote(&participant, answer)?);
+            votes.push(joined.vote(participant, answer)?);
         }
     }
-    Ok(votes)
+    Ok((all, votes))
 }
 
-/// Plan and key, by which an answer becomes a vote.
+/// Plan, key and study file, by which an answer becomes a vote.
 struct JoinedPlan {
     plan: StudyPlan,
     key: StudyKey,
-    /// Names of the real conditions.
-    real: Vec<String>,
+    file: StudyFile,
 }
 
 impl JoinedPlan {
     fn read(folder: &StudyFolder) -> Result<Self> {
         let file = StudyFile::read(&folder.study_file())?;
-        let real = file.condition.into_iter().filter(|condition| condition.real).map(|condition| condition.name);
-        Ok(Self { plan: read_json(&folder.plan())?, key: read_json(&folder.key())?, real: real.collect() })
+        Ok(Self { plan: read_json(&folder.plan())?, key: read_json(&folder.key())?, file })
     }
 
-    /// Participant of a bundle, of whom the address has told neither language nor code.
-    fn participant(&self, collected: &CollectedParticipant) -> Participant {
-        let trials = &self.plan.sessions[collected.session].trials;
-        let is_failed = |(trial, answer): &(&Trial, &GivenAnswer)| {
-            let expected = trial.expected.as_ref().filter(|_| trial.phase == TrialPhase::AttentionCheck);
-            expected.is_some_and(|expected| *expected != answer.response)
-        };
-        Participant {
-            id: collected.id.clone(),
-            session: collected.session as u32,
-            language: String::new(),
-            parameters: BTreeMap::new(),
-            code: String::new(),
-            status: if collected.completed { Status::Completed } else { Status::Active },
-            begun_ms: 0,
-            position: collected.answers.len() as u32,
-            given_ms: 0,
-            failed_checks: trials.iter().zip(&collected.answers).filter(is_failed).count() as u32,
-        }
+    /// Right response of an analysed trial: the real film's, the matched film's.
+    fn right_response(&self, design: TaskDesign, films: &[&FilmContent]) -> Option<Response> {
+        let shown: Option<Vec<_>> = films.iter().map(|film| self.file.find_condition(&film.condition)).collect();
+        right_response(design, &shown?)
     }
 
     fn vote(&self, participant: &Participant, answer: GivenAnswer) -> Result<StudyVote> {
@@ -219,7 +121,7 @@ impl JoinedPlan {
             clip: first.clip.clone(),
             speaker: first.speaker.clone(),
             conditions: films.iter().map(|film| film.condition.clone()).collect(),
-            expected: trial.expected.clone().or_else(|| self.expected(trial, task, &films)),
+            expected: trial.expected.clone().or_else(|| self.right_response(task.design, &films)),
             response: answer.response,
             stalled_secs: answer.stalled_secs,
             unfocused_secs: answer.unfocused_secs,
@@ -228,116 +130,60 @@ impl JoinedPlan {
             completed: participant.status == Status::Completed,
         })
     }
-
-    /// Right response of an analysed trial: the real film's, the matched film's.
-    fn expected(&self, trial: &Trial, task: &PlannedTask, films: &[&FilmContent]) -> Option<Response> {
-        let is_real = |film: &FilmContent| self.real.contains(&film.condition);
-        let is_matched = |film: &FilmContent| film.motion_of == film.clip;
-        let side_of = |is: &dyn Fn(&FilmContent) -> bool| match films {
-            [left, right] if is(left) != is(right) => {
-                Some(Response::Side(if is(left) { ScreenSide::Left } else { ScreenSide::Right }))
-            }
-            _ => None,
-        };
-        match task.design {
-            TaskDesign::Turing => side_of(&is_real),
-            TaskDesign::Mismatch => side_of(&is_matched),
-            TaskDesign::TuringSingle if trial.films.len() == 1 => Some(Response::Real(is_real(films[0]))),
-            TaskDesign::TuringSingle | TaskDesign::Preference | TaskDesign::Sliders => None,
-        }
-    }
 }
 
-fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
-    let bytes = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
-    serde_json::from_slice(&bytes).with_context(|| format!("{} is no file of a study", path.display()))
-}
-
-/// Table that is being written, row by row.
-enum TableFile {
-    Csv(Box<csv::Writer<File>>),
-    Jsonl(BufWriter<File>),
-}
-
-impl TableFile {
-    fn create(path: &Path, form: TableForm, columns: &[&str]) -> Result<Self> {
-        let file = File::create(path)?;
-        Ok(match form {
-            TableForm::Jsonl => Self::Jsonl(BufWriter::new(file)),
-            TableForm::Csv => {
-                let mut writer = csv::Writer::from_writer(file);
-                writer.write_record(columns)?;
-                Self::Csv(Box::new(writer))
-            }
-        })
-    }
-
-    fn add(&mut self, row: &impl Serialize, cells: impl FnOnce() -> Vec<String>) -> Result<()> {
-        match self {
-            Self::Csv(writer) => writer.write_record(cells())?,
-            Self::Jsonl(writer) => {
-                serde_json::to_writer(&mut *writer, row)?;
-                writer.write_all(b"\n")?;
-            }
-        }
-        Ok(())
-    }
-
-    fn end(self) -> Result<()> {
-        match self {
-            Self::Csv(mut writer) => Ok(writer.flush()?),
-            Self::Jsonl(mut writer) => Ok(writer.flush()?),
-        }
-    }
-}
-
-fn vote_cells(vote: &StudyVote) -> Vec<String> {
-    vec![
-        vote.participant.clone(),
-        vote.task.clone(),
-        word(&vote.design),
-        word(&vote.phase),
-        vote.trial.to_string(),
-        vote.clip.clone(),
-        vote.speaker.clone(),
-        vote.conditions.join("|"),
-        response_cell(&vote.response),
-        vote.expected.as_ref().map(response_cell).unwrap_or_default(),
-        vote.stalled_secs.to_string(),
-        vote.unfocused_secs.to_string(),
-        vote.response_secs.to_string(),
-        vote.plays.to_string(),
-        vote.completed.to_string(),
-    ]
-}
-
-fn participant_cells(participant: &Participant) -> Vec<String> {
+fn participant_row(participant: &Participant) -> Map<String, Value> {
     let own = [
-        participant.id.clone(),
-        (participant.session + 1).to_string(),
-        participant.language.clone(),
-        participant.status.word().to_owned(),
-        participant.position.to_string(),
-        participant.failed_checks.to_string(),
-        participant.begun_ms.to_string(),
-        participant.code.clone(),
+        json!(participant.id),
+        json!(participant.session + 1),
+        json!(participant.language),
+        json!(participant.status),
+        json!(participant.position),
+        json!(participant.failed_checks),
+        json!(participant.begun_ms),
+        json!(participant.code),
     ];
-    let given = PARAMETERS.iter().map(|name| participant.parameters.get(*name).cloned().unwrap_or_default());
-    own.into_iter().chain(given).collect()
+    let given = PARAMETERS.map(|name| json!(participant.parameters.get(name).map_or("", String::as_str)));
+    let columns = PARTICIPANT_COLUMNS.into_iter().chain(PARAMETERS).map(str::to_owned);
+    columns.zip(own.into_iter().chain(given)).collect()
 }
 
-/// Word by which serde writes a plain variant.
-fn word(value: &impl Serialize) -> String {
-    serde_json::to_value(value).ok().and_then(|word| word.as_str().map(str::to_owned)).unwrap_or_default()
+/// Writes a table whose rows serialize as objects with these columns.
+fn write_table(path: &Path, form: TableForm, columns: &[&str], rows: &[impl Serialize]) -> Result<()> {
+    workdir::replace(path, |attempt| {
+        let mut file = BufWriter::new(File::create(attempt)?);
+        match form {
+            TableForm::Csv => {
+                let mut writer = csv::Writer::from_writer(&mut file);
+                writer.write_record(columns)?;
+                for row in rows {
+                    let Value::Object(row) = serde_json::to_value(row)? else { continue };
+                    writer.write_record(row.values().map(cell))?;
+                }
+                writer.flush()?;
+            }
+            TableForm::Jsonl => {
+                for row in rows {
+                    serde_json::to_writer(&mut file, row)?;
+                    file.write_all(b"\n")?;
+                }
+            }
+        }
+        Ok(file.flush()?)
+    })
 }
 
-/// Response in a cell: `left`, `real`, `-1`, `70|20`, `42`.
-fn response_cell(response: &Response) -> String {
-    match response {
-        Response::Side(side) => word(side),
-        Response::Real(is_real) => if *is_real { "real" } else { "generated" }.to_owned(),
-        Response::Step(step) => step.to_string(),
-        Response::Scores(scores) => scores.iter().map(u8::to_string).collect::<Vec<_>>().join("|"),
-        Response::Number(number) => number.to_string(),
+/// Value in a cell; several are joined by `|`, and a response is its value: `left`, `real`, `-1`, `70|20`, `42`.
+fn cell(value: &Value) -> String {
+    match value {
+        Value::Null => String::new(),
+        Value::Bool(is_so) => is_so.to_string(),
+        Value::Number(number) => number.as_f64().unwrap_or(f64::NAN).to_string(),
+        Value::String(text) => text.clone(),
+        Value::Array(parts) => parts.iter().map(cell).collect::<Vec<_>>().join("|"),
+        Value::Object(response) => match response.get("real") {
+            Some(is_real) => if *is_real == json!(true) { "real" } else { "generated" }.to_owned(),
+            None => response.values().map(cell).collect(),
+        },
     }
 }

@@ -1,6 +1,27 @@
 //! Files of a study folder: what participants can reach lies below `public/`, everything else beside it.
 
+use anyhow::{Context, Result};
+use orator_base::stage::workdir;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
+
+/// Reads a JSON file of a built study.
+///
+/// # Errors
+/// A file that is missing or damaged.
+pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    serde_json::from_slice(&bytes)
+        .with_context(|| format!("{} is not as `orator study build` writes it", path.display()))
+}
+
+/// Writes a JSON file of a study, atomically.
+pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
+    let mut json = serde_json::to_vec_pretty(value)?;
+    json.push(b'\n');
+    workdir::write_file(path, &json)
+}
 
 /// Folder of a built study.
 #[derive(Clone, Debug)]

@@ -4,17 +4,14 @@
 
 pub mod analyse;
 pub mod build;
-pub mod bundle;
 pub mod design;
 pub mod export;
 pub mod file;
 pub mod folder;
 pub mod pages;
-pub mod pilot;
 pub mod plan;
 pub mod power;
 pub mod preregistration;
-pub mod response;
 pub mod seal;
 pub mod server;
 pub mod simulate;

@@ -1,6 +1,6 @@
 //! What each participant sees in which order, fixed before the first of them comes, and what each film shows.
 
-use super::response::Response;
+use super::vote::Response;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

@@ -6,8 +6,10 @@ use super::analyse::figure::FigureMethod;
 use super::analyse::outcome::BinaryVote;
 use super::analyse::result::{FigureSettings, ShareAnalysis, ShareMeasure};
 use super::analyse::share::{CHANCE, ShareCell, share};
+use super::analyse::words::percent;
 use super::simulate::{CrossedDesign, CrossedEffects, crossed_votes};
 use super::stats::equivalence::votes_needed;
+use super::stats::estimate::ConfidenceInterval;
 use super::stats::proportion::BinomialCount;
 use anyhow::{Result, ensure};
 use rayon::prelude::*;
@@ -46,8 +48,8 @@ pub struct PowerRow {
     pub n_votes: usize,
     pub power: f64,
     /// 95 % interval of the simulated power.
-    pub low: f64,
-    pub high: f64,
+    #[serde(flatten)]
+    pub ends: ConfidenceInterval,
 }
 
 /// Answer for one test.
@@ -116,14 +118,12 @@ pub fn power(
     let one = |k: &usize| holds(&simulated(&design, &effects, &settings, question.seed, stream(*k)));
     let n_found = (0..question.n_simulations).into_par_iter().filter(one).count() as u64;
     let count = BinomialCount::new(n_found, question.n_simulations as u64);
-    let interval =
-        count.and_then(|count| count.wilson(0.95)).map_or([0.0, 1.0], |interval| [interval.low, interval.high]);
+    let all = ConfidenceInterval { low: 0.0, high: 1.0 };
     PowerRow {
         n_participants,
         n_votes: n_participants * question.n_trials,
         power: n_found as f64 / question.n_simulations as f64,
-        low: interval[0],
-        high: interval[1],
+        ends: count.and_then(|count| count.wilson(0.95)).unwrap_or(all),
     }
 }
 
@@ -179,7 +179,6 @@ fn curve(
 /// Table for people.
 pub fn text(plan: &PowerPlan) -> String {
     let question = &plan.question;
-    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
     let mut text = format!(
         "{} votes a participant, {} clips; standard deviations of log odds: participants {:.2}, clips {:.2}\n\
          {} simulated studies a row, tests at 5 % with participants and clips crossed\n",
@@ -201,8 +200,8 @@ pub fn text(plan: &PowerPlan) -> String {
                 row.n_participants,
                 row.n_votes,
                 percent(row.power),
-                percent(row.low),
-                percent(row.high)
+                percent(row.ends.low),
+                percent(row.ends.high)
             );
         }
         text += &match curve.n_participants {

@@ -73,11 +73,6 @@ impl Preregistration {
         }
     }
 
-    /// The hypotheses alone.
-    pub fn claims(&self) -> Vec<StudyHypothesis> {
-        self.hypotheses.iter().map(|hypothesis| hypothesis.claim.clone()).collect()
-    }
-
     /// Writes the file, atomically.
     ///
     /// # Errors
@@ -154,7 +149,7 @@ mod tests {
         let made = Preregistration::new(&file);
         assert_eq!((made.participants, made.sessions), (100, 150));
         assert_eq!(made.tasks.iter().map(|task| task.votes).collect::<Vec<_>>(), [2000, 1000]);
-        assert_eq!(made.claims(), file.hypothesis);
+        assert!(made.hypotheses.iter().map(|hypothesis| &hypothesis.claim).eq(&file.hypothesis));
         assert!(
             made.hypotheses[0]
                 .statistic

@@ -2,14 +2,11 @@
 //! the checks of the analysis rest on them.
 
 use super::stats::cluster::votes::ClipVote;
+use super::stats::glmm::fit::{integrated, logistic};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use serde::Serialize;
-
-/// Steps and reach, in standard deviations, of the integral over a normal distribution.
-const STEPS: i32 = 400;
-const REACH: f64 = 8.0;
 
 /// Who votes about what: every participant about as many different clips, every clip about as often.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -38,27 +35,10 @@ impl CrossedEffects {
         let (mut low, mut high) = (-50.0, 50.0);
         for _ in 0..80 {
             let middle = (low + high) / 2.0;
-            if mean_probability(middle, sd) < self.share { low = middle } else { high = middle }
+            if integrated(middle, sd).0 < self.share { low = middle } else { high = middle }
         }
         (low + high) / 2.0
     }
-}
-
-/// Probability of success at these log odds.
-fn probability(log_odds: f64) -> f64 {
-    1.0 / (1.0 + (-log_odds).exp())
-}
-
-/// Mean probability where log odds have this mean and standard deviation.
-fn mean_probability(mean: f64, sd: f64) -> f64 {
-    let (mut sum, mut weights) = (0.0, 0.0);
-    for step in 0..=STEPS {
-        let z = REACH * f64::from(2 * step - STEPS) / f64::from(STEPS);
-        let weight = (-z * z / 2.0).exp();
-        sum += weight * probability(mean + sd * z);
-        weights += weight;
-    }
-    sum / weights
 }
 
 /// Votes of a study, drawn anew for each `stream` of the seed.
@@ -74,7 +54,7 @@ pub fn crossed_votes(design: &CrossedDesign, effects: &CrossedEffects, seed: u64
         (0..design.n_participants).flat_map(|participant| (0..design.n_trials).map(move |trial| (participant, trial)));
     let mut vote = |(participant, trial): (usize, usize)| {
         let clip = (participant * design.n_trials + trial) % design.n_clips.max(1);
-        let is_success = rng.random::<f64>() < probability(mean + participants[participant] + clips[clip]);
+        let is_success = rng.random::<f64>() < logistic(mean + participants[participant] + clips[clip]);
         ClipVote { participant, clip, score: f64::from(u8::from(is_success)) }
     };
     places.map(&mut vote).collect()

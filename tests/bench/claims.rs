@@ -3,8 +3,7 @@
 use super::report::Report;
 use anyhow::{Result, ensure};
 use orator_base::stage::progress::Progress;
-use orator_cluster::claim_files::UnitEnd;
-use orator_cluster::claims::{Claims, NextUnit};
+use orator_cluster::claims::{ClaimOptions, Claims, NextUnit, UnitEnd};
 use orator_cluster::heartbeat::BeatWatch;
 use orator_cluster::shared_folder::{DiskFolder, SharedFolder};
 use serde_json::json;
@@ -63,8 +62,9 @@ pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     let work = |worker: usize| -> Result<usize> {
         let watch = BeatWatch::new(Duration::from_secs(180), "");
         let name = format!("worker-{worker}");
-        let order = (0..args.units).collect();
-        let mut claims = Claims::new(&folder, &name, vec![Vec::new(); args.units], order, watch, false);
+        let (needs, order) = (vec![Vec::new(); args.units], (0..args.units).collect());
+        let mut claims =
+            Claims::new(&folder, ClaimOptions { worker: name.clone(), needs, order, retries: false }, watch);
         let mut n_done = 0;
         loop {
             match claims.next(begun.elapsed())? {

@@ -3,8 +3,7 @@
 use super::report::Report;
 use anyhow::{Result, ensure};
 use orator_base::stage::progress::Progress;
-use orator_cluster::claim_files::{Claim, UnitEnd};
-use orator_cluster::claims::{Claims, NextUnit};
+use orator_cluster::claims::{Claim, ClaimOptions, Claims, NextUnit, UnitEnd};
 use orator_cluster::heartbeat::{BeatWatch, DEAD_AFTER, Heartbeat, WORKERS};
 use orator_cluster::plan::{PIECE_SECS, PlannedUnit, UnitShare, in_order};
 use orator_cluster::shared_folder::SharedFolder;
@@ -157,7 +156,9 @@ fn simulate(units: &[PlannedUnit], n_workers: usize, args: &Args) -> Result<Simu
         let number = folder.lives.borrow().len();
         folder.lives.borrow_mut().push((at, None));
         let watch = BeatWatch::new(DEAD_AFTER, "");
-        let claims = Claims::new(&folder, &number.to_string(), needs.clone(), (0..units.len()).collect(), watch, false);
+        let (needs, order) = (needs.clone(), (0..units.len()).collect());
+        let options = ClaimOptions { worker: number.to_string(), needs, order, retries: false };
+        let claims = Claims::new(&folder, options, watch);
         SimulatedWorker { claims, number, slowness, hands: None }
     };
     let mut workers: Vec<SimulatedWorker> =

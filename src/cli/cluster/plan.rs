@@ -7,9 +7,10 @@ use crate::cli::ui::Ui;
 use anyhow::{Result, bail};
 use orator_base::stage::artifacts::StageName;
 use orator_base::stage::counted;
-use orator_cluster::estimate::stage_times::StageTimes;
-use orator_cluster::estimate::timing;
 use orator_cluster::plan::{ClusterPlan, PIECE_SECS, PlannedUnit};
+use orator_cluster::stage_times::StageTimes;
+use orator_cluster::timing;
+use orator_dataset::config;
 use orator_pipeline::Pipeline;
 use orator_pipeline::process::message::MediaRequest;
 use serde_json::{Value, json};
@@ -41,6 +42,15 @@ pub struct Args {
     untimed: bool,
 }
 
+/// Reads a plan and the pipeline it is of, and checks that they still belong together.
+pub fn open(path: &Path) -> Result<(ClusterPlan, Pipeline)> {
+    let plan = ClusterPlan::read(path)?;
+    let config = config::load(&plan.config, &plan.sets)?;
+    let pipeline = Pipeline::open(config)?.with_processes(this_program());
+    plan.check(&pipeline, &this_program())?;
+    Ok((plan, pipeline))
+}
+
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     if args.workers == Some(0) || args.hours.is_some_and(|hours| !hours.is_finite() || hours <= 0.0) {
         bail!("--workers takes a number from 1 on, --hours one above 0");
@@ -69,7 +79,6 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         lines.extend(told(&times, &lengths));
         facts["stages"] = stages(&times, &lengths);
         facts["peak_mib"] = json!(times.peak_mib);
-        facts["menu"] = json!(times.menu);
         let mut wall = |workers: usize| {
             let secs = times.wall_secs(&lengths, workers);
             lines.push(format!("{:<13}done in {}", counted(workers, "worker"), length(secs)));
@@ -121,7 +130,6 @@ fn told(times: &StageTimes, lengths: &[f64]) -> Vec<String> {
         times.processor
     ));
     lines.extend(times.peak_mib.map(|mib| format!("memory   {mib:.0} MiB a worker")));
-    lines.extend(times.menu.iter().map(|other| format!("--set {:40} {:.2} x the time", other.set, other.times)));
     lines
 }
 

@@ -55,7 +55,6 @@ fn worker(worker: &WorkerProgress) -> String {
         (false, true) => heartbeat.unit.as_ref().map_or("waits".to_owned(), |unit| format!("works on {unit}")),
         (false, false) => format!("dead, silent for {silent_secs:.0} s"),
     };
-    let rate = heartbeat.media_secs / heartbeat.secs.max(1.0);
-    let (done, failed) = (heartbeat.n_done, heartbeat.n_failed);
+    let (done, failed, rate) = (heartbeat.n_done, heartbeat.n_failed, heartbeat.media_rate());
     format!("worker  {worker}: {done} done, {failed} failed, {rate:.2} s of video a second; {state}")
 }

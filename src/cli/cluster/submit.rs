@@ -1,17 +1,15 @@
 //! `orator submit`.
 
-use super::work::open;
+use super::plan::open;
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::{Context, Result, bail, ensure};
 use orator_base::stage::workdir;
-use orator_cluster::estimate::stage_times::StageTimes;
-use orator_cluster::job::{JobRequest, TaskLimits};
+use orator_cluster::job::{JobRequest, TaskLimits, shell};
 use orator_cluster::kubernetes::{KubernetesTarget, manifests};
 use orator_cluster::plan::ClusterPlan;
-use orator_cluster::shell::shell;
-use orator_cluster::slurm;
-use orator_cluster::slurm::SlurmSettings;
+use orator_cluster::slurm::{self, SlurmSettings};
+use orator_cluster::stage_times::StageTimes;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};

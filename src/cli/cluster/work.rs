@@ -1,17 +1,14 @@
 //! `orator work`.
 
+use super::plan::open;
 use crate::cli::Outcome;
-use crate::cli::confine::this_program;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator_base::stage::counted;
 use orator_cluster::heartbeat::DEAD_AFTER;
-use orator_cluster::plan::ClusterPlan;
 use orator_cluster::worker::{WorkReport, WorkerOptions, work};
-use orator_dataset::config;
-use orator_pipeline::Pipeline;
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 /// Work on a plan, beside other workers on any machine that sees the same folders.
@@ -36,9 +33,6 @@ pub struct Args {
     /// End when the rest is in the hands of others, and do not wait whether they die.
     #[arg(long)]
     no_wait: bool,
-    /// Begin no unit later than so many hours after the start.
-    #[arg(long, value_name = "HOURS")]
-    begin_within: Option<f64>,
     /// Seconds between two signs of life.
     #[arg(long, value_name = "SECONDS", default_value_t = 15.0)]
     beat: f64,
@@ -65,7 +59,6 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         wait: !args.no_wait,
         beat: secs(args.beat),
         dead_after: secs(args.dead_after),
-        begin_within: args.begin_within.map(|hours| secs(3600.0 * hours)),
     };
     ui.listens_for_stop(
         "stopping after this unit; the next signal ends at once",
@@ -106,13 +99,4 @@ fn text(report: &WorkReport) -> String {
     lines
         .push(if report.all_ended { "every unit has ended" } else { "others have the rest, or it is left" }.to_owned());
     lines.join("\n")
-}
-
-/// Reads a plan and its pipeline, and checks that the plan was made from this configuration.
-pub fn open(path: &Path) -> Result<(ClusterPlan, Pipeline)> {
-    let plan = ClusterPlan::read(path)?;
-    let config = config::load(&plan.config, &plan.sets)?;
-    let pipeline = Pipeline::open(config)?.with_processes(this_program());
-    plan.check(&pipeline, &this_program())?;
-    Ok((plan, pipeline))
 }

@@ -9,7 +9,7 @@ use crate::cli::ui::Ui;
 use anyhow::Result;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use orator_base::stage::artifacts::StageName;
-use orator_cluster::estimate::timing;
+use orator_cluster::timing;
 use orator_dataset::config::Settings;
 use orator_onnx::{ModelError, ModelStore};
 use orator_pipeline::pose2d::models::wanted;

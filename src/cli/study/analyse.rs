@@ -39,15 +39,12 @@ pub struct Args {
     /// Points of percent on either side of chance that count as no difference; a registered bound goes before it.
     #[arg(long, value_name = "POINTS", default_value_t = 10.0)]
     bound: f64,
-    /// Draws of the bootstrap and of sign flips [default: as registered, else 10000]
+    /// Draws of sign flips and of participants [default: as registered, else 10000]
     #[arg(long, value_name = "N")]
     draws: Option<usize>,
     /// Seed of both [default: as registered, else 1]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Lines that an address has collected from the pages of a bundle, in the place of the study's own store.
-    #[arg(long, value_name = "FILE")]
-    posts: Option<PathBuf>,
     /// Also write one HTML page with plots, every figure and the methods paragraph.
     #[arg(long, value_name = "PAGE.html")]
     report: Option<PathBuf>,
@@ -116,7 +113,6 @@ fn analysis(args: &Args) -> Result<StudyAnalysis> {
         ..registered
     };
     if !args.source.is_dir() {
-        ensure!(args.posts.is_none(), "--posts needs the study's folder; {} is a file", args.source.display());
         let read = VotesRead::of_file(&args.source, &args.columns, args.design)?;
         let settings = settings(FigureSettings::default());
         return analyse([&name, &name], &read, None, &settings).with_context(|| args.source.display().to_string());
@@ -127,7 +123,7 @@ fn analysis(args: &Args) -> Result<StudyAnalysis> {
     }
     let folder = StudyFolder::new(&args.source);
     let registration = Registration::of_folder(&folder)?;
-    let read = VotesRead::of_votes(export::votes(&folder, args.posts.as_deref())?);
+    let read = VotesRead::of_votes(export::responses(&folder)?.1);
     let settings = settings(FigureSettings::from(&registration.settings));
     analyse([&registration.title, &name], &read, Some(&registration), &settings)
         .with_context(|| args.source.display().to_string())

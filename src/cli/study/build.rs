@@ -8,7 +8,6 @@ use anyhow::Result;
 use orator_base::stage::counted;
 use orator_study::build::{BuiltSpeaker, BuiltStudy, build};
 use orator_study::file::{ConditionSource, StudyFile, filled};
-use orator_study::pages::page_texts::text_keys;
 use orator_study::stimuli::film::SIZE;
 use serde_json::json;
 use std::path::PathBuf;
@@ -32,8 +31,6 @@ pub struct Args {
 
 pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     let file = StudyFile::read(&args.study)?;
-    let keys = text_keys(file.task.iter().map(|task| task.name.as_str()));
-    file.check_texts(&args.study, &keys.iter().map(String::as_str).collect::<Vec<_>>())?;
     let out = args.out.clone().unwrap_or_else(|| args.study.with_extension(""));
     // The folder itself, beneath which all is written, and the locks of what is read.
     let checkpoints = file.speaker.iter().flat_map(|speaker| {

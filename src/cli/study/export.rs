@@ -3,7 +3,7 @@
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::Result;
-use orator_study::export::{TableForm, export, export_posts};
+use orator_study::export::{TableForm, export};
 use orator_study::folder::StudyFolder;
 use serde_json::json;
 use std::path::PathBuf;
@@ -20,52 +20,26 @@ pub struct Args {
     /// The study's folder.
     #[arg(value_name = "DIR")]
     dir: PathBuf,
-    /// Form of the tables.
-    #[arg(long, value_enum, default_value = "csv")]
-    format: TableFormat,
-    /// Lines that an address has collected from the pages of a bundle, in the place of the server's store.
-    #[arg(long, value_name = "FILE")]
-    posts: Option<PathBuf>,
+    /// Form of the tables: columns with a header, or JSON Lines.
+    #[arg(long, value_parser = ["csv", "jsonl"], default_value = "csv")]
+    format: String,
     /// Folder to write them into; without: DIR/export.
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
 }
 
-/// Forms of tables.
-#[derive(Clone, Copy, clap::ValueEnum)]
-enum TableFormat {
-    /// Columns, with a header.
-    Csv,
-    /// JSON Lines.
-    Jsonl,
-}
-
 pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
-    let form = match args.format {
-        TableFormat::Csv => TableForm::Csv,
-        TableFormat::Jsonl => TableForm::Jsonl,
-    };
+    let form = if args.format == "csv" { TableForm::Csv } else { TableForm::Jsonl };
     let out = args.out.clone().unwrap_or_else(|| args.dir.join("export"));
-    let folder = StudyFolder::new(&args.dir);
-    let exported = match &args.posts {
-        None => export(&folder, form, &out)?,
-        Some(posts) => export_posts(&folder, posts, form, &out)?,
-    };
-    let dropped = match exported.n_dropped {
-        0 => String::new(),
-        n => format!("; {n} collected lines fit no session of the plan and are left out"),
-    };
+    let exported = export(&StudyFolder::new(&args.dir), form, &out)?;
     let text = format!(
-        "{} votes of {} participants: {}, {}{dropped}",
+        "{} votes of {} participants: {}, {}",
         exported.n_votes,
         exported.n_participants,
         exported.votes.display(),
         exported.participants.display()
     );
-    let next = match &args.posts {
-        None => format!("orator study analyse {}", args.dir.display()),
-        Some(posts) => format!("orator study analyse {} --posts {}", args.dir.display(), posts.display()),
-    };
+    let next = format!("orator study analyse {}", args.dir.display());
     ui.summary(&text, Some(&next), json!(exported));
     Ok(Outcome::Done)
 }

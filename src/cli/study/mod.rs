@@ -2,7 +2,6 @@
 
 pub mod analyse;
 pub mod build;
-pub mod bundle;
 pub mod export;
 pub mod plan;
 pub mod serve;

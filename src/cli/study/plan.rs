@@ -4,15 +4,12 @@ use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::{Context, Result, ensure};
 use orator_base::stage::progress::Progress as _;
-use orator_study::analyse::votes::columns::ColumnNames;
-use orator_study::analyse::votes::read::VotesRead;
 use orator_study::file::{StudyFile, StudyTask};
 use orator_study::folder::StudyFolder;
-use orator_study::pilot::PilotModel;
 use orator_study::plan::TaskDesign;
 use orator_study::power::{self, PowerQuestion};
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// Say how many participants a study needs, by simulating studies and analysing them.
@@ -38,16 +35,12 @@ pub struct Args {
     /// Bound of equivalence, points of percent [default: the registered one, else 10]
     #[arg(long, value_name = "POINTS")]
     bound: Option<f64>,
-    /// How much participants differ: standard deviation, log odds [default: of the pilot, else 0.3]
-    #[arg(long, value_name = "SD")]
-    participant_sd: Option<f64>,
-    /// How much clips differ: standard deviation, log odds [default: of the pilot, else 0.3]
-    #[arg(long, value_name = "SD")]
-    clip_sd: Option<f64>,
-    /// Table of votes of a small study before this one, such as `orator study export` writes; a mixed model of the task's
-    /// votes says how much participants and clips differ.
-    #[arg(long, value_name = "VOTES")]
-    pilot: Option<PathBuf>,
+    /// How much participants differ: standard deviation, log odds; the mixed model of `orator study analyse` estimates it.
+    #[arg(long, value_name = "SD", default_value_t = 0.3)]
+    participant_sd: f64,
+    /// How much clips differ: standard deviation, log odds.
+    #[arg(long, value_name = "SD", default_value_t = 0.3)]
+    clip_sd: f64,
     /// Clips of the task [default: as the study has them]
     #[arg(long, value_name = "N")]
     clips: Option<usize>,
@@ -65,13 +58,11 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     let task = task(args, &study)?;
     let mut registered = study.hypothesis.iter().filter(|hypothesis| hypothesis.task == task.name);
     let registered = registered.find_map(|hypothesis| hypothesis.points);
-    let pilot = args.pilot.as_deref().map(|path| pilot(path, task)).transpose()?;
-    let [of_participants, of_clips] = pilot.as_ref().map_or([0.3; 2], |model| [model.sd_participants, model.sd_clips]);
     let question = PowerQuestion {
         n_trials: task.trials,
         n_clips: args.clips.unwrap_or_else(|| n_clips(&study, task)),
-        sd_participants: args.participant_sd.unwrap_or(of_participants),
-        sd_clips: args.clip_sd.unwrap_or(of_clips),
+        sd_participants: args.participant_sd,
+        sd_clips: args.clip_sd,
         power: args.power,
         effect: args.effect / 100.0,
         bound: args.bound.or(registered).unwrap_or(10.0) / 100.0,
@@ -83,19 +74,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     let plan = power::plan(&question, &|row| bar.detail(&format!("{} participants", row.n_participants)))?;
     drop(bar);
     let secs = started.elapsed().as_secs_f64();
-    let pilot_said = pilot.as_ref().map(|model| {
-        format!(
-            "pilot: share {:.1} %, standard deviations of log odds: participants {:.2}, clips {:.2}, from {} participants \
-             and {} clips\n",
-            100.0 * model.share,
-            model.sd_participants,
-            model.sd_clips,
-            model.n_participants,
-            model.n_clips
-        )
-    });
-    let pilot_said = pilot_said.unwrap_or_default();
-    let text = format!("task {}\n{pilot_said}{}\nsimulated in {secs:.1} s", task.name, power::text(&plan));
+    let text = format!("task {}\n{}\nsimulated in {secs:.1} s", task.name, power::text(&plan));
     let wanted = plan.difference.n_participants.max(plan.equivalence.n_participants);
     let next = match wanted {
         Some(n) if n != study.participants => {
@@ -103,14 +82,8 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
         }
         _ => format!("orator study build {}", file.display()),
     };
-    ui.summary(&text, Some(&next), json!({ "task": task.name, "pilot": pilot, "plan": plan, "secs": secs }));
+    ui.summary(&text, Some(&next), json!({ "task": task.name, "plan": plan, "secs": secs }));
     Ok(Outcome::Done)
-}
-
-/// Model of a pilot's votes in the task.
-fn pilot(path: &Path, task: &StudyTask) -> Result<PilotModel> {
-    let read = VotesRead::of_file(path, &ColumnNames::default(), Some(task.design))?;
-    PilotModel::of_votes(&read.votes, &task.name, task.design).with_context(|| path.display().to_string())
 }
 
 /// Task that is named, or the first whose answers have a chance level.

@@ -25,9 +25,6 @@ pub struct Args {
     /// Port to listen at; 0: any that is free.
     #[arg(long, default_value_t = 8080)]
     port: u16,
-    /// File with the token of the operator's page, at least 16 letters; without it one is made and printed.
-    #[arg(long, value_name = "FILE")]
-    operator_token_file: Option<PathBuf>,
     /// Minutes without an answer after which a participant's place is given to another.
     #[arg(long, value_name = "MINUTES", default_value_t = 60)]
     abandoned_after: u32,
@@ -36,15 +33,13 @@ pub struct Args {
 pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     let folder = StudyFolder::new(&args.dir);
     let abandoned_secs = 60.0 * f64::from(args.abandoned_after);
-    let server = StudyServer::open(&folder, abandoned_secs, args.operator_token_file.as_deref())?;
+    let server = StudyServer::open(&folder, abandoned_secs)?;
     let title = server.study().title.clone();
     let counts = format!("{} sessions, {} films", server.study().plan.sessions.len(), server.study().n_films());
     let token = server.operator_token().to_owned();
-    let shown = if args.operator_token_file.is_some() { "as in the file".to_owned() } else { token.clone() };
     server.run(SocketAddr::new(args.listen, args.port), |address| {
         let page = format!("http://{address}/");
-        let text = format!("{title}: {counts}\nparticipants: {page}\noperator:     {page}operator, token {shown}");
-        let token = args.operator_token_file.is_none().then_some(token);
+        let text = format!("{title}: {counts}\nparticipants: {page}\noperator:     {page}operator, token {token}");
         let facts = json!({ "address": page, "operator_address": format!("{page}operator"), "operator_token": token });
         ui.summary(&text, None, facts);
     })?;

@@ -1,6 +1,6 @@
 //! `orator study`: its verbs.
 
-use super::{analyse, build, bundle, export, plan, serve};
+use super::{analyse, build, export, plan, serve};
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::Result;
@@ -19,7 +19,6 @@ pub struct Args {
 enum StudyVerb {
     Plan(plan::Args),
     Build(build::Args),
-    Bundle(bundle::Args),
     Serve(serve::Args),
     Export(export::Args),
     Analyse(analyse::Args),
@@ -29,7 +28,6 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     match args.verb {
         StudyVerb::Plan(args) => plan::run(&args, ui),
         StudyVerb::Build(args) => build::run(&args, ui),
-        StudyVerb::Bundle(args) => bundle::run(&args, ui),
         StudyVerb::Serve(args) => serve::run(&args, ui),
         StudyVerb::Export(args) => export::run(&args, ui),
         StudyVerb::Analyse(args) => analyse::run(&args, ui),

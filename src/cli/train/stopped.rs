@@ -4,7 +4,7 @@ use crate::StoppedTraining;
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::Result;
-use orator_cluster::shell::shell;
+use orator_cluster::job::shell;
 use serde_json::json;
 use std::path::Path;
 

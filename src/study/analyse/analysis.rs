@@ -2,7 +2,7 @@
 
 use super::exclusion::exclude;
 use super::methods::methods;
-use super::registration::{Registration, judged, register};
+use super::registration::{Registration, judge};
 use super::result::{FigureSettings, StudyAnalysis, TaskAnalysis};
 use super::task::task;
 use super::votes::read::VotesRead;
@@ -23,7 +23,8 @@ pub fn analyse(
     ensure!(exclusions.n_votes > 0, "{source} has no vote of the main phase");
     ensure!(!kept.is_empty(), "{source}: the exclusion rules leave no vote of {}", exclusions.n_votes);
     let hypotheses = registration.map(|registration| &registration.hypotheses[..]).unwrap_or_default();
-    let tasks = tasks(&kept, hypotheses, settings)?;
+    let mut tasks = tasks(&kept, hypotheses, settings)?;
+    let judged = judge(&mut tasks, hypotheses, settings.level());
     let without_exclusions = match exclusions.leaves_out() {
         true => self::tasks(&exclude(read, None).0, &[], settings)?,
         false => Vec::new(),
@@ -36,7 +37,7 @@ pub fn analyse(
         settings: settings.clone(),
         refused: read.refused.clone(),
         exclusions,
-        hypotheses: judged(&tasks, hypotheses, settings.level()),
+        hypotheses: judged,
         tasks,
         without_exclusions,
         notes: Vec::new(),
@@ -69,9 +70,7 @@ fn tasks(
         let bound = bound.map_or(settings.bound, |points| points / 100.0);
         task(name, &own, &FigureSettings { bound, ..settings.clone() })
     };
-    let mut tasks = names.into_iter().map(one).collect::<Result<Vec<_>>>()?;
-    register(&mut tasks, hypotheses);
-    Ok(tasks)
+    names.into_iter().map(one).collect()
 }
 
 /// What a reader must know beside the figures.

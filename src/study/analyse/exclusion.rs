@@ -81,6 +81,7 @@ pub fn exclude<'v>(read: &'v VotesRead, rules: Option<&ExclusionRules>) -> (Vec<
 
 fn of_rules<'v>(rules: &ExclusionRules, votes: &'v [StudyVote]) -> Vec<ExclusionTest<'v>> {
     let mut applied = Vec::new();
+    let mut add = |words: String, field, judge| applied.push(ExclusionTest { words, field, judge });
     if let Some(most) = rules.failed_checks {
         let mut n_failed: BTreeMap<&str, u32> = BTreeMap::new();
         let is_failed = |vote: &&StudyVote| {
@@ -88,29 +89,19 @@ fn of_rules<'v>(rules: &ExclusionRules, votes: &'v [StudyVote]) -> Vec<Exclusion
         };
         votes.iter().filter(is_failed).for_each(|vote| *n_failed.entry(&vote.participant).or_default() += 1);
         let names = n_failed.into_iter().filter(|(_, n)| *n >= most.max(1)).map(|(name, _)| name).collect();
-        let words = format!("failed {most} or more attention checks");
-        applied.push(ExclusionTest { words, field: "phase", judge: LeftOut::Participants(names) });
+        add(format!("failed {most} or more attention checks"), "phase", LeftOut::Participants(names));
     }
     if rules.incomplete {
         let names = votes.iter().filter(|vote| !vote.completed).map(|vote| vote.participant.as_str()).collect();
-        let words = "did not complete the session".to_owned();
-        applied.push(ExclusionTest { words, field: "completed", judge: LeftOut::Participants(names) });
+        add("did not complete the session".to_owned(), "completed", LeftOut::Participants(names));
     }
     if let Some(most) = rules.stalled_secs {
         let judge = LeftOut::Votes(Box::new(move |vote| vote.stalled_secs > most));
-        applied.push(ExclusionTest {
-            words: format!("trial: films stalled over {most} s"),
-            field: "stalled_secs",
-            judge,
-        });
+        add(format!("trial: films stalled over {most} s"), "stalled_secs", judge);
     }
     if let Some(most) = rules.unfocused_secs {
         let judge = LeftOut::Votes(Box::new(move |vote| vote.unfocused_secs > most));
-        applied.push(ExclusionTest {
-            words: format!("trial: page not in front over {most} s"),
-            field: "unfocused_secs",
-            judge,
-        });
+        add(format!("trial: page not in front over {most} s"), "unfocused_secs", judge);
     }
     applied
 }

@@ -1,5 +1,8 @@
-//! A figure of an analysis: interval, test or test of equivalence, with where it comes from.
+//! Figures of an analysis: intervals, tests and tests of equivalence of one number by several methods, each with where it
+//! comes from, and what could not be computed.
 
+use crate::stats::equivalence::Equivalence;
+use crate::stats::estimate::{ConfidenceInterval, StatisticsError, StudentEstimate, holm};
 use serde::Serialize;
 
 /// How a figure was got.
@@ -8,8 +11,6 @@ use serde::Serialize;
 pub enum FigureMethod {
     /// Crossed standard error, t distribution: holds for other participants and other clips.
     Crossed,
-    /// Bootstrap of participants and clips.
-    CrossedBootstrap,
     /// Sign flips of participants and clips.
     SignFlip,
     /// Exact test over the plan's own draw of sides.
@@ -44,7 +45,6 @@ impl FigureMethod {
     pub fn name(self) -> &'static str {
         match self {
             Self::Crossed => "participants and clips crossed",
-            Self::CrossedBootstrap => "bootstrap of participants and clips",
             Self::SignFlip => "sign flips of participants and clips",
             Self::Sides => "exact permutation of sides",
             Self::Participants => "t test of participants' shares",
@@ -82,8 +82,8 @@ impl FigureOrigin {
 pub struct IntervalFigure {
     #[serde(flatten)]
     pub origin: FigureOrigin,
-    pub low: f64,
-    pub high: f64,
+    #[serde(flatten)]
+    pub ends: ConfidenceInterval,
 }
 
 /// Test of the hypothesis that there is no difference.
@@ -107,6 +107,20 @@ impl TestFigure {
     pub fn new(method: FigureMethod, p: f64) -> Self {
         Self { origin: FigureOrigin::new(method), statistic: None, degrees_of_freedom: None, p, adjusted_p: None }
     }
+
+    /// Test of an estimate against `expected`.
+    pub fn of_estimate(method: FigureMethod, estimate: &StudentEstimate, expected: f64) -> Self {
+        Self {
+            statistic: Some(estimate.statistic(expected)),
+            degrees_of_freedom: Some(estimate.degrees_of_freedom),
+            ..Self::new(method, estimate.p_value(expected))
+        }
+    }
+
+    /// p value, adjusted where the test is one of several.
+    pub fn final_p(&self) -> f64 {
+        self.adjusted_p.unwrap_or(self.p)
+    }
 }
 
 /// Two one-sided tests that the difference lies within the bound.
@@ -118,7 +132,147 @@ pub struct EquivalenceFigure {
     /// Larger of the two p values.
     pub p: f64,
     /// 90 % interval.
-    pub low: f64,
-    pub high: f64,
+    #[serde(flatten)]
+    pub ends: ConfidenceInterval,
     pub passes: bool,
+}
+
+/// Figures about one number, the first of each kind the one to look at first.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct FigureSet {
+    pub intervals: Vec<IntervalFigure>,
+    pub tests: Vec<TestFigure>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub equivalence: Vec<EquivalenceFigure>,
+    /// What could not be computed, and why.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub missing: Vec<String>,
+}
+
+impl FigureSet {
+    pub fn interval(&self, method: FigureMethod) -> Option<ConfidenceInterval> {
+        self.intervals.iter().find(|interval| interval.origin.method == method).map(|interval| interval.ends)
+    }
+
+    pub fn test(&self, method: FigureMethod) -> Option<&TestFigure> {
+        self.tests.iter().find(|test| test.origin.method == method)
+    }
+
+    pub fn equivalence(&self, method: FigureMethod) -> Option<&EquivalenceFigure> {
+        self.equivalence.iter().find(|test| test.origin.method == method)
+    }
+
+    /// Figures method by method, those with an interval first.
+    pub fn rows(&self) -> impl Iterator<Item = FigureRow<'_>> {
+        let of_interval = |&IntervalFigure { origin, ends }: &IntervalFigure| FigureRow {
+            origin,
+            interval: Some(ends),
+            test: self.test(origin.method),
+        };
+        let alone = self.tests.iter().filter(|test| self.interval(test.origin.method).is_none());
+        let alone = alone.map(|test| FigureRow { origin: test.origin, interval: None, test: Some(test) });
+        self.intervals.iter().map(of_interval).chain(alone)
+    }
+
+    /// p value of the crossed test, adjusted where it is one of several.
+    pub fn crossed_p(&self) -> Option<f64> {
+        self.test(FigureMethod::Crossed).map(TestFigure::final_p)
+    }
+
+    /// Notes why a value is missing, or gives it.
+    pub fn known<T>(&mut self, method: FigureMethod, value: Result<T, StatisticsError>) -> Option<T> {
+        value.map_err(|error| self.missing.push(format!("{}: {error}", method.name()))).ok()
+    }
+
+    pub fn add_interval(&mut self, method: FigureMethod, interval: Result<ConfidenceInterval, StatisticsError>) {
+        if let Some(ends) = self.known(method, interval) {
+            self.intervals.push(IntervalFigure { origin: FigureOrigin::new(method), ends });
+        }
+    }
+
+    pub fn add_test(&mut self, method: FigureMethod, p: Result<f64, StatisticsError>) {
+        if let Some(p) = self.known(method, p) {
+            self.tests.push(TestFigure::new(method, p));
+        }
+    }
+
+    pub fn add_equivalence(&mut self, method: FigureMethod, test: Result<Equivalence, StatisticsError>) {
+        if let Some(test) = self.known(method, test) {
+            let (origin, passes) = (FigureOrigin::new(method), test.passes());
+            let Equivalence { bound, p, interval } = test;
+            self.equivalence.push(EquivalenceFigure { origin, bound, p, ends: interval, passes });
+        }
+    }
+
+    /// Adds the interval of an estimate and its test against `expected`.
+    pub fn add_estimate(&mut self, method: FigureMethod, estimate: &StudentEstimate, expected: f64, confidence: f64) {
+        self.add_interval(method, estimate.interval(confidence));
+        self.tests.push(TestFigure::of_estimate(method, estimate, expected));
+    }
+
+    /// Marks intervals and tests of a method as registered before the data were seen.
+    pub fn register(&mut self, method: FigureMethod) {
+        let intervals = self.intervals.iter_mut().map(|interval| &mut interval.origin);
+        let origins = intervals.chain(self.tests.iter_mut().map(|test| &mut test.origin));
+        origins.filter(|origin| origin.method == method).for_each(|origin| origin.exploratory = false);
+    }
+
+    /// Marks the equivalence test of a method as registered before the data were seen.
+    pub fn register_equivalence(&mut self, method: FigureMethod) {
+        let tests = self.equivalence.iter_mut().filter(|test| test.origin.method == method);
+        tests.for_each(|test| test.origin.exploratory = false);
+    }
+
+    /// Keeps intervals within `low` to `high`, over which a t distribution may carry them.
+    pub fn clamp(&mut self, low: f64, high: f64) {
+        for IntervalFigure { ends, .. } in &mut self.intervals {
+            *ends = ConfidenceInterval { low: ends.low.clamp(low, high), high: ends.high.clamp(low, high) };
+        }
+    }
+}
+
+/// Interval and test of one method.
+pub struct FigureRow<'s> {
+    pub origin: FigureOrigin,
+    pub interval: Option<ConfidenceInterval>,
+    pub test: Option<&'s TestFigure>,
+}
+
+/// Adjusts the tests of several sets, method by method, as one family each (Holm 1979). A single set is left alone.
+pub fn adjust(sets: &mut [&mut FigureSet]) {
+    if sets.len() < 2 {
+        return;
+    }
+    let mut methods: Vec<FigureMethod> =
+        sets.iter().flat_map(|set| set.tests.iter().map(|test| test.origin.method)).collect();
+    methods.sort_unstable();
+    methods.dedup();
+    for method in methods {
+        let tests = sets.iter_mut().filter_map(|set| set.tests.iter_mut().find(|test| test.origin.method == method));
+        let tests: Vec<&mut TestFigure> = tests.collect();
+        if let Ok(adjusted) = holm(&tests.iter().map(|test| test.p).collect::<Vec<_>>()) {
+            tests.into_iter().zip(adjusted).for_each(|(test, p)| test.adjusted_p = Some(p));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tests_of_one_method_are_a_family() {
+        let set = |p: &[(FigureMethod, f64)]| FigureSet {
+            tests: p.iter().map(|(method, p)| TestFigure::new(*method, *p)).collect(),
+            ..FigureSet::default()
+        };
+        let (crossed, wilson) = (FigureMethod::Crossed, FigureMethod::Binomial);
+        let mut sets = [set(&[(crossed, 0.01), (wilson, 0.03)]), set(&[(crossed, 0.04)]), set(&[(wilson, 0.02)])];
+        let [a, b, c] = &mut sets;
+        adjust(&mut [a, b, c]);
+        let adjusted = |set: &FigureSet| set.tests.iter().filter_map(|test| test.adjusted_p).collect::<Vec<_>>();
+        assert_eq!([&sets[0], &sets[1], &sets[2]].map(adjusted), [vec![0.02, 0.04], vec![0.04], vec![0.04]]);
+        adjust(&mut [&mut sets[1]]);
+        assert_eq!(adjusted(&sets[1]), [0.04]);
+    }
 }

@@ -5,55 +5,8 @@ use super::result::{ShareMeasure, StudyAnalysis, TaskAnalysis};
 use super::words::{count, list, p_value, percent, percents, points};
 use crate::plan::TaskDesign;
 
-/// Sources by the method that cites them.
-const SOURCES: [(&str, &str); 13] = [
-    (
-        "Bradley and Terry 1952",
-        "Bradley RA, Terry ME (1952). Rank analysis of incomplete block designs. Biometrika 39(3/4):324-345.",
-    ),
-    (
-        "Cameron et al. 2011",
-        "Cameron AC, Gelbach JB, Miller DL (2011). Robust inference with multiway clustering. Journal of Business & Economic Statistics 29(2):238-249.",
-    ),
-    (
-        "Clark 1973",
-        "Clark HH (1973). The language-as-fixed-effect fallacy. Journal of Verbal Learning and Verbal Behavior 12(4):335-359.",
-    ),
-    (
-        "Friedman 1937",
-        "Friedman M (1937). The use of ranks to avoid the assumption of normality implicit in the analysis of variance. Journal of the American Statistical Association 32(200):675-701.",
-    ),
-    (
-        "Holm 1979",
-        "Holm S (1979). A simple sequentially rejective multiple test procedure. Scandinavian Journal of Statistics 6(2):65-70.",
-    ),
-    (
-        "Jonell et al. 2021",
-        "Jonell P, Yoon Y, Wolfert P, Kucherenko T, Henter GE (2021). HEMVIP: human evaluation of multiple videos in parallel. ICMI 2021:707-711.",
-    ),
-    (
-        "Krippendorff 2011",
-        "Krippendorff K (2011). Computing Krippendorff's alpha-reliability. University of Pennsylvania.",
-    ),
-    (
-        "MacKinnon et al. 2021",
-        "MacKinnon JG, Nielsen MO, Webb MD (2021). Wild bootstrap and asymptotic inference with multiway clustering. Journal of Business & Economic Statistics 39(2):505-519.",
-    ),
-    ("Owen 2007", "Owen AB (2007). The pigeonhole bootstrap. The Annals of Applied Statistics 1(2):386-411."),
-    (
-        "Schuirmann 1987",
-        "Schuirmann DJ (1987). A comparison of the two one-sided tests procedure and the power approach for assessing the equivalence of average bioavailability. Journal of Pharmacokinetics and Biopharmaceutics 15(6):657-680.",
-    ),
-    ("Wilcoxon 1945", "Wilcoxon F (1945). Individual comparisons by ranking methods. Biometrics Bulletin 1(6):80-83."),
-    (
-        "Wilson 1927",
-        "Wilson EB (1927). Probable inference, the law of succession, and statistical inference. Journal of the American Statistical Association 22(158):209-212.",
-    ),
-    (
-        "Bates et al. 2015",
-        "Bates D, Maechler M, Bolker B, Walker S (2015). Fitting linear mixed-effects models using lme4. Journal of Statistical Software 67(1):1-48.",
-    ),
-];
+/// Sources, a line each: as a method cites it, and in full.
+const SOURCES: &str = include_str!("sources.txt");
 
 /// The paragraph, and the list of its sources.
 pub fn methods(analysis: &StudyAnalysis) -> String {
@@ -65,7 +18,8 @@ pub fn methods(analysis: &StudyAnalysis) -> String {
     text += &statistics(analysis);
     text += &registered(analysis);
     text += &results(analysis);
-    let cited: Vec<&str> = SOURCES.iter().filter(|(name, _)| text.contains(name)).map(|(_, source)| *source).collect();
+    let sources = SOURCES.lines().filter_map(|line| line.split_once(": "));
+    let cited: Vec<&str> = sources.filter(|(name, _)| text.contains(name)).map(|(_, source)| source).collect();
     format!("{}\n\nSources: {}", text.trim_end(), cited.join(" "))
 }
 
@@ -145,7 +99,6 @@ fn statistics(analysis: &StudyAnalysis) -> String {
     let settings = &analysis.settings;
     let is_used =
         |method: FigureMethod| analysis.tasks.iter().any(|task| task.origins().any(|origin| origin.method == method));
-    let draws = count(settings.n_draws);
     let mut text = format!(
         "Votes of one participant, and votes about one clip, are not independent (Clark 1973); estimates have standard \
          errors with participants and clips crossed (Cameron et al. 2011), judged by the t distribution with \
@@ -157,9 +110,6 @@ fn statistics(analysis: &StudyAnalysis) -> String {
             "Equivalence with chance within \u{b1}{} points was tested by two one-sided tests at 5 % (Schuirmann 1987). ",
             list(&bounds(analysis))
         );
-    }
-    if is_used(FigureMethod::CrossedBootstrap) {
-        text += &format!("Bootstrap intervals are of {draws} draws of participants and clips (Owen 2007). ");
     }
     if is_used(FigureMethod::SignFlip) {
         text += "Sign flips of whole participants or clips, whichever are fewer, test the same without a t distribution (MacKinnon et al. 2021). ";

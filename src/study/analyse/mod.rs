@@ -5,9 +5,7 @@
 pub mod analysis;
 pub mod exclusion;
 pub mod figure;
-pub mod figures;
 pub mod methods;
-pub mod model;
 pub mod outcome;
 pub mod page;
 pub mod pair;

@@ -2,9 +2,8 @@
 
 use super::result::ShareMeasure;
 use crate::plan::TaskDesign;
-use crate::response::{Response, ScreenSide};
 use crate::stats::cluster::votes::ClipVote;
-use crate::vote::StudyVote;
+use crate::vote::{Response, ScreenSide, StudyVote};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Numbers of participants and clips by their names, the same for all votes of a task.
@@ -35,6 +34,24 @@ impl<'v> Numbering<'v> {
             score,
         }
     }
+}
+
+/// Numbers of participants and of clips that votes are of.
+pub fn distinct<'v>(votes: impl IntoIterator<Item = &'v ClipVote> + Clone) -> [usize; 2] {
+    let participants: BTreeSet<usize> = votes.clone().into_iter().map(|vote| vote.participant).collect();
+    let clips: BTreeSet<usize> = votes.into_iter().map(|vote| vote.clip).collect();
+    [participants.len(), clips.len()]
+}
+
+/// Mean score; NaN of no vote.
+pub fn mean_score(votes: &[ClipVote]) -> f64 {
+    votes.iter().map(|vote| vote.score).sum::<f64>() / votes.len() as f64
+}
+
+/// All pairs of names, in their order.
+pub fn name_pairs<S: AsRef<str>>(names: &[S]) -> impl Iterator<Item = [&str; 2]> {
+    let pairs = |(k, a): (usize, &S)| names[k + 1..].iter().map(move |b| [a.as_ref(), b.as_ref()]);
+    names.iter().enumerate().flat_map(pairs)
 }
 
 /// Vote that is a success or not.
@@ -93,7 +110,7 @@ pub fn conditions(votes: &[&StudyVote]) -> Vec<String> {
 
 /// Differences between two conditions where one vote judged both: steps towards `first`, or its score less that of
 /// `second`.
-pub fn differences(votes: &[&StudyVote], numbering: &Numbering, first: &str, second: &str) -> Vec<ClipVote> {
+pub fn differences(votes: &[&StudyVote], numbering: &Numbering, [first, second]: [&str; 2]) -> Vec<ClipVote> {
     let one = |vote: &&StudyVote| {
         let place = |name: &str| vote.conditions.iter().position(|condition| condition == name);
         let (a, b) = (place(first)?, place(second)?);

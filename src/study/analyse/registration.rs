@@ -1,8 +1,7 @@
 //! What was written down before the data were seen: read from a sealed study, marked in the figures, and what became of
 //! each hypothesis.
 
-use super::figure::FigureMethod;
-use super::figures::FigureSet;
+use super::figure::{FigureMethod, FigureSet};
 use super::result::{JudgedClaim, JudgedHypothesis, PairAnalysis, ShareAnalysis, TaskAnalysis};
 use super::verdict::scope;
 use crate::file::{AnalysisSettings, ExclusionRules, HypothesisKind, StudyHypothesis};
@@ -54,68 +53,49 @@ impl Registration {
     }
 }
 
-/// Takes the mark of exploration from the figures that judge one of the hypotheses: the crossed ones.
-pub fn register(tasks: &mut [TaskAnalysis], hypotheses: &[RegisteredHypothesis]) {
-    for claim in hypotheses.iter().map(|hypothesis| &hypothesis.claim) {
-        for task in tasks.iter_mut().filter(|task| task.task == claim.task) {
-            let has_conditions = has_conditions(task);
-            let shares = task.shares.iter_mut().filter(|share| is_about(share, claim, has_conditions));
-            match claim.kind {
-                HypothesisKind::DiffersFromChance | HypothesisKind::GreaterThanChance => {
-                    shares.for_each(|share| share.figures.register(FigureMethod::Crossed));
-                }
-                HypothesisKind::Equivalence => {
-                    shares.for_each(|share| share.figures.register_equivalence(FigureMethod::Crossed));
-                }
-                HypothesisKind::Differs => {
-                    let pairs = task.pairs.iter_mut().filter(|pair| compares(pair, &claim.conditions));
-                    pairs.for_each(|pair| pair.figures.register(FigureMethod::Crossed));
-                }
-            }
-        }
-    }
-}
-
-/// What became of each hypothesis, by the figures that were registered for it, at the error of the first kind `level`.
-pub fn judged(tasks: &[TaskAnalysis], hypotheses: &[RegisteredHypothesis], level: f64) -> Vec<JudgedHypothesis> {
-    let judge = |hypothesis: &RegisteredHypothesis| {
-        let claim = &hypothesis.claim;
-        let found = tasks.iter().find(|task| task.task == claim.task);
-        let claims = found.map(|task| claims(task, claim, level)).unwrap_or_default();
+/// Outcome of each hypothesis, by the crossed figures that were registered for it, at the error of the first kind `level`.
+/// These figures lose the mark of exploration.
+pub fn judge(tasks: &mut [TaskAnalysis], hypotheses: &[RegisteredHypothesis], level: f64) -> Vec<JudgedHypothesis> {
+    let mut one = |RegisteredHypothesis { claim, statistic }: &RegisteredHypothesis| {
+        let found = tasks.iter_mut().find(|task| task.task == claim.task);
         JudgedHypothesis {
             task: claim.task.clone(),
             claim: words(claim),
-            statistic: hypothesis.statistic.clone(),
-            claims,
+            statistic: statistic.clone(),
+            claims: found.map(|task| claims(task, claim, level)).unwrap_or_default(),
         }
     };
-    hypotheses.iter().map(judge).collect()
+    hypotheses.iter().map(&mut one).collect()
 }
 
-fn claims(task: &TaskAnalysis, claim: &StudyHypothesis, level: f64) -> Vec<JudgedClaim> {
-    let tested = |scope: String, figures: &FigureSet, is_right_way: bool| {
-        let test = figures.test(FigureMethod::Crossed);
-        let p = test.map(|test| test.adjusted_p.unwrap_or(test.p));
+fn claims(task: &mut TaskAnalysis, claim: &StudyHypothesis, level: f64) -> Vec<JudgedClaim> {
+    let tested = |scope: String, figures: &mut FigureSet, is_right_way: bool| {
+        figures.register(FigureMethod::Crossed);
+        let p = figures.crossed_p();
         JudgedClaim { scope, p, holds: p.map(|p| p < level && is_right_way) }
     };
-    let has_conditions = has_conditions(task);
-    let shares = task.shares.iter().filter(|share| is_about(share, claim, has_conditions));
-    match claim.kind {
-        HypothesisKind::DiffersFromChance => shares.map(|share| tested(scope(share), &share.figures, true)).collect(),
-        HypothesisKind::GreaterThanChance => {
-            shares.map(|share| tested(scope(share), &share.figures, share.right_share() > 0.5)).collect()
-        }
-        HypothesisKind::Equivalence => shares
-            .map(|share| {
-                let test = share.figures.equivalence(FigureMethod::Crossed);
-                JudgedClaim { scope: scope(share), p: test.map(|test| test.p), holds: test.map(|test| test.passes) }
-            })
-            .collect(),
-        HypothesisKind::Differs => {
-            let pairs = task.pairs.iter().filter(|pair| compares(pair, &claim.conditions));
-            pairs.map(|pair| tested(format!("{} and {}", pair.first, pair.second), &pair.figures, true)).collect()
-        }
+    if claim.kind == HypothesisKind::Differs {
+        let is_about = |pair: &&mut PairAnalysis| {
+            let names = &claim.conditions;
+            names.is_empty() || names.contains(&pair.first) && names.contains(&pair.second)
+        };
+        let pairs = task.pairs.iter_mut().filter(is_about);
+        return pairs
+            .map(|pair| tested(format!("{} and {}", pair.first, pair.second), &mut pair.figures, true))
+            .collect();
     }
+    let has_conditions = task.shares.iter().any(|share| share.condition.is_some());
+    let judged = |share: &mut ShareAnalysis| {
+        let (scope, is_above) = (scope(share), share.right_share() > 0.5);
+        if claim.kind != HypothesisKind::Equivalence {
+            let is_right_way = is_above || claim.kind == HypothesisKind::DiffersFromChance;
+            return tested(scope, &mut share.figures, is_right_way);
+        }
+        share.figures.register_equivalence(FigureMethod::Crossed);
+        let test = share.figures.equivalence(FigureMethod::Crossed);
+        JudgedClaim { scope, p: test.map(|test| test.p), holds: test.map(|test| test.passes) }
+    };
+    task.shares.iter_mut().filter(|share| is_about(share, claim, has_conditions)).map(judged).collect()
 }
 
 /// A hypothesis in words.
@@ -136,19 +116,10 @@ fn words(claim: &StudyHypothesis) -> String {
     format!("{what}{which}{who}")
 }
 
-/// Whether films of several conditions are judged by themselves.
-fn has_conditions(task: &TaskAnalysis) -> bool {
-    task.shares.iter().any(|share| share.condition.is_some())
-}
-
 fn is_about(share: &ShareAnalysis, hypothesis: &StudyHypothesis, has_conditions: bool) -> bool {
     let is_condition = match &share.condition {
         Some(condition) => hypothesis.conditions.contains(condition),
         None => hypothesis.conditions.is_empty() || !has_conditions,
     };
     is_condition && share.speaker.is_some() == hypothesis.per_speaker
-}
-
-fn compares(pair: &PairAnalysis, conditions: &[String]) -> bool {
-    conditions.is_empty() || conditions.contains(&pair.first) && conditions.contains(&pair.second)
 }

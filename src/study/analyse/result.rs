@@ -2,8 +2,7 @@
 //! was got, whether that was fixed before the data were seen, and whether it takes votes for independent.
 
 use super::exclusion::ExclusionAccount;
-use super::figure::{FigureOrigin, IntervalFigure, TestFigure};
-use super::figures::FigureSet;
+use super::figure::{FigureOrigin, FigureSet, IntervalFigure, TestFigure};
 use super::votes::read::RefusedRow;
 use crate::file::AnalysisSettings;
 use crate::plan::TaskDesign;
@@ -73,7 +72,7 @@ pub struct FigureSettings {
     pub confidence: f64,
     /// Largest difference that counts as none, a share: 0.1 is 10 points of percent.
     pub bound: f64,
-    /// Draws of bootstrap and sign flips; 0 leaves them out.
+    /// Draws of sign flips and of participants; 0 leaves them out.
     pub n_draws: usize,
     pub seed: u64,
     /// Whether mixed models are fitted.
@@ -264,20 +263,10 @@ impl Conclusion {
     pub fn new(p: Option<f64>, level: f64, difference: f64, is_equivalent: bool) -> Self {
         match (p, is_equivalent) {
             (None, _) => Self::Untested,
-            (Some(p), true) if p < level => {
-                if difference > 0.0 {
-                    Self::AboveWithinBound
-                } else {
-                    Self::BelowWithinBound
-                }
-            }
-            (Some(p), false) if p < level => {
-                if difference > 0.0 {
-                    Self::Above
-                } else {
-                    Self::Below
-                }
-            }
+            (Some(p), true) if p < level && difference > 0.0 => Self::AboveWithinBound,
+            (Some(p), true) if p < level => Self::BelowWithinBound,
+            (Some(p), false) if p < level && difference > 0.0 => Self::Above,
+            (Some(p), false) if p < level => Self::Below,
             (Some(_), true) => Self::Equivalent,
             (Some(_), false) => Self::Undecided,
         }

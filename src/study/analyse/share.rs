@@ -1,19 +1,16 @@
 //! Share of successes against chance, by every method from the naive to the crossed one.
 
-use super::figure::FigureMethod;
-use super::figures::FigureSet;
-use super::model::fitted;
-use super::outcome::BinaryVote;
-use super::result::{Conclusion, FigureSettings, ShareAnalysis, ShareMeasure};
-use crate::stats::cluster::bootstrap::CrossedBootstrap;
+use super::figure::{FigureMethod, FigureSet, TestFigure};
+use super::outcome::{BinaryVote, distinct};
+use super::result::{Conclusion, FigureSettings, ModelFigure, ShareAnalysis, ShareMeasure};
 use crate::stats::cluster::crossed::crossed_estimate;
-use crate::stats::cluster::participants::participant_estimate;
-use crate::stats::cluster::votes::ClipVote;
+use crate::stats::cluster::sign_flips::sign_flip_p;
+use crate::stats::cluster::votes::{ClipVote, participant_estimate};
 use crate::stats::equivalence::Equivalence;
-use crate::stats::permutation::crossed_flip::crossed_sign_flip;
-use crate::stats::permutation::sides::{SideBlock, side_test};
+use crate::stats::glmm::fit::MixedLogit;
 use crate::stats::proportion::BinomialCount;
-use std::collections::{BTreeMap, BTreeSet};
+use crate::stats::sides::{SideBlock, side_p};
+use std::collections::BTreeMap;
 
 /// Share where nothing is known.
 pub const CHANCE: f64 = 0.5;
@@ -31,7 +28,7 @@ pub struct ShareCell<'v> {
 pub fn share(cell: &ShareCell, settings: &FigureSettings) -> ShareAnalysis {
     let votes: Vec<ClipVote> = cell.votes.iter().map(|vote| vote.vote).collect();
     let n_successes = votes.iter().filter(|vote| vote.score == 1.0).count() as u64;
-    let numbers = |of: fn(&ClipVote) -> usize| votes.iter().map(of).collect::<BTreeSet<_>>().len();
+    let [n_participants, n_clips] = distinct(&votes);
     let mut found = FigureSet::default();
     add_clustered(&mut found, cell, &votes, settings);
     add_naive(&mut found, n_successes, votes.len() as u64, settings);
@@ -46,15 +43,15 @@ pub fn share(cell: &ShareCell, settings: &FigureSettings) -> ShareAnalysis {
         condition: cell.condition.clone(),
         n_votes: votes.len() as u64,
         n_successes,
-        n_participants: numbers(|vote| vote.participant),
-        n_clips: numbers(|vote| vote.clip),
+        n_participants,
+        n_clips,
         share: n_successes as f64 / votes.len().max(1) as f64,
         figures: found,
         model: None,
         conclusion: Conclusion::Untested,
     };
     if settings.with_models && has_expectation {
-        analysis.model = fitted(&votes, &mut analysis.figures, settings.confidence);
+        analysis.model = mixed_model(&votes, &mut analysis.figures, settings.confidence);
     }
     conclude(&mut analysis, settings.level());
     analysis
@@ -68,15 +65,12 @@ fn add_clustered(found: &mut FigureSet, cell: &ShareCell, votes: &[ClipVote], se
         let equivalence = Equivalence::of_estimate(&estimate, CHANCE, settings.bound);
         found.add_equivalence(FigureMethod::Crossed, equivalence);
         if settings.n_draws > 0 {
-            let draws = CrossedBootstrap::new(&[votes], settings.n_draws, settings.seed);
-            let rescaled = draws.and_then(|draws| draws.estimate(|means| means[0]).rescaled(estimate.standard_error));
-            found.add_interval(FigureMethod::CrossedBootstrap, rescaled.and_then(|draws| draws.interval(confidence)));
-            let flips = crossed_sign_flip(votes, CHANCE, settings.n_draws, settings.seed);
-            found.add_test(FigureMethod::SignFlip, flips.map(|flips| flips.p));
+            let flips = sign_flip_p(votes, CHANCE, settings.n_draws, settings.seed);
+            found.add_test(FigureMethod::SignFlip, flips);
         }
     }
     if let Some(blocks) = side_blocks(&cell.votes) {
-        found.add_test(FigureMethod::Sides, side_test(&blocks).map(|test| test.p));
+        found.add_test(FigureMethod::Sides, side_p(&blocks));
     }
     if let Some(estimate) = found.known(FigureMethod::Participants, participant_estimate(votes)) {
         found.add_estimate(FigureMethod::Participants, &estimate, CHANCE, confidence);
@@ -93,9 +87,8 @@ fn add_naive(found: &mut FigureSet, n_successes: u64, n_votes: u64, settings: &F
 
 /// Draws the conclusion from the crossed test, adjusted where it is one of several, and the crossed equivalence.
 pub fn conclude(analysis: &mut ShareAnalysis, level: f64) {
-    let p = analysis.figures.test(FigureMethod::Crossed).map(|test| test.adjusted_p.unwrap_or(test.p));
     let is_equivalent = analysis.figures.equivalence(FigureMethod::Crossed).is_some_and(|test| test.passes);
-    analysis.conclusion = Conclusion::new(p, level, analysis.share - CHANCE, is_equivalent);
+    analysis.conclusion = Conclusion::new(analysis.figures.crossed_p(), level, analysis.share - CHANCE, is_equivalent);
 }
 
 /// Trials of each participant by sides; none where the sides are not known, as in tables that say only what was right.
@@ -108,4 +101,50 @@ fn side_blocks(votes: &[BinaryVote]) -> Option<Vec<SideBlock>> {
         blocks.entry(vote.vote.participant).or_default().push(is_left, chose_left);
     }
     (seen == [true; 2]).then(|| blocks.into_values().collect())
+}
+
+/// Fits the model of an intercept with random participants and clips to votes with scores 0 and 1. Its interval is of
+/// the share over all participants and clips, its test of the intercept against log odds of 0, with one degree of
+/// freedom less than the smaller number of participants and clips.
+fn mixed_model(votes: &[ClipVote], found: &mut FigureSet, confidence: f64) -> Option<ModelFigure> {
+    let model = found.known(FigureMethod::MixedModel, MixedLogit::fit(votes))?;
+    let (share, interval) = found.known(FigureMethod::MixedModel, model.share(confidence))?;
+    if !model.converged {
+        found.missing.push(format!("{}: the search for its maximum did not end", FigureMethod::MixedModel.name()));
+        return None;
+    }
+    found.add_interval(FigureMethod::MixedModel, Ok(interval));
+    found.tests.push(TestFigure::of_estimate(FigureMethod::MixedModel, &model.intercept, 0.0));
+    Some(ModelFigure {
+        exploratory: true,
+        share,
+        log_odds: model.intercept.value,
+        standard_error: model.intercept.standard_error,
+        sd_participants: model.sd_participants,
+        sd_clips: model.sd_clips,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::{CrossedDesign, CrossedEffects, crossed_votes};
+
+    #[test]
+    fn the_share_of_a_simulated_study_is_found() {
+        let design = CrossedDesign { n_participants: 60, n_trials: 10, n_clips: 30 };
+        let effects = CrossedEffects { share: 0.65, sd_participants: 0.5, sd_clips: 0.3 };
+        let votes = crossed_votes(&design, &effects, 4, 0);
+        let mut found = FigureSet::default();
+        let model = mixed_model(&votes, &mut found, 0.95).unwrap();
+        let interval = found.interval(FigureMethod::MixedModel).unwrap();
+        assert!(interval.low < 0.65 && 0.65 < interval.high, "{interval:?}");
+        assert!((model.share - 0.65).abs() < 0.06 && model.log_odds > 0.3, "{model:?}");
+        assert!(found.test(FigureMethod::MixedModel).unwrap().p < 0.01);
+        // Equal votes have no finite log odds.
+        let equal: Vec<_> = votes.iter().map(|vote| ClipVote { score: 1.0, ..*vote }).collect();
+        let mut found = FigureSet::default();
+        assert_eq!(mixed_model(&equal, &mut found, 0.95), None);
+        assert_eq!((found.missing.len(), found.tests.len()), (1, 0));
+    }
 }

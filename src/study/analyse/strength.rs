@@ -3,12 +3,9 @@
 use super::figure::{FigureMethod, FigureOrigin, IntervalFigure};
 use super::outcome::Numbering;
 use super::result::{FigureSettings, StrengthFigure};
-use crate::response::Response;
-use crate::stats::error::StatisticsError;
-use crate::stats::paired::bradley_terry::{BradleyTerry, participant_intervals};
-use crate::stats::paired::elo::EloSettings;
-use crate::stats::paired::votes::PairedVote;
-use crate::vote::StudyVote;
+use crate::stats::bradley_terry::{self, PairedVote, elo_ratings, strength_intervals};
+use crate::stats::estimate::StatisticsError;
+use crate::vote::{Response, StudyVote};
 
 /// Draws of participants for the intervals.
 const MOST_DRAWS: usize = 2000;
@@ -25,19 +22,19 @@ pub fn strengths(
 ) -> Result<Vec<StrengthFigure>, StatisticsError> {
     let paired: Vec<PairedVote> = votes.iter().flat_map(|vote| paired(vote, numbering, conditions)).collect();
     let n = conditions.len();
-    let model = BradleyTerry::fit(&paired, n)?;
-    let ratings = EloSettings::default().ratings(&paired, n, settings.seed)?;
+    let strengths = bradley_terry::strengths(&paired, n)?;
+    let ratings = elo_ratings(&paired, n, settings.seed)?;
     let n_draws = settings.n_draws.min(MOST_DRAWS);
     let intervals = match n_draws {
         0 => None,
         // Without enough draws that have finite strengths there are strengths without intervals.
-        _ => participant_intervals(&paired, n, settings.confidence, n_draws, settings.seed).ok(),
+        _ => strength_intervals(&paired, n, settings.confidence, n_draws, settings.seed).ok(),
     };
     let origin = FigureOrigin::new(FigureMethod::BradleyTerry);
     let row = |k: usize| StrengthFigure {
         condition: conditions[k].clone(),
-        log_strength: model.strengths[k],
-        interval: intervals.as_ref().map(|all| IntervalFigure { origin, low: all[k].low, high: all[k].high }),
+        log_strength: strengths[k],
+        interval: intervals.as_ref().map(|all| IntervalFigure { origin, ends: all[k] }),
         elo: ratings[k],
     };
     let mut rows: Vec<StrengthFigure> = (0..n).map(row).collect();
@@ -65,26 +62,11 @@ fn paired(vote: &StudyVote, numbering: &Numbering, conditions: &[String]) -> Vec
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plan::{TaskDesign, TrialPhase};
+    use crate::plan::TaskDesign;
 
     fn vote(participant: usize, conditions: &[&str], response: Response) -> StudyVote {
-        StudyVote {
-            participant: format!("p{participant}"),
-            task: "t".to_owned(),
-            design: TaskDesign::Preference,
-            phase: TrialPhase::Main,
-            trial: 1,
-            clip: "c".to_owned(),
-            speaker: String::new(),
-            conditions: conditions.iter().map(|name| (*name).to_owned()).collect(),
-            response,
-            expected: None,
-            stalled_secs: 0.0,
-            unfocused_secs: 0.0,
-            response_secs: 1.0,
-            plays: 1,
-            completed: true,
-        }
+        let participant = format!("p{participant}");
+        StudyVote { participant, ..StudyVote::example(TaskDesign::Preference, conditions, response) }
     }
 
     #[test]
@@ -114,7 +96,7 @@ mod tests {
             assert_eq!(ranked, ["natural", "good", "bad"]);
             assert!(rows.is_sorted_by(|a, b| a.elo >= b.elo));
             let interval = rows[0].interval.as_ref().unwrap();
-            assert!(interval.low < rows[0].log_strength && rows[0].log_strength < interval.high);
+            assert!(interval.ends.low < rows[0].log_strength && rows[0].log_strength < interval.ends.high);
         }
         let one_way = vote(0, &["bad", "good"], Response::Step(2));
         let votes = [&one_way];

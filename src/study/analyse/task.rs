@@ -1,19 +1,16 @@
 //! Analysis of one task: the cells of its design, its families of tests, the agreement of its participants.
 
-use super::figure::FigureMethod;
-use super::figures::{FigureSet, adjust};
-use super::outcome::{BinaryVote, Numbering, binary, conditions, differences, measure, scores};
-use super::pair::{overall, pairs, score_table};
-use super::result::{Conclusion, FigureSettings, PairAnalysis, ShareAnalysis, ShareMeasure, TaskAnalysis};
+use super::figure::{FigureMethod, adjust};
+use super::outcome::{BinaryVote, Numbering, binary, conditions, differences, measure, name_pairs, scores};
+use super::pair::{overall, pairs, score_table, single_pairs};
+use super::result::{FigureSettings, ShareAnalysis, ShareMeasure, TaskAnalysis};
 use super::share::{ShareCell, conclude, share};
 use super::strength::strengths;
 use super::verdict::verdicts;
 use crate::plan::TaskDesign;
-use crate::stats::cluster::crossed::crossed_difference;
-use crate::stats::cluster::participants::participant_differences;
 use crate::stats::cluster::votes::ClipVote;
+use crate::stats::estimate::StatisticsError;
 use crate::stats::krippendorff::{MeasurementScale, alpha};
-use crate::stats::rank::{ZeroDifferences, signed_rank};
 use crate::vote::StudyVote;
 use anyhow::{Context, Result, bail};
 use std::collections::{BTreeMap, BTreeSet};
@@ -101,41 +98,6 @@ fn family(analysis: &mut TaskAnalysis, level: f64, cells: impl FnOnce(&TaskAnaly
     analysis.shares.extend(cells);
 }
 
-/// Differences between conditions in how often single films were taken for real.
-fn single_pairs(votes: &[BinaryVote], conditions: &[&str], settings: &FigureSettings) -> Vec<PairAnalysis> {
-    let of = |name: &str| -> Vec<ClipVote> {
-        votes.iter().filter(|vote| vote.condition == name).map(|vote| vote.vote).collect()
-    };
-    let names = conditions.iter().enumerate().flat_map(|(k, a)| conditions[k + 1..].iter().map(move |b| [*a, *b]));
-    let pair = |[first, second]: [&str; 2]| {
-        let [a, b] = [first, second].map(of);
-        let mut found = FigureSet::default();
-        if let Some(estimate) = found.known(FigureMethod::Crossed, crossed_difference(&a, &b)) {
-            found.add_estimate(FigureMethod::Crossed, &estimate, 0.0, settings.confidence);
-        }
-        let ranked = participant_differences(&a, &b).and_then(|means| signed_rank(&means, ZeroDifferences::Wilcox));
-        found.add_test(FigureMethod::Wilcoxon, ranked.map(|test| test.p));
-        let mean = |votes: &[ClipVote]| votes.iter().map(|vote| vote.score).sum::<f64>() / votes.len().max(1) as f64;
-        let numbers = |of: fn(&ClipVote) -> usize| a.iter().chain(&b).map(of).collect::<BTreeSet<_>>().len();
-        PairAnalysis {
-            first: first.to_owned(),
-            second: second.to_owned(),
-            n_votes: a.len() + b.len(),
-            n_participants: numbers(|vote| vote.participant),
-            n_clips: numbers(|vote| vote.clip),
-            orders: None,
-            steps: None,
-            difference: mean(&a) - mean(&b),
-            figures: found,
-            conclusion: Conclusion::Untested,
-        }
-    };
-    let mut found: Vec<PairAnalysis> = names.map(pair).collect();
-    adjust(&mut found.iter_mut().map(|pair| &mut pair.figures).collect::<Vec<_>>());
-    found.iter_mut().for_each(|pair| super::pair::conclude(pair, settings.level()));
-    found
-}
-
 /// Preferences and sliders: pairs, scores, strengths.
 fn compared_task(analysis: &mut TaskAnalysis, votes: &[&StudyVote], numbering: &Numbering, settings: &FigureSettings) {
     if analysis.design == TaskDesign::Sliders {
@@ -154,36 +116,29 @@ fn compared_task(analysis: &mut TaskAnalysis, votes: &[&StudyVote], numbering: &
 }
 
 /// Krippendorff's alpha: participants rate clips, each condition or pair of them by itself.
-fn agreement(
-    votes: &[&StudyVote],
-    numbering: &Numbering,
-    analysis: &TaskAnalysis,
-) -> Result<f64, crate::stats::error::StatisticsError> {
+fn agreement(votes: &[&StudyVote], numbering: &Numbering, analysis: &TaskAnalysis) -> Result<f64, StatisticsError> {
     let names = &analysis.conditions;
     let (scale, groups): (_, Vec<Vec<ClipVote>>) = match analysis.design {
         TaskDesign::Sliders => {
             (MeasurementScale::Interval, names.iter().map(|name| scores(votes, numbering, name)).collect())
         }
         TaskDesign::Preference => {
-            let pairs = names.iter().enumerate().flat_map(|(k, a)| names[k + 1..].iter().map(move |b| (a, b)));
-            (MeasurementScale::Ordinal, pairs.map(|(a, b)| differences(votes, numbering, a, b)).collect())
+            let of_pair = |names| differences(votes, numbering, names);
+            (MeasurementScale::Ordinal, name_pairs(names).map(of_pair).collect())
         }
         design => {
             // Of single films, answers are compared, not whether they were right.
-            let measure = match design {
-                TaskDesign::TuringSingle => ShareMeasure::TakenForReal,
-                TaskDesign::Mismatch => ShareMeasure::MatchedChosen,
-                _ => ShareMeasure::GeneratedChosen,
-            };
+            let measure = measure(design).filter(|measure| *measure != ShareMeasure::Correct);
+            let measure = measure.unwrap_or(ShareMeasure::TakenForReal);
             let mut groups: BTreeMap<&str, Vec<ClipVote>> = BTreeMap::new();
             let all = binary(votes, numbering, measure);
             all.iter().for_each(|vote| groups.entry(vote.condition).or_default().push(vote.vote));
             (MeasurementScale::Nominal, groups.into_values().collect())
         }
     };
-    let mut units: BTreeMap<(usize, usize), Vec<Option<f64>>> = BTreeMap::new();
+    let mut units: BTreeMap<(usize, usize), Vec<f64>> = BTreeMap::new();
     for (group, votes) in groups.iter().enumerate() {
-        votes.iter().for_each(|vote| units.entry((group, vote.clip)).or_default().push(Some(vote.score)));
+        votes.iter().for_each(|vote| units.entry((group, vote.clip)).or_default().push(vote.score));
     }
     alpha(&units.into_values().collect::<Vec<_>>(), scale)
 }

@@ -1,6 +1,6 @@
 //! Summary of an analysis for the terminal.
 
-use super::figure::FigureMethod;
+use super::figure::{FigureMethod, FigureRow};
 use super::result::{StudyAnalysis, TaskAnalysis};
 use super::verdict::scope;
 use super::words::{bare_p, count, p_value, percent, percents, points};
@@ -90,18 +90,18 @@ fn rows(task: &TaskAnalysis) -> String {
             percent(share.share),
             count(share.n_votes as usize)
         );
-        for interval in &share.figures.intervals {
-            let naive = if interval.origin.naive { ", naive" } else { "" };
-            let name = format!("{}{naive}", interval.origin.method.name());
-            let test = share.figures.test(interval.origin.method);
+        for FigureRow { origin, interval, test } in share.figures.rows() {
+            let name = format!("{}{}", origin.method.name(), if origin.naive { ", naive" } else { "" });
+            let interval = interval.map(percents).unwrap_or_default();
             let p = test.map(|test| format!("  p {}", bare_p(test.p))).unwrap_or_default();
-            let _ = writeln!(text, "    {name:<44} {:>16}{p}{}", percents(interval), mark(interval.origin.exploratory));
+            let _ = writeln!(text, "    {name:<44} {interval:>16}{p}{}", mark(origin.exploratory));
         }
-        let alone = |method| share.figures.interval(method).is_none();
-        for test in share.figures.tests.iter().filter(|test| alone(test.origin.method)) {
-            let naive = if test.origin.naive { ", naive" } else { "" };
-            let name = format!("{}{naive}", test.origin.method.name());
-            let _ = writeln!(text, "    {name:<44} {:>16}  p {}{}", "", bare_p(test.p), mark(test.origin.exploratory));
+        if let Some(model) = &share.model {
+            let _ = writeln!(
+                text,
+                "    mixed model: standard deviations of log odds: participants {:.2}, clips {:.2}",
+                model.sd_participants, model.sd_clips
+            );
         }
         for test in &share.figures.equivalence {
             let naive = if test.origin.naive { ", naive" } else { "" };

@@ -38,7 +38,8 @@ fn of_share(share: &ShareAnalysis, settings: &FigureSettings) -> String {
         ShareMeasure::TakenForReal => "the film was taken for real in",
     };
     let confidence = format!("{:.0} %", 100.0 * settings.confidence);
-    let interval = share.figures.interval(FigureMethod::Crossed).or(share.figures.intervals.first());
+    let first = || share.figures.intervals.first().map(|interval| interval.ends);
+    let interval = share.figures.interval(FigureMethod::Crossed).or_else(first);
     let interval =
         interval.map(|interval| format!(" ({confidence} interval {})", percents(interval))).unwrap_or_default();
     let (n, share_of) = (count(share.n_votes as usize), percent(share.share));
@@ -52,8 +53,7 @@ fn of_share(share: &ShareAnalysis, settings: &FigureSettings) -> String {
 
 /// Meaning of a conclusion, with what it rests on.
 fn meaning(share: &ShareAnalysis) -> String {
-    let p = share.figures.test(FigureMethod::Crossed).map(|test| test.adjusted_p.unwrap_or(test.p));
-    let p = p.map(p_value).unwrap_or_default();
+    let p = share.figures.crossed_p().map(p_value).unwrap_or_default();
     let test = share.figures.equivalence(FigureMethod::Crossed);
     let equivalence = test.map(|test| p_value(test.p)).unwrap_or_default();
     let bound = test.map(|test| points(test.bound)).unwrap_or_default();
@@ -95,12 +95,10 @@ fn meaning(share: &ShareAnalysis) -> String {
 
 /// What the binomial test would say, where it says something else.
 fn naive(share: &ShareAnalysis, level: f64) -> String {
-    let (Some(test), Some(naive)) =
-        (share.figures.test(FigureMethod::Crossed), share.figures.test(FigureMethod::Binomial))
-    else {
+    let Some((p, naive)) = share.figures.crossed_p().zip(share.figures.test(FigureMethod::Binomial)) else {
         return String::new();
     };
-    match (test.adjusted_p.unwrap_or(test.p) < level) == (naive.p < level) {
+    match (p < level) == (naive.p < level) {
         true => String::new(),
         false => format!(
             " Taken for independent, which they are not, the votes would say the opposite (binomial test, {}).",

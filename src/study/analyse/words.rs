@@ -1,6 +1,6 @@
 //! Numbers of an analysis as words.
 
-use super::figure::IntervalFigure;
+use crate::stats::estimate::ConfidenceInterval;
 
 /// Count with commas between thousands.
 pub fn count(n: usize) -> String {
@@ -36,7 +36,7 @@ pub fn percent(share: f64) -> String {
 }
 
 /// Ends of an interval of a share: `50.3 to 54.7 %`.
-pub fn percents(interval: &IntervalFigure) -> String {
+pub fn percents(interval: ConfidenceInterval) -> String {
     format!("{:.1} to {:.1} %", 100.0 * interval.low, 100.0 * interval.high)
 }
 

@@ -1,7 +1,14 @@
-//! Clips of one speaker for one task, dealt to sessions with the comparison and the arrangement that each is shown in.
+//! Clips of one speaker for one task, dealt to sessions with the comparison and the arrangement that each is shown in, and
+//! the random numbers of a design.
 
+use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
+
+/// Random numbers of one purpose: a change of one purpose leaves the others as they are.
+pub fn stream(seed: u64, purpose: &str) -> ChaCha8Rng {
+    ChaCha8Rng::from_seed(*blake3::hash(format!("{seed} {purpose}").as_bytes()).as_bytes())
+}
 
 /// Clip with what it is shown in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -67,7 +74,6 @@ fn lcm(a: usize, b: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::SeedableRng;
     use std::collections::{BTreeMap, BTreeSet};
 
     proptest::proptest! {

@@ -1,14 +1,10 @@
 //! Design of a study, from its file and its clips.
 
-use super::balance::TaskBalance;
-use super::checks::numbers;
-use super::clip_deck::ClipDeck;
-use super::clip_needs::ClipNeeds;
-use super::designer::Designer;
+use super::clip_deck::{ClipDeck, stream};
+use super::clip_needs::{ClipNeeds, SharedClips};
+use super::designer::{Designer, numbers};
 use super::latin_square::SquareRows;
-use super::shared_clips::SharedClips;
-use super::stream::stream;
-use super::task_design::TaskDesigner;
+use super::task_design::{TaskBalance, TaskDesigner};
 use crate::file::StudyFile;
 use crate::plan::{FilmContent, PlannedTask, StudyPlan};
 use anyhow::Result;
@@ -74,7 +70,7 @@ mod tests {
     use super::*;
     use crate::file::ClipReuse;
     use crate::plan::{PlannedSession, TaskDesign, Trial, TrialPhase};
-    use crate::response::{Response, ScreenSide};
+    use crate::vote::{Response, ScreenSide};
     use std::collections::BTreeSet;
     use std::path::Path;
 

@@ -1,15 +1,12 @@
 //! Sessions one after the other: blocks of tasks, practice, training and main trials, attention checks among them.
 
-use super::balance::TaskBalance;
-use super::checks::{N_VARIANTS, places};
 use super::clip_deck::ClipDeck;
-use super::comparison::right_response;
+use super::clip_needs::SharedClips;
 use super::latin_square::SquareRows;
-use super::shared_clips::SharedClips;
-use super::task_design::{DealtTrial, TaskDesigner, deal};
+use super::task_design::{DealtTrial, TaskBalance, TaskDesigner, deal, right_response};
 use crate::file::{StudyCondition, StudyFile, StudyTask, TaskOrder};
 use crate::plan::{FilmContent, FilmSound, PlannedSession, Trial, TrialPhase};
-use crate::response::Response;
+use crate::vote::Response;
 use anyhow::{Context, Result};
 use rand::Rng;
 use rand::seq::SliceRandom;
@@ -133,4 +130,23 @@ impl Designer<'_> {
 /// What the films of a task let hear.
 fn heard(task: &StudyTask) -> FilmSound {
     if task.sound { FilmSound::Speech } else { FilmSound::Silence }
+}
+
+/// Numbered films of one check clip: a participant who tells another the number tells it to few.
+pub const N_VARIANTS: usize = 4;
+
+/// Before which main trials of a session checks come, ascending: spread over the session, none before the third trial, no
+/// two beside each other.
+pub fn places(n_main: usize, n_checks: usize, rng: &mut ChaCha8Rng) -> Vec<usize> {
+    let n_checks = n_checks.min(n_main.saturating_sub(2));
+    let border = |at: usize| 2 + (n_main - 2) * at / n_checks;
+    (0..n_checks).map(|at| rng.random_range(border(at)..border(at + 1))).collect()
+}
+
+/// Different numbers of two digits, equally likely.
+pub fn numbers(rng: &mut ChaCha8Rng) -> Vec<u16> {
+    let mut all: Vec<u16> = (10..=99).collect();
+    all.shuffle(rng);
+    all.truncate(N_VARIANTS);
+    all
 }

@@ -1,18 +1,13 @@
 //! Who sees what in which order: clips shared out to tasks, conditions and sides balanced over the sessions, attention
 //! checks among the trials.
 
-mod balance;
-mod checks;
 mod clip_deck;
 mod clip_needs;
-mod comparison;
 mod design;
 mod designer;
 mod latin_square;
-mod shared_clips;
-mod stream;
 mod task_design;
 
-pub use balance::TaskBalance;
 pub use clip_needs::ClipNeeds;
 pub use design::{DesignedStudy, design};
+pub use task_design::{TaskBalance, right_response};

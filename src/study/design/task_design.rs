@@ -1,12 +1,52 @@
-//! One task over all sessions: its decks of clips and the order of its trials.
+//! One task over all sessions: which conditions its trials compare, which response is right, its decks of clips, the order
+//! of its trials, and how equally votes are spread over what it compares.
 
-use super::clip_deck::{ClipDeck, DealtClip};
-use super::comparison::{ComparedConditions, comparisons};
+use super::clip_deck::{ClipDeck, DealtClip, stream};
+use super::clip_needs::SharedClips;
 use super::latin_square::SquareRows;
-use super::shared_clips::SharedClips;
-use super::stream::stream;
-use crate::file::{StudyFile, StudyTask};
+use crate::file::{StudyCondition, StudyFile, StudyTask};
+use crate::plan::TaskDesign;
+use crate::vote::{Response, ScreenSide};
 use std::collections::{BTreeMap, VecDeque};
+use std::fmt;
+
+/// Conditions of one trial.
+pub type ComparedConditions<'a> = Vec<&'a StudyCondition>;
+
+/// Comparisons of a task, each of which takes an equal share of its trials. Where films are judged singly, the real
+/// condition is as frequent as all others together, so that chance is one half.
+pub fn comparisons<'a>(file: &'a StudyFile, task: &StudyTask) -> Vec<ComparedConditions<'a>> {
+    let all: ComparedConditions = task.conditions.iter().filter_map(|name| file.find_condition(name)).collect();
+    let real = all.iter().copied().find(|condition| condition.real);
+    let others = || all.iter().copied().filter(|condition| !condition.real);
+    match task.design {
+        TaskDesign::Turing => others().filter_map(|other| Some(vec![real?, other])).collect(),
+        TaskDesign::TuringSingle => others().filter_map(|other| Some([vec![real?], vec![other]])).flatten().collect(),
+        TaskDesign::Preference => {
+            let pairs = all.iter().enumerate().flat_map(|(at, a)| all[at + 1..].iter().map(move |b| vec![*a, *b]));
+            pairs.collect()
+        }
+        TaskDesign::Sliders => vec![all],
+        TaskDesign::Mismatch => {
+            let matched = |condition: &StudyCondition| file.find_condition(condition.source.mismatch_of()?);
+            all.iter().filter_map(|condition| Some(vec![matched(condition)?, *condition])).collect()
+        }
+    }
+}
+
+/// Right response to conditions from left to right, where there is one.
+pub fn right_response(design: TaskDesign, shown: &[&StudyCondition]) -> Option<Response> {
+    let side = |is_right: fn(&StudyCondition) -> bool| {
+        let left = is_right(shown.first()?);
+        Some(Response::Side(if left { ScreenSide::Left } else { ScreenSide::Right }))
+    };
+    match design {
+        TaskDesign::Turing => side(|condition| condition.real),
+        TaskDesign::TuringSingle => Some(Response::Real(shown.first()?.real)),
+        TaskDesign::Mismatch => side(|condition| condition.source.mismatch_of().is_none()),
+        TaskDesign::Preference | TaskDesign::Sliders => None,
+    }
+}
 
 /// Clip of a speaker with what it is shown in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -95,4 +135,57 @@ pub fn deal(decks: &mut [ClipDeck], n: usize, session: usize) -> Vec<DealtTrial>
         hand.into_iter().map(move |dealt| DealtTrial { speaker, dealt })
     });
     hands.flatten().collect()
+}
+
+/// Votes of one task, once every wanted participant has answered.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TaskBalance {
+    pub task: String,
+    /// Clips by compared conditions.
+    pub n_cells: usize,
+    /// Fewest and most votes of a cell.
+    pub votes: [usize; 2],
+    /// Fewest and most votes of a cell with its films in one arrangement on the screen.
+    pub arranged: [usize; 2],
+    cells: BTreeMap<(usize, usize, usize), Vec<usize>>,
+}
+
+impl TaskBalance {
+    /// Balance without votes.
+    pub fn new(designer: &TaskDesigner, n_clips: &[usize]) -> Self {
+        let of_speaker = |(speaker, n): (usize, &usize)| (0..*n).map(move |clip| (speaker, clip)).collect::<Vec<_>>();
+        let clips = n_clips.iter().enumerate().flat_map(of_speaker);
+        let n_comparisons = designer.comparisons.len();
+        let empty = || vec![0; designer.arrangements.n_rows()];
+        let cells = clips.flat_map(|(speaker, clip)| (0..n_comparisons).map(move |k| (speaker, clip, k)));
+        let cells: BTreeMap<_, _> = cells.map(|cell| (cell, empty())).collect();
+        let (task, n_cells) = (designer.task.name.clone(), cells.len());
+        Self { task, n_cells, votes: [0; 2], arranged: [0; 2], cells }
+    }
+
+    pub fn count(&mut self, trials: &[DealtTrial]) {
+        for DealtTrial { speaker, dealt } in trials {
+            let cell = self.cells.get_mut(&(*speaker, dealt.clip, dealt.comparison));
+            if let Some(votes) = cell.and_then(|cell| cell.get_mut(dealt.arrangement)) {
+                *votes += 1;
+            }
+        }
+        self.votes = extent(self.cells.values().map(|cell| cell.iter().sum()));
+        self.arranged = extent(self.cells.values().flatten().copied());
+    }
+}
+
+fn extent(counts: impl Iterator<Item = usize>) -> [usize; 2] {
+    let counts: Vec<usize> = counts.collect();
+    [counts.iter().min(), counts.iter().max()].map(|count| count.copied().unwrap_or(0))
+}
+
+impl fmt::Display for TaskBalance {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let range = |[least, most]: [usize; 2]| {
+            if least == most { format!("{least}") } else { format!("{least} or {most}") }
+        };
+        let (votes, arranged) = (range(self.votes), range(self.arranged));
+        write!(f, "{}: {votes} votes of each of {} cells, {arranged} in each order of films", self.task, self.n_cells)
+    }
 }

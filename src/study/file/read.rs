@@ -1,8 +1,8 @@
 //! A study file read over its preset, and the resolved one written.
 
 use super::layers::{self, StudyPreset};
-use super::study_file::StudyFile;
-use super::{defaults, rules};
+use super::rules;
+use super::study_file::{StudyFile, fill_in};
 use anyhow::{Context, Result};
 use orator_base::stage::workdir;
 use orator_dataset::config::file::{line_of, nearest, refused};
@@ -37,29 +37,6 @@ impl StudyFile {
     pub fn write(&self, file: &Path) -> Result<()> {
         workdir::write_file(file, toml::to_string_pretty(self)?.as_bytes())
     }
-
-    /// Names of texts that the page does not have.
-    ///
-    /// # Errors
-    /// Each unknown key with the nearest of `known`.
-    pub fn check_texts(&self, file: &Path, known: &[&str]) -> Result<()> {
-        let known: Vec<String> = known.iter().map(|key| (*key).to_owned()).collect();
-        let keys = self.texts.iter().flat_map(|(language, texts)| texts.keys().map(move |key| (language, key)));
-        let unknown = keys.filter(|(_, key)| !known.contains(key)).map(|(language, key)| Problem {
-            key: format!("texts.{language}.{key}"),
-            location: SourceLocation::Line(line_of_key(file, language, key)),
-            message: format!("the page has no such text{}", nearest(key, known.iter())),
-        });
-        let problems: Vec<Problem> = unknown.collect();
-        if problems.is_empty() { Ok(()) } else { Err(ConfigError { file: file.to_owned(), problems }.into()) }
-    }
-}
-
-/// Line of a text in the file as it stands; 1 where it cannot be read.
-fn line_of_key(file: &Path, language: &str, key: &str) -> usize {
-    let text = std::fs::read_to_string(file).unwrap_or_default();
-    let spans = DeTable::parse(&text).map(|table| layers::spans(table.get_ref())).unwrap_or_default();
-    spans.get(&format!("texts.{language}.{key}")).map_or(1, |span| line_of(&text, span.start))
 }
 
 /// Study file of a text, or all that is wrong with it.
@@ -82,7 +59,7 @@ pub fn resolve(text: &str, file: &Path) -> Result<StudyFile, Vec<Problem>> {
     let read = StudyFile::deserialize(toml::de::Deserializer::from(Spanned::new(span, merged.into_inner())));
     let mut study = read.map_err(|error| vec![worded(text, &error, &spans)])?;
     study.preset = None;
-    defaults::fill_in(&mut study);
+    fill_in(&mut study);
     let folder = file.parent().unwrap_or(Path::new(""));
     paths_of(&mut study).for_each(|path| *path = folder.join(&path));
     let place = |key: &str| spans.get(key).map(|span| line_of(text, span.start));
@@ -216,6 +193,10 @@ mod tests {
             one("[clips]\nsecond = 3\n")[0].starts_with("line 11: clips.second: unknown key (did you mean seconds?)")
         );
         assert!(one("[[task]]\nname = \"x\"\ntrials = 3\n")[0].ends_with("the key design is missing"));
+        assert_eq!(
+            one("[texts.en]\nwelcom = \"Hi\"\n"),
+            ["line 11: texts.en.welcom: the page has no such text (did you mean welcome?)"]
+        );
         let wrong = one("[[task]]\nname = \"x\"\ndesign = \"sliders\"\ntrials = 3\nscale = \"appropriate\"\n");
         assert_eq!(
             wrong,
@@ -247,20 +228,6 @@ mod tests {
         for said in ["title: expected a title", "no speaker is named", "condition[mismatched].of: expected the name"] {
             assert!(bare.contains(said), "{said}: {bare}");
         }
-    }
-
-    #[test]
-    fn unknown_texts_are_named_with_the_nearest() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("study.toml");
-        std::fs::write(&path, format!("{SMALLEST}[texts.en]\nwelcom = \"Hi\"\n")).unwrap();
-        let file = StudyFile::read(&path).unwrap();
-        let error = file.check_texts(&path, &["welcome", "consent"]).unwrap_err().to_string();
-        assert!(
-            error.ends_with("line 11: texts.en.welcom: the page has no such text (did you mean welcome?)"),
-            "{error}"
-        );
-        file.check_texts(&path, &["welcom"]).unwrap();
     }
 
     proptest::proptest! {

@@ -1,8 +1,8 @@
 //! What a study file must hold beyond its types: a key and what was expected, for each rule that is broken.
 
 use super::condition::{ConditionSource, StudyCondition};
-use super::hypothesis::{HypothesisKind, StudyHypothesis};
-use super::study_file::{StudyFile, StudyTask};
+use super::study_file::{HypothesisKind, StudyFile, StudyHypothesis, StudyTask};
+use crate::pages::page_texts::text_keys;
 use crate::plan::TaskDesign;
 use orator_dataset::config::file::nearest;
 use std::collections::BTreeSet;
@@ -81,6 +81,12 @@ impl StudyRules<'_> {
         }
         for language in file.texts.keys().filter(|language| !file.languages.contains(language)) {
             self.say(format!("texts.{language}"), format!("{language:?} is not in languages: add it there"));
+        }
+        let known = text_keys(file.task.iter().map(|task| task.name.as_str()));
+        let keys = file.texts.iter().flat_map(|(language, texts)| texts.keys().map(move |key| (language, key)));
+        for (language, key) in keys.filter(|(_, key)| !known.contains(key)) {
+            let message = format!("the page has no such text{}", nearest(key, known.iter()));
+            self.say(format!("texts.{language}.{key}"), message);
         }
         if file.task.is_empty() {
             self.say("task", "no task is left: expected a [[task]], or a preset with its tasks");

@@ -1,7 +1,7 @@
-//! Sections of the study file.
+//! Sections of the study file, and the defaults that follow from the rest of it: compared conditions of a task, hypotheses of
+//! a design.
 
-use super::condition::StudyCondition;
-use super::hypothesis::StudyHypothesis;
+use super::condition::{ConditionSource, StudyCondition};
 use super::layers::StudyPreset;
 use crate::plan::TaskDesign;
 use orator_base::types::split::Split;
@@ -210,6 +210,37 @@ impl Default for AnalysisSettings {
     }
 }
 
+/// Hypothesis about one task.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StudyHypothesis {
+    pub task: String,
+    pub kind: HypothesisKind,
+    /// The two conditions that it is about; every pair that the task compares where it is empty.
+    #[serde(default)]
+    pub conditions: Vec<String>,
+    /// Whether each speaker is tested by itself instead of all together.
+    #[serde(default)]
+    pub per_speaker: bool,
+    /// Bound of equivalence in percentage points on either side of chance.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub points: Option<f64>,
+}
+
+/// What a hypothesis claims.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum HypothesisKind {
+    /// The share of right responses is not 50 %.
+    DiffersFromChance,
+    /// The share of right responses is above 50 %.
+    GreaterThanChance,
+    /// The share of right responses lies within `points` of 50 %.
+    Equivalence,
+    /// Two conditions are rated, preferred or taken for real unequally.
+    Differs,
+}
+
 impl StudyFile {
     /// Sessions that are planned: one for each participant, and the spare ones.
     pub fn n_sessions(&self) -> usize {
@@ -219,4 +250,61 @@ impl StudyFile {
     pub fn find_condition(&self, name: &str) -> Option<&StudyCondition> {
         self.condition.iter().find(|condition| condition.name == name)
     }
+}
+
+/// Drops tasks without trials, and fills in mismatched conditions, conditions of tasks and hypotheses where there are none.
+pub fn fill_in(file: &mut StudyFile) {
+    let empty: Vec<String> = file.task.iter().filter(|task| task.trials == 0).map(|task| task.name.clone()).collect();
+    file.task.retain(|task| task.trials > 0);
+    file.hypothesis.retain(|hypothesis| !empty.contains(&hypothesis.task));
+    let is_model =
+        |source: &ConditionSource| matches!(source, ConditionSource::Checkpoint(_) | ConditionSource::Files(_));
+    let models = file.condition.iter().filter(|condition| is_model(&condition.source) && !condition.real);
+    if let [model] = &models.map(|condition| condition.name.clone()).collect::<Vec<_>>()[..] {
+        let unsaid = file.condition.iter_mut().filter(|condition| condition.source.mismatch_of() == Some(""));
+        unsaid.for_each(|condition| condition.source = ConditionSource::Mismatched(model.clone()));
+    }
+    for at in 0..file.task.len() {
+        if file.task[at].conditions.is_empty() {
+            file.task[at].conditions = compared(file, &file.task[at]);
+        }
+    }
+    if file.hypothesis.is_empty() {
+        file.hypothesis = file.task.iter().flat_map(|task| hypotheses(task, file.speaker.len() > 1)).collect();
+    }
+}
+
+/// Conditions that fit a task: mismatched ones and theirs for a mismatch, all for sliders with sound, all but the
+/// mismatched ones otherwise.
+fn compared(file: &StudyFile, task: &StudyTask) -> Vec<String> {
+    let mismatch_of = |name: &str| file.find_condition(name).and_then(|condition| condition.source.mismatch_of());
+    let is_counterpart = |name: &str| file.condition.iter().any(|other| other.source.mismatch_of() == Some(name));
+    let fits = |name: &str| match task.design {
+        TaskDesign::Mismatch => mismatch_of(name).is_some() || is_counterpart(name),
+        TaskDesign::Sliders if task.sound => true,
+        TaskDesign::Sliders | TaskDesign::Turing | TaskDesign::TuringSingle | TaskDesign::Preference => {
+            mismatch_of(name).is_none()
+        }
+    };
+    file.condition.iter().map(|condition| condition.name.clone()).filter(|name| fits(name)).collect()
+}
+
+/// Usual hypotheses of a task, about all speakers together and, where there are several, about each.
+fn hypotheses(task: &StudyTask, has_speakers: bool) -> Vec<StudyHypothesis> {
+    let kinds: &[HypothesisKind] = match task.design {
+        TaskDesign::Turing | TaskDesign::TuringSingle => {
+            &[HypothesisKind::DiffersFromChance, HypothesisKind::Equivalence]
+        }
+        TaskDesign::Mismatch => &[HypothesisKind::GreaterThanChance],
+        TaskDesign::Preference | TaskDesign::Sliders => &[HypothesisKind::Differs],
+    };
+    let one = |kind: HypothesisKind, per_speaker: bool| StudyHypothesis {
+        task: task.name.clone(),
+        kind,
+        conditions: Vec::new(),
+        per_speaker,
+        points: (kind == HypothesisKind::Equivalence).then_some(10.0),
+    };
+    let scopes = if has_speakers { &[false, true][..] } else { &[false] };
+    kinds.iter().flat_map(|kind| scopes.iter().map(|per_speaker| one(*kind, *per_speaker))).collect()
 }

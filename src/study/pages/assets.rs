@@ -5,7 +5,7 @@ const PAGE: &str = "text/html; charset=utf-8";
 
 /// Path, content type and text of every file.
 pub const ASSETS: [(&str, &str, &str); 13] = [
-    ("/", PAGE, PARTICIPANT_PAGE),
+    ("/", PAGE, include_str!("page.html")),
     ("/app.css", "text/css; charset=utf-8", include_str!("page.css")),
     ("/app.js", SCRIPT, include_str!("app.js")),
     ("/backend.js", SCRIPT, include_str!("backend.js")),
@@ -19,9 +19,6 @@ pub const ASSETS: [(&str, &str, &str); 13] = [
     ("/operator", PAGE, include_str!("operator.html")),
     ("/operator.js", SCRIPT, include_str!("operator.js")),
 ];
-
-/// The participants' page.
-pub const PARTICIPANT_PAGE: &str = include_str!("page.html");
 
 /// Tones that the film of the sound check plays; `sound.js` asks for their number.
 pub const SOUND_CHECK_TONES: usize = 3;

@@ -2,8 +2,8 @@
 
 use super::reply::ApiError;
 use crate::plan::{PlannedTask, TaskDesign, Trial, TrialPhase};
-use crate::response::Response;
 use crate::store::answers::GivenAnswer;
+use crate::vote::Response;
 
 /// Seconds that a page may report: a day.
 const MOST_SECS: f64 = 86_400.0;
@@ -56,7 +56,15 @@ pub fn feedback(trial: &Trial) -> Option<&Response> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::response::ScreenSide;
+    use crate::vote::ScreenSide;
+
+    fn task(design: TaskDesign) -> PlannedTask {
+        PlannedTask { name: "t".to_owned(), design, replay: false, scale: String::new() }
+    }
+
+    fn trial(phase: TrialPhase, n_films: usize) -> Trial {
+        Trial { task: 0, phase, films: vec![String::new(); n_films], expected: None }
+    }
 
     #[test]
     fn each_design_takes_its_own_form_of_response() {
@@ -65,9 +73,8 @@ mod tests {
         let (step, number) = (Response::Step(-2), Response::Number(42));
         let all = [side, real, step, number, scores(&[0, 100])];
         let fitting = |design, phase| -> Vec<usize> {
-            let task = PlannedTask { name: "t".to_owned(), design, replay: false, scale: String::new() };
-            let trial = Trial { task: 0, phase, films: vec![String::new(), String::new()], expected: None };
-            all.iter().enumerate().filter(|(_, one)| fits(one, &trial, &task)).map(|(k, _)| k).collect()
+            let fits = |one: &Response| fits(one, &trial(phase, 2), &task(design));
+            all.iter().enumerate().filter(|(_, one)| fits(one)).map(|(k, _)| k).collect()
         };
         use TaskDesign::{Mismatch, Preference, Sliders, Turing, TuringSingle};
         for (design, form) in [(Turing, 0), (Mismatch, 0), (TuringSingle, 1), (Preference, 2), (Sliders, 4)] {
@@ -80,8 +87,6 @@ mod tests {
 
     #[test]
     fn numbers_keep_to_their_ranges() {
-        let task = |design| PlannedTask { name: "t".to_owned(), design, replay: false, scale: String::new() };
-        let trial = |phase| Trial { task: 0, phase, films: vec![String::new()], expected: None };
         let given = |response, plays, secs| GivenAnswer {
             position: 0,
             response,
@@ -91,7 +96,7 @@ mod tests {
             response_secs: 0.0,
         };
         let takes = |design, phase, response, plays, secs| {
-            check(&given(response, plays, secs), &trial(phase), &task(design)).is_ok()
+            check(&given(response, plays, secs), &trial(phase, 1), &task(design)).is_ok()
         };
         use TrialPhase::{AttentionCheck, Main};
         assert!(takes(TaskDesign::Preference, Main, Response::Step(2), 1, 0.0));

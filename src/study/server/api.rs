@@ -1,23 +1,25 @@
-//! The interface by which a page takes part: it begins, answers trial by trial, and may withdraw.
+//! The interface of the pages: a participant begins, answers trial by trial, and may withdraw; the operator sees how many
+//! take part and how far they are. Films, as a whole or in ranges.
 
 use super::answer::{check, fails_check, feedback};
-use super::app::{App, now_ms};
-use super::body::{JsonBody, bearer, unauthorized};
-use super::reply::{ApiError, json_reply, not_found};
+use super::reply::{ApiError, JsonBody, bearer, header_text, json_reply, not_found, unauthorized};
 use super::secret::{completion_code, participant_id};
-use super::{films, served::ServedStudy};
+use super::served::ServedStudy;
+use super::start::{App, now_ms};
 use crate::plan::TrialPhase;
-use crate::response::Response;
-use crate::store::answers::{GivenAnswer, Recorded, TrialTerms, record};
-use crate::store::participants::{self, Newcomer, PARAMETERS, Participant, Status};
-use axum::extract::{FromRequestParts, Path, State};
+use crate::store::answers::{self, GivenAnswer, Recorded, TrialTerms, record};
+use crate::store::participants::{self, NewParticipant, PARAMETERS, Participant, Status};
+use crate::vote::Response;
+use axum::body::Body;
+use axum::extract::{FromRequestParts, Path, Request, State};
 use axum::http::request::Parts;
-use axum::http::{HeaderMap, StatusCode};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response as HttpResponse};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use tower_http::services::ServeFile;
 
 /// Letters of what recruiting sites give along.
 const LONGEST_PARAMETER: usize = 128;
@@ -67,12 +69,12 @@ fn session_state<'a>(study: &'a ServedStudy, participant: &Participant) -> Sessi
 }
 
 /// Who asks: session and name, by a token that was signed here and does not ask too often.
-pub struct Asker {
+pub struct AuthenticatedSession {
     session: u32,
     id: String,
 }
 
-impl FromRequestParts<Arc<App>> for Asker {
+impl FromRequestParts<Arc<App>> for AuthenticatedSession {
     type Rejection = ApiError;
 
     async fn from_request_parts(parts: &mut Parts, app: &Arc<App>) -> Result<Self, ApiError> {
@@ -96,7 +98,7 @@ pub async fn study(State(app): Shared) -> HttpResponse {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Beginning {
+pub struct StartRequest {
     consent: bool,
     language: String,
     #[serde(default)]
@@ -104,7 +106,7 @@ pub struct Beginning {
 }
 
 /// `POST /api/begin`
-pub async fn begin(State(app): Shared, JsonBody(body): JsonBody<Beginning>) -> Result<HttpResponse, ApiError> {
+pub async fn begin(State(app): Shared, JsonBody(body): JsonBody<StartRequest>) -> Result<HttpResponse, ApiError> {
     if !app.limits.allow_begin() {
         return Err(ApiError::too_often());
     }
@@ -119,7 +121,7 @@ pub async fn begin(State(app): Shared, JsonBody(body): JsonBody<Beginning>) -> R
     }
     let (id, code) =
         participant_id().and_then(|id| Ok((id, completion_code()?))).map_err(|_| ApiError::not_stored())?;
-    let newcomer = Newcomer { id, language: body.language, parameters: body.parameters, code };
+    let newcomer = NewParticipant { id, language: body.language, parameters: body.parameters, code };
     let quota = app.study.quota;
     let begun = app.store.write(move |db| participants::begin(db, &newcomer, quota, now_ms())).await;
     let begun = begun.map_err(|_| ApiError::not_stored())?;
@@ -138,7 +140,10 @@ fn is_parameter(name: &str, value: &str) -> bool {
 }
 
 /// `GET /api/state`
-pub async fn state(State(app): Shared, Asker { id, .. }: Asker) -> Result<HttpResponse, ApiError> {
+pub async fn state(
+    State(app): Shared,
+    AuthenticatedSession { id, .. }: AuthenticatedSession,
+) -> Result<HttpResponse, ApiError> {
     let found = app.store.write(move |db| participants::find(db, &id)).await.map_err(|_| ApiError::not_stored())?;
     match found {
         Some(participant) if participant.status == Status::Replaced => Err(gone()),
@@ -150,7 +155,7 @@ pub async fn state(State(app): Shared, Asker { id, .. }: Asker) -> Result<HttpRe
 /// `POST /api/answer`
 pub async fn answer(
     State(app): Shared,
-    Asker { session, id }: Asker,
+    AuthenticatedSession { session, id }: AuthenticatedSession,
     JsonBody(answer): JsonBody<GivenAnswer>,
 ) -> Result<HttpResponse, ApiError> {
     let trials = app.study.trials(session);
@@ -186,16 +191,89 @@ struct Acknowledged<'a> {
 }
 
 /// `POST /api/withdraw`
-pub async fn withdraw(State(app): Shared, Asker { id, .. }: Asker) -> Result<HttpResponse, ApiError> {
+pub async fn withdraw(
+    State(app): Shared,
+    AuthenticatedSession { id, .. }: AuthenticatedSession,
+) -> Result<HttpResponse, ApiError> {
     app.limits.forget(&id);
     let known = app.store.erase(move |db| participants::withdraw(db, &id)).await.map_err(|_| ApiError::not_stored())?;
     if known { Ok(json_reply(&json!({ "withdrawn": true }))) } else { Err(withdrawn()) }
 }
 
-/// `GET /films/{16 hexadecimal digits}.mp4`
-pub async fn film(State(app): Shared, Path(name): Path<String>, headers: HeaderMap) -> HttpResponse {
-    match name.strip_suffix(".mp4").and_then(|name| app.study.film(name)) {
-        Some(film) => films::reply(film, &headers).await,
-        None => not_found().await.into_response(),
+/// `GET /api/operator`
+pub async fn operator(State(app): Shared, headers: HeaderMap) -> Result<HttpResponse, ApiError> {
+    if !app.secret.is_operator(bearer(&headers)?) {
+        return Err(unauthorized());
+    }
+    let read = |db: &_| Ok((participants::all(db)?, participants::n_withdrawn(db)?, answers::stalls(db)?));
+    let (all, withdrawn, stalls) = app.store.write(read).await.map_err(|_| ApiError::not_stored())?;
+    let now_ms = now_ms();
+    let place = |participant: &Participant| {
+        json!({
+            "place": participant.session + 1,
+            "status": participant.status,
+            "position": participant.position,
+            "n_trials": app.study.trials(participant.session).len(),
+            "idle_secs": (now_ms - participant.given_ms).max(0) / 1000,
+        })
+    };
+    Ok(json_reply(&json!({
+        "title": app.study.title,
+        "quota": app.study.quota.count(&all, withdrawn, now_ms),
+        "answers": all.iter().map(|participant| participant.position).sum::<u32>(),
+        "stalls": stalls,
+        "participants": all.iter().map(place).collect::<Vec<_>>(),
+    })))
+}
+
+/// `GET /films/{16 hexadecimal digits}.mp4`, as a whole or in one range of bytes.
+pub async fn film(State(app): Shared, Path(name): Path<String>, mut request: Request) -> HttpResponse {
+    let Some(film) = name.strip_suffix(".mp4").and_then(|name| app.study.film(name)) else {
+        return not_found().await.into_response();
+    };
+    if !header_text(request.headers(), header::RANGE).is_some_and(is_one_range) {
+        request.headers_mut().remove(header::RANGE);
+    }
+    let Ok(mut reply) = ServeFile::new(&film.path).try_call(request).await else {
+        return not_found().await.into_response();
+    };
+    if !reply.status().is_client_error() {
+        let forever = HeaderValue::from_static("public, max-age=31536000, immutable");
+        reply.headers_mut().insert(header::CACHE_CONTROL, forever);
+    }
+    reply.map(Body::new)
+}
+
+/// Whether the header `Range` asks for one range of bytes, like `bytes=2-5`; a server may ignore all others (RFC 9110,
+/// section 14.2).
+fn is_one_range(range: &str) -> bool {
+    let ends = range.strip_prefix("bytes=").and_then(|ends| ends.split_once('-'));
+    let is_number = |digits: &str| digits.bytes().all(|byte| byte.is_ascii_digit());
+    ends.is_some_and(|(first, last)| {
+        let is_ordered = || first.parse::<u64>().ok() <= last.parse::<u64>().ok() || last.is_empty();
+        is_number(first) && is_number(last) && !(first.is_empty() && last.is_empty()) && is_ordered()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_one_range;
+
+    #[test]
+    fn ranges_that_are_served_in_part() {
+        let one = ["bytes=0-0", "bytes=2-5", "bytes=2-", "bytes=-3", "bytes=-0", "bytes=10-"];
+        assert!(one.into_iter().all(is_one_range));
+        let others = [
+            "bytes=5-2",
+            "bytes=-",
+            "bytes=",
+            "bytes=0-1,3-4",
+            "bytes=a-b",
+            "bytes=+1-2",
+            "bytes= 1-2",
+            "Bytes=1-2",
+            "",
+        ];
+        assert!(!others.into_iter().any(is_one_range));
     }
 }

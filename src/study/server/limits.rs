@@ -4,38 +4,31 @@ use std::collections::HashMap;
 use std::sync::Mutex;
 use std::time::Instant;
 
-/// How many requests come at once, and how many a second after that.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Rate {
-    at_once: f64,
-    a_second: f64,
-}
-
-/// Of one participant, who needs about two a trial.
-const PARTICIPANT: Rate = Rate { at_once: 100.0, a_second: 5.0 };
-/// Of all who begin.
-const BEGIN: Rate = Rate { at_once: 500.0, a_second: 10.0 };
-
+/// Tokens of requests: how many there are at most, how many come a second, and how many are left.
 #[derive(Clone, Copy, Debug)]
 struct Bucket {
+    most: f64,
+    a_second: f64,
     left: f64,
     at: Instant,
 }
 
 impl Bucket {
-    fn full(rate: Rate, at: Instant) -> Self {
-        Self { left: rate.at_once, at }
+    fn full(most: f64, a_second: f64) -> Self {
+        Self { most, a_second, left: most, at: Instant::now() }
+    }
+
+    /// Bucket of one participant, who needs about two tokens a trial.
+    fn of_participant() -> Self {
+        Self::full(100.0, 5.0)
     }
 
     /// Takes one token, if there is one.
-    fn takes(&mut self, rate: Rate, now: Instant) -> bool {
-        let refilled = self.left + rate.a_second * now.saturating_duration_since(self.at).as_secs_f64();
-        self.left = refilled.min(rate.at_once);
-        self.at = now;
+    fn takes(&mut self, now: Instant) -> bool {
+        let refilled = self.left + self.a_second * now.saturating_duration_since(self.at).as_secs_f64();
+        (self.left, self.at) = (refilled.min(self.most), now);
         let is_left = self.left >= 1.0;
-        if is_left {
-            self.left -= 1.0;
-        }
+        self.left -= if is_left { 1.0 } else { 0.0 };
         is_left
     }
 }
@@ -49,22 +42,18 @@ pub struct RateLimits {
 
 impl RateLimits {
     pub fn new() -> Self {
-        Self { participants: Mutex::default(), begin: Mutex::new(Bucket::full(BEGIN, Instant::now())) }
+        Self { participants: Mutex::default(), begin: Mutex::new(Bucket::full(500.0, 10.0)) }
     }
 
     /// Whether the participant `id`, whose token was verified, may ask now.
     pub fn allow_participant(&self, id: &str) -> bool {
-        let now = Instant::now();
         let Ok(mut buckets) = self.participants.lock() else { return false };
-        if !buckets.contains_key(id) {
-            buckets.insert(id.to_owned(), Bucket::full(PARTICIPANT, now));
-        }
-        buckets.get_mut(id).is_some_and(|bucket| bucket.takes(PARTICIPANT, now))
+        buckets.entry(id.to_owned()).or_insert_with(Bucket::of_participant).takes(Instant::now())
     }
 
     /// Whether someone may begin now.
     pub fn allow_begin(&self) -> bool {
-        self.begin.lock().is_ok_and(|mut bucket| bucket.takes(BEGIN, Instant::now()))
+        self.begin.lock().is_ok_and(|mut bucket| bucket.takes(Instant::now()))
     }
 
     /// Drops the bucket of who has gone.
@@ -82,11 +71,11 @@ mod tests {
 
     #[test]
     fn a_bucket_empties_and_fills_again() {
-        let (rate, begun) = (Rate { at_once: 2.0, a_second: 10.0 }, Instant::now());
-        let mut bucket = Bucket::full(rate, begun);
+        let mut bucket = Bucket::full(2.0, 10.0);
+        let begun = bucket.at;
         let at = |ms| begun + Duration::from_millis(ms);
-        assert!(bucket.takes(rate, begun) && bucket.takes(rate, begun) && !bucket.takes(rate, begun));
-        assert!(!bucket.takes(rate, at(50)) && bucket.takes(rate, at(110)) && !bucket.takes(rate, at(120)));
-        assert!(bucket.takes(rate, at(9000)) && bucket.takes(rate, at(9000)) && !bucket.takes(rate, at(9000)));
+        assert!(bucket.takes(begun) && bucket.takes(begun) && !bucket.takes(begun));
+        assert!(!bucket.takes(at(50)) && bucket.takes(at(110)) && !bucket.takes(at(120)));
+        assert!(bucket.takes(at(9000)) && bucket.takes(at(9000)) && !bucket.takes(at(9000)));
     }
 }

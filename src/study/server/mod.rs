@@ -3,15 +3,9 @@
 
 pub mod answer;
 pub mod api;
-pub mod app;
-pub mod body;
-pub mod films;
 pub mod limits;
 pub mod listen;
-pub mod operator;
-pub mod range;
 pub mod reply;
-pub mod router;
 pub mod secret;
 pub mod served;
 pub mod start;

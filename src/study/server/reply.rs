@@ -1,19 +1,16 @@
-//! Replies: JSON, errors as a sentence with a status, and the headers that every reply carries.
+//! Requests and replies: JSON bodies, tokens, errors as a sentence with a status, and the headers of every reply.
 
-use axum::extract::Request;
+use axum::body::Bytes;
+use axum::extract::{FromRequest, Request};
 use axum::http::header::{self, HeaderName};
-use axum::http::{HeaderValue, StatusCode};
-use axum::middleware::Next;
+use axum::http::{HeaderMap, HeaderValue, StatusCode};
 use axum::response::{IntoResponse, Response as HttpResponse};
 use serde::Serialize;
+use serde::de::DeserializeOwned;
 use serde_json::json;
-use std::time::Duration;
-
-/// Time that a request may take until its reply begins, the reading of its body with it.
-const REQUEST_TIME: Duration = Duration::from_secs(10);
 
 /// Headers of every reply: nothing from elsewhere is loaded, nothing is shown within another page.
-const HEADERS: [(HeaderName, &str); 7] = [
+pub const HEADERS: [(HeaderName, &str); 7] = [
     (
         header::CONTENT_SECURITY_POLICY,
         "default-src 'none'; script-src 'self'; style-src 'self'; media-src 'self'; connect-src 'self'; \
@@ -106,18 +103,40 @@ pub async fn wrong_method() -> ApiError {
     ApiError::new(StatusCode::METHOD_NOT_ALLOWED, "This address does not take that method.")
 }
 
-/// Ends what takes too long, and adds the headers of every reply.
-pub async fn guard(request: Request, next: Next) -> HttpResponse {
-    let late = || ApiError::new(StatusCode::REQUEST_TIMEOUT, "The request took too long.");
-    let mut reply = match tokio::time::timeout(REQUEST_TIME, next.run(request)).await {
-        Ok(reply) => reply,
-        Err(_) => late().into_response(),
-    };
-    for (name, value) in HEADERS {
-        reply.headers_mut().insert(name, HeaderValue::from_static(value));
+/// Body of a request, JSON of a known form. Its content type must say so, which a form of another site cannot.
+pub struct JsonBody<T>(pub T);
+
+impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for JsonBody<T> {
+    type Rejection = ApiError;
+
+    async fn from_request(request: Request, state: &S) -> Result<Self, ApiError> {
+        let content_type = header_text(request.headers(), header::CONTENT_TYPE).unwrap_or_default();
+        let kind = content_type.split(';').next().unwrap_or_default().trim();
+        if !kind.eq_ignore_ascii_case("application/json") {
+            return Err(ApiError::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, "The body must be application/json."));
+        }
+        let bytes = Bytes::from_request(request, state).await;
+        let bytes = bytes.map_err(|error| ApiError::new(error.status(), "The body is too large, or broke off."))?;
+        let value = serde_json::from_slice(&bytes);
+        value.map(Self).map_err(|_| ApiError::bad("The body is not the JSON that this address takes."))
     }
-    if !reply.headers().contains_key(header::CACHE_CONTROL) {
-        reply.headers_mut().insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
-    }
-    reply
+}
+
+/// Token of the header `Authorization: Bearer TOKEN`.
+///
+/// # Errors
+/// No such header.
+pub fn bearer(headers: &HeaderMap) -> Result<&str, ApiError> {
+    let token = header_text(headers, header::AUTHORIZATION).and_then(|text| text.strip_prefix("Bearer "));
+    token.ok_or_else(unauthorized)
+}
+
+/// Refusal of a token.
+pub fn unauthorized() -> ApiError {
+    ApiError::new(StatusCode::UNAUTHORIZED, "A valid token is needed.")
+}
+
+/// Header as text; `None`: not there, or not of printable ASCII letters.
+pub fn header_text(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
+    headers.get(name)?.to_str().ok()
 }

@@ -74,19 +74,6 @@ impl StudySecret {
         read().with_context(|| format!("cannot use {}", path.display()))
     }
 
-    /// Takes the operator's token from the file `path` in place of the one made.
-    ///
-    /// # Errors
-    /// No such file, or fewer than 16 characters.
-    pub fn set_operator_token(&mut self, path: &Path) -> Result<()> {
-        let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
-        let token = text.trim();
-        let is_long = token.len() >= 16 && token.bytes().all(|byte| byte.is_ascii_graphic());
-        ensure!(is_long, "{}: the operator's token must be at least 16 letters and digits", path.display());
-        self.operator_token = token.to_owned();
-        Ok(())
-    }
-
     pub fn operator_token(&self) -> &str {
         &self.operator_token
     }
@@ -152,16 +139,9 @@ mod tests {
         for wrong in ["", "=", "\u{e9}", &format!("{token}="), &format!("{token}AAAA"), &token.repeat(100)] {
             assert_eq!(secret.verify(wrong), None, "{wrong}");
         }
-        let mut other = StudySecret { key: random().unwrap(), operator_token: String::new() };
+        let other = StudySecret { key: random().unwrap(), operator_token: String::new() };
         assert_eq!(other.verify(&token), None, "another study's");
         assert!(secret.is_operator(secret.operator_token()) && !secret.is_operator("") && !secret.is_operator(&token));
-
-        let given = dir.path().join("operator");
-        fs::write(&given, "short\n").unwrap();
-        assert!(format!("{:#}", other.set_operator_token(&given).unwrap_err()).contains("16 letters"));
-        fs::write(&given, "0123456789abcdef\n").unwrap();
-        other.set_operator_token(&given).unwrap();
-        assert!(other.is_operator("0123456789abcdef"));
         fs::set_permissions(&path, Permissions::from_mode(0o644)).unwrap();
         assert!(format!("{:#}", StudySecret::open(&path).err().unwrap()).contains("chmod 600"));
     }

@@ -1,15 +1,15 @@
 //! What a server serves: the plan's sessions and films, and the texts of the page.
 
 use crate::file::StudyFile;
-use crate::folder::StudyFolder;
+use crate::folder::{StudyFolder, read_json};
 use crate::pages::page_texts::page_texts;
 use crate::plan::{PlannedTask, StudyPlan, TaskDesign, Trial, TrialPhase};
 use crate::store::participants::Quota;
 use anyhow::{Context, Result, ensure};
+use orator_base::stage::fingerprint::hash_file;
 use orator_media::ffmpeg::probe::probe;
 use serde_json::json;
 use std::collections::{BTreeSet, HashMap};
-use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Milliseconds by which an answer may come before the stated end of its films: players round.
@@ -19,8 +19,6 @@ const LEEWAY_MS: f64 = 250.0;
 #[derive(Clone, Debug, PartialEq)]
 pub struct ServedFilm {
     pub path: PathBuf,
-    /// Bytes.
-    pub size: u64,
     secs: f64,
 }
 
@@ -48,7 +46,8 @@ impl ServedStudy {
     /// A file that is missing or unreadable, a plan that names what is not there.
     pub fn open(folder: &StudyFolder, abandoned_secs: f64) -> Result<Self> {
         let file = StudyFile::read(&folder.study_file())?;
-        let (plan, plan_hash) = read_plan(&folder.plan())?;
+        let plan: StudyPlan = read_json(&folder.plan())?;
+        let plan_hash = hash_file(&folder.plan())?;
         let trials = || plan.sessions.iter().flat_map(|session| &session.trials);
         let is_known = |trial: &Trial| trial.task < plan.tasks.len() && !trial.films.is_empty();
         ensure!(trials().all(is_known), "{}: a trial without a film or a task", folder.plan().display());
@@ -103,16 +102,9 @@ impl ServedStudy {
     }
 }
 
-fn read_plan(path: &Path) -> Result<(StudyPlan, String)> {
-    let bytes = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let plan = serde_json::from_slice(&bytes).with_context(|| format!("{} is not a study's plan", path.display()))?;
-    Ok((plan, blake3::hash(&bytes).to_hex().to_string()))
-}
-
 fn open_film(path: &Path, name: &str) -> Result<ServedFilm> {
     let is_opaque = name.len() == 16 && name.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'));
     ensure!(is_opaque, "the plan names a film {name:?}, which is not 16 hexadecimal digits");
-    let size = fs::metadata(path).with_context(|| format!("cannot read the film {}", path.display()))?.len();
     let secs = probe(path)?.duration_secs.with_context(|| format!("{} does not state its length", path.display()))?;
-    Ok(ServedFilm { path: path.to_owned(), size, secs })
+    Ok(ServedFilm { path: path.to_owned(), secs })
 }

@@ -1,20 +1,46 @@
-//! A study's server from its folder to its end.
+//! A study's server from its folder to its end, and its addresses.
 
-use super::app::App;
 use super::limits::RateLimits;
-use super::listen;
-use super::router::router;
+use super::reply::{HEADERS, not_found, text_reply, wrong_method};
 use super::secret::StudySecret;
 use super::served::ServedStudy;
+use super::{api, listen};
 use crate::folder::StudyFolder;
+use crate::pages::assets::ASSETS;
 use crate::seal::StudySeal;
 use crate::store::writer::ResponseStore;
 use anyhow::{Context, Result};
+use axum::Router;
+use axum::extract::DefaultBodyLimit;
+use axum::http::{HeaderValue, StatusCode, header};
+use axum::routing::{get, post};
 use std::net::SocketAddr;
-use std::path::Path;
+use std::sync::Arc;
 use std::thread::JoinHandle;
+use std::time::{Duration, SystemTime};
 use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
+use tower_http::set_header::SetResponseHeaderLayer;
+use tower_http::timeout::TimeoutLayer;
+
+/// Bytes of a body at most.
+const MOST_BODY: usize = 16 * 1024;
+/// Time that a request may take until its reply begins, the reading of its body with it.
+const REQUEST_TIME: Duration = Duration::from_secs(10);
+
+/// What the handlers share: the study, where its responses go, and who may ask how often.
+pub struct App {
+    pub study: ServedStudy,
+    pub store: ResponseStore,
+    pub secret: StudySecret,
+    pub limits: RateLimits,
+}
+
+/// Milliseconds since 1970.
+pub fn now_ms() -> i64 {
+    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+    since.map_or(0, |since| since.as_millis() as i64)
+}
 
 /// Server of one study, not listening yet.
 pub struct StudyServer {
@@ -24,15 +50,14 @@ pub struct StudyServer {
 
 impl StudyServer {
     /// Opens the study in `folder`, its responses and its secret. `abandoned_secs`: time without an answer after which a
-    /// place is given again. `operator_token`: file with the operator's token, in place of the one made.
+    /// place is given again.
     ///
     /// # Errors
     /// A study that is not as it was sealed, or whose secret or responses are not its own.
-    pub fn open(folder: &StudyFolder, abandoned_secs: f64, operator_token: Option<&Path>) -> Result<Self> {
+    pub fn open(folder: &StudyFolder, abandoned_secs: f64) -> Result<Self> {
         StudySeal::verify(folder)?;
         let study = ServedStudy::open(folder, abandoned_secs)?;
-        let mut secret = StudySecret::open(&folder.secret())?;
-        operator_token.map_or(Ok(()), |file| secret.set_operator_token(file))?;
+        let secret = StudySecret::open(&folder.secret())?;
         let (store, writer) = ResponseStore::open(&folder.responses(), &study.plan_hash)?;
         Ok(Self { app: App { study, store, secret, limits: RateLimits::new() }, writer })
     }
@@ -72,4 +97,30 @@ impl StudyServer {
         let _ = self.writer.join();
         Ok(())
     }
+}
+
+/// The addresses of a study's server.
+fn router(app: App) -> Router {
+    let mut router = Router::new()
+        .route("/api/study", get(api::study))
+        .route("/api/begin", post(api::begin))
+        .route("/api/state", get(api::state))
+        .route("/api/answer", post(api::answer))
+        .route("/api/withdraw", post(api::withdraw))
+        .route("/api/operator", get(api::operator))
+        .route("/films/{name}", get(api::film));
+    for (path, content_type, text) in ASSETS {
+        router = router.route(path, get(async move || text_reply(content_type, text)));
+    }
+    let no_store = HeaderValue::from_static("no-store");
+    let mut router = router
+        .fallback(not_found)
+        .method_not_allowed_fallback(wrong_method)
+        .layer(DefaultBodyLimit::max(MOST_BODY))
+        .layer(TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, REQUEST_TIME))
+        .layer(SetResponseHeaderLayer::if_not_present(header::CACHE_CONTROL, no_store));
+    for (name, value) in HEADERS {
+        router = router.layer(SetResponseHeaderLayer::overriding(name, HeaderValue::from_static(value)));
+    }
+    router.with_state(Arc::new(app))
 }

@@ -1,8 +1,7 @@
 //! Two one-sided tests: whether a value lies within a stated bound of another (Schuirmann 1987). A test that finds no
 //! difference does not show that there is none; this one can. The bound is fixed before the data are seen.
 
-use super::error::{StatisticsError, within};
-use super::estimate::{ConfidenceInterval, StudentEstimate};
+use super::estimate::{ConfidenceInterval, StatisticsError, StudentEstimate, within};
 use super::proportion::BinomialCount;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -18,6 +17,7 @@ pub struct Equivalence {
     /// Larger of the two one-sided p values.
     pub p: f64,
     /// 90 % interval of the value, which lies inside the bounds when the test passes.
+    #[serde(flatten)]
     pub interval: ConfidenceInterval,
 }
 
@@ -65,7 +65,7 @@ mod tests {
         assert!((exact(0.10).p / 6.51e-12 - 1.0).abs() < 0.01 && exact(0.10).passes(), "{}", exact(0.10).p);
         assert!((exact(0.05).p - 0.0131).abs() < 5e-5 && exact(0.05).passes(), "{}", exact(0.05).p);
         assert!(!exact(0.03).passes());
-        let estimate = StudentEstimate::new(0.525, count.standard_error(), f64::INFINITY).unwrap();
+        let estimate = StudentEstimate::new(0.525, (0.525f64 * 0.475 / 2000.0).sqrt(), f64::INFINITY).unwrap();
         let asymptotic = Equivalence::of_estimate(&estimate, 0.5, 0.05).unwrap();
         assert!((asymptotic.p - 0.0126).abs() < 5e-5, "{}", asymptotic.p);
     }
@@ -74,25 +74,6 @@ mod tests {
     fn votes_for_equivalence_follow_the_formula() {
         assert_eq!([0.05, 0.10].map(|bound| votes_needed(bound, 0.9).unwrap()), [1083, 271]);
         assert!(votes_needed(0.0, 0.9).is_err() && votes_needed(0.05, 1.0).is_err());
-    }
-
-    #[test]
-    fn numbers_are_those_of_statsmodels() {
-        let golden: serde_json::Value =
-            serde_json::from_str(include_str!("../../../fixtures/reference/study_stats_golden.json")).unwrap();
-        for case in golden["equivalence"].as_array().unwrap() {
-            let values: Vec<f64> = serde_json::from_value(case["values"].clone()).unwrap();
-            let bound = case["bound"].as_f64().unwrap();
-            let test = Equivalence::of_estimate(&StudentEstimate::of_mean(&values).unwrap(), 0.5, bound).unwrap();
-            let expected = case["p"].as_f64().unwrap();
-            assert!((test.p - expected).abs() <= 1e-9 * expected, "{} {expected}", test.p);
-        }
-        for case in golden["binomial_equivalence"].as_array().unwrap() {
-            let number = |name: &str| case[name].as_f64().unwrap();
-            let count = BinomialCount::new(number("successes") as u64, number("trials") as u64).unwrap();
-            let found = Equivalence::of_count(&count, 0.5, number("bound")).unwrap().p;
-            assert!((found - number("p")).abs() <= 1e-9 * number("p"), "{found} {case}");
-        }
     }
 
     /// The interval is inside the bounds exactly where the test passes.

@@ -1,36 +1,16 @@
-//! Tests by ranks: Wilcoxon's signed ranks of two paired conditions, Friedman's of several. Pairs and blocks are
-//! participants, independent of each other.
+//! Ranks and order statistics: Wilcoxon's signed ranks of two paired conditions, Friedman's test of several (pairs and
+//! blocks are participants, independent of each other), and a distribution-free interval of the median, as the GENEA
+//! challenges print their ratings (Kucherenko et al. 2021).
 
-use super::error::{StatisticsError, at_least, finite};
-use super::permutation::sign_flip::half_sums;
-use serde::Serialize;
-use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+use super::estimate::{ConfidenceInterval, StatisticsError, at_least, finite, tail};
+use statrs::distribution::{Binomial, ChiSquared, ContinuousCDF, DiscreteCDF, Normal};
 
-/// What becomes of differences of 0.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub enum ZeroDifferences {
-    /// Left out (Wilcoxon 1945).
-    Wilcox,
-    /// Ranked with the others, then left out (Pratt 1959).
-    Pratt,
-}
-
-/// Outcome of Wilcoxon's test.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct SignedRankTest {
-    /// Smaller of the sums of ranks of positive and of negative differences.
+/// Outcome of a test by ranks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RankTest {
+    /// Wilcoxon: smaller of the sums of ranks of positive and of negative differences. Friedman: chi-squared.
     pub statistic: f64,
     /// Two-sided p value.
-    pub p: f64,
-    /// Whether all signs were counted; else by the normal distribution with correction for ties, without correction
-    /// for continuity.
-    pub exact: bool,
-}
-
-/// Outcome of Friedman's test.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct FriedmanTest {
-    pub statistic: f64,
     pub p: f64,
 }
 
@@ -49,44 +29,49 @@ fn ranks(values: &[f64]) -> (Vec<f64>, Vec<f64>) {
     (ranks, ties)
 }
 
-/// Tests whether paired `differences` are symmetric about 0. Exact for up to 50 differences without ties and zeros and
-/// for up to 13 with them, as scipy's `wilcoxon` chooses.
-pub fn signed_rank(differences: &[f64], zeros: ZeroDifferences) -> Result<SignedRankTest, StatisticsError> {
+/// Probability of each sum of a random half of whole numbers: every one of `sizes` is in it with probability 1/2.
+fn half_sums(sizes: &[usize]) -> Vec<f64> {
+    let mut sums = vec![1.0];
+    for size in sizes {
+        let mut next = vec![0.0; sums.len() + size];
+        for (sum, probability) in sums.iter().enumerate() {
+            next[sum] += probability / 2.0;
+            next[sum + size] += probability / 2.0;
+        }
+        sums = next;
+    }
+    sums
+}
+
+/// Tests whether paired `differences` are symmetric about 0; differences of 0 are left out (Wilcoxon 1945). Exact for up to
+/// 50 differences without ties and zeros and for up to 13 with them, as scipy's `wilcoxon` chooses; else by the normal
+/// distribution with correction for ties, without correction for continuity.
+pub fn signed_rank(differences: &[f64]) -> Result<RankTest, StatisticsError> {
     finite("differences", differences)?;
-    let n_zero = differences.iter().filter(|difference| **difference == 0.0).count();
-    at_least("differences other than 0", 1, differences.len() - n_zero)?;
-    let ranked: Vec<f64> =
-        differences.iter().copied().filter(|value| zeros == ZeroDifferences::Pratt || *value != 0.0).collect();
-    let (ranks, mut ties) = ranks(&ranked.iter().map(|value| value.abs()).collect::<Vec<_>>());
+    let nonzero: Vec<f64> = differences.iter().copied().filter(|difference| *difference != 0.0).collect();
+    at_least("differences other than 0", 1, nonzero.len())?;
+    let (ranks, ties) = ranks(&nonzero.iter().map(|value| value.abs()).collect::<Vec<_>>());
     let sum =
-        |sign: f64| ranked.iter().zip(&ranks).filter(|(d, _)| **d * sign > 0.0).map(|(_, rank)| rank).sum::<f64>();
+        |sign: f64| nonzero.iter().zip(&ranks).filter(|(d, _)| **d * sign > 0.0).map(|(_, rank)| rank).sum::<f64>();
     let (above, below) = (sum(1.0), sum(-1.0));
     let statistic = above.min(below);
-    let is_tied = ties.iter().any(|n| *n > 1.0);
-    if differences.len() <= if is_tied || n_zero > 0 { 13 } else { 50 } {
+    let is_plain = nonzero.len() == differences.len() && ties.iter().all(|n| *n == 1.0);
+    let p = if differences.len() <= if is_plain { 50 } else { 13 } {
         // Ranks of ties are halves.
-        let nonzero = ranked.iter().zip(&ranks).filter(|(difference, _)| **difference != 0.0);
-        let sums = half_sums(&nonzero.map(|(_, rank)| (2.0 * rank) as usize).collect::<Vec<_>>());
-        let lower: f64 = sums.iter().take(1 + (2.0 * statistic) as usize).sum();
-        return Ok(SignedRankTest { statistic, p: (2.0 * lower).min(1.0), exact: true });
-    }
-    let cubes = |n: f64| n * (n + 1.0) * (2.0 * n + 1.0);
-    let n = ranked.len() as f64;
-    // Zeros that were ranked are the lowest ranks; they carry no sign (Cureton 1967).
-    let n_dropped = (ranked.len() + n_zero - differences.len()) as f64;
-    if n_dropped > 0.0 {
-        ties.remove(0);
-    }
-    let mean = (n * (n + 1.0) - n_dropped * (n_dropped + 1.0)) / 4.0;
-    let of_ties: f64 = ties.iter().map(|n| n.powi(3) - n).sum();
-    let deviation = ((cubes(n) - cubes(n_dropped) - of_ties / 2.0) / 24.0).sqrt();
-    let p = 2.0 * Normal::standard().sf((above - mean).abs() / deviation);
-    Ok(SignedRankTest { statistic, p: p.min(1.0), exact: false })
+        let sums = half_sums(&ranks.iter().map(|rank| (2.0 * rank) as usize).collect::<Vec<_>>());
+        2.0 * sums.iter().take(1 + (2.0 * statistic) as usize).sum::<f64>()
+    } else {
+        let n = nonzero.len() as f64;
+        let of_ties: f64 = ties.iter().map(|n| n.powi(3) - n).sum();
+        let deviation = ((n * (n + 1.0) * (2.0 * n + 1.0) - of_ties / 2.0) / 24.0).sqrt();
+        2.0 * Normal::standard().sf((above - n * (n + 1.0) / 4.0).abs() / deviation)
+    };
+    Ok(RankTest { statistic, p: p.min(1.0) })
 }
 
 /// Tests whether conditions differ, given for each participant one score of each condition (Friedman 1937, corrected
 /// for ties). By the chi-squared distribution, which holds for more than ten participants.
-pub fn friedman(blocks: &[Vec<f64>]) -> Result<FriedmanTest, StatisticsError> {
+pub fn friedman(blocks: &[Vec<f64>]) -> Result<RankTest, StatisticsError> {
     at_least("participants", 2, blocks.len())?;
     let k = blocks[0].len();
     at_least("conditions", 3, k)?;
@@ -109,7 +94,25 @@ pub fn friedman(blocks: &[Vec<f64>]) -> Result<FriedmanTest, StatisticsError> {
     let squares: f64 = sums.iter().map(|sum| sum * sum).sum();
     let statistic = (12.0 / (n * k * (k + 1.0)) * squares - 3.0 * n * (k + 1.0)) / correction;
     let distribution = ChiSquared::new(k - 1.0).map_err(|_| StatisticsError::NotFinite { what: "scores" })?;
-    Ok(FriedmanTest { statistic, p: distribution.sf(statistic.max(0.0)) })
+    Ok(RankTest { statistic, p: distribution.sf(statistic.max(0.0)) })
+}
+
+/// Interval of the median of independent `values`: the narrowest symmetric pair of order statistics that covers the true
+/// median with at least `confidence`, by the binomial distribution of the values below it (Hahn and Meeker 1991, section
+/// 5.2). Exact for any continuous distribution, conservative where values tie. Six values are needed for 95 %.
+pub fn median_interval(values: &[f64], confidence: f64) -> Result<ConfidenceInterval, StatisticsError> {
+    let tail = tail(confidence)?;
+    finite("values", values)?;
+    let n = values.len();
+    let too_few = |least| StatisticsError::TooFew { what: "values", least, found: n };
+    let below = Binomial::new(0.5, n as u64).map_err(|_| too_few(1))?;
+    // The interval leaves out `outside` values at each end: fewer than or as many lie below the median in a tail.
+    let Some(outside) = (0..n.div_ceil(2)).take_while(|rank| below.cdf(*rank as u64) <= tail).last() else {
+        return Err(too_few((-tail.log2()).ceil() as usize));
+    };
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    Ok(ConfidenceInterval { low: sorted[outside], high: sorted[n - 1 - outside] })
 }
 
 #[cfg(test)]
@@ -117,39 +120,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_those_of_scipy() {
-        let golden: serde_json::Value =
-            serde_json::from_str(include_str!("../../../fixtures/reference/study_stats_golden.json")).unwrap();
-        let near = |found: f64, expected: &serde_json::Value| {
-            let expected = expected.as_f64().unwrap();
-            assert!((found - expected).abs() <= 1e-9 * expected.abs(), "{found} {expected}");
-        };
-        for case in golden["wilcoxon"].as_array().unwrap() {
-            let differences: Vec<f64> = serde_json::from_value(case["differences"].clone()).unwrap();
-            for (zeros, name) in [(ZeroDifferences::Wilcox, "wilcox"), (ZeroDifferences::Pratt, "pratt")] {
-                let test = signed_rank(&differences, zeros).unwrap();
-                near(test.statistic, &case[name]["statistic"]);
-                near(test.p, &case[name]["p"]);
-            }
-        }
-        for case in golden["friedman"].as_array().unwrap() {
-            let blocks: Vec<Vec<f64>> = serde_json::from_value(case["blocks"].clone()).unwrap();
-            let test = friedman(&blocks).unwrap();
-            near(test.statistic, &case["statistic"]);
-            near(test.p, &case["p"]);
-        }
-    }
-
-    #[test]
     fn refusals() {
-        let zeros = [0.0; 4];
-        assert!(matches!(signed_rank(&zeros, ZeroDifferences::Pratt), Err(StatisticsError::TooFew { .. })));
-        assert!(signed_rank(&[], ZeroDifferences::Wilcox).is_err());
-        assert!(signed_rank(&[1.0, f64::NAN], ZeroDifferences::Wilcox).is_err());
-        let one = signed_rank(&[3.0], ZeroDifferences::Wilcox);
-        assert_eq!(one, Ok(SignedRankTest { statistic: 0.0, p: 1.0, exact: true }));
+        assert!(matches!(signed_rank(&[0.0; 4]), Err(StatisticsError::TooFew { .. })));
+        assert!(signed_rank(&[]).is_err() && signed_rank(&[1.0, f64::NAN]).is_err());
+        assert_eq!(signed_rank(&[3.0]), Ok(RankTest { statistic: 0.0, p: 1.0 }));
         assert!(friedman(&[]).is_err() && friedman(&[vec![1.0, 2.0], vec![2.0, 1.0]]).is_err());
         assert!(friedman(&[vec![1.0, 2.0, 3.0], vec![1.0]]).is_err());
         assert!(matches!(friedman(&vec![vec![1.0; 3]; 5]), Err(StatisticsError::NoSpread { .. })));
+    }
+
+    #[test]
+    fn six_values_are_needed() {
+        let six = [3.0, 1.0, 6.0, 2.0, 5.0, 4.0];
+        assert_eq!(median_interval(&six, 0.95), Ok(ConfidenceInterval { low: 1.0, high: 6.0 }));
+        let few = Err(StatisticsError::TooFew { what: "values", least: 6, found: 5 });
+        assert_eq!(median_interval(&six[..5], 0.95), few);
+        assert!(median_interval(&[], 0.95).is_err() && median_interval(&[f64::NAN; 9], 0.95).is_err());
+        assert_eq!(median_interval(&[2.0; 9], 0.95), Ok(ConfidenceInterval { low: 2.0, high: 2.0 }));
     }
 }

@@ -1,6 +1,7 @@
 //! One film: the faceless avatar alone before a plain backdrop, with the sound of its clip, and in an attention check a
 //! number. Every film of a study has the same size, rate and length; its mouth does not move.
 
+use crate::plan::{FilmContent, FilmSound};
 use anyhow::{Result, ensure};
 use orator_avatar::animate::Performance;
 use orator_avatar::animate::export::film_avatar::{AvatarStage, AvatarView, FilmCamera};
@@ -14,6 +15,8 @@ use std::path::Path;
 pub const SIZE: [usize; 2] = [800, 600];
 /// Where all films of a study are seen from.
 pub const CAMERA: FilmCamera = FilmCamera::Front;
+/// What the keys of names are made for.
+const NAMES: &str = "orator study 2026 names of films";
 /// Raised where the same content gives other bytes.
 const VERSION: u32 = 1;
 /// Constant rate factor. Equal quality, not an equal bit rate: at an equal rate lively motion would look worse.
@@ -30,6 +33,24 @@ pub struct FilmScene<'a> {
     pub sound: Option<&'a Sound>,
     /// Number that is shown in the middle third.
     pub number: Option<u16>,
+}
+
+/// Name of the film of that content in the study of that seed: 16 hexadecimal digits of a keyed hash, which tell nothing.
+pub fn film_name(seed: u64, content: &FilmContent) -> String {
+    let key = blake3::derive_key(NAMES, &seed.to_le_bytes());
+    let FilmContent { clip, speaker, condition, motion_of, number, sound } = content;
+    let number = number.map_or(String::new(), |number| number.to_string());
+    let sound = match sound {
+        FilmSound::Speech => "speech",
+        FilmSound::Silence => "silence",
+        FilmSound::Tones => "tones",
+    };
+    let mut hasher = blake3::Hasher::new_keyed(&key);
+    for part in [clip.as_str(), speaker, condition, motion_of, &number, sound] {
+        // The length keeps neighbouring parts apart.
+        hasher.update(&(part.len() as u64).to_le_bytes()).update(part.as_bytes());
+    }
+    hasher.finalize().to_hex().as_str()[..16].to_owned()
 }
 
 /// That films can be written which browsers play.

@@ -5,8 +5,5 @@ pub mod alike;
 pub mod condition_motion;
 pub mod cut;
 pub mod film;
-pub mod film_name;
-pub mod film_size;
 pub mod filmed;
 pub mod speaker_source;
-pub mod tones;

@@ -1,7 +1,7 @@
 //! Answers: each trial has one, in the order of the session, and it stays as it was given.
 
 use super::participants::{Participant, Status, find};
-use crate::response::Response;
+use crate::vote::Response;
 use rusqlite::{Connection, OptionalExtension, Row, params};
 use serde::{Deserialize, Serialize};
 

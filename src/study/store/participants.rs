@@ -151,14 +151,14 @@ impl Quota {
 
 /// Who begins.
 #[derive(Clone, Debug)]
-pub struct Newcomer {
+pub struct NewParticipant {
     pub id: String,
     pub language: String,
     pub parameters: BTreeMap<String, String>,
     pub code: String,
 }
 
-impl Newcomer {
+impl NewParticipant {
     /// Whether the recruiting site gives the same person along.
     fn is(&self, participant: &Participant) -> bool {
         PERSON.iter().any(|name| {
@@ -173,7 +173,12 @@ impl Newcomer {
 ///
 /// # Errors
 /// A database that fails.
-pub fn begin(db: &Connection, newcomer: &Newcomer, quota: Quota, now_ms: i64) -> rusqlite::Result<Option<Participant>> {
+pub fn begin(
+    db: &Connection,
+    newcomer: &NewParticipant,
+    quota: Quota,
+    now_ms: i64,
+) -> rusqlite::Result<Option<Participant>> {
     let all = all(db)?;
     if let Some(known) = all.iter().find(|participant| newcomer.is(participant)) {
         return Ok(Some(known.clone()));

@@ -190,9 +190,8 @@ fn registered_hypotheses_are_judged_and_marked() {
 }
 
 #[test]
-fn a_pilot_says_how_much_participants_and_clips_differ() {
-    let project = Project::with_clips("study-pilot", 0, 1.0);
-    std::fs::write(project.dir().join("pilot.csv"), votes_of_all_designs(40, 3)).unwrap();
+fn participants_are_planned_by_standard_deviations() {
+    let project = Project::with_clips("study-plan", 0, 1.0);
     let study = r#"
 title = "Planned"
 participants = 20
@@ -218,20 +217,12 @@ trials = 10
     std::fs::write(project.dir().join("study.toml"), study).unwrap();
     let plan =
         ["study", "plan", "study.toml", "--clips", "30", "--simulations", "100", "--power", "0.8", "--effect", "60"];
-    let answer = project.answer(&[&plan[..], &["--pilot", "pilot.csv"]].concat());
+    let answer = project.answer(&[&plan[..], &["--participant-sd", "0.5", "--clip-sd", "0.2"]].concat());
     assert_eq!(answer.code, 0, "{}", answer.errors);
-    let (pilot, question) = (&answer.json["pilot"], &answer.json["plan"]["question"]);
-    assert_eq!((&pilot["n_participants"], &pilot["n_clips"]), (&40.into(), &30.into()));
-    near(&pilot["share"], 0.34, 0.06);
-    for factor in ["sd_participants", "sd_clips"] {
-        assert_eq!(question[factor], pilot[factor]);
-    }
+    let question = &answer.json["plan"]["question"];
+    assert_eq!((&question["sd_participants"], &question["sd_clips"]), (&0.5.into(), &0.2.into()));
     let wanted = answer.json["plan"]["difference"]["n_participants"].as_u64().unwrap();
     assert!((10..80).contains(&wanted), "{wanted}");
-    let elsewhere = counted_votes(&[("other", "turing", "s", 60, 200)]);
-    std::fs::write(project.dir().join("other.csv"), elsewhere).unwrap();
-    let answer = project.answer(&[&plan[..], &["--pilot", "other.csv"]].concat());
-    assert!(answer.code == 1 && answer.errors.contains("no vote of the task pick; its tasks are other"));
 }
 
 #[test]

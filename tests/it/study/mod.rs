@@ -2,7 +2,6 @@
 
 mod analyse;
 mod build;
-mod bundle;
 mod coverage;
 mod films;
 mod pages;

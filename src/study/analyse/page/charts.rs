@@ -5,6 +5,7 @@ use crate::analyse::result::{PairAnalysis, ShareAnalysis, ShareMeasure, StudyAna
 use crate::analyse::verdict::scope;
 use crate::analyse::words::bare_p;
 use crate::plan::TaskDesign;
+use crate::stats::estimate::ConfidenceInterval;
 use orator_report::html::chart::forest::{ForestRow, ForestScale, forest};
 use orator_report::html::{Node, legend, node, table};
 
@@ -48,16 +49,20 @@ fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
     [low - room, high + room]
 }
 
+/// Ends of an interval, each times `factor`.
+fn scaled(interval: Option<ConfidenceInterval>, factor: f64) -> Option<[f64; 2]> {
+    interval.map(|ends| [factor * ends.low, factor * ends.high])
+}
+
 fn shares(task: &TaskAnalysis, analysis: &StudyAnalysis) -> Vec<Node> {
     let percent = |share: f64| 100.0 * share;
     let row = |share: &ShareAnalysis, class: &'static str, more: &str, method: FigureMethod| {
-        let interval = share.figures.interval(method);
-        let p = share.figures.test(method).map(|test| format!(", p {}", equal(test.adjusted_p.unwrap_or(test.p))));
+        let p = share.figures.test(method).map(|test| format!(", p {}", equal(test.final_p())));
         ForestRow {
             name: format!("{}{more}", scope(share)),
             class,
             value: percent(share.share),
-            interval: interval.map(|interval| [percent(interval.low), percent(interval.high)]),
+            interval: scaled(share.figures.interval(method), 100.0),
             said: format!("{:.1} %{}", percent(share.share), p.unwrap_or_default()),
         }
     };
@@ -111,7 +116,7 @@ fn scores(task: &TaskAnalysis) -> Vec<Node> {
             name: row.condition.clone(),
             class: "own",
             value: row.mean,
-            interval: row.figures.interval(FigureMethod::Crossed).map(|interval| [interval.low, interval.high]),
+            interval: scaled(row.figures.interval(FigureMethod::Crossed), 1.0),
             said: match row.figures.interval(FigureMethod::Median) {
                 Some(interval) => format!("median {} [{}, {}]", row.median, interval.low, interval.high),
                 None => format!("median {}", row.median),
@@ -127,16 +132,12 @@ fn scores(task: &TaskAnalysis) -> Vec<Node> {
 fn pairs(task: &TaskAnalysis) -> Vec<Node> {
     let factor = if task.design == TaskDesign::TuringSingle { 100.0 } else { 1.0 };
     let row = |pair: &PairAnalysis| {
-        let test = pair.figures.test(FigureMethod::Crossed);
-        let p = test.map(|test| format!(", p {}", equal(test.adjusted_p.unwrap_or(test.p))));
+        let p = pair.figures.crossed_p().map(|p| format!(", p {}", equal(p)));
         ForestRow {
             name: format!("{} \u{2212} {}", pair.first, pair.second),
             class: "own",
             value: factor * pair.difference,
-            interval: pair
-                .figures
-                .interval(FigureMethod::Crossed)
-                .map(|interval| [factor * interval.low, factor * interval.high]),
+            interval: scaled(pair.figures.interval(FigureMethod::Crossed), factor),
             said: format!("{:+.2}{}", factor * pair.difference, p.unwrap_or_default()),
         }
     };
@@ -185,7 +186,7 @@ fn strengths(task: &TaskAnalysis) -> Vec<Node> {
             name: row.condition.clone(),
             class: "own",
             value: row.log_strength,
-            interval: row.interval.as_ref().map(|interval| [interval.low, interval.high]),
+            interval: scaled(row.interval.as_ref().map(|interval| interval.ends), 1.0),
             said: format!("{:+.2}, Elo {:.0}", row.log_strength, row.elo),
         })
         .collect();

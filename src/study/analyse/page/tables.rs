@@ -1,10 +1,10 @@
 //! Every figure of a task in a table with its mark, and the account of exclusions.
 
-use crate::analyse::figure::{FigureMethod, FigureOrigin, TestFigure};
-use crate::analyse::figures::FigureSet;
+use crate::analyse::figure::{FigureOrigin, FigureRow, FigureSet, TestFigure};
 use crate::analyse::result::{ShareAnalysis, ShareMeasure, StudyAnalysis, TaskAnalysis};
 use crate::analyse::verdict::scope;
 use crate::analyse::words::{bare_p, count, percent};
+use crate::stats::estimate::ConfidenceInterval;
 use orator_report::html::{Node, node, table};
 
 /// Columns of the table of figures.
@@ -96,22 +96,9 @@ fn group(title: &str) -> Node {
 
 /// Rows of a set: a method's interval and test together, then equivalence.
 fn figure_rows(set: &FigureSet, factor: f64, unit: &str) -> Vec<Node> {
-    let mut methods: Vec<FigureMethod> = Vec::new();
-    let intervals = set.intervals.iter().map(|interval| interval.origin.method);
-    for method in intervals.chain(set.tests.iter().map(|test| test.origin.method)) {
-        if !methods.contains(&method) {
-            methods.push(method);
-        }
-    }
-    let ends = |low: f64, high: f64| format!("{:.2} to {:.2}{unit}", factor * low, factor * high);
-    let mut rows: Vec<Node> = methods
-        .into_iter()
-        .filter_map(|method| {
-            let (interval, test) = (set.interval(method), set.test(method));
-            let origin = interval.map(|interval| interval.origin).or(test.map(|test| test.origin))?;
-            Some(figure_row(origin, interval.map(|interval| ends(interval.low, interval.high)), test, None))
-        })
-        .collect();
+    let ends = |ends: ConfidenceInterval| format!("{:.2} to {:.2}{unit}", factor * ends.low, factor * ends.high);
+    let row = |FigureRow { origin, interval, test }| figure_row(origin, interval.map(ends), test, None);
+    let mut rows: Vec<Node> = set.rows().map(row).collect();
     rows.extend(set.equivalence.iter().map(|test| {
         let shown = TestFigure { origin: test.origin, ..TestFigure::new(test.origin.method, test.p) };
         let outcome = if test.passes { "shown" } else { "not shown" };
@@ -120,7 +107,7 @@ fn figure_rows(set: &FigureSet, factor: f64, unit: &str) -> Vec<Node> {
             100.0 * test.bound,
             test.origin.method.name()
         );
-        let interval = format!("90 %: {}", ends(test.low, test.high));
+        let interval = format!("90 %: {}", ends(test.ends));
         figure_row(test.origin, Some(interval), Some(&shown), Some(name))
     }));
     rows

@@ -1,33 +1,18 @@
 //! Columns of a table of votes, and what they are called in the file at hand.
 
+use crate::vote::VOTE_COLUMNS;
 use anyhow::{Result, bail, ensure};
 use std::collections::BTreeMap;
 
-/// Everything that a column can mean. Those of an exported study come first, in its order; `condition`, `correct` and
-/// `score` are the short forms of tables by others.
-pub const FIELDS: [&str; 19] = [
-    "participant",
-    "task",
-    "design",
-    "phase",
-    "trial",
-    "clip",
-    "speaker",
-    "conditions",
-    "response",
-    "expected",
-    "stalled_secs",
-    "unfocused_secs",
-    "response_secs",
-    "plays",
-    "completed",
-    "condition",
-    "correct",
-    "score",
-    "step",
-];
+/// Short forms of tables by others: one condition, whether the answer was right, one score, a step of preference.
+const SHORT_FORMS: [&str; 4] = ["condition", "correct", "score", "step"];
 
-/// Names of columns that differ from those of [`FIELDS`], by field.
+/// Everything that a column can mean.
+pub fn fields() -> impl Iterator<Item = &'static str> {
+    VOTE_COLUMNS.into_iter().chain(SHORT_FORMS)
+}
+
+/// Names of columns that differ from those of the fields, by field.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ColumnNames(BTreeMap<&'static str, String>);
 
@@ -39,8 +24,11 @@ impl ColumnNames {
             let Some((field, name)) = pair.split_once('=').map(|(field, name)| (field.trim(), name.trim())) else {
                 bail!("--columns: \"{pair}\" is no pair; expected like participant=worker,clip=stimulus")
             };
-            let Some(known) = FIELDS.into_iter().find(|known| *known == field) else {
-                bail!("--columns: there is no field \"{field}\"; fields are {}", FIELDS.join(", "))
+            let Some(known) = fields().find(|known| *known == field) else {
+                bail!(
+                    "--columns: there is no field \"{field}\"; fields are {}",
+                    fields().collect::<Vec<_>>().join(", ")
+                )
             };
             ensure!(!name.is_empty(), "--columns: {field} has no name behind the sign =");
             ensure!(names.insert(known, name.to_owned()).is_none(), "--columns: {field} is named twice");
@@ -57,7 +45,7 @@ impl ColumnNames {
     pub fn places(&self, header: &[String]) -> Result<BTreeMap<&'static str, usize>> {
         let is = |name: &str, cell: &String| cell.trim().to_lowercase() == name.to_lowercase();
         let mut places = BTreeMap::new();
-        for field in FIELDS {
+        for field in fields() {
             let name = self.of(field);
             let mut found = (0..header.len()).filter(|place| is(name, &header[*place]));
             match (found.next(), found.next()) {

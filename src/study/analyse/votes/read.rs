@@ -1,12 +1,11 @@
 //! File of votes: CSV or JSON Lines, of this program or of another. A row that cannot be used is kept with its line and
 //! the reason.
 
-use super::columns::{ColumnNames, FIELDS};
+use super::columns::ColumnNames;
 use super::row::{check, vote};
-use super::{delimited, json_lines};
+use super::rows::{delimited_rows, json_rows};
 use crate::plan::TaskDesign;
-use crate::response::Response;
-use crate::vote::StudyVote;
+use crate::vote::{Response, StudyVote, VOTE_COLUMNS};
 use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -61,7 +60,7 @@ impl VotesRead {
     }
 
     fn of_bytes(bytes: &[u8], is_json: bool, names: &ColumnNames, design: Option<TaskDesign>) -> Result<Self> {
-        let rows = if is_json { json_lines::rows(bytes, names)? } else { delimited::rows(bytes, names)? };
+        let rows = if is_json { json_rows(bytes, names)? } else { delimited_rows(bytes, names)? };
         let (mut read, mut seen) = (Self::default(), BTreeSet::new());
         let mut pages = SliderPages::default();
         let mut present: BTreeSet<&str> = BTreeSet::new();
@@ -92,7 +91,7 @@ impl VotesRead {
             bail!("none of {n_rows} rows is a vote{why}");
         }
         number_trials(&mut read.votes);
-        read.absent = FIELDS[..15].iter().copied().filter(|field| !present.contains(field)).collect();
+        read.absent = VOTE_COLUMNS.into_iter().filter(|field| !present.contains(field)).collect();
         Ok(read)
     }
 }
@@ -141,8 +140,7 @@ fn number_trials(votes: &mut [StudyVote]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plan::TrialPhase;
-    use crate::response::ScreenSide;
+    use crate::vote::ScreenSide;
 
     fn read(text: &str) -> Result<VotesRead> {
         VotesRead::of_bytes(text.as_bytes(), false, &ColumnNames::default(), None)
@@ -177,27 +175,11 @@ mod tests {
 
     #[test]
     fn exported_votes_come_back_from_both_formats() {
-        let vote = StudyVote {
-            participant: "p".to_owned(),
-            task: "t".to_owned(),
-            design: TaskDesign::Sliders,
-            phase: TrialPhase::Main,
-            trial: 3,
-            clip: "ellen/4".to_owned(),
-            speaker: "ellen".to_owned(),
-            conditions: vec!["N".to_owned(), "M".to_owned()],
-            response: Response::Scores(vec![60, 0]),
-            expected: None,
-            stalled_secs: 0.5,
-            unfocused_secs: 0.0,
-            response_secs: 4.25,
-            plays: 2,
-            completed: true,
-        };
+        let vote = StudyVote::example(TaskDesign::Sliders, &["N", "M"], Response::Scores(vec![60, 0]));
         let line = serde_json::to_string(&vote).unwrap();
         let json = VotesRead::of_bytes(line.as_bytes(), true, &ColumnNames::default(), None).unwrap();
         assert_eq!(json.votes, std::slice::from_ref(&vote));
-        let head = FIELDS[..15].join(",");
+        let head = VOTE_COLUMNS.join(",");
         for response in ["\"{\"\"scores\"\":[60,0]}\"", "60|0"] {
             let row = format!("p,t,sliders,main,3,ellen/4,ellen,N|M,{response},,0.5,0,4.25,2,true");
             assert_eq!(read(&format!("{head}\n{row}\n")).unwrap().votes, std::slice::from_ref(&vote), "{response}");

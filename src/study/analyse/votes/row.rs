@@ -1,8 +1,7 @@
 //! Row of a table to a vote.
 
 use crate::plan::{TaskDesign, TrialPhase};
-use crate::response::{Response, ScreenSide};
-use crate::vote::StudyVote;
+use crate::vote::{Response, ScreenSide, StudyVote};
 use serde::Deserialize;
 use serde::de::IntoDeserializer as _;
 use std::collections::BTreeMap;
@@ -165,27 +164,26 @@ fn response(field: &str, cell: &str, design: TaskDesign, phase: TrialPhase) -> R
     {
         return Ok(Response::Number(number));
     }
-    let read = match design {
-        TaskDesign::Turing | TaskDesign::Mismatch => match cell.to_lowercase().as_str() {
-            "left" => Some(Response::Side(ScreenSide::Left)),
-            "right" => Some(Response::Side(ScreenSide::Right)),
-            _ => None,
-        },
-        TaskDesign::TuringSingle => match cell.to_lowercase().as_str() {
-            "real" => Some(Response::Real(true)),
-            "generated" => Some(Response::Real(false)),
-            other => truth(other).map(Response::Real),
-        },
-        TaskDesign::Preference => cell.parse().ok().map(Response::Step),
-        TaskDesign::Sliders => {
-            cell.split('|').map(|score| score.trim().parse().ok()).collect::<Option<_>>().map(Response::Scores)
+    let word = cell.to_lowercase();
+    let (read, words) = match design {
+        TaskDesign::Turing | TaskDesign::Mismatch => {
+            let side = match word.as_str() {
+                "left" => Some(ScreenSide::Left),
+                "right" => Some(ScreenSide::Right),
+                _ => None,
+            };
+            (side.map(Response::Side), "left or right")
         }
-    };
-    let words = match design {
-        TaskDesign::Turing | TaskDesign::Mismatch => "left or right",
-        TaskDesign::TuringSingle => "real or generated",
-        TaskDesign::Preference => "a step from -2 to 2",
-        TaskDesign::Sliders => "scores from 0 to 100 like 70|20",
+        TaskDesign::TuringSingle => {
+            let named = [("real", true), ("generated", false)].into_iter().find(|(name, _)| *name == word);
+            let is_real = named.map(|(_, is_real)| is_real).or_else(|| truth(&word));
+            (is_real.map(Response::Real), "real or generated")
+        }
+        TaskDesign::Preference => (cell.parse().ok().map(Response::Step), "a step from -2 to 2"),
+        TaskDesign::Sliders => {
+            let scores = cell.split('|').map(|score| score.trim().parse().ok()).collect::<Option<_>>();
+            (scores.map(Response::Scores), "scores from 0 to 100 like 70|20")
+        }
     };
     read.ok_or_else(|| expected(field, cell, words))
 }

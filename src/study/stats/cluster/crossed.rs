@@ -2,8 +2,7 @@
 //! with Satterthwaite's degrees of freedom. Assumes that participants and clips are each a sample, drawn independently,
 //! and that votes which share neither are independent. Two of both are needed, some 20 for the t distribution to hold.
 
-use super::super::error::{StatisticsError, at_least};
-use super::super::estimate::StudentEstimate;
+use super::super::estimate::{StatisticsError, StudentEstimate, at_least};
 use super::votes::{CLIP, ClipVote, PAIR, PARTICIPANT, VoteGroups, scores};
 use std::ops::Range;
 

@@ -14,13 +14,11 @@ struct Observation {
     few: usize,
 }
 
-/// Likelihood as a function of linear predictor and standard deviations. Keeps the random intercepts of its last call,
+/// Likelihood as a function of the fixed intercept and the standard deviations. Keeps the random intercepts of its last call,
 /// from which the next one starts.
 pub(super) struct Laplace {
     /// Sorted by `many`.
     observations: Vec<Observation>,
-    /// Place of each vote before sorting.
-    order: Vec<usize>,
     n_many: usize,
     n_few: usize,
     clips_are_many: bool,
@@ -48,7 +46,6 @@ impl Laplace {
         let (n_many, n_few) = (groups.n[many], groups.n[few]);
         Self {
             observations: order.iter().map(observation).collect(),
-            order,
             n_many,
             n_few,
             clips_are_many,
@@ -56,24 +53,23 @@ impl Laplace {
         }
     }
 
-    /// Negative log-likelihood for the fixed part `linear` of each vote's log odds and the standard deviations of
-    /// participants and clips. Even in both deviations.
-    pub fn negative_log_likelihood(&mut self, linear: &[f64], [participants, clips]: [f64; 2]) -> f64 {
+    /// Negative log-likelihood for the fixed part `fixed` of all log odds and the standard deviations of participants and
+    /// clips. Even in both deviations.
+    pub fn negative_log_likelihood(&mut self, fixed: f64, [participants, clips]: [f64; 2]) -> f64 {
         let sds = if self.clips_are_many { [clips, participants] } else { [participants, clips] };
-        let linear: Vec<f64> = self.order.iter().map(|vote| linear[*vote]).collect();
-        let mut value = self.penalised(&self.intercepts, &linear, sds);
+        let mut value = self.penalised(&self.intercepts, fixed, sds);
         if !value.is_finite() {
             self.intercepts.fill(0.0);
-            value = self.penalised(&self.intercepts, &linear, sds);
+            value = self.penalised(&self.intercepts, fixed, sds);
         }
         for _ in 0..MOST {
-            let (gradient, curvature) = self.derivatives(&linear, sds);
+            let (gradient, curvature) = self.derivatives(fixed, sds);
             let step = self.solve(&curvature, gradient);
             let size = step.iter().fold(0.0f64, |most, v| most.max(v.abs()));
             let mut share = 1.0;
             let (next, next_value) = loop {
                 let next: Vec<f64> = self.intercepts.iter().zip(&step).map(|(u, v)| u - share * v).collect();
-                let next_value = self.penalised(&next, &linear, sds);
+                let next_value = self.penalised(&next, fixed, sds);
                 if next_value <= value + 1e-9 || share < 1e-6 {
                     break (next, next_value);
                 }
@@ -84,39 +80,33 @@ impl Laplace {
                 break;
             }
         }
-        let (_, curvature) = self.derivatives(&linear, sds);
+        let (_, curvature) = self.derivatives(fixed, sds);
         let n = self.n_few;
         let determinant = curvature.diagonal.iter().map(|v| 0.5 * v.ln()).sum::<f64>()
             + (0..n).map(|k| curvature.lower[k * n + k].ln()).sum::<f64>();
         value + determinant
     }
 
-    fn log_odds(&self, k: usize, linear: &[f64], intercepts: &[f64], sds: [f64; 2]) -> f64 {
-        let Observation { many, few, .. } = self.observations[k];
-        linear[k] + sds[0] * intercepts[many] + sds[1] * intercepts[self.n_many + few]
-    }
-
-    fn penalised(&self, intercepts: &[f64], linear: &[f64], sds: [f64; 2]) -> f64 {
-        let of_vote = |(k, observation): (usize, &Observation)| {
-            let eta = self.log_odds(k, linear, intercepts, sds);
-            eta.max(0.0) + (-eta.abs()).exp().ln_1p() - observation.success * eta
+    fn penalised(&self, intercepts: &[f64], fixed: f64, sds: [f64; 2]) -> f64 {
+        let of_vote = |&Observation { success, many, few }: &Observation| {
+            let eta = fixed + sds[0] * intercepts[many] + sds[1] * intercepts[self.n_many + few];
+            eta.max(0.0) + (-eta.abs()).exp().ln_1p() - success * eta
         };
-        self.observations.iter().enumerate().map(of_vote).sum::<f64>()
-            + 0.5 * intercepts.iter().map(|u| u * u).sum::<f64>()
+        self.observations.iter().map(of_vote).sum::<f64>() + 0.5 * intercepts.iter().map(|u| u * u).sum::<f64>()
     }
 
-    fn derivatives(&self, linear: &[f64], sds: [f64; 2]) -> (Vec<f64>, Curvature) {
+    fn derivatives(&self, fixed: f64, sds: [f64; 2]) -> (Vec<f64>, Curvature) {
         let n = self.n_few;
         let mut gradient = self.intercepts.clone();
         let mut diagonal = vec![1.0; self.n_many];
         let mut lower = vec![0.0; n * n];
         (0..n).for_each(|k| lower[k * n + k] = 1.0);
         let mut between = Vec::with_capacity(self.observations.len());
-        for (k, observation) in self.observations.iter().enumerate() {
-            let share = 1.0 / (1.0 + (-self.log_odds(k, linear, &self.intercepts, sds)).exp());
+        for &Observation { success, many, few } in &self.observations {
+            let eta = fixed + sds[0] * self.intercepts[many] + sds[1] * self.intercepts[self.n_many + few];
+            let share = 1.0 / (1.0 + (-eta).exp());
             let weight = share * (1.0 - share);
-            let residual = share - observation.success;
-            let (many, few) = (observation.many, observation.few);
+            let residual = share - success;
             gradient[many] += sds[0] * residual;
             gradient[self.n_many + few] += sds[1] * residual;
             diagonal[many] += sds[0] * sds[0] * weight;

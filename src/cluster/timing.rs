@@ -1,16 +1,14 @@
 //! Takes the time of every stage on this machine: excerpts from all over the videos are worked on as videos are, as many
 //! side by side.
 
-use super::menu;
-use super::process_memory::MemoryWatch;
-use super::stage_times::{Alternative, StageCost, StageTimes};
+use super::stage_times::{StageCost, StageTimes};
 use crate::plan::{PlannedUnit, settings_hash};
 use anyhow::{Context, Result, ensure};
+use nix::sys::resource::{UsageWho, getrusage};
 use orator_base::stage::artifacts::{Artifact, StageName};
 use orator_base::stage::fingerprint::hash_file;
-use orator_base::stage::progress::{Progress, Silent, Task};
+use orator_base::stage::progress::{Progress, Silent};
 use orator_base::stage::{Unit, workdir};
-use orator_dataset::config::Config;
 use orator_formats::media_json::MediaInfo;
 use orator_pipeline::process::message::{ExcerptRequest, MediaRequest};
 use orator_pipeline::timing::StageTime;
@@ -108,104 +106,67 @@ pub fn measure(
 ) -> Result<StageTimes> {
     let made_with = made_with(pipeline, program, jobs)?;
     let folder = pipeline.config().settings.work.dir.join(FOLDER);
-    let timed = Timing { pipeline, units, jobs, folder: &folder }.measure(progress);
+    let timed = measured(pipeline, units, jobs, &folder, progress);
     let removed = std::fs::remove_dir_all(&folder);
     let times = timed?;
     removed.with_context(|| format!("cannot remove {}", folder.display()))?;
     Ok(StageTimes { made_with, processor: processor(), jobs, ..times })
 }
 
-struct Timing<'a> {
-    pipeline: &'a Pipeline,
-    units: &'a [PlannedUnit],
+/// Times the stages on excerpts in `folder`.
+fn measured(
+    pipeline: &Pipeline,
+    units: &[PlannedUnit],
     jobs: usize,
-    folder: &'a Path,
+    folder: &Path,
+    progress: &dyn Progress,
+) -> Result<StageTimes> {
+    let _ = std::fs::remove_dir_all(folder);
+    std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    let lengths: Vec<f64> = units.iter().map(|unit| unit.secs.unwrap_or(0.0)).collect();
+    let (mut files, mut secs) = (Vec::new(), BTreeMap::new());
+    for (number, excerpt) in excerpts(&lengths).iter().enumerate() {
+        let unit = &units[excerpt.unit];
+        let to = folder.join(format!("{number:02}.mkv"));
+        let wanted = ExcerptRequest { start_secs: excerpt.start_secs, secs: excerpt.secs, to: to.clone() };
+        let request = MediaRequest { source: unit.source.clone(), excerpt: Some(wanted) };
+        // A video that cannot be read is told of when it is worked on.
+        if let Ok(Some(copied)) = pipeline.ask_media(&request) {
+            secs.insert(to.clone(), copied);
+            files.push((unit.speaker.clone(), to));
+        }
+    }
+    ensure!(!files.is_empty(), "of no video an excerpt can be copied: no time is taken");
+    let work = folder.join("work");
+    let task = progress.begin("timing the stages", 1);
+    let selection = Selection { to: StageName::Dataset, jobs: Some(jobs), force: true, ..Selection::default() };
+    let times = pipeline.on_excerpts(&files, &work).run(&selection, &Silent)?.times;
+    task.advance(1);
+    let peak_mib = peak_mib();
+    let excerpt_secs: f64 = secs.values().sum();
+    let cost = |stage: StageName| {
+        let own = times.iter().filter(|time| time.stage == stage);
+        let length = |time: &StageTime| match stage {
+            StageName::Dataset => excerpt_secs,
+            _ => secs.get(&time.unit.source).copied().unwrap_or(0.0),
+        };
+        let pairs: Vec<(f64, f64)> = own.map(|time| (length(time), time.secs)).collect();
+        let bytes_per_sec = workdir::bytes_under(&work.join(stage.as_str())) as f64 / excerpt_secs;
+        (stage.as_str().to_owned(), StageCost { bytes_per_sec, ..StageCost::fit(&pairs) })
+    };
+    Ok(StageTimes {
+        n_excerpts: files.len(),
+        excerpt_secs,
+        stages: StageName::ALL.map(cost).into(),
+        peak_mib,
+        ..StageTimes::default()
+    })
 }
 
-impl Timing<'_> {
-    fn measure(&self, progress: &dyn Progress) -> Result<StageTimes> {
-        let _ = std::fs::remove_dir_all(self.folder);
-        std::fs::create_dir_all(self.folder)
-            .with_context(|| format!("cannot make the folder {}", self.folder.display()))?;
-        let lengths: Vec<f64> = self.units.iter().map(|unit| unit.secs.unwrap_or(0.0)).collect();
-        let (mut files, mut secs) = (Vec::new(), BTreeMap::new());
-        for (number, excerpt) in excerpts(&lengths).iter().enumerate() {
-            let unit = &self.units[excerpt.unit];
-            let to = self.folder.join(format!("{number:02}.mkv"));
-            let wanted = ExcerptRequest { start_secs: excerpt.start_secs, secs: excerpt.secs, to: to.clone() };
-            let request = MediaRequest { source: unit.source.clone(), excerpt: Some(wanted) };
-            // A video that cannot be read is told of when it is worked on.
-            if let Ok(Some(copied)) = self.pipeline.ask_media(&request) {
-                secs.insert(to.clone(), copied);
-                files.push((unit.speaker.clone(), to));
-            }
-        }
-        ensure!(!files.is_empty(), "of no video an excerpt can be copied: no time is taken");
-        let memory = MemoryWatch::begin();
-        let work = self.folder.join("work");
-        let sets = menu::changes(self.pipeline.config())?;
-        let task = progress.begin("timing the stages", sets.len() as u64 + 2);
-        let times = self.run(self.pipeline, &files, &work, StageName::Dataset)?;
-        task.advance(1);
-        let peak_mib = memory.end();
-        let excerpt_secs: f64 = secs.values().sum();
-        let cost = |stage: StageName| {
-            let own = times.iter().filter(|time| time.stage == stage);
-            let length = |time: &StageTime| match stage {
-                StageName::Dataset => excerpt_secs,
-                _ => secs.get(&time.unit.source).copied().unwrap_or(0.0),
-            };
-            let pairs: Vec<(f64, f64)> = own.map(|time| (length(time), time.secs)).collect();
-            let bytes_per_sec = workdir::bytes_under(&work.join(stage.as_str())) as f64 / excerpt_secs;
-            (stage.as_str().to_owned(), StageCost { bytes_per_sec, ..StageCost::fit(&pairs) })
-        };
-        let mut timed = StageTimes {
-            n_excerpts: files.len(),
-            excerpt_secs,
-            stages: StageName::ALL.map(cost).into(),
-            peak_mib,
-            ..StageTimes::default()
-        };
-        timed.menu = self.menu(&files, sets, &*task)?;
-        Ok(timed)
-    }
-
-    /// Times of the stages up to this one on some excerpts.
-    fn run(
-        &self,
-        pipeline: &Pipeline,
-        files: &[(String, PathBuf)],
-        work: &Path,
-        to: StageName,
-    ) -> Result<Vec<StageTime>> {
-        let selection = Selection { to, jobs: Some(self.jobs), force: true, ..Selection::default() };
-        let report = pipeline.on_excerpts(files, work).run(&selection, &Silent)?;
-        Ok(report.times)
-    }
-
-    /// What other settings take for the first excerpts, over what these take.
-    fn menu(
-        &self,
-        files: &[(String, PathBuf)],
-        sets: Vec<(String, Config)>,
-        task: &dyn Task,
-    ) -> Result<Vec<Alternative>> {
-        let some = &files[..files.len().min(self.jobs.max(2))];
-        let secs = |pipeline: &Pipeline, number: usize| -> Result<f64> {
-            let work = self.folder.join(format!("menu-{number}"));
-            let times = self.run(pipeline, some, &work, StageName::Pose2d)?;
-            Ok(times.iter().map(|time| time.secs).sum())
-        };
-        let own = secs(self.pipeline, 0)?;
-        task.advance(1);
-        let mut menu = Vec::new();
-        for (number, (set, config)) in sets.into_iter().enumerate() {
-            let other = secs(&Pipeline::open(config)?.like(self.pipeline), number + 1)?;
-            menu.push(Alternative { set, times: other / own.max(1e-9) });
-            task.advance(1);
-        }
-        Ok(menu)
-    }
+/// Most memory of a process that this one has started and that has ended, MiB; none where there was none.
+fn peak_mib() -> Option<f64> {
+    let usage = getrusage(UsageWho::RUSAGE_CHILDREN).ok()?;
+    Some(usage.max_rss() as f64 / 1024.0).filter(|peak| *peak > 0.0)
 }
 
 /// The processor's name, where the system says it.

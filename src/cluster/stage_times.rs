@@ -1,6 +1,6 @@
-//! How long the stages take on a machine, from times of excerpts, and what that means for whole videos.
+//! How long the stages take on a machine, from times of excerpts, and what that means for whole videos and several workers:
+//! a simulation of the order in which the runner gives out work.
 
-use super::wall::{self, VideoWork};
 use anyhow::Result;
 use orator_base::stage::artifacts::StageName;
 use orator_base::stage::workdir;
@@ -28,8 +28,6 @@ pub struct StageTimes {
     pub stages: BTreeMap<String, StageCost>,
     /// Most memory of a process of a unit, MiB, where it could be seen.
     pub peak_mib: Option<f64>,
-    /// What other settings would take.
-    pub menu: Vec<Alternative>,
 }
 
 /// What a stage takes for a video.
@@ -40,15 +38,6 @@ pub struct StageCost {
     pub secs_per_sec: f64,
     /// Bytes of files for each second of video.
     pub bytes_per_sec: f64,
-}
-
-/// A change of the configuration and its price.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Alternative {
-    /// As `--set` takes it.
-    pub set: String,
-    /// Its time over that of the configuration, all stages of videos.
-    pub times: f64,
 }
 
 impl StageCost {
@@ -116,7 +105,7 @@ impl StageTimes {
 
     /// Seconds until `workers` have worked on videos of these lengths.
     pub fn wall_secs(&self, lengths: &[f64], workers: usize) -> f64 {
-        wall::wall_secs(&self.video_work(lengths), workers)
+        wall_secs(&self.video_work(lengths), workers)
     }
 
     /// The work on videos of these lengths in the order of a run, the longest first.
@@ -153,9 +142,80 @@ impl StageTimes {
     pub fn workers_within(&self, lengths: &[f64], secs: f64) -> Option<usize> {
         let videos = self.video_work(lengths);
         let most: usize = videos.iter().map(|video| video.n_spans.max(1)).sum();
-        let least = (wall::wall_secs(&videos, 1) / secs).floor().max(1.0) as usize;
-        (least..=most).find(|workers| wall::wall_secs(&videos, *workers) <= secs)
+        let least = (wall_secs(&videos, 1) / secs).floor().max(1.0) as usize;
+        (least..=most).find(|workers| wall_secs(&videos, *workers) <= secs)
     }
+}
+
+/// Work on one video, seconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct VideoWork {
+    /// Before the spans that workers share; all of it where there are none.
+    before: f64,
+    /// On each span.
+    span: f64,
+    /// How many of them; 0: workers share nothing of it.
+    n_spans: usize,
+    /// After the last span.
+    after: f64,
+}
+
+/// A video that a worker has begun.
+struct BegunVideo {
+    work: VideoWork,
+    /// When its spans can be taken.
+    since: f64,
+    /// Spans that nobody has taken.
+    n_left: usize,
+    /// When the last one taken is done.
+    ends: f64,
+}
+
+impl BegunVideo {
+    /// A worker that is free at `now` takes a span; when it is done.
+    fn take(&mut self, now: f64) -> f64 {
+        self.n_left -= 1;
+        let done = now + self.work.span;
+        self.ends = self.ends.max(done);
+        done
+    }
+}
+
+/// Seconds until `workers` have worked on all videos. Whoever is free takes the next video and its spans; where no video is
+/// left, spans of others.
+fn wall_secs(videos: &[VideoWork], workers: usize) -> f64 {
+    let n_pieces: usize = videos.iter().map(|video| video.n_spans.max(1)).sum();
+    let mut waiting = videos.iter();
+    let mut begun: Vec<BegunVideo> = Vec::new();
+    // When each worker is free, and the video that it has.
+    let mut crew: Vec<(f64, Option<usize>)> = vec![(0.0, None); workers.clamp(1, n_pieces.max(1))];
+    let mut wall = 0.0f64;
+    while let Some(at) = (0..crew.len()).min_by(|a, b| crew[*a].0.total_cmp(&crew[*b].0)) {
+        let (now, own) = crew[at];
+        if let Some(idx) = own {
+            let video = &mut begun[idx];
+            if video.n_left > 0 {
+                crew[at].0 = video.take(now);
+            } else {
+                let done = video.ends + video.work.after;
+                wall = wall.max(done);
+                crew[at] = (done, None);
+            }
+        } else if let Some(&work) = waiting.next() {
+            let since = now + work.before;
+            begun.push(BegunVideo { work, since, n_left: work.n_spans, ends: since });
+            crew[at] = (since, Some(begun.len() - 1));
+        } else if let Some(video) = begun.iter_mut().find(|video| video.n_left > 0 && video.since <= now) {
+            crew[at].0 = video.take(now);
+        } else if let Some(later) =
+            begun.iter().filter(|video| video.n_left > 0).map(|video| video.since).min_by(f64::total_cmp)
+        {
+            crew[at].0 = later;
+        } else {
+            crew.swap_remove(at);
+        }
+    }
+    wall
 }
 
 #[cfg(test)]
@@ -199,9 +259,35 @@ mod tests {
     fn what_is_kept_is_read_again() {
         let dir = tempfile::tempdir().unwrap();
         assert_eq!(StageTimes::read(dir.path()), None);
-        let mut times = times(0.25, 1.5);
-        times.menu.push(Alternative { set: "pose2d.face=\"\"".into(), times: 0.8 });
+        let times = times(0.25, 1.5);
         times.write(dir.path()).unwrap();
         assert_eq!(StageTimes::read(dir.path()), Some(times));
+    }
+
+    const LONG: VideoWork = VideoWork { before: 10.0, span: 100.0, n_spans: 3, after: 20.0 };
+    const SHORT: VideoWork = VideoWork { before: 40.0, span: 0.0, n_spans: 0, after: 0.0 };
+
+    #[test]
+    fn one_worker_takes_the_sum() {
+        assert_eq!(wall_secs(&[], 1), 0.0);
+        assert_eq!(wall_secs(&[LONG, SHORT, SHORT], 1), 330.0 + 80.0);
+    }
+
+    #[test]
+    fn spans_wait_for_what_is_before_and_the_rest_for_the_last_span() {
+        // 10, then spans 10..110 twice and 110..210, then 20 more.
+        assert_eq!(wall_secs(&[LONG], 2), 230.0);
+        assert_eq!(wall_secs(&[LONG], 3), 130.0);
+        assert_eq!(wall_secs(&[LONG], 99), 130.0);
+    }
+
+    #[test]
+    fn who_has_no_video_helps() {
+        // The second worker has SHORT until 40 and a span until 140; the first spans until 110 and 210.
+        assert_eq!(wall_secs(&[LONG, SHORT], 2), 230.0);
+        // Two short ones until 80, a span until 180.
+        assert_eq!(wall_secs(&[LONG, SHORT, SHORT], 2), 230.0);
+        // Four until 160, and the third span until 260; the first is done with the second at 210.
+        assert_eq!(wall_secs(&[LONG, SHORT, SHORT, SHORT, SHORT], 2), 280.0);
     }
 }

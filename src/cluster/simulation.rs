@@ -1,0 +1,190 @@
+//! A simulation of workers that claim units in a folder that shows what was written late, as a network file system does.
+
+use super::claims::{Claim, ClaimOptions, Claims, NextUnit, UnitEnd};
+use super::heartbeat::{BeatWatch, Heartbeat};
+use super::shared_folder::SharedFolder;
+use anyhow::Result;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::cell::{Cell, RefCell};
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+const DEAD_AFTER: Duration = Duration::from_secs(180);
+
+/// The server's files: each with its versions and their times.
+type Files = BTreeMap<String, Vec<(Duration, Vec<u8>)>>;
+
+/// One machine's view of the server: reads and lists may be as old as `delay`.
+struct DelayedFolder {
+    files: RefCell<Files>,
+    now: Cell<Duration>,
+    delay: Duration,
+    rng: RefCell<ChaCha8Rng>,
+}
+
+impl DelayedFolder {
+    fn seen_at(&self) -> Duration {
+        let late = self.rng.borrow_mut().random_range(0.0..=1.0);
+        self.now.get().saturating_sub(self.delay.mul_f64(late))
+    }
+}
+
+impl SharedFolder for DelayedFolder {
+    fn create(&self, name: &str, bytes: &[u8]) -> Result<bool> {
+        let mut files = self.files.borrow_mut();
+        if let Some(versions) = files.get(name) {
+            return Ok(versions[0].1 == bytes);
+        }
+        files.insert(name.to_owned(), vec![(self.now.get(), bytes.to_vec())]);
+        Ok(true)
+    }
+
+    fn read(&self, name: &str) -> Result<Option<Vec<u8>>> {
+        let at = self.seen_at();
+        let files = self.files.borrow();
+        let version = files.get(name).and_then(|versions| versions.iter().rev().find(|(time, _)| *time <= at));
+        Ok(version.map(|(_, bytes)| bytes.clone()))
+    }
+
+    fn list(&self, folder: &str) -> Result<Vec<String>> {
+        let at = self.seen_at();
+        let files = self.files.borrow();
+        let seen = files.iter().filter(|(_, versions)| versions[0].0 <= at);
+        Ok(seen.filter_map(|(name, _)| Some(name.strip_prefix(folder)?.strip_prefix('/')?.to_owned())).collect())
+    }
+
+    fn replace(&self, name: &str, bytes: &[u8]) -> Result<()> {
+        let version = (self.now.get(), bytes.to_vec());
+        self.files.borrow_mut().entry(name.to_owned()).or_default().push(version);
+        Ok(())
+    }
+}
+
+/// A worker of the simulation.
+struct Simulated<'a> {
+    claims: Claims<'a, DelayedFolder>,
+    name: String,
+    /// Its clock is so far from the server's.
+    clock: Duration,
+    beat: u64,
+    hands: Option<(Claim, Duration)>,
+    is_dead: bool,
+    /// Until then the worker neither works nor beats.
+    paused_until: Duration,
+}
+
+fn folder(delay: Duration, seed: u64) -> DelayedFolder {
+    let rng = RefCell::new(ChaCha8Rng::seed_from_u64(seed));
+    DelayedFolder { files: RefCell::default(), now: Cell::default(), delay, rng }
+}
+
+fn worker(folder: &DelayedFolder, n_units: usize, number: u64, retries: bool) -> Simulated<'_> {
+    let name = format!("w{number}");
+    let watch = BeatWatch::new(DEAD_AFTER, "");
+    // Every fourth unit needs the three before it.
+    let needs = (0..n_units).map(|unit| if unit % 4 == 3 { (unit - 3..unit).collect() } else { Vec::new() });
+    let (needs, order) = (needs.collect(), (0..n_units).collect());
+    Simulated {
+        claims: Claims::new(folder, ClaimOptions { worker: name.clone(), needs, order, retries }, watch),
+        name,
+        clock: Duration::from_secs(97 * number),
+        beat: 0,
+        hands: None,
+        is_dead: false,
+        paused_until: Duration::ZERO,
+    }
+}
+
+/// Eight workers on a folder that shows things up to a minute late, with clocks minutes apart. Some die, some stand still
+/// for longer than the dead are waited for; the dead are replaced. Every unit ends, and two have one unit at a time only
+/// where one of them died or stood still.
+#[test]
+fn every_unit_ends_whoever_dies() {
+    for seed in 0..20 {
+        let (mut rng, n_units) = (ChaCha8Rng::seed_from_u64(seed), 60);
+        let folder = folder(Duration::from_secs(60), seed);
+        let mut workers: Vec<Simulated> = (0..8).map(|number| worker(&folder, n_units, number, false)).collect();
+        let (mut ended, mut n_troubles, mut n_twice) = (BTreeMap::new(), 0, 0);
+        let (mut now, mut n_started) = (Duration::ZERO, 8);
+        while ended.len() < n_units {
+            now += Duration::from_secs(10);
+            assert!(now < Duration::from_secs(200_000), "seed {seed}: {} of {n_units}", ended.len());
+            folder.now.set(now);
+            for at in 0..workers.len() {
+                if workers[at].is_dead || now < workers[at].paused_until {
+                    continue;
+                }
+                match rng.random_range(0..1000) {
+                    0..4 => {
+                        (workers[at].is_dead, n_troubles) = (true, n_troubles + 1);
+                        let next = worker(&folder, n_units, n_started, false);
+                        n_started += 1;
+                        workers.push(next);
+                        continue;
+                    }
+                    4..8 => {
+                        let still = Duration::from_secs(rng.random_range(10..600));
+                        (workers[at].paused_until, n_troubles) = (now + still, n_troubles + 1);
+                        continue;
+                    }
+                    _ => {}
+                }
+                let one = &mut workers[at];
+                one.beat += 1;
+                let heartbeat = Heartbeat { beat: one.beat, ..Heartbeat::default() };
+                folder.replace(&Heartbeat::name(&one.name), &serde_json::to_vec(&heartbeat).unwrap()).unwrap();
+                match one.hands {
+                    Some((claim, until)) if now >= until => {
+                        one.hands = None;
+                        let end = UnitEnd { worker: one.name.clone(), error: None, secs: 1.0 };
+                        one.claims.end(claim, &end).unwrap();
+                        n_twice += usize::from(ended.insert(claim.unit, claim.epoch).is_some());
+                    }
+                    Some(_) => {}
+                    None => {
+                        if let NextUnit::Claimed(claim) = one.claims.next(now + one.clock).unwrap() {
+                            let needs = if claim.unit % 4 == 3 { claim.unit - 3..claim.unit } else { 0..0 };
+                            assert!(needs.into_iter().all(|needed| ended.contains_key(&needed)), "seed {seed}");
+                            one.hands = Some((claim, now + Duration::from_secs(rng.random_range(30..900))));
+                        }
+                    }
+                }
+            }
+        }
+        assert!(n_twice <= n_troubles, "seed {seed}: {n_twice} units done twice, {n_troubles} troubles");
+        assert!(n_troubles > 0);
+    }
+}
+
+#[test]
+fn the_dead_are_waited_for_the_slow_keep_what_they_have_and_the_failed_are_retried_once() {
+    let folder = folder(Duration::ZERO, 1);
+    let [mut a, mut b] = [0, 1].map(|number| worker(&folder, 2, number, false).claims);
+    let secs = Duration::from_secs;
+    let NextUnit::Claimed(first) = a.next(secs(0)).unwrap() else { panic!("nobody has a unit") };
+    let second = Claim { unit: 1 - first.unit, epoch: 1 };
+    assert_eq!(b.next(secs(0)).unwrap(), NextUnit::Claimed(second));
+    let beat = |beat| serde_json::to_vec(&Heartbeat { beat, ..Heartbeat::default() }).unwrap();
+    for at in 1..=30 {
+        // A slow one beats on.
+        folder.replace("workers/w0.json", &beat(at)).unwrap();
+        assert!(matches!(b.next(secs(60 * at)).unwrap(), NextUnit::Wait(_)));
+    }
+    assert!(a.is_mine(first).unwrap());
+    // It waits longer and longer, up to a twelfth of the time after which a worker is dead.
+    assert_eq!(b.next(secs(60 * 30 + 179)).unwrap(), NextUnit::Wait(secs(15)));
+    let stolen = Claim { epoch: 2, ..first };
+    assert_eq!(b.next(secs(60 * 30 + 179 + 15)).unwrap(), NextUnit::Claimed(stolen));
+    assert!(!a.is_mine(first).unwrap() && b.is_mine(stolen).unwrap());
+    let end = |error: Option<&str>| UnitEnd { worker: "w".to_owned(), error: error.map(str::to_owned), secs: 1.0 };
+    assert!(!a.end(first, &end(None)).unwrap(), "it was taken over");
+    assert!(b.end(stolen, &end(Some("no picture"))).unwrap());
+    assert!(b.end(second, &end(None)).unwrap());
+    assert_eq!(a.next(secs(0)).unwrap(), NextUnit::AllEnded);
+    let mut again = worker(&folder, 2, 7, true).claims;
+    let third = Claim { epoch: 3, ..first };
+    assert_eq!(again.next(secs(0)).unwrap(), NextUnit::Claimed(third));
+    assert!(again.end(third, &end(Some("no picture"))).unwrap());
+    assert_eq!(again.next(secs(1)).unwrap(), NextUnit::AllEnded);
+}

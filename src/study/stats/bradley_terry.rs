@@ -1,0 +1,229 @@
+//! Strengths of conditions such that one is preferred to another with log odds of the difference (Bradley and Terry
+//! 1952), by maximum likelihood, and Elo ratings as public arenas rank models (Chiang et al. 2024). A tie counts as half a
+//! win for each, a strength of preference as its share. Strengths are finite only where wins lead from each condition to
+//! each other one (Ford 1957): no prior makes up for votes that are missing.
+
+use super::cluster::sign_flips::rng_of_draw;
+use super::estimate::{ConfidenceInterval, StatisticsError, at_least, within};
+use ndarray::{Array1, Array2, Axis};
+use orator_base::math::cholesky;
+use rand::Rng;
+use rand::seq::SliceRandom;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// Most Newton steps.
+const MOST: usize = 100;
+/// Largest share of draws without finite strengths that an interval may leave out.
+const LEFT_OUT: f64 = 0.05;
+/// Elo: points that a vote moves at most, points that make odds of 10, mean rating, and random orders of votes.
+const ELO_K: f64 = 4.0;
+const ELO_SCALE: f64 = 400.0;
+const ELO_MEAN: f64 = 1000.0;
+const ELO_ORDERS: usize = 100;
+
+/// Vote of one participant between two conditions, by their numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PairedVote {
+    pub participant: usize,
+    pub first: usize,
+    pub second: usize,
+    /// 1 for the first condition, 0 for the second, 0.5 for a tie; strengths of preference lie between.
+    pub share: f64,
+}
+
+/// Refuses votes of a condition with itself, of conditions from `n_conditions` on, and shares outside 0 to 1.
+fn check(votes: &[PairedVote], n_conditions: usize) -> Result<(), StatisticsError> {
+    at_least("conditions", 2, n_conditions)?;
+    at_least("votes", 1, votes.len())?;
+    for vote in votes {
+        within("share of a vote", vote.share, 0.0..=1.0)?;
+        for condition in [vote.first, vote.second] {
+            within("condition", condition as f64, 0.0..=n_conditions as f64 - 1.0)?;
+        }
+        at_least("conditions in a vote", 2, if vote.first == vote.second { 1 } else { 2 })?;
+    }
+    Ok(())
+}
+
+/// Strengths in log odds, of mean 0.
+pub fn strengths(votes: &[PairedVote], n_conditions: usize) -> Result<Vec<f64>, StatisticsError> {
+    check(votes, n_conditions)?;
+    let mut wins = Array2::<f64>::zeros((n_conditions, n_conditions));
+    for vote in votes {
+        wins[[vote.first, vote.second]] += vote.share;
+        wins[[vote.second, vote.first]] += 1.0 - vote.share;
+    }
+    if !is_connected(&wins) {
+        return Err(StatisticsError::Unconnected { what: "conditions" });
+    }
+    let mut strengths = Array1::<f64>::zeros(n_conditions);
+    let mut fit = likelihood(&wins, &strengths);
+    for _ in 0..MOST {
+        let step = cholesky::solve(fit.information.clone(), fit.slope.clone().insert_axis(Axis(1)));
+        let step = step.remove_axis(Axis(1));
+        let mut share = 1.0;
+        let (next, next_fit) = loop {
+            let next = &strengths + &(&step * share);
+            let next_fit = likelihood(&wins, &next);
+            if next_fit.log >= fit.log - 1e-12 * fit.log.abs() || share < 1e-6 {
+                break (next, next_fit);
+            }
+            share *= 0.5;
+        };
+        (strengths, fit) = (next, next_fit);
+        if step.iter().all(|v| v.abs() < 1e-10) {
+            break;
+        }
+    }
+    let mean = strengths.mean().unwrap_or_default();
+    Ok((strengths - mean).to_vec())
+}
+
+/// Percentile interval of each strength by `n_draws` draws of participants with replacement. Draws without finite
+/// strengths are left out; more than 5 % of them are an error. Results do not depend on the number of threads.
+pub fn strength_intervals(
+    votes: &[PairedVote],
+    n_conditions: usize,
+    confidence: f64,
+    n_draws: usize,
+    seed: u64,
+) -> Result<Vec<ConfidenceInterval>, StatisticsError> {
+    at_least("draws", 1, n_draws)?;
+    let mut of_participants: BTreeMap<usize, Vec<PairedVote>> = BTreeMap::new();
+    votes.iter().for_each(|vote| of_participants.entry(vote.participant).or_default().push(*vote));
+    let ballots: Vec<Vec<PairedVote>> = of_participants.into_values().collect();
+    let fit = |draw: u64| {
+        let mut rng = rng_of_draw(seed, draw);
+        let n = ballots.len() as u64;
+        let drawn = (0..n).flat_map(|_| &ballots[rng.random_range(0..n) as usize]).copied();
+        strengths(&drawn.collect::<Vec<_>>(), n_conditions).ok()
+    };
+    let draws: Vec<Vec<f64>> = (0..n_draws as u64).into_par_iter().filter_map(fit).collect();
+    if (draws.len() as f64) < (1.0 - LEFT_OUT) * n_draws as f64 {
+        return Err(StatisticsError::Unconnected { what: "conditions" });
+    }
+    let interval = |k: usize| ConfidenceInterval::of_draws(draws.iter().map(|draw| draw[k]), confidence);
+    (0..n_conditions).map(interval).collect()
+}
+
+/// Elo rating of each condition: after each vote both conditions move by K times what the vote said less what the ratings
+/// predicted. The result depends on the order of votes, so it is the mean over random orders.
+pub fn elo_ratings(votes: &[PairedVote], n_conditions: usize, seed: u64) -> Result<Vec<f64>, StatisticsError> {
+    check(votes, n_conditions)?;
+    let mut votes = votes.to_vec();
+    // Where votes come from another file they may stand in another order.
+    votes.sort_by(|a, b| {
+        let key = |vote: &PairedVote| (vote.participant, vote.first, vote.second);
+        key(a).cmp(&key(b)).then(a.share.total_cmp(&b.share))
+    });
+    let mut rng = rng_of_draw(seed, 0);
+    let mut sums = vec![0.0; n_conditions];
+    for _ in 0..ELO_ORDERS {
+        votes.shuffle(&mut rng);
+        let mut ratings = vec![ELO_MEAN; n_conditions];
+        for vote in &votes {
+            let gap = ratings[vote.second] - ratings[vote.first];
+            let moved = ELO_K * (vote.share - 1.0 / (1.0 + 10f64.powf(gap / ELO_SCALE)));
+            ratings[vote.first] += moved;
+            ratings[vote.second] -= moved;
+        }
+        sums.iter_mut().zip(ratings).for_each(|(sum, rating)| *sum += rating);
+    }
+    Ok(sums.iter().map(|sum| sum / ELO_ORDERS as f64).collect())
+}
+
+/// Log-likelihood, its slope, and the information lifted by 1 / n in all places.
+struct Likelihood {
+    log: f64,
+    slope: Array1<f64>,
+    information: Array2<f64>,
+}
+
+fn likelihood(wins: &Array2<f64>, strengths: &Array1<f64>) -> Likelihood {
+    let n = strengths.len();
+    let mut found =
+        Likelihood { log: 0.0, slope: Array1::zeros(n), information: Array2::from_elem((n, n), 1.0 / n as f64) };
+    for ((i, j), won) in wins.indexed_iter().filter(|((i, j), _)| i != j) {
+        let eta = strengths[i] - strengths[j];
+        let share = 1.0 / (1.0 + (-eta).exp());
+        found.log -= won * ((-eta).max(0.0) + (-eta.abs()).exp().ln_1p());
+        found.slope[i] += won * (1.0 - share);
+        found.slope[j] -= won * (1.0 - share);
+        let weight = won * share * (1.0 - share);
+        for (a, b, sign) in [(i, i, 1.0), (j, j, 1.0), (i, j, -1.0), (j, i, -1.0)] {
+            found.information[[a, b]] += sign * weight;
+        }
+    }
+    found
+}
+
+/// Whether wins lead from each condition to each other one.
+fn is_connected(wins: &Array2<f64>) -> bool {
+    let n = wins.nrows();
+    let mut leads = wins.mapv(|won| won > 0.0);
+    for via in 0..n {
+        for from in 0..n {
+            for to in 0..n {
+                leads[[from, to]] |= leads[[from, via]] && leads[[via, to]];
+            }
+        }
+    }
+    leads.iter().all(|leads| *leads)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::Value;
+
+    /// Votes and the strengths that choix finds (`fixtures/reference/study_bradley_terry.py`).
+    fn sets() -> Vec<(Vec<PairedVote>, Vec<f64>)> {
+        let text = include_str!("../../../fixtures/reference/study_bradley_terry_golden.json");
+        let sets: Vec<Value> = serde_json::from_str(text).unwrap();
+        let vote = |row: &Value| {
+            let at = |k: usize| row[k].as_u64().unwrap() as usize;
+            PairedVote { participant: at(0), first: at(1), second: at(2), share: row[3].as_f64().unwrap() }
+        };
+        let votes = |set: &Value| set["votes"].as_array().unwrap().iter().map(vote).collect();
+        sets.iter().map(|set| (votes(set), serde_json::from_value(set["strengths"].clone()).unwrap())).collect()
+    }
+
+    fn ranked(values: &[f64]) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..values.len()).collect();
+        order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
+        order
+    }
+
+    #[test]
+    fn strengths_are_those_of_choix_and_ratings_rank_alike() {
+        for (votes, expected) in sets() {
+            let n = expected.len();
+            let found = strengths(&votes, n).unwrap();
+            assert!(found.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-5), "{found:?} for {expected:?}");
+            let intervals = strength_intervals(&votes, n, 0.95, 300, 1).unwrap();
+            assert!(intervals.iter().zip(&found).all(|(interval, at)| interval.low < *at && *at < interval.high));
+        }
+        let (votes, expected) = sets().remove(1);
+        let n = expected.len();
+        let ratings = elo_ratings(&votes, n, 7).unwrap();
+        let turned: Vec<PairedVote> = votes.iter().rev().copied().collect();
+        assert_eq!(ratings, elo_ratings(&turned, n, 7).unwrap());
+        assert!((ratings.iter().sum::<f64>() / n as f64 - ELO_MEAN).abs() < 1e-9);
+        assert_eq!(ranked(&ratings), ranked(&expected));
+    }
+
+    #[test]
+    fn votes_without_finite_strengths_are_refused() {
+        let vote = |first, second, share| PairedVote { participant: 0, first, second, share };
+        let fit = |votes: &[PairedVote], n| strengths(votes, n).unwrap_err();
+        assert!(matches!(fit(&[], 2), StatisticsError::TooFew { .. }));
+        assert!(matches!(fit(&[vote(0, 1, 0.5)], 1), StatisticsError::TooFew { .. }));
+        assert!(matches!(fit(&[vote(0, 1, 1.0); 5], 2), StatisticsError::Unconnected { .. }));
+        assert!(matches!(fit(&[vote(0, 1, 0.5)], 3), StatisticsError::Unconnected { .. }));
+        assert!(matches!(fit(&[vote(0, 2, 0.5)], 2), StatisticsError::OutOfRange { .. }));
+        assert!(matches!(fit(&[vote(0, 1, f64::NAN)], 2), StatisticsError::OutOfRange { .. }));
+        assert!(matches!(fit(&[vote(1, 1, 0.5)], 2), StatisticsError::TooFew { .. }));
+        assert!(elo_ratings(&[], 2, 1).is_err());
+    }
+}
