@@ -80,6 +80,9 @@ fn arrays() {
     let joint = |(t, j, k): (usize, usize, usize)| ((t + 7 * j + 3 * k) % 11) as f64 / 20.0;
     npz.add_array("human_joints", &Array3::from_shape_fn((20, 43, 3), joint)).unwrap();
     npz.finish().unwrap();
+    let mut npz = NpzWriter::new_compressed(fs::File::create(at("arrays", "capture-smplx.npz")).unwrap());
+    npz.add_array("poses", &Array2::from_shape_fn((3, 165), |(t, k)| joint((t, k, 0)))).unwrap();
+    npz.finish().unwrap();
     let mut npz = NpzWriter::new_compressed(fs::File::create(at("arrays", "capture-cmu.npz")).unwrap());
     npz.add_array("fps", &Array1::from_elem(1, 60.0)).unwrap();
     npz.add_array("walk", &Array3::from_shape_fn((4, 38, 3), |place| 900.0 * joint(place))).unwrap();

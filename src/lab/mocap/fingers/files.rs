@@ -1,7 +1,8 @@
-//! Finds captured or labelled fingers in files and folders, each kind told apart by what it holds: `.bvh` by joint
-//! names; `.npz` with `human_joints` [T, 43, 3] of TED speakers, without tips; `.txt` of 48 numbers a line, ICVL labels from the middles of bones, or of 42, NYU
-//! labels without knuckles, whose errors are after alignment only (`labels`). Sizes: the middle proximal phalanx 48 mm;
-//! TED wrist to middle knuckle 93.2 mm; NYU the middle finger's last two bones 51.3 mm.
+//! Finds captured or labelled fingers in files and folders: `.bvh` by joint names; `.npz` with SMPL-X `poses` [T, 165]
+//! on an assumed rest hand, or with `human_joints` [T, 43, 3] of TED speakers, without tips; `.txt` of 48 numbers a line,
+//! ICVL labels from the middles of bones, or of 42, NYU labels without knuckles, whose errors are after alignment only
+//! (`labels`). Sizes: the middle proximal phalanx 48 mm; TED wrist to middle knuckle 93.2 mm; NYU the middle finger's
+//! last two bones 51.3 mm.
 
 use super::labels;
 use super::take::{FingerTake, Fingers, Size};
@@ -9,7 +10,7 @@ use anyhow::{Result, bail, ensure};
 use orator_base::types::pose2d::N_HAND;
 use orator_base::types::skeleton::Side;
 use orator_formats::bvh::read::{Bvh, Positions};
-use orator_formats::mocap::{fingers, ted};
+use orator_formats::mocap::{fingers, smplx, ted};
 use orator_formats::npz::Npz;
 use orator_formats::search;
 use std::path::{Path, PathBuf};
@@ -51,6 +52,7 @@ fn read_set(path: &Path) -> Result<FingerSet> {
 pub fn read(path: &Path) -> Result<Vec<FingerTake>> {
     match path.extension().and_then(|e| e.to_str()) {
         Some("bvh") => of_bvh(path),
+        Some("npz") if smplx::is_smplx(path)? => of_smplx(path),
         Some("npz") => of_ted(path),
         Some("txt") => Ok(vec![labels::read(path)?]),
         _ => bail!("{}: fingers are read from .bvh, .npz and .txt files", path.display()),
@@ -82,6 +84,13 @@ fn of_bvh(path: &Path) -> Result<Vec<FingerTake>> {
         FingerTake::whole(&stem(path), side, frames, size)
     };
     Ok(found.into_iter().map(take).collect())
+}
+
+fn of_smplx(path: &Path) -> Result<Vec<FingerTake>> {
+    let take = |(side, frames): (Side, Vec<smplx::HandFrame>)| {
+        FingerTake::whole(&stem(path), side, frames.into_iter().map(|hand| hand.map(Some)).collect(), Size::Phalanx)
+    };
+    Ok(smplx::hands(path)?.into_iter().map(take).collect())
 }
 
 /// Both hands of a TED speaker. The skeleton is a regressor's: its palm is three times its first phalanges, so the palm
