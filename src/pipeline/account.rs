@@ -16,6 +16,7 @@ use std::path::Path;
 const UNKNOWN_FRAME_SECS: f64 = 1.0 / 15.0;
 
 /// How far a video has come.
+#[derive(Clone, Copy)]
 pub(super) enum Standing<'a> {
     /// Every stage up to `lift` is done: its ledger counts.
     Judged,
@@ -131,6 +132,7 @@ impl TimeAccount {
     }
 }
 
+#[allow(clippy::trivially_copy_pass_by_ref)] // serde passes a reference
 fn is_none<S: Serializer>(n_wrong: &usize, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_bool(*n_wrong == 0)
 }

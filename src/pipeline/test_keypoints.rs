@@ -5,7 +5,7 @@ use orator_base::types::pose2d::Keypoints;
 use orator_base::types::time::FrameRate;
 
 /// Keypoints at 15 frames a second whose body points (COCO point, x, y) are those that `at` gives of each frame; no hands.
-pub fn bodies<const N: usize>(
+pub(crate) fn bodies<const N: usize>(
     n_frames: usize,
     image_size: [u32; 2],
     at: impl Fn(usize) -> [(usize, f32, f32); N],

@@ -24,7 +24,12 @@ pub(crate) struct StreamDecoder {
 impl StreamDecoder {
     /// A decoder of `input`'s stream `stream_idx`; `threads` decoder threads (0: one a core). The other streams are
     /// not read.
-    pub fn new(path: &Path, mut input: format::context::Input, stream_idx: usize, threads: usize) -> Result<Self> {
+    pub(crate) fn new(
+        path: &Path,
+        mut input: format::context::Input,
+        stream_idx: usize,
+        threads: usize,
+    ) -> Result<Self> {
         for idx in 0..input.nb_streams() as usize {
             if idx != stream_idx {
                 // SAFETY: idx is below nb_streams, and the context is ours alone.
@@ -54,12 +59,12 @@ impl StreamDecoder {
     }
 
     /// Seconds of one tick of the stream's clock, as a fraction (numerator, denominator).
-    pub fn time_base(&self) -> Rational {
+    pub(crate) fn time_base(&self) -> Rational {
         self.time_base
     }
 
     /// The next decoded frame into `frame`, in the order of presentation; false at the end.
-    pub fn next(&mut self, frame: &mut Frame) -> Result<bool> {
+    pub(crate) fn next(&mut self, frame: &mut Frame) -> Result<bool> {
         loop {
             match self.decoder.receive_frame(frame) {
                 Ok(()) => {
@@ -84,7 +89,7 @@ impl StreamDecoder {
 
     /// Goes back or forth to the last place at or before `ticks` of the stream's clock from which decoding can begin, as far
     /// as the container knows. The frames that come next may be those of another place, or flawed.
-    pub fn seek(&mut self, ticks: i64) -> Result<()> {
+    pub(crate) fn seek(&mut self, ticks: i64) -> Result<()> {
         // SAFETY: the context is ours alone, and the stream is one of its streams.
         let code = unsafe {
             ffmpeg::ffi::av_seek_frame(
@@ -126,7 +131,7 @@ impl StreamDecoder {
     }
 
     /// Description of damage, if any.
-    pub fn damage(&self) -> Option<String> {
+    pub(crate) fn damage(&self) -> Option<String> {
         let stopped = self.stopped.map(|error| format!("reading broke off ({error})"));
         let bad = (self.n_bad > 0).then(|| format!("{} packets could not be decoded", self.n_bad));
         let flawed = (self.n_flawed > 0).then(|| format!("{} frames are flawed", self.n_flawed));

@@ -87,7 +87,7 @@ pub(crate) enum HdrTransfer {
 
 impl HdrTransfer {
     /// Transfer function of `frame`; `None` for SDR.
-    pub fn of(frame: &frame::Video) -> Option<Self> {
+    pub(crate) fn of(frame: &frame::Video) -> Option<Self> {
         match frame.color_transfer_characteristic() {
             color::TransferCharacteristic::SMPTE2084 => Some(Self::Pq),
             color::TransferCharacteristic::ARIB_STD_B67 => Some(Self::Hlg),
@@ -96,7 +96,7 @@ impl HdrTransfer {
     }
 
     /// Short name: `PQ` or `HLG`.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Pq => "PQ",
             Self::Hlg => "HLG",
@@ -109,10 +109,10 @@ pub(crate) struct ToneMapper(FilterGraph);
 
 impl ToneMapper {
     /// Format of the pictures that `map` takes.
-    pub const FORMAT: Pixel = Pixel::GBRP16LE;
+    pub(crate) const FORMAT: Pixel = Pixel::GBRP16LE;
 
     /// `has_wide_gamut`: the primaries are those of BT.2020, not BT.709.
-    pub fn new(transfer: HdrTransfer, has_wide_gamut: bool, size: [u32; 2]) -> Result<Self> {
+    pub(crate) fn new(transfer: HdrTransfer, has_wide_gamut: bool, size: [u32; 2]) -> Result<Self> {
         let (transfer, peak) = match transfer {
             HdrTransfer::Pq => ("smpte2084", 10_000.0 / WHITE),
             HdrTransfer::Hlg => ("arib-std-b67", 1000.0 / WHITE),
@@ -127,7 +127,7 @@ impl ToneMapper {
     }
 
     /// The picture as 8-bit RGB.
-    pub fn map(&mut self, frame: &frame::Video) -> Result<frame::Video> {
+    pub(crate) fn map(&mut self, frame: &frame::Video) -> Result<frame::Video> {
         self.0.push(Some(frame))?;
         self.0.pull()
     }

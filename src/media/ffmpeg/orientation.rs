@@ -13,11 +13,11 @@ pub(crate) struct Orientation {
 }
 
 impl Orientation {
-    pub const UPRIGHT: Self = Self { x: [1, 0], y: [0, 1] };
+    pub(crate) const UPRIGHT: Self = Self { x: [1, 0], y: [0, 1] };
 
     /// Orientation by the display matrix of a stream (nine 16.16 numbers; the first two rows are the images of the
     /// axes), snapped to right angles.
-    pub fn from_stream(stream: &Stream) -> Self {
+    pub(crate) fn from_stream(stream: &Stream) -> Self {
         let matrix = stream.side_data().find(|side| side.kind() == SideData::DisplayMatrix);
         let Some(numbers) = matrix.filter(|side| side.data().len() >= 36).map(|side| {
             side.data().as_chunks::<4>().0.iter().map(|bytes| i32::from_ne_bytes(*bytes)).collect::<Vec<i32>>()
@@ -32,12 +32,12 @@ impl Orientation {
     }
 
     /// Orientation whose upright picture has left and right exchanged.
-    pub fn mirrored(self) -> Self {
+    pub(crate) fn mirrored(self) -> Self {
         Self { x: [-self.x[0], self.x[1]], y: [-self.y[0], self.y[1]] }
     }
 
     /// Degrees clockwise from coded to upright: 0, 90, 180 or 270.
-    pub fn degrees(self) -> u32 {
+    pub(crate) fn degrees(self) -> u32 {
         match self.x {
             [1, _] => 0,
             [_, 1] => 90,
@@ -47,12 +47,12 @@ impl Orientation {
     }
 
     /// Width and height after rotation.
-    pub fn upright_size(self, [width, height]: [usize; 2]) -> [usize; 2] {
+    pub(crate) fn upright_size(self, [width, height]: [usize; 2]) -> [usize; 2] {
         if self.x[0] == 0 { [height, width] } else { [width, height] }
     }
 
     /// Upright picture of a coded one.
-    pub fn apply(self, coded: Image) -> Image {
+    pub(crate) fn apply(self, coded: Image) -> Image {
         if self == Self::UPRIGHT {
             return coded;
         }

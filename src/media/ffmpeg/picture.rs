@@ -20,12 +20,12 @@ pub(crate) struct Converter {
 
 impl Converter {
     /// Pictures of `size` (width, height in px, upright).
-    pub fn new(size: [usize; 2], orientation: Orientation) -> Self {
+    pub(crate) fn new(size: [usize; 2], orientation: Orientation) -> Self {
         Self { orientation, coded_size: orientation.upright_size(size), scaler: None }
     }
 
     /// `frame`, upright, in the size this converter was made for.
-    pub fn picture(&mut self, frame: &frame::Video) -> Result<Image> {
+    pub(crate) fn picture(&mut self, frame: &frame::Video) -> Result<Image> {
         let source = FrameFormat::of(frame);
         if self.scaler.as_ref().is_none_or(|scaler| scaler.source != source) {
             self.scaler = Some(Scaler::new(source, self.coded_size)?);

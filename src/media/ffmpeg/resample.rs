@@ -63,7 +63,7 @@ pub(crate) struct Resampler {
 }
 
 impl Resampler {
-    pub fn new(format: SoundFormat, rate: u32) -> Result<Self> {
+    pub(crate) fn new(format: SoundFormat, rate: u32) -> Result<Self> {
         let SoundFormat { sample, layout, rate: source_rate } = format;
         ensure!(source_rate > 0 && rate > 0, "sound at {source_rate} Hz cannot be brought to {rate} Hz");
         let mono = ChannelLayout::MONO;
@@ -77,22 +77,22 @@ impl Resampler {
         Ok(Self { context, format, rate, n_in: 0, n_out: 0, n_stretched: 0, even_at: 0 })
     }
 
-    pub fn format(&self) -> SoundFormat {
+    pub(crate) fn format(&self) -> SoundFormat {
         self.format
     }
 
     /// Seconds of input, stretched.
-    pub fn secs(&self) -> f64 {
+    pub(crate) fn secs(&self) -> f64 {
         self.n_in as f64 / f64::from(self.format.rate) + self.n_stretched as f64 / f64::from(self.rate)
     }
 
     /// Whether no stretch is active.
-    pub fn is_even(&self) -> bool {
+    pub(crate) fn is_even(&self) -> bool {
         self.n_in >= self.even_at
     }
 
     /// Makes the next `over_secs` seconds `secs` longer (shorter, if negative).
-    pub fn stretch(&mut self, secs: f64, over_secs: f64) -> Result<()> {
+    pub(crate) fn stretch(&mut self, secs: f64, over_secs: f64) -> Result<()> {
         let n = (secs * f64::from(self.rate)).round() as i32;
         let over = (over_secs * f64::from(self.rate)) as i32;
         // SAFETY: the context is live and ours.
@@ -104,7 +104,7 @@ impl Resampler {
     }
 
     /// Takes a frame of this resampler's format; the samples that are ready are appended to `out`.
-    pub fn push(&mut self, frame: &frame::Audio, out: &mut Vec<f32>) -> Result<()> {
+    pub(crate) fn push(&mut self, frame: &frame::Audio, out: &mut Vec<f32>) -> Result<()> {
         debug_assert!(format_of(frame) == self.format);
         self.n_in += frame.samples() as u64;
         // SAFETY: `frame` is a decoded frame, whose extended_data holds a pointer for each of its planes.
@@ -112,7 +112,7 @@ impl Resampler {
     }
 
     /// Appends the samples still inside, so that input and output last equally long.
-    pub fn finish(mut self, out: &mut Vec<f32>) -> Result<()> {
+    pub(crate) fn finish(mut self, out: &mut Vec<f32>) -> Result<()> {
         let start = out.len();
         // SAFETY: null input means flush.
         unsafe { self.convert(std::ptr::null_mut(), 0, out)? };

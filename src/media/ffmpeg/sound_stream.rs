@@ -2,7 +2,7 @@
 
 use super::audio::stream_mono;
 use anyhow::{Result, bail};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 /// Largest number of samples of a piece, and number of pieces decoded ahead.
@@ -29,7 +29,7 @@ impl SoundStream {
     pub fn open(path: &Path, rate: u32) -> Self {
         let (sender, pieces) = sync_channel(AHEAD);
         let path = path.to_owned();
-        std::thread::spawn(move || decode(path, rate, &sender));
+        std::thread::spawn(move || decode(&path, rate, &sender));
         Self { pieces }
     }
 }
@@ -42,9 +42,9 @@ impl Iterator for SoundStream {
     }
 }
 
-fn decode(path: PathBuf, rate: u32, sender: &SyncSender<Result<Vec<f32>>>) {
+fn decode(path: &Path, rate: u32, sender: &SyncSender<Result<Vec<f32>>>) {
     let mut has_left = false;
-    let ended = stream_mono(&path, 0, rate, &mut |streamed| {
+    let ended = stream_mono(path, 0, rate, &mut |streamed| {
         for piece in streamed.chunks(PIECE) {
             if sender.send(Ok(piece.to_vec())).is_err() {
                 has_left = true;

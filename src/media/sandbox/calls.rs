@@ -104,7 +104,7 @@ const REMOVEXATTRAT: c_long = 466;
 const FILE_SETATTR: c_long = 469;
 
 /// Restricts this thread and those it starts.
-pub fn restrict() -> Result<(), String> {
+pub(crate) fn restrict() -> Result<(), String> {
     apply().map_err(|error| format!("seccomp: {error}"))
 }
 

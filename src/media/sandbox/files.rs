@@ -29,7 +29,7 @@ const WRITE: BitFlags<AccessFs> = make_bitflags!(AccessFs::{
 });
 
 /// Restricts this thread and those it starts. Gives the version enforced, or why there is none.
-pub fn restrict(access: &FileAccess) -> Result<String, String> {
+pub(crate) fn restrict(access: &FileAccess) -> Result<String, String> {
     let status = enforce(access).map_err(|error| format!("Landlock: {error}"))?;
     let abi = match status.landlock {
         LandlockStatus::NotImplemented => {

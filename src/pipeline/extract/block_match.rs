@@ -78,7 +78,9 @@ fn blocks(picture: &Thumbnail) -> impl Iterator<Item = PictureBlock> {
     corners.filter_map(|(x, y)| {
         let mut values: Vec<f32> = rows(picture, x, y).flatten().copied().collect();
         let mean = values.iter().sum::<f32>() / values.len() as f32;
-        values.iter_mut().for_each(|value| *value -= mean);
+        for value in &mut values {
+            *value -= mean;
+        }
         let norm = values.iter().map(|value| value * value).sum::<f32>().sqrt();
         (norm >= FLAT * BLOCK as f32).then_some(PictureBlock { x, y, values, norm })
     })

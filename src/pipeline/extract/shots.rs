@@ -193,6 +193,7 @@ fn tightest(windows: &[Transition]) -> Option<Transition> {
 }
 
 #[cfg(test)]
+#[allow(clippy::unnecessary_wraps)] // a frame may repeat the one before
 mod tests {
     use super::*;
     use crate::extract::thumbnail::{THUMBNAIL, scene};
@@ -210,7 +211,9 @@ mod tests {
 
     fn scores(frames: &[Option<Image>]) -> Vec<f64> {
         let mut finder = ShotFinder::new(FrameRate::new(15, 1));
-        frames.iter().for_each(|frame| finder.push(frame.clone()));
+        for frame in frames {
+            finder.push(frame.clone());
+        }
         finder.finish()
     }
 

@@ -41,12 +41,16 @@ pub fn follow(frames: &[Vec<FoundPerson>], image_width: f32, max_gap: usize) -> 
     let mut chosen = vec![None; frames.len()];
     for (number, track) in tracks.iter().enumerate() {
         let free: Vec<(usize, usize)> = track.seen.iter().copied().filter(|(t, _)| owner[*t].is_none()).collect();
-        free.iter().for_each(|&(t, person)| chosen[t] = Some(person));
+        for &(t, person) in &free {
+            chosen[t] = Some(person);
+        }
         // Frames between two of a track belong to it, so that nobody else is taken while it is hidden.
         for pair in track.seen.windows(2) {
             owner[pair[0].0..=pair[1].0].iter_mut().for_each(|place| *place = place.or(Some(number)));
         }
-        free.iter().for_each(|&(t, _)| owner[t] = Some(number));
+        for (t, _) in free {
+            owner[t] = Some(number);
+        }
     }
     let (mut identity, mut n_taken, mut before) = (Vec::with_capacity(frames.len()), 0, None);
     for place in owner {

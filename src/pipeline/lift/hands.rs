@@ -20,7 +20,7 @@ const BATCH: usize = 1024;
 /// where the hand is missing. `mask` [T, 21] says what was seen.
 pub fn lift(
     lifter: &HandLifter,
-    points: ArrayView3<f32>,
+    points: &ArrayView3<f32>,
     side: Side,
     frame_secs: f32,
     mut joints: ArrayViewMut3<f32>,
@@ -30,9 +30,9 @@ pub fn lift(
     for start in (0..n_frames).step_by(BATCH) {
         let enough = |seen: SeenHand| if seen.iter().flatten().count() < LEAST_POINTS { [None; N_HAND] } else { seen };
         let seen: Vec<SeenHand> =
-            (start..n_frames.min(start + BATCH)).map(|t| enough(seen_points(&points, t))).collect();
+            (start..n_frames.min(start + BATCH)).map(|t| enough(seen_points(points, t))).collect();
         for (t, (hand, seen)) in (start..).zip(lifter.lift(&seen, side)?.into_iter().zip(&seen)) {
-            let Some(hand) = hand.and_then(unit_size) else { continue };
+            let Some(hand) = hand.as_ref().and_then(unit_size) else { continue };
             (0..N_HAND).for_each(|j| mask[[t, j]] = seen[j].is_some());
             joints.slice_mut(s![t, .., ..]).indexed_iter_mut().for_each(|((j, k), v)| *v = hand[j][k] as f32);
         }
@@ -50,7 +50,7 @@ fn seen_points(points: &ArrayView3<f32>, t: usize) -> SeenHand {
 }
 
 /// The hand with all its bones together 1 long; `None` of a hand without extent.
-fn unit_size(hand: HandJoints) -> Option<HandJoints> {
+fn unit_size(hand: &HandJoints) -> Option<HandJoints> {
     let bones: f64 = (1..N_HAND).map(|j| vec3::norm(vec3::sub(hand[j], hand[parent(j)]))).sum();
     (bones.is_finite() && bones > 1e-9).then(|| hand.map(|p| vec3::scale(p, 1.0 / bones)))
 }
@@ -87,10 +87,10 @@ mod tests {
 
     #[test]
     fn a_hand_without_extent_is_none() {
-        assert!(unit_size([[1.0; 3]; N_HAND]).is_none());
+        assert!(unit_size(&[[1.0; 3]; N_HAND]).is_none());
         let straight: HandJoints =
             std::array::from_fn(|j| if j == 0 { [0.0; 3] } else { [0.0, -2.0 - ((j - 1) % 4) as f64, 0.0] });
-        let hand = unit_size(straight).unwrap();
+        let hand = unit_size(&straight).unwrap();
         assert!((hand[9][1] / hand[10][1] - 2.0 / 3.0).abs() < 1e-9);
     }
 }

@@ -146,7 +146,7 @@ impl Lifter {
             let points = points.slice(s![interval.start..interval.end, .., ..]);
             let mut joints = into.joints.slice_mut(s![.., root..root + N_HAND, ..]);
             let mask = into.mask.slice_mut(s![.., root..root + N_HAND]);
-            hands::lift(&self.hands, points, side, (1.0 / fps) as f32, joints.view_mut(), mask)?;
+            hands::lift(&self.hands, &points, side, (1.0 / fps) as f32, joints.view_mut(), mask)?;
         }
         rest::fill(&mut into.joints, interval, resting);
         for root in [L_HAND, R_HAND] {

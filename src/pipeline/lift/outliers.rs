@@ -56,7 +56,9 @@ impl BoneChange {
         for (changes, t) in self.changes.outer_iter().zip(0..).filter(|(_, t)| refusals[*t].is_none()) {
             for (&change, (from, to)) in changes.iter().zip(POINTS) {
                 if exceeds(change, most) {
-                    [from, to].into_iter().for_each(|point| keypoints.body[[t, point, 2]] = 0.0);
+                    for point in [from, to] {
+                        keypoints.body[[t, point, 2]] = 0.0;
+                    }
                 }
             }
         }

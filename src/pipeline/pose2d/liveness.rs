@@ -103,7 +103,9 @@ fn change(before: &[f32], now: &[f32]) -> f32 {
     let at = |(x, y): (usize, usize)| {
         let mut steps: Vec<f32> = before.iter().zip(moved(now, x, y)).map(|(a, b)| b - a).collect();
         let mean = steps.iter().sum::<f32>() / steps.len().max(1) as f32;
-        steps.iter_mut().for_each(|step| *step = (*step - mean).abs());
+        for step in &mut steps {
+            *step = (*step - mean).abs();
+        }
         steps.sort_by(|a, b| b.total_cmp(a));
         steps.get((MOVING_SHARE * steps.len() as f64) as usize).copied().unwrap_or(0.0)
     };

@@ -67,9 +67,9 @@ impl Measures {
             measures.person.push(arms.into_iter().fold(score(coco::NOSE), f32::max));
             measures.face.push(face);
             measures.arms.push(arms.into_iter().fold(f32::INFINITY, f32::min));
-            let (neck, width) = shoulders(body);
+            let (neck, width) = shoulders(&body);
             let known = arms[0].min(arms[1]) >= SEEN_SCORE;
-            let [facing, nose_off] = if known { turn(body, neck) } else { [f32::NAN; 2] };
+            let [facing, nose_off] = if known { turn(&body, neck) } else { [f32::NAN; 2] };
             measures.facing.push(facing);
             measures.nose_off.push(nose_off);
             let now = known.then_some((neck, width));
@@ -84,8 +84,8 @@ impl Measures {
             speech: vec![1.0; n_frames],
             lip_sync: vec![1.0; n_frames],
             frame_difference: vec![255.0; n_frames],
-            left_hand: mean_scores(keypoints.left_hand.view()),
-            right_hand: mean_scores(keypoints.right_hand.view()),
+            left_hand: mean_scores(&keypoints.left_hand.view()),
+            right_hand: mean_scores(&keypoints.right_hand.view()),
             left_other: vec![0.0; n_frames],
             right_other: vec![0.0; n_frames],
             rest: rest::movement(keypoints),
@@ -111,14 +111,14 @@ pub fn identity(numbers: &[i64], restart: &[bool], jump: &[f32]) -> Vec<f32> {
 }
 
 /// The point between the shoulders, and the distance between them, in px.
-fn shoulders(body: ArrayView2<f32>) -> ([f32; 2], f32) {
+fn shoulders(body: &ArrayView2<f32>) -> ([f32; 2], f32) {
     let (left, right) = (at(body, coco::L_SHOULDER), at(body, coco::R_SHOULDER));
     let neck = [(left[0] + right[0]) / 2.0, (left[1] + right[1]) / 2.0];
     (neck, (left[0] - right[0]).hypot(left[1] - right[1]))
 }
 
 /// `facing` and `nose_off` of a frame whose shoulders are seen.
-fn turn(body: ArrayView2<f32>, neck: [f32; 2]) -> [f32; 2] {
+fn turn(body: &ArrayView2<f32>, neck: [f32; 2]) -> [f32; 2] {
     if body[[coco::NOSE, 2]] < SEEN_SCORE {
         return [f32::NAN; 2];
     }
@@ -147,11 +147,11 @@ fn way(before: Option<([f32; 2], f32)>, now: Option<([f32; 2], f32)>) -> f32 {
     (new[0] - old[0]).hypot(new[1] - old[1]) / new_width.max(old_width).max(1.0)
 }
 
-fn at(body: ArrayView2<f32>, joint: usize) -> [f32; 2] {
+fn at(body: &ArrayView2<f32>, joint: usize) -> [f32; 2] {
     [body[[joint, 0]], body[[joint, 1]]]
 }
 
-fn mean_scores(hand: ArrayView3<f32>) -> Vec<f32> {
+fn mean_scores(hand: &ArrayView3<f32>) -> Vec<f32> {
     let n_points = hand.shape()[1].max(1) as f32;
     hand.outer_iter().map(|points| points.column(2).sum() / n_points).collect()
 }
@@ -171,7 +171,7 @@ mod tests {
         ] {
             (body[[joint, 0]], body[[joint, 1]]) = (x, y);
         }
-        turn(body.view(), [200.0, 100.0])
+        turn(&body.view(), [200.0, 100.0])
     }
 
     #[test]

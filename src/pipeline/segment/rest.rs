@@ -17,14 +17,14 @@ pub const APART: f32 = 10.0;
 
 /// How far the farther wrist is from where it mostly is, in the second around each frame, in shoulder widths, [T].
 pub fn movement(keypoints: &Keypoints) -> Vec<f32> {
-    let wrists: Vec<Option<[f32; 4]>> = keypoints.body.outer_iter().map(wrists).collect();
+    let wrists: Vec<Option<[f32; 4]>> = keypoints.body.outer_iter().map(|body| wrists(&body)).collect();
     let reach = (REACH_SECS * keypoints.fps.per_sec()).round() as usize;
     let around = |t: usize| &wrists[t.saturating_sub(reach)..wrists.len().min(t + reach + 1)];
     (0..wrists.len()).map(|t| spread(wrists[t], around(t)).unwrap_or(APART)).collect()
 }
 
 /// Left and right wrist about the neck (x, y, x, y), in shoulder widths; `None` where one of these points is not seen.
-fn wrists(body: ArrayView2<f32>) -> Option<[f32; 4]> {
+fn wrists(body: &ArrayView2<f32>) -> Option<[f32; 4]> {
     let points = [coco::L_SHOULDER, coco::R_SHOULDER, coco::L_WRIST, coco::R_WRIST];
     let [left, right, left_wrist, right_wrist] = points.map(|j| [body[[j, 0]], body[[j, 1]]]);
     let width = (left[0] - right[0]).hypot(left[1] - right[1]);

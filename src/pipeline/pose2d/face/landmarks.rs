@@ -72,8 +72,9 @@ mod tests {
             })
             .collect();
         (points[EYES[0]], points[EYES[1]]) = ([-30.0, -20.0, 0.0], [30.0, -20.0, 0.0]);
-        UPPER_LIP.into_iter().for_each(|at| points[at] = [0.0, 30.0, 5.0]);
-        LOWER_LIP.into_iter().for_each(|at| points[at] = [0.0, 30.0 + open, 5.0]);
+        for (upper, lower) in UPPER_LIP.into_iter().zip(LOWER_LIP) {
+            (points[upper], points[lower]) = ([0.0, 30.0, 5.0], [0.0, 30.0 + open, 5.0]);
+        }
         let (sin, cos) = angle.sin_cos();
         points.iter().map(|[x, y, z]| [200.0 + x * cos - y * sin, 100.0 + x * sin + y * cos, *z]).collect()
     }

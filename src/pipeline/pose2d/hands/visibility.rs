@@ -44,7 +44,9 @@ impl SeenHands {
                 let behind = |point: &ScoredPoint| is_inside([point[0], point[1]], &outline);
                 let hidden: Vec<usize> = (0..21).filter(|&i| behind(&doubted.points[i])).collect();
                 if let Some(doubted) = &mut hands[unsure] {
-                    hidden.into_iter().for_each(|i| doubted.points[i][2] = 0.0);
+                    for i in hidden {
+                        doubted.points[i][2] = 0.0;
+                    }
                 }
             }
         }
@@ -111,6 +113,7 @@ pub fn distance(a: ScoredPoint, b: ScoredPoint) -> f64 {
 }
 
 #[cfg(test)]
+#[allow(clippy::unnecessary_wraps)] // a hand may be missing
 mod tests {
     use super::*;
 

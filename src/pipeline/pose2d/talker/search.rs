@@ -119,7 +119,9 @@ impl TalkerSearch {
 fn tie(people: &mut Vec<Talker>, idx: usize, found: &[PersonBox]) {
     let area = |one: &PersonBox| one.width * one.height;
     let largest = found.iter().map(area).fold(0.0, f32::max);
-    people.iter_mut().for_each(|one| one.is_here = false);
+    for one in people.iter_mut() {
+        one.is_here = false;
+    }
     for one in found.iter().filter(|one| area(one) >= RELEVANT * largest) {
         let overlap = |known: &Talker| known.path.last().map_or(0.0, |last| boxes::overlap(last, one));
         let free = (0..people.len()).filter(|&at| !people[at].is_here);
