@@ -5,8 +5,8 @@ use super::job::shell;
 use anyhow::{Context, Result, bail, ensure};
 use orator_base::stage::fingerprint::hash_file;
 use orator_base::stage::{Unit, workdir};
-use orator_dataset::config::Config;
 use orator_dataset::config::videos::Videos;
+use orator_dataset::config::{Config, GanConfig, Seq2seqConfig};
 use orator_pipeline::Pipeline;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -284,8 +284,8 @@ fn has(videos: &Videos, unit: &PlannedUnit) -> bool {
 pub fn settings_hash(config: &Config) -> Result<String> {
     let mut settings = config.settings.clone();
     settings.work.jobs = 0;
-    settings.gan = Default::default();
-    settings.seq2seq = Default::default();
+    settings.gan = GanConfig::default();
+    settings.seq2seq = Seq2seqConfig::default();
     Ok(blake3::hash(&serde_json::to_vec(&settings)?).to_hex().to_string())
 }
 

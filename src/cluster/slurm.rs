@@ -2,6 +2,7 @@
 
 use super::job::{JobRequest, TaskLimits, shell};
 use super::plan::ClusterPlan;
+use std::fmt::Write as _;
 use std::path::Path;
 
 /// Seconds before the end of its time in which a task is told to stop.
@@ -66,14 +67,15 @@ pub fn scripts(
         settings.head("orator", job.worker_limits, Some([n, job.n_at_once])) + &worker
     });
     let mut last = settings.head("orator-last", job.worker_limits, None) + &until_done(&shell(&job.last_worker()));
-    last += &format!("{} || code=$?\n", plan.datasets_command(&program));
+    let _ = writeln!(last, "{} || code=$?", plan.datasets_command(&program));
     for words in job.verify(plan, work) {
-        last += &format!("{} || code=$?\n", shell(&words));
+        let _ = writeln!(last, "{} || code=$?", shell(&words));
     }
     let mut retry = job.last_worker();
     retry.push("--retry".to_owned());
-    last += &format!(
-        "[ \"$code\" -ne 2 ] || echo {} {}\nexit \"$code\"\n",
+    let _ = writeln!(
+        last,
+        "[ \"$code\" -ne 2 ] || echo {} {}\nexit \"$code\"",
         shell(&["some units failed; when what ails them is mended:".to_owned()]),
         shell(&[shell(&retry)])
     );
@@ -123,6 +125,7 @@ fn clock(hours: f64) -> String {
 mod tests {
     use super::super::plan::PlannedUnit;
     use super::*;
+    use std::collections::BTreeMap;
 
     #[test]
     fn no_array_is_longer_than_the_cluster_allows_and_a_shell_reads_what_is_written() {
@@ -139,7 +142,7 @@ mod tests {
             config: "/w/pipeline.toml".into(),
             sets: vec!["extract.fps=15".to_owned()],
             settings: String::new(),
-            models: Default::default(),
+            models: BTreeMap::new(),
             units: ["guest's", "host"].map(|speaker| PlannedUnit::example(speaker, "talk")).to_vec(),
             seal: String::new(),
         };

@@ -14,7 +14,7 @@ use orator_pipeline::process::message::{ExcerptRequest, MediaRequest};
 use orator_pipeline::timing::StageTime;
 use orator_pipeline::{Pipeline, Selection};
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Share of all video that is timed, and within what bounds, seconds.
 const SHARE: f64 = 0.1;

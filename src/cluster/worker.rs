@@ -153,10 +153,11 @@ impl Session<'_> {
         heart.beat()?;
         let (stop, stopped) = channel::<()>();
         let ended = std::thread::scope(|scope| {
-            scope.spawn(|| {
+            let beats = &heart;
+            scope.spawn(move || {
                 while stopped.recv_timeout(self.options.beat) == Err(RecvTimeoutError::Timeout) {
                     // One beat that cannot be written is no death.
-                    let _ = heart.beat();
+                    let _ = beats.beat();
                 }
             });
             let ended = self.work(name, &heart);

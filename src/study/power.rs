@@ -16,6 +16,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal};
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 
 /// Fewest and most participants that are tried.
 const FEWEST: usize = 5;
@@ -192,11 +193,12 @@ pub fn text(plan: &PowerPlan) -> String {
         ),
     ];
     for (curve, what) in curves {
-        text += &format!("\n{what}\n  participants    votes    power    95 % interval\n");
+        let _ = writeln!(text, "\n{what}\n  participants    votes    power    95 % interval");
         for row in &curve.rows {
             let mark = if Some(row.n_participants) == curve.n_participants { "  <- enough" } else { "" };
-            text += &format!(
-                "  {:>12} {:>8} {:>8}    {} to {}{mark}\n",
+            let _ = writeln!(
+                text,
+                "  {:>12} {:>8} {:>8}    {} to {}{mark}",
                 row.n_participants,
                 row.n_votes,
                 percent(row.power),
@@ -211,8 +213,9 @@ pub fn text(plan: &PowerPlan) -> String {
                 question.n_clips
             ),
         };
-        text += &format!(
-            "  the formula for independent votes says {} votes ({} participants), of which the power is {}\n",
+        let _ = writeln!(
+            text,
+            "  the formula for independent votes says {} votes ({} participants), of which the power is {}",
             curve.naive_votes,
             curve.at_naive.n_participants,
             percent(curve.at_naive.power)

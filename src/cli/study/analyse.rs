@@ -15,6 +15,7 @@ use orator_study::plan::TaskDesign;
 use serde::Deserialize as _;
 use serde::de::IntoDeserializer as _;
 use serde_json::json;
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 /// Analyse the votes of a study: its own, or a table of any other.
@@ -79,11 +80,11 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     if let Some(path) = &args.report {
         let html = page::html(&analysis);
         workdir::write_file(path, html.as_bytes())?;
-        shown += &format!("\nwrote {}\n", path.display());
+        let _ = writeln!(shown, "\nwrote {}", path.display());
     }
     if let Some(path) = &args.methods {
         workdir::write_file(path, format!("{}\n", analysis.methods).as_bytes())?;
-        shown += &format!("\nwrote {}\n", path.display());
+        let _ = writeln!(shown, "\nwrote {}", path.display());
     }
     let next = args.report.is_none().then(|| {
         format!("orator study analyse {} --report analysis.html --methods methods.txt", args.source.display())

@@ -10,6 +10,7 @@ use orator_study::build::{BuiltSpeaker, BuiltStudy, build};
 use orator_study::file::{ConditionSource, StudyFile, filled};
 use orator_study::stimuli::film::SIZE;
 use serde_json::json;
+use std::fmt::Write as _;
 use std::path::PathBuf;
 
 /// Refused pieces of speech that are listed at most; all are in `clips/clips.json`.
@@ -56,22 +57,24 @@ fn text(built: &BuiltStudy) -> String {
     for BuiltSpeaker { name, clips, refused } in &built.speakers {
         let hidden = clips.iter().filter(|clip| clip.unseen > 0.0).count();
         let loud = clips.iter().filter(|clip| !clip.ends_in_pauses()).count();
-        text += &format!("{name}: {}", counted(clips.len(), "clip"));
+        let _ = write!(text, "{name}: {}", counted(clips.len(), "clip"));
         if hidden > 0 {
-            text += &format!(", {hidden} with joints that were not seen and are hidden in all conditions");
+            let _ = write!(text, ", {hidden} with joints that were not seen and are hidden in all conditions");
         }
         if loud > 0 {
-            text += &format!(", {loud} cut within speech, for want of pauses");
+            let _ = write!(text, ", {loud} cut within speech, for want of pauses");
         }
         text += "\n";
         for refused in refused.iter().take(MOST_LISTED) {
-            text += &format!("  no clip of {}: {}\n", refused.name, refused.reason);
+            let _ = writeln!(text, "  no clip of {}: {}", refused.name, refused.reason);
         }
         if refused.len() > MOST_LISTED {
-            text += &format!("  and of {} more pieces of speech\n", refused.len() - MOST_LISTED);
+            let _ = writeln!(text, "  and of {} more pieces of speech", refused.len() - MOST_LISTED);
         }
     }
-    built.balance.iter().for_each(|line| text += &format!("{line}\n"));
+    for line in &built.balance {
+        let _ = writeln!(text, "{line}");
+    }
     text + &format!(
         "{} of {} kB at {:.1} LUFS, {} of {}\n{} {}; over all: {}",
         counted(built.n_films, "film"),

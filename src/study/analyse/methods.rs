@@ -4,6 +4,7 @@ use super::figure::FigureMethod;
 use super::result::{ShareMeasure, StudyAnalysis, TaskAnalysis};
 use super::words::{count, list, p_value, percent, percents, points};
 use crate::plan::TaskDesign;
+use std::fmt::Write as _;
 
 /// Sources, a line each: as a method cites it, and in full.
 const SOURCES: &str = include_str!("sources.txt");
@@ -35,7 +36,8 @@ fn participants(analysis: &StudyAnalysis) -> String {
         }
     );
     if !analysis.refused.is_empty() {
-        text += &format!("{} rows of the table could not be read as votes and were left out. ", analysis.refused.len());
+        let _ =
+            write!(text, "{} rows of the table could not be read as votes and were left out. ", analysis.refused.len());
     }
     text
 }
@@ -106,7 +108,8 @@ fn statistics(analysis: &StudyAnalysis) -> String {
         100.0 * settings.confidence
     );
     if analysis.tasks.iter().any(|task| !task.shares.is_empty()) {
-        text += &format!(
+        let _ = write!(
+            text,
             "Equivalence with chance within \u{b1}{} points was tested by two one-sided tests at 5 % (Schuirmann 1987). ",
             list(&bounds(analysis))
         );
@@ -175,7 +178,8 @@ fn results(analysis: &StudyAnalysis) -> String {
             let equivalence = figures
                 .equivalence(FigureMethod::Crossed)
                 .map(|test| format!("; equivalence within \u{b1}{} points {}", points(test.bound), p_value(test.p)));
-            text += &format!(
+            let _ = write!(
+                text,
                 "{}, {}: {} [{}], {statistic}{}{adjusted}{}. ",
                 task.task,
                 super::verdict::scope(share),

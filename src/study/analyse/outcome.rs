@@ -50,8 +50,7 @@ pub fn mean_score(votes: &[ClipVote]) -> f64 {
 
 /// All pairs of names, in their order.
 pub fn name_pairs<S: AsRef<str>>(names: &[S]) -> impl Iterator<Item = [&str; 2]> {
-    let pairs = |(k, a): (usize, &S)| names[k + 1..].iter().map(move |b| [a.as_ref(), b.as_ref()]);
-    names.iter().enumerate().flat_map(pairs)
+    names.iter().enumerate().flat_map(|(k, a)| names[k + 1..].iter().map(move |b| [a.as_ref(), b.as_ref()]))
 }
 
 /// Vote that is a success or not.

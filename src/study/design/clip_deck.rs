@@ -83,7 +83,7 @@ mod tests {
             ahead in 0usize..4, hands in proptest::collection::vec(1usize..13, 1..40), seed in 0u64..100,
         ) {
             let mut deck = ClipDeck::new(n_clips, [n_comparisons, n_arrangements], ahead, ChaCha8Rng::seed_from_u64(seed));
-            let mut counts: [BTreeMap<DealtClip, usize>; 3] = Default::default();
+            let mut counts = [(); 3].map(|()| BTreeMap::<DealtClip, usize>::new());
             for clip in 0..n_clips {
                 for comparison in 0..n_comparisons {
                     for arrangement in 0..n_arrangements {

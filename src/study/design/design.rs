@@ -72,6 +72,7 @@ mod tests {
     use crate::plan::{PlannedSession, TaskDesign, Trial, TrialPhase};
     use crate::vote::{Response, ScreenSide};
     use std::collections::BTreeSet;
+    use std::fmt::Write as _;
     use std::path::Path;
 
     /// Film by the name that the tests give it.
@@ -96,14 +97,17 @@ mod tests {
     fn file(tasks: &[(TaskDesign, usize, usize)], n_speakers: usize, n_models: usize, more: &str) -> StudyFile {
         let mut text = format!("title = \"t\"\n{more}\n[[condition]]\nname = \"real\"\nkind = \"natural\"\n");
         for model in 0..n_models {
-            text += &format!("[[condition]]\nname = \"m{model}\"\nkind = \"checkpoint\"\ncheckpoint = \"m\"\n");
-            text += &format!("[[condition]]\nname = \"x{model}\"\nkind = \"mismatched\"\nof = \"m{model}\"\n");
+            let _ = writeln!(text, "[[condition]]\nname = \"m{model}\"\nkind = \"checkpoint\"\ncheckpoint = \"m\"");
+            let _ = writeln!(text, "[[condition]]\nname = \"x{model}\"\nkind = \"mismatched\"\nof = \"m{model}\"");
         }
-        (0..n_speakers).for_each(|k| text += &format!("[[speaker]]\nname = \"s{k}\"\ndataset = \"d\"\n"));
+        for k in 0..n_speakers {
+            let _ = writeln!(text, "[[speaker]]\nname = \"s{k}\"\ndataset = \"d\"");
+        }
         for (at, (design, trials, training)) in tasks.iter().enumerate() {
             let design_name = serde_json::to_value(design).unwrap();
-            text += &format!(
-                "[[task]]\nname = \"t{at}\"\ndesign = {design_name}\ntrials = {trials}\ntraining = {training}\n"
+            let _ = writeln!(
+                text,
+                "[[task]]\nname = \"t{at}\"\ndesign = {design_name}\ntrials = {trials}\ntraining = {training}"
             );
             match design {
                 TaskDesign::Sliders => text += "scale = \"appropriateness\"\n",
@@ -167,7 +171,7 @@ mod tests {
     /// Counts votes of cells anew, from what the films show.
     fn balanced(file: &StudyFile, sessions: &[PlannedSession], films: &Films) {
         for (at, task) in file.task.iter().enumerate() {
-            let (mut cells, mut sides): (BTreeMap<_, usize>, BTreeMap<_, usize>) = Default::default();
+            let (mut cells, mut sides) = (BTreeMap::<_, usize>::new(), BTreeMap::<_, usize>::new());
             let trials = sessions.iter().flat_map(|session| &session.trials);
             for trial in trials.filter(|trial| trial.task == at && trial.phase == TrialPhase::Main) {
                 let clip = films[&trial.films[0]].clip.clone();

@@ -198,7 +198,7 @@ impl Default for ExclusionRules {
 pub struct AnalysisSettings {
     /// Error of the first kind: intervals hold 1 - `alpha`.
     pub alpha: f64,
-    /// Bootstrap samples and permutations.
+    /// Draws of sign flips and of participants.
     pub resamples: usize,
     /// Seed of both.
     pub seed: u64,
