@@ -3,13 +3,13 @@
 pub mod background;
 pub mod camera;
 pub mod light;
-mod pixel;
+pub mod pixel;
 pub mod renderer;
-mod samples;
-mod shadow;
+pub mod samples;
+pub mod shadow;
 pub mod srgb;
-mod surfaces;
-mod visibility;
+pub mod surfaces;
+pub mod visibility;
 
 pub use background::Background;
 pub use camera::PinholeCamera;

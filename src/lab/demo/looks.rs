@@ -1,7 +1,11 @@
-//! Random looks of rendered people.
+//! Random looks of rendered people, and the points of their faces.
 
 use orator_avatar::animate::avatar::Appearance;
 use orator_avatar::animate::avatar::appearance::{Hairstyle, Reflectance, Top, Weave, lips_of};
+use orator_avatar::animate::avatar::head::{EAR, EYE, EYE_RADIUS, HeadForm};
+use orator_avatar::animate::avatar::stance::Stance;
+use orator_avatar::animate::rig::rig::Rig;
+use orator_base::math::vec3::Vec3;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -128,6 +132,19 @@ pub fn random(seed: u64) -> Appearance {
     }
 }
 
+/// Nose, left eye, right eye, left ear, right ear (the order of COCO) on the surface of a person of these looks, cm from
+/// the head joint in its axes.
+pub fn face(rig: &Rig, looks: &Appearance) -> [Vec3; 5] {
+    let stance = Stance::new(rig);
+    let head = HeadForm::new(rig, &stance, looks);
+    let at_front = |x: f64, y: f64| [x, y, head.front(x, y)];
+    let [ex, ey, ez] = EYE;
+    let [ax, ay, az] = EAR;
+    let sides = |x: f64, y: f64, z: f64| [[x, y, z], [-x, y, z]];
+    let ([left_eye, right_eye], [left_ear, right_ear]) = (sides(ex, ey, ez + EYE_RADIUS), sides(ax + 0.6, ay, az));
+    [at_front(0.0, 7.5), left_eye, right_eye, left_ear, right_ear].map(|at| head.scaled(at))
+}
+
 /// Colour between two neighbours of a row.
 fn between(rng: &mut ChaCha8Rng, row: &[Reflectance]) -> Reflectance {
     let at = rng.random_range(0.0..(row.len() - 1) as f32);
@@ -146,8 +163,8 @@ fn jittered(rng: &mut ChaCha8Rng, colours: &[Reflectance], spread: f32) -> Refle
 mod tests {
     use super::*;
     use orator_avatar::animate::avatar::Avatar;
-    use orator_avatar::animate::rig::rig::Rig;
     use orator_base::math::rotation::Rotation;
+    use orator_base::math::vec3::{add, norm, sub};
     use orator_base::types::pose3d::Motion;
     use orator_base::types::skeleton::N_JOINTS;
     use orator_base::types::time::FrameRate;
@@ -169,10 +186,30 @@ mod tests {
         assert!(people.iter().all(|person| person.top_colour.iter().all(|v| (0.0..=1.0).contains(v))));
     }
 
+    fn rig() -> Rig {
+        let unseen = ndarray::Array3::from_elem((1, N_JOINTS, 3), f32::NAN);
+        Rig::from_motion(&Motion::from_joints(FrameRate::new(15, 1), unseen))
+    }
+
+    #[test]
+    fn every_point_of_the_face_lies_on_the_skin_or_the_eyes() {
+        let (rig, looks) = (rig(), Appearance::plain());
+        let local = vec![Rotation::IDENTITY; rig.skeleton.joints.len()];
+        let meshes = Avatar::new(&rig, &looks).posed(&rig, rig.root, &local, 0.0);
+        let points = face(&rig, &looks);
+        let [nose, left, right, left_ear, right_ear] = points;
+        assert!(left[0] > 0.0 && left_ear[0] > left[0] && nose[2] > left[2] && left[2] > left_ear[2]);
+        assert!((left[0] + right[0]).abs() < 1e-9 && (left_ear[0] + right_ear[0]).abs() < 1e-9);
+        for point in points.map(|point| add(rig.skeleton.positions(rig.root, &local)[rig.head], point)) {
+            let all = meshes.iter().flat_map(|mesh| &mesh.points);
+            let near = all.map(|at| norm(sub(at.map(f64::from), point))).fold(f64::INFINITY, f64::min);
+            assert!(near < 0.6, "{point:?} is {near} cm off the surface");
+        }
+    }
+
     #[test]
     fn a_seed_gives_the_same_bytes_and_a_whole_avatar() {
-        let unseen = ndarray::Array3::from_elem((1, N_JOINTS, 3), f32::NAN);
-        let rig = Rig::from_motion(&Motion::from_joints(FrameRate::new(15, 1), unseen));
+        let rig = rig();
         let local = vec![Rotation::IDENTITY; rig.skeleton.joints.len()];
         let of = |seed: u64| Avatar::new(&rig, &random(seed)).posed(&rig, rig.root, &local, 0.3);
         let first = of(4);

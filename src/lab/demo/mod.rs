@@ -1,7 +1,7 @@
 //! Synthetic speakers with known joints, the embedded demo and the end-to-end test of the pipeline.
 //!
 //! `people`: rendered people in rooms, one of them the demo's `host`, with `more_speech` of that host without video.
-//! `looks`: random bodies, faces and clothes.
+//! `looks`: random bodies, faces and clothes; `scenery`: what stands behind the people.
 //! `check`: the results of the pipeline and of trained models against the truth.
 
 pub mod check;
@@ -9,5 +9,6 @@ pub mod host;
 pub mod looks;
 pub mod more_speech;
 pub mod people;
+pub mod scenery;
 
 pub use check::pipeline::GENERATOR;

@@ -9,6 +9,7 @@ use orator_avatar::render::{Background, Light, Mesh, PinholeCamera};
 use orator_base::stage::progress::{Progress, Silent};
 use orator_base::types::image::Image;
 use orator_base::types::time::FrameRate;
+use orator_lab::demo::scenery;
 use orator_media::ffmpeg::write::encode::VideoWriter;
 use orator_test_support::drawn::speech::Speech;
 use orator_test_support::rule::rule::RuleGestures;
@@ -124,7 +125,7 @@ fn desk() -> Background {
     let desk =
         square([[-80.0, 95.0, 70.0], [80.0, 95.0, 70.0], [80.0, 95.0, 15.0], [-80.0, 95.0, 15.0]], [0.0, 1.0, 0.0]);
     let camera = PinholeCamera::looking_at(SIZE, 1500.0, [0.0, 150.0, 260.0], [0.0, 125.0, 0.0], 0.0);
-    Background::of_scene(
+    scenery::background(
         &camera,
         &[&wall, &desk],
         &Light::studio([-0.5, 0.8, 0.7]),

@@ -5,7 +5,7 @@ use super::appearance::{Appearance, Reflectance};
 use super::assembly::{Assembly, PosedMesh};
 use super::body::BodyForm;
 use super::hand::HandForm;
-use super::head::{EAR, EYE, EYE_RADIUS, HeadForm};
+use super::head::HeadForm;
 use super::material::Material;
 use super::skin::Weights;
 use super::stance::Stance;
@@ -37,8 +37,6 @@ pub struct AvatarMesh {
 #[derive(Clone, Debug)]
 pub struct Avatar {
     pub parts: Vec<AvatarMesh>,
-    /// Nose, left eye, right eye, left ear, right ear, cm from the head joint in its axes.
-    pub face: [Vec3; 5],
 }
 
 impl Avatar {
@@ -49,13 +47,7 @@ impl Avatar {
         let head = HeadForm::new(rig, &stance, looks);
         let meshes = Assembly::new(&body, &head, &hands).meshes;
         let parts = meshes.into_iter().map(|(material, mesh)| AvatarMesh::rested(material, mesh, &stance)).collect();
-        let at_front = |x: f64, y: f64| [x, y, head.front(x, y)];
-        let [ex, ey, ez] = EYE;
-        let [ax, ay, az] = EAR;
-        let sides = |x: f64, y: f64, z: f64| [[x, y, z], [-x, y, z]];
-        let ([left_eye, right_eye], [left_ear, right_ear]) = (sides(ex, ey, ez + EYE_RADIUS), sides(ax + 0.6, ay, az));
-        let face = [at_front(0.0, 7.5), left_eye, right_eye, left_ear, right_ear].map(|at| head.scaled(at));
-        Self { parts, face }
+        Self { parts }
     }
 }
 

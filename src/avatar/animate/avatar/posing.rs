@@ -1,10 +1,10 @@
-//! Avatar in a pose: linear blend skinning into the world, and the points of head and hips that picture datasets name.
+//! Avatar in a pose: linear blend skinning into the world.
 
 use super::avatar::{Avatar, AvatarMesh};
 use crate::animate::rig::rig::Rig;
 use crate::render::Mesh;
 use orator_base::math::rotation::Rotation;
-use orator_base::math::vec3::{Vec3, add, sub};
+use orator_base::math::vec3::{Vec3, sub};
 
 /// Affine map of a joint from the T-pose into the world: the matrix's columns and the shift.
 type JointMap = [[f32; 3]; 4];
@@ -69,14 +69,6 @@ impl Avatar {
             part.pose_into(&maps, &forearms, mouth as f32, mesh);
         }
     }
-
-    /// Nose, left eye, right eye, left ear, right ear (the order of COCO) on the surface in a pose, world cm; they move
-    /// with the rig's head joint.
-    pub fn face_points(&self, rig: &Rig, root: Vec3, local: &[Rotation]) -> [Vec3; 5] {
-        let turn = rig.skeleton.world(local)[rig.head];
-        let place = rig.skeleton.positions(root, local)[rig.head];
-        self.face.map(|point| add(place, turn.turn(point)))
-    }
 }
 
 impl AvatarMesh {
@@ -127,7 +119,7 @@ mod tests {
     use orator_base::math::vec3::norm;
 
     #[test]
-    fn at_rest_the_pose_is_the_avatar_and_a_turned_head_turns_its_points() {
+    fn at_rest_the_pose_is_the_avatar_and_the_mouth_opens() {
         let rig = default_rig();
         let avatar = Avatar::new(&rig, &Appearance::plain());
         let mut local = vec![Rotation::IDENTITY; rig.skeleton.joints.len()];
@@ -138,20 +130,10 @@ mod tests {
                 assert!(norm(sub(*point, posed.map(f64::from))) < 1e-3);
             }
         }
-        let [nose, left, right, left_ear, right_ear] = avatar.face_points(&rig, rig.root, &local);
-        assert!(left[0] > 0.0 && left_ear[0] > left[0] && nose[2] > left[2] && left[2] > left_ear[2]);
-        assert!((left[0] + right[0]).abs() < 1e-9 && (left_ear[0] + right_ear[0]).abs() < 1e-9);
-        // Every point of the face lies on the skin or the eyes.
-        for point in [nose, left, right, left_ear, right_ear] {
-            let all = meshes.iter().flat_map(|mesh| &mesh.points);
-            let near = all.map(|at| norm(sub(at.map(f64::from), point))).fold(f64::INFINITY, f64::min);
-            assert!(near < 0.6, "{point:?} is {near} cm off the surface");
-        }
         // The head turned to its left; the same memory holds the new pose.
         local[rig.head] = Rotation::about([0.0, 1.0, 0.0], 0.5);
         avatar.pose_into(&rig, rig.root, &local, 0.0, &mut meshes);
         assert_eq!(meshes, avatar.posed(&rig, rig.root, &local, 0.0));
-        assert!(avatar.face_points(&rig, rig.root, &local)[0][0] > nose[0] + 2.0);
         // The mouth opens about the jaw's hinge.
         let lowered = |mouth: f64| {
             let open = avatar.posed(&rig, rig.root, &local, mouth);

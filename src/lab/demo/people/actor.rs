@@ -47,6 +47,8 @@ pub struct ActorRole {
 pub struct Actor {
     pub rig: Rig,
     pub avatar: Avatar,
+    /// Points of the face, cm from the head joint in its axes (`looks::face`).
+    pub face: [Vec3; 5],
     pub held: Option<HeldThing>,
     pub poses: Vec<ActorPose>,
     pub role: ActorRole,
@@ -132,9 +134,10 @@ impl Actor {
         let neck = add(turn.turn(seated.torso(&upright).neck), shift);
         let hips = add(turn.turn(seated.root(&upright)), shift);
         let unit = rig.skeleton.joints[rig.spine].offset[1] / 10.0;
-        let avatar = Avatar::new(&rig, &looks::random(seeds.clothes));
+        let looks = looks::random(seeds.clothes);
+        let (avatar, face) = (Avatar::new(&rig, &looks), looks::face(&rig, &looks));
         let desk_ahead = DESK_AHEAD + acts.carriage.desk_ahead();
-        Self { rig, avatar, held, poses, role, unit, neck, hips, desk_ahead }
+        Self { rig, avatar, face, held, poses, role, unit, neck, hips, desk_ahead }
     }
 
     /// Meshes of a pose: those of the body first, then of the held thing.

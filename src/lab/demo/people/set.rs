@@ -2,6 +2,7 @@
 
 use super::condition::Seat;
 use super::solid::{Colour, Solids};
+use crate::demo::scenery;
 use orator_avatar::render::{Background, Light, Mesh, PinholeCamera};
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::{Vec3, add};
@@ -56,7 +57,7 @@ pub fn background(camera: &PinholeCamera, light: &Light, seats: &[SeatPlace], rn
     let mut bytes = || std::array::from_fn(|_| grey + rng.random_range(0..60u8) - 30);
     let (top, bottom): ([u8; 3], [u8; 3]) = (bytes(), bytes());
     let plain: Image = Background::gradient(camera.size, top, bottom).image;
-    Background::of_scene(camera, &meshes.iter().collect::<Vec<_>>(), light, plain)
+    scenery::background(camera, &meshes.iter().collect::<Vec<_>>(), light, plain)
 }
 
 /// Colour between dark and light, little saturated.

@@ -5,7 +5,7 @@ use crate::rendered_truth::{RenderedTruth, Visibility};
 use ndarray::{Array1, Array2, Array3, s};
 use orator_avatar::render::{PinholeCamera, Renderer};
 use orator_base::math::rotation::Rotation;
-use orator_base::math::vec3::{Vec3, scale, sub};
+use orator_base::math::vec3::{Vec3, add, scale, sub};
 use orator_base::types::pose2d::{N_BODY, N_HAND};
 use orator_base::types::skeleton::{L_HAND, L_SHOULDER, N_JOINTS, NECK, R_HAND, R_SHOULDER};
 use orator_base::types::time::FrameRate;
@@ -160,7 +160,8 @@ impl FrameTruth {
 /// World points in the order of the truth, cm.
 fn points(actor: &Actor, pose: &ActorPose, places: &[Vec3]) -> [Vec3; N_POINTS] {
     let rig = &actor.rig;
-    let face = actor.avatar.face_points(rig, pose.root, &pose.local);
+    let turn = rig.skeleton.world(&pose.local)[rig.head];
+    let face = actor.face.map(|point| add(places[rig.head], turn.turn(point)));
     let leg = |name: &str| rig.skeleton.find(name).map_or([0.0; 3], |joint| places[joint]);
     let [left, right] = [L_SHOULDER, R_SHOULDER].map(|shoulder| [0, 1, 2].map(|k| places[rig.positions[shoulder + k]]));
     let mut all = Vec::with_capacity(N_POINTS);
