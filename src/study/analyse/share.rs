@@ -4,12 +4,11 @@ use super::figure::{FigureMethod, FigureSet, TestFigure};
 use super::outcome::{BinaryVote, distinct};
 use super::result::{Conclusion, FigureSettings, ModelFigure, ShareAnalysis, ShareMeasure};
 use crate::stats::cluster::crossed::crossed_estimate;
-use crate::stats::cluster::sign_flips::sign_flip_p;
+use crate::stats::cluster::sign_flips::{SideBlock, side_p, sign_flip_p};
 use crate::stats::cluster::votes::{ClipVote, participant_estimate};
 use crate::stats::equivalence::Equivalence;
 use crate::stats::glmm::fit::MixedLogit;
 use crate::stats::proportion::BinomialCount;
-use crate::stats::sides::{SideBlock, side_p};
 use std::collections::BTreeMap;
 
 /// Share where nothing is known.

@@ -10,7 +10,7 @@ use super::verdict::verdicts;
 use crate::plan::TaskDesign;
 use crate::stats::cluster::votes::ClipVote;
 use crate::stats::estimate::StatisticsError;
-use crate::stats::krippendorff::{MeasurementScale, alpha};
+use crate::stats::rank::{MeasurementScale, alpha};
 use crate::vote::StudyVote;
 use anyhow::{Context, Result, bail};
 use std::collections::{BTreeMap, BTreeSet};

@@ -2,9 +2,8 @@
 
 use super::equivalence::Equivalence;
 use super::estimate::{StudentEstimate, holm};
-use super::krippendorff::{MeasurementScale, alpha};
 use super::proportion::BinomialCount;
-use super::rank::{friedman, median_interval, signed_rank};
+use super::rank::{MeasurementScale, alpha, friedman, median_interval, signed_rank};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
