@@ -238,7 +238,7 @@ const HEADER_BYTES: usize = 8;
 const STEP_BYTES: usize = 4096;
 
 /// Length that films of these lengths can all have.
-fn common_bytes(lengths: impl IntoIterator<Item = usize>) -> usize {
+pub fn common_bytes(lengths: impl IntoIterator<Item = usize>) -> usize {
     let longest = lengths.into_iter().max().unwrap_or(0);
     (longest + HEADER_BYTES).next_multiple_of(STEP_BYTES)
 }
@@ -247,7 +247,7 @@ fn common_bytes(lengths: impl IntoIterator<Item = usize>) -> usize {
 ///
 /// # Errors
 /// A film that is longer, or shorter by less than a box or by more than 4 GB.
-fn padded(mut film: Vec<u8>, n_bytes: usize) -> Result<Vec<u8>> {
+pub fn padded(mut film: Vec<u8>, n_bytes: usize) -> Result<Vec<u8>> {
     let missing = n_bytes.checked_sub(film.len()).filter(|missing| *missing >= HEADER_BYTES);
     let size = missing.and_then(|missing| u32::try_from(missing).ok());
     let size = size.with_context(|| format!("{} bytes cannot become {n_bytes}", film.len()))?;

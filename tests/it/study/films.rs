@@ -7,9 +7,9 @@ use orator_base::types::split::Split;
 use orator_base::types::time::FrameRate;
 use orator_media::ffmpeg::frames::FrameReader;
 use orator_media::ffmpeg::probe::probe;
+use orator_study::build::{common_bytes, padded};
 use orator_study::file::StudyFile;
 use orator_study::plan::{FilmContent, FilmSound};
-use orator_study::stimuli::film_size::{common_bytes, padded};
 use orator_study::stimuli::filmed::{CutSpeaker, equally_loud};
 use orator_test_support::rule::dataset::{RULE, SpokenClip};
 

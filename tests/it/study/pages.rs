@@ -3,8 +3,8 @@
 
 use crate::fixtures::served_study::MadeStudy;
 use orator_study::plan::{PlannedTask, StudyPlan, TaskDesign, Trial, TrialPhase};
-use orator_study::vote::{Response, ScreenSide};
 use orator_study::seal::StudySeal;
+use orator_study::vote::{Response, ScreenSide};
 use orator_test_support::skip::{browser_driver, skip};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
