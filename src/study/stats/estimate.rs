@@ -1,15 +1,9 @@
 //! An estimate with its standard error, judged by Student's t distribution (Student 1908): p value and interval.
 
 use super::error::{StatisticsError, at_least, finite, tail};
+pub use orator_base::math::estimate::ConfidenceInterval;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
-
-/// Two ends of a confidence interval, in the unit of the estimate.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct ConfidenceInterval {
-    pub low: f64,
-    pub high: f64,
-}
 
 /// Estimate whose error, divided by its standard error, follows a t distribution.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
