@@ -11,9 +11,9 @@ use orator_dataset::config;
 use orator_dataset::leakage::SoundComparison;
 use orator_dataset::shared_sound;
 use orator_dataset::split::{Split, SplitBy, TimeBlock};
+use orator_dataset::write::assemble::DatasetWriter;
 use orator_dataset::write::part;
 use orator_dataset::write::part::{VideoEntry, VideoSource};
-use orator_dataset::write::writer::DatasetWriter;
 use std::collections::BTreeMap;
 use std::path::Path;
 
