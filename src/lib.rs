@@ -90,7 +90,7 @@ pub use orator_onnx::{ModelState, ModelStore};
 // Errors to be matched.
 pub use orator_base::stage::workdir::{BusyFolder, NoSpace};
 pub use orator_dataset::config::ConfigError;
-pub use orator_gesture::train::stopped::StoppedTraining;
+pub use orator_gesture::train::epochs::StoppedTraining;
 pub use orator_media::ffmpeg::UnreadableMedia;
 pub use orator_onnx::ModelError;
 pub use orator_pipeline::dataset::NothingKept;

@@ -86,7 +86,9 @@ pub fn text(info: &DatasetInfo, stats: &DatasetStats, leakage: &Leakage) -> Stri
     let models: Vec<String> = info.models.iter().map(model).collect();
     let models = if models.is_empty() { String::new() } else { format!(" with the models {}", models.join(", ")) };
     let _ = write!(text, "\nMade by {}{models}.", info.tool);
-    info.notes.iter().for_each(|note| text += &format!(" {note}"));
+    for note in &info.notes {
+        let _ = write!(text, " {note}");
+    }
     text.push('\n');
     text
 }
@@ -127,7 +129,9 @@ fn header(info: &DatasetInfo) -> String {
         .collect();
     if !filled.is_empty() {
         text += "configs:\n- config_name: default\n  data_files:\n";
-        filled.iter().for_each(|name| text += &format!("  - split: {name}\n    path: \"{name}-*.tar\"\n"));
+        for name in filled {
+            let _ = writeln!(text, "  - split: {name}\n    path: \"{name}-*.tar\"");
+        }
     }
     text + "---\n\n"
 }

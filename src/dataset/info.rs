@@ -1,11 +1,9 @@
 //! Description file `info.json`: the meaning of all numbers, for readers without this program.
 
-use super::index;
-use super::index::ShardRef;
+use super::index::{self, ShardRef};
 use super::sample::{N_KEYPOINTS, OPTIONAL_EXTENSIONS, WORDS_EXTENSION};
 use super::split::{Split, SplitBy, SplitRule, TimeBlock};
-use orator_base::types::skeleton;
-use orator_base::types::skeleton::{N_JOINTS, Side};
+use orator_base::types::skeleton::{self, N_JOINTS, Side};
 use orator_base::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -17,7 +17,6 @@ pub mod layout;
 pub mod leakage;
 pub mod read;
 pub mod sample;
-pub mod shard_files;
 pub mod shared_sound;
 pub mod split;
 pub mod stats;

@@ -3,14 +3,15 @@
 
 use super::index::{ByteRange, SampleRef};
 use super::info::DatasetInfo;
+use super::layout::read_json;
 use super::sample::{N_KEYPOINTS, Sample, WORDS_EXTENSION};
-use super::shard_files::ShardFiles;
 use super::split::Split;
 use super::stats::DatasetStats;
 use super::{CHECKSUMS, INDEX, INFO, STATS};
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array2, Array3};
 use orator_base::stage::workdir::FolderLock;
+use orator_base::types::file_name::FileName;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::Posture;
 use orator_base::types::skeleton::N_JOINTS;
@@ -19,12 +20,13 @@ use orator_formats::npy;
 use orator_formats::npy::{Element, Layout};
 use orator_formats::transcript::Word;
 use orator_formats::wav;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fs::{self, File};
 use std::io::BufRead;
 use std::ops::Range;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
 
 /// Open dataset; threads may share it without a lock.
 pub struct Dataset {
@@ -237,8 +239,45 @@ struct Schema {
     schema: u32,
 }
 
-fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T> {
-    let bytes = std::fs::read(path).with_context(|| format!("reading {}", path.display()))?;
-    serde_json::from_slice(&bytes)
-        .with_context(|| format!("{} is not as the dataset stage writes it; run the stage again", path.display()))
+/// Files held open at a time; programs may have 1,024 by default.
+const MOST_OPEN: usize = 256;
+
+/// Shards of a folder; threads share it.
+pub struct ShardFiles {
+    dir: PathBuf,
+    names: BTreeSet<FileName>,
+    /// Those open, the one used last in front.
+    open: Mutex<VecDeque<(FileName, Arc<File>)>>,
+}
+
+impl ShardFiles {
+    /// Shards of those names in `dir`.
+    pub fn new(dir: &Path, names: BTreeSet<FileName>) -> Self {
+        Self { dir: dir.to_owned(), names, open: Mutex::default() }
+    }
+
+    /// The file of a shard.
+    ///
+    /// # Errors
+    /// A name that is none of its shards'; a file that cannot be opened.
+    pub fn get(&self, name: &FileName) -> Result<Arc<File>> {
+        self.names.get(name).context("no such shard")?;
+        let mut open = self.open.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let used = match open.iter().position(|(known, _)| known == name) {
+            Some(at) => open.remove(at),
+            None => None,
+        };
+        let used = match used {
+            Some(used) => used,
+            None => {
+                let path = self.dir.join(name);
+                let file = File::open(&path).with_context(|| format!("opening the shard {}", path.display()))?;
+                (name.clone(), Arc::new(file))
+            }
+        };
+        let file = used.1.clone();
+        open.push_front(used);
+        open.truncate(MOST_OPEN);
+        Ok(file)
+    }
 }

@@ -1,5 +1,6 @@
 //! Sample of the dataset: motion, keypoints, sound and metadata of an interval, and its members as bytes.
 
+use super::layout::pretty;
 use super::words;
 use anyhow::{Context, Result, ensure};
 use ndarray::Array3;
@@ -63,8 +64,7 @@ impl Sample {
             "{key}: {} samples of sound for {n_frames} frames, expected {expected}",
             self.sound.samples.len()
         );
-        let mut json = serde_json::to_vec_pretty(&self.meta).context("writing a sample's facts as JSON")?;
-        json.push(b'\n');
+        let json = pretty(&self.meta).context("writing a sample's facts as JSON")?;
         Ok([
             json,
             npy::write_bool(self.motion.mask.shape(), self.motion.mask.iter()),

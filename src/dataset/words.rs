@@ -1,6 +1,7 @@
 //! Words of a video in its samples: a word belongs to the sample that holds its middle, so that each stands in one at
 //! most, and its times count from that sample's beginning.
 
+use super::layout::file_name;
 use anyhow::{Result, ensure};
 use orator_base::stage::ledger::{TranscriptAccount, WordCount};
 use orator_formats::transcript::{Transcript, Word};
@@ -117,10 +118,6 @@ pub fn check(words: &[Word], secs: f64) -> Result<()> {
 
 fn middle(word: &Word) -> f64 {
     f64::midpoint(word.start_secs, word.end_secs)
-}
-
-fn file_name(path: &Path) -> String {
-    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 #[cfg(test)]

@@ -11,8 +11,8 @@ use orator_base::types::split::Split;
 use orator_dataset::bones::VideoBones;
 use orator_dataset::sample::{N_KEYPOINTS, Sample};
 use orator_dataset::split::SplitBy;
+use orator_dataset::write::assemble::DatasetWriter;
 use orator_dataset::write::part::VideoSource;
-use orator_dataset::write::writer::DatasetWriter;
 use orator_formats::transcript::Word;
 use serde_json::{Value, json};
 

@@ -8,10 +8,10 @@ use crate::cli::outputs::{OutputFiles, is_same_file, names, next_output, of_take
 use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, bail, ensure};
 use orator_base::stage::progress::Progress as _;
-use orator_gesture::batch::motion_files::{checkpoint_file, model_lock};
 use orator_gesture::batch::spoken::{SegmentFacts, SpeechSource};
-use orator_gesture::batch::{SpeechBatch, sounds, speaker, transcripts};
+use orator_gesture::batch::{SpeechBatch, motion_files, sounds, transcripts};
 use orator_gesture::generate::model::GenerationChoice;
+use orator_gesture::generate::model::{checkpoint_file, model_lock};
 use orator_gesture::generate::seq2seq::metadata::is_sequence;
 use orator_gesture::generate::trained::TrainedSpeaker;
 use orator_nn::seq2seq::predict::StateAtSeams;
@@ -97,7 +97,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     for (take, outputs) in takes.iter().zip(&outputs) {
         let choice = GenerationChoice { speaker: args.speaker.clone(), seed: take.seed };
         let trained = TrainedSpeaker::open_as(&checkpoint, &choice)?;
-        made.push((speaker::write(&trained, &source, outputs, ui)?, trained));
+        made.push((motion_files::write(&trained, &source, outputs, ui)?, trained));
     }
     let Some((written, trained)) = made.first() else { bail!("no take was asked for") };
     let speed = written.secs * made.len() as f64 / made.iter().map(|made| made.0.motion_secs).sum::<f64>().max(1e-6);

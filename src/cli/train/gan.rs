@@ -14,10 +14,10 @@ use orator_gesture::evaluate::clips::held_out;
 use orator_gesture::evaluate::clips::held_out::HeldOutInterval;
 use orator_gesture::generate::GestureGenerator;
 use orator_gesture::generate::model::GenerationChoice;
+use orator_gesture::train::epochs::StoppedTraining;
 use orator_gesture::train::epochs::ValidatedStep;
 use orator_gesture::train::gan::score::{Validation, ValidationMetrics, below_mean_pose};
 use orator_gesture::train::gan::train;
-use orator_gesture::train::stopped::StoppedTraining;
 use orator_report::training::strip::HeldOutPair;
 use serde_json::json;
 use std::path::PathBuf;
@@ -144,7 +144,7 @@ fn train_one(args: &Args, speaker: Option<&String>, config: &Config, ui: &Ui) ->
         outcome.steps,
         if outcome.stopped_early { ", ended early: the score had stopped falling" } else { "" },
         100.0 * outcome.waiting,
-        outcome.n_windows,
+        outcome.n_examples,
         outcome.n_parameters,
         metrics(&outcome.validation),
         outcome.newest.display(),
@@ -163,7 +163,7 @@ fn train_one(args: &Args, speaker: Option<&String>, config: &Config, ui: &Ui) ->
         "stopped_early": outcome.stopped_early,
         "steps_per_sec": steps_per_sec,
         "waiting": outcome.waiting,
-        "windows": outcome.n_windows,
+        "windows": outcome.n_examples,
         "parameters": outcome.n_parameters,
         "validation": outcome.validation,
         "newest": outcome.newest,

@@ -1,10 +1,13 @@
 //! `pipeline.toml` as written: the text becomes a table laid over the defaults, and every key that is unknown or of
 //! the wrong type is a `Problem` with its line. All problems are found before any is reported.
 
-use super::Settings;
 use super::auto::AUTO;
+use super::sections::PATHS;
+use super::{Settings, SpeakerConfig};
+use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
+use std::path::Path;
 use toml::de::{DeTable, DeValue};
 use toml::{Spanned, Table, Value};
 
@@ -50,6 +53,13 @@ pub struct Given {
     pub notes: Vec<String>,
 }
 
+/// Table in each section for the keys that few change, which `pipeline.toml` does not list: `[gan.advanced]`. Each key is
+/// accepted there and in the section itself.
+const ADVANCED: &str = "advanced";
+
+/// Largest count up to which f64 holds every whole number.
+const MOST_COUNT: f64 = 9_007_199_254_740_992.0;
+
 /// Former keys and sections, and what each is called now.
 const RENAMED: [(&str, &str); 2] = [("shard", "dataset"), ("segment.max_bone_change", "lift.max_bone_change")];
 
@@ -63,8 +73,13 @@ pub struct Folders<'a> {
 
 /// Reads the text of a `pipeline.toml` and `--set key=value` changes over the defaults.
 pub fn read(text: &str, sets: &[String], folders: &Folders) -> Given {
-    let mut reader = Reader { locations: BTreeMap::new(), problems: Vec::new(), notes: Vec::new() };
-    let mut table = defaults();
+    let mut reader = Reader {
+        defaults: defaults::<Settings>(),
+        locations: BTreeMap::new(),
+        problems: Vec::new(),
+        notes: Vec::new(),
+    };
+    let mut table = reader.defaults.clone();
     match DeTable::parse(text) {
         Ok(mut document) => {
             let location_at = |span| SourceLocation::Line(line_of(text, span));
@@ -92,28 +107,27 @@ pub fn read(text: &str, sets: &[String], folders: &Folders) -> Given {
     Given { settings, locations: reader.locations, problems: reader.problems, notes: reader.notes }
 }
 
-fn defaults() -> Table {
+/// Every key with its default.
+fn defaults<T: Default + Serialize>() -> Table {
     // The defaults are plain numbers, strings and paths: they always have a TOML form.
-    Table::try_from(Settings::default()).unwrap_or_default()
-}
-
-/// Keys of a `[[speaker]]`: the lists with an entry that shows its type.
-fn speaker_schema() -> Table {
-    let text = || Value::String(String::new());
-    let words = ["name", "reference", "size", "licence", "consent", "source"].map(|key| (key.to_owned(), text()));
-    let lists = ["videos", "keypoints", "audio", "transcripts", "exclude", "mirrored", "train", "validation", "test"];
-    let lists = lists.map(|key| (key.to_owned(), Value::Array(vec![text()])));
-    let others = [("fps", Value::Float(0.0)), ("same_person", Value::Boolean(false))];
-    words.into_iter().chain(lists).chain(others.map(|(key, value)| (key.to_owned(), value))).collect()
+    Table::try_from(T::default()).unwrap_or_default()
 }
 
 struct Reader {
+    /// Every key with its default.
+    defaults: Table,
     locations: BTreeMap<String, SourceLocation>,
     problems: Vec<Problem>,
     notes: Vec<String>,
 }
 
 impl Reader {
+    /// Default of `section.key`; `None` for a speaker's.
+    fn default_of(&self, key: &str) -> Option<&Value> {
+        let (section, name) = key.split_once('.')?;
+        self.defaults.get(section)?.get(name)
+    }
+
     fn problem(&mut self, key: &str, location: SourceLocation, message: String) {
         self.problems.push(Problem { key: key.to_owned(), location, message });
     }
@@ -163,21 +177,38 @@ impl Reader {
                 self.lay_speakers(value.get_ref(), table, location, location_at);
                 continue;
             }
+            let is_section = prefix.matches('.').count() == 1 && !prefix.starts_with("speaker[");
+            if name.get_ref() == ADVANCED && is_section {
+                match value.get_ref() {
+                    DeValue::Table(written) => self.lay(written, table, &format!("{key}."), location_at),
+                    other => self.problem(&key, location, format!("expected a table, found {}", other.type_str())),
+                }
+                continue;
+            }
             let Some(default) = table.get_mut(name.get_ref().as_ref()) else {
-                let near = nearest(name.get_ref(), table.keys());
+                let advanced = is_section.then(|| ADVANCED.to_owned());
+                let near = nearest(name.get_ref(), table.keys().chain(&advanced));
                 self.problem(&key, location, format!("unknown key{near}"));
                 continue;
             };
+            let plain = key.replacen(&format!(".{ADVANCED}."), ".", 1);
             if let (Value::Table(inner), DeValue::Table(written)) = (&mut *default, value.get_ref()) {
                 self.lay(written, inner, &format!("{key}."), location_at);
                 continue;
             }
-            let model = if takes_number(&key, default) { Value::Float(0.0) } else { default.clone() };
-            let model = if matches!(value.get_ref(), DeValue::String(_)) { default.clone() } else { model };
-            match typed(value.get_ref(), &model) {
+            let model = self.default_of(&plain).unwrap_or(default).clone();
+            let is_number = takes_number(&plain, &model) && !matches!(value.get_ref(), DeValue::String(_));
+            match typed(value.get_ref(), if is_number { &Value::Float(0.0) } else { &model }) {
                 Ok(value) => {
-                    *default = value;
-                    self.locations.insert(key, location);
+                    *default = if is_number { count(value) } else { value };
+                    // One file has no key twice, so that the other was written in the other table.
+                    if let Some(SourceLocation::Line(line)) = self.locations.insert(plain.clone(), location)
+                        && location != SourceLocation::CommandLine
+                    {
+                        let (section, name) = plain.split_once('.').unwrap_or_default();
+                        let other = if key == plain { format!("{section}.{ADVANCED}.{name}") } else { plain };
+                        self.problem(&key, location, format!("given in line {line} too, as {other}; keep one"));
+                    }
                 }
                 Err(message) => self.problem(&key, location, message),
             }
@@ -202,7 +233,7 @@ impl Reader {
                 self.problem(&key, location, "expected a [[speaker]] table".to_owned());
                 continue;
             };
-            let mut speaker = speaker_schema();
+            let mut speaker = defaults::<SpeakerConfig>();
             self.locations.insert(key.clone(), location);
             self.lay(written, &mut speaker, &format!("{key}."), location_at);
             let is_written = |name: &str| written.keys().any(|key| key.get_ref() == name);
@@ -232,30 +263,19 @@ impl Reader {
         }
     }
 
-    /// Makes each path absolute: those of the file within its folder, those of `--set` within the current one. A path is
-    /// a setting whose type also takes a path with a folder.
+    /// Makes each path absolute: those of the file within its folder, those of `--set` within the current one.
     fn resolve_paths(&self, table: &mut Table, folders: &Folders) {
-        for (section, value) in table.iter_mut() {
-            let (is_list, entries) = match value {
-                Value::Array(entries) => (true, entries.iter_mut().filter_map(Value::as_table_mut).collect()),
-                Value::Table(inner) => (false, vec![inner]),
+        for (section, name) in PATHS {
+            let entries = match table.get_mut(section) {
+                Some(Value::Array(entries)) => entries.iter_mut().filter_map(Value::as_table_mut).collect(),
+                Some(Value::Table(entry)) => vec![entry],
                 _ => continue,
             };
-            for (at, inner) in entries.into_iter().enumerate() {
-                let texts = inner.iter().filter_map(|(name, value)| Some((name.clone(), value.as_str()?.to_owned())));
-                for (name, path) in texts.filter(|(_, path)| !path.is_empty()).collect::<Vec<_>>() {
-                    let key = if is_list { format!("{section}[{at}].{name}") } else { format!("{section}.{name}") };
-                    let is_set = self.locations.get(&key) == Some(&SourceLocation::CommandLine);
-                    let folder = if is_set { folders.current } else { folders.file };
-                    let path = [("folder", folder.to_owned()), ("path", path)];
-                    let path = path.map(|(key, text)| (key.to_owned(), Value::String(text)));
-                    let mut changed = inner.clone();
-                    changed.insert(name, Value::Table(path.into_iter().collect()));
-                    let alone = Value::Table(changed.clone());
-                    let alone = if is_list { Value::Array(vec![alone]) } else { alone };
-                    if Table::from_iter([(section.clone(), alone)]).try_into::<Settings>().is_ok() {
-                        *inner = changed;
-                    }
+            let is_set = self.locations.get(&format!("{section}.{name}")) == Some(&SourceLocation::CommandLine);
+            let folder = Path::new(if is_set { folders.current } else { folders.file });
+            for path in entries.into_iter().filter_map(|entry| entry.get_mut(name)) {
+                if let Some(text) = path.as_str().filter(|text| !text.is_empty()) {
+                    *path = Value::String(folder.join(text).to_string_lossy().into_owned());
                 }
             }
         }
@@ -302,8 +322,18 @@ fn section<'t, 'a>(written: &'t mut DeTable<'a>, name: Option<&str>) -> Option<&
 /// Whether a key whose default is the word "auto" takes a number as well.
 fn takes_number(key: &str, default: &Value) -> bool {
     let Some((section, name)) = key.split_once('.').filter(|_| default.as_str() == Some(AUTO)) else { return false };
-    let alone = Table::from_iter([(name.to_owned(), Value::Float(1.0))]);
+    let alone = Table::from_iter([(name.to_owned(), Value::Integer(1))]);
     Table::from_iter([(section.to_owned(), Value::Table(alone))]).try_into::<Settings>().is_ok()
+}
+
+/// A number as a whole one where it is one, so that it also fits a count.
+fn count(value: Value) -> Value {
+    match value {
+        Value::Float(number) if number.fract() == 0.0 && (0.0..=MOST_COUNT).contains(&number) => {
+            Value::Integer(number as i64)
+        }
+        other => other,
+    }
 }
 
 /// `value` in the type of `default`, or what was expected.

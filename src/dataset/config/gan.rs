@@ -1,86 +1,65 @@
-//! `[gan]` of `pipeline.toml`: the training of the speech-to-gesture network, as it is asked for. What is `"auto"` the
-//! recipe chooses (`train::gan::recipe`).
+//! `[gan]`: the training of the speech-to-gesture network. A [`GanConfig`] is what a user asks for, in which numbers may be
+//! `"auto"`; a [`GanSettings`] has every number, as a recipe fills it in and as checkpoints store it. `pipeline.toml` and the
+//! guide (`configuration`) document the keys.
 
-use super::auto::Auto;
+use super::auto::{AUTO, Auto};
 use super::choices::{AdversarialLoss, ComputeDevice, GanRecipe, MotionRepresentation, NetworkPreset};
 use orator_base::types::posture::PostureChannel;
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 
-/// `[gan]`: the generator's training.
+/// The keys of `[gan]`; `N` is the type of a number, and `C` that of a count, that a recipe may choose.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct GanConfig {
-    /// What chooses the values that are `"auto"`.
+#[serde(default)]
+pub struct GanValues<N, C> {
     pub recipe: GanRecipe,
     pub preset: NetworkPreset,
     pub representation: MotionRepresentation,
-    /// What is learnt beside the 49 joints.
     pub channels: Vec<PostureChannel>,
-    /// Window length in frames.
     pub window_frames: usize,
-    /// Frames between the starts of two windows of an interval.
     pub stride_frames: usize,
-    pub batch: Auto<usize>,
-    pub steps: Auto<usize>,
-    /// Highest learning rate.
-    pub learning_rate: Auto<f64>,
-    /// Of a new speaker in a model of several: share of the learning rate at which the weights move that all speakers have in
-    /// common; 0: only its own layer is learnt.
-    pub shared_rate: Auto<f64>,
-    /// Steps in which the learning rate rises from 0.
-    pub warmup_steps: Auto<usize>,
-    /// Share of the learning rate that is left at the last step, along half a cosine; 1: it stays.
-    pub fade_to: Auto<f64>,
+    pub batch: C,
+    pub steps: C,
+    pub learning_rate: N,
+    pub shared_rate: N,
+    pub warmup_steps: C,
+    pub fade_to: N,
     pub adversarial: AdversarialLoss,
-    /// Weights of the losses.
     pub lambda_l1: f64,
+    pub lambda_speed: N,
+    pub lambda_energy: N,
     pub lambda_velocity: f64,
-    /// Of the squared error of the joints' speeds: when they move, wherever they go.
-    pub lambda_speed: Auto<f64>,
-    /// Of the distance of the joints' mean squared speeds from the data's.
-    pub lambda_energy: Auto<f64>,
-    pub lambda_gan: Auto<f64>,
+    pub lambda_gan: N,
     pub lambda_bone: f64,
-    /// Step from which there is an adversarial loss, and steps in which its weight then rises from 0.
-    pub adversarial_from: Auto<usize>,
-    pub adversarial_ramp: Auto<usize>,
-    /// Weight of the past in the mean of the generator's weights that is validated and generates; 0: no mean.
-    pub ema_decay: Auto<f64>,
-    /// Share of the channels of the encoded sound that a step drops.
-    pub dropout: Auto<f64>,
-    /// Weight decay beside Adam (Loshchilov & Hutter 2019).
-    pub weight_decay: Auto<f64>,
-    /// Largest change of a window's speed, sound and motion alike, as a share.
-    pub augment_speed: Auto<f64>,
-    /// Largest shift of the spectrogram along its bands.
-    pub augment_pitch: Auto<f64>,
-    /// Largest change of loudness, dB.
-    pub augment_gain_db: Auto<f64>,
-    /// Loudest noise added, dB against the window's mean; -120: none.
-    pub augment_noise_db: Auto<f64>,
-    /// Most bands, and most seconds, that one mask hides.
-    pub augment_mask_bands: Auto<usize>,
-    pub augment_mask_secs: Auto<f64>,
-    /// Deviation of noise on the poses that the discriminator sees, normalised.
-    pub augment_pose_noise: Auto<f64>,
-    /// Share of the windows whose body is mirrored.
+    pub adversarial_from: C,
+    pub adversarial_ramp: C,
+    pub ema_decay: N,
+    pub dropout: N,
+    pub weight_decay: N,
+    pub augment_speed: N,
+    pub augment_pitch: N,
+    pub augment_gain_db: N,
+    pub augment_noise_db: N,
+    pub augment_mask_bands: C,
+    pub augment_mask_secs: N,
+    pub augment_pose_noise: N,
     pub augment_mirror: f64,
     pub seed: u64,
-    /// Steps of an epoch: at its end comes a validation.
-    pub epoch_steps: Auto<usize>,
-    /// Epochs without a better score after which the training ends; 0: never.
-    pub patience: Auto<usize>,
-    /// Steps between checkpoints; one comes with each validation too.
+    pub epoch_steps: C,
+    pub patience: C,
     pub checkpoint_every: usize,
-    /// Checkpoints kept.
     pub keep_checkpoints: usize,
     pub device: ComputeDevice,
 }
 
-impl Default for GanConfig {
-    fn default() -> Self {
-        let number = Auto::<f64>::Chosen;
-        let count = Auto::<usize>::Chosen;
+/// `[gan]` as a user asks for it.
+pub type GanConfig = GanValues<Auto<f64>, Auto<usize>>;
+/// `[gan]` with every number.
+pub type GanSettings = GanValues<f64, usize>;
+
+impl<N: Copy, C: Copy> GanValues<N, C> {
+    /// The defaults, with `number` and `count` for what a recipe chooses.
+    fn with(number: N, count: C) -> Self {
         Self {
             recipe: GanRecipe::Auto,
             preset: NetworkPreset::Light,
@@ -121,5 +100,102 @@ impl Default for GanConfig {
             keep_checkpoints: 3,
             device: ComputeDevice::Cpu,
         }
+    }
+}
+
+impl Default for GanConfig {
+    fn default() -> Self {
+        Self::with(Auto::Chosen, Auto::Chosen)
+    }
+}
+
+/// What a checkpoint means that does not state a key: versions without recipes trained as `paper` does.
+impl Default for GanSettings {
+    fn default() -> Self {
+        Self {
+            recipe: GanRecipe::Paper,
+            shared_rate: 1.0,
+            fade_to: 1.0,
+            augment_noise_db: -120.0,
+            ..Self::with(0.0, 0)
+        }
+    }
+}
+
+impl GanConfig {
+    /// The settings in which each key that is `"auto"` has the value that `recipe` gives it.
+    ///
+    /// # Errors
+    /// A key for which the recipe has no value, or a fraction for a count.
+    pub fn filled(&self, recipe: impl Fn(&str) -> Option<f64>) -> serde_json::Result<GanSettings> {
+        let mut values = serde_json::to_value(self)?;
+        for (key, value) in values.as_object_mut().into_iter().flatten() {
+            if *value == AUTO
+                && key != "recipe"
+                && let Some(chosen) = recipe(key)
+            {
+                *value = number(chosen);
+            }
+        }
+        serde_json::from_value(values)
+    }
+}
+
+/// A number as JSON; a count stays one.
+fn number(value: f64) -> Value {
+    if value.fract() == 0.0 && value >= 0.0 { json!(value as u64) } else { json!(value) }
+}
+
+impl GanSettings {
+    /// Learning rate of the step after `step` steps: it rises along a line, then falls along half a cosine.
+    pub fn rate(&self, step: usize) -> f64 {
+        let Self { learning_rate, warmup_steps, fade_to, steps, .. } = self;
+        if step < *warmup_steps {
+            return learning_rate * (step + 1) as f64 / (*warmup_steps + 1) as f64;
+        }
+        let n_fading = steps.saturating_sub(*warmup_steps).max(1);
+        let share = ((step - warmup_steps) as f64 / n_fading as f64).min(1.0);
+        let left = 0.5 * (1.0 + (std::f64::consts::PI * share).cos());
+        learning_rate * (fade_to + (1.0 - fade_to) * left)
+    }
+
+    /// Weight of the adversarial loss of the step after `step` steps; 0: there is none.
+    pub fn adversarial_weight(&self, step: usize) -> f64 {
+        let Some(since) = step.checked_sub(self.adversarial_from) else { return 0.0 };
+        let share = (since + 1) as f64 / (self.adversarial_ramp + 1) as f64;
+        self.lambda_gan * share.min(1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rate_rises_along_a_line_and_falls_along_half_a_cosine() {
+        let base = GanSettings { learning_rate: 1.0, ..GanSettings::default() };
+        let of = GanSettings { warmup_steps: 9, fade_to: 0.1, steps: 109, ..base.clone() };
+        assert_eq!((of.rate(0), of.rate(4), of.rate(9)), (0.1, 0.5, 1.0));
+        assert!((of.rate(59) - 0.55).abs() < 1e-12 && (of.rate(109) - 0.1).abs() < 1e-12);
+        assert!((of.rate(500) - 0.1).abs() < 1e-12, "a training that goes on after its last step");
+        assert_eq!((base.rate(0), base.rate(70_000)), (1.0, 1.0));
+    }
+
+    #[test]
+    fn the_adversarial_loss_starts_at_its_step() {
+        let always = GanSettings { lambda_gan: 0.5, ..GanSettings::default() };
+        let of = GanSettings { adversarial_from: 100, adversarial_ramp: 9, ..always.clone() };
+        let weights = [0, 99, 100, 104, 109, 1_000].map(|step| of.adversarial_weight(step));
+        assert_eq!(weights, [0.0, 0.0, 0.05, 0.25, 0.5, 0.5]);
+        assert_eq!(always.adversarial_weight(0), 0.5);
+    }
+
+    #[test]
+    fn what_is_given_counts_and_a_recipe_fills_the_rest() {
+        let asked = GanConfig { steps: 400.into(), dropout: 0.0.into(), ..GanConfig::default() };
+        let filled = asked.filled(|key| Some(if key == "augment_noise_db" { -0.5 } else { 7.0 })).unwrap();
+        let expected = GanSettings { steps: 400, dropout: 0.0, augment_noise_db: -0.5, ..GanSettings::with(7.0, 7) };
+        assert_eq!(filled, expected);
+        assert!(asked.filled(|_| None).is_err() && asked.filled(|_| Some(0.5)).is_err());
     }
 }

@@ -52,20 +52,18 @@ pub fn of_speaker(
         }
     }
     let is_one = paths.len() == 1 && sounds.len() == 1;
-    let source = |path: PathBuf| {
-        let name = name_of(&path);
-        let sound = sounds.iter().find(|sound| is_one || name_of(sound) == name).cloned();
-        let sound = sound.ok_or_else(|| match speaker.audio.is_empty() {
-            true => {
+    let source =
+        |path: PathBuf| {
+            let name = name_of(&path);
+            let sound = sounds.iter().find(|sound| is_one || name_of(sound) == name).cloned();
+            let sound = sound.ok_or_else(|| if speaker.audio.is_empty() {
                 "keypoints have no sound; write `audio = [\"FOLDER\"]` beside `keypoints` (a folder, a pattern or a \
                      file; a sound is found by the name of its keypoints)"
                     .to_owned()
-            }
-            false => format!("no sound called {name} is in `audio`; name it like the keypoints, as in {name}.wav"),
-        });
-        let fps = FrameRate::nearest(speaker.fps).filter(|_| speaker.fps > 0.0);
-        (path, KeypointSource { fps, image_size: speaker.image_size(), sound })
-    };
+            } else { format!("no sound called {name} is in `audio`; name it like the keypoints, as in {name}.wav") });
+            let fps = FrameRate::nearest(speaker.fps).filter(|_| speaker.fps > 0.0);
+            (path, KeypointSource { fps, image_size: speaker.image_size(), sound })
+        };
     paths.into_iter().map(source).collect()
 }
 
@@ -80,10 +78,7 @@ fn of_entry(entry: &str, root: &SearchRoot, missing: &mut Vec<String>) -> Result
         // A pattern may match every frame of a folder.
         let parent = path.parent().unwrap_or(&root.folder).to_owned();
         let has_frames = || is_json(&path) && entry.contains(['*', '?', '[']) && is_frame(&path);
-        match *frames_in.entry(parent.clone()).or_insert_with(has_frames) {
-            true => found.push(parent),
-            false => found.push(path),
-        }
+        if *frames_in.entry(parent.clone()).or_insert_with(has_frames) { found.push(parent) } else { found.push(path) }
     }
     let nothing = || format!("{entry}: no keypoints are there ({}, or folders of frames)", ENDINGS.join(", "));
     if found.is_empty() { Err(nothing()) } else { Ok(found) }
@@ -95,9 +90,12 @@ fn of_folder(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     if holds_frames(&paths) {
         return Ok(vec![folder.to_owned()]);
     }
-    let is_one = |path: &PathBuf| match path.is_dir() {
-        true => patterns::list(path).is_ok_and(|paths| holds_frames(&paths)),
-        false => patterns::has_ending(path, &ENDINGS),
+    let is_one = |path: &PathBuf| {
+        if path.is_dir() {
+            patterns::list(path).is_ok_and(|paths| holds_frames(&paths))
+        } else {
+            patterns::has_ending(path, &ENDINGS)
+        }
     };
     Ok(paths.into_iter().filter(is_one).collect())
 }

@@ -2,9 +2,9 @@
 //! defaults in, paths absolute, every value in its range). Each section is one small struct whose defaults are the
 //! documented ones; the top level `pipeline.toml` documents them and a test holds the two together.
 
-use super::file::{Folders, Problem};
+use super::file::{self, Folders, Problem};
+use super::rules;
 use super::sections::Settings;
-use super::{file, rules};
 use anyhow::{Context, Result};
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -104,7 +104,71 @@ mod tests {
         assert_eq!(Settings { speaker: Vec::new(), ..settings }, Settings::default());
         let one_speaker = Settings { speaker: vec![crate::config::SpeakerConfig::default()], ..Settings::default() };
         let defaults = toml::Table::try_from(one_speaker).unwrap();
-        assert_eq!(keys(&DEFAULT_FILE.parse().unwrap()), keys(&defaults));
+        let (listed, advanced) = (keys(&DEFAULT_FILE.parse().unwrap()), advanced_keys());
+        assert!(listed.len() <= 75 && listed.is_disjoint(&advanced), "{}", listed.len());
+        assert_eq!(listed.union(&advanced).cloned().collect::<BTreeSet<_>>(), keys(&defaults));
+    }
+
+    /// `section.key` of the guide's tables, whose defaults and ranges are those of the program.
+    fn advanced_keys() -> BTreeSet<String> {
+        let (mut section, mut keys) = ("", BTreeSet::new());
+        for line in include_str!("../../guide/configuration.md").lines() {
+            if let Some(of) = line.strip_prefix("### `[").and_then(|rest| rest.strip_suffix(".advanced]`")) {
+                section = of;
+            }
+            let cells: Vec<&str> =
+                line.trim_matches('|').split('|').map(|cell| cell.trim().trim_matches('`')).collect();
+            let [name, default, _, range] = cells[..] else { continue };
+            if section.is_empty() || name == "key" || name.starts_with('-') {
+                continue;
+            }
+            let key = format!("{section}.{name}");
+            let written = format!("[{section}.advanced]\n{name} = {default}\n");
+            let read = resolve(&written, &[], Path::new("pipeline.toml")).unwrap().0;
+            let set = resolve("", &[format!("{section}.{name}={default}")], Path::new("pipeline.toml")).unwrap().0;
+            let own = resolve("", &[], Path::new("pipeline.toml")).unwrap().0;
+            assert!(read == own && set == own, "{key} is not {default}");
+            if let Some((_, low, high, unit)) = rules::RANGES.iter().find(|(of, ..)| *of == key) {
+                assert_eq!(range, format!("{low} to {high} {unit}").trim_end(), "{key}");
+            }
+            assert!(keys.insert(key), "{name} is there twice");
+        }
+        keys
+    }
+
+    #[test]
+    fn a_key_is_read_in_its_section_and_in_the_advanced_table() {
+        let read = |text: &str, sets: &[&str]| {
+            let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
+            resolve(text, &sets, Path::new("p.toml")).unwrap().0.gan
+        };
+        let expected = read("[gan]\nlambda_speed = 0.5\n", &[]);
+        assert_eq!(expected.lambda_speed.given(), Some(0.5));
+        assert_eq!(read("[gan.advanced]\nlambda_speed = 0.5\n", &[]), expected);
+        assert_eq!(read("", &["gan.lambda_speed=0.5"]), expected);
+        assert_eq!(read("[gan]\nlambda_speed = 1.0\n", &["gan.advanced.lambda_speed=0.5"]), expected);
+        assert_eq!(
+            problems(
+                "[gan]\nlambda_speed = 1.0\n[gan.advanced]\nlambda_speed = 0.5\nlambda_sped = 1\nseed = \"a\"\n",
+                &[]
+            ),
+            [
+                "line 2: gan.lambda_speed: given in line 4 too, as gan.advanced.lambda_speed; keep one",
+                "line 5: gan.advanced.lambda_sped: unknown key (did you mean lambda_speed?)",
+                "line 6: gan.advanced.seed: expected a whole number, found string",
+            ]
+        );
+        assert_eq!(
+            problems(
+                "[gan]\nadvanced = 3\n[segment.advansed]\nmax_jump = 1\n",
+                &["lift.advanced.max_bone_change=7000"]
+            ),
+            [
+                "line 2: gan.advanced: expected a table, found integer",
+                "line 3: segment.advansed: unknown key (did you mean advanced?)",
+                "--set: lift.max_bone_change: 7000 is out of range: expected 0.01 to 100 bone lengths",
+            ]
+        );
     }
 
     /// `section.key` of all that a file holds.

@@ -4,7 +4,6 @@
 
 pub mod auto;
 pub mod choices;
-pub mod config_path;
 pub mod file;
 pub mod gan;
 pub mod keypoints;
@@ -21,14 +20,9 @@ pub use choices::{
     AdversarialLoss, ComputeDevice, ContinuityLoss, DistanceLoss, FollowRule, GanRecipe, MotionRepresentation,
     NetworkPreset, ReachLoss, SequenceNetwork, SpeechRule, SplitUnit,
 };
-pub use config_path::ConfigPath;
-pub use file::Problem;
-pub use file::SourceLocation;
-pub use gan::GanConfig;
+pub use file::{Problem, SourceLocation};
+pub use gan::{GanConfig, GanSettings};
 pub use keypoints::KeypointSource;
-pub use load::Config;
-pub use load::ConfigError;
-pub use load::DEFAULT_FILE;
-pub use load::{load, load_default};
+pub use load::{Config, ConfigError, DEFAULT_FILE, load, load_default};
 pub use sections::*;
 pub use seq2seq::Seq2seqConfig;

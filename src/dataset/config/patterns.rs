@@ -32,7 +32,8 @@ impl SearchRoot {
 /// Endings taken for videos when a folder is named.
 pub const OF_VIDEOS: [&str; 10] = ["mp4", "mkv", "mov", "webm", "avi", "m4v", "mpg", "mpeg", "ts", "wmv"];
 /// Endings taken for sounds, beside those of videos.
-pub const OF_SOUNDS: [&str; 8] = ["wav", "mp3", "flac", "ogg", "opus", "m4a", "aac", "wma"];
+pub const OF_SOUNDS: [&str; 12] =
+    ["wav", "flac", "mp3", "m4a", "ogg", "opus", "aac", "oga", "aif", "aiff", "wma", "caf"];
 
 /// Endings taken for transcripts.
 pub const OF_TRANSCRIPTS: [&str; 7] = ["json", "srt", "vtt", "textgrid", "ctm", "tsv", "txt"];

@@ -1,4 +1,5 @@
-//! `[seq2seq]`: training of the sequence-to-sequence networks.
+//! `[seq2seq]`: training of the sequence-to-sequence networks. `pipeline.toml` and the guide (`configuration`) document the
+//! keys.
 
 use super::choices::{ContinuityLoss, DistanceLoss, ReachLoss, SequenceNetwork};
 use serde::{Deserialize, Serialize};
@@ -8,41 +9,27 @@ use serde::{Deserialize, Serialize};
 #[serde(default, deny_unknown_fields)]
 pub struct Seq2seqConfig {
     pub network: SequenceNetwork,
-    /// Frames between the starts of two segments; 0: as long as a segment.
     pub stride_frames: usize,
     pub batch: usize,
     pub steps: usize,
     pub learning_rate: f64,
-    /// Step from which the learning rate falls in a line, to 0 behind the last of `steps`; 0: it does not.
     pub fade_from: usize,
-    /// Readings of the losses: the authors' code, or the paper. `autoencoder` has squared differences of codes alone.
     pub distance: DistanceLoss,
     pub continuity: ContinuityLoss,
     pub reach: ReachLoss,
-    /// Weights of the losses beside the distance.
     pub lambda_continuity: f64,
     pub lambda_reach: f64,
     pub lambda_adversarial: f64,
-    /// Seconds on either side of a segment whose words `words` reads.
     pub words_around_secs: f64,
-    /// Share of the segments that begin with poses the network made itself (scheduled sampling, Bengio et al. 2015).
     pub own_previous: f64,
-    /// Share of the words of a segment that a step reads as unknown ones (word dropout, Iyyer et al. 2015).
     pub word_dropout: f64,
-    /// Numbers of a state.
     pub hidden: usize,
-    /// Whether `words` and `adversarial` hear a GRU over the sound around a pose instead of that of the pose alone.
     pub hears_context: bool,
-    /// Steps in which `autoencoder` learns codes of poses, before it learns to hear them.
     pub autoencoder_steps: usize,
     pub seed: u64,
-    /// Steps of an epoch: at its end comes a validation.
     pub epoch_steps: usize,
-    /// Epochs without a better score after which the training ends; 0: never.
     pub patience: usize,
-    /// Steps between checkpoints; one comes with each validation too.
     pub checkpoint_every: usize,
-    /// Checkpoints kept.
     pub keep_checkpoints: usize,
 }
 

@@ -3,8 +3,7 @@
 
 use super::keypoints::{self, KeypointSource};
 use super::patterns::{self, SearchRoot};
-use super::transcripts;
-use super::{Config, SpeakerConfig};
+use super::{Config, SpeakerConfig, transcripts};
 use orator_base::stage::Unit;
 use orator_base::types::split::Split;
 use std::collections::BTreeMap;

@@ -3,11 +3,11 @@
 //! old one.
 
 use crate::info::DatasetInfo;
+use crate::layout::{pretty, read_json};
 use crate::leakage::Leakage;
 use crate::split::SplitBy;
 use crate::write::assemble::assemble;
-use crate::write::part;
-use crate::write::part::VideoEntry;
+use crate::write::part::{self, VideoEntry};
 use crate::{INFO, LEAKAGE};
 use anyhow::{Context, Result, ensure};
 use orator_base::stage::workdir;
@@ -52,17 +52,18 @@ pub fn without(dir: &Path, names: &BTreeSet<String>) -> Result<()> {
     if !dir.exists() {
         return Ok(());
     }
-    let left: Vec<String> = match dir.join(part::FOLDER).is_dir() {
-        true => part::names(dir)?.into_iter().filter(|name| !names.contains(name)).collect(),
-        false => Vec::new(),
+    let left: Vec<String> = if dir.join(part::FOLDER).is_dir() {
+        part::names(dir)?.into_iter().filter(|name| !names.contains(name)).collect()
+    } else {
+        Vec::new()
     };
     if left.is_empty() {
         return remove_whole(dir).with_context(|| format!("cannot remove {}", dir.display()));
     }
     let attempt = workdir::attempt_folder(dir)?;
     let made = || -> Result<()> {
-        let info: DatasetInfo = read_json(dir, INFO)?;
-        let leakage: Leakage = read_json(dir, LEAKAGE)?;
+        let info: DatasetInfo = read_json(&dir.join(INFO))?;
+        let leakage: Leakage = read_json(&dir.join(LEAKAGE))?;
         let mut compared = leakage.compared();
         compared.shared.retain(|shared| !names.contains(&shared.a) && !names.contains(&shared.b));
         for name in &left {
@@ -110,16 +111,4 @@ fn silenced(part: &VideoEntry, names: &BTreeSet<String>) -> VideoEntry {
         names.iter().for_each(|name| refused.message = refused.message.replace(name.as_str(), FORGOTTEN));
     }
     part
-}
-
-fn pretty(part: &VideoEntry) -> Result<Vec<u8>> {
-    let mut bytes = serde_json::to_vec_pretty(part)?;
-    bytes.push(b'\n');
-    Ok(bytes)
-}
-
-fn read_json<T: serde::de::DeserializeOwned>(dir: &Path, name: &str) -> Result<T> {
-    let path = dir.join(name);
-    let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
-    serde_json::from_slice(&bytes).with_context(|| format!("{} is damaged", path.display()))
 }

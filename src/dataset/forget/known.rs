@@ -2,12 +2,11 @@
 //! name or work name.
 
 use crate::config::{Config, videos};
+use crate::layout::file_name;
 use crate::split::SplitRecord;
-use crate::write::part;
-use crate::write::part::VideoEntry;
+use crate::write::part::{self, VideoEntry};
 use anyhow::{Result, bail, ensure};
-use orator_base::stage::artifacts;
-use orator_base::stage::artifacts::{StageName, speaker_dir};
+use orator_base::stage::artifacts::{self, StageName, speaker_dir};
 use orator_base::stage::fingerprint::hash_file;
 use orator_base::stage::parts::PARTS;
 use orator_base::stage::record::Record;
@@ -64,7 +63,7 @@ pub fn of_project(config: &Config) -> Result<Vec<KnownVideo>> {
     let mut known: Vec<KnownVideo> = Vec::new();
     for unit in videos::of(&all).into_iter().flat_map(|videos| videos.units) {
         let content = content(work, &unit.speaker, &unit.video);
-        let file = unit.source.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let file = file_name(&unit.source);
         let (speaker, work, source) = (unit.speaker, Some(unit.video), Some(unit.source));
         known.push(KnownVideo { speaker, work, source, content, file, parts: BTreeSet::new() });
     }
@@ -206,7 +205,7 @@ pub fn one<'a>(known: &'a [KnownVideo], wanted: &str, speaker: Option<&str>) -> 
             Some(source) => format!("\n  {}  {}", k.title(), source.display()),
             None => format!("\n  {}  {}", k.title(), k.file),
         };
-        videos.iter().map(line).collect::<String>()
+        videos.iter().map(line).collect::<Vec<_>>().concat()
     };
     let called: Vec<&KnownVideo> = all.iter().copied().filter(|k| k.is_called(wanted)).collect();
     match called.as_slice() {

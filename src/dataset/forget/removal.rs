@@ -5,10 +5,10 @@
 use super::dataset;
 use super::known::KnownVideo;
 use super::search::SearchTerm;
+use crate::layout::file_name;
 use crate::split::SplitRecord;
 use anyhow::{Context, Result};
-use orator_base::stage::artifacts;
-use orator_base::stage::artifacts::{StageName, speaker_dir};
+use orator_base::stage::artifacts::{self, StageName, speaker_dir};
 use orator_base::stage::fingerprint::hash_file;
 use orator_base::stage::{record, workdir};
 use orator_formats::checkpoint;
@@ -86,7 +86,7 @@ impl Removal {
             }
             let own: Vec<&String> = videos.iter().filter_map(|video| video.work.as_ref()).collect();
             for path in listed(&folder)? {
-                let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                let name = file_name(&path);
                 let name = name.trim_start_matches('.');
                 let is_of = |work: &&String| {
                     name.strip_prefix(work.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '_']))

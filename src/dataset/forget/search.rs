@@ -1,6 +1,7 @@
 //! Search of every byte of every file for a video's names and hashes: as text, as raw bytes, and inside `.npz` archives
 //! (members of tar files are stored uncompressed). Names of files and folders are searched too.
 
+use crate::layout::file_name;
 use anyhow::{Context, Result};
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -102,7 +103,7 @@ fn walk(root: &Path, path: &Path, terms: &[&SearchTerm], searched: &mut Searched
         return Ok(());
     }
     if path != root {
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let name = file_name(path);
         let mut scan = Scan::new(terms);
         scan.piece(name.as_bytes());
         let found =

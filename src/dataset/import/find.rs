@@ -2,6 +2,7 @@
 //! neighbouring one (`bvh/`, `wav/`, `tsv/`).
 
 use crate::INFO;
+use crate::config::patterns::OF_SOUNDS;
 use crate::write::part;
 use anyhow::{Context, Result, ensure};
 use orator_formats::mocap::captured::MotionKind;
@@ -32,7 +33,6 @@ pub struct ImportSources {
     pub unknown: Vec<(PathBuf, String)>,
 }
 
-const SOUND: [&str; 7] = ["wav", "flac", "mp3", "m4a", "ogg", "opus", "aac"];
 /// Names of neighbouring folders, in lower case.
 const SOUND_FOLDERS: [&str; 6] = ["wav", "wavs", "audio", "audios", "sound", "speech"];
 const TRANSCRIPT_FOLDERS: [&str; 13] = [
@@ -136,7 +136,7 @@ fn with_company(kind: MotionKind, motion: PathBuf) -> TakeFiles {
     let mut stems = vec![stem.as_str()];
     // The sound of gt_interval_3821.txt is 3821.wav.
     stems.extend(["gt_interval_", "prediction_interval_"].iter().filter_map(|prefix| stem.strip_prefix(prefix)));
-    let sound = beside(&motion, &stems, &SOUND, &SOUND_FOLDERS);
+    let sound = beside(&motion, &stems, &OF_SOUNDS, &SOUND_FOLDERS);
     let transcript = beside(&motion, &stems, &transcript::ENDINGS, &TRANSCRIPT_FOLDERS);
     TakeFiles { kind, motion, sound, transcript }
 }

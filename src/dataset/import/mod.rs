@@ -6,12 +6,10 @@
 //! unchanged.
 
 pub mod find;
-pub mod plan;
 pub mod shards;
 pub mod source;
 pub mod take;
 pub mod write;
 
-pub use plan::ImportPlan;
 pub use take::ImportedTake;
-pub use write::{Imported, import};
+pub use write::{ImportPlan, Imported, import};

@@ -2,6 +2,7 @@
 //! and noted. Bytes of members stay unchanged wherever a dataset can hold them.
 
 use crate::Split;
+use crate::layout::file_name;
 use crate::sample::{EXTENSIONS, N_KEYPOINTS, OPTIONAL_EXTENSIONS, Sample, WORDS_EXTENSION};
 use anyhow::{Context, Result, bail, ensure};
 use ndarray::{Array2, Array3};
@@ -73,7 +74,7 @@ pub fn open(tars: &[PathBuf]) -> Loose {
             Ok(_) => {}
             Err(error) => loose.failed.push((tar.clone(), format!("{error:#}"))),
         }
-        let name = tar.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let name = file_name(tar);
         let left_out =
             |(ending, n): (String, usize)| format!("{name}: {n} x .{ending} left out, no member of a sample");
         loose.notes.extend(unknown.into_iter().map(left_out));
@@ -106,7 +107,7 @@ fn list(
         }
         n_files += 1;
         let path = entry.path().with_context(reading)?.into_owned();
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let name = file_name(&path);
         let (key, ending) = name.split_once('.').unwrap_or((&name, ""));
         let member = EXTENSIONS.iter().chain(&OPTIONAL_EXTENSIONS).position(|extension| *extension == ending);
         let Some(member) = member else {
@@ -115,7 +116,7 @@ fn list(
         };
         let place = MemberLocation { tar: tar.to_owned(), offset: entry.raw_file_position(), bytes: entry.size() };
         ensure!(place.offset.saturating_add(place.bytes) <= length, "{}: {name} is cut off", reading());
-        let fresh = || LooseSample { key: key.to_owned(), members: Default::default(), optional: Default::default() };
+        let fresh = || LooseSample { key: key.to_owned(), members: [const { None }; 5], optional: [const { None }; 3] };
         let sample = samples.entry(key.to_owned()).or_insert_with(fresh);
         let Some(known) = sample.members.iter_mut().chain(&mut sample.optional).nth(member) else { continue };
         if let Some(first) = known {
@@ -155,7 +156,7 @@ impl LooseSample {
     /// # Errors
     /// A member that is missing or damaged; the message names it and its tar.
     pub fn read(&self) -> Result<(Sample, Vec<u8>)> {
-        let mut members: [Vec<u8>; 5] = Default::default();
+        let mut members = [const { Vec::new() }; 5];
         let mut tar = String::new();
         for ((place, extension), bytes) in self.members.iter().zip(EXTENSIONS).zip(&mut members) {
             let Some(place) = place else { bail!("the sample {} has no {}.{extension}", self.key, self.key) };

@@ -2,20 +2,21 @@
 //! first (outcome, ledger, sound codes) and written once its split is known.
 
 use super::find::{ImportSources, TakeFiles};
-use super::plan::{ImportOutcome, ImportPlan};
 use super::shards;
 use super::shards::{LooseSample, LooseVideo};
 use super::take::{ImportedTake, TakeOutcome};
+use super::write::{ImportOutcome, ImportPlan};
 use crate::bones::{VideoBones, of_speaker};
 use crate::config::videos::slug;
 use crate::info::DatasetInfo;
+use crate::layout::{file_name, read_json};
 use crate::shared_sound::SharedSound;
 use crate::split::{Assignment, SplitBy, TimeBlock};
+use crate::write::assemble::DatasetWriter;
 use crate::write::part;
 use crate::write::part::{VideoEntry, VideoSource};
-use crate::write::writer::DatasetWriter;
 use crate::{INFO, Split};
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 use orator_base::audio::fingerprint::Fingerprinter;
 use orator_base::motion::bones;
 use orator_base::stage::fingerprint::hash_file;
@@ -229,9 +230,7 @@ fn made_from(found: &TakeFiles, plan: &ImportPlan) -> Result<String> {
 }
 
 fn look_at_part(dir: &Path, name: &str, plan: &ImportPlan) -> Result<InspectedItem> {
-    let info = std::fs::read(dir.join(INFO)).with_context(|| format!("cannot read {}", dir.join(INFO).display()))?;
-    let info: DatasetInfo =
-        serde_json::from_slice(&info).with_context(|| format!("{} is damaged", dir.join(INFO).display()))?;
+    let info: DatasetInfo = read_json(&dir.join(INFO))?;
     let fps = plan.limits.fps;
     ensure!(
         info.fps == fps,
@@ -368,8 +367,4 @@ impl InspectedItem {
         };
         ImportOutcome { file: file.to_owned(), ended, kept_secs: self.source.ledger.kept_secs(), reason, message }
     }
-}
-
-fn file_name(path: &Path) -> String {
-    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }

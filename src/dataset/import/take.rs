@@ -3,6 +3,7 @@
 
 use super::find::TakeFiles;
 use crate::config::videos::slug;
+use crate::layout::file_name;
 use crate::sample::{N_KEYPOINTS, Sample};
 use crate::words::VideoWords;
 use anyhow::{Context, Result};
@@ -24,7 +25,6 @@ use orator_formats::mocap::captured::MotionKind;
 use orator_formats::transcript::{Transcript, Word};
 use orator_media::ffmpeg::audio;
 use serde_json::{Value, json};
-use std::path::Path;
 
 /// Requirements on a take.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -134,10 +134,9 @@ fn refusal(n_frames: usize, sound: Option<&Sound>, found: &TakeFiles, limits: &T
 }
 
 fn no_sound(found: &TakeFiles) -> TakeRefusal {
-    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let message = match &found.sound {
-        Some(sound) => format!("{} holds no sound", name(sound)),
-        None => format!("no sound file has the name of {}", name(&found.motion)),
+        Some(sound) => format!("{} holds no sound", file_name(sound)),
+        None => format!("no sound file has the name of {}", file_name(&found.motion)),
     };
     TakeRefusal { why: FrameRefusal::new(Refusal::NoSoundFile, 0.0, 0.0), message }
 }
@@ -178,7 +177,6 @@ fn keep(
         let hand = motion.mask.slice(s![.., root..root + N_HAND_JOINTS]);
         hand.iter().filter(|&&seen| seen).count() as f64 / hand.len().max(1) as f64
     };
-    let file = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let mut meta = json!({
         "video": name,
         "first_frame": 0,
@@ -192,8 +190,8 @@ fn keep(
         "sound_samples_padded": 0,
         "imported": {
             "kind": found.kind.name(),
-            "motion": file(&found.motion),
-            "sound": found.sound.as_deref().map(file),
+            "motion": file_name(&found.motion),
+            "sound": found.sound.as_deref().map(file_name),
             "source_fps": captured.motion.fps,
             "motion_secs": fps.secs(n_before),
             "sound_secs": sound_secs,

@@ -1,25 +1,23 @@
 //! Import in two passes: every item is inspected first (outcome, sound codes), so that splits can be assigned without
 //! leaks, then read again and written. Memory: one take, and the codes of all sound.
 
-use super::find;
-use super::find::TakeFiles;
-use super::plan::{ImportOutcome, ImportPlan};
+use super::find::{self, TakeFiles};
 use super::source::{ImportItem, InspectedItem};
-use crate::config;
-use crate::config::SplitUnit;
-use crate::info::DatasetInfo;
+use crate::config::{self, SplitUnit};
+use crate::import::take::TakeLimits;
+use crate::info::{About, DatasetInfo};
 use crate::leakage::SoundComparison;
-use crate::split;
-use crate::split::{Assignment, RecordedSplit, SplitBy, SplitPlan, SplitRule, Unassigned, blocks};
+use crate::split::{self, Assignment, RecordedSplit, SplitBy, SplitPlan, SplitRule, Unassigned, blocks};
 use crate::stats::DatasetStats;
+use crate::write::assemble::DatasetWriter;
 use crate::write::part;
-use crate::write::writer::DatasetWriter;
 use crate::{INFO, shared_sound};
 use anyhow::{Context, Result, ensure};
 use orator_base::stage::counted;
 use orator_base::stage::ledger::Ledger;
 use orator_base::stage::progress::Progress;
 use orator_formats::mocap::captured::MotionKind;
+use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -218,4 +216,30 @@ fn first_reasons(items: &[ImportItem], inspected: &[InspectedItem]) -> String {
     let n_others = inspected.len() - said.len();
     let others = if n_others > 0 { format!("; and {}", counted(n_others, "other")) } else { String::new() };
     said.join("; ") + &others
+}
+
+/// Request of an import.
+#[derive(Clone, Debug)]
+pub struct ImportPlan {
+    pub sources: Vec<PathBuf>,
+    /// Kind of the sources to import; `None`: every kind.
+    pub kind: Option<MotionKind>,
+    /// Description of the dataset; `about.fps` equals `limits.fps`.
+    pub about: About,
+    pub limits: TakeLimits,
+    /// Shares of the splits, seconds of shared sound, size of shards.
+    pub dataset: config::DatasetConfig,
+}
+
+/// Outcome of a take, or of a video of other shards.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ImportOutcome {
+    pub file: String,
+    /// One of `kept`, `refused`, `failed`.
+    pub ended: &'static str,
+    /// Seconds in the dataset.
+    pub kept_secs: f64,
+    pub reason: String,
+    #[serde(rename = "says")]
+    pub message: String,
 }

@@ -1,9 +1,8 @@
-//! Division of a speaker's videos into splits: `fill` (toward which share), `blocks` (a video in blocks of time),
+//! Division of a speaker's videos into splits: `blocks` (a video in blocks of time),
 //! `assign` (all videos), `record` (what stays when others are added, and why).
 
 pub mod assign;
 pub mod blocks;
-pub mod fill;
 pub mod record;
 
 pub use assign::{Assignment, SplitPlan, Unassigned, assign};

@@ -2,6 +2,7 @@
 //! folder, which is replaced as a whole.
 
 use crate::config::choices::SplitUnit;
+use crate::layout::pretty;
 use anyhow::{Context, Result, ensure};
 use orator_base::stage::workdir;
 use orator_base::types::split::{Split, TimeBlock};
@@ -98,9 +99,7 @@ impl SplitRecord {
     /// # Errors
     /// A folder that cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let mut bytes = serde_json::to_vec_pretty(self)?;
-        bytes.push(b'\n');
-        workdir::write_file(path, &bytes)
+        workdir::write_file(path, &pretty(self)?)
     }
 
     /// Forgets videos by content or by name; what followed one of them keeps its split. Returns how many went.

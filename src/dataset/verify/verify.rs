@@ -7,11 +7,11 @@
 use super::blocks;
 use super::sample::check_sample;
 use crate::info::DatasetInfo;
+use crate::layout::read_json;
 use crate::leakage::Leakage;
 use crate::read::Dataset;
 use crate::write::assemble::{LedgerLine, assemble_into};
-use crate::write::part;
-use crate::write::part::VideoEntry;
+use crate::write::part::{self, VideoEntry};
 use crate::{CHECKSUMS, INFO, LEAKAGE, README};
 use anyhow::{Context, Result, ensure};
 use orator_base::stage::fingerprint::hash_file;
@@ -87,8 +87,8 @@ pub fn verify(dir: &Path, deep: bool, progress: &dyn Progress) -> Result<Verifie
 
 /// Assembles the dataset again: the expected hash of every file, by its path.
 fn assembled(dir: &Path, there: &BTreeMap<String, u64>, found: &mut Verified) -> Result<BTreeMap<String, String>> {
-    let info: DatasetInfo = read_json(dir, INFO)?;
-    let leakage: Leakage = read_json(dir, LEAKAGE)?;
+    let info: DatasetInfo = read_json(&dir.join(INFO))?;
+    let leakage: Leakage = read_json(&dir.join(LEAKAGE))?;
     let written: Rc<RefCell<Vec<u8>>> = Rc::default();
     let mut open = |name: &str| -> Result<Box<dyn Write>> {
         Ok(if name == CHECKSUMS { Box::new(SharedBuffer(written.clone())) } else { Box::new(std::io::sink()) })
@@ -159,7 +159,7 @@ fn listed(there: &BTreeMap<String, u64>, wanted: &BTreeMap<String, String>, foun
 
 /// Checks the sums of each video.
 fn videos(dir: &Path, found: &mut Verified) -> Result<()> {
-    let info = read_json::<DatasetInfo>(dir, INFO)?;
+    let info = read_json::<DatasetInfo>(&dir.join(INFO))?;
     let fps = info.fps;
     let mut keys = BTreeSet::new();
     for name in part::names(dir)? {
@@ -231,7 +231,7 @@ fn words_accounted(part: &VideoEntry) -> Result<()> {
 fn hashes(dir: &Path, wanted: &BTreeMap<String, String>, deep: bool, found: &mut Verified, progress: &dyn Progress) {
     let task = progress.begin("hashes", wanted.len() as u64);
     for (file, hash) in wanted {
-        let large = file.ends_with(".tar") || file.ends_with(".sound");
+        let large = [".tar", ".sound"].iter().any(|ending| file.ends_with(ending));
         let path = dir.join(file);
         if (deep || !large) && path.is_file() {
             found.bytes += std::fs::metadata(&path).map_or(0, |meta| meta.len());
@@ -288,11 +288,6 @@ fn files_of(dir: &Path) -> Result<BTreeMap<String, u64>> {
         }
     }
     Ok(files)
-}
-
-fn read_json<T: serde::de::DeserializeOwned>(dir: &Path, name: &str) -> Result<T> {
-    let bytes = std::fs::read(dir.join(name)).with_context(|| format!("reading {name}"))?;
-    serde_json::from_slice(&bytes).with_context(|| format!("{name} is not as it was written"))
 }
 
 /// Ledgers of all videos of the dataset in `dir`.

@@ -3,12 +3,12 @@
 //! `b3sum`. The bytes depend on the videos alone, so a dataset grows, forgets and is verified by assembling it again.
 //! Memory: one video, and a line for each.
 
-use super::part;
-use super::part::VideoEntry;
+use super::part::{self, EntryWriter, VideoEntry, VideoSource};
 use crate::bones::{VideoBones, of_speaker};
 use crate::info::{About, DatasetInfo, DatasetVideo, SplitInfo};
+use crate::layout::pretty;
 use crate::leakage::{Leakage, SoundComparison};
-use crate::split::{Split, TimeBlock};
+use crate::split::{Split, SplitBy, TimeBlock};
 use crate::stats::{DatasetStats, StatsCollector};
 use crate::{CHECKSUMS, INDEX, INFO, LEAKAGE, LEDGER, README, STATS, card};
 use anyhow::{Context, Result};
@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Line of `ledger.jsonl`: the account of every second of a video.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -121,12 +121,6 @@ pub fn assemble_into(
     Ok((info, stats))
 }
 
-fn pretty(value: &impl Serialize) -> Result<Vec<u8>> {
-    let mut bytes = serde_json::to_vec_pretty(value)?;
-    bytes.push(b'\n');
-    Ok(bytes)
-}
-
 /// File with a running hash.
 struct HashedFile {
     name: &'static str,
@@ -153,5 +147,42 @@ impl HashedFile {
     fn finish(mut self) -> Result<String> {
         self.to.flush().with_context(|| format!("cannot write {} of the dataset", self.name))?;
         Ok(self.hasher.finalize().to_hex().to_string())
+    }
+}
+
+/// Writer of a dataset. Memory: one sample, and the locations of a video's samples.
+pub struct DatasetWriter {
+    dir: PathBuf,
+    about: About,
+    max_shard_bytes: u64,
+    compared: SoundComparison,
+}
+
+impl DatasetWriter {
+    /// Begins a dataset in the existing, empty folder `dir`. A shard is closed before it would exceed
+    /// `max_shard_bytes`.
+    pub fn new(dir: &Path, about: About, max_shard_bytes: u64) -> Self {
+        Self { dir: dir.to_owned(), about, max_shard_bytes, compared: SoundComparison::default() }
+    }
+
+    /// Sets the comparison of the videos' sound.
+    pub fn with_compared(self, compared: SoundComparison) -> Self {
+        Self { compared, ..self }
+    }
+
+    /// Begins a video, which `finish` of the result ends. Videos may be written in any order.
+    pub fn video(&self, source: VideoSource, split: Split, split_by: SplitBy) -> Result<EntryWriter> {
+        EntryWriter::new(&self.dir, source, Some(split), split_by, self.max_shard_bytes)
+    }
+
+    /// Begins a video with samples in several splits, cut from `blocks`.
+    pub fn video_in_blocks(&self, source: VideoSource, blocks: Vec<TimeBlock>) -> Result<EntryWriter> {
+        let writer = EntryWriter::new(&self.dir, source, None, SplitBy::Time, self.max_shard_bytes)?;
+        Ok(writer.with_blocks(blocks))
+    }
+
+    /// Assembles the dataset from its videos.
+    pub fn finish(self) -> Result<(DatasetInfo, DatasetStats)> {
+        assemble(&self.dir, &self.about, &self.compared)
     }
 }

@@ -3,4 +3,3 @@
 pub mod assemble;
 pub mod part;
 pub mod tar;
-pub mod writer;

@@ -6,6 +6,7 @@ use super::tar::ShardWriter;
 use crate::bones::VideoBones;
 use crate::index::{SampleRef, ShardRef};
 use crate::joint_stats::JointMoments;
+use crate::layout::{pretty, read_json};
 use crate::sample::Sample;
 use crate::split::SplitBy;
 use anyhow::{Context, Result, bail, ensure};
@@ -186,15 +187,13 @@ impl VideoEntry {
 
     /// Reads an entry; its ledger must be complete and its layout current.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = fs::read(path).with_context(|| format!("reading {}", path.display()))?;
-        let wrong = || format!("{} is not as the dataset stage writes it; run the stage again", path.display());
-        let part: Self = serde_json::from_slice(&bytes).with_context(wrong)?;
+        let part: Self = read_json(path)?;
         ensure!(part.schema == crate::SCHEMA, "{} has layout version {}", path.display(), part.schema);
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         ensure!(part.name == *stem, "{} speaks of the video {:?}", path.display(), part.name);
         let is_own = |shard: &&ShardRef| {
             let rest = Split::ALL.iter().find_map(|split| shard.file.strip_prefix(split.name())?.strip_prefix('-'));
-            rest.is_some_and(|rest| rest.starts_with(&*part.name) && rest.ends_with(".tar"))
+            rest.is_some_and(|rest| rest.starts_with(&*part.name) && rest.strip_suffix(".tar").is_some())
         };
         if let Some(other) = part.shards.iter().find(|shard| !is_own(shard)) {
             bail!("{} names the shard {}, which is none of its video's", path.display(), other.file);
@@ -204,9 +203,7 @@ impl VideoEntry {
 
     fn write(&self, dir: &Path) -> Result<()> {
         let path = Self::path(dir, &self.name);
-        let mut bytes = serde_json::to_vec_pretty(self)?;
-        bytes.push(b'\n');
-        fs::write(&path, bytes).with_context(|| format!("writing {}", path.display()))
+        fs::write(&path, pretty(self)?).with_context(|| format!("writing {}", path.display()))
     }
 
     /// Sound codes from the dataset in `dir`; empty without sound.

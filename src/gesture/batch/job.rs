@@ -6,8 +6,8 @@ use anyhow::Result;
 use orator_avatar::animate::export::file::FigureOptions;
 use orator_base::stage::fingerprint::HashCache;
 use orator_base::stage::progress::Progress;
-use orator_base::stage::runner::StageOutcome;
-use orator_base::stage::{artifacts, runner, workdir};
+use orator_base::stage::runner::{self, StageOutcome};
+use orator_base::stage::{artifacts, workdir};
 use orator_nn::seq2seq::predict::StateAtSeams;
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -86,8 +86,7 @@ impl SpeechBatch {
     /// What stops all: a format that is unknown, a common checkpoint that cannot be read, another batch in the same
     /// folder.
     pub fn run(&self, progress: &dyn Progress) -> Result<BatchReport> {
-        let (checkpoint, seams) = (self.checkpoint.as_deref(), self.seams);
-        let stage = BatchStage::new(&self.sounds, &self.formats, &self.folder, checkpoint, seams, self.figure)?;
+        let stage = BatchStage::new(self)?;
         let records = self.folder.join(RECORDS);
         let _lock = workdir::lock(&records)?;
         let hashes = HashCache::open(&artifacts::hashes(&records));

@@ -5,7 +5,6 @@ pub mod job;
 pub mod motion_files;
 pub mod sequence_files;
 pub mod sounds;
-pub mod speaker;
 pub mod spoken;
 pub mod stage;
 pub mod transcripts;

@@ -1,50 +1,24 @@
 //! One sound to motion to files. The sound is streamed, so that its length takes no memory but for its motion; only a film,
 //! which holds the sound, reads it whole.
 
+use super::sequence_files::write_sequence;
 use super::spoken::{SpeechSource, SpokenMotion};
 use crate::generate::GestureGenerator;
 use crate::generate::generator::CHUNK;
-use crate::generate::model::BEST;
+use crate::generate::trained::TrainedSpeaker;
 use anyhow::{Context as _, Result, ensure};
 use orator_avatar::animate::export::file::{ExportContent, ExportFormat};
 use orator_avatar::animate::{AnimationOptions, perform};
 use orator_base::audio::mel;
 use orator_base::stage::progress::Progress;
-use orator_base::stage::workdir::FolderLock;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::Posture;
 use orator_base::types::sound::SAMPLE_RATE;
-use orator_formats::checkpoint;
-use orator_media::ffmpeg::UnreadableMedia;
-use orator_media::ffmpeg::sound_stream;
-use orator_media::ffmpeg::sound_stream::SoundStream;
-use orator_media::ffmpeg::{audio, probe};
+use orator_media::ffmpeg::sound_stream::{self, SoundStream};
+use orator_media::ffmpeg::{UnreadableMedia, audio, probe};
+use orator_nn::seq2seq::predict::StateAtSeams;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-
-/// The checkpoint file meant by a file or a training's folder: its best, else its newest.
-///
-/// # Errors
-/// A path that is not there, a folder without checkpoints.
-pub fn checkpoint_file(path: &Path) -> Result<PathBuf> {
-    ensure!(path.exists(), "{} is not there; `orator train gan` makes checkpoints", path.display());
-    if !path.is_dir() {
-        return Ok(path.to_owned());
-    }
-    let best = path.join(BEST);
-    if best.is_file() {
-        return Ok(best);
-    }
-    let newest = checkpoint::list(path)?.pop();
-    newest
-        .map(|(_, file)| file)
-        .with_context(|| format!("{} holds no checkpoint (best.safetensors or step-*.safetensors)", path.display()))
-}
-
-/// Keeps the model of a checkpoint, a file or a training's folder, from being forgotten while it is in use.
-pub fn model_lock(checkpoint: &Path) -> Result<FolderLock> {
-    FolderLock::shared(if checkpoint.is_dir() { checkpoint } else { checkpoint.parent().unwrap_or(checkpoint) })
-}
 
 /// Writes the motion of `speaker` for a sound to `outputs`. Errors name the sound.
 pub fn write_motion(
@@ -137,6 +111,27 @@ fn narrow_band_note(rate: u32) -> Option<String> {
          listens to are empty, and it gestures as to muffled speech",
         mel::N_MELS
     ))
+}
+
+/// Writes the motion for a sound to `outputs`. Errors name the sound, or what this kind of network cannot do.
+pub fn write(
+    speaker: &TrainedSpeaker,
+    speech: &SpeechSource,
+    outputs: &[(PathBuf, ExportFormat)],
+    progress: &dyn Progress,
+) -> Result<SpokenMotion> {
+    match speaker {
+        TrainedSpeaker::Gan(speaker) => {
+            let name = speaker.name();
+            ensure!(speech.transcript.is_none(), "the speaker {name} reads no words: leave out --transcript");
+            ensure!(
+                speech.seams == StateAtSeams::Renewed,
+                "the speaker {name} makes no segments, and has no state: leave out --carry-state"
+            );
+            write_motion(speaker, speech, outputs, progress)
+        }
+        TrainedSpeaker::Sequence(speaker) => write_sequence(speaker, speech, outputs, progress),
+    }
 }
 
 #[cfg(test)]

@@ -3,15 +3,10 @@
 
 use anyhow::{Context, Result, bail, ensure};
 use orator_avatar::animate::export::file::ExportFormat;
+use orator_dataset::config::patterns::{OF_SOUNDS, OF_VIDEOS, has_ending};
 use orator_formats::search;
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
-
-/// Endings of files that have sound.
-const SOUNDS: [&str; 18] = [
-    "wav", "flac", "mp3", "ogg", "oga", "opus", "m4a", "aac", "aif", "aiff", "wma", "caf", "mp4", "m4v", "mov", "mkv",
-    "webm", "avi",
-];
 
 /// A sound of a batch.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -38,14 +33,12 @@ pub fn of_folder(folder: &Path, out: &Path) -> Result<Vec<BatchSound>> {
         folder.join("motions").display()
     );
     let mut enter = |folder: &Path| folder.canonicalize().ok() != out;
-    let sounds = |path: &PathBuf| {
-        let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-        SOUNDS.contains(&ending.as_str())
-    };
+    let endings = [&OF_SOUNDS[..], &OF_VIDEOS].concat();
+    let sounds = |path: &PathBuf| has_ending(path, &endings);
     let named = |path: PathBuf| (path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().into_owned(), path);
     let files: Vec<(String, PathBuf)> =
         search::files(folder, &mut enter)?.into_iter().filter(sounds).map(named).collect();
-    ensure!(!files.is_empty(), "{} holds no file that sounds ({})", folder.display(), SOUNDS.join(", "));
+    ensure!(!files.is_empty(), "{} holds no file that sounds ({})", folder.display(), endings.join(", "));
     let stem = |file: &str| file.rsplit_once('.').map_or(file, |(stem, _)| stem).to_owned();
     let mut called = BTreeMap::<String, usize>::new();
     files.iter().for_each(|(file, _)| *called.entry(stem(file).to_lowercase()).or_default() += 1);

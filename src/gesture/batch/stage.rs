@@ -1,9 +1,10 @@
 //! The stage: one unit a sound, whose motion goes into the common folder in each of the formats.
 
-use super::motion_files::{checkpoint_file, model_lock};
+use super::job::SpeechBatch;
+use super::motion_files;
 use super::sounds::BatchSound;
-use super::speaker;
 use super::spoken::SpeechSource;
+use crate::generate::model::{checkpoint_file, model_lock};
 use crate::generate::seq2seq::metadata::is_sequence;
 use crate::generate::trained::TrainedSpeaker;
 use anyhow::{Context, Result, bail, ensure};
@@ -19,49 +20,32 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 /// Sounds to motion files.
-pub struct BatchStage {
-    sounds: BTreeMap<String, BatchSound>,
+pub struct BatchStage<'a> {
+    batch: &'a SpeechBatch,
+    sounds: BTreeMap<&'a str, &'a BatchSound>,
     /// Endings with their formats.
     formats: Vec<(String, ExportFormat)>,
-    folder: PathBuf,
-    /// Of the sounds that name none.
+    /// File of the checkpoint of the sounds that name none.
     checkpoint: Option<PathBuf>,
-    /// What sequence-to-sequence networks begin a segment with.
-    seams: StateAtSeams,
-    figure: FigureOptions,
     /// The models in use, with the locks of their folders.
     speakers: Mutex<BTreeMap<PathBuf, (Arc<TrainedSpeaker>, FolderLock)>>,
 }
 
-impl BatchStage {
-    /// Writes into `folder` in the formats of those endings. `checkpoint`, a file or a training's folder, is for sounds
-    /// that name none.
+impl<'a> BatchStage<'a> {
+    /// The stage of a batch.
     ///
     /// # Errors
-    /// An ending that is unknown or named twice, a sound without a checkpoint, a `checkpoint` that cannot be read.
-    pub fn new(
-        sounds: &[BatchSound],
-        endings: &[String],
-        folder: &Path,
-        checkpoint: Option<&Path>,
-        seams: StateAtSeams,
-        figure: FigureOptions,
-    ) -> Result<Self> {
-        let checkpoint = checkpoint.map(checkpoint_file).transpose()?;
+    /// An ending that is unknown or named twice, a sound without a checkpoint, a common checkpoint that cannot be read.
+    pub fn new(batch: &'a SpeechBatch) -> Result<Self> {
+        let checkpoint = batch.checkpoint.as_deref().map(checkpoint_file).transpose()?;
         if checkpoint.is_none()
-            && let Some(sound) = sounds.iter().find(|sound| sound.checkpoint.is_none())
+            && let Some(sound) = batch.sounds.iter().find(|sound| sound.checkpoint.is_none())
         {
             bail!("the table names no checkpoint for {}; give --checkpoint", sound.audio.display());
         }
-        let stage = Self {
-            sounds: sounds.iter().map(|sound| (sound.name.clone(), sound.clone())).collect(),
-            formats: formats(endings)?,
-            folder: folder.to_owned(),
-            checkpoint,
-            seams,
-            figure,
-            speakers: Mutex::default(),
-        };
+        let sounds = batch.sounds.iter().map(|sound| (sound.name.as_str(), sound)).collect();
+        let formats = formats(&batch.formats)?;
+        let stage = Self { batch, sounds, formats, checkpoint, speakers: Mutex::default() };
         // A common checkpoint that cannot be read fails all sounds, and does so before any.
         stage.checkpoint.as_deref().map(|path| stage.speaker(path)).transpose()?;
         Ok(stage)
@@ -73,7 +57,7 @@ impl BatchStage {
     }
 
     fn sound(&self, unit: &Unit) -> Result<&BatchSound> {
-        self.sounds.get(&unit.video).with_context(|| format!("{unit} is no sound of this batch"))
+        self.sounds.get(unit.video.as_str()).copied().with_context(|| format!("{unit} is no sound of this batch"))
     }
 
     /// The transcript of a sound, which a sequence-to-sequence network alone reads.
@@ -100,7 +84,7 @@ impl BatchStage {
     }
 }
 
-impl Stage for BatchStage {
+impl Stage for BatchStage<'_> {
     fn name(&self) -> &'static str {
         "generate"
     }
@@ -112,11 +96,11 @@ impl Stage for BatchStage {
     fn settings(&self, _unit: &Unit) -> serde_json::Value {
         let endings: Vec<&str> = self.formats.iter().map(|(ending, _)| ending.as_str()).collect();
         let mut settings = json!({ "formats": endings, "animation": format!("{:?}", AnimationOptions::default()) });
-        if self.seams != StateAtSeams::default() {
-            settings["state"] = json!(self.seams);
+        if self.batch.seams != StateAtSeams::default() {
+            settings["state"] = json!(self.batch.seams);
         }
-        if self.figure != FigureOptions::default() {
-            settings["figure"] = json!({ "names": self.figure.names.label(), "fps": self.figure.fps });
+        if self.batch.figure != FigureOptions::default() {
+            settings["figure"] = json!({ "names": self.batch.figure.names.label(), "fps": self.batch.figure.fps });
         }
         settings
     }
@@ -129,22 +113,22 @@ impl Stage for BatchStage {
     }
 
     fn common_folder(&self) -> Option<&Path> {
-        Some(&self.folder)
+        Some(&self.batch.folder)
     }
 
     fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> Result<Report> {
         let speaker = self.speaker(&self.checkpoint_of(unit)?)?;
         let file = |ending: &str| format!("{}.{ending}", unit.video);
         for (ending, _) in &self.formats {
-            let path = self.folder.join(file(ending));
+            let path = self.batch.folder.join(file(ending));
             let is_sound = path.canonicalize().is_ok_and(|p| unit.source.canonicalize().is_ok_and(|s| s == p));
             ensure!(!is_sound, "{} is the speech itself; choose another --out-folder", path.display());
         }
         let outputs: Vec<(PathBuf, ExportFormat)> =
             self.formats.iter().map(|(ending, format)| (out.join(file(ending)), *format)).collect();
-        let (transcript, seams, figure) = (self.transcript_of(unit)?, self.seams, self.figure);
+        let (transcript, seams, figure) = (self.transcript_of(unit)?, self.batch.seams, self.batch.figure);
         let source = SpeechSource { audio: &unit.source, transcript, seams, figure };
-        let written = speaker::write(&speaker, &source, &outputs, progress)?;
+        let written = motion_files::write(&speaker, &source, &outputs, progress)?;
         let mut facts = json!({
             "secs": written.secs, "n_frames": written.n_frames, "speaker": speaker.name(), "note": written.note,
         });

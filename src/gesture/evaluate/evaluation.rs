@@ -1,14 +1,11 @@
 //! An evaluation as a value: motions beside their ground truth, with the simple predictors measured beside them.
 
-use super::baseline::baselines;
-use super::baseline::baselines::Predictor;
+use super::baseline::baselines::{self, Predictor};
 use super::clips::checkpoint::EvaluatedCheckpoint;
-use super::clips::clips;
-use super::clips::clips::EvalClips;
+use super::clips::clips::{self, EvalClips};
 use super::clips::motion_store::MotionStore;
 use super::clips::{of_speaker, pairs};
-use super::table::table;
-use super::table::table::Table;
+use super::table::table::{self, Table};
 use crate::metrics::settings::MetricSettings;
 use anyhow::{Result, ensure};
 use orator_base::stage::progress::Progress;

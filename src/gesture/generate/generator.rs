@@ -1,10 +1,7 @@
 //! Speech to motion with a trained speaker, chunk by chunk: memory does not grow with the sound.
 
-use super::mel_stream::MelStream;
-use super::mel_stream::mel_frames;
-use super::model;
-use super::model::BEST;
-use super::model::{GenerationChoice, SpeakerMetadata};
+use super::mel_stream::{MelStream, mel_frames};
+use super::model::{self, GenerationChoice, SpeakerMetadata, checkpoint_file};
 use anyhow::{Result, ensure};
 use ndarray::{Array2, Array3, s};
 use orator_base::types::pose3d::Motion;
@@ -35,9 +32,7 @@ impl GestureGenerator {
     /// As `open`, as this speaker and take. Errors as well on a speaker that the network does not know, and on takes of one that was
     /// trained without dropout.
     pub fn open_as(path: &Path, choice: &GenerationChoice) -> Result<Self> {
-        let file = if path.is_dir() { path.join(BEST) } else { path.to_owned() };
-        ensure!(file.is_file(), "there is no checkpoint {}; `orator train gan` writes one", file.display());
-        let (metadata, generator) = model::load(&file, choice)?;
+        let (metadata, generator) = model::load(&checkpoint_file(path)?, choice)?;
         Ok(Self { metadata, generator })
     }
 

@@ -8,15 +8,16 @@ use anyhow::{Context, Result, bail, ensure};
 use ndarray::ArrayView2;
 use orator_base::audio::mel;
 use orator_base::motion::bones;
+use orator_base::stage::workdir::FolderLock;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::sound::SAMPLE_RATE;
 use orator_base::types::time::FrameRate;
-use orator_formats::checkpoint::Contents;
+use orator_formats::checkpoint::{self, Contents};
 use orator_nn::gan::generator::{Config, Generator};
 use orator_nn::gan::speaker_layer::SPEAKER;
 use orator_nn::params::Params;
 use serde::{Deserialize, Serialize};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Tensors of the generator in a checkpoint begin with this.
 pub const GENERATOR: &str = "generator.";
@@ -114,8 +115,7 @@ impl SpeakerMetadata {
     /// The generator's numbers [144 or more, T] as motion whose bones have the speaker's lengths in every frame.
     pub fn motion(&self, raw: ArrayView2<f32>) -> Motion {
         let mut motion = Motion::from_joints(self.fps, self.representation.joints(raw, &self.normalisation));
-        let lengths = &self.normalisation.bone_lengths;
-        bones::with_lengths(&mut motion, &std::array::from_fn(|bone| lengths.get(bone).copied().unwrap_or(0.0)));
+        bones::with_lengths(&mut motion, &self.normalisation.lengths());
         motion
     }
 }
@@ -211,6 +211,29 @@ fn build(contents: &Contents) -> Result<(SpeakerMetadata, Generator)> {
 
 /// The best checkpoint by the validation's score: the generator alone, to generate with.
 pub const BEST: &str = "best.safetensors";
+
+/// The checkpoint file meant by a file or a training's folder: its best, else its newest.
+///
+/// # Errors
+/// A path that is not there, a folder without checkpoints.
+pub fn checkpoint_file(path: &Path) -> Result<PathBuf> {
+    ensure!(
+        path.exists(),
+        "{} is not there; `orator train gan` and `orator train seq2seq` write checkpoints",
+        path.display()
+    );
+    let best = if path.is_dir() { path.join(BEST) } else { path.to_owned() };
+    if best.is_file() {
+        return Ok(best);
+    }
+    let newest = checkpoint::list(path)?.pop().map(|(_, file)| file);
+    newest.with_context(|| format!("{} holds no checkpoint (best.safetensors or step-*.safetensors)", path.display()))
+}
+
+/// Keeps the model of a checkpoint, a file or a training's folder, from being forgotten while it is in use.
+pub fn model_lock(checkpoint: &Path) -> Result<FolderLock> {
+    FolderLock::shared(if checkpoint.is_dir() { checkpoint } else { checkpoint.parent().unwrap_or(checkpoint) })
+}
 
 #[cfg(test)]
 mod tests {

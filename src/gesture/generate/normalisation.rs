@@ -66,6 +66,11 @@ impl Normalisation {
         Ok(())
     }
 
+    /// Bone of joint `n + 1` to its parent, metres; 0: not known.
+    pub fn lengths(&self) -> [f32; N_BONES] {
+        std::array::from_fn(|bone| self.bone_lengths.get(bone).copied().unwrap_or(0.0))
+    }
+
     /// Numbers of a pose with those of the channels.
     pub fn n_numbers(&self) -> usize {
         N_FEATURES + 3 * self.channels.len()

@@ -1,7 +1,7 @@
 //! A trained speaker of either kind: sound, and where it reads them words, to motion of the 49 joints.
 
 use super::GestureGenerator;
-use super::model::{BEST, GenerationChoice};
+use super::model::{GenerationChoice, checkpoint_file};
 use super::normalisation::Normalisation;
 use super::seq2seq::SequenceGenerator;
 use super::seq2seq::architecture::Architecture;
@@ -29,11 +29,7 @@ impl TrainedSpeaker {
     /// Opens a checkpoint as `open` does, as this speaker and take. Errors where a network does not know the speaker, or has one
     /// take only.
     pub fn open_as(path: &Path, choice: &GenerationChoice) -> Result<Self> {
-        let file = if path.is_dir() { path.join(BEST) } else { path.to_owned() };
-        let gan = || Ok(Self::Gan(Box::new(GestureGenerator::open_as(path, choice)?)));
-        if !file.is_file() {
-            return gan();
-        }
+        let file = checkpoint_file(path)?;
         let kind = &checkpoint::facts(&file)?["speaker"]["kind"];
         ensure!(
             kind.is_string(),
@@ -41,9 +37,9 @@ impl TrainedSpeaker {
             file.display()
         );
         if !is_sequence_kind(kind) {
-            return gan();
+            return Ok(Self::Gan(Box::new(GestureGenerator::open_as(&file, choice)?)));
         }
-        let speaker = SequenceGenerator::open(path)?;
+        let speaker = SequenceGenerator::open(&file)?;
         ensure!(
             choice.seed.is_none(),
             "{} is of `orator train seq2seq`, which has one take of a speech: leave out --seed and --variants",
@@ -57,10 +53,10 @@ impl TrainedSpeaker {
 
     /// Opens a checkpoint as `open` does; of a network of several speakers the one of this name.
     pub fn open_for(path: &Path, speaker: &str) -> Result<Self> {
-        let file = if path.is_dir() { path.join(BEST) } else { path.to_owned() };
-        let is_of_several = file.is_file() && checkpoint::facts(&file)?["other_speakers"].is_array();
+        let file = checkpoint_file(path)?;
+        let is_of_several = checkpoint::facts(&file)?["other_speakers"].is_array();
         let speaker = is_of_several.then(|| speaker.to_owned());
-        Self::open_as(path, &GenerationChoice { speaker, seed: None })
+        Self::open_as(&file, &GenerationChoice { speaker, seed: None })
     }
 
     /// The speaker's name.

@@ -6,13 +6,10 @@ use super::beat::{aist, angles, consistency};
 use super::body_part::BodyPart;
 use super::definition::MetricFamily;
 use super::distribution::{diversity, frechet_metrics};
-use super::movement::angles as angles_of_posture;
-use super::movement::hellinger;
-use super::movement::{bone_change, cca, derivatives};
-use super::position::pck::PckAxes;
-use super::position::{errors, p_mpjpe, pck};
-use super::settings::Convention;
-use super::settings::MetricSettings;
+use super::movement::{angles as angles_of_posture, bone_change, cca, derivatives, hellinger};
+use super::position::pck::{self, PckAxes};
+use super::position::{errors, p_mpjpe};
+use super::settings::{Convention, MetricSettings};
 
 /// The metrics of the settings' convention.
 pub(crate) fn metrics(settings: &MetricSettings) -> Vec<MetricFamily> {

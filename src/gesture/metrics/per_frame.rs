@@ -4,8 +4,7 @@
 use super::body_part::{BodyPart, MeasuredPoint};
 use super::definition::{Definition, MetricFamily};
 use super::pair::PairedFrames;
-use orator_base::math::vec3;
-use orator_base::math::vec3::Vec3;
+use orator_base::math::vec3::{self, Vec3};
 use orator_base::types::skeleton::N_JOINTS;
 
 /// One point in a few frames in a row, all of them seen.

@@ -2,8 +2,7 @@
 
 use orator_base::types::posture::PostureChannel;
 use orator_base::types::time::FrameRate;
-use serde::Deserialize;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// What the numbers are set to.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -4,7 +4,6 @@
 use super::log::MetricsLog;
 use super::pace::TrainingPace;
 use super::resume::kept;
-use super::stopped::StoppedTraining;
 use crate::generate::model::BEST;
 use anyhow::{Context, Result, bail};
 use orator_base::stage::progress::Progress;
@@ -67,25 +66,38 @@ pub struct ValidatedStep {
     pub best_step: usize,
 }
 
-/// How the loop ended.
-pub struct EpochsEnd<V> {
-    /// The step it began at.
+/// How a training ended.
+#[derive(Clone, Debug)]
+pub struct TrainingOutcome<V> {
+    /// Steps of this training altogether, and the step this run began at.
+    pub steps: usize,
     pub began_at: usize,
+    /// Whether it ended before its last step since the score had not become better for as many epochs as its patience.
     pub stopped_early: bool,
+    /// Windows or segments that were trained on.
+    pub n_examples: usize,
+    pub n_parameters: usize,
+    /// Words that were trained with.
+    pub n_words: usize,
+    /// Share of the time of the steps that they waited for their batch, 0..1; validation and checkpoints do not count.
+    pub waiting: f64,
     /// Of the newest checkpoint.
     pub validation: V,
     pub newest: PathBuf,
+    /// Best by the validation's score.
+    pub best: PathBuf,
     pub best_step: usize,
 }
 
-/// Trains to the last step, or until the score no longer becomes better; `validated` is called behind each validation.
+/// Trains to the last step, or until the score no longer becomes better; `validated` is called after each validation. The
+/// outcome has no examples, parameters, words and waiting yet.
 /// Errors: those of a step, with the checkpoint that is kept; no step to do and no checkpoint; `StoppedTraining`.
 pub fn run<T: ValidatedTraining>(
     training: &mut T,
     folder: &Path,
     progress: &dyn Progress,
     validated: &mut dyn FnMut(ValidatedStep),
-) -> Result<EpochsEnd<T::Validation>> {
+) -> Result<TrainingOutcome<T::Validation>> {
     let EpochSchedule { steps, epoch_steps, checkpoint_every, .. } = training.schedule();
     let section = training.names().1;
     let began_at = training.n_done();
@@ -160,7 +172,19 @@ pub fn run<T: ValidatedTraining>(
     };
     let done = training.n_done();
     let best_step = training.best().map_or(done, |(step, _)| step);
-    Ok(EpochsEnd { began_at, stopped_early: done < steps, validation, newest, best_step })
+    Ok(TrainingOutcome {
+        steps: done,
+        began_at,
+        stopped_early: done < steps,
+        n_examples: 0,
+        n_parameters: 0,
+        n_words: 0,
+        waiting: 0.0,
+        validation,
+        newest,
+        best: folder.join(BEST),
+        best_step,
+    })
 }
 
 /// What is kept of a training that ends here.
@@ -176,4 +200,25 @@ fn is_over(training: &mut impl ValidatedTraining) -> bool {
     let done = training.n_done();
     let since = done - training.best().map_or(done, |(step, _)| step.min(done));
     patience > 0 && since >= patience * epoch_steps
+}
+
+/// A training that ended before its last step since it was asked to. Started again, it goes on behind `step`.
+#[derive(Clone, Debug, thiserror::Error)]
+#[error("stopped after step {step} of {steps}{}", self.checkpoint())]
+pub struct StoppedTraining {
+    /// Steps done, and steps of the whole training.
+    pub step: usize,
+    /// Steps of the whole training.
+    pub steps: usize,
+    /// Checkpoint of this step; `None`: there was no step.
+    pub newest: Option<PathBuf>,
+    /// Best checkpoint so far, and its step; `None`: nothing was validated yet, or this training chooses none.
+    pub best: Option<(usize, PathBuf)>,
+}
+
+impl StoppedTraining {
+    fn checkpoint(&self) -> String {
+        let Some(newest) = &self.newest else { return ", with no checkpoint yet".to_owned() };
+        format!("; the checkpoint {} goes on from there", newest.display())
+    }
 }

@@ -5,7 +5,8 @@
 use anyhow::{Context, Result};
 use orator_base::stage::workdir;
 use orator_formats::tfevents;
-use serde_json::Value;
+use serde::Serialize;
+use serde_json::{Value, json};
 use std::fs::{File, OpenOptions};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -50,6 +51,15 @@ impl MetricsLog {
     }
 }
 
+/// A line of the log: a step with its losses.
+pub fn line(step: usize, losses: &impl Serialize) -> Value {
+    let mut line = json!({ "step": step });
+    if let (Some(line), Ok(Value::Object(losses))) = (line.as_object_mut(), serde_json::to_value(losses)) {
+        line.extend(losses);
+    }
+    line
+}
+
 /// The whole lines of the log in `folder`, none where there is no log.
 pub fn read(folder: &Path) -> Result<Vec<Value>> {
     Ok(text(&folder.join(FILE))?.lines().filter_map(parsed).collect())
@@ -92,7 +102,6 @@ impl AppendedFile {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::json;
 
     #[test]
     fn resuming_drops_what_the_checkpoint_has_not_seen() -> Result<()> {

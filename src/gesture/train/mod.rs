@@ -12,4 +12,3 @@ pub mod optim;
 pub mod pace;
 pub mod resume;
 pub mod seq2seq;
-pub mod stopped;

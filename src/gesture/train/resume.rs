@@ -1,15 +1,17 @@
 //! What trainings that go on from a checkpoint share: windows of a step, settings that count, advice when one breaks.
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use orator_base::stage::progress::Progress;
 use orator_dataset::config::auto::AUTO;
-use orator_formats::checkpoint;
-use orator_formats::checkpoint::Contents;
+use orator_formats::checkpoint::{self, Contents};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::path::Path;
+
+/// Loss beyond which a training has exploded.
+const LOSS_LIMIT: f64 = 1e4;
 
 /// Random numbers of a step, which depend on the seed and the step alone.
 pub fn stream(seed: u64, step: usize) -> ChaCha8Rng {
@@ -39,7 +41,7 @@ pub fn settings<T: Serialize + DeserializeOwned>(
             continue;
         }
         if free.contains(&key.as_str()) {
-            kept[key] = value.clone();
+            kept[key].clone_from(value);
         } else if kept[key] != *value {
             differences.push(format!("{section}.{key} is {value} now, {} in the checkpoint, which counts", kept[key]));
         }
@@ -60,6 +62,18 @@ pub fn newest<T>(
     progress.say(&format!("going on from {} (step {step})", newest.display()));
     differences.iter().for_each(|line| progress.say(line));
     Ok(Some((stored, contents)))
+}
+
+/// Errors, stating all of them, when a loss is not finite or has exploded.
+pub fn ensure_sound(step: usize, losses: &[(&str, f64)], gradient_norm: f64) -> Result<()> {
+    let is_sound = losses.iter().all(|(_, loss)| loss.is_finite() && loss.abs() < LOSS_LIMIT);
+    let listed: Vec<String> = losses.iter().map(|(name, loss)| format!("{name} {loss}")).collect();
+    ensure!(
+        is_sound && gradient_norm.is_finite(),
+        "the training broke at step {step}: {}, norm of the gradient {gradient_norm}",
+        listed.join(", ")
+    );
+    Ok(())
 }
 
 /// Which checkpoint is kept when a training breaks, and what may help.

@@ -9,7 +9,7 @@ use orator_base::types::sound::SAMPLE_RATE;
 use orator_base::types::split::Split;
 use orator_base::types::sync;
 use orator_dataset::info::{About, DatasetInfo};
-use orator_dataset::write::writer::DatasetWriter;
+use orator_dataset::write::assemble::DatasetWriter;
 use orator_test_support::drawn::folder::{DATASET_FPS, DemoPlan};
 use orator_test_support::drawn::scene::DrawnScene;
 use orator_test_support::drawn::truth::DrawnTruth;

@@ -86,10 +86,10 @@ fn row(table: &Table, index: usize, last: &mut String) -> Option<Node> {
         let estimate = &row.values[index];
         let cell = node("td").class(if row.kind == PredictorKind::Prediction { "num own" } else { "num" });
         let cell = cell.text(labels::number(definition, estimate.value));
-        if !(estimate.low.is_finite() && estimate.high.is_finite()) {
+        if !estimate.interval.is_finite() {
             return cell;
         }
-        let [low, high] = [estimate.low, estimate.high].map(|value| labels::number(definition, value));
+        let [low, high] = [estimate.interval.low, estimate.interval.high].map(|value| labels::number(definition, value));
         let interval = format!("[{low}, {high}]");
         if row.kind == PredictorKind::Prediction {
             cell.child(node("small").text(interval))

@@ -4,7 +4,7 @@
 //! each other one (Ford 1957): no prior makes up for votes that are missing.
 
 use super::cluster::sign_flips::rng_of_draw;
-use super::estimate::{ConfidenceInterval, StatisticsError, at_least, within};
+use super::estimate::{interval_of_draws, ConfidenceInterval, StatisticsError, at_least, within};
 use ndarray::{Array1, Array2, Axis};
 use orator_base::math::cholesky;
 use rand::Rng;
@@ -103,7 +103,7 @@ pub fn strength_intervals(
     if (draws.len() as f64) < (1.0 - LEFT_OUT) * n_draws as f64 {
         return Err(StatisticsError::Unconnected { what: "conditions" });
     }
-    let interval = |k: usize| ConfidenceInterval::of_draws(draws.iter().map(|draw| draw[k]), confidence);
+    let interval = |k: usize| interval_of_draws(draws.iter().map(|draw| draw[k]), confidence);
     (0..n_conditions).map(interval).collect()
 }
 

@@ -2,6 +2,7 @@
 //! p values at once: Holm's step-down adjustment (Holm 1979), which bounds the probability of any false rejection whatever
 //! the tests' dependence.
 
+pub use orator_base::math::estimate::ConfidenceInterval;
 use orator_base::math::order::Ordered;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
@@ -44,20 +45,14 @@ pub fn tail(confidence: f64) -> Result<f64, StatisticsError> {
     Ok((1.0 - confidence) / 2.0)
 }
 
-/// Two ends of a confidence interval, in the unit of the estimate.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct ConfidenceInterval {
-    pub low: f64,
-    pub high: f64,
-}
-
-impl ConfidenceInterval {
-    /// Percentile interval of `draws`; those that are not finite are left out.
-    pub fn of_draws(draws: impl Iterator<Item = f64>, confidence: f64) -> Result<Self, StatisticsError> {
-        let (tail, sorted) = (tail(confidence)?, Ordered::new(draws));
-        let at = |share| sorted.quantile(share).ok_or(StatisticsError::TooFew { what: "draws", least: 1, found: 0 });
-        Ok(Self { low: at(tail)?, high: at(1.0 - tail)? })
-    }
+/// Percentile interval of `draws`; those that are not finite are left out.
+pub fn interval_of_draws(
+    draws: impl Iterator<Item = f64>,
+    confidence: f64,
+) -> Result<ConfidenceInterval, StatisticsError> {
+    let (tail, sorted) = (tail(confidence)?, Ordered::new(draws));
+    let at = |share| sorted.quantile(share).ok_or(StatisticsError::TooFew { what: "draws", least: 1, found: 0 });
+    Ok(ConfidenceInterval { low: at(tail)?, high: at(1.0 - tail)? })
 }
 
 /// Estimate whose error, divided by its standard error, follows a t distribution.
@@ -159,6 +154,6 @@ mod tests {
         assert!((normal.high - 1.959963984540054).abs() < 1e-12);
         assert_eq!(holm(&[]), Ok(vec![]));
         assert!(holm(&[0.2, f64::NAN]).is_err() && holm(&[1.1]).is_err());
-        assert!(ConfidenceInterval::of_draws([f64::NAN].into_iter(), 0.95).is_err());
+        assert!(interval_of_draws([f64::NAN].into_iter(), 0.95).is_err());
     }
 }

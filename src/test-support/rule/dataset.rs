@@ -16,7 +16,7 @@ use orator_base::types::sync;
 use orator_base::types::time::FrameRate;
 use orator_dataset::info::{About, DatasetInfo};
 use orator_dataset::sample::Sample;
-use orator_dataset::write::writer::DatasetWriter;
+use orator_dataset::write::assemble::DatasetWriter;
 use orator_formats::transcript::Word;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

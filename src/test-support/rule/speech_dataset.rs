@@ -11,7 +11,7 @@ use orator_base::types::sync;
 use orator_base::types::time::FrameRate;
 use orator_dataset::info::{About, DatasetInfo};
 use orator_dataset::sample::Sample;
-use orator_dataset::write::writer::DatasetWriter;
+use orator_dataset::write::assemble::DatasetWriter;
 use orator_formats::transcript::Transcript;
 use orator_media::ffmpeg::audio;
 use rand::SeedableRng;

@@ -7,9 +7,10 @@ use super::super::report::{Report, median};
 use anyhow::{Context, Result, ensure};
 use candle_core::{DType, Device, Tensor};
 use orator_base::stage::progress::Progress;
+use orator_dataset::config::Seq2seqConfig;
 use orator_formats::checkpoint::Contents;
 use orator_gesture::train::optim::adam::{self, Adam};
-use orator_gesture::train::seq2seq::losses::SequenceLoss;
+use orator_gesture::train::seq2seq::losses;
 use orator_nn::Mode;
 use orator_nn::ops::gradcheck::pattern;
 use orator_nn::params::Params;
@@ -118,7 +119,7 @@ impl Fixed {
         let start = Instant::now();
         for _ in 0..steps {
             let made = self.network.forward(&self.segment, &mut Mode::Train(&mut self.rng))?;
-            let loss = SequenceLoss::default().total(&made, &self.target, None)?;
+            let loss = losses::total(&Seq2seqConfig::default(), &made, &self.target, None)?;
             self.adam.step(&loss.backward()?, LEARNING_RATE)?;
         }
         Ok(start.elapsed().as_secs_f64())

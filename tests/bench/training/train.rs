@@ -16,9 +16,7 @@ use orator_gesture::generate::mel_stream::mel_frames;
 use orator_gesture::generate::model::SpeakerMetadata;
 use orator_gesture::generate::normalisation::{N_FEATURES, Normalisation};
 use orator_gesture::generate::representation::Representation;
-use orator_gesture::train::gan::recipe::material::TrainingMaterial;
-use orator_gesture::train::gan::recipe::settings::GanSettings;
-use orator_gesture::train::gan::recipe::start::TrainingStart;
+use orator_gesture::train::gan::recipe::{self, TrainingMaterial, TrainingStart};
 use orator_gesture::train::gan::step::{GanTrainer, Losses, MAX_NORM};
 use orator_gesture::train::gan::windows::WindowBatch;
 use orator_nn::cpu::thread_team::with_spinning_workers;
@@ -67,11 +65,11 @@ impl Fixed {
     fn new(args: &Args) -> Result<Self> {
         let preset = serde_json::from_value(json!(args.preset))?;
         let asked = GanConfig { recipe: GanRecipe::Paper, preset, batch: args.batch.into(), ..GanConfig::default() };
-        let settings = GanSettings::new(
+        let settings = recipe::settings(
             &asked,
             &TrainingMaterial { train_secs: 0.0, validation_secs: 0.0, n_speakers: 1 },
             TrainingStart::Nothing,
-        );
+        )?;
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let table = |value: f32| ndarray::Array2::from_elem((N_JOINTS, 3), value);
         let length = |joint: usize| if is_duplicate(joint) { 0.0 } else { 0.1 };

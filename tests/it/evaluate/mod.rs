@@ -1,5 +1,6 @@
 //! Metrics and evaluation.
 
+pub mod calibration;
 pub mod evaluate_checkpoints;
 pub mod evaluate_files;
 pub mod evaluate_speaker;

@@ -47,7 +47,7 @@ fn a_training_stopped_at_a_step_ends_with_the_same_bytes() {
     ] {
         let place = |part: &str| folder.path().join(format!("{name}-{part}"));
         let outcome = train(dataset, &settings, &place("whole"), &Silent).unwrap();
-        assert_eq!((outcome.steps, outcome.n_windows, outcome.validation.n_windows), (6, 21, 4));
+        assert_eq!((outcome.steps, outcome.n_examples, outcome.validation.n_windows), (6, 21, 4));
         assert_eq!(outcome.validation.split, "validation");
         let whole = bytes(&place("whole"));
         let names: Vec<&str> = whole.iter().map(|(name, _)| name.as_str()).collect();
@@ -152,7 +152,7 @@ fn a_few_windows_are_learnt_by_heart_and_spoken() {
     let outcome = train(&dataset, &settings, &out, &Silent).unwrap();
     let validation = outcome.validation;
     let (made, still) = (validation.generator, validation.mean_pose);
-    assert_eq!((validation.split.as_str(), outcome.n_windows), ("train", 8));
+    assert_eq!((validation.split.as_str(), outcome.n_examples), ("train", 8));
     let log = std::fs::read_to_string(out.join("metrics.jsonl")).unwrap();
     let l1 = |line: &str| serde_json::from_str::<serde_json::Value>(line).unwrap()["l1"].as_f64();
     assert!(log.lines().filter_map(l1).any(|l1| l1 < 0.1), "{log}");

@@ -44,7 +44,7 @@ fn a_training_stopped_at_a_step_ends_with_the_same_bytes() {
         let place = |part: &str| folder.path().join(format!("{network:?}-{part}"));
         let outcome = train(source, None, &settings, &place("whole"), &Silent).unwrap();
         // 99 and 64 frames: a segment of 8 + 15 frames every five of them
-        assert_eq!((outcome.steps, outcome.n_segments, outcome.n_words), (6, 16 + 9, 0));
+        assert_eq!((outcome.steps, outcome.n_examples, outcome.n_words), (6, 16 + 9, 0));
         assert_eq!((outcome.validation.split.as_str(), outcome.validation.n_segments), ("validation", 8));
         let whole = bytes(&place("whole"));
         let names: Vec<&str> = whole.iter().map(|(name, _)| name.as_str()).collect();

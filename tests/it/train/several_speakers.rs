@@ -17,12 +17,10 @@ use orator_gesture::generate::GestureGenerator;
 use orator_gesture::generate::model::{BEST, GENERATOR, GenerationChoice};
 use orator_gesture::train::epochs::ValidatedStep;
 use orator_gesture::train::gan::begin;
-use orator_gesture::train::gan::joined_windows::JoinedWindows;
-use orator_gesture::train::gan::recipe::material::TrainingMaterial;
-use orator_gesture::train::gan::recipe::settings::GanSettings;
-use orator_gesture::train::gan::recipe::start::TrainingStart;
+use orator_gesture::train::gan::recipe::{self, TrainingMaterial, TrainingStart};
 use orator_gesture::train::gan::start::StartingModel;
 use orator_gesture::train::gan::train::{train, train_watched};
+use orator_gesture::train::gan::windows::JoinedWindows;
 use orator_gesture::train::gan::windows::WindowLoader;
 use orator_nn::gan::speaker_layer::{SPEAKER, SPEAKER_EMBEDDING, SPEAKER_WEIGHT};
 use orator_test_support::project::Answer;
@@ -145,7 +143,8 @@ fn learns_its_layer_alone(both: &Path, new: &Dataset, out: &Path) {
 fn begins_as_the_nearest(both: &Path, new: &Dataset) {
     let normal = begin::normalisation(new).unwrap();
     let loader = WindowLoader::load(new, Split::Train, &normal, 32, 5).unwrap();
-    let of = GanSettings::new(&settings(), &TrainingMaterial::measure(&[new], 32), TrainingStart::SeveralSpeakers);
+    let of =
+        recipe::settings(&settings(), &TrainingMaterial::measure(&[new], 32), TrainingStart::SeveralSpeakers).unwrap();
     let metadata = begin::metadata(new, &normal, &loader, &of, 1).unwrap();
     let windows = JoinedWindows::new(vec![loader]);
     let trainer = StartingModel::read(both).unwrap().begin(vec![metadata], of, &windows).unwrap();

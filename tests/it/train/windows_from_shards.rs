@@ -6,9 +6,7 @@ use orator_dataset::Split;
 use orator_dataset::config::{GanConfig, GanRecipe};
 use orator_gesture::train::gan::augment::changes;
 use orator_gesture::train::gan::begin::normalisation_with_channels;
-use orator_gesture::train::gan::recipe::material::TrainingMaterial;
-use orator_gesture::train::gan::recipe::settings::GanSettings;
-use orator_gesture::train::gan::recipe::start::TrainingStart;
+use orator_gesture::train::gan::recipe::{self, TrainingMaterial, TrainingStart};
 use orator_gesture::train::gan::windows::{WindowBatch, WindowLoader};
 
 fn values(batch: &WindowBatch) -> Vec<Vec<f32>> {
@@ -35,7 +33,7 @@ fn windows_from_shards_are_those_from_memory() {
         augment_mirror: 0.5,
         ..GanConfig::default()
     };
-    let settings = GanSettings::new(&config, &material, TrainingStart::Nothing);
+    let settings = recipe::settings(&config, &material, TrainingStart::Nothing).unwrap();
     for step in 0..20 {
         let changes = changes(&settings, step, dataset.info().fps);
         // First, last and others.

@@ -3,8 +3,7 @@
 //! metric.
 
 use super::constant_pose::ConstantPoses;
-use super::neighbour;
-use super::neighbour::{Library, Query};
+use super::neighbour::{self, Library, Query};
 use crate::evaluate::clips::clips::{EvalClip, EvalClips};
 use crate::evaluate::clips::motion_store::{MotionStore, StoredMotion};
 use anyhow::Result;
@@ -219,11 +218,12 @@ fn constant_poses(clips: &EvalClips) -> Vec<Predictor> {
         means.push(ClipMotion::Constant(mean));
         medians.push(ClipMotion::Constant(median));
     }
-    let description = |what: &str| match is_alone {
-        true => {
+    let description = |what: &str| {
+        if is_alone {
             format!("the {what} of this very truth in every frame (oracle: no predictor knows it), which never moves")
+        } else {
+            format!("the {what} of the other clips' truths in every frame, which never moves")
         }
-        false => format!("the {what} of the other clips' truths in every frame, which never moves"),
     };
     vec![
         Predictor::new(PredictorKind::MeanPose, description("mean pose"), means),

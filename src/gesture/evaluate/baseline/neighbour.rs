@@ -60,9 +60,8 @@ pub fn motions(
         .into_par_iter()
         .map(|entry| -> Result<Vec<Option<NearestMatch>>> {
             let Some((rows, n_frames)) = features(entry)? else { return Ok(vec![None; windows.len()]) };
-            let find = |window: &QueryWindow| match asks_itself && window.query == entry {
-                true => None,
-                false => nearest(&rows, n_frames, window, entry),
+            let find = |window: &QueryWindow| {
+                if asks_itself && window.query == entry { None } else { nearest(&rows, n_frames, window, entry) }
             };
             Ok(windows.par_iter().map(find).collect())
         })

@@ -1,9 +1,9 @@
 //! Checkpoints under evaluation: a trained network of either kind, its name in the table, and its motion of the 49
 //! joints for the sound and the words of an interval.
 
-use crate::batch::motion_files::checkpoint_file;
 use crate::evaluate::baseline::predictor;
 use crate::generate::GestureGenerator;
+use crate::generate::model::checkpoint_file;
 use crate::generate::seq2seq::SequenceGenerator;
 use crate::generate::trained::TrainedSpeaker;
 use anyhow::{Context, Result, ensure};
@@ -109,12 +109,11 @@ impl EvaluatedCheckpoint {
         let mut sound = audio::at_rate(sound, rate)?;
         sound.samples.resize(sound.samples.len().max(wanted), 0.0);
         let poses = network.poses(&sound, words)?;
-        let motion = match network.is_captured() {
-            true => {
-                let captured = bvh::of_text(&network.bvh(&poses)?).context("its skeleton is no speaker's")?;
-                resample::at_rate(&without_fingers(captured.motion), fps)
-            }
-            false => network.motion(&poses)?,
+        let motion = if network.is_captured() {
+            let captured = bvh::of_text(&network.bvh(&poses)?).context("its skeleton is no speaker's")?;
+            resample::at_rate(&without_fingers(captured.motion), fps)
+        } else {
+            network.motion(&poses)?
         };
         let n_made = motion.n_frames();
         ensure!(n_made >= n_frames, "{n_made} frames of motion for {n_frames} of sound");

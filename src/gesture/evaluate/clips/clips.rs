@@ -3,13 +3,10 @@
 
 use super::motion_store::{MotionStore, StoredMotion};
 use super::pairs::FilePair;
-use super::sound_features;
-use super::sound_features::SoundFeatures;
+use super::sound_features::{self, SoundFeatures};
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array2, Array3, s};
-use orator_base::motion::bones;
-use orator_base::motion::resample;
-use orator_base::motion::units;
+use orator_base::motion::{bones, resample, units};
 use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::PostureChannel;
 use orator_base::types::skeleton::{L_HAND, N_JOINTS, NECK, is_duplicate};

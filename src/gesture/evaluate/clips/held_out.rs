@@ -6,7 +6,7 @@ use ndarray::{Array3, s};
 use orator_base::motion::bones;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::{Posture, PostureChannel};
-use orator_base::types::skeleton::{N_BONES, N_JOINTS};
+use orator_base::types::skeleton::N_JOINTS;
 use orator_base::types::sound::Sound;
 use orator_base::types::sync;
 use orator_dataset::index::SampleRef;
@@ -56,10 +56,11 @@ pub fn joints(
     has_channels: bool,
 ) -> Result<Array3<f32>> {
     let mut motion = dataset.motion(sample, frames.clone())?;
-    bones::with_lengths(&mut motion, &lengths(normal));
-    match has_channels {
-        true => Ok(with_posture(&motion.joints, dataset.posture(sample, frames)?.as_ref())),
-        false => Ok(motion.joints),
+    bones::with_lengths(&mut motion, &normal.lengths());
+    if has_channels {
+        Ok(with_posture(&motion.joints, dataset.posture(sample, frames)?.as_ref()))
+    } else {
+        Ok(motion.joints)
     }
 }
 
@@ -69,7 +70,7 @@ pub fn joints(
 /// A sample that cannot be read, or is damaged.
 pub fn interval(dataset: &Dataset, sample: &SampleRef, normal: &Normalisation) -> Result<HeldOutInterval> {
     let mut sample = dataset.read(sample)?;
-    bones::with_lengths(&mut sample.motion, &lengths(normal));
+    bones::with_lengths(&mut sample.motion, &normal.lengths());
     let words = sample.words.take().unwrap_or_default();
     let Sample { key, motion: ground_truth, posture, sound, .. } = sample;
     Ok(HeldOutInterval { key, ground_truth, posture, sound, words })
@@ -87,11 +88,6 @@ pub fn with_posture(joints: &Array3<f32>, posture: Option<&Posture>) -> Array3<f
         None => joints[[t, row, k]],
         Some(channel) => posture.map_or(f32::NAN, |posture| posture.channel(PostureChannel::ALL[channel])[[t, k]]),
     })
-}
-
-/// Bone of joint `n + 1` to its parent, metres; 0: not known.
-pub fn lengths(normal: &Normalisation) -> [f32; N_BONES] {
-    std::array::from_fn(|bone| normal.bone_lengths.get(bone).copied().unwrap_or(0.0))
 }
 
 impl HeldOutInterval {

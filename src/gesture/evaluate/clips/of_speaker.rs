@@ -3,17 +3,13 @@
 
 use super::checkpoint::EvaluatedCheckpoint;
 use super::clips::{ClipAudio, EvalClip, EvalClips, compared};
-use super::held_out;
-use super::held_out::HeldOutInterval;
+use super::held_out::{self, HeldOutInterval};
 use super::motion_store::{MotionStore, StoredMotion};
 use super::notes;
-use super::sound_features;
-use super::sound_features::SoundFeatureExtractor;
-use crate::evaluate::baseline::baselines;
-use crate::evaluate::baseline::baselines::{ClipMotion, NumberedCheckpoint, Predictor, PredictorKind};
+use super::sound_features::{self, SoundFeatureExtractor};
+use crate::evaluate::baseline::baselines::{self, ClipMotion, NumberedCheckpoint, Predictor, PredictorKind};
 use crate::evaluate::baseline::constant_pose::ConstantPoses;
-use crate::evaluate::baseline::neighbour;
-use crate::evaluate::baseline::neighbour::{Library, Query};
+use crate::evaluate::baseline::neighbour::{self, Library, Query};
 use crate::evaluate::baseline::predictor;
 use crate::generate::normalisation::{N_FEATURES, Normalisation};
 use crate::train::gan::begin::normalisation;
@@ -189,7 +185,7 @@ impl<'d> HeldOutSplit<'d> {
         let made = checkpoint.motion(sound, words, sample.n_frames, self.dataset.info().fps);
         let (mut made, posture) = made.with_context(|| format!("no motion for {}", sample.key))?;
         if own.is_none_or(|own| own.bone_lengths != self.normal.bone_lengths) {
-            bones::with_lengths(&mut made, &held_out::lengths(self.normal));
+            bones::with_lengths(&mut made, &self.normal.lengths());
         }
         Ok(if self.has_channels { held_out::with_posture(&made.joints, posture.as_ref()) } else { made.joints })
     }

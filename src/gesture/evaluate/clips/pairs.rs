@@ -1,6 +1,7 @@
 //! Pairs of files by name: ground truth, prediction and sound of a clip. No file is opened here.
 
 use anyhow::{Context, Result, bail, ensure};
+use orator_dataset::config::patterns::{self, OF_SOUNDS, OF_VIDEOS};
 use orator_formats::mocap::motion_file;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -9,7 +10,6 @@ use std::path::{Path, PathBuf};
 const TRUTH: [&str; 7] = ["gt_interval_", "ground_truth_", "truth_", "real_", "gt_", "true_", "natural_"];
 const PREDICTION: [&str; 8] =
     ["prediction_interval_", "prediction_", "predicted_", "generated_", "pred_", "made_", "output_", "synthetic_"];
-const SOUND: [&str; 11] = ["wav", "flac", "mp3", "m4a", "ogg", "opus", "aac", "mp4", "mov", "mkv", "webm"];
 
 /// Files of a clip.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -106,7 +106,7 @@ fn folders(truth: &Path, prediction: &Path) -> Result<FilePairs> {
 }
 
 fn by_name(found: &mut FilePairs, audio: &Path) -> Result<()> {
-    let mut sounds = by_key(files(audio, &SOUND)?)?;
+    let mut sounds = by_key(files(audio, &[&OF_SOUNDS[..], &OF_VIDEOS].concat())?)?;
     for pair in &mut found.pairs {
         pair.sound = sounds.remove(&pair.name);
         if pair.sound.is_none() {
@@ -124,17 +124,9 @@ fn by_name(found: &mut FilePairs, audio: &Path) -> Result<()> {
 
 /// Files of a folder with one of these endings, hidden ones left out, in the order of their names.
 fn files(folder: &Path, endings: &[&str]) -> Result<Vec<PathBuf>> {
-    let looking = || format!("cannot look into {}", folder.display());
-    let mut files = Vec::new();
-    for entry in std::fs::read_dir(folder).with_context(looking)? {
-        let path = entry.with_context(looking)?.path();
-        let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-        if path.is_file() && !stem(&path).starts_with('.') && endings.contains(&ending.as_str()) {
-            files.push(path);
-        }
-    }
-    files.sort();
-    Ok(files)
+    let paths = patterns::list(folder).with_context(|| format!("cannot look into {}", folder.display()))?;
+    let is_one = |path: &PathBuf| path.is_file() && !stem(path).starts_with('.') && patterns::has_ending(path, endings);
+    Ok(paths.into_iter().filter(is_one).collect())
 }
 
 fn by_key(files: impl IntoIterator<Item = PathBuf>) -> Result<BTreeMap<String, PathBuf>> {

@@ -4,7 +4,7 @@
 use crate::evaluate::baseline::baselines::Predictor;
 use crate::evaluate::clips::clips::EvalClips;
 use crate::metrics::catalogue::{Catalogue, IntervalSums, MetricSums, MotionPair, n_blocks};
-use ndarray::{Array2, s};
+use ndarray::s;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -119,13 +119,4 @@ fn together(all: Vec<IntervalSums>) -> IntervalSums {
         sum.blocks.extend(one.blocks);
     }
     sum
-}
-
-/// Number of occurrences of each of `n` blocks in each draw [n_draws, n].
-pub fn counts(drawn: &[Vec<usize>], n: usize) -> Array2<f64> {
-    let mut counts = Array2::zeros((drawn.len(), n));
-    for (mut row, draw) in counts.outer_iter_mut().zip(drawn) {
-        draw.iter().filter(|i| **i < n).for_each(|i| row[*i] += 1.0);
-    }
-    counts
 }

@@ -1,12 +1,13 @@
 //! Comparison of two results. Values are compared only where their definitions agree to the last parameter; elsewhere
 //! the difference is named.
 
-use super::bootstrap::Estimate;
 use super::result::{StoredMetric, StoredResult};
 use crate::evaluate::baseline::baselines::PredictorKind;
+use orator_base::math::estimate::Estimate;
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeSet;
+use std::fmt::Write as _;
 
 /// Metric that both results have.
 #[derive(Clone, Debug, Serialize)]
@@ -103,23 +104,30 @@ fn differences(path: &str, a: &Value, b: &Value, differ: &mut Vec<String>) {
 /// Table of both as text.
 pub fn text(compared: &Comparison) -> String {
     let cell = |estimate: &Option<Estimate>| match estimate {
-        Some(e) if e.low.is_finite() => format!("  {:.4} [{:.4}, {:.4}]", e.value, e.low, e.high),
+        Some(Estimate { value, interval }) if interval.low.is_finite() => {
+            format!("  {value:.4} [{:.4}, {:.4}]", interval.low, interval.high)
+        }
         Some(e) => format!("{:.4}", e.value),
         None => "-".to_owned(),
     };
-    let mut text = compared.warning.iter().map(|warning| format!("WARNING: {warning}\n\n")).collect::<String>();
+    let mut text = String::new();
+    if let Some(warning) = &compared.warning {
+        let _ = writeln!(text, "WARNING: {warning}\n");
+    }
     let width = compared.beside.iter().map(|row| row.name.chars().count() + row.unit.len() + 3).max().unwrap_or(0);
     if !compared.beside.is_empty() {
-        text += &format!("{:width$}{:>34}{:>34}\n", "", "A", "B");
+        let _ = writeln!(text, "{:width$}{:>34}{:>34}", "", "A", "B");
     }
     for row in &compared.beside {
         let name = if row.unit == "1" { row.name.clone() } else { format!("{} ({})", row.name, row.unit) };
-        text += &format!("{name:width$}{:>34}{:>34}\n", cell(&row.a), cell(&row.b));
+        let _ = writeln!(text, "{name:width$}{:>34}{:>34}", cell(&row.a), cell(&row.b));
     }
-    compared.refused.iter().for_each(|refusal| text += &format!("refused: {refusal}\n"));
+    for refusal in &compared.refused {
+        let _ = writeln!(text, "refused: {refusal}");
+    }
     for (names, which) in [(&compared.only_in_a, "A"), (&compared.only_in_b, "B")] {
         if !names.is_empty() {
-            text += &format!("only in {which}: {}\n", names.join("; "));
+            let _ = writeln!(text, "only in {which}: {}", names.join("; "));
         }
     }
     text

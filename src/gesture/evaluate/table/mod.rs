@@ -4,10 +4,7 @@
 pub mod block_length;
 pub mod blocks;
 pub mod bootstrap;
-#[cfg(test)]
-mod calibration;
 pub mod compare;
-pub mod decorrelation;
 pub mod left_out;
 pub mod result;
 pub mod sign_flips;

@@ -1,12 +1,12 @@
 //! Table as JSON and back. Each value has its definition, parameters and their hash; only values of one hash are
 //! comparable.
 
-use super::bootstrap::Estimate;
 use super::table::{PredictorRow, Table};
 use crate::evaluate::baseline::baselines::PredictorKind;
 use crate::evaluate::verdict::labels;
 use crate::evaluate::verdict::verdict::{better_than_nothing, hears};
 use anyhow::{Context, Result, ensure};
+use orator_base::math::estimate::Estimate;
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use std::path::Path;
@@ -130,7 +130,7 @@ impl StoredMetric {
     pub fn value(&self, kind: PredictorKind) -> Option<Estimate> {
         let value = self.values.get(&kind.key())?;
         let number = |key: &str| value.get(key).and_then(Value::as_f64);
-        let (low, high) = (number("low").unwrap_or(f64::NAN), number("high").unwrap_or(f64::NAN));
-        Some(Estimate { value: number("value")?, low, high })
+        let [low, high] = ["low", "high"].map(|key| number(key).unwrap_or(f64::NAN));
+        Some(Estimate::new(number("value")?, low, high))
     }
 }

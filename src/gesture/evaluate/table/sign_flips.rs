@@ -2,7 +2,7 @@
 //! for dependent data in blocks: Canay, Romano and Shaikh 2017). Several metrics are flipped together, and each is held
 //! against the largest of all (Westfall and Young 1993), so that the level is that of all of them at once.
 
-use super::bootstrap::Estimate;
+use orator_base::math::estimate::Estimate;
 use rand::{RngCore, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -47,7 +47,7 @@ pub fn test(differences: &[Vec<f64>], inflation: f64) -> Vec<TestedDifference> {
         let mean = metric[..n].iter().sum::<f64>() / blocks;
         let Some(unit) = unit else {
             let none = if mean == 0.0 { 0.0 } else { f64::NAN };
-            return TestedDifference { mean: Estimate { value: mean, low: none, high: none }, p: 1.0 };
+            return TestedDifference { mean: Estimate::new(mean, none, none), p: 1.0 };
         };
         // The sum of unit length is a function of Student's t, which is what the inflation divides.
         let size = unit.iter().sum::<f64>().abs();
@@ -57,7 +57,7 @@ pub fn test(differences: &[Vec<f64>], inflation: f64) -> Vec<TestedDifference> {
         let spread: f64 = metric[..n].iter().map(|value| (value - mean).powi(2)).sum();
         let room = blocks - critical * critical;
         let half = if room > 0.0 { critical * (inflation * spread / (blocks * room)).sqrt() } else { f64::INFINITY };
-        TestedDifference { mean: Estimate { value: mean, low: mean - half, high: mean + half }, p }
+        TestedDifference { mean: Estimate::new(mean, mean - half, mean + half), p }
     };
     differences.iter().zip(&units).map(of_metric).collect()
 }
@@ -125,8 +125,10 @@ mod tests {
             let (n, shift) = (5 + case % 9, f64::from(case as u32 % 7) * 0.1);
             let metrics: Vec<Vec<f64>> = (0..3).map(|_| (0..n).map(|_| number() + shift).collect()).collect();
             for tested in test(&metrics, 1.0 + f64::from(case as u32 % 4) * 0.2) {
-                assert!(tested.mean.low <= tested.mean.value && tested.mean.value <= tested.mean.high);
-                assert_eq!(tested.p <= LEVEL, tested.mean.is_apart_from_zero(), "{tested:?}");
+                assert!(
+                    tested.mean.interval.low <= tested.mean.value && tested.mean.value <= tested.mean.interval.high
+                );
+                assert_eq!(tested.p <= LEVEL, tested.mean.interval.excludes_zero(), "{tested:?}");
                 assert!(n >= FEWEST_BLOCKS || tested.p > LEVEL, "{tested:?}");
                 n_rejected += usize::from(tested.p <= LEVEL);
             }
@@ -137,13 +139,13 @@ mod tests {
     #[test]
     fn extremes() {
         let alike = test(&[vec![0.2; FEWEST_BLOCKS]], 1.0)[0];
-        assert!(alike.p == 2.0 / 128.0 && alike.mean.is_apart_from_zero(), "{alike:?}");
-        assert!(!test(&[vec![0.2; FEWEST_BLOCKS - 1]], 1.0)[0].mean.is_apart_from_zero());
+        assert!(alike.p == 2.0 / 128.0 && alike.mean.interval.excludes_zero(), "{alike:?}");
+        assert!(!test(&[vec![0.2; FEWEST_BLOCKS - 1]], 1.0)[0].mean.interval.excludes_zero());
         assert_eq!(test(&[vec![0.0; 9]], 1.0)[0].p, 1.0);
         let broken = test(&[vec![f64::NAN; 9], vec![1e300; 9], vec![]], 1.0);
         assert!(broken.iter().all(|tested| tested.p == 1.0), "{broken:?}");
         assert!(test(&[], 1.0).is_empty());
         let many = test(&[vec![1.0; 40]], 1.0)[0];
-        assert_eq!((many.p, many.mean.low), (1e-4, 1.0));
+        assert_eq!((many.p, many.mean.interval.low), (1e-4, 1.0));
     }
 }

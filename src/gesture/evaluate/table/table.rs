@@ -1,17 +1,16 @@
 //! Table of every metric of every predictor with its interval, on the same clips and the same draws.
 
 use super::block_length::BlockLength;
-use super::blocks;
-use super::bootstrap::{Estimate, draws};
 use super::left_out::BlockGroups;
-use super::sign_flips;
-use super::sign_flips::TestedDifference;
+use super::sign_flips::{self, TestedDifference};
+use super::{blocks, bootstrap};
 use crate::evaluate::baseline::baselines::{NumberedCheckpoint, Predictor, PredictorKind};
 use crate::evaluate::clips::clips::EvalClips;
 use crate::metrics::catalogue::{Better, Catalogue, Definition, IntervalSums};
 use crate::metrics::settings::MetricSettings;
 use anyhow::{Result, ensure};
 use ndarray::{Array2, s};
+use orator_base::math::estimate::Estimate;
 use orator_base::stage::progress::Task;
 
 /// Number of draws behind an interval; costly metrics (Frechet distances, correlations) take fewer.
@@ -84,17 +83,16 @@ pub fn measure(
         task.detail(&NumberedCheckpoint::name_of(predictor.kind, predictor.checkpoint.as_ref()));
         let measured = blocks::measure(&catalogue, clips, predictor, block_length.frames(fps));
         let row = row(&catalogue, predictor.kind, &predictor.description, &measured);
-        let left_out = match measured.blocks.len() == frames.len() {
-            true => {
-                let counts = groups.counts_without();
-                let mut values = catalogue.draw_cheap(&measured.blocks, counts.view());
-                let costly = catalogue.draw_costly(&measured.blocks, counts.view());
-                for index in (0..values.ncols()).filter(|index| catalogue.is_costly(*index)) {
-                    values.column_mut(index).assign(&costly.column(index));
-                }
-                values
+        let left_out = if measured.blocks.len() == frames.len() {
+            let counts = groups.counts_without();
+            let mut values = catalogue.draw_cheap(&measured.blocks, counts.view());
+            let costly = catalogue.draw_costly(&measured.blocks, counts.view());
+            for index in (0..values.ncols()).filter(|index| catalogue.is_costly(*index)) {
+                values.column_mut(index).assign(&costly.column(index));
             }
-            false => Array2::default((0, 0)),
+            values
+        } else {
+            Array2::default((0, 0))
         };
         rows.push(PredictorRow { checkpoint: predictor.checkpoint.clone(), left_out, ..row });
         task.advance(1);
@@ -155,7 +153,7 @@ fn halves(catalogue: &Catalogue, clips: &EvalClips) -> Option<PredictorRow> {
                 the frames; only for figures of whole sets";
     let mut row = row(catalogue, PredictorKind::TruthHalves, description, &measured);
     for (index, definition) in catalogue.definitions().iter().enumerate().filter(|(_, d)| !is_of_sets(d)) {
-        row.values[index] = Estimate { value: f64::NAN, low: f64::NAN, high: f64::NAN };
+        row.values[index] = Estimate::new(f64::NAN, f64::NAN, f64::NAN);
         row.reasons[index] = format!("{} needs two motions of the same seconds", definition.name);
     }
     Some(row)
@@ -172,7 +170,7 @@ fn row(catalogue: &Catalogue, kind: PredictorKind, description: &str, measured: 
     let drawn = if n_blocks == 0 {
         Array2::from_elem((0, values.len()), f64::NAN)
     } else {
-        let counts = blocks::counts(&draws(n_blocks, N_DRAWS), n_blocks);
+        let counts = bootstrap::counts(n_blocks, N_DRAWS);
         let mut drawn = catalogue.draw_cheap(&measured.blocks, counts.view());
         // A prefix of the same draws.
         let costly = catalogue.draw_costly(&measured.blocks, counts.slice(s![..N_COSTLY_DRAWS, ..]));
@@ -183,13 +181,12 @@ fn row(catalogue: &Catalogue, kind: PredictorKind, description: &str, measured: 
         drawn
     };
     let estimate = |(index, value): (usize, &f64)| {
-        let estimate = Estimate::from_draws(*value, &drawn.column(index).to_vec());
+        let Estimate { value, interval } = bootstrap::estimate(*value, &drawn.column(index).to_vec());
         // Metrics are never below 0.
-        Estimate { low: estimate.low.max(0.0 * estimate.low), ..estimate }
+        Estimate::new(value, interval.low.max(0.0 * interval.low), interval.high)
     };
-    let reason = |(index, value): (usize, &f64)| match value.is_finite() {
-        true => String::new(),
-        false => catalogue.reason(&measured.whole, index),
+    let reason = |(index, value): (usize, &f64)| {
+        if value.is_finite() { String::new() } else { catalogue.reason(&measured.whole, index) }
     };
     PredictorRow {
         kind,

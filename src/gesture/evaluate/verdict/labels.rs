@@ -1,7 +1,8 @@
 //! Labels of metrics for people: name, unit, rounded value, interval in brackets.
 
-use crate::evaluate::table::bootstrap::Estimate;
 use crate::metrics::catalogue::{Better, Definition};
+use orator_base::math::estimate::Estimate;
+use std::fmt::Write as _;
 
 /// Names of metric families; of common prefixes the longest comes first.
 const NAMES: [(&str, &str); 25] = [
@@ -52,7 +53,7 @@ pub fn whole_name(definition: &Definition) -> String {
         name += " of the truth";
     }
     if let Some(alpha) = definition.parameters.get("alpha") {
-        name += &format!(" at {alpha}");
+        let _ = write!(name, " at {alpha}");
     }
     if definition.unit == "%" && definition.name.starts_with("bone") {
         name += ", relative";
@@ -126,9 +127,11 @@ pub fn number(definition: &Definition, value: f64) -> String {
 /// Value with interval, like `41.2 [38.0, 44.1]`.
 pub fn bracketed(definition: &Definition, estimate: &Estimate) -> String {
     let number = |value: f64| number(definition, value);
-    match estimate.low.is_finite() && estimate.high.is_finite() {
-        true => format!("{} [{}, {}]", number(estimate.value), number(estimate.low), number(estimate.high)),
-        false => number(estimate.value),
+    let Estimate { value, interval } = *estimate;
+    if interval.is_finite() {
+        format!("{} [{}, {}]", number(value), number(interval.low), number(interval.high))
+    } else {
+        number(value)
     }
 }
 
@@ -152,7 +155,7 @@ mod tests {
     fn numbers_are_short() {
         let catalogue = Catalogue::new(&MetricSettings::default()).unwrap();
         let share = &catalogue.definitions()[0];
-        let estimate = Estimate { value: 0.4123, low: 0.38, high: 0.44 };
+        let estimate = Estimate::new(0.4123, 0.38, 0.44);
         assert_eq!(bracketed(share, &estimate), "41.2 [38.0, 44.0]");
         let error = catalogue.definitions().iter().find(|d| d.name == "mpjpe").unwrap();
         assert_eq!(unit(error), "mm");

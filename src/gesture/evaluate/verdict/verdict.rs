@@ -4,10 +4,10 @@
 
 use super::labels;
 use crate::evaluate::baseline::baselines::PredictorKind;
-use crate::evaluate::table::bootstrap::Estimate;
 use crate::evaluate::table::sign_flips::{FEWEST_BLOCKS, TestedDifference};
 use crate::evaluate::table::table::{PredictorRow, Table};
 use crate::metrics::catalogue::Better;
+use orator_base::math::estimate::Estimate;
 use serde::Serialize;
 
 /// Aspect of motion that a metric describes.
@@ -80,56 +80,29 @@ pub fn better_than_nothing(table: &Table, own: &PredictorRow) -> Verdict {
     // `None`: the convention has no metric of it.
     let place = of(Aspect::Position).next().map(|_| summed(of(Aspect::Position)));
     let rest = others().next().map(|_| rest);
-    let (word, description) = match (place, rest) {
-        (Some(Answer::Yes), None) => (
-            "in part",
-            "it is nearer to where the speaker is than a pose that never moves; how it moves, no figure of this convention says",
-        ),
-        (Some(Answer::No), None) => (
-            "no",
-            "a pose that never moves is nearer to where the speaker is; how it moves, no figure of this convention says",
-        ),
-        (None, Some(Answer::Yes)) => (
-            "in part",
-            "its poses and movements are more like the speaker's than a pose that never moves; whether it is nearer to where the speaker is, no figure of this convention says",
-        ),
-        (None, Some(Answer::No)) => {
-            ("no", "its poses or movements are less like the speaker's than a pose that never moves")
-        }
-        (Some(Answer::Yes), Some(Answer::Yes)) => (
-            "yes",
-            "it is nearer to where the speaker is, and moves more like the speaker, than a pose that never moves",
-        ),
-        (Some(Answer::Yes), Some(Answer::Undecided)) => (
-            "in part",
-            "it is nearer to where the speaker is than a pose that never moves; that it moves like the speaker is not shown",
-        ),
-        (Some(Answer::Yes), Some(Answer::No)) => (
-            "in part",
-            "it is nearer to where the speaker is than a pose that never moves, but its poses or movements are less like the speaker's",
-        ),
-        (Some(Answer::No), Some(Answer::Yes)) => (
-            "in part",
-            "its poses and movements are more like the speaker's than a pose that never moves, but that pose is nearer to where the speaker is",
-        ),
-        (Some(Answer::Undecided), Some(Answer::Yes)) => (
-            "in part",
-            "its poses and movements are more like the speaker's than a pose that never moves, but it is not shown to be nearer to where the speaker is",
-        ),
-        (Some(Answer::No), Some(_)) => (
-            "no",
-            "a pose that never moves is nearer to where the speaker is, and its poses and movements are not shown to be more like the speaker's",
-        ),
-        (Some(Answer::Undecided), Some(Answer::No)) => (
-            "no",
-            "its poses or movements are less like the speaker's than a pose that never moves, and it is not shown to be nearer to where the speaker is",
-        ),
-        (Some(Answer::Undecided) | None, _) => ("undecided", "no figure tells it apart from a pose that never moves"),
+    let position = match place {
+        Some(Answer::Yes) => "it is nearer to where the speaker is than a pose that never moves",
+        Some(Answer::No) => "a pose that never moves is nearer to where the speaker is",
+        Some(Answer::Undecided) => "it is not shown to be nearer to where the speaker is than a pose that never moves",
+        None => "no metric of this convention compares positions with a pose that never moves",
+    };
+    let motion = match rest {
+        Some(Answer::Yes) => "its poses and movements are more like the speaker's",
+        Some(Answer::No) => "its poses or movements are less like the speaker's",
+        Some(Answer::Undecided) => "its poses and movements are not shown to be more like the speaker's",
+        None => "no metric of this convention compares poses and movements",
+    };
+    let answers = [place, rest];
+    let word = match answers.iter().filter(|answer| **answer == Some(Answer::Yes)).count() {
+        2 => "yes",
+        1 => "in part",
+        _ if answers.contains(&Some(Answer::No)) => "no",
+        _ => "undecided",
     };
     let oracle = table.row(PredictorKind::MeanPose).is_some_and(|row| row.description.contains("oracle"));
     let oracle =
         if oracle { " (The pose is taken from the truth itself, which no predictor knows: a hard rival.)" } else { "" };
-    Verdict { word, sentence: format!("{question} {}: {description}.{oracle}", capital(word)), votes }
+    Verdict { word, sentence: format!("{question} {}: {position}; {motion}.{oracle}", capital(word)), votes }
 }
 
 /// Better of the constant poses in a metric.
@@ -147,7 +120,7 @@ pub fn against_nothing(table: &Table, own: &PredictorRow, index: usize) -> Optio
 }
 
 fn answer(tested: &TestedDifference) -> Answer {
-    match (tested.mean.is_apart_from_zero(), tested.mean.value > 0.0) {
+    match (tested.mean.interval.excludes_zero(), tested.mean.value > 0.0) {
         (true, true) => Answer::Yes,
         (true, false) => Answer::No,
         (false, _) => Answer::Undecided,

@@ -1,10 +1,10 @@
 //! Poses for a sound of any length, segment after segment, each begun with the last poses of the one before.
 
+use super::architecture;
 use super::metadata::{self, SequenceMetadata};
 use super::poses::PoseNumbers;
-use super::sound;
 use super::vocabulary::NumberedWord;
-use crate::generate::model::BEST;
+use crate::generate::model::checkpoint_file;
 use anyhow::{Result, ensure};
 use candle_core::{DType, Device, Tensor};
 use ndarray::{Array2, ArrayView2, s};
@@ -45,9 +45,7 @@ pub struct GeneratedPoses {
 impl SequenceGenerator {
     /// Opens a checkpoint of `orator train seq2seq`: a file, or the folder of a training (its best checkpoint).
     pub fn open(path: &Path) -> Result<Self> {
-        let file = if path.is_dir() { path.join(BEST) } else { path.to_owned() };
-        ensure!(file.is_file(), "there is no checkpoint {}; `orator train seq2seq` writes one", file.display());
-        let (metadata, network) = metadata::load(&file)?;
+        let (metadata, network) = metadata::load(&checkpoint_file(path)?)?;
         Ok(Self { metadata, network })
     }
 
@@ -84,7 +82,8 @@ impl SequenceGenerator {
         ensure!(sound.rate == rate, "the sound has {} Hz, expected {rate}", sound.rate);
         let n_frames = self.n_frames(sound.samples.len())?;
         let Config { predicted, context, .. } = *self.network.config();
-        let heard = sound::features(sound, self.fps(), n_frames, n_frames.next_multiple_of(predicted), context);
+        let heard =
+            architecture::audio_features(sound, self.fps(), n_frames, n_frames.next_multiple_of(predicted), context);
         let shape = (1, heard.nrows(), heard.ncols());
         let audio = Tensor::from_iter(heard.iter().copied(), &Device::Cpu)?.reshape(shape)?;
         Ok(HeardSpeech { n_frames, audio, said: self.metadata.vocabulary.numbered(words) })

@@ -1,8 +1,7 @@
 //! What a checkpoint of a sequence-to-sequence network says beside its tensors, and the network it describes.
 
-use super::architecture::{AROUND_SEGMENT_SECS, Architecture, network_config};
+use super::architecture::{AROUND_SEGMENT_SECS, Architecture, RATES, network_config};
 use super::poses::PoseNumbers;
-use super::sound::RATES;
 use super::vocabulary::{NumberedWord, Vocabulary};
 use anyhow::{Context, Result, ensure};
 use orator_base::types::time::FrameRate;

@@ -70,8 +70,7 @@ impl PoseNumbers {
             bail!("it moves the skeleton of the BVH files it was trained on, which is written as .bvh alone");
         };
         let mut motion = Motion::from_joints(fps, representation.joints(numbers.t(), normalisation));
-        let lengths = &normalisation.bone_lengths;
-        bones::with_lengths(&mut motion, &std::array::from_fn(|bone| lengths.get(bone).copied().unwrap_or(0.0)));
+        bones::with_lengths(&mut motion, &normalisation.lengths());
         Ok(motion)
     }
 }

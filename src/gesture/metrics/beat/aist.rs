@@ -5,8 +5,7 @@ use super::consistency::{minima, nearness};
 use crate::metrics::body_part::BodyPart;
 use crate::metrics::definition::{Better, Definition, MetricFamily};
 use crate::metrics::pair::PairedFrames;
-use orator_base::math::vec3;
-use orator_base::math::vec3::Vec3;
+use orator_base::math::vec3::{self, Vec3};
 use orator_base::types::skeleton::N_JOINTS;
 use serde_json::json;
 

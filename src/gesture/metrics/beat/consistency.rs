@@ -4,8 +4,7 @@
 use crate::metrics::body_part::BodyPart;
 use crate::metrics::definition::{Better, Definition, MetricFamily};
 use crate::metrics::pair::PairedFrames;
-use orator_base::math::vec3;
-use orator_base::math::vec3::Vec3;
+use orator_base::math::vec3::{self, Vec3};
 use orator_base::types::skeleton::{L_ELBOW, L_WRIST, N_JOINTS, R_ELBOW, R_WRIST};
 use serde_json::json;
 

@@ -63,7 +63,7 @@ impl AddAssign<&Self> for GaussianFit {
     fn add_assign(&mut self, other: &Self) {
         if self.n == 0 || other.n == 0 {
             if other.n > 0 {
-                *self = other.clone();
+                self.clone_from(other);
             }
             return;
         }

@@ -128,9 +128,12 @@ mod tests {
     fn rows(n: usize, d: usize, constant: bool) -> Array2<f64> {
         let hash =
             |i: usize, j: usize| ((12.9898 * i as f64 + 78.233 * j as f64).sin().abs() * 43_758.545_3).fract() - 0.5;
-        let mut rows = Array2::from_shape_fn((n, 2 * d), |(i, j)| match j < d {
-            true => hash(i, j) + 0.3 * hash(i, 1000),
-            false => hash(i, j - d + 500) + 0.4 * hash(i, j - d) - 0.2 * hash(i, 1000),
+        let mut rows = Array2::from_shape_fn((n, 2 * d), |(i, j)| {
+            if j < d {
+                hash(i, j) + 0.3 * hash(i, 1000)
+            } else {
+                hash(i, j - d + 500) + 0.4 * hash(i, j - d) - 0.2 * hash(i, 1000)
+            }
         });
         if constant {
             rows.column_mut(2).fill(0.7);

@@ -4,11 +4,9 @@
 use ndarray::{ArrayView2, ArrayView3};
 use orator_base::types::skeleton::{N_JOINTS, NECK, is_duplicate};
 use orator_base::types::time::FrameRate;
-use serde::{Deserialize, Serialize};
-use std::ops::AddAssign;
 
 /// Squared speeds so far.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MotionEnergy {
     /// Sum of squared speeds, (m/s)^2.
     pub sum: f64,
@@ -45,13 +43,6 @@ impl MotionEnergy {
     }
 }
 
-impl AddAssign for MotionEnergy {
-    fn add_assign(&mut self, other: Self) {
-        self.sum += other.sum;
-        self.n += other.n;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -78,7 +69,6 @@ mod tests {
         gap.add(joints.view(), mask.view(), fps);
         assert_eq!(gap.n, 3 * 46 - 2);
         assert!((gap.sum - 0.25).abs() < 1e-6);
-        gap += gap;
         assert!((gap.relative_to(&whole) - (0.25 / 136.0) / (0.25 / 46.0)).abs() < 1e-6);
         assert!(whole.relative_to(&MotionEnergy::default()).is_nan());
     }

@@ -3,10 +3,8 @@
 
 use crate::metrics::body_part::BodyPart;
 use crate::metrics::definition::{Better, Definition, MetricFamily};
-use crate::metrics::per_frame;
-use crate::metrics::per_frame::PointWindow;
-use orator_base::math::vec3;
-use orator_base::math::vec3::Vec3;
+use crate::metrics::per_frame::{self, PointWindow};
+use orator_base::math::vec3::{self, Vec3};
 use serde_json::json;
 
 /// Mean absolute difference of coordinates, metres: what the L1 loss of training measures.

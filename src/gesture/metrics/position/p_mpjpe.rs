@@ -4,8 +4,7 @@
 use crate::metrics::body_part::BodyPart;
 use crate::metrics::definition::{Better, Definition, MetricFamily};
 use orator_base::math::procrustes::similarity;
-use orator_base::math::vec3;
-use orator_base::math::vec3::Vec3;
+use orator_base::math::vec3::{self, Vec3};
 use orator_base::types::skeleton::{L_HAND, N_HAND_JOINTS, R_HAND};
 use serde_json::json;
 

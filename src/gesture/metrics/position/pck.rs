@@ -8,22 +8,20 @@ use crate::metrics::pair::PairedFrames;
 use crate::metrics::sums::BlockSums;
 use ndarray::{ArrayView2, ArrayView3, NdFloat};
 use orator_base::types::skeleton::{L_WRIST, N_JOINTS, NECK, R_SHOULDER, is_duplicate};
-use serde::{Deserialize, Serialize};
 use serde_json::json;
-use std::ops::AddAssign;
 
 /// A joint is correct up to this share of the pose's largest extent.
 pub const ALPHA: f32 = 0.2;
 
 /// Correct and counted keypoints of one part of the body.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct KeypointCount {
     pub n_correct: usize,
     pub n: usize,
 }
 
 /// Correct and counted keypoints.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CorrectKeypoints {
     /// The published metric: every joint but the neck, the two hand roots (the wrists again) included.
     pub all: KeypointCount,
@@ -195,21 +193,6 @@ impl CorrectKeypoints {
     }
 }
 
-impl AddAssign for KeypointCount {
-    fn add_assign(&mut self, other: Self) {
-        self.n_correct += other.n_correct;
-        self.n += other.n;
-    }
-}
-
-impl AddAssign for CorrectKeypoints {
-    fn add_assign(&mut self, other: Self) {
-        self.all += other.all;
-        self.body += other.body;
-        self.hands += other.hands;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -234,8 +217,5 @@ mod tests {
         let mut flat = CorrectKeypoints::default();
         flat.count(PckAxes::Xy, predicted.view(), ground_truth.view(), mask.view());
         assert_eq!(flat.body, count(3, 5));
-        let mut twice = correct;
-        twice += correct;
-        assert_eq!((twice.all, twice.share()), (count(90, 94), correct.share()));
     }
 }

@@ -2,7 +2,6 @@
 //! heart: other moments and speeds, other loudness and pitch, room noise, hidden bands and moments (Park et al. 2019),
 //! the body in a mirror.
 
-use super::recipe::settings::GanSettings;
 use crate::generate::mel_stream::mel_frames;
 use crate::generate::normalisation::Normalisation;
 use crate::train::resume;
@@ -10,6 +9,7 @@ use ndarray::{Array2, Axis, s};
 use orator_base::audio::mel;
 use orator_base::types::skeleton::{self, N_JOINTS};
 use orator_base::types::time::FrameRate;
+use orator_dataset::config::GanSettings;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -165,18 +165,9 @@ pub fn gaussian(n: usize, std: f64, seed: u64, step: usize) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::train::gan::recipe::material::TrainingMaterial;
-    use crate::train::gan::recipe::start::TrainingStart;
+    use crate::train::gan::recipe::tests::of_minutes;
     use orator_base::types::skeleton::{L_WRIST, R_WRIST};
-    use orator_dataset::config::GanConfig;
-
-    fn settings() -> GanSettings {
-        GanSettings::new(
-            &GanConfig::default(),
-            &TrainingMaterial { train_secs: 600.0, validation_secs: 0.0, n_speakers: 1 },
-            TrainingStart::Nothing,
-        )
-    }
+    use orator_dataset::config::GanRecipe;
 
     fn still() -> WindowChange {
         WindowChange {
@@ -198,7 +189,7 @@ mod tests {
 
     #[test]
     fn a_step_always_has_the_same_changes_within_their_bounds() {
-        let (of, fps) = (settings(), FrameRate::new(15, 1));
+        let (of, fps) = (of_minutes(GanRecipe::Auto, 10.0), FrameRate::new(15, 1));
         let text = |step| format!("{:?}", changes(&of, step, fps));
         assert!(text(3) == text(3) && text(3) != text(4));
         for change in (0..50).flat_map(|step| changes(&of, step, fps)) {
@@ -207,13 +198,7 @@ mod tests {
             let [first, last] = change.masked_bands;
             assert!(last - first <= of.augment_mask_bands && last <= mel::N_MELS);
         }
-        let paper = GanConfig { recipe: orator_dataset::config::GanRecipe::Paper, ..GanConfig::default() };
-        let paper = GanSettings::new(
-            &paper,
-            &TrainingMaterial { train_secs: 600.0, validation_secs: 0.0, n_speakers: 1 },
-            TrainingStart::Nothing,
-        );
-        assert!(changes(&paper, 3, fps).is_empty());
+        assert!(changes(&of_minutes(GanRecipe::Paper, 10.0), 3, fps).is_empty());
     }
 
     #[test]

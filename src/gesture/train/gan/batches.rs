@@ -4,8 +4,7 @@
 use super::windows::WindowBatch;
 use anyhow::{Context, Result};
 use rayon::ThreadPoolBuilder;
-use std::sync::mpsc;
-use std::sync::mpsc::{Receiver, Sender};
+use std::sync::mpsc::{self, Receiver, Sender};
 
 /// The batch of a step.
 pub type BatchOfStep<'a> = &'a (dyn Fn(usize) -> Result<WindowBatch> + Sync);

@@ -1,6 +1,5 @@
 //! What a training knows of its speakers before its first step: statistics of the datasets, or what a checkpoint says of them.
 
-use super::recipe::settings::GanSettings;
 use super::start;
 use super::windows::WindowLoader;
 use crate::generate::model::SpeakerMetadata;
@@ -10,7 +9,7 @@ use anyhow::{Context, Result, bail, ensure};
 use orator_base::motion::bones;
 use orator_base::types::posture::PostureChannel;
 use orator_base::types::skeleton::N_BONES;
-use orator_dataset::config::{MotionRepresentation, NetworkPreset};
+use orator_dataset::config::{GanSettings, MotionRepresentation, NetworkPreset};
 use orator_dataset::{Dataset, Split};
 use orator_nn::gan::generator::{Config, Preset};
 

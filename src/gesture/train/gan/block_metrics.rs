@@ -2,8 +2,7 @@
 
 use super::score::{ChannelError, ErrorReduction, ValidationMetrics};
 use super::windows::WindowBatch;
-use crate::metrics::distribution::frechet;
-use crate::metrics::distribution::frechet::{GaussianFit, frechet};
+use crate::metrics::distribution::frechet::{self, GaussianFit, frechet};
 use crate::metrics::movement::energy::MotionEnergy;
 use crate::metrics::position::pck::{CorrectKeypoints, PckAxes};
 use anyhow::Result;

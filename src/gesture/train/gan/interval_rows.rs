@@ -7,7 +7,6 @@ use anyhow::Result;
 use ndarray::Array2;
 use orator_base::audio::mel;
 use orator_base::motion::bones;
-use orator_base::types::skeleton::N_BONES;
 use orator_dataset::Dataset;
 use orator_dataset::index::SampleRef;
 use rayon::prelude::*;
@@ -33,7 +32,6 @@ pub struct TrainingIntervals<'d> {
     dataset: &'d Dataset,
     samples: Vec<SampleRef>,
     normal: Normalisation,
-    lengths: [f32; N_BONES],
     /// All of them, where they are few.
     held: Option<Vec<IntervalRows>>,
 }
@@ -49,8 +47,7 @@ impl<'d> TrainingIntervals<'d> {
         normal: &Normalisation,
         most_bytes: usize,
     ) -> Result<Self> {
-        let lengths = std::array::from_fn(|bone| normal.bone_lengths.get(bone).copied().unwrap_or(0.0));
-        let mut intervals = Self { dataset, samples, normal: normal.clone(), lengths, held: None };
+        let mut intervals = Self { dataset, samples, normal: normal.clone(), held: None };
         let bytes = |i| intervals.n_frames(i) * 5 * normal.n_numbers() + intervals.n_mels(i) * 4 * mel::N_MELS;
         if (0..intervals.n_intervals()).map(bytes).sum::<usize>() <= most_bytes {
             let whole = |i| {
@@ -94,11 +91,8 @@ impl<'d> TrainingIntervals<'d> {
         let (first_frame, first_mel) = (frames.start, mels.start);
         let mut motion = self.dataset.motion(sample, frames.clone())?;
         // Every video has its own constant lengths; the generator learns one body.
-        bones::with_lengths(&mut motion, &self.lengths);
-        let posture = match self.normal.channels.is_empty() {
-            true => None,
-            false => self.dataset.posture(sample, frames)?,
-        };
+        bones::with_lengths(&mut motion, &self.normal.lengths());
+        let posture = if self.normal.channels.is_empty() { None } else { self.dataset.posture(sample, frames)? };
         let (features, mask) = self.normal.features_with_channels(&motion, posture.as_ref());
         let start = mels.start * mel::HOP;
         let n_samples = mel::n_samples(mels.len());

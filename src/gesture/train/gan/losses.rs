@@ -6,6 +6,11 @@ use orator_base::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_WR
 use orator_dataset::config::AdversarialLoss;
 use orator_nn::gan::discriminator::motion;
 
+/// Value of a scalar.
+pub fn number(scalar: &Tensor) -> anyhow::Result<f64> {
+    Ok(f64::from(scalar.to_scalar::<f32>()?))
+}
+
 /// Mean absolute difference over the numbers whose mask is 1; all three of one shape.
 pub fn l1(made: &Tensor, real: &Tensor, mask: &Tensor) -> Result<Tensor> {
     let n = mask.sum_all()?.maximum(1.0)?;

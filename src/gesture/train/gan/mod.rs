@@ -7,7 +7,6 @@ pub mod batches;
 pub mod begin;
 pub mod block_metrics;
 pub mod interval_rows;
-pub mod joined_windows;
 pub mod losses;
 pub mod recipe;
 pub mod score;

@@ -1,15 +1,14 @@
 //! A training that begins with another speaker's model: the network's weights are taken over, normalisation and skeleton
 //! are the new speaker's.
 
-use super::joined_windows::JoinedWindows;
-use super::recipe::settings::GanSettings;
-use super::recipe::start::TrainingStart;
+use super::recipe::TrainingStart;
 use super::step::GanTrainer;
-use crate::generate::model::{self, BEST, GENERATOR, SpeakerMetadata, TrainedVideo};
+use super::windows::JoinedWindows;
+use crate::generate::model::{self, GENERATOR, SpeakerMetadata, TrainedVideo, checkpoint_file};
 use anyhow::{Context, Result, bail, ensure};
 use candle_core::Tensor;
 use orator_dataset::Dataset;
-use orator_formats::checkpoint;
+use orator_dataset::config::GanSettings;
 use orator_formats::checkpoint::Contents;
 use orator_nn::gan::generator::Config;
 use orator_nn::gan::speaker_layer::SPEAKER;
@@ -29,7 +28,7 @@ pub struct StartingModel {
 impl StartingModel {
     /// Reads a checkpoint of `orator train gan`, or of its folder the best one, else the newest. Errors name the file.
     pub fn read(path: &Path) -> Result<Self> {
-        let path = if path.is_dir() { in_folder(path)? } else { path.to_owned() };
+        let path = checkpoint_file(path)?;
         let contents = Contents::read(&path)?;
         let speakers = model::speakers(&contents.facts);
         let speakers =
@@ -45,9 +44,10 @@ impl StartingModel {
 
     /// What this model is for a training of so many speakers.
     pub fn kind(&self, n_speakers: usize) -> TrainingStart {
-        match n_speakers == 1 && self.speakers.iter().any(|speaker| speaker.network.speaker_weights) {
-            true => TrainingStart::SeveralSpeakers,
-            false => TrainingStart::AnotherSpeaker,
+        if n_speakers == 1 && self.speakers.iter().any(|speaker| speaker.network.speaker_weights) {
+            TrainingStart::SeveralSpeakers
+        } else {
+            TrainingStart::AnotherSpeaker
         }
     }
 
@@ -87,9 +87,12 @@ impl StartingModel {
             speakers[0].network = Config { n_speakers: 1, speaker_weights, ..speakers[0].network.clone() };
         }
         let trainer = GanTrainer::new(speakers, settings)?;
-        let begin = || match begins_with_several {
-            false => trainer.begin_with(&self.contents, None),
-            true => self.begin_as_the_nearest(&trainer, &layers, windows),
+        let begin = || {
+            if begins_with_several {
+                self.begin_as_the_nearest(&trainer, &layers, windows)
+            } else {
+                trainer.begin_with(&self.contents, None)
+            }
         };
         begin().with_context(|| format!("cannot begin with {}", self.path.display()))?;
         Ok(trainer)
@@ -120,17 +123,6 @@ impl StartingModel {
             }
         }
         trainer.begin_with(&self.contents, least.as_ref().map(|(_, layer)| layer))
-    }
-}
-
-fn in_folder(folder: &Path) -> Result<PathBuf> {
-    let best = folder.join(BEST);
-    if best.is_file() {
-        return Ok(best);
-    }
-    match checkpoint::list(folder)?.pop() {
-        Some((_, newest)) => Ok(newest),
-        None => bail!("there is no checkpoint in {}; `orator train gan` writes one", folder.display()),
     }
 }
 

@@ -2,8 +2,7 @@
 
 use super::augment;
 use super::average;
-use super::losses;
-use super::recipe::settings::GanSettings;
+use super::losses::{self, number};
 use super::score::Validation;
 use super::speakers::LearntSpeakers;
 use super::windows::WindowBatch;
@@ -14,7 +13,7 @@ use crate::train::optim::adam::Adam;
 use crate::train::resume;
 use anyhow::{Context, Result, ensure};
 use candle_core::{Device, Tensor};
-use orator_dataset::config::{ComputeDevice, GanConfig};
+use orator_dataset::config::{ComputeDevice, GanConfig, GanSettings};
 use orator_formats::checkpoint;
 use orator_formats::checkpoint::Contents;
 use orator_nn::gan::discriminator::{Discriminator, motion};
@@ -23,7 +22,7 @@ use orator_nn::gan::speaker_layer::SPEAKER;
 use orator_nn::ops::resize;
 use orator_nn::params::{Params, open_device};
 use rand::Rng;
-use serde_json::{Value, json};
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -36,8 +35,6 @@ const ADAM_D: &str = "adam.discriminator.";
 const DROPOUT: u64 = 0x6472_6f70;
 /// Norm to which the gradient of each network is clipped.
 pub const MAX_NORM: f64 = 10.0;
-/// Loss beyond which a training has exploded.
-const LOSS_LIMIT: f64 = 1e4;
 
 /// Settings that may change between two runs of one training; of the others the checkpoint's count.
 const FREE: [&str; 5] = ["steps", "patience", "checkpoint_every", "keep_checkpoints", "device"];
@@ -274,7 +271,15 @@ impl GanTrainer {
         let mut speakers = self.speakers.all().iter().cloned();
         let speaker = speakers.next().context("a training without a speaker")?;
         let other_speakers = speakers.collect();
-        Ok(serde_json::to_value(TrainerState { speaker, other_speakers, settings, step: self.step, best: self.best })?)
+        let state = TrainerState { speaker, other_speakers, settings, step: self.step, best: self.best };
+        let mut facts = serde_json::to_value(&state)?;
+        if state.settings.channels.is_empty()
+            && let Some(settings) = facts["settings"].as_object_mut()
+        {
+            // A key of trainings with channels alone.
+            settings.shift_remove("channels");
+        }
+        Ok(facts)
     }
 
     /// Takes over the weights of another speaker's generator, and of the discriminator where its checkpoint has one.
@@ -320,7 +325,14 @@ impl TrainerState {
             contents.facts["settings"].is_object(),
             "it is no checkpoint that this version can go on from; choose another --out, or move that folder away"
         );
-        serde_json::from_value(contents.facts.clone()).context("its facts are not those of this program's version")
+        let state: Self = serde_json::from_value(contents.facts.clone())
+            .context("its facts are not those of this program's version")?;
+        let GanSettings { batch, steps, epoch_steps, window_frames, .. } = state.settings;
+        ensure!(
+            batch > 1 && steps > 0 && epoch_steps > 0 && window_frames > 0,
+            "its settings have no batch, steps, epochs or windows"
+        );
+        Ok(state)
     }
 
     /// All speakers, in the order of their numbers.
@@ -335,33 +347,14 @@ impl TrainerState {
 }
 
 impl Losses {
-    /// Errors, saying all of them, when one is not finite or has exploded.
-    pub fn check(&self, step: usize) -> Result<()> {
-        let all = [self.l1, self.velocity, self.bone, self.adversarial, self.discriminator];
-        ensure!(
-            all.iter().all(|loss| loss.is_finite() && loss.abs() < LOSS_LIMIT) && self.gradient_norm.is_finite(),
-            "the training broke at step {step}: L1 {}, velocity {}, bone {}, adversarial {}, discriminator {}, norm of the \
-             gradient {}",
-            self.l1,
-            self.velocity,
-            self.bone,
-            self.adversarial,
-            self.discriminator,
-            self.gradient_norm
-        );
-        Ok(())
+    /// Losses by name, to look whether the training is sound.
+    pub fn named(&self) -> [(&'static str, f64); 5] {
+        [
+            ("L1", self.l1),
+            ("velocity", self.velocity),
+            ("bone", self.bone),
+            ("adversarial", self.adversarial),
+            ("discriminator", self.discriminator),
+        ]
     }
-
-    /// A line of the log.
-    pub fn line(&self, step: usize) -> Value {
-        let mut line = json!({ "step": step });
-        if let (Some(line), Ok(Value::Object(losses))) = (line.as_object_mut(), serde_json::to_value(self)) {
-            line.extend(losses);
-        }
-        line
-    }
-}
-
-fn number(scalar: &Tensor) -> Result<f64> {
-    Ok(f64::from(scalar.to_scalar::<f32>()?))
 }

@@ -6,54 +6,31 @@ use super::augment;
 use super::batches;
 use super::batches::BatchesAhead;
 use super::begin;
-use super::joined_windows::JoinedWindows;
-use super::recipe::account;
-use super::recipe::material::TrainingMaterial;
-use super::recipe::settings::GanSettings;
-use super::recipe::start::TrainingStart;
+use super::recipe::{self, TrainingMaterial, TrainingStart};
 use super::score::Validation;
 use super::start::StartingModel;
 use super::step::{GanTrainer, Losses, TrainerState};
 use super::validate::ValidationIntervals;
-use super::windows::{WindowLoader, needed};
+use super::windows::{JoinedWindows, WindowLoader, needed};
 pub use crate::generate::model::BEST;
 use crate::generate::model::SpeakerMetadata;
 use crate::generate::normalisation::Normalisation;
-use crate::train::epochs::{self, EpochSchedule, StepReport, ValidatedStep, ValidatedTraining};
+use crate::train::epochs::{self, EpochSchedule, StepReport, TrainingOutcome, ValidatedStep, ValidatedTraining};
+use crate::train::log;
 use crate::train::no_window;
 use crate::train::resume::{self, sample_windows};
 use anyhow::{Result, ensure};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir::{self, FolderLock};
-use orator_dataset::config::{ComputeDevice, GanConfig};
+use orator_dataset::config::{ComputeDevice, GanConfig, GanSettings};
 use orator_dataset::{Dataset, Split};
 use orator_formats::checkpoint;
 use orator_formats::checkpoint::Contents;
 use orator_nn::cpu::thread_team::with_spinning_workers;
 use orator_nn::gan::generator::FRAMES_MULTIPLE;
 use orator_nn::params::open_device;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
-
-/// How a training ended.
-#[derive(Clone, Debug)]
-pub struct TrainingOutcome {
-    /// Steps of this training altogether, and the step this run began at.
-    pub steps: usize,
-    pub began_at: usize,
-    /// Whether it ended before its last step since the score had not become better for `gan.patience` epochs.
-    pub stopped_early: bool,
-    pub n_windows: usize,
-    pub n_parameters: usize,
-    /// Of the newest checkpoint.
-    pub validation: Validation,
-    pub newest: PathBuf,
-    /// Best by the validation's score.
-    pub best: PathBuf,
-    pub best_step: usize,
-    /// Share of the time of the steps that they waited for their batch, 0..1; validation and checkpoints do not count.
-    pub waiting: f64,
-}
 
 /// Trains on `dataset` until `wanted.steps`, going on from the newest checkpoint in `folder`; what the settings of that
 /// checkpoint say counts, and differences are reported.
@@ -66,7 +43,7 @@ pub fn train(
     requested: &GanConfig,
     folder: &Path,
     progress: &dyn Progress,
-) -> Result<TrainingOutcome> {
+) -> Result<TrainingOutcome<Validation>> {
     train_watched(&[dataset], requested, None, folder, progress, &mut |_| ())
 }
 
@@ -80,7 +57,7 @@ pub fn train_watched(
     folder: &Path,
     progress: &dyn Progress,
     validated: &mut dyn FnMut(ValidatedStep),
-) -> Result<TrainingOutcome> {
+) -> Result<TrainingOutcome<Validation>> {
     check(requested)?;
     begin::check(datasets)?;
     // Others may listen to the model while it learns, and nobody may forget it.
@@ -101,7 +78,7 @@ pub fn train_watched(
         None => {
             let material = TrainingMaterial::measure(datasets, window_frames);
             let begins_with = start.as_ref().map_or(TrainingStart::Nothing, |start| start.kind(datasets.len()));
-            let settings = GanSettings::new(requested, &material, begins_with);
+            let settings = recipe::settings(requested, &material, begins_with)?;
             let normal = |dataset: &&Dataset| begin::normalisation_with_channels(dataset, &requested.channels);
             (settings, datasets.iter().map(normal).collect::<Result<Vec<_>>>()?)
         }
@@ -138,7 +115,7 @@ pub fn train_watched(
     if resumed.is_none() {
         let material = TrainingMaterial::measure(datasets, window_frames);
         let secs_a_step = secs_a_step(&trainer, &loader)?;
-        account::lines(&trainer.settings, &material, secs_a_step).iter().for_each(|line| progress.say(line));
+        recipe::lines(&trainer.settings, &material, secs_a_step)?.iter().for_each(|line| progress.say(line));
     }
     let settings = trainer.settings.clone();
     let batch = |step: usize| {
@@ -158,18 +135,7 @@ pub fn train_watched(
         let end = with_spinning_workers(|| epochs::run(&mut training, folder, progress, validated))?;
         Ok((end, training.waiting.as_secs_f64() / training.stepping.as_secs_f64().max(1e-9)))
     })?;
-    Ok(TrainingOutcome {
-        steps: trainer.step,
-        began_at: end.began_at,
-        stopped_early: end.stopped_early,
-        n_windows: loader.len(),
-        n_parameters: trainer.n_parameters(),
-        validation: end.validation,
-        newest: end.newest,
-        best: folder.join(BEST),
-        best_step: end.best_step,
-        waiting,
-    })
+    Ok(TrainingOutcome { n_examples: loader.len(), n_parameters: trainer.n_parameters(), waiting, ..end })
 }
 
 /// Seconds of a step on this machine, measured on networks that are dropped; `None` of a training of few steps.
@@ -233,10 +199,10 @@ impl ValidatedTraining for GanTraining<'_, '_> {
         self.waiting += before.elapsed();
         let losses = self.trainer.step(&batch)?;
         self.stepping += before.elapsed();
-        losses.check(self.trainer.step)?;
-        let Losses { l1, adversarial, discriminator, .. } = losses;
+        let Losses { l1, adversarial, discriminator, gradient_norm, .. } = losses;
+        resume::ensure_sound(self.trainer.step, &losses.named(), gradient_norm)?;
         let words = format!("L1 {l1:.3} adv {adversarial:.3} D {discriminator:.3}");
-        Ok(StepReport { line: losses.line(self.trainer.step), words })
+        Ok(StepReport { line: log::line(self.trainer.step, &losses), words })
     }
 
     fn validate(&self) -> Result<Validation> {

@@ -5,9 +5,7 @@ use super::block_metrics::{
     AngleSums, BlockErrors, BlockSettings, BlockSpread, HeldOutBlock, NormalisedBlock, PredictorSums, RunningMean,
     bone_changes, mean_error, reduction,
 };
-use super::recipe::settings::GanSettings;
-use super::score;
-use super::score::Validation;
+use super::score::{self, Validation};
 use super::step::GanTrainer;
 use super::windows::{WindowBatch, WindowLoader, needed};
 use crate::generate::normalisation::{N_FEATURES, Normalisation};
@@ -18,6 +16,7 @@ use candle_core::Tensor;
 use ndarray::{Array2, Array3, ArrayView2};
 use orator_base::stage::progress::Progress;
 use orator_base::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_WRIST};
+use orator_dataset::config::GanSettings;
 use orator_dataset::{Dataset, Split};
 use orator_nn::gan::generator::FRAMES_MULTIPLE;
 

@@ -5,7 +5,7 @@ use super::interval_rows::{IntervalRows, TrainingIntervals};
 use crate::generate::mel_stream::mel_frames;
 use crate::generate::normalisation::{N_FEATURES, Normalisation};
 use crate::train::no_window::NeededFrames;
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 use candle_core::{Device, Tensor};
 use ndarray::{Array2, Axis, Slice};
 use orator_base::audio::mel;
@@ -245,6 +245,64 @@ impl<'d> WindowLoader<'d> {
             speakers: vec![0; which.len()],
         })
     }
+}
+
+/// The windows of all speakers of a training, those of one speaker after those of the other.
+pub struct JoinedWindows<'d>(Vec<WindowLoader<'d>>);
+
+impl<'d> JoinedWindows<'d> {
+    /// Loaders by the numbers of their speakers, one at least.
+    pub fn new(loaders: Vec<WindowLoader<'d>>) -> Self {
+        Self(loaders)
+    }
+
+    /// Number of the windows.
+    pub fn len(&self) -> usize {
+        self.0.iter().map(WindowLoader::len).sum()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Rate of the poses.
+    pub fn fps(&self) -> FrameRate {
+        self.0[0].fps()
+    }
+
+    /// The windows of these numbers (each below `len`) as one batch, each with its change; `changes` may be empty. The
+    /// windows of a batch stand in order of their speakers.
+    pub fn batch_changed(&self, which: &[usize], changes: &[WindowChange]) -> Result<WindowBatch> {
+        if let [only] = &self.0[..] {
+            return only.batch_changed(which, changes);
+        }
+        let mut first = 0;
+        let mut parts = Vec::new();
+        for (speaker, loader) in (0u32..).zip(&self.0) {
+            let own = |i: &usize| (first..first + loader.len()).contains(i);
+            let places: Vec<usize> = (0..which.len()).filter(|n| own(&which[*n])).collect();
+            let windows: Vec<usize> = places.iter().map(|n| which[*n] - first).collect();
+            let changes: Vec<WindowChange> = places.iter().filter_map(|n| changes.get(*n).cloned()).collect();
+            first += loader.len();
+            if !windows.is_empty() {
+                parts.push(WindowBatch {
+                    speakers: vec![speaker; windows.len()],
+                    ..loader.batch_changed(&windows, &changes)?
+                });
+            }
+        }
+        joined(&parts).context("no window was asked for")
+    }
+}
+
+fn joined(parts: &[WindowBatch]) -> Result<WindowBatch> {
+    let of = |tensor: fn(&WindowBatch) -> &Tensor| Tensor::cat(&parts.iter().map(tensor).collect::<Vec<_>>(), 0);
+    Ok(WindowBatch {
+        mels: of(|part| &part.mels)?,
+        poses: of(|part| &part.poses)?,
+        mask: of(|part| &part.mask)?,
+        speakers: parts.iter().flat_map(|part| part.speakers.iter().copied()).collect(),
+    })
 }
 
 /// Row of a number in the mask of joints and angles.

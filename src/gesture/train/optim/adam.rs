@@ -1,11 +1,11 @@
-//! Adam (Kingma & Ba 2015), optionally AMSGrad (Reddi 2018), with moments that can be saved, and clipping of the
-//! gradient's norm. One pass over the memory of each tensor; the same bits for any number of threads.
+//! Adam (Kingma & Ba 2015), optionally AMSGrad (Reddi 2018), as an optimiser of candle, with moments that can be saved and
+//! clipping of the gradient's norm. One pass over the memory of each tensor; the same bits for any number of threads.
 
-use super::adam_fallback;
-use super::adam_fallback::AdamScalars;
+use super::adam_fallback::{self, AdamScalars};
 use anyhow::{Context, ensure};
 use candle_core::backprop::GradStore;
 use candle_core::{CpuStorage, Device, InplaceOp2, Layout, Result, Tensor, Var};
+use candle_nn::Optimizer;
 use orator_nn::cpu::thread_team::{parallel_for, parallel_map};
 use orator_nn::params::Params;
 use std::cell::RefCell;
@@ -38,8 +38,11 @@ impl Default for Config {
 /// Moves the trainable tensors of one [`Params`].
 pub struct Adam {
     config: Config,
+    learning_rate: f64,
     /// Updates done.
     step: u64,
+    /// Norm of the last gradient, before clipping.
+    norm: f64,
     slots: Vec<AdamSlot>,
 }
 
@@ -74,63 +77,20 @@ impl Adam {
 
     /// As `new`, with a share of the learning rate for each tensor by its name; one of 0 stays as it is.
     pub fn with_rates(params: &Params, config: Config, share: impl Fn(&str) -> f64) -> Result<Self> {
-        let moments = |var: &Var| -> Result<MomentStorage> {
-            if !var.device().is_cpu() {
-                return Ok(MomentStorage::Device(adam_fallback::DeviceMoments::zeros(var, config.amsgrad)?));
-            }
-            let zeros = vec![0.0; var.elem_count()];
-            let largest = if config.amsgrad { zeros.clone() } else { Vec::new() };
-            Ok(MomentStorage::Cpu(RefCell::new(AdamMoments { first: zeros.clone(), second: zeros, largest })))
-        };
-        let slot = |(name, var): (&str, &Var)| -> Result<AdamSlot> {
-            Ok(AdamSlot { name: name.to_owned(), var: var.clone(), share: share(name), moments: moments(var)? })
-        };
-        Ok(Self { config, step: 0, slots: params.trainables().map(slot).collect::<Result<_>>()? })
+        let (names, vars): (Vec<&str>, Vec<Var>) = params.trainables().map(|(name, var)| (name, var.clone())).unzip();
+        let mut adam = <Self as Optimizer>::new(vars, config)?;
+        for (slot, name) in adam.slots.iter_mut().zip(names) {
+            (slot.name, slot.share) = (name.to_owned(), share(name));
+        }
+        Ok(adam)
     }
 
     /// One update at this learning rate. A tensor without gradient stays. Returns the gradient's norm before
     /// clipping; when that is not finite nothing is changed.
     pub fn step(&mut self, gradients: &GradStore, learning_rate: f64) -> Result<f64> {
-        let gradients: Vec<Option<Tensor>> = self
-            .slots
-            .iter()
-            .map(|slot| gradients.get(&slot.var).map(Tensor::contiguous).transpose())
-            .collect::<Result<_>>()?;
-        let mut squares = 0.0;
-        for gradient in gradients.iter().flatten() {
-            squares += match gradient.device().is_cpu() {
-                true => orator_nn::cpu::tensor::read::<f32, _>(gradient, |g| Ok(sum_of_squares(g)))?,
-                false => adam_fallback::sum_of_squares(gradient)?,
-            };
-        }
-        let norm = squares.sqrt();
-        if !norm.is_finite() {
-            return Ok(norm);
-        }
-        self.step += 1;
-        let Config { beta1, beta2, eps, max_norm, weight_decay, .. } = self.config;
-        let age = self.step.min(i32::MAX as u64) as i32;
-        let scale = max_norm.map_or(1.0, |max| if norm > max { max / norm } else { 1.0 });
-        let scalars = AdamScalars {
-            beta1: beta1 as f32,
-            beta2: beta2 as f32,
-            eps: eps as f32,
-            scale: scale as f32,
-            rate: 0.0,
-            correction: (1.0 / (1.0 - beta2.powi(age))).sqrt() as f32,
-            keep: 1.0,
-        };
-        for (slot, gradient) in self.slots.iter_mut().zip(&gradients) {
-            let Some(gradient) = gradient.as_ref().filter(|_| slot.share > 0.0) else { continue };
-            let keep = if slot.var.rank() > 1 { 1.0 - learning_rate * slot.share * weight_decay } else { 1.0 };
-            let rate = learning_rate * slot.share / (1.0 - beta1.powi(age));
-            let scalars = AdamScalars { rate: rate as f32, keep: keep as f32, ..scalars };
-            match &mut slot.moments {
-                MomentStorage::Cpu(moments) => slot.var.inplace_op2(gradient, &AdamUpdate { moments, scalars })?,
-                MomentStorage::Device(moments) => moments.update(&slot.var, gradient, &scalars)?,
-            }
-        }
-        Ok(norm)
+        self.learning_rate = learning_rate;
+        Optimizer::step(self, gradients)?;
+        Ok(self.norm)
     }
 
     /// Moments and step count, to save: `<prefix><tensor>.first`, `.second`, `.largest`, and `<prefix>step`.
@@ -174,6 +134,85 @@ impl Adam {
         }
         self.step = ((halves[0] as u64) << 24) + halves[1] as u64;
         Ok(())
+    }
+}
+
+impl Optimizer for Adam {
+    type Config = Config;
+
+    /// Tensors without names, at a rate of 0.001.
+    fn new(vars: Vec<Var>, config: Config) -> Result<Self> {
+        let slot = |var: Var| -> Result<AdamSlot> {
+            let moments = MomentStorage::zeros(&var, config.amsgrad)?;
+            Ok(AdamSlot { name: String::new(), var, share: 1.0, moments })
+        };
+        let slots = vars.into_iter().map(slot).collect::<Result<_>>()?;
+        Ok(Self { config, learning_rate: 1e-3, step: 0, norm: 0.0, slots })
+    }
+
+    fn learning_rate(&self) -> f64 {
+        self.learning_rate
+    }
+
+    fn set_learning_rate(&mut self, learning_rate: f64) {
+        self.learning_rate = learning_rate;
+    }
+
+    fn step(&mut self, gradients: &GradStore) -> Result<()> {
+        let learning_rate = self.learning_rate;
+        let gradients: Vec<Option<Tensor>> = self
+            .slots
+            .iter()
+            .map(|slot| gradients.get(&slot.var).map(Tensor::contiguous).transpose())
+            .collect::<Result<_>>()?;
+        let mut squares = 0.0;
+        for gradient in gradients.iter().flatten() {
+            squares += if gradient.device().is_cpu() {
+                orator_nn::cpu::tensor::read::<f32, _>(gradient, |g| Ok(sum_of_squares(g)))?
+            } else {
+                adam_fallback::sum_of_squares(gradient)?
+            };
+        }
+        let norm = squares.sqrt();
+        self.norm = norm;
+        if !norm.is_finite() {
+            return Ok(());
+        }
+        self.step += 1;
+        let Config { beta1, beta2, eps, max_norm, weight_decay, .. } = self.config;
+        let age = self.step.min(i32::MAX as u64) as i32;
+        let scale = max_norm.map_or(1.0, |max| if norm > max { max / norm } else { 1.0 });
+        let scalars = AdamScalars {
+            beta1: beta1 as f32,
+            beta2: beta2 as f32,
+            eps: eps as f32,
+            scale: scale as f32,
+            rate: 0.0,
+            correction: (1.0 / (1.0 - beta2.powi(age))).sqrt() as f32,
+            keep: 1.0,
+        };
+        for (slot, gradient) in self.slots.iter_mut().zip(&gradients) {
+            let Some(gradient) = gradient.as_ref().filter(|_| slot.share > 0.0) else { continue };
+            let keep = if slot.var.rank() > 1 { 1.0 - learning_rate * slot.share * weight_decay } else { 1.0 };
+            let rate = learning_rate * slot.share / (1.0 - beta1.powi(age));
+            let scalars = AdamScalars { rate: rate as f32, keep: keep as f32, ..scalars };
+            match &mut slot.moments {
+                MomentStorage::Cpu(moments) => slot.var.inplace_op2(gradient, &AdamUpdate { moments, scalars })?,
+                MomentStorage::Device(moments) => moments.update(&slot.var, gradient, &scalars)?,
+            }
+        }
+        Ok(())
+    }
+}
+
+impl MomentStorage {
+    fn zeros(var: &Var, amsgrad: bool) -> Result<Self> {
+        if !var.device().is_cpu() {
+            return Ok(Self::Device(adam_fallback::DeviceMoments::zeros(var, amsgrad)?));
+        }
+        let zeros = vec![0.0; var.elem_count()];
+        let largest = if amsgrad { zeros.clone() } else { Vec::new() };
+        Ok(Self::Cpu(RefCell::new(AdamMoments { first: zeros.clone(), second: zeros, largest })))
     }
 }
 

@@ -1,7 +1,7 @@
 //! A folder of captures: of each `NAME.bvh` with its sound `NAME.wav`, and where there is one a transcript of that name.
 
 use super::sequence::{PoseSequence, SequenceSplits};
-use crate::generate::seq2seq::sound;
+use crate::generate::seq2seq::architecture;
 use anyhow::{Context, Result, bail, ensure};
 use ndarray::{Array2, s};
 use orator_base::audio::mfcc;
@@ -63,7 +63,7 @@ impl CaptureFolder {
             dir.display()
         );
         let rate = probe::probe(&first.wav)?.audio.map_or(0, |audio| audio.rate);
-        let rate = rate.clamp(*sound::RATES.start(), *sound::RATES.end());
+        let rate = rate.clamp(*architecture::RATES.start(), *architecture::RATES.end());
         Ok(Self { dir: dir.to_owned(), rate, mapping, captures })
     }
 
@@ -124,7 +124,7 @@ impl CaptureFolder {
         let poses = maps.features(&Bvh::read(&capture.bvh)?).with_context(|| capture.bvh.display().to_string())?;
         let sound = read_sound(&capture.wav, self.rate)?;
         let n = poses.nrows().min(mfcc::n_poses(sound.samples.len(), sound.rate, FPS.per_sec()));
-        let audio = sound::features(&sound, FPS, n, n, context);
+        let audio = architecture::audio_features(&sound, FPS, n, n, context);
         let Transcript { words, mut notes, .. } =
             capture.transcript.as_deref().map(Transcript::read).transpose()?.unwrap_or_default();
         notes.extend(after_end(&words, sound.secs()));

@@ -1,9 +1,10 @@
 //! What FineMotion's networks are trained to make small (GENEA 2020 entry, section on training; where paper and code
 //! differ both are here, and the code's reading is the default). Pure functions of poses [B, T, X] and of logits.
 
+use crate::train::gan::losses::{discriminator_loss, generator_loss};
 use candle_core::{Result, Tensor};
-use orator_dataset::config::{ContinuityLoss, DistanceLoss, ReachLoss};
-use serde::{Deserialize, Serialize};
+use candle_nn::loss::mse;
+use orator_dataset::config::{AdversarialLoss, ContinuityLoss, DistanceLoss, ReachLoss, Seq2seqConfig};
 
 /// Added under a root, which has no slope at 0.
 const TINY: f64 = 1e-12;
@@ -11,11 +12,6 @@ const TINY: f64 = 1e-12;
 /// Mean absolute difference (code).
 pub fn l1(made: &Tensor, real: &Tensor) -> Result<Tensor> {
     (made - real)?.abs()?.mean_all()
-}
-
-/// Mean squared difference (paper).
-pub fn mse(made: &Tensor, real: &Tensor) -> Result<Tensor> {
-    (made - real)?.sqr()?.mean_all()
 }
 
 /// Sum of absolute differences of following poses over the number of all numbers (code).
@@ -41,12 +37,7 @@ pub fn variance(made: &Tensor) -> Result<Tensor> {
 
 /// Half the sum of the binary cross-entropies of real logits against 1 and of generated ones against 0.
 pub fn discriminator(generated: &Tensor, real: &Tensor) -> Result<Tensor> {
-    (softplus(&real.neg()?)?.mean_all()? + softplus(generated)?.mean_all()?)? * 0.5
-}
-
-/// Binary cross-entropy of generated logits against 1 (non-saturating).
-pub fn adversarial(generated: &Tensor) -> Result<Tensor> {
-    softplus(&generated.neg()?)?.mean_all()
+    discriminator_loss(AdversarialLoss::Log, real, generated)? * 0.5
 }
 
 /// Differences of following poses: [B, T, X] to [B, T - 1, X].
@@ -55,67 +46,39 @@ fn steps(poses: &Tensor) -> Result<Tensor> {
     poses.narrow(1, 1, n)? - poses.narrow(1, 0, n)?
 }
 
-/// log(1 + e^x), without overflow.
-fn softplus(x: &Tensor) -> Result<Tensor> {
-    x.relu()? + (x.abs()?.neg()?.exp()? + 1.0)?.log()?
+/// Settings of the adversarial network's loss: squared differences, no reward of reach.
+pub fn of_adversarial(settings: &Seq2seqConfig) -> Seq2seqConfig {
+    Seq2seqConfig { distance: DistanceLoss::Mse, lambda_reach: 0.0, ..settings.clone() }
 }
 
-/// The loss of a generator, by parts and weights.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SequenceLoss {
-    pub distance: DistanceLoss,
-    pub continuity: ContinuityLoss,
-    pub reach: ReachLoss,
-    pub continuity_weight: f64,
-    pub reach_weight: f64,
-    /// Of the adversarial loss, where there is a discriminator.
-    pub adversarial_weight: f64,
-}
-
-impl Default for SequenceLoss {
-    fn default() -> Self {
-        Self {
-            distance: DistanceLoss::default(),
-            continuity: ContinuityLoss::default(),
-            reach: ReachLoss::default(),
-            continuity_weight: 0.01,
-            reach_weight: 1.0,
-            adversarial_weight: 0.01,
-        }
-    }
-}
-
-impl SequenceLoss {
-    /// That of the adversarial network: squared differences, no reward of reach.
-    pub fn of_adversarial(self) -> Self {
-        Self { distance: DistanceLoss::Mse, reach_weight: 0.0, ..self }
-    }
-
-    /// The weighted sum for poses and, where there is a discriminator, its logits of them.
-    pub fn total(&self, made: &Tensor, real: &Tensor, logits: Option<&Tensor>) -> Result<Tensor> {
-        let mut total = match self.distance {
-            DistanceLoss::L1 => l1(made, real)?,
-            DistanceLoss::Mse => mse(made, real)?,
+/// The weighted sum for poses and, where there is a discriminator, its logits of them.
+pub fn total(settings: &Seq2seqConfig, made: &Tensor, real: &Tensor, logits: Option<&Tensor>) -> Result<Tensor> {
+    let mut total = match settings.distance {
+        DistanceLoss::L1 => l1(made, real)?,
+        DistanceLoss::Mse => mse(made, real)?,
+    };
+    let mut add = |part: Tensor, weight: f64| -> Result<()> {
+        total = (&total + (part * weight)?)?;
+        Ok(())
+    };
+    if settings.lambda_continuity != 0.0 {
+        let part = match settings.continuity {
+            ContinuityLoss::Numbers => continuity_of_numbers(made)?,
+            ContinuityLoss::Poses => continuity_of_poses(made)?,
         };
-        if self.continuity_weight != 0.0 {
-            let part = match self.continuity {
-                ContinuityLoss::Numbers => continuity_of_numbers(made)?,
-                ContinuityLoss::Poses => continuity_of_poses(made)?,
-            };
-            total = (total + (part * self.continuity_weight)?)?;
-        }
-        if self.reach_weight != 0.0 {
-            let part = match self.reach {
-                ReachLoss::Excursion => excursion(made)?,
-                ReachLoss::Variance => variance(made)?,
-            };
-            total = (total + (part * self.reach_weight)?)?;
-        }
-        match logits {
-            Some(logits) => total + (adversarial(logits)? * self.adversarial_weight)?,
-            None => Ok(total),
-        }
+        add(part, settings.lambda_continuity)?;
     }
+    if settings.lambda_reach != 0.0 {
+        let part = match settings.reach {
+            ReachLoss::Excursion => excursion(made)?,
+            ReachLoss::Variance => variance(made)?,
+        };
+        add(part, settings.lambda_reach)?;
+    }
+    if let Some(logits) = logits {
+        add(generator_loss(AdversarialLoss::Log, logits)?, settings.lambda_adversarial)?;
+    }
+    Ok(total)
 }
 
 #[cfg(test)]
@@ -143,10 +106,11 @@ mod tests {
         let entropy = |x: f64| -(1.0 / (1.0 + (-x).exp())).ln();
         let expected = (entropy(2.0) + entropy(-1.0) + entropy(-0.5) + entropy(1.0)) / 4.0;
         assert!(near(discriminator(&logits(0.5, -1.0)?, &logits(2.0, -1.0)?), expected)?);
-        assert!(near(adversarial(&logits(0.5, -90.0)?), (entropy(0.5) + 90.0) / 2.0)?);
-        let of_code = SequenceLoss::default().total(&made, &real, None);
+        assert!(near(generator_loss(AdversarialLoss::Log, &logits(0.5, -90.0)?), (entropy(0.5) + 90.0) / 2.0)?);
+        let settings = Seq2seqConfig::default();
+        let of_code = total(&settings, &made, &real, None);
         assert!(near(of_code, 0.75 + 0.01 * 1.75 - 1.75)?);
-        let of_gan = SequenceLoss::default().of_adversarial().total(&made, &real, Some(&logits(0.0, 0.0)?));
+        let of_gan = total(&of_adversarial(&settings), &made, &real, Some(&logits(0.0, 0.0)?));
         assert!(near(of_gan, 1.25 + 0.0175 + 0.01 * 2f64.ln())?);
         Ok(())
     }
@@ -154,14 +118,14 @@ mod tests {
     #[test]
     fn gradients_are_right() -> Result<()> {
         let (made, real) = (pattern(&[2, 4, 3], 0.0)?, pattern(&[2, 4, 3], 3.0)?);
-        let of_paper = SequenceLoss {
+        let of_paper = Seq2seqConfig {
             distance: DistanceLoss::Mse,
             continuity: ContinuityLoss::Poses,
             reach: ReachLoss::Variance,
-            ..SequenceLoss::default()
+            ..Seq2seqConfig::default()
         };
-        for loss in [SequenceLoss::default(), of_paper] {
-            assert!(worst(&[made.clone(), real.clone()], |v| loss.total(&v[0], &v[1], Some(&v[0])))? < 1e-7);
+        for settings in [Seq2seqConfig::default(), of_paper] {
+            assert!(worst(&[made.clone(), real.clone()], |v| total(&settings, &v[0], &v[1], Some(&v[0])))? < 1e-7);
         }
         assert!(worst(&[made, real], |v| discriminator(&v[0], &v[1]))? < 1e-7);
         // Poses that stay where they are have no slope, and no NaN.

@@ -3,8 +3,8 @@
 use super::captures::CaptureFolder;
 use super::sequence::{PoseSequence, SequenceSplits};
 use crate::generate::representation::Representation;
+use crate::generate::seq2seq::architecture;
 use crate::generate::seq2seq::poses::PoseNumbers;
-use crate::generate::seq2seq::sound;
 use crate::train::gan::begin::normalisation;
 use anyhow::{Result, bail, ensure};
 use orator_base::types::sound::SAMPLE_RATE;
@@ -110,7 +110,7 @@ fn of_split(
         let sample = dataset.read(sample)?;
         let (numbers, known) = representation.directions(&sample.motion);
         let n = sample.motion.n_frames();
-        let audio = sound::features(&sample.sound, sample.motion.fps, n, n, context);
+        let audio = architecture::audio_features(&sample.sound, sample.motion.fps, n, n, context);
         Ok(PoseSequence::new(numbers, known, audio, sample.words.unwrap_or_default()))
     };
     dataset.samples(split).par_iter().map(read).collect()

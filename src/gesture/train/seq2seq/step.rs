@@ -1,20 +1,19 @@
 //! A sequence-to-sequence network in training: one step, and all of it to a checkpoint and back.
 
-use super::losses::{self, SequenceLoss};
+use super::losses;
 use super::segments::SegmentBatch;
 use super::validate::SequenceValidation;
 use crate::generate::model::BEST;
 use crate::generate::seq2seq::architecture::Architecture;
 use crate::generate::seq2seq::metadata::{NETWORK, SequenceMetadata};
 use crate::generate::seq2seq::vocabulary::{PADDING, UNKNOWN};
-use crate::train::optim::adam;
-use crate::train::optim::adam::Adam;
+use crate::train::gan::losses::number;
+use crate::train::optim::adam::{self, Adam};
 use crate::train::resume;
 use anyhow::{Context, Result, ensure};
 use candle_core::Tensor;
 use orator_dataset::config::Seq2seqConfig;
-use orator_formats::checkpoint;
-use orator_formats::checkpoint::Contents;
+use orator_formats::checkpoint::{self, Contents};
 use orator_nn::Mode;
 use orator_nn::params::Params;
 use orator_nn::seq2seq::adversarial::SegmentDiscriminator;
@@ -24,15 +23,13 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 
 const DISCRIMINATOR: &str = "discriminator.";
 const ADAM: &str = "adam.network.";
 const ADAM_D: &str = "adam.discriminator.";
-/// Loss beyond which a training has exploded.
-const LOSS_LIMIT: f64 = 1e4;
 /// Settings that may change between two runs of one training; of the others the checkpoint's count.
 const FREE: [&str; 4] = ["steps", "patience", "checkpoint_every", "keep_checkpoints"];
 
@@ -72,7 +69,8 @@ pub struct SequenceTrainer {
     params: Params,
     adam: Adam,
     adversary: Option<Adversary>,
-    loss: SequenceLoss,
+    /// Settings of the loss.
+    loss: Seq2seqConfig,
     /// Steps done.
     pub step: usize,
     /// Step and score of the best validation so far.
@@ -93,15 +91,7 @@ impl SequenceTrainer {
             let network = SegmentDiscriminator::new(&mut params, &metadata.network)?;
             Ok(Adversary { network, adam: Adam::new(&params, of_adam)?, params })
         };
-        let readings = SequenceLoss {
-            distance: settings.distance,
-            continuity: settings.continuity,
-            reach: settings.reach,
-            continuity_weight: settings.lambda_continuity,
-            reach_weight: settings.lambda_reach,
-            adversarial_weight: settings.lambda_adversarial,
-        };
-        let loss = if is_adversarial { readings.of_adversarial() } else { readings };
+        let loss = if is_adversarial { losses::of_adversarial(&settings) } else { settings.clone() };
         Ok(Self {
             adam: Adam::new(&params, of_adam)?,
             // Another seed, or tensors of the same name would begin alike.
@@ -127,9 +117,10 @@ impl SequenceTrainer {
         // Another seed than that of the windows.
         let mut rng = resume::stream(!self.settings.seed, self.step);
         if let Some(baseline) = self.network.audio_baseline() {
-            let total = match self.step < self.settings.autoencoder_steps {
-                true => baseline.loss_of_poses(&batch.real, &normal_like(&batch.real, &mut rng)?)?,
-                false => baseline.loss_of_speech(&batch.segment.audio, &batch.real, &mut Mode::Train(&mut rng))?,
+            let total = if self.step < self.settings.autoencoder_steps {
+                baseline.loss_of_poses(&batch.real, &normal_like(&batch.real, &mut rng)?)?
+            } else {
+                baseline.loss_of_speech(&batch.segment.audio, &batch.real, &mut Mode::Train(&mut rng))?
             };
             let gradient_norm = self.adam.step(&total.backward()?, rate)?;
             self.step += 1;
@@ -148,7 +139,7 @@ impl SequenceTrainer {
             adam.step(&loss.backward()?, rate)?;
             logits = Some(network.forward(&made, true)?);
         }
-        let total = self.loss.total(&made, &batch.real, logits.as_ref())?;
+        let total = losses::total(&self.loss, &made, &batch.real, logits.as_ref())?;
         let gradient_norm = self.adam.step(&total.backward()?, rate)?;
         self.step += 1;
         let l1 = Some(number(&losses::l1(&made, &batch.real)?)?);
@@ -214,22 +205,9 @@ impl SequenceState {
 }
 
 impl SequenceLosses {
-    /// Errors, saying all of them, when one is not finite or has exploded.
-    pub fn check(&self, step: usize) -> Result<()> {
-        let Self { total, l1, discriminator, gradient_norm } = *self;
-        ensure!(
-            [total, l1.unwrap_or(0.0), discriminator].iter().all(|loss| loss.is_finite() && loss.abs() < LOSS_LIMIT)
-                && gradient_norm.is_finite(),
-            "the training broke at step {step}: loss {total}, L1 {l1:?}, discriminator {discriminator}, norm of the gradient \
-             {gradient_norm}"
-        );
-        Ok(())
-    }
-
-    /// A line of the log.
-    pub fn line(&self, step: usize) -> Value {
-        let Self { total, l1, discriminator, gradient_norm } = *self;
-        json!({ "step": step, "total": total, "l1": l1, "discriminator": discriminator, "gradient_norm": gradient_norm })
+    /// Losses by name, to look whether the training is sound.
+    pub fn named(&self) -> [(&'static str, f64); 3] {
+        [("loss", self.total), ("L1", self.l1.unwrap_or(0.0)), ("discriminator", self.discriminator)]
     }
 }
 
@@ -256,10 +234,6 @@ fn drop_words(words: &Tensor, share: f64, rng: &mut ChaCha8Rng) -> Result<Tensor
 fn normal_like(tensor: &Tensor, rng: &mut ChaCha8Rng) -> Result<Tensor> {
     let numbers: Vec<f32> = (0..tensor.elem_count()).map(|_| StandardNormal.sample(rng)).collect();
     Ok(Tensor::from_vec(numbers, tensor.shape(), tensor.device())?)
-}
-
-fn number(scalar: &Tensor) -> Result<f64> {
-    Ok(f64::from(scalar.to_scalar::<f32>()?))
 }
 
 #[cfg(test)]

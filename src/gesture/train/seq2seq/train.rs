@@ -12,7 +12,8 @@ pub use crate::generate::model::BEST;
 use crate::generate::seq2seq::architecture::{Architecture, network_config};
 use crate::generate::seq2seq::metadata::SequenceMetadata;
 use crate::generate::seq2seq::vocabulary::{PADDING, UNKNOWN, Vocabulary};
-use crate::train::epochs::{self, EpochSchedule, StepReport, ValidatedStep, ValidatedTraining};
+use crate::train::epochs::{self, EpochSchedule, StepReport, TrainingOutcome, ValidatedStep, ValidatedTraining};
+use crate::train::log;
 use crate::train::no_window;
 use crate::train::no_window::NeededFrames;
 use crate::train::resume::{self, sample_windows, stream};
@@ -28,30 +29,10 @@ use orator_formats::word_vectors::WordVectors;
 use orator_nn::cpu::thread_team::with_spinning_workers;
 use orator_nn::seq2seq::config::Config;
 use orator_nn::seq2seq::encoders::set_word_vectors;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Numbers of a word where no table of vectors is given.
 const WORD: usize = 100;
-
-/// How a training ended.
-#[derive(Clone, Debug)]
-pub struct SequenceOutcome {
-    /// Steps of this training altogether, and the step this run began at.
-    pub steps: usize,
-    pub began_at: usize,
-    /// Whether it ended before its last step since the score had not become better for `seq2seq.patience` epochs.
-    pub stopped_early: bool,
-    pub n_segments: usize,
-    pub n_parameters: usize,
-    /// Words that were trained with.
-    pub n_words: usize,
-    /// Of the newest checkpoint.
-    pub validation: SequenceValidation,
-    pub newest: PathBuf,
-    /// Best by the validation's score.
-    pub best: PathBuf,
-    pub best_step: usize,
-}
 
 /// Trains until `requested.steps`, going on from the newest checkpoint in `folder`; what the settings of that checkpoint say
 /// counts, and differences are told. `vectors`: what words begin with; else the seed.
@@ -66,7 +47,7 @@ pub fn train(
     requested: &Seq2seqConfig,
     folder: &Path,
     progress: &dyn Progress,
-) -> Result<SequenceOutcome> {
+) -> Result<TrainingOutcome<SequenceValidation>> {
     train_watched(source, vectors, requested, folder, progress, &mut |_| ())
 }
 
@@ -78,7 +59,7 @@ pub fn train_watched(
     folder: &Path,
     progress: &dyn Progress,
     validated: &mut dyn FnMut(ValidatedStep),
-) -> Result<SequenceOutcome> {
+) -> Result<TrainingOutcome<SequenceValidation>> {
     check(requested)?;
     let Config { previous, predicted, .. } = network_config(source.fps(), 0, 0, [0, 0]);
     let needed = NeededFrames { name: "a segment", n_frames: previous + predicted, key: None };
@@ -146,18 +127,8 @@ pub fn train_watched(
     let held_out = ValidationSegments::new(&held_out, &train, trainer.settings.batch)?;
     let mut training = SequenceTraining { trainer: &mut trainer, loader: &train, held_out: &held_out };
     let end = with_spinning_workers(|| epochs::run(&mut training, folder, progress, validated))?;
-    Ok(SequenceOutcome {
-        steps: trainer.step,
-        began_at: end.began_at,
-        stopped_early: end.stopped_early,
-        n_segments: train.len(),
-        n_parameters: trainer.params().n_parameters(),
-        n_words: trainer.metadata.vocabulary.words().len(),
-        validation: end.validation,
-        newest: end.newest,
-        best: folder.join(BEST),
-        best_step: end.best_step,
-    })
+    let (n_parameters, n_words) = (trainer.params().n_parameters(), trainer.metadata.vocabulary.words().len());
+    Ok(TrainingOutcome { n_examples: train.len(), n_parameters, n_words, ..end })
 }
 
 /// A trainer as the seed and the word vectors make it, and the data.
@@ -275,10 +246,10 @@ impl ValidatedTraining for SequenceTraining<'_> {
             begin_with_own(&mut batch, &which, self.loader, &*self.trainer.network, own_previous, rng)?;
         }
         let losses = self.trainer.step(&batch)?;
-        losses.check(self.trainer.step)?;
-        let SequenceLosses { total, l1, .. } = losses;
+        let SequenceLosses { total, l1, gradient_norm, .. } = losses;
+        resume::ensure_sound(self.trainer.step, &losses.named(), gradient_norm)?;
         let words = format!("loss {total:.3}{}", l1.map_or(String::new(), |l1| format!(" L1 {l1:.3}")));
-        Ok(StepReport { line: losses.line(self.trainer.step), words })
+        Ok(StepReport { line: log::line(self.trainer.step, &losses), words })
     }
 
     fn validate(&self) -> Result<SequenceValidation> {

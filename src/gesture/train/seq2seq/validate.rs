@@ -2,6 +2,7 @@
 //! mean.
 
 use super::segments::{SegmentBatch, SegmentLoader};
+use crate::train::gan::losses::number;
 use crate::train::gan::score;
 use anyhow::Result;
 use candle_core::Tensor;
@@ -93,8 +94,4 @@ impl ValidationSegments {
 fn differences(x: &Tensor, dim: usize) -> candle_core::Result<Tensor> {
     let n = x.dim(dim)?.saturating_sub(1);
     x.narrow(dim, 1.min(x.dim(dim)?), n)? - x.narrow(dim, 0, n)?
-}
-
-fn number(scalar: &Tensor) -> Result<f64> {
-    Ok(f64::from(scalar.to_scalar::<f32>()?))
 }

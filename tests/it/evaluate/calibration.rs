@@ -2,11 +2,10 @@
 //! difference is found. Errors are first-order autoregressions. 300 evaluations of one setting; `ORATOR_LONG` makes them
 //! 2,000 of each.
 
-use super::block_length::BlockLength;
-use super::left_out::BlockGroups;
-use super::sign_flips;
-use super::sign_flips::LEVEL;
-use crate::metrics::catalogue::n_blocks;
+use orator_gesture::evaluate::table::block_length::BlockLength;
+use orator_gesture::evaluate::table::left_out::BlockGroups;
+use orator_gesture::evaluate::table::sign_flips::{self, LEVEL};
+use orator_gesture::metrics::catalogue::n_blocks;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
