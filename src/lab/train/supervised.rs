@@ -5,7 +5,7 @@ use anyhow::{Context, Result, ensure};
 use candle_core::{DType, Device, Tensor};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir::FolderLock;
-use orator_formats::checkpoint::{Contents, expect_same};
+use orator_formats::checkpoint::Contents;
 use orator_gesture::train::epochs::StoppedTraining;
 use orator_gesture::train::log::MetricsLog;
 use orator_gesture::train::optim::adam;

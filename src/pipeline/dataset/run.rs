@@ -10,7 +10,7 @@ use orator_base::types::interval::Interval;
 use orator_dataset::config;
 use orator_dataset::leakage::SoundComparison;
 use orator_dataset::shared_sound;
-use orator_dataset::split::{Assignment, Split, SplitBy, TimeBlock};
+use orator_dataset::split::Assignment;
 use orator_dataset::write::assemble::DatasetWriter;
 use orator_dataset::write::part::{self, VideoEntry, VideoSource};
 use serde_json::json;
