@@ -1,5 +1,6 @@
 //! The only folder that uses OpenCV: warps and letterboxes, pixels to tensors, heat-map filters, drawing, PNG files.
 
+pub mod blur;
 pub mod draw;
 pub mod png;
 pub mod tensor;

@@ -1,8 +1,6 @@
 //! Pixels to network input: channel order, layout, scale, mean and standard deviation in one pass, by a table of 256
-//! values for each channel. Network output: blur of a heat-map.
+//! values for each channel.
 
-use anyhow::{Result, ensure};
-use opencv::core::{Mat, MatTraitConstManual as _, Size};
 use orator_base::types::image::Image;
 
 /// Conversion of bytes to numbers.
@@ -46,34 +44,9 @@ impl Normaliser {
     }
 }
 
-/// A map with rows of `width`, blurred by a Gaussian kernel of `kernel` cells (made odd) with OpenCV's standard deviation
-/// for it; the edges are mirrored.
-///
-/// # Errors
-/// A map that is empty or has no whole rows.
-pub fn blurred(map: &[f32], width: usize, kernel: usize) -> Result<Vec<f32>> {
-    ensure!(width > 0 && !map.is_empty() && map.len().is_multiple_of(width), "{} cells in rows of {width}", map.len());
-    let (rows, columns) = (i32::try_from(map.len() / width)?, i32::try_from(width)?);
-    let kernel = i32::try_from(kernel | 1)?;
-    let mut blurred = Mat::default();
-    let map = Mat::new_rows_cols_with_data(rows, columns, map)?;
-    opencv::imgproc::gaussian_blur_def(&map, &mut blurred, Size::new(kernel, kernel), 0.0)?;
-    Ok(blurred.data_typed::<f32>()?.to_vec())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_peak_is_spread_evenly() {
-        let mut map = vec![0.0; 63];
-        map[3 * 9 + 4] = 16.0;
-        let found = blurred(&map, 9, 3).unwrap();
-        assert_eq!([found[3 * 9 + 4], found[3 * 9 + 5], found[2 * 9 + 3], found[1]], [4.0, 2.0, 1.0, 0.0]);
-        assert_eq!(blurred(&map, 9, 1).unwrap(), map);
-        assert!(blurred(&map, 10, 3).is_err() && blurred(&[], 1, 3).is_err());
-    }
 
     #[test]
     fn order_axes_and_numbers() {

@@ -4,19 +4,33 @@ use super::decode::{ScoredPoint, heatmap, points};
 use super::model_input::ModelInput;
 use anyhow::{Result, bail};
 use orator_base::types::image::Image;
+use orator_media::opencv::blur::GaussianBlur;
 use orator_media::opencv::warp::SrcFromDst;
-use orator_onnx::{Decode, KeypointOutputs, ModelEntry, Outputs, PictureFit, Runtime};
+use orator_onnx::{Decode, KeypointOutputs, ModelEntry, Outputs, PictureFit, Refine, Runtime};
 use std::path::Path;
 
-/// All points that outputs give, one position a keypoint (heat-maps or SimCC), in px of an input of `size` (height, width).
-pub fn points(decode: &Decode, outputs: &Outputs, size: [usize; 2]) -> Result<Vec<ScoredPoint>> {
-    match decode {
-        Decode::Heatmap { heatmap: name, refine, blur } => {
-            let (shape, maps) = outputs.floats(name)?;
-            heatmap::decode(shape, maps, size, *refine, *blur)
+/// Reads the outputs that give one place a keypoint: heat-maps or SimCC.
+pub struct PointReader {
+    decode: Decode,
+    gaussian: GaussianBlur,
+}
+
+impl PointReader {
+    pub fn new(decode: &Decode) -> Self {
+        let width = if let Decode::Heatmap { blur, refine: Refine::Dark, .. } = decode { *blur } else { 1 };
+        Self { decode: decode.clone(), gaussian: GaussianBlur::new(width) }
+    }
+
+    /// All points the model gives, in px of its input, `size` its height and width.
+    pub fn points(&self, outputs: &Outputs, size: [usize; 2]) -> Result<Vec<ScoredPoint>> {
+        match &self.decode {
+            Decode::Heatmap { heatmap: name, refine, .. } => {
+                let (shape, maps) = outputs.floats(name)?;
+                heatmap::decode(shape, maps, size, *refine, &self.gaussian)
+            }
+            Decode::Simcc { x, y, split } => points::simcc(outputs.floats(x)?, outputs.floats(y)?, *split),
+            other => bail!("keypoints cannot be read as {other:?}"),
         }
-        Decode::Simcc { x, y, split } => points::simcc(outputs.floats(x)?, outputs.floats(y)?, *split),
-        other => bail!("keypoints cannot be read as {other:?}"),
     }
 }
 
@@ -39,7 +53,7 @@ pub struct DetectedBody {
 /// The body model with its way of reading.
 pub struct BodyModel {
     pub feed: ModelInput,
-    decode: Decode,
+    reader: PointReader,
     margin: f64,
     map: KeypointOutputs,
 }
@@ -47,8 +61,8 @@ pub struct BodyModel {
 impl BodyModel {
     pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self> {
         let margin = if let PictureFit::Box { margin } = entry.fit { margin } else { 1.0 };
-        let (decode, map) = (entry.decode.clone(), entry.points.clone());
-        Ok(Self { feed: ModelInput::open(runtime, entry, dir)?, decode, margin, map })
+        let (reader, map) = (PointReader::new(&entry.decode), entry.points.clone());
+        Ok(Self { feed: ModelInput::open(runtime, entry, dir)?, reader, margin, map })
     }
 
     /// Whether it gives hands as well.
@@ -61,7 +75,7 @@ impl BodyModel {
         let size = self.feed.size();
         let Some(src_from_dst) = grown(place, size, self.margin) else { return Ok(None) };
         let outputs = self.feed.part(image, &src_from_dst)?;
-        let points = points(&self.decode, &outputs, size)?;
+        let points = self.reader.points(&outputs, size)?;
         let hand = |map: &[usize]| placed::<21>(&points, map, &src_from_dst);
         let hands = (!self.map.left_hand.is_empty()).then(|| [hand(&self.map.left_hand), hand(&self.map.right_hand)]);
         Ok(Some(DetectedBody { points: placed(&points, &self.map.body, &src_from_dst), hands }))

@@ -1,7 +1,7 @@
 //! The hand model: 21 points of the hand in a rotated square, how sure it is that there is one, and which hand it is
 //! where the model says so.
 
-use super::body::{self, placed};
+use super::body::{PointReader, placed};
 use super::decode::{ScoredPoint, points};
 use super::model_input::ModelInput;
 use super::region;
@@ -41,14 +41,15 @@ impl DetectedHand {
 /// The hand model with its way of reading.
 pub struct HandModel {
     pub feed: ModelInput,
+    reader: PointReader,
     decode: Decode,
     map: Vec<usize>,
 }
 
 impl HandModel {
     pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self> {
-        let (decode, map) = (entry.decode.clone(), entry.points.hand.clone());
-        Ok(Self { feed: ModelInput::open(runtime, entry, dir)?, decode, map })
+        let (reader, map) = (PointReader::new(&entry.decode), entry.points.hand.clone());
+        Ok(Self { feed: ModelInput::open(runtime, entry, dir)?, reader, decode: entry.decode.clone(), map })
     }
 
     /// The hand in the square; None where the square is no place in a picture or the model's numbers are none.
@@ -64,8 +65,7 @@ impl HandModel {
             let right = right.as_ref().map(|name| single(name)).transpose()?.map(f64::from);
             DetectedHand { points: placed(&points, &self.map, &src_from_dst), score: f64::from(score), right }
         } else {
-            let points = body::points(&self.decode, &outputs, size)?;
-            DetectedHand::from_points(placed(&points, &self.map, &src_from_dst))
+            DetectedHand::from_points(placed(&self.reader.points(&outputs, size)?, &self.map, &src_from_dst))
         };
         Ok((hand.score > 0.0 && hand.score.is_finite()).then_some(hand))
     }

@@ -10,7 +10,8 @@ use orator_base::stage::artifacts::{Artifact, StageName};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::{Input, Report, Stage, Unit};
 use orator_base::types::time::FrameRate;
-use orator_dataset::config::{self, FollowRule, Settings};
+use orator_dataset::config;
+use orator_dataset::config::{FollowRule, Settings};
 use orator_formats::media_json::MediaInfo;
 use orator_formats::timeline_npz::Timeline;
 use orator_media::ffmpeg;
@@ -62,7 +63,7 @@ impl Stage for Pose2dStage {
     }
 
     fn version(&self) -> u32 {
-        10
+        9
     }
 
     fn cost(&self) -> u32 {

@@ -4,20 +4,19 @@
 
 use super::points::{LARGEST, ScoredPoint, finite, peak};
 use anyhow::{Result, ensure};
-use orator_media::opencv::tensor::blurred;
+use orator_media::opencv::blur::GaussianBlur;
 use orator_onnx::Refine;
 
 /// A Newton step further than this many cells is not believed.
 const MAX_STEP: f64 = 1.5;
 
-/// The keypoints of maps of shape [1, K, rows, columns], in pixels of an input of `[height, width]`. `blur`: width of the
-/// kernel of `Refine::Dark`, cells.
+/// The keypoints of maps of shape [1, K, rows, columns], in pixels of an input of `[height, width]`.
 pub fn decode(
     shape: &[i64],
     maps: &[f32],
     input_size: [usize; 2],
     refine: Refine,
-    blur: usize,
+    gaussian: &GaussianBlur,
 ) -> Result<Vec<ScoredPoint>> {
     let &[1, _, rows @ 1..=LARGEST, columns @ 1..=LARGEST] = shape else {
         anyhow::bail!("heat-maps must have the shape [1, K, rows, columns], not {shape:?}")
@@ -26,16 +25,16 @@ pub fn decode(
     ensure!(maps.len().is_multiple_of(rows * columns), "{} numbers are no maps of {rows}x{columns}", maps.len());
     let cell_px = [input_size[1] as f64 / columns as f64, input_size[0] as f64 / rows as f64];
     let place = |map: &[f32]| {
-        let Some((at, height)) = peak(map) else { return Ok([0.0; 3]) };
+        let Some((at, height)) = peak(map) else { return [0.0; 3] };
         let (x, y) = (at % columns, at / columns);
         let [dx, dy] = match refine {
             Refine::None => [0.0; 2],
             Refine::Quarter => quarter(map, columns, x, y),
-            Refine::Dark => dark(&blurred(map, columns, blur)?, columns, x, y),
+            Refine::Dark => dark(map, columns, x, y, gaussian),
         };
-        Ok(finite([(x as f64 + dx) * cell_px[0], (y as f64 + dy) * cell_px[1], f64::from(height)]))
+        finite([(x as f64 + dx) * cell_px[0], (y as f64 + dy) * cell_px[1], f64::from(height)])
     };
-    maps.chunks_exact(rows * columns).map(place).collect()
+    Ok(maps.chunks_exact(rows * columns).map(place).collect())
 }
 
 /// A quarter cell towards the higher neighbour, on each axis.
@@ -57,14 +56,14 @@ fn quarter(map: &[f32], columns: usize, x: usize, y: usize) -> [f64; 2] {
     [towards(at(x - 1, y), at(x + 1, y)), towards(at(x, y - 1), at(x, y + 1))]
 }
 
-/// The Newton step of a blurred map from the peak's cell; none at the edge, or where it is implausibly long.
-fn dark(map: &[f32], columns: usize, x: usize, y: usize) -> [f64; 2] {
+/// The Newton step from the peak's cell; none at the edge, or where it is not believed.
+fn dark(map: &[f32], columns: usize, x: usize, y: usize, gaussian: &GaussianBlur) -> [f64; 2] {
     let rows = map.len() / columns;
     if x < 2 || y < 2 || x + 2 >= columns || y + 2 >= rows {
         return [0.0; 2];
     }
     let log = |dx: isize, dy: isize| {
-        let value = map[y.wrapping_add_signed(dy) * columns + x.wrapping_add_signed(dx)];
+        let value = gaussian.at(map, columns, x.wrapping_add_signed(dx), y.wrapping_add_signed(dy));
         f64::from(value.max(1e-10)).ln()
     };
     let here = 2.0 * log(0, 0);
@@ -93,7 +92,7 @@ mod tests {
     fn dark_finds_a_known_peak_between_the_cells() {
         for place in [[20.3, 30.8], [10.0, 12.5], [5.49, 40.1]] {
             let map = bell(48, 64, place);
-            let points = decode(&[1, 1, 64, 48], &map, [256, 192], Refine::Dark, 3).unwrap();
+            let points = decode(&[1, 1, 64, 48], &map, [256, 192], Refine::Dark, &GaussianBlur::new(3)).unwrap();
             let [x, y, score] = points[0];
             assert!((x / 4.0 - place[0]).abs() <= 0.05 && (y / 4.0 - place[1]).abs() <= 0.05, "{place:?} {x} {y}");
             assert!(score > 0.8 && score <= 0.9);
@@ -103,7 +102,8 @@ mod tests {
     #[test]
     fn other_refinements_and_edges() {
         let map = bell(48, 64, [20.3, 30.8]);
-        let found = |map: &[f32], refine| decode(&[1, 1, 64, 48], map, [64, 48], refine, 3).unwrap()[0];
+        let found =
+            |map: &[f32], refine| decode(&[1, 1, 64, 48], map, [64, 48], refine, &GaussianBlur::new(3)).unwrap()[0];
         assert_eq!(found(&map, Refine::None)[..2], [20.0, 31.0]);
         assert_eq!(found(&map, Refine::Quarter)[..2], [20.25, 30.75]);
         assert_eq!(found(&bell(48, 64, [0.2, 63.0]), Refine::Dark)[..2], [0.0, 63.0]);
@@ -111,7 +111,7 @@ mod tests {
         let mut holed = map.clone();
         holed[30 * 48 + 21] = f32::NAN;
         assert!(found(&holed, Refine::Dark).iter().all(|number| number.is_finite()));
-        assert!(decode(&[1, 1, 64], &map, [64, 48], Refine::Dark, 3).is_err());
-        assert!(decode(&[1, 1, 60, 48], &map[1..], [64, 48], Refine::Dark, 3).is_err());
+        assert!(decode(&[1, 1, 64], &map, [64, 48], Refine::Dark, &GaussianBlur::new(3)).is_err());
+        assert!(decode(&[1, 1, 60, 48], &map[1..], [64, 48], Refine::Dark, &GaussianBlur::new(3)).is_err());
     }
 }
