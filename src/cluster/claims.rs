@@ -84,7 +84,7 @@ pub struct UnitEnd {
 
 /// State of a unit as far as is visible; the later of two is the larger.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub struct UnitState {
+pub struct ClaimState {
     /// Of the last claim; 0: the unit is free.
     pub epoch: u32,
     /// Whether the unit ended under that claim.
@@ -96,16 +96,16 @@ fn folder_name(folder: usize) -> String {
 }
 
 /// Unit and state by the name of a file in its folder; none: another file.
-fn parsed(name: &str) -> Option<(usize, UnitState)> {
+fn parsed(name: &str) -> Option<(usize, ClaimState)> {
     let mut parts = name.split('.');
     let (unit, kind, epoch) = (parts.next()?, parts.next()?, parts.next()?);
     let is_known = matches!(kind, "claim" | "end") && parts.next().is_none();
-    let state = UnitState { epoch: epoch.parse().ok()?, has_ended: kind == "end" };
+    let state = ClaimState { epoch: epoch.parse().ok()?, has_ended: kind == "end" };
     Some((unit.parse().ok()?, state)).filter(|_| is_known)
 }
 
 /// Updates the states of the units whose files lie in folder `number`.
-fn update(states: &mut [UnitState], folder: &impl SharedFolder, number: usize) -> Result<()> {
+fn update(states: &mut [ClaimState], folder: &impl SharedFolder, number: usize) -> Result<()> {
     let units = number * PER_FOLDER..((number + 1) * PER_FOLDER).min(states.len());
     let files = folder.list(&folder_name(number))?;
     for (unit, state) in files.iter().filter_map(|name| parsed(name)).filter(|(unit, _)| units.contains(unit)) {
@@ -118,8 +118,8 @@ fn update(states: &mut [UnitState], folder: &impl SharedFolder, number: usize) -
 ///
 /// # Errors
 /// A folder that cannot be listed.
-pub fn read_states(folder: &impl SharedFolder, n_units: usize) -> Result<Vec<UnitState>> {
-    let mut states = vec![UnitState::default(); n_units];
+pub fn read_states(folder: &impl SharedFolder, n_units: usize) -> Result<Vec<ClaimState>> {
+    let mut states = vec![ClaimState::default(); n_units];
     (0..n_units.div_ceil(PER_FOLDER)).try_for_each(|number| update(&mut states, folder, number))?;
     Ok(states)
 }
@@ -153,7 +153,7 @@ pub struct Claims<'a, F> {
     folder: &'a F,
     options: ClaimOptions,
     watch: BeatWatch,
-    states: Vec<UnitState>,
+    states: Vec<ClaimState>,
     is_read: bool,
     /// Units at the start of the order that are known not to be free.
     n_passed: usize,
@@ -174,7 +174,7 @@ impl<'a, F: SharedFolder> Claims<'a, F> {
         Self {
             folder,
             watch,
-            states: vec![UnitState::default(); options.needs.len()],
+            states: vec![ClaimState::default(); options.needs.len()],
             is_read: false,
             n_passed: 0,
             failed: Vec::new(),
@@ -226,7 +226,7 @@ impl<'a, F: SharedFolder> Claims<'a, F> {
         }
         self.check_workers(now)?;
         while let Some(left) = self.left.pop() {
-            let UnitState { epoch, has_ended } = self.states[left.unit];
+            let ClaimState { epoch, has_ended } = self.states[left.unit];
             // A listing may be older than the end.
             let is_left = epoch == left.epoch && !has_ended && left.read_end(self.folder)?.is_none();
             if is_left && self.take(left.later())? {
@@ -245,7 +245,7 @@ impl<'a, F: SharedFolder> Claims<'a, F> {
     pub fn end(&mut self, claim: Claim, end: &UnitEnd) -> Result<bool> {
         let is_mine = self.is_mine(claim)?;
         self.folder.create(&claim.file("end"), &serde_json::to_vec(end)?)?;
-        self.states[claim.unit] = UnitState { epoch: claim.epoch, has_ended: true };
+        self.states[claim.unit] = ClaimState { epoch: claim.epoch, has_ended: true };
         Ok(is_mine)
     }
 
@@ -325,7 +325,7 @@ impl<'a, F: SharedFolder> Claims<'a, F> {
         let Claim { unit, epoch } = claim;
         let file = ClaimFile { worker: self.options.worker.clone(), unit, epoch };
         let is_taken = self.folder.create(&claim.file("claim"), &serde_json::to_vec(&file)?);
-        self.states[unit] = UnitState { epoch, has_ended: false };
+        self.states[unit] = ClaimState { epoch, has_ended: false };
         is_taken.with_context(|| format!("cannot claim unit {unit}"))
     }
 }

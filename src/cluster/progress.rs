@@ -1,6 +1,6 @@
 //! How far the workers of a plan are, from their files alone.
 
-use super::claims::{Claim, UnitState, read_states};
+use super::claims::{Claim, ClaimState, read_states};
 use super::heartbeat::{Heartbeat, WORKERS, this_machine};
 use super::plan::ClusterPlan;
 use super::shared_folder::{DiskFolder, SharedFolder};
@@ -57,7 +57,7 @@ pub fn progress(plan: &ClusterPlan, path: &Path, dead_after: Duration) -> Result
     let is_alive = |name: &str| workers.iter().any(|worker| worker.worker == name && worker.is_alive);
     let states = read_states(&folder, plan.units.len())?;
     let mut told = PlanProgress { n_units: plan.units.len(), ..PlanProgress::default() };
-    for (unit, (planned, UnitState { epoch, has_ended })) in plan.units.iter().zip(states).enumerate() {
+    for (unit, (planned, ClaimState { epoch, has_ended })) in plan.units.iter().zip(states).enumerate() {
         let (claim, secs) = (Claim { unit, epoch }, planned.media_secs().unwrap_or(0.0));
         told.media_secs += secs;
         told.n_taken_over += usize::from(epoch > 1);

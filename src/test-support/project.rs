@@ -30,7 +30,7 @@ pub struct Project {
 }
 
 /// How the program ended: exit code, its JSON, and what it said on standard error.
-pub struct Answer {
+pub struct ProgramAnswer {
     pub code: i32,
     pub json: serde_json::Value,
     pub errors: String,
@@ -96,25 +96,25 @@ impl Project {
     }
 
     /// `orator run` in the project's folder.
-    pub fn run(&self, args: &[&str]) -> Answer {
+    pub fn run(&self, args: &[&str]) -> ProgramAnswer {
         self.answer(&[&["run"], args].concat())
     }
 
     /// Any verb of `orator` in the project's folder, to its end.
-    pub fn answer(&self, args: &[&str]) -> Answer {
+    pub fn answer(&self, args: &[&str]) -> ProgramAnswer {
         Self::answer_to(self.command(args))
     }
 
     /// Any verb of another program in the project's folder, to its end.
-    pub fn answer_of(&self, program: &str, args: &[&str]) -> Answer {
+    pub fn answer_of(&self, program: &str, args: &[&str]) -> ProgramAnswer {
         Self::answer_to(self.command_of(Path::new(program), args))
     }
 
-    fn answer_to(mut command: Command) -> Answer {
+    fn answer_to(mut command: Command) -> ProgramAnswer {
         let output = command.output().unwrap();
         let json = serde_json::from_slice(&output.stdout).unwrap_or_default();
         let errors = String::from_utf8_lossy(&output.stderr).into_owned();
-        Answer { code: output.status.code().unwrap_or(-1), json, errors }
+        ProgramAnswer { code: output.status.code().unwrap_or(-1), json, errors }
     }
 
     /// Starts a verb without waiting.

@@ -64,8 +64,9 @@ fn every_file_begins_with_what_lives_in_it_in_six_lines() {
     let silent = texts.iter().filter(|(_, text)| !text.starts_with("//!")).map(|(name, _)| name.clone());
     none(&silent.collect::<Vec<_>>());
     let head = |text: &str| text.lines().take_while(|line| line.starts_with("//!")).count();
-    // The map of the crate is longer.
-    let long = texts.iter().filter(|(name, text)| head(text) > 6 && name != "src/lib.rs");
+    // The map of the workspace and the table of threads are longer.
+    let longer = ["src/lib.rs", "src/nn/cpu/mod.rs"];
+    let long = texts.iter().filter(|(name, text)| head(text) > 6 && !longer.contains(&name.as_str()));
     none(&long.map(|(name, _)| name.clone()).collect::<Vec<_>>());
 }
 

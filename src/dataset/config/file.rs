@@ -265,7 +265,7 @@ impl Reader {
 
     /// Makes each path absolute: those of the file within its folder, those of `--set` within the current one.
     fn resolve_paths(&self, table: &mut Table, folders: &Folders) {
-        for (section, name) in PATHS {
+        for (section, name) in PATHS.iter().filter_map(|key| key.split_once('.')) {
             let entries = match table.get_mut(section) {
                 Some(Value::Array(entries)) => entries.iter_mut().filter_map(Value::as_table_mut).collect(),
                 Some(Value::Table(entry)) => vec![entry],

@@ -9,14 +9,8 @@ use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// Keys that are paths; an empty one is none.
-pub(super) const PATHS: [(&str, &str); 6] = [
-    ("work", "dir"),
-    ("models", "dir"),
-    ("models", "onnxruntime"),
-    ("lift", "body_weights"),
-    ("lift", "hand_weights"),
-    ("speaker", "reference"),
-];
+pub(super) const PATHS: [&str; 6] =
+    ["work.dir", "models.dir", "models.onnxruntime", "lift.body_weights", "lift.hand_weights", "speaker.reference"];
 
 /// Everything a run needs to know. Paths are absolute once resolved.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

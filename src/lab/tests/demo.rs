@@ -5,9 +5,9 @@ use orator_dataset::{Dataset, Split};
 use orator_media::ffmpeg::audio;
 use orator_media::ffmpeg::frames::FrameReader;
 use orator_test_support::drawn::truth::DrawnTruth;
-use orator_test_support::project::{Answer, Project, speaker_clip};
+use orator_test_support::project::{ProgramAnswer, Project, speaker_clip};
 
-fn lab(project: &Project, args: &[&str]) -> Answer {
+fn lab(project: &Project, args: &[&str]) -> ProgramAnswer {
     project.answer_of(env!("CARGO_BIN_EXE_orator-lab"), args)
 }
 

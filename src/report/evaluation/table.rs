@@ -89,7 +89,8 @@ fn row(table: &Table, index: usize, last: &mut String) -> Option<Node> {
         if !estimate.interval.is_finite() {
             return cell;
         }
-        let [low, high] = [estimate.interval.low, estimate.interval.high].map(|value| labels::number(definition, value));
+        let [low, high] =
+            [estimate.interval.low, estimate.interval.high].map(|value| labels::number(definition, value));
         let interval = format!("[{low}, {high}]");
         if row.kind == PredictorKind::Prediction {
             cell.child(node("small").text(interval))

@@ -4,7 +4,7 @@
 //! each other one (Ford 1957): no prior makes up for votes that are missing.
 
 use super::cluster::sign_flips::rng_of_draw;
-use super::estimate::{interval_of_draws, ConfidenceInterval, StatisticsError, at_least, within};
+use super::estimate::{ConfidenceInterval, StatisticsError, at_least, interval_of_draws, within};
 use ndarray::{Array1, Array2, Axis};
 use orator_base::math::cholesky;
 use rand::Rng;

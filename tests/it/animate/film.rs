@@ -5,7 +5,7 @@ use crate::fixtures::media::sync_clips::{Kind, PLAIN, chirp, chirp_begins, make}
 use ndarray::{Array3, Axis, s};
 use orator_avatar::animate::draw::figure::{FigureView, LEFT, PAPER, RIGHT, draw_pose};
 use orator_avatar::animate::export::film;
-use orator_avatar::animate::export::film::{Film, FilmContent, SIZE, SecondPanel};
+use orator_avatar::animate::export::film::{Film, FilmSource, SIZE, SecondPanel};
 use orator_avatar::animate::export::film_avatar::FilmCamera;
 use orator_avatar::animate::export::film_source::SourceCamera;
 use orator_avatar::animate::{AnimationOptions, Constraints, Performance, Smoothing, perform};
@@ -38,8 +38,8 @@ fn middle(image: &Image, columns: std::ops::Range<usize>, hue: [u8; 3]) -> f64 {
 }
 
 /// Silent film of a performance alone, seen from the front.
-fn alone(performance: &Performance) -> FilmContent<'_> {
-    FilmContent { performance, camera: FilmCamera::Front, sound: None, beside: SecondPanel::Itself }
+fn alone(performance: &Performance) -> FilmSource<'_> {
+    FilmSource { performance, camera: FilmCamera::Front, sound: None, beside: SecondPanel::Itself }
 }
 
 /// The motion on its rig, neither smoothed nor constrained.
@@ -76,7 +76,7 @@ fn the_mp4_has_every_frame_and_the_sound() {
     let performance = unchanged(&swinging(6, 15));
     let samples = (0..16_000).map(|n| (n as f32 * 0.17).sin() * (n as f32 / 16_000.0)).collect();
     let sound = Sound { rate: 16_000, samples };
-    film::write(&path, FilmContent { sound: Some(&sound), ..alone(&performance) }, &Silent).unwrap();
+    film::write(&path, FilmSource { sound: Some(&sound), ..alone(&performance) }, &Silent).unwrap();
     let info = probe::probe(&path).unwrap();
     let secs = info.duration_secs.unwrap();
     assert!((secs - 15.0 / FPS.per_sec()).abs() < 0.1, "{secs} s");
@@ -118,7 +118,7 @@ fn a_click_at_a_second_stands_at_the_picture_of_that_second() {
     let sample = |n: usize| (1..4).map(|k| chirp(n as f64 / f64::from(rate) - f64::from(k))).sum::<f64>() as f32;
     let sound = Sound { rate, samples: (0..4 * rate as usize).map(sample).collect() };
     let performance = unchanged(&motion);
-    film::write(&path, FilmContent { sound: Some(&sound), ..alone(&performance) }, &Silent).unwrap();
+    film::write(&path, FilmSource { sound: Some(&sound), ..alone(&performance) }, &Silent).unwrap();
 
     let streams = streams(&path);
     let of = |kind: &str| streams.iter().find(|stream| stream.0 == kind).unwrap_or_else(|| panic!("no {kind}"));
@@ -151,7 +151,7 @@ fn the_video_beside_the_avatar_is_in_step() {
     let path = folder.path().join("beside.mp4");
     let performance = unchanged(&swinging(6, 30));
     let beside = SecondPanel::Video { path: &clip.path, from_secs: 2.0, camera: None };
-    film::write(&path, FilmContent { beside, ..alone(&performance) }, &Silent).unwrap();
+    film::write(&path, FilmSource { beside, ..alone(&performance) }, &Silent).unwrap();
     // A picture of the clip fills the left half: 64 x 48 px become 600 x 450.
     let read = |image: &Image| {
         let bit = |block: usize| {
@@ -165,7 +165,7 @@ fn the_video_beside_the_avatar_is_in_step() {
         assert_eq!(read(&frame.unwrap().image), 60 + 2 * n, "frame {n}");
     }
     let beside = SecondPanel::Video { path: &clip.path, from_secs: 60.0, camera: None };
-    let late = FilmContent { beside, ..alone(&performance) };
+    let late = FilmSource { beside, ..alone(&performance) };
     let error = format!("{:#}", film::write(&path, late, &Silent).unwrap_err());
     assert!(error.contains("lasts 6.0 s"), "{error}");
 }
@@ -176,7 +176,7 @@ fn another_motion_is_drawn_beside_in_the_same_size_until_it_ends() {
     other.fps = orator_base::types::time::FrameRate::new(30, 1);
     let [performance, other] = [unchanged(&motion), unchanged(&other)];
     let beside = SecondPanel::Motion { performance: &other, labels: ["truth", "prediction"] };
-    let mut film = Film::new(FilmContent { beside, ..alone(&performance) });
+    let mut film = Film::new(FilmSource { beside, ..alone(&performance) });
     let half = |image: &Image, from: usize| {
         let places = (from..from + 600).flat_map(|x| (70..610).map(move |y| (x, y)));
         places.filter(|&(x, y)| image.pixel(x, y) != PAPER).count()
@@ -214,7 +214,7 @@ fn the_avatar_moves_with_the_motion_and_nothing_is_cut() {
     let performance = perform(&motion, None, &AnimationOptions::default());
     let sound = Sound { rate: 16_000, samples: (0..12_800).map(|n| (n as f32 * 0.1).sin()).collect() };
     for camera in [FilmCamera::Front, FilmCamera::ThreeQuarter] {
-        let mut film = Film::new(FilmContent { camera, sound: Some(&sound), ..alone(&performance) });
+        let mut film = Film::new(FilmSource { camera, sound: Some(&sound), ..alone(&performance) });
         let (first, last) = (film.frame(0).unwrap(), film.frame(11).unwrap());
         assert_eq!([first.width, first.height], SIZE);
         assert_eq!(first, film.frame(0).unwrap(), "the same frame twice is the same picture");
@@ -258,7 +258,7 @@ fn before_its_video_the_avatar_stands_where_the_person_is() {
     let camera = SourceCamera::fit(&motion, &keypoints).unwrap();
     let performance = unchanged(&motion);
     let beside = SecondPanel::Video { path: &clip.path, from_secs: 0.0, camera: Some(&camera) };
-    let mut film = Film::new(FilmContent { beside, ..alone(&performance) });
+    let mut film = Film::new(FilmSource { beside, ..alone(&performance) });
     let mut video = FrameReader::open(&clip.path, FPS).unwrap();
     for t in 0..4 {
         let image = film.frame(t).unwrap();
@@ -281,7 +281,7 @@ fn two_avatars_stand_beside_each_other_in_one_size() {
     let beside = SecondPanel::Motion { performance: &other, labels: ["truth", "prediction"] };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("two.mp4");
-    film::write(&path, FilmContent { beside, ..alone(&one) }, &Silent).unwrap();
+    film::write(&path, FilmSource { beside, ..alone(&one) }, &Silent).unwrap();
     let frames: Vec<Image> = FrameReader::open(&path, FPS).unwrap().map(|frame| frame.unwrap().image).collect();
     assert_eq!(frames.len(), 10);
     let dark = |from: usize| {

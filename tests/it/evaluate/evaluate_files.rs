@@ -7,7 +7,7 @@ use orator_base::types::pose3d::Motion;
 use orator_base::types::time::FrameRate;
 use orator_formats::wav;
 use orator_formats::{authors_txt, joints_npz};
-use orator_test_support::project::{Answer, Project};
+use orator_test_support::project::{ProgramAnswer, Project};
 use orator_test_support::skip::real_data;
 use serde_json::Value;
 use std::fs::{self, File};
@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 /// A convention of one figure, which is soon measured.
 const SMALL: [&str; 2] = ["--convention", "speech2gesture"];
 
-fn value(answer: &Answer, name: &str, part: &str, who: &str) -> f64 {
+fn value(answer: &ProgramAnswer, name: &str, part: &str, who: &str) -> f64 {
     let metrics = answer.json["metrics"].as_array().unwrap();
     let is_it = |metric: &&Value| metric["name"] == name && metric["part"] == part;
     metrics.iter().find(is_it).unwrap()["values"][who]["value"].as_f64().unwrap()
@@ -86,7 +86,7 @@ fn only_values_of_one_hash_are_compared() {
     save("c.json", &["--fps", "30"]);
     let same = project.answer(&["evaluate", "compare", "a.json", "b.json"]);
     assert_eq!(same.code, 0, "{}", same.errors);
-    let of = |answer: &Answer, what: &str| answer.json["compared"][what].as_array().unwrap().clone();
+    let of = |answer: &ProgramAnswer, what: &str| answer.json["compared"][what].as_array().unwrap().clone();
     assert!(!of(&same, "beside").is_empty() && of(&same, "refused").is_empty());
     assert!(of(&same, "only_in_a").iter().all(|name| name.as_str().unwrap().contains("at 0.1")));
     let other = project.answer(&["evaluate", "compare", "a.json", "c.json"]);

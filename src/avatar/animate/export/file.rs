@@ -134,7 +134,7 @@ impl ExportFormat {
                 let resampled = (fps != performance.clip.fps).then(|| performance.resampled(fps));
                 let performance = resampled.as_ref().unwrap_or(performance);
                 let ExportContent { sound, beside, camera, .. } = *sources;
-                let content = film::FilmContent { performance, camera, sound, beside };
+                let content = film::FilmSource { performance, camera, sound, beside };
                 workdir::replace(path, |attempt| film::write(attempt, content, progress))
             }
         }

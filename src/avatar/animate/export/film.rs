@@ -41,7 +41,7 @@ pub fn smooth_rate(fps: FrameRate) -> FrameRate {
 
 /// What a film shows.
 #[derive(Clone, Copy, Debug)]
-pub struct FilmContent<'a> {
+pub struct FilmSource<'a> {
     pub performance: &'a Performance,
     pub camera: FilmCamera,
     pub sound: Option<&'a Sound>,
@@ -96,8 +96,8 @@ impl<'a> LabelledPanel<'a> {
 
 impl<'a> Film<'a> {
     /// Film with one view in which every frame of the body fits.
-    pub fn new(content: FilmContent<'a>) -> Self {
-        let FilmContent { performance, camera, sound, beside } = content;
+    pub fn new(content: FilmSource<'a>) -> Self {
+        let FilmSource { performance, camera, sound, beside } = content;
         let panel = |shown: &[&'a Performance], area, label| LabelledPanel::new(shown, camera, area, label);
         let panels = match beside {
             SecondPanel::Video { camera: Some(_), .. } => Vec::new(),
@@ -162,8 +162,8 @@ impl<'a> Film<'a> {
 
 /// Writes the film as an mp4 with the sound, in place; callers wrap it in `stage::workdir::replace`. Frames are drawn on
 /// a thread of their own while those before are encoded.
-pub fn write(path: &Path, content: FilmContent, progress: &dyn Progress) -> anyhow::Result<()> {
-    let FilmContent { performance, sound, beside, .. } = content;
+pub fn write(path: &Path, content: FilmSource, progress: &dyn Progress) -> anyhow::Result<()> {
+    let FilmSource { performance, sound, beside, .. } = content;
     let (fps, n_frames) = (performance.clip.fps, performance.clip.n_frames());
     let mut footage = match beside {
         SecondPanel::Video { path, from_secs, camera: None } => {
