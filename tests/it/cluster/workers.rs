@@ -27,6 +27,13 @@ fn children(of: u32) -> Vec<Pid> {
     numbers.filter(is_child).filter_map(Pid::from_raw).collect()
 }
 
+/// Whether a process has installed a handler of SIGTERM, which it does as its first step.
+fn handles_term(process: Pid) -> bool {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
+    let caught = status.lines().find_map(|line| u64::from_str_radix(line.strip_prefix("SigCgt:")?.trim(), 16).ok());
+    caught.is_some_and(|signals| signals & (1 << (Signal::TERM.as_raw() - 1)) != 0)
+}
+
 #[test]
 fn killed_and_lost_workers_leave_the_bytes_of_one_run() {
     let n_kills: usize = std::env::var("ORATOR_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(4);
@@ -138,9 +145,14 @@ fn a_worker_that_is_asked_to_end_with_all_its_processes_finishes_its_unit() {
     while epochs(&project.work(), "claim").is_empty() {
         std::thread::sleep(Duration::from_millis(20));
     }
-    std::thread::sleep(Duration::from_millis(300));
+    let started = loop {
+        let started = children(worker.id());
+        if !started.is_empty() && started.iter().all(|process| handles_term(*process)) {
+            break started;
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    };
     // As a scheduler does: the worker and whatever it has started.
-    let started = children(worker.id());
     signal(&worker, Signal::TERM);
     for child in started {
         // One may have ended meanwhile.

@@ -239,7 +239,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path().join("e.safetensors");
         let mut training_task = EmbeddingTask::new(Corpus::new(&[], &[], &[], &[], 3).unwrap(), 3).unwrap();
-        let built_in = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/motion_embedding.safetensors");
+        let built_in = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/motion_embedding.safetensors");
         start_from(&training_task, &built_in).unwrap();
         let lines = training_task.errors(false).unwrap();
         for (network, mean) in mm(&lines[0]).into_iter().zip(mm(&lines[1])) {
