@@ -76,7 +76,7 @@ impl Pipeline {
     /// folder.
     pub fn on_excerpts(&self, files: &[(String, PathBuf)], work: &Path) -> Self {
         let mut config = self.config().clone();
-        config.settings.work.dir = work.to_owned().into();
+        config.settings.work.dir = work.to_owned();
         let speakers = self.all_videos().iter().map(|videos| &videos.speaker);
         let videos = speakers.filter(|speaker| files.iter().any(|(of, _)| of == *speaker)).map(|speaker| {
             let own = files.iter().filter(|(of, _)| of == speaker);

@@ -46,8 +46,8 @@ const BATCH: (usize, usize) = (512, 1024);
 pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.frames > 0 && args.rounds > 0, "nothing to measure: there must be frames and rounds");
     let settings = config::LiftConfig {
-        body_weights: args.body_weights.clone().unwrap_or_default().into(),
-        hand_weights: args.hand_weights.clone().unwrap_or_default().into(),
+        body_weights: args.body_weights.clone().unwrap_or_default(),
+        hand_weights: args.hand_weights.clone().unwrap_or_default(),
         ..Default::default()
     };
     let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;

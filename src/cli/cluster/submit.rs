@@ -131,7 +131,7 @@ impl JobArgs {
     /// The plan, its work folder, and what its jobs are made of.
     fn request(&self) -> Result<(ClusterPlan, PathBuf, JobRequest)> {
         let (plan, pipeline) = open(&self.plan)?;
-        let work = pipeline.config().settings.work.dir.to_path_buf();
+        let work = pipeline.config().settings.work.dir.clone();
         ensure!(self.tasks > 0 && self.cores > 0, "tasks and cores must be more than 0");
         let n_at_once = self.at_once.unwrap_or(self.tasks);
         let lengths: Vec<f64> = plan.videos().iter().filter_map(|video| video.secs).collect();

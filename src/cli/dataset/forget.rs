@@ -175,7 +175,7 @@ fn of_project(args: &Args, locks: &mut Vec<FolderLock>) -> Result<ForgetTask> {
     }
     advice.extend(how_to_keep_away(&config, &speaker, &videos, whole));
     let titles = if whole { vec![speaker] } else { videos.iter().map(|video| video.title()).collect() };
-    Ok(ForgetTask { titles, removals: vec![removal], folders: vec![work.to_path_buf()], advice })
+    Ok(ForgetTask { titles, removals: vec![removal], folders: vec![work.clone()], advice })
 }
 
 /// What keeps the next run from bringing the videos back; nothing, where it would not.

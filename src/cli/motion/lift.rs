@@ -123,8 +123,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     }
     let (keypoints, mut notes) = if is_ours(&args.keypoints) { ours(&args)? } else { taken(&args)? };
     let settings = config::LiftConfig {
-        body_weights: args.body_weights.unwrap_or_default().into(),
-        hand_weights: args.hand_weights.unwrap_or_default().into(),
+        body_weights: args.body_weights.unwrap_or_default(),
+        hand_weights: args.hand_weights.unwrap_or_default(),
         smooth_arms: args.smooth_arms,
         smooth_hands: args.smooth_hands,
         level: args.level,

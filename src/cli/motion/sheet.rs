@@ -82,7 +82,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             let pipeline = Pipeline::open(args.config.load()?)?;
             let work = &pipeline.config().settings.work.dir;
             lock = Some(FolderLock::shared(work)?);
-            locked = Some(work.to_path_buf());
+            locked = Some(work.clone());
             of_run(&pipeline, &args)?
         }
     };

@@ -75,8 +75,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 fn defaults() -> Result<Config> {
     let here = std::env::current_dir()?;
     let mut settings = Settings::default();
-    settings.work.dir = here.join(&settings.work.dir).into();
-    settings.models.dir = here.join(&settings.models.dir).into();
+    settings.work.dir = here.join(&settings.work.dir);
+    settings.models.dir = here.join(&settings.models.dir);
     Ok(Config { settings, file: here.join("pipeline.toml (not there: defaults)"), notes: Vec::new() })
 }
 

@@ -153,7 +153,7 @@ fn settings(args: &Args) -> Result<Settings> {
         Settings::default()
     };
     if let Some(dir) = &args.models_dir {
-        settings.models.dir = dir.clone().into();
+        settings.models.dir = dir.clone();
     }
     Ok(settings)
 }

@@ -57,8 +57,8 @@ enum WordsVerb {
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let models = match &args.models_dir {
         Some(dir) => dir.clone(),
-        None if args.config.exists() => config::load(&args.config, &[])?.settings.models.dir.to_path_buf(),
-        None => Settings::default().models.dir.to_path_buf(),
+        None if args.config.exists() => config::load(&args.config, &[])?.settings.models.dir.clone(),
+        None => Settings::default().models.dir.clone(),
     };
     let folder = models.join(FOLDER);
     match &args.verb {

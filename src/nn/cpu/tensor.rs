@@ -138,8 +138,8 @@ pub fn matmul<T: Scalar>(product: &mut [T], left: Matrix<T>, right: Matrix<T>, m
         let sizes = [TILE.0.min(m - row), TILE.1.min(n - column), depth];
         // SAFETY: the assert bounds the factors; each tile writes its own rows and columns of `product`, row-major.
         unsafe {
-            gemm_on_this_thread(start.at(row * n + column), n, false, left.at(row, 0), right.at(0, column), sizes)
-        };
+            gemm_on_this_thread(start.at(row * n + column), n, false, left.at(row, 0), right.at(0, column), sizes);
+        }
     });
 }
 

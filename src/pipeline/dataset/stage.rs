@@ -77,7 +77,7 @@ impl DatasetStage {
         let mut stage = Self {
             settings: settings.dataset.clone(),
             speakers: settings.speaker.clone(),
-            work: settings.work.dir.to_path_buf(),
+            work: settings.work.dir.clone(),
             fixes_offset: settings.extract.fix_offset,
             guard_frames: division::guard_frames(settings, inputs.reach_secs),
             fps: settings.extract.rate(),

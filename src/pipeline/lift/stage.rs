@@ -85,7 +85,7 @@ impl Stage for LiftStage {
             [("body weights", &self.settings.body_weights), ("hand weights", &self.settings.hand_weights)]
         {
             if !path.as_os_str().is_empty() {
-                inputs.push(input(role, path.to_path_buf()));
+                inputs.push(input(role, path.clone()));
             }
         }
         Ok(inputs)

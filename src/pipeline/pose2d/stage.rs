@@ -42,13 +42,13 @@ impl Pose2dStage {
     /// Those of `ChosenModels::find`; `follow = "speaking"` without the models that find who speaks.
     pub fn new(settings: &Settings) -> Result<Self> {
         let named = settings.speaker.iter().filter(|speaker| !speaker.reference.as_os_str().is_empty());
-        let references = named.map(|speaker| (speaker.name.clone(), speaker.reference.to_path_buf())).collect();
+        let references = named.map(|speaker| (speaker.name.clone(), speaker.reference.clone())).collect();
         let models = settings.models.clone();
         let chosen = ChosenModels::find(settings)?;
         check_follow(&chosen.settings)?;
         let runtime = Runtime::load(&models.onnxruntime, &models.dir);
         let onnxruntime = runtime.map_or_else(|_| "missing".to_owned(), |runtime| runtime.version());
-        let (fps, work) = (settings.extract.rate(), settings.work.dir.to_path_buf());
+        let (fps, work) = (settings.extract.rate(), settings.work.dir.clone());
         Ok(Self { chosen, models, fps, work, references, onnxruntime })
     }
 

@@ -61,7 +61,7 @@ impl SubprocessStage<'_> {
         // The search for the library leads to folders that the process cannot list.
         if let Ok(library) = find_library(&settings.models.onnxruntime, &settings.models.dir) {
             reads.push(library.clone().into());
-            settings.models.onnxruntime = library.into();
+            settings.models.onnxruntime = library;
         }
         let of_speaker = self.videos.iter().find(|videos| videos.speaker == unit.speaker);
         Ok(UnitRequest {

@@ -35,7 +35,7 @@ impl SpeechDetector {
         if !store.path(entry).exists() {
             return Err(ModelError::Missing { id: entry.id.clone(), path: store.path(entry) }.into());
         }
-        let (models, library) = (settings.models.dir.to_path_buf(), settings.models.onnxruntime.to_path_buf());
+        let (models, library) = (settings.models.dir.clone(), settings.models.onnxruntime.clone());
         Ok(Some(Self { entry: entry.clone(), models, library }))
     }
 

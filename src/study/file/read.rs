@@ -194,8 +194,8 @@ mod tests {
         );
         assert!(one("[[task]]\nname = \"x\"\ntrials = 3\n")[0].ends_with("the key design is missing"));
         assert_eq!(
-            one("[texts.en]\nwelcom = \"Hi\"\n"),
-            ["line 11: texts.en.welcom: the page has no such text (did you mean welcome?)"]
+            one("[texts.en]\n\"study.titel\" = \"Hi\"\n"),
+            ["line 11: texts.en.study.titel: the page has no such text (did you mean study.title?)"]
         );
         let wrong = one("[[task]]\nname = \"x\"\ndesign = \"sliders\"\ntrials = 3\nscale = \"appropriate\"\n");
         assert_eq!(

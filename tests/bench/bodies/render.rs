@@ -2,7 +2,7 @@
 
 use super::super::report::{Report, median};
 use anyhow::{Context, Result, ensure};
-use orator_avatar::animate::export::film::{Film, FilmContent, SecondPanel, write as write_film};
+use orator_avatar::animate::export::film::{Film, FilmSource, SecondPanel, write as write_film};
 use orator_avatar::animate::export::film_avatar::{AvatarView, FilmCamera};
 use orator_avatar::animate::{AnimationOptions, perform};
 use orator_avatar::render::{Background, Light, Mesh, PinholeCamera};
@@ -47,7 +47,7 @@ pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     let folder = tempfile::tempdir()?;
     let task = progress.begin("render", args.rounds as u64);
     let (camera, beside) = (FilmCamera::Front, SecondPanel::Itself);
-    let content = FilmContent { performance: &performance, camera, sound: None, beside };
+    let content = FilmSource { performance: &performance, camera, sound: None, beside };
     let mut film = Film::new(content);
     let films: Vec<Image> = (0..args.frames.min(N_KEPT)).map(|frame| film.frame(frame)).collect::<Result<_>>()?;
     let mut secs: [Vec<f64>; 4] = Default::default();

@@ -22,7 +22,7 @@ use orator_gesture::train::seq2seq::captures::CaptureFolder;
 use orator_gesture::train::seq2seq::source::TrainingSource;
 use orator_gesture::train::seq2seq::train::train;
 use orator_media::ffmpeg::audio;
-use orator_test_support::project::{Answer, Project};
+use orator_test_support::project::{ProgramAnswer, Project};
 use serde_json::Value;
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -43,19 +43,19 @@ fn train_gan(project: &Project, data: &str, out: &str) {
 }
 
 /// Keys of the rows, and the checkpoints that they are of.
-fn rows(answer: &Answer) -> Vec<(String, String)> {
+fn rows(answer: &ProgramAnswer) -> Vec<(String, String)> {
     let text = |row: &Value, key: &str| row[key].as_str().unwrap_or_default().to_owned();
     let rows = answer.json["predictors"].as_array().unwrap();
     rows.iter().map(|row| (text(row, "name"), text(row, "checkpoint"))).collect()
 }
 
-fn value(answer: &Answer, name: &str, part: &str, who: &str) -> Option<f64> {
+fn value(answer: &ProgramAnswer, name: &str, part: &str, who: &str) -> Option<f64> {
     let metrics = answer.json["metrics"].as_array().unwrap();
     let metric = metrics.iter().find(|metric| metric["name"] == name && metric["part"] == part);
     metric.unwrap()["values"][who]["value"].as_f64()
 }
 
-fn notes(answer: &Answer) -> String {
+fn notes(answer: &ProgramAnswer) -> String {
     let notes = answer.json["notes"].as_array().unwrap();
     notes.iter().map(|note| note.as_str().unwrap().to_owned() + "\n").collect()
 }
@@ -98,7 +98,7 @@ fn networks_of_both_trainings_stand_in_one_table() {
     let alone = project.answer(&["evaluate", "--dataset", "data", "--checkpoint", "gan"]);
     assert_eq!(alone.json["truth"], answer.json["truth"]);
     assert!(alone.json["verdicts"].is_null() && alone.json["predictors"][0]["checkpoint"].is_null());
-    let metrics = |answer: &Answer| answer.json["metrics"].as_array().unwrap().clone();
+    let metrics = |answer: &ProgramAnswer| answer.json["metrics"].as_array().unwrap().clone();
     for (one, several) in metrics(&alone).iter().zip(metrics(&answer)) {
         for who in ["prediction", "mismatched_prediction", "nearest_neighbour"] {
             // Intervals differ, and the rounding of sums: all rows of a table share blocks, as long as the slowest of its

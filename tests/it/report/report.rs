@@ -2,7 +2,7 @@
 //! and a slider says what a run with that threshold then keeps.
 
 use crate::fixtures::browser::Browser;
-use orator_test_support::project::{Answer, Project};
+use orator_test_support::project::{ProgramAnswer, Project};
 use serde_json::Value;
 use std::path::Path;
 
@@ -10,7 +10,7 @@ const NAME: &str = "a <b> & \"c\" 'd'.mp4";
 /// Strict enough to refuse parts of what the synthetic speaker does.
 const STRICT: [&str; 4] = ["--set", "segment.max_body_gap_secs=0.1", "--set", "segment.min_frames=20"];
 
-fn report(project: &Project, args: &[&str]) -> (Answer, String) {
+fn report(project: &Project, args: &[&str]) -> (ProgramAnswer, String) {
     let answer = project.answer(&[&["report", "--out", "deep/r.html"], args].concat());
     assert_eq!(answer.code, 0, "{}", answer.errors);
     let html = std::fs::read_to_string(project.dir().join("deep/r.html")).unwrap();

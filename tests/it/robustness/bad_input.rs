@@ -5,14 +5,14 @@ use crate::fixtures::clips::ffmpeg;
 use orator_base::types::pose2d::Keypoints;
 use orator_formats::keypoints_npz;
 use orator_onnx::{Manifest, ModelEntry};
-use orator_test_support::project::{Answer, Project, files_under};
+use orator_test_support::project::{ProgramAnswer, Project, files_under};
 use orator_test_support::skip::skip;
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The line of `stage` for the video whose work name begins with `name`.
-fn line(answer: &Answer, stage: &str, name: &str) -> String {
+fn line(answer: &ProgramAnswer, stage: &str, name: &str) -> String {
     let of = |list: &str, text: &str| {
         let entries = answer.json[list].as_array().cloned().unwrap_or_default();
         let is_it = |entry: &&Value| {

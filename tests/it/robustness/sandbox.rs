@@ -223,7 +223,7 @@ fn no_process_outlives_its_run() {
             status.lines().any(|line| line.starts_with("State:") && !line.contains('Z') && !line.contains('X'))
         };
         let begun = Instant::now();
-        while is_alive() && begun.elapsed() < Duration::from_secs(2) {
+        while is_alive() && begun.elapsed() < Duration::from_secs(10) {
             std::thread::sleep(Duration::from_millis(1));
         }
         assert!(!is_alive(), "process {unit} lives");

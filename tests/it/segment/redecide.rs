@@ -1,13 +1,13 @@
 //! Thresholds changed after a run: `status --why` names the key and says which stages would run, `run` runs those and
 //! never pose2d; and the account of seconds in `status` adds up, with failures in it.
 
-use orator_test_support::project::{Answer, Project, files_under};
+use orator_test_support::project::{ProgramAnswer, Project, files_under};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
 
 /// Of each stage how many units stay fresh, how many would run, and why.
-fn plan(answer: &Answer) -> BTreeMap<String, (u64, u64, String)> {
+fn plan(answer: &ProgramAnswer) -> BTreeMap<String, (u64, u64, String)> {
     let of = |stage: &Value| {
         let why = stage["because"].as_array().unwrap().iter().map(|why| why.as_str().unwrap());
         let n = |key: &str| stage[key].as_u64().unwrap();

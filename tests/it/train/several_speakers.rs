@@ -23,7 +23,7 @@ use orator_gesture::train::gan::train::{train, train_watched};
 use orator_gesture::train::gan::windows::JoinedWindows;
 use orator_gesture::train::gan::windows::WindowLoader;
 use orator_nn::gan::speaker_layer::{SPEAKER, SPEAKER_EMBEDDING, SPEAKER_WEIGHT};
-use orator_test_support::project::Answer;
+use orator_test_support::project::ProgramAnswer;
 use std::path::Path;
 use std::process::Command;
 
@@ -58,12 +58,12 @@ fn settings() -> GanConfig {
     GanConfig { steps: 6.into(), epoch_steps: 3.into(), warmup_steps: 0.into(), fade_to: 1.0.into(), ..gan }
 }
 
-fn orator(dir: &Path, args: &str) -> Answer {
+fn orator(dir: &Path, args: &str) -> ProgramAnswer {
     let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
     let output = command.arg("--json").args(args.split_whitespace()).current_dir(dir).output().unwrap();
     let json = serde_json::from_slice(&output.stdout).unwrap_or_default();
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
-    Answer { code: output.status.code().unwrap_or(-1), json, errors }
+    ProgramAnswer { code: output.status.code().unwrap_or(-1), json, errors }
 }
 
 fn as_speaker(folder: &Path, name: &str) -> anyhow::Result<GestureGenerator> {

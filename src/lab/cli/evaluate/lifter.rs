@@ -45,8 +45,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 fn body(args: Args, ui: &Ui) -> Result<Outcome> {
     ensure!((1..=100_000).contains(&args.scenes), "--scenes must lie between 1 and 100000");
     let settings = config::LiftConfig {
-        body_weights: args.body_weights.unwrap_or_default().into(),
-        hand_weights: args.hand_weights.unwrap_or_default().into(),
+        body_weights: args.body_weights.unwrap_or_default(),
+        hand_weights: args.hand_weights.unwrap_or_default(),
         ..Default::default()
     };
     let takes = upper_body::read_all(&args.mocap).context("reading --mocap")?;
