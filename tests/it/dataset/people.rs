@@ -26,7 +26,7 @@ fn a_second_person_is_told_until_the_user_knows_better() {
     let root = dir.path();
     let units = [("one", 4), ("two", 5), ("other", 6)].map(|(name, seed)| video(root, name, 300, seed));
     let mut settings = settings(root);
-    let work = settings.work.dir.to_path_buf();
+    let work = settings.work.dir.clone();
     let splits = [(&units[0], Split::Train), (&units[1], Split::Validation), (&units[2], Split::Test)];
     let picture = artifacts::faces(&work, &units[0].speaker);
     let facts = |settings: &orator_dataset::config::Settings, name: &str| {

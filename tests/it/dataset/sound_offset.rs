@@ -21,7 +21,7 @@ fn late_and_early_sound_is_shifted_where_that_is_sure_and_asked_for() {
     let root = dir.path();
     let unit = video(root, "talk", 300, 3);
     let mut settings = settings(root);
-    let work = settings.work.dir.to_path_buf();
+    let work = settings.work.dir.clone();
     let made = |settings: &Settings, name: &str| {
         let (report, out) = shard_as(settings, std::slice::from_ref(&unit), &[(&unit, Split::Train)], name);
         report.unwrap();

@@ -72,8 +72,8 @@ fn unit(dir: &Path, n: usize, models: &Path) -> (Unit, Settings) {
     let source = clips::write_sized(dir, "nobody.mp4", n, FrameRate::new(30, 1), [160, 96], None);
     let unit = Unit { speaker: "host".into(), video: "nobody-00000000".into(), source };
     let mut settings = Settings::default();
-    settings.work.dir = dir.join("work").into();
-    settings.models.dir = models.to_owned().into();
+    settings.work.dir = dir.join("work");
+    settings.models.dir = models.to_owned();
     (unit, settings)
 }
 
@@ -133,7 +133,7 @@ fn a_timeline_of_another_video_and_a_missing_model_are_errors() {
         let said = Pose2dStage::new(&settings).unwrap().run(&unit, dir.path(), &Silent).unwrap_err().to_string();
         assert!(said.contains(&format!("its timeline has {n_frames}")), "{said}");
     }
-    settings.models.dir = dir.path().to_owned().into();
+    settings.models.dir = dir.path().to_owned();
     let said = Pose2dStage::new(&settings).unwrap().inputs(&unit).unwrap_err().to_string();
     assert!(said.contains("person_rtmdet_nano_320.onnx") && said.contains("orator models fetch"), "{said}");
 }

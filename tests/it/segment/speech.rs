@@ -146,7 +146,7 @@ fn kept_share(ledger: &Ledger) -> f64 {
 fn music_noise_and_applause_are_no_speech_and_speech_over_music_is() {
     let Some((_, dir, _)) = speech_model() else { return };
     let mut settings = Settings::default();
-    settings.models.dir = dir.clone().into();
+    settings.models.dir = dir.clone();
     for (name, sound) in [("music", music(10)), ("noise", steady_noise()), ("applause", applause(10))] {
         let [heard, loud] = ledgers(&sound, &settings);
         assert!(kept_share(&loud) > 0.99, "{name} is loud");
@@ -262,7 +262,7 @@ fn without_the_model_loudness_is_the_rule_and_is_said_once() {
 fn the_rule_follows_the_configuration_and_the_folder() {
     let dir = tempfile::tempdir().unwrap();
     let mut settings = Settings::default();
-    settings.models.dir = dir.path().to_path_buf().into();
+    settings.models.dir = dir.path().to_path_buf();
     assert!(SpeechDetector::find(&settings).unwrap().is_none());
     assert!(SpeechDetector::advice(&settings).unwrap().is_some_and(|line| line.contains("orator models fetch")));
     settings.segment.speech = SpeechRule::Vad;
