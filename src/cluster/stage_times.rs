@@ -150,13 +150,13 @@ impl StageTimes {
 /// Work on one video, seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct VideoWork {
-    /// Before the spans that workers share; all of it where there are none.
+    /// Work before the spans that workers share; the total where there are no spans.
     before: f64,
-    /// On each span.
+    /// Work on each span.
     span: f64,
-    /// How many of them; 0: workers share nothing of it.
+    /// Number of spans; 0: one worker processes the video alone.
     n_spans: usize,
-    /// After the last span.
+    /// Work after the last span.
     after: f64,
 }
 

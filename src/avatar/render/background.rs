@@ -1,4 +1,4 @@
-//! What is behind the figures and stays as it is: a picture, a gradient, or a scene with depth of its own.
+//! Static backgrounds behind the rendered meshes: a picture, a gradient, or a scene with its own depth.
 
 use super::shadow::ShadowMap;
 use orator_base::types::image::Image;

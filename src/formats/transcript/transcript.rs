@@ -127,14 +127,14 @@ fn tsv(text: &str) -> Result<Vec<Word>> {
 /// channel, start, duration, word and, where it is known, confidence.
 ///
 /// # Errors
-/// The line that is no row; several recordings, none of which has the name.
+/// Invalid row (with its line); several recordings, and none has this name.
 fn ctm(text: &str, name: &str) -> Result<Vec<Word>> {
     let rows = text.lines().zip(1..).filter(|(line, _)| !line.trim().is_empty() && !line.starts_with(";;"));
     let recordings: BTreeSet<&str> =
         rows.clone().filter_map(|(line, _)| line.split_whitespace().next()).take(1 << 20).collect();
     ensure!(
         recordings.len() <= 1 || recordings.contains(name),
-        "it holds {} recordings ({}, ...), none of which is called {name}",
+        "{} recordings ({}, ...), none named {name}",
         recordings.len(),
         recordings.first().copied().unwrap_or_default()
     );

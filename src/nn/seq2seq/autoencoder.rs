@@ -62,8 +62,8 @@ impl SpeechEncoder {
 
     /// Audio [B, T + context - 1, audio] to codes [B, T, code].
     pub fn forward(&self, audio: &Tensor, mode: &mut Mode) -> Result<Tensor> {
-        let heard = dropout(&self.audio.forward(audio, mode)?, self.config.dropout, mode)?;
-        self.linear.forward(&heard)?.reshape((audio.dim(0)?, (), self.config.code))
+        let features = dropout(&self.audio.forward(audio, mode)?, self.config.dropout, mode)?;
+        self.linear.forward(&features)?.reshape((audio.dim(0)?, (), self.config.code))
     }
 }
 
@@ -104,13 +104,13 @@ impl AudioBaseline {
         (self.autoencoder.forward(&(&poses + noise)?)? - poses)?.sqr()?.mean_all()
     }
 
-    /// Mean squared error of the codes that are heard, against those of the real poses [B, predicted, pose], through which
+    /// Mean squared error of the codes predicted from the audio, against those of the real poses [B, predicted, pose], through which
     /// nothing is learnt.
     pub fn loss_of_speech(&self, audio: &Tensor, poses: &Tensor, mode: &mut Mode) -> Result<Tensor> {
         let poses = poses.broadcast_div(self.scale.as_tensor())?;
         let codes = self.autoencoder.encode(&poses.flatten_to(1)?)?.detach();
-        let heard = self.speech.forward(audio, mode)?;
-        (heard.flatten_to(1)? - codes)?.sqr()?.mean_all()
+        let predicted = self.speech.forward(audio, mode)?;
+        (predicted.flatten_to(1)? - codes)?.sqr()?.mean_all()
     }
 
     /// Its sizes.

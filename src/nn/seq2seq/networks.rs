@@ -126,9 +126,9 @@ impl EncodesAndDecodes for ContextSeq2Seq {
         if n_frames != self.config.predicted {
             candle_core::bail!("words of {n_frames} frames for {} poses", self.config.predicted);
         }
-        let heard = self.audio.forward(&segment.audio, mode)?;
+        let audio = self.audio.forward(&segment.audio, mode)?;
         let said = self.words.last(&words.reshape((batch * n_frames, n_words))?)?.relu()?;
-        let frames = self.linear.forward(&Tensor::cat(&[heard, said], 1)?)?;
+        let frames = self.linear.forward(&Tensor::cat(&[audio, said], 1)?)?;
         let frames = frames.reshape((batch, n_frames, self.config.hidden))?;
         Ok(vec![self.gru.forward(&frames, self.config.dropout, mode)?])
     }

@@ -54,8 +54,7 @@ pub enum SecondPanel<'a> {
     /// None: the avatar fills the picture.
     #[default]
     Itself,
-    /// Frames of a video from this second of it on; with its camera they lie behind the avatar, which stands where the
-    /// person does.
+    /// Frames of a video from `from_secs` on; given its camera, the avatar is drawn over them at the position of the person.
     Video { path: &'a Path, from_secs: f64, camera: Option<&'a SourceCamera> },
     /// Another avatar, drawn in the same size; the labels of the two, the other last.
     Motion { performance: &'a Performance, labels: [&'a str; 2] },

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 pub struct NoSpace(anyhow::Error);
 
 impl NoSpace {
-    /// The error that came of it.
+    /// Wraps the error of the write that failed.
     pub fn new(error: anyhow::Error) -> Self {
         Self(error)
     }

@@ -13,7 +13,7 @@ use orator_nn::seq2seq::networks::{ContextSeq2Seq, WordsSeq2Seq};
 use orator_nn::seq2seq::predict::GesturePredictor;
 use serde::{Deserialize, Serialize};
 
-/// Seconds that are predicted at once, of the poses before them, and heard on either side of a pose.
+/// Seconds that are predicted at once, seconds of poses before them, and seconds of audio on either side of a pose.
 const PREDICTED_SECS: f64 = 1.0;
 const PREVIOUS_SECS: f64 = 0.5;
 const HEARD_SECS: f64 = 1.5;
@@ -121,8 +121,8 @@ pub const RATES: std::ops::RangeInclusive<u32> = 8_000..=48_000;
 /// side: [n_padded + context - 1, 26].
 pub fn audio_features(sound: &Sound, fps: FrameRate, n_frames: usize, n_padded: usize, context: usize) -> Array2<f32> {
     let silence = mfcc::silence(sound.rate);
-    let heard = mfcc::of_poses(&sound.samples, sound.rate, fps.per_sec(), n_frames);
-    let at = |(t, c): (usize, usize)| if t < n_frames { heard[[t, c]] } else { silence[c] };
+    let features = mfcc::of_poses(&sound.samples, sound.rate, fps.per_sec(), n_frames);
+    let at = |(t, c): (usize, usize)| if t < n_frames { features[[t, c]] } else { silence[c] };
     mfcc::with_context(&Array2::from_shape_fn((n_padded, N_CEPSTRA), at), context, &silence)
 }
 

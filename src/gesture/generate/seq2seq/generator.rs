@@ -82,14 +82,14 @@ impl SequenceGenerator {
         ensure!(sound.rate == rate, "the sound has {} Hz, expected {rate}", sound.rate);
         let n_frames = self.n_frames(sound.samples.len())?;
         let Config { predicted, context, .. } = *self.network.config();
-        let heard =
+        let features =
             architecture::audio_features(sound, self.fps(), n_frames, n_frames.next_multiple_of(predicted), context);
-        let shape = (1, heard.nrows(), heard.ncols());
-        let audio = Tensor::from_iter(heard.iter().copied(), &Device::Cpu)?.reshape(shape)?;
+        let shape = (1, features.nrows(), features.ncols());
+        let audio = Tensor::from_iter(features.iter().copied(), &Device::Cpu)?.reshape(shape)?;
         Ok(HeardSpeech { n_frames, audio, said: self.metadata.vocabulary.numbered(words) })
     }
 
-    /// Poses for what was heard. The first segment goes on from the mean pose.
+    /// Poses for the audio. The first segment goes on from the mean pose.
     ///
     /// # Errors
     /// A network that makes numbers that are not finite.

@@ -47,7 +47,7 @@ impl TrainingMaterial {
 struct RecipeRow {
     key: &'static str,
     paper: f64,
-    /// A new speaker in a network of several, of whom the layer is learnt.
+    /// Training of the layer of a new speaker in a network of several speakers.
     new_layer: f64,
     /// At the minutes of [`MINUTES`].
     auto: [f64; 4],
