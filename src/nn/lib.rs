@@ -1,4 +1,5 @@
-//! Network architectures and the operators they are made of: tensors in, tensors out. No files, no optimiser.
+//! Network architectures and the operators they are made of: tensors in, tensors out. `weights` reads and writes the files of
+//! weights. No optimiser.
 //!
 //! candle's operators are used only where finite differences confirm their gradients (`tests/it/train/operators.rs` has
 //! the list, and rejects the others); convolution, batch norm and recurrent layers are own ones. The layers of the lifters
@@ -11,5 +12,6 @@ pub mod motion_encoder;
 pub mod ops;
 pub mod params;
 pub mod seq2seq;
+pub mod weights;
 
 pub use ops::dropout::Mode;

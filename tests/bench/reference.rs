@@ -2,7 +2,7 @@
 //! command.
 
 use anyhow::{Context, Result, bail};
-use orator_formats::checkpoint::Contents;
+use orator_nn::weights::Contents;
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;

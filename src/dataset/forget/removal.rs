@@ -287,8 +287,7 @@ fn terms(videos: &[&KnownVideo], others: &[&KnownVideo]) -> Vec<SearchTerm> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use orator_formats::checkpoint::Contents;
-    use std::collections::BTreeMap;
+    use safetensors::tensor::TensorView;
 
     #[test]
     fn a_model_that_began_with_one_of_the_videos_is_found() {
@@ -299,7 +298,8 @@ mod tests {
             let facts = serde_json::json!({ "speaker": { "videos": videos } });
             let folder = work.path().join("gan").join(name);
             fs::create_dir_all(&folder).unwrap();
-            Contents { facts, tensors: BTreeMap::new() }.write(&folder.join("best.safetensors")).unwrap();
+            let bytes = checkpoint::to_bytes(&facts, Vec::<(String, TensorView)>::new()).unwrap();
+            fs::write(folder.join("best.safetensors"), bytes).unwrap();
             folder
         };
         let (both, _other) = (model("ben", &["aa11", "bb22"]), model("cleo", &["cc33"]));

@@ -256,7 +256,7 @@ mod tests {
         assert!(refusal("2\t1\tso\n", "tsv").contains("from 2 to 1"));
         assert!(refusal("-1\t1\tso\n", "tsv").contains("line 1: `so` is said from -1"));
         assert!(refusal("a 1 0.5 0.2\n", "ctm").contains("line 1"));
-        assert!(refusal("b 1 0 1 so\nc 1 0 1 so\n", "ctm").contains("called a"));
+        assert!(refusal("b 1 0 1 so\nc 1 0 1 so\n", "ctm").contains("none named a"));
         assert!(parse("{", "json").is_err() && parse("{}", "json").is_err());
         assert!(refusal(r#"{"words": [{"word": "so"}]}"#, "json").contains("word 1"));
         let transcript = parse("0.5\t0.7\tso\n1.0\t1.25\twell\n", "tsv").unwrap();

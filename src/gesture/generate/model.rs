@@ -12,10 +12,11 @@ use orator_base::stage::workdir::FolderLock;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::sound::SAMPLE_RATE;
 use orator_base::types::time::FrameRate;
-use orator_formats::checkpoint::{self, Contents};
+use orator_formats::checkpoint;
 use orator_nn::gan::generator::{Config, Generator};
 use orator_nn::gan::speaker_layer::SPEAKER;
 use orator_nn::params::Params;
+use orator_nn::weights::Contents;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 

@@ -4,7 +4,7 @@
 
 use anyhow::{Result, ensure};
 use candle_core::{DType, Tensor};
-use orator_formats::checkpoint::Contents;
+use orator_nn::weights::Contents;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

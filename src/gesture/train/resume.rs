@@ -3,7 +3,8 @@
 use anyhow::{Context, Result, ensure};
 use orator_base::stage::progress::Progress;
 use orator_dataset::config::auto::AUTO;
-use orator_formats::checkpoint::{self, Contents};
+use orator_formats::checkpoint;
+use orator_nn::weights::Contents;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;

@@ -1,11 +1,11 @@
 //! The lifters' weights: built into the program, or from files of `orator-lab train lifter`.
 
 use anyhow::{Context, Result, ensure};
-use orator_formats::checkpoint::Contents;
 use orator_nn::lifter::body::BodyLifter;
 use orator_nn::lifter::hand::{self, HandLifter};
 use orator_nn::lifter::temporal;
 use orator_nn::params::Params;
+use orator_nn::weights::Contents;
 use serde::de::DeserializeOwned;
 use std::path::Path;
 

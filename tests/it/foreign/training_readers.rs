@@ -2,9 +2,9 @@
 //! checkpoint's tensors in Python's `safetensors`. Both come from PyPI (`make readers`).
 
 use candle_core::{Device, Tensor};
-use orator_formats::checkpoint::Contents;
 use orator_gesture::train::log;
 use orator_gesture::train::log::MetricsLog;
+use orator_nn::weights::Contents;
 use orator_test_support::skip::readers;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;

@@ -1,9 +1,9 @@
 //! Weights: checkpoints of a speaker, lifters, spaces of movement.
 
 use crate::fixtures::fuzzing::harness::{corpus, fuzz_bytes, fuzz_file};
-use orator_formats::checkpoint::Contents;
 use orator_gesture::generate::model::{self, GenerationChoice};
 use orator_gesture::metrics::space::{basis::Basis, embedding};
+use orator_nn::weights::Contents;
 use orator_pipeline::lift::weights;
 
 #[test]

@@ -3,8 +3,8 @@
 
 use crate::fixtures::clips;
 use crate::fixtures::untrained::{generate, write_untrained_speaker};
-use orator_formats::checkpoint::Contents;
 use orator_formats::wav;
+use orator_nn::weights::Contents;
 use std::path::Path;
 
 fn with_dropout(dir: &Path) {

@@ -5,10 +5,10 @@ use super::poses::PoseNumbers;
 use super::vocabulary::{NumberedWord, Vocabulary};
 use anyhow::{Context, Result, ensure};
 use orator_base::types::time::FrameRate;
-use orator_formats::checkpoint::Contents;
 use orator_nn::params::Params;
 use orator_nn::seq2seq::config::Config;
 use orator_nn::seq2seq::predict::GesturePredictor;
+use orator_nn::weights::Contents;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

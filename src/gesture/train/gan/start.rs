@@ -9,9 +9,9 @@ use anyhow::{Context, Result, bail, ensure};
 use candle_core::Tensor;
 use orator_dataset::Dataset;
 use orator_dataset::config::GanSettings;
-use orator_formats::checkpoint::Contents;
 use orator_nn::gan::generator::Config;
 use orator_nn::gan::speaker_layer::SPEAKER;
+use orator_nn::weights::Contents;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

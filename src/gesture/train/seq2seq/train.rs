@@ -24,11 +24,11 @@ use orator_base::stage::workdir::{self, FolderLock};
 use orator_dataset::Split;
 use orator_dataset::config::{Seq2seqConfig, SequenceNetwork};
 use orator_formats::checkpoint;
-use orator_formats::checkpoint::Contents;
 use orator_formats::word_vectors::WordVectors;
 use orator_nn::cpu::thread_team::with_spinning_workers;
 use orator_nn::seq2seq::config::Config;
 use orator_nn::seq2seq::encoders::set_word_vectors;
+use orator_nn::weights::Contents;
 use std::path::Path;
 
 /// Numbers of a word where no table of vectors is given.

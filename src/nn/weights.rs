@@ -1,0 +1,112 @@
+//! Weights of networks and facts about them: the tensors of the files of `orator_formats::checkpoint`.
+
+use anyhow::ensure;
+use candle_core::safetensors::Load;
+use candle_core::{DType, Device, Tensor};
+use orator_base::stage::workdir;
+use orator_formats::checkpoint;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Contents of a file: named tensors, and metadata as JSON.
+pub struct Contents {
+    pub facts: Value,
+    pub tensors: BTreeMap<String, Tensor>,
+}
+
+impl Contents {
+    /// The tensors whose names begin with `prefix`, without it.
+    pub fn part(&self, prefix: &str) -> BTreeMap<String, Tensor> {
+        let strip = |(name, tensor): (&String, &Tensor)| Some((name.strip_prefix(prefix)?.to_owned(), tensor.clone()));
+        self.tensors.iter().filter_map(strip).collect()
+    }
+
+    /// Checks that a network of at least `least` weights may be in it, before memory is taken for one.
+    pub fn expect_numbers(&self, least: usize) -> anyhow::Result<()> {
+        let n_numbers: usize = self.tensors.values().map(Tensor::elem_count).sum();
+        ensure!(least <= n_numbers, "its network has {least} weights or more, the file {n_numbers}");
+        Ok(())
+    }
+
+    /// Adds tensors with `prefix` before their names.
+    pub fn add(&mut self, prefix: &str, tensors: BTreeMap<String, Tensor>) {
+        self.tensors.extend(tensors.into_iter().map(|(name, tensor)| (format!("{prefix}{name}"), tensor)));
+    }
+
+    /// The bytes of the file.
+    pub fn to_bytes(&self) -> anyhow::Result<Vec<u8>> {
+        let tensors = self.tensors.iter().map(|(name, tensor)| (name.clone(), tensor));
+        checkpoint::to_bytes(&self.facts, tensors)
+    }
+
+    /// Parses the bytes that [`Contents::to_bytes`] gives.
+    pub fn from_bytes(bytes: &[u8]) -> anyhow::Result<Self> {
+        let facts = checkpoint::facts_of(bytes)?;
+        let file = safetensors::SafeTensors::deserialize(bytes)?;
+        let load = |(name, view): (String, safetensors::tensor::TensorView)| {
+            let tensor = view.load(&Device::Cpu)?;
+            ensure!(
+                is_finite(&tensor)?,
+                "the tensor {name} holds a number that is not finite: it was damaged, or its training failed"
+            );
+            Ok((name, tensor))
+        };
+        let tensors = file.tensors().into_iter().map(load).collect::<anyhow::Result<_>>()?;
+        Ok(Self { facts, tensors })
+    }
+
+    /// Writes the file atomically.
+    pub fn write(&self, path: &Path) -> anyhow::Result<()> {
+        workdir::write_file(path, &self.to_bytes()?)
+    }
+
+    /// Reads a file. Errors name it.
+    pub fn read(path: &Path) -> anyhow::Result<Self> {
+        checkpoint::read_with(path, Self::from_bytes)
+    }
+}
+
+fn is_finite(tensor: &Tensor) -> anyhow::Result<bool> {
+    if !tensor.dtype().is_float() {
+        return Ok(true);
+    }
+    let numbers = tensor.flatten_all()?.to_dtype(DType::F32)?.to_vec1::<f32>()?;
+    Ok(numbers.iter().all(|number| number.is_finite()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use anyhow::Context;
+    use orator_formats::checkpoint::path;
+    use serde_json::json;
+
+    #[test]
+    fn contents_come_back_and_bytes_repeat() -> anyhow::Result<()> {
+        let folder = tempfile::tempdir()?;
+        let mut contents = Contents { facts: json!({"step": 7, "kind": "test"}), tensors: BTreeMap::new() };
+        let tensor = Tensor::new(&[[1f32, 2.0], [3.0, f32::MIN_POSITIVE]], &Device::Cpu)?;
+        contents.add("net.", BTreeMap::from([("w".into(), tensor.clone()), ("a".into(), tensor.clone())]));
+        let file = path(folder.path(), 7);
+        contents.write(&file)?;
+        let read = Contents::read(&file)?;
+        assert_eq!(read.facts, contents.facts);
+        assert_eq!(read.part("net.")["w"].to_vec2::<f32>()?, tensor.to_vec2::<f32>()?);
+        assert_eq!(read.to_bytes()?, std::fs::read(&file)?);
+        Ok(())
+    }
+
+    #[test]
+    fn a_weight_that_is_no_number_is_named() -> anyhow::Result<()> {
+        let folder = tempfile::tempdir()?;
+        let file = path(folder.path(), 1);
+        for wrong in [f32::NAN, f32::INFINITY] {
+            let tensors = BTreeMap::from([("net.w".to_owned(), Tensor::new(&[1.0, wrong, 2.0], &Device::Cpu)?)]);
+            Contents { facts: json!({}), tensors }.write(&file)?;
+            let text = format!("{:#}", Contents::read(&file).err().context("it was read")?);
+            assert!(text.contains("step-0000001.safetensors") && text.contains("net.w"), "{text}");
+        }
+        Ok(())
+    }
+}
