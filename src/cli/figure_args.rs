@@ -7,7 +7,7 @@ use orator_avatar::animate::rig::names::Names;
 use orator_base::types::time::FrameRate;
 
 #[derive(clap::Args)]
-pub struct FigureArgs {
+pub(super) struct FigureArgs {
     /// What the bones are called in .bvh, .fbx, .glb and .json.
     #[arg(long, value_name = "own|mixamo|unity-humanoid|vrm|unreal", default_value = "own", value_parser = names_called)]
     names: Names,
@@ -19,17 +19,17 @@ pub struct FigureArgs {
 
 impl FigureArgs {
     /// The options as a value.
-    pub fn options(&self) -> FigureOptions {
+    pub(super) fn options(&self) -> FigureOptions {
         FigureOptions { names: self.names, fps: self.fps }
     }
 
     /// Errors on names that are in none of these files.
-    pub fn check(&self, outputs: &OutputFiles) -> Result<()> {
+    pub(super) fn check(&self, outputs: &OutputFiles) -> Result<()> {
         self.check_formats(outputs.iter().map(|(_, format)| *format))
     }
 
     /// As `check`, of formats.
-    pub fn check_formats(&self, mut formats: impl Iterator<Item = ExportFormat>) -> Result<()> {
+    pub(super) fn check_formats(&self, mut formats: impl Iterator<Item = ExportFormat>) -> Result<()> {
         let is_named = formats.any(ExportFormat::has_names);
         ensure!(
             is_named || self.names == Names::Own,

@@ -1,7 +1,7 @@
 //! Weights and facts about them in one file: safetensors whose metadata holds one JSON object under `orator`. The same
 //! contents give the same bytes. `orator_nn::weights` reads the tensors.
 
-use anyhow::{Context, ensure};
+use anyhow::Context;
 use safetensors::View;
 use serde_json::Value;
 use std::collections::HashMap;

@@ -50,7 +50,6 @@ pub struct MediaInfo {
     pub keypoints_from: Option<String>,
 }
 
-#[allow(clippy::trivially_copy_pass_by_ref)] // serde passes a reference
 fn is_zero(n: &usize) -> bool {
     *n == 0
 }

@@ -223,7 +223,7 @@ pub(crate) mod tests {
     use ndarray::Ix3;
 
     /// The file with another shape in its header.
-    pub fn with_shape(bytes: &[u8], old: &str, new: &str) -> Vec<u8> {
+    pub(crate) fn with_shape(bytes: &[u8], old: &str, new: &str) -> Vec<u8> {
         let header = String::from_utf8_lossy(&bytes[10..128]).replace(old, new);
         [&bytes[..10], format!("{:<117}\n", header.trim_end()).as_bytes(), &bytes[128..]].concat()
     }

@@ -132,7 +132,6 @@ impl TimeAccount {
     }
 }
 
-#[allow(clippy::trivially_copy_pass_by_ref)] // serde passes a reference
 fn is_none<S: Serializer>(n_wrong: &usize, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_bool(*n_wrong == 0)
 }

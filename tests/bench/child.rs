@@ -14,23 +14,23 @@ const TICKS: f64 = 100.0;
 
 /// How a run went.
 #[derive(Clone, Copy, Debug)]
-pub struct Child {
-    pub secs: f64,
+pub(crate) struct Child {
+    pub(crate) secs: f64,
     /// Peak resident memory.
-    pub peak_mib: f64,
+    pub(crate) peak_mib: f64,
     /// Processor time, in and for the program, seconds.
-    pub cpu_secs: f64,
+    pub(crate) cpu_secs: f64,
     /// Mean number of threads that ran or could have run, counted up to the number of cores: what would have been busy
     /// had nothing else been at work on the machine.
-    pub busy: f64,
+    pub(crate) busy: f64,
 }
 
 /// Runs `orator ARGS` in the folder `dir`.
 ///
 /// # Errors
 /// Fails where the program cannot be started, or fails with its own words.
-pub fn measure(dir: &Path, args: &[&str]) -> Result<Child> {
-    let n_cores = std::thread::available_parallelism().map_or(1, |n| n.get());
+pub(crate) fn measure(dir: &Path, args: &[&str]) -> Result<Child> {
+    let n_cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
     let log = fs::File::create(dir.join("bench.log"))?;
     command.current_dir(dir).args(args).stdin(Stdio::null()).stdout(Stdio::null()).stderr(log);
@@ -55,29 +55,29 @@ pub fn measure(dir: &Path, args: &[&str]) -> Result<Child> {
 }
 
 /// Peak resident memory of this program itself until now.
-pub fn own_peak_mib() -> f64 {
+pub(crate) fn own_peak_mib() -> f64 {
     fs::read_to_string("/proc/self/status").ok().as_deref().and_then(high_water_mib).unwrap_or(f64::NAN)
 }
 
 /// Processor time of this program itself until now, seconds: on a busy machine it says more than the clock.
-pub fn own_cpu_secs() -> f64 {
+pub(crate) fn own_cpu_secs() -> f64 {
     fs::read_to_string("/proc/self/stat").ok().as_deref().and_then(ticks).map_or(f64::NAN, |ticks| ticks / TICKS)
 }
 
 /// Peak resident memory from a `status` file of /proc.
-pub fn high_water_mib(status: &str) -> Option<f64> {
+pub(crate) fn high_water_mib(status: &str) -> Option<f64> {
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     Some(line.split_whitespace().next()?.parse::<f64>().ok()? / 1024.0)
 }
 
 /// Fields 14 and 15 of `stat`, counted behind the name in brackets.
-pub fn ticks(stat: &str) -> Option<f64> {
+pub(crate) fn ticks(stat: &str) -> Option<f64> {
     let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
     Some(fields.get(11)?.parse::<f64>().ok()? + fields.get(12)?.parse::<f64>().ok()?)
 }
 
 /// Threads that run or wait for a core.
-pub fn n_running(folder: &str) -> usize {
+pub(crate) fn n_running(folder: &str) -> usize {
     let threads = fs::read_dir(Path::new(folder).join("task")).into_iter().flatten().flatten();
     let state = |stat: String| stat.rsplit_once(')').and_then(|(_, rest)| rest.trim_start().chars().next());
     let states = threads.filter_map(|thread| fs::read_to_string(thread.path().join("stat")).ok().and_then(state));

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 /// The claims of a plan alone: workers share tiny units that take no time. Units a second, and operations on the shared
 /// folder a unit.
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// Units of the plan.
     #[arg(long, default_value_t = 100_000, value_name = "N")]
     units: usize,
@@ -48,7 +48,7 @@ impl SharedFolder for Counted {
     }
 }
 
-pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
+pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.units > 0 && args.workers > 0, "units and workers must be more than 0");
     let dir = tempfile::tempdir()?;
     let folder = Counted {

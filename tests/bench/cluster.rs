@@ -19,7 +19,7 @@ use std::time::Duration;
 /// the shared folder. The claims are the program's own. Videos of 2 minutes to 3 hours; of every hundred units two fail
 /// and two take their worker with them, which comes back ten minutes later; every twentieth worker is three times slower.
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// Hours of video.
     #[arg(long, default_value_t = 1000.0, value_name = "HOURS")]
     hours: f64,
@@ -217,7 +217,7 @@ fn simulate(units: &[PlannedUnit], n_workers: usize, args: &Args) -> Result<Simu
     })
 }
 
-pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
+pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.hours > 0.0 && args.workers.iter().all(|n| *n > 0), "hours and workers must be more than 0");
     let videos = videos(3600.0 * args.hours, &mut ChaCha8Rng::seed_from_u64(0));
     let n_videos = videos.len();

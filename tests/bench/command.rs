@@ -13,7 +13,7 @@ use std::process::ExitCode;
 /// Measure the speed of a part of the pipeline.
 #[derive(Parser)]
 #[command(name = "cargo bench --", help_expected = true)]
-pub struct Cli {
+pub(crate) struct Cli {
     #[command(subcommand)]
     part: Option<Part>,
     /// Print one JSON object on standard output instead of text for people.
@@ -71,15 +71,15 @@ impl Part {
 ///
 /// # Errors
 /// An unknown argument, no part, or a measurement that failed.
-pub fn measure(words: impl IntoIterator<Item = impl Into<OsString>>, progress: &dyn Progress) -> Result<Report> {
+pub(crate) fn measure(words: impl IntoIterator<Item = impl Into<OsString>>, progress: &dyn Progress) -> Result<Report> {
     let program = OsString::from("bench");
     let cli = Cli::try_parse_from(std::iter::once(program).chain(words.into_iter().map(Into::into)))?;
     cli.part.context("no part to measure")?.measure(progress)
 }
 
 /// Parses the command line, measures, prints the result. Exit code 1 after an error.
-#[allow(clippy::print_stdout)]
-pub fn main() -> ExitCode {
+#[allow(clippy::print_stdout)] // the result of the program
+pub(crate) fn main() -> ExitCode {
     let cli = Cli::parse();
     let Some(part) = &cli.part else {
         println!("{}", Cli::command().render_help());

@@ -29,7 +29,7 @@ use std::time::Instant;
 /// Shards written and read, beside a plain copy of the same files on the same disk; and windows loaded, beside what a
 /// training takes of them. All files are flushed to the disk on both sides, all that is read is in the page cache.
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// Seconds of motion in the dataset, in intervals of 20 s; about 52 kB each.
     #[arg(long, default_value_t = 5000, value_name = "SECS")]
     secs: usize,
@@ -49,7 +49,7 @@ const INTERVAL_SECS: usize = 20;
 /// Intervals of a video.
 const PER_VIDEO: usize = 15;
 
-pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
+pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     let n_intervals = args.secs / INTERVAL_SECS;
     ensure!(args.rounds > 0 && args.steps > 1, "nothing to measure: there must be rounds and at least 2 steps");
     ensure!(n_intervals > 2 * PER_VIDEO, "{} s are too few: the bench needs more than two videos of 300 s", args.secs);

@@ -26,7 +26,7 @@ use std::time::Instant;
 /// Evaluation of predicted motion beside the ground truth, in memory: all metrics, all baselines, all draws and the page. How long
 /// each part takes, and the most memory. Motion and sound are those of the synthetic speaker, 15 frames a second.
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// Hours of motion.
     #[arg(long, default_value_t = 1.0, value_name = "HOURS")]
     hours: f64,
@@ -53,7 +53,7 @@ impl Task for Stopwatch {
     }
 }
 
-pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
+pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.hours > 0.0 && args.hours <= 24.0, "--hours is {}, expected up to 24", args.hours);
     ensure!(args.clips > 0 && args.threads > 0, "nothing to measure: there must be clips and threads");
     let n_frames = (args.hours * 3600.0 * FPS.per_sec()) as usize / args.clips;

@@ -24,7 +24,7 @@ use std::time::Instant;
 /// memory it took. The speech is synthetic, the weights are random. From samples to joints, with the spectrogram but
 /// without files.
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// Seconds of speech.
     #[arg(long, default_value_t = 600.0, value_name = "SECS")]
     secs: f64,
@@ -45,7 +45,7 @@ pub struct Args {
 /// Motion is made at this rate.
 const FPS: FrameRate = FrameRate::new(15, 1);
 
-pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
+pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.secs >= 1.0 && args.secs < 1e6, "--secs is {}, expected 1 to a million", args.secs);
     ensure!(args.rounds > 0 && args.threads > 0, "nothing to measure: there must be rounds and threads");
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build()?;

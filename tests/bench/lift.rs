@@ -25,7 +25,7 @@ use std::time::Instant;
 /// as its networks alone take for as many frames. The keypoints are made by rule. Everything runs in a pool of one
 /// thread.
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// Frames lifted in each round, at 15 a second.
     #[arg(long, default_value_t = 1800, value_name = "N")]
     frames: usize,
@@ -43,7 +43,7 @@ pub struct Args {
 /// Windows and hands that go through the networks together, as the lifters do it.
 const BATCH: (usize, usize) = (512, 1024);
 
-pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
+pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.frames > 0 && args.rounds > 0, "nothing to measure: there must be frames and rounds");
     let settings = config::LiftConfig {
         body_weights: args.body_weights.clone().unwrap_or_default(),

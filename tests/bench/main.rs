@@ -1,11 +1,11 @@
 //! The benchmark, in a process like the program's.
 
+#![allow(dead_code)] // what the tests use of the benchmark and of its fixtures
+
 #[path = "mod.rs"]
-pub mod bench;
-#[path = "../../src/process.rs"]
-pub mod process;
+pub(crate) mod bench;
 
 fn main() -> std::process::ExitCode {
-    process::prepare();
+    orator::process::prepare();
     bench::command::main()
 }

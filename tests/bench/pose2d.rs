@@ -21,7 +21,7 @@ use std::time::Instant;
 /// Frames to keypoints: time a frame, the share of it inside ONNX Runtime, how often each model is asked, one worker
 /// against two, and (with `--python`) against the Python reference of the same chain. Every worker is one thread.
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// A video of a speaker; with `--beside`, its `keypoints.npz`.
     video: PathBuf,
     /// Keypoints of the same video that another version or other settings gave: says how far both are apart, instead
@@ -151,7 +151,7 @@ fn beside(one: &Path, other: &Path) -> Result<Report> {
     Ok(Report { text, facts })
 }
 
-pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
+pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     if let Some(other) = &args.beside {
         return beside(&args.video, other);
     }

@@ -8,18 +8,18 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
-pub struct Reference {
+pub(crate) struct Reference {
     child: Child,
     to: ChildStdin,
     from: BufReader<ChildStdout>,
     /// What it said first.
-    pub hello: Value,
+    pub(crate) hello: Value,
 }
 
 impl Reference {
     /// Starts `script` with the Python that ORATOR_REFERENCE_PYTHON names, on so many threads, `given` written to
     /// `file` for it.
-    pub fn start(script: &Path, n_threads: usize, given: &Contents, file: &Path) -> Result<Self> {
+    pub(crate) fn start(script: &Path, n_threads: usize, given: &Contents, file: &Path) -> Result<Self> {
         given.write(file)?;
         let python = std::env::var("ORATOR_REFERENCE_PYTHON").unwrap_or_else(|_| "python3".to_owned());
         let n_threads = n_threads.to_string();
@@ -38,18 +38,18 @@ impl Reference {
     }
 
     /// PyTorch's version.
-    pub fn version(&self) -> &str {
+    pub(crate) fn version(&self) -> &str {
         self.hello["torch"].as_str().unwrap_or("?")
     }
 
     /// The answer to a command.
-    pub fn ask(&mut self, command: &str) -> Result<Value> {
+    pub(crate) fn ask(&mut self, command: &str) -> Result<Value> {
         writeln!(self.to, "{command}").context("the reference has stopped")?;
         self.answer().with_context(|| format!("no answer to `{command}`"))
     }
 
     /// The seconds in the answer to a command.
-    pub fn secs(&mut self, command: &str) -> Result<f64> {
+    pub(crate) fn secs(&mut self, command: &str) -> Result<f64> {
         self.ask(command)?["secs"].as_f64().context("the reference gave no time")
     }
 

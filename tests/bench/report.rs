@@ -5,19 +5,19 @@ use orator_base::math::order;
 use orator_base::stage::progress::{Progress, Task};
 
 /// A measurement: as text for people and as one JSON object.
-pub struct Report {
-    pub text: String,
-    pub facts: serde_json::Value,
+pub(crate) struct Report {
+    pub(crate) text: String,
+    pub(crate) facts: serde_json::Value,
 }
 
 /// The median of the rounds: the larger one of the two in the middle; NaN of none.
-pub fn median(rounds: Vec<f64>) -> f64 {
+pub(crate) fn median(rounds: Vec<f64>) -> f64 {
     order::upper_median(rounds).unwrap_or(f64::NAN)
 }
 
 /// Progress bars on standard error, hidden where that is no terminal.
 #[derive(Default)]
-pub struct Bars(MultiProgress);
+pub(crate) struct Bars(MultiProgress);
 
 impl Progress for Bars {
     fn begin(&self, label: &str, total: u64) -> Box<dyn Task> {

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 
 /// How busy `orator run` keeps the processor: all stages for the videos of a project, into a work folder of its own.
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// The project's configuration.
     #[arg(short, long, default_value = "pipeline.toml", value_name = "FILE")]
     config: PathBuf,
@@ -20,7 +20,7 @@ pub struct Args {
     rounds: usize,
 }
 
-pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
+pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.rounds > 0, "nothing to measure: there must be a round");
     let config = config::load(&args.config, &[])?;
     let folder = config.file.parent().context("a configuration lies in a folder")?;
@@ -35,7 +35,7 @@ pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
         task.advance(1);
     }
     drop(task);
-    let n_cores = std::thread::available_parallelism().map_or(1, |n| n.get()) as f64;
+    let n_cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get) as f64;
     let of = |value: fn(&Child) -> f64| median(rounds.iter().map(value).collect());
     let (secs, used, busy) = (of(|c| c.secs), of(|c| c.cpu_secs / c.secs) / n_cores, of(|c| c.busy) / n_cores);
     let text = format!(

@@ -25,7 +25,7 @@ use std::path::{Path, PathBuf};
 /// for the hours, a video of every ten minutes, each with the records and files of `extract` and `pose2d`, whose arrays are
 /// those of a six-second clip with another sound. Each verb runs as a program of its own.
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// Hours of video, two numbers.
     #[arg(long, num_args = 2, default_values_t = [10, 100], value_name = "HOURS")]
     hours: Vec<usize>,
@@ -51,7 +51,7 @@ const VERBS: [(&str, &[&str]); 10] = [
     ("forget", &["forget", "--video", "talk-00000.mp4"]),
 ];
 
-pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
+pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     let (few, many) = (args.hours[0], args.hours[1]);
     ensure!(few > 0 && many > few, "--hours takes two numbers, the second one larger, not {few} and {many}");
     let root = std::path::absolute(args.dir.join(format!("bench-{}", std::process::id())))?;

@@ -17,7 +17,7 @@ use std::time::Instant;
 /// other ground truth in raw poses, in the fixed basis and in the trained embedding; and how long an hour takes. Without
 /// --dataset the motion is the synthetic speaker's.
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// Minutes of the synthetic speaker, half of them disturbed.
     #[arg(long, default_value_t = 20, value_name = "N")]
     minutes: usize,
@@ -29,7 +29,7 @@ pub struct Args {
     rounds: usize,
 }
 
-pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
+pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!((2..=600).contains(&args.minutes), "--minutes is {}, expected 2 to 600", args.minutes);
     ensure!(args.rounds > 0, "--rounds is 0, expected at least 1");
     let task = progress.begin("spaces", 0);

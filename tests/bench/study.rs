@@ -23,7 +23,7 @@ const FRAMES: usize = 5;
 /// Milliseconds of an answer while all participants answer at once, beside a bare route that writes the same row. Needs
 /// node and autocannon (`make loader`).
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// Participants at once, each with a connection.
     #[arg(long, default_value_t = 200, value_name = "N")]
     participants: usize,
@@ -41,7 +41,7 @@ pub struct Args {
 /// Median and 99 % quantile of the answers' times, milliseconds.
 type Quantiles = [f64; 2];
 
-pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
+pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.rounds > 0 && args.participants > 0 && args.answers > 1, "nothing to measure");
     let task = progress.begin("study", args.rounds as u64);
     let (mut bare, mut served) = (Vec::new(), Vec::new());

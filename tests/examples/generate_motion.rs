@@ -4,7 +4,7 @@
 //! cargo run --release --example generate_motion -- work/gan/host speech.wav gestures.bvh
 //! ```
 
-#![allow(clippy::print_stdout)]
+#![allow(clippy::print_stdout)] // a program
 
 use anyhow::{Result, bail};
 use orator::{
@@ -25,7 +25,7 @@ fn main() -> Result<()> {
 }
 
 /// Writes the motion of the checkpoint's speaker for a sound; gives a line on it.
-pub fn generate(checkpoint: &Path, speech: &Path, out: &Path) -> Result<String> {
+pub(crate) fn generate(checkpoint: &Path, speech: &Path, out: &Path) -> Result<String> {
     let format = ExportFormat::from_path(out)?;
     let generator = GestureGenerator::open(checkpoint)?;
     let sound = read_sound(speech)?;

@@ -4,7 +4,7 @@
 //! cargo run --release --example lift_keypoints -- work/pose2d/host/VIDEO/keypoints.npz lifted.bvh
 //! ```
 
-#![allow(clippy::print_stdout)]
+#![allow(clippy::print_stdout)] // a program
 
 use anyhow::{Result, bail};
 use orator::{AnimationOptions, ExportContent, ExportFormat, LiftConfig, Lifter, Silent, perform, read_keypoints};
@@ -18,7 +18,7 @@ fn main() -> Result<()> {
 }
 
 /// Lifts with the built-in weights; gives a line on what was lifted.
-pub fn lift(keypoints: &Path, out: &Path) -> Result<String> {
+pub(crate) fn lift(keypoints: &Path, out: &Path) -> Result<String> {
     let format = ExportFormat::from_path(out)?;
     let keypoints = read_keypoints(keypoints)?;
     let lifter = Lifter::new(&LiftConfig::default())?;

@@ -4,7 +4,7 @@
 //! cargo run --release --example read_dataset -- work/dataset/host
 //! ```
 
-#![allow(clippy::print_stdout)]
+#![allow(clippy::print_stdout)] // a program
 
 use anyhow::{Result, bail};
 use orator::{Dataset, Split};
@@ -18,7 +18,7 @@ fn main() -> Result<()> {
 }
 
 /// Lines on the splits of the dataset in `dir`.
-pub fn read(dir: &Path) -> Result<Vec<String>> {
+pub(crate) fn read(dir: &Path) -> Result<Vec<String>> {
     let dataset = Dataset::open(dir)?;
     let mut lines = Vec::new();
     for split in Split::ALL {

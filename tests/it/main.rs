@@ -6,7 +6,7 @@
 mod animate;
 /// The benchmark's own modules, so that its parts are tested without a release build.
 #[path = "../bench/mod.rs"]
-#[allow(dead_code)]
+#[allow(dead_code)] // what only the benchmark calls
 mod bench;
 mod cli;
 mod cluster;

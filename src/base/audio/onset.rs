@@ -190,7 +190,7 @@ mod tests {
     use super::*;
 
     /// Signal of the reference script: bursts of falling tones, 6 s.
-    pub fn bursts() -> Vec<f32> {
+    pub(super) fn bursts() -> Vec<f32> {
         let sample = |i: usize| {
             let t = i as f64 / f64::from(SAMPLE_RATE);
             let burst = |k: usize| {

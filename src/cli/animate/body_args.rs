@@ -6,7 +6,7 @@ use orator_avatar::animate::{AnimationOptions, Yaw};
 use orator_base::types::posture::Posture;
 
 #[derive(clap::Args)]
-pub struct BodyArgs {
+pub(super) struct BodyArgs {
     /// Leave the head at rest though the face is known.
     #[arg(long, conflicts_with = "keypoints")]
     neutral_head: bool,
@@ -36,16 +36,16 @@ enum LegsName {
 }
 
 impl BodyArgs {
-    pub fn yaw(&self) -> Yaw {
+    pub(super) fn yaw(&self) -> Yaw {
         if self.shoulder_yaw == ShoulderYaw::Removed { Yaw::Removed } else { Yaw::Spine }
     }
 
-    pub fn has_breath(&self) -> bool {
+    pub(super) fn has_breath(&self) -> bool {
         !self.no_breath
     }
 
     /// Options with the legs that were asked for, else those of the person seen.
-    pub fn of(&self, input: &InputMotion, options: &AnimationOptions) -> AnimationOptions {
+    pub(super) fn of(&self, input: &InputMotion, options: &AnimationOptions) -> AnimationOptions {
         let legs = match self.legs {
             Some(LegsName::Seated) => Legs::Seated,
             Some(LegsName::Standing) => Legs::Standing,
@@ -57,7 +57,7 @@ impl BodyArgs {
     }
 
     /// The posture as far as it is asked for.
-    pub fn posture(&self, posture: Option<Posture>) -> Option<Posture> {
+    pub(super) fn posture(&self, posture: Option<Posture>) -> Option<Posture> {
         let mut posture = posture?;
         if self.neutral_head {
             posture.head.fill(f32::NAN);

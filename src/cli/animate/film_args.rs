@@ -3,7 +3,7 @@
 use orator_avatar::animate::export::film_avatar::FilmCamera;
 
 #[derive(clap::Args)]
-pub struct FilmArgs {
+pub(super) struct FilmArgs {
     /// Removed: only its former default is accepted.
     #[arg(long = "style", hide = true, value_parser = former_style)]
     _style: Option<String>,
@@ -21,7 +21,7 @@ enum CameraName {
 }
 
 impl FilmArgs {
-    pub fn camera(&self) -> FilmCamera {
+    pub(super) fn camera(&self) -> FilmCamera {
         match self.camera {
             CameraName::Front | CameraName::Source => FilmCamera::Front,
             CameraName::ThreeQuarter => FilmCamera::ThreeQuarter,
@@ -29,12 +29,12 @@ impl FilmArgs {
     }
 
     /// Whether the avatar stands before the video.
-    pub fn is_over_video(&self) -> bool {
+    pub(super) fn is_over_video(&self) -> bool {
         self.camera == CameraName::Source
     }
 
     /// Whether a camera other than the default was named.
-    pub fn is_given(&self) -> bool {
+    pub(super) fn is_given(&self) -> bool {
         self.camera != CameraName::Front
     }
 }

@@ -3,7 +3,7 @@
 use orator_avatar::animate::performance::{AnimationReport, Jerk, SeenFrames};
 
 /// Lines on jerk, head, seen frames and clamped angles.
-pub fn text(report: &AnimationReport) -> String {
+pub(super) fn text(report: &AnimationReport) -> String {
     let number = |jerk: Option<f64>| jerk.map_or("-".to_owned(), |jerk| format!("{jerk:.0}"));
     let jerk = |jerk: Jerk| format!("{} -> {}", number(jerk.before), number(jerk.after));
     let mut text = format!("jerk, m/s3: arms {}, hands {}\n", jerk(report.arms), jerk(report.hands));

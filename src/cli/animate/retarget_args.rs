@@ -11,7 +11,7 @@ use orator_base::stage::workdir;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
-pub struct RetargetArgs {
+pub(super) struct RetargetArgs {
     /// Put the motion on the skeleton of this file: a .bvh is written as .bvh, a .glb as that file with an animation
     /// added. Its bones are found by their names and listed.
     #[arg(long, value_name = "RIG.glb|RIG.bvh", conflicts_with = "names")]
@@ -25,7 +25,7 @@ pub struct RetargetArgs {
 }
 
 /// A user's skeleton, opened.
-pub struct OpenedRig {
+pub(super) struct OpenedRig {
     rig: RetargetRig,
     /// Text of the map and where it is from; `None`: by names.
     map: Option<(String, PathBuf)>,
@@ -34,17 +34,17 @@ pub struct OpenedRig {
 
 impl RetargetArgs {
     /// Files that are read.
-    pub fn reads(&self) -> impl Iterator<Item = &Path> {
+    pub(super) fn reads(&self) -> impl Iterator<Item = &Path> {
         [&self.retarget, &self.bone_map].into_iter().flatten().map(PathBuf::as_path)
     }
 
     /// Files that are written beside the outputs.
-    pub fn writes(&self) -> Option<&Path> {
+    pub(super) fn writes(&self) -> Option<&Path> {
         self.write_bone_map.as_deref()
     }
 
     /// Opens the skeleton, if one is given.
-    pub fn open(&self) -> Result<Option<OpenedRig>> {
+    pub(super) fn open(&self) -> Result<Option<OpenedRig>> {
         let Some(path) = &self.retarget else { return Ok(None) };
         let rig = RetargetRig::open(path)?;
         let read = |path: &PathBuf| {
@@ -58,7 +58,7 @@ impl RetargetArgs {
 
 impl OpenedRig {
     /// Writes the performance on the skeleton; says which bones were found.
-    pub fn write(&self, performance: &Performance, outputs: &OutputFiles, ui: &Ui) -> Result<()> {
+    pub(super) fn write(&self, performance: &Performance, outputs: &OutputFiles, ui: &Ui) -> Result<()> {
         outputs.iter().try_for_each(|(path, _)| self.rig.check_output(path))?;
         let ours = &performance.rig.skeleton;
         let map = match &self.map {

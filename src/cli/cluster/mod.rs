@@ -1,6 +1,6 @@
 //! Many machines on one work folder: `plan`, `work`, `submit`, and `status --plan`.
 
-pub mod plan;
-pub mod progress;
-pub mod submit;
-pub mod work;
+pub(super) mod plan;
+pub(super) mod progress;
+pub(super) mod submit;
+pub(super) mod work;

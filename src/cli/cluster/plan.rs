@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 /// The stages are timed on excerpts of the videos, on this machine, which should be idle; the times are kept until
 /// program, settings, models or machine change. The plan is what `orator work` and `orator submit` go by.
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     #[command(flatten)]
     config: ConfigArgs,
     /// The plan; default: plan.json in the work folder.
@@ -43,7 +43,7 @@ pub struct Args {
 }
 
 /// Reads a plan and the pipeline it is of, and checks that they still belong together.
-pub fn open(path: &Path) -> Result<(ClusterPlan, Pipeline)> {
+pub(crate) fn open(path: &Path) -> Result<(ClusterPlan, Pipeline)> {
     let plan = ClusterPlan::read(path)?;
     let config = config::load(&plan.config, &plan.sets)?;
     let pipeline = Pipeline::open(config)?.with_processes(this_program());
@@ -51,7 +51,7 @@ pub fn open(path: &Path) -> Result<(ClusterPlan, Pipeline)> {
     Ok((plan, pipeline))
 }
 
-pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     if args.workers == Some(0) || args.hours.is_some_and(|hours| !hours.is_finite() || hours <= 0.0) {
         bail!("--workers takes a number from 1 on, --hours one above 0");
     }

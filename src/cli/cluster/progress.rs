@@ -10,7 +10,7 @@ use serde_json::json;
 use std::path::Path;
 
 /// Prints how far the workers of a plan are.
-pub fn run(path: &Path, ui: &Ui) -> Result<Outcome> {
+pub(crate) fn run(path: &Path, ui: &Ui) -> Result<Outcome> {
     let plan = ClusterPlan::read(path)?;
     let told = progress(&plan, path, DEAD_AFTER)?;
     let next = match told.n_done + told.n_failed == told.n_units {

@@ -16,7 +16,7 @@ use std::process::{Command, Stdio};
 
 /// Start workers on a cluster: write the jobs, and send them.
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     #[command(subcommand)]
     to: To,
 }
@@ -119,7 +119,7 @@ struct SshArgs {
     hosts: Vec<String>,
 }
 
-pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     match args.to {
         To::Slurm(args) => to_slurm(&args, ui),
         To::Kubernetes(args) => to_kubernetes(&args, ui),

@@ -17,7 +17,7 @@ use std::time::Duration;
 /// SIGTERM or Ctrl-C ends a worker after the unit at hand, a second one at once; the same command goes on from there.
 /// Exit code 2 says that some units failed.
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// The plan, of `orator plan`.
     #[arg(long, value_name = "FILE")]
     plan: PathBuf,
@@ -47,10 +47,10 @@ fn shard(text: &str) -> Result<(usize, usize), String> {
     shard.ok_or_else(|| "expected I/N with I from 0 to N - 1".to_owned())
 }
 
-pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let (plan, pipeline) = open(&args.plan)?;
     pipeline.check()?;
-    let cores = || std::thread::available_parallelism().map_or(1, |n| n.get());
+    let cores = || std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let secs = |secs: f64| Duration::try_from_secs_f64(secs.max(0.1)).unwrap_or(Duration::MAX);
     let options = WorkerOptions {
         jobs: if args.jobs == 0 { cores() } else { args.jobs },

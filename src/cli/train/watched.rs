@@ -14,13 +14,13 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Name that stands for all speakers of the configuration, unless one is called so.
-pub const ALL: &str = "all";
+pub(super) const ALL: &str = "all";
 /// Intervals on the page of a training, and how much of each is generated.
 const N_PAIRS: usize = 3;
 const PAIR_SECS: f64 = 8.0;
 
 /// Folders of a training as the command line has them.
-pub struct Places<'a> {
+pub(super) struct Places<'a> {
     pub config: &'a Config,
     pub speaker: Option<&'a String>,
     pub dataset: Option<&'a PathBuf>,
@@ -29,7 +29,7 @@ pub struct Places<'a> {
 
 impl Places<'_> {
     /// Opens the datasets of `speakers`, and says where what is learnt of all goes: `work/ROOM/all` unless told.
-    pub fn open_several(&self, room: &str, datasets: &[PathBuf]) -> Result<(Vec<Dataset>, PathBuf)> {
+    pub(super) fn open_several(&self, room: &str, datasets: &[PathBuf]) -> Result<(Vec<Dataset>, PathBuf)> {
         let work = &self.config.settings.work.dir;
         let folders: Vec<PathBuf> = match datasets {
             [] => self.config.settings.speaker.iter().map(|of| work.join("dataset").join(&of.name)).collect(),
@@ -42,7 +42,7 @@ impl Places<'_> {
 
     /// Opens the dataset, and says where what is learnt goes: `work/ROOM/SPEAKER` unless told. A dataset named without a
     /// speaker is of its own.
-    pub fn open(&self, room: &str) -> Result<(Dataset, PathBuf)> {
+    pub(super) fn open(&self, room: &str) -> Result<(Dataset, PathBuf)> {
         let work = &self.config.settings.work.dir;
         let named = match self.dataset {
             Some(_) => self.speaker.cloned(),
@@ -77,19 +77,19 @@ fn speaker(given: Option<&String>, config: &Config) -> Result<String> {
 }
 
 /// The page of a training. What hinders it is said, once on the way, and ends nothing.
-pub struct WatchedPage<'a> {
+pub(super) struct WatchedPage<'a> {
     page: LivePage<'a>,
     ui: &'a Ui,
     is_told: bool,
 }
 
 impl<'a> WatchedPage<'a> {
-    pub fn new(folder: &'a Path, speaker: String, poses: PosesOfBest<'a>, ui: &'a Ui) -> Self {
+    pub(super) fn new(folder: &'a Path, speaker: String, poses: PosesOfBest<'a>, ui: &'a Ui) -> Self {
         Self { page: LivePage::new(folder, speaker, poses), ui, is_told: false }
     }
 
     /// Writes the page behind a validation.
-    pub fn update(&mut self, at: ValidatedStep) {
+    pub(super) fn update(&mut self, at: ValidatedStep) {
         if let Err(error) = self.page.write(at)
             && !self.is_told
         {
@@ -99,7 +99,7 @@ impl<'a> WatchedPage<'a> {
     }
 
     /// Writes the page of a training that is done; `None`: it cannot be written.
-    pub fn finish(mut self, at: ValidatedStep) -> Option<PathBuf> {
+    pub(super) fn finish(mut self, at: ValidatedStep) -> Option<PathBuf> {
         let written = self.page.write(at).inspect_err(|error| {
             self.ui.say(&format!("no page of this training: {error:#}"));
         });
@@ -108,7 +108,7 @@ impl<'a> WatchedPage<'a> {
 }
 
 /// A few intervals that were not trained on; of the training split where there are no others.
-pub fn shown(dataset: &Dataset) -> Vec<SampleRef> {
+pub(super) fn shown(dataset: &Dataset) -> Vec<SampleRef> {
     let splits = [Split::Validation, Split::Train].map(|split| dataset.samples(split));
     let samples = splits.into_iter().find(|samples| !samples.is_empty()).unwrap_or_default();
     let n = samples.len().min(N_PAIRS);
@@ -116,7 +116,7 @@ pub fn shown(dataset: &Dataset) -> Vec<SampleRef> {
 }
 
 /// Frames in the middle of so many.
-pub fn middle(n_frames: usize, fps: FrameRate) -> Range<usize> {
+pub(super) fn middle(n_frames: usize, fps: FrameRate) -> Range<usize> {
     let span = ((PAIR_SECS * fps.per_sec()) as usize).min(n_frames);
     let first = (n_frames - span) / 2;
     first..first + span

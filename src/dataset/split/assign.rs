@@ -251,31 +251,31 @@ struct Fill {
 
 impl Fill {
     /// Empty splits for `total_secs` in all, with these shares for validation and test.
-    pub fn new(validation: f64, test: f64, total_secs: f64) -> Self {
+    pub(crate) fn new(validation: f64, test: f64, total_secs: f64) -> Self {
         let shares = [(Split::Train, 1.0 - validation - test), (Split::Validation, validation), (Split::Test, test)];
         let splits = shares.into_iter().filter(|(_, share)| *share > 0.0).map(|(split, share)| (split, share, 0.0));
         Self { splits: splits.collect(), total_secs }
     }
 
     /// Adds seconds to a split.
-    pub fn add(&mut self, split: Split, secs: f64) {
+    pub(crate) fn add(&mut self, split: Split, secs: f64) {
         self.splits.iter_mut().filter(|(other, ..)| *other == split).for_each(|(_, _, filled)| *filled += secs);
     }
 
     /// Splits with their shares.
-    pub fn shares(&self) -> Vec<(Split, f64)> {
+    pub(crate) fn shares(&self) -> Vec<(Split, f64)> {
         self.splits.iter().map(|(split, share, _)| (*split, *share)).collect()
     }
 
     /// Splits without a second, with their shares, the largest share first.
-    pub fn empty(&self) -> Vec<(Split, f64)> {
+    pub(crate) fn empty(&self) -> Vec<(Split, f64)> {
         let mut empty: Vec<_> = self.splits.iter().filter(|(.., filled)| *filled <= 0.0).collect();
         empty.sort_by(|a, b| b.1.total_cmp(&a.1));
         empty.into_iter().map(|(split, share, _)| (*split, *share)).collect()
     }
 
     /// Split that lacks most seconds. When only `n_left` videos are left for as many empty splits or more, an empty one.
-    pub fn lacking_most(&self, n_left: usize) -> Split {
+    pub(crate) fn lacking_most(&self, n_left: usize) -> Split {
         let empty = self.empty();
         let may = |split: Split| n_left > empty.len() || empty.iter().any(|(other, _)| *other == split);
         let lacking = |(_, share, filled): &(Split, f64, f64)| share * self.total_secs - filled;

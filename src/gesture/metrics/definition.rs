@@ -99,7 +99,7 @@ pub(crate) struct MetricFamily {
 }
 
 impl MetricFamily {
-    pub fn new(
+    pub(crate) fn new(
         definitions: Vec<Definition>,
         n_sums: usize,
         measure: impl Fn(&PairedFrames, &mut BlockSums) + Send + Sync + 'static,
@@ -109,7 +109,7 @@ impl MetricFamily {
     }
 
     /// One number: the first sum over the second.
-    pub fn mean(
+    pub(crate) fn mean(
         definition: Definition,
         measure: impl Fn(&PairedFrames, &mut BlockSums) + Send + Sync + 'static,
     ) -> Self {
@@ -117,7 +117,7 @@ impl MetricFamily {
     }
 
     /// A number of the prediction and that of the ground truth: the first two sums over the third.
-    pub fn mean_of_both(
+    pub(crate) fn mean_of_both(
         definitions: [Definition; 2],
         measure: impl Fn(&PairedFrames, &mut BlockSums) + Send + Sync + 'static,
     ) -> Self {

@@ -32,7 +32,7 @@ pub(crate) struct PairedFrames<'a> {
 }
 
 impl<'a> PairedFrames<'a> {
-    pub fn new(interval: &MotionPair<'a>) -> Self {
+    pub(crate) fn new(interval: &MotionPair<'a>) -> Self {
         let frames = |joints: &ArrayView3<f32>| {
             let n_joints = joints.shape()[1];
             let pose = |t: usize| {
@@ -56,17 +56,17 @@ impl<'a> PairedFrames<'a> {
         Self { interval: *interval, predicted, ground_truth, seen, fps: interval.fps.per_sec() }
     }
 
-    pub fn n_frames(&self) -> usize {
+    pub(crate) fn n_frames(&self) -> usize {
         self.seen.len()
     }
 
     /// Whether the joint is seen in all of `n` frames from `t` on; false where the interval ends.
-    pub fn sees(&self, t: usize, n: usize, joint: usize) -> bool {
+    pub(crate) fn sees(&self, t: usize, n: usize, joint: usize) -> bool {
         self.seen.get(t..t + n).is_some_and(|frames| frames.iter().all(|seen| seen[joint]))
     }
 
     /// By block the frames in which all of `joints` are seen.
-    pub fn whole_frames(&self, joints: &[usize], blocks: &BlockSums) -> Vec<Vec<usize>> {
+    pub(crate) fn whole_frames(&self, joints: &[usize], blocks: &BlockSums) -> Vec<Vec<usize>> {
         let mut frames = vec![Vec::new(); blocks.n()];
         for t in (0..self.n_frames()).filter(|t| joints.iter().all(|joint| self.seen[*t][*joint])) {
             frames[blocks.of(t)].push(t);
@@ -75,7 +75,7 @@ impl<'a> PairedFrames<'a> {
     }
 
     /// How many seen joints of the predicted motion are not finite in frame `t`.
-    pub fn n_broken(&self, t: usize) -> usize {
+    pub(crate) fn n_broken(&self, t: usize) -> usize {
         let joints = self.predicted[t].iter().zip(&self.seen[t]);
         joints.filter(|(p, seen)| **seen && p.iter().any(|v| !v.is_finite())).count()
     }

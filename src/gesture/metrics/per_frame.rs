@@ -32,22 +32,22 @@ pub(crate) fn windows<'a, 'b>(
 
 impl PointWindow<'_, '_> {
     /// Frames a second.
-    pub fn fps(&self) -> f64 {
+    pub(crate) fn fps(&self) -> f64 {
         self.pair.fps
     }
 
     /// Position of the predicted point in frame `k` of the window.
-    pub fn predicted(&self, k: usize) -> Vec3 {
+    pub(crate) fn predicted(&self, k: usize) -> Vec3 {
         self.at(&self.pair.predicted, k)
     }
 
     /// Where the real point is in frame `k` of the window.
-    pub fn ground_truth(&self, k: usize) -> Vec3 {
+    pub(crate) fn ground_truth(&self, k: usize) -> Vec3 {
         self.at(&self.pair.ground_truth, k)
     }
 
     /// Prediction minus ground truth.
-    pub fn apart(&self, k: usize) -> Vec3 {
+    pub(crate) fn apart(&self, k: usize) -> Vec3 {
         vec3::sub(self.predicted(k), self.ground_truth(k))
     }
 

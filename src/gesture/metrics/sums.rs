@@ -35,7 +35,7 @@ impl Default for CostlySums {
 }
 
 impl CostlySums {
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         match self {
             Self::Block(row) => row.len(),
             Self::Added(row) => row.len(),
@@ -43,7 +43,7 @@ impl CostlySums {
     }
 
     /// All numbers as f64.
-    pub fn row(&self) -> Vec<f64> {
+    pub(crate) fn row(&self) -> Vec<f64> {
         (0..self.len()).map(|i| self.at(i)).collect()
     }
 
@@ -80,27 +80,27 @@ fn add(own: &mut Vec<f64>, others: &[f64]) {
 
 impl BlockSums {
     /// `n` blocks of `width` numbers, all `start`, over an interval of `n_frames`.
-    pub fn new(n: usize, width: usize, n_frames: usize, start: f64) -> Self {
+    pub(crate) fn new(n: usize, width: usize, n_frames: usize, start: f64) -> Self {
         Self { n_frames, width, rows: vec![start; n * width] }
     }
 
     /// How many blocks.
-    pub fn n(&self) -> usize {
+    pub(crate) fn n(&self) -> usize {
         self.rows.len().checked_div(self.width).unwrap_or(0)
     }
 
     /// The block that frame `t` belongs to.
-    pub fn of(&self, t: usize) -> usize {
+    pub(crate) fn of(&self, t: usize) -> usize {
         (t * self.n() / self.n_frames.max(1)).min(self.n().saturating_sub(1))
     }
 
     /// The sums of the block of frame `t`.
-    pub fn at(&mut self, t: usize) -> &mut [f64] {
+    pub(crate) fn at(&mut self, t: usize) -> &mut [f64] {
         let block = self.of(t);
         self.row(block)
     }
 
-    pub fn row(&mut self, block: usize) -> &mut [f64] {
+    pub(crate) fn row(&mut self, block: usize) -> &mut [f64] {
         &mut self.rows[block * self.width..(block + 1) * self.width]
     }
 }

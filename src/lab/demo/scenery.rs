@@ -156,7 +156,7 @@ mod tests {
         let (floor, cube) = (floor(), cube([0.0, 20.0, 0.0], 10.0));
         let mut renderer = Renderer::new([200, 160]);
         let over = renderer.draw(&camera, &[&cube], &light, &background(&camera, &[&floor], &light, black()));
-        let on_floor = |x: f64| camera.pixel(camera.see([x, 0.0, 0.0])).map(|v| v.round());
+        let on_floor = |x: f64| camera.pixel(camera.see([x, 0.0, 0.0])).map(f64::round);
         for image in [&over, &background(&camera, &[&floor, &cube], &light, black()).image] {
             let at = |x: f64| image.pixel(on_floor(x)[0] as usize, on_floor(x)[1] as usize)[0];
             // The light comes from +x at 45 degrees: 20 cm up, the shadow falls 20 cm towards -x.

@@ -99,7 +99,7 @@ macro_rules! kernel {
             }
         }
 
-        #[allow(unreachable_patterns)]
+        #[allow(unreachable_patterns)] // `$vectors` may be 1 or 2
         pub(crate) unsafe fn $choose(job: &TileJob<$number>, n_rows: usize, n_vectors: usize) {
             // SAFETY: the caller's.
             unsafe {
@@ -116,21 +116,21 @@ macro_rules! kernel {
 
 /// Four numbers side by side, for processors this room has no own words for.
 mod any {
-    pub fn zero<T: Copy + Default>() -> [T; 4] {
+    pub(super) fn zero<T: Copy + Default>() -> [T; 4] {
         [T::default(); 4]
     }
 
-    pub unsafe fn load<T: Copy>(at: *const T) -> [T; 4] {
+    pub(super) unsafe fn load<T: Copy>(at: *const T) -> [T; 4] {
         // SAFETY: the caller's.
         unsafe { at.cast::<[T; 4]>().read_unaligned() }
     }
 
-    pub unsafe fn store<T: Copy>(at: *mut T, values: [T; 4]) {
+    pub(super) unsafe fn store<T: Copy>(at: *mut T, values: [T; 4]) {
         // SAFETY: the caller's.
         unsafe { at.cast::<[T; 4]>().write_unaligned(values) };
     }
 
-    pub fn spread<T: Copy>(value: T) -> [T; 4] {
+    pub(super) fn spread<T: Copy>(value: T) -> [T; 4] {
         [value; 4]
     }
 }

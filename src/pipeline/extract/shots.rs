@@ -193,7 +193,6 @@ fn tightest(windows: &[Transition]) -> Option<Transition> {
 }
 
 #[cfg(test)]
-#[allow(clippy::unnecessary_wraps)] // a frame may repeat the one before
 mod tests {
     use super::*;
     use crate::extract::thumbnail::{THUMBNAIL, scene};

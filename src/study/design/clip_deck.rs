@@ -6,7 +6,7 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
 /// Random numbers of one purpose: a change of one purpose leaves the others as they are.
-pub fn stream(seed: u64, purpose: &str) -> ChaCha8Rng {
+pub(super) fn stream(seed: u64, purpose: &str) -> ChaCha8Rng {
     ChaCha8Rng::from_seed(*blake3::hash(format!("{seed} {purpose}").as_bytes()).as_bytes())
 }
 
@@ -21,7 +21,7 @@ pub struct DealtClip {
 
 /// Deck that, however many are dealt, has dealt all clips equally often, to one; within each clip all comparisons, and
 /// within each of them all arrangements.
-pub struct ClipDeck {
+pub(super) struct ClipDeck {
     order: Vec<usize>,
     n_comparisons: usize,
     n_arrangements: usize,
@@ -32,14 +32,19 @@ pub struct ClipDeck {
 }
 
 impl ClipDeck {
-    pub fn new(n_clips: usize, [n_comparisons, n_arrangements]: [usize; 2], ahead: usize, rng: ChaCha8Rng) -> Self {
+    pub(super) fn new(
+        n_clips: usize,
+        [n_comparisons, n_arrangements]: [usize; 2],
+        ahead: usize,
+        rng: ChaCha8Rng,
+    ) -> Self {
         let (order, n_comparisons, n_arrangements) =
             ((0..n_clips).collect(), n_comparisons.max(1), n_arrangements.max(1));
         Self { order, n_comparisons, n_arrangements, ahead, n_dealt: 0, rng }
     }
 
     /// Clips for one session, none twice: `n` of them, at most as many as there are.
-    pub fn deal(&mut self, n: usize) -> Vec<DealtClip> {
+    pub(super) fn deal(&mut self, n: usize) -> Vec<DealtClip> {
         let mut hand: Vec<DealtClip> = Vec::new();
         let n_clips = self.order.len();
         let (n_comparisons, n_arrangements) = (self.n_comparisons, self.n_arrangements);

@@ -13,7 +13,7 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
 /// State of a design between sessions.
-pub struct Designer<'a> {
+pub(super) struct Designer<'a> {
     pub file: &'a StudyFile,
     /// By speaker.
     pub shared: Vec<SharedClips>,
@@ -33,7 +33,7 @@ type NamedClip = [String; 2];
 
 impl Designer<'_> {
     /// Session of that number; they are made in their order.
-    pub fn session(&mut self, session: usize) -> Result<PlannedSession> {
+    pub(super) fn session(&mut self, session: usize) -> Result<PlannedSession> {
         let order = match self.file.task_order {
             TaskOrder::Balanced => {
                 let row = self.task_rows.deal();
@@ -109,7 +109,7 @@ impl Designer<'_> {
     }
 
     /// Film with tones whose clip is in no trial but practice.
-    pub fn sound_check(&mut self) -> Result<String> {
+    pub(super) fn sound_check(&mut self) -> Result<String> {
         let clip = self.clip(0, self.shared.first().and_then(|shared| shared.practice.first()))?;
         let comparison = self.tasks.first().and_then(|task| task.comparisons.first());
         let condition = comparison.and_then(|comparison| comparison.first()).context("no task compares anything")?;
@@ -133,18 +133,18 @@ fn heard(task: &StudyTask) -> FilmSound {
 }
 
 /// Numbered films of one check clip: a participant who tells another the number tells it to few.
-pub const N_VARIANTS: usize = 4;
+pub(super) const N_VARIANTS: usize = 4;
 
 /// Before which main trials of a session checks come, ascending: spread over the session, none before the third trial, no
 /// two beside each other.
-pub fn places(n_main: usize, n_checks: usize, rng: &mut ChaCha8Rng) -> Vec<usize> {
+pub(super) fn places(n_main: usize, n_checks: usize, rng: &mut ChaCha8Rng) -> Vec<usize> {
     let n_checks = n_checks.min(n_main.saturating_sub(2));
     let border = |at: usize| 2 + (n_main - 2) * at / n_checks;
     (0..n_checks).map(|at| rng.random_range(border(at)..border(at + 1))).collect()
 }
 
 /// Different numbers of two digits, equally likely.
-pub fn numbers(rng: &mut ChaCha8Rng) -> Vec<u16> {
+pub(super) fn numbers(rng: &mut ChaCha8Rng) -> Vec<u16> {
     let mut all: Vec<u16> = (10..=99).collect();
     all.shuffle(rng);
     all.truncate(N_VARIANTS);

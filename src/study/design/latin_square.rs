@@ -4,7 +4,7 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
 /// Rows of a Latin square of `n` things, balanced for what comes before: `n` rows, twice as many for an odd `n`.
-pub fn williams(n: usize) -> Vec<Vec<usize>> {
+pub(super) fn williams(n: usize) -> Vec<Vec<usize>> {
     // 0, 1, n - 1, 2, n - 2, ...: neighbours differ by each number once.
     let first: Vec<usize> =
         (0..n).map(|place| if place % 2 == 1 { place / 2 + 1 } else { (n - place / 2) % n }).collect();

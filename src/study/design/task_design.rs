@@ -11,11 +11,11 @@ use std::collections::{BTreeMap, VecDeque};
 use std::fmt;
 
 /// Conditions of one trial.
-pub type ComparedConditions<'a> = Vec<&'a StudyCondition>;
+pub(super) type ComparedConditions<'a> = Vec<&'a StudyCondition>;
 
 /// Comparisons of a task, each of which takes an equal share of its trials. Where films are judged singly, the real
 /// condition is as frequent as all others together, so that chance is one half.
-pub fn comparisons<'a>(file: &'a StudyFile, task: &StudyTask) -> Vec<ComparedConditions<'a>> {
+pub(super) fn comparisons<'a>(file: &'a StudyFile, task: &StudyTask) -> Vec<ComparedConditions<'a>> {
     let all: ComparedConditions = task.conditions.iter().filter_map(|name| file.find_condition(name)).collect();
     let real = all.iter().copied().find(|condition| condition.real);
     let others = || all.iter().copied().filter(|condition| !condition.real);
@@ -126,7 +126,7 @@ impl<'a> TaskDesigner<'a> {
 }
 
 /// `n` clips of all speakers, as many of each; those too many go to other speakers in every session.
-pub fn deal(decks: &mut [ClipDeck], n: usize, session: usize) -> Vec<DealtTrial> {
+pub(super) fn deal(decks: &mut [ClipDeck], n: usize, session: usize) -> Vec<DealtTrial> {
     let n_speakers = decks.len().max(1);
     let (each, more) = (n / n_speakers, n % n_speakers);
     let n_of = |speaker: usize| each + usize::from((speaker + session * (n_speakers - more)) % n_speakers < more);

@@ -36,7 +36,7 @@ impl StudyPreset {
 }
 
 /// Lays `written` over `below`: tables key by key, lists of named tables by name, all else as a whole.
-pub fn lay<'t>(written: DeTable<'t>, below: &mut DeTable<'t>) {
+pub(super) fn lay<'t>(written: DeTable<'t>, below: &mut DeTable<'t>) {
     for (key, value) in written {
         let Some(under) = below.get_mut(key.get_ref().as_ref()) else {
             below.insert(key, value);
@@ -87,7 +87,7 @@ fn name_of<'v>(entry: &'v Spanned<DeValue<'_>>) -> Option<&'v str> {
 }
 
 /// Byte ranges of all that is written, by key: `clips.seconds`, `task[NAME].trials`, `hypothesis[0].kind`.
-pub fn spans(table: &DeTable<'_>) -> BTreeMap<String, Range<usize>> {
+pub(super) fn spans(table: &DeTable<'_>) -> BTreeMap<String, Range<usize>> {
     let mut found = BTreeMap::new();
     collect(table, "", &mut found);
     found

@@ -40,7 +40,7 @@ impl StudyFile {
 }
 
 /// Study file of a text, or all that is wrong with it.
-pub fn resolve(text: &str, file: &Path) -> Result<StudyFile, Vec<Problem>> {
+pub(super) fn resolve(text: &str, file: &Path) -> Result<StudyFile, Vec<Problem>> {
     let whole = |at: usize, message: String| {
         vec![Problem { key: String::new(), location: SourceLocation::Line(line_of(text, at)), message }]
     };

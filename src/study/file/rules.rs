@@ -8,7 +8,7 @@ use orator_dataset::config::file::nearest;
 use std::collections::BTreeSet;
 
 /// Keys of a file that break a rule, with what was expected and what to do.
-pub fn check(file: &StudyFile) -> Vec<(String, String)> {
+pub(super) fn check(file: &StudyFile) -> Vec<(String, String)> {
     let mut rules = StudyRules { file, broken: Vec::new() };
     rules.whole();
     rules.speakers();

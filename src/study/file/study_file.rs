@@ -253,7 +253,7 @@ impl StudyFile {
 }
 
 /// Drops tasks without trials, and fills in mismatched conditions, conditions of tasks and hypotheses where there are none.
-pub fn fill_in(file: &mut StudyFile) {
+pub(super) fn fill_in(file: &mut StudyFile) {
     let empty: Vec<String> = file.task.iter().filter(|task| task.trials == 0).map(|task| task.name.clone()).collect();
     file.task.retain(|task| task.trials > 0);
     file.hypothesis.retain(|hypothesis| !empty.contains(&hypothesis.task));

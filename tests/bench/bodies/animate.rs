@@ -18,7 +18,7 @@ use std::time::Instant;
 /// Joints to animation, on one core: smoothing, rotations and constraints, then the bytes of each kind of file, none of
 /// which is written. The motion is the synthetic speaker's, with missing hands.
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// Seconds of motion.
     #[arg(long, default_value_t = 300.0, value_name = "SECS")]
     secs: f64,
@@ -32,7 +32,7 @@ pub struct Args {
 
 const FPS: FrameRate = FrameRate::new(15, 1);
 
-pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
+pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.secs >= 1.0 && args.secs < 1e5, "--secs is {}, expected 1 to a hundred thousand", args.secs);
     ensure!(args.rounds > 0 && args.fps > 0, "nothing to measure: there must be rounds and frames a second");
     let mut dice = ChaCha8Rng::seed_from_u64(1337);

@@ -1,4 +1,4 @@
 //! Bodies: joints as animation files, and the avatar as pictures.
 
-pub mod animate;
-pub mod render;
+pub(crate) mod animate;
+pub(crate) mod render;

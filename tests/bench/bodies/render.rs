@@ -21,7 +21,7 @@ use std::time::Instant;
 /// Avatar to pictures of 1280 x 720 px, on one core: posing and drawing, with shadows; beside it the background of a desk
 /// and a wall, once. Then a whole film, as `orator animate` makes it, and the encoder alone on the same pictures.
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// Frames of a round.
     #[arg(long, default_value_t = 150, value_name = "N")]
     frames: usize,
@@ -36,7 +36,7 @@ const N_KEPT: usize = 30;
 /// Real time: frames a second.
 const FPS: FrameRate = FrameRate::new(30, 1);
 
-pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
+pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.rounds > 0 && args.frames > 0, "nothing to measure: there must be rounds and frames");
     let mut dice = ChaCha8Rng::seed_from_u64(1337);
     let secs = FPS.secs(args.frames);

@@ -23,7 +23,7 @@ use std::time::Instant;
 /// Training of the temporal lifter on one thread: seconds a step and, with `--python`, against PyTorch. Both train the
 /// same network on the same batch: forward, backward, clipping, Adam with AMSGrad.
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// Channels of the network.
     #[arg(long, default_value_t = 256, value_name = "N")]
     channels: usize,
@@ -152,7 +152,7 @@ impl TrainingTask for Fixed {
     }
 }
 
-pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
+pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(
         args.rounds > 0 && args.steps > 0 && args.batch > 1 && args.channels > 0,
         "nothing to measure: there must be rounds, steps, channels, and two windows a batch at least"

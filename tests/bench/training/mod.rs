@@ -1,5 +1,5 @@
 //! Speed of training steps.
 
-pub mod lifter;
-pub mod seq2seq;
-pub mod train;
+pub(crate) mod lifter;
+pub(crate) mod seq2seq;
+pub(crate) mod train;

@@ -35,7 +35,7 @@ const SEGMENTS: usize = 20;
 
 /// A training step of a sequence-to-sequence network, and generation with it.
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// The contextual network instead of that of words.
     #[arg(long)]
     contextual: bool,
@@ -155,7 +155,7 @@ impl Fixed {
     }
 }
 
-pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
+pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.rounds > 0 && args.steps > 0 && args.batch > 1, "rounds, steps and two segments a batch at least");
     let n_threads = rayon::current_num_threads();
     let mut ours = Fixed::new(args)?;

@@ -38,7 +38,7 @@ const EVERY: usize = 97;
 /// PyTorch. Both train the same networks on the same batch: forward kinematics of the bones, L1 over the joints that
 /// are not missing, the least-squares adversarial loss, clipping of the gradient, Adam.
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// The network: `light` or `paper`.
     #[arg(long, default_value = "light", value_name = "NAME")]
     preset: String,
@@ -169,7 +169,7 @@ impl Fixed {
     }
 }
 
-pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
+pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(
         args.rounds > 0 && args.steps > 0 && args.batch > 1,
         "nothing to measure: there must be rounds, steps and two windows a batch at least"

@@ -1,11 +1,11 @@
 //! Rotations and animation files.
 
-pub mod animate;
-pub mod animate_verb;
-pub mod bvh;
-pub mod captured;
-pub mod film;
-pub mod gltf;
-pub mod motion_files;
-pub mod posture;
-pub mod rates;
+pub(crate) mod animate;
+pub(crate) mod animate_verb;
+pub(crate) mod bvh;
+pub(crate) mod captured;
+pub(crate) mod film;
+pub(crate) mod gltf;
+pub(crate) mod motion_files;
+pub(crate) mod posture;
+pub(crate) mod rates;

@@ -1,18 +1,17 @@
 //! The examples, run as functions on small made-up files.
 
+#![allow(dead_code)] // their `main`
+
 use crate::fixtures::untrained::write_untrained_speaker;
 use crate::fixtures::{clips, footage, gesture_dataset};
 use orator_base::stage::Unit;
 use orator_base::stage::artifacts::Artifact;
 use orator_formats::wav;
 
-#[allow(dead_code)]
 #[path = "../../examples/generate_motion.rs"]
 mod generate_motion;
-#[allow(dead_code)]
 #[path = "../../examples/lift_keypoints.rs"]
 mod lift_keypoints;
-#[allow(dead_code)]
 #[path = "../../examples/read_dataset.rs"]
 mod read_dataset;
 

@@ -1,10 +1,10 @@
 //! Verbs of the program.
 
-pub mod bench;
-pub mod completions;
-pub mod container;
-pub mod error_texts;
-pub mod examples;
-pub mod guide;
-pub mod library;
-pub mod models_verb;
+pub(crate) mod bench;
+pub(crate) mod completions;
+pub(crate) mod container;
+pub(crate) mod error_texts;
+pub(crate) mod examples;
+pub(crate) mod guide;
+pub(crate) mod library;
+pub(crate) mod models_verb;

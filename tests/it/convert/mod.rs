@@ -1,7 +1,7 @@
 //! Published models of other formats to ONNX: each layer kind against plain arithmetic, real files, damaged files.
 
-pub mod damaged;
-pub mod ncnn;
-pub mod published;
-pub mod tfjs;
-pub mod tflite;
+pub(crate) mod damaged;
+pub(crate) mod ncnn;
+pub(crate) mod published;
+pub(crate) mod tfjs;
+pub(crate) mod tflite;

@@ -1,15 +1,15 @@
 //! The dataset: written, read, verified, imported, forgotten.
 
-pub mod dataset;
-pub mod dataset_verify;
-pub mod forget;
-pub mod import;
-pub mod import_readers;
-pub mod people;
-pub mod posture;
-pub mod shard;
-pub mod shared_sound;
-pub mod sound_offset;
-pub mod splits;
-pub mod splits_by_time;
-pub mod words;
+pub(crate) mod dataset;
+pub(crate) mod dataset_verify;
+pub(crate) mod forget;
+pub(crate) mod import;
+pub(crate) mod import_readers;
+pub(crate) mod people;
+pub(crate) mod posture;
+pub(crate) mod shard;
+pub(crate) mod shared_sound;
+pub(crate) mod sound_offset;
+pub(crate) mod splits;
+pub(crate) mod splits_by_time;
+pub(crate) mod words;

@@ -1,9 +1,9 @@
 //! Metrics and evaluation.
 
-pub mod calibration;
-pub mod evaluate_checkpoints;
-pub mod evaluate_files;
-pub mod evaluate_speaker;
-pub mod frechet_response;
-pub mod golden_metrics;
-pub mod metrics;
+pub(crate) mod calibration;
+pub(crate) mod evaluate_checkpoints;
+pub(crate) mod evaluate_files;
+pub(crate) mod evaluate_speaker;
+pub(crate) mod frechet_response;
+pub(crate) mod golden_metrics;
+pub(crate) mod metrics;

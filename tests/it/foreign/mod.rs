@@ -1,9 +1,9 @@
 //! Our files opened by programs that others wrote.
 
-pub mod aligned_words;
-pub mod blender;
-pub mod dataset_readers;
-pub mod fbx;
-pub mod retargeted;
-pub mod training_readers;
-pub mod vrm;
+pub(crate) mod aligned_words;
+pub(crate) mod blender;
+pub(crate) mod dataset_readers;
+pub(crate) mod fbx;
+pub(crate) mod retargeted;
+pub(crate) mod training_readers;
+pub(crate) mod vrm;

@@ -2,11 +2,11 @@
 //! long time, no memory out of proportion (`fixtures::fuzzing`). BOLERO_RANDOM_ITERATIONS is the number of
 //! executions of each, BOLERO_RANDOM_SEED repeats one.
 
-pub mod arrays;
-pub mod corpus;
-pub mod dataset;
-pub mod media;
-pub mod models;
-pub mod motion;
-pub mod texts;
-pub mod weights;
+pub(crate) mod arrays;
+pub(crate) mod corpus;
+pub(crate) mod dataset;
+pub(crate) mod media;
+pub(crate) mod models;
+pub(crate) mod motion;
+pub(crate) mod texts;
+pub(crate) mod weights;

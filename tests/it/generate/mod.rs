@@ -1,7 +1,7 @@
 //! Speech to motion.
 
-pub mod generate;
-pub mod generate_batch;
-pub mod generate_sequence;
-pub mod generate_sounds;
-pub mod takes;
+pub(crate) mod generate;
+pub(crate) mod generate_batch;
+pub(crate) mod generate_sequence;
+pub(crate) mod generate_sounds;
+pub(crate) mod takes;

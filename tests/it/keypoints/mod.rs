@@ -1,5 +1,5 @@
 //! Keypoints of other programs: their formats, what is wrong with them, their road to a dataset.
 
-pub mod bad_input;
-pub mod formats;
-pub mod road;
+pub(crate) mod bad_input;
+pub(crate) mod formats;
+pub(crate) mod road;

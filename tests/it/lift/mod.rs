@@ -1,8 +1,8 @@
 //! 2D to 3D.
 
-pub mod lift;
-pub mod lift_bad_input;
-pub mod lift_camera;
-pub mod lift_joints;
-pub mod lift_outliers;
-pub mod lift_units;
+pub(crate) mod lift;
+pub(crate) mod lift_bad_input;
+pub(crate) mod lift_camera;
+pub(crate) mod lift_joints;
+pub(crate) mod lift_outliers;
+pub(crate) mod lift_units;

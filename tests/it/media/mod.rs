@@ -1,9 +1,9 @@
 //! Sound and pictures of a file, in step; shots.
 
-pub mod extract;
-pub mod media_frames;
-pub mod media_sound;
-pub mod pictures;
-pub mod shots;
-pub mod sync;
-pub mod tracks;
+pub(crate) mod extract;
+pub(crate) mod media_frames;
+pub(crate) mod media_sound;
+pub(crate) mod pictures;
+pub(crate) mod shots;
+pub(crate) mod sync;
+pub(crate) mod tracks;

@@ -1,11 +1,11 @@
 //! Numbers held to independent references: golden values from committed scripts, and real clips.
 
-pub mod face_parity;
-pub mod generator_parity;
-pub mod golden;
-pub mod heatmap_parity;
-pub mod lifter_parity;
-pub mod packages;
-pub mod pose_parity;
-pub mod real;
-pub mod seq2seq_parity;
+pub(crate) mod face_parity;
+pub(crate) mod generator_parity;
+pub(crate) mod golden;
+pub(crate) mod heatmap_parity;
+pub(crate) mod lifter_parity;
+pub(crate) mod packages;
+pub(crate) mod pose_parity;
+pub(crate) mod real;
+pub(crate) mod seq2seq_parity;

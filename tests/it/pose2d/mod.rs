@@ -1,4 +1,4 @@
 //! The chain of 2D models.
 
-pub mod pose_chain;
-pub mod real_life;
+pub(crate) mod pose_chain;
+pub(crate) mod real_life;

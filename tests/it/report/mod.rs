@@ -1,6 +1,6 @@
 //! Pages for people.
 
-pub mod evaluate_page;
-pub mod report;
-pub mod sheet;
-pub mod sliders;
+pub(crate) mod evaluate_page;
+pub(crate) mod report;
+pub(crate) mod sheet;
+pub(crate) mod sliders;

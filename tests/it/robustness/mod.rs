@@ -1,15 +1,15 @@
 //! Kills, memory, bad and hostile input, lost output, privacy, programs side by side, the processes in which videos are
 //! read.
 
-pub mod bad_input;
-pub mod earlier_versions;
-pub mod faults;
-pub mod hostile_files;
-pub mod kill;
-pub mod memory;
-pub mod output;
-pub mod parts;
-pub mod privacy;
-pub mod runner;
-pub mod sandbox;
-pub mod side_by_side;
+pub(crate) mod bad_input;
+pub(crate) mod earlier_versions;
+pub(crate) mod faults;
+pub(crate) mod hostile_files;
+pub(crate) mod kill;
+pub(crate) mod memory;
+pub(crate) mod output;
+pub(crate) mod parts;
+pub(crate) mod privacy;
+pub(crate) mod runner;
+pub(crate) mod sandbox;
+pub(crate) mod side_by_side;

@@ -1,7 +1,7 @@
 //! What is kept and what is refused.
 
-pub mod redecide;
-pub mod rendered_voices;
-pub mod segment;
-pub mod speech;
-pub mod voices;
+pub(crate) mod redecide;
+pub(crate) mod rendered_voices;
+pub(crate) mod segment;
+pub(crate) mod speech;
+pub(crate) mod voices;

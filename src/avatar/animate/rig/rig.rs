@@ -212,7 +212,7 @@ pub(crate) mod tests {
     use super::*;
 
     /// Rig of the default bones.
-    pub fn default_rig() -> Rig {
+    pub(crate) fn default_rig() -> Rig {
         let unseen = ndarray::Array3::from_elem((1, N_JOINTS, 3), f32::NAN);
         Rig::from_motion(&Motion::from_joints(orator_base::types::time::FrameRate::new(15, 1), unseen))
     }

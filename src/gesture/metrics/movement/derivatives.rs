@@ -16,7 +16,7 @@ pub(crate) enum DerivativeOrder {
 }
 
 impl DerivativeOrder {
-    pub const ALL: [Self; 3] = [Self::Speed, Self::Acceleration, Self::Jerk];
+    pub(crate) const ALL: [Self; 3] = [Self::Speed, Self::Acceleration, Self::Jerk];
 
     /// Weights of the frames, first to last.
     const fn weights(self) -> &'static [f64] {

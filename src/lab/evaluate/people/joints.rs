@@ -76,7 +76,7 @@ pub fn measure(lifter: &Lifter, clips: &[&RenderedClip]) -> Result<(Vec<Motion>,
         }
         motions.push(found);
     }
-    let [lifted, of_true_keypoints, mean_pose] = sums.map(|sum| sum.mean());
+    let [lifted, of_true_keypoints, mean_pose] = sums.map(ErrorSums::mean);
     Ok((motions, LiftedErrors { lifted, of_true_keypoints, mean_pose }))
 }
 

@@ -222,7 +222,6 @@ fn shoulder_px(body: &[ScoredPoint; 17]) -> f64 {
 }
 
 #[cfg(test)]
-#[allow(clippy::unnecessary_wraps)] // a hand may be missing
 mod tests {
     use super::*;
 

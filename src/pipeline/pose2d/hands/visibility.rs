@@ -113,7 +113,6 @@ pub fn distance(a: ScoredPoint, b: ScoredPoint) -> f64 {
 }
 
 #[cfg(test)]
-#[allow(clippy::unnecessary_wraps)] // a hand may be missing
 mod tests {
     use super::*;
 

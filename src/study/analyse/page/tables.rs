@@ -11,7 +11,7 @@ use orator_report::html::{Node, node, table};
 const COLUMNS: [&str; 6] = ["Method", "Interval", "Statistic", "p", "p after Holm", "Mark"];
 
 /// Table of a task's figures, grouped by the number that they are about.
-pub fn task(task: &TaskAnalysis) -> Vec<Node> {
+pub(super) fn task(task: &TaskAnalysis) -> Vec<Node> {
     let mut rows = Vec::new();
     for share in &task.shares {
         rows.push(group(&share_title(share)));
@@ -134,7 +134,7 @@ fn figure_row(origin: FigureOrigin, interval: Option<String>, test: Option<&Test
 }
 
 /// Registered hypotheses with their outcomes.
-pub fn hypotheses(analysis: &StudyAnalysis) -> Vec<Node> {
+pub(super) fn hypotheses(analysis: &StudyAnalysis) -> Vec<Node> {
     let rows = analysis.hypotheses.iter().flat_map(|hypothesis| {
         let title = group(&format!("{}: {} ({}).", hypothesis.task, hypothesis.claim, hypothesis.statistic));
         let rows = hypothesis.claims.iter().map(|claim| {
@@ -152,7 +152,7 @@ pub fn hypotheses(analysis: &StudyAnalysis) -> Vec<Node> {
 }
 
 /// Rules with what each leaves out by itself, and rows that are no votes.
-pub fn exclusions(analysis: &StudyAnalysis) -> Vec<Node> {
+pub(super) fn exclusions(analysis: &StudyAnalysis) -> Vec<Node> {
     let account = &analysis.exclusions;
     let number = |n: usize| node("td").class("num").text(count(n));
     let cells = |name: &str, participants: usize, votes: usize, said: &str| {

@@ -49,7 +49,7 @@ pub(in super::super) struct CrossedVariance {
 }
 
 impl CrossedVariance {
-    pub fn total(&self) -> f64 {
+    pub(crate) fn total(&self) -> f64 {
         self.parts.iter().sum()
     }
 
@@ -69,7 +69,7 @@ impl CrossedVariance {
 }
 
 impl Contrast {
-    pub fn value(&self, scores: &[f64]) -> f64 {
+    pub(crate) fn value(&self, scores: &[f64]) -> f64 {
         self.0.iter().map(|(cell, weight)| weight * mean(&scores[cell.clone()])).sum()
     }
 
@@ -77,7 +77,7 @@ impl Contrast {
     /// mean product of votes that share nothing: without bias where the design is balanced, and then those of the
     /// analysis of variance. Their sum is the two-way clustered variance of Cameron, Gelbach and Miller 2011 but for its
     /// divisor. 0 where no two votes share nothing.
-    pub fn variance(&self, groups: &VoteGroups, scores: &[f64]) -> CrossedVariance {
+    pub(crate) fn variance(&self, groups: &VoteGroups, scores: &[f64]) -> CrossedVariance {
         let sums: Vec<[Vec<(f64, f64)>; 3]> = self.0.iter().map(|(cell, _)| group_sums(cell, groups, scores)).collect();
         let mut parts = [0.0; 3];
         for (a, (cell_a, weight_a)) in sums.iter().zip(&self.0) {

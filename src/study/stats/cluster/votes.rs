@@ -31,7 +31,7 @@ pub(in super::super) struct VoteGroups {
 
 impl VoteGroups {
     /// Refuses cells without votes and scores that are not finite.
-    pub fn new(cells: &[&[ClipVote]]) -> Result<Self, StatisticsError> {
+    pub(crate) fn new(cells: &[&[ClipVote]]) -> Result<Self, StatisticsError> {
         for votes in cells {
             at_least("votes", 1, votes.len())?;
             votes.iter().try_for_each(|vote| finite("scores", &[vote.score]))?;

@@ -33,7 +33,7 @@ struct Curvature {
 }
 
 impl Laplace {
-    pub fn new(groups: &VoteGroups, successes: &[f64]) -> Self {
+    pub(super) fn new(groups: &VoteGroups, successes: &[f64]) -> Self {
         let clips_are_many = groups.n[CLIP] > groups.n[PARTICIPANT];
         let (many, few) = if clips_are_many { (CLIP, PARTICIPANT) } else { (PARTICIPANT, CLIP) };
         let mut order: Vec<usize> = (0..successes.len()).collect();
@@ -55,7 +55,7 @@ impl Laplace {
 
     /// Negative log-likelihood for the fixed part `fixed` of all log odds and the standard deviations of participants and
     /// clips. Even in both deviations.
-    pub fn negative_log_likelihood(&mut self, fixed: f64, [participants, clips]: [f64; 2]) -> f64 {
+    pub(super) fn negative_log_likelihood(&mut self, fixed: f64, [participants, clips]: [f64; 2]) -> f64 {
         let sds = if self.clips_are_many { [clips, participants] } else { [participants, clips] };
         let mut value = self.penalised(&self.intercepts, fixed, sds);
         if !value.is_finite() {
