@@ -1,6 +1,5 @@
 //! Many machines on one work folder: `plan`, `work`, `submit`, and `status --plan`.
 
 pub mod plan;
-pub mod progress;
 pub mod submit;
 pub mod work;

@@ -26,18 +26,6 @@ pub enum Preset {
     Paper,
 }
 
-impl std::str::FromStr for Preset {
-    type Err = anyhow::Error;
-
-    fn from_str(name: &str) -> anyhow::Result<Self> {
-        match name {
-            "light" => Ok(Preset::Light),
-            "paper" => Ok(Preset::Paper),
-            _ => anyhow::bail!("the network preset is `light` or `paper`, not `{name}`"),
-        }
-    }
-}
-
 /// The network's shape.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Config {
