@@ -30,7 +30,7 @@
 //! Data flow. A frame: `media::ffmpeg` -> `media::opencv` (crop, warp) -> `onnx` -> `pipeline::pose2d` (decode, track) ->
 //! *keypoints* -> `pipeline::segment` -> `pipeline::lift` -> *joints* -> `dataset::write` -> *shard* -> `dataset::read` ->
 //! `gesture::train`. A sample of sound: `media::ffmpeg` -> *audio file* -> `dataset::write` -> *shard* -> `dataset::read`
-//! -> `base::audio::mel` -> `nn::gan`. Sound and frames meet by time in seconds (`base::types::sync`).
+//! -> `base::audio::mel` -> `nn::gan`. Sound and frames meet by time in seconds (`base::types::sound`).
 //!
 //! Invariants: the same input, configuration and seed give the same bytes, whatever the number of workers. Writes are
 //! atomic: attempt file, fsync, rename (`base::stage::workdir`), record last. Readers of a dataset or a model hold its

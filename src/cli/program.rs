@@ -7,7 +7,7 @@ use super::dataset::{align, forget, import, verify as dataset};
 use super::motion::{lift, sheet};
 use super::moved::MovedVerb;
 use super::pipeline::{init, report, run, status};
-use super::setup::{completions, doctor, guide, models, words};
+use super::setup::{completions, doctor, models, words};
 use super::signals;
 use super::ui::Ui;
 use super::{animate, evaluate, generate, study, train, ui};
@@ -64,7 +64,7 @@ enum Verb {
     Generate(generate::Args),
     Animate(animate::Args),
     Study(study::Args),
-    Guide(guide::Args),
+    Guide(completions::GuideArgs),
     Completions(completions::Args),
     Man(completions::ManArgs),
     #[command(hide = true)]
@@ -105,7 +105,7 @@ fn run(cli: Cli, ui: &Ui) -> Result<Outcome> {
         Verb::Generate(args) => generate::run(args, ui),
         Verb::Animate(args) => animate::run(args, ui),
         Verb::Study(args) => study::run(args, ui),
-        Verb::Guide(args) => guide::run(&args, ui),
+        Verb::Guide(args) => completions::run_guide(&args, ui),
         Verb::Completions(args) => completions::run(&args, Cli::command(), ui),
         Verb::Man(args) => completions::run_man(&args, Cli::command(), ui),
         Verb::Demo(args) => args.refuse("demo"),

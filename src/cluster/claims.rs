@@ -44,9 +44,6 @@ impl Claim {
     }
 
     /// The worker that made it; `None`: it is not visible yet.
-    ///
-    /// # Errors
-    /// A file that cannot be read.
     pub fn read_owner(self, folder: &impl SharedFolder) -> Result<Option<String>> {
         let bytes = folder.read(&self.file("claim"))?;
         let claim: Option<ClaimFile> = bytes.and_then(|bytes| serde_json::from_slice(&bytes).ok());
@@ -54,9 +51,6 @@ impl Claim {
     }
 
     /// How the unit ended under it; `None`: it has not, as far as is visible.
-    ///
-    /// # Errors
-    /// A file that cannot be read.
     pub fn read_end(self, folder: &impl SharedFolder) -> Result<Option<UnitEnd>> {
         let bytes = folder.read(&self.file("end"))?;
         Ok(bytes.and_then(|bytes| serde_json::from_slice(&bytes).ok()))
@@ -115,9 +109,6 @@ fn update(states: &mut [ClaimState], folder: &impl SharedFolder, number: usize) 
 }
 
 /// States of the `n_units` units of a plan.
-///
-/// # Errors
-/// A folder that cannot be listed.
 pub fn read_states(folder: &impl SharedFolder, n_units: usize) -> Result<Vec<ClaimState>> {
     let mut states = vec![ClaimState::default(); n_units];
     (0..n_units.div_ceil(PER_FOLDER)).try_for_each(|number| update(&mut states, folder, number))?;
@@ -188,9 +179,6 @@ impl<'a, F: SharedFolder> Claims<'a, F> {
     }
 
     /// Claims the next unit; `now` is a time of this worker's own clock.
-    ///
-    /// # Errors
-    /// A folder that cannot be read or written.
     pub fn next(&mut self, now: Duration) -> Result<NextUnit> {
         if let Some(claim) = self.claimed_next(now)? {
             self.waited = Duration::ZERO;

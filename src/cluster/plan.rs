@@ -187,17 +187,10 @@ impl ClusterPlan {
         let bytes = std::fs::read(path)
             .with_context(|| format!("cannot read the plan {}; `orator plan` writes one", path.display()))?;
         let plan: Self = serde_json::from_slice(&bytes).with_context(|| format!("{} is no plan", path.display()))?;
-        ensure!(
-            plan.version == VERSION,
-            "{} is a plan of version {}, expected {VERSION}: write it anew with `orator plan`",
-            path.display(),
-            plan.version
-        );
-        ensure!(
-            plan.seal == plan.sealed()?,
-            "{} was changed since `orator plan` wrote it: write it anew",
-            path.display()
-        );
+        let (path, version) = (path.display(), plan.version);
+        let anew = "write it anew with `orator plan`";
+        ensure!(version == VERSION, "{path} is a plan of version {version}, expected {VERSION}: {anew}");
+        ensure!(plan.seal == plan.sealed()?, "{path} was changed since `orator plan` wrote it: write it anew");
         Ok(plan)
     }
 

@@ -48,9 +48,6 @@ pub struct WorkerProgress {
 }
 
 /// Reads how far the plan at `path` is. A worker that was silent for `dead_after` is dead.
-///
-/// # Errors
-/// A folder that cannot be read.
 pub fn progress(plan: &ClusterPlan, path: &Path, dead_after: Duration) -> Result<PlanProgress> {
     let folder = DiskFolder(plan.folder(path));
     let workers = workers(&folder, dead_after)?;

@@ -1,5 +1,5 @@
-//! How long the stages take on a machine, from times of excerpts, and what that means for whole videos and several workers:
-//! a simulation of the order in which the runner gives out work.
+//! How long the stages take on a machine, from times of excerpts, and what that means for complete videos and several
+//! workers, by the bound of list scheduling.
 
 use anyhow::Result;
 use orator_base::stage::artifacts::StageName;
@@ -79,9 +79,6 @@ impl StageTimes {
     }
 
     /// Keeps the times in a work folder.
-    ///
-    /// # Errors
-    /// The file cannot be written.
     pub fn write(&self, work: &Path) -> Result<()> {
         let mut bytes = serde_json::to_vec_pretty(self)?;
         bytes.push(b'\n');
@@ -105,30 +102,22 @@ impl StageTimes {
 
     /// Seconds until `workers` have worked on videos of these lengths.
     pub fn wall_secs(&self, lengths: &[f64], workers: usize) -> f64 {
-        wall_secs(&self.video_work(lengths), workers)
+        self.workload(lengths).wall_secs(workers)
     }
 
-    /// The work on videos of these lengths in the order of a run, the longest first.
-    fn video_work(&self, lengths: &[f64]) -> Vec<VideoWork> {
-        let mut lengths = lengths.to_vec();
-        lengths.sort_by(|a, b| b.total_cmp(a));
-        lengths.into_iter().map(|length| self.work(length)).collect()
-    }
-
-    /// The work on a video, with the spans of the stage that has parts.
-    fn work(&self, length_secs: f64) -> VideoWork {
-        let secs = |stages: &[StageName]| stages.iter().map(|stage| self.cost(*stage).secs(length_secs)).sum();
-        let n_spans = spans::count(length_secs);
-        let stages = StageName::OF_VIDEOS;
-        match stages.iter().position(|stage| *stage == StageName::Pose2d).filter(|_| n_spans > 1) {
-            None => VideoWork { before: self.video_secs(length_secs), span: 0.0, n_spans: 0, after: 0.0 },
-            Some(parted) => VideoWork {
-                before: secs(&stages[..parted]),
-                span: self.cost(StageName::Pose2d).secs(length_secs / n_spans as f64),
-                n_spans,
-                after: secs(&stages[parted + 1..]),
-            },
-        }
+    fn workload(&self, lengths: &[f64]) -> Workload {
+        let pose2d = self.cost(StageName::Pose2d);
+        lengths.iter().fold(Workload::default(), |sum, length| {
+            // Workers share the spans of one stage; the other stages of a video run one after the other.
+            let n_spans = spans::count(*length);
+            let (others, span) =
+                (self.video_secs(*length) - pose2d.secs(*length), pose2d.secs(length / n_spans as f64));
+            Workload {
+                total: sum.total + others + n_spans as f64 * span,
+                longest: sum.longest.max(others + span),
+                n_pieces: sum.n_pieces + n_spans,
+            }
+        })
     }
 
     /// Hours after which a worker of so many may be ended: twice what the work takes, since machines differ, and half an
@@ -140,82 +129,29 @@ impl StageTimes {
     /// The fewest workers that are done with videos of these lengths within so many seconds; none: the longest video with a
     /// worker for each of its spans takes longer.
     pub fn workers_within(&self, lengths: &[f64], secs: f64) -> Option<usize> {
-        let videos = self.video_work(lengths);
-        let most: usize = videos.iter().map(|video| video.n_spans.max(1)).sum();
-        let least = (wall_secs(&videos, 1) / secs).floor().max(1.0) as usize;
-        (least..=most).find(|workers| wall_secs(&videos, *workers) <= secs)
+        let work = self.workload(lengths);
+        (1..=work.n_pieces).find(|workers| work.wall_secs(*workers) <= secs)
     }
 }
 
-/// Work on one video, seconds.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct VideoWork {
-    /// Work before the spans that workers share; the total where there are no spans.
-    before: f64,
-    /// Work on each span.
-    span: f64,
-    /// Number of spans; 0: one worker processes the video alone.
-    n_spans: usize,
-    /// Work after the last span.
-    after: f64,
+/// Work on several videos.
+#[derive(Clone, Copy, Default)]
+struct Workload {
+    /// Seconds of work on all videos.
+    total: f64,
+    /// Seconds of the video that takes longest with a worker for each of its spans.
+    longest: f64,
+    /// Videos and spans that workers take one by one.
+    n_pieces: usize,
 }
 
-/// A video that a worker has begun.
-struct BegunVideo {
-    work: VideoWork,
-    /// When its spans can be taken.
-    since: f64,
-    /// Spans that nobody has taken.
-    n_left: usize,
-    /// When the last one taken is done.
-    ends: f64,
-}
-
-impl BegunVideo {
-    /// A worker that is free at `now` takes a span; when it is done.
-    fn take(&mut self, now: f64) -> f64 {
-        self.n_left -= 1;
-        let done = now + self.work.span;
-        self.ends = self.ends.max(done);
-        done
+impl Workload {
+    /// Seconds that list scheduling takes at most (Graham 1969): the longest chain, and a share of the rest. With a worker
+    /// for each piece nothing waits.
+    fn wall_secs(&self, workers: usize) -> f64 {
+        let rest = if workers < self.n_pieces { self.total - self.longest } else { 0.0 };
+        self.longest + rest / workers.max(1) as f64
     }
-}
-
-/// Seconds until `workers` have worked on all videos. Whoever is free takes the next video and its spans; where no video is
-/// left, spans of others.
-fn wall_secs(videos: &[VideoWork], workers: usize) -> f64 {
-    let n_pieces: usize = videos.iter().map(|video| video.n_spans.max(1)).sum();
-    let mut waiting = videos.iter();
-    let mut begun: Vec<BegunVideo> = Vec::new();
-    // When each worker is free, and the video that it has.
-    let mut crew: Vec<(f64, Option<usize>)> = vec![(0.0, None); workers.clamp(1, n_pieces.max(1))];
-    let mut wall = 0.0f64;
-    while let Some(at) = (0..crew.len()).min_by(|a, b| crew[*a].0.total_cmp(&crew[*b].0)) {
-        let (now, own) = crew[at];
-        if let Some(idx) = own {
-            let video = &mut begun[idx];
-            if video.n_left > 0 {
-                crew[at].0 = video.take(now);
-            } else {
-                let done = video.ends + video.work.after;
-                wall = wall.max(done);
-                crew[at] = (done, None);
-            }
-        } else if let Some(&work) = waiting.next() {
-            let since = now + work.before;
-            begun.push(BegunVideo { work, since, n_left: work.n_spans, ends: since });
-            crew[at] = (since, Some(begun.len() - 1));
-        } else if let Some(video) = begun.iter_mut().find(|video| video.n_left > 0 && video.since <= now) {
-            crew[at].0 = video.take(now);
-        } else if let Some(later) =
-            begun.iter().filter(|video| video.n_left > 0).map(|video| video.since).min_by(f64::total_cmp)
-        {
-            crew[at].0 = later;
-        } else {
-            crew.swap_remove(at);
-        }
-    }
-    wall
 }
 
 #[cfg(test)]
@@ -242,17 +178,23 @@ mod tests {
     }
 
     #[test]
-    fn workers_take_the_longest_that_is_left() {
-        let (times, lengths) = (times(1.0, 2.0), [10.0, 40.0, 20.0, 10.0]);
-        assert_eq!(times.wall_secs(&lengths, 1), 164.0);
-        assert_eq!(times.wall_secs(&lengths, 2), 83.0);
-        assert_eq!(times.wall_secs(&lengths, 99), 81.0);
-        assert_eq!(times.workers_within(&lengths, 83.0), Some(2));
-        assert_eq!((times.workers_within(&lengths, 200.0), times.workers_within(&lengths, 80.0)), (Some(1), None));
-        assert_eq!(times.limit_hours(&lengths, 2), 0.5 + 2.0 * 83.0 / 3600.0);
-        // A long one is shared: ten minutes in five spans.
-        assert_eq!(times.wall_secs(&[600.0], 1), 5.0 * 241.0);
-        assert_eq!(times.wall_secs(&[600.0], 5), 241.0);
+    fn workers_share_all_but_the_longest_chain() {
+        let times = times(1.0, 2.0);
+        // 600 s are 5 spans of 241 s.
+        for (lengths, sum, chain) in [(&[10.0, 40.0, 20.0, 10.0][..], 164.0, 81.0), (&[600.0, 10.0], 1226.0, 241.0)] {
+            let walls: Vec<f64> = (1..=8).map(|workers| times.wall_secs(lengths, workers)).collect();
+            assert_eq!((walls[0], walls[7], times.wall_secs(lengths, usize::MAX)), (sum, chain, chain));
+            assert!(walls.is_sorted_by(|fewer, more| fewer >= more), "{walls:?}");
+            for (workers, wall) in (1..).zip(&walls) {
+                assert!(*wall >= chain && *wall >= sum / f64::from(workers), "{workers}: {wall}");
+                let least = 1 + walls.iter().position(|other| other <= wall).unwrap();
+                assert_eq!(times.workers_within(lengths, *wall), Some(least));
+            }
+            assert_eq!(times.workers_within(lengths, chain - 1.0), None);
+            assert_eq!(times.limit_hours(lengths, 2), 0.5 + 2.0 * walls[1] / 3600.0);
+        }
+        assert_eq!(times.wall_secs(&[10.0, 40.0, 20.0, 10.0], 2), 81.0 + 83.0 / 2.0);
+        assert_eq!(times.wall_secs(&[], 1), 0.0);
     }
 
     #[test]
@@ -262,32 +204,5 @@ mod tests {
         let times = times(0.25, 1.5);
         times.write(dir.path()).unwrap();
         assert_eq!(StageTimes::read(dir.path()), Some(times));
-    }
-
-    const LONG: VideoWork = VideoWork { before: 10.0, span: 100.0, n_spans: 3, after: 20.0 };
-    const SHORT: VideoWork = VideoWork { before: 40.0, span: 0.0, n_spans: 0, after: 0.0 };
-
-    #[test]
-    fn one_worker_takes_the_sum() {
-        assert_eq!(wall_secs(&[], 1), 0.0);
-        assert_eq!(wall_secs(&[LONG, SHORT, SHORT], 1), 330.0 + 80.0);
-    }
-
-    #[test]
-    fn spans_wait_for_what_is_before_and_the_rest_for_the_last_span() {
-        // 10, then spans 10..110 twice and 110..210, then 20 more.
-        assert_eq!(wall_secs(&[LONG], 2), 230.0);
-        assert_eq!(wall_secs(&[LONG], 3), 130.0);
-        assert_eq!(wall_secs(&[LONG], 99), 130.0);
-    }
-
-    #[test]
-    fn who_has_no_video_helps() {
-        // The second worker has SHORT until 40 and a span until 140; the first spans until 110 and 210.
-        assert_eq!(wall_secs(&[LONG, SHORT], 2), 230.0);
-        // Two short ones until 80, a span until 180.
-        assert_eq!(wall_secs(&[LONG, SHORT, SHORT], 2), 230.0);
-        // Four until 160, and the third span until 260; the first is done with the second at 210.
-        assert_eq!(wall_secs(&[LONG, SHORT, SHORT, SHORT, SHORT], 2), 280.0);
     }
 }

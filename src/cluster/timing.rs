@@ -5,11 +5,10 @@ use super::stage_times::{StageCost, StageTimes};
 use crate::plan::{PlannedUnit, settings_hash};
 use anyhow::{Context, Result, ensure};
 use nix::sys::resource::{UsageWho, getrusage};
-use orator_base::stage::artifacts::{Artifact, StageName};
+use orator_base::stage::artifacts::StageName;
 use orator_base::stage::fingerprint::hash_file;
 use orator_base::stage::progress::{Progress, Silent};
-use orator_base::stage::{Unit, workdir};
-use orator_formats::media_json::MediaInfo;
+use orator_base::stage::workdir;
 use orator_pipeline::process::message::{ExcerptRequest, MediaRequest};
 use orator_pipeline::timing::StageTime;
 use orator_pipeline::{Pipeline, Selection};
@@ -55,9 +54,6 @@ pub fn excerpts(lengths: &[f64]) -> Vec<TimedExcerpt> {
 }
 
 /// What the times count for: program, settings, models, machine and workers.
-///
-/// # Errors
-/// A program or models that cannot be read.
 pub fn made_with(pipeline: &Pipeline, program: &Path, jobs: usize) -> Result<String> {
     let made_with = (
         hash_file(program)?,
@@ -68,28 +64,6 @@ pub fn made_with(pipeline: &Pipeline, program: &Path, jobs: usize) -> Result<Str
         jobs,
     );
     Ok(blake3::hash(&serde_json::to_vec(&made_with)?).to_hex().to_string())
-}
-
-/// Seconds that `orator plan` said the videos of a run take at the stages they went through, and those they took; none where
-/// it timed another program, other settings or another machine, or no length of a video is known. A unit that an earlier
-/// run had begun has no say.
-pub fn planned_and_taken(pipeline: &Pipeline, program: &Path, taken: &[StageTime]) -> Option<(f64, f64)> {
-    let work = &pipeline.config().settings.work.dir;
-    let known = StageTimes::read(work)?;
-    if made_with(pipeline, program, known.jobs).ok()? != known.made_with {
-        return None;
-    }
-    // A unit that was worked on in parts has several times.
-    let mut of_videos: BTreeMap<(StageName, &Unit), f64> = BTreeMap::new();
-    for time in taken.iter().filter(|time| time.stage != StageName::Dataset && !time.is_rest) {
-        *of_videos.entry((time.stage, &time.unit)).or_default() += time.secs;
-    }
-    let pair = |((stage, unit), secs): ((StageName, &Unit), f64)| {
-        let media = MediaInfo::read(&Artifact::MediaInfo.path(work, unit)).ok()?;
-        Some((known.cost(stage).secs(media.duration_secs), secs))
-    };
-    let sum = of_videos.into_iter().filter_map(pair).fold((0.0, 0.0), |sum, pair| (sum.0 + pair.0, sum.1 + pair.1));
-    (sum.0 > 0.0).then_some(sum)
 }
 
 /// Times the stages on excerpts of the units whose length is known, `jobs` side by side. The excerpts and what is made of

@@ -131,19 +131,10 @@ pub struct About {
 impl About {
     /// Description of `speaker` at `fps` with all other fields empty.
     pub fn new(speaker: &str, fps: FrameRate) -> Self {
-        let nothing = String::new;
-        Self {
-            speaker: speaker.to_owned(),
-            tool: concat!("orator ", env!("CARGO_PKG_VERSION")).to_owned(),
-            fps,
-            models: Vec::new(),
-            licence: nothing(),
-            consent: nothing(),
-            source: nothing(),
-            notes: Vec::new(),
-            no_sound: false,
-            split_rule: None,
-        }
+        let (speaker, tool) = (speaker.to_owned(), concat!("orator ", env!("CARGO_PKG_VERSION")).to_owned());
+        let (models, notes, no_sound, split_rule) = (Vec::new(), Vec::new(), false, None);
+        let [licence, consent, source] = [const { String::new() }; 3];
+        Self { speaker, tool, fps, models, licence, consent, source, notes, no_sound, split_rule }
     }
 }
 

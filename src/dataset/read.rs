@@ -3,11 +3,10 @@
 
 use super::index::{ByteRange, SampleRef};
 use super::info::DatasetInfo;
-use super::layout::read_json;
 use super::sample::{N_KEYPOINTS, Sample, WORDS_EXTENSION};
 use super::split::Split;
 use super::stats::DatasetStats;
-use super::{CHECKSUMS, INDEX, INFO, STATS};
+use super::{CHECKSUMS, INDEX, INFO, STATS, read_json};
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array2, Array3};
 use orator_base::stage::workdir::FolderLock;
@@ -16,8 +15,7 @@ use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::Posture;
 use orator_base::types::skeleton::N_JOINTS;
 use orator_base::types::sound::{SAMPLE_RATE, Sound};
-use orator_formats::npy;
-use orator_formats::npy::{Element, Layout};
+use orator_formats::npy::{self, Element, Layout};
 use orator_formats::transcript::Word;
 use orator_formats::wav;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};

@@ -1,15 +1,13 @@
 //! Sample of the dataset: motion, keypoints, sound and metadata of an interval, and its members as bytes.
 
-use super::layout::pretty;
-use super::words;
+use super::{pretty, words};
 use anyhow::{Context, Result, ensure};
 use ndarray::Array3;
 use orator_base::types::pose2d::{N_BODY, N_HAND};
 use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::{Posture, PostureChannel};
 use orator_base::types::skeleton::N_JOINTS;
-use orator_base::types::sound::{SAMPLE_RATE, Sound};
-use orator_base::types::sync;
+use orator_base::types::sound::{SAMPLE_RATE, Sound, sample_at};
 use orator_formats::transcript::Word;
 use orator_formats::{npy, wav};
 
@@ -58,7 +56,7 @@ impl Sample {
         ensure!(self.motion.mask.shape() == [n_frames, N_JOINTS], "{key}: the mask is not [{n_frames}, 49]");
         ensure!(self.pose2d.shape() == [n_frames, N_KEYPOINTS, 3], "{key}: keypoints are not [{n_frames}, 59, 3]");
         ensure!(self.sound.rate == SAMPLE_RATE, "{key}: sound at {} Hz, not {SAMPLE_RATE}", self.sound.rate);
-        let expected = sync::sample_at(self.motion.fps, SAMPLE_RATE, n_frames);
+        let expected = sample_at(self.motion.fps, SAMPLE_RATE, n_frames);
         ensure!(
             self.sound.samples.len().abs_diff(expected) <= 1,
             "{key}: {} samples of sound for {n_frames} frames, expected {expected}",

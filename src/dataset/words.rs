@@ -1,7 +1,7 @@
 //! Words of a video in its samples: a word belongs to the sample that holds its middle, so that each stands in one at
 //! most, and its times count from that sample's beginning.
 
-use super::layout::file_name;
+use super::file_name;
 use anyhow::{Result, ensure};
 use orator_base::stage::ledger::{TranscriptAccount, WordCount};
 use orator_formats::transcript::{Transcript, Word};

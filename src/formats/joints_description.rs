@@ -38,10 +38,8 @@ pub fn is_one(path: &Path) -> bool {
     [".npy.json", ".txt.json"].iter().any(|ending| name.ends_with(ending))
 }
 
-/// Rate of the joints at `path` by their description; `None` where there is none.
-///
-/// # Errors
-/// A description that cannot be read, names no rate of motion, or is of another number of frames than `n_frames`.
+/// Rate of the joints at `path` by their description; `None` where there is none. Errors: a description that cannot be
+/// read, names no rate of motion, or is of another number of frames than `n_frames`.
 pub fn rate(path: &Path, n_frames: usize) -> Result<Option<FrameRate>> {
     let (beside, file) = (path_of(path), path.display());
     let text = match std::fs::read(&beside) {

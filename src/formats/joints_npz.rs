@@ -2,8 +2,7 @@
 //! where there is no motion), `mask` bool [T,49], `fps` f64 [2] (numerator, denominator); of a lifted video `extra` f32
 //! [T,3,3] too: nose, right hip, left hip, in the axes of the joints, NaN where not known.
 
-use super::npz;
-use super::npz::Npz;
+use super::npz::{self, Npz};
 use anyhow::{Context, Result};
 use ndarray::{Array3, Ix2, Ix3};
 use orator_base::types::pose3d::Motion;

@@ -6,8 +6,7 @@
 //! and `face_score` f32 [T].
 
 use super::keypoints::range;
-use super::npz;
-use super::npz::Npz;
+use super::npz::{self, Npz};
 use anyhow::{Result, bail, ensure};
 use ndarray::{Array1, Array2, Array3, ArrayD, Ix1, Ix2, Ix3, aview1};
 use orator_base::types::pose2d::{Keypoints, N_BODY, N_HAND};
@@ -55,10 +54,8 @@ pub fn read_noting(path: &Path) -> Result<(Keypoints, Vec<String>)> {
 }
 
 /// `read_noting` of a picture whose `size` (width, height) is given, where it is, in place of the file's. Coordinates in
-/// 0..1 are shares of the picture: they become pixels by its size.
-///
-/// # Errors
-/// As `read`, and shares of a picture whose size is not known.
+/// 0..1 are shares of the picture: they become pixels by its size. Errors: as `read`, and shares of a picture whose
+/// size is not known.
 pub fn read_sized(path: &Path, size: Option<[u32; 2]>) -> Result<(Keypoints, Vec<String>)> {
     let (mut keypoints, known_size, mut notes) = read_as_written(path)?;
     if let Some(size) = size {

@@ -15,9 +15,7 @@ pub fn below(folder: &Path, endings: &[&str]) -> Result<Vec<PathBuf>> {
 }
 
 /// All files below `folder`, in the order of their names; folders that `enter` refuses and hidden names are left out.
-///
-/// # Errors
-/// A folder that cannot be listed, or lies more than 64 folders deep.
+/// Errors: a folder that cannot be listed, or lies more than 64 folders deep.
 pub fn files(folder: &Path, enter: &mut dyn FnMut(&Path) -> bool) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     walk(folder, MAX_DEPTH, &mut BTreeSet::new(), enter, &mut files)?;

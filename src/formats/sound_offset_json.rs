@@ -1,14 +1,11 @@
 //! `sound_offset.json`: how much later the sound of a video is than its picture.
 
 use anyhow::{Context, Result, ensure};
-use orator_base::types::sync::SoundOffset;
+use orator_base::types::sound::SoundOffset;
 use std::io::ErrorKind;
 use std::path::Path;
 
-/// Reads the file; `None` where it is not there.
-///
-/// # Errors
-/// A file that is not as the segment stage writes it.
+/// Reads the file; `None` where it is not there. Errors: a file that is not as the segment stage writes it.
 pub fn read(path: &Path) -> Result<Option<SoundOffset>> {
     let bytes = match std::fs::read(path) {
         Ok(bytes) => bytes,

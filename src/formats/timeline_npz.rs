@@ -1,8 +1,7 @@
 //! `timeline.npz`: the frames of a video at the dataset rate, one value each. Arrays: `source_secs` f64 [T], `repeated`
 //! bool [T], `shot_score` f64 [T], `restart` bool [T], `still` f32 [T]; for a long video `span` bool [T].
 
-use super::npz;
-use super::npz::Npz;
+use super::npz::{self, Npz};
 use anyhow::Result;
 use ndarray::aview1;
 use std::ops::Range;

@@ -30,10 +30,7 @@ pub struct FileBytes {
 }
 
 impl FileMemory {
-    /// An empty file in `folder`.
-    ///
-    /// # Errors
-    /// No file can be made there.
+    /// An empty file in `folder`. Errors: no file can be made there.
     pub fn new(folder: &Path) -> Result<Self> {
         let made = || -> Result<Self> {
             let file = tempfile::tempfile_in(folder)?;
@@ -46,10 +43,7 @@ impl FileMemory {
         made().with_context(|| format!("{}: no temporary file can be made in this folder", folder.display()))
     }
 
-    /// Adds bytes.
-    ///
-    /// # Errors
-    /// The disk is full.
+    /// Adds bytes. Errors: the disk is full.
     pub fn keep(&mut self, bytes: &[u8]) -> Result<FileBytes> {
         let (start, end) = (self.end, self.end.saturating_add(bytes.len() as u64));
         ensure!(end <= CAPACITY, "more than {} GiB of temporary data", CAPACITY >> 30);

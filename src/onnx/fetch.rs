@@ -7,13 +7,12 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 use orator_base::stage::workdir;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
-use std::fmt;
-use std::fmt::Write as _;
+use std::fmt::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Most bytes of a file, 1 GiB.
-const MAX_BYTES: u64 = 1 << 30;
+pub(super) const MAX_BYTES: u64 = 1 << 30;
 /// Folders beneath a mirror that are looked into.
 const MAX_DEPTH: usize = 3;
 

@@ -16,15 +16,8 @@ pub mod store;
 
 pub use entry::*;
 pub use fetch::FetchSource;
-pub use manifest::MANIFEST_FILE;
-pub use manifest::Manifest;
-pub use model::Model;
-pub use model::ModelError;
-pub use model::Outputs;
-pub use model::sha256_of;
-pub use runtime::LIBRARY;
-pub use runtime::Runtime;
-pub use runtime::TELEMETRY_OFF;
-pub use runtime::find_library;
+pub use manifest::{MANIFEST_FILE, Manifest};
+pub use model::{Model, ModelError, Outputs, sha256_of};
+pub use runtime::{LIBRARY, Runtime, TELEMETRY_OFF, find_library};
 pub use source::{Conversion, ModelSource, PinnedFile, SourceFile, SourceKind};
 pub use store::{AUTO, Fetched, ModelState, ModelStore, Wanted};

@@ -1,6 +1,7 @@
 //! Published packages: downloaded by the user's own `npm` or `pip`, so that mirrors and proxies work, and read without
 //! running anything that is in them.
 
+use super::fetch::MAX_BYTES;
 use super::{ModelSource, SourceKind};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use std::collections::BTreeMap;
@@ -8,9 +9,6 @@ use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-
-/// Most bytes of a file inside a package, 1 GiB.
-const MAX_BYTES: u64 = 1 << 30;
 
 /// Downloads the file of the package `source` into the empty folder `dir` and gives its path; its bytes are not yet
 /// checked. Errors: no `npm` or `pip`, or what it says.

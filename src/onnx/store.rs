@@ -25,15 +25,14 @@ pub struct ModelStore {
 
 /// Whether a model's file is there with the bytes of its description.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum ModelState {
     /// There, with the pinned bytes.
-    #[serde(rename = "present")]
     Present,
     /// There, with other bytes.
     #[serde(rename = "wrong hash")]
     WrongHash,
     /// Not there, or not readable.
-    #[serde(rename = "missing")]
     Missing,
 }
 
@@ -243,19 +242,15 @@ impl ModelStore {
             ModelState::WrongHash => {
                 bail!("{} is there already with other bytes: rename one of the two", path.display())
             }
-            ModelState::Missing => copy(file, &path)?,
+            ModelState::Missing => workdir::replace(&path, |attempt| {
+                std::io::copy(&mut std::fs::File::open(file)?, &mut std::fs::File::create(attempt)?)?;
+                Ok(())
+            })?,
         }
         workdir::write_file(&manifest, text.as_bytes())?;
         self.manifest = Manifest::load(&self.dir)?;
         Ok(entry)
     }
-}
-
-fn copy(from: &Path, to: &Path) -> Result<()> {
-    workdir::replace(to, |attempt| {
-        std::io::copy(&mut std::fs::File::open(from)?, &mut std::fs::File::create(attempt)?)?;
-        Ok(())
-    })
 }
 
 /// The description of a new file that is fed and read like a known one.

@@ -4,7 +4,7 @@
 use orator_base::stage::Unit;
 use orator_base::stage::artifacts::{Artifact, StageName};
 use orator_base::stage::ledger::Ledger;
-use orator_base::types::sync::SoundOffset;
+use orator_base::types::sound::SoundOffset;
 use orator_formats::media_json::MediaInfo;
 use orator_formats::sound_offset_json;
 use orator_media::ffmpeg::probe::probe;

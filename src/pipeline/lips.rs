@@ -2,7 +2,7 @@
 //! lips beside how open the voice sounds, both without what changes slowly, correlated at every lag.
 
 use orator_base::audio::openness::Openness;
-use orator_base::types::sync::SoundOffset;
+use orator_base::types::sound::SoundOffset;
 use orator_base::types::time::FrameRate;
 
 /// Lags that are tried, in steps of `LAG_STEP_SECS` on either side of none.

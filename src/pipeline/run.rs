@@ -203,7 +203,7 @@ impl StageRun<'_> {
         let config = self.pipeline.config();
         let units: Vec<Unit> = alive.iter().flat_map(|videos| stages::units(first, config, videos)).collect();
         let work = &config.settings.work.dir;
-        let clock = StageClock::new(work, names, &units);
+        let clock = StageClock::default();
         let hook = |stage: &'static str, unit: &Unit, work: UnitWork<'_>| clock.time(stage, unit, work);
         let timed = |name: &StageName| Ok(HookedStage { stage: self.pipeline.stage(*name, ready)?, hook: &hook });
         let stages = names.iter().map(timed).collect::<Result<Vec<_>>>()?;

@@ -5,11 +5,9 @@ use super::process::message::MediaRequest;
 use super::process::{answer_media, ask_media};
 use super::stages::UnitWork;
 use anyhow::Result;
-use orator_base::stage::artifacts::{self, StageName};
-use orator_base::stage::parts::folder_of_parts;
+use orator_base::stage::artifacts::StageName;
 use orator_base::stage::{Report, Unit};
 use orator_dataset::config::videos::Videos;
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -20,42 +18,27 @@ pub struct StageTime {
     pub stage: StageName,
     pub unit: Unit,
     pub secs: f64,
-    /// Whether the unit had been begun before: what was done of it then is not in `secs`.
-    pub is_rest: bool,
 }
 
 /// Takes the times of units.
-pub struct StageClock {
-    /// Units that had a folder of parts before the clock began.
-    begun: BTreeSet<(StageName, Unit)>,
-    times: Mutex<Vec<StageTime>>,
-}
+#[derive(Default)]
+pub struct StageClock(Mutex<Vec<StageTime>>);
 
 impl StageClock {
-    /// A clock for `stages` of `units`, whose folders are in `work`.
-    pub fn new(work: &Path, stages: &[StageName], units: &[Unit]) -> Self {
-        let all = stages.iter().flat_map(|stage| units.iter().map(move |unit| (*stage, unit.clone())));
-        let has_parts =
-            |(stage, unit): &(StageName, Unit)| folder_of_parts(&artifacts::dir(work, *stage, unit)).is_dir();
-        Self { begun: all.filter(has_parts).collect(), times: Mutex::default() }
-    }
-
     /// Does the work on a unit; that of one that fails is timed too.
     pub fn time(&self, stage: &str, unit: &Unit, work: UnitWork) -> Result<Report> {
         let start = Instant::now();
         let report = work();
         if let Ok(stage) = stage.parse() {
-            let secs = start.elapsed().as_secs_f64();
-            let is_rest = self.begun.contains(&(stage, unit.clone()));
-            let time = StageTime { stage, unit: unit.clone(), secs, is_rest };
-            self.times.lock().unwrap_or_else(PoisonError::into_inner).push(time);
+            let time = StageTime { stage, unit: unit.clone(), secs: start.elapsed().as_secs_f64() };
+            self.0.lock().unwrap_or_else(PoisonError::into_inner).push(time);
         }
         report
     }
 
-    /// The times, in the order in which the work ended; the clock begins anew.
+    /// The times, in the order in which the work ended.
     pub fn take(&self) -> Vec<StageTime> {
-        std::mem::take(&mut *self.times.lock().unwrap_or_else(PoisonError::into_inner))
+        std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 

@@ -78,12 +78,9 @@ pub struct PowerPlan {
 /// Participants needed for both tests; `tell` hears of each number that was tried.
 pub fn plan(question: &PowerQuestion, tell: &(dyn Fn(&PowerRow) + Sync)) -> Result<PowerPlan> {
     ensure!(question.n_trials > 0 && question.n_clips > 1, "a participant has at least one trial, a study two clips");
-    ensure!(
-        question.n_trials <= question.n_clips,
-        "{} trials of {} clips: a participant sees no clip twice; give more clips or fewer trials",
-        question.n_trials,
-        question.n_clips
-    );
+    let (trials, clips) = (question.n_trials, question.n_clips);
+    let few = "a participant sees no clip twice; give more clips or fewer trials";
+    ensure!(trials <= clips, "{trials} trials of {clips} clips: {few}");
     ensure!((0.1..1.0).contains(&question.power), "the power is a share from 0.1 to below 1");
     ensure!((0.001..=0.499).contains(&(question.effect - CHANCE).abs()), "the effect is a share other than 0.5");
     ensure!((0.001..0.5).contains(&question.bound), "the bound is a share below 0.5");
@@ -196,15 +193,9 @@ pub fn text(plan: &PowerPlan) -> String {
         let _ = writeln!(text, "\n{what}\n  participants    votes    power    95 % interval");
         for row in &curve.rows {
             let mark = if Some(row.n_participants) == curve.n_participants { "  <- enough" } else { "" };
-            let _ = writeln!(
-                text,
-                "  {:>12} {:>8} {:>8}    {} to {}{mark}",
-                row.n_participants,
-                row.n_votes,
-                percent(row.power),
-                percent(row.ends.low),
-                percent(row.ends.high)
-            );
+            let PowerRow { n_participants, n_votes, .. } = row;
+            let [power, low, high] = [row.power, row.ends.low, row.ends.high].map(percent);
+            let _ = writeln!(text, "  {n_participants:>12} {n_votes:>8} {power:>8}    {low} to {high}{mark}");
         }
         text += &match curve.n_participants {
             Some(n) => format!("  {n} participants for a power of {}\n", percent(question.power)),
@@ -213,13 +204,9 @@ pub fn text(plan: &PowerPlan) -> String {
                 question.n_clips
             ),
         };
-        let _ = writeln!(
-            text,
-            "  the formula for independent votes says {} votes ({} participants), of which the power is {}",
-            curve.naive_votes,
-            curve.at_naive.n_participants,
-            percent(curve.at_naive.power)
-        );
+        let (n, PowerRow { n_participants, power, .. }) = (curve.naive_votes, curve.at_naive);
+        let said = format!("says {n} votes ({n_participants} participants), of which the power is {}", percent(power));
+        let _ = writeln!(text, "  the formula for independent votes {said}");
     }
     text
 }

@@ -74,9 +74,6 @@ impl Preregistration {
     }
 
     /// Writes the file, atomically.
-    ///
-    /// # Errors
-    /// A folder that cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
         workdir::write_file(path, &serde_json::to_vec_pretty(self)?)
     }

@@ -66,9 +66,6 @@ impl StudySeal {
     }
 
     /// Writes the seal, atomically: the last file of a build.
-    ///
-    /// # Errors
-    /// A folder that cannot be written.
     pub fn write(&self, folder: &StudyFolder) -> Result<()> {
         workdir::write_file(&folder.seal(), &serde_json::to_vec_pretty(self)?)
     }
@@ -110,9 +107,6 @@ impl StudySeal {
     }
 
     /// Files that are not as they were sealed.
-    ///
-    /// # Errors
-    /// A file that cannot be read.
     pub fn compare(&self, folder: &StudyFolder) -> Result<BrokenSeal> {
         let mut broken = BrokenSeal::default();
         let listed = sealed_files(folder)?;

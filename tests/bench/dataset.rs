@@ -6,8 +6,7 @@ use ndarray::{Array2, Array3};
 use orator_base::stage::progress::{Progress, Silent, Task};
 use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::N_JOINTS;
-use orator_base::types::sound::{SAMPLE_RATE, Sound};
-use orator_base::types::sync;
+use orator_base::types::sound::{SAMPLE_RATE, Sound, sample_at};
 use orator_base::types::time::FrameRate;
 use orator_dataset::config;
 use orator_dataset::info::About;
@@ -117,7 +116,7 @@ fn measure(args: &Args, n_intervals: usize, place: &Path, progress: &dyn Progres
 fn random_interval(seed: u64) -> Sample {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let n_frames = FPS.frames_in(INTERVAL_SECS as f64);
-    let n_samples = sync::sample_at(FPS, SAMPLE_RATE, n_frames);
+    let n_samples = sample_at(FPS, SAMPLE_RATE, n_frames);
     Sample {
         key: String::new(),
         motion: Motion {

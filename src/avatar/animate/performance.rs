@@ -4,12 +4,11 @@
 use super::rig::constraints::{ClampTally, Clamps, Constraints};
 use super::rig::rig::{CM, Rig};
 use super::solve::arm::{SolveFilters, rotations};
-use super::solve::head;
 use super::solve::legs::Legs;
 use super::solve::positions::JointPositions;
 use super::solve::smoothing::Smoothing;
 use super::solve::track::RotationTrack;
-use super::solve::trunk;
+use super::solve::{head, trunk};
 use ndarray::{Array2, Array3};
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::{Vec3, scale};

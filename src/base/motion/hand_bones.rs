@@ -2,8 +2,7 @@
 //! hands take are defined in `train::scene::hand_shape`.
 
 use super::view::hand::HandJoints;
-use crate::math::vec3;
-use crate::math::vec3::Vec3;
+use crate::math::vec3::{self, Vec3};
 use crate::types::pose2d::N_HAND;
 
 /// Bones of the thumb, index, middle, ring and little finger in mm: from the wrist to the first joint, then the

@@ -10,7 +10,7 @@ use crate::math::vec3::{Vec3, add, scale, sub, unit};
 use crate::types::pose2d::{SEEN_SCORE, coco};
 use crate::types::posture::Posture;
 use crate::types::skeleton::{L_SHOULDER, R_SHOULDER};
-use ndarray::{Array2, ArrayView2, ArrayView3};
+use ndarray::{ArrayView2, ArrayView3};
 
 /// What the lifter knows of the same frames.
 #[derive(Clone, Copy, Debug, Default)]
@@ -38,8 +38,7 @@ const SEATED_BELOW: f64 = 0.4;
 /// Posture over the frames of the keypoints [T, 17, 3] (COCO; x px, y px, score).
 pub fn estimate(body: ArrayView3<f32>, lifted: LiftedBody) -> Posture {
     let n_frames = body.shape()[0];
-    let mut posture =
-        Posture { head: Array2::from_elem((n_frames, 3), f32::NAN), trunk: Array2::from_elem((n_frames, 3), f32::NAN) };
+    let mut posture = Posture::unseen(n_frames);
     for (t, angles) in face::angles(body).into_iter().enumerate() {
         let angles = angles.unwrap_or([f64::NAN; 3]);
         (0..3).for_each(|k| posture.head[[t, k]] = angles[k] as f32);

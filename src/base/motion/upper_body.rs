@@ -1,21 +1,14 @@
 //! The nine points of the upper body that the body lifter sees, and the size they are given.
 
 use crate::math::order::upper_median;
-use crate::math::vec3;
-use crate::math::vec3::Vec3;
+use crate::math::vec3::{self, Vec3};
 use crate::types::pose2d::coco;
-use crate::types::skeleton;
 use crate::types::skeleton::BODY_BONES;
+pub use crate::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST, R_ELBOW, R_SHOULDER, R_WRIST};
 
 /// Nose, right shoulder, elbow, wrist, left the same, right hip, left hip.
 pub const N_POINTS: usize = 9;
 pub const NOSE: usize = 0;
-pub const R_SHOULDER: usize = 1;
-pub const R_ELBOW: usize = 2;
-pub const R_WRIST: usize = 3;
-pub const L_SHOULDER: usize = 4;
-pub const L_ELBOW: usize = 5;
-pub const L_WRIST: usize = 6;
 pub const R_HIP: usize = 7;
 pub const L_HIP: usize = 8;
 
@@ -34,12 +27,6 @@ pub const COCO: [usize; N_POINTS] = [
 
 /// The points of the arms, which have the numbers of the skeleton's joints.
 pub const ARMS: std::ops::RangeInclusive<usize> = R_SHOULDER..=L_WRIST;
-const _: () = assert!(
-    R_SHOULDER == skeleton::R_SHOULDER
-        && R_WRIST == skeleton::R_WRIST
-        && L_SHOULDER == skeleton::L_SHOULDER
-        && L_WRIST == skeleton::L_WRIST
-);
 
 /// Index of the point on the other side.
 pub const MIRROR: [usize; N_POINTS] = [NOSE, L_SHOULDER, L_ELBOW, L_WRIST, R_SHOULDER, R_ELBOW, R_WRIST, L_HIP, R_HIP];

@@ -1,10 +1,9 @@
 //! One attempt at a piece of work: its files are made in a folder of their own, take their place when they are whole, and
 //! the record comes last.
 
-use super::Report;
 use super::fingerprint::Fingerprint;
 use super::record::{Output, Record};
-use super::workdir;
+use super::{Report, workdir};
 use anyhow::{Context, Result, anyhow};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;

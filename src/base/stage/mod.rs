@@ -15,10 +15,5 @@ pub mod unit;
 pub mod workdir;
 pub mod wrapper;
 
-pub use unit::Input;
-pub use unit::Report;
-pub use unit::Stage;
-pub use unit::Unit;
-pub use unit::counted;
-pub use unit::write_json;
+pub use unit::{Input, Report, Stage, Unit, counted, write_json};
 pub use wrapper::StageWrapper;

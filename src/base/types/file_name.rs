@@ -11,7 +11,7 @@ const MOST_BYTES: usize = 255;
 /// Name of one file or folder within its folder: 1 to 255 bytes, no separator (`/` or `\`), no dot at the beginning, no
 /// control character. A path that such a name is joined to is not left.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(try_from = "String", into = "String")]
+#[serde(try_from = "String")]
 pub struct FileName(String);
 
 /// Text that is no [`FileName`].
@@ -38,12 +38,6 @@ impl TryFrom<String> for FileName {
 
     fn try_from(name: String) -> Result<Self, FileNameError> {
         Self::new(name)
-    }
-}
-
-impl From<FileName> for String {
-    fn from(name: FileName) -> Self {
-        name.0
     }
 }
 

@@ -10,5 +10,4 @@ pub mod posture;
 pub mod skeleton;
 pub mod sound;
 pub mod split;
-pub mod sync;
 pub mod time;

@@ -2,8 +2,7 @@
 
 use anyhow::{Context as _, Result, bail, ensure};
 use ndarray::{Array3, ArrayView3};
-use orator_base::motion::posture;
-use orator_base::motion::posture::LiftedBody;
+use orator_base::motion::posture::{self, LiftedBody};
 use orator_base::motion::units;
 use orator_base::stage::artifacts::{Artifact, StageName};
 use orator_base::types::pose2d::{Keypoints, N_BODY};
@@ -13,8 +12,7 @@ use orator_base::types::sound::Sound;
 use orator_base::types::time::FrameRate;
 use orator_dataset::index::SampleRef;
 use orator_dataset::{Dataset, Split};
-use orator_formats::mocap::motion_file;
-use orator_formats::mocap::motion_file::MotionFile;
+use orator_formats::mocap::motion_file::{self, MotionFile};
 use orator_formats::{joints_npz, keypoints_npz};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;

@@ -5,7 +5,6 @@ mod film_args;
 pub mod input;
 mod report_text;
 mod retarget_args;
-mod smoothing_args;
 pub mod verb;
 
 pub use verb::{Args, run};

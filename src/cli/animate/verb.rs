@@ -1,11 +1,10 @@
 //! `orator animate`.
 
-use super::body_args::BodyArgs;
+use super::body_args::{BodyArgs, SmoothingArgs};
 use super::film_args::FilmArgs;
 use super::input::{InputMotion, MotionInput, inputs};
 use super::report_text;
 use super::retarget_args::{OpenedRig, RetargetArgs};
-use super::smoothing_args::SmoothingArgs;
 use crate::cli::Outcome;
 use crate::cli::config_args::split;
 use crate::cli::confine::confine;
@@ -25,8 +24,7 @@ use orator_base::types::pose3d::Motion;
 use orator_base::types::sound::{SAMPLE_RATE, Sound};
 use orator_base::types::time::FrameRate;
 use orator_dataset::Split;
-use orator_formats::mocap::motion_file;
-use orator_formats::mocap::motion_file::USUAL_FPS;
+use orator_formats::mocap::motion_file::{self, USUAL_FPS};
 use orator_media::ffmpeg::audio;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};

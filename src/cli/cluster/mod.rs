@@ -1,6 +1,5 @@
 //! Many machines on one work folder: `plan`, `work`, `submit`, and `status --plan`.
 
-pub(super) mod plan;
-pub(super) mod progress;
-pub(super) mod submit;
-pub(super) mod work;
+pub mod plan;
+pub mod submit;
+pub mod work;

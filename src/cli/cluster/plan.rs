@@ -1,4 +1,4 @@
-//! `orator plan`.
+//! `orator plan`, and how far its workers are.
 
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
@@ -7,7 +7,9 @@ use crate::cli::ui::Ui;
 use anyhow::{Result, bail};
 use orator_base::stage::artifacts::StageName;
 use orator_base::stage::counted;
+use orator_cluster::heartbeat::DEAD_AFTER;
 use orator_cluster::plan::{ClusterPlan, PIECE_SECS, PlannedUnit};
+use orator_cluster::progress::{PlanProgress, WorkerProgress, progress};
 use orator_cluster::stage_times::StageTimes;
 use orator_cluster::timing;
 use orator_dataset::config;
@@ -122,13 +124,9 @@ fn told(times: &StageTimes, lengths: &[f64]) -> Vec<String> {
         format!("{stage:9}{:>10} of work{gib:8.2} GiB of files", length(times.stage_secs(stage, lengths)))
     };
     let mut lines: Vec<String> = StageName::ALL.map(stage).into();
-    lines.push(format!(
-        "timed on {} of {:.0} s in all, {} side by side, {}",
-        counted(times.n_excerpts, "excerpt"),
-        times.excerpt_secs,
-        times.jobs,
-        times.processor
-    ));
+    let StageTimes { excerpt_secs, jobs, processor, .. } = times;
+    let excerpts = counted(times.n_excerpts, "excerpt");
+    lines.push(format!("timed on {excerpts} of {excerpt_secs:.0} s in all, {jobs} side by side, {processor}"));
     lines.extend(times.peak_mib.map(|mib| format!("memory   {mib:.0} MiB a worker")));
     lines
 }
@@ -149,4 +147,50 @@ fn length(secs: f64) -> String {
         ..6000.0 => format!("{:.0} min", secs / 60.0),
         _ => format!("{:.1} h", secs / 3600.0),
     }
+}
+
+/// Prints how far the workers of a plan are: `orator status --plan`.
+pub fn show_progress(path: &Path, ui: &Ui) -> Result<Outcome> {
+    let plan = ClusterPlan::read(path)?;
+    let told = progress(&plan, path, DEAD_AFTER)?;
+    let next = match told.n_done + told.n_failed == told.n_units {
+        true if told.n_failed > 0 => format!("orator work --plan {} --retry", path.display()),
+        true => plan.datasets_command("orator"),
+        false => format!("orator work --plan {}", path.display()),
+    };
+    let mut facts = json!(told);
+    facts["next"] = json!(next);
+    ui.summary(&progress_text(&told), Some(&next), facts);
+    Ok(Outcome::Done)
+}
+
+fn progress_text(told: &PlanProgress) -> String {
+    let hours = |secs: f64| secs / 3600.0;
+    let PlanProgress { n_units, n_done, n_failed, n_claimed, n_left_by_dead, n_taken_over, .. } = told;
+    let n_free = n_units - n_done - n_failed - n_claimed - n_left_by_dead;
+    let mut lines = vec![format!(
+        "{n_units} units: {n_done} done, {n_failed} failed, {n_claimed} in work, {n_left_by_dead} left by dead workers, \
+         {n_free} free; {n_taken_over} taken over"
+    )];
+    let left = told.secs_left.map_or("unknown".to_owned(), |secs| format!("{:.2} h", hours(secs)));
+    let (ended, all) = (hours(told.ended_media_secs), hours(told.media_secs));
+    lines.push(format!("{ended:.2} of {all:.2} h of video; time left at this pace: {left}"));
+    lines.extend(told.stopped.iter().map(|reason| format!("all workers have stopped: {reason}")));
+    lines.extend(told.workers.iter().map(worker));
+    lines.extend(told.failures.iter().map(|(reason, units)| {
+        let first = units.first().map(String::as_str).unwrap_or_default();
+        format!("failed  {} x {reason} ({first})", units.len())
+    }));
+    lines.join("\n")
+}
+
+fn worker(worker: &WorkerProgress) -> String {
+    let WorkerProgress { worker, is_alive, heartbeat, silent_secs } = worker;
+    let state = match (heartbeat.ended, is_alive) {
+        (true, _) => "ended".to_owned(),
+        (false, true) => heartbeat.unit.as_ref().map_or("waits".to_owned(), |unit| format!("works on {unit}")),
+        (false, false) => format!("dead, silent for {silent_secs:.0} s"),
+    };
+    let (done, failed, rate) = (heartbeat.n_done, heartbeat.n_failed, heartbeat.media_rate());
+    format!("worker  {worker}: {done} done, {failed} failed, {rate:.2} s of video a second; {state}")
 }

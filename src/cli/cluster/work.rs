@@ -83,12 +83,8 @@ pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 }
 
 fn text(report: &WorkReport) -> String {
-    let mut lines = vec![format!(
-        "{} done ({} up to date before), {} failed",
-        counted(report.done, "unit"),
-        report.fresh,
-        report.failed.len()
-    )];
+    let (done, fresh, failed) = (counted(report.done, "unit"), report.fresh, report.failed.len());
+    let mut lines = vec![format!("{done} done ({fresh} up to date before), {failed} failed")];
     if report.taken_over + report.laid_aside > 0 {
         lines.push(format!(
             "{} taken over from dead workers, {} laid aside since others had taken them over",
@@ -96,7 +92,7 @@ fn text(report: &WorkReport) -> String {
         ));
     }
     lines.extend(report.failed.iter().map(|(unit, error)| format!("failed  {unit}: {error}")));
-    lines
-        .push(if report.all_ended { "every unit has ended" } else { "others have the rest, or it is left" }.to_owned());
+    let rest = if report.all_ended { "every unit has ended" } else { "others have the rest, or it is left" };
+    lines.push(rest.to_owned());
     lines.join("\n")
 }

@@ -1,6 +1,5 @@
-//! `orator evaluate`.
+//! `orator evaluate`, and `compare` of two results.
 
-use super::compare;
 use crate::cli::Outcome;
 use crate::cli::config_args::split;
 use crate::cli::confine::confine;
@@ -13,7 +12,8 @@ use orator_dataset::{Dataset, Split};
 use orator_gesture::evaluate::Evaluation;
 use orator_gesture::evaluate::clips::checkpoint::EvaluatedCheckpoint;
 use orator_gesture::evaluate::clips::motion_store::{HELD_BYTES, MotionStore};
-use orator_gesture::evaluate::table::result;
+use orator_gesture::evaluate::table::result::StoredResult;
+use orator_gesture::evaluate::table::{compare, result};
 use orator_gesture::evaluate::verdict::text;
 use orator_gesture::generate::model::model_lock;
 use orator_gesture::metrics::settings::Convention;
@@ -40,7 +40,7 @@ pub struct Args {
 
 #[derive(clap::Subcommand)]
 enum What {
-    Compare(compare::Args),
+    Compare(CompareArgs),
     #[command(hide = true)]
     Lifter(MovedVerb),
     #[command(hide = true)]
@@ -94,7 +94,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     confine(report.as_deref(), dataset.iter().chain(checkpoint).map(PathBuf::as_path));
     match args.what {
         Some(What::Lifter(args)) => args.refuse("evaluate lifter"),
-        Some(What::Compare(args)) => compare::run(&args, ui),
+        Some(What::Compare(args)) => compare_results(&args, ui),
         Some(What::People(args)) => args.refuse("evaluate people"),
         None => motion(&args.motion, ui),
     }
@@ -166,4 +166,29 @@ fn evaluation(args: &MotionArgs, store: &MotionStore, ui: &Ui) -> Result<Evaluat
         bail!("nothing to measure: give --truth and --prediction, or --dataset and --checkpoint")
     };
     Evaluation::from_files(truth, prediction, args.audio.as_deref(), args.fps, store, ui)
+}
+
+/// Put two results side by side, and refuse what is not comparable.
+///
+/// Each value of a result holds the hash of its definition and parameters. Values of one hash are shown beside each other;
+/// of a metric whose hashes differ it is said in which parameters, and the exit code is 1.
+#[derive(clap::Args)]
+struct CompareArgs {
+    /// What `orator evaluate --json` wrote.
+    #[arg(value_name = "A.json")]
+    a: PathBuf,
+    /// Another one.
+    #[arg(value_name = "B.json")]
+    b: PathBuf,
+}
+
+fn compare_results(args: &CompareArgs, ui: &Ui) -> Result<Outcome> {
+    let compared = compare::compare(&StoredResult::read(&args.a)?, &StoredResult::read(&args.b)?);
+    let is_refused = !compared.refused.is_empty();
+    if compared.beside.is_empty() && !is_refused {
+        bail!("{} and {} have no metric in common", args.a.display(), args.b.display());
+    }
+    let text = format!("A: {}\nB: {}\n\n{}", args.a.display(), args.b.display(), compare::text(&compared));
+    ui.summary(&text, None, json!({ "compared": compared }));
+    Ok(if is_refused { Outcome::Wrong } else { Outcome::Done })
 }

@@ -9,7 +9,6 @@ use crate::cli::ui::Ui;
 use anyhow::Result;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use orator_base::stage::artifacts::StageName;
-use orator_cluster::timing;
 use orator_dataset::config::Settings;
 use orator_onnx::{ModelError, ModelStore};
 use orator_pipeline::pose2d::models::wanted;
@@ -78,11 +77,6 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     };
     let mut lines: Vec<String> = report.stages.iter().map(counts).collect();
     lines.extend(report.datasets.iter().map(|dir| format!("dataset  {}", dir.display())));
-    let predicted = timing::planned_and_taken(&pipeline, &this_program(), &report.times);
-    lines.extend(predicted.map(|(planned, took)| {
-        let off = 100.0 * (took / planned - 1.0);
-        format!("work     {took:.0} s; `orator plan` said {planned:.0} s ({off:+.0} %)")
-    }));
     let n_failed = report.failures.len();
     if n_failed > 0 {
         lines.push(format!("{n_failed} failed; `orator status --why` says each error again"));
@@ -97,7 +91,6 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let mut facts = json!(report);
     facts["next"] = json!(next);
     facts["work_secs"] = json!(report.times.iter().map(|time| time.secs).sum::<f64>());
-    facts["planned_work_secs"] = json!(predicted.map(|(planned, _)| planned));
     ui.summary(&lines.join("\n"), Some(&next), facts);
     Ok(if n_failed == 0 { Outcome::Done } else { Outcome::SomeFailed })
 }

@@ -1,7 +1,7 @@
 //! `orator status`.
 
 use crate::cli::Outcome;
-use crate::cli::cluster::progress;
+use crate::cli::cluster::plan::show_progress;
 use crate::cli::config_args::ConfigArgs;
 use crate::cli::confine::confine;
 use crate::cli::ui::Ui;
@@ -35,7 +35,7 @@ pub struct Args {
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     if let Some(plan) = &args.plan {
-        return progress::run(plan, ui);
+        return show_progress(plan, ui);
     }
     let pipeline = Pipeline::open(args.config.load()?)?;
     let work = &pipeline.config().settings.work.dir;

@@ -1,9 +1,11 @@
-//! `orator completions` and `orator man`: what shells and `man` know of the program.
+//! `orator guide`, `orator completions` and `orator man`: what people, shells and `man` read about the program.
 
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
+use crate::guide::{TOPICS, Topic};
 use anyhow::{Context, Result};
 use clap::Command;
+use clap::builder::PossibleValuesParser;
 use clap_complete::Shell;
 use clap_mangen::Man;
 use serde_json::json;
@@ -29,6 +31,16 @@ pub struct ManArgs {
     dir: Option<PathBuf>,
 }
 
+/// Print a page of the guide, or the list of its pages.
+///
+/// The pages are Markdown: `orator guide dataset | less`.
+#[derive(clap::Args)]
+pub struct GuideArgs {
+    /// Page to print; none: the list.
+    #[arg(value_parser = PossibleValuesParser::new(TOPICS.map(|topic| topic.name)))]
+    topic: Option<String>,
+}
+
 /// Prints the script of a shell; `command` is the program's own command line.
 pub fn run(args: &Args, mut command: Command, ui: &Ui) -> Result<Outcome> {
     let mut script = Vec::new();
@@ -49,6 +61,24 @@ pub fn run_man(args: &ManArgs, command: Command, ui: &Ui) -> Result<Outcome> {
         Man::new(command).render(&mut page)?;
         let page = String::from_utf8(page)?;
         ui.summary(&page, None, json!({ "page": page }));
+    }
+    Ok(Outcome::Done)
+}
+
+/// Prints a page or the list.
+pub fn run_guide(args: &GuideArgs, ui: &Ui) -> Result<Outcome> {
+    let facts = |topic: &Topic| json!({ "topic": topic.name, "summary": topic.summary });
+    match TOPICS.iter().find(|topic| Some(topic.name) == args.topic.as_deref()) {
+        Some(topic) => {
+            let mut page = facts(topic);
+            page["text"] = topic.text.into();
+            ui.summary(topic.text, None, page);
+        }
+        None => {
+            let lines = TOPICS.map(|topic| format!("{:14} {}", topic.name, topic.summary)).join("\n");
+            let list: Vec<_> = TOPICS.iter().map(facts).collect();
+            ui.summary(&lines, Some("orator guide TOPIC"), json!({ "topics": list }));
+        }
     }
     Ok(Outcome::Done)
 }

@@ -2,6 +2,5 @@
 
 pub mod completions;
 pub mod doctor;
-pub mod guide;
 pub mod models;
 pub mod words;

@@ -2,9 +2,7 @@
 
 pub mod analyse;
 pub mod build;
-pub mod export;
 pub mod plan;
-pub mod serve;
 pub mod verb;
 
 pub use verb::{Args, run};

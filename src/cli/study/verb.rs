@@ -1,9 +1,15 @@
-//! `orator study`: its verbs.
+//! `orator study`: its verbs, with `serve` and `export`.
 
-use super::{analyse, build, export, plan, serve};
+use super::{analyse, build, plan};
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::Result;
+use orator_study::export::{TableForm, export};
+use orator_study::folder::StudyFolder;
+use orator_study::server::start::StudyServer;
+use serde_json::json;
+use std::net::{IpAddr, SocketAddr};
+use std::path::PathBuf;
 
 /// A user study of gestures: build its films, serve it, analyse the answers.
 ///
@@ -19,8 +25,8 @@ pub struct Args {
 enum StudyVerb {
     Plan(plan::Args),
     Build(build::Args),
-    Serve(serve::Args),
-    Export(export::Args),
+    Serve(ServeArgs),
+    Export(ExportArgs),
     Analyse(analyse::Args),
 }
 
@@ -28,8 +34,77 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     match args.verb {
         StudyVerb::Plan(args) => plan::run(&args, ui),
         StudyVerb::Build(args) => build::run(&args, ui),
-        StudyVerb::Serve(args) => serve::run(&args, ui),
-        StudyVerb::Export(args) => export::run(&args, ui),
+        StudyVerb::Serve(args) => serve(&args, ui),
+        StudyVerb::Export(args) => export_tables(&args, ui),
         StudyVerb::Analyse(args) => analyse::run(&args, ui),
     }
+}
+
+/// Serve a built study to its participants until Ctrl-C.
+///
+/// Answers are stored in DIR/responses.sqlite, each before it is acknowledged; a server that was stopped or killed goes on
+/// where it was. No address of a participant and no trace of a browser is stored. The server speaks HTTP: for participants
+/// elsewhere put it behind a proxy with a certificate (caddy, nginx) on the same machine.
+#[derive(clap::Args)]
+struct ServeArgs {
+    /// The study's folder.
+    #[arg(value_name = "DIR")]
+    dir: PathBuf,
+    /// Address to listen at; others than this machine reach it only if it is not a loopback address.
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
+    listen: IpAddr,
+    /// Port to listen at; 0: any that is free.
+    #[arg(long, default_value_t = 8080)]
+    port: u16,
+    /// Minutes without an answer after which a participant's place is given to another.
+    #[arg(long, value_name = "MINUTES", default_value_t = 60)]
+    abandoned_after: u32,
+}
+
+fn serve(args: &ServeArgs, ui: &Ui) -> Result<Outcome> {
+    let folder = StudyFolder::new(&args.dir);
+    let abandoned_secs = 60.0 * f64::from(args.abandoned_after);
+    let server = StudyServer::open(&folder, abandoned_secs)?;
+    let title = server.study().title.clone();
+    let counts = format!("{} sessions, {} films", server.study().plan.sessions.len(), server.study().n_films());
+    let token = server.operator_token().to_owned();
+    server.run(SocketAddr::new(args.listen, args.port), |address| {
+        let page = format!("http://{address}/");
+        let text = format!("{title}: {counts}\nparticipants: {page}\noperator:     {page}operator, token {token}");
+        let facts = json!({ "address": page, "operator_address": format!("{page}operator"), "operator_token": token });
+        ui.summary(&text, None, facts);
+    })?;
+    Ok(Outcome::Done)
+}
+
+/// Write the responses of a study as tables, also while it is being served.
+///
+/// `votes` has a row for each answered trial: participant, task, design, phase, trial (from 1), clip, speaker, conditions
+/// (from left to right), response and expected (left or right; real or generated; -2 to 2; scores; a number), stalled_secs,
+/// unfocused_secs, response_secs, plays, completed. `participants` has a row for each participant: participant, place,
+/// language, status (active, completed, replaced), answers, failed_checks, begun_ms (since 1970), code, and what the
+/// recruiting site gave along. Several values in a cell are joined by |.
+#[derive(clap::Args)]
+struct ExportArgs {
+    /// The study's folder.
+    #[arg(value_name = "DIR")]
+    dir: PathBuf,
+    /// Form of the tables: columns with a header, or JSON Lines.
+    #[arg(long, value_parser = ["csv", "jsonl"], default_value = "csv")]
+    format: String,
+    /// Folder to write them into; without: DIR/export.
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+}
+
+fn export_tables(args: &ExportArgs, ui: &Ui) -> Result<Outcome> {
+    let form = if args.format == "csv" { TableForm::Csv } else { TableForm::Jsonl };
+    let out = args.out.clone().unwrap_or_else(|| args.dir.join("export"));
+    let exported = export(&StudyFolder::new(&args.dir), form, &out)?;
+    let [votes, participants] = [&exported.votes, &exported.participants].map(|path| path.display());
+    let (n_votes, n_participants) = (exported.n_votes, exported.n_participants);
+    let text = format!("{n_votes} votes of {n_participants} participants: {votes}, {participants}");
+    let next = format!("orator study analyse {}", args.dir.display());
+    ui.summary(&text, Some(&next), json!(exported));
+    Ok(Outcome::Done)
 }

@@ -4,104 +4,77 @@
 
 use super::auto::{AUTO, Auto};
 use super::choices::{AdversarialLoss, ComputeDevice, GanRecipe, MotionRepresentation, NetworkPreset};
+use super::sections::KeyRanges;
 use orator_base::types::posture::PostureChannel;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-/// The keys of `[gan]`; `N` is the type of a number, and `C` that of a count, that a recipe may choose.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct GanValues<N, C> {
-    pub recipe: GanRecipe,
-    pub preset: NetworkPreset,
-    pub representation: MotionRepresentation,
-    pub channels: Vec<PostureChannel>,
-    pub window_frames: usize,
-    pub stride_frames: usize,
-    pub batch: C,
-    pub steps: C,
-    pub learning_rate: N,
-    pub shared_rate: N,
-    pub warmup_steps: C,
-    pub fade_to: N,
-    pub adversarial: AdversarialLoss,
-    pub lambda_l1: f64,
-    pub lambda_speed: N,
-    pub lambda_energy: N,
-    pub lambda_velocity: f64,
-    pub lambda_gan: N,
-    pub lambda_bone: f64,
-    pub adversarial_from: C,
-    pub adversarial_ramp: C,
-    pub ema_decay: N,
-    pub dropout: N,
-    pub weight_decay: N,
-    pub augment_speed: N,
-    pub augment_pitch: N,
-    pub augment_gain_db: N,
-    pub augment_noise_db: N,
-    pub augment_mask_bands: C,
-    pub augment_mask_secs: N,
-    pub augment_pose_noise: N,
-    pub augment_mirror: f64,
-    pub seed: u64,
-    pub epoch_steps: C,
-    pub patience: C,
-    pub checkpoint_every: usize,
-    pub keep_checkpoints: usize,
-    pub device: ComputeDevice,
+/// Defines [`GanValues`] with defaults and ranges; `$number` and `$count` are the arguments for what a recipe chooses.
+macro_rules! gan_values {
+    (|$number:ident, $count:ident| $($key:ident: $type:ty = $default:expr $(=> $range:expr)?,)*) => {
+        /// The keys of `[gan]`; `N` is the type of a number, and `C` that of a count, that a recipe may choose.
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[serde(default)]
+        pub struct GanValues<N, C> {
+            $(pub $key: $type,)*
+        }
+
+        impl<N: Copy, C: Copy> GanValues<N, C> {
+            pub(super) const RANGES: KeyRanges = &[$($((stringify!($key), $range),)?)*];
+
+            /// The defaults, with `number` and `count` for what a recipe chooses.
+            fn with($number: N, $count: C) -> Self {
+                Self { $($key: $default,)* }
+            }
+        }
+    };
+}
+
+gan_values! { |number, count|
+    recipe: GanRecipe = GanRecipe::Auto,
+    preset: NetworkPreset = NetworkPreset::Light,
+    representation: MotionRepresentation = MotionRepresentation::Bones,
+    channels: Vec<PostureChannel> = Vec::new(),
+    window_frames: usize = 64 => (32.0, 4096.0, "frames"),
+    stride_frames: usize = 5 => (1.0, 4096.0, "frames"),
+    batch: C = count => (2.0, 4096.0, "windows"),
+    steps: C = count => (1.0, 1e9, "steps"),
+    learning_rate: N = number => (1e-9, 1.0, ""),
+    shared_rate: N = number => (0.0, 1.0, ""),
+    warmup_steps: C = count => (0.0, 1e9, "steps"),
+    fade_to: N = number => (0.0, 1.0, ""),
+    adversarial: AdversarialLoss = AdversarialLoss::LeastSquares,
+    lambda_l1: f64 = 1.0 => (0.0, 1e4, ""),
+    lambda_speed: N = number => (0.0, 1e4, ""),
+    lambda_energy: N = number => (0.0, 1e4, ""),
+    lambda_velocity: f64 = 0.0 => (0.0, 1e4, ""),
+    lambda_gan: N = number => (0.0, 1e4, ""),
+    lambda_bone: f64 = 0.1 => (0.0, 1e4, ""),
+    adversarial_from: C = count => (0.0, 1e9, "steps"),
+    adversarial_ramp: C = count => (0.0, 1e9, "steps"),
+    ema_decay: N = number => (0.0, 0.999_999, ""),
+    dropout: N = number => (0.0, 0.9, ""),
+    weight_decay: N = number => (0.0, 10.0, ""),
+    augment_speed: N = number => (0.0, 0.5, ""),
+    augment_pitch: N = number => (0.0, 16.0, "bands"),
+    augment_gain_db: N = number => (0.0, 40.0, "dB"),
+    augment_noise_db: N = number => (-120.0, 20.0, "dB"),
+    augment_mask_bands: C = count => (0.0, 32.0, "bands"),
+    augment_mask_secs: N = number => (0.0, 2.0, "seconds"),
+    augment_pose_noise: N = number => (0.0, 2.0, "deviations"),
+    augment_mirror: f64 = 0.0 => (0.0, 1.0, ""),
+    seed: u64 = 1337,
+    epoch_steps: C = count => (1.0, 1e9, "steps"),
+    patience: C = count => (0.0, 1e9, "epochs"),
+    checkpoint_every: usize = 100 => (1.0, 1e9, "steps"),
+    keep_checkpoints: usize = 3 => (1.0, 1e6, "checkpoints"),
+    device: ComputeDevice = ComputeDevice::Cpu,
 }
 
 /// `[gan]` as a user asks for it.
 pub type GanConfig = GanValues<Auto<f64>, Auto<usize>>;
 /// `[gan]` with every number.
 pub type GanSettings = GanValues<f64, usize>;
-
-impl<N: Copy, C: Copy> GanValues<N, C> {
-    /// The defaults, with `number` and `count` for what a recipe chooses.
-    fn with(number: N, count: C) -> Self {
-        Self {
-            recipe: GanRecipe::Auto,
-            preset: NetworkPreset::Light,
-            representation: MotionRepresentation::Bones,
-            channels: Vec::new(),
-            window_frames: 64,
-            stride_frames: 5,
-            batch: count,
-            steps: count,
-            learning_rate: number,
-            shared_rate: number,
-            warmup_steps: count,
-            fade_to: number,
-            adversarial: AdversarialLoss::LeastSquares,
-            lambda_l1: 1.0,
-            lambda_speed: number,
-            lambda_energy: number,
-            lambda_velocity: 0.0,
-            lambda_gan: number,
-            lambda_bone: 0.1,
-            adversarial_from: count,
-            adversarial_ramp: count,
-            ema_decay: number,
-            dropout: number,
-            weight_decay: number,
-            augment_speed: number,
-            augment_pitch: number,
-            augment_gain_db: number,
-            augment_noise_db: number,
-            augment_mask_bands: count,
-            augment_mask_secs: number,
-            augment_pose_noise: number,
-            augment_mirror: 0.0,
-            seed: 1337,
-            epoch_steps: count,
-            patience: count,
-            checkpoint_every: 100,
-            keep_checkpoints: 3,
-            device: ComputeDevice::Cpu,
-        }
-    }
-}
 
 impl Default for GanConfig {
     fn default() -> Self {

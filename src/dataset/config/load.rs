@@ -1,6 +1,4 @@
-//! `pipeline.toml`, twice: as written (`file`: a table with the line of every key) and resolved (`Settings`:
-//! defaults in, paths absolute, every value in its range). Each section is one small struct whose defaults are the
-//! documented ones; the top level `pipeline.toml` documents them and a test holds the two together.
+//! From the text of a configuration to settings, or to all that is wrong with it.
 
 use super::file::{self, Folders, Problem};
 use super::rules;
@@ -49,9 +47,7 @@ pub fn load(file: &Path, sets: &[String]) -> Result<Config> {
     let text = std::fs::read_to_string(file).with_context(|| {
         format!("cannot read the configuration {}; `orator init DIR` writes one, -c FILE names another", file.display())
     })?;
-    let file = std::path::absolute(file)?;
-    let (settings, notes) = resolve(&text, sets, &file)?;
-    Ok(Config { settings, file, notes })
+    resolve(&text, sets, std::path::absolute(file)?)
 }
 
 /// The configuration of an empty file in the place of `file`, with the `--set` changes.
@@ -59,13 +55,11 @@ pub fn load(file: &Path, sets: &[String]) -> Result<Config> {
 /// # Errors
 /// `ConfigError` with every problem at once.
 pub fn load_default(file: &Path, sets: &[String]) -> Result<Config> {
-    let file = std::path::absolute(file)?;
-    let (settings, notes) = resolve("", sets, &file)?;
-    Ok(Config { settings, file, notes })
+    resolve("", sets, std::path::absolute(file)?)
 }
 
-/// The settings that the text of `file` gives, and notes on former keys.
-fn resolve(text: &str, sets: &[String], file: &Path) -> Result<(Settings, Vec<String>)> {
+/// What the text of `file` gives.
+fn resolve(text: &str, sets: &[String], file: PathBuf) -> Result<Config> {
     let current = std::env::current_dir()?;
     let unicode = |folder: &Path| -> Result<String> {
         Ok(folder
@@ -79,9 +73,9 @@ fn resolve(text: &str, sets: &[String], file: &Path) -> Result<(Settings, Vec<St
     problems.extend(rules::check(&given.settings, &given.locations));
     problems.sort_by(|a, b| (a.location, &a.key).cmp(&(b.location, &b.key)));
     if problems.is_empty() {
-        Ok((given.settings, given.notes))
+        Ok(Config { settings: given.settings, file, notes: given.notes })
     } else {
-        Err(ConfigError { file: file.to_owned(), problems }.into())
+        Err(ConfigError { file, problems }.into())
     }
 }
 
@@ -90,17 +84,18 @@ mod tests {
     use super::*;
     use std::collections::BTreeSet;
 
+    fn resolved(text: &str, sets: &[&str]) -> Result<Config> {
+        resolve(text, &sets.iter().map(|set| (*set).to_owned()).collect::<Vec<_>>(), "pipeline.toml".into())
+    }
+
     fn problems(text: &str, sets: &[&str]) -> Vec<String> {
-        let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
-        match resolve(text, &sets, Path::new("pipeline.toml")) {
-            Ok(_) => Vec::new(),
-            Err(error) => error.to_string().lines().skip(1).map(|line| line.trim().to_owned()).collect(),
-        }
+        let error = resolved(text, sets).map_or_else(|error| error.to_string(), |_| String::new());
+        error.lines().skip(1).map(|line| line.trim().to_owned()).collect()
     }
 
     #[test]
     fn the_documented_file_is_the_default() {
-        let settings = resolve(DEFAULT_FILE, &[], Path::new("pipeline.toml")).unwrap().0;
+        let settings = resolved(DEFAULT_FILE, &[]).unwrap().settings;
         assert_eq!(Settings { speaker: Vec::new(), ..settings }, Settings::default());
         let one_speaker = Settings { speaker: vec![crate::config::SpeakerConfig::default()], ..Settings::default() };
         let defaults = toml::Table::try_from(one_speaker).unwrap();
@@ -124,11 +119,11 @@ mod tests {
             }
             let key = format!("{section}.{name}");
             let written = format!("[{section}.advanced]\n{name} = {default}\n");
-            let read = resolve(&written, &[], Path::new("pipeline.toml")).unwrap().0;
-            let set = resolve("", &[format!("{section}.{name}={default}")], Path::new("pipeline.toml")).unwrap().0;
-            let own = resolve("", &[], Path::new("pipeline.toml")).unwrap().0;
-            assert!(read == own && set == own, "{key} is not {default}");
-            if let Some((_, low, high, unit)) = rules::RANGES.iter().find(|(of, ..)| *of == key) {
+            let set = format!("{section}.{name}={default}");
+            let own = resolved("", &[]).unwrap().settings;
+            assert!(resolved(&written, &[]).unwrap().settings == own, "{key} is not {default}");
+            assert!(resolved("", &[&set]).unwrap().settings == own, "{key} is not {default}");
+            if let Some((_, (low, high, unit))) = rules::ranges().find(|(of, _)| *of == key) {
                 assert_eq!(range, format!("{low} to {high} {unit}").trim_end(), "{key}");
             }
             assert!(keys.insert(key), "{name} is there twice");
@@ -138,10 +133,7 @@ mod tests {
 
     #[test]
     fn a_key_is_read_in_its_section_and_in_the_advanced_table() {
-        let read = |text: &str, sets: &[&str]| {
-            let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
-            resolve(text, &sets, Path::new("p.toml")).unwrap().0.gan
-        };
+        let read = |text: &str, sets: &[&str]| resolved(text, sets).unwrap().settings.gan;
         let expected = read("[gan]\nlambda_speed = 0.5\n", &[]);
         assert_eq!(expected.lambda_speed.given(), Some(0.5));
         assert_eq!(read("[gan.advanced]\nlambda_speed = 0.5\n", &[]), expected);
@@ -201,14 +193,14 @@ mod tests {
     #[test]
     fn the_smallest_file_works() {
         let text = "[[speaker]]\nname = \"host\"\nvideos = [\"videos/host/*.mp4\"]\n";
-        let settings = resolve(text, &["extract.fps=10".into()], Path::new("p.toml")).unwrap().0;
+        let settings = resolved(text, &["extract.fps=10"]).unwrap().settings;
         assert_eq!((settings.speaker[0].name.as_str(), settings.extract.fps), ("host", 10));
     }
 
     #[test]
     fn former_keys_are_read_with_a_note() {
         let text = "[segment]\nmax_bone_change = 0.3\n[lift]\nlevel = true\n[shard]\ntest = 0.2\n";
-        let (settings, notes) = resolve(text, &["shard.validation=0.1".into()], Path::new("p.toml")).unwrap();
+        let Config { settings, notes, .. } = resolved(text, &["shard.validation=0.1"]).unwrap();
         assert_eq!((settings.lift.max_bone_change, settings.lift.level), (0.3, true));
         assert_eq!((settings.dataset.validation, settings.dataset.test), (0.1, 0.2));
         assert_eq!(
@@ -265,8 +257,8 @@ mod tests {
     fn paths_count_from_the_file_or_the_current_folder() {
         let text = "[models]\nonnxruntime = \"lib/ort.so\"\n[lift]\nbody_weights = \"/abs.safetensors\"\n\
                     [[speaker]]\nname = \"work\"\nvideos = [\"a.mp4\"]\nreference = \"face.jpg\"\nsource = \"disk\"\n";
-        let file = Path::new("/project/pipeline.toml");
-        let settings = resolve(text, &["lift.hand_weights=hands.safetensors".into()], file).unwrap().0;
+        let sets = ["lift.hand_weights=hands.safetensors".to_owned()];
+        let settings = resolve(text, &sets, "/project/pipeline.toml".into()).unwrap().settings;
         assert_eq!(&*settings.work.dir, Path::new("/project/work"));
         assert_eq!(&*settings.models.onnxruntime, Path::new("/project/lib/ort.so"));
         assert_eq!(&*settings.lift.body_weights, Path::new("/abs.safetensors"));
@@ -302,7 +294,7 @@ mod tests {
             text in "(\\[?\\[?(gan|speaker|extract|work|shard|[a-z]{1,4})[\\].=]?[a-z_]{0,6} ?=? ?[\"0-9a-z.\\[\\]{}-]{0,8}\n){0,8}|.{0,60}",
             set in "(gan|work|lift|speaker)\\.[a-z]{1,8}=.{0,8}|.{0,20}",
         ) {
-            let _ = resolve(&text, &[set], Path::new("pipeline.toml"));
+            let _ = resolved(&text, &[&set]);
         }
     }
 }

@@ -1,101 +1,38 @@
-//! Ranges of the settings: one line a key.
+//! Ranges of the settings, as the sections state them, and what no range says.
 
-use super::Settings;
 use super::auto::AUTO;
 use super::file::{Problem, SourceLocation};
+use super::sections::KeyRanges;
+use super::{DatasetConfig, ExtractConfig, GanConfig, LiftConfig, ModelsConfig, Pose2dConfig, SegmentConfig};
+use super::{Seq2seqConfig, Settings, WorkConfig};
 use std::collections::{BTreeMap, BTreeSet};
 use toml::{Table, Value};
 
-/// Least and greatest value of each number, and its unit.
-pub(super) const RANGES: [(&str, f64, f64, &str); 80] = [
-    ("extract.fps", 1.0, 120.0, "frames a second"),
-    ("extract.audio_track", 0.0, 100.0, ""),
-    ("pose2d.person_every", 1.0, 10_000.0, "frames"),
-    ("pose2d.palm_every", 1.0, 10_000.0, "frames"),
-    ("pose2d.person_follow", 0.0, 1.0, ""),
-    ("pose2d.hand_score", 0.0, 1.0, ""),
-    ("pose2d.joint_score", 0.0, 1.0, ""),
-    ("segment.shot_threshold", 0.0, 1.0, ""),
-    ("segment.min_frames", 1.0, 1e6, "frames"),
-    ("segment.joint_score", 0.0, 1.0, ""),
-    ("segment.max_body_gap_secs", 0.0, 1.0, "seconds, all that lift fills"),
-    ("segment.max_hand_gap_secs", 0.0, 1.0, "seconds, all that lift fills"),
-    ("segment.min_hand_share", 0.0, 1.0, ""),
-    ("segment.max_rest_move", 0.0, 1.0, "shoulder widths"),
-    ("segment.min_shoulder_px", 1.0, 1e5, "pixels"),
-    ("segment.min_sound_db", -120.0, 0.0, "dB of full scale"),
-    ("segment.min_speech", 0.0, 1.0, ""),
-    ("segment.min_lip_sync", -1.0, 1.0, ""),
-    ("segment.max_quiet_secs", 0.0, 60.0, "seconds"),
-    ("segment.min_change", 0.0, 255.0, "steps of 8-bit colour"),
-    ("segment.max_still_secs", 0.0, 1.0, "seconds, all that lift fills"),
-    ("segment.min_facing", -10.0, 10.0, "neck-nose distances"),
-    ("segment.max_nose_off", 0.0, 10.0, "half shoulder widths"),
-    ("segment.max_people", 1.0, 255.0, "people"),
-    ("segment.max_crowd_share", 0.0, 1.0, ""),
-    ("segment.max_jump", 0.01, 100.0, "shoulder widths"),
-    ("lift.max_bone_change", 0.01, 100.0, "bone lengths"),
-    ("lift.smooth_arms", 0.0, 30.0, "frames"),
-    ("lift.smooth_hands", 0.0, 30.0, "frames"),
-    ("dataset.max_mb", 1.0, 100_000.0, "megabytes"),
-    ("dataset.validation", 0.0, 0.9, ""),
-    ("dataset.test", 0.0, 0.9, ""),
-    ("dataset.duplicate_secs", 0.0, 3600.0, "seconds"),
-    ("gan.window_frames", 32.0, 4096.0, "frames"),
-    ("gan.stride_frames", 1.0, 4096.0, "frames"),
-    ("gan.batch", 2.0, 4096.0, "windows"),
-    ("gan.steps", 1.0, 1e9, "steps"),
-    ("gan.learning_rate", 1e-9, 1.0, ""),
-    ("gan.lambda_l1", 0.0, 1e4, ""),
-    ("gan.lambda_speed", 0.0, 1e4, ""),
-    ("gan.lambda_energy", 0.0, 1e4, ""),
-    ("gan.lambda_velocity", 0.0, 1e4, ""),
-    ("gan.epoch_steps", 1.0, 1e9, "steps"),
-    ("gan.lambda_gan", 0.0, 1e4, ""),
-    ("gan.lambda_bone", 0.0, 1e4, ""),
-    ("gan.shared_rate", 0.0, 1.0, ""),
-    ("gan.warmup_steps", 0.0, 1e9, "steps"),
-    ("gan.fade_to", 0.0, 1.0, ""),
-    ("gan.adversarial_from", 0.0, 1e9, "steps"),
-    ("gan.adversarial_ramp", 0.0, 1e9, "steps"),
-    ("gan.ema_decay", 0.0, 0.999_999, ""),
-    ("gan.dropout", 0.0, 0.9, ""),
-    ("gan.weight_decay", 0.0, 10.0, ""),
-    ("gan.augment_speed", 0.0, 0.5, ""),
-    ("gan.augment_pitch", 0.0, 16.0, "bands"),
-    ("gan.augment_gain_db", 0.0, 40.0, "dB"),
-    ("gan.augment_noise_db", -120.0, 20.0, "dB"),
-    ("gan.augment_mask_bands", 0.0, 32.0, "bands"),
-    ("gan.augment_mask_secs", 0.0, 2.0, "seconds"),
-    ("gan.augment_pose_noise", 0.0, 2.0, "deviations"),
-    ("gan.augment_mirror", 0.0, 1.0, ""),
-    ("gan.patience", 0.0, 1e9, "epochs"),
-    ("gan.checkpoint_every", 1.0, 1e9, "steps"),
-    ("gan.keep_checkpoints", 1.0, 1e6, "checkpoints"),
-    ("seq2seq.stride_frames", 0.0, 4096.0, "frames"),
-    ("seq2seq.batch", 2.0, 4096.0, "segments"),
-    ("seq2seq.steps", 1.0, 1e9, "steps"),
-    ("seq2seq.learning_rate", 1e-9, 1.0, ""),
-    ("seq2seq.fade_from", 0.0, 1e9, "steps"),
-    ("seq2seq.lambda_continuity", 0.0, 1e4, ""),
-    ("seq2seq.lambda_reach", 0.0, 1e4, ""),
-    ("seq2seq.lambda_adversarial", 0.0, 1e4, ""),
-    ("seq2seq.words_around_secs", 0.0, 60.0, "s"),
-    ("seq2seq.own_previous", 0.0, 1.0, ""),
-    ("seq2seq.word_dropout", 0.0, 0.95, ""),
-    ("seq2seq.hidden", 1.0, 4096.0, "numbers"),
-    ("seq2seq.autoencoder_steps", 0.0, 1e9, "steps"),
-    ("seq2seq.epoch_steps", 1.0, 1e9, "steps"),
-    ("seq2seq.checkpoint_every", 1.0, 1e9, "steps"),
-    ("seq2seq.keep_checkpoints", 1.0, 1e6, "checkpoints"),
-];
+/// Least and greatest value of each number by its key, and its unit.
+pub(super) fn ranges() -> impl Iterator<Item = (String, (f64, f64, &'static str))> {
+    let sections = [
+        ("work", WorkConfig::RANGES),
+        ("models", ModelsConfig::RANGES),
+        ("extract", ExtractConfig::RANGES),
+        ("pose2d", Pose2dConfig::RANGES),
+        ("segment", SegmentConfig::RANGES),
+        ("lift", LiftConfig::RANGES),
+        ("dataset", DatasetConfig::RANGES),
+        ("gan", GanConfig::RANGES),
+        ("seq2seq", Seq2seqConfig::RANGES),
+    ];
+    let of_section = |(section, keys): (&'static str, KeyRanges)| {
+        keys.iter().map(move |(key, range)| (format!("{section}.{key}"), *range))
+    };
+    sections.into_iter().flat_map(of_section)
+}
 
 /// Every value out of its range, with what was expected.
 pub fn check(settings: &Settings, locations: &BTreeMap<String, SourceLocation>) -> Vec<Problem> {
     let mut rules = Rules { locations, problems: Vec::new() };
     // Settings are plain numbers, strings and paths: they always have a TOML form.
     let values = Table::try_from(settings).unwrap_or_default();
-    for (key, low, high, unit) in RANGES {
+    for (key, (low, high, unit)) in ranges() {
         let value = key.split_once('.').and_then(|(section, name)| values.get(section)?.get(name));
         let value = match value {
             Some(Value::Integer(value)) => *value as f64,
@@ -106,7 +43,7 @@ pub fn check(settings: &Settings, locations: &BTreeMap<String, SourceLocation>) 
         };
         if !(low..=high).contains(&value) {
             let message = format!("{value} is out of range: expected {low} to {high} {unit}");
-            rules.problem(key, message.trim_end().to_owned());
+            rules.problem(&key, message.trim_end().to_owned());
         }
     }
     if settings.dataset.validation + settings.dataset.test > 0.95 {

@@ -12,6 +12,33 @@ use std::path::PathBuf;
 pub(super) const PATHS: [&str; 6] =
     ["work.dir", "models.dir", "models.onnxruntime", "lift.body_weights", "lift.hand_weights", "speaker.reference"];
 
+/// The keys of a section that are numbers: least and greatest value, unit.
+pub(super) type KeyRanges = &'static [(&'static str, (f64, f64, &'static str))];
+
+/// A section of the configuration: each key with its type, its default and, of a number, its range. Unknown keys are
+/// refused.
+macro_rules! section {
+    ($(#[$doc:meta])* $name:ident { $($key:ident: $type:ty = $default:expr $(=> $range:expr)?,)* }) => {
+        $(#[$doc])*
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[serde(default, deny_unknown_fields)]
+        pub struct $name {
+            $(pub $key: $type,)*
+        }
+
+        impl $name {
+            pub(super) const RANGES: $crate::config::sections::KeyRanges = &[$($((stringify!($key), $range),)?)*];
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self { $($key: $default,)* }
+            }
+        }
+    };
+}
+pub(super) use section;
+
 /// Everything a run needs to know. Paths are absolute once resolved.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -65,43 +92,31 @@ pub fn image_size(text: &str) -> Option<[u32; 2]> {
     Some([px(width)?, px(height)?])
 }
 
-/// `[work]`: where the stages write.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct WorkConfig {
-    pub dir: PathBuf,
-    pub jobs: usize,
-    pub sandbox: bool,
-}
-
-impl Default for WorkConfig {
-    fn default() -> Self {
-        Self { dir: "work".into(), jobs: 0, sandbox: true }
+section! {
+    /// `[work]`: where the stages write.
+    WorkConfig {
+        dir: PathBuf = "work".into(),
+        jobs: usize = 0,
+        sandbox: bool = true,
     }
 }
 
-/// `[models]`: where the ONNX models and the ONNX Runtime library are.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ModelsConfig {
-    pub dir: PathBuf,
-    pub onnxruntime: PathBuf,
-}
-
-impl Default for ModelsConfig {
-    fn default() -> Self {
-        Self { dir: "models".into(), onnxruntime: PathBuf::new() }
+section! {
+    /// `[models]`: where the ONNX models and the ONNX Runtime library are.
+    ModelsConfig {
+        dir: PathBuf = "models".into(),
+        onnxruntime: PathBuf = PathBuf::new(),
     }
 }
 
-/// `[extract]`: the dataset's clock.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ExtractConfig {
-    pub fps: u32,
-    pub audio_track: usize,
-    pub fix_offset: bool,
-    pub keep_frames: bool,
+section! {
+    /// `[extract]`: the dataset's clock.
+    ExtractConfig {
+        fps: u32 = 15 => (1.0, 120.0, "frames a second"),
+        audio_track: usize = 0 => (0.0, 100.0, ""),
+        fix_offset: bool = false,
+        keep_frames: bool = false,
+    }
 }
 
 impl ExtractConfig {
@@ -111,136 +126,70 @@ impl ExtractConfig {
     }
 }
 
-impl Default for ExtractConfig {
-    fn default() -> Self {
-        Self { fps: 15, audio_track: 0, fix_offset: false, keep_frames: false }
+section! {
+    /// `[pose2d]`: which models look at a frame (ids of `models/manifest.toml`; `auto`: the best that is there), and the
+    /// tracking of the one speaker.
+    Pose2dConfig {
+        person: String = "auto".into(),
+        body: String = "auto".into(),
+        hand: String = "auto".into(),
+        palm: String = "auto".into(),
+        face: String = "auto".into(),
+        follow: FollowRule = FollowRule::Largest,
+        person_every: usize = 5 => (1.0, 10_000.0, "frames"),
+        palm_every: usize = 5 => (1.0, 10_000.0, "frames"),
+        person_follow: f64 = 0.3 => (0.0, 1.0, ""),
+        hand_score: f64 = 0.5 => (0.0, 1.0, ""),
+        joint_score: f64 = 0.3 => (0.0, 1.0, ""),
     }
 }
 
-/// `[pose2d]`: which models look at a frame (ids of `models/manifest.toml`; `auto`: the best that is there), and the
-/// tracking of the one speaker.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Pose2dConfig {
-    pub person: String,
-    pub body: String,
-    pub hand: String,
-    pub palm: String,
-    pub face: String,
-    pub follow: FollowRule,
-    pub person_every: usize,
-    pub palm_every: usize,
-    pub person_follow: f64,
-    pub hand_score: f64,
-    pub joint_score: f64,
-}
-
-impl Default for Pose2dConfig {
-    fn default() -> Self {
-        Self {
-            person: "auto".into(),
-            body: "auto".into(),
-            hand: "auto".into(),
-            palm: "auto".into(),
-            face: "auto".into(),
-            follow: FollowRule::Largest,
-            person_every: 5,
-            palm_every: 5,
-            person_follow: 0.3,
-            hand_score: 0.5,
-            joint_score: 0.3,
-        }
+section! {
+    /// `[segment]`: which stretches are worth keeping.
+    SegmentConfig {
+        shot_threshold: f64 = 0.2 => (0.0, 1.0, ""),
+        min_frames: usize = 64 => (1.0, 1e6, "frames"),
+        joint_score: f64 = 0.3 => (0.0, 1.0, ""),
+        max_body_gap_secs: f64 = 0.34 => (0.0, 1.0, "seconds, all that lift fills"),
+        max_hand_gap_secs: f64 = 1.0 => (0.0, 1.0, "seconds, all that lift fills"),
+        min_hand_share: f64 = 0.5 => (0.0, 1.0, ""),
+        max_rest_move: f64 = 0.1 => (0.0, 1.0, "shoulder widths"),
+        min_shoulder_px: f64 = 40.0 => (1.0, 1e5, "pixels"),
+        min_sound_db: f64 = -50.0 => (-120.0, 0.0, "dB of full scale"),
+        speech: SpeechRule = SpeechRule::Auto,
+        min_speech: f64 = 0.4 => (0.0, 1.0, ""),
+        min_lip_sync: f64 = 0.1 => (-1.0, 1.0, ""),
+        max_quiet_secs: f64 = 3.0 => (0.0, 60.0, "seconds"),
+        min_change: f64 = 0.03 => (0.0, 255.0, "steps of 8-bit colour"),
+        max_still_secs: f64 = 0.5 => (0.0, 1.0, "seconds, all that lift fills"),
+        min_facing: f64 = 1.0 => (-10.0, 10.0, "neck-nose distances"),
+        max_nose_off: f64 = 1.0 => (0.0, 10.0, "half shoulder widths"),
+        max_people: u32 = 5 => (1.0, 255.0, "people"),
+        max_crowd_share: f64 = 0.3 => (0.0, 1.0, ""),
+        max_jump: f64 = 0.5 => (0.01, 100.0, "shoulder widths"),
     }
 }
 
-/// `[segment]`: which stretches are worth keeping.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct SegmentConfig {
-    pub shot_threshold: f64,
-    pub min_frames: usize,
-    pub joint_score: f64,
-    pub max_body_gap_secs: f64,
-    pub max_hand_gap_secs: f64,
-    pub min_hand_share: f64,
-    pub max_rest_move: f64,
-    pub min_shoulder_px: f64,
-    pub min_sound_db: f64,
-    pub speech: SpeechRule,
-    pub min_speech: f64,
-    pub min_lip_sync: f64,
-    pub max_quiet_secs: f64,
-    pub min_change: f64,
-    pub max_still_secs: f64,
-    pub min_facing: f64,
-    pub max_nose_off: f64,
-    pub max_people: u32,
-    pub max_crowd_share: f64,
-    pub max_jump: f64,
-}
-
-impl Default for SegmentConfig {
-    fn default() -> Self {
-        Self {
-            shot_threshold: 0.2,
-            min_frames: 64,
-            joint_score: 0.3,
-            max_body_gap_secs: 0.34,
-            max_hand_gap_secs: 1.0,
-            min_hand_share: 0.5,
-            max_rest_move: 0.1,
-            min_shoulder_px: 40.0,
-            min_sound_db: -50.0,
-            speech: SpeechRule::Auto,
-            min_speech: 0.4,
-            min_lip_sync: 0.1,
-            max_quiet_secs: 3.0,
-            min_change: 0.03,
-            max_still_secs: 0.5,
-            min_facing: 1.0,
-            max_nose_off: 1.0,
-            max_people: 5,
-            max_crowd_share: 0.3,
-            max_jump: 0.5,
-        }
+section! {
+    /// `[lift]`: 2D keypoints to 3D joints.
+    LiftConfig {
+        body_weights: PathBuf = PathBuf::new(),
+        hand_weights: PathBuf = PathBuf::new(),
+        smooth_arms: f64 = 0.8 => (0.0, 30.0, "frames"),
+        smooth_hands: f64 = 1.5 => (0.0, 30.0, "frames"),
+        level: bool = false,
+        max_bone_change: f64 = 0.4 => (0.01, 100.0, "bone lengths"),
     }
 }
 
-/// `[lift]`: 2D keypoints to 3D joints.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct LiftConfig {
-    pub body_weights: PathBuf,
-    pub hand_weights: PathBuf,
-    pub smooth_arms: f64,
-    pub smooth_hands: f64,
-    pub level: bool,
-    pub max_bone_change: f64,
-}
-
-impl Default for LiftConfig {
-    fn default() -> Self {
-        let none = PathBuf::new();
-        let (smooth_arms, smooth_hands, level, max_bone_change) = (0.8, 1.5, false, 0.4);
-        Self { body_weights: none.clone(), hand_weights: none, smooth_arms, smooth_hands, level, max_bone_change }
-    }
-}
-
-/// `[dataset]`: the dataset on disk.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct DatasetConfig {
-    pub max_mb: u32,
-    pub split_by: SplitUnit,
-    pub validation: f64,
-    pub test: f64,
-    pub duplicate_secs: f64,
-    pub posture: bool,
-}
-
-impl Default for DatasetConfig {
-    fn default() -> Self {
-        let (validation, test, duplicate_secs, posture) = (0.15, 0.15, 5.0, false);
-        Self { max_mb: 256, split_by: SplitUnit::Auto, validation, test, duplicate_secs, posture }
+section! {
+    /// `[dataset]`: the dataset on disk.
+    DatasetConfig {
+        max_mb: u32 = 256 => (1.0, 100_000.0, "megabytes"),
+        split_by: SplitUnit = SplitUnit::Auto,
+        validation: f64 = 0.15 => (0.0, 0.9, ""),
+        test: f64 = 0.15 => (0.0, 0.9, ""),
+        duplicate_secs: f64 = 5.0 => (0.0, 3600.0, "seconds"),
+        posture: bool = false,
     }
 }

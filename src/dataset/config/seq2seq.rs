@@ -2,64 +2,35 @@
 //! keys.
 
 use super::choices::{ContinuityLoss, DistanceLoss, ReachLoss, SequenceNetwork};
+use super::sections::section;
 use serde::{Deserialize, Serialize};
 
-/// `[seq2seq]`: the network, its losses and its training.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Seq2seqConfig {
-    pub network: SequenceNetwork,
-    pub stride_frames: usize,
-    pub batch: usize,
-    pub steps: usize,
-    pub learning_rate: f64,
-    pub fade_from: usize,
-    pub distance: DistanceLoss,
-    pub continuity: ContinuityLoss,
-    pub reach: ReachLoss,
-    pub lambda_continuity: f64,
-    pub lambda_reach: f64,
-    pub lambda_adversarial: f64,
-    pub words_around_secs: f64,
-    pub own_previous: f64,
-    pub word_dropout: f64,
-    pub hidden: usize,
-    pub hears_context: bool,
-    pub autoencoder_steps: usize,
-    pub seed: u64,
-    pub epoch_steps: usize,
-    pub patience: usize,
-    pub checkpoint_every: usize,
-    pub keep_checkpoints: usize,
-}
-
-impl Default for Seq2seqConfig {
-    fn default() -> Self {
-        Self {
-            network: SequenceNetwork::Contextual,
-            stride_frames: 0,
-            batch: 50,
-            steps: 20_000,
-            learning_rate: 1e-3,
-            fade_from: 0,
-            distance: DistanceLoss::L1,
-            continuity: ContinuityLoss::Numbers,
-            reach: ReachLoss::Excursion,
-            lambda_continuity: 0.01,
-            lambda_reach: 1.0,
-            lambda_adversarial: 0.01,
-            words_around_secs: 2.0,
-            own_previous: 0.0,
-            word_dropout: 0.0,
-            hidden: 150,
-            hears_context: false,
-            autoencoder_steps: 2_000,
-            seed: 1337,
-            epoch_steps: 250,
-            patience: 0,
-            checkpoint_every: 250,
-            keep_checkpoints: 3,
-        }
+section! {
+    /// `[seq2seq]`: the network, its losses and its training.
+    Seq2seqConfig {
+        network: SequenceNetwork = SequenceNetwork::Contextual,
+        stride_frames: usize = 0 => (0.0, 4096.0, "frames"),
+        batch: usize = 50 => (2.0, 4096.0, "segments"),
+        steps: usize = 20_000 => (1.0, 1e9, "steps"),
+        learning_rate: f64 = 1e-3 => (1e-9, 1.0, ""),
+        fade_from: usize = 0 => (0.0, 1e9, "steps"),
+        distance: DistanceLoss = DistanceLoss::L1,
+        continuity: ContinuityLoss = ContinuityLoss::Numbers,
+        reach: ReachLoss = ReachLoss::Excursion,
+        lambda_continuity: f64 = 0.01 => (0.0, 1e4, ""),
+        lambda_reach: f64 = 1.0 => (0.0, 1e4, ""),
+        lambda_adversarial: f64 = 0.01 => (0.0, 1e4, ""),
+        words_around_secs: f64 = 2.0 => (0.0, 60.0, "s"),
+        own_previous: f64 = 0.0 => (0.0, 1.0, ""),
+        word_dropout: f64 = 0.0 => (0.0, 0.95, ""),
+        hidden: usize = 150 => (1.0, 4096.0, "numbers"),
+        hears_context: bool = false,
+        autoencoder_steps: usize = 2_000 => (0.0, 1e9, "steps"),
+        seed: u64 = 1337,
+        epoch_steps: usize = 250 => (1.0, 1e9, "steps"),
+        patience: usize = 0,
+        checkpoint_every: usize = 250 => (1.0, 1e9, "steps"),
+        keep_checkpoints: usize = 3 => (1.0, 1e6, "checkpoints"),
     }
 }
 

@@ -3,12 +3,12 @@
 //! old one.
 
 use crate::info::DatasetInfo;
-use crate::layout::{pretty, read_json};
 use crate::leakage::Leakage;
 use crate::split::SplitBy;
 use crate::write::assemble::assemble;
 use crate::write::part::{self, VideoEntry};
 use crate::{INFO, LEAKAGE};
+use crate::{pretty, read_json};
 use anyhow::{Context, Result, ensure};
 use orator_base::stage::workdir;
 use std::collections::BTreeSet;

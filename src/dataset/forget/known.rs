@@ -2,7 +2,7 @@
 //! name or work name.
 
 use crate::config::{Config, videos};
-use crate::layout::file_name;
+use crate::file_name;
 use crate::split::SplitRecord;
 use crate::write::part::{self, VideoEntry};
 use anyhow::{Result, bail, ensure};

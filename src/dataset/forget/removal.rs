@@ -5,7 +5,7 @@
 use super::dataset;
 use super::known::KnownVideo;
 use super::search::SearchTerm;
-use crate::layout::file_name;
+use crate::file_name;
 use crate::split::SplitRecord;
 use anyhow::{Context, Result};
 use orator_base::stage::artifacts::{self, StageName, speaker_dir};

@@ -1,7 +1,7 @@
 //! Search of every byte of every file for a video's names and hashes: as text, as raw bytes, and inside `.npz` archives
 //! (members of tar files are stored uncompressed). Names of files and folders are searched too.
 
-use crate::layout::file_name;
+use crate::file_name;
 use anyhow::{Context, Result};
 use std::collections::BTreeSet;
 use std::fs::File;

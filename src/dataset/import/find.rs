@@ -34,22 +34,8 @@ pub struct ImportSources {
 }
 
 /// Names of neighbouring folders, in lower case.
-const SOUND_FOLDERS: [&str; 6] = ["wav", "wavs", "audio", "audios", "sound", "speech"];
-const TRANSCRIPT_FOLDERS: [&str; 13] = [
-    "ctm",
-    "tsv",
-    "transcript",
-    "transcripts",
-    "text",
-    "texts",
-    "txt",
-    "json",
-    "words",
-    "textgrid",
-    "srt",
-    "vtt",
-    "subtitles",
-];
+const SOUND_FOLDERS: &str = "wav wavs audio audios sound speech";
+const TRANSCRIPT_FOLDERS: &str = "ctm tsv transcript transcripts text texts txt json words textgrid srt vtt subtitles";
 
 /// Searches `sources`, files or folders; with `only`, files of other kinds are left out.
 ///
@@ -112,11 +98,9 @@ fn kind(path: &Path) -> std::result::Result<Option<MotionKind>, String> {
         "tar" => Ok(Some(MotionKind::Shards)),
         "npz" => {
             let npz = Npz::open(path).map_err(|error| format!("{error:#}"))?;
-            let known = npz.has("human_joints").then_some(MotionKind::Ted);
             let names = npz.names().join(", ");
-            known
-                .map(Some)
-                .ok_or_else(|| format!("it holds no `human_joints` [T, 43, 3] (TED Expressive), but: {names}"))
+            let unknown = format!("it holds no `human_joints` [T, 43, 3] (TED Expressive), but: {names}");
+            if npz.has("human_joints") { Ok(Some(MotionKind::Ted)) } else { Err(unknown) }
         }
         "txt" => Ok(has_147_numbers(path).then_some(MotionKind::Authors)),
         _ => Ok(None),
@@ -136,13 +120,13 @@ fn with_company(kind: MotionKind, motion: PathBuf) -> TakeFiles {
     let mut stems = vec![stem.as_str()];
     // The sound of gt_interval_3821.txt is 3821.wav.
     stems.extend(["gt_interval_", "prediction_interval_"].iter().filter_map(|prefix| stem.strip_prefix(prefix)));
-    let sound = beside(&motion, &stems, &OF_SOUNDS, &SOUND_FOLDERS);
-    let transcript = beside(&motion, &stems, &transcript::ENDINGS, &TRANSCRIPT_FOLDERS);
+    let sound = beside(&motion, &stems, &OF_SOUNDS, SOUND_FOLDERS);
+    let transcript = beside(&motion, &stems, &transcript::ENDINGS, TRANSCRIPT_FOLDERS);
     TakeFiles { kind, motion, sound, transcript }
 }
 
 /// File of one of these names and endings in the motion's own folder or in a neighbouring folder of those names.
-fn beside(motion: &Path, stems: &[&str], endings: &[&str], folders: &[&str]) -> Option<PathBuf> {
+fn beside(motion: &Path, stems: &[&str], endings: &[&str], folders: &str) -> Option<PathBuf> {
     let own = motion.parent()?;
     let mut places = vec![own.to_owned()];
     let above = if own.as_os_str().is_empty() { Path::new("..") } else { own.parent()? };
@@ -152,7 +136,7 @@ fn beside(motion: &Path, stems: &[&str], endings: &[&str], folders: &[&str]) -> 
     siblings.sort();
     let called = |path: &PathBuf| {
         let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-        folders.contains(&name.as_str())
+        folders.split(' ').any(|folder| folder == name)
     };
     places.extend(siblings.into_iter().filter(called));
     let candidates = places.iter().flat_map(|place| {

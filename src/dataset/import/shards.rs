@@ -1,9 +1,8 @@
 //! Tar shards outside a dataset folder: members are found by name, in any order and any tar; other files are left out
 //! and noted. Bytes of members stay unchanged wherever a dataset can hold them.
 
-use crate::Split;
-use crate::layout::file_name;
 use crate::sample::{EXTENSIONS, N_KEYPOINTS, OPTIONAL_EXTENSIONS, Sample, WORDS_EXTENSION};
+use crate::{Split, file_name};
 use anyhow::{Context, Result, bail, ensure};
 use ndarray::{Array2, Array3};
 use orator_base::stage::ledger::{Kept, Ledger, Refused};
@@ -13,8 +12,7 @@ use orator_base::types::posture::Posture;
 use orator_base::types::skeleton::N_JOINTS;
 use orator_base::types::sound::{SAMPLE_RATE, Sound};
 use orator_base::types::time::FrameRate;
-use orator_formats::npy;
-use orator_formats::npy::{Element, Layout};
+use orator_formats::npy::{self, Element, Layout};
 use orator_formats::wav;
 use std::collections::BTreeMap;
 use std::fs::File;

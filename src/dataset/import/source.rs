@@ -2,27 +2,23 @@
 //! first (outcome, ledger, sound codes) and written once its split is known.
 
 use super::find::{ImportSources, TakeFiles};
-use super::shards;
-use super::shards::{LooseSample, LooseVideo};
+use super::shards::{self, LooseSample, LooseVideo};
 use super::take::{ImportedTake, TakeOutcome};
 use super::write::{ImportOutcome, ImportPlan};
 use crate::bones::{VideoBones, of_speaker};
 use crate::config::videos::slug;
 use crate::info::DatasetInfo;
-use crate::layout::{file_name, read_json};
 use crate::shared_sound::SharedSound;
 use crate::split::{Assignment, SplitBy, TimeBlock};
 use crate::write::assemble::DatasetWriter;
-use crate::write::part;
-use crate::write::part::{VideoEntry, VideoSource};
-use crate::{INFO, Split};
+use crate::write::part::{self, VideoEntry, VideoSource};
+use crate::{INFO, Split, file_name, read_json};
 use anyhow::{Result, ensure};
 use orator_base::audio::fingerprint::Fingerprinter;
 use orator_base::motion::bones;
 use orator_base::stage::fingerprint::hash_file;
 use orator_base::stage::ledger::{Kept, Ledger, Refused, TranscriptAccount, WordCount};
 use orator_base::stage::refusal::{FrameRefusal, Refusal};
-use orator_base::types::sound::Sound;
 use orator_formats::joints_description::path_of;
 use orator_formats::mocap::bvh;
 use std::path::{Path, PathBuf};
@@ -208,7 +204,9 @@ fn look_at_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
             let notes = source.ledger.words.iter().flat_map(|words| words.notes.iter().cloned());
             let unit = kept.sample.meta["imported"].as_object().and_then(bvh::unit_note);
             let remark = unit.into_iter().chain(bones).chain(notes).collect::<Vec<_>>().join("; ");
-            let codes = (!plan.limits.no_sound).then(|| codes([&kept.sample.sound]));
+            let mut fingerprinter = Fingerprinter::default();
+            fingerprinter.push(&kept.sample.sound.samples);
+            let codes = (!plan.limits.no_sound).then(|| fingerprinter.finish());
             Ok(InspectedItem { source, codes, remark, ..InspectedItem::default() })
         }
     }
@@ -250,7 +248,7 @@ fn look_at_part(dir: &Path, name: &str, plan: &ImportPlan) -> Result<InspectedIt
         None => Some(Assignment::Blocks(part.blocks.clone())).filter(|_| !part.samples.is_empty()),
     };
     let VideoEntry { name, file, content, made_from, ledger, bones, failure, .. } = part;
-    let source = VideoSource { name: name.into(), file, content, made_from, ledger, bones, failure };
+    let source = VideoSource { name: name.to_string(), file, content, made_from, ledger, bones, failure };
     Ok(InspectedItem {
         source,
         split,
@@ -307,12 +305,6 @@ fn look_at_loose(video: &LooseVideo, plan: &ImportPlan) -> Result<InspectedItem>
         _ => Some(Assignment::Blocks(blocks)),
     };
     Ok(InspectedItem { source, split, codes: Some(fingerprinter.finish()), ..InspectedItem::default() })
-}
-
-fn codes<'a>(sounds: impl IntoIterator<Item = &'a Sound>) -> Vec<u32> {
-    let mut fingerprinter = Fingerprinter::default();
-    sounds.into_iter().for_each(|sound| fingerprinter.push(&sound.samples));
-    fingerprinter.finish()
 }
 
 impl InspectedItem {

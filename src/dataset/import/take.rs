@@ -3,25 +3,21 @@
 
 use super::find::TakeFiles;
 use crate::config::videos::slug;
-use crate::layout::file_name;
+use crate::file_name;
 use crate::sample::{N_KEYPOINTS, Sample};
 use crate::words::VideoWords;
 use anyhow::{Context, Result};
 use ndarray::{Array3, s};
 use orator_base::math::order::Ordered;
-use orator_base::motion::bones;
-use orator_base::motion::resample;
+use orator_base::motion::{bones, resample};
 use orator_base::stage::fingerprint::hash_file;
 use orator_base::stage::ledger::TranscriptAccount;
 use orator_base::stage::refusal::{FrameRefusal, Refusal};
 use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::{L_HAND, N_BONES, N_HAND_JOINTS, N_JOINTS, R_HAND};
-use orator_base::types::sound::{SAMPLE_RATE, Sound};
-use orator_base::types::sync;
+use orator_base::types::sound::{SAMPLE_RATE, Sound, sample_at};
 use orator_base::types::time::FrameRate;
-use orator_formats::mocap::captured;
-use orator_formats::mocap::captured::CapturedMotion;
-use orator_formats::mocap::captured::MotionKind;
+use orator_formats::mocap::captured::{self, CapturedMotion, MotionKind};
 use orator_formats::transcript::{Transcript, Word};
 use orator_media::ffmpeg::audio;
 use serde_json::{Value, json};
@@ -96,7 +92,7 @@ impl ImportedTake {
         let n_frames = motion.n_frames();
         let sound = match &found.sound {
             _ if limits.no_sound => {
-                let n_samples = sync::sample_at(limits.fps, SAMPLE_RATE, n_frames);
+                let n_samples = sample_at(limits.fps, SAMPLE_RATE, n_frames);
                 Some(Sound { rate: SAMPLE_RATE, samples: vec![0.0; n_samples] })
             }
             Some(path) => audio::read_mono(path, SAMPLE_RATE)?.filter(|sound| !sound.samples.is_empty()),
@@ -162,7 +158,7 @@ fn keep(
     bones::with_lengths(&mut motion, &lengths);
     let moved = moved_mm(&before, &motion.joints);
     let sound_secs = sound.secs();
-    sound.samples.resize(sync::sample_at(fps, SAMPLE_RATE, n_frames), 0.0);
+    sound.samples.resize(sample_at(fps, SAMPLE_RATE, n_frames), 0.0);
     let transcript = match &found.transcript {
         Some(path) => Transcript::read(path)?,
         None => captured.text.as_deref().map(Transcript::of_text).unwrap_or_default(),

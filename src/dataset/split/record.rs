@@ -2,7 +2,7 @@
 //! folder, which is replaced as a whole.
 
 use crate::config::choices::SplitUnit;
-use crate::layout::pretty;
+use crate::pretty;
 use anyhow::{Context, Result, ensure};
 use orator_base::stage::workdir;
 use orator_base::types::split::{Split, TimeBlock};

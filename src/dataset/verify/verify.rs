@@ -7,12 +7,11 @@
 use super::blocks;
 use super::sample::check_sample;
 use crate::info::DatasetInfo;
-use crate::layout::read_json;
 use crate::leakage::Leakage;
 use crate::read::Dataset;
 use crate::write::assemble::{LedgerLine, assemble_into};
 use crate::write::part::{self, VideoEntry};
-use crate::{CHECKSUMS, INFO, LEAKAGE, README};
+use crate::{CHECKSUMS, INFO, LEAKAGE, README, read_json};
 use anyhow::{Context, Result, ensure};
 use orator_base::stage::fingerprint::hash_file;
 use orator_base::stage::progress::Progress;

@@ -6,8 +6,8 @@
 use super::part::{self, EntryWriter, VideoEntry, VideoSource};
 use crate::bones::{VideoBones, of_speaker};
 use crate::info::{About, DatasetInfo, DatasetVideo, SplitInfo};
-use crate::layout::pretty;
 use crate::leakage::{Leakage, SoundComparison};
+use crate::pretty;
 use crate::split::{Split, SplitBy, TimeBlock};
 use crate::stats::{DatasetStats, StatsCollector};
 use crate::{CHECKSUMS, INDEX, INFO, LEAKAGE, LEDGER, README, STATS, card};

@@ -1,8 +1,8 @@
 //! Motion of a BVH file as the numbers FineMotion learns (Korzun et al. 2020): exponential maps of 15 joints of the upper
 //! body at 20 frames a second, the hips held still; and back to a BVH file of the same skeleton.
 
-use super::read::{Bvh, Channel};
-use super::skeleton::BvhSkeleton;
+use super::read::Bvh;
+use super::skeleton::{BvhSkeleton, JointChannels};
 use anyhow::{Context, Result, bail, ensure};
 use ndarray::{Array2, ArrayView2};
 use orator_base::math::rotation::Rotation;
@@ -171,13 +171,8 @@ impl ExponentialMaps {
             }
             let mut channels = self.rest.clone();
             for (&joint, map) in self.joints.iter().zip(maps) {
-                let parts = &self.skeleton.joints[joint];
-                let Some(order) = parts.rotation_order() else { continue };
-                let rotations =
-                    parts.channels.iter().enumerate().filter(|(_, channel)| matches!(channel, Channel::Rotation(_)));
-                for ((at, _), angle) in rotations.zip(Rotation::from_rotation_vector(map).euler(order)) {
-                    channels[first_channels[joint] + at] = angle.to_degrees();
-                }
+                let values = &mut channels[first_channels[joint]..];
+                self.skeleton.joints[joint].set_rotation(Rotation::from_rotation_vector(map), values);
             }
             channels
         };
@@ -193,12 +188,10 @@ impl ExponentialMaps {
     /// Exponential maps of the learnt joints [T, 3 * joints], every frame that 20 a second keep but the last one.
     fn exponential_maps(&self, bvh: &Bvh) -> Result<Array2<f64>> {
         let skeleton = BvhSkeleton::of(bvh);
+        let same = |(a, b): (&JointChannels, &JointChannels)| (&a.name, &a.channels) == (&b.name, &b.channels);
+        let are_same = skeleton.joints.iter().zip(&self.skeleton.joints).all(same);
         ensure!(
-            skeleton.joints.iter().map(|joint| (&joint.name, &joint.channels)).eq(self
-                .skeleton
-                .joints
-                .iter()
-                .map(|joint| (&joint.name, &joint.channels))),
+            are_same && skeleton.joints.len() == self.skeleton.joints.len(),
             "its skeleton has other joints or channels than the first file's ({} joints, expected {})",
             skeleton.joints.len(),
             self.skeleton.joints.len()
@@ -238,14 +231,8 @@ impl ExponentialMaps {
 
     /// Rotation of a joint in a frame.
     fn rotation(&self, joint: usize, frame: &[f64]) -> Rotation {
-        let parts = &self.skeleton.joints[joint];
         let values = &frame[self.skeleton.first_channels()[joint]..];
-        let mut angles = parts.channels.iter().zip(values).filter_map(|(channel, value)| match channel {
-            Channel::Rotation(_) => Some(value.to_radians()),
-            Channel::Position(_) => None,
-        });
-        let angles = std::array::from_fn(|_| angles.next().unwrap_or(0.0));
-        Rotation::from_euler(parts.rotation_order().unwrap_or([0, 1, 2]), angles)
+        self.skeleton.joints[joint].rotation(values).unwrap_or(Rotation::IDENTITY)
     }
 }
 

@@ -32,6 +32,20 @@ impl JointChannels {
         let order: [usize; 3] = axes.try_into().ok()?;
         (order[0] != order[1] && order[1] != order[2] && order[0] != order[2]).then_some(order)
     }
+
+    /// The rotation that its channels' numbers, the first of `values`, are; `None` as of `rotation_order`.
+    pub fn rotation(&self, values: &[f64]) -> Option<Rotation> {
+        let turns = self.channels.iter().zip(values).filter(|(channel, _)| matches!(channel, Channel::Rotation(_)));
+        let mut angles = turns.map(|(_, degrees)| degrees.to_radians());
+        Some(Rotation::from_euler(self.rotation_order()?, std::array::from_fn(|_| angles.next().unwrap_or(0.0))))
+    }
+
+    /// Puts a rotation in its channels' numbers, the first of `values`.
+    pub fn set_rotation(&self, turn: Rotation, values: &mut [f64]) {
+        let angles = self.rotation_order().map(|order| turn.euler(order));
+        let turns = self.channels.iter().zip(values).filter(|(channel, _)| matches!(channel, Channel::Rotation(_)));
+        turns.zip(angles.into_iter().flatten()).for_each(|((_, value), angle)| *value = angle.to_degrees());
+    }
 }
 
 /// Joints in the order of the file, parents before children.

@@ -4,9 +4,8 @@
 use super::entry::point;
 use super::found::{FoundKeypoints, FoundPerson, NamedArrays};
 use super::{mediapipe, pats};
-use crate::keypoints_npz;
-use crate::npy;
 use crate::npz::Npz;
+use crate::{keypoints_npz, npy};
 use anyhow::{Context, Result, bail};
 use ndarray::{Array3, ArrayView2, Axis};
 use orator_base::types::pose2d::Keypoint;

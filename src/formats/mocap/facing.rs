@@ -4,8 +4,7 @@
 
 use anyhow::{Context, Result, bail, ensure};
 use orator_base::math::order::upper_median;
-use orator_base::math::vec3;
-use orator_base::math::vec3::Vec3;
+use orator_base::math::vec3::{self, Vec3};
 
 /// Units that motion comes in, metres: metre, centimetre, millimetre, inch, and the 0.45 inch of old CMU files.
 const UNITS: [(&str, f64); 5] =
@@ -43,11 +42,8 @@ pub struct AxisAlignment {
 }
 
 impl AxisAlignment {
-    /// Alignment of a take by all of its frames.
-    ///
-    /// # Errors
-    /// No frame with neck, shoulders and hips; arms that are no person's in any known unit; shoulders that lie above
-    /// each other or turn so much that no side is the front.
+    /// Alignment of a take by all of its frames. Errors: no frame with neck, shoulders and hips; arms that are no
+    /// person's in any known unit; shoulders that lie above each other or turn so much that no side is the front.
     pub fn fit(frames: &[TorsoLandmarks]) -> Result<Self> {
         let frames: Vec<&TorsoLandmarks> = frames.iter().filter(|f| f.is_finite()).collect();
         ensure!(!frames.is_empty(), "no frame has a neck, shoulders and hips");

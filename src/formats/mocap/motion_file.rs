@@ -33,11 +33,9 @@ pub fn has_ending(path: &Path) -> bool {
     path.extension().is_some_and(|ending| ENDINGS.iter().any(|known| ending.eq_ignore_ascii_case(known)))
 }
 
-/// Reads the motion of `path`; `fps` is the rate of a file that does not say its own (without: 15).
-///
-/// # Errors
-/// Not there, empty, of another kind, another number of joints, without a frame, or without any joint that is seen: the
-/// message names the file, what is in it and what was expected.
+/// Reads the motion of `path`; `fps` is the rate of a file that does not say its own (without: 15). Errors: not there,
+/// empty, of another kind, another number of joints, without a frame, or without any joint that is seen: the message
+/// names the file, what is in it and what was expected.
 pub fn read(path: &Path, fps: Option<FrameRate>) -> Result<MotionFile> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let size = std::fs::metadata(path).with_context(|| format!("{} cannot be read", path.display()))?.len();
@@ -91,9 +89,7 @@ pub fn read(path: &Path, fps: Option<FrameRate>) -> Result<MotionFile> {
 }
 
 /// Reads the motion of `path`, which its user says to be at `fps`; without, a file that does not say its rate is at 15.
-///
-/// # Errors
-/// As [`read`], and a file that says another rate than `fps`.
+/// Errors: as [`read`], and a file that says another rate than `fps`.
 pub fn read_at(path: &Path, fps: Option<FrameRate>) -> Result<MotionFile> {
     let read = read(path, Some(fps.unwrap_or(USUAL_FPS)))?;
     if let Some(fps) = fps.filter(|fps| read.says_rate && *fps != read.motion.fps) {

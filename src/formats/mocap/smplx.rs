@@ -4,8 +4,7 @@
 use crate::npz::Npz;
 use anyhow::Result;
 use orator_base::math::rotation::Rotation;
-use orator_base::math::vec3;
-use orator_base::math::vec3::Vec3;
+use orator_base::math::vec3::{self, Vec3};
 use orator_base::motion::hand_bones::BONES;
 use orator_base::types::pose2d::N_HAND;
 use orator_base::types::skeleton::Side;
@@ -30,10 +29,8 @@ pub fn is_smplx(path: &Path) -> Result<bool> {
 
 /// Frames of the left (joints 25..40) and of the right hand (40..55), in the axes of the T-pose: left fingers along +x,
 /// palms down, thumbs towards +z. The rest hand, which the file does not hold, is ASSUMED: flat and straight, mean bones,
-/// thumb 45 degrees forward and somewhat down; no mean hand is added to the rotations.
-///
-/// # Errors
-/// No `poses` of that shape.
+/// thumb 45 degrees forward and somewhat down; no mean hand is added to the rotations. Errors: no `poses` of that
+/// shape.
 pub fn hands(path: &Path) -> Result<[(Side, Vec<HandFrame>); 2]> {
     let poses = Npz::open(path)?.numbers("poses", &[None, Some(N_NUMBERS)])?;
     let rotation = |t: usize, joint: usize| {

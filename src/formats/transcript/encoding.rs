@@ -2,10 +2,8 @@
 
 use anyhow::{Result, bail, ensure};
 
-/// The text without its byte order mark.
-///
-/// # Errors
-/// Another encoding; the message names the line of the first byte that is no text.
+/// The text without its byte order mark. Errors: another encoding; the message names the line of the first byte that is
+/// no text.
 pub fn text_of(bytes: &[u8]) -> Result<String> {
     match bytes {
         [0xff, 0xfe, rest @ ..] => utf16(rest, u16::from_le_bytes),

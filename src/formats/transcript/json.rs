@@ -18,10 +18,8 @@ const END: &[&str] = &["end_secs", "end_time", "end", "endTime"];
 const WORD: &[&str] = &["word", "text", "value"];
 const CONFIDENCE: &[&str] = &["confidence", "probability", "score"];
 
-/// Finds every list `words` at any depth; of a recogniser's `alternatives` the first counts.
-///
-/// # Errors
-/// No JSON, or none with words or text; the number of a word whose times cannot be.
+/// Finds every list `words` at any depth; of a recogniser's `alternatives` the first counts. Errors: no JSON, or none
+/// with words or text; the number of a word whose times cannot be.
 pub fn read(text: &str) -> Result<JsonTranscript> {
     let value: Value = serde_json::from_str(text).context("it is not valid JSON")?;
     let mut words = Vec::new();

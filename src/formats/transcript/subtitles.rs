@@ -4,10 +4,7 @@
 use super::word::{self, Word};
 use anyhow::{Context, Result, bail, ensure};
 
-/// The words of all cues, in their order.
-///
-/// # Errors
-/// The line of a time that cannot be read; text without any cue.
+/// The words of all cues, in their order. Errors: the line of a time that cannot be read; text without any cue.
 pub fn read(text: &str) -> Result<Vec<Word>> {
     let mut words = Vec::new();
     let mut lines = text.lines().map(str::trim).zip(1..).peekable();

@@ -3,10 +3,8 @@
 use super::word::{self, Word};
 use anyhow::{Context, Result, ensure};
 
-/// The intervals with text of the tier whose name has `word` in it, else of the first tier of intervals.
-///
-/// # Errors
-/// No tier of intervals; an interval without its two times.
+/// The intervals with text of the tier whose name has `word` in it, else of the first tier of intervals. Errors: no
+/// tier of intervals; an interval without its two times.
 pub fn read(text: &str) -> Result<Vec<Word>> {
     let values = values(text);
     let mut tiers = Vec::new();
@@ -60,16 +58,11 @@ fn tier(values: &[TextGridValue], at: &mut usize) -> Result<(String, Vec<Word>)>
     let n_intervals = (number("its beginning")?, number("its end")?, number("a number of intervals")?).2;
     let mut words = Vec::new();
     for n in 1..=n_intervals as u64 {
-        let time = |value: &TextGridValue| match value {
-            TextGridValue::Number(number) => Some(*number),
-            TextGridValue::Text(_) => None,
-        };
-        let (start_secs, end_secs) = (time(next()?), time(next()?));
-        let (Some(start_secs), Some(end_secs), TextGridValue::Text(word)) = (start_secs, end_secs, next()?) else {
+        let interval = (next()?, next()?, next()?);
+        let (TextGridValue::Number(start), TextGridValue::Number(end), TextGridValue::Text(word)) = interval else {
             anyhow::bail!("tier {name}: interval {n} needs two times and a text");
         };
-        word::push(&mut words, word, (start_secs, end_secs), None)
-            .with_context(|| format!("tier {name}: interval {n}"))?;
+        word::push(&mut words, word, (*start, *end), None).with_context(|| format!("tier {name}: interval {n}"))?;
     }
     Ok((name, words))
 }

@@ -55,11 +55,8 @@ impl Transcript {
         Self { text, words, notes }
     }
 
-    /// Reads a transcript by its ending.
-    ///
-    /// # Errors
-    /// A file that cannot be read, is larger than 256 MiB, in another encoding or no transcript; the message names the
-    /// line or the word.
+    /// Reads a transcript by its ending. Errors: a file that cannot be read, is larger than 256 MiB, in another
+    /// encoding or no transcript; the message names the line or the word.
     pub fn read(path: &Path) -> Result<Self> {
         let reading = || format!("cannot read {}", path.display());
         let bytes = std::fs::metadata(path).with_context(reading)?.len();
@@ -72,9 +69,7 @@ impl Transcript {
     }
 
     /// Reads text in the format of an ending, in small letters; `stem` names the recording in a file of several.
-    ///
-    /// # Errors
-    /// The line or the word that is not as the format says.
+    /// Errors: the line or the word that is not as the format says.
     pub fn parse(text: &str, ending: &str, stem: &str) -> Result<Self> {
         let words = match ending {
             "tsv" => tsv(text)?,
@@ -100,10 +95,7 @@ impl Transcript {
 }
 
 /// The words of a table with tabs, a row a word or a sentence: start, end and text in seconds (GENEA 2022 and 2023), or in
-/// milliseconds under the header `start end text` (Whisper).
-///
-/// # Errors
-/// The line of a row without times.
+/// milliseconds under the header `start end text` (Whisper). Errors: the line of a row without times.
 fn tsv(text: &str) -> Result<Vec<Word>> {
     let mut words = Vec::new();
     let mut per_sec = 1.0;
@@ -124,10 +116,8 @@ fn tsv(text: &str) -> Result<Vec<Word>> {
 }
 
 /// The words of the recording `name`, or of the only one there is, in CTM of NIST's scoring tools and of Kaldi: recording,
-/// channel, start, duration, word and, where it is known, confidence.
-///
-/// # Errors
-/// Invalid row (with its line); several recordings, and none has this name.
+/// channel, start, duration, word and, where it is known, confidence. Errors: invalid row (with its line); several
+/// recordings, and none has this name.
 fn ctm(text: &str, name: &str) -> Result<Vec<Word>> {
     let rows = text.lines().zip(1..).filter(|(line, _)| !line.trim().is_empty() && !line.starts_with(";;"));
     let recordings: BTreeSet<&str> =

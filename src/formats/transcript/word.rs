@@ -31,10 +31,7 @@ pub enum WordSource {
 }
 
 /// Adds the words of `text`, said from `start_secs` to `end_secs`: one word has that time, several share it by their
-/// letters. `confidence` outside 0..1 is left out.
-///
-/// # Errors
-/// Times that are no span of a sound.
+/// letters. `confidence` outside 0..1 is left out. Errors: times that are no span of a sound.
 pub fn push(
     words: &mut Vec<Word>,
     text: &str,

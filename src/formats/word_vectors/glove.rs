@@ -8,10 +8,8 @@ use std::path::Path;
 /// Most bytes of a line.
 const MAX_LINE: u64 = 1 << 20;
 
-/// Writes the vectors of a text as the table `path`; the number of words.
-///
-/// # Errors
-/// The line that is not as the others: too few numbers, no number, no text; a text that is cut off.
+/// Writes the vectors of a text as the table `path`; the number of words. Errors: the line that is not as the others:
+/// too few numbers, no number, no text; a text that is cut off.
 pub fn convert(mut text: impl BufRead, path: &Path) -> Result<usize> {
     let mut writer: Option<TableWriter> = None;
     let (mut line, mut promised, mut n_lines) = (Vec::new(), None, 0_u64);

@@ -32,10 +32,7 @@ pub struct WordVectors {
 }
 
 impl WordVectors {
-    /// Opens a table.
-    ///
-    /// # Errors
-    /// A file that is none, is cut off or damaged.
+    /// Opens a table. Errors: a file that is none, is cut off or damaged.
     pub fn open(path: &Path) -> Result<Self> {
         Self::read(path).with_context(|| format!("{} is no table of word vectors", path.display()))
     }
@@ -91,10 +88,7 @@ impl WordVectors {
         row.map_or(UNKNOWN, |row| N_SPECIAL + *row as usize)
     }
 
-    /// Vector of an index.
-    ///
-    /// # Errors
-    /// No such index, a file that cannot be read.
+    /// Vector of an index. Errors: no such index, a file that cannot be read.
     pub fn vector(&self, index: usize) -> Result<Vec<f32>> {
         let row = match index {
             PADDING => return Ok(vec![0.0; self.dim]),

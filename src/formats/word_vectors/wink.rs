@@ -7,10 +7,8 @@ use std::fmt;
 use std::io::Read;
 use std::path::Path;
 
-/// Writes the vectors of the JSON as the table `path`; the number of words. Memory: one vector, and the words.
-///
-/// # Errors
-/// No such JSON; a vector with too few numbers.
+/// Writes the vectors of the JSON as the table `path`; the number of words. Memory: one vector, and the words. Errors:
+/// no such JSON; a vector with too few numbers.
 pub fn convert(json: impl Read, path: &Path) -> Result<usize> {
     let mut writer = None;
     let mut json = serde_json::Deserializer::from_reader(json);

@@ -35,10 +35,8 @@ impl TableWriter {
         self.dim
     }
 
-    /// Adds a word; the first vector of a word counts.
-    ///
-    /// # Errors
-    /// A vector of another length or with a number that is not finite, a word with a line break.
+    /// Adds a word; the first vector of a word counts. Errors: a vector of another length or with a number that is not
+    /// finite, a word with a line break.
     pub fn push(&mut self, word: &str, vector: &[f32]) -> Result<()> {
         ensure!(vector.len() == self.dim, "`{word}` has {} numbers, the vectors have {}", vector.len(), self.dim);
         ensure!(vector.iter().all(|number| number.is_finite()), "`{word}` has a number that is not finite");
@@ -51,10 +49,7 @@ impl TableWriter {
         Ok(())
     }
 
-    /// Writes the words and the header; the number of words.
-    ///
-    /// # Errors
-    /// No word.
+    /// Writes the words and the header; the number of words. Errors: no word.
     pub fn finish(mut self) -> Result<usize> {
         let (n_words, dim) = (self.known.len(), self.dim);
         ensure!(n_words > 0, "it holds no word");

@@ -5,7 +5,7 @@
 use anyhow::Result;
 use candle_core::{Device, Tensor};
 use orator_base::audio::mel;
-use orator_base::types::sync;
+use orator_base::types::sound::sample_at;
 use orator_base::types::time::FrameRate;
 use std::ops::Range;
 
@@ -70,7 +70,7 @@ fn period(n_samples: usize) -> usize {
 /// Spectrogram frames that span `n_frames` frames of motion: the nearest whole number of 10 ms hops.
 pub fn mel_frames(fps: FrameRate, n_frames: usize) -> usize {
     let rate = orator_base::types::sound::SAMPLE_RATE;
-    (sync::sample_at(fps, rate, n_frames) + mel::HOP / 2) / mel::HOP
+    (sample_at(fps, rate, n_frames) + mel::HOP / 2) / mel::HOP
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use super::GestureGenerator;
 use super::model::{GenerationChoice, checkpoint_file};
 use super::normalisation::Normalisation;
 use super::seq2seq::SequenceGenerator;
-use super::seq2seq::architecture::Architecture;
+use super::seq2seq::architecture::{self, Architecture};
 use super::seq2seq::metadata::is_sequence_kind;
 use anyhow::{Result, bail, ensure};
 use orator_base::types::pose3d::Motion;
@@ -114,7 +114,7 @@ impl TrainedSpeaker {
 
     /// Whether it reads words.
     pub fn reads_words(&self) -> bool {
-        self.architecture().is_some_and(|architecture| architecture.word_encoder().is_some())
+        self.architecture().is_some_and(|of| architecture::word_encoder(of).is_some())
     }
 
     /// Motion for a sound and what is said in it. Errors: sound too short or of another rate, or a speaker that moves a

@@ -173,14 +173,10 @@ mod tests {
     use ndarray::{Array3, ArrayView3, array, s};
     use orator_base::types::skeleton::N_JOINTS;
 
-    const CONVENTIONS: [Convention; 6] = [
-        Convention::Orator,
-        Convention::Speech2gesture,
-        Convention::Genea,
-        Convention::Emage,
-        Convention::Trimodal,
-        Convention::Aist,
-    ];
+    const CONVENTIONS: [Convention; 6] = {
+        use Convention::{Aist, Emage, Genea, Orator, Speech2gesture, Trimodal};
+        [Orator, Speech2gesture, Genea, Emage, Trimodal, Aist]
+    };
 
     /// Two motions without meaning, [T, 49, 3].
     fn motions(n_frames: usize) -> (Array3<f32>, Array3<f32>) {
@@ -319,6 +315,7 @@ mod tests {
         });
         for convention in CONVENTIONS {
             let catalogue = Catalogue::new(&MetricSettings { convention, ..MetricSettings::default() }).unwrap();
+            assert!(catalogue.definitions().iter().all(|of| !of.formula.is_empty() && !of.undefined.is_empty()));
             let [first, second] = [f32::NAN, 7.0].map(|hidden| {
                 let [predicted, ground_truth] = [true, false].map(|predicted| {
                     let mut joints = moving(predicted);

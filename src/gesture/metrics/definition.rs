@@ -4,7 +4,7 @@
 use super::pair::PairedFrames;
 use super::sums::BlockSums;
 use serde::Serialize;
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 /// Which way a value is good.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -38,6 +38,11 @@ pub struct Definition {
 }
 
 impl Definition {
+    /// A number without parameters, whose formula the caller adds.
+    pub fn new(name: &'static str, part: &'static str, unit: &'static str, better: Better) -> Self {
+        Self { name, part, unit, better, formula: "", undefined: "", parameters: Value::Object(Map::new()) }
+    }
+
     /// First 16 hexadecimal digits of blake3 over name, part, unit, formula and parameters (keys in order).
     pub fn hash(&self) -> String {
         let mut hasher = blake3::Hasher::new();
@@ -133,13 +138,10 @@ mod tests {
     #[test]
     fn the_hash_sees_all_but_the_order_of_keys() {
         let definition = |parameters| Definition {
-            name: "pck_3d",
-            part: "all",
-            unit: "1",
-            better: Better::Higher,
             formula: "share",
             undefined: "never",
             parameters,
+            ..Definition::new("pck_3d", "all", "1", Better::Higher)
         };
         let one = definition(json!({"alpha": 0.2, "fps": [15, 1]}));
         assert_eq!(one.hash(), definition(json!({"fps": [15, 1], "alpha": 0.2})).hash());

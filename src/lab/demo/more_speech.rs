@@ -5,9 +5,8 @@ use super::host;
 use anyhow::Result;
 use orator_base::stage::progress::Progress;
 use orator_base::types::pose3d::Motion;
-use orator_base::types::sound::SAMPLE_RATE;
+use orator_base::types::sound::{SAMPLE_RATE, sample_at};
 use orator_base::types::split::Split;
-use orator_base::types::sync;
 use orator_dataset::info::{About, DatasetInfo};
 use orator_dataset::write::assemble::DatasetWriter;
 use orator_test_support::drawn::folder::{DATASET_FPS, DemoPlan};
@@ -76,7 +75,7 @@ fn clip(plan: &DemoPlan, is_rendered: bool, number: u64) -> Result<SpokenVideo> 
         let scene = DrawnScene::new(seed, CLIP_SECS, plan.size);
         (DrawnTruth::new(&scene, DATASET_FPS).motion, scene.sound())
     };
-    sound.samples.resize(sync::sample_at(DATASET_FPS, SAMPLE_RATE, motion.n_frames()), 0.0);
+    sound.samples.resize(sample_at(DATASET_FPS, SAMPLE_RATE, motion.n_frames()), 0.0);
     let name = format!("spoken-{number}");
     let content = blake3::hash(format!("orator demo, more speech {is_rendered} {seed}").as_bytes());
     let content = content.to_hex().to_string();

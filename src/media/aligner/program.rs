@@ -35,10 +35,8 @@ pub struct Aligner {
 }
 
 impl Aligner {
-    /// Version of the package, as the interpreter `python` finds it.
-    ///
-    /// # Errors
-    /// No such interpreter, or no package; the message says how to get both.
+    /// Version of the package, as the interpreter `python` finds it. Errors: no such interpreter, or no package; the
+    /// message says how to get both.
     pub fn version(python: &Path) -> Result<String> {
         let name = python.display();
         let remedy = remedy();
@@ -57,10 +55,7 @@ impl Aligner {
         Ok(version)
     }
 
-    /// Starts the process by the interpreter `python`.
-    ///
-    /// # Errors
-    /// As of `version`.
+    /// Starts the process by the interpreter `python`. Errors: as of `version`.
     pub fn start(python: &Path) -> Result<Self> {
         Self::version(python)?;
         let mut command = Command::new(python);
@@ -70,10 +65,7 @@ impl Aligner {
     }
 
     /// Times of the words in a sound, `None` where a word does not fit. `feed` gets what takes the sound: pieces of mono
-    /// samples in -1..1 at 16 kHz.
-    ///
-    /// # Errors
-    /// Of `feed`; a process that ended too early, with what it said.
+    /// samples in -1..1 at 16 kHz. Errors: of `feed`; a process that ended too early, with what it said.
     pub fn align(
         mut self,
         words: &[SpokenWord],

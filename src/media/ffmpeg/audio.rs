@@ -53,10 +53,7 @@ pub fn at_rate(sound: &Sound, rate: u32) -> Result<Sound> {
     Ok(Sound { rate, samples })
 }
 
-/// The whole sound of `path` as mono at 16 kHz.
-///
-/// # Errors
-/// `UnreadableMedia` where there is none, or none that decodes.
+/// The whole sound of `path` as mono at 16 kHz. Errors: `UnreadableMedia` where there is none, or none that decodes.
 pub fn read_sound(path: &Path) -> Result<Sound> {
     let name = path.display();
     let unreadable = |problem| Err(UnreadableMedia(problem).into());
@@ -96,15 +93,7 @@ pub fn stream_mono(
     let mut zero_secs = origin::first_picture_secs(path)?;
     let mut decode = StreamDecoder::new(path, input, stream_idx, 1)?;
     let secs_per_tick = f64::from(decode.time_base());
-    let mut timeline = SoundTimeline {
-        rate,
-        n_written: 0,
-        n_skip: 0,
-        run: None,
-        ahead: ClockDrift::default(),
-        ready: Vec::new(),
-        sink,
-    };
+    let mut timeline = SoundTimeline::new(rate, sink);
     let mut frame = frame::Audio::empty();
     let (mut n_frames, mut n_misplaced) = (0u64, 0u64);
     while decode.next(&mut frame)? {
@@ -174,7 +163,11 @@ struct SoundTimeline<'a> {
     sink: &'a mut dyn FnMut(&[f32]) -> Result<()>,
 }
 
-impl SoundTimeline<'_> {
+impl<'a> SoundTimeline<'a> {
+    fn new(rate: u32, sink: &'a mut dyn FnMut(&[f32]) -> Result<()>) -> Self {
+        Self { rate, n_written: 0, n_skip: 0, run: None, ahead: ClockDrift::default(), ready: Vec::new(), sink }
+    }
+
     /// Second at which the sound so far ends.
     fn end_secs(&self) -> f64 {
         let written = self.n_written as f64 / f64::from(self.rate);
@@ -255,15 +248,7 @@ mod tests {
     #[test]
     fn a_jump_in_time_is_believed_up_to_ten_minutes_and_a_day() {
         let mut sink = |_: &[f32]| Ok(());
-        let mut timeline = SoundTimeline {
-            rate: 10,
-            n_written: 50,
-            n_skip: 0,
-            run: None,
-            ahead: ClockDrift::default(),
-            ready: Vec::new(),
-            sink: &mut sink,
-        };
+        let mut timeline = SoundTimeline { n_written: 50, ..SoundTimeline::new(10, &mut sink) };
         let reaches =
             |timeline: &SoundTimeline| [None, Some(-1e12), Some(604.0), Some(606.0)].map(|at| timeline.reaches(at));
         assert_eq!(reaches(&timeline), [true, true, true, false]);

@@ -146,10 +146,8 @@ impl FrameReader {
 
     /// Goes to output frame `frame_idx`, which shows the source frame at `source_secs` as an earlier reading from the start
     /// told: `advance` gives it next, as not repeated. Decoding begins where the container says that it can, at least
-    /// `LEAD_SECS` earlier, so that few frames are decoded in vain.
-    ///
-    /// # Errors
-    /// A container that cannot go there; no source frame of exactly that time.
+    /// `LEAD_SECS` earlier, so that few frames are decoded in vain. Errors: a container that cannot go there; no source
+    /// frame of exactly that time.
     pub fn go_to(&mut self, frame_idx: usize, source_secs: f64) -> Result<()> {
         let ticks = (source_secs / f64::from(self.decode.time_base())).round() as i64;
         let lead = (LEAD_SECS / f64::from(self.decode.time_base())).round() as i64;

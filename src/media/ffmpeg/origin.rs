@@ -4,7 +4,7 @@
 use super::decode::StreamDecoder;
 use super::source;
 use anyhow::Result;
-use ffmpeg_next::{Packet, Rational, frame};
+use ffmpeg_next::{Packet, frame};
 use std::path::Path;
 
 /// Largest number of packets read in search of the first picture.
@@ -30,7 +30,7 @@ pub(crate) fn first_picture_secs(path: &Path) -> Result<Option<f64>> {
             ticks = unmoved;
         }
     }
-    Ok(Some(secs(ticks, tick)))
+    Ok(Some(ticks as f64 * f64::from(tick)))
 }
 
 /// Presentation time of the picture at byte `position` without edit lists. Where an edit list begins between two
@@ -48,8 +48,4 @@ fn unmoved_ticks(path: &Path, stream_idx: usize, position: i64) -> Result<Option
         }
     }
     Ok(None)
-}
-
-fn secs(ticks: i64, tick: Rational) -> f64 {
-    ticks as f64 * f64::from(tick)
 }

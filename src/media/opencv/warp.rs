@@ -50,10 +50,8 @@ impl Region {
     }
 }
 
-/// Fills `dst` with `src` under the transform; outside of `src` is black.
-///
-/// # Errors
-/// An empty picture, one wider or higher than 32766 px, a transform that is not finite.
+/// Fills `dst` with `src` under the transform; outside of `src` is black. Errors: an empty picture, one wider or higher
+/// than 32766 px, a transform that is not finite.
 pub fn warp(src: &Image, src_from_dst: &SrcFromDst, dst: &mut Image) -> Result<()> {
     ensure!(src_from_dst.is_sound(), "a picture cannot be warped by {src_from_dst:?}");
     let size = Size::new(side(dst.width)?, side(dst.height)?);

@@ -104,11 +104,7 @@ const REMOVEXATTRAT: c_long = 466;
 const FILE_SETATTR: c_long = 469;
 
 /// Restricts this thread and those it starts.
-pub(crate) fn restrict() -> Result<(), String> {
-    apply().map_err(|error| format!("seccomp: {error}"))
-}
-
-fn apply() -> Result<(), Error> {
+pub(crate) fn restrict() -> Result<(), Error> {
     let mut rules: BTreeMap<i64, Vec<SeccompRule>> =
         REFUSED.iter().chain(REFUSED_FORMS).map(|call| (*call, Vec::new())).collect();
     let mut refuse = |call: c_long, argument: u8, op: SeccompCmpOp, value: u64| {

@@ -54,7 +54,8 @@ pub fn restrict(access: &FileAccess) -> Restriction {
 
 /// Restricts this thread and those it starts, as `restrict` does a process; other threads of the process stay free.
 pub fn restrict_thread(access: &FileAccess) -> Restriction {
-    Restriction { files: super::files::restrict(access), calls: super::calls::restrict() }
+    let calls = super::calls::restrict().map_err(|error| format!("seccomp: {error}"));
+    Restriction { files: super::files::restrict(access), calls }
 }
 
 #[cfg(test)]

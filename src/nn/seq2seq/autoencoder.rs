@@ -3,6 +3,7 @@
 
 use super::config::{Config, Segment};
 use super::encoders::ContextEncoder;
+use super::predict::GesturePredictor;
 use crate::Mode;
 use crate::ops::affine::Affine;
 use crate::ops::dropout::dropout;
@@ -112,14 +113,18 @@ impl AudioBaseline {
         let predicted = self.speech.forward(audio, mode)?;
         (predicted.flatten_to(1)? - codes)?.sqr()?.mean_all()
     }
+}
 
-    /// Its sizes.
-    pub fn config(&self) -> &Config {
+impl GesturePredictor for AudioBaseline {
+    fn config(&self) -> &Config {
         &self.config
     }
 
-    /// Poses [B, predicted, pose] of segments.
-    pub fn poses(&self, segment: &Segment, mode: &mut Mode) -> Result<Tensor> {
+    fn audio_baseline(&self) -> Option<&AudioBaseline> {
+        Some(self)
+    }
+
+    fn forward(&self, segment: &Segment, mode: &mut Mode) -> Result<Tensor> {
         self.config.check(segment)?;
         let codes = self.speech.forward(&segment.audio, mode)?;
         let poses = self.autoencoder.decode(&codes.flatten_to(1)?)?.broadcast_mul(self.scale.as_tensor())?;

@@ -25,20 +25,6 @@ pub trait GesturePredictor: Send + Sync {
     }
 }
 
-impl GesturePredictor for AudioBaseline {
-    fn config(&self) -> &Config {
-        self.config()
-    }
-
-    fn forward(&self, segment: &Segment, mode: &mut Mode) -> Result<Tensor> {
-        self.poses(segment, mode)
-    }
-
-    fn audio_baseline(&self) -> Option<&AudioBaseline> {
-        Some(self)
-    }
-}
-
 /// State that a decoder begins a segment with, but for the first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]

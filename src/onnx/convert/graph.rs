@@ -9,15 +9,16 @@ use std::collections::BTreeMap;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ElementType {
     F32 = 1,
+    I32 = 6,
     I64 = 7,
     F16 = 10,
 }
 
 impl ElementType {
-    const fn n_bytes(self) -> usize {
+    pub(crate) const fn n_bytes(self) -> usize {
         match self {
             Self::F16 => 2,
-            Self::F32 => 4,
+            Self::F32 | Self::I32 => 4,
             Self::I64 => 8,
         }
     }

@@ -3,7 +3,7 @@
 use super::graph::AttributeValue::{Int, Ints, Text};
 use super::graph::{ElementType, OnnxGraph};
 use super::layout::{SlidingWindow, size};
-use super::ncnn_file::{NcnnLayer, NcnnWeight, NcnnWeights, layers};
+use super::ncnn_file::{NcnnLayer, NcnnWeights, layers};
 use super::source::ConversionOptions;
 use anyhow::{Context, Result, bail, ensure};
 use std::collections::{BTreeMap, BTreeSet};
@@ -160,10 +160,6 @@ impl<'a> NcnnConverter<'a> {
         Ok(NcnnBlob { name: self.graph.concat(&names, 1 + axis as i64), shape })
     }
 
-    fn weight(&mut self, dims: &[usize], weight: NcnnWeight) -> Result<String> {
-        self.graph.constant(if weight.half { ElementType::F16 } else { ElementType::F32 }, dims, weight.raw)
-    }
-
     fn convolution(&mut self, layer: &NcnnLayer, NcnnBlob { name, shape }: NcnnBlob) -> Result<NcnnBlob> {
         layer.knows(&[0, 1, 2, 3, 4, 5, 6, 7, 9, 11, 12, 13, 14, 15, 16])?;
         let of = |key: i32, absent: usize| size(layer.int(key, absent as i64)?);
@@ -195,11 +191,11 @@ impl<'a> NcnnConverter<'a> {
             "a weight of the sizes {dims:?} does not have {} numbers",
             layer.int(6, 0)?
         );
-        let weight = self.weights.tagged(n_weights.unwrap_or_default())?;
-        let mut inputs = vec![name, self.weight(&dims, weight)?];
+        let (element, weight) = self.weights.tagged(n_weights.unwrap_or_default())?;
+        let mut inputs = vec![name, self.graph.constant(element, &dims, weight)?];
         if layer.int(5, 0)? != 0 {
             let bias = self.weights.plain(channels)?;
-            inputs.push(self.weight(&[channels], bias)?);
+            inputs.push(self.graph.constant(ElementType::F32, &[channels], bias)?);
         }
         let mut name = self.graph.windowed(&inputs, [down, along], pads, Some(group), true);
         match layer.int(9, 0)? {

@@ -1,5 +1,6 @@
 //! The two files of an ncnn model: a line of text for each layer, and the weights one after the other.
 
+use super::graph::ElementType;
 use anyhow::{Context, Result, bail, ensure};
 use std::collections::BTreeMap;
 
@@ -98,14 +99,6 @@ fn layer(line: &str) -> Result<NcnnLayer<'_>> {
     Ok(NcnnLayer { kind, name, inputs, outputs, parameters })
 }
 
-/// The numbers of a weight, little-endian.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct NcnnWeight<'a> {
-    pub raw: &'a [u8],
-    /// 2 or 4 bytes a number.
-    pub half: bool,
-}
-
 /// What of a `.bin` file is not yet read.
 pub(crate) struct NcnnWeights<'a> {
     rest: &'a [u8],
@@ -125,23 +118,23 @@ impl<'a> NcnnWeights<'a> {
         Ok(taken)
     }
 
-    /// `n` numbers, whose form is said before them. Errors: fewer, or in a form other than float16 and float32.
-    pub(crate) fn tagged(&mut self, n: usize) -> Result<NcnnWeight<'a>> {
+    /// `n` numbers, little-endian, whose form is said before them. Errors: fewer, or in a form other than float16 and float32.
+    pub(crate) fn tagged(&mut self, n: usize) -> Result<(ElementType, &'a [u8])> {
         let tag = self.take(4)?;
         match u32::from_le_bytes([tag[0], tag[1], tag[2], tag[3]]) {
-            0 => self.plain(n),
+            0 => Ok((ElementType::F32, self.plain(n)?)),
             FLOAT16 => {
                 let raw = self.take(n.saturating_mul(2))?;
                 self.take(raw.len().next_multiple_of(4) - raw.len())?;
-                Ok(NcnnWeight { raw, half: true })
+                Ok((ElementType::F16, raw))
             }
             tag => bail!("weights are float16 or float32, not of the form {tag:#x}"),
         }
     }
 
     /// `n` 32-bit floats.
-    pub(crate) fn plain(&mut self, n: usize) -> Result<NcnnWeight<'a>> {
-        Ok(NcnnWeight { raw: self.take(n.saturating_mul(4))?, half: false })
+    pub(crate) fn plain(&mut self, n: usize) -> Result<&'a [u8]> {
+        self.take(n.saturating_mul(4))
     }
 
     /// Nothing may be left.

@@ -4,7 +4,7 @@
 use super::graph::AttributeValue::{Float, Text};
 use super::graph::{ElementType, OnnxGraph};
 use super::layout::{CHANNELS_FIRST, SlidingWindow, four, size};
-use super::tfjs_file::{TfElement, TfGraph, TfNode, TfTensor};
+use super::tfjs_file::{TfGraph, TfNode, TfTensor};
 use anyhow::{Context, Result, bail, ensure};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -37,12 +37,8 @@ impl<'a> TfConverter<'a> {
         order: Option<[usize; 4]>,
         dims: Option<&[usize]>,
     ) -> Result<String> {
-        let element = match tensor.element {
-            TfElement::F16 => ElementType::F16,
-            TfElement::F32 => ElementType::F32,
-            TfElement::I32 => bail!("a weight is float16 or float32, not int32"),
-        };
-        self.graph.weight((element, &tensor.shape, tensor.raw), order, dims)
+        ensure!(tensor.element != ElementType::I32, "a weight is float16 or float32, not int32");
+        self.graph.weight((tensor.element, &tensor.shape, tensor.raw), order, dims)
     }
 
     /// What the node `wanted` gives, after all that it needs. Errors: a node that is missing, needs itself, or is of an

@@ -1,5 +1,6 @@
 //! The two files of a TensorFlow.js graph model: nodes in JSON, and their constants one after the other.
 
+use super::graph::ElementType;
 use super::layout::{MAX_SIZE, int32s, size};
 use anyhow::{Context, Result, bail, ensure};
 use base64::Engine as _;
@@ -7,18 +8,10 @@ use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
-/// What the numbers of a constant are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum TfElement {
-    F16,
-    F32,
-    I32,
-}
-
 /// A constant: sizes and little-endian numbers.
 #[derive(Clone, Debug)]
 pub(crate) struct TfTensor<'a> {
-    pub element: TfElement,
+    pub element: ElementType,
     pub shape: Vec<usize>,
     pub raw: &'a [u8],
 }
@@ -90,7 +83,7 @@ impl<'a> TfGraph<'a> {
 impl TfTensor<'_> {
     /// The numbers of a row of 32-bit integers, or of a single one. Errors: other numbers, or more than 64 of them.
     pub(crate) fn integers(&self) -> Result<Vec<i64>> {
-        ensure!(self.element == TfElement::I32 && self.raw.len() <= 256, "it holds a few 32-bit integers");
+        ensure!(self.element == ElementType::I32 && self.raw.len() <= 256, "it holds a few 32-bit integers");
         Ok(int32s(self.raw).map(i64::from).collect())
     }
 }
@@ -130,9 +123,9 @@ impl TfNode {
 fn read_tensor<'a>(described: &Value, rest: &'a [u8]) -> Result<(TfTensor<'a>, &'a [u8])> {
     let quantized = described.pointer("/quantization/dtype").map(|kind| kind.as_str().unwrap_or("of no name"));
     let element = match (text(described, "/dtype")?, quantized) {
-        ("float32", Some("float16")) => TfElement::F16,
-        ("float32", None) if described.get("quantization").is_none() => TfElement::F32,
-        ("int32", None) if described.get("quantization").is_none() => TfElement::I32,
+        ("float32", Some("float16")) => ElementType::F16,
+        ("float32", None) if described.get("quantization").is_none() => ElementType::F32,
+        ("int32", None) if described.get("quantization").is_none() => ElementType::I32,
         (kind, quantized) => {
             bail!("numbers are float16, float32 or int32, not {kind} {}", quantized.unwrap_or_default())
         }
@@ -140,8 +133,7 @@ fn read_tensor<'a>(described: &Value, rest: &'a [u8]) -> Result<(TfTensor<'a>, &
     let shape = list(described, "/shape")?.iter().map(integer).collect::<Result<Vec<_>>>()?;
     ensure!(shape.len() <= 6 && shape.iter().all(|dim| (0..=MAX_SIZE as i64).contains(dim)), "its sizes are {shape:?}");
     let shape: Vec<usize> = shape.into_iter().map(|dim| dim as usize).collect();
-    let n_bytes = if element == TfElement::F16 { 2 } else { 4 };
-    let n_bytes = shape.iter().try_fold(n_bytes, |product: usize, dim| product.checked_mul(*dim));
+    let n_bytes = shape.iter().try_fold(element.n_bytes(), |product: usize, dim| product.checked_mul(*dim));
     let (raw, after) = n_bytes
         .and_then(|n_bytes| rest.split_at_checked(n_bytes))
         .with_context(|| format!("the second file ends within it, its sizes are {shape:?}"))?;

@@ -20,10 +20,6 @@ struct Constant<'a> {
     element: i8,
 }
 
-struct TfliteTensor {
-    shape: Vec<usize>,
-}
-
 struct TfliteOperator<'a> {
     code: i32,
     inputs: Vec<i32>,
@@ -33,7 +29,8 @@ struct TfliteOperator<'a> {
 
 /// A conversion under way.
 struct TfliteConverter<'a> {
-    tensors: Vec<TfliteTensor>,
+    /// Sizes of the tensors.
+    shapes: Vec<Vec<usize>>,
     constants: BTreeMap<usize, Constant<'a>>,
     /// Names in the graph of what operators gave.
     values: BTreeMap<usize, String>,
@@ -47,10 +44,10 @@ pub(crate) fn convert(file: &[u8], graph: OnnxGraph, options: &ConversionOptions
     let codes: Vec<i32> = model.tables(1)?.into_iter().map(code).collect::<Result<_>>()?;
     let network = model.tables(2)?.into_iter().next().context("it holds no graph")?;
     let buffers = model.tables(4)?;
-    let (mut tensors, mut constants) = (Vec::new(), BTreeMap::new());
+    let (mut shapes, mut constants) = (Vec::<Vec<usize>>::new(), BTreeMap::new());
     for (k, tensor) in network.tables(0)?.into_iter().enumerate() {
         let shape = tensor.ints(0, MAX_AXES)?.into_iter().map(|dim| size(dim.into())).collect::<Result<_>>();
-        tensors.push(TfliteTensor { shape: shape.with_context(|| format!("tensor {k}"))? });
+        shapes.push(shape.with_context(|| format!("tensor {k}"))?);
         let buffer = usize::try_from(tensor.int(2, 0)?).ok().and_then(|buffer| buffers.get(buffer));
         let raw = buffer.with_context(|| format!("tensor {k} has no buffer among the {}", buffers.len()))?.bytes(0)?;
         if !raw.is_empty() {
@@ -58,8 +55,8 @@ pub(crate) fn convert(file: &[u8], graph: OnnxGraph, options: &ConversionOptions
         }
     }
     let index = |tensor: i32| {
-        let found = usize::try_from(tensor).ok().filter(|tensor| *tensor < tensors.len());
-        found.with_context(|| format!("there is no tensor {tensor} among the {}", tensors.len()))
+        let found = usize::try_from(tensor).ok().filter(|tensor| *tensor < shapes.len());
+        found.with_context(|| format!("there is no tensor {tensor} among the {}", shapes.len()))
     };
     let outputs = network.ints(2, MAX_INPUTS)?.into_iter().map(index).collect::<Result<Vec<_>>>()?;
     ensure!(
@@ -93,13 +90,13 @@ pub(crate) fn convert(file: &[u8], graph: OnnxGraph, options: &ConversionOptions
         }
     }
 
-    let shape = tensors[first].shape.clone();
+    let shape = shapes[first].clone();
     ensure!(
         shape.len() == 4 && shape == options.shape()?,
         "the input has the sizes {shape:?}, the description says {:?}",
         options.input.shape
     );
-    let mut converter = TfliteConverter { tensors, constants, values: BTreeMap::new(), graph };
+    let mut converter = TfliteConverter { shapes, constants, values: BTreeMap::new(), graph };
     let image = converter.graph.op("Transpose", &[&options.input.name], &[("perm", Ints(&[0, 3, 1, 2]))]);
     converter.values.insert(first, image);
     for (k, (operator, _)) in operators.iter().zip(used).enumerate().filter(|(_, (_, used))| *used) {
@@ -107,7 +104,7 @@ pub(crate) fn convert(file: &[u8], graph: OnnxGraph, options: &ConversionOptions
     }
     let mut ports = Vec::new();
     for (tensor, name) in named {
-        let (value, shape) = (converter.value(tensor)?, converter.tensors[tensor].shape.clone());
+        let (value, shape) = (converter.value(tensor)?, converter.shapes[tensor].clone());
         match shape.len() {
             4 => converter.graph.output(name, "Transpose", &[&value], &[("perm", Ints(&[0, 2, 3, 1]))]),
             _ => converter.graph.output(name, "Identity", &[&value], &[]),
@@ -147,7 +144,7 @@ impl<'a> TfliteConverter<'a> {
     /// The value as TFLite has it: channels last.
     fn channels_last(&mut self, tensor: usize) -> Result<String> {
         let value = self.value(tensor)?;
-        match self.tensors[tensor].shape.as_slice() {
+        match self.shapes[tensor].as_slice() {
             [_, 1, 1, _] => Ok(value),
             [_, _, _, _] => Ok(self.graph.op("Transpose", &[&value], &[("perm", Ints(&[0, 2, 3, 1]))])),
             _ => Ok(value),
@@ -166,7 +163,7 @@ impl<'a> TfliteConverter<'a> {
             1 => ElementType::F16,
             _ => bail!("weights are float32 or float16, not TFLite's type {element} (tensor {tensor})"),
         };
-        self.graph.weight((element, &self.tensors[tensor].shape, raw), order, dims)
+        self.graph.weight((element, &self.shapes[tensor], raw), order, dims)
     }
 
     /// The integers in a constant.
@@ -187,7 +184,7 @@ impl<'a> TfliteConverter<'a> {
     }
 
     fn operator(&mut self, operator: &TfliteOperator) -> Result<()> {
-        let n_tensors = self.tensors.len();
+        let n_tensors = self.shapes.len();
         let input = |k: usize| {
             let tensor = operator.inputs.get(k).and_then(|tensor| usize::try_from(*tensor).ok());
             tensor.filter(|tensor| *tensor < n_tensors)
@@ -196,7 +193,7 @@ impl<'a> TfliteConverter<'a> {
         let first = needed(0)?;
         let options = || operator.options.context("its options are missing");
         let fused = |field: usize| operator.options.map_or(Ok(0), |options| options.byte(field));
-        let output = self.tensors[operator.output].shape.clone();
+        let output = self.shapes[operator.output].clone();
         let value = match operator.code {
             0 => {
                 let (a, b) = (self.value(first)?, self.value(needed(1)?)?);
@@ -217,7 +214,7 @@ impl<'a> TfliteConverter<'a> {
             }
             9 => {
                 let weight = needed(1)?;
-                let [_, n_inputs] = self.tensors[weight].shape[..] else { bail!("the weight has 2 axes") };
+                let [_, n_inputs] = self.shapes[weight][..] else { bail!("the weight has 2 axes") };
                 let flat = self.channels_last(first)?;
                 let shape = self.graph.ints(&[-1, n_inputs as i64])?;
                 let flat = self.graph.op("Reshape", &[&flat, &shape], &[]);
@@ -265,7 +262,7 @@ impl<'a> TfliteConverter<'a> {
             40 => {
                 let mut axes: Vec<i64> = self.integers(needed(1)?)?.iter().map(|axis| axis.rem_euclid(4)).collect();
                 axes.sort_unstable();
-                let n_axes = self.tensors[first].shape.len();
+                let n_axes = self.shapes[first].len();
                 ensure!(
                     axes == [1, 2] && n_axes == 4,
                     "the mean goes over height and width, not over the axes {axes:?}"
@@ -276,7 +273,7 @@ impl<'a> TfliteConverter<'a> {
             }
             54 => {
                 let slope = needed(1)?;
-                let channels = *self.tensors[slope].shape.last().context("the slope has no axes")?;
+                let channels = *self.shapes[slope].last().context("the slope has no axes")?;
                 let (value, slope) = (self.value(first)?, self.weight(slope, None, Some(&[channels, 1, 1]))?);
                 self.graph.op("PRelu", &[&value, &slope], &[])
             }
@@ -300,8 +297,8 @@ impl<'a> TfliteConverter<'a> {
         options: FlatTable,
     ) -> Result<String> {
         let dilations = if depthwise { 5 } else { 4 };
-        let [_, height, width, channels] = four("the input", &self.tensors[image].shape)?;
-        let [_, kernel_height, kernel_width, _] = four("the weight", &self.tensors[weight].shape)?;
+        let [_, height, width, channels] = four("the input", &self.shapes[image])?;
+        let [_, kernel_height, kernel_width, _] = four("the weight", &self.shapes[weight])?;
         let window = |kernel, stride, dilation| -> Result<_> {
             let [stride, dilation] = [size(options.int(stride, 1)?.into())?, size(options.int(dilation, 1)?.into())?];
             Ok(SlidingWindow { kernel, stride, dilation })
@@ -319,7 +316,7 @@ impl<'a> TfliteConverter<'a> {
     }
 
     fn max_pool(&mut self, image: usize, options: FlatTable) -> Result<String> {
-        let [_, height, width, _] = four("the input", &self.tensors[image].shape)?;
+        let [_, height, width, _] = four("the input", &self.shapes[image])?;
         let window = |kernel, stride| -> Result<_> {
             let [kernel, stride] = [size(options.int(kernel, 0)?.into())?, size(options.int(stride, 0)?.into())?];
             Ok(SlidingWindow { kernel, stride, dilation: 1 })

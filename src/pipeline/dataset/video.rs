@@ -15,14 +15,12 @@ use orator_base::types::pose2d::Keypoints;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::Posture;
 use orator_base::types::skeleton::{L_HAND, N_HAND_JOINTS, R_HAND};
-use orator_base::types::sound::{SAMPLE_RATE, Sound};
-use orator_base::types::sync::{self, SoundOffset};
+use orator_base::types::sound::{SAMPLE_RATE, Sound, SoundOffset, samples_of};
 use orator_dataset::bones::VideoBones;
 use orator_dataset::config::videos::slug;
 use orator_dataset::sample::Sample;
 use orator_dataset::words::VideoWords;
-use orator_formats::sound_offset_json;
-use orator_formats::{joints_npz, keypoints_npz};
+use orator_formats::{joints_npz, keypoints_npz, sound_offset_json};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -259,7 +257,7 @@ impl LiftedSamples<'_> {
     /// The sound under an interval, and how many samples of silence stand in for some that are not there.
     fn sound_of(&mut self, interval: Interval) -> Result<(Sound, usize)> {
         let reading = || format!("cannot read {}", self.video.sound.display());
-        let range = sync::samples_of(self.video.intervals.fps, SAMPLE_RATE, interval.start..interval.end);
+        let range = samples_of(self.video.intervals.fps, SAMPLE_RATE, interval.start..interval.end);
         let n_held = i64::from(self.sound.duration());
         let [start, end] = [range.start, range.end].map(|at| (at as i64 + self.video.shift).clamp(0, n_held));
         // Silence where the shifted sound begins after the interval does.

@@ -130,10 +130,6 @@ fn without_pictures(source_secs: Vec<f64>) -> Timeline {
 }
 
 impl KeypointPose2dStage {
-    pub fn new(work: &Path) -> Self {
-        Self { work: work.to_owned() }
-    }
-
     fn taken(&self, unit: &Unit) -> PathBuf {
         Artifact::Keypoints.within(&dir(&self.work, StageName::Extract, unit))
     }
@@ -199,7 +195,7 @@ impl StageBySource {
 
     /// The stage `pose2d`.
     pub fn pose2d(of_videos: Box<dyn Stage>, settings: &Settings, all: &[Videos]) -> Box<dyn Stage> {
-        Self::both(of_videos, Box::new(KeypointPose2dStage::new(&settings.work.dir)), all)
+        Self::both(of_videos, Box::new(KeypointPose2dStage { work: settings.work.dir.clone() }), all)
     }
 
     /// The way of videos alone where there are no keypoints.

@@ -81,13 +81,9 @@ impl Stage for LiftStage {
             input("intervals", self.file(Artifact::SegmentIntervals, unit)),
             input("ledger", self.file(Artifact::SegmentLedger, unit)),
         ];
-        for (role, path) in
-            [("body weights", &self.settings.body_weights), ("hand weights", &self.settings.hand_weights)]
-        {
-            if !path.as_os_str().is_empty() {
-                inputs.push(input(role, path.clone()));
-            }
-        }
+        let weights = [("body weights", &self.settings.body_weights), ("hand weights", &self.settings.hand_weights)];
+        let given = weights.into_iter().filter(|(_, path)| !path.as_os_str().is_empty());
+        inputs.extend(given.map(|(role, path)| input(role, path.clone())));
         Ok(inputs)
     }
 

@@ -52,6 +52,7 @@ pub fn is_same_person(before: &SeenPerson, after: &SeenPerson) -> bool {
 }
 
 /// Follows one person.
+#[derive(Default)]
 pub struct SpeakerTracker {
     pub detector: Option<Detector>,
     pub track: PersonTrack,
@@ -75,19 +76,7 @@ pub struct SpeakerTracker {
 impl SpeakerTracker {
     /// Without a detector the whole picture is the speaker's.
     pub fn new(detector: Option<Detector>) -> Self {
-        Self {
-            detector,
-            track: PersonTrack::default(),
-            tracks: LivenessTracks::default(),
-            reference: None,
-            colours: None,
-            n_strange: 0,
-            several: false,
-            before: None,
-            first: None,
-            talker: None,
-            idx: 0,
-        }
+        Self { detector, ..Self::default() }
     }
 
     /// A picture that shows the speaker, as its largest person. Errors: nobody is found in it.

@@ -38,24 +38,22 @@ pub fn serve() -> Result<()> {
         Request::Unit(unit) => {
             let paths = |paths: &[std::ffi::OsString]| paths.iter().map(PathBuf::from).collect();
             restrict(&FileAccess { reads: Some(paths(&unit.reads)), writes: vec![(&unit.out).into()] });
-            std::thread::spawn(end_with_parent);
-            let message = match attempt::guarded(|| work(*unit, &out)) {
-                Ok(Report { line, facts }) => Message::Done { line, facts },
-                Err(error) => Message::Failed(SentFailure::of(&workdir::full_disk(error))),
-            };
-            out.send(&message)
+            let done = |Report { line, facts }| Message::Done { line, facts };
+            answer(&out, || work(*unit, &out).map(done))
         }
         Request::Media(media) => {
             let writes = media.excerpt.iter().filter_map(|excerpt| excerpt.to.parent().map(Into::into)).collect();
             restrict(&FileAccess { reads: Some(vec![media.source.clone()]), writes });
-            std::thread::spawn(end_with_parent);
-            let message = match attempt::guarded(|| answer_media(&media)) {
-                Ok(secs) => Message::Secs(secs),
-                Err(error) => Message::Failed(SentFailure::of(&workdir::full_disk(error))),
-            };
-            out.send(&message)
+            answer(&out, || answer_media(&media).map(Message::Secs))
         }
     }
+}
+
+/// Sends the message that `work` ends with, for as long as the process that asked is there.
+fn answer(out: &Messages, work: impl FnOnce() -> Result<Message>) -> Result<()> {
+    std::thread::spawn(end_with_parent);
+    let failed = |error| Message::Failed(SentFailure::of(&workdir::full_disk(error)));
+    out.send(&attempt::guarded(work).unwrap_or_else(failed))
 }
 
 /// Ends the process when the other end of standard input is gone.

@@ -11,7 +11,7 @@ use orator_base::stage::ledger::{Ledger, longest_first};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::{Input, Report, Stage, Unit, counted, write_json};
 use orator_base::types::interval::Intervals;
-use orator_base::types::sync::SoundOffset;
+use orator_base::types::sound::SoundOffset;
 use orator_dataset::config;
 use orator_formats::keypoints_npz;
 use orator_formats::media_json::MediaInfo;

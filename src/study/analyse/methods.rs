@@ -50,12 +50,8 @@ fn exclusions(analysis: &StudyAnalysis) -> String {
     let rule = |count_of: &super::exclusion::ExclusionCount| match &count_of.unknown {
         Some(_) => format!("{} (not applicable: not recorded)", count_of.rule),
         None if count_of.n_participants > 0 => {
-            format!(
-                "{} ({} participants, {} votes)",
-                count_of.rule,
-                count(count_of.n_participants),
-                count(count_of.n_votes)
-            )
+            let [participants, votes] = [count_of.n_participants, count_of.n_votes].map(count);
+            format!("{} ({participants} participants, {votes} votes)", count_of.rule)
         }
         None => format!("{} ({} votes)", count_of.rule, count(count_of.n_votes)),
     };

@@ -222,7 +222,7 @@ pub struct StrengthFigure {
     /// Log odds of being put above a condition of mean strength (Bradley and Terry 1952).
     pub log_strength: f64,
     pub interval: Option<IntervalFigure>,
-    /// Elo rating; the mean is 1000.
+    /// The strength on the Elo scale; the mean is 1000.
     pub elo: f64,
 }
 

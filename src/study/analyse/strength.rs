@@ -3,7 +3,7 @@
 use super::figure::{FigureMethod, FigureOrigin, IntervalFigure};
 use super::outcome::Numbering;
 use super::result::{FigureSettings, StrengthFigure};
-use crate::stats::bradley_terry::{self, PairedVote, elo_ratings, strength_intervals};
+use crate::stats::bradley_terry::{self, PairedVote, elo, strength_intervals};
 use crate::stats::estimate::StatisticsError;
 use crate::vote::{Response, StudyVote};
 
@@ -23,7 +23,6 @@ pub fn strengths(
     let paired: Vec<PairedVote> = votes.iter().flat_map(|vote| paired(vote, numbering, conditions)).collect();
     let n = conditions.len();
     let strengths = bradley_terry::strengths(&paired, n)?;
-    let ratings = elo_ratings(&paired, n, settings.seed)?;
     let n_draws = settings.n_draws.min(MOST_DRAWS);
     let intervals = match n_draws {
         0 => None,
@@ -35,7 +34,7 @@ pub fn strengths(
         condition: conditions[k].clone(),
         log_strength: strengths[k],
         interval: intervals.as_ref().map(|all| IntervalFigure { origin, ends: all[k] }),
-        elo: ratings[k],
+        elo: elo(strengths[k]),
     };
     let mut rows: Vec<StrengthFigure> = (0..n).map(row).collect();
     rows.sort_by(|a, b| b.log_strength.total_cmp(&a.log_strength));

@@ -13,13 +13,8 @@ const MOST_REFUSED: usize = 20;
 pub fn text(analysis: &StudyAnalysis) -> String {
     let mut text = String::new();
     let account = &analysis.exclusions;
-    let _ = writeln!(
-        text,
-        "{}: {} votes of {} participants",
-        analysis.title,
-        count(account.n_votes_kept),
-        count(account.n_participants_kept)
-    );
+    let [votes, participants] = [account.n_votes_kept, account.n_participants_kept].map(count);
+    let _ = writeln!(text, "{}: {votes} votes of {participants} participants", analysis.title);
     if !analysis.hypotheses.is_empty() {
         text += "\nregistered hypotheses\n";
         for hypothesis in &analysis.hypotheses {
@@ -48,15 +43,9 @@ pub fn text(analysis: &StudyAnalysis) -> String {
         }
         for (task, all) in analysis.tasks.iter().zip(&analysis.without_exclusions) {
             if let Some((kept, all)) = task.pooled().zip(all.pooled()) {
-                let _ = writeln!(
-                    text,
-                    "  {}: {} of {} votes, {} of {} without exclusions",
-                    task.task,
-                    percent(kept.share),
-                    count(kept.n_votes as usize),
-                    percent(all.share),
-                    count(all.n_votes as usize)
-                );
+                let [kept, all] =
+                    [kept, all].map(|of| format!("{} of {}", percent(of.share), count(of.n_votes as usize)));
+                let _ = writeln!(text, "  {}: {kept} votes, {all} without exclusions", task.task);
             }
         }
     }
@@ -83,13 +72,8 @@ fn rows(task: &TaskAnalysis) -> String {
     let mut text = String::new();
     let mark = |is_exploratory: bool| if is_exploratory { "*" } else { " " };
     for share in &task.shares {
-        let _ = writeln!(
-            text,
-            "\n  {:<46} {:>8} of {:>8} votes",
-            scope(share),
-            percent(share.share),
-            count(share.n_votes as usize)
-        );
+        let (scope, percent, votes) = (scope(share), percent(share.share), count(share.n_votes as usize));
+        let _ = writeln!(text, "\n  {scope:<46} {percent:>8} of {votes:>8} votes");
         for FigureRow { origin, interval, test } in share.figures.rows() {
             let name = format!("{}{}", origin.method.name(), if origin.naive { ", naive" } else { "" });
             let interval = interval.map(percents).unwrap_or_default();

@@ -31,9 +31,6 @@ impl StudyFile {
     }
 
     /// Writes the file with every default in it, atomically.
-    ///
-    /// # Errors
-    /// A folder that cannot be written.
     pub fn write(&self, file: &Path) -> Result<()> {
         workdir::write_file(file, toml::to_string_pretty(self)?.as_bytes())
     }

@@ -1,5 +1,6 @@
 //! Requests and replies: JSON bodies, tokens, errors as a sentence with a status, and the headers of every reply.
 
+use crate::store::writer::NotStored;
 use axum::body::Bytes;
 use axum::extract::{FromRequest, Request};
 use axum::http::header::{self, HeaderName};
@@ -65,6 +66,12 @@ impl ApiError {
     }
 }
 
+impl From<NotStored> for ApiError {
+    fn from(_: NotStored) -> Self {
+        Self::not_stored()
+    }
+}
+
 impl IntoResponse for ApiError {
     fn into_response(self) -> HttpResponse {
         let mut reply = with_status(self.status, &json!({ "error": self.sentence }));
@@ -123,9 +130,6 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for JsonBody<T> {
 }
 
 /// Token of the header `Authorization: Bearer TOKEN`.
-///
-/// # Errors
-/// No such header.
 pub fn bearer(headers: &HeaderMap) -> Result<&str, ApiError> {
     let token = header_text(headers, header::AUTHORIZATION).and_then(|text| text.strip_prefix("Bearer "));
     token.ok_or_else(unauthorized)

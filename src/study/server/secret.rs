@@ -18,9 +18,6 @@ const TOKEN: usize = 4 + ID + blake3::OUT_LEN;
 const CODE_LETTERS: &[u8; 32] = b"ABCDEFGHJKLMNPQRSTUVWXYZ23456789";
 
 /// Bytes that nobody can foretell.
-///
-/// # Errors
-/// A system without a source of them.
 pub fn random<const N: usize>() -> Result<[u8; N]> {
     let mut bytes = [0; N];
     let read = File::open("/dev/urandom").and_then(|mut source| source.read_exact(&mut bytes));
@@ -29,17 +26,11 @@ pub fn random<const N: usize>() -> Result<[u8; N]> {
 }
 
 /// A random completion code, ten letters.
-///
-/// # Errors
-/// No randomness.
 pub fn completion_code() -> Result<String> {
     Ok(random::<10>()?.into_iter().map(|byte| char::from(CODE_LETTERS[usize::from(byte % 32)])).collect())
 }
 
 /// A random name of a participant.
-///
-/// # Errors
-/// No randomness.
 pub fn participant_id() -> Result<String> {
     Ok(hex(&random::<ID>()?))
 }

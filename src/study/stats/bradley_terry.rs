@@ -1,14 +1,13 @@
 //! Strengths of conditions such that one is preferred to another with log odds of the difference (Bradley and Terry
-//! 1952), by maximum likelihood, and Elo ratings as public arenas rank models (Chiang et al. 2024). A tie counts as half a
-//! win for each, a strength of preference as its share. Strengths are finite only where wins lead from each condition to
-//! each other one (Ford 1957): no prior makes up for votes that are missing.
+//! 1952), by maximum likelihood, also on the scale of Elo, as the GENEA leaderboard (Nagy et al. 2024) and Chatbot Arena
+//! (Chiang et al. 2024) print them. A tie counts as half a win for each, a strength of preference as its share. Strengths are
+//! finite only where wins lead from each condition to each other one (Ford 1957): no prior makes up for missing votes.
 
 use super::cluster::sign_flips::rng_of_draw;
 use super::estimate::{ConfidenceInterval, StatisticsError, at_least, interval_of_draws, within};
 use ndarray::{Array1, Array2, Axis};
 use orator_base::math::cholesky;
 use rand::Rng;
-use rand::seq::SliceRandom;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -16,11 +15,6 @@ use std::collections::BTreeMap;
 const MOST: usize = 100;
 /// Largest share of draws without finite strengths that an interval may leave out.
 const LEFT_OUT: f64 = 0.05;
-/// Elo: points that a vote moves at most, points that make odds of 10, mean rating, and random orders of votes.
-const ELO_K: f64 = 4.0;
-const ELO_SCALE: f64 = 400.0;
-const ELO_MEAN: f64 = 1000.0;
-const ELO_ORDERS: usize = 100;
 
 /// Vote of one participant between two conditions, by their numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,30 +101,9 @@ pub fn strength_intervals(
     (0..n_conditions).map(interval).collect()
 }
 
-/// Elo rating of each condition: after each vote both conditions move by K times what the vote said less what the ratings
-/// predicted. The result depends on the order of votes, so it is the mean over random orders.
-pub fn elo_ratings(votes: &[PairedVote], n_conditions: usize, seed: u64) -> Result<Vec<f64>, StatisticsError> {
-    check(votes, n_conditions)?;
-    let mut votes = votes.to_vec();
-    // Where votes come from another file they may stand in another order.
-    votes.sort_by(|a, b| {
-        let key = |vote: &PairedVote| (vote.participant, vote.first, vote.second);
-        key(a).cmp(&key(b)).then(a.share.total_cmp(&b.share))
-    });
-    let mut rng = rng_of_draw(seed, 0);
-    let mut sums = vec![0.0; n_conditions];
-    for _ in 0..ELO_ORDERS {
-        votes.shuffle(&mut rng);
-        let mut ratings = vec![ELO_MEAN; n_conditions];
-        for vote in &votes {
-            let gap = ratings[vote.second] - ratings[vote.first];
-            let moved = ELO_K * (vote.share - 1.0 / (1.0 + 10f64.powf(gap / ELO_SCALE)));
-            ratings[vote.first] += moved;
-            ratings[vote.second] -= moved;
-        }
-        sums.iter_mut().zip(ratings).for_each(|(sum, rating)| *sum += rating);
-    }
-    Ok(sums.iter().map(|sum| sum / ELO_ORDERS as f64).collect())
+/// Elo rating of a strength: a difference of 400 is odds of 10, and the mean rating is 1000.
+pub fn elo(log_strength: f64) -> f64 {
+    1000.0 + 400.0 / std::f64::consts::LN_10 * log_strength
 }
 
 /// Log-likelihood, its slope, and the information lifted by 1 / n in all places.
@@ -189,14 +162,8 @@ mod tests {
         sets.iter().map(|set| (votes(set), serde_json::from_value(set["strengths"].clone()).unwrap())).collect()
     }
 
-    fn ranked(values: &[f64]) -> Vec<usize> {
-        let mut order: Vec<usize> = (0..values.len()).collect();
-        order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
-        order
-    }
-
     #[test]
-    fn strengths_are_those_of_choix_and_ratings_rank_alike() {
+    fn strengths_are_those_of_choix() {
         for (votes, expected) in sets() {
             let n = expected.len();
             let found = strengths(&votes, n).unwrap();
@@ -204,13 +171,8 @@ mod tests {
             let intervals = strength_intervals(&votes, n, 0.95, 300, 1).unwrap();
             assert!(intervals.iter().zip(&found).all(|(interval, at)| interval.low < *at && *at < interval.high));
         }
-        let (votes, expected) = sets().remove(1);
-        let n = expected.len();
-        let ratings = elo_ratings(&votes, n, 7).unwrap();
-        let turned: Vec<PairedVote> = votes.iter().rev().copied().collect();
-        assert_eq!(ratings, elo_ratings(&turned, n, 7).unwrap());
-        assert!((ratings.iter().sum::<f64>() / n as f64 - ELO_MEAN).abs() < 1e-9);
-        assert_eq!(ranked(&ratings), ranked(&expected));
+        assert_eq!(elo(0.0), 1000.0);
+        assert!((elo(10f64.ln()) - 1400.0).abs() < 1e-9 && (elo(0.1f64.ln()) - 600.0).abs() < 1e-9);
     }
 
     #[test]
@@ -224,6 +186,5 @@ mod tests {
         assert!(matches!(fit(&[vote(0, 2, 0.5)], 2), StatisticsError::OutOfRange { .. }));
         assert!(matches!(fit(&[vote(0, 1, f64::NAN)], 2), StatisticsError::OutOfRange { .. }));
         assert!(matches!(fit(&[vote(1, 1, 0.5)], 2), StatisticsError::TooFew { .. }));
-        assert!(elo_ratings(&[], 2, 1).is_err());
     }
 }

@@ -8,7 +8,7 @@ use ndarray::{Array2, Array3, Axis, s};
 use orator_base::motion::{resample, units};
 use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::{Posture, PostureChannel};
-use orator_base::types::sync;
+use orator_base::types::sound::samples_of;
 use orator_base::types::time::FrameRate;
 use orator_dataset::Dataset;
 use orator_formats::mocap::motion_file;
@@ -197,7 +197,7 @@ fn other_clips(clips: &[StudyClip]) -> Vec<usize> {
 
 /// Samples of the sound that belong to a clip.
 pub fn sound_of(piece: &SpokenPiece, clip: &StudyClip, fps: FrameRate) -> Vec<f32> {
-    let range = sync::samples_of(fps, piece.sound.rate, clip.frames.clone());
+    let range = samples_of(fps, piece.sound.rate, clip.frames.clone());
     let mut samples = piece.sound.samples.get(range.start..).unwrap_or_default().to_vec();
     samples.resize(range.len(), 0.0);
     samples

@@ -66,9 +66,6 @@ struct CutCandidate {
 }
 
 /// Cuts `n_wanted` clips of `n_frames`, fewer where there are no more; `rank` orders clips that are equally good.
-///
-/// # Errors
-/// Speech that cannot be read.
 pub fn cut(source: &SpeakerSource, n_frames: usize, n_wanted: usize, rank: impl Fn(&str) -> u64) -> Result<CutSpeech> {
     let looked_at = (0..source.n_pieces()).into_par_iter().map(|piece| {
         let piece = source.read(piece)?;

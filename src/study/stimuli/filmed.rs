@@ -16,8 +16,7 @@ use orator_avatar::animate::export::film::smooth_rate;
 use orator_avatar::animate::export::film_avatar::AvatarStage;
 use orator_base::audio::loudness;
 use orator_base::stage::progress::Progress;
-use orator_base::types::sound::Sound;
-use orator_base::types::sync;
+use orator_base::types::sound::{Sound, sample_at};
 use orator_base::types::time::FrameRate;
 use orator_formats::mocap::motion_file::USUAL_FPS;
 use rayon::prelude::*;
@@ -86,7 +85,7 @@ impl CutSpeaker {
             for clip in of_piece {
                 let n_film_frames = film_fps.frames_in(fps.secs(clip.frames.len()));
                 let mut samples = sound_of(&piece, clip, fps);
-                samples.resize(sync::sample_at(film_fps, piece.sound.rate, n_film_frames), 0.0);
+                samples.resize(sample_at(film_fps, piece.sound.rate, n_film_frames), 0.0);
                 sounds.push(faded(Sound { rate: piece.sound.rate, samples }));
             }
         }

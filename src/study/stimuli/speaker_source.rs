@@ -95,9 +95,6 @@ impl SpeakerSource {
     }
 
     /// Reads a piece.
-    ///
-    /// # Errors
-    /// A file that cannot be read, or a damaged dataset.
     pub fn read(&self, piece: usize) -> Result<SpokenPiece> {
         let Piece { name, place } = &self.pieces[piece];
         match (place, &self.dataset) {

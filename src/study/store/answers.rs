@@ -121,9 +121,6 @@ fn at(db: &Connection, id: &str, position: u32) -> rusqlite::Result<Option<Given
 }
 
 /// Answers of a participant in the order of the session.
-///
-/// # Errors
-/// A database that fails.
 pub fn of(db: &Connection, id: &str) -> rusqlite::Result<Vec<GivenAnswer>> {
     let sql = format!("SELECT {COLUMNS} FROM answer WHERE participant = ?1 ORDER BY position");
     db.prepare(&sql)?.query_map([id], of_row)?.collect()
@@ -137,9 +134,6 @@ pub struct StallCount {
 }
 
 /// Counts the answers whose films stopped.
-///
-/// # Errors
-/// A database that fails.
 pub fn stalls(db: &Connection) -> rusqlite::Result<StallCount> {
     let sql = "SELECT COUNT(*), TOTAL(stalled_secs) FROM answer WHERE stalled_secs > 0";
     db.query_row(sql, [], |row| Ok(StallCount { trials: row.get(0)?, secs: row.get(1)? }))

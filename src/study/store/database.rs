@@ -81,9 +81,6 @@ pub fn erase_deleted(db: &Connection) -> rusqlite::Result<()> {
 }
 
 /// Adds one to a count of the table `about`.
-///
-/// # Errors
-/// A failed write.
 pub fn count_up(db: &Connection, name: &str) -> rusqlite::Result<()> {
     db.execute("UPDATE about SET value = value + 1 WHERE name = ?1", params![name]).map(drop)
 }

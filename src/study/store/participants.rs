@@ -170,9 +170,6 @@ impl NewParticipant {
 
 /// Gives the first free session to `newcomer`; whoever had abandoned it is replaced. Who comes again by the name that the
 /// recruiting site gives along is the participant of before. `None`: the study has all the participants wanted.
-///
-/// # Errors
-/// A database that fails.
 pub fn begin(
     db: &Connection,
     newcomer: &NewParticipant,
@@ -202,27 +199,18 @@ pub fn begin(
 }
 
 /// Participant of that name; `None`: never begun, or withdrawn.
-///
-/// # Errors
-/// A database that fails.
 pub fn find(db: &Connection, id: &str) -> rusqlite::Result<Option<Participant>> {
     let sql = format!("SELECT {} FROM participant WHERE id = ?1", Participant::COLUMNS);
     db.query_row(&sql, [id], Participant::of_row).optional()
 }
 
 /// All participants, the first to begin first.
-///
-/// # Errors
-/// A database that fails.
 pub fn all(db: &Connection) -> rusqlite::Result<Vec<Participant>> {
     let sql = format!("SELECT {} FROM participant ORDER BY begun_ms, id", Participant::COLUMNS);
     db.prepare(&sql)?.query_map([], Participant::of_row)?.collect()
 }
 
 /// Deletes all of a participant and counts the withdrawal; `false`: there is none of that name.
-///
-/// # Errors
-/// A database that fails.
 pub fn withdraw(db: &Connection, id: &str) -> rusqlite::Result<bool> {
     db.execute("DELETE FROM answer WHERE participant = ?1", [id])?;
     let is_known = db.execute("DELETE FROM participant WHERE id = ?1", [id])? > 0;
@@ -233,9 +221,6 @@ pub fn withdraw(db: &Connection, id: &str) -> rusqlite::Result<bool> {
 }
 
 /// Number of participants who withdrew.
-///
-/// # Errors
-/// A database that fails.
 pub fn n_withdrawn(db: &Connection) -> rusqlite::Result<u32> {
     db.query_row("SELECT CAST(value AS INTEGER) FROM about WHERE name = 'withdrawn'", [], |row| row.get(0))
 }

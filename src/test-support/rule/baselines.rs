@@ -6,8 +6,7 @@ use anyhow::{Result, ensure};
 use ndarray::{Array2, Array3, ArrayView3, Axis, concatenate, s};
 use orator_base::audio::mel;
 use orator_base::types::skeleton::N_JOINTS;
-use orator_base::types::sound::Sound;
-use orator_base::types::sync;
+use orator_base::types::sound::{Sound, sample_at, samples_of};
 use orator_base::types::time::FrameRate;
 use orator_dataset::{Dataset, Sample, Split};
 use rayon::prelude::*;
@@ -21,11 +20,11 @@ const SECOND: HeardFrames = HeardFrames { before: 13, behind: 1 };
 /// Log-mel spectrogram by motion frame [T, 64]: the mean over the hops that begin in the frame.
 pub fn sound_of_frames(sound: &Sound, n_frames: usize, fps: FrameRate) -> Array2<f64> {
     let mut samples = sound.samples.clone();
-    samples.resize(sync::sample_at(fps, sound.rate, n_frames) + mel::WINDOW, 0.0);
+    samples.resize(sample_at(fps, sound.rate, n_frames) + mel::WINDOW, 0.0);
     let mels = mel::log_mel(&samples);
     let mut frames = Array2::zeros((n_frames, mel::N_MELS));
     for (t, mut frame) in frames.outer_iter_mut().enumerate() {
-        let hops = sync::samples_of(fps, sound.rate, t..t + 1);
+        let hops = samples_of(fps, sound.rate, t..t + 1);
         let (first, last) = (hops.start.div_ceil(mel::HOP), hops.end.div_ceil(mel::HOP).min(mels.nrows()));
         let mean = mels.slice(s![first.min(last.saturating_sub(1))..last, ..]).mean_axis(Axis(0));
         frame.assign(&mean.unwrap_or_default().mapv(f64::from));

@@ -10,9 +10,8 @@ use crate::spoken_video::SpokenVideo;
 use anyhow::{Context, Result, ensure};
 use orator_base::stage::progress::Progress;
 use orator_base::types::pose3d::Motion;
-use orator_base::types::sound::{SAMPLE_RATE, Sound};
+use orator_base::types::sound::{SAMPLE_RATE, Sound, sample_at};
 use orator_base::types::split::Split;
-use orator_base::types::sync;
 use orator_base::types::time::FrameRate;
 use orator_dataset::info::{About, DatasetInfo};
 use orator_dataset::sample::Sample;
@@ -95,7 +94,7 @@ impl SpokenClip {
     pub fn sound(&self) -> Sound {
         let mut rng = self.rng("sound");
         let mut sound = self.speech().sound(self.secs(), &mut rng);
-        sound.samples.resize(sync::sample_at(FPS, SAMPLE_RATE, self.n_frames), 0.0);
+        sound.samples.resize(sample_at(FPS, SAMPLE_RATE, self.n_frames), 0.0);
         sound.samples.iter_mut().for_each(|sample| *sample += ROOM * rng.random_range(-1.0..1.0));
         sound
     }

@@ -7,7 +7,7 @@ use orator_base::stage::Unit;
 use orator_base::stage::artifacts::Artifact;
 use orator_base::stage::progress::Silent;
 use orator_base::types::skeleton::{L_HAND, parent};
-use orator_base::types::sync;
+use orator_base::types::sound::samples_of;
 use orator_dataset::config::SplitUnit;
 use orator_dataset::split::SplitBy;
 use orator_dataset::verify::verify::{accounts, verify};
@@ -68,7 +68,7 @@ fn samples_hold_the_frames_and_the_sound_of_their_interval() {
         assert_eq!(sample.key, format!("{name}-{}-{start:06}", &source[..8]));
         let audio = Artifact::Sound.path(&dir.path().join("work"), unit);
         let whole: Vec<i16> = hound::WavReader::open(audio).unwrap().samples().map(Result::unwrap).collect();
-        let range = sync::samples_of(FPS, 16_000, start..start + sample.n_frames());
+        let range = samples_of(FPS, 16_000, start..start + sample.n_frames());
         let mut expected: Vec<f32> =
             whole[range.start..range.end.min(whole.len())].iter().map(|&s| f32::from(s) / 32_768.0).collect();
         expected.resize(range.len(), 0.0);

@@ -2,7 +2,7 @@
 
 use crate::fixtures::media::lifted_videos::{settings, shard_as, video};
 use orator_base::stage::artifacts::Artifact;
-use orator_base::types::sync::SoundOffset;
+use orator_base::types::sound::SoundOffset;
 use orator_dataset::config::Settings;
 use orator_dataset::{Dataset, Split};
 use std::path::Path;

@@ -6,7 +6,7 @@ use ndarray::{Array3, s};
 use orator_base::audio::mel;
 use orator_base::stage::Unit;
 use orator_base::stage::progress::Silent;
-use orator_base::types::sync;
+use orator_base::types::sound::samples_of;
 use orator_dataset::config::{LiftConfig, SplitUnit};
 use orator_dataset::verify::verify::verify;
 use orator_dataset::write::part::VideoEntry;
@@ -76,7 +76,7 @@ fn one_long_talk_gives_all_three_splits_without_a_leak() {
             assert!(apart(&reached(own), &reached(other)), "{own:?} and {other:?} were made from a common frame");
             // A window moved out of its sample by its whole length does not meet the other either.
             assert!(apart(&(own.start.saturating_sub(WINDOW)..own.end + WINDOW), other));
-            let sound = |frames: &Range<usize>| sync::samples_of(FPS, 16_000, frames.clone());
+            let sound = |frames: &Range<usize>| samples_of(FPS, 16_000, frames.clone());
             let context = sound(own).start.saturating_sub(mel::FFT)..sound(own).end + mel::FFT;
             assert!(apart(&context, &sound(other)));
         }
@@ -105,7 +105,7 @@ fn other_splits_have_no_say_in_what_is_trained_on() {
         let mut rng = ChaCha8Rng::seed_from_u64(99);
         for t in (0..TALK).filter(|t| !train.iter().any(|frames| frames.contains(t))) {
             joints.slice_mut(s![t, 1.., ..]).mapv_inplace(|_| rng.random_range(-0.5f32..0.5));
-            let range = sync::samples_of(FPS, 16_000, t..t + 1);
+            let range = samples_of(FPS, 16_000, t..t + 1);
             let end = range.end.min(sound.len());
             sound[range.start.min(end)..end].iter_mut().for_each(|sample| *sample = rng.random());
         }

@@ -3,8 +3,7 @@
 
 use ndarray::ArrayView2;
 use orator_base::types::image::Image;
-use orator_base::types::skeleton;
-use orator_base::types::skeleton::{L_HAND, L_SHOULDER, L_WRIST, N_JOINTS, R_HAND, R_SHOULDER, R_WRIST, Side};
+use orator_base::types::skeleton::{self, L_HAND, L_SHOULDER, L_WRIST, N_JOINTS, R_HAND, R_SHOULDER, R_WRIST, Side};
 use orator_media::opencv::draw;
 
 /// Background colour of all pictures.

@@ -19,10 +19,8 @@ pub struct BoneMap {
 }
 
 impl BoneMap {
-    /// Finds the joints by their names; the chest is the joint that carries both arms and the neck.
-    ///
-    /// # Errors
-    /// Hips, an arm, forearm or hand that no name is like.
+    /// Finds the joints by their names; the chest is the joint that carries both arms and the neck. Errors: hips, an
+    /// arm, forearm or hand that no name is like.
     pub fn found(rig: &UserRig) -> Result<Self> {
         // Names of what cannot move match nothing.
         let names: Vec<&str> =
@@ -34,10 +32,8 @@ impl BoneMap {
         Self { joints }.whole(rig)
     }
 
-    /// Reads the text of a map.
-    ///
-    /// # Errors
-    /// No TOML, a bone that we have not, a joint that the skeleton has not, a bone missing that is needed.
+    /// Reads the text of a map. Errors: no TOML, a bone that we have not, a joint that the skeleton has not, a bone
+    /// missing that is needed.
     pub fn parse(text: &str, rig: &UserRig, ours: &Skeleton) -> Result<Self> {
         let table: BTreeMap<String, String> =
             toml::from_str(text).context("expected lines like LeftArm = \"upperarm_l\"")?;

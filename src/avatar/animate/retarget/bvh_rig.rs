@@ -4,7 +4,7 @@ use super::user_rig::{UserJoint, UserRig};
 use anyhow::{Result, ensure};
 use orator_base::math::rotation::Rotation;
 use orator_base::types::time::FrameRate;
-use orator_formats::bvh::read::{Bvh, Channel};
+use orator_formats::bvh::read::Bvh;
 use orator_formats::bvh::skeleton::{BvhSkeleton, JointChannels};
 
 /// Skeleton of a BVH file with the positions that it has channels for.
@@ -16,10 +16,7 @@ pub struct BvhRig {
 }
 
 impl BvhRig {
-    /// The skeleton of a file.
-    ///
-    /// # Errors
-    /// A joint whose rotation channels are not three about different axes.
+    /// The skeleton of a file. Errors: a joint whose rotation channels are not three about different axes.
     pub fn new(bvh: &Bvh) -> Result<Self> {
         let skeleton = BvhSkeleton::of(bvh);
         skeleton.check()?;
@@ -55,35 +52,14 @@ impl BvhRig {
 
     /// Local rotations of the first frame.
     fn first_frame(&self) -> Vec<Rotation> {
-        let mut values = self.first.iter();
-        let turn = |joint: &JointChannels| {
-            let angles: Vec<f64> = joint
-                .channels
-                .iter()
-                .zip(values.by_ref())
-                .filter(|(channel, _)| matches!(channel, Channel::Rotation(_)))
-                .map(|(_, degrees)| degrees.to_radians())
-                .collect();
-            match (joint.rotation_order(), angles[..].try_into()) {
-                (Some(order), Ok(angles)) => Rotation::from_euler(order, angles),
-                _ => Rotation::IDENTITY,
-            }
-        };
-        self.skeleton.joints.iter().map(turn).collect()
+        let joints = self.skeleton.joints.iter().zip(self.skeleton.first_channels());
+        joints.map(|(joint, first)| joint.rotation(&self.first[first..]).unwrap_or(Rotation::IDENTITY)).collect()
     }
 
     fn channels(&self, local: &[Rotation]) -> Vec<f64> {
         let mut values = self.first.clone();
-        let mut next = 0;
-        for (joint, &turn) in self.skeleton.joints.iter().zip(local) {
-            let mut angles = joint.rotation_order().map(|order| turn.euler(order)).into_iter().flatten();
-            for channel in &joint.channels {
-                if matches!(channel, Channel::Rotation(_)) {
-                    values[next] = angles.next().map_or(0.0, f64::to_degrees);
-                }
-                next += 1;
-            }
-        }
+        let joints = self.skeleton.joints.iter().zip(self.skeleton.first_channels());
+        joints.zip(local).for_each(|((joint, first), turn)| joint.set_rotation(*turn, &mut values[first..]));
         values
     }
 }

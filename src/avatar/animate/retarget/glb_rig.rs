@@ -25,10 +25,8 @@ pub struct GlbRig {
 }
 
 impl GlbRig {
-    /// Reads the bytes of a file.
-    ///
-    /// # Errors
-    /// No GLB, buffers in other files, nodes that are no tree, scaled unevenly or given as a matrix.
+    /// Reads the bytes of a file. Errors: no GLB, buffers in other files, nodes that are no tree, scaled unevenly or
+    /// given as a matrix.
     pub fn new(file: &[u8]) -> Result<Self> {
         let (scene, bytes) = chunks(file).context("no binary glTF 2.0 (.glb)")?;
         let buffers = scene["buffers"].as_array().map_or(0, Vec::len);

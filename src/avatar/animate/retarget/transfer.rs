@@ -61,10 +61,8 @@ pub struct Transfer<'a> {
 }
 
 impl<'a> Transfer<'a> {
-    /// Prepares the transfer from `rig` by a map.
-    ///
-    /// # Errors
-    /// A skeleton whose arms have no length, or whose left and right are at one place.
+    /// Prepares the transfer from `rig` by a map. Errors: a skeleton whose arms have no length, or whose left and right
+    /// are at one place.
     pub fn new(rig: &Rig, user: &'a UserRig, map: &BoneMap) -> Result<Self> {
         let ours = &rig.skeleton;
         let t_pose = ours.positions(rig.root, &vec![Rotation::IDENTITY; ours.joints.len()]);

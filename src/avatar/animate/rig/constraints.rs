@@ -3,8 +3,7 @@
 //! continuous. The limits are in `limits`.
 
 use super::hinge::Bend;
-use super::limits;
-use super::limits::{CURL_COHERENCE, Limit, turn, within};
+use super::limits::{self, CURL_COHERENCE, Limit, turn, within};
 use super::rig::Rig;
 use crate::animate::solve::arm_pose::ArmPose;
 use crate::animate::solve::track::smoothstep;

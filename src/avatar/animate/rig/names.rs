@@ -157,38 +157,17 @@ mod tests {
         let mixamo = ["UpLeg", "Leg", "Foot", "ToeBase", "Toe_End", "Shoulder", "Arm", "ForeArm", "Hand"];
         let mixamos_fingers = ["Thumb", "Index", "Middle", "Ring", "Pinky"];
         let mixamos_fingers = mixamos_fingers.iter().flat_map(|f| (1..=4).map(move |k| format!("Hand{f}{k}")));
-        for (names, n, start, trunk, sides, limbs, fingers) in [
+        let mixamos_trunk = "Hips Spine Spine1 Spine2 Neck Head HeadTop_End";
+        let vrms_fingers = [&thumb[..], &fingers(&FINGERS[1..])].concat();
+        for (names, n, start, trunk, limbs, fingers) in [
             // HumanBodyBones without those it calls optional and we have nothing for: eyes, jaw, toes, UpperChest.
-            (
-                Names::UnityHumanoid,
-                49,
-                "",
-                "Hips Spine Chest Neck Head",
-                ["Left", "Right"],
-                &limbs[..],
-                fingers(&FINGERS),
-            ),
+            (Names::UnityHumanoid, 49, "", "Hips Spine Chest Neck Head", &limbs[..], fingers(&FINGERS)),
             // VRM 1.0, humanoid.md, without upperChest, eyes, jaw and toes, which it does not require.
-            (
-                Names::Vrm,
-                49,
-                "",
-                "hips spine chest neck head",
-                ["left", "right"],
-                &limbs[..],
-                [&thumb[..], &fingers(&FINGERS[1..])].concat(),
-            ),
+            (Names::Vrm, 49, "", "hips spine chest neck head", &limbs[..], vrms_fingers),
             // X Bot and Y Bot.
-            (
-                Names::Mixamo,
-                65,
-                "mixamorig:",
-                "Hips Spine Spine1 Spine2 Neck Head HeadTop_End",
-                ["Left", "Right"],
-                &mixamo[..],
-                mixamos_fingers.collect(),
-            ),
+            (Names::Mixamo, 65, "mixamorig:", mixamos_trunk, &mixamo[..], mixamos_fingers.collect()),
         ] {
+            let sides = if names == Names::Vrm { ["left", "right"] } else { ["Left", "Right"] };
             let all = FileSkeleton::new(&default_rig().skeleton, names, RestAxes::World).skeleton.joints;
             let called: BTreeSet<&String> = all.iter().map(|joint| &joint.name).collect();
             assert_eq!(called.len(), all.len(), "a name is given twice");

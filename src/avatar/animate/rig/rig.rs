@@ -8,8 +8,7 @@ use orator_base::math::order::upper_median;
 use orator_base::math::vec3::{Vec3, across, cross, norm, scale};
 use orator_base::motion::fk::Skeleton;
 use orator_base::types::pose3d::Motion;
-use orator_base::types::skeleton;
-use orator_base::types::skeleton::{L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, N_JOINTS, NECK, R_HAND};
+use orator_base::types::skeleton::{self, L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, N_JOINTS, NECK, R_HAND};
 
 /// Centimetres in a metre.
 pub const CM: f64 = 100.0;

@@ -4,8 +4,7 @@
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::{Vec3, across, add, norm, scale, sub, unit};
 use orator_base::types::pose3d::Motion;
-use orator_base::types::skeleton;
-use orator_base::types::skeleton::{L_HAND, L_SHOULDER, L_WRIST, N_JOINTS, R_HAND, R_SHOULDER, R_WRIST};
+use orator_base::types::skeleton::{self, L_HAND, L_SHOULDER, L_WRIST, N_JOINTS, R_HAND, R_SHOULDER, R_WRIST};
 
 /// Shortest bone with a direction, metres.
 const LEAST_METRES: f64 = 1e-5;

@@ -59,20 +59,15 @@ pub fn lock_with_others(folder: &Path) -> Result<FolderLock> {
 }
 
 impl FolderLock {
-    /// Exclusive lock, for replacing, changing or removing the folder.
-    ///
-    /// # Errors
-    /// `BusyFolder`; the lock file is a link.
+    /// Exclusive lock, for replacing, changing or removing the folder. Errors: `BusyFolder`; the lock file is a link.
     pub fn exclusive(folder: &Path) -> Result<Self> {
         // Without a folder to lie in, there is no lock; making the folder itself fails for the same reason.
         let _ = fs::create_dir_all(parent(folder));
         Self::beside(folder, true)
     }
 
-    /// Shared lock, for reading the folder and for writing files that are derived from it.
-    ///
-    /// # Errors
-    /// `BusyFolder`; the lock file is a link.
+    /// Shared lock, for reading the folder and for writing files that are derived from it. Errors: `BusyFolder`; the
+    /// lock file is a link.
     pub fn shared(folder: &Path) -> Result<Self> {
         Self::beside(folder, false)
     }

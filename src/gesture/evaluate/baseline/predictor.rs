@@ -5,14 +5,13 @@ use anyhow::{Result, ensure};
 use ndarray::s;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::Posture;
-use orator_base::types::sound::{SAMPLE_RATE, Sound};
-use orator_base::types::sync;
+use orator_base::types::sound::{SAMPLE_RATE, Sound, sample_at};
 use orator_formats::transcript::Word;
 use std::ops::Range;
 
 /// Generated motion for one sound, exactly `n_frames` long, with the posture where it is learnt.
 pub fn motion(speaker: &GestureGenerator, sound: &Sound, n_frames: usize) -> Result<(Motion, Option<Posture>)> {
-    let wanted = sync::sample_at(speaker.fps(), SAMPLE_RATE, n_frames) + 1;
+    let wanted = sample_at(speaker.fps(), SAMPLE_RATE, n_frames) + 1;
     let mut sound = sound.clone();
     sound.samples.resize(sound.samples.len().max(wanted), 0.0);
     let (predicted, posture) = speaker.motion_and_posture(&sound)?;

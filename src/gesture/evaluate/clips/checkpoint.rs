@@ -12,8 +12,7 @@ use orator_base::motion::resample;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::Posture;
 use orator_base::types::skeleton::{L_HAND, N_JOINTS, is_duplicate};
-use orator_base::types::sound::Sound;
-use orator_base::types::sync;
+use orator_base::types::sound::{Sound, sample_at};
 use orator_base::types::time::FrameRate;
 use orator_formats::mocap::bvh;
 use orator_formats::transcript::Word;
@@ -105,7 +104,7 @@ impl EvaluatedCheckpoint {
         };
         let rate = network.metadata.rate;
         let spare = if network.is_captured() { SPARE_FRAMES } else { 0 };
-        let wanted = sync::sample_at(fps, rate, n_frames) + sync::sample_at(network.fps(), rate, spare) + 1;
+        let wanted = sample_at(fps, rate, n_frames) + sample_at(network.fps(), rate, spare) + 1;
         let mut sound = audio::at_rate(sound, rate)?;
         sound.samples.resize(sound.samples.len().max(wanted), 0.0);
         let poses = network.poses(&sound, words)?;

@@ -7,8 +7,7 @@ use orator_base::motion::bones;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::{Posture, PostureChannel};
 use orator_base::types::skeleton::N_JOINTS;
-use orator_base::types::sound::Sound;
-use orator_base::types::sync;
+use orator_base::types::sound::{Sound, samples_of};
 use orator_dataset::index::SampleRef;
 use orator_dataset::{Dataset, Sample, Split};
 use orator_formats::transcript::Word;
@@ -98,7 +97,7 @@ impl HeldOutInterval {
         let inside = self.words.iter().filter(|word| word.start_secs >= start && word.end_secs <= end);
         let moved =
             |word: &Word| Word { start_secs: word.start_secs - start, end_secs: word.end_secs - start, ..word.clone() };
-        let sound = sync::samples_of(ground_truth.fps, self.sound.rate, frames.clone());
+        let sound = samples_of(ground_truth.fps, self.sound.rate, frames.clone());
         let sound = self.sound.samples.get(sound.start..sound.end.min(self.sound.samples.len())).unwrap_or_default();
         Self {
             key: self.key.clone(),

@@ -158,9 +158,9 @@ fn told_share(path: &Path) -> String {
 mod tests {
     use super::*;
 
-    fn folder(names: &[&str]) -> tempfile::TempDir {
+    fn folder(names: &str) -> tempfile::TempDir {
         let dir = tempfile::tempdir().unwrap();
-        for name in names {
+        for name in names.split(' ') {
             std::fs::create_dir_all(dir.path().join(name).parent().unwrap()).unwrap();
             std::fs::write(dir.path().join(name), "").unwrap();
         }
@@ -169,17 +169,7 @@ mod tests {
 
     #[test]
     fn files_meet_by_their_names() {
-        let dir = folder(&[
-            "t/a.npy",
-            "t/gt_b.txt",
-            "t/c.bvh",
-            "t/notes.md",
-            "t/.hidden.npy",
-            "p/a.bvh",
-            "p/pred_b.npy",
-            "p/d.npy",
-            "s/a.wav",
-        ]);
+        let dir = folder("t/a.npy t/gt_b.txt t/c.bvh t/notes.md t/.hidden.npy p/a.bvh p/pred_b.npy p/d.npy s/a.wav");
         let at = |name: &str| dir.path().join(name);
         let found = find(&at("t"), &at("p"), Some(&at("s"))).unwrap();
         let names: Vec<&str> = found.pairs.iter().map(|pair| pair.name.as_str()).collect();
@@ -194,8 +184,7 @@ mod tests {
 
     #[test]
     fn one_folder_may_hold_both_sides() {
-        let dir =
-            folder(&["gt_interval_7.txt", "prediction_interval_7.txt", "gt_interval_8.txt", "7.wav", "README.txt"]);
+        let dir = folder("gt_interval_7.txt prediction_interval_7.txt gt_interval_8.txt 7.wav README.txt");
         let found = find(dir.path(), dir.path(), Some(dir.path())).unwrap();
         assert_eq!((found.pairs.len(), found.pairs[0].name.as_str()), (1, "7"));
         assert_eq!(found.pairs[0].sound, Some(dir.path().join("7.wav")));
@@ -204,8 +193,7 @@ mod tests {
 
     #[test]
     fn what_cannot_be_paired_is_refused() {
-        let dir =
-            folder(&["t/a.npy", "t/b.npy", "p/c.npy", "q/a.npy", "q/a.bvh", "e/x.md", "s/z.wav", "r/a.npy", "r/b.npy"]);
+        let dir = folder("t/a.npy t/b.npy p/c.npy q/a.npy q/a.bvh e/x.md s/z.wav r/a.npy r/b.npy");
         let said = |truth: &str, prediction: &str, audio: Option<&str>| {
             let at = |name: &str| dir.path().join(name);
             format!("{:#}", find(&at(truth), &at(prediction), audio.map(at).as_deref()).unwrap_err())

@@ -6,12 +6,12 @@ use ndarray::Array2;
 use orator_base::audio::mfcc::{self, N_CEPSTRA};
 use orator_base::types::sound::Sound;
 use orator_base::types::time::FrameRate;
+pub use orator_dataset::config::SequenceNetwork as Architecture;
 use orator_nn::params::Params;
 use orator_nn::seq2seq::autoencoder::AudioBaseline;
 use orator_nn::seq2seq::config::Config;
 use orator_nn::seq2seq::networks::{ContextSeq2Seq, WordsSeq2Seq};
 use orator_nn::seq2seq::predict::GesturePredictor;
-use serde::{Deserialize, Serialize};
 
 /// Seconds that are predicted at once, seconds of poses before them, and seconds of audio on either side of a pose.
 const PREDICTED_SECS: f64 = 1.0;
@@ -23,20 +23,6 @@ const AROUND_POSE_SECS: f64 = 1.5;
 pub const AROUND_SEGMENT_SECS: f64 = 2.0;
 /// Rounding of times, seconds.
 const ROUNDING_SECS: f64 = 1e-6;
-
-/// Network of the entry to GENEA 2020, or of its experiments.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Architecture {
-    /// Sound and words around each pose; submitted.
-    Contextual,
-    /// Sound of each pose, words of the segment.
-    Words,
-    /// Sound alone, trained against a discriminator.
-    Adversarial,
-    /// Sound alone, to the codes of an autoencoder of poses: the audio baseline.
-    Autoencoder,
-}
 
 /// Sizes at a rate, all others as published: `pose` numbers of a pose, `vocabulary` words of `word` numbers, states of
 /// `hidden`.
@@ -55,62 +41,62 @@ pub fn network_config(fps: FrameRate, pose: usize, vocabulary: usize, [hidden, w
     }
 }
 
-impl Architecture {
-    /// A network whose tensors are added to `params`.
-    pub fn network(self, params: &mut Params, config: &Config) -> Result<Box<dyn GesturePredictor>> {
-        Ok(match self {
-            Self::Contextual => Box::new(ContextSeq2Seq::new(params, config)?),
-            Self::Words => Box::new(WordsSeq2Seq::new(params, config)?),
-            Self::Adversarial => Box::new(WordsSeq2Seq::without_words(params, config)?),
-            Self::Autoencoder => Box::new(AudioBaseline::new(params, config)?),
-        })
-    }
+/// A network whose tensors are added to `params`.
+pub fn network(of: Architecture, params: &mut Params, config: &Config) -> Result<Box<dyn GesturePredictor>> {
+    Ok(match of {
+        Architecture::Contextual => Box::new(ContextSeq2Seq::new(params, config)?),
+        Architecture::Words => Box::new(WordsSeq2Seq::new(params, config)?),
+        Architecture::Adversarial => Box::new(WordsSeq2Seq::without_words(params, config)?),
+        Architecture::Autoencoder => Box::new(AudioBaseline::new(params, config)?),
+    })
+}
 
-    /// Name of the encoder that holds the table of word vectors; `None`: no words are read.
-    pub fn word_encoder(self) -> Option<&'static str> {
-        matches!(self, Self::Contextual | Self::Words).then_some("word_encoder")
-    }
+/// Name of the encoder that holds the table of word vectors; `None`: no words are read.
+pub fn word_encoder(of: Architecture) -> Option<&'static str> {
+    matches!(of, Architecture::Contextual | Architecture::Words).then_some("word_encoder")
+}
 
-    /// Words of a segment whose first predicted pose is `first`: one row a pose, one row of those so many seconds `around`
-    /// the segment, or no row. `said` in the order of beginnings.
-    pub fn words(
-        self,
-        said: &[NumberedWord],
-        [first, predicted]: [usize; 2],
-        fps: FrameRate,
-        around: f64,
-    ) -> Vec<Vec<u32>> {
-        let within = |start: f64, end: f64| {
-            let (start, end) = (start - ROUNDING_SECS, end + ROUNDING_SECS);
-            let first = said.partition_point(|word| word.start_secs < start);
-            let begun = said[first..].iter().take_while(|word| word.start_secs <= end);
-            begun.filter(|word| word.end_secs <= end).map(|word| word.number).collect::<Vec<u32>>()
-        };
-        match self {
-            Self::Contextual => (first..first + predicted)
-                .map(|t| within(fps.secs(t) - AROUND_POSE_SECS, fps.secs(t) + AROUND_POSE_SECS))
-                .collect(),
-            Self::Words => {
-                let (start, end) = (fps.secs(first), fps.secs(first + predicted));
-                vec![within(start - around, end + around)]
-            }
-            Self::Adversarial | Self::Autoencoder => Vec::new(),
+/// Words of a segment whose first predicted pose is `first`: one row a pose, one row of those so many seconds `around`
+/// the segment, or no row. `said` in the order of beginnings.
+pub fn words(
+    of: Architecture,
+    said: &[NumberedWord],
+    [first, predicted]: [usize; 2],
+    fps: FrameRate,
+    around: f64,
+) -> Vec<Vec<u32>> {
+    let within = |start: f64, end: f64| {
+        let (start, end) = (start - ROUNDING_SECS, end + ROUNDING_SECS);
+        let first = said.partition_point(|word| word.start_secs < start);
+        let begun = said[first..].iter().take_while(|word| word.start_secs <= end);
+        begun.filter(|word| word.end_secs <= end).map(|word| word.number).collect::<Vec<u32>>()
+    };
+    match of {
+        Architecture::Contextual => (first..first + predicted)
+            .map(|t| within(fps.secs(t) - AROUND_POSE_SECS, fps.secs(t) + AROUND_POSE_SECS))
+            .collect(),
+        Architecture::Words => {
+            let (start, end) = (fps.secs(first), fps.secs(first + predicted));
+            vec![within(start - around, end + around)]
         }
+        Architecture::Adversarial | Architecture::Autoencoder => Vec::new(),
     }
+}
 
-    /// Words of segments side by side, padded at their ends to the longest row and to one word at least: [B, predicted, W]
-    /// or [B, W].
-    pub fn words_tensor(self, segments: &[Vec<Vec<u32>>]) -> Result<Option<Tensor>> {
-        let rows = || segments.iter().flatten();
-        let n_words = rows().map(Vec::len).max().unwrap_or(0).max(1);
-        let padded = rows().flat_map(|row| row.iter().copied().chain(std::iter::repeat(PADDING)).take(n_words));
-        let numbers: Vec<u32> = padded.collect();
-        let n_rows = segments.first().map_or(0, Vec::len);
-        match self {
-            Self::Contextual => Tensor::from_vec(numbers, (segments.len(), n_rows, n_words), &Device::Cpu).map(Some),
-            Self::Words => Tensor::from_vec(numbers, (segments.len(), n_words), &Device::Cpu).map(Some),
-            Self::Adversarial | Self::Autoencoder => Ok(None),
+/// Words of segments side by side, padded at their ends to the longest row and to one word at least: [B, predicted, W]
+/// or [B, W].
+pub fn words_tensor(of: Architecture, segments: &[Vec<Vec<u32>>]) -> Result<Option<Tensor>> {
+    let rows = || segments.iter().flatten();
+    let n_words = rows().map(Vec::len).max().unwrap_or(0).max(1);
+    let padded = rows().flat_map(|row| row.iter().copied().chain(std::iter::repeat(PADDING)).take(n_words));
+    let numbers: Vec<u32> = padded.collect();
+    let n_rows = segments.first().map_or(0, Vec::len);
+    match of {
+        Architecture::Contextual => {
+            Tensor::from_vec(numbers, (segments.len(), n_rows, n_words), &Device::Cpu).map(Some)
         }
+        Architecture::Words => Tensor::from_vec(numbers, (segments.len(), n_words), &Device::Cpu).map(Some),
+        Architecture::Adversarial | Architecture::Autoencoder => Ok(None),
     }
 }
 
@@ -144,19 +130,19 @@ mod tests {
         let said = [word(2, 0.0), word(3, 2.0), word(4, 4.0), word(5, 7.0)];
         let fps = FrameRate::new(20, 1);
         // the segment from 3 s to 4 s; the words from 1 s to 6 s
-        let of_words = Architecture::Words.words(&said, [60, 20], fps, AROUND_SEGMENT_SECS);
+        let of_words = words(Architecture::Words, &said, [60, 20], fps, AROUND_SEGMENT_SECS);
         assert_eq!(of_words, [[3, 4]]);
         // from 2.6 s to 4.4 s no word is whole, from 1.9 s to 5.1 s two are
-        assert_eq!(Architecture::Words.words(&said, [60, 20], fps, 0.4), [Vec::<u32>::new()]);
-        assert_eq!(Architecture::Words.words(&said, [60, 20], fps, 1.1), [[3, 4]]);
+        assert_eq!(words(Architecture::Words, &said, [60, 20], fps, 0.4), [Vec::<u32>::new()]);
+        assert_eq!(words(Architecture::Words, &said, [60, 20], fps, 1.1), [[3, 4]]);
         // the pose at 3 s reads from 1.5 s to 4.5 s, the one at 3.55 s from 2.05 s
-        let around = Architecture::Contextual.words(&said, [60, 20], fps, AROUND_SEGMENT_SECS);
+        let around = words(Architecture::Contextual, &said, [60, 20], fps, AROUND_SEGMENT_SECS);
         assert_eq!((around.len(), &around[0][..], &around[11][..]), (20, &[3, 4][..], &[4][..]));
-        let tensor = Architecture::Words.words_tensor(&[of_words, vec![Vec::new()]])?;
+        let tensor = words_tensor(Architecture::Words, &[of_words, vec![Vec::new()]])?;
         assert_eq!(tensor.map(|t| t.to_vec2::<u32>()).transpose()?, Some(vec![vec![3, 4], vec![0, 0]]));
-        let silent = Architecture::Contextual.words_tensor(&[vec![Vec::new(); 20]])?;
+        let silent = words_tensor(Architecture::Contextual, &[vec![Vec::new(); 20]])?;
         assert_eq!(silent.map(|t| t.dims().to_vec()), Some(vec![1, 20, 1]));
-        assert!(Architecture::Adversarial.words_tensor(&[Vec::new()])?.is_none());
+        assert!(words_tensor(Architecture::Adversarial, &[Vec::new()])?.is_none());
         Ok(())
     }
 }

@@ -61,7 +61,7 @@ impl SequenceGenerator {
 
     /// Whether it reads words, not sound alone.
     pub fn reads_words(&self) -> bool {
-        self.metadata.architecture.word_encoder().is_some()
+        architecture::word_encoder(self.metadata.architecture).is_some()
     }
 
     /// Whole frames that fit into a sound of so many samples. Errors when there is none.
@@ -94,11 +94,11 @@ impl SequenceGenerator {
     /// # Errors
     /// A network that makes numbers that are not finite.
     pub fn speak(&self, speech: &HeardSpeech, seams: StateAtSeams) -> Result<GeneratedPoses> {
-        let architecture = self.metadata.architecture;
         let HeardSpeech { n_frames, audio, said } = speech;
         let Config { pose, previous, predicted, .. } = *self.network.config();
         let start = Tensor::zeros((1, previous, pose), DType::F32, &Device::Cpu)?;
-        let words = |i| architecture.words_tensor(&[self.metadata.words_of_segment(said, i * predicted)]);
+        let of = &self.metadata;
+        let words = |i| architecture::words_tensor(of.architecture, &[of.words_of_segment(said, i * predicted)]);
         let made = generate(&*self.network, audio, &start, seams, words)?.flatten_all()?.to_vec1::<f32>()?;
         ensure!(
             made.iter().all(|number| number.is_finite()),

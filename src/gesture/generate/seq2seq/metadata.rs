@@ -1,6 +1,6 @@
 //! What a checkpoint of a sequence-to-sequence network says beside its tensors, and the network it describes.
 
-use super::architecture::{AROUND_SEGMENT_SECS, Architecture, RATES, network_config};
+use super::architecture::{self, AROUND_SEGMENT_SECS, Architecture, RATES, network_config};
 use super::poses::PoseNumbers;
 use super::vocabulary::{NumberedWord, Vocabulary};
 use anyhow::{Context, Result, ensure};
@@ -47,7 +47,7 @@ impl SequenceMetadata {
 
     /// Words that the network reads of a segment whose first predicted pose is `first`, of those in order of beginnings.
     pub fn words_of_segment(&self, said: &[NumberedWord], first: usize) -> Vec<Vec<u32>> {
-        self.architecture.words(said, [first, self.network.predicted], self.fps, self.words_around_secs)
+        architecture::words(self.architecture, said, [first, self.network.predicted], self.fps, self.words_around_secs)
     }
 
     /// Errors unless the facts fit each other and this program.
@@ -102,7 +102,7 @@ fn build(contents: &Contents) -> Result<(SequenceMetadata, Box<dyn GesturePredic
     metadata.check()?;
     contents.expect_numbers(metadata.network.hidden * metadata.network.hidden)?;
     let mut params = Params::frozen();
-    let network = metadata.architecture.network(&mut params, &metadata.network)?;
+    let network = architecture::network(metadata.architecture, &mut params, &metadata.network)?;
     params.load(&contents.part(NETWORK))?;
     Ok((metadata, network))
 }

@@ -18,10 +18,6 @@ const ORDER: f64 = 10.0;
 pub(crate) fn metric(fps: f64) -> MetricFamily {
     let order = ((ORDER / FPS * fps).round() as usize).max(1);
     let definition = Definition {
-        name: "beat_alignment",
-        part: BodyPart::Body.name(),
-        unit: "1",
-        better: Better::NearerTruth,
         formula: "per interval the mean over the beats of the MOTION of exp(-d^2 / 2 sigma^2), d to the nearest onset, \
                   both in whole frames; 0 for an interval without a beat; mean over intervals, long or short alike. \
                   Beats: strict local minima of the summed way of joints 1-6 from frame to frame (0 in the first), \
@@ -29,6 +25,7 @@ pub(crate) fn metric(fps: f64) -> MetricFamily {
                   Theirs: beats of music instead of onsets, 24 joints of SMPL",
         undefined: "no interval has sound with an onset",
         parameters: json!({"sigma_secs": SIGMA_FRAMES / FPS, "order_frames": order, "joints": BodyPart::Body.joints()}),
+        ..Definition::new("beat_alignment", BodyPart::Body.name(), "1", Better::NearerTruth)
     };
     MetricFamily::mean_of_both(definition.with_truth("beat_alignment_of_real"), move |pair, blocks| {
         let Some(onsets) = pair.interval.onsets else { return };

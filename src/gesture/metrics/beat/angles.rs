@@ -28,10 +28,6 @@ pub(crate) fn metric(fps: f64) -> MetricFamily {
     // their average change of an angle, in a frame of the data's rate
     let angles = ANGLES.map(|(joints, usual)| (joints, usual * (FPS / fps)));
     let definition = Definition {
-        name: "beat_consistency",
-        part: "arms",
-        unit: "1",
-        better: Better::NearerTruth,
         formula: "sum over intervals, angles and onsets of exp(-d^2 / 2 sigma^2), d to the nearest beat of the angle, \
                   divided by the number of onsets of all angles that have a beat in the interval (an angle without \
                   is left out). Angles in half turns between neck-shoulder, upper arm and forearm; |change from frame \
@@ -39,6 +35,7 @@ pub(crate) fn metric(fps: f64) -> MetricFamily {
                   below one neighbour",
         undefined: "there is no sound, no onset in it, or no angle has a beat",
         parameters: json!({"sigma_secs": SIGMA, "drop": DROP, "average_change": angles.map(|(_, usual)| usual)}),
+        ..Definition::new("beat_consistency", "arms", "1", Better::NearerTruth)
     };
     let measure = move |pair: &PairedFrames, blocks: &mut BlockSums| {
         let Some(onsets) = pair.interval.onsets else { return };

@@ -53,16 +53,13 @@ const ORDER_FPS: f64 = 30.0;
 pub(crate) fn metric(fps: f64) -> MetricFamily {
     let order = order(fps);
     let definition = Definition {
-        name: "beat_consistency",
-        part: "arms",
-        unit: "1",
-        better: Better::NearerTruth,
         formula: "mean over the onsets of the sound and over the joints of exp(-d^2 / 2 sigma^2), d the time to the nearest \
                   beat of the joint: a strict local minimum, among `order` frames on either side, of its speed by \
                   central differences; 0 where a joint has no beat in the interval; onsets where the joint is not \
                   seen left out. Onsets: spectral flux, `audio::onset`",
         undefined: "there is no sound, no onset in it, or no elbow or wrist is seen at one",
         parameters: json!({"joints": JOINTS, "sigma_secs": SIGMA, "order_frames": order}),
+        ..Definition::new("beat_consistency", "arms", "1", Better::NearerTruth)
     };
     MetricFamily::mean_of_both(definition.with_truth(OF_REAL), move |pair, blocks| {
         let Some(onsets) = pair.interval.onsets else { return };
@@ -98,10 +95,6 @@ const EMAGE_CUT: f64 = 2.0;
 pub(crate) fn emage(fps: f64) -> MetricFamily {
     let (order, cut) = (order(fps), (EMAGE_CUT * fps).round() as usize);
     let definition = Definition {
-        name: "beat_consistency",
-        part: BodyPart::Body.name(),
-        unit: "1",
-        better: Better::NearerTruth,
         formula: "per interval the mean over joints 1-6 and over onsets of exp(-d^2 / 2 sigma^2), d to the nearest beat \
                   of the joint; intervals weigh by their frames without the cut. Beats: strict local minima of speed \
                   (central differences) / the joint's mean speed in the real interval (theirs: of their dataset), \
@@ -113,6 +106,7 @@ pub(crate) fn emage(fps: f64) -> MetricFamily {
             "joints": BodyPart::Body.joints(), "sigma_secs": EMAGE_SIGMA, "order_frames": order,
             "threshold": EMAGE_THRESHOLD, "cut_frames": cut,
         }),
+        ..Definition::new("beat_consistency", BodyPart::Body.name(), "1", Better::NearerTruth)
     };
     MetricFamily::mean_of_both(definition.with_truth(OF_REAL), move |pair, blocks| {
         let Some(onsets) = pair.interval.onsets else { return };

@@ -13,15 +13,11 @@ use serde_json::json;
 pub(crate) fn l1div(part: BodyPart) -> MetricFamily {
     let joints = part.joints();
     let definition = Definition {
-        name: "l1div",
-        part: part.name(),
-        unit: "m",
-        better: Better::NearerTruth,
         formula: "sum over j and the coordinates x, y, z of the mean over all frames of |x - mean of x over its interval|, \
                   frames of all intervals pooled; of each joint the frames in which it is seen, and no joint that \
                   never is",
         undefined: "no joint of the part is seen",
-        parameters: json!({}),
+        ..Definition::new("l1div", part.name(), "m", Better::NearerTruth)
     };
     let n_sums = 3 * joints.len();
     let measure = move |pair: &PairedFrames, blocks: &mut BlockSums| {
@@ -55,16 +51,13 @@ const MOST_SECS: usize = 30;
 pub(crate) fn pairwise(part: BodyPart) -> MetricFamily {
     let joints = part.joints();
     let definition = Definition {
-        name: "average_pairwise_distance",
-        part: part.name(),
-        unit: "m",
-        better: Better::NearerTruth,
         formula: "mean over all pairs of frames of one interval that lie 1, 2, ... whole seconds apart, the first at a \
                   whole second from the interval's start (nearest frames), of the Euclidean distance of the two \
                   poses as one vector of all joints of the part; over the joints seen in both, times \
                   sqrt(joints / seen joints)",
         undefined: "no interval is longer than a second, or no joint of the part is seen in both poses",
         parameters: json!({"every_secs": 1, "most_secs": MOST_SECS}),
+        ..Definition::new("average_pairwise_distance", part.name(), "m", Better::NearerTruth)
     };
     MetricFamily::mean_of_both(definition.with_truth("average_pairwise_distance_of_real"), move |pair, blocks| {
         let frame_of = |secs: usize| (secs as f64 * pair.fps).round() as usize;

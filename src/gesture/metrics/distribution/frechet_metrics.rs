@@ -33,15 +33,12 @@ pub(crate) fn poses(part: BodyPart) -> MetricFamily {
     let joints = part.joints();
     let d = 3 * joints.len();
     let definition = Definition {
-        name: "frechet_pose",
-        part: part.name(),
-        unit: "cm^2",
-        better: Better::Lower,
         formula: "|m_p - m_g|^2 + trace(C_p + C_g - 2 sqrt(C_p C_g)), m and C mean and unbiased covariance of the rows; a \
                   row is the pose of one frame, x, y, z of all joints of the part in centimetres from the neck; frames \
                   in which not all of them are seen are left out",
         undefined: "fewer than 2 frames have all joints of the part",
         parameters: json!({"n_numbers": d}),
+        ..Definition::new("frechet_pose", part.name(), "cm^2", Better::Lower)
     };
     family(definition, d, move |pair, blocks| {
         let rows = |poses: &[[Vec3; N_JOINTS]], frames: &[usize]| {
@@ -100,13 +97,10 @@ pub(crate) fn embedding() -> MetricFamily {
 fn in_space(space: FixedSpace) -> MetricFamily {
     let FixedSpace { name, formula, hash, windows, n_frames, stride, n_numbers } = space;
     let definition = Definition {
-        name,
-        part: "all",
-        unit: "1",
-        better: Better::Lower,
         formula,
         undefined: "fewer than 2 windows are wholly seen",
         parameters: json!({"n_frames": n_frames, "stride": stride, "n_numbers": n_numbers, "space": hash}),
+        ..Definition::new(name, "all", "1", Better::Lower)
     };
     family(definition, n_numbers, move |pair, blocks| {
         let interval = &pair.interval;

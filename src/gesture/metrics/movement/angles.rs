@@ -41,13 +41,9 @@ fn turn(degrees: f64) -> f64 {
 pub(crate) fn metrics(channel: PostureChannel) -> [MetricFamily; 4] {
     let row = N_JOINTS + usize::from(channel == PostureChannel::Trunk);
     let definition = |name, unit, better, formula, undefined| Definition {
-        name,
-        part: channel.name(),
-        unit,
-        better,
         formula,
         undefined,
-        parameters: json!({}),
+        ..Definition::new(name, channel.name(), unit, better)
     };
     let unseen = "its angles are not predicted, or not seen";
     let error = definition(

@@ -55,13 +55,10 @@ pub(crate) fn metric() -> MetricFamily {
 fn definitions(part: BodyPart) -> Vec<Definition> {
     let both = |(name, of_real, unit, formula)| {
         let definition = Definition {
-            name,
-            part: part.name(),
-            unit,
-            better: Better::Lower,
             formula,
             undefined: "no bone of the part is seen (for changes: in 2 frames in a row), or one has no length",
             parameters: json!({"bones": part.joints()}),
+            ..Definition::new(name, part.name(), unit, Better::Lower)
         };
         definition.with_truth(of_real)
     };

@@ -19,16 +19,13 @@ pub(crate) fn metric(part: BodyPart) -> MetricFamily {
     let joints = part.joints();
     let d = 3 * joints.len();
     let definition = Definition {
-        name: "cca",
-        part: part.name(),
-        unit: "1",
-        better: Better::Higher,
         formula: "first canonical correlation (one component) of the poses of made and real motion in the same frames, all \
                   intervals together: x, y, z of all joints of the part, frames in which all are seen; coordinates \
                   with a standard deviation of at most 1e-8 m are dropped, and those that the others determine up to \
                   1e-10 of their variance (which changes nothing)",
         undefined: "fewer frames with all joints of the part than there are coordinates, or nothing in one motion moves",
         parameters: json!({"n_numbers": d, "n_components": 1}),
+        ..Definition::new("cca", part.name(), "1", Better::Higher)
     };
     let measure = move |pair: &PairedFrames, blocks: &mut BlockSums| {
         for (block, frames) in pair.whole_frames(&joints, blocks).iter().enumerate() {

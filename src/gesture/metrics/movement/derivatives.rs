@@ -5,7 +5,6 @@ use crate::metrics::body_part::BodyPart;
 use crate::metrics::definition::{Better, Definition, MetricFamily};
 use crate::metrics::per_frame::windows;
 use orator_base::math::vec3::{self, Vec3};
-use serde_json::json;
 
 /// How often positions are differentiated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,14 +68,10 @@ fn family(
     let (points, weights) = (part.points(), order.weights());
     let [name, of_real] = order.names();
     let definition = Definition {
-        name,
-        part: part.name(),
-        unit,
-        better: Better::NearerTruth,
         formula,
         undefined: "no joint of the part is seen in enough frames in a row (2 for speed, 3 for acceleration, 4 for \
                     jerk)",
-        parameters: json!({}),
+        ..Definition::new(name, part.name(), unit, Better::NearerTruth)
     };
     let family = MetricFamily::mean_of_both(definition.with_truth(of_real), move |pair, blocks| {
         let windows = || windows(pair, &points, weights.len(), 0);

@@ -48,13 +48,10 @@ fn family(
     parameters: Value,
 ) -> MetricFamily {
     let definition = Definition {
-        name: "hellinger_speed",
-        part,
-        unit: "1",
-        better: Better::Lower,
         formula,
         undefined: "no joint of the part is seen in 2 frames in a row, or all speeds are beyond the last bin",
         parameters,
+        ..Definition::new("hellinger_speed", part, "1", Better::Lower)
     };
     let measure = move |pair: &PairedFrames, blocks: &mut BlockSums| {
         for t in 0..pair.n_frames().saturating_sub(1) {

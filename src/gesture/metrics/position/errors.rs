@@ -10,13 +10,9 @@ use serde_json::json;
 /// Mean absolute difference of coordinates, metres: what the L1 loss of training measures.
 pub(crate) fn l1(part: BodyPart) -> MetricFamily {
     let definition = Definition {
-        name: "l1",
-        part: part.name(),
-        unit: "m",
-        better: Better::Lower,
         formula: "mean over t, j and the coordinates x, y, z of |p - g|",
         undefined: "no joint of the part is seen",
-        parameters: json!({}),
+        ..Definition::new("l1", part.name(), "m", Better::Lower)
     };
     per_frame::mean(definition, part, 1, 0, |window| mean_size(window.apart(0)))
 }
@@ -24,14 +20,10 @@ pub(crate) fn l1(part: BodyPart) -> MetricFamily {
 /// Mean per-joint position error, millimetres, from the neck, or from the own wrist.
 pub(crate) fn mpjpe(part: BodyPart) -> MetricFamily {
     let definition = Definition {
-        name: "mpjpe",
-        part: part.name(),
-        unit: "mm",
-        better: Better::Lower,
         formula: "1000 times the mean over t and j of the distance |p - g|, positions from the neck (part \
                   fingers_from_wrist: from the wrist of the same side)",
         undefined: "no joint of the part is seen",
-        parameters: json!({}),
+        ..Definition::new("mpjpe", part.name(), "mm", Better::Lower)
     };
     per_frame::mean(definition, part, 1, 0, |window| 1000.0 * vec3::norm(window.apart(0)))
 }
@@ -39,14 +31,10 @@ pub(crate) fn mpjpe(part: BodyPart) -> MetricFamily {
 /// How far the accelerations of the predicted motion are from the ground truth.
 pub(crate) fn acceleration(part: BodyPart) -> MetricFamily {
     let definition = Definition {
-        name: "acceleration_error",
-        part: part.name(),
-        unit: "m/s^2",
-        better: Better::Lower,
         formula: "mean over t and j of |a_p - a_g| with a(t) = (x(t) - 2 x(t+1) + x(t+2)) * fps^2, where the joint is seen \
                   in all three frames",
         undefined: "no joint of the part is seen in 3 frames in a row",
-        parameters: json!({}),
+        ..Definition::new("acceleration_error", part.name(), "m/s^2", Better::Lower)
     };
     let of = |window: &PointWindow| vec3::norm(second_difference(window)) * window.fps() * window.fps();
     per_frame::mean(definition, part, 3, 0, of)
@@ -55,14 +43,10 @@ pub(crate) fn acceleration(part: BodyPart) -> MetricFamily {
 /// Trimodal: per coordinate and frame.
 pub(crate) fn acceleration_by_coordinate() -> MetricFamily {
     let definition = Definition {
-        name: "acceleration_error",
-        part: BodyPart::All.name(),
-        unit: "m/frame^2",
-        better: Better::Lower,
         formula: "mean over t, j and the coordinates x, y, z of |d2 p - d2 g|, d2 the second difference from frame to frame, \
                   not multiplied with the frame rate (so another figure at another rate)",
         undefined: "no joint is seen in 3 frames in a row",
-        parameters: json!({}),
+        ..Definition::new("acceleration_error", BodyPart::All.name(), "m/frame^2", Better::Lower)
     };
     per_frame::mean(definition, BodyPart::All, 3, 0, |window| mean_size(second_difference(window)))
 }
@@ -75,14 +59,11 @@ const SEED_FPS: f64 = 15.0;
 pub(crate) fn maje(fps: f64) -> MetricFamily {
     let n_seed = (N_SEED / SEED_FPS * fps).round() as usize;
     let definition = Definition {
-        name: "maje",
-        part: BodyPart::All.name(),
-        unit: "m",
-        better: Better::Lower,
         formula: "mean over t, j and the coordinates x, y, z of |p - g| without the first frames of every interval, \
                   which their generator is given (4 at 15 frames a second)",
         undefined: "no joint is seen after the seed",
         parameters: json!({"n_seed_frames": n_seed}),
+        ..Definition::new("maje", BodyPart::All.name(), "m", Better::Lower)
     };
     per_frame::mean(definition, BodyPart::All, 1, n_seed, |window| mean_size(window.apart(0)))
 }

@@ -22,7 +22,7 @@ const CHANGES: u64 = 0x6368_616e_6765;
 const NOISE_KNOTS: usize = 5;
 
 /// A window's change.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct WindowChange {
     /// Seconds by which the window begins later, or earlier, than the one drawn.
     pub shift_secs: f64,
@@ -170,17 +170,7 @@ mod tests {
     use orator_dataset::config::GanRecipe;
 
     fn still() -> WindowChange {
-        WindowChange {
-            shift_secs: 0.0,
-            speed: 1.0,
-            is_mirrored: false,
-            pitch_bands: 0.0,
-            gain: 0.0,
-            noise: 0.0,
-            masked_bands: [0; 2],
-            masked_frames: [0; 2],
-            seed: 1,
-        }
+        WindowChange { speed: 1.0, seed: 1, ..WindowChange::default() }
     }
 
     fn sound() -> Array2<f32> {

@@ -3,8 +3,7 @@
 //! and the step alone (the place of the loader is the step), everything else is in the checkpoint.
 
 use super::augment;
-use super::batches;
-use super::batches::BatchesAhead;
+use super::batches::{self, BatchesAhead};
 use super::begin;
 use super::recipe::{self, TrainingMaterial, TrainingStart};
 use super::score::Validation;
@@ -16,9 +15,8 @@ pub use crate::generate::model::BEST;
 use crate::generate::model::SpeakerMetadata;
 use crate::generate::normalisation::Normalisation;
 use crate::train::epochs::{self, EpochSchedule, StepReport, TrainingOutcome, ValidatedStep, ValidatedTraining};
-use crate::train::log;
-use crate::train::no_window;
 use crate::train::resume::{self, sample_windows};
+use crate::train::{log, no_window};
 use anyhow::{Result, ensure};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir::{self, FolderLock};
@@ -91,8 +89,7 @@ pub fn train_watched(
         })
         .collect::<Result<_>>()?;
     let n_windows: usize = loaders.iter().map(WindowLoader::len).sum();
-    let places: Vec<String> = datasets.iter().map(|dataset| dataset.dir().display().to_string()).collect();
-    let places = places.join(", ");
+    let places = datasets.iter().map(|dataset| dataset.dir().display().to_string()).collect::<Vec<_>>().join(", ");
     progress.say(&format!("{n_windows} windows of {places}; what is learnt goes to {}", folder.display()));
     let held_out = ValidationIntervals::load(&spoken, &settings, progress)?;
     let metadata = |((dataset, normal), loader): (&(&Dataset, Normalisation), &WindowLoader)| {

@@ -1,6 +1,7 @@
 //! Segments of sequences as batches: the poses before, the sound and words, and the poses to predict.
 
 use super::sequence::PoseSequence;
+use crate::generate::seq2seq::architecture;
 use crate::generate::seq2seq::metadata::SequenceMetadata;
 use crate::generate::seq2seq::vocabulary::NumberedWord;
 use anyhow::{Result, ensure};
@@ -101,7 +102,7 @@ impl SegmentLoader {
         let segment = Segment {
             audio: tensor(heard, network.audio_frames(), audio)?,
             previous: tensor(before, previous, pose)?,
-            words: architecture.words_tensor(&words)?,
+            words: architecture::words_tensor(*architecture, &words)?,
         };
         Ok(SegmentBatch {
             segment,

@@ -4,7 +4,7 @@ use super::losses;
 use super::segments::SegmentBatch;
 use super::validate::SequenceValidation;
 use crate::generate::model::BEST;
-use crate::generate::seq2seq::architecture::Architecture;
+use crate::generate::seq2seq::architecture::{self, Architecture};
 use crate::generate::seq2seq::metadata::{NETWORK, SequenceMetadata};
 use crate::generate::seq2seq::vocabulary::{PADDING, UNKNOWN};
 use crate::train::gan::losses::number;
@@ -82,7 +82,7 @@ impl SequenceTrainer {
     /// Networks as the seed makes them.
     pub fn new(metadata: SequenceMetadata, settings: Seq2seqConfig) -> Result<Self> {
         let mut params = Params::new(settings.seed);
-        let network = metadata.architecture.network(&mut params, &metadata.network)?;
+        let network = architecture::network(metadata.architecture, &mut params, &metadata.network)?;
         let is_adversarial = metadata.architecture == Architecture::Adversarial;
         let beta1 = if is_adversarial { 0.5 } else { 0.9 };
         let of_adam =

@@ -9,20 +9,19 @@ use super::source::TrainingSource;
 use super::step::{SequenceLosses, SequenceState, SequenceTrainer};
 use super::validate::{SequenceValidation, ValidationSegments};
 pub use crate::generate::model::BEST;
-use crate::generate::seq2seq::architecture::{Architecture, network_config};
+use crate::generate::seq2seq::architecture::{self, network_config};
 use crate::generate::seq2seq::metadata::SequenceMetadata;
 use crate::generate::seq2seq::vocabulary::{PADDING, UNKNOWN, Vocabulary};
 use crate::train::epochs::{self, EpochSchedule, StepReport, TrainingOutcome, ValidatedStep, ValidatedTraining};
 use crate::train::log;
-use crate::train::no_window;
-use crate::train::no_window::NeededFrames;
+use crate::train::no_window::{self, NeededFrames};
 use crate::train::resume::{self, sample_windows, stream};
 use anyhow::{Context, Result, ensure};
 use candle_core::{Device, Tensor};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir::{self, FolderLock};
 use orator_dataset::Split;
-use orator_dataset::config::{Seq2seqConfig, SequenceNetwork};
+use orator_dataset::config::Seq2seqConfig;
 use orator_formats::checkpoint;
 use orator_formats::word_vectors::WordVectors;
 use orator_nn::cpu::thread_team::with_spinning_workers;
@@ -144,8 +143,7 @@ fn begin(
         ..network_config(fps, poses.n_numbers(), n_words, [settings.hidden, word])
     };
     let splits = source.sequences(&poses, sizes(0).context)?;
-    let architecture = architecture(settings.network);
-    let vocabulary = match architecture.word_encoder() {
+    let vocabulary = match architecture::word_encoder(settings.network) {
         Some(_) => Vocabulary::of(splits.train.iter().flat_map(|sequence: &PoseSequence| &sequence.words)),
         None => Vocabulary::default(),
     };
@@ -154,7 +152,7 @@ fn begin(
         name: source.name(),
         fps,
         rate: source.rate(),
-        architecture,
+        architecture: settings.network,
         network: sizes(vocabulary.n_numbers()),
         poses,
         vocabulary,
@@ -170,7 +168,7 @@ fn begin(
 /// Padding begins with zeros, the unknown word with ones, the others with their vectors where there are some.
 fn begin_words(trainer: &SequenceTrainer, vectors: Option<&WordVectors>) -> Result<()> {
     let SequenceMetadata { architecture, vocabulary, network, .. } = &trainer.metadata;
-    let Some(encoder) = architecture.word_encoder() else { return Ok(()) };
+    let Some(encoder) = architecture::word_encoder(*architecture) else { return Ok(()) };
     let found = trainer.params().trainables().find(|(name, _)| *name == format!("{encoder}.embedding.weight"));
     let (_, table) = found.context("this network has no table of words")?;
     let mut rows = table.to_vec2::<f32>()?;
@@ -301,16 +299,6 @@ fn resume(
         }
         Ok((stored, differences))
     })
-}
-
-/// The network of a name of the configuration.
-fn architecture(network: SequenceNetwork) -> Architecture {
-    match network {
-        SequenceNetwork::Contextual => Architecture::Contextual,
-        SequenceNetwork::Words => Architecture::Words,
-        SequenceNetwork::Adversarial => Architecture::Adversarial,
-        SequenceNetwork::Autoencoder => Architecture::Autoencoder,
-    }
 }
 
 fn check(settings: &Seq2seqConfig) -> Result<()> {

@@ -8,10 +8,8 @@ use ffmpeg_next::{Rational, codec, encoder, format};
 use std::path::Path;
 
 /// Copies about `secs` seconds of the pictures of `from`, from the picture that decodes alone at or before `start_secs` on,
-/// and the sound that would be taken, into the Matroska file `to`. Returns how many seconds were copied.
-///
-/// # Errors
-/// A file that cannot be read, has no pictures, or whose streams Matroska does not take.
+/// and the sound that would be taken, into the Matroska file `to`. Returns how many seconds were copied. Errors: a file
+/// that cannot be read, has no pictures, or whose streams Matroska does not take.
 pub fn copy(from: &Path, to: &Path, start_secs: f64, secs: f64) -> Result<f64> {
     let mut input = source::open(from)?;
     let video = source::video_stream(&input).with_context(|| format!("{} has no pictures", from.display()))?.index();

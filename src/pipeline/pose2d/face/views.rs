@@ -3,8 +3,7 @@
 
 use super::landmarks::{self, FacePoint};
 use crate::portrait::Portrait;
-use crate::pose2d::appearance;
-use crate::pose2d::patch;
+use crate::pose2d::{appearance, patch};
 use anyhow::Result;
 use orator_base::math::order::median;
 use orator_base::math::procrustes::similarity;

@@ -63,12 +63,8 @@ pub fn forest(label: &str, rows: &[ForestRow], scale: &ForestScale) -> Node {
         svg = svg.child(drawn.child(circle("point", [x.at(row.value), y], 4.5)));
         svg = svg.child(words("tick", [RIGHT + 12.0, y + 4.0], "start", &row.said));
     }
-    svg.child(line("axis", [LEFT, floor], [RIGHT, floor])).child(words(
-        "tick",
-        [RIGHT, floor + 29.0],
-        "end",
-        scale.unit,
-    ))
+    let unit = words("tick", [RIGHT, floor + 29.0], "end", scale.unit);
+    svg.child(line("axis", [LEFT, floor], [RIGHT, floor])).child(unit)
 }
 
 #[cfg(test)]

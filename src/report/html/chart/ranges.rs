@@ -42,12 +42,8 @@ pub fn ranges(label: &str, rows: &[ValueRange], [low, high]: [f64; 2], ends: [&s
             .child(rect(&format!("box {}", range.class), [low, y - 4.5], [(high - low).max(1.0), 9.0]))
             .child(line("median", [median, y - 5.5], [median, y + 5.5]));
     }
-    svg.child(words("tick", [LEFT, floor + 29.0], "start", ends[0])).child(words(
-        "tick",
-        [RIGHT, floor + 29.0],
-        "end",
-        ends[1],
-    ))
+    let end = |x: f64, anchor: &str, text: &str| words("tick", [x, floor + 29.0], anchor, text);
+    svg.child(end(LEFT, "start", ends[0])).child(end(RIGHT, "end", ends[1]))
 }
 
 #[cfg(test)]

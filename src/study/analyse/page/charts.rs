@@ -13,24 +13,15 @@ use orator_report::html::{Node, legend, node, table};
 const STEPS: [&str; 5] = ["second clearly", "second", "neither", "first", "first clearly"];
 
 /// Charts of a task.
-pub(super) fn task(task: &TaskAnalysis, analysis: &StudyAnalysis) -> Vec<Node> {
-    let mut body = Vec::new();
-    if !task.shares.is_empty() {
-        body.extend(shares(task, analysis));
-    }
-    if !task.scores.is_empty() {
-        body.extend(scores(task));
-    }
-    if task.pairs.iter().any(|pair| pair.steps.is_some()) {
-        body.extend(steps(task));
-    }
-    if !task.pairs.is_empty() {
-        body.extend(pairs(task));
-    }
-    if !task.strengths.is_empty() {
-        body.extend(strengths(task));
-    }
-    body
+pub fn task(task: &TaskAnalysis, analysis: &StudyAnalysis) -> Vec<Node> {
+    let parts = [
+        (!task.shares.is_empty()).then(|| shares(task, analysis)),
+        (!task.scores.is_empty()).then(|| scores(task)),
+        task.pairs.iter().any(|pair| pair.steps.is_some()).then(|| steps(task)),
+        (!task.pairs.is_empty()).then(|| pairs(task)),
+        (!task.strengths.is_empty()).then(|| strengths(task)),
+    ];
+    parts.into_iter().flatten().flatten().collect()
 }
 
 fn card(chart: Node) -> Node {

@@ -3,6 +3,7 @@
 use crate::analyse::figure::{FigureOrigin, FigureRow, FigureSet, TestFigure};
 use crate::analyse::result::{ShareAnalysis, ShareMeasure, StudyAnalysis, TaskAnalysis};
 use crate::analyse::verdict::scope;
+use crate::analyse::votes::read::RefusedRow;
 use crate::analyse::words::{bare_p, count, percent};
 use crate::stats::estimate::ConfidenceInterval;
 use orator_report::html::{Node, node, table};
@@ -26,31 +27,21 @@ pub(super) fn task(task: &TaskAnalysis) -> Vec<Node> {
         }));
     }
     for row in &task.scores {
-        let title = format!(
-            "{}: median {}, mean {:.2} of {} scores ({} participants, {} clips)",
-            row.condition,
-            row.median,
-            row.mean,
-            count(row.n_scores),
-            count(row.n_participants),
-            count(row.n_clips)
-        );
-        rows.push(group(&title));
+        let [scores, participants, clips] = [row.n_scores, row.n_participants, row.n_clips].map(count);
+        rows.push(group(&format!(
+            "{}: median {}, mean {:.2} of {scores} scores ({participants} participants, {clips} clips)",
+            row.condition, row.median, row.mean
+        )));
         rows.extend(figure_rows(&row.figures, 1.0, ""));
     }
     for pair in &task.pairs {
         let orders = pair.orders.map(|[above, tied, below]| format!("; {above} above, {tied} neither, {below} below"));
-        let title = format!(
-            "{} less {}: {:+.3} in {} votes ({} participants, {} clips{})",
-            pair.first,
-            pair.second,
-            pair.difference,
-            count(pair.n_votes),
-            count(pair.n_participants),
-            count(pair.n_clips),
-            orders.unwrap_or_default()
-        );
-        rows.push(group(&title));
+        let orders = orders.unwrap_or_default();
+        let [votes, participants, clips] = [pair.n_votes, pair.n_participants, pair.n_clips].map(count);
+        rows.push(group(&format!(
+            "{} less {}: {:+.3} in {votes} votes ({participants} participants, {clips} clips{orders})",
+            pair.first, pair.second, pair.difference
+        )));
         rows.extend(figure_rows(&pair.figures, 1.0, ""));
     }
     if let Some(test) = &task.overall {
@@ -63,11 +54,8 @@ pub(super) fn task(task: &TaskAnalysis) -> Vec<Node> {
     });
     let mut body = vec![node("div").class("scroll").attr("tabindex", "0").child(table("figures", head, rows))];
     if let Some(alpha) = task.agreement {
-        body.push(
-            node("p")
-                .class("small")
-                .text(format!("Agreement of participants: Krippendorff's alpha = {alpha:.3} (1: perfect, 0: chance).")),
-        );
+        let text = format!("Agreement of participants: Krippendorff's alpha = {alpha:.3} (1: perfect, 0: chance).");
+        body.push(node("p").class("small").text(text));
     }
     body
 }
@@ -79,15 +67,10 @@ fn share_title(share: &ShareAnalysis) -> String {
         ShareMeasure::Correct => "right",
         ShareMeasure::TakenForReal => "taken for real",
     };
-    format!(
-        "{}: {what} in {} of {} votes, {} ({} participants, {} clips)",
-        scope(share),
-        count(share.n_successes as usize),
-        count(share.n_votes as usize),
-        percent(share.share),
-        count(share.n_participants),
-        count(share.n_clips)
-    )
+    let (scope, percent) = (scope(share), percent(share.share));
+    let [successes, votes] = [share.n_successes, share.n_votes].map(|n| count(n as usize));
+    let [participants, clips] = [share.n_participants, share.n_clips].map(count);
+    format!("{scope}: {what} in {successes} of {votes} votes, {percent} ({participants} participants, {clips} clips)")
 }
 
 fn group(title: &str) -> Node {
@@ -102,11 +85,8 @@ fn figure_rows(set: &FigureSet, factor: f64, unit: &str) -> Vec<Node> {
     rows.extend(set.equivalence.iter().map(|test| {
         let shown = TestFigure { origin: test.origin, ..TestFigure::new(test.origin.method, test.p) };
         let outcome = if test.passes { "shown" } else { "not shown" };
-        let name = format!(
-            "equivalence within \u{b1}{} points ({}): {outcome}",
-            100.0 * test.bound,
-            test.origin.method.name()
-        );
+        let (points, method) = (100.0 * test.bound, test.origin.method.name());
+        let name = format!("equivalence within \u{b1}{points} points ({method}): {outcome}");
         let interval = format!("90 %: {}", ends(test.ends));
         figure_row(test.origin, Some(interval), Some(&shown), Some(name))
     }));
@@ -160,11 +140,10 @@ pub(super) fn exclusions(analysis: &StudyAnalysis) -> Vec<Node> {
         node("tr").child(name).child(number(participants)).child(number(votes)).child(node("td").text(said))
     };
     let mut rows = vec![cells("answered", account.n_participants, account.n_votes, "")];
-    rows.extend(
-        account.rules.iter().map(|rule| {
-            cells(&rule.rule, rule.n_participants, rule.n_votes, rule.unknown.as_deref().unwrap_or_default())
-        }),
-    );
+    for rule in &account.rules {
+        let unknown = rule.unknown.as_deref().unwrap_or_default();
+        rows.push(cells(&rule.rule, rule.n_participants, rule.n_votes, unknown));
+    }
     rows.push(cells("analysed", account.n_participants_kept, account.n_votes_kept, ""));
     let head = ["", "Participants", "Votes", ""]
         .map(|title| node("th").attr("scope", "col").class(if title.is_empty() { "" } else { "num" }).text(title));
@@ -177,12 +156,8 @@ pub(super) fn exclusions(analysis: &StudyAnalysis) -> Vec<Node> {
     if !analysis.refused.is_empty() {
         let most = 200;
         body.push(node("h3").text(format!("{} rows that are no votes", count(analysis.refused.len()))));
-        let rows = analysis.refused.iter().take(most);
-        body.push(
-            node("ul")
-                .class("notes")
-                .children(rows.map(|row| node("li").text(format!("line {}: {}", row.line, row.reason)))),
-        );
+        let line = |row: &RefusedRow| node("li").text(format!("line {}: {}", row.line, row.reason));
+        body.push(node("ul").class("notes").children(analysis.refused.iter().take(most).map(line)));
         if analysis.refused.len() > most {
             body.push(node("p").class("small").text(format!("The first {most} are shown; the JSON result has all.")));
         }

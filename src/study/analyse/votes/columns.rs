@@ -1,14 +1,17 @@
-//! Columns of a table of votes, and what they are called in the file at hand.
+//! Columns of a table of votes, what they are called in the given file, and its rows. Text of columns: comma, semicolon or
+//! tab, quoted or not, with or without a byte order mark. JSON Lines: one object a line, its keys the columns.
 
+use super::row::{MOST_ROWS, RowCells};
 use crate::vote::VOTE_COLUMNS;
-use anyhow::{Result, bail, ensure};
+use anyhow::{Context, Result, bail, ensure};
+use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 
 /// Short forms of tables by others: one condition, whether the answer was right, one score, a step of preference.
 const SHORT_FORMS: [&str; 4] = ["condition", "correct", "score", "step"];
 
 /// Everything that a column can mean.
-pub fn fields() -> impl Iterator<Item = &'static str> {
+fn fields() -> impl Iterator<Item = &'static str> {
     VOTE_COLUMNS.into_iter().chain(SHORT_FORMS)
 }
 
@@ -37,12 +40,12 @@ impl ColumnNames {
     }
 
     /// Name in the file of a field.
-    pub fn of(&self, field: &'static str) -> &str {
+    fn of(&self, field: &'static str) -> &str {
         self.0.get(field).map_or(field, String::as_str)
     }
 
     /// Places of the fields in a header, by field. Names are compared without regard to case and outer space.
-    pub fn places(&self, header: &[String]) -> Result<BTreeMap<&'static str, usize>> {
+    fn places(&self, header: &[String]) -> Result<BTreeMap<&'static str, usize>> {
         let is = |name: &str, cell: &String| cell.trim().to_lowercase() == name.to_lowercase();
         let mut places = BTreeMap::new();
         for field in fields() {
@@ -93,4 +96,98 @@ fn near(field: &str, cell: &str) -> f64 {
 fn shown(header: &[String]) -> String {
     let names: Vec<String> = header.iter().take(20).map(|name| name.trim().chars().take(40).collect()).collect();
     format!("{}{}", names.join(", "), if header.len() > 20 { ", ..." } else { "" })
+}
+
+/// Rows with their line, or why one cannot be read.
+pub type LinedRows = Vec<(u64, std::result::Result<RowCells, String>)>;
+
+/// Rows of a table. A row that is no text or has another number of cells than the header is given with the reason.
+pub fn delimited_rows(bytes: &[u8], names: &ColumnNames) -> Result<LinedRows> {
+    ensure!(!bytes.starts_with(&[0xff, 0xfe]) && !bytes.starts_with(&[0xfe, 0xff]), "it is UTF-16; save it as UTF-8");
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let delimiter = delimiter(bytes);
+    let mut reader = csv::ReaderBuilder::new();
+    let mut reader = reader.delimiter(delimiter).flexible(true).has_headers(false).from_reader(bytes);
+    let mut record = csv::ByteRecord::new();
+    ensure!(reader.read_byte_record(&mut record)?, "it is empty; the first line names the columns");
+    let header: Vec<String> = record.iter().map(|cell| String::from_utf8_lossy(cell).into_owned()).collect();
+    let places = names.places(&header)?;
+    let mut rows = Vec::new();
+    while reader.read_byte_record(&mut record).context("a row cannot be read")? {
+        let line = record.position().map_or(0, csv::Position::line);
+        if record.iter().all(<[u8]>::is_empty) {
+            continue;
+        }
+        ensure!(rows.len() < MOST_ROWS, "it has more than {MOST_ROWS} rows");
+        rows.push((line, cells(&record, header.len(), &places, delimiter == b';')));
+    }
+    Ok(rows)
+}
+
+fn cells(
+    record: &csv::ByteRecord,
+    width: usize,
+    places: &BTreeMap<&'static str, usize>,
+    has_decimal_comma: bool,
+) -> std::result::Result<RowCells, String> {
+    if record.len() != width {
+        return Err(format!("it has {} cells where the header has {width}", record.len()));
+    }
+    let mut values = BTreeMap::new();
+    for (field, place) in places {
+        let cell = std::str::from_utf8(&record[*place]).map_err(|_| format!("{field} is no UTF-8"))?;
+        values.insert(*field, cell.trim().to_owned());
+    }
+    Ok(RowCells { values, has_decimal_comma })
+}
+
+/// Delimiter that occurs most often in the first line outside quotes.
+fn delimiter(bytes: &[u8]) -> u8 {
+    let mut counts = [(b',', 0), (b';', 0), (b'\t', 0)];
+    let mut is_quoted = false;
+    for &byte in bytes.iter().take_while(|byte| **byte != b'\n') {
+        is_quoted ^= byte == b'"';
+        counts.iter_mut().filter(|(delimiter, _)| *delimiter == byte && !is_quoted).for_each(|(_, n)| *n += 1);
+    }
+    counts.iter().rev().max_by_key(|(_, n)| *n).map_or(b',', |(delimiter, _)| *delimiter)
+}
+
+/// Rows of JSON Lines. A line that is no object is given with the reason.
+pub fn json_rows(bytes: &[u8], names: &ColumnNames) -> Result<LinedRows> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let mut rows: LinedRows = Vec::new();
+    for (line, text) in bytes.split(|byte| *byte == b'\n').enumerate() {
+        if text.iter().all(u8::is_ascii_whitespace) {
+            continue;
+        }
+        ensure!(rows.len() < MOST_ROWS, "it has more than {MOST_ROWS} rows");
+        let object = serde_json::from_slice::<Map<String, Value>>(text);
+        let row = match object {
+            Ok(object) if rows.is_empty() => {
+                names.places(&object.keys().cloned().collect::<Vec<_>>())?;
+                Ok(json_cells(&object, names))
+            }
+            Ok(object) => Ok(json_cells(&object, names)),
+            Err(error) => Err(format!("it is no JSON object: {error}")),
+        };
+        rows.push((line as u64 + 1, row));
+    }
+    ensure!(!rows.is_empty(), "it is empty");
+    Ok(rows)
+}
+
+fn json_cells(object: &Map<String, Value>, names: &ColumnNames) -> RowCells {
+    let value = |field| object.get(names.of(field)).map(|value| (field, text(value)));
+    let values: BTreeMap<_, _> = fields().filter_map(value).collect();
+    RowCells { values, has_decimal_comma: false }
+}
+
+/// Value as the cell of a table would have it.
+fn text(value: &Value) -> String {
+    match value {
+        Value::Null => String::new(),
+        Value::String(text) => text.trim().to_owned(),
+        Value::Array(parts) => parts.iter().map(text).collect::<Vec<_>>().join("|"),
+        other => other.to_string(),
+    }
 }

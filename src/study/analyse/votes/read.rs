@@ -1,9 +1,8 @@
 //! File of votes: CSV or JSON Lines, of this program or of another. A row that cannot be used is kept with its line and
 //! the reason.
 
-use super::columns::ColumnNames;
+use super::columns::{ColumnNames, delimited_rows, json_rows};
 use super::row::{check, vote};
-use super::rows::{delimited_rows, json_rows};
 use crate::plan::TaskDesign;
 use crate::vote::{Response, StudyVote, VOTE_COLUMNS};
 use anyhow::{Context, Result, bail, ensure};
@@ -110,12 +109,8 @@ impl SliderPages {
             return Ok(());
         };
         if vote.conditions.iter().any(|condition| whole.conditions.contains(condition)) {
-            return Err(format!(
-                "{} gave {} of {} a score above",
-                vote.participant,
-                vote.conditions.join(", "),
-                vote.clip
-            ));
+            let StudyVote { participant, conditions, clip, .. } = vote;
+            return Err(format!("{participant} gave {} of {clip} a score above", conditions.join(", ")));
         }
         if let (Response::Scores(all), Response::Scores(one)) = (&mut whole.response, vote.response) {
             all.extend(one);

@@ -5,8 +5,3 @@ mod laplace;
 mod minimum;
 
 pub mod fit;
-
-#[cfg(test)]
-mod calibration;
-#[cfg(test)]
-mod golden;

@@ -32,29 +32,16 @@ pub enum FbxValue {
     Doubles(Vec<f64>),
 }
 
-impl From<&str> for FbxValue {
-    fn from(text: &str) -> Self {
-        Self::Text(text.to_owned())
-    }
+macro_rules! value_from {
+    ($($of:ty => $kind:ident),+) => {
+        $(impl From<$of> for FbxValue {
+            fn from(value: $of) -> Self {
+                Self::$kind(value.into())
+            }
+        })+
+    };
 }
-
-impl From<i32> for FbxValue {
-    fn from(value: i32) -> Self {
-        Self::Int(value)
-    }
-}
-
-impl From<i64> for FbxValue {
-    fn from(value: i64) -> Self {
-        Self::Long(value)
-    }
-}
-
-impl From<f64> for FbxValue {
-    fn from(value: f64) -> Self {
-        Self::Double(value)
-    }
-}
+value_from!(&str => Text, i32 => Int, i64 => Long, f64 => Double);
 
 /// Node with its properties and children.
 #[derive(Clone, Debug, Default, PartialEq)]
