@@ -68,7 +68,7 @@ impl BodyArgs {
 }
 
 #[derive(clap::Args)]
-pub struct SmoothingArgs {
+pub(super) struct SmoothingArgs {
     /// As much as the noise of each bone in this clip asks for; cubics over 0.6 s (arms) and 1 s (hands), without delay;
     /// or none.
     #[arg(long, value_enum, default_value = "adaptive")]
@@ -87,7 +87,7 @@ enum SmoothingKind {
 
 impl SmoothingArgs {
     /// The smoothing that was asked for. Errors: a strength out of its range, or of another kind of smoothing.
-    pub fn smoothing(&self) -> Result<Smoothing> {
+    pub(super) fn smoothing(&self) -> Result<Smoothing> {
         let strength = self.smoothing_strength;
         ensure!(
             strength == 1.0 || self.smoothing == SmoothingKind::Adaptive,

@@ -1,5 +1,5 @@
 //! Many machines on one work folder: `plan`, `work`, `submit`, and `status --plan`.
 
-pub mod plan;
-pub mod submit;
-pub mod work;
+pub(super) mod plan;
+pub(super) mod submit;
+pub(super) mod work;

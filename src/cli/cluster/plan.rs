@@ -150,7 +150,7 @@ fn length(secs: f64) -> String {
 }
 
 /// Prints how far the workers of a plan are: `orator status --plan`.
-pub fn show_progress(path: &Path, ui: &Ui) -> Result<Outcome> {
+pub(crate) fn show_progress(path: &Path, ui: &Ui) -> Result<Outcome> {
     let plan = ClusterPlan::read(path)?;
     let told = progress(&plan, path, DEAD_AFTER)?;
     let next = match told.n_done + told.n_failed == told.n_units {

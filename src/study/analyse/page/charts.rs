@@ -13,7 +13,7 @@ use orator_report::html::{Node, legend, node, table};
 const STEPS: [&str; 5] = ["second clearly", "second", "neither", "first", "first clearly"];
 
 /// Charts of a task.
-pub fn task(task: &TaskAnalysis, analysis: &StudyAnalysis) -> Vec<Node> {
+pub(super) fn task(task: &TaskAnalysis, analysis: &StudyAnalysis) -> Vec<Node> {
     let parts = [
         (!task.shares.is_empty()).then(|| shares(task, analysis)),
         (!task.scores.is_empty()).then(|| scores(task)),
