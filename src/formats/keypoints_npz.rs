@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bare_body_is_enough_and_what_stands_in_is_said() {
+    fn a_bare_body_is_enough_what_stands_in_is_said_and_a_wrong_shape_is_an_error() {
         let dir = tempfile::tempdir().unwrap();
         let mut body = Array3::from_elem((2, N_BODY, 3), 7.0);
         body[[1, 3, 0]] = f64::NAN;
@@ -206,13 +206,8 @@ mod tests {
         assert_eq!((keypoints.body[[1, 3, 2]], keypoints.body[[0, 3, 2]]), (0.0, 7.0));
         let empty = read(&body_only(dir.path(), &Array3::zeros((0, N_BODY, 3)))).unwrap();
         assert_eq!(empty.n_frames(), 0);
-    }
-
-    #[test]
-    fn a_wrong_shape_is_an_error() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = body_only(dir.path(), &Array3::zeros((2, 18, 3)));
-        let text = format!("{:#}", read(&path).unwrap_err());
+        let wrong = read(&body_only(dir.path(), &Array3::zeros((2, 18, 3))));
+        let text = format!("{:#}", wrong.unwrap_err());
         assert!(text.contains("[2, 18, 3]") && text.contains("[T, 17, 3]"), "{text}");
     }
 

@@ -52,13 +52,8 @@ impl LocalFit {
         let widest = (WIDEST_SECS * fps).clamp(NARROWEST, 1000.0);
         let sigmas = std::iter::successors(Some(NARROWEST), |sigma| Some(sigma * RATIO));
         let frames = |secs: f64| (secs * fps).round().clamp(1.0, 10_000.0) as usize;
-        Self {
-            sigmas: sigmas.take_while(|&sigma| sigma <= widest).collect(),
-            noise_half: frames(NOISE_SECS),
-            even_half: frames(EVEN_SECS),
-            strength,
-            tolerance,
-        }
+        let sigmas = sigmas.take_while(|&sigma| sigma <= widest).collect();
+        Self { sigmas, noise_half: frames(NOISE_SECS), even_half: frames(EVEN_SECS), strength, tolerance }
     }
 
     /// The smoothed run. `known`: deviation of the noise that is known beforehand, frame by frame, for as many as there

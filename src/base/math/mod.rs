@@ -2,7 +2,6 @@
 
 pub mod cholesky;
 pub mod eigen;
-pub mod estimate;
 pub mod gaussian;
 pub mod local_fit;
 pub mod order;

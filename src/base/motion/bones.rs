@@ -84,9 +84,7 @@ mod tests {
                 let grow = if t == 4 { 2.0 } else { 1.0 };
                 let step =
                     if j == L_HAND || j == R_HAND { [0.0; 3] } else { [0.01 * j as f32 * grow, 0.02 * grow, 0.0] };
-                for k in 0..3 {
-                    joints[[t, j, k]] = joints[[t, p, k]] + step[k];
-                }
+                (0..3).for_each(|k| joints[[t, j, k]] = joints[[t, p, k]] + step[k]);
             }
         }
         Motion { fps: FrameRate::new(15, 1), joints, mask: Array2::from_elem((5, N_JOINTS), true) }

@@ -20,13 +20,8 @@ impl<'a> OverallProgress<'a> {
     pub fn begin(stages: &[&dyn Stage], units: &[Unit], progress: &'a dyn Progress) -> Self {
         let whole = units.iter().flat_map(|unit| stages.iter().map(|stage| work(*stage, unit))).sum();
         let label = format!("{} of {}", names(stages), super::counted(units.len(), "unit"));
-        Self {
-            progress,
-            task: progress.begin(&label, PARTS),
-            whole,
-            done: Mutex::new((0.0, 0)),
-            has_estimate: AtomicBool::new(false),
-        }
+        let task = progress.begin(&label, PARTS);
+        Self { progress, task, whole, done: Mutex::new((0.0, 0)), has_estimate: AtomicBool::new(false) }
     }
 
     /// What the stage reports its work on the unit to.

@@ -199,15 +199,9 @@ fn run_unit<'a>(
             let progress = overall.of(stage, unit);
             return attempt(&folder, stage.common_folder(), &fingerprint, |out| stage.run(unit, out, &progress));
         }
-        let (fingerprint, folder) = (fingerprint.clone(), folder.clone());
-        let parts = pool.work(PartedWork {
-            stage,
-            unit,
-            n_parts,
-            fingerprint: fingerprint.clone(),
-            folder: folder.clone(),
-            overall,
-        })?;
+        let key = fingerprint.clone();
+        let parts = PartedWork { stage, unit, n_parts, fingerprint: key, folder: folder.clone(), overall };
+        let parts = pool.work(parts)?;
         let report = attempt(&folder, None, &fingerprint, |out| stage.join(unit, &parts, out))?;
         // What cannot be removed now is removed by the next run.
         let _ = remove_parts(&folder);

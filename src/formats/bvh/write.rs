@@ -128,13 +128,8 @@ mod tests {
             let r = Rotation::about([0.0, 0.0, 1.0], degrees.to_radians());
             vec![Rotation::IDENTITY, r, Rotation::IDENTITY, Rotation::IDENTITY, Rotation::IDENTITY]
         };
-        BvhClip {
-            skeleton,
-            fps: FrameRate::new(15, 1),
-            root: [0.0, 90.0, 0.0],
-            travel: Vec::new(),
-            local: vec![turn(0.0), turn(30.0)],
-        }
+        let local = vec![turn(0.0), turn(30.0)];
+        BvhClip { skeleton, fps: FrameRate::new(15, 1), root: [0.0, 90.0, 0.0], travel: Vec::new(), local }
     }
 
     #[test]

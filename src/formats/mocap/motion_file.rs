@@ -155,25 +155,18 @@ mod tests {
         let npy = |shape: (usize, usize, usize), value: f32| {
             move |path: &Path| Array3::from_elem(shape, value).write_npy(File::create(path).unwrap()).unwrap()
         };
+        let (whole, flat) = (Array2::<i32>::zeros((4, 147)), Array::<f32, _>::zeros(147));
         let cases = [
             (said("gone.npy", &|_| ()), "cannot be read"),
             (said("empty.npy", &|path| std::fs::write(path, "").unwrap()), "is empty"),
             (said("joints.npy", &npy((4, 43, 3), 0.0)), "[4, 43, 3]"),
             (said("none.npy", &npy((0, 49, 3), 0.0)), "no frame"),
             (said("nan.npy", &npy((4, 49, 3), f32::NAN)), "all joints of all 4 frames are missing"),
-            (
-                said("whole.npy", &|path| {
-                    Array2::<i32>::zeros((4, 147)).write_npy(File::create(path).unwrap()).unwrap();
-                }),
-                "float",
-            ),
+            (said("whole.npy", &|path| whole.write_npy(File::create(path).unwrap()).unwrap()), "float"),
             (said("a.mp4", &|path| std::fs::write(path, "x").unwrap()), "expected .npy"),
             (said("a.txt", &|path| std::fs::write(path, "1 2 3\n").unwrap()), "147"),
             (said("a.bvh", &|path| std::fs::write(path, "x").unwrap()), "a.bvh"),
-            (
-                said("flat.npy", &|path| Array::<f32, _>::zeros(147).write_npy(File::create(path).unwrap()).unwrap()),
-                "[147]",
-            ),
+            (said("flat.npy", &|path| flat.write_npy(File::create(path).unwrap()).unwrap()), "[147]"),
         ];
         for (text, says) in cases {
             assert!(text.contains(says), "{says}: {text}");

@@ -73,13 +73,8 @@ fn describe_video(stream: &Stream) -> VideoInfo {
     let coded_size = [width, height].map(|n| usize::try_from(n).unwrap_or(0));
     let orientation = Orientation::from_stream(stream);
     let fps = [stream.avg_frame_rate(), stream.rate()].into_iter().find_map(frame_rate);
-    VideoInfo {
-        codec: codec_name(stream),
-        coded_size,
-        image_size: orientation.upright_size(square_pixels(coded_size, Rational::from(aspect))),
-        rotation: orientation.degrees(),
-        fps,
-    }
+    let image_size = orientation.upright_size(square_pixels(coded_size, Rational::from(aspect)));
+    VideoInfo { codec: codec_name(stream), coded_size, image_size, rotation: orientation.degrees(), fps }
 }
 
 /// Size with square pixels: the width stretched by the sample aspect ratio where that differs from 1 by more than a

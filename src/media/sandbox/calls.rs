@@ -8,105 +8,45 @@ use seccompiler::{
 };
 use std::collections::BTreeMap;
 
+/// System calls by libc's names of them.
+macro_rules! calls {
+    ($($name:ident)*) => { &[$(libc::$name),*] };
+}
+
 /// Refused with any arguments.
-const REFUSED: &[c_long] = &[
+const REFUSED: &[c_long] = calls![
     // Other programs and other processes.
-    libc::SYS_execve,
-    libc::SYS_execveat,
-    libc::SYS_ptrace,
-    libc::SYS_process_vm_readv,
-    libc::SYS_process_vm_writev,
-    libc::SYS_pidfd_open,
-    libc::SYS_pidfd_getfd,
-    libc::SYS_pidfd_send_signal,
-    libc::SYS_tkill,
-    libc::SYS_rt_sigqueueinfo,
-    libc::SYS_rt_tgsigqueueinfo,
+    SYS_execve SYS_execveat SYS_ptrace SYS_process_vm_readv SYS_process_vm_writev SYS_pidfd_open SYS_pidfd_getfd
+    SYS_pidfd_send_signal SYS_tkill SYS_rt_sigqueueinfo SYS_rt_tgsigqueueinfo
     // Networks and other sockets; io_uring makes calls that no filter sees.
-    libc::SYS_socket,
-    libc::SYS_socketpair,
-    libc::SYS_connect,
-    libc::SYS_bind,
-    libc::SYS_listen,
-    libc::SYS_accept,
-    libc::SYS_accept4,
-    libc::SYS_sendto,
-    libc::SYS_sendmsg,
-    libc::SYS_sendmmsg,
-    libc::SYS_io_uring_setup,
-    libc::SYS_io_uring_enter,
-    libc::SYS_io_uring_register,
+    SYS_socket SYS_socketpair SYS_connect SYS_bind SYS_listen SYS_accept SYS_accept4 SYS_sendto SYS_sendmsg SYS_sendmmsg
+    SYS_io_uring_setup SYS_io_uring_enter SYS_io_uring_register
     // Memory and messages shared by name.
-    libc::SYS_shmget,
-    libc::SYS_semget,
-    libc::SYS_msgget,
+    SYS_shmget SYS_semget SYS_msgget
     // Mode, owner, times and attributes of files, which Landlock leaves alone.
-    libc::SYS_fchmod,
-    libc::SYS_fchmodat,
-    libc::SYS_fchown,
-    libc::SYS_fchownat,
-    libc::SYS_utimensat,
-    libc::SYS_setxattr,
-    libc::SYS_lsetxattr,
-    libc::SYS_fsetxattr,
-    libc::SYS_removexattr,
-    libc::SYS_lremovexattr,
-    libc::SYS_fremovexattr,
-    FCHMODAT2,
-    SETXATTRAT,
-    REMOVEXATTRAT,
-    FILE_SETATTR,
+    SYS_fchmod SYS_fchmodat SYS_fchown SYS_fchownat SYS_utimensat SYS_setxattr SYS_lsetxattr SYS_fsetxattr
+    SYS_removexattr SYS_lremovexattr SYS_fremovexattr
     // The system.
-    libc::SYS_mount,
-    libc::SYS_umount2,
-    libc::SYS_pivot_root,
-    libc::SYS_chroot,
-    libc::SYS_move_mount,
-    libc::SYS_open_tree,
-    libc::SYS_fsopen,
-    libc::SYS_fsmount,
-    libc::SYS_mount_setattr,
-    libc::SYS_setns,
-    libc::SYS_unshare,
-    libc::SYS_open_by_handle_at,
-    libc::SYS_bpf,
-    libc::SYS_perf_event_open,
-    libc::SYS_userfaultfd,
-    libc::SYS_add_key,
-    libc::SYS_request_key,
-    libc::SYS_keyctl,
-    libc::SYS_init_module,
-    libc::SYS_finit_module,
-    libc::SYS_delete_module,
-    libc::SYS_kexec_load,
-    libc::SYS_reboot,
+    SYS_mount SYS_umount2 SYS_pivot_root SYS_chroot SYS_move_mount SYS_open_tree SYS_fsopen SYS_fsmount
+    SYS_mount_setattr SYS_setns SYS_unshare SYS_open_by_handle_at SYS_bpf SYS_perf_event_open SYS_userfaultfd
+    SYS_add_key SYS_request_key SYS_keyctl SYS_init_module SYS_finit_module SYS_delete_module SYS_kexec_load SYS_reboot
 ];
+
+/// Of newer kernels, with one number on all processors: fchmodat2, setxattrat, removexattrat, file_setattr.
+const REFUSED_NEWER: &[c_long] = &[452, 463, 466, 469];
 
 /// Forms of the calls above that other processors never had.
 #[cfg(target_arch = "x86_64")]
-const REFUSED_FORMS: &[c_long] = &[
-    libc::SYS_fork,
-    libc::SYS_vfork,
-    libc::SYS_chmod,
-    libc::SYS_chown,
-    libc::SYS_lchown,
-    libc::SYS_utime,
-    libc::SYS_utimes,
-    libc::SYS_futimesat,
+const REFUSED_FORMS: &[c_long] = calls![
+    SYS_fork SYS_vfork SYS_chmod SYS_chown SYS_lchown SYS_utime SYS_utimes SYS_futimesat
 ];
 #[cfg(not(target_arch = "x86_64"))]
 const REFUSED_FORMS: &[c_long] = &[];
 
-// Calls of newer kernels, which have one number on all processors.
-const FCHMODAT2: c_long = 452;
-const SETXATTRAT: c_long = 463;
-const REMOVEXATTRAT: c_long = 466;
-const FILE_SETATTR: c_long = 469;
-
 /// Restricts this thread and those it starts.
 pub(crate) fn restrict() -> Result<(), Error> {
     let mut rules: BTreeMap<i64, Vec<SeccompRule>> =
-        REFUSED.iter().chain(REFUSED_FORMS).map(|call| (*call, Vec::new())).collect();
+        REFUSED.iter().chain(REFUSED_NEWER).chain(REFUSED_FORMS).map(|call| (*call, Vec::new())).collect();
     let mut refuse = |call: c_long, argument: u8, op: SeccompCmpOp, value: u64| {
         let condition = SeccompCondition::new(argument, SeccompCmpArgLen::Dword, op, value)?;
         rules.entry(call).or_default().push(SeccompRule::new(vec![condition])?);

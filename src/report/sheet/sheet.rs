@@ -206,8 +206,8 @@ impl SheetClip<'_> {
     }
 }
 
-/// Draws height and depth of both wrists over the frames `frames` from row `top` on, with a mark at each of `marks`; filled frames are
-/// paler than seen ones.
+/// Draws height and depth of both wrists over `frames` from row `top` on, with a mark at each of `marks`. Filled frames
+/// are paler than seen ones.
 fn draw_strip(image: &mut Image, top: usize, motion: &Motion, frames: Range<usize>, marks: &[usize]) -> Result<()> {
     let lane_px = (STRIP_PX as f32 - 30.0) / LANES.len() as f32;
     let (left, right) = (MARGIN_PX, image.width as f32 - 10.0);
