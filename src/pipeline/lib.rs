@@ -26,24 +26,4 @@ pub use run::{RunReport, RunState, Selection, StageCounts, UnitFailure, UnitRepo
 pub use status::{StagePlan, StatusReport, UnitState, UnitStatus};
 
 #[cfg(test)]
-mod test_keypoints {
-    use ndarray::{Array3, arr1, s};
-    use orator_base::types::pose2d::Keypoints;
-    use orator_base::types::time::FrameRate;
-
-    /// Keypoints at 15 frames a second whose body points (COCO point, x, y) are those that `at` gives of each frame; no hands.
-    pub(crate) fn bodies<const N: usize>(
-        n_frames: usize,
-        image_size: [u32; 2],
-        at: impl Fn(usize) -> [(usize, f32, f32); N],
-    ) -> Keypoints {
-        let mut body = Array3::zeros((n_frames, 17, 3));
-        for t in 0..n_frames {
-            for (point, x, y) in at(t) {
-                body.slice_mut(s![t, point, ..]).assign(&arr1(&[x, y, 0.9]));
-            }
-        }
-        let hand = Array3::zeros((n_frames, 21, 3));
-        Keypoints { fps: FrameRate::new(15, 1), image_size, body, left_hand: hand.clone(), right_hand: hand }
-    }
-}
+mod test_keypoints;

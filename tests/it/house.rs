@@ -134,7 +134,15 @@ fn a_folder_holds_at_most_16_files_and_its_map_no_code() {
             while let Some(rest) = words.strip_prefix("#[").and_then(|rest| rest.split_once(']')) {
                 words = rest.1.trim_start();
             }
-            let is_map = ["mod ", "pub mod ", "pub(crate) mod ", "pub use ", "pub(crate) use "];
+            let is_map = [
+                "mod ",
+                "pub mod ",
+                "pub(crate) mod ",
+                "pub(super) mod ",
+                "pub use ",
+                "pub(crate) use ",
+                "pub(super) use ",
+            ];
             if !words.is_empty() && !is_map.iter().any(|word| words.starts_with(word)) {
                 wrong.push(format!("{name} holds code: {words}"));
             }

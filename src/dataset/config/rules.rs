@@ -5,6 +5,7 @@ use super::file::{Problem, SourceLocation};
 use super::sections::KeyRanges;
 use super::{DatasetConfig, ExtractConfig, GanConfig, LiftConfig, ModelsConfig, Pose2dConfig, SegmentConfig};
 use super::{Seq2seqConfig, Settings, WorkConfig};
+use orator_base::stage::artifacts::StageName;
 use std::collections::{BTreeMap, BTreeSet};
 use toml::{Table, Value};
 
@@ -13,10 +14,10 @@ pub(super) fn ranges() -> impl Iterator<Item = (String, (f64, f64, &'static str)
     let sections = [
         ("work", WorkConfig::RANGES),
         ("models", ModelsConfig::RANGES),
-        ("extract", ExtractConfig::RANGES),
-        ("pose2d", Pose2dConfig::RANGES),
-        ("segment", SegmentConfig::RANGES),
-        ("lift", LiftConfig::RANGES),
+        (StageName::Extract.as_str(), ExtractConfig::RANGES),
+        (StageName::Pose2d.as_str(), Pose2dConfig::RANGES),
+        (StageName::Segment.as_str(), SegmentConfig::RANGES),
+        (StageName::Lift.as_str(), LiftConfig::RANGES),
         ("dataset", DatasetConfig::RANGES),
         ("gan", GanConfig::RANGES),
         ("seq2seq", Seq2seqConfig::RANGES),
