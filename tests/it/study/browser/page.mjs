@@ -87,9 +87,21 @@ function keys(page) {
 
 // Acts on an element by touch alone.
 function fingers(page) {
+  // A finger finds a control that stands still and can be used: films that load move what is below them.
+  const isStill = (node) =>
+    new Promise((resolve) => {
+      const { x, y } = node.getBoundingClientRect();
+      const wait = () => requestAnimationFrame(() => requestAnimationFrame(compare));
+      const compare = () => {
+        const later = node.getBoundingClientRect();
+        resolve(!node.disabled && later.x === x && later.y === y);
+      };
+      wait();
+    });
   const tap = async (selector) => {
     const target = await page.waitForSelector(selector);
-    await target.scrollIntoView();
+    do await target.scrollIntoView();
+    while (!(await target.evaluate(isStill)));
     await target.tap();
   };
   return {
