@@ -60,7 +60,7 @@ pub fn made_with(pipeline: &Pipeline, program: &Path, jobs: usize) -> Result<Str
         settings_hash(pipeline.config())?,
         pipeline.model_hashes()?,
         processor(),
-        std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+        std::thread::available_parallelism().map_or(1, |n| n.get()),
         jobs,
     );
     Ok(blake3::hash(&serde_json::to_vec(&made_with)?).to_hex().to_string())

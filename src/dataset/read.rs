@@ -260,7 +260,7 @@ impl ShardFiles {
     /// A name that is none of its shards'; a file that cannot be opened.
     pub fn get(&self, name: &FileName) -> Result<Arc<File>> {
         self.names.get(name).context("no such shard")?;
-        let mut open = self.open.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut open = self.open.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
         let used = match open.iter().position(|(known, _)| known == name) {
             Some(at) => open.remove(at),
             None => None,

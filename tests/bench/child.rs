@@ -30,7 +30,7 @@ pub(crate) struct Child {
 /// # Errors
 /// Fails where the program cannot be started, or fails with its own words.
 pub(crate) fn measure(dir: &Path, args: &[&str]) -> Result<Child> {
-    let n_cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let n_cores = std::thread::available_parallelism().map_or(1, |n| n.get());
     let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
     let log = fs::File::create(dir.join("bench.log"))?;
     command.current_dir(dir).args(args).stdin(Stdio::null()).stdout(Stdio::null()).stderr(log);

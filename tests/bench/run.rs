@@ -35,7 +35,7 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
         task.advance(1);
     }
     drop(task);
-    let n_cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get) as f64;
+    let n_cores = std::thread::available_parallelism().map_or(1, |n| n.get()) as f64;
     let of = |value: fn(&Child) -> f64| median(rounds.iter().map(value).collect());
     let (secs, used, busy) = (of(|c| c.secs), of(|c| c.cpu_secs / c.secs) / n_cores, of(|c| c.busy) / n_cores);
     let text = format!(

@@ -46,8 +46,7 @@ impl OpennessMeter {
     /// Takes the next samples, mono at 16 kHz, -1..1.
     pub fn push(&mut self, samples: &[f32]) {
         self.spectra.push(samples, |_, spectrum| {
-            let energy =
-                |bins: &Range<usize>| spectrum[bins.clone()].iter().map(realfft::num_complex::Complex::norm_sqr).sum();
+            let energy = |bins: &Range<usize>| spectrum[bins.clone()].iter().map(|bin| bin.norm_sqr()).sum();
             self.energies.push(std::array::from_fn(|band| energy(&self.bins[band])));
         });
     }

@@ -2,6 +2,7 @@
 
 pub mod cholesky;
 pub mod eigen;
+pub mod estimate;
 pub mod gaussian;
 pub mod local_fit;
 pub mod order;

@@ -50,7 +50,7 @@ fn shard(text: &str) -> Result<(usize, usize), String> {
 pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let (plan, pipeline) = open(&args.plan)?;
     pipeline.check()?;
-    let cores = || std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let cores = || std::thread::available_parallelism().map_or(1, |n| n.get());
     let secs = |secs: f64| Duration::try_from_secs_f64(secs.max(0.1)).unwrap_or(Duration::MAX);
     let options = WorkerOptions {
         jobs: if args.jobs == 0 { cores() } else { args.jobs },

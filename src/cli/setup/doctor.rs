@@ -42,7 +42,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let mut checks = vec![
         ok("ffmpeg libraries", orator_media::ffmpeg::version()),
         ok("OpenCV", orator_media::opencv::version()),
-        ok("processor cores", std::thread::available_parallelism().map_or(1, std::num::NonZero::get).to_string()),
+        ok("processor cores", std::thread::available_parallelism().map_or(1, |n| n.get()).to_string()),
     ];
     match config {
         Ok(config) => {

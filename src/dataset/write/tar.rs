@@ -105,9 +105,8 @@ impl ShardWriter {
     fn close(&mut self) -> Result<()> {
         let Some(mut open) = self.open.take() else { return Ok(()) };
         let file = self.file_name()?;
-        let written = open
-            .push(&[0; 2 * BLOCK])
-            .and_then(|()| open.file.into_inner().map_err(std::io::IntoInnerError::into_error));
+        let written =
+            open.push(&[0; 2 * BLOCK]).and_then(|()| open.file.into_inner().map_err(|error| error.into_error()));
         let shard = written.with_context(|| format!("writing {}", self.dir.join(&file).display()))?;
         // Every file is flushed when the folder is put in place; this only starts the disk early.
         drop(std::thread::spawn(move || shard.sync_all()));

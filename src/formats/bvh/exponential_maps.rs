@@ -143,7 +143,7 @@ impl ExponentialMaps {
         ensure!(self.rest.len() == self.skeleton.n_channels(), "its rest pose has {} numbers", self.rest.len());
         ensure!(self.columns.iter().all(|&column| column < 3 * self.joints.len()), "it has a column of no joint");
         for &joint in &self.joints {
-            let order = self.skeleton.joints.get(joint).and_then(super::skeleton::JointChannels::rotation_order);
+            let order = self.skeleton.joints.get(joint).and_then(|joint| joint.rotation_order());
             ensure!(order.is_some(), "joint {joint} has no three rotations");
         }
         let mut numbers = self.mean.iter().chain(&self.largest).chain(&self.rest);

@@ -73,7 +73,7 @@ impl<'a> BatchStage<'a> {
     }
 
     fn speaker(&self, checkpoint: &Path) -> Result<Arc<TrainedSpeaker>> {
-        let mut speakers = self.speakers.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut speakers = self.speakers.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
         if let Some((speaker, _)) = speakers.get(checkpoint) {
             return Ok(speaker.clone());
         }

@@ -185,7 +185,7 @@ mod tests {
             assert!(StreamingGenerator::new(&net, preset, 427, 64, 33, mels).is_err());
             assert!(StreamingGenerator::new(&net, preset, 0, 64, 32, mels).is_err());
             assert_eq!(
-                StreamingGenerator::new(&net, preset, 427, 64, 32, mels)?.filter(std::result::Result::is_err).count(),
+                StreamingGenerator::new(&net, preset, 427, 64, 32, mels)?.filter(|made| made.is_err()).count(),
                 1
             );
         }

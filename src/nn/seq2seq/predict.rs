@@ -89,7 +89,7 @@ mod tests {
         fn forward(&self, segment: &Segment, _: &mut Mode) -> Result<Tensor> {
             self.0.check(segment)?;
             let last = segment.previous.narrow(1, self.0.previous - 1, 1)?.flatten_all()?.to_vec1::<f32>()?[0];
-            let words = segment.words.as_ref().map(candle_core::Tensor::to_vec1::<u32>).transpose()?;
+            let words = segment.words.as_ref().map(|words| words.to_vec1::<u32>()).transpose()?;
             let step = if words.is_some_and(|words| words[0] == 1) { 100.0 } else { 1.0 };
             let poses: Vec<f32> = (1..=self.0.predicted).map(|t| last + step * t as f32).collect();
             Tensor::from_vec(poses, (1, self.0.predicted, 1), &Device::Cpu)

@@ -22,7 +22,6 @@ const FOUND_AGAIN: f32 = 0.75;
 /// if the pictures before and after do not match (`block_match`). Gestures, pans and noise go on for several frames and
 /// cancel out; after a flash the picture is back. A gradual transition (`dissolves`) scores at its first frame and at the
 /// first frame after it.
-#[derive(Default)]
 pub struct ShotFinder {
     /// Frames of the dataset rate for one at 15 a second.
     pace: usize,
@@ -55,7 +54,15 @@ struct Transition {
 impl ShotFinder {
     /// A finder for frames at `rate`.
     pub fn new(rate: FrameRate) -> Self {
-        Self { pace: ((rate.per_sec() / 15.0).round() as usize).max(1), ..Self::default() }
+        Self {
+            pace: ((rate.per_sec() / 15.0).round() as usize).max(1),
+            recent: VecDeque::new(),
+            frames: Vec::new(),
+            n_frames: 0,
+            changes: Vec::new(),
+            cuts: Vec::new(),
+            windows: Vec::new(),
+        }
     }
 
     /// The next frame's thumbnail; `None` when it repeats the frame before.

@@ -18,7 +18,6 @@ const MOST_LOOKS: f64 = 0.25;
 const STEP: i32 = 10;
 
 /// Looks at a video.
-#[derive(Default)]
 pub struct PictureSurvey {
     frames_per_sec: usize,
     /// New frames so far, and the one at which the next look begins.
@@ -34,7 +33,15 @@ pub struct PictureSurvey {
 impl PictureSurvey {
     /// A survey of frames at `rate`.
     pub fn new(rate: FrameRate) -> Self {
-        Self { frames_per_sec: (rate.per_sec().round() as usize).max(2), ..Self::default() }
+        Self {
+            frames_per_sec: (rate.per_sec().round() as usize).max(2),
+            n_frames: 0,
+            next_look: 0,
+            first: None,
+            combs: Vec::new(),
+            n_flagged: 0,
+            bars: BarFinder::default(),
+        }
     }
 
     /// Whether the next frame's picture is looked at.

@@ -2,7 +2,8 @@
 //! speed and jerk of prediction and ground truth.
 
 use crate::html::chart::dots::{ChartDot, dots};
-use crate::html::chart::histogram::{Counts, profile_card};
+use crate::html::chart::histogram::Counts;
+use crate::html::chart::profile;
 use crate::html::numbers::number;
 use crate::html::{Node, legend, node};
 use ndarray::ArrayView3;
@@ -121,9 +122,12 @@ pub fn speeds(clips: &EvalClips) -> Vec<Node> {
             counts
         };
         let (ground_truth, predicted) = (count(|clip| clip.ground_truth.view()), count(|clip| clip.predicted.view()));
-        let [truth, prediction] = [&ground_truth, &predicted].map(|counts| number(counts.quantile(0.5)));
-        let medians = format!("median: truth {truth}, prediction {prediction} {unit}");
-        profile_card(title, unit, &[("real", &ground_truth), ("made", &predicted)], medians)
+        let medians = format!(
+            "median: truth {}, prediction {} {unit}",
+            number(ground_truth.quantile(0.5)),
+            number(predicted.quantile(0.5))
+        );
+        profile::card(title, unit, &[("real", &ground_truth), ("made", &predicted)], medians)
     };
     let about = "How often each value occurs (heights go with the square root of the share, so that rare values are seen; the \
                  last bin holds what is beyond). Dashed: the medians.";

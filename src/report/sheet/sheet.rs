@@ -3,9 +3,10 @@
 //! one page is in memory.
 
 use super::cells::{CELL_PX, CellView, SheetCrop, pose_cell};
+use super::strip::{STRIP_PX, draw_strip};
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array3, Axis};
-use orator_avatar::animate::draw::figure::{INK, LEFT, PAPER, RIGHT, mix};
+use orator_avatar::animate::draw::figure::{INK, LEFT, PAPER, RIGHT};
 use orator_base::stage::progress::Progress;
 use orator_base::types::image::{Image, PictureOptions};
 use orator_base::types::pose2d::{Keypoints, coco};
@@ -14,7 +15,6 @@ use orator_base::types::skeleton::{L_HAND, L_WRIST, N_HAND_JOINTS, R_HAND, R_WRI
 use orator_media::ffmpeg::frames::FrameReader;
 use orator_media::opencv::draw;
 use orator_pipeline::lift::quality::jitter_around;
-use std::ops::Range;
 use std::path::Path;
 
 /// Rows of moments on a page.
@@ -24,12 +24,6 @@ const WORDS_PX: usize = 22;
 const GAP_PX: usize = 16;
 const MOMENT_HIGH_PX: usize = WORDS_PX + CELL_PX + 6;
 const TITLE_PX: usize = 36;
-/// Height of the chart, px.
-const STRIP_PX: usize = 260;
-/// Width of the labels at the left.
-const MARGIN_PX: f32 = 60.0;
-/// Axis of a lane, its range in metres from top to bottom, and its label.
-const LANES: [(usize, [f32; 2], &str); 2] = [(1, [-0.3, 0.7], "height"), (2, [-0.7, 0.1], "depth")];
 
 /// Content of a contact sheet.
 pub struct SheetClip<'a> {
@@ -204,42 +198,4 @@ impl SheetClip<'_> {
         }
         words.join("   ")
     }
-}
-
-/// Draws height and depth of both wrists over `frames` from row `top` on, with a mark at each of `marks`. Filled frames
-/// are paler than seen ones.
-fn draw_strip(image: &mut Image, top: usize, motion: &Motion, frames: Range<usize>, marks: &[usize]) -> Result<()> {
-    let lane_px = (STRIP_PX as f32 - 30.0) / LANES.len() as f32;
-    let (left, right) = (MARGIN_PX, image.width as f32 - 10.0);
-    let n_steps = frames.len().saturating_sub(1).max(1) as f32;
-    let x_of = |t: usize| left + (right - left) * t.saturating_sub(frames.start) as f32 / n_steps;
-    for (lane, (axis, [above, below], words)) in LANES.into_iter().enumerate() {
-        let (start, end) = (top as f32 + lane as f32 * lane_px + 4.0, top as f32 + (lane + 1) as f32 * lane_px - 4.0);
-        let y_of = |metres: f32| start + (end - start) * ((metres - above) / (below - above)).clamp(0.0, 1.0);
-        for decimetre in (above * 10.0).round() as i32..=(below * 10.0).round() as i32 {
-            let metres = decimetre as f32 / 10.0;
-            let pale = if decimetre == 0 { 0.3 } else { 0.85 };
-            draw::line(image, [left, y_of(metres)], [right, y_of(metres)], 1.0, mix(INK, PAPER, pale))?;
-        }
-        draw::text(image, words, [6.0, start + 14.0], 9.0, INK)?;
-        let [first, last] = [above, below].map(|metres| format!("{:+.1} m", if axis == 1 { -metres } else { metres }));
-        draw::text(image, &first, [6.0, start + 32.0], 8.0, INK)?;
-        draw::text(image, &last, [6.0, end], 8.0, INK)?;
-        for &mark in marks {
-            draw::line(image, [x_of(mark), start], [x_of(mark), end], 1.0, mix(INK, PAPER, 0.6))?;
-        }
-        for (wrist, rgb) in [(R_WRIST, RIGHT), (L_WRIST, LEFT)] {
-            for t in frames.clone().skip(1) {
-                let from = [x_of(t - 1), y_of(motion.joints[[t - 1, wrist, axis]])];
-                let to = [x_of(t), y_of(motion.joints[[t, wrist, axis]])];
-                let seen = motion.mask[[t, wrist]] && motion.mask[[t - 1, wrist]];
-                draw::line(image, from, to, 2.0, if seen { rgb } else { mix(rgb, PAPER, 0.6) })?;
-            }
-        }
-    }
-    for &mark in marks {
-        let words = format!("{:.1}", motion.fps.secs(mark));
-        draw::text(image, &words, [x_of(mark) - 8.0, (top + STRIP_PX) as f32 - 8.0], 9.0, INK)?;
-    }
-    Ok(())
 }

@@ -1,7 +1,7 @@
 //! Single pass over the videos, one at a time, that collects all data of the report. Of a video only its ledger is
 //! kept.
 
-use super::motion::MovementCounts;
+use super::movement::MovementCounts;
 use super::spread::MeasureCounts;
 use super::thresholds::THRESHOLDS;
 use super::video::VideoSummary;

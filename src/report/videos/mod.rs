@@ -1,8 +1,11 @@
-//! Page of a speaker's videos. Data (`gather`, one pass over the videos): `video`, `what_if`, `spread`, `motion`, `worst`,
-//! `pictures`. Sections: `summary`, `timelines`, `pictures`, `spread`, `sliders`, `motion`; `page` joins them.
+//! Page of a speaker's videos. Data (`gather`, one pass over the videos): `video`, `what_if`, `spread`, `movement`,
+//! `worst`, `pictures`. Sections: `summary`, `timelines`, `gallery`, `spread`, `sliders`, `motion`; `page` joins
+//! them.
 
+pub mod gallery;
 pub mod gather;
 pub mod motion;
+pub mod movement;
 pub mod page;
 pub mod pictures;
 pub mod reasons;

@@ -1,118 +1,11 @@
-//! Positions and speeds of joints in the kept frames, and their charts. Arms are measured from the neck, finger tips from
-//! their wrist.
+//! Charts of joint positions and speeds.
 
-use crate::html::chart::histogram::{Counts, profile_card};
+use super::movement::{MovementCounts, PAIRS};
+use crate::html::chart::profile;
 use crate::html::chart::ranges::{ValueRange, ranges};
 use crate::html::numbers::number;
 use crate::html::{Node, legend, node};
 use orator_base::stage::counted;
-use orator_base::types::interval::Interval;
-use orator_base::types::pose3d::Motion;
-use orator_base::types::skeleton::{L_ELBOW, L_HAND, L_WRIST, NECK, R_ELBOW, R_HAND, R_WRIST};
-
-/// Largest distance of a joint from its reference, metres.
-const REACH: f64 = 1.2;
-/// Largest counted speed, metres a second.
-const FASTEST: f64 = 3.0;
-
-/// Joint of each side (left, right) and the joints they are measured from.
-#[derive(Clone, Copy)]
-pub struct JointPair {
-    pub name: &'static str,
-    joints: [usize; 2],
-    from: [usize; 2],
-    pub is_arm: bool,
-}
-
-const fn tip(name: &'static str, finger: usize) -> JointPair {
-    let tip = 4 * finger + 4;
-    JointPair { name, joints: [L_HAND + tip, R_HAND + tip], from: [L_WRIST, R_WRIST], is_arm: false }
-}
-
-pub const PAIRS: [JointPair; 5] = [
-    JointPair { name: "elbow", joints: [L_ELBOW, R_ELBOW], from: [NECK; 2], is_arm: true },
-    JointPair { name: "wrist", joints: [L_WRIST, R_WRIST], from: [NECK; 2], is_arm: true },
-    tip("thumb tip", 0),
-    tip("index tip", 1),
-    tip("little tip", 4),
-];
-
-/// Positions of a joint by axis (x to the speaker's left, y down, z away from the camera), and its speeds.
-pub struct JointMovement {
-    places: [Counts; 3],
-    ends: [[f64; 2]; 3],
-    /// Speeds, metres a second.
-    pub speeds: Counts,
-}
-
-impl JointMovement {
-    fn new() -> Self {
-        let places = || Counts::new(-REACH, REACH, 480);
-        Self {
-            places: [places(), places(), places()],
-            ends: [[f64::INFINITY, f64::NEG_INFINITY]; 3],
-            speeds: Counts::new(0.0, FASTEST, 50),
-        }
-    }
-
-    /// Minimum, 5 %, median, 95 %, maximum on an axis, metres; NaN where never measured.
-    pub fn marks(&self, axis: usize) -> [f64; 5] {
-        if self.places[axis].total() == 0 {
-            return [f64::NAN; 5];
-        }
-        let [lowest, highest] = self.ends[axis];
-        let at = |share: f64| self.places[axis].quantile(share).clamp(lowest, highest);
-        [lowest, at(0.05), at(0.5), at(0.95), highest]
-    }
-}
-
-/// Left and right joint of every pair.
-pub struct MovementCounts {
-    pub pairs: Vec<[JointMovement; 2]>,
-    pub n_frames: usize,
-}
-
-impl MovementCounts {
-    pub fn new() -> Self {
-        Self { pairs: PAIRS.iter().map(|_| [JointMovement::new(), JointMovement::new()]).collect(), n_frames: 0 }
-    }
-
-    /// Counts the frames of a video's kept intervals.
-    pub fn add(&mut self, motion: &Motion, intervals: &[Interval]) {
-        let n_frames = motion.n_frames();
-        for interval in intervals.iter().filter(|interval| interval.end <= n_frames) {
-            self.n_frames += interval.n_frames();
-            for (pair, joints) in PAIRS.iter().zip(&mut self.pairs) {
-                for (side, joint) in joints.iter_mut().enumerate() {
-                    joint.add(motion, *interval, pair.joints[side], pair.from[side]);
-                }
-            }
-        }
-    }
-}
-
-impl JointMovement {
-    fn add(&mut self, motion: &Motion, interval: Interval, joint: usize, from: usize) {
-        let mut before: Option<[f64; 3]> = None;
-        for t in interval.start..interval.end {
-            let at = [0, 1, 2].map(|axis| f64::from(motion.joints[[t, joint, axis]] - motion.joints[[t, from, axis]]));
-            if at.iter().any(|v| !v.is_finite()) {
-                before = None;
-                continue;
-            }
-            for (axis, value) in at.into_iter().enumerate() {
-                self.places[axis].add(value);
-                let [lowest, highest] = &mut self.ends[axis];
-                (*lowest, *highest) = (lowest.min(value), highest.max(value));
-            }
-            if let Some(before) = before {
-                let way = at.iter().zip(before).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
-                self.speeds.add(way * motion.fps.per_sec());
-            }
-            before = Some(at);
-        }
-    }
-}
 
 /// Axis with the labels of its ends.
 const AXES: [(&str, [&str; 2]); 3] = [
@@ -146,7 +39,7 @@ pub fn motion(movement: &MovementCounts) -> Vec<Node> {
             .collect();
         let medians = format!("median {}", medians.join(", "));
         let lines: Vec<_> = SIDES.iter().zip(joints).map(|(side, joint)| (*side, &joint.speeds)).collect();
-        profile_card(&format!("Speed of the {}", pair.name), "m/s", &lines, medians)
+        profile::card(&format!("Speed of the {}", pair.name), "m/s", &lines, medians)
     });
     vec![
         node("p").text(about),
@@ -178,29 +71,4 @@ fn range_card(
     let end = (farthest * 20.0).ceil() / 20.0;
     let title = format!("{name}: {along}");
     node("div").class("card range").child(node("h3").text(&title)).child(ranges(&title, &rows, [-end, end], ends))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use ndarray::Array3;
-    use orator_base::types::skeleton::N_JOINTS;
-    use orator_base::types::time::FrameRate;
-
-    #[test]
-    fn a_wrist_that_goes_one_metre_a_second_is_measured_so() {
-        let fps = FrameRate::new(10, 1);
-        let mut joints = Array3::zeros((10, N_JOINTS, 3));
-        (0..10).for_each(|t| joints[[t, L_WRIST, 0]] = t as f32 * 0.1);
-        joints[[3, R_WRIST, 2]] = f32::NAN;
-        let mut movement = MovementCounts::new();
-        let intervals = [Interval { start: 0, end: 6 }, Interval { start: 8, end: 99 }];
-        movement.add(&Motion::from_joints(fps, joints), &intervals);
-        let [left, right] = &movement.pairs[1];
-        let [lowest, _, median, _, highest] = left.marks(0);
-        assert!(lowest == 0.0 && (highest - 0.5).abs() < 1e-6 && (median - 0.2).abs() < 0.01, "{median}");
-        assert!((left.speeds.quantile(0.5) - 1.0).abs() < 0.05);
-        assert_eq!((left.speeds.total(), right.speeds.total(), movement.n_frames), (5, 3, 6));
-        assert!(MovementCounts::new().pairs[0][0].marks(2)[0].is_nan());
-    }
 }

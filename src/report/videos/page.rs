@@ -1,11 +1,11 @@
 //! Whole page of a speaker's videos.
 
+use super::gallery::{Pictures, gallery};
 use super::gather::{ReportData, gather};
-use super::pictures::{Pictures, gallery, thumbnails};
 use super::spread::distributions;
 use super::summary;
 use super::summary::ReportTotals;
-use super::{motion, sliders, timelines};
+use super::{motion, pictures, sliders, timelines};
 use crate::faces;
 use crate::html::{Page, Section};
 use crate::preview;
@@ -59,7 +59,7 @@ fn draw(settings: &Settings, gathered: &mut ReportData, progress: &dyn Progress)
     for number in request {
         let video = &mut gathered.videos[number];
         task.detail(&video.unit.video);
-        match thumbnails(&settings.work.dir, &video.unit, number, &gathered.worst) {
+        match pictures::thumbnails(&settings.work.dir, &video.unit, number, &gathered.worst) {
             Ok(pictures) => found.extend(pictures.into_iter().map(|(frames, picture)| ((number, frames), picture))),
             Err(error) => video.note(&format!("No pictures of it: {error:#}")),
         }

@@ -1,17 +1,12 @@
-//! Worst frames of every rule as thumbnails: small video frames under their keypoints. A video is read once, up to its last
+//! Thumbnails of the chosen moments: small video frames under their keypoints. A video is read once, up to its last
 //! moment. Keypoints of other programs stand on an empty picture.
 
-use super::reasons;
-use super::video::VideoSummary;
-use super::worst::{Moment, Worst};
-use crate::html;
-use crate::html::numbers::clock;
-use crate::html::{Node, node};
+use super::worst::Worst;
 use anyhow::{Context, Result, ensure};
 use orator_avatar::animate::draw::overlay;
 use orator_avatar::animate::draw::overlay::ImageTransform;
+use orator_base::stage::Unit;
 use orator_base::stage::artifacts::Artifact;
-use orator_base::stage::{Unit, counted};
 use orator_base::types::image::Image;
 use orator_base::types::pose2d::Keypoints;
 use orator_formats::keypoints_npz;
@@ -99,45 +94,4 @@ fn side_by_side<'a>(images: impl Iterator<Item = &'a Image> + Clone) -> Image {
         left += image.width + GAP_PX;
     }
     all
-}
-
-/// Pictures by video and by the frames of their moment.
-pub type Pictures = BTreeMap<(usize, Vec<usize>), MomentThumbnail>;
-
-/// Row of pictures for each rule.
-pub fn gallery(worst: &Worst, pictures: &Pictures, videos: &[VideoSummary]) -> Vec<Node> {
-    if worst.rules.is_empty() {
-        return vec![node("p").class("empty").text("Nothing was refused, or no pictures were asked for.")];
-    }
-    let about = "Of each rule the refused intervals that break it most, each at its worst frame, with the keypoints that were \
-                 found. Two pictures side by side are a frame and the next.";
-    let mut shown = vec![node("p").text(about)];
-    for ((_, reason, unit), moments) in &worst.rules {
-        let swatch = node("span").class(format!("swatch {}", reasons::class(reason)));
-        let measured = if unit.is_empty() { String::new() } else { format!(", measured in {unit}") };
-        let about = format!("{}{measured}", counted(moments.len(), "interval"));
-        let title =
-            node("h3").class("rule").child(swatch).child(node("span").text(reason)).child(node("small").text(about));
-        let cards = moments.iter().filter_map(|moment| Some(card(moment, videos.get(moment.video)?, pictures)));
-        shown.push(node("div").class("gallery").child(title).child(node("div").class("shots").children(cards)));
-    }
-    shown
-}
-
-fn card(moment: &Moment, video: &VideoSummary, pictures: &Pictures) -> Node {
-    let at = format!("{} at {}", video.file, clock(moment.secs));
-    let shown = match pictures.get(&(moment.video, moment.frames.clone())) {
-        Some(found) => html::jpeg(&found.jpeg, found.size, &format!("{at}: {}", moment.description)),
-        None => node("p").class("empty nopicture").text("The picture cannot be read."),
-    };
-    let link = node("a").attr("href", format!("#{}", video.anchor())).text(at);
-    let description = if moment.here.is_empty() {
-        moment.description.clone()
-    } else {
-        format!("{}; {}", moment.description, moment.here)
-    };
-    node("figure")
-        .class(if moment.frames.len() > 1 { "card shot pair" } else { "card shot" })
-        .child(shown)
-        .child(node("figcaption").child(link).child(node("small").text(description)))
 }

@@ -40,8 +40,12 @@ pub fn lines(videos: &[VideoSummary]) -> Vec<Node> {
             secs if secs >= 0.05 => format!(", hands at rest in {}", length(secs)),
             _ => String::new(),
         };
-        let [kept, whole] = [ledger.kept_secs(), ledger.duration_secs].map(length);
-        let about = format!("{kept} kept of {whole} in {}{rest}", counted(ledger.kept.len(), "interval"));
+        let about = format!(
+            "{} kept of {} in {}{rest}",
+            length(ledger.kept_secs()),
+            length(ledger.duration_secs),
+            counted(ledger.kept.len(), "interval")
+        );
         let share = (ledger.duration_secs / longest).max(NARROWEST);
         let title = node("h3").child(node("span").text(&video.file)).child(node("small").text(about));
         let line = if ledger.duration_secs > 0.0 {
@@ -59,11 +63,19 @@ pub fn lines(videos: &[VideoSummary]) -> Vec<Node> {
 /// Parts of a ledger in order.
 fn stretches(video: &VideoSummary) -> Vec<TimelineSpan> {
     let ledger = &video.ledger;
-    let stretch = |start_secs: f64, end_secs: f64, class: String, word: &str, description: String| {
-        let ([start, end], secs) = ([start_secs, end_secs].map(clock), (10.0 * (end_secs - start_secs)).round() / 10.0);
-        let description = format!("{start} to {end} ({} s): {word}\n{description}", number(secs));
-        let (word, description) = (word.to_owned(), description.trim_end().to_owned());
-        TimelineSpan { start_secs, end_secs, class, word, description }
+    let stretch = |start_secs: f64, end_secs: f64, class: String, word: &str, description: String| TimelineSpan {
+        start_secs,
+        end_secs,
+        class,
+        word: word.to_owned(),
+        description: format!(
+            "{} to {} ({} s): {word}\n{description}",
+            clock(start_secs),
+            clock(end_secs),
+            number((10.0 * (end_secs - start_secs)).round() / 10.0)
+        )
+        .trim_end()
+        .to_owned(),
     };
     let rests = |kept: &Kept| {
         let inside = |rest: &&Kept| kept.start_secs <= rest.start_secs && rest.end_secs <= kept.end_secs;

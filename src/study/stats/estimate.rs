@@ -2,7 +2,7 @@
 //! p values at once: Holm's step-down adjustment (Holm 1979), which bounds the probability of any false rejection whatever
 //! the tests' dependence.
 
-pub use orator_base::math::order::ConfidenceInterval;
+pub use orator_base::math::estimate::ConfidenceInterval;
 use orator_base::math::order::Ordered;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};

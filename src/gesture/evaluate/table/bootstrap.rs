@@ -1,7 +1,8 @@
 //! Block bootstrap: confidence intervals of a metric from blocks drawn with replacement (Efron 1979; Kuensch 1989).
 
 use ndarray::Array2;
-use orator_base::math::order::{Estimate, Ordered};
+use orator_base::math::estimate::Estimate;
+use orator_base::math::order::Ordered;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -3,7 +3,7 @@
 
 use super::result::{StoredMetric, StoredResult};
 use crate::evaluate::baseline::baselines::PredictorKind;
-use orator_base::math::order::Estimate;
+use orator_base::math::estimate::Estimate;
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeSet;

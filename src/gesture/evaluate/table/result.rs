@@ -6,7 +6,7 @@ use crate::evaluate::baseline::baselines::PredictorKind;
 use crate::evaluate::verdict::labels;
 use crate::evaluate::verdict::verdict::{better_than_nothing, hears};
 use anyhow::{Context, Result, ensure};
-use orator_base::math::order::Estimate;
+use orator_base::math::estimate::Estimate;
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use std::path::Path;

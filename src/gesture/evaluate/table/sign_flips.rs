@@ -2,7 +2,7 @@
 //! for dependent data in blocks: Canay, Romano and Shaikh 2017). Several metrics are flipped together, and each is held
 //! against the largest of all (Westfall and Young 1993), so that the level is that of all of them at once.
 
-use orator_base::math::order::Estimate;
+use orator_base::math::estimate::Estimate;
 use rand::{RngCore, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -10,7 +10,7 @@ use crate::metrics::catalogue::{Better, Catalogue, Definition, IntervalSums};
 use crate::metrics::settings::MetricSettings;
 use anyhow::{Result, ensure};
 use ndarray::{Array2, s};
-use orator_base::math::order::Estimate;
+use orator_base::math::estimate::Estimate;
 use orator_base::stage::progress::Task;
 
 /// Number of draws behind an interval; costly metrics (Frechet distances, correlations) take fewer.

@@ -1,7 +1,7 @@
 //! Labels of metrics for people: name, unit, rounded value, interval in brackets.
 
 use crate::metrics::catalogue::{Better, Definition};
-use orator_base::math::order::Estimate;
+use orator_base::math::estimate::Estimate;
 use std::fmt::Write as _;
 
 /// Names of metric families; of common prefixes the longest comes first.

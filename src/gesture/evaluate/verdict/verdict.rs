@@ -7,7 +7,7 @@ use crate::evaluate::baseline::baselines::PredictorKind;
 use crate::evaluate::table::sign_flips::{FEWEST_BLOCKS, TestedDifference};
 use crate::evaluate::table::table::{PredictorRow, Table};
 use crate::metrics::catalogue::Better;
-use orator_base::math::order::Estimate;
+use orator_base::math::estimate::Estimate;
 use serde::Serialize;
 
 /// Aspect of motion that a metric describes.

@@ -98,7 +98,7 @@ fn row(lift: &LiftHands, set: &FingerSet, n_hands: usize, seed: u64) -> Result<H
         (0..n_hands).map(|_| shot(&truths[rng.random_range(0..truths.len())], &mut rng)).collect();
     let seen: Vec<SeenHand> = shots.iter().map(|s| s.seen).collect();
     let lifted = lift(&seen)?;
-    let whole = set.takes.iter().all(crate::mocap::fingers::take::FingerTake::has_knuckles);
+    let whole = set.takes.iter().all(|take| take.has_knuckles());
     let sized: Vec<Option<HandJoints>> =
         shots.iter().zip(&lifted).map(|(s, h)| Some(to_size(&s.truth, h.as_ref()?))).collect();
     let of = |hands: &[Option<HandJoints>]| errors(&shots, hands, whole);

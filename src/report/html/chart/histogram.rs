@@ -1,7 +1,7 @@
-//! Histogram with a threshold, whose failing side has another colour, and distributions over one another as lines.
+//! Histogram with a threshold; the side that fails has another colour.
 
-use super::scale::{Scale, drawing, line, px, rect, stroke, words};
-use crate::html::node::{Node, node};
+use super::scale::{Scale, drawing, line, px, rect, words};
+use crate::html::node::Node;
 use crate::html::numbers::{number, with_unit};
 
 /// Counts in bins of equal width from `low` to `high`; the outer bins include values beyond.
@@ -70,10 +70,6 @@ const TOP: f64 = 22.0;
 const FLOOR: f64 = 122.0;
 const LEFT: f64 = 8.0;
 const RIGHT: f64 = 332.0;
-/// Height, top and floor of distributions over one another.
-const PROFILE_HEIGHT: f64 = 130.0;
-const PROFILE_TOP: f64 = 10.0;
-const PROFILE_FLOOR: f64 = 100.0;
 
 /// Histogram as SVG. Heights follow the square root of the share, so that rare values remain visible.
 pub fn histogram(label: &str, counts: &Counts, unit: &str, threshold: Option<ThresholdLine>) -> Node {
@@ -102,44 +98,17 @@ pub fn histogram(label: &str, counts: &Counts, unit: &str, threshold: Option<Thr
     }
     if let Some(ThresholdLine { value, is_least }) = threshold {
         let at = x.at(value);
-        let (anchor, x) = if at > (LEFT + RIGHT) / 2.0 { ("end", at - 4.0) } else { ("start", at + 4.0) };
+        let anchor = if at > (LEFT + RIGHT) / 2.0 { "end" } else { "start" };
         let description = format!("at {} {}", if is_least { "least" } else { "most" }, with_unit(value, unit));
         svg = svg.child(line("threshold", [at, TOP - 8.0], [at, FLOOR]).attr("data-x", px(at)));
-        svg = svg.child(words("mark", [x, TOP - 9.0], anchor, &description));
+        svg = svg.child(words(
+            "mark",
+            [if anchor == "end" { at - 4.0 } else { at + 4.0 }, TOP - 9.0],
+            anchor,
+            &description,
+        ));
     }
     svg
-}
-
-/// Card of two or more distributions; `medians` says their medians in words.
-pub fn profile_card(title: &str, unit: &str, lines: &[(&str, &Counts)], medians: String) -> Node {
-    node("div")
-        .class("card speed")
-        .child(node("h3").text(title))
-        .child(profile(&format!("{title}: {medians}"), unit, lines))
-        .child(node("small").text(medians))
-}
-
-/// Lines with their class; heights follow the square root of the share. All have the bins of the first.
-fn profile(label: &str, unit: &str, lines: &[(&str, &Counts)]) -> Node {
-    let mut svg = drawing(WIDTH, PROFILE_HEIGHT, label);
-    let Some((_, first)) = lines.first() else { return svg };
-    let x = Scale { low: first.low, high: first.high, from: LEFT, to: RIGHT };
-    let share = |counts: &Counts, bin: usize| counts.bins[bin] as f64 / counts.total().max(1) as f64;
-    let shares = |counts: &Counts| (0..counts.bins.len()).map(|bin| share(counts, bin)).fold(0.0, f64::max);
-    let most = lines.iter().map(|(_, counts)| shares(counts)).fold(1e-9, f64::max);
-    for (class, counts) in lines.iter().filter(|(_, counts)| counts.total() > 0) {
-        let y = |bin: usize| PROFILE_FLOOR - (share(counts, bin) / most).sqrt() * (PROFILE_FLOOR - PROFILE_TOP);
-        let middle = |bin: usize| (counts.edge(bin) + counts.edge(bin + 1)) / 2.0;
-        svg = svg.child(stroke(class, (0..counts.bins.len()).map(|bin| [x.at(middle(bin)), y(bin)])));
-        let median = x.at(counts.quantile(0.5));
-        svg = svg.child(line(&format!("middle {class}"), [median, PROFILE_TOP], [median, PROFILE_FLOOR]));
-    }
-    svg = svg.child(line("axis", [LEFT, PROFILE_FLOOR], [RIGHT, PROFILE_FLOOR]));
-    for tick in x.ticks(5) {
-        let anchor = if tick <= first.low { "start" } else { "middle" };
-        svg = svg.child(words("tick", [x.at(tick), PROFILE_FLOOR + 15.0], anchor, &number(tick)));
-    }
-    svg.child(words("tick", [RIGHT, PROFILE_FLOOR + 28.0], "end", unit))
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ pub mod dots;
 pub mod forest;
 pub mod histogram;
 pub mod lines;
+pub mod profile;
 pub mod ranges;
 pub mod scale;
 pub mod timeline;
