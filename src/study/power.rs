@@ -205,8 +205,8 @@ pub fn text(plan: &PowerPlan) -> String {
             ),
         };
         let (n, PowerRow { n_participants, power, .. }) = (curve.naive_votes, curve.at_naive);
-        let said = format!("says {n} votes ({n_participants} participants), of which the power is {}", percent(power));
-        let _ = writeln!(text, "  the formula for independent votes {said}");
+        let needed = format!("{n} votes ({n_participants} participants), whose actual power is {}", percent(power));
+        let _ = writeln!(text, "  the formula for independent votes asks for {needed}");
     }
     text
 }

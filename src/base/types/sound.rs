@@ -47,9 +47,9 @@ pub struct SoundOffset {
     pub secs: f64,
     /// Correlation of lips and voice at that offset.
     pub correlation: f64,
-    /// Chance that a voice of somebody else would nowhere match as well, 0..1.
+    /// Probability that the sound of another voice matches less well at every lag, 0..1.
     pub confidence: f64,
-    /// Seconds in which a mouth was seen and speech heard.
+    /// Seconds with both a visible mouth and speech.
     pub compared_secs: f64,
 }
 
@@ -59,7 +59,7 @@ impl SoundOffset {
         self.confidence >= SURE && self.secs.abs() < FARTHEST_SECS
     }
 
-    /// Whether people should hear of it: it is sure, and more than a frame of film.
+    /// Whether to report the offset: it is sure, and longer than one frame of film.
     pub fn is_told(&self) -> bool {
         self.is_sure() && self.secs.abs() >= TOLD_SECS
     }
