@@ -4,6 +4,7 @@
 pub(crate) mod bad_input;
 pub(crate) mod earlier_versions;
 pub(crate) mod faults;
+pub(crate) mod full_disk;
 pub(crate) mod hostile_files;
 pub(crate) mod kill;
 pub(crate) mod memory;

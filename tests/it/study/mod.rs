@@ -8,4 +8,5 @@ mod pages;
 mod serve;
 mod serve_crowd;
 mod serve_hostile;
+mod server_killed;
 mod whole;
