@@ -44,7 +44,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 ///
 /// Answers are stored in DIR/responses.sqlite, each before it is acknowledged; a server that was stopped or killed goes on
 /// where it was. No address of a participant and no trace of a browser is stored. The server speaks HTTP: for participants
-/// elsewhere put it behind a proxy with a certificate (caddy, nginx) on the same machine.
+/// elsewhere put it behind a proxy with a certificate (caddy, nginx) on the same machine, and give --host-name.
 #[derive(clap::Args)]
 struct ServeArgs {
     /// The study's folder.
@@ -56,6 +56,10 @@ struct ServeArgs {
     /// Port to listen at; 0: any that is free.
     #[arg(long, default_value_t = 8080)]
     port: u16,
+    /// Name by which a proxy serves the study (study.example.org). Requests that name a host other than this and the
+    /// listened address get status 421; the limit of connections per address is then left to the proxy.
+    #[arg(long, value_name = "NAME")]
+    host_name: Option<String>,
     /// Minutes without an answer after which a participant's place is given to another.
     #[arg(long, value_name = "MINUTES", default_value_t = 60)]
     abandoned_after: u32,
@@ -68,7 +72,7 @@ fn serve(args: &ServeArgs, ui: &Ui) -> Result<Outcome> {
     let title = server.study().title.clone();
     let counts = format!("{} sessions, {} films", server.study().plan.sessions.len(), server.study().n_films());
     let token = server.operator_token().to_owned();
-    server.run(SocketAddr::new(args.listen, args.port), |address| {
+    server.run(SocketAddr::new(args.listen, args.port), args.host_name.clone(), |address| {
         let page = format!("http://{address}/");
         let text = format!("{title}: {counts}\nparticipants: {page}\noperator:     {page}operator, token {token}");
         let facts = json!({ "address": page, "operator_address": format!("{page}operator"), "operator_token": token });

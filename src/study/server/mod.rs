@@ -3,9 +3,12 @@
 
 pub mod answer;
 pub mod api;
+pub mod host;
 pub mod limits;
 pub mod listen;
+pub mod peers;
 pub mod reply;
 pub mod secret;
 pub mod served;
 pub mod start;
+pub mod write_timeout;

@@ -1,5 +1,6 @@
 //! A study's server from its folder to its end, and its addresses.
 
+use super::host::{AllowedHosts, check_host};
 use super::limits::RateLimits;
 use super::reply::{HEADERS, not_found, text_reply, wrong_method};
 use super::secret::StudySecret;
@@ -13,6 +14,7 @@ use anyhow::{Context, Result};
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
 use axum::http::{HeaderValue, StatusCode, header};
+use axum::middleware;
 use axum::routing::{get, post};
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -70,14 +72,17 @@ impl StudyServer {
         self.app.secret.operator_token()
     }
 
-    /// Serves at `address` until Ctrl-C or a request to terminate. `listening` is told where, once it does.
+    /// Serves at `address` until Ctrl-C or a request to terminate. `listening` is told where, once it does. `host_name`:
+    /// name by which a proxy serves the study; it is then the proxy that limits the connections of each peer.
     ///
     /// # Errors
-    /// An address that cannot be listened at.
-    pub fn run(self, address: SocketAddr, listening: impl FnOnce(SocketAddr)) -> Result<()> {
+    /// An address that cannot be listened at, or a `host_name` that is more than a name.
+    pub fn run(self, address: SocketAddr, host_name: Option<String>, listening: impl FnOnce(SocketAddr)) -> Result<()> {
+        let is_proxied = host_name.is_some();
+        let hosts = AllowedHosts::new(address.ip(), host_name)?;
         let runtime =
             tokio::runtime::Builder::new_multi_thread().enable_all().build().context("cannot start threads")?;
-        let router = router(self.app);
+        let router = router(self.app, hosts);
         runtime.block_on(async {
             let mut terminated = signal(SignalKind::terminate()).context("cannot wait for a signal")?;
             let listener = TcpListener::bind(address).await;
@@ -89,7 +94,7 @@ impl StudyServer {
                     _ = terminated.recv() => {}
                 }
             };
-            listen::serve(listener, router, stop).await;
+            listen::serve(listener, router, is_proxied, stop).await;
             anyhow::Ok(())
         })?;
         drop(runtime);
@@ -99,8 +104,8 @@ impl StudyServer {
     }
 }
 
-/// The addresses of a study's server.
-fn router(app: App) -> Router {
+/// The addresses of a study's server, each served under the names of `hosts`.
+fn router(app: App, hosts: AllowedHosts) -> Router {
     let mut router = Router::new()
         .route("/api/study", get(api::study))
         .route("/api/begin", post(api::begin))
@@ -118,6 +123,7 @@ fn router(app: App) -> Router {
         .method_not_allowed_fallback(wrong_method)
         .layer(DefaultBodyLimit::max(MOST_BODY))
         .layer(TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, REQUEST_TIME))
+        .layer(middleware::from_fn_with_state(Arc::new(hosts), check_host))
         .layer(SetResponseHeaderLayer::if_not_present(header::CACHE_CONTROL, no_store));
     for (name, value) in HEADERS {
         router = router.layer(SetResponseHeaderLayer::overriding(name, HeaderValue::from_static(value)));

@@ -5,12 +5,20 @@ use anyhow::{Context, Result};
 use rusqlite::{Connection, TransactionBehavior};
 use std::path::Path;
 use std::thread::JoinHandle;
+use std::time::Duration;
 use tokio::sync::{mpsc, oneshot};
+use tokio::time::timeout;
 
 /// Pieces of work that one commit holds at most.
 const MOST_IN_A_COMMIT: usize = 256;
 /// Pieces of work that wait at most; who brings more waits to hand them in.
 const MOST_WAITING: usize = 1024;
+
+/// Time until work is refused, the wait of earlier work with it: shorter than a request may take, so that the client is
+/// told.
+const STORE_TIME: Duration = Duration::from_secs(8);
+/// Time that a transaction waits for a lock of another process.
+const LOCK_TIME: Duration = Duration::from_secs(3);
 
 /// Tells who waits that the work is committed.
 type Acknowledge = Box<dyn FnOnce() + Send>;
@@ -22,7 +30,7 @@ struct Job {
     erases: bool,
 }
 
-/// The work was not committed: a full disk, a database that cannot be written.
+/// The work was not committed: a full disk, a database that cannot be written or that another process locks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the response could not be stored")]
 pub struct NotStored;
@@ -40,6 +48,7 @@ impl ResponseStore {
     /// Those of [`database::open`].
     pub fn open(path: &Path, plan: &str) -> Result<(Self, JoinHandle<()>)> {
         let mut db = database::open(path, plan)?;
+        db.busy_timeout(LOCK_TIME)?;
         let (jobs, mut waiting) = mpsc::channel(MOST_WAITING);
         let thread = std::thread::Builder::new().name("responses".to_owned());
         let thread = thread.spawn(move || write_all(&mut db, &mut waiting)).context("cannot start a thread")?;
@@ -76,11 +85,18 @@ impl ResponseStore {
     ) -> Result<T, NotStored> {
         let (answer, answered) = oneshot::channel();
         let work: Work = Box::new(move |db| {
+            // Its client was refused, or has gone; a withdrawal is carried out all the same.
+            if answer.is_closed() && !erases {
+                return Ok(Box::new(|| ()));
+            }
             let value = work(db)?;
             Ok(Box::new(move || drop(answer.send(value))))
         });
-        self.jobs.send(Job { work, erases }).await.map_err(|_| NotStored)?;
-        answered.await.map_err(|_| NotStored)
+        let stored = async {
+            self.jobs.send(Job { work, erases }).await.map_err(|_| NotStored)?;
+            answered.await.map_err(|_| NotStored)
+        };
+        timeout(STORE_TIME, stored).await.unwrap_or(Err(NotStored))
     }
 }
 
@@ -122,7 +138,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("responses.sqlite");
         let (store, thread) = ResponseStore::open(&path, "plan").unwrap();
-        let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap();
         let add = |db: &Connection| {
             database::count_up(db, "withdrawn")?;
             db.query_row("SELECT value FROM about WHERE name = 'withdrawn'", [], |row| row.get::<_, String>(0))

@@ -22,12 +22,12 @@ fn status(stream: &mut TcpStream) -> u16 {
 }
 
 fn get(address: &str, target: &str) -> u16 {
-    raw(address, format!("GET {target} HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n").as_bytes())
+    raw(address, format!("GET {target} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n").as_bytes())
 }
 
 fn post(address: &str, path: &str, token: &str, body: &[u8]) -> u16 {
     let head = format!(
-        "POST {path} HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Type: application/json\r\n\
+        "POST {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nContent-Type: application/json\r\n\
          Authorization: Bearer {token}\r\nContent-Length: {}\r\n\r\n",
         body.len()
     );
@@ -74,11 +74,11 @@ fn no_path_leads_out_of_the_study() {
         assert_eq!(get(&served.address, target), 404, "{target}");
     }
     assert_eq!(get(&served.address, "/films/%ff%fe.mp4"), 400, "no UTF-8");
-    assert_eq!(raw(&served.address, b"GET /\xff\xfe HTTP/1.1\r\nHost: x\r\n\r\n"), 400);
+    assert_eq!(raw(&served.address, b"GET /\xff\xfe HTTP/1.1\r\nHost: localhost\r\n\r\n"), 400);
     for garbage in [&b"\x16\x03\x01\x02\x00\x01"[..], b"GET\r\n\r\n", b"GET / HTTP/9\r\n\r\n", b"\0\0\0\0\r\n\r\n"] {
         assert_eq!(raw(&served.address, garbage), 400);
     }
-    let header = |name: &str, value: &str| format!("GET / HTTP/1.1\r\nHost: x\r\n{name}: {value}\r\n\r\n");
+    let header = |name: &str, value: &str| format!("GET / HTTP/1.1\r\nHost: localhost\r\n{name}: {value}\r\n\r\n");
     assert_eq!(raw(&served.address, header("Cookie", &"x".repeat(100_000)).as_bytes()), 431);
     assert_eq!(raw(&served.address, header("A: b\r\n".repeat(200).trim_end(), "").as_bytes()), 431);
     assert!([414, 431].contains(&get(&served.address, &format!("/{}", "x".repeat(100_000)))));
@@ -149,18 +149,21 @@ fn what_is_no_answer_is_refused_and_nothing_is_stored() {
     client.begin(address, "last").unwrap();
     let token = &client.token;
     assert_eq!(post(address, "/api/answer", token, &vec![b' '; 17_000]), 413);
-    let chunked =
-        "POST /api/answer HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nTransfer-Encoding: chunked\r\n";
+    let chunked = "POST /api/answer HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nTransfer-Encoding: chunked\r\n";
     let chunk = format!("4e20\r\n{}\r\n0\r\n\r\n", " ".repeat(20_000));
     assert_eq!(raw(address, format!("{chunked}Authorization: Bearer {token}\r\n\r\n{chunk}").as_bytes()), 413);
     for kind in ["text/plain", "application/x-www-form-urlencoded", "application/jsonp", ""] {
-        let head =
-            format!("POST /api/begin HTTP/1.1\r\nHost: x\r\nContent-Type: {kind}\r\nContent-Length: 2\r\n\r\n{{}}");
+        let head = format!(
+            "POST /api/begin HTTP/1.1\r\nHost: localhost\r\nContent-Type: {kind}\r\nContent-Length: 2\r\n\r\n{{}}"
+        );
         assert_eq!(raw(address, head.as_bytes()), 415, "{kind}");
     }
     for (method, path) in [("GET", "/api/answer"), ("POST", "/api/state"), ("DELETE", "/api/withdraw"), ("PUT", "/")] {
         assert_eq!(
-            raw(address, format!("{method} {path} HTTP/1.1\r\nHost: x\r\nContent-Length: 0\r\n\r\n").as_bytes()),
+            raw(
+                address,
+                format!("{method} {path} HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n").as_bytes()
+            ),
             405
         );
     }
@@ -212,7 +215,8 @@ fn who_begins_with_hostile_words_is_refused_and_so_is_a_forged_token() {
         assert_eq!(post(address, "/api/answer", token, right.as_bytes()), 401, "{token}");
         assert_eq!(post(address, "/api/withdraw", token, b"{}"), 401, "{token}");
     }
-    let none = b"POST /api/answer HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: 0\r\n\r\n";
+    let none =
+        b"POST /api/answer HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 0\r\n\r\n";
     assert_eq!(raw(address, none), 401);
     assert!(study.exported("votes").is_empty());
     for _ in 0..3 {
@@ -236,10 +240,55 @@ fn who_sends_slowly_is_cut_off() {
         stream
     };
     let mut silent = open(b"");
-    let mut half_head = open(b"GET / HTTP/1.1\r\nHost: x\r\n");
+    let mut half_head = open(b"GET / HTTP/1.1\r\nHost: localhost\r\n");
     let mut half_body =
-        open(b"POST /api/begin HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: 100\r\n\r\n{");
+        open(b"POST /api/begin HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 100\r\n\r\n{");
+    let trickle = half_body.try_clone().unwrap();
+    let trickle = std::thread::spawn(move || {
+        while (&trickle).write_all(b" ").is_ok() {
+            std::thread::sleep(Duration::from_millis(300));
+        }
+    });
     assert_eq!(status(&mut half_body), 408);
     assert!([0, 408].contains(&status(&mut half_head)) && [0, 408].contains(&status(&mut silent)));
+    trickle.join().unwrap();
     assert!(begun.elapsed() < Duration::from_secs(15), "{:?}", begun.elapsed());
+}
+
+#[test]
+fn requests_that_name_another_host_are_misdirected() {
+    let study = MadeStudy::new(1, 1, 3, 5);
+    let served = study.serve(&[]);
+    let reply = |address: &str, head: &str| {
+        let mut stream = TcpStream::connect(address).unwrap();
+        stream.write_all(format!("{head}\r\nConnection: close\r\n\r\n").as_bytes()).unwrap();
+        let mut text = String::new();
+        stream.read_to_string(&mut text).unwrap();
+        text
+    };
+    let status_of = |address: &str, host: &str| {
+        let reply = reply(address, &format!("GET /api/study HTTP/1.1\r\nHost: {host}"));
+        reply[9..12].parse::<u16>().unwrap()
+    };
+    let address = &served.address;
+    for host in [address.as_str(), "localhost:8080", "127.0.0.1"] {
+        assert_eq!(status_of(address, host), 200, "{host}");
+    }
+    for host in ["evil.example", "evil.example:8080", "study.example.org", "192.0.2.1", "127.0.0.1.evil.example", ""] {
+        assert_eq!(status_of(address, host), 421, "{host}");
+    }
+    for head in ["GET / HTTP/1.0", "GET http://evil.example/ HTTP/1.1\r\nHost: localhost"] {
+        let said = reply(address, head);
+        assert!(said[9..].starts_with("421 ") && said.contains("--host-name"), "{said}");
+        assert!(
+            said.contains("content-type: text/plain") && said.contains("x-content-type-options: nosniff"),
+            "{said}"
+        );
+    }
+    drop(served);
+
+    let served = study.serve(&["--host-name", "study.example.org"]);
+    for (host, status) in [("study.example.org", 200), (&served.address, 200), ("evil.example", 421)] {
+        assert_eq!(status_of(&served.address, host), status, "{host}");
+    }
 }

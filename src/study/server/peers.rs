@@ -1,0 +1,78 @@
+//! How many connections each peer has, so that no peer takes them all. Addresses are held only while connections are
+//! open, and never written.
+
+use std::collections::HashMap;
+use std::net::{IpAddr, Ipv6Addr};
+use std::sync::{Arc, Mutex};
+
+/// Open connections by peer: an IPv4 address, or an IPv6 network of 64 bits, the least that a provider assigns.
+#[derive(Debug)]
+pub struct PeerLimit {
+    most: usize,
+    open: Mutex<HashMap<IpAddr, usize>>,
+}
+
+impl PeerLimit {
+    /// Limit of `most` connections for each peer.
+    pub fn new(most: usize) -> Arc<Self> {
+        Arc::new(Self { most, open: Mutex::default() })
+    }
+
+    /// Counts a connection from `address` until the result is dropped. `None`: its peer has as many as it may.
+    pub fn admit(self: &Arc<Self>, address: IpAddr) -> Option<PeerConnection> {
+        let peer = peer(address);
+        let mut open = self.open.lock().ok()?;
+        let n_open = open.entry(peer).or_default();
+        if *n_open >= self.most {
+            return None;
+        }
+        *n_open += 1;
+        Some(PeerConnection { limit: self.clone(), peer })
+    }
+}
+
+/// A counted connection.
+#[derive(Debug)]
+pub struct PeerConnection {
+    limit: Arc<PeerLimit>,
+    peer: IpAddr,
+}
+
+impl Drop for PeerConnection {
+    fn drop(&mut self) {
+        let Ok(mut open) = self.limit.open.lock() else { return };
+        if let Some(n_open) = open.get_mut(&self.peer) {
+            *n_open -= 1;
+            if *n_open == 0 {
+                open.remove(&self.peer);
+            }
+        }
+    }
+}
+
+fn peer(address: IpAddr) -> IpAddr {
+    match address.to_canonical() {
+        IpAddr::V6(address) => Ipv6Addr::from_bits(address.to_bits() & !u128::from(u64::MAX)).into(),
+        address @ IpAddr::V4(_) => address,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_peer_has_its_number_of_connections_and_no_more() {
+        let limit = PeerLimit::new(2);
+        let admit = |address: &str| limit.admit(address.parse().unwrap());
+        let [first, second] = ["192.0.2.1", "::ffff:192.0.2.1"].map(admit);
+        assert!(first.is_some() && second.is_some() && admit("192.0.2.1").is_none());
+        let others = ["192.0.2.2", "2001:db8::1", "2001:db8::ffff:0:0:2", "2001:db8:0:1::1"].map(admit);
+        assert!(others.iter().all(Option::is_some) && admit("2001:db8::3").is_none());
+        drop(first);
+        let third = admit("192.0.2.1");
+        assert!(third.is_some() && admit("192.0.2.1").is_none());
+        drop((second, third, others));
+        assert!(limit.open.lock().unwrap().is_empty());
+    }
+}
