@@ -56,7 +56,8 @@ struct ServeArgs {
     /// Port to listen at; 0: any that is free.
     #[arg(long, default_value_t = 8080)]
     port: u16,
-    /// Minutes without an answer after which a participant's place is given to another.
+    /// Minutes without an answer after which a participant's place is given to another; before the first answer 5 minutes
+    /// and twice the films' length at most.
     #[arg(long, value_name = "MINUTES", default_value_t = 60)]
     abandoned_after: u32,
 }

@@ -3,6 +3,7 @@
 
 pub mod answer;
 pub mod api;
+pub mod clock;
 pub mod limits;
 pub mod listen;
 pub mod reply;
