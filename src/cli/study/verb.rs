@@ -60,7 +60,8 @@ struct ServeArgs {
     /// listened address get status 421; the limit of connections per address is then left to the proxy.
     #[arg(long, value_name = "NAME")]
     host_name: Option<String>,
-    /// Minutes without an answer after which a participant's place is given to another.
+    /// Minutes without an answer after which a participant's place is given to another; before the first answer 5 minutes
+    /// and twice the films' length at most.
     #[arg(long, value_name = "MINUTES", default_value_t = 60)]
     abandoned_after: u32,
 }

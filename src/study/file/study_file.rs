@@ -31,6 +31,9 @@ pub struct StudyFile {
     /// Address to which participants return at the end; `{code}` in it stands for their completion code.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub return_url: Option<String>,
+    /// Whether only those may begin whose address holds the participant ID of a recruiting site.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub require_id: bool,
     /// Whether the first task begins with a trial that only shows how the page works.
     #[serde(default = "yes")]
     pub practice: bool,

@@ -33,8 +33,17 @@ async function start() {
   const kept = recall("language");
   useLanguage(study.languages.includes(kept) ? kept : preferredLanguage(study.languages));
   entitle();
+  takeLinkedToken();
   if (recall("token")) await resume();
   else consent();
+}
+
+// Takes the token of a link from the researcher, for participants who cannot open the browser where they began.
+function takeLinkedToken() {
+  const token = new URLSearchParams(location.hash.slice(1)).get("resume");
+  if (!token || recall("token")) return;
+  keep("token", token);
+  history.replaceState(null, "", location.pathname + location.search);
 }
 
 function entitle() {
@@ -79,11 +88,14 @@ async function instructions() {
 }
 
 async function begin() {
+  // Another tab has begun in the meantime.
+  if (recall("token")) return resume();
   let begun;
   try {
     begun = await patiently(() => backend.begin(currentLanguage()), waits);
   } catch (error) {
-    if (error.status === 409) show(t("full.title"), [text(t("full.text"))]);
+    const { reason } = error;
+    if (["full", "known", "id-missing"].includes(reason)) show(t(`${reason}.title`), [text(t(`${reason}.text`))]);
     else refused(error);
     return;
   }

@@ -26,6 +26,8 @@ pub const SOUND_CHECK_TONES: usize = 3;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::store::participants::QuotaCounts;
+    use std::collections::BTreeSet;
 
     #[test]
     fn pages_load_what_is_here_and_nothing_stands_inline() {
@@ -44,5 +46,15 @@ mod tests {
         }
         let sound = include_str!("sound.js");
         assert!(sound.contains(&format!("const TONES = {SOUND_CHECK_TONES};")));
+    }
+
+    #[test]
+    fn the_operators_page_names_every_count_that_the_server_sends() {
+        let script = include_str!("operator.js");
+        let (_, labels) = script.split_once("const COUNTS = {").unwrap();
+        let (labels, _) = labels.split_once("};").unwrap();
+        let labels: BTreeSet<&str> = labels.lines().filter_map(|line| Some(line.trim().split_once(':')?.0)).collect();
+        let sent = serde_json::to_value(QuotaCounts::default()).unwrap();
+        assert_eq!(labels, sent.as_object().unwrap().keys().map(String::as_str).collect::<BTreeSet<_>>());
     }
 }

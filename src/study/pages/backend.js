@@ -8,9 +8,10 @@ const LONGEST_WAIT_SECS = 30;
 
 // A server that refuses, with its sentence.
 export class Refusal extends Error {
-  constructor(status, sentence, retrySecs) {
-    super(sentence);
+  constructor(status, { error, reason }, retrySecs) {
+    super(error ?? `${status}`);
     this.status = status;
+    this.reason = reason;
     this.retrySecs = retrySecs;
   }
 
@@ -22,7 +23,7 @@ export class Refusal extends Error {
 async function ask(url, options = {}) {
   const reply = await fetch(url, { signal: AbortSignal.timeout(REQUEST_MS), referrerPolicy: "no-referrer", ...options });
   const value = await reply.json().catch(() => ({}));
-  if (!reply.ok) throw new Refusal(reply.status, value.error ?? `${reply.status}`, Number(reply.headers.get("Retry-After")));
+  if (!reply.ok) throw new Refusal(reply.status, value, Number(reply.headers.get("Retry-After")));
   return value;
 }
 

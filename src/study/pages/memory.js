@@ -12,6 +12,8 @@ function read() {
 }
 
 let kept = read();
+// Another tab of the same browser goes on with the same session.
+window.addEventListener("storage", () => (kept = read()));
 
 export const recall = (key) => kept[key];
 

@@ -8,8 +8,8 @@ const COUNTS = {
   wanted: "Participants wanted",
   completed: "Completed",
   active: "Taking part now",
-  abandoned: "Without an answer for long; their places are free",
-  failed_checks: "Completed with too many failed attention checks",
+  abandoned: "Without an answer for too long; their places are free",
+  excluded: "Completed with too many failed attention checks",
   replaced: "Whose place was given to another",
   withdrawn: "Withdrawn, their data deleted",
 };
@@ -55,7 +55,7 @@ const table = (heads, rows, label) =>
       "table",
       {},
       el("thead", {}, el("tr", {}, ...heads.map((head) => el("th", { scope: "col" }, head)))),
-      el("tbody", {}, ...rows.map((row) => el("tr", {}, ...row.map((cell) => el("td", {}, `${cell}`))))),
+      el("tbody", {}, ...rows.map((row) => el("tr", {}, ...row.map((cell) => el("td", {}, cell))))),
     ),
   );
 
@@ -63,6 +63,10 @@ function duration(secs) {
   if (secs < 90) return `${Math.round(secs)} s`;
   return secs < 5400 ? `${Math.round(secs / 60)} min` : `${Math.round(secs / 3600)} h`;
 }
+
+// Link by which a participant goes on in another browser than the one where they began.
+const resumeLink = (token) =>
+  token ? el("a", { href: new URL(`./#resume=${token}`, location.href).href }, "Link to resume the session") : "";
 
 function draw(progress) {
   const { title, quota, answers, participants, stalls } = progress;
@@ -74,13 +78,13 @@ function draw(progress) {
       askForToken("");
     }, "quiet"),
   );
-  const counts = Object.entries(COUNTS).filter(([key]) => key in quota).map(([key, label]) => [label, quota[key]]);
+  const counts = Object.entries(COUNTS).map(([key, label]) => [label, quota[key]]);
   counts.push(["Answers stored", answers]);
-  if (stalls) counts.push(["Trials with a stalled film", stalls.trials], ["Seconds stalled in all", Math.round(stalls.secs)]);
+  counts.push(["Trials with a stalled film", stalls.trials], ["Seconds stalled in all", Math.round(stalls.secs)]);
   const done = el("progress", { max: `${quota.wanted}`, value: `${Math.min(quota.completed, quota.wanted)}`, "aria-label": "Completed of the wanted" });
   const nodes = [el("p", {}, `${quota.completed} of ${quota.wanted} participants have completed the study.`), done, el("h2", {}, "Quota"), table(["What", "Number"], counts, "Quota")];
-  const places = participants.map((one) => [one.place, one.status, `${one.position} of ${one.n_trials}`, duration(one.idle_secs)]);
-  nodes.push(el("h2", {}, "Places"), table(["Place", "State", "Trials answered", "Since the last"], places, "Places"));
+  const places = participants.map((one) => [one.place, one.status, `${one.position} of ${one.n_trials}`, duration(one.idle_secs), resumeLink(one.token)]);
+  nodes.push(el("h2", {}, "Places"), table(["Place", "State", "Trials answered", "Since the last", "For the participant"], places, "Places"));
   if (document.querySelector("h1")?.textContent === "Progress" && !byId("token")) byId("main").replaceChildren(document.querySelector("h1"), ...nodes);
   else show("Progress", nodes);
 }

@@ -5,10 +5,10 @@ use super::answer::{check, fails_check, feedback};
 use super::reply::{ApiError, JsonBody, bearer, header_text, json_reply, not_found, unauthorized};
 use super::secret::{completion_code, participant_id};
 use super::served::ServedStudy;
-use super::start::{App, now_ms};
+use super::start::App;
 use crate::plan::TrialPhase;
 use crate::store::answers::{self, GivenAnswer, Recorded, TrialTerms, record};
-use crate::store::participants::{self, NewParticipant, PARAMETERS, Participant, Status};
+use crate::store::participants::{self, BeginOutcome, NewParticipant, PARAMETERS, Participant, Status};
 use crate::vote::Response;
 use axum::body::Body;
 use axum::extract::{FromRequestParts, Path, Request, State};
@@ -84,7 +84,9 @@ impl FromRequestParts<Arc<App>> for AuthenticatedSession {
 }
 
 fn gone() -> ApiError {
-    ApiError::new(StatusCode::GONE, "This session has ended: too much time passed, and its place was given to another.")
+    let sentence =
+        "This session has ended: too much time passed and its place was given to another, or it was begun anew.";
+    ApiError::new(StatusCode::GONE, sentence)
 }
 
 fn withdrawn() -> ApiError {
@@ -122,12 +124,22 @@ pub async fn begin(State(app): Shared, JsonBody(body): JsonBody<StartRequest>) -
     let named = || anyhow::Ok((participant_id()?, completion_code()?));
     let (id, code) = named().map_err(|_| ApiError::not_stored())?;
     let newcomer = NewParticipant { id, language: body.language, parameters: body.parameters, code };
-    let quota = app.study.quota;
-    let begun = app.store.write(move |db| participants::begin(db, &newcomer, quota, now_ms())).await?;
-    let participant = begun.ok_or_else(|| ApiError::conflict("The study has all its participants. Thank you."))?;
-    if participant.status == Status::Replaced {
-        return Err(gone());
+    if app.study.requires_id && !newcomer.has_id() {
+        let sentence = "The address lacks the participant ID of a recruiting site; open the study by its link there.";
+        return Err(ApiError::new(StatusCode::FORBIDDEN, sentence).because("id-missing"));
     }
+    let (quota, clock) = (app.study.quota, app.clock);
+    let participant = match app.store.write(move |db| participants::begin(db, &newcomer, quota, clock.now_ms())).await?
+    {
+        BeginOutcome::Begun(participant) => participant,
+        BeginOutcome::Known => {
+            let sentence = "This participant ID has been used already; go on in the browser where you began.";
+            return Err(ApiError::conflict(sentence).because("known"));
+        }
+        BeginOutcome::Full => {
+            return Err(ApiError::conflict("The study has all its participants. Thank you.").because("full"));
+        }
+    };
     let token = app.secret.token(participant.session, &participant.id);
     Ok(json_reply(&json!({ "token": token, "state": session_state(&app.study, &participant) })))
 }
@@ -165,7 +177,8 @@ pub async fn answer(
         is_last: answer.position as usize + 1 == trials.len(),
         fails_check: fails_check(&answer.response, trial),
     };
-    match app.store.write(move |db| record(db, &id, &answer, terms, now_ms())).await? {
+    let clock = app.clock;
+    match app.store.write(move |db| record(db, &id, &answer, terms, clock.now_ms())).await? {
         Recorded::Stored(participant) => {
             Ok(json_reply(&Acknowledged { feedback: feedback(trial), state: session_state(&app.study, &participant) }))
         }
@@ -204,14 +217,17 @@ pub async fn operator(State(app): Shared, headers: HeaderMap) -> Result<HttpResp
     }
     let read = |db: &_| Ok((participants::all(db)?, participants::n_withdrawn(db)?, answers::stalls(db)?));
     let (all, withdrawn, stalls) = app.store.write(read).await?;
-    let now_ms = now_ms();
+    let now_ms = app.clock.now_ms();
     let place = |participant: &Participant| {
+        let may_go_on = participant.status == Status::Active;
         json!({
             "place": participant.session + 1,
             "status": participant.status,
             "position": participant.position,
             "n_trials": app.study.trials(participant.session).len(),
             "idle_secs": (now_ms - participant.given_ms).max(0) / 1000,
+            // For participants who cannot open the browser where they began.
+            "token": may_go_on.then(|| app.secret.token(participant.session, &participant.id)),
         })
     };
     Ok(json_reply(&json!({

@@ -3,6 +3,7 @@
 
 pub mod answer;
 pub mod api;
+pub mod clock;
 pub mod host;
 pub mod limits;
 pub mod listen;

@@ -33,13 +33,15 @@ pub const HEADERS: [(HeaderName, &str); 7] = [
 pub struct ApiError {
     pub status: StatusCode,
     sentence: String,
+    /// Word by which the page finds its own text.
+    reason: Option<&'static str>,
     /// Seconds after which the request may succeed.
     retry_secs: Option<i64>,
 }
 
 impl ApiError {
     pub fn new(status: StatusCode, sentence: impl Into<String>) -> Self {
-        Self { status, sentence: sentence.into(), retry_secs: None }
+        Self { status, sentence: sentence.into(), reason: None, retry_secs: None }
     }
 
     pub fn bad(sentence: impl Into<String>) -> Self {
@@ -48,6 +50,12 @@ impl ApiError {
 
     pub fn conflict(sentence: impl Into<String>) -> Self {
         Self::new(StatusCode::CONFLICT, sentence)
+    }
+
+    /// For the page's text `REASON.text`.
+    #[must_use]
+    pub fn because(self, reason: &'static str) -> Self {
+        Self { reason: Some(reason), ..self }
     }
 
     /// May be tried again after so many seconds.
@@ -74,7 +82,11 @@ impl From<NotStored> for ApiError {
 
 impl IntoResponse for ApiError {
     fn into_response(self) -> HttpResponse {
-        let mut reply = with_status(self.status, &json!({ "error": self.sentence }));
+        let mut body = json!({ "error": self.sentence });
+        if let Some(reason) = self.reason {
+            body["reason"] = json!(reason);
+        }
+        let mut reply = with_status(self.status, &body);
         if let Some(secs) = self.retry_secs {
             reply.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from(secs.max(0)));
         }

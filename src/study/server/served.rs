@@ -14,6 +14,9 @@ use std::path::{Path, PathBuf};
 
 /// Milliseconds by which an answer may come before the stated end of its films: players round.
 const LEEWAY_MS: f64 = 250.0;
+/// Milliseconds that a participant has for the first answer, beside twice the length of that trial's films: the task's
+/// instructions are read and films are loaded in it. Consent and the sound check come before a place is given.
+const UNANSWERED_MS: i64 = 300_000;
 
 /// Film as it is served.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,6 +34,8 @@ pub struct ServedStudy {
     /// BLAKE3 hash of the plan's file.
     pub plan_hash: String,
     pub quota: Quota,
+    /// Whether only participants with the ID of a recruiting site may begin.
+    pub requires_id: bool,
     /// Address to which a participant returns at the end.
     pub return_url: Option<String>,
     /// Texts and tasks, as the page reads them.
@@ -60,6 +65,7 @@ impl ServedStudy {
             wanted: u32::try_from(file.participants).context("too many participants")?,
             excluded_from: file.exclusion.failed_checks,
             abandoned_ms: (1000.0 * abandoned_secs) as i64,
+            unanswered_ms: UNANSWERED_MS,
         };
         let page = json!({
             "title": file.title,
@@ -70,7 +76,12 @@ impl ServedStudy {
             "sound_check": sound_check,
         });
         let (title, languages, return_url) = (file.title, file.languages, file.return_url);
-        Ok(Self { title, languages, plan, plan_hash, quota, return_url, page, films })
+        let requires_id = file.require_id;
+        let mut study = Self { title, languages, plan, plan_hash, quota, requires_id, return_url, page, films };
+        let first_trials = study.plan.sessions.iter().filter_map(|session| session.trials.first());
+        let first_ms = first_trials.map(|trial| study.least_ms(trial)).max().unwrap_or(0);
+        study.quota.unanswered_ms += 2 * first_ms;
+        Ok(study)
     }
 
     /// Film of that opaque name; no other file is served.

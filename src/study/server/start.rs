@@ -1,5 +1,6 @@
 //! A study's server from its folder to its end, and its addresses.
 
+use super::clock::Clock;
 use super::host::{AllowedHosts, check_host};
 use super::limits::RateLimits;
 use super::reply::{HEADERS, not_found, text_reply, wrong_method};
@@ -10,6 +11,7 @@ use crate::folder::StudyFolder;
 use crate::pages::assets::ASSETS;
 use crate::seal::StudySeal;
 use crate::store::writer::ResponseStore;
+use crate::store::{database, participants};
 use anyhow::{Context, Result};
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
@@ -19,7 +21,7 @@ use axum::routing::{get, post};
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::thread::JoinHandle;
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
 use tower_http::set_header::SetResponseHeaderLayer;
@@ -36,12 +38,7 @@ pub struct App {
     pub store: ResponseStore,
     pub secret: StudySecret,
     pub limits: RateLimits,
-}
-
-/// Milliseconds since 1970.
-pub fn now_ms() -> i64 {
-    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
-    since.map_or(0, |since| since.as_millis() as i64)
+    pub clock: Clock,
 }
 
 /// Server of one study, not listening yet.
@@ -61,7 +58,9 @@ impl StudyServer {
         let study = ServedStudy::open(folder, abandoned_secs)?;
         let secret = StudySecret::open(&folder.secret())?;
         let (store, writer) = ResponseStore::open(&folder.responses(), &study.plan_hash)?;
-        Ok(Self { app: App { study, store, secret, limits: RateLimits::new() }, writer })
+        let latest_ms = participants::latest_ms(&database::open_to_read(&folder.responses())?)?;
+        let (limits, clock) = (RateLimits::new(), Clock::start(latest_ms));
+        Ok(Self { app: App { study, store, secret, limits, clock }, writer })
     }
 
     pub fn study(&self) -> &ServedStudy {

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 /// What recruiting sites give along (Prolific, Mechanical Turk).
 pub const PARAMETERS: [&str; 6] = ["PROLIFIC_PID", "STUDY_ID", "SESSION_ID", "workerId", "assignmentId", "hitId"];
 
-/// Those of them that name a person.
+/// Those of them that are the ID of a person.
 const PERSON: [&str; 2] = ["PROLIFIC_PID", "workerId"];
 
 /// Where a participant stands.
@@ -101,8 +101,10 @@ pub struct Quota {
     pub wanted: u32,
     /// Failed attention checks from which on a participant is excluded.
     pub excluded_from: Option<u32>,
-    /// Milliseconds without an answer after which a place is given again.
+    /// Milliseconds without a further answer after which a place is given again.
     pub abandoned_ms: i64,
+    /// Milliseconds without the first answer after which a place is given again, if `abandoned_ms` is not less.
+    pub unanswered_ms: i64,
 }
 
 /// How many participants there are, by how far they came.
@@ -126,7 +128,11 @@ impl Quota {
     /// Whether `participant` has a place that nobody else may take.
     fn holds(&self, participant: &Participant, now_ms: i64) -> bool {
         match participant.status {
-            Status::Active => now_ms - participant.given_ms < self.abandoned_ms,
+            Status::Active => {
+                let is_unanswered = participant.position == 0;
+                let most_ms = if is_unanswered { self.unanswered_ms } else { i64::MAX }.min(self.abandoned_ms);
+                now_ms - participant.given_ms < most_ms
+            }
             Status::Completed => self.excluded_from.is_none_or(|least| participant.failed_checks < least),
             Status::Replaced => false,
         }
@@ -159,43 +165,60 @@ pub struct NewParticipant {
 }
 
 impl NewParticipant {
-    /// Whether the recruiting site gives the same person along.
+    /// IDs that a recruiting site gave, by their parameter.
+    fn ids(&self) -> impl Iterator<Item = (&str, &String)> {
+        PERSON.into_iter().filter_map(|name| Some((name, self.parameters.get(name).filter(|id| !id.is_empty())?)))
+    }
+
+    /// Whether a recruiting site gave an ID.
+    pub fn has_id(&self) -> bool {
+        self.ids().next().is_some()
+    }
+
+    /// Whether `participant` has the same ID.
     fn is(&self, participant: &Participant) -> bool {
-        PERSON.iter().any(|name| {
-            let person = self.parameters.get(*name).filter(|person| !person.is_empty());
-            person.is_some() && person == participant.parameters.get(*name)
-        })
+        self.ids().any(|(name, id)| participant.parameters.get(name) == Some(id))
     }
 }
 
-/// Gives the first free session to `newcomer`; whoever had abandoned it is replaced. Who comes again by the name that the
-/// recruiting site gives along is the participant of before. `None`: the study has all the participants wanted.
-pub fn begin(
-    db: &Connection,
-    newcomer: &NewParticipant,
-    quota: Quota,
-    now_ms: i64,
-) -> rusqlite::Result<Option<Participant>> {
-    let all = all(db)?;
-    if let Some(known) = all.iter().find(|participant| newcomer.is(participant)) {
-        return Ok(Some(known.clone()));
+/// What became of a request to begin.
+#[derive(Clone, Debug, PartialEq)]
+pub enum BeginOutcome {
+    Begun(Participant),
+    /// A session with answers has the same ID; only its token opens it, because anybody can send an ID.
+    Known,
+    /// The study has all the participants wanted.
+    Full,
+}
+
+/// Gives the first free session to `newcomer`; whoever had abandoned it is replaced. A session of the same ID that has no
+/// answer yet is given up for the new one: the page may have been opened in another browser, or the reply was lost.
+///
+/// # Errors
+/// A database that fails; nothing is stored.
+pub fn begin(db: &Connection, newcomer: &NewParticipant, quota: Quota, now_ms: i64) -> rusqlite::Result<BeginOutcome> {
+    let (own, others): (Vec<_>, Vec<_>) = all(db)?.into_iter().partition(|participant| newcomer.is(participant));
+    let is_current = |participant: &Participant| participant.status != Status::Replaced;
+    let own: Vec<Participant> = own.into_iter().filter(is_current).collect();
+    if own.iter().any(|participant| participant.position > 0) {
+        return Ok(BeginOutcome::Known);
     }
-    let holders = all.into_iter().filter(|participant| quota.holds(participant, now_ms));
+    let holders = others.into_iter().filter(|participant| quota.holds(participant, now_ms));
     let taken: BTreeSet<u32> = holders.map(|participant| participant.session).collect();
-    let Some(session) = (0..quota.n_sessions).find(|session| !taken.contains(session)) else { return Ok(None) };
-    if taken.len() >= quota.wanted as usize {
-        return Ok(None);
-    }
+    let free = (0..quota.n_sessions).find(|session| !taken.contains(session));
+    let Some(session) = free.filter(|_| taken.len() < quota.wanted as usize) else { return Ok(BeginOutcome::Full) };
     let (replaced, active) = (Status::Replaced, Status::Active);
-    db.execute(
-        "UPDATE participant SET status = ?1 WHERE session = ?2 AND status = ?3",
-        params![replaced, session, active],
-    )?;
+    for given_up in own.iter().map(|participant| participant.session).chain([session]) {
+        db.execute(
+            "UPDATE participant SET status = ?1 WHERE session = ?2 AND status = ?3",
+            params![replaced, given_up, active],
+        )?;
+    }
     let parameters = serde_json::to_string(&newcomer.parameters).unwrap_or_default();
     let sql =
         format!("INSERT INTO participant ({}) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, 0, ?7, 0)", Participant::COLUMNS);
     db.execute(&sql, params![newcomer.id, session, newcomer.language, parameters, newcomer.code, active, now_ms])?;
-    find(db, &newcomer.id)
+    find(db, &newcomer.id)?.map(BeginOutcome::Begun).ok_or(rusqlite::Error::QueryReturnedNoRows)
 }
 
 /// Participant of that name; `None`: never begun, or withdrawn.
@@ -220,7 +243,81 @@ pub fn withdraw(db: &Connection, id: &str) -> rusqlite::Result<bool> {
     Ok(is_known)
 }
 
+/// Latest time in milliseconds since 1970 at which a participant began or answered; 0 without any participant.
+pub fn latest_ms(db: &Connection) -> rusqlite::Result<i64> {
+    let sql = "SELECT COALESCE(MAX(MAX(begun_ms, given_ms)), 0) FROM participant";
+    db.query_row(sql, [], |row| row.get(0))
+}
+
 /// Number of participants who withdrew.
 pub fn n_withdrawn(db: &Connection) -> rusqlite::Result<u32> {
     db.query_row("SELECT CAST(value AS INTEGER) FROM about WHERE name = 'withdrawn'", [], |row| row.get(0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::answers::{GivenAnswer, Recorded, TrialTerms, record};
+    use super::super::database;
+    use super::*;
+    use crate::vote::Response;
+
+    const QUOTA: Quota =
+        Quota { n_sessions: 3, wanted: 2, excluded_from: None, abandoned_ms: 3_600_000, unanswered_ms: 300_000 };
+
+    /// Begins a session `name` with that ID at a recruiting site.
+    fn begin_as(db: &Connection, name: &str, pid: &str, now_ms: i64) -> BeginOutcome {
+        let parameters = BTreeMap::from([("PROLIFIC_PID".to_owned(), pid.to_owned())]);
+        let (id, language) = (name.to_owned(), "en".to_owned());
+        begin(db, &NewParticipant { id, language, parameters, code: String::new() }, QUOTA, now_ms).unwrap()
+    }
+
+    fn session(outcome: &BeginOutcome) -> Option<u32> {
+        if let BeginOutcome::Begun(participant) = outcome { Some(participant.session) } else { None }
+    }
+
+    /// Answers the first trial of the session `name`.
+    fn answer(db: &Connection, name: &str, now_ms: i64) -> Recorded {
+        let response = Response::Number(42);
+        let [stalled_secs, unfocused_secs, response_secs] = [0.0; 3];
+        let given = GivenAnswer { position: 0, response, plays: 1, stalled_secs, unfocused_secs, response_secs };
+        record(db, name, &given, TrialTerms { least_ms: 0, is_last: false, fails_check: false }, now_ms).unwrap()
+    }
+
+    fn status(db: &Connection, name: &str) -> Status {
+        find(db, name).unwrap().unwrap().status
+    }
+
+    #[test]
+    fn an_id_opens_no_session_with_answers_and_gives_up_one_without() {
+        let dir = tempfile::tempdir().unwrap();
+        let db = database::open(&dir.path().join("responses.sqlite"), "plan").unwrap();
+        assert_eq!(session(&begin_as(&db, "first", "p", 1000)), Some(0));
+        assert_eq!(session(&begin_as(&db, "second", "p", 2000)), Some(0), "no place more for the same person");
+        assert_eq!((status(&db, "first"), answer(&db, "first", 3000)), (Status::Replaced, Recorded::Replaced));
+        assert!(matches!(answer(&db, "second", 3000), Recorded::Stored(_)));
+        assert_eq!(begin_as(&db, "third", "p", 4000), BeginOutcome::Known);
+        assert_eq!(begin_as(&db, "third", "p", 4_000_000), BeginOutcome::Known, "abandoned, but not replaced");
+        assert_eq!(session(&begin_as(&db, "other", "q", 4_000_000)), Some(0), "the abandoned place");
+        assert_eq!(session(&begin_as(&db, "third", "p", 4_000_001)), Some(1), "after the place was given away");
+        assert_eq!(status(&db, "other"), Status::Active, "who has that place now keeps it");
+        assert_eq!(begin_as(&db, "last", "r", 4_000_002), BeginOutcome::Full);
+        assert_eq!(latest_ms(&db).unwrap(), 4_000_001);
+    }
+
+    #[test]
+    fn a_session_without_an_answer_is_given_again_after_minutes() {
+        let dir = tempfile::tempdir().unwrap();
+        let db = database::open(&dir.path().join("responses.sqlite"), "plan").unwrap();
+        assert_eq!(latest_ms(&db).unwrap(), 0);
+        for name in ["silent", "answers"] {
+            assert!(session(&begin_as(&db, name, "", 0)).is_some());
+        }
+        assert!(matches!(answer(&db, "answers", 10_000), Recorded::Stored(_)));
+        assert_eq!(begin_as(&db, "early", "", 299_999), BeginOutcome::Full);
+        let counts = QUOTA.count(&all(&db).unwrap(), 0, 300_000);
+        assert_eq!((counts.active, counts.abandoned), (1, 1));
+        assert!(matches!(answer(&db, "silent", 300_000), Recorded::Stored(_)), "late, but the place is not given away");
+        assert_eq!(begin_as(&db, "later", "", 3_609_999), BeginOutcome::Full, "an answer holds it for an hour");
+        assert_eq!(session(&begin_as(&db, "last", "", 3_610_000)), Some(1));
+    }
 }

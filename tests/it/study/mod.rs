@@ -6,6 +6,7 @@ mod coverage;
 mod films;
 mod pages;
 mod serve;
+mod serve_begin;
 mod serve_busy;
 mod serve_crowd;
 mod serve_hostile;

@@ -1,7 +1,7 @@
 //! Whole sessions of every design in a real browser, against the real server: by keys alone and by touch alone, light and
 //! dark, with a reload, a lost network, a look away and a withdrawal; axe-core looks at every step.
 
-use crate::fixtures::served_study::MadeStudy;
+use crate::fixtures::served_study::{Client, MadeStudy, fitting};
 use orator_study::plan::{PlannedTask, StudyPlan, TaskDesign, Trial, TrialPhase};
 use orator_study::seal::StudySeal;
 use orator_study::vote::{Response, ScreenSide};
@@ -127,4 +127,63 @@ fn a_session_by_keys_and_one_by_touch_are_stored_as_they_were_answered() {
     assert_eq!((plays(1), plays(11)), (1, 2), "the reload in the middle of a film counts as a play");
     // A second, as far as the film still played when another page came to the front.
     assert!(votes[1]["unfocused_secs"].as_f64().unwrap() >= 0.3, "{}", votes[1]);
+}
+
+/// What a script of the folder `browser` prints, run with these arguments.
+fn script(driver: &Path, name: &str, args: &[&str]) -> Value {
+    let mut command = Command::new("node");
+    command.arg(format!("tests/it/study/browser/{name}.mjs")).args(args).env("ORATOR_DRIVER", driver);
+    let done = command.output().unwrap();
+    assert!(done.status.success(), "{name}: {}", String::from_utf8_lossy(&done.stderr));
+    serde_json::from_slice(&done.stdout).unwrap()
+}
+
+#[test]
+fn a_browser_resumes_by_its_token_and_another_by_the_operators_link() {
+    let Some(driver) = browser_driver() else { return };
+    if Command::new("chromium").arg("--version").output().is_err() {
+        return skip("no browser is installed (package chromium)");
+    }
+    let made = MadeStudy::new(3, 3, 4, 5).requiring_id();
+    let served = made.serve(&[]);
+    let page = |more: &str| format!("http://{}/{more}", served.address);
+    let visit = |url: &str| script(&driver, "visit", &["--url", url]);
+    let seen = |headings: [&str; 2], begins: u32| json!({ "headings": headings, "begins": begins, "fragment": "" });
+    assert_eq!(visit(&page("")), seen(["Your participant ID is missing", "Taking part"], 1));
+    let recruited = page("?PROLIFIC_PID=p1");
+    assert_eq!(visit(&recruited), seen(["Which one is real?", "Welcome back"], 1));
+
+    let operator = Client { token: served.operator_token.clone(), ..Client::new() };
+    let progress = operator.get(&served.address, "/api/operator").unwrap().1;
+    let token = progress["participants"][0]["token"].as_str().unwrap().to_owned();
+    let first = Client { token, ..Client::new() };
+    assert_eq!(first.answer(&served.address, 0, &fitting(0, true)).unwrap().0, 200);
+    assert_eq!(visit(&recruited), seen(["You have begun already", "Taking part"], 1));
+
+    // Another participant, who fails the attention check.
+    let mut inattentive = Client::new();
+    inattentive.begin(&served.address, "p2").unwrap();
+    for position in 0..4 {
+        assert_eq!(inattentive.answer(&served.address, position, &fitting(position, false)).unwrap().0, 200);
+    }
+    let shown = script(&driver, "operator", &["--url", &page("operator"), "--token", &served.operator_token]);
+    assert_eq!((&shown["findings"], &shown["problems"]), (&json!([]), &json!([])));
+    let quota = [
+        ["Participants wanted", "3"],
+        ["Completed", "0"],
+        ["Taking part now", "1"],
+        ["Without an answer for too long; their places are free", "0"],
+        ["Completed with too many failed attention checks", "1"],
+        ["Whose place was given to another", "0"],
+        ["Withdrawn, their data deleted", "0"],
+        ["Answers stored", "5"],
+        ["Trials with a stalled film", "5"],
+        ["Seconds stalled in all", "1"],
+    ];
+    assert_eq!(shown["quota"], json!(quota));
+    let places = shown["places"].as_array().unwrap();
+    assert_eq!((&places[0][0], &places[0][1], &places[0][2]), (&json!("1"), &json!("active"), &json!("1 of 4")));
+    assert_eq!((&places[1][1], &places[1][4]), (&json!("completed"), &json!("")));
+    let link = shown["links"][0].as_str().unwrap();
+    assert_eq!(visit(link), seen(["Welcome back", "Welcome back"], 0));
 }

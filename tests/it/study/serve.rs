@@ -80,10 +80,7 @@ fn places_are_given_in_order_and_those_of_who_left_again() {
     for position in 0..3 {
         assert_eq!(clients[1].answer(address, position, &fitting(position, false)).unwrap().0, 200);
     }
-    // Who comes again from the recruiting site, without the token, goes on where they were.
-    let (status, again) = Client::new().begin(address, "b").unwrap();
-    assert_eq!((status, &again["state"]["position"]), (200, &json!(3)));
-    assert!(again["state"]["completion"]["code"].is_string(), "{again}");
+    assert_eq!(Client::new().begin(address, "b").unwrap().0, 409, "nobody takes part twice");
     assert_eq!(study.exported("participants").len(), 2);
     let mut fourth = Client::new();
     assert_eq!(fourth.begin(address, "d").unwrap().0, 200);
@@ -94,10 +91,10 @@ fn places_are_given_in_order_and_those_of_who_left_again() {
     assert_eq!(fifth.begin(&served.address, "e").unwrap().0, 200, "an abandoned place");
     assert_eq!(clients[2].get(&served.address, "/api/state").unwrap().0, 410, "was given to another");
     assert_eq!(clients[2].answer(&served.address, 0, &fitting(0, true)).unwrap().0, 410);
-    assert_eq!(Client::new().begin(&served.address, "c").unwrap().0, 410, "nobody begins twice");
+    assert_eq!(Client::new().begin(&served.address, "c").unwrap().0, 200, "who was replaced may begin anew");
     let operator = Client { token: served.operator_token.clone(), ..Client::new() };
     let quota = operator.get(&served.address, "/api/operator").unwrap().1["quota"].clone();
-    assert_eq!((&quota["excluded"], &quota["withdrawn"], &quota["replaced"]), (&json!(1), &json!(1), &json!(1)));
+    assert_eq!((&quota["excluded"], &quota["withdrawn"], &quota["replaced"]), (&json!(1), &json!(1), &json!(2)));
 }
 
 #[test]
