@@ -1,7 +1,9 @@
 //! What every other crate builds on, without any foreign library: plain values (`types`), mathematics (`math`), the body
-//! as numbers (`motion`), sound features (`audio`), and how a step runs, is recorded and resumes (`stage`).
+//! as numbers (`motion`), sound features (`audio`), how a step runs, is recorded and resumes (`stage`), and how programs of
+//! others are started (`foreign_program`).
 
 pub mod audio;
+pub mod foreign_program;
 pub mod math;
 pub mod motion;
 pub mod stage;

@@ -173,9 +173,11 @@ impl<'a> Fetcher<'a> {
         }
         let n = self.packages.len();
         let package = self.packages.entry(source.sha256.clone()).or_insert_with(|| {
-            let dir = self.downloads.join(n.to_string());
-            let downloaded = std::fs::create_dir_all(&dir).map_err(Into::into);
-            let downloaded = downloaded.and_then(|()| package::download(source, &dir)).and_then(|file| {
+            // A name of this process: the npm of a fetch that was killed may go on, and must not write in here.
+            let dir = self.downloads.join(format!("{}-{n}", std::process::id()));
+            let made = std::fs::create_dir_all(&dir);
+            let made = made.with_context(|| format!("cannot make the folder {}", dir.display()));
+            let downloaded = made.and_then(|()| package::download(source, &dir)).and_then(|file| {
                 let found = sha256_of(&file)?;
                 ensure!(
                     found.eq_ignore_ascii_case(&source.sha256),

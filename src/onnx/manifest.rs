@@ -1,7 +1,7 @@
 //! `manifest.toml`: the models known, built in and beside the model files. One model's description is in `entry`, what
 //! makes it sound in `check`; `model` opens what is described here.
 
-use super::{ModelEntry, ModelRole, ModelSource, PinnedFile};
+use super::{ModelEntry, ModelRole, PinnedFile};
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -60,8 +60,7 @@ impl Manifest {
             let known = manifest.models[..idx].iter().any(|other| other.id == entry.id);
             ensure!(!known, "model {:?} stands in it twice", entry.id);
         }
-        let files = manifest.runtime.iter().chain(&manifest.words);
-        files.flat_map(|file| &file.sources).try_for_each(ModelSource::check)?;
+        manifest.runtime.iter().chain(&manifest.words).try_for_each(PinnedFile::check)?;
         for entry in &manifest.layouts {
             entry.check().with_context(|| format!("layout {:?}", entry.id))?;
         }
@@ -121,6 +120,7 @@ mod tests {
         assert!(message("sha256 = \"4720", "sha256 = \"x720").contains("64 hex"));
         assert!(message("[1, 3, 320, 320]", "[1, 320, 320]").contains("shape"));
         assert!(message("body = [0, ", "body = [99, ").contains("no output 99"));
+        assert!(message("file = \"wink", "file = \"../wink").contains("plain name"));
         assert!(message("margin = 1.25", "margin = 0.0").contains("go together"));
         assert!(message("person-yolox-nano", "person-rtmdet-nano").contains("twice"));
     }

@@ -4,28 +4,37 @@
 use super::fetch::MAX_BYTES;
 use super::{ModelSource, SourceKind};
 use anyhow::{Context, Result, anyhow, bail, ensure};
+use orator_base::foreign_program::command_in;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
-/// Downloads the file of the package `source` into the empty folder `dir` and gives its path; its bytes are not yet
-/// checked. Errors: no `npm` or `pip`, or what it says.
+/// Downloads the file of the package `source` into the empty folder `dir`, in which `npm` or `pip` works, and gives its
+/// path; its bytes are not yet checked. Errors: no `npm` or `pip`, or what it says.
 pub(crate) fn download(source: &ModelSource, dir: &Path) -> Result<PathBuf> {
-    let folder = dir.to_str().with_context(|| format!("{} is not UTF-8", dir.display()))?;
+    let destination = dir.join("package");
+    let folder = destination.to_str().with_context(|| format!("{} is not UTF-8", dir.display()))?;
+    let cannot_make = || format!("cannot make the folder {folder}");
+    std::fs::create_dir(&destination).with_context(cannot_make)?;
     match source.from {
         SourceKind::Npm => {
+            // `.npmrc` of a project chooses the registry and can send variables to it. npm looks for the project in the
+            // folders above, and for a workspace above that: this one, which has no `.npmrc`, is made the project. With
+            // `--prefix` npm would no longer read the system's own configuration.
+            std::fs::write(dir.join("package.json"), "{}\n").with_context(cannot_make)?;
             let arguments = [
                 "pack",
                 &source.name,
                 "--pack-destination",
                 folder,
                 "--ignore-scripts",
+                "--workspaces=false",
                 "--silent",
                 "--fetch-retries=1",
             ];
-            run(&[&["npm"]], &arguments, "npm is not installed (the Debian package npm)")?;
+            run(dir, &[&["npm"]], &arguments, "npm is not installed (the Debian package npm)")?;
         }
         SourceKind::Pip => {
             let mut arguments = vec!["download", "--no-deps", "--only-binary=:all:", "--quiet", "--retries=1"];
@@ -35,19 +44,20 @@ pub(crate) fn download(source: &ModelSource, dir: &Path) -> Result<PathBuf> {
                 arguments.extend(["--platform", platform]);
             }
             arguments.extend(["--dest", folder, &source.name]);
-            let known: [&[&str]; 2] = [&["pip3"], &["python3", "-m", "pip"]];
-            run(&known, &arguments, "pip is not installed (the Debian package python3-pip)")?;
+            let known: [&[&str]; 2] = [&["pip3"], &["python3", "-I", "-m", "pip"]];
+            run(dir, &known, &arguments, "pip is not installed (the Debian package python3-pip)")?;
         }
         SourceKind::Address => bail!("{} is no package", source.name),
     }
-    let file = std::fs::read_dir(dir)?.next().with_context(|| format!("{source}: nothing was downloaded"))??;
+    let file =
+        std::fs::read_dir(&destination)?.next().with_context(|| format!("{source}: nothing was downloaded"))??;
     Ok(file.path())
 }
 
-/// Runs the first of the programs that is there.
-fn run(programs: &[&[&str]], arguments: &[&str], missing: &str) -> Result<()> {
+/// Runs the first of the programs that is there, in the folder `dir`.
+fn run(dir: &Path, programs: &[&[&str]], arguments: &[&str], missing: &str) -> Result<()> {
     for words in programs {
-        let mut command = Command::new(words[0]);
+        let mut command = command_in(dir, Path::new(words[0]))?;
         let called = command.args(&words[1..]).args(arguments).stdin(Stdio::null()).stdout(Stdio::null()).output();
         match called {
             Ok(output) if output.status.success() => return Ok(()),

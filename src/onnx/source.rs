@@ -3,6 +3,7 @@
 
 use super::convert::SourceFormat;
 use anyhow::{Result, ensure};
+use orator_base::types::file_name::FileName;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -91,6 +92,14 @@ impl fmt::Display for SourceKind {
 impl fmt::Display for ModelSource {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} {}", self.from, self.name)
+    }
+}
+
+impl PinnedFile {
+    /// Says what is wrong with the description.
+    pub(super) fn check(&self) -> Result<()> {
+        ensure!(FileName::new(&self.file).is_ok(), "file must be the plain name of a file: {:?}", self.file);
+        self.sources.iter().try_for_each(ModelSource::check)
     }
 }
 

@@ -183,11 +183,17 @@ impl ModelStore {
         })
     }
 
+    /// Removes the downloads of a fetch that was killed. Errors: they cannot be removed, or belong to a fetch under way.
+    pub fn sweep(&self) -> Result<()> {
+        if self.dir.join(DOWNLOADS).exists() { self.with_downloads(|_| Ok(())) } else { Ok(()) }
+    }
+
     /// Runs `fetch` with an empty path for downloads, while no other fetch writes into the folder.
     fn with_downloads<T>(&self, fetch: impl FnOnce(&Path) -> Result<T>) -> Result<T> {
         let _lock = workdir::lock(&self.dir)?;
         let downloads = self.dir.join(DOWNLOADS);
-        let _ = std::fs::remove_dir_all(&downloads);
+        // What lies there already could be read as configuration.
+        workdir::remove(&downloads).with_context(|| format!("cannot remove {}", downloads.display()))?;
         let fetched = fetch(&downloads);
         let _ = std::fs::remove_dir_all(&downloads);
         fetched

@@ -4,6 +4,7 @@ use super::plan::open;
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::{Context, Result, bail, ensure};
+use orator_base::foreign_program::{command_in, empty_folder};
 use orator_base::stage::workdir;
 use orator_cluster::job::{JobRequest, TaskLimits, shell};
 use orator_cluster::kubernetes::{KubernetesTarget, manifests};
@@ -11,7 +12,8 @@ use orator_cluster::plan::ClusterPlan;
 use orator_cluster::slurm::{self, SlurmSettings};
 use orator_cluster::stage_times::StageTimes;
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::os::unix::fs::PermissionsExt as _;
+use std::path::{Path, PathBuf, absolute};
 use std::process::{Command, Stdio};
 
 /// Start workers on a cluster: write the jobs, and send them.
@@ -144,7 +146,7 @@ impl JobArgs {
         };
         let request = JobRequest {
             program,
-            plan: std::path::absolute(&self.plan)?,
+            plan: absolute(&self.plan)?,
             n_tasks: self.tasks.min(plan.units.len().max(1)),
             n_at_once,
             worker_limits: TaskLimits {
@@ -157,7 +159,7 @@ impl JobArgs {
     }
 
     fn jobs_folder(&self, plan: &ClusterPlan) -> Result<PathBuf> {
-        Ok(std::path::absolute(plan.folder(&self.plan))?.join("jobs"))
+        Ok(absolute(plan.folder(&self.plan))?.join("jobs"))
     }
 
     fn next(&self) -> String {
@@ -224,15 +226,25 @@ fn to_slurm(args: &SlurmArgs, ui: &Ui) -> Result<Outcome> {
 
 /// MaxArraySize of the cluster: indices are below it.
 fn max_array_size() -> Option<usize> {
-    let out = Command::new("scontrol").args(["show", "config"]).output().ok()?;
+    let folder = empty_folder().ok()?;
+    let out = command_in(folder.path(), Path::new("scontrol")).ok()?.args(["show", "config"]).output().ok()?;
     let text = String::from_utf8_lossy(&out.stdout).into_owned();
     let line = text.lines().find(|line| line.trim_start().starts_with("MaxArraySize"))?;
     line.split('=').nth(1)?.trim().parse().ok()
 }
 
-/// Sends a script; the number of its job.
+/// The program of that name in the absolute folders of PATH, in whose place a file of the working directory never comes.
+fn installed(name: &str) -> Option<PathBuf> {
+    let folders = std::env::var_os("PATH")?;
+    let files = std::env::split_paths(&folders).filter(|folder| folder.is_absolute()).map(|folder| folder.join(name));
+    let is_program = |meta: std::fs::Metadata| meta.is_file() && meta.permissions().mode() & 0o111 != 0;
+    files.into_iter().find(|file| file.metadata().is_ok_and(is_program))
+}
+
+/// Sends a script; the number of its job. The working directory is that of the job as well, so sbatch keeps it.
 fn sbatch(options: &[&str], script: &Path) -> Result<String> {
-    let out = Command::new("sbatch").arg("--parsable").args(options).arg(script).output();
+    let program = installed("sbatch").context("there is no sbatch; --dry-run writes the scripts without it")?;
+    let out = Command::new(program).arg("--parsable").args(options).arg(script).output();
     let out = out.context("cannot start sbatch; --dry-run writes the scripts without it")?;
     if !out.status.success() {
         bail!("sbatch refused {}: {}", script.display(), String::from_utf8_lossy(&out.stderr).trim());
@@ -260,7 +272,13 @@ fn to_kubernetes(args: &KubernetesArgs, ui: &Ui) -> Result<Outcome> {
         ui.summary(&text, Some(&next), json!({ "manifests": file, "next": next }));
         return Ok(Outcome::Done);
     }
-    let status = Command::new("kubectl").args(["apply", "-f"]).arg(&file).stdout(Stdio::null()).status();
+    let folder = empty_folder()?;
+    let mut kubectl = command_in(folder.path(), Path::new("kubectl"))?;
+    if let Some(files) = std::env::var_os("KUBECONFIG") {
+        let files = std::env::split_paths(&files).map(|file| absolute(&file).unwrap_or(file));
+        kubectl.env("KUBECONFIG", std::env::join_paths(files)?);
+    }
+    let status = kubectl.args(["apply", "-f"]).arg(&file).stdout(Stdio::null()).status();
     let status = status.context("cannot start kubectl; --dry-run writes the manifests without it")?;
     ensure!(status.success(), "kubectl did not take {}", file.display());
     let text = format!("sent {} workers: {}", request.n_tasks, file.display());
@@ -278,9 +296,10 @@ fn to_ssh(args: &SshArgs, ui: &Ui) -> Result<Outcome> {
         ui.summary(&lines.join("\n"), Some(&next), json!({ "commands": lines, "next": next }));
         return Ok(Outcome::Done);
     }
+    let folder = empty_folder()?;
     let start = |host: &String| {
         // Without a terminal, a worker whose connection is lost works on; its end is seen in the plan's folder.
-        let child = Command::new("ssh")
+        let child = command_in(folder.path(), Path::new("ssh"))?
             .args(["-o", "BatchMode=yes", host, &line])
             .stdin(Stdio::null())
             .stdout(Stdio::null())

@@ -64,17 +64,19 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     match &args.verb {
         WordsVerb::Fetch { mirror } => {
             let table = path_of(&folder, GLOVE);
+            let store = ModelStore::open(&models)?;
             if let Ok(there) = WordVectors::open(&table) {
+                let _ = store.sweep();
                 return Ok(made(&table, &there, "there already", ui));
             }
-            let store = ModelStore::open(&models)?;
+            let terms = store.manifest().words.as_ref().map(|words| words.licence.clone()).unwrap_or_default();
             std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
             let had = store.fetch_words(mirror.as_deref(), ui, |json, source| {
+                // The table comes last: where it is, nothing is missing.
+                workdir::write_file(&table.with_extension("licence.txt"), format!("{terms}\n").as_bytes())?;
                 make(json, &table)?;
                 Ok(source.to_string())
             })?;
-            let terms = store.manifest().words.as_ref().map(|words| words.licence.clone()).unwrap_or_default();
-            workdir::write_file(&table.with_extension("licence.txt"), format!("{terms}\n").as_bytes())?;
             Ok(made(&table, &WordVectors::open(&table)?, &had, ui))
         }
         WordsVerb::Add { file, name } => {

@@ -1,6 +1,7 @@
 """Forced alignment of an English text with its sound by pocketsphinx. Standard input: the number of words, then a line
 each: the word, and the seconds between which it may be said ("-": unknown); then the sound, 16 kHz, 16-bit mono.
-Standard output: a line a word, in order: start, end and confidence, or "-" where the word does not fit.
+Standard output: an empty line when the modules are loaded, then a line a word, in order: start, end and confidence, or
+"-" where the word does not fit.
 
 The sound is taken in pieces of half a minute, so that memory does not grow with it. In a piece the words that come next
 follow one another, or give way, at a price, to any row of phones, behind which any word may go on. The end of a piece
@@ -269,6 +270,7 @@ def bytes_of(secs):
 
 
 def main():
+    print(flush=True)
     source = sys.stdin.buffer
     rows = [source.readline().decode().rstrip("\n").split("\t") for _ in range(int(source.readline()))]
     hints = [tuple(None if secs == "-" else float(secs) for secs in row[1:]) for row in rows]

@@ -1,8 +1,9 @@
 //! The process that aligns: started, fed with words and sound, asked for times.
 
 use anyhow::{Context, Result, bail, ensure};
+use orator_base::foreign_program::{command_in, empty_folder};
 use std::fmt::Write as _;
-use std::io::{ErrorKind, Write};
+use std::io::{ErrorKind, Read as _, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
@@ -40,7 +41,8 @@ impl Aligner {
     pub fn version(python: &Path) -> Result<String> {
         let name = python.display();
         let remedy = remedy();
-        let asked = Command::new(python).args(["-c", ASK]).stdin(Stdio::null()).output();
+        let folder = empty_folder()?;
+        let asked = isolated(python, ASK, folder.path())?.stdin(Stdio::null()).output();
         let output = match asked {
             Ok(output) => output,
             Err(error) if error.kind() == ErrorKind::NotFound => bail!("there is no Python `{name}`: {remedy}"),
@@ -58,9 +60,13 @@ impl Aligner {
     /// Starts the process by the interpreter `python`. Errors: as of `version`.
     pub fn start(python: &Path) -> Result<Self> {
         Self::version(python)?;
-        let mut command = Command::new(python);
-        command.args(["-c", DRIVER]).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        let process = command.spawn().with_context(|| format!("cannot run {}", python.display()))?;
+        let folder = empty_folder()?;
+        let mut command = isolated(python, DRIVER, folder.path())?;
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut process = command.spawn().with_context(|| format!("cannot run {}", python.display()))?;
+        // The driver's first byte reports that its modules are loaded: the folder can be removed, before this process may
+        // restrict itself. Without that byte the process has ended, which `align` reports.
+        let _ = process.stdout.as_mut().map(|stdout| stdout.read_exact(&mut [0]));
         Ok(Self { process, python: python.to_owned() })
     }
 
@@ -104,6 +110,13 @@ impl Aligner {
         ensure!(times.len() == words.len(), "the aligner gave {} words of {}", times.len(), words.len());
         Ok(times)
     }
+}
+
+/// Python in isolated mode (no variables PYTHON*, no user site, no module of the working directory), in an empty folder.
+fn isolated(python: &Path, code: &str, folder: &Path) -> Result<Command> {
+    let mut command = command_in(folder, python)?;
+    command.args(["-I", "-c", code]);
+    Ok(command)
 }
 
 /// What gets the package, and how its interpreter is named.

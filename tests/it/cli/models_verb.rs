@@ -1,7 +1,7 @@
 //! `orator models` as a user meets it: list, fetch from a folder, check, add, and what goes wrong.
 
 use crate::fixtures::onnx_models::models;
-use orator_onnx::{Manifest, sha256_of};
+use crate::fixtures::source_models::packages::{package_models, stand_in};
 use orator_test_support::skip::real_data;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -80,56 +80,6 @@ fn a_mirror_of_what_a_model_is_made_of_will_do() {
     assert!(read(&dir) == read(store.dir()), "one model, one result");
 }
 
-/// A models folder whose manifest has one model: the marker person, from an address that is gone, then from packages.
-fn package_models(dir: &Path, order: &[&str]) -> String {
-    let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/marker_person.onnx");
-    let sha256 = sha256_of(&model).unwrap();
-    let kept = dir.join("package");
-    std::fs::create_dir_all(&kept).unwrap();
-    std::fs::copy(&model, kept.join("person.onnx")).unwrap();
-    std::fs::write(kept.join("LICENSE"), "as you like").unwrap();
-    let run = |program: &str, arguments: &[&str]| {
-        assert!(Command::new(program).args(arguments).current_dir(dir).status().unwrap().success());
-    };
-    run("tar", &["-czf", "host-1.tgz", "package"]);
-    run(
-        "python3",
-        &[
-            "-c",
-            "import zipfile; z = zipfile.ZipFile('host-1.whl', 'w'); z.write('package/person.onnx'); z.write('package/LICENSE')",
-        ],
-    );
-    let source = |from: &str| {
-        let (name, file) = match from {
-            "npm" => ("host@1", "host-1.tgz"),
-            "pip" => ("host==1", "host-1.whl"),
-            _ => ("http://127.0.0.1:9/", ""),
-        };
-        let pin = if file.is_empty() { String::new() } else { sha256_of(&dir.join(file)).unwrap() };
-        format!(
-            "[[model.source]]\nfrom = {from:?}\nname = {name:?}\nsha256 = {pin:?}\n\
-             files = [{{ path = \"package/person.onnx\", sha256 = {sha256:?} }}]\nlicence = \"package/LICENSE\"\n"
-        )
-    };
-    let mut entry = Manifest::builtin().unwrap().get("person-marker").unwrap().clone();
-    (entry.id, entry.conversion) = ("person-packed".into(), None);
-    let own = Manifest { models: vec![entry], ..Manifest::default() };
-    toml::to_string(&own).unwrap() + &order.iter().map(|from| source(from)).collect::<String>()
-}
-
-/// A program on the search path that stands for npm or pip: it copies `file` to where it is told.
-fn stand_in(dir: &Path, name: &str, file: &Path) {
-    use std::os::unix::fs::PermissionsExt;
-    let option = if name == "npm" { "--pack-destination" } else { "--dest" };
-    let script = format!(
-        "#!/bin/sh\necho called >> {log}\nwhile [ \"$1\" != {option} ]; do shift; done\ncp {file} \"$2\"\n",
-        log = dir.join("calls").display(),
-        file = file.display()
-    );
-    std::fs::write(dir.join(name), script).unwrap();
-    std::fs::set_permissions(dir.join(name), std::fs::Permissions::from_mode(0o755)).unwrap();
-}
-
 #[test]
 fn the_first_source_that_answers_is_taken() {
     let root = tempfile::tempdir().unwrap();
@@ -139,7 +89,7 @@ fn the_first_source_that_answers_is_taken() {
     }
     let fetch = |order: &[&str]| {
         std::fs::write(dir.join("manifest.toml"), package_models(root.path(), order)).unwrap();
-        let _ = std::fs::remove_file(dir.join("marker_person.onnx"));
+        let _ = std::fs::remove_file(dir.join("packed_person.onnx"));
         let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
         command.args(["models", "fetch", "person-packed", "--models-dir"]).arg(&dir);
         let path = format!("{}:/usr/bin:/bin", bin.display());
@@ -152,16 +102,16 @@ fn the_first_source_that_answers_is_taken() {
     assert!(reasons.iter().all(|reason| message.contains(reason)), "{message}");
 
     for (from, file) in [("npm", "host-1.tgz"), ("pip", "host-1.whl")] {
-        stand_in(&bin, if from == "npm" { "npm" } else { "pip3" }, &root.path().join(file));
+        stand_in(&bin, if from == "npm" { "npm" } else { "pip3" }, root.path().join(file).to_str().unwrap());
         let had = fetch(&["address", from]);
         assert_eq!(had.status.code(), Some(0), "{}", said(&had));
         assert!(said(&had).contains(if from == "npm" { "npm package host@1" } else { "PyPI package host==1" }));
-        let licence = std::fs::read_to_string(dir.join("marker_person.licence.txt")).unwrap();
+        let licence = std::fs::read_to_string(dir.join("packed_person.licence.txt")).unwrap();
         assert!(licence.contains("as you like") && licence.contains("licence MIT"), "{licence}");
         assert!(!dir.join(".downloads").exists());
     }
     std::fs::write(root.path().join("host-1.tgz"), b"another package").unwrap();
-    std::fs::remove_file(dir.join("marker_person.onnx")).unwrap();
+    std::fs::remove_file(dir.join("packed_person.onnx")).unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
     command.args(["models", "fetch", "person-packed", "--models-dir"]).arg(&dir);
     let wrong = command.env("PATH", format!("{}:/usr/bin:/bin", bin.display())).output().unwrap();

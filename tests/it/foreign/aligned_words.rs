@@ -30,7 +30,7 @@ const OTHER: &str = "the committee met on tuesday to consider a proposal from th
 /// Words said, with the beginning and the end of each, where the voice tells them.
 struct Speech {
     dir: tempfile::TempDir,
-    packages: PathBuf,
+    python: PathBuf,
     words: Vec<(String, Option<f64>, Option<f64>)>,
 }
 
@@ -55,7 +55,8 @@ impl Speech {
             (word["word"].as_str().unwrap().to_owned(), word["start_secs"].as_f64(), word["end_secs"].as_f64())
         });
         let words = words.collect();
-        Some(Self { dir, packages, words })
+        let python = python_with(&packages, dir.path());
+        Some(Self { dir, python, words })
     }
 
     fn path(&self, name: &str) -> PathBuf {
@@ -65,7 +66,7 @@ impl Speech {
     /// What `orator align` makes of a text of this speech.
     fn aligned(&self, file: &str, text: impl AsRef<[u8]>) -> Result<Transcript, String> {
         std::fs::write(self.path(file), text).unwrap();
-        let output = align(&self.packages, &self.path("said.wav"), &self.path(file), &self.path("out.words.json"));
+        let output = align(&self.python, &self.path("said.wav"), &self.path(file), &self.path("out.words.json"));
         if !output.status.success() {
             return Err(String::from_utf8_lossy(&output.stderr).into_owned());
         }
@@ -73,10 +74,20 @@ impl Speech {
     }
 }
 
-fn align(packages: &Path, sound: &Path, text: &Path, out: &Path) -> Output {
+/// The Python of a new virtual environment in `dir` that has these packages: Python is run without PYTHONPATH.
+fn python_with(packages: &Path, dir: &Path) -> PathBuf {
+    let environment = dir.join("environment");
+    let made = Command::new("python3").args(["-m", "venv", "--without-pip"]).arg(&environment).status().unwrap();
+    assert!(made.success(), "python3 -m venv");
+    let version = std::fs::read_dir(environment.join("lib")).unwrap().next().unwrap().unwrap().path();
+    std::fs::write(version.join("site-packages/aligner.pth"), packages.to_str().unwrap()).unwrap();
+    environment.join("bin/python")
+}
+
+fn align(python: &Path, sound: &Path, text: &Path, out: &Path) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
     command.arg("align").args([sound, text]).arg("--out").arg(out);
-    command.env("PYTHONPATH", packages).env("ORATOR_PYTHON", "python3").output().unwrap()
+    command.env("ORATOR_PYTHON", python).output().unwrap()
 }
 
 /// Errors of the boundaries of aligned words in seconds, in order of size; `known` of each word, `None` for a wrong one.
@@ -175,9 +186,9 @@ fn what_cannot_be_aligned_is_refused_with_its_place() {
     let mut silent = std::fs::read(speech.path("said.wav")).unwrap();
     silent[44..].fill(0);
     std::fs::write(speech.path("silent.wav"), silent).unwrap();
-    let output = align(&speech.packages, &speech.path("silent.wav"), &speech.path("text.txt"), &out);
+    let output = align(&speech.python, &speech.path("silent.wav"), &speech.path("text.txt"), &out);
     assert!(String::from_utf8_lossy(&output.stderr).contains("it is silent") && !out.exists());
-    let output = align(&speech.packages, &speech.path("text.txt"), &speech.path("text.txt"), &out);
+    let output = align(&speech.python, &speech.path("text.txt"), &speech.path("text.txt"), &out);
     assert!(!output.status.success() && !out.exists());
 }
 

@@ -1,12 +1,14 @@
-//! Kills, memory, bad and hostile input, lost output, privacy, programs side by side, the processes in which videos are
-//! read.
+//! Kills, memory, bad and hostile input, lost output, privacy, programs side by side, programs of others, the
+//! processes in which videos are read.
 
 pub(crate) mod bad_input;
 pub(crate) mod earlier_versions;
 pub(crate) mod faults;
+pub(crate) mod foreign_programs;
 pub(crate) mod full_disk;
 pub(crate) mod hostile_files;
 pub(crate) mod kill;
+pub(crate) mod killed_fetch;
 pub(crate) mod memory;
 pub(crate) mod output;
 pub(crate) mod parts;

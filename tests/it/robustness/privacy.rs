@@ -2,6 +2,7 @@
 //! `orator study serve` is the one verb that listens, which is its purpose; it connects to nobody.
 
 use crate::fixtures::faults::scenes::{SCENES, copy, prepare, set_up};
+use crate::fixtures::faults::shim::path_with;
 use orator_test_support::skip::skip;
 use std::path::{Component, Path};
 use std::process::{Command, Stdio};
@@ -12,8 +13,9 @@ const CALLS: &str = "trace=socket,connect,sendto,openat,openat2,creat,mkdir,mkdi
 
 /// Runs a verb under strace in `dir` and gives the calls that open a socket or write outside of it.
 fn calls_outside(dir: &Path, args: &[&str]) -> Vec<String> {
-    let home = dir.join("home");
-    std::fs::create_dir_all(&home).unwrap();
+    // Python starts in an empty folder of temporary files, which goes.
+    let [home, temporary] = ["home", "temporary"].map(|name| dir.join(name));
+    [&home, &temporary].into_iter().for_each(|folder| std::fs::create_dir_all(folder).unwrap());
     let trace = dir.join("trace.txt");
     let mut command = Command::new("strace");
     command
@@ -21,10 +23,14 @@ fn calls_outside(dir: &Path, args: &[&str]) -> Vec<String> {
         .arg(&trace)
         .arg(env!("CARGO_BIN_EXE_orator"))
         .args(args);
+    command.env("PATH", path_with(&dir.join("bin"))).env("TMPDIR", &temporary);
     command.env("HOME", &home).env_remove("XDG_CACHE_HOME").current_dir(dir);
     let status = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).status().unwrap();
     assert_eq!(status.code(), Some(0), "{args:?}");
-    assert_eq!(std::fs::read_dir(&home).unwrap().count(), 0, "{args:?} wrote into the home folder");
+    for folder in [&home, &temporary] {
+        let n_files = std::fs::read_dir(folder).unwrap().count();
+        assert_eq!(n_files, 0, "{args:?} left files in {}", folder.display());
+    }
     let trace = std::fs::read_to_string(trace).unwrap();
     let outside = trace.lines().filter(|line| is_outside(line, dir));
     outside.map(str::to_owned).collect()
