@@ -1,4 +1,5 @@
-//! A long video is worked on in spans, by one worker, by two of a run, and by two of a plan: the same bytes each time.
+//! A long video is worked on in spans, by one worker, by two of a run, and by two of a plan, which are killed: the same
+//! bytes each time.
 
 use crate::fixtures::clips;
 use crate::fixtures::faults::plan_workers::{epochs, worker, written};
@@ -58,10 +59,24 @@ fn a_long_video_is_shared_and_its_bytes_are_those_of_one_worker() {
     let Some(planned) = project("planned") else { return };
     let plan = planned.answer(&["plan", "--untimed", "--piece", "2"]);
     assert_eq!((plan.code, &plan.json["units"]), (0, &json!(4)), "{}", plan.errors);
-    let workers = [worker(&planned), worker(&planned)];
+    // Each of two workers is killed once: one when the first stage is done and spans are shared, the other when a span is.
+    let mut workers = [worker(&planned), worker(&planned)];
+    let begun = |project: &Project| files_under(&project.work()).iter().any(|(name, _)| name.contains(".parts/"));
+    let steps: [&dyn Fn(&Project) -> bool; 2] = [&begun, &done];
+    for (at, is_reached) in steps.into_iter().enumerate() {
+        while !is_reached(&planned) {
+            assert!(workers[at].try_wait().unwrap().is_none(), "it ended before it was killed");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        workers[at].kill().unwrap();
+        workers[at].wait().unwrap();
+        workers[at] = worker(&planned);
+    }
     for mut worker in workers {
         assert!(worker.wait().unwrap().success());
     }
+    let taken_over = epochs(&planned.work(), "claim").values().filter(|epoch| **epoch > 1).count();
+    assert!(taken_over > 0, "no killed worker had a unit");
     assert_eq!(epochs(&planned.work(), "end").len(), 4);
     let status = planned.answer(&["status", "--plan", "work/plan.json"]).json;
     assert!((status["ended_media_secs"].as_f64().unwrap() - status["media_secs"].as_f64().unwrap()).abs() < 1e-6);
