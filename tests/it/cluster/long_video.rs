@@ -5,8 +5,10 @@ use crate::fixtures::clips;
 use crate::fixtures::faults::plan_workers::{epochs, worker, written};
 use orator_formats::timeline_npz::Timeline;
 use orator_test_support::project::{Project, files_under};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::process::Child;
 use std::time::Duration;
 
 /// A project with one video of 190 s at 2 pictures a second: a clip of 10 s over and over.
@@ -28,6 +30,21 @@ fn project(name: &str) -> Option<Project> {
 fn spans(project: &Project) -> usize {
     let timeline = files_under(&project.work()).into_iter().find(|(name, _)| name.ends_with("timeline.npz")).unwrap().1;
     Timeline::read(&timeline).unwrap().spans().len()
+}
+
+/// The worker that has a unit in hand.
+fn holder(project: &Project, workers: &[Child]) -> Option<usize> {
+    let files: BTreeMap<String, PathBuf> = files_under(&project.work()).into_iter().collect();
+    let open = files
+        .iter()
+        .filter(|(name, _)| name.contains(".claim.") && !files.contains_key(&name.replace("claim.", "end.")));
+    let mut holders = open.filter_map(|(_, path)| {
+        let claim: Value = serde_json::from_slice(&std::fs::read(path).ok()?).ok()?;
+        // HOST-PROCESS-NUMBER-NONCE
+        let process: u32 = claim["worker"].as_str()?.rsplit('-').nth(2)?.parse().ok()?;
+        workers.iter().position(|worker| worker.id() == process)
+    });
+    holders.next()
 }
 
 #[test]
@@ -59,15 +76,21 @@ fn a_long_video_is_shared_and_its_bytes_are_those_of_one_worker() {
     let Some(planned) = project("planned") else { return };
     let plan = planned.answer(&["plan", "--untimed", "--piece", "2"]);
     assert_eq!((plan.code, &plan.json["units"]), (0, &json!(4)), "{}", plan.errors);
-    // Each of two workers is killed once: one when the first stage is done and spans are shared, the other when a span is.
+    // Two workers are killed with a unit in hand: one when spans are shared, another when one of them is done.
     let mut workers = [worker(&planned), worker(&planned)];
     let begun = |project: &Project| files_under(&project.work()).iter().any(|(name, _)| name.contains(".parts/"));
     let steps: [&dyn Fn(&Project) -> bool; 2] = [&begun, &done];
-    for (at, is_reached) in steps.into_iter().enumerate() {
-        while !is_reached(&planned) {
-            assert!(workers[at].try_wait().unwrap().is_none(), "it ended before it was killed");
+    for is_reached in steps {
+        let at = loop {
+            assert!(
+                workers.iter_mut().all(|worker| worker.try_wait().unwrap().is_none()),
+                "it ended before it was killed"
+            );
+            if let Some(at) = Some(()).filter(|()| is_reached(&planned)).and_then(|()| holder(&planned, &workers)) {
+                break at;
+            }
             std::thread::sleep(Duration::from_millis(20));
-        }
+        };
         workers[at].kill().unwrap();
         workers[at].wait().unwrap();
         workers[at] = worker(&planned);

@@ -170,7 +170,7 @@ fn a_worker_that_is_asked_to_end_with_all_its_processes_finishes_its_unit() {
 #[test]
 fn eight_workers_at_once_do_every_unit_once() {
     let n_clips = 8;
-    let project = Project::with_clips("eight", n_clips, 1.0);
+    let project = Project::with_clips("eight", n_clips, 4.6);
     assert_eq!(project.answer(&["plan", "--untimed"]).code, 0);
     let workers: Vec<Child> = (0..8).map(|_| worker(&project)).collect();
     for mut worker in workers {
