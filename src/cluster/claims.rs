@@ -10,7 +10,7 @@ use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 /// Units whose files share a folder: a listing stays short.
@@ -43,18 +43,31 @@ impl Claim {
         format!("{}/{unit:06}.{kind}.{epoch:04}", folder_name(unit / PER_FOLDER))
     }
 
-    /// The worker that made it; `None`: it is not visible yet.
-    pub fn read_owner(self, folder: &impl SharedFolder) -> Result<Option<String>> {
-        let bytes = folder.read(&self.file("claim"))?;
-        let claim: Option<ClaimFile> = bytes.and_then(|bytes| serde_json::from_slice(&bytes).ok());
-        Ok(claim.map(|claim| claim.worker))
+    /// The worker that made it.
+    pub fn read_owner(self, folder: &impl SharedFolder) -> Result<ClaimOwner> {
+        let file = self.file("claim");
+        let Some(bytes) = folder.read(&file)? else { return Ok(ClaimOwner::NotVisible) };
+        let claim = serde_json::from_slice(&bytes).map(|claim: ClaimFile| claim.worker);
+        Ok(claim.map_or(ClaimOwner::Unreadable(file), ClaimOwner::Worker))
     }
 
-    /// How the unit ended under it; `None`: it has not, as far as is visible.
+    /// How the unit ended under it; `None`: it has not, as far as is visible. A file that says nothing is a failure.
     pub fn read_end(self, folder: &impl SharedFolder) -> Result<Option<UnitEnd>> {
-        let bytes = folder.read(&self.file("end"))?;
-        Ok(bytes.and_then(|bytes| serde_json::from_slice(&bytes).ok()))
+        let file = self.file("end");
+        let damaged =
+            || UnitEnd { worker: String::new(), error: Some(format!("{file} does not say how it ended")), secs: 0.0 };
+        Ok(folder.read(&file)?.map(|bytes| serde_json::from_slice(&bytes).unwrap_or_else(|_| damaged())))
     }
+}
+
+/// Whom the file of a claim names.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum ClaimOwner {
+    /// The file is not visible yet.
+    NotVisible,
+    Worker(String),
+    /// What has the name of the file, given here, is none or names no worker; nobody made it as a claim.
+    Unreadable(String),
 }
 
 /// Content of a claim's file.
@@ -89,9 +102,14 @@ fn folder_name(folder: usize) -> String {
     format!("claims/{folder:04}")
 }
 
-/// Unit and state by the name of a file in its folder; none: another file.
+/// Unit and state by the name of a file in its folder; none: another file. A unit is held by whatever has the name of a
+/// claim, but has not ended by what is no file.
 fn parsed(name: &str) -> Option<(usize, ClaimState)> {
-    let mut parts = name.split('.');
+    let file = name.strip_suffix('/');
+    if file.is_some_and(|name| name.contains(".end.")) {
+        return None;
+    }
+    let mut parts = file.unwrap_or(name).split('.');
     let (unit, kind, epoch) = (parts.next()?, parts.next()?, parts.next()?);
     let is_known = matches!(kind, "claim" | "end") && parts.next().is_none();
     let state = ClaimState { epoch: epoch.parse().ok()?, has_ended: kind == "end" };
@@ -122,6 +140,8 @@ pub enum NextUnit {
     Claimed(Claim),
     /// Nothing now: other workers have what is left. Ask again after this time.
     Wait(Duration),
+    /// Nothing: all that is left is `Claims::blocked`, or needs what is.
+    Blocked,
     /// Nothing: every unit has ended.
     AllEnded,
 }
@@ -151,6 +171,8 @@ pub struct Claims<'a, F> {
     /// Claims that may be taken over: of failed units, and of dead workers.
     failed: Vec<Claim>,
     left: Vec<Claim>,
+    /// Files in the place of claims and ends, by unit.
+    blocked: BTreeMap<usize, String>,
     /// Known owners of claims.
     owners: BTreeMap<Claim, String>,
     /// Earliest time of the next check for dead workers.
@@ -170,6 +192,7 @@ impl<'a, F: SharedFolder> Claims<'a, F> {
             n_passed: 0,
             failed: Vec::new(),
             left: Vec::new(),
+            blocked: BTreeMap::new(),
             owners: BTreeMap::new(),
             next_check: Duration::ZERO,
             waited: Duration::ZERO,
@@ -187,9 +210,32 @@ impl<'a, F: SharedFolder> Claims<'a, F> {
         if self.options.order.iter().all(|unit| self.states[*unit].has_ended) {
             return Ok(NextUnit::AllEnded);
         }
+        if self.is_stuck() {
+            return Ok(NextUnit::Blocked);
+        }
         let most = self.watch.interval();
         self.waited = (self.waited * 3 / 2).clamp(FIRST_WAIT.min(most), most);
         Ok(NextUnit::Wait(self.waited))
+    }
+
+    /// Units, each with the file in the place of its claim or end that no worker wrote.
+    pub fn blocked(&self) -> &BTreeMap<usize, String> {
+        &self.blocked
+    }
+
+    /// Whether every unit of the order that has not ended is blocked, or needs one that is.
+    fn is_stuck(&self) -> bool {
+        let blocked = self.blocked.keys().copied();
+        let mut stuck: BTreeSet<usize> = blocked.filter(|unit| !self.states[*unit].has_ended).collect();
+        let left = || self.options.order.iter().filter(|unit| !self.states[**unit].has_ended);
+        loop {
+            let needs_one = |unit: &&usize| self.options.needs[**unit].iter().any(|needed| stuck.contains(needed));
+            let more: Vec<usize> = left().filter(|unit| !stuck.contains(unit)).filter(needs_one).copied().collect();
+            if more.is_empty() {
+                return left().all(|unit| stuck.contains(unit));
+            }
+            stuck.extend(more);
+        }
     }
 
     /// The unit that is claimed: one that had failed, else a free one, else one that a dead worker left.
@@ -232,7 +278,10 @@ impl<'a, F: SharedFolder> Claims<'a, F> {
     /// Records how the unit ended; `false`: another worker had taken it over.
     pub fn end(&mut self, claim: Claim, end: &UnitEnd) -> Result<bool> {
         let is_mine = self.is_mine(claim)?;
-        self.folder.create(&claim.file("end"), &serde_json::to_vec(end)?)?;
+        let file = claim.file("end");
+        if !self.folder.create(&file, &serde_json::to_vec(end)?)? {
+            self.blocked.insert(claim.unit, file);
+        }
         self.states[claim.unit] = ClaimState { epoch: claim.epoch, has_ended: true };
         Ok(is_mine)
     }
@@ -297,9 +346,22 @@ impl<'a, F: SharedFolder> Claims<'a, F> {
             claimed.swap_remove(self.rng.random_range(0..claimed.len()));
         }
         for claim in claimed {
-            let known = self.owners.get(&claim).cloned();
-            let Some(owner) = known.map_or_else(|| claim.read_owner(self.folder), |owner| Ok(Some(owner)))? else {
-                continue;
+            let was_blocked = self.blocked.remove(&claim.unit).is_some();
+            let known = self.owners.get(&claim).cloned().map(ClaimOwner::Worker);
+            let owner = match known.map_or_else(|| claim.read_owner(self.folder), Ok)? {
+                ClaimOwner::Worker(owner) => owner,
+                ClaimOwner::Unreadable(file) => {
+                    self.blocked.insert(claim.unit, file);
+                    continue;
+                }
+                ClaimOwner::NotVisible => {
+                    if was_blocked {
+                        // What was in the way is removed.
+                        self.states[claim.unit].epoch -= 1;
+                        self.n_passed = 0;
+                    }
+                    continue;
+                }
             };
             if owner != self.options.worker && self.watch.is_dead(self.folder, &owner, now)? {
                 self.left.push(claim);

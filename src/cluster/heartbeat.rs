@@ -3,7 +3,7 @@
 
 use super::shared_folder::SharedFolder;
 use anyhow::Result;
-use orator_base::stage::workdir::is_alive;
+use orator_base::stage::workdir;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -61,22 +61,14 @@ impl Heartbeat {
     /// Whether it is known without waiting that the worker is gone: it said so, or it was a process of this machine that
     /// is no more.
     pub fn is_over(&self, machine: &str) -> bool {
-        self.ended || (!machine.is_empty() && self.machine == machine && !is_alive(self.pid))
+        self.ended || (!machine.is_empty() && self.machine == machine && !workdir::is_alive(self.pid))
     }
 }
 
-/// The name of the machine that this program is on, and a word that tells machines and containers apart.
+/// The name of the machine that this program is on, and what identifies machines and containers.
 pub fn this_machine() -> (String, String) {
-    let text = |path: &str| std::fs::read_to_string(path).unwrap_or_default().trim().to_owned();
     let host = rustix::system::uname().nodename().to_string_lossy().into_owned();
-    let boot = text("/proc/sys/kernel/random/boot_id");
-    // Process numbers count anew in a container.
-    let processes = std::fs::read_link("/proc/self/ns/pid").unwrap_or_default();
-    let machine = match boot.is_empty() {
-        true => String::new(),
-        false => blake3::hash(format!("{boot} {}", processes.display()).as_bytes()).to_hex()[..16].to_owned(),
-    };
-    (host, machine)
+    (host, workdir::machine().to_owned())
 }
 
 /// Watches the beats of other workers.

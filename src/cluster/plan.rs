@@ -2,8 +2,10 @@
 //! program, configuration and models before they claim a unit.
 
 use super::job::shell;
+use super::sealed_input::SealedInput;
 use anyhow::{Context, Result, bail, ensure};
-use orator_base::stage::fingerprint::hash_file;
+use orator_base::stage::fingerprint::{HashCache, hash_file};
+use orator_base::stage::progress::Progress;
 use orator_base::stage::{Unit, workdir};
 use orator_dataset::config::videos::Videos;
 use orator_dataset::config::{Config, GanConfig, Seq2seqConfig};
@@ -14,7 +16,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 /// Meaning of the file; another one is refused.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// Usual length of a piece of a long video, seconds.
 pub const PIECE_SECS: f64 = 600.0;
 /// Videos from so many pieces on are shared by several workers.
@@ -49,7 +51,8 @@ pub struct PlannedUnit {
     /// Work name of the video.
     pub video: String,
     pub source: PathBuf,
-    pub bytes: u64,
+    /// Files that its first stage reads.
+    pub inputs: Vec<SealedInput>,
     /// Duration of the video, where it could be read.
     pub secs: Option<f64>,
     /// What is to be done of the video.
@@ -75,6 +78,11 @@ impl PlannedUnit {
     /// The unit of the stages.
     pub fn unit(&self) -> Unit {
         Unit { speaker: self.speaker.clone(), video: self.video.clone(), source: self.source.clone() }
+    }
+
+    /// Errors where a file is not what it was when the plan was written.
+    pub fn check_inputs(&self, hashes: &HashCache) -> Result<()> {
+        self.inputs.iter().try_for_each(|input| input.check(hashes))
     }
 
     /// Seconds of video that have gone through when it has ended, where the length is known.
@@ -138,31 +146,42 @@ pub fn in_order(videos: Vec<PlannedUnit>, piece_secs: f64) -> Vec<PlannedUnit> {
 }
 
 impl ClusterPlan {
-    /// The plan of all videos of a pipeline. `secs` gives the duration of a video; long ones are shared in pieces of
-    /// about `piece_secs`.
+    /// The plan of all videos of a pipeline, which are read whole where their hashes are not known. `secs` gives the duration
+    /// of a video; long ones are shared in pieces of about `piece_secs`.
     ///
     /// # Errors
-    /// No video; weights or a program that cannot be read.
+    /// No video; videos, weights or a program that cannot be read.
     pub fn new(
         pipeline: &Pipeline,
         sets: &[String],
         program: &Path,
         secs: &dyn Fn(&Path) -> Option<f64>,
         piece_secs: f64,
+        progress: &dyn Progress,
     ) -> Result<Self> {
-        let planned = |unit: &Unit| PlannedUnit {
-            speaker: unit.speaker.clone(),
-            video: unit.video.clone(),
-            source: unit.source.clone(),
-            bytes: std::fs::metadata(&unit.source).map_or(0, |meta| meta.len()),
+        let videos: Vec<Unit> = pipeline.videos(&[])?.into_iter().flat_map(|videos| videos.units).collect();
+        ensure!(!videos.is_empty(), "{} names no video that is there", pipeline.config().file.display());
+        let (hashes, inputs) = (pipeline.hashes(), pipeline.source_inputs(&videos)?);
+        let task = progress.begin("hashing the videos", videos.len() as u64);
+        let mut units = Vec::new();
+        for (Unit { speaker, video, source }, inputs) in videos.into_iter().zip(inputs) {
+            let sealed = inputs.into_iter().map(|input| SealedInput::new(input, &hashes)).collect::<Result<_>>();
+            let inputs = sealed.with_context(|| format!("no plan without the content of {speaker}/{video}"))?;
             // To the millisecond, which comes back from the file as it is.
-            secs: secs(&unit.source).map(|secs| (1000.0 * secs).round() / 1000.0),
-            share: UnitShare::Whole,
-            needs: Vec::new(),
-        };
-        let videos = pipeline.videos(&[])?;
-        let mut units: Vec<PlannedUnit> = videos.iter().flat_map(|videos| &videos.units).map(planned).collect();
-        ensure!(!units.is_empty(), "{} names no video that is there", pipeline.config().file.display());
+            let secs = secs(&source).map(|secs| (1000.0 * secs).round() / 1000.0);
+            units.push(PlannedUnit {
+                speaker,
+                video,
+                source,
+                inputs,
+                secs,
+                share: UnitShare::Whole,
+                needs: Vec::new(),
+            });
+            hashes.save_now_and_then();
+            task.advance(1);
+        }
+        hashes.save()?;
         units.sort_by(|a, b| (&a.speaker, &a.video).cmp(&(&b.speaker, &b.video)));
         let config = pipeline.config();
         let mut plan = Self {
@@ -184,12 +203,16 @@ impl ClusterPlan {
     /// # Errors
     /// No plan, a plan of another version, or one that was changed since it was written.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path)
+        let bytes = workdir::read_file(path)
             .with_context(|| format!("cannot read the plan {}; `orator plan` writes one", path.display()))?;
-        let plan: Self = serde_json::from_slice(&bytes).with_context(|| format!("{} is no plan", path.display()))?;
-        let (path, version) = (path.display(), plan.version);
+        let no_plan = || format!("{} is no plan", path.display());
+        let known: serde_json::Value = serde_json::from_slice(&bytes).with_context(no_plan)?;
         let anew = "write it anew with `orator plan`";
-        ensure!(version == VERSION, "{path} is a plan of version {version}, expected {VERSION}: {anew}");
+        if let Some(version) = known["version"].as_u64().filter(|version| *version != u64::from(VERSION)) {
+            bail!("{} is a plan of version {version}, expected {VERSION}: {anew}", path.display());
+        }
+        let plan: Self = serde_json::from_value(known).with_context(no_plan)?;
+        let path = path.display();
         ensure!(plan.seal == plan.sealed()?, "{path} was changed since `orator plan` wrote it: write it anew");
         Ok(plan)
     }
@@ -253,11 +276,27 @@ impl ClusterPlan {
         if let Some((name, _)) = self.models.iter().find(|(name, hash)| models.get(*name) != Some(hash)) {
             bail!("the model {name} is not the one of the plan: copy the same models to every machine, or {anew}");
         }
-        let videos = pipeline.videos(&[])?;
-        let is_known = |unit: &PlannedUnit| videos.iter().any(|videos| has(videos, unit));
-        match self.units.iter().find(|unit| !is_known(unit)) {
+        match self.missing(pipeline)?.first() {
             Some(unit) => bail!("the video {} of the plan is not found here: {anew}", unit.source.display()),
             None => Ok(()),
+        }
+    }
+
+    /// Videos of the plan that the pipeline does not find.
+    fn missing(&self, pipeline: &Pipeline) -> Result<Vec<PlannedUnit>> {
+        let videos = pipeline.videos(&[])?;
+        let is_known = |unit: &PlannedUnit| videos.iter().any(|videos| has(videos, unit));
+        Ok(self.videos().into_iter().filter(|unit| !is_known(unit)).collect())
+    }
+
+    /// Videos of the plan at `path` that the pipeline does not find; none where there is no plan of these settings.
+    ///
+    /// # Errors
+    /// Settings that cannot be hashed.
+    pub fn missing_videos(path: &Path, pipeline: &Pipeline) -> Result<Vec<PlannedUnit>> {
+        match Self::read(path) {
+            Ok(plan) if plan.settings == settings_hash(pipeline.config())? => plan.missing(pipeline),
+            _ => Ok(Vec::new()),
         }
     }
 
@@ -290,7 +329,7 @@ impl PlannedUnit {
             speaker: speaker.to_owned(),
             video: video.to_owned(),
             source: video.into(),
-            bytes: 1,
+            inputs: Vec::new(),
             secs: None,
             share: UnitShare::Whole,
             needs: Vec::new(),
@@ -324,6 +363,16 @@ mod tests {
         let media: f64 = units.iter().filter_map(PlannedUnit::media_secs).sum();
         assert!((media - 2899.0).abs() < 1e-9);
     }
+
+    #[test]
+    fn a_plan_of_another_version_is_refused_with_what_to_do() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("plan.json");
+        std::fs::write(&file, "{\"version\": 2, \"units\": [{\"bytes\": 1}]}").unwrap();
+        let error = ClusterPlan::read(&file).unwrap_err().to_string();
+        assert!(error.contains("version 2, expected 3: write it anew with `orator plan`"), "{error}");
+    }
+
     #[test]
     fn settings_of_training_are_no_part_of_it() {
         let dir = tempfile::tempdir().unwrap();

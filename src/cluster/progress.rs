@@ -1,15 +1,15 @@
 //! How far the workers of a plan are, from their files alone.
 
-use super::claims::{Claim, ClaimState, read_states};
+use super::claims::{Claim, ClaimOwner, ClaimState, read_states};
 use super::heartbeat::{Heartbeat, WORKERS, this_machine};
 use super::plan::ClusterPlan;
 use super::shared_folder::{DiskFolder, SharedFolder};
-use super::worker::STOP;
+use super::worker::read_stop;
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// What the workers of a plan have done.
@@ -21,6 +21,8 @@ pub struct PlanProgress {
     /// In the hands of workers that are alive, and of dead ones.
     pub n_claimed: usize,
     pub n_left_by_dead: usize,
+    /// Units held by what is no claim of a worker: a folder, a pipe, or a damaged file.
+    pub blocked: Vec<PathBuf>,
     /// Units that were taken over once or more.
     pub n_taken_over: usize,
     /// Seconds of video of all units, and of those that have ended; without those of unknown length.
@@ -59,9 +61,10 @@ pub fn progress(plan: &ClusterPlan, path: &Path, dead_after: Duration) -> Result
         told.media_secs += secs;
         told.n_taken_over += usize::from(epoch > 1);
         if !has_ended && epoch > 0 {
-            match claim.read_owner(&folder)?.is_some_and(|worker| is_alive(&worker)) {
-                true => told.n_claimed += 1,
-                false => told.n_left_by_dead += 1,
+            match claim.read_owner(&folder)? {
+                ClaimOwner::Worker(worker) if is_alive(&worker) => told.n_claimed += 1,
+                ClaimOwner::Worker(_) | ClaimOwner::NotVisible => told.n_left_by_dead += 1,
+                ClaimOwner::Unreadable(file) => told.blocked.push(folder.0.join(file)),
             }
         } else if has_ended {
             told.ended_media_secs += secs;
@@ -76,7 +79,7 @@ pub fn progress(plan: &ClusterPlan, path: &Path, dead_after: Duration) -> Result
     }
     let rate: f64 = workers.iter().filter(|worker| worker.is_alive).map(|worker| worker.heartbeat.media_rate()).sum();
     told.secs_left = (rate > 0.0).then(|| (told.media_secs - told.ended_media_secs) / rate);
-    told.stopped = folder.read(STOP)?.map(|reason| String::from_utf8_lossy(&reason).into_owned());
+    told.stopped = read_stop(&folder)?;
     told.workers = workers;
     Ok(told)
 }

@@ -3,6 +3,7 @@
 
 use anyhow::{Context, Result};
 use orator_base::stage::workdir;
+use rustix::io::Errno;
 use std::fs;
 use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
@@ -13,9 +14,10 @@ pub trait SharedFolder {
     /// Makes the file with these bytes; `false`: there is one of that name. Of several that try, one succeeds. The bytes must
     /// be no one else's.
     fn create(&self, name: &str, bytes: &[u8]) -> Result<bool>;
-    /// The bytes of a file, maybe not the newest; `None`: not there, or not seen yet.
+    /// The bytes of a file, maybe not the newest; `None`: not there, or not seen yet. What has the name and is no file that can
+    /// be read (a folder, a pipe, a link to nothing) is read as empty.
     fn read(&self, name: &str) -> Result<Option<Vec<u8>>>;
-    /// Names of the files of a folder, maybe without the newest.
+    /// Names of the files of a folder, maybe without the newest; `/` follows the name of what is no file.
     fn list(&self, folder: &str) -> Result<Vec<String>>;
     /// Puts the bytes in the place of a file that this worker alone writes.
     fn replace(&self, name: &str, bytes: &[u8]) -> Result<()>;
@@ -55,9 +57,10 @@ impl SharedFolder for DiskFolder {
 
     fn read(&self, name: &str) -> Result<Option<Vec<u8>>> {
         let path = self.0.join(name);
-        match fs::read(&path) {
+        match workdir::read_file(&path) {
             Ok(bytes) => Ok(Some(bytes)),
-            Err(error) if is_gone(&error) => Ok(None),
+            Err(error) if is_gone(&error) && !path.is_symlink() => Ok(None),
+            Err(error) if is_gone(&error) || is_no_file(&error) => Ok(Some(Vec::new())),
             Err(error) => Err(error).with_context(|| format!("cannot read {}", path.display())),
         }
     }
@@ -69,8 +72,12 @@ impl SharedFolder for DiskFolder {
             Err(error) if is_gone(&error) => return Ok(Vec::new()),
             Err(error) => return Err(error).with_context(|| format!("cannot list {}", path.display())),
         };
-        let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
-        Ok(names.filter(|name| !name.starts_with('.')).collect())
+        let name = |entry: fs::DirEntry| {
+            let name = entry.file_name().into_string().ok().filter(|name| !name.starts_with('.'))?;
+            let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
+            Some(if is_file { name } else { name + "/" })
+        };
+        Ok(entries.filter_map(|entry| name(entry.ok()?)).collect())
     }
 
     fn replace(&self, name: &str, bytes: &[u8]) -> Result<()> {
@@ -81,6 +88,13 @@ impl SharedFolder for DiskFolder {
 /// The file is not there, or was removed on another machine while this one had it open.
 fn is_gone(error: &std::io::Error) -> bool {
     error.kind() == ErrorKind::NotFound || error.kind() == ErrorKind::StaleNetworkFileHandle
+}
+
+/// The name is that of a folder, a pipe, a socket, a circle of links, or of a file that may not be read.
+fn is_no_file(error: &std::io::Error) -> bool {
+    let is_other = |errno: Errno| error.raw_os_error() == Some(errno.raw_os_error());
+    let kinds = [ErrorKind::IsADirectory, ErrorKind::InvalidInput, ErrorKind::PermissionDenied];
+    kinds.contains(&error.kind()) || is_other(Errno::NXIO) || is_other(Errno::LOOP)
 }
 
 #[cfg(test)]
@@ -109,5 +123,23 @@ mod tests {
         assert_eq!(fs::read_dir(dir.path().join("a")).unwrap().count(), 50, "no draft is left");
         assert_eq!(folder.list("b").unwrap(), Vec::<String>::new());
         assert_eq!(folder.read("b/c").unwrap(), None);
+    }
+
+    #[test]
+    fn what_is_no_file_holds_its_name_and_keeps_nobody_waiting() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = DiskFolder(dir.path().to_owned());
+        let at = |name: &str| dir.path().join("a").join(name);
+        fs::create_dir_all(at("folder")).unwrap();
+        std::os::unix::fs::symlink("nowhere", at("link")).unwrap();
+        std::os::unix::fs::symlink("circle", at("circle")).unwrap();
+        assert!(std::process::Command::new("mkfifo").arg(at("pipe")).status().unwrap().success());
+        for name in ["a/folder", "a/link", "a/circle", "a/pipe"] {
+            assert!(!folder.create(name, b"mine").unwrap(), "{name}");
+            assert_eq!(folder.read(name).unwrap().as_deref(), Some(&b""[..]), "{name}");
+        }
+        let mut names = folder.list("a").unwrap();
+        names.sort();
+        assert_eq!(names, ["circle/", "folder/", "link/", "pipe/"]);
     }
 }

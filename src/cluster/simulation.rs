@@ -2,7 +2,7 @@
 
 use super::claims::{Claim, ClaimOptions, Claims, NextUnit, UnitEnd};
 use super::heartbeat::{BeatWatch, Heartbeat};
-use super::shared_folder::SharedFolder;
+use super::shared_folder::{DiskFolder, SharedFolder};
 use anyhow::Result;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -187,4 +187,47 @@ fn the_dead_are_waited_for_the_slow_keep_what_they_have_and_the_failed_are_retri
     assert_eq!(again.next(secs(0)).unwrap(), NextUnit::Claimed(third));
     assert!(again.end(third, &end(Some("no picture"))).unwrap());
     assert_eq!(again.next(secs(1)).unwrap(), NextUnit::AllEnded);
+}
+
+#[test]
+fn what_has_the_name_of_a_claim_holds_that_unit_alone() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = DiskFolder(dir.path().to_owned());
+    let at = |name: &str| dir.path().join("claims/0000").join(name);
+    // A folder and a damaged file are no claims, a folder is no end; unit 3 needs one that nobody can claim.
+    std::fs::create_dir_all(at("000001.claim.0001")).unwrap();
+    std::fs::write(at("000002.claim.0001"), "").unwrap();
+    std::fs::create_dir(at("000004.end.0001")).unwrap();
+    let needs = vec![vec![], vec![], vec![], vec![1], vec![]];
+    let options = ClaimOptions { worker: "w".to_owned(), needs, order: (0..5).collect(), retries: false };
+    let mut claims = Claims::new(&folder, options, BeatWatch::new(DEAD_AFTER, ""));
+    let end = UnitEnd { worker: "w".to_owned(), error: None, secs: 1.0 };
+    let mut ended = Vec::new();
+    while let NextUnit::Claimed(claim) = claims.next(Duration::ZERO).unwrap() {
+        claims.end(claim, &end).unwrap();
+        ended.push(claim.unit);
+    }
+    ended.sort_unstable();
+    assert_eq!(ended, [0, 4]);
+    assert_eq!(claims.next(Duration::ZERO).unwrap(), NextUnit::Blocked);
+    let files = ["claim", "claim", "end"].into_iter().zip([1, 2, 4]);
+    let expected = files.map(|(kind, unit)| (unit, format!("claims/0000/{unit:06}.{kind}.0001"))).collect();
+    assert_eq!(claims.blocked(), &expected);
+    // What is removed is claimed by a worker that still waits.
+    std::fs::remove_dir(at("000001.claim.0001")).unwrap();
+    assert!(matches!(claims.next(DEAD_AFTER).unwrap(), NextUnit::Wait(_)));
+    for unit in [1, 3] {
+        let claim = Claim { unit, epoch: 1 };
+        assert_eq!(claims.next(DEAD_AFTER).unwrap(), NextUnit::Claimed(claim));
+        assert!(claims.end(claim, &end).unwrap());
+    }
+    assert_eq!(claims.next(DEAD_AFTER).unwrap(), NextUnit::Blocked);
+}
+
+#[test]
+fn an_end_that_says_nothing_is_a_failure() {
+    let folder = folder(Duration::ZERO, 1);
+    folder.create("claims/0000/000000.end.0001", b"").unwrap();
+    let end = Claim { unit: 0, epoch: 1 }.read_end(&folder).unwrap().unwrap();
+    assert!(end.error.unwrap().contains("000000.end.0001"));
 }

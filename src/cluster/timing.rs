@@ -23,7 +23,7 @@ const MOST_SECS: f64 = 120.0;
 const LONG_SECS: f64 = 10.0;
 const SHORT_SECS: f64 = 2.5;
 /// Folder of excerpts in the work folder, while they are timed.
-const FOLDER: &str = "timing";
+pub(super) const FOLDER: &str = "timing";
 
 /// A piece of a unit.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -14,11 +14,11 @@ use orator_base::stage::workdir;
 use orator_base::stage::workdir::NoSpace;
 use orator_pipeline::Pipeline;
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// File that stops every worker of a plan, with the reason in it.
@@ -54,8 +54,19 @@ pub struct WorkReport {
     pub taken_over: usize,
     /// Units laid aside since others had taken them over.
     pub laid_aside: usize,
+    /// Units that nobody can claim or end, each with what is in the place of its claim or end.
+    pub blocked: BTreeSet<String>,
     /// Whether every unit of the plan, or of the share, has ended.
     pub all_ended: bool,
+}
+
+/// Why all workers are to stop; `None`: they are not.
+pub(super) fn read_stop(folder: &DiskFolder) -> Result<Option<String>> {
+    let said = |reason: Vec<u8>| match reason.is_empty() {
+        true => format!("{} is there", folder.0.join(STOP).display()),
+        false => String::from_utf8_lossy(&reason).into_owned(),
+    };
+    Ok(folder.read(STOP)?.map(said))
 }
 
 /// Works on the plan at `path`.
@@ -74,6 +85,7 @@ pub fn work(
     begin_after_stop(&folder)?;
     let dir = &pipeline.config().settings.work.dir;
     let _lock = workdir::lock_with_others(dir).context("no work now")?;
+    workdir::sweep_folder(dir, 2);
     let (host, machine) = this_machine();
     let hashes = pipeline.hashes();
     let session = Session {
@@ -121,12 +133,12 @@ fn worker_name(host: &str) -> String {
 
 /// Goes on where a full disk had stopped all workers, if there is room again.
 fn begin_after_stop(folder: &DiskFolder) -> Result<()> {
-    let Some(reason) = folder.read(STOP)? else { return Ok(()) };
+    let Some(reason) = read_stop(folder)? else { return Ok(()) };
     let probe = folder.0.join(format!(".room-{}", std::process::id()));
     let has_room = std::fs::write(&probe, vec![0; 64 << 20]).is_ok();
     let _ = std::fs::remove_file(&probe);
     if !has_room {
-        bail!("{}: all workers have stopped; make room and start them again", String::from_utf8_lossy(&reason));
+        bail!("{reason}: all workers have stopped; make room and start them again");
     }
     workdir::remove_file(&folder.0.join(STOP))
 }
@@ -182,13 +194,17 @@ impl Session<'_> {
             match claims.next(self.begun.elapsed())? {
                 NextUnit::Claimed(claim) => self.work_on(name, claim, &mut claims, heart)?,
                 NextUnit::Wait(time) if self.options.wait => self.rest(time),
-                NextUnit::Wait(_) => return Ok(()),
+                NextUnit::Wait(_) | NextUnit::Blocked => break,
                 NextUnit::AllEnded => {
                     self.report().all_ended = true;
-                    return Ok(());
+                    break;
                 }
             }
         }
+        let in_the_way = |(unit, file): (&usize, &String)| {
+            format!("{}: {} was not written by a worker", self.plan.units[*unit], self.folder.0.join(file).display())
+        };
+        self.report().blocked.extend(claims.blocked().iter().map(in_the_way));
         Ok(())
     }
 
@@ -214,8 +230,8 @@ impl Session<'_> {
 
     /// Errors with what stopped all workers.
     fn is_to_stop(&self) -> Result<bool> {
-        if let Some(reason) = self.folder.read(STOP)? {
-            bail!("{}: all workers stop; make room and start them again", String::from_utf8_lossy(&reason));
+        if let Some(reason) = read_stop(&self.folder)? {
+            bail!("{reason}: all workers stop; make room and start them again");
         }
         Ok(self.progress.is_to_stop() || self.is_broken.load(Ordering::Relaxed))
     }
@@ -226,15 +242,17 @@ impl Session<'_> {
         heart.content().unit = Some(planned.to_string());
         let begun = Instant::now();
         let still_mine = || match claims.is_mine(claim)? {
-            true => Ok(()),
+            true => planned.check_inputs(self.hashes),
             false => Err(Abandoned(format!("{} was taken over by another worker", planned.video)).into()),
         };
         let run =
             |stages: &[StageName]| self.pipeline.run_video(stages, &unit, self.hashes, &still_mine, self.progress);
-        let ended = match planned.share {
-            UnitShare::Whole => run(&StageName::OF_VIDEOS)?,
-            UnitShare::Extract => run(&[StageName::Extract])?,
-            UnitShare::Parts { idx, of } => {
+        let ended = match (planned.check_inputs(self.hashes), planned.share) {
+            // The stages that are up to date would ask nobody.
+            (Err(error), _) => vec![StageOutcome::Failed(Arc::new(error))],
+            (Ok(()), UnitShare::Whole) => run(&StageName::OF_VIDEOS)?,
+            (Ok(()), UnitShare::Extract) => run(&[StageName::Extract])?,
+            (Ok(()), UnitShare::Parts { idx, of }) => {
                 self.pipeline.run_parts(&unit, (idx, of), self.hashes, &still_mine, self.progress)?
             }
         };
@@ -263,6 +281,8 @@ impl Session<'_> {
         report.laid_aside += usize::from(!is_mine);
         let mut content = heart.content();
         match error {
+            // The unit is another worker's now, which may have removed what this one was writing.
+            Some(_) if !is_mine => {}
             Some(error) => {
                 content.n_failed += 1;
                 report.failed.push((planned.to_string(), error));

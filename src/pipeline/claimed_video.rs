@@ -9,7 +9,7 @@ use orator_base::stage::artifacts::StageName;
 use orator_base::stage::fingerprint::HashCache;
 use orator_base::stage::progress::Progress;
 use orator_base::stage::runner::StageOutcome;
-use orator_base::stage::{Report, Stage, Unit, runner};
+use orator_base::stage::{Input, Report, Stage, Unit, runner};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -63,6 +63,18 @@ impl Pipeline {
         let stage = HookedStage { stage: self.stage(StageName::Pose2d, &[])?, hook: &while_mine };
         let ended = runner::run_parts(&stage, unit, share, &self.config().settings.work.dir, hashes, progress);
         Ok(ended.err().map(|error| StageOutcome::Failed(Arc::new(error))).into_iter().collect())
+    }
+
+    /// The files that the first stage reads for each of the videos: the video, or keypoints of another program and their
+    /// sound.
+    ///
+    /// # Errors
+    /// Those of `run_video`.
+    pub fn source_inputs(&self, units: &[Unit]) -> Result<Vec<Vec<Input>>> {
+        let stage = self.stage(StageName::Extract, &[])?;
+        // Where no sound belongs to keypoints, the stage says so when its turn comes.
+        let source = |unit: &Unit| vec![Input { role: "video".into(), path: unit.source.clone() }];
+        Ok(units.iter().map(|unit| stage.inputs(unit).unwrap_or_else(|_| source(unit))).collect())
     }
 
     /// BLAKE3 of the weights that the stages of videos ask, by the names of their files.

@@ -150,6 +150,8 @@ impl Pipeline {
             // What is on record of a dataset counts before its turn comes.
             workdir::recover_folder(&speaker_dir(&settings.work.dir, StageName::Dataset, &videos.speaker))?;
         }
+        // Files of the stages and of the work folder lie two folders deep.
+        workdir::sweep_folder(&settings.work.dir, 2);
         let jobs = self.jobs(selection.jobs);
         if let Some(line) = SpeechDetector::advice(settings)?.filter(|_| selection.has(StageName::Segment)) {
             progress.event(&Event::Advice { line });
@@ -248,13 +250,21 @@ impl StageRun<'_> {
         Ok(failed)
     }
 
-    /// The videos the datasets are made of; an event tells of each that is not ready and left out.
-    fn ready(&self, alive: &[Videos]) -> Result<Vec<Unit>> {
+    /// The videos the datasets are made of. Each that is left out, as a stage before is not up to date, is an event and a
+    /// failure of the run.
+    fn ready(&mut self, alive: &[Videos]) -> Result<Vec<Unit>> {
         let mut all_ready = Vec::new();
         for videos in alive {
             let ready = stages::ready(self.pipeline.config(), videos, self.hashes)?;
             for unit in videos.units.iter().filter(|unit| !ready.contains(unit)) {
                 self.progress.event(&Event::LeftOut { unit: &unit.to_string() });
+                self.report.failures.push(UnitFailure {
+                    speaker: None,
+                    unit: Some(unit.to_string()),
+                    stage: StageName::Dataset,
+                    error: "left out of the dataset: an earlier stage is not up to date".to_owned(),
+                    cause: None,
+                });
             }
             all_ready.extend(ready);
         }

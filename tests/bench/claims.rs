@@ -1,7 +1,7 @@
 //! `cargo bench -- claims`.
 
 use super::report::Report;
-use anyhow::{Result, ensure};
+use anyhow::{Result, bail, ensure};
 use orator_base::stage::progress::Progress;
 use orator_cluster::claims::{ClaimOptions, Claims, NextUnit, UnitEnd};
 use orator_cluster::heartbeat::BeatWatch;
@@ -75,6 +75,7 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
                     n_done += 1;
                 }
                 NextUnit::Wait(_) => std::thread::sleep(Duration::from_millis(20)),
+                NextUnit::Blocked => bail!("what is in the way: {:?}", claims.blocked()),
                 NextUnit::AllEnded => return Ok(n_done),
             }
         }

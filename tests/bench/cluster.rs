@@ -110,7 +110,7 @@ fn videos(secs: f64, rng: &mut ChaCha8Rng) -> Vec<PlannedUnit> {
             speaker: "host".to_owned(),
             source: (&name).into(),
             video: name,
-            bytes: 0,
+            inputs: Vec::new(),
             secs: Some(length),
             share: UnitShare::Whole,
             needs: Vec::new(),
@@ -198,7 +198,7 @@ fn simulate(units: &[PlannedUnit], n_workers: usize, args: &Args) -> Result<Simu
                 events.push(Reverse((now + asked + Duration::from_secs_f64(secs), at)));
             }
             NextUnit::Wait(time) => events.push(Reverse((now + asked + time, at))),
-            NextUnit::AllEnded => {}
+            NextUnit::Blocked | NextUnit::AllEnded => {}
         }
     }
     ensure!(ended.iter().all(|ended| *ended), "a unit is lost");

@@ -55,9 +55,11 @@ pub struct HashCache {
     saved: Mutex<Instant>,
 }
 
-#[derive(Clone, Serialize, Deserialize)]
-struct KnownHash {
-    bytes: u64,
+/// The content of a file or folder: its BLAKE3 in hex, with the size in bytes and the time of change by which it is known
+/// again without being read.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct KnownHash {
+    pub bytes: u64,
     changed_ns: u64,
     hash: String,
 }
@@ -70,18 +72,32 @@ impl HashCache {
 
     /// BLAKE3 of the content of `path`, in hex; of a folder as `hash_file` says.
     pub fn hash(&self, path: &Path) -> Result<String> {
+        Ok(self.content(path)?.hash)
+    }
+
+    /// The content of `path`; it is read where it is not known. Errors: it cannot be read.
+    pub fn content(&self, path: &Path) -> Result<KnownHash> {
         let (bytes, changed_ns) = size_and_change(path)?;
+        let read = || Ok(KnownHash { bytes, changed_ns, hash: hash_file(path)? });
         // Two names that are no text may look alike.
-        let Some(name) = path.to_str().map(str::to_owned) else { return hash_file(path) };
+        let Some(name) = path.to_str().map(str::to_owned) else { return read() };
         if let Some(known) = self.known().get(&name)
             && known.bytes == bytes
             && known.changed_ns == changed_ns
         {
-            return Ok(known.hash.clone());
+            return Ok(known.clone());
         }
-        let hash = hash_file(path)?;
-        self.known().insert(name, KnownHash { bytes, changed_ns, hash: hash.clone() });
-        Ok(hash)
+        let content = read()?;
+        self.known().insert(name, content.clone());
+        Ok(content)
+    }
+
+    /// Whether `path` still has this content. Size and time of change decide where they are equal, and a different size does;
+    /// else the content is hashed. Errors: it cannot be read.
+    pub fn is_unchanged(&self, path: &Path, content: &KnownHash) -> Result<bool> {
+        let (bytes, changed_ns) = size_and_change(path)?;
+        let is_same_size = bytes == content.bytes;
+        Ok(is_same_size && (changed_ns == content.changed_ns || self.hash(path)? == content.hash))
     }
 
     /// Keeps what is known for the next run, beside what other programs have kept meanwhile.
@@ -107,7 +123,7 @@ impl HashCache {
 }
 
 fn read_known(file: &Path) -> BTreeMap<String, KnownHash> {
-    fs::read(file).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default()
+    workdir::read_file(file).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default()
 }
 
 /// Bytes of a file, and its time of change in ns; of a folder the sum over its files, and a digest of their names and

@@ -84,7 +84,7 @@ fn beside(folder: &Path, suffix: &str) -> PathBuf {
 impl Record {
     /// The record of the unit in `folder`; `None` where there is none that can be read.
     pub fn read(folder: &Path) -> Option<Self> {
-        let record: Self = serde_json::from_slice(&fs::read(record_path(folder)).ok()?).ok()?;
+        let record: Self = serde_json::from_slice(&workdir::read_file(&record_path(folder)).ok()?).ok()?;
         Some(Self { fingerprint: record.fingerprint.renamed(), ..record })
     }
 
@@ -143,7 +143,7 @@ fn collect(folder: &Path, prefix: &str, outputs: &mut Vec<Output>) -> Result<()>
 impl Failure {
     /// The failure of the unit in `folder`, if its last attempt failed.
     pub fn read(folder: &Path) -> Option<Self> {
-        let failure: Self = serde_json::from_slice(&fs::read(failure_path(folder)).ok()?).ok()?;
+        let failure: Self = serde_json::from_slice(&workdir::read_file(&failure_path(folder)).ok()?).ok()?;
         Some(Self { fingerprint: failure.fingerprint.map(Fingerprint::renamed), ..failure })
     }
 

@@ -4,9 +4,10 @@ use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
 use crate::cli::confine::this_program;
 use crate::cli::ui::Ui;
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use orator_base::stage::artifacts::StageName;
 use orator_base::stage::counted;
+use orator_base::stage::workdir::FolderLock;
 use orator_cluster::heartbeat::DEAD_AFTER;
 use orator_cluster::plan::{ClusterPlan, PIECE_SECS, PlannedUnit};
 use orator_cluster::progress::{PlanProgress, WorkerProgress, progress};
@@ -21,6 +22,7 @@ use std::path::{Path, PathBuf};
 
 /// Write a sealed plan of all videos, and say what it takes to work on them.
 ///
+/// Every video is read once for the hash of its content, unless that is known: workers do not work on one that changed since.
 /// The stages are timed on excerpts of the videos, on this machine, which should be idle; the times are kept until
 /// program, settings, models or machine change. The plan is what `orator work` and `orator submit` go by.
 #[derive(clap::Args)]
@@ -67,8 +69,11 @@ pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         let request = MediaRequest { source: path.to_owned(), excerpt: None };
         pipeline.ask_media(&request).ok().flatten()
     };
-    let plan = ClusterPlan::new(&pipeline, &args.config.set, &this_program(), &secs, 60.0 * args.piece)?;
+    // What is being forgotten is not planned meanwhile.
+    let lock = FolderLock::shared(work).context("no plan now")?;
+    let plan = ClusterPlan::new(&pipeline, &args.config.set, &this_program(), &secs, 60.0 * args.piece, ui)?;
     plan.write(&out)?;
+    drop(lock);
     let videos = plan.videos();
     let lengths: Vec<f64> = videos.iter().filter_map(|unit| unit.secs).collect();
     let hours: f64 = lengths.iter().sum::<f64>() / 3600.0;
@@ -167,7 +172,7 @@ pub(crate) fn show_progress(path: &Path, ui: &Ui) -> Result<Outcome> {
 fn progress_text(told: &PlanProgress) -> String {
     let hours = |secs: f64| secs / 3600.0;
     let PlanProgress { n_units, n_done, n_failed, n_claimed, n_left_by_dead, n_taken_over, .. } = told;
-    let n_free = n_units - n_done - n_failed - n_claimed - n_left_by_dead;
+    let n_free = n_units - n_done - n_failed - n_claimed - n_left_by_dead - told.blocked.len();
     let mut lines = vec![format!(
         "{n_units} units: {n_done} done, {n_failed} failed, {n_claimed} in work, {n_left_by_dead} left by dead workers, \
          {n_free} free; {n_taken_over} taken over"
@@ -175,6 +180,9 @@ fn progress_text(told: &PlanProgress) -> String {
     let left = told.secs_left.map_or("unknown".to_owned(), |secs| format!("{:.2} h", hours(secs)));
     let (ended, all) = (hours(told.ended_media_secs), hours(told.media_secs));
     lines.push(format!("{ended:.2} of {all:.2} h of video; time left at this pace: {left}"));
+    lines.extend(
+        told.blocked.iter().map(|file| format!("blocked by {}: no worker wrote it; remove it", file.display())),
+    );
     lines.extend(told.stopped.iter().map(|reason| format!("all workers have stopped: {reason}")));
     lines.extend(told.workers.iter().map(worker));
     lines.extend(told.failures.iter().map(|(reason, units)| {

@@ -15,7 +15,8 @@ use std::time::Duration;
 ///
 /// Each worker claims one video after the other. What a dead worker had in its hands is taken over; a slow one keeps it.
 /// SIGTERM or Ctrl-C ends a worker after the unit at hand, a second one at once; the same command goes on from there.
-/// Exit code 2 says that some units failed.
+/// A video that changed since the plan was written is not worked on. Exit code 2 says that some units failed, or cannot be
+/// claimed.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// The plan, of `orator plan`.
@@ -75,7 +76,7 @@ pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let mut facts = json!(report);
     facts["next"] = json!(next);
     ui.summary(&text(&report), Some(&next), facts);
-    Ok(match (ui.was_stopped() && !report.all_ended, has_failed) {
+    Ok(match (ui.was_stopped() && !report.all_ended, has_failed || !report.blocked.is_empty()) {
         (true, _) => Outcome::Stopped,
         (false, true) => Outcome::SomeFailed,
         (false, false) => Outcome::Done,
@@ -92,6 +93,7 @@ fn text(report: &WorkReport) -> String {
         ));
     }
     lines.extend(report.failed.iter().map(|(unit, error)| format!("failed  {unit}: {error}")));
+    lines.extend(report.blocked.iter().map(|what| format!("blocked {what}; remove it and start a worker again")));
     let rest = if report.all_ended { "every unit has ended" } else { "others have the rest, or it is left" };
     lines.push(rest.to_owned());
     lines.join("\n")

@@ -6,6 +6,7 @@ use crate::cli::ui::Ui;
 use anyhow::{Context, Result, bail};
 use orator_base::stage::artifacts::{StageName, speaker_dir};
 use orator_base::stage::workdir::{self, FolderLock};
+use orator_cluster::forget::plans_naming;
 use orator_dataset::config::{Config, videos};
 use orator_dataset::forget::known::{self, KnownVideo};
 use orator_dataset::forget::removal::{Removal, models_dirs};
@@ -16,7 +17,7 @@ use std::path::{Path, PathBuf};
 /// Forget a video, or a speaker: remove all that was derived from it, and prove by search that nothing is left.
 ///
 /// Goes through the stages' files, the dataset (shards, statistics, index, ledger, card, checksums), trained models (a
-/// model cannot unlearn) and the table of hashes; the other videos' shards stay byte for byte. Then every file under the
+/// model cannot unlearn), plans of `orator plan` and the table of hashes; the other videos' shards stay byte for byte. Then every file under the
 /// work folder is searched for the video's names and hashes. Exit code 1 says that something was found. The video file
 /// itself, and copies elsewhere, are yours to delete.
 #[derive(clap::Args)]
@@ -158,7 +159,8 @@ fn of_project(args: &Args, locks: &mut Vec<FolderLock>) -> Result<ForgetTask> {
         }
     }
     let others: Vec<&KnownVideo> = all.iter().filter(|k| !videos.contains(k)).collect();
-    let removal = Removal::of_work(work, &speaker, &videos, &others, whole)?;
+    let mut removal = Removal::of_work(work, &speaker, &videos, &others, whole)?;
+    let plans = plans_naming(work, &removal.terms)?;
     if is_locked {
         let own = models_dirs(work, &speaker);
         for folder in removal.models.iter().filter(|folder| !own.contains(folder)) {
@@ -166,6 +168,12 @@ fn of_project(args: &Args, locks: &mut Vec<FolderLock>) -> Result<ForgetTask> {
         }
     }
     let mut advice: Vec<String> = Vec::new();
+    if !plans.is_empty() {
+        advice.push(
+            "a plan listed it and is removed: write it anew with `orator plan` before more workers start".to_owned(),
+        );
+    }
+    removal.paths.extend(plans);
     for video in &videos {
         let twins = others.iter().filter(|other| video.content.is_some() && other.content == video.content);
         advice.extend(twins.map(|twin| {

@@ -9,17 +9,20 @@ use crate::cli::ui::Ui;
 use anyhow::Result;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use orator_base::stage::artifacts::StageName;
+use orator_base::stage::progress::{Event, Progress};
+use orator_cluster::plan::ClusterPlan;
 use orator_dataset::config::Settings;
 use orator_onnx::{ModelError, ModelStore};
 use orator_pipeline::pose2d::models::wanted;
 use orator_pipeline::segment::speech_rule::SpeechDetector;
-use orator_pipeline::{Pipeline, Selection};
+use orator_pipeline::{Pipeline, Selection, UnitFailure};
 use serde_json::json;
 
 /// Run the stages extract, pose2d, segment, lift, dataset for every video of every speaker.
 ///
 /// What is up to date is not done again: a run that was killed goes on where it was. A video that fails is reported and
-/// the others go on. Exit code 2 says that some failed or that a speaker ended with no interval.
+/// the others go on. Exit code 2 says that some failed, that a speaker ended with no interval, or that a dataset is made
+/// without a video: its earlier stages are not up to date, or `orator plan` listed it and it is gone.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -61,7 +64,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let selection = Selection { from, to, speakers: args.speaker, jobs: args.jobs, force: args.force };
     let pipeline = Pipeline::open(args.config.load()?)?.with_processes(this_program());
     signals::tell_when_stopped("every stage of a video that is done is kept, and the same command goes on from there");
-    let report = match pipeline.run(&selection, ui) {
+    let mut report = match pipeline.run(&selection, ui) {
         Err(error) if is_missing_model(&error) && ui.asks(&format!("{error:#}\nget the models now?")) => {
             let settings = &pipeline.config().settings;
             let Settings { models, pose2d, .. } = settings;
@@ -72,6 +75,21 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         ended => ended?,
     };
 
+    if selection.from == StageName::Dataset {
+        // The videos of a plan were worked on before: one that is gone since is missing in the dataset.
+        let plan = pipeline.config().settings.work.dir.join("plan.json");
+        for unit in ClusterPlan::missing_videos(&plan, &pipeline)? {
+            if !selection.speakers.is_empty() && !selection.speakers.contains(&unit.speaker) {
+                continue;
+            }
+            let (stage, name) = (StageName::Dataset, unit.to_string());
+            let (video, plan) = (unit.source.display(), plan.display());
+            let error =
+                format!("the video {video} of {plan} is gone: put it back, or write the plan anew with `orator plan`");
+            ui.event(&Event::Failed { stage: stage.as_str(), unit: &name, error: &error });
+            report.failures.push(UnitFailure { speaker: None, unit: Some(name), stage, error, cause: None });
+        }
+    }
     let counts = |(stage, n): (&StageName, &orator_pipeline::StageCounts)| {
         format!("{stage:8} {} done, {} up to date, {} failed", n.done, n.fresh, n.failed)
     };

@@ -239,7 +239,7 @@ fn pages(work: &Path) -> Result<Vec<PathBuf>> {
         for path in listed(&folder)? {
             if path.is_dir() && !path.is_symlink() {
                 folders.push(path);
-            } else if path.extension().is_some_and(|ending| ending == "html") {
+            } else if path.extension().is_some_and(|ending| ending == "html") && path.is_file() {
                 pages.push(path);
             }
         }

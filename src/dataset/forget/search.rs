@@ -5,7 +5,7 @@ use crate::file_name;
 use anyhow::{Context, Result};
 use std::collections::BTreeSet;
 use std::fs::File;
-use std::io::Read;
+use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 /// Text or bytes that must not be found.
@@ -115,6 +115,12 @@ fn walk(root: &Path, path: &Path, terms: &[&SearchTerm], searched: &mut Searched
         let mut entries = entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<_>>>().with_context(reading)?;
         entries.sort();
         return entries.iter().try_for_each(|entry| walk(root, entry, terms, searched));
+    }
+    // A pipe, a socket, a link to nothing or to a folder holds no bytes.
+    match path.metadata() {
+        Ok(meta) if !meta.is_file() => return Ok(()),
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
+        _ => {}
     }
     searched.n_files += 1;
     let (bytes, found) = scan(File::open(path).with_context(reading)?, terms).with_context(reading)?;
@@ -231,6 +237,8 @@ mod tests {
         npz.write_all(b"header a.mp4").unwrap();
         npz.finish().unwrap();
         std::fs::create_dir(dir.path().join("a.mp4")).unwrap();
+        std::os::unix::fs::symlink("nowhere", dir.path().join("link")).unwrap();
+        assert!(std::process::Command::new("mkfifo").arg(dir.path().join("pipe")).status().unwrap().success());
         let searched = search(&[dir.path().to_owned()], &terms()).unwrap();
         let mut files: Vec<String> =
             searched.places.iter().map(|p| p.file.rsplit('/').next().unwrap().to_owned()).collect();

@@ -7,7 +7,9 @@ use orator_formats::timeline_npz::Timeline;
 use orator_test_support::project::{Project, files_under};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use serde_json::Value;
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::process::Child;
 use std::time::Duration;
 
@@ -30,6 +32,21 @@ fn project(name: &str, n_repeats: usize) -> Option<Project> {
 fn spans(project: &Project) -> usize {
     let timeline = files_under(&project.work()).into_iter().find(|(name, _)| name.ends_with("timeline.npz")).unwrap().1;
     Timeline::read(&timeline).unwrap().spans().len()
+}
+
+/// The worker that has a unit in hand.
+fn holder(project: &Project, workers: &[Child]) -> Option<usize> {
+    let files: BTreeMap<String, PathBuf> = files_under(&project.work()).into_iter().collect();
+    let open = files
+        .iter()
+        .filter(|(name, _)| name.contains(".claim.") && !files.contains_key(&name.replace("claim.", "end.")));
+    let mut holders = open.filter_map(|(_, path)| {
+        let claim: Value = serde_json::from_slice(&std::fs::read(path).ok()?).ok()?;
+        // HOST-PROCESS-NUMBER-NONCE
+        let process: u32 = claim["worker"].as_str()?.rsplit('-').nth(2)?.parse().ok()?;
+        workers.iter().position(|worker| worker.id() == process)
+    });
+    holders.next()
 }
 
 #[test]
@@ -64,20 +81,34 @@ fn a_long_video_is_shared_and_its_bytes_are_those_of_one_worker() {
     let plan = planned.answer(&["plan", "--untimed", "--piece", "2"]);
     let n_units = plan.json["units"].as_u64().unwrap();
     assert!(plan.code == 0 && (n_units == 4 || is_long), "{n_units}: {}", plan.errors);
-    // Their clocks are up to 15 minutes apart; every second worker is killed once and another takes its place.
+    // Their clocks are up to 15 minutes apart. Workers are killed with a unit in hand: one when spans are shared, the
+    // others when one of them is done.
     let mut rng = ChaCha8Rng::seed_from_u64(5);
-    let mut workers: Vec<Child> = (0..n_workers).map(|_| worker_off(&planned, rng.random_range(-900..900))).collect();
-    let mut n_killed = 0;
-    for at in (0..n_workers).step_by(2) {
-        std::thread::sleep(Duration::from_millis(rng.random_range(300..1500)));
-        n_killed += usize::from(workers[at].try_wait().unwrap().is_none());
-        let _ = workers[at].kill();
+    let mut start = || worker_off(&planned, rng.random_range(-900..900));
+    let mut workers: Vec<Child> = (0..n_workers).map(|_| start()).collect();
+    let n_killed = n_workers / 2 + 1;
+    for kill in 0..n_killed {
+        let is_reached = || match kill {
+            0 => files_under(&planned.work()).iter().any(|(name, _)| name.contains(".parts/")),
+            _ => done(&planned),
+        };
+        let at = loop {
+            let are_running = workers.iter_mut().all(|worker| worker.try_wait().unwrap().is_none());
+            assert!(are_running, "it ended before it was killed");
+            if let Some(at) = Some(()).filter(|()| is_reached()).and_then(|()| holder(&planned, &workers)) {
+                break at;
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        };
+        workers[at].kill().unwrap();
         workers[at].wait().unwrap();
-        workers[at] = worker_off(&planned, rng.random_range(-900..900));
+        workers[at] = start();
     }
     for mut worker in workers {
         assert!(worker.wait().unwrap().success());
     }
+    let taken_over = epochs(&planned.work(), "claim").values().filter(|epoch| **epoch > 1).count();
+    assert!(taken_over > 0, "no killed worker had a unit");
     assert_eq!(epochs(&planned.work(), "end").len() as u64, n_units);
     let status = planned.answer(&["status", "--plan", "work/plan.json"]).json;
     assert!((status["ended_media_secs"].as_f64().unwrap() - status["media_secs"].as_f64().unwrap()).abs() < 1e-6);

@@ -2,5 +2,7 @@
 
 mod jobs;
 mod long_video;
+mod planted;
+mod sealed;
 mod timing;
 mod workers;

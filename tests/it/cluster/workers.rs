@@ -3,7 +3,7 @@
 //! minutes apart.
 
 use crate::fixtures::faults::plan_workers::{epochs, faketime, worker, worker_off, written};
-use orator_test_support::project::Project;
+use orator_test_support::project::{Project, files_under};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rustix::process::{Pid, Signal, kill_process};
@@ -114,12 +114,16 @@ fn a_bad_video_fails_alone_and_a_plan_is_kept() {
     let status = project.answer(&["status", "--plan", "work/plan.json"]);
     assert_eq!((status.json["n_done"].as_u64(), status.json["n_failed"].as_u64()), (Some(2), Some(1)));
     assert_eq!(status.json["failures"].as_object().unwrap().len(), 1);
-    // Nothing is left to do; the failed one is taken again when that is asked for.
+    // Nothing is left to do; the failed one is taken again when that is asked for, but only with the content that was planned.
     let again = project.answer(&["work", "--plan", "work/plan.json"]);
     assert_eq!((again.code, again.json["done"].as_u64()), (0, Some(0)));
     std::fs::copy(project.clips().pop().unwrap(), project.video("broken.mp4")).unwrap();
     let retried = project.answer(&["work", "--plan", "work/plan.json", "--retry"]);
-    assert_eq!((retried.code, retried.json["done"].as_u64()), (0, Some(1)), "{}", retried.errors);
+    assert_eq!((retried.code, retried.json["done"].as_u64()), (2, Some(0)), "another video: {}", retried.errors);
+    assert_eq!(project.answer(&["plan", "--untimed"]).code, 0);
+    let planned = project.answer(&["work", "--plan", "work/plan.json"]);
+    let counts = ["done", "fresh"].map(|key| planned.json[key].as_u64());
+    assert_eq!((planned.code, counts), (0, [Some(3), Some(2)]), "{}", planned.errors);
     assert_eq!(project.answer(&["status", "--plan", "work/plan.json"]).json["n_failed"].as_u64(), Some(0));
 
     let plan = project.work().join("plan.json");
@@ -161,4 +165,24 @@ fn a_worker_that_is_asked_to_end_with_all_its_processes_finishes_its_unit() {
     assert_eq!(worker.wait_with_output().unwrap().status.code(), Some(143));
     let status = project.answer(&["status", "--plan", "work/plan.json"]).json;
     assert_eq!((status["n_done"].as_u64(), status["n_failed"].as_u64()), (Some(1), Some(0)), "{status}");
+}
+
+#[test]
+fn eight_workers_at_once_do_every_unit_once() {
+    let n_clips = 8;
+    let project = Project::with_clips("eight", n_clips, 4.6);
+    assert_eq!(project.answer(&["plan", "--untimed"]).code, 0);
+    let workers: Vec<Child> = (0..8).map(|_| worker(&project)).collect();
+    for mut worker in workers {
+        assert!(worker.wait().unwrap().success());
+    }
+    for kind in ["claim", "end"] {
+        let epochs = epochs(&project.work(), kind);
+        assert!(epochs.len() == n_clips && epochs.values().all(|epoch| *epoch == 1), "{kind}: {epochs:?}");
+    }
+    let status = project.answer(&["status", "--plan", "work/plan.json"]).json;
+    assert_eq!((status["n_done"].as_u64(), status["n_taken_over"].as_u64()), (Some(8), Some(0)), "{status}");
+    let extracted = files_under(&project.work().join("extract"));
+    let records = extracted.iter().filter(|(name, _)| name.ends_with(".record.json")).count();
+    assert_eq!(records, n_clips);
 }

@@ -4,6 +4,7 @@
 use orator_test_support::project::{Project, files_under};
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::process::Command;
 use std::time::{Duration, Instant, SystemTime};
 
 /// Every record under `work` with its time of change: done, and when.
@@ -72,4 +73,28 @@ fn the_number_of_workers_changes_no_byte() {
     assert_eq!(one.run(&["--jobs", "1"]).code, 0);
     assert_eq!(two.run(&["--jobs", "2"]).code, 0);
     assert!(dataset(&one.work()) == dataset(&two.work()));
+}
+
+#[test]
+fn a_run_removes_what_dead_processes_left_whatever_they_were_writing() {
+    let project = Project::with_clips("swept", 1, 1.0);
+    assert_eq!(project.run(&["--to", "extract"]).code, 0);
+    // A zombie: it has ended, and nobody has asked how.
+    let mut zombie = Command::new("true").spawn().unwrap();
+    let stat = format!("/proc/{}/stat", zombie.id());
+    while !std::fs::read_to_string(&stat).unwrap().contains(") Z ") {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let (host, process) = (project.work().join("extract/host"), zombie.id());
+    let folder = host.join(format!(".gone-00000000.attempt-{process}-1"));
+    let file = host.join(format!(".gone-00000000.record.attempt-{process}-1.json"));
+    std::fs::create_dir(&folder).unwrap();
+    std::fs::write(&file, "half").unwrap();
+    for path in [&folder, &file] {
+        let old = SystemTime::now() - Duration::from_secs(2 * 24 * 60 * 60);
+        std::fs::File::open(path).unwrap().set_modified(old).unwrap();
+    }
+    assert_eq!(project.run(&["--to", "extract"]).code, 0);
+    assert!(!folder.exists() && !file.exists());
+    zombie.wait().unwrap();
 }

@@ -1,10 +1,9 @@
 //! Names of attempts: hidden, beside their target, with the extension that writers choose their format by, and no two
-//! alike (`.NAME.attempt-PROCESS-NUMBER.EXT`), so that programs that write the same file never share an attempt. What
-//! a killed program left is removed by the next attempt at the same target.
+//! alike (`.NAME.attempt-PROCESS-START-MACHINE-NUMBER.EXT`), so that programs that write the same file never share an
+//! attempt. What a killed program left is removed by the next attempt at the same target, and by the next run (`sweep_folder`).
 
 use super::file::parent;
-use rustix::io::Errno;
-use rustix::process::{Pid, test_kill_process};
+use super::process::{is_alive, machine, started};
 use std::ffi::OsString;
 use std::fs;
 use std::io::{ErrorKind, Result};
@@ -12,8 +11,9 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, SystemTime};
 
-/// A file that changed within this time may belong to a program on another machine.
-const RECENT: Duration = Duration::from_secs(60);
+/// An attempt of an unknown process that changed within this time may belong to a program on another machine, whose clock
+/// may differ by hours.
+const RECENT: Duration = Duration::from_secs(24 * 60 * 60);
 
 /// Makes an attempt beside `target` by `create`, which must fail where something is, a link too.
 pub(crate) fn begin(target: &Path, create: impl Fn(&Path) -> Result<()>) -> Result<PathBuf> {
@@ -22,7 +22,7 @@ pub(crate) fn begin(target: &Path, create: impl Fn(&Path) -> Result<()>) -> Resu
     let [start, end] = name_parts(target);
     loop {
         let mut name = start.clone();
-        name.push(format!("-{}-{}", std::process::id(), NEXT.fetch_add(1, Ordering::Relaxed)));
+        name.push(format!("-{}-{}", Maker::this().marks(), NEXT.fetch_add(1, Ordering::Relaxed)));
         name.push(&end);
         let path = target.with_file_name(name);
         match create(&path) {
@@ -32,10 +32,32 @@ pub(crate) fn begin(target: &Path, create: impl Fn(&Path) -> Result<()>) -> Resu
     }
 }
 
-/// Removes what killed programs left of their attempts at `target`.
+/// Removes what killed programs left of their attempts at `target`. A folder is attempted under a lock and by one thread of
+/// a process at a time, so that one of this process, or of an unknown one, is left over.
 pub(crate) fn sweep(target: &Path) -> Result<()> {
-    let mut stale = attempts(target).into_iter().filter(|(path, process)| is_stale(path, *process));
+    let is_folder = |path: &Path| path.symlink_metadata().is_ok_and(|meta| meta.is_dir());
+    let this = Maker::this();
+    let is_stale =
+        |path: &Path, maker: Option<&Maker>| match maker.filter(|maker| **maker != this).and_then(Maker::is_at_work) {
+            Some(is_at_work) => !is_at_work,
+            None => is_folder(path) || is_old(path),
+        };
+    let mut stale = attempts(target).into_iter().filter(|(path, maker)| is_stale(path, maker.as_ref()));
     stale.try_for_each(|(path, _)| remove(&path))
+}
+
+/// Removes what killed programs left in `folder` and, `depth` levels deep, in its folders, whatever the targets: a target
+/// may never be attempted again. What cannot be removed is left to the next run.
+pub fn sweep_folder(folder: &Path, depth: usize) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let (path, name) = (entry.path(), entry.file_name());
+        let marks = name.to_str().filter(|name| name.starts_with('.')).and_then(|name| name.rsplit_once(".attempt-"));
+        match marks.and_then(|(_, marks)| Maker::parse(marks.split('.').next()?)) {
+            Some(maker) if !maker.is_at_work().unwrap_or_else(|| !is_old(&path)) => drop(remove(&path)),
+            None if depth > 0 && entry.file_type().is_ok_and(|kind| kind.is_dir()) => sweep_folder(&path, depth - 1),
+            _ => {}
+        }
+    }
 }
 
 /// Where the folder `target` stands while two renames put another in its place.
@@ -61,24 +83,64 @@ pub fn remove(path: &Path) -> Result<()> {
     }
 }
 
-/// Whether a process of that number is at work on this machine.
-pub fn is_alive(process: u32) -> bool {
-    let pid = i32::try_from(process).ok().and_then(Pid::from_raw);
-    pid.is_some_and(|pid| test_kill_process(pid) != Err(Errno::SRCH))
+/// The process that made an attempt, by the attempt's name.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Maker {
+    process: u32,
+    /// Its start, as a number may be given again, and its machine. `None`: written by an earlier version, or not known.
+    origin: Option<(u64, String)>,
 }
 
-/// The attempts at `target`, sorted, with the processes in their names; earlier versions wrote none.
-fn attempts(target: &Path) -> Vec<(PathBuf, Option<u32>)> {
+impl Maker {
+    fn this() -> Self {
+        let process = std::process::id();
+        let origin = started(process).zip(Some(machine()).filter(|machine| !machine.is_empty()));
+        Self { process, origin: origin.map(|(start, machine)| (start, machine.to_owned())) }
+    }
+
+    fn marks(&self) -> String {
+        match &self.origin {
+            Some((start, machine)) => format!("{}-{start}-{machine}", self.process),
+            None => self.process.to_string(),
+        }
+    }
+
+    /// Reads the marks and the number of an attempt.
+    fn parse(text: &str) -> Option<Self> {
+        let (marks, number) = text.rsplit_once('-')?;
+        let _: u64 = number.parse().ok()?;
+        let mut parts = marks.split('-');
+        let process = parts.next()?.parse().ok()?;
+        let origin = match (parts.next(), parts.next(), parts.next()) {
+            (None, ..) => None,
+            (Some(start), Some(machine), None) => Some((start.parse().ok()?, machine.to_owned())),
+            _ => return None,
+        };
+        Some(Self { process, origin })
+    }
+
+    /// Whether the process goes on with the attempt; `None`: it was on another machine, or may have been.
+    fn is_at_work(&self) -> Option<bool> {
+        match &self.origin {
+            Some((start, on)) if on == machine() => {
+                Some(is_alive(self.process) && started(self.process).is_none_or(|now| now == *start))
+            }
+            Some(_) => None,
+            // One process made one attempt at a time, and a number may come again after a restart.
+            None => Some(true).filter(|_| self.process != std::process::id() && is_alive(self.process)),
+        }
+    }
+}
+
+/// The attempts at `target`, sorted, with the processes in their names; the earliest versions wrote none.
+fn attempts(target: &Path) -> Vec<(PathBuf, Option<Maker>)> {
     let [start, end] = name_parts(target);
     let entries = fs::read_dir(parent(target)).into_iter().flatten().flatten();
     let parsed = |name: OsString| {
         let rest = name.as_encoded_bytes().strip_prefix(start.as_encoded_bytes())?;
         let rest = std::str::from_utf8(rest.strip_suffix(end.as_encoded_bytes())?).ok()?;
-        let process = match rest.strip_prefix('-').and_then(|rest| rest.split_once('-')) {
-            Some((process, number)) => number.parse::<u64>().ok().and_then(|_| process.parse().ok()).map(Some)?,
-            None => rest.is_empty().then_some(None)?,
-        };
-        Some((target.with_file_name(name), process))
+        let maker = if rest.is_empty() { None } else { Some(Maker::parse(rest.strip_prefix('-')?)?) };
+        Some((target.with_file_name(name), maker))
     };
     let mut found: Vec<_> = entries.filter_map(|entry| parsed(entry.file_name())).collect();
     found.sort();
@@ -97,13 +159,11 @@ fn name_parts(target: &Path) -> [OsString; 2] {
     [start, end]
 }
 
-/// Whether nobody goes on with an attempt. A folder is attempted under a lock, so that its programs are of this machine;
-/// one process makes one attempt at a time, and a number may come again after a restart.
-fn is_stale(path: &Path, process: Option<u32>) -> bool {
-    let is_at_work = process.is_some_and(|process| process != std::process::id() && is_alive(process));
-    let Ok(meta) = path.symlink_metadata() else { return false };
-    let age = meta.modified().ok().and_then(|time| SystemTime::now().duration_since(time).ok());
-    !is_at_work && (meta.is_dir() || age.is_some_and(|age| age >= RECENT))
+/// Whether nothing changed there for long. A time in the future is not old.
+fn is_old(path: &Path) -> bool {
+    let changed = path.symlink_metadata().and_then(|meta| meta.modified());
+    let age = changed.ok().and_then(|time| SystemTime::now().duration_since(time).ok());
+    age.is_some_and(|age| age >= RECENT)
 }
 
 #[cfg(test)]
@@ -141,8 +201,59 @@ mod tests {
         assert!(a != b && a.extension() == target.extension());
         let mut left = left_over(&target);
         left.retain(|path| ![&a, &b].contains(&path));
-        // Process 1 is at work everywhere; the young one may be of another machine.
+        // Process 1 is at work everywhere; the young one of an earlier version may be of another machine.
         assert_eq!(left, [dir.path().join(".q.attempt-1-1.mp4"), young]);
+    }
+
+    /// Sets the time of change of a file or folder `secs` ahead of now.
+    fn change(path: &Path, secs: i64) {
+        let by = Duration::from_secs(secs.unsigned_abs());
+        let time = if secs < 0 { SystemTime::now() - by } else { SystemTime::now() + by };
+        File::open(path).unwrap().set_modified(time).unwrap();
+    }
+
+    #[test]
+    fn attempts_of_the_dead_go_whatever_the_clocks_say_and_those_of_others_stay() {
+        let dir = tempfile::tempdir().unwrap();
+        let (own, here) = (std::process::id(), machine());
+        let (dead, start) = (ended_process(), started(own).unwrap());
+        let old = -(RECENT.as_secs() as i64) - 1;
+        // Another process had the number of this one before.
+        let reused = format!("{own}-{}-{here}-1", start - 1);
+        let elsewhere = format!("{own}-{start}-ffffffffffffffff");
+        let cases = [
+            (format!("{dead}-1-{here}-1"), 0, true),
+            (format!("{dead}-1-{here}-2"), 3600, true),
+            (reused, 0, true),
+            (format!("{own}-{start}-{here}-1"), old, false),
+            (format!("{elsewhere}-1"), -3600, false),
+            (format!("{elsewhere}-2"), 3600, false),
+            (format!("{elsewhere}-3"), old, true),
+            (format!("{dead}-1"), -3600, false),
+            (format!("{dead}-2"), old, true),
+        ];
+        for is_folder in [false, true] {
+            let (folder, other) = (dir.path().join("stage/host"), dir.path().join("a/b/c"));
+            let paths: Vec<PathBuf> =
+                cases.iter().map(|(marks, ..)| folder.join(format!(".a.attempt-{marks}.npz"))).collect();
+            let plant = |path: &Path| {
+                fs::create_dir_all(path.parent().unwrap()).unwrap();
+                if is_folder { fs::create_dir(path).unwrap() } else { create(path).unwrap() }
+            };
+            paths.iter().zip(&cases).for_each(|(path, (_, secs, _))| {
+                plant(path);
+                change(path, *secs);
+            });
+            let deep = other.join(format!(".a.attempt-{dead}-1-{here}-1.npz"));
+            plant(&deep);
+            sweep_folder(dir.path(), 2);
+            for (path, (_, _, goes)) in paths.iter().zip(&cases) {
+                assert_eq!(path.exists(), !goes, "{}", path.display());
+            }
+            assert!(deep.exists(), "deeper than asked for");
+            fs::remove_dir_all(dir.path().join("stage")).unwrap();
+            fs::remove_dir_all(dir.path().join("a")).unwrap();
+        }
     }
 
     #[test]
@@ -151,7 +262,7 @@ mod tests {
         let (target, victim) = (dir.path().join("a.json"), dir.path().join("victim"));
         fs::write(&victim, "precious").unwrap();
         for number in 0..200 {
-            let name = format!(".a.attempt-{}-{number}.json", std::process::id());
+            let name = format!(".a.attempt-{}-{number}.json", Maker::this().marks());
             std::os::unix::fs::symlink(&victim, dir.path().join(name)).unwrap();
         }
         super::super::write_file(&target, b"new").unwrap();

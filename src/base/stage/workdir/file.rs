@@ -2,8 +2,10 @@
 
 use super::attempt;
 use anyhow::{Context, Result};
-use std::fs::{self, File};
-use std::io::{ErrorKind, Write};
+use rustix::fs::OFlags;
+use std::fs::{self, File, OpenOptions};
+use std::io::{ErrorKind, Read, Write};
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 
 /// The disk is full, or a quota is used up.
@@ -56,6 +58,19 @@ pub(crate) fn flush_tree(folder: &Path) -> Result<()> {
         if path.is_dir() { flush_tree(&path)? } else { flush(&path)? }
     }
     flush(folder)
+}
+
+/// The bytes of a file. Errors: those of `fs::read`; something else than a file, a named pipe too, for which nothing waits
+/// (`ErrorKind::InvalidInput`, of a folder `IsADirectory`).
+pub fn read_file(path: &Path) -> std::io::Result<Vec<u8>> {
+    let mut file = OpenOptions::new().read(true).custom_flags(OFlags::NONBLOCK.bits() as i32).open(path)?;
+    if !file.metadata()?.is_file() {
+        let kind = if path.is_dir() { ErrorKind::IsADirectory } else { ErrorKind::InvalidInput };
+        return Err(kind.into());
+    }
+    let mut bytes = Vec::new();
+    file.read_to_end(&mut bytes)?;
+    Ok(bytes)
 }
 
 /// Writes `bytes` to `path` atomically; its folder is made if missing.

@@ -2,9 +2,9 @@
 //! or removed as a whole, so that its file lies beside it and goes with the last that holds it. No lock is waited for:
 //! who comes second is told who is at work. A lock goes with its process, however that ends.
 
-use super::attempt::is_alive;
 use super::file::parent;
 use super::folder::{recover_folder, restore_folder};
+use super::process::is_alive;
 use anyhow::{Context, Result};
 use rustix::fs::OFlags;
 use rustix::io::Errno;
@@ -123,6 +123,9 @@ fn take(folder: &Path, path: &Path, is_exclusive: bool) -> Result<Option<File>> 
                 anyhow::bail!("{} is a link, expected a lock file; remove it", path.display())
             }
             Err(error) => match error.kind() {
+                ErrorKind::IsADirectory | ErrorKind::InvalidInput => {
+                    anyhow::bail!("{} is a folder or a pipe, expected a lock file; remove it", path.display())
+                }
                 ErrorKind::NotFound | ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => return Ok(None),
                 _ => return Err(error).with_context(|| format!("cannot open the lock file {}", path.display())),
             },
@@ -148,16 +151,19 @@ fn take(folder: &Path, path: &Path, is_exclusive: bool) -> Result<Option<File>> 
     }
 }
 
-/// Opens a lock file, made if missing: never a link, never cut off. Only to be read, where it may not be written.
+/// Opens a lock file, made if missing: never a link, never cut off. Only to be read, where it may not be written. Errors:
+/// `ErrorKind::InvalidInput` of a named pipe.
 fn open(path: &Path) -> std::io::Result<File> {
-    let flags = OFlags::NOFOLLOW.bits() as i32;
+    let flags = (OFlags::NOFOLLOW | OFlags::NONBLOCK).bits() as i32;
     let mut options = OpenOptions::new();
-    match options.read(true).append(true).create(true).custom_flags(flags).open(path) {
+    let opened = match options.read(true).append(true).create(true).custom_flags(flags).open(path) {
         Err(error) if matches!(error.kind(), ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem) => {
             OpenOptions::new().read(true).custom_flags(flags).open(path)
         }
         opened => opened,
-    }
+    };
+    let file = opened?;
+    if file.metadata()?.is_file() { Ok(file) } else { Err(ErrorKind::InvalidInput.into()) }
 }
 
 /// Whether the open lock file is still the one at `path`.
@@ -218,6 +224,16 @@ mod tests {
             assert!(error.to_string().contains("is a link"), "{error:#}");
         }
         assert_eq!(fs::read_to_string(&victim).unwrap(), "precious");
+        for is_folder in [true, false] {
+            super::super::remove(&work.join(".lock")).unwrap();
+            if is_folder {
+                fs::create_dir(work.join(".lock")).unwrap();
+            } else {
+                assert!(std::process::Command::new("mkfifo").arg(work.join(".lock")).status().unwrap().success());
+            }
+            let error = lock(&work).unwrap_err().to_string();
+            assert!(error.contains("is a folder or a pipe") && error.contains("remove it"), "{error}");
+        }
         fs::remove_file(work.join(".lock")).unwrap();
         let first = lock(&work).unwrap();
         let text = fs::read_to_string(work.join(".lock")).unwrap();

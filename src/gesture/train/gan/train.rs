@@ -61,6 +61,7 @@ pub fn train_watched(
     // Others may listen to the model while it learns, and nobody may forget it.
     let _model = FolderLock::shared(folder)?;
     let _lock = workdir::lock(folder)?;
+    workdir::sweep_folder(folder, 0);
     let resumed = resume(datasets, requested, folder, progress)?;
     let start = from.filter(|_| resumed.is_none()).map(StartingModel::read).transpose()?;
     if let Some(start) = &start {

@@ -69,6 +69,7 @@ pub fn train_watched(
     // Others may listen to the model while it learns, and nobody may forget it.
     let _model = FolderLock::shared(folder)?;
     let _lock = workdir::lock(folder)?;
+    workdir::sweep_folder(folder, 0);
     let resumed = resume(source, requested, folder, progress)?;
     let (mut trainer, splits) = match &resumed {
         Some((stored, contents)) => {

@@ -1,0 +1,82 @@
+//! What plans hold of a video that is to be forgotten: the plan lists it, its workers and jobs may name it. All of that is
+//! removed, not rewritten: a plan without the video has another seal, so that nothing that refers to it would go on.
+
+use super::timing;
+use anyhow::{Context, Result};
+use orator_dataset::forget::search::{SearchTerm, search};
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Plans in the work folder that hold one of the terms, with the folders of their workers, folders of earlier plans that
+/// do, and the excerpts that a killed `orator plan` left.
+///
+/// # Errors
+/// A folder that cannot be listed, a file that cannot be searched.
+pub fn plans_naming(work: &Path, terms: &[SearchTerm]) -> Result<Vec<PathBuf>> {
+    if !work.is_dir() {
+        return Ok(Vec::new());
+    }
+    let listing = || format!("cannot list {}", work.display());
+    let entries = fs::read_dir(work).with_context(listing)?.map(|entry| Ok(entry?.path()));
+    let entries = entries.collect::<Result<BTreeSet<PathBuf>>>().with_context(listing)?;
+    let holds_one =
+        |path: &PathBuf| -> Result<bool> { Ok(!search(std::slice::from_ref(path), terms)?.places.is_empty()) };
+    let mut found = BTreeSet::new();
+    for path in entries.iter().filter(|path| is_plan(path)) {
+        if holds_one(path)? {
+            found.insert(path.clone());
+        }
+    }
+    for path in &entries {
+        let Some(plan) = plan_of(path) else { continue };
+        if found.contains(&plan) || holds_one(path)? {
+            found.insert(path.clone());
+        }
+    }
+    found.extend(Some(work.join(timing::FOLDER)).filter(|folder| folder.is_dir()));
+    Ok(found.into_iter().collect())
+}
+
+/// Whether the file is a plan of any version, or an attempt at one.
+fn is_plan(path: &Path) -> bool {
+    let is_json = path.extension().is_some_and(|ending| ending == "json") && path.is_file();
+    let bytes = if is_json { fs::read(path).unwrap_or_default() } else { Vec::new() };
+    let has = |key: &[u8]| bytes.windows(key.len()).any(|window| window == key);
+    has(b"\"program\":") && has(b"\"units\":")
+}
+
+/// The plan that a folder of workers is of.
+fn plan_of(folder: &Path) -> Option<PathBuf> {
+    let (stem, seal) = folder.file_name()?.to_str()?.rsplit_once('-')?;
+    let is_seal = seal.len() == 12 && seal.bytes().all(|byte| byte.is_ascii_hexdigit());
+    (is_seal && folder.is_dir()).then(|| folder.with_file_name(format!("{stem}.json")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn plans_that_hold_a_video_are_found_with_their_folders() {
+        let dir = tempfile::tempdir().unwrap();
+        let work = dir.path();
+        let write = |name: &str, text: &str| {
+            fs::create_dir_all(work.join(name).parent().unwrap()).unwrap();
+            fs::write(work.join(name), text).unwrap();
+        };
+        let plan = |video: &str| format!("{{\n  \"program\": \"1\",\n  \"units\": [\"{video}\"]\n}}");
+        write("plan.json", &plan("/v/a.mp4"));
+        write("plan-0123456789ab/claims/0000/000000.claim.0001", "{}");
+        write("plan-aaaaaaaaaaaa/workers/w.json", "/v/a.mp4");
+        write("other.json", &plan("/v/b.mp4"));
+        write("other-0123456789ab/workers/w.json", "/v/b.mp4");
+        write("stage_times.json", "\"/v/a.mp4\"");
+        write("timing/00.mkv", "an excerpt");
+        let terms = SearchTerm::name("path", "/v/a.mp4");
+        let found = plans_naming(work, &terms).unwrap();
+        let expected = ["plan-0123456789ab", "plan-aaaaaaaaaaaa", "plan.json", "timing"].map(|name| work.join(name));
+        assert_eq!(found, expected);
+        assert!(plans_naming(&work.join("none"), &terms).unwrap().is_empty());
+    }
+}
