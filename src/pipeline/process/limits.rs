@@ -65,7 +65,8 @@ impl Limits {
         let secs = stated.map_or(LONGEST_SECS, |secs| LONGEST_SECS.min(secs + 60.0));
         let memory =
             BASE_BYTES + BYTES_PER_PIXEL * pixels + BYTES_PER_FRAME * secs * rate + MEMORY_PER_BYTE * n_bytes as f64;
-        let n_frames = secs * header.fps.unwrap_or(0.0).max(FPS[0]).min(FPS[1]);
+        let fps = header.fps.filter(|fps| fps.is_finite()).unwrap_or(0.0).clamp(FPS[0], FPS[1]);
+        let n_frames = secs * fps;
         let cpu_secs = BASE_SECS + n_frames * (SECS_PER_FRAME + SECS_PER_MEGAPIXEL * pixels / 1e6);
         Self::new(memory, cpu_secs, format!("{:.0} s of {width}x{height} pictures", secs.ceil()))
     }
