@@ -2,7 +2,7 @@
 
 use super::pipeline::Pipeline;
 use super::process::message::MediaRequest;
-use super::process::{answer_media, ask_media};
+use super::process::{Limits, answer_media, ask_media};
 use super::stages::UnitWork;
 use anyhow::Result;
 use orator_base::stage::artifacts::StageName;
@@ -49,10 +49,11 @@ impl Pipeline {
     /// # Errors
     /// A video that cannot be read.
     pub fn ask_media(&self, request: &MediaRequest) -> Result<Option<f64>> {
-        match self.program() {
-            Some(program) => ask_media(program, request),
+        let header = match self.program() {
+            Some(program) => ask_media(program, request, &Limits::of_header()),
             None => answer_media(request),
-        }
+        };
+        Ok(header?.secs)
     }
 
     /// This pipeline with these files, each with the name of its speaker, in place of all videos, and another work

@@ -6,7 +6,7 @@ use ffmpeg_next::{Frame, Packet, Rational, codec, decoder, format, media};
 use std::path::{Path, PathBuf};
 
 /// Most pixels of a picture, twice those of 8K; a header of a few bytes may claim any number.
-const MOST_PIXELS: i64 = 1 << 26;
+pub const MOST_PIXELS: i64 = 1 << 26;
 
 /// Decoder with its position in the file.
 pub(crate) struct StreamDecoder {
@@ -77,6 +77,7 @@ impl StreamDecoder {
                         return Ok(false);
                     }
                 }
+                Err(error) if is_out_of_memory(error) => return self.fail(error),
                 // The decoder's last frames are broken; those before are valid.
                 Err(_) if self.draining && self.n_bad > 1000 => return Ok(false),
                 Err(_) => self.n_bad += 1,
@@ -113,11 +114,11 @@ impl StreamDecoder {
         let mut packet = Packet::empty();
         match packet.read(&mut self.input) {
             Ok(()) if packet.stream() != self.stream_idx => {}
-            Ok(()) => {
-                if self.decoder.send_packet(&packet).is_err() {
-                    self.n_bad += 1;
-                }
-            }
+            Ok(()) => match self.decoder.send_packet(&packet) {
+                Ok(()) => {}
+                Err(error) if is_out_of_memory(error) => return self.fail(error),
+                Err(_) => self.n_bad += 1,
+            },
             Err(error) => {
                 if error != ffmpeg::Error::Eof {
                     self.stopped = Some(error);
@@ -130,6 +131,11 @@ impl StreamDecoder {
         Ok(())
     }
 
+    /// Lack of memory is no damage of the file: the same file must not give fewer frames on a smaller machine.
+    fn fail<T>(&self, error: ffmpeg::Error) -> Result<T> {
+        Err(error).with_context(|| format!("cannot decode {}", self.path.display()))
+    }
+
     /// Description of damage, if any.
     pub(crate) fn damage(&self) -> Option<String> {
         let stopped = self.stopped.map(|error| format!("reading broke off ({error})"));
@@ -138,4 +144,8 @@ impl StreamDecoder {
         let parts: Vec<String> = stopped.into_iter().chain(bad).chain(flawed).collect();
         (!parts.is_empty()).then(|| parts.join(", "))
     }
+}
+
+fn is_out_of_memory(error: ffmpeg::Error) -> bool {
+    matches!(error, ffmpeg::Error::Other { errno: ffmpeg::error::ENOMEM })
 }

@@ -52,7 +52,7 @@ pub struct UnreadableMedia(pub String);
 /// repeated pictures or silence.
 pub(crate) const LONGEST_GAP_SECS: f64 = 600.0;
 /// Longest plausible video or sound, seconds (a day).
-pub(crate) const LONGEST_SECS: f64 = 86_400.0;
+pub const LONGEST_SECS: f64 = 86_400.0;
 
 /// Opens `path` and reads its headers.
 pub(crate) fn open(path: &Path) -> Result<Input> {

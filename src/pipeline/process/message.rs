@@ -22,15 +22,19 @@ pub enum Request {
     Restrict,
     /// To work on a unit.
     Unit(Box<UnitRequest>),
-    /// To say how long a video is, or to copy an excerpt of it.
-    Media(MediaRequest),
+    /// To read the header of a video, or to copy an excerpt of it.
+    Media {
+        wanted: MediaRequest,
+        /// Most bytes of memory.
+        memory: u64,
+    },
 }
 
 /// What is wanted of a video before any stage.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MediaRequest {
     pub source: PathBuf,
-    /// The excerpt to copy; without it the length is asked for.
+    /// The excerpt to copy; without it the header is read.
     pub excerpt: Option<ExcerptRequest>,
 }
 
@@ -41,6 +45,17 @@ pub struct ExcerptRequest {
     pub secs: f64,
     /// The file to write, in a folder that is there.
     pub to: PathBuf,
+}
+
+/// The header of a video as far as limits depend on it; of an excerpt, its length alone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MediaHeader {
+    /// Length in seconds, if stated.
+    pub secs: Option<f64>,
+    /// Width and height in px as coded; 0 without pictures.
+    pub image_size: [usize; 2],
+    /// Average frames a second, if stated.
+    pub fps: Option<f64>,
 }
 
 /// A unit at a stage, with all that the stage is built of.
@@ -63,6 +78,8 @@ pub struct UnitRequest {
     pub reads: Vec<OsString>,
     /// The empty folder that it writes into.
     pub out: OsString,
+    /// Most bytes of memory.
+    pub memory: u64,
 }
 
 /// What the process says. Tasks of its progress have numbers.
@@ -95,7 +112,7 @@ pub enum Message {
         facts: Map<String, Value>,
     },
     /// Answer to `Request::Media`.
-    Secs(Option<f64>),
+    Media(MediaHeader),
     Failed(SentFailure),
 }
 
@@ -135,6 +152,7 @@ mod tests {
             keypoints: Some(KeypointSource { fps: None, image_size: Some([4, 3]), sound: Err("none".into()) }),
             reads: vec![source.clone()],
             out: "out".into(),
+            memory: 1 << 40,
         };
         let mut pipe = Vec::new();
         send(&mut pipe, &Request::Unit(Box::new(unit))).unwrap();

@@ -1,25 +1,25 @@
 //! A stage that works on each unit in a subprocess. To a run it is the stage itself.
 
 use super::failure::plain;
-use super::message::{MediaRequest, Message, Request, UnitRequest, receive, send};
-use super::unit::VERB;
-use anyhow::{Context, Result, anyhow, bail, ensure};
+use super::limits::Limits;
+use super::message::{MediaHeader, MediaRequest, Message, Request, UnitRequest, receive};
+use super::subprocess::{Answers, UnitProcess};
+use anyhow::{Result, anyhow, bail, ensure};
+use orator_base::stage::artifacts::{Artifact, StageName};
 use orator_base::stage::progress::{Event, Progress, Task};
 use orator_base::stage::{Report, Stage, StageWrapper, Unit};
-use orator_dataset::config::Config;
+use orator_base::types::time::FrameRate;
 use orator_dataset::config::videos::Videos;
+use orator_dataset::config::{Config, KeypointSource};
+use orator_formats::media_json::MediaInfo;
 use orator_media::sandbox::Restriction;
 use orator_onnx::find_library;
 use std::collections::BTreeMap;
-use std::io::{BufReader, Read};
-use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
+use std::io::Read;
 use std::path::Path;
-use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 
 /// Most tasks under way at a time that a process is believed.
 const MAX_TASKS: usize = 16;
-/// Bytes of what a process complained of that are kept: the last ones.
-const MAX_COMPLAINT: usize = 2000;
 
 /// A stage of videos, with the program that works on its units.
 pub struct SubprocessStage<'a> {
@@ -45,15 +45,39 @@ impl StageWrapper for SubprocessStage<'_> {
 
 impl SubprocessStage<'_> {
     fn work(&self, unit: &Unit, part: Option<usize>, out: &Path, progress: &dyn Progress) -> Result<Report> {
-        let mut process = UnitProcess::start(self.program)?;
-        process.ask(&Request::Unit(Box::new(self.request(unit, part, out)?)));
-        match process.follow(progress) {
-            Ok(ended) => ended,
-            Err(death) => Err(anyhow!("{}: the process that read it {death}", unit.source.display())),
-        }
+        let limits = self.limits(unit)?;
+        let request = Request::Unit(Box::new(self.request(unit, part, out, limits.memory)?));
+        asked(self.program, &request, &unit.source, &limits, |answers| relay(answers, progress))
     }
 
-    fn request(&self, unit: &Unit, part: Option<usize>, out: &Path) -> Result<UnitRequest> {
+    /// Limits of a process for the unit: by the header of the video, or by what `extract` found of it.
+    fn limits(&self, unit: &Unit) -> Result<Limits> {
+        let settings = &self.config.settings;
+        let header = if self.name() != StageName::Extract.as_str() {
+            MediaInfo::read(&Artifact::MediaInfo.path(&settings.work.dir, unit)).ok().map(|media| MediaHeader {
+                secs: Some(media.duration_secs.max(media.audio_secs.unwrap_or(0.0))),
+                image_size: media.image_size,
+                fps: media.source_fps.map(FrameRate::per_sec),
+            })
+        } else if self.keypoints(unit).is_none() {
+            let request = MediaRequest { source: unit.source.clone(), excerpt: None };
+            Some(ask_media(self.program, &request, &Limits::of_header())?)
+        } else {
+            None
+        };
+        let beside = self.stage.inputs(unit)?.into_iter().filter(|input| input.path != unit.source);
+        let n_bytes = beside.filter_map(|input| std::fs::metadata(input.path).ok()).map(|meta| meta.len()).sum();
+        let rate = settings.extract.rate().per_sec();
+        Ok(header.map_or_else(Limits::of_machine, |header| Limits::of_video(&header, rate, n_bytes)))
+    }
+
+    /// What the configuration says of a unit that is keypoints of another program.
+    fn keypoints(&self, unit: &Unit) -> Option<&KeypointSource> {
+        let of_speaker = self.videos.iter().find(|videos| videos.speaker == unit.speaker);
+        of_speaker.and_then(|videos| videos.keypoints.get(&unit.video))
+    }
+
+    fn request(&self, unit: &Unit, part: Option<usize>, out: &Path, memory: u64) -> Result<UnitRequest> {
         let mut settings = self.config.settings.clone();
         settings.speaker.retain(|speaker| speaker.name == unit.speaker);
         let mut reads: Vec<_> = self.stage.inputs(unit)?.into_iter().map(|input| input.path.into()).collect();
@@ -63,7 +87,6 @@ impl SubprocessStage<'_> {
             reads.push(library.clone().into());
             settings.models.onnxruntime = library;
         }
-        let of_speaker = self.videos.iter().find(|videos| videos.speaker == unit.speaker);
         Ok(UnitRequest {
             stage: self.name().to_owned(),
             speaker: unit.speaker.clone(),
@@ -72,9 +95,10 @@ impl SubprocessStage<'_> {
             part,
             settings,
             config_file: self.config.file.clone(),
-            keypoints: of_speaker.and_then(|videos| videos.keypoints.get(&unit.video)).cloned(),
+            keypoints: self.keypoints(unit).cloned(),
             reads,
             out: out.into(),
+            memory,
         })
     }
 }
@@ -84,7 +108,10 @@ impl SubprocessStage<'_> {
 /// # Errors
 /// The program cannot be started, or does not answer.
 pub fn probe(program: &Path) -> Result<Restriction> {
-    match UnitProcess::start(program)?.answer(&Request::Restrict)? {
+    let mut process = UnitProcess::start(program)?;
+    process.ask(&Request::Restrict);
+    let answer = process.follow(&Limits::of_header(), |answers| receive(answers));
+    match answer.map_err(|death| anyhow!("{}: the process that it started {death}", program.display()))? {
         Message::Restricted(restriction) => Ok(restriction),
         other => bail!("{other:?} is no answer"),
     }
@@ -93,75 +120,29 @@ pub fn probe(program: &Path) -> Result<Restriction> {
 /// What a restricted process that `program` starts finds of a video: see `answer_media`.
 ///
 /// # Errors
-/// Those of `answer_media`; a process that is lost.
-pub fn ask_media(program: &Path, request: &MediaRequest) -> Result<Option<f64>> {
-    match UnitProcess::start(program)?.answer(&Request::Media(request.clone())) {
-        Ok(Message::Secs(secs)) => Ok(secs),
-        Ok(Message::Failed(failure)) => Err(failure.into_error()),
-        _ => bail!("{}: the process that read it gave no answer", request.source.display()),
-    }
+/// Those of `answer_media`; a process that is lost, or ended by its limits.
+pub fn ask_media(program: &Path, request: &MediaRequest, limits: &Limits) -> Result<MediaHeader> {
+    let source = &request.source;
+    let request = Request::Media { wanted: request.clone(), memory: limits.memory };
+    asked(program, &request, source, limits, |answers| match receive(answers)? {
+        Message::Media(header) => Ok(Ok(header)),
+        Message::Failed(failure) => Ok(Err(failure.into_error())),
+        _ => bail!("no answer to the request"),
+    })
 }
 
-/// A process at work, which ends with this value. It may have been taken over by what it read.
-struct UnitProcess {
-    child: Child,
-    /// Open while the process may live.
-    stdin: Option<ChildStdin>,
-}
-
-impl UnitProcess {
-    fn start(program: &Path) -> Result<Self> {
-        let mut command = Command::new(program);
-        command.arg(VERB).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        // Ctrl-C is for the run alone, which ends its processes.
-        command.process_group(0);
-        let mut child = command.spawn().with_context(|| format!("cannot start {}", program.display()))?;
-        let stdin = child.stdin.take();
-        Ok(Self { child, stdin })
-    }
-
-    /// Sends the request. A process that is gone already is noticed by its silence.
-    fn ask(&mut self, request: &Request) {
-        let _ = self.stdin.as_mut().map(|stdin| send(stdin, request));
-    }
-
-    /// The one message that the process sends in answer to a request.
-    fn answer(mut self, request: &Request) -> Result<Message> {
-        self.ask(request);
-        receive(&mut self.child.stdout.take().context("no pipe")?)
-    }
-
-    /// Follows the process to the stage's result and ends it, so that nothing is written after; or says how it was lost.
-    fn follow(&mut self, progress: &dyn Progress) -> Result<Result<Report>, String> {
-        let (Some(out), Some(complaints)) = (self.child.stdout.take(), self.child.stderr.take()) else {
-            return Err("has no pipes".to_owned());
-        };
-        let (result, complaint) = std::thread::scope(|scope| {
-            let complaint = scope.spawn(|| last_bytes(complaints));
-            let result = relay(&mut BufReader::new(out), progress);
-            let _ = self.child.kill();
-            (result, complaint.join().unwrap_or_default())
-        });
-        let status = self.child.wait();
-        result.map_err(|error| {
-            let is_end = |cause: &std::io::Error| cause.kind() == std::io::ErrorKind::UnexpectedEof;
-            let death = match status {
-                Ok(status) if error.chain().filter_map(|cause| cause.downcast_ref()).any(is_end) => death(status),
-                _ => "sent what makes no sense".to_owned(),
-            };
-            match plain(String::from_utf8_lossy(&complaint).trim()) {
-                said if said.is_empty() => death,
-                said => format!("{death}; it said: {said}"),
-            }
-        })
-    }
-}
-
-impl Drop for UnitProcess {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
+/// The answer of a process that `program` starts and that reads `source`, as `read` understands it.
+fn asked<T>(
+    program: &Path,
+    request: &Request,
+    source: &Path,
+    limits: &Limits,
+    read: impl FnOnce(&mut Answers<'_>) -> Result<Result<T>>,
+) -> Result<T> {
+    let mut process = UnitProcess::start(program)?;
+    process.ask(request);
+    let lost = |death| Err(anyhow!("{}: the process that read it {death}", source.display()));
+    process.follow(limits, read).unwrap_or_else(lost).map_err(|error| limits.explain(source, error))
 }
 
 /// Hands the progress on until the process has a result. Errors: its end, or what is no message.
@@ -180,31 +161,7 @@ fn relay(from: &mut impl Read, progress: &dyn Progress) -> Result<Result<Report>
             Message::Estimate { line } => progress.event(&Event::Estimate { line: &plain(&line) }),
             Message::Done { line, facts } => return Ok(Ok(Report { line: plain(&line), facts })),
             Message::Failed(failure) => return Ok(Err(failure.into_error())),
-            Message::Restricted(_) | Message::Secs(_) => bail!("no answer to the request"),
+            Message::Restricted(_) | Message::Media(_) => bail!("no answer to the request"),
         }
     }
-}
-
-/// The last bytes that the process writes before it ends.
-fn last_bytes(mut from: impl Read) -> Vec<u8> {
-    let (mut last, mut piece) = (Vec::new(), [0; 4096]);
-    while let Ok(n @ 1..) = from.read(&mut piece) {
-        last.extend_from_slice(&piece[..n]);
-        last.drain(..last.len().saturating_sub(MAX_COMPLAINT));
-    }
-    last
-}
-
-/// How a process ended before it had a result.
-fn death(status: ExitStatus) -> String {
-    if let Some(signal) = status.signal() {
-        let why = match signal {
-            6 => " (it gave up)",
-            7 | 11 => " (it reached for memory that is not its own): the file may be damaged, or made to do harm",
-            9 => " (killed: memory ran out, or by hand)",
-            _ => "",
-        };
-        return format!("was ended by signal {signal}{why}");
-    }
-    format!("ended before it was done ({status})")
 }

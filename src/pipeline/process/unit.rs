@@ -2,11 +2,13 @@
 //! with the run that started it.
 
 use super::failure::SentFailure;
-use super::message::{MediaRequest, Message, Request, UnitRequest, receive, send};
+use super::limits::limit_memory;
+use super::message::{MediaHeader, MediaRequest, Message, Request, UnitRequest, receive, send};
 use crate::stages;
 use anyhow::{Context, Result};
 use orator_base::stage::progress::{Event, Progress, Task};
 use orator_base::stage::{Report, Unit, attempt, workdir};
+use orator_base::types::time::FrameRate;
 use orator_dataset::config::Config;
 use orator_dataset::config::videos::Videos;
 use orator_media::ffmpeg::probe::probe;
@@ -36,22 +38,25 @@ pub fn serve() -> Result<()> {
             out.send(&Message::Restricted(restrict(&FileAccess { reads: Some(Vec::new()), writes: Vec::new() })))
         }
         Request::Unit(unit) => {
+            limit_memory(unit.memory)?;
             let paths = |paths: &[std::ffi::OsString]| paths.iter().map(PathBuf::from).collect();
             restrict(&FileAccess { reads: Some(paths(&unit.reads)), writes: vec![(&unit.out).into()] });
             let done = |Report { line, facts }| Message::Done { line, facts };
             answer(&out, || work(*unit, &out).map(done))
         }
-        Request::Media(media) => {
+        Request::Media { wanted: media, memory } => {
+            limit_memory(memory)?;
             let writes = media.excerpt.iter().filter_map(|excerpt| excerpt.to.parent().map(Into::into)).collect();
             restrict(&FileAccess { reads: Some(vec![media.source.clone()]), writes });
-            answer(&out, || answer_media(&media).map(Message::Secs))
+            answer(&out, || answer_media(&media).map(Message::Media))
         }
     }
 }
 
 /// Sends the message that `work` ends with, for as long as the process that asked is there.
 fn answer(out: &Messages, work: impl FnOnce() -> Result<Message>) -> Result<()> {
-    std::thread::spawn(end_with_parent);
+    let watched = std::thread::Builder::new().spawn(end_with_parent);
+    let work = || watched.context("cannot allocate memory for a thread").and_then(|_| work());
     let failed = |error| Message::Failed(SentFailure::of(&workdir::full_disk(error)));
     out.send(&attempt::guarded(work).unwrap_or_else(failed))
 }
@@ -79,15 +84,19 @@ fn work(request: UnitRequest, out: &Messages) -> Result<Report> {
     }
 }
 
-/// The length of a video in seconds, where a header says it; of an excerpt, what was copied.
+/// The header of a video; the length of an excerpt that it copies.
 ///
 /// # Errors
 /// A video that cannot be read, an excerpt that cannot be copied.
-pub fn answer_media(request: &MediaRequest) -> Result<Option<f64>> {
-    match &request.excerpt {
-        None => Ok(probe(&request.source)?.duration_secs),
-        Some(wanted) => excerpt::copy(&request.source, &wanted.to, wanted.start_secs, wanted.secs).map(Some),
+pub fn answer_media(request: &MediaRequest) -> Result<MediaHeader> {
+    if let Some(wanted) = &request.excerpt {
+        let secs = excerpt::copy(&request.source, &wanted.to, wanted.start_secs, wanted.secs)?;
+        return Ok(MediaHeader { secs: Some(secs), ..MediaHeader::default() });
     }
+    let media = probe(&request.source)?;
+    let image_size = media.video.as_ref().map_or([0; 2], |video| video.coded_size);
+    let fps = media.video.and_then(|video| video.fps).map(FrameRate::per_sec);
+    Ok(MediaHeader { secs: media.duration_secs, image_size, fps })
 }
 
 /// Standard output.

@@ -3,7 +3,8 @@
 
 use orator::{Pipeline, Selection, Silent, StageName, UnreadableMedia, load_config};
 use orator_media::sandbox::{FileAccess, restrict, restrict_thread};
-use orator_pipeline::process::{VERB, probe};
+use orator_pipeline::process::message::MediaRequest;
+use orator_pipeline::process::{Limits, VERB, ask_media, probe};
 use orator_test_support::project::{Project, files_under};
 use orator_test_support::skip::skip;
 use std::collections::BTreeMap;
@@ -87,6 +88,91 @@ fn attempt_everything(dir: &Path) {
         let is_refused = matches!(error.kind(), ErrorKind::PermissionDenied | ErrorKind::CrossesDevices);
         assert!(is_refused, "{what}: {error}");
     }
+    attempt_calls();
+}
+
+/// Makes a system call whose pointers are all null, and returns its error number.
+fn call(number: libc::c_long, arguments: &[libc::c_long]) -> Option<i32> {
+    let at = |idx: usize| arguments.get(idx).copied().unwrap_or(0);
+    // SAFETY: with null pointers the calls that are tried read and write no memory of this process; a new mapping is left
+    // alone.
+    let answer = unsafe { libc::syscall(number, at(0), at(1), at(2), at(3), at(4), at(5)) };
+    (answer < 0).then(std::io::Error::last_os_error).and_then(|error| error.raw_os_error())
+}
+
+/// Calls that act on the parent process, or take memory that is not counted. Without the filter they would not fail with
+/// EPERM, and change nothing there.
+fn attempt_calls() {
+    let parent = libc::c_long::from(std::os::unix::process::parent_id());
+    let first = |number: i32| libc::c_long::from(number);
+    let shared = first(libc::MAP_SHARED | libc::MAP_ANONYMOUS);
+    let refused: &[(&str, libc::c_long, &[libc::c_long])] = &[
+        ("setpriority", libc::SYS_setpriority, &[0, parent]),
+        ("setpriority of a group", libc::SYS_setpriority, &[1, 0]),
+        ("setpriority of a user", libc::SYS_setpriority, &[2, 0]),
+        ("ioprio_set", libc::SYS_ioprio_set, &[1, parent]),
+        ("ioprio_set of a group", libc::SYS_ioprio_set, &[2, 0]),
+        ("sched_setaffinity", libc::SYS_sched_setaffinity, &[parent]),
+        ("sched_setscheduler", libc::SYS_sched_setscheduler, &[parent]),
+        ("sched_setparam", libc::SYS_sched_setparam, &[parent]),
+        ("sched_setattr", libc::SYS_sched_setattr, &[parent]),
+        ("prlimit64", libc::SYS_prlimit64, &[parent]),
+        ("setpgid", libc::SYS_setpgid, &[parent]),
+        ("get_robust_list", libc::SYS_get_robust_list, &[parent]),
+        ("kcmp", libc::SYS_kcmp, &[parent, parent]),
+        ("ptrace", libc::SYS_ptrace, &[16, parent]),
+        ("process_vm_readv", libc::SYS_process_vm_readv, &[parent]),
+        ("process_vm_writev", libc::SYS_process_vm_writev, &[parent]),
+        ("process_madvise", libc::SYS_process_madvise, &[-1]),
+        ("process_mrelease", libc::SYS_process_mrelease, &[-1]),
+        ("migrate_pages", libc::SYS_migrate_pages, &[parent]),
+        ("move_pages", libc::SYS_move_pages, &[parent]),
+        ("pidfd_open", libc::SYS_pidfd_open, &[parent]),
+        ("pidfd_getfd", libc::SYS_pidfd_getfd, &[-1]),
+        ("pidfd_send_signal", libc::SYS_pidfd_send_signal, &[-1]),
+        ("kill", libc::SYS_kill, &[parent, first(libc::SIGCONT)]),
+        ("tkill", libc::SYS_tkill, &[parent, first(libc::SIGCONT)]),
+        ("tgkill", libc::SYS_tgkill, &[parent, parent, first(libc::SIGCONT)]),
+        ("rt_sigqueueinfo", libc::SYS_rt_sigqueueinfo, &[parent, first(libc::SIGCONT)]),
+        ("rt_tgsigqueueinfo", libc::SYS_rt_tgsigqueueinfo, &[parent, parent, first(libc::SIGCONT)]),
+        ("F_SETOWN", libc::SYS_fcntl, &[-1, first(libc::F_SETOWN), parent]),
+        ("F_SETOWN_EX", libc::SYS_fcntl, &[-1, 15]),
+        ("PR_SCHED_CORE", libc::SYS_prctl, &[first(libc::PR_SCHED_CORE), 2, parent]),
+        ("PR_SET_PDEATHSIG", libc::SYS_prctl, &[first(libc::PR_SET_PDEATHSIG), 0]),
+        ("shmat", libc::SYS_shmat, &[-1]),
+        ("memfd_create", libc::SYS_memfd_create, &[]),
+        ("shared memory", libc::SYS_mmap, &[0, 4096, 1, shared, -1]),
+    ];
+    for (what, number, arguments) in refused {
+        assert_eq!(call(*number, arguments), Some(libc::EPERM), "{what}");
+    }
+    // Of the thread itself, as thread pools do.
+    assert_eq!(call(libc::SYS_sched_setaffinity, &[0]), Some(libc::EINVAL));
+    assert_eq!(call(libc::SYS_prlimit64, &[0]), None);
+    assert_eq!(call(libc::SYS_setpriority, &[0, 0, 19]), None);
+    assert_eq!(call(libc::SYS_mmap, &[0, 4096, 1, first(libc::MAP_PRIVATE | libc::MAP_ANONYMOUS), -1]), None);
+}
+
+#[test]
+fn a_process_that_needs_more_memory_than_its_limit_says_so() {
+    let project = Project::with_clips("memory-limit", 1, 1.0);
+    let wanted = MediaRequest { source: project.clips()[0].clone(), excerpt: None };
+    let ask = |limits: &Limits| ask_media(Path::new(PROGRAM), &wanted, limits);
+    let header = ask(&Limits::of_header()).unwrap();
+    assert!(header.secs.is_some() && header.image_size[0] > 0, "{header:?}");
+    let error = format!("{:#}", ask(&Limits { memory: 1 << 20, ..Limits::of_header() }).unwrap_err());
+    assert!(error.contains("mp4: reading it takes more than the 1 MB of memory"), "{error}");
+}
+
+#[test]
+fn a_process_that_waits_for_ever_is_ended() {
+    let dir = tempfile::tempdir().unwrap();
+    let source = dir.path().join("pipe.mp4");
+    assert!(Command::new("mkfifo").arg(&source).status().unwrap().success());
+    let limits = Limits { idle_secs: 2, ..Limits::of_header() };
+    let error = ask_media(Path::new(PROGRAM), &MediaRequest { source, excerpt: None }, &limits).unwrap_err();
+    let error = format!("{error:#}");
+    assert!(error.contains("pipe.mp4: the process that read it did nothing for 2 s and was ended"), "{error}");
 }
 
 #[test]
@@ -186,6 +272,19 @@ fn a_process_that_dies_fails_its_unit_alone() {
         assert_eq!(project.run(&[]).code, 0);
         fs::remove_dir_all(project.work()).unwrap();
     }
+}
+
+#[test]
+fn a_signal_to_stop_is_for_the_run_alone() {
+    let project = Project::with_clips("stop-signals", 1, 4.6);
+    let mut run = project.start(&["run", "--to", "segment"]);
+    let mut signalled = std::collections::BTreeSet::new();
+    while let Some(unit) = unit_of(&mut run) {
+        // It may have ended since.
+        let _ = Command::new("kill").args(["-TERM", &unit.to_string()]).stderr(Stdio::null()).status().unwrap();
+        signalled.insert(unit);
+    }
+    assert!(run.wait().unwrap().success() && !signalled.is_empty());
 }
 
 #[test]

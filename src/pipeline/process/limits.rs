@@ -1,0 +1,189 @@
+//! Limits of memory and time for the process of a unit, from the size of the pictures and the length of the video. They
+//! are several times what real videos take (the guide has the measurements), so that only a hostile or broken file meets
+//! them.
+
+use super::message::MediaHeader;
+use anyhow::{Error, Result};
+use orator_media::ffmpeg::decode::MOST_PIXELS;
+use orator_media::ffmpeg::source::LONGEST_SECS;
+use rustix::process::{Resource, Rlimit, setrlimit};
+use std::path::Path;
+
+/// Bytes for the program, its libraries, and the tensors of the models.
+const BASE_BYTES: f64 = (2_u64 << 30) as f64;
+/// Bytes a pixel: a decoder's 16 reference pictures and those that wait for display, at 6 bytes a pixel, and copies as RGB.
+const BYTES_PER_PIXEL: f64 = 128.0;
+/// Bytes a frame at the dataset rate: keypoints, times and scores.
+const BYTES_PER_FRAME: f64 = 4096.0;
+/// Bytes of memory for each byte of a model or of an earlier stage's result.
+const MEMORY_PER_BYTE: f64 = 8.0;
+/// Most share of the machine's memory that one process takes.
+const MACHINE_SHARE: f64 = 0.75;
+/// Seconds of processor time for loading libraries and models.
+const BASE_SECS: f64 = 3600.0;
+/// Seconds of processor time for each frame of the file, and for each megapixel of it.
+const SECS_PER_FRAME: f64 = 1.0;
+const SECS_PER_MEGAPIXEL: f64 = 0.5;
+/// Frame rates that are assumed at least and at most.
+const FPS: [f64; 2] = [60.0, 240.0];
+/// Seconds in which a process gets no processor time and reports nothing before it counts as hanging.
+const IDLE_SECS: u64 = 900;
+
+/// Limits of one process.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Limits {
+    /// Bytes of private writable memory.
+    pub memory: u64,
+    /// Seconds of processor time; ten times as much may pass.
+    pub cpu_secs: u64,
+    /// Seconds of processor time between two reports of progress.
+    pub quiet_secs: u64,
+    /// Seconds without processor time and without a report.
+    pub idle_secs: u64,
+    /// Whose reading the limits are meant for, for messages.
+    pub basis: String,
+}
+
+impl Limits {
+    /// For reading a header or copying an excerpt: no size is known.
+    pub fn of_header() -> Self {
+        Self::new(BASE_BYTES, BASE_SECS, "the header of a file".to_owned())
+    }
+
+    /// For files that are no videos: keypoints of other programs.
+    pub fn of_machine() -> Self {
+        let longest = FPS[1] * LONGEST_SECS;
+        Self::new(f64::INFINITY, BASE_SECS + longest * SECS_PER_FRAME, "a file on this machine".to_owned())
+    }
+
+    /// For a video with this header that becomes frames at `rate` a second, beside `n_bytes` of models and other inputs.
+    pub fn of_video(header: &MediaHeader, rate: f64, n_bytes: u64) -> Self {
+        let [width, height] = header.image_size;
+        let pixels = width.saturating_mul(height).min(MOST_PIXELS as usize) as f64;
+        let stated = header.secs.filter(|secs| secs.is_finite() && *secs > 0.0);
+        // The reader goes on for a minute after the stated end.
+        let secs = stated.map_or(LONGEST_SECS, |secs| LONGEST_SECS.min(secs + 60.0));
+        let memory =
+            BASE_BYTES + BYTES_PER_PIXEL * pixels + BYTES_PER_FRAME * secs * rate + MEMORY_PER_BYTE * n_bytes as f64;
+        let fps = header.fps.filter(|fps| fps.is_finite()).unwrap_or(0.0).clamp(FPS[0], FPS[1]);
+        let n_frames = secs * fps;
+        let cpu_secs = BASE_SECS + n_frames * (SECS_PER_FRAME + SECS_PER_MEGAPIXEL * pixels / 1e6);
+        Self::new(memory, cpu_secs, format!("{:.0} s of {width}x{height} pictures", secs.ceil()))
+    }
+
+    fn new(memory: f64, cpu_secs: f64, basis: String) -> Self {
+        let machine = rustix::system::sysinfo();
+        let machine = machine.totalram as f64 * f64::from(machine.mem_unit) * MACHINE_SHARE;
+        Self {
+            memory: memory.min(machine) as u64,
+            cpu_secs: cpu_secs as u64,
+            quiet_secs: (BASE_SECS + cpu_secs / 8.0) as u64,
+            idle_secs: IDLE_SECS,
+            basis,
+        }
+    }
+
+    /// The error, with the limit in front where it is that memory ran out while `source` was read.
+    pub fn explain(&self, source: &Path, error: Error) -> Error {
+        if !is_out_of_memory(&format!("{error:#}")) {
+            return error;
+        }
+        error.context(format!(
+            "{}: reading it takes more than the {} MB of memory that is allowed for {}: the file may be damaged, or made \
+             to do harm; encode it again, smaller if that is not enough",
+            source.display(),
+            self.memory >> 20,
+            self.basis
+        ))
+    }
+
+    /// Which limit a process has passed that used `cpu` seconds of processor time, `quiet` of them since its last report,
+    /// in `passed` seconds, the last `idle` of them without either.
+    pub fn passed(&self, [cpu, quiet]: [f64; 2], [passed, idle]: [u64; 2]) -> Option<String> {
+        let most = if idle >= self.idle_secs {
+            format!("did nothing for {}", span(self.idle_secs))
+        } else if quiet > self.quiet_secs as f64 {
+            format!("reported no progress in {} of processor time", span(self.quiet_secs))
+        } else if cpu > self.cpu_secs as f64 {
+            format!("used more than the {} of processor time allowed for {}", span(self.cpu_secs), self.basis)
+        } else if passed > self.cpu_secs.saturating_mul(10) {
+            format!("took more than the {} allowed for {}", span(self.cpu_secs.saturating_mul(10)), self.basis)
+        } else {
+            return None;
+        };
+        Some(format!("{most} and was ended: the file may be damaged, or made to do harm; copy or encode it again"))
+    }
+}
+
+/// Limits the memory of this process for good.
+pub fn limit_memory(bytes: u64) -> Result<()> {
+    Ok(setrlimit(Resource::Data, Rlimit { current: Some(bytes), maximum: Some(bytes) })?)
+}
+
+/// How Rust, the C library, ffmpeg, OpenCV and ONNX Runtime report that memory ran out.
+fn is_out_of_memory(text: &str) -> bool {
+    let text = text.to_lowercase();
+    let reports = [
+        "memory allocation of",
+        "allocate memory",
+        "bad_alloc",
+        "bad allocation",
+        "insufficient memory",
+        "out of memory",
+        "failed to map segment",
+    ];
+    reports.iter().any(|report| text.contains(report))
+}
+
+/// `90 s`, `15 min`, `30 h`.
+fn span(secs: u64) -> String {
+    match secs {
+        0..120 => format!("{secs} s"),
+        120..7200 => format!("{} min", secs / 60),
+        _ => format!("{} h", secs / 3600),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use anyhow::anyhow;
+
+    fn header(secs: f64, image_size: [usize; 2], fps: f64) -> MediaHeader {
+        MediaHeader { secs: Some(secs), image_size, fps: Some(fps) }
+    }
+
+    #[test]
+    fn limits_grow_with_the_video_and_no_header_lifts_them() {
+        let of = |secs, size| Limits::of_video(&header(secs, size, 30.0), 15.0, 0);
+        let (small, long) = (of(10.0, [320, 180]), of(3600.0, [320, 180]));
+        assert!(long.cpu_secs > 10 * small.cpu_secs && long.memory > small.memory);
+        assert!(of(10.0, [1920, 1080]).memory > small.memory);
+        for hostile in [f64::NAN, f64::INFINITY, -1.0, 1e300] {
+            let claimed = Limits::of_video(&header(hostile, [usize::MAX; 2], hostile), 15.0, 0);
+            assert!(claimed.memory <= Limits::of_machine().memory);
+            assert!(claimed.cpu_secs < 2_000_000_000, "{claimed:?}");
+        }
+    }
+
+    #[test]
+    fn the_limit_that_is_passed_is_named() {
+        let limits = Limits::of_video(&header(10.0, [320, 180], 30.0), 15.0, 0);
+        let passed = |cpu, time| limits.passed(cpu, time).unwrap_or_default();
+        assert_eq!(passed([3000.0, 3000.0], [30_000, 800]), "");
+        assert!(passed([0.0, 0.0], [900, 900]).contains("did nothing for 15 min"));
+        assert!(passed([5000.0, 5000.0], [5000, 0]).contains("reported no progress"));
+        assert!(passed([8000.0, 0.0], [8000, 0]).contains("h of processor time allowed for 70 s of 320x180 pictures"));
+        assert!(passed([0.0, 0.0], [10_000_000, 0]).contains("took more than"));
+    }
+
+    #[test]
+    fn lack_of_memory_is_explained() {
+        let limits = Limits::of_header();
+        let explained = |text: &'static str| format!("{:#}", limits.explain(Path::new("a.mp4"), anyhow!(text)));
+        assert_eq!(explained("no such file"), "no such file");
+        let text = explained("cannot decode a.mp4: Cannot allocate memory");
+        assert!(text.starts_with("a.mp4: reading it takes more than the ") && text.ends_with("Cannot allocate memory"));
+        assert!(text.contains(" MB of memory that is allowed for the header of a file"), "{text}");
+    }
+}
