@@ -2,6 +2,7 @@
 //! speaker, the frame-weighted median over the videos.
 
 use anyhow::{Context, Result, ensure};
+use orator_base::input;
 use orator_base::math::order::weighted_median;
 use orator_base::types::skeleton::N_BONES;
 use serde::{Deserialize, Serialize};
@@ -19,17 +20,23 @@ pub struct VideoBones {
 impl VideoBones {
     /// Reads `bones.json`.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+        let bytes = input::read(path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
         let bones: Self =
             serde_json::from_slice(&bytes).with_context(|| format!("{} holds no bone lengths", path.display()))?;
-        let plausible = bones.lengths_metres.iter().all(|length| (0.0..10.0).contains(length));
-        ensure!(
-            bones.lengths_metres.len() == N_BONES && plausible,
-            "{}: expected {N_BONES} lengths from 0 to 10 metres",
-            path.display()
-        );
+        check_lengths("lengths_metres", &bones.lengths_metres).with_context(|| path.display().to_string())?;
         Ok(bones)
     }
+}
+
+/// Checks the bone lengths in the field `name`.
+///
+/// # Errors
+/// Another number of lengths than 48, or one outside 0 to 10 metres.
+pub(crate) fn check_lengths(name: &str, lengths: &[f64]) -> Result<()> {
+    ensure!(lengths.len() == N_BONES, "`{name}` has {} lengths, expected {N_BONES}", lengths.len());
+    let wrong = lengths.iter().find(|length| !(0.0..10.0).contains(*length));
+    ensure!(wrong.is_none(), "`{name}` has the length {:?}, expected 0 to 10 metres", wrong.unwrap_or(&0.0));
+    Ok(())
 }
 
 /// Weighted median of each bone over the videos in which it was measured; 0 where it never was.
@@ -46,6 +53,18 @@ pub fn of_speaker(videos: &[VideoBones]) -> [f32; N_BONES] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn lengths_of_no_body_are_refused_by_their_field() {
+        let says = |lengths: &[f64]| check_lengths("lengths_metres", lengths).map_err(|error| error.to_string());
+        assert_eq!(says(&[0.0; N_BONES]), Ok(()));
+        for wrong in [-0.1, f64::NAN, f64::INFINITY, 10.0] {
+            let mut lengths = [0.2; N_BONES];
+            lengths[7] = wrong;
+            assert!(says(&lengths).unwrap_err().starts_with(&format!("`lengths_metres` has the length {wrong:?}")));
+        }
+        assert!(says(&[0.2]).unwrap_err().contains("has 1 lengths"));
+    }
 
     #[test]
     fn long_videos_weigh_more_and_unmeasured_bones_nothing() {

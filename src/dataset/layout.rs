@@ -1,6 +1,7 @@
 //! Files and constants of the dataset's folder, and how its JSON files are read and written.
 
 use anyhow::{Context, Result};
+use orator_base::input;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::path::Path;
@@ -22,7 +23,7 @@ pub const CHECKSUMS: &str = "checksums.b3";
 
 /// Reads a JSON file of a dataset; errors name it.
 pub(crate) fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
-    let bytes = std::fs::read(path).with_context(|| format!("reading {}", path.display()))?;
+    let bytes = input::read(path, input::MOST_TEXT).with_context(|| format!("reading {}", path.display()))?;
     serde_json::from_slice(&bytes)
         .with_context(|| format!("{} is not as the dataset stage writes it; run the stage again", path.display()))
 }

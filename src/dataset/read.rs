@@ -1,6 +1,7 @@
 //! Reading of a dataset's folder: any sample, or any range of frames of one. Damaged, missing or foreign files are
 //! errors that name the file and what to do.
 
+use super::bones::check_lengths;
 use super::index::{ByteRange, SampleRef};
 use super::info::DatasetInfo;
 use super::sample::{N_KEYPOINTS, Sample, WORDS_EXTENSION};
@@ -9,6 +10,7 @@ use super::stats::DatasetStats;
 use super::{CHECKSUMS, INDEX, INFO, STATS, read_json};
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array2, Array3};
+use orator_base::input;
 use orator_base::stage::workdir::FolderLock;
 use orator_base::types::file_name::FileName;
 use orator_base::types::pose3d::Motion;
@@ -66,8 +68,10 @@ impl Dataset {
             "{}: expected sound at {SAMPLE_RATE} Hz, 1 to 1000 frames a second and {N_JOINTS} joints",
             dir.join(INFO).display()
         );
+        check_lengths("bone_lengths_metres", &info.bone_lengths_metres)
+            .with_context(|| dir.join(INFO).display().to_string())?;
         let stats: DatasetStats = read_json(&dir.join(STATS))?;
-        ensure!(stats.is_whole(), "{}: its tables do not have 49 rows", dir.join(STATS).display());
+        stats.check().with_context(|| dir.join(STATS).display().to_string())?;
         let mut shards = BTreeMap::new();
         for shard in info.shards() {
             let path = dir.join(&shard.file);
@@ -105,7 +109,8 @@ impl Dataset {
     /// Hash (BLAKE3, hex) of the dataset's checksums, and so of all its files.
     pub fn hash(&self) -> Result<String> {
         let path = self.dir.join(CHECKSUMS);
-        let checksums = fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
+        let checksums =
+            input::read(&path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
         Ok(blake3::hash(&checksums).to_hex().to_string())
     }
 
@@ -223,7 +228,7 @@ impl Dataset {
 
 fn read_index(path: &Path) -> Result<Vec<SampleRef>> {
     let reading = || format!("reading {}", path.display());
-    let lines = std::io::BufReader::new(File::open(path).with_context(reading)?).lines();
+    let lines = std::io::BufReader::new(input::open(path).with_context(reading)?).lines();
     let parse = |(n, line): (usize, std::io::Result<String>)| {
         let wrong =
             || format!("{}, line {}: not as the dataset stage writes it; run the stage again", path.display(), n + 1);
@@ -269,7 +274,7 @@ impl ShardFiles {
             Some(used) => used,
             None => {
                 let path = self.dir.join(name);
-                let file = File::open(&path).with_context(|| format!("opening the shard {}", path.display()))?;
+                let file = input::open(&path).with_context(|| format!("opening the shard {}", path.display()))?;
                 (name.clone(), Arc::new(file))
             }
         };

@@ -4,6 +4,7 @@
 use super::joint_stats::JointMoments;
 use super::write::part::VideoEntry;
 use super::{STRIDE_FRAMES, WINDOW_FRAMES};
+use anyhow::{Result, ensure};
 use ndarray::Array2;
 use orator_base::stage::ledger::WordCount;
 use orator_base::types::interval::Interval;
@@ -12,6 +13,9 @@ use orator_base::types::skeleton::N_JOINTS;
 use orator_base::types::split::Split;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+
+/// Largest coordinate or angle of a body, metres or radians.
+const MOST: f64 = 1000.0;
 
 /// Contents of `stats.json`. Rows are joints, columns x, y, z in metres; a joint never seen has zeros.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -81,11 +85,30 @@ impl DatasetStats {
         table(&self.std)
     }
 
-    /// Whether every table has one row for each joint.
-    pub(crate) fn is_whole(&self) -> bool {
-        self.n_seen.len() == N_JOINTS
-            && [&self.mean, &self.std, &self.min, &self.max].iter().all(|t| t.len() == N_JOINTS)
+    /// Errors unless every table has one row for each joint, within the range of a body, and no deviation is negative.
+    pub(crate) fn check(&self) -> Result<()> {
+        ensure!(self.n_seen.len() == N_JOINTS, "`n_seen` has {} rows, expected {N_JOINTS}", self.n_seen.len());
+        let tables = [("mean", &self.mean), ("std", &self.std), ("min", &self.min), ("max", &self.max)];
+        for (name, rows) in tables {
+            ensure!(rows.len() == N_JOINTS, "`{name}` has {} rows, expected {N_JOINTS}", rows.len());
+            check_numbers(name, rows.iter().flatten())?;
+        }
+        for (channel, AngleStats { mean, std, .. }) in self.posture.iter().flatten() {
+            for (table, angles) in [("mean", mean), ("std", std)] {
+                let field = format!("posture.{}.{table}", channel.name());
+                check_numbers(&field, angles.iter())?;
+            }
+        }
+        Ok(())
     }
+}
+
+/// Checks numbers of the field `name`, metres or radians.
+fn check_numbers<'a>(name: &str, mut numbers: impl Iterator<Item = &'a f64>) -> Result<()> {
+    let least = if name.ends_with("std") { 0.0 } else { -MOST };
+    let wrong = numbers.find(|number| !(least..=MOST).contains(*number));
+    ensure!(wrong.is_none(), "`{name}` holds {:?}, expected {least} to {MOST}", wrong.unwrap_or(&0.0));
+    Ok(())
 }
 
 fn table(rows: &[[f64; 3]]) -> Array2<f32> {

@@ -5,6 +5,7 @@
 
 use anyhow::{Context as _, bail, ensure};
 use ndarray::Array3;
+use orator_base::input;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::{N_JOINTS, authors_from_house};
 use orator_base::types::time::FrameRate;
@@ -18,7 +19,7 @@ const NECK_TOLERANCE: f32 = 1e-3;
 
 /// Reads a motion of `fps` (the authors': 15). `nan` marks a missing joint. Errors name the line.
 pub fn read(path: &Path, fps: FrameRate) -> anyhow::Result<Motion> {
-    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let text = input::read_text(path, input::MOST_DATA).with_context(|| format!("cannot read {}", path.display()))?;
     parse(&text, fps).with_context(|| format!("{} is not motion in the authors' layout", path.display()))
 }
 

@@ -2,6 +2,7 @@
 //! contents give the same bytes. `orator_nn::weights` reads the tensors.
 
 use anyhow::Context;
+use orator_base::input;
 use safetensors::View;
 use serde_json::Value;
 use std::collections::HashMap;
@@ -26,7 +27,8 @@ pub fn facts(path: &Path) -> anyhow::Result<Value> {
 
 /// What `parse` makes of a file. Errors name it.
 pub fn read_with<T>(path: &Path, parse: fn(&[u8]) -> anyhow::Result<T>) -> anyhow::Result<T> {
-    let bytes = std::fs::read(path).with_context(|| format!("cannot read the weights {}", path.display()))?;
+    let bytes =
+        input::read(path, input::MOST_DATA).with_context(|| format!("cannot read the weights {}", path.display()))?;
     parse(&bytes).with_context(|| format!("{} is not a checkpoint or weights file", path.display()))
 }
 

@@ -3,6 +3,7 @@
 //! read too), `n_frames`, `shape`, `units`, `axes`.
 
 use anyhow::{Context as _, Result, bail, ensure};
+use orator_base::input;
 use orator_base::stage::workdir;
 use orator_base::types::time::FrameRate;
 use serde::Deserialize;
@@ -42,7 +43,7 @@ pub fn is_one(path: &Path) -> bool {
 /// read, names no rate of motion, or is of another number of frames than `n_frames`.
 pub fn rate(path: &Path, n_frames: usize) -> Result<Option<FrameRate>> {
     let (beside, file) = (path_of(path), path.display());
-    let text = match std::fs::read(&beside) {
+    let text = match input::read(&beside, input::MOST_TEXT) {
         Ok(text) => text,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
         Err(error) => return Err(error).with_context(|| format!("cannot read {}", beside.display())),

@@ -1,6 +1,7 @@
 //! `media.json`: what a video is, as far as the stages after the first need it and people want to know.
 
 use anyhow::{Context, Result, ensure};
+use orator_base::input;
 use orator_base::types::image::{PictureOptions, PixelArea};
 use orator_base::types::sound::AudioTracks;
 use orator_base::types::time::FrameRate;
@@ -116,10 +117,12 @@ impl MediaInfo {
 
     /// Reads `media.json`. Errors: unreadable, incomplete, or a duration that is none.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+        let bytes = input::read(path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
         let info: Self = serde_json::from_slice(&bytes).with_context(|| format!("{} is incomplete", path.display()))?;
-        let secs = info.duration_secs;
-        ensure!(secs.is_finite() && secs >= 0.0, "{}: a duration of {secs} s", path.display());
+        for (field, secs) in [("duration_secs", info.duration_secs), ("audio_secs", info.audio_secs.unwrap_or(0.0))] {
+            ensure!(secs.is_finite() && secs >= 0.0, "{}: `{field}` is {secs}, expected 0 or more", path.display());
+        }
+        info.fps.checked().with_context(|| format!("{}: `fps`", path.display()))?;
         Ok(info)
     }
 

@@ -6,6 +6,7 @@ use anyhow::{Context as _, bail, ensure};
 use ndarray::{Array, Array3, ArrayD, Dimension, IxDyn};
 use ndarray_npy::npy::header::Header;
 use ndarray_npy::{ReadNpyError, ReadNpyExt as _, ReadableElement, WriteNpyExt as _};
+use orator_base::input;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::N_JOINTS;
 use orator_base::types::time::FrameRate;
@@ -16,7 +17,7 @@ use std::path::Path;
 /// Reads a motion of `fps` from an array of f32 or f64, [T, 49, 3] or [T, 147] (joint after joint); a joint that is not
 /// finite is missing, in the mask too.
 pub fn read(path: &Path, fps: FrameRate) -> anyhow::Result<Motion> {
-    let bytes = std::fs::read(path).with_context(|| format!("cannot open {}", path.display()))?;
+    let bytes = input::read(path, input::MOST_DATA).with_context(|| format!("cannot open {}", path.display()))?;
     let numbers = match typed::<f32>(&bytes) {
         Ok(None) => parse::<f64, IxDyn>(&bytes).map(|array| array.mapv(|v| v as f32)),
         Ok(Some(array)) => Ok(array),

@@ -5,6 +5,7 @@ use super::npy;
 use anyhow::{Context, Result, bail, ensure};
 use ndarray::{Array1, ArrayD, array};
 use ndarray_npy::{NpzWriter, ReadNpyError, WriteNpzError};
+use orator_base::input;
 use orator_base::types::time::FrameRate;
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read as _, Seek, SeekFrom, Write};
@@ -28,7 +29,7 @@ pub type AxisLength = Option<usize>;
 impl Npz {
     /// Opens the archive. Errors: no such file, no zip archive.
     pub fn open(path: &Path) -> Result<Self> {
-        let file = File::open(path).with_context(|| format!("cannot open {}", path.display()))?;
+        let file = input::open(path).with_context(|| format!("cannot open {}", path.display()))?;
         let n_file_bytes = file.metadata().with_context(|| format!("cannot open {}", path.display()))?.len();
         let mut archive = ZipArchive::new(BufReader::new(file))
             .with_context(|| format!("{} is no .npz file (numpy.savez writes one)", path.display()))?;

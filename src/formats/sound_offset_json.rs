@@ -1,13 +1,14 @@
 //! `sound_offset.json`: how much later the sound of a video is than its picture.
 
 use anyhow::{Context, Result, ensure};
+use orator_base::input;
 use orator_base::types::sound::SoundOffset;
 use std::io::ErrorKind;
 use std::path::Path;
 
 /// Reads the file; `None` where it is not there. Errors: a file that is not as the segment stage writes it.
 pub fn read(path: &Path) -> Result<Option<SoundOffset>> {
-    let bytes = match std::fs::read(path) {
+    let bytes = match input::read(path, input::MOST_TEXT) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
         Err(error) => return Err(error).with_context(|| format!("cannot read {}", path.display())),

@@ -5,6 +5,7 @@ use candle_core::safetensors::Load;
 use candle_core::{DType, Device, Tensor};
 use orator_base::stage::workdir;
 use orator_formats::checkpoint;
+use safetensors::Dtype;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -40,11 +41,17 @@ impl Contents {
         checkpoint::to_bytes(&self.facts, tensors)
     }
 
-    /// Parses the bytes that [`Contents::to_bytes`] gives.
+    /// Parses the bytes that [`Contents::to_bytes`] gives, or published weights, whose matrices are of half precision.
     pub fn from_bytes(bytes: &[u8]) -> anyhow::Result<Self> {
+        Self::parse(bytes, &[Dtype::F32, Dtype::F16])
+    }
+
+    fn parse(bytes: &[u8], dtypes: &[Dtype]) -> anyhow::Result<Self> {
         let facts = checkpoint::facts_of(bytes)?;
         let file = safetensors::SafeTensors::deserialize(bytes)?;
         let load = |(name, view): (String, safetensors::tensor::TensorView)| {
+            let (dtype, expected) = (view.dtype(), dtypes[0]);
+            ensure!(dtypes.contains(&dtype), "the tensor {name} is of type {dtype:?}, expected {expected:?}");
             let tensor = view.load(&Device::Cpu)?;
             ensure!(
                 is_finite(&tensor)?,
@@ -61,16 +68,13 @@ impl Contents {
         workdir::write_file(path, &self.to_bytes()?)
     }
 
-    /// Reads a file. Errors name it.
+    /// Reads a checkpoint, whose tensors are all F32. Errors name the file.
     pub fn read(path: &Path) -> anyhow::Result<Self> {
-        checkpoint::read_with(path, Self::from_bytes)
+        checkpoint::read_with(path, |bytes| Self::parse(bytes, &[Dtype::F32]))
     }
 }
 
 fn is_finite(tensor: &Tensor) -> anyhow::Result<bool> {
-    if !tensor.dtype().is_float() {
-        return Ok(true);
-    }
     let numbers = tensor.flatten_all()?.to_dtype(DType::F32)?.to_vec1::<f32>()?;
     Ok(numbers.iter().all(|number| number.is_finite()))
 }
@@ -94,6 +98,21 @@ mod tests {
         assert_eq!(read.facts, contents.facts);
         assert_eq!(read.part("net.")["w"].to_vec2::<f32>()?, tensor.to_vec2::<f32>()?);
         assert_eq!(read.to_bytes()?, std::fs::read(&file)?);
+        Ok(())
+    }
+
+    #[test]
+    fn a_checkpoint_of_another_number_type_is_refused() -> anyhow::Result<()> {
+        let folder = tempfile::tempdir()?;
+        let file = path(folder.path(), 1);
+        for dtype in [DType::F16, DType::F64, DType::U32] {
+            let tensor = Tensor::new(&[1f32, 2.0], &Device::Cpu)?.to_dtype(dtype)?;
+            Contents { facts: json!({}), tensors: BTreeMap::from([("net.w".to_owned(), tensor)]) }.write(&file)?;
+            let text = format!("{:#}", Contents::read(&file).err().context("it was read")?);
+            let expected = format!("the tensor net.w is of type {dtype:?}, expected F32");
+            assert!(text.contains("step-0000001.safetensors") && text.contains(&expected), "{text}");
+            assert_eq!(Contents::from_bytes(&std::fs::read(&file)?).is_ok(), dtype == DType::F16);
+        }
         Ok(())
     }
 

@@ -4,6 +4,7 @@
 use super::convert::{ConversionOptions, convert};
 use super::{ModelEntry, ModelSource, PinnedFile, SourceKind, package, sha256_of};
 use anyhow::{Context, Result, anyhow, bail, ensure};
+use orator_base::input;
 use orator_base::stage::workdir;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -76,7 +77,8 @@ impl<'a> Fetcher<'a> {
     pub(crate) fn get(&mut self, entry: &ModelEntry, path: &Path) -> Result<FetchSource> {
         let alone = |bytes, source| Obtained { bytes, licence: None, source };
         if let Some(found) = self.offered(&entry.sha256) {
-            let bytes = std::fs::read(found).with_context(|| format!("cannot read {}", found.display()))?;
+            let bytes =
+                input::read(found, input::MOST_DATA).with_context(|| format!("cannot read {}", found.display()))?;
             return write(entry, path, alone(bytes, FetchSource::Mirror(found.to_owned())));
         }
         let mut refused = String::new();
@@ -155,7 +157,7 @@ impl<'a> Fetcher<'a> {
         }
         let read = |file: &super::SourceFile| {
             let path = self.offered(&file.sha256).with_context(|| format!("the mirror has no {}", file.path))?;
-            Ok(std::fs::read(path)?)
+            Ok(input::read(path, input::MOST_DATA)?)
         };
         Ok((source.files.iter().map(read).collect::<Result<_>>()?, None))
     }

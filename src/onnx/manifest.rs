@@ -3,6 +3,7 @@
 
 use super::{ModelEntry, ModelRole, PinnedFile};
 use anyhow::{Context, Result, ensure};
+use orator_base::input;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -38,7 +39,7 @@ impl Manifest {
     pub fn load(dir: &Path) -> Result<Self> {
         let mut manifest = Self::builtin()?;
         let path = dir.join(MANIFEST_FILE);
-        match std::fs::read_to_string(&path) {
+        match input::read_text(&path, input::MOST_TEXT) {
             Ok(text) => {
                 let own = Self::parse(&text).with_context(|| format!("in {}", path.display()))?;
                 manifest.runtime = own.runtime.or(manifest.runtime);

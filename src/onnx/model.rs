@@ -3,6 +3,7 @@
 
 use super::{ModelEntry, ModelRole, Port, Runtime};
 use anyhow::{Context, Result, anyhow};
+use orator_base::input;
 use ort::session::builder::GraphOptimizationLevel;
 use ort::session::{Session, SessionOutputs};
 use ort::value::{Outlet, TensorElementType, TensorRef, ValueType};
@@ -121,7 +122,7 @@ impl Outputs<'_> {
 /// SHA-256 of a file's content, in hex.
 pub fn sha256_of(path: &Path) -> Result<String> {
     let mut hash = Sha256::new();
-    let copied = std::fs::File::open(path).and_then(|mut file| std::io::copy(&mut file, &mut hash));
+    let copied = input::open(path).and_then(|mut file| std::io::copy(&mut file, &mut hash));
     copied.with_context(|| format!("cannot read {}", path.display()))?;
     Ok(format!("{:x}", hash.finalize()))
 }
@@ -135,7 +136,7 @@ pub(super) fn open_session(runtime: &Runtime, entry: &ModelEntry, dir: &Path) ->
     if !path.exists() {
         return Err(ModelError::Missing { id: id(), path });
     }
-    let bytes = match std::fs::read(&path) {
+    let bytes = match input::read(&path, input::MOST_DATA) {
         Ok(bytes) => bytes,
         Err(error) => return Err(ModelError::Unreadable { id: id(), path, error: error.to_string() }),
     };

@@ -5,8 +5,8 @@ use super::fetch::MAX_BYTES;
 use super::{ModelSource, SourceKind};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use orator_base::foreign_program::command_in;
+use orator_base::input;
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
@@ -76,7 +76,7 @@ fn run(dir: &Path, programs: &[&[&str]], arguments: &[&str], missing: &str) -> R
 /// The content of the members `paths` of the package file, in their order. Errors: no archive, a member that is not in
 /// it or larger than 1 GiB.
 pub(crate) fn members(kind: SourceKind, package: &Path, paths: &[&str]) -> Result<Vec<Vec<u8>>> {
-    let file = File::open(package)?;
+    let file = input::open(package)?;
     let mut found = BTreeMap::new();
     if kind == SourceKind::Npm {
         let mut archive = tar::Archive::new(flate2::read::GzDecoder::new(file));

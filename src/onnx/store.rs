@@ -4,6 +4,7 @@
 use super::fetch::{FetchSource, Fetcher};
 use super::{MANIFEST_FILE, Manifest, Model, ModelEntry, ModelError, ModelOrigin, ModelRole, Runtime, sha256_of};
 use anyhow::{Context, Result, bail};
+use orator_base::input;
 use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir;
 use serde::Serialize;
@@ -234,7 +235,7 @@ impl ModelStore {
         let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         Model::open(runtime, &entry, folder).with_context(|| format!("{} is not like that", file.display()))?;
         let manifest = self.dir.join(MANIFEST_FILE);
-        let written = match std::fs::read_to_string(&manifest) {
+        let written = match input::read_text(&manifest, input::MOST_TEXT) {
             Ok(text) => text,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
             Err(error) => return Err(error).with_context(|| format!("cannot read {}", manifest.display())),
@@ -249,7 +250,7 @@ impl ModelStore {
                 bail!("{} is there already with other bytes: rename one of the two", path.display())
             }
             ModelState::Missing => workdir::replace(&path, |attempt| {
-                std::io::copy(&mut std::fs::File::open(file)?, &mut std::fs::File::create(attempt)?)?;
+                std::io::copy(&mut input::open(file)?, &mut std::fs::File::create(attempt)?)?;
                 Ok(())
             })?,
         }

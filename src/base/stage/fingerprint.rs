@@ -4,6 +4,7 @@
 
 use super::artifacts::StageName;
 use super::{Stage, Unit, workdir};
+use crate::input;
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -166,7 +167,7 @@ pub fn hash_file(path: &Path) -> Result<String> {
     }
     let read = || -> std::io::Result<String> {
         let mut hasher = blake3::Hasher::new();
-        hasher.update_reader(fs::File::open(path)?)?;
+        hasher.update_reader(input::open(path)?)?;
         Ok(hasher.finalize().to_hex().to_string())
     };
     read().with_context(|| format!("cannot read {}", path.display()))

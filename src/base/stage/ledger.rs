@@ -2,6 +2,7 @@
 //! stage that failed. `segment` writes it, `lift` moves seconds from kept to refused; later stages only add up.
 
 use super::refusal::FrameRefusal;
+use crate::input;
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -119,7 +120,7 @@ impl Ledger {
 
     /// Reads `ledger.json` and checks that the stretches lie end to end and fill the duration.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+        let bytes = input::read(path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
         let ledger: Self =
             serde_json::from_slice(&bytes).with_context(|| format!("{} is no ledger", path.display()))?;
         ensure!(

@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 /// Frames a second as an exact fraction in lowest terms (`30000/1001` is NTSC). Both parts are at least 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(from = "Fraction")]
+#[serde(try_from = "Fraction")]
 pub struct FrameRate {
     /// Numerator.
     pub num: u32,
@@ -26,9 +26,14 @@ struct Fraction {
     den: u32,
 }
 
-impl From<Fraction> for FrameRate {
-    fn from(Fraction { num, den }: Fraction) -> Self {
-        Self::new(num, den)
+impl TryFrom<Fraction> for FrameRate {
+    type Error = String;
+
+    fn try_from(Fraction { num, den }: Fraction) -> Result<Self, String> {
+        if num == 0 || den == 0 {
+            return Err(format!("invalid frame rate {num}/{den}: expected `num` and `den` of at least 1"));
+        }
+        Ok(Self::new(num, den))
     }
 }
 
@@ -152,11 +157,13 @@ mod tests {
     }
 
     #[test]
-    fn no_file_makes_a_rate_without_parts() {
-        let read = |text| serde_json::from_str::<FrameRate>(text).unwrap();
-        assert_eq!(read("{\"num\":0,\"den\":0}"), FrameRate::new(1, 1));
+    fn a_stored_rate_with_a_zero_part_is_refused() {
+        let read = |text: &str| serde_json::from_str::<FrameRate>(text).map_err(|error| error.to_string());
+        for (text, rate) in [("{\"num\":15,\"den\":0}", "15/0"), ("{\"num\":0,\"den\":1}", "0/1")] {
+            assert!(read(text).unwrap_err().starts_with(&format!("invalid frame rate {rate}")), "{text}");
+        }
         let ntsc = FrameRate::new(30_000, 1_001);
-        assert_eq!(read(&serde_json::to_string(&ntsc).unwrap()), ntsc);
+        assert_eq!(read(&serde_json::to_string(&ntsc).unwrap()), Ok(ntsc));
     }
 
     proptest::proptest! {

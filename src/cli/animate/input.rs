@@ -57,7 +57,7 @@ pub fn inputs(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result
         let name = named.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         MotionInput { name, location: InputLocation::File(path) }
     };
-    if path.is_file() {
+    if !path.is_dir() {
         return Ok(vec![file(path.to_owned(), path)]);
     }
     if Artifact::Joints.within(path).is_file() {

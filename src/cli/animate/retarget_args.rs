@@ -6,6 +6,7 @@ use anyhow::{Context as _, Result, ensure};
 use orator_avatar::animate::Performance;
 use orator_avatar::animate::retarget::bone_map::BoneMap;
 use orator_avatar::animate::retarget::retargeted::RetargetRig;
+use orator_base::input;
 use orator_base::stage::progress::Progress as _;
 use orator_base::stage::workdir;
 use std::path::{Path, PathBuf};
@@ -48,7 +49,8 @@ impl RetargetArgs {
         let Some(path) = &self.retarget else { return Ok(None) };
         let rig = RetargetRig::open(path)?;
         let read = |path: &PathBuf| {
-            let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+            let text =
+                input::read_text(path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
             Ok::<_, anyhow::Error>((text, path.clone()))
         };
         let map = self.bone_map.as_ref().map(read).transpose()?;

@@ -3,13 +3,13 @@
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::{Context, Result, ensure};
+use orator_base::input;
 use orator_base::stage::workdir;
 use orator_dataset::config::{self, Settings};
 use orator_formats::transcript::Transcript;
 use orator_formats::word_vectors::{WordVectors, glove, wink};
 use orator_onnx::{ModelStore, sha256_of};
 use serde_json::{Value, json};
-use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
@@ -100,7 +100,7 @@ fn path_of(folder: &Path, name: &str) -> PathBuf {
 
 /// Makes the table of a file of vectors.
 fn make(file: &Path, table: &Path) -> Result<()> {
-    let reader = File::open(file).with_context(|| format!("cannot read {}", file.display()))?;
+    let reader = input::open(file).with_context(|| format!("cannot read {}", file.display()))?;
     let reader = BufReader::with_capacity(1 << 20, reader);
     let is_json = file.extension().is_some_and(|ending| ending == "json");
     let converted = workdir::replace(table, |attempt| {

@@ -3,6 +3,7 @@
 
 use super::SpeakerConfig;
 use super::patterns::{self, OF_SOUNDS, OF_VIDEOS, SearchRoot};
+use orator_base::input;
 use orator_base::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -111,7 +112,7 @@ fn is_json(path: &Path) -> bool {
 /// Whether a JSON file holds the people of one frame; one that cannot be read does not.
 fn is_frame(path: &Path) -> bool {
     let mut head = Vec::new();
-    let read = std::fs::File::open(path).and_then(|file| file.take(HEAD_BYTES).read_to_end(&mut head));
+    let read = input::open(path).and_then(|file| file.take(HEAD_BYTES).read_to_end(&mut head));
     let head = String::from_utf8_lossy(&head);
     read.is_ok() && (head.contains("\"people\"") || !OF_MANY_FRAMES.iter().any(|key| head.contains(key)))
 }

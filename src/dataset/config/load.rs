@@ -4,6 +4,7 @@ use super::file::{self, Folders, Problem};
 use super::rules;
 use super::sections::Settings;
 use anyhow::{Context, Result};
+use orator_base::input;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -44,7 +45,7 @@ impl fmt::Display for ConfigError {
 /// # Errors
 /// A file that cannot be read, or `ConfigError` with every problem at once.
 pub fn load(file: &Path, sets: &[String]) -> Result<Config> {
-    let text = std::fs::read_to_string(file).with_context(|| {
+    let text = input::read_text(file, input::MOST_TEXT).with_context(|| {
         format!("cannot read the configuration {}; `orator init DIR` writes one, -c FILE names another", file.display())
     })?;
     resolve(&text, sets, std::path::absolute(file)?)

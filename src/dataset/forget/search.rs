@@ -3,8 +3,8 @@
 
 use crate::file_name;
 use anyhow::{Context, Result};
+use orator_base::input;
 use std::collections::BTreeSet;
-use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
@@ -123,14 +123,14 @@ fn walk(root: &Path, path: &Path, terms: &[&SearchTerm], searched: &mut Searched
         _ => {}
     }
     searched.n_files += 1;
-    let (bytes, found) = scan(File::open(path).with_context(reading)?, terms).with_context(reading)?;
+    let (bytes, found) = scan(input::open(path).with_context(reading)?, terms).with_context(reading)?;
     searched.bytes += bytes;
     let place = |file: &str, (at, what)| SearchHit { file: file.to_owned(), at: Some(at), what };
     let file = path.display().to_string();
     searched.places.extend(found.into_iter().map(|found| place(&file, found)));
     if path.extension().is_some_and(|ending| ending == "npz" || ending == "zip") {
         // A file that is no archive was searched as it is.
-        let Ok(mut archive) = zip::ZipArchive::new(File::open(path).with_context(reading)?) else { return Ok(()) };
+        let Ok(mut archive) = zip::ZipArchive::new(input::open(path).with_context(reading)?) else { return Ok(()) };
         for n in 0..archive.len() {
             let entry = archive.by_index(n).with_context(reading)?;
             let inside = format!("{file}!{}", entry.name());
@@ -232,7 +232,7 @@ mod tests {
         write("binary.bin", &[&[7; 100], hash.as_bytes().as_slice(), &[9; 50]].concat());
         write("hex.txt", format!("b3:{}", hash.to_hex()).as_bytes());
         write("clean.txt", b"extra.mp4 b-a.mp4");
-        let mut npz = zip::ZipWriter::new(File::create(dir.path().join("x.npz")).unwrap());
+        let mut npz = zip::ZipWriter::new(std::fs::File::create(dir.path().join("x.npz")).unwrap());
         npz.start_file("y.npy", zip::write::SimpleFileOptions::default()).unwrap();
         npz.write_all(b"header a.mp4").unwrap();
         npz.finish().unwrap();

@@ -5,10 +5,10 @@ use crate::INFO;
 use crate::config::patterns::OF_SOUNDS;
 use crate::write::part;
 use anyhow::{Context, Result, ensure};
+use orator_base::input;
 use orator_formats::mocap::captured::MotionKind;
 use orator_formats::npz::Npz;
 use orator_formats::{search, transcript};
-use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
@@ -108,7 +108,7 @@ fn kind(path: &Path) -> std::result::Result<Option<MotionKind>, String> {
 }
 
 fn has_147_numbers(path: &Path) -> bool {
-    let Ok(file) = File::open(path) else { return false };
+    let Ok(file) = input::open(path) else { return false };
     let mut line = String::new();
     // A line of the text layout of Rebol et al. (2021) is under 4 kB.
     let read = BufReader::new(file.take(16 << 10)).read_line(&mut line);

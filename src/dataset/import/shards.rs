@@ -5,6 +5,7 @@ use crate::sample::{EXTENSIONS, N_KEYPOINTS, OPTIONAL_EXTENSIONS, Sample, WORDS_
 use crate::{Split, file_name};
 use anyhow::{Context, Result, bail, ensure};
 use ndarray::{Array2, Array3};
+use orator_base::input;
 use orator_base::stage::ledger::{Kept, Ledger, Refused};
 use orator_base::stage::refusal::{FrameRefusal, Refusal};
 use orator_base::types::pose3d::Motion;
@@ -15,7 +16,6 @@ use orator_base::types::time::FrameRate;
 use orator_formats::npy::{self, Element, Layout};
 use orator_formats::wav;
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
@@ -95,7 +95,7 @@ fn list(
 ) -> Result<usize> {
     let mut n_files = 0;
     let reading = || format!("cannot read {} as a tar file", tar.display());
-    let file = File::open(tar).with_context(reading)?;
+    let file = input::open(tar).with_context(reading)?;
     let length = file.metadata().with_context(reading)?.len();
     let mut archive = tar::Archive::new(file);
     for entry in archive.entries_with_seek().with_context(reading)? {
@@ -134,7 +134,7 @@ fn split_of(tar: &Path) -> Option<Split> {
 
 fn read_place(place: &MemberLocation) -> Result<Vec<u8>> {
     let read = || -> std::io::Result<Vec<u8>> {
-        let mut file = File::open(&place.tar)?;
+        let mut file = input::open(&place.tar)?;
         file.seek(SeekFrom::Start(place.offset))?;
         let mut bytes = Vec::new();
         file.take(place.bytes).read_to_end(&mut bytes)?;

@@ -13,6 +13,7 @@ use crate::write::assemble::DatasetWriter;
 use crate::write::part;
 use crate::{INFO, shared_sound};
 use anyhow::{Context, Result, ensure};
+use orator_base::input;
 use orator_base::stage::counted;
 use orator_base::stage::ledger::Ledger;
 use orator_base::stage::progress::Progress;
@@ -33,7 +34,7 @@ pub struct Imported {
 
 /// Frame rate of the first dataset folder among the sources, the default rate of an import.
 pub fn rate_of(sources: &[PathBuf]) -> Option<orator_base::types::time::FrameRate> {
-    let info = sources.iter().find_map(|source| std::fs::read(source.join(INFO)).ok())?;
+    let info = sources.iter().find_map(|source| input::read(source.join(INFO), input::MOST_TEXT).ok())?;
     serde_json::from_slice::<DatasetInfo>(&info).ok().map(|info| info.fps)
 }
 

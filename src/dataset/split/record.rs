@@ -4,6 +4,7 @@
 use crate::config::choices::SplitUnit;
 use crate::pretty;
 use anyhow::{Context, Result, ensure};
+use orator_base::input;
 use orator_base::stage::workdir;
 use orator_base::types::split::{Split, TimeBlock};
 use serde::{Deserialize, Serialize};
@@ -80,7 +81,7 @@ impl SplitRecord {
         if !path.exists() {
             return Ok(None);
         }
-        let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+        let bytes = input::read(path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
         let damaged = || {
             format!(
                 "{} is damaged: it keeps every video in its split. Put it back from a copy, or remove it, and the \

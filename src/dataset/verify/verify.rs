@@ -13,6 +13,7 @@ use crate::write::assemble::{LedgerLine, assemble_into};
 use crate::write::part::{self, VideoEntry};
 use crate::{CHECKSUMS, INFO, LEAKAGE, README, read_json};
 use anyhow::{Context, Result, ensure};
+use orator_base::input;
 use orator_base::stage::fingerprint::hash_file;
 use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir::FolderLock;
@@ -102,7 +103,8 @@ fn assembled(dir: &Path, there: &BTreeMap<String, u64>, found: &mut Verified) ->
     let wanted: BTreeMap<String, String> =
         text.lines().filter_map(|line| line.split_once("  ")).map(|(hash, file)| (file.into(), hash.into())).collect();
     if there.contains_key(CHECKSUMS) {
-        let stated = std::fs::read(dir.join(CHECKSUMS)).with_context(|| format!("reading {CHECKSUMS}"))?;
+        let stated =
+            input::read(dir.join(CHECKSUMS), input::MOST_TEXT).with_context(|| format!("reading {CHECKSUMS}"))?;
         if stated != text.as_bytes() {
             let text_of = String::from_utf8_lossy(&stated).into_owned();
             let named = text_of.lines().filter_map(|line| line.split_once("  ")).map(|(_, file)| file);
@@ -122,7 +124,7 @@ fn assembled(dir: &Path, there: &BTreeMap<String, u64>, found: &mut Verified) ->
 
 /// Line of the card in the dataset's list of checksums: its words are those of the version that wrote it.
 fn card_line(dir: &Path) -> Option<String> {
-    let stated = std::fs::read_to_string(dir.join(CHECKSUMS)).ok()?;
+    let stated = input::read_text(dir.join(CHECKSUMS), input::MOST_TEXT).ok()?;
     let line = stated.lines().find(|line| is_card(line))?;
     let is_hash = line.split_once("  ").is_some_and(|(hash, _)| hash.len() == 64 && hash.is_ascii());
     is_hash.then(|| line.to_owned())
@@ -232,7 +234,8 @@ fn hashes(dir: &Path, wanted: &BTreeMap<String, String>, deep: bool, found: &mut
     for (file, hash) in wanted {
         let large = [".tar", ".sound"].iter().any(|ending| file.ends_with(ending));
         let path = dir.join(file);
-        if (deep || !large) && path.is_file() {
+        // A pipe or a device in the place of a large file is reported without its content.
+        if (deep || !large || !path.is_file()) && path.exists() {
             found.bytes += std::fs::metadata(&path).map_or(0, |meta| meta.len());
             match hash_file(&path) {
                 Ok(now) if now == *hash => {}
@@ -292,7 +295,7 @@ fn files_of(dir: &Path) -> Result<BTreeMap<String, u64>> {
 /// Ledgers of all videos of the dataset in `dir`.
 pub fn accounts(dir: &Path) -> Result<Vec<LedgerLine>> {
     let path = dir.join(crate::LEDGER);
-    let text = std::fs::read_to_string(&path).with_context(|| format!("reading {}", path.display()))?;
+    let text = input::read_text(&path, input::MOST_TEXT).with_context(|| format!("reading {}", path.display()))?;
     let parse = |line: &str| serde_json::from_str(line).with_context(|| format!("{} is damaged", path.display()));
     text.lines().map(parse).collect()
 }

@@ -3,13 +3,14 @@
 //! video is added or forgotten without touching another.
 
 use super::tar::ShardWriter;
-use crate::bones::VideoBones;
+use crate::bones::{VideoBones, check_lengths};
 use crate::index::{SampleRef, ShardRef};
 use crate::joint_stats::JointMoments;
 use crate::sample::Sample;
 use crate::split::SplitBy;
 use crate::{pretty, read_json};
 use anyhow::{Context, Result, bail, ensure};
+use orator_base::input;
 use orator_base::stage::fingerprint::hash_file;
 use orator_base::stage::ledger::Ledger;
 use orator_base::types::file_name::FileName;
@@ -195,6 +196,12 @@ impl VideoEntry {
             let rest = Split::ALL.iter().find_map(|split| shard.file.strip_prefix(split.name())?.strip_prefix('-'));
             rest.is_some_and(|rest| rest.starts_with(&*part.name) && rest.strip_suffix(".tar").is_some())
         };
+        if !part.bones.lengths_metres.is_empty() {
+            check_lengths("bones.lengths_metres", &part.bones.lengths_metres)
+                .with_context(|| path.display().to_string())?;
+        }
+        let silence = part.padded_sound_secs;
+        ensure!(silence >= 0.0, "{}: `padded_sound_secs` is {silence}, expected 0 or more", path.display());
         if let Some(other) = part.shards.iter().find(|shard| !is_own(shard)) {
             bail!("{} names the shard {}, which is none of its video's", path.display(), other.file);
         }
@@ -258,7 +265,7 @@ impl VideoEntry {
 
 /// Hashes by path from `checksums.b3` of the dataset in `dir`; empty where it cannot be read.
 pub fn stated_hashes(dir: &Path) -> BTreeMap<String, String> {
-    let text = fs::read_to_string(dir.join(crate::CHECKSUMS)).unwrap_or_default();
+    let text = input::read_text(dir.join(crate::CHECKSUMS), input::MOST_TEXT).unwrap_or_default();
     text.lines().filter_map(|line| line.split_once("  ")).map(|(hash, file)| (file.into(), hash.into())).collect()
 }
 
@@ -297,7 +304,7 @@ pub fn write_sound(dir: &Path, name: &str, codes: &[u32]) -> Result<String> {
 /// Reads the sound codes of the video `name`.
 pub fn read_sound(dir: &Path, name: &str) -> Result<Vec<u32>> {
     let path = sound_path(dir, name);
-    let bytes = fs::read(&path).with_context(|| format!("reading {}", path.display()))?;
+    let bytes = input::read(&path, input::MOST_TEXT).with_context(|| format!("reading {}", path.display()))?;
     ensure!(bytes.len().is_multiple_of(4), "{} is cut off: run the dataset stage again with --force", path.display());
     Ok(bytes.as_chunks::<4>().0.iter().map(|code| u32::from_le_bytes(*code)).collect())
 }

@@ -148,6 +148,7 @@ impl ExponentialMaps {
         }
         let mut numbers = self.mean.iter().chain(&self.largest).chain(&self.rest);
         ensure!(numbers.all(|v| v.is_finite()), "it holds a number that is not finite");
+        ensure!(self.largest.iter().all(|v| *v > 0.0), "its `largest` has a number that is not above 0");
         Ok(())
     }
 

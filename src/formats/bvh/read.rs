@@ -3,6 +3,7 @@
 
 use super::skeleton::{JointChannels, placed};
 use anyhow::{Context, Result, anyhow, bail, ensure};
+use orator_base::input;
 use orator_base::math::vec3::Vec3;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -44,11 +45,17 @@ pub enum Positions {
 /// six bytes a frame at least.
 const FEW_POSITIONS: usize = 1 << 20;
 const POSITIONS_PER_BYTE: usize = 4;
+/// Most joints of a skeleton, ends of bones included; rigs with hair, cloth and twist bones have several hundred.
+pub const MOST_JOINTS: usize = 10_000;
+/// Most joints within each other, and most bytes of a name: the end of a bone repeats the name of its joint.
+const MOST_DEPTH: usize = 512;
+const MOST_NAME_BYTES: usize = 1024;
 
 impl Bvh {
     /// Reads a file. Errors: unreadable, or not BVH (the message names what was expected).
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+        let text =
+            input::read_text(path, input::MOST_DATA).with_context(|| format!("cannot read {}", path.display()))?;
         Self::parse(&text).with_context(|| format!("{} is no readable BVH", path.display()))
     }
 
@@ -152,6 +159,9 @@ impl Bvh {
 
 /// Opens a joint below the innermost open one.
 fn push(joints: &mut Vec<JointChannels>, open: &mut Vec<usize>, name: String, words: &mut Words) -> Result<()> {
+    ensure!(joints.len() < MOST_JOINTS, "it has more than {MOST_JOINTS} joints: give the file of one figure");
+    ensure!(open.len() < MOST_DEPTH, "more than {MOST_DEPTH} joints hang on each other");
+    ensure!(name.len() <= MOST_NAME_BYTES, "joint {}: a name of {} bytes", joints.len() + 1, name.len());
     words.expect("{")?;
     joints.push(JointChannels { name, parent: open.last().copied(), offset: [0.0; 3], channels: Vec::new() });
     open.push(joints.len() - 1);
@@ -268,6 +278,19 @@ mod tests {
         let many = says(&file("1 Xposition", 20_000, &"0 ".repeat(20_000)));
         assert!(many.contains("20000 frames of 201 joints with 1 channels"), "{many}");
         assert_eq!(Bvh::parse(&file("1 Xposition", 100, &"0 ".repeat(100))).unwrap().n_frames, 100);
+    }
+
+    #[test]
+    fn skeletons_beyond_any_figure_are_refused_early() {
+        let says = |text: String| format!("{:#}", Bvh::parse(&text).unwrap_err());
+        let head = "HIERARCHY ROOT a { OFFSET 0 0 0 CHANNELS 1 Xposition ";
+        let joint = "JOINT b { OFFSET 0 0 0 } ";
+        assert!(says(format!("{head}{}", joint.repeat(MOST_JOINTS))).contains("more than 10000 joints"));
+        assert!(says(format!("{head}{}", "JOINT b { ".repeat(MOST_DEPTH))).contains("more than 512 joints"));
+        // Each end would be named after the one before it.
+        assert!(says(format!("{head}{}", "End Site { ".repeat(300))).contains("a name of"));
+        let whole = format!("{head}{}}} MOTION Frames: 1 Frame Time: 0.04 0", joint.repeat(MOST_JOINTS - 1));
+        assert_eq!(Bvh::parse(&whole).unwrap().joints.len(), MOST_JOINTS);
     }
 
     proptest::proptest! {

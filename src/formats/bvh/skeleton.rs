@@ -99,10 +99,10 @@ impl BvhSkeleton {
     }
 
     /// A BVH file of this skeleton; `frames`: all channels of each frame.
-    pub fn to_bvh<'a>(&self, fps: FrameRate, frames: impl ExactSizeIterator<Item = &'a [f64]>) -> String {
+    pub fn to_bvh(&self, fps: FrameRate, frames: impl ExactSizeIterator<Item: AsRef<[f64]>>) -> String {
         let mut text = self.head(fps, frames.len());
         for frame in frames {
-            let numbers: Vec<String> = frame.iter().map(|value| format!("{value:.6}")).collect();
+            let numbers: Vec<String> = frame.as_ref().iter().map(|value| format!("{value:.6}")).collect();
             text.push_str(&numbers.join(" "));
             text.push('\n');
         }

@@ -9,6 +9,9 @@ use serde::Deserialize;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
+/// Most people in a frame: they are compared with those of the frame before.
+const MOST_PERSONS: usize = 1000;
+
 /// A file whose top is an object.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
@@ -60,22 +63,37 @@ pub fn parse(bytes: &[u8]) -> Result<FoundKeypoints> {
 }
 
 /// Numbered frames of entries as keypoints.
-pub fn of_frames(program: &str, frames: BTreeMap<u64, Vec<JsonEntry>>) -> Result<FoundKeypoints> {
+fn of_frames(program: &str, frames: BTreeMap<u64, Vec<JsonEntry>>) -> Result<FoundKeypoints> {
     let mut counts = BTreeSet::new();
-    let mut numbered = BTreeMap::new();
-    for (number, entries) in frames {
-        let mut people: Vec<FoundPerson> = Vec::with_capacity(entries.len());
-        for (at, entry) in entries.iter().enumerate() {
-            let person = entry.person().map_err(|message| anyhow::anyhow!("frame {number}, person {at}: {message}"))?;
-            if let Some((person, n_points)) = person {
-                counts.insert(n_points);
-                people.push(person);
-            }
+    let numbered = frames.into_iter().map(|(number, entries)| Ok((number, persons(number, &entries, &mut counts)?)));
+    let numbered = numbered.collect::<Result<_>>()?;
+    of_persons(program, &counts, numbered)
+}
+
+/// The persons of frame `number`; adds the numbers of points that they have to `counts`. Errors: an entry that is no
+/// person, more persons than any picture shows.
+pub fn persons(number: u64, entries: &[JsonEntry], counts: &mut BTreeSet<usize>) -> Result<Vec<FoundPerson>> {
+    let n = entries.len();
+    ensure!(n <= MOST_PERSONS, "frame {number} holds {n} people, expected {MOST_PERSONS} at most");
+    let mut persons = Vec::with_capacity(n);
+    for (at, entry) in entries.iter().enumerate() {
+        let person = entry.person().map_err(|message| anyhow::anyhow!("frame {number}, person {at}: {message}"))?;
+        if let Some((person, n_points)) = person {
+            counts.insert(n_points);
+            persons.push(person);
         }
-        numbered.insert(number, people);
     }
+    Ok(persons)
+}
+
+/// Numbered frames of persons, of so many points each, as keypoints.
+pub fn of_persons(
+    program: &str,
+    counts: &BTreeSet<usize>,
+    numbered: BTreeMap<u64, Vec<FoundPerson>>,
+) -> Result<FoundKeypoints> {
     let (frames, notes) = in_order(numbered)?;
-    let counts = counts.into_iter().map(|n| n.to_string()).collect::<Vec<_>>().join(" and ");
+    let counts = counts.iter().map(|n| n.to_string()).collect::<Vec<_>>().join(" and ");
     Ok(FoundKeypoints::new(format!("{program}, {counts} points"), frames, notes))
 }
 

@@ -2,18 +2,21 @@
 //! (`NAME_000000000012_keypoints.json`).
 
 use super::document::FramePeople;
-use super::entry::JsonEntry;
-use super::found::{CoordinateUnit, FoundKeypoints};
+use super::found::{CoordinateUnit, FoundKeypoints, FoundPerson};
 use super::frames::number_of;
 use super::range::check_pixels;
 use super::{arrays, document};
 use crate::joints_description::is_one;
 use anyhow::{Context, Result, bail, ensure};
-use std::collections::BTreeMap;
+use orator_base::input;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Share of negative coordinates from which on shares of the picture are none.
 const MOST_NEGATIVE: f64 = 0.2;
+
+/// Most bytes of the file of one frame.
+const MOST_FRAME_BYTES: u64 = 16 << 20;
 
 /// Reads keypoints of any known kind. Errors name the file, the place, what was expected.
 pub fn read(path: &Path) -> Result<FoundKeypoints> {
@@ -36,7 +39,7 @@ pub fn read(path: &Path) -> Result<FoundKeypoints> {
 }
 
 fn read_file(path: &Path) -> Result<FoundKeypoints> {
-    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let bytes = input::read(path, input::MOST_DATA).with_context(|| format!("cannot read {}", path.display()))?;
     match bytes.get(..4) {
         _ if path.extension().is_some_and(|end| end == "npz") => arrays::read_npz(path),
         Some(b"PK\x03\x04") => arrays::read_npz(path),
@@ -59,12 +62,13 @@ fn read_folder(folder: &Path) -> Result<FoundKeypoints> {
     files.sort();
     ensure!(!files.is_empty(), "{} holds no .json file of a frame", folder.display());
     let mut program = "";
-    let mut frames: BTreeMap<u64, (&PathBuf, Vec<JsonEntry>)> = BTreeMap::new();
+    let mut counts = BTreeSet::new();
+    let mut frames: BTreeMap<u64, (&PathBuf, Vec<FoundPerson>)> = BTreeMap::new();
     for file in &files {
         let name = file.file_name().unwrap_or_default().to_string_lossy();
         let number = number_of(&name)
             .with_context(|| format!("{}: no digits in its name say which frame it is", file.display()))?;
-        let bytes = std::fs::read(file).with_context(|| format!("cannot read {}", file.display()))?;
+        let bytes = input::read(file, MOST_FRAME_BYTES).with_context(|| format!("cannot read {}", file.display()))?;
         let read = document::people(&bytes).with_context(|| file.display().to_string())?;
         program = read.program;
         let people = match read.people {
@@ -75,7 +79,9 @@ fn read_folder(folder: &Path) -> Result<FoundKeypoints> {
                 frames.len()
             ),
         };
-        if let Some((other, _)) = frames.insert(number, (file, people)) {
+        // The lists of numbers of a frame take more memory than its persons.
+        let persons = document::persons(number, &people, &mut counts).with_context(|| folder.display().to_string())?;
+        if let Some((other, _)) = frames.insert(number, (file, persons)) {
             bail!(
                 "{} and {} are both frame {number}; each video needs a folder of its own",
                 other.display(),
@@ -83,6 +89,6 @@ fn read_folder(folder: &Path) -> Result<FoundKeypoints> {
             );
         }
     }
-    let frames = frames.into_iter().map(|(number, (_, people))| (number, people)).collect();
-    document::of_frames(program, frames).with_context(|| folder.display().to_string())
+    let frames = frames.into_iter().map(|(number, (_, persons))| (number, persons)).collect();
+    document::of_persons(program, &counts, frames).with_context(|| folder.display().to_string())
 }

@@ -7,6 +7,7 @@ use crate::npz::{AxisLength, Npz};
 use crate::{authors_txt, joints_description, npy};
 use anyhow::{Context, Result, bail, ensure};
 use ndarray::{Ix2, Ix3};
+use orator_base::input;
 use orator_base::motion::units;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::N_JOINTS;
@@ -38,7 +39,8 @@ pub fn has_ending(path: &Path) -> bool {
 /// names the file, what is in it and what was expected.
 pub fn read(path: &Path, fps: Option<FrameRate>) -> Result<MotionFile> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let size = std::fs::metadata(path).with_context(|| format!("{} cannot be read", path.display()))?.len();
+    let meta = input::open(path).and_then(|file| file.metadata());
+    let size = meta.with_context(|| format!("{} cannot be read", path.display()))?.len();
     ensure!(size > 0, "{} is empty (0 bytes): expected a motion", path.display());
     let (mut notes, mut says_rate, assumed) = (Vec::new(), true, fps.unwrap_or(USUAL_FPS));
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();

@@ -3,6 +3,7 @@
 
 use super::word::{self, Word};
 use anyhow::{Context, Result, bail, ensure};
+use std::collections::BTreeSet;
 
 /// The words of all cues, in their order. Errors: the line of a time that cannot be read; text without any cue.
 pub fn read(text: &str) -> Result<Vec<Word>> {
@@ -11,7 +12,7 @@ pub fn read(text: &str) -> Result<Vec<Word>> {
     let mut n_cues = 0;
     // Where words are timed, a cue shows the line before again.
     let is_rolling = text.split('<').skip(1).any(|part| inline_time(part).is_some());
-    let mut before: Vec<String> = Vec::new();
+    let mut before: BTreeSet<String> = BTreeSet::new();
     while let Some((line, n)) = lines.next() {
         let Some((start, rest)) = line.split_once("-->") else { continue };
         let end = rest.split_whitespace().next().unwrap_or_default();
@@ -28,7 +29,7 @@ pub fn read(text: &str) -> Result<Vec<Word>> {
         let said: Vec<&str> =
             cue.iter().zip(&shown).filter(|(_, shown)| is_new(shown)).map(|(line, _)| *line).collect();
         push_cue(&mut words, &said.join(" "), start, end).with_context(|| format!("line {n}"))?;
-        before = shown;
+        before = shown.into_iter().collect();
     }
     ensure!(
         n_cues > 0 || text.trim().is_empty() || text.starts_with("WEBVTT"),
@@ -47,7 +48,10 @@ fn push_cue(words: &mut Vec<Word>, text: &str, start: f64, end: f64) -> Result<(
                 word::push(words, &plain(&piece), (at, time), None)?;
                 (at, piece) = (time, rest.to_owned());
             }
-            None if nth > 0 => piece = format!("{piece}<{part}"),
+            None if nth > 0 => {
+                piece.push('<');
+                piece.push_str(part);
+            }
             None => part.clone_into(&mut piece),
         }
     }
@@ -110,6 +114,18 @@ mod tests {
         assert!(format!("{:#}", read("x --> 00:01\nso\n").unwrap_err()).contains("line 1"));
         assert!(read("00:02 --> 00:01\nso\n").is_err());
         assert!(read("so well\n").is_err() && read("\n").unwrap().is_empty());
+    }
+
+    #[test]
+    fn a_cue_of_any_form_takes_linear_time() {
+        let cue = |text: &str| format!("WEBVTT\n\n00:01.000 --> 00:02.000\n{text}\n\n");
+        let lines: String = (0..100_000).map(|n| format!("line{n:06}<00:01.500>\n")).collect();
+        for text in [cue(&"<".repeat(4 << 20)), cue(&"a<".repeat(2 << 20)), cue(&lines) + &cue(&lines)] {
+            let begun = std::time::Instant::now();
+            read(&text).unwrap();
+            // Quadratic time is minutes here.
+            assert!(begun.elapsed().as_secs() < 20, "{} bytes took {:?}", text.len(), begun.elapsed());
+        }
     }
 
     #[test]

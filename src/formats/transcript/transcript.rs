@@ -5,6 +5,7 @@ use super::json::JsonTranscript;
 use super::word::{self, Word, WordSource};
 use super::{encoding, json, subtitles, textgrid};
 use anyhow::{Context, Result, bail, ensure};
+use orator_base::input;
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -59,9 +60,7 @@ impl Transcript {
     /// encoding or no transcript; the message names the line or the word.
     pub fn read(path: &Path) -> Result<Self> {
         let reading = || format!("cannot read {}", path.display());
-        let bytes = std::fs::metadata(path).with_context(reading)?.len();
-        ensure!(bytes <= MAX_BYTES, "{} has {bytes} bytes: that is no transcript", path.display());
-        let bytes = std::fs::read(path).with_context(reading)?;
+        let bytes = input::read(path, MAX_BYTES).with_context(reading)?;
         let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let read = encoding::text_of(&bytes).and_then(|text| Self::parse(&text, &ending, &stem));

@@ -3,6 +3,7 @@
 
 use super::writer::{VECTORS, WORDS};
 use anyhow::{Context, Result, ensure};
+use orator_base::input;
 use safetensors::Dtype;
 use safetensors::tensor::Metadata;
 use std::collections::HashMap;
@@ -38,7 +39,7 @@ impl WordVectors {
     }
 
     fn read(path: &Path) -> Result<Self> {
-        let file = File::open(path)?;
+        let file = input::open(path)?;
         let bytes = file.metadata()?.len();
         let part = |at: u64, size: u64| -> Result<Vec<u8>> {
             ensure!(at.checked_add(size).is_some_and(|end| end <= bytes), "it has only {bytes} bytes: it is cut off");

@@ -3,6 +3,7 @@
 
 use anyhow::{Context, Result, bail, ensure};
 use orator_avatar::animate::export::file::ExportFormat;
+use orator_base::input;
 use orator_dataset::config::patterns::{OF_SOUNDS, OF_VIDEOS, has_ending};
 use orator_formats::search;
 use std::collections::BTreeMap;
@@ -57,7 +58,7 @@ pub fn of_folder(folder: &Path, out: &Path) -> Result<Vec<BatchSound>> {
 /// The rows of the table `path`: columns `audio`, and if they are there `out`, `checkpoint` (or `speaker`) and `transcript`. Paths count
 /// from the table's folder. Errors name the line.
 pub fn of_table(path: &Path) -> Result<Vec<BatchSound>> {
-    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let bytes = input::read(path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
     let text = std::str::from_utf8(&bytes).with_context(|| format!("{} is no text in UTF-8", path.display()))?;
     let folder = path.parent().unwrap_or(Path::new(""));
     parse(text, folder).and_then(distinct).with_context(|| format!("the table {}", path.display()))

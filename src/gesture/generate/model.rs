@@ -263,11 +263,20 @@ mod tests {
             ("/speaker/network/n_mels", 1_000_000),
             ("/speaker/fps/num", 4_000_000_000u32),
             ("/speaker/representation", 7),
+            ("/speaker/fps/den", 0),
+            ("/speaker/normalisation/std/3", 0),
         ] {
             let mut facts = contents.facts.clone();
             *facts.pointer_mut(place).unwrap() = value.into();
             let wrong = Contents { facts, tensors: contents.tensors.clone() };
             assert!(build(&wrong).is_err(), "{place} {value}");
+        }
+        for (field, value) in [("bone_lengths", -0.1), ("std", -1.0), ("mean", 1e300)] {
+            let mut facts = contents.facts.clone();
+            facts["speaker"]["normalisation"][field][5] = value.into();
+            let wrong = Contents { facts, tensors: contents.tensors.clone() };
+            let text = format!("{:#}", build(&wrong).err().unwrap());
+            assert!(text.contains("normalisation"), "{field}: {text}");
         }
     }
 }

@@ -61,6 +61,11 @@ impl Normalisation {
         ensure!(metres.all(|v| v.abs() <= 100.0), "its normalisation has numbers beyond 100 m");
         let mut radians = self.channels.iter().flat_map(|channel| channel.mean.into_iter().chain(channel.std));
         ensure!(radians.all(|v| v.abs() <= 100.0), "its normalisation has angles beyond 100 radians");
+        let positive = |std: &[f32], least: f32| std.iter().all(|v| *v >= least);
+        ensure!(positive(&self.std, f32::MIN_POSITIVE), "its `normalisation.std` has a deviation that is not above 0");
+        ensure!(positive(&self.bone_lengths, 0.0), "its `normalisation.bone_lengths` has a negative length");
+        let of_channels = self.channels.iter().all(|channel| positive(&channel.std, 0.0));
+        ensure!(of_channels, "its `normalisation.channels` has a negative deviation");
         let is_once = self.channels.is_sorted_by(|a, b| a.channel < b.channel);
         ensure!(is_once, "its channels stand twice or in another order than head, trunk");
         Ok(())

@@ -5,6 +5,7 @@ use anyhow::{Context, Result, bail};
 use ffmpeg_next as ffmpeg;
 use ffmpeg_next::format::context::Input;
 use ffmpeg_next::format::stream::{Disposition, Stream};
+use orator_base::input;
 use orator_base::types::sound::AudioTracks;
 use std::io::Read;
 use std::ops::RangeInclusive;
@@ -64,14 +65,12 @@ pub(crate) fn open_with(path: &Path, options: &[(&str, &str)]) -> Result<Input> 
     init();
     let name = path.display();
     let cannot = || UnreadableMedia(format!("cannot read {name}"));
-    let mut file =
-        std::fs::File::open(path).with_context(|| UnreadableMedia(format!("cannot read {name}: {EXPECTED}")))?;
-    let size = file.metadata().with_context(cannot)?;
     let unreadable = |problem: String| Err(UnreadableMedia(problem).into());
-    if size.is_dir() {
+    if path.is_dir() {
         return unreadable(format!("{name} is a folder: {EXPECTED}"));
     }
-    if size.is_file() && size.len() == 0 {
+    let mut file = input::open(path).with_context(|| UnreadableMedia(format!("cannot read {name}: {EXPECTED}")))?;
+    if file.metadata().with_context(cannot)?.len() == 0 {
         return unreadable(format!("{name} is empty (0 bytes): {EXPECTED}; copy it again"));
     }
     let mut head = [0u8; 12];

@@ -1,6 +1,7 @@
 //! PNG files.
 
 use anyhow::{Context, Result, ensure};
+use orator_base::input;
 use orator_base::types::image::Image;
 use png::{BitDepth, ColorType, Decoder, Encoder, Transformations};
 use std::fs::File;
@@ -26,7 +27,7 @@ pub fn write(path: &Path, image: &Image) -> Result<()> {
 /// Reads any PNG as 8-bit RGB; transparency is dropped.
 pub fn read(path: &Path) -> Result<Image> {
     let read = || -> Result<Image> {
-        let mut decoder = Decoder::new(BufReader::new(File::open(path)?));
+        let mut decoder = Decoder::new(BufReader::new(input::open(path)?));
         decoder.set_transformations(Transformations::normalize_to_color8());
         let mut reader = decoder.read_info()?;
         let size = reader.output_buffer_size().context("it is too large")?;

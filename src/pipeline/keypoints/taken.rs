@@ -47,8 +47,11 @@ pub fn take_in(
         let place = if is_one || below + 1 >= people.len() { place } else { nearest as f64 };
         gathered.push(pose(person_at(&people, place), &followed, nearest), fps.secs(t));
     }
-    let (keypoints, extras) = gathered.finish(fps, image_size)?;
+    // The source is gone before the arrays are there: each takes a kilobyte a frame.
     let mut notes = found.notes;
+    drop(people);
+    drop(found.frames);
+    let (keypoints, extras) = gathered.finish(fps, image_size)?;
     notes.extend(others(&followed));
     Ok(TakenKeypoints { keypoints, extras, duration_secs, notes })
 }

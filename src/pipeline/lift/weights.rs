@@ -1,6 +1,7 @@
 //! The lifters' weights: built into the program, or from files of `orator-lab train lifter`.
 
 use anyhow::{Context, Result, ensure};
+use orator_base::input;
 use orator_nn::lifter::body::BodyLifter;
 use orator_nn::lifter::hand::{self, HandLifter};
 use orator_nn::lifter::temporal;
@@ -56,7 +57,8 @@ fn load<T>(
     if path.as_os_str().is_empty() {
         return parse(builtin, kind, make).with_context(|| format!("the built-in {kind} does not fit this program"));
     }
-    let bytes = std::fs::read(path).with_context(|| format!("cannot read the weights {}", path.display()))?;
+    let bytes =
+        input::read(path, input::MOST_DATA).with_context(|| format!("cannot read the weights {}", path.display()))?;
     parse(&bytes, kind, make)
         .with_context(|| format!("{} does not hold weights of `orator-lab train lifter --part {part}`", path.display()))
 }

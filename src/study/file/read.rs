@@ -4,6 +4,7 @@ use super::layers::{self, StudyPreset};
 use super::rules;
 use super::study_file::{StudyFile, fill_in};
 use anyhow::{Context, Result};
+use orator_base::input;
 use orator_base::stage::workdir;
 use orator_dataset::config::file::{line_of, nearest, refused};
 use orator_dataset::config::{ConfigError, Problem, SourceLocation};
@@ -23,7 +24,7 @@ impl StudyFile {
     /// # Errors
     /// A file that cannot be read, or [`ConfigError`] with what is wrong in it.
     pub fn read(file: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(file).with_context(|| {
+        let text = input::read_text(file, input::MOST_TEXT).with_context(|| {
             format!("cannot read the study file {}; `orator guide study` shows one", file.display())
         })?;
         let file = std::path::absolute(file)?;

@@ -36,6 +36,13 @@ fn under_an_armature(folder: &Path) -> PathBuf {
         "translation": [0.5, 0.0, 1.0] });
     scene["nodes"].as_array_mut().unwrap().push(node);
     scene["scenes"][0]["nodes"][0] = json!(armature);
+    let path = folder.join("armature.glb");
+    std::fs::write(&path, glb_file(&scene, &bytes)).unwrap();
+    path
+}
+
+/// Bytes of a GLB file with this scene and data.
+fn glb_file(scene: &Value, bytes: &[u8]) -> Vec<u8> {
     let mut text = scene.to_string().into_bytes();
     text.resize(text.len().next_multiple_of(4), b' ');
     let mut file = b"glTF".to_vec();
@@ -46,10 +53,34 @@ fn under_an_armature(folder: &Path) -> PathBuf {
     file.extend(&text);
     file.extend((bytes.len() as u32).to_le_bytes());
     file.extend(b"BIN\0");
-    file.extend(&bytes);
-    let path = folder.join("armature.glb");
-    std::fs::write(&path, file).unwrap();
-    path
+    file.extend(bytes);
+    file
+}
+
+#[test]
+fn nodes_that_do_not_move_take_no_memory_a_frame_and_too_many_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, figure) = written(folder.path(), 0, Names::Mixamo);
+    let with_nodes = |n: usize| {
+        let Glb { mut scene, bytes } = Glb::read(&figure);
+        let more = (0..n).map(|k| json!({ "name": format!("prop {k}") }));
+        scene["nodes"].as_array_mut().unwrap().extend(more);
+        let path = folder.path().join(format!("{n}.glb"));
+        std::fs::write(&path, glb_file(&scene, &bytes)).unwrap();
+        path
+    };
+    let performance = perform(&swinging(5, 600), None, &AnimationOptions::default());
+    let rig = RetargetRig::open(&with_nodes(9_000)).unwrap();
+    let map = BoneMap::found(rig.rig()).unwrap();
+    let out = folder.path().join("moved.glb");
+    let memory = allocation_counter::measure(|| rig.write(&out, &performance, &map).unwrap());
+    // The rotations of all nodes in all frames alone are 165 MiB.
+    assert!(memory.bytes_max < 80 << 20, "{} bytes", memory.bytes_max);
+    let moved = Glb::read(&out);
+    let channels = moved.scene["animations"][0]["channels"].as_array().unwrap();
+    assert!((40..100).contains(&channels.len()), "{} channels", channels.len());
+    let error = format!("{:#}", RetargetRig::open(&with_nodes(10_000)).unwrap_err());
+    assert!(error.contains("10000.glb") && error.contains("nodes, 10000 at most"), "{error}");
 }
 
 #[test]

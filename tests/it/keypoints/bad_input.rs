@@ -55,6 +55,7 @@ fn every_kind_of_damage_is_named() {
         "{\"images\": [{\"id\": 1, \"file_name\": \"1.jpg\"}], \"annotations\": [{\"image_id\": 2}]}",
     );
     write("sparse.json", "[{\"image_id\": 397133, \"keypoints\": []}, {\"image_id\": 900, \"keypoints\": []}]");
+    write("crowd.json", &serde_json::Value::from(vec![person(51); 1001]).to_string());
     write("nobody/a_0_keypoints.json", "{\"people\": []}");
     write("mixed/a_0_keypoints.json", "{\"people\": []}");
     write("mixed/b_0_keypoints.json", "{\"people\": []}");
@@ -104,6 +105,7 @@ fn every_kind_of_damage_is_named() {
             "sparse.json",
             "2 frames with numbers from 900 to 397133; expected the frames of one video, one after the other",
         ),
+        ("crowd.json", "frame 0 holds 1001 people, expected 1000 at most"),
         ("nobody", "nobody: nobody is seen in any frame"),
         (
             "mixed",

@@ -218,6 +218,75 @@ fn a_failed_video_takes_no_name_from_a_good_one_and_commands_no_terminal() {
     assert_eq!(keys, ["one-000000", "two-000000"]);
 }
 
+/// Runs the program for a minute at most, since it must not wait for a writer or read without end.
+fn run_briefly(dir: &Path, args: &[&str]) -> (i32, String) {
+    let mut command = Command::new("timeout");
+    let output = command.args(["60", env!("CARGO_BIN_EXE_orator")]).args(args).current_dir(dir).output().unwrap();
+    let words = String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout);
+    (output.status.code().unwrap_or(-1), words)
+}
+
+#[test]
+fn pipes_and_devices_are_refused_in_the_place_of_files() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    let pipe = |name: &str| {
+        let _ = fs::remove_file(at(name));
+        rustix::fs::mkfifoat(rustix::fs::CWD, at(name), rustix::fs::Mode::RWXU).unwrap();
+    };
+    let device = |name: &str| {
+        let _ = fs::remove_file(at(name));
+        std::os::unix::fs::symlink("/dev/zero", at(name)).unwrap();
+    };
+    fs::create_dir_all(at("kp/talk")).unwrap();
+    fs::write(at("kp/talk/a_0_keypoints.json"), "{\"people\": []}").unwrap();
+    pipe("kp/talk/a_1_keypoints.json");
+    let error = format!("{:#}", orator_formats::keypoints::read(&at("kp/talk")).unwrap_err());
+    assert!(error.contains("a_1_keypoints.json: it is a named pipe, expected a regular file"), "{error}");
+    for name in ["a.npy", "a.npz", "a.txt", "a.bvh"] {
+        for (kind, put) in [("named pipe", &pipe as &dyn Fn(&str)), ("device", &device)] {
+            put(name);
+            let (code, errors) = run_briefly(dir.path(), &["animate", name, "--out", "out.glb"]);
+            let expected = format!("it is a {kind}, expected a regular file");
+            assert!(code == 1 && errors.contains(name) && errors.contains(&expected), "{code} {errors}");
+        }
+    }
+    for file in ["info.json", "stats.json", "index.jsonl", "checksums.b3", "videos/one.json", "train-one-0000.tar"] {
+        fs::create_dir_all(at("data")).unwrap();
+        dataset(&at("data"));
+        pipe(&format!("data/{file}"));
+        for args in [&["dataset", "verify", "data"][..], &["import", "data", "--out", "out", "--speaker", "host"]] {
+            let (code, words) = run_briefly(dir.path(), args);
+            // An import assembles the common files anew.
+            assert!((1..=2).contains(&code) || args[0] == "import" && code == 0, "{file}: {code} {words}");
+            let _ = fs::remove_dir_all(at("out"));
+        }
+        fs::remove_dir_all(at("data")).unwrap();
+    }
+}
+
+#[test]
+fn numbers_that_no_dataset_has_are_refused_by_their_field() {
+    let dir = tempfile::tempdir().unwrap();
+    for (file, place, value, expected) in [
+        ("info.json", "/fps/den", serde_json::json!(0), "invalid frame rate 15/0"),
+        ("info.json", "/bone_lengths_metres/3", serde_json::json!(-0.2), "`bone_lengths_metres` has the length -0.2"),
+        ("stats.json", "/std/5/1", serde_json::json!(-1.0), "`std` holds -1.0"),
+        ("stats.json", "/mean/5/1", serde_json::json!(1e300), "`mean` holds 1e300"),
+    ] {
+        let data = dir.path().join("data");
+        fs::create_dir(&data).unwrap();
+        dataset(&data);
+        let path = data.join(file);
+        let mut fields: serde_json::Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+        *fields.pointer_mut(place).unwrap() = value;
+        fs::write(&path, fields.to_string()).unwrap();
+        let error = format!("{:#}", Dataset::open(&data).err().unwrap());
+        assert!(error.contains(file) && error.contains(expected), "{place}: {error}");
+        fs::remove_dir_all(&data).unwrap();
+    }
+}
+
 #[cfg(unix)]
 #[test]
 fn folders_that_lead_to_themselves_end() {

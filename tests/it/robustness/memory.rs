@@ -93,6 +93,20 @@ fn lifting_holds_its_arrays_and_little_more() {
     assert!(short > 10.0 && grown <= 1.4 * arrays + 32.0, "{grown:.0} MiB more for {arrays:.0} MiB of arrays");
 }
 
+#[test]
+fn a_folder_of_frames_takes_memory_for_its_persons_alone() {
+    let (dir, n_frames) = (tempfile::tempdir().unwrap(), 2_000);
+    let numbers = |n: usize| vec![5.5; 3 * n];
+    let person = serde_json::json!({ "pose_keypoints_2d": numbers(25), "hand_left_keypoints_2d": numbers(21),
+        "hand_right_keypoints_2d": numbers(21) });
+    let text = serde_json::json!({ "people": [person] }).to_string();
+    (0..n_frames).for_each(|t| std::fs::write(dir.path().join(format!("a_{t:012}_keypoints.json")), &text).unwrap());
+    let memory = allocation_counter::measure(|| drop(orator_formats::keypoints::read(dir.path()).unwrap()));
+    // A person is 59 points of 12 bytes.
+    let bytes = memory.bytes_max / n_frames;
+    assert!(bytes < 1_400, "{bytes} bytes a frame");
+}
+
 /// Peak resident memory in MiB of `orator generate` from so many seconds of sound to joints, and of these joints.
 fn peak_of_generate(secs: f64) -> (f64, f64) {
     let dir = tempfile::tempdir().unwrap();

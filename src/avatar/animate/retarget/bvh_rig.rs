@@ -44,10 +44,9 @@ impl BvhRig {
         UserRig { joints: self.skeleton.joints.iter().map(joint).collect(), standing: self.first_frame() }
     }
 
-    /// Text of the file with this motion, local rotations a frame.
-    pub fn text(&self, fps: FrameRate, frames: &[Vec<Rotation>]) -> String {
-        let frames: Vec<Vec<f64>> = frames.iter().map(|local| self.channels(local)).collect();
-        self.skeleton.to_bvh(fps, frames.iter().map(Vec::as_slice))
+    /// Text of the file with this motion: for each frame the local rotations of all joints.
+    pub fn text(&self, fps: FrameRate, frames: impl ExactSizeIterator<Item = Vec<Rotation>>) -> String {
+        self.skeleton.to_bvh(fps, frames.map(|local| self.channels(&local)))
     }
 
     /// Local rotations of the first frame.

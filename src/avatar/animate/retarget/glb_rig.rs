@@ -7,12 +7,15 @@ use anyhow::{Context as _, Result, ensure};
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::Vec3;
 use orator_base::types::time::FrameRate;
+use orator_formats::bvh::read::MOST_JOINTS;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 
 /// Largest relative difference of the three scales of a node.
 const UNEVEN: f64 = 1e-3;
+/// Most bytes of the JSON that describes the scene, which takes several times as much memory once parsed.
+const MOST_SCENE_BYTES: u32 = 32 << 20;
 
 /// A GLB file taken apart.
 #[derive(Clone, Debug)]
@@ -28,11 +31,13 @@ impl GlbRig {
     /// Reads the bytes of a file. Errors: no GLB, buffers in other files, nodes that are no tree, scaled unevenly or
     /// given as a matrix.
     pub fn new(file: &[u8]) -> Result<Self> {
-        let (scene, bytes) = chunks(file).context("no binary glTF 2.0 (.glb)")?;
+        let (scene, bytes) = chunks(file)?;
         let buffers = scene["buffers"].as_array().map_or(0, Vec::len);
         let is_outside = scene["buffers"].as_array().into_iter().flatten().any(|buffer| buffer.get("uri").is_some());
         ensure!(buffers <= 1 && !is_outside, "its data lie in other files; export it as one .glb");
         let list = |key: &str| scene[key].as_array().into_iter().flatten();
+        let n_nodes = list("nodes").count();
+        ensure!(n_nodes <= MOST_JOINTS, "it has {n_nodes} nodes, {MOST_JOINTS} at most: export the figure alone");
         let nodes = list("nodes").enumerate().map(|(n, node)| {
             SceneNode::deserialize(node).with_context(|| format!("node {n} is not as glTF 2.0 describes nodes"))
         });
@@ -65,16 +70,30 @@ impl GlbRig {
         &self.rig
     }
 
-    /// Bytes of the file with an animation: local rotations a frame, of the joints that move.
-    pub fn file(&self, fps: FrameRate, frames: &[Vec<Rotation>], moves: impl Fn(usize) -> bool) -> Vec<u8> {
+    /// Bytes of the file with an animation of the joints that move; `frames`: for each frame the local rotations of all
+    /// joints, of which only those of moving joints are kept.
+    pub fn file(
+        &self,
+        fps: FrameRate,
+        frames: impl ExactSizeIterator<Item = Vec<Rotation>>,
+        moves: impl Fn(usize) -> bool,
+    ) -> Vec<u8> {
         let mut scene = self.scene.clone();
         let mut buffer = GlbBuffer::reopened(&scene, self.bytes.clone());
-        if !frames.is_empty() {
-            let times: Vec<[f32; 1]> = (0..frames.len()).map(|frame| [fps.secs(frame) as f32]).collect();
+        let n_frames = frames.len();
+        let mut tracks: Vec<(usize, Vec<Rotation>)> = (0..self.rig.joints.len())
+            .filter(|&joint| moves(joint))
+            .map(|joint| (joint, Vec::with_capacity(n_frames)))
+            .collect();
+        for local in frames {
+            tracks.iter_mut().for_each(|(joint, track)| track.push(local[*joint]));
+        }
+        if n_frames > 0 {
+            let times: Vec<[f32; 1]> = (0..n_frames).map(|frame| [fps.secs(frame) as f32]).collect();
             let input = buffer.floats(&times, "SCALAR", BufferUse::Other);
             let (mut samplers, mut channels) = (Vec::new(), Vec::new());
-            for joint in (0..self.rig.joints.len()).filter(|&joint| moves(joint)) {
-                let output = buffer.floats(&signed(frames.iter().map(|local| local[joint])), "VEC4", BufferUse::Other);
+            for (joint, track) in tracks {
+                let output = buffer.floats(&signed(track.into_iter()), "VEC4", BufferUse::Other);
                 let target = json!({ "node": self.nodes[joint], "path": "rotation" });
                 channels.push(json!({ "sampler": samplers.len(), "target": target }));
                 samplers.push(json!({ "input": input, "output": output, "interpolation": "LINEAR" }));
@@ -89,8 +108,16 @@ impl GlbRig {
     }
 }
 
-/// The scene and the data of a GLB file.
-fn chunks(file: &[u8]) -> Option<(Value, Vec<u8>)> {
+/// The scene and the data of a GLB file. Errors: another file, or one whose scene is described in more bytes than
+/// `MOST_JOINTS` nodes with their meshes and animations need.
+fn chunks(file: &[u8]) -> Result<(Value, Vec<u8>)> {
+    let length = file.get(12..16).map_or(0, |word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]));
+    let mib = length >> 20;
+    ensure!(length <= MOST_SCENE_BYTES, "its scene is described in {mib} MiB of JSON: export the figure alone");
+    parsed_chunks(file).context("no binary glTF 2.0 (.glb)")
+}
+
+fn parsed_chunks(file: &[u8]) -> Option<(Value, Vec<u8>)> {
     let word = |at: usize| Some(u32::from_le_bytes(file.get(at..at + 4)?.try_into().ok()?) as usize);
     if file.get(..4)? != b"glTF" || word(4)? != 2 || file.get(16..20)? != b"JSON" {
         return None;

@@ -7,6 +7,7 @@ use super::transfer::Transfer;
 use super::user_rig::UserRig;
 use crate::animate::performance::Performance;
 use anyhow::{Context as _, Result, bail, ensure};
+use orator_base::input;
 use orator_base::math::rotation::Rotation;
 use orator_base::stage::workdir;
 use orator_formats::bvh::read::Bvh;
@@ -32,7 +33,8 @@ impl RetargetRig {
         let file = match ending(path).as_str() {
             "bvh" => RigFile::Bvh(BvhRig::new(&Bvh::read(path)?).with_context(no_rig)?),
             "glb" => {
-                let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+                let bytes =
+                    input::read(path, input::MOST_DATA).with_context(|| format!("cannot read {}", path.display()))?;
                 RigFile::Glb(GlbRig::new(&bytes).with_context(no_rig)?)
             }
             _ => bail!("{}: the skeleton to move is given as .bvh or .glb", path.display()),
@@ -69,11 +71,12 @@ impl RetargetRig {
     /// Writes a performance on this skeleton.
     pub fn write(&self, path: &Path, performance: &Performance, map: &BoneMap) -> Result<()> {
         self.check_output(path)?;
-        let (frames, moves) = self.moved(performance, map)?;
-        let fps = performance.clip.fps;
+        let (transfer, clip) = (Transfer::new(&performance.rig, &self.rig, map)?, &performance.clip);
+        // One frame of all joints at a time: a file may have many more joints than those that move.
+        let frames = (0..clip.n_frames()).map(|frame| transfer.frame(clip, frame));
         match &self.file {
-            RigFile::Bvh(bvh) => workdir::write_file(path, bvh.text(fps, &frames).as_bytes()),
-            RigFile::Glb(glb) => workdir::write_file(path, &glb.file(fps, &frames, |joint| moves[joint])),
+            RigFile::Bvh(bvh) => workdir::write_file(path, bvh.text(clip.fps, frames).as_bytes()),
+            RigFile::Glb(glb) => workdir::write_file(path, &glb.file(clip.fps, frames, |joint| transfer.moves(joint))),
         }
     }
 }

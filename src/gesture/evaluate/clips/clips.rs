@@ -6,6 +6,7 @@ use super::pairs::FilePair;
 use super::sound_features::{self, SoundFeatures};
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array2, Array3, s};
+use orator_base::input;
 use orator_base::motion::{bones, resample, units};
 use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::PostureChannel;
@@ -18,7 +19,6 @@ use orator_formats::mocap::motion_file;
 use orator_formats::wav;
 use orator_media::ffmpeg::sound_stream::SoundStream;
 use rayon::prelude::*;
-use std::fs::File;
 use std::os::unix::fs::FileExt as _;
 use std::path::PathBuf;
 
@@ -78,7 +78,7 @@ impl ClipAudio {
                 let (from, to) = (from.min(*n_samples), to.min(*n_samples));
                 let reading = || format!("reading {}", path.display());
                 let mut bytes = vec![0; 2 * to.saturating_sub(from)];
-                let file = File::open(path).with_context(reading)?;
+                let file = input::open(path).with_context(reading)?;
                 file.read_exact_at(&mut bytes, offset + 2 * from as u64).with_context(reading)?;
                 Ok(bytes.chunks_exact(2).map(|pair| i16::from_le_bytes([pair[0], pair[1]])).collect())
             }

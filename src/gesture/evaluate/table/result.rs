@@ -6,6 +6,7 @@ use crate::evaluate::baseline::baselines::PredictorKind;
 use crate::evaluate::verdict::labels;
 use crate::evaluate::verdict::verdict::{better_than_nothing, hears};
 use anyhow::{Context, Result, ensure};
+use orator_base::input;
 use orator_base::math::estimate::Estimate;
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
@@ -111,7 +112,8 @@ impl StoredResult {
     /// # Errors
     /// A missing file, other JSON, another version, or a hash that does not match its definition.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+        let text =
+            input::read_text(path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
         let stored: Self = serde_json::from_str(&text).with_context(|| {
             format!("{} is no result of an evaluation: `orator evaluate --json ... > FILE` writes one", path.display())
         })?;

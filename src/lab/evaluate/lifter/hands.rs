@@ -17,8 +17,8 @@ use orator_base::motion::hand_bones::relaxed;
 use orator_base::motion::view::hand::{HandJoints, SeenHand, parent};
 use orator_base::types::pose2d::N_HAND;
 use orator_base::types::skeleton::Side;
+use orator_formats::checkpoint;
 use orator_nn::lifter::hand::HandLifter;
-use orator_nn::weights::Contents;
 use orator_pipeline::lift::weights;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -77,7 +77,7 @@ pub fn evaluate(lift: &LiftHands, sets: &[FingerSet], n_hands: usize, seed: u64)
 
 /// Lifter with the weights of a file (built-in ones where `path` is empty), of either network.
 pub fn lifter_of(path: &Path) -> Result<Box<LiftHands<'static>>> {
-    if !path.as_os_str().is_empty() && Contents::read(path)?.facts["kind"] == heatmaps::KIND {
+    if !path.as_os_str().is_empty() && checkpoint::facts(path)?["kind"] == heatmaps::KIND {
         let training_task = HeatmapLifterTask::new(0)?;
         start_from(&training_task, path)?;
         return Ok(Box::new(move |seen| Ok(training_task.lifter().lift(seen, Side::Right)?)));

@@ -5,11 +5,10 @@ use super::columns::{ColumnNames, delimited_rows, json_rows};
 use super::row::{check, vote};
 use crate::plan::TaskDesign;
 use crate::vote::{Response, StudyVote, VOTE_COLUMNS};
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, bail};
+use orator_base::input;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
-use std::io::Read as _;
 use std::path::Path;
 
 /// Bytes of the largest file.
@@ -48,11 +47,7 @@ impl VotesRead {
     /// Reads a file. `design` is that of rows that do not say theirs.
     pub fn of_file(path: &Path, names: &ColumnNames, design: Option<TaskDesign>) -> Result<Self> {
         let place = || path.display().to_string();
-        let mut bytes = Vec::new();
-        let file = fs::File::open(path).with_context(place)?;
-        ensure!(file.metadata().with_context(place)?.is_file(), "{}: it is no file", place());
-        file.take(MOST_BYTES + 1).read_to_end(&mut bytes).with_context(place)?;
-        ensure!(bytes.len() as u64 <= MOST_BYTES, "{}: it is larger than 1 GiB", place());
+        let bytes = input::read(path, MOST_BYTES).with_context(place)?;
         let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
         let is_json = ending == "jsonl" || ending == "ndjson" || ending == "json";
         Self::of_bytes(&bytes, is_json, names, design).with_context(place)

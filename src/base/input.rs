@@ -1,0 +1,103 @@
+//! Opens and reads files that other programs wrote or other people sent: regular files only, of a bounded size. A named
+//! pipe would wait for a writer, and a device may have no end.
+
+use rustix::fs::OFlags;
+use std::fs::{File, FileType, OpenOptions};
+use std::io::{Error, ErrorKind, Read, Result};
+use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
+use std::path::Path;
+
+/// Most bytes of a description: configuration, JSON records, tables.
+pub const MOST_TEXT: u64 = 256 << 20;
+/// Most bytes of one file of motion, keypoints or weights.
+pub const MOST_DATA: u64 = 4 << 30;
+
+/// Opens a regular file for reading.
+///
+/// # Errors
+/// As `File::open`; anything but a regular file, in words that follow the file's name in the caller's context.
+pub fn open(path: impl AsRef<Path>) -> Result<File> {
+    let path = path.as_ref();
+    // Without O_NONBLOCK, opening a named pipe waits for its writer. It changes nothing for regular files.
+    let flags = (OFlags::NONBLOCK | OFlags::NOCTTY).bits() as i32;
+    let opened = OpenOptions::new().read(true).custom_flags(flags).open(path);
+    // Sockets and some devices cannot be opened: their error would not say what they are.
+    let meta = opened.as_ref().map_or_else(|_| path.metadata(), File::metadata);
+    match meta {
+        Ok(meta) if !meta.is_file() => {
+            let kind = kind_of(meta.file_type());
+            Err(Error::new(ErrorKind::InvalidInput, format!("it is a {kind}, expected a regular file")))
+        }
+        _ => opened,
+    }
+}
+
+/// Reads a regular file.
+///
+/// # Errors
+/// As [`open`]; a file of more than `most_bytes`.
+pub fn read(path: impl AsRef<Path>, most_bytes: u64) -> Result<Vec<u8>> {
+    let file = open(path)?;
+    let n_bytes = file.metadata()?.len();
+    let mut bytes = Vec::new();
+    if n_bytes <= most_bytes {
+        bytes.try_reserve_exact(n_bytes as usize)?;
+        // A file may grow while it is read.
+        file.take(most_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
+    }
+    if n_bytes.max(bytes.len() as u64) > most_bytes {
+        let shown =
+            if most_bytes < 1 << 20 { format!("{most_bytes} bytes") } else { format!("{} MiB", most_bytes >> 20) };
+        return Err(Error::new(ErrorKind::FileTooLarge, format!("it is larger than {shown}, the most that is read")));
+    }
+    Ok(bytes)
+}
+
+/// Reads a regular file of UTF-8 text.
+///
+/// # Errors
+/// As [`read`]; text in another encoding.
+pub fn read_text(path: impl AsRef<Path>, most_bytes: u64) -> Result<String> {
+    let text = String::from_utf8(read(path, most_bytes)?);
+    text.map_err(|error| Error::new(ErrorKind::InvalidData, format!("it is not UTF-8 text: {}", error.utf8_error())))
+}
+
+fn kind_of(kind: FileType) -> &'static str {
+    if kind.is_fifo() {
+        "named pipe"
+    } else if kind.is_socket() {
+        "socket"
+    } else if kind.is_dir() {
+        "folder"
+    } else {
+        "device"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_regular_files_of_a_bounded_size_are_read() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        std::fs::write(at("a.txt"), "words").unwrap();
+        std::os::unix::fs::symlink("a.txt", at("link.txt")).unwrap();
+        std::os::unix::fs::symlink("/dev/zero", at("zero")).unwrap();
+        let pipe = std::process::Command::new("mkfifo").arg(at("pipe")).status().unwrap();
+        let _socket = std::os::unix::net::UnixListener::bind(at("socket")).unwrap();
+        assert_eq!(read(at("a.txt"), 5).unwrap(), b"words");
+        assert_eq!(read_text(at("link.txt"), MOST_TEXT).unwrap(), "words");
+        let says = |name: &str| read(at(name), 4).unwrap_err().to_string();
+        assert_eq!(says("a.txt"), "it is larger than 4 bytes, the most that is read");
+        assert!(pipe.success());
+        assert_eq!(says("pipe"), "it is a named pipe, expected a regular file");
+        assert_eq!(says("zero"), "it is a device, expected a regular file");
+        assert_eq!(says("socket"), "it is a socket, expected a regular file");
+        assert_eq!(says(""), "it is a folder, expected a regular file");
+        assert_eq!(read(at("none"), 4).unwrap_err().kind(), ErrorKind::NotFound);
+        std::fs::write(at("latin"), b"so\xf6").unwrap();
+        assert!(read_text(at("latin"), 9).unwrap_err().to_string().contains("not UTF-8"));
+    }
+}
