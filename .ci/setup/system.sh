@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Debian packages that the program is built with and tested by (strace, libfaketime), and the parts of the Rust toolchain.
+# Debian packages that the program is built with and watched by (strace, in one test), and the parts of the Rust toolchain.
 . "$(dirname "$0")/lib.sh"
 
 need_packages libavformat-dev libavcodec-dev libavfilter-dev libavutil-dev libswscale-dev libswresample-dev \
-    libopencv-core-dev libopencv-imgproc-dev clang pkg-config g++ ffmpeg strace libfaketime ca-certificates
+    libopencv-core-dev libopencv-imgproc-dev clang pkg-config g++ ffmpeg strace ca-certificates
 command -v cargo >/dev/null || fail 'no cargo; install Rust 1.89 or newer with rustup'
 for tool in clippy fmt; do
     cargo "$tool" --version >/dev/null 2>&1 || rustup component add clippy rustfmt || true

@@ -2,10 +2,10 @@
 //! the same bytes each time. With `ORATOR_LONG=1` (`make prove`) it has 17 minutes and eight workers.
 
 use crate::fixtures::clips;
-use crate::fixtures::faults::plan_workers::{epochs, worker_off, written};
+use crate::fixtures::faults::plan_workers::{WorkerClocks, epochs, written};
 use orator_formats::timeline_npz::Timeline;
 use orator_test_support::project::{Project, files_under};
-use rand::{Rng, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -83,8 +83,8 @@ fn a_long_video_is_shared_and_its_bytes_are_those_of_one_worker() {
     assert!(plan.code == 0 && (n_units == 4 || is_long), "{n_units}: {}", plan.errors);
     // Their clocks are up to 15 minutes apart. Workers are killed with a unit in hand: one when spans are shared, the
     // others when one of them is done.
-    let mut rng = ChaCha8Rng::seed_from_u64(5);
-    let mut start = || worker_off(&planned, rng.random_range(-900..900));
+    let (mut rng, mut clocks) = (ChaCha8Rng::seed_from_u64(5), WorkerClocks::new());
+    let mut start = || clocks.start(&planned, &mut rng);
     let mut workers: Vec<Child> = (0..n_workers).map(|_| start()).collect();
     let n_killed = n_workers / 2 + 1;
     for kill in 0..n_killed {

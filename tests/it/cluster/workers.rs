@@ -1,8 +1,8 @@
 //! Workers on one plan are killed, stand still and are started again: the datasets are those of one undisturbed run.
-//! `ORATOR_KILLS` says how often (`make prove`: 200, by eight workers). Where libfaketime is installed their clocks are
-//! minutes apart.
+//! `ORATOR_KILLS` says how often (`make prove`: 200, by eight workers). Their clocks are
+//! minutes apart and jump while they work.
 
-use crate::fixtures::faults::plan_workers::{epochs, faketime, worker, worker_off, written};
+use crate::fixtures::faults::plan_workers::{WorkerClocks, epochs, worker, written};
 use orator_test_support::project::{Project, files_under};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -42,15 +42,14 @@ fn killed_and_lost_workers_leave_the_bytes_of_one_run() {
     assert_eq!(calm.run(&[]).code, 0);
     let expected = written(&calm.work());
     assert!(expected.keys().any(|name| name.ends_with(".tar")));
-    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    let (mut rng, mut clocks) = (ChaCha8Rng::seed_from_u64(7), WorkerClocks::new());
     let (mut n_killed, mut n_lost, mut n_taken_over, mut n_plans) = (0, 0, 0, 0);
     while n_killed + n_lost < n_kills {
         n_plans += 1;
         let project = Project::with_clips("crowd", n_clips, 4.6);
         let plan = project.answer(&["plan", "--untimed"]);
         assert_eq!((plan.code, &plan.json["units"]), (0, &serde_json::json!(n_clips)), "{}", plan.errors);
-        let mut off = || rng.random_range(-900..900);
-        let mut workers: Vec<Child> = (0..n_workers).map(|_| worker_off(&project, off())).collect();
+        let mut workers: Vec<Child> = (0..n_workers).map(|_| clocks.start(&project, &mut rng)).collect();
         let mut still: Vec<Child> = Vec::new();
         let begun = Instant::now();
         while epochs(&project.work(), "end").len() < n_clips {
@@ -60,9 +59,10 @@ fn killed_and_lost_workers_leave_the_bytes_of_one_run() {
                 epochs(&project.work(), "end").len()
             );
             std::thread::sleep(Duration::from_millis(rng.random_range(50..400)));
+            clocks.jump(&mut rng);
             let at = rng.random_range(0..workers.len());
             if n_killed + n_lost < n_kills && workers[at].try_wait().unwrap().is_none() {
-                let next = worker_off(&project, rng.random_range(-900..900));
+                let next = clocks.start(&project, &mut rng);
                 let mut old = std::mem::replace(&mut workers[at], next);
                 // Its processes of units go with it.
                 if rng.random_bool(0.7) {
@@ -97,7 +97,7 @@ fn killed_and_lost_workers_leave_the_bytes_of_one_run() {
     eprintln!(
         "{n_plans} plans of {n_clips} units, {n_workers} workers at a time, clocks {}: {n_killed} workers killed, {n_lost} lost \
          and late, {n_taken_over} units taken over; the bytes are those of one run",
-        if faketime().is_some() { "up to 15 minutes off" } else { "as they are" }
+        clocks.describe()
     );
 }
 
