@@ -20,5 +20,6 @@ pub mod signals;
 pub mod study;
 pub mod train;
 pub mod ui;
+mod verb_groups;
 
 pub use program::{Outcome, main, run_program};

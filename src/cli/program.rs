@@ -10,7 +10,7 @@ use super::pipeline::{init, report, run, status};
 use super::setup::{completions, doctor, models, words};
 use super::signals;
 use super::ui::Ui;
-use super::{animate, evaluate, generate, study, train, ui};
+use super::{animate, evaluate, generate, study, train, ui, verb_groups};
 use anyhow::Result;
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use orator_base::stage::workdir;
@@ -30,9 +30,10 @@ pub enum Outcome {
     Wrong,
 }
 
-/// Videos of one speaker to a 3D speech-gesture dataset, and to a model that gestures like that speaker.
+/// Build a 3D speech-gesture dataset from videos of a speaker, and train a model that gestures like the speaker.
 #[derive(Parser)]
 #[command(name = "orator", version, help_expected = true, subcommand_required = true, arg_required_else_help = true)]
+#[command(before_help = verb_groups::list::<Verb>(), help_template = verb_groups::TEMPLATE)]
 struct Cli {
     #[command(subcommand)]
     verb: Verb,
@@ -41,8 +42,9 @@ struct Cli {
     json: bool,
 }
 
+/// The verbs of `orator`.
 #[derive(Subcommand)]
-enum Verb {
+pub(super) enum Verb {
     Init(init::Args),
     Run(run::Args),
     Status(status::Args),

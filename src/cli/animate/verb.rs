@@ -30,8 +30,9 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Turn joints into files for animation programs: rotations of a whole figure, smoothed and held within what a body
-/// can do.
+/// Convert motion to BVH, FBX, glTF, VRM, video and other formats.
+///
+/// Joint positions become rotations of a full body, smoothed and limited to possible joint angles.
 ///
 /// IN is a motion: .npy (joints [frames, 49, 3], metres; its rate in the .npy.json beside it), .txt (the layout of Rebol et
 /// al. 2021), joints.npz or the folder of a lifted video (work/lift/SPEAKER/VIDEO), or a dataset (work/dataset/SPEAKER)

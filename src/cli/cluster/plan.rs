@@ -20,7 +20,7 @@ use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Write a sealed plan of all videos, and say what it takes to work on them.
+/// Write a plan for cluster workers, with time estimates.
 ///
 /// Every video is read once for the hash of its content, unless that is known: workers do not work on one that changed since.
 /// The stages are timed on excerpts of the videos, on this machine, which should be idle; the times are kept until

@@ -16,7 +16,7 @@ use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf, absolute};
 use std::process::{Command, Stdio};
 
-/// Start workers on a cluster: write the jobs, and send them.
+/// Submit workers to Slurm, Kubernetes or SSH hosts.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     #[command(subcommand)]

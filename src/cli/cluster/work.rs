@@ -11,7 +11,7 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Work on a plan, beside other workers on any machine that sees the same folders.
+/// Process units of a plan, alongside other workers.
 ///
 /// Each worker claims one video after the other. What a dead worker had in its hands is taken over; a slow one keeps it.
 /// SIGTERM or Ctrl-C ends a worker after the unit at hand, a second one at once; the same command goes on from there.

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 /// Words that do not fit and are named in the summary.
 const SHOWN: usize = 8;
 
-/// Give the words of an English transcript their times, by forced alignment with its sound.
+/// Find the word times of an English transcript by forced alignment.
 ///
 /// For transcripts with times of sentences only (.srt, .vtt, ...), or plain text (.txt). Times that are there say where
 /// a word is looked for, 5 s around. English alone: the acoustic model and the dictionary are those of US English in the

@@ -14,7 +14,7 @@ use orator_dataset::forget::search::{Searched, search};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Forget a video, or a speaker: remove all that was derived from it, and prove by search that nothing is left.
+/// Remove everything derived from a video or a speaker.
 ///
 /// Goes through the stages' files, the dataset (shards, statistics, index, ledger, card, checksums), trained models (a
 /// model cannot unlearn), plans of `orator plan` and the table of hashes; the other videos' shards stay byte for byte. Then every file under the

@@ -17,7 +17,7 @@ use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Make a dataset of motion that others captured, with its sound.
+/// Create a dataset from motion capture and its audio.
 ///
 /// Sources are files, or folders that are searched: the authors' text clips (147 numbers a line), TED Expressive (.npz
 /// with `human_joints`), BVH, and WebDataset shards or dataset folders of this program, to merge them or to take them

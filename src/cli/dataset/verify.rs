@@ -12,7 +12,7 @@ use orator_dataset::{Dataset, Split};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Look at a finished dataset: what it holds, and whether every byte is as it was written.
+/// Verify or describe a finished dataset.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(subcommand)]

@@ -24,7 +24,7 @@ use serde::de::IntoDeserializer as _;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
-/// Measure predicted motion beside the ground truth, and say what the metrics are worth.
+/// Measure predicted motion against the ground truth and baselines.
 ///
 /// Files or folders of motion (.npy, .npz, the authors' .txt, .bvh), or checkpoints on a split of a dataset. Beside each
 /// figure stands the same for poses that never move, the nearest neighbour, mismatched motion and the truth itself; with its

@@ -18,7 +18,7 @@ use orator_nn::seq2seq::predict::StateAtSeams;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Turn speech into motion with a trained speaker.
+/// Generate motion from speech with a trained model.
 ///
 /// The sound may be a wav, flac or mp3 file or the sound of a video, of any length. The ending of each output file
 /// chooses what is written: .npy (joints [frames, 49, 3], metres), .txt (the layout of Rebol et al. 2021), .bvh (bone

@@ -19,7 +19,7 @@ use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Lift 2D keypoints to 3D joints, outside a run.
+/// Lift 2D keypoints to 3D joints.
 ///
 /// KEYPOINTS is ours or another program's: a folder of OpenPose (a JSON file a frame), JSON of MMPose, AlphaPose or
 /// COCO-WholeBody, arrays of MediaPipe or PATS (.npy, .npz); the kind is told by the content. Ours is a .npz that holds `body` [T,17,3] (COCO-17; x px, y px, score) and, if known, `left_hand` and `right_hand`

@@ -22,7 +22,7 @@ use orator_report::sheet::sheet::SheetClip;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// Draw contact sheets of lifted clips: picture and keypoints, the 3D pose from the front and from the side.
+/// Draw contact sheets: picture, keypoints and 3D pose.
 ///
 /// Of the videos of a run (`-c`), once they are lifted; or of loose files (`--video`, `--keypoints`, `--joints`). A
 /// moment every second; the grid is 0.1 m, the neck at its axes; a strip shows height and depth of the wrists. Beside

@@ -8,7 +8,7 @@ use orator_dataset::config::DEFAULT_FILE;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Write a commented pipeline.toml, and the folders for videos and models, into DIR.
+/// Create a project folder with a commented pipeline.toml.
 #[derive(clap::Args)]
 pub struct Args {
     /// The project's folder; created if it is not there.

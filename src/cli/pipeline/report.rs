@@ -14,7 +14,7 @@ use orator_report::html::numbers::{length, percent};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Write one HTML page that shows what became of every second: kept, refused and why, or failed.
+/// Write an HTML report: which seconds were accepted or rejected, and why.
 ///
 /// With a timeline of each video, the worst frames of each rule, the distributions of what was measured, sliders that say
 /// what other thresholds would keep, and how the joints move. The page needs no network and nothing beside it.

@@ -18,7 +18,7 @@ use orator_pipeline::segment::speech_rule::SpeechDetector;
 use orator_pipeline::{Pipeline, Selection, UnitFailure};
 use serde_json::json;
 
-/// Run the stages extract, pose2d, segment, lift, dataset for every video of every speaker.
+/// Run the pipeline: extract, pose2d, segment, lift, dataset.
 ///
 /// What is up to date is not done again: a run that was killed goes on where it was. A video that fails is reported and
 /// the others go on. Exit code 2 says that some failed, that a speaker ended with no interval, or that a dataset is made

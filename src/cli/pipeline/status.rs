@@ -16,8 +16,10 @@ use std::path::PathBuf;
 /// Reasons of a stage's plan that are written out; `--json` has all.
 const REASONS_SHOWN: usize = 3;
 
-/// Show every stage of every video (up to date, stale, failed, or waiting for an earlier stage), and what became of every
-/// second: kept, refused for which reason, lost to a failed stage, or waiting for a verdict.
+/// Show the state of every stage and the use of every second of video.
+///
+/// A stage of a video is up to date, stale, failed, or waiting for an earlier stage. A second of video is accepted,
+/// rejected with a reason, missing because a stage failed, or not yet decided.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]

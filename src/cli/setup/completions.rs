@@ -11,7 +11,7 @@ use clap_mangen::Man;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Print the script that completes verbs and options in a shell.
+/// Print a shell completion script.
 ///
 /// bash: `orator completions bash > ~/.local/share/bash-completion/completions/orator`. fish: `orator completions fish >
 /// ~/.config/fish/completions/orator.fish`. zsh: `orator completions zsh > FOLDER/_orator`, with a FOLDER of `fpath`.
@@ -21,7 +21,7 @@ pub struct Args {
     shell: Shell,
 }
 
-/// Print the manual page, or write the pages of all verbs into a folder.
+/// Print or write manual pages.
 ///
 /// `orator man | man -l -` shows it; `orator man ~/.local/share/man/man1` installs all, for `man orator-run`.
 #[derive(clap::Args)]
@@ -31,7 +31,7 @@ pub struct ManArgs {
     dir: Option<PathBuf>,
 }
 
-/// Print a page of the guide, or the list of its pages.
+/// Print a page of the guide.
 ///
 /// The pages are Markdown: `orator guide dataset | less`.
 #[derive(clap::Args)]

@@ -18,7 +18,7 @@ use orator_pipeline::segment::speech_rule::SpeechDetector;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Say what is installed, what is missing, and the command that fixes it.
+/// Check the installation and print the commands that fix it.
 ///
 /// Looks at the libraries, the ONNX models that the configuration chooses, and the work folder. Without a
 /// configuration file the defaults are looked at. Exit code 1 says that something is missing.

@@ -12,7 +12,7 @@ use orator_pipeline::segment::speech_rule::SpeechDetector;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// List, fetch, add and check the ONNX models.
+/// List, fetch, add and check ONNX models.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(subcommand)]

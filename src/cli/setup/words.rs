@@ -18,7 +18,7 @@ const FOLDER: &str = "words";
 /// Name of the fetched table.
 const GLOVE: &str = "glove-6b-100d";
 
-/// Get word vectors, make them from a file, and see how many words of transcripts they know.
+/// Fetch, add and check word vectors.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(subcommand)]

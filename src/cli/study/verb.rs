@@ -11,7 +11,7 @@ use serde_json::json;
 use std::net::{IpAddr, SocketAddr};
 use std::path::PathBuf;
 
-/// A user study of gestures: build its films, serve it, analyse the answers.
+/// Build, serve and analyse a user study.
 ///
 /// A study file (STUDY.toml) says whose motion is compared, by which questions, by how many participants, and what is
 /// tested; `orator guide study` describes it.

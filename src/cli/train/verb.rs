@@ -5,7 +5,7 @@ use crate::cli::Outcome;
 use crate::cli::moved::MovedVerb;
 use crate::cli::ui::Ui;
 
-/// Train a speaker's generator on a dataset.
+/// Train a gesture generator on a dataset.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(subcommand)]
