@@ -2,7 +2,7 @@
 //! channels first made channels last.
 
 use super::operator::{CpuOperator, CustomOperator, Gradients, Operand};
-use crate::cpu::frames::{FrameMixture, transpose};
+use crate::cpu::frames::{FrameInterpolation, transpose};
 use crate::cpu::tensor::Scalar;
 use candle_core::{Result, Shape, Tensor};
 use std::ops::Range;
@@ -17,8 +17,8 @@ pub fn twice_plus(x: &Tensor, skip: &Tensor) -> Result<Tensor> {
     mix(x, Some(skip), doubled(x.dim(1)?))
 }
 
-fn doubled(n_in: usize) -> FrameMixture {
-    FrameMixture { n_in, of: (0..2 * n_in).map(|i| (i / 2, i / 2, 0.0)).collect() }
+fn doubled(n_in: usize) -> FrameInterpolation {
+    FrameInterpolation { n_in, of: (0..2 * n_in).map(|i| (i / 2, i / 2, 0.0)).collect() }
 }
 
 /// Linear interpolation to `n_out` frames, [B, T, C] to [B, n_out, C], as TensorFlow 1 does without aligned corners:
@@ -64,7 +64,7 @@ pub fn linear_part(x: &Tensor, part: &ResizedPart) -> Result<Tensor> {
         let (before, share) = part.place(i);
         (before - needed.start, (before - needed.start + 1).min(needed.len() - 1), share)
     });
-    mix(x, None, FrameMixture { n_in: needed.len(), of: of.collect() })
+    mix(x, None, FrameInterpolation { n_in: needed.len(), of: of.collect() })
 }
 
 /// `x` with its last two axes exchanged, [B, C, T] to [B, T, C], in memory too.
@@ -76,7 +76,7 @@ pub fn transposed(x: &Tensor) -> Result<Tensor> {
     x.contiguous()?.apply_op3(&none, &none, CustomOperator(TransposeOp))
 }
 
-fn mix(x: &Tensor, skip: Option<&Tensor>, mixture: FrameMixture) -> Result<Tensor> {
+fn mix(x: &Tensor, skip: Option<&Tensor>, mixture: FrameInterpolation) -> Result<Tensor> {
     if !x.device().is_cpu() {
         return fallback_mix(x, skip, &mixture);
     }
@@ -88,7 +88,7 @@ fn mix(x: &Tensor, skip: Option<&Tensor>, mixture: FrameMixture) -> Result<Tenso
 }
 
 /// [`mix`] with the framework's operators, on any device.
-fn fallback_mix(x: &Tensor, skip: Option<&Tensor>, mixture: &FrameMixture) -> Result<Tensor> {
+fn fallback_mix(x: &Tensor, skip: Option<&Tensor>, mixture: &FrameInterpolation) -> Result<Tensor> {
     let select = |of: Vec<u32>| x.contiguous()?.index_select(&Tensor::new(of, x.device())?, 1);
     let frames = |which: fn(&(usize, usize, f64)) -> usize| mixture.of.iter().map(|of| which(of) as u32).collect();
     let (a, b) = (select(frames(|of| of.0))?, select(frames(|of| of.1))?);
@@ -99,7 +99,7 @@ fn fallback_mix(x: &Tensor, skip: Option<&Tensor>, mixture: &FrameMixture) -> Re
 }
 
 struct MixOp {
-    mixture: FrameMixture,
+    mixture: FrameInterpolation,
     /// The second operand is added.
     plus: bool,
 }
@@ -166,7 +166,7 @@ mod tests {
     fn the_frameworks_operators_give_the_same() -> Result<()> {
         let (x, skip) = (pattern(&[2, 3, 5], 0.0)?, pattern(&[2, 7, 5], 1.0)?);
         let of = vec![(0, 1, 0.25), (1, 2, 0.5), (2, 2, 0.0), (0, 0, 0.0), (2, 1, 0.9), (1, 1, 0.3), (0, 2, 0.7)];
-        let mixture = FrameMixture { n_in: 3, of };
+        let mixture = FrameInterpolation { n_in: 3, of };
         let own = |v: &[Tensor]| mix(&v[0], Some(&v[1]), mixture.clone());
         let off = apart(&[x, skip], own, |v| fallback_mix(&v[0], Some(&v[1]), &mixture))?;
         assert!(off < 1e-12, "{off:e}");
