@@ -40,10 +40,10 @@ impl ChannelMoments {
             return other.clone();
         }
         let n = self.n + other.n;
-        let apart: Vec<f64> = self.mean.iter().zip(&other.mean).map(|(a, b)| b - a).collect();
-        let mean = self.mean.iter().zip(&apart).map(|(mean, apart)| mean + apart * other.n / n).collect();
-        let squares = self.squares.iter().zip(&other.squares).zip(&apart);
-        let squares = squares.map(|((a, b), apart)| a + b + apart * apart * self.n * other.n / n).collect();
+        let delta: Vec<f64> = self.mean.iter().zip(&other.mean).map(|(a, b)| b - a).collect();
+        let mean = self.mean.iter().zip(&delta).map(|(mean, delta)| mean + delta * other.n / n).collect();
+        let squares = self.squares.iter().zip(&other.squares).zip(&delta);
+        let squares = squares.map(|((a, b), delta)| a + b + delta * delta * self.n * other.n / n).collect();
         Self { n, mean, squares }
     }
 }

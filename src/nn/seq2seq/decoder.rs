@@ -97,15 +97,15 @@ mod tests {
         let segment = |previous: Tensor| Segment { audio: encoded[0].clone(), previous, words: None };
         let first = segment(pattern(&[2, 5, 3], 1.0)?);
         let (poses, state) = decoder.continue_from(&first, &encoded, None)?;
-        let apart = |a: &Tensor, b: &Tensor| (a - b)?.abs()?.max_all()?.to_scalar::<f64>();
-        assert!(apart(&poses, &decoder.forward(&first, &encoded, &mut Mode::Eval)?)? < 1e-12);
+        let max_difference = |a: &Tensor, b: &Tensor| (a - b)?.abs()?.max_all()?.to_scalar::<f64>();
+        assert!(max_difference(&poses, &decoder.forward(&first, &encoded, &mut Mode::Eval)?)? < 1e-12);
         let (carried, _) = decoder.continue_from(&segment(poses.narrow(1, 1, 5)?), &encoded, Some(&state))?;
         // The first pose is read twice, as is the last pose before any segment.
         let read = Tensor::cat(&[&first.previous, &first.previous.narrow(1, 4, 1)?, &poses], 1)?;
         let all = decoder.decode(&read, &decoder.first_state(&encoded)?, &encoded, &mut Mode::Eval)?;
-        assert!(apart(&carried, &all)? < 1e-12);
+        assert!(max_difference(&carried, &all)? < 1e-12);
         let renewed = decoder.forward(&segment(poses.narrow(1, 1, 5)?), &encoded, &mut Mode::Eval)?;
-        assert!(apart(&carried, &renewed)? > 1e-6);
+        assert!(max_difference(&carried, &renewed)? > 1e-6);
         Ok(())
     }
 }
