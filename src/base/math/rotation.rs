@@ -131,7 +131,7 @@ impl Rotation {
         if sum.w.hypot(norm(sum.v)) > 1e-9 { sum.normalised() } else { from }
     }
 
-    /// The same rotation as the other of its two unit quaternions.
+    /// Other unit quaternion of the same rotation.
     fn opposite(self) -> Self {
         Self { w: -self.w, v: scale(self.v, -1.0) }
     }

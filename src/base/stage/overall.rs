@@ -192,11 +192,11 @@ mod tests {
         let eighths = || steps().map(|n| n * 8 / PARTS);
         overall.skip(&stages, &units[0]);
         drop(overall.of(stages[0], &units[1]));
-        assert_eq!(seen(), [1, 4]);
+        assert_eq!(eighths(), [1, 4]);
         let costly = overall.of(stages[1], &units[1]);
         let task = costly.begin("", 3);
         task.advance(1);
-        assert_eq!(seen(), [2, 4]);
+        assert_eq!(eighths(), [2, 4]);
         task.advance(5);
         drop(task);
         drop(costly);

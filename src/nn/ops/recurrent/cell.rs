@@ -94,7 +94,7 @@ impl<T: Scalar> ForwardCell<T> {
         }
     }
 
-    /// Computes one step for as many rows as `previous` has states. Input rows are `stride` values max_difference; `gates` and
+    /// Computes one step for as many rows as `previous` has states. Input rows are `stride` values apart; `gates` and
     /// `next` are overwritten.
     pub fn step(&self, x: &[T], stride: usize, previous: &[T], gates: &mut [T], next: &mut [T]) {
         let width = self.sizes.width();
