@@ -51,7 +51,7 @@ pub struct Report {
 pub trait Stage: Sync {
     /// Stage name: an argument of `--from`, and the stage's folder under `work/`.
     fn name(&self) -> &'static str;
-    /// Version of the stage; incremented when the output changes for equal inputs and settings.
+    /// Version of the stage; incremented when the bytes that it writes change their meaning.
     fn version(&self) -> u32;
     /// Run time per video relative to other stages.
     fn cost(&self) -> u32 {

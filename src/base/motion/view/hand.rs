@@ -1,6 +1,6 @@
 //! Input of the hand lifter, built here for training and lifting: the 21 points of a hand, normalised. A left hand is
-//! mirrored to a right one, the wrist is the origin, the palm points up, and the standard deviation of the points is
-//! 1.
+//! mirrored to a right one, the wrist is the origin, the palm points up, and the root mean square distance of the
+//! points from their centroid is 1.
 
 use crate::math::vec3::Vec3;
 use crate::types::pose2d::N_HAND;
