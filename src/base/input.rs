@@ -1,5 +1,5 @@
-//! Opens and reads files that other programs wrote or other people sent: regular files only, of a bounded size. A named
-//! pipe would wait for a writer, and a device may have no end.
+//! Opens and reads files that other programs wrote or other users sent: only regular files, of bounded size. Opening a
+//! named pipe would wait for a writer, and a device may have no end.
 
 use rustix::fs::OFlags;
 use std::fs::{File, FileType, OpenOptions};
@@ -7,21 +7,21 @@ use std::io::{Error, ErrorKind, Read, Result};
 use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
 use std::path::Path;
 
-/// Most bytes of a description: configuration, JSON records, tables.
+/// Maximum size in bytes of a text file: configuration, JSON records, tables.
 pub const MOST_TEXT: u64 = 256 << 20;
-/// Most bytes of one file of motion, keypoints or weights.
+/// Maximum size in bytes of a file of motion, keypoints or weights.
 pub const MOST_DATA: u64 = 4 << 30;
 
 /// Opens a regular file for reading.
 ///
 /// # Errors
-/// As `File::open`; anything but a regular file, in words that follow the file's name in the caller's context.
+/// Those of `File::open`; `path` is not a regular file. The message continues the file's name in the caller's context.
 pub fn open(path: impl AsRef<Path>) -> Result<File> {
     let path = path.as_ref();
     // Without O_NONBLOCK, opening a named pipe waits for its writer. It changes nothing for regular files.
     let flags = (OFlags::NONBLOCK | OFlags::NOCTTY).bits() as i32;
     let opened = OpenOptions::new().read(true).custom_flags(flags).open(path);
-    // Sockets and some devices cannot be opened: their error would not say what they are.
+    // Sockets and some devices cannot be opened, and that error would not name the file type.
     let meta = opened.as_ref().map_or_else(|_| path.metadata(), File::metadata);
     match meta {
         Ok(meta) if !meta.is_file() => {
@@ -32,17 +32,17 @@ pub fn open(path: impl AsRef<Path>) -> Result<File> {
     }
 }
 
-/// Reads a regular file.
+/// Reads a regular file completely.
 ///
 /// # Errors
-/// As [`open`]; a file of more than `most_bytes`.
+/// Those of [`open`]; the file is larger than `most_bytes`.
 pub fn read(path: impl AsRef<Path>, most_bytes: u64) -> Result<Vec<u8>> {
     let file = open(path)?;
     let n_bytes = file.metadata()?.len();
     let mut bytes = Vec::new();
     if n_bytes <= most_bytes {
         bytes.try_reserve_exact(n_bytes as usize)?;
-        // A file may grow while it is read.
+        // Limited again, because the file may grow while it is read.
         file.take(most_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
     }
     if n_bytes.max(bytes.len() as u64) > most_bytes {
@@ -53,10 +53,10 @@ pub fn read(path: impl AsRef<Path>, most_bytes: u64) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Reads a regular file of UTF-8 text.
+/// Reads a regular file of UTF-8 text completely.
 ///
 /// # Errors
-/// As [`read`]; text in another encoding.
+/// Those of [`read`]; the text is not UTF-8.
 pub fn read_text(path: impl AsRef<Path>, most_bytes: u64) -> Result<String> {
     let text = String::from_utf8(read(path, most_bytes)?);
     text.map_err(|error| Error::new(ErrorKind::InvalidData, format!("it is not UTF-8 text: {}", error.utf8_error())))
@@ -89,13 +89,13 @@ mod tests {
         let _socket = std::os::unix::net::UnixListener::bind(at("socket")).unwrap();
         assert_eq!(read(at("a.txt"), 5).unwrap(), b"words");
         assert_eq!(read_text(at("link.txt"), MOST_TEXT).unwrap(), "words");
-        let says = |name: &str| read(at(name), 4).unwrap_err().to_string();
-        assert_eq!(says("a.txt"), "it is larger than 4 bytes, the most that is read");
+        let error_of = |name: &str| read(at(name), 4).unwrap_err().to_string();
+        assert_eq!(error_of("a.txt"), "it is larger than 4 bytes, the most that is read");
         assert!(pipe.success());
-        assert_eq!(says("pipe"), "it is a named pipe, expected a regular file");
-        assert_eq!(says("zero"), "it is a device, expected a regular file");
-        assert_eq!(says("socket"), "it is a socket, expected a regular file");
-        assert_eq!(says(""), "it is a folder, expected a regular file");
+        assert_eq!(error_of("pipe"), "it is a named pipe, expected a regular file");
+        assert_eq!(error_of("zero"), "it is a device, expected a regular file");
+        assert_eq!(error_of("socket"), "it is a socket, expected a regular file");
+        assert_eq!(error_of(""), "it is a folder, expected a regular file");
         assert_eq!(read(at("none"), 4).unwrap_err().kind(), ErrorKind::NotFound);
         std::fs::write(at("latin"), b"so\xf6").unwrap();
         assert!(read_text(at("latin"), 9).unwrap_err().to_string().contains("not UTF-8"));

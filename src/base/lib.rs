@@ -1,6 +1,6 @@
-//! What every other crate builds on, without any foreign library: plain values (`types`), mathematics (`math`), the body
-//! as numbers (`motion`), sound features (`audio`), reading of foreign files (`input`), how a step runs, is recorded and
-//! resumes (`stage`), and how programs of others are started (`foreign_program`).
+//! The lowest layer of the project, without any foreign library: plain values (`types`), mathematics (`math`), body
+//! motion (`motion`), audio features (`audio`), reading of foreign files (`input`), running, recording and resuming of
+//! stages (`stage`), and commands for external programs (`foreign_program`).
 
 pub mod audio;
 pub mod foreign_program;

@@ -178,7 +178,7 @@ impl ClusterPlan {
                 share: UnitShare::Whole,
                 needs: Vec::new(),
             });
-            hashes.save_now_and_then();
+            hashes.save_periodically();
             task.advance(1);
         }
         hashes.save()?;

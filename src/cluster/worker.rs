@@ -9,7 +9,7 @@ use anyhow::{Context, Result, anyhow, bail};
 use orator_base::stage::artifacts::StageName;
 use orator_base::stage::fingerprint::HashCache;
 use orator_base::stage::progress::Progress;
-use orator_base::stage::runner::{Abandoned, StageOutcome};
+use orator_base::stage::runner::{ClaimLost, StageOutcome};
 use orator_base::stage::workdir;
 use orator_base::stage::workdir::NoSpace;
 use orator_pipeline::Pipeline;
@@ -84,7 +84,7 @@ pub fn work(
     let folder = DiskFolder(plan.folder(path));
     begin_after_stop(&folder)?;
     let dir = &pipeline.config().settings.work.dir;
-    let _lock = workdir::lock_with_others(dir).context("no work now")?;
+    let _lock = workdir::lock_shared(dir).context("no work now")?;
     workdir::sweep_folder(dir, 2);
     let (host, machine) = this_machine();
     let hashes = pipeline.hashes();
@@ -243,7 +243,7 @@ impl Session<'_> {
         let begun = Instant::now();
         let still_mine = || match claims.is_mine(claim)? {
             true => planned.check_inputs(self.hashes),
-            false => Err(Abandoned(format!("{} was taken over by another worker", planned.video)).into()),
+            false => Err(ClaimLost(format!("{} was taken over by another worker", planned.video)).into()),
         };
         let run =
             |stages: &[StageName]| self.pipeline.run_video(stages, &unit, self.hashes, &still_mine, self.progress);
@@ -262,7 +262,7 @@ impl Session<'_> {
         });
         heart.content().unit = None;
         if let Some(error) = &failed {
-            if error.is::<Abandoned>() {
+            if error.is::<ClaimLost>() {
                 self.report().laid_aside += 1;
                 return Ok(());
             }

@@ -1,5 +1,5 @@
 //! Motion in the text layout of Rebol et al. 2021: one frame a line, 147 floats `x0 y0 z0 x1 ...`, metres, the neck
-//! first and at the origin, each finger TIP FIRST (in memory: base first, `skeleton::authors_from_house`). Numbers
+//! first and at the origin, each finger TIP FIRST (in memory: base first, `skeleton::swap_authors_order`). Numbers
 //! are written as numpy's `savetxt` writes them. Values are taken as they are, rounded to f32: in the
 //! authors' predictions the hand roots (7, 28) lie some mm beside the wrists.
 
@@ -7,7 +7,7 @@ use anyhow::{Context as _, bail, ensure};
 use ndarray::Array3;
 use orator_base::input;
 use orator_base::types::pose3d::Motion;
-use orator_base::types::skeleton::{N_JOINTS, authors_from_house};
+use orator_base::types::skeleton::{N_JOINTS, swap_authors_order};
 use orator_base::types::time::FrameRate;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -45,7 +45,7 @@ pub fn parse(text: &str, fps: FrameRate) -> anyhow::Result<Motion> {
     let n_frames = numbers.len() / N_NUMBERS;
     ensure!(n_frames > 0, "no frame in it");
     let joints = Array3::from_shape_fn((n_frames, N_JOINTS, 3), |(frame, joint, axis)| {
-        numbers[frame * N_NUMBERS + 3 * authors_from_house(joint) + axis]
+        numbers[frame * N_NUMBERS + 3 * swap_authors_order(joint) + axis]
     });
     Ok(Motion::from_joints(fps, joints))
 }
@@ -58,7 +58,7 @@ pub fn format(motion: &Motion) -> String {
             if n > 0 {
                 text.push(' ');
             }
-            push_number(&mut text, frame[[authors_from_house(n / 3), n % 3]]);
+            push_number(&mut text, frame[[swap_authors_order(n / 3), n % 3]]);
         }
         text.push('\n');
     }

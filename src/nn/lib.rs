@@ -1,9 +1,9 @@
-//! Network architectures and the operators they are made of: tensors in, tensors out. `weights` reads and writes the files of
-//! weights. No optimiser.
+//! Network architectures and their operators: tensors in, tensors out. `weights` reads and writes weight files. The
+//! optimisers are elsewhere.
 //!
-//! candle's operators are used only where finite differences confirm their gradients (`tests/it/train/operators.rs` has
-//! the list, and rejects the others); convolution, batch norm and recurrent layers are own ones. The layers of the lifters
-//! work channels first; those of the GAN (`conv_block`) channels last, where nothing needs to be unfolded.
+//! candle's operators are used only where finite differences confirm their gradients (`tests/it/train/operators.rs`
+//! lists them and rejects the others); convolution, batch norm and recurrent layers are implemented here. The layers
+//! of the lifters are channels first; those of the GAN (`conv_block`) are channels last, which avoids unfolding.
 
 pub mod cpu;
 pub mod gan;

@@ -1,6 +1,6 @@
-//! The parameters of a network: named tensors, initialised from a seed, sorted by name, and the device they are on. The
-//! initial values of a tensor depend on the seed and its name only, so adding a layer leaves the others unchanged.
-//! (candle-nn's `VarMap` seeds one generator for all tensors and does not tell buffers from trainable tensors.)
+//! Parameters of a network: named tensors, initialised from a seed, sorted by name, and their device. The initial
+//! values of a tensor depend only on the seed and its name, so that adding a layer leaves the others unchanged.
+//! (candle-nn's `VarMap` uses one generator for all tensors and does not distinguish buffers from trainable tensors.)
 
 use anyhow::{Context, bail, ensure};
 use candle_core::{DType, Device, Result, Tensor, Var};
@@ -9,7 +9,10 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
 
-/// The CPU, or the first NVIDIA card. Errors, with what to do: the program was built without CUDA, there is no card.
+/// Opens the CPU or the first NVIDIA GPU.
+///
+/// # Errors
+/// The program was built without CUDA, or there is no GPU.
 pub fn open_device(on_card: bool) -> anyhow::Result<Device> {
     if !on_card {
         return Ok(Device::Cpu);
@@ -34,28 +37,28 @@ pub enum Init {
 
 /// Named tensors of one or more networks.
 pub struct Params {
-    /// `None`: for inference.
+    /// Seed of the initial values; `None` for inference.
     seed: Option<u64>,
     dtype: DType,
     device: Device,
     trainable: BTreeMap<String, Var>,
-    /// Saved, but not updated by the optimiser: running statistics.
+    /// Tensors that are saved but not updated by the optimiser, such as running statistics.
     buffers: BTreeMap<String, Var>,
 }
 
 impl Params {
-    /// An empty set in f32.
+    /// Creates an empty set in f32.
     pub fn new(seed: u64) -> Self {
         Self::with_dtype(seed, DType::F32)
     }
 
-    /// An empty set of this type (f64 is for proving gradients).
+    /// Creates an empty set of this type (f64 for gradient checks).
     pub fn with_dtype(seed: u64, dtype: DType) -> Self {
         let (trainable, buffers) = (BTreeMap::new(), BTreeMap::new());
         Self { seed: Some(seed), dtype, device: Device::Cpu, trainable, buffers }
     }
 
-    /// Puts the tensors that follow on this device. Initial values do not depend on the device.
+    /// Sets the device of the tensors that are created afterwards. Initial values do not depend on the device.
     pub fn on(self, device: &Device) -> Self {
         Self { device: device.clone(), ..self }
     }
@@ -65,13 +68,16 @@ impl Params {
         &self.device
     }
 
-    /// An empty set in f32 for a network that is loaded and not trained: a forward pass keeps no graph, so that its
-    /// memory is freed on the way. Everything is 0 until loaded.
+    /// Creates an empty set in f32 for a network that is loaded and not trained. Forward passes build no graph, so
+    /// that intermediate results are freed early. All values are 0 until loaded.
     pub fn frozen() -> Self {
         Self { seed: None, ..Self::new(0) }
     }
 
-    /// A new tensor that the optimiser updates. Errors when the name is taken.
+    /// Creates a tensor that the optimiser updates.
+    ///
+    /// # Errors
+    /// The name is already used.
     pub fn trainable(&mut self, name: &str, shape: &[usize], init: Init) -> Result<Tensor> {
         let var = self.make(name, shape, init)?;
         let tensor = if self.seed.is_some() { var.as_tensor().clone() } else { var.as_detached_tensor() };
@@ -79,19 +85,19 @@ impl Params {
         Ok(tensor)
     }
 
-    /// A layer's `<name>.weight` of this shape [out, ...] and `<name>.bias` [out].
+    /// Creates a layer's `<name>.weight` of this shape [out, ...] and `<name>.bias` [out].
     pub fn layer(&mut self, name: &str, shape: &[usize], weight: Init, bias: Init) -> Result<(Tensor, Tensor)> {
         let weight = self.trainable(&format!("{name}.weight"), shape, weight)?;
         Ok((weight, self.trainable(&format!("{name}.bias"), &shape[..1], bias)?))
     }
 
-    /// A fully connected layer.
+    /// Creates a fully connected layer.
     pub fn linear(&mut self, name: &str, [n_in, n_out]: [usize; 2], weight: Init, bias: f64) -> Result<Linear> {
         let (weight, bias) = self.layer(name, &[n_out, n_in], weight, Init::Constant(bias))?;
         Ok(Linear::new(weight, Some(bias)))
     }
 
-    /// A new tensor that is saved with the others and changed by its owner only.
+    /// Creates a tensor that is saved with the others but updated only by its owner.
     pub fn buffer(&mut self, name: &str, shape: &[usize], value: f64) -> Result<Var> {
         let var = self.make(name, shape, Init::Constant(value))?;
         self.buffers.insert(name.to_owned(), var.clone());
@@ -117,12 +123,12 @@ impl Params {
         Var::from_tensor(&values.to_device(&self.device)?)
     }
 
-    /// The tensors that the optimiser updates, sorted by name.
+    /// Tensors that the optimiser updates, sorted by name.
     pub fn trainables(&self) -> impl Iterator<Item = (&str, &Var)> {
         self.trainable.iter().map(|(name, var)| (name.as_str(), var))
     }
 
-    /// Everything that is saved, sorted by name within trainables, then buffers.
+    /// All saved tensors: the trainable ones, then the buffers, each sorted by name.
     pub fn all(&self) -> impl Iterator<Item = (&str, &Var)> {
         self.trainable.iter().chain(&self.buffers).map(|(name, var)| (name.as_str(), var))
     }
@@ -132,14 +138,16 @@ impl Params {
         self.trainable.values().map(|var| var.elem_count()).sum()
     }
 
-    /// Copies of everything on the CPU, to save.
+    /// Copies all tensors to the CPU, for saving.
     pub fn tensors(&self) -> Result<BTreeMap<String, Tensor>> {
         let copy = |var: &Var| if var.device().is_cpu() { var.copy() } else { var.to_device(&Device::Cpu) };
         self.all().map(|(name, var)| Ok((name.to_owned(), copy(var)?))).collect()
     }
 
-    /// Overwrites every tensor with that of the same name. Errors, naming the tensor, when one is missing, too many
-    /// or of another shape.
+    /// Overwrites every tensor with the one of the same name.
+    ///
+    /// # Errors
+    /// A tensor is missing, unknown or has another shape; the message names it.
     pub fn load(&self, tensors: &BTreeMap<String, Tensor>) -> anyhow::Result<()> {
         for (name, var) in self.all() {
             let tensor = tensors.get(name).with_context(|| format!("tensor {name} is missing"))?;
@@ -158,7 +166,7 @@ impl Params {
     }
 }
 
-/// `n` numbers in -bound..bound.
+/// Returns `n` numbers in -bound..bound.
 fn uniform(seed: u64, name: &str, n: usize, bound: f64) -> Vec<f64> {
     let key = [&seed.to_le_bytes(), name.as_bytes()].concat();
     let mut rng = ChaCha8Rng::from_seed(*blake3::hash(&key).as_bytes());

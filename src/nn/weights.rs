@@ -1,4 +1,4 @@
-//! Weights of networks and facts about them: the tensors of the files of `orator_formats::checkpoint`.
+//! Weights and metadata of networks: the contents of the files defined in `orator_formats::checkpoint`.
 
 use anyhow::ensure;
 use candle_core::safetensors::Load;
@@ -10,38 +10,38 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Contents of a file: named tensors, and metadata as JSON.
+/// Contents of a weight file: named tensors, and metadata as JSON.
 pub struct Contents {
     pub facts: Value,
     pub tensors: BTreeMap<String, Tensor>,
 }
 
 impl Contents {
-    /// The tensors whose names begin with `prefix`, without it.
+    /// Returns the tensors whose names start with `prefix`, without the prefix.
     pub fn part(&self, prefix: &str) -> BTreeMap<String, Tensor> {
         let strip = |(name, tensor): (&String, &Tensor)| Some((name.strip_prefix(prefix)?.to_owned(), tensor.clone()));
         self.tensors.iter().filter_map(strip).collect()
     }
 
-    /// Checks that a network of at least `least` weights may be in it, before memory is taken for one.
+    /// Checks that the file may contain a network of at least `least` weights, before memory is allocated for it.
     pub fn expect_numbers(&self, least: usize) -> anyhow::Result<()> {
         let n_numbers: usize = self.tensors.values().map(Tensor::elem_count).sum();
         ensure!(least <= n_numbers, "its network has {least} weights or more, the file {n_numbers}");
         Ok(())
     }
 
-    /// Adds tensors with `prefix` before their names.
+    /// Adds tensors, with `prefix` prepended to their names.
     pub fn add(&mut self, prefix: &str, tensors: BTreeMap<String, Tensor>) {
         self.tensors.extend(tensors.into_iter().map(|(name, tensor)| (format!("{prefix}{name}"), tensor)));
     }
 
-    /// The bytes of the file.
+    /// Serialises the contents.
     pub fn to_bytes(&self) -> anyhow::Result<Vec<u8>> {
         let tensors = self.tensors.iter().map(|(name, tensor)| (name.clone(), tensor));
         checkpoint::to_bytes(&self.facts, tensors)
     }
 
-    /// Parses the bytes that [`Contents::to_bytes`] gives, or published weights, whose matrices are of half precision.
+    /// Parses the output of [`Contents::to_bytes`], or published weights, whose matrices may be of half precision.
     pub fn from_bytes(bytes: &[u8]) -> anyhow::Result<Self> {
         Self::parse(bytes, &[Dtype::F32, Dtype::F16])
     }
@@ -68,7 +68,11 @@ impl Contents {
         workdir::write_file(path, &self.to_bytes()?)
     }
 
-    /// Reads a checkpoint, whose tensors are all F32. Errors name the file.
+    /// Reads a checkpoint, whose tensors must all be F32.
+    ///
+    /// # Errors
+    /// The file cannot be read, is malformed, or has a tensor of another type or with a non-finite value; the message
+    /// names the file.
     pub fn read(path: &Path) -> anyhow::Result<Self> {
         checkpoint::read_with(path, |bytes| Self::parse(bytes, &[Dtype::F32]))
     }
@@ -87,7 +91,7 @@ mod tests {
     use serde_json::json;
 
     #[test]
-    fn contents_come_back_and_bytes_repeat() -> anyhow::Result<()> {
+    fn contents_round_trip_to_identical_bytes() -> anyhow::Result<()> {
         let folder = tempfile::tempdir()?;
         let mut contents = Contents { facts: json!({"step": 7, "kind": "test"}), tensors: BTreeMap::new() };
         let tensor = Tensor::new(&[[1f32, 2.0], [3.0, f32::MIN_POSITIVE]], &Device::Cpu)?;
@@ -102,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn a_checkpoint_of_another_number_type_is_refused() -> anyhow::Result<()> {
+    fn a_checkpoint_of_another_number_type_is_rejected() -> anyhow::Result<()> {
         let folder = tempfile::tempdir()?;
         let file = path(folder.path(), 1);
         for dtype in [DType::F16, DType::F64, DType::U32] {
@@ -117,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn a_weight_that_is_no_number_is_named() -> anyhow::Result<()> {
+    fn a_tensor_with_a_non_finite_weight_is_named() -> anyhow::Result<()> {
         let folder = tempfile::tempdir()?;
         let file = path(folder.path(), 1);
         for wrong in [f32::NAN, f32::INFINITY] {

@@ -88,7 +88,7 @@ impl TimeAccount {
         let media = if is_extracted { MediaInfo::read(&Artifact::MediaInfo.path(work, unit)).ok() } else { None };
         let not_judged = media.as_ref().and_then(MediaInfo::not_judged);
         let offset = sound_offset_json::read(&Artifact::SoundOffset.path(work, unit)).ok().flatten();
-        let account = Self { not_judged, sound_offset: offset.filter(SoundOffset::is_told), ..account };
+        let account = Self { not_judged, sound_offset: offset.filter(SoundOffset::is_reportable), ..account };
         let Some(duration) = media.as_ref().map(|media| media.duration_secs).or_else(|| probed(&unit.source)) else {
             return Self { n_unknown: 1, ..account };
         };

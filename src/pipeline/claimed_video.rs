@@ -13,7 +13,7 @@ use orator_base::stage::{Input, Report, Stage, Unit, runner};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Checks that the worker still holds its claim on the video: `Err` of `runner::Abandoned` where it does not.
+/// Checks that the worker still holds its claim on the video: `Err` of `runner::ClaimLost` where it does not.
 pub type ClaimCheck<'a> = &'a (dyn Fn() -> Result<()> + Sync);
 
 /// Does the work if the video is the worker's before and after.

@@ -1,35 +1,34 @@
-//! What a piece of sound is like, in 32 bits every 32 ms, so that the same recording is known again after cutting,
-//! re-encoding and a change of level (Haitsma and Kalker, "A Highly Robust Audio Fingerprinting System", ISMIR 2002).
-//! Which videos share sound is asked in `dataset`.
-//!
-//! A window of 256 ms is divided into 33 bands from 300 to 3000 Hz, equally wide in pitch. Bit m of a code says whether
-//! the difference of the energies of bands m and m + 1 grew since the window before. Silence has the code 0.
+//! Audio fingerprints: 32 bits every 32 ms that identify a recording after cutting, re-encoding and a change of level
+//! (Haitsma and Kalker, "A Highly Robust Audio Fingerprinting System", ISMIR 2002). `dataset` finds videos that share
+//! sound. A window of 256 ms is divided into 33 bands from 300 to 3000 Hz of equal width in pitch. Bit m of a code is
+//! set if the difference between the energies of bands m and m + 1 has grown since the window before. Silence has the
+//! code 0.
 
 use super::spectrum::StreamedSpectra;
 use realfft::num_complex::Complex;
 
-/// Samples between two codes, at 16 kHz.
+/// Samples between successive codes, at 16 kHz.
 pub const HOP: usize = 512;
-/// Codes a second.
+/// Codes per second.
 pub const PER_SEC: f64 = 16_000.0 / HOP as f64;
 
 const WINDOW: usize = 4096;
 const N_BANDS: usize = 33;
 const LOWEST_HZ: f64 = 300.0;
 const HIGHEST_HZ: f64 = 3000.0;
-/// Mean square below which a window is silence: -60 dB of full scale.
+/// Mean square below which a window is silent: -60 dB of full scale.
 const SILENCE: f64 = 1e-6;
 
-/// Makes the codes of a sound at 16 kHz that comes in pieces of any length.
+/// Computes the codes of a sound at 16 kHz that arrives in chunks of any length.
 pub struct Fingerprinter {
     spectra: StreamedSpectra,
     bands: BandDifferences,
     codes: Vec<u32>,
 }
 
-/// Makes the code of a window from its bands and those of the window before.
+/// Computes the code of a window from the energies of its bands and of those of the window before.
 struct BandDifferences {
-    /// First bin of each band, and the end of the last.
+    /// First bin of each band, then the end of the last band.
     edges: [usize; N_BANDS + 1],
     before: [f64; N_BANDS],
 }
@@ -50,12 +49,12 @@ impl Default for Fingerprinter {
 }
 
 impl Fingerprinter {
-    /// Takes the next samples, -1..1.
+    /// Processes the next samples, -1..1.
     pub fn push(&mut self, samples: &[f32]) {
         self.spectra.push(samples, |sound, bins| self.codes.push(self.bands.code(sound, bins)));
     }
 
-    /// A code for every whole window.
+    /// Returns one code per complete window.
     pub fn finish(self) -> Vec<u32> {
         self.codes
     }
@@ -81,7 +80,7 @@ mod tests {
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    /// Noise whose colour changes 20 times a second.
+    /// Sums of six tones that change 20 times a second.
     fn babble(secs: usize, seed: u64) -> Vec<f32> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut tones = [(0.0f32, 0.0f32); 6];
@@ -95,9 +94,9 @@ mod tests {
         (0..16_000 * secs).map(sample).collect()
     }
 
-    fn codes(samples: &[f32], piece: usize) -> Vec<u32> {
+    fn codes(samples: &[f32], chunk: usize) -> Vec<u32> {
         let mut fingerprinter = Fingerprinter::default();
-        samples.chunks(piece).for_each(|piece| fingerprinter.push(piece));
+        samples.chunks(chunk).for_each(|chunk| fingerprinter.push(chunk));
         fingerprinter.finish()
     }
 
@@ -107,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn pieces_do_not_matter_and_silence_is_zero() {
+    fn codes_are_independent_of_chunk_lengths_and_silence_is_zero() {
         let sound = babble(4, 1);
         assert_eq!(codes(&sound, 64_000), codes(&sound, 777));
         assert_eq!(codes(&sound, 999).len(), (64_000 - WINDOW) / HOP + 1);
@@ -115,15 +114,15 @@ mod tests {
     }
 
     #[test]
-    fn the_same_sound_is_near_and_another_far() {
+    fn copies_are_similar_and_other_sounds_are_not() {
         let sound = babble(10, 1);
-        let whole = codes(&sound, 4096);
-        // half a hop off (the worst), quieter, with noise 20 dB below
+        let original = codes(&sound, 4096);
+        // Shifted by half a hop (the worst case), quieter, and with noise 20 dB below the signal.
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let level = (sound.iter().map(|v| v * v).sum::<f32>() / sound.len() as f32).sqrt();
         let copy: Vec<f32> = sound[256..].iter().map(|v| 0.3 * (v + level * rng.random_range(-0.17..0.17))).collect();
-        let near = wrong_bits(&whole, &codes(&copy, 4096));
-        let far = wrong_bits(&whole, &codes(&babble(10, 2), 4096));
+        let near = wrong_bits(&original, &codes(&copy, 4096));
+        let far = wrong_bits(&original, &codes(&babble(10, 2), 4096));
         assert!(near < 0.25 && (far - 0.5).abs() < 0.03, "{near} {far}");
     }
 }

@@ -1,17 +1,17 @@
-//! Loudness of speech as listeners judge it: the integrated loudness of ITU-R BS.1770-4 (EBU R 128) of one channel, LUFS.
+//! Perceived loudness of speech: integrated loudness of one channel by ITU-R BS.1770-4 (EBU R 128), in LUFS.
 
 use crate::types::sound::Sound;
 use ebur128::{EbuR128, Mode};
 
-/// Integrated loudness in LUFS; `None` for a sound that is silent throughout. A sound shorter than one block of 0.4 s is
-/// measured as one block.
+/// Measures the integrated loudness in LUFS; `None` for a sound that is silent throughout. A sound shorter than one
+/// block of 0.4 s is measured as one block.
 pub fn integrated(sound: &Sound) -> Option<f64> {
     let block = 4 * ((sound.rate as usize + 5) / 10);
     let n = sound.samples.len();
     let mut meter = EbuR128::new(1, sound.rate, Mode::I).ok()?;
     meter.add_frames_f32(&sound.samples).ok()?;
     meter.add_frames_f32(&vec![0.0; block.saturating_sub(n)]).ok()?;
-    // The zeros that fill up a short sound do not count.
+    // Compensates for the zeros that pad a short sound.
     let share = n as f64 / n.max(block) as f64;
     let lufs = meter.loudness_global().ok()? - 10.0 * share.log10();
     lufs.is_finite().then_some(lufs)
@@ -22,7 +22,7 @@ mod tests {
     use super::*;
     use std::f64::consts::TAU;
 
-    /// Sine of 997 Hz, levels in dB below full scale with their seconds.
+    /// Sine of 997 Hz at successive levels, given as (dB of full scale, seconds).
     fn sine(rate: u32, levels: &[(f64, f64)]) -> Sound {
         let mut samples = Vec::new();
         for &(db, secs) in levels {
@@ -35,8 +35,8 @@ mod tests {
     }
 
     #[test]
-    fn a_full_sine_has_three_db_less_than_full_scale() {
-        // ITU-R BS.1770-4, annex 1: 0 dB FS at 997 Hz in one channel reads -3.01.
+    fn a_full_scale_sine_is_three_db_below_full_scale() {
+        // ITU-R BS.1770-4, annex 1: a sine of 0 dB FS at 997 Hz in one channel measures -3.01.
         for rate in [48_000, 44_100, 16_000] {
             let found = integrated(&sine(rate, &[(0.0, 3.0)])).unwrap();
             assert!((found + 3.01).abs() < 0.06, "{rate} Hz: {found}");
@@ -44,7 +44,7 @@ mod tests {
     }
 
     #[test]
-    fn pauses_and_soft_parts_do_not_count() {
+    fn pauses_and_soft_parts_are_ignored() {
         // EBU Tech 3341, cases 3 and 4 (there two channels, 3.01 LU louder).
         for levels in [
             &[(-36.0, 10.0), (-23.0, 60.0), (-36.0, 10.0)][..],

@@ -1,4 +1,4 @@
-//! Log-mel spectrograms as speech2gesture computes them (TensorFlow's `stft` and `linear_to_mel_weight_matrix`):
+//! Log-mel spectrograms as computed by speech2gesture (TensorFlow's `stft` and `linear_to_mel_weight_matrix`):
 //! magnitudes, 64 triangular bands on the HTK mel scale, natural logarithm. No padding and no normalisation.
 
 use super::spectrum::{Spectrum, hann};
@@ -7,28 +7,28 @@ use ndarray::Array2;
 use std::ops::RangeInclusive;
 use std::sync::LazyLock;
 
-/// Samples of a window, between the starts of two windows, and of the Fourier transform: 25 ms, 10 ms, 32 ms.
+/// Window length, hop and length of the Fourier transform in samples: 25 ms, 10 ms, 32 ms.
 pub const WINDOW: usize = 400;
 pub const HOP: usize = 160;
 pub const FFT: usize = 512;
-/// Mel bands, and the lowest and highest frequency they reach, in Hz.
+/// Number of mel bands, and the lowest and highest frequency that they cover in Hz.
 pub const N_MELS: usize = 64;
 pub const LOWEST_HZ: f64 = 125.0;
 pub const HIGHEST_HZ: f64 = 7500.0;
-/// Added before the logarithm.
+/// Offset added before the logarithm.
 pub const FLOOR: f32 = 1e-6;
 
-/// Spectrogram frames of `n_samples` samples: only whole windows count.
+/// Number of spectrogram frames of `n_samples` samples; only complete windows count.
 pub const fn n_frames(n_samples: usize) -> usize {
     if n_samples < WINDOW { 0 } else { (n_samples - WINDOW) / HOP + 1 }
 }
 
-/// Samples that give exactly `n_frames` spectrogram frames.
+/// Number of samples that give exactly `n_frames` spectrogram frames.
 pub const fn n_samples(n_frames: usize) -> usize {
     if n_frames == 0 { 0 } else { (n_frames - 1) * HOP + WINDOW }
 }
 
-/// ln(mel + 1e-6) of mono sound at 16 kHz, samples in -1..1: [`n_frames`, 64]. Frame k is the sound from k * 10 ms on.
+/// Computes ln(mel + 1e-6) of mono sound at 16 kHz, samples in -1..1: [`n_frames`, 64]. Frame k starts at k * 10 ms.
 pub fn log_mel(samples: &[f32]) -> Array2<f32> {
     let mut spectrum = Spectrum::new(hann(WINDOW), FFT);
     let mut magnitudes = vec![0.0f32; FFT / 2 + 1];
@@ -44,12 +44,12 @@ pub fn log_mel(samples: &[f32]) -> Array2<f32> {
     mels
 }
 
-/// Lower corner of a band's triangle in Hz.
+/// Lower corner frequency of a band's triangle in Hz.
 pub fn lowest_hz(band: usize) -> f64 {
     700.0 * ((corner(band) / 1127.0).exp() - 1.0)
 }
 
-/// Corner `i` of the triangles, equally spaced in mel.
+/// Corner `i` of the triangles in mel, equally spaced.
 fn corner(i: usize) -> f64 {
     let (low, high) = (mel_of(LOWEST_HZ), mel_of(HIGHEST_HZ));
     low + (high - low) * i as f64 / (N_MELS + 1) as f64
@@ -61,14 +61,14 @@ fn mel_of(hz: f64) -> f64 {
 
 static BANDS: LazyLock<Vec<Band>> = LazyLock::new(bands);
 
-/// The bins of one band that have a weight.
+/// Bins of one band, with their weights.
 pub struct Band {
     pub first: usize,
     pub weights: Vec<f32>,
 }
 
 impl Band {
-    /// Of those of `bins` whose `weight` is above 0.
+    /// Creates a band from those of `bins` whose `weight` is above 0.
     pub fn new(bins: RangeInclusive<usize>, weight: impl Fn(usize) -> f64) -> Self {
         let inside: Vec<(usize, f64)> =
             bins.map(|bin| (bin, weight(bin))).filter(|(_, weight)| *weight > 0.0).collect();
@@ -77,7 +77,7 @@ impl Band {
     }
 }
 
-/// Triangles with corners equally spaced in mel; the zero bin belongs to none.
+/// Triangles with corners equally spaced in mel; the zero bin belongs to no band.
 fn bands() -> Vec<Band> {
     let weight = |band: usize, bin: usize| {
         let at = mel_of(bin as f64 * f64::from(SAMPLE_RATE) / FFT as f64);
@@ -97,7 +97,7 @@ mod tests {
         rows: Vec<(usize, Vec<f32>)>,
     }
 
-    /// The signal of `fixtures/reference/mel_reference.py`: a rising tone, a steady one, and a hash as noise.
+    /// Signal of `fixtures/reference/mel_reference.py`: a rising tone, a steady tone, and a hash as noise.
     fn signal(n: usize) -> Vec<f32> {
         let tau = std::f64::consts::TAU;
         let value = |i: usize| {
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn agrees_with_the_reference() -> anyhow::Result<()> {
+    fn spectrogram_equals_the_reference() -> anyhow::Result<()> {
         let golden: Golden = serde_json::from_str(include_str!("../../../fixtures/reference/mel_golden.json"))?;
         let mels = log_mel(&signal(67_267));
         assert_eq!((mels.nrows(), golden.n_frames), (418, 418));

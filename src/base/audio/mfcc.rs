@@ -1,23 +1,25 @@
-//! Mel-frequency cepstra as FineMotion computes them (Korzun et al. 2020, with the library python_speech_features): 26
-//! cepstra of 26 bands every 10 ms, the first replaced by the log energy; their means over poses, and the context of these.
+//! Mel-frequency cepstral coefficients as computed by FineMotion (Korzun et al. 2020, with the library
+//! python_speech_features): 26 coefficients of 26 bands every 10 ms, the first replaced by the log energy; their means
+//! over poses, and padding of these by context.
 
 use ndarray::Array2;
 use realfft::RealFftPlanner;
 use std::f64::consts::PI;
 
-/// Cepstra, and mel bands.
+/// Number of cepstral coefficients, and of mel bands.
 pub const N_CEPSTRA: usize = 26;
 const FFT: usize = 1024;
-/// Seconds of a window, and between the starts of two.
+/// Window length and hop in seconds.
 const WINDOW_SECS: f64 = 0.02;
 const STEP_SECS: f64 = 0.01;
 const PRE_EMPHASIS: f64 = 0.97;
 const LIFTER: f64 = 22.0;
-/// The scale of 16-bit samples, which the log energy shows.
-const FULL: f64 = 32_768.0;
+/// Full scale of 16-bit samples, on which the log energy depends.
+const FULL_SCALE: f64 = 32_768.0;
 
-/// Of mono sound at `rate` samples a second (at most 51.2 kHz: a window is one transform), samples in -1..1: [n, 26], row
-/// k the 20 ms from k * 10 ms on; the last window is filled up with zeros.
+/// Computes the coefficients of mono sound at `rate` samples per second (at most 51.2 kHz, where a window fills the
+/// transform), samples in -1..1: [n, 26]. Row k covers the 20 ms from k * 10 ms on; the last window is padded with
+/// zeros.
 pub fn mfcc(samples: &[f32], rate: u32) -> Array2<f64> {
     let length = ((WINDOW_SECS * f64::from(rate)).round() as usize).clamp(1, FFT);
     let step = ((STEP_SECS * f64::from(rate)).round() as usize).max(1);
@@ -30,8 +32,8 @@ pub fn mfcc(samples: &[f32], rate: u32) -> Array2<f64> {
     let (mut frame, mut spectrum) = (fft.make_input_vec(), fft.make_output_vec());
     let mut work = fft.make_scratch_vec();
     let (bands, cosines) = (bands(rate), cosines());
-    let sample = |i: usize| samples.get(i).map_or(0.0, |v| FULL * f64::from(*v));
-    // past the end python_speech_features has zeros, not what pre-emphasis makes of the step down to zero
+    let sample = |i: usize| samples.get(i).map_or(0.0, |v| FULL_SCALE * f64::from(*v));
+    // As in python_speech_features, samples after the end are zero, and not the pre-emphasis of the step to zero.
     let emphasised = |i: usize| match i {
         0 => sample(0),
         _ if i >= samples.len() => 0.0,
@@ -41,7 +43,7 @@ pub fn mfcc(samples: &[f32], rate: u32) -> Array2<f64> {
     for (k, mut row) in cepstra.outer_iter_mut().enumerate() {
         frame.fill(0.0);
         (0..length).for_each(|i| frame[i] = emphasised(k * step + i));
-        // the lengths are the transform's own, so it cannot refuse
+        // Buffer lengths are those of the transform, so it cannot fail.
         let _ = fft.process_with_scratch(&mut frame, &mut spectrum, &mut work);
         let power: Vec<f64> = spectrum.iter().map(|bin| bin.norm_sqr() / FFT as f64).collect();
         let log = |v: f64| if v == 0.0 { f64::EPSILON.ln() } else { v.ln() };
@@ -56,8 +58,9 @@ pub fn mfcc(samples: &[f32], rate: u32) -> Array2<f64> {
     cepstra
 }
 
-/// Cepstra of `n` poses [n, 26], `fps` a second: the mean of the rows of [`mfcc`] over the time of each pose, those at its
-/// edges in part (at 20 a second five whole rows); past the sound its last row is held. Zeros of no sound.
+/// Computes coefficients of `n` poses [n, 26] at `fps` per second: the mean of the rows of [`mfcc`] over each pose,
+/// where rows at its edges count partially (at 20 per second a pose has five complete rows). After the end of the
+/// sound its last row is repeated; without sound the result is zero.
 pub fn of_poses(samples: &[f32], rate: u32, fps: f64, n: usize) -> Array2<f64> {
     let rows = mfcc(samples, rate);
     let per_pose = 1.0 / (fps * STEP_SECS);
@@ -67,7 +70,7 @@ pub fn of_poses(samples: &[f32], rate: u32, fps: f64, n: usize) -> Array2<f64> {
         let (start, end) = (t as f64 * per_pose, (t + 1) as f64 * per_pose);
         let mut at = start;
         while end - at > 1e-9 {
-            // whole rows but for what rounding leaves of them
+            // Tolerates rounding errors at the edges of rows.
             let row = (at + 1e-9).floor();
             let next = (row + 1.0).min(end);
             mean.scaled_add((next - at) / per_pose, &rows.row(last.min(row as usize)));
@@ -77,12 +80,12 @@ pub fn of_poses(samples: &[f32], rate: u32, fps: f64, n: usize) -> Array2<f64> {
     means
 }
 
-/// Poses that whole rows of a sound of so many samples are there for.
+/// Number of poses that are completely covered by a sound of `n_samples`.
 pub fn n_poses(n_samples: usize, rate: u32, fps: f64) -> usize {
     (n_samples as f64 / f64::from(rate) * fps + 1e-6) as usize
 }
 
-/// Rows [n, 26] with half a context (an odd number of rows) of `silence` before and behind: [n + context - 1, 26].
+/// Pads rows [n, 26] with half a context (an odd number of rows) of `silence` before and after: [n + context - 1, 26].
 pub fn with_context(rows: &Array2<f64>, context: usize, silence: &[f64; N_CEPSTRA]) -> Array2<f32> {
     let half = context / 2;
     Array2::from_shape_fn((rows.nrows() + 2 * half, N_CEPSTRA), |(t, c)| {
@@ -91,13 +94,14 @@ pub fn with_context(rows: &Array2<f64>, context: usize, silence: &[f64; N_CEPSTR
     })
 }
 
-/// Cepstra of silence: FineMotion pads with the first row of a silent recording, this with that of zeros.
+/// Coefficients of silence: the first row of digital silence. FineMotion pads with the first row of a silent
+/// recording.
 pub fn silence(rate: u32) -> [f64; N_CEPSTRA] {
     let rows = mfcc(&[0.0; 1], rate);
     std::array::from_fn(|c| rows[[0, c]])
 }
 
-/// Weights of each band over the bins [26][513]: triangles between bins equally spaced in mel.
+/// Weights of each band over the bins [26][513]: triangles between bins that are equally spaced in mel.
 fn bands(rate: u32) -> Vec<Vec<f64>> {
     let most = 2595.0 * (1.0 + f64::from(rate) / 2.0 / 700.0).log10();
     let corner = |i: usize| {
@@ -116,7 +120,7 @@ fn bands(rate: u32) -> Vec<Vec<f64>> {
     (0..N_CEPSTRA).map(weights).collect()
 }
 
-/// The orthonormal cosine transform [cepstrum, band].
+/// Orthonormal cosine transform [coefficient, band].
 fn cosines() -> Array2<f64> {
     let n = N_CEPSTRA as f64;
     Array2::from_shape_fn((N_CEPSTRA, N_CEPSTRA), |(c, band)| {
@@ -130,7 +134,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cepstra_are_those_of_python_speech_features() {
+    fn coefficients_equal_those_of_python_speech_features() {
         let golden: serde_json::Value =
             serde_json::from_str(include_str!("../../../fixtures/reference/audio_features_golden.json")).unwrap();
         for case in golden["mfcc"].as_array().unwrap() {
@@ -157,13 +161,13 @@ mod tests {
     }
 
     #[test]
-    fn poses_of_another_rate_share_the_rows_at_their_edges() {
+    fn poses_at_another_rate_share_the_rows_at_their_edges() {
         let sound: Vec<f32> = (0..16_000).map(|i| 0.3 * (i as f32 * 0.2).sin() * (i as f32 * 0.0007).cos()).collect();
         let (rows, poses) = (mfcc(&sound, 16_000), of_poses(&sound, 16_000, 15.0, n_poses(16_000, 16_000, 15.0)));
         assert_eq!(poses.nrows(), 15);
-        // pose 1 lasts from row 6 2/3 to 13 1/3
-        let whole: f64 = (7..13).map(|row| rows[[row, 3]]).sum();
-        let known = (whole + rows[[6, 3]] / 3.0 + rows[[13, 3]] / 3.0) * 3.0 / 20.0;
+        // Pose 1 covers rows 6 2/3 to 13 1/3.
+        let complete: f64 = (7..13).map(|row| rows[[row, 3]]).sum();
+        let known = (complete + rows[[6, 3]] / 3.0 + rows[[13, 3]] / 3.0) * 3.0 / 20.0;
         assert!((poses[[1, 3]] - known).abs() < 1e-9, "{} {known}", poses[[1, 3]]);
         let silence = silence(16_000);
         let padded = with_context(&poses, 7, &silence);

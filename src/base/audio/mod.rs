@@ -1,4 +1,4 @@
-//! Waveforms to features. Pure: samples in, arrays out.
+//! Audio features from waveforms, as pure functions of samples.
 
 pub mod fingerprint;
 pub mod loudness;

@@ -1,30 +1,29 @@
-//! When something begins in a sound: onsets as librosa 0.11 finds them with `onset_detect(y, sr=16000, hop_length=512,
-//! units="time")`, which the beat metrics of the field are made with. Spectral flux of 128 mel bands in decibels (Boeck and
-//! Widmer 2013), then peaks that stand out from their surroundings.
-//!
-//! Decibels are cut 80 below the loudest of the whole sound, so a sound is heard twice: `Loudest`, then `Onsets`. Both
-//! take it in pieces; only the strength of each hop is kept, 4 bytes every 32 ms.
+//! Audio onsets as detected by librosa 0.11 with `onset_detect(y, sr=16000, hop_length=512, units="time")`, on which
+//! the beat metrics of the field are based: spectral flux of 128 mel bands in decibels (Boeck and Widmer 2013), then
+//! peaks above their surroundings. Decibels are clipped at 80 below the maximum of the complete sound, so a sound
+//! needs two passes: `Loudest`, then `Onsets`. Both process it in chunks and store only the strength per hop, 4 bytes
+//! per 32 ms.
 
 use super::mel::Band;
 use super::spectrum::{StreamedSpectra, hann};
 use crate::types::sound::SAMPLE_RATE;
 
-/// Samples between two frames, and of a window.
+/// Hop between frames, and window length, in samples.
 pub const HOP: usize = 512;
 const WINDOW: usize = 2048;
 const N_MELS: usize = 128;
-/// Power below this is silence.
-const LEAST_POWER: f32 = 1e-10;
-/// Decibels below the loudest that count.
+/// Minimum power; anything below is silence.
+const MIN_POWER: f32 = 1e-10;
+/// Dynamic range below the maximum, in decibels.
 const RANGE_DB: f32 = 80.0;
-/// Frames without a strength at the start: the lag of 1, and half a window.
+/// Frames without an onset strength at the start: the lag of 1, and half a window.
 const N_BEFORE: usize = 1 + WINDOW / (2 * HOP);
-/// A peak stands this far above the mean of the frames from 3 before to 3 after it, of strengths scaled to 0..1.
+/// Minimum height of a peak above the mean of the frames from 3 before to 3 after it, for strengths scaled to 0..1.
 const DELTA: f64 = 0.07;
 const AROUND: usize = 3;
 
-/// Onset times in seconds of mono sound at 16 kHz, samples in -1..1 (one that is not finite counts as 0). Empty where nothing
-/// changes.
+/// Returns the onset times in seconds of mono sound at 16 kHz, samples in -1..1 (non-finite ones count as 0). Empty
+/// for a constant sound.
 pub fn onsets(samples: &[f32]) -> Vec<f64> {
     let mut loudest = Loudest::default();
     loudest.push(samples);
@@ -33,7 +32,7 @@ pub fn onsets(samples: &[f32]) -> Vec<f64> {
     onsets.finish()
 }
 
-/// First hearing: how loud the loudest band ever is, decibels.
+/// First pass: maximum level of any band in decibels.
 pub struct Loudest {
     spectra: Spectra,
     most: f32,
@@ -46,26 +45,26 @@ impl Default for Loudest {
 }
 
 impl Loudest {
-    /// The next samples.
+    /// Processes the next samples.
     pub fn push(&mut self, samples: &[f32]) {
         let most = &mut self.most;
         self.spectra.push(samples, |bands| *most = bands.iter().fold(*most, |most, db| most.max(*db)));
     }
 
-    /// Decibels of the loudest band.
+    /// Returns the maximum level in decibels.
     pub fn finish(mut self) -> f32 {
         self.push(&[0.0; WINDOW / 2]);
         self.most
     }
 }
 
-/// Second hearing: the onsets.
+/// Second pass: onset detection.
 pub struct Onsets {
     spectra: Spectra,
     flux: Flux,
 }
 
-/// How much louder each frame is than the one before.
+/// Increase of the level from each frame to the next.
 struct Flux {
     floor_db: f32,
     previous: Option<[f32; N_MELS]>,
@@ -73,31 +72,31 @@ struct Flux {
 }
 
 impl Onsets {
-    /// With what `Loudest` found.
+    /// Starts the second pass with the result of `Loudest`.
     pub fn new(loudest_db: f32) -> Self {
         let flux = Flux { floor_db: loudest_db - RANGE_DB, previous: None, strengths: Vec::new() };
         Self { spectra: Spectra::new(), flux }
     }
 
-    /// The next samples.
+    /// Processes the next samples.
     pub fn push(&mut self, samples: &[f32]) {
         let flux = &mut self.flux;
         self.spectra.push(samples, |bands| flux.push(bands));
     }
 
-    /// Onset strength of every hop: mean over bands of the rise in decibels since the hop before, `HOP` samples apart, the
-    /// first 3 hops 0.
+    /// Returns the onset strength of every hop of `HOP` samples: the mean over bands of the rise in decibels since the
+    /// hop before; 0 for the first 3 hops.
     pub fn strengths(mut self) -> Vec<f32> {
         self.push(&[0.0; WINDOW / 2]);
         let n = self.flux.strengths.len();
         let mut strengths = vec![0.0; N_BEFORE];
-        // the first frame has none before it
+        // The first frame has no predecessor.
         strengths.extend(self.flux.strengths.into_iter().skip(1));
         strengths.truncate(n);
         strengths
     }
 
-    /// Onset times, seconds.
+    /// Returns the onset times in seconds.
     pub fn finish(self) -> Vec<f64> {
         let secs = |frame: usize| (frame * HOP) as f64 / f64::from(SAMPLE_RATE);
         peaks(&self.strengths()).into_iter().map(secs).collect()
@@ -115,25 +114,25 @@ impl Flux {
     }
 }
 
-/// Frames whose strength, scaled to 0..1, is `DELTA` above the mean around it. (At this rate and hop librosa's other rules,
-/// local maximum and waiting time, span less than a frame.)
+/// Returns the frames whose strength, scaled to 0..1, exceeds the mean around them by at least `DELTA`. (At this rate
+/// and hop librosa's other conditions, local maximum and waiting time, span less than a frame.)
 fn peaks(strengths: &[f32]) -> Vec<usize> {
     let least = strengths.iter().copied().fold(f32::INFINITY, f32::min);
     let most = strengths.iter().copied().fold(f32::NEG_INFINITY, f32::max) - least;
-    // nothing at all, or nothing that changes
+    // No frames, or constant strength.
     if most.is_nan() || most <= 0.0 {
         return Vec::new();
     }
     let scaled: Vec<f32> = strengths.iter().map(|v| (v - least) / (most + f32::MIN_POSITIVE)).collect();
-    let stands_out = |i: &usize| {
+    let is_peak = |i: &usize| {
         let around = &scaled[i.saturating_sub(AROUND)..(i + AROUND + 1).min(scaled.len())];
         f64::from(scaled[*i]) >= f64::from(around.iter().sum::<f32>()) / around.len() as f64 + DELTA
     };
-    (0..scaled.len()).filter(stands_out).collect()
+    (0..scaled.len()).filter(is_peak).collect()
 }
 
-/// Sound in pieces to mel bands in decibels, a frame every `HOP` samples, its window centred on the frame's time and filled
-/// up with zeros at the ends.
+/// Converts sound in chunks to mel bands in decibels: a frame every `HOP` samples, whose window is centred on the
+/// frame's time and padded with zeros at the ends.
 struct Spectra {
     windows: StreamedSpectra,
     bands: Vec<Band>,
@@ -145,14 +144,14 @@ impl Spectra {
     }
 
     fn push(&mut self, samples: &[f32], mut each: impl FnMut(&[f32; N_MELS])) {
-        for piece in samples.chunks(16 * WINDOW) {
-            let piece: Vec<f32> = piece.iter().map(|v| if v.is_finite() { *v } else { 0.0 }).collect();
-            self.windows.push(&piece, |_, spectrum| {
+        for chunk in samples.chunks(16 * WINDOW) {
+            let chunk: Vec<f32> = chunk.iter().map(|v| if v.is_finite() { *v } else { 0.0 }).collect();
+            self.windows.push(&chunk, |_, spectrum| {
                 let mut decibels = [0.0; N_MELS];
                 for (db, band) in decibels.iter_mut().zip(&self.bands) {
                     let bins = band.weights.iter().zip(spectrum.get(band.first..).unwrap_or_default());
                     let power: f32 = bins.map(|(weight, bin)| weight * bin.norm_sqr()).sum();
-                    *db = 10.0 * power.max(LEAST_POWER).log10();
+                    *db = 10.0 * power.max(MIN_POWER).log10();
                 }
                 each(&decibels);
             });
@@ -160,7 +159,7 @@ impl Spectra {
     }
 }
 
-/// Triangles of equal area with corners equally spaced on Slaney's mel scale, 0 to 8000 Hz: linear below 1000 Hz,
+/// Triangles of equal area with corners equally spaced on Slaney's mel scale from 0 to 8000 Hz: linear below 1000 Hz,
 /// logarithmic above (Slaney, Auditory Toolbox, 1998).
 fn bands() -> Vec<Band> {
     const LINEAR: f64 = 200.0 / 3.0;
@@ -189,7 +188,7 @@ fn bands() -> Vec<Band> {
 mod tests {
     use super::*;
 
-    /// Signal of the reference script: bursts of falling tones, 6 s.
+    /// Signal of the reference script: bursts of decaying tones, 6 s.
     pub(super) fn bursts() -> Vec<f32> {
         let sample = |i: usize| {
             let t = i as f64 / f64::from(SAMPLE_RATE);
@@ -206,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn onsets_are_those_of_librosa() {
+    fn onsets_equal_those_of_librosa() {
         let golden: serde_json::Value =
             serde_json::from_str(include_str!("../../../fixtures/reference/audio_features_golden.json")).unwrap();
         let sound = bursts();
@@ -214,9 +213,9 @@ mod tests {
         let mut loudest = Loudest::default();
         loudest.push(&sound);
         let loudest = loudest.finish();
-        let mut in_pieces = Onsets::new(loudest);
-        sound.chunks(777).for_each(|piece| in_pieces.push(piece));
-        let strengths = in_pieces.strengths();
+        let mut in_chunks = Onsets::new(loudest);
+        sound.chunks(777).for_each(|chunk| in_chunks.push(chunk));
+        let strengths = in_chunks.strengths();
         let expected = list("strengths");
         assert_eq!(strengths.len(), expected.len());
         for (i, (found, expected)) in strengths.iter().zip(&expected).enumerate() {
@@ -226,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn silence_and_nothing_have_no_onsets() {
+    fn silence_and_empty_sounds_have_no_onsets() {
         assert!(onsets(&[]).is_empty());
         assert!(onsets(&[0.0; 20_000]).is_empty());
         assert!(onsets(&[f32::NAN; 3000]).is_empty());

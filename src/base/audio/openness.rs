@@ -1,33 +1,35 @@
-//! How open the mouth of a voice sounds. Open vowels carry most between 600 and 5000 Hz; closed lips leave the murmur below
-//! (the first formant falls with the jaw: Stevens, Acoustic Phonetics, 1998, section 3.2), and hisses above are said with
-//! the teeth together. The contrast of the three, in dB, needs no gain: a softer voice sounds no more closed.
+//! Mouth openness estimated from the voice. Open vowels have most energy between 600 and 5000 Hz; closed lips leave
+//! the murmur below (the first formant falls as the jaw closes: Stevens, Acoustic Phonetics, 1998, section 3.2), and
+//! the fricatives above are spoken with the teeth together. The contrast of the three in dB is independent of gain: a
+//! quieter voice does not appear more closed.
 
 use super::spectrum::{StreamedSpectra, hann};
 use crate::types::sound::SAMPLE_RATE;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-/// Samples of a window, and between the starts of two: 32 ms, 10 ms.
+/// Window length and hop in samples: 32 ms, 10 ms.
 const WINDOW: usize = 512;
 const HOP: usize = 160;
-/// Edges of the bands in Hz, and the weight of each band's dB: murmur, open voice, hiss.
+/// Edges of the bands in Hz, and the weight of each band's level in dB: murmur, open voice, hiss.
 const EDGES_HZ: [f64; 8] = [100.0, 300.0, 600.0, 1000.0, 1800.0, 3000.0, 5000.0, 7800.0];
 const WEIGHTS: [f32; N_BANDS] = [-0.5, -0.5, 0.5, 0.5, 0.5, 0.5, -0.5];
 const N_BANDS: usize = 7;
-/// What is so far below the loud parts of its band is silence, dB; loud is what a tenth of the windows reaches.
+/// Level below the loud parts of a band at which it counts as silent, dB; the loud level is exceeded by a tenth of the
+/// windows.
 const SILENCE_DB: f32 = -30.0;
-const LOUD_SHARE: f64 = 0.9;
-/// Steps over which the contrast is smoothed on either side.
+const LOUD_QUANTILE: f64 = 0.9;
+/// Number of steps on either side over which the contrast is smoothed.
 const SMOOTH: usize = 5;
 
-/// Sound piece by piece to how open its voice sounds. Memory: 28 bytes for 10 ms of sound.
+/// Measures the openness of a voice in a sound that arrives in chunks. Memory: 28 bytes per 10 ms of sound.
 pub struct OpennessMeter {
     spectra: StreamedSpectra,
     bins: [Range<usize>; N_BANDS],
     energies: Vec<[f32; N_BANDS]>,
 }
 
-/// How open a voice sounds, every 10 ms, dB.
+/// Openness of the mouth every 10 ms, dB.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Openness(Vec<f32>);
 
@@ -43,7 +45,7 @@ impl Default for OpennessMeter {
 }
 
 impl OpennessMeter {
-    /// Takes the next samples, mono at 16 kHz, -1..1.
+    /// Processes the next samples, mono at 16 kHz, -1..1.
     pub fn push(&mut self, samples: &[f32]) {
         self.spectra.push(samples, |_, spectrum| {
             let energy = |bins: &Range<usize>| spectrum[bins.clone()].iter().map(|bin| bin.norm_sqr()).sum();
@@ -51,11 +53,11 @@ impl OpennessMeter {
         });
     }
 
-    /// The whole sound's.
+    /// Returns the openness over the complete sound.
     pub fn finish(self) -> Openness {
         let loud: [f32; N_BANDS] = std::array::from_fn(|band| {
             let mut energies: Vec<f32> = self.energies.iter().map(|energies| energies[band]).collect();
-            let rank = (LOUD_SHARE * energies.len().saturating_sub(1) as f64) as usize;
+            let rank = (LOUD_QUANTILE * energies.len().saturating_sub(1) as f64) as usize;
             let loud = if energies.is_empty() { 0.0 } else { *energies.select_nth_unstable_by(rank, f32::total_cmp).1 };
             loud.max(1e-9)
         });
@@ -68,7 +70,7 @@ impl OpennessMeter {
 }
 
 impl Openness {
-    /// At a time in seconds, between two steps; NaN outside the sound.
+    /// Returns the openness at a time in seconds, interpolated linearly; NaN outside the sound.
     pub fn at(&self, secs: f64) -> f32 {
         let place = (secs * f64::from(SAMPLE_RATE) - WINDOW as f64 / 2.0) / HOP as f64;
         if !(place >= 0.0 && place <= self.0.len().saturating_sub(1) as f64) || self.0.is_empty() {
@@ -80,7 +82,7 @@ impl Openness {
     }
 }
 
-/// Means under a raised cosine; the ends weigh what there is.
+/// Smooths with a raised cosine, which is truncated and renormalised at the ends.
 fn smoothed(values: &[f32]) -> Vec<f32> {
     let weight = |away: usize| (0.5 + 0.5 * (TAU / 2.0 * away as f64 / (SMOOTH + 1) as f64).cos()) as f32;
     let weights: [f32; SMOOTH + 1] = std::array::from_fn(weight);
@@ -99,7 +101,7 @@ fn smoothed(values: &[f32]) -> Vec<f32> {
 mod tests {
     use super::*;
 
-    /// Half seconds of tones, each of the given frequencies and loudness.
+    /// Half seconds of tones, each part with its frequencies and amplitude.
     fn tones(parts: &[(&[f64], f64)]) -> Vec<f32> {
         let tone = |(hz, loud): &(&[f64], f64)| {
             let (hz, loud) = (hz.to_vec(), *loud);
@@ -111,14 +113,14 @@ mod tests {
         parts.iter().flat_map(tone).collect()
     }
 
-    fn measured(samples: &[f32], piece: usize) -> Openness {
+    fn measured(samples: &[f32], chunk: usize) -> Openness {
         let mut meter = OpennessMeter::default();
-        samples.chunks(piece).for_each(|piece| meter.push(piece));
+        samples.chunks(chunk).for_each(|chunk| meter.push(chunk));
         meter.finish()
     }
 
     #[test]
-    fn an_open_vowel_sounds_more_open_than_a_murmur_a_hiss_or_silence_at_any_loudness() {
+    fn open_vowels_exceed_murmur_hiss_and_silence_at_any_loudness() {
         let (open, murmur, hiss): (&[f64], &[f64], &[f64]) =
             (&[150.0, 400.0, 800.0, 1200.0, 2500.0, 4000.0], &[150.0, 400.0], &[6000.0, 7000.0]);
         let parts = [(open, 0.1), (murmur, 0.1), (open, 0.02), (hiss, 0.1), (open, 0.1), (open, 0.0)];
@@ -132,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn pieces_of_any_length_give_the_same() {
+    fn chunks_of_any_length_give_equal_results() {
         let samples = tones(&[(&[300.0, 900.0], 0.1), (&[200.0], 0.2)]);
         assert_eq!(measured(&samples, 7), measured(&samples, 100_000));
         assert_eq!(measured(&samples[..500], 100), Openness::default());

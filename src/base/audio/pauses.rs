@@ -1,20 +1,20 @@
-//! Where speech pauses: the level of a sound at a moment against that of its speech.
+//! Detection of pauses in speech: the level of a sound relative to the level of its speech.
 
 use crate::types::sound::Sound;
 use std::ops::Range;
 
-/// Length of a window of the level, seconds.
+/// Window length of the level in seconds.
 const WINDOW_SECS: f64 = 0.01;
-/// A pause is quiet this long on either side of its middle, seconds.
+/// Half length of the shortest detected pause, seconds.
 const HALF_SECS: f64 = 0.06;
-/// Share of the windows that are not louder than speech.
+/// Fraction of the windows that are not louder than the reference level of speech.
 const SPEECH_SHARE: f64 = 0.95;
-/// What is this far below speech is none, dB.
+/// Minimum level of a window with speech, dB relative to the reference level.
 const SPEECH_DB: f32 = -25.0;
 /// Level of silence, dB.
 const FLOOR_DB: f32 = -100.0;
 
-/// Level of a sound over time, dB from that of its speech.
+/// Level of a sound over time in dB relative to the level of its speech.
 #[derive(Clone, Debug)]
 pub struct SpeechLevel {
     windows: Vec<f32>,
@@ -36,12 +36,12 @@ impl SpeechLevel {
         Self { windows }
     }
 
-    /// Loudest level around a moment; silence before the beginning and after the end.
+    /// Returns the highest level around a time in seconds; silence before the start and after the end.
     pub fn around(&self, secs: f64) -> f32 {
         self.part(secs - HALF_SECS..secs + HALF_SECS).iter().copied().fold(FLOOR_DB, f32::max)
     }
 
-    /// Share of a stretch of time, seconds, in which there is speech.
+    /// Returns the fraction of a time range in seconds that contains speech.
     pub fn speech_share(&self, secs: Range<f64>) -> f64 {
         let part = self.part(secs);
         part.iter().filter(|level| **level > SPEECH_DB).count() as f64 / part.len().max(1) as f64
@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_pause_is_far_below_speech_whatever_the_gain() {
+    fn a_pause_is_far_below_speech_at_any_gain() {
         for gain in [1.0, 0.02] {
             let loud = |i: usize| if (8_000..12_000).contains(&(i % 16_000)) { 0.0 } else { gain * 0.5 };
             let samples = (0..64_000).map(|i| loud(i) * if i % 2 == 0 { 1.0 } else { -1.0 }).collect();

@@ -1,9 +1,9 @@
-//! Linear equations with a symmetric positive definite matrix, by Cholesky decomposition.
+//! Solution of linear equations with a symmetric positive definite matrix by Cholesky decomposition.
 
 use ndarray::{Array1, Array2};
 
-/// Solution X of A X = B for a symmetric positive definite A [n, n] and B [n, m]. A direction in which A has no size
-/// gets a large but finite answer.
+/// Solves A X = B for X with a symmetric positive definite A [n, n] and B [n, m]. Pivots below 1e-12 are raised to it,
+/// so that the solution is finite, though large, for a singular A.
 pub fn solve(mut a: Array2<f64>, mut b: Array2<f64>) -> Array2<f64> {
     let n = a.nrows();
     for j in 0..n {
@@ -32,7 +32,7 @@ mod tests {
     use ndarray::array;
 
     #[test]
-    fn the_solution_gives_the_right_side_back() {
+    fn the_solution_satisfies_the_equations() {
         let a = array![[4.0, 1.0, 0.5], [1.0, 3.0, -0.2], [0.5, -0.2, 2.0]];
         let x = array![[1.0, -2.0], [0.5, 3.0], [-1.5, 0.25]];
         let off = solve(a.clone(), a.dot(&x)) - x;

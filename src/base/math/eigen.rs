@@ -1,14 +1,15 @@
-//! Two decompositions of symmetric matrices that the Frechet distance needs: a factor of a positive semi-definite one,
-//! and the eigenvalues (Golub and Van Loan, Matrix Computations, 4th edition, 4.2.8, 8.3.1 and 8.3.3).
+//! Two decompositions of symmetric matrices for the Frechet distance: a factor of a positive semi-definite matrix, and
+//! the eigenvalues (Golub and Van Loan, Matrix Computations, 4th edition, 4.2.8, 8.3.1 and 8.3.3).
 
 use ndarray::{Array1, Array2, Axis, s};
 
-/// Share of the largest diagonal below which a value is rounding.
+/// Fraction of the largest diagonal element below which a value is a rounding error.
 const ROUNDING: f64 = 1e-14;
-/// Most steps until an eigenvalue stands alone; two or three are usual.
-const MOST_STEPS: usize = 60;
+/// Maximum number of QR steps per eigenvalue; two or three are usual.
+const MAX_STEPS: usize = 60;
 
-/// `f` [d, rank] with `f fᵀ` the given positive semi-definite matrix [d, d]: Cholesky's, pivoted, ended at the rank.
+/// Returns `f` [d, rank] with `f fᵀ` equal to the positive semi-definite `matrix` [d, d], by pivoted Cholesky
+/// decomposition.
 pub fn factor(matrix: &Array2<f64>) -> Array2<f64> {
     let mut rest = matrix.clone();
     let floor = ROUNDING * rest.diag().iter().fold(0.0, |most: f64, v| most.max(*v));
@@ -29,34 +30,34 @@ pub fn factor(matrix: &Array2<f64>) -> Array2<f64> {
     ndarray::concatenate(Axis(1), &views).unwrap_or_else(|_| Array2::zeros((matrix.nrows(), 0)))
 }
 
-/// Eigenvalues of a symmetric matrix, in no order.
+/// Returns the eigenvalues of a symmetric matrix, unordered.
 pub fn eigenvalues(matrix: Array2<f64>) -> Vec<f64> {
-    let (mut diagonal, mut beside) = tridiagonal(matrix);
+    let (mut diagonal, mut off_diagonal) = tridiagonal(matrix);
     let mut high = diagonal.len();
     let mut n_steps = 0;
     while high > 1 {
-        let small = |i: usize| beside[i].abs() <= f64::EPSILON * (diagonal[i].abs() + diagonal[i + 1].abs());
-        if small(high - 2) || n_steps == MOST_STEPS {
+        let small = |i: usize| off_diagonal[i].abs() <= f64::EPSILON * (diagonal[i].abs() + diagonal[i + 1].abs());
+        if small(high - 2) || n_steps == MAX_STEPS {
             high -= 1;
             n_steps = 0;
             continue;
         }
         let low = (0..high - 1).rev().find(|i| small(*i)).map_or(0, |i| i + 1);
-        qr_step(&mut diagonal[low..high], &mut beside[low..high - 1]);
+        qr_step(&mut diagonal[low..high], &mut off_diagonal[low..high - 1]);
         n_steps += 1;
     }
     diagonal
 }
 
-/// The diagonal [n] and the one beside it [n - 1] of a tridiagonal matrix with the same eigenvalues: Householder
-/// reflections from both sides, a column at a time.
+/// Returns the diagonal [n] and the subdiagonal [n - 1] of a tridiagonal matrix with the same eigenvalues, by
+/// Householder reflections from both sides, one column at a time.
 fn tridiagonal(mut a: Array2<f64>) -> (Vec<f64>, Vec<f64>) {
     let n = a.nrows();
-    let mut beside = Vec::with_capacity(n.saturating_sub(1));
+    let mut off_diagonal = Vec::with_capacity(n.saturating_sub(1));
     for k in 0..n.saturating_sub(1) {
         let mut v = a.slice(s![k + 1.., k]).to_owned();
         let norm = -v.dot(&v).sqrt().copysign(v[0]);
-        beside.push(norm);
+        off_diagonal.push(norm);
         v[0] -= norm;
         let square = v.dot(&v);
         if square > 0.0 {
@@ -69,10 +70,10 @@ fn tridiagonal(mut a: Array2<f64>) -> (Vec<f64>, Vec<f64>) {
             }
         }
     }
-    (a.diag().to_vec(), beside)
+    (a.diag().to_vec(), off_diagonal)
 }
 
-/// One implicit QR step with Wilkinson's shift on a tridiagonal matrix of at least 2 rows.
+/// Applies one implicit QR step with Wilkinson's shift to a tridiagonal matrix of at least 2 rows.
 fn qr_step(d: &mut [f64], e: &mut [f64]) {
     let n = d.len();
     let half = (d[n - 2] - d[n - 1]) / 2.0;
@@ -106,15 +107,15 @@ mod tests {
     }
 
     #[test]
-    fn a_known_matrix_has_its_known_eigenvalues() {
-        // of the chain 2, -1: 2 - 2 cos(k pi / (n + 1))
+    fn eigenvalues_of_a_known_matrix() {
+        // The tridiagonal matrix of 2 and -1 has the eigenvalues 2 - 2 cos(k pi / (n + 1)).
         let n = 30;
         let chain = Array2::from_shape_fn((n, n), |(i, j)| match i.abs_diff(j) {
             0 => 2.0,
             1 => -1.0,
             _ => 0.0,
         });
-        // turned by a reflection, so that it is full
+        // A reflection makes the matrix dense.
         let v = Array1::from_shape_fn(n, |i| hash(i, 3));
         let square = v.dot(&v);
         let turn = Array2::from_shape_fn((n, n), |(i, j)| f64::from(u8::from(i == j)) - 2.0 * v[i] * v[j] / square);
@@ -127,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn degenerate_matrices_end() {
+    fn degenerate_matrices_terminate() {
         assert!(eigenvalues(Array2::zeros((0, 0))).is_empty());
         assert_eq!(eigenvalues(Array2::zeros((5, 5))), vec![0.0; 5]);
         assert_eq!(eigenvalues(Array2::from_elem((1, 1), 3.0)), vec![3.0]);
@@ -139,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn a_factor_has_the_rank_and_gives_the_matrix_back() {
+    fn the_factor_has_the_rank_and_reproduces_the_matrix() {
         let rows = Array2::from_shape_fn((7, 20), |(i, j)| hash(i, j));
         let matrix = rows.t().dot(&rows);
         let f = factor(&matrix);

@@ -2,14 +2,14 @@
 
 use serde::Serialize;
 
-/// Two ends of a confidence interval, in the unit of the estimate.
+/// Bounds of a confidence interval, in the unit of the estimate.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ConfidenceInterval {
     pub low: f64,
     pub high: f64,
 }
 
-/// A value with its confidence interval; as JSON `value`, `low` and `high`.
+/// A value with its confidence interval; serialised as `value`, `low` and `high`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Estimate {
     pub value: f64,
@@ -18,19 +18,19 @@ pub struct Estimate {
 }
 
 impl ConfidenceInterval {
-    /// Whether 0 lies outside the interval.
+    /// Returns whether 0 lies outside the interval.
     pub fn excludes_zero(&self) -> bool {
         self.low > 0.0 || self.high < 0.0
     }
 
-    /// Whether both ends are finite.
+    /// Returns whether both bounds are finite.
     pub fn is_finite(&self) -> bool {
         self.low.is_finite() && self.high.is_finite()
     }
 }
 
 impl Estimate {
-    /// `value` in the interval from `low` to `high`.
+    /// Creates an estimate of `value` with the interval from `low` to `high`.
     pub const fn new(value: f64, low: f64, high: f64) -> Self {
         Self { value, interval: ConfidenceInterval { low, high } }
     }

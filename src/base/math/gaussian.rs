@@ -1,11 +1,11 @@
-//! Smoothing over time without delay: a Gaussian-weighted straight line is fitted around every frame and read off at
-//! it. In the middle of a track that is the plain Gaussian filter; at the ends, and beside gaps, it stays true to a
-//! steady motion where a cut-off kernel would pull it back.
+//! Smoothing over time without delay: a Gaussian-weighted straight line is fitted around every frame and evaluated at
+//! that frame. In the middle of a track this equals the Gaussian filter; at the ends and beside gaps it reproduces
+//! linear motion, where a truncated kernel would be biased.
 
 use ndarray::{ArrayViewMut1, ArrayViewMut3, Axis};
 
-/// Smooths every number of `tracks` [T, n, k] along T with a Gaussian of `sigma` frames; `sigma` 0 changes nothing.
-/// Numbers that are not finite stay as they are and end a track: nothing is carried over a gap.
+/// Smooths every value of `tracks` [T, n, k] along T with a Gaussian of `sigma` frames; `sigma` 0 changes nothing.
+/// Non-finite values are unchanged and end a track: nothing is smoothed across a gap.
 pub fn gaussian(mut tracks: ArrayViewMut3<f32>, sigma: f64) {
     let half = (3.0 * sigma).ceil();
     if !(1.0..10_000.0).contains(&half) {
@@ -17,7 +17,7 @@ pub fn gaussian(mut tracks: ArrayViewMut3<f32>, sigma: f64) {
     }
 }
 
-/// `weights[d]`: weight of a frame d frames away.
+/// `weights[d]` is the weight at a distance of d frames.
 fn smooth_track(mut track: ArrayViewMut1<f32>, weights: &[f64]) {
     let raw = track.to_vec();
     let half = weights.len() - 1;
@@ -57,7 +57,7 @@ mod tests {
     }
 
     #[test]
-    fn the_middle_of_a_pulse_is_the_gaussian_itself() {
+    fn the_impulse_response_is_the_gaussian() {
         let mut pulse = [0.0; 21];
         pulse[10] = 1.0;
         let out = smoothed(&pulse, 1.0);
@@ -70,7 +70,7 @@ mod tests {
     }
 
     #[test]
-    fn steady_motion_is_kept_to_the_very_ends_and_gaps_divide() {
+    fn linear_motion_is_exact_up_to_the_ends_and_gaps_separate() {
         let nan = f32::NAN;
         let line = [0.0, 1.0, 2.0, 3.0, nan, 40.0, 42.0, 44.0, nan, 7.0];
         let out = smoothed(&line, 2.0);
@@ -82,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_falls() {
+    fn noise_is_attenuated() {
         let noisy: Vec<f32> = (0..200).map(|t| if t % 2 == 0 { 1.0 } else { -1.0 }).collect();
         assert!(smoothed(&noisy, 1.0)[5..195].iter().all(|v| v.abs() < 0.05));
     }

@@ -1,4 +1,5 @@
-//! Vectors, rotations, Procrustes alignment, eigenvalues, filters, median and quantiles. Knows no body and no file.
+//! Vectors, rotations, Procrustes alignment, eigenvalues, filters, medians and quantiles. Independent of bodies and
+//! files.
 
 pub mod cholesky;
 pub mod eigen;

@@ -1,58 +1,60 @@
-//! Order statistics: median, quantile and the trimmed ends of a set of numbers. Numbers that are not finite are left out
-//! everywhere. `median` and `quantile` may lie between two numbers; the `lower_` and `upper_` ones occur in the set.
+//! Order statistics: median, quantile and the trimmed ends of a set of numbers. Non-finite numbers are ignored
+//! everywhere. `median` and `quantile` may interpolate between two numbers; the `lower_` and `upper_` variants return
+//! a number of the set.
 
 use std::ops::{Add, Div};
 
-/// A floating-point number that can be ordered: f32 or f64.
+/// A sortable floating-point number: f32 or f64.
 pub trait Sortable: Copy + From<u8> + Into<f64> + Add<Output = Self> + Div<Output = Self> {}
 
 impl<F: Copy + From<u8> + Into<f64> + Add<Output = F> + Div<Output = F>> Sortable for F {}
 
-/// Finite numbers in ascending order. Every method gives `None` of an empty set.
+/// Finite numbers in ascending order. Every method returns `None` for an empty set.
 #[derive(Clone, Debug)]
 pub struct Ordered<F>(Vec<F>);
 
 impl<F: Sortable> Ordered<F> {
-    /// Sorts the finite ones of `values`.
+    /// Sorts the finite numbers of `values`.
     pub fn new(values: impl IntoIterator<Item = F>) -> Self {
         let mut values: Vec<F> = values.into_iter().filter(|&value| value.into().is_finite()).collect();
         values.sort_unstable_by(|&a, &b| a.into().total_cmp(&b.into()));
         Self(values)
     }
 
-    /// The number at `rank`, counted from 0 at the smallest.
+    /// Number at `rank`, counted from 0 for the smallest.
     fn at(&self, rank: usize) -> Option<F> {
         self.0.get(rank).copied()
     }
 
-    /// The number in the middle, or the mean of the two there.
+    /// Middle number, or the mean of the two middle numbers.
     pub fn median(&self) -> Option<F> {
         Some((self.lower_quantile(0.5)? + self.upper_median()?) / F::from(2))
     }
 
-    /// The number in the middle, the larger of two.
+    /// Middle number, or the larger of the two middle numbers.
     pub fn upper_median(&self) -> Option<F> {
         self.at(self.0.len() / 2)
     }
 
-    /// The number at rank `share * (n - 1)`, rounded down; `share` is 0..=1.
+    /// Number at rank `share * (n - 1)`, rounded down; `share` is 0..=1.
     pub fn lower_quantile(&self, share: f64) -> Option<F> {
         self.at((share * self.0.len().checked_sub(1)? as f64).floor() as usize)
     }
 
-    /// The smallest number once one in `part` of them, rounded down, is cut off below.
+    /// Smallest number after the smallest `n / part` numbers, rounded down, are trimmed.
     pub fn low_end(&self, part: usize) -> Option<F> {
         self.at(self.0.len() / part)
     }
 
-    /// The largest number once one in `part` of them, rounded down, is cut off above.
+    /// Largest number after the largest `n / part` numbers, rounded down, are trimmed.
     pub fn high_end(&self, part: usize) -> Option<F> {
         self.at(self.0.len().checked_sub(1 + self.0.len() / part)?)
     }
 }
 
 impl Ordered<f64> {
-    /// The value at rank `share * (n - 1)`, in proportion between its two neighbours (numpy's `quantile`).
+    /// Value at rank `share * (n - 1)`, interpolated linearly between its neighbours (numpy's `quantile`); `share` is
+    /// 0..=1.
     pub fn quantile(&self, share: f64) -> Option<f64> {
         let rank = share * self.0.len().checked_sub(1)? as f64;
         let (below, above) = (self.at(rank.floor() as usize)?, self.at(rank.ceil() as usize)?);
@@ -60,27 +62,27 @@ impl Ordered<f64> {
     }
 }
 
-/// The number in the middle, or the mean of the two there.
+/// Middle number, or the mean of the two middle numbers.
 pub fn median<F: Sortable>(values: impl IntoIterator<Item = F>) -> Option<F> {
     Ordered::new(values).median()
 }
 
-/// The number in the middle, the smaller of two.
+/// Middle number, or the smaller of the two middle numbers.
 pub fn lower_median<F: Sortable>(values: impl IntoIterator<Item = F>) -> Option<F> {
     lower_quantile(values, 0.5)
 }
 
-/// The number in the middle, the larger of two.
+/// Middle number, or the larger of the two middle numbers.
 pub fn upper_median<F: Sortable>(values: impl IntoIterator<Item = F>) -> Option<F> {
     Ordered::new(values).upper_median()
 }
 
-/// The number at rank `share * (n - 1)`, rounded down; `share` is 0..=1.
+/// Number at rank `share * (n - 1)`, rounded down; `share` is 0..=1.
 pub fn lower_quantile<F: Sortable>(values: impl IntoIterator<Item = F>, share: f64) -> Option<F> {
     Ordered::new(values).lower_quantile(share)
 }
 
-/// The smallest number that half of all weight does not exceed. Numbers must be finite.
+/// Smallest number at which the cumulative weight reaches half of the total weight. Numbers must be finite.
 pub fn weighted_median(mut values: Vec<(f64, u64)>) -> Option<f64> {
     values.sort_by(|a, b| a.0.total_cmp(&b.0));
     let total: u64 = values.iter().map(|(_, weight)| weight).sum();
@@ -96,11 +98,11 @@ pub fn weighted_median(mut values: Vec<(f64, u64)>) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// Ten numbers whose ranks are known, with what does not count between them.
+    /// Ten numbers of known ranks, with ignored non-finite ones between them.
     const TEN: [f64; 13] = [7.0, f64::NAN, -1.0, 3.0, 3.0, f64::INFINITY, 20.0, 0.5, 8.0, -4.0, 11.0, 5.0, f64::NAN];
 
     #[test]
-    fn every_variant_gives_its_known_number() {
+    fn every_variant_returns_the_known_number() {
         // -4 -1 0.5 3 3 | 5 7 8 11 20
         let ten = Ordered::new(TEN);
         assert_eq!((median(TEN), lower_median(TEN), upper_median(TEN)), (Some(4.0), Some(3.0), Some(5.0)));
@@ -117,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_has_no_median() {
+    fn an_empty_set_has_no_median() {
         let none = Ordered::new([f64::NAN]);
         assert_eq!((none.median(), none.upper_median(), none.quantile(0.5)), (None, None, None));
         assert_eq!((none.low_end(10), none.high_end(10), none.lower_quantile(0.7)), (None, None, None));
@@ -125,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn weight_is_reached_from_below() {
+    fn weighted_median_reaches_half_of_the_weight() {
         assert_eq!(weighted_median(vec![(0.9, 50), (0.2, 40), (0.3, 100)]), Some(0.3));
         assert_eq!(weighted_median(vec![(2.0, 1), (1.0, 1)]), Some(1.0));
     }

@@ -1,7 +1,8 @@
-//! The similarity (turn, uniform scale, shift; no reflection) that lays one set of points best onto another, in the
-//! least-squares sense: Horn's unit quaternion (Closed-form solution of absolute orientation, 1987, section 4).
+//! Procrustes alignment: the similarity (rotation, uniform scale, translation; no reflection) that best maps one set
+//! of points onto another in the least-squares sense, by Horn's unit quaternion (Closed-form solution of absolute
+//! orientation using unit quaternions, 1987, section 4).
 
-/// `to = scale * rotation * from + shift`.
+/// Similarity transform `to = scale * rotation * from + shift`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Similarity {
     pub scale: f64,
@@ -10,14 +11,14 @@ pub struct Similarity {
 }
 
 impl Similarity {
-    /// The point moved.
+    /// Transforms a point.
     pub fn apply(&self, p: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|i| self.scale * (0..3).map(|k| self.rotation[i][k] * p[k]).sum::<f64>() + self.shift[i])
     }
 }
 
-/// The best similarity from `from` onto `to`, pairs in order. `None`: unequal counts, fewer than three pairs, a number
-/// that is not finite, or all points of `from` in one place.
+/// Returns the best similarity from `from` onto `to`, which are paired by index. `None` for unequal counts, fewer than
+/// three pairs, a non-finite number, or if all points of `from` coincide.
 pub fn similarity(from: &[[f64; 3]], to: &[[f64; 3]]) -> Option<Similarity> {
     let n = from.len();
     if n != to.len() || n < 3 || from.iter().chain(to).flatten().any(|v| !v.is_finite()) {
@@ -55,7 +56,7 @@ fn mean(points: &[[f64; 3]]) -> [f64; 3] {
     std::array::from_fn(|k| points.iter().map(|p| p[k]).sum::<f64>() / points.len() as f64)
 }
 
-/// Rotation matrix of the unit quaternion w, x, y, z.
+/// Rotation matrix of the unit quaternion (w, x, y, z).
 fn matrix_of([w, x, y, z]: [f64; 4]) -> [[f64; 3]; 3] {
     [
         [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
@@ -104,7 +105,7 @@ mod tests {
         [[0.1, 0.2, 0.3], [1.0, -0.4, 0.2], [-0.6, 0.9, 1.1], [0.3, 0.3, -0.8], [2.0, 1.0, 0.5]];
 
     #[test]
-    fn a_known_similarity_is_found_again() {
+    fn a_known_similarity_is_recovered() {
         for (w, x, y, z) in
             [(1.0, 0.0, 0.0, 0.0), (0.3, -0.7, 0.2, 0.6), (0.0, 0.0, 1.0, 0.0), (-0.9, 0.1, 0.1, 0.4f64)]
         {
@@ -138,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_to_align_is_none() {
+    fn degenerate_input_gives_none() {
         assert!(similarity(&POINTS[..2], &POINTS[..2]).is_none());
         assert!(similarity(&[[1.0; 3]; 4], &POINTS[..4]).is_none());
         assert!(similarity(&POINTS, &[[f64::NAN; 3]; 5]).is_none());

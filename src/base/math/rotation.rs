@@ -1,10 +1,10 @@
-//! Rotations in space as unit quaternions: between directions, between frames, swing and twist, Euler angles in any
-//! order, exponential maps. Right-handed, angles in radians unless a name says degrees.
+//! Rotations in space as unit quaternions: between directions and frames, swing and twist, Euler angles in any order,
+//! exponential maps. Right-handed; angles are in radians unless a name says degrees.
 
 use super::vec3::{Vec3, add, any_across, cross, dot, norm, scale};
 use std::ops::Mul;
 
-/// A rotation: the unit quaternion `w + xi + yj + zk`. `a * b` turns by `b` first, then by `a`.
+/// A rotation: the unit quaternion `w + xi + yj + zk`. `a * b` rotates by `b` first, then by `a`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rotation {
     pub w: f64,
@@ -14,14 +14,14 @@ pub struct Rotation {
 impl Rotation {
     pub const IDENTITY: Self = Self { w: 1.0, v: [0.0; 3] };
 
-    /// By `angle` about the unit vector `axis`.
+    /// Rotation by `angle` about the unit vector `axis`.
     pub fn about(axis: Vec3, angle: f64) -> Self {
         let (sin, cos) = (angle / 2.0).sin_cos();
         Self { w: cos, v: scale(axis, sin) }
     }
 
-    /// The smallest rotation that turns the unit vector `from` into the unit vector `to`. For opposite vectors, where
-    /// every axis across is as good, one fixed axis is chosen.
+    /// Smallest rotation from the unit vector `from` to the unit vector `to`. For opposite vectors, where the axis is
+    /// ambiguous, one perpendicular axis is chosen deterministically.
     pub fn between(from: Vec3, to: Vec3) -> Self {
         let cos = dot(from, to);
         let axis = cross(from, to);
@@ -32,9 +32,10 @@ impl Rotation {
         Self::about(scale(axis, 1.0 / sin), sin.atan2(cos))
     }
 
-    /// The rotation that turns the axes x, y, z into the orthonormal right-handed `x`, `y`, `z`.
+    /// Rotation that maps the axes x, y, z to the orthonormal right-handed `x`, `y`, `z`.
     pub fn from_axes(x: Vec3, y: Vec3, z: Vec3) -> Self {
-        // Shepperd's method: the largest of the four components first, so that nothing small is divided by.
+        // Shepperd's method: the largest of the four components is computed first, which avoids division by small
+        // numbers.
         let trace = x[0] + y[1] + z[2];
         let q = if trace > x[0].max(y[1]).max(z[2]) {
             let s = (1.0 + trace).sqrt() * 2.0;
@@ -52,18 +53,18 @@ impl Rotation {
         q.normalised()
     }
 
-    /// The rotation that turns the unit vectors `from.0`, `from.1` (at right angles) into `to.0`, `to.1`.
+    /// Rotation that maps the perpendicular unit vectors `from.0`, `from.1` to `to.0`, `to.1`.
     pub fn between_frames(from: (Vec3, Vec3), to: (Vec3, Vec3)) -> Self {
         let axes = |(a, b): (Vec3, Vec3)| Self::from_axes(a, b, cross(a, b));
         axes(to) * axes(from).inverse()
     }
 
-    /// The images of the axes x, y, z.
+    /// Images of the axes x, y, z.
     pub fn axes(self) -> [Vec3; 3] {
         [self.turn([1.0, 0.0, 0.0]), self.turn([0.0, 1.0, 0.0]), self.turn([0.0, 0.0, 1.0])]
     }
 
-    /// The image of `a`.
+    /// Rotates the vector `a`.
     pub fn turn(self, a: Vec3) -> Vec3 {
         let t = scale(cross(self.v, a), 2.0);
         add(add(a, scale(t, self.w)), cross(self.v, t))
@@ -73,18 +74,19 @@ impl Rotation {
         Self { w: self.w, v: scale(self.v, -1.0) }
     }
 
-    /// Rotation as seen in a mirror that turns x round.
+    /// Rotation reflected in the plane x = 0.
     pub fn mirrored(self) -> Self {
         Self { w: self.w, v: [self.v[0], -self.v[1], -self.v[2]] }
     }
 
-    /// The angle of the rotation, 0..=pi.
+    /// Angle of the rotation, 0..=pi.
     pub fn angle(self) -> f64 {
         2.0 * norm(self.v).atan2(self.w.abs())
     }
 
-    /// `self = swing * twist`: the angle of the twist about the unit vector `axis`, -pi..=pi, and the swing, whose own
-    /// axis is across. A half turn across has no definite twist: it is 0.
+    /// Decomposes `self = swing * twist`: returns the swing, whose axis is perpendicular to the unit vector `axis`,
+    /// and the angle of the twist about `axis`, -pi..=pi. For a half turn about a perpendicular axis the twist is
+    /// undefined and returned as 0.
     pub fn swing_twist(self, axis: Vec3) -> (Self, f64) {
         let along = dot(self.v, axis);
         if along.hypot(self.w) < 1e-12 {
@@ -99,7 +101,7 @@ impl Rotation {
         (self * Self::about(axis, angle).inverse(), angle)
     }
 
-    /// The share `t` (0..=1) of the shortest way from `self` to `to`.
+    /// Spherical linear interpolation from `self` to `to` along the shortest path; `t` is 0..=1.
     pub fn slerp(self, to: Self, t: f64) -> Self {
         let turn = self.inverse() * to;
         let turn = if turn.w < 0.0 { turn.opposite() } else { turn };
@@ -110,9 +112,9 @@ impl Rotation {
         (self * Self::about(scale(turn.v, 1.0 / sin), 2.0 * sin.atan2(turn.w) * t)).normalised()
     }
 
-    /// The share `t` (0..=1) of the way from the second of four rotations, evenly spaced in time, to the third: the cubic
-    /// with the speed of the neighbours' chord at both (Catmull and Rom), laid through their quaternions and made a unit
-    /// one again. Piece after piece it has no corner.
+    /// Cubic interpolation between the second and the third of four rotations that are evenly spaced in time; `t` is
+    /// 0..=1. A Catmull-Rom spline through the quaternions, normalised; its derivative is continuous across successive
+    /// segments.
     pub fn cubic(near: [Self; 4], t: f64) -> Self {
         let turned = |to: Self, from: Self| if to.w * from.w + dot(to.v, from.v) < 0.0 { to.opposite() } else { to };
         let [before, from, to, after] = near;
@@ -129,22 +131,22 @@ impl Rotation {
         if sum.w.hypot(norm(sum.v)) > 1e-9 { sum.normalised() } else { from }
     }
 
-    /// Rotation by the other of its two quaternions.
+    /// Other unit quaternion of the same rotation.
     fn opposite(self) -> Self {
         Self { w: -self.w, v: scale(self.v, -1.0) }
     }
 
-    /// Degrees about Z, X and Y such that `self = Rz * Rx * Ry` (BVH channels `Zrotation Xrotation Yrotation`);
-    /// x lies in -90..=90.
+    /// Angles in degrees about Z, X and Y such that `self = Rz * Rx * Ry` (BVH channels `Zrotation Xrotation
+    /// Yrotation`); x is in -90..=90.
     pub fn euler_zxy_degrees(self) -> Vec3 {
         self.euler([2, 0, 1]).map(f64::to_degrees)
     }
 
-    /// Angles about three different axes (0 x, 1 y, 2 z) such that `self` is the product of the rotations about them in
-    /// this order; the middle one lies in -pi/2..=pi/2.
+    /// Angles about three different axes (0 x, 1 y, 2 z) such that `self` is the product of the rotations about them
+    /// in this order; the middle angle is in -pi/2..=pi/2.
     pub fn euler(self, order: [usize; 3]) -> Vec3 {
         let [i, j, k] = order;
-        // +1 where the axes follow each other as x, y, z, x do
+        // +1 for a cyclic permutation of x, y, z.
         let sign = if (i + 1) % 3 == j { 1.0 } else { -1.0 };
         let columns = self.axes();
         let matrix = |row: usize, column: usize| columns[column][row];
@@ -158,7 +160,7 @@ impl Rotation {
         }
     }
 
-    /// The product of rotations by `angles` about three axes (0 x, 1 y, 2 z), as [`Self::euler`] takes it apart.
+    /// Product of rotations by `angles` about three axes (0 x, 1 y, 2 z), the inverse of [`Self::euler`].
     pub fn from_euler(order: [usize; 3], angles: Vec3) -> Self {
         order.into_iter().zip(angles).fold(Self::IDENTITY, |product, (axis, angle)| {
             let mut about = [0.0; 3];
@@ -167,15 +169,15 @@ impl Rotation {
         })
     }
 
-    /// The exponential map: axis times angle, 0..=pi long.
+    /// Exponential map: axis times angle, of length 0..=pi.
     pub fn rotation_vector(self) -> Vec3 {
         let q = if self.w < 0.0 { self.opposite() } else { self };
         let sin = norm(q.v);
-        // sin(a / 2) = a / 2 to the last digit where it is this small
+        // sin(a / 2) equals a / 2 to the last digit for such small angles.
         scale(q.v, if sin < 1e-9 { 2.0 } else { 2.0 * sin.atan2(q.w) / sin })
     }
 
-    /// The rotation whose axis times angle is `vector`, of any length.
+    /// Rotation whose axis times angle is `vector`, of any length.
     pub fn from_rotation_vector(vector: Vec3) -> Self {
         let angle = norm(vector);
         if angle < 1e-12 {
@@ -239,21 +241,21 @@ mod tests {
     }
 
     #[test]
-    fn between_turns_one_direction_into_the_other_also_when_opposite() {
+    fn between_maps_one_direction_to_the_other_even_if_opposite() {
         for a in directions() {
             for b in directions().into_iter().chain([a, scale(a, -1.0)]) {
                 let r = Rotation::between(a, b);
                 assert!(close(r.turn(a), b));
                 assert!((r.angle() - dot(a, b).clamp(-1.0, 1.0).acos()).abs() < 1e-6);
             }
-            // A hair beside the opposite direction.
+            // Almost opposite directions.
             let b = crate::math::vec3::unit(add(scale(a, -1.0), scale(any_across(a), 1e-7)), 0.0).unwrap();
             assert!(norm(sub(Rotation::between(a, b).turn(a), b)) < 1e-7);
         }
     }
 
     #[test]
-    fn axes_and_euler_angles_give_the_rotation_back() {
+    fn axes_and_euler_angles_reproduce_the_rotation() {
         for r in rotations() {
             let [x, y, z] = r.axes();
             let same = Rotation::from_axes(x, y, z);
@@ -269,16 +271,16 @@ mod tests {
                 assert!(norm(sub(back.turn([0.3, -0.5, 0.8]), r.turn([0.3, -0.5, 0.8]))) < 1e-8, "{order:?} {r:?}");
             }
         }
-        // Known: a quarter turn about y takes z to x.
+        // Known result: a quarter turn about y maps z to x.
         assert!(close(from_euler_zxy_degrees([0.0, 0.0, 90.0]).turn([0.0, 0.0, 1.0]), [1.0, 0.0, 0.0]));
     }
 
     #[test]
-    fn the_exponential_map_gives_the_rotation_back() {
+    fn the_exponential_map_reproduces_the_rotation() {
         for r in rotations() {
             let vector = r.rotation_vector();
             assert!(norm(vector) <= std::f64::consts::PI + 1e-12);
-            // the other way round, beyond half a turn, is the same rotation
+            // The complementary vector in the opposite direction, beyond half a turn, is the same rotation.
             let other = match norm(vector) {
                 angle if angle > 0.1 => scale(vector, (angle - std::f64::consts::TAU) / angle),
                 _ => vector,
@@ -291,12 +293,12 @@ mod tests {
     }
 
     #[test]
-    fn swing_and_twist_make_the_rotation() {
+    fn swing_times_twist_is_the_rotation() {
         for r in rotations() {
             for axis in [[1.0, 0.0, 0.0], [0.0, 0.6, 0.8]] {
                 let (swing, twist) = r.swing_twist(axis);
-                let whole = swing * Rotation::about(axis, twist);
-                assert!(close(whole.turn([0.2, 0.4, -0.7]), r.turn([0.2, 0.4, -0.7])));
+                let product = swing * Rotation::about(axis, twist);
+                assert!(close(product.turn([0.2, 0.4, -0.7]), r.turn([0.2, 0.4, -0.7])));
                 assert!(dot(swing.v, axis).abs() < 1e-9 && twist.abs() <= std::f64::consts::PI + 1e-12);
             }
         }
@@ -305,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn slerp_walks_the_shortest_way() {
+    fn slerp_takes_the_shortest_path() {
         let (a, b) = (Rotation::about([0.0, 1.0, 0.0], 0.2), Rotation::about([0.0, 1.0, 0.0], 1.0));
         let negative = Rotation { w: -b.w, v: scale(b.v, -1.0) };
         for to in [b, negative] {

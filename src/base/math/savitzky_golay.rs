@@ -1,19 +1,20 @@
-//! The Savitzky-Golay filter: a polynomial is fitted to the frames around each frame and read off at it. At the ends
-//! of a run the first and the last whole window's polynomials are read off (scipy's `mode="interp"`), so that nothing
-//! is shortened and nothing comes late.
+//! Savitzky-Golay filter: a polynomial is fitted to the frames around each frame and evaluated at that frame. At the
+//! ends of a run the polynomials of the first and the last complete window are evaluated (scipy's `mode="interp"`), so
+//! that the run keeps its length and has no delay.
 
 use super::vec3::{Vec3, add, scale};
 
-/// The filter for one length of window and order of polynomial.
+/// Filter for one window length and polynomial order.
 #[derive(Clone, Debug)]
 pub struct SavitzkyGolay {
     order: usize,
-    /// Row `i`: how the fit at the window's frame `i` is made of the window's values.
+    /// Row `i`: weights of the window's values in the fit at the window's frame `i`.
     fits: Vec<Vec<f64>>,
 }
 
 impl SavitzkyGolay {
-    /// A window of `2 * half + 1` frames and a polynomial of `order`; an order that the window cannot hold is lowered.
+    /// Creates a filter with a window of `2 * half + 1` frames and a polynomial of `order`, reduced to `2 * half` if
+    /// it is larger.
     pub fn new(half: usize, order: usize) -> Self {
         let window = 2 * half + 1;
         let basis = orthonormal_powers(window, order);
@@ -22,13 +23,13 @@ impl SavitzkyGolay {
         Self { order, fits }
     }
 
-    /// Frames of the window.
+    /// Number of frames of the window.
     pub fn window(&self) -> usize {
         self.fits.len()
     }
 
-    /// The smoothed run. One shorter than the window is smoothed with the longest window it holds; too short for the
-    /// polynomial to leave anything out, it stays as it is.
+    /// Smooths a run. A run that is shorter than the window is smoothed with the longest window that fits; if that
+    /// window has no more frames than the polynomial has coefficients, the run is returned unchanged.
     pub fn run(&self, values: &[Vec3]) -> Vec<Vec3> {
         let (n, window) = (values.len(), self.fits.len());
         if n < window {
@@ -46,14 +47,14 @@ impl SavitzkyGolay {
     }
 }
 
-/// Polynomials up to `order`, orthonormal over a window's frames.
+/// Polynomials up to `order`, orthonormal over the frames of a window.
 fn orthonormal_powers(window: usize, order: usize) -> Vec<Vec<f64>> {
     let half = (window as f64 - 1.0) / 2.0;
     let at = |i: usize| (i as f64 - half) / half.max(1.0);
     let mut basis: Vec<Vec<f64>> = Vec::new();
     for degree in 0..=order.min(window - 1) {
         let mut power: Vec<f64> = (0..window).map(|i| at(i).powi(degree as i32)).collect();
-        // Twice: what rounding leaves of the others goes too.
+        // Twice, to remove what rounding leaves of the other polynomials.
         for _ in 0..2 {
             for other in &basis {
                 let along: f64 = power.iter().zip(other).map(|(a, b)| a * b).sum();
@@ -79,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn scipy_says_the_same_inside_and_at_the_ends() {
+    fn results_equal_those_of_scipy_inside_and_at_the_ends() {
         let golden: serde_json::Value =
             serde_json::from_str(include_str!("../../../fixtures/reference/smoothing_golden.json")).unwrap();
         let numbers =
@@ -96,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cubic_passes_and_a_short_run_is_no_error() {
+    fn a_cubic_is_unchanged_and_short_runs_are_accepted() {
         let cubic: Vec<f64> = (0..30).map(f64::from).map(|t| 1.0 + t - 0.2 * t * t + 0.01 * t * t * t).collect();
         for n in [0, 1, 4, 5, 8, 9, 30] {
             for (found, expected) in run(4, 3, &cubic[..n]).iter().zip(&cubic) {

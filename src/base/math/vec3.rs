@@ -1,6 +1,6 @@
-//! Vectors of three f64: the handful of operations that rotations and skeletons need.
+//! Operations on vectors of three f64 for rotations and skeletons.
 
-/// x, y, z.
+/// A vector x, y, z.
 pub type Vec3 = [f64; 3];
 
 pub fn add(a: Vec3, b: Vec3) -> Vec3 {
@@ -28,18 +28,18 @@ pub fn norm(a: Vec3) -> f64 {
     dot(a, a).sqrt()
 }
 
-/// The direction of `a`; `None` where it is shorter than `least` or not a number.
+/// Direction of `a`; `None` if its length is not greater than `least` or is NaN.
 pub fn unit(a: Vec3, least: f64) -> Option<Vec3> {
     let length = norm(a);
     (length > least).then(|| scale(a, 1.0 / length))
 }
 
-/// The part of `a` at right angles to the unit vector `axis`.
+/// Component of `a` perpendicular to the unit vector `axis`.
 pub fn across(a: Vec3, axis: Vec3) -> Vec3 {
     sub(a, scale(axis, dot(a, axis)))
 }
 
-/// Some unit vector at right angles to the unit vector `a`.
+/// Returns a unit vector perpendicular to the unit vector `a`.
 pub fn any_across(a: Vec3) -> Vec3 {
     let least = (0..3).min_by(|&i, &j| a[i].abs().total_cmp(&a[j].abs())).unwrap_or(0);
     let mut pick = [0.0; 3];

@@ -1,12 +1,12 @@
-//! Bone lengths of a motion: measuring one robust set, and giving a motion exactly that set.
+//! Bone lengths of a motion: robust measurement, and scaling of a motion to given lengths.
 
 use crate::math::order::lower_median;
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::{L_HAND, N_BONES, N_JOINTS, NECK, R_HAND, parent};
 
-/// One length a bone in metres: the median over the frames where both its ends were seen (mask true), else over the
-/// frames where both are there. Bone `joint - 1` leads from the parent to `joint`. A bone that is never there, and the
-/// two hand roots (which are the wrists), measure 0.
+/// Measures one length per bone in metres: the median over the frames where both of its ends were visible (mask true),
+/// otherwise over the frames where both exist. Bone `joint - 1` is the one from the parent to `joint`. The result is 0
+/// for a bone that never exists, and for the two hand roots, which duplicate the wrists.
 pub fn measure(motion: &Motion) -> [f32; N_BONES] {
     let mut lengths = [0.0; N_BONES];
     for joint in 1..N_JOINTS {
@@ -24,9 +24,9 @@ pub fn measure(motion: &Motion) -> [f32; N_BONES] {
     lengths
 }
 
-/// Gives every bone its length: each joint is put in the direction it had from its parent, from the neck outwards, the
-/// neck at 0. A length of 0 (not measured) leaves that bone as long as it was. The hand roots become the wrists
-/// exactly. A missing joint (NaN) stays missing, and a joint whose parent is missing becomes so.
+/// Sets the length of every bone: each joint is moved along its direction from its parent, from the neck outwards,
+/// with the neck at 0. A length of 0 (not measured) leaves the bone unchanged. The hand roots become equal to the
+/// wrists. A missing joint (NaN) stays missing, and the children of a missing joint become missing.
 pub fn with_lengths(motion: &mut Motion, lengths: &[f32; N_BONES]) {
     for t in 0..motion.n_frames() {
         let before: [[f32; 3]; N_JOINTS] = std::array::from_fn(|j| at(motion, t, j));
@@ -41,20 +41,20 @@ pub fn with_lengths(motion: &mut Motion, lengths: &[f32; N_BONES]) {
             after[joint] = match lengths[joint - 1] {
                 _ if hand_root => after[parent],
                 _ if !own.is_finite() => [f32::NAN; 3],
-                wanted if wanted > 0.0 && own > 1e-9 => {
-                    let grow = wanted / own;
+                target if target > 0.0 && own > 1e-9 => {
+                    let grow = target / own;
                     std::array::from_fn(|k| after[parent][k] + (before[joint][k] - before[parent][k]) * grow)
                 }
-                // no direction to keep: hang the joint straight down
-                wanted if wanted > 0.0 => [after[parent][0], after[parent][1] + wanted, after[parent][2]],
+                // The bone has no direction: the joint hangs straight down.
+                target if target > 0.0 => [after[parent][0], after[parent][1] + target, after[parent][2]],
                 _ => std::array::from_fn(|k| after[parent][k] + before[joint][k] - before[parent][k]),
             };
         }
         for (joint, position) in after.iter().enumerate() {
-            let there = position.iter().all(|v| v.is_finite());
-            motion.mask[[t, joint]] &= there;
+            let exists = position.iter().all(|v| v.is_finite());
+            motion.mask[[t, joint]] &= exists;
             for (k, &v) in position.iter().enumerate() {
-                motion.joints[[t, joint, k]] = if there { v } else { f32::NAN };
+                motion.joints[[t, joint, k]] = if exists { v } else { f32::NAN };
             }
         }
     }
@@ -75,7 +75,7 @@ mod tests {
     use crate::types::time::FrameRate;
     use ndarray::{Array2, Array3, s};
 
-    /// Five frames; joint j lies at its parent + (0.01 j, 0.02, 0), frame 4 has everything twice as long.
+    /// Five frames; joint j lies at its parent + (0.01 j, 0.02, 0), and all bones of frame 4 are twice as long.
     fn motion() -> Motion {
         let mut joints = Array3::zeros((5, N_JOINTS, 3));
         for t in 0..5 {
@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn the_median_ignores_an_outlier_and_unseen_frames() {
+    fn the_median_ignores_outliers_and_hidden_frames() {
         let mut m = motion();
         let lengths = measure(&m);
         let expected = (0.03f32.powi(2) + 0.02f32.powi(2)).sqrt();
@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn lengths_become_exact_directions_stay_and_nan_stays() {
+    fn lengths_become_exact_and_directions_and_nan_stay() {
         let mut m = motion();
         m.joints.slice_mut(s![2, R_ELBOW, ..]).fill(f32::NAN);
         let before = m.clone();
@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unmeasured_bone_keeps_its_length_and_an_empty_motion_is_fine() {
+    fn an_unmeasured_bone_and_an_empty_motion_are_unchanged() {
         let mut m = motion();
         let before = m.clone();
         with_lengths(&mut m, &[0.0; N_BONES]);

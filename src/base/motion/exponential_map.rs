@@ -1,11 +1,11 @@
-//! Tracks of exponential maps (axis times angle) without the jumps from one side of half a turn to the other.
+//! Tracks of exponential maps (axis times angle) without jumps between the two representations of a rotation.
 
 use crate::math::vec3::{Vec3, norm, scale, sub};
 use std::f64::consts::TAU;
 
-/// Takes a track's jumps out: of the two vectors of a rotation each frame gets the one nearer to the frame before.
-/// FineMotion (Korzun et al. 2020) compares the angles of vectors alone, which finds no jump between vectors of up to half
-/// a turn; this compares the vectors.
+/// Removes the jumps of a track: each frame gets the one of the two vectors of its rotation that is closer to the
+/// frame before. FineMotion (Korzun et al. 2020) compares only the angles of the vectors, which detects no jump
+/// between vectors of up to half a turn; this function compares the vectors.
 pub fn make_continuous(track: &mut [Vec3]) {
     for t in 1..track.len() {
         let (before, now) = (track[t - 1], track[t]);
@@ -13,7 +13,7 @@ pub fn make_continuous(track: &mut [Vec3]) {
         if angle == 0.0 {
             continue;
         }
-        // whole turns that bring the vector nearest to the one before
+        // The number of full turns that brings the vector closest to the one before.
         let along = (0..3).map(|k| before[k] * now[k]).sum::<f64>() / angle;
         let turns = ((along - angle) / TAU).round();
         let other = scale(now, (angle + turns * TAU) / angle);
@@ -43,7 +43,7 @@ mod tests {
     }
 
     #[test]
-    fn a_track_without_jumps_stays() {
+    fn a_continuous_track_is_unchanged() {
         let mut track: Vec<Vec3> = (0..50).map(|t| [0.02 * f64::from(t), 0.3, -0.1]).collect();
         let before = track.clone();
         make_continuous(&mut track);

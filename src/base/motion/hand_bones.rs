@@ -1,13 +1,13 @@
-//! A mean human hand: lengths of its bones, how the palm fans out, and the hand made of them at given joint angles. The angles that
-//! hands take are defined in `train::scene::hand_shape`.
+//! A mean human hand: bone lengths, the spread of the fingers in the palm, and the hand at given joint angles. The
+//! joint angles of plausible hands are defined in `train::scene::hand_shape`.
 
 use super::view::hand::HandJoints;
 use crate::math::vec3::{self, Vec3};
 use crate::types::pose2d::N_HAND;
 
 /// Bones of the thumb, index, middle, ring and little finger in mm: from the wrist to the first joint, then the
-/// phalanges (thumb: metacarpal, two phalanges). Phalanges and metacarpals: Buryanov & Kotiuk 2010, table 2 (mean of
-/// 66 adults), the last with 4 mm of fingertip; the wrist adds 22 mm to the metacarpals.
+/// phalanges (thumb: metacarpal, two phalanges). Source of phalanges and metacarpals: Buryanov & Kotiuk 2010, table 2
+/// (mean of 66 adults); the last phalanx includes 4 mm of fingertip, and the wrist adds 22 mm to the metacarpals.
 pub const BONES: [[f64; 4]; 5] = [
     [34.0, 46.2, 31.6, 25.7],
     [90.1, 39.8, 22.4, 19.8],
@@ -15,21 +15,21 @@ pub const BONES: [[f64; 4]; 5] = [
     [80.0, 41.4, 25.7, 21.3],
     [75.7, 32.7, 18.1, 20.0],
 ];
-/// Angle of the first joints within the palm, degrees from the middle finger towards the thumb.
+/// Angle of the first joints within the palm, in degrees from the middle finger towards the thumb.
 pub const FAN: [f64; 5] = [52.0, 15.0, 2.0, -11.0, -25.0];
-/// The middle finger's first phalanx of a hand that errors are measured on, metres.
+/// First phalanx of the middle finger of the hand on which errors are measured, metres.
 pub const PHALANX: f64 = 0.048;
-/// Metres of such a hand for a millimetre of `BONES`.
+/// Metres per millimetre of `BONES` that scale the mean hand to `PHALANX`.
 pub const METRES: f64 = PHALANX / BONES[2][1];
 
-/// A direction in a right hand that stands upright (fingers along -y, thumb towards +x, the palm facing -z): `aside`
-/// radians from the fingers' towards the thumb, then raised by `flexion` towards where the palm faces.
+/// Returns a direction in an upright right hand (fingers along -y, thumb towards +x, palm facing -z): `aside` radians
+/// from the fingers' direction towards the thumb, then raised by `flexion` radians towards the palm side.
 pub fn direction(aside: f64, flexion: f64) -> Vec3 {
     [aside.sin() * flexion.cos(), -aside.cos() * flexion.cos(), -flexion.sin()]
 }
 
-/// Puts the joints of a finger on an upright right hand: the first at `root`, the others along phalanges of `lengths` 1 to
-/// 3, each bent by so many radians more than the one before.
+/// Places the joints of a finger on an upright right hand: the first at `root`, the others along the phalanges
+/// `lengths[1..]`, each bent by its angle in `bends` (radians) relative to the one before.
 pub fn put_finger(hand: &mut HandJoints, finger: usize, root: Vec3, aside: f64, bends: [f64; 3], lengths: [f64; 4]) {
     let first = 1 + 4 * finger;
     hand[first] = root;
@@ -41,8 +41,9 @@ pub fn put_finger(hand: &mut HandJoints, finger: usize, root: Vec3, aside: f64, 
     }
 }
 
-/// The upright right hand of mean bones at rest, metres, wrist at 0, its size that of measured hands: fingers bent a
-/// little (20, 30 and 18 degrees), the thumb beside and somewhat before the palm.
+/// Returns the upright right hand of mean bones in a relaxed pose, in metres, with the wrist at 0 and the first
+/// phalanx of the middle finger of length `PHALANX`: the fingers are slightly bent (20, 30 and 18 degrees), the thumb
+/// is beside and slightly in front of the palm.
 pub fn relaxed() -> HandJoints {
     let mut hand: HandJoints = [[0.0; 3]; N_HAND];
     for finger in 0..5 {
@@ -62,7 +63,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_hand_at_rest_has_the_measured_size() {
+    fn the_relaxed_hand_has_the_reference_size() {
         let hand = relaxed();
         assert!((vec3::norm(vec3::sub(hand[10], hand[9])) - PHALANX).abs() < 1e-12);
         assert!(hand[5][0] > hand[17][0] && hand[4][0] > hand[5][0] && hand[12][2] < 0.0);

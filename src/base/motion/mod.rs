@@ -1,4 +1,5 @@
-//! Motion as numbers: forward kinematics, rotations, Procrustes, smoothing, bone lengths; readers and writers of motion files. Pure but for those files.
+//! Body motion: bone lengths, forward kinematics, head and trunk angles, resampling, unit checks, and the lifters'
+//! inputs.
 
 pub mod bones;
 pub mod exponential_map;

@@ -1,7 +1,7 @@
-//! Posture of trunk and head from what a camera saw: the head from the face, the trunk's yaw from the lifted shoulders,
-//! its lean and roll from the line of hips and neck. The clip's median upright is the level, since keypoints do not show
-//! how the camera was held. Without lifted hips the roll is that of the picture, without any hips a share of the
-//! shoulders' tilt, and the lean is not known.
+//! Posture of trunk and head from keypoints: the head from the face, the trunk's yaw from the lifted shoulders, its
+//! lean and roll from the line between hips and neck. The clip's median upright direction is taken as vertical,
+//! because keypoints do not reveal the camera's tilt. Without lifted hips the roll is measured in the picture, without
+//! any hips it is a fraction of the shoulders' tilt, and the lean is unknown.
 
 use super::face;
 use crate::math::order::{median, upper_median};
@@ -12,30 +12,30 @@ use crate::types::posture::Posture;
 use crate::types::skeleton::{L_SHOULDER, R_SHOULDER};
 use ndarray::{ArrayView2, ArrayView3};
 
-/// What the lifter knows of the same frames.
+/// Lifted joints of the same frames.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LiftedBody<'a> {
-    /// Joints [T, 49, 3] about the neck, metres: x image right, y down, z away.
+    /// Joints [T, 49, 3] relative to the neck, metres: x image right, y down, z away.
     pub joints: Option<ArrayView3<'a, f32>>,
     /// Nose, right hip, left hip [T, 3, 3] in the same axes.
     pub extra: Option<ArrayView3<'a, f32>>,
 }
 
-/// Shortest line with a direction, metres or px.
-const LEAST: f64 = 1e-5;
-/// Share of the tilt of the shoulders that is the trunk's roll (rendered people: 0.3 to 0.7, correlation 0.9).
+/// Minimum length of a line with a defined direction, metres or px.
+const MIN_LENGTH: f64 = 1e-5;
+/// Trunk roll as a fraction of the shoulders' tilt (rendered persons: 0.3 to 0.7, correlation 0.9).
 const ROLL_OF_TILT: f64 = 0.5;
-/// Share of the frames in which hips must be seen to be used.
+/// Minimum fraction of the frames in which the hips are visible for them to be used.
 const HIPS_SHARE: f64 = 0.5;
 /// COCO-17 indices of left and right knee.
 const KNEES: [usize; 2] = [13, 14];
-/// Frames with hip and knee that tell how a person sits, as a share.
+/// Minimum fraction of the frames with hip and knee for `is_seated`.
 const KNEES_SHARE: f64 = 0.2;
-/// Height from hip to knee over that from shoulder to hip, in the picture: 0.8 standing, -0.2 to 0.3 seated; knees that a
-/// picture cuts off are guessed beneath it, at 0.5.
+/// Maximum ratio of the height from hip to knee to that from shoulder to hip of a seated person, in the picture: 0.8
+/// standing, -0.2 to 0.3 seated; pose models guess knees below the picture's edge at 0.5.
 const SEATED_BELOW: f64 = 0.4;
 
-/// Posture over the frames of the keypoints [T, 17, 3] (COCO; x px, y px, score).
+/// Estimates the posture for the frames of the keypoints [T, 17, 3] (COCO; x px, y px, score).
 pub fn estimate(body: ArrayView3<f32>, lifted: LiftedBody) -> Posture {
     let n_frames = body.shape()[0];
     let mut posture = Posture::unseen(n_frames);
@@ -45,16 +45,16 @@ pub fn estimate(body: ArrayView3<f32>, lifted: LiftedBody) -> Posture {
     }
     let of = |all: Option<ArrayView3<f32>>, t: usize, row: usize| -> Option<Vec3> {
         let frame = all.filter(|all| t < all.shape()[0])?;
-        let place = [0, 1, 2].map(|k| f64::from(frame[[t, row, k]]) * if k == 0 { 1.0 } else { -1.0 });
-        place.iter().all(|v| v.is_finite()).then_some(place)
+        let position = [0, 1, 2].map(|k| f64::from(frame[[t, row, k]]) * if k == 0 { 1.0 } else { -1.0 });
+        position.iter().all(|v| v.is_finite()).then_some(position)
     };
     let up = |t: usize| {
         let [right, left] = [1, 2].map(|hip| of(lifted.extra, t, hip));
-        unit(scale(add(right?, left?), -0.5), LEAST)
+        unit(scale(add(right?, left?), -0.5), MIN_LENGTH)
     };
     let shoulders = |t: usize| Some(sub(of(lifted.joints, t, L_SHOULDER)?, of(lifted.joints, t, R_SHOULDER)?));
     let ups: Vec<Option<Vec3>> = (0..n_frames).map(up).collect();
-    let upright = median_direction(&ups).filter(|_| is_often(&ups));
+    let upright = median_direction(&ups).filter(|_| is_mostly_visible(&ups));
     let level = upright.map_or(Rotation::IDENTITY, |upright| Rotation::between(upright, [0.0, 1.0, 0.0]));
     let rolls = if upright.is_some() { Vec::new() } else { picture_rolls(body) };
     for (t, &up) in ups.iter().enumerate() {
@@ -70,7 +70,7 @@ pub fn estimate(body: ArrayView3<f32>, lifted: LiftedBody) -> Posture {
     posture
 }
 
-/// Rows of an array [T, 3] for `n_frames`, `None` where an angle is missing or the array has ended.
+/// Returns the rows of an array [T, 3] for `n_frames`; `None` where an angle is missing or after the end of the array.
 pub fn angles_of(rows: ArrayView2<f32>, n_frames: usize) -> Vec<Option<Vec3>> {
     let row = |t: usize| {
         let row = (t < rows.shape()[0]).then(|| [0, 1, 2].map(|k| f64::from(rows[[t, k]])))?;
@@ -79,8 +79,8 @@ pub fn angles_of(rows: ArrayView2<f32>, n_frames: usize) -> Vec<Option<Vec3>> {
     (0..n_frames).map(row).collect()
 }
 
-/// Whether the person of the keypoints [T, 17, 3] sits: whether thighs hang much less than a standing one's, by the
-/// median; `None` where hips and knees are seen in less than a fifth of the frames.
+/// Returns whether the person of the keypoints [T, 17, 3] is seated, from the median height of the thighs relative to
+/// the trunk; `None` if hips and knees are visible in less than a fifth of the frames.
 pub fn is_seated(body: ArrayView3<f32>) -> Option<bool> {
     let drops: Vec<Option<f64>> = body
         .outer_iter()
@@ -99,8 +99,8 @@ pub fn is_seated(body: ArrayView3<f32>) -> Option<bool> {
     Some(median(drops.into_iter().flatten())? < SEATED_BELOW)
 }
 
-/// Rolls towards the right shoulder about the clip's median, radians, by the line of hips and neck in the picture, else
-/// by the shoulders.
+/// Returns rolls towards the right shoulder relative to the clip's median, radians, from the line between hips and
+/// neck in the picture, or from the shoulders if the hips are rarely visible.
 fn picture_rolls(body: ArrayView3<f32>) -> Vec<Option<f64>> {
     let trunk = |frame: ArrayView2<f32>| {
         let neck = middle(&frame, [coco::L_SHOULDER, coco::R_SHOULDER])?;
@@ -120,7 +120,7 @@ fn picture_rolls(body: ArrayView3<f32>) -> Vec<Option<f64>> {
     rolls.into_iter().map(|roll| Some(roll? - level)).collect()
 }
 
-/// Middle of two seen points, px.
+/// Midpoint of two visible points, px.
 fn middle(frame: &ArrayView2<f32>, points: [usize; 2]) -> Option<[f64; 2]> {
     let [a, b] = points.map(|point| seen(frame, point));
     let (a, b) = (a?, b?);
@@ -132,12 +132,12 @@ fn seen(frame: &ArrayView2<f32>, point: usize) -> Option<[f64; 2]> {
     (x.is_finite() && y.is_finite() && score >= SEEN_SCORE).then_some([f64::from(x), f64::from(y)])
 }
 
-fn is_often(directions: &[Option<Vec3>]) -> bool {
+fn is_mostly_visible(directions: &[Option<Vec3>]) -> bool {
     let n_seen = directions.iter().flatten().count();
     n_seen > 0 && n_seen as f64 >= HIPS_SHARE * directions.len() as f64
 }
 
 fn median_direction(directions: &[Option<Vec3>]) -> Option<Vec3> {
     let along = |k: usize| upper_median(directions.iter().flatten().map(|direction| direction[k]));
-    unit([along(0)?, along(1)?, along(2)?], LEAST)
+    unit([along(0)?, along(1)?, along(2)?], MIN_LENGTH)
 }

@@ -1,22 +1,23 @@
-//! Motion at another rate. Going down, what the new rate cannot hold is filtered away first (a Kaiser-windowed sinc
-//! of linear phase), so that nothing folds back; going up, the same sinc interpolates. Frame n of the result stands at
-//! exactly n / fps seconds after the source's first frame. At the source's own rate nothing changes.
+//! Resampling of motion to another frame rate. Downsampling first applies a low-pass filter (a Kaiser-windowed sinc of
+//! linear phase) against aliasing; upsampling interpolates with the same sinc. Frame n of the result is at exactly n /
+//! fps seconds after the source's first frame. At the source's own rate the motion is returned unchanged.
 
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::N_JOINTS;
 use crate::types::time::FrameRate;
 use ndarray::{Array2, Array3};
 
-/// Half of the kernel, in periods of the slower rate.
+/// Half width of the kernel, in periods of the slower rate.
 const HALF_WIDTH: f64 = 8.0;
-/// Kaiser's shape: side lobes of -60 dB.
+/// Shape parameter of the Kaiser window: side lobes of -60 dB.
 const BETA: f64 = 6.0;
-/// Frequency at which the filter is down to one half, as a share of half the slower rate: with this width all that would fold back
-/// is below -60 dB from half the rate on, and what lies below 0.62 of it (4.6 Hz at 15 frames a second) is untouched.
+/// Frequency of half amplitude, as a fraction of half the slower rate: with this kernel width, everything from half
+/// the rate on, which would alias, is below -60 dB, and frequencies below 0.62 of it (4.6 Hz at 15 frames per second)
+/// are unchanged.
 const CUTOFF: f64 = 0.81;
 
-/// The motion at `fps`; a joint is missing where the source's is missing at that moment, and not seen where a
-/// neighbouring frame of the source did not see it.
+/// Resamples the motion to `fps`. A joint is missing where the source's joint is missing at that time, and masked if
+/// it is masked in a neighbouring frame of the source.
 pub fn at_rate(motion: &Motion, fps: FrameRate) -> Motion {
     let from = motion.fps;
     if u64::from(from.num) * u64::from(fps.den) == u64::from(fps.num) * u64::from(from.den) {
@@ -27,7 +28,7 @@ pub fn at_rate(motion: &Motion, fps: FrameRate) -> Motion {
     let n_frames = if n_source == 0 { 0 } else { (last_secs * fps.per_sec() + 1e-6).floor() as usize + 1 };
     let mut joints = Array3::from_elem((n_frames, N_JOINTS, 3), f32::NAN);
     let mut mask = Array2::from_elem((n_frames, N_JOINTS), false);
-    // the kernel of each frame of the result: the same for all joints
+    // One kernel per frame of the result, shared by all joints.
     let kernels: Vec<ResamplingKernel> =
         (0..n_frames).map(|n| ResamplingKernel::at(fps.secs(n) * from.per_sec(), from, fps)).collect();
     for joint in 0..N_JOINTS {
@@ -36,7 +37,7 @@ pub fn at_rate(motion: &Motion, fps: FrameRate) -> Motion {
             let tracks: [Vec<f64>; 3] =
                 std::array::from_fn(|k| (start..end).map(|t| f64::from(motion.joints[[t, joint, k]])).collect());
             for (n, kernel) in kernels.iter().enumerate() {
-                let (below, above) = (kernel.place.floor() as usize, kernel.place.ceil() as usize);
+                let (below, above) = (kernel.time.floor() as usize, kernel.time.ceil() as usize);
                 if below < start || above >= end {
                     continue;
                 }
@@ -50,57 +51,58 @@ pub fn at_rate(motion: &Motion, fps: FrameRate) -> Motion {
     Motion { fps, joints, mask }
 }
 
-/// Stretches of frames in which a joint is there.
+/// Returns the ranges of frames in which a joint exists.
 fn runs(motion: &Motion, joint: usize) -> Vec<(usize, usize)> {
-    let there = |t: usize| (0..3).all(|k| motion.joints[[t, joint, k]].is_finite());
-    let there: Vec<bool> = (0..motion.n_frames()).map(there).collect();
+    let exists = |t: usize| (0..3).all(|k| motion.joints[[t, joint, k]].is_finite());
+    let exists: Vec<bool> = (0..motion.n_frames()).map(exists).collect();
     let mut end = 0;
-    let runs = there.chunk_by(|a, b| a == b).map(|run| {
+    let runs = exists.chunk_by(|a, b| a == b).map(|run| {
         let start = end;
         end += run.len();
         (run[0], start, end)
     });
-    runs.filter(|(there, ..)| *there).map(|(_, start, end)| (start, end)).collect()
+    runs.filter(|(exists, ..)| *exists).map(|(_, start, end)| (start, end)).collect()
 }
 
-/// Weights of the source's frames around one moment.
+/// Weights of the source frames around one point in time.
 struct ResamplingKernel {
-    /// The moment, in frames of the source.
-    place: f64,
+    /// Point in time, in frames of the source.
+    time: f64,
     first: i64,
     weights: Vec<f64>,
 }
 
 impl ResamplingKernel {
-    fn at(place: f64, from: FrameRate, to: FrameRate) -> Self {
-        // moments that meet a frame of the source do so exactly
-        let place = if (place - place.round()).abs() < 1e-6 { place.round() } else { place };
+    fn at(time: f64, from: FrameRate, to: FrameRate) -> Self {
+        // Times that coincide with a frame of the source are exact.
+        let time = if (time - time.round()).abs() < 1e-6 { time.round() } else { time };
         let slower = (to.per_sec() / from.per_sec()).min(1.0);
         let cutoff = if slower < 1.0 { CUTOFF * slower } else { 1.0 };
         let half = HALF_WIDTH / slower;
-        let (first, last) = ((place - half).ceil() as i64, (place + half).floor() as i64);
+        let (first, last) = ((time - half).ceil() as i64, (time + half).floor() as i64);
         let weight = |frame: i64| {
-            let d = frame as f64 - place;
+            let d = frame as f64 - time;
             let x = std::f64::consts::PI * cutoff * d;
             let sinc = if x.abs() < 1e-9 { 1.0 } else { x.sin() / x };
             sinc * bessel_0(BETA * (1.0 - (d / half).powi(2)).max(0.0).sqrt())
         };
         let mut weights: Vec<f64> = (first..=last).map(weight).collect();
-        // a little slope, so that steady motion comes through exactly wherever the moment lies between two frames
+        // A linear correction of the weights, so that linear motion is reproduced exactly at any time between two
+        // frames.
         let moment = |weights: &[f64], power: i32| -> f64 {
-            weights.iter().zip(first..).map(|(w, frame)| w * (frame as f64 - place).powi(power)).sum()
+            weights.iter().zip(first..).map(|(w, frame)| w * (frame as f64 - time).powi(power)).sum()
         };
         let (m0, m1, m2) = (moment(&weights, 0), moment(&weights, 1), moment(&weights, 2));
         let determinant = m0 * m2 - m1 * m1;
         for (w, frame) in weights.iter_mut().zip(first..) {
-            let d = frame as f64 - place;
+            let d = frame as f64 - time;
             *w *= if determinant.abs() > 1e-9 * m0 * m0 { (m2 - m1 * d) / determinant } else { 1.0 / m0 };
         }
-        Self { place, first, weights }
+        Self { time, first, weights }
     }
 
-    /// The filtered value of a track whose first number is frame `start`. Beyond its ends it goes on as its own point
-    /// reflection, which stays true to a steady motion.
+    /// Filters a track whose first value is frame `start`. Beyond its ends the track is continued by point reflection,
+    /// which reproduces linear motion.
     fn apply(&self, track: &[f64], start: usize) -> f64 {
         let last = track.len() as i64 - 1;
         let value = |frame: i64| {
@@ -116,7 +118,7 @@ impl ResamplingKernel {
     }
 }
 
-/// The modified Bessel function of order 0, by its series.
+/// Modified Bessel function of the first kind of order 0, by its series.
 fn bessel_0(x: f64) -> f64 {
     let (mut sum, mut term, mut k) = (1.0, 1.0, 1.0);
     while term > 1e-12 * sum {
@@ -132,7 +134,7 @@ mod tests {
     use super::*;
     use std::f64::consts::TAU;
 
-    /// Joint 1 swings along x with `hz` for `secs` seconds.
+    /// Joint 1 oscillates along x at `hz` for `secs` seconds.
     fn swing(fps: FrameRate, secs: f64, hz: f64) -> Motion {
         let n = (secs * fps.per_sec()).round() as usize;
         let joints = Array3::from_shape_fn((n, N_JOINTS, 3), |(t, j, k)| {
@@ -141,7 +143,7 @@ mod tests {
         Motion::from_joints(fps, joints)
     }
 
-    /// The largest value in the middle of the take, and the largest difference from the swing itself.
+    /// Maximum amplitude in the middle of the resampled motion, and maximum deviation from the original oscillation.
     fn measured(from: (u32, u32), to: u32, hz: f64) -> (f64, f64) {
         let motion = at_rate(&swing(FrameRate::new(from.0, from.1), 8.0, hz), FrameRate::new(to, 1));
         let middle = motion.n_frames() / 4..motion.n_frames() * 3 / 4;
@@ -152,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn slow_motion_is_kept_at_its_exact_time_and_fast_motion_does_not_fold_back() {
+    fn slow_motion_is_exact_and_fast_motion_does_not_alias() {
         for from in [(20, 1), (30, 1), (60, 1), (120, 1), (30_000, 1001)] {
             for hz in [0.5, 2.0, 4.0] {
                 let (_, off) = measured(from, 15, hz);
@@ -170,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn steady_motion_stays_itself_up_to_its_ends_and_the_length_is_that_of_the_source() {
+    fn linear_motion_is_exact_up_to_its_ends_and_keeps_its_duration() {
         for (from, n, to, expected) in
             [(60, 241, 15, 61), (30, 60, 15, 30), (20, 40, 15, 30), (15, 33, 15, 33), (30, 1, 15, 1)]
         {
@@ -187,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_stays_a_gap_and_spoils_nothing_else() {
+    fn a_gap_stays_a_gap_and_affects_nothing_else() {
         let mut motion = swing(FrameRate::new(60, 1), 4.0, 1.0);
         motion.joints.slice_mut(ndarray::s![100..140, 2, ..]).fill(f32::NAN);
         motion.mask.slice_mut(ndarray::s![100..140, 2]).fill(false);

@@ -1,4 +1,5 @@
-//! The unit and the upright of joints, told by the arms: a person's upper arm and forearm are 0.1 to 0.6 m long.
+//! Detection of the unit and the vertical direction of joints from the arms: upper arm and forearm of a person are 0.1
+//! to 0.6 m long.
 
 use crate::math::order;
 use crate::types::pose3d::Motion;
@@ -6,7 +7,7 @@ use crate::types::skeleton::{ARM_BONES, L_ELBOW, L_WRIST, NECK, R_ELBOW, R_WRIST
 use anyhow::{Result, bail};
 use std::ops::RangeInclusive;
 
-/// Units other than the metre that joints come in, with what turns them into metres.
+/// Common units other than the metre, with their factors to metres.
 const UNITS: [(&str, f32); 8] = [
     ("feet", 0.3048),
     ("decimetres", 0.1),
@@ -17,15 +18,17 @@ const UNITS: [(&str, f32); 8] = [
     ("metres divided by 100", 100.0),
     ("metres divided by 1000", 1000.0),
 ];
-/// Median length of a person's arm bones, metres: of an adult, of people, and what is let pass for small and large figures.
+/// Median length of a person's arm bones in metres: typical adult, plausible range, and the wider range that is
+/// accepted for small and large characters.
 const ADULT: f32 = 0.27;
-const PERSON: RangeInclusive<f32> = 0.1..=0.6;
-const LET_PASS: RangeInclusive<f32> = 0.05..=0.8;
-/// Share of the frames in which arms lie above the neck, from which on y is taken to point up, and the fewest frames.
+const PLAUSIBLE: RangeInclusive<f32> = 0.1..=0.6;
+const ACCEPTED: RangeInclusive<f32> = 0.05..=0.8;
+/// Fraction of the frames with the arms above the neck from which y is assumed to point up, and the minimum number of
+/// frames.
 const UPSIDE_DOWN: f64 = 0.98;
-const FEWEST_FRAMES: usize = 15;
+const MIN_FRAMES: usize = 15;
 
-/// Median length of upper arms and forearms; `None` where no arm is there in any frame.
+/// Returns the median length of upper arms and forearms; `None` if no frame has an arm.
 pub fn arm_bone(motion: &Motion) -> Option<f32> {
     let joints = &motion.joints;
     let length = |t: usize, (a, b): (usize, usize)| {
@@ -34,23 +37,25 @@ pub fn arm_bone(motion: &Motion) -> Option<f32> {
     order::median((0..motion.n_frames()).flat_map(|t| ARM_BONES.map(|bone| length(t, bone))).collect::<Vec<_>>())
 }
 
-/// Checks that the joints are in metres; motion without arms passes. The error says which unit it seems to be, and how to
-/// convert it.
+/// Checks that the joints are in metres; motion without arms passes.
+///
+/// # Errors
+/// The arm bones are too short or too long; the message names the most likely unit and how to convert it.
 pub fn check(motion: &Motion) -> Result<()> {
-    let Some(length) = arm_bone(motion).filter(|length| !LET_PASS.contains(length)) else { return Ok(()) };
+    let Some(length) = arm_bone(motion).filter(|length| !ACCEPTED.contains(length)) else { return Ok(()) };
     let unlikely = |metres: f32| (length * metres / ADULT).ln().abs();
-    let fitting = UNITS.into_iter().filter(|(_, metres)| PERSON.contains(&(length * metres)));
-    let wanted =
+    let fitting = UNITS.into_iter().filter(|(_, metres)| PLAUSIBLE.contains(&(length * metres)));
+    let needed =
         "joints must be in metres about the neck (x image right, y down, z away), where a person's are 0.1 to 0.6";
     match fitting.min_by(|a, b| unlikely(a.1).total_cmp(&unlikely(b.1))) {
         Some((unit, metres)) => bail!(
-            "its arm bones are {length:.3} long; {wanted}: it seems to be in {unit}; multiply every coordinate by {metres}"
+            "its arm bones are {length:.3} long; {needed}: it seems to be in {unit}; multiply every coordinate by {metres}"
         ),
-        None => bail!("its arm bones are {length:.3} long, a person's in no known unit; {wanted}"),
+        None => bail!("its arm bones are {length:.3} long, a person's in no known unit; {needed}"),
     }
 }
 
-/// Whether y certainly points up: elbows and wrists lie above the neck in nearly every frame.
+/// Returns whether y points up: elbows and wrists are above the neck in nearly every frame.
 pub fn is_upside_down(motion: &Motion) -> bool {
     let joints = &motion.joints;
     let mut n = [0usize; 2];
@@ -60,7 +65,7 @@ pub fn is_upside_down(motion: &Motion) -> bool {
             n = [n[0] + 1, n[1] + usize::from(below.iter().all(|y| *y < 0.0))];
         }
     }
-    n[0] >= FEWEST_FRAMES && n[1] as f64 >= UPSIDE_DOWN * n[0] as f64
+    n[0] >= MIN_FRAMES && n[1] as f64 >= UPSIDE_DOWN * n[0] as f64
 }
 
 #[cfg(test)]
@@ -70,7 +75,7 @@ mod tests {
     use crate::types::time::FrameRate;
     use ndarray::Array3;
 
-    /// Arms that hang down, upper arm 0.29, forearm 0.25.
+    /// Arms hanging down, upper arm 0.29, forearm 0.25.
     fn standing(n_frames: usize) -> Motion {
         let mut joints = Array3::zeros((n_frames, N_JOINTS, 3));
         for (side, [shoulder, elbow, wrist]) in
@@ -85,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_unit_is_named_with_what_to_do() {
+    fn a_wrong_unit_is_named_with_its_factor() {
         let motion = standing(20);
         let times = |by: f32| Motion { joints: &motion.joints * by, ..motion.clone() };
         for by in [0.5, 1.0, 1.6] {
@@ -101,8 +106,8 @@ mod tests {
             (0.001, "metres divided by 1000", "1000"),
         ] {
             let text = check(&times(by)).unwrap_err().to_string();
-            let says = format!("seems to be in {unit}; multiply every coordinate by {metres}");
-            assert!(text.ends_with(&says), "{by}: {text}");
+            let advice = format!("seems to be in {unit}; multiply every coordinate by {metres}");
+            assert!(text.ends_with(&advice), "{by}: {text}");
         }
         assert!(check(&times(1e6)).unwrap_err().to_string().contains("no known unit"));
         check(&Motion { joints: &motion.joints * f32::NAN, ..motion }).unwrap();

@@ -1,4 +1,4 @@
-//! The nine points of the upper body that the body lifter sees, and the size they are given.
+//! The nine keypoints of the upper body that the body lifter uses, and their normalisation in size.
 
 use crate::math::order::upper_median;
 use crate::math::vec3::{self, Vec3};
@@ -6,13 +6,13 @@ use crate::types::pose2d::coco;
 use crate::types::skeleton::BODY_BONES;
 pub use crate::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST, R_ELBOW, R_SHOULDER, R_WRIST};
 
-/// Nose, right shoulder, elbow, wrist, left the same, right hip, left hip.
+/// Number of keypoints: nose; right shoulder, elbow, wrist; left shoulder, elbow, wrist; right hip, left hip.
 pub const N_POINTS: usize = 9;
 pub const NOSE: usize = 0;
 pub const R_HIP: usize = 7;
 pub const L_HIP: usize = 8;
 
-/// COCO index of each point.
+/// COCO index of each keypoint.
 pub const COCO: [usize; N_POINTS] = [
     coco::NOSE,
     coco::R_SHOULDER,
@@ -25,28 +25,29 @@ pub const COCO: [usize; N_POINTS] = [
     coco::L_HIP,
 ];
 
-/// The points of the arms, which have the numbers of the skeleton's joints.
+/// Keypoints of the arms, whose indices equal those of the skeleton's joints.
 pub const ARMS: std::ops::RangeInclusive<usize> = R_SHOULDER..=L_WRIST;
 
-/// Index of the point on the other side.
+/// Index of each keypoint's counterpart on the other side.
 pub const MIRROR: [usize; N_POINTS] = [NOSE, L_SHOULDER, L_ELBOW, L_WRIST, R_SHOULDER, R_ELBOW, R_WRIST, L_HIP, R_HIP];
 
-/// Nine points in camera axes (x right, y down, z away) relative to the neck, the middle of the shoulders.
+/// Nine keypoints in camera axes (x right, y down, z away), relative to the neck, the midpoint of the shoulders.
 pub type Pose = [Vec3; N_POINTS];
 
-/// Nine points of a picture, x and y in px; `None`: not seen.
+/// Nine keypoints of a picture, x and y in px; `None`: not visible.
 pub type SeenBody = [Option<[f32; 2]>; N_POINTS];
 
-/// Every body is given this size (`size`) in metres: a picture does not tell how large a person is.
+/// Size in metres, in the sense of `size`, to which every body is scaled, because a picture does not show a person's
+/// size.
 pub const REFERENCE_SIZE: f64 = 0.90;
 
-/// Width of the shoulders, a mean upper arm and a mean forearm together.
+/// Sum of the shoulder width, the mean upper arm length and the mean forearm length.
 pub fn size(pose: &Pose) -> f64 {
     let bone = |(a, b): (usize, usize)| vec3::norm(vec3::sub(pose[a], pose[b]));
     bone(BODY_BONES[0]) + (bone(BODY_BONES[1]) + bone(BODY_BONES[2]) + bone(BODY_BONES[3]) + bone(BODY_BONES[4])) / 2.0
 }
 
-/// Metres a unit of `poses`, such that their median size is `REFERENCE_SIZE`; 1 when there is nothing to measure.
+/// Metres per unit of `poses` that scale their median size to `REFERENCE_SIZE`; 1 if there is nothing to measure.
 pub fn metres_per_unit(poses: &[Pose]) -> f64 {
     upper_median(poses.iter().map(size).filter(|s| *s > 0.0)).map_or(1.0, |s| REFERENCE_SIZE / s)
 }

@@ -1,4 +1,4 @@
-//! The names of the five stages and of every file that they write. No other file of the crate spells them.
+//! Names of the five stages and of every file that they write. No other file of the crate contains these names.
 
 use super::Unit;
 use anyhow::bail;
@@ -7,15 +7,15 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// A stage of the pipeline, in the order in which they run.
+/// Stages of the pipeline, in the order in which they run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum StageName {
-    /// Videos to sound, frame times and shot scores.
+    /// Videos to audio, frame times and shot scores.
     Extract,
     /// Frames to 2D keypoints of one speaker.
     Pose2d,
-    /// Keypoints to intervals worth keeping.
+    /// Keypoints to usable intervals.
     Segment,
     /// 2D keypoints to 3D joints.
     Lift,
@@ -24,12 +24,12 @@ pub enum StageName {
 }
 
 impl StageName {
-    /// Every stage, in order.
+    /// All stages, in order.
     pub const ALL: [Self; 5] = [Self::Extract, Self::Pose2d, Self::Segment, Self::Lift, Self::Dataset];
-    /// The stages that work video by video, in order.
+    /// Stages that process one video at a time, in order.
     pub const OF_VIDEOS: [Self; 4] = [Self::Extract, Self::Pose2d, Self::Segment, Self::Lift];
 
-    /// The name: an argument of `--from`, the stage's folder in the work folder.
+    /// Stage name: an argument of `--from`, and the stage's folder in the work folder.
     pub const fn as_str(self) -> &'static str {
         match self {
             Self::Extract => "extract",
@@ -40,7 +40,7 @@ impl StageName {
         }
     }
 
-    /// The name that the stage had in earlier versions of the program, where it was another.
+    /// Name of the stage in earlier versions of the program, if it was different.
     pub const fn former(self) -> Option<&'static str> {
         match self {
             Self::Dataset => Some("shard"),
@@ -58,7 +58,7 @@ impl fmt::Display for StageName {
 impl FromStr for StageName {
     type Err = anyhow::Error;
 
-    /// Reads a name, today's or a former one.
+    /// Parses a current or a former name.
     fn from_str(name: &str) -> anyhow::Result<Self> {
         match Self::ALL.into_iter().find(|stage| stage.as_str() == name || stage.former() == Some(name)) {
             Some(stage) => Ok(stage),
@@ -67,24 +67,24 @@ impl FromStr for StageName {
     }
 }
 
-/// A file that a stage writes for a video.
+/// Files that a stage writes for a video.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Artifact {
-    /// 16 kHz mono; absent for a video without sound.
+    /// Audio, 16 kHz mono; absent for a video without an audio track.
     Sound,
     Timeline,
     MediaInfo,
-    /// The folder of the frames as PNG, if asked for.
+    /// Folder with the frames as PNG; written on request.
     Frames,
     Keypoints,
-    /// What was seen in a part of a long video, until all parts are there.
+    /// Detections in one part of a long video; removed when all parts have been joined.
     PoseSpan,
-    /// Shape of the face and colours of the person; absent where no face was seen. So is the next.
+    /// Face shape and colours of the person; absent, like `FacePicture`, when no face was detected.
     Portrait,
-    /// The face, seen from the front.
+    /// Picture of the face from the front.
     FacePicture,
     Measures,
-    /// How much later the sound is than the picture; absent where nobody was seen to speak.
+    /// Delay of the audio against the picture; absent when nobody was visibly speaking.
     SoundOffset,
     SegmentIntervals,
     SegmentLedger,
@@ -97,7 +97,7 @@ pub enum Artifact {
 }
 
 impl Artifact {
-    /// The stage that writes it.
+    /// Stage that writes the file.
     pub const fn stage(self) -> StageName {
         match self {
             Self::Sound | Self::Timeline | Self::MediaInfo | Self::Frames => StageName::Extract,
@@ -109,7 +109,7 @@ impl Artifact {
         }
     }
 
-    /// The file's name in the folder of the video.
+    /// File name in the folder of the video.
     pub const fn file(self) -> &'static str {
         match self {
             Self::Sound => "audio.wav",
@@ -131,38 +131,38 @@ impl Artifact {
         }
     }
 
-    /// The file of the video `unit` under the work folder `work`.
+    /// Path of the file for the video `unit` in the work folder `work`.
     pub fn path(self, work: &Path, unit: &Unit) -> PathBuf {
         self.within(&dir(work, self.stage(), unit))
     }
 
-    /// The file in `folder`, a stage's folder of one video.
+    /// Path of the file in `folder`, a stage's folder of one video.
     pub fn within(self, folder: &Path) -> PathBuf {
         folder.join(self.file())
     }
 }
 
-/// The folder of `unit` at `stage`: `work/<stage>/<speaker>/<video>`, for a whole speaker `work/<stage>/<speaker>`.
+/// Folder of `unit` at `stage`: `work/<stage>/<speaker>/<video>`, or `work/<stage>/<speaker>` for a whole speaker.
 pub fn dir(work: &Path, stage: StageName, unit: &Unit) -> PathBuf {
     unit.dir(&work.join(stage.as_str()))
 }
 
-/// The folder of a speaker at `stage`; of the last stage it is the dataset.
+/// Folder of a speaker at `stage`; for `StageName::Dataset` this folder is the dataset.
 pub fn speaker_dir(work: &Path, stage: StageName, speaker: &str) -> PathBuf {
     work.join(stage.as_str()).join(speaker)
 }
 
-/// The record of the splits of a speaker's videos, which outlives the dataset.
+/// Record of the splits of a speaker's videos; it is kept when the dataset is removed.
 pub fn splits(work: &Path, speaker: &str) -> PathBuf {
     work.join("splits").join(format!("{speaker}.json"))
 }
 
-/// The picture of one face a video, where a speaker's videos seem to show several people.
+/// Contact sheet with one face per video, written when a speaker's videos seem to show several persons.
 pub fn faces(work: &Path, speaker: &str) -> PathBuf {
     work.join("faces").join(format!("{speaker}.png"))
 }
 
-/// The table of known hashes of a work folder.
+/// Cache of file hashes in a work folder.
 pub fn hashes(work: &Path) -> PathBuf {
     work.join("hashes.json")
 }
@@ -172,7 +172,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_stage_is_found_by_its_name_and_by_its_former_name() {
+    fn stages_parse_by_current_and_by_former_name() {
         for stage in StageName::ALL {
             assert_eq!(stage.as_str().parse::<StageName>().unwrap(), stage);
         }

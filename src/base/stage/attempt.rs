@@ -1,5 +1,5 @@
-//! One attempt at a piece of work: its files are made in a folder of their own, take their place when they are whole, and
-//! the record comes last.
+//! One attempt at a unit of work: its files are written to a separate folder, which replaces the target when they are
+//! complete, and the record is written last.
 
 use super::fingerprint::Fingerprint;
 use super::record::{Output, Record};
@@ -8,14 +8,17 @@ use anyhow::{Context, Result, anyhow};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-/// Runs a stage's code. A panic is a defect, but one video must not take the night's run with it.
-pub fn guarded<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
+/// Runs a stage's code and turns a panic, which is a bug, into an error, so that one video does not end a long run.
+pub fn catch_panics<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
     let caught = catch_unwind(AssertUnwindSafe(work));
     caught.unwrap_or_else(|panic| Err(anyhow!("internal error: {}", panic_text(&*panic))))
 }
 
-/// Lets `work` fill an empty folder, which then takes the place of `folder`, or whose files go into the `common` folder; the
-/// record is written last.
+/// Calls `work` with an empty folder to fill. That folder then replaces `folder`, or its files are moved into
+/// `common`; the record is written last.
+///
+/// # Errors
+/// Those of `work`; the folders, the files or the record cannot be written. The attempt is then removed.
 pub fn attempt(
     folder: &Path,
     common: Option<&Path>,
@@ -26,7 +29,8 @@ pub fn attempt(
     let finish = || -> Result<Report> {
         let report = work(&attempt).map_err(workdir::full_disk)?;
         let outputs = Output::list(&attempt)?;
-        // An old record must not speak for new files, should this run be killed before it writes its own.
+        // Removed first: if the program is killed before it writes the new record, the old one must not describe new
+        // files.
         Record::forget(folder)?;
         match common {
             Some(common) => workdir::move_files(&attempt, common, outputs.iter().map(|output| output.file.as_str()))?,

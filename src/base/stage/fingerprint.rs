@@ -1,6 +1,6 @@
-//! The key that decides whether work must be done again: stage name and version, every setting that has a say in the bytes,
-//! and the BLAKE3 of every input. Paths, times and the number of workers are not in it. Contents are hashed once and
-//! remembered by size and time of change (`HashCache`), so that asking again costs nothing.
+//! The key that decides whether work must be repeated: stage name and version, every setting that influences the
+//! output, and the BLAKE3 hash of every input. Paths, times and the number of workers are not part of it. `HashCache`
+//! stores content hashes by size and modification time, so that a repeated check does not read the files.
 
 use super::artifacts::StageName;
 use super::{Stage, Unit, workdir};
@@ -13,18 +13,21 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Instant, UNIX_EPOCH};
 
-/// The key of one unit at one stage, in its parts so that a difference can be named.
+/// Key of one unit at one stage, as separate parts, so that a difference can be named.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Fingerprint {
     pub stage: String,
     pub version: u32,
     pub settings: serde_json::Value,
-    /// Role to BLAKE3 of the content, in hex.
+    /// Input role to BLAKE3 of the content, in hex.
     pub inputs: BTreeMap<String, String>,
 }
 
 impl Fingerprint {
-    /// The fingerprint of `unit` at `stage` now. Errors when an input cannot be read.
+    /// Computes the current fingerprint of `unit` at `stage`.
+    ///
+    /// # Errors
+    /// An input cannot be read.
     pub fn now(stage: &dyn Stage, unit: &Unit, hashes: &HashCache) -> Result<Self> {
         let mut inputs = BTreeMap::new();
         for input in stage.inputs(unit)? {
@@ -34,8 +37,7 @@ impl Fingerprint {
         Ok(Self { stage: stage.name().to_owned(), version: stage.version(), settings: stage.settings(unit), inputs })
     }
 
-    /// A fingerprint that stands under a former name of its stage, under today's: as the stage, and as the section of the
-    /// settings.
+    /// Replaces a former stage name by the current one, both as the stage and as the name of its settings section.
     pub fn renamed(mut self) -> Self {
         if let Some(stage) = StageName::ALL.into_iter().find(|stage| stage.former() == Some(&*self.stage)) {
             if let Some(settings) = self.settings.as_object_mut()
@@ -49,15 +51,15 @@ impl Fingerprint {
     }
 }
 
-/// BLAKE3 of files, remembered between runs by path, size and time of change.
+/// BLAKE3 hashes of files, cached between runs by path, size and modification time.
 pub struct HashCache {
     file: PathBuf,
     known: Mutex<BTreeMap<String, KnownHash>>,
     saved: Mutex<Instant>,
 }
 
-/// The content of a file or folder: its BLAKE3 in hex, with the size in bytes and the time of change by which it is known
-/// again without being read.
+/// Content of a file or folder: its BLAKE3 in hex, with the size in bytes and the modification time by which it is
+/// recognised without being read.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct KnownHash {
     pub bytes: u64,
@@ -66,21 +68,27 @@ pub struct KnownHash {
 }
 
 impl HashCache {
-    /// Reads what is known from `file`; a missing or damaged file knows nothing.
+    /// Loads the cache from `file`; a missing or damaged file gives an empty cache.
     pub fn open(file: &Path) -> Self {
         Self { file: file.to_owned(), known: Mutex::new(read_known(file)), saved: Mutex::new(Instant::now()) }
     }
 
-    /// BLAKE3 of the content of `path`, in hex; of a folder as `hash_file` says.
+    /// Returns the BLAKE3 of the content of `path` in hex; folders are hashed as in [`hash_file`].
+    ///
+    /// # Errors
+    /// `path` cannot be read.
     pub fn hash(&self, path: &Path) -> Result<String> {
         Ok(self.content(path)?.hash)
     }
 
-    /// The content of `path`; it is read where it is not known. Errors: it cannot be read.
+    /// Returns size and hash of the content of `path`, which is read only if it is not cached.
+    ///
+    /// # Errors
+    /// `path` cannot be read.
     pub fn content(&self, path: &Path) -> Result<KnownHash> {
         let (bytes, changed_ns) = size_and_change(path)?;
         let read = || Ok(KnownHash { bytes, changed_ns, hash: hash_file(path)? });
-        // Two names that are no text may look alike.
+        // Paths that are not UTF-8 are not cached: two of them may have the same text.
         let Some(name) = path.to_str().map(str::to_owned) else { return read() };
         if let Some(known) = self.known().get(&name)
             && known.bytes == bytes
@@ -93,27 +101,30 @@ impl HashCache {
         Ok(content)
     }
 
-    /// Whether `path` still has this content. Size and time of change decide where they are equal, and a different size does;
-    /// else the content is hashed. Errors: it cannot be read.
+    /// Returns whether `path` still has this content. Equal size and modification time, or a different size, decide
+    /// without reading; otherwise the content is hashed.
+    ///
+    /// # Errors
+    /// `path` cannot be read.
     pub fn is_unchanged(&self, path: &Path, content: &KnownHash) -> Result<bool> {
         let (bytes, changed_ns) = size_and_change(path)?;
         let is_same_size = bytes == content.bytes;
         Ok(is_same_size && (changed_ns == content.changed_ns || self.hash(path)? == content.hash))
     }
 
-    /// Keeps what is known for the next run, beside what other programs have kept meanwhile.
+    /// Writes the cache for the next run, merged with entries that other programs have saved in the meantime.
     pub fn save(&self) -> Result<()> {
-        let mut kept = read_known(&self.file);
-        kept.extend(self.known().clone());
-        workdir::write_file(&self.file, &serde_json::to_vec(&kept)?)
+        let mut merged = read_known(&self.file);
+        merged.extend(self.known().clone());
+        workdir::write_file(&self.file, &serde_json::to_vec(&merged)?)
     }
 
-    /// Saves once a minute at most, so that a long run that is killed has not hashed for nothing.
-    pub fn save_now_and_then(&self) {
+    /// Saves at most once a minute, so that a long run that is killed does not lose its hashes.
+    pub fn save_periodically(&self) {
         let Ok(mut saved) = self.saved.try_lock() else { return };
         if saved.elapsed().as_secs() >= 60 {
             *saved = Instant::now();
-            // What cannot be kept is hashed again.
+            // Hashes that cannot be saved are computed again by the next run.
             let _ = self.save();
         }
     }
@@ -127,8 +138,8 @@ fn read_known(file: &Path) -> BTreeMap<String, KnownHash> {
     workdir::read_file(file).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default()
 }
 
-/// Bytes of a file, and its time of change in ns; of a folder the sum over its files, and a digest of their names and
-/// times.
+/// Returns the size in bytes and the modification time in ns. For a folder: the sum of the sizes, and a digest of the
+/// names and modification times of its files.
 fn size_and_change(path: &Path) -> Result<(u64, u64)> {
     let meta = fs::metadata(path).with_context(|| format!("cannot read {}", path.display()))?;
     if !meta.is_dir() {
@@ -146,7 +157,7 @@ fn size_and_change(path: &Path) -> Result<(u64, u64)> {
     Ok((bytes, digest.iter().take(8).fold(0, |number, byte| number << 8 | u64::from(*byte))))
 }
 
-/// The files of a folder, sorted; folders in it are passed over.
+/// Lists the files of a folder, sorted; subfolders are skipped.
 fn files_in(folder: &Path) -> Result<Vec<PathBuf>> {
     let listed = fs::read_dir(folder).with_context(|| format!("cannot list {}", folder.display()))?;
     let mut files: Vec<PathBuf> = listed.filter_map(|entry| entry.ok().map(|entry| entry.path())).collect();
@@ -155,7 +166,8 @@ fn files_in(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// BLAKE3 of a file's content, in hex, read in pieces; of a folder that of the names and hashes of its files.
+/// Returns the BLAKE3 of a file's content in hex, read in chunks; for a folder, the hash of its file names and file
+/// hashes.
 pub fn hash_file(path: &Path) -> Result<String> {
     if path.is_dir() {
         let mut hasher = blake3::Hasher::new();
@@ -178,7 +190,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_record_under_a_former_name_counts_under_todays() {
+    fn records_of_a_former_stage_name_equal_current_ones() {
         let of = |name: &str| Fingerprint {
             stage: name.to_owned(),
             version: 2,

@@ -1,5 +1,6 @@
-//! The account of a video's seconds: every one of them is kept, refused for a reason with what was measured, or lost to a
-//! stage that failed. `segment` writes it, `lift` moves seconds from kept to refused; later stages only add up.
+//! The ledger of a video's seconds: every second is either retained, refused (with a reason and a measured value), or
+//! belongs to a stage that failed. `segment` writes it and `lift` moves seconds from retained to refused; later stages
+//! only sum them.
 
 use super::refusal::FrameRefusal;
 use crate::input;
@@ -8,47 +9,47 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// The whole account; its stretches lie end to end from 0 to `duration_secs`.
+/// Ledger of a video; its intervals are contiguous and cover 0 to `duration_secs`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Ledger {
     pub duration_secs: f64,
     pub kept: Vec<Kept>,
-    /// Parts of the kept stretches in which the hands rest on each other.
+    /// Parts of the retained intervals in which the hands rest on each other.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub resting: Vec<Kept>,
     pub refused: Vec<Refused>,
     #[serde(default)]
     pub failed: Vec<Failed>,
-    /// Its words; `None`: no transcript was asked for.
+    /// Account of the words; `None`: no transcript was requested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub words: Option<TranscriptAccount>,
 }
 
-/// The account of a video's words.
+/// Account of a video's transcript.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TranscriptAccount {
-    /// File name of the transcript; `None`: the video has none.
+    /// File name of the transcript; `None`: the video has no transcript.
     pub file: Option<String>,
     #[serde(flatten)]
     pub count: WordCount,
-    /// What is doubtful or wrong about it, a sentence each.
+    /// Problems of the transcript, one sentence each.
     pub notes: Vec<String>,
 }
 
-/// What became of words: `n_kept`, `n_refused` and `n_outside` add up to `n_words`.
+/// Numbers of words by outcome: `n_kept`, `n_refused` and `n_outside` add up to `n_words`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct WordCount {
     pub n_words: usize,
-    /// Words in samples.
+    /// Words inside samples.
     pub n_kept: usize,
-    /// Words in stretches that were not kept.
+    /// Words in intervals that were refused.
     pub n_refused: usize,
-    /// Words after the end of the sound.
+    /// Words after the end of the audio.
     pub n_outside: usize,
 }
 
 impl WordCount {
-    /// Whether every word is accounted for.
+    /// Returns whether every word is accounted for.
     pub fn is_whole(&self) -> bool {
         self.n_kept + self.n_refused + self.n_outside == self.n_words
     }
@@ -63,38 +64,38 @@ impl std::ops::AddAssign for WordCount {
     }
 }
 
-/// A stretch worth keeping.
+/// A retained interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Kept {
     pub start_secs: f64,
     pub end_secs: f64,
 }
 
-/// A stretch that was not.
+/// A refused interval.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Refused {
     pub start_secs: f64,
     pub end_secs: f64,
-    /// The reason in a word or two, for programs.
+    /// Short machine-readable reason.
     pub reason: String,
-    /// What was measured, and what it had to reach or stay below, both in `unit`.
+    /// Measured value; it and the violated limit `threshold` are in `unit`.
     pub measured: f64,
     pub threshold: f64,
     #[serde(default)]
     pub unit: String,
-    /// A sentence for people.
+    /// Sentence for the user.
     #[serde(rename = "says")]
     pub message: String,
 }
 
 impl Refused {
-    /// A stretch refused for `why`, in the words of its reason.
+    /// Creates an interval refused for `why`, with the standard message of its reason.
     pub fn new(start_secs: f64, end_secs: f64, why: FrameRefusal) -> Self {
         let message = why.refusal.message(why.measured, why.threshold);
         Self::with_message(start_secs, end_secs, why, message)
     }
 
-    /// A stretch refused for `why`, in words of its own.
+    /// Creates an interval refused for `why`, with a custom message.
     pub fn with_message(start_secs: f64, end_secs: f64, why: FrameRefusal, message: String) -> Self {
         let FrameRefusal { refusal, measured, threshold } = why;
         let (reason, unit) = (refusal.reason().to_owned(), refusal.unit().to_owned());
@@ -102,7 +103,7 @@ impl Refused {
     }
 }
 
-/// A stretch that no verdict was reached on: its stage failed.
+/// An interval that was not judged, because its stage failed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Failed {
     pub start_secs: f64,
@@ -112,13 +113,16 @@ pub struct Failed {
 }
 
 impl Ledger {
-    /// The account of a video whose stage failed: all of its `duration_secs`.
+    /// Creates the ledger of a video whose stage failed: all of its `duration_secs` are `failed`.
     pub fn failed(duration_secs: f64, stage: &str, error: &str) -> Self {
         let failed = Failed { start_secs: 0.0, end_secs: duration_secs, stage: stage.into(), error: error.into() };
         Self { duration_secs, failed: vec![failed], ..Self::default() }
     }
 
-    /// Reads `ledger.json` and checks that the stretches lie end to end and fill the duration.
+    /// Reads `ledger.json`.
+    ///
+    /// # Errors
+    /// The file cannot be read or is not a ledger; its intervals are not contiguous or do not fill the duration.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = input::read(path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
         let ledger: Self =
@@ -132,17 +136,18 @@ impl Ledger {
         Ok(ledger)
     }
 
-    /// Seconds kept.
+    /// Retained seconds.
     pub fn kept_secs(&self) -> f64 {
         self.kept.iter().map(|kept| kept.end_secs - kept.start_secs).sum()
     }
 
-    /// Seconds kept in which the hands rest.
+    /// Retained seconds in which the hands rest.
     pub fn resting_secs(&self) -> f64 {
         self.resting.iter().map(|rest| rest.end_secs - rest.start_secs).sum()
     }
 
-    /// With stretches in which the hands rest, from second to second; the video's last frame may be cut off by its end.
+    /// Sets the intervals in which the hands rest, given as (start, end) in seconds and clipped to the duration,
+    /// because the video's last frame may extend beyond it.
     #[must_use]
     pub fn with_resting(mut self, stretches: impl Iterator<Item = (f64, f64)>) -> Self {
         let until = self.duration_secs;
@@ -151,7 +156,7 @@ impl Ledger {
         self
     }
 
-    /// Seconds refused, by reason.
+    /// Refused seconds by reason.
     pub fn refused_secs(&self) -> BTreeMap<String, f64> {
         let mut secs = BTreeMap::new();
         for refused in &self.refused {
@@ -160,12 +165,12 @@ impl Ledger {
         secs
     }
 
-    /// Seconds of failed stages.
+    /// Seconds of stages that failed.
     pub fn failed_secs(&self) -> f64 {
         self.failed.iter().map(|failed| failed.end_secs - failed.start_secs).sum()
     }
 
-    /// Whether every second from 0 to the end belongs to exactly one stretch.
+    /// Returns whether every second from 0 to the end belongs to exactly one interval.
     pub fn is_whole(&self) -> bool {
         let kept = self.kept.iter().map(|kept| (kept.start_secs, kept.end_secs));
         let refused = self.refused.iter().map(|refused| (refused.start_secs, refused.end_secs));
@@ -183,7 +188,7 @@ impl Ledger {
     }
 }
 
-/// `reason 3.2 s, reason 1.0 s`, the longest first.
+/// Formats `reason 3.2 s, reason 1.0 s`, longest first; reasons below 0.05 s are omitted.
 pub fn longest_first(secs: &BTreeMap<String, f64>) -> String {
     let mut reasons: Vec<_> = secs.iter().filter(|(_, secs)| **secs >= 0.05).collect();
     reasons.sort_by(|a, b| b.1.total_cmp(a.1).then(a.0.cmp(b.0)));

@@ -1,5 +1,5 @@
-//! How any stage runs, is recorded, and resumes: a step is a `Stage`, what it works on is a `Unit`, and what was done is a
-//! `record::Record` written last. `artifacts` has the names of the five stages and of their files.
+//! How stages run, are recorded, and resume: a step is a `Stage`, its work item is a `Unit`, and finished work is
+//! documented by a `record::Record`, which is written last. `artifacts` names the five stages and their files.
 
 pub mod artifacts;
 pub mod attempt;

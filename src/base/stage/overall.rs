@@ -1,42 +1,43 @@
-//! The bar of a whole run: it moves while a stage works on a video, by that stage's share of all the work.
+//! Progress bar of a complete run: it advances while a stage works on a video, weighted by that stage's share of the
+//! work.
 
 use super::progress::{Event, PARTS, Progress, Task};
 use super::{Stage, Unit};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// The work on all units at all stages as one task of `PARTS` steps.
+/// Work on all units at all stages as one task of `PARTS` steps.
 pub struct OverallProgress<'a> {
     progress: &'a dyn Progress,
     task: Box<dyn Task + 'a>,
-    whole: f64,
-    /// Work done so far, and the steps of the task it came to.
+    total_work: f64,
+    /// Work done so far, and the number of task steps reported for it.
     done: Mutex<(f64, u64)>,
     has_estimate: AtomicBool,
 }
 
 impl<'a> OverallProgress<'a> {
-    /// Begins the task. The work on a unit at a stage is the bytes of its source times the cost of the stage.
+    /// Begins the task. The work on a unit at a stage is the size of its source file in bytes times the stage's cost.
     pub fn begin(stages: &[&dyn Stage], units: &[Unit], progress: &'a dyn Progress) -> Self {
-        let whole = units.iter().flat_map(|unit| stages.iter().map(|stage| work(*stage, unit))).sum();
+        let total_work = units.iter().flat_map(|unit| stages.iter().map(|stage| work(*stage, unit))).sum();
         let label = format!("{} of {}", names(stages), super::counted(units.len(), "unit"));
         let task = progress.begin(&label, PARTS);
-        Self { progress, task, whole, done: Mutex::new((0.0, 0)), has_estimate: AtomicBool::new(false) }
+        Self { progress, task, total_work, done: Mutex::new((0.0, 0)), has_estimate: AtomicBool::new(false) }
     }
 
-    /// What the stage reports its work on the unit to.
+    /// Returns the progress handle for the work of `stage` on `unit`.
     pub fn of(&'a self, stage: &dyn Stage, unit: &Unit) -> UnitProgress<'a> {
         let label = format!("{} {unit}", stage.name());
         UnitProgress { overall: self, label, left: Mutex::new(work(stage, unit)) }
     }
 
-    /// What the stage reports its work on a part of the unit to.
+    /// Returns the progress handle for one part of the work of `stage` on `unit`.
     pub fn of_part(&'a self, stage: &dyn Stage, unit: &Unit, part: usize, n_parts: usize) -> UnitProgress<'a> {
         let label = format!("{} {unit} {} of {n_parts}", stage.name(), part + 1);
         UnitProgress { overall: self, label, left: Mutex::new(work(stage, unit) / n_parts.max(1) as f64) }
     }
 
-    /// The unit needs no work at these stages, or gets none.
+    /// Counts the work of these stages on the unit as skipped, because it is not needed or is not done.
     pub fn skip(&self, stages: &[&dyn Stage], unit: &Unit) {
         self.count(stages.iter().map(|stage| work(*stage, unit)).sum(), |task, steps| task.skip(steps));
     }
@@ -44,7 +45,7 @@ impl<'a> OverallProgress<'a> {
     fn count(&self, work: f64, report: impl FnOnce(&dyn Task, u64)) {
         let Ok(mut done) = self.done.lock() else { return };
         done.0 += work;
-        let steps = (done.0 / self.whole * PARTS as f64).round().clamp(0.0, PARTS as f64) as u64;
+        let steps = (done.0 / self.total_work * PARTS as f64).round().clamp(0.0, PARTS as f64) as u64;
         report(&*self.task, steps.saturating_sub(done.1));
         done.1 = done.1.max(steps);
     }
@@ -62,7 +63,7 @@ fn names(stages: &[&dyn Stage]) -> String {
     }
 }
 
-/// The work of one stage on one unit. When it is dropped, all of it is done.
+/// Progress of one stage on one unit. Dropping it counts the remaining work as done.
 pub struct UnitProgress<'a> {
     overall: &'a OverallProgress<'a>,
     label: String,
@@ -70,7 +71,7 @@ pub struct UnitProgress<'a> {
 }
 
 impl UnitProgress<'_> {
-    /// No work is needed.
+    /// Counts the remaining work as skipped.
     pub fn skip(&self) {
         let Ok(mut left) = self.left.lock() else { return };
         self.overall.count(std::mem::take(&mut *left), |task, steps| task.skip(steps));
@@ -86,9 +87,9 @@ impl UnitProgress<'_> {
 
 impl Progress for UnitProgress<'_> {
     fn begin(&self, _label: &str, total: u64) -> Box<dyn Task + '_> {
-        let whole = self.left.lock().map_or(0.0, |left| *left);
+        let remaining = self.left.lock().map_or(0.0, |left| *left);
         let task = self.overall.progress.begin(&self.label, total);
-        Box::new(UnitTask { task, unit: self, step: if total == 0 { 0.0 } else { whole / total as f64 } })
+        Box::new(UnitTask { task, unit: self, step: if total == 0 { 0.0 } else { remaining / total as f64 } })
     }
 
     fn say(&self, line: &str) {
@@ -96,9 +97,9 @@ impl Progress for UnitProgress<'_> {
     }
 
     fn event(&self, event: &Event<'_>) {
-        let is_told =
+        let is_repeated =
             matches!(event, Event::Estimate { .. }) && self.overall.has_estimate.swap(true, Ordering::Relaxed);
-        if !is_told {
+        if !is_repeated {
             self.overall.progress.event(event);
         }
     }
@@ -113,7 +114,7 @@ impl Drop for UnitProgress<'_> {
 struct UnitTask<'a> {
     task: Box<dyn Task + 'a>,
     unit: &'a UnitProgress<'a>,
-    /// Work a step stands for.
+    /// Work per step.
     step: f64,
 }
 
@@ -181,21 +182,21 @@ mod tests {
     }
 
     #[test]
-    fn the_bar_moves_within_a_unit_and_ends_at_the_whole() {
+    fn bar_advances_within_a_unit_and_ends_at_the_total() {
         let unit = |video: &str| Unit { speaker: "host".into(), video: video.into(), source: "nothing".into() };
         let (units, stages) = ([unit("a"), unit("b")], [Costly(1), Costly(3)]);
         let stages = [&stages[0] as &dyn Stage, &stages[1]];
         let counted = Counted::default();
         let overall = OverallProgress::begin(&stages, &units, &counted);
         let steps = || counted.0.each_ref().map(|n| n.load(Ordering::Relaxed));
-        let seen = || steps().map(|n| n * 8 / PARTS);
+        let eighths = || steps().map(|n| n * 8 / PARTS);
         overall.skip(&stages, &units[0]);
         drop(overall.of(stages[0], &units[1]));
-        assert_eq!(seen(), [1, 4]);
+        assert_eq!(eighths(), [1, 4]);
         let costly = overall.of(stages[1], &units[1]);
         let task = costly.begin("", 3);
         task.advance(1);
-        assert_eq!(seen(), [2, 4]);
+        assert_eq!(eighths(), [2, 4]);
         task.advance(5);
         drop(task);
         drop(costly);

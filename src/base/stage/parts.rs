@@ -1,8 +1,8 @@
-//! Units whose work is done in parts: the worker of such a unit shares its parts with workers that have run out of units.
-//! Each part has a folder and a record of its own under `NAME.parts` beside the unit's folder, so that finished parts
+//! Units whose work is divided into parts: the worker of such a unit shares its parts with workers that have no units
+//! left. Each part has its own folder and record in `NAME.parts` beside the unit's folder, so that finished parts
 //! survive a worker that is killed.
 
-use super::attempt::{attempt, guarded};
+use super::attempt::{attempt, catch_panics};
 use super::fingerprint::Fingerprint;
 use super::overall::OverallProgress;
 use super::record::Record;
@@ -12,37 +12,43 @@ use anyhow::{Context, Result};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-/// End of the name of the folder with a unit's parts.
+/// Suffix of the folder with a unit's parts.
 pub const PARTS: &str = ".parts";
 
-/// Work on a unit that has parts.
+/// Work on a unit that is divided into parts.
 #[derive(Clone)]
 pub struct PartedWork<'a> {
     pub stage: &'a dyn Stage,
     pub unit: &'a Unit,
     pub n_parts: usize,
     pub fingerprint: Fingerprint,
-    /// The unit's folder.
+    /// Folder of the unit.
     pub folder: PathBuf,
     pub overall: &'a OverallProgress<'a>,
 }
 
-/// The folder of the parts of the unit in `folder`.
-pub fn folder_of_parts(folder: &Path) -> PathBuf {
+/// Returns the folder with the parts of the unit in `folder`.
+pub fn parts_folder(folder: &Path) -> PathBuf {
     let name = folder.file_name().unwrap_or_default().to_string_lossy();
     folder.with_file_name(format!("{name}{PARTS}"))
 }
 
 /// Removes the parts of the unit in `folder`, if there are any.
+///
+/// # Errors
+/// The folder with the parts cannot be removed.
 pub fn remove_parts(folder: &Path) -> Result<()> {
-    let parts = folder_of_parts(folder);
+    let parts = parts_folder(folder);
     workdir::remove(&parts).with_context(|| format!("cannot remove {}", parts.display()))
 }
 
 impl PartedWork<'_> {
-    /// Does a part, unless it is done.
+    /// Runs a part, unless it is already done.
+    ///
+    /// # Errors
+    /// Those of the stage.
     pub fn work_on(&self, part: usize) -> Result<()> {
-        let folder = self.folder_of(part);
+        let folder = self.part_folder(part);
         let progress = self.overall.of_part(self.stage, self.unit, part, self.n_parts);
         if Record::read(&folder).is_some_and(|record| record.dirty(&self.fingerprint, &folder).is_none()) {
             progress.skip();
@@ -55,8 +61,8 @@ impl PartedWork<'_> {
         attempt(&folder, None, &self.fingerprint, work).map(drop)
     }
 
-    fn folder_of(&self, part: usize) -> PathBuf {
-        folder_of_parts(&self.folder).join(part.to_string())
+    fn part_folder(&self, part: usize) -> PathBuf {
+        parts_folder(&self.folder).join(part.to_string())
     }
 }
 
@@ -67,13 +73,13 @@ pub struct WorkerPool<'a> {
 }
 
 struct PoolState<'a> {
-    /// Workers that still take units, and so may share parts.
+    /// Workers that may still take units, and thus may still share parts.
     n_busy: usize,
     open: Vec<SharedUnit<'a>>,
     n_shared: usize,
 }
 
-/// A unit whose parts are in progress.
+/// A unit with parts in progress.
 struct SharedUnit<'a> {
     number: usize,
     work: Arc<PartedWork<'a>>,
@@ -83,16 +89,18 @@ struct SharedUnit<'a> {
 }
 
 impl<'a> WorkerPool<'a> {
-    /// A pool of `n` workers that all take units; each calls `help` when there is no unit left.
+    /// Creates a pool of `n` workers that take units; each calls `help` when no unit is left.
     pub fn new(n: usize) -> Self {
         let state = PoolState { n_busy: n, open: Vec::new(), n_shared: 0 };
         Self { state: Mutex::new(state), changed: Condvar::new() }
     }
 
-    /// Does all parts of a unit, together with who helps. Returns their folders in order. Errors: the first error of a
-    /// part; no part is begun after it.
+    /// Runs all parts of a unit, together with the workers that help. Returns their folders in order.
+    ///
+    /// # Errors
+    /// The first error of a part; no further part is started after it.
     pub fn work(&self, work: PartedWork<'a>) -> Result<Vec<PathBuf>> {
-        let folders = (0..work.n_parts).map(|part| work.folder_of(part)).collect();
+        let folders = (0..work.n_parts).map(|part| work.part_folder(part)).collect();
         let number = {
             let mut state = self.state();
             state.n_shared += 1;
@@ -113,7 +121,7 @@ impl<'a> WorkerPool<'a> {
         }
     }
 
-    /// Does parts of other workers' units, until no worker takes units any more.
+    /// Runs parts of other workers' units until no worker takes units any more.
     pub fn help(&self) {
         loop {
             while self.work_on_one(None) {}
@@ -127,7 +135,7 @@ impl<'a> WorkerPool<'a> {
         }
     }
 
-    /// Does one part, of the unit of that number or of any; `false`: there is none.
+    /// Runs one part, of the unit with this number or of any unit; returns `false` if there is none.
     fn work_on_one(&self, number: Option<usize>) -> bool {
         let taken = {
             let mut state = self.state();
@@ -140,7 +148,7 @@ impl<'a> WorkerPool<'a> {
             })
         };
         let Some((number, work, part)) = taken else { return false };
-        let ended = guarded(|| work.work_on(part));
+        let ended = catch_panics(|| work.work_on(part));
         let mut state = self.state();
         if let Some(shared) = state.open.iter_mut().find(|shared| shared.number == number) {
             shared.n_running -= 1;
@@ -162,7 +170,7 @@ impl SharedUnit<'_> {
     }
 }
 
-/// Counts a worker as one that takes units, until it is dropped.
+/// Counts a worker as busy with units until it is dropped.
 pub struct BusyGuard<'c, 'a>(pub &'c WorkerPool<'a>);
 
 impl Drop for BusyGuard<'_, '_> {

@@ -1,20 +1,21 @@
-//! How long work reports itself. The library only speaks to these traits; the bars are drawn in `cli`.
+//! Progress reports of long work. The library uses only these traits; `cli` draws the bars.
 
-/// Steps of a task that counts shares of a whole: a hundredth of a percent is 100.
+/// Number of steps of a task that reports fractions of its total: 100 steps are 0.01 %.
 pub const PARTS: u64 = 1_000_000;
 
-/// Something that can show work going on.
+/// Receiver of progress reports.
 pub trait Progress: Send + Sync {
-    /// A piece of work of `total` steps begins (0: length unknown; `PARTS`: shares of a whole). It ends when the task is
-    /// dropped.
+    /// Begins a task of `total` steps (0: unknown length; `PARTS`: the task reports fractions). Dropping the task ends
+    /// it.
     fn begin(&self, label: &str, total: u64) -> Box<dyn Task + '_>;
-    /// A line the user should see while work goes on (a warning, a milestone).
+    /// Shows a line during the work (a warning, a milestone).
     fn say(&self, line: &str);
-    /// Whether the user has asked for an end: work that can end early, at a place from which it goes on, ends there.
+    /// Returns whether the user has requested a stop; work that can resume later then ends at the next resumable
+    /// point.
     fn is_to_stop(&self) -> bool {
         false
     }
-    /// Something happened to a unit; says its message unless overridden.
+    /// Reports an event of a unit; the default implementation prints its message.
     fn event(&self, event: &Event<'_>) {
         if let Some(message) = event.message() {
             self.say(&message);
@@ -22,27 +23,27 @@ pub trait Progress: Send + Sync {
     }
 }
 
-/// Something that happened to a `unit` at a `stage` of a run. Units are `speaker/video`, or `speaker` of a dataset.
+/// Events of a `unit` at a `stage` of a run. A unit is `speaker/video`, or `speaker` for a dataset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event<'a> {
-    /// A stage worked on the unit; `line` is the stage's report.
+    /// A stage finished the unit; `line` is the stage's report.
     Done { stage: &'a str, unit: &'a str, line: &'a str },
-    /// A stage skipped the unit.
+    /// A stage skipped the unit, whose results are up to date.
     Fresh { stage: &'a str, unit: &'a str },
     /// The unit failed at a stage.
     Failed { stage: &'a str, unit: &'a str, error: &'a str },
-    /// An entry of the configuration leads to no video.
+    /// An entry of the configuration matches no video.
     NoVideo { speaker: &'a str, error: &'a str },
-    /// The dataset is made without this video, which is not fresh at every stage before.
+    /// The dataset is built without this video, which is not up to date at every earlier stage.
     LeftOut { unit: &'a str },
-    /// How long the whole may take; said of the first unit alone.
+    /// Estimated duration of the run; reported once, for the first unit.
     Estimate { line: &'a str },
-    /// What a run does without, and what would change that; said once.
+    /// Something that the run lacks and how to provide it; reported once.
     Advice { line: &'a str },
 }
 
 impl Event<'_> {
-    /// A line for people; none where there is nothing to say.
+    /// Formats a line for the user; `None` for events that are not printed.
     pub fn message(&self) -> Option<String> {
         match self {
             Self::Fresh { .. } | Self::Done { line: "", .. } => None,
@@ -56,21 +57,21 @@ impl Event<'_> {
     }
 }
 
-/// One piece of work under way.
+/// A task in progress.
 pub trait Task: Send + Sync {
-    /// `steps` more steps are done.
+    /// Counts `steps` more steps as done.
     fn advance(&self, steps: u64);
-    /// `steps` more steps needed no work: they say nothing of the time that is left.
+    /// Counts `steps` more steps that needed no work; they are ignored in the estimate of the remaining time.
     fn skip(&self, steps: u64) {
         self.advance(steps);
     }
-    /// A short text beside the bar (a loss, the unit at hand).
+    /// Sets a short text beside the bar (a loss, the current unit).
     fn detail(&self, text: &str);
-    /// How far the task is, for those who see no bar.
+    /// Reports progress as a line, for output without a bar.
     fn milestone(&self, _line: &str) {}
 }
 
-/// Shows nothing.
+/// Progress receiver that shows nothing.
 pub struct Silent;
 
 impl Progress for Silent {

@@ -1,4 +1,4 @@
-//! The record of work done, written last, and why a unit is not fresh as a value that prints.
+//! The record of finished work, which is written last, and the reasons why a unit is not up to date.
 
 use super::fingerprint::{Fingerprint, hash_file};
 use super::workdir;
@@ -8,18 +8,18 @@ use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What was done for a unit: its key, and every file it made.
+/// Finished work on a unit: its key, and every file that it wrote.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Record {
     pub fingerprint: Fingerprint,
     pub outputs: Vec<Output>,
-    /// The stage's line for people.
+    /// Report line of the stage, for the user.
     pub line: String,
-    /// The stage's numbers for programs.
+    /// Values reported by the stage, for programs.
     pub facts: serde_json::Map<String, serde_json::Value>,
 }
 
-/// One file of a unit's folder, with `/` between folders.
+/// A file in a unit's folder; `file` is relative to the folder, with `/` as the separator.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Output {
     pub file: String,
@@ -27,14 +27,14 @@ pub struct Output {
     pub hash: String,
 }
 
-/// The last failure of a unit, kept beside what an earlier success made.
+/// Last failure of a unit, stored beside the files of an earlier success.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Failure {
     pub fingerprint: Option<Fingerprint>,
     pub error: String,
 }
 
-/// Why a unit must be worked on.
+/// Reasons why a unit must be processed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum DirtyReason {
     NeverDone,
@@ -66,12 +66,12 @@ impl fmt::Display for DirtyReason {
     }
 }
 
-/// The record of the unit in `folder`: `NAME.record.json` beside it.
+/// Path of the record of the unit in `folder`: `NAME.record.json` beside it.
 pub fn record_path(folder: &Path) -> PathBuf {
     beside(folder, "record.json")
 }
 
-/// The failure of the unit in `folder`: `NAME.failed.json` beside it.
+/// Path of the failure of the unit in `folder`: `NAME.failed.json` beside it.
 pub fn failure_path(folder: &Path) -> PathBuf {
     beside(folder, "failed.json")
 }
@@ -82,27 +82,29 @@ fn beside(folder: &Path, suffix: &str) -> PathBuf {
 }
 
 impl Record {
-    /// The record of the unit in `folder`; `None` where there is none that can be read.
+    /// Reads the record of the unit in `folder`; `None` if there is no readable record.
     pub fn read(folder: &Path) -> Option<Self> {
         let record: Self = serde_json::from_slice(&workdir::read_file(&record_path(folder)).ok()?).ok()?;
         Some(Self { fingerprint: record.fingerprint.renamed(), ..record })
     }
 
-    /// Forgets an earlier failure, and writes the record of the unit in `folder`. On an error, also a late one of the disk,
-    /// no record is left to speak against the failure.
+    /// Removes an earlier failure and writes the record of the unit in `folder`.
+    ///
+    /// # Errors
+    /// The disk reports an error, also when flushing. No record is then left that would contradict the failure.
     pub fn write(&self, folder: &Path) -> Result<()> {
         Failure::forget(folder)?;
         let path = record_path(folder);
         workdir::write_file(&path, &serde_json::to_vec_pretty(self)?).inspect_err(|_| drop(fs::remove_file(&path)))
     }
 
-    /// Takes the record of the unit in `folder` away, for good before anything else happens.
+    /// Removes the record of the unit in `folder`, and flushes the removal to disk.
     pub fn forget(folder: &Path) -> Result<()> {
         workdir::remove_file(&record_path(folder))
     }
 
-    /// Why the unit in `folder` is not fresh under the fingerprint `now`; `None`: it is. Sizes of outputs are
-    /// compared, not contents.
+    /// Returns why the unit in `folder` is not up to date for the fingerprint `now`; `None`: it is. Outputs are
+    /// compared by size only.
     pub fn dirty(&self, now: &Fingerprint, folder: &Path) -> Option<DirtyReason> {
         difference(&self.fingerprint, now).or_else(|| self.outputs.iter().find_map(|output| output.missing(folder)))
     }
@@ -118,7 +120,7 @@ impl Output {
         }
     }
 
-    /// Every file under `folder`, sorted by name.
+    /// Lists every file under `folder`, sorted by name, with its size and hash.
     pub fn list(folder: &Path) -> Result<Vec<Self>> {
         let mut outputs = Vec::new();
         collect(folder, "", &mut outputs)?;
@@ -141,18 +143,18 @@ fn collect(folder: &Path, prefix: &str, outputs: &mut Vec<Output>) -> Result<()>
 }
 
 impl Failure {
-    /// The failure of the unit in `folder`, if its last attempt failed.
+    /// Reads the failure of the unit in `folder`, if its last attempt failed.
     pub fn read(folder: &Path) -> Option<Self> {
         let failure: Self = serde_json::from_slice(&workdir::read_file(&failure_path(folder)).ok()?).ok()?;
         Some(Self { fingerprint: failure.fingerprint.map(Fingerprint::renamed), ..failure })
     }
 
-    /// Takes the failure of the unit in `folder` away, if there is one.
+    /// Removes the failure of the unit in `folder`, if there is one.
     pub fn forget(folder: &Path) -> Result<()> {
         workdir::remove_file(&failure_path(folder))
     }
 
-    /// Keeps the failure beside what is there.
+    /// Writes the failure beside the existing files.
     pub fn write(&self, folder: &Path) -> Result<()> {
         workdir::write_file(&failure_path(folder), &serde_json::to_vec_pretty(self)?)
     }
@@ -176,7 +178,7 @@ fn difference(was: &Fingerprint, now: &Fingerprint) -> Option<DirtyReason> {
     gone.map(|role| DirtyReason::InputRemoved { role: role.clone() })
 }
 
-/// The first setting that differs, by its dotted key.
+/// Returns the first setting that differs, by its dotted key.
 fn setting_difference(key: &str, was: &serde_json::Value, now: &serde_json::Value) -> Option<DirtyReason> {
     if let (Some(was), Some(now)) = (was.as_object(), now.as_object()) {
         let mut names: Vec<&String> = was.keys().chain(now.keys()).collect();

@@ -1,11 +1,11 @@
-//! Why seconds of a video are not kept: the list of reasons, each with its word for programs, the unit of the measured
-//! value, a heading and a sentence for people.
+//! Reasons for refusing seconds of a video: each has a machine-readable word, the unit of its measured value, a
+//! heading and a sentence for the user.
 
-/// Defines the reasons: what is measured, then name, word in the ledger, unit and heading.
+/// Defines the reasons: the measured quantity as documentation, then name, word in the ledger, unit and heading.
 macro_rules! refusals {
     ($($(#[$doc:meta])* $name:ident: $reason:literal, $unit:literal, $heading:literal;)*) => {
-        /// A reason. Those of `JUDGED` come first, in the order in which they are checked: a frame is refused for the
-        /// first that holds.
+        /// A reason for refusing frames. The reasons in `JUDGED` come first, in the order in which they are checked:
+        /// the first one that applies is recorded.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
         pub enum Refusal {
             $($(#[$doc])* $name,)*
@@ -24,92 +24,93 @@ macro_rules! refusals {
 }
 
 refusals! {
-    /// Share of the frames with sound.
+    /// Fraction of the frames with sound.
     NoSound: "no sound", "", "no sound track, or it has ended";
-    /// Loudness, dB of full scale.
+    /// Loudness in dB of full scale.
     Quiet: "quiet", "dB", "the sound is too quiet for speech";
-    /// Share of the sound that is speech.
+    /// Fraction of the sound that is speech.
     NoSpeech: "no speech", "", "the sound is not speech";
-    /// Correlation of the mouth that is seen with the voice that is heard.
-    OtherVoice: "voice of another", "", "the voice is not that of the person seen";
-    /// Seconds for which the picture stands still.
-    Still: "still", "s", "the picture stands still";
-    /// Best score of face and arms.
+    /// Correlation between the visible mouth and the voice.
+    OffScreenSpeaker: "voice of another", "", "the voice is not that of the person seen";
+    /// Seconds for which the picture is static.
+    Static: "still", "s", "the picture stands still";
+    /// Highest score of face and arms.
     NoPerson: "no person", "", "nobody is seen";
-    /// Pixels between the shoulders.
+    /// Distance between the shoulders in px.
     Small: "too small", "px", "the speaker is too small in the picture";
     /// Score of nose and eyes.
     Face: "face", "", "the face is not visible";
-    /// Width of the shoulders in distances from neck to nose.
+    /// Width of the shoulders in neck-nose distances.
     Turned: "turned", "neck-nose distances", "the speaker is turned sideways or away";
-    /// Half shoulder widths between nose and neck.
+    /// Horizontal distance from nose to neck in half shoulder widths.
     NoseOff: "turned", "half shoulder widths", "the speaker is turned sideways or away";
     /// Lowest score of shoulders and elbows.
     Arms: "arms", "", "shoulders or elbows are not visible";
-    /// Seconds for which a hand is missing, the other one having been found in its place.
+    /// Seconds for which a hand is missing because the other hand was detected at its position.
     OtherHand: "other hand", "s", "one hand is found in the place of the other";
     /// Seconds for which a hand is missing.
     HandGap: "hands", "s", "a hand is not visible for too long";
-    /// Shoulder widths the neck moves within a frame.
+    /// Shoulder widths that the neck moves from one frame to the next.
     Jump: "jump", "shoulder widths", "the speaker jumps from frame to frame";
-    /// Seconds that a shot boundary leaves of a stretch.
+    /// Seconds of an interval that remain beside a shot boundary.
     Cut: "cut", "s", "a cut leaves too short an interval";
-    /// Seconds that a change of the followed person leaves of a stretch.
+    /// Seconds of an interval that remain beside a change of the tracked person.
     Identity: "other person", "s", "a change of person leaves too short an interval";
-    /// Seconds of a stretch that other refusals leave.
+    /// Seconds of an interval that remain between other refusals.
     TooShort: "too short", "s", "too short between other refusals";
-    /// Share of the frames in which the less visible hand is seen.
+    /// Fraction of the frames in which the less visible hand is visible.
     HandShare: "hands", "", "a hand is not visible for too long";
-    /// Share of the frames with too many people.
+    /// Fraction of the frames with too many persons.
     Crowd: "crowd", "", "too many people are in view";
-    /// Share of its length that a lifted bone is off it.
+    /// Deviation of a lifted bone from its length in the video, as a fraction of that length.
     Bones: "bones", "bone lengths", "a lifted bone is far off its length";
-    /// Joints that stay unseen for longer than lifting fills.
-    Open: "open", "joints", "joints stay unseen for too long";
-    /// Seconds that another video of the dataset has as well.
+    /// Number of joints that are not visible for longer than lifting interpolates.
+    MissingJoints: "open", "joints", "joints stay unseen for too long";
+    /// Seconds that are also in another video of the dataset.
     Duplicate: "duplicate", "s", "another video has it already";
-    /// Seconds left out between two splits of a video.
-    Guard: "between splits", "s", "left out between two splits";
-    /// An imported take without a sound, or the rest of one behind the end of its sound.
+    /// Seconds omitted between two splits of a video.
+    SplitGap: "between splits", "s", "left out between two splits";
+    /// An imported take without a sound file, or its frames after the end of the sound.
     NoSoundFile: "no sound", "s", "no sound was found, or it has ended";
-    /// An imported take that a model predicted.
+    /// An imported take that was predicted by a model.
     Prediction: "prediction", "", "a model predicted it";
-    /// Seconds by which sound and motion of an imported take differ in length.
-    OutOfStep: "out of step", "s", "sound and motion differ in length";
-    /// Frames that motion and sound of an imported take have in common.
+    /// Difference in seconds between the lengths of sound and motion of an imported take.
+    LengthMismatch: "out of step", "s", "sound and motion differ in length";
+    /// Number of frames of an imported take with both motion and sound.
     FewFrames: "too short", "frames", "sound and motion have too few frames in common";
-    /// Seconds that the imported shards leave out.
+    /// Seconds that the imported shards do not contain.
     NotImported: "not here", "s", "the imported shards do not hold it";
 }
 
 impl Refusal {
-    /// The reasons that `segment` and `lift` judge frames by.
+    /// Reasons by which `segment` and `lift` judge frames.
     pub const JUDGED: [Self; 21] = match Self::ALL.first_chunk() {
         Some(judged) => *judged,
         None => panic!("fewer reasons than judged ones"),
     };
 
-    /// The judged reason of a ledger's entry with this word and unit.
+    /// Finds the judged reason of a ledger entry with this word and unit.
     pub fn find(reason: &str, unit: &str) -> Option<Self> {
         Self::JUDGED.into_iter().find(|refusal| refusal.reason() == reason && refusal.unit() == unit)
     }
 
-    /// The reason in the ledger.
+    /// Machine-readable word in the ledger.
     pub const fn reason(self) -> &'static str {
         self.texts()[0]
     }
 
-    /// Unit of `measured` and `threshold`; empty: scores and shares, 0 to 1, and a correlation, -1 to 1.
+    /// Unit of the measured value and the threshold. Empty for scores and fractions (0 to 1) and for correlations (-1
+    /// to 1).
     pub const fn unit(self) -> &'static str {
         self.texts()[1]
     }
 
-    /// Meaning of the reason, for a legend.
+    /// Explanation of the reason, for a legend.
     pub const fn heading(self) -> &'static str {
         self.texts()[2]
     }
 
-    /// The sentence, with what was measured and the threshold.
+    /// Formats the sentence for the user from the measured value and the threshold, both in `unit()`.
     pub fn message(self, measured: f64, threshold: f64) -> String {
         let (m, t) = (measured, threshold);
         match self {
@@ -118,10 +119,10 @@ impl Refusal {
             Self::NoSpeech => {
                 format!("no speech: {:.0} % of the sound is speech, at least {:.0} % are needed", 100.0 * m, 100.0 * t)
             }
-            Self::OtherVoice => {
+            Self::OffScreenSpeaker => {
                 format!("voice of another: the mouth follows the sound with {m:.2}, at least {t:.2} is needed")
             }
-            Self::Still => format!("the picture stands still for {m:.1} s, {t:.1} s are allowed"),
+            Self::Static => format!("the picture stands still for {m:.1} s, {t:.1} s are allowed"),
             Self::NoPerson => format!("no person: face and arms score {m:.2} at best, {t:.2} is needed"),
             Self::Small => format!("too small: {m:.0} px between the shoulders, {t:.0} px are needed"),
             Self::Face => format!("the face is not visible: nose and eyes score {m:.2}, {t:.2} is needed"),
@@ -145,19 +146,19 @@ impl Refusal {
             Self::HandShare => format!("a hand is seen in only {m:.2} of the frames, {t:.2} is needed"),
             Self::Crowd => format!("too many people in {m:.2} of the frames, {t:.2} is allowed"),
             Self::Bones => format!("a bone was lifted {m:.2} off its length in the video, {t:.2} is allowed"),
-            Self::Open => format!("{m:.0} of the joints are not seen for longer than can be filled"),
+            Self::MissingJoints => format!("{m:.0} of the joints are not seen for longer than can be filled"),
             Self::Duplicate => format!("{m:.1} s are in another video"),
-            Self::Guard => format!("{m:.1} s are left out: two splits are at least {t:.1} s apart"),
+            Self::SplitGap => format!("{m:.1} s are left out: two splits are at least {t:.1} s apart"),
             Self::NoSoundFile => "the sound ends here".to_owned(),
             Self::Prediction => "it is what a model predicted, not how a person moved".to_owned(),
-            Self::OutOfStep => format!("sound and motion are {m:.3} s apart, at most {t} s are believed"),
+            Self::LengthMismatch => format!("sound and motion are {m:.3} s apart, at most {t} s are believed"),
             Self::FewFrames => format!("{m} frames have motion and sound, at least {t} are needed"),
             Self::NotImported => "the shards that were imported do not hold it".to_owned(),
         }
     }
 }
 
-/// Why a frame, or a run of frames, is refused: the reason, what was measured, and what it had to reach or stay below.
+/// Why a frame or a run of frames is refused: the reason, the measured value, and the limit that it violates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameRefusal {
     pub refusal: Refusal,
@@ -170,7 +171,7 @@ impl FrameRefusal {
         Self { refusal, measured, threshold }
     }
 
-    /// The mean of what was measured over a run of frames.
+    /// Returns the mean measured value over a run of frames.
     pub fn mean_measured(run: &[Option<Self>]) -> f64 {
         run.iter().flatten().map(|refused| refused.measured).sum::<f64>() / run.len().max(1) as f64
     }

@@ -1,7 +1,7 @@
-//! Runs stages over units: what is fresh is skipped, the rest is worked on by several workers, a failed unit does not
-//! stop the others. What a unit makes does not depend on who made it.
+//! Runs stages over units: units that are up to date are skipped, several workers process the others, and a failed
+//! unit does not stop the run. Results do not depend on which worker processes a unit.
 
-use super::attempt::{attempt, guarded};
+use super::attempt::{attempt, catch_panics};
 use super::fingerprint::{Fingerprint, HashCache};
 use super::overall::OverallProgress;
 use super::parts::{BusyGuard, PartedWork, WorkerPool, remove_parts};
@@ -14,7 +14,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-/// Where a unit stands at a stage.
+/// State of a unit at a stage.
 #[derive(Clone, Debug)]
 pub enum State {
     Fresh(Record),
@@ -22,21 +22,21 @@ pub enum State {
     Failed(String),
 }
 
-/// Work that was laid aside since somebody else has it now: no failure of the unit.
+/// Error: the worker has lost its claim on the unit to another worker. This is not a failure of the unit.
 #[derive(Clone, Debug, thiserror::Error)]
 #[error("{0}")]
-pub struct Abandoned(pub String);
+pub struct ClaimLost(pub String);
 
-/// How a unit came out of a run.
+/// Outcome of a run for a unit.
 #[derive(Clone, Debug)]
 pub enum StageOutcome {
-    /// Fresh already.
+    /// The unit was already up to date.
     Skipped(Report),
     Done(Report),
     Failed(Arc<anyhow::Error>),
 }
 
-/// Where `unit` stands. An unreadable input is a failure.
+/// Determines the state of `unit`. An unreadable input is a failure.
 pub fn state(stage: &dyn Stage, unit: &Unit, work: &Path, hashes: &HashCache) -> State {
     let folder = unit.dir(&work.join(stage.name()));
     let now = match Fingerprint::now(stage, unit, hashes) {
@@ -57,7 +57,7 @@ pub fn state(stage: &dyn Stage, unit: &Unit, work: &Path, hashes: &HashCache) ->
     }
 }
 
-/// Runs `stage` for every unit on `jobs` workers (at least one); the answers stand in the order of `units`.
+/// Runs `stage` for every unit on `jobs` workers (at least one). The outcomes are in the order of `units`.
 pub fn run(
     stage: &dyn Stage,
     units: &[Unit],
@@ -69,9 +69,10 @@ pub fn run(
     run_stages(&[stage], units, work, hashes, limits, progress).into_iter().flatten().collect()
 }
 
-/// Runs `stages`, one after the other, for every unit on `jobs` workers (at least one). No unit waits for another at any
-/// stage, and the largest begin first, so that the workers end together. A unit that fails goes no further: its answers,
-/// one a stage, end with the failure. They stand in the order of `units`.
+/// Runs `stages` in sequence for every unit on `jobs` workers (at least one). No stage waits until all units have
+/// finished the stage before it, and the largest units start first, so that the workers finish at about the same time.
+/// Stages after a failure are not run for that unit: its outcomes, one per stage, end with the failure. The units are
+/// in the order of `units`.
 pub fn run_stages(
     stages: &[&dyn Stage],
     units: &[Unit],
@@ -91,8 +92,8 @@ pub fn run_stages(
                 let busy = BusyGuard(&pool);
                 while let Some(&at) = order.get(next.fetch_add(1, Ordering::SeqCst)) {
                     for (idx, stage) in stages.iter().enumerate() {
-                        let place = (work, hashes, force);
-                        let answer = run_unit(*stage, &units[at], place, &pool, &overall);
+                        let context = (work, hashes, force);
+                        let answer = run_unit(*stage, &units[at], context, &pool, &overall);
                         report(&answer, *stage, &units[at], progress);
                         let has_failed = matches!(answer, StageOutcome::Failed(_));
                         if let Ok(mut answers) = ended[at].lock() {
@@ -103,7 +104,7 @@ pub fn run_stages(
                             break;
                         }
                     }
-                    hashes.save_now_and_then();
+                    hashes.save_periodically();
                 }
                 drop(busy);
                 pool.help();
@@ -111,17 +112,20 @@ pub fn run_stages(
         }
     });
     let answers = ended.into_iter().map(|answers| answers.into_inner().unwrap_or_default());
-    let whole = |mut answers: Vec<StageOutcome>| {
+    let completed = |mut answers: Vec<StageOutcome>| {
         if answers.len() < stages.len() && !matches!(answers.last(), Some(StageOutcome::Failed(_))) {
             answers.push(StageOutcome::Failed(Arc::new(anyhow!("the worker was lost"))));
         }
         answers
     };
-    answers.map(whole).collect()
+    answers.map(completed).collect()
 }
 
-/// Does share `idx` of `of` of the unit's parts, those that are not done; nothing where the stage has no parts or the
-/// unit is fresh. Errors: an input that cannot be read; the first part that fails.
+/// Runs share `idx` of `of` of the unit's parts, except finished ones. Does nothing if the unit has no parts or is up
+/// to date.
+///
+/// # Errors
+/// An input cannot be read; the first error of a part.
 pub fn run_parts(
     stage: &dyn Stage,
     unit: &Unit,
@@ -142,10 +146,10 @@ pub fn run_parts(
     let folder = unit.dir(&work.join(stage.name()));
     let parts = PartedWork { stage, unit, n_parts, fingerprint, folder, overall: &overall };
     let bound = |idx: usize| idx * n_parts / of.max(1);
-    (bound(idx)..bound(idx + 1)).try_for_each(|part| guarded(|| parts.work_on(part)))
+    (bound(idx)..bound(idx + 1)).try_for_each(|part| catch_panics(|| parts.work_on(part)))
 }
 
-/// Indices of the units, those of large files first.
+/// Returns the indices of the units, ordered by descending size of the source file.
 fn largest_first(units: &[Unit]) -> Vec<usize> {
     let bytes = |unit: &Unit| std::fs::metadata(&unit.source).map_or(0, |meta| meta.len());
     let mut order: Vec<usize> = (0..units.len()).collect();
@@ -172,7 +176,7 @@ fn run_unit<'a>(
     overall: &'a OverallProgress<'a>,
 ) -> StageOutcome {
     let folder = unit.dir(&work.join(stage.name()));
-    let fingerprint = match guarded(|| Fingerprint::now(stage, unit, hashes)) {
+    let fingerprint = match catch_panics(|| Fingerprint::now(stage, unit, hashes)) {
         Ok(now) => now,
         Err(error) => {
             overall.skip(&[stage], unit);
@@ -184,8 +188,8 @@ fn run_unit<'a>(
         && record.dirty(&fingerprint, stage.common_folder().unwrap_or(&folder)).is_none()
     {
         overall.skip(&[stage], unit);
-        // An earlier program may have left one that is over, a killed one the parts; where they cannot be removed, the
-        // record still counts.
+        // An earlier version may have left an outdated failure, and a killed program parts. If they cannot be removed,
+        // the record is still valid.
         let _ = Failure::forget(&folder).and_then(|()| remove_parts(&folder));
         return StageOutcome::Skipped(Report { line: record.line, facts: record.facts });
     }
@@ -195,7 +199,7 @@ fn run_unit<'a>(
         }
         let n_parts = stage.n_parts(unit)?;
         if n_parts < 2 {
-            let _lock = stage.is_read_long().then(|| FolderLock::exclusive(&folder)).transpose()?;
+            let _lock = stage.needs_folder_lock().then(|| FolderLock::exclusive(&folder)).transpose()?;
             let progress = overall.of(stage, unit);
             return attempt(&folder, stage.common_folder(), &fingerprint, |out| stage.run(unit, out, &progress));
         }
@@ -207,15 +211,16 @@ fn run_unit<'a>(
         let _ = remove_parts(&folder);
         Ok(report)
     };
-    match guarded(work) {
+    match catch_panics(work) {
         Ok(report) => StageOutcome::Done(report),
         Err(error) => failed(&folder, Some(fingerprint), error),
     }
 }
 
 fn failed(folder: &Path, fingerprint: Option<Fingerprint>, error: anyhow::Error) -> StageOutcome {
-    if !error.is::<Abandoned>() {
-        // The failure is shown either way; where even this cannot be written the work folder itself is the trouble.
+    if !error.is::<ClaimLost>() {
+        // The failure is reported in any case; if even this file cannot be written, the work folder itself is
+        // unusable.
         let _ = Failure { fingerprint, error: format!("{error:#}") }.write(folder);
     }
     StageOutcome::Failed(Arc::new(error))

@@ -1,23 +1,23 @@
-//! What a stage is, what it works on, reads and reports.
+//! The interface of a stage: the units that it processes, the files that it reads, and its report.
 
 use super::progress::Progress;
 use anyhow::Context;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// One thing a stage works on: a video of a speaker, or (for the dataset) a whole speaker.
+/// Work item of a stage: a video of a speaker, or a whole speaker (for the dataset).
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Unit {
-    /// Name of the speaker; empty where a unit belongs to none.
+    /// Name of the speaker; empty if the unit belongs to no speaker.
     pub speaker: String,
     /// Work folder name of the video: slug of its stem, `-`, 8 hex digits of its path; empty for a whole speaker.
     pub video: String,
-    /// The video file; for a whole speaker the configuration file.
+    /// The video file; the configuration file for a whole speaker.
     pub source: PathBuf,
 }
 
 impl Unit {
-    /// The folder of the unit under `stage`, a stage's folder: `<speaker>/<video>`, or `<speaker>` of a whole speaker.
+    /// Folder of the unit in `stage`, a stage's folder: `<speaker>/<video>`, or `<speaker>` for a whole speaker.
     pub fn dir(&self, stage: &Path) -> PathBuf {
         let speaker = stage.join(&self.speaker);
         if self.video.is_empty() { speaker } else { speaker.join(&self.video) }
@@ -33,68 +33,69 @@ impl fmt::Display for Unit {
     }
 }
 
-/// A file a stage reads: its role (`video`, `keypoints`, `model:body`) and where it is.
+/// An input file of a stage: its role (`video`, `keypoints`, `model:body`) and its path.
 #[derive(Clone, Debug)]
 pub struct Input {
     pub role: String,
     pub path: PathBuf,
 }
 
-/// One line of a stage's report on a unit, for people; and the numbers behind it, for programs.
+/// Report of a stage on a unit: a line for the user, and the values behind it for programs.
 #[derive(Clone, Debug, Default)]
 pub struct Report {
     pub line: String,
     pub facts: serde_json::Map<String, serde_json::Value>,
 }
 
-/// A step of the pipeline. The same inputs and settings give the same bytes, whatever else runs beside it.
+/// A step of the pipeline. Equal inputs and settings give identical bytes, whatever else runs at the same time.
 pub trait Stage: Sync {
-    /// The name: an argument of `--from`, and the folder under `work/`.
+    /// Stage name: an argument of `--from`, and the stage's folder under `work/`.
     fn name(&self) -> &'static str;
-    /// Goes up when the bytes it writes change their meaning.
+    /// Version of the stage; incremented when the bytes that it writes change their meaning.
     fn version(&self) -> u32;
-    /// Time it takes for a video, relative to other stages.
+    /// Run time per video relative to other stages.
     fn cost(&self) -> u32 {
         1
     }
-    /// Every setting that influences the bytes made of `unit`, and the versions of the tools that do. Reads nothing from
-    /// disk: what depends on files is determined when the stage is constructed.
+    /// Every setting that influences the output for `unit`, and the versions of the tools that do. Reads nothing from
+    /// disk: settings that depend on files are determined when the stage is constructed.
     fn settings(&self, unit: &Unit) -> serde_json::Value;
-    /// The files it reads for `unit`; their contents are part of the fingerprint.
+    /// Input files for `unit`; their contents are part of the fingerprint.
     fn inputs(&self, unit: &Unit) -> anyhow::Result<Vec<Input>>;
-    /// The folder into which the files of all units go side by side; none: each unit's own folder under the stage's.
+    /// Folder that receives the files of all units; `None`: each unit has its own folder in the stage's folder.
     fn common_folder(&self) -> Option<&Path> {
         None
     }
-    /// Whether others read the unit's folder for long: nobody may while the stage writes it anew.
-    fn is_read_long(&self) -> bool {
+    /// Whether other programs read the unit's folder for a long time, so that the stage must lock it before replacing
+    /// it.
+    fn needs_folder_lock(&self) -> bool {
         false
     }
-    /// Does the work: writes its files into the empty folder `out` and nowhere else.
+    /// Processes the unit: writes its files into the empty folder `out` and nowhere else.
     fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> anyhow::Result<Report>;
-    /// The number of parts in which the work on `unit` can be done, in any order and by anybody; with `join` that gives the
-    /// bytes of `run`.
+    /// Number of parts of the work on `unit`. Parts can run in any order and in any process; `join` then gives the
+    /// same bytes as `run`.
     fn n_parts(&self, _unit: &Unit) -> anyhow::Result<usize> {
         Ok(1)
     }
-    /// Does a part of the work, from 0: writes its files into the empty folder `out` and nowhere else.
+    /// Processes part `part`, counted from 0: writes its files into the empty folder `out` and nowhere else.
     fn run_part(&self, unit: &Unit, part: usize, _out: &Path, _progress: &dyn Progress) -> anyhow::Result<()> {
         anyhow::bail!("{} of {unit} has no part {part}", self.name())
     }
-    /// Makes the unit's files in the empty folder `out` of the folders of all `parts`, in order.
+    /// Builds the unit's files in the empty folder `out` from the folders of all `parts`, in order.
     fn join(&self, unit: &Unit, parts: &[PathBuf], _out: &Path) -> anyhow::Result<Report> {
         anyhow::bail!("{} of {unit} has no {} parts", self.name(), parts.len())
     }
 }
 
-/// Writes a file of a stage into its `out` folder as JSON for people.
+/// Writes a file of a stage as indented JSON.
 pub fn write_json(path: &Path, value: &impl serde::Serialize) -> anyhow::Result<()> {
     let mut bytes = serde_json::to_vec_pretty(value)?;
     bytes.push(b'\n');
     std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
 }
 
-/// `1 video`, `2 videos`.
+/// Formats a count with its noun: `1 video`, `2 videos`.
 pub fn counted(n: usize, what: &str) -> String {
     if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
 }

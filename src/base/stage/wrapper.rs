@@ -1,19 +1,19 @@
-//! A stage around another one, of which it changes the work alone.
+//! A stage that wraps another stage and replaces only its work.
 
 use super::progress::Progress;
 use super::{Input, Report, Stage, Unit};
 use anyhow::Result;
 use std::path::{Path, PathBuf};
 
-/// All of a stage but the work is that of an inner one.
+/// A stage that delegates everything except its work to an inner stage.
 pub trait StageWrapper: Sync {
-    /// The inner stage, by which `unit` is worked on; that of units of no special kind without one.
+    /// Inner stage that processes `unit`; `None`: the inner stage of ordinary units.
     fn inner(&self, unit: Option<&Unit>) -> &dyn Stage;
-    /// Does the work, as `Stage::run`.
+    /// Processes the unit, as `Stage::run`.
     fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> Result<Report> {
         self.inner(Some(unit)).run(unit, out, progress)
     }
-    /// Does a part of the work, as `Stage::run_part`.
+    /// Processes a part, as `Stage::run_part`.
     fn run_part(&self, unit: &Unit, part: usize, out: &Path, progress: &dyn Progress) -> Result<()> {
         self.inner(Some(unit)).run_part(unit, part, out, progress)
     }
@@ -44,8 +44,8 @@ impl<W: StageWrapper> Stage for W {
         self.inner(None).common_folder()
     }
 
-    fn is_read_long(&self) -> bool {
-        self.inner(None).is_read_long()
+    fn needs_folder_lock(&self) -> bool {
+        self.inner(None).needs_folder_lock()
     }
 
     fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> Result<Report> {

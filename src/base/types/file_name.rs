@@ -1,35 +1,38 @@
-//! Names that a file gives to other files.
+//! File names that a file contains, for instance names of other files.
 
 use serde::{Deserialize, Serialize};
 use std::borrow::Borrow;
 use std::fmt;
 use std::ops::Deref;
 
-/// Most bytes of a name, those of common file systems.
-const MOST_BYTES: usize = 255;
+/// Maximum length of a name in bytes, the limit of common file systems.
+const MAX_BYTES: usize = 255;
 
-/// Name of one file or folder within its folder: 1 to 255 bytes, no separator (`/` or `\`), no dot at the beginning, no
-/// control character. A path that such a name is joined to is not left.
+/// Name of one file or folder within its folder: 1 to 255 bytes, no separator (`/` or `\`), no leading dot, no control
+/// character. Joining such a name to a folder never leaves the folder.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String")]
 pub struct FileName(String);
 
-/// Text that is no [`FileName`].
+/// Error: the text is not a [`FileName`].
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{0:?} is no name of a file: expected 1 to {MOST_BYTES} bytes without /, \\, control characters or a dot at the beginning"
+    "{0:?} is no name of a file: expected 1 to {MAX_BYTES} bytes without /, \\, control characters or a dot at the beginning"
 )]
 pub struct FileNameError(String);
 
 impl FileName {
     /// Checks a name.
+    ///
+    /// # Errors
+    /// The name violates the rules of [`FileName`].
     pub fn new(name: impl Into<String>) -> Result<Self, FileNameError> {
         let name = name.into();
-        let is_plain = (1..=MOST_BYTES).contains(&name.len())
+        let is_plain = (1..=MAX_BYTES).contains(&name.len())
             && !name.starts_with('.')
             && !name.contains(|letter: char| matches!(letter, '/' | '\\') || letter.is_control());
-        // An error of a name of many pages shows its beginning.
-        if is_plain { Ok(Self(name)) } else { Err(FileNameError(name.chars().take(MOST_BYTES).collect())) }
+        // Truncated, because the error prints the name, which may be very long.
+        if is_plain { Ok(Self(name)) } else { Err(FileNameError(name.chars().take(MAX_BYTES).collect())) }
     }
 }
 
@@ -84,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_name_stays_in_its_folder() {
+    fn names_never_leave_their_folder() {
         for name in ["a", "train-clip-1-ef0a7ac8-0000.tar", "Vortrag über Öl.mp4", "a..b", &"x".repeat(255)] {
             let quoted = serde_json::to_string(name).unwrap();
             let read: FileName = serde_json::from_str(&quoted).unwrap();

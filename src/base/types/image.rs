@@ -1,8 +1,8 @@
-//! A picture in memory, and how those of a video are to be read.
+//! A picture in memory, and options for reading the pictures of a video.
 
 use serde::{Deserialize, Serialize};
 
-/// 8-bit RGB, rows from the top without padding: `data.len() == 3 * width * height`.
+/// Picture of 8-bit RGB; rows from the top, without padding: `data.len() == 3 * width * height`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Image {
     pub width: usize,
@@ -11,12 +11,12 @@ pub struct Image {
 }
 
 impl Image {
-    /// A picture of one colour.
+    /// Creates a picture of one colour.
     pub fn filled(width: usize, height: usize, rgb: [u8; 3]) -> Self {
         Self { width, height, data: rgb.repeat(width * height) }
     }
 
-    /// The part of the picture within `area`, which is cut to the picture.
+    /// Returns the part of the picture within `area`, which is clipped to the picture.
     pub fn cropped(&self, area: PixelArea) -> Self {
         let [x, y] = [area.x.min(self.width), area.y.min(self.height)];
         let [width, height] = [area.width.min(self.width - x), area.height.min(self.height - y)];
@@ -27,7 +27,7 @@ impl Image {
         Self { width, height, data: rows.copied().collect() }
     }
 
-    /// The picture in the middle of a black one of `size` (width, height), which is no smaller.
+    /// Pads the picture with black to `size` (width, height), which must not be smaller; the picture is centred.
     pub fn framed(&self, [width, height]: [usize; 2]) -> Self {
         let mut framed = Self::filled(width, height, [0; 3]);
         let [left, top] = [width.saturating_sub(self.width) / 2, height.saturating_sub(self.height) / 2];
@@ -39,14 +39,14 @@ impl Image {
         framed
     }
 
-    /// The pixel in column `x`, row `y`. Panics outside the picture, like indexing.
+    /// Returns the pixel in column `x`, row `y`. Panics outside the picture, like indexing.
     pub fn pixel(&self, x: usize, y: usize) -> [u8; 3] {
         let at = 3 * (y * self.width + x);
         [self.data[at], self.data[at + 1], self.data[at + 2]]
     }
 }
 
-/// Rectangle of a picture, px.
+/// Rectangle in a picture, px.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PixelArea {
     pub x: usize,
@@ -55,18 +55,18 @@ pub struct PixelArea {
     pub height: usize,
 }
 
-/// How the pictures of a video are to be read.
+/// Options for reading the pictures of a video.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PictureOptions {
-    /// The two fields of a frame were taken one after the other: one is kept, the other interpolated where they differ.
+    /// Deinterlace: one field of a frame is retained, the other is interpolated where the two fields differ.
     pub deinterlace: bool,
-    /// Left and right are exchanged.
+    /// Flip the picture horizontally.
     pub mirrored: bool,
 }
 
 impl PictureOptions {
-    /// Whether pictures are read as they are.
+    /// Returns whether pictures are read unchanged.
     pub fn is_plain(&self) -> bool {
         *self == Self::default()
     }
@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_crop_is_cut_to_the_picture() {
+    fn crop_is_clipped_to_the_picture() {
         let image = Image { width: 3, height: 2, data: (0..18).collect() };
         let area = |x, y, width, height| PixelArea { x, y, width, height };
         assert_eq!(image.cropped(area(0, 0, 3, 2)), image);

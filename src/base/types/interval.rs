@@ -1,9 +1,9 @@
-//! Runs of frames that are kept.
+//! Retained runs of frames.
 
 use super::time::FrameRate;
 use serde::{Deserialize, Serialize};
 
-/// Frames `start..end` of a video at the dataset rate: continuous motion of the one speaker with its sound.
+/// Frames `start..end` of a video at the dataset rate: continuous motion of one speaker, with sound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Interval {
     pub start: usize,
@@ -16,27 +16,26 @@ impl Interval {
         self.end.saturating_sub(self.start)
     }
 
-    /// Number of windows of `n_frames` when one begins every `stride` frames; with `stride == n_frames` they lie side by
-    /// side.
+    /// Number of windows of `n_frames` that start every `stride` frames; with `stride == n_frames` they are adjacent.
     pub const fn n_windows(self, n_frames: usize, stride: usize) -> usize {
         let length = self.end.saturating_sub(self.start);
         if n_frames == 0 || stride == 0 || length < n_frames { 0 } else { (length - n_frames) / stride + 1 }
     }
 }
 
-/// The intervals of a video, as they stand in `intervals.json`: in order, apart from each other.
+/// Intervals of a video as stored in `intervals.json`: sorted and disjoint.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Intervals {
     pub fps: FrameRate,
     pub n_frames: usize,
     pub intervals: Vec<Interval>,
     pub windows_64: Windows64,
-    /// Stretches of the intervals in which the hands rest on each other: what is not seen of them is filled and masked.
+    /// Parts of the intervals in which the hands rest on each other; the hidden joints are filled in and masked.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub resting: Vec<Interval>,
 }
 
-/// Windows of 64 frames in all intervals together: one every 5 frames, and side by side.
+/// Numbers of windows of 64 frames over all intervals: with a stride of 5 frames, and without overlap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Windows64 {
     pub stride_5: usize,
@@ -44,14 +43,14 @@ pub struct Windows64 {
 }
 
 impl Intervals {
-    /// Counts the windows of `intervals`.
+    /// Creates the intervals and counts their windows.
     pub fn new(fps: FrameRate, n_frames: usize, intervals: Vec<Interval>) -> Self {
         let count = |stride| intervals.iter().map(|interval| interval.n_windows(64, stride)).sum();
         let windows_64 = Windows64 { stride_5: count(5), apart: count(64) };
         Self { fps, n_frames, intervals, windows_64, resting: Vec::new() }
     }
 
-    /// With the parts of the stretches `resting` that lie in the intervals.
+    /// Sets `resting` to the parts of the given intervals that overlap the retained ones.
     #[must_use]
     pub fn with_resting(mut self, resting: &[Interval]) -> Self {
         let part = |interval: &Interval, rest: &Interval| Interval {
@@ -63,12 +62,12 @@ impl Intervals {
         self
     }
 
-    /// Stretches in which the hands rest, from second to second.
+    /// Intervals in which the hands rest, as (start, end) in seconds.
     pub fn resting_stretches(&self) -> impl Iterator<Item = (f64, f64)> {
         self.resting.iter().map(|rest| (self.fps.secs(rest.start), self.fps.secs(rest.end)))
     }
 
-    /// Seconds in which the hands rest.
+    /// Total duration in seconds in which the hands rest.
     pub fn resting_secs(&self) -> f64 {
         self.resting.iter().map(|rest| self.fps.secs(rest.n_frames())).sum()
     }

@@ -1,5 +1,5 @@
-//! Plain values every room speaks: time, pictures, poses, sound, intervals. No files, no maths beyond their own
-//! invariants; this room imports nothing of the project.
+//! Plain values used by all modules: time, pictures, poses, sound, intervals. No file access, no mathematics beyond
+//! their own invariants; this module imports no other module of the project.
 
 pub mod file_name;
 pub mod image;

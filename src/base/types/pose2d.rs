@@ -1,20 +1,21 @@
-//! 2D keypoints: one frame as the detectors give it, and a whole video as it is stored.
+//! 2D keypoints: one frame as detected, and a complete video as stored.
 
 use super::time::FrameRate;
 use ndarray::Array3;
 use serde::{Deserialize, Serialize};
 
-/// Points of a body, COCO-17: nose, left/right eye, ear, shoulder, elbow, wrist, hip, knee, ankle (odd = left).
+/// Number of body keypoints, COCO-17: nose, left/right eye, ear, shoulder, elbow, wrist, hip, knee, ankle (odd =
+/// left).
 pub const N_BODY: usize = 17;
-/// Points of a hand: wrist, then thumb, index, middle, ring, little, each base to tip.
+/// Number of hand keypoints: wrist, then thumb, index, middle, ring, little finger, each from base to tip.
 pub const N_HAND: usize = 21;
 
-/// A keypoint counts as seen from this score on.
+/// Minimum score of a visible keypoint.
 pub const SEEN_SCORE: f32 = 0.3;
-/// A hand's keypoint counts as seen by the hand lifter from this score on.
+/// Minimum score of a visible hand keypoint for the hand lifter.
 pub const HAND_SEEN_SCORE: f32 = 0.2;
 
-/// COCO-17 indices.
+/// Keypoint indices of COCO-17.
 pub mod coco {
     pub const NOSE: usize = 0;
     pub const L_EYE: usize = 1;
@@ -31,8 +32,8 @@ pub mod coco {
     pub const R_HIP: usize = 12;
 }
 
-/// A point of the picture in pixels (x right, y down, the centre of the top left pixel is 0, 0) and how sure the
-/// detector is, 0..1; score 0 means missing.
+/// Point in a picture, in pixels (x right, y down, the centre of the top left pixel is 0, 0), with the detector's
+/// confidence, 0..1; score 0 means missing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Keypoint {
     pub x: f32,
@@ -40,7 +41,7 @@ pub struct Keypoint {
     pub score: f32,
 }
 
-/// A box of the picture in pixels, top left corner and size, with the detector's score.
+/// Bounding box in pixels: top left corner and size, with the detector's score.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PersonBox {
     pub x: f32,
@@ -50,38 +51,39 @@ pub struct PersonBox {
     pub score: f32,
 }
 
-/// Person and keypoints of one frame. A hand or body not found is all zeros.
+/// Tracked person and keypoints of one frame. Keypoints of a missing hand or body are all zeros.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Pose2d {
-    /// The followed person.
+    /// Bounding box of the tracked person.
     pub person: PersonBox,
-    /// People in view.
+    /// Number of persons in the picture.
     pub n_people: u8,
-    /// Number of the person that is tracked; it changes with the person.
+    /// Track id of the tracked person.
     pub identity: i64,
-    /// COCO-17.
+    /// Body keypoints, COCO-17.
     pub body: [Keypoint; N_BODY],
     /// The speaker's left hand.
     pub left_hand: [Keypoint; N_HAND],
     /// The speaker's right hand.
     pub right_hand: [Keypoint; N_HAND],
-    /// Whether the other hand was found where the left and the right hand were looked for, which then count as missing.
+    /// Whether the detector found the opposite hand in the search regions of the [left, right] hand, which then counts
+    /// as missing.
     pub other_hand: [bool; 2],
-    /// The speaker's face, where it is seen closely.
+    /// The speaker's face, if it is large enough in the picture.
     pub face: Option<FaceSeen>,
 }
 
-/// What is seen of a face.
+/// Measurements of a detected face.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FaceSeen {
-    /// How sure it is that there is a face, 0..1.
+    /// Confidence that the region contains a face, 0..1.
     pub score: f32,
-    /// Distance of the lips in distances between the outer corners of the eyes.
+    /// Distance between the lips in distances between the outer corners of the eyes.
     pub opening: f32,
 }
 
 impl Pose2d {
-    /// What is seen in a part of a picture, as px of the whole: the part's corner is at `x`, `y`.
+    /// Converts detections in a crop with the top left corner (`x`, `y`) to px of the full picture.
     #[must_use]
     pub fn moved(mut self, [x, y]: [usize; 2]) -> Self {
         let [x, y] = [x as f32, y as f32];
@@ -96,12 +98,12 @@ impl Pose2d {
     }
 }
 
-/// The keypoints of a whole video at the dataset rate; last axis x px, y px, score; score 0 = missing.
+/// Keypoints of a complete video at the dataset rate; last axis: x px, y px, score; score 0 means missing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Keypoints {
     /// The dataset rate.
     pub fps: FrameRate,
-    /// Width and height in px of the upright picture.
+    /// Width and height of the upright picture in px.
     pub image_size: [u32; 2],
     /// [T, 17, 3]
     pub body: Array3<f32>,

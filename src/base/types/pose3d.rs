@@ -1,51 +1,54 @@
-//! 3D motion: joints over time in camera axes, metres, the neck at the origin.
+//! 3D motion: joint positions over time in camera axes, in metres, with the neck at the origin.
 
 use super::skeleton;
 use super::time::FrameRate;
 use ndarray::{Array2, Array3};
 
-/// Motion of the 49-joint skeleton (`skeleton`): x image right, y down, z away from the camera, float32 metres, the
-/// neck at the origin of every frame.
+/// Motion of the 49-joint skeleton (`skeleton`): x image right, y down, z away from the camera, float32 metres; the
+/// neck is the origin of every frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motion {
-    /// Frames a second.
+    /// Frame rate.
     pub fps: FrameRate,
     /// [T, 49, 3]; a missing joint is NaN.
     pub joints: Array3<f32>,
-    /// [T, 49]; false where the joint was not seen (missing, or filled over a gap).
+    /// [T, 49]; false if the joint was not visible (missing, or interpolated over a gap).
     pub mask: Array2<bool>,
 }
 
-/// Farthest that a joint lies from the neck, metres, or medians of all coordinates where that is more: a whole figure in
-/// millimetres can be told from a joint gone astray.
+/// Maximum plausible coordinate of a joint relative to the neck: in metres, or in medians of all coordinates if that
+/// is larger, so that motion in millimetres is distinguished from a single outlier.
 const FARTHEST: f32 = 100.0;
-/// Farthest in any unit: far less than what overflows.
+/// Maximum coordinate in any unit, far below what overflows.
 const FARTHEST_OF_ALL: f32 = 1e5;
 
-/// Joint beyond all sense.
+/// Error: implausibly distant joint.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
     "frame {frame}, joint {joint} ({}): {position:?} lies beyond all sense, {FARTHEST} m from the neck or more; joints must be in metres",
     skeleton::name(*joint)
 )]
 pub struct FarJoint {
-    /// Frame, from 0.
+    /// Frame index, from 0.
     pub frame: usize,
-    /// Joint, 0..49.
+    /// Joint index, 0..49.
     pub joint: usize,
     /// Position as read.
     pub position: [f32; 3],
 }
 
 impl Motion {
-    /// From joints [T, 49, 3] alone: what is not finite was not seen.
+    /// Creates motion from joints [T, 49, 3]; joints with a non-finite coordinate are masked as not visible.
     pub fn from_joints(fps: FrameRate, joints: Array3<f32>) -> Self {
         let mask = joints.map_axis(ndarray::Axis(2), |place| place.iter().all(|v| v.is_finite()));
         Self { fps, joints, mask }
     }
 
-    /// Checks that every joint lies within 100 m of the neck or is missing; done once, where a file is read. A figure
-    /// that is large as a whole passes, to be told later that it is not in metres.
+    /// Checks that every joint is missing or within 100 m of the neck; called once, when a file is read. Motion that
+    /// is large as a whole passes, because a later check reports that it is not in metres.
+    ///
+    /// # Errors
+    /// `FarJoint`, the first joint that is too far.
     pub fn in_range(self) -> Result<Self, FarJoint> {
         let mut sizes: Vec<f32> = self.joints.iter().map(|v| v.abs()).filter(|v| v.is_finite()).collect();
         let middle = sizes.len() / 2;

@@ -1,32 +1,32 @@
-//! What a speaker's trunk and head do beside the 49 joints.
+//! Posture of a speaker's trunk and head, which are not part of the 49 joints.
 
 use ndarray::{Array2, s};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
-/// Angles of trunk and head, frame by frame, in the axes of the motion they belong to, radians; NaN where they are not
-/// seen. Both are of the world, not of one against the other.
+/// Angles of trunk and head per frame, in the axes of the corresponding motion, radians; NaN if not visible. Both are
+/// absolute, not relative to each other.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Posture {
-    /// [T, 3]: yaw to the person's left, pitch downwards, roll towards the right shoulder. Of the head, 0 when it looks
-    /// into the camera as it does in the clip's median.
+    /// [T, 3]: yaw to the person's left, pitch downwards, roll towards the right shoulder; 0 for the head's median
+    /// orientation in the clip, which is taken as looking into the camera.
     pub head: Array2<f32>,
-    /// [T, 3]: the same of the trunk, from the hips to the neck; pitch is the lean forward.
+    /// [T, 3]: yaw, pitch and roll of the trunk, from the hips to the neck; pitch is the forward lean.
     pub trunk: Array2<f32>,
 }
 
-/// Part of the body whose angles a posture holds.
+/// Body part whose angles a posture contains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PostureChannel {
-    /// Angles of the head.
+    /// Head angles.
     Head,
-    /// Angles of the trunk.
+    /// Trunk angles.
     Trunk,
 }
 
 impl PostureChannel {
-    /// Both, in the order in which they are stored.
+    /// All channels, in the order in which they are stored.
     pub const ALL: [Self; 2] = [Self::Head, Self::Trunk];
 
     /// Name in files and in the configuration.
@@ -39,7 +39,7 @@ impl PostureChannel {
 }
 
 impl Posture {
-    /// Posture of `n_frames` in which nothing is seen.
+    /// Creates a posture of `n_frames` in which nothing is visible.
     pub fn unseen(n_frames: usize) -> Self {
         let nothing = Array2::from_elem((n_frames, 3), f32::NAN);
         Self { head: nothing.clone(), trunk: nothing }
@@ -53,7 +53,7 @@ impl Posture {
         }
     }
 
-    /// Angles [T, 3] of a channel, to be changed.
+    /// Mutable angles [T, 3] of a channel.
     pub fn channel_mut(&mut self, channel: PostureChannel) -> &mut Array2<f32> {
         match channel {
             PostureChannel::Head => &mut self.head,
@@ -61,7 +61,7 @@ impl Posture {
         }
     }
 
-    /// The frames `frames` alone.
+    /// Returns the frames in `frames`.
     pub fn slice(&self, frames: Range<usize>) -> Self {
         let [head, trunk] = [&self.head, &self.trunk].map(|of| of.slice(s![frames.clone(), ..]).to_owned());
         Self { head, trunk }

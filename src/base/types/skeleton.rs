@@ -1,12 +1,13 @@
-//! The 49-joint skeleton of Rebol et al. 2021 in house order: neck, right arm, left arm, left hand, right hand; a
-//! hand is its wrist, then thumb, index, middle, ring, little, each BASE TO TIP (the OpenPose / MediaPipe order).
-//! The authors' text files run each finger tip first: `AUTHORS_FROM_HOUSE` is that permutation, its own inverse.
+//! The 49-joint skeleton of Rebol et al. 2021 in the joint order of this project: neck, right arm, left arm, left
+//! hand, right hand; a hand is its wrist, then thumb, index, middle, ring, little finger, each from BASE TO TIP (the
+//! OpenPose / MediaPipe order). The authors' text files list each finger from the tip; `swap_authors_order` converts
+//! between the two orders and is its own inverse.
 
-/// Joints of the skeleton.
+/// Number of joints of the skeleton.
 pub const N_JOINTS: usize = 49;
-/// Joints of a hand, its root (the wrist again) included.
+/// Number of joints of a hand, including its root, which duplicates the wrist.
 pub const N_HAND_JOINTS: usize = 21;
-/// Bones: every joint but the neck has one, to its parent.
+/// Number of bones: every joint except the neck has one, to its parent.
 pub const N_BONES: usize = N_JOINTS - 1;
 
 pub const NECK: usize = 0;
@@ -16,21 +17,21 @@ pub const R_WRIST: usize = 3;
 pub const L_SHOULDER: usize = 4;
 pub const L_ELBOW: usize = 5;
 pub const L_WRIST: usize = 6;
-/// Root of the left hand; equals `L_WRIST` exactly.
+/// Root of the left hand; always equal to `L_WRIST`.
 pub const L_HAND: usize = 7;
-/// Root of the right hand; equals `R_WRIST` exactly.
+/// Root of the right hand; always equal to `R_WRIST`.
 pub const R_HAND: usize = 28;
 
-/// Bones of the arms, each with the joints at its ends: upper arms, then forearms, right before left.
+/// Bones of the arms as pairs of joints: upper arms, then forearms, right before left.
 pub const ARM_BONES: [(usize, usize); 4] =
     [(R_SHOULDER, R_ELBOW), (L_SHOULDER, L_ELBOW), (R_ELBOW, R_WRIST), (L_ELBOW, L_WRIST)];
-/// The shoulders as one bone, then `ARM_BONES`: the bones that give a body its size.
+/// The shoulder line, then `ARM_BONES`: the bones that determine the scale of a body.
 pub const BODY_BONES: [(usize, usize); 5] =
     [(R_SHOULDER, L_SHOULDER), ARM_BONES[0], ARM_BONES[1], ARM_BONES[2], ARM_BONES[3]];
 /// Shoulder, elbow and wrist of the right and the left arm.
 pub const ARMS: [[usize; 3]; 2] = [[R_SHOULDER, R_ELBOW, R_WRIST], [L_SHOULDER, L_ELBOW, L_WRIST]];
 
-/// Side of the speaker's own body a joint belongs to.
+/// Side of the speaker's body that a joint belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
     Centre,
@@ -41,7 +42,7 @@ pub enum Side {
 const FINGERS: [&str; 5] = ["Thumb", "Index", "Middle", "Ring", "Little"];
 const PHALANGES: [&str; 4] = ["Base", "Inter", "Distal", "Tip"];
 
-/// Parent of each joint; the neck's is `None`.
+/// Returns the parent of a joint; `None` for the neck.
 pub const fn parent(joint: usize) -> Option<usize> {
     match joint {
         NECK => None,
@@ -56,7 +57,7 @@ pub const fn parent(joint: usize) -> Option<usize> {
     }
 }
 
-/// Side of each joint.
+/// Returns the side of a joint.
 pub const fn side(joint: usize) -> Side {
     match joint {
         NECK => Side::Centre,
@@ -66,12 +67,12 @@ pub const fn side(joint: usize) -> Side {
     }
 }
 
-/// Whether the joint is a hand's root, which is the wrist again.
+/// Returns whether the joint is the root of a hand, which duplicates the wrist.
 pub const fn is_duplicate(joint: usize) -> bool {
     joint == L_HAND || joint == R_HAND
 }
 
-/// Name of a joint, for instance `RWrist`, `LIndexTip`.
+/// Returns the name of a joint, for instance `RWrist`, `LIndexTip`.
 pub fn name(joint: usize) -> String {
     const BODY: [&str; 7] = ["Neck", "RShoulder", "RElbow", "RWrist", "LShoulder", "LElbow", "LWrist"];
     if joint < L_HAND {
@@ -84,7 +85,7 @@ pub fn name(joint: usize) -> String {
     }
 }
 
-/// Joint on the other side of the body.
+/// Returns the corresponding joint on the other side of the body.
 pub const fn mirror(joint: usize) -> usize {
     match joint {
         NECK => NECK,
@@ -95,8 +96,9 @@ pub const fn mirror(joint: usize) -> usize {
     }
 }
 
-/// `house[j] = authors[authors_from_house(j)]` and the other way round: fingers are reversed within themselves.
-pub const fn authors_from_house(joint: usize) -> usize {
+/// Converts a joint index between the joint order of this project and that of the authors, in both directions, by
+/// reversing each finger: `joints[j] = authors[swap_authors_order(j)]`.
+pub const fn swap_authors_order(joint: usize) -> usize {
     if joint < L_HAND {
         return joint;
     }
@@ -120,16 +122,16 @@ mod tests {
     }
 
     #[test]
-    fn mirror_and_authors_order_are_their_own_inverses() {
+    fn mirror_and_authors_order_are_self_inverse() {
         for joint in 0..N_JOINTS {
             assert_eq!(mirror(mirror(joint)), joint);
-            assert_eq!(authors_from_house(authors_from_house(joint)), joint);
+            assert_eq!(swap_authors_order(swap_authors_order(joint)), joint);
             if let Some(p) = parent(joint) {
                 assert_eq!(parent(mirror(joint)), Some(mirror(p)));
             }
         }
         assert_eq!(name(8), "LThumbBase");
-        assert_eq!(authors_from_house(8), 11);
+        assert_eq!(swap_authors_order(8), 11);
         assert_eq!((name(48).as_str(), side(48)), ("RLittleTip", Side::Right));
     }
 }

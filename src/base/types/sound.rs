@@ -1,23 +1,24 @@
-//! Sound in memory, and how it meets frames: by how much they are apart, and the samples that belong to a frame. Frame `n`
-//! begins at `n / fps` seconds; sample counts are never derived from frame counts in any other place.
+//! Sound in memory and its alignment with frames: the offset between sound and picture, and the samples of a frame.
+//! Frame `n` begins at `n / fps` seconds; only this file converts frame counts to sample counts.
 
 use super::time::FrameRate;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::ops::Range;
 
-/// The rate of all sound inside the pipeline, in samples a second.
+/// Sample rate of all sound inside the pipeline, Hz.
 pub const SAMPLE_RATE: u32 = 16_000;
-/// Confidence from which an offset is sure.
+/// Minimum confidence of a reliable offset.
 const SURE: f64 = 0.99;
-/// An offset below is none that anybody sees; one beyond the other may be greater still than any lag that was tried.
-const TOLD_SECS: f64 = 0.04;
-const FARTHEST_SECS: f64 = 0.72;
+/// Minimum offset that is reported; a smaller one is not noticeable.
+const MIN_REPORTED_SECS: f64 = 0.04;
+/// Upper limit of a reliable offset: at this value the true offset may exceed the range of lags that was searched.
+const MAX_SECS: f64 = 0.72;
 
-/// Mono samples in -1..1 at `rate` samples a second.
+/// Mono sound.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sound {
-    /// Samples a second.
+    /// Sample rate in Hz.
     pub rate: u32,
     /// Amplitudes, -1..1.
     pub samples: Vec<f32>,
@@ -30,38 +31,38 @@ impl Sound {
     }
 }
 
-/// Sound tracks of a file, and the one taken.
+/// Audio tracks of a file, and the selected one.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct AudioTracks {
     pub n_tracks: usize,
-    /// Number of the track, from 1.
+    /// Number of the selected track, from 1.
     pub taken: usize,
-    /// Language of each, as the file names it; empty: not named.
+    /// Language of each track as named in the file; empty if not named.
     pub languages: Vec<String>,
 }
 
-/// How much later the sound of a video is than its picture, as the lips of the person seen say.
+/// Delay of the sound of a video relative to the picture, measured from the speaker's lips.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SoundOffset {
-    /// Seconds; negative: the sound is early.
+    /// Delay in seconds; negative if the sound is early.
     pub secs: f64,
-    /// Correlation of lips and voice at that offset.
+    /// Correlation of lips and voice at this delay.
     pub correlation: f64,
-    /// Probability that the sound of another voice matches less well at every lag, 0..1.
+    /// Probability that the sound of another voice correlates less at every lag, 0..1.
     pub confidence: f64,
     /// Seconds with both a visible mouth and speech.
     pub compared_secs: f64,
 }
 
 impl SoundOffset {
-    /// Whether the sound may be shifted by it.
+    /// Returns whether the offset is reliable enough to shift the sound by it.
     pub fn is_sure(&self) -> bool {
-        self.confidence >= SURE && self.secs.abs() < FARTHEST_SECS
+        self.confidence >= SURE && self.secs.abs() < MAX_SECS
     }
 
-    /// Whether to report the offset: it is sure, and longer than one frame of film.
-    pub fn is_told(&self) -> bool {
-        self.is_sure() && self.secs.abs() >= TOLD_SECS
+    /// Returns whether to report the offset: it is reliable and not shorter than one frame at 25 fps.
+    pub fn is_reportable(&self) -> bool {
+        self.is_sure() && self.secs.abs() >= MIN_REPORTED_SECS
     }
 }
 
@@ -73,13 +74,14 @@ impl fmt::Display for SoundOffset {
     }
 }
 
-/// The sample at which frame `frame_idx` begins: `round(frame_idx / fps * rate)`, halves upwards, in whole numbers.
+/// Returns the first sample of frame `frame_idx`: `round(frame_idx / fps * rate)`, halves rounded up, in integer
+/// arithmetic.
 pub fn sample_at(fps: FrameRate, rate: u32, frame_idx: usize) -> usize {
     let (num, den) = (u128::from(fps.num.max(1)), u128::from(fps.den));
     ((2 * frame_idx as u128 * den * u128::from(rate) + num) / (2 * num)) as usize
 }
 
-/// The samples of `frames`; neighbouring ranges of frames have neighbouring ranges of samples.
+/// Returns the samples of `frames`; adjacent ranges of frames have adjacent ranges of samples.
 pub fn samples_of(fps: FrameRate, rate: u32, frames: Range<usize>) -> Range<usize> {
     sample_at(fps, rate, frames.start)..sample_at(fps, rate, frames.end)
 }
@@ -89,7 +91,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sound_and_frames_meet_by_time() {
+    fn samples_and_frames_align_in_time() {
         let fps = FrameRate::new(15, 1);
         assert_eq!(samples_of(fps, 16_000, 0..15), 0..16_000);
         assert_eq!(sample_at(fps, 16_000, 1), 1_067);
@@ -102,11 +104,11 @@ mod tests {
     }
 
     #[test]
-    fn an_offset_says_what_is_late_and_whether_that_is_sure() {
+    fn offset_prints_direction_and_reliability() {
         let offset = SoundOffset { secs: 0.12, correlation: 0.5, confidence: 0.999, compared_secs: 60.0 };
-        assert_eq!((offset.to_string().as_str(), offset.is_told()), ("sound is 120 ms late (sure)", true));
+        assert_eq!((offset.to_string().as_str(), offset.is_reportable()), ("sound is 120 ms late (sure)", true));
         let offset = SoundOffset { secs: -0.02, confidence: 0.5, ..offset };
-        assert_eq!((offset.to_string().as_str(), offset.is_told()), ("sound is 20 ms early (not sure)", false));
+        assert_eq!((offset.to_string().as_str(), offset.is_reportable()), ("sound is 20 ms early (not sure)", false));
         assert!(!SoundOffset { secs: 0.73, confidence: 1.0, ..offset }.is_sure());
     }
 }

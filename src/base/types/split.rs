@@ -1,24 +1,24 @@
-//! The three parts of a dataset, and the stretches of a video that belong to them.
+//! The three splits of a dataset, and the time blocks of a video that belong to them.
 
 use serde::{Deserialize, Serialize};
 
-/// A part of the dataset. A video belongs to one of them as a whole, or in blocks of time.
+/// A split of the dataset. A video belongs to one split as a whole or in time blocks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Split {
-    /// Videos to learn from.
+    /// Training data.
     Train,
-    /// Videos that choose the best checkpoint.
+    /// Data that selects the best checkpoint.
     Validation,
-    /// Videos for the final measurement.
+    /// Data for the final evaluation.
     Test,
 }
 
 impl Split {
-    /// Every split.
+    /// All splits.
     pub const ALL: [Split; 3] = [Split::Train, Split::Validation, Split::Test];
 
-    /// The name in file names, JSON and the configuration.
+    /// Name in file names, JSON and the configuration.
     pub const fn name(self) -> &'static str {
         match self {
             Split::Train => "train",
@@ -28,24 +28,24 @@ impl Split {
     }
 }
 
-/// Stretch of a video that belongs to one split.
+/// Part of a video that belongs to one split.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TimeBlock {
-    /// Split; `None`: left out, since another split has the same sound.
+    /// Split of the block; `None`: omitted, because another split contains the same sound.
     pub split: Option<Split>,
-    /// First second.
+    /// Start in seconds.
     pub start_secs: f64,
-    /// Last second, exclusive.
+    /// End in seconds, exclusive.
     pub end_secs: f64,
 }
 
 impl TimeBlock {
-    /// Block from 0 that no video outlasts: a video that is in `split` as a whole.
+    /// Creates a block from 0 that is longer than any video, for a video that belongs to `split` as a whole.
     pub const fn whole(split: Split) -> Self {
         Self { split: Some(split), start_secs: 0.0, end_secs: f64::MAX }
     }
 
-    /// Duration.
+    /// Duration in seconds.
     pub fn secs(&self) -> f64 {
         self.end_secs - self.start_secs
     }

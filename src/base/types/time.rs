@@ -1,10 +1,10 @@
-//! Time: frame rates as rationals and the one rule that turns a frame number into seconds.
+//! Time: frame rates as rational numbers, and the conversion from frame numbers to seconds.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
-/// Frames a second as an exact fraction in lowest terms (`30000/1001` is NTSC). Both parts are at least 1.
+/// Frames per second as an exact fraction in lowest terms (`30000/1001` is NTSC). Both parts are at least 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "Fraction")]
 pub struct FrameRate {
@@ -14,12 +14,12 @@ pub struct FrameRate {
     pub den: u32,
 }
 
-/// Rate that neither camera nor studio has.
+/// Error: frame rate outside the range of cameras and motion capture systems.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0} is no frame rate of motion: expected 1 to 1000 frames a second")]
 pub struct ImplausibleRate(pub FrameRate);
 
-/// Rate as stored in a file, where a part may be 0.
+/// Frame rate as stored in a file, where a part may be 0.
 #[derive(Deserialize)]
 struct Fraction {
     num: u32,
@@ -38,7 +38,8 @@ impl TryFrom<Fraction> for FrameRate {
 }
 
 impl FrameRate {
-    /// `num / den` frames a second in lowest terms; a zero part becomes 1, so that no rate divides by zero.
+    /// Creates a rate of `num / den` frames per second in lowest terms; a zero part becomes 1, so that no rate divides
+    /// by zero.
     pub const fn new(num: u32, den: u32) -> Self {
         let num = if num == 0 { 1 } else { num };
         let den = if den == 0 { 1 } else { den };
@@ -49,8 +50,8 @@ impl FrameRate {
         Self { num: num / divisor, den: den / divisor }
     }
 
-    /// The simplest fraction within one part in 100 000 of a decimal: whole, NTSC (hundreds over 1001), thousandths;
-    /// else ten thousandths. `None` outside 0.01..=100 000.
+    /// Returns the simplest fraction within one part in 100 000 of a decimal: an integer, NTSC (hundreds over 1001),
+    /// thousandths, or else ten-thousandths. `None` outside 0.01..=100 000.
     pub fn nearest(per_sec: f64) -> Option<Self> {
         if !(0.01..=100_000.0).contains(&per_sec) {
             return None;
@@ -64,34 +65,38 @@ impl FrameRate {
         Some(Self::new(num, den))
     }
 
-    /// Whether a camera or a studio has such a rate: 1 to 1000 frames a second.
+    /// Returns whether a camera or a motion capture system can have this rate: 1 to 1000 frames per second.
     pub fn is_plausible(self) -> bool {
         (1.0..=1000.0).contains(&self.per_sec())
     }
 
-    /// The rate if it is plausible, else what is wrong with it.
+    /// Returns the rate.
+    ///
+    /// # Errors
+    /// The rate is not plausible.
     pub fn checked(self) -> Result<Self, ImplausibleRate> {
         if self.is_plausible() { Ok(self) } else { Err(ImplausibleRate(self)) }
     }
 
-    /// The rate in frames a second.
+    /// Rate in frames per second.
     pub fn per_sec(self) -> f64 {
         f64::from(self.num) / f64::from(self.den)
     }
 
-    /// Presentation time of frame `frame_idx` in seconds, counted from frame 0.
+    /// Presentation time of frame `frame_idx` in seconds; frame 0 is at 0.
     pub fn secs(self, frame_idx: usize) -> f64 {
         frame_idx as f64 * f64::from(self.den) / f64::from(self.num)
     }
 
-    /// Number of frames that lie wholly or partly inside `secs` seconds: the first n with `n / rate >= secs`.
+    /// Number of frames that start within `secs` seconds: the first n with `n / rate >= secs`.
     pub fn frames_in(self, secs: f64) -> usize {
         let frames = secs * self.per_sec();
         (frames - 1e-6).ceil().max(0.0) as usize
     }
 }
 
-/// Reads `15`, `29.97` (meaning 30000/1001), `30000/1001`, each with or without ` fps`; 1 to 1000 frames a second.
+/// Parses `15`, `29.97` (meaning 30000/1001) or `30000/1001`, each with or without ` fps`; 1 to 1000 frames per
+/// second.
 impl FromStr for FrameRate {
     type Err = String;
 
@@ -136,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn rates_are_read_as_people_write_them() {
+    fn rates_parse_from_common_notations() {
         for (text, num, den) in [
             ("15", 15, 1),
             (" 25.0", 25, 1),
@@ -157,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stored_rate_with_a_zero_part_is_refused() {
+    fn a_stored_rate_with_a_zero_part_is_rejected() {
         let read = |text: &str| serde_json::from_str::<FrameRate>(text).map_err(|error| error.to_string());
         for (text, rate) in [("{\"num\":15,\"den\":0}", "15/0"), ("{\"num\":0,\"den\":1}", "0/1")] {
             assert!(read(text).unwrap_err().starts_with(&format!("invalid frame rate {rate}")), "{text}");
@@ -168,14 +173,14 @@ mod tests {
 
     proptest::proptest! {
         #[test]
-        fn a_printed_rate_is_read_back(num in 1_000u32..1_000_000, den in 1u32..1_002) {
+        fn a_printed_rate_parses_to_itself(num in 1_000u32..1_000_000, den in 1u32..1_002) {
             let rate = FrameRate::new(num, den);
             let is_possible = (1.0..=1000.0).contains(&rate.per_sec());
             proptest::prop_assert_eq!(rate.to_string().parse().ok(), is_possible.then_some(rate));
         }
 
         #[test]
-        fn a_decimal_comes_near(thousandths in 1_000u32..1_000_000) {
+        fn a_decimal_is_approximated(thousandths in 1_000u32..1_000_000) {
             let rate: FrameRate = format!("{}", f64::from(thousandths) / 1000.0).parse().unwrap();
             proptest::prop_assert!((rate.per_sec() * 1000.0 / f64::from(thousandths) - 1.0).abs() < 1e-5);
         }

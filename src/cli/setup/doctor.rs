@@ -170,7 +170,7 @@ fn word_checks(models: &Path) -> Vec<Check> {
 /// The work folder: can it be written, and do locks hold there?
 fn work(dir: &Path) -> Check {
     let existing = dir.ancestors().find(|folder| folder.exists()).unwrap_or(dir);
-    match workdir::are_kept_apart(existing) {
+    match workdir::locks_work(existing) {
         Ok(true) => ok("work folder", dir.display().to_string()),
         Ok(false) => ok("work folder", format!("{} (locks do not hold there: one command at a time)", dir.display())),
         Err(error) => wrong("work folder", format!("{error:#}"), "choose another with --set work.dir=FOLDER"),

@@ -116,7 +116,7 @@ fn refusal(n_frames: usize, sound: Option<&Sound>, found: &TakeFiles, limits: &T
     let apart = sound_secs - motion_secs;
     if apart.abs() > limits.max_apart_secs {
         return Some(TakeRefusal {
-            why: FrameRefusal::new(Refusal::OutOfStep, apart.abs(), limits.max_apart_secs),
+            why: FrameRefusal::new(Refusal::LengthMismatch, apart.abs(), limits.max_apart_secs),
             message: format!(
                 "the sound has {sound_secs:.3} s, the motion {motion_secs:.3} s: {:.3} s apart, at most {} s are believed",
                 apart.abs(),

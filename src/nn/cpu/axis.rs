@@ -1,28 +1,28 @@
-//! One axis of a convolution: which inputs an output hears, and which outputs an input's gradient comes from. Indices
-//! only; the sums are in `conv`.
+//! Index arithmetic for one axis of a convolution: the inputs of each output, and the outputs that contribute to the
+//! gradient of each input. The sums are computed in `direct_conv`.
 
 use std::ops::Range;
 
-/// How kernels lie over one axis.
+/// Geometry of a convolution along one axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ConvAxis {
     pub n_in: usize,
     pub n_out: usize,
     pub kernel: usize,
     pub stride: usize,
-    /// Zeros before the first input.
+    /// Number of zeros before the first input.
     pub pad: usize,
 }
 
 impl ConvAxis {
-    /// TensorFlow's "same": ceil(n_in / stride) places come out; the smaller half of the padding goes first.
+    /// TensorFlow's "same" padding: ceil(n_in / stride) outputs; the smaller half of the padding comes first.
     pub fn same(n_in: usize, kernel: usize, stride: usize) -> Self {
         let n_out = n_in.div_ceil(stride);
         let total = ((n_out.max(1) - 1) * stride + kernel).saturating_sub(n_in);
         Self { n_in, n_out, kernel, stride, pad: total / 2 }
     }
 
-    /// Every `stride`-th place the kernel fits on; none where it does not.
+    /// No padding: one output for every `stride`-th position at which the kernel fits; none if it does not fit.
     pub fn valid(n_in: usize, kernel: usize, stride: usize) -> Self {
         Self { n_in, n_out: (n_in + stride).saturating_sub(kernel) / stride, kernel, stride, pad: 0 }
     }
@@ -40,8 +40,8 @@ impl ConvAxis {
         }
     }
 
-    /// The gradient's way back: an input's gradient depends on its place modulo the stride, so there are `stride`
-    /// convolutions of the output's gradient, each with every `stride`-th tap, last tap first.
+    /// Windows of the backward pass. The gradient of an input depends on its position modulo the stride, so there are
+    /// `stride` convolutions of the output's gradient, each with every `stride`-th kernel offset in descending order.
     pub fn backward(&self) -> Vec<AxisWindows> {
         let of_phase = |phase: usize| {
             let kernel_offsets: Vec<usize> = (phase..self.kernel).step_by(self.stride).rev().collect();
@@ -62,15 +62,15 @@ impl ConvAxis {
         (0..self.stride).filter_map(of_phase).filter(|windows| windows.n > 0).collect()
     }
 
-    /// Outputs whose tap `k` falls inside the input.
+    /// Outputs for which kernel offset `k` lies inside the input.
     pub fn inside(&self, k: usize) -> Range<usize> {
         let start = self.pad.saturating_sub(k).div_ceil(self.stride).min(self.n_out);
         start..(self.n_in + self.pad).saturating_sub(k).div_ceil(self.stride).clamp(start, self.n_out)
     }
 }
 
-/// Sums over one axis: the one of window `v` reads from `first + v * step` on, a place for each of `taps`, and its
-/// result is place `to_first + v * to_step`.
+/// Windows of the sums along one axis: window `v` reads from position `first + v * step` on, one position for each of
+/// `kernel_offsets`, and writes its result at position `to_first + v * to_step`.
 #[derive(Clone, Debug)]
 pub struct AxisWindows {
     pub n_from: usize,
@@ -84,7 +84,7 @@ pub struct AxisWindows {
 }
 
 impl AxisWindows {
-    /// Places read by so many windows.
+    /// Number of positions read by `n` successive windows.
     pub fn receptive_field(&self, n: usize) -> usize {
         (n.max(1) - 1) * self.step + self.kernel_offsets.len()
     }

@@ -1,16 +1,16 @@
-//! Statistics over the rows of a matrix whose columns are channels, and batch norm with the leaky ReLU behind it on
-//! such rows: plain memory in, plain memory out. Sums run over blocks of fixed size in one order.
+//! Statistics over the rows of a matrix whose columns are channels, and batch norm followed by leaky ReLU on such
+//! rows, on plain slices. Sums run over blocks of fixed size in a fixed order.
 
 use super::tensor::{GRAIN, LANES, Scalar, SharedOutputPtr, written};
 use super::thread_team::{parallel_for, parallel_map};
 use super::vectorised::vectorised;
 use rayon::prelude::*;
 
-/// Numbers summed before the sum goes on in f64, and numbers one task takes.
+/// Number of values that are summed before the sum continues in f64, and number of values per task.
 const BLOCK: usize = 16 * 1024;
 const TASK: usize = 128 * 1024;
 
-/// How many values each channel has had, their mean, and the sum of their squared distances to it.
+/// Number of values per channel, their mean, and the sum of their squared deviations from the mean.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ChannelMoments {
     pub n: f64,
@@ -19,10 +19,10 @@ pub struct ChannelMoments {
 }
 
 impl ChannelMoments {
-    /// Of rows of `n_channels`.
+    /// Measures rows of `n_channels`.
     pub fn measure<T: Scalar>(values: &[T], n_channels: usize) -> Self {
         let mut all = Self::default();
-        for block in values.chunks(whole_rows(BLOCK, n_channels)) {
+        for block in values.chunks(row_multiple(BLOCK, n_channels)) {
             let n = (block.len() / n_channels) as f64;
             let (mut mean, mut squares) = (vec![T::zero(); n_channels], vec![T::zero(); n_channels]);
             block_sums(block, &mut mean);
@@ -34,27 +34,27 @@ impl ChannelMoments {
         all
     }
 
-    /// Moments of both sets of values (Chan et al. 1979).
+    /// Combines the moments of two sets of values (Chan et al. 1979).
     pub fn and(&self, other: &Self) -> Self {
         if self.n == 0.0 {
             return other.clone();
         }
         let n = self.n + other.n;
-        let apart: Vec<f64> = self.mean.iter().zip(&other.mean).map(|(a, b)| b - a).collect();
-        let mean = self.mean.iter().zip(&apart).map(|(mean, apart)| mean + apart * other.n / n).collect();
-        let squares = self.squares.iter().zip(&other.squares).zip(&apart);
-        let squares = squares.map(|((a, b), apart)| a + b + apart * apart * self.n * other.n / n).collect();
+        let delta: Vec<f64> = self.mean.iter().zip(&other.mean).map(|(a, b)| b - a).collect();
+        let mean = self.mean.iter().zip(&delta).map(|(mean, delta)| mean + delta * other.n / n).collect();
+        let squares = self.squares.iter().zip(&other.squares).zip(&delta);
+        let squares = squares.map(|((a, b), delta)| a + b + delta * delta * self.n * other.n / n).collect();
         Self { n, mean, squares }
     }
 }
 
-/// So many numbers, but whole rows and at least one.
-fn whole_rows(n: usize, n_channels: usize) -> usize {
+/// Returns the largest multiple of `n_channels` up to `n`, but at least `n_channels`.
+fn row_multiple(n: usize, n_channels: usize) -> usize {
     (n / n_channels).max(1) * n_channels
 }
 
 vectorised!(
-    /// The sum of each channel over some rows.
+    /// Sums each channel over some rows.
     block_sums = block_sums_body(block: &[T], sums: &mut [T])
 );
 
@@ -81,7 +81,7 @@ fn block_sums_body<T: Scalar>(block: &[T], sums: &mut [T]) {
 }
 
 vectorised!(
-    /// The sum of each channel's squared distances to `mean` over some rows.
+    /// Sums each channel's squared deviations from `mean` over some rows.
     block_squares = block_squares_body(block: &[T], mean: &[T], squares: &mut [T])
 );
 
@@ -99,7 +99,7 @@ fn block_squares_body<T: Scalar>(block: &[T], mean: &[T], squares: &mut [T]) {
     }
 }
 
-/// `N` channels from `first` on of every row.
+/// Iterates over `N` channels from `first` on of every row.
 #[inline(always)]
 fn rows<T, const N: usize>(block: &[T], n_channels: usize, first: usize) -> impl Iterator<Item = &[T; N]> {
     block.chunks_exact(n_channels).filter_map(move |row| row.get(first..)?.first_chunk())
@@ -117,28 +117,28 @@ fn sums_of_squares<T: Scalar, const N: usize>(block: &[T], n_channels: usize, fi
     sums
 }
 
-/// The sum of each channel.
+/// Sums each channel.
 pub fn sums<T: Scalar>(values: &[T], n_channels: usize) -> Vec<f64> {
-    let of_task = |task: &[T]| {
-        let (mut sums, mut of_block) = (vec![0.0; n_channels], vec![T::zero(); n_channels]);
-        for block in task.chunks(whole_rows(BLOCK, n_channels)) {
-            block_sums(block, &mut of_block);
-            sums.iter_mut().zip(&of_block).for_each(|(sum, value)| *sum += value.to_f64());
+    let sum_task = |task: &[T]| {
+        let (mut sums, mut block_total) = (vec![0.0; n_channels], vec![T::zero(); n_channels]);
+        for block in task.chunks(row_multiple(BLOCK, n_channels)) {
+            block_sums(block, &mut block_total);
+            sums.iter_mut().zip(&block_total).for_each(|(sum, value)| *sum += value.to_f64());
         }
         sums
     };
-    let tasks: Vec<Vec<f64>> = values.par_chunks(whole_rows(TASK, n_channels)).map(of_task).collect();
+    let tasks: Vec<Vec<f64>> = values.par_chunks(row_multiple(TASK, n_channels)).map(sum_task).collect();
     add_up(tasks, n_channels)
 }
 
 fn add_up(tasks: Vec<Vec<f64>>, n: usize) -> Vec<f64> {
-    tasks.into_iter().fold(vec![0.0; n], |mut all, of_task| {
-        all.iter_mut().zip(of_task).for_each(|(sum, value)| *sum += value);
+    tasks.into_iter().fold(vec![0.0; n], |mut all, part| {
+        all.iter_mut().zip(part).for_each(|(sum, value)| *sum += value);
         all
     })
 }
 
-/// `y = leaky(z * scale + shift)`, a scale and a shift a channel.
+/// `y = leaky(z * scale + shift)`, with a scale and a shift per channel.
 pub struct Norm<T> {
     pub mean: Vec<T>,
     pub scale: Vec<T>,
@@ -147,29 +147,29 @@ pub struct Norm<T> {
 }
 
 impl<T: Scalar> Norm<T> {
-    /// `z` overwritten with the result.
+    /// Overwrites `z` with the result.
     pub fn apply(&self, z: &mut [T]) {
         apply_rows(self, z);
     }
 
-    /// Rows of `z` that one task takes, as numbers.
+    /// Number of values of the rows of `z` that one task processes.
     fn chunk(&self) -> usize {
-        whole_rows(GRAIN, self.scale.len())
+        row_multiple(GRAIN, self.scale.len())
     }
 
-    /// `apply` on all threads.
+    /// Overwrites `z` with the result, on all threads.
     pub fn apply_parallel(&self, z: &mut [T]) {
         let (n, start, chunk) = (z.len(), SharedOutputPtr::new(z), self.chunk());
-        // SAFETY: every piece is a part of `z` of its own.
+        // SAFETY: the chunks of `z` are disjoint.
         parallel_for(n.div_ceil(chunk), |i| unsafe {
             self.apply(std::slice::from_raw_parts_mut(start.at(i * chunk), chunk.min(n - i * chunk)));
         });
     }
 
-    /// The result for `z`, which stays, on all threads.
+    /// Returns the result for `z` without modifying it, on all threads.
     pub fn forward(&self, z: &[T]) -> Vec<T> {
         let chunk = self.chunk();
-        // SAFETY: every chunk writes as many numbers of the result as it reads, at the same place.
+        // SAFETY: every chunk of the result is written by one task, as many values as it reads.
         unsafe {
             written(z.len(), |y: SharedOutputPtr<T>| {
                 parallel_for(z.len().div_ceil(chunk), |i| {
@@ -192,29 +192,29 @@ impl<T: Scalar> Norm<T> {
         y
     }
 
-    /// `grad` taken back through the activation.
+    /// Gradient before the activation, from `grad` after it.
     #[inline(always)]
-    fn before<const N: usize>(&self, z: &[T; N], grad: &[T; N], scale: &[T; N], shift: &[T; N]) -> [T; N] {
-        let mut before = [T::zero(); N];
+    fn before_activation<const N: usize>(&self, z: &[T; N], grad: &[T; N], scale: &[T; N], shift: &[T; N]) -> [T; N] {
+        let mut before_activation = [T::zero(); N];
         for i in 0..N {
-            before[i] = if z[i] * scale[i] + shift[i] > T::zero() { grad[i] } else { grad[i] * self.slope };
+            before_activation[i] = if z[i] * scale[i] + shift[i] > T::zero() { grad[i] } else { grad[i] * self.slope };
         }
-        before
+        before_activation
     }
 
-    /// Sums over all rows of `g` and of `g * (z - mean)`, `g` being `grad` taken back through the activation.
+    /// Sums over all rows of `g` and of `g * (z - mean)`, where `g` is `grad` before the activation.
     pub fn sums_of_gradient(&self, z: &[T], grad: &[T]) -> (Vec<f64>, Vec<f64>) {
         let n = self.scale.len();
-        let of_task = |(z, grad): (&[T], &[T])| {
+        let sum_task = |(z, grad): (&[T], &[T])| {
             let mut sums = vec![0.0; 2 * n];
-            for (z, grad) in z.chunks(whole_rows(BLOCK, n)).zip(grad.chunks(whole_rows(BLOCK, n))) {
+            for (z, grad) in z.chunks(row_multiple(BLOCK, n)).zip(grad.chunks(row_multiple(BLOCK, n))) {
                 sum_gradient(self, z, grad, &mut sums);
             }
             sums
         };
-        let chunk = whole_rows(TASK, n);
+        let chunk = row_multiple(TASK, n);
         let tasks: Vec<_> = z.chunks(chunk).zip(grad.chunks(chunk)).collect();
-        let mut plain = add_up(parallel_map(tasks.len(), |task| of_task(tasks[task])), 2 * n);
+        let mut plain = add_up(parallel_map(tasks.len(), |task| sum_task(tasks[task])), 2 * n);
         let product = plain.split_off(n);
         (plain, product)
     }
@@ -227,7 +227,7 @@ impl<T: Scalar> Norm<T> {
         let (mean, scale, shift) = (some(&self.mean), some(&self.scale), some(&self.shift));
         let (mut plain, mut product) = ([T::zero(); N], [T::zero(); N]);
         for (z, grad) in rows::<T, N>(z, n, first).zip(rows::<T, N>(grad, n, first)) {
-            let g = self.before(z, grad, &scale, &shift);
+            let g = self.before_activation(z, grad, &scale, &shift);
             for i in 0..N {
                 plain[i] += g[i];
                 product[i] += g[i] * (z[i] - mean[i]);
@@ -242,22 +242,22 @@ impl<T: Scalar> Norm<T> {
     /// Overwrites `z` with the gradient before the norm: `scale * g + constant + linear * (z - mean)`.
     pub fn backward(&self, z: &mut [T], grad: &[T], constant: &[T], linear: &[T]) {
         let n = self.scale.len();
-        // constant + linear * (z - mean), with one number less.
+        // constant + linear * (z - mean) as offset + linear * z.
         let offset: Vec<T> =
             constant.iter().zip(linear).zip(&self.mean).map(|((c, l), mean)| *c - *l * *mean).collect();
-        let chunk = whole_rows(TASK, n);
+        let chunk = row_multiple(TASK, n);
         let channels = |i: usize| (self.scale[i], self.shift[i], offset[i], linear[i]);
         let n_wide = n / LANES;
-        let turns = NormGradients {
-            wide: (0..n_wide).map(|i| NormGradient::new(|lane| channels(i * LANES + lane))).collect(),
-            rest: (n_wide * LANES..n).map(|i| NormGradient::new(|_| channels(i))).collect(),
+        let coefficients = NormCoefficients {
+            wide: (0..n_wide).map(|i| NormCoefficient::new(|lane| channels(i * LANES + lane))).collect(),
+            rest: (n_wide * LANES..n).map(|i| NormCoefficient::new(|_| channels(i))).collect(),
         };
         let (n_all, start) = (z.len(), SharedOutputPtr::new(z));
         parallel_for(n_all.div_ceil(chunk), |task| {
             let part = task * chunk..n_all.min((task + 1) * chunk);
-            // SAFETY: every task's part of `z` is its own.
+            // SAFETY: the tasks' parts of `z` are disjoint.
             let z = unsafe { std::slice::from_raw_parts_mut(start.at(part.start), part.len()) };
-            turn_rows(self, &turns, z, &grad[part]);
+            backward_rows(self, &coefficients, z, &grad[part]);
         });
     }
 }
@@ -283,7 +283,7 @@ fn apply_rows_body<T: Scalar>(norm: &Norm<T>, z: &mut [T]) {
 }
 
 vectorised!(
-    /// Adds the sums of [`Norm::sums_of_gradient`] over some rows, one kind after the other.
+    /// Adds the sums of [`Norm::sums_of_gradient`] over some rows: first all of `g`, then all of the product.
     sum_gradient = sum_gradient_body(norm: &Norm<T>, z: &[T], grad: &[T], sums: &mut [f64])
 );
 
@@ -299,38 +299,38 @@ fn sum_gradient_body<T: Scalar>(norm: &Norm<T>, z: &[T], grad: &[T], sums: &mut 
 
 vectorised!(
     /// [`Norm::backward`] of some rows.
-    turn_rows = turn_rows_body(norm: &Norm<T>, turns: &NormGradients<T>, z: &mut [T], grad: &[T])
+    backward_rows = backward_rows_body(norm: &Norm<T>, coefficients: &NormCoefficients<T>, z: &mut [T], grad: &[T])
 );
 
 #[inline(always)]
-fn turn_rows_body<T: Scalar>(norm: &Norm<T>, turns: &NormGradients<T>, z: &mut [T], grad: &[T]) {
+fn backward_rows_body<T: Scalar>(norm: &Norm<T>, coefficients: &NormCoefficients<T>, z: &mut [T], grad: &[T]) {
     let n = norm.scale.len();
     for (z, grad) in z.chunks_exact_mut(n).zip(grad.chunks_exact(n)) {
         let ((z, z_rest), (grad, grad_rest)) = (z.as_chunks_mut(), grad.as_chunks());
-        for ((z, grad), turn) in z.iter_mut().zip(grad).zip(&turns.wide) {
-            *z = turn.turned(norm, z, grad);
+        for ((z, grad), coefficient) in z.iter_mut().zip(grad).zip(&coefficients.wide) {
+            *z = coefficient.gradient(norm, z, grad);
         }
-        for ((z, grad), turn) in z_rest.iter_mut().zip(grad_rest).zip(&turns.rest) {
-            [*z] = turn.turned(norm, &[*z], &[*grad]);
+        for ((z, grad), coefficient) in z_rest.iter_mut().zip(grad_rest).zip(&coefficients.rest) {
+            [*z] = coefficient.gradient(norm, &[*z], &[*grad]);
         }
     }
 }
 
-/// The channels of a [`Norm::backward`], some at once and those left over.
-pub struct NormGradients<T> {
-    wide: Vec<NormGradient<T, LANES>>,
-    rest: Vec<NormGradient<T, 1>>,
+/// Coefficients of a [`Norm::backward`]: groups of `LANES` channels, then the remaining ones.
+pub struct NormCoefficients<T> {
+    wide: Vec<NormCoefficient<T, LANES>>,
+    rest: Vec<NormCoefficient<T, 1>>,
 }
 
-/// What turns `z` of `N` channels into its gradient.
-pub struct NormGradient<T, const N: usize> {
+/// Coefficients that convert `z` of `N` channels to its gradient.
+pub struct NormCoefficient<T, const N: usize> {
     scale: [T; N],
     shift: [T; N],
     offset: [T; N],
     linear: [T; N],
 }
 
-impl<T: Scalar, const N: usize> NormGradient<T, N> {
+impl<T: Scalar, const N: usize> NormCoefficient<T, N> {
     fn new(of: impl Fn(usize) -> (T, T, T, T)) -> Self {
         use std::array::from_fn;
         Self {
@@ -342,13 +342,13 @@ impl<T: Scalar, const N: usize> NormGradient<T, N> {
     }
 
     #[inline(always)]
-    fn turned(&self, norm: &Norm<T>, z: &[T; N], grad: &[T; N]) -> [T; N] {
-        let g = norm.before(z, grad, &self.scale, &self.shift);
-        let mut turned = [T::zero(); N];
+    fn gradient(&self, norm: &Norm<T>, z: &[T; N], grad: &[T; N]) -> [T; N] {
+        let g = norm.before_activation(z, grad, &self.scale, &self.shift);
+        let mut gradient = [T::zero(); N];
         for i in 0..N {
-            turned[i] = self.scale[i] * g[i] + self.offset[i] + self.linear[i] * z[i];
+            gradient[i] = self.scale[i] * g[i] + self.offset[i] + self.linear[i] * z[i];
         }
-        turned
+        gradient
     }
 }
 
@@ -357,7 +357,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn moments_of_parts_are_those_of_the_whole() {
+    fn moments_of_blocks_combine_to_those_of_all_values() {
         let n_channels = 3;
         let values: Vec<f64> = (0..3 * 20_000).map(|i| (f64::from(i) * 0.37).sin() + f64::from(i % 3)).collect();
         let whole = ChannelMoments::measure(&values, n_channels);

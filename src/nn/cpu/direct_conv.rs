@@ -1,23 +1,23 @@
-//! Convolution over two axes, channels last, on plain memory: forward and the gradient of the input, f32 or f64. Nothing is
-//! unfolded: the tiles of `kernel` read their left factors where they lie (a copy of the few rows at work, with its
-//! padding, stays in the cache) and multiply them with weights packed once a pass. Time alone is an axis of one.
-//!
-//! Every number is summed by one thread in one order, so results do not depend on how many threads there are.
+//! Direct convolution over two axes, channels last, on plain slices: forward and the gradient of the input, f32 or
+//! f64. Nothing is unfolded: the tiles of `kernel` read their left factors in place (from a padded copy of a few rows,
+//! which stays in the cache) and multiply them with weights that are packed once per pass. A convolution over time
+//! only has one axis of length 1. Every value is summed by one thread in a fixed order, so results do not depend on
+//! the number of threads.
 
 use super::axis::{AxisWindows, ConvAxis};
-use super::kernel::{MOST_ROWS, TileSteps};
+use super::kernel::{MAX_ROWS, TileSteps};
 use super::packed_weights::{PackedWeights, StepBlock, WeightOrder};
 use super::tensor::{Scalar, SharedOutputPtr, scratch, written};
 use super::thread_team::parallel_for;
 use std::ops::Range;
 
-/// Numbers of input a piece of work copies at most (some rows at least), and steps of a sum whose packed weights stay
-/// in the first-level cache.
+/// Maximum number of input values that a task copies (but at least some rows), and number of summation steps whose
+/// packed weights stay in the first-level cache.
 const PIECE: usize = 48 * 1024;
 const DEPTH: usize = 144;
 
-/// A convolution's sizes: input [B, rows, columns, n_in], weight [n_out, n_in, K rows, K columns], output
-/// [B, rows', columns', n_out].
+/// Sizes of a convolution: input [B, rows, columns, n_in], weight [n_out, n_in, K rows, K columns], output [B, rows',
+/// columns', n_out].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ConvSizes {
     pub batch: usize,
@@ -31,7 +31,7 @@ impl ConvSizes {
         self.axes[0].kernel * self.axes[1].kernel
     }
 
-    /// Numbers of input, weight and output.
+    /// Number of values of the input; below, those of the weight and of the output.
     pub fn len_in(&self) -> usize {
         self.batch * self.axes[0].n_in * self.axes[1].n_in * self.n_in
     }
@@ -45,8 +45,8 @@ impl ConvSizes {
     }
 }
 
-/// The convolution of `x` plus `bias`. As soon as some rows of an output are whole, while they lie in the cache,
-/// `finish` gets them, [places, n_out], with the number of the piece (0..[`n_pieces`]).
+/// Convolves `x` and adds `bias`. `finish` is called with the number of a piece (0..[`n_pieces`]) and its rows of the
+/// output [positions, n_out] as soon as they are complete, while they are in the cache.
 pub fn forward<T: Scalar>(
     s: &ConvSizes,
     x: &[T],
@@ -58,7 +58,7 @@ pub fn forward<T: Scalar>(
     let pass = forward_pass(s);
     let panels = PackedWeights::pack(weight, &pass.order(s.n_in * s.kernel_len(), s.kernel_len()));
     let per_row = s.axes[1].n_out * s.n_out;
-    // SAFETY: the pieces together write every row of every output, each its own.
+    // SAFETY: the pieces are disjoint and together cover every row of every output.
     unsafe {
         written(s.len_out(), |to: SharedOutputPtr<T>| {
             let pieces = pass.pieces();
@@ -73,7 +73,7 @@ pub fn forward<T: Scalar>(
     }
 }
 
-/// How many pieces a forward pass works in.
+/// Number of pieces of a forward pass.
 pub fn n_pieces(s: &ConvSizes) -> usize {
     forward_pass(s).pieces().len()
 }
@@ -88,11 +88,11 @@ fn forward_pass(s: &ConvSizes) -> ConvPass {
     }
 }
 
-/// The gradient of the input.
+/// Computes the gradient of the input.
 pub fn gradient_of_input<T: Scalar>(s: &ConvSizes, weight: &[T], grad: &[T]) -> Vec<T> {
     assert!(grad.len() == s.len_out() && weight.len() == s.len_weight());
     let zeros = vec![T::zero(); s.n_in];
-    // SAFETY: the pieces of the phases together write every place, each its own.
+    // SAFETY: the pieces of all phases are disjoint and together cover every position.
     unsafe {
         written(s.len_in(), |to: SharedOutputPtr<T>| {
             for rows in s.axes[0].backward() {
@@ -116,18 +116,18 @@ pub fn gradient_of_input<T: Scalar>(s: &ConvSizes, weight: &[T], grad: &[T]) -> 
     }
 }
 
-/// One convolution over padded rows, forward or (a phase of) backward.
+/// One convolution over padded rows: forward, or one phase of the backward pass.
 struct ConvPass {
     batch: usize,
     n_from: usize,
     n_to: usize,
     windows: [AxisWindows; 2],
-    /// The whole kernel's size.
+    /// Size of the complete kernel.
     kernel: [usize; 2],
 }
 
 impl ConvPass {
-    /// Where the weights lie for this pass.
+    /// Memory order of the weights for this pass.
     fn order(&self, per_column: usize, per_channel: usize) -> WeightOrder {
         let [rows, columns] = &self.windows;
         let kernel_offsets = rows
@@ -138,22 +138,23 @@ impl ConvPass {
         WeightOrder { n_columns: self.n_to, per_column, n_channels: self.n_from, per_channel, kernel_offsets }
     }
 
-    /// Sample and windows' rows of each piece of work; the same for any number of threads.
+    /// Returns sample and window rows of each piece of work, independent of the number of threads.
     fn pieces(&self) -> Vec<(usize, Range<usize>)> {
         let [rows, columns] = &self.windows;
         let per_row = columns.receptive_field(columns.n) * self.n_from;
         let n_rows = ((PIECE / per_row.max(1)).saturating_sub(rows.kernel_offsets.len()) / rows.step + 1)
-            .max(MOST_ROWS.div_ceil(columns.n))
+            .max(MAX_ROWS.div_ceil(columns.n))
             .min(rows.n);
-        // Pieces of equal size rather than a small last one.
+        // Pieces of equal size instead of a small last one.
         let n = rows.n.div_ceil(n_rows);
         let piece = move |b, i| (b, rows.n * i / n..rows.n * (i + 1) / n);
         (0..self.batch).flat_map(|b| (0..n).map(move |i| piece(b, i))).collect()
     }
 
-    /// Writes the places of the windows of sample `b` in these rows: `begin` plus the sums.
+    /// Writes the outputs of the windows of sample `b` in these rows: `begin` plus the sums.
     ///
-    /// Safety: `to` holds the batch's results, and no other thread writes to those of these windows.
+    /// # Safety
+    /// `to` has room for the batch's results, and no other thread writes to those of these windows.
     unsafe fn run<T: Scalar>(
         &self,
         from: &[T],
@@ -168,20 +169,20 @@ impl ConvPass {
         let per_row = width * n_from;
         scratch(rows.receptive_field(piece.len()) * per_row, |padded: &mut [T]| {
             self.copy(from, padded, b, piece.start);
-            let places = piece.clone().flat_map(|row| (0..columns.n).map(move |column| (row, column)));
-            let places: Vec<(usize, usize)> = places
+            let positions = piece.clone().flat_map(|row| (0..columns.n).map(move |column| (row, column)));
+            let positions: Vec<(usize, usize)> = positions
                 .map(|(row, column)| {
                     let left = ((row - piece.start) * rows.step * width + column * columns.step) * n_from;
                     let to_row = b * rows.n_to + rows.to_first + row * rows.to_step;
                     (left, (to_row * columns.n_to + columns.to_first + column * columns.to_step) * self.n_to)
                 })
                 .collect();
-            // Steps of one row tap lie side by side in the padded copy.
+            // The steps of one row offset are contiguous in the padded copy.
             let run = columns.kernel_offsets.len() * n_from;
             if rows.kernel_offsets.len() * run == 0 {
-                for (_, place) in &places {
-                    // SAFETY: the caller's.
-                    unsafe { to.at(*place).copy_from_nonoverlapping(begin.as_ptr(), self.n_to) };
+                for (_, position) in &positions {
+                    // SAFETY: guaranteed by the caller.
+                    unsafe { to.at(*position).copy_from_nonoverlapping(begin.as_ptr(), self.n_to) };
                 }
                 return;
             }
@@ -199,15 +200,16 @@ impl ConvPass {
                             inner: TileSteps { n: part.len(), left: 1, right: panel.columns },
                         };
                         let begin = (row == 0 && part.start == 0).then_some(begin);
-                        // SAFETY: places lie inside the padded copy and `to`; the caller sees to the rest.
-                        unsafe { panel.multiply(&panels.data, padded, &places, to, begin, &at) };
+                        // SAFETY: the positions lie inside the padded copy and `to`; the caller guarantees exclusive
+                        // access.
+                        unsafe { panel.multiply(&panels.data, padded, &positions, to, begin, &at) };
                     }
                 }
             }
         });
     }
 
-    /// The rows the piece from `first_row` on reads, with zeros where the input ends.
+    /// Copies the rows that the piece from `first_row` on reads, with zeros outside the input.
     fn copy<T: Scalar>(&self, from: &[T], padded: &mut [T], b: usize, first_row: usize) {
         let [rows, columns] = &self.windows;
         let width = columns.receptive_field(columns.n) as isize;

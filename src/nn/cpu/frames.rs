@@ -1,33 +1,33 @@
-//! Plain memory of sequences: frames as mixtures of two frames each (interpolation over time) with their gradient, and
-//! the change between channels first and channels last. Every number is made by one thread in one order.
+//! Operations on sequences in plain slices: linear interpolation of frames with its gradient, and transposition
+//! between channels first and channels last. Every value is computed by one thread in a fixed order.
 
 use super::tensor::{Scalar, SharedOutputPtr, written};
 use super::thread_team::parallel_for;
 
-/// Side of the square blocks of a transposition, which stay in the cache.
+/// Side of the square blocks of a transposition, which fit in the cache.
 const BLOCK: usize = 32;
 
-/// What every frame of a result is made of: frame i is `a + share * (b - a)`, a and b being frames of the input.
+/// Linear interpolation of frames: frame i of the result is `a + share * (b - a)` for frames a and b of the input.
 #[derive(Clone, Debug)]
-pub struct FrameMixture {
+pub struct FrameInterpolation {
     pub n_in: usize,
-    /// First and second frame, and the share of the second.
+    /// First frame, second frame and the weight of the second, for each frame of the result.
     pub of: Vec<(usize, usize, f64)>,
 }
 
-impl FrameMixture {
-    /// Frames of the result.
+impl FrameInterpolation {
+    /// Number of frames of the result.
     pub fn n_out(&self) -> usize {
         self.of.len()
     }
 
-    /// `x` [B, `n_in`, C] to [B, `n_out`, C], plus `skip` of that shape where there is one.
+    /// Interpolates `x` [B, `n_in`, C] to [B, `n_out`, C], plus `skip` of that shape if given.
     pub fn mix<T: Scalar>(&self, x: &[T], skip: Option<&[T]>, n_channels: usize) -> Vec<T> {
         let (of_x, of_y) = (self.n_in * n_channels, self.n_out() * n_channels);
         let batch = x.len() / of_x;
         assert!(batch * of_x == x.len() && skip.is_none_or(|skip| skip.len() == batch * of_y));
         assert!(self.of.iter().all(|(a, b, _)| *a.max(b) < self.n_in));
-        // SAFETY: every sample writes its own frames, all of them.
+        // SAFETY: every sample writes all of its own frames.
         unsafe {
             written(batch * of_y, |start: SharedOutputPtr<T>| {
                 parallel_for(batch, |sample| {
@@ -47,11 +47,11 @@ impl FrameMixture {
         }
     }
 
-    /// The gradient of the input, from that of the result.
+    /// Computes the gradient of the input from that of the result.
     pub fn gradient<T: Scalar>(&self, grad: &[T], n_channels: usize) -> Vec<T> {
         let (of_x, of_y) = (self.n_in * n_channels, self.n_out() * n_channels);
         let batch = grad.len() / of_y;
-        // SAFETY: every sample writes its own frames, all of them first with zeros.
+        // SAFETY: every sample initialises all of its own frames with zeros before it adds to them.
         unsafe {
             written(batch * of_x, |start: SharedOutputPtr<T>| {
                 parallel_for(batch, |sample| {
@@ -72,12 +72,12 @@ impl FrameMixture {
     }
 }
 
-/// [batch, rows, columns] to [batch, columns, rows].
+/// Transposes [batch, rows, columns] to [batch, columns, rows].
 pub fn transpose<T: Scalar>(x: &[T], rows: usize, columns: usize) -> Vec<T> {
     let n = rows * columns;
     let (batch, blocks) = (x.len() / n, columns.div_ceil(BLOCK));
     assert!(batch * n == x.len());
-    // SAFETY: every task writes its own columns of its own sample, all of them.
+    // SAFETY: every task writes all of its own columns of its own sample.
     unsafe {
         written(x.len(), |start: SharedOutputPtr<T>| {
             parallel_for(batch * blocks, |task| {
@@ -99,7 +99,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_transposition_is_the_definition() {
+    fn transposition_equals_its_definition() {
         for (batch, rows, columns) in [(1, 1, 1), (2, 3, 70), (3, 65, 33), (1, 1, 40)] {
             let x: Vec<f64> = (0..batch * rows * columns).map(|i| i as f64).collect();
             let y = transpose(&x, rows, columns);

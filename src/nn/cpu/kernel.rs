@@ -1,24 +1,24 @@
-//! The innermost loop of every convolution: a tile of up to [`MOST_ROWS`] x some vectors of sums that stay in registers
-//! while products are added to them. Written once, compiled for AVX-512, for AVX2 and for any processor; which one
-//! runs is found out when the program does.
+//! The innermost loop of every convolution: a tile of up to [`MAX_ROWS`] rows and several vectors of sums, which stay
+//! in registers while products are added. Written once and compiled for AVX-512, for AVX2 and for any processor; the
+//! version is selected at run time.
 
-/// Rows of a tile at most.
-pub const MOST_ROWS: usize = 6;
+/// Maximum number of rows of a tile.
+pub const MAX_ROWS: usize = 6;
 
-/// What a tile is made of: summed over all steps k, an outer and an inner loop,
-/// `to[row][column] = from[row][column] + rows[row][at(k)] * right[at(k)][column]`.
+/// Work on one tile: over all steps k, an outer and an inner loop, it sums `to[row][column] = from[row][column] +
+/// rows[row][at(k)] * right[at(k)][column]`.
 pub struct TileJob<T> {
-    /// Where each row's left factors begin, what its sums begin with, and where they go.
-    pub rows: [*const T; MOST_ROWS],
-    pub from: [*const T; MOST_ROWS],
-    pub to: [*mut T; MOST_ROWS],
-    /// Where the right factors begin: vectors of columns.
+    /// Addresses of each row's left factors, of the initial values of its sums, and of its results.
+    pub rows: [*const T; MAX_ROWS],
+    pub from: [*const T; MAX_ROWS],
+    pub to: [*mut T; MAX_ROWS],
+    /// Address of the right factors: vectors of columns.
     pub right: *const T,
     pub outer: TileSteps,
     pub inner: TileSteps,
 }
 
-/// `n` steps, and how far left and right factors lie apart.
+/// `n` steps, with the strides of the left and the right factors.
 #[derive(Clone, Copy, Debug)]
 pub struct TileSteps {
     pub n: usize,
@@ -26,21 +26,21 @@ pub struct TileSteps {
     pub right: usize,
 }
 
-/// The loop as the processor has it.
+/// Tile loop for one processor type.
 #[derive(Clone, Copy)]
 pub struct TileKernel<T> {
-    /// Numbers in a vector.
+    /// Number of values in a vector.
     pub lanes: usize,
-    /// Vectors beside each other in a tile at most: 1, 2 or 4.
-    pub most_vectors: usize,
-    /// Runs a job of so many rows and so many vectors (1, 2 or 4).
+    /// Maximum number of vectors side by side in a tile: 1, 2 or 4.
+    pub max_vectors: usize,
+    /// Runs a job with the given numbers of rows and vectors (1, 2 or 4).
     ///
     /// # Safety
-    /// Every address the job reads from is readable, those of `to` writable by this thread alone.
+    /// Every address that the job reads is readable, and those of `to` are writable by this thread alone.
     pub run: unsafe fn(&TileJob<T>, usize, usize),
 }
 
-/// The tile of so many rows.
+/// Calls the tile with the given number of rows.
 macro_rules! rows {
     ($job:ident, $n_rows:ident, $tile:ident, $vectors:literal) => {
         match $n_rows {
@@ -55,13 +55,13 @@ macro_rules! rows {
     };
 }
 
-/// A tile's loop and the choice of its size, for one kind of processor and one type of number.
+/// Tile loop and the dispatch on its size, for one processor type and one number type.
 macro_rules! kernel {
     ($(#[$attribute:meta])* $tile:ident, $choose:ident, $number:ty, $lanes:literal, $vectors:literal;
      $zero:path, $load:path, $store:path, $spread:path, $add_product:expr) => {
         $(#[$attribute])*
         unsafe fn $tile<const ROWS: usize, const VECTORS: usize>(job: &TileJob<$number>) {
-            // SAFETY: the caller's.
+            // SAFETY: guaranteed by the caller.
             unsafe {
                 let mut sums = [[$zero(); VECTORS]; ROWS];
                 for (sums, from) in sums.iter_mut().zip(&job.from) {
@@ -101,7 +101,7 @@ macro_rules! kernel {
 
         #[allow(unreachable_patterns)] // `$vectors` may be 1 or 2
         pub(crate) unsafe fn $choose(job: &TileJob<$number>, n_rows: usize, n_vectors: usize) {
-            // SAFETY: the caller's.
+            // SAFETY: guaranteed by the caller.
             unsafe {
                 match n_vectors {
                     1 => rows!(job, n_rows, $tile, 1),
@@ -114,19 +114,19 @@ macro_rules! kernel {
     };
 }
 
-/// Four numbers side by side, for processors this room has no own words for.
+/// Operations on four values for processors without a specific implementation.
 mod any {
     pub(super) fn zero<T: Copy + Default>() -> [T; 4] {
         [T::default(); 4]
     }
 
     pub(super) unsafe fn load<T: Copy>(at: *const T) -> [T; 4] {
-        // SAFETY: the caller's.
+        // SAFETY: guaranteed by the caller.
         unsafe { at.cast::<[T; 4]>().read_unaligned() }
     }
 
     pub(super) unsafe fn store<T: Copy>(at: *mut T, values: [T; 4]) {
-        // SAFETY: the caller's.
+        // SAFETY: guaranteed by the caller.
         unsafe { at.cast::<[T; 4]>().write_unaligned(values) };
     }
 
@@ -174,20 +174,20 @@ mod x86 {
     );
 }
 
-/// A function that chooses the kernel of this processor for a type of number: the kernels with their lanes.
+/// Defines a function that selects the kernel of this processor for a number type, from kernels with their lanes.
 macro_rules! choose_kernel {
     ($choose:ident, $number:ty, $wide:ident: $wide_lanes:literal, $half:ident: $half_lanes:literal, $any:ident) => {
         pub fn $choose() -> TileKernel<$number> {
             #[cfg(target_arch = "x86_64")]
             {
                 if std::arch::is_x86_feature_detected!("avx512f") {
-                    return TileKernel { lanes: $wide_lanes, most_vectors: 4, run: x86::$wide };
+                    return TileKernel { lanes: $wide_lanes, max_vectors: 4, run: x86::$wide };
                 }
                 if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
-                    return TileKernel { lanes: $half_lanes, most_vectors: 2, run: x86::$half };
+                    return TileKernel { lanes: $half_lanes, max_vectors: 2, run: x86::$half };
                 }
             }
-            TileKernel { lanes: 4, most_vectors: 2, run: $any }
+            TileKernel { lanes: 4, max_vectors: 2, run: $any }
         }
     };
 }
@@ -195,11 +195,12 @@ macro_rules! choose_kernel {
 choose_kernel!(of_f32, f32, wide_f32: 16, half_f32: 8, any_f32);
 choose_kernel!(of_f64, f64, wide_f64: 8, half_f64: 4, any_f64);
 
-/// Columns cut into panels as wide as tiles: (first column, vectors), widest first; the last may reach beyond.
+/// Splits columns into panels of the width of tiles, widest first: (first column, number of vectors). The last panel
+/// may extend beyond `n_columns`.
 pub fn panels<T>(kernel: &TileKernel<T>, n_columns: usize) -> Vec<(usize, usize)> {
     let (mut panels, mut first, mut left) = (Vec::new(), 0, n_columns.div_ceil(kernel.lanes));
     while left > 0 {
-        let n = [4, 2, 1].into_iter().find(|n| *n <= left && *n <= kernel.most_vectors).unwrap_or(1);
+        let n = [4, 2, 1].into_iter().find(|n| *n <= left && *n <= kernel.max_vectors).unwrap_or(1);
         panels.push((first, n));
         first += n * kernel.lanes;
         left -= n;
@@ -212,12 +213,12 @@ mod tests {
     use super::*;
 
     fn agrees(kernel: TileKernel<f64>) {
-        for n_vectors in [1, 2, 4].into_iter().filter(|n| *n <= kernel.most_vectors) {
-            for n_rows in 1..=MOST_ROWS {
+        for n_vectors in [1, 2, 4].into_iter().filter(|n| *n <= kernel.max_vectors) {
+            for n_rows in 1..=MAX_ROWS {
                 let (n_columns, n_steps) = (n_vectors * kernel.lanes, 5);
                 let left: Vec<f64> = (0..200).map(|i| f64::from(i) * 0.5).collect();
                 let right: Vec<f64> = (0..2000).map(|i| f64::from(i % 17)).collect();
-                let mut sums = vec![1.0; MOST_ROWS * n_columns];
+                let mut sums = vec![1.0; MAX_ROWS * n_columns];
                 let start = sums.as_mut_ptr();
                 let to = std::array::from_fn(|row| start.wrapping_add(row * n_columns));
                 let job = TileJob {
@@ -228,7 +229,7 @@ mod tests {
                     outer: TileSteps { n: 2, left: 10, right: 400 },
                     inner: TileSteps { n: n_steps, left: 2, right: 60 },
                 };
-                // SAFETY: all lies inside the vectors above.
+                // SAFETY: all addresses lie inside the vectors above.
                 unsafe { (kernel.run)(&job, n_rows, n_vectors) };
                 for (i, sum) in sums.iter().enumerate() {
                     let (row, column) = (i / n_columns, i % n_columns);
@@ -244,18 +245,18 @@ mod tests {
     }
 
     #[test]
-    fn every_processors_tiles_are_right() {
+    fn tiles_of_every_processor_type_are_correct() {
         agrees(of_f64());
-        agrees(TileKernel { lanes: 4, most_vectors: 2, run: any_f64 });
+        agrees(TileKernel { lanes: 4, max_vectors: 2, run: any_f64 });
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
-            agrees(TileKernel { lanes: 4, most_vectors: 2, run: x86::half_f64 });
+            agrees(TileKernel { lanes: 4, max_vectors: 2, run: x86::half_f64 });
         }
     }
 
     #[test]
     fn panels_cover_all_columns() {
-        let kernel = TileKernel { lanes: 16, most_vectors: 4, run: any_f32 };
+        let kernel = TileKernel { lanes: 16, max_vectors: 4, run: any_f32 };
         assert_eq!(panels(&kernel, 144), [(0, 4), (64, 4), (128, 1)]);
         assert_eq!(panels(&kernel, 96), [(0, 4), (64, 2)]);
         assert_eq!(panels(&kernel, 1), [(0, 1)]);

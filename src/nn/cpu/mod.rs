@@ -1,5 +1,5 @@
-//! Kernels of the operators on a processor: direct convolution over packed weights, weight gradients, channel
-//! statistics, row-wise loops of recurrent layers, and the threads that share them.
+//! CPU kernels of the operators: direct convolution over packed weights, weight gradients, channel statistics,
+//! row-wise loops of recurrent layers, and their thread pools.
 //!
 //! # Threads of the program
 //!

@@ -1,16 +1,16 @@
-//! A matrix laid out as the tiles of `kernel` read it, to be multiplied by rows again and again: the weights of a
-//! recurrent layer meet a few rows at every step of a sequence, too few to lay them out anew each time.
+//! A matrix in the memory order in which the tiles of `kernel` read it, for repeated multiplication: a recurrent layer
+//! multiplies its weights with a few rows at every step of a sequence, too few to pack them every time.
 
-use super::kernel::{MOST_ROWS, TileJob, TileKernel, TileSteps, panels};
+use super::kernel::{MAX_ROWS, TileJob, TileKernel, TileSteps, panels};
 use super::tensor::Scalar;
 
-/// Columns are filled up with zeros to a multiple of this many.
+/// Columns are padded with zeros to a multiple of this number.
 pub const COLUMNS: usize = 16;
 
-/// Matrix [depth, columns], panel after panel of columns.
+/// Matrix [depth, columns], stored as consecutive panels of columns.
 pub struct PackedMatrix<T> {
     data: Vec<T>,
-    /// First column and vectors of each panel.
+    /// First column and number of vectors of each panel.
     panels: Vec<(usize, usize)>,
     kernel: TileKernel<T>,
     depth: usize,
@@ -18,7 +18,7 @@ pub struct PackedMatrix<T> {
 }
 
 impl<T: Scalar> PackedMatrix<T> {
-    /// `element` gives the number in a row and a column.
+    /// Packs a matrix; `element(row, column)` returns its elements.
     pub fn new(depth: usize, n_columns: usize, element: impl Fn(usize, usize) -> T) -> Self {
         let (kernel, width) = (T::kernel(), n_columns.next_multiple_of(COLUMNS));
         let panels = panels(&kernel, width);
@@ -33,13 +33,13 @@ impl<T: Scalar> PackedMatrix<T> {
         Self { data, panels, kernel, depth, width }
     }
 
-    /// Columns, those of zeros included.
+    /// Number of columns, including the padding.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Adds the products of `n_rows` rows of `left` with the matrix to the rows of `to`, which are as wide as the matrix
-    /// at least; rows begin every so many numbers.
+    /// Adds the products of `n_rows` rows of `left` with the matrix to the rows of `to`, which have at least `width`
+    /// values. Successive rows start `left_stride` and `to_stride` values apart.
     pub fn multiply_add(&self, n_rows: usize, left: &[T], left_stride: usize, to: &mut [T], to_stride: usize) {
         if n_rows == 0 || self.depth == 0 {
             return;
@@ -57,8 +57,8 @@ impl<T: Scalar> PackedMatrix<T> {
         for &(first, n_vectors) in &self.panels {
             let columns = n_vectors * self.kernel.lanes;
             let right = self.data[self.depth * first..].as_ptr();
-            for row in (0..n_rows).step_by(MOST_ROWS) {
-                let n = MOST_ROWS.min(n_rows - row);
+            for row in (0..n_rows).step_by(MAX_ROWS) {
+                let n = MAX_ROWS.min(n_rows - row);
                 let to = std::array::from_fn(|i| to.wrapping_add((row + i.min(n - 1)) * to_stride + first));
                 let job = TileJob {
                     rows: std::array::from_fn(|i| left.wrapping_add((row + i.min(n - 1)) * left_stride)),

@@ -1,30 +1,31 @@
-//! Weights of a convolution laid out as the tiles of `kernel` read them, and their products with the places of a
-//! padded copy.
+//! Weights of a convolution in the memory order in which the tiles of `kernel` read them, and their products with
+//! positions of a padded copy.
 
-use super::kernel::{MOST_ROWS, TileJob, TileSteps, panels};
+use super::kernel::{MAX_ROWS, TileJob, TileSteps, panels};
 use super::tensor::{LANES, Scalar, SharedOutputPtr, aligned, written};
 use super::thread_team::parallel_for;
 use std::ops::Range;
 
-/// Weights in the order in which tiles want them: panel after panel of columns, in each one row a step of the sum.
+/// Weights in tile order: consecutive panels of columns; each panel has one row per summation step.
 pub struct PackedWeights<T> {
     pub data: Vec<T>,
     pub panels: Vec<WeightPanel>,
 }
 
-/// Some columns of weights.
+/// A panel of columns of the weights.
 pub struct WeightPanel {
-    /// Where its data begins, its first column, and how many of its columns there are; the rest of its width is zero.
+    /// Start of its data, its first column, and its number of columns; the rest of its width is zero.
     start: usize,
     first: usize,
     n: usize,
     n_vectors: usize,
-    /// Width of the panel.
+    /// Width of the panel, including the padding.
     pub columns: usize,
 }
 
-/// Where the weights of one pass lie: that of column `o`, channel `c` and the pass's tap `i` is number
-/// `o * per_column + c * per_channel + taps[i]`; steps of a sum go through the channels of one tap after the other.
+/// Memory order of the weights of a pass: the weight of column `o`, channel `c` and the pass's kernel offset `i` is at
+/// `o * per_column + c * per_channel + kernel_offsets[i]`; the summation steps iterate over the channels within each
+/// offset.
 pub struct WeightOrder {
     pub n_columns: usize,
     pub per_column: usize,
@@ -33,9 +34,9 @@ pub struct WeightOrder {
     pub kernel_offsets: Vec<usize>,
 }
 
-/// Numbers of a column that are read at once: whole lines of memory.
+/// Number of values of a column that are read together: complete cache lines.
 const AT_ONCE: usize = 128;
-/// Channels of a task.
+/// Number of channels per task.
 const CHANNELS: usize = 64;
 
 impl<T: Scalar> PackedWeights<T> {
@@ -52,26 +53,28 @@ impl<T: Scalar> PackedWeights<T> {
         let mut panels: Vec<WeightPanel> = panels.collect();
         let most = kernel_offsets.iter().copied().max().unwrap_or(0);
         let n_at_once = (AT_ONCE / kernel_offsets.len().max(1)).max(1);
-        // What lies side by side in memory is fetched at once: channels of a column, or columns of a channel.
+        // Values that are adjacent in memory are read together: the channels of a column, or the columns of a channel.
         let of_columns = per_column < per_channel;
-        let (per_line, per_place) = if of_columns { (*per_channel, *per_column) } else { (*per_column, *per_channel) };
+        let (per_line, per_position) =
+            if of_columns { (*per_channel, *per_column) } else { (*per_column, *per_channel) };
         let pack = |data: SharedOutputPtr<T>, panel: &WeightPanel, channels: Range<usize>| {
             let mut lines = Vec::new();
             for first in channels.clone().step_by(n_at_once) {
                 let some = first..channels.end.min(first + n_at_once);
                 let (n_lines, in_line) = if of_columns { (some.len(), panel.n) } else { (panel.n, some.len()) };
                 let corner = panel.first * per_column + first * per_channel;
-                let length = (in_line - 1) * per_place + most + 1;
+                let length = (in_line - 1) * per_position + most + 1;
                 lines.clear();
                 for n in 0..n_lines {
                     lines.extend_from_slice(&weight[corner + n * per_line..][..length]);
                 }
-                let (from_channel, from_column) = if of_columns { (length, per_place) } else { (per_place, length) };
+                let (from_channel, from_column) =
+                    if of_columns { (length, per_position) } else { (per_position, length) };
                 for channel in some.clone() {
                     for (i, kernel_offset) in kernel_offsets.iter().enumerate() {
                         let row = &lines[(channel - first) * from_channel + kernel_offset..];
                         let step = i * n_channels + channel;
-                        // SAFETY: a step's row of this panel, which only this task writes.
+                        // SAFETY: only this task writes this step's row of this panel.
                         let to = unsafe {
                             std::slice::from_raw_parts_mut(data.at(panel.start + step * panel.columns), panel.columns)
                         };
@@ -88,14 +91,15 @@ impl<T: Scalar> PackedWeights<T> {
         let tasks: Vec<(&WeightPanel, Range<usize>)> = panels
             .iter()
             .flat_map(|panel| {
-                // A phase of a gradient may have no tap at all.
+                // A phase of a gradient may have no kernel offset.
                 let starts = (0..*n_channels).step_by(CHANNELS).filter(|_| !kernel_offsets.is_empty());
                 starts.map(move |start| (panel, start..(*n_channels).min(start + CHANNELS)))
             })
             .collect();
         let n_numbers = start;
         let mut first = 0;
-        // SAFETY: the tasks together write every row of every panel, this thread what lies before and behind them.
+        // SAFETY: the tasks together write every row of every panel; this thread writes the padding before and after
+        // them.
         let data = unsafe {
             written(n_numbers + LANES, |data: SharedOutputPtr<T>| {
                 first = aligned(data.at(0));
@@ -110,16 +114,16 @@ impl<T: Scalar> PackedWeights<T> {
 }
 
 impl WeightPanel {
-    /// Adds the products of one block of steps to the sums at every place or, where it is the first, to `begin`, one number
-    /// a column.
+    /// Adds the products of one block of steps to the sums at every position, or to `begin`, one value per column, if
+    /// the block is the first.
     ///
     /// # Safety
-    /// Places lie inside `left` (with the block's reach) and `to`, which no other thread writes to there.
+    /// The positions, extended by the block, lie inside `left` and `to`, and no other thread writes there.
     pub unsafe fn multiply<T: Scalar>(
         &self,
         right: &[T],
         left: &[T],
-        places: &[(usize, usize)],
+        positions: &[(usize, usize)],
         to: SharedOutputPtr<T>,
         begin: Option<&[T]>,
         block: &StepBlock,
@@ -127,10 +131,10 @@ impl WeightPanel {
         let kernel = T::kernel();
         let begin = begin.map(|begin| begin[self.first..][..self.n].as_ptr());
         let right = right[self.start + block.right..].as_ptr();
-        for tile in places.chunks(MOST_ROWS) {
+        for tile in positions.chunks(MAX_ROWS) {
             let of = |row: usize| tile[row.min(tile.len() - 1)];
-            // SAFETY: the caller's.
-            let to: [*mut T; MOST_ROWS] = std::array::from_fn(|row| unsafe { to.at(of(row).1 + self.first) });
+            // SAFETY: guaranteed by the caller.
+            let to: [*mut T; MAX_ROWS] = std::array::from_fn(|row| unsafe { to.at(of(row).1 + self.first) });
             let mut job = TileJob {
                 rows: std::array::from_fn(|row| left.as_ptr().wrapping_add(of(row).0 + block.left)),
                 from: to.map(|to| begin.unwrap_or(to)),
@@ -139,28 +143,29 @@ impl WeightPanel {
                 outer: block.outer,
                 inner: block.inner,
             };
-            // SAFETY: the caller's; where the panel is wider than its columns, sums are kept aside meanwhile.
+            // SAFETY: guaranteed by the caller; if the panel is wider than its columns, the sums are kept in a local
+            // buffer.
             unsafe {
                 if self.n == self.columns {
                     (kernel.run)(&job, tile.len(), self.n_vectors);
                     continue;
                 }
-                let mut aside = [[T::zero(); 64]; MOST_ROWS];
-                for (aside, from) in aside.iter_mut().zip(&job.from).take(tile.len()) {
-                    aside.as_mut_ptr().copy_from_nonoverlapping(*from, self.n);
+                let mut local = [[T::zero(); 64]; MAX_ROWS];
+                for (local, from) in local.iter_mut().zip(&job.from).take(tile.len()) {
+                    local.as_mut_ptr().copy_from_nonoverlapping(*from, self.n);
                 }
-                job.to = aside.each_mut().map(|row| row.as_mut_ptr());
+                job.to = local.each_mut().map(|row| row.as_mut_ptr());
                 job.from = job.to.map(<*mut T>::cast_const);
                 (kernel.run)(&job, tile.len(), self.n_vectors);
-                for (aside, place) in aside.iter().zip(&to).take(tile.len()) {
-                    place.copy_from_nonoverlapping(aside.as_ptr(), self.n);
+                for (local, position) in local.iter().zip(&to).take(tile.len()) {
+                    position.copy_from_nonoverlapping(local.as_ptr(), self.n);
                 }
             }
         }
     }
 }
 
-/// Steps of a sum, as a part of all.
+/// A block of summation steps: offsets of its factors, and its loops.
 pub struct StepBlock {
     pub left: usize,
     pub right: usize,

@@ -1,6 +1,6 @@
-//! The memory under a tensor, for this room's own operators: slices in, slices out, scratch buffers that are reused,
-//! and the one matrix product. Everything here gives the same bits for any number of threads: work is cut into
-//! pieces of a fixed size and each number is summed by one thread in one order.
+//! Memory access for the operators of this crate: slices of tensors, reusable scratch buffers, and matrix products.
+//! Every function gives identical bits for any number of threads: work is divided into pieces of fixed size, and each
+//! value is summed by one thread in a fixed order.
 
 use super::kernel;
 use super::kernel::TileKernel;
@@ -10,19 +10,19 @@ use rayon::prelude::*;
 use std::cell::RefCell;
 use std::thread::LocalKey;
 
-/// Rows and columns of a product one task computes.
+/// Rows and columns of a matrix product per task.
 const TILE: (usize, usize) = (128, 256);
-/// Numbers summed side by side, as the processor does best.
+/// Number of values that are summed in parallel lanes.
 pub const LANES: usize = 16;
-/// A piece of element-wise work is at least this many numbers.
+/// Minimum number of values per task of element-wise work.
 pub const GRAIN: usize = 16 * 1024;
 
-/// The number types our operators are written for: f32 to train with, f64 to prove the gradients with.
+/// Number types of the operators: f32 for training, f64 for gradient checks.
 pub trait Scalar: WithDType {
     fn pool() -> &'static LocalKey<RefCell<Vec<Vec<Self>>>>;
-    /// The loop of the processor at hand.
+    /// Tile loop of the current processor.
     fn kernel() -> TileKernel<Self>;
-    /// e^x; in f32 an approximation that loops can be vectorised with.
+    /// e^x; in f32 an approximation that allows vectorised loops.
     fn fast_exp(self) -> Self;
 }
 
@@ -48,7 +48,10 @@ macro_rules! real {
 real!(f32, kernel::of_f32, exp_f32);
 real!(f64, kernel::of_f64, f64::exp);
 
-/// The numbers of a contiguous tensor inside an operator. Errors when it is not contiguous (callers see to it).
+/// Returns the values of a contiguous tensor inside an operator.
+///
+/// # Errors
+/// The tensor is not contiguous; callers guarantee that it is.
 pub fn slice<'a, T: Scalar>(storage: &'a CpuStorage, layout: &Layout) -> Result<&'a [T]> {
     let Some((start, end)) = layout.contiguous_offsets() else {
         candle_core::bail!("this operator wants contiguous tensors, got strides {:?}", layout.stride());
@@ -56,7 +59,7 @@ pub fn slice<'a, T: Scalar>(storage: &'a CpuStorage, layout: &Layout) -> Result<
     Ok(&T::cpu_storage_as_slice(storage)?[start..end])
 }
 
-/// Lends the numbers of a tensor on the CPU, copying only when it is not contiguous.
+/// Calls `f` with the values of a tensor on the CPU; copies them only if the tensor is not contiguous.
 pub fn read<T: Scalar, R>(tensor: &Tensor, f: impl FnOnce(&[T]) -> Result<R>) -> Result<R> {
     let tensor = tensor.contiguous()?;
     let (storage, layout) = tensor.storage_and_layout();
@@ -66,7 +69,10 @@ pub fn read<T: Scalar, R>(tensor: &Tensor, f: impl FnOnce(&[T]) -> Result<R>) ->
     }
 }
 
-/// Errors unless the tensor holds f32 or f64; true for f64.
+/// Returns whether the number type is f64.
+///
+/// # Errors
+/// It is neither f32 nor f64.
 pub fn is_f64(dtype: DType) -> Result<bool> {
     match dtype {
         DType::F32 => Ok(false),
@@ -75,14 +81,14 @@ pub fn is_f64(dtype: DType) -> Result<bool> {
     }
 }
 
-/// Numbers from `start` to the next start of a line of the cache, less than [`LANES`]: vectors that lie in two lines are loaded
-/// at half the speed.
+/// Number of values from `start` to the next cache line, less than [`LANES`]. Vectors that span two cache lines are
+/// loaded at half the speed.
 pub fn aligned<T>(start: *const T) -> usize {
     start.align_offset(64).min(LANES - 1)
 }
 
-/// Lends a buffer of `len` numbers whose contents are arbitrary, from the start of a line of the cache on; the memory is kept
-/// for the next caller.
+/// Calls `f` with a buffer of `len` values of arbitrary content, aligned to a cache line; the memory is reused by
+/// later calls.
 pub fn scratch<T: Scalar, R>(len: usize, f: impl FnOnce(&mut [T]) -> R) -> R {
     let mut buffer = T::pool().with_borrow_mut(Vec::pop).unwrap_or_default();
     if buffer.len() < len + LANES {
@@ -94,7 +100,7 @@ pub fn scratch<T: Scalar, R>(len: usize, f: impl FnOnce(&mut [T]) -> R) -> R {
     result
 }
 
-/// A matrix in memory: element (row, column) is `data[row * row_stride + column * column_stride]`.
+/// Matrix in memory: element (row, column) is `data[row * row_stride + column * column_stride]`.
 #[derive(Clone, Copy)]
 pub struct Matrix<'a, T> {
     pub data: &'a [T],
@@ -103,28 +109,28 @@ pub struct Matrix<'a, T> {
 }
 
 impl<'a, T> Matrix<'a, T> {
-    /// A row-major matrix of rows of `n_columns`.
+    /// Creates a row-major matrix with `n_columns` columns.
     pub fn new(data: &'a [T], n_columns: usize) -> Self {
         Self { data, row_stride: n_columns, column_stride: 1 }
     }
 
-    /// Transpose: rows and columns swapped, memory untouched.
+    /// Transposed view of the same memory.
     pub fn transposed(self) -> Self {
         Self { data: self.data, row_stride: self.column_stride, column_stride: self.row_stride }
     }
 
-    /// The part from this row and column on.
+    /// View of the part from this row and column on.
     fn at(self, row: usize, column: usize) -> Self {
         Self { data: &self.data[row * self.row_stride + column * self.column_stride..], ..self }
     }
 
-    /// Whether so many rows and columns, at least one of each, lie inside `data`.
+    /// Returns whether this many rows and columns, at least one of each, lie inside `data`.
     fn holds(&self, rows: usize, columns: usize) -> bool {
         (rows - 1) * self.row_stride + (columns - 1) * self.column_stride < self.data.len()
     }
 }
 
-/// `product = left x right`, [m, depth] x [depth, n], row-major; `product` is overwritten.
+/// Computes `product = left x right`, [m, depth] x [depth, n], row-major; overwrites `product`.
 pub fn matmul<T: Scalar>(product: &mut [T], left: Matrix<T>, right: Matrix<T>, m: usize, n: usize, depth: usize) {
     if m == 0 || n == 0 {
         return;
@@ -143,7 +149,7 @@ pub fn matmul<T: Scalar>(product: &mut [T], left: Matrix<T>, right: Matrix<T>, m
     });
 }
 
-/// Adds `left x right`, [m, depth] x [depth, n], to `sum`, row-major, on this thread alone.
+/// Adds `left x right`, [m, depth] x [depth, n], to `sum`, row-major, on the calling thread.
 pub fn add_product<T: Scalar>(sum: &mut [T], left: Matrix<T>, right: Matrix<T>, m: usize, n: usize, depth: usize) {
     if m == 0 || n == 0 || depth == 0 {
         return;
@@ -154,11 +160,11 @@ pub fn add_product<T: Scalar>(sum: &mut [T], left: Matrix<T>, right: Matrix<T>, 
     unsafe { gemm_on_this_thread(sum.as_mut_ptr(), n, true, left, right, [m, n, depth]) };
 }
 
-/// `left x right`, [m, depth] x [depth, n], into rows at `to` that are `stride` apart: added to what is there, or
-/// overwriting it.
+/// Computes `left x right`, [m, depth] x [depth, n], into rows at `to` with distance `stride`: added to their values,
+/// or overwriting them.
 ///
 /// # Safety
-/// The factors hold so many rows and columns, `to` as many rows, which no other thread reads or writes.
+/// The factors have this many rows and columns, and `to` this many rows, which no other thread reads or writes.
 unsafe fn gemm_on_this_thread<T: Scalar>(
     to: *mut T,
     stride: usize,
@@ -171,7 +177,7 @@ unsafe fn gemm_on_this_thread<T: Scalar>(
     let ((left_column, left_row), (right_column, right_row)) = (strides(left), strides(right));
     let (left, right) = (left.data.as_ptr(), right.data.as_ptr());
     let (of_sum, one, alone) = (if adds { T::one() } else { T::zero() }, T::one(), gemm::Parallelism::None);
-    // SAFETY: the caller's.
+    // SAFETY: guaranteed by the caller.
     unsafe {
         gemm::gemm(
             m,
@@ -197,19 +203,19 @@ unsafe fn gemm_on_this_thread<T: Scalar>(
     }
 }
 
-/// New numbers, which `write` writes without zeros having been there before.
+/// Allocates `len` values that `write` initialises, without zeroing them first.
 ///
 /// # Safety
-/// `write` writes every one of the `len` numbers, and reads none that it has not written.
+/// `write` writes every one of the `len` values, and reads none that it has not written.
 pub unsafe fn written<T: Scalar>(len: usize, write: impl FnOnce(SharedOutputPtr<T>)) -> Vec<T> {
     let mut values = Vec::with_capacity(len);
     write(SharedOutputPtr(values.as_mut_ptr()));
-    // SAFETY: all are written, as the caller promises.
+    // SAFETY: the caller guarantees that all values are written.
     unsafe { values.set_len(len) };
     values
 }
 
-/// Where a result begins: tasks write disjoint parts of it.
+/// Pointer to the start of a result of which tasks write disjoint parts.
 #[derive(Clone, Copy)]
 pub struct SharedOutputPtr<T>(*mut T);
 
@@ -219,29 +225,29 @@ unsafe impl<T: Send> Send for SharedOutputPtr<T> {}
 unsafe impl<T: Send> Sync for SharedOutputPtr<T> {}
 
 impl<T> SharedOutputPtr<T> {
-    /// Start of `values`, which nobody else uses meanwhile.
+    /// Creates a pointer to the start of `values`, which must not be accessed otherwise in the meantime.
     pub fn new(values: &mut [T]) -> Self {
         Self(values.as_mut_ptr())
     }
 
-    /// The result from `offset` on.
+    /// Pointer to the result from `offset` on.
     ///
     /// # Safety
     /// `offset` lies inside the result.
     pub unsafe fn from(self, offset: usize) -> Self {
-        // SAFETY: the caller's.
+        // SAFETY: guaranteed by the caller.
         Self(unsafe { self.at(offset) })
     }
 
     /// # Safety
     /// `offset` lies inside the result.
     pub unsafe fn at(self, offset: usize) -> *mut T {
-        // SAFETY: the caller's.
+        // SAFETY: guaranteed by the caller.
         unsafe { self.0.add(offset) }
     }
 }
 
-/// The sum of `values`, always in the same order.
+/// Sums `values` in a fixed order.
 pub fn sum<T: Scalar>(values: &[T]) -> f64 {
     let (chunks, rest) = values.as_chunks::<LANES>();
     let mut lanes = [T::zero(); LANES];

@@ -1,7 +1,7 @@
-//! Parallel pieces of work for this room's operators. By themselves they run on rayon's threads. A training step is some
-//! hundred small ones, though, and a thread that falls asleep between two of them comes too late to the next, on a
-//! shared machine by a time slice; so a training keeps a team of threads that look for work all the time, as those of
-//! other frameworks do. Who does a piece never changes what it gives.
+//! Parallel loops for the operators of this crate, by default on rayon's threads. A training step consists of some
+//! hundred small loops, and a thread that falls asleep between two of them wakes too late for the next, on a shared
+//! machine by a time slice. Training therefore uses a team of spinning threads, as other frameworks do. Results do not
+//! depend on which thread runs a task.
 
 use rayon::prelude::*;
 use std::cell::{Cell, UnsafeCell};
@@ -9,34 +9,34 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::SeqCst};
 use std::sync::{Mutex, OnceLock};
 
-/// A piece's work by its number, as the team sees it: alive as long as `ThreadTeam::run` has not returned.
+/// Work of the team, called with the number of a piece; valid until `ThreadTeam::run` returns.
 type TeamTask = *const (dyn Fn(usize) + Sync);
 
 struct ThreadTeam {
-    /// Written by the leader alone, while it is closed and nobody is active.
+    /// Written only by the leader, while `closed` is set and `active` is 0.
     work: UnsafeCell<Option<(TeamTask, usize)>>,
     next: AtomicUsize,
-    /// Helpers that may be reading `work`.
+    /// Number of helpers that may be reading `work`.
     active: AtomicUsize,
     closed: AtomicBool,
-    broken: AtomicBool,
-    over: AtomicBool,
+    failed: AtomicBool,
+    ended: AtomicBool,
 }
 
-// SAFETY: `work` is guarded by `closed` and `active` as said there.
+// SAFETY: access to `work` is synchronised by `closed` and `active`, as documented there.
 unsafe impl Sync for ThreadTeam {}
 
 thread_local!(static TEAM: Cell<*const ThreadTeam> = const { Cell::new(std::ptr::null()) });
 
-/// Runs `f`, whose parallel pieces are shared out among threads that stay awake until it returns.
+/// Calls `f`; its parallel loops use threads that spin until it returns.
 pub fn with_spinning_workers<R>(f: impl FnOnce() -> R) -> R {
     let team = ThreadTeam {
         work: UnsafeCell::new(None),
         next: AtomicUsize::new(0),
         active: AtomicUsize::new(0),
         closed: AtomicBool::new(true),
-        broken: AtomicBool::new(false),
-        over: AtomicBool::new(false),
+        failed: AtomicBool::new(false),
+        ended: AtomicBool::new(false),
     };
     let n_helpers = rayon::current_num_threads().saturating_sub(1);
     if n_helpers == 0 || !TEAM.get().is_null() {
@@ -49,20 +49,20 @@ pub fn with_spinning_workers<R>(f: impl FnOnce() -> R) -> R {
         TEAM.set(&raw const team);
         let result = catch_unwind(AssertUnwindSafe(f));
         TEAM.set(std::ptr::null());
-        team.over.store(true, SeqCst);
+        team.ended.store(true, SeqCst);
         result.unwrap_or_else(|panic| resume_unwind(panic))
     })
 }
 
-/// Runs `f` for 0..n, on all threads at hand, in any order.
+/// Calls `f` for 0..n in any order, on all available threads.
 pub fn parallel_for(n: usize, f: impl Fn(usize) + Sync) {
     let team = TEAM.get();
     if team.is_null() {
         return (0..n).into_par_iter().for_each(&f);
     }
-    // Pieces of pieces are the business of the thread that has them.
+    // Nested loops run on the thread of the outer piece.
     TEAM.set(std::ptr::null());
-    // SAFETY: a team outlives the time for which its leader's thread points to it.
+    // SAFETY: the team outlives the period in which its leader's thread points to it.
     let result = catch_unwind(AssertUnwindSafe(|| unsafe { &*team }.run(n, &f)));
     TEAM.set(team);
     if let Err(panic) = result {
@@ -70,7 +70,7 @@ pub fn parallel_for(n: usize, f: impl Fn(usize) + Sync) {
     }
 }
 
-/// What `f` gives for 0..n, in this order, worked out on all threads at hand.
+/// Returns the results of `f` for 0..n in order, computed on all available threads.
 pub fn parallel_map<R: Send + Sync>(n: usize, f: impl Fn(usize) -> R + Sync) -> Vec<R> {
     let results: Vec<OnceLock<R>> = (0..n).map(|_| OnceLock::new()).collect();
     parallel_for(n, |i| {
@@ -79,7 +79,7 @@ pub fn parallel_map<R: Send + Sync>(n: usize, f: impl Fn(usize) -> R + Sync) -> 
     results.into_iter().filter_map(OnceLock::into_inner).collect()
 }
 
-/// What `f` gives for each of `items` with its number, in their order, worked out on all threads at hand.
+/// Returns the results of `f` for each of `items` with its index, in order, computed on all available threads.
 pub fn parallel_each<I: Send, R: Send + Sync>(
     items: impl Iterator<Item = I>,
     f: impl Fn(usize, I) -> R + Sync,
@@ -91,22 +91,22 @@ pub fn parallel_each<I: Send, R: Send + Sync>(
 
 impl ThreadTeam {
     fn run(&self, n: usize, f: &(dyn Fn(usize) + Sync)) {
-        // SAFETY: only the lifetime is forgotten; nobody is active when this function returns.
+        // SAFETY: only the lifetime is erased; no helper is active when this function returns.
         let work: TeamTask = unsafe { std::mem::transmute::<&(dyn Fn(usize) + Sync), TeamTask>(f) };
-        // SAFETY: closed, and nobody active: since the last run, or from the beginning.
+        // SAFETY: `closed` is set and no helper is active, since the previous run or since construction.
         unsafe { *self.work.get() = Some((work, n)) };
         self.next.store(0, SeqCst);
         self.closed.store(false, SeqCst);
         let own = catch_unwind(AssertUnwindSafe(|| self.take(f, n)));
         self.closed.store(true, SeqCst);
-        let mut patience = SpinWait::default();
+        let mut spin = SpinWait::default();
         while self.active.load(SeqCst) > 0 {
-            patience.wait();
+            spin.wait();
         }
         if let Err(panic) = own {
             resume_unwind(panic);
         }
-        assert!(!self.broken.load(SeqCst), "a piece of parallel work failed");
+        assert!(!self.failed.load(SeqCst), "a piece of parallel work failed");
     }
 
     fn take(&self, f: &(dyn Fn(usize) + Sync), n: usize) {
@@ -120,22 +120,22 @@ impl ThreadTeam {
     }
 
     fn help(&self) {
-        let mut patience = SpinWait::default();
-        while !self.over.load(SeqCst) {
+        let mut spin = SpinWait::default();
+        while !self.ended.load(SeqCst) {
             if self.closed.load(SeqCst) {
-                patience.wait();
+                spin.wait();
                 continue;
             }
-            patience = SpinWait::default();
+            spin = SpinWait::default();
             self.active.fetch_add(1, SeqCst);
-            // Seen open while active: the leader waits for us from here on.
+            // `closed` is still unset after `active` was incremented, so the leader now waits for this thread.
             if !self.closed.load(SeqCst) {
-                // SAFETY: the leader writes only while nobody is active.
+                // SAFETY: the leader writes only while no helper is active.
                 if let Some((work, n)) = unsafe { *self.work.get() } {
-                    // SAFETY: the work lives until the leader has seen that nobody is active.
+                    // SAFETY: the work is valid until the leader has seen that no helper is active.
                     let help = AssertUnwindSafe(|| self.take(unsafe { &*work }, n));
                     if catch_unwind(help).is_err() {
-                        self.broken.store(true, SeqCst);
+                        self.failed.store(true, SeqCst);
                     }
                 }
             }
@@ -145,7 +145,7 @@ impl ThreadTeam {
     }
 }
 
-/// Waits awake; where it takes long, whoever else wants the processor gets it.
+/// Waits by spinning; after a while it yields the processor to other threads.
 #[derive(Default)]
 struct SpinWait {
     n_spins: u32,
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn every_piece_is_done_once() {
+    fn every_piece_runs_once() {
         for n_threads in [1, 3] {
             with_threads(n_threads, || {
                 with_spinning_workers(|| {
@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn a_piece_that_fails_is_told_and_the_threads_are_let_go() {
+    fn a_panicking_piece_is_reported_and_the_threads_end() {
         let failing = || with_spinning_workers(|| parallel_for(100, |i| assert!(i != 50, "piece 50")));
         assert!(with_threads(3, || catch_unwind(failing)).is_err());
     }

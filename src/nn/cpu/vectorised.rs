@@ -1,10 +1,10 @@
-//! Row-wise work of recurrent networks, compiled for AVX-512, for AVX2 and for any processor: the gates of a GRU,
-//! attention of one state over some keys, dropout. Rows are multiples of [`COLUMNS`] long, filled up with zeros.
+//! Row-wise operations of recurrent networks, compiled for AVX-512, for AVX2 and for any processor: the gates of a
+//! GRU, attention of one state over keys, dropout. Row lengths are multiples of [`COLUMNS`], padded with zeros.
 
 use super::packed_matrix::COLUMNS;
 use super::tensor::Scalar;
 
-/// A function whose loops are compiled for each kind of processor.
+/// Defines a function whose loops are compiled for each processor type.
 macro_rules! vectorised {
     ($(#[$doc:meta])* $name:ident = $body:ident($($argument:ident: $type:ty),*)) => {
         $(#[$doc])*
@@ -22,11 +22,11 @@ macro_rules! vectorised {
                 if std::arch::is_x86_feature_detected!("avx512dq") && std::arch::is_x86_feature_detected!("avx512bw")
                     && std::arch::is_x86_feature_detected!("avx512vl")
                 {
-                    // SAFETY: the processor has what the function is compiled for.
+                    // SAFETY: the processor supports the features that the function is compiled for.
                     return unsafe { wide($($argument),*) };
                 }
                 if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
-                    // SAFETY: the processor has what the function is compiled for.
+                    // SAFETY: the processor supports the features that the function is compiled for.
                     return unsafe { half($($argument),*) };
                 }
             }
@@ -38,9 +38,10 @@ macro_rules! vectorised {
 pub(super) use vectorised;
 
 vectorised!(
-    /// Gates of a GRU. Rows of `sums` hold, each `width` long, what goes into the candidate from the input, into the reset
-    /// gate, into the update gate, and into the candidate from the state; they become candidate n, reset r, update z, and
-    /// stay. `next = (1 - z) n + z previous`, with n = tanh(input + r state).
+    /// Gates of a GRU. Each row of `sums` consists of four parts of length `width`: the input's contribution to the
+    /// candidate, the sum of the reset gate, the sum of the update gate, and the state's contribution to the
+    /// candidate. The first three are overwritten with candidate n, reset r and update z. `next = (1 - z) n + z
+    /// previous`, with n = tanh(input + r state).
     gates_forward = forward_body(sums: &mut [T], previous: &[T], next: &mut [T], width: usize)
 );
 
@@ -51,7 +52,7 @@ fn forward_body<T: Scalar>(sums: &mut [T], previous: &[T], next: &mut [T], width
         let (candidate, sums) = sums.split_at_mut(width);
         let (reset, sums) = sums.split_at_mut(width);
         let (update, state) = sums.split_at_mut(width);
-        // Lanes on the stack: slices that might overlap would not be vectorised.
+        // Lanes on the stack, because loops over slices that may overlap are not vectorised.
         for at in (0..width).step_by(COLUMNS) {
             let (mut n, mut r, mut z) = (lanes(candidate, at), lanes(reset, at), lanes(update, at));
             let (state, mut next_state) = (lanes(state, at), lanes(previous, at));
@@ -69,7 +70,7 @@ fn forward_body<T: Scalar>(sums: &mut [T], previous: &[T], next: &mut [T], width
     }
 }
 
-/// Numbers from this place on.
+/// Copies `COLUMNS` values from position `at` on.
 #[inline(always)]
 fn lanes<T: Scalar>(row: &[T], at: usize) -> [T; COLUMNS] {
     let mut lanes = [T::zero(); COLUMNS];
@@ -78,8 +79,9 @@ fn lanes<T: Scalar>(row: &[T], at: usize) -> [T; COLUMNS] {
 }
 
 vectorised!(
-    /// Gradients of what went into the gates, in the order of `gates`, which [`gates_forward`] left; the gradient of the
-    /// next state in `grad` becomes that part of the previous state's that does not pass the gates.
+    /// Gradients of the gates' sums, in the order of `gates`, which [`gates_forward`] has written. `grad`, the
+    /// gradient of the next state, is overwritten with the part of the previous state's gradient that does not pass
+    /// through the gates.
     gates_backward = backward_body(gates: &[T], previous: &[T], grad: &mut [T], of_sums: &mut [T], width: usize)
 );
 
@@ -119,8 +121,8 @@ fn tanh<T: Scalar>(x: T) -> T {
 }
 
 vectorised!(
-    /// Attention of a state over keys, as many rows as there are `weights`: weights = softmax of the inner products, context =
-    /// sum of the weighted keys.
+    /// Attention of a state over as many keys as there are `weights`: weights = softmax of the inner products, context
+    /// = sum of the weighted keys.
     attend = attend_body(state: &[T], keys: &[T], weights: &mut [T], context: &mut [T])
 );
 
@@ -143,7 +145,7 @@ fn attend_body<T: Scalar>(state: &[T], keys: &[T], weights: &mut [T], context: &
     }
 }
 
-/// What the backward pass of an attention reads.
+/// Inputs of the backward pass of an attention.
 #[derive(Clone, Copy)]
 pub struct Attended<'a, T> {
     pub state: &'a [T],
@@ -191,24 +193,24 @@ fn add_scaled<T: Scalar>(to: &mut [T], scale: T, row: &[T]) {
     to.iter_mut().zip(row).for_each(|(to, value)| *to += scale * *value);
 }
 
-/// Which numbers a dropout zeroes, as a function of a seed and the number's place, so that no mask is kept.
+/// Dropout mask as a function of a seed and a value's position, so that no mask is stored.
 #[derive(Clone, Copy, Debug)]
 pub struct DropMask {
     seed: u32,
     threshold: u32,
-    /// What kept numbers are multiplied by.
+    /// Factor of the retained values.
     pub scale: f64,
 }
 
 impl DropMask {
-    /// Drops a share `p` of the numbers, 0 <= p < 1.
+    /// Drops a fraction `p` of the values, 0 <= p < 1.
     pub fn new(seed: u32, p: f64) -> Self {
         Self { seed, threshold: (p * f64::from(u32::MAX)) as u32, scale: 1.0 / (1.0 - p) }
     }
 }
 
 vectorised!(
-    /// Drops numbers of `values`, the first of which stands at this place of the whole.
+    /// Applies dropout to `values`; `first` is the position of the first value in the complete array.
     drop_out = drop_body(values: &mut [T], first: usize, mask: DropMask)
 );
 
@@ -225,15 +227,16 @@ fn drop_body<T: Scalar>(values: &mut [T], first: usize, mask: DropMask) {
     }
 }
 
-/// e^x to 2 units in the last place (Cephes' reduction and polynomial), without a branch, so that loops are vectorised.
+/// e^x to 2 units in the last place (range reduction and polynomial of Cephes), without branches, so that loops are
+/// vectorised.
 #[inline(always)]
 pub fn exp_f32(x: f32) -> f32 {
-    /// Added to a number of moderate size, leaves its integer in the lowest bits.
+    /// Adding it to a number of moderate size leaves the number's integer part in the lowest bits.
     const ROUND: f32 = 12_582_912.0;
     let x = x.clamp(-87.0, 88.0);
     let rounded = x * std::f32::consts::LOG2_E + ROUND;
     let n = rounded - ROUND;
-    // ln 2 in two parts, the first of few digits.
+    // ln 2 in two parts, the first with few digits.
     let rest = x - n * 0.693_359_4 + n * 2.121_944_4e-4;
     let series = ((((1.987_569_1e-4 * rest + 1.398_199_9e-3) * rest + 8.333_452e-3) * rest + 4.166_579_6e-2) * rest
         + 1.666_666_5e-1)
@@ -248,7 +251,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn gates_are_those_of_the_definition() {
+    fn gates_equal_their_definition() {
         let width = COLUMNS;
         let value = |i: usize, k: f64| ((i as f64) * k).sin() * 3.0;
         let mut sums: Vec<f32> = (0..8 * width).map(|i| value(i, 1.3) as f32).collect();
@@ -266,20 +269,20 @@ mod tests {
     }
 
     #[test]
-    fn a_share_is_dropped_whatever_the_pieces() {
+    fn dropout_is_independent_of_chunks_and_drops_the_fraction() {
         let mask = DropMask::new(77, 0.3);
-        let mut whole = vec![1.0f32; 100_000];
-        drop_out(&mut whole, 5, mask);
+        let mut complete = vec![1.0f32; 100_000];
+        drop_out(&mut complete, 5, mask);
         let mut pieces = vec![1.0f32; 100_000];
         pieces.chunks_mut(777).enumerate().for_each(|(i, piece)| drop_out(piece, 5 + 777 * i, mask));
-        assert_eq!(whole, pieces);
-        let dropped = whole.iter().filter(|v| **v == 0.0).count() as f64 / 1e5;
+        assert_eq!(complete, pieces);
+        let dropped = complete.iter().filter(|v| **v == 0.0).count() as f64 / 1e5;
         assert!((dropped - 0.3).abs() < 0.01, "{dropped}");
-        assert!((whole.iter().sum::<f32>() / 1e5 - 1.0).abs() < 0.02);
+        assert!((complete.iter().sum::<f32>() / 1e5 - 1.0).abs() < 0.02);
     }
 
     #[test]
-    fn exponentials_are_near() {
+    fn exponentials_are_accurate() {
         for i in -8000..8000 {
             let x = i as f32 * 0.01;
             assert!((exp_f32(x) / x.exp() - 1.0).abs() < 3e-7, "{x}");

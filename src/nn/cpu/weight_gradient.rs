@@ -1,25 +1,25 @@
-//! The gradient of a convolution's weight: for every tap and channel pair a sum over all places of the batch. Tasks
-//! share out the weights, not the places, so that no two threads add to one number.
+//! The gradient of a convolution's weight: for every kernel offset and channel pair a sum over all positions of the
+//! batch. Tasks divide the weights, not the positions, so that no two threads add to the same value.
 
 use super::direct_conv::ConvSizes;
-use super::kernel::{MOST_ROWS, TileJob, TileSteps, panels};
+use super::kernel::{MAX_ROWS, TileJob, TileSteps, panels};
 use super::tensor::{Scalar, SharedOutputPtr, scratch, written};
 use super::thread_team::{parallel_for, parallel_map};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Places of a piece, whose gradients are laid side by side: where they lie in memory, a power of two apart, few of them
-/// fit into the first-level cache at once.
-const PLACES: usize = 256;
-/// Numbers of an output's weights that are written at once: whole lines of memory.
+/// Number of positions per piece, whose gradients are copied to contiguous memory: in position they are a power of two
+/// apart, so that only few of them fit in the first-level cache.
+const POSITIONS: usize = 256;
+/// Number of values of an output's weights that are written together: complete cache lines.
 const AT_ONCE: usize = 32;
-/// Input channels of a task.
-const CHANNELS: usize = 11 * MOST_ROWS;
+/// Number of input channels per task.
+const CHANNELS: usize = 11 * MAX_ROWS;
 
-/// The gradient of the weight.
+/// Computes the gradient of the weight.
 pub fn gradient_of_weight<T: Scalar>(s: &ConvSizes, x: &[T], grad: &[T]) -> Vec<T> {
     assert!(x.len() == s.len_in() && grad.len() == s.len_out());
-    // Only runs along the second axis are long in memory: a lone axis is that one.
+    // Only runs along the second axis are contiguous in memory, so a single axis is moved there.
     let turned = s.axes[1].n_in == 1 && s.axes[1].kernel == 1 && s.axes[1].n_out == 1;
     let s = &if turned { ConvSizes { axes: [s.axes[1], s.axes[0]], ..*s } } else { *s };
     let kernel = T::kernel();
@@ -52,7 +52,7 @@ pub fn gradient_of_weight<T: Scalar>(s: &ConvSizes, x: &[T], grad: &[T]) -> Vec<
                 let mut at = (o * s.n_in + channels.start + some.start) * s.kernel_len();
                 for c in some.clone() {
                     for sums in &kernel_offsets {
-                        // SAFETY: the numbers of these channels of this output, which only this task writes.
+                        // SAFETY: only this task writes the values of these channels of this output.
                         unsafe { gradient.at(at).write(sums[c * width + o - first]) };
                         at += 1;
                     }
@@ -62,7 +62,7 @@ pub fn gradient_of_weight<T: Scalar>(s: &ConvSizes, x: &[T], grad: &[T]) -> Vec<
     };
     let parts: Vec<(usize, usize)> =
         (0..panels.len()).flat_map(|panel| (0..n_chunks).map(move |chunk| (panel, chunk))).collect();
-    // SAFETY: the parts together write every number.
+    // SAFETY: the parts together write every value.
     unsafe {
         written(s.len_weight(), |gradient: SharedOutputPtr<T>| {
             parallel_for(parts.len(), |part| spread(gradient, parts[part]));
@@ -70,7 +70,8 @@ pub fn gradient_of_weight<T: Scalar>(s: &ConvSizes, x: &[T], grad: &[T]) -> Vec<
     }
 }
 
-/// The numbers with their channels filled up with zeros to whole vectors (None where they are), and how many there are.
+/// Pads the channels with zeros to complete vectors (`None` if they are already complete); returns the number of
+/// channels.
 fn pad_channels<T: Scalar>(values: &[T], n: usize, lanes: usize) -> (Option<Vec<T>>, usize) {
     let padded = n.next_multiple_of(lanes);
     if padded == n {
@@ -83,8 +84,8 @@ fn pad_channels<T: Scalar>(values: &[T], n: usize, lanes: usize) -> (Option<Vec<
     (Some(to), padded)
 }
 
-/// For one row tap, some input channels and a panel of output channels: sums of `x * grad` over all places of the batch,
-/// [column taps, channels, width of the panel].
+/// Sums of `x * grad` over all positions of the batch for one row offset, some input channels and a panel of output
+/// channels: [column offsets, channels, width of the panel].
 fn sum_products<T: Scalar>(
     s: &ConvSizes,
     x: &[T],
@@ -100,9 +101,10 @@ fn sum_products<T: Scalar>(
     let mut sums = vec![T::zero(); columns.kernel * channels.len() * width];
     let start = sums.as_mut_ptr();
     let inside = rows.inside(row_offset);
-    // A piece is some rows of a sample or, where a sample has one row, some samples; a row longer than a piece is cut.
-    let n_places = PLACES.min(columns.n_out);
-    let n_lines = (PLACES / columns.n_out).max(1);
+    // A piece consists of rows of a sample or, if a sample has one row, of samples; a row longer than a piece is
+    // divided.
+    let n_positions = POSITIONS.min(columns.n_out);
+    let n_lines = (POSITIONS / columns.n_out).max(1);
     let x_at =
         |b: usize, row: usize| (b * rows.n_in + row * rows.stride + row_offset - rows.pad) * columns.n_in * s.n_in;
     let grad_at = |b: usize, row: usize| (b * rows.n_out + row) * columns.n_out * n_columns;
@@ -111,16 +113,16 @@ fn sum_products<T: Scalar>(
     let of_line = |b: usize, line: usize| if one_row { (line, inside.start) } else { (b, line) };
     let x_per_line = if one_row { rows.n_in } else { rows.stride } * columns.n_in * s.n_in;
     let grad_per_line = if one_row { rows.n_out } else { 1 } * columns.n_out * n_columns;
-    let pieces = || (0..columns.n_out).step_by(n_places).map(|at| at..columns.n_out.min(at + n_places));
-    scratch(n_lines * n_places * width, |packed: &mut [T]| {
+    let pieces = || (0..columns.n_out).step_by(n_positions).map(|at| at..columns.n_out.min(at + n_positions));
+    scratch(n_lines * n_positions * width, |packed: &mut [T]| {
         for (b, line) in samples.flat_map(|b| lines.clone().step_by(n_lines).map(move |line| (b, line))) {
             let n = n_lines.min(lines.end - line);
             let (b, row) = of_line(b, line);
             for piece in pieces() {
                 for (line, packed) in packed.chunks_exact_mut(piece.len() * width).take(n).enumerate() {
                     let grad = &grad[grad_at(b, row) + line * grad_per_line + first..];
-                    for (place, packed) in piece.clone().zip(packed.chunks_exact_mut(width)) {
-                        packed.copy_from_slice(&grad[place * n_columns..][..width]);
+                    for (position, packed) in piece.clone().zip(packed.chunks_exact_mut(width)) {
+                        packed.copy_from_slice(&grad[position * n_columns..][..width]);
                     }
                 }
                 for column_offset in 0..columns.kernel {
@@ -132,8 +134,8 @@ fn sum_products<T: Scalar>(
                     let x_at = x_at(b, row) + (across.start * columns.stride + column_offset - columns.pad) * s.n_in;
                     let outer = TileSteps { n, left: x_per_line, right: piece.len() * width };
                     let inner = TileSteps { n: across.len(), left: columns.stride * s.n_in, right: width };
-                    for channel in channels.clone().step_by(MOST_ROWS) {
-                        let n_rows = MOST_ROWS.min(channels.end - channel);
+                    for channel in channels.clone().step_by(MAX_ROWS) {
+                        let n_rows = MAX_ROWS.min(channels.end - channel);
                         let of = |row: usize| row.min(n_rows - 1);
                         let at = column_offset * channels.len() + channel - channels.start;
                         let to = std::array::from_fn(|row| start.wrapping_add((at + of(row)) * width));
@@ -145,7 +147,7 @@ fn sum_products<T: Scalar>(
                             outer,
                             inner,
                         };
-                        // SAFETY: `inside` keeps all steps inside `x` and `packed`; `sums` is this task's.
+                        // SAFETY: `inside` keeps all steps inside `x` and `packed`; `sums` belongs to this task.
                         unsafe { (kernel.run)(&job, n_rows, n_vectors) };
                     }
                 }

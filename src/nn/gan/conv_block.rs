@@ -1,5 +1,5 @@
-//! The brick of generator and discriminator: convolution (padding "same", with bias), batch norm (eps 1e-3), leaky
-//! ReLU 0.2; over time, or over time and frequency. Channels come last.
+//! Building block of generator and discriminator: convolution (padding "same", with bias), batch norm (eps 1e-3),
+//! leaky ReLU 0.2; over time, or over time and frequency. Channels last.
 
 use crate::ops::batch_norm::BatchNorm;
 use crate::ops::conv_norm::conv_norm;
@@ -8,42 +8,43 @@ use crate::params::{Init, Params};
 use candle_core::{Result, Tensor};
 
 const EPS: f64 = 1e-3;
-/// Weight of a new batch in the running statistics, where nothing else is said.
+/// Default weight of a new batch in the running statistics.
 pub const MOMENTUM: f64 = 0.1;
-/// Slope of the leaky ReLU.
+/// Negative slope of the leaky ReLU.
 pub const SLOPE: f64 = 0.2;
 
-/// `<name>.conv.weight` [O, C, K...], `<name>.conv.bias` [O] and the norm `<name>.norm`.
+/// Tensors: `<name>.conv.weight` [O, C, K...], `<name>.conv.bias` [O] and the norm `<name>.norm`.
 pub struct ConvBlock {
     weight: Tensor,
     bias: Tensor,
     norm: BatchNorm,
     stride: usize,
-    /// The kernel covers all frequencies and is not padded.
-    across: bool,
+    /// Whether the kernel covers all frequencies, without padding.
+    full_height: bool,
 }
 
 impl ConvBlock {
-    /// Weight of this `shape` [C', C, K] (over time) or [C', C, K, K'] (over time and frequency); `momentum`: weight of a
-    /// new batch in the running statistics.
+    /// Creates a block with a weight of this `shape`: [C', C, K] (over time) or [C', C, K, K'] (over time and
+    /// frequency). `momentum` is the weight of a new batch in the running statistics.
     pub fn new(params: &mut Params, name: &str, shape: &[usize], stride: usize, momentum: f64) -> Result<Self> {
         let (weight, bias) = params.layer(&format!("{name}.conv"), shape, Init::Glorot, Init::Constant(0.0))?;
         let norm = BatchNorm::new(params, &format!("{name}.norm"), shape[0], EPS, momentum, SLOPE)?;
-        Ok(Self { weight, bias, norm, stride, across: false })
+        Ok(Self { weight, bias, norm, stride, full_height: false })
     }
 
-    /// Weight of this `shape` [C', C, K, F] without padding, stride 1, over all F frequencies of its input.
-    pub fn across(params: &mut Params, name: &str, shape: [usize; 4], momentum: f64) -> Result<Self> {
-        Ok(Self { across: true, ..Self::new(params, name, &shape, 1, momentum)? })
+    /// Creates a block with a weight of this `shape` [C', C, K, F], stride 1 and no padding, over all F frequencies of
+    /// its input.
+    pub fn full_height(params: &mut Params, name: &str, shape: [usize; 4], momentum: f64) -> Result<Self> {
+        Ok(Self { full_height: true, ..Self::new(params, name, &shape, 1, momentum)? })
     }
 
-    /// [B, T, C] to [B, ceil(T / stride), C'], or [B, T, F, C] to [B, T', F', C'].
+    /// Maps [B, T, C] to [B, ceil(T / stride), C'], or [B, T, F, C] to [B, T', F', C'].
     pub fn forward(&self, x: &Tensor, train: bool) -> Result<Tensor> {
         let Self { weight, bias, norm, .. } = self;
-        if !self.across {
+        if !self.full_height {
             return conv_norm(x, weight, bias, norm, conv2d::same(x, weight, self.stride)?, train);
         }
-        // A frequency's channels are channels too: what is left is a convolution over time.
+        // The channels of all frequencies are treated as channels, which leaves a convolution over time.
         let ((batch, time, frequencies, channels), (n_out, _, kernel, _)) = (x.dims4()?, weight.dims4()?);
         let x = x.contiguous()?.reshape((batch, time, frequencies * channels))?;
         let weight = weight.permute((0, 3, 1, 2))?.contiguous()?.reshape((n_out, (), kernel))?;
@@ -58,16 +59,16 @@ mod tests {
     use candle_core::DType;
 
     #[test]
-    fn gradients_are_right_in_two_dimensions() -> Result<()> {
+    fn gradients_are_correct_in_two_dimensions() -> Result<()> {
         let mut params = Params::with_dtype(3, DType::F64);
         let plain = ConvBlock::new(&mut params, "plain", &[3, 2, 3, 3], 1, MOMENTUM)?;
         let down = ConvBlock::new(&mut params, "down", &[2, 3, 4, 4], 2, MOMENTUM)?;
-        let across = ConvBlock::across(&mut params, "across", [2, 2, 3, 4], MOMENTUM)?;
+        let full_height = ConvBlock::full_height(&mut params, "across", [2, 2, 3, 4], MOMENTUM)?;
         let x = pattern(&[2, 9, 8, 2], 0.0)?;
         let y = down.forward(&plain.forward(&x, false)?, false)?;
         assert_eq!(y.dims(), [2, 5, 4, 2]);
-        assert_eq!(across.forward(&y, false)?.dims(), [2, 3, 1, 2]);
-        let all = |v: &[Tensor]| across.forward(&down.forward(&plain.forward(&v[0], false)?, false)?, false);
+        assert_eq!(full_height.forward(&y, false)?.dims(), [2, 3, 1, 2]);
+        let all = |v: &[Tensor]| full_height.forward(&down.forward(&plain.forward(&v[0], false)?, false)?, false);
         assert!(worst(&[x], all)? < 1e-7);
         Ok(())
     }

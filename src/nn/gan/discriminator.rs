@@ -1,5 +1,5 @@
-//! The motion discriminator: a patch network over the frame-to-frame differences of normalised poses that scores
-//! about every fourth frame as real or generated (Ginosar et al. 2019).
+//! The motion discriminator: a patch network on the frame-to-frame differences of normalised poses that scores about
+//! every fourth frame as real or generated (Ginosar et al. 2019).
 
 use super::conv_block::{ConvBlock, MOMENTUM, SLOPE};
 use crate::ops::conv2d::Conv;
@@ -10,7 +10,7 @@ use candle_core::{Result, Tensor};
 const KERNEL: usize = 4;
 const WIDTH: usize = 64;
 
-/// Two halvings of time, then two layers at that rate.
+/// Network: two layers that halve the frame rate, then two layers at that rate.
 pub struct Discriminator {
     first: Conv,
     blocks: [ConvBlock; 2],
@@ -18,7 +18,7 @@ pub struct Discriminator {
 }
 
 impl Discriminator {
-    /// Makes the network's tensors; `n_in` numbers a pose.
+    /// Creates the network's tensors for `n_in` values per pose.
     pub fn new(params: &mut Params, n_in: usize) -> Result<Self> {
         Ok(Self {
             first: Conv::new(params, "first", &[WIDTH, n_in, KERNEL], 2)?,
@@ -30,7 +30,7 @@ impl Discriminator {
         })
     }
 
-    /// Differences [B, n_in, T - 1] to scores [B, 1, about T / 4]; 1 means real, 0 generated.
+    /// Scores differences [B, n_in, T - 1]: [B, 1, about T / 4]; 1 means real, 0 generated.
     pub fn forward(&self, motion: &Tensor, train: bool) -> Result<Tensor> {
         let mut x = candle_nn::ops::leaky_relu(&self.first.forward(&resize::transposed(motion)?)?, SLOPE)?;
         for block in &self.blocks {
@@ -40,7 +40,7 @@ impl Discriminator {
     }
 }
 
-/// Differences of following frames: [B, C, T] to [B, C, T - 1].
+/// Returns the differences of successive frames: [B, C, T] to [B, C, T - 1].
 pub fn motion(poses: &Tensor) -> Result<Tensor> {
     let n = poses.dim(2)?.saturating_sub(1);
     poses.narrow(2, 1, n)? - poses.narrow(2, 0, n)?
@@ -53,7 +53,7 @@ mod tests {
     use candle_core::DType;
 
     #[test]
-    fn it_has_the_published_size_and_right_gradients() -> Result<()> {
+    fn size_is_the_published_one_and_gradients_are_correct() -> Result<()> {
         let mut params = Params::with_dtype(2, DType::F64);
         let net = Discriminator::new(&mut params, 144)?;
         assert_eq!(params.n_parameters(), 202_945);

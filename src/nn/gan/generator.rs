@@ -1,6 +1,6 @@
-//! The speech-to-gesture generator (Ginosar et al. 2019, as Rebol et al. 2021 use it): log-mel in, poses out. An
-//! audio encoder turns the spectrogram into one vector a pose frame; a UNet over time with additive skips turns those
-//! into motion. Fully convolutional: any number of frames that is a multiple of [`FRAMES_MULTIPLE`].
+//! The speech-to-gesture generator (Ginosar et al. 2019, as used by Rebol et al. 2021) from log-mel spectrograms to
+//! poses. An audio encoder maps the spectrogram to one vector per pose frame; a UNet over time with additive skip
+//! connections maps these to motion. Fully convolutional: the number of frames is any multiple of [`FRAMES_MULTIPLE`].
 
 use super::conv_block::ConvBlock;
 use super::speaker_layer::SpeakerLayer;
@@ -10,17 +10,17 @@ use crate::params::Params;
 use candle_core::{Result, Tensor};
 use serde::{Deserialize, Serialize};
 
-/// The UNet halves time five times.
+/// Divisor of the number of frames: the UNet halves the frame rate five times.
 pub const FRAMES_MULTIPLE: usize = 32;
 const N_ENTER: usize = 2;
 const N_LEVELS: usize = 5;
 const N_DECODER: usize = 4;
 
-/// How the spectrogram is read.
+/// Architecture of the audio encoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Preset {
-    /// For CPUs: mel bands are channels, convolutions run over time only.
+    /// For CPUs: mel bands are channels, and convolutions run over time only.
     Light,
     /// The published network: convolutions over time and frequency.
     Paper,
@@ -38,23 +38,24 @@ impl std::str::FromStr for Preset {
     }
 }
 
-/// The network's shape.
+/// Configuration of the network.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Config {
     pub preset: Preset,
-    /// Mel bands that come in; 64 for `paper`.
+    /// Number of input mel bands; 64 for `paper`.
     pub n_mels: usize,
-    /// Channels of the UNet.
+    /// Number of channels of the UNet.
     pub width: usize,
-    /// Numbers of a pose that come out.
+    /// Number of output values per pose.
     pub n_out: usize,
     /// Weight of a new batch in the running statistics of the batch norms (PyTorch's convention).
-    #[serde(default = "before_it_was_stated")]
+    #[serde(default = "default_norm_momentum")]
     pub norm_momentum: f64,
-    /// Speakers that a layer each tells apart (`SpeakerLayer`); 0: the network knows one speaker and has none.
+    /// Number of speakers with a layer of their own (`SpeakerLayer`); 0: a network for one speaker, without such a
+    /// layer.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub n_speakers: usize,
-    /// Whether these layers multiply, or only add, as those of earlier versions do.
+    /// Whether the speaker layers multiply by weights, or only add vectors, as in earlier versions.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub speaker_weights: bool,
 }
@@ -63,21 +64,21 @@ fn is_zero(n: &usize) -> bool {
     *n == 0
 }
 
-fn before_it_was_stated() -> f64 {
+fn default_norm_momentum() -> f64 {
     0.1
 }
 
 impl Config {
-    /// The sizes of a preset; the UNet is the same. The published momentum is 0.01, which a training of some hundred
-    /// steps on a CPU never catches up with: `light` takes 0.1.
+    /// Creates the configuration of a preset; the UNet is the same for both. The published momentum is 0.01, with
+    /// which the running statistics lag behind in trainings of some hundred steps on a CPU, so `light` uses 0.1.
     pub fn from_preset(preset: Preset, n_out: usize) -> Self {
         let norm_momentum = if preset == Preset::Paper { 0.01 } else { 0.1 };
         Self { preset, n_mels: 64, width: 256, n_out, norm_momentum, n_speakers: 0, speaker_weights: false }
     }
 }
 
-/// Log-mel spectrograms to poses: convolutions over the spectrogram that shorten time by 8, one vector a step; then a UNet
-/// over time with additive skips.
+/// Network from log-mel spectrograms to poses: convolutions that shorten the spectrogram by 8 in time, to one vector
+/// per step; then a UNet over time with additive skip connections.
 pub struct Generator {
     preset: Preset,
     audio_encoder: Vec<ConvBlock>,
@@ -89,12 +90,12 @@ pub struct Generator {
     last: Conv,
 }
 
-/// Kernel and stride of a layer that keeps the number of frames, and of one that halves it.
+/// Kernel and stride of a layer that preserves the number of frames, and of one that halves it.
 const PLAIN: (usize, usize) = (3, 1);
 const DOWN: (usize, usize) = (4, 2);
 
 impl Generator {
-    /// Makes the network's tensors.
+    /// Creates the network's tensors.
     pub fn new(params: &mut Params, config: &Config) -> Result<Self> {
         let (n, momentum) = (config.width, config.norm_momentum);
         let audio_encoder = audio_encoder(params, config)?;
@@ -118,8 +119,8 @@ impl Generator {
         })
     }
 
-    /// `mels` [B, n_mels, T_mel] to poses [B, n_out, n_frames]; `n_frames` is a multiple of [`FRAMES_MULTIPLE`] and
-    /// both span the same time. `speakers` as in [`Self::encode`].
+    /// Maps `mels` [B, n_mels, T_mel] to poses [B, n_out, n_frames]; `n_frames` is a multiple of [`FRAMES_MULTIPLE`]
+    /// and covers the same time as `mels`. `speakers` as in [`Self::encode`].
     pub fn forward(&self, mels: &Tensor, speakers: &[u32], n_frames: usize, train: bool) -> Result<Tensor> {
         if n_frames == 0 || !n_frames.is_multiple_of(FRAMES_MULTIPLE) {
             candle_core::bail!("the generator makes a multiple of {FRAMES_MULTIPLE} frames, not {n_frames}");
@@ -127,8 +128,8 @@ impl Generator {
         self.decode(&resize::linear(&self.encode(mels, speakers, train)?, n_frames)?, train)
     }
 
-    /// `mels` [B, n_mels, T_mel] to encoded sound [B, about T_mel / 8, width]. `speakers`: the number of each sound's
-    /// speaker, which a network of one does not ask for.
+    /// Encodes `mels` [B, n_mels, T_mel] to [B, about T_mel / 8, width]. `speakers` has the index of each sample's
+    /// speaker; it is ignored by networks for one speaker.
     pub fn encode(&self, mels: &Tensor, speakers: &[u32], train: bool) -> Result<Tensor> {
         let mels = resize::transposed(mels)?;
         let encoded = match self.preset {
@@ -141,7 +142,7 @@ impl Generator {
         }
     }
 
-    /// Encoded sound at every pose frame, [B, T, width], to poses [B, n_out, T]; T is a multiple of
+    /// Decodes audio vectors at every pose frame, [B, T, width], to poses [B, n_out, T]; T is a multiple of
     /// [`FRAMES_MULTIPLE`].
     pub fn decode(&self, x: &Tensor, train: bool) -> Result<Tensor> {
         let mut x = through(&self.enter, x.clone(), train)?;
@@ -157,13 +158,13 @@ impl Generator {
     }
 }
 
-/// One block after the other.
+/// Applies the blocks in sequence.
 fn through(blocks: &[ConvBlock], x: Tensor, train: bool) -> Result<Tensor> {
     blocks.iter().try_fold(x, |x, block| block.forward(&x, train))
 }
 
-/// Plain layers and layers that halve time in turn; those of `paper` run over frequency as well, until a last one joins
-/// what is left of it.
+/// Creates alternating layers that preserve and that halve the frame rate; those of `paper` run over frequency as
+/// well, until the last layer combines the remaining frequencies.
 fn audio_encoder(params: &mut Params, config: &Config) -> Result<Vec<ConvBlock>> {
     let (mels, n, momentum) = (config.n_mels, config.width, config.norm_momentum);
     let (narrow, wide) = (n * 3 / 8, n / 2);
@@ -178,7 +179,7 @@ fn audio_encoder(params: &mut Params, config: &Config) -> Result<Vec<ConvBlock>>
         blocks.push(ConvBlock::new(params, &format!("front.{i}"), &shape, stride, momentum)?);
     }
     if config.preset == Preset::Paper {
-        blocks.push(ConvBlock::across(params, "front.7", [n, n, 3, mels / 8], momentum)?);
+        blocks.push(ConvBlock::full_height(params, "front.7", [n, n, 3, mels / 8], momentum)?);
     }
     Ok(blocks)
 }
@@ -204,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn shapes_follow_the_frames_asked_for() -> Result<()> {
+    fn output_has_the_requested_number_of_frames() -> Result<()> {
         let mut params = Params::new(0);
         let config = Config { width: 16, ..Config::from_preset(Preset::Light, 6) };
         let net = Generator::new(&mut params, &config)?;
@@ -218,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn gradients_reach_the_input_right() -> Result<()> {
+    fn gradients_of_the_input_are_correct() -> Result<()> {
         for (preset, n_mels) in [(Preset::Light, 5), (Preset::Paper, 8)] {
             let mut params = Params::with_dtype(1, DType::F64);
             let net = Generator::new(&mut params, &Config { n_mels, width: 4, ..Config::from_preset(preset, 3) })?;

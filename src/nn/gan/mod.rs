@@ -1,5 +1,5 @@
-//! The networks of the speech-to-gesture GAN: audio encoder and motion UNet (`generator`), with what it has of each speaker (`speaker_layer`), motion discriminator, and
-//! the generator run in chunks (`streaming`).
+//! The networks of the speech-to-gesture GAN: audio encoder and motion UNet (`generator`) with speaker-specific layers
+//! (`speaker_layer`), motion discriminator, and the generator run in chunks (`streaming`).
 
 pub mod conv_block;
 pub mod discriminator;

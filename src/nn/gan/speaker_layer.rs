@@ -1,29 +1,30 @@
-//! What a network of several speakers has of each of them: a linear layer between the encoded sound and the UNet (linear
-//! hidden network; Gemello et al. 2007). Encoder and UNet are common to all: what is heard and how arms move; the layer
-//! says what this speaker answers to what is heard.
+//! Speaker-specific parameters of a network for several speakers: a linear layer between audio encoder and UNet
+//! (linear hidden network; Gemello et al. 2007). Encoder and UNet, which model the audio and the arm motion, are
+//! shared; the layer models how this speaker responds to the audio.
 
 use crate::params::{Init, Params};
 use candle_core::{IndexOp, Result, Tensor};
 
-/// Begins the name of each tensor that has a row a speaker.
+/// Prefix of the names of all tensors that have one row per speaker.
 pub const SPEAKER: &str = "speaker.";
-/// Vectors [speakers, width] that are added, and bound of their first values: as large as what is heard, so that the first
-/// layers tell the speakers apart from the first step on.
+/// Vectors [speakers, width] that are added, and the bound of their initial values, which is as large as the encoded
+/// audio, so that the layers distinguish the speakers from the first training step on.
 pub const SPEAKER_EMBEDDING: &str = "speaker.embedding";
 const EMBEDDING_BOUND: f64 = 1.5;
-/// Weights [speakers, width, width] of the layers, less the identity.
+/// Weights [speakers, width, width] of the layers, minus the identity.
 pub const SPEAKER_WEIGHT: &str = "speaker.weight";
 
 /// Layers of all speakers: x + W x + b.
 pub struct SpeakerLayer {
     /// [speakers, width]
     vectors: Tensor,
-    /// [speakers, width, width], as they are multiplied from the right; `None`: of a version that only added.
+    /// [speakers, width, width], multiplied from the right; `None`: the network is of a version that only added
+    /// vectors.
     weights: Option<Tensor>,
 }
 
 impl SpeakerLayer {
-    /// Makes the tensors; `has_weights`: not only vectors.
+    /// Creates the tensors; without `has_weights` only the vectors.
     pub fn new(params: &mut Params, n_speakers: usize, width: usize, has_weights: bool) -> Result<Self> {
         let vectors = params.trainable(SPEAKER_EMBEDDING, &[n_speakers, width], Init::Uniform(EMBEDDING_BOUND))?;
         let weights = has_weights
@@ -32,7 +33,8 @@ impl SpeakerLayer {
         Ok(Self { vectors, weights })
     }
 
-    /// `encoded` [B, T, width] through the layer of each sound's speaker, of which a network of one does not ask.
+    /// Applies the layer of each sample's speaker to `encoded` [B, T, width]; `speakers` is ignored by networks for
+    /// one speaker.
     pub fn forward(&self, encoded: &Tensor, speakers: &[u32]) -> Result<Tensor> {
         let (n_sounds, n_speakers) = (encoded.dim(0)?, self.vectors.dim(0)?);
         let vectors = of_speakers(&self.vectors, speakers, n_sounds)?;
@@ -45,7 +47,7 @@ impl SpeakerLayer {
     }
 }
 
-/// Rows [`n_sounds`, ...] of the speakers of so many sounds; [1, ...] of a network of one.
+/// Returns the rows [`n_sounds`, ...] of the speakers of the samples; [1, ...] for a network for one speaker.
 fn of_speakers(table: &Tensor, speakers: &[u32], n_sounds: usize) -> Result<Tensor> {
     let n_speakers = table.dim(0)?;
     if n_speakers == 1 {
@@ -64,13 +66,13 @@ mod tests {
     use candle_core::DType;
 
     #[test]
-    fn each_sound_goes_through_the_layer_of_its_speaker() -> Result<()> {
+    fn each_sample_uses_the_layer_of_its_speaker() -> Result<()> {
         let mut params = Params::with_dtype(0, DType::F64);
         let layer = SpeakerLayer::new(&mut params, 3, 4, true)?;
         let encoded = pattern(&[2, 5, 4], 0.0)?;
         let vectors = params.tensors()?[SPEAKER_EMBEDDING].clone();
         let least = |a: Tensor, b: Tensor| (a - b)?.abs()?.flatten_all()?.max(0)?.to_scalar::<f64>();
-        // Before the first step the layers only add.
+        // Before the first training step the layers only add the vectors.
         let out = layer.forward(&encoded, &[2, 1])?;
         let expected = encoded.i(0)?.broadcast_add(&vectors.narrow(0, 2, 1)?)?;
         assert!(least(out.i(0)?, expected)? < 1e-12);

@@ -1,62 +1,64 @@
-//! The generator over a sound of any length in constant memory: the audio encoder and the UNet each run piece by piece,
-//! every piece with so much beside it that the padding at its ends reaches nothing that is kept. Pieces begin where
-//! every strided layer begins anew, and the resize between encoder and UNet counts from the beginning of the whole, so
-//! the result is that of one pass.
+//! The generator for sound of any length in constant memory: audio encoder and UNet run piece by piece, each piece
+//! with enough context that the padding at its ends does not affect the part that is used. Pieces start at multiples
+//! of all strides, and the resize between encoder and UNet counts from the start of the sound, so the result equals
+//! that of one pass.
 
 use super::generator::{FRAMES_MULTIPLE, Generator, Preset};
 use crate::ops::resize;
 use candle_core::{Result, Tensor};
 use std::ops::Range;
 
-/// Spectrogram frames under one result of the audio encoder.
+/// Number of spectrogram frames per result of the audio encoder.
 const HOPS: usize = 8;
-/// Results of the audio encoder that one piece makes: 20 s of sound.
+/// Number of results of the audio encoder per piece: 20 s of sound.
 const PIECE: usize = 256;
 
 /// Result `i` of the audio encoder depends on this many spectrogram frames before `8 i`, and on those up to `8 i` plus
-/// [`heard_behind`].
+/// [`audio_after`].
 ///
-/// What a layer reads follows from kernel and stride. With TensorFlow's "same" padding a layer of kernel 3 and stride 1
-/// computes place `i` from `i - 1..=i + 1`, and one of kernel 4 and stride 2 from `2 i - 1..=2 i + 2`, for even and odd
-/// lengths alike (the padding before is one place for both); the last layer of `paper` is not padded and reads
+/// These numbers follow from kernel and stride of each layer. With TensorFlow's "same" padding a layer of kernel 3 and
+/// stride 1 computes position `i` from `i - 1..=i + 1`, and one of kernel 4 and stride 2 from `2 i - 1..=2 i + 2`, for
+/// even and odd lengths alike (both pad one position at the start); the last layer of `paper` is not padded and reads
 /// `i..=i + 2`.
-const HEARD_BEFORE: usize = 22;
-/// Frames before and behind 32 of poses that the UNet reads for them: 97, made whole pieces.
-const BESIDE: usize = 97usize.next_multiple_of(FRAMES_MULTIPLE);
+const AUDIO_BEFORE: usize = 22;
+/// Number of frames before and after 32 pose frames that the UNet reads for them: 97, rounded up to complete pieces.
+const MARGIN: usize = 97usize.next_multiple_of(FRAMES_MULTIPLE);
 
-/// Spectrogram frames from `8 i` on that result `i` of the audio encoder depends on, less one.
-const fn heard_behind(preset: Preset) -> usize {
+/// Index of the last spectrogram frame, counted from `8 i`, on which result `i` of the audio encoder depends.
+const fn audio_after(preset: Preset) -> usize {
     match preset {
         Preset::Light => 29,
         Preset::Paper => 45,
     }
 }
 
-/// Results of the audio encoder for so many spectrogram frames.
+/// Number of results of the audio encoder for `n_mel_frames` spectrogram frames.
 fn n_encoded_frames(preset: Preset, n_mel_frames: usize) -> usize {
     let eighth = (0..3).fold(n_mel_frames, |n, _| n.div_ceil(2));
     if preset == Preset::Paper { eighth.saturating_sub(2) } else { eighth }
 }
 
-/// A sound of any length on its way through the generator; yields the poses [1, n_out, T] of one chunk after another.
+/// Generator over a sound of any length; yields the poses [1, n_out, T] of successive chunks.
 pub struct StreamingGenerator<'a, M> {
     generator: &'a Generator,
     preset: Preset,
-    /// Log-mels [1, n_mels, T_mel] of these spectrogram frames.
+    /// Function that returns the log-mel spectrogram [1, n_mels, T_mel] of a range of frames.
     mels: M,
     n_mel_frames: usize,
     n_frames: usize,
     chunk: usize,
-    /// First frame that is not generated yet.
+    /// First frame that has not been generated.
     next: usize,
-    /// Results of the audio encoder that later chunks need, [1, n, width], and which is the first of them.
+    /// Results of the audio encoder that later chunks need, [1, n, width]; `first_encoded` is the index of the first
+    /// one.
     encoded: Option<Tensor>,
     first_encoded: usize,
 }
 
 impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> StreamingGenerator<'a, M> {
-    /// The generator is of one speaker. `n_mel_frames` of sound, which `mels` makes as they are asked for, in order, become `n_frames` of poses, `chunk`
-    /// at a time; both are multiples of 32 frames and `n_frames` spans the same time as the sound.
+    /// Creates a stream that converts `n_mel_frames` of sound to `n_frames` of poses, `chunk` at a time. The generator
+    /// is one for a single speaker. `mels` is called with successive ranges of spectrogram frames. `n_frames` and
+    /// `chunk` are multiples of 32, and `n_frames` covers the same time as the sound.
     pub fn new(
         generator: &'a Generator,
         preset: Preset,
@@ -77,7 +79,7 @@ impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> StreamingGenerator<'a, M> {
     }
 
     fn chunk(&mut self, frames: Range<usize>) -> Result<Tensor> {
-        let (first, end) = (frames.start.saturating_sub(BESIDE), (frames.end + BESIDE).min(self.n_frames));
+        let (first, end) = (frames.start.saturating_sub(MARGIN), (frames.end + MARGIN).min(self.n_frames));
         let n_encoded = n_encoded_frames(self.preset, self.n_mel_frames);
         let part = resize::ResizedPart { frames: first..end, n_out: self.n_frames, n_in: n_encoded };
         let needed = part.needed();
@@ -88,7 +90,7 @@ impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> StreamingGenerator<'a, M> {
         poses.narrow(2, frames.start - first, frames.len())
     }
 
-    /// Sees to it that these results of the audio encoder are at hand, and lets go of those before them.
+    /// Ensures that these results of the audio encoder are buffered, and drops those before them.
     fn encode_until(&mut self, needed: Range<usize>, n_encoded: usize) -> Result<()> {
         let mut parts = Vec::new();
         let mut end = needed.start;
@@ -102,17 +104,17 @@ impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> StreamingGenerator<'a, M> {
             end = piece.end;
             parts.push(self.encode(piece, n_encoded)?);
         }
-        // A copy, so that what is let go of is freed.
+        // Copied, so that the memory of the dropped results is freed.
         self.encoded = Some(Tensor::cat(&parts, 1)?.force_contiguous()?);
         Ok(())
     }
 
-    /// These results of the audio encoder.
+    /// Computes these results of the audio encoder.
     fn encode(&mut self, piece: Range<usize>, n_encoded: usize) -> Result<Tensor> {
-        let first = piece.start.saturating_sub(HEARD_BEFORE.div_ceil(HOPS));
+        let first = piece.start.saturating_sub(AUDIO_BEFORE.div_ceil(HOPS));
         let end = match piece.end {
             end if end == n_encoded => self.n_mel_frames,
-            end => ((end - 1) * HOPS + heard_behind(self.preset) + 1).min(self.n_mel_frames),
+            end => ((end - 1) * HOPS + audio_after(self.preset) + 1).min(self.n_mel_frames),
         };
         let encoded = self.generator.encode(&(self.mels)(first * HOPS..end)?, &[], false)?;
         encoded.narrow(1, piece.start - first, piece.len())
@@ -146,12 +148,13 @@ mod tests {
     use std::collections::BTreeMap;
 
     #[test]
-    fn results_are_counted() {
+    fn encoded_frames_are_counted_correctly() {
         assert_eq!([418, 425, 8, 1].map(|n| n_encoded_frames(Preset::Light, n)), [53, 54, 1, 1]);
         assert_eq!([418, 425, 17, 16].map(|n| n_encoded_frames(Preset::Paper, n)), [51, 52, 1, 0]);
     }
 
-    /// A network of random numbers, the running statistics too, in f64: what reached too far would be seen.
+    /// Network with random parameters and running statistics in f64, so that errors at the ends of pieces are
+    /// detectable.
     fn network(preset: Preset) -> anyhow::Result<Generator> {
         let mut params = Params::with_dtype(5, DType::F64);
         let net = Generator::new(&mut params, &Config { n_mels: 8, width: 8, ..Config::from_preset(preset, 3) })?;
@@ -165,19 +168,19 @@ mod tests {
     }
 
     #[test]
-    fn chunks_of_any_size_are_one_pass() -> anyhow::Result<()> {
+    fn chunks_of_any_size_equal_one_pass() -> anyhow::Result<()> {
         for preset in [Preset::Light, Preset::Paper] {
             let net = network(preset)?;
-            // 6.67 spectrogram frames a pose frame, and other numbers, even and odd.
+            // 6.67 spectrogram frames per pose frame, and other ratios, even and odd.
             for (n_mel, n_frames) in [(213, 32), (427, 64), (2994, 448), (6829, 1024), (2003, 608)] {
                 let mels = pattern(&[1, 8, n_mel], 3.0)?;
-                let whole = net.forward(&mels, &[], n_frames, false)?;
+                let one_pass = net.forward(&mels, &[], n_frames, false)?;
                 for chunk in [32, 96, 256, 4096] {
                     let mels = |frames: Range<usize>| mels.narrow(2, frames.start, frames.len());
                     let chunks = StreamingGenerator::new(&net, preset, n_mel, n_frames, chunk, mels)?;
                     let parts = chunks.collect::<Result<Vec<_>>>()?;
                     assert!(parts.iter().all(|part| part.dims()[2] <= chunk));
-                    let off = (Tensor::cat(&parts, 2)? - &whole)?.abs()?.max_all()?.to_scalar::<f64>()?;
+                    let off = (Tensor::cat(&parts, 2)? - &one_pass)?.abs()?.max_all()?.to_scalar::<f64>()?;
                     assert!(off < 1e-11, "{preset:?}, {n_mel} to {n_frames} by {chunk}: {off:e}");
                 }
             }

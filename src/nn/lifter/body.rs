@@ -1,5 +1,5 @@
-//! The body lifter: the temporal-convolution network with the views it was trained on, from keypoints over time to
-//! poses over time.
+//! The body lifter: the temporal-convolution network with its input normalisation, from keypoints over time to poses
+//! over time.
 
 use super::temporal::{Config, TemporalLifter};
 use crate::Mode;
@@ -8,40 +8,41 @@ use candle_core::{Device, Result, Tensor};
 use orator_base::motion::upper_body::{Pose, SeenBody};
 use orator_base::motion::view::body::{BodyView, N_IN, N_OUT, mirror_mean};
 
-/// Windows that go through the network together.
+/// Number of windows per forward pass.
 const BATCH: usize = 256;
 /// Prefix of the network's tensors.
 const NAME: &str = "body";
 
-/// The network that turns a window of keypoints into the pose of its middle frame.
+/// Network that maps a window of keypoints to the pose of its middle frame.
 pub struct BodyLifter {
     pub net: TemporalLifter,
 }
 
 impl BodyLifter {
-    /// The network's shape for this many channels and these kernel widths, whose product is the window's frames.
+    /// Configuration for this number of channels and these kernel widths, whose product is the number of frames of a
+    /// window.
     pub fn config(channels: usize, widths: &[usize]) -> Config {
         Config { n_in: N_IN, n_out: N_OUT, channels, widths: widths.to_vec(), dropout: 0.0 }
     }
 
-    /// Makes the network's tensors in `params`.
+    /// Creates the network's tensors in `params`.
     pub fn new(params: &mut Params, config: &Config) -> Result<Self> {
         Ok(Self { net: TemporalLifter::new(params, NAME, config)? })
     }
 
-    /// A pose for every frame, in px of the picture, the neck at 0: `None` where a shoulder is not seen within half a
-    /// window. Before the first and after the last frame the body stands still. The frames of a window
-    /// lie `step` frames apart: the network knows motion at 15 frames a second. Each window is looked at in the mirror
-    /// as well.
+    /// Returns a pose for every frame, in px of the picture with the neck at 0; `None` where a shoulder is not visible
+    /// within half a window. The first and last frame are repeated beyond the ends. The frames of a window are `step`
+    /// frames apart, because the network is trained at 15 frames per second. The result is averaged with that of the
+    /// mirrored window.
     pub fn poses(&self, seen: &[SeenBody], step: f64) -> Result<Vec<Option<Pose>>> {
         let window = self.net.config().receptive_field();
         let view = |t: usize| BodyView::around(seen, t, window, step);
         let mut poses = Vec::with_capacity(seen.len());
         for first in (0..seen.len()).step_by(BATCH) {
             let views: Vec<Option<BodyView>> = (first..seen.len().min(first + BATCH)).map(view).collect();
-            let there: Vec<&BodyView> = views.iter().flatten().collect();
-            let mirrored: Vec<BodyView> = there.iter().map(|view| view.mirrored()).collect();
-            let outputs = self.outputs(there.iter().copied().chain(&mirrored))?;
+            let visible: Vec<&BodyView> = views.iter().flatten().collect();
+            let mirrored: Vec<BodyView> = visible.iter().map(|view| view.mirrored()).collect();
+            let outputs = self.outputs(visible.iter().copied().chain(&mirrored))?;
             let (own, other) = outputs.split_at(outputs.len() / 2);
             let mut outputs = own.chunks_exact(N_OUT).zip(other.chunks_exact(N_OUT)).map(|(a, b)| mirror_mean(a, b));
             poses.extend(views.iter().map(|view| Some(view.as_ref()?.pose(&outputs.next()?))));
@@ -49,7 +50,7 @@ impl BodyLifter {
         Ok(poses)
     }
 
-    /// N_OUT numbers a view.
+    /// Returns N_OUT values per view.
     fn outputs<'a>(&self, views: impl Iterator<Item = &'a BodyView>) -> Result<Vec<f32>> {
         let numbers: Vec<f32> = views.flat_map(|view| view.numbers.iter().copied()).collect();
         let window = self.net.config().receptive_field();
@@ -67,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_frame_gets_a_pose_and_none_where_nobody_is() -> anyhow::Result<()> {
+    fn every_frame_has_a_pose_unless_nothing_is_visible() -> anyhow::Result<()> {
         let mut params = Params::new(1);
         let lifter = BodyLifter::new(&mut params, &BodyLifter::config(16, &[3, 3, 3]))?;
         let seen: SeenBody = std::array::from_fn(|j| Some([j as f32 * 10.0, (j * j) as f32]));

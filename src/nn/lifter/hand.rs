@@ -1,5 +1,5 @@
-//! The hand lifter: the 21 keypoints of one hand in one frame to 21 joints. A plain perceptron on coordinates, which
-//! carry all that heat-maps drawn at the same points would (Zimmermann & Brox 2017 used such maps).
+//! The hand lifter: 21 joints from the 21 keypoints of one hand in one frame. A perceptron on coordinates, which
+//! contain the same information as heat maps drawn at these points (used by Zimmermann & Brox 2017).
 
 use crate::Mode;
 use crate::ops::dropout::dropout;
@@ -13,12 +13,12 @@ use serde::{Deserialize, Serialize};
 /// Prefix of the network's tensors in a weights file.
 pub const NAME: &str = "hand";
 
-/// The network's shape.
+/// Configuration of the network.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Config {
-    /// Numbers of a hand that go in: 21 x (x, y, score).
+    /// Number of inputs of a hand: 21 x (x, y, visible).
     pub n_in: usize,
-    /// Numbers that come out: 21 x (x, y, z).
+    /// Number of outputs: 21 x (x, y, z).
     pub n_out: usize,
     /// Width of the two hidden layers.
     pub hidden: usize,
@@ -31,14 +31,14 @@ impl Default for Config {
     }
 }
 
-/// Three fully connected layers with leaky ReLU (slope 0.01) between.
+/// Three fully connected layers with leaky ReLU (slope 0.01) in between.
 pub struct HandLifter {
     config: Config,
     layers: [Linear; 3],
 }
 
 impl HandLifter {
-    /// Makes the network's tensors under `<name>.`.
+    /// Creates the network's tensors under `<name>.`.
     pub fn new(params: &mut Params, name: &str, config: &Config) -> Result<Self> {
         let Config { n_in, n_out, hidden, .. } = *config;
         let mut layer = |i: usize, n: [usize; 2]| params.linear(&format!("{name}.{i}"), n, Init::He, 0.0);
@@ -50,7 +50,7 @@ impl HandLifter {
         &self.config
     }
 
-    /// [B, n_in] to [B, n_out].
+    /// Maps [B, n_in] to [B, n_out].
     pub fn forward(&self, x: &Tensor, mode: &mut Mode) -> Result<Tensor> {
         let [first, second, last] = &self.layers;
         let x = dropout(&candle_nn::ops::leaky_relu(&first.forward(x)?, 0.01)?, self.config.dropout, mode)?;
@@ -58,7 +58,8 @@ impl HandLifter {
         last.forward(&x)
     }
 
-    /// Hands of that side in px, the wrist at 0, in the axes of the picture; `None` where too little is seen.
+    /// Lifts hands of the given side to px in the axes of the picture, with the wrist at 0; `None` where too few
+    /// points are visible.
     pub fn lift(&self, seen: &[SeenHand], side: Side) -> Result<Vec<Option<HandJoints>>> {
         let views: Vec<Option<HandView>> = seen.iter().map(|s| HandView::new(s, side)).collect();
         let x: Vec<f32> = views.iter().flatten().flat_map(|view| view.numbers).collect();
@@ -79,7 +80,7 @@ mod tests {
     use candle_core::DType;
 
     #[test]
-    fn gradients_and_size_are_right() -> anyhow::Result<()> {
+    fn gradients_and_size_are_correct() -> anyhow::Result<()> {
         let mut params = Params::with_dtype(1, DType::F64);
         let config = Config { n_in: 6, n_out: 5, hidden: 7, dropout: 0.0 };
         let net = HandLifter::new(&mut params, "hand", &config)?;

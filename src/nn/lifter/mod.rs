@@ -1,4 +1,5 @@
-//! The networks that lift 2D to 3D: the temporal convolutions with the body lifter on them, and the hand lifter.
+//! Networks for lifting from 2D to 3D: the temporal-convolution network and the body lifter based on it, and the hand
+//! lifter.
 
 pub mod body;
 pub mod hand;

@@ -1,5 +1,5 @@
-//! The temporal-convolution lifter of VideoPose3D (Pavllo et al. 2019): 2D keypoints over time to 3D joints of the
-//! middle frame, in its strided form: windows of exactly one receptive field, without wasted work.
+//! The temporal-convolution lifter of VideoPose3D (Pavllo et al. 2019): 3D joints of the middle frame from 2D
+//! keypoints over time, in its strided form: windows of exactly one receptive field, without redundant work.
 
 use crate::Mode;
 use crate::ops::batch_norm::BatchNorm;
@@ -9,15 +9,15 @@ use crate::params::Params;
 use candle_core::{Module, Result, Tensor};
 use serde::{Deserialize, Serialize};
 
-/// Weight of the first batches in the running statistics; a training lowers it (`set_momentum`).
+/// Initial weight of a new batch in the running statistics; training lowers it with `set_momentum`.
 const MOMENTUM: f64 = 0.1;
 
-/// The network's shape.
+/// Configuration of the network.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Config {
-    /// Numbers of a frame that go in, for instance 2 a keypoint.
+    /// Number of inputs per frame, for instance 2 per keypoint.
     pub n_in: usize,
-    /// Numbers of a frame that come out, 3 a joint.
+    /// Number of outputs per frame, 3 per joint.
     pub n_out: usize,
     pub channels: usize,
     /// Odd kernel widths; their product is the receptive field.
@@ -26,13 +26,13 @@ pub struct Config {
 }
 
 impl Config {
-    /// Frames one output frame looks at.
+    /// Number of input frames of one output frame.
     pub fn receptive_field(&self) -> usize {
         self.widths.iter().product()
     }
 }
 
-/// The network: `expand`, a residual block a further width, `shrink`.
+/// Network: `expand`, one residual block for each further width, `shrink`.
 pub struct TemporalLifter {
     config: Config,
     expand: ConvUnit,
@@ -40,14 +40,14 @@ pub struct TemporalLifter {
     shrink: Conv1d,
 }
 
-/// A convolution over each `width` frames, then one of width 1.
+/// A convolution over every `width` frames, then one of width 1.
 struct ResidualBlock {
     width: usize,
     over_time: ConvUnit,
     mix: ConvUnit,
 }
 
-/// Convolution without bias, batch norm, ReLU; dropout follows.
+/// Convolution without bias, batch norm, ReLU, dropout.
 struct ConvUnit {
     conv: Conv1d,
     norm: BatchNorm,
@@ -67,7 +67,10 @@ impl ConvUnit {
 }
 
 impl TemporalLifter {
-    /// Makes the network's tensors under `<name>.`; errors when a width is even or the config has no width.
+    /// Creates the network's tensors under `<name>.`.
+    ///
+    /// # Errors
+    /// A width is even, or there is none.
     pub fn new(params: &mut Params, name: &str, config: &Config) -> Result<Self> {
         let Some((first, others)) = config.widths.split_first() else {
             candle_core::bail!("a temporal lifter needs at least one width");
@@ -91,9 +94,9 @@ impl TemporalLifter {
         &self.config
     }
 
-    /// Windows of one receptive field [B, n_in, RF] to their middle frames [B, n_out]. The windows lie end to end in one
-    /// sequence: since every kernel steps by its own width, none reaches into the next window, and all work is done on
-    /// long rows.
+    /// Maps windows of one receptive field [B, n_in, RF] to their middle frames [B, n_out]. The windows are
+    /// concatenated to one sequence: the stride of every kernel equals its width, so none extends into the next
+    /// window, and all operations run on long rows.
     pub fn forward(&self, x: &Tensor, mode: &mut Mode) -> Result<Tensor> {
         let p = self.config.dropout;
         let (n_windows, n, n_frames) = x.dims3()?;
@@ -109,7 +112,7 @@ impl TemporalLifter {
         self.shrink.forward(&x)?.squeeze(0)?.t()?.contiguous()
     }
 
-    /// Weight of a new batch in the running statistics of every batch norm.
+    /// Sets the weight of a new batch in the running statistics of every batch norm.
     pub fn set_momentum(&mut self, momentum: f64) {
         self.expand.norm.set_momentum(momentum);
         for block in &mut self.blocks {
@@ -126,7 +129,7 @@ mod tests {
     use candle_core::DType;
 
     #[test]
-    fn it_has_the_published_size() -> anyhow::Result<()> {
+    fn size_is_the_published_one() -> anyhow::Result<()> {
         let mut params = Params::frozen();
         let config = Config { n_in: 34, n_out: 51, channels: 1024, widths: vec![3, 3, 3], dropout: 0.0 };
         let net = TemporalLifter::new(&mut params, "lifter", &config)?;
@@ -136,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn gradients_reach_the_input_right() -> anyhow::Result<()> {
+    fn gradients_of_the_input_are_correct() -> anyhow::Result<()> {
         let mut params = Params::with_dtype(1, DType::F64);
         let small = Config { n_in: 2, n_out: 3, channels: 4, widths: vec![3, 3], dropout: 0.0 };
         let net = TemporalLifter::new(&mut params, "l", &small)?;

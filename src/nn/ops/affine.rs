@@ -1,5 +1,5 @@
-//! A fully connected layer over the last axis, bias and ReLU included, as one operator: many rows by few columns, each
-//! piece of rows by one thread, results independent of the number of threads.
+//! A fully connected layer over the last axis, including bias and ReLU, as one operator, for many rows and few
+//! columns. Each piece of rows is processed by one thread; results do not depend on the number of threads.
 
 use super::operator::{CpuOperator, CustomOperator, Gradients, Operand};
 use crate::cpu::packed_matrix::PackedMatrix;
@@ -8,13 +8,14 @@ use crate::cpu::thread_team::parallel_each;
 use crate::params::{Init, Params};
 use candle_core::{D, Module, Result, Shape, Tensor};
 
-/// Rows that are multiplied before their sums are stored.
+/// Number of rows that are multiplied before their sums are stored.
 const ROWS: usize = 48;
-/// Pieces of the rows at most, and rows of a piece at least.
-const PIECES: usize = 8;
-const SMALLEST_PIECE: usize = 128;
+/// Maximum number of pieces, and minimum number of rows per piece.
+const MAX_PIECES: usize = 8;
+const MIN_PIECE_ROWS: usize = 128;
 
-/// `<name>.weight` [out, in] and `<name>.bias` [out], both uniform in +-1 / sqrt(in), as PyTorch's begin.
+/// Tensors `<name>.weight` [out, in] and `<name>.bias` [out], both initialised uniformly in +-1 / sqrt(in), as in
+/// PyTorch.
 pub struct Affine {
     weight: Tensor,
     bias: Tensor,
@@ -28,7 +29,7 @@ impl Affine {
         Ok(Self { weight, bias, relu: false })
     }
 
-    /// Adds a ReLU to the result.
+    /// Applies a ReLU to the output.
     pub fn with_relu(self) -> Self {
         Self { relu: true, ..self }
     }
@@ -43,13 +44,13 @@ impl Affine {
 }
 
 impl Module for Affine {
-    /// [..., in] to [..., out].
+    /// Maps [..., in] to [..., out].
     fn forward(&self, x: &Tensor) -> Result<Tensor> {
         affine(x, &self.weight, &self.bias, self.relu)
     }
 }
 
-/// `x` [..., in] times `weight` [out, in] plus `bias` [out], negative results made zero with `relu`.
+/// Computes `x` [..., in] times the transposed `weight` [out, in] plus `bias` [out], with a ReLU if `relu` is set.
 fn affine(x: &Tensor, weight: &Tensor, bias: &Tensor, relu: bool) -> Result<Tensor> {
     let (mut shape, n_in) = (x.dims().to_vec(), x.dim(D::Minus1)?);
     let y = x.contiguous()?.reshape(((), n_in))?.apply_op3(weight, bias, CustomOperator(AffineOp { relu }))?;
@@ -63,7 +64,7 @@ struct AffineOp {
     relu: bool,
 }
 
-/// Rows, numbers of a row that goes in, and of one that comes out.
+/// Number of rows, inputs per row and outputs per row.
 type AffineSizes = (usize, usize, usize);
 
 fn sizes(x: &[usize], weight: &[usize], n_bias: usize) -> Result<AffineSizes> {
@@ -73,12 +74,13 @@ fn sizes(x: &[usize], weight: &[usize], n_bias: usize) -> Result<AffineSizes> {
     }
 }
 
-/// Rows of a piece.
+/// Number of rows per piece.
 fn piece(n: usize) -> usize {
-    n.div_ceil(PIECES).max(SMALLEST_PIECE).next_multiple_of(ROWS)
+    n.div_ceil(MAX_PIECES).max(MIN_PIECE_ROWS).next_multiple_of(ROWS)
 }
 
-/// Products of the rows of `x` with a matrix, some rows at a time, handed to `store` with the first row's number.
+/// Multiplies the rows of `x` with a matrix, some rows at a time; `store` receives the index of the first row and the
+/// products.
 fn products<T: Scalar>(x: &[T], n_in: usize, by: &PackedMatrix<T>, mut store: impl FnMut(usize, &[T])) {
     let mut sums = vec![T::zero(); ROWS * by.width()];
     for (i, x) in x.chunks(ROWS * n_in).enumerate() {
@@ -158,10 +160,10 @@ impl CpuOperator for AffineOp {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::gradcheck::{any_threads_give_the_same, apart, pattern, worst};
+    use crate::ops::gradcheck::{check_thread_independence, max_difference, pattern, worst};
 
     #[test]
-    fn it_is_the_composed_layer_and_gradients_are_right() -> Result<()> {
+    fn layer_equals_the_composed_one_and_gradients_are_correct() -> Result<()> {
         for (shape, relu) in [(&[2, 5, 3][..], false), (&[7, 3], true), (&[1, 3], false)] {
             let inputs = [pattern(shape, 0.0)?, pattern(&[4, 3], 5.0)?, pattern(&[4], 9.0)?];
             let own = |v: &[Tensor]| affine(&v[0], &v[1], &v[2], relu);
@@ -170,7 +172,7 @@ mod tests {
                 let y = if relu { y.relu()? } else { y };
                 y.reshape([&shape[..shape.len() - 1], &[4]].concat())
             };
-            let (off, error) = (apart(&inputs, own, composed)?, worst(&inputs, own)?);
+            let (off, error) = (max_difference(&inputs, own, composed)?, worst(&inputs, own)?);
             assert!(off < 1e-12 && error < 1e-7, "{shape:?}: {off:e} {error:e}");
         }
         Ok(())
@@ -178,11 +180,11 @@ mod tests {
 
     #[test]
     fn any_number_of_threads_gives_the_same_bits() -> Result<()> {
-        any_threads_give_the_same(&[&[1500, 26], &[50, 26], &[50]], 1, |v| affine(&v[0], &v[1], &v[2], true))
+        check_thread_independence(&[&[1500, 26], &[50, 26], &[50]], 1, |v| affine(&v[0], &v[1], &v[2], true))
     }
 
     #[test]
-    fn what_does_not_fit_is_an_error() -> Result<()> {
+    fn mismatched_shapes_are_errors() -> Result<()> {
         let (x, weight) = (pattern(&[2, 3], 0.0)?, pattern(&[4, 3], 0.0)?);
         assert!(affine(&x, &weight, &pattern(&[4], 0.0)?, false).is_ok());
         assert!(affine(&x, &weight, &pattern(&[3], 0.0)?, false).is_err());

@@ -1,6 +1,6 @@
-//! Batch normalisation with the leaky ReLU behind it in one operator, forward and backward: a third of the memory
-//! passes of the two built from parts. Training uses the batch's statistics and follows them with running ones;
-//! evaluation uses the running ones.
+//! Batch normalisation followed by leaky ReLU as one operator, forward and backward, with a third of the memory passes
+//! of two separate operators. Training uses the batch's statistics and updates the running statistics; evaluation uses
+//! the running statistics.
 
 use super::fallback;
 use super::operator::{CpuOperator, CustomOperator, Gradients, Operand};
@@ -11,15 +11,15 @@ use candle_core::{Device, Result, Shape, Tensor, Var};
 use rayon::prelude::*;
 use std::sync::{Arc, OnceLock};
 
-/// Mean and variance of each channel.
+/// Mean and variance per channel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Statistics {
     pub mean: Vec<f64>,
     pub variance: Vec<f64>,
 }
 
-/// A normalisation with its numbers: `<name>.weight` (1), `<name>.bias` (0), `<name>.running_mean` (0) and
-/// `<name>.running_var` (1), each [C].
+/// Batch norm layer. Tensors with their initial values: `<name>.weight` (1), `<name>.bias` (0), `<name>.running_mean`
+/// (0) and `<name>.running_var` (1), each [C].
 pub struct BatchNorm {
     pub(crate) weight: Tensor,
     pub(crate) bias: Tensor,
@@ -31,8 +31,8 @@ pub struct BatchNorm {
 }
 
 impl BatchNorm {
-    /// `momentum`: weight of a new batch in the running statistics (PyTorch's convention: TensorFlow's 0.99 is 0.01
-    /// here). `slope`: what negative results are multiplied with afterwards; 1 for no activation, 0 for ReLU.
+    /// Creates a layer. `momentum` is the weight of a new batch in the running statistics (PyTorch's convention:
+    /// TensorFlow's 0.99 is 0.01 here). `slope` is the factor of negative results; 1 for no activation, 0 for ReLU.
     pub fn new(params: &mut Params, name: &str, n: usize, eps: f64, momentum: f64, slope: f64) -> Result<Self> {
         let (weight, bias) = params.layer(name, &[n], Init::Constant(1.0), Init::Constant(0.0))?;
         let running_mean = params.buffer(&format!("{name}.running_mean"), &[n], 0.0)?;
@@ -40,17 +40,18 @@ impl BatchNorm {
         Ok(Self { weight, bias, running_mean, running_var, eps, momentum, slope })
     }
 
-    /// Changes the weight of a new batch in the running statistics.
+    /// Sets the weight of a new batch in the running statistics.
     pub fn set_momentum(&mut self, momentum: f64) {
         self.momentum = momentum;
     }
 
-    /// [B, C, ...] to the same shape. Training moves the running statistics.
+    /// Maps [B, C, ...] to the same shape. Training updates the running statistics.
     pub fn forward(&self, x: &Tensor, train: bool) -> Result<Tensor> {
         self.forward_dropped(x, train, None)
     }
 
-    /// [`Self::forward`] with a dropout behind a ReLU (slope 0): what is dropped looks like what the ReLU has cut.
+    /// [`Self::forward`] with dropout after a ReLU (slope 0); the backward pass treats dropped values like those that
+    /// the ReLU has set to zero.
     pub fn forward_dropped(&self, x: &Tensor, train: bool, dropout: Option<DropMask>) -> Result<Tensor> {
         if dropout.is_some() && self.slope != 0.0 {
             candle_core::bail!("dropout goes with a ReLU, not with slope {}", self.slope);
@@ -62,12 +63,12 @@ impl BatchNorm {
         let op = BatchNormOp { statistics: statistics.clone(), eps: self.eps, slope: self.slope, train, dropout };
         let y = x.contiguous()?.apply_op3(&self.weight, &self.bias, CustomOperator(op))?;
         if let (true, Some(batch)) = (train, statistics.get()) {
-            self.follow(batch, x.elem_count() / batch.mean.len())?;
+            self.update_running(batch, x.elem_count() / batch.mean.len())?;
         }
         Ok(y)
     }
 
-    /// [`Self::forward`] with the framework's operators, on any device.
+    /// [`Self::forward`] with candle's operators, on any device.
     pub fn forward_fallback(&self, x: &Tensor, train: bool) -> Result<Tensor> {
         let (mean, variance) = if train {
             fallback::statistics(x)?
@@ -76,52 +77,52 @@ impl BatchNorm {
         };
         let y = fallback::normalise(x, (&mean, &variance), &self.weight, &self.bias, self.eps, self.slope)?;
         if train {
-            self.follow_tensors(&mean.detach(), &variance.detach(), x.elem_count() / mean.elem_count())?;
+            self.update_running_tensors(&mean.detach(), &variance.detach(), x.elem_count() / mean.elem_count())?;
         }
         Ok(y)
     }
 
-    /// The running statistics.
+    /// Returns the running statistics.
     pub fn running(&self) -> Result<Statistics> {
         let values = |var: &Var| var.to_dtype(candle_core::DType::F64)?.to_vec1();
         Ok(Statistics { mean: values(&self.running_mean)?, variance: values(&self.running_var)? })
     }
 
-    /// Moves the running statistics towards those of a batch of `n` values a channel; the variance is the unbiased one.
-    pub fn follow(&self, batch: &Statistics, n: usize) -> Result<()> {
+    /// Updates the running statistics with those of a batch of `n` values per channel, using the unbiased variance.
+    pub fn update_running(&self, batch: &Statistics, n: usize) -> Result<()> {
         let tensor = |values: &[f64]| Tensor::new(values, &Device::Cpu)?.to_dtype(self.running_mean.dtype());
-        self.follow_tensors(&tensor(&batch.mean)?, &tensor(&batch.variance)?, n)
+        self.update_running_tensors(&tensor(&batch.mean)?, &tensor(&batch.variance)?, n)
     }
 
-    fn follow_tensors(&self, mean: &Tensor, variance: &Tensor, n: usize) -> Result<()> {
+    fn update_running_tensors(&self, mean: &Tensor, variance: &Tensor, n: usize) -> Result<()> {
         let n = n as f64;
-        let towards = |running: &Var, batch: &Tensor, scale: f64| {
+        let update = |running: &Var, batch: &Tensor, scale: f64| {
             running
                 .set(&((running.as_detached_tensor() * (1.0 - self.momentum))? + (batch * (self.momentum * scale))?)?)
         };
-        towards(&self.running_mean, mean, 1.0)?;
-        towards(&self.running_var, variance, n / (n - 1.0).max(1.0))
+        update(&self.running_mean, mean, 1.0)?;
+        update(&self.running_var, variance, n / (n - 1.0).max(1.0))
     }
 }
 
 struct BatchNormOp {
-    /// Set by the forward pass when training, before it when evaluating.
+    /// Set by the forward pass in training, before it in evaluation.
     statistics: Arc<OnceLock<Statistics>>,
     eps: f64,
     slope: f64,
     train: bool,
-    /// Behind a ReLU alone.
+    /// Only after a ReLU.
     dropout: Option<DropMask>,
 }
 
 impl BatchNormOp {
-    /// What numbers that are not dropped are multiplied by.
-    fn kept_scale(&self) -> f64 {
+    /// Factor of the values that are not dropped.
+    fn retained_scale(&self) -> f64 {
         self.dropout.map_or(1.0, |mask| mask.scale)
     }
 }
 
-/// Batch, channels, and numbers of a channel in one sample.
+/// Batch size, number of channels, and number of values per channel and sample.
 type NormSizes = (usize, usize, usize);
 
 fn sizes(dims: &[usize], n_weights: usize) -> Result<NormSizes> {
@@ -133,7 +134,7 @@ fn sizes(dims: &[usize], n_weights: usize) -> Result<NormSizes> {
     }
 }
 
-/// The rows [b, c] of channel `c`, over all b.
+/// Iterates over the rows [b, c] of channel `c`, for all b.
 fn rows<T>(x: &[T], c: usize, (_, channels, len): NormSizes) -> impl Iterator<Item = &[T]> {
     x.chunks_exact(len).skip(c).step_by(channels)
 }
@@ -148,7 +149,7 @@ fn measure<T: Scalar>(x: &[T], s: NormSizes) -> Statistics {
     Statistics { mean, variance }
 }
 
-/// The sum of `(x - centre)^2`, always in the same order.
+/// Sums `(x - centre)^2` in a fixed order.
 fn sum_of_squares<T: Scalar>(x: &[T], centre: T) -> f64 {
     let (chunks, rest) = x.as_chunks::<LANES>();
     let mut lanes = [T::zero(); LANES];
@@ -158,8 +159,8 @@ fn sum_of_squares<T: Scalar>(x: &[T], centre: T) -> f64 {
     lanes.iter().map(|lane| lane.to_f64()).sum()
 }
 
-/// The sums of `grad` and of `grad * (x - centre)`, `grad` being taken back through the activation whose result is
-/// `y`; always in the same order.
+/// Sums `grad` and `grad * (x - centre)` in a fixed order, after backpropagating `grad` through the activation with
+/// the output `y`.
 fn sums_of_gradient<T: Scalar>(x: &[T], y: &[T], grad: &[T], centre: T, slope: T) -> (f64, f64) {
     let (xs, ys, grads) = (x.as_chunks::<LANES>(), y.as_chunks::<LANES>(), grad.as_chunks::<LANES>());
     let (mut plain, mut product) = ([T::zero(); LANES], [T::zero(); LANES]);
@@ -177,7 +178,7 @@ fn sums_of_gradient<T: Scalar>(x: &[T], y: &[T], grad: &[T], centre: T, slope: T
     (total(plain), total(product))
 }
 
-/// The gradient before the leaky ReLU whose result is `y`.
+/// Gradient before the leaky ReLU with the output `y`.
 fn before_activation<T: Scalar>(y: T, grad: T, slope: T) -> T {
     if y > T::zero() { grad } else { grad * slope }
 }
@@ -221,7 +222,7 @@ impl CpuOperator for BatchNormOp {
                 of_product += product;
             }
             let inverse = 1.0 / (statistics.variance[c] + self.eps).sqrt();
-            (T::from_f64(of_product * inverse * self.kept_scale()), T::from_f64(of_bias * self.kept_scale()))
+            (T::from_f64(of_product * inverse * self.retained_scale()), T::from_f64(of_bias * self.retained_scale()))
         };
         let (grad_weight, grad_bias): (Vec<T>, Vec<T>) =
             (0..s.1).into_par_iter().with_min_len(GRAIN / (s.0 * s.2)).map(per_channel).unzip();
@@ -233,10 +234,10 @@ impl CpuOperator for BatchNormOp {
                 let c = row % s.1;
                 let inverse = 1.0 / (statistics.variance[c] + self.eps).sqrt();
                 let scale = weight.values[c].to_f64() * inverse;
-                // The batch's own mean and variance move with x; fixed ones do not.
+                // The batch's own mean and variance depend on x; the running ones do not.
                 let moving = if self.train { scale / n } else { 0.0 };
                 let (scale, constant) =
-                    (T::from_f64(scale * self.kept_scale()), T::from_f64(-moving * grad_bias[c].to_f64()));
+                    (T::from_f64(scale * self.retained_scale()), T::from_f64(-moving * grad_bias[c].to_f64()));
                 let linear = T::from_f64(-moving * grad_weight[c].to_f64() * inverse);
                 let centre = T::from_f64(statistics.mean[c]);
                 for (((out, x), y), grad) in out.iter_mut().zip(x).zip(y).zip(grad) {
@@ -251,11 +252,11 @@ impl CpuOperator for BatchNormOp {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::gradcheck::{apart, pattern, worst};
+    use crate::ops::gradcheck::{max_difference, pattern, worst};
     use candle_core::DType;
 
     #[test]
-    fn it_is_what_the_framework_gives_and_gradients_are_right() -> Result<()> {
+    fn results_equal_those_of_candle_and_gradients_are_correct() -> Result<()> {
         let fixed = Statistics { mean: vec![0.2, -0.3, 0.1], variance: vec![0.5, 1.5, 2.0] };
         for (shape, train, slope) in [
             (&[4, 3, 5][..], true, 1.0),
@@ -280,14 +281,14 @@ mod tests {
                 let (mean, variance) = if train { fallback::statistics(&v[0])? } else { known()? };
                 fallback::normalise(&v[0], (&mean, &variance), &v[1], &v[2], 1e-3, slope)
             };
-            let (off, error) = (apart(&inputs, own, by_fallback)?, worst(&inputs, own)?);
+            let (off, error) = (max_difference(&inputs, own, by_fallback)?, worst(&inputs, own)?);
             assert!(off < 1e-11 && error < 1e-7, "{shape:?}, train {train}, slope {slope}: {off:e} {error:e}");
         }
         Ok(())
     }
 
     #[test]
-    fn what_is_dropped_behind_a_relu_has_no_gradient() -> Result<()> {
+    fn dropped_values_after_a_relu_have_no_gradient() -> Result<()> {
         let inputs = [pattern(&[6, 3, 5], 0.0)?, (pattern(&[3], 5.0)? + 1.5)?, pattern(&[3], 9.0)?];
         let dropped = |v: &[Tensor]| {
             let dropout = Some(DropMask::new(4, 0.3));

@@ -1,6 +1,6 @@
-//! Convolution over time, channels first, with its own forward and backward passes (the stock one's weight gradient is
-//! wrong for every batch larger than one). All frames of the whole batch become the columns of one matrix, so that a pass
-//! is one matrix product; sums run in a fixed order, so results do not depend on the number of threads.
+//! Convolution over time, channels first, with its own forward and backward passes (the weight gradient of candle's is
+//! wrong for batches larger than one). All frames of the batch become the columns of one matrix, so that a pass is one
+//! matrix product. Sums have a fixed order, so results do not depend on the number of threads.
 
 use super::operator::{CpuOperator, CustomOperator, Gradients, Operand};
 use crate::cpu::axis::ConvAxis;
@@ -9,30 +9,30 @@ use crate::params::{Init, Params};
 use candle_core::{Module, Result, Shape, Tensor};
 use rayon::prelude::*;
 
-/// A convolution with its weights: `<name>.weight` [O, C, K], Glorot uniform, and `<name>.bias` [O], zero.
+/// A convolution layer: `<name>.weight` [O, C, K], Glorot uniform, and `<name>.bias` [O], zero.
 pub struct Conv1d {
     weight: Tensor,
     /// Constant zeros for a layer without bias.
     bias: Tensor,
-    /// `None`: as many frames come out as go in, the ends padded with zeros; else no padding, every so many frames.
+    /// `None`: zero padding that preserves the number of frames; otherwise no padding, with this stride.
     stride: Option<usize>,
 }
 
 impl Conv1d {
-    /// `n_in` channels to `n_out`, as many frames as come in, with bias.
+    /// Creates a layer with bias from `n_in` to `n_out` channels that preserves the number of frames.
     pub fn new(params: &mut Params, name: &str, n_in: usize, n_out: usize, kernel: usize) -> Result<Self> {
         let (weight, bias) = params.layer(name, &[n_out, n_in, kernel], Init::Glorot, Init::Constant(0.0))?;
         Ok(Self { weight, bias, stride: None })
     }
 
-    /// `n` channels in and out, without bias and padding.
+    /// Creates a layer with `n` = [input, output] channels, without bias and padding.
     pub fn valid(params: &mut Params, name: &str, n: [usize; 2], kernel: usize, stride: usize) -> Result<Self> {
         let weight = params.trainable(&format!("{name}.weight"), &[n[1], n[0], kernel], Init::Glorot)?;
         let bias = Tensor::zeros(n[1], weight.dtype(), weight.device())?;
         Ok(Self { weight, bias, stride: Some(stride) })
     }
 
-    /// [`Self::valid`] with a bias, both initialised uniformly in +-1 / sqrt(fan in), as in PyTorch.
+    /// [`Self::valid`] with a bias; both tensors are initialised uniformly in +-1 / sqrt(fan in), as in PyTorch.
     pub fn valid_with_bias(
         params: &mut Params,
         name: &str,
@@ -47,7 +47,7 @@ impl Conv1d {
 }
 
 impl Module for Conv1d {
-    /// [B, C, T] to [B, O, T'].
+    /// Maps [B, C, T] to [B, O, T'].
     fn forward(&self, x: &Tensor) -> Result<Tensor> {
         let (n_frames, kernel) = (x.dim(2)?, self.weight.dim(2)?);
         let axis = match self.stride {
@@ -67,7 +67,8 @@ struct Conv1dOp {
     axis: ConvAxis,
 }
 
-/// All sizes of one pass: `n` columns are the output frames of the whole batch, `depth` rows are (channel, tap).
+/// Sizes of one pass: the `n` columns are the output frames of the complete batch, the `depth` rows are (channel,
+/// kernel offset).
 struct Conv1dSizes {
     batch: usize,
     n_in: usize,
@@ -95,14 +96,14 @@ impl Conv1dOp {
         }
     }
 
-    /// Output frames whose tap `k` falls inside the input, and the input frame under the first of them.
+    /// Output frames for which kernel offset `k` lies inside the input, and the input frame of the first of them.
     fn inside(&self, k: usize) -> (std::ops::Range<usize>, usize) {
         let inside = self.axis.inside(k);
         let first = (inside.start * self.axis.stride + k).saturating_sub(self.axis.pad);
         (inside, first)
     }
 
-    /// Row (c, k), column (b, t): `x[b, c, t * stride + k - pad]`, zero outside.
+    /// Unfolds the input: row (c, k), column (b, t) is `x[b, c, t * stride + k - pad]`, zero outside.
     fn columns<T: Scalar>(&self, columns: &mut [T], x: &[T], s: &Conv1dSizes) {
         let ConvAxis { n_in, n_out, kernel, stride, .. } = self.axis;
         let per_channel = kernel * s.n;
@@ -123,7 +124,7 @@ impl Conv1dOp {
         });
     }
 
-    /// The transpose of `columns`: every column entry is added to the input frame it came from, taps in order.
+    /// Transpose of `columns`: adds every entry to the input frame that it came from, in the order of kernel offsets.
     fn uncolumns<T: Scalar>(&self, x: &mut [T], columns: &[T], s: &Conv1dSizes) {
         let ConvAxis { n_in, n_out, kernel, stride, .. } = self.axis;
         x.par_chunks_mut(n_in).with_min_len(GRAIN / (n_in * kernel)).enumerate().for_each(|(row, x)| {
@@ -168,7 +169,7 @@ impl CpuOperator for Conv1dOp {
         let (mut grad_weight, mut grad_bias) = (zeros(s.n_out * s.depth), zeros(s.n_out));
         scratch(s.depth * s.n + grad.len(), |memory: &mut [T]| {
             let (columns, rows) = memory.split_at_mut(s.depth * s.n);
-            // Gradient of the batch as one row an output channel.
+            // Gradient of the batch with one row per output channel.
             rows.par_chunks_mut(s.n).zip(&mut grad_bias).with_min_len(GRAIN / s.n).enumerate().for_each(
                 |(o, (row, grad_bias))| {
                     for (b, row) in row.chunks_exact_mut(t_out).enumerate() {
@@ -192,10 +193,10 @@ mod tests {
     use super::*;
     use crate::cpu::direct_conv::ConvSizes;
     use crate::ops::conv2d;
-    use crate::ops::gradcheck::{any_threads_give_the_same, apart, pattern, worst};
+    use crate::ops::gradcheck::{check_thread_independence, max_difference, pattern, worst};
 
     #[test]
-    fn it_is_the_convolution_with_channels_last_and_gradients_are_right() -> Result<()> {
+    fn results_equal_those_of_conv2d_and_gradients_are_correct() -> Result<()> {
         for (batch, axis) in [
             (2, ConvAxis::valid(9, 1, 1)),
             (3, ConvAxis::same(11, 3, 1)),
@@ -215,7 +216,7 @@ mod tests {
                 let axes = [axis, ConvAxis::valid(1, 1, 1)];
                 conv2d::conv(&v[0].t()?, &v[1], &v[2], ConvSizes { batch, n_in: 3, n_out: 4, axes })?.t()
             };
-            let (off, error) = (apart(&inputs, own, channels_last)?, worst(&inputs, own)?);
+            let (off, error) = (max_difference(&inputs, own, channels_last)?, worst(&inputs, own)?);
             assert!(off < 1e-12 && error < 1e-7, "{axis:?}: {off:e} {error:e}");
         }
         Ok(())
@@ -224,11 +225,11 @@ mod tests {
     #[test]
     fn any_number_of_threads_gives_the_same_bits() -> Result<()> {
         let axis = ConvAxis::same(61, 3, 1);
-        any_threads_give_the_same(&[&[5, 40, 61], &[70, 40, 3], &[70]], 1, |v| conv1d(&v[0], &v[1], &v[2], axis))
+        check_thread_independence(&[&[5, 40, 61], &[70, 40, 3], &[70]], 1, |v| conv1d(&v[0], &v[1], &v[2], axis))
     }
 
     #[test]
-    fn what_does_not_fit_is_an_error() -> Result<()> {
+    fn mismatched_shapes_are_errors() -> Result<()> {
         let (x, bias) = (pattern(&[2, 3, 2], 0.0)?, pattern(&[4], 0.0)?);
         let fits = |weight: &[usize], bias: &Tensor| -> Result<bool> {
             Ok(conv1d(&x, &pattern(weight, 0.0)?, bias, ConvAxis::valid(2, weight[2], 1)).is_ok())

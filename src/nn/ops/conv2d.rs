@@ -1,5 +1,5 @@
 //! Convolution as an operator on tensors, channels last, with its weights: [B, T, C] over time and [B, T, F, C] over
-//! time and frequency. The sums are in `conv`; where a batch norm follows, `conv_norm` does both at once.
+//! time and frequency. The sums are computed in `direct_conv`; `conv_norm` includes a subsequent batch norm.
 
 use super::fallback;
 use super::operator::{CpuOperator, CustomOperator, Gradients, Operand};
@@ -11,7 +11,7 @@ use crate::cpu::weight_gradient;
 use crate::params::{Init, Params};
 use candle_core::{Result, Shape, Tensor};
 
-/// The sizes of a convolution of `x` with `weight` [O, C, K] or [O, C, K, K'], padding "same".
+/// Sizes of a convolution of `x` with `weight` [O, C, K] or [O, C, K, K'], padding "same".
 pub fn same(x: &Tensor, weight: &Tensor, stride: usize) -> Result<ConvSizes> {
     sizes(x, weight, |n, kernel| ConvAxis::same(n, kernel, stride))
 }
@@ -35,7 +35,7 @@ fn sizes(x: &Tensor, weight: &Tensor, axis: impl Fn(usize, usize) -> ConvAxis) -
     Ok(ConvSizes { batch, n_in, n_out, axes })
 }
 
-/// The shape of the result of a convolution of an input of this rank.
+/// Shape of the output for an input of rank `rank`.
 pub fn shape_out(s: &ConvSizes, rank: usize) -> Shape {
     let [rows, columns] = s.axes;
     match rank {
@@ -44,7 +44,7 @@ pub fn shape_out(s: &ConvSizes, rank: usize) -> Shape {
     }
 }
 
-/// Gradients of `x` and the weight from that of the result, each where it is wanted.
+/// Computes the gradients of `x` and the weight from that of the output, each only if it is tracked.
 pub fn gradients<T: Scalar>(s: &ConvSizes, x: &Operand<T>, weight: &Operand<T>, grad: &[T]) -> [Option<Vec<T>>; 2] {
     [
         x.tracked.then(|| direct_conv::gradient_of_input(s, weight.values, grad)),
@@ -52,8 +52,7 @@ pub fn gradients<T: Scalar>(s: &ConvSizes, x: &Operand<T>, weight: &Operand<T>, 
     ]
 }
 
-/// A convolution with its weights: `<name>.weight` [O, C, K], Glorot uniform, and `<name>.bias` [O], zero; padding
-/// "same".
+/// A convolution layer with padding "same": `<name>.weight` [O, C, K], Glorot uniform, and `<name>.bias` [O], zero.
 pub struct Conv {
     weight: Tensor,
     bias: Tensor,
@@ -66,13 +65,13 @@ impl Conv {
         Ok(Self { weight, bias, stride })
     }
 
-    /// [B, T, C] to [B, T', O].
+    /// Maps [B, T, C] to [B, T', O].
     pub fn forward(&self, x: &Tensor) -> Result<Tensor> {
         conv(x, &self.weight, &self.bias, same(x, &self.weight, self.stride)?)
     }
 }
 
-/// The convolution of these sizes, on any device.
+/// Convolves tensors of these sizes, on any device.
 pub fn conv(x: &Tensor, weight: &Tensor, bias: &Tensor, sizes: ConvSizes) -> Result<Tensor> {
     if !x.device().is_cpu() {
         return fallback::conv(x, weight, bias, &sizes);
@@ -102,7 +101,7 @@ impl CpuOperator for ConvOp {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::gradcheck::{any_threads_give_the_same, apart, pattern, worst};
+    use crate::ops::gradcheck::{check_thread_independence, max_difference, pattern, worst};
 
     /// Input, weight and bias of a batch of two.
     fn inputs(s: &ConvSizes) -> Result<[Tensor; 3]> {
@@ -115,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_what_the_framework_gives_and_gradients_are_right() -> Result<()> {
+    fn results_equal_those_of_candle_and_gradients_are_correct() -> Result<()> {
         let same = ConvAxis::same;
         let alone = ConvAxis::valid(1, 1, 1);
         for (n_in, n_out, axes) in [
@@ -131,7 +130,7 @@ mod tests {
         ] {
             let s = ConvSizes { batch: 2, n_in, n_out, axes };
             let own = |v: &[Tensor]| conv(&v[0], &v[1], &v[2], s);
-            let (off, error) = (apart(&inputs(&s)?, own, |v| by_fallback(v, &s))?, worst(&inputs(&s)?, own)?);
+            let (off, error) = (max_difference(&inputs(&s)?, own, |v| by_fallback(v, &s))?, worst(&inputs(&s)?, own)?);
             assert!(off < 1e-12 && error < 1e-7, "{s:?}: {off:e} {error:e}");
         }
         Ok(())
@@ -142,10 +141,10 @@ mod tests {
     }
 
     #[test]
-    fn panels_of_every_width_are_right() -> Result<()> {
+    fn panels_of_every_width_are_correct() -> Result<()> {
         for (n_in, n_out) in [(70, 96), (5, 113)] {
             let s = ConvSizes { batch: 2, n_in, n_out, axes: [ConvAxis::same(6, 4, 2), ConvAxis::same(3, 3, 2)] };
-            let off = apart(&inputs(&s)?, |v| conv(&v[0], &v[1], &v[2], s), |v| by_fallback(v, &s))?;
+            let off = max_difference(&inputs(&s)?, |v| conv(&v[0], &v[1], &v[2], s), |v| by_fallback(v, &s))?;
             assert!(off < 1e-9, "{n_in} to {n_out}: {off:e}");
         }
         Ok(())
@@ -153,13 +152,13 @@ mod tests {
 
     #[test]
     fn any_number_of_threads_gives_the_same_bits() -> Result<()> {
-        any_threads_give_the_same(&[&[3, 21, 10, 20], &[70, 20, 4, 4], &[70]], 1, |v| {
+        check_thread_independence(&[&[3, 21, 10, 20], &[70, 20, 4, 4], &[70]], 1, |v| {
             conv(&v[0], &v[1], &v[2], same(&v[0], &v[1], 2)?)
         })
     }
 
     #[test]
-    fn what_does_not_fit_is_an_error() -> Result<()> {
+    fn mismatched_shapes_are_errors() -> Result<()> {
         let x = pattern(&[2, 3, 4], 0.0)?;
         assert!(same(&x, &pattern(&[5, 4, 3], 0.0)?, 1).is_ok());
         assert!(same(&x, &pattern(&[5, 3, 3], 0.0)?, 1).is_err());

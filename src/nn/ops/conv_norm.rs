@@ -1,6 +1,6 @@
-//! Convolution, batch norm and leaky ReLU as one operator, channels last: the statistics are summed while an output
-//! lies in the cache, evaluation writes the result at once, and the way back overwrites what was kept for it. Of a
-//! layer in training two numbers a place are kept: before the norm, and the result.
+//! Convolution, batch norm and leaky ReLU as one operator, channels last: statistics are summed while the output is in
+//! the cache, evaluation writes the final result directly, and the backward pass overwrites the saved values. Training
+//! stores two values per position: the input of the norm, and the result.
 
 use super::batch_norm::{BatchNorm, Statistics};
 use super::conv2d;
@@ -12,8 +12,8 @@ use crate::cpu::tensor::Scalar;
 use candle_core::{CpuStorage, Result, Shape, Tensor};
 use std::sync::{Arc, Mutex, OnceLock};
 
-/// `x` [B, T, C] or [B, T, F, C] through the convolution of these sizes, then `norm` with its activation. Training uses
-/// the batch's statistics and moves the running ones.
+/// Applies the convolution of these sizes to `x` [B, T, C] or [B, T, F, C], then `norm` with its activation. Training
+/// uses the batch's statistics and updates the running ones.
 pub fn conv_norm(
     x: &Tensor,
     weight: &Tensor,
@@ -31,26 +31,26 @@ pub fn conv_norm(
     if !train {
         let _ = statistics.set(norm.running()?);
     }
-    let keeps = [&x, weight, &channels].iter().any(|tensor| tensor.track_op());
-    let kept = keeps.then(|| Mutex::new(None));
-    let op = ConvNormOp { sizes, eps: norm.eps, slope: norm.slope, train, statistics: statistics.clone(), kept };
+    let saves = [&x, weight, &channels].iter().any(|tensor| tensor.track_op());
+    let saved_input = saves.then(|| Mutex::new(None));
+    let op = ConvNormOp { sizes, eps: norm.eps, slope: norm.slope, train, statistics: statistics.clone(), saved_input };
     let y = x.apply_op3(weight, &channels, CustomOperator(op))?;
     if let (true, Some(batch)) = (train, statistics.get()) {
-        norm.follow(batch, y.elem_count() / sizes.n_out)?;
+        norm.update_running(batch, y.elem_count() / sizes.n_out)?;
     }
     Ok(y)
 }
 
-/// Operator of [`conv_norm`]; the third input holds bias, norm's weight and norm's bias, one after the other.
+/// Operator of [`conv_norm`]; its third input is the concatenation of bias, norm weight and norm bias.
 struct ConvNormOp {
     sizes: ConvSizes,
     eps: f64,
     slope: f64,
     train: bool,
-    /// Set by the forward pass when training, before it when evaluating.
+    /// Set by the forward pass in training, before it in evaluation.
     statistics: Arc<OnceLock<Statistics>>,
-    /// For the way back, if there is one: the values before the norm.
-    kept: Option<Mutex<Option<CpuStorage>>>,
+    /// Input of the norm, saved for the backward pass if there is one.
+    saved_input: Option<Mutex<Option<CpuStorage>>>,
 }
 
 impl ConvNormOp {
@@ -67,10 +67,10 @@ impl ConvNormOp {
         }
     }
 
-    /// The result and, where there is a way back, what was before the norm.
+    /// Returns the result and, if there will be a backward pass, the input of the norm.
     fn normalised<T: Scalar>(&self, x: &[T], weight: &[T], channels: &[T]) -> (Vec<T>, Option<Vec<T>>) {
         let (s, bias) = (&self.sizes, &channels[..self.sizes.n_out]);
-        if let (None, Some(statistics)) = (&self.kept, self.statistics.get()) {
+        if let (None, Some(statistics)) = (&self.saved_input, self.statistics.get()) {
             let norm = self.norm(channels, statistics);
             return (direct_conv::forward(s, x, weight, bias, |_, piece| norm.apply(piece)), None);
         }
@@ -85,26 +85,26 @@ impl ConvNormOp {
             Statistics { variance: all.squares.iter().map(|v| v / all.n).collect(), mean: all.mean }
         });
         let norm = self.norm(channels, statistics);
-        if self.kept.is_none() {
+        if self.saved_input.is_none() {
             norm.apply_parallel(&mut z);
             return (z, None);
         }
         (norm.forward(&z), Some(z))
     }
 
-    /// Overwrites `z` with its gradient; gives those of bias, norm's weight and norm's bias.
+    /// Overwrites `z` with its gradient; returns the gradients of bias, norm weight and norm bias, concatenated.
     fn overwrite<T: Scalar>(&self, z: &mut [T], channels: &[T], statistics: &Statistics, grad: &[T]) -> Vec<T> {
         let norm = self.norm(channels, statistics);
         let (plain, product) = norm.sums_of_gradient(z, grad);
         let n = (z.len() / self.sizes.n_out) as f64;
         let inverse: Vec<f64> = statistics.variance.iter().map(|v| 1.0 / (v + self.eps).sqrt()).collect();
-        // The batch's own mean and variance move with z; fixed ones do not.
+        // The batch's own mean and variance depend on z; the running ones do not.
         let moving = |scale: &T| if self.train { scale.to_f64() / n } else { 0.0 };
         let constant: Vec<T> = norm.scale.iter().zip(&plain).map(|(s, sum)| T::from_f64(-moving(s) * sum)).collect();
         let linear = norm.scale.iter().zip(&product).zip(&inverse);
         let linear: Vec<T> = linear.map(|((s, sum), inv)| T::from_f64(-moving(s) * sum * inv * inv)).collect();
         norm.backward(z, grad, &constant, &linear);
-        // A batch's own mean takes a bias away again: its gradient is zero then.
+        // Subtracting the batch's own mean cancels the bias, so its gradient is zero.
         let of_bias = |(s, sum): (&T, &f64)| if self.train { T::zero() } else { T::from_f64(s.to_f64() * sum) };
         let of_bias: Vec<T> = norm.scale.iter().zip(&plain).map(of_bias).collect();
         let of_weight = product.iter().zip(&inverse).map(|(sum, inverse)| T::from_f64(sum * inverse));
@@ -117,15 +117,15 @@ impl CpuOperator for ConvNormOp {
 
     fn forward<T: Scalar>(&self, [x, weight, channels]: [Operand<T>; 3]) -> Result<(Vec<T>, Shape)> {
         let (y, z) = self.normalised(x.values, weight.values, channels.values);
-        if let Some(Ok(mut kept)) = self.kept.as_ref().map(Mutex::lock) {
-            *kept = z.map(T::to_cpu_storage_owned);
+        if let Some(Ok(mut saved_input)) = self.saved_input.as_ref().map(Mutex::lock) {
+            *saved_input = z.map(T::to_cpu_storage_owned);
         }
         Ok((y, conv2d::shape_out(&self.sizes, x.dims.len())))
     }
 
     fn backward<T: Scalar>(&self, [x, weight, channels]: [Operand<T>; 3], _: &[T], grad: &[T]) -> Gradients<T> {
-        let kept = self.kept.as_ref().and_then(|kept| kept.lock().ok()?.take());
-        let (Some(z), Some(statistics)) = (kept, self.statistics.get()) else {
+        let saved_input = self.saved_input.as_ref().and_then(|saved_input| saved_input.lock().ok()?.take());
+        let (Some(z), Some(statistics)) = (saved_input, self.statistics.get()) else {
             candle_core::bail!("a layer's way back can be gone once only");
         };
         let mut z = T::cpu_storage_data(z)?;
@@ -135,7 +135,7 @@ impl CpuOperator for ConvNormOp {
     }
 }
 
-/// What [`conv_norm`] gives, on devices without the kernels.
+/// [`conv_norm`] for devices without the kernels.
 pub fn fallback_conv_norm(
     x: &Tensor,
     weight: &Tensor,
@@ -150,11 +150,12 @@ pub fn fallback_conv_norm(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::gradcheck::{any_threads_give_the_same, apart, pattern};
+    use crate::ops::gradcheck::{check_thread_independence, max_difference, pattern};
     use crate::params::Params;
     use candle_core::DType;
 
-    /// Inputs and kernels of the networks' layers, small: over time, over time and frequency, even and odd.
+    /// Inputs, kernels and strides like those of the networks' layers, but small: over time, over time and frequency,
+    /// even and odd.
     const LAYERS: [(&[usize], &[usize], usize); 8] = [
         (&[2, 9, 2], &[3, 2, 3], 1),
         (&[2, 12, 2], &[3, 2, 4], 2),
@@ -167,14 +168,14 @@ mod tests {
     ];
 
     #[test]
-    fn it_is_what_the_framework_gives_with_its_gradients_and_running_statistics() -> Result<()> {
+    fn results_gradients_and_running_statistics_equal_those_of_candle() -> Result<()> {
         for ((shape, kernel, stride), (train, slope)) in LAYERS
             .into_iter()
             .flat_map(|layer| [(true, 0.2), (true, 1.0), (false, 0.2)].map(|settings| (layer, settings)))
         {
             let inputs = [pattern(shape, 0.0)?, pattern(kernel, 7.0)?, pattern(&kernel[..1], 3.0)?];
             let s = conv2d::same(&inputs[0], &inputs[1], stride)?;
-            // Weights and running statistics as those of a layer in training.
+            // Weights and running statistics like those of a layer in training.
             let norm = || -> Result<(Params, BatchNorm)> {
                 let mut params = Params::with_dtype(0, DType::F64);
                 let norm = BatchNorm::new(&mut params, "n", 3, 1e-3, 0.1, slope)?;
@@ -185,7 +186,7 @@ mod tests {
                 Ok((params, norm))
             };
             let ((_, own), (_, other)) = (norm()?, norm()?);
-            let off = apart(
+            let off = max_difference(
                 &inputs,
                 |v| conv_norm(&v[0], &v[1], &v[2], &own, s, train),
                 |v| fallback_conv_norm(&v[0], &v[1], &v[2], &other, &s, train),
@@ -200,7 +201,7 @@ mod tests {
 
     #[test]
     fn any_number_of_threads_gives_the_same_bits() -> Result<()> {
-        any_threads_give_the_same(&[&[3, 40, 10, 20], &[70, 20, 3, 3], &[70]], 1, |v| {
+        check_thread_independence(&[&[3, 40, 10, 20], &[70, 20, 3, 3], &[70]], 1, |v| {
             let norm = BatchNorm::new(&mut Params::new(0), "n", 70, 1e-3, 0.3, 0.2)?;
             conv_norm(&v[0], &v[1], &v[2], &norm, conv2d::same(&v[0], &v[1], 1)?, true)
         })

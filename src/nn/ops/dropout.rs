@@ -1,9 +1,9 @@
-//! Whether a network trains, and dropout with masks from a seeded generator (candle's cannot be seeded on the CPU).
+//! Training mode, and dropout with masks from a seeded generator (candle's dropout cannot be seeded on the CPU).
 
 use candle_core::{Result, Tensor};
 use rand::Rng;
 
-/// Whether a forward pass trains (batch statistics, dropout masks drawn from the generator) or evaluates.
+/// Mode of a forward pass: training (batch statistics, dropout masks from the generator) or evaluation.
 pub enum Mode<'a> {
     Train(&'a mut rand_chacha::ChaCha8Rng),
     Eval,
@@ -15,7 +15,7 @@ impl Mode<'_> {
     }
 }
 
-/// While training, zeroes each number with probability `p` and scales the others by 1 / (1 - p).
+/// In training, zeroes each value with probability `p` and scales the others by 1 / (1 - p).
 pub fn dropout(x: &Tensor, p: f64, mode: &mut Mode) -> Result<Tensor> {
     match mode {
         Mode::Train(rng) if p > 0.0 => {
@@ -37,7 +37,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     #[test]
-    fn a_share_is_dropped_and_the_mean_kept() -> Result<()> {
+    fn a_fraction_is_dropped_and_the_mean_is_preserved() -> Result<()> {
         let x = Tensor::ones((100, 100), DType::F32, &Device::Cpu)?;
         let draw = || dropout(&x, 0.25, &mut Mode::Train(&mut ChaCha8Rng::seed_from_u64(3)))?.flatten_all()?.to_vec1();
         let y: Vec<f32> = draw()?;

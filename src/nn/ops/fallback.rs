@@ -1,13 +1,13 @@
-//! The operators of this room made of the framework's own, for devices that are not the CPU: slower, but every part has
-//! a gradient that finite differences confirm, and runs wherever the framework does. On the CPU they are only tested:
-//! they give what the room's own operators give.
+//! The operators of this crate composed of candle's, for devices other than the CPU: slower, but every part has a
+//! gradient that finite differences confirm and runs wherever candle does. On the CPU they are used only in tests,
+//! which check that they give the same results as this crate's operators.
 
 use crate::cpu::axis::ConvAxis;
 use crate::cpu::direct_conv::ConvSizes;
 use candle_core::{D, Result, Tensor};
 
-/// Pads axis `dim` of `x` by `before`, and on the other side pads or cuts it to `reach` places in all, so that a kernel
-/// walks to the very last one: with some left over the framework's backward pass fails.
+/// Pads axis `dim` of `x` by `before`, then pads or cuts its end to `len` positions in total, so that the kernel
+/// reaches exactly the last one: with remaining positions candle's backward pass fails.
 fn fitted(x: &Tensor, dim: usize, before: usize, len: usize) -> Result<Tensor> {
     let (n, end) = (x.dim(dim)?, len.saturating_sub(before));
     if end < n {
@@ -16,8 +16,8 @@ fn fitted(x: &Tensor, dim: usize, before: usize, len: usize) -> Result<Tensor> {
     x.pad_with_zeros(dim, before, end - n)
 }
 
-/// A convolution of `x` [B, T, C] or [B, T, F, C] with `weight` [O, C, K] or [O, C, K, K'], and `bias` [O]: channels
-/// first, [B, O, T', F'].
+/// Convolves `x` [B, T, C] or [B, T, F, C] with `weight` [O, C, K] or [O, C, K, K'] and adds `bias` [O]; the result is
+/// channels first, [B, O, T', F'].
 pub fn conv_first(x: &Tensor, weight: &Tensor, bias: &Tensor, s: &ConvSizes) -> Result<Tensor> {
     let (x, weight) = match x.rank() {
         3 => (x.unsqueeze(2)?, weight.unsqueeze(3)?),
@@ -25,7 +25,7 @@ pub fn conv_first(x: &Tensor, weight: &Tensor, bias: &Tensor, s: &ConvSizes) -> 
     };
     let mut x = x.permute((0, 3, 1, 2))?;
     let [down, across] = s.axes;
-    // Over time alone there is one frequency, on which every stride stands once.
+    // A convolution over time only has one frequency, for which every stride gives one position.
     let stride = down.stride;
     if across.stride != stride && across.n_out != 1 {
         candle_core::bail!("one stride for both axes, not {} and {}", down.stride, across.stride);
@@ -37,18 +37,18 @@ pub fn conv_first(x: &Tensor, weight: &Tensor, bias: &Tensor, s: &ConvSizes) -> 
     y.broadcast_add(&bias.reshape((1, (), 1, 1))?)
 }
 
-/// From channels first to channels last, and to the rank that the input had.
+/// Converts channels first to channels last, with the rank of the input.
 pub fn last(y: &Tensor, rank: usize) -> Result<Tensor> {
     let y = y.permute((0, 2, 3, 1))?;
     if rank == 3 { y.squeeze(2)?.contiguous() } else { y.contiguous() }
 }
 
-/// A convolution, channels last: as [`super::conv2d::Conv`].
+/// Convolution, channels last, as [`super::conv2d::Conv`].
 pub fn conv(x: &Tensor, weight: &Tensor, bias: &Tensor, s: &ConvSizes) -> Result<Tensor> {
     last(&conv_first(x, weight, bias, s)?, x.rank())
 }
 
-/// Mean and variance (of the batch itself, not the estimate) of every channel of [B, C, ...], [C] each.
+/// Mean and biased variance of every channel of [B, C, ...], [C] each.
 pub fn statistics(x: &Tensor) -> Result<(Tensor, Tensor)> {
     let (batch, channels) = (x.dim(0)?, x.dim(1)?);
     let rows = x.reshape((batch, channels, ()))?.transpose(0, 1)?.contiguous()?.reshape((channels, ()))?;
@@ -57,7 +57,7 @@ pub fn statistics(x: &Tensor) -> Result<(Tensor, Tensor)> {
     Ok((mean.squeeze(1)?, variance))
 }
 
-/// Batch norm with these statistics ([C] each, part of the graph while training), then the leaky ReLU of this slope.
+/// Batch norm with these statistics ([C] each, part of the graph in training), then leaky ReLU with this slope.
 pub fn normalise(
     x: &Tensor,
     (mean, variance): (&Tensor, &Tensor),

@@ -1,17 +1,18 @@
 //! Checks of operators for tests: gradients by backpropagation against central differences in f64, equality of two
-//! implementations, and equal bits for any number of threads. Public, so that the tests of other crates share it.
+//! implementations, and identical bits for any number of threads. Public, so that the tests of other crates can use
+//! it.
 
 use candle_core::{DType, Device, Result, Tensor, Var};
 
-/// Pseudo-random numbers in -1..1, the same on every machine.
+/// Pseudo-random values in -1..1, identical on every machine.
 pub fn pattern(shape: &[usize], phase: f64) -> Result<Tensor> {
     let n: usize = shape.iter().product();
     let values: Vec<f64> = (0..n).map(|i| ((i as f64 + phase) * 12.9898).sin() * 43758.5453 % 1.0).collect();
     Tensor::from_vec(values, shape, &Device::Cpu)
 }
 
-/// Largest difference between the gradient of `sum(f(inputs) * fixed pattern)` by backpropagation and by central
-/// differences, over all numbers of all `inputs` (f64), relative to 1 + |gradient|.
+/// Returns the largest difference between the gradients of `sum(f(inputs) * fixed pattern)` by backpropagation and by
+/// central differences, over all values of all `inputs` (f64), relative to 1 + |gradient|.
 pub fn worst(inputs: &[Tensor], f: impl Fn(&[Tensor]) -> Result<Tensor>) -> Result<f64> {
     let vars: Vec<Var> = inputs.iter().map(Var::from_tensor).collect::<Result<_>>()?;
     let tensors = |vars: &[Var]| vars.iter().map(|var| var.as_tensor().clone()).collect::<Vec<_>>();
@@ -44,8 +45,8 @@ pub fn worst(inputs: &[Tensor], f: impl Fn(&[Tensor]) -> Result<Tensor>) -> Resu
     Ok(worst)
 }
 
-/// Largest difference between `a` and `b` of `inputs`: of the results and of the gradients of all inputs.
-pub fn apart(
+/// Returns the largest difference between `a` and `b` for `inputs`, over the results and the gradients of all inputs.
+pub fn max_difference(
     inputs: &[Tensor],
     a: impl Fn(&[Tensor]) -> Result<Tensor>,
     b: impl Fn(&[Tensor]) -> Result<Tensor>,
@@ -64,9 +65,12 @@ pub fn apart(
     Ok(worst)
 }
 
-/// Errors unless the result of `f` on f32 inputs of these shapes and the gradient of input `which` have the same bits for
-/// one and for three threads.
-pub fn any_threads_give_the_same(
+/// Checks that the result of `f` on f32 inputs of these shapes and the gradient of input `which` are bitwise identical
+/// for one and for three threads.
+///
+/// # Errors
+/// They differ.
+pub fn check_thread_independence(
     shapes: &[&[usize]],
     which: usize,
     f: impl Fn(&[Tensor]) -> Result<Tensor> + Sync,

@@ -1,33 +1,36 @@
-//! Own operators as custom operators of candle: forward and backward pass, written once for f32 and f64, on contiguous
-//! memory of the CPU.
+//! Adapter from the operators of this crate to custom operators of candle: forward and backward pass, written once for
+//! f32 and f64, on contiguous memory of the CPU.
 
 use crate::cpu::tensor::{Scalar, is_f64, read, slice};
 use candle_core::backend::BackendStorage;
 use candle_core::{CpuStorage, CustomOp3, Layout, Result, Shape, Tensor};
 
-/// A tensor that an operator reads.
+/// An input tensor of an operator.
 pub struct Operand<'a, T> {
     pub values: &'a [T],
     pub dims: &'a [usize],
-    /// Whether its gradient is wanted.
+    /// Whether its gradient is required.
     pub tracked: bool,
 }
 
-/// Gradients of the three operands; `None`: not wanted.
+/// Gradients of the three operands; `None`: not required.
 pub type Gradients<T> = Result<[Option<Vec<T>>; 3]>;
 
 /// An operator on three tensors.
 pub trait CpuOperator: Send + Sync {
     const NAME: &'static str;
 
-    /// The result and its shape. Errors when the shapes of the operands do not fit each other.
+    /// Computes the result and its shape.
+    ///
+    /// # Errors
+    /// The shapes of the operands do not match.
     fn forward<T: Scalar>(&self, operands: [Operand<T>; 3]) -> Result<(Vec<T>, Shape)>;
 
-    /// The gradients of the operands from `grad`, that of the result `y`.
+    /// Computes the gradients of the operands from `grad`, the gradient of the result `y`.
     fn backward<T: Scalar>(&self, operands: [Operand<T>; 3], y: &[T], grad: &[T]) -> Gradients<T>;
 }
 
-/// An operator, for `Tensor::apply_op3`.
+/// Adapter of an operator for `Tensor::apply_op3`.
 pub struct CustomOperator<O>(pub O);
 
 impl<O: CpuOperator> CustomOp3 for CustomOperator<O> {

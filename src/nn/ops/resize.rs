@@ -1,28 +1,28 @@
-//! Changing the number of frames, channels last: twice as many by repetition, any number by linear interpolation; and
-//! channels first made channels last.
+//! Resizing over time, channels last: doubling by repetition, and linear interpolation to any number of frames; and
+//! transposition from channels first to channels last.
 
 use super::operator::{CpuOperator, CustomOperator, Gradients, Operand};
-use crate::cpu::frames::{FrameMixture, transpose};
+use crate::cpu::frames::{FrameInterpolation, transpose};
 use crate::cpu::tensor::Scalar;
 use candle_core::{Result, Shape, Tensor};
 use std::ops::Range;
 
-/// Every frame twice: [B, T, C] to [B, 2T, C].
+/// Repeats every frame twice: [B, T, C] to [B, 2T, C].
 pub fn twice(x: &Tensor) -> Result<Tensor> {
     mix(x, None, doubled(x.dim(1)?))
 }
 
-/// Every frame of `x` [B, T, C] twice, plus `skip` [B, 2T, C].
+/// Repeats every frame of `x` [B, T, C] twice and adds `skip` [B, 2T, C].
 pub fn twice_plus(x: &Tensor, skip: &Tensor) -> Result<Tensor> {
     mix(x, Some(skip), doubled(x.dim(1)?))
 }
 
-fn doubled(n_in: usize) -> FrameMixture {
-    FrameMixture { n_in, of: (0..2 * n_in).map(|i| (i / 2, i / 2, 0.0)).collect() }
+fn doubled(n_in: usize) -> FrameInterpolation {
+    FrameInterpolation { n_in, of: (0..2 * n_in).map(|i| (i / 2, i / 2, 0.0)).collect() }
 }
 
-/// Linear interpolation to `n_out` frames, [B, T, C] to [B, n_out, C], as TensorFlow 1 does without aligned corners:
-/// frame i of the result lies at i * T / n_out, the last frame is held.
+/// Interpolates linearly to `n_out` frames, [B, T, C] to [B, n_out, C], like TensorFlow 1 without aligned corners:
+/// frame i of the result is at i * T / n_out, and the last frame is repeated.
 pub fn linear(x: &Tensor, n_out: usize) -> Result<Tensor> {
     let n_in = x.dim(1)?;
     if n_in == n_out {
@@ -32,7 +32,7 @@ pub fn linear(x: &Tensor, n_out: usize) -> Result<Tensor> {
     linear_part(&x.narrow(1, 0, part.needed().end)?, &part)
 }
 
-/// Some frames of a linear interpolation of `n_in` frames to `n_out`.
+/// A range of frames of a linear interpolation from `n_in` frames to `n_out`.
 pub struct ResizedPart {
     pub frames: Range<usize>,
     pub n_in: usize,
@@ -40,21 +40,22 @@ pub struct ResizedPart {
 }
 
 impl ResizedPart {
-    /// The frame at or before the place of frame `i` of the result, and the way from it to the next.
+    /// Returns the input frame at or before the position of frame `i` of the result, and the fraction of the distance
+    /// to the next.
     fn place(&self, i: usize) -> (usize, f64) {
         let at = i as f64 * self.n_in as f64 / self.n_out as f64;
         let before = (at as usize).min(self.n_in.saturating_sub(1));
         (before, at - before as f64)
     }
 
-    /// The frames that go in.
+    /// Returns the required input frames.
     pub fn needed(&self) -> Range<usize> {
         let last = self.place(self.frames.end.saturating_sub(1)).0;
         self.place(self.frames.start).0..(last + 2).min(self.n_in)
     }
 }
 
-/// A part of what [`linear`] makes, from the frames that it needs, [B, `part.needed()`, C].
+/// Computes a part of the result of [`linear`] from the frames that it requires, [B, `part.needed()`, C].
 pub fn linear_part(x: &Tensor, part: &ResizedPart) -> Result<Tensor> {
     let needed = part.needed();
     if x.dim(1)? != needed.len() || needed.is_empty() || part.frames.is_empty() {
@@ -64,10 +65,10 @@ pub fn linear_part(x: &Tensor, part: &ResizedPart) -> Result<Tensor> {
         let (before, share) = part.place(i);
         (before - needed.start, (before - needed.start + 1).min(needed.len() - 1), share)
     });
-    mix(x, None, FrameMixture { n_in: needed.len(), of: of.collect() })
+    mix(x, None, FrameInterpolation { n_in: needed.len(), of: of.collect() })
 }
 
-/// `x` with its last two axes exchanged, [B, C, T] to [B, T, C], in memory too.
+/// Transposes the last two axes of `x` in memory, [B, C, T] to [B, T, C].
 pub fn transposed(x: &Tensor) -> Result<Tensor> {
     if !x.device().is_cpu() || x.rank() != 3 {
         return x.t()?.contiguous();
@@ -76,31 +77,32 @@ pub fn transposed(x: &Tensor) -> Result<Tensor> {
     x.contiguous()?.apply_op3(&none, &none, CustomOperator(TransposeOp))
 }
 
-fn mix(x: &Tensor, skip: Option<&Tensor>, mixture: FrameMixture) -> Result<Tensor> {
+fn mix(x: &Tensor, skip: Option<&Tensor>, interpolation: FrameInterpolation) -> Result<Tensor> {
     if !x.device().is_cpu() {
-        return fallback_mix(x, skip, &mixture);
+        return fallback_mix(x, skip, &interpolation);
     }
     let x = x.contiguous()?;
     let skip = skip.map(Tensor::contiguous).transpose()?;
     let none = Tensor::zeros(0, x.dtype(), x.device())?;
-    let op = MixOp { mixture, plus: skip.is_some() };
+    let op = MixOp { interpolation, plus: skip.is_some() };
     x.apply_op3(skip.as_ref().unwrap_or(&none), &none, CustomOperator(op))
 }
 
-/// [`mix`] with the framework's operators, on any device.
-fn fallback_mix(x: &Tensor, skip: Option<&Tensor>, mixture: &FrameMixture) -> Result<Tensor> {
+/// [`mix`] with candle's operators, on any device.
+fn fallback_mix(x: &Tensor, skip: Option<&Tensor>, interpolation: &FrameInterpolation) -> Result<Tensor> {
     let select = |of: Vec<u32>| x.contiguous()?.index_select(&Tensor::new(of, x.device())?, 1);
-    let frames = |which: fn(&(usize, usize, f64)) -> usize| mixture.of.iter().map(|of| which(of) as u32).collect();
+    let frames =
+        |which: fn(&(usize, usize, f64)) -> usize| interpolation.of.iter().map(|of| which(of) as u32).collect();
     let (a, b) = (select(frames(|of| of.0))?, select(frames(|of| of.1))?);
-    let share: Vec<f64> = mixture.of.iter().map(|of| of.2).collect();
+    let share: Vec<f64> = interpolation.of.iter().map(|of| of.2).collect();
     let share = Tensor::new(share, x.device())?.to_dtype(x.dtype())?.reshape((1, (), 1))?;
     let mixed = (&a + (b - &a)?.broadcast_mul(&share)?)?;
     skip.map_or(Ok(mixed.clone()), |skip| &mixed + skip)
 }
 
 struct MixOp {
-    mixture: FrameMixture,
-    /// The second operand is added.
+    interpolation: FrameInterpolation,
+    /// Whether the second operand is added.
     plus: bool,
 }
 
@@ -108,18 +110,18 @@ impl CpuOperator for MixOp {
     const NAME: &'static str = "frames as mixtures of two";
 
     fn forward<T: Scalar>(&self, [x, skip, _]: [Operand<T>; 3]) -> Result<(Vec<T>, Shape)> {
-        let (&[batch, n_in, n_channels], n_out) = (x.dims, self.mixture.n_out()) else {
+        let (&[batch, n_in, n_channels], n_out) = (x.dims, self.interpolation.n_out()) else {
             candle_core::bail!("frames [B, T, C] are resized, not {:?}", x.dims);
         };
-        if n_in != self.mixture.n_in || (self.plus && skip.dims != [batch, n_out, n_channels]) {
+        if n_in != self.interpolation.n_in || (self.plus && skip.dims != [batch, n_out, n_channels]) {
             candle_core::bail!("{:?} does not resize to {n_out} frames plus {:?}", x.dims, skip.dims);
         }
         let skip = self.plus.then_some(skip.values);
-        Ok((self.mixture.mix(x.values, skip, n_channels), Shape::from((batch, n_out, n_channels))))
+        Ok((self.interpolation.mix(x.values, skip, n_channels), Shape::from((batch, n_out, n_channels))))
     }
 
     fn backward<T: Scalar>(&self, [x, skip, _]: [Operand<T>; 3], _: &[T], grad: &[T]) -> Gradients<T> {
-        let of_x = x.tracked.then(|| self.mixture.gradient(grad, x.dims[2]));
+        let of_x = x.tracked.then(|| self.interpolation.gradient(grad, x.dims[2]));
         Ok([of_x, (self.plus && skip.tracked).then(|| grad.to_vec()), None])
     }
 }
@@ -144,11 +146,11 @@ impl CpuOperator for TransposeOp {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::gradcheck::{apart, pattern, worst};
+    use crate::ops::gradcheck::{max_difference, pattern, worst};
     use candle_core::Device;
 
     #[test]
-    fn gradients_are_right_also_where_the_input_is_used_again() -> Result<()> {
+    fn gradients_are_correct_even_if_the_input_is_used_twice() -> Result<()> {
         let x = pattern(&[2, 3, 5], 0.0)?;
         for n_out in [3, 5, 7, 11] {
             assert!(worst(std::slice::from_ref(&x), |v| linear(&v[0].sqr()?, n_out))? < 1e-7);
@@ -163,19 +165,19 @@ mod tests {
     }
 
     #[test]
-    fn the_frameworks_operators_give_the_same() -> Result<()> {
+    fn results_equal_those_of_candle() -> Result<()> {
         let (x, skip) = (pattern(&[2, 3, 5], 0.0)?, pattern(&[2, 7, 5], 1.0)?);
         let of = vec![(0, 1, 0.25), (1, 2, 0.5), (2, 2, 0.0), (0, 0, 0.0), (2, 1, 0.9), (1, 1, 0.3), (0, 2, 0.7)];
-        let mixture = FrameMixture { n_in: 3, of };
-        let own = |v: &[Tensor]| mix(&v[0], Some(&v[1]), mixture.clone());
-        let off = apart(&[x, skip], own, |v| fallback_mix(&v[0], Some(&v[1]), &mixture))?;
+        let interpolation = FrameInterpolation { n_in: 3, of };
+        let own = |v: &[Tensor]| mix(&v[0], Some(&v[1]), interpolation.clone());
+        let off = max_difference(&[x, skip], own, |v| fallback_mix(&v[0], Some(&v[1]), &interpolation))?;
         assert!(off < 1e-12, "{off:e}");
         assert!(twice_plus(&pattern(&[2, 3, 5], 0.0)?, &pattern(&[2, 5, 5], 0.0)?).is_err());
         Ok(())
     }
 
     #[test]
-    fn positions_are_tensorflows() -> Result<()> {
+    fn positions_equal_those_of_tensorflow() -> Result<()> {
         let x = transposed(&Tensor::new(&[[[0.0f64, 1.0, 2.0, 3.0]]], &Device::Cpu)?)?;
         let at = |n_out| linear(&x, n_out)?.flatten_all()?.to_vec1::<f64>();
         assert_eq!(at(8)?, [0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.0]);

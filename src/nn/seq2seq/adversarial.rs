@@ -1,4 +1,4 @@
-//! The discriminator of network C: whether a segment of poses is real, without sound or words.
+//! The discriminator of network C, which classifies a segment of poses as real without audio or words.
 
 use super::config::Config;
 use crate::ops::affine::Affine;
@@ -7,12 +7,12 @@ use crate::ops::conv1d::Conv1d;
 use crate::params::Params;
 use candle_core::{Module, Result, Tensor};
 
-/// Kernel of each convolution; both take every second frame.
+/// Kernels of the convolutions; both have stride 2.
 const KERNELS: [usize; 2] = [4, 3];
-/// Slope of the leaky ReLUs.
+/// Negative slope of the leaky ReLUs.
 const SLOPE: f64 = 0.2;
 
-/// `conv.0`, `norm.0`, `conv.1`, `norm.1`, then `linear.0` and `linear.1`.
+/// Tensors: `conv.0`, `norm.0`, `conv.1`, `norm.1`, then `linear.0` and `linear.1`.
 pub struct SegmentDiscriminator {
     blocks: Vec<(Conv1d, BatchNorm)>,
     hidden: Affine,
@@ -20,7 +20,7 @@ pub struct SegmentDiscriminator {
 }
 
 impl SegmentDiscriminator {
-    /// For segments of `config.predicted` poses.
+    /// Creates a discriminator for segments of `config.predicted` poses.
     pub fn new(params: &mut Params, config: &Config) -> Result<Self> {
         let (mut blocks, mut n_in, mut n_frames) = (Vec::new(), config.pose, config.predicted);
         for (i, (channels, kernel)) in config.score_channels.into_iter().zip(KERNELS).enumerate() {
@@ -39,7 +39,7 @@ impl SegmentDiscriminator {
         })
     }
 
-    /// Poses [B, predicted, pose] to logits [B, 1] that they are real.
+    /// Returns the logits [B, 1] that poses [B, predicted, pose] are real.
     pub fn forward(&self, poses: &Tensor, train: bool) -> Result<Tensor> {
         let mut x = poses.t()?.contiguous()?;
         for (conv, norm) in &self.blocks {

@@ -1,4 +1,4 @@
-//! Network D, the audio baseline: a denoising autoencoder of single poses, and an encoder from speech to its code
+//! Network D, the audio baseline: a denoising autoencoder of single poses, and an encoder from speech to its codes
 //! (Kucherenko et al. 2019, with the context encoder of network B).
 
 use super::config::{Config, Segment};
@@ -10,7 +10,8 @@ use crate::ops::dropout::dropout;
 use crate::params::Params;
 use candle_core::{Module, Result, Tensor, Var};
 
-/// Under `<name>`: `encoder.0`, `encoder.2`, `decoder.0`, `decoder.2`, a pose to its code and back, ReLU within, tanh behind.
+/// Autoencoder of a pose with ReLU after the hidden layers and tanh after code and output. Tensors under `<name>`:
+/// `encoder.0`, `encoder.2`, `decoder.0`, `decoder.2`.
 pub struct PoseAutoencoder {
     layers: [Affine; 4],
 }
@@ -29,23 +30,23 @@ impl PoseAutoencoder {
         })
     }
 
-    /// Codes [B, code] of poses [B, pose].
+    /// Encodes poses [B, pose] to codes [B, code].
     pub fn encode(&self, poses: &Tensor) -> Result<Tensor> {
         self.layers[1].forward(&self.layers[0].forward(poses)?)?.tanh()
     }
 
-    /// Poses of codes.
+    /// Decodes codes [B, code] to poses [B, pose].
     pub fn decode(&self, codes: &Tensor) -> Result<Tensor> {
         self.layers[3].forward(&self.layers[2].forward(codes)?)?.tanh()
     }
 
-    /// Poses that come back, from poses to which the caller has added noise.
+    /// Reconstructs poses, to which the caller has added noise.
     pub fn forward(&self, poses: &Tensor) -> Result<Tensor> {
         self.decode(&self.encode(poses)?)
     }
 }
 
-/// Under `<name>`: `audio_encoder` as in network B, dropout, and `linear` to the code.
+/// Encoder from audio to codes. Tensors under `<name>`: `audio_encoder` as in network B, and, after dropout, `linear`.
 pub struct SpeechEncoder {
     audio: ContextEncoder,
     linear: Affine,
@@ -61,16 +62,16 @@ impl SpeechEncoder {
         })
     }
 
-    /// Audio [B, T + context - 1, audio] to codes [B, T, code].
+    /// Encodes audio [B, T + context - 1, audio] to codes [B, T, code].
     pub fn forward(&self, audio: &Tensor, mode: &mut Mode) -> Result<Tensor> {
         let features = dropout(&self.audio.forward(audio, mode)?, self.config.dropout, mode)?;
         self.linear.forward(&features)?.reshape((audio.dim(0)?, (), self.config.code))
     }
 }
 
-/// Network D as a whole: speech to codes to poses. `autoencoder.`, `speech.`, and two tensors set before the training:
-/// `scale` [pose], by which poses are divided so that tanh reaches them, and `noise` [pose], the deviation of what is added
-/// to the divided poses.
+/// Network D: speech to codes to poses. Tensors: `autoencoder.`, `speech.`, and two that are set before the training:
+/// `scale` [pose], by which poses are divided so that they lie in the range of tanh, and `noise` [pose], the standard
+/// deviation of the noise that is added to the scaled poses.
 pub struct AudioBaseline {
     autoencoder: PoseAutoencoder,
     speech: SpeechEncoder,
@@ -80,7 +81,7 @@ pub struct AudioBaseline {
 }
 
 impl AudioBaseline {
-    /// Scales of 1, no noise.
+    /// Creates a network with scales of 1 and without noise.
     pub fn new(params: &mut Params, config: &Config) -> Result<Self> {
         Ok(Self {
             autoencoder: PoseAutoencoder::new(params, "autoencoder.", config)?,
@@ -91,23 +92,23 @@ impl AudioBaseline {
         })
     }
 
-    /// Sets the scales (above 0) and the deviations of the noise.
+    /// Sets the scales (above 0) and the standard deviations of the noise.
     pub fn set_scale(&self, scale: &Tensor, noise: &Tensor) -> Result<()> {
         self.scale.set(scale)?;
         self.noise.set(noise)
     }
 
-    /// Mean squared error of poses [B, T, pose] that come back from their codes, with `normal` [B, T, pose] of deviation 1
-    /// times the noise added before.
-    pub fn loss_of_poses(&self, poses: &Tensor, normal: &Tensor) -> Result<Tensor> {
+    /// Mean squared error of the reconstruction of scaled poses [B, T, pose], to which `normal` [B, T, pose] of unit
+    /// variance times the noise is added.
+    pub fn pose_loss(&self, poses: &Tensor, normal: &Tensor) -> Result<Tensor> {
         let poses = poses.broadcast_div(self.scale.as_tensor())?.flatten_to(1)?;
         let noise = normal.broadcast_mul(self.noise.as_tensor())?.flatten_to(1)?;
         (self.autoencoder.forward(&(&poses + noise)?)? - poses)?.sqr()?.mean_all()
     }
 
-    /// Mean squared error of the codes predicted from the audio, against those of the real poses [B, predicted, pose], through which
-    /// nothing is learnt.
-    pub fn loss_of_speech(&self, audio: &Tensor, poses: &Tensor, mode: &mut Mode) -> Result<Tensor> {
+    /// Mean squared error between the codes predicted from the audio and those of the real poses [B, predicted, pose],
+    /// which pass no gradient.
+    pub fn speech_loss(&self, audio: &Tensor, poses: &Tensor, mode: &mut Mode) -> Result<Tensor> {
         let poses = poses.broadcast_div(self.scale.as_tensor())?;
         let codes = self.autoencoder.encode(&poses.flatten_to(1)?)?.detach();
         let predicted = self.speech.forward(audio, mode)?;

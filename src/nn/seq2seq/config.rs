@@ -1,40 +1,41 @@
-//! Sizes of the networks, as the authors' code has them by default, and the batch they all read.
+//! Configuration of the networks, with the defaults of the authors' code, and their common input batch.
 
 use candle_core::{Result, Tensor};
 use serde::{Deserialize, Serialize};
 
-/// Sizes and shares of dropout. The default is the code's reading of each.
+/// Sizes and dropout rates. The defaults are those of the authors' code.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Config {
-    /// Numbers of a pose.
+    /// Number of values per pose.
     pub pose: usize,
-    /// Audio features of a frame.
+    /// Number of audio features per frame.
     pub audio: usize,
-    /// Audio frames around a pose, odd, its own in the middle.
+    /// Number of audio frames around a pose, odd; the pose's own frame is in the middle.
     pub context: usize,
-    /// Poses read before the first that is predicted, and poses predicted at once.
+    /// Number of poses before the first predicted one, and number of poses that are predicted at once.
     pub previous: usize,
     pub predicted: usize,
-    /// Numbers of every state but those of the words.
+    /// Size of every state except those of the words.
     pub hidden: usize,
-    /// Words of the training text, and numbers of a word.
+    /// Number of words of the vocabulary, and size of a word vector.
     pub vocabulary: usize,
     pub word: usize,
-    /// Numbers of a state of the words in one direction.
+    /// Size of a state of the words in one direction.
     pub word_hidden: usize,
-    /// Layers of the encoder of `words`; the published network has two, the adversarial one.
+    /// Number of layers of the encoder of `words`: two in the published network, one in the adversarial one.
     pub encoder_layers: usize,
-    /// Whether `words` hears a GRU over the audio around a frame instead of that frame alone.
+    /// Whether the encoder of `words` runs a GRU over the audio around a frame instead of using only that frame.
     pub hears_context: bool,
-    /// Share dropped between the layers of the encoder, behind its last, and behind each layer over the context.
+    /// Dropout rate between the layers of the encoder; below, the rate after its last layer and after each layer over
+    /// the context.
     pub dropout_between: f64,
     pub dropout: f64,
-    /// Share of state and contexts that `words` drops before the output.
+    /// Dropout rate of state and contexts before the output of `words`.
     pub dropout_read: f64,
-    /// Channels of the discriminator's convolutions, and numbers of the layer behind them.
+    /// Numbers of channels of the discriminator's convolutions, and size of the hidden layer after them.
     pub score_channels: [usize; 2],
     pub score_hidden: usize,
-    /// Numbers of the autoencoder's inner layers, and of the code of a pose.
+    /// Size of the autoencoder's hidden layers, and of the code of a pose.
     pub pose_hidden: usize,
     pub code: usize,
 }
@@ -65,12 +66,15 @@ impl Default for Config {
 }
 
 impl Config {
-    /// Audio frames of a segment: those of its poses and half a context on either side.
+    /// Number of audio frames of a segment: those of its poses and half a context on either side.
     pub fn audio_frames(&self) -> usize {
         self.predicted + self.context - 1
     }
 
-    /// Errors when the segment is not one of these sizes.
+    /// Checks the shapes of a segment.
+    ///
+    /// # Errors
+    /// The segment does not have these sizes, or the context is even.
     pub fn check(&self, segment: &Segment) -> Result<()> {
         let batch = segment.audio.dim(0)?;
         let expected = [batch, self.audio_frames(), self.audio];
@@ -86,19 +90,21 @@ impl Config {
     }
 }
 
-/// Inputs of a batch of segments.
+/// Input batch of segments.
 #[derive(Clone, Debug)]
 pub struct Segment {
-    /// Audio features [B, predicted + context - 1, audio]: those around the first predicted pose come first.
+    /// Audio features [B, predicted + context - 1, audio], starting with the context of the first predicted pose.
     pub audio: Tensor,
-    /// Poses before the first that is predicted, [B, previous, pose].
+    /// Poses before the first predicted one, [B, previous, pose].
     pub previous: Tensor,
-    /// Numbers of words in the vocabulary (u32), padded to one length that is at least 1: those of the segment [B, W] for
-    /// `words`, those around each predicted pose [B, predicted, W] for `contextual`; none for networks without words.
+    /// Word indices in the vocabulary (u32), padded to a common length of at least 1: those of the segment [B, W] for
+    /// `words`, those around each predicted pose [B, predicted, W] for `contextual`; `None` for networks without
+    /// words.
     pub words: Option<Tensor>,
 }
 
-/// Windows of `width` frames around each of the middle frames: [B, T + width - 1, C] to [B, T, width, C].
+/// Returns the windows of `width` frames around each frame with complete context: [B, T + width - 1, C] to [B, T,
+/// width, C].
 pub fn windows(audio: &Tensor, width: usize) -> Result<Tensor> {
     let n = (audio.dim(1)? + 1).saturating_sub(width);
     Tensor::stack(&(0..n).map(|t| audio.narrow(1, t, width)).collect::<Result<Vec<_>>>()?, 1)

@@ -1,4 +1,4 @@
-//! The decoder that all sequence-to-sequence networks share.
+//! The common decoder of all sequence-to-sequence networks.
 
 use super::config::{Config, Segment};
 use crate::Mode;
@@ -8,8 +8,8 @@ use crate::ops::recurrent::gru::{Gru, drop_mask};
 use crate::params::Params;
 use candle_core::{Module, Result, Tensor};
 
-/// Under `<name>.`: `init` from the encoder's last states to the first state, `gru`, `attention` (and `word_attention`)
-/// from encoder states to keys, `output` from state and contexts to a pose.
+/// Tensors under `<name>.`: `init` from the encoder's last states to the initial state, `gru`, `attention` (and
+/// `word_attention`) from encoder states to keys, `output` from state and contexts to a pose.
 pub struct Decoder {
     init: Affine,
     gru: Gru,
@@ -20,7 +20,8 @@ pub struct Decoder {
 }
 
 impl Decoder {
-    /// `n_encoded`: numbers of a state of each encoded sequence, the sound's first. `dropout`: of state and contexts.
+    /// Creates a decoder. `n_encoded` has the state size of each encoded sequence, the audio's first; `dropout` is the
+    /// rate for state and contexts.
     pub fn new(params: &mut Params, name: &str, config: &Config, n_encoded: &[usize], dropout: f64) -> Result<Self> {
         let (pose, hidden) = (config.pose, config.hidden);
         let kinds = ["attention", "word_attention"];
@@ -38,15 +39,21 @@ impl Decoder {
         })
     }
 
-    /// Poses [B, predicted, pose] after those of the segment. `encoded`: sequences [B, K, n]; the first is the sound, whose
-    /// forward state at its end and backward state at its beginning make the first state.
+    /// Predicts the poses [B, predicted, pose] that follow those of the segment. `encoded` has sequences [B, K, n];
+    /// the first is the audio, whose last forward state and first backward state give the initial state.
     pub fn forward(&self, segment: &Segment, encoded: &[Tensor], mode: &mut Mode) -> Result<Tensor> {
         self.decode(&segment.previous, &self.first_state(encoded)?, encoded, mode)
     }
 
-    /// Poses as those of `forward`, nothing dropped, and the state [B, hidden] that has read all of them but the last.
-    /// `state`: that of the segment before, which takes the place of the first state and of all previous poses but the last.
-    pub fn go_on(&self, segment: &Segment, encoded: &[Tensor], state: Option<&Tensor>) -> Result<(Tensor, Tensor)> {
+    /// Predicts poses as `forward` does, without dropout, and returns the state [B, hidden] after reading all of them
+    /// except the last. `state` is the state of the previous segment; it replaces the initial state and all previous
+    /// poses except the last.
+    pub fn continue_from(
+        &self,
+        segment: &Segment,
+        encoded: &[Tensor],
+        state: Option<&Tensor>,
+    ) -> Result<(Tensor, Tensor)> {
         let n_previous = segment.previous.dim(1)?;
         let last = segment.previous.narrow(1, n_previous - 1, 1)?.contiguous()?;
         let (previous, state) = match state {
@@ -83,22 +90,22 @@ mod tests {
     use crate::ops::gradcheck::pattern;
 
     #[test]
-    fn a_carried_state_is_that_of_all_poses_since_the_first_state() -> Result<()> {
+    fn a_carried_state_has_read_all_poses_since_the_initial_state() -> Result<()> {
         let config = Config { pose: 3, hidden: 4, previous: 5, predicted: 6, ..Config::default() };
         let decoder = Decoder::new(&mut Params::with_dtype(1, candle_core::DType::F64), "decoder", &config, &[8], 0.0)?;
         let encoded = [pattern(&[2, 6, 8], 0.0)?];
         let segment = |previous: Tensor| Segment { audio: encoded[0].clone(), previous, words: None };
         let first = segment(pattern(&[2, 5, 3], 1.0)?);
-        let (made, state) = decoder.go_on(&first, &encoded, None)?;
-        let apart = |a: &Tensor, b: &Tensor| (a - b)?.abs()?.max_all()?.to_scalar::<f64>();
-        assert!(apart(&made, &decoder.forward(&first, &encoded, &mut Mode::Eval)?)? < 1e-12);
-        let (carried, _) = decoder.go_on(&segment(made.narrow(1, 1, 5)?), &encoded, Some(&state))?;
-        // The first pose is read twice, as the last pose before any segment is.
-        let read = Tensor::cat(&[&first.previous, &first.previous.narrow(1, 4, 1)?, &made], 1)?;
-        let whole = decoder.decode(&read, &decoder.first_state(&encoded)?, &encoded, &mut Mode::Eval)?;
-        assert!(apart(&carried, &whole)? < 1e-12);
-        let renewed = decoder.forward(&segment(made.narrow(1, 1, 5)?), &encoded, &mut Mode::Eval)?;
-        assert!(apart(&carried, &renewed)? > 1e-6);
+        let (poses, state) = decoder.continue_from(&first, &encoded, None)?;
+        let max_difference = |a: &Tensor, b: &Tensor| (a - b)?.abs()?.max_all()?.to_scalar::<f64>();
+        assert!(max_difference(&poses, &decoder.forward(&first, &encoded, &mut Mode::Eval)?)? < 1e-12);
+        let (carried, _) = decoder.continue_from(&segment(poses.narrow(1, 1, 5)?), &encoded, Some(&state))?;
+        // The first pose is read twice, as is the last pose before any segment.
+        let read = Tensor::cat(&[&first.previous, &first.previous.narrow(1, 4, 1)?, &poses], 1)?;
+        let all = decoder.decode(&read, &decoder.first_state(&encoded)?, &encoded, &mut Mode::Eval)?;
+        assert!(max_difference(&carried, &all)? < 1e-12);
+        let renewed = decoder.forward(&segment(poses.narrow(1, 1, 5)?), &encoded, &mut Mode::Eval)?;
+        assert!(max_difference(&carried, &renewed)? > 1e-6);
         Ok(())
     }
 }

@@ -1,4 +1,4 @@
-//! Encoders of the sequence-to-sequence networks: audio frame by frame, audio with its context around each pose, words.
+//! Encoders of the sequence-to-sequence networks: audio per frame, audio with its context around each pose, words.
 
 use super::config::{Config, windows};
 use crate::Mode;
@@ -8,9 +8,9 @@ use crate::ops::recurrent::gru::{Gru, drop_mask};
 use crate::params::{Init, Params};
 use candle_core::{Module, Result, Tensor};
 
-/// Encoder of audio frame by frame: two layers, then a GRU of one or two layers in both directions. Under `<name>.`:
-/// `context` (a GRU over the audio around a frame, where asked for), `linear.0` and `linear.2` with
-/// ReLUs, and `gru`, its layers numbered.
+/// Encoder of audio per frame: two layers, then a bidirectional GRU of one or more layers. Tensors under `<name>.`:
+/// `context` (a GRU over the audio around a frame, if configured), `linear.0` and `linear.2`, each followed by a ReLU,
+/// and `gru` with numbered layers.
 pub struct FrameEncoder {
     context: Option<Gru>,
     layers: [Affine; 2],
@@ -38,7 +38,7 @@ impl FrameEncoder {
         })
     }
 
-    /// Audio [B, T + context - 1, audio] to states [B, T, 2 hidden].
+    /// Encodes audio [B, T + context - 1, audio] to states [B, T, 2 hidden].
     pub fn forward(&self, audio: &Tensor, mode: &mut Mode) -> Result<Tensor> {
         let (batch, n_frames, n) = audio.dims3()?;
         let around = self.config.context - 1;
@@ -65,8 +65,9 @@ const EPS: f64 = 1e-5;
 const MOMENTUM: f64 = 0.1;
 
 /// Encoder of the audio around each pose: three layers over the frames of its context, normalised per position in the
-/// context, a GRU over them, and its last output, normalised. Under `<name>.`: `linear.0` to `.2`, `norm.0` to `.2` with a channel a place of the context (statistics over batch and
-/// features), `gru`, and `norm.3` over the GRU's numbers.
+/// context, a GRU over them, and its last output, normalised. Tensors under `<name>.`: `linear.0` to `.2`; `norm.0` to
+/// `.2`, with one channel per position in the context (statistics over batch and features); `gru`; and `norm.3` over
+/// the GRU's state.
 pub struct ContextEncoder {
     layers: Vec<(Affine, BatchNorm)>,
     gru: Gru,
@@ -92,7 +93,7 @@ impl ContextEncoder {
         })
     }
 
-    /// Audio [B, T + context - 1, audio] to what is heard around each of T frames, [B * T, hidden].
+    /// Encodes the audio [B, T + context - 1, audio] around each of T frames to [B * T, hidden].
     pub fn forward(&self, audio: &Tensor, mode: &mut Mode) -> Result<Tensor> {
         let (batch, n_frames, n) = audio.dims3()?;
         let n_windows = batch * (n_frames + 1 - self.width);
@@ -105,27 +106,29 @@ impl ContextEncoder {
     }
 }
 
-/// Encoder of words as vectors that are trained with the network: `<name>.embedding.weight` [vocabulary, word], initial values of variance 1, and the GRU `<name>.gru` in both directions.
+/// Encoder of words with trained word vectors. Tensors: `<name>.embedding.weight` [vocabulary, word] with initial
+/// values of variance 1, and the bidirectional GRU `<name>.gru`.
 pub struct WordEncoder {
     table: Tensor,
     gru: Gru,
 }
 
 impl WordEncoder {
-    /// `n`: words of the vocabulary, numbers of a word, numbers of a state in one direction.
+    /// Creates an encoder; `n` has the number of words, the size of a word vector and the size of a state in one
+    /// direction.
     pub fn new(params: &mut Params, name: &str, n: [usize; 3]) -> Result<Self> {
         let [vocabulary, word, hidden] = n;
         let table = params.trainable(&table_name(name), &[vocabulary, word], Init::Uniform(3f64.sqrt()))?;
         Ok(Self { table, gru: Gru::new(params, &format!("{name}.gru"), [word, hidden], 0, true)? })
     }
 
-    /// States [B, W, 2 hidden] of words [B, W].
+    /// Returns the states [B, W, 2 hidden] of words [B, W].
     pub fn states(&self, words: &Tensor) -> Result<Tensor> {
         self.gru.forward(&self.vectors(words)?, 0.0, &mut Mode::Eval)
     }
 
-    /// Output at the last word, [B, 2 hidden]: words before it reach the forward direction alone; padding is read as words
-    /// are.
+    /// Returns the output at the last word, [B, 2 hidden]. Earlier words affect only the forward direction; padding is
+    /// read like a word.
     pub fn last(&self, words: &Tensor) -> Result<Tensor> {
         self.gru.last(&self.vectors(words)?)
     }
@@ -137,12 +140,15 @@ impl WordEncoder {
     }
 }
 
-/// Name of the table of a word encoder.
+/// Name of the word vectors of a word encoder.
 fn table_name(encoder: &str) -> String {
     format!("{encoder}.embedding.weight")
 }
 
-/// Sets the word vectors [vocabulary, word] of the word encoder `name`. Errors when there is none, or of another shape.
+/// Sets the word vectors [vocabulary, word] of the word encoder `name`.
+///
+/// # Errors
+/// There is no such encoder, or its vectors have another shape.
 pub fn set_word_vectors(params: &Params, name: &str, vectors: &Tensor) -> Result<()> {
     let table = table_name(name);
     match params.trainables().find(|(own, _)| *own == table) {
@@ -157,7 +163,7 @@ mod tests {
     use candle_core::Device;
 
     #[test]
-    fn vectors_are_set_for_the_encoder_that_is_named_and_for_its_words_alone() -> Result<()> {
+    fn word_vectors_are_set_for_the_named_encoder_only() -> Result<()> {
         let mut params = Params::new(1);
         let encoder = WordEncoder::new(&mut params, "said", [3, 2, 4])?;
         let states = |word: u32| encoder.last(&Tensor::new(&[[word]], &Device::Cpu)?)?.flatten_all()?.to_vec1::<f32>();

@@ -1,5 +1,6 @@
-//! FineMotion's networks for GENEA 2020: speech and words to poses by sequence-to-sequence models that share a decoder
-//! (`networks`, with the discriminator of `adversarial`), and the denoising autoencoder they were compared with. A batch is a [`config::Segment`], a network a [`predict::GesturePredictor`].
+//! FineMotion's networks for GENEA 2020: sequence-to-sequence models from speech and words to poses with a common
+//! decoder (`networks`, with the discriminator of `adversarial`), and the denoising autoencoder that they were
+//! compared with. A batch is a [`config::Segment`], a network a [`predict::GesturePredictor`].
 
 pub mod adversarial;
 pub mod autoencoder;

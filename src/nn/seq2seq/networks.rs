@@ -1,4 +1,4 @@
-//! The networks with encoders and the shared decoder: `WordsSeq2Seq` (network A) and `ContextSeq2Seq` (network B).
+//! The networks with encoders and the common decoder: `WordsSeq2Seq` (network A) and `ContextSeq2Seq` (network B).
 
 use super::config::{Config, Segment};
 use super::decoder::Decoder;
@@ -10,11 +10,11 @@ use crate::ops::recurrent::gru::Gru;
 use crate::params::Params;
 use candle_core::{Module, Result, Tensor};
 
-/// A network of encoders and a decoder that attends to what they give.
+/// A network of encoders and a decoder that attends to the encoded sequences.
 trait EncodesAndDecodes: Send + Sync {
     fn parts(&self) -> (&Config, &Decoder);
 
-    /// Encoded sequences, the audio first.
+    /// Returns the encoded sequences, the audio first.
     fn encoded(&self, segment: &Segment, mode: &mut Mode) -> Result<Vec<Tensor>>;
 }
 
@@ -28,15 +28,15 @@ impl<N: EncodesAndDecodes> GesturePredictor for N {
         self.parts().1.forward(segment, &encoded, mode)
     }
 
-    fn go_on(&self, segment: &Segment, state: Option<&Tensor>) -> Result<(Tensor, Option<Tensor>)> {
+    fn continue_from(&self, segment: &Segment, state: Option<&Tensor>) -> Result<(Tensor, Option<Tensor>)> {
         let encoded = self.encoded(segment, &mut Mode::Eval)?;
-        let (poses, state) = self.parts().1.go_on(segment, &encoded, state)?;
+        let (poses, state) = self.parts().1.continue_from(segment, &encoded, state)?;
         Ok((poses, Some(state)))
     }
 }
 
-/// Network A: the audio of a segment frame by frame and its words, with attention over each. Without words and with one
-/// layer it is the generator of the adversarial network. Tensors: `encoder`, `word_encoder` where words are read, `decoder`.
+/// Network A: the audio of a segment per frame and its words, with attention over both. Without words and with one
+/// layer it is the generator of the adversarial network. Tensors: `encoder`, `word_encoder` (with words), `decoder`.
 pub struct WordsSeq2Seq {
     encoder: FrameEncoder,
     words: Option<WordEncoder>,
@@ -45,14 +45,14 @@ pub struct WordsSeq2Seq {
 }
 
 impl WordsSeq2Seq {
-    /// The published network: two attentions.
+    /// Creates the published network, with two attentions.
     pub fn new(params: &mut Params, config: &Config) -> Result<Self> {
         let n = [config.vocabulary, config.word, config.word_hidden];
         let words = WordEncoder::new(params, "word_encoder", n)?;
         Self::with(params, config, Some(words), &[2 * config.hidden, 2 * config.word_hidden])
     }
 
-    /// The network without words, for the adversarial training of `adversarial`; its encoder has one layer.
+    /// Creates the network without words, with one encoder layer, for the adversarial training of `adversarial`.
     pub fn without_words(params: &mut Params, config: &Config) -> Result<Self> {
         let config = Config { encoder_layers: 1, dropout_read: 0.0, ..config.clone() };
         Self::with(params, &config, None, &[2 * config.hidden])
@@ -73,7 +73,7 @@ impl EncodesAndDecodes for WordsSeq2Seq {
         (&self.config, &self.decoder)
     }
 
-    /// States of the sound, and of the words where they are read.
+    /// Returns the states of the audio, and of the words if the network reads them.
     fn encoded(&self, segment: &Segment, mode: &mut Mode) -> Result<Vec<Tensor>> {
         self.config.check(segment)?;
         let mut encoded = vec![self.encoder.forward(&segment.audio, mode)?];
@@ -88,8 +88,8 @@ impl EncodesAndDecodes for WordsSeq2Seq {
     }
 }
 
-/// Network B, which was submitted: audio and words around each frame, encoded over the frames of a segment. Tensors:
-/// `audio_encoder`, `word_encoder`, `linear` over both side by side, `gru` over the frames, `decoder`.
+/// Network B, the submitted one: audio and words around each frame, encoded over the frames of a segment. Tensors:
+/// `audio_encoder`, `word_encoder`, `linear` over the concatenation of both, `gru` over the frames, `decoder`.
 pub struct ContextSeq2Seq {
     audio: ContextEncoder,
     words: WordEncoder,
@@ -118,7 +118,7 @@ impl EncodesAndDecodes for ContextSeq2Seq {
         (&self.config, &self.decoder)
     }
 
-    /// States over the frames of the segment.
+    /// Returns the states over the frames of the segment.
     fn encoded(&self, segment: &Segment, mode: &mut Mode) -> Result<Vec<Tensor>> {
         self.config.check(segment)?;
         let Some(words) = &segment.words else { candle_core::bail!("this network reads the words around each pose") };
@@ -127,8 +127,8 @@ impl EncodesAndDecodes for ContextSeq2Seq {
             candle_core::bail!("words of {n_frames} frames for {} poses", self.config.predicted);
         }
         let audio = self.audio.forward(&segment.audio, mode)?;
-        let said = self.words.last(&words.reshape((batch * n_frames, n_words))?)?.relu()?;
-        let frames = self.linear.forward(&Tensor::cat(&[audio, said], 1)?)?;
+        let spoken = self.words.last(&words.reshape((batch * n_frames, n_words))?)?.relu()?;
+        let frames = self.linear.forward(&Tensor::cat(&[audio, spoken], 1)?)?;
         let frames = frames.reshape((batch, n_frames, self.config.hidden))?;
         Ok(vec![self.gru.forward(&frames, self.config.dropout, mode)?])
     }

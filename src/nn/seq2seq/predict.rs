@@ -1,4 +1,5 @@
-//! What all sequence-to-sequence networks can do: predict a segment of poses, and a whole sound segment after segment.
+//! Common interface of the sequence-to-sequence networks: prediction of one segment of poses, and of a complete sound
+//! segment by segment.
 
 use super::autoencoder::AudioBaseline;
 use super::config::{Config, Segment};
@@ -6,38 +7,45 @@ use crate::Mode;
 use candle_core::{Result, Tensor};
 use serde::Serialize;
 
-/// A network that goes on from poses with the speech that belongs to what follows.
+/// A network that predicts poses from previous poses and the speech that accompanies the predicted ones.
 pub trait GesturePredictor: Send + Sync {
     fn config(&self) -> &Config;
 
-    /// Poses [B, predicted, pose] of a batch of segments.
+    /// Predicts the poses [B, predicted, pose] of a batch of segments.
     fn forward(&self, segment: &Segment, mode: &mut Mode) -> Result<Tensor>;
 
-    /// Itself where it predicts codes of poses, which are learnt before the speech.
+    /// Returns the network itself if it is an [`AudioBaseline`], whose pose codes are trained before the speech
+    /// encoder.
     fn audio_baseline(&self) -> Option<&AudioBaseline> {
         None
     }
 
-    /// Poses of segments with nothing dropped, from the decoder's `state` behind the segments before where it is given, and
-    /// the state behind these. A network without a state, as is the default, neither reads nor gives one.
-    fn go_on(&self, segment: &Segment, _state: Option<&Tensor>) -> Result<(Tensor, Option<Tensor>)> {
+    /// Predicts the poses of segments without dropout, starting from the decoder's `state` after the previous segments
+    /// if given, and returns the state after these segments. The default is for networks without a state, which ignore
+    /// and return none.
+    fn continue_from(&self, segment: &Segment, _state: Option<&Tensor>) -> Result<(Tensor, Option<Tensor>)> {
         Ok((self.forward(segment, &mut Mode::Eval)?, None))
     }
 }
 
-/// State that a decoder begins a segment with, but for the first.
+/// Decoder state at the start of every segment except the first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum StateAtSeams {
-    /// Made of the encoder's, as before the first segment, and led over the last poses: as in the authors' code.
+    /// Computed from the encoder, as before the first segment, and updated with the previous poses: as in the authors'
+    /// code.
     #[default]
     Renewed,
-    /// That behind the segment before, as in the paper.
+    /// State after the previous segment, as in the paper.
     Carried,
 }
 
-/// Poses [1, n predicted, pose] of a sound of n segments, each begun with the last poses of the one before. `audio` [1,
-/// n predicted + context - 1, audio]; `start` [1, previous, pose]; `words` gives those of a segment by its number.
+/// Generates poses [1, n predicted, pose] for a sound of n segments; each segment starts from the last poses of the
+/// one before. Inputs: `audio` [1, n predicted + context - 1, audio] and `start` [1, previous, pose]; `words` returns
+/// the words of a segment by its index.
+///
+/// # Errors
+/// The sound is shorter than one segment.
 pub fn generate(
     network: &dyn GesturePredictor,
     audio: &Tensor,
@@ -52,17 +60,17 @@ pub fn generate(
     for i in 0..n {
         let audio = audio.narrow(1, i * config.predicted, config.audio_frames())?;
         let segment = Segment { audio, previous: previous.clone(), words: words(i)? };
-        let made = match seams {
+        let predicted = match seams {
             StateAtSeams::Renewed => network.forward(&segment, &mut Mode::Eval)?,
             StateAtSeams::Carried => {
-                let (made, behind) = network.go_on(&segment, state.as_ref())?;
-                state = behind;
-                made
+                let (predicted, state_after) = network.continue_from(&segment, state.as_ref())?;
+                state = state_after;
+                predicted
             }
         };
-        let both = Tensor::cat(&[&previous, &made], 1)?;
+        let both = Tensor::cat(&[&previous, &predicted], 1)?;
         previous = both.narrow(1, both.dim(1)? - config.previous, config.previous)?.contiguous()?;
-        poses.push(made);
+        poses.push(predicted);
     }
     if poses.is_empty() {
         candle_core::bail!("a sound of {} frames is shorter than one segment", audio.dim(1)?);
@@ -78,7 +86,7 @@ mod tests {
     use crate::seq2seq::networks::WordsSeq2Seq;
     use candle_core::Device;
 
-    /// Adds 1 to the last pose, step by step, 100 where its word is 1, and counts segments in its state.
+    /// Adds 1, or 100 if the segment's word is 1, to the last pose at every step, and counts segments in its state.
     struct Counting(Config);
 
     impl GesturePredictor for Counting {
@@ -95,10 +103,10 @@ mod tests {
             Tensor::from_vec(poses, (1, self.0.predicted, 1), &Device::Cpu)
         }
 
-        fn go_on(&self, segment: &Segment, state: Option<&Tensor>) -> Result<(Tensor, Option<Tensor>)> {
+        fn continue_from(&self, segment: &Segment, state: Option<&Tensor>) -> Result<(Tensor, Option<Tensor>)> {
             let state = state.map_or(0.0, |state| state.to_scalar::<f32>().unwrap_or(f32::NAN)) + 1.0;
-            let made = (self.forward(segment, &mut Mode::Eval)? + f64::from(1000.0 * state))?;
-            Ok((made, Some(Tensor::new(state, &Device::Cpu)?)))
+            let poses = (self.forward(segment, &mut Mode::Eval)? + f64::from(1000.0 * state))?;
+            Ok((poses, Some(Tensor::new(state, &Device::Cpu)?)))
         }
     }
 
@@ -111,12 +119,12 @@ mod tests {
     }
 
     #[test]
-    fn segments_go_on_from_the_last_poses_and_hear_their_words() -> Result<()> {
+    fn segments_continue_from_the_last_poses_with_their_words() -> Result<()> {
         let expected = [6.0, 7.0, 8.0, 108.0, 208.0, 308.0, 309.0, 310.0, 311.0];
         for previous in [1, 2, 3, 7] {
             assert_eq!(counted(9, previous, StateAtSeams::Renewed)?, expected);
         }
-        // Two frames are no segment more.
+        // Two remaining frames do not give another segment.
         assert_eq!(counted(8, 2, StateAtSeams::Renewed)?, expected[..6]);
         assert!(counted(2, 2, StateAtSeams::Renewed).is_err() && counted(0, 2, StateAtSeams::Carried).is_err());
         let carried = counted(6, 2, StateAtSeams::Carried)?;
@@ -125,17 +133,17 @@ mod tests {
     }
 
     #[test]
-    fn ways_over_a_seam_share_the_first_segment_alone() -> Result<()> {
+    fn state_at_seams_does_not_affect_the_first_segment() -> Result<()> {
         let sizes = Config { pose: 2, audio: 3, context: 5, previous: 3, predicted: 4, ..Config::default() };
         let config = Config { hidden: 6, vocabulary: 4, word: 3, word_hidden: 3, ..sizes };
         let network = WordsSeq2Seq::new(&mut Params::new(3), &config)?;
         let audio = pattern(&[1, 12 + 4, 3], 0.0)?.to_dtype(candle_core::DType::F32)?;
         let start = Tensor::zeros((1, 3, 2), candle_core::DType::F32, &Device::Cpu)?;
-        let made = |seams| {
+        let generated = |seams| {
             let words = |_| Tensor::new(&[[2u32, 0]], &Device::Cpu).map(Some);
             generate(&network, &audio, &start, seams, words)?.flatten_all()?.to_vec1::<f32>()
         };
-        let (renewed, carried) = (made(StateAtSeams::Renewed)?, made(StateAtSeams::Carried)?);
+        let (renewed, carried) = (generated(StateAtSeams::Renewed)?, generated(StateAtSeams::Carried)?);
         assert_eq!((renewed.len(), &renewed[..8]), (24, &carried[..8]));
         assert!(renewed[8..16] != carried[8..16] && carried.iter().all(|v| v.is_finite()));
         Ok(())

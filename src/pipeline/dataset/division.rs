@@ -194,7 +194,7 @@ impl Division {
             let message = "another video has the same sound in another split".to_owned();
             return Some(Refused::with_message(start_secs, end_secs, why, message));
         }
-        let why = FrameRefusal::new(Refusal::Guard, end_secs - start_secs, fps.secs(self.guard_frames));
+        let why = FrameRefusal::new(Refusal::SplitGap, end_secs - start_secs, fps.secs(self.guard_frames));
         Some(Refused::new(start_secs, end_secs, why))
     }
 }

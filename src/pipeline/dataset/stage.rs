@@ -252,7 +252,7 @@ impl Stage for DatasetStage {
         Ok(inputs)
     }
 
-    fn is_read_long(&self) -> bool {
+    fn needs_folder_lock(&self) -> bool {
         true
     }
 

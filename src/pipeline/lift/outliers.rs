@@ -77,7 +77,7 @@ pub fn open_refusals(raw: &Motion, intervals: &[Interval]) -> Vec<Option<FrameRe
     for t in intervals.iter().flat_map(|interval| interval.start..interval.end) {
         let joints = raw.joints.slice(s![t, .., 0]);
         let n_open = joints.iter().filter(|x| !x.is_finite()).count();
-        refusals[t] = (n_open > 0).then(|| FrameRefusal::new(Refusal::Open, n_open as f64, 0.0));
+        refusals[t] = (n_open > 0).then(|| FrameRefusal::new(Refusal::MissingJoints, n_open as f64, 0.0));
     }
     refusals
 }

@@ -98,7 +98,7 @@ mod tests {
         let same = exclude_frames(&intervals, &ledger, &refusals, 64).unwrap();
         assert_eq!(same, (intervals.clone(), ledger.clone()));
         refusals[150..160].fill(Some(FrameRefusal::new(Refusal::Bones, 0.75, 0.5)));
-        refusals[299] = Some(FrameRefusal::new(Refusal::Open, 3.0, 0.0));
+        refusals[299] = Some(FrameRefusal::new(Refusal::MissingJoints, 3.0, 0.0));
         let (left, reduced) = exclude_frames(&intervals, &ledger, &refusals, 64).unwrap();
         assert_eq!(left.intervals, [Interval { start: 0, end: 100 }, Interval { start: 160, end: 299 }]);
         assert!(reduced.is_whole());

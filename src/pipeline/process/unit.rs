@@ -58,7 +58,7 @@ fn answer(out: &Messages, work: impl FnOnce() -> Result<Message>) -> Result<()> 
     let watched = std::thread::Builder::new().spawn(end_with_parent);
     let work = || watched.context("cannot allocate memory for a thread").and_then(|_| work());
     let failed = |error| Message::Failed(SentFailure::of(&workdir::full_disk(error)));
-    out.send(&attempt::guarded(work).unwrap_or_else(failed))
+    out.send(&attempt::catch_panics(work).unwrap_or_else(failed))
 }
 
 /// Ends the process when the other end of standard input is gone.

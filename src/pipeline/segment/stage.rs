@@ -85,7 +85,7 @@ impl Stage for SegmentStage {
         let rule = if self.speech.is_some() { "vad" } else { "loudness" };
         report.facts.insert("speech".to_owned(), rule.into());
         report.facts.insert("sound_offset".to_owned(), serde_json::to_value(offset)?);
-        report.line.extend(offset.filter(SoundOffset::is_told).map(|offset| format!("; {offset}")));
+        report.line.extend(offset.filter(SoundOffset::is_reportable).map(|offset| format!("; {offset}")));
         report.line.extend(video.not_judged().map(|said| format!("; {said}")));
         Ok(report)
     }

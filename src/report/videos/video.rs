@@ -52,7 +52,7 @@ impl VideoSummary {
             }
         }
         if let Some(offset) = sound_offset_json::read(&Artifact::SoundOffset.path(work, unit)).ok().flatten()
-            && offset.is_told()
+            && offset.is_reportable()
         {
             video.note(&format!("By the lips, the {offset}."));
         }

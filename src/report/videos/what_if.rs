@@ -60,12 +60,12 @@ impl JudgedVideo<'_> {
 /// The frames of a lifted video's ledger that were left open.
 pub fn open_frames(ledger: &Ledger, video: &MediaInfo) -> Vec<Option<FrameRefusal>> {
     let mut open = vec![None; video.n_frames];
-    let is_open = |reason: &str, unit: &str| Refusal::find(reason, unit) == Some(Refusal::Open);
+    let is_open = |reason: &str, unit: &str| Refusal::find(reason, unit) == Some(Refusal::MissingJoints);
     for stretch in ledger.refused.iter().filter(|stretch| is_open(&stretch.reason, &stretch.unit)) {
         let frame = |secs: f64| ((secs * video.fps.per_sec()).round() as usize).min(video.n_frames);
         // The last frame may be cut off by the video's end.
         let end = if stretch.end_secs == video.duration_secs { video.n_frames } else { frame(stretch.end_secs) };
-        let why = FrameRefusal::new(Refusal::Open, stretch.measured, stretch.threshold);
+        let why = FrameRefusal::new(Refusal::MissingJoints, stretch.measured, stretch.threshold);
         open[frame(stretch.start_secs).min(end)..end].fill(Some(why));
     }
     open
@@ -113,7 +113,7 @@ mod tests {
         let max_bone_change = 0.4;
         let none = JudgedVideo { measures: &measures, video: &video, bone_change: &[], max_bone_change, open: &[] };
         assert!((none.kept_secs(&rules) - (19.99 - 1.0 / 15.0)).abs() < 1e-9);
-        let why = FrameRefusal::new(Refusal::Open, 3.0, 0.0);
+        let why = FrameRefusal::new(Refusal::MissingJoints, 3.0, 0.0);
         let refused = vec![Refused::new(12.0, 13.0, why), Refused::new(19.0, 19.99, why)];
         let open = open_frames(&Ledger { refused, ..Ledger::default() }, &video);
         assert_eq!((open.iter().flatten().count(), open[180].is_some(), open[195].is_some()), (30, true, false));

@@ -152,8 +152,8 @@ fn said(refusal: Refusal, value: f64) -> String {
     match refusal {
         Refusal::Quiet => format!("{value} dB here"),
         Refusal::NoSpeech => format!("share of speech {value} here"),
-        Refusal::OtherVoice => format!("mouth and voice correlate with {value} around here"),
-        Refusal::Still => format!("change of {value} steps here"),
+        Refusal::OffScreenSpeaker => format!("mouth and voice correlate with {value} around here"),
+        Refusal::Static => format!("change of {value} steps here"),
         Refusal::Small => format!("{value} px here"),
         Refusal::Turned => format!("{value} neck-nose distances here"),
         Refusal::NoseOff => format!("{value} half shoulder widths here"),

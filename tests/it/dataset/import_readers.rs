@@ -1,6 +1,6 @@
 //! Readers of captured motion: joints as the source has them, in house axes.
 
-use orator_base::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_SHOULDER, R_WRIST, authors_from_house};
+use orator_base::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_SHOULDER, R_WRIST, swap_authors_order};
 use orator_base::types::time::FrameRate;
 use orator_formats::authors_txt;
 use orator_formats::mocap::bvh;
@@ -126,7 +126,7 @@ fn the_authors_clips_are_permuted_and_nothing_else() {
         let numbers: Vec<f32> = line.split_whitespace().map(|v| v.parse().unwrap()).collect();
         for j in 0..N_JOINTS {
             for k in 0..3 {
-                assert_eq!(take.motion.joints[[t, j, k]], numbers[3 * authors_from_house(j) + k]);
+                assert_eq!(take.motion.joints[[t, j, k]], numbers[3 * swap_authors_order(j) + k]);
             }
         }
     }

@@ -1,7 +1,7 @@
 //! The runner with a toy stage whose units have parts: who has no unit helps, what is done is kept, what fails is told.
 
 use orator_base::stage::fingerprint::HashCache;
-use orator_base::stage::parts::folder_of_parts;
+use orator_base::stage::parts::parts_folder;
 use orator_base::stage::progress::{Progress, Silent};
 use orator_base::stage::runner::{StageOutcome, run, run_parts};
 use orator_base::stage::{Input, Report, Stage, Unit};
@@ -106,7 +106,7 @@ fn workers_without_units_help_and_every_part_is_done_once() {
     assert!(workers.len() > 2, "{workers:?}");
     // The unit with one part is worked on as a whole.
     assert_eq!(place.spelt(), "abcdefghijklmnopqr");
-    assert!(!folder_of_parts(&place.work().join("spell/host/long")).exists());
+    assert!(!parts_folder(&place.work().join("spell/host/long")).exists());
     assert_eq!(place.run(&units, 1), ["skipped abcdefghijklmno", "skipped x", "skipped pqr"]);
     assert_eq!(place.spelt(), "");
 }

@@ -1,51 +1,54 @@
-//! The body lifter's input: a window of frames centred on its neck, in one scale, beside what a longer stretch tells
-//! about the body. Training and lifting meet here, so that both show the network the same thing. The scale is the
-//! largest apparent bone of the stretch (a shoulder width would collapse where the speaker turns); the longest
-//! appearance of each kind of bone tells the body's proportions, and with them how far a bone points at the camera.
+//! Input of the body lifter: a window of frames centred on the neck, normalised to one scale, with body proportions
+//! measured over a longer range. Training and lifting both build it here, so that the network sees identical input.
+//! The scale is the largest apparent bone of the range (a shoulder width would collapse when the speaker turns); the
+//! largest apparent length of each bone type gives the proportions, and thereby how far a bone points at the camera.
 
 use crate::math::order::Ordered;
 use crate::math::vec3;
 use crate::motion::upper_body::{L_HIP, L_SHOULDER, MIRROR, N_POINTS, NOSE, Pose, R_HIP, R_SHOULDER, SeenBody};
 use crate::types::skeleton::BODY_BONES;
 
-/// Frames of the stretch before and after the middle one.
+/// Number of frames before and after the middle one over which the proportions are measured.
 const AROUND: isize = 40;
-/// A bone of an arm is no larger than this many times the second largest: a point that stays elsewhere for long does not
-/// stretch a body. Of rendered people 1 in 100 stretches have more than 1.28, 1 in 1,000 more than 1.53.
+/// Maximum length of a bone as a multiple of the second largest bone, so that a keypoint that is wrong for a long time
+/// does not change the scale. For rendered persons 1 in 100 ranges exceeds 1.28, 1 in 1,000 exceeds 1.53.
 const LARGEST_BY_SECOND: f32 = 1.4;
-/// Kinds of bone whose longest appearance goes in: shoulders, upper arm, forearm, neck to nose, neck to pelvis.
+/// Number of bone types with a maximum length in the input: shoulders, upper arm, forearm, neck to nose, neck to
+/// pelvis.
 const N_KINDS: usize = 5;
-/// Numbers a frame goes in with: x, y and whether it was seen, a point; then the kinds of bone, the same in all frames.
+/// Input channels per frame: x, y and visibility of each point, then the bone types, which are constant over the
+/// window.
 pub const N_IN: usize = 3 * N_POINTS + N_KINDS;
-/// Numbers a frame comes out with: x, y, z a point.
+/// Output channels per frame: x, y, z of each point.
 pub const N_OUT: usize = 3 * N_POINTS;
 
-/// A window as the network sees it.
+/// Input window of the network.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodyView {
-    /// [N_IN][window]: channel `3 * point + k` over time; k: x, y, seen (1) or held from the nearest frame (0).
+    /// [N_IN][window]: channel `3 * point + k` over time; k: x, y, visible (1) or copied from the nearest frame (0).
     pub numbers: Vec<f32>,
-    /// px that are 1 in `numbers`.
+    /// px per unit of `numbers`.
     pub scale: f32,
 }
 
 impl BodyView {
-    /// The view of frame `t`: `window` frames (an odd number), `step` apart, between two frames where that is no whole
-    /// number; before the first and after the last frame the body stands still. `None` when a shoulder is never seen
-    /// in the window, or everything is one spot.
+    /// Builds the input for frame `t`: `window` frames (an odd number), `step` frames apart, interpolated if that is
+    /// not an integer; the first and last frame are repeated beyond the ends. `None` if a shoulder is never visible in
+    /// the window or all points coincide.
     pub fn around(seen: &[SeenBody], t: usize, window: usize, step: f64) -> Option<Self> {
         let last = seen.len().checked_sub(1)? as f64;
-        let place = |d: isize| t as f64 + d as f64 * step;
+        let source_time = |d: isize| t as f64 + d as f64 * step;
         let half = window as isize / 2;
-        let frames: Vec<SeenBody> = (-half..=half).map(|d| at(seen, place(d).clamp(0.0, last))).collect();
-        let inside = |d: &isize| (0.0..=last).contains(&place(*d));
-        let reach = AROUND.max(half);
-        let stretch: Vec<SeenBody> = (-reach..=reach).filter(inside).map(|d| at(seen, place(d))).collect();
-        Self::from_frames(&frames, &longest(&stretch))
+        let frames: Vec<SeenBody> = (-half..=half).map(|d| at(seen, source_time(d).clamp(0.0, last))).collect();
+        let inside = |d: &isize| (0.0..=last).contains(&source_time(*d));
+        let half_range = AROUND.max(half);
+        let range: Vec<SeenBody> =
+            (-half_range..=half_range).filter(inside).map(|d| at(seen, source_time(d))).collect();
+        Self::from_frames(&frames, &longest(&range))
     }
 
-    /// The view of `frames` of a body whose bones appear at most so long. A point not seen is held from the nearest
-    /// frame that shows it, moving with the neck; one never seen lies on the neck.
+    /// Builds the input from `frames` and the largest apparent bone lengths. A point that is not visible is copied,
+    /// relative to the neck, from the nearest frame in which it is; one that is never visible is put on the neck.
     fn from_frames(frames: &[SeenBody], longest: &[f32; N_KINDS]) -> Option<Self> {
         let n = frames.len();
         let right = held(frames.iter().map(|f| f[R_SHOULDER]).collect())?;
@@ -75,7 +78,7 @@ impl BodyView {
         Some(Self { numbers, scale })
     }
 
-    /// Window in the mirror: what the network sees of a speaker whose left is their right.
+    /// Mirrors the window: the input for a speaker whose left and right are exchanged.
     pub fn mirrored(&self) -> Self {
         let n = self.n_frames();
         let mut numbers = Vec::with_capacity(self.numbers.len());
@@ -98,8 +101,8 @@ impl BodyView {
         [self.numbers[3 * point * n + n / 2], self.numbers[(3 * point + 1) * n + n / 2]]
     }
 
-    /// The middle frame's pose in px from the network's `output` (N_OUT numbers): x and y are what it adds to the
-    /// input, z is its own; the neck is put back between the shoulders.
+    /// Returns the middle frame's pose in px for the network's `output` (N_OUT numbers): x and y are residuals to the
+    /// input, z is absolute; the neck is moved back to the midpoint of the shoulders.
     pub fn pose(&self, output: &[f32]) -> Pose {
         let mut pose: Pose = std::array::from_fn(|j| {
             let [x, y] = self.middle(j);
@@ -111,7 +114,7 @@ impl BodyView {
     }
 }
 
-/// The mean of a window's output and that of the window in the mirror: left and right are lifted alike.
+/// Averages the output for a window with that for the mirrored window, so that left and right are treated equally.
 pub fn mirror_mean(output: &[f32], of_mirrored: &[f32]) -> Vec<f32> {
     let mut mean = Vec::with_capacity(N_OUT);
     for (j, other) in MIRROR.into_iter().enumerate() {
@@ -121,10 +124,11 @@ pub fn mirror_mean(output: &[f32], of_mirrored: &[f32]) -> Vec<f32> {
     mean
 }
 
-/// The points at a place between two frames: in proportion where both show a point, else as in the nearer one.
-fn at(seen: &[SeenBody], place: f64) -> SeenBody {
-    let (before, after) = (&seen[place.floor() as usize], &seen[place.ceil() as usize]);
-    let share = place.fract() as f32;
+/// Interpolates the points at `time` between two frames linearly; a point that is visible in only one of them is
+/// taken from the nearer frame.
+fn at(seen: &[SeenBody], time: f64) -> SeenBody {
+    let (before, after) = (&seen[time.floor() as usize], &seen[time.ceil() as usize]);
+    let share = time.fract() as f32;
     std::array::from_fn(|j| match (before[j], after[j]) {
         (Some(a), Some(b)) => Some([0, 1].map(|k| a[k] + share * (b[k] - a[k]))),
         (a, _) if share < 0.5 => a,
@@ -132,7 +136,7 @@ fn at(seen: &[SeenBody], place: f64) -> SeenBody {
     })
 }
 
-/// Each gap filled from the nearest frame that is there, the earlier of two; `None` when there is none.
+/// Fills each gap from the nearest frame with a value, the earlier of two; `None` if there is no value.
 fn held(mut track: Vec<Option<[f32; 2]>>) -> Option<Vec<[f32; 2]>> {
     let seen: Vec<usize> = (0..track.len()).filter(|&t| track[t].is_some()).collect();
     let mut next = 0;
@@ -147,8 +151,8 @@ fn held(mut track: Vec<Option<[f32; 2]>>) -> Option<Vec<[f32; 2]>> {
     track.into_iter().collect()
 }
 
-/// Largest apparent length of each kind of bone, in px: of each bone the tenth of the frames where it is largest is left
-/// out, so that one stray point does not stretch a body. 0: never seen.
+/// Largest apparent length of each bone type in px. The largest tenth of each bone's lengths is ignored, so that a
+/// single outlier does not change the scale. 0: never visible.
 fn longest(frames: &[SeenBody]) -> [f32; N_KINDS] {
     let apart = |a: Option<[f32; 2]>, b: Option<[f32; 2]>| Some((a?[0] - b?[0]).hypot(a?[1] - b?[1]));
     let middle = |a: Option<[f32; 2]>, b: Option<[f32; 2]>| Some([(a?[0] + b?[0]) / 2.0, (a?[1] + b?[1]) / 2.0]);
@@ -166,7 +170,7 @@ fn longest(frames: &[SeenBody]) -> [f32; N_KINDS] {
     ]
 }
 
-/// The value that a tenth of the values exceed; 0 of none.
+/// Returns the value that a tenth of the values exceed; 0 if there are none.
 fn large(lengths: impl Iterator<Item = f32>) -> f32 {
     Ordered::new(lengths).high_end(10).unwrap_or(0.0)
 }
@@ -189,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn a_view_forgets_place_and_size() {
+    fn the_view_is_independent_of_position_and_size() {
         let frames: Vec<SeenBody> = (0..WINDOW).map(|t| frame(t as f32)).collect();
         let twice: Vec<SeenBody> =
             frames.iter().map(|f| f.map(|p| p.map(|[x, y]| [2.0 * x + 7.0, 2.0 * y - 9.0]))).collect();
@@ -202,19 +206,19 @@ mod tests {
     }
 
     #[test]
-    fn the_mirror_swaps_the_sides_and_back() {
+    fn mirroring_swaps_the_sides() {
         let frames: Vec<SeenBody> = (0..WINDOW).map(|t| frame(3.0 * t as f32)).collect();
         let flipped: Vec<SeenBody> = frames.iter().map(|f| MIRROR.map(|j| f[j].map(|[x, y]| [900.0 - x, y]))).collect();
         let (a, b) = (middle_view(&frames).unwrap(), middle_view(&flipped).unwrap());
         assert!(a.mirrored().numbers.iter().zip(&b.numbers).all(|(x, y)| (x - y).abs() < 1e-5));
         let output: Vec<f32> = (0..N_OUT).map(|i| (i * i) as f32).collect();
-        let there: Vec<f32> =
+        let mirrored: Vec<f32> =
             MIRROR.iter().flat_map(|&j| [-output[3 * j], output[3 * j + 1], output[3 * j + 2]]).collect();
-        assert_eq!(mirror_mean(&output, &there), output);
+        assert_eq!(mirror_mean(&output, &mirrored), output);
     }
 
     #[test]
-    fn what_is_not_seen_is_held_beside_the_neck() {
+    fn hidden_points_move_with_the_neck() {
         let mut frames: Vec<SeenBody> = (0..WINDOW).map(|t| frame(10.0 * t as f32)).collect();
         for f in &mut frames[5..] {
             f[R_WRIST] = None;
@@ -232,14 +236,14 @@ mod tests {
     }
 
     #[test]
-    fn between_two_frames_points_lie_in_proportion() {
+    fn points_between_two_frames_are_interpolated() {
         let frames: Vec<SeenBody> = vec![[Some([0.0, 4.0]); 9], [Some([2.0, 8.0]); 9], [None; 9]];
         assert_eq!(at(&frames, 0.25)[0], Some([0.5, 5.0]));
         assert_eq!((at(&frames, 1.4)[0], at(&frames, 1.6)[0]), (Some([2.0, 8.0]), None));
     }
 
     #[test]
-    fn a_point_that_stays_elsewhere_does_not_stretch_the_body() {
+    fn a_displaced_point_does_not_change_the_scale() {
         let mut frames: Vec<SeenBody> = (0..71).map(|_| frame(0.0)).collect();
         frames[40..65].iter_mut().for_each(|f| f[L_WRIST] = Some([800.0, 310.0]));
         let scale = middle_view(&frames).unwrap().scale;
@@ -247,9 +251,9 @@ mod tests {
     }
 
     #[test]
-    fn a_longer_stretch_tells_the_proportions() {
+    fn proportions_are_measured_over_a_longer_range() {
         let mut frames: Vec<SeenBody> = (0..71).map(|_| frame(0.0)).collect();
-        // the left forearm is stretched for a while, outside the window of the middle frame
+        // The left forearm is stretched for a while, outside the window of the middle frame.
         frames[55..67].iter_mut().for_each(|f| f[L_WRIST] = Some([355.0, 380.0]));
         frames[20][L_WRIST] = Some([3550.0, 380.0]);
         let view = middle_view(&frames).unwrap();

@@ -1,6 +1,7 @@
-//! Names of attempts: hidden, beside their target, with the extension that writers choose their format by, and no two
-//! alike (`.NAME.attempt-PROCESS-START-MACHINE-NUMBER.EXT`), so that programs that write the same file never share an
-//! attempt. What a killed program left is removed by the next attempt at the same target, and by the next run (`sweep_folder`).
+//! Names of attempts: hidden, beside their target, with the target's extension (by which writers choose a format), and
+//! unique (`.NAME.attempt-PROCESS-START-MACHINE-NUMBER.EXT`), so that programs that write the same file never share an
+//! attempt. What a killed program left is removed by the next attempt at that target, and by the next run
+//! (`sweep_folder`).
 
 use super::file::parent;
 use super::process::{is_alive, machine, started};
@@ -11,18 +12,18 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, SystemTime};
 
-/// An attempt of an unknown process that changed within this time may belong to a program on another machine, whose clock
-/// may differ by hours.
+/// Age below which an attempt of an unknown process may still be in progress: the process may run on another machine,
+/// whose clock may differ by hours.
 const RECENT: Duration = Duration::from_secs(24 * 60 * 60);
 
-/// Makes an attempt beside `target` by `create`, which must fail where something is, a link too.
+/// Creates an attempt beside `target` with `create`, which must fail if anything exists at the path, including a link.
 pub(crate) fn begin(target: &Path, create: impl Fn(&Path) -> Result<()>) -> Result<PathBuf> {
     static NEXT: AtomicU64 = AtomicU64::new(1);
     sweep(target)?;
     let [start, end] = name_parts(target);
     loop {
         let mut name = start.clone();
-        name.push(format!("-{}-{}", Maker::this().marks(), NEXT.fetch_add(1, Ordering::Relaxed)));
+        name.push(format!("-{}-{}", Owner::this().marks(), NEXT.fetch_add(1, Ordering::Relaxed)));
         name.push(&end);
         let path = target.with_file_name(name);
         match create(&path) {
@@ -32,49 +33,49 @@ pub(crate) fn begin(target: &Path, create: impl Fn(&Path) -> Result<()>) -> Resu
     }
 }
 
-/// Removes what killed programs left of their attempts at `target`. A folder is attempted under a lock and by one thread of
-/// a process at a time, so that one of this process, or of an unknown one, is left over.
+/// Removes what killed programs left of their attempts at `target`. A folder is attempted under a lock and by only one
+/// thread of a process at a time, so an attempt at a folder by this or by an unknown process is left over.
 pub(crate) fn sweep(target: &Path) -> Result<()> {
     let is_folder = |path: &Path| path.symlink_metadata().is_ok_and(|meta| meta.is_dir());
-    let this = Maker::this();
+    let this = Owner::this();
     let is_stale =
-        |path: &Path, maker: Option<&Maker>| match maker.filter(|maker| **maker != this).and_then(Maker::is_at_work) {
-            Some(is_at_work) => !is_at_work,
+        |path: &Path, owner: Option<&Owner>| match owner.filter(|owner| **owner != this).and_then(Owner::is_working) {
+            Some(is_working) => !is_working,
             None => is_folder(path) || is_old(path),
         };
-    let mut stale = attempts(target).into_iter().filter(|(path, maker)| is_stale(path, maker.as_ref()));
+    let mut stale = attempts(target).into_iter().filter(|(path, owner)| is_stale(path, owner.as_ref()));
     stale.try_for_each(|(path, _)| remove(&path))
 }
 
-/// Removes what killed programs left in `folder` and, `depth` levels deep, in its folders, whatever the targets: a target
-/// may never be attempted again. What cannot be removed is left to the next run.
+/// Removes what killed programs left in `folder` and, `depth` levels deep, in its subfolders, for every target,
+/// because a target may never be attempted again. What cannot be removed is left to the next run.
 pub fn sweep_folder(folder: &Path, depth: usize) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let (path, name) = (entry.path(), entry.file_name());
         let marks = name.to_str().filter(|name| name.starts_with('.')).and_then(|name| name.rsplit_once(".attempt-"));
-        match marks.and_then(|(_, marks)| Maker::parse(marks.split('.').next()?)) {
-            Some(maker) if !maker.is_at_work().unwrap_or_else(|| !is_old(&path)) => drop(remove(&path)),
+        match marks.and_then(|(_, marks)| Owner::parse(marks.split('.').next()?)) {
+            Some(owner) if !owner.is_working().unwrap_or_else(|| !is_old(&path)) => drop(remove(&path)),
             None if depth > 0 && entry.file_type().is_ok_and(|kind| kind.is_dir()) => sweep_folder(&path, depth - 1),
             _ => {}
         }
     }
 }
 
-/// Where the folder `target` stands while two renames put another in its place.
-pub(crate) fn moved_aside(target: &Path) -> PathBuf {
+/// Path of the folder `target` while two renames replace it.
+pub(crate) fn backup_path(target: &Path) -> PathBuf {
     let mut name = OsString::from(".");
     name.push(target.file_name().unwrap_or_default());
     name.push(".old");
     target.with_file_name(name)
 }
 
-/// What killed attempts left beside `target`, and those of programs at work.
+/// Lists what killed attempts left beside `target`, and the attempts of running programs.
 pub fn left_over(target: &Path) -> Vec<PathBuf> {
-    let old = Some(moved_aside(target)).filter(|old| old.symlink_metadata().is_ok());
+    let old = Some(backup_path(target)).filter(|old| old.symlink_metadata().is_ok());
     old.into_iter().chain(attempts(target).into_iter().map(|(path, _)| path)).collect()
 }
 
-/// Removes a file, a link or a folder; nothing there is no error.
+/// Removes a file, a link or a folder; a missing path is not an error.
 pub fn remove(path: &Path) -> Result<()> {
     let is_folder = path.symlink_metadata().is_ok_and(|meta| meta.is_dir());
     match if is_folder { fs::remove_dir_all(path) } else { fs::remove_file(path) } {
@@ -83,15 +84,15 @@ pub fn remove(path: &Path) -> Result<()> {
     }
 }
 
-/// The process that made an attempt, by the attempt's name.
+/// The process that created an attempt, as encoded in the attempt's name.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Maker {
+struct Owner {
     process: u32,
-    /// Its start, as a number may be given again, and its machine. `None`: written by an earlier version, or not known.
+    /// Start time, because process ids are reused, and machine. `None`: written by an earlier version, or unknown.
     origin: Option<(u64, String)>,
 }
 
-impl Maker {
+impl Owner {
     fn this() -> Self {
         let process = std::process::id();
         let origin = started(process).zip(Some(machine()).filter(|machine| !machine.is_empty()));
@@ -105,7 +106,7 @@ impl Maker {
         }
     }
 
-    /// Reads the marks and the number of an attempt.
+    /// Parses the process marks and the attempt number of a name.
     fn parse(text: &str) -> Option<Self> {
         let (marks, number) = text.rsplit_once('-')?;
         let _: u64 = number.parse().ok()?;
@@ -119,35 +120,36 @@ impl Maker {
         Some(Self { process, origin })
     }
 
-    /// Whether the process goes on with the attempt; `None`: it was on another machine, or may have been.
-    fn is_at_work(&self) -> Option<bool> {
+    /// Returns whether the process is still working on the attempt; `None`: it ran, or may have run, on another
+    /// machine.
+    fn is_working(&self) -> Option<bool> {
         match &self.origin {
             Some((start, on)) if on == machine() => {
                 Some(is_alive(self.process) && started(self.process).is_none_or(|now| now == *start))
             }
             Some(_) => None,
-            // One process made one attempt at a time, and a number may come again after a restart.
+            // Such a process made one attempt at a time, and its id may have been reused after a restart.
             None => Some(true).filter(|_| self.process != std::process::id() && is_alive(self.process)),
         }
     }
 }
 
-/// The attempts at `target`, sorted, with the processes in their names; the earliest versions wrote none.
-fn attempts(target: &Path) -> Vec<(PathBuf, Option<Maker>)> {
+/// Lists the attempts at `target`, sorted, with the process encoded in each name; the earliest versions encoded none.
+fn attempts(target: &Path) -> Vec<(PathBuf, Option<Owner>)> {
     let [start, end] = name_parts(target);
     let entries = fs::read_dir(parent(target)).into_iter().flatten().flatten();
     let parsed = |name: OsString| {
         let rest = name.as_encoded_bytes().strip_prefix(start.as_encoded_bytes())?;
         let rest = std::str::from_utf8(rest.strip_suffix(end.as_encoded_bytes())?).ok()?;
-        let maker = if rest.is_empty() { None } else { Some(Maker::parse(rest.strip_prefix('-')?)?) };
-        Some((target.with_file_name(name), maker))
+        let owner = if rest.is_empty() { None } else { Some(Owner::parse(rest.strip_prefix('-')?)?) };
+        Some((target.with_file_name(name), owner))
     };
     let mut found: Vec<_> = entries.filter_map(|entry| parsed(entry.file_name())).collect();
     found.sort();
     found
 }
 
-/// The name of an attempt before and after its numbers.
+/// Returns the parts of an attempt's name before and after its numbers.
 fn name_parts(target: &Path) -> [OsString; 2] {
     let (mut start, mut end) = (OsString::from("."), OsString::new());
     start.push(target.file_stem().unwrap_or_default());
@@ -159,7 +161,7 @@ fn name_parts(target: &Path) -> [OsString; 2] {
     [start, end]
 }
 
-/// Whether nothing changed there for long. A time in the future is not old.
+/// Returns whether `path` has not changed for at least `RECENT`. A modification time in the future is not old.
 fn is_old(path: &Path) -> bool {
     let changed = path.symlink_metadata().and_then(|meta| meta.modified());
     let age = changed.ok().and_then(|time| SystemTime::now().duration_since(time).ok());
@@ -175,7 +177,7 @@ mod tests {
         File::create_new(path).map(drop)
     }
 
-    /// The number of a process that has ended.
+    /// Returns the id of a process that has ended.
     fn ended_process() -> u32 {
         let mut child = std::process::Command::new("true").spawn().unwrap();
         child.wait().unwrap();
@@ -183,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn no_two_attempts_are_alike_and_those_of_the_dead_go() {
+    fn attempts_are_unique_and_those_of_ended_processes_are_removed() {
         let dir = tempfile::tempdir().unwrap();
         let target = dir.path().join("q.mp4");
         let dead = ended_process();
@@ -194,18 +196,18 @@ mod tests {
             let file = File::create(dir.path().join(name)).unwrap();
             file.set_modified(SystemTime::now() - 2 * RECENT).unwrap();
         }
-        let young = dir.path().join(format!(".q.attempt-{dead}-4.mp4"));
-        create(&young).unwrap();
+        let recent = dir.path().join(format!(".q.attempt-{dead}-4.mp4"));
+        create(&recent).unwrap();
         assert_eq!(left_over(&target).len(), 4);
         let (a, b) = (begin(&target, create).unwrap(), begin(&target, create).unwrap());
         assert!(a != b && a.extension() == target.extension());
         let mut left = left_over(&target);
         left.retain(|path| ![&a, &b].contains(&path));
-        // Process 1 is at work everywhere; the young one of an earlier version may be of another machine.
-        assert_eq!(left, [dir.path().join(".q.attempt-1-1.mp4"), young]);
+        // Process 1 runs on every machine; the recent attempt of an earlier version may be from another machine.
+        assert_eq!(left, [dir.path().join(".q.attempt-1-1.mp4"), recent]);
     }
 
-    /// Sets the time of change of a file or folder `secs` ahead of now.
+    /// Sets the modification time of a file or folder to `secs` from now.
     fn change(path: &Path, secs: i64) {
         let by = Duration::from_secs(secs.unsigned_abs());
         let time = if secs < 0 { SystemTime::now() - by } else { SystemTime::now() + by };
@@ -213,12 +215,12 @@ mod tests {
     }
 
     #[test]
-    fn attempts_of_the_dead_go_whatever_the_clocks_say_and_those_of_others_stay() {
+    fn attempts_of_ended_processes_are_removed_despite_clock_skew_and_others_stay() {
         let dir = tempfile::tempdir().unwrap();
         let (own, here) = (std::process::id(), machine());
         let (dead, start) = (ended_process(), started(own).unwrap());
         let old = -(RECENT.as_secs() as i64) - 1;
-        // Another process had the number of this one before.
+        // An earlier process had the same id as this one.
         let reused = format!("{own}-{}-{here}-1", start - 1);
         let elsewhere = format!("{own}-{start}-ffffffffffffffff");
         let cases = [
@@ -262,7 +264,7 @@ mod tests {
         let (target, victim) = (dir.path().join("a.json"), dir.path().join("victim"));
         fs::write(&victim, "precious").unwrap();
         for number in 0..200 {
-            let name = format!(".a.attempt-{}-{number}.json", Maker::this().marks());
+            let name = format!(".a.attempt-{}-{number}.json", Owner::this().marks());
             std::os::unix::fs::symlink(&victim, dir.path().join(name)).unwrap();
         }
         super::super::write_file(&target, b"new").unwrap();

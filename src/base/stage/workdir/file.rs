@@ -8,26 +8,26 @@ use std::io::{ErrorKind, Read, Write};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 
-/// The disk is full, or a quota is used up.
+/// Error: the disk is full, or a quota is exhausted.
 #[derive(Debug, thiserror::Error)]
 #[error(transparent)]
 pub struct NoSpace(anyhow::Error);
 
 impl NoSpace {
-    /// Wraps the error of the write that failed.
+    /// Wraps the error of the failed write.
     pub fn new(error: anyhow::Error) -> Self {
         Self(error)
     }
 }
 
-/// An error that comes of a full disk becomes `NoSpace` with the same text; any other stays.
+/// Converts an error caused by a full disk into `NoSpace` with the same text; returns any other error unchanged.
 pub fn full_disk(error: anyhow::Error) -> anyhow::Error {
     let is_full = |error: &std::io::Error| matches!(error.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded);
     let full = error.chain().filter_map(|cause| cause.downcast_ref()).any(is_full);
     if full { NoSpace(error).into() } else { error }
 }
 
-/// The folder that `path` lies in.
+/// Returns the folder that contains `path`.
 pub(crate) fn parent(path: &Path) -> PathBuf {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
@@ -35,7 +35,7 @@ pub(crate) fn parent(path: &Path) -> PathBuf {
     }
 }
 
-/// Bytes of the files in a folder and all folders beneath it, as far as they can be seen.
+/// Returns the total size in bytes of the files in a folder and its subfolders; unreadable entries count as 0.
 pub fn bytes_under(folder: &Path) -> u64 {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let bytes = |entry: fs::DirEntry| match entry.metadata() {
@@ -46,12 +46,12 @@ pub fn bytes_under(folder: &Path) -> u64 {
     entries.map(bytes).sum()
 }
 
-/// Waits until a file, or the list of a folder, is on the disk.
+/// Flushes a file, or the entries of a folder, to disk.
 pub(crate) fn flush(path: &Path) -> Result<()> {
     Ok(File::open(path)?.sync_all()?)
 }
 
-/// Waits until all of a folder is on the disk.
+/// Flushes a folder with all its contents to disk.
 pub(crate) fn flush_tree(folder: &Path) -> Result<()> {
     for entry in fs::read_dir(folder)? {
         let path = entry?.path();
@@ -60,8 +60,11 @@ pub(crate) fn flush_tree(folder: &Path) -> Result<()> {
     flush(folder)
 }
 
-/// The bytes of a file. Errors: those of `fs::read`; something else than a file, a named pipe too, for which nothing waits
-/// (`ErrorKind::InvalidInput`, of a folder `IsADirectory`).
+/// Reads a file completely. It never waits for a writer.
+///
+/// # Errors
+/// Those of `fs::read`; `path` is a folder (`ErrorKind::IsADirectory`) or another non-regular file, such as a named
+/// pipe (`ErrorKind::InvalidInput`).
 pub fn read_file(path: &Path) -> std::io::Result<Vec<u8>> {
     let mut file = OpenOptions::new().read(true).custom_flags(OFlags::NONBLOCK.bits() as i32).open(path)?;
     if !file.metadata()?.is_file() {
@@ -73,13 +76,19 @@ pub fn read_file(path: &Path) -> std::io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Writes `bytes` to `path` atomically; its folder is made if missing.
+/// Writes `bytes` to `path` atomically and creates its folder if missing.
+///
+/// # Errors
+/// Those of [`replace`].
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
     replace(path, |attempt| Ok(File::create(attempt)?.write_all(bytes)?))
 }
 
-/// Lets `write` make a file under an attempt name beside `path` (the same extension), then puts it in place. An empty
-/// file is there already. If `write` fails, the attempt is removed and what was at `path` stays.
+/// Calls `write` with the path of a new empty file beside `path`, with the same extension, and then renames it to
+/// `path`. Creates the folder of `path` if missing.
+///
+/// # Errors
+/// Those of `write`; a file operation fails (`NoSpace` if the disk is full). The file at `path` is then unchanged.
 pub fn replace(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
     let folder = parent(path);
     fs::create_dir_all(&folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
@@ -95,7 +104,10 @@ pub fn replace(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<(
     replaced().map_err(full_disk).with_context(|| format!("cannot write {}", path.display()))
 }
 
-/// Removes the file at `path`, if there is one, and flushes its folder.
+/// Removes the file at `path`, if it exists, and flushes its folder.
+///
+/// # Errors
+/// The file cannot be removed or the folder cannot be flushed.
 pub fn remove_file(path: &Path) -> Result<()> {
     match fs::remove_file(path) {
         Ok(()) => flush(&parent(path)),
@@ -105,8 +117,11 @@ pub fn remove_file(path: &Path) -> Result<()> {
     .with_context(|| format!("cannot remove {}", path.display()))
 }
 
-/// Moves finished files, named with `/` between folders, from the folder `attempt` into `folder`, beside what is there;
-/// `attempt` goes.
+/// Moves finished files, named relative to `attempt` with `/` as the separator, into `folder` beside existing files,
+/// and removes `attempt`.
+///
+/// # Errors
+/// A file cannot be moved (`NoSpace` if the disk is full); `attempt` cannot be removed.
 pub fn move_files<'f>(attempt: &Path, folder: &Path, files: impl Iterator<Item = &'f str>) -> Result<()> {
     for file in files {
         let (from, to) = (attempt.join(file), folder.join(file));
@@ -121,7 +136,7 @@ pub fn move_files<'f>(attempt: &Path, folder: &Path, files: impl Iterator<Item =
     fs::remove_dir_all(attempt).with_context(|| format!("cannot remove {}", attempt.display()))
 }
 
-/// Whether something is in the folder at `path`, or `path` is a file.
+/// Returns whether `path` is a folder with entries, or a file.
 pub fn has_files(path: &Path) -> bool {
     path.exists() && fs::read_dir(path).map_or(true, |mut entries| entries.next().is_some())
 }
@@ -131,7 +146,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_failed_write_leaves_what_was_there() {
+    fn a_failed_write_leaves_the_old_file() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("deep/a.json");
         write_file(&path, b"old").unwrap();
@@ -145,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn two_that_write_one_file_at_once_both_end_well() {
+    fn concurrent_writes_of_one_file_both_succeed() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.json");
         replace(&path, |outer| {
@@ -158,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn a_full_disk_is_found_beneath_any_context() {
+    fn full_disk_is_detected_under_any_context() {
         let io = std::io::Error::from(ErrorKind::StorageFull);
         let error = anyhow::Error::from(io).context("cannot write a");
         let text = format!("{error:#}");

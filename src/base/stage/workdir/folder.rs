@@ -1,4 +1,5 @@
-//! A whole folder in the place of another: one exchange of names, or two renames where the file system has none.
+//! Replacing a folder by another: an atomic exchange of names, or two renames where the file system does not support
+//! it.
 
 use super::attempt;
 use super::file::{flush, flush_tree, full_disk, parent};
@@ -9,10 +10,13 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Exchanges two folders; `false`: the file system cannot.
+/// Exchanges two folders; returns `false` if the file system does not support it.
 type Exchange<'a> = &'a dyn Fn(&Path, &Path) -> io::Result<bool>;
 
-/// Puts the finished folder `attempt` in the place of `target`, which may exist. Every file is flushed first.
+/// Replaces `target`, which may be missing, by the finished folder `attempt`, after flushing every file to disk.
+///
+/// # Errors
+/// A file operation fails (`NoSpace` if the disk is full).
 pub fn replace_folder(attempt: &Path, target: &Path) -> Result<()> {
     let moved = || -> Result<()> {
         flush_tree(attempt)?;
@@ -21,11 +25,14 @@ pub fn replace_folder(attempt: &Path, target: &Path) -> Result<()> {
     moved().map_err(full_disk).with_context(|| format!("cannot put {} in its place", target.display()))
 }
 
-/// Lets `write` fill an empty folder, then puts that in the place of `place`. If `write` fails, what was there stays.
-pub fn build_folder<T>(place: &Path, write: impl FnOnce(&Path) -> Result<T>) -> Result<T> {
-    let attempt = attempt_folder(place)?;
+/// Calls `write` with an empty folder to fill, which then replaces `target`.
+///
+/// # Errors
+/// Those of `write`; a file operation fails (`NoSpace` if the disk is full). `target` is then unchanged.
+pub fn build_folder<T>(target: &Path, write: impl FnOnce(&Path) -> Result<T>) -> Result<T> {
+    let attempt = attempt_folder(target)?;
     let written = write(&attempt).map_err(full_disk).and_then(|written| {
-        replace_folder(&attempt, place)?;
+        replace_folder(&attempt, target)?;
         Ok(written)
     });
     if written.is_err() {
@@ -34,43 +41,52 @@ pub fn build_folder<T>(place: &Path, write: impl FnOnce(&Path) -> Result<T>) -> 
     written
 }
 
-/// An empty folder beside `target` to work in. What killed attempts left there is removed, after a replacement that was
-/// killed halfway is taken back.
+/// Creates an empty working folder beside `target`. First undoes a replacement that was killed halfway, and removes
+/// what killed attempts left beside `target`.
+///
+/// # Errors
+/// A file operation fails (`NoSpace` if the disk is full).
 pub fn attempt_folder(target: &Path) -> Result<PathBuf> {
     restore_folder(target)?;
-    let made = || -> io::Result<PathBuf> {
+    let create = || -> io::Result<PathBuf> {
         fs::create_dir_all(parent(target))?;
         if target.symlink_metadata().is_ok() {
-            attempt::remove(&attempt::moved_aside(target))?;
+            attempt::remove(&attempt::backup_path(target))?;
         }
         attempt::begin(target, |path| fs::create_dir(path))
     };
-    made()
+    create()
         .map_err(|error| full_disk(error.into()))
         .with_context(|| format!("cannot write {}: no folder can be made beside it", target.display()))
 }
 
-/// Ends what killed programs began at `target`: the folder is put back where it stood aside, attempts are removed. For who
-/// has the folder, or the work folder, alone.
+/// Recovers from programs that were killed while replacing `target`: moves the folder back to its path and removes
+/// attempts. The caller must hold an exclusive lock on the folder or on the work folder.
+///
+/// # Errors
+/// A file operation fails.
 pub fn recover_folder(target: &Path) -> Result<()> {
     restore_folder(target)?;
     let remove = || -> io::Result<()> {
         if target.symlink_metadata().is_ok() {
-            attempt::remove(&attempt::moved_aside(target))?;
+            attempt::remove(&attempt::backup_path(target))?;
         }
         attempt::sweep(target)
     };
     remove().with_context(|| format!("cannot remove what a killed program left beside {}", target.display()))
 }
 
-/// Puts back what `replace_folder` had moved aside when it was killed between its two renames.
+/// Moves the folder back that `replace_folder` had renamed when it was killed between its two renames.
+///
+/// # Errors
+/// The folder cannot be renamed.
 pub fn restore_folder(target: &Path) -> Result<()> {
-    let old = attempt::moved_aside(target);
+    let old = attempt::backup_path(target);
     if target.symlink_metadata().is_ok() || !old.is_dir() {
         return Ok(());
     }
     match fs::rename(&old, target) {
-        // Another reader was faster.
+        // Another reader has restored it first.
         Err(_) if target.symlink_metadata().is_ok() => Ok(()),
         renamed => renamed.with_context(|| format!("cannot put {} back", target.display())),
     }
@@ -79,15 +95,15 @@ pub fn restore_folder(target: &Path) -> Result<()> {
 fn exchange(a: &Path, b: &Path) -> io::Result<bool> {
     match renameat_with(CWD, a, CWD, b, RenameFlags::EXCHANGE) {
         Ok(()) => Ok(true),
-        // File systems without it, kernels without it, containers that forbid it.
+        // File systems or kernels that do not support it, and containers that forbid it.
         Err(Errno::INVAL | Errno::NOSYS | Errno::OPNOTSUPP | Errno::PERM) => Ok(false),
         Err(error) => Err(error.into()),
     }
 }
 
-/// The renames of a replacement. `step` comes before each of them and before what follows; tests stop there.
+/// Replaces `target`. `step` is called before each file operation, so that tests can stop there.
 fn put(attempt: &Path, target: &Path, exchange: Exchange, step: &mut dyn FnMut() -> io::Result<()>) -> Result<()> {
-    let aside = attempt::moved_aside(target);
+    let backup = attempt::backup_path(target);
     step()?;
     let old = if target.symlink_metadata().is_err() {
         fs::rename(attempt, target)?;
@@ -95,15 +111,15 @@ fn put(attempt: &Path, target: &Path, exchange: Exchange, step: &mut dyn FnMut()
     } else if exchange(attempt, target)? {
         Some(attempt)
     } else {
-        // With the target in its place this is no only copy.
-        attempt::remove(&aside)?;
+        // `target` exists, so `backup` is not the only copy.
+        attempt::remove(&backup)?;
         step()?;
-        fs::rename(target, &aside)?;
+        fs::rename(target, &backup)?;
         if let Err(error) = step().and_then(|()| fs::rename(attempt, target)) {
-            fs::rename(&aside, target)?;
+            fs::rename(&backup, target)?;
             return Err(error.into());
         }
-        Some(&*aside)
+        Some(&*backup)
     };
     step()?;
     flush(&parent(target))?;
@@ -122,20 +138,20 @@ mod tests {
 
     const FILES: [&str; 3] = ["1", "2", "3"];
 
-    /// The folder `target` with three files that say `text`.
+    /// Writes three files with the content `text`.
     fn write(folder: &Path, text: &str) {
         FILES.iter().for_each(|file| fs::write(folder.join(file), text).unwrap());
     }
 
-    /// What all three files say.
+    /// Returns the content of the three files, which must be equal.
     fn read(folder: &Path) -> String {
         let texts = FILES.map(|file| fs::read_to_string(folder.join(file)).unwrap());
         assert!(texts[0] == texts[1] && texts[1] == texts[2], "{texts:?}");
         texts[0].clone()
     }
 
-    /// Replaces "old" by "new" and stops at a step, as a kill does (`dies`) or a disk that fails. Returns the folder, and
-    /// whether the step was reached.
+    /// Replaces "old" by "new" and stops at step `at`, by a kill (`dies`) or by a disk error. Returns the parent
+    /// folder, and whether the step was reached.
     fn stopped(at: usize, dies: bool, exchange: Exchange) -> (tempfile::TempDir, bool) {
         let dir = tempfile::tempdir().unwrap();
         let target = dir.path().join("host");
@@ -157,23 +173,23 @@ mod tests {
     }
 
     #[test]
-    fn a_replacement_stopped_at_any_step_leaves_the_old_or_the_new_whole() {
+    fn replacement_stopped_at_any_step_leaves_a_complete_folder() {
         let two_renames = |_: &Path, _: &Path| Ok(false);
         let ways: [(Exchange, usize); 2] = [(&exchange, 3), (&two_renames, 5)];
         for (way, n_steps) in ways {
             for dies in [false, true] {
-                let mut seen = Vec::new();
+                let mut contents = Vec::new();
                 for at in 0..n_steps {
                     let (dir, is_stopped) = stopped(at, dies, way);
                     assert!(is_stopped, "step {at} of {n_steps}");
                     let target = dir.path().join("host");
                     if dies {
-                        // What any start does first, a reader's and a writer's.
+                        // Readers and writers do this first.
                         restore_folder(&target).unwrap();
                     }
-                    seen.push(read(&target));
+                    contents.push(read(&target));
                     let attempt = attempt_folder(&target).unwrap();
-                    assert_eq!(read(&target), seen[at], "the only copy was removed");
+                    assert_eq!(read(&target), contents[at], "the only copy was removed");
                     write(&attempt, "newer");
                     replace_folder(&attempt, &target).unwrap();
                     assert_eq!(read(&target), "newer");
@@ -181,21 +197,21 @@ mod tests {
                     assert!(!target.join("of the old").exists());
                     assert!(target.symlink_metadata().unwrap().is_dir());
                 }
-                assert!(seen[0] == "old" && seen.last().unwrap() == "new", "{seen:?}");
+                assert!(contents[0] == "old" && contents.last().unwrap() == "new", "{contents:?}");
                 assert!(!stopped(n_steps, dies, way).1);
             }
         }
     }
 
     #[test]
-    fn an_attempt_takes_back_what_was_moved_aside() {
+    fn attempt_folder_restores_a_folder_from_its_backup() {
         let dir = tempfile::tempdir().unwrap();
         let target = dir.path().join("host.v2");
-        let aside = attempt::moved_aside(&target);
-        fs::create_dir(&aside).unwrap();
-        write(&aside, "old");
+        let backup = attempt::backup_path(&target);
+        fs::create_dir(&backup).unwrap();
+        write(&backup, "old");
         attempt_folder(&target).unwrap();
         assert_eq!(read(&target), "old");
-        assert!(!aside.exists());
+        assert!(!backup.exists());
     }
 }

@@ -1,6 +1,6 @@
-//! Locks that keep programs apart. `lock` is inside a folder that stays; a `FolderLock` is for a folder that is replaced
-//! or removed as a whole, so that its file lies beside it and goes with the last that holds it. No lock is waited for:
-//! who comes second is told who is at work. A lock goes with its process, however that ends.
+//! Locks between programs. `lock` uses a file inside a folder that stays; a `FolderLock` protects a folder that is
+//! replaced or removed as a whole, so its file lies beside the folder and is deleted with the last lock. No call waits
+//! for a lock: the error names the programs that hold it. The system releases a lock when its process ends.
 
 use super::file::parent;
 use super::folder::{recover_folder, restore_folder};
@@ -15,34 +15,37 @@ use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-/// Another program works in the folder.
+/// Error: another program is working in the folder.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{by} is at work in {}; wait for it to end", folder.display())]
 pub struct BusyFolder {
-    /// The folder with the lock.
+    /// The locked folder.
     pub folder: PathBuf,
-    /// Who has it: what the programs do, and their processes.
+    /// The programs that hold the lock: what they do, and their process ids.
     pub by: String,
 }
 
-/// A folder that others leave alone (`exclusive`), or only read (`shared`), until this is dropped.
+/// A lock on a folder, `exclusive` or `shared`, until this is dropped.
 #[derive(Debug)]
 pub struct FolderLock {
-    /// `None`: nothing can be written there, so that nobody replaces the folder either.
+    /// Locked file; `None`: its folder is not writable, so that no program can replace the locked folder.
     file: Option<File>,
-    /// The lock file, where it goes with the lock.
+    /// Path of the lock file, if it is deleted with the lock.
     path: Option<PathBuf>,
 }
 
 static PROGRAM: OnceLock<String> = OnceLock::new();
 
-/// Says what this program does, for others that find its locks; once.
+/// Sets the description of this program that other programs report when they find its locks; only the first call
+/// counts.
 pub fn announce(program: String) {
     PROGRAM.get_or_init(|| program);
 }
 
-/// One program at a time writes in `folder`, made if missing. Errors when another has it, or the folder cannot be
-/// written in.
+/// Locks `folder`, created if missing, for writing by this program only.
+///
+/// # Errors
+/// `BusyFolder`; the folder is not writable.
 pub fn lock(folder: &Path) -> Result<FolderLock> {
     let path = folder.join(".lock");
     fs::create_dir_all(folder).with_context(|| format!("cannot write in {}", folder.display()))?;
@@ -50,37 +53,44 @@ pub fn lock(folder: &Path) -> Result<FolderLock> {
     Ok(FolderLock { file: Some(file), path: None })
 }
 
-/// Several programs write in `folder`, made if missing, who share the work among themselves; none has it alone. Errors as
-/// those of `lock`.
-pub fn lock_with_others(folder: &Path) -> Result<FolderLock> {
+/// Locks `folder`, created if missing, for programs that write in it and share the work; excludes `lock`.
+///
+/// # Errors
+/// `BusyFolder`; the folder cannot be created.
+pub fn lock_shared(folder: &Path) -> Result<FolderLock> {
     let path = folder.join(".lock");
     fs::create_dir_all(folder).with_context(|| format!("cannot write in {}", folder.display()))?;
     Ok(FolderLock { file: take(folder, &path, false)?, path: None })
 }
 
 impl FolderLock {
-    /// Exclusive lock, for replacing, changing or removing the folder. Errors: `BusyFolder`; the lock file is a link.
+    /// Takes an exclusive lock, for replacing, changing or removing the folder.
+    ///
+    /// # Errors
+    /// `BusyFolder`; the lock file is a link.
     pub fn exclusive(folder: &Path) -> Result<Self> {
-        // Without a folder to lie in, there is no lock; making the folder itself fails for the same reason.
+        // Without a parent folder there is no lock; creating the folder itself then fails for the same reason.
         let _ = fs::create_dir_all(parent(folder));
         Self::beside(folder, true)
     }
 
-    /// Shared lock, for reading the folder and for writing files that are derived from it. Errors: `BusyFolder`; the
-    /// lock file is a link.
+    /// Takes a shared lock, for reading the folder and for writing files that are derived from it.
+    ///
+    /// # Errors
+    /// `BusyFolder`; the lock file is a link.
     pub fn shared(folder: &Path) -> Result<Self> {
         Self::beside(folder, false)
     }
 
-    /// Takes the lock, and puts the folder back where a killed program was replacing it.
+    /// Takes the lock, and restores the folder if a program was killed while replacing it.
     fn beside(folder: &Path, is_exclusive: bool) -> Result<Self> {
         let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-        // One lock file, whichever links lead to the folder.
-        let place = folder.canonicalize().or_else(|_| std::path::absolute(folder))?;
+        // Canonical, so that all links to the folder lead to one lock file.
+        let canonical = folder.canonicalize().or_else(|_| std::path::absolute(folder))?;
         let mut name = OsString::from(".");
-        name.push(place.file_name().unwrap_or_default());
+        name.push(canonical.file_name().unwrap_or_default());
         name.push(".lock");
-        let path = parent(&place).join(name);
+        let path = parent(&canonical).join(name);
         let lock = Self { file: take(folder, &path, is_exclusive)?, path: Some(path) };
         if is_exclusive {
             recover_folder(folder)?;
@@ -94,7 +104,8 @@ impl FolderLock {
 impl Drop for FolderLock {
     fn drop(&mut self) {
         if let (Some(file), Some(path)) = (&self.file, &self.path) {
-            // The last one takes the file away; whoever opened it meanwhile sees that and opens another.
+            // The last holder deletes the file; a program that has opened it meanwhile notices that and opens a new
+            // one.
             if file.unlock().is_ok() && file.try_lock().is_ok() && is_at(file, path) {
                 let _ = fs::remove_file(path);
             }
@@ -102,8 +113,11 @@ impl Drop for FolderLock {
     }
 }
 
-/// Whether locks keep programs apart in `folder`, which is there: a second handle is refused.
-pub fn are_kept_apart(folder: &Path) -> Result<bool> {
+/// Returns whether locks work in the existing folder `folder`: a second file handle must be refused.
+///
+/// # Errors
+/// The folder is not writable.
+pub fn locks_work(folder: &Path) -> Result<bool> {
     let probe = folder.join(format!(".lock-probe-{}", std::process::id()));
     let tried = || -> std::io::Result<bool> {
         let (first, second) = (open(&probe)?, open(&probe)?);
@@ -114,7 +128,7 @@ pub fn are_kept_apart(folder: &Path) -> Result<bool> {
     tried
 }
 
-/// Locks the file at `path`, made if missing, for work in `folder`; `None`: no file can be made there.
+/// Locks the file at `path`, created if missing, for work in `folder`; `None`: the file cannot be created.
 fn take(folder: &Path, path: &Path, is_exclusive: bool) -> Result<Option<File>> {
     loop {
         let mut file = match open(path) {
@@ -136,14 +150,14 @@ fn take(folder: &Path, path: &Path, is_exclusive: bool) -> Result<Option<File>> 
             Err(TryLockError::WouldBlock) => {
                 return Err(BusyFolder { folder: folder.to_owned(), by: holders(&file) }.into());
             }
-            // A file system without locks, as `are_kept_apart` says.
+            // The file system does not support locks; `locks_work` detects that.
             Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Unsupported => {}
             Err(TryLockError::Error(error)) if error.raw_os_error() == Some(Errno::NOLCK.raw_os_error()) => {}
             Err(TryLockError::Error(error)) => {
                 return Err(error).with_context(|| format!("cannot lock {}", path.display()));
             }
         }
-        // A name that cannot be left only makes the message to others poorer.
+        // If the name cannot be written, only the message to other programs is less exact.
         let program = PROGRAM.get().map_or("a program that uses orator", String::as_str);
         let _ = if is_exclusive { file.set_len(0) } else { Ok(()) };
         let _ = file.write_all(format!("{} {program}\n", std::process::id()).as_bytes());
@@ -151,8 +165,11 @@ fn take(folder: &Path, path: &Path, is_exclusive: bool) -> Result<Option<File>> 
     }
 }
 
-/// Opens a lock file, made if missing: never a link, never cut off. Only to be read, where it may not be written. Errors:
-/// `ErrorKind::InvalidInput` of a named pipe.
+/// Opens a lock file, created if missing: links are refused and the file is never truncated. Opened for reading only
+/// if it is not writable.
+///
+/// # Errors
+/// `ErrorKind::InvalidInput` for a named pipe.
 fn open(path: &Path) -> std::io::Result<File> {
     let flags = (OFlags::NOFOLLOW | OFlags::NONBLOCK).bits() as i32;
     let mut options = OpenOptions::new();
@@ -166,16 +183,16 @@ fn open(path: &Path) -> std::io::Result<File> {
     if file.metadata()?.is_file() { Ok(file) } else { Err(ErrorKind::InvalidInput.into()) }
 }
 
-/// Whether the open lock file is still the one at `path`.
+/// Returns whether the open lock file is still the one at `path`.
 fn is_at(file: &File, path: &Path) -> bool {
     let number = |meta: fs::Metadata| (meta.dev(), meta.ino());
     file.metadata().is_ok_and(|file| path.symlink_metadata().is_ok_and(|there| number(file) == number(there)))
 }
 
-/// Those that wrote their names into the lock file and are at work.
+/// Returns the running programs whose names are in the lock file.
 fn holders(file: &File) -> String {
     let mut text = String::new();
-    // What cannot be read names nobody.
+    // An unreadable file gives no names.
     let _ = file.take(1 << 16).read_to_string(&mut text);
     let line = |line: &str| {
         let (process, program) = line.split_once(' ')?;
@@ -193,13 +210,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn readers_share_and_a_writer_is_told_who_they_are() {
+    fn readers_share_a_lock_and_the_error_of_a_writer_names_them() {
         let dir = tempfile::tempdir().unwrap();
         let folder = dir.path().join("host");
         let (first, second) = (FolderLock::shared(&folder).unwrap(), FolderLock::shared(&folder).unwrap());
         let error = FolderLock::exclusive(&folder).unwrap_err();
-        let said = format!("(process {}) is at work in {}", std::process::id(), folder.display());
-        assert!(error.is::<BusyFolder>() && error.to_string().contains(&said), "{error}");
+        let expected = format!("(process {}) is at work in {}", std::process::id(), folder.display());
+        assert!(error.is::<BusyFolder>() && error.to_string().contains(&expected), "{error}");
         drop(first);
         assert!(FolderLock::exclusive(&folder).is_err());
         drop(second);
@@ -207,12 +224,12 @@ mod tests {
         let writer = FolderLock::exclusive(&folder).unwrap();
         assert!(FolderLock::shared(&folder).is_err());
         drop(writer);
-        assert!(are_kept_apart(dir.path()).unwrap());
+        assert!(locks_work(dir.path()).unwrap());
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
     }
 
     #[test]
-    fn a_lock_file_is_never_a_link_and_never_cut_off() {
+    fn lock_files_are_never_links_and_never_truncated() {
         let dir = tempfile::tempdir().unwrap();
         let (work, victim) = (dir.path().join("work"), dir.path().join("victim"));
         fs::write(&victim, "precious").unwrap();
@@ -244,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn who_reads_a_folder_that_was_being_replaced_finds_it() {
+    fn shared_lock_restores_a_folder_that_was_being_replaced() {
         let dir = tempfile::tempdir().unwrap();
         let folder = dir.path().join("host");
         fs::create_dir(dir.path().join(".host.old")).unwrap();

@@ -1,5 +1,6 @@
-//! Writing so that a kill at any moment leaves either the old or the new, whole: write an attempt beside the target,
-//! flush it to disk, rename. The only renames of the project are here, and the locks that keep programs apart.
+//! Crash-safe writing: a kill at any moment leaves either the complete old or the complete new files. An attempt is
+//! written beside the target, flushed to disk and renamed. All renames of the project are here, and the locks between
+//! programs.
 
 mod attempt;
 mod file;
@@ -10,5 +11,5 @@ mod process;
 pub use attempt::{left_over, remove, sweep_folder};
 pub use file::{NoSpace, bytes_under, full_disk, has_files, move_files, read_file, remove_file, replace, write_file};
 pub use folder::{attempt_folder, build_folder, recover_folder, replace_folder, restore_folder};
-pub use lock::{BusyFolder, FolderLock, announce, are_kept_apart, lock, lock_with_others};
+pub use lock::{BusyFolder, FolderLock, announce, lock, lock_shared, locks_work};
 pub use process::{is_alive, machine};

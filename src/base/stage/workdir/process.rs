@@ -1,24 +1,24 @@
-//! Processes as the system knows them: whether one runs, when it started, and on which machine.
+//! Information about processes from the system: whether one runs, when it started, and on which machine.
 
 use rustix::io::Errno;
 use rustix::process::{Pid, test_kill_process};
 use std::fs;
 use std::sync::OnceLock;
 
-/// Positions in `/proc/PID/stat` after the name.
+/// Field positions in `/proc/PID/stat`, counted after the process name.
 const STATE: usize = 0;
 const START: usize = 19;
 
-/// Whether a process of that number runs on this machine. A zombie does not: it has ended, and its parent has not asked
-/// how.
+/// Returns whether a process with this id runs on this machine. A zombie does not count: it has ended, and its parent
+/// has not collected its exit status.
 pub fn is_alive(process: u32) -> bool {
     let pid = i32::try_from(process).ok().and_then(Pid::from_raw);
     let is_there = pid.is_some_and(|pid| test_kill_process(pid) != Err(Errno::SRCH));
-    // Without /proc, or where it hides the process, that a signal could be sent is enough.
+    // Without /proc, or if it hides the process, it is enough that a signal can be sent.
     is_there && !stat(process, STATE).is_some_and(|state| ["Z", "X", "x"].contains(&&*state))
 }
 
-/// Start of a process in clock ticks since the start of the machine, which no change of the clock moves; `None`: not known.
+/// Returns the start time of a process in clock ticks since boot, which clock changes do not affect; `None`: unknown.
 pub(super) fn started(process: u32) -> Option<u64> {
     stat(process, START)?.parse().ok()
 }
@@ -26,18 +26,18 @@ pub(super) fn started(process: u32) -> Option<u64> {
 fn stat(process: u32, field: usize) -> Option<String> {
     let stat = fs::read(format!("/proc/{process}/stat")).ok()?;
     let stat = String::from_utf8_lossy(&stat);
-    // The name before is in parentheses and may contain anything.
+    // The process name, in parentheses, may contain any character.
     let (_, fields) = stat.rsplit_once(')')?;
     fields.split_whitespace().nth(field).map(str::to_owned)
 }
 
-/// Identifies this machine since its start, and this container on it: 16 hex digits; empty where the system does not
-/// tell.
+/// Identifies this boot of this machine, and the container: 16 hex digits; empty if the system does not provide a boot
+/// id.
 pub fn machine() -> &'static str {
     static MACHINE: OnceLock<String> = OnceLock::new();
     MACHINE.get_or_init(|| {
         let boot = fs::read_to_string("/proc/sys/kernel/random/boot_id").unwrap_or_default();
-        // Process numbers start again in a container.
+        // Each container has its own process ids.
         let processes = fs::read_link("/proc/self/ns/pid").unwrap_or_default();
         match boot.trim() {
             "" => String::new(),
@@ -58,7 +58,7 @@ mod tests {
         let process = child.id();
         assert!(is_alive(process) && is_alive(std::process::id()));
         child.kill().unwrap();
-        // Nobody has asked for its end yet.
+        // Its exit status has not been collected yet.
         let begun = Instant::now();
         while is_alive(process) {
             assert!(begun.elapsed() < Duration::from_secs(10), "a zombie counts as alive");

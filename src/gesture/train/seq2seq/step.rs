@@ -119,9 +119,9 @@ impl SequenceTrainer {
         let mut rng = resume::stream(!self.settings.seed, self.step);
         if let Some(baseline) = self.network.audio_baseline() {
             let total = if self.step < self.settings.autoencoder_steps {
-                baseline.loss_of_poses(&batch.real, &normal_like(&batch.real, &mut rng)?)?
+                baseline.pose_loss(&batch.real, &normal_like(&batch.real, &mut rng)?)?
             } else {
-                baseline.loss_of_speech(&batch.segment.audio, &batch.real, &mut Mode::Train(&mut rng))?
+                baseline.speech_loss(&batch.segment.audio, &batch.real, &mut Mode::Train(&mut rng))?
             };
             let gradient_norm = self.adam.step(&total.backward()?, rate)?;
             self.step += 1;

@@ -61,7 +61,7 @@ impl TrainingTask for HandLifterTask {
             }
         };
         x.copy_from_slice(&view.numbers);
-        y.copy_from_slice(&view.wanted(&drawn.truth));
+        y.copy_from_slice(&view.target(&drawn.truth));
     }
 
     fn forward(&self, x: &Tensor, mode: &mut Mode) -> candle_core::Result<Tensor> {

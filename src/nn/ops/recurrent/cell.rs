@@ -1,6 +1,6 @@
-//! One step of a GRU (Cho 2014, in PyTorch's form) for some rows of a batch, forward and backward. Inside, a state is
-//! filled up with zeros to whole vectors, and gates stand in the order candidate from the input, reset, update,
-//! candidate from the state: the first three come from the input, the last three from the state.
+//! One step of a GRU (Cho 2014, in PyTorch's form) for some rows of a batch, forward and backward. Internally a state
+//! is padded with zeros to complete vectors, and the gates have the order candidate from the input, reset, update,
+//! candidate from the state: the first three use the input, the last three the state.
 
 use crate::cpu::packed_matrix::{COLUMNS, PackedMatrix};
 use crate::cpu::tensor::{Matrix, Scalar, add_product};
@@ -9,17 +9,17 @@ use candle_core::Result;
 use std::any::Any;
 use std::sync::OnceLock;
 
-/// Rows of the largest piece of a batch.
+/// Maximum number of rows of a piece of a batch.
 const PIECE: usize = 64;
-/// Batches of fewer rows are one piece.
-const UNDIVIDED: usize = 8;
+/// Batches with fewer rows are one piece.
+const MIN_DIVIDED: usize = 8;
 
-/// Rows of each piece of a batch; the last piece may have fewer. They do not depend on the number of threads.
-pub fn rows_of_a_piece(batch: usize) -> usize {
-    if batch < UNDIVIDED { batch.max(1) } else { batch.div_ceil(batch.div_ceil(PIECE).next_multiple_of(2)) }
+/// Number of rows per piece of a batch, independent of the number of threads; the last piece may have fewer.
+pub fn piece_rows(batch: usize) -> usize {
+    if batch < MIN_DIVIDED { batch.max(1) } else { batch.div_ceil(batch.div_ceil(PIECE).next_multiple_of(2)) }
 }
 
-/// Numbers of the input and of the state.
+/// Sizes of the input and of the state.
 #[derive(Clone, Copy, Debug)]
 pub struct GruSizes {
     pub input: usize,
@@ -27,17 +27,18 @@ pub struct GruSizes {
 }
 
 impl GruSizes {
-    /// Length of a state with its zeros.
+    /// Length of a state including its padding.
     pub fn width(&self) -> usize {
         self.hidden.next_multiple_of(COLUMNS)
     }
 
-    /// Weights of the input [3 H, I] and of the state [3 H, H], both biases [3 H]; rows are reset, update, candidate.
+    /// Number of weights: those of the input [3 H, I] and of the state [3 H, H], and both biases [3 H]; the rows are
+    /// reset, update, candidate.
     pub fn n_weights(&self) -> usize {
         3 * self.hidden * (self.input + self.hidden + 2)
     }
 
-    /// Those four of as many numbers as [`Self::n_weights`].
+    /// Splits [`Self::n_weights`] values into these four tensors.
     fn parts<'a, T>(&self, weights: &'a [T]) -> [&'a [T]; 4] {
         let (of_input, rest) = weights.split_at(3 * self.hidden * self.input);
         let (of_state, rest) = rest.split_at(3 * self.hidden * self.hidden);
@@ -45,25 +46,25 @@ impl GruSizes {
         [of_input, of_state, input_bias, state_bias]
     }
 
-    /// The row of a weight for a column of the three gates of the input; none in the filling.
+    /// Row of an input weight for a column of the input's three gates; `None` in the padding.
     fn row_of_input(&self, column: usize) -> Option<usize> {
         let (gate, i) = (column / self.width(), column % self.width());
         (i < self.hidden).then_some([2, 0, 1][gate] * self.hidden + i)
     }
 
-    /// The row of a weight for a column of the three gates of the state.
+    /// Row of a state weight for a column of the state's three gates; `None` in the padding.
     fn row_of_state(&self, column: usize) -> Option<usize> {
         let (gate, i) = (column / self.width(), column % self.width());
         (i < self.hidden).then_some(gate * self.hidden + i)
     }
 }
 
-/// Weights as the forward pass reads them.
+/// Weights in the layout of the forward pass.
 pub struct ForwardCell<T> {
     sizes: GruSizes,
     of_input: PackedMatrix<T>,
     of_state: PackedMatrix<T>,
-    /// What the four sums begin with.
+    /// Initial values of the four sums.
     bias: Vec<T>,
 }
 
@@ -93,8 +94,8 @@ impl<T: Scalar> ForwardCell<T> {
         }
     }
 
-    /// A step of as many rows as `previous` has states: input rows every `stride` numbers; `gates` and `next` are
-    /// overwritten.
+    /// Computes one step for as many rows as `previous` has states. Input rows are `stride` values apart; `gates` and
+    /// `next` are overwritten.
     pub fn step(&self, x: &[T], stride: usize, previous: &[T], gates: &mut [T], next: &mut [T]) {
         let width = self.sizes.width();
         let n = previous.len() / width;
@@ -105,7 +106,7 @@ impl<T: Scalar> ForwardCell<T> {
     }
 }
 
-/// Weights as the backward pass reads them, and the gradients of those of one piece.
+/// Weights in the layout of the backward pass.
 pub struct BackwardCell<T> {
     sizes: GruSizes,
     to_input: PackedMatrix<T>,
@@ -127,26 +128,27 @@ impl<T: Scalar> BackwardCell<T> {
         }
     }
 
-    /// A step back: `grad`, the gradient of the next state, becomes that of the previous; `of_gates` is overwritten.
+    /// Backpropagates one step: `grad`, the gradient of the next state, is overwritten with that of the previous
+    /// state; `of_gates` is overwritten with that of the gates.
     pub fn step(&self, gates: &[T], previous: &[T], grad: &mut [T], of_gates: &mut [T]) {
         let width = self.sizes.width();
         gates_backward(gates, previous, grad, of_gates, width);
         self.to_state.multiply_add(grad.len() / width, &of_gates[width..], 4 * width, grad, width);
     }
 
-    /// Length of a row of the input's gradient with its zeros.
+    /// Length of a row of the input's gradient including its padding.
     pub fn input_width(&self) -> usize {
         self.to_input.width()
     }
 
-    /// Adds the gradient of the input, rows of [`Self::input_width`], from that of the gates.
+    /// Adds the gradient of the input to rows of [`Self::input_width`], from that of the gates.
     pub fn add_input_gradient(&self, of_gates: &[T], to: &mut [T]) {
         let (width, input_width) = (self.sizes.width(), self.input_width());
         self.to_input.multiply_add(to.len() / input_width, of_gates, 4 * width, to, input_width);
     }
 
     /// Adds the gradients of the weights to `to`, in their order, from all rows of a piece: gradients of the gates,
-    /// inputs (rows of `input` numbers) and previous states.
+    /// inputs (rows of `input` values) and previous states.
     pub fn add_weight_gradients(&self, of_gates: &[T], inputs: &[T], previous: &[T], to: &mut [T]) {
         let (s, width) = (self.sizes, self.sizes.width());
         let GruSizes { input, hidden } = s;
@@ -173,8 +175,8 @@ impl<T: Scalar> BackwardCell<T> {
     }
 }
 
-/// Adds the weight gradients of the pieces of a batch, in their order.
-pub fn sum_of_pieces<T: Scalar>(pieces: &[Vec<T>]) -> Vec<T> {
+/// Sums the weight gradients of the pieces of a batch, in order.
+pub fn sum_pieces<T: Scalar>(pieces: &[Vec<T>]) -> Vec<T> {
     let mut sum = pieces.first().cloned().unwrap_or_default();
     for piece in pieces.iter().skip(1) {
         sum.iter_mut().zip(piece).for_each(|(sum, value)| *sum += *value);
@@ -182,14 +184,14 @@ pub fn sum_of_pieces<T: Scalar>(pieces: &[Vec<T>]) -> Vec<T> {
     sum
 }
 
-/// Copies rows of `hidden` numbers into rows filled up with zeros.
+/// Copies rows of `hidden` values into rows padded with zeros.
 pub fn widen<T: Scalar>(rows: &[T], hidden: usize, to: &mut [T], width: usize) {
     for (from, to) in rows.chunks_exact(hidden).zip(to.chunks_exact_mut(width)) {
         to[..hidden].copy_from_slice(from);
     }
 }
 
-/// What the forward pass of an operator leaves for its backward pass: numbers by pieces of the batch, written once.
+/// Values that the forward pass of an operator saves for its backward pass, per piece of the batch; written once.
 #[derive(Default)]
 pub struct SavedPieces(OnceLock<Box<dyn Any + Send + Sync>>);
 
@@ -198,7 +200,10 @@ impl SavedPieces {
         let _ = self.0.set(Box::new(pieces));
     }
 
-    /// Errors when no forward pass has left anything.
+    /// Returns the saved values.
+    ///
+    /// # Errors
+    /// No forward pass has saved values.
     pub fn get<T: 'static>(&self) -> Result<&[Vec<T>]> {
         match self.0.get().and_then(|pieces| pieces.downcast_ref::<Vec<Vec<T>>>()) {
             Some(pieces) => Ok(pieces),

@@ -1,9 +1,9 @@
-//! A decoder that goes on from poses it is given: a GRU reads them, then takes its own last pose at every step, attends
-//! to encoded sequences by inner products (Luong 2015, "dot") and makes the next pose from state and contexts. The whole
-//! loop, with backpropagation through time, is one operator: twenty steps of small products would else be some hundred
-//! operators each way.
+//! A decoder that continues given poses: a GRU reads them, then its own last pose at every step, attends to encoded
+//! sequences by inner products (Luong 2015, "dot") and computes the next pose from state and contexts. The complete
+//! loop, with backpropagation through time, is one operator, because twenty steps of small products would otherwise be
+//! several hundred operators in each direction.
 
-use super::cell::{GruSizes, SavedPieces, rows_of_a_piece, sum_of_pieces};
+use super::cell::{GruSizes, SavedPieces, piece_rows, sum_pieces};
 use super::decoder_pass::{BackwardDecoder, DecoderSizes, ForwardDecoder};
 use crate::cpu::tensor::Scalar;
 use crate::cpu::thread_team::parallel_each;
@@ -11,26 +11,26 @@ use crate::cpu::vectorised::DropMask;
 use crate::ops::operator::{CpuOperator, CustomOperator, Gradients, Operand};
 use candle_core::{Result, Shape, Tensor};
 
-/// What a decoder starts from.
+/// Inputs of a decoder.
 pub struct DecoderInputs<'a> {
-    /// Poses [B, P, X] that are read before the first step; the last is read once more at the first step.
+    /// Poses [B, P, X] that are read before the first step; the last one is read again at the first step.
     pub previous: &'a Tensor,
-    /// State [B, H] before them.
+    /// State [B, H] before these poses.
     pub state: &'a Tensor,
-    /// Sequences [B, K, H] to attend to, each by itself; what is attended to is also what is read.
+    /// Sequences [B, K, H] with separate attention, used both as keys and as values.
     pub keys: &'a [Tensor],
 }
 
 /// Weights of a decoder.
 pub struct DecoderWeights<'a> {
-    /// Those of the GRU as one row of numbers.
+    /// Weights of the GRU as one flat tensor.
     pub gru: &'a Tensor,
-    /// [X, (1 + sequences) H] over state and contexts side by side, and bias [X].
+    /// [X, (1 + sequences) H] over the concatenation of state and contexts; below, the bias [X].
     pub weight: &'a Tensor,
     pub bias: &'a Tensor,
 }
 
-/// `n_steps` poses [B, N, X]. `mask`: dropout of state and contexts side by side, at every step.
+/// Computes `n_steps` poses [B, N, X]. `mask` is the dropout of state and contexts, concatenated, at every step.
 pub fn decode(
     inputs: &DecoderInputs,
     weights: &DecoderWeights,
@@ -46,7 +46,7 @@ pub fn decode(
     let all = Tensor::cat(&[weights.gru, &weights.weight.flatten_all()?, weights.bias], 0)?;
     let n_keys = inputs.keys.iter().map(|keys| keys.dim(1)).collect::<Result<Vec<_>>>()?;
     let cell = GruSizes { input: pose, hidden: inputs.state.dim(1)? };
-    let sizes = DecoderSizes { batch, n_previous, n_steps, cell, n_keys, piece: rows_of_a_piece(batch) };
+    let sizes = DecoderSizes { batch, n_previous, n_steps, cell, n_keys, piece: piece_rows(batch) };
     if weights.weight.dims() != [pose, sizes.n_read() * cell.hidden] {
         candle_core::bail!(
             "decoder: output weights {:?} for poses {:?}",
@@ -103,7 +103,7 @@ impl CpuOperator for DecoderOp {
         Ok([
             start.tracked.then_some(of_start),
             keys.tracked.then_some(of_keys),
-            weights.tracked.then(|| sum_of_pieces(&of_weights)),
+            weights.tracked.then(|| sum_pieces(&of_weights)),
         ])
     }
 }
@@ -111,12 +111,12 @@ impl CpuOperator for DecoderOp {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::gradcheck::{any_threads_give_the_same, apart, pattern, worst};
+    use crate::ops::gradcheck::{check_thread_independence, max_difference, pattern, worst};
     use crate::ops::recurrent::gru::{GruOptions, gru};
 
     const CELL: GruSizes = GruSizes { input: 3, hidden: 4 };
 
-    /// Previous poses, state, two sequences of keys, weights of GRU and output.
+    /// Previous poses, state, two sequences of keys, weights of the GRU and the output.
     fn shapes(batch: usize) -> [Vec<usize>; 7] {
         let (previous, state) = (vec![batch, 2, 3], vec![batch, 4]);
         [previous, state, vec![batch, 5, 4], vec![batch, 2, 4], vec![CELL.n_weights()], vec![3, 12], vec![3]]
@@ -150,10 +150,10 @@ mod tests {
     }
 
     #[test]
-    fn it_is_the_composed_decoder_and_gradients_are_right() -> Result<()> {
+    fn decoder_equals_the_composed_one_and_gradients_are_correct() -> Result<()> {
         for batch in [2, 9] {
             let inputs = inputs(batch)?;
-            let off = apart(&inputs, |v| own(v, None), composed)?;
+            let off = max_difference(&inputs, |v| own(v, None), composed)?;
             let error = worst(&inputs, |v| own(v, None))?;
             let dropped = worst(&inputs, |v| own(v, Some(DropMask::new(9, 0.5))))?;
             assert!(off < 1e-12 && error < 1e-7 && dropped < 1e-7, "{off:e} {error:e} {dropped:e}");
@@ -165,11 +165,11 @@ mod tests {
     fn any_number_of_threads_gives_the_same_bits() -> Result<()> {
         let shapes = shapes(150);
         let shapes: Vec<&[usize]> = shapes.iter().map(Vec::as_slice).collect();
-        any_threads_give_the_same(&shapes, 4, |v| own(v, Some(DropMask::new(3, 0.5))))
+        check_thread_independence(&shapes, 4, |v| own(v, Some(DropMask::new(3, 0.5))))
     }
 
     #[test]
-    fn what_does_not_fit_is_an_error() -> Result<()> {
+    fn mismatched_shapes_are_errors() -> Result<()> {
         let good = inputs(2)?;
         assert!(own(&good, None).is_ok());
         for (which, dim) in [(1, 0), (2, 2), (4, 0), (5, 1), (6, 0)] {

@@ -11,26 +11,26 @@ pub struct DecoderSizes {
     pub batch: usize,
     pub n_previous: usize,
     pub n_steps: usize,
-    /// Pose and state.
+    /// Sizes of pose and state.
     pub cell: GruSizes,
-    /// Keys of each sequence.
+    /// Number of keys of each sequence.
     pub n_keys: Vec<usize>,
-    /// Rows of a piece.
+    /// Number of rows per piece.
     pub piece: usize,
 }
 
 impl DecoderSizes {
-    /// States the output is made from: the decoder's own and a context a sequence.
+    /// Number of vectors that the output is computed from: the decoder's state and one context per sequence.
     pub fn n_read(&self) -> usize {
         1 + self.n_keys.len()
     }
 
-    /// Keys of all sequences.
+    /// Number of keys of all sequences.
     pub fn all_keys(&self) -> usize {
         self.n_keys.iter().sum()
     }
 
-    /// Numbers of a row of the starts: previous poses and state.
+    /// Length of a row of the starts: previous poses and state.
     pub fn start_len(&self) -> usize {
         self.n_previous * self.cell.input + self.cell.hidden
     }
@@ -39,7 +39,10 @@ impl DecoderSizes {
         self.cell.n_weights() + self.cell.input * (self.n_read() * self.cell.hidden + 1)
     }
 
-    /// Errors when starts, keys and weights are not of these sizes.
+    /// Checks the shapes of starts, keys and weights.
+    ///
+    /// # Errors
+    /// They do not have these sizes.
     pub fn check(&self, start: &[usize], keys: &[usize], n_weights: usize) -> Result<()> {
         let fits = start == [self.batch, self.start_len()]
             && keys == [self.batch, self.all_keys(), self.cell.hidden]
@@ -53,25 +56,25 @@ impl DecoderSizes {
     }
 }
 
-/// What the forward pass of a piece of `n` rows leaves, one after the other: gates and states of every step, the first
-/// state included; attention weights and what the output is made from, for every step that has an output.
+/// Lengths of the values that the forward pass of a piece of `n` rows saves, in order: gates of every step; states of
+/// every step and the initial one; attention weights, and inputs of the output layer, of every step with an output.
 fn saved_len(s: &DecoderSizes, n: usize) -> [usize; 4] {
     let (width, steps) = (s.cell.width(), s.n_previous + s.n_steps);
     [steps * n * 4 * width, (steps + 1) * n * width, s.n_steps * n * s.all_keys(), s.n_steps * n * s.n_read() * width]
 }
 
-/// Column of the output weights for a place in what the output is made from; none in the filling.
+/// Column of the output weights for a position in the padded input of the output layer; `None` in the padding.
 fn output_column(s: &DecoderSizes, place: usize) -> Option<usize> {
     let (part, i) = (place / s.cell.width(), place % s.cell.width());
     (i < s.cell.hidden).then_some(part * s.cell.hidden + i)
 }
 
-/// First number in the whole of the result that a dropout of what row `row` reads at step `step` stands at.
+/// Position in the dropout mask of the first input of the output layer of row `row` at step `step`.
 fn drop_place(s: &DecoderSizes, row: usize, step: usize) -> usize {
     (row * s.n_steps + step) * s.n_read() * s.cell.width()
 }
 
-/// The keys of each row in turn, cut into sequences: first key and number of keys.
+/// First key and number of keys of each sequence.
 fn sequences(s: &DecoderSizes) -> impl Iterator<Item = (usize, usize)> {
     let firsts = s.n_keys.iter().scan(0, |first, n| {
         *first += n;
@@ -80,14 +83,14 @@ fn sequences(s: &DecoderSizes) -> impl Iterator<Item = (usize, usize)> {
     firsts.zip(s.n_keys.iter().copied())
 }
 
-/// Keys of a piece, filled up to whole vectors.
+/// Keys of a piece, padded to complete vectors.
 fn wide_keys<T: Scalar>(s: &DecoderSizes, keys: &[T]) -> Vec<T> {
     let mut wide = vec![T::zero(); keys.len() / s.cell.hidden * s.cell.width()];
     widen(keys, s.cell.hidden, &mut wide, s.cell.width());
     wide
 }
 
-/// Weights as the forward pass reads them.
+/// Weights in the layout of the forward pass.
 pub struct ForwardDecoder<'a, T> {
     sizes: &'a DecoderSizes,
     mask: Option<DropMask>,
@@ -110,7 +113,7 @@ impl<'a, T: Scalar> ForwardDecoder<'a, T> {
         Self { sizes, mask, cell: ForwardCell::new(s.cell, of_cell), output, bias: wide }
     }
 
-    /// Poses `y` of the rows from `begin` on; returns what the backward pass needs.
+    /// Computes the poses `y` of the rows from `begin` on; returns the values that the backward pass requires.
     pub fn run(&self, begin: usize, start: &[T], keys: &[T], y: &mut [T]) -> Vec<T> {
         let s = self.sizes;
         let (pose, hidden, width) = (s.cell.input, s.cell.hidden, s.cell.width());
@@ -159,12 +162,12 @@ impl<'a, T: Scalar> ForwardDecoder<'a, T> {
     }
 }
 
-/// Weights as the backward pass reads them.
+/// Weights in the layout of the backward pass.
 pub struct BackwardDecoder<'a, T> {
     sizes: &'a DecoderSizes,
     mask: Option<DropMask>,
     cell: BackwardCell<T>,
-    /// From the gradient of a pose to that of what it is made from.
+    /// Maps the gradient of a pose to that of the output layer's input.
     to_read: PackedMatrix<T>,
 }
 
@@ -178,8 +181,8 @@ impl<'a, T: Scalar> BackwardDecoder<'a, T> {
         Self { sizes, mask, cell: BackwardCell::new(s.cell, of_cell), to_read }
     }
 
-    /// Adds the gradients of starts and keys of the rows from `begin` on to `of_start` and `of_keys`; returns those of the
-    /// weights. Inputs: starts and keys; outputs: poses and their gradients.
+    /// Adds the gradients of starts and keys of the rows from `begin` on to `of_start` and `of_keys`; returns those of
+    /// the weights. The tuples are starts and keys, and poses with their gradients.
     pub fn run(
         &self,
         begin: usize,
@@ -244,7 +247,7 @@ impl<'a, T: Scalar> BackwardDecoder<'a, T> {
             self.cell.step(gates, previous, &mut of_state, of_gates);
             of_input.fill(T::zero());
             self.cell.add_input_gradient(of_gates, &mut of_input);
-            // Where the step has read its pose.
+            // The pose that the step has read.
             let (x, of_x, row_len, at) = match step.checked_sub(s.n_previous + 1) {
                 None => (start, &mut *of_start, start_len, step.min(s.n_previous - 1) * pose),
                 Some(before) => (y, &mut of_y[..], y_len, before * pose),

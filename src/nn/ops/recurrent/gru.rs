@@ -1,8 +1,8 @@
-//! A GRU layer over a whole sequence, in one direction or both, with backpropagation through time: one operator, so
-//! that a step costs its products and its gates and nothing else. Pieces of the batch go through the sequence side by
-//! side; results do not depend on the number of threads.
+//! A GRU layer over a complete sequence, in one direction or both, with backpropagation through time, as one operator,
+//! which avoids the overhead of separate operators per step. Pieces of the batch are processed in parallel; results do
+//! not depend on the number of threads.
 
-use super::cell::{BackwardCell, ForwardCell, GruSizes, SavedPieces, rows_of_a_piece, sum_of_pieces, widen};
+use super::cell::{BackwardCell, ForwardCell, GruSizes, SavedPieces, piece_rows, sum_pieces, widen};
 use crate::Mode;
 use crate::cpu::tensor::Scalar;
 use crate::cpu::thread_team::parallel_each;
@@ -12,22 +12,23 @@ use crate::params::{Init, Params};
 use candle_core::{Result, Shape, Tensor};
 use rand::Rng;
 
-/// A layer with its weights, named as PyTorch names them: `<name>.weight_ih_l0` [3 H, I], `.weight_hh_l0` [3 H, H],
-/// `.bias_ih_l0` and `.bias_hh_l0` [3 H], for the reverse direction with `_reverse` behind; rows are reset, update,
-/// candidate.
+/// A layer with its weights, named as in PyTorch: `<name>.weight_ih_l0` [3 H, I], `.weight_hh_l0` [3 H, H],
+/// `.bias_ih_l0` and `.bias_hh_l0` [3 H], with the suffix `_reverse` for the reverse direction; rows are reset,
+/// update, candidate.
 pub struct Gru {
-    /// Four tensors a direction.
+    /// Four tensors per direction.
     weights: Vec<Tensor>,
     hidden: usize,
 }
 
 impl Gru {
-    /// Layer `layer` of the names; `n`: numbers of the input and of the state. First values uniform in +-1 / sqrt(H), as PyTorch's.
-    pub fn new(params: &mut Params, name: &str, n: [usize; 2], layer: usize, both_ways: bool) -> Result<Self> {
+    /// Creates layer number `layer` (part of the tensor names) with `n` = sizes of [input, state]. Initial values are
+    /// uniform in +-1 / sqrt(H), as in PyTorch.
+    pub fn new(params: &mut Params, name: &str, n: [usize; 2], layer: usize, bidirectional: bool) -> Result<Self> {
         let [input, hidden] = n;
         let init = Init::Uniform(1.0 / (hidden as f64).sqrt());
         let mut weights = Vec::new();
-        for suffix in if both_ways { &["", "_reverse"][..] } else { &[""] } {
+        for suffix in if bidirectional { &["", "_reverse"][..] } else { &[""] } {
             let mut add = |kind: &str, shape: &[usize]| -> Result<()> {
                 weights.push(params.trainable(&format!("{name}.{kind}_l{layer}{suffix}"), shape, init)?);
                 Ok(())
@@ -40,23 +41,23 @@ impl Gru {
         Ok(Self { weights, hidden })
     }
 
-    /// Every state of a sequence [B, T, I] from a first state of zeros: [B, T, directions * H], of which training drops a
-    /// share `p`.
+    /// Returns all states of a sequence [B, T, I], starting from zeros: [B, T, directions * H]; training applies
+    /// dropout with rate `p`.
     pub fn forward(&self, x: &Tensor, p: f64, mode: &mut Mode) -> Result<Tensor> {
         self.run(x, false, drop_mask(p, mode))
     }
 
-    /// The output of the last step [B, directions * H]: the reverse direction has seen that step alone.
+    /// Returns the output of the last step [B, directions * H]; the reverse direction has read only that step.
     pub fn last(&self, x: &Tensor) -> Result<Tensor> {
         self.run(x, true, None)
     }
 
-    /// Weights as one row of numbers, for operators that contain this layer.
+    /// Weights as one flat tensor, for operators that contain this layer.
     pub fn flat_weights(&self) -> Result<Tensor> {
         Tensor::cat(&self.weights.iter().map(Tensor::flatten_all).collect::<Result<Vec<_>>>()?, 0)
     }
 
-    /// The state [B, H] of a layer of one direction that goes on from `state` [B, H] over a sequence [B, T, I].
+    /// Returns the state [B, H] of a unidirectional layer after reading a sequence [B, T, I] from `state` [B, H] on.
     pub fn state_after(&self, x: &Tensor, state: &Tensor) -> Result<Tensor> {
         let options = GruOptions { n_directions: 1, last: true, mask: None };
         gru(x, &state.unsqueeze(0)?, &self.flat_weights()?, options)
@@ -69,7 +70,7 @@ impl Gru {
     }
 }
 
-/// The mask of a dropout while training; none where nothing is dropped.
+/// Draws the mask of a dropout in training; `None` if nothing is dropped.
 pub fn drop_mask(p: f64, mode: &mut Mode) -> Option<DropMask> {
     match mode {
         Mode::Train(rng) if p > 0.0 => Some(DropMask::new(rng.random(), p)),
@@ -77,19 +78,19 @@ pub fn drop_mask(p: f64, mode: &mut Mode) -> Option<DropMask> {
     }
 }
 
-/// What a GRU gives.
+/// Options of a GRU.
 #[derive(Clone, Copy, Debug)]
 pub struct GruOptions {
-    /// 1: forward; 2: forward and backward in time, side by side in the result.
+    /// 1: forward; 2: forward and backward in time, concatenated in the result.
     pub n_directions: usize,
-    /// Only the result of the last step, for which the backward direction makes one step.
+    /// Return only the result of the last step, for which the backward direction makes one step.
     pub last: bool,
     /// Dropout of the result.
     pub mask: Option<DropMask>,
 }
 
-/// States of a GRU over `x` [B, T, I] from the `first` states [directions, B, H], with `weights` one direction after the
-/// other: [B, T, directions * H], or with `last` [B, directions * H].
+/// Returns the states of a GRU over `x` [B, T, I] from the `first` states [directions, B, H] on, with the concatenated
+/// `weights` of the directions: [B, T, directions * H], or [B, directions * H] with `last`.
 pub fn gru(x: &Tensor, first: &Tensor, weights: &Tensor, options: GruOptions) -> Result<Tensor> {
     let saves = x.track_op() || first.track_op() || weights.track_op();
     let op = GruOp { options, saves, saved: SavedPieces::default() };
@@ -107,9 +108,9 @@ struct PassSizes {
     batch: usize,
     n_steps: usize,
     cell: GruSizes,
-    /// Rows of a piece.
+    /// Number of rows per piece.
     piece: usize,
-    /// Numbers of a row of the result.
+    /// Number of values per row of the result.
     row: usize,
 }
 
@@ -121,23 +122,23 @@ impl GruOp {
             let fits = (directions, b, n_weights) == (n_directions, batch, n_directions * cell.n_weights());
             if fits && batch * n_steps * input * hidden > 0 {
                 let row = if last { 1 } else { n_steps } * directions * hidden;
-                return Ok(PassSizes { batch, n_steps, cell, piece: rows_of_a_piece(batch), row });
+                return Ok(PassSizes { batch, n_steps, cell, piece: piece_rows(batch), row });
             }
         }
         candle_core::bail!("gru: input {x:?} does not fit first states {first:?} and {n_weights} weights")
     }
 
-    /// Steps of a direction.
+    /// Number of steps of a direction.
     fn steps(&self, direction: usize, s: &PassSizes) -> usize {
         if self.options.last && direction == 1 { 1 } else { s.n_steps }
     }
 
-    /// Where in time step `k` of a direction is.
+    /// Time index of step `k` of a direction.
     fn time(direction: usize, k: usize, s: &PassSizes) -> usize {
         if direction == 1 { s.n_steps - 1 - k } else { k }
     }
 
-    /// Where the output of step `k` begins in a row of the result; none for steps that give no output.
+    /// Position of the output of step `k` in a row of the result; `None` for steps without output.
     fn place(&self, direction: usize, k: usize, s: &PassSizes) -> Option<usize> {
         let GruOptions { n_directions, last, .. } = self.options;
         let time = Self::time(direction, k, s);
@@ -145,7 +146,8 @@ impl GruOp {
         if last { (time == s.n_steps - 1).then(|| at(0)) } else { Some(at(time)) }
     }
 
-    /// Numbers of a direction of a piece of `n` rows: gates of every step, and every state, the first included.
+    /// Numbers of values saved for a direction of a piece of `n` rows: gates of every step; states of every step and
+    /// the initial one.
     fn saved_len(&self, direction: usize, n: usize, s: &PassSizes) -> [usize; 2] {
         let (steps, width) = (self.steps(direction, s), s.cell.width());
         [steps * n * 4 * width, (steps + 1) * n * width]
@@ -264,16 +266,16 @@ impl CpuOperator for GruOp {
             let parts = (0..n_directions).flat_map(|d| of_pieces.iter().map(move |piece| part(d, piece)));
             parts.flatten().collect()
         });
-        Ok([x.tracked.then_some(of_x), of_first, weights.tracked.then(|| sum_of_pieces(&of_weights))])
+        Ok([x.tracked.then_some(of_x), of_first, weights.tracked.then(|| sum_pieces(&of_weights))])
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::gradcheck::{any_threads_give_the_same, apart, pattern, worst};
+    use crate::ops::gradcheck::{check_thread_independence, max_difference, pattern, worst};
 
-    /// A GRU of the framework's operators, one way.
+    /// A unidirectional GRU composed of candle's operators.
     fn composed(x: &Tensor, first: &Tensor, weights: &Tensor, reverse: bool) -> Result<Tensor> {
         let ((_, n_steps, input), hidden) = (x.dims3()?, first.dim(1)?);
         let part = |start: usize, rows: usize, columns: usize| {
@@ -313,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_the_composed_layer_and_gradients_are_right() -> Result<()> {
+    fn layer_equals_the_composed_one_and_gradients_are_correct() -> Result<()> {
         for (n_directions, last, batch) in [(1, false, 2), (1, true, 3), (2, false, 10), (2, true, 2)] {
             let inputs = inputs(n_directions, batch)?;
             let own = |v: &[Tensor]| gru(&v[0], &v[1], &v[2], GruOptions { n_directions, last, mask: None });
@@ -323,14 +325,14 @@ mod tests {
                 let y = Tensor::cat(&(0..n_directions).map(way).collect::<Result<Vec<_>>>()?, 2)?;
                 if last { y.narrow(1, 4, 1)?.squeeze(1) } else { Ok(y) }
             };
-            let (off, error) = (apart(&inputs, own, by_parts)?, worst(&inputs, own)?);
+            let (off, error) = (max_difference(&inputs, own, by_parts)?, worst(&inputs, own)?);
             assert!(off < 1e-12 && error < 1e-7, "{n_directions} {last}: {off:e} {error:e}");
         }
         Ok(())
     }
 
     #[test]
-    fn what_is_dropped_has_no_gradient() -> Result<()> {
+    fn dropped_values_have_no_gradient() -> Result<()> {
         let mask = Some(DropMask::new(5, 0.4));
         let dropped = |v: &[Tensor]| gru(&v[0], &v[1], &v[2], GruOptions { n_directions: 2, last: false, mask });
         let inputs = inputs(2, 3)?;
@@ -344,13 +346,13 @@ mod tests {
     fn any_number_of_threads_gives_the_same_bits() -> Result<()> {
         let weights = 2 * GruSizes { input: 26, hidden: 50 }.n_weights();
         let options = GruOptions { n_directions: 2, last: false, mask: Some(DropMask::new(1, 0.2)) };
-        any_threads_give_the_same(&[&[150, 7, 26], &[2, 150, 50], &[weights]], 2, |v| {
+        check_thread_independence(&[&[150, 7, 26], &[2, 150, 50], &[weights]], 2, |v| {
             gru(&v[0], &v[1], &(&v[2] * 0.2)?, options)
         })
     }
 
     #[test]
-    fn what_does_not_fit_is_an_error() -> Result<()> {
+    fn mismatched_shapes_are_errors() -> Result<()> {
         let [x, first, weights] = inputs(1, 2)?;
         let options = GruOptions { n_directions: 1, last: false, mask: None };
         assert!(gru(&x, &first, &weights, options).is_ok());

@@ -1,4 +1,4 @@
-//! Recurrent layers, each a single operator over the whole sequence: GRU, and decoder with attention.
+//! Recurrent layers, each a single operator over a complete sequence: GRU, and decoder with attention.
 
 pub mod cell;
 pub mod decoder;
