@@ -69,7 +69,7 @@ pub fn read_sized(path: &Path, size: Option<[u32; 2]>) -> Result<(Keypoints, Vec
         keypoints.image_size = size;
         notes.retain(|note| !note.contains("`image_size`"));
     }
-    if range::are_fractions(range::places(&keypoints)) {
+    if range::are_fractions(range::coordinates(&keypoints)) {
         let size = size.or(known_size).filter(|size| size.iter().all(|px| *px >= MIN_IMAGE_SIDE));
         let Some([width, height]) = size else {
             bail!(
@@ -78,9 +78,9 @@ pub fn read_sized(path: &Path, size: Option<[u32; 2]>) -> Result<(Keypoints, Vec
                 path.display()
             );
         };
-        let n_negative = range::places(&keypoints).filter(|place| place[0] < 0.0 || place[1] < 0.0).count();
+        let n_negative = range::coordinates(&keypoints).filter(|xy| xy[0] < 0.0 || xy[1] < 0.0).count();
         ensure!(
-            n_negative * 5 < range::places(&keypoints).count().max(1),
+            n_negative * 5 < range::coordinates(&keypoints).count().max(1),
             "{}: its coordinates lie between -1 and 1: expected pixels, or shares of the picture from 0 to 1",
             path.display()
         );

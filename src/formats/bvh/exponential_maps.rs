@@ -1,5 +1,5 @@
 //! Motion of a BVH file as the features of FineMotion (Korzun et al. 2020): exponential maps of 15 upper-body joints
-//! at 20 frames per second, with fixed hips; and the conversion back to a BVH file with the is_same skeleton.
+//! at 20 frames per second, with fixed hips; and the conversion back to a BVH file with the same skeleton.
 
 use super::read::Bvh;
 use super::skeleton::{BvhSkeleton, JointChannels};
