@@ -4,7 +4,7 @@
 
 use super::message::MediaHeader;
 use anyhow::{Error, Result};
-use orator_media::ffmpeg::decode::MOST_PIXELS;
+use orator_media::ffmpeg::decode::MAX_PIXELS;
 use orator_media::ffmpeg::source::LONGEST_SECS;
 use rustix::process::{Resource, Rlimit, setrlimit};
 use std::path::Path;
@@ -59,7 +59,7 @@ impl Limits {
     /// For a video with this header that becomes frames at `rate` a second, beside `n_bytes` of models and other inputs.
     pub fn of_video(header: &MediaHeader, rate: f64, n_bytes: u64) -> Self {
         let [width, height] = header.image_size;
-        let pixels = width.saturating_mul(height).min(MOST_PIXELS as usize) as f64;
+        let pixels = width.saturating_mul(height).min(MAX_PIXELS as usize) as f64;
         let stated = header.secs.filter(|secs| secs.is_finite() && *secs > 0.0);
         // The reader goes on for a minute after the stated end.
         let secs = stated.map_or(LONGEST_SECS, |secs| LONGEST_SECS.min(secs + 60.0));
