@@ -139,7 +139,7 @@ impl Npz {
         one_text.then(|| letters.collect())
     }
 
-    /// Raw bytes of the array's `.npy` entry, checked against the size in its header before they are decompressed.
+    /// Raw bytes of the array's `.npy` entry; the size in its header is checked before the data are decompressed.
     fn bytes(&mut self, name: &str) -> Result<Vec<u8>> {
         let Some(at) = self.names.iter().position(|n| n == name) else {
             bail!("{} has no array `{name}`; it has: {}", self.path.display(), self.names.join(", "));
@@ -204,11 +204,7 @@ impl<W: Write + Seek> NpzOutput<W> {
         Self { to, at: 0, error: None }
     }
 
-    /// Flushes the file.
-    ///
-    /// # Errors
-    ///
-    /// The first error of any write.
+    /// Flushes the file. Errors: the first error of any write.
     fn finish(mut self) -> Result<()> {
         let flushed = self.to.flush();
         Ok(self.error.map_or(flushed, Err)?)

@@ -41,8 +41,8 @@ pub enum Positions {
     Auto,
 }
 
-/// Limits of the number of positions (frames times joints): one that applies to every file, and one per byte of the
-/// file. A moving joint takes at least six bytes per frame.
+/// Maximum number of positions (frames times joints): the larger of a fixed limit and a limit per byte of the file. A
+/// moving joint takes at least six bytes per frame.
 const MIN_POSITION_LIMIT: usize = 1 << 20;
 const MAX_POSITIONS_PER_BYTE: usize = 4;
 /// Maximum number of joints including end sites; rigs with hair, cloth and twist bones have several hundred.

@@ -16,7 +16,7 @@ use std::path::Path;
 
 /// Index into `joint_names::ROLES` of each of joints 0..7 of `types::skeleton`.
 const BODY: [usize; 7] = [0, 2, 3, 4, 5, 6, 7];
-/// Common frame rates of cameras and studios: integers, and broadcast rates of 1000/1001 times these. Files round the
+/// Common integer frame rates of cameras and studios; `BROADCAST_RATES` are multiplied by 1000/1001. Files round the
 /// frame time, so a relative difference below `RATE_ROUNDING` is taken for the common rate.
 const RATES: [u32; 9] = [15, 20, 24, 25, 30, 50, 60, 100, 120];
 const BROADCAST_RATES: [u32; 3] = [24, 30, 60];

@@ -156,11 +156,7 @@ pub(crate) fn default_track(input: &Input) -> Option<Stream<'_>> {
 }
 
 /// Stream of audio track `track` (from 1; 0: the default track), with all available tracks; `None` without audio. A
-/// file with a single track always uses it.
-///
-/// # Errors
-///
-/// The file has fewer tracks.
+/// file with a single track always uses it. Errors: the file has fewer tracks.
 pub(crate) fn audio_track(input: &Input, track: usize) -> Result<Option<(Stream<'_>, AudioTracks)>> {
     let streams = audio_streams(input);
     let Some(default_stream) = default_track(input) else { return Ok(None) };
