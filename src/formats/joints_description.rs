@@ -34,7 +34,7 @@ pub fn path_of(path: &Path) -> PathBuf {
 }
 
 /// Whether a file name is that of a description file.
-pub fn is_one(path: &Path) -> bool {
+pub fn is_description(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
     [".npy.json", ".txt.json"].iter().any(|ending| name.ends_with(ending))
 }
@@ -45,28 +45,28 @@ pub fn is_one(path: &Path) -> bool {
 ///
 /// The description is unreadable, has no plausible frame rate, or is for a number of frames other than `n_frames`.
 pub fn rate(path: &Path, n_frames: usize) -> Result<Option<FrameRate>> {
-    let (beside, file) = (path_of(path), path.display());
-    let text = match input::read(&beside, input::MOST_TEXT) {
+    let (description_path, file) = (path_of(path), path.display());
+    let text = match input::read(&description_path, input::MOST_TEXT) {
         Ok(text) => text,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(error).with_context(|| format!("cannot read {}", beside.display())),
+        Err(error) => return Err(error).with_context(|| format!("cannot read {}", description_path.display())),
     };
-    let beside = beside.display();
+    let description_path = description_path.display();
     let remedy = || format!("delete it, or write {{\"fps\": [30, 1]}} (or what {file} has) into it");
     let description: JointsDescription = serde_json::from_slice(&text)
-        .with_context(|| format!("{beside} does not say the frames a second of {file}: {}", remedy()))?;
+        .with_context(|| format!("{description_path} does not say the frames a second of {file}: {}", remedy()))?;
     let rate = match description.fps {
         DescribedRate::Fraction([num, den]) if num > 0 && den > 0 => Some(FrameRate::new(num, den)),
         DescribedRate::Number(per_sec) => FrameRate::nearest(per_sec),
         DescribedRate::Fraction(_) => None,
     };
     let Some(rate) = rate.filter(|rate| rate.is_plausible()) else {
-        bail!("{beside}: its `fps` is no frame rate of motion, 1 to 1000 frames a second: {}", remedy())
+        bail!("{description_path}: its `fps` is no frame rate of motion, 1 to 1000 frames a second: {}", remedy())
     };
     if let Some(described) = description.n_frames {
         ensure!(
             described == n_frames,
-            "{beside} describes {described} frames and {file} has {n_frames}: it is of another motion; {}",
+            "{description_path} describes {described} frames and {file} has {n_frames}: it is of another motion; {}",
             remedy()
         );
     }
@@ -76,10 +76,10 @@ pub fn rate(path: &Path, n_frames: usize) -> Result<Option<FrameRate>> {
 /// Writes the joints to `path` with `write`, then their description. An old description is removed first, so that it
 /// can never be mistaken for that of the new joints.
 pub fn with(path: &Path, fps: FrameRate, shape: &[usize], write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
-    let beside = path_of(path);
-    match std::fs::remove_file(&beside) {
+    let description_path = path_of(path);
+    match std::fs::remove_file(&description_path) {
         Err(error) if !matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
-            return Err(error).with_context(|| format!("cannot replace {}", beside.display()));
+            return Err(error).with_context(|| format!("cannot replace {}", description_path.display()));
         }
         _ => workdir::replace(path, write)?,
     }
@@ -92,7 +92,7 @@ pub fn with(path: &Path, fps: FrameRate, shape: &[usize], write: impl FnOnce(&Pa
         "units": "metres",
         "axes": "x image right, y down, z away from the camera, the neck at the origin",
     });
-    workdir::write_file(&beside, format!("{description}\n").as_bytes())
+    workdir::write_file(&description_path, format!("{description}\n").as_bytes())
 }
 
 #[cfg(test)]
@@ -104,7 +104,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.npy");
         let text = |description: &str| std::fs::write(path_of(&path), description).unwrap();
-        let says = |words: &str| {
+        let assert_error = |words: &str| {
             let error = format!("{:#}", rate(&path, 4).unwrap_err());
             assert!(error.contains("a.npy.json") && error.contains(words), "{error}");
         };
@@ -112,17 +112,17 @@ mod tests {
         let ntsc = FrameRate::new(30_000, 1001);
         with(&path, ntsc, &[4, 49, 3], |attempt| Ok(std::fs::write(attempt, "numbers")?)).unwrap();
         assert_eq!(rate(&path, 4).unwrap(), Some(ntsc));
-        assert!(is_one(&path_of(&path)) && !is_one(&path) && !is_one(Path::new("a.json")));
+        assert!(is_description(&path_of(&path)) && !is_description(&path) && !is_description(Path::new("a.json")));
         assert!(format!("{:#}", rate(&path, 5).unwrap_err()).contains("describes 4 frames"));
         text("{\"fps\": 29.97}");
         assert_eq!(rate(&path, 9).unwrap(), Some(ntsc));
         text("{\"fps\": [30, 0]}");
-        says("1 to 1000");
+        assert_error("1 to 1000");
         text("{\"fps\": 0.5}");
-        says("1 to 1000");
+        assert_error("1 to 1000");
         text("{\"rate\": 30}");
-        says("does not say the frames a second");
+        assert_error("does not say the frames a second");
         text("no JSON");
-        says("delete it");
+        assert_error("delete it");
     }
 }

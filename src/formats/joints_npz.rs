@@ -78,8 +78,8 @@ mod tests {
             are_scaled in proptest::bool::ANY,
         ) {
             let at = |t: usize, j: usize, k: usize| {
-                let (number, seen) = numbers[(t * 147 + j * 3 + k) % numbers.len()];
-                (if are_scaled { number.sin() * 99.0 } else { number }, seen)
+                let (number, is_visible) = numbers[(t * 147 + j * 3 + k) % numbers.len()];
+                (if are_scaled { number.sin() * 99.0 } else { number }, is_visible)
             };
             let motion = Motion {
                 fps: FrameRate::new(num, den),

@@ -302,8 +302,8 @@ pub(crate) mod tests {
         #[test]
         fn no_bytes_panic(header in ".{0,100}", bytes in proptest::collection::vec(proptest::num::u8::ANY, 0..100)) {
             let length = (header.len() as u16).to_le_bytes();
-            let whole = [&b"\x93NUMPY\x01\x00"[..], &length, header.as_bytes(), &bytes].concat();
-            let _ = parse::<f32, IxDyn>(&whole);
+            let file_bytes = [&b"\x93NUMPY\x01\x00"[..], &length, header.as_bytes(), &bytes].concat();
+            let _ = parse::<f32, IxDyn>(&file_bytes);
             let _ = parse::<f32, IxDyn>(&bytes);
         }
     }

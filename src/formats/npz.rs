@@ -134,9 +134,10 @@ impl Npz {
         let header = std::str::from_utf8(bytes.get(10..data_at)?).ok()?;
         let one_text =
             header.contains("'descr': '<U") && ["()", "(1,)"].iter().any(|s| header.contains(&format!("'shape': {s}")));
-        let letters = bytes.get(data_at..)?.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-        let letters = letters.take_while(|&letter| letter != 0).map(|l| char::from_u32(l).unwrap_or('\u{fffd}'));
-        one_text.then(|| letters.collect())
+        let characters = bytes.get(data_at..)?.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+        let characters =
+            characters.take_while(|&character| character != 0).map(|l| char::from_u32(l).unwrap_or('\u{fffd}'));
+        one_text.then(|| characters.collect())
     }
 
     /// Raw bytes of the array's `.npy` entry; the size in its header is checked before the data are decompressed.
@@ -150,7 +151,7 @@ impl Npz {
         // An entry may unpack to more bytes than the archive declares: read one byte past that size to detect it.
         let mut entry = entry.take(stated.saturating_add(1));
         let mut bytes = Vec::new();
-        entry.by_ref().take(npy::MOST_HEADER_BYTES).read_to_end(&mut bytes).with_context(unreadable)?;
+        entry.by_ref().take(npy::MAX_HEADER_BYTES).read_to_end(&mut bytes).with_context(unreadable)?;
         if let Some(promised) = npy::file_bytes(&bytes) {
             ensure!(
                 promised == stated,

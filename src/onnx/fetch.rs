@@ -128,9 +128,9 @@ impl<'a> Fetcher<'a> {
     ) -> Result<Obtained, String> {
         let mut failures = String::new();
         let (mirrored, others): (Vec<_>, Vec<_>) = sources.iter().partition(|source| self.has_mirrored(source));
-        let of_mirror = mirrored.into_iter().map(|source| (source, FetchSource::MirrorOf(source.clone())));
-        let of_others = others.into_iter().map(|source| (source, FetchSource::Source(source.clone())));
-        for (source, from) in of_mirror.chain(of_others) {
+        let mirrored_sources = mirrored.into_iter().map(|source| (source, FetchSource::MirrorOf(source.clone())));
+        let other_sources = others.into_iter().map(|source| (source, FetchSource::Source(source.clone())));
+        for (source, from) in mirrored_sources.chain(other_sources) {
             let files = match from {
                 FetchSource::MirrorOf(_) => self.mirrored(source),
                 _ => self.files(source),

@@ -127,12 +127,12 @@ impl ModelStore {
         if id != AUTO {
             return self.manifest.get_as(id, role);
         }
-        let mut of_role = self.of_role(role);
-        let present = self.of_role(role).find(|entry| self.path(entry).is_file());
-        present.or_else(|| of_role.next()).with_context(|| format!("the manifest has no {role:?} model"))
+        let mut with_role = self.with_role(role);
+        let present = self.with_role(role).find(|entry| self.path(entry).is_file());
+        present.or_else(|| with_role.next()).with_context(|| format!("the manifest has no {role:?} model"))
     }
 
-    fn of_role(&self, role: ModelRole) -> impl Iterator<Item = &ModelEntry> {
+    fn with_role(&self, role: ModelRole) -> impl Iterator<Item = &ModelEntry> {
         self.manifest.models.iter().filter(move |entry| entry.role == role)
     }
 
@@ -153,7 +153,7 @@ impl ModelStore {
         for one in wanted {
             let (known, candidates): (Vec<_>, Vec<_>) = match one {
                 Wanted::Id(id) => (vec![self.manifest.get(id)?], vec![self.manifest.get(id)?]),
-                Wanted::Role(role) => (self.of_role(*role).collect(), self.candidates(*role).collect()),
+                Wanted::Role(role) => (self.with_role(*role).collect(), self.candidates(*role).collect()),
             };
             if let Some(entry) = known.into_iter().find(|entry| self.state(entry) == ModelState::Present) {
                 fetched.push(Fetched { entry, source: Ok(FetchSource::Present) });
@@ -238,7 +238,7 @@ impl ModelStore {
         for one in wanted {
             match one {
                 Wanted::Id(id) => missing.extend(Some(self.manifest.get(id)?).filter(|entry| !is_present(entry))),
-                Wanted::Role(role) if self.of_role(*role).any(|entry| is_present(&entry)) => {}
+                Wanted::Role(role) if self.with_role(*role).any(|entry| is_present(&entry)) => {}
                 Wanted::Role(role) => missing.extend(self.candidates(*role)),
             }
         }
@@ -247,7 +247,7 @@ impl ModelStore {
 
     /// Models of a role that can be downloaded, best first.
     pub fn candidates(&self, role: ModelRole) -> impl Iterator<Item = &ModelEntry> {
-        self.of_role(role).filter(|entry| entry.is_served())
+        self.with_role(role).filter(|entry| entry.is_served())
     }
 
     /// Registers the ONNX file `file`, with the preprocessing and decoding of the model or layout `like`: copies it

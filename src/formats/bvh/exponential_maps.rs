@@ -356,13 +356,14 @@ mod tests {
             |entries: &[&str]| JointMapping::parse(&entries.iter().map(|e| (*e).to_owned()).collect::<Vec<_>>());
         let fewer = parse(&["Spine3=", "Neck1="]).unwrap();
         assert_eq!(fitted(std::slice::from_ref(&bvh), &fewer).unwrap().n_columns(), 39);
-        let says = |mapping: &JointMapping| format!("{:#}", fitted(std::slice::from_ref(&bvh), mapping).unwrap_err());
-        let text = says(&parse(&["Spine3=Chest"]).unwrap());
+        let error_of =
+            |mapping: &JointMapping| format!("{:#}", fitted(std::slice::from_ref(&bvh), mapping).unwrap_err());
+        let text = error_of(&parse(&["Spine3=Chest"]).unwrap());
         assert!(
             text.contains("no joint Chest") && text.contains("Spine3=NAME") && text.contains("LeftUpLeg"),
             "{text}"
         );
-        assert!(says(&parse(&["Spine3=Spine2"]).unwrap()).contains("two joints"));
+        assert!(error_of(&parse(&["Spine3=Spine2"]).unwrap()).contains("two joints"));
         assert!(parse(&["Spine3"]).is_err() && parse(&["Tail=Tail"]).is_err());
         let mut other = bvh.clone();
         other.joints[2].name = "Knee".into();

@@ -1,7 +1,7 @@
 //! BVH reader for any hierarchy and any number and order of channels, with the positions of all joints in a frame.
 //! `mocap` maps the joints to our skeleton.
 
-use super::skeleton::{JointChannels, placed};
+use super::skeleton::{JointChannels, joint_positions};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use orator_base::input;
 use orator_base::math::vec3::Vec3;
@@ -152,7 +152,7 @@ impl Bvh {
     /// Positions of all joints in every frame, in the file's units and axes.
     pub fn positions(&self, positions: Positions) -> Vec<Vec<Vec3>> {
         let positions = self.resolve(positions);
-        self.frames().map(|frame| placed(&self.joints, frame, positions)).collect()
+        self.frames().map(|frame| joint_positions(&self.joints, frame, positions)).collect()
     }
 
     /// Channel values of each frame, in joint order.
@@ -251,7 +251,7 @@ mod tests {
     #[test]
     fn errors_name_the_position_in_the_file() {
         let good = arm("3 Zrotation Yrotation Xrotation", "0 0 0 0 0 0 0 0 0");
-        for (broken, says) in [
+        for (broken, expected) in [
             (String::new(), "ends before"),
             (good.replace("ROOT", "LEAF"), "`LEAF`"),
             (good.replace("Yrotation", "Wrotation"), "Wrotation"),
@@ -265,7 +265,7 @@ mod tests {
             (good[..20].to_owned(), "ends before"),
         ] {
             let text = format!("{:#}", Bvh::parse(&broken).unwrap_err());
-            assert!(text.contains(says), "{text}");
+            assert!(text.contains(expected), "{text}");
         }
     }
 
@@ -278,24 +278,24 @@ mod tests {
                  Frame Time: 0.04 {values}"
             )
         };
-        let says = |text: &str| format!("{:#}", Bvh::parse(text).unwrap_err());
-        assert!(says(&file("0", 99_999_999, "")).contains("99999999 frames of no channel"));
-        let many = says(&file("1 Xposition", 20_000, &"0 ".repeat(20_000)));
+        let error_of = |text: &str| format!("{:#}", Bvh::parse(text).unwrap_err());
+        assert!(error_of(&file("0", 99_999_999, "")).contains("99999999 frames of no channel"));
+        let many = error_of(&file("1 Xposition", 20_000, &"0 ".repeat(20_000)));
         assert!(many.contains("20000 frames of 201 joints with 1 channels"), "{many}");
         assert_eq!(Bvh::parse(&file("1 Xposition", 100, &"0 ".repeat(100))).unwrap().n_frames, 100);
     }
 
     #[test]
     fn oversized_skeletons_are_rejected() {
-        let says = |text: String| format!("{:#}", Bvh::parse(&text).unwrap_err());
+        let error_of = |text: String| format!("{:#}", Bvh::parse(&text).unwrap_err());
         let head = "HIERARCHY ROOT a { OFFSET 0 0 0 CHANNELS 1 Xposition ";
         let joint = "JOINT b { OFFSET 0 0 0 } ";
-        assert!(says(format!("{head}{}", joint.repeat(MAX_JOINTS))).contains("more than 10000 joints"));
-        assert!(says(format!("{head}{}", "JOINT b { ".repeat(MAX_DEPTH))).contains("more than 512 joints"));
+        assert!(error_of(format!("{head}{}", joint.repeat(MAX_JOINTS))).contains("more than 10000 joints"));
+        assert!(error_of(format!("{head}{}", "JOINT b { ".repeat(MAX_DEPTH))).contains("more than 512 joints"));
         // Each nested end site would extend the name of its parent.
-        assert!(says(format!("{head}{}", "End Site { ".repeat(300))).contains("a name of"));
-        let whole = format!("{head}{}}} MOTION Frames: 1 Frame Time: 0.04 0", joint.repeat(MAX_JOINTS - 1));
-        assert_eq!(Bvh::parse(&whole).unwrap().joints.len(), MAX_JOINTS);
+        assert!(error_of(format!("{head}{}", "End Site { ".repeat(300))).contains("a name of"));
+        let valid = format!("{head}{}}} MOTION Frames: 1 Frame Time: 0.04 0", joint.repeat(MAX_JOINTS - 1));
+        assert_eq!(Bvh::parse(&valid).unwrap().joints.len(), MAX_JOINTS);
     }
 
     proptest::proptest! {

@@ -35,16 +35,18 @@ impl JointChannels {
 
     /// Rotation for the channel values at the start of `values`; `None` if [`Self::rotation_order`] is.
     pub fn rotation(&self, values: &[f64]) -> Option<Rotation> {
-        let turns = self.channels.iter().zip(values).filter(|(channel, _)| matches!(channel, Channel::Rotation(_)));
-        let mut angles = turns.map(|(_, degrees)| degrees.to_radians());
+        let rotation_channels =
+            self.channels.iter().zip(values).filter(|(channel, _)| matches!(channel, Channel::Rotation(_)));
+        let mut angles = rotation_channels.map(|(_, degrees)| degrees.to_radians());
         Some(Rotation::from_euler(self.rotation_order()?, std::array::from_fn(|_| angles.next().unwrap_or(0.0))))
     }
 
     /// Writes a rotation to the channel values at the start of `values`.
     pub fn set_rotation(&self, turn: Rotation, values: &mut [f64]) {
         let angles = self.rotation_order().map(|order| turn.euler(order));
-        let turns = self.channels.iter().zip(values).filter(|(channel, _)| matches!(channel, Channel::Rotation(_)));
-        turns.zip(angles.into_iter().flatten()).for_each(|((_, value), angle)| *value = angle.to_degrees());
+        let rotation_channels =
+            self.channels.iter().zip(values).filter(|(channel, _)| matches!(channel, Channel::Rotation(_)));
+        rotation_channels.zip(angles.into_iter().flatten()).for_each(|((_, value), angle)| *value = angle.to_degrees());
     }
 }
 
@@ -97,7 +99,7 @@ impl BvhSkeleton {
     /// Joint positions for the channel values of a frame, in the file's unit; position channels are added to the
     /// offset.
     pub fn positions(&self, frame: &[f64]) -> Vec<Vec3> {
-        placed(&self.joints, frame, Positions::Add)
+        joint_positions(&self.joints, frame, Positions::Add)
     }
 
     /// BVH file with this skeleton and the channel values of `frames`.
@@ -143,9 +145,9 @@ impl BvhSkeleton {
 }
 
 /// Positions of joints, in which parents precede children, for the channel values of a frame, in the file's unit.
-pub(super) fn placed(joints: &[JointChannels], frame: &[f64], positions: Positions) -> Vec<Vec3> {
-    let mut turned = vec![Rotation::IDENTITY; joints.len()];
-    let mut placed = vec![[0.0; 3]; joints.len()];
+pub(super) fn joint_positions(joints: &[JointChannels], frame: &[f64], positions: Positions) -> Vec<Vec3> {
+    let mut global_rotations = vec![Rotation::IDENTITY; joints.len()];
+    let mut global_positions = vec![[0.0; 3]; joints.len()];
     let mut values = frame.iter();
     for (at, joint) in joints.iter().enumerate() {
         let (mut step, mut turn) = (joint.offset, Rotation::IDENTITY);
@@ -160,12 +162,15 @@ pub(super) fn placed(joints: &[JointChannels], frame: &[f64], positions: Positio
                 }
             }
         }
-        (turned[at], placed[at]) = match joint.parent {
-            Some(parent) => (turned[parent] * turn, vec3::add(placed[parent], turned[parent].turn(step))),
+        (global_rotations[at], global_positions[at]) = match joint.parent {
+            Some(parent) => (
+                global_rotations[parent] * turn,
+                vec3::add(global_positions[parent], global_rotations[parent].turn(step)),
+            ),
             None => (turn, step),
         };
     }
-    placed
+    global_positions
 }
 
 fn channel_name(channel: &Channel) -> String {

@@ -56,7 +56,7 @@ impl JsonEntry {
         if points.is_empty() {
             return Ok(None);
         }
-        let mut person = PointLayout::of_json(points.len())?.person(&points);
+        let mut person = PointLayout::for_json(points.len())?.person(&points);
         let hands = [
             ("hand_left_keypoints_2d", &self.hand_left_keypoints_2d, Side::Left),
             ("hand_right_keypoints_2d", &self.hand_right_keypoints_2d, Side::Right),

@@ -28,14 +28,14 @@ impl FoundPerson {
 
     /// Bounding box of the detected body points, with their mean score; `None` if there are none.
     pub fn area(&self) -> Option<PersonBox> {
-        let seen: Vec<&Keypoint> = self.body.iter().filter(|point| point.score > 0.0).collect();
+        let detected: Vec<&Keypoint> = self.body.iter().filter(|point| point.score > 0.0).collect();
         let side = |of: fn(&Keypoint) -> f32| {
-            seen.iter().fold([f32::MAX, f32::MIN], |[low, high], point| [low.min(of(point)), high.max(of(point))])
+            detected.iter().fold([f32::MAX, f32::MIN], |[low, high], point| [low.min(of(point)), high.max(of(point))])
         };
         let ([left, right], [top, bottom]) = (side(|p| p.x), side(|p| p.y));
-        let score = seen.iter().map(|point| point.score).sum::<f32>() / seen.len().max(1) as f32;
+        let score = detected.iter().map(|point| point.score).sum::<f32>() / detected.len().max(1) as f32;
         let area = PersonBox { x: left, y: top, width: right - left, height: bottom - top, score };
-        (!seen.is_empty()).then_some(area)
+        (!detected.is_empty()).then_some(area)
     }
 }
 
@@ -90,7 +90,7 @@ impl FoundKeypoints {
     /// Smallest image size in px that contains all body points.
     pub fn extent(&self) -> [u32; 2] {
         let points = || self.frames.iter().flatten().flat_map(|person| &person.body).filter(|point| point.score > 0.0);
-        let farthest = |of: fn(&Keypoint) -> f32| points().fold(1.0_f32, |most, point| most.max(of(point)));
+        let farthest = |of: fn(&Keypoint) -> f32| points().fold(1.0_f32, |max, point| max.max(of(point)));
         [farthest(|p| p.x), farthest(|p| p.y)].map(|px| px.min(1e6).ceil() as u32)
     }
 

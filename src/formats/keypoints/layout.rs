@@ -52,7 +52,7 @@ impl PointLayout {
 
     /// Converts `n_points` points to a person; hands that the format stores separately are missing.
     pub fn person(&self, points: &[Keypoint]) -> FoundPerson {
-        let at = |place: usize| points.get(place).copied().unwrap_or_default();
+        let at = |index: usize| points.get(index).copied().unwrap_or_default();
         let hand = |side: usize| {
             self.hands.map_or([Keypoint::default(); N_HAND], |first| std::array::from_fn(|k| at(first[side] + k)))
         };
@@ -88,11 +88,11 @@ mod tests {
             (PATS, PATS_10),
         ] {
             let names: Vec<&str> = names.split_whitespace().collect();
-            for (k, place) in layout.body.into_iter().enumerate() {
-                if place == NONE {
+            for (k, index) in layout.body.into_iter().enumerate() {
+                if index == NONE {
                     assert!(!names.contains(&wanted[k]), "{} has {}", layout.n_points, wanted[k]);
                 } else {
-                    assert_eq!(names[place], wanted[k], "{} points", layout.n_points);
+                    assert_eq!(names[index], wanted[k], "{} points", layout.n_points);
                 }
             }
         }

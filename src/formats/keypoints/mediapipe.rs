@@ -115,7 +115,7 @@ fn split(array: &ndarray::ArrayD<f32>) -> Option<Landmarks> {
 
 /// Mean distance between the wrists of the pose and those of the hands; `None` if they never occur in the same frame.
 fn wrist_gap(all: ArrayView3<f32>, pairs: [(usize, usize); 2]) -> Option<f64> {
-    let place = |t: usize, j: usize| {
+    let xy = |t: usize, j: usize| {
         let [x, y] = [all[[t, j, 0]], all[[t, j, 1]]];
         (x.is_finite() && y.is_finite() && (x != 0.0 || y != 0.0)).then_some([x, y])
     };
@@ -123,7 +123,7 @@ fn wrist_gap(all: ArrayView3<f32>, pairs: [(usize, usize); 2]) -> Option<f64> {
     let wrist_pairs = frames.flat_map(|t| pairs.map(|(wrist, root)| (t, wrist, root)));
     let gaps: Vec<f64> = wrist_pairs
         .filter_map(|(t, wrist, root)| {
-            let ([ax, ay], [bx, by]) = (place(t, wrist)?, place(t, root)?);
+            let ([ax, ay], [bx, by]) = (xy(t, wrist)?, xy(t, root)?);
             Some(f64::from((ax - bx).hypot(ay - by)))
         })
         .collect();
@@ -134,8 +134,8 @@ fn wrist_gap(all: ArrayView3<f32>, pairs: [(usize, usize); 2]) -> Option<f64> {
 fn extent(points: ArrayView3<f32>) -> f64 {
     let height = |frame: ndarray::ArrayView2<f32>| {
         let ys = frame.column(1).into_iter().copied().filter(|y| y.is_finite() && *y != 0.0).collect::<Vec<_>>();
-        let most = ys.iter().copied().fold(f32::MIN, f32::max) - ys.iter().copied().fold(f32::MAX, f32::min);
-        if ys.is_empty() { 0.0 } else { f64::from(most) }
+        let range = ys.iter().copied().fold(f32::MIN, f32::max) - ys.iter().copied().fold(f32::MAX, f32::min);
+        if ys.is_empty() { 0.0 } else { f64::from(range) }
     };
     points.outer_iter().map(height).sum()
 }

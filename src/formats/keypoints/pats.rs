@@ -27,19 +27,18 @@ pub fn read(arrays: &NamedArrays) -> Result<Option<FoundKeypoints>> {
         ensure!(shape == [n_frames, N], "`{name}` has the shape {shape:?}, expected [{n_frames}, {N}]");
     }
     let score = |t: usize, j: usize| confidence.map_or(1.0, |(_, scores)| scores[[t, j]]);
-    let place = |t: usize, j: usize| match array.shape() {
+    let xy = |t: usize, j: usize| match array.shape() {
         [_, N, 2] => [array[[t, j, 0]], array[[t, j, 1]]],
         [_, 2, N] => [array[[t, 0, j]], array[[t, 1, j]]],
         _ => [array[[t, j]], array[[t, N + j]]],
     };
     let frame = |t: usize| {
-        let points: Vec<Keypoint> =
-            (0..N).map(|j| (place(t, j), score(t, j))).map(|([x, y], s)| point(x, y, s)).collect();
+        let points: Vec<Keypoint> = (0..N).map(|j| (xy(t, j), score(t, j))).map(|([x, y], s)| point(x, y, s)).collect();
         let person = PATS.person(&points);
         if person.area().is_some() { vec![person] } else { Vec::new() }
     };
     let found = FoundKeypoints::new("PATS, 52 points".to_owned(), (0..n_frames).map(frame).collect(), Vec::new());
-    let from_neck = (0..n_frames).all(|t| place(t, 0) == [0.0; 2]);
+    let from_neck = (0..n_frames).all(|t| xy(t, 0) == [0.0; 2]);
     ensure!(
         !from_neck || found.unit == CoordinateUnit::Pixels,
         "its points lie less than 2 from the neck at 0, 0: no pixels; write them in pixels of the video's picture, in which \

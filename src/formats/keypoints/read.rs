@@ -6,7 +6,7 @@ use super::found::{CoordinateUnit, FoundKeypoints, FoundPerson};
 use super::frames::number_of;
 use super::range::check_pixels;
 use super::{arrays, document};
-use crate::joints_description::is_one;
+use crate::joints_description::is_description;
 use anyhow::{Context, Result, bail, ensure};
 use orator_base::input;
 use std::collections::{BTreeMap, BTreeSet};
@@ -57,7 +57,7 @@ fn read_folder(folder: &Path) -> Result<FoundKeypoints> {
     let listed = std::fs::read_dir(folder).with_context(|| format!("cannot list the folder {}", folder.display()))?;
     let paths = listed.filter_map(|entry| entry.ok().map(|entry| entry.path()));
     let is_frame =
-        |path: &PathBuf| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("json")) && !is_one(path);
+        |path: &PathBuf| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("json")) && !is_description(path);
     let mut files: Vec<PathBuf> = paths.filter(is_frame).collect();
     files.sort();
     ensure!(!files.is_empty(), "{} holds no .json file of a frame", folder.display());

@@ -63,9 +63,12 @@ pub fn read(path: &Path, fps: Option<FrameRate>) -> Result<MotionFile> {
         "bvh" => {
             let captured = bvh::read_unrotated(path)?;
             notes.extend(bvh::unit_note(&captured.facts).map(|note| format!("{name}: {note}")));
-            let turned = captured.facts.get("turned_degrees").and_then(serde_json::Value::as_f64).unwrap_or(0.0);
-            if turned.abs() > 0.0 {
-                notes.push(format!("{name} does not face +z: turned by {turned:.0} degrees to face the camera"));
+            let rotated_degrees =
+                captured.facts.get("turned_degrees").and_then(serde_json::Value::as_f64).unwrap_or(0.0);
+            if rotated_degrees.abs() > 0.0 {
+                notes.push(format!(
+                    "{name} does not face +z: turned by {rotated_degrees:.0} degrees to face the camera"
+                ));
             }
             captured.motion
         }
@@ -77,7 +80,7 @@ pub fn read(path: &Path, fps: Option<FrameRate>) -> Result<MotionFile> {
     }
     ensure!(motion.n_frames() > 0, "{} has no frame", path.display());
     ensure!(
-        motion.mask.iter().any(|seen| *seen),
+        motion.mask.iter().any(|is_visible| *is_visible),
         "{}: all joints of all {} frames are missing (NaN, or false in the mask)",
         path.display(),
         motion.n_frames()
@@ -118,8 +121,8 @@ fn read_npz(path: &Path, assumed: FrameRate) -> Result<(Motion, bool)> {
     let fps = if has_rate { npz.frame_rate("fps")? } else { assumed };
     let mut motion = Motion::from_joints(fps, joints);
     if npz.has("mask") {
-        let seen = npz.bools("mask", &[Some(motion.n_frames()), Some(N_JOINTS)])?.into_dimensionality::<Ix2>()?;
-        motion.mask.zip_mut_with(&seen, |there, seen| *there &= seen);
+        let is_visible = npz.bools("mask", &[Some(motion.n_frames()), Some(N_JOINTS)])?.into_dimensionality::<Ix2>()?;
+        motion.mask.zip_mut_with(&is_visible, |is_valid, is_visible| *is_valid &= is_visible);
     }
     Ok((motion, has_rate))
 }
@@ -165,21 +168,21 @@ mod tests {
         let npy = |shape: (usize, usize, usize), value: f32| {
             move |path: &Path| Array3::from_elem(shape, value).write_npy(File::create(path).unwrap()).unwrap()
         };
-        let (whole, flat) = (Array2::<i32>::zeros((4, 147)), Array::<f32, _>::zeros(147));
+        let (integers, flat) = (Array2::<i32>::zeros((4, 147)), Array::<f32, _>::zeros(147));
         let cases = [
             (error_of("gone.npy", &|_| ()), "cannot be read"),
             (error_of("empty.npy", &|path| std::fs::write(path, "").unwrap()), "is empty"),
             (error_of("joints.npy", &npy((4, 43, 3), 0.0)), "[4, 43, 3]"),
             (error_of("none.npy", &npy((0, 49, 3), 0.0)), "no frame"),
             (error_of("nan.npy", &npy((4, 49, 3), f32::NAN)), "all joints of all 4 frames are missing"),
-            (error_of("whole.npy", &|path| whole.write_npy(File::create(path).unwrap()).unwrap()), "float"),
+            (error_of("whole.npy", &|path| integers.write_npy(File::create(path).unwrap()).unwrap()), "float"),
             (error_of("a.mp4", &|path| std::fs::write(path, "x").unwrap()), "expected .npy"),
             (error_of("a.txt", &|path| std::fs::write(path, "1 2 3\n").unwrap()), "147"),
             (error_of("a.bvh", &|path| std::fs::write(path, "x").unwrap()), "a.bvh"),
             (error_of("flat.npy", &|path| flat.write_npy(File::create(path).unwrap()).unwrap()), "[147]"),
         ];
-        for (text, says) in cases {
-            assert!(text.contains(says), "{says}: {text}");
+        for (text, expected) in cases {
+            assert!(text.contains(expected), "{expected}: {text}");
         }
     }
 }

@@ -56,11 +56,11 @@ fn hand(side: Side, rotation: impl Fn(usize, usize) -> Rotation) -> HandFrame {
         let down = if row == 0 { -0.25 } else { 0.0 };
         let bone_direction = direction(side, REST_FAN[row], 0.4 * down);
         let mut at = vec3::scale(direction(side, REST_PALM[row], 1.5 * down), BONES[row][0]);
-        let mut turned = Rotation::IDENTITY;
+        let mut global_rotation = Rotation::IDENTITY;
         joints[root] = at;
         for k in 0..3 {
-            turned = turned * rotation(finger, k);
-            at = vec3::add(at, vec3::scale(turned.turn(bone_direction), BONES[row][k + 1]));
+            global_rotation = global_rotation * rotation(finger, k);
+            at = vec3::add(at, vec3::scale(global_rotation.turn(bone_direction), BONES[row][k + 1]));
             joints[root + k + 1] = at;
         }
     }

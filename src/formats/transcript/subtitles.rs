@@ -30,9 +30,9 @@ pub fn read(text: &str) -> Result<Vec<Word>> {
         }
         let shown: Vec<String> = cue.iter().map(|line| plain(line)).collect();
         let is_new = |shown: &String| !is_rolling || !previous.contains(shown);
-        let said: Vec<&str> =
+        let new_lines: Vec<&str> =
             cue.iter().zip(&shown).filter(|(_, shown)| is_new(shown)).map(|(line, _)| *line).collect();
-        push_cue(&mut words, &said.join(" "), start, end).with_context(|| format!("line {n}"))?;
+        push_cue(&mut words, &new_lines.join(" "), start, end).with_context(|| format!("line {n}"))?;
         previous = shown.into_iter().collect();
     }
     ensure!(
@@ -138,9 +138,9 @@ mod tests {
                    00:00:03.000 --> 00:00:03.010\nso well &amp;\n\n\
                    00:00:03.010 --> 00:00:04.000\nso well &amp;\nnow<00:00:03.500><c> then</c>\n";
         let words = read(vtt).unwrap();
-        let said: Vec<_> = words.iter().map(|w| (w.word.as_str(), w.start_secs, w.end_secs)).collect();
+        let found: Vec<_> = words.iter().map(|w| (w.word.as_str(), w.start_secs, w.end_secs)).collect();
         let expected = [("so", 1.0, 1.5), ("well", 1.5, 2.0), ("&", 2.0, 3.0), ("now", 3.01, 3.5), ("then", 3.5, 4.0)];
-        assert_eq!(said, expected);
+        assert_eq!(found, expected);
         assert!(words.iter().all(|word| word.source == WordSource::Given));
     }
 }

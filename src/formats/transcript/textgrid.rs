@@ -89,8 +89,8 @@ mod tests {
     fn both_formats_yield_the_words() {
         for text in [LONG, SHORT] {
             let words = read(text).unwrap();
-            let said: Vec<_> = words.iter().map(|word| (word.word.as_str(), word.start_secs, word.end_secs)).collect();
-            assert_eq!(said, [("so", 0.5, 2.0)]);
+            let found: Vec<_> = words.iter().map(|word| (word.word.as_str(), word.start_secs, word.end_secs)).collect();
+            assert_eq!(found, [("so", 0.5, 2.0)]);
         }
         assert!(read("File type = \"ooTextFile\"\n").is_err());
         for end in 0..SHORT.len() {

@@ -51,12 +51,12 @@ pub fn push(
     let confidence = confidence.filter(|confidence| (0.0..=1.0).contains(confidence));
     let n_letters: usize = text.split_whitespace().map(|word| word.chars().count()).sum();
     let secs = (end_secs - start_secs) / n_letters.max(1) as f64;
-    let is_one = text.split_whitespace().nth(1).is_none();
+    let is_single_word = text.split_whitespace().nth(1).is_none();
     let (mut n_before, mut at) = (0, start_secs);
     for word in text.split_whitespace() {
         n_before += word.chars().count();
         let until = if n_before == n_letters { end_secs } else { start_secs + secs * n_before as f64 };
-        let source = if is_one { WordSource::Given } else { WordSource::Shared };
+        let source = if is_single_word { WordSource::Given } else { WordSource::Shared };
         words.push(Word { word: word.to_owned(), start_secs: at, end_secs: until, source, confidence });
         at = until;
     }

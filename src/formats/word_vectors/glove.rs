@@ -23,10 +23,10 @@ pub fn convert(mut text: impl BufRead, path: &Path) -> Result<usize> {
         if read == 0 {
             break;
         }
-        let place = || format!("line {n}");
+        let position = || format!("line {n}");
         ensure!(line.ends_with(b"\n"), "line {n} has no end: the file is cut off, or is no text of vectors");
         let line =
-            std::str::from_utf8(&line).with_context(place).context("it is no text (UTF-8) of GloVe or word2vec")?;
+            std::str::from_utf8(&line).with_context(position).context("it is no text (UTF-8) of GloVe or word2vec")?;
         let line = line.trim_end_matches(['\n', '\r', ' ']);
         let parts: Vec<&str> = line.split(' ').collect();
         if let (1, [words, dim]) = (n, parts.as_slice()) {
@@ -38,7 +38,7 @@ pub fn convert(mut text: impl BufRead, path: &Path) -> Result<usize> {
         }
         let writer = match &mut writer {
             Some(writer) => writer,
-            None => writer.insert(TableWriter::new(path, parts.len() - 1).with_context(place)?),
+            None => writer.insert(TableWriter::new(path, parts.len() - 1).with_context(position)?),
         };
         let Some(at) = parts.len().checked_sub(writer.dim()).filter(|at| *at > 0) else {
             bail!(
@@ -59,7 +59,7 @@ pub fn convert(mut text: impl BufRead, path: &Path) -> Result<usize> {
             parts.len() - 1,
             writer.dim()
         );
-        writer.push(&word, &vector).with_context(place)?;
+        writer.push(&word, &vector).with_context(position)?;
         n_lines += 1;
     }
     if let Some(declared) = declared {

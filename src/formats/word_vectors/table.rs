@@ -150,13 +150,13 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         drop(table(dir.path(), "the 0.5 -1\nso 1 2\n").unwrap());
         let path = dir.path().join("w.safetensors");
-        let whole = std::fs::read(&path).unwrap();
-        for end in 0..whole.len() {
-            std::fs::write(&path, &whole[..end]).unwrap();
+        let file_bytes = std::fs::read(&path).unwrap();
+        for end in 0..file_bytes.len() {
+            std::fs::write(&path, &file_bytes[..end]).unwrap();
             assert!(WordVectors::open(&path).is_err(), "{end}");
         }
         for at in (0..512).step_by(3) {
-            let mut bytes = whole.clone();
+            let mut bytes = file_bytes.clone();
             bytes[at] ^= 0x15;
             std::fs::write(&path, &bytes).unwrap();
             let _ = WordVectors::open(&path).map(|table| table.vector(2));

@@ -6,7 +6,7 @@
 use super::decode::StreamDecoder;
 use super::origin;
 use super::resample::{Resampler, SoundFormat, first_not_finite, format_of};
-use super::source::{self, LONGEST_SECS, MAX_GAP_SECS, UnreadableMedia};
+use super::source::{self, MAX_GAP_SECS, MAX_SECS, UnreadableMedia};
 use anyhow::{Context, Result, bail};
 use ffmpeg_next::format::{Sample, sample};
 use ffmpeg_next::{ChannelLayout, frame};
@@ -188,7 +188,7 @@ impl<'a> SoundTimeline<'a> {
     fn is_plausible_time(&self, at: Option<f64>) -> bool {
         let end = self.end_secs();
         let at = at.unwrap_or(end);
-        at - end.max(0.0) <= MAX_GAP_SECS && at < LONGEST_SECS
+        at - end.max(0.0) <= MAX_GAP_SECS && at < MAX_SECS
     }
 
     /// Adds a frame that starts at `at` seconds; without a time it continues where the preceding audio ended.

@@ -53,7 +53,7 @@ pub struct UnreadableMedia(pub String);
 /// filled with repeated images or silence.
 pub(crate) const MAX_GAP_SECS: f64 = 600.0;
 /// Longest plausible video or audio, seconds (a day).
-pub const LONGEST_SECS: f64 = 86_400.0;
+pub const MAX_SECS: f64 = 86_400.0;
 
 /// Opens `path` and reads its headers.
 pub(crate) fn open(path: &Path) -> Result<Input> {
@@ -182,7 +182,7 @@ pub(crate) fn stated_secs(input: &Input, stream: &Stream) -> Option<f64> {
 /// Latest plausible timestamp, seconds: one minute after every stated end, but at most a day.
 pub(crate) fn latest_secs(input: &Input, stream: &Stream) -> f64 {
     let stated = lengths(input, stream).into_iter().fold(0.0, f64::max);
-    if stated > 0.0 { LONGEST_SECS.min(stated + 60.0) } else { LONGEST_SECS }
+    if stated > 0.0 { MAX_SECS.min(stated + 60.0) } else { MAX_SECS }
 }
 
 /// Stated lengths of the stream and of the file, seconds; negative if unknown.

@@ -41,9 +41,9 @@ pub(crate) fn convert(
     let weights = NcnnWeights::new(weights);
     let mut converter = NcnnConverter { blobs: BTreeMap::new(), weights, graph, input };
     for layer in &layers {
-        let place = || format!("the layer {:?} ({})", layer.name, layer.kind);
-        let outputs = converter.layer(layer).with_context(place)?;
-        ensure!(outputs.len() == layer.outputs.len(), "{} has {} outputs", place(), outputs.len());
+        let layer_name = || format!("the layer {:?} ({})", layer.name, layer.kind);
+        let outputs = converter.layer(layer).with_context(layer_name)?;
+        ensure!(outputs.len() == layer.outputs.len(), "{} has {} outputs", layer_name(), outputs.len());
         converter.blobs.extend(layer.outputs.iter().copied().zip(outputs));
     }
     converter.weights.end()?;

@@ -111,11 +111,11 @@ impl<'a> NcnnWeights<'a> {
     }
 
     fn take(&mut self, n_bytes: usize) -> Result<&'a [u8]> {
-        let (taken, rest) = self.rest.split_at_checked(n_bytes).with_context(|| {
+        let (bytes, rest) = self.rest.split_at_checked(n_bytes).with_context(|| {
             format!("{n_bytes} bytes of weights are expected, {} are left of the .bin file", self.rest.len())
         })?;
         self.rest = rest;
-        Ok(taken)
+        Ok(bytes)
     }
 
     /// Reads `n` little-endian numbers, preceded by a tag with their type. Errors: the file is too short, or the type

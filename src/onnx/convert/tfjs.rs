@@ -194,7 +194,7 @@ impl<'a> TfConverter<'a> {
     /// Adds a constant that broadcasts to `value`: its axes are the last ones of `value`, of equal size or 1.
     fn broadcast(&mut self, tensor: &TfTensor, value: &TfValue) -> Result<String> {
         let is_compatible = tensor.shape.len() <= value.shape.len()
-            && tensor.shape.iter().rev().zip(value.shape.iter().rev()).all(|(size, whole)| *size == 1 || size == whole);
+            && tensor.shape.iter().rev().zip(value.shape.iter().rev()).all(|(size, full)| *size == 1 || size == full);
         ensure!(is_compatible, "a constant of the sizes {:?} does not suit {:?}", tensor.shape, value.shape);
         match tensor.shape.as_slice() {
             [channels] if value.channels_first => self.weight(tensor, None, Some(&[*channels, 1, 1])),
@@ -275,8 +275,8 @@ impl<'a> TfConverter<'a> {
 
 /// Height and width entries of four numbers in NHWC order.
 fn height_and_width(numbers: &[i64]) -> Result<[usize; 2]> {
-    let [1, down, along, 1] = *numbers else { bail!("1, height, width, 1 are expected, not {numbers:?}") };
-    Ok([size(down)?, size(along)?])
+    let [1, height, width, 1] = *numbers else { bail!("1, height, width, 1 are expected, not {numbers:?}") };
+    Ok([size(height)?, size(width)?])
 }
 
 /// Windows over height and width.

@@ -82,12 +82,12 @@ mod tests {
     #[test]
     fn excerpt_has_the_images_and_audio_of_its_range() {
         let dir = tempfile::tempdir().unwrap();
-        let (whole, part, fps) = (dir.path().join("whole.mp4"), dir.path().join("part.mkv"), FrameRate::new(25, 1));
+        let (full, part, fps) = (dir.path().join("whole.mp4"), dir.path().join("part.mkv"), FrameRate::new(25, 1));
         let sound = Sound { samples: (0..16_000 * 30).map(|i| ((i as f32) * 0.1).sin() * 0.5).collect(), rate: 16_000 };
-        let mut video = VideoWriter::create(&whole, 64, 48, fps, Some(&sound)).unwrap();
+        let mut video = VideoWriter::create(&full, 64, 48, fps, Some(&sound)).unwrap();
         (0..25 * 30).for_each(|i| video.push(&Image::filled(64, 48, [(i / 4) as u8; 3])).unwrap());
         video.finish().unwrap();
-        let secs = copy(&whole, &part, 14.0, 5.0).unwrap();
+        let secs = copy(&full, &part, 14.0, 5.0).unwrap();
         assert!((4.9..5.2).contains(&secs), "{secs}");
         let media = probe(&part).unwrap();
         assert!(media.audio.is_some() && media.video.unwrap().coded_size == [64, 48]);
