@@ -14,7 +14,8 @@ pub fn outputs(out: &[PathBuf], is_read: impl Fn(&Path) -> bool, input: &str, hi
     for (n, path) in out.iter().enumerate() {
         ensure!(!is_read(path), "{} is {input}; write to another file", path.display());
         ensure!(!out[..n].contains(path), "{} is asked for twice", path.display());
-        let joints = out.iter().find(|joints| description::is_one(path) && description::path_of(joints) == **path);
+        let joints =
+            out.iter().find(|joints| description::is_description(path) && description::path_of(joints) == **path);
         if let Some(joints) = joints {
             bail!("{} is where the rate of {} is written; write to another file", path.display(), joints.display());
         }

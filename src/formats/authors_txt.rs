@@ -1,7 +1,7 @@
-//! Motion in the text layout of Rebol et al. 2021: one frame a line, 147 floats `x0 y0 z0 x1 ...`, metres, the neck
-//! first and at the origin, each finger TIP FIRST (in memory: base first, `skeleton::swap_authors_order`). Numbers
-//! are written as numpy's `savetxt` writes them. Values are taken as they are, rounded to f32: in the
-//! authors' predictions the hand roots (7, 28) lie some mm beside the wrists.
+//! Motion in the text layout of Rebol et al. 2021: one frame per line, 147 floats `x0 y0 z0 x1 ...` in metres, neck
+//! first and at the origin, each finger from TIP to base (in memory: base to tip, see
+//! `skeleton::swap_authors_order`). Numbers are formatted as by numpy's `savetxt`. Values are not corrected, only
+//! rounded to f32: in the authors' predictions the hand roots (7, 28) are some mm away from the wrists.
 
 use anyhow::{Context as _, bail, ensure};
 use ndarray::Array3;
@@ -12,18 +12,22 @@ use orator_base::types::time::FrameRate;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Numbers on a line.
+/// Numbers per line.
 const N_NUMBERS: usize = 3 * N_JOINTS;
-/// Distance of the neck from the origin, metres, beyond which the file is refused.
+/// Maximum absolute neck coordinate, metres; files beyond it are rejected.
 const NECK_TOLERANCE: f32 = 1e-3;
 
-/// Reads a motion of `fps` (the authors': 15). `nan` marks a missing joint. Errors name the line.
+/// Reads a motion at `fps` (15 for the authors' files). `nan` marks a missing joint.
+///
+/// # Errors
+///
+/// The line with a wrong number of values, an invalid number or a neck away from the origin; a file without frames.
 pub fn read(path: &Path, fps: FrameRate) -> anyhow::Result<Motion> {
     let text = input::read_text(path, input::MOST_DATA).with_context(|| format!("cannot read {}", path.display()))?;
     parse(&text, fps).with_context(|| format!("{} is not motion in the authors' layout", path.display()))
 }
 
-/// Reads motion from text in the authors' layout.
+/// Parses text in the authors' layout; as [`read`].
 pub fn parse(text: &str, fps: FrameRate) -> anyhow::Result<Motion> {
     let mut numbers: Vec<f32> = Vec::with_capacity(text.len() / 26);
     for (line, n) in text.lines().zip(1..).filter(|(line, _)| !line.trim().is_empty()) {
@@ -50,7 +54,7 @@ pub fn parse(text: &str, fps: FrameRate) -> anyhow::Result<Motion> {
     Ok(Motion::from_joints(fps, joints))
 }
 
-/// The motion as text; a missing joint is `nan nan nan`.
+/// Formats a motion as text; a missing joint is written as `nan nan nan`.
 pub fn format(motion: &Motion) -> String {
     let mut text = String::with_capacity(motion.n_frames() * N_NUMBERS * 26);
     for frame in motion.joints.outer_iter() {
@@ -65,19 +69,19 @@ pub fn format(motion: &Motion) -> String {
     text
 }
 
-/// numpy's `%.18e`: at least two digits of exponent, with its sign.
+/// Appends a number in numpy's `%.18e` format: signed exponent of at least two digits.
 fn push_number(text: &mut String, number: f32) {
     if !number.is_finite() {
         text.push_str("nan");
         return;
     }
-    let rust = format!("{:.18e}", f64::from(number));
-    match rust.split_once('e').map(|(digits, exponent)| (digits, exponent.parse::<i32>())) {
+    let formatted = format!("{:.18e}", f64::from(number));
+    match formatted.split_once('e').map(|(digits, exponent)| (digits, exponent.parse::<i32>())) {
         Some((digits, Ok(exponent))) => {
             let sign = if exponent < 0 { '-' } else { '+' };
             let _ = write!(text, "{digits}e{sign}{:02}", exponent.abs());
         }
-        _ => text.push_str(&rust),
+        _ => text.push_str(&formatted),
     }
 }
 
@@ -89,7 +93,7 @@ mod tests {
     const FPS: FrameRate = FrameRate::new(15, 1);
 
     #[test]
-    fn a_motion_survives_the_round_trip_and_fingers_are_tip_first() {
+    fn motion_round_trips_with_fingers_tip_first() {
         let mut joints = Array3::from_shape_fn((3, N_JOINTS, 3), |(t, j, k)| (t * 147 + j * 3 + k) as f32 * 0.37e-3);
         joints.slice_mut(ndarray::s![.., NECK, ..]).fill(0.0);
         joints.slice_mut(ndarray::s![1, 30, ..]).fill(f32::NAN);
@@ -98,7 +102,7 @@ mod tests {
         let again = parse(&text, FPS).unwrap();
         assert!(again.joints.iter().zip(&motion.joints).all(|(a, b)| a == b || (a.is_nan() && b.is_nan())));
         assert_eq!(again.mask, motion.mask);
-        // The house's left thumb tip (joint 11) is the authors' joint 8.
+        // The left thumb tip, joint 11 in memory, is the authors' joint 8.
         let numbers: Vec<f32> = text.lines().next().unwrap().split(' ').map(|w| w.parse().unwrap()).collect();
         assert_eq!(numbers[24], motion.joints[[0, 11, 0]]);
     }
@@ -107,11 +111,11 @@ mod tests {
     fn errors_name_the_line() {
         let line = vec!["0.5"; 144].join(" ");
         let good = format!("0 0 0 {line}\n");
-        let said = |text: &str| format!("{:#}", parse(text, FPS).unwrap_err());
-        assert!(said(&format!("{good}{good}0 0 0 1\n")).contains("line 3: 4 numbers, expected 147"));
-        assert!(said(&format!("{good}0 0 zero {line}\n")).contains("line 2, number 3: `zero`"));
-        assert!(said(&format!("1 0 0 {line}\n")).contains("line 1: the first joint"));
-        assert!(said("\n\n").contains("no frame"));
+        let error_of = |text: &str| format!("{:#}", parse(text, FPS).unwrap_err());
+        assert!(error_of(&format!("{good}{good}0 0 0 1\n")).contains("line 3: 4 numbers, expected 147"));
+        assert!(error_of(&format!("{good}0 0 zero {line}\n")).contains("line 2, number 3: `zero`"));
+        assert!(error_of(&format!("1 0 0 {line}\n")).contains("line 1: the first joint"));
+        assert!(error_of("\n\n").contains("no frame"));
     }
 
     proptest::proptest! {

@@ -1,5 +1,5 @@
-//! Weights and facts about them in one file: safetensors whose metadata holds one JSON object under `orator`. The same
-//! contents give the same bytes. `orator_nn::weights` reads the tensors.
+//! Weights and their metadata in one file: safetensors whose metadata holds one JSON object under `orator`. The bytes
+//! are deterministic. `orator_nn::weights` reads the tensors.
 
 use anyhow::Context;
 use orator_base::input;
@@ -8,43 +8,43 @@ use serde_json::Value;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// The key of our JSON in the file's metadata.
+/// Key of the JSON object in the safetensors metadata.
 const METADATA: &str = "orator";
-/// Name of a training checkpoint's file for a step.
+/// File name prefix of a training checkpoint, followed by its step.
 const PREFIX: &str = "step-";
 
-/// The bytes of a file with these facts and tensors.
+/// File contents for this metadata and these tensors.
 pub fn to_bytes<V: View>(facts: &Value, tensors: impl IntoIterator<Item = (String, V)>) -> anyhow::Result<Vec<u8>> {
-    // One key only: the order of a HashMap with more would change the bytes.
+    // A single key: with more, the iteration order of the HashMap would change the bytes.
     let metadata = HashMap::from([(METADATA.to_owned(), serde_json::to_string(facts)?)]);
     Ok(safetensors::serialize(tensors, Some(metadata))?)
 }
 
-/// Facts of a file alone. Errors name it.
+/// Metadata of a file, without its tensors. Errors name the file.
 pub fn facts(path: &Path) -> anyhow::Result<Value> {
     read_with(path, facts_of)
 }
 
-/// What `parse` makes of a file. Errors name it.
+/// Applies `parse` to the contents of a file. Errors name the file.
 pub fn read_with<T>(path: &Path, parse: fn(&[u8]) -> anyhow::Result<T>) -> anyhow::Result<T> {
     let bytes =
         input::read(path, input::MOST_DATA).with_context(|| format!("cannot read the weights {}", path.display()))?;
     parse(&bytes).with_context(|| format!("{} is not a checkpoint or weights file", path.display()))
 }
 
-/// Facts of a file with these bytes.
+/// Metadata in the contents of a file.
 pub fn facts_of(bytes: &[u8]) -> anyhow::Result<Value> {
     let (_, header) = safetensors::SafeTensors::read_metadata(bytes)?;
     let facts = header.metadata().as_ref().and_then(|m| m.get(METADATA)).context("it was not written by orator")?;
     Ok(serde_json::from_str(facts)?)
 }
 
-/// The checkpoint of `step` inside the folder of a training.
+/// Path of the checkpoint of `step` in the folder of a training run.
 pub fn path(folder: &Path, step: usize) -> PathBuf {
     folder.join(format!("{PREFIX}{step:07}.safetensors"))
 }
 
-/// The checkpoints in a folder, oldest first, with their steps; none when there is no such folder.
+/// Checkpoints in a folder with their steps, oldest first; empty if the folder does not exist.
 pub fn list(folder: &Path) -> anyhow::Result<Vec<(usize, PathBuf)>> {
     if !folder.exists() {
         return Ok(Vec::new());
@@ -63,7 +63,7 @@ pub fn list(folder: &Path) -> anyhow::Result<Vec<(usize, PathBuf)>> {
     Ok(found)
 }
 
-/// Removes all but the newest `n_kept` checkpoints (at least one stays).
+/// Removes all but the newest `n_kept` checkpoints; the newest one always remains.
 pub fn prune(folder: &Path, n_kept: usize) -> anyhow::Result<()> {
     let found = list(folder)?;
     let n_old = found.len().saturating_sub(n_kept.max(1));
@@ -78,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_newest_are_kept() -> anyhow::Result<()> {
+    fn prune_retains_the_newest() -> anyhow::Result<()> {
         let folder = tempfile::tempdir()?;
         for step in [100, 20, 3000] {
             std::fs::write(path(folder.path(), step), b"x")?;

@@ -1,6 +1,6 @@
-//! The description of a file of joints that cannot say its rate: `motion.npy.json` beside `motion.npy`, `motion.txt.json`
-//! beside `motion.txt`. One object: `format` "orator joints", `version` 1, `fps` [numerator, denominator] (a number is
-//! read too), `n_frames`, `shape`, `units`, `axes`.
+//! Description file for joint arrays that do not store their frame rate: `motion.npy.json` next to `motion.npy`,
+//! `motion.txt.json` next to `motion.txt`. One object: `format` "orator joints", `version` 1, `fps` [numerator,
+//! denominator] (a number is also accepted), `n_frames`, `shape`, `units`, `axes`.
 
 use anyhow::{Context as _, Result, bail, ensure};
 use orator_base::input;
@@ -11,14 +11,14 @@ use serde_json::json;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// What a file says of the joints beside it.
+/// Contents of a description file.
 #[derive(Debug, Deserialize)]
 struct JointsDescription {
     fps: DescribedRate,
     n_frames: Option<usize>,
 }
 
-/// Frames a second, as a fraction or as a number.
+/// Frames per second, as a fraction or as a number.
 #[derive(Debug, Deserialize)]
 #[serde(untagged)]
 enum DescribedRate {
@@ -26,57 +26,60 @@ enum DescribedRate {
     Number(f64),
 }
 
-/// Path of the description of the joints at `path`.
+/// Path of the description file for the joints at `path`.
 pub fn path_of(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".json");
     name.into()
 }
 
-/// Whether a file's name is that of a description.
-pub fn is_one(path: &Path) -> bool {
+/// Whether a file name is that of a description file.
+pub fn is_description(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
     [".npy.json", ".txt.json"].iter().any(|ending| name.ends_with(ending))
 }
 
-/// Rate of the joints at `path` by their description; `None` where there is none. Errors: a description that cannot be
-/// read, names no rate of motion, or is of another number of frames than `n_frames`.
+/// Frame rate of the joints at `path` according to their description file; `None` if there is none.
+///
+/// # Errors
+///
+/// The description is unreadable, has no plausible frame rate, or is for a number of frames other than `n_frames`.
 pub fn rate(path: &Path, n_frames: usize) -> Result<Option<FrameRate>> {
-    let (beside, file) = (path_of(path), path.display());
-    let text = match input::read(&beside, input::MOST_TEXT) {
+    let (description_path, file) = (path_of(path), path.display());
+    let text = match input::read(&description_path, input::MOST_TEXT) {
         Ok(text) => text,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(error).with_context(|| format!("cannot read {}", beside.display())),
+        Err(error) => return Err(error).with_context(|| format!("cannot read {}", description_path.display())),
     };
-    let beside = beside.display();
+    let description_path = description_path.display();
     let remedy = || format!("delete it, or write {{\"fps\": [30, 1]}} (or what {file} has) into it");
-    let said: JointsDescription = serde_json::from_slice(&text)
-        .with_context(|| format!("{beside} does not say the frames a second of {file}: {}", remedy()))?;
-    let rate = match said.fps {
+    let description: JointsDescription = serde_json::from_slice(&text)
+        .with_context(|| format!("{description_path} does not say the frames a second of {file}: {}", remedy()))?;
+    let rate = match description.fps {
         DescribedRate::Fraction([num, den]) if num > 0 && den > 0 => Some(FrameRate::new(num, den)),
         DescribedRate::Number(per_sec) => FrameRate::nearest(per_sec),
         DescribedRate::Fraction(_) => None,
     };
     let Some(rate) = rate.filter(|rate| rate.is_plausible()) else {
-        bail!("{beside}: its `fps` is no frame rate of motion, 1 to 1000 frames a second: {}", remedy())
+        bail!("{description_path}: its `fps` is no frame rate of motion, 1 to 1000 frames a second: {}", remedy())
     };
-    if let Some(described) = said.n_frames {
+    if let Some(described) = description.n_frames {
         ensure!(
             described == n_frames,
-            "{beside} describes {described} frames and {file} has {n_frames}: it is of another motion; {}",
+            "{description_path} describes {described} frames and {file} has {n_frames}: it is of another motion; {}",
             remedy()
         );
     }
     Ok(Some(rate))
 }
 
-/// Writes the numbers at `path` by `write`, and their description. An old description is gone before the numbers are
-/// there, so that it never speaks for new ones.
+/// Writes the joints to `path` with `write`, then their description. An old description is removed first, so that it
+/// can never be mistaken for that of the new joints.
 pub fn with(path: &Path, fps: FrameRate, shape: &[usize], write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
-    let beside = path_of(path);
-    match std::fs::remove_file(&beside) {
+    let description_path = path_of(path);
+    match std::fs::remove_file(&description_path) {
         Err(error) if !matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
-            return Err(error).with_context(|| format!("cannot replace {}", beside.display()));
+            return Err(error).with_context(|| format!("cannot replace {}", description_path.display()));
         }
         _ => workdir::replace(path, write)?,
     }
@@ -89,7 +92,7 @@ pub fn with(path: &Path, fps: FrameRate, shape: &[usize], write: impl FnOnce(&Pa
         "units": "metres",
         "axes": "x image right, y down, z away from the camera, the neck at the origin",
     });
-    workdir::write_file(&beside, format!("{description}\n").as_bytes())
+    workdir::write_file(&description_path, format!("{description}\n").as_bytes())
 }
 
 #[cfg(test)]
@@ -97,11 +100,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_rate_comes_back_and_one_of_other_frames_is_refused() {
+    fn rate_round_trips_and_other_frame_count_is_rejected() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.npy");
-        let text = |said: &str| std::fs::write(path_of(&path), said).unwrap();
-        let says = |words: &str| {
+        let text = |description: &str| std::fs::write(path_of(&path), description).unwrap();
+        let assert_error = |words: &str| {
             let error = format!("{:#}", rate(&path, 4).unwrap_err());
             assert!(error.contains("a.npy.json") && error.contains(words), "{error}");
         };
@@ -109,17 +112,17 @@ mod tests {
         let ntsc = FrameRate::new(30_000, 1001);
         with(&path, ntsc, &[4, 49, 3], |attempt| Ok(std::fs::write(attempt, "numbers")?)).unwrap();
         assert_eq!(rate(&path, 4).unwrap(), Some(ntsc));
-        assert!(is_one(&path_of(&path)) && !is_one(&path) && !is_one(Path::new("a.json")));
+        assert!(is_description(&path_of(&path)) && !is_description(&path) && !is_description(Path::new("a.json")));
         assert!(format!("{:#}", rate(&path, 5).unwrap_err()).contains("describes 4 frames"));
         text("{\"fps\": 29.97}");
         assert_eq!(rate(&path, 9).unwrap(), Some(ntsc));
         text("{\"fps\": [30, 0]}");
-        says("1 to 1000");
+        assert_error("1 to 1000");
         text("{\"fps\": 0.5}");
-        says("1 to 1000");
+        assert_error("1 to 1000");
         text("{\"rate\": 30}");
-        says("does not say the frames a second");
+        assert_error("does not say the frames a second");
         text("no JSON");
-        says("delete it");
+        assert_error("delete it");
     }
 }

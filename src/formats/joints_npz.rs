@@ -1,6 +1,6 @@
-//! The joints file `joints.npz`: the 3D motion of a video. Arrays: `pose3d` f32 [T,49,3] (metres, house order, NaN
-//! where there is no motion), `mask` bool [T,49], `fps` f64 [2] (numerator, denominator); of a lifted video `extra` f32
-//! [T,3,3] too: nose, right hip, left hip, in the axes of the joints, NaN where not known.
+//! `joints.npz`: the 3D motion of a video. Arrays: `pose3d` f32 [T,49,3] (metres, joint order and axes of
+//! `types::skeleton`, NaN where there is no motion), `mask` bool [T,49], `fps` f64 [2] (numerator, denominator); for
+//! a lifted video also `extra` f32 [T,3,3]: nose, right hip, left hip in the same axes, NaN if unknown.
 
 use super::npz::{self, Npz};
 use anyhow::{Context, Result};
@@ -9,7 +9,11 @@ use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::N_JOINTS;
 use std::path::Path;
 
-/// Reads the motion. Errors: unreadable, an array missing or of a wrong shape.
+/// Reads the motion.
+///
+/// # Errors
+///
+/// The file is unreadable, or an array is missing, has a wrong shape or is out of range.
 pub fn read(path: &Path) -> Result<Motion> {
     let mut npz = Npz::open(path)?;
     let joints = npz.floats("pose3d", &[None, Some(N_JOINTS), Some(3)])?.into_dimensionality::<Ix3>()?;
@@ -18,7 +22,7 @@ pub fn read(path: &Path) -> Result<Motion> {
     motion.in_range().with_context(|| path.display().to_string())
 }
 
-/// Reads nose, right hip and left hip [T, 3, 3] beside the motion; `None` in a file without them. Errors as `read`.
+/// Reads nose, right hip and left hip [T, 3, 3]; `None` if the file lacks them. Errors as [`read`].
 pub fn read_extra(path: &Path) -> Result<Option<Array3<f32>>> {
     let mut npz = Npz::open(path)?;
     if !npz.has("extra") {
@@ -27,12 +31,12 @@ pub fn read_extra(path: &Path) -> Result<Option<Array3<f32>>> {
     Ok(Some(npz.floats("extra", &[None, Some(3), Some(3)])?.into_dimensionality::<Ix3>()?))
 }
 
-/// Writes the file at `path`; the same motion gives the same bytes.
+/// Writes the file at `path`. The bytes are deterministic.
 pub fn write(path: &Path, motion: &Motion) -> Result<()> {
     write_with(path, motion, None)
 }
 
-/// Writes the file of a lifted video, with its nose and hips.
+/// Writes the file of a lifted video, including nose and hips.
 pub fn write_lifted(path: &Path, motion: &Motion, extra: &Array3<f32>) -> Result<()> {
     write_with(path, motion, Some(extra))
 }
@@ -53,7 +57,7 @@ mod tests {
     use orator_base::types::time::FrameRate;
 
     #[test]
-    fn nose_and_hips_lie_beside_the_joints() {
+    fn nose_and_hips_are_stored_with_the_joints() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("joints.npz");
         let motion = Motion::from_joints(FrameRate::new(15, 1), Array3::zeros((2, N_JOINTS, 3)));
@@ -67,15 +71,15 @@ mod tests {
     proptest::proptest! {
         #![proptest_config(proptest::test_runner::Config::with_cases(24))]
         #[test]
-        fn any_motion_comes_back(
+        fn motion_round_trips(
             n_frames in 0usize..4,
             (num, den) in (1u32..100_000, 1u32..1_002),
             numbers in proptest::collection::vec((proptest::num::f32::ANY, proptest::bool::ANY), 49 * 9),
             are_scaled in proptest::bool::ANY,
         ) {
             let at = |t: usize, j: usize, k: usize| {
-                let (number, seen) = numbers[(t * 147 + j * 3 + k) % numbers.len()];
-                (if are_scaled { number.sin() * 99.0 } else { number }, seen)
+                let (number, is_visible) = numbers[(t * 147 + j * 3 + k) % numbers.len()];
+                (if are_scaled { number.sin() * 99.0 } else { number }, is_visible)
             };
             let motion = Motion {
                 fps: FrameRate::new(num, den),

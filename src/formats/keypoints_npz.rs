@@ -1,9 +1,8 @@
-//! The keypoints file `keypoints.npz`: the 2D keypoints of a video at the dataset rate. Arrays: `body` f32 [T,17,3]
-//! (COCO-17; x px, y px, score), `left_hand` and `right_hand` f32 [T,21,3], `image_size` i64 [2] (width, height),
-//! `fps` f64 [2] (numerator, denominator; one number is read too), `time_secs` f64 [T], `person` f32 [T,5]
-//! (x, y, width, height, score), `n_people` i64 [T], `identity` i64 [T], `other_hand` i64 [T,2]
-//! (1 where a hand is missing because the other one was found in its place); where a face model looked, `mouth_opening`
-//! and `face_score` f32 [T].
+//! `keypoints.npz`: the 2D keypoints of a video at the dataset rate. Arrays: `body` f32 [T,17,3] (COCO-17; x px, y
+//! px, score), `left_hand`, `right_hand` f32 [T,21,3], `image_size` i64 [2] (width, height), `fps` f64 [2]
+//! (numerator, denominator; one number is also accepted), `time_secs` f64 [T], `person` f32 [T,5] (x, y, width,
+//! height, score), `n_people` i64 [T], `identity` i64 [T], `other_hand` i64 [T,2] (1: this hand was a duplicate of
+//! the other one); with a face model also `mouth_opening`, `face_score` f32 [T].
 
 use super::keypoints::range;
 use super::npz::{self, Npz};
@@ -13,57 +12,65 @@ use orator_base::types::pose2d::{Keypoints, N_BODY, N_HAND};
 use orator_base::types::time::FrameRate;
 use std::path::Path;
 
-/// Arrays of the file beside the keypoints.
+/// Arrays of the file other than the keypoints.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Extras {
     /// Source time of each frame in seconds, [T].
     pub time_secs: Array1<f64>,
-    /// Box of the followed person: x, y, width, height in px, score; [T, 5].
+    /// Bounding box of the tracked person: x, y, width, height in px, score; [T, 5].
     pub person: Array2<f32>,
-    /// People seen in each frame, [T].
+    /// Number of persons detected in each frame, [T].
     pub n_people: Array1<i64>,
-    /// Number of the person tracked in each frame, [T]: one higher where another person is taken, or tracking begins anew.
+    /// Identity of the tracked person in each frame, [T]; incremented when another person is selected or tracking
+    /// restarts.
     pub identity: Array1<i64>,
-    /// Whether the left and the right hand are missing because the other one was found in their place, [T, 2].
+    /// Whether the left and the right hand are missing because the detection at their position was the other hand,
+    /// [T, 2].
     pub other_hand: Array2<bool>,
-    /// What was seen of the face; none where no face model looked.
+    /// Face measurements; `None` if no face model was run.
     pub face: Option<FaceFrames>,
 }
 
-/// The face of the followed person in each frame.
+/// Face measurements of the tracked person in each frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FaceFrames {
-    /// Distance of the lips in distances between the outer corners of the eyes, [T]; NaN: not seen.
+    /// Distance between the lips divided by the distance between the outer eye corners, [T]; NaN: no face detected.
     pub opening: Array1<f32>,
-    /// How sure it is that there is a face, 0..1, [T]; 0: not seen.
+    /// Confidence that a face is present, 0..1, [T]; 0: no face detected.
     pub score: Array1<f32>,
 }
 
-/// Least width and height of a picture, px: less is no picture's size.
-const SMALLEST_PICTURE: u32 = 16;
+/// Minimum plausible width and height of an image, px.
+const MIN_IMAGE_SIDE: u32 = 16;
 
-/// Reads the keypoints, in pixels. A point with a number that is not finite is a missing one (all zeros). Errors: unreadable,
-/// `body` missing, arrays of wrong or unequal shapes.
+/// Reads the keypoints, in pixels. A point with a non-finite value becomes a missing point (all zeros).
+///
+/// # Errors
+///
+/// The file is unreadable, `body` is missing, or arrays have wrong or inconsistent shapes.
 pub fn read(path: &Path) -> Result<Keypoints> {
     Ok(read_noting(path)?.0)
 }
 
-/// `read`, and a sentence for each array that was not there with what stands in for it.
+/// [`read`], with one note for each missing array that names its substitute.
 pub fn read_noting(path: &Path) -> Result<(Keypoints, Vec<String>)> {
     read_sized(path, None)
 }
 
-/// `read_noting` of a picture whose `size` (width, height) is given, where it is, in place of the file's. Coordinates in
-/// 0..1 are shares of the picture: they become pixels by its size. Errors: as `read`, and shares of a picture whose
-/// size is not known.
+/// [`read_noting`], with `size` (width, height), if given, replacing the image size of the file. Coordinates in 0..1
+/// are fractions of the image size and are converted to pixels.
+///
+/// # Errors
+///
+/// Those of [`read`]; fractional coordinates without a known image size.
 pub fn read_sized(path: &Path, size: Option<[u32; 2]>) -> Result<(Keypoints, Vec<String>)> {
     let (mut keypoints, known_size, mut notes) = read_as_written(path)?;
     if let Some(size) = size {
         keypoints.image_size = size;
         notes.retain(|note| !note.contains("`image_size`"));
     }
-    if range::are_shares(range::places(&keypoints)) {
-        let size = size.or(known_size).filter(|size| size.iter().all(|px| *px >= SMALLEST_PICTURE));
+    if range::are_fractions(range::coordinates(&keypoints)) {
+        let size = size.or(known_size).filter(|size| size.iter().all(|px| *px >= MIN_IMAGE_SIDE));
         let Some([width, height]) = size else {
             bail!(
                 "{}: its coordinates lie in 0..1, shares of the picture's width and height, and the picture's size is not \
@@ -71,9 +78,9 @@ pub fn read_sized(path: &Path, size: Option<[u32; 2]>) -> Result<(Keypoints, Vec
                 path.display()
             );
         };
-        let n_negative = range::places(&keypoints).filter(|place| place[0] < 0.0 || place[1] < 0.0).count();
+        let n_negative = range::coordinates(&keypoints).filter(|xy| xy[0] < 0.0 || xy[1] < 0.0).count();
         ensure!(
-            n_negative * 5 < range::places(&keypoints).count().max(1),
+            n_negative * 5 < range::coordinates(&keypoints).count().max(1),
             "{}: its coordinates lie between -1 and 1: expected pixels, or shares of the picture from 0 to 1",
             path.display()
         );
@@ -88,7 +95,7 @@ pub fn read_sized(path: &Path, size: Option<[u32; 2]>) -> Result<(Keypoints, Vec
     Ok((keypoints, notes))
 }
 
-/// The keypoints in the unit of the file, the picture's size where the file says it, and `read_noting`'s sentences.
+/// The keypoints in the unit of the file, the image size if the file has one, and the notes of [`read_noting`].
 pub(super) fn read_as_written(path: &Path) -> Result<(Keypoints, Option<[u32; 2]>, Vec<String>)> {
     let mut npz = Npz::open(path)?;
     let mut notes = Vec::new();
@@ -129,7 +136,11 @@ pub(super) fn read_as_written(path: &Path) -> Result<(Keypoints, Option<[u32; 2]
     Ok((Keypoints { fps, image_size, body, left_hand, right_hand }, known_size, notes))
 }
 
-/// Reads what the file holds beside the keypoints. Errors: unreadable, missing, wrong shapes.
+/// Reads the arrays other than the keypoints.
+///
+/// # Errors
+///
+/// The file is unreadable, or an array is missing or has a wrong shape.
 pub fn read_extras(path: &Path) -> Result<Extras> {
     let mut npz = Npz::open(path)?;
     let time_secs = npz.numbers("time_secs", &[None])?.into_dimensionality::<Ix1>()?;
@@ -137,21 +148,21 @@ pub fn read_extras(path: &Path) -> Result<Extras> {
     let person = npz.floats("person", &[n_frames, Some(5)])?.into_dimensionality::<Ix2>()?;
     let n_people = npz.numbers("n_people", &[n_frames])?.mapv(|v| v as i64).into_dimensionality::<Ix1>()?;
     let identity = npz.numbers("identity", &[n_frames])?.mapv(|v| v as i64).into_dimensionality::<Ix1>()?;
-    // Files of earlier versions do not tell.
+    // Files of earlier versions lack this array.
     let other_hand = match npz.has("other_hand") {
         true => npz.numbers("other_hand", &[n_frames, Some(2)])?.mapv(|v| v != 0.0).into_dimensionality::<Ix2>()?,
         false => Array2::from_elem((time_secs.len(), 2), false),
     };
     let face = npz.has("mouth_opening").then(|| -> Result<FaceFrames> {
-        let mut of_face =
+        let mut face_array =
             |name: &str| -> Result<Array1<f32>> { Ok(npz.floats(name, &[n_frames])?.into_dimensionality::<Ix1>()?) };
-        Ok(FaceFrames { opening: of_face("mouth_opening")?, score: of_face("face_score")? })
+        Ok(FaceFrames { opening: face_array("mouth_opening")?, score: face_array("face_score")? })
     });
     let face = face.transpose()?;
     Ok(Extras { time_secs, person, n_people, identity, other_hand, face })
 }
 
-/// Writes the file at `path`; the same keypoints give the same bytes.
+/// Writes the file at `path`. The bytes are deterministic.
 pub fn write(path: &Path, keypoints: &Keypoints, extras: &Extras) -> Result<()> {
     npz::write(path, |npz| {
         npz.add_array("body", &keypoints.body)?;
@@ -174,7 +185,7 @@ pub fn write(path: &Path, keypoints: &Keypoints, extras: &Extras) -> Result<()> 
     })
 }
 
-/// [T, n, 3] with every point that is not finite made a missing one.
+/// Points [T, n, 3], with every non-finite point replaced by a missing one (zeros).
 fn points(array: ArrayD<f32>) -> Result<Array3<f32>> {
     let mut points = array.into_dimensionality::<Ix3>()?;
     for mut point in points.lanes_mut(ndarray::Axis(2)) {
@@ -197,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bare_body_is_enough_what_stands_in_is_said_and_a_wrong_shape_is_an_error() {
+    fn missing_arrays_are_noted_and_wrong_shapes_are_errors() {
         let dir = tempfile::tempdir().unwrap();
         let mut body = Array3::from_elem((2, N_BODY, 3), 7.0);
         body[[1, 3, 0]] = f64::NAN;
@@ -214,7 +225,7 @@ mod tests {
     proptest::proptest! {
         #![proptest_config(proptest::test_runner::Config::with_cases(24))]
         #[test]
-        fn any_finite_keypoints_come_back_and_the_bytes_repeat(
+        fn finite_keypoints_round_trip_with_deterministic_bytes(
             n_frames in 0usize..4,
             sides in [1u32..1_000_000, 1u32..1_000_000],
             has_face in proptest::bool::ANY,

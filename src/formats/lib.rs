@@ -1,4 +1,4 @@
-//! File formats, read and written. Every reader names the file, the place and what was expected.
+//! Readers and writers of file formats. Every read error names the file, the position in it and what was expected.
 
 pub mod authors_txt;
 pub mod bvh;

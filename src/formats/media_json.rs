@@ -1,4 +1,4 @@
-//! `media.json`: what a video is, as far as the stages after the first need it and people want to know.
+//! `media.json`: properties of a video that later stages and users need.
 
 use anyhow::{Context, Result, ensure};
 use orator_base::input;
@@ -8,45 +8,45 @@ use orator_base::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// A video: its length at the dataset rate, and what its file holds.
+/// Properties of a video: its length at the dataset rate, and the contents of its file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MediaInfo {
     pub duration_secs: f64,
-    /// Frames at the dataset rate.
+    /// Number of frames at the dataset rate.
     pub n_frames: usize,
     /// The dataset rate.
     pub fps: FrameRate,
-    /// Width and height in px as shown: turned upright, with square pixels.
+    /// Width and height in px as displayed: upright, with square pixels.
     #[serde(default)]
     pub image_size: [usize; 2],
-    /// Degrees clockwise from coded to upright: 0, 90, 180 or 270.
+    /// Clockwise rotation from coded to upright image, degrees: 0, 90, 180 or 270.
     pub rotation: Option<u32>,
-    /// ffmpeg's name: `h264`, `hevc`, `vp9`.
+    /// Codec name used by ffmpeg: `h264`, `hevc`, `vp9`.
     pub codec: Option<String>,
-    /// Average frames a second of the file; `None` if no header says.
+    /// Average frame rate of the file; `None` if no header states it.
     pub source_fps: Option<FrameRate>,
     #[serde(default)]
     pub has_audio: bool,
-    /// Length of the sound, seconds.
+    /// Length of the audio, seconds.
     pub audio_secs: Option<f64>,
-    /// What could not be read of the file.
+    /// Description of the parts of the file that could not be read.
     pub damage: Option<String>,
-    /// How its pictures are to be read.
+    /// Options for decoding the images.
     #[serde(default, skip_serializing_if = "PictureOptions::is_plain")]
     pub pictures: PictureOptions,
-    /// Part of the pictures between bars, px of the upright picture; `None` without bars.
+    /// Area inside letterbox or pillarbox bars, px of the upright image; `None` without bars.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub active_area: Option<PixelArea>,
     /// HDR transfer function, `PQ` or `HLG`; `None` for SDR.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hdr: Option<String>,
-    /// Number of times the size of the pictures changes.
+    /// Number of times the image size changes.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub n_resizes: usize,
-    /// The sound tracks, where there are several.
+    /// Audio tracks, if there are several.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub audio_tracks: Option<AudioTracks>,
-    /// Format of the keypoints that stand in for the pictures, `OpenPose, 25 points`; `None`: a video with pictures.
+    /// Format of the keypoints that replace the video, such as `OpenPose, 25 points`; `None` for a video.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub keypoints_from: Option<String>,
 }
@@ -55,11 +55,11 @@ fn is_zero(n: &usize) -> bool {
     *n == 0
 }
 
-/// Properties that only pictures tell, for people.
-const OF_PICTURES: &str = "cuts, still pictures and whether the person is a picture";
+/// Checks that require images, as listed in messages.
+const IMAGE_CHECKS: &str = "cuts, still pictures and whether the person is a picture";
 
 impl MediaInfo {
-    /// A video of which nothing but its length is known.
+    /// A video of which only the length is known.
     pub const fn new(duration_secs: f64, n_frames: usize, fps: FrameRate) -> Self {
         Self {
             duration_secs,
@@ -81,7 +81,7 @@ impl MediaInfo {
         }
     }
 
-    /// What is out of the ordinary about a file, and what was done about it.
+    /// Notes on unusual properties of the file and how each one was handled.
     pub fn remarks(&self) -> Vec<String> {
         let mut remarks = Vec::new();
         if self.pictures.deinterlace {
@@ -109,13 +109,17 @@ impl MediaInfo {
         remarks
     }
 
-    /// Sentence about what is not judged, as there are no pictures; `None`: all of it is.
+    /// Note on the checks that were skipped because there are no images; `None` for a video.
     pub fn not_judged(&self) -> Option<String> {
         let format = self.keypoints_from.as_ref()?;
-        Some(format!("from keypoints ({format}), without pictures: {OF_PICTURES} are not judged"))
+        Some(format!("from keypoints ({format}), without pictures: {IMAGE_CHECKS} are not judged"))
     }
 
-    /// Reads `media.json`. Errors: unreadable, incomplete, or a duration that is none.
+    /// Reads `media.json`.
+    ///
+    /// # Errors
+    ///
+    /// The file is unreadable or incomplete, or has an invalid duration or frame rate.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = input::read(path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
         let info: Self = serde_json::from_slice(&bytes).with_context(|| format!("{} is incomplete", path.display()))?;

@@ -1,6 +1,6 @@
-//! NumPy's `.npy` files: motion as a plain array [T, 49, 3], a missing joint NaN, without its rate; and the float32 and
-//! bool arrays of a shard (version 1.0, little endian, C order), whose rows are found without reading the whole file.
-//! Whatever a header promises is checked against the bytes there are before memory is allocated.
+//! NumPy `.npy` files: motion as a plain array [T, 49, 3] (NaN: missing joint; no frame rate), and the float32 and
+//! bool arrays of a shard (version 1.0, little endian, C order), whose rows are located without reading the complete
+//! file. Every size in a header is checked against the bytes present before memory is allocated.
 
 use anyhow::{Context as _, bail, ensure};
 use ndarray::{Array, Array3, ArrayD, Dimension, IxDyn};
@@ -14,8 +14,8 @@ use std::fs::File;
 use std::io::{BufWriter, Write as _};
 use std::path::Path;
 
-/// Reads a motion of `fps` from an array of f32 or f64, [T, 49, 3] or [T, 147] (joint after joint); a joint that is not
-/// finite is missing, in the mask too.
+/// Reads a motion at `fps` from an f32 or f64 array [T, 49, 3] or [T, 147] (joint by joint), in metres. Joints with a
+/// non-finite coordinate are missing and cleared in the mask.
 pub fn read(path: &Path, fps: FrameRate) -> anyhow::Result<Motion> {
     let bytes = input::read(path, input::MOST_DATA).with_context(|| format!("cannot open {}", path.display()))?;
     let numbers = match typed::<f32>(&bytes) {
@@ -36,10 +36,11 @@ pub fn read(path: &Path, fps: FrameRate) -> anyhow::Result<Motion> {
     Ok(Motion::from_joints(fps, joints))
 }
 
-/// Most bytes of a header, its magic string and length included.
-pub(crate) const MOST_HEADER_BYTES: u64 = 1 << 16;
+/// Maximum size of a header including magic string and length field, bytes.
+pub(crate) const MAX_HEADER_BYTES: u64 = 1 << 16;
 
-/// Bytes of a whole file that begins with `head`, as its header promises; `None` where it has no numbers.
+/// Total size in bytes of the file that begins with `head`, computed from its header; `None` if the header is invalid
+/// or its element type is not numeric.
 pub(crate) fn file_bytes(head: &[u8]) -> Option<u64> {
     if !has_small_header(head) {
         return None;
@@ -47,27 +48,27 @@ pub(crate) fn file_bytes(head: &[u8]) -> Option<u64> {
     let mut rest = head;
     let header = Header::from_reader(&mut rest).ok()?;
     let n_header = (head.len() - rest.len()) as u64;
-    // `<f4`, `|b1`: the last digits are the bytes of a number.
+    // The digits of a type descriptor (`<f4`, `|b1`) give the bytes per element.
     let kind = header.type_descriptor.as_string()?;
     let bytes: u64 = kind.trim_start_matches(['<', '>', '|', '=']).strip_prefix(['f', 'i', 'u', 'b'])?.parse().ok()?;
     header.shape.iter().try_fold(bytes, |n, &axis| n.checked_mul(axis as u64))?.checked_add(n_header)
 }
 
-/// An array from the bytes of its file. What the header promises is held against these bytes before anything is
-/// allocated for it.
+/// Parses an array from the bytes of its file. The size in the header is checked against these bytes before memory is
+/// allocated.
 pub(crate) fn parse<T: ReadableElement, D: Dimension>(bytes: &[u8]) -> Result<Array<T, D>, ReadNpyError> {
     if !has_small_header(bytes) {
         return Err(ReadNpyError::MissingData);
     }
     let n_numbers = Header::from_reader(&mut &*bytes)?.shape.iter().try_fold(1usize, |n, axis| n.checked_mul(*axis));
-    // A number takes a byte at least; the exact length is checked while reading.
+    // Every element takes at least one byte; the exact length is checked by the reader.
     if n_numbers.is_none_or(|n| n > bytes.len()) {
         return Err(ReadNpyError::MissingData);
     }
     Array::read_npy(bytes)
 }
 
-/// The array if it is of type `T`; `None` if it is of another type.
+/// The array if its elements are of type `T`; `None` if they are of another type.
 pub(crate) fn typed<T: ReadableElement>(bytes: &[u8]) -> Result<Option<ArrayD<T>>, ReadNpyError> {
     match parse::<T, IxDyn>(bytes) {
         Err(ReadNpyError::WrongDescriptor(_)) => Ok(None),
@@ -75,7 +76,7 @@ pub(crate) fn typed<T: ReadableElement>(bytes: &[u8]) -> Result<Option<ArrayD<T>
     }
 }
 
-/// An array of any usual type of numbers; `None` if it is of another type.
+/// Numeric array (f32, f64, i64, i32 or u32) as f64; `None` if its elements are of another type.
 pub(crate) fn numbers(bytes: &[u8]) -> Result<Option<ArrayD<f64>>, ReadNpyError> {
     Ok(if let Some(array) = typed::<f32>(bytes)? {
         Some(array.mapv(f64::from))
@@ -90,7 +91,8 @@ pub(crate) fn numbers(bytes: &[u8]) -> Result<Option<ArrayD<f64>>, ReadNpyError>
     })
 }
 
-/// Whether the whole header is there, without brackets in brackets in brackets (its parser is recursive).
+/// Whether the header is complete and has few brackets: its parser is recursive and deep nesting would overflow the
+/// stack.
 fn has_small_header(bytes: &[u8]) -> bool {
     let header = match bytes {
         [_, _, _, _, _, _, 1, _, a, b, rest @ ..] => rest.get(..usize::from(u16::from_le_bytes([*a, *b]))),
@@ -100,24 +102,24 @@ fn has_small_header(bytes: &[u8]) -> bool {
     header.is_some_and(|header| header.iter().filter(|byte| b"([{".contains(byte)).count() <= 16)
 }
 
-/// Writes the joints. Call it inside `stage::workdir::replace`: it writes in place.
+/// Writes the joints as [T, 49, 3]. This writes in place, so call it inside `stage::workdir::replace`.
 pub fn write(path: &Path, motion: &Motion) -> anyhow::Result<()> {
     write_points(path, &motion.joints)
 }
 
-/// Writes points [T, n, 3] of any number a frame; as `write`.
+/// Writes points [T, n, 3] for any n, in place like [`write`].
 pub fn write_points(path: &Path, points: &Array3<f32>) -> anyhow::Result<()> {
     let mut file = BufWriter::new(File::create(path)?);
     points.as_standard_layout().write_npy(&mut file)?;
     Ok(file.flush()?)
 }
 
-/// Enough bytes from the start of any array of a shard to hold its whole header.
+/// Number of bytes at the start of a shard's array that always contain its header.
 pub const HEADER_BYTES: usize = 128;
 
 const MAGIC: &[u8] = b"\x93NUMPY\x01\x00";
 
-/// An element type of the arrays in a shard.
+/// Element type of a shard array.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Element {
     F32,
@@ -144,7 +146,7 @@ fn header(element: Element, shape: &[usize]) -> Vec<u8> {
     let shape: String = shape.iter().map(|n| format!("{n}, ")).collect();
     let shape = shape.trim_end_matches(' ');
     let dict = format!("{{'descr': '{}', 'fortran_order': False, 'shape': ({shape}), }}", element.descr());
-    // Spaces and a line feed pad the header, so that the data begins at a multiple of 64 bytes.
+    // The header is padded with spaces and a line feed, so that the data starts at a multiple of 64 bytes.
     let length = (MAGIC.len() + 2 + dict.len() + 1).next_multiple_of(64) - MAGIC.len() - 2;
     let mut bytes = MAGIC.to_vec();
     bytes.extend((length as u16).to_le_bytes());
@@ -154,7 +156,7 @@ fn header(element: Element, shape: &[usize]) -> Vec<u8> {
     bytes
 }
 
-/// The file of a float32 array of `shape`; `values` in C order.
+/// File contents of a float32 array of `shape`; `values` in C order.
 pub fn write_f32<'a>(shape: &[usize], values: impl Iterator<Item = &'a f32>) -> Vec<u8> {
     let mut bytes = header(Element::F32, shape);
     bytes.reserve(4 * shape.iter().product::<usize>());
@@ -162,14 +164,14 @@ pub fn write_f32<'a>(shape: &[usize], values: impl Iterator<Item = &'a f32>) -> 
     bytes
 }
 
-/// The file of a bool array of `shape`; `values` in C order.
+/// File contents of a bool array of `shape`; `values` in C order.
 pub fn write_bool<'a>(shape: &[usize], values: impl Iterator<Item = &'a bool>) -> Vec<u8> {
     let mut bytes = header(Element::Bool, shape);
     bytes.extend(values.map(|&value| u8::from(value)));
     bytes
 }
 
-/// Position of the rows of an array in its file.
+/// Location of the rows of an array in its file, in bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layout {
     pub data_at: usize,
@@ -178,8 +180,12 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// Reads the header at the start of `bytes` of a file of `file_bytes`. The array must hold `element`s, its
-    /// rows must have the shape `row`, and the file must be exactly as long as the header says.
+    /// Parses the header at the start of `bytes`; the complete file has `file_bytes` bytes.
+    ///
+    /// # Errors
+    ///
+    /// The elements are not of type `element`, the rows do not have the shape `row`, or the file is not exactly as
+    /// long as the header implies.
     pub fn parse(bytes: &[u8], file_bytes: u64, element: Element, row: &[usize]) -> anyhow::Result<Layout> {
         ensure!(bytes.starts_with(MAGIC), "not a .npy file of version 1.0");
         let length = match bytes.get(8..10) {
@@ -208,12 +214,12 @@ impl Layout {
     }
 }
 
-/// Little endian bytes as float32; a rest of fewer than four bytes is left out.
+/// Little-endian bytes as float32; a trailing remainder of fewer than four bytes is ignored.
 pub fn floats(bytes: &[u8]) -> Vec<f32> {
     bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
 }
 
-/// Bytes as bool.
+/// Bytes as bool; every non-zero byte is true.
 pub fn bools(bytes: &[u8]) -> Vec<bool> {
     bytes.iter().map(|&b| b != 0).collect()
 }
@@ -223,14 +229,14 @@ pub(crate) mod tests {
     use super::*;
     use ndarray::Ix3;
 
-    /// The file with another shape in its header.
+    /// The file contents with another shape in the header.
     pub(crate) fn with_shape(bytes: &[u8], old: &str, new: &str) -> Vec<u8> {
         let header = String::from_utf8_lossy(&bytes[10..128]).replace(old, new);
         [&bytes[..10], format!("{:<117}\n", header.trim_end()).as_bytes(), &bytes[128..]].concat()
     }
 
     #[test]
-    fn a_header_that_promises_too_much_is_an_error() {
+    fn header_larger_than_the_file_is_an_error() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("motion.npy");
         let mut bytes = Vec::new();
@@ -245,7 +251,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn others_read_what_is_written_and_the_layout_finds_the_rows() {
+    fn written_arrays_are_valid_npy_and_layout_locates_rows() {
         let array = Array3::from_shape_fn((7, 49, 3), |(t, j, k)| (t * 1000 + j * 3 + k) as f32 - 0.5);
         let bytes = write_f32(&[7, 49, 3], array.iter());
         assert_eq!(Array3::<f32>::read_npy(&bytes[..]).unwrap(), array);
@@ -267,7 +273,7 @@ pub(crate) mod tests {
         for bit in 0..8 * bytes.len() {
             let mut damaged = bytes.clone();
             damaged[bit / 8] ^= 1 << (bit % 8);
-            // either it is noticed, or the rows are where they were
+            // Either the damage is detected, or the rows are still located correctly.
             if let Ok(layout) = Layout::parse(&damaged, bytes.len() as u64, Element::F32, &[3]) {
                 assert_eq!(layout.n_rows * layout.row_bytes + layout.data_at, bytes.len());
             }
@@ -277,14 +283,14 @@ pub(crate) mod tests {
     proptest::proptest! {
         #![proptest_config(proptest::test_runner::Config::with_cases(24))]
         #[test]
-        fn any_joints_come_back_bit_for_bit(
+        fn joints_round_trip_bit_for_bit(
             bits in proptest::collection::vec(proptest::num::f32::ANY, 3 * N_JOINTS..9 * N_JOINTS),
         ) {
             let n_frames = bits.len() / (3 * N_JOINTS);
             let joints = Array3::from_shape_fn((n_frames, N_JOINTS, 3), |(t, j, k)| bits[(t * N_JOINTS + j) * 3 + k]);
             let motion = Motion::from_joints(FrameRate::new(15, 1), joints);
-            let there = |t: usize, j: usize| (0..3).all(|k| motion.joints[[t, j, k]].is_finite());
-            proptest::prop_assert!(motion.mask.indexed_iter().all(|((t, j), seen)| *seen == there(t, j)));
+            let is_finite_joint = |t: usize, j: usize| (0..3).all(|k| motion.joints[[t, j, k]].is_finite());
+            proptest::prop_assert!(motion.mask.indexed_iter().all(|((t, j), seen)| *seen == is_finite_joint(t, j)));
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join("a.npy");
             write(&path, &motion).unwrap();
@@ -296,8 +302,8 @@ pub(crate) mod tests {
         #[test]
         fn no_bytes_panic(header in ".{0,100}", bytes in proptest::collection::vec(proptest::num::u8::ANY, 0..100)) {
             let length = (header.len() as u16).to_le_bytes();
-            let whole = [&b"\x93NUMPY\x01\x00"[..], &length, header.as_bytes(), &bytes].concat();
-            let _ = parse::<f32, IxDyn>(&whole);
+            let file_bytes = [&b"\x93NUMPY\x01\x00"[..], &length, header.as_bytes(), &bytes].concat();
+            let _ = parse::<f32, IxDyn>(&file_bytes);
             let _ = parse::<f32, IxDyn>(&bytes);
         }
     }

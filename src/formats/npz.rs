@@ -1,5 +1,5 @@
-//! Named arrays in a `.npz` file, with errors that name the file, the array, what was expected and what is there.
-//! The files of the pipeline (`keypoints_npz`, `joints_npz`) say what their arrays mean; this file does not.
+//! Named arrays in a `.npz` file; errors name the file, the array, what was expected and what was found. The meaning
+//! of the arrays is documented in the modules of each file (`keypoints_npz`, `joints_npz`).
 
 use super::npy;
 use anyhow::{Context, Result, bail, ensure};
@@ -12,22 +12,27 @@ use std::io::{self, BufReader, BufWriter, Read as _, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use zip::ZipArchive;
 
-/// Most bytes of the arrays of a file together: a day of keypoints at 30 frames a second.
-const MOST_BYTES: u64 = 2 << 30;
+/// Maximum total size of the arrays of a file, bytes: a day of keypoints at 30 frames a second.
+const MAX_BYTES: u64 = 2 << 30;
 
 /// An open `.npz` file.
 pub struct Npz {
     path: PathBuf,
-    /// One an entry of the archive, in its order.
+    /// Array names, one per archive entry, in archive order.
     names: Vec<String>,
     archive: ZipArchive<BufReader<File>>,
 }
 
-/// Length expected of one axis; `None`: any.
+/// Expected length of one axis; `None` accepts any length.
 pub type AxisLength = Option<usize>;
 
 impl Npz {
-    /// Opens the archive. Errors: no such file, no zip archive.
+    /// Opens the archive.
+    ///
+    /// # Errors
+    ///
+    /// The file is missing or is not a zip archive, or its arrays unpack to more than `MAX_BYTES` (or than the file
+    /// itself).
     pub fn open(path: &Path) -> Result<Self> {
         let file = input::open(path).with_context(|| format!("cannot open {}", path.display()))?;
         let n_file_bytes = file.metadata().with_context(|| format!("cannot open {}", path.display()))?.len();
@@ -38,30 +43,34 @@ impl Npz {
             let entry = archive.by_index_raw(at).with_context(|| format!("{} is damaged", path.display()))?;
             n_bytes = n_bytes.saturating_add(entry.size());
         }
-        // What is not compressed takes no more memory than disk.
-        let most = MOST_BYTES.max(n_file_bytes);
+        // Uncompressed arrays take no more memory than disk space, so a large file is acceptable.
+        let max_bytes = MAX_BYTES.max(n_file_bytes);
         ensure!(
-            n_bytes <= most,
+            n_bytes <= max_bytes,
             "{}: its arrays unpack to more than {} MiB, which is not read; save fewer arrays in one file",
             path.display(),
-            most >> 20
+            max_bytes >> 20
         );
         let name = |i| archive.name_for_index(i).unwrap_or_default();
         let names = (0..archive.len()).map(|i| name(i).strip_suffix(".npy").unwrap_or(name(i)).to_owned()).collect();
         Ok(Self { path: path.to_owned(), names, archive })
     }
 
-    /// Names of the arrays, in the order of the file.
+    /// Array names, in file order.
     pub fn names(&self) -> &[String] {
         &self.names
     }
 
-    /// Whether the file has this array.
+    /// Whether the file contains array `name`.
     pub fn has(&self, name: &str) -> bool {
         self.names.iter().any(|n| n == name)
     }
 
-    /// A number array of any float or integer type as f64. Errors: missing, another shape, another type.
+    /// Numeric array of any float or integer type, converted to f64.
+    ///
+    /// # Errors
+    ///
+    /// The array is missing, or has another shape or an unsupported type.
     pub fn numbers(&mut self, name: &str, shape: &[AxisLength]) -> Result<ArrayD<f64>> {
         let found = npy::numbers(&self.bytes(name)?);
         let Some(array) = self.readable(name, found)? else {
@@ -71,7 +80,11 @@ impl Npz {
         Ok(array)
     }
 
-    /// A float array as f32. Errors as `numbers`.
+    /// Float array as f32.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Npz::numbers`].
     pub fn floats(&mut self, name: &str, shape: &[AxisLength]) -> Result<ArrayD<f32>> {
         let bytes = self.bytes(name)?;
         if let Some(array) = self.readable(name, npy::typed(&bytes))? {
@@ -81,7 +94,11 @@ impl Npz {
         Ok(self.numbers(name, shape)?.mapv(|v| v as f32))
     }
 
-    /// An array of truth values. Errors: missing, another shape, another type.
+    /// Boolean array.
+    ///
+    /// # Errors
+    ///
+    /// The array is missing, or has another shape or type.
     pub fn bools(&mut self, name: &str, shape: &[AxisLength]) -> Result<ArrayD<bool>> {
         let found = npy::typed(&self.bytes(name)?);
         let Some(array) = self.readable(name, found)? else {
@@ -91,7 +108,7 @@ impl Npz {
         Ok(array)
     }
 
-    /// The frame rate in array `name`: two numbers, numerator and denominator, or one number of frames a second.
+    /// Frame rate in array `name`: either numerator and denominator, or one number of frames per second.
     pub fn frame_rate(&mut self, name: &str) -> Result<FrameRate> {
         let values = self.numbers(name, &[])?.into_raw_vec_and_offset().0;
         let rate = match values[..] {
@@ -110,19 +127,20 @@ impl Npz {
         })
     }
 
-    /// A single text (`<U`, four bytes a letter); `None` where there is no such array, or it holds something else.
+    /// Scalar string (`<U`, four bytes per character); `None` if the array is missing or is not a single string.
     pub fn text(&mut self, name: &str) -> Option<String> {
         let bytes = self.has(name).then(|| self.bytes(name).ok()).flatten()?;
         let data_at = bytes.iter().position(|&byte| byte == b'\n')? + 1;
         let header = std::str::from_utf8(bytes.get(10..data_at)?).ok()?;
         let one_text =
             header.contains("'descr': '<U") && ["()", "(1,)"].iter().any(|s| header.contains(&format!("'shape': {s}")));
-        let letters = bytes.get(data_at..)?.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-        let letters = letters.take_while(|&letter| letter != 0).map(|l| char::from_u32(l).unwrap_or('\u{fffd}'));
-        one_text.then(|| letters.collect())
+        let characters = bytes.get(data_at..)?.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+        let characters =
+            characters.take_while(|&character| character != 0).map(|l| char::from_u32(l).unwrap_or('\u{fffd}'));
+        one_text.then(|| characters.collect())
     }
 
-    /// The array as it lies in the file.
+    /// Raw bytes of the array's `.npy` entry; the size in its header is checked before the data are decompressed.
     fn bytes(&mut self, name: &str) -> Result<Vec<u8>> {
         let Some(at) = self.names.iter().position(|n| n == name) else {
             bail!("{} has no array `{name}`; it has: {}", self.path.display(), self.names.join(", "));
@@ -130,10 +148,10 @@ impl Npz {
         let unreadable = || format!("{}: array `{name}` cannot be read", self.path.display());
         let entry = self.archive.by_index(at).with_context(unreadable)?;
         let stated = entry.size();
-        // The unpacked bytes may be more than the archive states; they end where it says.
+        // An entry may unpack to more bytes than the archive declares: read one byte past that size to detect it.
         let mut entry = entry.take(stated.saturating_add(1));
         let mut bytes = Vec::new();
-        entry.by_ref().take(npy::MOST_HEADER_BYTES).read_to_end(&mut bytes).with_context(unreadable)?;
+        entry.by_ref().take(npy::MAX_HEADER_BYTES).read_to_end(&mut bytes).with_context(unreadable)?;
         if let Some(promised) = npy::file_bytes(&bytes) {
             ensure!(
                 promised == stated,
@@ -146,25 +164,25 @@ impl Npz {
         Ok(bytes)
     }
 
-    /// What was read of an array; the error names the file and the array.
+    /// Adds the names of the file and the array to a read error.
     fn readable<T>(&self, name: &str, found: Result<T, ReadNpyError>) -> Result<T> {
         found.with_context(|| format!("{}: array `{name}` cannot be read", self.path.display()))
     }
 
-    /// An empty `expected` takes every shape.
+    /// Checks the shape of an array; an empty `expected` accepts every shape.
     fn check(&self, name: &str, shape: &[usize], expected: &[AxisLength]) -> Result<()> {
         let fits =
             shape.len() == expected.len() && shape.iter().zip(expected).all(|(&n, want)| want.is_none_or(|w| w == n));
         if !expected.is_empty() && !fits {
-            let want: Vec<String> =
-                expected.iter().map(|a| a.map_or_else(|| "T".to_owned(), |n| n.to_string())).collect();
-            bail!("{}: array `{name}` has shape {shape:?}, expected [{}]", self.path.display(), want.join(", "));
+            let expected: Vec<String> =
+                expected.iter().map(|axis| axis.map_or_else(|| "T".to_owned(), |n| n.to_string())).collect();
+            bail!("{}: array `{name}` has shape {shape:?}, expected [{}]", self.path.display(), expected.join(", "));
         }
         Ok(())
     }
 }
 
-/// Writes a file of the arrays that `add` adds; the same arrays give the same bytes.
+/// Writes the arrays that `add` adds to a new file. The bytes are deterministic.
 pub fn write(path: &Path, add: impl FnOnce(&mut NpzWriter<NpzOutput>) -> Result<(), WriteNpzError>) -> Result<()> {
     let attempt = || -> Result<()> {
         let mut npz = NpzWriter::new(NpzOutput::new(BufWriter::new(File::create(path)?)));
@@ -174,8 +192,8 @@ pub fn write(path: &Path, add: impl FnOnce(&mut NpzWriter<NpzOutput>) -> Result<
     attempt().with_context(|| format!("cannot write {}", path.display()))
 }
 
-/// Writer that keeps its first error for `finish` and ignores what follows: an archive that is dropped after an error
-/// writes its end, and would print that it cannot.
+/// Writer that records its first error for `finish` and ignores all later writes. `NpzWriter` writes the end of the
+/// archive when it is dropped, even after an error, and would print that this failed.
 pub struct NpzOutput<W = BufWriter<File>> {
     to: W,
     at: u64,
@@ -187,13 +205,13 @@ impl<W: Write + Seek> NpzOutput<W> {
         Self { to, at: 0, error: None }
     }
 
-    /// Flushes what was written. Errors: the first one of any write.
+    /// Flushes the file. Errors: the first error of any write.
     fn finish(mut self) -> Result<()> {
         let flushed = self.to.flush();
         Ok(self.error.map_or(flushed, Err)?)
     }
 
-    /// Result of a step; `otherwise` if it or one before failed.
+    /// Result of an I/O operation, or `otherwise` if this or an earlier operation failed.
     fn step<T>(&mut self, otherwise: T, step: impl FnOnce(&mut W) -> io::Result<T>) -> T {
         if self.error.is_some() {
             return otherwise;
@@ -241,7 +259,7 @@ mod tests {
     use ndarray::arr0;
 
     #[test]
-    fn a_full_disk_is_one_error_at_the_end() {
+    fn full_disk_is_reported_once_by_finish() {
         let write = |left: usize| {
             let mut disk = vec![0; left];
             let mut npz = NpzWriter::new(NpzOutput::new(io::Cursor::new(&mut disk[..])));
@@ -259,7 +277,7 @@ mod tests {
         }
     }
 
-    /// An archive of `body.npy` with these bytes.
+    /// Writes an archive whose entry `body.npy` has these bytes.
     fn archive(path: &Path, bytes: &[u8], compression: zip::CompressionMethod) {
         let options = zip::write::SimpleFileOptions::default().compression_method(compression);
         let mut zip = zip::ZipWriter::new(File::create(path).unwrap());
@@ -268,8 +286,8 @@ mod tests {
         zip.finish().unwrap();
     }
 
-    /// Bytes of an array of five numbers under the header of another shape.
-    fn promising(shape: &str) -> Vec<u8> {
+    /// `.npy` bytes of an array of five numbers with another shape in the header.
+    fn npy_with_shape(shape: &str) -> Vec<u8> {
         let mut bytes = Vec::new();
         ndarray_npy::WriteNpyExt::write_npy(&Array1::<f32>::zeros(5), &mut bytes).unwrap();
         npy::tests::with_shape(&bytes, "(5,)", shape)
@@ -282,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn rates_come_as_one_number_or_as_a_fraction() {
+    fn frame_rate_is_a_number_or_a_fraction() {
         let dir = tempfile::tempdir().unwrap();
         let path = file_with(dir.path(), |npz| {
             npz.add_array("one", &arr0(15i64))?;
@@ -311,27 +329,27 @@ mod tests {
         assert!(Npz::open(&dir.path().join("none.npz")).is_err());
     }
 
-    /// An archive of one array whose `n_bytes` are zeros behind the header of another shape.
+    /// Writes an archive of one array: `n_bytes` bytes, a header with this shape and then zeros.
     fn packed(path: &Path, shape: &str, n_bytes: usize) {
-        let mut bytes = promising(shape);
+        let mut bytes = npy_with_shape(shape);
         bytes.resize(n_bytes, 0);
         archive(path, &bytes, zip::CompressionMethod::Deflated);
     }
 
     #[test]
-    fn what_promises_too_much_or_unpacks_to_more_than_it_states_is_refused() {
+    fn arrays_larger_than_declared_are_rejected() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.npz");
         packed(&path, "(2097120,)", 8 << 20);
         assert!(std::fs::metadata(&path).unwrap().len() < 20_000);
         Npz::open(&path).unwrap().floats("body", &[]).unwrap();
-        // The sizes in the local header and in the archive's list.
+        // Replaces the size in the local header and in the central directory.
         let stated = |n: u32| {
             let bytes = std::fs::read(&path).unwrap();
             let old = (8u32 << 20).to_le_bytes();
-            let places: Vec<usize> = (0..bytes.len() - 4).filter(|&at| bytes[at..at + 4] == old).collect();
+            let offsets: Vec<usize> = (0..bytes.len() - 4).filter(|&at| bytes[at..at + 4] == old).collect();
             let mut bytes = bytes.clone();
-            places.iter().for_each(|&at| bytes[at..at + 4].copy_from_slice(&n.to_le_bytes()));
+            offsets.iter().for_each(|&at| bytes[at..at + 4].copy_from_slice(&n.to_le_bytes()));
             let changed = dir.path().join("b.npz");
             std::fs::write(&changed, bytes).unwrap();
             Npz::open(&changed).and_then(|mut npz| npz.floats("body", &[])).map(drop)
@@ -343,7 +361,7 @@ mod tests {
         packed(&path, "(8,)", 8 << 20);
         let text = format!("{:#}", Npz::open(&path).unwrap().floats("body", &[]).unwrap_err());
         assert!(text.contains("has 8388608 bytes, its header promises 160"), "{text}");
-        archive(&path, &promising("(1000000000000,)"), zip::CompressionMethod::Stored);
+        archive(&path, &npy_with_shape("(1000000000000,)"), zip::CompressionMethod::Stored);
         let text = format!("{:#}", Npz::open(&path).unwrap().floats("body", &[]).unwrap_err());
         assert!(text.contains("a.npz") && text.contains("body"), "{text}");
     }
@@ -351,7 +369,7 @@ mod tests {
     proptest::proptest! {
         #![proptest_config(proptest::test_runner::Config::with_cases(24))]
         #[test]
-        fn arrays_come_back_and_damage_does_not_panic(
+        fn arrays_round_trip_and_damage_does_not_panic(
             numbers in proptest::collection::vec(proptest::num::f64::ANY, 1..40),
             damage in proptest::collection::vec((0usize..1000, proptest::num::u8::ANY), 1..6),
         ) {

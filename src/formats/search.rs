@@ -1,21 +1,25 @@
-//! Finds files below a folder. A folder that links lead to again is not entered again.
+//! Finds files below a folder. A folder that is reachable through several links is visited once.
 
 use anyhow::{Context, Result, ensure};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Most folders within each other.
+/// Maximum nesting depth of folders.
 const MAX_DEPTH: usize = 64;
 
-/// All files below `folder`, in the order of their names, that have one of the `endings` (without the dot).
+/// All files below `folder` that have one of the `endings` (without the dot), sorted by name within each folder.
 pub fn below(folder: &Path, endings: &[&str]) -> Result<Vec<PathBuf>> {
     let mut files = files(folder, &mut |_| true)?;
     files.retain(|path| path.extension().and_then(|e| e.to_str()).is_some_and(|e| endings.contains(&e)));
     Ok(files)
 }
 
-/// All files below `folder`, in the order of their names; folders that `enter` refuses and hidden names are left out.
-/// Errors: a folder that cannot be listed, or lies more than 64 folders deep.
+/// All files below `folder`, sorted by name within each folder; hidden names and folders rejected by `enter` are
+/// skipped.
+///
+/// # Errors
+///
+/// A folder cannot be listed, or is nested more than 64 folders deep.
 pub fn files(folder: &Path, enter: &mut dyn FnMut(&Path) -> bool) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     walk(folder, MAX_DEPTH, &mut BTreeSet::new(), enter, &mut files)?;
@@ -25,12 +29,12 @@ pub fn files(folder: &Path, enter: &mut dyn FnMut(&Path) -> bool) -> Result<Vec<
 fn walk(
     folder: &Path,
     depth: usize,
-    seen: &mut BTreeSet<PathBuf>,
+    visited: &mut BTreeSet<PathBuf>,
     enter: &mut dyn FnMut(&Path) -> bool,
     files: &mut Vec<PathBuf>,
 ) -> Result<()> {
     let listing = || format!("cannot list {}", folder.display());
-    if !seen.insert(folder.canonicalize().with_context(listing)?) || !enter(folder) {
+    if !visited.insert(folder.canonicalize().with_context(listing)?) || !enter(folder) {
         return Ok(());
     }
     ensure!(depth > 0, "{} lies more than {MAX_DEPTH} folders deep; name a folder nearer to it", folder.display());
@@ -42,8 +46,8 @@ fn walk(
             continue;
         }
         match path.metadata() {
-            Ok(meta) if meta.is_dir() => walk(&path, depth - 1, seen, enter, files)?,
-            // A pipe or a device has no end.
+            Ok(meta) if meta.is_dir() => walk(&path, depth - 1, visited, enter, files)?,
+            // Reading a pipe or a device may never end.
             Ok(meta) if !meta.is_file() => {}
             _ => files.push(path),
         }
@@ -58,7 +62,7 @@ mod tests {
     use std::os::unix::fs::symlink;
 
     #[test]
-    fn folders_that_lead_back_are_entered_once() {
+    fn link_cycles_are_visited_once() {
         let dir = tempfile::tempdir().unwrap();
         let at = |name: &str| dir.path().join(name);
         std::fs::create_dir_all(at("a/b")).unwrap();

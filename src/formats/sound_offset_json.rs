@@ -1,4 +1,4 @@
-//! `sound_offset.json`: how much later the sound of a video is than its picture.
+//! `sound_offset.json`: delay of the audio of a video relative to its images.
 
 use anyhow::{Context, Result, ensure};
 use orator_base::input;
@@ -6,7 +6,11 @@ use orator_base::types::sound::SoundOffset;
 use std::io::ErrorKind;
 use std::path::Path;
 
-/// Reads the file; `None` where it is not there. Errors: a file that is not as the segment stage writes it.
+/// Reads the file; `None` if it does not exist.
+///
+/// # Errors
+///
+/// The file is unreadable, not in the format of the segment stage, or has an offset of 60 s or more.
 pub fn read(path: &Path) -> Result<Option<SoundOffset>> {
     let bytes = match input::read(path, input::MOST_TEXT) {
         Ok(bytes) => bytes,
@@ -24,7 +28,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_offset_that_is_missing_or_damaged_is_told_apart() {
+    fn missing_and_damaged_offsets_are_distinguished() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("offset.json");
         assert_eq!(read(&path).unwrap(), None);

@@ -1,24 +1,24 @@
-//! The log as TensorBoard reads it: each line of numbers as one record of an event file. Records are framed as
-//! TensorFlow's TFRecord (length, masked CRC-32C, bytes, masked CRC-32C); a record is an `Event` of tensorflow's
-//! event.proto with a `Summary` of `simple_value`s. The time of an event is its step, so that the bytes repeat.
+//! The training log as a TensorBoard event file: one record per log line. Records use TensorFlow's TFRecord framing
+//! (length, masked CRC-32C, bytes, masked CRC-32C); each holds an `Event` (tensorflow's event.proto) with a `Summary`
+//! of `simple_value`s. The wall time of an event is its step, so that the bytes are deterministic.
 
 use serde_json::{Map, Value};
 
-/// The file beside `metrics.jsonl`; TensorBoard looks for `tfevents` in the name.
+/// File name, in the folder of `metrics.jsonl`; TensorBoard looks for `tfevents` in the name.
 pub const FILE: &str = "events.out.tfevents.orator";
-/// The version that TensorBoard expects in the first record.
+/// File version, which TensorBoard expects in the first record.
 const VERSION: &[u8] = b"brain.Event:2";
 const MASK: u32 = 0xa282_ead8;
 
-/// The record that begins a file.
+/// First record of a file.
 pub fn first() -> Vec<u8> {
     let mut event = Vec::new();
     field(&mut event, 3, VERSION);
     framed(&event)
 }
 
-/// The record of a line of the log; none where it has no number. `l1` of a training line becomes `train/l1`; of a
-/// validation, the generator's `pck` becomes `validation/pck`, another predictor's `validation/mean_pose/pck`.
+/// Record of a log line; `None` if the line has no number. `l1` of a training line becomes `train/l1`; in a
+/// validation, `pck` of the generator becomes `validation/pck`, of another predictor `validation/mean_pose/pck`.
 pub fn record(line: &Value) -> Option<Vec<u8>> {
     let step = line["step"].as_u64()?;
     let mut scalars = Vec::new();
@@ -45,7 +45,7 @@ pub fn record(line: &Value) -> Option<Vec<u8>> {
     Some(framed(&event))
 }
 
-/// The numbers below `object` with their names from `under` on.
+/// Collects all numbers below `object`, with their paths prefixed by `under`.
 fn collect(under: &str, object: &Map<String, Value>, scalars: &mut Vec<(String, f64)>) {
     for (name, value) in object {
         match value {
@@ -59,7 +59,7 @@ fn collect(under: &str, object: &Map<String, Value>, scalars: &mut Vec<(String, 
     }
 }
 
-/// A field of protobuf that holds bytes.
+/// Appends a length-delimited protobuf field.
 fn field(message: &mut Vec<u8>, number: u8, bytes: &[u8]) {
     message.push(number << 3 | 2);
     varint(message, bytes.len() as u64);
@@ -89,7 +89,7 @@ mod tests {
     use serde_json::json;
 
     #[test]
-    fn names_follow_the_line() {
+    fn tags_are_paths_in_the_log_line() {
         let mut found = Vec::new();
         let line = json!({"generator": {"pck": 0.5, "frechet": null}, "mean_pose": {"pck": 0.25}, "split": "test", "score": 2});
         collect("validation", line.as_object().unwrap(), &mut found);

@@ -1,5 +1,5 @@
-//! `timeline.npz`: the frames of a video at the dataset rate, one value each. Arrays: `source_secs` f64 [T], `repeated`
-//! bool [T], `shot_score` f64 [T], `restart` bool [T], `still` f32 [T]; for a long video `span` bool [T].
+//! `timeline.npz`: per-frame values of a video at the dataset rate. Arrays: `source_secs` f64 [T], `repeated` bool
+//! [T], `shot_score` f64 [T], `restart` bool [T], `still` f32 [T]; for a long video also `span` bool [T].
 
 use super::npz::{self, Npz};
 use anyhow::Result;
@@ -7,21 +7,21 @@ use ndarray::aview1;
 use std::ops::Range;
 use std::path::Path;
 
-/// The frames of a video, one value each; all of the same length T.
+/// Per-frame values of a video; all vectors have the same length T.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Timeline {
-    /// Time of the picture in the video file, seconds.
+    /// Time of the image in the video file, seconds.
     pub source_secs: Vec<f64>,
-    /// Whether the frame shows the picture of the frame before.
+    /// Whether the frame repeats the image of the previous frame.
     pub repeated: Vec<bool>,
-    /// How much the frame looks like the first one of a shot, 0..1.
+    /// Confidence that the frame is the first one of a shot, 0..1.
     pub shot_score: Vec<f64>,
-    /// Whether the score is high enough for tracking to begin anew.
+    /// Whether tracking restarts at this frame because its shot score is high.
     pub restart: Vec<bool>,
-    /// Whether a span begins that is worked on apart: tracking begins anew, and reading can begin at this frame. Never the
-    /// first one.
+    /// Whether a span that is processed separately starts here: tracking restarts, and decoding can start at this
+    /// frame. Never set for the first frame.
     pub span: Vec<bool>,
-    /// Mean change of the picture since the frame before, in steps of 8-bit colour; 0 where it is repeated.
+    /// Mean absolute difference from the previous image, in 8-bit intensity levels; 0 for a repeated frame.
     pub frame_difference: Vec<f32>,
 }
 
@@ -31,14 +31,18 @@ impl Timeline {
         self.repeated.len()
     }
 
-    /// The spans of frames that are worked on apart, in order: all frames together.
+    /// The spans of frames that are processed separately, in order; together they cover all frames.
     pub fn spans(&self) -> Vec<Range<usize>> {
         let starts = self.span.iter().enumerate().filter(|(idx, starts)| **starts && *idx > 0).map(|(idx, _)| idx);
         let bounds: Vec<usize> = std::iter::once(0).chain(starts).chain([self.n_frames()]).collect();
         bounds.windows(2).map(|pair| pair[0]..pair[1]).collect()
     }
 
-    /// Reads `timeline.npz`. Errors name the file and the array that is missing or of another length.
+    /// Reads `timeline.npz`.
+    ///
+    /// # Errors
+    ///
+    /// The file is unreadable, or an array is missing or of another length; the message names it.
     pub fn read(path: &Path) -> Result<Self> {
         let mut npz = Npz::open(path)?;
         let repeated: Vec<bool> = npz.bools("repeated", &[None])?.into_iter().collect();
@@ -48,7 +52,7 @@ impl Timeline {
             shot_score: npz.numbers("shot_score", &length)?.into_iter().collect(),
             restart: npz.bools("restart", &length)?.into_iter().collect(),
             frame_difference: npz.floats("still", &length)?.into_iter().collect(),
-            // Earlier versions had none.
+            // Files of earlier versions lack this array.
             span: match npz.has("span") {
                 true => npz.bools("span", &length)?.into_iter().collect(),
                 false => vec![false; repeated.len()],
@@ -57,7 +61,7 @@ impl Timeline {
         })
     }
 
-    /// Writes `timeline.npz`; the same timeline gives the same bytes.
+    /// Writes `timeline.npz`. The bytes are deterministic.
     pub fn write(&self, path: &Path) -> Result<()> {
         npz::write(path, |npz| {
             npz.add_array("source_secs", &aview1(&self.source_secs))?;
@@ -77,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_written_is_read_back_and_a_missing_array_is_named() {
+    fn timeline_round_trips_and_missing_arrays_are_named() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.npz");
         let timeline = Timeline {

@@ -1,5 +1,5 @@
-//! Sound as 16-bit mono WAV with the plain 44-byte header, written to memory or to a file; and where the samples of such
-//! a file lie, so that a part of it can be read. Sound files of others are read by `external::ffmpeg`.
+//! 16-bit mono WAV with the plain 44-byte header, written to memory or to a file, and the sample range of such a
+//! file, so that a part of it can be read. Audio files from elsewhere are decoded by `ffmpeg` of the media crate.
 
 use anyhow::{Context, Result, ensure};
 use hound::{SampleFormat, WavReader, WavSpec};
@@ -8,25 +8,29 @@ use std::fs::File;
 use std::io::{BufWriter, Cursor, Seek, Write};
 use std::path::{Path, PathBuf};
 
-/// Bytes before the first sample.
+/// Size of the header, bytes.
 pub const HEADER_BYTES: usize = 44;
 
 const fn spec(rate: u32) -> WavSpec {
     WavSpec { channels: 1, sample_rate: rate, bits_per_sample: 16, sample_format: SampleFormat::Int }
 }
 
-/// Writes samples, those outside -1..1 clipped; samples of another such WAV come back bit for bit.
+/// Writes samples clipped to -1..1; samples read from such a file are written back bit for bit.
 fn push<W: Write + Seek>(file: &mut hound::WavWriter<W>, samples: &[f32]) -> hound::Result<()> {
-    let mut places = file.get_i16_writer(samples.len() as u32);
+    let mut writer = file.get_i16_writer(samples.len() as u32);
     for sample in samples {
         let value = f64::from(sample * 32_768.0);
-        // Halves away from zero, as `round` has it, exactly; `round` itself is a slow call.
-        places.write_sample((value + 0.5f64.copysign(value)) as i16);
+        // Rounds half away from zero exactly like `round`, which is a slow function call.
+        writer.write_sample((value + 0.5f64.copysign(value)) as i16);
     }
-    places.flush()
+    writer.flush()
 }
 
-/// The bytes of a WAV file. Errors: more than 4 GB of samples.
+/// Contents of a WAV file.
+///
+/// # Errors
+///
+/// More than 4 GB of samples.
 pub fn to_bytes(sound: &Sound) -> Result<Vec<u8>> {
     let mut bytes = Cursor::new(Vec::with_capacity(HEADER_BYTES + 2 * sound.samples.len()));
     let mut file = hound::WavWriter::new(&mut bytes, spec(sound.rate))?;
@@ -35,21 +39,21 @@ pub fn to_bytes(sound: &Sound) -> Result<Vec<u8>> {
     Ok(bytes.into_inner())
 }
 
-/// Writes a sound to the file `out`.
+/// Writes `sound` to the file `out`.
 pub fn write(out: &Path, sound: &Sound) -> Result<()> {
     let mut wav = WavWriter::create(out, sound.rate)?;
     wav.push(&sound.samples)?;
     wav.finish()
 }
 
-/// A WAV file written piece by piece.
+/// A WAV file written in chunks.
 pub struct WavWriter {
     path: PathBuf,
     file: hound::WavWriter<BufWriter<File>>,
 }
 
 impl WavWriter {
-    /// Begins a file of `rate` samples a second.
+    /// Creates a file with `rate` samples per second.
     pub fn create(path: &Path, rate: u32) -> Result<Self> {
         let file = hound::WavWriter::create(path, spec(rate));
         Ok(Self { path: path.to_owned(), file: file.with_context(|| format!("cannot write {}", path.display()))? })
@@ -66,17 +70,21 @@ impl WavWriter {
     }
 }
 
-/// Number of samples in a file of `file_bytes` that begins with `bytes`. Errors: not as this module writes files.
+/// Number of samples in a file of `file_bytes` bytes that begins with `bytes`.
+///
+/// # Errors
+///
+/// The file does not have the header that this module writes for `rate`, or is truncated.
 pub fn n_samples(bytes: &[u8], file_bytes: u64, rate: u32) -> Result<usize> {
     let mut head = Cursor::new(&bytes[..bytes.len().min(HEADER_BYTES)]);
     let found = WavReader::new(&mut head).ok().map(|reader| (reader.spec(), reader.len() as usize));
-    let whole = |n: &usize| head.position() == HEADER_BYTES as u64 && file_bytes == (HEADER_BYTES + 2 * n) as u64;
-    let n_samples = found.filter(|(found, n)| *found == spec(rate) && whole(n)).map(|(_, n)| n);
+    let is_complete = |n: &usize| head.position() == HEADER_BYTES as u64 && file_bytes == (HEADER_BYTES + 2 * n) as u64;
+    let n_samples = found.filter(|(found, n)| *found == spec(rate) && is_complete(n)).map(|(_, n)| n);
     ensure!(n_samples.is_some(), "not a 16-bit mono WAV file at {rate} Hz with a 44-byte header");
     Ok(n_samples.unwrap_or_default())
 }
 
-/// Little endian 16-bit samples as -1..1.
+/// Little-endian 16-bit samples scaled to -1..1.
 pub fn samples(bytes: &[u8]) -> Vec<f32> {
     bytes.chunks_exact(2).map(|b| f32::from(i16::from_le_bytes([b[0], b[1]])) / 32_768.0).collect()
 }
@@ -86,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_value_comes_back_and_the_header_is_the_plain_one() {
+    fn every_sample_value_round_trips_with_the_plain_header() {
         let all: Vec<f32> = (i16::MIN..=i16::MAX).map(|n| f32::from(n) / 32_768.0).collect();
         let bytes = to_bytes(&Sound { rate: 16_000, samples: all.clone() }).unwrap();
         let header = b"RIFF\x24\0\x02\0WAVEfmt \x10\0\0\0\x01\0\x01\0\x80\x3e\0\0\0\x7d\0\0\x02\0\x10\0data\0\0\x02\0";
@@ -99,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn loud_samples_are_clipped_and_other_files_refused() {
+    fn samples_are_clipped_and_other_files_rejected() {
         let loud = Sound { rate: 16_000, samples: vec![1.5, -1.5, f32::NAN, 1e-5, 1.6e-5] };
         let bytes = to_bytes(&loud).unwrap();
         let expected = [i16::MAX, i16::MIN, 0, 0, 1].map(i16::to_le_bytes).concat();
@@ -111,7 +119,7 @@ mod tests {
 
     proptest::proptest! {
         #[test]
-        fn any_sound_comes_back_within_half_a_step(
+        fn sound_round_trips_within_one_step(
             rate in 1u32..200_000,
             sound in proptest::collection::vec(-1.0f32..1.0, 0..300),
         ) {

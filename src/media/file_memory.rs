@@ -1,5 +1,5 @@
-//! Memory that lies in a temporary file: the system writes it out where memory is short, and it does not count as a
-//! program's own. The file has no name and is gone with the program.
+//! Memory backed by a temporary file: the system can write it out when memory is short, and it does not count as
+//! private memory of the process. The file has no name and disappears with the process.
 
 use anyhow::{Context, Result, ensure};
 use memmap2::Mmap;
@@ -9,12 +9,12 @@ use std::os::unix::fs::FileExt as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Most bytes of a file. It has holes: what was not written takes no place.
+/// Maximum size of a file, bytes. The file is sparse: unwritten parts take no disk space.
 const CAPACITY: u64 = 64 << 30;
-/// What is kept begins at multiples of this, so that it can be seen as numbers.
+/// Alignment of each stored block, bytes, so that it can be reinterpreted as numbers.
 const ALIGNMENT: u64 = 16;
 
-/// A temporary file to which bytes are added.
+/// A temporary file to which bytes are appended.
 pub struct FileMemory {
     folder: PathBuf,
     file: File,
@@ -30,21 +30,29 @@ pub struct FileBytes {
 }
 
 impl FileMemory {
-    /// An empty file in `folder`. Errors: no file can be made there.
+    /// Creates an empty file in `folder`.
+    ///
+    /// # Errors
+    ///
+    /// No temporary file can be created there.
     pub fn new(folder: &Path) -> Result<Self> {
-        let made = || -> Result<Self> {
+        let create = || -> Result<Self> {
             let file = tempfile::tempfile_in(folder)?;
             file.set_len(CAPACITY)?;
-            // SAFETY: the file has no name, so that nobody else can write or shorten it; this type writes only behind
-            // its end, and gives out bytes before it.
+            // SAFETY: the file has no name, so that no other process can write or truncate it; this type writes only
+            // after `end` and hands out only bytes before it.
             let map = unsafe { Mmap::map(&file) }?;
             Ok(Self { folder: folder.to_owned(), file, map: Arc::new(map), end: 0 })
         };
-        made().with_context(|| format!("{}: no temporary file can be made in this folder", folder.display()))
+        create().with_context(|| format!("{}: no temporary file can be made in this folder", folder.display()))
     }
 
-    /// Adds bytes. Errors: the disk is full.
-    pub fn keep(&mut self, bytes: &[u8]) -> Result<FileBytes> {
+    /// Appends bytes.
+    ///
+    /// # Errors
+    ///
+    /// The disk or the file is full.
+    pub fn append(&mut self, bytes: &[u8]) -> Result<FileBytes> {
         let (start, end) = (self.end, self.end.saturating_add(bytes.len() as u64));
         ensure!(end <= CAPACITY, "more than {} GiB of temporary data", CAPACITY >> 30);
         let written = self.file.write_all_at(bytes, start);
@@ -66,12 +74,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_kept_is_there_while_more_is_added() {
+    fn stored_bytes_remain_valid_while_more_are_appended() {
         let mut memory = FileMemory::new(&std::env::temp_dir()).unwrap();
-        let kept: Vec<FileBytes> =
-            (0..50u8).map(|n| memory.keep(&vec![n; 1000 * usize::from(n) + 1]).unwrap()).collect();
+        let stored: Vec<FileBytes> =
+            (0..50u8).map(|n| memory.append(&vec![n; 1000 * usize::from(n) + 1]).unwrap()).collect();
         drop(memory);
-        for (n, bytes) in kept.iter().enumerate() {
+        for (n, bytes) in stored.iter().enumerate() {
             let bytes = bytes.as_slice();
             assert!(bytes.len() == 1000 * n + 1 && bytes.iter().all(|byte| usize::from(*byte) == n));
             assert_eq!(bytes.as_ptr() as usize % 16, 0);

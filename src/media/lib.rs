@@ -1,5 +1,5 @@
-//! The only crate that calls FFmpeg and OpenCV. Also here: the sandbox of processes that read foreign files, file-backed
-//! memory, and the external program that aligns words with sound.
+//! The only crate that calls FFmpeg and OpenCV. It also contains the sandbox of processes that read untrusted files,
+//! file-backed memory, and the external program for forced alignment of words.
 
 pub mod aligner;
 pub mod ffmpeg;

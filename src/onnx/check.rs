@@ -1,12 +1,12 @@
-//! What makes the description of a model sound: names that exist, a role that fits the decoding, keypoint maps that are
-//! complete. The file itself is checked in `model`.
+//! Validation of model descriptions: existing names, a role that matches the decoding, complete keypoint maps. The
+//! file itself is checked in `model`.
 
 use super::{Decode, KeypointOutputs, ModelEntry, ModelRole as Role, ModelSource, PictureFit as Fit, TensorAxes};
 use anyhow::{Result, bail, ensure};
 use orator_base::types::file_name::FileName;
 
 impl ModelEntry {
-    /// Height and width of the picture it is fed.
+    /// Height and width of the input image.
     pub fn input_size(&self) -> Result<[usize; 2]> {
         let shape = self.inputs.first().map(|port| port.shape.as_slice());
         let (size, channels) = match (self.picture.axes, shape) {
@@ -24,23 +24,23 @@ impl ModelEntry {
         Ok(size.map(|side| side as usize))
     }
 
-    /// Number of outputs a keypoint map may name, where the shape of the output says it.
+    /// Number of keypoints in the decoded output, if its shape states it.
     fn n_points(&self) -> Option<usize> {
         let named = |name: &String| self.outputs.iter().find(|port| port.name == *name);
-        let (name, axis, share) = match &self.decode {
+        let (name, axis, divisor) = match &self.decode {
             Decode::Heatmap { heatmap, .. } => (heatmap, 1, 1),
             Decode::Simcc { x, .. } => (x, 1, 1),
             Decode::Regression { landmarks, .. } => (landmarks, 1, 2),
             _ => return None,
         };
         let size = *named(name)?.shape.get(axis)?;
-        usize::try_from(size).ok().map(|size| size / share)
+        usize::try_from(size).ok().map(|size| size / divisor)
     }
 
-    /// Says what is wrong with the file's name and pin.
+    /// Checks the file name, hash, sources and licence.
     pub(crate) fn check_file(&self) -> Result<()> {
         ensure!(
-            plain(&self.file),
+            is_plain_name(&self.file),
             "file must be the plain name of a file in the folder of the models: {:?}",
             self.file
         );
@@ -51,17 +51,17 @@ impl ModelEntry {
         Ok(())
     }
 
-    /// Says what is wrong with the description, before any file is opened.
+    /// Checks the description without opening the file.
     pub(crate) fn check(&self) -> Result<()> {
-        ensure!(plain(&self.id), "id must be a plain name");
+        ensure!(is_plain_name(&self.id), "id must be a plain name");
         if self.role == Role::Speech {
             return super::speech::check(self);
         }
         ensure!(self.inputs.len() == 1, "it must have exactly one input, not {}", self.inputs.len());
         let [height, width] = self.input_size()?;
         let numbers = [self.picture.scale].into_iter().chain(self.picture.mean).chain(self.picture.std);
-        let sound = numbers.clone().all(f64::is_finite) && !self.picture.std.contains(&0.0);
-        ensure!(sound, "picture: scale, mean and std must be finite, std not 0");
+        let is_valid = numbers.clone().all(f64::is_finite) && !self.picture.std.contains(&0.0);
+        ensure!(is_valid, "picture: scale, mean and std must be finite, std not 0");
         for name in self.decode.names() {
             ensure!(
                 self.outputs.iter().any(|port| port.name == name),
@@ -69,7 +69,7 @@ impl ModelEntry {
             );
         }
         self.decode.check()?;
-        let fits = match (self.role, &self.fit, &self.decode) {
+        let is_compatible = match (self.role, &self.fit, &self.decode) {
             (Role::Person, Fit::Letterbox { .. }, Decode::Detections { .. } | Decode::YoloxGrid { .. }) => true,
             (Role::Body, Fit::Box { margin }, Decode::Heatmap { .. } | Decode::Simcc { .. }) => *margin > 0.0,
             (Role::Hand, Fit::Region, Decode::Heatmap { .. } | Decode::Simcc { .. } | Decode::Regression { .. })
@@ -78,30 +78,30 @@ impl ModelEntry {
             (role, ..) => role == Role::Other,
         };
         ensure!(
-            fits,
+            is_compatible,
             "role, fit and decode do not go together: person: letterbox + detections or yolox-grid; body: box (margin > 0) + \
              heatmap or simcc; hand: region (a square input) + heatmap, simcc or regression; palm: letterbox (a square \
              input) + ssd-anchors; face: region (a square input) + regression"
         );
-        let whole = |points: &[usize], n: usize| points.len() == n;
-        let maps = match self.role {
+        let is_complete = |points: &[usize], n: usize| points.len() == n;
+        let are_complete = match self.role {
             Role::Body => {
                 let hands = [&self.points.left_hand, &self.points.right_hand];
                 let none = hands.iter().all(|points| points.is_empty());
-                whole(&self.points.body, 17) && (none || hands.iter().all(|points| whole(points, 21)))
+                is_complete(&self.points.body, 17) && (none || hands.iter().all(|points| is_complete(points, 21)))
             }
-            Role::Hand => whole(&self.points.hand, 21),
+            Role::Hand => is_complete(&self.points.hand, 21),
             _ => true,
         };
         ensure!(
-            maps,
+            are_complete,
             "points: a body model names 17 `body` points (and 21 `left_hand` and `right_hand`, or neither), a hand model 21 `hand` points"
         );
         if let Some(n_points) = self.n_points() {
             let KeypointOutputs { body, hand, left_hand, right_hand } = &self.points;
             let all = [body, hand, left_hand, right_hand].into_iter().flatten();
-            if let Some(beyond) = all.clone().find(|point| **point >= n_points) {
-                bail!("points: there is no output {beyond}, the model gives {n_points}");
+            if let Some(invalid) = all.clone().find(|point| **point >= n_points) {
+                bail!("points: there is no output {invalid}, the model gives {n_points}");
             }
         }
         Ok(())
@@ -109,7 +109,7 @@ impl ModelEntry {
 }
 
 impl Decode {
-    /// Names of the outputs it reads.
+    /// Names of the outputs used for decoding.
     fn names(&self) -> Vec<&str> {
         match self {
             Self::Detections { boxes, labels, .. } => {
@@ -141,7 +141,7 @@ impl Decode {
     }
 }
 
-/// Whether the name stays in its folder.
-fn plain(name: &str) -> bool {
+/// Whether the name is a plain file name without a path.
+fn is_plain_name(name: &str) -> bool {
     FileName::new(name).is_ok()
 }

@@ -1,10 +1,9 @@
-//! The description of one model: where it comes from, how its input is made and its outputs are read. Typed, strict (an
-//! unknown key is an error) and data only.
+//! Description of one model: its sources, preprocessing and decoding. A strict data type (unknown keys are errors).
 
 use super::{Conversion, ModelSource};
 use serde::{Deserialize, Serialize};
 
-/// One model file: what it is, where it is from, how it is fed and read.
+/// One model file: its identity, sources, preprocessing and decoding.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModelEntry {
@@ -14,26 +13,26 @@ pub struct ModelEntry {
     pub role: ModelRole,
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub file: String,
-    /// 64 hex digits of the file's content.
+    /// SHA-256 of the file, 64 hex digits.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub sha256: String,
     #[serde(default)]
     pub bytes: u64,
-    /// Serves exactly the pinned bytes.
+    /// URL that serves exactly the pinned bytes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub url: Option<String>,
-    /// Where the files it is made of are, in the order in which they are tried; after `url`.
+    /// Sources of the files from which the model is built, in the order in which they are tried, after `url`.
     #[serde(default, rename = "source", skip_serializing_if = "Vec::is_empty")]
     pub sources: Vec<ModelSource>,
-    /// How it is made of the files of a source; none: the one file of a source is the model.
+    /// Conversion from the files of a source; `None`: the single file of a source is the model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub convert: Option<Conversion>,
-    /// Tool and steps that made the file from its origin, where no source has what it is made of.
+    /// Tool and steps by which the file was converted, for models without a source for the original files.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub conversion: Option<String>,
     pub inputs: Vec<Port>,
     pub outputs: Vec<Port>,
-    /// What a model of pictures is fed; a speech model has none of these three.
+    /// Preprocessing and decoding of image models; speech models do not use these three fields.
     #[serde(default)]
     pub picture: InputPicture,
     #[serde(default)]
@@ -46,7 +45,7 @@ pub struct ModelEntry {
     pub origin: ModelOrigin,
 }
 
-/// A named tensor; -1 stands for any size.
+/// A named tensor; -1 is any size.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Port {
@@ -54,7 +53,7 @@ pub struct Port {
     pub shape: Vec<i64>,
 }
 
-/// What a model is asked for.
+/// Task of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ModelRole {
@@ -67,7 +66,7 @@ pub enum ModelRole {
     Other,
 }
 
-/// Where the weights come from and under which terms.
+/// Origin and licence of the weights.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModelOrigin {
@@ -79,7 +78,7 @@ pub struct ModelOrigin {
     pub note: String,
 }
 
-/// Pixel to tensor: `(pixel * scale - mean) / std`, in the order of `channels`.
+/// Normalisation from pixels to tensor: `(pixel * scale - mean) / std`, in the order of `channels`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InputPicture {
@@ -113,15 +112,16 @@ pub enum TensorAxes {
     Nhwc,
 }
 
-/// How the picture gets into the input.
+/// How the image is fitted into the input.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum PictureFit {
-    /// The whole picture, its shape kept, grey level `pad` around it.
+    /// The complete image with its aspect ratio preserved, padded with grey level `pad`.
     Letterbox { anchor: Anchor, pad: u8 },
-    /// A person's box grown to the input's shape, then by `margin`; outside black.
+    /// A person's bounding box extended to the aspect ratio of the input, then by the factor `margin`; black outside
+    /// the image.
     Box { margin: f64 },
-    /// A rotated square; outside black.
+    /// A rotated square; black outside the image.
     #[default]
     Region,
 }
@@ -133,7 +133,7 @@ pub enum Anchor {
     Centre,
 }
 
-/// What the outputs mean; the names are names of outputs.
+/// Meaning of the outputs; string fields are output names.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Decode {
@@ -154,7 +154,7 @@ pub enum Decode {
     Heatmap {
         heatmap: String,
         refine: Refine,
-        /// Width of the blur before refining: an odd number of cells.
+        /// Width of the blur before refinement, an odd number of cells.
         #[serde(default = "three")]
         blur: usize,
     },
@@ -166,7 +166,7 @@ pub enum Decode {
     Regression {
         landmarks: String,
         score: String,
-        /// The score is a logit.
+        /// Whether the score is a logit.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         logit: bool,
         right: Option<String>,
@@ -180,12 +180,12 @@ pub enum Decode {
         wrist: usize,
         middle: usize,
     },
-    /// Read by no stage, or by the code of its role.
+    /// Not decoded by any stage, or decoded by the code for its role.
     #[default]
     None,
 }
 
-/// How a heat-map's peak is placed between the cells.
+/// Sub-cell refinement of a heat-map peak.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Refine {
@@ -194,7 +194,7 @@ pub enum Refine {
     Dark,
 }
 
-/// Which output is which keypoint; empty: the model does not give it.
+/// Index of the output for each keypoint; empty if the model does not predict these keypoints.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct KeypointOutputs {
@@ -209,12 +209,12 @@ pub struct KeypointOutputs {
 }
 
 impl ModelEntry {
-    /// Whether some place serves it, or what it is made of.
+    /// Whether the model, or the files from which it is built, can be downloaded.
     pub fn is_served(&self) -> bool {
         self.url.is_some() || !self.sources.is_empty()
     }
 
-    /// What the model is, where it comes from and under which terms, for people.
+    /// Description of the model, its origin and its licence, for users.
     pub fn terms(&self) -> String {
         let ModelOrigin { repository, commit, path, licence, note } = &self.origin;
         let note = if note.is_empty() { String::new() } else { format!("\n{note}") };

@@ -1,5 +1,5 @@
-//! Getting the file of one model: from a folder that has it or what it is made of, else from its sources in their order.
-//! Every file is pinned by its SHA-256 before it is converted, and the result after it.
+//! Fetches the file of one model: from a folder that has it or the files to convert, or else from its sources in
+//! order. Every file is checked against its pinned SHA-256 before conversion, and the result after it.
 
 use super::convert::{ConversionOptions, convert};
 use super::{ModelEntry, ModelSource, PinnedFile, SourceKind, package, sha256_of};
@@ -12,23 +12,23 @@ use std::fmt::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Most bytes of a file, 1 GiB.
+/// Maximum file size, 1 GiB.
 pub(super) const MAX_BYTES: u64 = 1 << 30;
-/// Folders beneath a mirror that are looked into.
+/// Maximum folder depth searched in a mirror.
 const MAX_DEPTH: usize = 3;
 
-/// Where the file of a model was had from.
+/// Source from which the file of a model was fetched.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FetchSource {
-    /// The folder of models had it.
+    /// Already present in the models folder.
     Present,
     /// A file of the mirror.
     Mirror(PathBuf),
-    /// Files of the mirror that this source names.
+    /// Files of the mirror that are listed for this source.
     MirrorOf(ModelSource),
-    /// The address of the manifest.
+    /// The URL in the manifest.
     Url(String),
-    /// A source of the manifest.
+    /// A source in the manifest.
     Source(ModelSource),
 }
 
@@ -44,130 +44,133 @@ impl fmt::Display for FetchSource {
     }
 }
 
-/// A file that was had, with what its source says of its licence.
+/// A fetched file, with the licence text of its source.
 struct Obtained {
     bytes: Vec<u8>,
     licence: Option<String>,
     source: FetchSource,
 }
 
-/// Gets files of models into a folder. A package is downloaded once.
+/// Fetches model files into a folder. Each package is downloaded once.
 pub(super) struct Fetcher<'a> {
     /// SHA-256 and path of every file of the mirror.
-    offered: Vec<(String, PathBuf)>,
-    /// Where packages are downloaded to.
+    mirror_files: Vec<(String, PathBuf)>,
+    /// Folder for package downloads.
     downloads: &'a Path,
-    /// File of each package by its pinned SHA-256, or why it could not be had.
+    /// Path of each package by its pinned SHA-256, or why it could not be downloaded.
     packages: BTreeMap<String, Result<PathBuf, String>>,
 }
 
 impl<'a> Fetcher<'a> {
-    /// Looks at the files of the mirror, whatever their names.
+    /// Hashes all files of the mirror, regardless of their names.
     pub(crate) fn new(mirror: Option<&Path>, downloads: &'a Path) -> Result<Self> {
-        let mut offered = Vec::new();
+        let mut mirror_files = Vec::new();
         if let Some(mirror) = mirror {
-            offer(mirror, MAX_DEPTH, &mut offered)?;
-            offered.sort();
+            list_mirror(mirror, MAX_DEPTH, &mut mirror_files)?;
+            mirror_files.sort();
         }
-        Ok(Self { offered, downloads, packages: BTreeMap::new() })
+        Ok(Self { mirror_files, downloads, packages: BTreeMap::new() })
     }
 
-    /// Writes the file of the model to `path`, and what its source says of its licence beside it. Errors: no source
-    /// that has it; the message says why of each.
+    /// Writes the file of the model to `path`, with the licence text of its source in a file next to it. Errors: no
+    /// source has the file; the message gives the reason for each.
     pub(crate) fn get(&mut self, entry: &ModelEntry, path: &Path) -> Result<FetchSource> {
-        let alone = |bytes, source| Obtained { bytes, licence: None, source };
-        if let Some(found) = self.offered(&entry.sha256) {
+        let without_licence = |bytes, source| Obtained { bytes, licence: None, source };
+        if let Some(found) = self.in_mirror(&entry.sha256) {
             let bytes =
                 input::read(found, input::MOST_DATA).with_context(|| format!("cannot read {}", found.display()))?;
-            return write(entry, path, alone(bytes, FetchSource::Mirror(found.to_owned())));
+            return write(entry, path, without_licence(bytes, FetchSource::Mirror(found.to_owned())));
         }
-        let mut refused = String::new();
+        let mut failures = String::new();
         if let Some(url) = &entry.url {
-            match download(url).and_then(|bytes| pinned(&bytes, &entry.sha256, url).map(|()| bytes)) {
-                Ok(bytes) => return write(entry, path, alone(bytes, FetchSource::Url(url.clone()))),
-                Err(error) => _ = write!(refused, "\n      {url}: {error:#}"),
+            match download(url).and_then(|bytes| check_hash(&bytes, &entry.sha256, url).map(|()| bytes)) {
+                Ok(bytes) => return write(entry, path, without_licence(bytes, FetchSource::Url(url.clone()))),
+                Err(error) => _ = write!(failures, "\n      {url}: {error:#}"),
             }
         }
-        match self.first_of(&entry.sources, |files| made(entry, files)) {
+        match self.first_of(&entry.sources, |files| build(entry, files)) {
             Ok(obtained) => return write(entry, path, obtained),
-            Err(reasons) => refused += &reasons,
+            Err(reasons) => failures += &reasons,
         }
-        if refused.is_empty() {
+        if failures.is_empty() {
             let steps = entry.conversion.as_deref().unwrap_or("no conversion is written down");
             let _ = write!(
-                refused,
+                failures,
                 "\n      no place serves it. It was made from {} @ {} : {} by: {steps}",
                 entry.origin.repository, entry.origin.commit, entry.origin.path
             );
         }
-        bail!("it could not be had:{refused}\n      a folder that has the file (sha256 {}): --mirror DIR", entry.sha256)
+        bail!(
+            "it could not be had:{failures}\n      a folder that has the file (sha256 {}): --mirror DIR",
+            entry.sha256
+        )
     }
 
-    /// Writes a file that is no model to `path`. Errors: no source that has it; the message says why of each.
+    /// Writes a file other than a model to `path`. Errors: no source has it; the message gives the reason for each.
     pub(crate) fn get_file(&mut self, file: &PinnedFile, path: &Path) -> Result<FetchSource> {
-        let whole = |files: &[Vec<u8>]| {
+        let concatenate = |files: &[Vec<u8>]| {
             let bytes = files.concat();
-            pinned(&bytes, &file.sha256, &file.file).map(|()| bytes)
+            check_hash(&bytes, &file.sha256, &file.file).map(|()| bytes)
         };
-        let obtained = self.first_of(&file.sources, whole);
+        let obtained = self.first_of(&file.sources, concatenate);
         let Obtained { bytes, source, .. } =
-            obtained.map_err(|refused| anyhow!("{} could not be had:{refused}", file.file))?;
+            obtained.map_err(|failures| anyhow!("{} could not be had:{failures}", file.file))?;
         workdir::write_file(path, &bytes)?;
         Ok(source)
     }
 
-    /// What `make` gives of the files of the first source that has them; those in the mirror come first. An error says why
-    /// of each source.
+    /// Result of `make` for the files of the first source that has them, with mirrored sources first. The error gives
+    /// the reason for each source.
     fn first_of(
         &mut self,
         sources: &[ModelSource],
         make: impl Fn(&[Vec<u8>]) -> Result<Vec<u8>>,
     ) -> Result<Obtained, String> {
-        let mut refused = String::new();
+        let mut failures = String::new();
         let (mirrored, others): (Vec<_>, Vec<_>) = sources.iter().partition(|source| self.has_mirrored(source));
-        let of_mirror = mirrored.into_iter().map(|source| (source, FetchSource::MirrorOf(source.clone())));
-        let of_others = others.into_iter().map(|source| (source, FetchSource::Source(source.clone())));
-        for (source, from) in of_mirror.chain(of_others) {
+        let mirrored_sources = mirrored.into_iter().map(|source| (source, FetchSource::MirrorOf(source.clone())));
+        let other_sources = others.into_iter().map(|source| (source, FetchSource::Source(source.clone())));
+        for (source, from) in mirrored_sources.chain(other_sources) {
             let files = match from {
                 FetchSource::MirrorOf(_) => self.mirrored(source),
                 _ => self.files(source),
             };
             match files.and_then(|(files, licence)| Ok((make(&files)?, licence))) {
                 Ok((bytes, licence)) => return Ok(Obtained { bytes, licence, source: from }),
-                Err(error) if source.from == SourceKind::Address => _ = write!(refused, "\n      {error:#}"),
-                Err(error) => _ = write!(refused, "\n      {source}: {error:#}"),
+                Err(error) if source.from == SourceKind::Address => _ = write!(failures, "\n      {error:#}"),
+                Err(error) => _ = write!(failures, "\n      {source}: {error:#}"),
             }
         }
-        Err(refused)
+        Err(failures)
     }
 
-    fn offered(&self, sha256: &str) -> Option<&Path> {
-        let found = self.offered.iter().find(|(hash, _)| hash.eq_ignore_ascii_case(sha256))?;
+    fn in_mirror(&self, sha256: &str) -> Option<&Path> {
+        let found = self.mirror_files.iter().find(|(hash, _)| hash.eq_ignore_ascii_case(sha256))?;
         Some(&found.1)
     }
 
     fn has_mirrored(&self, source: &ModelSource) -> bool {
-        let has_package = !source.sha256.is_empty() && self.offered(&source.sha256).is_some();
-        has_package || source.files.iter().all(|file| self.offered(&file.sha256).is_some())
+        let has_package = !source.sha256.is_empty() && self.in_mirror(&source.sha256).is_some();
+        has_package || source.files.iter().all(|file| self.in_mirror(&file.sha256).is_some())
     }
 
     fn mirrored(&self, source: &ModelSource) -> Result<(Vec<Vec<u8>>, Option<String>)> {
-        if let Some(package) = self.offered(&source.sha256).filter(|_| !source.sha256.is_empty()) {
+        if let Some(package) = self.in_mirror(&source.sha256).filter(|_| !source.sha256.is_empty()) {
             return unpacked(source, package);
         }
         let read = |file: &super::SourceFile| {
-            let path = self.offered(&file.sha256).with_context(|| format!("the mirror has no {}", file.path))?;
+            let path = self.in_mirror(&file.sha256).with_context(|| format!("the mirror has no {}", file.path))?;
             Ok(input::read(path, input::MOST_DATA)?)
         };
         Ok((source.files.iter().map(read).collect::<Result<_>>()?, None))
     }
 
-    /// The files of a source, and the text of its licence where it has one.
+    /// Files of a source, and its licence text if it has one.
     fn files(&mut self, source: &ModelSource) -> Result<(Vec<Vec<u8>>, Option<String>)> {
         if source.from == SourceKind::Address {
             let get = |file: &super::SourceFile| {
                 let url = format!("{}{}", source.name, file.path);
-                part(file, download(&url).with_context(|| url.clone())?)
+                checked_part(file, download(&url).with_context(|| url.clone())?)
             };
             let licence = source.licence.as_ref().and_then(|path| download(&format!("{}{path}", source.name)).ok());
             let text = licence.map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
@@ -175,11 +178,12 @@ impl<'a> Fetcher<'a> {
         }
         let n = self.packages.len();
         let package = self.packages.entry(source.sha256.clone()).or_insert_with(|| {
-            // A name of this process: the npm of a fetch that was killed may go on, and must not write in here.
+            // The name contains the process id: the npm process of a killed fetch may still be running and must not
+            // write here.
             let dir = self.downloads.join(format!("{}-{n}", std::process::id()));
-            let made = std::fs::create_dir_all(&dir);
-            let made = made.with_context(|| format!("cannot make the folder {}", dir.display()));
-            let downloaded = made.and_then(|()| package::download(source, &dir)).and_then(|file| {
+            let created = std::fs::create_dir_all(&dir);
+            let created = created.with_context(|| format!("cannot make the folder {}", dir.display()));
+            let downloaded = created.and_then(|()| package::download(source, &dir)).and_then(|file| {
                 let found = sha256_of(&file)?;
                 ensure!(
                     found.eq_ignore_ascii_case(&source.sha256),
@@ -194,33 +198,37 @@ impl<'a> Fetcher<'a> {
     }
 }
 
-/// Adds hash and path of every file of a folder that may be one of a model.
-fn offer(folder: &Path, depth: usize, offered: &mut Vec<(String, PathBuf)>) -> Result<()> {
+/// Adds hash and path of every file in a folder that is small enough for a model.
+fn list_mirror(folder: &Path, depth: usize, mirror_files: &mut Vec<(String, PathBuf)>) -> Result<()> {
     let cannot = || format!("cannot read the folder {}", folder.display());
     for file in std::fs::read_dir(folder).with_context(cannot)? {
         let file = file.with_context(cannot)?;
         let (path, kind) = (file.path(), file.file_type()?);
         if kind.is_dir() && depth > 0 {
-            offer(&path, depth - 1, offered)?;
+            list_mirror(&path, depth - 1, mirror_files)?;
         } else if path.metadata().is_ok_and(|meta| meta.is_file() && meta.len() <= MAX_BYTES) {
-            offered.push((sha256_of(&path)?, path));
+            mirror_files.push((sha256_of(&path)?, path));
         }
     }
     Ok(())
 }
 
-/// The members of a package that a source names, each checked, and the text of its licence.
+/// Files of a package that a source lists, each checked, and its licence text.
 fn unpacked(source: &ModelSource, package: &Path) -> Result<(Vec<Vec<u8>>, Option<String>)> {
     let paths: Vec<&str> =
         source.files.iter().map(|file| &file.path).chain(&source.licence).map(String::as_str).collect();
     let mut members = package::members(source.from, package, &paths)?.into_iter();
-    let files =
-        source.files.iter().zip(members.by_ref()).map(|(file, bytes)| part(file, bytes)).collect::<Result<_>>()?;
+    let files = source
+        .files
+        .iter()
+        .zip(members.by_ref())
+        .map(|(file, bytes)| checked_part(file, bytes))
+        .collect::<Result<_>>()?;
     Ok((files, members.next().map(|bytes| String::from_utf8_lossy(&bytes).into_owned())))
 }
 
-/// What counts of a file, checked against its pin.
-fn part(file: &super::SourceFile, bytes: Vec<u8>) -> Result<Vec<u8>> {
+/// The used byte range of a file, checked against its pinned hash.
+fn checked_part(file: &super::SourceFile, bytes: Vec<u8>) -> Result<Vec<u8>> {
     let bytes = match file.range {
         None => bytes,
         Some([start, end]) => {
@@ -228,18 +236,18 @@ fn part(file: &super::SourceFile, bytes: Vec<u8>) -> Result<Vec<u8>> {
             bytes.get(range).with_context(|| format!("{} has only {} bytes", file.path, bytes.len()))?.to_vec()
         }
     };
-    pinned(&bytes, &file.sha256, &file.path)?;
+    check_hash(&bytes, &file.sha256, &file.path)?;
     Ok(bytes)
 }
 
-fn pinned(bytes: &[u8], sha256: &str, name: &str) -> Result<()> {
+fn check_hash(bytes: &[u8], sha256: &str, name: &str) -> Result<()> {
     let found = format!("{:x}", Sha256::digest(bytes));
     ensure!(found.eq_ignore_ascii_case(sha256), "{name} has sha256 {found}, expected {sha256}");
     Ok(())
 }
 
-/// The file of a model, made from those of a source.
-fn made(entry: &ModelEntry, files: &[Vec<u8>]) -> Result<Vec<u8>> {
+/// Builds the file of a model from the files of a source.
+fn build(entry: &ModelEntry, files: &[Vec<u8>]) -> Result<Vec<u8>> {
     let files: Vec<&[u8]> = files.iter().map(Vec::as_slice).collect();
     let bytes = match &entry.convert {
         Some(conversion) => {
@@ -252,7 +260,7 @@ fn made(entry: &ModelEntry, files: &[Vec<u8>]) -> Result<Vec<u8>> {
         }
         None => files.concat(),
     };
-    pinned(&bytes, &entry.sha256, &entry.file)?;
+    check_hash(&bytes, &entry.sha256, &entry.file)?;
     Ok(bytes)
 }
 
@@ -264,10 +272,10 @@ fn download(url: &str) -> Result<Vec<u8>> {
     Ok(agent.get(url).call()?.body_mut().with_config().limit(MAX_BYTES).read_to_vec()?)
 }
 
-/// Puts the file in its place, and a text with its origin and licence beside it.
+/// Writes the file to `path`, and its origin and licence to a text file next to it.
 fn write(entry: &ModelEntry, path: &Path, obtained: Obtained) -> Result<FetchSource> {
     let Obtained { bytes, licence, source } = obtained;
-    pinned(&bytes, &entry.sha256, &entry.file)?;
+    check_hash(&bytes, &entry.sha256, &entry.file)?;
     let text = licence.map(|text| format!("\n{}\n", text.trim_end())).unwrap_or_default();
     workdir::write_file(&path.with_extension("licence.txt"), (entry.terms() + &text).as_bytes())?;
     workdir::write_file(path, &bytes)?;

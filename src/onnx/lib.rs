@@ -1,6 +1,6 @@
-//! The only room that knows ONNX Runtime: finding its library, sessions, the manifest that describes the models, checks
-//! of hashes, names and shapes, the folder of models, and the conversion of other formats. What the numbers of an output
-//! mean is written in the manifest and read in `pose2d`.
+//! The only crate that uses ONNX Runtime: finding its library, sessions, the manifest that describes the models,
+//! checks of hashes, names and shapes, the models folder, and conversion from other formats. The manifest states the
+//! meaning of each output; `pose2d` decodes them.
 
 pub mod check;
 pub mod convert;

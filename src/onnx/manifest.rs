@@ -1,5 +1,5 @@
-//! `manifest.toml`: the models known, built in and beside the model files. One model's description is in `entry`, what
-//! makes it sound in `check`; `model` opens what is described here.
+//! `manifest.toml`: the known models, built in and from the models folder. `entry` describes one model, `check`
+//! validates descriptions, `model` opens the files.
 
 use super::{ModelEntry, ModelRole, PinnedFile};
 use anyhow::{Context, Result, ensure};
@@ -7,35 +7,35 @@ use orator_base::input;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// The file's name inside the folder of the models.
+/// File name in the models folder.
 pub const MANIFEST_FILE: &str = "manifest.toml";
 
 const BUILTIN: &str = include_str!("../../models/manifest.toml");
 
-/// All models known, in the order of the file.
+/// All known models, in file order.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
     #[serde(default, rename = "model", skip_serializing_if = "Vec::is_empty")]
     pub models: Vec<ModelEntry>,
-    /// The ONNX Runtime library, for machines that have none.
+    /// The ONNX Runtime library, for machines without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub runtime: Option<PinnedFile>,
-    /// Word vectors, as they are published.
+    /// Word vectors in their published form.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub words: Option<PinnedFile>,
-    /// Descriptions without a file: forms to register other models by.
+    /// Descriptions without a file: templates for registering other models.
     #[serde(default, rename = "layout", skip_serializing_if = "Vec::is_empty")]
     pub layouts: Vec<ModelEntry>,
 }
 
 impl Manifest {
-    /// The models described inside the program.
+    /// The built-in manifest.
     pub fn builtin() -> Result<Self> {
         Self::parse(BUILTIN).context("the built-in manifest of models")
     }
 
-    /// The built-in models with `manifest.toml` of `dir` laid over them, where there is one.
+    /// The built-in manifest, overridden by `manifest.toml` in `dir` if it exists.
     pub fn load(dir: &Path) -> Result<Self> {
         let mut manifest = Self::builtin()?;
         let path = dir.join(MANIFEST_FILE);
@@ -44,8 +44,8 @@ impl Manifest {
                 let own = Self::parse(&text).with_context(|| format!("in {}", path.display()))?;
                 manifest.runtime = own.runtime.or(manifest.runtime);
                 manifest.words = own.words.or(manifest.words);
-                own.models.into_iter().for_each(|entry| put(&mut manifest.models, entry));
-                own.layouts.into_iter().for_each(|entry| put(&mut manifest.layouts, entry));
+                own.models.into_iter().for_each(|entry| replace_or_push(&mut manifest.models, entry));
+                own.layouts.into_iter().for_each(|entry| replace_or_push(&mut manifest.layouts, entry));
             }
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
             Err(error) => return Err(error).with_context(|| format!("cannot read {}", path.display())),
@@ -53,7 +53,7 @@ impl Manifest {
         Ok(manifest)
     }
 
-    /// Reads the text of a manifest and checks every entry.
+    /// Parses a manifest and checks every entry.
     pub fn parse(text: &str) -> Result<Self> {
         let manifest: Self = toml::from_str(text).context("not a manifest of models")?;
         for (idx, entry) in manifest.models.iter().enumerate() {
@@ -68,7 +68,7 @@ impl Manifest {
         Ok(manifest)
     }
 
-    /// The model of that id.
+    /// The model with this id.
     pub fn get(&self, id: &str) -> Result<&ModelEntry> {
         self.models.iter().find(|entry| entry.id == id).with_context(|| {
             let known: Vec<_> = self.models.iter().map(|entry| entry.id.as_str()).collect();
@@ -76,12 +76,12 @@ impl Manifest {
         })
     }
 
-    /// The description, with or without a file, of that id.
+    /// The layout or model with this id.
     pub fn like(&self, id: &str) -> Result<&ModelEntry> {
         self.layouts.iter().find(|entry| entry.id == id).map_or_else(|| self.get(id), Ok)
     }
 
-    /// The model of that id, which must have the role.
+    /// The model with this id, which must have this role.
     pub fn get_as(&self, id: &str, role: ModelRole) -> Result<&ModelEntry> {
         let entry = self.get(id)?;
         ensure!(entry.role == role, "the model {id:?} is a {:?} model; a {role:?} model is wanted here", entry.role);
@@ -89,8 +89,8 @@ impl Manifest {
     }
 }
 
-/// Replaces the entry of the same id by `entry`, which else comes at the end.
-fn put(entries: &mut Vec<ModelEntry>, entry: ModelEntry) {
+/// Replaces the entry with the same id, or appends `entry`.
+fn replace_or_push(entries: &mut Vec<ModelEntry>, entry: ModelEntry) {
     match entries.iter_mut().find(|known| known.id == entry.id) {
         Some(known) => *known = entry,
         None => entries.push(entry),
@@ -102,7 +102,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_builtin_manifest_reads_and_writes_itself() {
+    fn builtin_manifest_round_trips() {
         let manifest = Manifest::builtin().unwrap();
         assert_eq!((manifest.models.len(), manifest.layouts.len()), (16, 5));
         assert_eq!(Manifest::parse(&toml::to_string(&manifest).unwrap()).unwrap(), manifest);
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_are_named() {
+    fn errors_name_the_mistake() {
         let message =
             |from: &str, to: &str| format!("{:#}", Manifest::parse(&BUILTIN.replacen(from, to, 1)).unwrap_err());
         assert!(message("role = \"person\"", "rolle = \"person\"").contains("rolle"));
@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn a_manifest_beside_the_models_is_laid_over_the_builtin_one() {
+    fn manifest_of_the_folder_overrides_the_builtin_one() {
         let dir = tempfile::tempdir().unwrap();
         let mut own = Manifest::builtin().unwrap().get("person-rtmdet-nano").unwrap().clone();
         own.id = "person-mine".into();

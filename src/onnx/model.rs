@@ -1,5 +1,5 @@
-//! One opened model: its file was checked against the manifest (there, the right bytes, the right names and shapes), it
-//! owns its input buffer, and it counts the seconds spent inside ONNX Runtime.
+//! An opened model whose file was checked against the manifest (present, correct hash, names and shapes). It owns its
+//! input buffer and measures the time spent inside ONNX Runtime.
 
 use super::{ModelEntry, ModelRole, Port, Runtime};
 use anyhow::{Context, Result, anyhow};
@@ -12,10 +12,11 @@ use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Why a model cannot be used: `id` is the model, `path` its file, `found` what is there instead of `expected`.
+/// Reason why a model cannot be used: `id` is the model, `path` its file, `found` the actual value instead of
+/// `expected`.
 #[derive(Clone, Debug, thiserror::Error, Serialize, Deserialize)]
 pub enum ModelError {
-    /// The file is not there.
+    /// The file does not exist.
     #[error(
         "the model {id} is missing: {path} is not there; `orator models fetch` gets it, models.dir names another folder"
     )]
@@ -23,16 +24,16 @@ pub enum ModelError {
     /// The file cannot be read.
     #[error("the model {id} cannot be read: {path}: {error}")]
     Unreadable { id: String, path: PathBuf, error: String },
-    /// The file has other bytes than those pinned.
+    /// The hash of the file differs from the pinned one.
     #[error(
         "the model {id} is not the one described: {path} has sha256 {found}, expected {expected}; `orator models fetch` gets the \
          right one, `orator models add` registers this one"
     )]
     WrongHash { id: String, path: PathBuf, expected: String, found: String },
-    /// ONNX Runtime does not open the file.
+    /// ONNX Runtime cannot open the file.
     #[error("the model {id} is no ONNX model this ONNX Runtime can open: {path}: {error}")]
     NotOnnx { id: String, path: PathBuf, error: String },
-    /// An input or output, `port`, has another name, type or shape.
+    /// An input or output, `port`, has another name, type or shape than described.
     #[error(
         "the model {id} has another layout than described: {path}: {port}: expected {expected}, found {found}; describe it in \
          manifest.toml (`orator models add FILE --like ID`)"
@@ -40,7 +41,7 @@ pub enum ModelError {
     WrongLayout { id: String, path: PathBuf, port: String, expected: String, found: String },
 }
 
-/// A model ready to run, on one thread.
+/// A model that is ready to run, on one thread.
 pub struct Model {
     entry: ModelEntry,
     session: Session,
@@ -51,8 +52,7 @@ pub struct Model {
 }
 
 impl Model {
-    /// Opens the file of `entry` in the folder `dir`. Errors: each an `ModelError`: missing, unreadable, wrong hash,
-    /// not ONNX, wrong layout.
+    /// Opens the file of `entry` in the folder `dir`. Errors are documented in [`ModelError`].
     pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self, ModelError> {
         let session = open_session(runtime, entry, dir)?;
         let shape = entry.inputs.first().map(|port| port.shape.clone()).unwrap_or_default();
@@ -61,17 +61,17 @@ impl Model {
         Ok(Self { entry: entry.clone(), session, shape, input, inside: Duration::ZERO, n_runs: 0 })
     }
 
-    /// Its description.
+    /// Description of the model.
     pub fn entry(&self) -> &ModelEntry {
         &self.entry
     }
 
-    /// The input tensor, row-major, as the last run left it; fill it before `run`.
+    /// The input tensor, row-major, with the values of the last run; fill it before `run`.
     pub fn input_mut(&mut self) -> &mut [f32] {
         &mut self.input
     }
 
-    /// Runs the model on what is in its input.
+    /// Runs the model on its input tensor.
     pub fn run(&mut self) -> Result<Outputs<'_>> {
         let input = TensorRef::from_array_view((self.shape.as_slice(), self.input.as_slice()))?;
         let start = Instant::now();
@@ -82,30 +82,30 @@ impl Model {
         Ok(Outputs { id: &self.entry.id, outputs })
     }
 
-    /// Seconds spent inside `Session::run` since it was opened.
+    /// Total time spent in `Session::run`, seconds.
     pub fn secs_inside(&self) -> f64 {
         self.inside.as_secs_f64()
     }
 
-    /// How often it ran.
+    /// Number of runs.
     pub fn n_runs(&self) -> u64 {
         self.n_runs
     }
 }
 
-/// What a run gave; borrowed from the model until the next run.
+/// Outputs of a run; borrowed from the model until the next run.
 pub struct Outputs<'m> {
     pub(super) id: &'m str,
     pub(super) outputs: SessionOutputs<'m>,
 }
 
 impl Outputs<'_> {
-    /// Shape and numbers of a float output.
+    /// Shape and values of a float output.
     pub fn floats(&self, name: &str) -> Result<(&[i64], &[f32])> {
         self.read(name)
     }
 
-    /// Shape and numbers of an integer output.
+    /// Shape and values of an integer output.
     pub fn integers(&self, name: &str) -> Result<(&[i64], &[i64])> {
         self.read(name)
     }
@@ -119,7 +119,7 @@ impl Outputs<'_> {
     }
 }
 
-/// SHA-256 of a file's content, in hex.
+/// SHA-256 of a file, in hex.
 pub fn sha256_of(path: &Path) -> Result<String> {
     let mut hash = Sha256::new();
     let copied = input::open(path).and_then(|mut file| std::io::copy(&mut file, &mut hash));
@@ -127,9 +127,9 @@ pub fn sha256_of(path: &Path) -> Result<String> {
     Ok(format!("{:x}", hash.finalize()))
 }
 
-/// Opens the file of `entry` in the folder `dir`: the right bytes, names and shapes.
+/// Opens the file of `entry` in the folder `dir` after checking its hash, names and shapes.
 pub(super) fn open_session(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Session, ModelError> {
-    // The rate of sound is a whole number; pictures are not.
+    // The sample rate input of a speech model is an integer; inputs of image models are floats.
     let is_speech = entry.role == ModelRole::Speech;
     let path = dir.join(&entry.file);
     let id = || entry.id.clone();
@@ -157,29 +157,30 @@ pub(super) fn open_session(runtime: &Runtime, entry: &ModelEntry, dir: &Path) ->
     Ok(session)
 }
 
-/// One thread, no spinning, everything optimised, the same numbers on every run.
+/// Creates a session with one thread, no spinning, full optimisation and deterministic results.
 fn session(runtime: &Runtime, bytes: &[u8]) -> Result<Session> {
-    fn plain<T>(error: ort::Error<T>) -> anyhow::Error {
+    fn to_anyhow<T>(error: ort::Error<T>) -> anyhow::Error {
         anyhow!("{error}")
     }
     Session::builder(runtime.environment())?
         .with_intra_threads(1)
-        .map_err(plain)?
+        .map_err(to_anyhow)?
         .with_inter_threads(1)
-        .map_err(plain)?
+        .map_err(to_anyhow)?
         .with_intra_op_spinning(false)
-        .map_err(plain)?
+        .map_err(to_anyhow)?
         .with_optimization_level(GraphOptimizationLevel::Level3)
-        .map_err(plain)?
+        .map_err(to_anyhow)?
         .with_deterministic_compute(true)
-        .map_err(plain)?
+        .map_err(to_anyhow)?
         .with_log_level(ort::logging::LogLevel::Error)
-        .map_err(plain)?
+        .map_err(to_anyhow)?
         .commit_from_memory(bytes)
-        .map_err(plain)
+        .map_err(to_anyhow)
 }
 
-/// The first difference between what the file has and what the manifest says: which port, expected, found.
+/// The first difference between the file and the manifest: port, expected value, found value. `all`: the manifest
+/// must list all ports of the file.
 fn mismatch(what: &str, found: &[Outlet], expected: &[Port], all: bool) -> Option<(String, String, String)> {
     let names = |ports: &mut dyn Iterator<Item = &str>| ports.collect::<Vec<_>>().join(", ");
     if all && found.len() != expected.len() {
@@ -195,16 +196,16 @@ fn mismatch(what: &str, found: &[Outlet], expected: &[Port], all: bool) -> Optio
             ValueType::Tensor { ty, shape, .. } => (*ty, shape.to_vec()),
             other => return Some((named(), "a tensor".into(), format!("{other:?}"))),
         };
-        let usable = if all {
+        let is_supported = if all {
             element == TensorElementType::Float32
         } else {
             matches!(element, TensorElementType::Float32 | TensorElementType::Int64)
         };
-        if !usable {
+        if !is_supported {
             return Some((named(), "float32".into(), format!("{element:?}")));
         }
-        let same = |(a, b): (&i64, &i64)| *a < 0 || *b < 0 || a == b;
-        if shape.len() != port.shape.len() || !shape.iter().zip(&port.shape).all(same) {
+        let is_same_size = |(a, b): (&i64, &i64)| *a < 0 || *b < 0 || a == b;
+        if shape.len() != port.shape.len() || !shape.iter().zip(&port.shape).all(is_same_size) {
             return Some((named(), format!("{:?}", port.shape), format!("{shape:?}")));
         }
     }

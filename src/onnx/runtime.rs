@@ -1,4 +1,4 @@
-//! ONNX Runtime itself: its shared library is looked for and loaded when it is first needed, once a process.
+//! ONNX Runtime: its shared library is located and loaded on first use, once per process.
 
 use anyhow::{Result, anyhow, bail};
 use ort::environment::Environment;
@@ -6,29 +6,33 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
-/// What the library is called; a version may follow.
+/// File name of the library; a version suffix may follow.
 pub const LIBRARY: &str = "libonnxruntime.so";
-/// Names a library outright, before any search.
+/// Environment variable with the path of the library, which bypasses the search.
 const VARIABLE: &str = "ORT_DYLIB_PATH";
 
-/// The variable that stops ONNX Runtime from reporting its use to its maker, read by the library when it is loaded:
-/// its own switch comes after the first report. The program sets it before its first thread starts; a program that
-/// uses this crate does so itself.
+/// Environment variable that disables ONNX Runtime telemetry. The library reads it while loading; its API switch
+/// takes effect only after the first report. The program sets it before its first thread starts, and other programs
+/// that use this crate must do the same.
 pub const TELEMETRY_OFF: &str = "ORT_DISABLE_TELEMETRY";
 
-/// ONNX Runtime, loaded.
+/// The loaded ONNX Runtime.
 #[derive(Clone)]
 pub struct Runtime {
     environment: Environment,
     library: PathBuf,
 }
 
-/// There is one a process: the first library loaded stays.
+/// One runtime per process: the first library loaded is used from then on.
 static LOADED: Mutex<Option<Runtime>> = Mutex::new(None);
 
 impl Runtime {
-    /// Loads the library `explicit` (empty: see `find_library`). Later calls give the library of the first. Errors: no
-    /// library, or one that cannot be loaded; the message says how to get it.
+    /// Loads the library `explicit` (if empty, the one found by [`find_library`]). Later calls return the first
+    /// library.
+    ///
+    /// # Errors
+    ///
+    /// No library was found, or it cannot be loaded; the message says how to get one.
     pub fn load(explicit: &Path, models_dir: &Path) -> Result<Self> {
         let mut loaded = LOADED.lock().map_err(|_| anyhow!("loading ONNX Runtime failed before"))?;
         if let Some(runtime) = loaded.as_ref() {
@@ -50,12 +54,12 @@ impl Runtime {
         Ok(runtime)
     }
 
-    /// The library that was loaded.
+    /// Path of the loaded library.
     pub fn library(&self) -> &Path {
         &self.library
     }
 
-    /// Its version, as the library's file name carries it (`libonnxruntime.so.1.31.1`).
+    /// Library version, taken from its file name (`libonnxruntime.so.1.31.1`).
     pub fn version(&self) -> String {
         let file = std::fs::canonicalize(&self.library).unwrap_or_else(|_| self.library.clone());
         let name = file.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
@@ -68,8 +72,8 @@ impl Runtime {
     }
 }
 
-/// Where the library is: `explicit`, else the variable ORT_DYLIB_PATH, else a `lib` folder beside the program or one
-/// of the folders above it, else the `lib` folder of the models.
+/// Path of the library: `explicit`, or else the variable ORT_DYLIB_PATH, or else a `lib` folder in the program's
+/// folder or one of its ancestors, or else the `lib` folder of the models.
 pub fn find_library(explicit: &Path, models_dir: &Path) -> Result<PathBuf> {
     if !explicit.as_os_str().is_empty() {
         if explicit.is_file() {
@@ -84,8 +88,8 @@ pub fn find_library(explicit: &Path, models_dir: &Path) -> Result<PathBuf> {
         bail!("{VARIABLE} names {}, which is not a file", named.display());
     }
     let program = std::env::current_exe().and_then(std::fs::canonicalize).unwrap_or_default();
-    let beside = program.ancestors().skip(1).map(|folder| folder.join("lib"));
-    beside.chain([models_dir.join("lib")]).find_map(|folder| library_in(&folder)).ok_or_else(|| {
+    let lib_folders = program.ancestors().skip(1).map(|folder| folder.join("lib"));
+    lib_folders.chain([models_dir.join("lib")]).find_map(|folder| library_in(&folder)).ok_or_else(|| {
         anyhow!(
             "the ONNX Runtime library ({LIBRARY}) was not found; `orator models fetch` gets it, models.onnxruntime or {VARIABLE} \
              names another"
@@ -93,7 +97,7 @@ pub fn find_library(explicit: &Path, models_dir: &Path) -> Result<PathBuf> {
     })
 }
 
-/// The library in a folder; of several versions the last by name.
+/// The library in a folder; among several versions the last by name.
 fn library_in(folder: &Path) -> Option<PathBuf> {
     let files = std::fs::read_dir(folder).ok()?.flatten().map(|file| file.path());
     let named = |path: &PathBuf| path.file_name().and_then(OsStr::to_str).is_some_and(|name| name.starts_with(LIBRARY));
@@ -105,10 +109,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_library_is_found_beside_the_models_and_missed_with_advice() {
+    fn library_is_found_in_lib_and_its_absence_is_explained() {
         let dir = tempfile::tempdir().unwrap();
-        let lost = find_library(&dir.path().join("gone.so"), dir.path()).unwrap_err();
-        assert!(lost.to_string().contains("gone.so") && lost.to_string().contains("make runtime"));
+        let error = find_library(&dir.path().join("gone.so"), dir.path()).unwrap_err();
+        assert!(error.to_string().contains("gone.so") && error.to_string().contains("make runtime"));
         std::fs::create_dir(dir.path().join("lib")).unwrap();
         for version in ["1.9.0", "1.31.1"] {
             std::fs::write(dir.path().join(format!("lib/{LIBRARY}.{version}")), b"").unwrap();

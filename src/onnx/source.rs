@@ -1,5 +1,5 @@
-//! Where the file of a model comes from: addresses and published packages, in the order in which they are tried, and how
-//! the file is made from what they hold. Data only.
+//! Sources of model files: addresses and published packages, in the order in which they are tried, and the conversion
+//! of their files. Data only.
 
 use super::convert::SourceFormat;
 use anyhow::{Result, ensure};
@@ -7,74 +7,75 @@ use orator_base::types::file_name::FileName;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// One place that has the files a model is made of.
+/// One source of the files from which a model is built.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModelSource {
-    /// What kind of place.
+    /// Kind of source.
     pub from: SourceKind,
-    /// What the path of each file follows in its address; NAME@VERSION of an npm, NAME==VERSION of a PyPI package.
+    /// URL prefix of the file paths; NAME@VERSION of an npm package, NAME==VERSION of a PyPI package.
     pub name: String,
-    /// SHA-256 of the package's file, 64 hex digits; empty for addresses, whose files are pinned one by one.
+    /// SHA-256 of the package file, 64 hex digits; empty for addresses, whose files are pinned individually.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub sha256: String,
-    /// The wheel's PYTHON-ABI-PLATFORM, where a PyPI package has more than one (`cp311-cp311-manylinux_2_17_x86_64`).
+    /// PYTHON-ABI-PLATFORM of the wheel, if a PyPI package has several (`cp311-cp311-manylinux_2_17_x86_64`).
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub wheel: String,
-    /// The files, in the order of the format.
+    /// Files, in the order that the format requires.
     pub files: Vec<SourceFile>,
-    /// Path of the text of the licence, beside the files.
+    /// Path of the licence text in the source.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub licence: Option<String>,
 }
 
-/// A file that is no model (the library of ONNX Runtime, word vectors), and the places that have it.
+/// A file other than a model (the ONNX Runtime library, word vectors), with its sources.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PinnedFile {
-    /// Its name.
+    /// File name.
     pub file: String,
-    /// SHA-256 of its content, 64 hex digits.
+    /// SHA-256 of the file, 64 hex digits.
     pub sha256: String,
-    /// The terms it is used under.
+    /// Licence of the file.
     pub licence: String,
-    /// Where it is, in the order in which the places are tried.
+    /// Sources, in the order in which they are tried.
     #[serde(rename = "source")]
     pub sources: Vec<ModelSource>,
 }
 
-/// What kind of place has the files.
+/// Kind of a source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SourceKind {
-    /// Files behind an address.
+    /// Files at URLs.
     Address,
-    /// Members of an npm package.
+    /// Files in an npm package.
     Npm,
-    /// Members of a wheel of PyPI.
+    /// Files in a wheel from PyPI.
     Pip,
 }
 
-/// A file of a source.
+/// A file in a source.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SourceFile {
-    /// Its path inside the package, or the end of its address.
+    /// Path inside the package, or end of the URL.
     pub path: String,
-    /// The first byte that counts and the first after it, where the file is a part of that one.
+    /// Byte range [start, end) that is used; `None`: the complete file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub range: Option<[u64; 2]>,
-    /// SHA-256 of what counts, 64 hex digits.
+    /// SHA-256 of the used bytes, 64 hex digits.
     pub sha256: String,
 }
 
-/// How the file of a model is made from the files of a source.
+/// Conversion of the files of a source to a model.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Conversion {
     /// The format of the source.
     pub format: SourceFormat,
-    /// Names for the outputs of the source, in its order, "" for one that is left out; none: those of the model.
+    /// Names for the outputs of the source, in its order, "" for outputs to omit; if empty, the output names of the
+    /// model.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub outputs: Vec<String>,
 }

@@ -1,5 +1,5 @@
-//! The model that tells speech (Silero VAD, version 6, 16 kHz): it is fed windows of sound one after the other, beside a
-//! little of the window before and the state that its last answer left.
+//! Speech detection model (Silero VAD, version 6, 16 kHz): it processes consecutive windows of audio, each with the
+//! end of the previous window and the recurrent state.
 
 use super::model::{Outputs, open_session};
 use super::{ModelEntry, ModelError, Port, Runtime};
@@ -8,29 +8,29 @@ use ort::session::Session;
 use ort::value::TensorRef;
 use std::path::Path;
 
-/// Samples of a window, at 16 kHz.
+/// Samples per window, at 16 kHz.
 pub const WINDOW: usize = 512;
-/// Samples of the window before that are fed again.
+/// Samples of the previous window that precede each window.
 const CONTEXT: usize = 64;
-/// Shape of the state.
+/// Shape of the recurrent state.
 const STATE: [i64; 3] = [2, 1, 128];
-/// Rate, which is an input of its own.
+/// Sample rate, which is an input of the model.
 const RATE: i64 = 16_000;
-/// Names of its inputs and outputs.
+/// Names of the inputs and outputs.
 const INPUTS: [&str; 3] = ["input", "state", "sr"];
 const OUTPUTS: [&str; 2] = ["output", "stateN"];
 
-/// The model ready to listen to a sound from its beginning, on one thread.
+/// The model at the start of an audio signal, on one thread.
 pub struct SpeechModel {
     id: String,
     session: Session,
-    /// Context, then the window.
+    /// Context followed by the window.
     input: [f32; CONTEXT + WINDOW],
     state: Vec<f32>,
 }
 
 impl SpeechModel {
-    /// Opens the file of `entry` in the folder `dir`. Errors: what is wrong with the file.
+    /// Opens the file of `entry` in the folder `dir`. Errors are documented in [`ModelError`].
     pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self, ModelError> {
         let session = open_session(runtime, entry, dir)?;
         let n_state: i64 = STATE.iter().product();
@@ -42,8 +42,12 @@ impl SpeechModel {
         })
     }
 
-    /// Probability of speech, 0..1, in the next window of the sound; one of fewer than 512 samples ends in silence.
-    /// Errors: a window that is too long; an answer of another shape.
+    /// Probability of speech, 0..1, in the next window of the audio; a window of fewer than 512 samples is padded
+    /// with silence.
+    ///
+    /// # Errors
+    ///
+    /// The window is too long, or the outputs have another shape.
     pub fn probability(&mut self, window: &[f32]) -> Result<f32> {
         ensure!(window.len() <= WINDOW, "a window of {} samples, expected {WINDOW}", window.len());
         let (sound, silence) = self.input[CONTEXT..].split_at_mut(window.len());
@@ -73,13 +77,13 @@ impl SpeechModel {
     }
 }
 
-/// Says what is wrong with the description of a speech model: its inputs and outputs are those of this file.
+/// Checks the description of a speech model: its inputs and outputs must be those of this file.
 pub(super) fn check(entry: &ModelEntry) -> Result<()> {
     let shapes: [&[i64]; 3] = [&[1, (CONTEXT + WINDOW) as i64], &STATE, &[]];
-    let is_it = |(port, (name, shape)): (&Port, (&str, &[i64]))| port.name == name && port.shape == shape;
-    let is_fed = entry.inputs.len() == 3 && entry.inputs.iter().zip(INPUTS.into_iter().zip(shapes)).all(is_it);
-    ensure!(is_fed, "a speech model has the inputs input [1, 576], state [2, 1, 128] and sr []");
-    let answers = |name: &str| entry.outputs.iter().any(|port| port.name == name);
-    ensure!(OUTPUTS.into_iter().all(answers), "a speech model has the outputs output and stateN");
+    let is_same = |(port, (name, shape)): (&Port, (&str, &[i64]))| port.name == name && port.shape == shape;
+    let has_inputs = entry.inputs.len() == 3 && entry.inputs.iter().zip(INPUTS.into_iter().zip(shapes)).all(is_same);
+    ensure!(has_inputs, "a speech model has the inputs input [1, 576], state [2, 1, 128] and sr []");
+    let has_output = |name: &str| entry.outputs.iter().any(|port| port.name == name);
+    ensure!(OUTPUTS.into_iter().all(has_output), "a speech model has the outputs output and stateN");
     Ok(())
 }

@@ -1,5 +1,5 @@
-//! The folder of models: what is there, getting what is missing, registering other models, checking all. Every file is
-//! pinned by its SHA-256; a source with other bytes is refused.
+//! The models folder: listing, fetching, registering and checking models. Every file is pinned by its SHA-256; a
+//! source with other bytes is rejected.
 
 use super::fetch::{FetchSource, Fetcher};
 use super::{MANIFEST_FILE, Manifest, Model, ModelEntry, ModelError, ModelOrigin, ModelRole, Runtime, sha256_of};
@@ -12,46 +12,46 @@ use std::ffi::OsStr;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// In the place of a model's id: the first of its role, in the order of the manifest, whose file is there.
+/// Value instead of a model id that selects the first model of its role, in manifest order, whose file exists.
 pub const AUTO: &str = "auto";
-/// Folder of downloads under way, inside the folder of models.
+/// Folder for downloads in progress, inside the models folder.
 const DOWNLOADS: &str = ".downloads";
 
-/// A folder of model files with the manifest that describes them.
+/// A folder of model files with their manifest.
 #[derive(Clone, Debug)]
 pub struct ModelStore {
     dir: PathBuf,
     manifest: Manifest,
 }
 
-/// Whether a model's file is there with the bytes of its description.
+/// State of a model's file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ModelState {
-    /// There, with the pinned bytes.
+    /// Present, with the pinned hash.
     Present,
-    /// There, with other bytes.
+    /// Present, with another hash.
     #[serde(rename = "wrong hash")]
     WrongHash,
-    /// Not there, or not readable.
+    /// Missing or unreadable.
     Missing,
 }
 
 /// A model to fetch.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Wanted {
-    /// The model of this id.
+    /// The model with this id.
     Id(String),
-    /// One of this role: the one that is there, else the first that can be had, in the order of the manifest.
+    /// One model of this role: one that is present, or else the first that can be downloaded, in manifest order.
     Role(ModelRole),
 }
 
-/// A model that was looked for.
+/// Result of fetching a model.
 #[derive(Debug)]
 pub struct Fetched<'a> {
     /// The model.
     pub entry: &'a ModelEntry,
-    /// Where it was had from, or why it could not be had.
+    /// The source it was fetched from, or why it could not be fetched.
     pub source: Result<FetchSource>,
 }
 
@@ -66,24 +66,31 @@ impl fmt::Display for ModelState {
 }
 
 impl ModelStore {
-    /// Reads the manifest of the folder `dir`, which need not exist: the built-in models are known then. Errors: a
-    /// manifest that is not sound.
+    /// Reads the manifest of the folder `dir`; without it, only the built-in models are known.
+    ///
+    /// # Errors
+    ///
+    /// The manifest is invalid.
     pub fn open(dir: &Path) -> Result<Self> {
         let dir = std::path::absolute(dir)?;
         Ok(Self { manifest: Manifest::load(&dir)?, dir })
     }
 
-    /// The folder, absolute.
+    /// Absolute path of the folder.
     pub fn dir(&self) -> &Path {
         &self.dir
     }
 
-    /// All models known.
+    /// All known models.
     pub fn manifest(&self) -> &Manifest {
         &self.manifest
     }
 
-    /// The models of those ids; all where none is named. Errors: an id the manifest does not have.
+    /// The models with these ids, or all models if `ids` is empty.
+    ///
+    /// # Errors
+    ///
+    /// An id that is not in the manifest.
     pub fn entries(&self, ids: &[String]) -> Result<Vec<&ModelEntry>> {
         if ids.is_empty() {
             return Ok(self.manifest.models.iter().collect());
@@ -91,7 +98,7 @@ impl ModelStore {
         ids.iter().map(|id| self.manifest.get(id)).collect()
     }
 
-    /// Whether the file of a model is there with the right bytes; its names and shapes are not looked at.
+    /// State of the file of a model by its hash; names and shapes are not checked.
     pub fn state(&self, entry: &ModelEntry) -> ModelState {
         match sha256_of(&self.path(entry)) {
             Ok(found) if found.eq_ignore_ascii_case(&entry.sha256) => ModelState::Present,
@@ -100,34 +107,42 @@ impl ModelStore {
         }
     }
 
-    /// The file of a model, whether it is there or not.
+    /// Path of the file of a model, which may be missing.
     pub fn path(&self, entry: &ModelEntry) -> PathBuf {
         self.dir.join(&entry.file)
     }
 
-    /// Opens the file of a model: right bytes, right names and shapes. Errors: what is wrong with it.
+    /// Opens the file of a model after checking its hash, names and shapes.
     pub fn check(&self, runtime: &Runtime, entry: &ModelEntry) -> Result<Model, ModelError> {
         Model::open(runtime, entry, &self.dir)
     }
 
-    /// The model of that id and role. `auto` is the first of the role, in the order of the manifest, whose file is
-    /// there; where none is, the first. Errors: an id the manifest does not have, or of another role.
+    /// The model with this id and role. `auto` selects the first model of the role, in manifest order, whose file
+    /// exists, or else the first.
+    ///
+    /// # Errors
+    ///
+    /// The id is not in the manifest or has another role.
     pub fn choose(&self, id: &str, role: ModelRole) -> Result<&ModelEntry> {
         if id != AUTO {
             return self.manifest.get_as(id, role);
         }
-        let mut of_role = self.of_role(role);
-        let there = self.of_role(role).find(|entry| self.path(entry).is_file());
-        there.or_else(|| of_role.next()).with_context(|| format!("the manifest has no {role:?} model"))
+        let mut with_role = self.with_role(role);
+        let present = self.with_role(role).find(|entry| self.path(entry).is_file());
+        present.or_else(|| with_role.next()).with_context(|| format!("the manifest has no {role:?} model"))
     }
 
-    fn of_role(&self, role: ModelRole) -> impl Iterator<Item = &ModelEntry> {
+    fn with_role(&self, role: ModelRole) -> impl Iterator<Item = &ModelEntry> {
         self.manifest.models.iter().filter(move |entry| entry.role == role)
     }
 
-    /// Gets each model that is not there with the right bytes: from the folder `mirror`, whose files may have any name
-    /// and may be what the model is made of, else from its sources. One that fails does not stop the others. Errors: a
-    /// mirror that cannot be read, a folder that cannot be written, another fetch into the same folder.
+    /// Fetches each model that is not present with the pinned hash: from the folder `mirror`, whose files may have
+    /// any name and may be inputs of a conversion, or else from its sources. A failure does not stop the other
+    /// models.
+    ///
+    /// # Errors
+    ///
+    /// The mirror cannot be read, the folder cannot be written, or another fetch is using it.
     pub fn fetch(&self, wanted: &[Wanted], mirror: Option<&Path>, progress: &dyn Progress) -> Result<Vec<Fetched<'_>>> {
         self.with_downloads(|downloads| self.fetch_with(Fetcher::new(mirror, downloads)?, wanted, progress))
     }
@@ -138,7 +153,7 @@ impl ModelStore {
         for one in wanted {
             let (known, candidates): (Vec<_>, Vec<_>) = match one {
                 Wanted::Id(id) => (vec![self.manifest.get(id)?], vec![self.manifest.get(id)?]),
-                Wanted::Role(role) => (self.of_role(*role).collect(), self.candidates(*role).collect()),
+                Wanted::Role(role) => (self.with_role(*role).collect(), self.candidates(*role).collect()),
             };
             if let Some(entry) = known.into_iter().find(|entry| self.state(entry) == ModelState::Present) {
                 fetched.push(Fetched { entry, source: Ok(FetchSource::Present) });
@@ -147,9 +162,9 @@ impl ModelStore {
             for entry in candidates {
                 task.detail(&entry.id);
                 let source = fetcher.get(entry, &self.path(entry));
-                let is_had = source.is_ok();
+                let is_fetched = source.is_ok();
                 fetched.push(Fetched { entry, source });
-                if is_had {
+                if is_fetched {
                     break;
                 }
             }
@@ -158,8 +173,12 @@ impl ModelStore {
         Ok(fetched)
     }
 
-    /// Puts the ONNX Runtime library of the manifest into the folder `lib` of the models, where `Runtime::load` finds
-    /// it. A file of the mirror serves as well. Errors: no place that has it.
+    /// Fetches the ONNX Runtime library of the manifest into the folder `lib` of the models, where `Runtime::load`
+    /// finds it, from the mirror or its sources.
+    ///
+    /// # Errors
+    ///
+    /// No source has it.
     pub fn fetch_runtime(&self, mirror: Option<&Path>, progress: &dyn Progress) -> Result<FetchSource> {
         let runtime = self.manifest.runtime.as_ref().context("the manifest names no ONNX Runtime")?;
         let _task = progress.begin("ONNX Runtime", 0);
@@ -167,8 +186,11 @@ impl ModelStore {
         self.with_downloads(|downloads| Fetcher::new(mirror, downloads)?.get_file(runtime, &path))
     }
 
-    /// Gets the word vectors of the manifest, and gives what `convert` makes of the file as it is published. Errors: no
-    /// place that has it; an error of `convert`.
+    /// Fetches the published word vectors of the manifest and returns the result of `convert` for that file.
+    ///
+    /// # Errors
+    ///
+    /// No source has it, or `convert` fails.
     pub fn fetch_words<T>(
         &self,
         mirror: Option<&Path>,
@@ -184,45 +206,57 @@ impl ModelStore {
         })
     }
 
-    /// Removes the downloads of a fetch that was killed. Errors: they cannot be removed, or belong to a fetch under way.
+    /// Removes downloads left by a fetch that was killed.
+    ///
+    /// # Errors
+    ///
+    /// They cannot be removed, or belong to a running fetch.
     pub fn sweep(&self) -> Result<()> {
         if self.dir.join(DOWNLOADS).exists() { self.with_downloads(|_| Ok(())) } else { Ok(()) }
     }
 
-    /// Runs `fetch` with an empty path for downloads, while no other fetch writes into the folder.
+    /// Runs `fetch` with an unused path for downloads, under a lock against other fetches into the folder.
     fn with_downloads<T>(&self, fetch: impl FnOnce(&Path) -> Result<T>) -> Result<T> {
         let _lock = workdir::lock(&self.dir)?;
         let downloads = self.dir.join(DOWNLOADS);
-        // What lies there already could be read as configuration.
+        // Files left there could be read as configuration.
         workdir::remove(&downloads).with_context(|| format!("cannot remove {}", downloads.display()))?;
         let fetched = fetch(&downloads);
         let _ = std::fs::remove_dir_all(&downloads);
         fetched
     }
 
-    /// What `fetch` may get for `wanted`: every model that is asked for by its id or is a candidate for a role, and is
-    /// not there. Errors: an id the manifest does not have.
+    /// Models that `fetch` may download for `wanted`: each missing model that is named by id, and all candidates of a
+    /// role without a present model.
+    ///
+    /// # Errors
+    ///
+    /// An id that is not in the manifest.
     pub fn missing(&self, wanted: &[Wanted]) -> Result<Vec<&ModelEntry>> {
-        let is_there = |entry: &&ModelEntry| self.state(entry) == ModelState::Present;
+        let is_present = |entry: &&ModelEntry| self.state(entry) == ModelState::Present;
         let mut missing = Vec::new();
         for one in wanted {
             match one {
-                Wanted::Id(id) => missing.extend(Some(self.manifest.get(id)?).filter(|entry| !is_there(entry))),
-                Wanted::Role(role) if self.of_role(*role).any(|entry| is_there(&entry)) => {}
+                Wanted::Id(id) => missing.extend(Some(self.manifest.get(id)?).filter(|entry| !is_present(entry))),
+                Wanted::Role(role) if self.with_role(*role).any(|entry| is_present(&entry)) => {}
                 Wanted::Role(role) => missing.extend(self.candidates(*role)),
             }
         }
         Ok(missing)
     }
 
-    /// Models of a role that can be had, the best first.
+    /// Models of a role that can be downloaded, best first.
     pub fn candidates(&self, role: ModelRole) -> impl Iterator<Item = &ModelEntry> {
-        self.of_role(role).filter(|entry| entry.is_served())
+        self.with_role(role).filter(|entry| entry.is_served())
     }
 
-    /// Registers the ONNX file `file`, which is fed and read like the model or layout `like`: copies it into the folder
-    /// and writes its description into the folder's manifest. Without `id` it is called as its file. Errors: other
-    /// inputs or outputs than `like` has, an id or a file name that is taken.
+    /// Registers the ONNX file `file`, with the preprocessing and decoding of the model or layout `like`: copies it
+    /// into the folder and adds its description to the folder's manifest. The default `id` is the file name without
+    /// `.onnx`.
+    ///
+    /// # Errors
+    ///
+    /// The inputs or outputs differ from those of `like`, or the id or file name is taken.
     pub fn add(
         &mut self,
         runtime: &Runtime,
@@ -231,7 +265,7 @@ impl ModelStore {
         id: Option<&str>,
         licence: &str,
     ) -> Result<ModelEntry> {
-        let entry = described(file, self.manifest.like(like)?, id, licence)?;
+        let entry = describe_like(file, self.manifest.like(like)?, id, licence)?;
         let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         Model::open(runtime, &entry, folder).with_context(|| format!("{} is not like that", file.display()))?;
         let manifest = self.dir.join(MANIFEST_FILE);
@@ -260,8 +294,8 @@ impl ModelStore {
     }
 }
 
-/// The description of a new file that is fed and read like a known one.
-fn described(file: &Path, like: &ModelEntry, id: Option<&str>, licence: &str) -> Result<ModelEntry> {
+/// Description of a new file with the preprocessing and decoding of a known model.
+fn describe_like(file: &Path, like: &ModelEntry, id: Option<&str>, licence: &str) -> Result<ModelEntry> {
     let name = file.file_name().and_then(OsStr::to_str).with_context(|| format!("{} is no file", file.display()))?;
     let bytes = std::fs::metadata(file).with_context(|| format!("cannot read {}", file.display()))?.len();
     let stem = name.strip_suffix(".onnx").unwrap_or(name);

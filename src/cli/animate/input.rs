@@ -140,8 +140,8 @@ impl MotionInput {
                 InputMotion { sound: Some(sample.sound), posture: sample.posture.or(seen.posture), ..seen }
             }
             InputLocation::File(path) => {
-                let MotionFile { motion, says_rate, notes } = motion_file::read_at(path, fps)?;
-                let has_rate = says_rate || fps.is_some();
+                let MotionFile { motion, has_rate, notes } = motion_file::read_at(path, fps)?;
+                let has_rate = has_rate || fps.is_some();
                 InputMotion { motion, posture: None, is_seated: None, sound: None, has_rate, notes }
             }
         };

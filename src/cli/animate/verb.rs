@@ -24,7 +24,7 @@ use orator_base::types::pose3d::Motion;
 use orator_base::types::sound::{SAMPLE_RATE, Sound};
 use orator_base::types::time::FrameRate;
 use orator_dataset::Split;
-use orator_formats::mocap::motion_file::{self, USUAL_FPS};
+use orator_formats::mocap::motion_file::{self, DEFAULT_FPS};
 use orator_media::ffmpeg::audio;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -225,11 +225,11 @@ fn animate(
     let film_fps = options.fps.unwrap_or_else(|| smooth_rate(motion.fps));
     let other = match &args.beside {
         Some(path) if motion_file::has_ending(path) => {
-            let other = motion_file::read(path, Some(args.in_fps.unwrap_or(USUAL_FPS)))?;
+            let other = motion_file::read(path, Some(args.in_fps.unwrap_or(DEFAULT_FPS)))?;
             units::check(&other.motion).with_context(|| path.display().to_string())?;
             notes.extend(other.notes);
-            if !other.says_rate && args.in_fps.is_none() {
-                notes.push(format!("{} does not say its rate: taken for {USUAL_FPS}", path.display()));
+            if !other.has_rate && args.in_fps.is_none() {
+                notes.push(format!("{} does not say its rate: taken for {DEFAULT_FPS}", path.display()));
             }
             Some(perform(&other.motion, None, &AnimationOptions { fps: Some(film_fps), ..*options }))
         }

@@ -78,7 +78,7 @@ fn is_ours(path: &Path) -> bool {
 /// Keypoints of ours, with what is to be said of them.
 fn ours(args: &Args) -> Result<(Keypoints, Vec<String>)> {
     let (mut keypoints, mut notes) = keypoints_npz::read_sized(&args.keypoints, args.size)?;
-    range::check_pixels(range::places(&keypoints)).with_context(|| args.keypoints.display().to_string())?;
+    range::check_pixels(range::coordinates(&keypoints)).with_context(|| args.keypoints.display().to_string())?;
     if let Some(fps) = args.fps {
         keypoints.fps = fps;
         notes.retain(|note| !note.contains("`fps`"));

@@ -1,5 +1,5 @@
-//! Motion of a BVH file as the numbers FineMotion learns (Korzun et al. 2020): exponential maps of 15 joints of the upper
-//! body at 20 frames a second, the hips held still; and back to a BVH file of the same skeleton.
+//! Motion of a BVH file as the features of FineMotion (Korzun et al. 2020): exponential maps of 15 upper-body joints
+//! at 20 frames per second, with fixed hips; and the conversion back to a BVH file with the same skeleton.
 
 use super::read::Bvh;
 use super::skeleton::{BvhSkeleton, JointChannels};
@@ -13,7 +13,7 @@ use orator_base::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Joints that are learnt, by their names in the captures of GENEA 2020.
+/// Joints used as features, named as in the captures of GENEA 2020.
 pub const JOINTS: [&str; 15] = [
     "Spine",
     "Spine1",
@@ -31,23 +31,27 @@ pub const JOINTS: [&str; 15] = [
     "LeftForeArm",
     "LeftHand",
 ];
-/// Frames a second of the numbers.
+/// Frame rate of the features.
 pub const FPS: FrameRate = FrameRate::new(20, 1);
-/// A column that changes less is left out.
-const LEAST_STD: f64 = 1e-6;
-/// Added to the largest value that a column is divided by.
+/// Columns with a smaller standard deviation in the first file are dropped.
+const MIN_STD: f64 = 1e-6;
+/// Added to the largest absolute value of a column, which is a divisor.
 const EPS: f64 = 1e-8;
-/// Half the frames of the smoothing window, and the order of its polynomial.
+/// Half width of the smoothing window in frames, and order of its polynomial.
 const SMOOTHING: (usize, usize) = (4, 3);
 
-/// What the joints are called in a skeleton other than GENEA's: of those named, its own name, or nothing where it has no
-/// such joint.
+/// Names of the joints in a skeleton other than GENEA's: joint name to the skeleton's own name, or to an empty name
+/// if the skeleton has no such joint. Joints that are not listed have GENEA's names.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct JointMapping(BTreeMap<String, String>);
 
 impl JointMapping {
-    /// From `Spine3=Chest` and, of a joint that is not there, `Spine3=`. Errors: another form, a joint that is not learnt.
+    /// Parses entries such as `Spine3=Chest`, or `Spine3=` if the skeleton has no such joint.
+    ///
+    /// # Errors
+    ///
+    /// An entry of another form, or for a joint that is not in [`JOINTS`].
     pub fn parse(entries: &[String]) -> Result<Self> {
         let entry = |entry: &String| {
             let (joint, name) = entry.split_once('=').with_context(|| format!("`{entry}`: expected JOINT=NAME"))?;
@@ -57,7 +61,7 @@ impl JointMapping {
         Ok(Self(entries.iter().map(entry).collect::<Result<_>>()?))
     }
 
-    /// Joints of the skeleton that are learnt, in the reverse of its order (the order of FineMotion's columns).
+    /// Indices of the feature joints, in reverse skeleton order (the order of FineMotion's columns).
     fn find(&self, skeleton: &BvhSkeleton) -> Result<Vec<usize>> {
         let names = || skeleton.joints.iter().map(|joint| joint.name.as_str());
         let mut found = Vec::new();
@@ -82,33 +86,39 @@ impl JointMapping {
     }
 }
 
-/// The way between the motion of one skeleton and the numbers that are learnt.
+/// Conversion between the motion of one skeleton and features.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ExponentialMaps {
     pub skeleton: BvhSkeleton,
-    /// Channels of all joints where nothing is learnt: the first frame of the first file, the root at 0.
+    /// Channel values outside the features: the first frame of the first file, with the root channels at 0.
     rest: Vec<f64>,
-    /// Joints that are learnt.
+    /// Indices of the feature joints.
     joints: Vec<usize>,
-    /// Columns that are learnt, of three for each of `joints`; and of each the mean and the largest absolute value.
+    /// Columns used as features, out of three for each of `joints`, with the mean and the largest absolute value of
+    /// each.
     columns: Vec<usize>,
     mean: Vec<f64>,
     largest: Vec<f64>,
 }
 
 impl ExponentialMaps {
-    /// From the files to learn from with their names, of which one is held at a time. Errors, naming the file: none, a file
-    /// of another skeleton than the first, no frame, numbers that are not finite, joints that are not there.
+    /// Fits the conversion to training files, given with their names; all their exponential maps are held in memory,
+    /// but only one file at a time.
+    ///
+    /// # Errors
+    ///
+    /// No file; or, with the file name, a skeleton that differs from the first file's, no frame, non-finite numbers,
+    /// or missing joints.
     pub fn of(files: impl IntoIterator<Item = Result<(String, Bvh)>>, mapping: &JointMapping) -> Result<Self> {
         let mut files = files.into_iter();
         let (name, first) = files.next().context("there is no motion to learn from")??;
-        let mut maps = Self::of_skeleton(&first, mapping).with_context(|| name.clone())?;
+        let mut maps = Self::from_first_file(&first, mapping).with_context(|| name.clone())?;
         let mut all = vec![maps.exponential_maps(&first).context(name)?];
         for file in files {
             let (name, bvh) = file?;
             all.push(maps.exponential_maps(&bvh).context(name)?);
         }
-        maps.columns = (0..all[0].ncols()).filter(|&column| all[0].column(column).std(0.0) >= LEAST_STD).collect();
+        maps.columns = (0..all[0].ncols()).filter(|&column| all[0].column(column).std(0.0) >= MIN_STD).collect();
         ensure!(!maps.columns.is_empty(), "no joint of the first file moves");
         let n_frames: usize = all.iter().map(Array2::nrows).sum();
         for &column in &maps.columns {
@@ -119,8 +129,8 @@ impl ExponentialMaps {
         Ok(maps)
     }
 
-    /// Of the skeleton of the first file, without columns.
-    fn of_skeleton(first: &Bvh, mapping: &JointMapping) -> Result<Self> {
+    /// Conversion for the skeleton of the first file, without columns.
+    fn from_first_file(first: &Bvh, mapping: &JointMapping) -> Result<Self> {
         let skeleton = BvhSkeleton::of(first);
         skeleton.check()?;
         let joints = mapping.find(&skeleton)?;
@@ -130,12 +140,12 @@ impl ExponentialMaps {
         Ok(Self { skeleton, rest, joints, columns: Vec::new(), mean: Vec::new(), largest: Vec::new() })
     }
 
-    /// Numbers of a frame.
+    /// Number of features per frame.
     pub fn n_columns(&self) -> usize {
         self.columns.len()
     }
 
-    /// Errors unless the tables fit each other, as those of a checkpoint may not.
+    /// Checks that the tables are consistent, which those of a damaged checkpoint may not be.
     pub fn check(&self) -> Result<()> {
         self.skeleton.check()?;
         let n = self.columns.len();
@@ -152,7 +162,8 @@ impl ExponentialMaps {
         Ok(())
     }
 
-    /// Numbers of a file [T, columns] at 20 frames a second: centred on the mean, divided by the largest value.
+    /// Features of a file [T, columns] at 20 frames per second: the mean subtracted, divided by the largest absolute
+    /// value.
     pub fn features(&self, bvh: &Bvh) -> Result<Array2<f32>> {
         let all = self.exponential_maps(bvh)?;
         Ok(Array2::from_shape_fn((all.nrows(), self.columns.len()), |(t, i)| {
@@ -160,7 +171,8 @@ impl ExponentialMaps {
         }))
     }
 
-    /// Channels of each frame for numbers [T, columns]; what is not learnt stays as in the first file's first frame.
+    /// Channel values of each frame for features [T, columns]; all other channels have the values of the first frame
+    /// of the first file.
     pub fn channels(&self, features: ArrayView2<f32>) -> Vec<Vec<f64>> {
         let first_channels = self.skeleton.first_channels();
         let at_rest: Vec<Vec3> =
@@ -180,17 +192,18 @@ impl ExponentialMaps {
         features.outer_iter().map(frame).collect()
     }
 
-    /// A BVH file of the skeleton for numbers [T, columns].
+    /// BVH file of the skeleton for features [T, columns].
     pub fn to_bvh(&self, features: ArrayView2<f32>) -> String {
         let channels = self.channels(features);
         self.skeleton.to_bvh(FPS, channels.iter().map(Vec::as_slice))
     }
 
-    /// Exponential maps of the learnt joints [T, 3 * joints], every frame that 20 a second keep but the last one.
+    /// Exponential maps of the feature joints [T, 3 * joints], resampled to 20 frames per second. As in FineMotion,
+    /// the last frame of the file is excluded.
     fn exponential_maps(&self, bvh: &Bvh) -> Result<Array2<f64>> {
         let skeleton = BvhSkeleton::of(bvh);
-        let same = |(a, b): (&JointChannels, &JointChannels)| (&a.name, &a.channels) == (&b.name, &b.channels);
-        let are_same = skeleton.joints.iter().zip(&self.skeleton.joints).all(same);
+        let is_same = |(a, b): (&JointChannels, &JointChannels)| (&a.name, &a.channels) == (&b.name, &b.channels);
+        let are_same = skeleton.joints.iter().zip(&self.skeleton.joints).all(is_same);
         ensure!(
             are_same && skeleton.joints.len() == self.skeleton.joints.len(),
             "its skeleton has other joints or channels than the first file's ({} joints, expected {})",
@@ -203,9 +216,9 @@ impl ExponentialMaps {
         if let Some(t) = frames.iter().position(|frame| frame.iter().any(|value| !value.is_finite())) {
             bail!("frame {t} has a number that is not finite");
         }
-        // up to the frame before the last one
+        // Up to the frame before the last one.
         let n = (0..).take_while(|t| (f64::from(*t) * per_frame).round() < frames.len() as f64 - 1.0).count();
-        let whole = (per_frame - per_frame.round()).abs() < 0.01;
+        let is_integer_step = (per_frame - per_frame.round()).abs() < 0.01;
         let mut maps = Array2::zeros((n, 3 * self.joints.len()));
         for (i, &joint) in self.joints.iter().enumerate() {
             let name = &self.skeleton.joints[joint].name;
@@ -215,11 +228,11 @@ impl ExponentialMaps {
             );
             let rotation = |t: usize| self.rotation(joint, frames[t.min(frames.len() - 1)]);
             let at = |t: usize| {
-                let place = t as f64 * per_frame;
-                if whole {
+                let source_frame = t as f64 * per_frame;
+                if is_integer_step {
                     return rotation(t * per_frame.round() as usize);
                 }
-                rotation(place as usize).slerp(rotation(place as usize + 1), place.fract())
+                rotation(source_frame as usize).slerp(rotation(source_frame as usize + 1), source_frame.fract())
             };
             let mut track: Vec<Vec3> = (0..n).map(|t| at(t).rotation_vector()).collect();
             make_continuous(&mut track);
@@ -230,14 +243,14 @@ impl ExponentialMaps {
         Ok(maps)
     }
 
-    /// Rotation of a joint in a frame.
+    /// Local rotation of a joint in a frame of channel values.
     fn rotation(&self, joint: usize, frame: &[f64]) -> Rotation {
         let values = &frame[self.skeleton.first_channels()[joint]..];
         self.skeleton.joints[joint].rotation(values).unwrap_or(Rotation::IDENTITY)
     }
 }
 
-/// Smooths every column of numbers [T, columns] with the Savitzky-Golay filter over 9 frames, of order 3.
+/// Smooths every column of features [T, columns] with a Savitzky-Golay filter over 9 frames, of order 3.
 pub fn smooth(features: &mut Array2<f32>) {
     let filter = SavitzkyGolay::new(SMOOTHING.0, SMOOTHING.1);
     for mut column in features.columns_mut() {
@@ -251,8 +264,8 @@ mod tests {
     use super::*;
     use orator_base::math::vec3::{norm, sub};
 
-    /// A skeleton with the joints of GENEA and hips, legs and fingers beside them, whose angles swing; the captures' own order
-    /// of channels. `legs` moves what is not learnt.
+    /// A skeleton with the joints of GENEA plus hips, legs and fingers, whose angles oscillate; channel order as in
+    /// the GENEA captures. `legs` scales the motion of the joints that are not features.
     fn captured(n_frames: usize, frame_secs: f64, legs: f64) -> Bvh {
         let six = "CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation";
         let three = "CHANNELS 3 Zrotation Xrotation Yrotation";
@@ -274,8 +287,8 @@ mod tests {
         for t in 0..n_frames {
             let mut numbers = vec![0.0; 6];
             for (i, joint) in names.iter().enumerate().skip(1).filter(|(_, joint)| !joint.channels.is_empty()) {
-                let learnt = JOINTS.contains(&joint.name.as_str());
-                let wide = if learnt { 1.0 } else { legs };
+                let is_feature = JOINTS.contains(&joint.name.as_str());
+                let wide = if is_feature { 1.0 } else { legs };
                 let far = if joint.name == "LeftArm" { 170.0 } else { 35.0 };
                 let secs = t as f64 * frame_secs;
                 for k in 0..3 {
@@ -295,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn a_round_trip_leaves_every_joint_where_it_is() {
+    fn round_trip_preserves_joint_positions() {
         let bvh = captured(301, 1.0 / 60.0, 0.0);
         let maps = fitted(std::slice::from_ref(&bvh), &JointMapping::default()).unwrap();
         maps.check().unwrap();
@@ -319,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn hips_stand_still_and_what_is_not_learnt_stays_as_it_began() {
+    fn hips_and_other_joints_stay_fixed() {
         let bvh = captured(61, 1.0 / 60.0, 1.0);
         let maps = fitted(std::slice::from_ref(&bvh), &JointMapping::default()).unwrap();
         let channels = maps.channels(maps.features(&bvh).unwrap().view());
@@ -337,19 +350,20 @@ mod tests {
     }
 
     #[test]
-    fn joints_of_another_skeleton_are_named_or_refused() {
+    fn joint_mapping_handles_other_skeletons() {
         let bvh = captured(31, 1.0 / 60.0, 0.0);
         let parse =
             |entries: &[&str]| JointMapping::parse(&entries.iter().map(|e| (*e).to_owned()).collect::<Vec<_>>());
         let fewer = parse(&["Spine3=", "Neck1="]).unwrap();
         assert_eq!(fitted(std::slice::from_ref(&bvh), &fewer).unwrap().n_columns(), 39);
-        let says = |mapping: &JointMapping| format!("{:#}", fitted(std::slice::from_ref(&bvh), mapping).unwrap_err());
-        let text = says(&parse(&["Spine3=Chest"]).unwrap());
+        let error_of =
+            |mapping: &JointMapping| format!("{:#}", fitted(std::slice::from_ref(&bvh), mapping).unwrap_err());
+        let text = error_of(&parse(&["Spine3=Chest"]).unwrap());
         assert!(
             text.contains("no joint Chest") && text.contains("Spine3=NAME") && text.contains("LeftUpLeg"),
             "{text}"
         );
-        assert!(says(&parse(&["Spine3=Spine2"]).unwrap()).contains("two joints"));
+        assert!(error_of(&parse(&["Spine3=Spine2"]).unwrap()).contains("two joints"));
         assert!(parse(&["Spine3"]).is_err() && parse(&["Tail=Tail"]).is_err());
         let mut other = bvh.clone();
         other.joints[2].name = "Knee".into();
@@ -362,7 +376,7 @@ mod tests {
     }
 
     #[test]
-    fn smoothing_takes_the_shake_and_leaves_the_way() {
+    fn smoothing_removes_jitter_and_keeps_slow_motion() {
         let mut features =
             Array2::from_shape_fn((60, 3), |(t, _)| (t as f32 * 0.1).sin() + if t % 2 == 0 { 0.05 } else { -0.05 });
         smooth(&mut features);

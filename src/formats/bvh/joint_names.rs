@@ -1,8 +1,8 @@
-//! Names of the joints of a BVH file: every studio, exporter and dataset has names of its own. Names are compared
-//! without prefix, case and separators, so `mixamorig:LeftForeArm`, `CC_Base_L_Forearm`, `LowerArm_L` and
-//! `left_elbow` all are the left elbow.
+//! Joint names of BVH files, which differ between studios, exporters and datasets. Names are compared without prefix,
+//! case and separators, so `mixamorig:LeftForeArm`, `CC_Base_L_Forearm`, `LowerArm_L` and `left_elbow` are all the
+//! left elbow.
 
-/// The ten joints that place an upper body, in this order.
+/// The ten joints that define the pose of an upper body.
 pub const ROLES: [&str; 10] = [
     "neck",
     "head",
@@ -16,18 +16,18 @@ pub const ROLES: [&str; 10] = [
     "left hip",
 ];
 
-/// Prefixes of a whole skeleton.
+/// Prefixes that all joint names of a skeleton share.
 const PREFIXES: [&str; 6] = ["ccbase", "bip001", "bip01", "valvebiped", "def", "b"];
 
 const NECK: &[&str] = &["necktwist01", "neck", "neck0", "neck1", "lowerneck", "neck01", "upperneck"];
 const HEAD: &[&str] = &["head"];
-/// The joint at which a limb turns: `shoulder` is often the collar bone's, so it comes last.
+/// Names of the shoulder joint proper; `shoulder` often names the collar bone, so it comes last.
 const SHOULDER: &[&str] = &["upperarm", "uparm", "humerus", "arm", "shldr", "shoulder"];
 const ELBOW: &[&str] = &["forearm", "lowerarm", "lowarm", "radius", "elbow"];
 const WRIST: &[&str] = &["wrist", "hand"];
 const HIP: &[&str] = &["upleg", "upperleg", "thigh", "femur", "hip", "leg"];
 
-/// Index of the name that plays each of the ten roles; `None`: no name does.
+/// Index of the name for each of the ten [`ROLES`]; `None` if no name matches.
 pub fn find(names: &[&str]) -> [Option<usize>; 10] {
     let plain: Vec<String> = names.iter().map(|name| plain(name)).collect();
     let find = |stems: &[&str], side: Option<[&str; 2]>| {
@@ -54,11 +54,11 @@ pub fn find(names: &[&str]) -> [Option<usize>; 10] {
     ]
 }
 
-/// Without the skeleton's prefix, case and separators.
+/// Normalised name: lower case, without the skeleton's prefix and without separators.
 pub fn plain(name: &str) -> String {
     let name = name.rsplit([':', '|']).next().unwrap_or(name);
     let lower = name.to_ascii_lowercase();
-    // a prefix of one letter counts only where a separator ends it
+    // A prefix counts only if a separator follows it, as `b` starts many names.
     let mut parts: Vec<&str> = lower.split(['_', '-', '.', ' ']).filter(|part| !part.is_empty()).collect();
     let joined = |n: usize, parts: &[&str]| parts.iter().take(n).copied().collect::<String>();
     for n in [2, 1] {
@@ -75,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_names_of_many_studios_are_understood() {
+    fn joint_names_of_common_rigs_are_recognised() {
         let kinds = [
             "Hips Spine Spine1 Neck Neck1 Head LeftShoulder LeftArm LeftForeArm LeftHand LeftHandThumb1 RightShoulder \
              RightArm RightForeArm RightHand LeftUpLeg LeftLeg RightUpLeg RightLeg",

@@ -1,4 +1,4 @@
-//! BVH files: read, written, and what their joints are called.
+//! BVH files: reader, writer, joint names, and conversion to exponential maps.
 
 pub mod exponential_maps;
 pub mod joint_names;

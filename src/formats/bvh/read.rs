@@ -1,58 +1,62 @@
-//! Reads BVH: any hierarchy, channels in any order and number, and the positions of all joints in a frame. What the
-//! joints mean is `mocap`'s.
+//! BVH reader for any hierarchy and any number and order of channels, with the positions of all joints in a frame.
+//! `mocap` maps the joints to our skeleton.
 
-use super::skeleton::{JointChannels, placed};
+use super::skeleton::{JointChannels, joint_positions};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use orator_base::input;
 use orator_base::math::vec3::Vec3;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// A BVH file in memory, in its own units and axes.
+/// Contents of a BVH file, in its own units and axes.
 #[derive(Clone, Debug)]
 pub struct Bvh {
-    /// An `End Site` is named after its parent, with `_end`.
+    /// Joints in file order; an `End Site` is named after its parent, with the suffix `_end`.
     pub joints: Vec<JointChannels>,
-    /// Seconds between two frames.
+    /// Time between consecutive frames, seconds.
     pub frame_secs: f64,
     pub n_frames: usize,
-    /// Frame by frame all channels in the order of the joints.
+    /// Channel values [n_frames * n_channels], in joint order within a frame.
     pub(super) values: Vec<f64>,
     pub(super) n_channels: usize,
 }
 
-/// Axis 0 x, 1 y, 2 z.
+/// A degree of freedom of a joint; axis 0 is x, 1 is y, 2 is z.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Channel {
-    /// Along an axis, in the file's unit.
+    /// Translation along an axis, in the file's unit.
     Position(usize),
-    /// About an axis, degrees.
+    /// Rotation about an axis, degrees.
     Rotation(usize),
 }
-/// Meaning of a joint's position channels: the format does not define it, and both kinds occur.
+/// Meaning of a joint's position channels: the format does not define it, and both conventions occur.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Positions {
-    /// They are added to the OFFSET (the original description; CMU files).
+    /// Values are added to OFFSET (the original specification; CMU files).
     Add,
-    /// They stand in the OFFSET's place (Bandai-Namco files).
+    /// Values replace OFFSET (Bandai-Namco files).
     Replace,
-    /// `Replace` where joints below the root have position channels that lie closer to their OFFSET than to zero (an
-    /// added position would be near zero), else `Add`.
+    /// `Replace` if the position channels of the joints below the root are closer to their OFFSET than to zero (added
+    /// values would be near zero), otherwise `Add`.
     Auto,
 }
 
-/// Positions (frames times joints) that every file may have, and those for each of its bytes: a joint that moves takes
-/// six bytes a frame at least.
-const FEW_POSITIONS: usize = 1 << 20;
-const POSITIONS_PER_BYTE: usize = 4;
-/// Most joints of a skeleton, ends of bones included; rigs with hair, cloth and twist bones have several hundred.
-pub const MOST_JOINTS: usize = 10_000;
-/// Most joints within each other, and most bytes of a name: the end of a bone repeats the name of its joint.
-const MOST_DEPTH: usize = 512;
-const MOST_NAME_BYTES: usize = 1024;
+/// Maximum number of positions (frames times joints): the larger of a fixed limit and a limit per byte of the file. A
+/// moving joint takes at least six bytes per frame.
+const MIN_POSITION_LIMIT: usize = 1 << 20;
+const MAX_POSITIONS_PER_BYTE: usize = 4;
+/// Maximum number of joints including end sites; rigs with hair, cloth and twist bones have several hundred.
+pub const MAX_JOINTS: usize = 10_000;
+/// Maximum nesting depth, and maximum length of a name: an end site repeats the name of its parent.
+const MAX_DEPTH: usize = 512;
+const MAX_NAME_BYTES: usize = 1024;
 
 impl Bvh {
-    /// Reads a file. Errors: unreadable, or not BVH (the message names what was expected).
+    /// Reads a file.
+    ///
+    /// # Errors
+    ///
+    /// The file is unreadable or not BVH; the message names what was expected.
     pub fn read(path: &Path) -> Result<Self> {
         let text =
             input::read_text(path, input::MOST_DATA).with_context(|| format!("cannot read {}", path.display()))?;
@@ -97,7 +101,7 @@ impl Bvh {
         words.expect("Frame")?;
         words.expect("Time:")?;
         let frame_secs = words.number()?;
-        // Files round the seconds of a frame.
+        // The bounds allow for the rounding of frame times.
         ensure!(
             (0.000_99..=1.01).contains(&frame_secs),
             "Frame Time: {frame_secs:?} seconds, expected 0.001 to 1 (1000 to 1 frames a second)"
@@ -111,23 +115,23 @@ impl Bvh {
             "{} numbers after Frame Time, expected {n_frames} frames x {n_channels}",
             values.len()
         );
-        // Positions of all joints are held in memory; a file of fewer than one number for several of them is none of a body.
+        // The positions of all joints are held in memory, so their number is limited by the size of the file.
         let n_positions = n_frames as usize * joints.len();
         ensure!(
-            n_positions <= FEW_POSITIONS.max(POSITIONS_PER_BYTE * text.len()),
+            n_positions <= MIN_POSITION_LIMIT.max(MAX_POSITIONS_PER_BYTE * text.len()),
             "{n_frames} frames of {} joints with {n_channels} channels together: too few numbers for so many positions",
             joints.len()
         );
         Ok(Self { joints, frame_secs, n_frames: n_frames as usize, values, n_channels })
     }
 
-    /// The joint of that name.
+    /// Index of the joint with this name.
     pub fn find(&self, name: &str) -> Option<usize> {
         self.joints.iter().position(|j| j.name == name)
     }
 
-    /// `Add` or `Replace` for `Auto`, by the rule given there.
-    pub fn settle(&self, positions: Positions) -> Positions {
+    /// Resolves `Auto` to `Add` or `Replace` by the rule documented there.
+    pub fn resolve(&self, positions: Positions) -> Positions {
         if positions != Positions::Auto {
             return positions;
         }
@@ -147,21 +151,21 @@ impl Bvh {
 
     /// Positions of all joints in every frame, in the file's units and axes.
     pub fn positions(&self, positions: Positions) -> Vec<Vec<Vec3>> {
-        let positions = self.settle(positions);
-        self.frames().map(|frame| placed(&self.joints, frame, positions)).collect()
+        let positions = self.resolve(positions);
+        self.frames().map(|frame| joint_positions(&self.joints, frame, positions)).collect()
     }
 
-    /// All channels of each frame, in the order of the joints.
+    /// Channel values of each frame, in joint order.
     pub fn frames(&self) -> impl Iterator<Item = &[f64]> {
         (0..self.n_frames).map(|t| &self.values[t * self.n_channels..(t + 1) * self.n_channels])
     }
 }
 
-/// Opens a joint below the innermost open one.
+/// Adds a joint as a child of the innermost open joint and opens it.
 fn push(joints: &mut Vec<JointChannels>, open: &mut Vec<usize>, name: String, words: &mut Words) -> Result<()> {
-    ensure!(joints.len() < MOST_JOINTS, "it has more than {MOST_JOINTS} joints: give the file of one figure");
-    ensure!(open.len() < MOST_DEPTH, "more than {MOST_DEPTH} joints hang on each other");
-    ensure!(name.len() <= MOST_NAME_BYTES, "joint {}: a name of {} bytes", joints.len() + 1, name.len());
+    ensure!(joints.len() < MAX_JOINTS, "it has more than {MAX_JOINTS} joints: give the file of one figure");
+    ensure!(open.len() < MAX_DEPTH, "more than {MAX_DEPTH} joints hang on each other");
+    ensure!(name.len() <= MAX_NAME_BYTES, "joint {}: a name of {} bytes", joints.len() + 1, name.len());
     words.expect("{")?;
     joints.push(JointChannels { name, parent: open.last().copied(), offset: [0.0; 3], channels: Vec::new() });
     open.push(joints.len() - 1);
@@ -203,7 +207,7 @@ impl<'a> Words<'a> {
 mod tests {
     use super::*;
 
-    /// A root and an arm of two bones of length 10 along x; the elbow has position channels when `positions`.
+    /// A root and an arm of two bones of length 10 along x; `elbow_channels` is the CHANNELS line of the elbow.
     fn arm(elbow_channels: &str, motion: &str) -> String {
         format!(
             "HIERARCHY\nROOT Hips\n{{\nOFFSET 0 5 0\nCHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation Xrotation\n\
@@ -212,22 +216,23 @@ mod tests {
         )
     }
 
-    fn close(a: Vec3, b: Vec3) {
+    fn assert_close(a: Vec3, b: Vec3) {
         assert!((0..3).all(|k| (a[k] - b[k]).abs() < 1e-9), "{a:?} {b:?}");
     }
 
     #[test]
-    fn rotations_apply_in_the_order_of_the_channels() {
-        // root at (1, 5 + 2, 3) turned 90 about z; elbow turned 90 about y, then, in its own axes, 90 about x
+    fn rotations_apply_in_channel_order() {
+        // The root is at (1, 5 + 2, 3), rotated 90 about z; the elbow is rotated 90 about y, then, in its own axes,
+        // 90 about x.
         let bvh = Bvh::parse(&arm("3 Yrotation Xrotation Zrotation", "1 2 3 90 0 0 90 90 90")).unwrap();
         assert_eq!((bvh.n_frames, bvh.frame_secs, bvh.joints[2].name.as_str()), (1, 0.04, "Elbow_end"));
         let pose = &bvh.positions(Positions::Auto)[0];
-        close(pose[0], [1.0, 7.0, 3.0]);
-        close(pose[1], [1.0, 17.0, 3.0]);
-        // Ry(90) Rx(90) Rz(90) x = Ry(90) Rx(90) y = Ry(90) z = x, and the root turns x into y
-        close(pose[2], [1.0, 27.0, 3.0]);
+        assert_close(pose[0], [1.0, 7.0, 3.0]);
+        assert_close(pose[1], [1.0, 17.0, 3.0]);
+        // Ry(90) Rx(90) Rz(90) x = Ry(90) Rx(90) y = Ry(90) z = x, and the root rotates x to y.
+        assert_close(pose[2], [1.0, 27.0, 3.0]);
         let other = Bvh::parse(&arm("3 Zrotation Yrotation Xrotation", "0 0 0 0 0 0 0 90 0")).unwrap();
-        close(other.positions(Positions::Auto)[0][2], [10.0, 5.0, -10.0]);
+        assert_close(other.positions(Positions::Auto)[0][2], [10.0, 5.0, -10.0]);
     }
 
     #[test]
@@ -235,18 +240,18 @@ mod tests {
         let channels = "6 Xposition Yposition Zposition Zrotation Yrotation Xrotation";
         let text = arm(channels, "0 0 0 0 0 0 10.2 0 0 0 0 0");
         let bvh = Bvh::parse(&text).unwrap();
-        assert_eq!(bvh.settle(Positions::Auto), Positions::Replace);
-        close(bvh.positions(Positions::Auto)[0][1], [10.2, 0.0, 0.0]);
-        close(bvh.positions(Positions::Add)[0][1], [20.2, 5.0, 0.0]);
+        assert_eq!(bvh.resolve(Positions::Auto), Positions::Replace);
+        assert_close(bvh.positions(Positions::Auto)[0][1], [10.2, 0.0, 0.0]);
+        assert_close(bvh.positions(Positions::Add)[0][1], [20.2, 5.0, 0.0]);
         let small = Bvh::parse(&arm(channels, "0 0 0 0 0 0 0.1 0 0 0 0 0")).unwrap();
-        assert_eq!(small.settle(Positions::Auto), Positions::Add);
-        close(small.positions(Positions::Auto)[0][1], [10.1, 5.0, 0.0]);
+        assert_eq!(small.resolve(Positions::Auto), Positions::Add);
+        assert_close(small.positions(Positions::Auto)[0][1], [10.1, 5.0, 0.0]);
     }
 
     #[test]
-    fn broken_files_are_errors_that_say_where() {
+    fn errors_name_the_position_in_the_file() {
         let good = arm("3 Zrotation Yrotation Xrotation", "0 0 0 0 0 0 0 0 0");
-        for (broken, says) in [
+        for (broken, expected) in [
             (String::new(), "ends before"),
             (good.replace("ROOT", "LEAF"), "`LEAF`"),
             (good.replace("Yrotation", "Wrotation"), "Wrotation"),
@@ -260,12 +265,12 @@ mod tests {
             (good[..20].to_owned(), "ends before"),
         ] {
             let text = format!("{:#}", Bvh::parse(&broken).unwrap_err());
-            assert!(text.contains(says), "{text}");
+            assert!(text.contains(expected), "{text}");
         }
     }
 
     #[test]
-    fn counts_beyond_the_file_take_no_memory() {
+    fn implausible_counts_allocate_no_memory() {
         let joints = "JOINT a { OFFSET 0 0 0 ".repeat(200) + &"} ".repeat(200);
         let file = |channels: &str, n_frames: usize, values: &str| {
             format!(
@@ -273,24 +278,24 @@ mod tests {
                  Frame Time: 0.04 {values}"
             )
         };
-        let says = |text: &str| format!("{:#}", Bvh::parse(text).unwrap_err());
-        assert!(says(&file("0", 99_999_999, "")).contains("99999999 frames of no channel"));
-        let many = says(&file("1 Xposition", 20_000, &"0 ".repeat(20_000)));
+        let error_of = |text: &str| format!("{:#}", Bvh::parse(text).unwrap_err());
+        assert!(error_of(&file("0", 99_999_999, "")).contains("99999999 frames of no channel"));
+        let many = error_of(&file("1 Xposition", 20_000, &"0 ".repeat(20_000)));
         assert!(many.contains("20000 frames of 201 joints with 1 channels"), "{many}");
         assert_eq!(Bvh::parse(&file("1 Xposition", 100, &"0 ".repeat(100))).unwrap().n_frames, 100);
     }
 
     #[test]
-    fn skeletons_beyond_any_figure_are_refused_early() {
-        let says = |text: String| format!("{:#}", Bvh::parse(&text).unwrap_err());
+    fn oversized_skeletons_are_rejected() {
+        let error_of = |text: String| format!("{:#}", Bvh::parse(&text).unwrap_err());
         let head = "HIERARCHY ROOT a { OFFSET 0 0 0 CHANNELS 1 Xposition ";
         let joint = "JOINT b { OFFSET 0 0 0 } ";
-        assert!(says(format!("{head}{}", joint.repeat(MOST_JOINTS))).contains("more than 10000 joints"));
-        assert!(says(format!("{head}{}", "JOINT b { ".repeat(MOST_DEPTH))).contains("more than 512 joints"));
-        // Each end would be named after the one before it.
-        assert!(says(format!("{head}{}", "End Site { ".repeat(300))).contains("a name of"));
-        let whole = format!("{head}{}}} MOTION Frames: 1 Frame Time: 0.04 0", joint.repeat(MOST_JOINTS - 1));
-        assert_eq!(Bvh::parse(&whole).unwrap().joints.len(), MOST_JOINTS);
+        assert!(error_of(format!("{head}{}", joint.repeat(MAX_JOINTS))).contains("more than 10000 joints"));
+        assert!(error_of(format!("{head}{}", "JOINT b { ".repeat(MAX_DEPTH))).contains("more than 512 joints"));
+        // Each nested end site would extend the name of its parent.
+        assert!(error_of(format!("{head}{}", "End Site { ".repeat(300))).contains("a name of"));
+        let valid = format!("{head}{}}} MOTION Frames: 1 Frame Time: 0.04 0", joint.repeat(MAX_JOINTS - 1));
+        assert_eq!(Bvh::parse(&valid).unwrap().joints.len(), MAX_JOINTS);
     }
 
     proptest::proptest! {

@@ -1,4 +1,4 @@
-//! The skeleton of a BVH file, kept so that other motion can be written in it: joints, offsets and channels as they were.
+//! The skeleton of a BVH file (joints, offsets and channels), stored so that other motion can be written with it.
 
 use super::read::{Bvh, Channel, Positions};
 use anyhow::{Result, ensure};
@@ -8,18 +8,18 @@ use orator_base::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 
-/// A joint, or the end of a bone, which has no channels.
+/// A joint, or an end site, which has no channels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JointChannels {
     pub name: String,
     pub parent: Option<usize>,
-    /// From the parent, in the file's unit.
+    /// Offset from the parent, in the file's unit.
     pub offset: Vec3,
     pub channels: Vec<Channel>,
 }
 
 impl JointChannels {
-    /// Axes of its rotation channels in their order; `None` unless there are three about different axes.
+    /// Axes of the rotation channels in channel order; `None` unless there are exactly three about different axes.
     pub fn rotation_order(&self) -> Option<[usize; 3]> {
         let axes: Vec<usize> = self
             .channels
@@ -33,18 +33,20 @@ impl JointChannels {
         (order[0] != order[1] && order[1] != order[2] && order[0] != order[2]).then_some(order)
     }
 
-    /// The rotation that its channels' numbers, the first of `values`, are; `None` as of `rotation_order`.
+    /// Rotation for the channel values at the start of `values`; `None` if [`Self::rotation_order`] is.
     pub fn rotation(&self, values: &[f64]) -> Option<Rotation> {
-        let turns = self.channels.iter().zip(values).filter(|(channel, _)| matches!(channel, Channel::Rotation(_)));
-        let mut angles = turns.map(|(_, degrees)| degrees.to_radians());
+        let rotation_channels =
+            self.channels.iter().zip(values).filter(|(channel, _)| matches!(channel, Channel::Rotation(_)));
+        let mut angles = rotation_channels.map(|(_, degrees)| degrees.to_radians());
         Some(Rotation::from_euler(self.rotation_order()?, std::array::from_fn(|_| angles.next().unwrap_or(0.0))))
     }
 
-    /// Puts a rotation in its channels' numbers, the first of `values`.
+    /// Writes a rotation to the channel values at the start of `values`.
     pub fn set_rotation(&self, turn: Rotation, values: &mut [f64]) {
         let angles = self.rotation_order().map(|order| turn.euler(order));
-        let turns = self.channels.iter().zip(values).filter(|(channel, _)| matches!(channel, Channel::Rotation(_)));
-        turns.zip(angles.into_iter().flatten()).for_each(|((_, value), angle)| *value = angle.to_degrees());
+        let rotation_channels =
+            self.channels.iter().zip(values).filter(|(channel, _)| matches!(channel, Channel::Rotation(_)));
+        rotation_channels.zip(angles.into_iter().flatten()).for_each(|((_, value), angle)| *value = angle.to_degrees());
     }
 }
 
@@ -56,17 +58,17 @@ pub struct BvhSkeleton {
 }
 
 impl BvhSkeleton {
-    /// The skeleton of a file.
+    /// Skeleton of a BVH file.
     pub fn of(bvh: &Bvh) -> Self {
         Self { joints: bvh.joints.clone() }
     }
 
-    /// Numbers of a frame.
+    /// Number of channel values per frame.
     pub fn n_channels(&self) -> usize {
         self.joints.iter().map(|joint| joint.channels.len()).sum()
     }
 
-    /// Place of each joint's first channel in a frame.
+    /// Index of each joint's first channel in a frame.
     pub fn first_channels(&self) -> Vec<usize> {
         let mut next = 0;
         self.joints
@@ -78,7 +80,8 @@ impl BvhSkeleton {
             .collect()
     }
 
-    /// Errors unless it is a tree whose parents come first, with finite offsets, as every file has one.
+    /// Checks that the joints form a tree with parents before children, finite offsets and valid channels, as every
+    /// BVH file has.
     pub fn check(&self) -> Result<()> {
         for (at, joint) in self.joints.iter().enumerate() {
             ensure!(joint.parent.is_none() == (at == 0), "joint {} has no place in the skeleton", joint.name);
@@ -93,12 +96,13 @@ impl BvhSkeleton {
         Ok(())
     }
 
-    /// Positions of all joints for the channels of a frame, in the file's unit; position channels are added to the offset.
+    /// Joint positions for the channel values of a frame, in the file's unit; position channels are added to the
+    /// offset.
     pub fn positions(&self, frame: &[f64]) -> Vec<Vec3> {
-        placed(&self.joints, frame, Positions::Add)
+        joint_positions(&self.joints, frame, Positions::Add)
     }
 
-    /// A BVH file of this skeleton; `frames`: all channels of each frame.
+    /// BVH file with this skeleton and the channel values of `frames`.
     pub fn to_bvh(&self, fps: FrameRate, frames: impl ExactSizeIterator<Item: AsRef<[f64]>>) -> String {
         let mut text = self.head(fps, frames.len());
         for frame in frames {
@@ -109,7 +113,7 @@ impl BvhSkeleton {
         text
     }
 
-    /// Text of a file up to the numbers of its first frame.
+    /// Text of the file before the values of its first frame.
     pub(super) fn head(&self, fps: FrameRate, n_frames: usize) -> String {
         let mut text = String::from("HIERARCHY\n");
         let mut open: Vec<usize> = Vec::new();
@@ -140,10 +144,10 @@ impl BvhSkeleton {
     }
 }
 
-/// Positions of joints, parents before children, for the channels of a frame, in the file's unit.
-pub(super) fn placed(joints: &[JointChannels], frame: &[f64], positions: Positions) -> Vec<Vec3> {
-    let mut turned = vec![Rotation::IDENTITY; joints.len()];
-    let mut placed = vec![[0.0; 3]; joints.len()];
+/// Positions of joints, in which parents precede children, for the channel values of a frame, in the file's unit.
+pub(super) fn joint_positions(joints: &[JointChannels], frame: &[f64], positions: Positions) -> Vec<Vec3> {
+    let mut global_rotations = vec![Rotation::IDENTITY; joints.len()];
+    let mut global_positions = vec![[0.0; 3]; joints.len()];
     let mut values = frame.iter();
     for (at, joint) in joints.iter().enumerate() {
         let (mut step, mut turn) = (joint.offset, Rotation::IDENTITY);
@@ -158,12 +162,15 @@ pub(super) fn placed(joints: &[JointChannels], frame: &[f64], positions: Positio
                 }
             }
         }
-        (turned[at], placed[at]) = match joint.parent {
-            Some(parent) => (turned[parent] * turn, vec3::add(placed[parent], turned[parent].turn(step))),
+        (global_rotations[at], global_positions[at]) = match joint.parent {
+            Some(parent) => (
+                global_rotations[parent] * turn,
+                vec3::add(global_positions[parent], global_rotations[parent].turn(step)),
+            ),
             None => (turn, step),
         };
     }
-    placed
+    global_positions
 }
 
 fn channel_name(channel: &Channel) -> String {
@@ -181,7 +188,7 @@ mod tests {
     const TEXT: &str = include_str!("../../../fixtures/reference/bvh_take.bvh");
 
     #[test]
-    fn a_file_written_in_its_own_skeleton_is_itself() {
+    fn file_rewritten_with_its_own_skeleton_is_unchanged() {
         let bvh = Bvh::parse(TEXT).unwrap();
         let skeleton = BvhSkeleton::of(&bvh);
         skeleton.check().unwrap();

@@ -1,5 +1,5 @@
-//! Writes BVH: a skeleton with local rotations over time. The root has six channels, every other joint three, in the
-//! order Z X Y; an end of a bone is an `End Site`. Which skeleton, and in which axes and units, is the caller's.
+//! BVH writer: a skeleton with local rotations over time. The root has six channels, every other joint three, in the
+//! order Z X Y; bone ends become `End Site`. The caller chooses the skeleton, axes and units.
 
 use super::read::Channel;
 use super::skeleton::{BvhSkeleton, JointChannels};
@@ -10,16 +10,16 @@ use orator_base::types::time::FrameRate;
 use std::fmt::Write as _;
 use std::io;
 
-/// Rotations of a skeleton over time.
+/// Animation of a skeleton.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BvhClip {
     pub skeleton: Skeleton,
     pub fps: FrameRate,
-    /// Position of the root at rest.
+    /// Rest position of the root.
     pub root: Vec3,
-    /// Way of the root from there, frame by frame; empty: it stays.
+    /// Translation of the root from `root`, per frame; empty if the root does not move.
     pub travel: Vec<Vec3>,
-    /// Frame by frame one local rotation a joint (ends: anything).
+    /// One local rotation per frame and joint; those of bone ends are ignored.
     pub local: Vec<Vec<Rotation>>,
 }
 
@@ -31,7 +31,7 @@ impl BvhClip {
 
     /// Position of the root in a frame.
     pub fn root_at(&self, frame_idx: usize) -> Vec3 {
-        self.travel.get(frame_idx).map_or(self.root, |&way| add(self.root, way))
+        self.travel.get(frame_idx).map_or(self.root, |&translation| add(self.root, translation))
     }
 
     /// Positions of all joints in a frame.
@@ -39,8 +39,8 @@ impl BvhClip {
         self.skeleton.positions(self.root_at(frame_idx), &self.local[frame_idx])
     }
 
-    /// Motion at another rate: through the given frames, its speed without a jump at them; the last frame is
-    /// held. The root travels in straight lines.
+    /// Motion resampled to `fps`: cubic rotations that pass through the given frames with continuous velocity, linear
+    /// root translation; the last frame is held.
     pub fn resampled(&self, fps: FrameRate) -> Self {
         let n_frames = if self.local.is_empty() { 0 } else { fps.frames_in(self.fps.secs(self.n_frames())) };
         let last = self.n_frames().saturating_sub(1);
@@ -48,35 +48,40 @@ impl BvhClip {
         let local = (0..n_frames).map(|frame| {
             let at = at(frame);
             let before = at.floor() as usize;
-            let near = [before.saturating_sub(1), before, (before + 1).min(last), (before + 2).min(last)];
-            let share = at - before as f64;
-            let between = |joint: usize| Rotation::cubic(near.map(|t| self.local[t][joint]), share);
+            let neighbours = [before.saturating_sub(1), before, (before + 1).min(last), (before + 2).min(last)];
+            let fraction = at - before as f64;
+            let between = |joint: usize| Rotation::cubic(neighbours.map(|t| self.local[t][joint]), fraction);
             (0..self.skeleton.joints.len()).map(between).collect()
         });
-        let way = |frame: usize| {
-            let (before, share) = (at(frame).floor() as usize, at(frame).fract());
+        let translation = |frame: usize| {
+            let (before, fraction) = (at(frame).floor() as usize, at(frame).fract());
             let [from, to] = [before, (before + 1).min(last)].map(|t| self.travel.get(t).copied().unwrap_or_default());
-            add(scale(from, 1.0 - share), scale(to, share))
+            add(scale(from, 1.0 - fraction), scale(to, fraction))
         };
-        let travel = if self.travel.is_empty() { Vec::new() } else { (0..n_frames).map(way).collect() };
+        let travel = if self.travel.is_empty() { Vec::new() } else { (0..n_frames).map(translation).collect() };
         Self { local: local.collect(), fps, skeleton: self.skeleton.clone(), root: self.root, travel }
     }
 
-    /// The clip as the text of a BVH file. Lengths keep 1e-6 of their unit, angles 1e-5 degrees.
+    /// Text of a BVH file. Lengths are rounded to 1e-6 of their unit, angles to 1e-5 degrees.
     pub fn to_bvh(&self) -> String {
         let mut text = Vec::new();
-        // memory takes whatever is written, and all of it is text
+        // Writing to memory cannot fail, and the bytes are valid UTF-8.
         let _ = self.write_bvh(&mut text);
         String::from_utf8(text).unwrap_or_default()
     }
 
-    /// Writes the text of `to_bvh` frame by frame.
+    /// Writes the text of [`Self::to_bvh`] frame by frame.
     pub fn write_bvh(&self, out: &mut dyn io::Write) -> io::Result<()> {
         let order = self.written_order();
-        let place = |joint: usize| order.iter().position(|&written| written == joint);
+        let written_idx = |joint: usize| order.iter().position(|&written| written == joint);
         let joint = |&joint: &usize| {
             let Joint { name, parent, offset, end } = self.skeleton.joints[joint].clone();
-            JointChannels { name, parent: parent.and_then(place), offset, channels: channels(end, parent.is_none()) }
+            JointChannels {
+                name,
+                parent: parent.and_then(written_idx),
+                offset,
+                channels: channels(end, parent.is_none()),
+            }
         };
         let written = BvhSkeleton { joints: order.iter().map(joint).collect() };
         let mut text = written.head(self.fps, self.n_frames());
@@ -95,14 +100,14 @@ impl BvhClip {
         out.write_all(text.as_bytes())
     }
 
-    /// Joints depth first: the order in which a BVH names them and gives their channels.
+    /// Joints in depth-first order, in which BVH lists joints and channels.
     fn written_order(&self) -> Vec<usize> {
         let mut order = Vec::with_capacity(self.skeleton.joints.len());
-        let mut ahead: Vec<usize> = (0..self.skeleton.joints.len().min(1)).collect();
-        while let Some(joint) = ahead.pop() {
+        let mut stack: Vec<usize> = (0..self.skeleton.joints.len().min(1)).collect();
+        while let Some(joint) = stack.pop() {
             order.push(joint);
             let children: Vec<usize> = self.skeleton.children(joint).collect();
-            ahead.extend(children.into_iter().rev());
+            stack.extend(children.into_iter().rev());
         }
         order
     }
@@ -133,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn the_text_is_a_bvh() {
+    fn text_is_valid_bvh() {
         let expected = "HIERARCHY\nROOT Hips\n{\n\tOFFSET 0.000000 0.000000 0.000000\n\tCHANNELS 6 Xposition Yposition \
             Zposition Zrotation Xrotation Yrotation\n\tJOINT Left\n\t{\n\t\tOFFSET 1.000000 0.000000 0.000000\n\t\t\
             CHANNELS 3 Zrotation Xrotation Yrotation\n\t\tEnd Site\n\t\t{\n\t\t\tOFFSET 1.000000 0.000000 0.000000\n\
@@ -150,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn resampling_keeps_the_time_and_passes_through_the_frames() {
+    fn resampling_keeps_duration_and_passes_through_frames() {
         let mut given = clip();
         let turns = [0.0, 30.0, 60.0, 90.0].map(|degrees: f64| {
             vec![Rotation::about([0.0, 0.0, 1.0], degrees.to_radians()); given.skeleton.joints.len()]
@@ -170,7 +175,7 @@ mod tests {
     proptest::proptest! {
         #![proptest_config(proptest::test_runner::Config::with_cases(48))]
         #[test]
-        fn what_is_written_is_read_back(
+        fn written_clip_round_trips(
             turns in proptest::collection::vec(([-1.0f64..1.0, -1.0f64..1.0, -1.0f64..1.0], -3.1f64..3.1), 6),
             offsets in [-50.0f64..50.0, -50.0f64..50.0, -50.0f64..50.0],
         ) {

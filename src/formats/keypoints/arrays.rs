@@ -1,4 +1,4 @@
-//! Arrays of keypoints in `.npy` and `.npz` files, told apart by their shapes: MediaPipe's landmarks, PATS, and our own
+//! Keypoint arrays in `.npy` and `.npz` files, identified by their shapes: MediaPipe landmarks, PATS, and
 //! `keypoints.npz`.
 
 use super::entry::point;
@@ -12,35 +12,35 @@ use orator_base::types::pose2d::Keypoint;
 use orator_base::types::time::FrameRate;
 use std::path::Path;
 
-/// Reads the one array of a `.npy` file.
+/// Reads the array of a `.npy` file.
 pub fn read_npy(path: &Path, bytes: &[u8]) -> Result<FoundKeypoints> {
     let expected =
         || format!("{} is no .npy file of numbers (float32, float64 or integers; no objects)", path.display());
     let array = npy::numbers(bytes).with_context(expected)?.with_context(expected)?;
-    of_arrays(path, vec![(String::new(), array.mapv(|v| v as f32))])
+    from_arrays(path, vec![(String::new(), array.mapv(|v| v as f32))])
 }
 
-/// Reads a `.npz` file; `fps` (one number, or numerator and denominator) and `image_size` (width, height) are read with
-/// every kind.
+/// Reads a `.npz` file. `fps` (one number, or numerator and denominator) and `image_size` (width, height) are read
+/// for every format.
 pub fn read_npz(path: &Path) -> Result<FoundKeypoints> {
     let mut npz = Npz::open(path)?;
     let fps = if npz.has("fps") { Some(npz.frame_rate("fps")?) } else { None };
     if npz.has("body") {
-        return ours(path, fps);
+        return read_keypoints_npz(path, fps);
     }
     let names: Vec<String> = npz.names().to_vec();
-    // Texts and objects beside the arrays say nothing here.
+    // Arrays of strings and objects are ignored.
     let arrays = names.into_iter().filter_map(|name| npz.floats(&name, &[]).ok().map(|array| (name, array)));
     let arrays: NamedArrays = arrays.collect();
     let size = arrays.iter().find(|(name, array)| name == "image_size" && array.len() == 2);
     let size = size.map(|(_, array)| array.iter().map(|px| *px as u32).collect::<Vec<_>>());
-    let mut found = of_arrays(path, arrays)?;
+    let mut found = from_arrays(path, arrays)?;
     found.fps = fps.or(found.fps);
     found.image_size = size.map(|size| [size[0], size[1]]).filter(|size| size.iter().all(|px| *px > 0));
     Ok(found)
 }
 
-fn of_arrays(path: &Path, arrays: NamedArrays) -> Result<FoundKeypoints> {
+fn from_arrays(path: &Path, arrays: NamedArrays) -> Result<FoundKeypoints> {
     let shapes: Vec<String> = arrays.iter().map(|(name, array)| format!("{name} {:?}", array.shape())).collect();
     let read = match mediapipe::read(&arrays) {
         Ok(None) => pats::read(&arrays),
@@ -57,8 +57,8 @@ fn of_arrays(path: &Path, arrays: NamedArrays) -> Result<FoundKeypoints> {
     }
 }
 
-/// Our own file.
-fn ours(path: &Path, fps: Option<FrameRate>) -> Result<FoundKeypoints> {
+/// Reads `keypoints.npz` as written by this program.
+fn read_keypoints_npz(path: &Path, fps: Option<FrameRate>) -> Result<FoundKeypoints> {
     let (keypoints, image_size, notes) = keypoints_npz::read_as_written(path)?;
     let person = |t: usize| {
         let points = |array: &Array3<f32>| -> Vec<Keypoint> { triples(array.index_axis(Axis(0), t)) };
@@ -67,7 +67,7 @@ fn ours(path: &Path, fps: Option<FrameRate>) -> Result<FoundKeypoints> {
         FoundPerson { body, left_hand: hand(&keypoints.left_hand), right_hand: hand(&keypoints.right_hand) }
     };
     let frames = (0..keypoints.n_frames()).map(|t| vec![person(t)]).collect();
-    // What the caller says of rate and size takes the place of these two.
+    // The caller replaces missing rates and sizes and adds its own notes on them.
     let notes = notes.into_iter().filter(|note| !note.contains("`fps`") && !note.contains("image_size")).collect();
     Ok(FoundKeypoints { fps, image_size, ..FoundKeypoints::new("orator, 17 points".to_owned(), frames, notes) })
 }

@@ -1,5 +1,5 @@
-//! A JSON file of keypoints: OpenPose's frame, MMPose's results and its inferencer's lists, AlphaPose's and COCO's results,
-//! COCO-WholeBody's annotations. Python writes NaN into JSON, which is read as a missing number.
+//! JSON keypoint files: OpenPose frames, MMPose results and inferencer lists, AlphaPose and COCO results,
+//! COCO-WholeBody annotations. NaN, which Python writes into JSON, is read as a missing number.
 
 use super::entry::{ImageName, JsonEntry};
 use super::found::{FoundKeypoints, FoundPerson};
@@ -9,10 +9,10 @@ use serde::Deserialize;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Most people in a frame: they are compared with those of the frame before.
-const MOST_PERSONS: usize = 1000;
+/// Maximum number of persons per frame: each is compared with those of the previous frame.
+const MAX_PERSONS: usize = 1000;
 
-/// A file whose top is an object.
+/// A file whose top level is an object.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 struct KeypointDocument {
@@ -22,7 +22,7 @@ struct KeypointDocument {
     images: Vec<AnnotatedImage>,
 }
 
-/// Picture of an annotation file.
+/// Image of an annotation file.
 #[derive(Debug, Deserialize)]
 struct AnnotatedImage {
     id: ImageName,
@@ -34,47 +34,51 @@ struct AnnotatedImage {
     height: u32,
 }
 
-/// People of a file.
+/// Persons found in a file.
 pub struct JsonPeople {
-    /// The program in a word: `OpenPose`.
+    /// Name of the program: `OpenPose`.
     pub program: &'static str,
     image_size: Option<[u32; 2]>,
     pub people: FramePeople,
 }
 
-/// People, with or without frames.
+/// Persons, with or without frame numbers.
 pub enum FramePeople {
-    /// Everybody in the one picture of the file.
+    /// All persons in the single image of the file.
     Picture(Vec<JsonEntry>),
-    /// Everybody in each frame, by its number.
+    /// All persons in each frame, by frame number.
     Frames(BTreeMap<u64, Vec<JsonEntry>>),
 }
 
-/// The keypoints of a whole video in the bytes of its JSON file. Errors name line and column, or frame and person.
+/// Parses the keypoints of a complete video from the bytes of a JSON file. Errors name line and column, or frame and
+/// person.
 pub fn parse(bytes: &[u8]) -> Result<FoundKeypoints> {
     let JsonPeople { program, image_size, people } = people(bytes)?;
     let frames = match people {
         FramePeople::Frames(frames) => frames,
         FramePeople::Picture(people) => BTreeMap::from([(0, people)]),
     };
-    let mut found = of_frames(program, frames)?;
+    let mut found = from_frames(program, frames)?;
     found.image_size = image_size;
     Ok(found)
 }
 
-/// Numbered frames of entries as keypoints.
-fn of_frames(program: &str, frames: BTreeMap<u64, Vec<JsonEntry>>) -> Result<FoundKeypoints> {
+/// Converts numbered frames of entries to keypoints.
+fn from_frames(program: &str, frames: BTreeMap<u64, Vec<JsonEntry>>) -> Result<FoundKeypoints> {
     let mut counts = BTreeSet::new();
     let numbered = frames.into_iter().map(|(number, entries)| Ok((number, persons(number, &entries, &mut counts)?)));
     let numbered = numbered.collect::<Result<_>>()?;
     of_persons(program, &counts, numbered)
 }
 
-/// The persons of frame `number`; adds the numbers of points that they have to `counts`. Errors: an entry that is no
-/// person, more persons than any picture shows.
+/// Converts the entries of frame `number` to persons, and adds their numbers of points to `counts`.
+///
+/// # Errors
+///
+/// An entry is not a valid person, or there are more than 1000 persons.
 pub fn persons(number: u64, entries: &[JsonEntry], counts: &mut BTreeSet<usize>) -> Result<Vec<FoundPerson>> {
     let n = entries.len();
-    ensure!(n <= MOST_PERSONS, "frame {number} holds {n} people, expected {MOST_PERSONS} at most");
+    ensure!(n <= MAX_PERSONS, "frame {number} holds {n} people, expected {MAX_PERSONS} at most");
     let mut persons = Vec::with_capacity(n);
     for (at, entry) in entries.iter().enumerate() {
         let person = entry.person().map_err(|message| anyhow::anyhow!("frame {number}, person {at}: {message}"))?;
@@ -86,7 +90,7 @@ pub fn persons(number: u64, entries: &[JsonEntry], counts: &mut BTreeSet<usize>)
     Ok(persons)
 }
 
-/// Numbered frames of persons, of so many points each, as keypoints.
+/// Converts numbered frames of persons, with the numbers of points in `counts`, to keypoints.
 pub fn of_persons(
     program: &str,
     counts: &BTreeSet<usize>,
@@ -97,18 +101,18 @@ pub fn of_persons(
     Ok(FoundKeypoints::new(format!("{program}, {counts} points"), frames, notes))
 }
 
-/// The people in the bytes of a JSON file.
+/// Parses the persons in the bytes of a JSON file.
 pub fn people(bytes: &[u8]) -> Result<JsonPeople> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let bytes = without_nan(bytes);
-    let mut signs = bytes.iter().filter(|byte| !byte.is_ascii_whitespace());
-    match (signs.next(), signs.next()) {
-        (Some(b'{'), _) => of_object(read(&bytes)?),
+    let mut first_bytes = bytes.iter().filter(|byte| !byte.is_ascii_whitespace());
+    match (first_bytes.next(), first_bytes.next()) {
+        (Some(b'{'), _) => from_object(read(&bytes)?),
         (Some(b'['), Some(b'[')) => {
             let frames: Vec<Vec<JsonEntry>> = read(&bytes)?;
             Ok(JsonPeople::new("MMPose", FramePeople::Frames((0..).zip(frames).collect())))
         }
-        (Some(b'['), _) => of_list(read(&bytes)?),
+        (Some(b'['), _) => from_list(read(&bytes)?),
         _ => bail!("no JSON: it begins neither with {{ nor with ["),
     }
 }
@@ -123,13 +127,13 @@ fn read<'de, T: Deserialize<'de>>(bytes: &'de [u8]) -> Result<T> {
     serde_json::from_slice(bytes).context("the JSON is cut off, damaged or of another kind")
 }
 
-fn of_object(object: KeypointDocument) -> Result<JsonPeople> {
+fn from_object(object: KeypointDocument) -> Result<JsonPeople> {
     let KeypointDocument { people, instance_info, annotations, images } = object;
     if let Some(people) = people {
         return Ok(JsonPeople::new("OpenPose", FramePeople::Picture(people)));
     }
     if let Some(instances) = instance_info {
-        return Ok(JsonPeople { program: "MMPose", ..of_list(instances)? });
+        return Ok(JsonPeople { program: "MMPose", ..from_list(instances)? });
     }
     let Some(annotations) = annotations else {
         bail!(
@@ -144,7 +148,7 @@ fn of_object(object: KeypointDocument) -> Result<JsonPeople> {
             Some(name) if images.is_empty() => number_of_image(name)?,
             Some(name) => *numbers
                 .get(name)
-                .with_context(|| format!("annotation {at}: `images` has no picture {}", shown(name)))?,
+                .with_context(|| format!("annotation {at}: `images` has no picture {}", format_name(name)))?,
             None => bail!("annotation {at}: the key image_id is missing"),
         };
         frames.entry(number).or_default().push(entry);
@@ -153,15 +157,15 @@ fn of_object(object: KeypointDocument) -> Result<JsonPeople> {
     Ok(JsonPeople { program: "COCO-WholeBody", image_size: size, people: FramePeople::Frames(frames) })
 }
 
-/// Frame number of each picture: the digits of its name, else its place in the list.
+/// Frame number of each image: the digits of its file name if these are unique, otherwise its index in the list.
 fn annotated_numbers(images: &[AnnotatedImage]) -> BTreeMap<&ImageName, u64> {
     let by_name: Option<Vec<u64>> = images.iter().map(|image| number_of(&image.file_name)).collect();
-    let are_apart = |numbers: &Vec<u64>| numbers.iter().collect::<BTreeSet<_>>().len() == numbers.len();
-    let numbers = by_name.filter(are_apart).unwrap_or_else(|| (0..images.len() as u64).collect());
+    let are_unique = |numbers: &Vec<u64>| numbers.iter().collect::<BTreeSet<_>>().len() == numbers.len();
+    let numbers = by_name.filter(are_unique).unwrap_or_else(|| (0..images.len() as u64).collect());
     images.iter().map(|image| &image.id).zip(numbers).collect()
 }
 
-fn of_list(entries: Vec<JsonEntry>) -> Result<JsonPeople> {
+fn from_list(entries: Vec<JsonEntry>) -> Result<JsonPeople> {
     if entries.iter().any(|entry| entry.instances.is_some()) {
         let mut frames = BTreeMap::new();
         for (at, entry) in (0..).zip(entries) {
@@ -191,14 +195,14 @@ fn number_of_image(name: &ImageName) -> Result<u64> {
     }
 }
 
-fn shown(name: &ImageName) -> String {
+fn format_name(name: &ImageName) -> String {
     match name {
         ImageName::Number(number) => number.to_string(),
         ImageName::Name(text) => format!("{text:?}"),
     }
 }
 
-/// The text with Python's NaN and Infinity as `null`.
+/// The JSON with Python's NaN and Infinity replaced by `null`.
 fn without_nan(bytes: &[u8]) -> Cow<'_, [u8]> {
     let text = String::from_utf8_lossy(bytes);
     if !text.contains("NaN") && !text.contains("Infinity") {

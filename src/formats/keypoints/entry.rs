@@ -1,5 +1,5 @@
-//! One object of a JSON file of keypoints: a person of any format, or a frame of them. What is not known is passed over
-//! while reading, so that memory holds points alone.
+//! One object of a JSON keypoint file: a person in any format, or a frame of persons. Unknown keys are skipped during
+//! parsing, so that only the points are held in memory.
 
 use super::found::FoundPerson;
 use super::layout::PointLayout;
@@ -9,16 +9,16 @@ use serde::Deserialize;
 use serde::de::{DeserializeSeed, Deserializer, Error, SeqAccess, Visitor};
 use std::fmt;
 
-/// Keys of all formats together; each file has some of them.
+/// Keys of all formats; each file has some of them.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub struct JsonEntry {
-    /// MMPose: number of the frame, and its people.
+    /// MMPose: frame number, and the persons of the frame.
     pub frame_id: Option<u64>,
     pub instances: Option<Vec<JsonEntry>>,
-    /// AlphaPose, COCO: the picture that shows the person.
+    /// AlphaPose, COCO: the image that shows the person.
     pub image_id: Option<ImageName>,
-    /// x, y, score of each point; x, y of each point beside `keypoint_scores`.
+    /// x, y, score of each point; only x, y if `keypoint_scores` is present.
     keypoints: PointNumbers,
     keypoint_scores: PointNumbers,
     /// COCO-WholeBody.
@@ -30,7 +30,7 @@ pub struct JsonEntry {
     hand_right_keypoints_2d: PointNumbers,
 }
 
-/// Name or number of a picture.
+/// Name or number of an image.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
 #[serde(untagged)]
 pub enum ImageName {
@@ -39,8 +39,11 @@ pub enum ImageName {
 }
 
 impl JsonEntry {
-    /// The person, and the number of points of the body's list; `None` where the list is empty. Errors: a list of
-    /// another length than a known order has.
+    /// The person, and the number of points in the body list; `None` if the list is empty.
+    ///
+    /// # Errors
+    ///
+    /// A list whose length matches no known layout.
     pub fn person(&self) -> Result<Option<(FoundPerson, usize)>, String> {
         let (key, numbers) = match self.pose_keypoints_2d.0.is_empty() {
             true => ("keypoints", &self.keypoints.0),
@@ -53,7 +56,7 @@ impl JsonEntry {
         if points.is_empty() {
             return Ok(None);
         }
-        let mut person = PointLayout::of_json(points.len())?.person(&points);
+        let mut person = PointLayout::for_json(points.len())?.person(&points);
         let hands = [
             ("hand_left_keypoints_2d", &self.hand_left_keypoints_2d, Side::Left),
             ("hand_right_keypoints_2d", &self.hand_right_keypoints_2d, Side::Right),
@@ -71,11 +74,11 @@ impl JsonEntry {
     }
 }
 
-/// A point; one that is not a number, or lies at 0, 0, is missing. Visibilities of annotations (2: visible, 1: hidden)
-/// are scores of 1.
+/// Creates a keypoint. Non-finite coordinates, a score that is not positive, and 0, 0 mean a missing point.
+/// Visibility flags of annotations (2: visible, 1: occluded) become scores of 1.
 pub fn point(x: f32, y: f32, score: f32) -> Keypoint {
-    let is_there = x.is_finite() && y.is_finite() && score > 0.0 && (x != 0.0 || y != 0.0);
-    if is_there { Keypoint { x, y, score: score.min(1.0) } } else { Keypoint::default() }
+    let is_present = x.is_finite() && y.is_finite() && score > 0.0 && (x != 0.0 || y != 0.0);
+    if is_present { Keypoint { x, y, score: score.min(1.0) } } else { Keypoint::default() }
 }
 
 fn triples(key: &str, numbers: &[f32]) -> Result<Vec<Keypoint>, String> {
@@ -95,7 +98,7 @@ fn scored(numbers: &[f32], scores: &[f32]) -> Result<Vec<Keypoint>, String> {
     Ok(pairs.iter().zip(scores).map(|(&[x, y], &score)| point(x, y, score)).collect())
 }
 
-/// Lists of numbers in JSON, however deep they are nested, as one flat list; `null` is NaN.
+/// Arbitrarily nested JSON lists of numbers, flattened; `null` is NaN.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct PointNumbers(Vec<f32>);
 
@@ -107,7 +110,7 @@ impl<'de> Deserialize<'de> for PointNumbers {
     }
 }
 
-/// The list that numbers are put on.
+/// Visitor that appends numbers to a list.
 struct Flat<'a>(&'a mut Vec<f32>);
 
 impl<'de> DeserializeSeed<'de> for Flat<'_> {

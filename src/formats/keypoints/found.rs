@@ -1,14 +1,15 @@
-//! Keypoints as another program found them: everybody in every frame, at the program's own rate and in its own unit.
+//! Keypoints detected by another program: all persons in every frame, at the program's own frame rate and in its own
+//! unit.
 
-use super::range::{MOST_LOOKED_AT, UPPER_BODY, are_shares};
+use super::range::{MAX_EXAMINED_POINTS, UPPER_BODY, are_fractions};
 use ndarray::ArrayD;
 use orator_base::types::pose2d::{Keypoint, N_BODY, N_HAND, PersonBox};
 use orator_base::types::time::FrameRate;
 
-/// Arrays of a file by their names; the only one of a `.npy` file has none.
+/// Arrays of a file with their names; the array of a `.npy` file has an empty name.
 pub type NamedArrays = Vec<(String, ArrayD<f32>)>;
 
-/// One person of a frame in our orders of points; a point with score 0 is missing.
+/// One person in a frame, in our point orders; a point with score 0 is missing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FoundPerson {
     /// COCO-17.
@@ -20,21 +21,21 @@ pub struct FoundPerson {
 }
 
 impl FoundPerson {
-    /// Every point: body, left hand, right hand.
+    /// All points: body, left hand, right hand.
     pub fn points_mut(&mut self) -> impl Iterator<Item = &mut Keypoint> {
         self.body.iter_mut().chain(&mut self.left_hand).chain(&mut self.right_hand)
     }
 
-    /// Box around the points of the body that are there, with their mean score; `None` without one.
+    /// Bounding box of the detected body points, with their mean score; `None` if there are none.
     pub fn area(&self) -> Option<PersonBox> {
-        let seen: Vec<&Keypoint> = self.body.iter().filter(|point| point.score > 0.0).collect();
+        let detected: Vec<&Keypoint> = self.body.iter().filter(|point| point.score > 0.0).collect();
         let side = |of: fn(&Keypoint) -> f32| {
-            seen.iter().fold([f32::MAX, f32::MIN], |[low, high], point| [low.min(of(point)), high.max(of(point))])
+            detected.iter().fold([f32::MAX, f32::MIN], |[low, high], point| [low.min(of(point)), high.max(of(point))])
         };
         let ([left, right], [top, bottom]) = (side(|p| p.x), side(|p| p.y));
-        let score = seen.iter().map(|point| point.score).sum::<f32>() / seen.len().max(1) as f32;
+        let score = detected.iter().map(|point| point.score).sum::<f32>() / detected.len().max(1) as f32;
         let area = PersonBox { x: left, y: top, width: right - left, height: bottom - top, score };
-        (!seen.is_empty()).then_some(area)
+        (!detected.is_empty()).then_some(area)
     }
 }
 
@@ -42,64 +43,63 @@ impl FoundPerson {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CoordinateUnit {
     Pixels,
-    /// 0..1 of width and height of the picture.
-    Share,
-    /// Pixels from the person's neck.
+    /// Fractions 0..1 of the image width and height.
+    Fraction,
+    /// Pixels relative to the person's neck.
     FromNeck,
 }
 
 /// Keypoints of a video.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FoundKeypoints {
-    /// The format in words: `OpenPose, 25 points`.
+    /// Display name of the format: `OpenPose, 25 points`.
     pub format: String,
-    /// Frames a second, where the file says.
+    /// Frame rate, if the file states it.
     pub fps: Option<FrameRate>,
-    /// Width and height of the picture in px, where the file says.
+    /// Width and height of the image in px, if the file states them.
     pub image_size: Option<[u32; 2]>,
     pub unit: CoordinateUnit,
-    /// Everybody in each frame.
+    /// All persons in each frame.
     pub frames: Vec<Vec<FoundPerson>>,
-    /// What stands in for what is missing, a sentence each.
+    /// One sentence for each missing item, naming its substitute.
     pub notes: Vec<String>,
 }
 
 impl FoundKeypoints {
-    /// Keypoints of a file that says neither rate nor size; the unit is told by the coordinates.
+    /// Keypoints of a file that states neither frame rate nor image size; the unit is derived from the coordinates.
     pub fn new(format: String, frames: Vec<Vec<FoundPerson>>, notes: Vec<String>) -> Self {
-        let unit = if are_shares(places(&frames)) { CoordinateUnit::Share } else { CoordinateUnit::Pixels };
+        let unit = if are_fractions(coordinates(&frames)) { CoordinateUnit::Fraction } else { CoordinateUnit::Pixels };
         Self { format, fps: None, image_size: None, unit, frames, notes }
     }
 
-    /// Share of the points looked at that have a negative coordinate, 0..1.
-    pub fn negative_share(&self) -> f64 {
+    /// Fraction of the examined points that have a negative coordinate, 0..1.
+    pub fn negative_fraction(&self) -> f64 {
         let (mut n, mut n_negative) = (0_usize, 0_usize);
-        for point in seen_points(&self.frames) {
+        for point in examined_points(&self.frames) {
             n += 1;
             n_negative += usize::from(point.x < 0.0 || point.y < 0.0);
         }
         n_negative as f64 / n.max(1) as f64
     }
 
-    /// Places of the points looked at: x, y.
-    pub fn places(&self) -> impl Iterator<Item = [f32; 2]> {
-        places(&self.frames)
+    /// Coordinates x, y of the examined points.
+    pub fn coordinates(&self) -> impl Iterator<Item = [f32; 2]> {
+        coordinates(&self.frames)
     }
 
-    /// The farthest point of a body as a picture's size, px: the least that shows all of them.
+    /// Smallest image size in px that contains all body points.
     pub fn extent(&self) -> [u32; 2] {
         let points = || self.frames.iter().flatten().flat_map(|person| &person.body).filter(|point| point.score > 0.0);
-        let farthest = |of: fn(&Keypoint) -> f32| points().fold(1.0_f32, |most, point| most.max(of(point)));
+        let farthest = |of: fn(&Keypoint) -> f32| points().fold(1.0_f32, |max, point| max.max(of(point)));
         [farthest(|p| p.x), farthest(|p| p.y)].map(|px| px.min(1e6).ceil() as u32)
     }
 
-    /// Turns the coordinates into pixels of a picture of that size; a neck that is the origin gets a place in its
-    /// upper half.
+    /// Converts the coordinates to pixels of an image of that size; a neck at the origin is placed in its upper half.
     pub fn to_pixels(&mut self, image_size: [u32; 2]) {
         let [width, height] = image_size.map(|px| px as f32);
         let (scale, shift) = match self.unit {
             CoordinateUnit::Pixels => return,
-            CoordinateUnit::Share => ([width, height], [-0.5; 2]),
+            CoordinateUnit::Fraction => ([width, height], [-0.5; 2]),
             CoordinateUnit::FromNeck => ([1.0; 2], [width / 2.0, 0.4 * height]),
         };
         for point in self.frames.iter_mut().flatten().flat_map(FoundPerson::points_mut) {
@@ -111,11 +111,11 @@ impl FoundKeypoints {
     }
 }
 
-fn places(frames: &[Vec<FoundPerson>]) -> impl Iterator<Item = [f32; 2]> {
-    seen_points(frames).map(|point| [point.x, point.y])
+fn coordinates(frames: &[Vec<FoundPerson>]) -> impl Iterator<Item = [f32; 2]> {
+    examined_points(frames).map(|point| [point.x, point.y])
 }
 
-fn seen_points(frames: &[Vec<FoundPerson>]) -> impl Iterator<Item = &Keypoint> {
+fn examined_points(frames: &[Vec<FoundPerson>]) -> impl Iterator<Item = &Keypoint> {
     let upper = frames.iter().flatten().flat_map(|person| &person.body[..UPPER_BODY]);
-    upper.filter(|point| point.score > 0.0).take(MOST_LOOKED_AT)
+    upper.filter(|point| point.score > 0.0).take(MAX_EXAMINED_POINTS)
 }

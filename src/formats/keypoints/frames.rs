@@ -1,31 +1,35 @@
-//! Numbered frames in order: what is missing between them counts as not seen, and is said.
+//! Numbered frames as a sequence; missing frames count as frames without persons, and are noted.
 
 use super::found::FoundPerson;
 use anyhow::{Result, bail};
 use std::collections::BTreeMap;
 
-/// Most frames for each one that is there; a file of fewer frames than `FEW` may have longer gaps.
-const MOST_EMPTY: u64 = 20;
-const FEW: u64 = 10_000;
+/// Maximum ratio of the length of the sequence to the number of frames present; sequences of up to `SHORT_SEQUENCE`
+/// frames may have larger gaps.
+const MAX_LENGTH_RATIO: u64 = 20;
+const SHORT_SEQUENCE: u64 = 10_000;
 
-/// Everybody in each frame, the first one numbered 0 or 1; and notes on gaps. Errors: no frame; numbers that are too
-/// far apart to be one video's.
+/// The persons in each frame, starting at frame number 0 or 1, and notes on gaps.
+///
+/// # Errors
+///
+/// No frame; numbers too far apart to be those of one video.
 pub fn in_order(numbered: BTreeMap<u64, Vec<FoundPerson>>) -> Result<(Vec<Vec<FoundPerson>>, Vec<String>)> {
     let (Some(&first), Some(&last)) = (numbered.keys().next(), numbered.keys().next_back()) else {
         bail!("no frames");
     };
     let base = first.min(1);
-    let (n_there, n_frames) = (numbered.len() as u64, (last - base).saturating_add(1));
-    if n_frames > FEW && n_frames / MOST_EMPTY > n_there {
+    let (n_present, n_frames) = (numbered.len() as u64, (last - base).saturating_add(1));
+    if n_frames > SHORT_SEQUENCE && n_frames / MAX_LENGTH_RATIO > n_present {
         bail!(
-            "{n_there} frames with numbers from {first} to {last}; expected the frames of one video, one after the other"
+            "{n_present} frames with numbers from {first} to {last}; expected the frames of one video, one after the other"
         );
     }
     let mut notes = Vec::new();
     if first > base {
         notes.push(format!("the first frame has the number {first}: {} before it count as not seen", first - base));
     }
-    let n_gaps = n_frames - n_there - (first - base);
+    let n_gaps = n_frames - n_present - (first - base);
     if n_gaps > 0 {
         let missing = (first..last).find(|number| !numbered.contains_key(number)).unwrap_or(first);
         notes.push(format!("{n_gaps} frames are missing, the first has the number {missing}: taken as not seen"));
@@ -37,7 +41,7 @@ pub fn in_order(numbered: BTreeMap<u64, Vec<FoundPerson>>) -> Result<(Vec<Vec<Fo
     Ok((frames, notes))
 }
 
-/// The last run of digits in a file name without its ending: the number of a frame.
+/// Frame number: the last run of digits in a file name without its extension, at most 18 digits.
 pub fn number_of(name: &str) -> Option<u64> {
     let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
     let stem = ["_keypoints", "_predictions"].iter().fold(stem, |stem, end| stem.strip_suffix(end).unwrap_or(stem));
@@ -53,7 +57,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn frames_are_numbered_by_the_last_digits_of_their_names() {
+    fn frame_number_is_the_last_run_of_digits() {
         for (name, number) in [
             ("talk2_000000000012_keypoints.json", Some(12)),
             ("0.jpg", Some(0)),
@@ -69,7 +73,7 @@ mod tests {
     }
 
     #[test]
-    fn gaps_are_empty_frames_and_are_said() {
+    fn gaps_become_empty_frames_with_a_note() {
         let frames = |numbers: &[u64]| in_order(numbers.iter().map(|n| (*n, vec![FoundPerson::default()])).collect());
         let (found, notes) = frames(&[1, 2, 3]).unwrap();
         assert_eq!((found.len(), notes.len()), (3, 0));

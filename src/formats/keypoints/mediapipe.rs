@@ -1,7 +1,7 @@
-//! Landmarks of MediaPipe as arrays: pose [T, 33, 3..5] (x, y, z, visibility, presence) with hands [T, 21, 2..3] beside it,
-//! or one array of all: pose, left hand, right hand [T, 75, ...]; pose, face, left hand, right hand [T, 543, ...] (553 with
-//! irises), also flat with 4 numbers a pose landmark [T, 1662]; or face, left hand, pose, right hand, another usual order.
-//! Coordinates are shares of the picture, 0..1. Where no visibility is there, a landmark with a place has the score 1.
+//! MediaPipe landmark arrays: pose [T, 33, 3..5] (x, y, z, visibility, presence) and separate hands [T, 21, 2..3], or
+//! all in one: pose, left, right hand [T, 75, ...]; pose, face, left, right hand [T, 543, ...] (553 with irises), or
+//! flat with 4 numbers per pose landmark [T, 1662]; or in the other common order face, left hand, pose, right hand.
+//! Coordinates are fractions 0..1 of the image. Without visibility, a landmark that is not at 0, 0 has score 1.
 
 use super::entry::point;
 use super::found::{FoundKeypoints, FoundPerson, NamedArrays};
@@ -11,7 +11,7 @@ use ndarray::{Array3, ArrayView3, Ix2, Ix3, s};
 use orator_base::types::pose2d::{Keypoint, N_HAND};
 
 const N_POSE: usize = 33;
-/// Face landmarks, without and with irises.
+/// Number of face landmarks, without and with irises.
 const N_FACE: [usize; 2] = [468, 478];
 
 /// Landmarks of a video: pose, left hand, right hand, each [T, n, 2..5].
@@ -20,9 +20,13 @@ struct Landmarks {
     hands: [Option<Array3<f32>>; 2],
 }
 
-/// The keypoints; `None` where no array has a shape of MediaPipe's. Errors: arrays of unequal lengths.
+/// The keypoints; `None` if no array has a MediaPipe shape.
+///
+/// # Errors
+///
+/// Pose and hands have different numbers of frames.
 pub fn read(arrays: &NamedArrays) -> Result<Option<FoundKeypoints>> {
-    let Some(landmarks) = arrays.iter().find_map(|(_, array)| split(array)).or_else(|| apart(arrays)) else {
+    let Some(landmarks) = arrays.iter().find_map(|(_, array)| split(array)).or_else(|| separate_arrays(arrays)) else {
         return Ok(None);
     };
     let n_frames = landmarks.pose.shape()[0];
@@ -49,8 +53,8 @@ pub fn read(arrays: &NamedArrays) -> Result<Option<FoundKeypoints>> {
     Ok(Some(FoundKeypoints::new(format!("MediaPipe, pose{hands}"), frames, no_hands.into_iter().collect())))
 }
 
-/// Scores of pose landmarks: the visibility where there are four numbers or more, also a third number that always lies in 0..1
-/// (depths do not).
+/// Accessor for the scores of pose landmarks: the visibility if there are at least four numbers, or a third number
+/// that is always in 0..1 (depths are not).
 fn pose_score(pose: &Array3<f32>) -> fn(&Array3<f32>, usize, usize) -> f32 {
     let third = || pose.slice(s![.., .., 2]).into_iter().copied().filter(|v| v.is_finite());
     match pose.shape()[2] {
@@ -61,18 +65,18 @@ fn pose_score(pose: &Array3<f32>) -> fn(&Array3<f32>, usize, usize) -> f32 {
     }
 }
 
-/// Arrays of their own for pose and hands; the hands by their names (`left_hand`, `lh`, ...).
-fn apart(arrays: &NamedArrays) -> Option<Landmarks> {
-    let of = |n: usize, is_it: &dyn Fn(&str) -> bool| {
+/// Separate arrays for pose and hands; the hands are identified by name (`left_hand`, `lh`, ...).
+fn separate_arrays(arrays: &NamedArrays) -> Option<Landmarks> {
+    let of = |n: usize, is_name: &dyn Fn(&str) -> bool| {
         let fits = |shape: &[usize]| matches!(shape, [_, points, 2..=5] if *points == n);
-        let found = arrays.iter().find(|(name, array)| is_it(&name.to_lowercase()) && fits(array.shape()));
+        let found = arrays.iter().find(|(name, array)| is_name(&name.to_lowercase()) && fits(array.shape()));
         found.and_then(|(_, array)| array.clone().into_dimensionality::<Ix3>().ok())
     };
     let side = |word: &str, short: &str| of(N_HAND, &|name| name.contains(word) || name.starts_with(short));
     Some(Landmarks { pose: of(N_POSE, &|_| true)?, hands: [side("left", "lh"), side("right", "rh")] })
 }
 
-/// An array of all landmarks, cut into its parts.
+/// Splits an array of all landmarks into its parts.
 fn split(array: &ndarray::ArrayD<f32>) -> Option<Landmarks> {
     if let [n_frames, n] = array.shape() {
         let face = N_FACE.into_iter().find(|face| 4 * N_POSE + 3 * (face + 2 * N_HAND) == *n)?;
@@ -97,41 +101,41 @@ fn split(array: &ndarray::ArrayD<f32>) -> Option<Landmarks> {
     let hands = N_POSE + face;
     let orders = [(0, hands, hands + N_HAND), (face + N_HAND, face, face + N_HAND + N_POSE)];
     let gaps = orders.map(|(pose, left, right)| wrist_gap(all, [(pose + 15, left), (pose + 16, right)]));
-    let last_fits = match gaps {
+    let use_second = match gaps {
         [Some(first), Some(last)] => last < first,
-        // Without hands: a body is larger than its face.
+        // Without hands, the orders are distinguished by size: a body is taller than its face.
         _ => {
             let [first, last] = orders.map(|(pose, _, _)| extent(all.slice(s![.., pose..pose + N_POSE, ..])));
             last > first
         }
     };
-    let (pose, left, right) = orders[usize::from(last_fits)];
+    let (pose, left, right) = orders[usize::from(use_second)];
     Some(cut(pose, left, right))
 }
 
-/// Mean distance of the pose's wrists from the hands' own; `None` where they never are in one frame.
+/// Mean distance between the wrists of the pose and those of the hands; `None` if they never occur in the same frame.
 fn wrist_gap(all: ArrayView3<f32>, pairs: [(usize, usize); 2]) -> Option<f64> {
-    let place = |t: usize, j: usize| {
+    let xy = |t: usize, j: usize| {
         let [x, y] = [all[[t, j, 0]], all[[t, j, 1]]];
         (x.is_finite() && y.is_finite() && (x != 0.0 || y != 0.0)).then_some([x, y])
     };
     let frames = 0..all.shape()[0];
-    let moments = frames.flat_map(|t| pairs.map(|(wrist, root)| (t, wrist, root)));
-    let gaps: Vec<f64> = moments
+    let wrist_pairs = frames.flat_map(|t| pairs.map(|(wrist, root)| (t, wrist, root)));
+    let gaps: Vec<f64> = wrist_pairs
         .filter_map(|(t, wrist, root)| {
-            let ([ax, ay], [bx, by]) = (place(t, wrist)?, place(t, root)?);
+            let ([ax, ay], [bx, by]) = (xy(t, wrist)?, xy(t, root)?);
             Some(f64::from((ax - bx).hypot(ay - by)))
         })
         .collect();
     (!gaps.is_empty()).then(|| gaps.iter().sum::<f64>() / gaps.len() as f64)
 }
 
-/// Mean height that the points take, in the unit of the coordinates.
+/// Sum over all frames of the vertical extent of the points, in the unit of the coordinates.
 fn extent(points: ArrayView3<f32>) -> f64 {
     let height = |frame: ndarray::ArrayView2<f32>| {
         let ys = frame.column(1).into_iter().copied().filter(|y| y.is_finite() && *y != 0.0).collect::<Vec<_>>();
-        let most = ys.iter().copied().fold(f32::MIN, f32::max) - ys.iter().copied().fold(f32::MAX, f32::min);
-        if ys.is_empty() { 0.0 } else { f64::from(most) }
+        let range = ys.iter().copied().fold(f32::MIN, f32::max) - ys.iter().copied().fold(f32::MAX, f32::min);
+        if ys.is_empty() { 0.0 } else { f64::from(range) }
     };
     points.outer_iter().map(height).sum()
 }

@@ -1,7 +1,7 @@
-//! Keypoints that other programs found, the kind derived from the content: OpenPose, MMPose, COCO-WholeBody and AlphaPose
-//! as JSON (`document`, `entry` a person in it), MediaPipe, PATS and our own as arrays (`arrays`, `mediapipe`, `pats`).
-//! `layout` has the orders of joints, `range` derives their unit, `found` is what all become, `frames` puts numbered frames
-//! in order, `read` chooses.
+//! Keypoints detected by other programs, with the format derived from the content: JSON of OpenPose, MMPose,
+//! COCO-WholeBody and AlphaPose (`document`; `entry` is one person), and arrays of MediaPipe, PATS and this program
+//! (`arrays`, `mediapipe`, `pats`). `read` selects the reader, `layout` holds the point orders, `range` derives the
+//! unit, `frames` orders numbered frames, and `found` is the common result.
 
 pub mod arrays;
 pub mod document;

@@ -1,24 +1,24 @@
-//! The kind of a file of keypoints, by its content; or a folder with a JSON file for each frame, as OpenPose writes it
-//! (`NAME_000000000012_keypoints.json`).
+//! Reads keypoints in the format detected from the content of the file, or from a folder with one JSON file per
+//! frame, as written by OpenPose (`NAME_000000000012_keypoints.json`).
 
 use super::document::FramePeople;
 use super::found::{CoordinateUnit, FoundKeypoints, FoundPerson};
 use super::frames::number_of;
 use super::range::check_pixels;
 use super::{arrays, document};
-use crate::joints_description::is_one;
+use crate::joints_description::is_description;
 use anyhow::{Context, Result, bail, ensure};
 use orator_base::input;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Share of negative coordinates from which on shares of the picture are none.
-const MOST_NEGATIVE: f64 = 0.2;
+/// Fraction of negative coordinates from which on coordinates are not fractions of the image.
+const MAX_NEGATIVE: f64 = 0.2;
 
-/// Most bytes of the file of one frame.
-const MOST_FRAME_BYTES: u64 = 16 << 20;
+/// Maximum size of the file of one frame, bytes.
+const MAX_FRAME_BYTES: u64 = 16 << 20;
 
-/// Reads keypoints of any known kind. Errors name the file, the place, what was expected.
+/// Reads keypoints in any known format. Errors name the file, the position and what was expected.
 pub fn read(path: &Path) -> Result<FoundKeypoints> {
     let found = if path.is_dir() { read_folder(path)? } else { read_file(path)? };
     let shown = path.display();
@@ -28,12 +28,12 @@ pub fn read(path: &Path) -> Result<FoundKeypoints> {
         "{shown}: nobody is seen in any frame"
     );
     ensure!(
-        found.unit != CoordinateUnit::Share || found.negative_share() < MOST_NEGATIVE,
+        found.unit != CoordinateUnit::Fraction || found.negative_fraction() < MAX_NEGATIVE,
         "{shown}: its coordinates lie between -1 and 1; write them in pixels (OpenPose: --keypoint_scale 0) or as shares \
          of the picture from 0 to 1 (--keypoint_scale 3)"
     );
     if found.unit == CoordinateUnit::Pixels {
-        check_pixels(found.places()).with_context(|| shown.to_string())?;
+        check_pixels(found.coordinates()).with_context(|| shown.to_string())?;
     }
     Ok(found)
 }
@@ -57,7 +57,7 @@ fn read_folder(folder: &Path) -> Result<FoundKeypoints> {
     let listed = std::fs::read_dir(folder).with_context(|| format!("cannot list the folder {}", folder.display()))?;
     let paths = listed.filter_map(|entry| entry.ok().map(|entry| entry.path()));
     let is_frame =
-        |path: &PathBuf| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("json")) && !is_one(path);
+        |path: &PathBuf| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("json")) && !is_description(path);
     let mut files: Vec<PathBuf> = paths.filter(is_frame).collect();
     files.sort();
     ensure!(!files.is_empty(), "{} holds no .json file of a frame", folder.display());
@@ -68,7 +68,7 @@ fn read_folder(folder: &Path) -> Result<FoundKeypoints> {
         let name = file.file_name().unwrap_or_default().to_string_lossy();
         let number = number_of(&name)
             .with_context(|| format!("{}: no digits in its name say which frame it is", file.display()))?;
-        let bytes = input::read(file, MOST_FRAME_BYTES).with_context(|| format!("cannot read {}", file.display()))?;
+        let bytes = input::read(file, MAX_FRAME_BYTES).with_context(|| format!("cannot read {}", file.display()))?;
         let read = document::people(&bytes).with_context(|| file.display().to_string())?;
         program = read.program;
         let people = match read.people {
@@ -79,7 +79,7 @@ fn read_folder(folder: &Path) -> Result<FoundKeypoints> {
                 frames.len()
             ),
         };
-        // The lists of numbers of a frame take more memory than its persons.
+        // Entries are converted at once: their lists of numbers take more memory than persons.
         let persons = document::persons(number, &people, &mut counts).with_context(|| folder.display().to_string())?;
         if let Some((other, _)) = frames.insert(number, (file, persons)) {
             bail!(

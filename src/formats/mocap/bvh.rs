@@ -1,4 +1,4 @@
-//! A take from a BVH file: the joints of the 49 that its skeleton has, found by their names, at the file's own rate.
+//! A take from a BVH file: those of the 49 joints that its skeleton has, found by name, at the file's own frame rate.
 
 use super::captured::CapturedMotion;
 use super::facing::{AxisAlignment, TorsoLandmarks};
@@ -14,54 +14,57 @@ use orator_base::types::time::FrameRate;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
-/// The role (`joint_names::ROLES`) of each of joints 0..7 of `types::skeleton`.
+/// Index into `joint_names::ROLES` of each of joints 0..7 of `types::skeleton`.
 const BODY: [usize; 7] = [0, 2, 3, 4, 5, 6, 7];
-/// The rates of cameras and studios, whole, and in 1001sts of a thousand. Files round the seconds of a frame, so a rate this
-/// near (relative) is meant.
+/// Common integer frame rates of cameras and studios; `BROADCAST_RATES` are multiplied by 1000/1001. Files round the
+/// frame time, so a relative difference below `RATE_ROUNDING` is taken for the common rate.
 const RATES: [u32; 9] = [15, 20, 24, 25, 30, 50, 60, 100, 120];
 const BROADCAST_RATES: [u32; 3] = [24, 30, 60];
 const RATE_ROUNDING: f64 = 1.1e-3;
 
-/// Reads a take, turned to face the camera. Errors: not BVH, a skeleton without neck or shoulders, no standing or
-/// sitting person.
+/// Reads a take, rotated to face the camera.
+///
+/// # Errors
+///
+/// The file is not BVH, its skeleton lacks neck or shoulders, or the person neither stands nor sits upright.
 pub fn read(path: &Path) -> Result<CapturedMotion> {
-    take(path, |alignment| alignment)
+    read_take(path, |alignment| alignment)
 }
 
-/// Reads a take as it stands: y up, facing +z, as `orator animate` writes it, so that it lies beside the motion it came
-/// from. A file with other axes is turned as `read` does, and its facts say so.
-pub fn read_as_it_stands(path: &Path) -> Result<CapturedMotion> {
-    take(path, |alignment| alignment.as_it_stands().unwrap_or(alignment))
+/// Reads a take without rotation if it is y up and faces +z, as `orator animate` writes it, so that it stays aligned
+/// with the motion it came from. A file with other axes is rotated as by [`read`], which its facts record.
+pub fn read_unrotated(path: &Path) -> Result<CapturedMotion> {
+    read_take(path, |alignment| alignment.unrotated().unwrap_or(alignment))
 }
 
-/// Reads a take from the text of a BVH file, turned as [`read`] does.
-pub fn of_text(text: &str) -> Result<CapturedMotion> {
-    of_bvh(&Bvh::parse(text)?, |alignment| alignment)
+/// Parses a take from the text of a BVH file, rotated as by [`read`].
+pub fn from_text(text: &str) -> Result<CapturedMotion> {
+    from_bvh(&Bvh::parse(text)?, |alignment| alignment)
 }
 
-/// Sentence on the unit of a take by its facts; `None` where it is the centimetre, BVH's usual one.
+/// Note on the unit of a take according to its facts; `None` for centimetres, the usual unit of BVH.
 pub fn unit_note(facts: &Map<String, Value>) -> Option<String> {
     let unit = facts.get("source_unit").and_then(Value::as_str).filter(|unit| *unit != "centimetre")?;
     Some(format!("by the length of its arms its unit is the {unit}: brought to metres"))
 }
 
-fn take(path: &Path, placed: impl Fn(AxisAlignment) -> AxisAlignment) -> Result<CapturedMotion> {
+fn read_take(path: &Path, align: impl Fn(AxisAlignment) -> AxisAlignment) -> Result<CapturedMotion> {
     let bvh = Bvh::read(path)?;
-    of_bvh(&bvh, placed).with_context(|| format!("{} is no speaker's motion", path.display()))
+    from_bvh(&bvh, align).with_context(|| format!("{} is no speaker's motion", path.display()))
 }
 
-fn of_bvh(bvh: &Bvh, placed: impl Fn(AxisAlignment) -> AxisAlignment) -> Result<CapturedMotion> {
+fn from_bvh(bvh: &Bvh, align: impl Fn(AxisAlignment) -> AxisAlignment) -> Result<CapturedMotion> {
     let names: Vec<&str> = bvh.joints.iter().map(|joint| joint.name.as_str()).collect();
     let roles = joint_names::find(&names);
     let map = joint_map(bvh, &names, roles)?;
     let frames = bvh.positions(Positions::Auto);
     let landmarks: Vec<TorsoLandmarks> = frames.iter().map(|frame| landmarks(frame, &map, roles)).collect();
-    let alignment = placed(AxisAlignment::fit(&landmarks)?);
+    let alignment = align(AxisAlignment::fit(&landmarks)?);
     let mut joints = Array3::from_elem((frames.len(), N_JOINTS, 3), f32::NAN);
     for (t, (frame, landmarks)) in frames.iter().zip(&landmarks).enumerate() {
         for (joint, at) in map.iter().enumerate() {
             let Some(&position) = at.and_then(|at| frame.get(at)) else { continue };
-            for (k, v) in alignment.place(position, landmarks.neck).into_iter().enumerate() {
+            for (k, v) in alignment.align_joint(position, landmarks.neck).into_iter().enumerate() {
                 joints[[t, joint, k]] = v as f32;
             }
         }
@@ -77,7 +80,7 @@ fn of_bvh(bvh: &Bvh, placed: impl Fn(AxisAlignment) -> AxisAlignment) -> Result<
     Ok(CapturedMotion { motion, text: None, facts: facts.as_object().cloned().unwrap_or_else(Map::new) })
 }
 
-/// The file's joint for each joint of `types::skeleton`.
+/// Index of the file's joint for each joint of `types::skeleton`. Errors if neck or a shoulder is missing.
 fn joint_map(bvh: &Bvh, names: &[&str], roles: [Option<usize>; 10]) -> Result<[Option<usize>; N_JOINTS]> {
     let needed: Vec<&str> =
         [0, 2, 5].into_iter().filter(|&role| roles[role].is_none()).map(|role| joint_names::ROLES[role]).collect();
@@ -112,17 +115,17 @@ fn landmarks(frame: &[Vec3], map: &[Option<usize>; N_JOINTS], roles: [Option<usi
         (Some(right), Some(left)) => Some(vec3::scale(vec3::add(right, left), 0.5)),
         _ => frame.first().copied(),
     };
-    let nowhere = [f64::NAN; 3];
+    let missing = [f64::NAN; 3];
     TorsoLandmarks {
-        neck: at(map[skeleton::NECK]).unwrap_or(nowhere),
-        right_shoulder: at(map[skeleton::R_SHOULDER]).unwrap_or(nowhere),
-        left_shoulder: at(map[skeleton::L_SHOULDER]).unwrap_or(nowhere),
-        hips: hips.unwrap_or(nowhere),
+        neck: at(map[skeleton::NECK]).unwrap_or(missing),
+        right_shoulder: at(map[skeleton::R_SHOULDER]).unwrap_or(missing),
+        left_shoulder: at(map[skeleton::L_SHOULDER]).unwrap_or(missing),
+        hips: hips.unwrap_or(missing),
         arm,
     }
 }
 
-/// The rate that a file's seconds of a frame mean.
+/// Frame rate for a rounded frame time.
 fn rate(frame_secs: f64) -> FrameRate {
     let off = |(num, den): (u32, u32)| (f64::from(num) / f64::from(den) * frame_secs - 1.0).abs();
     let rates = RATES.map(|rate| (rate, 1)).into_iter().chain(BROADCAST_RATES.map(|rate| (1000 * rate, 1001)));

@@ -1,7 +1,7 @@
-//! Captured motion as its source holds it, in house order and axes but at the source's own rate and with its own
-//! bones; and which reader a file needs.
+//! Captured motion in the joint order and axes of `types::skeleton`, but at the frame rate and with the bone lengths
+//! of its source; and the reader for each kind of file.
 
-use super::motion_file::USUAL_FPS;
+use super::motion_file::DEFAULT_FPS;
 use super::{bvh, ted};
 use crate::{authors_txt, joints_description};
 use anyhow::{Context, Result, bail};
@@ -10,31 +10,31 @@ use orator_base::types::pose3d::Motion;
 use serde_json::{Map, Value};
 use std::path::Path;
 
-/// One continuous take of captured motion.
+/// A continuous take of captured motion.
 #[derive(Clone, Debug)]
 pub struct CapturedMotion {
-    /// At the source's rate; a joint that the source does not have is NaN.
+    /// Motion at the source's frame rate; joints that the source lacks are NaN.
     pub motion: Motion,
-    /// Words that are spoken, where the motion's own file has them.
+    /// Spoken text, if the motion file contains it.
     pub text: Option<String>,
-    /// Changes made to the joints, for the sample's metadata.
+    /// Changes made to the joints, recorded in the sample's metadata.
     pub facts: Map<String, Value>,
 }
 
-/// Kind of a file of captured motion.
+/// Kind of a captured motion file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum MotionKind {
-    /// The authors' text clips: 147 numbers a line.
+    /// Text clips of Rebol et al. 2021: 147 numbers per line.
     Authors,
     /// TED Expressive: `.npz` with `human_joints`.
     Ted,
     Bvh,
-    /// WebDataset tar shards of ours, or a dataset's folder.
+    /// WebDataset tar shards written by this program, or a dataset folder.
     Shards,
 }
 
 impl MotionKind {
-    /// Its name on the command line and in facts.
+    /// Name on the command line and in facts.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Authors => "authors",
@@ -45,13 +45,18 @@ impl MotionKind {
     }
 }
 
-/// Reads the motion file of a take of that kind.
+/// Reads a motion file of the given kind.
+///
+/// # Errors
+///
+/// The file is unreadable, is not of that kind, or holds samples; its frame rate, unit or coordinates are
+/// implausible.
 pub fn read(kind: MotionKind, path: &Path) -> Result<CapturedMotion> {
     let captured = match kind {
         MotionKind::Authors => {
-            let motion = authors_txt::read(path, USUAL_FPS)?;
-            let said = joints_description::rate(path, motion.n_frames())?;
-            let motion = Motion { fps: said.unwrap_or(USUAL_FPS), ..motion };
+            let motion = authors_txt::read(path, DEFAULT_FPS)?;
+            let rate = joints_description::rate(path, motion.n_frames())?;
+            let motion = Motion { fps: rate.unwrap_or(DEFAULT_FPS), ..motion };
             CapturedMotion { motion, text: None, facts: Map::new() }
         }
         MotionKind::Ted => ted::read(path)?,

@@ -1,16 +1,16 @@
-//! Joints of the hands in a BVH skeleton: those of each finger are found by their names in any convention, and ordered by
-//! the hierarchy.
+//! Hand joints of a BVH skeleton: the joints of each finger are found by name, in any naming convention, and ordered
+//! by the hierarchy.
 
 use crate::bvh::read::Bvh;
 use orator_base::math::vec3;
 use orator_base::types::pose2d::N_HAND;
 use orator_base::types::skeleton::Side;
 
-/// Words for the fingers, thumb first.
+/// Names of the fingers, thumb first.
 const FINGERS: [&[&str]; 5] = [&["thumb"], &["index"], &["middle", "mid"], &["ring"], &["pinky", "little", "pinkie"]];
 
-/// The joints of a side's hand, wrist first, then thumb to little finger, each base to tip; `None` where there are no
-/// two fingers to hang on one wrist.
+/// Indices of the hand joints of one side: wrist, then thumb to little finger, each base to tip; `None` unless at
+/// least two fingers share a wrist.
 pub fn hand(bvh: &Bvh, side: Side) -> Option<[Option<usize>; N_HAND]> {
     let chains: Vec<Vec<usize>> = (0..5).map(|finger| chain(bvh, side, finger)).collect();
     let firsts: Vec<usize> = chains.iter().filter_map(|c| c.first().copied()).collect();
@@ -18,33 +18,33 @@ pub fn hand(bvh: &Bvh, side: Side) -> Option<[Option<usize>; N_HAND]> {
     let mut joints = [None; N_HAND];
     joints[0] = Some(wrist);
     for (finger, chain) in chains.iter().enumerate() {
-        let chain = &chain[usize::from(begins_in_the_palm(bvh, wrist, finger, chain))..];
-        let bones = chain.iter().zip(0..4).take_while(|(joint, k)| *k == 0 || length(bvh, **joint) > 0.0);
+        let chain = &chain[usize::from(has_metacarpal(bvh, wrist, finger, chain))..];
+        let bones = chain.iter().zip(0..4).take_while(|(joint, k)| *k == 0 || bone_length(bvh, **joint) > 0.0);
         bones.for_each(|(&joint, k)| joints[1 + 4 * finger + k] = Some(joint));
     }
     Some(joints)
 }
 
-/// The joints of that finger from its base on, with the end of its last bone.
+/// Joints of a finger from its base to the end site of its last bone; empty if there are fewer than two.
 fn chain(bvh: &Bvh, side: Side, finger: usize) -> Vec<usize> {
     let mut chain: Vec<usize> = Vec::new();
     for (i, joint) in bvh.joints.iter().enumerate() {
         let follows = chain.last().is_none_or(|last| joint.parent == Some(*last));
-        if follows && meaning(&joint.name) == Some((side, finger)) {
+        if follows && parse_name(&joint.name) == Some((side, finger)) {
             chain.push(i);
         }
     }
     if chain.len() > 1 { chain } else { Vec::new() }
 }
 
-/// The side and the finger a joint's name speaks of.
-fn meaning(name: &str) -> Option<(Side, usize)> {
+/// Side and finger that a joint name denotes.
+fn parse_name(name: &str) -> Option<(Side, usize)> {
     let words = words(name.rsplit(':').next().unwrap_or(name));
     let all = words.concat();
     if ["foot", "toe", "eye", "brow", "lip"].iter().any(|w| all.contains(w)) {
         return None;
     }
-    // "lthumb" is one word to begin with: the side is what is left of it
+    // "lthumb" is one word: the side is the rest of it without the finger name.
     let (finger, rest) = words.iter().enumerate().find_map(|(i, word)| {
         FINGERS.iter().enumerate().find_map(|(finger, names)| {
             let (before, after) = names.iter().find_map(|name| word.split_once(name))?;
@@ -53,22 +53,22 @@ fn meaning(name: &str) -> Option<(Side, usize)> {
             ends.then(|| (finger, [before, after].into_iter().chain(others).map(str::to_owned).collect::<Vec<_>>()))
         })
     })?;
-    let says = |side: &str| rest.iter().any(|word| word == &side[..1] || word.contains(side));
-    match (says("left"), says("right")) {
+    let has_side = |side: &str| rest.iter().any(|word| word == &side[..1] || word.contains(side));
+    match (has_side("left"), has_side("right")) {
         (true, false) => Some((Side::Left, finger)),
         (false, true) => Some((Side::Right, finger)),
         _ => None,
     }
 }
 
-/// The words of a name in small letters: apart at signs, digits, and where small letters turn to a capital.
+/// Lower-case words of a name, split at non-letters and at changes of letter case.
 fn words(name: &str) -> Vec<String> {
     let letters: Vec<char> = name.chars().collect();
     let mut words = vec![String::new()];
     for (i, c) in letters.iter().enumerate() {
-        let small = |k: usize| letters.get(k).is_some_and(|c| c.is_lowercase());
-        let begins = c.is_uppercase() && (i > 0 && small(i - 1) || small(i + 1));
-        if begins || !c.is_alphabetic() {
+        let is_lower = |k: usize| letters.get(k).is_some_and(|c| c.is_lowercase());
+        let starts_word = c.is_uppercase() && (i > 0 && is_lower(i - 1) || is_lower(i + 1));
+        if starts_word || !c.is_alphabetic() {
             words.push(String::new());
         }
         if let (true, Some(word)) = (c.is_alphabetic(), words.last_mut()) {
@@ -79,27 +79,27 @@ fn words(name: &str) -> Vec<String> {
     words
 }
 
-/// The deepest joint all of them hang on.
+/// The deepest joint that is an ancestor of all `joints`; `None` for fewer than two joints.
 fn common_parent(bvh: &Bvh, joints: &[usize]) -> Option<usize> {
-    let above = |joint: usize| std::iter::successors(bvh.joints[joint].parent, |&j| bvh.joints[j].parent);
+    let ancestors = |joint: usize| std::iter::successors(bvh.joints[joint].parent, |&j| bvh.joints[j].parent);
     let (first, others) = joints.split_first()?;
-    let shared = |candidate: &usize| others.iter().all(|&j| above(j).any(|a| a == *candidate));
-    above(*first).find(shared).filter(|_| !others.is_empty())
+    let is_common = |candidate: &usize| others.iter().all(|&j| ancestors(j).any(|a| a == *candidate));
+    ancestors(*first).find(is_common).filter(|_| !others.is_empty())
 }
 
-fn length(bvh: &Bvh, joint: usize) -> f64 {
+fn bone_length(bvh: &Bvh, joint: usize) -> f64 {
     vec3::norm(bvh.joints[joint].offset)
 }
 
-/// Whether a chain's first joint is no knuckle but lies between wrist and knuckle: of a finger, a first joint nearer
-/// to the wrist than to the next; of the thumb, one more joint than a thumb has, counted from 0.
-fn begins_in_the_palm(bvh: &Bvh, wrist: usize, finger: usize, chain: &[usize]) -> bool {
+/// Whether the first joint of a chain is a metacarpal joint in the palm instead of the knuckle. Fingers: it is nearer
+/// to the wrist than to the next joint. Thumb: the chain has one joint more than a thumb, numbered from 0.
+fn has_metacarpal(bvh: &Bvh, wrist: usize, finger: usize, chain: &[usize]) -> bool {
     let [first, second, ..] = chain else { return false };
     if finger == 0 {
         return chain.len() > 4 && bvh.joints[*first].name.contains('0') && !bvh.joints[*second].name.contains("02");
     }
     let to_wrist = std::iter::successors(Some(*first), |&j| bvh.joints[j].parent).take_while(|&j| j != wrist);
-    chain.len() > 4 && to_wrist.map(|j| length(bvh, j)).sum::<f64>() < length(bvh, *second)
+    chain.len() > 4 && to_wrist.map(|j| bone_length(bvh, j)).sum::<f64>() < bone_length(bvh, *second)
 }
 
 #[cfg(test)]
@@ -107,7 +107,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_of_many_rigs_are_understood() {
+    fn joint_names_of_common_rigs_are_parsed() {
         let left = |finger| Some((Side::Left, finger));
         for (name, meant) in [
             ("mixamorig:LeftHandThumb1", left(0)),
@@ -129,12 +129,12 @@ mod tests {
             ("String", None),
             ("Thumb", None),
         ] {
-            assert_eq!(meaning(name), meant, "{name}");
+            assert_eq!(parse_name(name), meant, "{name}");
         }
     }
 
-    /// A left hand: thumb of three joints; index with a joint in the palm; middle of four joints, the last without
-    /// length; fingers without end sites.
+    /// A left hand: a thumb of three joints; an index finger with a metacarpal joint; a middle finger of four joints,
+    /// the last bone without length; no other end sites.
     const HAND: &str = "HIERARCHY ROOT Hips { OFFSET 0 0 0 CHANNELS 3 Zrotation Xrotation Yrotation
         JOINT LeftHand { OFFSET 50 0 0 CHANNELS 0
           JOINT LeftHandThumb1 { OFFSET 3 0 2 CHANNELS 0 JOINT LeftHandThumb2 { OFFSET 4 0 1 CHANNELS 0
@@ -148,7 +148,7 @@ mod tests {
         MOTION Frames: 2 Frame Time: 0.04 0 0 0 90 0 0";
 
     #[test]
-    fn joints_find_their_places_in_the_hand() {
+    fn hand_joints_are_ordered_by_finger() {
         let bvh = Bvh::parse(HAND).unwrap();
         let named = hand(&bvh, Side::Left).unwrap().map(|joint| joint.map(|joint| bvh.joints[joint].name.as_str()));
         assert_eq!((named[0], named[4]), (Some("LeftHand"), Some("LeftHandThumb3_end")));

@@ -1,4 +1,4 @@
-//! Motion that others captured, read into this program's skeleton.
+//! Readers for motion captured by others, converted to the skeleton of this program.
 
 pub mod bvh;
 pub mod captured;

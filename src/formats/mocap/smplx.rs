@@ -1,5 +1,5 @@
-//! SMPL-X joint rotations in `.npz` files (BEAT2, EMAGE): `poses` [T, 165], axis-angle in radians, read as the finger
-//! joints of both hands on an assumed rest hand.
+//! SMPL-X joint rotations in `.npz` files (BEAT2, EMAGE): `poses` [T, 165], axis-angle in radians, converted to the
+//! finger joints of both hands by forward kinematics of an assumed rest hand.
 
 use crate::npz::Npz;
 use anyhow::Result;
@@ -10,27 +10,32 @@ use orator_base::types::pose2d::N_HAND;
 use orator_base::types::skeleton::Side;
 use std::path::Path;
 
-/// Numbers of a frame: 55 joints of an axis-angle vector each.
+/// Numbers per frame: 55 joints with an axis-angle vector each.
 const N_NUMBERS: usize = 165;
-/// Roots of the fingers in the file's order: index, middle, LITTLE, RING, thumb.
+/// Base joints of the fingers in file order: index, middle, LITTLE, RING, thumb.
 const ROOTS: [usize; 5] = [5, 9, 17, 13, 1];
-/// Degrees by which the fingers of the rest hand fan out towards the thumb, thumb to little finger.
+/// Directions of the fingers of the rest hand, degrees towards the thumb; thumb to little finger.
 const REST_FAN: [f64; 5] = [45.0, 8.0, 0.0, -12.0, -26.0];
-/// Directions of the knuckles on the palm, degrees towards the thumb.
+/// Directions of the knuckles from the wrist, degrees towards the thumb; thumb to little finger.
 const REST_PALM: [f64; 5] = [48.0, 15.0, 1.0, -12.0, -25.0];
 
-/// Joints of one hand in a frame: wrist, then thumb to little finger, each base to tip; unit: the reference hand's.
+/// Joints of one hand in a frame: wrist, then thumb to little finger, each base to tip; the unit is that of the
+/// reference hand's bones.
 pub type HandFrame = [Vec3; N_HAND];
 
-/// Whether the file has SMPL-X rotations.
+/// Whether the file contains SMPL-X rotations.
 pub fn is_smplx(path: &Path) -> Result<bool> {
     Ok(Npz::open(path)?.has("poses"))
 }
 
-/// Frames of the left (joints 25..40) and of the right hand (40..55), in the axes of the T-pose: left fingers along +x,
-/// palms down, thumbs towards +z. The rest hand, which the file does not hold, is ASSUMED: flat and straight, mean bones,
-/// thumb 45 degrees forward and somewhat down; no mean hand is added to the rotations. Errors: no `poses` of that
-/// shape.
+/// Frames of the left hand (joints 25..40) and the right hand (40..55), in the axes of the T-pose: left fingers along
+/// +x, palms down, thumbs towards +z. The file does not contain the rest hand, which is ASSUMED to be flat and
+/// straight with mean bone lengths, the thumb 45 degrees forward and slightly down; no mean hand pose is added to the
+/// rotations.
+///
+/// # Errors
+///
+/// The file has no `poses` of that shape.
 pub fn hands(path: &Path) -> Result<[(Side, Vec<HandFrame>); 2]> {
     let poses = Npz::open(path)?.numbers("poses", &[None, Some(N_NUMBERS)])?;
     let rotation = |t: usize, joint: usize| {
@@ -43,26 +48,26 @@ pub fn hands(path: &Path) -> Result<[(Side, Vec<HandFrame>); 2]> {
     Ok([(25, Side::Left), (40, Side::Right)].map(|(first, side)| (side, frames(first, side))))
 }
 
-/// One hand from the rotations of its joints, given by finger (in the file's order) and joint.
+/// Computes one hand from its joint rotations, given by finger (in file order) and joint.
 fn hand(side: Side, rotation: impl Fn(usize, usize) -> Rotation) -> HandFrame {
     let mut joints: HandFrame = [[0.0; 3]; N_HAND];
     for (finger, root) in ROOTS.into_iter().enumerate() {
         let row = root / 4;
         let down = if row == 0 { -0.25 } else { 0.0 };
-        let along = direction(side, REST_FAN[row], 0.4 * down);
+        let bone_direction = direction(side, REST_FAN[row], 0.4 * down);
         let mut at = vec3::scale(direction(side, REST_PALM[row], 1.5 * down), BONES[row][0]);
-        let mut turned = Rotation::IDENTITY;
+        let mut global_rotation = Rotation::IDENTITY;
         joints[root] = at;
         for k in 0..3 {
-            turned = turned * rotation(finger, k);
-            at = vec3::add(at, vec3::scale(turned.turn(along), BONES[row][k + 1]));
+            global_rotation = global_rotation * rotation(finger, k);
+            at = vec3::add(at, vec3::scale(global_rotation.turn(bone_direction), BONES[row][k + 1]));
             joints[root + k + 1] = at;
         }
     }
     joints
 }
 
-/// Unit vector in the palm, `degrees` from the middle finger towards the thumb; mirrored for the right hand.
+/// Unit vector `degrees` from the middle finger towards the thumb, lowered by `down`; mirrored for the right hand.
 fn direction(side: Side, degrees: f64, down: f64) -> Vec3 {
     let (sin, cos) = degrees.to_radians().sin_cos();
     let [x, y, z] = vec3::unit([cos, down, sin], 1e-9).unwrap_or_default();
@@ -75,7 +80,7 @@ mod tests {
     use ndarray::Array2;
 
     #[test]
-    fn fingers_bend_to_the_palm_of_their_side() {
+    fn fingers_bend_towards_the_palm() {
         let mut poses = Array2::<f32>::zeros((2, N_NUMBERS));
         for joint in 25..55 {
             let side = if joint < 40 { -1.0 } else { 1.0 };

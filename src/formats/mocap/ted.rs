@@ -1,5 +1,6 @@
-//! TED Expressive: `human_joints` [T, 43, 3] in camera axes (y down), metres, of a regressor; `fps`; `sentence`.
-//! Joint 1 is the neck, joint 0 the spine below it; left arm 2 4 6, right arm 3 5 7; three joints a finger and no tips.
+//! TED Expressive: `human_joints` [T, 43, 3] in camera axes (y down), metres, estimated by a regressor; `fps`;
+//! `sentence`. Joint 1 is the neck, joint 0 the spine below it; left arm 2 4 6, right arm 3 5 7; three joints per
+//! finger, no tips.
 
 use super::captured::CapturedMotion;
 use crate::npz::Npz;
@@ -12,14 +13,14 @@ use orator_base::types::skeleton::{L_HAND, N_JOINTS, R_HAND, Side};
 use serde_json::Map;
 use std::path::Path;
 
-/// Number of joints of a frame.
+/// Number of joints per frame.
 pub const N_TED: usize = 43;
-/// Their joint for each of joints 0..7 of `types::skeleton`: neck, right arm, left arm.
+/// TED joint for each of joints 0..7 of `types::skeleton`: neck, right arm, left arm.
 const BODY: [usize; 7] = [1, 3, 5, 7, 2, 4, 6];
-/// First points of the fingers in their order: index, middle, little, ring, thumb.
+/// Base joints of the fingers in file order: index, middle, little, ring, thumb.
 const ROOTS: [usize; 5] = [5, 9, 17, 13, 1];
 
-/// Their joint for each point of a hand: the wrist, then thumb to little finger, each base to tip.
+/// TED joint for each point of a hand: wrist, then thumb to little finger, each base to tip.
 pub fn hand(side: Side) -> [Option<usize>; N_HAND] {
     let (wrist, first) = if side == Side::Left { (6, 8) } else { (7, 23) };
     let mut joints = [None; N_HAND];
@@ -30,17 +31,18 @@ pub fn hand(side: Side) -> [Option<usize>; N_HAND] {
     joints
 }
 
-/// Reads a clip. Joints that the source does not have (finger tips) are NaN.
+/// Reads a clip. Joints that the source lacks (finger tips) are NaN.
 pub fn read(path: &Path) -> Result<CapturedMotion> {
     let mut npz = Npz::open(path)?;
     let fps = npz.frame_rate("fps")?;
-    let theirs = npz.numbers("human_joints", &[None, Some(N_TED), Some(3)])?;
-    let point = |t: usize, j: usize| -> Vec3 { std::array::from_fn(|k| theirs[[t, j, k]]) };
-    let of_hand = |side, root| hand(side).into_iter().enumerate().filter_map(move |(k, j)| Some((root + k, j?)));
-    let body = BODY.into_iter().enumerate().chain(of_hand(Side::Left, L_HAND)).chain(of_hand(Side::Right, R_HAND));
-    let mut joints = Array3::from_elem((theirs.shape()[0], N_JOINTS, 3), f32::NAN);
+    let ted_joints = npz.numbers("human_joints", &[None, Some(N_TED), Some(3)])?;
+    let point = |t: usize, j: usize| -> Vec3 { std::array::from_fn(|k| ted_joints[[t, j, k]]) };
+    let hand_joints = |side, root| hand(side).into_iter().enumerate().filter_map(move |(k, j)| Some((root + k, j?)));
+    let body =
+        BODY.into_iter().enumerate().chain(hand_joints(Side::Left, L_HAND)).chain(hand_joints(Side::Right, R_HAND));
+    let mut joints = Array3::from_elem((ted_joints.shape()[0], N_JOINTS, 3), f32::NAN);
     for (joint, j) in body {
-        for t in 0..theirs.shape()[0] {
+        for t in 0..ted_joints.shape()[0] {
             let from_neck = vec3::sub(point(t, j), point(t, BODY[0])).map(|v| v as f32);
             joints.slice_mut(s![t, joint, ..]).assign(&ndarray::aview1(&from_neck));
         }
@@ -53,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn joints_of_the_hands_find_their_places_and_tips_are_unknown() {
+    fn hand_joints_are_mapped_without_tips() {
         assert_eq!((hand(Side::Left)[17], hand(Side::Right)[1]), (Some(14), Some(35)));
         assert!([4, 8, 12, 16, 20].iter().all(|&tip| hand(Side::Left)[tip].is_none()));
     }

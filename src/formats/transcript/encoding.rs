@@ -1,9 +1,12 @@
-//! Bytes of a text file to text: UTF-8, or UTF-16 with its mark, as Praat and Windows programs write it.
+//! Decodes text files: UTF-8, or UTF-16 with a byte order mark, as Praat and Windows programs write it.
 
 use anyhow::{Result, bail, ensure};
 
-/// The text without its byte order mark. Errors: another encoding; the message names the line of the first byte that is
-/// no text.
+/// The decoded text without its byte order mark.
+///
+/// # Errors
+///
+/// Another encoding; the message names the line of the first invalid byte.
 pub fn text_of(bytes: &[u8]) -> Result<String> {
     match bytes {
         [0xff, 0xfe, rest @ ..] => utf16(rest, u16::from_le_bytes),
@@ -33,11 +36,11 @@ fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Result<String> {
     let (pairs, rest) = bytes.as_chunks::<2>();
     ensure!(rest.is_empty(), "it is UTF-16, and ends in the middle of a letter");
     let mut text = String::new();
-    for letter in char::decode_utf16(pairs.iter().map(|pair| unit(*pair))) {
-        let Ok(letter) = letter else {
+    for character in char::decode_utf16(pairs.iter().map(|pair| unit(*pair))) {
+        let Ok(character) = character else {
             bail!("line {}: half a letter of UTF-16; save the file as UTF-8", 1 + text.matches('\n').count())
         };
-        text.push(letter);
+        text.push(character);
     }
     Ok(text)
 }
@@ -47,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn encodings_are_told_by_their_marks_and_others_refused_with_their_line() {
+    fn encodings_are_detected_and_others_rejected_with_their_line() {
         let utf16 = |swap: bool| {
             let units = "\u{feff}sö\n".encode_utf16();
             let bytes = units.map(|unit| if swap { unit.to_be_bytes() } else { unit.to_le_bytes() });

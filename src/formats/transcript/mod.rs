@@ -1,5 +1,6 @@
-//! Transcripts: words with their times, as speech recognisers, aligners and subtitles write them, one format a file
-//! but for tables. `transcript` reads a file by its ending, decodes its text (`encoding`), and notes what is wrong with its times.
+//! Transcripts: words with their times, as written by speech recognisers, aligners and subtitle programs; one file
+//! per format except for tables. `transcript` selects the reader by file extension, decodes the text (`encoding`) and
+//! notes problems with the times.
 
 pub mod encoding;
 pub mod json;

@@ -1,18 +1,22 @@
-//! Subtitles, SubRip (`.srt`) and WebVTT (`.vtt`): cues of several words, which share the time of their cue; where WebVTT
-//! times single words, these have their own.
+//! Subtitles in SubRip (`.srt`) and WebVTT (`.vtt`) format: the words of a cue share its time, except for words with
+//! their own times in WebVTT.
 
 use super::word::{self, Word};
 use anyhow::{Context, Result, bail, ensure};
 use std::collections::BTreeSet;
 
-/// The words of all cues, in their order. Errors: the line of a time that cannot be read; text without any cue.
+/// The words of all cues, in file order.
+///
+/// # Errors
+///
+/// The line of an invalid time; text without any cue.
 pub fn read(text: &str) -> Result<Vec<Word>> {
     let mut words = Vec::new();
     let mut lines = text.lines().map(str::trim).zip(1..).peekable();
     let mut n_cues = 0;
-    // Where words are timed, a cue shows the line before again.
+    // With timed words (rolling captions), a cue repeats the previous line.
     let is_rolling = text.split('<').skip(1).any(|part| inline_time(part).is_some());
-    let mut before: BTreeSet<String> = BTreeSet::new();
+    let mut previous: BTreeSet<String> = BTreeSet::new();
     while let Some((line, n)) = lines.next() {
         let Some((start, rest)) = line.split_once("-->") else { continue };
         let end = rest.split_whitespace().next().unwrap_or_default();
@@ -25,11 +29,11 @@ pub fn read(text: &str) -> Result<Vec<Word>> {
             cue.push(line);
         }
         let shown: Vec<String> = cue.iter().map(|line| plain(line)).collect();
-        let is_new = |shown: &String| !is_rolling || !before.contains(shown);
-        let said: Vec<&str> =
+        let is_new = |shown: &String| !is_rolling || !previous.contains(shown);
+        let new_lines: Vec<&str> =
             cue.iter().zip(&shown).filter(|(_, shown)| is_new(shown)).map(|(line, _)| *line).collect();
-        push_cue(&mut words, &said.join(" "), start, end).with_context(|| format!("line {n}"))?;
-        before = shown.into_iter().collect();
+        push_cue(&mut words, &new_lines.join(" "), start, end).with_context(|| format!("line {n}"))?;
+        previous = shown.into_iter().collect();
     }
     ensure!(
         n_cues > 0 || text.trim().is_empty() || text.starts_with("WEBVTT"),
@@ -38,7 +42,7 @@ pub fn read(text: &str) -> Result<Vec<Word>> {
     Ok(words)
 }
 
-/// Adds the words of a cue, piece by piece between the times within it.
+/// Adds the words of a cue, split at the inline times.
 fn push_cue(words: &mut Vec<Word>, text: &str, start: f64, end: f64) -> Result<()> {
     let (mut at, mut piece) = (start, String::new());
     for (nth, part) in text.split('<').enumerate() {
@@ -58,14 +62,14 @@ fn push_cue(words: &mut Vec<Word>, text: &str, start: f64, end: f64) -> Result<(
     word::push(words, &plain(&piece), (at, end), None)
 }
 
-/// Time of a tag `00:00:01.500>`, and the text behind it.
+/// Time of a tag `00:00:01.500>`, and the text after it.
 fn inline_time(part: &str) -> Option<(f64, &str)> {
     let (time, rest) = part.split_once('>')?;
     let is_time = time.contains(':') && time.bytes().all(|byte| byte.is_ascii_digit() || b":.".contains(&byte));
     Some((seconds(time).ok().filter(|_| is_time)?, rest))
 }
 
-/// Hours, minutes and seconds with `:` between, a decimal comma or point.
+/// Parses hours, minutes and seconds separated by `:`, with a decimal comma or point.
 fn seconds(time: &str) -> Result<f64> {
     let mut secs = 0.0;
     for part in time.replace(',', ".").splitn(3, ':') {
@@ -77,10 +81,10 @@ fn seconds(time: &str) -> Result<f64> {
     Ok(secs)
 }
 
-/// Text without markup (`<i>`, `{\an8}`) and with the letters that WebVTT escapes.
+/// Text without markup (`<i>`, `{\an8}`), with WebVTT entities decoded.
 fn plain(text: &str) -> String {
     let mut depth = 0_usize;
-    let shown = text.chars().filter(|letter| match letter {
+    let shown = text.chars().filter(|character| match character {
         '<' | '{' => {
             depth += 1;
             false
@@ -101,7 +105,7 @@ mod tests {
     use crate::transcript::WordSource;
 
     #[test]
-    fn cues_of_both_formats_become_words() {
+    fn cues_of_both_formats_are_split_into_words() {
         let srt =
             "1\r\n00:00:01,000 --> 00:00:02,000\r\n<i>so</i> well\r\n\r\n2\r\n01:00:00,5 --> 01:00:01,5\r\nnow\r\n";
         let words = read(srt).unwrap();
@@ -117,26 +121,26 @@ mod tests {
     }
 
     #[test]
-    fn a_cue_of_any_form_takes_linear_time() {
+    fn parsing_takes_linear_time() {
         let cue = |text: &str| format!("WEBVTT\n\n00:01.000 --> 00:02.000\n{text}\n\n");
         let lines: String = (0..100_000).map(|n| format!("line{n:06}<00:01.500>\n")).collect();
         for text in [cue(&"<".repeat(4 << 20)), cue(&"a<".repeat(2 << 20)), cue(&lines) + &cue(&lines)] {
-            let begun = std::time::Instant::now();
+            let started = std::time::Instant::now();
             read(&text).unwrap();
-            // Quadratic time is minutes here.
-            assert!(begun.elapsed().as_secs() < 20, "{} bytes took {:?}", text.len(), begun.elapsed());
+            // Quadratic time would take minutes.
+            assert!(started.elapsed().as_secs() < 20, "{} bytes took {:?}", text.len(), started.elapsed());
         }
     }
 
     #[test]
-    fn words_that_webvtt_times_have_their_own_times_once() {
+    fn webvtt_inline_times_are_used_once_per_word() {
         let vtt = "WEBVTT\n\n00:00:01.000 --> 00:00:03.000\nso<00:00:01.500><c> well</c><00:00:02.000><c> &amp;</c>\n\n\
                    00:00:03.000 --> 00:00:03.010\nso well &amp;\n\n\
                    00:00:03.010 --> 00:00:04.000\nso well &amp;\nnow<00:00:03.500><c> then</c>\n";
         let words = read(vtt).unwrap();
-        let said: Vec<_> = words.iter().map(|w| (w.word.as_str(), w.start_secs, w.end_secs)).collect();
+        let found: Vec<_> = words.iter().map(|w| (w.word.as_str(), w.start_secs, w.end_secs)).collect();
         let expected = [("so", 1.0, 1.5), ("well", 1.5, 2.0), ("&", 2.0, 3.0), ("now", 3.01, 3.5), ("then", 3.5, 4.0)];
-        assert_eq!(said, expected);
+        assert_eq!(found, expected);
         assert!(words.iter().all(|word| word.source == WordSource::Given));
     }
 }

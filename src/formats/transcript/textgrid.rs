@@ -1,10 +1,13 @@
-//! Praat's TextGrid, long and short text format: the words of its tier of words.
+//! Praat TextGrid, in the long and the short text format: the words of its word tier.
 
 use super::word::{self, Word};
 use anyhow::{Context, Result, ensure};
 
-/// The intervals with text of the tier whose name has `word` in it, else of the first tier of intervals. Errors: no
-/// tier of intervals; an interval without its two times.
+/// The non-empty intervals of the first tier with `word` in its name, or else of the first interval tier.
+///
+/// # Errors
+///
+/// No interval tier; an interval without two valid times.
 pub fn read(text: &str) -> Result<Vec<Word>> {
     let values = values(text);
     let mut tiers = Vec::new();
@@ -16,12 +19,13 @@ pub fn read(text: &str) -> Result<Vec<Word>> {
             tiers.push(tier(&values, &mut at)?);
         }
     }
-    let spoken = tiers.iter().position(|(name, _)| name.to_lowercase().contains("word")).unwrap_or(0);
+    let word_tier = tiers.iter().position(|(name, _)| name.to_lowercase().contains("word")).unwrap_or(0);
     ensure!(!tiers.is_empty(), "it has no tier of intervals");
-    Ok(tiers.swap_remove(spoken).1)
+    Ok(tiers.swap_remove(word_tier).1)
 }
 
-/// Numbers and quoted texts, which both formats have in the same order; labels such as `xmin =` and `[1]` are not values.
+/// A number or quoted text; both formats have the same sequence of values. Labels such as `xmin =` and `[1]` are not
+/// values.
 enum TextGridValue {
     Number(f64),
     Text(String),
@@ -41,7 +45,8 @@ fn values(text: &str) -> Vec<TextGridValue> {
     values
 }
 
-/// Name and intervals of a tier: its name, its span, the number of intervals, then two times and a text for each.
+/// Name and intervals of a tier. The values are its name, start, end and number of intervals, then two times and a
+/// text per interval.
 fn tier(values: &[TextGridValue], at: &mut usize) -> Result<(String, Vec<Word>)> {
     let mut next = || {
         *at += 1;
@@ -81,11 +86,11 @@ mod tests {
         \"words\"\n0\n2\n2\n0\n0.5\n\"\"\n0.5\n2\n\"so\"\n";
 
     #[test]
-    fn both_formats_give_the_words() {
+    fn both_formats_yield_the_words() {
         for text in [LONG, SHORT] {
             let words = read(text).unwrap();
-            let said: Vec<_> = words.iter().map(|word| (word.word.as_str(), word.start_secs, word.end_secs)).collect();
-            assert_eq!(said, [("so", 0.5, 2.0)]);
+            let found: Vec<_> = words.iter().map(|word| (word.word.as_str(), word.start_secs, word.end_secs)).collect();
+            assert_eq!(found, [("so", 0.5, 2.0)]);
         }
         assert!(read("File type = \"ooTextFile\"\n").is_err());
         for end in 0..SHORT.len() {

@@ -1,5 +1,5 @@
-//! Transcripts by their endings: `.json` (recognisers), `.tsv`, `.ctm`, `.srt`, `.vtt`, `.TextGrid`, or words without
-//! times from `.txt`. Times that cannot be are errors with their place, doubtful ones are notes.
+//! Transcripts, read by file extension: `.json` (recognisers), `.tsv`, `.ctm`, `.srt`, `.vtt`, `.TextGrid`, or words
+//! without times from `.txt`. Impossible times are errors with their position, doubtful ones are notes.
 
 use super::json::JsonTranscript;
 use super::word::{self, Word, WordSource};
@@ -9,26 +9,26 @@ use orator_base::input;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// Endings of transcripts, in the order in which one of several is chosen.
+/// File extensions of transcripts, in order of preference.
 pub const ENDINGS: [&str; 7] = ["tsv", "json", "TextGrid", "ctm", "srt", "vtt", "txt"];
 
-/// Most bytes of a transcript, 256 MiB: a hundred days of speech.
+/// Maximum size of a transcript, 256 MiB: a hundred days of speech.
 const MAX_BYTES: u64 = 256 << 20;
-/// Seconds by which a word may begin before the end of the one before without a note: the rounding of recognisers.
+/// Overlap of consecutive words that is not noted, seconds: the rounding of recognisers.
 const OVERLAP_SECS: f64 = 0.02;
 
-/// Transcript; `words` is empty without times.
+/// A transcript; `words` is empty if it has no times.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Transcript {
     pub text: String,
-    /// Words in the order of their beginnings.
+    /// Words sorted by start time.
     pub words: Vec<Word>,
-    /// What is doubtful about it, a sentence each.
+    /// One sentence for each doubtful property.
     pub notes: Vec<String>,
 }
 
 impl Transcript {
-    /// Transcript without times.
+    /// Creates a transcript without times.
     pub fn of_text(text: &str) -> Self {
         let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
         let note = match text.is_empty() {
@@ -38,7 +38,7 @@ impl Transcript {
         Self { text, words: Vec::new(), notes: vec![note.to_owned()] }
     }
 
-    /// Transcript of words with times.
+    /// Creates a transcript of words with times, sorted by start time.
     pub fn of_words(mut words: Vec<Word>) -> Self {
         let disorder = words.windows(2).find(|pair| pair[1].start_secs < pair[0].start_secs);
         let disorder = disorder.map(|pair| {
@@ -56,8 +56,12 @@ impl Transcript {
         Self { text, words, notes }
     }
 
-    /// Reads a transcript by its ending. Errors: a file that cannot be read, is larger than 256 MiB, in another
-    /// encoding or no transcript; the message names the line or the word.
+    /// Reads a transcript in the format of its file extension.
+    ///
+    /// # Errors
+    ///
+    /// The file is unreadable, larger than 256 MiB, in another encoding or not a transcript; the message names the
+    /// line or the word.
     pub fn read(path: &Path) -> Result<Self> {
         let reading = || format!("cannot read {}", path.display());
         let bytes = input::read(path, MAX_BYTES).with_context(reading)?;
@@ -67,8 +71,11 @@ impl Transcript {
         read.with_context(|| format!("{} is no transcript", path.display()))
     }
 
-    /// Reads text in the format of an ending, in small letters; `stem` names the recording in a file of several.
-    /// Errors: the line or the word that is not as the format says.
+    /// Parses text in the format of a lower-case file extension; `stem` selects the recording in a file of several.
+    ///
+    /// # Errors
+    ///
+    /// The line or the word that does not conform to the format.
     pub fn parse(text: &str, ending: &str, stem: &str) -> Result<Self> {
         let words = match ending {
             "tsv" => tsv(text)?,
@@ -84,7 +91,7 @@ impl Transcript {
         Ok(Self::of_words(words))
     }
 
-    /// Transcript of the words that begin before second `end`; text without times is kept whole.
+    /// Transcript of the words that start before `end` seconds; a transcript without times is returned unchanged.
     pub fn until(&self, end: f64) -> Self {
         if self.words.is_empty() {
             return self.clone();
@@ -93,30 +100,30 @@ impl Transcript {
     }
 }
 
-/// The words of a table with tabs, a row a word or a sentence: start, end and text in seconds (GENEA 2022 and 2023), or in
-/// milliseconds under the header `start end text` (Whisper). Errors: the line of a row without times.
+/// Words of a tab-separated table, one word or sentence per row: start, end and text in seconds (GENEA 2022 and
+/// 2023), or in milliseconds with the header `start end text` (Whisper). Errors name the line.
 fn tsv(text: &str) -> Result<Vec<Word>> {
     let mut words = Vec::new();
     let mut per_sec = 1.0;
     for (line, n) in text.lines().zip(1..).filter(|(line, _)| !line.trim().is_empty()) {
         let mut parts = line.splitn(3, '\t').map(str::trim);
-        let (Some(start), Some(end), Some(said)) = (parts.next(), parts.next(), parts.next()) else {
+        let (Some(start), Some(end), Some(text)) = (parts.next(), parts.next(), parts.next()) else {
             bail!("line {n}: expected start, end and word with tabs between, found `{line}`");
         };
         match (start.parse::<f64>(), end.parse::<f64>()) {
-            (Ok(start), Ok(end)) => word::push(&mut words, said, (start / per_sec, end / per_sec), None)
+            (Ok(start), Ok(end)) => word::push(&mut words, text, (start / per_sec, end / per_sec), None)
                 .with_context(|| format!("line {n}"))?,
             // Header line.
-            _ if n == 1 => per_sec = if (start, end, said) == ("start", "end", "text") { 1000.0 } else { 1.0 },
+            _ if n == 1 => per_sec = if (start, end, text) == ("start", "end", "text") { 1000.0 } else { 1.0 },
             _ => bail!("line {n}: `{start}` and `{end}` are no seconds"),
         }
     }
     Ok(words)
 }
 
-/// The words of the recording `name`, or of the only one there is, in CTM of NIST's scoring tools and of Kaldi: recording,
-/// channel, start, duration, word and, where it is known, confidence. Errors: invalid row (with its line); several
-/// recordings, and none has this name.
+/// Words of the recording `name`, or of the only recording, in CTM of NIST's scoring tools and of Kaldi: recording,
+/// channel, start, duration, word and optionally confidence. Errors: an invalid row (with its line); several
+/// recordings, none of which has this name.
 fn ctm(text: &str, name: &str) -> Result<Vec<Word>> {
     let rows = text.lines().zip(1..).filter(|(line, _)| !line.trim().is_empty() && !line.starts_with(";;"));
     let recordings: BTreeSet<&str> =
@@ -131,17 +138,17 @@ fn ctm(text: &str, name: &str) -> Result<Vec<Word>> {
     for (line, n) in rows {
         let parts: Vec<&str> = line.split_whitespace().collect();
         let number = |at: usize| parts.get(at).and_then(|part| part.parse::<f64>().ok());
-        let (Some(start), Some(secs), Some(said)) = (number(2), number(3), parts.get(4)) else {
+        let (Some(start), Some(secs), Some(text)) = (number(2), number(3), parts.get(4)) else {
             bail!("line {n}: expected recording, channel, start, duration and word, found `{line}`");
         };
         if recordings.len() == 1 || parts[0] == name {
-            word::push(&mut words, said, (start, start + secs), number(5)).with_context(|| format!("line {n}"))?;
+            word::push(&mut words, text, (start, start + secs), number(5)).with_context(|| format!("line {n}"))?;
         }
     }
     Ok(words)
 }
 
-/// Note on words that begin after the end of a sound of `sound_secs`.
+/// Note on words that start after the end of the audio at `sound_secs`.
 pub fn after_end(words: &[Word], sound_secs: f64) -> Option<String> {
     let mut outside = words.iter().filter(|word| word.start_secs >= sound_secs);
     let first = outside.next()?;
@@ -155,7 +162,7 @@ pub fn after_end(words: &[Word], sound_secs: f64) -> Option<String> {
     ))
 }
 
-/// Note on words that begin before the end of the one before.
+/// Note on words that start before the previous word ends.
 fn overlaps(words: &[Word]) -> Option<String> {
     let over = |pair: &[Word]| pair[0].end_secs - pair[1].start_secs;
     let pairs = words.windows(2).filter(|pair| over(pair) > OVERLAP_SECS);
@@ -170,7 +177,7 @@ fn overlaps(words: &[Word]) -> Option<String> {
     ))
 }
 
-/// Note on words whose times are not their own.
+/// Note on words whose times were shared or interpolated.
 fn untimed(words: &[Word]) -> Option<String> {
     let shared = words.iter().filter(|word| word.source == WordSource::Shared).count();
     let between = words.iter().filter(|word| word.source == WordSource::Interpolated).count();
@@ -192,62 +199,62 @@ mod tests {
         Transcript::parse(text, ending, "a")
     }
 
-    fn said(text: &str, ending: &str) -> String {
+    fn words_of(text: &str, ending: &str) -> String {
         let words = parse(text, ending).unwrap().words;
         let words = words.iter().map(|w| format!("{}@{}-{}", w.word, w.start_secs, w.end_secs));
         words.collect::<Vec<_>>().join(" ")
     }
 
-    fn refusal(text: &str, ending: &str) -> String {
+    fn error_of(text: &str, ending: &str) -> String {
         format!("{:#}", parse(text, ending).unwrap_err())
     }
 
     #[test]
-    fn every_layout_gives_the_same_words() {
+    fn every_format_yields_the_same_words() {
         let expected = "so@0.5-0.7 well@1-1.25";
-        assert_eq!(said("0.5\t0.7\tso\n1.0\t1.25\twell\n", "tsv"), expected);
-        assert_eq!(said("start\tend\tword\n1.0\t1.25\twell\n\n0.5\t0.7\tso\n", "tsv"), expected);
-        assert_eq!(said("start\tend\ttext\n500\t700\tso\n1000\t1250\twell\n", "tsv"), expected);
-        assert_eq!(said("a 1 0.5 0.2 so 0.9\na 1 1 0.25 well\n", "ctm"), expected);
-        assert_eq!(said(";; b\nb 1 9 1 no\na 1 0.5 0.2 so\na 1 1.0 0.25 well\n", "ctm"), expected);
+        assert_eq!(words_of("0.5\t0.7\tso\n1.0\t1.25\twell\n", "tsv"), expected);
+        assert_eq!(words_of("start\tend\tword\n1.0\t1.25\twell\n\n0.5\t0.7\tso\n", "tsv"), expected);
+        assert_eq!(words_of("start\tend\ttext\n500\t700\tso\n1000\t1250\twell\n", "tsv"), expected);
+        assert_eq!(words_of("a 1 0.5 0.2 so 0.9\na 1 1 0.25 well\n", "ctm"), expected);
+        assert_eq!(words_of(";; b\nb 1 9 1 no\na 1 0.5 0.2 so\na 1 1.0 0.25 well\n", "ctm"), expected);
         let google = r#"[{"alternatives": [{"transcript": "so well", "words": [
             {"start_time": "0.500s", "end_time": "0.700s", "word": "so"}]}, {"words": [{"start_time": "9s"}]}]},
             {"alternatives": [{"words": [{"start_time": "1s", "end_time": "1.250s", "word": "well"}]}]}]"#;
-        assert_eq!(said(google, "json"), expected);
+        assert_eq!(words_of(google, "json"), expected);
         let plain = r#"[{"start": 0.5, "end": 0.7, "word": "so"}, {"start": 1, "end": 1.25, "word": "well"}]"#;
-        assert_eq!(said(plain, "json"), expected);
+        assert_eq!(words_of(plain, "json"), expected);
         let whisper = r#"{"text": " so well", "language": "en", "segments": [{"id": 0, "start": 0.5, "end": 1.25,
             "text": " so well", "words": [{"word": " so", "start": 0.5, "end": 0.7, "probability": 0.8},
             {"word": " well", "start": 1.0, "end": 1.25, "probability": 0.9}]}]}"#;
-        assert_eq!(said(whisper, "json"), expected);
+        assert_eq!(words_of(whisper, "json"), expected);
         assert_eq!(parse(whisper, "json").unwrap().words[0].confidence, Some(0.8));
         let without_words = r#"{"text": " so well", "segments": [{"start": 0.5, "end": 2.0, "text": " so well"}]}"#;
-        assert_eq!(said(without_words, "json"), "so@0.5-1 well@1-2");
+        assert_eq!(words_of(without_words, "json"), "so@0.5-1 well@1-2");
         assert!(parse(without_words, "json").unwrap().notes[0].contains("2 of 2 words share"));
         assert_eq!(parse(r#"{"text": "so  well"}"#, "json").unwrap(), Transcript::of_text("so well"));
     }
 
     #[test]
-    fn a_number_that_whisperx_does_not_time_lies_between_its_neighbours() {
+    fn untimed_whisperx_numerals_are_interpolated() {
         let words = r#"{"segments": [{"start": 0, "end": 2, "text": "in 2020 we", "words": [
             {"word": "in", "start": 0, "end": 0.5, "score": 0.9}, {"word": "2020"},
             {"word": "we", "start": 1.5, "end": 2, "score": 0.9}]}], "word_segments": [{"word": "in", "start": 0, "end": 0.5}]}"#;
-        assert_eq!(said(words, "json"), "in@0-0.5 2020@0.5-1.5 we@1.5-2");
+        assert_eq!(words_of(words, "json"), "in@0-0.5 2020@0.5-1.5 we@1.5-2");
         let transcript = parse(words, "json").unwrap();
         assert_eq!((transcript.words[1].source, transcript.words[1].confidence), (WordSource::Interpolated, Some(0.0)));
         assert!(transcript.notes[0].starts_with("1 of 3 words"));
     }
 
     #[test]
-    fn errors_say_where_and_an_end_cuts_words() {
-        assert!(refusal("0 1 so\n", "tsv").contains("line 1"));
-        assert!(refusal("0\t1\tso\n2\tx\twell", "tsv").contains("line 2"));
-        assert!(refusal("2\t1\tso\n", "tsv").contains("from 2 to 1"));
-        assert!(refusal("-1\t1\tso\n", "tsv").contains("line 1: `so` is said from -1"));
-        assert!(refusal("a 1 0.5 0.2\n", "ctm").contains("line 1"));
-        assert!(refusal("b 1 0 1 so\nc 1 0 1 so\n", "ctm").contains("none named a"));
+    fn errors_name_the_position_and_until_cuts_words() {
+        assert!(error_of("0 1 so\n", "tsv").contains("line 1"));
+        assert!(error_of("0\t1\tso\n2\tx\twell", "tsv").contains("line 2"));
+        assert!(error_of("2\t1\tso\n", "tsv").contains("from 2 to 1"));
+        assert!(error_of("-1\t1\tso\n", "tsv").contains("line 1: `so` is said from -1"));
+        assert!(error_of("a 1 0.5 0.2\n", "ctm").contains("line 1"));
+        assert!(error_of("b 1 0 1 so\nc 1 0 1 so\n", "ctm").contains("none named a"));
         assert!(parse("{", "json").is_err() && parse("{}", "json").is_err());
-        assert!(refusal(r#"{"words": [{"word": "so"}]}"#, "json").contains("word 1"));
+        assert!(error_of(r#"{"words": [{"word": "so"}]}"#, "json").contains("word 1"));
         let transcript = parse("0.5\t0.7\tso\n1.0\t1.25\twell\n", "tsv").unwrap();
         assert_eq!((transcript.notes.len(), transcript.until(1.0).text.as_str()), (0, "so"));
         assert_eq!(transcript.until(1.1).text, "so well");
@@ -255,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_doubtful_is_noted() {
+    fn doubtful_times_are_noted() {
         let notes = |text: &str, ending: &str| parse(text, ending).unwrap().notes.join("; ");
         assert!(notes("0\t1\tso\n0.5\t2\twell\n", "tsv").contains("1 of 2 words begin before"));
         assert!(notes("1\t2\tso\n0.5\t0.9\twell\n", "tsv").contains("`well` at 0.50 s is said behind `so`"));
@@ -266,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hundred_thousand_words_are_read() {
+    fn reads_a_hundred_thousand_words() {
         let rows: String = (0..100_000).map(|n| format!("{}\t{}\tso\n", n, n + 1)).collect();
         assert_eq!(parse(&rows, "tsv").unwrap().words.len(), 100_000);
     }

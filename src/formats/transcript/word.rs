@@ -3,35 +3,39 @@
 use anyhow::{Result, ensure};
 use serde::{Deserialize, Serialize};
 
-/// Word with its time, seconds from the beginning of the sound.
+/// A word with its time in seconds from the start of the audio.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Word {
     pub word: String,
     pub start_secs: f64,
     pub end_secs: f64,
-    /// Where the times come from.
+    /// Origin of the times.
     pub source: WordSource,
-    /// How sure the word or its times are, 0..1; `None`: the transcript does not say.
+    /// Confidence in the word or its times, 0..1; `None` if the transcript has none.
     pub confidence: Option<f64>,
 }
 
-/// Where the times of a word come from.
+/// Origin of the times of a word.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum WordSource {
-    /// The transcript times the word.
+    /// Stated in the transcript.
     #[default]
     Given,
-    /// The time of a sentence, shared by its words in proportion to their letters.
+    /// Share of the time of a sentence, proportional to the number of characters.
     Shared,
-    /// Forced alignment of the text with the sound.
+    /// Forced alignment of the text with the audio.
     Aligned,
-    /// The time between two other words, shared by those that have none.
+    /// Interpolated between the neighbouring words with times.
     Interpolated,
 }
 
-/// Adds the words of `text`, said from `start_secs` to `end_secs`: one word has that time, several share it by their
-/// letters. `confidence` outside 0..1 is left out. Errors: times that are no span of a sound.
+/// Appends the words of `text`, spoken from `start_secs` to `end_secs`. Several words share the time in proportion to
+/// their number of characters. A `confidence` outside 0..1 is dropped.
+///
+/// # Errors
+///
+/// The times are not finite, negative or in the wrong order.
 pub fn push(
     words: &mut Vec<Word>,
     text: &str,
@@ -47,12 +51,12 @@ pub fn push(
     let confidence = confidence.filter(|confidence| (0.0..=1.0).contains(confidence));
     let n_letters: usize = text.split_whitespace().map(|word| word.chars().count()).sum();
     let secs = (end_secs - start_secs) / n_letters.max(1) as f64;
-    let is_one = text.split_whitespace().nth(1).is_none();
+    let is_single_word = text.split_whitespace().nth(1).is_none();
     let (mut n_before, mut at) = (0, start_secs);
     for word in text.split_whitespace() {
         n_before += word.chars().count();
         let until = if n_before == n_letters { end_secs } else { start_secs + secs * n_before as f64 };
-        let source = if is_one { WordSource::Given } else { WordSource::Shared };
+        let source = if is_single_word { WordSource::Given } else { WordSource::Shared };
         words.push(Word { word: word.to_owned(), start_secs: at, end_secs: until, source, confidence });
         at = until;
     }

@@ -1,5 +1,6 @@
-//! Look-up in a table of word vectors, by the rules of FineMotion's entry to GENEA 2020: lower case, a stop at the end
-//! stripped; index 0 is padding, a vector of zeros, index 1 an unknown word, a vector of ones. Memory: the words.
+//! Look-up in a table of word vectors, by the rules of FineMotion's entry to GENEA 2020: lower case, a final full
+//! stop removed; index 0 is padding, a vector of zeros, index 1 an unknown word, a vector of ones. Only the words are
+//! held in memory.
 
 use super::writer::{VECTORS, WORDS};
 use anyhow::{Context, Result, ensure};
@@ -15,17 +16,17 @@ use std::path::{Path, PathBuf};
 pub const PADDING: usize = 0;
 /// Index of a word without a vector.
 pub const UNKNOWN: usize = 1;
-/// Indices before the first word's.
+/// Number of indices before that of the first word.
 const N_SPECIAL: usize = 2;
-/// Most bytes of a header.
+/// Maximum size of the header, bytes.
 const MAX_HEADER_BYTES: u64 = 1 << 16;
 
-/// Open table of word vectors; threads may share it.
+/// An open table of word vectors; it can be shared between threads.
 #[derive(Debug)]
 pub struct WordVectors {
     path: PathBuf,
     file: File,
-    /// Offset of the first vector.
+    /// File offset of the first vector, bytes.
     at: u64,
     dim: usize,
     /// Row of each word.
@@ -33,7 +34,11 @@ pub struct WordVectors {
 }
 
 impl WordVectors {
-    /// Opens a table. Errors: a file that is none, is cut off or damaged.
+    /// Opens a table.
+    ///
+    /// # Errors
+    ///
+    /// The file is not a table of word vectors, or is truncated or damaged.
     pub fn open(path: &Path) -> Result<Self> {
         Self::read(path).with_context(|| format!("{} is no table of word vectors", path.display()))
     }
@@ -58,10 +63,10 @@ impl WordVectors {
         let data = 8 + length;
         let end = data + vectors.data_offsets.1.max(words.data_offsets.1) as u64;
         ensure!(end == bytes, "it has {bytes} bytes, its header says {end}: it is cut off or damaged");
-        let said = part(data + words.data_offsets.0 as u64, (words.data_offsets.1 - words.data_offsets.0) as u64)?;
-        let said = String::from_utf8(said).context("its words are no UTF-8")?;
-        let mut rows = HashMap::with_capacity(said.lines().count());
-        for (word, row) in said.lines().zip(0_u32..) {
+        let word_list = part(data + words.data_offsets.0 as u64, (words.data_offsets.1 - words.data_offsets.0) as u64)?;
+        let word_list = String::from_utf8(word_list).context("its words are no UTF-8")?;
+        let mut rows = HashMap::with_capacity(word_list.lines().count());
+        for (word, row) in word_list.lines().zip(0_u32..) {
             rows.entry(word.to_owned()).or_insert(row);
         }
         ensure!(rows.len() == n_words, "it has {} words and {n_words} vectors", rows.len());
@@ -69,7 +74,7 @@ impl WordVectors {
         Ok(Self { path: path.to_owned(), file, at, dim, rows })
     }
 
-    /// Numbers of a vector.
+    /// Dimension of the vectors.
     pub fn dim(&self) -> usize {
         self.dim
     }
@@ -79,17 +84,21 @@ impl WordVectors {
         self.rows.len()
     }
 
-    /// Index of a word as a transcript writes it; `UNKNOWN` without a vector. A word that is unknown with the punctuation
-    /// around it is looked up without.
+    /// Index of a word as written in a transcript; `UNKNOWN` if it has no vector. A word that is unknown with its
+    /// surrounding punctuation is looked up without it.
     pub fn index(&self, word: &str) -> usize {
         let word = word.trim().to_lowercase();
         let stripped = word.strip_suffix('.').filter(|rest| !rest.is_empty()).unwrap_or(&word);
-        let bare = stripped.trim_matches(|letter: char| !letter.is_alphanumeric());
+        let bare = stripped.trim_matches(|character: char| !character.is_alphanumeric());
         let row = self.rows.get(stripped).or_else(|| self.rows.get(bare));
         row.map_or(UNKNOWN, |row| N_SPECIAL + *row as usize)
     }
 
-    /// Vector of an index. Errors: no such index, a file that cannot be read.
+    /// Vector of an index.
+    ///
+    /// # Errors
+    ///
+    /// The index is out of range, or the file cannot be read.
     pub fn vector(&self, index: usize) -> Result<Vec<f32>> {
         let row = match index {
             PADDING => return Ok(vec![0.0; self.dim]),
@@ -103,7 +112,7 @@ impl WordVectors {
         Ok(bytes.as_chunks::<4>().0.iter().map(|number| f32::from_le_bytes(*number)).collect())
     }
 
-    /// Number of the words that have vectors.
+    /// Number of `words` that have vectors.
     pub fn n_known<'w>(&self, words: impl IntoIterator<Item = &'w str>) -> usize {
         words.into_iter().filter(|word| self.index(word) != UNKNOWN).count()
     }
@@ -114,7 +123,7 @@ mod tests {
     use super::super::glove;
     use super::*;
 
-    /// Table of a text of vectors.
+    /// Table converted from GloVe text.
     fn table(dir: &Path, text: &str) -> Result<WordVectors> {
         let path = dir.join("w.safetensors");
         glove::convert(text.as_bytes(), &path)?;
@@ -122,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn words_are_found_by_the_rules_of_the_paper() {
+    fn words_are_looked_up_as_in_the_paper() {
         let dir = tempfile::tempdir().unwrap();
         let table = table(dir.path(), "the 0.5 -1\nso 1e-3 2\n. 3 4\nu.s. 5 6\nthe 9 9\n").unwrap();
         assert_eq!((table.dim(), table.n_words()), (2, 4));
@@ -137,17 +146,17 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_cut_off_is_refused_wherever_it_is_cut() {
+    fn truncated_files_are_errors_and_damage_does_not_panic() {
         let dir = tempfile::tempdir().unwrap();
         drop(table(dir.path(), "the 0.5 -1\nso 1 2\n").unwrap());
         let path = dir.path().join("w.safetensors");
-        let whole = std::fs::read(&path).unwrap();
-        for end in 0..whole.len() {
-            std::fs::write(&path, &whole[..end]).unwrap();
+        let file_bytes = std::fs::read(&path).unwrap();
+        for end in 0..file_bytes.len() {
+            std::fs::write(&path, &file_bytes[..end]).unwrap();
             assert!(WordVectors::open(&path).is_err(), "{end}");
         }
         for at in (0..512).step_by(3) {
-            let mut bytes = whole.clone();
+            let mut bytes = file_bytes.clone();
             bytes[at] ^= 0x15;
             std::fs::write(&path, &bytes).unwrap();
             let _ = WordVectors::open(&path).map(|table| table.vector(2));

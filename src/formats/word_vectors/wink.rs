@@ -1,4 +1,4 @@
-//! JSON of the npm packages `wink-embeddings-*`: GloVe's vectors by word, each with its length and its number behind.
+//! JSON of the npm packages `wink-embeddings-*`: GloVe vectors by word, each followed by its norm and its index.
 
 use super::writer::TableWriter;
 use anyhow::{Context, Result};
@@ -7,8 +7,11 @@ use std::fmt;
 use std::io::Read;
 use std::path::Path;
 
-/// Writes the vectors of the JSON as the table `path`; the number of words. Memory: one vector, and the words. Errors:
-/// no such JSON; a vector with too few numbers.
+/// Converts the JSON to the table `path` and returns the number of words. Memory: one vector, and the words.
+///
+/// # Errors
+///
+/// The JSON has another structure; a vector with too few numbers.
 pub fn convert(json: impl Read, path: &Path) -> Result<usize> {
     let mut writer = None;
     let mut json = serde_json::Deserializer::from_reader(json);
@@ -75,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_json_of_the_package_becomes_a_table() {
+    fn package_json_is_converted_to_a_table() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("w.safetensors");
         let json = r#"{"precision": 8, "l2NormIndex": 2, "size": 2, "dimensions": 2, "words": ["the", "so"],

@@ -1,4 +1,4 @@
-//! Writer of a table of word vectors. Memory: the words.
+//! Writer of a table of word vectors. Only the words are held in memory.
 
 use anyhow::{Context, Result, ensure};
 use std::collections::BTreeSet;
@@ -6,13 +6,13 @@ use std::fs::File;
 use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
 
-/// Tensors of the file.
+/// Names of the tensors in the file.
 pub const VECTORS: &str = "vectors";
 pub const WORDS: &str = "words";
-/// Bytes of the length and the JSON before the tensors; the JSON is padded with spaces.
+/// Size of the length field and the JSON header before the tensors; the JSON is padded with spaces.
 const HEADER_BYTES: usize = 512;
 
-/// Writer of vectors of `dim` numbers in the order in which they come.
+/// Writer of vectors of dimension `dim`, in the order of the `push` calls.
 pub struct TableWriter {
     file: BufWriter<File>,
     dim: usize,
@@ -21,7 +21,7 @@ pub struct TableWriter {
 }
 
 impl TableWriter {
-    /// Begins the file `path`.
+    /// Creates the file `path`.
     pub fn new(path: &Path, dim: usize) -> Result<Self> {
         ensure!((1..=10_000).contains(&dim), "vectors of {dim} numbers: expected 1 to 10000");
         let file = File::create(path).with_context(|| format!("cannot write {}", path.display()))?;
@@ -30,13 +30,16 @@ impl TableWriter {
         Ok(Self { file, dim, words: String::new(), known: BTreeSet::new() })
     }
 
-    /// Numbers of a vector.
+    /// Dimension of the vectors.
     pub fn dim(&self) -> usize {
         self.dim
     }
 
-    /// Adds a word; the first vector of a word counts. Errors: a vector of another length or with a number that is not
-    /// finite, a word with a line break.
+    /// Adds a word; only the first vector of each word is used.
+    ///
+    /// # Errors
+    ///
+    /// The vector has another length or a non-finite number; the word is empty or contains a line break.
     pub fn push(&mut self, word: &str, vector: &[f32]) -> Result<()> {
         ensure!(vector.len() == self.dim, "`{word}` has {} numbers, the vectors have {}", vector.len(), self.dim);
         ensure!(vector.iter().all(|number| number.is_finite()), "`{word}` has a number that is not finite");
@@ -49,7 +52,11 @@ impl TableWriter {
         Ok(())
     }
 
-    /// Writes the words and the header; the number of words. Errors: no word.
+    /// Writes the words and the header, and returns the number of words.
+    ///
+    /// # Errors
+    ///
+    /// No word was added.
     pub fn finish(mut self) -> Result<usize> {
         let (n_words, dim) = (self.known.len(), self.dim);
         ensure!(n_words > 0, "it holds no word");

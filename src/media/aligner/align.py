@@ -1,11 +1,11 @@
-"""Forced alignment of an English text with its sound by pocketsphinx. Standard input: the number of words, then a line
-each: the word, and the seconds between which it may be said ("-": unknown); then the sound, 16 kHz, 16-bit mono.
-Standard output: an empty line when the modules are loaded, then a line a word, in order: start, end and confidence, or
-"-" where the word does not fit.
+"""Forced alignment of an English text with its audio by pocketsphinx. Standard input: the number of words, then one
+line per word: the word, and the range of seconds in which it may be spoken ("-": unknown); then the audio, 16 kHz,
+16-bit mono. Standard output: an empty line once the modules are loaded, then one line per word, in order: start, end
+and confidence, or "-" if the word does not fit.
 
-The sound is taken in pieces of half a minute, so that memory does not grow with it. In a piece the words that come next
-follow one another, or give way, at a price, to any row of phones, behind which any word may go on. The end of a piece
-is aligned again with the piece after it."""
+The audio is processed in chunks of half a minute, so that memory does not grow with its length. In a chunk, the next
+words follow each other or are interrupted, at a cost, by any sequence of phones, after which any of the words may
+follow. The end of a chunk is aligned again together with the next chunk."""
 import array
 import itertools
 import math
@@ -17,21 +17,22 @@ import unicodedata
 import pocketsphinx
 
 RATE, BYTES, FRAMES = 16_000, 32_000, 100
-# Seconds of a piece, of its end that is taken again, and of its end in which a word may be left for the next piece.
-PIECE_SECS, AGAIN_SECS, TAIL_SECS = 30, 2, 10
-# Words a second of the fastest speech, and of common speech; most words that are looked at in one piece.
-MAX_WORDS, COMMON_WORDS, MOST_WORDS = 6, 2.5, 300
-# Seconds by which a given time may be wrong.
+# Length of a chunk, of its end that is aligned again, and of its end in which words may be left to the next chunk,
+# seconds.
+CHUNK_SECS, OVERLAP_SECS, TAIL_SECS = 30, 2, 10
+# Words per second of the fastest and of typical speech; maximum number of words considered in one chunk.
+MAX_RATE, TYPICAL_RATE, MAX_WORDS = 6, 2.5, 300
+# Error of the given times, seconds.
 HINT_SECS = 5
-# Probabilities that stand for the price of a row of phones instead of words: each phone, its beginning, its end.
+# Probabilities that penalise a sequence of phones instead of words: each phone, its start, its end.
 PHONE, BEGIN, END = 1e-14, 1e-15, 1e-15
-# Words and seconds of a run that is believed although more words are passed over than the time before it can hold.
+# Words and seconds of a run that is accepted although it skips more words than fit into the time before it.
 RUN_WORDS, RUN_SECS = 4, 1.0
-# Fewest words that are believed between two rows of phones.
-ALONE_WORDS = 3
-# Cost a frame, in nats, of a word that fits wholly, and of one that fits no better than any phones.
-FITS, FITS_NOT = 3.0, 8.0
-# Sounds between words; the noises of the model take the place of words.
+# Minimum number of words accepted between two sequences of phones.
+MIN_ISOLATED_WORDS = 3
+# Cost per frame, in nats, of a word that fits perfectly, and of one that fits no better than arbitrary phones.
+GOOD_COST, BAD_COST = 3.0, 8.0
+# Fillers between words; the noise entries of the model would replace words.
 FILLERS = b"<s> SIL\n</s> SIL\n<sil> SIL\n"
 PHONES = """\
 AA AE AH AO AW AY B CH D DH EH ER EY F G HH IH IY JH K L M N NG OW OY P R S SH T TH UH UW V W Y Z ZH""".split()
@@ -53,7 +54,7 @@ SIGNS = {"%": "percent", "&": "and", "$": "dollars", "+": "plus", "@": "at"}
 
 
 def number(n, link=()):
-    """The words of a whole number below a billion; `link` stands behind hundreds."""
+    """The words of an integer below a billion; `link` follows the hundreds."""
     if n < 20:
         return [ONES[n]]
     if n < 100:
@@ -61,12 +62,12 @@ def number(n, link=()):
     for size, name in ((1_000_000, "million"), (1000, "thousand"), (100, "hundred")):
         if n >= size:
             rest = n % size
-            behind = [*(link if rest < 100 else ()), *number(rest, link)] if rest else []
-            return number(n // size, link) + [name] + behind
+            tail = [*(link if rest < 100 else ()), *number(rest, link)] if rest else []
+            return number(n // size, link) + [name] + tail
 
 
 def readings(digits, ending):
-    """Ways to say a number with an ending like "th", each a list of words."""
+    """Readings of a number with an ending such as "th", each a list of words."""
     n = int(digits)
     if len(digits) > 9 or (len(digits) > 1 and digits[0] == "0"):
         return [[ONES[int(digit)] for digit in digits]]
@@ -84,7 +85,7 @@ def readings(digits, ending):
 
 
 class Pronunciations:
-    """The dictionary of the model, and guesses for what is not in it."""
+    """The dictionary of the model, with guesses for words that it lacks."""
 
     def __init__(self, decoder):
         self.lookup = decoder.lookup_word
@@ -94,7 +95,7 @@ class Pronunciations:
         return [phones for phones in found if phones]
 
     def of(self, word):
-        """Rows of phones that a word of the text may have; none where it has no sound that is known."""
+        """Possible phone sequences of a word of the text; empty if its pronunciation is unknown."""
         word = word.lower().replace("\u2019", "'")
         word = "".join(letter for letter in unicodedata.normalize("NFKD", word) if not unicodedata.combining(letter))
         ways = []
@@ -126,8 +127,8 @@ class Pronunciations:
         return listed or [self.guess(re.sub(r"[^a-z]", "", part))]
 
     def guess(self, letters):
-        """Phones of a word that no dictionary holds: of the two words it is made of, of its letters where it has no
-        vowel, or of groups of letters."""
+        """Phones of a word that is not in the dictionary: as a compound of two words, as an abbreviation spelt out if
+        it has no vowel, or from groups of letters."""
         for at in range(len(letters) - 3, 2, -1):
             both = self.lookup(letters[:at]), self.lookup(letters[at:])
             if all(both):
@@ -147,7 +148,7 @@ class Pronunciations:
 
 class Aligner:
     def __init__(self, words, hints):
-        # The library reads the list of fillers from a file alone: one in memory.
+        # The library reads the list of fillers only from a file, so one is created in memory.
         fillers = os.memfd_create("fillers")
         os.write(fillers, FILLERS)
         self.decoder = pocketsphinx.Decoder(
@@ -157,7 +158,7 @@ class Aligner:
         pronunciations = Pronunciations(self.decoder)
         known = {word: pronunciations.of(word) for word in dict.fromkeys(words)}
         self.ways = [known[word] for word in words]
-        # Every word has names of its own, that its place in the text is known from them.
+        # Names unique to every word, from which its index in the text is known.
         for number, ways in enumerate(self.ways):
             for way, phones in enumerate(ways):
                 self.decoder.add_word(f"{number}_{way}", phones, False)
@@ -167,99 +168,99 @@ class Aligner:
         self.found = [None] * len(words)
 
     def window(self, first, at, secs, lost_secs):
-        """Numbers of the words that the sound from second `at` on may hold."""
-        numbers, most = [], min(MAX_WORDS * secs + COMMON_WORDS * lost_secs, MOST_WORDS)
+        """Indices of the words that may be spoken in `secs` seconds of audio from second `at` on."""
+        numbers, max_words = [], min(MAX_RATE * secs + TYPICAL_RATE * lost_secs, MAX_WORDS)
         for number in range(first, len(self.ways)):
             start, end = self.hints[number]
-            if len(numbers) >= most or (start is not None and start > at + secs + HINT_SECS):
+            if len(numbers) >= max_words or (start is not None and start > at + secs + HINT_SECS):
                 break
             if self.ways[number] and (end is None or end > at - HINT_SECS):
                 numbers.append(number)
         return numbers
 
-    def heard(self, numbers, sound, at):
-        """Number, start, end and cost a frame of the words that the sound holds, in the order of the text."""
+    def decode(self, numbers, sound, at):
+        """Index, start, end and cost per frame of the words found in the audio, in text order."""
         n = len(numbers)
-        row, behind, end = n + 1, n + 2, n + 3
+        phones, after, end = n + 1, n + 2, n + 3
         moves = [(k, k + 1, 1.0, f"{number}_{way}")
                  for k, number in enumerate(numbers) for way in range(len(self.ways[number]))]
         for k in range(n + 1):
-            moves += [(k, row, BEGIN), (behind, k, END), (k, end, 1.0)]
-        moves += [(row, behind, PHONE, f"+{phone}") for phone in PHONES] + [(behind, row, 1.0), (behind, end, 1.0)]
-        self.decoder.add_fsg("piece", self.decoder.create_fsg("piece", 0, end, moves))
-        self.decoder.activate_search("piece")
+            moves += [(k, phones, BEGIN), (after, k, END), (k, end, 1.0)]
+        moves += [(phones, after, PHONE, f"+{phone}") for phone in PHONES] + [(after, phones, 1.0), (after, end, 1.0)]
+        self.decoder.add_fsg("chunk", self.decoder.create_fsg("chunk", 0, end, moves))
+        self.decoder.activate_search("chunk")
         self.decoder.start_utt()
         self.decoder.process_raw(sound, full_utt=True)
         self.decoder.end_utt()
-        # Runs of words, with the number of rows of phones before each.
+        # Runs of words, with the number of filler phones before each.
         spans, n_rows = [], 0
         for part in self.decoder.seg() or []:
             name, _, way = part.word.partition("_")
             n_rows += name.startswith("+")
             if way:
                 frames = part.end_frame + 1 - part.start_frame
-                # Likelihoods are given as 1.0001 to a power, which is kept in 1024ths.
+                # Likelihoods are powers of 1.0001 whose exponents are stored in units of 1024.
                 cost = -1024 * math.log(max(part.ascore, 1e-300)) / frames
                 start = at + part.start_frame / FRAMES
                 spans.append((n_rows, (int(name), start, start + frames / FRAMES, cost)))
         runs = [(rows, [span for _, span in run]) for rows, run in itertools.groupby(spans, lambda pair: pair[0])]
-        sure = [run for rows, run in runs if len(run) >= ALONE_WORDS or rows in (0, n_rows)]
-        return in_order([span for run in sure for span in run])
+        accepted = [run for rows, run in runs if len(run) >= MIN_ISOLATED_WORDS or rows in (0, n_rows)]
+        return longest_ordered([span for run in accepted for span in run])
 
     def run(self, read):
-        """Aligns all words with the sound that `read` gives, a number of bytes at a time."""
+        """Aligns all words with the audio that `read` returns, called with a number of bytes."""
         sound, at, first, is_end, lost_secs = b"", 0.0, 0, False, 0.0
         while not is_end and first < len(self.ways):
-            more = read(PIECE_SECS * BYTES - len(sound))
-            is_end = len(sound) + len(more) < PIECE_SECS * BYTES
+            more = read(CHUNK_SECS * BYTES - len(sound))
+            is_end = len(sound) + len(more) < CHUNK_SECS * BYTES
             sound += more
-            piece = sound[:len(sound) // 2 * 2] if is_end else sound[:pause(sound)]
-            secs = len(piece) / BYTES
+            chunk = sound[:len(sound) // 2 * 2] if is_end else sound[:pause(sound)]
+            secs = len(chunk) / BYTES
             numbers = self.window(first, at, secs, lost_secs)
-            spans = self.heard(numbers, piece, at) if numbers and secs >= 0.1 else []
-            spans = believed(spans, first, at)
+            spans = self.decode(numbers, chunk, at) if numbers and secs >= 0.1 else []
+            spans = plausible(spans, first, at)
             until = at + secs
             if not is_end:
-                spans = [span for span in spans if span[2] <= until - AGAIN_SECS]
+                spans = [span for span in spans if span[2] <= until - OVERLAP_SECS]
             for number, start, end, cost in spans:
-                fit = (FITS_NOT - cost) / (FITS_NOT - FITS)
+                fit = (BAD_COST - cost) / (BAD_COST - GOOD_COST)
                 self.found[number] = (start, end, min(max(fit, 0.01), 1.0))
             first = spans[-1][0] + 1 if spans else first
-            end = max(spans[-1][2], until - TAIL_SECS) if spans else until - AGAIN_SECS
+            end = max(spans[-1][2], until - TAIL_SECS) if spans else until - OVERLAP_SECS
             lost_secs = 0.0 if spans else lost_secs + end - at
             step = max(bytes_of(end - at), 0)
             sound, at = sound[step:], at + step / BYTES
 
 
-def in_order(spans):
-    """The spans that go on in the order of the text and last longest together."""
+def longest_ordered(spans):
+    """The spans in text order with the longest total duration."""
     best = []
     for n, (number, start, end, _) in enumerate(spans):
         before = max((m for m in range(n) if spans[m][0] < number), key=lambda m: best[m][0], default=None)
         best.append(((best[before][0] if before is not None else 0.0) + end - start, before))
     at = max(range(len(best)), key=lambda n: best[n][0], default=None)
-    kept = []
+    accepted = []
     while at is not None:
-        kept.append(spans[at])
+        accepted.append(spans[at])
         at = best[at][1]
-    return kept[::-1]
+    return accepted[::-1]
 
 
-def believed(spans, first, at):
-    """The spans without short runs that pass over more words than can be said in the time before them."""
-    kept, last, next_number = [], at, first
+def plausible(spans, first, at):
+    """The spans without short runs that skip more words than can be spoken in the time before them."""
+    accepted, last, next_number = [], at, first
     for _, run in itertools.groupby(enumerate(spans), lambda pair: pair[1][0] - pair[0]):
         run = [span for _, span in run]
-        passed = run[0][0] - next_number
-        if passed > MAX_WORDS * (run[0][1] - last) + 2 and (len(run) < RUN_WORDS or run[-1][2] - run[0][1] < RUN_SECS):
+        skipped = run[0][0] - next_number
+        if skipped > MAX_RATE * (run[0][1] - last) + 2 and (len(run) < RUN_WORDS or run[-1][2] - run[0][1] < RUN_SECS):
             continue
-        kept += run
+        accepted += run
         last, next_number = run[-1][2], run[-1][0] + 1
-    return kept
+    return accepted
 
 
 def pause(sound):
-    """Bytes up to the quietest moment of the last third."""
+    """Number of bytes before the quietest moment of the last third."""
     samples, step = array.array("h", sound), RATE // 10
     starts = range(2 * len(samples) // 3, len(samples) - step, step // 2)
     return 2 * (min(starts, key=lambda at: sum(map(abs, samples[at:at + step]))) + step // 2)
@@ -276,7 +277,7 @@ def main():
     hints = [tuple(None if secs == "-" else float(secs) for secs in row[1:]) for row in rows]
     aligner = Aligner([row[0] for row in rows], hints)
     aligner.run(source.read)
-    # What is left of the sound is taken, so that its writer can end.
+    # The remaining audio is read, so that its writer does not block.
     while source.read(1 << 20):
         pass
     for found in aligner.found:

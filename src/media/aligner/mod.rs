@@ -1,4 +1,4 @@
-//! Forced alignment by the Python package `pocketsphinx`, in a process of its own. `align.py` is what that process runs.
+//! Forced alignment with the Python package `pocketsphinx` in a subprocess, which runs `align.py`.
 
 pub mod program;
 

@@ -1,4 +1,4 @@
-//! The process that aligns: started, fed with words and sound, asked for times.
+//! The subprocess for forced alignment: starting it, sending words and audio, and reading the times.
 
 use anyhow::{Context, Result, bail, ensure};
 use orator_base::foreign_program::{command_in, empty_folder};
@@ -7,21 +7,22 @@ use std::io::{ErrorKind, Read as _, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-/// What the interpreter runs, given on its command line.
-const DRIVER: &str = include_str!("align.py");
-/// Version of the package that the driver is written for.
+/// Program passed to the interpreter on its command line.
+const PROGRAM: &str = include_str!("align.py");
+/// Package version for which the program is written.
 const VERSION: &str = "5.1.1";
-/// The package's version, or an error.
-const ASK: &str = "import os, pocketsphinx, importlib.metadata as m; os.memfd_create; print(m.version('pocketsphinx'))";
+/// Prints the package version, or fails.
+const PRINT_VERSION: &str =
+    "import os, pocketsphinx, importlib.metadata as m; os.memfd_create; print(m.version('pocketsphinx'))";
 
-/// Word of a text, and the seconds between which it may be said, where they are known.
+/// A word of a text, and the range of seconds in which it may be spoken, if known.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpokenWord {
     pub word: String,
     pub within: Option<(f64, f64)>,
 }
 
-/// Seconds from the beginning of the sound, and how well the word fits, above 0 up to 1.
+/// Times of a word in seconds from the start of the audio, and its confidence (0, 1].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AlignedWord {
     pub start_secs: f64,
@@ -29,21 +30,24 @@ pub struct AlignedWord {
     pub confidence: f64,
 }
 
-/// A started process that waits for words and sound.
+/// A running subprocess that waits for words and audio.
 pub struct Aligner {
     process: Child,
     python: PathBuf,
 }
 
 impl Aligner {
-    /// Version of the package, as the interpreter `python` finds it. Errors: no such interpreter, or no package; the
-    /// message says how to get both.
+    /// Version of the package found by the interpreter `python`.
+    ///
+    /// # Errors
+    ///
+    /// The interpreter or the package is missing; the message explains how to install both.
     pub fn version(python: &Path) -> Result<String> {
         let name = python.display();
         let remedy = remedy();
         let folder = empty_folder()?;
-        let asked = isolated(python, ASK, folder.path())?.stdin(Stdio::null()).output();
-        let output = match asked {
+        let queried = isolated(python, PRINT_VERSION, folder.path())?.stdin(Stdio::null()).output();
+        let output = match queried {
             Ok(output) => output,
             Err(error) if error.kind() == ErrorKind::NotFound => bail!("there is no Python `{name}`: {remedy}"),
             Err(error) => return Err(error).with_context(|| format!("cannot run {name}: {remedy}")),
@@ -57,21 +61,25 @@ impl Aligner {
         Ok(version)
     }
 
-    /// Starts the process by the interpreter `python`. Errors: as of `version`.
+    /// Starts the subprocess with the interpreter `python`. Errors as [`Self::version`].
     pub fn start(python: &Path) -> Result<Self> {
         Self::version(python)?;
         let folder = empty_folder()?;
-        let mut command = isolated(python, DRIVER, folder.path())?;
+        let mut command = isolated(python, PROGRAM, folder.path())?;
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut process = command.spawn().with_context(|| format!("cannot run {}", python.display()))?;
-        // The driver's first byte reports that its modules are loaded: the folder can be removed, before this process may
-        // restrict itself. Without that byte the process has ended, which `align` reports.
+        // The program's first byte reports that its modules are loaded, so that the folder can be removed before this
+        // process restricts itself. Without that byte the subprocess has ended, which `align` reports.
         let _ = process.stdout.as_mut().map(|stdout| stdout.read_exact(&mut [0]));
         Ok(Self { process, python: python.to_owned() })
     }
 
-    /// Times of the words in a sound, `None` where a word does not fit. `feed` gets what takes the sound: pieces of mono
-    /// samples in -1..1 at 16 kHz. Errors: of `feed`; a process that ended too early, with what it said.
+    /// Aligns words with audio; `None` for a word that does not fit. `feed` is called with a function that takes
+    /// chunks of mono samples in -1..1 at 16 kHz.
+    ///
+    /// # Errors
+    ///
+    /// Those of `feed`; a subprocess that ended early, with the last line of its error output.
     pub fn align(
         mut self,
         words: &[SpokenWord],
@@ -80,18 +88,18 @@ impl Aligner {
         let mut pipe = self.process.stdin.take().context("the aligner has no input")?;
         let header = header(words);
         let mut bytes = Vec::new();
-        let fed = pipe.write_all(header.as_bytes()).map_err(anyhow::Error::from).and_then(|()| {
-            feed(&mut |piece| {
+        let sent = pipe.write_all(header.as_bytes()).map_err(anyhow::Error::from).and_then(|()| {
+            feed(&mut |chunk| {
                 bytes.clear();
-                let levels = piece.iter().map(|sample| (sample.clamp(-1.0, 1.0) * 32_767.0).round() as i16);
+                let levels = chunk.iter().map(|sample| (sample.clamp(-1.0, 1.0) * 32_767.0).round() as i16);
                 bytes.extend(levels.flat_map(i16::to_le_bytes));
                 Ok(pipe.write_all(&bytes)?)
             })
         });
         drop(pipe);
-        let is_gone = |error: &std::io::Error| error.kind() == ErrorKind::BrokenPipe;
-        if let Err(error) = fed
-            && !error.downcast_ref::<std::io::Error>().is_some_and(is_gone)
+        let is_broken_pipe = |error: &std::io::Error| error.kind() == ErrorKind::BrokenPipe;
+        if let Err(error) = sent
+            && !error.downcast_ref::<std::io::Error>().is_some_and(is_broken_pipe)
         {
             let _ = self.process.kill();
             let _ = self.process.wait();
@@ -105,21 +113,22 @@ impl Aligner {
             output.status,
             last_line(&output.stderr)
         );
-        let said = String::from_utf8_lossy(&output.stdout);
-        let times: Vec<_> = said.lines().map(times).collect::<Result<_>>()?;
+        let output_text = String::from_utf8_lossy(&output.stdout);
+        let times: Vec<_> = output_text.lines().map(times).collect::<Result<_>>()?;
         ensure!(times.len() == words.len(), "the aligner gave {} words of {}", times.len(), words.len());
         Ok(times)
     }
 }
 
-/// Python in isolated mode (no variables PYTHON*, no user site, no module of the working directory), in an empty folder.
+/// Python command in isolated mode (no PYTHON* variables, no user site, no modules from the working directory), in an
+/// empty folder.
 fn isolated(python: &Path, code: &str, folder: &Path) -> Result<Command> {
     let mut command = command_in(folder, python)?;
     command.args(["-I", "-c", code]);
     Ok(command)
 }
 
-/// What gets the package, and how its interpreter is named.
+/// Instructions for installing the package and naming its interpreter.
 fn remedy() -> String {
     format!(
         "make one with `python3 -m venv aligner && aligner/bin/pip install pocketsphinx=={VERSION}`, and name it with \
@@ -127,11 +136,11 @@ fn remedy() -> String {
     )
 }
 
-/// Words for the process: their number, then a line each.
+/// Input for the subprocess: the number of words, then one word per line.
 fn header(words: &[SpokenWord]) -> String {
     let mut header = format!("{}\n", words.len());
     for SpokenWord { word, within } in words {
-        // A word has no blanks within; other control characters are no part of it.
+        // Words contain no spaces; other control characters are removed.
         let word = word.replace(char::is_control, "");
         let _ = match within {
             Some((from, until)) => writeln!(header, "{word}\t{from}\t{until}"),
@@ -150,8 +159,14 @@ fn times(line: &str) -> Result<Option<AlignedWord>> {
     }
 }
 
-fn last_line(said: &[u8]) -> String {
-    String::from_utf8_lossy(said).lines().rev().map(str::trim).find(|line| !line.is_empty()).unwrap_or("").to_owned()
+fn last_line(output_text: &[u8]) -> String {
+    String::from_utf8_lossy(output_text)
+        .lines()
+        .rev()
+        .map(str::trim)
+        .find(|line| !line.is_empty())
+        .unwrap_or("")
+        .to_owned()
 }
 
 #[cfg(test)]
@@ -159,7 +174,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_and_times_cross_the_pipe_as_lines() {
+    fn words_and_times_are_exchanged_as_lines() {
         let words = [("so\u{7}", None), ("well", Some((0.5, 2.0)))];
         let words = words.map(|(word, within)| SpokenWord { word: word.to_owned(), within });
         assert_eq!(header(&words), "2\nso\t-\t-\nwell\t0.5\t2\n");
@@ -169,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn an_interpreter_that_is_not_there_is_named_with_the_remedy() {
+    fn missing_interpreter_is_reported_with_the_remedy() {
         let error = Aligner::version(Path::new("/nowhere/python")).unwrap_err().to_string();
         assert!(error.contains("/nowhere/python") && error.contains("pocketsphinx==5.1.1"), "{error}");
     }

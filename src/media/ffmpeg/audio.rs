@@ -1,41 +1,42 @@
-//! The sound of a file as mono at one rate, on the clock of its pictures: sample k belongs to second k / rate after
-//! the first picture. Sound before that is cut, a late start and gaps in the container are silence. A file without
-//! pictures starts with its first sample. Sound more than ten minutes after the sound before it, or beyond a day, is
-//! left out as damage.
+//! Audio of a file as mono at one rate, on the clock of its images: sample k is at k / rate seconds after the first
+//! image. Earlier audio is cut; a late start and gaps in the container become silence. A file without images starts
+//! with its first sample. Audio more than ten minutes after the preceding audio, or beyond a day, is dropped as
+//! damaged.
 
 use super::decode::StreamDecoder;
 use super::origin;
 use super::resample::{Resampler, SoundFormat, first_not_finite, format_of};
-use super::source::{self, LONGEST_GAP_SECS, LONGEST_SECS, UnreadableMedia};
+use super::source::{self, MAX_GAP_SECS, MAX_SECS, UnreadableMedia};
 use anyhow::{Context, Result, bail};
 use ffmpeg_next::format::{Sample, sample};
 use ffmpeg_next::{ChannelLayout, frame};
 use orator_base::types::sound::{AudioTracks, SAMPLE_RATE, Sound};
 use std::path::Path;
 
-/// Difference between timestamp and sample count that is a gap, seconds: less than a lost frame of any codec, more than
-/// the rounding of any container.
+/// Difference between timestamp and sample count that counts as a gap, seconds: less than a lost frame of any codec,
+/// more than the rounding of any container.
 const GAP_SECS: f64 = 0.015;
-/// Timestamps that wander away from the count of samples, as where a clock ran slow, are followed: where their mean
-/// distance over `MEAN_SECS` is more than the rounding of a container, the next `STRETCH_SECS` are stretched by it.
+/// Drift of the timestamps relative to the sample count, for instance from a slow clock, is followed: if the mean
+/// difference over `MEAN_SECS` exceeds `ROUNDING_SECS`, the rounding of containers, the next `STRETCH_SECS` are
+/// stretched by it.
 const MEAN_SECS: f64 = 1.0;
 const ROUNDING_SECS: f64 = 0.0005;
 const STRETCH_SECS: f64 = 1.0;
-/// Samples that are brought to another rate at once.
-const PIECE: usize = 65_536;
+/// Number of samples resampled at once.
+const CHUNK: usize = 65_536;
 
-/// The whole sound of `path` (wav, flac, mp3, a video, ...) as mono at `rate` samples a second; `None` when it has no
-/// sound.
+/// All audio of `path` (wav, flac, mp3, a video, ...) as mono at `rate` samples per second; `None` if it has no
+/// audio.
 pub fn read_mono(path: &Path, rate: u32) -> Result<Option<Sound>> {
     let mut samples = Vec::new();
-    let streamed = stream_mono(path, 0, rate, &mut |piece| {
-        samples.extend_from_slice(piece);
+    let streamed = stream_mono(path, 0, rate, &mut |chunk| {
+        samples.extend_from_slice(chunk);
         Ok(())
     })?;
     Ok(streamed.map(|_| Sound { rate, samples }))
 }
 
-/// A sound at another rate, as long as before. What lies above half the lower rate is not in it.
+/// Resamples a sound to `rate` with unchanged duration; frequencies above half the lower rate are removed.
 pub fn at_rate(sound: &Sound, rate: u32) -> Result<Sound> {
     if sound.rate == rate {
         return Ok(sound.clone());
@@ -43,17 +44,21 @@ pub fn at_rate(sound: &Sound, rate: u32) -> Result<Sound> {
     let sample = Sample::F32(sample::Type::Packed);
     let mut resampler = Resampler::new(SoundFormat { sample, layout: ChannelLayout::MONO, rate: sound.rate }, rate)?;
     let mut samples = Vec::new();
-    for piece in sound.samples.chunks(PIECE) {
-        let mut frame = frame::Audio::new(sample, piece.len(), ChannelLayout::MONO);
+    for chunk in sound.samples.chunks(CHUNK) {
+        let mut frame = frame::Audio::new(sample, chunk.len(), ChannelLayout::MONO);
         frame.set_rate(sound.rate);
-        frame.plane_mut::<f32>(0).copy_from_slice(piece);
+        frame.plane_mut::<f32>(0).copy_from_slice(chunk);
         resampler.push(&frame, &mut samples)?;
     }
     resampler.finish(&mut samples)?;
     Ok(Sound { rate, samples })
 }
 
-/// The whole sound of `path` as mono at 16 kHz. Errors: `UnreadableMedia` where there is none, or none that decodes.
+/// All audio of `path` as mono at 16 kHz.
+///
+/// # Errors
+///
+/// [`UnreadableMedia`] if the file does not exist or has no audio that decodes.
 pub fn read_sound(path: &Path) -> Result<Sound> {
     let name = path.display();
     let unreadable = |problem| Err(UnreadableMedia(problem).into());
@@ -66,19 +71,23 @@ pub fn read_sound(path: &Path) -> Result<Sound> {
     }
 }
 
-/// Totals of `stream_mono`.
+/// Summary of a [`stream_mono`] call.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StreamedSound {
-    /// Length in seconds.
+    /// Length of the audio, seconds.
     pub secs: f64,
-    /// Track that was read, and the others.
+    /// The track that was read, and the available ones.
     pub tracks: AudioTracks,
-    /// Sentence about what was left out.
+    /// Note on audio that was dropped.
     pub damage: Option<String>,
 }
 
-/// Decodes the sound track `track` of `path` (from 1; 0: the automatic choice) and hands it to `sink` piece by piece;
-/// `None` without sound. A sample that is no number is an error that names its second.
+/// Decodes the audio track `track` of `path` (from 1; 0: automatic choice) and passes it to `sink` in chunks; `None`
+/// without audio.
+///
+/// # Errors
+///
+/// The file or track cannot be read or decoded, or a sample is not finite; the message gives its time.
 pub fn stream_mono(
     path: &Path,
     track: usize,
@@ -103,9 +112,9 @@ pub fn stream_mono(
         source::check_rate(path, frame.rate())?;
         let at = frame.timestamp().map(|ticks| ticks as f64 * secs_per_tick);
         let zero = *zero_secs.get_or_insert(at.unwrap_or(0.0));
-        // A time far beyond the file's stated end is broken; the sound continues without a gap.
+        // A time far beyond the stated end of the file is invalid; the audio continues without a gap.
         let at = at.map(|at| at - zero).filter(|at| *at < latest_secs);
-        if timeline.reaches(at) {
+        if timeline.is_plausible_time(at) {
             n_frames += 1;
             if let Some(sample_idx) = first_not_finite(&frame) {
                 let secs = at.unwrap_or(timeline.end_secs()) + sample_idx as f64 / f64::from(frame.rate());
@@ -130,7 +139,7 @@ pub fn stream_mono(
     Ok(Some(StreamedSound { secs: timeline.n_written as f64 / f64::from(rate), tracks, damage }))
 }
 
-/// Difference of timestamps and sample count.
+/// Accumulated difference between timestamps and sample count.
 #[derive(Default)]
 struct ClockDrift {
     sum: f64,
@@ -138,9 +147,10 @@ struct ClockDrift {
 }
 
 impl ClockDrift {
-    /// Adds a frame of `secs` whose timestamp is `ahead` seconds late; returns the mean at the end of each `MEAN_SECS`.
-    fn mean(&mut self, ahead: f64, secs: f64) -> Option<f64> {
-        self.sum += ahead * secs;
+    /// Adds a frame of `secs` whose timestamp is `drift` seconds late; returns the mean difference after each
+    /// `MEAN_SECS`.
+    fn mean(&mut self, drift: f64, secs: f64) -> Option<f64> {
+        self.sum += drift * secs;
         self.secs += secs;
         let mean = (self.secs >= MEAN_SECS).then(|| self.sum / self.secs);
         if mean.is_some() {
@@ -150,51 +160,51 @@ impl ClockDrift {
     }
 }
 
-/// Placement of continuous runs of sound in time.
+/// Places continuous runs of audio on the timeline.
 struct SoundTimeline<'a> {
     rate: u32,
     n_written: u64,
-    /// Samples at the start of the run that are before time 0 or repeated.
+    /// Samples to skip at the start of the run, because they are before time 0 or already written.
     n_skip: u64,
-    /// Current run, and its start in seconds.
+    /// Current run, and its start time in seconds.
     run: Option<(Resampler, f64)>,
-    ahead: ClockDrift,
+    drift: ClockDrift,
     ready: Vec<f32>,
     sink: &'a mut dyn FnMut(&[f32]) -> Result<()>,
 }
 
 impl<'a> SoundTimeline<'a> {
     fn new(rate: u32, sink: &'a mut dyn FnMut(&[f32]) -> Result<()>) -> Self {
-        Self { rate, n_written: 0, n_skip: 0, run: None, ahead: ClockDrift::default(), ready: Vec::new(), sink }
+        Self { rate, n_written: 0, n_skip: 0, run: None, drift: ClockDrift::default(), ready: Vec::new(), sink }
     }
 
-    /// Second at which the sound so far ends.
+    /// End time of the audio so far, seconds.
     fn end_secs(&self) -> f64 {
         let written = self.n_written as f64 / f64::from(self.rate);
         self.run.as_ref().map_or(written, |(run, start)| start + run.secs())
     }
 
-    /// Whether sound at second `at` is close enough to the sound before it, and before the last plausible second.
-    fn reaches(&self, at: Option<f64>) -> bool {
+    /// Whether audio at `at` seconds is close enough to the preceding audio and before the maximum length.
+    fn is_plausible_time(&self, at: Option<f64>) -> bool {
         let end = self.end_secs();
         let at = at.unwrap_or(end);
-        at - end.max(0.0) <= LONGEST_GAP_SECS && at < LONGEST_SECS
+        at - end.max(0.0) <= MAX_GAP_SECS && at < MAX_SECS
     }
 
-    /// Sound that starts at second `at`; without a time it goes on where the sound before it ended.
+    /// Adds a frame that starts at `at` seconds; without a time it continues where the preceding audio ended.
     fn push(&mut self, at: Option<f64>, frame: &frame::Audio) -> Result<()> {
         let format = format_of(frame);
         let end = self.end_secs();
         let at = at.unwrap_or(end);
-        let goes_on = self.run.is_some() && (at - end).abs() <= GAP_SECS;
-        if !goes_on || self.run.as_ref().is_none_or(|(run, _)| run.format() != format) {
+        let continues = self.run.is_some() && (at - end).abs() <= GAP_SECS;
+        if !continues || self.run.as_ref().is_none_or(|(run, _)| run.format() != format) {
             self.end_run()?;
-            self.begin_run(Resampler::new(format, self.rate)?, at)?;
+            self.start_run(Resampler::new(format, self.rate)?, at)?;
         }
         if let Some((run, _)) = &mut self.run {
-            if goes_on
-                && run.is_even()
-                && let Some(mean) = self.ahead.mean(at - end, frame.samples() as f64 / f64::from(frame.rate()))
+            if continues
+                && run.is_unstretched()
+                && let Some(mean) = self.drift.mean(at - end, frame.samples() as f64 / f64::from(frame.rate()))
                 && mean.abs() > ROUNDING_SECS
             {
                 run.stretch(mean, STRETCH_SECS)?;
@@ -204,14 +214,14 @@ impl<'a> SoundTimeline<'a> {
         self.deliver()
     }
 
-    fn begin_run(&mut self, run: Resampler, at: f64) -> Result<()> {
-        let place = (at * f64::from(self.rate)).round() as i64;
-        let late = place.saturating_sub(i64::try_from(self.n_written)?);
-        self.n_skip = late.min(0).unsigned_abs();
+    fn start_run(&mut self, run: Resampler, at: f64) -> Result<()> {
+        let start_sample = (at * f64::from(self.rate)).round() as i64;
+        let delay = start_sample.saturating_sub(i64::try_from(self.n_written)?);
+        self.n_skip = delay.min(0).unsigned_abs();
         self.run = Some((run, at));
-        self.ahead = ClockDrift::default();
+        self.drift = ClockDrift::default();
         const SILENCE: [f32; 4096] = [0.0; 4096];
-        let mut n_silent = late.max(0) as u64;
+        let mut n_silent = delay.max(0) as u64;
         while n_silent > 0 {
             let n = n_silent.min(SILENCE.len() as u64);
             (self.sink)(&SILENCE[..n as usize])?;
@@ -246,14 +256,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_jump_in_time_is_believed_up_to_ten_minutes_and_a_day() {
+    fn time_jumps_are_limited_to_ten_minutes_and_a_day() {
         let mut sink = |_: &[f32]| Ok(());
         let mut timeline = SoundTimeline { n_written: 50, ..SoundTimeline::new(10, &mut sink) };
-        let reaches =
-            |timeline: &SoundTimeline| [None, Some(-1e12), Some(604.0), Some(606.0)].map(|at| timeline.reaches(at));
-        assert_eq!(reaches(&timeline), [true, true, true, false]);
+        let is_plausible_time = |timeline: &SoundTimeline| {
+            [None, Some(-1e12), Some(604.0), Some(606.0)].map(|at| timeline.is_plausible_time(at))
+        };
+        assert_eq!(is_plausible_time(&timeline), [true, true, true, false]);
         timeline.n_written = 864_000;
-        assert_eq!(reaches(&timeline), [false, true, true, true]);
-        assert!(!timeline.reaches(Some(f64::NAN)));
+        assert_eq!(is_plausible_time(&timeline), [false, true, true, true]);
+        assert!(!timeline.is_plausible_time(Some(f64::NAN)));
     }
 }

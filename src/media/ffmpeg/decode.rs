@@ -1,14 +1,14 @@
-//! Decoder of one stream, frame by frame with presentation times. Broken packets are counted and skipped.
+//! Decodes one stream frame by frame, with presentation times. Broken packets are counted and skipped.
 
 use anyhow::{Context, Result};
 use ffmpeg_next as ffmpeg;
 use ffmpeg_next::{Frame, Packet, Rational, codec, decoder, format, media};
 use std::path::{Path, PathBuf};
 
-/// Most pixels of a picture, twice those of 8K; a header of a few bytes may claim any number.
-pub const MOST_PIXELS: i64 = 1 << 26;
+/// Maximum number of pixels of an image, twice that of 8K; a short header may claim any size.
+pub const MAX_PIXELS: i64 = 1 << 26;
 
-/// Decoder with its position in the file.
+/// Decoder with its open input.
 pub(crate) struct StreamDecoder {
     path: PathBuf,
     input: format::context::Input,
@@ -22,8 +22,8 @@ pub(crate) struct StreamDecoder {
 }
 
 impl StreamDecoder {
-    /// A decoder of `input`'s stream `stream_idx`; `threads` decoder threads (0: one a core). The other streams are
-    /// not read.
+    /// Creates a decoder of stream `stream_idx` with `threads` threads (0: one per core). The other streams are not
+    /// read.
     pub(crate) fn new(
         path: &Path,
         mut input: format::context::Input,
@@ -32,7 +32,7 @@ impl StreamDecoder {
     ) -> Result<Self> {
         for idx in 0..input.nb_streams() as usize {
             if idx != stream_idx {
-                // SAFETY: idx is below nb_streams, and the context is ours alone.
+                // SAFETY: idx is below nb_streams, and the context is owned here.
                 unsafe {
                     (**(*input.as_mut_ptr()).streams.add(idx)).discard = ffmpeg::ffi::AVDiscard::AVDISCARD_ALL;
                 }
@@ -46,8 +46,8 @@ impl StreamDecoder {
         let open = || -> Result<decoder::Opened, ffmpeg::Error> {
             let mut context = codec::Context::from_parameters(parameters)?;
             context.set_threading(codec::threading::Config::count(threads));
-            // SAFETY: the context is ours and not open yet.
-            unsafe { (*context.as_mut_ptr()).max_pixels = MOST_PIXELS };
+            // SAFETY: the context is owned here and not open yet.
+            unsafe { (*context.as_mut_ptr()).max_pixels = MAX_PIXELS };
             let mut decoder = context.decoder();
             decoder.set_packet_time_base(time_base);
             decoder.open_as(decoder::find(id).ok_or(ffmpeg::Error::DecoderNotFound)?)
@@ -58,12 +58,12 @@ impl StreamDecoder {
         Ok(Self { path, input, stream_idx, decoder, time_base, draining: false, n_bad: 0, n_flawed: 0, stopped: None })
     }
 
-    /// Seconds of one tick of the stream's clock, as a fraction (numerator, denominator).
+    /// Duration of one tick of the stream's clock, seconds, as a fraction.
     pub(crate) fn time_base(&self) -> Rational {
         self.time_base
     }
 
-    /// The next decoded frame into `frame`, in the order of presentation; false at the end.
+    /// Decodes the next frame into `frame`, in presentation order; false at the end.
     pub(crate) fn next(&mut self, frame: &mut Frame) -> Result<bool> {
         loop {
             match self.decoder.receive_frame(frame) {
@@ -78,7 +78,7 @@ impl StreamDecoder {
                     }
                 }
                 Err(error) if is_out_of_memory(error) => return self.fail(error),
-                // The decoder's last frames are broken; those before are valid.
+                // The remaining frames in the decoder are broken; the earlier ones are valid.
                 Err(_) if self.draining && self.n_bad > 1000 => return Ok(false),
                 Err(_) => self.n_bad += 1,
             }
@@ -88,10 +88,10 @@ impl StreamDecoder {
         }
     }
 
-    /// Goes back or forth to the last place at or before `ticks` of the stream's clock from which decoding can begin, as far
-    /// as the container knows. The frames that come next may be those of another place, or flawed.
+    /// Seeks to the last point at or before `ticks` of the stream's clock at which decoding can start, as far as the
+    /// container knows. The next frames may be from another position, or flawed.
     pub(crate) fn seek(&mut self, ticks: i64) -> Result<()> {
-        // SAFETY: the context is ours alone, and the stream is one of its streams.
+        // SAFETY: the context is owned here, and the stream is one of its streams.
         let code = unsafe {
             ffmpeg::ffi::av_seek_frame(
                 self.input.as_mut_ptr(),
@@ -109,7 +109,7 @@ impl StreamDecoder {
         Ok(())
     }
 
-    /// Passes the next packet to the decoder, or the end of the stream.
+    /// Passes the next packet, or the end of the stream, to the decoder.
     fn feed(&mut self) -> Result<()> {
         let mut packet = Packet::empty();
         match packet.read(&mut self.input) {
@@ -131,7 +131,7 @@ impl StreamDecoder {
         Ok(())
     }
 
-    /// Lack of memory is no damage of the file: the same file must not give fewer frames on a smaller machine.
+    /// Out of memory is an error rather than damage: the same file must not yield fewer frames on a smaller machine.
     fn fail<T>(&self, error: ffmpeg::Error) -> Result<T> {
         Err(error).with_context(|| format!("cannot decode {}", self.path.display()))
     }

@@ -1,6 +1,6 @@
-//! Filters of libavfilter, run on the caller's thread alone: deinterlacing (`yadif`, which leaves
-//! no combs of a drawn clip where `bwdif` leaves 5 %), and tone mapping of HDR (ITU-R BT.2100)
-//! to SDR by `zscale` and `tonemap`, with the reference white of BT.2408 as 1.
+//! libavfilter filters, run on the calling thread only: deinterlacing with `yadif` (it leaves no combing in an
+//! animated clip, `bwdif` leaves 5 %), and tone mapping of HDR (ITU-R BT.2100) to SDR with `zscale` and `tonemap`,
+//! where 1 is the reference white of BT.2408.
 
 use anyhow::{Context, Result, ensure};
 use ffmpeg_next::format::Pixel;
@@ -8,19 +8,19 @@ use ffmpeg_next::{Error, color, ffi, filter, frame};
 
 /// Luminance of the reference white, cd/m2.
 const WHITE: f64 = 203.0;
-/// Share of the reference white up to which light is unchanged; brighter light is compressed toward 1.
+/// Fraction of the reference white up to which luminance is unchanged; brighter light is compressed towards 1.
 const KNEE: f64 = 0.8;
-/// Least side of a picture whose planes are all large enough for `yadif`.
-const LEAST_PX: u32 = 16;
+/// Minimum side of an image for which all planes are large enough for `yadif`.
+const MIN_SIDE_PX: u32 = 16;
 
-/// A chain of filters between a source and a sink of frames.
+/// A filter chain between a frame source and a sink.
 struct FilterGraph(filter::Graph);
 
 impl FilterGraph {
     fn new(format: Pixel, [width, height]: [u32; 2], chain: &str) -> Result<Self> {
         let open = || -> Result<filter::Graph, Error> {
             let mut graph = filter::Graph::new();
-            // SAFETY: the graph is ours and has no filter yet.
+            // SAFETY: the graph is owned here and has no filter yet.
             unsafe { (*graph.as_mut_ptr()).nb_threads = 1 };
             let [source, sink] = ["buffer", "buffersink"].map(|name| filter::find(name).ok_or(Error::FilterNotFound));
             let number = ffi::AVPixelFormat::from(format) as i32;
@@ -34,10 +34,11 @@ impl FilterGraph {
         Ok(Self(open().with_context(|| format!("libavfilter cannot run `{chain}` on {format:?} pictures"))?))
     }
 
-    /// Passes a frame to the chain; `None`: the end.
+    /// Passes a frame to the chain; `None` marks the end.
     fn push(&mut self, frame: Option<&frame::Video>) -> Result<()> {
         let mut source = self.0.get("in").context("a filter graph without a source")?;
-        // SAFETY: the source belongs to the live graph and takes a reference of its own to a live frame; null is the end.
+        // SAFETY: the source belongs to the live graph and takes its own reference to a live frame; null marks the
+        // end.
         let code = unsafe {
             let frame = frame.map_or(std::ptr::null(), |frame| frame.as_ptr());
             ffi::av_buffersrc_write_frame(source.as_mut_ptr(), frame)
@@ -46,7 +47,7 @@ impl FilterGraph {
         Ok(())
     }
 
-    /// The next frame that comes out.
+    /// Next output frame of the chain.
     fn pull(&mut self) -> Result<frame::Video> {
         let mut frame = frame::Video::empty();
         let mut sink = self.0.get("out").context("a filter graph without a sink")?;
@@ -55,18 +56,19 @@ impl FilterGraph {
     }
 }
 
-/// An interlaced frame as the picture of its first field, by itself and its neighbours in the video.
+/// Deinterlaces a frame: the image of its first field, interpolated with its neighbours in the video.
 pub(crate) fn deinterlaced(
     before: Option<&frame::Video>,
     frame: &frame::Video,
     after: Option<&frame::Video>,
 ) -> Result<frame::Video> {
-    let shape = |frame: &frame::Video| (frame.format(), [frame.width(), frame.height()]);
-    let (format, size) = shape(frame);
-    if size[0].min(size[1]) < LEAST_PX {
+    let format_and_size = |frame: &frame::Video| (frame.format(), [frame.width(), frame.height()]);
+    let (format, size) = format_and_size(frame);
+    if size[0].min(size[1]) < MIN_SIDE_PX {
         return Ok(frame.clone());
     }
-    let [before, after] = [before, after].map(|beside| beside.filter(|beside| shape(beside) == (format, size)));
+    let [before, after] =
+        [before, after].map(|neighbour| neighbour.filter(|neighbour| format_and_size(neighbour) == (format, size)));
     let mut graph = FilterGraph::new(format, size, "yadif=mode=send_frame:parity=auto:deint=all")?;
     for frame in [before, Some(frame), after].into_iter().flatten() {
         graph.push(Some(frame))?;
@@ -78,7 +80,7 @@ pub(crate) fn deinterlaced(
     graph.pull()
 }
 
-/// Transfer function of an HDR picture.
+/// Transfer function of an HDR image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum HdrTransfer {
     Pq,
@@ -104,14 +106,14 @@ impl HdrTransfer {
     }
 }
 
-/// Tone mapping of HDR pictures of one size.
+/// Tone mapper for HDR images of one size.
 pub(crate) struct ToneMapper(FilterGraph);
 
 impl ToneMapper {
-    /// Format of the pictures that `map` takes.
+    /// Pixel format that `map` expects.
     pub(crate) const FORMAT: Pixel = Pixel::GBRP16LE;
 
-    /// `has_wide_gamut`: the primaries are those of BT.2020, not BT.709.
+    /// Creates a tone mapper; `has_wide_gamut`: the primaries are those of BT.2020, not BT.709.
     pub(crate) fn new(transfer: HdrTransfer, has_wide_gamut: bool, size: [u32; 2]) -> Result<Self> {
         let (transfer, peak) = match transfer {
             HdrTransfer::Pq => ("smpte2084", 10_000.0 / WHITE),
@@ -126,7 +128,7 @@ impl ToneMapper {
         Ok(Self(FilterGraph::new(Self::FORMAT, size, &chain)?))
     }
 
-    /// The picture as 8-bit RGB.
+    /// Maps an image to 8-bit RGB.
     pub(crate) fn map(&mut self, frame: &frame::Video) -> Result<frame::Video> {
         self.0.push(Some(frame))?;
         self.0.pull()
@@ -137,7 +139,7 @@ impl ToneMapper {
 mod tests {
     use super::*;
 
-    /// A picture of one colour, through the tone mapping.
+    /// Tone-mapped image of one colour.
     fn mapped(transfer: HdrTransfer, has_wide_gamut: bool, [r, g, b]: [f64; 3]) -> [u8; 3] {
         let mut frame = frame::Video::new(ToneMapper::FORMAT, 16, 16);
         for (plane, value) in [g, b, r].into_iter().enumerate() {
@@ -155,13 +157,13 @@ mod tests {
     }
 
     #[test]
-    fn reference_levels_come_out_where_bt_2408_puts_them() {
-        // BT.2408, table 1: the reference white is 58 % PQ and 75 % HLG, an 18 % gray card 38 % of both.
+    fn reference_levels_match_bt_2408() {
+        // BT.2408, table 1: the reference white is at 58 % PQ and 75 % HLG, an 18 % grey card at 38 % of both.
         for (transfer, white) in [(HdrTransfer::Pq, 0.58), (HdrTransfer::Hlg, 0.75)] {
             assert!((240..=248).contains(&gray(transfer, white)), "{}", gray(transfer, white));
             let card = 255.0 * (26.0f64 / 203.0).powf(1.0 / 2.4);
-            let got = f64::from(gray(transfer, 0.38));
-            assert!((got - card).abs() < 4.0, "{transfer:?}: {got}, expected {card}");
+            let found = f64::from(gray(transfer, 0.38));
+            assert!((found - card).abs() < 4.0, "{transfer:?}: {found}, expected {card}");
             assert_eq!(gray(transfer, 0.0), 0);
             assert!(gray(transfer, 1.0) >= 252);
             let levels: Vec<u8> = (0..=50).map(|step| gray(transfer, f64::from(step) / 50.0)).collect();
@@ -170,13 +172,13 @@ mod tests {
     }
 
     #[test]
-    fn compressed_light_keeps_its_hue() {
-        // PQ signals of 4, 2 and 1 reference whites.
+    fn tone_mapping_preserves_hue() {
+        // PQ signals of 4, 2 and 1 times the reference white.
         let light = mapped(HdrTransfer::Pq, false, [0.7244, 0.6509, 0.5807]).map(|v| (f64::from(v) / 255.0).powf(2.4));
         assert!((light[0] / light[1] - 2.0).abs() < 0.1 && (light[1] / light[2] - 2.0).abs() < 0.1, "{light:?}");
     }
 
-    /// Lines of a disc at `x` px; the odd ones of a disc at `later` px.
+    /// Interlaced disc: even lines show it at `x` px, odd lines at `later` px.
     fn disc(x: f64, later: f64) -> frame::Video {
         let mut frame = frame::Video::new(Pixel::YUV420P, 128, 80);
         (1..3).for_each(|plane| frame.data_mut(plane).fill(128));
@@ -192,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn a_deinterlaced_picture_is_that_of_the_first_field() {
+    fn deinterlacing_shows_the_first_field() {
         let frames = [0.0, 12.0, 24.0].map(|step| disc(40.0 + step, 46.0 + step));
         let (truth, before) = (disc(52.0, 52.0), &frames[0]);
         let error = |a: &frame::Video| {
@@ -203,10 +205,10 @@ mod tests {
             let found = deinterlaced(Some(before), &frames[1], after).unwrap();
             assert!(error(&found) < 0.2 * error(&frames[1]), "{} of {}", error(&found), error(&frames[1]));
         }
-        let still = disc(52.0, 52.0);
-        assert!(error(&deinterlaced(Some(&still), &still, Some(&still)).unwrap()) == 0.0);
+        let static_frame = disc(52.0, 52.0);
+        assert!(error(&deinterlaced(Some(&static_frame), &static_frame, Some(&static_frame)).unwrap()) == 0.0);
         let other = frame::Video::new(Pixel::YUV420P, 64, 48);
-        assert_eq!(deinterlaced(Some(&other), &still, None).unwrap().width(), 128);
+        assert_eq!(deinterlaced(Some(&other), &static_frame, None).unwrap().width(), 128);
         for size in [[1, 1], [16, 15], [9, 40], [16, 16]] {
             let tiny = frame::Video::new(Pixel::YUV420P, size[0], size[1]);
             assert_eq!(deinterlaced(None, &tiny, None).unwrap().height(), size[1]);

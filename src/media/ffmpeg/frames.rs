@@ -1,60 +1,60 @@
-//! Pictures of a video as a stream at the dataset's rate by presentation time: output frame n shows the source frame
-//! nearest n / rate, the earlier one of two equally near. Only shown frames are converted. Time 0 is the first source
-//! frame that decodes. The last frame lasts as long as its packet says (else one source frame, ten minutes at most),
-//! which gives `duration_secs`; there are `FrameRate::frames_in(duration_secs)` output frames. All pictures have the size
-//! of the first; those of another shape stand in black bars.
+//! Images of a video as a stream at the dataset rate, by presentation time: output frame n shows the source frame
+//! nearest to n / rate, the earlier one if two are equally near. Only shown frames are converted. Time 0 is the first
+//! frame that decodes. The last frame lasts as long as its packet states (or one source frame; ten minutes at most),
+//! which determines `duration_secs` and the number of output frames, `FrameRate::frames_in(duration_secs)`. All
+//! images have the size of the first; others are scaled, with black bars for another aspect ratio.
 
 use super::decode::StreamDecoder;
 use super::filter::{HdrTransfer, deinterlaced};
 use super::orientation::Orientation;
 use super::picture::Converter;
 use super::probe::{self, ProbedMedia};
-use super::source::{self, LONGEST_GAP_SECS, UnreadableMedia};
+use super::source::{self, MAX_GAP_SECS, UnreadableMedia};
 use anyhow::{Context, Result, bail};
 use ffmpeg_next::frame;
 use orator_base::types::image::{Image, PictureOptions};
 use orator_base::types::time::FrameRate;
 use std::path::{Path, PathBuf};
 
-/// Largest number of sizes whose conversion is kept ready.
-const MOST_CONVERTERS: usize = 8;
-/// Time before a place at which decoding begins at the latest to get there, seconds: pictures at a place to begin may refer
-/// to earlier ones.
+/// Maximum number of cached converters, one per image size.
+const MAX_CONVERTERS: usize = 8;
+/// Decoding starts at least this long before a seek position, seconds: images at a seek point may refer to earlier
+/// ones.
 const LEAD_SECS: f64 = 1.0;
-/// Shapes whose sides' ratios differ by less than this share are one.
-const SAME_SHAPE: f64 = 0.01;
+/// Relative difference below which two aspect ratios are equal.
+const ASPECT_TOLERANCE: f64 = 0.01;
 
-/// One picture at the dataset rate.
+/// An image at the dataset rate.
 #[derive(Clone, Debug)]
 pub struct TimedFrame {
     pub frame_idx: usize,
     /// RGB, upright.
     pub image: Image,
-    /// Presentation time of the source frame shown, seconds from the first one.
+    /// Presentation time of the source frame, seconds from the first one.
     pub source_secs: f64,
-    /// Whether it is the source frame of the previous output frame.
+    /// Whether it shows the same source frame as the previous output frame.
     pub repeated: bool,
 }
 
-/// Times of one output frame, without its picture.
+/// Times of an output frame, without its image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameTime {
     pub frame_idx: usize,
     pub source_secs: f64,
     pub repeated: bool,
-    /// How the size of the file's picture differs from that of the previous output frame.
+    /// Change of the coded image size since the previous output frame.
     pub resize: Resize,
 }
 
-/// Change of the picture's size inside a file.
+/// Change of the image size within a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Resize {
-    /// The size is that of the frame before.
+    /// The size is unchanged.
     #[default]
     None,
-    /// The shape is the same: what is seen stays in its place.
+    /// The aspect ratio is unchanged, so relative positions remain valid.
     Scaled,
-    /// The shape is another one.
+    /// The aspect ratio has changed.
     Reshaped,
 }
 
@@ -64,8 +64,8 @@ struct SourceFrame {
     ticks: i64,
 }
 
-/// Stream of a video's pictures at one rate. As an iterator it yields full-size pictures; `advance` and `picture` give
-/// times alone and pictures on demand.
+/// Stream of the images of a video at one rate. As an iterator it yields full-size images; `advance` and `picture`
+/// return times only and images on demand.
 pub struct FrameReader {
     path: PathBuf,
     fps: FrameRate,
@@ -75,14 +75,14 @@ pub struct FrameReader {
     options: PictureOptions,
     image_size: [usize; 2],
     converters: Vec<([usize; 2], Converter)>,
-    /// Ticks of the stream's clock at the first frame.
+    /// Timestamp of the first frame, in ticks of the stream.
     origin: i64,
-    /// Shown frame, the one before it and the one after it.
+    /// The shown frame, and its neighbours.
     before: Option<frame::Video>,
     shown: SourceFrame,
     following: Option<SourceFrame>,
     next_idx: usize,
-    /// Output frame that is not read, nor those after it.
+    /// Output frame at which reading stops.
     end_idx: usize,
     last_shown: Option<i64>,
     last_size: [usize; 2],
@@ -93,12 +93,16 @@ pub struct FrameReader {
 }
 
 impl FrameReader {
-    /// Opens the video `path` with one decoder thread and decodes its first frames; errors if none decodes.
+    /// Opens the video `path` with one decoder thread and decodes its first frames.
+    ///
+    /// # Errors
+    ///
+    /// The file cannot be opened, has no images, or none that decodes.
     pub fn open(path: &Path, fps: FrameRate) -> Result<Self> {
         Self::open_with(path, fps, 1)
     }
 
-    /// Opens with `threads` decoder threads (0: one a core), which do not change the frames.
+    /// Opens with `threads` decoder threads (0: one per core), which do not change the result.
     pub fn open_with(path: &Path, fps: FrameRate, threads: usize) -> Result<Self> {
         let input = source::open(path)?;
         let info = probe::describe(&input);
@@ -144,11 +148,14 @@ impl FrameReader {
         Ok(reader)
     }
 
-    /// Goes to output frame `frame_idx`, which shows the source frame at `source_secs` as an earlier reading from the start
-    /// told: `advance` gives it next, as not repeated. Decoding begins where the container says that it can, at least
-    /// `LEAD_SECS` earlier, so that few frames are decoded in vain. Errors: a container that cannot go there; no source
-    /// frame of exactly that time.
-    pub fn go_to(&mut self, frame_idx: usize, source_secs: f64) -> Result<()> {
+    /// Seeks to output frame `frame_idx`, which shows the source frame at `source_secs` as reported by an earlier
+    /// reading from the start: `advance` returns it next, as not repeated. Decoding starts at a seek point at least
+    /// `LEAD_SECS` earlier, so that few frames are decoded in vain.
+    ///
+    /// # Errors
+    ///
+    /// The container cannot seek, or has no source frame at exactly that time.
+    pub fn seek(&mut self, frame_idx: usize, source_secs: f64) -> Result<()> {
         let ticks = (source_secs / f64::from(self.decode.time_base())).round() as i64;
         let lead = (LEAD_SECS / f64::from(self.decode.time_base())).round() as i64;
         self.decode.seek(self.origin.saturating_add(ticks - lead))?;
@@ -167,13 +174,13 @@ impl FrameReader {
         Ok(())
     }
 
-    /// Ends before output frame `frame_idx`, if not earlier.
+    /// Stops before output frame `frame_idx`, or earlier at the end of the video.
     #[must_use]
     pub fn until(self, frame_idx: usize) -> Self {
         Self { end_idx: frame_idx, ..self }
     }
 
-    /// Reads the pictures by `options` from now on.
+    /// Uses `options` for the following images.
     #[must_use]
     pub fn with_options(mut self, options: PictureOptions) -> Self {
         if options.mirrored != self.options.mirrored {
@@ -189,37 +196,37 @@ impl FrameReader {
         HdrTransfer::of(&self.shown.frame).map(HdrTransfer::name)
     }
 
-    /// Whether the shown frame says that it is interlaced.
+    /// Whether the shown frame is flagged as interlaced.
     pub fn is_flagged_interlaced(&self) -> bool {
         self.shown.frame.is_interlaced()
     }
 
-    /// Information of the headers.
+    /// Header information.
     pub fn info(&self) -> &ProbedMedia {
         &self.info
     }
 
-    /// Width and height in px of the upright pictures.
+    /// Width and height of the upright images, px.
     pub fn image_size(&self) -> [usize; 2] {
         self.image_size
     }
 
-    /// Expected number of frames by the headers, for progress bars.
+    /// Number of frames expected from the headers, for progress bars.
     pub fn expected_frames(&self) -> Option<usize> {
         self.info.duration_secs.map(|secs| self.fps.frames_in(secs))
     }
 
-    /// Seconds of pictures read so far; once the frames are at their end, the length of the video.
+    /// Length of the video read so far, seconds; its total length once all frames have been read.
     pub fn duration_secs(&self) -> f64 {
         let last = self.following.as_ref().unwrap_or(&self.shown);
-        self.secs(last.ticks) + self.secs_of(last).min(LONGEST_GAP_SECS)
+        self.secs(last.ticks) + self.secs_of(last).min(MAX_GAP_SECS)
     }
 
-    /// Description of damage although frames came; complete at the end of the frames.
+    /// Description of damage in a video that could be read; complete after the last frame.
     pub fn damage(&self) -> Option<String> {
         let misplaced = (self.n_misplaced > 0).then(|| format!("{} frames with impossible times", self.n_misplaced));
         let last = self.secs_of(self.following.as_ref().unwrap_or(&self.shown));
-        let endless = (last > LONGEST_GAP_SECS).then(|| format!("the last picture claims to last {last:.0} s"));
+        let endless = (last > MAX_GAP_SECS).then(|| format!("the last picture claims to last {last:.0} s"));
         let read = self.duration_secs();
         let stated = self.info.duration_secs.filter(|stated| self.following.is_none() && *stated > read + 1.0);
         let short = stated.map(|stated| format!("pictures end at {read:.2} s of {stated:.2} s"));
@@ -228,7 +235,7 @@ impl FrameReader {
         (!parts.is_empty()).then(|| parts.join(", "))
     }
 
-    /// Times of the next output frame, whose picture `picture` then returns; `None` at the end.
+    /// Times of the next output frame, whose image `picture` then returns; `None` at the end.
     pub fn advance(&mut self) -> Result<Option<FrameTime>> {
         let frame_idx = self.next_idx;
         if frame_idx >= self.end_idx {
@@ -253,15 +260,15 @@ impl FrameReader {
         Ok(Some(FrameTime { frame_idx, source_secs: self.secs(self.shown.ticks), repeated, resize }))
     }
 
-    /// Shown picture, upright: in full, or scaled to `size` (width, height in px).
+    /// The shown image, upright, in full size or scaled to `size` (width, height in px).
     pub fn picture(&mut self, size: Option<[usize; 2]>) -> Result<Image> {
         let size = size.unwrap_or(self.image_size);
-        let fitted = self.fitted(size);
-        let at = self.converters.iter().position(|(of, _)| *of == fitted).unwrap_or_else(|| {
-            if self.converters.len() == MOST_CONVERTERS {
+        let fitted_size = self.fitted_size(size);
+        let at = self.converters.iter().position(|(of, _)| *of == fitted_size).unwrap_or_else(|| {
+            if self.converters.len() == MAX_CONVERTERS {
                 self.converters.clear();
             }
-            self.converters.push((fitted, Converter::new(fitted, self.orientation)));
+            self.converters.push((fitted_size, Converter::new(fitted_size, self.orientation)));
             self.converters.len() - 1
         });
         let (shown, after) = (&self.shown.frame, self.following.as_ref().map(|following| &following.frame));
@@ -273,32 +280,33 @@ impl FrameReader {
         };
         let picture =
             picture.with_context(|| format!("{}, at {:.3} s", self.path.display(), self.secs(self.shown.ticks)))?;
-        Ok(if fitted == size { picture } else { picture.framed(size) })
+        Ok(if fitted_size == size { picture } else { picture.framed(size) })
     }
 
-    /// Size of the shown frame within a picture of `size`: all of it, unless its shape is not that of the first frame.
-    fn fitted(&self, size: [usize; 2]) -> [usize; 2] {
+    /// Size of the shown frame within an image of `size`: smaller if its aspect ratio differs from that of the first
+    /// frame.
+    fn fitted_size(&self, size: [usize; 2]) -> [usize; 2] {
         let shown = upright_size(&self.shown.frame, self.orientation);
-        if is_one_shape(shown, self.image_size) {
+        if has_same_aspect(shown, self.image_size) {
             return size;
         }
-        let shares = [0, 1].map(|axis| shown[axis].max(1) as f64 / self.image_size[axis].max(1) as f64);
-        let most = shares[0].max(shares[1]);
-        [0, 1].map(|axis| ((size[axis] as f64 * shares[axis] / most).round() as usize).clamp(1, size[axis].max(1)))
+        let ratios = [0, 1].map(|axis| shown[axis].max(1) as f64 / self.image_size[axis].max(1) as f64);
+        let max_ratio = ratios[0].max(ratios[1]);
+        [0, 1].map(|axis| ((size[axis] as f64 * ratios[axis] / max_ratio).round() as usize).clamp(1, size[axis].max(1)))
     }
 
     /// Change of size since the previous output frame.
     fn resize(&mut self) -> Resize {
         let size = upright_size(&self.shown.frame, self.orientation);
         let before = std::mem::replace(&mut self.last_size, size);
-        match (before == size, is_one_shape(before, size)) {
+        match (before == size, has_same_aspect(before, size)) {
             (true, _) => Resize::None,
             (false, true) => Resize::Scaled,
             (false, false) => Resize::Reshaped,
         }
     }
 
-    /// Whether output frame `frame_idx` is at most as far from `early` as from `late` (ticks), exactly.
+    /// Whether output frame `frame_idx` is no farther from `early` than from `late` (ticks), in exact arithmetic.
     fn is_before_middle(&self, frame_idx: usize, early: i64, late: i64) -> bool {
         let base = self.decode.time_base();
         let (num, den) = (i128::from(base.numerator().max(1)), i128::from(base.denominator().max(1)));
@@ -307,14 +315,14 @@ impl FrameReader {
         twice_target <= (i128::from(early) + i128::from(late)) * num * i128::from(self.fps.num)
     }
 
-    /// The next source frame later than `ticks`.
+    /// Decodes the next source frame later than `ticks`.
     fn decode_after(&mut self, ticks: i64) -> Result<Option<SourceFrame>> {
         let mut frame = frame::Video::empty();
         while self.decode.next(&mut frame)? {
-            // A frame without a time follows the previous one by that one's duration.
+            // A frame without a timestamp follows the previous frame after that frame's duration.
             let own = frame.timestamp().map(|at| at.saturating_sub(self.origin));
             let at = own.unwrap_or_else(|| ticks.saturating_add(frame.packet().duration.max(1)));
-            let is_near = self.secs(at.saturating_sub(ticks)) <= LONGEST_GAP_SECS;
+            let is_near = self.secs(at.saturating_sub(ticks)) <= MAX_GAP_SECS;
             if at > ticks && is_near && self.secs(at) < self.latest_secs {
                 return Ok(Some(SourceFrame { frame, ticks: at }));
             }
@@ -327,7 +335,7 @@ impl FrameReader {
         ticks as f64 * f64::from(self.decode.time_base())
     }
 
-    /// Duration of a source frame by the file.
+    /// Duration of a source frame as stated by the file, or else from the average frame rate.
     fn secs_of(&self, source: &SourceFrame) -> f64 {
         let stated = self.secs(source.frame.packet().duration);
         if stated > 0.0 {
@@ -344,9 +352,9 @@ fn upright_size(frame: &frame::Video, orientation: Orientation) -> [usize; 2] {
     orientation.upright_size(probe::square_pixels(size, frame.aspect_ratio()))
 }
 
-fn is_one_shape(a: [usize; 2], b: [usize; 2]) -> bool {
+fn has_same_aspect(a: [usize; 2], b: [usize; 2]) -> bool {
     let [a, b] = [a, b].map(|[width, height]| width.max(1) as f64 / height.max(1) as f64);
-    (a / b - 1.0).abs() < SAME_SHAPE
+    (a / b - 1.0).abs() < ASPECT_TOLERANCE
 }
 
 impl Iterator for FrameReader {

@@ -1,4 +1,4 @@
-//! JPEG in memory, with reproducible bytes.
+//! JPEG encoding in memory, with reproducible bytes.
 
 use anyhow::{Context, Result, ensure};
 use ffmpeg_next as ffmpeg;
@@ -8,10 +8,14 @@ use ffmpeg_next::software::scaling;
 use ffmpeg_next::{Packet, Rational, encoder, frame};
 use orator_base::types::image::Image;
 
-/// ffmpeg's quality, 1 (best) to 31: near to what cameras write at "85".
+/// ffmpeg's quality scale, 1 (best) to 31; about what cameras write at quality 85.
 const QUALITY: i32 = 4;
 
-/// Bytes of a JPEG file. Errors: a picture without pixels, an ffmpeg without the encoder.
+/// Encodes an image as a JPEG file.
+///
+/// # Errors
+///
+/// The image has no pixels, or ffmpeg has no JPEG encoder.
 pub fn encode(image: &Image) -> Result<Vec<u8>> {
     super::source::init();
     let [width, height] = [u32::try_from(image.width)?, u32::try_from(image.height)?];
@@ -25,7 +29,7 @@ pub fn encode(image: &Image) -> Result<Vec<u8>> {
     context.set_threading(codec::threading::Config::count(1));
     context.set_flags(codec::Flags::QSCALE | codec::Flags::BITEXACT);
     let quality = QUALITY * ffmpeg::ffi::FF_QP2LAMBDA;
-    // SAFETY: the context is ours and not open yet.
+    // SAFETY: the context is owned here and not open yet.
     unsafe { (*context.as_mut_ptr()).global_quality = quality };
     let mut opened = context.open_as(jpeg)?;
     let mut rgb = frame::Video::new(Pixel::RGB24, width, height);
@@ -39,7 +43,7 @@ pub fn encode(image: &Image) -> Result<Vec<u8>> {
     let mut yuv = frame::Video::empty();
     scaler.run(&rgb, &mut yuv)?;
     yuv.set_pts(Some(0));
-    // SAFETY: the frame is ours.
+    // SAFETY: the frame is owned here.
     unsafe { (*yuv.as_mut_ptr()).quality = quality };
     opened.send_frame(&yuv)?;
     opened.send_eof()?;
@@ -53,7 +57,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_picture_becomes_a_small_jpeg_and_the_bytes_repeat() {
+    fn encodes_small_jpegs_with_reproducible_bytes() {
         let data = (0..3 * 121 * 80_u32).map(|i| (i % 363 / 3) as u8).collect();
         let image = Image { width: 121, height: 80, data };
         let bytes = encode(&image).unwrap();

@@ -1,7 +1,7 @@
-//! The only folder that uses ffmpeg: `probe` (headers), `frames` (pictures at a chosen rate),
-//! `audio` (sound on the same clock; `sound_stream` on demand), `write` (mp4, excerpts), `jpeg`. Below them: `source` opens
-//! files, `decode` decodes one stream, `picture` converts to upright RGB by `orientation` and `filter`.
-//! Time 0 is the first picture that decodes (`origin`); without pictures it is the first sample.
+//! The only folder that uses ffmpeg: `probe` (headers), `frames` (images at a chosen rate), `audio` (audio on the
+//! same clock; `sound_stream` as an iterator), `write` (mp4, excerpts), `jpeg`. They are built on `source`, which
+//! opens files, `decode`, which decodes one stream, and `picture`, which converts to upright RGB using `orientation`
+//! and `filter`. Time 0 is the first image that decodes (`origin`); without images it is the first audio sample.
 
 pub mod audio;
 pub mod decode;

@@ -1,11 +1,11 @@
-//! Rotation and mirroring between the coded picture and the upright one.
+//! Rotation and mirroring between the coded and the upright image.
 
 use ffmpeg_next::codec::packet::side_data::Type as SideData;
 use ffmpeg_next::format::stream::Stream;
 use orator_base::types::image::Image;
 
-/// Rotation of the coded picture to the upright one: its x axis points along `x` and its y axis along `y` of the
-/// upright picture, each a unit step (right and down are positive). Mirroring is possible, other angles are not.
+/// Transform from the coded to the upright image: the x and y axes of the coded image point along `x` and `y` in the
+/// upright image, each a unit step (right and down are positive). Right angles and mirroring only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Orientation {
     x: [i8; 2],
@@ -15,7 +15,7 @@ pub(crate) struct Orientation {
 impl Orientation {
     pub(crate) const UPRIGHT: Self = Self { x: [1, 0], y: [0, 1] };
 
-    /// Orientation by the display matrix of a stream (nine 16.16 numbers; the first two rows are the images of the
+    /// Orientation from the display matrix of a stream (nine 16.16 numbers; the first two rows are the images of the
     /// axes), snapped to right angles.
     pub(crate) fn from_stream(stream: &Stream) -> Self {
         let matrix = stream.side_data().find(|side| side.kind() == SideData::DisplayMatrix);
@@ -26,17 +26,17 @@ impl Orientation {
         };
         let [a, b, c, d] = [numbers[0], numbers[1], numbers[3], numbers[4]];
         let unit = |v: i32| v.signum() as i8;
-        let turned = b.unsigned_abs() > a.unsigned_abs();
-        let (x, y) = if turned { ([0, unit(b)], [unit(c), 0]) } else { ([unit(a), 0], [0, unit(d)]) };
+        let is_rotated = b.unsigned_abs() > a.unsigned_abs();
+        let (x, y) = if is_rotated { ([0, unit(b)], [unit(c), 0]) } else { ([unit(a), 0], [0, unit(d)]) };
         if x == [0, 0] || y == [0, 0] { Self::UPRIGHT } else { Self { x, y } }
     }
 
-    /// Orientation whose upright picture has left and right exchanged.
+    /// Orientation with left and right of the upright image swapped.
     pub(crate) fn mirrored(self) -> Self {
         Self { x: [-self.x[0], self.x[1]], y: [-self.y[0], self.y[1]] }
     }
 
-    /// Degrees clockwise from coded to upright: 0, 90, 180 or 270.
+    /// Clockwise rotation from coded to upright image, degrees: 0, 90, 180 or 270.
     pub(crate) fn degrees(self) -> u32 {
         match self.x {
             [1, _] => 0,
@@ -51,14 +51,14 @@ impl Orientation {
         if self.x[0] == 0 { [height, width] } else { [width, height] }
     }
 
-    /// Upright picture of a coded one.
+    /// Converts a coded image to an upright one.
     pub(crate) fn apply(self, coded: Image) -> Image {
         if self == Self::UPRIGHT {
             return coded;
         }
         let [width, height] = self.upright_size([coded.width, coded.height]);
         let mut upright = Image::filled(width, height, [0; 3]);
-        // Position of coded pixel 0, 0: at the far side of every reversed axis.
+        // Position of coded pixel 0, 0: at the far end of every reversed axis.
         let origin = |back: bool, n: usize| if back { n as isize - 1 } else { 0 };
         let x0 = origin(self.x[0] + self.y[0] < 0, width);
         let y0 = origin(self.x[1] + self.y[1] < 0, height);
@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn turns_and_mirrors() {
+    fn rotates_and_mirrors() {
         // 0 1        4 2 0        5 4        1 3 5        1 0
         // 2 3  cw->  5 3 1   180  3 2   ccw  0 2 4  flip  3 2
         // 4 5                     1 0                     5 4

@@ -1,5 +1,5 @@
-//! Conversion of a decoded frame to an upright RGB `Image`: colour conversion and scaling by swscale, tone mapping of
-//! HDR, rotation.
+//! Converts decoded frames to upright RGB images: colour conversion and scaling with swscale, tone mapping of HDR,
+//! rotation.
 
 use super::filter::{HdrTransfer, ToneMapper};
 use super::orientation::Orientation;
@@ -10,21 +10,21 @@ use ffmpeg_next::software::scaling;
 use ffmpeg_next::{color, frame};
 use orator_base::types::image::Image;
 
-/// Converter of one stream's frames to pictures of one size; swscale's tables are kept between frames.
+/// Converts the frames of one stream to images of one size; swscale's tables are reused between frames.
 pub(crate) struct Converter {
     orientation: Orientation,
-    /// Size of the pictures before rotation.
+    /// Size of the images before rotation.
     coded_size: [usize; 2],
     scaler: Option<Scaler>,
 }
 
 impl Converter {
-    /// Pictures of `size` (width, height in px, upright).
+    /// Creates a converter to upright images of `size` (width, height in px).
     pub(crate) fn new(size: [usize; 2], orientation: Orientation) -> Self {
         Self { orientation, coded_size: orientation.upright_size(size), scaler: None }
     }
 
-    /// `frame`, upright, in the size this converter was made for.
+    /// Converts `frame` to an upright image of the size of this converter.
     pub(crate) fn picture(&mut self, frame: &frame::Video) -> Result<Image> {
         let source = FrameFormat::of(frame);
         if self.scaler.as_ref().is_none_or(|scaler| scaler.source != source) {
@@ -35,12 +35,12 @@ impl Converter {
     }
 }
 
-/// What swscale must know of a frame.
+/// Properties of a frame that swscale needs.
 #[derive(Clone, Copy, PartialEq)]
 struct FrameFormat {
     format: Pixel,
     size: [u32; 2],
-    /// Matrix number of swscale, and whether the values use the full range.
+    /// Colour matrix number of swscale, and 1 for full-range values.
     colour: [i32; 2],
     hdr: Option<HdrTransfer>,
     has_wide_gamut: bool,
@@ -58,52 +58,53 @@ impl FrameFormat {
     }
 }
 
-/// swscale for frames of one format to RGB of one size.
+/// swscale context from frames of one format to RGB of one size.
 struct Scaler {
     source: FrameFormat,
     size: [usize; 2],
     context: scaling::Context,
     rgb: frame::Video,
-    tones: Option<ToneMapper>,
+    tone_mapper: Option<ToneMapper>,
 }
 
-// SAFETY: swscale's context is plain memory without ties to a thread, and only `convert(&mut self)` touches it.
+// SAFETY: swscale's context is plain memory that is not bound to a thread, and only `convert(&mut self)` uses it.
 unsafe impl Send for Scaler {}
 
 impl Scaler {
     fn new(source: FrameFormat, size: [usize; 2]) -> Result<Self> {
         let [width, height] = source.size;
-        let shrinks = 2 * size[0] <= width as usize;
-        let flags = if shrinks { scaling::Flags::AREA } else { scaling::Flags::BICUBIC };
+        let is_downscaling = 2 * size[0] <= width as usize;
+        let flags = if is_downscaling { scaling::Flags::AREA } else { scaling::Flags::BICUBIC };
         let (w, h) = (u32::try_from(size[0])?, u32::try_from(size[1])?);
         if w == 0 || h == 0 {
             bail!("a picture of {w} x {h} px was asked for");
         }
-        let tones = source.hdr.map(|transfer| ToneMapper::new(transfer, source.has_wide_gamut, [w, h])).transpose()?;
-        let rgb = if tones.is_some() { ToneMapper::FORMAT } else { Pixel::RGB24 };
+        let tone_mapper =
+            source.hdr.map(|transfer| ToneMapper::new(transfer, source.has_wide_gamut, [w, h])).transpose()?;
+        let rgb = if tone_mapper.is_some() { ToneMapper::FORMAT } else { Pixel::RGB24 };
         let mut context = scaling::Context::get(source.format, width, height, rgb, w, h, flags)
             .with_context(|| format!("cannot turn {:?} pictures into RGB", source.format))?;
-        // SAFETY: the context is live, the tables are swscale's own static ones; one = 1.0 in 16.16.
+        // SAFETY: the context is live, and the tables are static memory of swscale; one = 1.0 in 16.16.
         unsafe {
             let table = ffmpeg::ffi::sws_getCoefficients(source.colour[0]);
             let one = 1 << 16;
             ffmpeg::ffi::sws_setColorspaceDetails(context.as_mut_ptr(), table, source.colour[1], table, 0, 0, one, one);
         }
-        Ok(Self { source, size, context, rgb: frame::Video::empty(), tones })
+        Ok(Self { source, size, context, rgb: frame::Video::empty(), tone_mapper })
     }
 
     fn convert(&mut self, frame: &frame::Video) -> Result<Image> {
         let [width, height] = self.size;
         self.context.run(frame, &mut self.rgb).context("swscale failed")?;
-        let toned = self.tones.as_mut().map(|tones| tones.map(&self.rgb)).transpose()?;
-        let rgb = toned.as_ref().unwrap_or(&self.rgb);
+        let tone_mapped = self.tone_mapper.as_mut().map(|tone_mapper| tone_mapper.map(&self.rgb)).transpose()?;
+        let rgb = tone_mapped.as_ref().unwrap_or(&self.rgb);
         // Rows of the frame are padded to a multiple of 32 bytes.
         let rows = rgb.data(0).chunks(rgb.stride(0)).take(height);
         Ok(Image { width, height, data: rows.flat_map(|row| &row[..3 * width]).copied().collect() })
     }
 }
 
-/// Matrix number of swscale; unspecified spaces are BT.601, its default.
+/// Colour matrix number of swscale; unspecified colour spaces are treated as BT.601, its default.
 fn colour_matrix(space: color::Space) -> i32 {
     match space {
         color::Space::BT709 => ffmpeg::ffi::SWS_CS_ITU709,

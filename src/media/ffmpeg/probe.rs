@@ -1,5 +1,5 @@
-//! Headers of a media file, without decoding. Missing values stay unknown; a file with neither pictures nor sound is an
-//! error.
+//! Reads the headers of a media file without decoding. Missing values are `None`; a file with neither video nor audio
+//! is an error.
 
 use super::orientation::Orientation;
 use super::source;
@@ -13,33 +13,33 @@ use std::path::Path;
 /// Streams of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProbedMedia {
-    /// Length as stated: of the pictures if there are any, else of the sound; `None` if no header says.
+    /// Stated length, seconds: of the video stream, or else of the audio stream; `None` if no header states it.
     pub duration_secs: Option<f64>,
     pub video: Option<VideoInfo>,
     pub audio: Option<AudioInfo>,
 }
 
-/// Stream of pictures.
+/// Properties of a video stream.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VideoInfo {
-    /// ffmpeg's name: `h264`, `hevc`, `vp9`.
+    /// Codec name used by ffmpeg: `h264`, `hevc`, `vp9`.
     pub codec: String,
     /// Width and height in px as coded.
     pub coded_size: [usize; 2],
-    /// Width and height in px as shown: turned upright, with square pixels.
+    /// Width and height in px as displayed: upright, with square pixels.
     pub image_size: [usize; 2],
-    /// Degrees clockwise from coded to upright: 0, 90, 180 or 270.
+    /// Clockwise rotation from coded to upright image, degrees: 0, 90, 180 or 270.
     pub rotation: u32,
-    /// Average frames a second; `None` if no header says.
+    /// Average frame rate; `None` if no header states it.
     pub fps: Option<FrameRate>,
 }
 
-/// Stream of sound.
+/// Properties of an audio stream.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AudioInfo {
-    /// ffmpeg's name: `aac`, `opus`, `pcm_s16le`.
+    /// Codec name used by ffmpeg: `aac`, `opus`, `pcm_s16le`.
     pub codec: String,
-    /// Samples a second.
+    /// Samples per second.
     pub rate: u32,
     pub n_channels: u32,
 }
@@ -51,13 +51,13 @@ pub fn probe(path: &Path) -> Result<ProbedMedia> {
 
 pub(crate) fn describe(input: &Input) -> ProbedMedia {
     let video = source::video_stream(input);
-    let audio = source::automatic_track(input);
+    let audio = source::default_track(input);
     let duration_secs = video.as_ref().or(audio.as_ref()).and_then(|stream| source::stated_secs(input, stream));
     ProbedMedia {
         duration_secs,
         video: video.map(|stream| describe_video(&stream)),
         audio: audio.map(|stream| {
-            let [rate, n_channels] = source::sound_numbers(&stream);
+            let [rate, n_channels] = source::audio_parameters(&stream);
             AudioInfo { codec: codec_name(&stream), rate, n_channels }
         }),
     }
@@ -77,12 +77,12 @@ fn describe_video(stream: &Stream) -> VideoInfo {
     VideoInfo { codec: codec_name(stream), coded_size, image_size, rotation: orientation.degrees(), fps }
 }
 
-/// Size with square pixels: the width stretched by the sample aspect ratio where that differs from 1 by more than a
-/// hundredth and less than a factor 4 (other values are errors of an encoder).
+/// Size with square pixels: the width is scaled by the sample aspect ratio if that differs from 1 by more than 1 %
+/// and by less than a factor of 4 (other values are encoder errors).
 pub(crate) fn square_pixels([width, height]: [usize; 2], aspect: Rational) -> [usize; 2] {
     let ratio = f64::from(aspect);
-    let believable = ratio.is_finite() && (0.25..=4.0).contains(&ratio) && (ratio - 1.0).abs() > 0.01;
-    if believable { [((width as f64 * ratio).round() as usize).max(1), height] } else { [width, height] }
+    let is_plausible = ratio.is_finite() && (0.25..=4.0).contains(&ratio) && (ratio - 1.0).abs() > 0.01;
+    if is_plausible { [((width as f64 * ratio).round() as usize).max(1), height] } else { [width, height] }
 }
 
 fn frame_rate(rate: Rational) -> Option<FrameRate> {

@@ -1,5 +1,5 @@
-//! Conversion of decoded sound to mono f32 at one rate by swresample. A `Resampler` serves one continuous run of one
-//! format.
+//! Conversion of decoded audio to mono f32 at one rate with swresample. A `Resampler` handles one continuous run of
+//! one format.
 
 use anyhow::{Context, Result, ensure};
 use ffmpeg_next as ffmpeg;
@@ -7,23 +7,23 @@ use ffmpeg_next::format::{Sample, sample};
 use ffmpeg_next::software::resampling;
 use ffmpeg_next::{ChannelLayout, Dictionary, frame};
 
-/// Format of a sound frame.
+/// Format of an audio frame.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) struct SoundFormat {
     pub sample: Sample,
     pub layout: ChannelLayout,
-    /// Samples a second.
+    /// Samples per second.
     pub rate: u32,
 }
 
-/// The format of `frame`; a layout that the file does not name is the usual one for its number of channels.
+/// The format of `frame`; an unspecified channel layout is replaced by the default one for the number of channels.
 pub(crate) fn format_of(frame: &frame::Audio) -> SoundFormat {
     let named = frame.channel_layout();
     let layout = if named.is_empty() { ChannelLayout::default(i32::from(frame.channels())) } else { named };
     SoundFormat { sample: frame.format(), layout, rate: frame.rate() }
 }
 
-/// First sample of `frame` that is NaN or infinite in any channel; such a sample would make every derived value NaN.
+/// Index of the first sample of `frame` that is NaN or infinite in any channel; it would make all derived values NaN.
 pub(crate) fn first_not_finite(frame: &frame::Audio) -> Option<usize> {
     let (n_samples, n_channels) = (frame.samples(), usize::from(frame.channels()));
     let (n_planes, n_each) = match frame.format() {
@@ -57,9 +57,10 @@ pub(crate) struct Resampler {
     rate: u32,
     n_in: u64,
     n_out: u64,
-    /// Number of samples added (or removed) by stretching, and the input count at which the last stretch ends.
+    /// Number of samples added (or, if negative, removed) by stretching, and the input count at which the last
+    /// stretch ends.
     n_stretched: i64,
-    even_at: u64,
+    stretch_end: u64,
 }
 
 impl Resampler {
@@ -68,42 +69,42 @@ impl Resampler {
         ensure!(source_rate > 0 && rate > 0, "sound at {source_rate} Hz cannot be brought to {rate} Hz");
         let mono = ChannelLayout::MONO;
         let packed = Sample::F32(sample::Type::Packed);
-        // Without a bound, float sound mixed down from several channels grows beyond 1.
+        // Without this bound, float audio mixed down from several channels exceeds 1.
         let options = Dictionary::from_iter([("rematrix_maxval", "1.0")]);
         let context = resampling::Context::get_with(sample, layout, source_rate, packed, mono, rate, options);
         let context = context.with_context(|| {
             format!("cannot bring {sample:?} sound of {} channels at {source_rate} Hz to mono", layout.channels())
         })?;
-        Ok(Self { context, format, rate, n_in: 0, n_out: 0, n_stretched: 0, even_at: 0 })
+        Ok(Self { context, format, rate, n_in: 0, n_out: 0, n_stretched: 0, stretch_end: 0 })
     }
 
     pub(crate) fn format(&self) -> SoundFormat {
         self.format
     }
 
-    /// Seconds of input, stretched.
+    /// Duration of the input after stretching, seconds.
     pub(crate) fn secs(&self) -> f64 {
         self.n_in as f64 / f64::from(self.format.rate) + self.n_stretched as f64 / f64::from(self.rate)
     }
 
     /// Whether no stretch is active.
-    pub(crate) fn is_even(&self) -> bool {
-        self.n_in >= self.even_at
+    pub(crate) fn is_unstretched(&self) -> bool {
+        self.n_in >= self.stretch_end
     }
 
-    /// Makes the next `over_secs` seconds `secs` longer (shorter, if negative).
+    /// Makes the next `over_secs` seconds longer by `secs` (shorter if negative).
     pub(crate) fn stretch(&mut self, secs: f64, over_secs: f64) -> Result<()> {
         let n = (secs * f64::from(self.rate)).round() as i32;
         let over = (over_secs * f64::from(self.rate)) as i32;
-        // SAFETY: the context is live and ours.
+        // SAFETY: the context is live and owned here.
         let done = unsafe { ffmpeg::ffi::swr_set_compensation(self.context.as_mut_ptr(), n, over) };
         ensure!(done >= 0, "swresample cannot stretch ({})", ffmpeg::Error::from(done));
         self.n_stretched += i64::from(n);
-        self.even_at = self.n_in + (over_secs * f64::from(self.format.rate)) as u64;
+        self.stretch_end = self.n_in + (over_secs * f64::from(self.format.rate)) as u64;
         Ok(())
     }
 
-    /// Takes a frame of this resampler's format; the samples that are ready are appended to `out`.
+    /// Converts a frame of this resampler's format and appends the samples that are ready to `out`.
     pub(crate) fn push(&mut self, frame: &frame::Audio, out: &mut Vec<f32>) -> Result<()> {
         debug_assert!(format_of(frame) == self.format);
         self.n_in += frame.samples() as u64;
@@ -111,7 +112,7 @@ impl Resampler {
         unsafe { self.convert((*frame.as_ptr()).extended_data.cast::<*const u8>(), frame.samples(), out) }
     }
 
-    /// Appends the samples still inside, so that input and output last equally long.
+    /// Appends the remaining samples, so that input and output have equal duration.
     pub(crate) fn finish(mut self, out: &mut Vec<f32>) -> Result<()> {
         let start = out.len();
         // SAFETY: null input means flush.
@@ -128,13 +129,13 @@ impl Resampler {
     unsafe fn convert(&mut self, planes: *mut *const u8, n_samples: usize, out: &mut Vec<f32>) -> Result<()> {
         let n_samples = i32::try_from(n_samples)?;
         let start = out.len();
-        // SAFETY: `out` is given the room that swresample says it can fill, and cut to what it filled.
+        // SAFETY: `out` is given the capacity that swresample reports, and truncated to the samples written.
         let n_out = unsafe {
             let context = self.context.as_mut_ptr();
-            let room = ffmpeg::ffi::swr_get_out_samples(context, n_samples).max(0) + 32;
-            out.resize(start + room as usize, 0.0);
+            let capacity = ffmpeg::ffi::swr_get_out_samples(context, n_samples).max(0) + 32;
+            out.resize(start + capacity as usize, 0.0);
             let mut plane = out.as_mut_ptr().add(start).cast::<u8>();
-            ffmpeg::ffi::swr_convert(context, &raw mut plane, room, planes, n_samples)
+            ffmpeg::ffi::swr_convert(context, &raw mut plane, capacity, planes, n_samples)
         };
         out.truncate(start + usize::try_from(n_out).unwrap_or(0));
         ensure!(n_out >= 0, "swresample failed ({})", ffmpeg::Error::from(n_out));

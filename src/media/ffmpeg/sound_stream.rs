@@ -1,36 +1,36 @@
-//! Sound of a file as a pull stream in constant memory: a thread decodes a few pieces ahead.
+//! Audio of a file as an iterator with constant memory: a thread decodes a few chunks ahead.
 
 use super::audio::stream_mono;
 use anyhow::{Result, bail};
 use std::path::Path;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
-/// Largest number of samples of a piece, and number of pieces decoded ahead.
-const PIECE: usize = 16_384;
-const AHEAD: usize = 8;
+/// Maximum number of samples per chunk, and number of chunks decoded ahead.
+const CHUNK: usize = 16_384;
+const N_AHEAD: usize = 8;
 
-/// Number of samples of the sound of `path` as mono at `rate`, by decoding all of it; `None` without sound.
+/// Number of samples of the audio of `path` as mono at `rate`, found by decoding it; `None` without audio.
 pub fn n_samples(path: &Path, rate: u32) -> Result<Option<usize>> {
     let mut n = 0;
-    let streamed = stream_mono(path, 0, rate, &mut |piece| {
-        n += piece.len();
+    let streamed = stream_mono(path, 0, rate, &mut |chunk| {
+        n += chunk.len();
         Ok(())
     })?;
     Ok(streamed.map(|_| n))
 }
 
-/// Sound of a file in pieces: mono samples in -1..1.
+/// Audio of a file in chunks of mono samples in -1..1.
 pub struct SoundStream {
-    pieces: Receiver<Result<Vec<f32>>>,
+    chunks: Receiver<Result<Vec<f32>>>,
 }
 
 impl SoundStream {
-    /// Begins to decode the sound of `path` as mono at `rate`. An error comes as the last piece.
+    /// Starts decoding the audio of `path` as mono at `rate`. An error is returned as the last chunk.
     pub fn open(path: &Path, rate: u32) -> Self {
-        let (sender, pieces) = sync_channel(AHEAD);
+        let (sender, chunks) = sync_channel(N_AHEAD);
         let path = path.to_owned();
         std::thread::spawn(move || decode(&path, rate, &sender));
-        Self { pieces }
+        Self { chunks }
     }
 }
 
@@ -38,23 +38,23 @@ impl Iterator for SoundStream {
     type Item = Result<Vec<f32>>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        self.pieces.recv().ok()
+        self.chunks.recv().ok()
     }
 }
 
 fn decode(path: &Path, rate: u32, sender: &SyncSender<Result<Vec<f32>>>) {
-    let mut has_left = false;
+    let mut is_disconnected = false;
     let ended = stream_mono(path, 0, rate, &mut |streamed| {
-        for piece in streamed.chunks(PIECE) {
-            if sender.send(Ok(piece.to_vec())).is_err() {
-                has_left = true;
+        for chunk in streamed.chunks(CHUNK) {
+            if sender.send(Ok(chunk.to_vec())).is_err() {
+                is_disconnected = true;
                 bail!("nobody listens any more");
             }
         }
         Ok(())
     });
-    if let (Err(error), false) = (ended, has_left) {
-        // A receiver that is gone needs no error.
+    if let (Err(error), false) = (ended, is_disconnected) {
+        // A dropped receiver needs no error.
         let _ = sender.send(Err(error));
     }
 }

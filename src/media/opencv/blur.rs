@@ -1,4 +1,4 @@
-//! Gaussian blur at single cells of a small map: a heat-map is only needed around its peak.
+//! Gaussian blur at single cells of a small map: heat-maps only need it around their peaks.
 
 /// Gaussian kernel of odd width with sum 1; widths 1 to 7 are OpenCV's fixed tables.
 pub struct GaussianBlur(Vec<f32>);
@@ -14,32 +14,32 @@ impl GaussianBlur {
             width => {
                 let half = (width / 2) as f64;
                 let sigma = 0.3 * (half - 1.0) + 0.8;
-                let bell = |cell: usize| (-((cell as f64 - half) / sigma).powi(2) / 2.0).exp();
-                let sum: f64 = (0..width).map(bell).sum();
-                Self((0..width).map(|cell| (bell(cell) / sum) as f32).collect())
+                let gaussian_weight = |cell: usize| (-((cell as f64 - half) / sigma).powi(2) / 2.0).exp();
+                let sum: f64 = (0..width).map(gaussian_weight).sum();
+                Self((0..width).map(|cell| (gaussian_weight(cell) / sum) as f32).collect())
             }
         }
     }
 
-    /// The blurred value at column `x`, row `y` of a map with rows of `width`; its edge is mirrored (the edge cell
-    /// itself once). 0 for a map of another size.
+    /// Blurred value at column `x`, row `y` of a map with rows of `width` cells. The border is reflected without
+    /// repeating the edge cell. Returns 0 if the map has another size.
     pub fn at(&self, map: &[f32], width: usize, x: usize, y: usize) -> f32 {
         let height = map.len() / width.max(1);
         let half = (self.0.len() / 2) as isize;
         let mut sum = 0.0;
         for (dy, wy) in (-half..).zip(&self.0) {
-            let row = mirrored(y as isize + dy, height) * width;
+            let row = reflect(y as isize + dy, height) * width;
             let across = (-half..)
                 .zip(&self.0)
-                .map(|(dx, wx)| wx * map.get(row + mirrored(x as isize + dx, width)).copied().unwrap_or(0.0));
+                .map(|(dx, wx)| wx * map.get(row + reflect(x as isize + dx, width)).copied().unwrap_or(0.0));
             sum += wy * across.sum::<f32>();
         }
         sum
     }
 }
 
-/// The index inside 0..size that a mirror at each end shows (`cba|abc` without the doubled edge).
-fn mirrored(at: isize, size: usize) -> usize {
+/// Index in 0..size after reflection at both ends (`cb|abc|ba`: the edge is not repeated).
+fn reflect(at: isize, size: usize) -> usize {
     let last = size as isize - 1;
     if last <= 0 {
         return 0;

@@ -1,6 +1,6 @@
-//! Anti-aliased drawing: lines, circles, polygons, capsules, text. Points are pixels with fractions (the centre of the
-//! top left pixel is 0, 0), an edge softens about half a pixel outwards; drawing is clipped to the picture and
-//! non-finite points draw nothing.
+//! Anti-aliased drawing of lines, circles, polygons, capsules and text. Points are in fractional pixels (the centre
+//! of the top left pixel is 0, 0); edges are blurred about half a pixel outwards. Drawing is clipped to the image,
+//! and non-finite points draw nothing.
 
 use anyhow::Context as _;
 use opencv::boxed_ref::BoxedRefMut;
@@ -8,26 +8,26 @@ use opencv::core::{Mat, Point, Scalar, Vec3b, Vector};
 use opencv::imgproc;
 use orator_base::types::image::Image;
 
-/// Binary digits after the point of the coordinates handed to OpenCV: 1/16 px.
+/// Fractional bits of the coordinates passed to OpenCV: 1/16 px.
 const SHIFT: i32 = 4;
-/// Largest magnitude of coordinates, px; larger ones are clamped against overflow.
-const FAR_PX: f32 = 30_000.0;
-/// Corners of a capsule's half circle.
-const ROUND_STEPS: usize = 12;
+/// Largest magnitude of coordinates, px; larger ones are clamped to avoid overflow.
+const MAX_COORDINATE_PX: f32 = 30_000.0;
+/// Segments per arc of a capsule.
+const ARC_STEPS: usize = 12;
 
-/// A line of `width_px` (at least 1) from `from` to `to`.
+/// Draws a line `width_px` wide (at least 1) from `from` to `to`.
 pub fn line(image: &mut Image, from: [f32; 2], to: [f32; 2], width_px: f32, rgb: [u8; 3]) -> anyhow::Result<()> {
     let (Some(from), Some(to)) = (fixed(from), fixed(to)) else { return Ok(()) };
     let width = width_px.round().clamp(1.0, 1000.0) as i32;
-    on(image, |mat| imgproc::line(mat, from, to, colour(rgb), width, imgproc::LINE_AA, SHIFT))
+    draw_on(image, |mat| imgproc::line(mat, from, to, colour(rgb), width, imgproc::LINE_AA, SHIFT))
 }
 
-/// A filled circle.
+/// Draws a filled circle.
 pub fn circle(image: &mut Image, centre: [f32; 2], radius_px: f32, rgb: [u8; 3]) -> anyhow::Result<()> {
     ring(image, centre, radius_px, imgproc::FILLED, rgb)
 }
 
-/// The outline of a circle, `width_px` wide.
+/// Draws the outline of a circle, `width_px` wide.
 pub fn circle_outline(
     image: &mut Image,
     centre: [f32; 2],
@@ -38,7 +38,7 @@ pub fn circle_outline(
     ring(image, centre, radius_px, width_px.round().clamp(1.0, 1000.0) as i32, rgb)
 }
 
-/// A filled convex polygon; fewer than 3 corners draw nothing.
+/// Draws a filled convex polygon; fewer than 3 corners draw nothing.
 pub fn polygon(image: &mut Image, corners: &[[f32; 2]], rgb: [u8; 3]) -> anyhow::Result<()> {
     let Some(points) = corners.iter().map(|&corner| fixed(corner)).collect::<Option<Vector<Point>>>() else {
         return Ok(());
@@ -46,10 +46,10 @@ pub fn polygon(image: &mut Image, corners: &[[f32; 2]], rgb: [u8; 3]) -> anyhow:
     if points.len() < 3 {
         return Ok(());
     }
-    on(image, |mat| imgproc::fill_convex_poly(mat, &points, colour(rgb), imgproc::LINE_AA, SHIFT))
+    draw_on(image, |mat| imgproc::fill_convex_poly(mat, &points, colour(rgb), imgproc::LINE_AA, SHIFT))
 }
 
-/// A limb: the hull of a circle of `from_radius_px` at `from` and one of `to_radius_px` at `to`.
+/// Draws a limb: the convex hull of a circle of `from_radius_px` at `from` and one of `to_radius_px` at `to`.
 pub fn capsule(
     image: &mut Image,
     from: [f32; 2],
@@ -64,55 +64,58 @@ pub fn capsule(
         let (centre, radius) = if from_radius_px > to_radius_px { (from, from_radius_px) } else { (to, to_radius_px) };
         return circle(image, centre, radius, rgb);
     }
-    let along = dy.atan2(dx);
+    let direction = dy.atan2(dx);
     // The common tangents touch both circles at this angle from the axis.
-    let open = ((from_radius_px - to_radius_px) / distance).acos();
+    let tangent_angle = ((from_radius_px - to_radius_px) / distance).acos();
     let arc = |centre: [f32; 2], radius: f32, start: f32, sweep: f32| {
-        (0..=ROUND_STEPS).map(move |step| {
-            let angle = start + sweep * step as f32 / ROUND_STEPS as f32;
+        (0..=ARC_STEPS).map(move |step| {
+            let angle = start + sweep * step as f32 / ARC_STEPS as f32;
             [centre[0] + radius * angle.cos(), centre[1] + radius * angle.sin()]
         })
     };
     let full = std::f32::consts::TAU;
-    let outline: Vec<[f32; 2]> = arc(to, to_radius_px, along - open, 2.0 * open)
-        .chain(arc(from, from_radius_px, along + open, full - 2.0 * open))
+    let outline: Vec<[f32; 2]> = arc(to, to_radius_px, direction - tangent_angle, 2.0 * tangent_angle)
+        .chain(arc(from, from_radius_px, direction + tangent_angle, full - 2.0 * tangent_angle))
         .collect();
     polygon(image, &outline, rgb)
 }
 
-/// One line of text (ASCII) whose left end of the base line is `at`; capitals are `height_px` tall.
-pub fn text(image: &mut Image, words: &str, at: [f32; 2], height_px: f32, rgb: [u8; 3]) -> anyhow::Result<()> {
+/// Draws one line of ASCII text whose baseline starts at `at`; capitals are `height_px` tall.
+pub fn text(image: &mut Image, text: &str, at: [f32; 2], height_px: f32, rgb: [u8; 3]) -> anyhow::Result<()> {
     if !(at[0].is_finite() && at[1].is_finite()) {
         return Ok(());
     }
-    let at = Point::new(at[0].clamp(-FAR_PX, FAR_PX).round() as i32, at[1].clamp(-FAR_PX, FAR_PX).round() as i32);
+    let at = Point::new(
+        at[0].clamp(-MAX_COORDINATE_PX, MAX_COORDINATE_PX).round() as i32,
+        at[1].clamp(-MAX_COORDINATE_PX, MAX_COORDINATE_PX).round() as i32,
+    );
     let (scale, weight) = font(height_px);
     let face = imgproc::FONT_HERSHEY_SIMPLEX;
-    on(image, |mat| imgproc::put_text(mat, words, at, face, scale, colour(rgb), weight, imgproc::LINE_AA, false))
+    draw_on(image, |mat| imgproc::put_text(mat, text, at, face, scale, colour(rgb), weight, imgproc::LINE_AA, false))
 }
 
-/// Width in px of `words` drawn by `text`.
-pub fn text_width(words: &str, height_px: f32) -> anyhow::Result<f32> {
+/// Width in px of a line of text of that height.
+pub fn text_width(text: &str, height_px: f32) -> anyhow::Result<f32> {
     let (scale, weight) = font(height_px);
-    let size = imgproc::get_text_size(words, imgproc::FONT_HERSHEY_SIMPLEX, scale, weight, &mut 0)
+    let size = imgproc::get_text_size(text, imgproc::FONT_HERSHEY_SIMPLEX, scale, weight, &mut 0)
         .context("measuring a line of text")?;
     Ok(size.width as f32)
 }
 
-/// Copies `cell` into the picture, its top left corner at `left`, `top`; rows that do not fit are left out.
+/// Copies `cell` into the image with its top left corner at `left`, `top`; rows that do not fit are dropped.
 pub fn paste(image: &mut Image, cell: &Image, [left, top]: [usize; 2]) {
     if cell.width == 0 || left + cell.width > image.width {
         return;
     }
     for (y, row) in cell.data.chunks_exact(3 * cell.width).enumerate() {
         let start = 3 * ((top + y) * image.width + left);
-        if let Some(place) = image.data.get_mut(start..start + row.len()) {
-            place.copy_from_slice(row);
+        if let Some(target) = image.data.get_mut(start..start + row.len()) {
+            target.copy_from_slice(row);
         }
     }
 }
 
-/// Scale and stroke width of the font: its capitals are 21 px tall at scale 1.
+/// Scale and stroke width of the font, whose capitals are 21 px tall at scale 1.
 fn font(height_px: f32) -> (f64, i32) {
     let height = f64::from(height_px.clamp(4.0, 500.0));
     (height / 21.0, (height / 14.0).round().max(1.0) as i32)
@@ -123,22 +126,22 @@ fn ring(image: &mut Image, centre: [f32; 2], radius_px: f32, width: i32, rgb: [u
     if !radius_px.is_finite() || radius_px < 0.0 {
         return Ok(());
     }
-    let radius = (radius_px.min(FAR_PX) * (1 << SHIFT) as f32).round() as i32;
-    on(image, |mat| imgproc::circle(mat, centre, radius, colour(rgb), width, imgproc::LINE_AA, SHIFT))
+    let radius = (radius_px.min(MAX_COORDINATE_PX) * (1 << SHIFT) as f32).round() as i32;
+    draw_on(image, |mat| imgproc::circle(mat, centre, radius, colour(rgb), width, imgproc::LINE_AA, SHIFT))
 }
 
 fn colour([r, g, b]: [u8; 3]) -> Scalar {
     Scalar::new(f64::from(r), f64::from(g), f64::from(b), 0.0)
 }
 
-/// Point in OpenCV's fixed-point coordinates; `None` where it is not finite.
+/// Point in OpenCV's fixed-point coordinates; `None` if it is not finite.
 fn fixed([x, y]: [f32; 2]) -> Option<Point> {
-    let digits = |v: f32| (v.clamp(-FAR_PX, FAR_PX) * (1 << SHIFT) as f32).round() as i32;
-    (x.is_finite() && y.is_finite()).then(|| Point::new(digits(x), digits(y)))
+    let to_fixed = |v: f32| (v.clamp(-MAX_COORDINATE_PX, MAX_COORDINATE_PX) * (1 << SHIFT) as f32).round() as i32;
+    (x.is_finite() && y.is_finite()).then(|| Point::new(to_fixed(x), to_fixed(y)))
 }
 
-/// Calls OpenCV on the picture's own memory.
-fn on(image: &mut Image, paint: impl FnOnce(&mut BoxedRefMut<Mat>) -> opencv::Result<()>) -> anyhow::Result<()> {
+/// Calls OpenCV on the memory of the image, without copying.
+fn draw_on(image: &mut Image, paint: impl FnOnce(&mut BoxedRefMut<Mat>) -> opencv::Result<()>) -> anyhow::Result<()> {
     if image.width == 0 || image.height == 0 {
         return Ok(());
     }
@@ -157,7 +160,7 @@ mod tests {
     const RED: [u8; 3] = [200, 10, 20];
 
     #[test]
-    fn shapes_land_where_they_are_asked_for_in_their_colour() {
+    fn shapes_are_drawn_at_their_position_in_their_colour() {
         let mut image = Image::filled(60, 40, WHITE);
         circle(&mut image, [15.0, 20.0], 6.0, RED).unwrap();
         assert_eq!(image.pixel(15, 20), RED);
@@ -169,24 +172,26 @@ mod tests {
     }
 
     #[test]
-    fn a_capsule_covers_its_area() {
+    fn capsule_covers_its_area() {
         let mut image = Image::filled(200, 100, WHITE);
         capsule(&mut image, [50.0, 50.0], 20.0, [150.0, 50.0], 10.0, [0; 3]).unwrap();
-        let ink: f64 = image.data.chunks(3).map(|p| 1.0 - f64::from(p[0]) / 255.0).sum();
-        // Trapezium between the tangents plus the two circle sectors beyond them.
+        let drawn_area: f64 = image.data.chunks(3).map(|p| 1.0 - f64::from(p[0]) / 255.0).sum();
+        // Trapezium between the tangents, plus the circle sectors outside it.
         let (d, big, small) = (100.0f64, 20.0f64, 10.0f64);
-        let open = ((big - small) / d).acos();
+        let tangent_angle = ((big - small) / d).acos();
         let tangent = (d * d - (big - small).powi(2)).sqrt();
-        let area = tangent * (big + small) + (std::f64::consts::PI - open) * big * big + open * small * small;
-        // OpenCV softens an edge about half a pixel outwards.
+        let area = tangent * (big + small)
+            + (std::f64::consts::PI - tangent_angle) * big * big
+            + tangent_angle * small * small;
+        // OpenCV blurs edges about half a pixel outwards.
         let area = area + 0.6 * (2.0 * tangent + std::f64::consts::PI * (big + small));
-        assert!((ink / area - 1.0).abs() < 0.02, "{ink} against {area}");
+        assert!((drawn_area / area - 1.0).abs() < 0.02, "{drawn_area} against {area}");
         assert_eq!((image.pixel(32, 50), image.pixel(158, 50)), ([0; 3], [0; 3]));
         assert_eq!((image.pixel(27, 50), image.pixel(163, 50)), (WHITE, WHITE));
     }
 
     #[test]
-    fn what_is_outside_or_not_a_number_leaves_the_picture_alone() {
+    fn out_of_range_and_non_finite_points_draw_nothing() {
         let mut image = Image::filled(20, 10, WHITE);
         circle(&mut image, [f32::NAN, 5.0], 3.0, RED).unwrap();
         line(&mut image, [5.0, 5.0], [f32::INFINITY, 5.0], 3.0, RED).unwrap();
@@ -198,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn text_is_as_wide_as_measured() {
+    fn text_width_matches_the_drawn_text() {
         let mut image = Image::filled(300, 40, WHITE);
         text(&mut image, "12.3 s", [10.0, 30.0], 20.0, [0; 3]).unwrap();
         let dark = |x: usize| (0..40).any(|y| image.pixel(x, y)[0] < 128);

@@ -1,4 +1,5 @@
-//! The only folder that uses OpenCV: warps and letterboxes, pixels to tensors, heat-map filters, drawing, PNG files.
+//! The only folder that uses OpenCV: warps and letterboxes, conversion to tensors, heat-map filters, drawing. PNG
+//! files are also here.
 
 pub mod blur;
 pub mod draw;

@@ -1,4 +1,4 @@
-//! PNG files.
+//! PNG reader and writer.
 
 use anyhow::{Context, Result, ensure};
 use orator_base::input;
@@ -8,9 +8,9 @@ use std::fs::File;
 use std::io::{BufReader, BufWriter, Write};
 use std::path::Path;
 
-/// Writes the picture; not atomically (a stage's folder, or `stage::workdir::replace`, sees to that).
+/// Writes an image in place; callers that need an atomic replacement use `stage::workdir::replace` or a stage folder.
 pub fn write(path: &Path, image: &Image) -> Result<()> {
-    let written = || -> Result<()> {
+    let attempt = || -> Result<()> {
         let mut file = BufWriter::new(File::create(path)?);
         let (width, height) = (u32::try_from(image.width)?, u32::try_from(image.height)?);
         let mut encoder = Encoder::new(&mut file, width, height);
@@ -21,7 +21,7 @@ pub fn write(path: &Path, image: &Image) -> Result<()> {
         writer.finish()?;
         Ok(file.flush()?)
     };
-    written().with_context(|| format!("cannot write the picture {}", path.display()))
+    attempt().with_context(|| format!("cannot write the picture {}", path.display()))
 }
 
 /// Reads any PNG as 8-bit RGB; transparency is dropped.
@@ -52,7 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_picture_survives_its_file() {
+    fn image_round_trips_through_png() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.png");
         let image = Image { width: 3, height: 2, data: (0..18).collect() };

@@ -1,18 +1,19 @@
-//! Pixels to network input: channel order, layout, scale, mean and standard deviation in one pass, by a table of 256
-//! values for each channel.
+//! Conversion of pixels to network input: channel order, layout, scale, mean and standard deviation in one pass, with
+//! a lookup table of 256 values per channel.
 
 use orator_base::types::image::Image;
 
-/// Conversion of bytes to numbers.
+/// Converter of images to normalised tensors.
 pub struct Normaliser {
-    /// Channels in the tensor's order: index of a pixel's byte, and its 256 values.
+    /// Per channel in tensor order: the index of its byte in a pixel, and its lookup table.
     channels: [(usize, Box<[f32; 256]>); 3],
     planar: bool,
 }
 
 impl Normaliser {
-    /// `(byte * scale - mean) / std`, `mean` and `std` in the tensor's channel order. `bgr`: the tensor's order is blue,
-    /// green, red. `planar`: one plane a channel (NCHW), else the channels of a pixel side by side (NHWC).
+    /// Creates the conversion `(byte * scale - mean) / std`, with `mean` and `std` in the channel order of the
+    /// tensor. `bgr`: that order is blue, green, red. `planar`: one plane per channel (NCHW), otherwise interleaved
+    /// channels (NHWC).
     pub fn new(bgr: bool, planar: bool, scale: f64, mean: [f64; 3], std: [f64; 3]) -> Self {
         let channel = |c: usize| {
             let table = std::array::from_fn(|byte| ((byte as f64 * scale - mean[c]) / std[c]) as f32);
@@ -21,7 +22,8 @@ impl Normaliser {
         Self { channels: [channel(0), channel(1), channel(2)], planar }
     }
 
-    /// Writes the picture into `tensor` (3 * width * height numbers; what is beyond either stays).
+    /// Writes the image into `tensor` of 3 * width * height numbers; excess elements of a larger tensor are
+    /// unchanged.
     pub fn fill(&self, image: &Image, tensor: &mut [f32]) {
         let [(i0, t0), (i1, t1), (i2, t2)] = &self.channels;
         let pixels = image.data.chunks_exact(3);
@@ -49,7 +51,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn order_axes_and_numbers() {
+    fn channel_order_layout_and_scale_are_applied() {
         let image = Image { width: 2, height: 1, data: vec![10, 20, 30, 40, 50, 60] };
         let mut tensor = [0.0; 6];
         Normaliser::new(true, true, 1.0, [1.0, 2.0, 3.0], [2.0, 1.0, 1.0]).fill(&image, &mut tensor);

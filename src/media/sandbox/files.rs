@@ -1,4 +1,5 @@
-//! Landlock: files are read and written as the rules say, TCP and signals to other processes end at the process.
+//! Landlock rules: files can be read and written only as `FileAccess` states; TCP and signals to other processes are
+//! blocked.
 
 use super::FileAccess;
 use landlock::{
@@ -7,7 +8,7 @@ use landlock::{
 };
 use std::path::PathBuf;
 
-/// Libraries and data of the system, and what the C library and ONNX Runtime ask about the machine.
+/// System libraries and data, and the files from which the C library and ONNX Runtime query the machine.
 const SYSTEM: [&str; 10] = [
     "/usr",
     "/lib",
@@ -21,14 +22,14 @@ const SYSTEM: [&str; 10] = [
     "/sys/fs/cgroup",
 ];
 
-/// Reading; no program is executed.
+/// Read access, without execution.
 const READ: BitFlags<AccessFs> = make_bitflags!(AccessFs::{ReadFile | ReadDir});
-/// Writing of files and folders alone: a link or a pipe could lead whoever reads them astray.
+/// Write access to regular files and folders only: a link or a pipe could mislead a later reader.
 const WRITE: BitFlags<AccessFs> = make_bitflags!(AccessFs::{
     ReadFile | ReadDir | WriteFile | Truncate | MakeReg | MakeDir | RemoveFile | RemoveDir
 });
 
-/// Restricts this thread and those it starts. Gives the version enforced, or why there is none.
+/// Restricts this thread and the threads that it starts. Returns the Landlock version enforced, or why it is not.
 pub(crate) fn restrict(access: &FileAccess) -> Result<String, String> {
     let status = enforce(access).map_err(|error| format!("Landlock: {error}"))?;
     let abi = match status.landlock {
@@ -52,12 +53,12 @@ fn enforce(access: &FileAccess) -> Result<landlock::RestrictionStatus, RulesetEr
     let abi = ABI::V7;
     let (reads, moves): (Vec<PathBuf>, BitFlags<AccessFs>) = match &access.reads {
         Some(reads) => (SYSTEM.iter().map(PathBuf::from).chain(reads.iter().cloned()).collect(), BitFlags::EMPTY),
-        // A process that reads everything moves finished files between its folders too.
+        // A process with full read access may also move finished files between its folders.
         None => (vec!["/".into()], AccessFs::Refer.into()),
     };
     let mut ruleset = Ruleset::default();
     if !moves.is_empty() {
-        // The first kernels with Landlock refuse every such move: no Landlock is better there.
+        // The first Landlock version blocks every such move, so Landlock is not used there.
         ruleset = ruleset.set_compatibility(CompatLevel::SoftRequirement).handle_access(moves)?;
         ruleset = ruleset.set_compatibility(CompatLevel::BestEffort);
     }
@@ -74,7 +75,7 @@ fn enforce(access: &FileAccess) -> Result<landlock::RestrictionStatus, RulesetEr
         .restrict_self()
 }
 
-/// The symbolic links of a folder, which may lead out of it.
+/// The symbolic links in a folder, which may point outside it.
 fn linked_files(folder: &PathBuf) -> Vec<PathBuf> {
     if folder.parent().is_none() || SYSTEM.iter().any(|system| folder.as_os_str() == *system) {
         return Vec::new();

@@ -1,5 +1,6 @@
-//! Restriction of the whole process for good, before it starts threads: which `files` it may read and write (Landlock),
-//! which system `calls` it may make (seccomp). Neither needs privileges. `stop_signals` is for whoever starts such a process.
+//! Permanent restriction of the process before it starts threads: the `files` that it can read and write (Landlock),
+//! and the system `calls` that it can make (seccomp). Neither needs privileges. `stop_signals` is for parents of such
+//! processes.
 
 mod calls;
 mod files;

@@ -1,24 +1,24 @@
-//! The restriction as a whole: what a restricted process may still do with files, and what the kernel enforces of it.
+//! Files that a restricted process can access, and a report of what the kernel enforces.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::path::PathBuf;
 
-/// Files and folders that a restricted process still reaches; what does not exist is passed over.
+/// Files and folders that a restricted process can access; missing ones are skipped.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FileAccess {
-    /// Read, with all beneath them, besides the libraries of the system; `None`: everything.
+    /// Paths that can be read, with everything below them, in addition to the system libraries; `None`: all files.
     pub reads: Option<Vec<PathBuf>>,
-    /// Folders beneath which files are made, written, renamed and removed.
+    /// Folders below which files can be created, written, renamed and removed.
     pub writes: Vec<PathBuf>,
 }
 
-/// What the kernel enforces, or why it does not.
+/// Restrictions that the kernel enforces, or why it does not.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Restriction {
-    /// Of files: the version of Landlock.
+    /// File access: the Landlock version.
     pub files: Result<String, String>,
-    /// Of system calls.
+    /// System calls.
     pub calls: Result<(), String>,
 }
 
@@ -40,9 +40,9 @@ impl fmt::Display for Restriction {
     }
 }
 
-/// Restricts this process for good: files as `access` says; no socket, no other program, no other process, no change of
-/// the system. What the kernel cannot enforce is left out and named in the answer. A process that has several threads
-/// already is left as it is, since only the calling one could be restricted.
+/// Restricts this process permanently: file access as in `access`; no sockets, no other programs or processes, no
+/// changes to the system. Restrictions that the kernel cannot enforce are skipped and named in the result. A process
+/// that already has several threads is not restricted, since only the calling thread could be.
 pub fn restrict(access: &FileAccess) -> Restriction {
     let n_threads = std::fs::read_dir("/proc/self/task").map_or(1, Iterator::count);
     if n_threads > 1 {
@@ -52,7 +52,8 @@ pub fn restrict(access: &FileAccess) -> Restriction {
     restrict_thread(access)
 }
 
-/// Restricts this thread and those it starts, as `restrict` does a process; other threads of the process stay free.
+/// Restricts this thread and the threads that it starts, as [`restrict`] does for a process; other threads are
+/// unaffected.
 pub fn restrict_thread(access: &FileAccess) -> Restriction {
     let calls = super::calls::restrict().map_err(|error| format!("seccomp: {error}"));
     Restriction { files: super::files::restrict(access), calls }
@@ -63,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_answer_names_what_is_missing() {
+    fn display_names_missing_restrictions() {
         let of = |files: Result<&str, &str>, calls: Result<(), &str>| Restriction {
             files: files.map(str::to_owned).map_err(str::to_owned),
             calls: calls.map_err(str::to_owned),

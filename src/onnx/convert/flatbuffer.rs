@@ -1,12 +1,12 @@
-//! Tables of a flatbuffer, read; every offset is checked against the end of the file.
+//! Reader for flatbuffer tables; every offset is checked against the end of the file.
 
 use super::layout::int32s;
 use anyhow::{Context, Result, ensure};
 
-/// The most entries of a list of tables.
+/// Maximum number of entries in a list of tables.
 const MAX_TABLES: usize = 1 << 14;
 
-/// One table: fields by number, absent ones at their default.
+/// A table: fields are accessed by number; absent ones have their default.
 #[derive(Clone, Copy)]
 pub(crate) struct FlatTable<'a> {
     file: &'a [u8],
@@ -16,63 +16,64 @@ pub(crate) struct FlatTable<'a> {
 }
 
 impl<'a> FlatTable<'a> {
-    /// The table that the file begins with.
+    /// The root table of the file.
     pub(crate) fn root(file: &'a [u8]) -> Result<Self> {
         Self::at(file, target(file, 0)?)
     }
 
     fn at(file: &'a [u8], position: usize) -> Result<Self> {
-        let back = i32::from_le_bytes(read(file, position)?);
-        let vtable =
-            position.checked_add_signed(-(back as isize)).context("a table's list of fields is not in the file")?;
+        let vtable_offset = i32::from_le_bytes(read(file, position)?);
+        let vtable = position
+            .checked_add_signed(-(vtable_offset as isize))
+            .context("a table's list of fields is not in the file")?;
         let n_bytes = usize::from(u16::from_le_bytes(read(file, vtable)?));
         let offsets = file.get(vtable + 4..vtable + n_bytes.max(4));
         Ok(Self { file, position, offsets: offsets.context("a table's list of fields is not in the file")? })
     }
 
-    /// Where a field is, if it is there.
+    /// Position of a field, if present.
     fn field(&self, field: usize) -> Option<usize> {
         let offset = self.offsets.get(2 * field..2 * field + 2)?;
         let offset = usize::from(offset[0]) | usize::from(offset[1]) << 8;
         (offset != 0).then_some(self.position + offset)
     }
 
-    /// An 8-bit number; absent: 0.
+    /// Reads an 8-bit number; 0 if absent.
     pub(crate) fn byte(&self, field: usize) -> Result<i8> {
         self.field(field).map_or(Ok(0), |at| Ok(i8::from_le_bytes(read(self.file, at)?)))
     }
 
-    /// A 32-bit number.
+    /// Reads a 32-bit number; `absent` if absent.
     pub(crate) fn int(&self, field: usize, absent: i32) -> Result<i32> {
         self.field(field).map_or(Ok(absent), |at| Ok(i32::from_le_bytes(read(self.file, at)?)))
     }
 
-    /// A table.
+    /// Reads a table.
     pub(crate) fn table(&self, field: usize) -> Result<Option<Self>> {
         let Some(at) = self.field(field) else { return Ok(None) };
         Self::at(self.file, target(self.file, at)?).map(Some)
     }
 
-    /// A list of tables.
+    /// Reads a list of tables.
     pub(crate) fn tables(&self, field: usize) -> Result<Vec<Self>> {
         let (n_tables, start, _) = self.list(field, 4)?;
         ensure!(n_tables <= MAX_TABLES, "a list of tables has at most {MAX_TABLES} entries, not {n_tables}");
         (0..n_tables).map(|k| Self::at(self.file, target(self.file, start + 4 * k)?)).collect()
     }
 
-    /// A list of 32-bit numbers. Errors: more than `max` of them.
+    /// Reads a list of at most `max` 32-bit numbers.
     pub(crate) fn ints(&self, field: usize, max: usize) -> Result<Vec<i32>> {
         let (n_ints, _, bytes) = self.list(field, 4)?;
         ensure!(n_ints <= max, "a list has at most {max} numbers, not {n_ints}");
         Ok(int32s(bytes).collect())
     }
 
-    /// A list of bytes.
+    /// Reads a list of bytes.
     pub(crate) fn bytes(&self, field: usize) -> Result<&'a [u8]> {
         Ok(self.list(field, 1)?.2)
     }
 
-    /// The number of entries, where they start, and their bytes.
+    /// The number of entries of a list, the position of the first one, and their bytes.
     fn list(&self, field: usize, n_bytes: usize) -> Result<(usize, usize, &'a [u8])> {
         let Some(at) = self.field(field) else { return Ok((0, 0, &[])) };
         let list = target(self.file, at)?;
@@ -92,7 +93,7 @@ fn read<const N: usize>(file: &[u8], at: usize) -> Result<[u8; N]> {
     bytes.with_context(|| format!("the file ends before byte {}", at.saturating_add(N)))
 }
 
-/// What the offset at `at` points to.
+/// Position to which the offset at `at` points.
 fn target(file: &[u8], at: usize) -> Result<usize> {
     Ok(at + u32::from_le_bytes(read(file, at)?) as usize)
 }

@@ -1,11 +1,11 @@
-//! An ONNX graph under construction: operators in the order in which they run, and weights, equal ones stored once.
+//! An ONNX graph under construction: operators in execution order, and weights, where equal ones are stored once.
 
 use super::layout::{SlidingWindow, four, transposed};
 use super::protobuf::{bytes, float, number};
 use anyhow::{Result, ensure};
 use std::collections::BTreeMap;
 
-/// The numbers of a tensor, with ONNX's numbers for them.
+/// Element type of a tensor, with its number in ONNX.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ElementType {
     F32 = 1,
@@ -24,7 +24,7 @@ impl ElementType {
     }
 }
 
-/// The value of an operator's attribute.
+/// Value of an operator attribute.
 #[derive(Clone, Copy)]
 pub enum AttributeValue<'a> {
     Int(i64),
@@ -33,7 +33,7 @@ pub enum AttributeValue<'a> {
     Ints(&'a [i64]),
 }
 
-/// Operators and weights so far.
+/// Builder with the operators and weights added so far.
 pub struct OnnxGraph {
     nodes: Vec<u8>,
     n_ops: usize,
@@ -43,25 +43,26 @@ pub struct OnnxGraph {
 }
 
 impl OnnxGraph {
-    /// An empty graph for a source of `n_bytes`: no honest conversion gives more than twice as many bytes of weights.
+    /// Creates an empty graph for a source of `n_bytes`, which limits the weights: no valid conversion more than
+    /// doubles their size.
     pub fn new(n_bytes: usize) -> Self {
         let n_weight_bytes_left = n_bytes.saturating_mul(2).saturating_add(1 << 20);
         Self { nodes: Vec::new(), n_ops: 0, weights: Vec::new(), constants: BTreeMap::new(), n_weight_bytes_left }
     }
 
-    /// An operator with one output, whose name is given back.
+    /// Adds an operator with one output and returns the name of the output.
     pub fn op(&mut self, kind: &str, inputs: &[&str], attributes: &[(&str, AttributeValue)]) -> String {
         let output = format!("t{}", self.n_ops + 1);
         self.add(kind, inputs, std::slice::from_ref(&output), attributes);
         output
     }
 
-    /// An operator whose output is the graph's output `name`.
+    /// Adds an operator whose output is the graph output `name`.
     pub fn output(&mut self, name: &str, kind: &str, inputs: &[&str], attributes: &[(&str, AttributeValue)]) {
         self.add(kind, inputs, &[name.to_owned()], attributes);
     }
 
-    /// An operator with `n` outputs.
+    /// Adds an operator with `n` outputs and returns their names.
     pub fn ops(&mut self, n: usize, kind: &str, inputs: &[&str], attributes: &[(&str, AttributeValue)]) -> Vec<String> {
         let outputs: Vec<String> = (0..n).map(|k| format!("t{}_{k}", self.n_ops + 1)).collect();
         self.add(kind, inputs, &outputs, attributes);
@@ -81,8 +82,11 @@ impl OnnxGraph {
         bytes(&mut self.nodes, 1, &node);
     }
 
-    /// The name of a constant, as float32 where it is given as float16; equal ones share it. Errors: `raw`
-    /// (little-endian) has another length than `dims` says; the weights grow beyond the source's size.
+    /// Adds a constant, or reuses an equal one, and returns its name; float16 is cast to float32.
+    ///
+    /// # Errors
+    ///
+    /// `raw` (little-endian) does not match `dims`, or the weights exceed the limit for the source.
     pub fn constant(&mut self, element: ElementType, dims: &[usize], raw: &[u8]) -> Result<String> {
         let size = element.n_bytes();
         let n_bytes = dims.iter().try_fold(size, |product: usize, dim| product.checked_mul(*dim));
@@ -114,7 +118,7 @@ impl OnnxGraph {
         Ok(name)
     }
 
-    /// A weight of the sizes `shape`, its axes reordered, or with the sizes `dims` instead of its own.
+    /// Adds a weight of shape `shape`, with its axes reordered by `order` or reshaped to `dims`.
     pub fn weight(
         &mut self,
         (element, shape, raw): (ElementType, &[usize], &[u8]),
@@ -127,29 +131,29 @@ impl OnnxGraph {
         self.constant(element, &order.map(|axis| shape[axis]), &raw)
     }
 
-    /// A constant of floats.
+    /// Adds a float constant.
     pub fn floats(&mut self, dims: &[usize], values: &[f32]) -> Result<String> {
         self.constant(ElementType::F32, dims, &values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<_>>())
     }
 
-    /// A constant row of sizes.
+    /// Adds a 1-D constant of sizes.
     pub fn sizes(&mut self, sizes: &[usize]) -> Result<String> {
         self.ints(&sizes.iter().map(|size| *size as i64).collect::<Vec<_>>())
     }
 
-    /// The values side by side along an axis.
+    /// Concatenates values along an axis.
     pub fn concat(&mut self, values: &[String], axis: i64) -> String {
-        self.op("Concat", &texts(values), &[("axis", AttributeValue::Int(axis))])
+        self.op("Concat", &as_strs(values), &[("axis", AttributeValue::Int(axis))])
     }
 
-    /// Values above 6 or below 0 cut off.
+    /// Clips values to 0..6.
     pub fn relu6(&mut self, value: &str) -> Result<String> {
         let (low, high) = (self.floats(&[], &[0.0])?, self.floats(&[], &[6.0])?);
         Ok(self.op("Clip", &[value, &low, &high], &[]))
     }
 
-    /// Convolution (`inputs`: image, weight and, if there is one, bias; `group`) or, without `group`, the maximum of
-    /// windows over height and width. `pads`: zeros at the top, left, bottom and right.
+    /// Convolution (`inputs`: image, weight and optionally bias; `group`) or, without `group`, max pooling, over
+    /// height and width. `pads`: zeros at the top, left, bottom and right.
     pub(crate) fn windowed(
         &mut self,
         inputs: &[String],
@@ -158,9 +162,9 @@ impl OnnxGraph {
         group: Option<usize>,
         has_dilations: bool,
     ) -> String {
-        let along = |of: fn(SlidingWindow) -> usize| windows.map(|window| of(window) as i64);
-        let [kernel, strides] = [along(|window| window.kernel), along(|window| window.stride)];
-        let dilations = along(|window| window.dilation);
+        let per_axis = |of: fn(SlidingWindow) -> usize| windows.map(|window| of(window) as i64);
+        let [kernel, strides] = [per_axis(|window| window.kernel), per_axis(|window| window.stride)];
+        let dilations = per_axis(|window| window.dilation);
         let mut attributes = vec![
             ("kernel_shape", AttributeValue::Ints(&kernel)),
             ("strides", AttributeValue::Ints(&strides)),
@@ -168,16 +172,16 @@ impl OnnxGraph {
         ];
         attributes.extend(group.map(|group| ("group", AttributeValue::Int(group as i64))));
         attributes.extend(has_dilations.then_some(("dilations", AttributeValue::Ints(&dilations))));
-        self.op(if group.is_some() { "Conv" } else { "MaxPool" }, &texts(inputs), &attributes)
+        self.op(if group.is_some() { "Conv" } else { "MaxPool" }, &as_strs(inputs), &attributes)
     }
 
-    /// A constant row of integers.
+    /// Adds a 1-D integer constant.
     pub fn ints(&mut self, values: &[i64]) -> Result<String> {
         let raw: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
         self.constant(ElementType::I64, &[values.len()], &raw)
     }
 
-    /// The bytes of the model file with these inputs and outputs (name and sizes), all float32.
+    /// Contents of the model file with these float32 inputs and outputs (name and shape).
     pub fn model(self, inputs: &[(&str, &[usize])], outputs: &[(&str, &[usize])]) -> Vec<u8> {
         let mut graph = self.nodes;
         bytes(&mut graph, 2, b"pose");
@@ -195,7 +199,7 @@ impl OnnxGraph {
     }
 }
 
-fn texts(values: &[String]) -> Vec<&str> {
+fn as_strs(values: &[String]) -> Vec<&str> {
     values.iter().map(String::as_str).collect()
 }
 
@@ -224,7 +228,7 @@ fn attribute(name: &str, value: AttributeValue) -> Vec<u8> {
     out
 }
 
-/// A float32 tensor by name and sizes, as inputs and outputs are declared.
+/// Declaration of a float32 input or output with its name and shape.
 fn port(name: &str, dims: &[usize]) -> Vec<u8> {
     let (mut shape, mut tensor, mut kind, mut port) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for dim in dims {

@@ -1,21 +1,20 @@
-//! Sizes of windows, and the order of a tensor's axes: pictures are channels first (NCHW) in ONNX, channels last (NHWC) in
-//! TensorFlow.
+//! Window sizes and axis orders: images are channels first (NCHW) in ONNX and channels last (NHWC) in TensorFlow.
 
 use anyhow::{Context, Result, ensure};
 
-/// The largest size of one axis; products of two stay far below an overflow.
+/// Maximum size of one axis; products of two are far from overflow.
 pub(crate) const MAX_SIZE: usize = 1 << 24;
 
-/// Where each axis of NCHW stands in NHWC.
+/// Index in NHWC of each axis of NCHW.
 pub(crate) const CHANNELS_FIRST: [usize; 4] = [0, 3, 1, 2];
 
-/// A size read from a file. Errors: the number is not in 1..=`MAX_SIZE`.
+/// Checks a size read from a file. Errors: the number is not in 1..=`MAX_SIZE`.
 pub(crate) fn size(number: i64) -> Result<usize> {
     let size = usize::try_from(number).ok().filter(|size| (1..=MAX_SIZE).contains(size));
     size.with_context(|| format!("a size is 1 to {MAX_SIZE}, not {number}"))
 }
 
-/// Little-endian 32-bit integers.
+/// Decodes little-endian 32-bit integers.
 pub(crate) fn int32s(raw: &[u8]) -> impl Iterator<Item = i32> {
     raw.as_chunks().0.iter().map(|int| i32::from_le_bytes(*int))
 }
@@ -25,8 +24,8 @@ pub(crate) fn four(what: &str, dims: &[usize]) -> Result<[usize; 4]> {
     dims.try_into().ok().with_context(|| format!("{what} has 4 axes, not the sizes {dims:?}"))
 }
 
-/// The bytes of a tensor with `dims` whose axis `k` comes from axis `order[k]`. Errors: `raw` has another length than
-/// `dims` and `n_bytes` a number say.
+/// Transposes a tensor of shape `dims`, so that axis `k` of the result is axis `order[k]` of the input. Errors: the
+/// length of `raw` does not match `dims` with `n_bytes` per element.
 pub(crate) fn transposed(raw: &[u8], n_bytes: usize, dims: [usize; 4], order: [usize; 4]) -> Result<Vec<u8>> {
     let expected = dims.iter().try_fold(n_bytes, |product: usize, dim| product.checked_mul(*dim));
     ensure!(
@@ -51,7 +50,7 @@ pub(crate) fn transposed(raw: &[u8], n_bytes: usize, dims: [usize; 4], order: [u
     Ok(out)
 }
 
-/// A window that slides over one axis.
+/// A sliding window over one axis.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SlidingWindow {
     pub kernel: usize,
@@ -60,18 +59,19 @@ pub(crate) struct SlidingWindow {
 }
 
 impl SlidingWindow {
-    /// The numbers of zeros before and after an axis of `size`, so that the result has `size / stride` steps, rounded up.
+    /// Numbers of zeros before and after an axis of `size` for TensorFlow's SAME padding, which yields `size /
+    /// stride` steps, rounded up.
     pub(crate) fn same_padding(self, size: usize) -> (usize, usize) {
-        let reach = (size.div_ceil(self.stride) - 1) * self.stride + (self.kernel - 1) * self.dilation + 1;
-        let total = reach.saturating_sub(size);
+        let extent = (size.div_ceil(self.stride) - 1) * self.stride + (self.kernel - 1) * self.dilation + 1;
+        let total = extent.saturating_sub(size);
         (total / 2, total - total / 2)
     }
 
-    /// The number of steps over an axis of `size`, padding included. Errors: the window does not fit in once.
+    /// Number of steps over an axis of `size`, which includes padding. Errors: the window is larger than the axis.
     pub(crate) fn n_steps(self, size: usize) -> Result<usize> {
-        let reach = (self.kernel - 1) * self.dilation + 1;
-        ensure!(reach <= size, "a window of {reach} cells does not fit into {size}");
-        Ok((size - reach) / self.stride + 1)
+        let extent = (self.kernel - 1) * self.dilation + 1;
+        ensure!(extent <= size, "a window of {extent} cells does not fit into {size}");
+        Ok((size - extent) / self.stride + 1)
     }
 }
 
@@ -80,9 +80,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn axes_change_places() {
+    fn axes_are_transposed() {
         let raw: Vec<u8> = (0..12).collect();
-        // [1, 2, 3, 2] channels last to [1, 2, 2, 3]
+        // [1, 2, 3, 2] channels last to [1, 2, 2, 3].
         let out = transposed(&raw, 1, [1, 2, 3, 2], CHANNELS_FIRST).unwrap();
         assert_eq!(out, [0, 2, 4, 6, 8, 10, 1, 3, 5, 7, 9, 11]);
         assert_eq!(transposed(&raw, 2, [1, 1, 3, 2], [0, 1, 3, 2]).unwrap()[..6], [0, 1, 4, 5, 8, 9]);
@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn a_window_is_padded_to_the_size_it_should_give() {
+    fn same_padding_yields_the_expected_size() {
         let window = SlidingWindow { kernel: 3, stride: 2, dilation: 1 };
         assert_eq!((window.same_padding(8), window.same_padding(7)), ((0, 1), (1, 1)));
         assert_eq!(window.n_steps(9).unwrap(), 4);

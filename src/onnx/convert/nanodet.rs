@@ -1,5 +1,6 @@
-//! NanoDet to boxes of people. Each cell of three grids foretells four distances to the sides of a box, each as a
-//! distribution over whole multiples of the grid's stride, whose mean counts (Li et al. 2020, section 3).
+//! Converts NanoDet to person bounding boxes. Each cell of three grids predicts the distances to the four sides of a
+//! box, each as a distribution over multiples of the stride of the grid, of which the mean is taken (Li et al. 2020,
+//! section 3).
 
 use super::graph::AttributeValue::{Int, Ints};
 use super::graph::OnnxGraph;
@@ -8,19 +9,19 @@ use super::tfjs::{TfConverter, TfValue};
 use super::tfjs_file::TfGraph;
 use anyhow::{Result, bail, ensure};
 
-/// The ends of the heads with the pixels of a cell's side: classes, then distributions.
+/// Output nodes of the heads (classes, then distributions) with the strides of their grids in pixels.
 const HEADS: [(&str, usize); 3] =
     [("PartitionedCall/Add_29", 8), ("PartitionedCall/Add_33", 16), ("PartitionedCall/Add_37", 32)];
-/// Classes of COCO; the first one is a person.
+/// Number of COCO classes; the first one is a person.
 const N_CLASSES: usize = 80;
 
-/// Whether the graph has the nodes of a NanoDet.
+/// Whether the graph contains the nodes of a NanoDet.
 pub(crate) fn is_nanodet(source: &TfGraph) -> bool {
     HEADS.iter().all(|(node, _)| source.nodes.contains_key(*node))
 }
 
-/// The model as ONNX: image [1, 3, S, S] to rows [1, cells, 5] of x0, y0, x1, y1 in pixels of the input and the score of
-/// a person, 0..1.
+/// Converts the model to ONNX: image [1, 3, S, S] to rows [1, cells, 5] of x0, y0, x1, y1 in pixels of the input, and
+/// the person score, 0..1.
 pub(crate) fn convert(source: &TfGraph, graph: OnnxGraph, options: &ConversionOptions) -> Result<Vec<u8>> {
     let (shape, output) = (options.shape()?, options.only_output()?);
     let [1, 3, side, width] = shape[..] else { bail!("the input has the sizes 1, 3, S, S, not {shape:?}") };
@@ -48,12 +49,12 @@ pub(crate) fn convert(source: &TfGraph, graph: OnnxGraph, options: &ConversionOp
         let bins = slice(graph, &head.name, 1, [N_CLASSES, channels])?;
         let by_side = graph.sizes(&[1, 4, n_bins, n_cells])?;
         let bins = graph.op("Reshape", &[&bins, &by_side], &[]);
-        let likely = graph.op("Softmax", &[&bins], &[("axis", Int(2))]);
+        let distribution = graph.op("Softmax", &[&bins], &[("axis", Int(2))]);
         let lengths: Vec<f32> = (0..n_bins).map(|bin| (bin * stride) as f32).collect();
         let lengths = graph.floats(&[1, 1, n_bins, 1], &lengths)?;
-        let likely = graph.op("Mul", &[&likely, &lengths], &[]);
+        let distribution = graph.op("Mul", &[&distribution, &lengths], &[]);
         let axis = graph.ints(&[2])?;
-        distances.push(graph.op("ReduceSum", &[&likely, &axis], &[("keepdims", Int(0))]));
+        distances.push(graph.op("ReduceSum", &[&distribution, &axis], &[("keepdims", Int(0))]));
         let centre = |cell: usize| (cell as f32 + 0.5) * stride as f32;
         columns.extend((0..n_cells).map(|cell| centre(cell % n_side)));
         rows.extend((0..n_cells).map(|cell| centre(cell / n_side)));
@@ -72,7 +73,7 @@ pub(crate) fn convert(source: &TfGraph, graph: OnnxGraph, options: &ConversionOp
     Ok(source.graph.model(&[(&options.input.name, &shape)], &[(output, &[1, n_cells, 5])]))
 }
 
-/// Part of an axis.
+/// Slices a value along an axis.
 fn slice(graph: &mut OnnxGraph, value: &str, axis: i64, [start, end]: [usize; 2]) -> Result<String> {
     let (start, end, axis) = (graph.sizes(&[start])?, graph.sizes(&[end])?, graph.ints(&[axis])?);
     Ok(graph.op("Slice", &[value, &start, &end, &axis], &[]))

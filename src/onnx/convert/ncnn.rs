@@ -1,4 +1,4 @@
-//! ncnn: layers over blobs of channels, rows and columns, without a batch.
+//! Converts ncnn models: layers over blobs of channels, rows and columns, without a batch axis.
 
 use super::graph::AttributeValue::{Int, Ints, Text};
 use super::graph::{ElementType, OnnxGraph};
@@ -8,17 +8,17 @@ use super::source::ConversionOptions;
 use anyhow::{Context, Result, bail, ensure};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Stands for "the rest" in the sizes of a slice.
+/// Value that means "the rest" in the sizes of a slice.
 const REST: f64 = -233.0;
 
-/// A blob: its name in the result; channels, rows, columns.
+/// A blob: its name in the result, and its shape: channels, rows, columns.
 #[derive(Clone, Debug)]
 struct NcnnBlob {
     name: String,
     shape: [usize; 3],
 }
 
-/// A conversion under way.
+/// State of a conversion.
 struct NcnnConverter<'a> {
     blobs: BTreeMap<&'a str, NcnnBlob>,
     weights: NcnnWeights<'a>,
@@ -26,7 +26,7 @@ struct NcnnConverter<'a> {
     input: NcnnBlob,
 }
 
-/// The model as ONNX; its outputs are the blobs that no layer reads.
+/// Converts the model to ONNX; its outputs are the blobs that no layer reads.
 pub(crate) fn convert(
     parameters: &[u8],
     weights: &[u8],
@@ -41,9 +41,9 @@ pub(crate) fn convert(
     let weights = NcnnWeights::new(weights);
     let mut converter = NcnnConverter { blobs: BTreeMap::new(), weights, graph, input };
     for layer in &layers {
-        let place = || format!("the layer {:?} ({})", layer.name, layer.kind);
-        let outputs = converter.layer(layer).with_context(place)?;
-        ensure!(outputs.len() == layer.outputs.len(), "{} has {} outputs", place(), outputs.len());
+        let layer_name = || format!("the layer {:?} ({})", layer.name, layer.kind);
+        let outputs = converter.layer(layer).with_context(layer_name)?;
+        ensure!(outputs.len() == layer.outputs.len(), "{} has {} outputs", layer_name(), outputs.len());
         converter.blobs.extend(layer.outputs.iter().copied().zip(outputs));
     }
     converter.weights.end()?;
@@ -70,32 +70,33 @@ impl<'a> NcnnConverter<'a> {
         self.blobs.get(name).cloned().with_context(|| format!("no layer before gives {name:?}"))
     }
 
-    /// What a layer gives, one blob an output.
+    /// Converts a layer and returns one blob per output.
     fn layer(&mut self, layer: &NcnnLayer<'a>) -> Result<Vec<NcnnBlob>> {
         let inputs = layer.inputs.iter().map(|name| self.blob(name)).collect::<Result<Vec<_>>>()?;
         let first = || inputs.first().cloned().context("it has no input");
         let result = match layer.kind {
             "Input" => {
-                layer.knows(&[0, 1, 2])?;
-                let said = [layer.int(2, 0)?, layer.int(1, 0)?, layer.int(0, 0)?];
+                layer.check_keys(&[0, 1, 2])?;
+                let stated = [layer.int(2, 0)?, layer.int(1, 0)?, layer.int(0, 0)?];
                 let described = self.input.shape;
-                let agrees = said.iter().zip(described).all(|(said, size)| *said == 0 || *said == size as i64);
-                ensure!(agrees, "the input has the sizes {said:?}, the description says {described:?}");
+                let is_consistent =
+                    stated.iter().zip(described).all(|(stated, size)| *stated == 0 || *stated == size as i64);
+                ensure!(is_consistent, "the input has the sizes {stated:?}, the description says {described:?}");
                 self.input.clone()
             }
             "Split" => {
-                layer.knows(&[])?;
+                layer.check_keys(&[])?;
                 return Ok(vec![first()?; layer.outputs.len()]);
             }
             "Slice" => return self.slice(layer, first()?),
             "Convolution" | "ConvolutionDepthWise" => self.convolution(layer, first()?)?,
             "ReLU" => {
-                layer.knows(&[])?;
+                layer.check_keys(&[])?;
                 let NcnnBlob { name, shape } = first()?;
                 NcnnBlob { name: self.graph.op("Relu", &[&name], &[]), shape }
             }
             "BinaryOp" => {
-                layer.knows(&[0])?;
+                layer.check_keys(&[0])?;
                 let [a, b] = inputs.as_slice() else { bail!("it has 2 inputs, not {}", inputs.len()) };
                 ensure!(layer.int(0, 0)? == 0, "the operation is an addition (0), not {}", layer.int(0, 0)?);
                 ensure!(a.shape == b.shape, "the sizes of its inputs differ: {:?} and {:?}", a.shape, b.shape);
@@ -103,7 +104,7 @@ impl<'a> NcnnConverter<'a> {
             }
             "Concat" => self.concatenation(layer, &inputs)?,
             "Reshape" => {
-                layer.knows(&[0, 1, 2])?;
+                layer.check_keys(&[0, 1, 2])?;
                 let NcnnBlob { name, shape } = first()?;
                 let new = [size(layer.int(2, 0)?)?, size(layer.int(1, 0)?)?, size(layer.int(0, 0)?)?];
                 ensure!(count(new) == count(shape), "the sizes {shape:?} cannot become {new:?}");
@@ -111,7 +112,7 @@ impl<'a> NcnnConverter<'a> {
                 NcnnBlob { name: self.graph.op("Reshape", &[&name, &sizes], &[]), shape: new }
             }
             "Permute" => {
-                layer.knows(&[0])?;
+                layer.check_keys(&[0])?;
                 let NcnnBlob { name, shape: [channels, height, width] } = first()?;
                 ensure!(layer.int(0, 0)? == 2, "rows and channels change places (2), not {}", layer.int(0, 0)?);
                 let name = self.graph.op("Transpose", &[&name], &[("perm", Ints(&[0, 2, 1, 3]))]);
@@ -124,7 +125,7 @@ impl<'a> NcnnConverter<'a> {
     }
 
     fn slice(&mut self, layer: &NcnnLayer, NcnnBlob { name, shape }: NcnnBlob) -> Result<Vec<NcnnBlob>> {
-        layer.knows(&[0, 1])?;
+        layer.check_keys(&[0, 1])?;
         let axis = axis(layer.int(1, 0)?)?;
         let (parts, mut left, mut sizes) = (layer.list(0), shape[axis], Vec::new());
         for (k, part) in parts.iter().enumerate() {
@@ -146,7 +147,7 @@ impl<'a> NcnnConverter<'a> {
     }
 
     fn concatenation(&mut self, layer: &NcnnLayer, parts: &[NcnnBlob]) -> Result<NcnnBlob> {
-        layer.knows(&[0])?;
+        layer.check_keys(&[0])?;
         let axis = axis(layer.int(0, 0)?)?;
         let mut shape = parts.first().context("it has no inputs")?.shape;
         shape[axis] = 0;
@@ -161,7 +162,7 @@ impl<'a> NcnnConverter<'a> {
     }
 
     fn convolution(&mut self, layer: &NcnnLayer, NcnnBlob { name, shape }: NcnnBlob) -> Result<NcnnBlob> {
-        layer.knows(&[0, 1, 2, 3, 4, 5, 6, 7, 9, 11, 12, 13, 14, 15, 16])?;
+        layer.check_keys(&[0, 1, 2, 3, 4, 5, 6, 7, 9, 11, 12, 13, 14, 15, 16])?;
         let of = |key: i32, absent: usize| size(layer.int(key, absent as i64)?);
         let channels = of(0, 0)?;
         let group = if layer.kind == "Convolution" { 1 } else { of(7, 1)? };
@@ -170,24 +171,24 @@ impl<'a> NcnnConverter<'a> {
             "{} to {channels} channels cannot be in {group} groups",
             shape[0]
         );
-        let along = SlidingWindow { kernel: of(1, 0)?, stride: of(3, 1)?, dilation: of(2, 1)? };
-        let down = SlidingWindow {
-            kernel: of(11, along.kernel)?,
-            stride: of(13, along.stride)?,
-            dilation: of(12, along.dilation)?,
+        let horizontal = SlidingWindow { kernel: of(1, 0)?, stride: of(3, 1)?, dilation: of(2, 1)? };
+        let vertical = SlidingWindow {
+            kernel: of(11, horizontal.kernel)?,
+            stride: of(13, horizontal.stride)?,
+            dilation: of(12, horizontal.dilation)?,
         };
         let left = layer.int(4, 0)?;
         let top = layer.int(14, left)?;
         let pads = [top, left, layer.int(16, top)?, layer.int(15, left)?];
         ensure!(pads.iter().all(|n_zeros| (0..4096).contains(n_zeros)), "the zeros at the sides are {pads:?}");
         let padded = |size: usize, before: i64, after: i64| size + (before + after) as usize;
-        let height = down.n_steps(padded(shape[1], pads[0], pads[2]))?;
-        let width = along.n_steps(padded(shape[2], pads[1], pads[3]))?;
+        let height = vertical.n_steps(padded(shape[1], pads[0], pads[2]))?;
+        let width = horizontal.n_steps(padded(shape[2], pads[1], pads[3]))?;
 
-        let dims = [channels, shape[0] / group, down.kernel, along.kernel];
+        let dims = [channels, shape[0] / group, vertical.kernel, horizontal.kernel];
         let n_weights = dims.iter().try_fold(1, |product: usize, dim| product.checked_mul(*dim));
         ensure!(
-            n_weights.is_some_and(|n| layer.int(6, 0).is_ok_and(|said| said == n as i64)),
+            n_weights.is_some_and(|n| layer.int(6, 0).is_ok_and(|stated| stated == n as i64)),
             "a weight of the sizes {dims:?} does not have {} numbers",
             layer.int(6, 0)?
         );
@@ -197,7 +198,7 @@ impl<'a> NcnnConverter<'a> {
             let bias = self.weights.plain(channels)?;
             inputs.push(self.graph.constant(ElementType::F32, &[channels], bias)?);
         }
-        let mut name = self.graph.windowed(&inputs, [down, along], pads, Some(group), true);
+        let mut name = self.graph.windowed(&inputs, [vertical, horizontal], pads, Some(group), true);
         match layer.int(9, 0)? {
             0 => {}
             1 => name = self.graph.op("Relu", &[&name], &[]),
@@ -206,14 +207,14 @@ impl<'a> NcnnConverter<'a> {
         Ok(NcnnBlob { name, shape: [channels, height, width] })
     }
 
-    /// Nearest cell by a whole factor, or bilinear with the corners on each other.
+    /// Nearest-neighbour resize by an integer factor, or bilinear resize with aligned corners.
     fn resize(&mut self, layer: &NcnnLayer, NcnnBlob { name, shape }: NcnnBlob) -> Result<NcnnBlob> {
-        layer.knows(&[0, 1, 2, 3, 4, 6])?;
-        let said = [size(layer.int(3, 0)?.max(1))?, size(layer.int(4, 0)?.max(1))?];
+        layer.check_keys(&[0, 1, 2, 3, 4, 6])?;
+        let stated = [size(layer.int(3, 0)?.max(1))?, size(layer.int(4, 0)?.max(1))?];
         let factor = [size(layer.int(1, 1)?)?, size(layer.int(2, 1)?)?];
         let (sides, mode) = match (layer.int(0, 0)?, layer.int(3, 0)?, layer.int(6, 0)?) {
             (1, 0, 0) => ([shape[1] * factor[0], shape[2] * factor[1]], ["nearest", "asymmetric"]),
-            (2, 1.., 1) => (said, ["linear", "align_corners"]),
+            (2, 1.., 1) => (stated, ["linear", "align_corners"]),
             (kind, _, _) => bail!("nearest (1) by a factor, bilinear (2) to a size with the corners kept, not {kind}"),
         };
         let [height, width] = [size(sides[0] as i64)?, size(sides[1] as i64)?];
@@ -228,7 +229,7 @@ impl<'a> NcnnConverter<'a> {
     }
 }
 
-/// Channels, rows or columns.
+/// Checks an axis index: channels, rows or columns.
 fn axis(number: i64) -> Result<usize> {
     usize::try_from(number).ok().filter(|axis| *axis < 3).with_context(|| format!("there is no axis {number} among 3"))
 }

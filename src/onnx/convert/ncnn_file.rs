@@ -1,17 +1,17 @@
-//! The two files of an ncnn model: a line of text for each layer, and the weights one after the other.
+//! The two files of an ncnn model: one line of text per layer, and the concatenated weights.
 
 use super::graph::ElementType;
 use anyhow::{Context, Result, bail, ensure};
 use std::collections::BTreeMap;
 
-/// The first line of the text.
+/// First line of the text.
 const MAGIC: &str = "7767517";
-/// The most layers.
+/// Maximum number of layers.
 const MAX_LAYERS: usize = 1 << 14;
-/// What comes before weights of 16-bit floats.
+/// Tag before float16 weights.
 const FLOAT16: u32 = 0x0130_6b47;
 
-/// A line of the text.
+/// A layer, from one line of the text.
 #[derive(Debug)]
 pub(crate) struct NcnnLayer<'a> {
     pub kind: &'a str,
@@ -23,7 +23,7 @@ pub(crate) struct NcnnLayer<'a> {
 }
 
 impl NcnnLayer<'_> {
-    /// A whole number. Errors: a list, or a fraction.
+    /// An integer parameter; `absent` if absent. Errors: the value is a list or a fraction.
     pub(crate) fn int(&self, key: i32, absent: i64) -> Result<i64> {
         let Some(numbers) = self.parameters.get(&key) else { return Ok(absent) };
         match numbers.as_slice() {
@@ -32,13 +32,13 @@ impl NcnnLayer<'_> {
         }
     }
 
-    /// The numbers of a list; absent: none.
+    /// Numbers of a list parameter; empty if absent.
     pub(crate) fn list(&self, key: i32) -> &[f64] {
         self.parameters.get(&key).map_or(&[], Vec::as_slice)
     }
 
-    /// Nothing may be said that is not read. Errors: a parameter beyond `keys`.
-    pub(crate) fn knows(&self, keys: &[i32]) -> Result<()> {
+    /// Checks that all parameters are supported. Errors: a parameter is not in `keys`.
+    pub(crate) fn check_keys(&self, keys: &[i32]) -> Result<()> {
         match self.parameters.keys().find(|key| !keys.contains(key)) {
             Some(key) => bail!("parameter {key} = {:?} is not known", self.list(*key)),
             None => Ok(()),
@@ -46,8 +46,8 @@ impl NcnnLayer<'_> {
     }
 }
 
-/// The layers of a `.param` file in the order in which they run. Errors: another first line, or a line that is no
-/// layer; the message has its number.
+/// Layers of a `.param` file in execution order. Errors: the first line is wrong, or a line is not a layer; the
+/// message has its number.
 pub(crate) fn layers(file: &[u8]) -> Result<Vec<NcnnLayer<'_>>> {
     let text = std::str::from_utf8(file).context("the .param file is no text")?;
     let mut lines = text.lines().enumerate();
@@ -59,7 +59,7 @@ pub(crate) fn layers(file: &[u8]) -> Result<Vec<NcnnLayer<'_>>> {
     let Some([Ok(n_layers), Ok(_)]) = counts.as_deref() else { bail!("line 2 has the numbers of layers and blobs") };
     let n_layers: usize = *n_layers;
     let written = lines.filter(|(_, line)| !line.trim().is_empty());
-    let layers = written.take(MAX_LAYERS + 1).map(|(k, line)| layer(line).with_context(|| place(k)));
+    let layers = written.take(MAX_LAYERS + 1).map(|(k, line)| layer(line).with_context(|| line_position(k)));
     let layers = layers.collect::<Result<Vec<_>>>()?;
     ensure!(
         layers.len() == n_layers && n_layers <= MAX_LAYERS,
@@ -69,7 +69,7 @@ pub(crate) fn layers(file: &[u8]) -> Result<Vec<NcnnLayer<'_>>> {
     Ok(layers)
 }
 
-fn place(line: usize) -> String {
+fn line_position(line: usize) -> String {
     format!("line {} of the .param file", line + 1)
 }
 
@@ -86,7 +86,7 @@ fn layer(line: &str) -> Result<NcnnLayer<'_>> {
         let number = |number: &str| number.parse::<f64>().ok().filter(|number| number.is_finite());
         let parameter = word.split_once('=').and_then(|(key, value)| {
             let (key, numbers) = (key.parse::<i32>().ok()?, value.split(',').map(number).collect::<Option<Vec<_>>>()?);
-            // A list has the key -23300 - k and begins with its length.
+            // A list has the key -23300 - k and starts with its length.
             match (key, numbers.as_slice()) {
                 (0..=64, [_]) => Some((key, numbers)),
                 (-23364..=-23300, [n, list @ ..]) if *n == list.len() as f64 => Some((-23300 - key, list.to_vec())),
@@ -99,26 +99,27 @@ fn layer(line: &str) -> Result<NcnnLayer<'_>> {
     Ok(NcnnLayer { kind, name, inputs, outputs, parameters })
 }
 
-/// What of a `.bin` file is not yet read.
+/// Reader for the weights in a `.bin` file; holds the unread rest.
 pub(crate) struct NcnnWeights<'a> {
     rest: &'a [u8],
 }
 
 impl<'a> NcnnWeights<'a> {
-    /// All of it.
+    /// Starts at the beginning of the file.
     pub(crate) fn new(file: &'a [u8]) -> Self {
         Self { rest: file }
     }
 
     fn take(&mut self, n_bytes: usize) -> Result<&'a [u8]> {
-        let (taken, rest) = self.rest.split_at_checked(n_bytes).with_context(|| {
+        let (bytes, rest) = self.rest.split_at_checked(n_bytes).with_context(|| {
             format!("{n_bytes} bytes of weights are expected, {} are left of the .bin file", self.rest.len())
         })?;
         self.rest = rest;
-        Ok(taken)
+        Ok(bytes)
     }
 
-    /// `n` numbers, little-endian, whose form is said before them. Errors: fewer, or in a form other than float16 and float32.
+    /// Reads `n` little-endian numbers, preceded by a tag with their type. Errors: the file is too short, or the type
+    /// is neither float16 nor float32.
     pub(crate) fn tagged(&mut self, n: usize) -> Result<(ElementType, &'a [u8])> {
         let tag = self.take(4)?;
         match u32::from_le_bytes([tag[0], tag[1], tag[2], tag[3]]) {
@@ -132,12 +133,12 @@ impl<'a> NcnnWeights<'a> {
         }
     }
 
-    /// `n` 32-bit floats.
+    /// Reads `n` 32-bit floats without a tag.
     pub(crate) fn plain(&mut self, n: usize) -> Result<&'a [u8]> {
         self.take(n.saturating_mul(4))
     }
 
-    /// Nothing may be left.
+    /// Checks that all weights have been read.
     pub(crate) fn end(&self) -> Result<()> {
         ensure!(self.rest.is_empty(), "{} bytes of the .bin file belong to no layer", self.rest.len());
         Ok(())

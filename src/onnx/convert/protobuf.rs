@@ -1,6 +1,6 @@
-//! Fields of protobuf messages, written.
+//! Writer for the fields of protobuf messages.
 
-/// Appends an unsigned number, seven bits a byte, the lowest first.
+/// Appends an unsigned number, seven bits per byte, least significant first.
 pub(crate) fn varint(out: &mut Vec<u8>, mut number: u64) {
     while number > 127 {
         out.push(number as u8 & 127 | 128);
@@ -9,20 +9,20 @@ pub(crate) fn varint(out: &mut Vec<u8>, mut number: u64) {
     out.push(number as u8);
 }
 
-/// Appends a field with a number.
+/// Appends an integer field.
 pub(crate) fn number(out: &mut Vec<u8>, field: u64, number: i64) {
     varint(out, field << 3);
     varint(out, number as u64);
 }
 
-/// Appends a field with a text or a message.
+/// Appends a length-delimited field: a string or a message.
 pub(crate) fn bytes(out: &mut Vec<u8>, field: u64, bytes: &[u8]) {
     varint(out, field << 3 | 2);
     varint(out, bytes.len() as u64);
     out.extend_from_slice(bytes);
 }
 
-/// Appends a field with a 32-bit float.
+/// Appends a 32-bit float field.
 pub(crate) fn float(out: &mut Vec<u8>, field: u64, number: f32) {
     varint(out, field << 3 | 5);
     out.extend_from_slice(&number.to_le_bytes());
@@ -33,7 +33,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn fields_have_the_bytes_of_the_format() {
+    fn fields_are_encoded_as_specified() {
         let mut out = Vec::new();
         number(&mut out, 1, 150);
         bytes(&mut out, 2, b"ab");

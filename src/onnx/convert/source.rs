@@ -1,4 +1,4 @@
-//! What can be converted, what the result looks like from outside, and the choice of the converter.
+//! Source formats, options for the converted model, and the choice of the converter.
 
 use super::graph::OnnxGraph;
 use super::{movenet, nanodet, ncnn, tfjs_file::TfGraph, tflite};
@@ -7,17 +7,18 @@ use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 use std::fmt::{Display, Formatter};
 
-/// The format of published model files.
+/// Format of published model files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SourceFormat {
-    /// One file, taken as it is.
+    /// One file, used without conversion.
     Onnx,
-    /// One flatbuffer, weights fp32 or fp16.
+    /// One flatbuffer with fp32 or fp16 weights.
     Tflite,
-    /// The `.json` and the `.bin` of a graph model: MoveNet (single pose), to heat-maps, or NanoDet, to boxes of people.
+    /// The `.json` and the `.bin` file of a graph model: MoveNet (single pose), converted to heat-maps, or NanoDet,
+    /// to person bounding boxes.
     TfjsGraph,
-    /// The `.param` and the `.bin`.
+    /// The `.param` and the `.bin` file.
     Ncnn,
 }
 
@@ -32,17 +33,21 @@ impl Display for SourceFormat {
     }
 }
 
-/// What the result looks like from outside.
+/// Inputs and outputs of the converted model.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ConversionOptions {
-    /// Name and shape of the input; the shape is that of the source, where the source says it.
+    /// Name and shape of the input; the shape must equal that of the source, if the source states it.
     pub input: Port,
-    /// Names of the outputs in the order of the source; one with an empty name is left out.
+    /// Names of the outputs in the order of the source; outputs with an empty name are omitted.
     pub outputs: Vec<String>,
 }
 
 impl ConversionOptions {
-    /// The sizes of the input. Errors: a size below 1 or above any picture's.
+    /// Shape of the input.
+    ///
+    /// # Errors
+    ///
+    /// A size is not in 1..=16384.
     pub fn shape(&self) -> Result<Vec<usize>> {
         let size = |size: &i64| usize::try_from(*size).ok().filter(|size| (1..=1 << 14).contains(size));
         let sizes: Option<Vec<usize>> = self.input.shape.iter().map(size).collect();
@@ -51,7 +56,11 @@ impl ConversionOptions {
         })
     }
 
-    /// The name of the only output.
+    /// Name of the only output.
+    ///
+    /// # Errors
+    ///
+    /// There is not exactly one named output.
     pub fn only_output(&self) -> Result<&str> {
         match self.outputs.as_slice() {
             [name] if !name.is_empty() => Ok(name),
@@ -60,9 +69,12 @@ impl ConversionOptions {
     }
 }
 
-/// The model in `files` as the bytes of an ONNX file; how many files, and in which order, the format says. Errors:
-/// another number of files, or one that is damaged, or that holds something unknown: the message names the layer and
-/// what was expected.
+/// Converts the model in `files`, whose number and order depend on the format, to the contents of an ONNX file.
+///
+/// # Errors
+///
+/// The number of files is wrong, or a file is damaged or contains something unsupported; the message names the layer
+/// and what was expected.
 pub fn convert(format: SourceFormat, files: &[&[u8]], options: &ConversionOptions) -> Result<Vec<u8>> {
     let expected = match format {
         SourceFormat::Onnx | SourceFormat::Tflite => 1,

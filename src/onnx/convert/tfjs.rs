@@ -1,5 +1,6 @@
-//! Nodes of a TensorFlow.js graph to ONNX operators: those that a wanted node needs, each once. A picture that is channels
-//! last in TensorFlow is channels first in the result; transpositions between the two cost nothing.
+//! Converts TensorFlow.js graph nodes to ONNX operators: all nodes on which a requested node depends, each once.
+//! Images that are channels last in TensorFlow are channels first in the result; transpositions between the two are
+//! free.
 
 use super::graph::AttributeValue::{Float, Text};
 use super::graph::{ElementType, OnnxGraph};
@@ -8,16 +9,16 @@ use super::tfjs_file::{TfGraph, TfNode, TfTensor};
 use anyhow::{Context, Result, bail, ensure};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What a node gives: its name in the result, its sizes in TensorFlow.
+/// Output of a node: its name in the result, and its shape in TensorFlow.
 #[derive(Clone, Debug)]
 pub(crate) struct TfValue {
     pub name: String,
     pub shape: Vec<usize>,
-    /// NHWC in TensorFlow, NCHW in the result.
+    /// Whether it is NHWC in TensorFlow and NCHW in the result.
     pub channels_first: bool,
 }
 
-/// A conversion under way.
+/// State of a conversion.
 pub(crate) struct TfConverter<'a> {
     pub source: &'a TfGraph<'a>,
     pub graph: OnnxGraph,
@@ -25,12 +26,12 @@ pub(crate) struct TfConverter<'a> {
 }
 
 impl<'a> TfConverter<'a> {
-    /// A conversion in which the node `name` is done already.
+    /// Creates a converter in which the node `name` already has the value `value`.
     pub(crate) fn new(source: &'a TfGraph<'a>, graph: OnnxGraph, name: &str, value: TfValue) -> Self {
         Self { source, graph, values: BTreeMap::from([(name.to_owned(), value)]) }
     }
 
-    /// A weight, its axes reordered, or with the sizes `dims` instead of its own.
+    /// Adds a weight, with its axes reordered by `order` or reshaped to `dims`.
     pub(crate) fn weight(
         &mut self,
         tensor: &TfTensor,
@@ -41,14 +42,14 @@ impl<'a> TfConverter<'a> {
         self.graph.weight((tensor.element, &tensor.shape, tensor.raw), order, dims)
     }
 
-    /// What the node `wanted` gives, after all that it needs. Errors: a node that is missing, needs itself, or is of an
-    /// unknown kind.
+    /// Output of the node `wanted`, after conversion of all nodes on which it depends. Errors: a node is missing,
+    /// depends on itself, or is of an unsupported kind.
     pub(crate) fn value(&mut self, wanted: &str) -> Result<TfValue> {
         let source = self.source;
-        let (mut waiting, mut begun) = (vec![wanted], BTreeSet::new());
-        while let Some(name) = waiting.last().copied() {
+        let (mut stack, mut visited) = (vec![wanted], BTreeSet::new());
+        while let Some(name) = stack.last().copied() {
             if self.values.contains_key(name) {
-                waiting.pop();
+                stack.pop();
                 continue;
             }
             let node = source.nodes.get(name).with_context(|| format!("there is no node {name:?}"))?;
@@ -57,10 +58,10 @@ impl<'a> TfConverter<'a> {
             if missing.is_empty() {
                 let value = self.node(node).with_context(|| format!("the node {name:?} ({})", node.op))?;
                 self.values.insert(name.to_owned(), value);
-                waiting.pop();
+                stack.pop();
             } else {
-                ensure!(begun.insert(name), "the node {name:?} needs its own result");
-                waiting.extend(missing);
+                ensure!(visited.insert(name), "the node {name:?} needs its own result");
+                stack.extend(missing);
             }
         }
         self.values.get(wanted).cloned().context("a node without a result")
@@ -71,7 +72,7 @@ impl<'a> TfConverter<'a> {
         self.values.get(name).cloned().with_context(|| format!("input {k} ({name:?}) is the result of a node"))
     }
 
-    /// A picture among the inputs, with its height, width and channels.
+    /// The first input, which must be an image, with its height, width and channels.
     fn picture(&self, node: &TfNode) -> Result<(TfValue, [usize; 3])> {
         let value = self.input(node, 0)?;
         let [_, height, width, channels] = four("the input", &value.shape)?;
@@ -98,7 +99,7 @@ impl<'a> TfConverter<'a> {
             }
             "MaxPool" => {
                 let (value, [height, width, channels]) = self.picture(node)?;
-                let windows = windows(node, along_picture(&node.integers("ksize")?)?)?;
+                let windows = windows(node, height_and_width(&node.integers("ksize")?)?)?;
                 let (pads, height, width) = padding(node, windows, [height, width])?;
                 let name = self.graph.windowed(std::slice::from_ref(&value.name), windows, pads, None, false);
                 Ok(TfValue { name, shape: vec![value.shape[0], height, width, channels], ..value })
@@ -161,23 +162,28 @@ impl<'a> TfConverter<'a> {
         Ok(TfValue { name, shape: vec![value.shape[0], height, width, channels], channels_first: true })
     }
 
-    /// Two results of the same sizes, or one and a constant that is repeated along it.
+    /// Combines two outputs of the same shape, or one with a broadcast constant.
     fn elementwise(&mut self, node: &TfNode, kind: &str) -> Result<TfValue> {
         let [a, b] = node.inputs.as_slice() else { bail!("it has 2 inputs, not {}", node.inputs.len()) };
         let (mut names, mut result) = (Vec::new(), None::<TfValue>);
         for input in [a, b] {
             if let Some(value) = self.values.get(input) {
-                let same = result
+                let is_same_shape = result
                     .as_ref()
                     .is_none_or(|other| (&other.shape, other.channels_first) == (&value.shape, value.channels_first));
-                ensure!(same, "the sizes of its inputs differ: {:?} and {:?}", result.map(|r| r.shape), value.shape);
+                ensure!(
+                    is_same_shape,
+                    "the sizes of its inputs differ: {:?} and {:?}",
+                    result.map(|r| r.shape),
+                    value.shape
+                );
                 result = Some(value.clone());
             }
         }
         let result = result.context("both inputs are constants")?;
         for input in [a, b] {
             names.push(match self.source.tensors.get(input) {
-                Some(tensor) => self.repeated(tensor, &result)?,
+                Some(tensor) => self.broadcast(tensor, &result)?,
                 None => self.values.get(input).map(|value| value.name.clone()).unwrap_or_default(),
             });
         }
@@ -185,11 +191,11 @@ impl<'a> TfConverter<'a> {
         Ok(TfValue { name, ..result })
     }
 
-    /// A constant whose axes, the last ones of `value`, have its sizes or 1.
-    fn repeated(&mut self, tensor: &TfTensor, value: &TfValue) -> Result<String> {
-        let suits = tensor.shape.len() <= value.shape.len()
-            && tensor.shape.iter().rev().zip(value.shape.iter().rev()).all(|(size, whole)| *size == 1 || size == whole);
-        ensure!(suits, "a constant of the sizes {:?} does not suit {:?}", tensor.shape, value.shape);
+    /// Adds a constant that broadcasts to `value`: its axes are the last ones of `value`, of equal size or 1.
+    fn broadcast(&mut self, tensor: &TfTensor, value: &TfValue) -> Result<String> {
+        let is_compatible = tensor.shape.len() <= value.shape.len()
+            && tensor.shape.iter().rev().zip(value.shape.iter().rev()).all(|(size, full)| *size == 1 || size == full);
+        ensure!(is_compatible, "a constant of the sizes {:?} does not suit {:?}", tensor.shape, value.shape);
         match tensor.shape.as_slice() {
             [channels] if value.channels_first => self.weight(tensor, None, Some(&[*channels, 1, 1])),
             [_, _, _, _] if value.channels_first => self.weight(tensor, Some(CHANNELS_FIRST), None),
@@ -267,15 +273,15 @@ impl<'a> TfConverter<'a> {
     }
 }
 
-/// The two numbers of four that belong to height and width.
-fn along_picture(numbers: &[i64]) -> Result<[usize; 2]> {
-    let [1, down, along, 1] = *numbers else { bail!("1, height, width, 1 are expected, not {numbers:?}") };
-    Ok([size(down)?, size(along)?])
+/// Height and width entries of four numbers in NHWC order.
+fn height_and_width(numbers: &[i64]) -> Result<[usize; 2]> {
+    let [1, height, width, 1] = *numbers else { bail!("1, height, width, 1 are expected, not {numbers:?}") };
+    Ok([size(height)?, size(width)?])
 }
 
-/// The windows over height and width.
+/// Windows over height and width.
 fn windows(node: &TfNode, kernel: [usize; 2]) -> Result<[SlidingWindow; 2]> {
-    let strides = along_picture(&node.integers("strides")?)?;
+    let strides = height_and_width(&node.integers("strides")?)?;
     let kernel = [size(kernel[0] as i64)?, size(kernel[1] as i64)?];
     Ok([0, 1].map(|axis| SlidingWindow { kernel: kernel[axis], stride: strides[axis], dilation: 1 }))
 }

@@ -1,4 +1,4 @@
-//! The two files of a TensorFlow.js graph model: nodes in JSON, and their constants one after the other.
+//! The two files of a TensorFlow.js graph model: nodes in JSON, and the concatenated constants.
 
 use super::graph::ElementType;
 use super::layout::{MAX_SIZE, int32s, size};
@@ -8,7 +8,7 @@ use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
-/// A constant: sizes and little-endian numbers.
+/// A constant: shape and little-endian numbers.
 #[derive(Clone, Debug)]
 pub(crate) struct TfTensor<'a> {
     pub element: ElementType,
@@ -16,7 +16,7 @@ pub(crate) struct TfTensor<'a> {
     pub raw: &'a [u8],
 }
 
-/// A node that computes something.
+/// An operator node.
 #[derive(Clone, Debug)]
 pub(crate) struct TfNode {
     pub op: String,
@@ -32,8 +32,8 @@ pub(crate) struct TfGraph<'a> {
 }
 
 impl<'a> TfGraph<'a> {
-    /// The graph in the JSON `topology`, its constants in `weights`. Errors: no such JSON, or the constants have
-    /// together another length than `weights`.
+    /// Reads the graph in the JSON `topology`, with its constants in `weights`. Errors: the JSON has another
+    /// structure, or the total length of the constants is not that of `weights`.
     pub(crate) fn read(topology: &[u8], weights: &'a [u8]) -> Result<Self> {
         let json: Value = serde_json::from_slice(topology).context("its first file is no JSON")?;
         let (mut tensors, mut rest) = (BTreeMap::new(), weights);
@@ -58,19 +58,19 @@ impl<'a> TfGraph<'a> {
         Ok(Self { nodes, tensors })
     }
 
-    /// A constant.
+    /// Constant of that name.
     pub(crate) fn tensor(&self, name: &str) -> Result<&TfTensor<'a>> {
         self.tensors.get(name).with_context(|| format!("there is no constant {name:?}"))
     }
 
-    /// The sizes of the graph's only input.
+    /// Shape of the only input of the graph.
     pub(crate) fn input_shape(&self) -> Result<Vec<usize>> {
         let (_, input) = self.input()?;
         let sizes = list(&input.attributes, "/shape/shape/dim")?;
         sizes.iter().map(|dim| size(integer(dim.get("size").unwrap_or(dim))?)).collect()
     }
 
-    /// The node that stands for the graph's only input, with its name.
+    /// Name and node of the only input of the graph.
     pub(crate) fn input(&self) -> Result<(&str, &TfNode)> {
         let mut inputs = self.nodes.iter().filter(|(_, node)| node.op == "Placeholder");
         match (inputs.next(), inputs.next()) {
@@ -81,7 +81,7 @@ impl<'a> TfGraph<'a> {
 }
 
 impl TfTensor<'_> {
-    /// The numbers of a row of 32-bit integers, or of a single one. Errors: other numbers, or more than 64 of them.
+    /// Values of a scalar or 1-D constant of 32-bit integers. Errors: another element type, or more than 64 values.
     pub(crate) fn integers(&self) -> Result<Vec<i64>> {
         ensure!(self.element == ElementType::I32 && self.raw.len() <= 256, "it holds a few 32-bit integers");
         Ok(int32s(self.raw).map(i64::from).collect())
@@ -89,37 +89,35 @@ impl TfTensor<'_> {
 }
 
 impl TfNode {
-    /// An attribute that is a list of integers.
+    /// Attribute with a list of integers.
     pub(crate) fn integers(&self, name: &str) -> Result<Vec<i64>> {
         list(&self.attributes, &format!("/{name}/list/i"))?.iter().map(integer).collect()
     }
 
-    /// An attribute that is a text.
+    /// String attribute.
     pub(crate) fn text(&self, name: &str) -> Result<String> {
-        decoded(
-            self.attributes.pointer(&format!("/{name}/s")).with_context(|| format!("it has no attribute {name:?}"))?,
-        )
+        decode(self.attributes.pointer(&format!("/{name}/s")).with_context(|| format!("it has no attribute {name:?}"))?)
     }
 
-    /// An attribute that is a list of texts; absent: none.
+    /// Attribute with a list of strings; empty if absent.
     pub(crate) fn texts(&self, name: &str) -> Result<Vec<String>> {
         let texts = self.attributes.pointer(&format!("/{name}/list/s")).and_then(Value::as_array);
-        texts.map_or(&[][..], Vec::as_slice).iter().map(decoded).collect()
+        texts.map_or(&[][..], Vec::as_slice).iter().map(decode).collect()
     }
 
-    /// An attribute that is yes or no; absent: no.
+    /// Boolean attribute; false if absent.
     pub(crate) fn is(&self, name: &str) -> bool {
         self.attributes.pointer(&format!("/{name}/b")).and_then(Value::as_bool).unwrap_or(false)
     }
 
-    /// An attribute that is a number.
+    /// Float attribute.
     pub(crate) fn number(&self, name: &str) -> Result<f32> {
         let number = self.attributes.pointer(&format!("/{name}/f")).and_then(Value::as_f64);
         Ok(number.with_context(|| format!("it has no attribute {name:?}"))? as f32)
     }
 }
 
-/// A constant at the start of `rest`, and what follows.
+/// Reads a constant at the start of `rest` and returns the remaining bytes.
 fn read_tensor<'a>(described: &Value, rest: &'a [u8]) -> Result<(TfTensor<'a>, &'a [u8])> {
     let quantized = described.pointer("/quantization/dtype").map(|kind| kind.as_str().unwrap_or("of no name"));
     let element = match (text(described, "/dtype")?, quantized) {
@@ -149,14 +147,14 @@ fn text<'j>(json: &'j Value, pointer: &str) -> Result<&'j str> {
     json.pointer(pointer).and_then(Value::as_str).with_context(|| format!("there is no text at {pointer}"))
 }
 
-/// An integer, which may be written as a text.
+/// Reads an integer, which may be given as a string.
 fn integer(json: &Value) -> Result<i64> {
     let number = json.as_i64().or_else(|| json.as_str()?.parse().ok());
     number.with_context(|| format!("{json} is no integer"))
 }
 
-/// A text in Base64.
-fn decoded(json: &Value) -> Result<String> {
+/// Decodes a Base64 string.
+fn decode(json: &Value) -> Result<String> {
     let bytes = json.as_str().and_then(|text| STANDARD.decode(text).ok());
     let decoded = bytes.and_then(|bytes| String::from_utf8(bytes).ok());
     decoded.with_context(|| format!("{json} is no text in Base64"))

@@ -1,5 +1,5 @@
-//! TFLite: a flatbuffer of tensors, buffers and operators in the order in which they run. Inside the result, 4-D tensors
-//! are channels first.
+//! Converts TFLite models: a flatbuffer of tensors, buffers and operators in execution order. 4-D tensors are
+//! channels first in the result.
 
 use super::flatbuffer::FlatTable;
 use super::graph::AttributeValue::{Int, Ints, Text};
@@ -9,11 +9,11 @@ use super::source::ConversionOptions;
 use anyhow::{Context, Result, bail, ensure};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The most axes of a tensor, and the most inputs of an operator.
+/// Maximum number of axes of a tensor, and of inputs of an operator.
 const MAX_AXES: usize = 6;
 const MAX_INPUTS: usize = 64;
 
-/// The bytes of a constant and TFLite's number for its elements.
+/// Bytes of a constant, and TFLite's number for its element type.
 #[derive(Clone, Copy)]
 struct Constant<'a> {
     raw: &'a [u8],
@@ -27,17 +27,17 @@ struct TfliteOperator<'a> {
     options: Option<FlatTable<'a>>,
 }
 
-/// A conversion under way.
+/// State of a conversion.
 struct TfliteConverter<'a> {
-    /// Sizes of the tensors.
+    /// Shapes of the tensors.
     shapes: Vec<Vec<usize>>,
     constants: BTreeMap<usize, Constant<'a>>,
-    /// Names in the graph of what operators gave.
+    /// Names of operator outputs in the graph, by tensor.
     values: BTreeMap<usize, String>,
     graph: OnnxGraph,
 }
 
-/// The model as ONNX.
+/// Converts the model to ONNX.
 pub(crate) fn convert(file: &[u8], graph: OnnxGraph, options: &ConversionOptions) -> Result<Vec<u8>> {
     let model = FlatTable::root(file)?;
     let code = |code: FlatTable| Ok(code.int(3, 0)?.max(i32::from(code.byte(0)?)));
@@ -80,7 +80,7 @@ pub(crate) fn convert(file: &[u8], graph: OnnxGraph, options: &ConversionOptions
         let inputs = operator.ints(1, MAX_INPUTS)?;
         operators.push(TfliteOperator { code, inputs, output: index(*output)?, options: operator.table(4)? });
     }
-    // Only what the named outputs need.
+    // Only operators on which the named outputs depend are converted.
     let mut needed: BTreeSet<usize> = named.iter().map(|(tensor, _)| *tensor).collect();
     let mut used = vec![false; operators.len()];
     for (used, operator) in used.iter_mut().zip(&operators).rev() {
@@ -115,7 +115,7 @@ pub(crate) fn convert(file: &[u8], graph: OnnxGraph, options: &ConversionOptions
     Ok(converter.graph.model(&[(&options.input.name, &shape)], &ports))
 }
 
-/// TFLite's name of an operator.
+/// TFLite's name for an operator.
 fn kind(code: i32) -> String {
     let known = match code {
         0 => "ADD",
@@ -141,7 +141,7 @@ impl<'a> TfliteConverter<'a> {
         self.values.get(&tensor).cloned().with_context(|| format!("no operator before gives tensor {tensor}"))
     }
 
-    /// The value as TFLite has it: channels last.
+    /// The value in TFLite's layout, channels last.
     fn channels_last(&mut self, tensor: usize) -> Result<String> {
         let value = self.value(tensor)?;
         match self.shapes[tensor].as_slice() {
@@ -155,7 +155,7 @@ impl<'a> TfliteConverter<'a> {
         self.constants.get(&tensor).copied().with_context(|| format!("tensor {tensor} holds no numbers"))
     }
 
-    /// A weight, its axes reordered, or with the sizes `dims` instead of its own.
+    /// Adds a weight, with its axes reordered by `order` or reshaped to `dims`.
     fn weight(&mut self, tensor: usize, order: Option<[usize; 4]>, dims: Option<&[usize]>) -> Result<String> {
         let Constant { raw, element } = self.constant_of(tensor)?;
         let element = match element {
@@ -166,15 +166,15 @@ impl<'a> TfliteConverter<'a> {
         self.graph.weight((element, &self.shapes[tensor], raw), order, dims)
     }
 
-    /// The integers in a constant.
+    /// Values of an integer constant.
     fn integers(&self, tensor: usize) -> Result<Vec<i64>> {
         let Constant { raw, element } = self.constant_of(tensor)?;
         ensure!(element == 2 && raw.len() <= 8 * 2 * MAX_AXES, "tensor {tensor} holds a few 32-bit integers");
         Ok(int32s(raw).map(i64::from).collect())
     }
 
-    /// The activation that is fused with an operator.
-    fn activated(&mut self, value: String, activation: i8) -> Result<String> {
+    /// Applies the activation that is fused with an operator.
+    fn activate(&mut self, value: String, activation: i8) -> Result<String> {
         match activation {
             0 => Ok(value),
             1 => Ok(self.graph.op("Relu", &[&value], &[])),
@@ -198,7 +198,7 @@ impl<'a> TfliteConverter<'a> {
             0 => {
                 let (a, b) = (self.value(first)?, self.value(needed(1)?)?);
                 let sum = self.graph.op("Add", &[&a, &b], &[]);
-                self.activated(sum, fused(0)?)?
+                self.activate(sum, fused(0)?)?
             }
             2 => {
                 let axis = options()?.int(0, 0)?.rem_euclid(output.len().max(1) as i32) as usize;
@@ -224,8 +224,8 @@ impl<'a> TfliteConverter<'a> {
                 }
                 let inputs: Vec<&str> = inputs.iter().map(String::as_str).collect();
                 let product = self.graph.op("Gemm", &inputs, &[("transB", Int(1))]);
-                let product = self.activated(product, fused(0)?)?;
-                if output.len() == 2 { product } else { self.reshaped(&product, &output)? }
+                let product = self.activate(product, fused(0)?)?;
+                if output.len() == 2 { product } else { self.reshape(&product, &output)? }
             }
             14 => {
                 let value = self.value(first)?;
@@ -234,7 +234,7 @@ impl<'a> TfliteConverter<'a> {
             17 => self.max_pool(first, options()?)?,
             22 => {
                 let value = self.channels_last(first)?;
-                let value = self.reshaped(&value, &output)?;
+                let value = self.reshape(&value, &output)?;
                 match output.len() {
                     4 => self.graph.op("Transpose", &[&value], &[("perm", Ints(&[0, 3, 1, 2]))]),
                     _ => value,
@@ -283,7 +283,7 @@ impl<'a> TfliteConverter<'a> {
         Ok(())
     }
 
-    fn reshaped(&mut self, value: &str, shape: &[usize]) -> Result<String> {
+    fn reshape(&mut self, value: &str, shape: &[usize]) -> Result<String> {
         let shape = self.graph.sizes(shape)?;
         Ok(self.graph.op("Reshape", &[value, &shape], &[]))
     }
@@ -303,16 +303,21 @@ impl<'a> TfliteConverter<'a> {
             let [stride, dilation] = [size(options.int(stride, 1)?.into())?, size(options.int(dilation, 1)?.into())?];
             Ok(SlidingWindow { kernel, stride, dilation })
         };
-        let [down, along] = [window(kernel_height, 2, dilations + 1)?, window(kernel_width, 1, dilations)?];
-        let pads = padding(options, [(down, height), (along, width)])?;
+        let [vertical, horizontal] = [window(kernel_height, 2, dilations + 1)?, window(kernel_width, 1, dilations)?];
+        let pads = padding(options, [(vertical, height), (horizontal, width)])?;
         let order = if depthwise { [3, 0, 1, 2] } else { CHANNELS_FIRST };
         let mut inputs = vec![self.value(image)?, self.weight(weight, Some(order), None)?];
         if let Some(bias) = bias {
             inputs.push(self.weight(bias, None, None)?);
         }
-        let result =
-            self.graph.windowed(&inputs, [down, along], pads, Some(if depthwise { channels } else { 1 }), true);
-        self.activated(result, options.byte(if depthwise { 4 } else { 3 })?)
+        let result = self.graph.windowed(
+            &inputs,
+            [vertical, horizontal],
+            pads,
+            Some(if depthwise { channels } else { 1 }),
+            true,
+        );
+        self.activate(result, options.byte(if depthwise { 4 } else { 3 })?)
     }
 
     fn max_pool(&mut self, image: usize, options: FlatTable) -> Result<String> {
@@ -321,18 +326,19 @@ impl<'a> TfliteConverter<'a> {
             let [kernel, stride] = [size(options.int(kernel, 0)?.into())?, size(options.int(stride, 0)?.into())?];
             Ok(SlidingWindow { kernel, stride, dilation: 1 })
         };
-        let [down, along] = [window(4, 2)?, window(3, 1)?];
-        let pads = padding(options, [(down, height), (along, width)])?;
+        let [vertical, horizontal] = [window(4, 2)?, window(3, 1)?];
+        let pads = padding(options, [(vertical, height), (horizontal, width)])?;
         let value = self.value(image)?;
-        let pooled = self.graph.windowed(&[value], [down, along], pads, None, false);
-        self.activated(pooled, options.byte(5)?)
+        let pooled = self.graph.windowed(&[value], [vertical, horizontal], pads, None, false);
+        self.activate(pooled, options.byte(5)?)
     }
 }
 
-/// Top, left, bottom, right: none, or what keeps the size (padding `SAME`), of a window an axis and the axis's size.
+/// Zeros at the top, left, bottom and right for SAME or VALID padding of a window over each axis, given with the axis
+/// sizes.
 fn padding(options: FlatTable, windows: [(SlidingWindow, usize); 2]) -> Result<[i64; 4]> {
-    let padded = options.byte(0)? == 0;
+    let is_same_padding = options.byte(0)? == 0;
     let [(top, bottom), (left, right)] =
-        windows.map(|(window, size)| if padded { window.same_padding(size) } else { (0, 0) });
+        windows.map(|(window, size)| if is_same_padding { window.same_padding(size) } else { (0, 0) });
     Ok([top, left, bottom, right].map(|n_zeros| n_zeros as i64))
 }

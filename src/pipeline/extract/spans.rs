@@ -64,7 +64,7 @@ fn is_read_alike(
     start: usize,
 ) -> Result<bool> {
     let timeline = &read.timeline;
-    reader.go_to(start, timeline.source_secs[start])?;
+    reader.seek(start, timeline.source_secs[start])?;
     for idx in start..(start + COMPARED).min(timeline.n_frames()) {
         let Some(time) = reader.advance()? else { return Ok(false) };
         let is_same = time.frame_idx == idx

@@ -4,8 +4,8 @@
 
 use super::message::MediaHeader;
 use anyhow::{Error, Result};
-use orator_media::ffmpeg::decode::MOST_PIXELS;
-use orator_media::ffmpeg::source::LONGEST_SECS;
+use orator_media::ffmpeg::decode::MAX_PIXELS;
+use orator_media::ffmpeg::source::MAX_SECS;
 use rustix::process::{Resource, Rlimit, setrlimit};
 use std::path::Path;
 
@@ -52,17 +52,17 @@ impl Limits {
 
     /// For files that are no videos: keypoints of other programs.
     pub fn of_machine() -> Self {
-        let longest = FPS[1] * LONGEST_SECS;
+        let longest = FPS[1] * MAX_SECS;
         Self::new(f64::INFINITY, BASE_SECS + longest * SECS_PER_FRAME, "a file on this machine".to_owned())
     }
 
     /// For a video with this header that becomes frames at `rate` a second, beside `n_bytes` of models and other inputs.
     pub fn of_video(header: &MediaHeader, rate: f64, n_bytes: u64) -> Self {
         let [width, height] = header.image_size;
-        let pixels = width.saturating_mul(height).min(MOST_PIXELS as usize) as f64;
+        let pixels = width.saturating_mul(height).min(MAX_PIXELS as usize) as f64;
         let stated = header.secs.filter(|secs| secs.is_finite() && *secs > 0.0);
         // The reader goes on for a minute after the stated end.
-        let secs = stated.map_or(LONGEST_SECS, |secs| LONGEST_SECS.min(secs + 60.0));
+        let secs = stated.map_or(MAX_SECS, |secs| MAX_SECS.min(secs + 60.0));
         let memory =
             BASE_BYTES + BYTES_PER_PIXEL * pixels + BYTES_PER_FRAME * secs * rate + MEMORY_PER_BYTE * n_bytes as f64;
         let fps = header.fps.filter(|fps| fps.is_finite()).unwrap_or(0.0).clamp(FPS[0], FPS[1]);

@@ -10,7 +10,7 @@ use orator_base::motion::bones;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::{Posture, PostureChannel};
 use orator_base::types::skeleton::{N_BONES, N_JOINTS};
-use orator_formats::mocap::motion_file::USUAL_FPS;
+use orator_formats::mocap::motion_file::DEFAULT_FPS;
 
 /// Sight that all films of one speech share.
 #[derive(Clone, Debug)]
@@ -79,7 +79,7 @@ impl CommonBody {
         let lengths =
             measured.fold(stated, |best, lengths| if known(&lengths) > known(&best) { lengths } else { best });
         let mut all = Array3::zeros((0, N_JOINTS, 3));
-        let mut fps = USUAL_FPS;
+        let mut fps = DEFAULT_FPS;
         for shown in shown {
             let mut motion = shown.motion.clone();
             bones::with_lengths(&mut motion, &lengths);

@@ -18,7 +18,7 @@ use orator_base::audio::loudness;
 use orator_base::stage::progress::Progress;
 use orator_base::types::sound::{Sound, sample_at};
 use orator_base::types::time::FrameRate;
-use orator_formats::mocap::motion_file::USUAL_FPS;
+use orator_formats::mocap::motion_file::DEFAULT_FPS;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
@@ -73,7 +73,7 @@ impl CutSpeaker {
         let models = ConditionModels::open(&file.condition, name)?;
         let source = match (&speaker.dataset, &speaker.sounds) {
             (Some(dataset), _) => SpeakerSource::of_dataset(name, dataset, speaker.split)?,
-            (None, Some(sounds)) => SpeakerSource::of_sounds(name, sounds, models.fps().unwrap_or(USUAL_FPS))?,
+            (None, Some(sounds)) => SpeakerSource::of_sounds(name, sounds, models.fps().unwrap_or(DEFAULT_FPS))?,
             (None, None) => bail!("the speaker {name} has neither a dataset nor sounds"),
         };
         let fps = source.fps;

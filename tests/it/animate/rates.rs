@@ -65,7 +65,7 @@ fn a_lift_at_30_frames_a_second_is_animated_at_30() {
         assert!((frame_secs(&dir.join(format!("{joints}.bvh"))) - 1.0 / 30.0).abs() < 1e-6, "{joints}");
         // The figure's joints say their rate as well.
         let again = motion_file::read(&dir.join(format!("again-{joints}")), None).unwrap();
-        assert!(again.motion.fps == THIRTY && again.says_rate && again.notes.is_empty(), "{joints}: {:?}", again.notes);
+        assert!(again.motion.fps == THIRTY && again.has_rate && again.notes.is_empty(), "{joints}: {:?}", again.notes);
         let (code, _, said) = orator(dir, &format!("animate {joints} --out x.bvh --in-fps 15"));
         assert!(code == 1 && said.contains("says 30 fps, and 15 fps is given"), "{joints}: {said}");
         assert!(said.contains(joints) && said.contains("--in-fps"), "{joints}: {said}");

@@ -222,7 +222,7 @@ fn a_captured_motion_comes_back_as_it_is_imported() {
     let read = || Bvh::read(&folder.path().join("a.bvh")).unwrap();
     let maps = ExponentialMaps::of([Ok(("a".to_owned(), read()))], &JointMapping::default()).unwrap();
     let text = maps.to_bvh(maps.features(&read()).unwrap().view());
-    let mut made = resample::at_rate(&bvh::of_text(&text).unwrap().motion, FPS);
+    let mut made = resample::at_rate(&bvh::from_text(&text).unwrap().motion, FPS);
     bones::with_lengths(&mut made, &bones::measure(&expected));
     // metres; the ends aside, where the two resamplings have other neighbours
     let mut worst = 0.0f32;

@@ -51,7 +51,7 @@ fn one_sound_becomes_every_kind_of_file() {
     assert_eq!(std::fs::read_dir(&made).unwrap().count(), 6, "no attempt is left behind");
     for name in ["a.npy", "a.txt"] {
         let read = motion_file::read(&made.join(name), None).unwrap();
-        assert!(read.says_rate && read.motion.fps == FPS, "{name}");
+        assert!(read.has_rate && read.motion.fps == FPS, "{name}");
     }
 
     // Another kind of sound: a telephone's mp3, a video's track.

@@ -242,12 +242,12 @@ fn a_reading_that_begins_inside_goes_on_as_one_from_the_start() {
     let whole = read(FrameReader::open(&path, fps).unwrap());
     for from in [0, 1, 77, 158, 159] {
         let mut reader = FrameReader::open(&path, fps).unwrap();
-        reader.go_to(from, whole[from].2).unwrap();
+        reader.seek(from, whole[from].2).unwrap();
         assert_eq!(read(reader), whole[from..], "from {from}");
     }
     let mut reader = FrameReader::open(&path, fps).unwrap();
     for between in [whole[77].2 + 0.011, 8.5] {
-        let error = reader.go_to(77, between).unwrap_err().to_string();
+        let error = reader.seek(77, between).unwrap_err().to_string();
         assert!(error.contains("long.mp4 shows no picture at"), "{error}");
     }
 }

@@ -7,7 +7,7 @@ use anyhow::{Context as _, Result, ensure};
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::Vec3;
 use orator_base::types::time::FrameRate;
-use orator_formats::bvh::read::MOST_JOINTS;
+use orator_formats::bvh::read::MAX_JOINTS;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -37,7 +37,7 @@ impl GlbRig {
         ensure!(buffers <= 1 && !is_outside, "its data lie in other files; export it as one .glb");
         let list = |key: &str| scene[key].as_array().into_iter().flatten();
         let n_nodes = list("nodes").count();
-        ensure!(n_nodes <= MOST_JOINTS, "it has {n_nodes} nodes, {MOST_JOINTS} at most: export the figure alone");
+        ensure!(n_nodes <= MAX_JOINTS, "it has {n_nodes} nodes, {MAX_JOINTS} at most: export the figure alone");
         let nodes = list("nodes").enumerate().map(|(n, node)| {
             SceneNode::deserialize(node).with_context(|| format!("node {n} is not as glTF 2.0 describes nodes"))
         });
@@ -109,7 +109,7 @@ impl GlbRig {
 }
 
 /// The scene and the data of a GLB file. Errors: another file, or one whose scene is described in more bytes than
-/// `MOST_JOINTS` nodes with their meshes and animations need.
+/// `MAX_JOINTS` nodes with their meshes and animations need.
 fn chunks(file: &[u8]) -> Result<(Value, Vec<u8>)> {
     let length = file.get(12..16).map_or(0, |word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]));
     let mib = length >> 20;

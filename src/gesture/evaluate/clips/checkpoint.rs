@@ -109,7 +109,7 @@ impl EvaluatedCheckpoint {
         sound.samples.resize(sound.samples.len().max(wanted), 0.0);
         let poses = network.poses(&sound, words)?;
         let motion = if network.is_captured() {
-            let captured = bvh::of_text(&network.bvh(&poses)?).context("its skeleton is no speaker's")?;
+            let captured = bvh::from_text(&network.bvh(&poses)?).context("its skeleton is no speaker's")?;
             resample::at_rate(&without_fingers(captured.motion), fps)
         } else {
             network.motion(&poses)?

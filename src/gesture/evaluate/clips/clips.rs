@@ -193,7 +193,7 @@ fn clip(
         let read = motion_file::read(path, given)?;
         units::check(&read.motion).with_context(|| path.display().to_string())?;
         notes.extend(read.notes);
-        if let Some(given) = given.filter(|given| read.says_rate && *given != read.motion.fps) {
+        if let Some(given) = given.filter(|given| read.has_rate && *given != read.motion.fps) {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
             notes.push(format!("{name} says {}: {given} (--fps) is not for it", read.motion.fps));
         }

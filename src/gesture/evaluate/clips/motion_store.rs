@@ -55,7 +55,7 @@ impl MotionStore {
         let Some(file) = state.file.as_mut().filter(|_| left.is_none()) else { return Ok(StoredMotion::Held(joints)) };
         let (n_frames, n_rows, n_axes) = joints.dim();
         let numbers: Vec<f32> = joints.iter().copied().collect();
-        let kept = file.keep(bytemuck::cast_slice(&numbers))?;
+        let kept = file.append(bytemuck::cast_slice(&numbers))?;
         Ok(StoredMotion::InFile([n_frames, n_rows, n_axes], kept))
     }
 }

@@ -1,5 +1,5 @@
-//! Writing of an mp4: H.264 by libx264 where available, else MPEG-4 part 2, with AAC. The bytes are reproducible. The
-//! caller replaces the file atomically.
+//! Writes mp4 files: H.264 with libx264 if available, otherwise MPEG-4 part 2, with AAC audio. The bytes are
+//! reproducible. The caller replaces the file atomically.
 
 use crate::ffmpeg::source;
 use anyhow::{Context, Result, ensure};
@@ -13,7 +13,7 @@ use orator_base::types::sound::Sound;
 use orator_base::types::time::FrameRate;
 use std::path::{Path, PathBuf};
 
-/// Open mp4. Without `finish` the file is no valid mp4.
+/// An mp4 file being written; it is invalid until `finish` is called.
 pub struct VideoWriter {
     path: PathBuf,
     output: format::context::Output,
@@ -32,20 +32,20 @@ struct SoundTrack {
     n_sent: usize,
 }
 
-/// Constant rate factor of a good picture; 6 more halve the bit rate.
+/// Constant rate factor for good quality; each increase by 6 halves the bit rate.
 pub const GOOD_CRF: u32 = 18;
 
 const VIDEO: usize = 0;
 const AUDIO: usize = 1;
 
 impl VideoWriter {
-    /// Begins the mp4 `path` of pictures of `width` x `height` px (an odd side gains a row or column that repeats the
-    /// last), with the whole of `sound` from time 0 on.
+    /// Creates the mp4 `path` for images of `width` x `height` px (an odd side is extended by repeating its last row
+    /// or column), with all of `sound` from time 0 on.
     pub fn create(path: &Path, width: usize, height: usize, fps: FrameRate, sound: Option<&Sound>) -> Result<Self> {
         Self::with_crf(path, [width, height], fps, sound, GOOD_CRF)
     }
 
-    /// `create` with another constant rate factor of libx264, 0..=51.
+    /// [`Self::create`] with another constant rate factor of libx264, 0..=51.
     pub fn with_crf(
         path: &Path,
         [width, height]: [usize; 2],
@@ -58,7 +58,7 @@ impl VideoWriter {
         let even = [width, height].map(|n| n.next_multiple_of(2));
         let what = || format!("cannot write the video {}", path.display());
         let mut output = format::output_as(&source::url(path)?, "mp4").with_context(what)?;
-        // SAFETY: the context is ours; the flag leaves out the library's version and the time of day.
+        // SAFETY: the context is owned here; the flag omits the library version and the time of day.
         unsafe { (*output.as_mut_ptr()).flags |= ffmpeg::ffi::AVFMT_FLAG_BITEXACT };
         let video = open_video(even, fps, crf).with_context(what)?;
         output.add_stream_with(&video).with_context(what)?.set_time_base(video_tick(fps));
@@ -77,7 +77,7 @@ impl VideoWriter {
         Ok(Self { path, output, size: [width, height], even, fps, video, scaler, n_frames: 0, sound })
     }
 
-    /// Appends a picture, shown for one frame.
+    /// Appends an image, shown for one frame.
     pub fn push(&mut self, image: &Image) -> Result<()> {
         let [width, height] = self.size;
         ensure!(
@@ -92,7 +92,7 @@ impl VideoWriter {
         self.encode(image, sound_until).with_context(|| format!("cannot write the video {}", self.path.display()))
     }
 
-    /// Writes the rest and closes the file.
+    /// Writes the remaining data and closes the file.
     pub fn finish(mut self) -> Result<()> {
         self.close().with_context(|| format!("cannot write the video {}", self.path.display()))
     }
@@ -105,12 +105,12 @@ impl VideoWriter {
         for (row_idx, row) in rgb.data_mut(0).chunks_mut(stride).take(self.even[1]).enumerate() {
             let from = row_bytes * row_idx.min(image.height - 1);
             row[..row_bytes].copy_from_slice(&image.data[from..from + row_bytes]);
-            // Padding to the end of the row is filled, since swscale reads beyond the last pixel.
+            // The padding at the end of a row is filled, since swscale reads beyond the last pixel.
             for at in row_bytes..row.len() {
                 row[at] = row[at - 3];
             }
         }
-        // A new frame each time: the encoder keeps those it was given.
+        // A new frame for each image: the encoder retains the frames it was given.
         let mut yuv = frame::Video::empty();
         self.scaler.run(&rgb, &mut yuv)?;
         yuv.set_pts(Some(self.n_frames as i64));
@@ -132,7 +132,7 @@ impl VideoWriter {
         let mut packet = Packet::empty();
         while self.video.receive_packet(&mut packet).is_ok() {
             packet.set_stream(VIDEO);
-            // Encoders leave it out, and without it the last frame has no length and is lost.
+            // Encoders omit the duration, without which the last frame has no length and is dropped by readers.
             packet.set_duration(1);
             packet.rescale_ts(video_tick(self.fps), to);
             packet.write_interleaved(&mut self.output)?;
@@ -140,7 +140,7 @@ impl VideoWriter {
         Ok(())
     }
 
-    /// Encodes the sound up to second `until`; all of it, and the encoder's rest, for infinity.
+    /// Encodes the audio up to `until` seconds; for infinity, all of it, and flushes the encoder.
     fn write_sound(&mut self, until: f64) -> Result<()> {
         let Some(track) = &mut self.sound else { return Ok(()) };
         let to = self.output.stream(AUDIO).context("the sound stream is gone")?.time_base();
@@ -168,7 +168,7 @@ impl SoundTrack {
         context.set_rate(i32::try_from(sound.rate)?);
         context.set_format(Sample::F32(sample::Type::Planar));
         context.set_channel_layout(ChannelLayout::MONO);
-        // SAFETY: the context is ours; ffmpeg before 7 wants the layout in both its old and its new field.
+        // SAFETY: the context is owned here; ffmpeg before 7 needs the layout in both its old and its new field.
         unsafe { ffmpeg::ffi::av_channel_layout_default(&raw mut (*context.as_mut_ptr()).ch_layout, 1) };
         context.set_bit_rate(96_000);
         context.set_time_base(Rational(1, i32::try_from(sound.rate)?));
@@ -181,7 +181,7 @@ impl SoundTrack {
         Rational(1, self.sound.rate as i32)
     }
 
-    /// Passes the next frame of samples to the encoder if it ends before second `until`; returns false if there is
+    /// Passes the next frame of samples to the encoder if it ends before `until` seconds; returns false if there is
     /// none.
     fn send(&mut self, until: f64) -> Result<bool> {
         let n_until = (until * f64::from(self.sound.rate)).min(self.sound.samples.len() as f64) as usize;
@@ -202,13 +202,13 @@ impl SoundTrack {
     }
 }
 
-/// Whether films become H.264, which every browser plays, and not MPEG-4 part 2, which none does.
+/// Whether videos are written as H.264, which every browser plays, rather than MPEG-4 part 2, which none does.
 pub fn has_h264() -> bool {
     source::init();
     encoder::find_by_name("libx264").is_some()
 }
 
-/// An encoder of pictures of an even size, one thread so that the bytes do not depend on the machine's cores.
+/// Opens an encoder for images of even size, with one thread so that the bytes do not depend on the number of cores.
 fn open_video([width, height]: [usize; 2], fps: FrameRate, crf: u32) -> Result<encoder::video::Encoder> {
     let x264 = encoder::find_by_name("libx264");
     let codec = x264.or_else(|| encoder::find(Id::MPEG4)).context("this ffmpeg has no encoder for H.264 or MPEG-4")?;
@@ -216,7 +216,7 @@ fn open_video([width, height]: [usize; 2], fps: FrameRate, crf: u32) -> Result<e
     context.set_width(u32::try_from(width)?);
     context.set_height(u32::try_from(height)?);
     context.set_format(Pixel::YUV420P);
-    // The default of swscale, stated so that players of large pictures do not assume BT.709.
+    // The default of swscale, written explicitly so that players of large images do not assume BT.709.
     context.set_colorspace(color::Space::SMPTE170M);
     context.set_color_range(color::Range::MPEG);
     context.set_time_base(video_tick(fps));
@@ -225,14 +225,15 @@ fn open_video([width, height]: [usize; 2], fps: FrameRate, crf: u32) -> Result<e
     context.set_flags(codec::Flags::GLOBAL_HEADER | codec::Flags::BITEXACT);
     let (factor, crf) = (f64::from(crf), crf.to_string());
     let options: &[(&str, &str)] = match x264 {
-        // libx264's vector code reads beyond the edge of very narrow pictures: their bytes would change between runs.
+        // The SIMD code of libx264 reads beyond the edge of very narrow images, so that their bytes would vary
+        // between runs.
         Some(_) if width < 128 => &[("preset", "veryfast"), ("crf", &crf), ("x264-params", "no-asm=1")],
-        // Its macroblock tree reads memory it never wrote, at any width.
+        // Its macroblock tree reads uninitialised memory at any width.
         Some(_) => &[("preset", "veryfast"), ("crf", &crf), ("x264-params", "mbtree=0")],
         None => {
-            // A quarter of a bit a pixel for a good picture.
-            let share = 2f64.powf((f64::from(GOOD_CRF) - factor) / 6.0);
-            context.set_bit_rate((share * width as f64 * height as f64 * fps.per_sec() / 4.0) as usize);
+            // A quarter of a bit per pixel at good quality.
+            let quality_factor = 2f64.powf((f64::from(GOOD_CRF) - factor) / 6.0);
+            context.set_bit_rate((quality_factor * width as f64 * height as f64 * fps.per_sec() / 4.0) as usize);
             &[]
         }
     };

@@ -1,5 +1,5 @@
-//! A piece of a video as a file of its own, its packets copied as they are coded: what a stage takes for it is what it
-//! takes for the video.
+//! Copies an excerpt of a video to a file of its own without re-encoding, so that stages treat it as they treat the
+//! video.
 
 use crate::ffmpeg::source;
 use anyhow::{Context, Result, ensure};
@@ -7,13 +7,16 @@ use ffmpeg_next::format::context::{Input, Output};
 use ffmpeg_next::{Rational, codec, encoder, format};
 use std::path::Path;
 
-/// Copies about `secs` seconds of the pictures of `from`, from the picture that decodes alone at or before `start_secs` on,
-/// and the sound that would be taken, into the Matroska file `to`. Returns how many seconds were copied. Errors: a file
-/// that cannot be read, has no pictures, or whose streams Matroska does not take.
+/// Copies about `secs` seconds of the video stream of `from`, starting at the key frame at or before `start_secs`,
+/// and of the default audio track, into the Matroska file `to`. Returns the number of seconds copied.
+///
+/// # Errors
+///
+/// The file cannot be read, has no images, or has streams that Matroska does not support.
 pub fn copy(from: &Path, to: &Path, start_secs: f64, secs: f64) -> Result<f64> {
     let mut input = source::open(from)?;
     let video = source::video_stream(&input).with_context(|| format!("{} has no pictures", from.display()))?.index();
-    let sound = source::automatic_track(&input).map(|stream| stream.index());
+    let sound = source::default_track(&input).map(|stream| stream.index());
     let what = || format!("cannot copy an excerpt of {}", from.display());
     if start_secs > 0.0 {
         let at = (start_secs * f64::from(ffmpeg_next::ffi::AV_TIME_BASE)) as i64;
@@ -25,7 +28,7 @@ pub fn copy(from: &Path, to: &Path, start_secs: f64, secs: f64) -> Result<f64> {
         add_stream(&mut output, &input, *index).with_context(what)?;
     }
     output.write_header().with_context(what)?;
-    // Begins with the first picture that decodes alone.
+    // The excerpt starts with the first key frame.
     let (mut first_secs, mut last_secs) = (None, 0.0f64);
     for (stream, mut packet) in input.packets() {
         let Some(to_stream) = streams.iter().position(|index| *index == stream.index()) else { continue };
@@ -42,9 +45,9 @@ pub fn copy(from: &Path, to: &Path, start_secs: f64, secs: f64) -> Result<f64> {
             }
             last_secs = last_secs.max(secs_at(time + packet.duration().max(1)) - first);
         }
-        let earlier = |time: Option<i64>| time.map(|time| time - (first / f64::from(tick)).round() as i64);
-        packet.set_pts(earlier(packet.pts()));
-        packet.set_dts(earlier(packet.dts()));
+        let shifted = |time: Option<i64>| time.map(|time| time - (first / f64::from(tick)).round() as i64);
+        packet.set_pts(shifted(packet.pts()));
+        packet.set_dts(shifted(packet.dts()));
         let to_tick = output.stream(to_stream).map_or(Rational(1, 1000), |stream| stream.time_base());
         packet.rescale_ts(tick, to_tick);
         packet.set_position(-1);
@@ -60,7 +63,8 @@ fn add_stream(output: &mut Output, input: &Input, index: usize) -> Result<()> {
     let from = input.stream(index).context("a stream is gone")?;
     let mut to = output.add_stream(encoder::find(codec::Id::None))?;
     to.set_parameters(from.parameters());
-    // SAFETY: the parameters belong to the new stream; the tag of another container is taken from them.
+    // SAFETY: the parameters belong to the new stream; the codec tag is cleared because it is specific to the source
+    // container.
     unsafe { (*to.parameters().as_mut_ptr()).codec_tag = 0 };
     Ok(())
 }
@@ -76,21 +80,25 @@ mod tests {
     use orator_base::types::time::FrameRate;
 
     #[test]
-    fn an_excerpt_has_the_pictures_and_the_sound_of_its_time() {
+    fn excerpt_has_the_images_and_audio_of_its_range() {
         let dir = tempfile::tempdir().unwrap();
-        let (whole, part, fps) = (dir.path().join("whole.mp4"), dir.path().join("part.mkv"), FrameRate::new(25, 1));
+        let (full, part, fps) = (dir.path().join("whole.mp4"), dir.path().join("part.mkv"), FrameRate::new(25, 1));
         let sound = Sound { samples: (0..16_000 * 30).map(|i| ((i as f32) * 0.1).sin() * 0.5).collect(), rate: 16_000 };
-        let mut video = VideoWriter::create(&whole, 64, 48, fps, Some(&sound)).unwrap();
+        let mut video = VideoWriter::create(&full, 64, 48, fps, Some(&sound)).unwrap();
         (0..25 * 30).for_each(|i| video.push(&Image::filled(64, 48, [(i / 4) as u8; 3])).unwrap());
         video.finish().unwrap();
-        let secs = copy(&whole, &part, 14.0, 5.0).unwrap();
+        let secs = copy(&full, &part, 14.0, 5.0).unwrap();
         assert!((4.9..5.2).contains(&secs), "{secs}");
         let media = probe(&part).unwrap();
         assert!(media.audio.is_some() && media.video.unwrap().coded_size == [64, 48]);
         let frames: Vec<_> = FrameReader::open(&part, FrameRate::new(5, 1)).unwrap().map(Result::unwrap).collect();
-        // It begins at most one group of pictures before.
-        let shade = f64::from(frames[0].image.data[0]) * 4.0 / 25.0;
-        assert!((3.0..14.5).contains(&shade) && (24..=27).contains(&frames.len()), "{shade} {}", frames.len());
+        // The excerpt starts at most one group of pictures earlier.
+        let start_secs = f64::from(frames[0].image.data[0]) * 4.0 / 25.0;
+        assert!(
+            (3.0..14.5).contains(&start_secs) && (24..=27).contains(&frames.len()),
+            "{start_secs} {}",
+            frames.len()
+        );
         assert!(copy(&dir.path().join("no.mp4"), &part, 0.0, 5.0).is_err());
     }
 }

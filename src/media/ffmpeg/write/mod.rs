@@ -1,4 +1,5 @@
-//! Media files that are written: `encode` makes an mp4 of pictures, `excerpt` copies a piece of a video as it is coded.
+//! Writers of media files: `encode` creates an mp4 from images, `excerpt` copies a part of a video without
+//! re-encoding.
 
 pub mod encode;
 pub mod excerpt;

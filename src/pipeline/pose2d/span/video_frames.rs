@@ -35,7 +35,7 @@ impl VideoFrames<'_> {
         let mut reader = FrameReader::open(source, self.fps)?.with_options(self.media.pictures);
         let [width, height] = reader.image_size();
         if self.span.start > 0 {
-            reader.go_to(self.span.start, self.timeline.source_secs[self.span.start])?;
+            reader.seek(self.span.start, self.timeline.source_secs[self.span.start])?;
         }
         if self.span.end < n_expected {
             reader = reader.until(self.span.end);
