@@ -30,7 +30,7 @@ pub fn read(text: &str) -> Result<JsonTranscript> {
         Value::String(text) => return Ok(JsonTranscript::Text(text.clone())),
         Value::Array(list) if list.is_empty() => return Ok(JsonTranscript::Words(words)),
         Value::Array(list) if list.iter().any(|entry| seconds(entry, START).is_some()) => {
-            collect_words(list, &mut words)?
+            collect_words(list, &mut words)?;
         }
         _ => collect_nested(&value, &mut words)?,
     }
