@@ -1,6 +1,6 @@
 //! Report of an animation as text.
 
-use orator_avatar::animate::performance::{AnimationReport, Jerk, SeenFrames};
+use orator_avatar::animate::performance::{AnimationReport, DetectedFrames, Jerk};
 
 /// Lines on jerk, head, seen frames and clamped angles.
 pub(super) fn text(report: &AnimationReport) -> String {
@@ -33,7 +33,7 @@ pub(super) fn text(report: &AnimationReport) -> String {
 
 /// What was not seen in all frames; nothing when all was.
 fn seen(report: &AnimationReport) -> String {
-    let SeenFrames { left_arm, right_arm, left_hand, right_hand } = report.seen;
+    let DetectedFrames { left_arm, right_arm, left_hand, right_hand } = report.seen;
     let arms = match left_arm == right_arm {
         true => vec![("arms", left_arm)],
         false => vec![("left arm", left_arm), ("right arm", right_arm)],
