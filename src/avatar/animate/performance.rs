@@ -144,7 +144,7 @@ pub fn perform_on(rig: Rig, motion: &Motion, posture: Option<&Posture>, options:
         let as_it_is = rotations(&positions, &rig, &SolveFilters::new(Smoothing::None, motion.fps));
         let within = constrained(clip_of(&as_it_is), &mut tally);
         let frames: Vec<Vec<Vec3>> = (0..within.n_frames()).map(|t| within.positions(t)).collect();
-        positions = positions.moved(|t, joint| scale(frames[t][rig.positions[joint]], 1.0 / CM));
+        positions = positions.with_positions(|t, joint| scale(frames[t][rig.positions[joint]], 1.0 / CM));
     }
     let filters = SolveFilters::new(options.smoothing, motion.fps);
     let mut tracks = rotations(&positions, &rig, &filters);

@@ -66,7 +66,7 @@ impl OpenedRig {
         let map = match &self.map {
             Some((text, path)) => BoneMap::parse(text, self.rig.rig(), ours)
                 .with_context(|| format!("{} maps no bones", path.display()))?,
-            None => BoneMap::found(self.rig.rig())?,
+            None => BoneMap::detect(self.rig.rig())?,
         };
         let text = map.text(self.rig.rig(), ours);
         if let Some(path) = &self.write_map {
