@@ -2,7 +2,7 @@
 
 use orator_avatar::animate::performance::{AnimationReport, DetectedFrames, Jerk};
 
-/// Lines on jerk, head, seen frames and clamped angles.
+/// Lines about jerk, head, detected frames and clamped angles.
 pub(super) fn text(report: &AnimationReport) -> String {
     let number = |jerk: Option<f64>| jerk.map_or("-".to_owned(), |jerk| format!("{jerk:.0}"));
     let jerk = |jerk: Jerk| format!("{} -> {}", number(jerk.before), number(jerk.after));
@@ -31,7 +31,7 @@ pub(super) fn text(report: &AnimationReport) -> String {
     text
 }
 
-/// What was not seen in all frames; nothing when all was.
+/// Parts of the body that were not detected in all frames; empty if all were.
 fn seen(report: &AnimationReport) -> String {
     let DetectedFrames { left_arm, right_arm, left_hand, right_hand } = report.seen;
     let arms = match left_arm == right_arm {

@@ -1,4 +1,4 @@
-//! `orator words`: word vectors, got or made from a file, and how many words of transcripts they know.
+//! `orator words`: fetches word vectors or imports them from a file, and checks their coverage of transcripts.
 
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-/// Folder of the tables within that of the models.
+/// Folder of the tables within the models folder.
 const FOLDER: &str = "words";
 /// Name of the fetched table.
 const GLOVE: &str = "glove-6b-100d";
@@ -72,7 +72,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             let terms = store.manifest().words.as_ref().map(|words| words.licence.clone()).unwrap_or_default();
             std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
             let had = store.fetch_words(mirror.as_deref(), ui, |json, source| {
-                // The table comes last: where it is, nothing is missing.
+                // The table is written last: if it exists, its licence file does too.
                 workdir::write_file(&table.with_extension("licence.txt"), format!("{terms}\n").as_bytes())?;
                 make(json, &table)?;
                 Ok(source.to_string())
@@ -98,7 +98,7 @@ fn path_of(folder: &Path, name: &str) -> PathBuf {
     folder.join(format!("{name}.safetensors"))
 }
 
-/// Makes the table of a file of vectors.
+/// Converts a file of vectors into a table.
 fn make(file: &Path, table: &Path) -> Result<()> {
     let reader = input::open(file).with_context(|| format!("cannot read {}", file.display()))?;
     let reader = BufReader::with_capacity(1 << 20, reader);
@@ -118,7 +118,7 @@ fn made(path: &Path, table: &WordVectors, how: &str, ui: &Ui) -> Outcome {
     Outcome::Done
 }
 
-/// Tables in a folder, by name.
+/// Tables in a folder, sorted by name.
 fn tables(folder: &Path) -> Vec<PathBuf> {
     let mut tables: Vec<PathBuf> =
         std::fs::read_dir(folder).into_iter().flatten().flatten().map(|e| e.path()).collect();
@@ -127,7 +127,7 @@ fn tables(folder: &Path) -> Vec<PathBuf> {
     tables
 }
 
-/// Tables in the folder of the models, each opened.
+/// Tables in the models folder, each opened.
 pub(super) fn opened(models: &Path) -> Vec<(PathBuf, Result<WordVectors>)> {
     let tables = tables(&models.join(FOLDER)).into_iter();
     tables.map(|path| (path.clone(), WordVectors::open(&path))).collect()
