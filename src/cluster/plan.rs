@@ -106,8 +106,8 @@ impl PlannedUnit {
         let of = (secs / piece_secs).round().max(2.0) as usize;
         let first = Self { share: UnitShare::Extract, ..self.clone() };
         let parts = (0..of).map(|idx| Self { share: UnitShare::Parts { idx, of }, needs: vec![0], ..self.clone() });
-        let whole = Self { needs: (1..=of).collect(), ..self.clone() };
-        std::iter::once(first).chain(parts).chain([whole]).collect()
+        let final_unit = Self { needs: (1..=of).collect(), ..self.clone() };
+        std::iter::once(first).chain(parts).chain([final_unit]).collect()
     }
 }
 

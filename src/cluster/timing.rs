@@ -35,11 +35,11 @@ pub struct TimedExcerpt {
 
 /// Excerpts of videos of these lengths (seconds): a tenth of the total, evenly spread, and two short ones.
 pub fn excerpts(lengths: &[f64]) -> Vec<TimedExcerpt> {
-    let whole: f64 = lengths.iter().sum();
-    let budget = (SHARE * whole).clamp(MIN_SECS, MAX_SECS).min(whole);
+    let total_secs: f64 = lengths.iter().sum();
+    let budget = (SHARE * total_secs).clamp(MIN_SECS, MAX_SECS).min(total_secs);
     let n = (((budget - 2.0 * SHORT_SECS) / LONG_SECS).floor() as usize).max(1);
     let at = |share: f64, secs: f64| {
-        let mut left = share * whole;
+        let mut left = share * total_secs;
         for (unit, length) in lengths.iter().enumerate() {
             if left < *length {
                 let secs = secs.min(*length);

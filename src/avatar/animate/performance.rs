@@ -81,7 +81,7 @@ pub struct DetectedFrames {
 
 impl DetectedFrames {
     fn count(motion: &Motion) -> Self {
-        let there = seen(motion);
+        let there = finite_joints(motion);
         let is_seen =
             |t: usize, joint: usize| there[[t, joint]] && motion.mask.get([t, joint]).is_none_or(|&seen| seen);
         let frames = |joints: Range<usize>, least: usize| {
@@ -166,8 +166,9 @@ pub fn perform_on(rig: Rig, motion: &Motion, posture: Option<&Posture>, options:
 
     let after = joints(&rig, &clip);
     let jerk = |joints: &[(usize, usize)]| {
-        let of =
-            |positions: &Array3<f32>| jerk::mean(positions.view(), seen(motion).view(), motion.fps.per_sec(), joints);
+        let of = |positions: &Array3<f32>| {
+            jerk::mean(positions.view(), finite_joints(motion).view(), motion.fps.per_sec(), joints)
+        };
         Jerk { before: of(&motion.joints), after: of(&after) }
     };
     let arms = [R_SHOULDER, L_SHOULDER].into_iter().flat_map(|shoulder| (shoulder..shoulder + 3).map(|j| (j, NECK)));
@@ -211,6 +212,6 @@ fn joints(rig: &Rig, clip: &BvhClip) -> Array3<f32> {
 }
 
 /// Mask [T, 49] of the joints with finite coordinates, detected or filled.
-fn seen(motion: &Motion) -> Array2<bool> {
+fn finite_joints(motion: &Motion) -> Array2<bool> {
     motion.joints.map_axis(ndarray::Axis(2), |place| place.iter().all(|v| v.is_finite()))
 }

@@ -61,8 +61,8 @@ pub fn inputs(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result
         return Ok(vec![file(path.to_owned(), path)]);
     }
     if Artifact::Joints.within(path).is_file() {
-        let whole = path.canonicalize().with_context(|| format!("cannot open {}", path.display()))?;
-        return Ok(vec![file(Artifact::Joints.within(path), &whole)]);
+        let absolute = path.canonicalize().with_context(|| format!("cannot open {}", path.display()))?;
+        return Ok(vec![file(Artifact::Joints.within(path), &absolute)]);
     }
     let (mut found, mut bvh) = (Vec::new(), Vec::new());
     for entry in std::fs::read_dir(path).with_context(|| format!("cannot open {}", path.display()))? {
@@ -131,13 +131,17 @@ impl MotionInput {
     /// Reads the motion; `fps` is the frame rate given by the user. `keypoints` is the file of face keypoints; without
     /// it those of the run or the dataset are used.
     pub fn read(&self, fps: Option<FrameRate>, keypoints: Option<&Path>) -> Result<InputMotion> {
-        let take = match &self.location {
+        let loaded = match &self.location {
             InputLocation::Sample(dataset, sample) => {
                 let sample = dataset.read(sample)?;
                 let body = sample.pose2d.slice(ndarray::s![.., ..N_BODY, ..]).to_owned();
-                let seen = InputMotion::seen(sample.motion, body.view(), None);
+                let with_posture = InputMotion::with_keypoints(sample.motion, body.view(), None);
                 // The angles of a dataset were computed on the complete video.
-                InputMotion { sound: Some(sample.sound), posture: sample.posture.or(seen.posture), ..seen }
+                InputMotion {
+                    sound: Some(sample.sound),
+                    posture: sample.posture.or(with_posture.posture),
+                    ..with_posture
+                }
             }
             InputLocation::File(path) => {
                 let MotionFile { motion, says_rate, notes } = motion_file::read_at(path, fps)?;
@@ -145,18 +149,18 @@ impl MotionInput {
                 InputMotion { motion, posture: None, is_seated: None, sound: None, has_rate, notes }
             }
         };
-        check(&take.motion).with_context(|| format!("no animation of {}", self.name))?;
-        match self.keypoints(keypoints, &take.motion)? {
+        check(&loaded.motion).with_context(|| format!("no animation of {}", self.name))?;
+        match self.keypoints(keypoints, &loaded.motion)? {
             Some(Keypoints { body, .. }) => {
-                let InputMotion { motion, sound, has_rate, notes, .. } = take;
+                let InputMotion { motion, sound, has_rate, notes, .. } = loaded;
                 Ok(InputMotion {
                     sound,
                     has_rate,
                     notes,
-                    ..InputMotion::seen(motion, body.view(), self.extra()?.as_ref())
+                    ..InputMotion::with_keypoints(motion, body.view(), self.extra()?.as_ref())
                 })
             }
-            None => Ok(take),
+            None => Ok(loaded),
         }
     }
 
@@ -196,7 +200,7 @@ impl MotionInput {
 
 impl InputMotion {
     /// Motion of a person with known keypoints [T, 17, 3] and optionally nose and hips [T, 3, 3] in 3D.
-    fn seen(motion: Motion, body: ArrayView3<f32>, extra: Option<&Array3<f32>>) -> Self {
+    fn with_keypoints(motion: Motion, body: ArrayView3<f32>, extra: Option<&Array3<f32>>) -> Self {
         let lifted = LiftedBody { joints: Some(motion.joints.view()), extra: extra.map(|extra| extra.view()) };
         let posture = Some(posture::estimate(body, lifted));
         let is_seated = posture::is_seated(body);

@@ -11,7 +11,7 @@ pub(super) fn text(report: &AnimationReport) -> String {
         Some(n) if n > 0 => format!("head: seen in {n} of {} frames\n", report.n_frames),
         _ => "head: at rest\n".to_owned(),
     };
-    text += &seen(report);
+    text += &detected(report);
     let clamped: Vec<_> = report.clamps.iter().filter(|clamps| clamps.joint_frames > 0).collect();
     match (report.clamps.is_empty(), clamped.is_empty()) {
         (true, _) => text += "no constraints\n",
@@ -32,7 +32,7 @@ pub(super) fn text(report: &AnimationReport) -> String {
 }
 
 /// Parts of the body that were not detected in all frames; empty if all were.
-fn seen(report: &AnimationReport) -> String {
+fn detected(report: &AnimationReport) -> String {
     let DetectedFrames { left_arm, right_arm, left_hand, right_hand } = report.seen;
     let arms = match left_arm == right_arm {
         true => vec![("arms", left_arm)],

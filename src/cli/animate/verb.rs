@@ -213,9 +213,9 @@ fn animate(
     options: &AnimationOptions,
     ui: &Ui,
 ) -> Result<AnimationSummary> {
-    let taken = input.read(args.in_fps, args.keypoints.as_deref())?;
-    let options = &args.body.of(&taken, options);
-    let InputMotion { motion, posture, sound: own, has_rate, mut notes, .. } = taken;
+    let loaded = input.read(args.in_fps, args.keypoints.as_deref())?;
+    let options = &args.body.of(&loaded, options);
+    let InputMotion { motion, posture, sound: own, has_rate, mut notes, .. } = loaded;
     let (sound, posture) = (sound.or(own), args.body.posture(posture));
     let started = Instant::now();
     let performance = perform(&motion, posture.as_ref(), options);
@@ -249,7 +249,7 @@ fn animate(
     let is_film = outputs.iter().any(|&(_, format)| format == ExportFormat::Mp4);
     let motion_secs = motion.fps.secs(motion.n_frames());
     let of_file = |path: &Path, from_secs: f64| -> Result<Option<Sound>> {
-        Ok(audio::read_mono(path, SAMPLE_RATE)?.map(|whole| part(&whole, from_secs, motion_secs)))
+        Ok(audio::read_mono(path, SAMPLE_RATE)?.map(|sound| part(&sound, from_secs, motion_secs)))
     };
     let sound = match (sound, beside) {
         (None, SecondPanel::Video { path, from_secs, .. }) if is_film => of_file(path, from_secs)?,
@@ -330,7 +330,7 @@ fn options(args: &Args) -> Result<AnimationOptions> {
 }
 
 /// Up to `secs` seconds of a sound from second `from_secs` on.
-fn part(whole: &Sound, from_secs: f64, secs: f64) -> Sound {
-    let at = |secs: f64| ((secs * f64::from(whole.rate)).round() as usize).min(whole.samples.len());
-    Sound { rate: whole.rate, samples: whole.samples[at(from_secs)..at(from_secs + secs)].to_vec() }
+fn part(sound: &Sound, from_secs: f64, secs: f64) -> Sound {
+    let at = |secs: f64| ((secs * f64::from(sound.rate)).round() as usize).min(sound.samples.len());
+    Sound { rate: sound.rate, samples: sound.samples[at(from_secs)..at(from_secs + secs)].to_vec() }
 }

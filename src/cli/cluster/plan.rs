@@ -123,9 +123,9 @@ fn times(pipeline: &Pipeline, units: &[PlannedUnit], ui: &Ui) -> Result<StageTim
 }
 
 fn prediction_lines(times: &StageTimes, lengths: &[f64]) -> Vec<String> {
-    let whole: f64 = lengths.iter().sum();
+    let total_secs: f64 = lengths.iter().sum();
     let stage = |stage: StageName| {
-        let gib = times.cost(stage).bytes_per_sec * whole / f64::from(1 << 30);
+        let gib = times.cost(stage).bytes_per_sec * total_secs / f64::from(1 << 30);
         format!("{stage:9}{:>10} of work{gib:8.2} GiB of files", format_duration(times.stage_secs(stage, lengths)))
     };
     let mut lines: Vec<String> = StageName::ALL.map(stage).into();
@@ -137,9 +137,9 @@ fn prediction_lines(times: &StageTimes, lengths: &[f64]) -> Vec<String> {
 }
 
 fn stages(times: &StageTimes, lengths: &[f64]) -> Value {
-    let whole: f64 = lengths.iter().sum();
+    let total_secs: f64 = lengths.iter().sum();
     let stage = |stage: StageName| {
-        let bytes = times.cost(stage).bytes_per_sec * whole;
+        let bytes = times.cost(stage).bytes_per_sec * total_secs;
         (stage.to_string(), json!({ "work_secs": times.stage_secs(stage, lengths), "bytes": bytes }))
     };
     StageName::ALL.map(stage).into_iter().collect::<serde_json::Map<String, Value>>().into()

@@ -84,13 +84,17 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let plan = plan(&args)?;
     let out = std::path::absolute(&args.out)?;
     let _lock = FolderLock::exclusive(&out)?;
-    let taken = workdir::has_files(&out);
+    let is_occupied = workdir::has_files(&out);
     ensure!(
-        !taken || args.force,
+        !is_occupied || args.force,
         "{} is not empty; choose another folder, or --force replaces the dataset",
         out.display()
     );
-    ensure!(!taken || out.join(INFO).is_file(), "{} holds no dataset, so --force does not replace it", out.display());
+    ensure!(
+        !is_occupied || out.join(INFO).is_file(),
+        "{} holds no dataset, so --force does not replace it",
+        out.display()
+    );
     for source in &args.sources {
         let inside = out.exists() && out.starts_with(std::path::absolute(source)?);
         ensure!(!inside, "{} lies in {}, which is imported; choose another folder", out.display(), source.display());

@@ -93,17 +93,18 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let _lock = model_lock(&checkpoint)?;
     let (seams, figure) = (seams(args.carry_state), args.figure.options());
     let source = SpeechSource { audio, transcript: args.transcript.as_deref(), seams, figure };
-    let mut made = Vec::new();
+    let mut results = Vec::new();
     for (variant, outputs) in variants.iter().zip(&outputs) {
         let choice = GenerationChoice { speaker: args.speaker.clone(), seed: variant.seed };
         let trained = TrainedSpeaker::open_as(&checkpoint, &choice)?;
-        made.push((motion_files::write(&trained, &source, outputs, ui)?, trained));
+        results.push((motion_files::write(&trained, &source, outputs, ui)?, trained));
     }
-    let Some((written, trained)) = made.first() else { bail!("no take was asked for") };
-    let speed = written.secs * made.len() as f64 / made.iter().map(|made| made.0.motion_secs).sum::<f64>().max(1e-6);
+    let Some((written, trained)) = results.first() else { bail!("no take was asked for") };
+    let speed =
+        written.secs * results.len() as f64 / results.iter().map(|result| result.0.motion_secs).sum::<f64>().max(1e-6);
     let names: Vec<String> = outputs.iter().flat_map(names).collect();
     let note = written.note.as_ref().map_or(String::new(), |note| format!("note: {note}\n"));
-    let n_variants = if made.len() > 1 { format!("{} takes of ", made.len()) } else { String::new() };
+    let n_variants = if results.len() > 1 { format!("{} takes of ", results.len()) } else { String::new() };
     let text = format!(
         "{n_variants}{:.1} s of speech, {} frames of {} at {}, {speed:.0} x real time\n{note}{}wrote {}",
         written.secs,
@@ -113,15 +114,15 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         written.segments.as_ref().map(segments).unwrap_or_default(),
         names.join(", ")
     );
-    let said = args.transcript.as_ref().map_or(String::new(), |path| format!(" --transcript {}", path.display()));
-    let said = args.speaker.as_ref().map_or(said.clone(), |name| format!("{said} --speaker {name}"));
+    let flags = args.transcript.as_ref().map_or(String::new(), |path| format!(" --transcript {}", path.display()));
+    let flags = args.speaker.as_ref().map_or(flags.clone(), |name| format!("{flags} --speaker {name}"));
     let carried = if args.carry_state { " --carry-state" } else { "" };
     let seed =
         variants.first().and_then(|variant| variant.seed).map_or(String::new(), |seed| format!(" --seed {seed}"));
     // Motion on a captured skeleton can be written as .bvh only.
     let next = outputs.first().and_then(next_output).filter(|_| !trained.is_captured()).map(|out| {
         let (checkpoint, audio, out) = (given.display(), audio.display(), out.display());
-        format!("orator generate --checkpoint {checkpoint} --audio {audio}{said}{carried}{seed} --out {out}")
+        format!("orator generate --checkpoint {checkpoint} --audio {audio}{flags}{carried}{seed} --out {out}")
     });
     let seeds: Vec<Option<u64>> = variants.iter().map(|variant| variant.seed).collect();
     let facts = json!({

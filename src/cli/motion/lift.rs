@@ -102,9 +102,9 @@ fn read_foreign(args: &Args) -> Result<(Keypoints, Vec<String>)> {
         }
         None => bail!("{file}: it does not say its picture's size; give it with --size, like --size 1280x720"),
     };
-    let taken = take_in(found, fps, size, fps)?;
-    notes.extend(taken.notes);
-    Ok((taken.keypoints, notes))
+    let imported = take_in(found, fps, size, fps)?;
+    notes.extend(imported.notes);
+    Ok((imported.keypoints, notes))
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {

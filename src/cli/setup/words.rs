@@ -67,7 +67,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             let store = ModelStore::open(&models)?;
             if let Ok(there) = WordVectors::open(&table) {
                 let _ = store.sweep();
-                return Ok(made(&table, &there, "there already", ui));
+                return Ok(report_table(&table, &there, "there already", ui));
             }
             let terms = store.manifest().words.as_ref().map(|words| words.licence.clone()).unwrap_or_default();
             std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
@@ -77,7 +77,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
                 make(json, &table)?;
                 Ok(source.to_string())
             })?;
-            Ok(made(&table, &WordVectors::open(&table)?, &had, ui))
+            Ok(report_table(&table, &WordVectors::open(&table)?, &had, ui))
         }
         WordsVerb::Add { file, name } => {
             let stem = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -88,7 +88,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
             let table = path_of(&folder, &name);
             make(file, &table)?;
-            Ok(made(&table, &WordVectors::open(&table)?, &format!("made from {}", file.display()), ui))
+            Ok(report_table(&table, &WordVectors::open(&table)?, &format!("made from {}", file.display()), ui))
         }
         WordsVerb::Check { transcripts } => check(&folder, transcripts, ui),
     }
@@ -110,7 +110,7 @@ fn make(file: &Path, table: &Path) -> Result<()> {
     converted.with_context(|| format!("{} holds no word vectors", file.display()))
 }
 
-fn made(path: &Path, table: &WordVectors, how: &str, ui: &Ui) -> Outcome {
+fn report_table(path: &Path, table: &WordVectors, how: &str, ui: &Ui) -> Outcome {
     let text = format!("{}: {} words of {} numbers, {how}", path.display(), table.n_words(), table.dim());
     let hash = sha256_of(path).unwrap_or_default();
     let facts = json!({ "file": path, "words": table.n_words(), "dim": table.dim(), "sha256": hash });
@@ -145,7 +145,7 @@ fn check(folder: &Path, transcripts: &[PathBuf], ui: &Ui) -> Result<Outcome> {
         for (file, transcript) in &texts {
             let words: Vec<&str> = transcript.text.split_whitespace().collect();
             let (n_words, n_known) = (words.len(), table.n_known(words));
-            let said = match (n_words, n_known) {
+            let coverage = match (n_words, n_known) {
                 (0, _) => "it holds no word".to_owned(),
                 (_, 0) => format!("none of its {n_words} words is known: is it in the language of the vectors?"),
                 _ => {
@@ -153,8 +153,8 @@ fn check(folder: &Path, transcripts: &[PathBuf], ui: &Ui) -> Result<Outcome> {
                 }
             };
             is_wrong |= n_known == 0;
-            lines.push(format!("  {}: {said}", file.display()));
-            known.push(json!({ "file": file, "words": n_words, "known": n_known, "said": said }));
+            lines.push(format!("  {}: {coverage}", file.display()));
+            known.push(json!({ "file": file, "words": n_words, "known": n_known, "said": coverage }));
         }
         facts.push(json!({ "file": path, "words": table.n_words(), "dim": table.dim(), "transcripts": known }));
     }

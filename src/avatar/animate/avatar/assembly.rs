@@ -56,13 +56,13 @@ pub struct Assembly<'a> {
 
 impl<'a> Assembly<'a> {
     pub fn new(body: &'a BodyForm<'a>, head: &HeadForm, hands: &[HandForm; 2]) -> Self {
-        let mut whole = Self { body, looks: body.looks, meshes: BTreeMap::new() };
-        whole.clothes();
+        let mut assembly = Self { body, looks: body.looks, meshes: BTreeMap::new() };
+        assembly.clothes();
         for (side, hand) in hands.iter().enumerate() {
-            whole.hand(side, hand);
+            assembly.hand(side, hand);
         }
-        whole.head(head);
-        whole
+        assembly.head(head);
+        assembly
     }
 
     fn add(&mut self, material: Material, weights: Vec<Weights>, surface: Surface, colour: Reflectance) {
@@ -116,8 +116,8 @@ impl<'a> Assembly<'a> {
             None => Surface::from_field(&field, bounds, palm),
             Some(arm) => {
                 let middle = body.stance.positions[body.rig.arms[side].hand];
-                let whole = bounding_box([bounds, arm.bounds()].into_iter());
-                Surface::focused(&field, whole, palm, (middle, ARM_FOCUS_RADIUS * size))
+                let arm_bounds = bounding_box([bounds, arm.bounds()].into_iter());
+                Surface::focused(&field, arm_bounds, palm, (middle, ARM_FOCUS_RADIUS * size))
             }
         };
         let surface = surface.with_normals_of(&normals, NORMAL_WIDTH * palm);

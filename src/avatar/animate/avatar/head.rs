@@ -146,8 +146,8 @@ impl<'a> HeadForm<'a> {
             );
         let shell = cone([x + 0.75, y + 1.1, z + 0.1], [x + 0.6, y - 0.6, z + 0.35], [0.8, 0.6]).flattened(out, 0.55);
         let field = |at: Vec3| smooth_difference(form.distance(at), shell.distance(at), 0.35);
-        let whole = |at: Vec3| smooth_union(field(at), self.without_cavities(at), 0.7);
-        Surface::from_field(&field, form.bounds(), EAR_CELL).with_normals_of(&whole, 0.3 * EAR_CELL)
+        let blended = |at: Vec3| smooth_union(field(at), self.without_cavities(at), 0.7);
+        Surface::from_field(&field, form.bounds(), EAR_CELL).with_normals_of(&blended, 0.3 * EAR_CELL)
     }
 
     /// Surface of the hair, in the axes of the reference head; `None` if bald.

@@ -78,8 +78,8 @@ fn solve(
     let n_frames = positions.n_frames();
     let relax_frames = Some(RELAX_SECS * filters.fps);
     let smooth = |parent: &RotationTrack, from: usize, to: usize| -> Directions {
-        let seen = |t: usize| Some(parent[t].inverse().turn(positions.direction(t, from, to)?));
-        let mut track: Directions = (0..n_frames).map(seen).collect();
+        let local_direction = |t: usize| Some(parent[t].inverse().turn(positions.direction(t, from, to)?));
+        let mut track: Directions = (0..n_frames).map(local_direction).collect();
         filters.arms.directions(&mut track, &[]);
         track
     };
@@ -149,8 +149,9 @@ fn solve_finger(
     let (hinge, base) = (finger_hinge(finger), L_HAND + 1 + 4 * finger);
     let mut parent: ObservedTrack = vec![Some(Rotation::IDENTITY); frames.len()];
     [0, 1, 2].map(|k| {
-        let seen = |t: usize| Some(frames[t]?.inverse().turn(positions.direction(t, base + k, base + k + 1)?));
-        let mut track: Directions = (0..frames.len()).map(seen).collect();
+        let local_direction =
+            |t: usize| Some(frames[t]?.inverse().turn(positions.direction(t, base + k, base + k + 1)?));
+        let mut track: Directions = (0..frames.len()).map(local_direction).collect();
         filter.directions(&mut track, positions.hand_error());
         let bone = |(parent, to): (&Option<Rotation>, Option<Vec3>)| {
             Some(hinge.rotation(hinge.bend((*parent)?.inverse().turn(to?))))

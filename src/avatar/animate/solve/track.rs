@@ -21,13 +21,13 @@ pub fn mirrored(mut track: RotationTrack) -> RotationTrack {
 
 /// Fills the gaps of a track; `rest` if nothing was detected. With `relax_frames` it moves to `rest` within that many
 /// frames of the nearest detected one.
-pub fn filled(seen: ObservedTrack, rest: Rotation, relax_frames: Option<f64>) -> RotationTrack {
-    let (mut before, mut after) = (None, next_seen(&seen, 0));
-    let mut track = RotationTrack::with_capacity(seen.len());
-    for (t, now) in seen.iter().enumerate() {
+pub fn filled(observed: ObservedTrack, rest: Rotation, relax_frames: Option<f64>) -> RotationTrack {
+    let (mut before, mut after) = (None, next_observed(&observed, 0));
+    let mut track = RotationTrack::with_capacity(observed.len());
+    for (t, now) in observed.iter().enumerate() {
         if let Some(rotation) = *now {
             before = Some((t, rotation));
-            after = next_seen(&seen, t + 1);
+            after = next_observed(&observed, t + 1);
             track.push(rotation);
             continue;
         }
@@ -48,8 +48,8 @@ pub fn filled(seen: ObservedTrack, rest: Rotation, relax_frames: Option<f64>) ->
 }
 
 /// First detected frame from `start` on.
-fn next_seen(seen: &ObservedTrack, start: usize) -> Option<(usize, Rotation)> {
-    seen[start..].iter().position(Option::is_some).and_then(|ahead| Some((start + ahead, seen[start + ahead]?)))
+fn next_observed(observed: &ObservedTrack, start: usize) -> Option<(usize, Rotation)> {
+    observed[start..].iter().position(Option::is_some).and_then(|ahead| Some((start + ahead, observed[start + ahead]?)))
 }
 
 /// Smooth step from 0 below `low` to 1 above `high`.

@@ -63,18 +63,18 @@ impl FbxObjects {
     pub fn document(self, fps: FrameRate, n_frames: usize, take: &str) -> Vec<FbxNode> {
         let rate =
             RATES.into_iter().find(|&(rate, _)| FrameRate::new(rate, 1) == fps).map_or(CUSTOM_RATE, |found| found.1);
-        let whole = |name: &str, value: i32| property(name, ["int", "Integer", ""], vec![value.into()]);
+        let integer = |name: &str, value: i32| property(name, ["int", "Integer", ""], vec![value.into()]);
         let number = |name: &str, value: f64| property(name, ["double", "Number", ""], vec![value.into()]);
         let time = |name: &str, frame: usize| property(name, ["KTime", "Time", ""], vec![ticks(fps, frame).into()]);
         let settings = [
-            whole("UpAxis", 1),
-            whole("UpAxisSign", 1),
-            whole("FrontAxis", 2),
-            whole("FrontAxisSign", 1),
-            whole("CoordAxis", 0),
-            whole("CoordAxisSign", 1),
-            whole("OriginalUpAxis", 1),
-            whole("OriginalUpAxisSign", 1),
+            integer("UpAxis", 1),
+            integer("UpAxisSign", 1),
+            integer("FrontAxis", 2),
+            integer("FrontAxisSign", 1),
+            integer("CoordAxis", 0),
+            integer("CoordAxisSign", 1),
+            integer("OriginalUpAxis", 1),
+            integer("OriginalUpAxisSign", 1),
             number("UnitScaleFactor", 1.0),
             number("OriginalUnitScaleFactor", 1.0),
             property("TimeMode", ["enum", "", ""], vec![rate.into()]),
