@@ -110,7 +110,7 @@ impl RowBand {
         }
     }
 
-    /// Whether a triangle is background everything in the cells that it may touch.
+    /// Whether a triangle is behind everything in the cells that it may touch.
     pub fn is_hidden(&self, triangle: &FlatTriangle, extent: Extent) -> bool {
         let ([first, last], [top, bottom]) = (extent[0].map(usize::from), self.rows_of(extent));
         let nearest = triangle.nearness[0].max(triangle.nearness[1]).max(triangle.nearness[2]);

@@ -1,4 +1,4 @@
-//! Shapes as signed distance fields (cm, negative inside): tapered limbs, smooth_union by smooth unions and cut by planes.
+//! Shapes as signed distance fields (cm, negative inside): tapered limbs, joined by smooth unions and cut by planes.
 
 use orator_base::math::vec3::{Vec3, add, dot, norm, scale, sub};
 
