@@ -70,8 +70,8 @@ impl RowBand {
         Self { width, rows: [0; 2], nearness: vec![[0.0; 4]; n], triangles: vec![[NO_TRIANGLE; 4]; n], cells }
     }
 
-    /// Resets the band to other rows and clears a range of columns; `background` is the inverse depth of the background for
-    /// the whole image.
+    /// Resets the band to other rows and clears a range of columns; `background` is the inverse depth of the background
+    /// for the whole image.
     pub fn reset(&mut self, rows: [usize; 2], columns: [usize; 2], background: Option<&[[f32; 4]]>) {
         self.rows = rows;
         for y in rows[0]..rows[1] {
