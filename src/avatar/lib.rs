@@ -1,4 +1,4 @@
-//! Joint positions to an animated avatar: rigs, retargeting and export (`animate`), and the software renderer (`render`).
+//! From joint positions to an animated avatar: rigs, retargeting and export (`animate`), software renderer (`render`).
 
 pub mod animate;
 pub mod render;

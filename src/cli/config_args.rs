@@ -1,4 +1,4 @@
-//! Arguments several verbs share.
+//! Arguments shared by several verbs.
 
 use crate::Split;
 use std::path::PathBuf;
@@ -15,14 +15,14 @@ pub struct ConfigArgs {
 }
 
 impl ConfigArgs {
-    /// Arguments as typed, for the next command; begins with a space unless empty.
+    /// The arguments as typed, for a suggested command; begins with a space unless empty.
     pub fn flags(&self) -> String {
         let file = self.config.display().to_string();
         let file = if file == "pipeline.toml" { String::new() } else { format!(" -c {file}") };
         self.set.iter().fold(file, |flags, set| format!("{flags} --set {set}"))
     }
 
-    /// Reads the configuration; where the usual file is not there, the defaults count.
+    /// Reads the configuration, or uses the defaults if the default file does not exist.
     pub fn load_or_default(&self) -> anyhow::Result<orator_dataset::config::Config> {
         let is_usual = self.config == std::path::Path::new("pipeline.toml");
         if is_usual && !self.config.exists() {
@@ -32,7 +32,8 @@ impl ConfigArgs {
         }
     }
 
-    /// Reads the configuration, with every problem at once; a key under a former name is noted on standard error.
+    /// Reads the configuration and reports all of its problems at once; a key with a former name is noted on standard
+    /// error.
     pub fn load(&self) -> anyhow::Result<orator_dataset::config::Config> {
         let config = orator_dataset::config::load(&self.config, &self.set)?;
         config.notes.iter().for_each(|note| crate::cli::ui::note(&format!("note    {note}")));
@@ -40,7 +41,7 @@ impl ConfigArgs {
     }
 }
 
-/// Reads the name of a split.
+/// Parses the name of a split.
 pub fn split(name: &str) -> Result<Split, String> {
     let found = Split::ALL.into_iter().find(|split| split.name() == name);
     found.ok_or_else(|| "expected train, validation or test".to_owned())

@@ -1,4 +1,4 @@
-//! Options on the figure in the files of `orator animate` and `orator generate`.
+//! Options of the figure in files that `orator animate` and `orator generate` write.
 
 use super::outputs::OutputFiles;
 use anyhow::{Result, ensure};
@@ -18,17 +18,17 @@ pub(super) struct FigureArgs {
 }
 
 impl FigureArgs {
-    /// The options as a value.
+    /// The parsed options.
     pub(super) fn options(&self) -> FigureOptions {
         FigureOptions { names: self.names, fps: self.fps }
     }
 
-    /// Errors on names that are in none of these files.
+    /// Checks that one of the files uses bone names if a naming convention is given.
     pub(super) fn check(&self, outputs: &OutputFiles) -> Result<()> {
         self.check_formats(outputs.iter().map(|(_, format)| *format))
     }
 
-    /// As `check`, of formats.
+    /// The check of `check`, for formats.
     pub(super) fn check_formats(&self, mut formats: impl Iterator<Item = ExportFormat>) -> Result<()> {
         let is_named = formats.any(ExportFormat::has_names);
         ensure!(

@@ -1,11 +1,10 @@
-//! The command line: the one place with clap, indicatif and println. One file a verb; a verb's doc comment is its
-//! `--help`. Exit codes: 0 all done; 1 usage, configuration, or a check that did not pass; 2 some units failed, the others are done;
-//! 130 and 143 stopped by Ctrl-C or SIGTERM.
+//! The command line, the only module that uses clap, indicatif and println. Each verb is one file, and its doc comment
+//! is its `--help`. Exit codes: 0 all done; 1 usage, configuration, or a check that failed; 2 some units failed, the
+//! others are done; 130 and 143 stopped by Ctrl-C or SIGTERM.
 
 pub mod animate;
 mod cluster;
 pub mod config_args;
-pub mod confine;
 pub mod dataset;
 pub mod evaluate;
 mod figure_args;
@@ -15,6 +14,7 @@ pub mod moved;
 pub mod outputs;
 pub mod pipeline;
 pub mod program;
+pub mod sandbox;
 pub mod setup;
 pub mod signals;
 pub mod study;

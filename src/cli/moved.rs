@@ -1,4 +1,4 @@
-//! Verbs that are part of `orator-lab`: what `orator` answers to their old names.
+//! Verbs that moved to `orator-lab`: the answer of `orator` to their old names.
 
 use super::program::Outcome;
 use anyhow::{Result, bail};

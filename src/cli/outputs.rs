@@ -1,4 +1,4 @@
-//! The files that verbs of motion write.
+//! The output files of verbs that write motion.
 
 use anyhow::{Result, bail, ensure};
 use orator_avatar::animate::export::file::ExportFormat;
@@ -8,8 +8,11 @@ use std::path::{Path, PathBuf};
 /// Files to write, with their formats.
 pub type OutputFiles = Vec<(PathBuf, ExportFormat)>;
 
-/// The formats of the files `out`, of which none may be asked for twice, a folder, or what the verb reads (`is_read`,
-/// called `input` in the error); `hint` ends the error on a folder.
+/// Formats of the output files `out`. `input` names the files for which `is_read` holds; `hint` is appended to the
+/// error about a folder.
+///
+/// # Errors
+/// A file is listed twice, is a folder, is one that the verb reads, or has an unknown extension.
 pub fn outputs(out: &[PathBuf], is_read: impl Fn(&Path) -> bool, input: &str, hint: &str) -> Result<OutputFiles> {
     for (n, path) in out.iter().enumerate() {
         ensure!(!is_read(path), "{} is {input}; write to another file", path.display());
@@ -24,28 +27,28 @@ pub fn outputs(out: &[PathBuf], is_read: impl Fn(&Path) -> bool, input: &str, hi
     out.iter().map(|path| Ok((path.clone(), ExportFormat::from_path(path)?))).collect()
 }
 
-/// A file's name for a take: `motion.bvh` becomes `motion-2.bvh`.
-pub fn of_take(path: &Path, take: usize) -> PathBuf {
+/// File name of a variant: `motion.bvh` becomes `motion-2.bvh`.
+pub fn variant_path(path: &Path, variant: usize) -> PathBuf {
     let mut name = path.file_stem().unwrap_or_default().to_os_string();
-    name.push(format!("-{take}"));
-    if let Some(ending) = path.extension() {
+    name.push(format!("-{variant}"));
+    if let Some(extension) = path.extension() {
         name.push(".");
-        name.push(ending);
+        name.push(extension);
     }
     path.with_file_name(name)
 }
 
-/// Whether two paths lead to one file.
+/// Whether two paths refer to the same file.
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
     a == b || a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b))
 }
 
-/// The files' names.
+/// Paths of the files, for display.
 pub fn names(outputs: &OutputFiles) -> Vec<String> {
     outputs.iter().map(|(path, _)| path.display().to_string()).collect()
 }
 
-/// The file to write next: the first as a film, or for an animation program; none when both are there.
+/// The file to suggest next: first a film, then a file for an animation program; `None` if both were written.
 pub fn next_output(outputs: &OutputFiles) -> Option<PathBuf> {
     let kinds = [(ExportFormat::Mp4, "mp4"), (ExportFormat::Bvh, "bvh")];
     let missing = kinds.into_iter().find(|&(format, _)| outputs.iter().all(|&(_, written)| written != format));

@@ -1,6 +1,5 @@
-//! The command line: the one place with clap, indicatif and println. One file a verb; a verb's doc comment is its
-//! `--help`. Exit codes: 0 all done; 1 usage, configuration, or a check that did not pass; 2 some units failed, the others are done;
-//! 130 and 143 stopped by Ctrl-C or SIGTERM.
+//! The command line of `orator`: its verbs, and the program that parses it, runs a verb, reports errors and returns the
+//! exit code (see the parent module for the codes).
 
 use super::cluster::{plan, submit, work};
 use super::dataset::{align, forget, import, verify as dataset};
@@ -17,16 +16,16 @@ use orator_base::stage::workdir;
 use orator_pipeline::process::{VERB, serve};
 use std::process::ExitCode;
 
-/// How a verb ended, when it ended well enough to say so itself.
+/// Result of a verb that did not fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// Everything asked for is done.
+    /// All work is done.
     Done,
     /// Some units failed (each was reported); the others are done.
     SomeFailed,
-    /// Ended early by request (Ctrl-C, SIGTERM), at a place from which the same command goes on.
+    /// Stopped on request (Ctrl-C, SIGTERM) at a point from which the same command continues.
     Stopped,
-    /// What was looked at (the set-up, a dataset) is not as it must be; what is wrong was printed.
+    /// A check (of the set-up or a dataset) failed; the problems were printed.
     Wrong,
 }
 
@@ -73,11 +72,11 @@ pub(super) enum Verb {
     Demo(MovedVerb),
 }
 
-/// Parses the command line, runs the verb, reports an error, and gives the exit code.
+/// Parses the command line, runs the verb, reports an error, and returns the exit code.
 pub fn main() -> ExitCode {
-    // Before anything else: the process of a unit restricts itself while it has one thread.
+    // This comes first because the subprocess of a unit must restrict itself while it has a single thread.
     if std::env::args_os().nth(1).is_some_and(|verb| verb == VERB) {
-        signals::leave_to_parent();
+        signals::ignore_signals();
         let ended = serve().inspect_err(|error| ui::note(&format!("error: {error:#}")));
         return if ended.is_ok() { ExitCode::SUCCESS } else { ExitCode::from(1) };
     }
@@ -114,8 +113,8 @@ fn run(cli: Cli, ui: &Ui) -> Result<Outcome> {
     }
 }
 
-/// Parses the command line into `C`, runs it, reports an error, and returns the exit code. `json` reads the flag of that
-/// name.
+/// Parses the command line into `C`, runs it, reports an error, and returns the exit code. `json` reads the `--json`
+/// flag.
 pub fn run_program<C: CommandFactory + FromArgMatches>(
     json: impl FnOnce(&C) -> bool,
     run: impl FnOnce(C, &Ui) -> Result<Outcome>,
@@ -147,7 +146,7 @@ pub fn run_program<C: CommandFactory + FromArgMatches>(
     }
 }
 
-/// The program and its verb, like `orator train gan`.
+/// The program and its verb, such as `orator train gan`.
 fn words(program: &str, matches: &ArgMatches) -> String {
     let (mut words, mut next) = (program.to_owned(), matches.subcommand());
     while let Some((word, matches)) = next {
@@ -159,7 +158,7 @@ fn words(program: &str, matches: &ArgMatches) -> String {
 
 #[cfg(test)]
 mod tests {
-    /// Every argument has its help; no two clash.
+    /// Every argument has help, and no two conflict.
     #[test]
     fn the_command_line_is_sound() {
         <super::Cli as clap::CommandFactory>::command().debug_assert();

@@ -1,5 +1,5 @@
-//! Ctrl-C and SIGTERM: work ends at once and says what is kept, or is asked to end where it can go on from, and at once
-//! when asked again.
+//! Ctrl-C and SIGTERM: a verb either exits at once and reports what is saved, or is asked to stop at a point from which
+//! it can continue and exits at once on the second signal.
 
 use super::ui::note;
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -7,46 +7,48 @@ use std::sync::{Arc, LazyLock};
 use tokio::runtime::{Builder, Runtime};
 use tokio::signal::unix::{SignalKind, signal};
 
-/// Where signals arrive: a pair of sockets, which a restricted program cannot open any more.
+/// Runtime that receives signals. It uses a socket pair, which a restricted process can no longer open.
 static RUNTIME: LazyLock<Option<Runtime>> = LazyLock::new(|| Builder::new_current_thread().enable_all().build().ok());
 
-/// Opens what signals need. It comes before the program is restricted, and starts no thread.
+/// Opens the resources for signals without starting a thread. Call this before the process is restricted.
 pub fn prepare() {
     LazyLock::force(&RUNTIME);
 }
 
-/// From here on Ctrl-C and SIGTERM do nothing. For a process that ends with the one that started it: terminals and schedulers
-/// send them to both, and the other one decides what is finished first. It starts no thread.
-pub fn leave_to_parent() {
+/// Ignores Ctrl-C and SIGTERM from now on, without starting a thread. This is for a process that exits together with
+/// its parent: terminals and schedulers signal both, and the parent decides what to finish first.
+pub fn ignore_signals() {
     let Some(runtime) = &*RUNTIME else { return };
     let _guard = runtime.enter();
-    // A signal that was listened for once has lost its own effect for good.
+    // Registering a handler once disables the default action of a signal permanently.
     let _ = (signal(SignalKind::interrupt()), signal(SignalKind::terminate()));
 }
 
-/// From here on Ctrl-C or SIGTERM ends the program (exit code 130 or 143) and says what is kept: `kept`, and how to go on.
-pub fn tell_when_stopped(kept: &'static str) {
-    listen(move |code| end(code, kept));
+/// From now on, Ctrl-C or SIGTERM exits the program (code 130 or 143) and prints `kept`: what is saved and how to
+/// continue.
+pub fn exit_on_signal(kept: &'static str) {
+    on_signal(move |code| end(code, kept));
 }
 
-/// Whether an end was asked for, by Ctrl-C or SIGTERM.
+/// Whether a stop was requested by Ctrl-C or SIGTERM.
 #[derive(Clone, Default)]
 pub struct StopRequest {
-    /// Exit code; 0: nothing was asked.
+    /// Exit code; 0 if no stop was requested.
     code: Arc<AtomicU8>,
 }
 
 impl StopRequest {
-    /// From here on the first signal is a request, of which `first` is said; the second ends the program and says `kept`.
+    /// From now on, the first signal is a stop request and prints `first`; the second exits the program and prints
+    /// `kept`.
     pub fn listen(&self, first: &'static str, kept: &'static str) {
-        let asked = self.code.clone();
-        listen(move |code| match asked.swap(code, Ordering::Relaxed) {
+        let requested = self.code.clone();
+        on_signal(move |code| match requested.swap(code, Ordering::Relaxed) {
             0 => note(&format!("\n{first}")),
             _ => end(code, kept),
         });
     }
 
-    /// Exit code of a program that ends by request.
+    /// Exit code of a program that stops on request; `None` without a request.
     pub fn code(&self) -> Option<u8> {
         Some(self.code.load(Ordering::Relaxed)).filter(|code| *code > 0)
     }
@@ -57,9 +59,9 @@ fn end(code: u8, kept: &str) {
     std::process::exit(i32::from(code));
 }
 
-/// Calls with the exit code of each signal, from a thread of its own. Where there can be none, a signal ends the program
-/// as it does by default.
-fn listen(mut called: impl FnMut(u8) + Send + 'static) {
+/// Calls `handler` with the exit code of each signal, on a separate thread. If signals cannot be received, they exit the
+/// program by default.
+fn on_signal(mut handler: impl FnMut(u8) + Send + 'static) {
     let Some(runtime) = &*RUNTIME else { return };
     let guard = runtime.enter();
     let (interrupt, terminate) = (signal(SignalKind::interrupt()), signal(SignalKind::terminate()));
@@ -68,8 +70,8 @@ fn listen(mut called: impl FnMut(u8) + Send + 'static) {
     std::thread::spawn(move || {
         runtime.block_on(async {
             loop {
-                // 128 and the signal's number, as shells have it.
-                called(tokio::select! {
+                // 128 plus the signal number, as in shells.
+                handler(tokio::select! {
                     _ = interrupt.recv() => 130,
                     _ = terminate.recv() => 143,
                 });

@@ -1,4 +1,4 @@
-//! What a verb prints: progress bars on standard error, a closing summary (or one JSON object) on standard output.
+//! Output of a verb: progress bars on standard error, a final summary (or one JSON object) on standard output.
 
 use super::signals::StopRequest;
 use indicatif::{HumanDuration, MultiProgress, ProgressBar, ProgressState, ProgressStyle};
@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-/// The terminal, or its absence. An output that cannot be written never ends the work.
+/// The terminal, if any. Failing to write output never stops the work.
 pub struct Ui {
     json: bool,
     bars: MultiProgress,
@@ -19,12 +19,12 @@ pub struct Ui {
 }
 
 impl Ui {
-    /// With `json` the summary is one JSON object; bars go to standard error and hide themselves where that is no terminal.
+    /// With `json` the summary is one JSON object. Bars go to standard error and are hidden if that is not a terminal.
     pub fn new(json: bool) -> Self {
         Self { json, bars: MultiProgress::new(), has_lost_output: AtomicBool::new(false), stop: StopRequest::default() }
     }
 
-    /// The closing words of a verb: the summary for people and the next command to type, or `facts` for programs.
+    /// Prints the result of a verb: the summary and the next command to type, or `facts` with `--json`.
     pub fn summary(&self, text: &str, next: Option<&str>, facts: serde_json::Value) {
         if self.json {
             return self.print(&facts.to_string());
@@ -33,7 +33,7 @@ impl Ui {
         self.print(&format!("{}{next}", text.trim_end()));
     }
 
-    /// An error that ended the verb.
+    /// Prints the error that ended the verb.
     pub fn error(&self, error: &anyhow::Error) {
         note(&format!("error: {error:#}"));
         if self.json {
@@ -41,8 +41,8 @@ impl Ui {
         }
     }
 
-    /// Asks a question that is answered by y or n; no, where nobody is at the terminal.
-    pub fn asks(&self, question: &str) -> bool {
+    /// Asks a yes/no question; returns `false` without an interactive terminal.
+    pub fn confirm(&self, question: &str) -> bool {
         let is_attended = std::io::stdin().is_terminal() && std::io::stderr().is_terminal();
         if self.json || !is_attended {
             return false;
@@ -52,31 +52,31 @@ impl Ui {
         std::io::stdin().read_line(&mut answer).is_ok() && answer.trim().eq_ignore_ascii_case("y")
     }
 
-    /// Whether standard output could not take all that was written to it (a full disk).
+    /// Whether writing to standard output failed (for example, because of a full disk).
     pub fn has_lost_output(&self) -> bool {
         self.has_lost_output.load(Ordering::Relaxed)
     }
 
-    /// From here on the first Ctrl-C or SIGTERM asks for an end (`is_to_stop`); the second ends the program and says what
-    /// is kept. Of the first `stopping` is said.
-    pub fn listens_for_stop(&self, stopping: &'static str, kept: &'static str) {
+    /// From now on, the first Ctrl-C or SIGTERM requests a stop (`is_to_stop`) and prints `stopping`; the second exits
+    /// the program and prints `kept`.
+    pub fn enable_stop_requests(&self, stopping: &'static str, kept: &'static str) {
         self.stop.listen(stopping, kept);
     }
 
-    /// Whether an end was asked for.
+    /// Whether a stop was requested.
     pub fn was_stopped(&self) -> bool {
         self.stop.code().is_some()
     }
 
-    /// Exit code of what ended by request.
+    /// Exit code of a verb that stopped on request.
     pub fn stop_code(&self) -> u8 {
         self.stop.code().unwrap_or(1)
     }
 
-    /// Writes a line on standard output. A reader who has gone away (`orator status | head`) is no failure.
+    /// Writes a line to standard output. A reader that closed the pipe (`orator status | head`) is not an error.
     fn print(&self, line: &str) {
         let mut out = std::io::stdout();
-        if let Err(error) = writeln!(out, "{}", shown(line)).and_then(|()| out.flush())
+        if let Err(error) = writeln!(out, "{}", sanitised(line)).and_then(|()| out.flush())
             && error.kind() != ErrorKind::BrokenPipe
         {
             self.has_lost_output.store(true, Ordering::Relaxed);
@@ -112,16 +112,16 @@ impl Progress for Ui {
     }
 
     fn say(&self, line: &str) {
-        // `MultiProgress::suspend` would panic on a terminal that is gone.
+        // `MultiProgress::suspend` would panic if the terminal has closed.
         if self.bars.is_hidden() {
             note(line);
         } else {
-            let _ = self.bars.println(shown(line));
+            let _ = self.bars.println(sanitised(line));
         }
     }
 }
 
-/// Time that is left at the pace so far; none where nothing has been done that took time.
+/// Estimated remaining time at the current rate; `None` before any step that took time.
 fn secs_left(state: &ProgressState, n_skipped: u64) -> Option<Duration> {
     let done = state.pos().saturating_sub(n_skipped);
     let left = state.len()?.saturating_sub(state.pos());
@@ -143,7 +143,7 @@ impl Task for Bar {
         self.bar.inc(steps);
     }
     fn detail(&self, text: &str) {
-        self.bar.set_message(shown(text).into_owned());
+        self.bar.set_message(sanitised(text).into_owned());
     }
     fn milestone(&self, line: &str) {
         if self.bar.is_hidden() {
@@ -158,13 +158,13 @@ impl Drop for Bar {
     }
 }
 
-/// Writes a line on standard error, where that can still be written.
+/// Writes a line to standard error and ignores failures.
 pub fn note(line: &str) {
-    let _ = writeln!(std::io::stderr(), "{}", shown(line));
+    let _ = writeln!(std::io::stderr(), "{}", sanitised(line));
 }
 
-/// Text without control characters: words of a damaged file must not command the terminal.
-pub fn shown(text: &str) -> Cow<'_, str> {
+/// Replaces control characters: text from a damaged file must not control the terminal.
+pub fn sanitised(text: &str) -> Cow<'_, str> {
     let commands = |letter: char| letter.is_control() && !matches!(letter, '\n' | '\t');
     if text.contains(commands) { text.replace(commands, "\u{fffd}").into() } else { text.into() }
 }

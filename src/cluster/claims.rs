@@ -1,7 +1,8 @@
-//! Which worker does which unit, by files that are only ever created. `NUMBER.claim.EPOCH` names the worker that has a
-//! unit, `NUMBER.end.EPOCH` how it ended. A worker that takes a unit over from a dead one, or again after a failure, creates
-//! the claim of the next epoch: of two that try, one succeeds, and nothing is ever taken away from a third. The claim of the
-//! highest epoch counts; the owner of an older one discards its work (`Claims::is_mine`).
+//! Assignment of units to workers by files that are created once and never changed. `NUMBER.claim.EPOCH` names the
+//! worker that owns a unit; `NUMBER.end.EPOCH` records how the unit ended. A worker that takes a unit over from a dead
+//! worker, or retries it after a failure, creates the claim of the next epoch: if two workers try, one succeeds, and no
+//! other claim is affected. The claim of the highest epoch is valid; the owner of an older one discards its work
+//! (`Claims::is_mine`).
 
 use super::heartbeat::BeatWatch;
 use super::shared_folder::SharedFolder;
@@ -13,37 +14,38 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-/// Units whose files share a folder: a listing stays short.
-const PER_FOLDER: usize = 1000;
-/// Free units from which the next one is drawn, so that workers seldom try the same.
-const AHEAD: usize = 16;
-/// Most units whose workers are checked at a time; all waiting workers together see all units.
-const MOST_CHECKED: usize = 32;
-/// A worker waits so long at first; then longer and longer, up to the time between two checks for dead workers.
+/// Number of units whose files share a folder, so that listings stay short.
+const UNITS_PER_FOLDER: usize = 1000;
+/// Number of free units from which the next one is drawn at random, so that workers seldom try the same unit.
+const FREE_CANDIDATES: usize = 16;
+/// Maximum number of claims whose owners are checked at a time; the random choices of all waiting workers together
+/// cover all units.
+const MAX_CHECKED: usize = 32;
+/// First waiting time of a worker. It grows by half each time, up to the interval between two checks for dead workers.
 const FIRST_WAIT: Duration = Duration::from_secs(2);
 
 /// A unit that a worker has claimed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Claim {
-    /// Its number in the plan.
+    /// Index of the unit in the plan.
     pub unit: usize,
-    /// 1; more where other workers had it before.
+    /// Epoch of the claim: 1 for the first, one more each time the unit is taken over or retried.
     pub epoch: u32,
 }
 
 impl Claim {
-    /// The claim of the worker that takes the unit over.
-    pub fn later(self) -> Self {
+    /// The claim of the next epoch, for a worker that takes the unit over.
+    pub fn next_epoch(self) -> Self {
         Self { epoch: self.epoch + 1, ..self }
     }
 
-    /// Its file of a kind: `claim` or `end`.
+    /// Path of the file of a kind (`claim` or `end`) in the shared folder.
     fn file(self, kind: &str) -> String {
         let Self { unit, epoch } = self;
-        format!("{}/{unit:06}.{kind}.{epoch:04}", folder_name(unit / PER_FOLDER))
+        format!("{}/{unit:06}.{kind}.{epoch:04}", folder_name(unit / UNITS_PER_FOLDER))
     }
 
-    /// The worker that made it.
+    /// Reads which worker created the claim.
     pub fn read_owner(self, folder: &impl SharedFolder) -> Result<ClaimOwner> {
         let file = self.file("claim");
         let Some(bytes) = folder.read(&file)? else { return Ok(ClaimOwner::NotVisible) };
@@ -51,7 +53,8 @@ impl Claim {
         Ok(claim.map_or(ClaimOwner::Unreadable(file), ClaimOwner::Worker))
     }
 
-    /// How the unit ended under it; `None`: it has not, as far as is visible. A file that says nothing is a failure.
+    /// Reads how the unit ended under this claim; `None` if no end is visible yet. An unreadable file counts as a
+    /// failure.
     pub fn read_end(self, folder: &impl SharedFolder) -> Result<Option<UnitEnd>> {
         let file = self.file("end");
         let damaged =
@@ -60,17 +63,17 @@ impl Claim {
     }
 }
 
-/// Whom the file of a claim names.
+/// Owner that the file of a claim names.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ClaimOwner {
     /// The file is not visible yet.
     NotVisible,
     Worker(String),
-    /// What has the name of the file, given here, is none or names no worker; nobody made it as a claim.
+    /// The path (given here) is not a regular file or names no worker, so no worker created it as a claim.
     Unreadable(String),
 }
 
-/// Content of a claim's file.
+/// Content of a claim file.
 #[derive(Serialize, Deserialize)]
 struct ClaimFile {
     worker: String,
@@ -78,21 +81,21 @@ struct ClaimFile {
     epoch: u32,
 }
 
-/// How a unit ended.
+/// Result of the work on a unit, the content of an end file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct UnitEnd {
-    /// The worker that had it.
+    /// Name of the worker that worked on the unit.
     pub worker: String,
-    /// Why it failed; none: it is done.
+    /// Error message; `None` if the unit succeeded.
     pub error: Option<String>,
-    /// Seconds of work.
+    /// Working time, seconds.
     pub secs: f64,
 }
 
-/// State of a unit as far as is visible; the later of two is the larger.
+/// State of a unit as far as it is visible. States are ordered by time: the later one is larger.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct ClaimState {
-    /// Of the last claim; 0: the unit is free.
+    /// Epoch of the last claim; 0 if the unit is free.
     pub epoch: u32,
     /// Whether the unit ended under that claim.
     pub has_ended: bool,
@@ -102,9 +105,9 @@ fn folder_name(folder: usize) -> String {
     format!("claims/{folder:04}")
 }
 
-/// Unit and state by the name of a file in its folder; none: another file. A unit is held by whatever has the name of a
-/// claim, but has not ended by what is no file.
-fn parsed(name: &str) -> Option<(usize, ClaimState)> {
+/// Parses a file name of a claim folder (`/` at its end: not a regular file) into unit and state; `None` for any other
+/// name. Anything named like a claim occupies the unit, but only a regular file can end it.
+fn parse_name(name: &str) -> Option<(usize, ClaimState)> {
     let file = name.strip_suffix('/');
     if file.is_some_and(|name| name.contains(".end.")) {
         return None;
@@ -116,11 +119,11 @@ fn parsed(name: &str) -> Option<(usize, ClaimState)> {
     Some((unit.parse().ok()?, state)).filter(|_| is_known)
 }
 
-/// Updates the states of the units whose files lie in folder `number`.
-fn update(states: &mut [ClaimState], folder: &impl SharedFolder, number: usize) -> Result<()> {
-    let units = number * PER_FOLDER..((number + 1) * PER_FOLDER).min(states.len());
+/// Updates the states of the units whose files are in folder `number`.
+fn update_states(states: &mut [ClaimState], folder: &impl SharedFolder, number: usize) -> Result<()> {
+    let units = number * UNITS_PER_FOLDER..((number + 1) * UNITS_PER_FOLDER).min(states.len());
     let files = folder.list(&folder_name(number))?;
-    for (unit, state) in files.iter().filter_map(|name| parsed(name)).filter(|(unit, _)| units.contains(unit)) {
+    for (unit, state) in files.iter().filter_map(|name| parse_name(name)).filter(|(unit, _)| units.contains(unit)) {
         states[unit] = states[unit].max(state);
     }
     Ok(())
@@ -129,56 +132,56 @@ fn update(states: &mut [ClaimState], folder: &impl SharedFolder, number: usize) 
 /// States of the `n_units` units of a plan.
 pub fn read_states(folder: &impl SharedFolder, n_units: usize) -> Result<Vec<ClaimState>> {
     let mut states = vec![ClaimState::default(); n_units];
-    (0..n_units.div_ceil(PER_FOLDER)).try_for_each(|number| update(&mut states, folder, number))?;
+    (0..n_units.div_ceil(UNITS_PER_FOLDER)).try_for_each(|number| update_states(&mut states, folder, number))?;
     Ok(states)
 }
 
-/// What there is to do.
+/// Answer of [`Claims::next`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum NextUnit {
-    /// This unit.
+    /// This worker now owns the unit of the claim.
     Claimed(Claim),
-    /// Nothing now: other workers have what is left. Ask again after this time.
+    /// All remaining units are claimed by other workers or need units that have not ended. Ask again after this time.
     Wait(Duration),
-    /// Nothing: all that is left is `Claims::blocked`, or needs what is.
+    /// Every remaining unit is in `Claims::blocked` or needs a unit that is.
     Blocked,
-    /// Nothing: every unit has ended.
+    /// Every unit has ended.
     AllEnded,
 }
 
-/// Which units a worker may claim.
+/// Settings of a worker's claims.
 #[derive(Clone, Debug)]
 pub struct ClaimOptions {
-    /// Unique name of the worker.
+    /// Name of the worker, unique in the plan.
     pub worker: String,
-    /// For each unit of the plan, those that must have ended before.
+    /// For each unit of the plan, the units that must have ended before it starts.
     pub needs: Vec<Vec<usize>>,
-    /// Units this worker may take, in its order.
+    /// Units that this worker may claim, in order of preference.
     pub order: Vec<usize>,
-    /// Whether units that had failed before this worker started are taken again.
+    /// Whether to claim units again that had failed before this worker started.
     pub retries: bool,
 }
 
-/// The claims of a plan, as one worker sees them.
+/// The claims of a plan as seen by one worker.
 pub struct Claims<'a, F> {
     folder: &'a F,
     options: ClaimOptions,
     watch: BeatWatch,
     states: Vec<ClaimState>,
-    is_read: bool,
-    /// Units at the start of the order that are known not to be free.
+    has_states: bool,
+    /// Number of units at the start of `order` that are known to be claimed.
     n_passed: usize,
-    /// Claims that may be taken over: of failed units, and of dead workers.
+    /// Claims that may be taken over: those of failed units (`failed`) and those of dead workers (`orphaned`).
     failed: Vec<Claim>,
-    left: Vec<Claim>,
-    /// Files in the place of claims and ends, by unit.
+    orphaned: Vec<Claim>,
+    /// Foreign files at the path of a claim or an end, by unit.
     blocked: BTreeMap<usize, String>,
     /// Known owners of claims.
     owners: BTreeMap<Claim, String>,
-    /// Earliest time of the next check for dead workers.
+    /// Time of the next check for dead workers.
     next_check: Duration,
-    /// How long the worker last waited.
-    waited: Duration,
+    /// Waiting time that `next` returned last; zero after a successful claim.
+    last_wait: Duration,
     rng: ChaCha8Rng,
 }
 
@@ -188,23 +191,23 @@ impl<'a, F: SharedFolder> Claims<'a, F> {
             folder,
             watch,
             states: vec![ClaimState::default(); options.needs.len()],
-            is_read: false,
+            has_states: false,
             n_passed: 0,
             failed: Vec::new(),
-            left: Vec::new(),
+            orphaned: Vec::new(),
             blocked: BTreeMap::new(),
             owners: BTreeMap::new(),
             next_check: Duration::ZERO,
-            waited: Duration::ZERO,
+            last_wait: Duration::ZERO,
             rng: ChaCha8Rng::from_seed(*blake3::hash(options.worker.as_bytes()).as_bytes()),
             options,
         }
     }
 
-    /// Claims the next unit; `now` is a time of this worker's own clock.
+    /// Claims the next unit; `now` is the time on this worker's own clock.
     pub fn next(&mut self, now: Duration) -> Result<NextUnit> {
-        if let Some(claim) = self.claimed_next(now)? {
-            self.waited = Duration::ZERO;
+        if let Some(claim) = self.claim_next(now)? {
+            self.last_wait = Duration::ZERO;
             return Ok(NextUnit::Claimed(claim));
         }
         if self.options.order.iter().all(|unit| self.states[*unit].has_ended) {
@@ -213,17 +216,17 @@ impl<'a, F: SharedFolder> Claims<'a, F> {
         if self.is_stuck() {
             return Ok(NextUnit::Blocked);
         }
-        let most = self.watch.interval();
-        self.waited = (self.waited * 3 / 2).clamp(FIRST_WAIT.min(most), most);
-        Ok(NextUnit::Wait(self.waited))
+        let longest = self.watch.interval();
+        self.last_wait = (self.last_wait * 3 / 2).clamp(FIRST_WAIT.min(longest), longest);
+        Ok(NextUnit::Wait(self.last_wait))
     }
 
-    /// Units, each with the file in the place of its claim or end that no worker wrote.
+    /// Units that cannot be claimed or ended, each with the foreign file at the path of its claim or end.
     pub fn blocked(&self) -> &BTreeMap<usize, String> {
         &self.blocked
     }
 
-    /// Whether every unit of the order that has not ended is blocked, or needs one that is.
+    /// Whether every unit of the order that has not ended is blocked or needs a blocked one.
     fn is_stuck(&self) -> bool {
         let blocked = self.blocked.keys().copied();
         let mut stuck: BTreeSet<usize> = blocked.filter(|unit| !self.states[*unit].has_ended).collect();
@@ -238,44 +241,44 @@ impl<'a, F: SharedFolder> Claims<'a, F> {
         }
     }
 
-    /// The unit that is claimed: one that had failed, else a free one, else one that a dead worker left.
-    fn claimed_next(&mut self, now: Duration) -> Result<Option<Claim>> {
-        if !self.is_read {
-            self.read()?;
-            self.is_read = true;
-            self.failed = if self.options.retries { self.failed()? } else { Vec::new() };
+    /// Tries to claim a unit: a failed one first, then a free one, then one of a dead worker.
+    fn claim_next(&mut self, now: Duration) -> Result<Option<Claim>> {
+        if !self.has_states {
+            self.refresh()?;
+            self.has_states = true;
+            self.failed = if self.options.retries { self.failed_claims()? } else { Vec::new() };
         }
         while let Some(failed) = self.failed.pop() {
-            if self.take(failed.later())? {
-                return Ok(Some(failed.later()));
+            if self.try_claim(failed.next_epoch())? {
+                return Ok(Some(failed.next_epoch()));
             }
         }
-        if let Some(claim) = self.take_free()? {
+        if let Some(claim) = self.claim_free()? {
             return Ok(Some(claim));
         }
-        self.read()?;
-        // What has ended meanwhile may have been waited for.
-        if let Some(claim) = self.take_free()? {
+        self.refresh()?;
+        // Units that ended in the meantime may have made others ready.
+        if let Some(claim) = self.claim_free()? {
             return Ok(Some(claim));
         }
         self.check_workers(now)?;
-        while let Some(left) = self.left.pop() {
-            let ClaimState { epoch, has_ended } = self.states[left.unit];
-            // A listing may be older than the end.
-            let is_left = epoch == left.epoch && !has_ended && left.read_end(self.folder)?.is_none();
-            if is_left && self.take(left.later())? {
-                return Ok(Some(left.later()));
+        while let Some(orphan) = self.orphaned.pop() {
+            let ClaimState { epoch, has_ended } = self.states[orphan.unit];
+            // The listing may be older than the end file.
+            let is_orphaned = epoch == orphan.epoch && !has_ended && orphan.read_end(self.folder)?.is_none();
+            if is_orphaned && self.try_claim(orphan.next_epoch())? {
+                return Ok(Some(orphan.next_epoch()));
             }
         }
         Ok(None)
     }
 
-    /// Whether no other worker has taken the unit over. To be called just before work is published.
+    /// Whether no other worker has taken the unit over. Call this just before publishing results.
     pub fn is_mine(&self, claim: Claim) -> Result<bool> {
-        Ok(self.folder.read(&claim.later().file("claim"))?.is_none())
+        Ok(self.folder.read(&claim.next_epoch().file("claim"))?.is_none())
     }
 
-    /// Records how the unit ended; `false`: another worker had taken it over.
+    /// Records how the unit ended; `false` if another worker had taken the unit over.
     pub fn end(&mut self, claim: Claim, end: &UnitEnd) -> Result<bool> {
         let is_mine = self.is_mine(claim)?;
         let file = claim.file("end");
@@ -286,44 +289,44 @@ impl<'a, F: SharedFolder> Claims<'a, F> {
         Ok(is_mine)
     }
 
-    /// Updates the states, except those of folders in which every unit has ended.
-    fn read(&mut self) -> Result<()> {
-        for number in 0..self.states.len().div_ceil(PER_FOLDER) {
-            let units = self.states[number * PER_FOLDER..].iter().take(PER_FOLDER);
-            if !self.is_read || units.into_iter().any(|state| !state.has_ended) {
-                update(&mut self.states, self.folder, number)?;
+    /// Updates the states, except in folders where every unit has ended.
+    fn refresh(&mut self) -> Result<()> {
+        for number in 0..self.states.len().div_ceil(UNITS_PER_FOLDER) {
+            let units = self.states[number * UNITS_PER_FOLDER..].iter().take(UNITS_PER_FOLDER);
+            if !self.has_states || units.into_iter().any(|state| !state.has_ended) {
+                update_states(&mut self.states, self.folder, number)?;
             }
         }
         Ok(())
     }
 
-    /// Takes one of the next free units.
-    fn take_free(&mut self) -> Result<Option<Claim>> {
+    /// Claims one of the next free units.
+    fn claim_free(&mut self) -> Result<Option<Claim>> {
         loop {
             let is_free = |unit: &usize| self.states[*unit].epoch == 0;
             let order = &self.options.order;
             self.n_passed += order[self.n_passed..].iter().take_while(|unit| !is_free(unit)).count();
             let is_ready = |unit: &usize| self.options.needs[*unit].iter().all(|needed| self.states[*needed].has_ended);
             let free = order[self.n_passed..].iter().copied().filter(is_free).filter(is_ready);
-            let next: Vec<usize> = free.take(AHEAD).collect();
+            let next: Vec<usize> = free.take(FREE_CANDIDATES).collect();
             let Some(&unit) = next.choose(&mut self.rng) else { return Ok(None) };
             let claim = Claim { unit, epoch: 1 };
-            if self.take(claim)? {
+            if self.try_claim(claim)? {
                 return Ok(Some(claim));
             }
-            update(&mut self.states, self.folder, unit / PER_FOLDER)?;
+            update_states(&mut self.states, self.folder, unit / UNITS_PER_FOLDER)?;
         }
     }
 
-    /// Last claims of the units of the order, with whether they ended under it.
+    /// The last claim of each claimed unit of the order, and whether the unit ended under it.
     fn last_claims(&self) -> impl Iterator<Item = (Claim, bool)> {
         let claim =
             |unit: &usize| (Claim { unit: *unit, epoch: self.states[*unit].epoch }, self.states[*unit].has_ended);
         self.options.order.iter().map(claim).filter(|(claim, _)| claim.epoch > 0)
     }
 
-    /// Claims under which units of the order failed, the first one last.
-    fn failed(&self) -> Result<Vec<Claim>> {
+    /// Claims under which units of the order failed, in reverse order.
+    fn failed_claims(&self) -> Result<Vec<Claim>> {
         let mut failed = Vec::new();
         for (claim, _) in self.last_claims().filter(|(_, has_ended)| *has_ended) {
             if claim.read_end(self.folder)?.is_some_and(|end| end.error.is_some()) {
@@ -334,15 +337,16 @@ impl<'a, F: SharedFolder> Claims<'a, F> {
         Ok(failed)
     }
 
-    /// Collects claims whose workers are dead, or have ended without them, at the time `now` of this worker's clock.
+    /// Collects the claims of dead workers and of workers that exited before the unit ended; `now` is the time on this
+    /// worker's clock.
     fn check_workers(&mut self, now: Duration) -> Result<()> {
-        if !self.left.is_empty() || now < self.next_check {
+        if !self.orphaned.is_empty() || now < self.next_check {
             return Ok(());
         }
         self.next_check = now + self.watch.interval();
         let mut claimed: Vec<Claim> =
             self.last_claims().filter(|(_, has_ended)| !has_ended).map(|(claim, _)| claim).collect();
-        while claimed.len() > MOST_CHECKED {
+        while claimed.len() > MAX_CHECKED {
             claimed.swap_remove(self.rng.random_range(0..claimed.len()));
         }
         for claim in claimed {
@@ -356,7 +360,7 @@ impl<'a, F: SharedFolder> Claims<'a, F> {
                 }
                 ClaimOwner::NotVisible => {
                     if was_blocked {
-                        // What was in the way is removed.
+                        // The foreign file was removed, so the unit is free again.
                         self.states[claim.unit].epoch -= 1;
                         self.n_passed = 0;
                     }
@@ -364,18 +368,18 @@ impl<'a, F: SharedFolder> Claims<'a, F> {
                 }
             };
             if owner != self.options.worker && self.watch.is_dead(self.folder, &owner, now)? {
-                self.left.push(claim);
+                self.orphaned.push(claim);
             }
             self.owners.insert(claim, owner);
         }
         Ok(())
     }
 
-    fn take(&mut self, claim: Claim) -> Result<bool> {
+    fn try_claim(&mut self, claim: Claim) -> Result<bool> {
         let Claim { unit, epoch } = claim;
         let file = ClaimFile { worker: self.options.worker.clone(), unit, epoch };
-        let is_taken = self.folder.create(&claim.file("claim"), &serde_json::to_vec(&file)?);
+        let is_claimed = self.folder.create(&claim.file("claim"), &serde_json::to_vec(&file)?);
         self.states[unit] = ClaimState { epoch, has_ended: false };
-        is_taken.with_context(|| format!("cannot claim unit {unit}"))
+        is_claimed.with_context(|| format!("cannot claim unit {unit}"))
     }
 }

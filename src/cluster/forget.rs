@@ -1,5 +1,5 @@
-//! What plans hold of a video that is to be forgotten: the plan lists it, its workers and jobs may name it. All of that is
-//! removed, not rewritten: a plan without the video has another seal, so that nothing that refers to it would go on.
+//! Finds the plans that mention a video to be forgotten, with the folders of their workers. The caller removes them as
+//! a whole: a plan without the video would have another seal, so nothing that refers to the old plan could continue.
 
 use super::timing;
 use anyhow::{Context, Result};
@@ -8,11 +8,11 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Plans in the work folder that hold one of the terms, with the folders of their workers, folders of earlier plans that
-/// do, and the excerpts that a killed `orator plan` left.
+/// Paths in the work folder to remove: plans that contain one of the terms, with the folders of their workers; worker
+/// folders of earlier plans that contain one; and the folder of excerpts that a killed `orator plan` left.
 ///
 /// # Errors
-/// A folder that cannot be listed, a file that cannot be searched.
+/// A folder cannot be listed or a file cannot be searched.
 pub fn plans_naming(work: &Path, terms: &[SearchTerm]) -> Result<Vec<PathBuf>> {
     if !work.is_dir() {
         return Ok(Vec::new());
@@ -38,7 +38,7 @@ pub fn plans_naming(work: &Path, terms: &[SearchTerm]) -> Result<Vec<PathBuf>> {
     Ok(found.into_iter().collect())
 }
 
-/// Whether the file is a plan of any version, or an attempt at one.
+/// Whether the file is a plan of any version, complete or not.
 fn is_plan(path: &Path) -> bool {
     let is_json = path.extension().is_some_and(|ending| ending == "json") && path.is_file();
     let bytes = if is_json { fs::read(path).unwrap_or_default() } else { Vec::new() };
@@ -46,7 +46,7 @@ fn is_plan(path: &Path) -> bool {
     has(b"\"program\":") && has(b"\"units\":")
 }
 
-/// The plan that a folder of workers is of.
+/// Path of the plan to which a folder of workers belongs; `None` if the folder's name does not end in a seal.
 fn plan_of(folder: &Path) -> Option<PathBuf> {
     let (stem, seal) = folder.file_name()?.to_str()?.rsplit_once('-')?;
     let is_seal = seal.len() == 12 && seal.bytes().all(|byte| byte.is_ascii_hexdigit());

@@ -1,5 +1,5 @@
-//! Who is at work: every worker counts on in a file of its own. Whether one is dead is seen from its count alone, by the
-//! watcher's own clock, so that the clocks of machines may differ by minutes.
+//! Heartbeats of workers: every worker increments a counter in its own file. A watcher detects dead workers from the
+//! counter and its own clock alone, so the clocks of machines may differ by minutes.
 
 use super::shared_folder::SharedFolder;
 use anyhow::Result;
@@ -8,102 +8,102 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// Folder of the workers' files.
+/// Folder of the heartbeat files.
 pub const WORKERS: &str = "workers";
 
-/// Time without a beat after which a worker is dead, unless another is asked for.
+/// Default time without a beat after which a worker counts as dead.
 pub const DEAD_AFTER: Duration = Duration::from_secs(180);
 
-/// What a worker says of itself.
+/// Status that a worker publishes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Heartbeat {
-    /// Goes up with every beat.
+    /// Counter, incremented at every beat.
     pub beat: u64,
-    /// The machine's name.
+    /// Host name of the machine.
     pub host: String,
-    /// Tells machines, and containers on one machine, apart; empty: not known.
+    /// Identifier of the machine or container; empty if unknown.
     pub machine: String,
-    /// The process on that machine.
+    /// Process id on that machine.
     pub pid: u32,
-    /// Start by the machine's clock, seconds since 1970; for people.
+    /// Start time by the machine's clock, seconds since 1970; for display only.
     pub started: u64,
-    /// Whether the worker ended by itself, with nothing in its hands.
+    /// Whether the worker exited in order and holds no unit.
     pub ended: bool,
-    /// Units that it has done, and that failed in its hands.
+    /// Number of units done.
     pub n_done: usize,
-    /// Units that failed.
+    /// Number of units that failed.
     pub n_failed: usize,
-    /// Seconds of video in the units done.
+    /// Duration of the video in the units done, seconds.
     pub media_secs: f64,
-    /// Seconds since its start, by its own clock.
+    /// Time since the start, seconds, by the worker's own clock.
     pub secs: f64,
-    /// Unit in its hands.
+    /// Unit in progress.
     pub unit: Option<String>,
 }
 
 impl Heartbeat {
-    /// The file of a worker.
+    /// Path of a worker's file in the shared folder.
     pub fn name(worker: &str) -> String {
         format!("{WORKERS}/{worker}.json")
     }
 
-    /// What a worker said last; `None`: nothing yet, or half of it.
+    /// Reads the last status of a worker; `None` if there is none or it is incomplete.
     pub fn read(folder: &impl SharedFolder, worker: &str) -> Result<Option<Self>> {
         let bytes = folder.read(&Self::name(worker))?;
         Ok(bytes.and_then(|bytes| serde_json::from_slice(&bytes).ok()))
     }
 
-    /// Seconds of video a second.
+    /// Throughput, seconds of video per second.
     pub fn media_rate(&self) -> f64 {
         self.media_secs / self.secs.max(1.0)
     }
 
-    /// Whether it is known without waiting that the worker is gone: it said so, or it was a process of this machine that
-    /// is no more.
+    /// Whether the worker is known to have exited: its status says so, or it was a process of this machine that no
+    /// longer exists.
     pub fn is_over(&self, machine: &str) -> bool {
         self.ended || (!machine.is_empty() && self.machine == machine && !workdir::is_alive(self.pid))
     }
 }
 
-/// The name of the machine that this program is on, and what identifies machines and containers.
+/// Host name and identifier of the machine (or container) that this program runs on.
 pub fn this_machine() -> (String, String) {
     let host = rustix::system::uname().nodename().to_string_lossy().into_owned();
     (host, workdir::machine().to_owned())
 }
 
-/// Watches the beats of other workers.
+/// Detects dead workers by their heartbeats.
 pub struct BeatWatch {
-    /// More than a network file system keeps what it knows.
+    /// Must exceed the cache lifetime of the network file system.
     dead_after: Duration,
     machine: String,
-    /// Last beat of each worker, and when it was seen first.
-    seen: BTreeMap<String, (Option<u64>, Duration)>,
+    /// Last beat of each worker, and when the watcher first saw that beat.
+    last_beats: BTreeMap<String, (Option<u64>, Duration)>,
 }
 
 impl BeatWatch {
-    /// A watcher on `machine`.
+    /// Creates a watcher that runs on `machine`.
     pub fn new(dead_after: Duration, machine: &str) -> Self {
-        Self { dead_after, machine: machine.to_owned(), seen: BTreeMap::new() }
+        Self { dead_after, machine: machine.to_owned(), last_beats: BTreeMap::new() }
     }
 
-    /// Time between two checks: the dead are found a twelfth later than they are known to be dead.
+    /// Time between two checks: dead workers are detected at most a twelfth of `dead_after` late.
     pub fn interval(&self) -> Duration {
         self.dead_after / 12
     }
 
-    /// Whether the worker is dead at the time `now` of the watcher's clock. One seen for the first time is not, unless that
-    /// is known.
+    /// Whether the worker is dead at the time `now` on the watcher's clock. A worker seen for the first time counts as
+    /// alive unless it is known to have exited.
     pub fn is_dead(&mut self, folder: &impl SharedFolder, worker: &str, now: Duration) -> Result<bool> {
         let heartbeat = Heartbeat::read(folder, worker)?;
         if heartbeat.as_ref().is_some_and(|heartbeat| heartbeat.is_over(&self.machine)) {
             return Ok(true);
         }
         let beat = heartbeat.map(|heartbeat| heartbeat.beat);
-        let seen = self.seen.entry(worker.to_owned()).or_insert((beat, now));
-        // A cache may show an older beat again: only more is news.
-        if beat > seen.0 {
-            *seen = (beat, now);
+        let last = self.last_beats.entry(worker.to_owned()).or_insert((beat, now));
+        // A cache may return an older beat again, so only a higher one counts.
+        if beat > last.0 {
+            *last = (beat, now);
         }
-        Ok(now.saturating_sub(seen.1) >= self.dead_after)
+        Ok(now.saturating_sub(last.1) >= self.dead_after)
     }
 }

@@ -1,51 +1,52 @@
-//! What the jobs of every scheduler have in common: the commands of a worker and of the end, as a POSIX shell reads them.
+//! Parts shared by the jobs of all schedulers: the command lines of the workers and of the final job, quoted for a
+//! POSIX shell.
 
 use super::plan::ClusterPlan;
 use orator_base::stage::artifacts::{StageName, speaker_dir};
 use std::path::{Path, PathBuf};
 
-/// What one task may use.
+/// Resource limits of one task.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TaskLimits {
     /// Processor cores.
     pub cores: usize,
     /// Memory, GiB.
     pub memory_gib: f64,
-    /// Longest time, hours.
+    /// Time limit, hours.
     pub hours: f64,
 }
 
 impl TaskLimits {
-    /// The memory in MiB, rounded up.
+    /// The memory limit, MiB, rounded up.
     pub fn memory_mib(&self) -> u64 {
         (self.memory_gib * 1024.0).ceil() as u64
     }
 }
 
-/// What jobs are made of.
+/// Inputs of the job scripts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JobRequest {
-    /// The program on the machines of the cluster.
+    /// Path of the program on the machines of the cluster.
     pub program: PathBuf,
-    /// The plan there.
+    /// Path of the plan on the machines of the cluster.
     pub plan: PathBuf,
-    /// Number of workers, each a task of its own.
+    /// Number of workers; each is a separate task.
     pub n_tasks: usize,
-    /// Most tasks at a time.
+    /// Maximum number of tasks that run at the same time.
     pub n_at_once: usize,
-    /// What a worker may use.
+    /// Resource limits of a worker.
     pub worker_limits: TaskLimits,
 }
 
 impl JobRequest {
-    /// Arguments of a task's worker: it leaves what is in the hands of others.
+    /// Command line of a task's worker, which skips units claimed by other workers.
     pub fn worker(&self) -> Vec<String> {
         let mut words = self.last_worker();
         words.push("--no-wait".to_owned());
         words
     }
 
-    /// Arguments of the last worker, which waits for all others and takes over what the dead have left.
+    /// Command line of the last worker, which waits for all others and takes over the units of dead ones.
     pub fn last_worker(&self) -> Vec<String> {
         let [program, plan] = [&self.program, &self.plan].map(|path| path.display().to_string());
         [program.as_str(), "work", "--plan", plan.as_str(), "--jobs", &self.worker_limits.cores.to_string()]
@@ -53,7 +54,7 @@ impl JobRequest {
             .to_vec()
     }
 
-    /// The command lines that verify the datasets of a work folder.
+    /// Command lines that verify the datasets in a work folder, one per speaker.
     pub fn verify(&self, plan: &ClusterPlan, work: &Path) -> Vec<Vec<String>> {
         let dataset = |speaker| speaker_dir(work, StageName::Dataset, speaker);
         let words = |speaker| {
@@ -64,7 +65,7 @@ impl JobRequest {
     }
 }
 
-/// The words as a shell reads them, quoted where they must be.
+/// Joins the words to a shell command, quoting where necessary.
 pub fn shell(words: &[String]) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "-_./=:,+@%".contains(c);
     let quoted = |word: &String| match !word.is_empty() && word.chars().all(is_plain) {

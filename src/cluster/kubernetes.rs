@@ -1,24 +1,26 @@
-//! Jobs for Kubernetes: an Indexed Job of workers and a Job that makes the datasets, on the volumes that hold the project.
+//! Kubernetes manifests: an Indexed Job of workers and a Job that builds the datasets, on the volume that holds the
+//! project.
 
 use super::job::{JobRequest, shell};
 use super::plan::ClusterPlan;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Where jobs run.
+/// Cluster settings of the manifests.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KubernetesTarget {
-    /// Image that holds the program.
+    /// Container image with the program.
     pub image: String,
     pub namespace: String,
-    /// Claim of the volume with the project, which every node can write, and its size (GiB) where it is to be made.
+    /// PersistentVolumeClaim of the project, writable from every node, and its size (GiB) if the manifests should
+    /// create it.
     pub claim: String,
     pub claim_gib: Option<u64>,
-    /// Where the volume is mounted: a folder above plan, videos and work.
+    /// Mount path of the volume: a folder that contains the plan, the videos and the work folder.
     pub mount: String,
 }
 
-/// The manifests, as one List that `kubectl apply -f` takes. The job of the datasets waits for the units by itself.
+/// The manifests, as one List for `kubectl apply -f`. The job of the datasets itself waits until the units have ended.
 pub fn manifests(job: &JobRequest, plan: &ClusterPlan, work: &Path, target: &KubernetesTarget) -> Value {
     let name = |suffix: &str| format!("orator-{}{suffix}", &plan.seal[..8.min(plan.seal.len())]);
     let meta =
@@ -33,7 +35,7 @@ pub fn manifests(job: &JobRequest, plan: &ClusterPlan, work: &Path, target: &Kub
             "metadata": { "labels": { "app": "orator" } },
             "spec": {
                 "restartPolicy": "Never",
-                // Time for the unit at hand, when a node is emptied.
+                // Gives the unit in progress time to finish when a node is drained.
                 "terminationGracePeriodSeconds": 120,
                 "containers": [{
                     "name": "orator", "image": target.image, "command": command, "resources": resources,
@@ -43,13 +45,13 @@ pub fn manifests(job: &JobRequest, plan: &ClusterPlan, work: &Path, target: &Kub
             },
         })
     };
-    // A lost node is no failure of the task; a program that fails three times is.
+    // Losing a node does not count as a failure of the task; exit code 1 of the program fails the job.
     let lost_node =
         json!({ "action": "Ignore", "onPodConditions": [{ "type": "DisruptionTarget", "status": "True" }] });
     let failed = json!({
         "action": "FailJob", "onExitCodes": { "containerName": "orator", "operator": "In", "values": [1] },
     });
-    let of_index = json!({ "rules": [lost_node, failed] });
+    let failure_rules = json!({ "rules": [lost_node, failed] });
     let seconds = (limits.hours * 3600.0).ceil() as i64;
     let script = |lines: Vec<String>| vec!["/bin/sh".to_owned(), "-c".to_owned(), lines.join("\n")];
     let mut last = vec!["code=0".to_owned(), format!("{} || code=$?", shell(&job.last_worker()))];
@@ -68,8 +70,8 @@ pub fn manifests(job: &JobRequest, plan: &ClusterPlan, work: &Path, target: &Kub
         "apiVersion": "batch/v1", "kind": "Job", "metadata": meta(""),
         "spec": {
             "completionMode": "Indexed", "completions": job.n_tasks, "parallelism": job.n_at_once.min(job.n_tasks),
-            "backoffLimit": 3 * job.n_tasks, "activeDeadlineSeconds": seconds, "podFailurePolicy": of_index,
-            "template": pod(script(ended_with_its_pod(&shell(&job.worker())))),
+            "backoffLimit": 3 * job.n_tasks, "activeDeadlineSeconds": seconds, "podFailurePolicy": failure_rules,
+            "template": pod(script(sigterm_forwarding_script(&shell(&job.worker())))),
         },
     }));
     items.push(json!({
@@ -82,14 +84,14 @@ pub fn manifests(job: &JobRequest, plan: &ClusterPlan, work: &Path, target: &Kub
     json!({ "apiVersion": "v1", "kind": "List", "items": items })
 }
 
-/// Lines of a shell that runs a worker and hands SIGTERM on to it, which the shell as the pod's first process would keep to
-/// itself; videos that failed (exit code 2) do not fail the pod.
-fn ended_with_its_pod(worker: &str) -> Vec<String> {
+/// Shell script that runs a worker and forwards SIGTERM to it, which the shell, as the pod's first process, would not
+/// do by itself. Failed videos (exit code 2) do not fail the pod.
+fn sigterm_forwarding_script(worker: &str) -> Vec<String> {
     let lines = [
         &format!("{worker} & worker=$!"),
         "trap 'kill -TERM $worker 2>/dev/null' TERM",
         "wait $worker; code=$?",
-        // A signal ends the wait, not the worker.
+        // A signal ends the `wait`, not the worker.
         "while kill -0 $worker 2>/dev/null; do wait $worker; code=$?; done",
         "[ $code -eq 0 ] || [ $code -eq 2 ]",
     ];
@@ -104,15 +106,17 @@ mod tests {
     use std::time::Duration;
 
     #[test]
-    fn a_worker_hears_that_its_pod_is_to_end() {
+    fn a_worker_receives_the_sigterm_of_its_pod() {
         let code = |worker: &str, signal: Option<Signal>| {
-            let mut pod = Command::new("/bin/sh").args(["-c", &ended_with_its_pod(worker).join("\n")]).spawn().unwrap();
+            let mut pod =
+                Command::new("/bin/sh").args(["-c", &sigterm_forwarding_script(worker).join("\n")]).spawn().unwrap();
             std::thread::sleep(Duration::from_millis(300));
             signal.iter().for_each(|signal| kill_process(Pid::from_child(&pod), *signal).unwrap());
             pod.wait().unwrap().code()
         };
-        let listens = |code: u8| format!("sh -c 'trap \"sleep 0.2; exit {code}\" TERM; while :; do sleep 0.05; done'");
-        assert_eq!([0, 2, 1].map(|n| code(&listens(n), Some(Signal::TERM))), [Some(0), Some(0), Some(1)]);
+        let traps_term =
+            |code: u8| format!("sh -c 'trap \"sleep 0.2; exit {code}\" TERM; while :; do sleep 0.05; done'");
+        assert_eq!([0, 2, 1].map(|n| code(&traps_term(n), Some(Signal::TERM))), [Some(0), Some(0), Some(1)]);
         assert_eq!([0, 2, 3].map(|n| code(&format!("sh -c 'exit {n}'"), None)), [Some(0), Some(0), Some(1)]);
     }
 }

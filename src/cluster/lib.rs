@@ -1,8 +1,8 @@
-//! Many machines on one work folder. A sealed `plan` lists the units with the content of their files (`sealed_input`); each `worker` claims units in the shared folder
-//! (`claims`, by files that are only ever created, in a `shared_folder` that may show them late), shows that it is alive
-//! (`heartbeat`), runs the stages of what it claimed, and takes over what dead workers left; `progress` is what all of them
-//! did so far; `forget` finds the plans that name a video. `slurm` and `kubernetes` write the jobs that start workers. `timing` times the stages on excerpts,
-//! `stage_times` derives what a plan takes.
+//! Processing on many machines that share one work folder. A sealed `plan` lists the units and the hashes of their
+//! files (`sealed_input`). Each `worker` claims units by creating files (`claims`) in a `shared_folder` that may show
+//! them late, publishes a `heartbeat`, runs the stages, and takes over the units of dead workers. `progress` summarises
+//! all workers; `forget` finds plans that name a video; `slurm` and `kubernetes` write the jobs that start workers
+//! (`job`); `timing` measures the stages on excerpts, from which `stage_times` predicts the duration of a plan.
 
 pub mod claims;
 pub mod forget;

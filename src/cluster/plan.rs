@@ -1,5 +1,5 @@
-//! A sealed plan: which units there are, and what they are made with. Workers on any machine check that they hold the same
-//! program, configuration and models before they claim a unit.
+//! A sealed plan: the units, and the program, configuration and models that process them. Workers on any machine check
+//! that theirs are identical before they claim a unit.
 
 use super::job::shell;
 use super::sealed_input::SealedInput;
@@ -15,77 +15,80 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// Meaning of the file; another one is refused.
+/// Version of the file format; a file of any other version is rejected.
 const VERSION: u32 = 3;
-/// Usual length of a piece of a long video, seconds.
+/// Default length of a piece of a long video, seconds.
 pub const PIECE_SECS: f64 = 600.0;
-/// Videos from so many pieces on are shared by several workers.
-const LONG: f64 = 1.5;
-/// No video is longer, seconds.
+/// Videos of at least this many pieces are split among several workers.
+const MIN_SPLIT_PIECES: f64 = 1.5;
+/// Upper bound of the length of a video, seconds.
 const LONGEST_SECS: f64 = 1e9;
 
-/// What workers do.
+/// The units to process and what they depend on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ClusterPlan {
-    /// Meaning of this file.
+    /// Version of the file format.
     pub version: u32,
     /// BLAKE3 of the program.
     pub program: String,
-    /// The configuration, and BLAKE3 of its settings.
+    /// Path of the configuration; `settings` is the BLAKE3 of its settings.
     pub config: PathBuf,
-    /// `--set` changes of the configuration.
+    /// `--set` overrides of the configuration.
     pub sets: Vec<String>,
     pub settings: String,
-    /// BLAKE3 of every file of weights, by its name.
+    /// BLAKE3 of every weight file, by file name.
     pub models: BTreeMap<String, String>,
-    /// The units, in the order in which they are taken: the longest first.
+    /// The units in the order in which workers claim them: the longest first.
     pub units: Vec<PlannedUnit>,
-    /// BLAKE3 of all of the above.
+    /// BLAKE3 of all other fields.
     pub seal: String,
 }
 
-/// A video to be worked on, or what prepares the work on a long one.
+/// A video to process, or a piece of the work on a long one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlannedUnit {
     pub speaker: String,
-    /// Work name of the video.
+    /// Name of the video in the work folder.
     pub video: String,
     pub source: PathBuf,
-    /// Files that its first stage reads.
+    /// Files that the first stage reads.
     pub inputs: Vec<SealedInput>,
-    /// Duration of the video, where it could be read.
+    /// Duration of the video, seconds, if it could be read.
     pub secs: Option<f64>,
-    /// What is to be done of the video.
+    /// Part of the work on the video that this unit does.
     pub share: UnitShare,
-    /// Numbers of the units that must have ended before.
+    /// Indices of the units that must have ended before this one starts.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub needs: Vec<usize>,
 }
 
-/// What a unit is of the work on a video.
+/// Part of the work on a video that a unit does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum UnitShare {
-    /// All of it that is not done.
+    /// All stages, as far as they are not up to date.
     Whole,
-    /// The first stage.
+    /// The first stage only.
     Extract,
-    /// A share of the parts of the stages that have parts: number `idx` of `of`.
+    /// Piece `idx` of `of` of the stages that can be split.
     Parts { idx: usize, of: usize },
 }
 
 impl PlannedUnit {
-    /// The unit of the stages.
+    /// The unit as the pipeline knows it.
     pub fn unit(&self) -> Unit {
         Unit { speaker: self.speaker.clone(), video: self.video.clone(), source: self.source.clone() }
     }
 
-    /// Errors where a file is not what it was when the plan was written.
+    /// Checks the input files.
+    ///
+    /// # Errors
+    /// A file has changed since the plan was written, or cannot be read.
     pub fn check_inputs(&self, hashes: &HashCache) -> Result<()> {
         self.inputs.iter().try_for_each(|input| input.check(hashes))
     }
 
-    /// Seconds of video that have gone through when it has ended, where the length is known.
+    /// Seconds of video that count as processed when this unit has ended, if the duration is known.
     pub fn media_secs(&self) -> Option<f64> {
         match self.share {
             UnitShare::Whole if self.needs.is_empty() => self.secs,
@@ -94,18 +97,17 @@ impl PlannedUnit {
         }
     }
 
-    /// The units of a video, each with the numbers among them that it needs; pieces of a long one are about `piece_secs`
-    /// long.
-    fn shared(self, piece_secs: f64) -> Vec<Self> {
+    /// Splits a long video into units with pieces of about `piece_secs` seconds; `needs` holds indices into the result.
+    fn split(self, piece_secs: f64) -> Vec<Self> {
         let secs = self.secs.unwrap_or(0.0);
-        if secs < LONG * piece_secs {
+        if secs < MIN_SPLIT_PIECES * piece_secs {
             return vec![self];
         }
         let of = (secs / piece_secs).round().max(2.0) as usize;
         let first = Self { share: UnitShare::Extract, ..self.clone() };
         let parts = (0..of).map(|idx| Self { share: UnitShare::Parts { idx, of }, needs: vec![0], ..self.clone() });
-        let whole = Self { needs: (1..=of).collect(), ..self.clone() };
-        std::iter::once(first).chain(parts).chain([whole]).collect()
+        let final_unit = Self { needs: (1..=of).collect(), ..self.clone() };
+        std::iter::once(first).chain(parts).chain([final_unit]).collect()
     }
 }
 
@@ -119,12 +121,12 @@ impl fmt::Display for PlannedUnit {
     }
 }
 
-/// Puts the units of videos in the order in which they are taken: what others wait for first, then the longest.
-pub fn in_order(videos: Vec<PlannedUnit>, piece_secs: f64) -> Vec<PlannedUnit> {
+/// Splits the videos and sorts the units: units that others depend on first, then by length, longest first.
+pub fn split_and_sort(videos: Vec<PlannedUnit>, piece_secs: f64) -> Vec<PlannedUnit> {
     let mut units: Vec<PlannedUnit> = Vec::new();
     for video in videos {
         let n_before = units.len();
-        units.extend(video.shared(piece_secs).into_iter().map(|mut unit| {
+        units.extend(video.split(piece_secs).into_iter().map(|mut unit| {
             unit.needs.iter_mut().for_each(|needed| *needed += n_before);
             unit
         }));
@@ -146,11 +148,11 @@ pub fn in_order(videos: Vec<PlannedUnit>, piece_secs: f64) -> Vec<PlannedUnit> {
 }
 
 impl ClusterPlan {
-    /// The plan of all videos of a pipeline, which are read whole where their hashes are not known. `secs` gives the duration
-    /// of a video; long ones are shared in pieces of about `piece_secs`.
+    /// Creates the plan of all videos of a pipeline; videos whose hash is not cached are read completely. `secs`
+    /// returns the duration of a video; long videos are split into pieces of about `piece_secs` seconds.
     ///
     /// # Errors
-    /// No video; videos, weights or a program that cannot be read.
+    /// The pipeline has no video, or a video, weight file or the program cannot be read.
     pub fn new(
         pipeline: &Pipeline,
         sets: &[String],
@@ -167,7 +169,7 @@ impl ClusterPlan {
         for (Unit { speaker, video, source }, inputs) in videos.into_iter().zip(inputs) {
             let sealed = inputs.into_iter().map(|input| SealedInput::new(input, &hashes)).collect::<Result<_>>();
             let inputs = sealed.with_context(|| format!("no plan without the content of {speaker}/{video}"))?;
-            // To the millisecond, which comes back from the file as it is.
+            // Rounded to milliseconds, which JSON reproduces exactly.
             let secs = secs(&source).map(|secs| (1000.0 * secs).round() / 1000.0);
             units.push(PlannedUnit {
                 speaker,
@@ -191,46 +193,46 @@ impl ClusterPlan {
             sets: sets.to_vec(),
             settings: settings_hash(config)?,
             models: pipeline.model_hashes()?,
-            units: in_order(units, piece_secs),
+            units: split_and_sort(units, piece_secs),
             seal: String::new(),
         };
-        plan.seal = plan.sealed()?;
+        plan.seal = plan.compute_seal()?;
         Ok(plan)
     }
 
     /// Reads a plan.
     ///
     /// # Errors
-    /// No plan, a plan of another version, or one that was changed since it was written.
+    /// The file is not a plan, has another version, or was changed after it was written.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = workdir::read_file(path)
             .with_context(|| format!("cannot read the plan {}; `orator plan` writes one", path.display()))?;
-        let no_plan = || format!("{} is no plan", path.display());
-        let known: serde_json::Value = serde_json::from_slice(&bytes).with_context(no_plan)?;
-        let anew = "write it anew with `orator plan`";
+        let invalid_plan = || format!("{} is no plan", path.display());
+        let known: serde_json::Value = serde_json::from_slice(&bytes).with_context(invalid_plan)?;
+        let advice = "write it anew with `orator plan`";
         if let Some(version) = known["version"].as_u64().filter(|version| *version != u64::from(VERSION)) {
-            bail!("{} is a plan of version {version}, expected {VERSION}: {anew}", path.display());
+            bail!("{} is a plan of version {version}, expected {VERSION}: {advice}", path.display());
         }
-        let plan: Self = serde_json::from_value(known).with_context(no_plan)?;
+        let plan: Self = serde_json::from_value(known).with_context(invalid_plan)?;
         let path = path.display();
-        ensure!(plan.seal == plan.sealed()?, "{path} was changed since `orator plan` wrote it: write it anew");
+        ensure!(plan.seal == plan.compute_seal()?, "{path} was changed since `orator plan` wrote it: write it anew");
         Ok(plan)
     }
 
-    /// Writes the plan. What workers did by an earlier one in its place does not count for it.
+    /// Writes the plan. Results of workers under an earlier plan at this path do not count for it.
     pub fn write(&self, path: &Path) -> Result<()> {
         let mut bytes = serde_json::to_vec_pretty(self)?;
         bytes.push(b'\n');
         workdir::write_file(path, &bytes)
     }
 
-    /// The folder where workers meet: beside the plan, of its name and seal.
+    /// The folder that the workers share: next to the plan, named after the plan and its seal.
     pub fn folder(&self, path: &Path) -> PathBuf {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         path.with_file_name(format!("{stem}-{}", &self.seal[..12]))
     }
 
-    /// The videos, one unit each.
+    /// One unit for each video.
     pub fn videos(&self) -> Vec<PlannedUnit> {
         self.units.iter().filter(|unit| unit.share == UnitShare::Whole).cloned().collect()
     }
@@ -241,17 +243,17 @@ impl ClusterPlan {
         names.into_iter().collect()
     }
 
-    /// The command line by which `program` makes the datasets when all units have ended.
+    /// Command line with which `program` builds the datasets after all units have ended.
     pub fn datasets_command(&self, program: &str) -> String {
         format!("{} --only dataset", self.command(program, &["run"]))
     }
 
-    /// The command line by which `program` trains a model; the speaker's name comes behind it.
+    /// Command line with which `program` trains a model; the caller appends the speaker's name.
     pub fn training_command(&self, program: &str) -> String {
         format!("{} --speaker", self.command(program, &["train", "gan"]))
     }
 
-    /// A command line of `program` with the configuration of the plan.
+    /// A command line of `program` with the configuration and overrides of the plan.
     fn command(&self, program: &str, verb: &[&str]) -> String {
         let mut words = vec![program.to_owned()];
         words.extend(verb.iter().map(|&word| word.to_owned()));
@@ -260,24 +262,24 @@ impl ClusterPlan {
         shell(&words)
     }
 
-    /// Errors where this program, its configuration or its models are not those of the plan.
+    /// Checks that the program, its configuration and its models are those of the plan.
     ///
     /// # Errors
     /// What differs, and what to do.
     pub fn check(&self, pipeline: &Pipeline, program: &Path) -> Result<()> {
-        let anew = "write the plan anew with `orator plan`";
+        let advice = "write the plan anew with `orator plan`";
         if hash_file(program)? != self.program {
-            bail!("this program is not the one that wrote the plan: use the same on every machine, or {anew}");
+            bail!("this program is not the one that wrote the plan: use the same on every machine, or {advice}");
         }
         if settings_hash(pipeline.config())? != self.settings {
-            bail!("{} changed since the plan was written: {anew}", self.config.display());
+            bail!("{} changed since the plan was written: {advice}", self.config.display());
         }
         let models = pipeline.model_hashes()?;
         if let Some((name, _)) = self.models.iter().find(|(name, hash)| models.get(*name) != Some(hash)) {
-            bail!("the model {name} is not the one of the plan: copy the same models to every machine, or {anew}");
+            bail!("the model {name} is not the one of the plan: copy the same models to every machine, or {advice}");
         }
         match self.missing(pipeline)?.first() {
-            Some(unit) => bail!("the video {} of the plan is not found here: {anew}", unit.source.display()),
+            Some(unit) => bail!("the video {} of the plan is not found here: {advice}", unit.source.display()),
             None => Ok(()),
         }
     }
@@ -289,10 +291,11 @@ impl ClusterPlan {
         Ok(self.videos().into_iter().filter(|unit| !is_known(unit)).collect())
     }
 
-    /// Videos of the plan at `path` that the pipeline does not find; none where there is no plan of these settings.
+    /// Videos of the plan at `path` that the pipeline does not find; empty if `path` is not a plan with the pipeline's
+    /// settings.
     ///
     /// # Errors
-    /// Settings that cannot be hashed.
+    /// The settings cannot be hashed.
     pub fn missing_videos(path: &Path, pipeline: &Pipeline) -> Result<Vec<PlannedUnit>> {
         match Self::read(path) {
             Ok(plan) if plan.settings == settings_hash(pipeline.config())? => plan.missing(pipeline),
@@ -300,10 +303,10 @@ impl ClusterPlan {
         }
     }
 
-    /// BLAKE3 of the plan without its seal.
-    fn sealed(&self) -> Result<String> {
-        let open = Self { seal: String::new(), ..self.clone() };
-        Ok(blake3::hash(&serde_json::to_vec(&open)?).to_hex().to_string())
+    /// BLAKE3 of the plan with an empty seal.
+    fn compute_seal(&self) -> Result<String> {
+        let unsealed = Self { seal: String::new(), ..self.clone() };
+        Ok(blake3::hash(&serde_json::to_vec(&unsealed)?).to_hex().to_string())
     }
 }
 
@@ -311,8 +314,8 @@ fn has(videos: &Videos, unit: &PlannedUnit) -> bool {
     videos.speaker == unit.speaker && videos.units.iter().any(|known| known.video == unit.video)
 }
 
-/// BLAKE3 of the settings of videos and datasets: training comes after the plan, and how many work side by side has no
-/// say in what they make.
+/// BLAKE3 of the settings that affect videos and datasets. Training comes after the plan, and the number of parallel
+/// jobs does not change results.
 pub fn settings_hash(config: &Config) -> Result<String> {
     let mut settings = config.settings.clone();
     settings.work.jobs = 0;
@@ -323,7 +326,7 @@ pub fn settings_hash(config: &Config) -> Result<String> {
 
 #[cfg(test)]
 impl PlannedUnit {
-    /// A video of unknown length for tests.
+    /// A video of unknown length, for tests.
     pub fn example(speaker: &str, video: &str) -> Self {
         Self {
             speaker: speaker.to_owned(),
@@ -347,8 +350,9 @@ mod tests {
     }
 
     #[test]
-    fn long_videos_are_shared_and_what_others_wait_for_comes_first() {
-        let units = in_order(vec![video("short", 300.0), video("long", 1700.0), video("middle", 899.0)], PIECE_SECS);
+    fn long_videos_are_split_and_prerequisites_come_first() {
+        let units =
+            split_and_sort(vec![video("short", 300.0), video("long", 1700.0), video("middle", 899.0)], PIECE_SECS);
         let names: Vec<String> = units.iter().map(PlannedUnit::to_string).collect();
         let parts = ["host/long (part 1 of 3)", "host/long (part 2 of 3)", "host/long (part 3 of 3)"];
         assert_eq!(names[..2], ["host/long (extract)", "host/middle"]);
@@ -365,7 +369,7 @@ mod tests {
     }
 
     #[test]
-    fn a_plan_of_another_version_is_refused_with_what_to_do() {
+    fn a_plan_of_another_version_is_rejected_with_advice() {
         let dir = tempfile::tempdir().unwrap();
         let file = dir.path().join("plan.json");
         std::fs::write(&file, "{\"version\": 2, \"units\": [{\"bytes\": 1}]}").unwrap();
@@ -374,7 +378,7 @@ mod tests {
     }
 
     #[test]
-    fn settings_of_training_are_no_part_of_it() {
+    fn training_settings_do_not_change_the_hash() {
         let dir = tempfile::tempdir().unwrap();
         let file = dir.path().join("pipeline.toml");
         std::fs::write(&file, "[[speaker]]\nname = \"host\"\nvideos = [\"host/*.mp4\"]\n").unwrap();

@@ -1,4 +1,4 @@
-//! How far the workers of a plan are, from their files alone.
+//! Progress of all workers of a plan, read from the files in their folder.
 
 use super::claims::{Claim, ClaimOwner, ClaimState, read_states};
 use super::heartbeat::{Heartbeat, WORKERS, this_machine};
@@ -12,84 +12,84 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// What the workers of a plan have done.
+/// Summary of the work on a plan.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct PlanProgress {
     pub n_units: usize,
     pub n_done: usize,
     pub n_failed: usize,
-    /// In the hands of workers that are alive, and of dead ones.
+    /// Units claimed by live workers, and by dead ones.
     pub n_claimed: usize,
     pub n_left_by_dead: usize,
-    /// Units held by what is no claim of a worker: a folder, a pipe, or a damaged file.
+    /// Paths that occupy a unit without being a worker's claim: a folder, a pipe or a damaged file.
     pub blocked: Vec<PathBuf>,
-    /// Units that were taken over once or more.
+    /// Units that were claimed more than once.
     pub n_taken_over: usize,
-    /// Seconds of video of all units, and of those that have ended; without those of unknown length.
+    /// Duration of the video in all units and in those that have ended, seconds; units of unknown length count 0.
     pub media_secs: f64,
     pub ended_media_secs: f64,
-    /// Seconds until the end at the pace of the workers that are alive; none where that is not known.
+    /// Estimated seconds until the end at the rate of the live workers; `None` if the rate is unknown.
     pub secs_left: Option<f64>,
-    /// Failed units by the reason.
+    /// Failed units, by error.
     pub failures: BTreeMap<String, Vec<String>>,
-    /// Those at work or gone, by name.
+    /// All workers that have published a heartbeat, by name.
     pub workers: Vec<WorkerProgress>,
-    /// Why all workers have stopped.
+    /// Reason why all workers have stopped.
     pub stopped: Option<String>,
 }
 
-/// What a worker has done.
+/// Status of one worker.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct WorkerProgress {
     pub worker: String,
     pub is_alive: bool,
     #[serde(flatten)]
     pub heartbeat: Heartbeat,
-    /// Seconds since it was last heard, by the file server's clock.
+    /// Seconds since the last heartbeat, by the file server's clock.
     pub silent_secs: f64,
 }
 
-/// Reads how far the plan at `path` is. A worker that was silent for `dead_after` is dead.
+/// Reads the progress of the plan at `path`. A worker without a heartbeat for `dead_after` counts as dead.
 pub fn progress(plan: &ClusterPlan, path: &Path, dead_after: Duration) -> Result<PlanProgress> {
     let folder = DiskFolder(plan.folder(path));
     let workers = workers(&folder, dead_after)?;
     let is_alive = |name: &str| workers.iter().any(|worker| worker.worker == name && worker.is_alive);
     let states = read_states(&folder, plan.units.len())?;
-    let mut told = PlanProgress { n_units: plan.units.len(), ..PlanProgress::default() };
+    let mut summary = PlanProgress { n_units: plan.units.len(), ..PlanProgress::default() };
     for (unit, (planned, ClaimState { epoch, has_ended })) in plan.units.iter().zip(states).enumerate() {
         let (claim, secs) = (Claim { unit, epoch }, planned.media_secs().unwrap_or(0.0));
-        told.media_secs += secs;
-        told.n_taken_over += usize::from(epoch > 1);
+        summary.media_secs += secs;
+        summary.n_taken_over += usize::from(epoch > 1);
         if !has_ended && epoch > 0 {
             match claim.read_owner(&folder)? {
-                ClaimOwner::Worker(worker) if is_alive(&worker) => told.n_claimed += 1,
-                ClaimOwner::Worker(_) | ClaimOwner::NotVisible => told.n_left_by_dead += 1,
-                ClaimOwner::Unreadable(file) => told.blocked.push(folder.0.join(file)),
+                ClaimOwner::Worker(worker) if is_alive(&worker) => summary.n_claimed += 1,
+                ClaimOwner::Worker(_) | ClaimOwner::NotVisible => summary.n_left_by_dead += 1,
+                ClaimOwner::Unreadable(file) => summary.blocked.push(folder.0.join(file)),
             }
         } else if has_ended {
-            told.ended_media_secs += secs;
+            summary.ended_media_secs += secs;
             match claim.read_end(&folder)?.and_then(|end| end.error) {
-                None => told.n_done += 1,
+                None => summary.n_done += 1,
                 Some(error) => {
-                    told.n_failed += 1;
-                    told.failures.entry(reason(&error)).or_default().push(planned.to_string());
+                    summary.n_failed += 1;
+                    summary.failures.entry(reason(&error)).or_default().push(planned.to_string());
                 }
             }
         }
     }
     let rate: f64 = workers.iter().filter(|worker| worker.is_alive).map(|worker| worker.heartbeat.media_rate()).sum();
-    told.secs_left = (rate > 0.0).then(|| (told.media_secs - told.ended_media_secs) / rate);
-    told.stopped = read_stop(&folder)?;
-    told.workers = workers;
-    Ok(told)
+    summary.secs_left = (rate > 0.0).then(|| (summary.media_secs - summary.ended_media_secs) / rate);
+    summary.stopped = read_stop(&folder)?;
+    summary.workers = workers;
+    Ok(summary)
 }
 
-/// The innermost cause of an error, which units of one trouble share.
+/// The innermost cause of an error; units that fail for one cause are listed together.
 fn reason(error: &str) -> String {
     error.rsplit(": ").next().unwrap_or(error).to_owned()
 }
 
-/// All workers that have said something.
+/// All workers that have published a heartbeat.
 fn workers(folder: &DiskFolder, dead_after: Duration) -> Result<Vec<WorkerProgress>> {
     let mut names = folder.list(WORKERS)?;
     names.sort();
@@ -97,7 +97,7 @@ fn workers(folder: &DiskFolder, dead_after: Duration) -> Result<Vec<WorkerProgre
         return Ok(Vec::new());
     }
     let (_, machine) = this_machine();
-    // The time of the file server, whatever this machine's clock says.
+    // A fresh file gives the time of the file server, independent of this machine's clock.
     let probe = folder.0.join(WORKERS).join(format!(".now-{}", std::process::id()));
     let changed = |path: &Path| fs::metadata(path).and_then(|meta| meta.modified());
     fs::write(&probe, b"now").with_context(|| format!("cannot write in {}", folder.0.display()))?;

@@ -1,5 +1,5 @@
-//! The files that workers read for a unit (a video; keypoints and their sound), sealed in the plan with their content: a unit
-//! is worked on only while they are what was planned.
+//! The files that workers read for a unit (a video, or keypoints and their audio), recorded in the plan with their
+//! content. A unit is processed only while its files match the plan.
 
 use anyhow::{Result, ensure};
 use orator_base::stage::Input;
@@ -17,16 +17,19 @@ pub struct SealedInput {
 }
 
 impl SealedInput {
-    /// Reads the input, unless its hash is known.
+    /// Records the input; hashes its content unless the hash is cached.
     ///
     /// # Errors
-    /// An input that cannot be read.
+    /// The input cannot be read.
     pub fn new(input: Input, hashes: &HashCache) -> Result<Self> {
         let content = hashes.content(&input.path)?;
         Ok(Self { role: input.role, path: input.path, content })
     }
 
-    /// Errors where the content is not that of the plan, or cannot be read. A new time of change alone is no change.
+    /// Checks that the content is that of the plan; a new modification time alone is ignored.
+    ///
+    /// # Errors
+    /// The content differs or cannot be read.
     pub fn check(&self, hashes: &HashCache) -> Result<()> {
         ensure!(
             hashes.is_unchanged(&self.path, &self.content)?,
@@ -46,7 +49,7 @@ mod tests {
     use std::time::{Duration, SystemTime};
 
     #[test]
-    fn a_changed_video_is_named_and_a_touched_one_is_the_planned_one() {
+    fn a_changed_video_is_reported_and_a_touched_one_accepted() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.mp4");
         let hashes = HashCache::open(&dir.path().join("hashes.json"));
@@ -58,18 +61,18 @@ mod tests {
         let sealed = SealedInput::new(Input { role: "video".into(), path: path.clone() }, &hashes).unwrap();
         let json = serde_json::to_string(&sealed).unwrap();
         assert_eq!(serde_json::from_str::<SealedInput>(&json).unwrap(), sealed);
-        let said = || sealed.check(&hashes).map_err(|error| format!("{error:#}"));
-        assert_eq!(said(), Ok(()));
+        let check = || sealed.check(&hashes).map_err(|error| format!("{error:#}"));
+        assert_eq!(check(), Ok(()));
         write("planned", 50);
-        assert_eq!(said(), Ok(()), "a time alone is no change");
+        assert_eq!(check(), Ok(()), "a time alone is no change");
         for (text, secs_ago) in [("changed", 40), ("longer than planned", 100)] {
             write(text, secs_ago);
-            let error = said().unwrap_err();
+            let error = check().unwrap_err();
             assert!(error.contains("a.mp4 changed since the plan") && error.contains("orator plan"), "{error}");
         }
         write("planned", 10);
-        assert_eq!(said(), Ok(()));
+        assert_eq!(check(), Ok(()));
         fs::remove_file(&path).unwrap();
-        assert!(said().unwrap_err().contains("a.mp4"));
+        assert!(check().unwrap_err().contains("a.mp4"));
     }
 }

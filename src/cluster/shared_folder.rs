@@ -1,5 +1,5 @@
-//! What workers on many machines ask of the folder that they share: to create a file once, to read, list and replace.
-//! Nothing else is needed, and no lock, so that NFS with its caches will do.
+//! Operations on the folder that workers on many machines share: create a file once, read, list and replace. No locks
+//! are used, so that NFS with its caches is sufficient.
 
 use anyhow::{Context, Result};
 use orator_base::stage::workdir;
@@ -9,26 +9,27 @@ use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// A folder of small files that several machines see. Names have `/` between folders.
+/// A folder of small files that is visible to several machines. Names use `/` as separator.
 pub trait SharedFolder {
-    /// Makes the file with these bytes; `false`: there is one of that name. Of several that try, one succeeds. The bytes must
-    /// be no one else's.
+    /// Creates the file with these bytes; returns `false` if the name exists. If several callers try, one succeeds. The
+    /// bytes must be unique to the caller.
     fn create(&self, name: &str, bytes: &[u8]) -> Result<bool>;
-    /// The bytes of a file, maybe not the newest; `None`: not there, or not seen yet. What has the name and is no file that can
-    /// be read (a folder, a pipe, a link to nothing) is read as empty.
+    /// The bytes of a file, possibly outdated; `None` if the file does not exist or is not visible yet. Anything other
+    /// than a readable file (a folder, a pipe, a dangling link) is read as empty.
     fn read(&self, name: &str) -> Result<Option<Vec<u8>>>;
-    /// Names of the files of a folder, maybe without the newest; `/` follows the name of what is no file.
+    /// Names of the files of a folder, possibly without the newest; the names of entries other than regular files end
+    /// in `/`.
     fn list(&self, folder: &str) -> Result<Vec<String>>;
-    /// Puts the bytes in the place of a file that this worker alone writes.
+    /// Replaces a file that only this worker writes.
     fn replace(&self, name: &str, bytes: &[u8]) -> Result<()>;
 }
 
-/// A folder of a file system.
+/// A folder on a file system.
 #[derive(Clone, Debug)]
 pub struct DiskFolder(pub PathBuf);
 
 impl SharedFolder for DiskFolder {
-    /// By a hard link to a file that is whole, which every network file system does at once or not at all.
+    /// Hard-links a complete file, which every network file system does atomically.
     fn create(&self, name: &str, bytes: &[u8]) -> Result<bool> {
         static NEXT: AtomicU64 = AtomicU64::new(0);
         let path = self.0.join(name);
@@ -48,7 +49,7 @@ impl SharedFolder for DiskFolder {
                 removed.with_context(|| format!("cannot remove {}", draft.display()))?;
                 Ok(true)
             }
-            // A link whose answer was lost is asked for again by the system, and then there already.
+            // If the reply to a link request was lost, the system repeats the request and finds the link already there.
             Err(error) if error.kind() == ErrorKind::AlreadyExists => Ok(self.read(name)?.as_deref() == Some(bytes)),
             Err(error) => Err(workdir::full_disk(error.into()))
                 .with_context(|| format!("cannot link {}: workers need a file system with hard links", path.display())),
@@ -60,7 +61,7 @@ impl SharedFolder for DiskFolder {
         match workdir::read_file(&path) {
             Ok(bytes) => Ok(Some(bytes)),
             Err(error) if is_gone(&error) && !path.is_symlink() => Ok(None),
-            Err(error) if is_gone(&error) || is_no_file(&error) => Ok(Some(Vec::new())),
+            Err(error) if is_gone(&error) || is_not_regular(&error) => Ok(Some(Vec::new())),
             Err(error) => Err(error).with_context(|| format!("cannot read {}", path.display())),
         }
     }
@@ -85,13 +86,13 @@ impl SharedFolder for DiskFolder {
     }
 }
 
-/// The file is not there, or was removed on another machine while this one had it open.
+/// The file does not exist, or was removed on another machine while this one had it open.
 fn is_gone(error: &std::io::Error) -> bool {
     error.kind() == ErrorKind::NotFound || error.kind() == ErrorKind::StaleNetworkFileHandle
 }
 
-/// The name is that of a folder, a pipe, a socket, a circle of links, or of a file that may not be read.
-fn is_no_file(error: &std::io::Error) -> bool {
+/// The name belongs to a folder, a pipe, a socket, a cycle of links, or a file without read permission.
+fn is_not_regular(error: &std::io::Error) -> bool {
     let is_other = |errno: Errno| error.raw_os_error() == Some(errno.raw_os_error());
     let kinds = [ErrorKind::IsADirectory, ErrorKind::InvalidInput, ErrorKind::PermissionDenied];
     kinds.contains(&error.kind()) || is_other(Errno::NXIO) || is_other(Errno::LOOP)
@@ -102,7 +103,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn of_many_that_create_a_file_one_succeeds() {
+    fn one_of_several_concurrent_creations_succeeds() {
         let dir = tempfile::tempdir().unwrap();
         let folder = DiskFolder(dir.path().to_owned());
         let created: usize = std::thread::scope(|scope| {
@@ -126,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_file_holds_its_name_and_keeps_nobody_waiting() {
+    fn other_file_kinds_occupy_their_name_without_blocking() {
         let dir = tempfile::tempdir().unwrap();
         let folder = DiskFolder(dir.path().to_owned());
         let at = |name: &str| dir.path().join("a").join(name);

@@ -1,4 +1,4 @@
-//! A simulation of workers that claim units in a folder that shows what was written late, as a network file system does.
+//! Simulation of workers that claim units in a folder that shows changes late, as a network file system does.
 
 use super::claims::{Claim, ClaimOptions, Claims, NextUnit, UnitEnd};
 use super::heartbeat::{BeatWatch, Heartbeat};
@@ -12,10 +12,10 @@ use std::time::Duration;
 
 const DEAD_AFTER: Duration = Duration::from_secs(180);
 
-/// The server's files: each with its versions and their times.
+/// Files on the server, each with its versions and their times.
 type Files = BTreeMap<String, Vec<(Duration, Vec<u8>)>>;
 
-/// One machine's view of the server: reads and lists may be as old as `delay`.
+/// A machine's view of the server: reads and listings may be up to `delay` old.
 struct DelayedFolder {
     files: RefCell<Files>,
     now: Cell<Duration>,
@@ -24,7 +24,7 @@ struct DelayedFolder {
 }
 
 impl DelayedFolder {
-    fn seen_at(&self) -> Duration {
+    fn visible_time(&self) -> Duration {
         let late = self.rng.borrow_mut().random_range(0.0..=1.0);
         self.now.get().saturating_sub(self.delay.mul_f64(late))
     }
@@ -41,17 +41,17 @@ impl SharedFolder for DelayedFolder {
     }
 
     fn read(&self, name: &str) -> Result<Option<Vec<u8>>> {
-        let at = self.seen_at();
+        let at = self.visible_time();
         let files = self.files.borrow();
         let version = files.get(name).and_then(|versions| versions.iter().rev().find(|(time, _)| *time <= at));
         Ok(version.map(|(_, bytes)| bytes.clone()))
     }
 
     fn list(&self, folder: &str) -> Result<Vec<String>> {
-        let at = self.seen_at();
+        let at = self.visible_time();
         let files = self.files.borrow();
-        let seen = files.iter().filter(|(_, versions)| versions[0].0 <= at);
-        Ok(seen.filter_map(|(name, _)| Some(name.strip_prefix(folder)?.strip_prefix('/')?.to_owned())).collect())
+        let visible = files.iter().filter(|(_, versions)| versions[0].0 <= at);
+        Ok(visible.filter_map(|(name, _)| Some(name.strip_prefix(folder)?.strip_prefix('/')?.to_owned())).collect())
     }
 
     fn replace(&self, name: &str, bytes: &[u8]) -> Result<()> {
@@ -61,16 +61,16 @@ impl SharedFolder for DelayedFolder {
     }
 }
 
-/// A worker of the simulation.
+/// A simulated worker.
 struct Simulated<'a> {
     claims: Claims<'a, DelayedFolder>,
     name: String,
-    /// Its clock is so far from the server's.
+    /// Offset of its clock from the server's.
     clock: Duration,
     beat: u64,
-    hands: Option<(Claim, Duration)>,
+    current: Option<(Claim, Duration)>,
     is_dead: bool,
-    /// Until then the worker neither works nor beats.
+    /// Until this time the worker neither works nor beats.
     paused_until: Duration,
 }
 
@@ -82,7 +82,7 @@ fn folder(delay: Duration, seed: u64) -> DelayedFolder {
 fn worker(folder: &DelayedFolder, n_units: usize, number: u64, retries: bool) -> Simulated<'_> {
     let name = format!("w{number}");
     let watch = BeatWatch::new(DEAD_AFTER, "");
-    // Every fourth unit needs the three before it.
+    // Every fourth unit needs the three units before it.
     let needs = (0..n_units).map(|unit| if unit % 4 == 3 { (unit - 3..unit).collect() } else { Vec::new() });
     let (needs, order) = (needs.collect(), (0..n_units).collect());
     Simulated {
@@ -90,22 +90,22 @@ fn worker(folder: &DelayedFolder, n_units: usize, number: u64, retries: bool) ->
         name,
         clock: Duration::from_secs(97 * number),
         beat: 0,
-        hands: None,
+        current: None,
         is_dead: false,
         paused_until: Duration::ZERO,
     }
 }
 
-/// Eight workers on a folder that shows things up to a minute late, with clocks minutes apart. Some die, some stand still
-/// for longer than the dead are waited for; the dead are replaced. Every unit ends, and two have one unit at a time only
-/// where one of them died or stood still.
+/// Eight workers on a folder that shows changes up to a minute late, with clocks minutes apart. Some die and are
+/// replaced; some pause for longer than the timeout for dead workers. Every unit ends, and a unit ends twice only if a
+/// worker died or paused.
 #[test]
-fn every_unit_ends_whoever_dies() {
+fn every_unit_ends_although_workers_die() {
     for seed in 0..20 {
         let (mut rng, n_units) = (ChaCha8Rng::seed_from_u64(seed), 60);
         let folder = folder(Duration::from_secs(60), seed);
         let mut workers: Vec<Simulated> = (0..8).map(|number| worker(&folder, n_units, number, false)).collect();
-        let (mut ended, mut n_troubles, mut n_twice) = (BTreeMap::new(), 0, 0);
+        let (mut ended, mut n_faults, mut n_twice) = (BTreeMap::new(), 0, 0);
         let (mut now, mut n_started) = (Duration::ZERO, 8);
         while ended.len() < n_units {
             now += Duration::from_secs(10);
@@ -117,15 +117,15 @@ fn every_unit_ends_whoever_dies() {
                 }
                 match rng.random_range(0..1000) {
                     0..4 => {
-                        (workers[at].is_dead, n_troubles) = (true, n_troubles + 1);
+                        (workers[at].is_dead, n_faults) = (true, n_faults + 1);
                         let next = worker(&folder, n_units, n_started, false);
                         n_started += 1;
                         workers.push(next);
                         continue;
                     }
                     4..8 => {
-                        let still = Duration::from_secs(rng.random_range(10..600));
-                        (workers[at].paused_until, n_troubles) = (now + still, n_troubles + 1);
+                        let pause = Duration::from_secs(rng.random_range(10..600));
+                        (workers[at].paused_until, n_faults) = (now + pause, n_faults + 1);
                         continue;
                     }
                     _ => {}
@@ -134,9 +134,9 @@ fn every_unit_ends_whoever_dies() {
                 one.beat += 1;
                 let heartbeat = Heartbeat { beat: one.beat, ..Heartbeat::default() };
                 folder.replace(&Heartbeat::name(&one.name), &serde_json::to_vec(&heartbeat).unwrap()).unwrap();
-                match one.hands {
+                match one.current {
                     Some((claim, until)) if now >= until => {
-                        one.hands = None;
+                        one.current = None;
                         let end = UnitEnd { worker: one.name.clone(), error: None, secs: 1.0 };
                         one.claims.end(claim, &end).unwrap();
                         n_twice += usize::from(ended.insert(claim.unit, claim.epoch).is_some());
@@ -146,19 +146,19 @@ fn every_unit_ends_whoever_dies() {
                         if let NextUnit::Claimed(claim) = one.claims.next(now + one.clock).unwrap() {
                             let needs = if claim.unit % 4 == 3 { claim.unit - 3..claim.unit } else { 0..0 };
                             assert!(needs.into_iter().all(|needed| ended.contains_key(&needed)), "seed {seed}");
-                            one.hands = Some((claim, now + Duration::from_secs(rng.random_range(30..900))));
+                            one.current = Some((claim, now + Duration::from_secs(rng.random_range(30..900))));
                         }
                     }
                 }
             }
         }
-        assert!(n_twice <= n_troubles, "seed {seed}: {n_twice} units done twice, {n_troubles} troubles");
-        assert!(n_troubles > 0);
+        assert!(n_twice <= n_faults, "seed {seed}: {n_twice} units done twice, {n_faults} troubles");
+        assert!(n_faults > 0);
     }
 }
 
 #[test]
-fn the_dead_are_waited_for_the_slow_keep_what_they_have_and_the_failed_are_retried_once() {
+fn dead_workers_are_replaced_slow_ones_keep_their_claims_and_failures_are_retried_once() {
     let folder = folder(Duration::ZERO, 1);
     let [mut a, mut b] = [0, 1].map(|number| worker(&folder, 2, number, false).claims);
     let secs = Duration::from_secs;
@@ -167,12 +167,12 @@ fn the_dead_are_waited_for_the_slow_keep_what_they_have_and_the_failed_are_retri
     assert_eq!(b.next(secs(0)).unwrap(), NextUnit::Claimed(second));
     let beat = |beat| serde_json::to_vec(&Heartbeat { beat, ..Heartbeat::default() }).unwrap();
     for at in 1..=30 {
-        // A slow one beats on.
+        // A slow worker still beats.
         folder.replace("workers/w0.json", &beat(at)).unwrap();
         assert!(matches!(b.next(secs(60 * at)).unwrap(), NextUnit::Wait(_)));
     }
     assert!(a.is_mine(first).unwrap());
-    // It waits longer and longer, up to a twelfth of the time after which a worker is dead.
+    // The waiting time grows up to a twelfth of the timeout for dead workers.
     assert_eq!(b.next(secs(60 * 30 + 179)).unwrap(), NextUnit::Wait(secs(15)));
     let stolen = Claim { epoch: 2, ..first };
     assert_eq!(b.next(secs(60 * 30 + 179 + 15)).unwrap(), NextUnit::Claimed(stolen));
@@ -190,11 +190,12 @@ fn the_dead_are_waited_for_the_slow_keep_what_they_have_and_the_failed_are_retri
 }
 
 #[test]
-fn what_has_the_name_of_a_claim_holds_that_unit_alone() {
+fn a_foreign_file_named_like_a_claim_blocks_only_its_unit() {
     let dir = tempfile::tempdir().unwrap();
     let folder = DiskFolder(dir.path().to_owned());
     let at = |name: &str| dir.path().join("claims/0000").join(name);
-    // A folder and a damaged file are no claims, a folder is no end; unit 3 needs one that nobody can claim.
+    // A folder and a damaged file are not claims, and a folder is not an end; unit 3 needs a unit that cannot be
+    // claimed.
     std::fs::create_dir_all(at("000001.claim.0001")).unwrap();
     std::fs::write(at("000002.claim.0001"), "").unwrap();
     std::fs::create_dir(at("000004.end.0001")).unwrap();
@@ -213,7 +214,7 @@ fn what_has_the_name_of_a_claim_holds_that_unit_alone() {
     let files = ["claim", "claim", "end"].into_iter().zip([1, 2, 4]);
     let expected = files.map(|(kind, unit)| (unit, format!("claims/0000/{unit:06}.{kind}.0001"))).collect();
     assert_eq!(claims.blocked(), &expected);
-    // What is removed is claimed by a worker that still waits.
+    // Once the foreign folder is removed, a waiting worker claims the unit.
     std::fs::remove_dir(at("000001.claim.0001")).unwrap();
     assert!(matches!(claims.next(DEAD_AFTER).unwrap(), NextUnit::Wait(_)));
     for unit in [1, 3] {
@@ -225,7 +226,7 @@ fn what_has_the_name_of_a_claim_holds_that_unit_alone() {
 }
 
 #[test]
-fn an_end_that_says_nothing_is_a_failure() {
+fn an_unreadable_end_file_counts_as_a_failure() {
     let folder = folder(Duration::ZERO, 1);
     folder.create("claims/0000/000000.end.0001", b"").unwrap();
     let end = Claim { unit: 0, epoch: 1 }.read_end(&folder).unwrap().unwrap();

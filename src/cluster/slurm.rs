@@ -1,36 +1,37 @@
-//! Jobs for Slurm: an array of workers, a last job after all of them, and trainings after that.
+//! Slurm jobs: an array of workers, a final job after all of them, and training jobs after that.
 
 use super::job::{JobRequest, TaskLimits, shell};
 use super::plan::ClusterPlan;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Seconds before the end of its time in which a task is told to stop.
+/// Seconds before its time limit at which a task receives SIGTERM.
 const NOTICE_SECS: u64 = 120;
 
 /// The scripts of a plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SlurmScripts {
-    /// One script an array, none longer than the cluster allows.
+    /// Arrays of workers, each within the cluster's size limit.
     pub arrays: Vec<String>,
-    /// The job after all arrays, however they ended: it works on what they left, makes the datasets and verifies them.
+    /// The job after all arrays, whatever their result: it processes the remaining units, builds the datasets and
+    /// verifies them.
     pub last: String,
-    /// Arrays after the last job, a training a speaker; none where none is asked for.
+    /// Arrays after the last job, one training per speaker; empty if no training is requested.
     pub trainings: Vec<String>,
 }
 
-/// What all scripts have in common.
+/// Settings shared by all scripts.
 pub struct SlurmSettings<'a> {
     /// The cluster's MaxArraySize.
     pub max_array: usize,
-    /// Folder of the outputs.
+    /// Folder of the log files.
     pub logs: &'a Path,
-    /// More lines for `#SBATCH` (a partition, an account).
+    /// Additional `#SBATCH` options (such as a partition or an account).
     pub options: &'a [String],
 }
 
 impl SlurmSettings<'_> {
-    /// What stands before a script's commands; of an array, how many tasks it has and how many at once.
+    /// The header of a script; for an array, `array` is the number of tasks and how many run at the same time.
     fn head(&self, name: &str, limits: TaskLimits, array: Option<[usize; 2]>) -> String {
         let output = if array.is_some() { "%A_%a.out" } else { "%j.out" };
         let mut lines = vec![
@@ -51,7 +52,7 @@ impl SlurmSettings<'_> {
     }
 }
 
-/// Writes the scripts; `training` is what the training of a speaker may use, where one is asked for.
+/// Writes the scripts; `training` holds the resource limits of a training, `None` if no training is requested.
 pub fn scripts(
     job: &JobRequest,
     plan: &ClusterPlan,
@@ -60,13 +61,13 @@ pub fn scripts(
     training: Option<TaskLimits>,
 ) -> SlurmScripts {
     let (most, program) = (settings.max_array.max(1), job.program.display().to_string());
-    // Units that failed are the last job's matter.
-    let worker = until_done(&shell(&job.worker())) + "[ \"$code\" -ne 2 ] || code=0\nexit \"$code\"\n";
+    // Exit code 2 (failed units) is ignored here: the last job reports it.
+    let worker = run_and_requeue(&shell(&job.worker())) + "[ \"$code\" -ne 2 ] || code=0\nexit \"$code\"\n";
     let arrays = (0..job.n_tasks.max(1)).step_by(most).map(|first| {
         let n = most.min(job.n_tasks.max(1) - first);
         settings.head("orator", job.worker_limits, Some([n, job.n_at_once])) + &worker
     });
-    let mut last = settings.head("orator-last", job.worker_limits, None) + &until_done(&shell(&job.last_worker()));
+    let mut last = settings.head("orator-last", job.worker_limits, None) + &run_and_requeue(&shell(&job.last_worker()));
     let _ = writeln!(last, "{} || code=$?", plan.datasets_command(&program));
     for words in job.verify(plan, work) {
         let _ = writeln!(last, "{} || code=$?", shell(&words));
@@ -79,9 +80,9 @@ pub fn scripts(
         shell(&["some units failed; when what ails them is mended:".to_owned()]),
         shell(&[shell(&retry)])
     );
-    let of_speakers = |speakers: &[&str], limits: TaskLimits| {
+    let training_array = |speakers: &[&str], limits: TaskLimits| {
         let names: Vec<String> = speakers.iter().map(|&name| name.to_owned()).collect();
-        let training = until_done(&format!("{} \"$1\"", plan.training_command(&program)));
+        let training = run_and_requeue(&format!("{} \"$1\"", plan.training_command(&program)));
         settings.head("orator-train", limits, Some([names.len(), names.len()]))
             + &format!("set -- {}\nshift \"$SLURM_ARRAY_TASK_ID\"\n{training}exit \"$code\"\n", shell(&names))
     };
@@ -90,19 +91,19 @@ pub fn scripts(
     SlurmScripts {
         arrays: arrays.collect(),
         last,
-        trainings: trainings.map(|(some, limits)| of_speakers(some, limits)).collect(),
+        trainings: trainings.map(|(some, limits)| training_array(some, limits)).collect(),
     }
 }
 
-/// Runs a worker or a training beside the shell, which hears the signal before the end of the time and passes it on: it ends
-/// after its unit, or with a checkpoint, or at once when the time is nearly over. What was stopped (code 143) is queued
-/// again.
-fn until_done(worker: &str) -> String {
-    let patience = NOTICE_SECS.saturating_sub(20);
+/// Runs a worker or a training in the background of the shell, which receives SIGTERM before the time limit and
+/// forwards it: the program stops after its unit or with a checkpoint. Shortly before the limit a second SIGTERM makes
+/// it stop at once. A program that was stopped (exit code 143) is queued again.
+fn run_and_requeue(worker: &str) -> String {
+    let grace_secs = NOTICE_SECS.saturating_sub(20);
     format!(
         "{worker} &\n\
          worker=$!\n\
-         stop() {{ kill -TERM \"$worker\"; (sleep {patience}; kill -TERM \"$worker\") 2>/dev/null & }}\n\
+         stop() {{ kill -TERM \"$worker\"; (sleep {grace_secs}; kill -TERM \"$worker\") 2>/dev/null & }}\n\
          trap stop TERM\n\
          code=0\n\
          wait \"$worker\" || code=$?\n\
@@ -115,7 +116,7 @@ fn until_done(worker: &str) -> String {
     )
 }
 
-/// Hours as Slurm reads them, rounded up to minutes.
+/// Hours in Slurm's time format, rounded up to minutes.
 fn clock(hours: f64) -> String {
     let minutes = (hours * 60.0).ceil().max(1.0) as u64;
     format!("{}:{:02}:00", minutes / 60, minutes % 60)
@@ -128,7 +129,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     #[test]
-    fn no_array_is_longer_than_the_cluster_allows_and_a_shell_reads_what_is_written() {
+    fn arrays_respect_the_cluster_limit_and_scripts_parse() {
         let job = JobRequest {
             program: "/opt/or ator".into(),
             plan: "/w/plan's.json".into(),
@@ -149,12 +150,12 @@ mod tests {
         let options = ["--partition=long".to_owned()];
         let settings = SlurmSettings { max_array: 1001, logs: Path::new("/w/logs"), options: &options };
         let training = TaskLimits { cores: 8, ..job.worker_limits };
-        let made = scripts(&job, &plan, Path::new("/w/work"), &settings, Some(training));
+        let written = scripts(&job, &plan, Path::new("/w/work"), &settings, Some(training));
         let array =
             |script: &String| script.lines().find_map(|line| line.strip_prefix("#SBATCH --array=").map(str::to_owned));
-        let arrays: Vec<String> = made.arrays.iter().filter_map(array).collect();
+        let arrays: Vec<String> = written.arrays.iter().filter_map(array).collect();
         assert_eq!(arrays, ["0-1000%40", "0-1000%40", "0-497%40"]);
-        for text in made.arrays.iter().chain([&made.last]).chain(&made.trainings) {
+        for text in written.arrays.iter().chain([&written.last]).chain(&written.trainings) {
             assert!(text.contains("#SBATCH --time=1:01:00\n") && text.contains("#SBATCH --mem=3584M\n"), "{text}");
             assert!(text.contains("#SBATCH --partition=long\n"), "{text}");
             let mut shell = std::process::Command::new("sh");
@@ -163,17 +164,17 @@ mod tests {
             assert!(shell.wait().unwrap().success(), "{text}");
         }
         assert!(
-            made.last.contains("'/opt/or ator' run -c /w/pipeline.toml --set extract.fps=15 --only dataset"),
+            written.last.contains("'/opt/or ator' run -c /w/pipeline.toml --set extract.fps=15 --only dataset"),
             "{}",
-            made.last
+            written.last
         );
-        assert_eq!(made.trainings.len(), 1);
+        assert_eq!(written.trainings.len(), 1);
         let commands = [
             "#SBATCH --array=0-1%2\n",
             "#SBATCH --cpus-per-task=8\n",
             "set -- 'guest'\\''s' host\nshift \"$SLURM_ARRAY_TASK_ID\"\n",
             "'/opt/or ator' train gan -c /w/pipeline.toml --set extract.fps=15 --speaker \"$1\" &\n",
         ];
-        commands.iter().for_each(|line| assert!(made.trainings[0].contains(line), "{}", made.trainings[0]));
+        commands.iter().for_each(|line| assert!(written.trainings[0].contains(line), "{}", written.trainings[0]));
     }
 }

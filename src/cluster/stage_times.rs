@@ -1,5 +1,5 @@
-//! How long the stages take on a machine, from times of excerpts, and what that means for complete videos and several
-//! workers, by the bound of list scheduling.
+//! Duration of the stages on a machine, fitted to times of excerpts, and the predicted duration for complete videos and
+//! several workers, by the bound of list scheduling.
 
 use anyhow::Result;
 use orator_base::stage::artifacts::StageName;
@@ -15,34 +15,34 @@ const FILE: &str = "stage_times.json";
 /// Times of the stages on one machine.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StageTimes {
-    /// Program, settings, models and machine that were timed; with others the times do not count.
+    /// Hash of the program, settings, models and machine that were timed; the times are invalid for any other.
     pub made_with: String,
-    /// The processor by its name.
+    /// Name of the processor.
     pub processor: String,
-    /// Videos worked on side by side while the time was taken.
+    /// Number of videos processed in parallel during the measurement.
     pub jobs: usize,
-    /// Excerpts, and how long they were together, seconds.
+    /// Number of excerpts, and their total duration, seconds.
     pub n_excerpts: usize,
     pub excerpt_secs: f64,
-    /// Cost of each stage, by its name.
+    /// Cost of each stage, by stage name.
     pub stages: BTreeMap<String, StageCost>,
-    /// Most memory of a process of a unit, MiB, where it could be seen.
+    /// Peak memory of a unit's process, MiB, if known.
     pub peak_mib: Option<f64>,
 }
 
-/// What a stage takes for a video.
+/// Cost of a stage for one video.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StageCost {
-    /// Seconds whatever the video, and seconds for each of its seconds.
+    /// Seconds independent of the length of the video, and seconds of work for each second of video.
     pub fixed_secs: f64,
     pub secs_per_sec: f64,
-    /// Bytes of files for each second of video.
+    /// Bytes of output for each second of video.
     pub bytes_per_sec: f64,
 }
 
 impl StageCost {
-    /// The cost that fits times of excerpts, (length, seconds of work) each: least squares, every excerpt weighed by the
-    /// inverse of its length, neither part below 0.
+    /// Fits the cost to the times of excerpts, (length, working time) in seconds each: least squares with each excerpt
+    /// weighted by the inverse of its length, both parts at least 0.
     pub fn fit(times: &[(f64, f64)]) -> Self {
         let sum = |f: fn(f64, f64) -> f64| -> f64 {
             times.iter().map(|(length, secs)| f(*length, *secs) / length.max(1e-3)).sum()
@@ -50,7 +50,7 @@ impl StageCost {
         let (n, length, square) = (sum(|_, _| 1.0), sum(|length, _| length), sum(|length, _| length * length));
         let (secs, product) = (sum(|_, secs| secs), sum(|length, secs| length * secs));
         let spread = n * square - length * length;
-        // Excerpts of one length tell nothing of the fixed part.
+        // Excerpts of equal length do not determine the fixed part.
         let slope = if spread > 1e-9 * n * square { (n * product - length * secs) / spread } else { f64::INFINITY };
         let (fixed_secs, secs_per_sec) = match secs - slope * length {
             _ if square <= 0.0 => (0.0, 0.0),
@@ -61,46 +61,46 @@ impl StageCost {
         Self { fixed_secs, secs_per_sec, bytes_per_sec: 0.0 }
     }
 
-    /// Seconds of work for a video of this length.
+    /// Seconds of work for a video of this length (seconds).
     pub fn secs(&self, length_secs: f64) -> f64 {
         self.fixed_secs + self.secs_per_sec * length_secs
     }
 }
 
 impl StageTimes {
-    /// The file of a work folder.
+    /// Path of the file in a work folder.
     pub fn path(work: &Path) -> PathBuf {
         work.join(FILE)
     }
 
-    /// The times on record in a work folder; none where there are none that can be read.
+    /// Reads the times saved in a work folder; `None` if there are none or they cannot be read.
     pub fn read(work: &Path) -> Option<Self> {
         serde_json::from_slice(&std::fs::read(Self::path(work)).ok()?).ok()
     }
 
-    /// Keeps the times in a work folder.
+    /// Saves the times in a work folder.
     pub fn write(&self, work: &Path) -> Result<()> {
         let mut bytes = serde_json::to_vec_pretty(self)?;
         bytes.push(b'\n');
         workdir::write_file(&Self::path(work), &bytes)
     }
 
-    /// Cost of a stage; nothing where it was not timed.
+    /// Cost of a stage; zero if it was not timed.
     pub fn cost(&self, stage: StageName) -> StageCost {
         self.stages.get(stage.as_str()).copied().unwrap_or_default()
     }
 
-    /// Seconds of work on a video at all of its stages.
+    /// Seconds of work on a video in all its stages.
     pub fn video_secs(&self, length_secs: f64) -> f64 {
         StageName::OF_VIDEOS.into_iter().map(|stage| self.cost(stage).secs(length_secs)).sum()
     }
 
-    /// Seconds of work at a stage on videos of these lengths.
+    /// Seconds of work in a stage on videos of these lengths (seconds).
     pub fn stage_secs(&self, stage: StageName, lengths: &[f64]) -> f64 {
         lengths.iter().map(|length| self.cost(stage).secs(*length)).sum()
     }
 
-    /// Seconds until `workers` have worked on videos of these lengths.
+    /// Seconds until `workers` workers have processed videos of these lengths.
     pub fn wall_secs(&self, lengths: &[f64], workers: usize) -> f64 {
         self.workload(lengths).wall_secs(workers)
     }
@@ -120,14 +120,14 @@ impl StageTimes {
         })
     }
 
-    /// Hours after which a worker of so many may be ended: twice what the work takes, since machines differ, and half an
-    /// hour to begin and for the datasets.
+    /// Time limit for each of `workers` workers, hours: twice the predicted duration, since machines differ, plus half
+    /// an hour for startup and the datasets.
     pub fn limit_hours(&self, lengths: &[f64], workers: usize) -> f64 {
         0.5 + 2.0 * self.wall_secs(lengths, workers) / 3600.0
     }
 
-    /// The fewest workers that are done with videos of these lengths within so many seconds; none: the longest video with a
-    /// worker for each of its spans takes longer.
+    /// The smallest number of workers that process videos of these lengths within `secs` seconds; `None` if the longest
+    /// video takes longer even with one worker for each of its spans.
     pub fn workers_within(&self, lengths: &[f64], secs: f64) -> Option<usize> {
         let work = self.workload(lengths);
         (1..=work.n_pieces).find(|workers| work.wall_secs(*workers) <= secs)
@@ -139,15 +139,15 @@ impl StageTimes {
 struct Workload {
     /// Seconds of work on all videos.
     total: f64,
-    /// Seconds of the video that takes longest with a worker for each of its spans.
+    /// Seconds for the longest video with one worker for each of its spans.
     longest: f64,
-    /// Videos and spans that workers take one by one.
+    /// Number of spans, the largest useful number of workers.
     n_pieces: usize,
 }
 
 impl Workload {
-    /// Seconds that list scheduling takes at most (Graham 1969): the longest chain, and a share of the rest. With a worker
-    /// for each piece nothing waits.
+    /// Upper bound of the duration under list scheduling (Graham 1969), seconds: the longest chain plus an equal share
+    /// of the rest. With one worker per piece, nothing waits.
     fn wall_secs(&self, workers: usize) -> f64 {
         let rest = if workers < self.n_pieces { self.total - self.longest } else { 0.0 };
         self.longest + rest / workers.max(1) as f64
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn costs_are_fitted_and_never_below_nothing() {
+    fn costs_are_fitted_and_never_negative() {
         let line: Vec<(f64, f64)> = [2.0, 10.0, 9.0].map(|length| (length, 1.5 + 0.8 * length)).to_vec();
         let cost = StageCost::fit(&line);
         assert!((cost.fixed_secs - 1.5).abs() < 1e-9 && (cost.secs_per_sec - 0.8).abs() < 1e-9, "{cost:?}");
@@ -178,9 +178,9 @@ mod tests {
     }
 
     #[test]
-    fn workers_share_all_but_the_longest_chain() {
+    fn workers_share_all_work_but_the_longest_chain() {
         let times = times(1.0, 2.0);
-        // 600 s are 5 spans of 241 s.
+        // A video of 600 s has 5 spans that cost 241 s each.
         for (lengths, sum, chain) in [(&[10.0, 40.0, 20.0, 10.0][..], 164.0, 81.0), (&[600.0, 10.0], 1226.0, 241.0)] {
             let walls: Vec<f64> = (1..=8).map(|workers| times.wall_secs(lengths, workers)).collect();
             assert_eq!((walls[0], walls[7], times.wall_secs(lengths, usize::MAX)), (sum, chain, chain));
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_kept_is_read_again() {
+    fn saved_times_are_read_back() {
         let dir = tempfile::tempdir().unwrap();
         assert_eq!(StageTimes::read(dir.path()), None);
         let times = times(0.25, 1.5);

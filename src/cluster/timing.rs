@@ -1,5 +1,5 @@
-//! Takes the time of every stage on this machine: excerpts from all over the videos are worked on as videos are, as many
-//! side by side.
+//! Times every stage on this machine: excerpts spread over all videos are processed like videos, with the same number
+//! of parallel jobs.
 
 use super::stage_times::{StageCost, StageTimes};
 use crate::plan::{PlannedUnit, settings_hash};
@@ -15,17 +15,17 @@ use orator_pipeline::{Pipeline, Selection};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Share of all video that is timed, and within what bounds, seconds.
+/// Share of all video that is timed, and its bounds in seconds.
 const SHARE: f64 = 0.1;
-const LEAST_SECS: f64 = 30.0;
-const MOST_SECS: f64 = 120.0;
-/// Length of an excerpt, and of two short ones that tell what a stage takes whatever the video.
+const MIN_SECS: f64 = 30.0;
+const MAX_SECS: f64 = 120.0;
+/// Length of an excerpt, and of the two short ones that determine the fixed cost of a stage, seconds.
 const LONG_SECS: f64 = 10.0;
 const SHORT_SECS: f64 = 2.5;
-/// Folder of excerpts in the work folder, while they are timed.
+/// Folder of the excerpts in the work folder during the measurement.
 pub(super) const FOLDER: &str = "timing";
 
-/// A piece of a unit.
+/// A segment of a unit's video.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimedExcerpt {
     pub unit: usize,
@@ -33,13 +33,13 @@ pub struct TimedExcerpt {
     pub secs: f64,
 }
 
-/// Pieces of videos of these lengths: a tenth of all, evenly spread over it, and two short ones.
+/// Excerpts of videos of these lengths (seconds): a tenth of the total, evenly spread, and two short ones.
 pub fn excerpts(lengths: &[f64]) -> Vec<TimedExcerpt> {
-    let whole: f64 = lengths.iter().sum();
-    let budget = (SHARE * whole).clamp(LEAST_SECS, MOST_SECS).min(whole);
+    let total_secs: f64 = lengths.iter().sum();
+    let budget = (SHARE * total_secs).clamp(MIN_SECS, MAX_SECS).min(total_secs);
     let n = (((budget - 2.0 * SHORT_SECS) / LONG_SECS).floor() as usize).max(1);
     let at = |share: f64, secs: f64| {
-        let mut left = share * whole;
+        let mut left = share * total_secs;
         for (unit, length) in lengths.iter().enumerate() {
             if left < *length {
                 let secs = secs.min(*length);
@@ -53,7 +53,7 @@ pub fn excerpts(lengths: &[f64]) -> Vec<TimedExcerpt> {
     long.chain([1.0 / 3.0, 2.0 / 3.0].map(|share| at(share, SHORT_SECS))).flatten().collect()
 }
 
-/// What the times count for: program, settings, models, machine and workers.
+/// Hash of everything that the times depend on: program, settings, models, machine and number of jobs.
 pub fn made_with(pipeline: &Pipeline, program: &Path, jobs: usize) -> Result<String> {
     let made_with = (
         hash_file(program)?,
@@ -66,11 +66,11 @@ pub fn made_with(pipeline: &Pipeline, program: &Path, jobs: usize) -> Result<Str
     Ok(blake3::hash(&serde_json::to_vec(&made_with)?).to_hex().to_string())
 }
 
-/// Times the stages on excerpts of the units whose length is known, `jobs` side by side. The excerpts and what is made of
-/// them are removed.
+/// Times the stages on excerpts of the units of known length, `jobs` in parallel. The excerpts and their artifacts are
+/// removed afterwards.
 ///
 /// # Errors
-/// No excerpt could be copied or worked on; a work folder that cannot be written.
+/// No excerpt could be copied or processed, or the work folder cannot be written.
 pub fn measure(
     pipeline: &Pipeline,
     program: &Path,
@@ -80,7 +80,7 @@ pub fn measure(
 ) -> Result<StageTimes> {
     let made_with = made_with(pipeline, program, jobs)?;
     let folder = pipeline.config().settings.work.dir.join(FOLDER);
-    let timed = measured(pipeline, units, jobs, &folder, progress);
+    let timed = time_excerpts(pipeline, units, jobs, &folder, progress);
     let removed = std::fs::remove_dir_all(&folder);
     let times = timed?;
     removed.with_context(|| format!("cannot remove {}", folder.display()))?;
@@ -88,7 +88,7 @@ pub fn measure(
 }
 
 /// Times the stages on excerpts in `folder`.
-fn measured(
+fn time_excerpts(
     pipeline: &Pipeline,
     units: &[PlannedUnit],
     jobs: usize,
@@ -104,7 +104,7 @@ fn measured(
         let to = folder.join(format!("{number:02}.mkv"));
         let wanted = ExcerptRequest { start_secs: excerpt.start_secs, secs: excerpt.secs, to: to.clone() };
         let request = MediaRequest { source: unit.source.clone(), excerpt: Some(wanted) };
-        // A video that cannot be read is told of when it is worked on.
+        // An unreadable video is reported when it is processed.
         if let Ok(Some(copied)) = pipeline.ask_media(&request) {
             secs.insert(to.clone(), copied);
             files.push((unit.speaker.clone(), to));
@@ -137,13 +137,13 @@ fn measured(
     })
 }
 
-/// Most memory of a process that this one has started and that has ended, MiB; none where there was none.
+/// Peak memory of the child processes that have exited, MiB; `None` if there were none.
 fn peak_mib() -> Option<f64> {
     let usage = getrusage(UsageWho::RUSAGE_CHILDREN).ok()?;
     Some(usage.max_rss() as f64 / 1024.0).filter(|peak| *peak > 0.0)
 }
 
-/// The processor's name, where the system says it.
+/// Name of the processor, if the system reports it.
 fn processor() -> String {
     let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let name = info.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
@@ -155,7 +155,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn excerpts_are_a_tenth_from_all_over_and_lie_inside() {
+    fn excerpts_cover_a_tenth_evenly_within_the_videos() {
         let lengths = [600.0, 2.0, 300.0, 298.0];
         let some = excerpts(&lengths);
         assert!(some.iter().map(|one| one.secs).sum::<f64>() <= 0.1 * lengths.iter().sum::<f64>());
@@ -163,7 +163,7 @@ mod tests {
         assert!(some.iter().all(|one| one.start_secs >= 0.0 && one.start_secs + one.secs <= lengths[one.unit] + 1e-9));
         let of = |unit: usize| some.iter().filter(|one| one.unit == unit && one.secs > SHORT_SECS).count();
         assert_eq!((of(0), of(2), of(3)), (5, 2, 3));
-        // Of little video at least half a minute.
+        // For short videos, at least half a minute is timed.
         let few = excerpts(&[60.0]);
         assert_eq!((few.len(), few[0].secs), (4, LONG_SECS));
         assert_eq!(excerpts(&[1.5]), [TimedExcerpt { unit: 0, start_secs: 0.0, secs: 1.5 }; 3]);

@@ -1,5 +1,5 @@
-//! A worker: it claims units of a plan, one after the other, and runs their stages, until every unit has ended or it is
-//! asked to stop. Any number of workers on any machines share a plan.
+//! A worker claims units of a plan one after the other and runs their stages until every unit has ended or it is asked
+//! to stop. Any number of workers on any machines may share a plan.
 
 use super::claims::{Claim, ClaimOptions, Claims, NextUnit, UnitEnd};
 use super::heartbeat::{BeatWatch, Heartbeat, this_machine};
@@ -21,59 +21,59 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-/// File that stops every worker of a plan, with the reason in it.
+/// File that stops every worker of a plan; it contains the reason.
 pub const STOP: &str = "stop.txt";
 
-/// How a worker works.
+/// Settings of the workers of one process.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WorkerOptions {
-    /// Units at a time, each under a claim of its own.
+    /// Number of units in parallel, each under its own claim.
     pub jobs: usize,
-    /// The share `i` of `n`, from 0, of an array without claims by chance; none: any unit.
+    /// Share `i` of `n` (`i` from 0) of the videos in a job array; `None` for any unit.
     pub shard: Option<(usize, usize)>,
-    /// Takes units again that had failed.
+    /// Whether to retry units that had failed.
     pub retry: bool,
-    /// Waits for the units in the hands of others, to take over those of the dead.
+    /// Whether to wait for units claimed by other workers, in order to take over those of dead ones.
     pub wait: bool,
-    /// Time between two beats.
+    /// Time between two heartbeats.
     pub beat: Duration,
-    /// Time without a beat after which another worker is dead.
+    /// Time without a heartbeat after which another worker counts as dead.
     pub dead_after: Duration,
 }
 
-/// What workers of one process did.
+/// Results of the workers of one process.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct WorkReport {
-    /// Units done, those that were fresh among them.
+    /// Number of units done, including those that were up to date.
     pub done: usize,
-    /// Of those, fresh at every stage before.
+    /// Number of units done whose stages were all up to date before.
     pub fresh: usize,
     /// Units that failed, each with its error.
     pub failed: Vec<(String, String)>,
-    /// Units taken over from dead workers.
+    /// Number of units taken over from dead workers.
     pub taken_over: usize,
-    /// Units laid aside since others had taken them over.
+    /// Number of units given up because other workers had taken them over.
     pub laid_aside: usize,
-    /// Units that nobody can claim or end, each with what is in the place of its claim or end.
+    /// Units that cannot be claimed or ended, each with the foreign file at the path of its claim or end.
     pub blocked: BTreeSet<String>,
-    /// Whether every unit of the plan, or of the share, has ended.
+    /// Whether every unit of the plan, or of this process's share, has ended.
     pub all_ended: bool,
 }
 
-/// Why all workers are to stop; `None`: they are not.
+/// Reason why all workers must stop; `None` if they need not.
 pub(super) fn read_stop(folder: &DiskFolder) -> Result<Option<String>> {
-    let said = |reason: Vec<u8>| match reason.is_empty() {
+    let text = |reason: Vec<u8>| match reason.is_empty() {
         true => format!("{} is there", folder.0.join(STOP).display()),
         false => String::from_utf8_lossy(&reason).into_owned(),
     };
-    Ok(folder.read(STOP)?.map(said))
+    Ok(folder.read(STOP)?.map(text))
 }
 
-/// Works on the plan at `path`.
+/// Processes the plan at `path`.
 ///
 /// # Errors
-/// Another program, configuration or models than the plan's; a folder that cannot be written; a full disk, of which
-/// every worker of the plan is told.
+/// The shared folder cannot be written, another process locks the work folder, or the disk is full (which stops every
+/// worker of the plan).
 pub fn work(
     plan: &ClusterPlan,
     path: &Path,
@@ -82,7 +82,7 @@ pub fn work(
     progress: &dyn Progress,
 ) -> Result<WorkReport> {
     let folder = DiskFolder(plan.folder(path));
-    begin_after_stop(&folder)?;
+    resume_after_stop(&folder)?;
     let dir = &pipeline.config().settings.work.dir;
     let _lock = workdir::lock_shared(dir).context("no work now")?;
     workdir::sweep_folder(dir, 2);
@@ -117,13 +117,13 @@ pub fn work(
         let workers: Vec<_> = (0..options.jobs.max(1)).map(|_| scope.spawn(run)).collect();
         workers.into_iter().try_for_each(|worker| worker.join().unwrap_or_else(|_| bail!("a worker has panicked")))
     });
-    // What cannot be kept is hashed again.
+    // Hashes that cannot be saved are computed again next time.
     let _ = hashes.save();
     ended?;
     Ok(session.report.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 
-/// A name that no other worker has: the machine's, the process and a number by chance.
+/// A unique worker name: host name, process id, a counter and a random number.
 fn worker_name(host: &str) -> String {
     static NEXT: AtomicU64 = AtomicU64::new(0);
     let host: String = host.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).take(40).collect();
@@ -131,8 +131,8 @@ fn worker_name(host: &str) -> String {
     format!("{host}-{}-{}-{nonce:08x}", std::process::id(), NEXT.fetch_add(1, Ordering::Relaxed))
 }
 
-/// Goes on where a full disk had stopped all workers, if there is room again.
-fn begin_after_stop(folder: &DiskFolder) -> Result<()> {
+/// Removes the stop file of a full disk if there is space again.
+fn resume_after_stop(folder: &DiskFolder) -> Result<()> {
     let Some(reason) = read_stop(folder)? else { return Ok(()) };
     let probe = folder.0.join(format!(".room-{}", std::process::id()));
     let has_room = std::fs::write(&probe, vec![0; 64 << 20]).is_ok();
@@ -143,7 +143,7 @@ fn begin_after_stop(folder: &DiskFolder) -> Result<()> {
     workdir::remove_file(&folder.0.join(STOP))
 }
 
-/// Workers of one process on one plan.
+/// The workers of one process on one plan.
 struct Session<'a> {
     plan: &'a ClusterPlan,
     folder: DiskFolder,
@@ -154,34 +154,34 @@ struct Session<'a> {
     begun: Instant,
     machine: &'a str,
     report: Mutex<WorkReport>,
-    /// Whether a worker ended with an error, so that all end.
+    /// Whether a worker failed, so that all others stop too.
     is_broken: AtomicBool,
 }
 
 impl Session<'_> {
-    /// One worker, with its heartbeat.
+    /// Runs one worker with its heartbeat.
     fn run(&self, name: &str, first: Heartbeat) -> Result<()> {
-        let heart = HeartbeatFile { folder: &self.folder, name, content: Mutex::new(first), begun: self.begun };
-        heart.beat()?;
+        let heartbeat = HeartbeatFile { folder: &self.folder, name, content: Mutex::new(first), begun: self.begun };
+        heartbeat.beat()?;
         let (stop, stopped) = channel::<()>();
         let ended = std::thread::scope(|scope| {
-            let beats = &heart;
+            let beating = &heartbeat;
             scope.spawn(move || {
                 while stopped.recv_timeout(self.options.beat) == Err(RecvTimeoutError::Timeout) {
-                    // One beat that cannot be written is no death.
-                    let _ = beats.beat();
+                    // A single failed beat does not make the worker count as dead.
+                    let _ = beating.beat();
                 }
             });
-            let ended = self.work(name, &heart);
+            let ended = self.work(name, &heartbeat);
             drop(stop);
             ended
         });
-        // After an error too: other workers may take its unit at once.
-        heart.content().ended = true;
-        ended.and(heart.beat())
+        // This also holds after an error, so that other workers may take over its unit at once.
+        heartbeat.content().ended = true;
+        ended.and(heartbeat.beat())
     }
 
-    fn work(&self, name: &str, heart: &HeartbeatFile) -> Result<()> {
+    fn work(&self, name: &str, heartbeat: &HeartbeatFile) -> Result<()> {
         let options = ClaimOptions {
             worker: name.to_owned(),
             needs: self.plan.units.iter().map(|unit| unit.needs.clone()).collect(),
@@ -190,9 +190,9 @@ impl Session<'_> {
         };
         let watch = BeatWatch::new(self.options.dead_after, self.machine);
         let mut claims = Claims::new(&self.folder, options, watch);
-        while !self.is_to_stop()? {
+        while !self.should_stop()? {
             match claims.next(self.begun.elapsed())? {
-                NextUnit::Claimed(claim) => self.work_on(name, claim, &mut claims, heart)?,
+                NextUnit::Claimed(claim) => self.work_on(name, claim, &mut claims, heartbeat)?,
                 NextUnit::Wait(time) if self.options.wait => self.rest(time),
                 NextUnit::Wait(_) | NextUnit::Blocked => break,
                 NextUnit::AllEnded => {
@@ -201,14 +201,14 @@ impl Session<'_> {
                 }
             }
         }
-        let in_the_way = |(unit, file): (&usize, &String)| {
+        let blocked_unit = |(unit, file): (&usize, &String)| {
             format!("{}: {} was not written by a worker", self.plan.units[*unit], self.folder.0.join(file).display())
         };
-        self.report().blocked.extend(claims.blocked().iter().map(in_the_way));
+        self.report().blocked.extend(claims.blocked().iter().map(blocked_unit));
         Ok(())
     }
 
-    /// Waits so long, or until the program is asked to stop.
+    /// Waits for `time`, or until the program is asked to stop.
     fn rest(&self, time: Duration) {
         let begun = Instant::now();
         while let Some(left) = time.checked_sub(begun.elapsed()).filter(|_| !self.progress.is_to_stop()) {
@@ -216,7 +216,7 @@ impl Session<'_> {
         }
     }
 
-    /// The units this worker takes, in the order of the plan. All units of a video are of one share.
+    /// Units that this worker may claim, in the order of the plan. All units of a video belong to one shard.
     fn order(&self) -> Vec<usize> {
         let mut videos: BTreeMap<(&str, &str), usize> = BTreeMap::new();
         let mut number = |unit: &usize| {
@@ -224,43 +224,52 @@ impl Session<'_> {
             let next = videos.len();
             *videos.entry((speaker, video)).or_insert(next)
         };
-        let of_shard = |unit: &usize| self.options.shard.is_none_or(|(i, n)| number(unit) % n == i);
-        (0..self.plan.units.len()).filter(of_shard).collect()
+        let is_in_shard = |unit: &usize| self.options.shard.is_none_or(|(i, n)| number(unit) % n == i);
+        (0..self.plan.units.len()).filter(is_in_shard).collect()
     }
 
-    /// Errors with what stopped all workers.
-    fn is_to_stop(&self) -> Result<bool> {
+    /// Whether to stop after the current unit.
+    ///
+    /// # Errors
+    /// The reason why all workers must stop.
+    fn should_stop(&self) -> Result<bool> {
         if let Some(reason) = read_stop(&self.folder)? {
             bail!("{reason}: all workers stop; make room and start them again");
         }
         Ok(self.progress.is_to_stop() || self.is_broken.load(Ordering::Relaxed))
     }
 
-    fn work_on(&self, name: &str, claim: Claim, claims: &mut Claims<DiskFolder>, heart: &HeartbeatFile) -> Result<()> {
+    fn work_on(
+        &self,
+        name: &str,
+        claim: Claim,
+        claims: &mut Claims<DiskFolder>,
+        heartbeat: &HeartbeatFile,
+    ) -> Result<()> {
         let planned = &self.plan.units[claim.unit];
         let unit = planned.unit();
-        heart.content().unit = Some(planned.to_string());
+        heartbeat.content().unit = Some(planned.to_string());
         let begun = Instant::now();
-        let still_mine = || match claims.is_mine(claim)? {
+        let check_claim = || match claims.is_mine(claim)? {
             true => planned.check_inputs(self.hashes),
             false => Err(ClaimLost(format!("{} was taken over by another worker", planned.video)).into()),
         };
         let run =
-            |stages: &[StageName]| self.pipeline.run_video(stages, &unit, self.hashes, &still_mine, self.progress);
+            |stages: &[StageName]| self.pipeline.run_video(stages, &unit, self.hashes, &check_claim, self.progress);
         let ended = match (planned.check_inputs(self.hashes), planned.share) {
-            // The stages that are up to date would ask nobody.
+            // Stages that are up to date do not call `check_claim`, so the inputs are also checked here.
             (Err(error), _) => vec![StageOutcome::Failed(Arc::new(error))],
             (Ok(()), UnitShare::Whole) => run(&StageName::OF_VIDEOS)?,
             (Ok(()), UnitShare::Extract) => run(&[StageName::Extract])?,
             (Ok(()), UnitShare::Parts { idx, of }) => {
-                self.pipeline.run_parts(&unit, (idx, of), self.hashes, &still_mine, self.progress)?
+                self.pipeline.run_parts(&unit, (idx, of), self.hashes, &check_claim, self.progress)?
             }
         };
         let failed = ended.iter().find_map(|outcome| match outcome {
             StageOutcome::Failed(error) => Some(error.clone()),
             _ => None,
         });
-        heart.content().unit = None;
+        heartbeat.content().unit = None;
         if let Some(error) = &failed {
             if error.is::<ClaimLost>() {
                 self.report().laid_aside += 1;
@@ -271,7 +280,7 @@ impl Session<'_> {
                 return Err(anyhow!("{error:#}").context("the disk is full: all workers stop"));
             }
         }
-        // What fails before the whole video's turn fails once more with it, and is told then.
+        // A failure of a preparatory unit occurs again in the unit of the whole video and is reported there.
         let is_whole = planned.share == UnitShare::Whole;
         let error = failed.filter(|_| is_whole).map(|error| format!("{error:#}"));
         let secs = begun.elapsed().as_secs_f64();
@@ -279,9 +288,9 @@ impl Session<'_> {
         let mut report = self.report();
         report.taken_over += usize::from(claim.epoch > 1);
         report.laid_aside += usize::from(!is_mine);
-        let mut content = heart.content();
+        let mut content = heartbeat.content();
         match error {
-            // The unit is another worker's now, which may have removed what this one was writing.
+            // The unit belongs to another worker now, which may have removed files that this one was writing.
             Some(_) if !is_mine => {}
             Some(error) => {
                 content.n_failed += 1;
@@ -307,7 +316,7 @@ fn host_of(worker: &str) -> &str {
     worker.rsplitn(4, '-').last().unwrap_or(worker)
 }
 
-/// The heartbeat of one worker.
+/// Heartbeat file of one worker.
 struct HeartbeatFile<'a> {
     folder: &'a DiskFolder,
     name: &'a str,

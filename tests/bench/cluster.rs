@@ -5,7 +5,7 @@ use anyhow::{Result, ensure};
 use orator_base::stage::progress::Progress;
 use orator_cluster::claims::{Claim, ClaimOptions, Claims, NextUnit, UnitEnd};
 use orator_cluster::heartbeat::{BeatWatch, DEAD_AFTER, Heartbeat, WORKERS};
-use orator_cluster::plan::{PIECE_SECS, PlannedUnit, UnitShare, in_order};
+use orator_cluster::plan::{PIECE_SECS, PlannedUnit, UnitShare, split_and_sort};
 use orator_cluster::shared_folder::SharedFolder;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -221,7 +221,7 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.hours > 0.0 && args.workers.iter().all(|n| *n > 0), "hours and workers must be more than 0");
     let videos = videos(3600.0 * args.hours, &mut ChaCha8Rng::seed_from_u64(0));
     let n_videos = videos.len();
-    let units = in_order(videos, PIECE_SECS);
+    let units = split_and_sort(videos, PIECE_SECS);
     let mut text = format!("{:.0} h in {n_videos} videos, {} units\n", args.hours, units.len());
     text += "workers   hours  efficiency  twice  created / read / listed a unit   operations a second, most\n";
     let task = progress.begin("cluster", args.workers.len() as u64);

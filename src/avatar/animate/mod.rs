@@ -1,4 +1,5 @@
-//! Joints to rotations, and the files people open: BVH, GLB, MP4, contact sheets.
+//! Animation of joint positions: rigs, joint rotations, avatars, and exported files (BVH, GLB, FBX, MP4, contact
+//! sheets).
 
 pub mod avatar;
 pub mod draw;

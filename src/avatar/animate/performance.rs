@@ -1,5 +1,5 @@
-//! Pipeline from joints to animation: motion is smoothed, solved as rotations of a rig, resampled to the requested rate
-//! and held within the joint limits. Every exported file is written from its result.
+//! Pipeline from joint positions to an animation: the motion is smoothed, solved as rotations of a rig, resampled to
+//! the requested rate and clamped to the joint limits. Every exported file is written from its result.
 
 use super::rig::constraints::{ClampTally, Clamps, Constraints};
 use super::rig::rig::{CM, Rig};
@@ -24,51 +24,51 @@ use std::ops::Range;
 /// Settings of the animation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AnimationOptions {
-    /// The filter over time.
+    /// Temporal filter.
     pub smoothing: Smoothing,
-    /// Which joint limits hold.
+    /// Joint limits to apply.
     pub constraints: Constraints,
-    /// The turn of the shoulders.
+    /// Treatment of the shoulders' yaw.
     pub yaw: Yaw,
-    /// Lower body.
+    /// Treatment of the lower body.
     pub legs: Legs,
-    /// Whether the chest breathes; no joint of a motion moves against the neck by it.
+    /// Whether the chest breathes; joint positions relative to the neck do not change.
     pub breath: bool,
-    /// Frame rate of the output; `None`: that of the motion.
+    /// Frame rate of the output; `None` for the rate of the motion.
     pub fps: Option<FrameRate>,
 }
 
 /// Treatment of the shoulders' yaw.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Yaw {
-    /// Yaw turns spine and chest.
+    /// Yaw turns the spine and the chest.
     #[default]
     Spine,
     /// Yaw is removed: the rig always faces +z.
     Removed,
 }
 
-/// Account of what was done to the motion.
+/// Statistics of the processing of a motion.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct AnimationReport {
-    /// Frames of the motion.
+    /// Number of frames of the motion.
     pub n_frames: usize,
-    /// Jerk of the arms at the motion's own rate, over the frames that were seen.
+    /// Jerk of the arms at the motion's own rate, over frames in which they were detected.
     pub arms: Jerk,
     /// Jerk of the fingers relative to their wrist.
     pub hands: Jerk,
     /// Clamps by kind of the unsmoothed joints, at the motion's own rate.
     pub clamps: Vec<Clamps>,
-    /// Number of frames in which the head was seen; `None` without a posture.
+    /// Number of frames in which the head was detected; `None` without a posture.
     pub face_frames: Option<usize>,
-    /// Frames in which each limb was seen.
-    pub seen: SeenFrames,
+    /// Number of frames in which each limb was detected.
+    pub seen: DetectedFrames,
 }
 
-/// Number of frames, at the motion's own rate, in which a part of the body was seen; in the others it is interpolated
-/// or held.
+/// Number of frames, at the motion's own rate, in which a part of the body was detected; in all others it is
+/// interpolated or held.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct SeenFrames {
+pub struct DetectedFrames {
     /// Shoulder, elbow and wrist.
     pub left_arm: usize,
     /// Shoulder, elbow and wrist.
@@ -79,9 +79,9 @@ pub struct SeenFrames {
     pub right_hand: usize,
 }
 
-impl SeenFrames {
+impl DetectedFrames {
     fn count(motion: &Motion) -> Self {
-        let there = seen(motion);
+        let there = finite_joints(motion);
         let is_seen =
             |t: usize, joint: usize| there[[t, joint]] && motion.mask.get([t, joint]).is_none_or(|&seen| seen);
         let frames = |joints: Range<usize>, least: usize| {
@@ -99,36 +99,36 @@ impl SeenFrames {
     }
 }
 
-/// Mean norm of the third derivative, m/s^3; `None` where no four consecutive frames are seen.
+/// Mean norm of the third derivative, m/s^3; `None` if no four consecutive frames were detected.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Jerk {
-    /// Of the motion as it came.
+    /// Jerk of the input motion.
     pub before: Option<f64>,
-    /// Of the motion on the rig.
+    /// Jerk of the motion on the rig.
     pub after: Option<f64>,
 }
 
-/// Motion on its rig.
+/// An animated motion with its rig.
 #[derive(Clone, Debug)]
 pub struct Performance {
     /// The skeleton with its bone lengths.
     pub rig: Rig,
-    /// The rotations of its joints.
+    /// The joint rotations.
     pub clip: BvhClip,
-    /// What was done to the motion.
+    /// Statistics of the processing.
     pub report: AnimationReport,
 }
 
-/// Animates a motion on a rig of its own bone lengths; a `posture` turns head and trunk, which moves no joint against the
-/// neck.
+/// Animates a motion on a rig with its own bone lengths; a `posture` turns head and trunk without moving joints
+/// relative to the neck.
 ///
-/// Joint limits are applied before smoothing, so that a joint found on the wrong side does not pull its neighbours in
-/// time, and again after smoothing and at the output rate, so that they hold in every written frame.
+/// Joint limits are applied before smoothing, so that a misplaced joint does not distort neighbouring frames, and again
+/// after smoothing and at the output rate, so that they hold in every written frame.
 pub fn perform(motion: &Motion, posture: Option<&Posture>, options: &AnimationOptions) -> Performance {
     perform_on(Rig::from_motion(motion), motion, posture, options)
 }
 
-/// Animates a motion on a given rig, as several motions of one person share it.
+/// Animates a motion on a given rig, for example one shared by several motions of a speaker.
 pub fn perform_on(rig: Rig, motion: &Motion, posture: Option<&Posture>, options: &AnimationOptions) -> Performance {
     let clip_of = |tracks: &[RotationTrack]| {
         let local = (0..motion.n_frames()).map(|t| tracks.iter().map(|track| track[t]).collect()).collect();
@@ -144,7 +144,7 @@ pub fn perform_on(rig: Rig, motion: &Motion, posture: Option<&Posture>, options:
         let as_it_is = rotations(&positions, &rig, &SolveFilters::new(Smoothing::None, motion.fps));
         let within = constrained(clip_of(&as_it_is), &mut tally);
         let frames: Vec<Vec<Vec3>> = (0..within.n_frames()).map(|t| within.positions(t)).collect();
-        positions = positions.moved(|t, joint| scale(frames[t][rig.positions[joint]], 1.0 / CM));
+        positions = positions.with_positions(|t, joint| scale(frames[t][rig.positions[joint]], 1.0 / CM));
     }
     let filters = SolveFilters::new(options.smoothing, motion.fps);
     let mut tracks = rotations(&positions, &rig, &filters);
@@ -166,8 +166,9 @@ pub fn perform_on(rig: Rig, motion: &Motion, posture: Option<&Posture>, options:
 
     let after = joints(&rig, &clip);
     let jerk = |joints: &[(usize, usize)]| {
-        let of =
-            |positions: &Array3<f32>| jerk::mean(positions.view(), seen(motion).view(), motion.fps.per_sec(), joints);
+        let of = |positions: &Array3<f32>| {
+            jerk::mean(positions.view(), finite_joints(motion).view(), motion.fps.per_sec(), joints)
+        };
         Jerk { before: of(&motion.joints), after: of(&after) }
     };
     let arms = [R_SHOULDER, L_SHOULDER].into_iter().flat_map(|shoulder| (shoulder..shoulder + 3).map(|j| (j, NECK)));
@@ -178,18 +179,19 @@ pub fn perform_on(rig: Rig, motion: &Motion, posture: Option<&Posture>, options:
         hands: jerk(&hands.collect::<Vec<_>>()),
         clamps: if options.constraints == Constraints::NONE { Vec::new() } else { tally.clamps() },
         face_frames,
-        seen: SeenFrames::count(motion),
+        seen: DetectedFrames::count(motion),
     };
     Performance { clip: resampled.unwrap_or(clip), rig, report }
 }
 
 impl Performance {
-    /// Performance at another rate: rotations between the frames are interpolated on the sphere, the frames themselves stay.
+    /// The performance at another rate: rotations between frames are interpolated spherically, existing frames are
+    /// unchanged.
     pub fn resampled(&self, fps: FrameRate) -> Self {
         Self { rig: self.rig.clone(), clip: self.clip.resampled(fps), report: self.report.clone() }
     }
 
-    /// Joints [T, 49, 3] of the rig (metres, axes of `types::skeleton`, the neck at the origin) at the clip's rate.
+    /// Joints [T, 49, 3] of the rig (metres, axes of `types::skeleton`, neck at the origin) at the clip's rate.
     pub fn motion(&self) -> Motion {
         Motion::from_joints(self.clip.fps, joints(&self.rig, &self.clip))
     }
@@ -209,7 +211,7 @@ fn joints(rig: &Rig, clip: &BvhClip) -> Array3<f32> {
     joints
 }
 
-/// Mask [T, 49] of the joints with finite coordinates, seen or filled.
-fn seen(motion: &Motion) -> Array2<bool> {
+/// Mask [T, 49] of the joints with finite coordinates, detected or filled.
+fn finite_joints(motion: &Motion) -> Array2<bool> {
     motion.joints.map_axis(ndarray::Axis(2), |place| place.iter().all(|v| v.is_finite()))
 }

@@ -5,22 +5,23 @@ use orator_base::types::image::Image;
 use std::fmt::Debug;
 use std::sync::Arc;
 
-/// Background of a picture, drawn once and copied into every frame.
+/// Background of an image, drawn once and copied into every frame.
 #[derive(Clone, Debug)]
 pub struct Background {
     pub image: Image,
     pub scene: Option<Arc<dyn StaticScene>>,
 }
 
-/// Surfaces behind and before the figures that do not move, as one camera sees them.
+/// Static surfaces in front of and behind the figures, rendered for one camera.
 pub trait StaticScene: Debug + Send + Sync {
-    /// One over the depth of each sample, 1/cm; 0 where there is nothing.
+    /// Inverse depth of each sample, 1/cm; 0 where there is no surface. Shape: pixels of the image, row by row, four
+    /// samples each.
     fn nearness(&self) -> &[[f32; 4]];
 
-    /// Mesh, label and depth (cm) at a pixel.
+    /// Mesh, label and depth (cm) at a pixel index; `None` where there is no surface.
     fn label(&self, at: usize) -> Option<(u16, u16, f64)>;
 
-    /// Lays the shadows of figures over a copy of the background.
+    /// Draws the shadows of the figures over a copy of the background.
     fn shade(&self, image: &mut Image, shadows: &ShadowMap);
 }
 
@@ -29,7 +30,7 @@ impl Background {
         Self { image, scene: None }
     }
 
-    /// One sRGB colour at the top that turns into another towards the bottom.
+    /// Vertical gradient between two sRGB colours.
     pub fn gradient([width, height]: [usize; 2], top: [u8; 3], bottom: [u8; 3]) -> Self {
         let last = height.max(2) - 1;
         let row = |y: usize| {

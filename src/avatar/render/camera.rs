@@ -3,25 +3,25 @@
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::{Vec3, across, cross, sub, unit};
 
-/// Nearest depth that is projected, cm.
+/// Minimum depth that is projected, cm; surfaces are clipped there.
 pub const NEAR_CM: f64 = 5.0;
 
-/// Camera whose axes are x right, y down, z away from it.
+/// Camera with axes x right, y down, z forward.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PinholeCamera {
-    /// Width and height of the picture, px.
+    /// Width and height of the image, px.
     pub size: [usize; 2],
-    /// Focal length, px; the axis meets the middle of the picture.
+    /// Focal length, px; the principal point is the centre of the image.
     pub focal_px: f64,
     /// Position in the world, cm.
     pub position: Vec3,
-    /// Camera axes from world axes.
+    /// Rotation from world axes to camera axes.
     pub axes: Rotation,
 }
 
 impl PinholeCamera {
-    /// Camera at `position` that looks at `target` (both world cm), rolled clockwise by `roll` radians about its axis.
-    /// One that looks straight up or down has the world's z axis as its upper side.
+    /// Camera at `position` that looks at `target` (both in world axes, cm), rolled clockwise by `roll` radians about
+    /// its optical axis. If it looks straight up or down, the world's z axis is up in the image.
     pub fn looking_at(size: [usize; 2], focal_px: f64, position: Vec3, target: Vec3, roll: f64) -> Self {
         let away = unit(sub(target, position), 1e-9).unwrap_or([0.0, 0.0, -1.0]);
         let down = [[0.0, -1.0, 0.0], [0.0, 0.0, -1.0]].into_iter().find_map(|down| unit(across(down, away), 1e-3));
@@ -31,13 +31,13 @@ impl PinholeCamera {
         Self { size, focal_px, position, axes }
     }
 
-    /// World point in camera axes, cm.
+    /// A world point in camera axes, cm.
     pub fn see(&self, point: Vec3) -> Vec3 {
         self.axes.turn(sub(point, self.position))
     }
 
-    /// Pixel of a point in camera axes (the centre of the top left pixel is 0, 0). Points nearer than `NEAR_CM` are
-    /// projected as if they were that far.
+    /// Pixel of a point in camera axes; the centre of the top left pixel is (0, 0). Points nearer than `NEAR_CM` are
+    /// projected as if at that depth.
     pub fn pixel(&self, [x, y, z]: Vec3) -> [f64; 2] {
         let [cx, cy] = self.size.map(|n| (n as f64 - 1.0) / 2.0);
         let per_cm = self.focal_px / z.max(NEAR_CM);
@@ -51,7 +51,7 @@ mod tests {
 
     #[test]
     fn the_target_is_in_the_middle_up_is_up_and_a_figure_from_the_front_has_its_left_on_the_right() {
-        // The figure faces +z with its left at +x.
+        // The subject faces +z with its left side at +x.
         let camera = PinholeCamera::looking_at([640, 480], 700.0, [0.0, 140.0, 200.0], [0.0, 120.0, 0.0], 0.0);
         let px = |point: Vec3| camera.pixel(camera.see(point));
         let [x, y] = px([0.0, 120.0, 0.0]);
@@ -66,7 +66,7 @@ mod tests {
         let px = |roll: f64| camera(roll).pixel(camera(roll).see([0.0, 10.0, 0.0]));
         let (upright, rolled) = (px(0.0), px(0.1));
         assert!((upright[0] - 99.5).abs() < 1e-9 && upright[1] < 99.5);
-        // A camera rolled clockwise shows the world turned anticlockwise.
+        // Rolling the camera clockwise turns the image of the world anticlockwise.
         assert!(rolled[0] < 99.0, "{rolled:?}");
     }
 }

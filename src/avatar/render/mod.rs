@@ -1,4 +1,4 @@
-//! Software renderer: posed triangle meshes seen by a pinhole camera, with the same bytes on every machine.
+//! Software renderer: posed triangle meshes through a pinhole camera, with identical bytes on every machine.
 
 pub mod background;
 pub mod camera;

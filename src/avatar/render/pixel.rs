@@ -1,30 +1,30 @@
-//! Light of one pixel from the triangles at its four samples.
+//! Shading of pixels from the triangles at their four samples.
 
-use super::samples::{NO_TRIANGLE, PARTS, SPOTS};
+use super::samples::{NO_TRIANGLE, SAMPLE_OFFSETS, SUBPIXELS};
 use super::shadow::ShadowMap;
 use super::srgb::{Srgb, Steps, compressed, steps};
 use super::surfaces::{INNER_LIGHT, Radiance, RadiancePlane, Surfaces};
 
-/// Depths of one surface within a pixel differ by less than this share.
-const ONE_SURFACE: f32 = 0.012;
-/// No plane of a triangle is known yet, or none exists.
+/// Relative depth difference within a pixel below which two samples belong to one surface.
+const SAME_SURFACE_RATIO: f32 = 0.012;
+/// Entries of `numbers`: a plane not computed yet, and a triangle whose radiance is not planar.
 const NO_PLANE: u32 = u32::MAX;
-const UNEVEN: u32 = u32::MAX - 1;
+const NOT_PLANAR: u32 = u32::MAX - 1;
 
-/// What a pixel sends, weighted by the samples that are covered.
+/// Light of a pixel, weighted by its covered samples.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PixelLight {
-    /// Linear RGB without the key light, and of the key light.
+    /// Linear RGB without the key light, and of the unshadowed key light.
     pub own: [f32; 4],
     pub key: [f32; 4],
-    /// Point in the light's axes of the first surface.
-    pub asking: [f32; 3],
-    /// Share of covered samples, 0..1.
+    /// Shadow query point of the first surface, in light axes.
+    pub shadow_point: [f32; 3],
+    /// Fraction of covered samples, 0..1.
     pub cover: f32,
 }
 
 impl PixelLight {
-    /// Linear RGB with a share of the key light.
+    /// Linear RGB if a fraction `lit` of the key light arrives.
     #[inline(always)]
     pub fn sum(&self, lit: f32) -> [f32; 4] {
         let mut sum = self.own;
@@ -33,18 +33,18 @@ impl PixelLight {
     }
 }
 
-/// Light of the triangles of a picture, worked out where it is asked for.
+/// Shading of the triangles of an image, computed on demand.
 #[derive(Clone, Debug, Default)]
 pub struct Shading {
-    /// What the vertices send, and for which of them that is known.
+    /// Radiance of each vertex, and whether it is computed.
     vertices: Vec<Radiance>,
     is_known: Vec<bool>,
-    /// Plane of each triangle.
+    /// Index into `planes` for each triangle.
     numbers: Vec<u32>,
     planes: Vec<RadiancePlane>,
-    /// Numbers of the last pixel's mesh: from one to another.
+    /// Range of triangle indices of the last pixel's mesh.
     mesh: [u32; 2],
-    /// Pixels of a row, and which of them are drawn: from one to another.
+    /// Pixels of a row, and the column ranges that are drawn.
     row: Vec<Steps>,
     runs: Vec<[usize; 2]>,
 }
@@ -55,54 +55,54 @@ pub fn is_empty(triangles: &[u32; 4]) -> bool {
     triangles[0] & triangles[1] & triangles[2] & triangles[3] == NO_TRIANGLE
 }
 
-/// Sample that is nearest to the camera.
+/// Index of the sample nearest to the camera.
 #[inline(always)]
 pub fn nearest(nearness: &[f32; 4]) -> usize {
     (1..4).fold(0, |best, k| if nearness[k] > nearness[best] { k } else { best })
 }
 
-/// One of the surfaces in a pixel.
+/// A surface within a pixel.
 #[derive(Clone, Copy, Default)]
-struct Part {
+struct PixelSurface {
     triangle: u32,
-    /// Share of the pixel.
+    /// Fraction of the pixel.
     share: f32,
-    /// Point of the surface, parts of a pixel.
+    /// Point on the surface, in subpixels.
     point: [i32; 2],
 }
 
 /// Calls `each` for every surface in a pixel.
 #[inline(always)]
-fn for_parts(
+fn for_surfaces(
     surfaces: &Surfaces,
     (triangles, nearness): (&[u32; 4], &[f32; 4]),
     [x, y]: [usize; 2],
-    mut each: impl FnMut(Part),
+    mut each: impl FnMut(PixelSurface),
 ) {
-    let mut is_open = triangles.map(|triangle| triangle != NO_TRIANGLE);
+    let mut is_pending = triangles.map(|triangle| triangle != NO_TRIANGLE);
     for k in 0..4 {
-        if !is_open[k] {
+        if !is_pending[k] {
             continue;
         }
         let mesh = surfaces.triangles[triangles[k] as usize].mesh;
         let mut n = 1;
         for other in k + 1..4 {
-            if is_open[other] {
-                let is_near = (nearness[k] - nearness[other]).abs() < ONE_SURFACE * nearness[k];
+            if is_pending[other] {
+                let is_near = (nearness[k] - nearness[other]).abs() < SAME_SURFACE_RATIO * nearness[k];
                 if is_near && surfaces.triangles[triangles[other] as usize].mesh == mesh {
-                    is_open[other] = false;
+                    is_pending[other] = false;
                     n += 1;
                 }
             }
         }
-        let point = [x as i32 * PARTS + SPOTS[k][0], y as i32 * PARTS + SPOTS[k][1]];
-        each(Part { triangle: triangles[k], share: n as f32 * 0.25, point });
+        let point = [x as i32 * SUBPIXELS + SAMPLE_OFFSETS[k][0], y as i32 * SUBPIXELS + SAMPLE_OFFSETS[k][1]];
+        each(PixelSurface { triangle: triangles[k], share: n as f32 * 0.25, point });
     }
 }
 
 impl Shading {
-    /// Starts over with the triangles of another picture.
-    pub fn open(&mut self, surfaces: &Surfaces) {
+    /// Resets the caches for the triangles of another image.
+    pub fn reset(&mut self, surfaces: &Surfaces) {
         self.numbers.clear();
         self.numbers.resize(surfaces.triangles.len(), NO_PLANE);
         self.planes.clear();
@@ -120,12 +120,12 @@ impl Shading {
             Some(plane) => plane.radiance_at(point),
             None => {
                 let triangle = &surfaces.triangles[number as usize];
-                surfaces.radiance_at(triangle, &self.corners(surfaces, shadows, number), point)
+                surfaces.radiance_at(triangle, &self.corner_radiances(surfaces, shadows, number), point)
             }
         }
     }
 
-    /// Plane of a triangle; none where it is uneven.
+    /// Radiance plane of a triangle; `None` if its radiance is not planar.
     #[inline(always)]
     fn plane(&mut self, surfaces: &Surfaces, shadows: Option<&ShadowMap>, number: u32) -> Option<&RadiancePlane> {
         if self.numbers[number as usize] == NO_PLANE {
@@ -137,17 +137,17 @@ impl Shading {
     #[inline(never)]
     fn make_plane(&mut self, surfaces: &Surfaces, shadows: Option<&ShadowMap>, number: u32) {
         let triangle = &surfaces.triangles[number as usize];
-        self.numbers[number as usize] = UNEVEN;
-        if surfaces.is_even(triangle) {
-            let corners = self.corners(surfaces, shadows, number);
+        self.numbers[number as usize] = NOT_PLANAR;
+        if surfaces.is_planar(triangle) {
+            let corners = self.corner_radiances(surfaces, shadows, number);
             self.numbers[number as usize] = self.planes.len() as u32;
             self.planes.push(surfaces.plane(triangle, &corners));
         }
     }
 
-    /// What the corners of a triangle send.
+    /// Radiance at the corners of a triangle.
     #[inline(never)]
-    fn corners(&mut self, surfaces: &Surfaces, shadows: Option<&ShadowMap>, number: u32) -> [Radiance; 3] {
+    fn corner_radiances(&mut self, surfaces: &Surfaces, shadows: Option<&ShadowMap>, number: u32) -> [Radiance; 3] {
         let triangle = &surfaces.triangles[number as usize];
         let mut corners = [Radiance::default(); 3];
         for (corner, vertex) in corners.iter_mut().zip(triangle.vertices) {
@@ -163,12 +163,12 @@ impl Shading {
         corners
     }
 
-    /// Whether all samples show the first one's surface.
+    /// Whether all samples show the surface of the first one.
     #[inline(always)]
     fn is_one_surface(&mut self, surfaces: &Surfaces, triangles: &[u32; 4], nearness: &[f32; 4]) -> bool {
         let [a, b, c, d] = *nearness;
-        let reach = ONE_SURFACE * a;
-        if !((a - b).abs() < reach && (a - c).abs() < reach && (a - d).abs() < reach) {
+        let tolerance = SAME_SURFACE_RATIO * a;
+        if !((a - b).abs() < tolerance && (a - c).abs() < tolerance && (a - d).abs() < tolerance) {
             return false;
         }
         let [a, b, c, d] = *triangles;
@@ -179,13 +179,13 @@ impl Shading {
         a.min(b).min(c).min(d) >= first && a.max(b).max(c).max(d) < end
     }
 
-    /// Light of a pixel before shadows.
+    /// Light of a pixel before shadows are applied.
     pub fn light(&mut self, surfaces: &Surfaces, samples: (&[u32; 4], &[f32; 4]), pixel: [usize; 2]) -> PixelLight {
         let mut light = PixelLight::default();
-        for_parts(surfaces, samples, pixel, |Part { triangle, share, point }| {
-            let [own, key, asking] = self.radiance(surfaces, None, triangle, point);
+        for_surfaces(surfaces, samples, pixel, |PixelSurface { triangle, share, point }| {
+            let [own, key, shadow_point] = self.radiance(surfaces, None, triangle, point);
             if light.cover == 0.0 {
-                light.asking = [asking[0], asking[1], asking[2]];
+                light.shadow_point = [shadow_point[0], shadow_point[1], shadow_point[2]];
             }
             light.cover += share;
             for k in 0..4 {
@@ -196,8 +196,8 @@ impl Shading {
         light
     }
 
-    /// Writes a row of pixels over its background, `image`, and what is in front there; the first has a place in the
-    /// picture.
+    /// Draws a row of pixels over the background in `image` and stores the frontmost triangles in `front`; `[left, y]`
+    /// is the first pixel.
     pub fn draw_row(
         &mut self,
         surfaces: &Surfaces,
@@ -233,13 +233,13 @@ impl Shading {
                 let nearest = nearest(samples.1);
                 front[at] = (samples.0[nearest], samples.1[nearest]);
                 row[at] = steps(if self.is_one_surface(surfaces, samples.0, samples.1) {
-                    let point = [0, 1].map(|k| pixel[k] as i32 * PARTS + SPOTS[0][k]);
+                    let point = [0, 1].map(|k| pixel[k] as i32 * SUBPIXELS + SAMPLE_OFFSETS[0][k]);
                     with_shadow(shadows, &self.radiance(surfaces, Some(shadows), first, point))
                 } else {
                     let (mut linear, cover) = self.mixed(surfaces, shadows, samples, pixel);
-                    let behind = srgb.linears([image[3 * at], image[3 * at + 1], image[3 * at + 2]]);
+                    let background = srgb.linears([image[3 * at], image[3 * at + 1], image[3 * at + 2]]);
                     for k in 0..4 {
-                        linear[k] += (1.0 - cover) * behind[k];
+                        linear[k] += (1.0 - cover) * background[k];
                     }
                     linear
                 });
@@ -255,13 +255,13 @@ impl Shading {
         }
         for &[from, to] in &self.runs[..n_runs] {
             for (pixel, steps) in image[3 * from..3 * to].as_chunks_mut::<3>().0.iter_mut().zip(&row[from..to]) {
-                *pixel = srgb.bytes_of(*steps);
+                *pixel = srgb.bytes_from_steps(*steps);
             }
         }
         self.row = row;
     }
 
-    /// Pixels of one triangle beside each other, from a first one on.
+    /// Draws adjacent pixels that show one triangle, starting at `[left, y]`.
     #[inline(always)]
     fn draw_run(
         &mut self,
@@ -271,17 +271,17 @@ impl Shading {
         [left, y]: [usize; 2],
         row: &mut [Steps],
     ) {
-        let point = |x: usize| [(left + x) as i32 * PARTS, y as i32 * PARTS];
+        let point = |x: usize| [(left + x) as i32 * SUBPIXELS, y as i32 * SUBPIXELS];
         let Some(plane) = self.plane(surfaces, Some(shadows), number) else {
-            for (x, steps_of) in row.iter_mut().enumerate() {
+            for (x, pixel) in row.iter_mut().enumerate() {
                 let radiance = self.radiance(surfaces, Some(shadows), number, point(x));
-                *steps_of = steps(with_shadow(shadows, &radiance));
+                *pixel = steps(with_shadow(shadows, &radiance));
             }
             return;
         };
         let (mut radiance, across) = (plane.radiance_at(point(0)), &plane.across);
-        for steps_of in row {
-            *steps_of = steps(with_shadow(shadows, &radiance));
+        for pixel in row {
+            *pixel = steps(with_shadow(shadows, &radiance));
             for n in 0..3 {
                 for k in 0..4 {
                     radiance[n][k] += across[n][k];
@@ -290,7 +290,7 @@ impl Shading {
         }
     }
 
-    /// Linear RGB of a pixel with several surfaces, weighted by the share of covered samples, and that share.
+    /// Linear RGB of a pixel with several surfaces, weighted by coverage, and the fraction of covered samples.
     #[inline(never)]
     pub fn mixed(
         &mut self,
@@ -300,7 +300,7 @@ impl Shading {
         pixel: [usize; 2],
     ) -> ([f32; 4], f32) {
         let (mut sum, mut cover) = ([0.0f32; 4], 0.0);
-        for_parts(surfaces, samples, pixel, |Part { triangle, share, point }| {
+        for_surfaces(surfaces, samples, pixel, |PixelSurface { triangle, share, point }| {
             let light = with_shadow(shadows, &self.radiance(surfaces, Some(shadows), triangle, point));
             cover += share;
             for k in 0..4 {
@@ -311,11 +311,11 @@ impl Shading {
     }
 }
 
-/// Linear RGB of what a surface sends, with its shadow.
+/// Linear RGB of a surface, with shadow and tone mapping.
 #[inline(always)]
-fn with_shadow(shadows: &ShadowMap, [own, key, asking]: &Radiance) -> [f32; 4] {
+fn with_shadow(shadows: &ShadowMap, [own, key, shadow_point]: &Radiance) -> [f32; 4] {
     let is_turned_away = key[0] + key[1] + key[2] <= 1e-4;
-    let lit = if is_turned_away { 0.0 } else { shadows.lit([asking[0], asking[1], asking[2]]) };
+    let lit = if is_turned_away { 0.0 } else { shadows.lit([shadow_point[0], shadow_point[1], shadow_point[2]]) };
     let mut light = *own;
     for k in 0..4 {
         light[k] += lit * key[k];

@@ -1,5 +1,5 @@
-//! Frames of posed meshes over a background: visibility first (four samples a pixel, nearest triangle), then the light of
-//! what is seen, once a surface and pixel. The figures' area alone is worked on.
+//! Frames of posed meshes over a background: first visibility (nearest triangle at four samples per pixel), then
+//! shading, once per surface and pixel. Only the area of the figures is processed.
 
 use super::background::{Background, StaticScene};
 use super::camera::PinholeCamera;
@@ -12,10 +12,10 @@ use super::visibility::VisibleTriangles;
 use orator_base::types::image::Image;
 use std::sync::Arc;
 
-/// Texels of the figures' shadow map, each way.
+/// Width and height of the figures' shadow map, texels.
 const SHADOW_TEXELS: usize = 256;
 
-/// Renderer with the memory that frames of one size need.
+/// Renderer with buffers for frames of one size.
 #[derive(Clone, Debug)]
 pub struct Renderer {
     size: [usize; 2],
@@ -23,16 +23,16 @@ pub struct Renderer {
     surfaces: Surfaces,
     shading: Shading,
     shadows: ShadowMap,
-    /// Triangle and nearness (1/cm) in front at each pixel of the last frame.
+    /// Frontmost triangle and its inverse depth (1/cm) at each pixel of the last frame.
     front: Vec<(u32, f32)>,
-    /// Rows of pixels in `front` that the last frame filled, in columns from one to another.
+    /// For each row, the range of columns of `front` that the last frame filled.
     spans: Vec<[usize; 2]>,
     n_meshes: usize,
     scene: Option<Arc<dyn StaticScene>>,
 }
 
 impl Renderer {
-    /// Renderer of pictures with a width and a height, px.
+    /// Renderer for images of a width and height, px.
     pub fn new(size: [usize; 2]) -> Self {
         Self {
             size,
@@ -47,8 +47,8 @@ impl Renderer {
         }
     }
 
-    /// Picture of meshes before a background. Camera and background have the renderer's size; with another one the
-    /// background is returned as it is.
+    /// Renders meshes over a background. If the camera or the background does not have the renderer's size, the
+    /// background is returned unchanged.
     pub fn draw(&mut self, camera: &PinholeCamera, meshes: &[&Mesh], light: &Light, background: &Background) -> Image {
         let mut image = background.image.clone();
         self.spans.fill([0; 2]);
@@ -58,7 +58,7 @@ impl Renderer {
             return image;
         }
         self.surfaces.set(camera, meshes, light);
-        self.shading.open(&self.surfaces);
+        self.shading.reset(&self.surfaces);
         self.shadows.cast(self.surfaces.casters(meshes), false);
         if let Some(scene) = &self.scene {
             scene.shade(&mut image, &self.shadows);
@@ -67,11 +67,11 @@ impl Renderer {
         image
     }
 
-    /// Mesh, label and depth along the camera's axis (cm) of the frontmost surface at a pixel of the last frame. Meshes
-    /// of the background's scene are counted on after those of the frame.
+    /// Mesh, label and depth along the camera axis (cm) of the frontmost surface at a pixel of the last frame. Mesh
+    /// indices of the background scene follow those of the frame.
     pub fn label_at(&self, px: [f64; 2]) -> Option<(usize, u16, f64)> {
         let [x, y] = px.map(|v| (v + 0.5).floor());
-        // Also false for NaN.
+        // The condition is also false for NaN.
         if !(x >= 0.0 && y >= 0.0 && x < self.size[0] as f64 && y < self.size[1] as f64) {
             return None;
         }
@@ -88,8 +88,8 @@ impl Renderer {
 
     fn fill(&mut self, image: &mut Image) {
         let Self { size: [width, _], visibility, surfaces, shading, shadows, front, spans, scene, .. } = self;
-        let behind = scene.as_ref().map(|scene| scene.nearness());
-        visibility.visit(surfaces, behind, |band, rows, columns| {
+        let background = scene.as_ref().map(|scene| scene.nearness());
+        visibility.visit(surfaces, background, |band, rows, columns| {
             let [left, right] = columns;
             spans[rows[0]..rows[1]].fill(columns);
             for y in rows[0]..rows[1] {
@@ -127,15 +127,15 @@ mod tests {
         quad([corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)], [0.0, 0.0, 1.0], label)
     }
 
-    /// A floor at height `y` that reaches `half` to all sides of a place.
+    /// A floor at height `y` that extends by `half` in each direction.
     fn floor(y: f32, z: f32, half: f32) -> Mesh {
         let corner = |dx: f32, dz: f32| [dx * half, y, z + dz * half];
         quad([corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0), corner(-1.0, -1.0)], [0.0, 1.0, 0.0], 5)
     }
 
-    /// A ball of `n` x `2 n` patches.
+    /// A sphere of 6 `n` x `n` patches.
     fn ball(middle: [f32; 3], radius: f32, n: usize) -> Mesh {
-        // Points of a cube's faces brought to length 1: no angle is needed.
+        // Points on the faces of a cube are normalised, which needs no trigonometry.
         let side = |k: usize| k as f32 / n as f32 * 2.0 - 1.0;
         let (mut normals, mut triangles) = (Vec::new(), Vec::new());
         for (axis, sign) in [(0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0), (2, 1.0), (2, -1.0f32)] {
@@ -164,12 +164,12 @@ mod tests {
     }
 
     #[test]
-    fn a_ball_has_the_outline_and_the_depth_of_a_ball() {
+    fn a_sphere_has_the_right_area_and_depth() {
         let (ball, mut renderer) = (ball([0.0; 3], 12.0, 24), Renderer::new([200, 160]));
-        // The difference of what is drawn over white and over black shows the background's share.
+        // The difference between renderings over white and over black is the visible part of the background.
         let [white, black] = [[255; 3], [0; 3]].map(|rgb| {
-            let behind = Background::picture(Image::filled(200, 160, rgb));
-            let image = renderer.draw(&camera(), &[&ball], &WHITE, &behind);
+            let background = Background::picture(Image::filled(200, 160, rgb));
+            let image = renderer.draw(&camera(), &[&ball], &WHITE, &background);
             image.data.iter().map(|byte| Srgb::tables().linears([*byte; 3])[0] / 3.0).sum::<f32>()
         });
         let area = 200.0 * 160.0 - (white - black);
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn the_nearer_surface_is_seen_whatever_the_order() {
+    fn the_nearer_surface_is_visible_in_any_order() {
         let (near, far) = (square(2.0, 0.0, 10.0, 6.0, 1), square(-2.0, 0.0, 0.0, 9.0, 2));
         let mut renderer = Renderer::new([200, 160]);
         let one = renderer.draw(&camera(), &[&near, &far], &WHITE, &black());
@@ -196,25 +196,25 @@ mod tests {
     }
 
     #[test]
-    fn an_edge_through_a_pixel_covers_its_share() {
-        // The left edge stands at 20 px from the axis, at half a pixel, or between the first and the second quarter.
+    fn coverage_counts_the_samples_inside_an_edge() {
+        // The left edge is 20 px from the axis: at half a pixel, or between samples.
         for (edge, samples) in [(20.5f32, 2.0), (20.25, 3.0), (20.75, 1.0), (20.0, 4.0)] {
             let left = edge / 4.0;
             let mesh = square(left + 5.0, 0.0, 0.0, 5.0, 0);
             let image = Renderer::new([200, 160]).draw(&camera(), &[&mesh], &WHITE, &black());
-            // The middle of the picture lies between two pixels.
-            let seen = Srgb::tables().linears(image.pixel(120, 80))[1];
-            assert!((seen - 0.5 * samples / 4.0).abs() < 0.004, "{seen} at {edge}");
+            // The centre of the image is between two pixels.
+            let value = Srgb::tables().linears(image.pixel(120, 80))[1];
+            assert!((value - 0.5 * samples / 4.0).abs() < 0.004, "{value} at {edge}");
             assert_eq!(image.pixel(119, 80)[1], 0);
         }
     }
 
     #[test]
-    fn a_floor_that_passes_under_the_camera_is_cut_and_stands_at_its_depth() {
+    fn a_floor_below_the_camera_is_clipped_and_has_the_right_depth() {
         let floor = floor(-20.0, 0.0, 400.0);
         let mut renderer = Renderer::new([200, 160]);
         let image = renderer.draw(&camera(), &[&floor], &WHITE, &black());
-        // The floor's end, 500 cm away, is 16 px below the axis.
+        // The far end of the floor, 500 cm away, is 16 px below the axis.
         assert_eq!((image.pixel(100, 90)[0], image.pixel(100, 100)[0]), (0, Srgb::tables().bytes([0.5; 4])[0]));
         let (_, label, depth) = renderer.label_at([100.0, 119.0]).unwrap();
         assert!(label == 5 && (depth - 200.6).abs() < 0.5, "{depth} cm");
@@ -232,19 +232,19 @@ mod tests {
         let together = renderer.draw(&camera, &[&floor, &ball], &light, &black());
         let on_floor = |x: f64| camera.pixel(camera.see([x, 0.0, 0.0])).map(f64::round);
         let at = |x: f64| together.pixel(on_floor(x)[0] as usize, on_floor(x)[1] as usize)[0];
-        // The light comes from +x at 45 degrees: 20 cm up, the shadow falls 20 cm towards -x.
+        // The light comes from +x at 45 degrees, so from a height of 20 cm the shadow falls 20 cm towards -x.
         assert!(at(-20.0) < 140 && at(20.0) > 180 && at(-40.0).abs_diff(at(40.0)) < 12, "{} {}", at(-20.0), at(20.0));
     }
 
     #[test]
-    fn the_bytes_are_the_same_after_other_frames() {
+    fn frames_do_not_depend_on_earlier_frames() {
         let camera = PinholeCamera::looking_at([200, 160], 250.0, [30.0, 60.0, 100.0], [0.0; 3], 0.0);
         let light = Light::studio([-0.5, 0.75, 0.6]);
         let (floor, ball) = (floor(0.0, 0.0, 60.0), ball([0.0, 12.0, 0.0], 9.0, 12));
-        let behind = Background::gradient([200, 160], [60; 3], [180; 3]);
+        let background = Background::gradient([200, 160], [60; 3], [180; 3]);
         let mut renderer = Renderer::new([200, 160]);
-        let image = renderer.draw(&camera, &[&floor, &ball], &light, &behind);
+        let image = renderer.draw(&camera, &[&floor, &ball], &light, &background);
         renderer.draw(&camera, &[&square(0.0, 0.0, 40.0, 50.0, 0)], &light, &black());
-        assert_eq!(image, renderer.draw(&camera, &[&floor, &ball], &light, &behind));
+        assert_eq!(image, renderer.draw(&camera, &[&floor, &ball], &light, &background));
     }
 }

@@ -1,33 +1,35 @@
-//! Frontmost triangle of four samples in each pixel, for a band of rows at a time, which the processor's cache holds.
+//! Frontmost triangle at four samples of each pixel, for one band of rows at a time so that it fits into the
+//! processor's cache.
 
-/// Parts of a pixel that vertices are rounded to: with whole numbers, triangles that share an edge leave no gap.
-pub const PARTS: i32 = 16;
-/// Extent of a triangle whose edge functions i32 holds, parts.
-const SMALL: i32 = 512 * PARTS;
-/// Samples of a pixel from its centre, parts: a rotated grid.
-pub const SPOTS: [[i32; 2]; 4] = [[-2, -6], [6, -2], [-6, 2], [2, 6]];
-const FURTHEST_SPOT: i32 = 6;
-/// Triangle of a sample that no triangle covers.
+/// Subpixels per pixel, to which vertices are rounded: integer arithmetic leaves no gaps between triangles that share
+/// an edge.
+pub const SUBPIXELS: i32 = 16;
+/// Maximum extent of a triangle whose edge functions fit into i32, subpixels.
+const MAX_I32_EXTENT: i32 = 512 * SUBPIXELS;
+/// Offsets of the samples from the centre of their pixel, subpixels: a rotated grid.
+pub const SAMPLE_OFFSETS: [[i32; 2]; 4] = [[-2, -6], [6, -2], [-6, 2], [2, 6]];
+const MAX_SAMPLE_OFFSET: i32 = 6;
+/// Marks a sample that no triangle covers.
 pub const NO_TRIANGLE: u32 = u32::MAX;
-/// Width of the cells in which hidden triangles are told at once, px.
+/// Width of the cells of the hierarchical depth test, px.
 const CELL: usize = 8;
-/// Rows of a band.
+/// Number of rows in a band.
 pub const BAND_ROWS: usize = 16;
 
-/// Pixels that may have a sample within a triangle: first column and the one after the last, the same of rows.
+/// Pixels that may have a sample within a triangle: half-open ranges of columns and rows.
 pub type Extent = [[u16; 2]; 2];
 
-/// Triangle in the picture.
+/// A triangle projected to the image.
 #[derive(Clone, Copy, Debug)]
 pub struct FlatTriangle {
-    /// Corners, parts of a pixel from the centre of the top left one.
+    /// Corners, in subpixels from the centre of the top left pixel.
     pub corners: [[i32; 2]; 3],
-    /// One over the depth of the corners, 1/cm.
+    /// Inverse depth of the corners, 1/cm.
     pub nearness: [f32; 3],
 }
 
 impl FlatTriangle {
-    /// Twice the area; negative where the corners run counter-clockwise as one sees them.
+    /// Twice the signed area; negative if the corners run counter-clockwise in the image.
     #[inline(always)]
     pub fn area(&self) -> i64 {
         let [a, b, c] = self.corners;
@@ -35,13 +37,13 @@ impl FlatTriangle {
         across(a, b, 0) * across(a, c, 1) - across(a, c, 0) * across(a, b, 1)
     }
 
-    /// Pixels in a picture of `size` that may have a sample within the triangle.
+    /// Pixels in an image of `size` that may have a sample within the triangle.
     #[inline(always)]
     pub fn extent(&self, size: [usize; 2]) -> Extent {
         let ends = |k: usize| {
             let [a, b, c] = [self.corners[0][k], self.corners[1][k], self.corners[2][k]];
-            let first = (a.min(b).min(c) - FURTHEST_SPOT + PARTS - 1).div_euclid(PARTS);
-            let last = (a.max(b).max(c) + FURTHEST_SPOT).div_euclid(PARTS) + 1;
+            let first = (a.min(b).min(c) - MAX_SAMPLE_OFFSET + SUBPIXELS - 1).div_euclid(SUBPIXELS);
+            let last = (a.max(b).max(c) + MAX_SAMPLE_OFFSET).div_euclid(SUBPIXELS) + 1;
             let n = size[k] as i32;
             [first.clamp(0, n) as u16, last.clamp(0, n) as u16]
         };
@@ -54,10 +56,10 @@ impl FlatTriangle {
 pub struct RowBand {
     width: usize,
     rows: [usize; 2],
-    /// One over the depth, 1/cm; 0 is infinitely far. [BAND_ROWS, width]
+    /// Inverse depth, 1/cm; 0 is infinity. Shape: [BAND_ROWS, width]
     pub nearness: Vec<[f32; 4]>,
     pub triangles: Vec<[u32; 4]>,
-    /// Least nearness in each cell, once `close_cells` has run.
+    /// Minimum inverse depth in each cell, valid after `update_cells`.
     cells: Vec<f32>,
 }
 
@@ -68,16 +70,16 @@ impl RowBand {
         Self { width, rows: [0; 2], nearness: vec![[0.0; 4]; n], triangles: vec![[NO_TRIANGLE; 4]; n], cells }
     }
 
-    /// Starts over as other rows with no triangle in some columns; `behind` is the nearness of what a whole picture shows
-    /// without them.
-    pub fn open(&mut self, rows: [usize; 2], columns: [usize; 2], behind: Option<&[[f32; 4]]>) {
+    /// Resets the band to other rows and clears a range of columns; `background` is the inverse depth of the background
+    /// for the whole image.
+    pub fn reset(&mut self, rows: [usize; 2], columns: [usize; 2], background: Option<&[[f32; 4]]>) {
         self.rows = rows;
         for y in rows[0]..rows[1] {
             let row = self.at(columns[0], y)..self.at(columns[1], y);
-            match behind {
-                Some(behind) => {
+            match background {
+                Some(background) => {
                     let there = y * self.width;
-                    self.nearness[row.clone()].copy_from_slice(&behind[there + columns[0]..there + columns[1]]);
+                    self.nearness[row.clone()].copy_from_slice(&background[there + columns[0]..there + columns[1]]);
                 }
                 None => self.nearness[row.clone()].fill([0.0; 4]),
             }
@@ -85,14 +87,14 @@ impl RowBand {
         }
     }
 
-    /// Index of a pixel of the picture.
+    /// Index of a pixel, given its position in the image.
     #[inline(always)]
     pub fn at(&self, x: usize, y: usize) -> usize {
         (y - self.rows[0]) * self.width + x
     }
 
-    /// Notes how far each cell of some columns reaches, for `is_hidden`.
-    pub fn close_cells(&mut self, columns: [usize; 2]) {
+    /// Computes the depth bounds of the cells in a range of columns, for `is_hidden`.
+    pub fn update_cells(&mut self, columns: [usize; 2]) {
         let n_columns = self.width.div_ceil(CELL);
         for cell_y in 0..(self.rows[1] - self.rows[0]).div_ceil(CELL) {
             for cell_x in columns[0] / CELL..columns[1].div_ceil(CELL) {
@@ -108,7 +110,7 @@ impl RowBand {
         }
     }
 
-    /// Whether a triangle lies behind everything in the cells it may touch.
+    /// Whether a triangle is behind everything in the cells that it may touch.
     pub fn is_hidden(&self, triangle: &FlatTriangle, extent: Extent) -> bool {
         let ([first, last], [top, bottom]) = (extent[0].map(usize::from), self.rows_of(extent));
         let nearest = triangle.nearness[0].max(triangle.nearness[1]).max(triangle.nearness[2]);
@@ -117,17 +119,17 @@ impl RowBand {
             .all(|y| (first / CELL..last.div_ceil(CELL)).all(|x| nearest < self.cells[y * n_columns + x]))
     }
 
-    /// Rows of the band within an extent that reaches into it.
+    /// Rows of the band within an extent that overlaps it.
     #[inline(always)]
     fn rows_of(&self, extent: Extent) -> [usize; 2] {
         extent[1].map(|y| usize::from(y).clamp(self.rows[0], self.rows[1]))
     }
 
-    /// Puts a triangle, seen from either side, wherever it is frontmost.
+    /// Rasterises a triangle with either orientation wherever it is frontmost.
     pub fn fill(&mut self, triangle: &FlatTriangle, extent: Extent, number: u32) {
         let [a, b, c] = triangle.corners;
         let length = |k: usize| a[k].max(b[k]).max(c[k]) - a[k].min(b[k]).min(c[k]);
-        if length(0) <= SMALL && length(1) <= SMALL {
+        if length(0) <= MAX_I32_EXTENT && length(1) <= MAX_I32_EXTENT {
             self.fill_with::<i32>(triangle, extent, number);
         } else {
             self.fill_with::<i64>(triangle, extent, number);
@@ -135,25 +137,25 @@ impl RowBand {
     }
 
     #[inline(always)]
-    fn fill_with<T: Whole>(&mut self, triangle: &FlatTriangle, extent: Extent, number: u32) {
+    fn fill_with<T: EdgeInteger>(&mut self, triangle: &FlatTriangle, extent: Extent, number: u32) {
         let FlatTriangle { corners, nearness } = triangle;
         let area = triangle.area();
         let sign = area.signum() as i32;
         let ([left, right], [top, bottom]) = (extent[0].map(usize::from), self.rows_of(extent));
-        let start = [left as i32 * PARTS, top as i32 * PARTS];
-        // Edge functions: at least 0 on the inner side, at the four samples of the first pixel; their steps.
+        let start = [left as i32 * SUBPIXELS, top as i32 * SUBPIXELS];
+        // Edge functions, non-negative inside, at the four samples of the first pixel, and their steps per pixel.
         let mut edges = [[T::ZERO; 4]; 3];
         let mut steps = [[T::ZERO; 2]; 3];
         for side in 0..3 {
             let (p, q) = (corners[(side + 1) % 3], corners[(side + 2) % 3]);
             let slope = [T::of((p[1] - q[1]) * sign), T::of((q[0] - p[0]) * sign)];
             let middle = slope[0] * T::of(start[0] - p[0]) + slope[1] * T::of(start[1] - p[1]);
-            for (edge, spot) in edges[side].iter_mut().zip(SPOTS) {
-                *edge = middle + slope[0] * T::of(spot[0]) + slope[1] * T::of(spot[1]);
+            for (edge, offset) in edges[side].iter_mut().zip(SAMPLE_OFFSETS) {
+                *edge = middle + slope[0] * T::of(offset[0]) + slope[1] * T::of(offset[1]);
             }
-            steps[side] = [slope[0] * T::of(PARTS), slope[1] * T::of(PARTS)];
+            steps[side] = [slope[0] * T::of(SUBPIXELS), slope[1] * T::of(SUBPIXELS)];
         }
-        // The plane of nearness over the picture.
+        // Inverse depth is a linear function of the image position.
         let [a, b, c] = *corners;
         let from_a = [(b[0] - a[0]) as f32, (b[1] - a[1]) as f32];
         let from_b = [(c[0] - a[0]) as f32, (c[1] - a[1]) as f32];
@@ -164,17 +166,18 @@ impl RowBand {
             (rise[1] * from_a[0] - rise[0] * from_b[0]) * per_area,
         ];
         let mut first = [0.0; 4];
-        for (first, spot) in first.iter_mut().zip(SPOTS) {
-            let (right, down) = ((start[0] + spot[0] - a[0]) as f32, (start[1] + spot[1] - a[1]) as f32);
+        for (first, offset) in first.iter_mut().zip(SAMPLE_OFFSETS) {
+            let (right, down) = ((start[0] + offset[0] - a[0]) as f32, (start[1] + offset[1] - a[1]) as f32);
             *first = nearness[0] + slope[0] * right + slope[1] * down;
         }
-        let per_pixel = [slope[0] * PARTS as f32, slope[1] * PARTS as f32];
+        let per_pixel = [slope[0] * SUBPIXELS as f32, slope[1] * SUBPIXELS as f32];
         self.fill_rows(&Setup { edges, steps, first, per_pixel, number }, [left, right], [top, bottom]);
     }
 
-    /// Walks over the pixels of an extent. Apart from its set-up, the compiler makes vectors of the four samples.
+    /// Rasterises the pixels of an extent. It is separate from the set-up so that the compiler vectorises over the four
+    /// samples.
     #[inline(never)]
-    fn fill_rows<T: Whole>(&mut self, setup: &Setup<T>, [left, right]: [usize; 2], [top, bottom]: [usize; 2]) {
+    fn fill_rows<T: EdgeInteger>(&mut self, setup: &Setup<T>, [left, right]: [usize; 2], [top, bottom]: [usize; 2]) {
         let Setup { mut edges, steps, mut first, per_pixel, number } = *setup;
         for y in top..bottom {
             let columns = self.at(left, y)..self.at(right, y);
@@ -182,7 +185,7 @@ impl RowBand {
             let ([mut e0, mut e1, mut e2], mut here) = (edges, first);
             let mut is_entered = false;
             for (front, triangles) in pixels {
-                // Loops over four samples without branches become one instruction each.
+                // Loops over the four samples without branches compile to one instruction each.
                 let mut outer = [0; 4];
                 for k in 0..4 {
                     outer[k] = T::outer(e0[k], e1[k], e2[k]);
@@ -195,16 +198,19 @@ impl RowBand {
                 let mut new = here;
                 here.iter_mut().for_each(|nearness| *nearness += per_pixel[0]);
                 if outer[0] & outer[1] & outer[2] & outer[3] < 0 {
-                    // Thin triangles pass between samples: the row ends where all of them are beyond one edge.
+                    // Thin triangles may pass between samples, so the row ends only where all samples are beyond one
+                    // edge.
                     if is_entered
-                        && (is_left(&e0, steps[0][0]) || is_left(&e1, steps[1][0]) || is_left(&e2, steps[2][0]))
+                        && (is_beyond_edge(&e0, steps[0][0])
+                            || is_beyond_edge(&e1, steps[1][0])
+                            || is_beyond_edge(&e2, steps[2][0]))
                     {
                         break;
                     }
                     continue;
                 }
                 is_entered = true;
-                // Outside, as if infinitely far.
+                // Samples outside the triangle get infinite depth.
                 for k in 0..4 {
                     new[k] = f32::from_bits(new[k].to_bits() & !((outer[k] >> 31) as u32));
                 }
@@ -229,36 +235,36 @@ impl RowBand {
     }
 }
 
-/// Whether all samples of a pixel and of those right of it are beyond an edge.
+/// Whether all samples of a pixel and of the pixels to its right are outside an edge.
 #[inline(always)]
-fn is_left<T: Whole>(edge: &[T; 4], step: T) -> bool {
+fn is_beyond_edge<T: EdgeInteger>(edge: &[T; 4], step: T) -> bool {
     let [a, b, c, d] = edge.map(|v| T::outer(v, v, v));
     a & b & c & d & T::outer(step, step, step) < 0
 }
 
-/// What is known of a triangle at the first pixel of its extent, and the steps to the next across and down.
+/// Edge functions and inverse depth of a triangle at the first pixel of its extent, and their steps per column and row.
 struct Setup<T> {
     edges: [[T; 4]; 3],
     steps: [[T; 2]; 3],
-    /// Nearness at the four samples, 1/cm.
+    /// Inverse depth at the four samples, 1/cm.
     first: [f32; 4],
     per_pixel: [f32; 2],
     number: u32,
 }
 
-/// Integer that holds the edge functions of a triangle.
-trait Whole: Copy + std::ops::Add<Output = Self> + std::ops::Mul<Output = Self> {
+/// Integer type for the edge functions of a triangle.
+trait EdgeInteger: Copy + std::ops::Add<Output = Self> + std::ops::Mul<Output = Self> {
     const ZERO: Self;
-    fn of(whole: i32) -> Self;
-    /// A negative number where one of three is negative.
+    fn of(v: i32) -> Self;
+    /// Negative if any of the three is negative.
     fn outer(a: Self, b: Self, c: Self) -> i32;
 }
 
-impl Whole for i32 {
+impl EdgeInteger for i32 {
     const ZERO: Self = 0;
 
-    fn of(whole: i32) -> Self {
-        whole
+    fn of(v: i32) -> Self {
+        v
     }
 
     #[inline(always)]
@@ -267,11 +273,11 @@ impl Whole for i32 {
     }
 }
 
-impl Whole for i64 {
+impl EdgeInteger for i64 {
     const ZERO: Self = 0;
 
-    fn of(whole: i32) -> Self {
-        i64::from(whole)
+    fn of(v: i32) -> Self {
+        i64::from(v)
     }
 
     #[inline(always)]

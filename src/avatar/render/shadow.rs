@@ -2,10 +2,10 @@
 
 use super::light::{Light, dot};
 
-/// Least offset of a surface from its own shadow, cm; a texel's width is added.
+/// Minimum depth bias against self-shadowing, cm; the width of a texel is added.
 const BIAS_CM: f32 = 0.35;
-/// Surroundings of a point that take light from all round: places on two rings, and the rings' radii.
-const NEAR_SPOTS: [[f32; 2]; 12] = [
+/// Ambient occlusion samples around a point: directions on two rings, and the radii of the rings.
+const OCCLUSION_OFFSETS: [[f32; 2]; 12] = [
     [1.0, 0.0],
     [0.0, 1.0],
     [-1.0, 0.0],
@@ -19,29 +19,30 @@ const NEAR_SPOTS: [[f32; 2]; 12] = [
     [0.383, -0.924],
     [0.924, -0.383],
 ];
-const NEAR_RADII_CM: [f32; 2] = [2.0, 4.5];
-/// Nearest and furthest of what takes light, cm, and the share it takes where it is all round.
-const NEAR_BIAS_CM: f32 = 0.8;
-const NEAR_CM: f32 = 22.0;
-const NEAR_STRENGTH: f32 = 0.9;
-/// Texels around the casters that nothing casts on.
+const OCCLUSION_RADII_CM: [f32; 2] = [2.0, 4.5];
+/// Minimum and maximum distance of occluders, cm, and the fraction of ambient light that they block if they cover all
+/// samples.
+const OCCLUSION_BIAS_CM: f32 = 0.8;
+const OCCLUSION_RANGE_CM: f32 = 22.0;
+const OCCLUSION_STRENGTH: f32 = 0.9;
+/// Empty texels around the shadow casters.
 const MARGIN: usize = 4;
-/// Width of the cells that tell where the map is empty, texels.
+/// Width of the cells that mark non-empty parts of the map, texels.
 const CELL: usize = 16;
 
-/// Distance of what the key light meets first, over a plane across it.
+/// Distance from the key light to the first surface, on a plane perpendicular to the light.
 #[derive(Clone, Debug)]
 pub struct ShadowMap {
     n: usize,
-    /// Position of texel 0, 0 across the light, cm.
+    /// Position of texel (0, 0) perpendicular to the light, cm.
     origin: [f32; 2],
     texels_per_cm: f32,
     bias: f32,
-    /// Distance along the light, cm; infinite where nothing is met. [n, n]
+    /// Depth along the light, cm; infinite where there is no caster. Shape: [n, n]
     depths: Vec<f32>,
-    /// Least and greatest distance in the four by four texels from each on.
+    /// Minimum and maximum depth in the 4 x 4 texels that start at each texel.
     ends: [Vec<f32>; 2],
-    /// Whether a cell or its neighbours hold anything.
+    /// Whether a cell contains a caster.
     cells: Vec<bool>,
     is_empty: bool,
 }
@@ -55,14 +56,15 @@ impl ShadowMap {
         Self { n, origin: [0.0; 2], texels_per_cm: 1.0, bias: BIAS_CM, depths, ends, cells, is_empty: true }
     }
 
-    /// A point in the light's axes: cm across it (twice) and along it.
+    /// A world point in light axes, cm: two coordinates perpendicular to the light, then the depth along it.
     #[inline(always)]
-    pub fn seen(axes: &[[f32; 3]; 3], point: [f32; 3]) -> [f32; 3] {
+    pub fn light_space(axes: &[[f32; 3]; 3], point: [f32; 3]) -> [f32; 3] {
         [dot(axes[0], point), dot(axes[1], point), dot(axes[2], point)]
     }
 
-    /// Casts triangles, points in the light's axes. With `only_far_sides` those that face the light cast nothing: what
-    /// is closed casts the same shadow and lies in none of its own, and walls, which have one side, cast none.
+    /// Renders the casters, given as points in light axes and triangles. With `only_far_sides`, triangles that face the
+    /// light are skipped: closed meshes then cast the same shadow without shading themselves, and one-sided walls cast
+    /// none.
     pub fn cast<'a>(
         &mut self,
         parts: impl Iterator<Item = (&'a [[f32; 3]], &'a [[u32; 3]])> + Clone,
@@ -97,11 +99,11 @@ impl ShadowMap {
                 let corners = [a.0, b.0, c.0];
                 let area = area(&corners);
                 let towards_light = if only_far_sides { -area } else { area };
-                // Triangles seen edge-on and those without numbers cast nothing either.
+                // Edge-on triangles and those with NaN are skipped too.
                 if towards_light.is_nan() || towards_light <= 1e-9 {
                     continue;
                 }
-                // Texels whose middle, a whole number, lies between.
+                // Range of texels whose centres (at integer coordinates) are inside.
                 let ends = |k: usize| {
                     let (low, high) = (a.1[k].min(b.1[k]).min(c.1[k]), a.1[k].max(b.1[k]).max(c.1[k]));
                     [low as usize + 1, (high as usize + 1).min(self.n)]
@@ -112,8 +114,8 @@ impl ShadowMap {
                 }
             }
         }
-        self.close_cells();
-        self.close_ends();
+        self.update_cells();
+        self.update_ends();
     }
 
     fn texel(&self, [x, y, depth]: [f32; 3]) -> [f32; 3] {
@@ -138,7 +140,7 @@ impl ShadowMap {
         }
     }
 
-    fn close_cells(&mut self) {
+    fn update_cells(&mut self) {
         let n_cells = self.n.div_ceil(CELL);
         for (y, row) in self.depths.chunks_exact(self.n).enumerate() {
             for (cell, texels) in row.chunks(CELL).enumerate() {
@@ -149,26 +151,26 @@ impl ShadowMap {
         }
     }
 
-    fn close_ends(&mut self) {
+    fn update_ends(&mut self) {
         let [nearest, furthest] = &mut self.ends;
         let [rows, texels] = [self.n, 1];
         let mut along = vec![f32::INFINITY; self.depths.len()];
-        over_four(&self.depths, texels, &mut along, |a, b| if a < b { a } else { b });
-        over_four(&along, rows, nearest, |a, b| if a < b { a } else { b });
-        over_four(&self.depths, texels, &mut along, |a, b| if a > b { a } else { b });
-        over_four(&along, rows, furthest, |a, b| if a > b { a } else { b });
+        fold_four(&self.depths, texels, &mut along, |a, b| if a < b { a } else { b });
+        fold_four(&along, rows, nearest, |a, b| if a < b { a } else { b });
+        fold_four(&self.depths, texels, &mut along, |a, b| if a > b { a } else { b });
+        fold_four(&along, rows, furthest, |a, b| if a > b { a } else { b });
     }
 
-    /// Whether anything may cast on points between `low` and `high`, cm across the light.
+    /// Whether a caster may shade points between `low` and `high`, cm perpendicular to the light.
     pub fn reaches(&self, low: [f32; 2], high: [f32; 2]) -> bool {
         if self.is_empty {
             return false;
         }
         let ends = |k: usize| {
             let [from, to] = [low[k], high[k]].map(|v| (v - self.origin[k]) * self.texels_per_cm);
-            let around = MARGIN as f32 + NEAR_RADII_CM[1] * self.texels_per_cm;
+            let around = MARGIN as f32 + OCCLUSION_RADII_CM[1] * self.texels_per_cm;
             let first = (from - around).max(0.0) as usize / CELL;
-            // A negative end leaves nothing.
+            // A negative end gives an empty range.
             let last = if to < -around { 0 } else { (to + around) as usize / CELL + 1 };
             (first, last.min(self.n.div_ceil(CELL)))
         };
@@ -176,45 +178,46 @@ impl ShadowMap {
         (rows.0..rows.1).any(|y| (columns.0..columns.1).any(|x| self.cells[y * self.n.div_ceil(CELL) + x]))
     }
 
-    /// Share of the light from all round that reaches a point in the light's axes, 0..1: less close behind something, by
-    /// how much of it stands before the point within `NEAR_RADII_CM`. It sets a hand off from the chest and the desk.
+    /// Fraction of ambient light at a point in light axes, 0..1: reduced by nearby occluders towards the light within
+    /// `OCCLUSION_RADII_CM`. This separates a hand visually from the chest and the desk.
     pub fn open_share(&self, point: [f32; 3]) -> f32 {
         if self.is_empty {
             return 1.0;
         }
         let last = (self.n - 1) as f32;
         let mut hidden = 0.0;
-        for (radius, spots) in NEAR_RADII_CM.into_iter().zip([&NEAR_SPOTS[..4], &NEAR_SPOTS[4..]]) {
-            for spot in spots {
-                let [x, y, depth] = self.texel([point[0] + radius * spot[0], point[1] + radius * spot[1], point[2]]);
+        for (radius, offsets) in OCCLUSION_RADII_CM.into_iter().zip([&OCCLUSION_OFFSETS[..4], &OCCLUSION_OFFSETS[4..]])
+        {
+            for offset in offsets {
+                let [x, y, depth] =
+                    self.texel([point[0] + radius * offset[0], point[1] + radius * offset[1], point[2]]);
                 if x >= 0.0 && y >= 0.0 && x <= last && y <= last {
                     let behind = depth - self.depths[y as i32 as usize * self.n + x as i32 as usize];
-                    if behind > NEAR_BIAS_CM + 1.2 * radius && behind < NEAR_CM {
-                        hidden += 1.0 - behind * (1.0 / NEAR_CM);
+                    if behind > OCCLUSION_BIAS_CM + 1.2 * radius && behind < OCCLUSION_RANGE_CM {
+                        hidden += 1.0 - behind * (1.0 / OCCLUSION_RANGE_CM);
                     }
                 }
             }
         }
-        1.0 - hidden * (NEAR_STRENGTH / NEAR_SPOTS.len() as f32)
+        1.0 - hidden * (OCCLUSION_STRENGTH / OCCLUSION_OFFSETS.len() as f32)
     }
 
-    /// Where in the map a point in the light's axes asks for the key light: texels across, and the distance that must be
-    /// free, cm.
+    /// Shadow query of a point in light axes, for `lit`: position in texels (twice) and biased depth, cm.
     #[inline(always)]
-    pub fn asking(&self, point: [f32; 3]) -> [f32; 3] {
+    pub fn query(&self, point: [f32; 3]) -> [f32; 3] {
         let [x, y, depth] = self.texel(point);
         [x, y, depth - self.bias]
     }
 
-    /// Share of the key light that reaches a point, 0..1, by where it asks: a tent over four by four texels.
+    /// Fraction of the key light at a shadow query, 0..1, filtered over 4 x 4 texels with a tent kernel.
     #[inline(always)]
     pub fn lit(&self, [x, y, depth]: [f32; 3]) -> f32 {
         let furthest = (self.n - 3) as f32;
-        // Also false for NaN.
+        // The condition is also false for NaN.
         if self.is_empty || !(x > 1.0 && y > 1.0 && x < furthest && y < furthest) {
             return 1.0;
         }
-        let (column, row) = (whole(x), whole(y));
+        let (column, row) = (floor(x), floor(y));
         let start = (row - 1) * self.n + column - 1;
         if depth < self.ends[0][start] {
             return 1.0;
@@ -222,24 +225,24 @@ impl ShadowMap {
         if depth >= self.ends[1][start] {
             return 0.0;
         }
-        self.lit_in_part([x - column as f32, y - row as f32], [column, row], depth)
+        self.partly_lit([x - column as f32, y - row as f32], [column, row], depth)
     }
 
-    /// Share of the key light where only some of the texels are nearer to the light.
+    /// Fraction of the key light where only some of the texels are shadowed.
     #[inline(never)]
-    fn lit_in_part(&self, [right, low]: [f32; 2], [column, row]: [usize; 2], depth: f32) -> f32 {
+    fn partly_lit(&self, [right, low]: [f32; 2], [column, row]: [usize; 2], depth: f32) -> f32 {
         let across = [1.0 - right, 1.0, 1.0, right];
         let down = [1.0 - low, 1.0, 1.0, low];
         let mut lit = [0.0f32; 4];
         for (k, share) in down.into_iter().enumerate() {
             let start = (row - 1 + k) * self.n + column - 1;
             let Some(texels) = self.depths[start..].first_chunk::<4>() else { continue };
-            let mut open = [0.0f32; 4];
+            let mut weights = [0.0f32; 4];
             for n in 0..4 {
-                open[n] = if depth < texels[n] { share } else { 0.0 };
+                weights[n] = if depth < texels[n] { share } else { 0.0 };
             }
             for n in 0..4 {
-                lit[n] += open[n];
+                lit[n] += weights[n];
             }
         }
         for n in 0..4 {
@@ -249,9 +252,9 @@ impl ShadowMap {
     }
 }
 
-/// Folds four values that stand `step` apart.
+/// Folds four values that are `step` apart.
 #[inline(always)]
-fn over_four(from: &[f32], step: usize, to: &mut [f32], fold: impl Fn(f32, f32) -> f32) {
+fn fold_four(from: &[f32], step: usize, to: &mut [f32], fold: impl Fn(f32, f32) -> f32) {
     let n = from.len() - 3 * step;
     let [a, b, c, d] = [0, 1, 2, 3].map(|k| &from[k * step..][..n]);
     for (at, to) in to[..n].iter_mut().enumerate() {
@@ -259,25 +262,25 @@ fn over_four(from: &[f32], step: usize, to: &mut [f32], fold: impl Fn(f32, f32) 
     }
 }
 
-/// Whole part of a number from 1 to 2^22; a whole number itself may give the one below, next to which it lies as well.
+/// Integer part of a number from 1 to 2^22; for an integer, the result may be one less, which the filter tolerates.
 #[inline(always)]
-fn whole(v: f32) -> usize {
-    // In sums with 2^23 the lowest bits are the number, rounded.
+fn floor(v: f32) -> usize {
+    // In the sum with 2^23 the lowest mantissa bits hold the rounded number.
     ((v - 0.5 + (1 << 23) as f32).to_bits() & 0x7f_ffff) as usize
 }
 
-/// Twice the area of a triangle across the light; positive where it faces the light.
+/// Twice the signed area of a triangle projected along the light; positive if it faces the light.
 fn area([a, b, c]: &[[f32; 3]; 3]) -> f32 {
     (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
 }
 
-/// Offset along the normal at which a surface asks for its shadow, cm: it keeps curved surfaces from shading themselves.
+/// Offset of shadow queries along the normal, cm, which prevents self-shadowing of curved surfaces.
 pub const NORMAL_OFFSET_CM: f32 = 0.5;
 
-/// A point in the light's axes where a surface asks for its shadow.
+/// The point, in light axes, at which a surface queries its shadow.
 #[inline(always)]
-pub fn asking_point(light: &Light, axes: &[[f32; 3]; 3], point: [f32; 3], normal: [f32; 3]) -> [f32; 3] {
-    // Further out where the light grazes.
+pub fn query_point(light: &Light, axes: &[[f32; 3]; 3], point: [f32; 3], normal: [f32; 3]) -> [f32; 3] {
+    // The offset grows at grazing angles.
     let by = NORMAL_OFFSET_CM * (1.5 - dot(normal, light.to_key).abs());
-    ShadowMap::seen(axes, [point[0] + by * normal[0], point[1] + by * normal[1], point[2] + by * normal[2]])
+    ShadowMap::light_space(axes, [point[0] + by * normal[0], point[1] + by * normal[1], point[2] + by * normal[2]])
 }

@@ -1,19 +1,19 @@
-//! sRGB bytes and linear light, by tables that are made with exactly specified arithmetic (no power function of the
-//! system), so that a picture has the same bytes on every machine.
+//! Conversion between sRGB bytes and linear light by tables. They are computed with exactly rounded operations only
+//! (without the system's power function), so that images are identical on every machine.
 
 use std::sync::LazyLock;
 
-/// Steps of the encoding table; one is at most 0.4 of a byte apart from its neighbour.
+/// Number of steps of the encoding table; adjacent steps differ by at most 0.4 of a byte.
 const N_STEPS: usize = 8192;
-/// Entries of the table: as many as the bits that are looked at hold, so that none is outside it.
+/// Number of table entries: a power of two, so that the masked index is always in range.
 const N_ENTRIES: usize = 1 << 14;
-/// Linear value from which on highlights are compressed.
+/// Linear value above which highlights are compressed.
 const SHOULDER: f32 = 0.6;
 
 static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|byte| decoded(byte as f64 / 255.0) as f32));
 
 static BYTES: LazyLock<[u8; N_ENTRIES]> = LazyLock::new(|| {
-    // The byte whose range, between the middles to its neighbours, holds the value.
+    // The nearest byte; `bound` is the midpoint to the next one.
     let bound = |byte: u32| decoded((f64::from(byte) + 0.5) / 255.0);
     let mut byte = 0;
     std::array::from_fn(|step| {
@@ -24,7 +24,7 @@ static BYTES: LazyLock<[u8; N_ENTRIES]> = LazyLock::new(|| {
     })
 });
 
-/// Both tables at hand.
+/// Both conversion tables.
 #[derive(Clone, Copy)]
 pub struct Srgb {
     linear: &'static [f32; 256],
@@ -36,19 +36,19 @@ impl Srgb {
         Self { linear: &LINEAR, bytes: &BYTES }
     }
 
-    /// Bytes of linear RGB (the fourth number is none); values outside 0..1 have the byte of the nearest end.
+    /// sRGB bytes of linear RGB; the fourth component is ignored and values are clamped to 0..1.
     #[inline(always)]
     pub fn bytes(self, linear: [f32; 4]) -> [u8; 3] {
-        self.bytes_of(steps(linear))
+        self.bytes_from_steps(steps(linear))
     }
 
-    /// Bytes of linear RGB as steps of the table.
+    /// sRGB bytes of table steps.
     #[inline(always)]
-    pub fn bytes_of(self, [r, g, b, _]: Steps) -> [u8; 3] {
+    pub fn bytes_from_steps(self, [r, g, b, _]: Steps) -> [u8; 3] {
         [r, g, b].map(|step| self.bytes[step.to_bits() as usize % N_ENTRIES])
     }
 
-    /// Linear light of the bytes of a pixel.
+    /// Linear RGB of an sRGB pixel; the fourth component is 0.
     #[inline(always)]
     pub fn linears(self, bytes: [u8; 3]) -> [f32; 4] {
         let [r, g, b] = bytes.map(|byte| self.linear[usize::from(byte)]);
@@ -56,20 +56,20 @@ impl Srgb {
     }
 }
 
-/// Sums with numbers up to a quarter of 2^16 are rounded to whole ones, which stand in the lowest bits.
-const WHOLE: f32 = (1 << 23) as f32;
+/// Adding this number rounds a value below 2^14 to an integer in the lowest mantissa bits.
+const ROUNDING: f32 = (1 << 23) as f32;
 
-/// Linear RGB in steps of the table of bytes, which the lowest bits of the numbers hold.
+/// Linear RGB as indices of the byte table, in the lowest mantissa bits.
 pub type Steps = [f32; 4];
 
-/// Steps of linear RGB; values outside 0..1 have those of the nearest end.
+/// Table steps of linear RGB; values are clamped to 0..1.
 #[inline(always)]
 pub fn steps(linear: [f32; 4]) -> Steps {
     let mut steps = linear;
     for step in &mut steps {
         *step *= N_STEPS as f32;
     }
-    // Also 0 for NaN.
+    // NaN also becomes 0.
     for step in &mut steps {
         *step = if *step > 0.0 { *step } else { 0.0 };
     }
@@ -77,12 +77,12 @@ pub fn steps(linear: [f32; 4]) -> Steps {
         *step = if *step < N_STEPS as f32 { *step } else { N_STEPS as f32 };
     }
     for step in &mut steps {
-        *step += WHOLE;
+        *step += ROUNDING;
     }
     steps
 }
 
-/// Linear light 0..1 for a scene's linear light, which has no upper end: equal up to the shoulder, then less and less.
+/// Tone mapping of unbounded linear light to 0..1: the identity up to `SHOULDER`, then a smooth roll-off.
 #[inline(always)]
 pub fn compressed(scene: [f32; 4]) -> [f32; 4] {
     let mut all = scene;
@@ -99,7 +99,7 @@ fn decoded(encoded: f64) -> f64 {
     if encoded <= 0.04045 {
         return encoded / 12.92;
     }
-    // x^2.4 = x^2 times the fifth root of x^2, which Newton's method finds from above.
+    // x^2.4 is x^2 times its fifth root, to which Newton's method converges from above.
     let x = (encoded + 0.055) / 1.055;
     let square = x * x;
     let mut root = 1.0;
@@ -115,7 +115,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bytes_come_back_and_the_curve_is_that_of_the_standard() {
+    fn bytes_round_trip_and_the_curve_is_the_standard_one() {
         let srgb = Srgb::tables();
         for byte in 0..=255 {
             assert_eq!(srgb.bytes(srgb.linears([byte, 0, byte])), [byte, 0, byte]);
@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn the_shoulder_never_turns_back() {
+    fn tone_mapping_is_strictly_increasing() {
         let values: Vec<f32> = (0..400).map(|n| compressed([n as f32 / 100.0; 4])[1]).collect();
         assert!(values.windows(2).all(|pair| pair[0] < pair[1]) && values.iter().all(|v| *v < 1.0));
     }

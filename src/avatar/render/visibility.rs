@@ -1,17 +1,17 @@
-//! Which triangles a picture shows: its bands one after the other, outer sides before inner ones.
+//! Visible triangles of an image, found band by band, with triangles that show their outer side first.
 
 use super::samples::{BAND_ROWS, RowBand};
 use super::surfaces::{SurfaceTriangle, Surfaces};
 
-/// Memory of the search for what is seen.
+/// Buffers of the visibility search.
 #[derive(Clone, Debug)]
 pub struct VisibleTriangles {
     size: [usize; 2],
     band: RowBand,
-    /// Numbers of the triangles of each band, outer sides before inner ones, and where those of each band and side end.
+    /// Triangle indices of each band, outer sides before inner ones, and the end of the range for each band and side.
     numbers: Vec<u32>,
     ends: Vec<usize>,
-    /// First column of each band's triangles and the one after the last.
+    /// Range of columns that the triangles of each band cover.
     columns: Vec<[u16; 2]>,
 }
 
@@ -22,12 +22,12 @@ impl VisibleTriangles {
         Self { size, band: RowBand::new(size[0]), numbers: Vec::new(), ends, columns }
     }
 
-    /// Calls `each` with every band that has triangles, its rows and its columns; `behind` is the nearness of what the
-    /// picture shows without them.
+    /// Calls `each` with every band that has triangles, its rows and its columns; `background` is the inverse depth of
+    /// the background.
     pub fn visit(
         &mut self,
         surfaces: &Surfaces,
-        behind: Option<&[[f32; 4]]>,
+        background: Option<&[[f32; 4]]>,
         mut each: impl FnMut(&RowBand, [usize; 2], [usize; 2]),
     ) {
         self.sort(surfaces);
@@ -40,14 +40,14 @@ impl VisibleTriangles {
                 continue;
             }
             let rows = [number * BAND_ROWS, ((number + 1) * BAND_ROWS).min(self.size[1])];
-            self.band.open(rows, columns, behind);
+            self.band.reset(rows, columns, background);
             for &number in outer {
                 let outer = &surfaces.triangles[number as usize];
                 self.band.fill(&surfaces.flat(outer), outer.extent, number);
             }
-            // Nearly all inner sides are hidden, which their cells tell at once.
+            // Nearly all inner sides are hidden, which the cells detect cheaply.
             if !inner.is_empty() {
-                self.band.close_cells(columns);
+                self.band.update_cells(columns);
             }
             for &number in inner {
                 let inner = &surfaces.triangles[number as usize];
@@ -60,7 +60,7 @@ impl VisibleTriangles {
         }
     }
 
-    /// Sorts the triangles by band and side; one that reaches into several bands stands in each.
+    /// Sorts the triangles by band and side; a triangle that overlaps several bands is listed in each.
     fn sort(&mut self, surfaces: &Surfaces) {
         let bands = |rows: [u16; 2]| usize::from(rows[0]) / BAND_ROWS..usize::from(rows[1]).div_ceil(BAND_ROWS);
         self.ends.fill(0);
@@ -74,7 +74,7 @@ impl VisibleTriangles {
         }
         let mut sum = 0;
         for end in &mut self.ends {
-            // For now where the side begins.
+            // The entry holds the start of the range until the loop below has filled it.
             (*end, sum) = (sum, sum + *end);
         }
         self.numbers.clear();

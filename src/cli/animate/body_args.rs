@@ -1,4 +1,4 @@
-//! Options of `orator animate` about trunk, head and legs, and of smoothing.
+//! Options of `orator animate` for trunk, head and legs, and for smoothing.
 
 use super::input::InputMotion;
 use anyhow::{Result, ensure};
@@ -45,7 +45,7 @@ impl BodyArgs {
         !self.no_breath
     }
 
-    /// Options with the legs that were asked for, else those of the person seen.
+    /// Options with the legs that were requested, or else those of the person in the input.
     pub(super) fn of(&self, input: &InputMotion, options: &AnimationOptions) -> AnimationOptions {
         let legs = match self.legs {
             Some(LegsName::Seated) => Legs::Seated,
@@ -57,7 +57,7 @@ impl BodyArgs {
         AnimationOptions { legs, ..*options }
     }
 
-    /// The posture as far as it is asked for.
+    /// The parts of the posture that the options retain.
     pub(super) fn posture(&self, posture: Option<Posture>) -> Option<Posture> {
         let mut posture = posture?;
         if self.neutral_head {
@@ -86,7 +86,10 @@ enum SmoothingKind {
 }
 
 impl SmoothingArgs {
-    /// The smoothing that was asked for. Errors: a strength out of its range, or of another kind of smoothing.
+    /// The requested smoothing.
+    ///
+    /// # Errors
+    /// A strength that is out of range or does not belong to the kind of smoothing.
     pub(super) fn smoothing(&self) -> Result<Smoothing> {
         let strength = self.smoothing_strength;
         ensure!(

@@ -1,4 +1,4 @@
-//! Options of `orator animate` that say how a film shows bodies.
+//! Options of `orator animate` for films of bodies.
 
 use orator_avatar::animate::export::film_avatar::FilmCamera;
 
@@ -28,12 +28,12 @@ impl FilmArgs {
         }
     }
 
-    /// Whether the avatar stands before the video.
+    /// Whether the avatar is drawn over the video.
     pub(super) fn is_over_video(&self) -> bool {
         self.camera == CameraName::Source
     }
 
-    /// Whether a camera other than the default was named.
+    /// Whether a camera other than the default was given.
     pub(super) fn is_given(&self) -> bool {
         self.camera != CameraName::Front
     }

@@ -1,4 +1,4 @@
-//! Which motions `orator animate` is given, and what is beside them: face keypoints, sound.
+//! Input motions of `orator animate`, with their face keypoints and audio.
 
 use anyhow::{Context as _, Result, bail, ensure};
 use ndarray::{Array3, ArrayView3};
@@ -28,20 +28,20 @@ enum InputLocation {
     Sample(Rc<Dataset>, Box<SampleRef>),
 }
 
-/// A motion with what is beside it.
+/// A motion with its posture and audio.
 pub struct InputMotion {
     pub motion: Motion,
     pub posture: Option<Posture>,
-    /// Whether the person sits, where hips and knees are seen.
+    /// Whether the person sits; `None` if hips and knees were not detected.
     pub is_seated: Option<bool>,
     pub sound: Option<Sound>,
-    /// Whether its rate is its own, or given; else assumed.
+    /// Whether its frame rate is known from the file or given; otherwise it is assumed.
     pub has_rate: bool,
-    /// What had to be assumed to read it, sentences.
+    /// Assumptions made when reading it, as sentences.
     pub notes: Vec<String>,
 }
 
-/// The motions meant by a file, a lifted video's or a speaker's folder, a folder of motions, or a dataset.
+/// The motions denoted by a file, the folder of a lifted video or a speaker, a folder of motions, or a dataset.
 pub fn inputs(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result<Vec<MotionInput>> {
     ensure!(path.exists(), "{} is not there", path.display());
     let is_dataset = path.join("info.json").is_file() && path.join("index.jsonl").is_file();
@@ -61,8 +61,8 @@ pub fn inputs(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result
         return Ok(vec![file(path.to_owned(), path)]);
     }
     if Artifact::Joints.within(path).is_file() {
-        let whole = path.canonicalize().with_context(|| format!("cannot open {}", path.display()))?;
-        return Ok(vec![file(Artifact::Joints.within(path), &whole)]);
+        let absolute = path.canonicalize().with_context(|| format!("cannot open {}", path.display()))?;
+        return Ok(vec![file(Artifact::Joints.within(path), &absolute)]);
     }
     let (mut found, mut bvh) = (Vec::new(), Vec::new());
     for entry in std::fs::read_dir(path).with_context(|| format!("cannot open {}", path.display()))? {
@@ -74,7 +74,7 @@ pub fn inputs(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result
             if is_bvh { &mut bvh } else { &mut found }.push(file(entry.clone(), &entry));
         }
     }
-    // BVH files beside joints are what was made of them.
+    // BVH files next to joints were created from them.
     if found.is_empty() {
         found = bvh;
     }
@@ -118,7 +118,7 @@ fn of_dataset(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result
 }
 
 impl MotionInput {
-    /// Whether this is that file.
+    /// Whether the motion is read from that file.
     pub fn is_at(&self, path: &Path) -> bool {
         match &self.location {
             InputLocation::File(file) => {
@@ -128,16 +128,20 @@ impl MotionInput {
         }
     }
 
-    /// Reads the motion; `fps` is what its user says to be its rate. `keypoints` is where the face is from, else what a run
-    /// or a dataset has.
+    /// Reads the motion; `fps` is the frame rate given by the user. `keypoints` is the file of face keypoints; without
+    /// it those of the run or the dataset are used.
     pub fn read(&self, fps: Option<FrameRate>, keypoints: Option<&Path>) -> Result<InputMotion> {
-        let take = match &self.location {
+        let loaded = match &self.location {
             InputLocation::Sample(dataset, sample) => {
                 let sample = dataset.read(sample)?;
                 let body = sample.pose2d.slice(ndarray::s![.., ..N_BODY, ..]).to_owned();
-                let seen = InputMotion::seen(sample.motion, body.view(), None);
-                // A dataset's own angles are those of the whole video.
-                InputMotion { sound: Some(sample.sound), posture: sample.posture.or(seen.posture), ..seen }
+                let with_posture = InputMotion::with_keypoints(sample.motion, body.view(), None);
+                // The angles of a dataset were computed on the complete video.
+                InputMotion {
+                    sound: Some(sample.sound),
+                    posture: sample.posture.or(with_posture.posture),
+                    ..with_posture
+                }
             }
             InputLocation::File(path) => {
                 let MotionFile { motion, has_rate, notes } = motion_file::read_at(path, fps)?;
@@ -145,22 +149,22 @@ impl MotionInput {
                 InputMotion { motion, posture: None, is_seated: None, sound: None, has_rate, notes }
             }
         };
-        check(&take.motion).with_context(|| format!("no animation of {}", self.name))?;
-        match self.keypoints(keypoints, &take.motion)? {
+        check(&loaded.motion).with_context(|| format!("no animation of {}", self.name))?;
+        match self.keypoints(keypoints, &loaded.motion)? {
             Some(Keypoints { body, .. }) => {
-                let InputMotion { motion, sound, has_rate, notes, .. } = take;
+                let InputMotion { motion, sound, has_rate, notes, .. } = loaded;
                 Ok(InputMotion {
                     sound,
                     has_rate,
                     notes,
-                    ..InputMotion::seen(motion, body.view(), self.extra()?.as_ref())
+                    ..InputMotion::with_keypoints(motion, body.view(), self.extra()?.as_ref())
                 })
             }
-            None => Ok(take),
+            None => Ok(loaded),
         }
     }
 
-    /// The keypoints of a file, else of the run that a lifted video belongs to.
+    /// The keypoints of a file, or else of the run to which a lifted video belongs.
     pub fn keypoints(&self, named: Option<&Path>, motion: &Motion) -> Result<Option<Keypoints>> {
         let path = named.map(Path::to_owned).or_else(|| self.of_run(Artifact::Keypoints));
         path.map(|path| read_keypoints(&path, motion)).transpose()
@@ -176,12 +180,13 @@ impl MotionInput {
         }
     }
 
-    /// The sound of the run that a lifted video belongs to.
+    /// The audio of the run to which a lifted video belongs.
     pub fn sound_of_run(&self) -> Option<PathBuf> {
         self.of_run(Artifact::Sound)
     }
 
-    /// `work/lift/SPEAKER/VIDEO/joints.npz` has its keypoints at `work/pose2d/SPEAKER/VIDEO/keypoints.npz`, and so on.
+    /// Path of an artifact in the run: `work/lift/SPEAKER/VIDEO/joints.npz` has its keypoints at
+    /// `work/pose2d/SPEAKER/VIDEO/keypoints.npz`, and so on.
     fn of_run(&self, file: Artifact) -> Option<PathBuf> {
         let InputLocation::File(path) = &self.location else { return None };
         let folder = path.canonicalize().ok()?.parent()?.to_owned();
@@ -194,8 +199,8 @@ impl MotionInput {
 }
 
 impl InputMotion {
-    /// Motion of a person of whom keypoints [T, 17, 3], perhaps nose and hips [T, 3, 3] in 3D, are known.
-    fn seen(motion: Motion, body: ArrayView3<f32>, extra: Option<&Array3<f32>>) -> Self {
+    /// Motion of a person with known keypoints [T, 17, 3] and optionally nose and hips [T, 3, 3] in 3D.
+    fn with_keypoints(motion: Motion, body: ArrayView3<f32>, extra: Option<&Array3<f32>>) -> Self {
         let lifted = LiftedBody { joints: Some(motion.joints.view()), extra: extra.map(|extra| extra.view()) };
         let posture = Some(posture::estimate(body, lifted));
         let is_seated = posture::is_seated(body);
@@ -215,7 +220,7 @@ fn read_keypoints(path: &Path, motion: &Motion) -> Result<Keypoints> {
     Ok(keypoints)
 }
 
-/// That there is something to animate, in metres.
+/// Checks that the motion has frames and is in metres.
 fn check(motion: &Motion) -> Result<()> {
     ensure!(motion.n_frames() > 0, "it has no frames");
     units::arm_bone(motion)

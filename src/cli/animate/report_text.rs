@@ -1,8 +1,8 @@
 //! Report of an animation as text.
 
-use orator_avatar::animate::performance::{AnimationReport, Jerk, SeenFrames};
+use orator_avatar::animate::performance::{AnimationReport, DetectedFrames, Jerk};
 
-/// Lines on jerk, head, seen frames and clamped angles.
+/// Lines about jerk, head, detected frames and clamped angles.
 pub(super) fn text(report: &AnimationReport) -> String {
     let number = |jerk: Option<f64>| jerk.map_or("-".to_owned(), |jerk| format!("{jerk:.0}"));
     let jerk = |jerk: Jerk| format!("{} -> {}", number(jerk.before), number(jerk.after));
@@ -11,7 +11,7 @@ pub(super) fn text(report: &AnimationReport) -> String {
         Some(n) if n > 0 => format!("head: seen in {n} of {} frames\n", report.n_frames),
         _ => "head: at rest\n".to_owned(),
     };
-    text += &seen(report);
+    text += &detected(report);
     let clamped: Vec<_> = report.clamps.iter().filter(|clamps| clamps.joint_frames > 0).collect();
     match (report.clamps.is_empty(), clamped.is_empty()) {
         (true, _) => text += "no constraints\n",
@@ -31,9 +31,9 @@ pub(super) fn text(report: &AnimationReport) -> String {
     text
 }
 
-/// What was not seen in all frames; nothing when all was.
-fn seen(report: &AnimationReport) -> String {
-    let SeenFrames { left_arm, right_arm, left_hand, right_hand } = report.seen;
+/// Parts of the body that were not detected in all frames; empty if all were.
+fn detected(report: &AnimationReport) -> String {
+    let DetectedFrames { left_arm, right_arm, left_hand, right_hand } = report.seen;
     let arms = match left_arm == right_arm {
         true => vec![("arms", left_arm)],
         false => vec![("left arm", left_arm), ("right arm", right_arm)],

@@ -1,4 +1,4 @@
-//! Options of `orator animate` that put the motion on a skeleton of the user's own.
+//! Options of `orator animate` for retargeting to a user's own skeleton.
 
 use crate::cli::outputs::OutputFiles;
 use crate::cli::ui::Ui;
@@ -25,10 +25,10 @@ pub(super) struct RetargetArgs {
     write_bone_map: Option<PathBuf>,
 }
 
-/// A user's skeleton, opened.
+/// The opened skeleton of a user.
 pub(super) struct OpenedRig {
     rig: RetargetRig,
-    /// Text of the map and where it is from; `None`: by names.
+    /// Text of the bone map and its path; `None` to match bones by name.
     map: Option<(String, PathBuf)>,
     write_map: Option<PathBuf>,
 }
@@ -39,7 +39,7 @@ impl RetargetArgs {
         [&self.retarget, &self.bone_map].into_iter().flatten().map(PathBuf::as_path)
     }
 
-    /// Files that are written beside the outputs.
+    /// Files that are written in addition to the outputs.
     pub(super) fn writes(&self) -> Option<&Path> {
         self.write_bone_map.as_deref()
     }
@@ -59,14 +59,14 @@ impl RetargetArgs {
 }
 
 impl OpenedRig {
-    /// Writes the performance on the skeleton; says which bones were found.
+    /// Writes the performance on the skeleton and prints which bones were found.
     pub(super) fn write(&self, performance: &Performance, outputs: &OutputFiles, ui: &Ui) -> Result<()> {
         outputs.iter().try_for_each(|(path, _)| self.rig.check_output(path))?;
         let ours = &performance.rig.skeleton;
         let map = match &self.map {
             Some((text, path)) => BoneMap::parse(text, self.rig.rig(), ours)
                 .with_context(|| format!("{} maps no bones", path.display()))?,
-            None => BoneMap::found(self.rig.rig())?,
+            None => BoneMap::detect(self.rig.rig())?,
         };
         let text = map.text(self.rig.rig(), ours);
         if let Some(path) = &self.write_map {

@@ -7,9 +7,9 @@ use super::report_text;
 use super::retarget_args::{OpenedRig, RetargetArgs};
 use crate::cli::Outcome;
 use crate::cli::config_args::split;
-use crate::cli::confine::confine;
 use crate::cli::figure_args::FigureArgs;
 use crate::cli::outputs::{OutputFiles, names, next_output, outputs};
+use crate::cli::sandbox::enter_sandbox;
 use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, bail, ensure};
 use clap::ArgAction;
@@ -107,12 +107,12 @@ pub struct Args {
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let written = args.out.iter().map(PathBuf::as_path).chain(args.retarget.writes());
-    confine(written, [args.input.as_path()].into_iter().chain(args.retarget.reads()));
+    enter_sandbox(written, [args.input.as_path()].into_iter().chain(args.retarget.reads()));
     let options = options(&args)?;
     let rig = args.retarget.open()?;
     let inputs = inputs(&args.input, args.sample.as_deref(), args.split)?;
     if !args.format.is_empty() {
-        return whole_folder(&args, &inputs, rig.as_ref(), &options, ui);
+        return animate_folder(&args, &inputs, rig.as_ref(), &options, ui);
     }
     let [input] = inputs.as_slice() else {
         bail!(
@@ -145,8 +145,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Every motion of a folder or dataset; one that fails does not stop the others.
-fn whole_folder(
+/// Animates every motion of a folder or dataset; a failure does not stop the others.
+fn animate_folder(
     args: &Args,
     inputs: &[MotionInput],
     rig: Option<&OpenedRig>,
@@ -190,7 +190,7 @@ fn whole_folder(
     Ok(if n_failed > 0 { Outcome::SomeFailed } else { Outcome::Done })
 }
 
-/// Errors on an option that changes nothing in these outputs.
+/// Rejects options that have no effect on these outputs.
 fn check_effect(args: &Args, outputs: &OutputFiles) -> Result<()> {
     let is_film = outputs.iter().any(|&(_, format)| format == ExportFormat::Mp4);
     let (beside, audio) = (args.beside.is_some(), args.audio.is_some());
@@ -200,8 +200,8 @@ fn check_effect(args: &Args, outputs: &OutputFiles) -> Result<()> {
     args.figure.check(outputs)
 }
 
-/// The report on one animation, for people and for programs.
-struct Done {
+/// Report on one animation, as text and as JSON.
+struct AnimationSummary {
     text: String,
     facts: Value,
 }
@@ -213,10 +213,10 @@ fn animate(
     outputs: &OutputFiles,
     options: &AnimationOptions,
     ui: &Ui,
-) -> Result<Done> {
-    let taken = input.read(args.in_fps, args.keypoints.as_deref())?;
-    let options = &args.body.of(&taken, options);
-    let InputMotion { motion, posture, sound: own, has_rate, mut notes, .. } = taken;
+) -> Result<AnimationSummary> {
+    let loaded = input.read(args.in_fps, args.keypoints.as_deref())?;
+    let options = &args.body.of(&loaded, options);
+    let InputMotion { motion, posture, sound: own, has_rate, mut notes, .. } = loaded;
     let (sound, posture) = (sound.or(own), args.body.posture(posture));
     let started = Instant::now();
     let performance = perform(&motion, posture.as_ref(), options);
@@ -250,7 +250,7 @@ fn animate(
     let is_film = outputs.iter().any(|&(_, format)| format == ExportFormat::Mp4);
     let motion_secs = motion.fps.secs(motion.n_frames());
     let of_file = |path: &Path, from_secs: f64| -> Result<Option<Sound>> {
-        Ok(audio::read_mono(path, SAMPLE_RATE)?.map(|whole| part(&whole, from_secs, motion_secs)))
+        Ok(audio::read_mono(path, SAMPLE_RATE)?.map(|sound| part(&sound, from_secs, motion_secs)))
     };
     let sound = match (sound, beside) {
         (None, SecondPanel::Video { path, from_secs, .. }) if is_film => of_file(path, from_secs)?,
@@ -303,10 +303,10 @@ fn animate(
         "film_has_sound": is_film.then_some(sound.is_some()),
         "outputs": names(outputs),
     });
-    Ok(Done { text, facts })
+    Ok(AnimationSummary { text, facts })
 }
 
-/// Camera of the video that the motion was lifted from, where a film is to be seen from there.
+/// Camera of the video from which the motion was lifted, if the film is to be rendered from there.
 fn source(args: &Args, input: &MotionInput, motion: &Motion) -> Result<Option<SourceCamera>> {
     if !args.film.is_over_video() {
         return Ok(None);
@@ -330,8 +330,8 @@ fn options(args: &Args) -> Result<AnimationOptions> {
     Ok(AnimationOptions { smoothing, constraints, yaw, legs: Legs::default(), breath, fps })
 }
 
-/// The part of a sound from a second on, as much as there is of `secs`.
-fn part(whole: &Sound, from_secs: f64, secs: f64) -> Sound {
-    let at = |secs: f64| ((secs * f64::from(whole.rate)).round() as usize).min(whole.samples.len());
-    Sound { rate: whole.rate, samples: whole.samples[at(from_secs)..at(from_secs + secs)].to_vec() }
+/// Up to `secs` seconds of a sound from second `from_secs` on.
+fn part(sound: &Sound, from_secs: f64, secs: f64) -> Sound {
+    let at = |secs: f64| ((secs * f64::from(sound.rate)).round() as usize).min(sound.samples.len());
+    Sound { rate: sound.rate, samples: sound.samples[at(from_secs)..at(from_secs + secs)].to_vec() }
 }

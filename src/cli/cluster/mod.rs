@@ -1,4 +1,4 @@
-//! Many machines on one work folder: `plan`, `work`, `submit`, and `status --plan`.
+//! Verbs for many machines on one work folder: `plan`, `work`, `submit`, and `status --plan`.
 
 pub(super) mod plan;
 pub(super) mod submit;

@@ -1,8 +1,8 @@
-//! `orator plan`, and how far its workers are.
+//! `orator plan`, and the progress of its workers.
 
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
-use crate::cli::confine::this_program;
+use crate::cli::sandbox::this_program;
 use crate::cli::ui::Ui;
 use anyhow::{Context, Result, bail};
 use orator_base::stage::artifacts::StageName;
@@ -46,7 +46,7 @@ pub(crate) struct Args {
     untimed: bool,
 }
 
-/// Reads a plan and the pipeline it is of, and checks that they still belong together.
+/// Reads a plan and its pipeline, and checks that they still match.
 pub(crate) fn open(path: &Path) -> Result<(ClusterPlan, Pipeline)> {
     let plan = ClusterPlan::read(path)?;
     let config = config::load(&plan.config, &plan.sets)?;
@@ -69,7 +69,7 @@ pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         let request = MediaRequest { source: path.to_owned(), excerpt: None };
         pipeline.ask_media(&request).ok().flatten()
     };
-    // What is being forgotten is not planned meanwhile.
+    // The shared lock prevents `orator forget` from running at the same time.
     let lock = FolderLock::shared(work).context("no plan now")?;
     let plan = ClusterPlan::new(&pipeline, &args.config.set, &this_program(), &secs, 60.0 * args.piece, ui)?;
     plan.write(&out)?;
@@ -83,12 +83,12 @@ pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let mut facts = json!({ "plan": out, "units": plan.units.len(), "hours": hours, "next": next });
     if !args.untimed && !lengths.is_empty() {
         let times = times(&pipeline, &videos, ui)?;
-        lines.extend(told(&times, &lengths));
+        lines.extend(prediction_lines(&times, &lengths));
         facts["stages"] = stages(&times, &lengths);
         facts["peak_mib"] = json!(times.peak_mib);
         let mut wall = |workers: usize| {
             let secs = times.wall_secs(&lengths, workers);
-            lines.push(format!("{:<13}done in {}", counted(workers, "worker"), length(secs)));
+            lines.push(format!("{:<13}done in {}", counted(workers, "worker"), format_duration(secs)));
             facts["wall_secs"][workers.to_string()] = json!(secs);
         };
         let workers: BTreeSet<usize> = [1, times.jobs].into_iter().chain(args.workers).collect();
@@ -100,7 +100,7 @@ pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
                 Some(n) => format!("within {hours} h {} are done", counted(n, "worker")),
                 None => format!(
                     "within {hours} h no number of workers is done: the longest piece alone takes {}",
-                    length(times.wall_secs(&lengths, usize::MAX))
+                    format_duration(times.wall_secs(&lengths, usize::MAX))
                 ),
             });
         }
@@ -110,7 +110,7 @@ pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// The times on record where they count for this program, these settings and this machine, else new ones.
+/// The saved stage times if they are valid for this program, these settings and this machine; otherwise measures them.
 fn times(pipeline: &Pipeline, units: &[PlannedUnit], ui: &Ui) -> Result<StageTimes> {
     let (work, jobs) = (&pipeline.config().settings.work.dir, pipeline.jobs(None));
     let made_with = timing::made_with(pipeline, &this_program(), jobs)?;
@@ -122,11 +122,11 @@ fn times(pipeline: &Pipeline, units: &[PlannedUnit], ui: &Ui) -> Result<StageTim
     Ok(times)
 }
 
-fn told(times: &StageTimes, lengths: &[f64]) -> Vec<String> {
-    let whole: f64 = lengths.iter().sum();
+fn prediction_lines(times: &StageTimes, lengths: &[f64]) -> Vec<String> {
+    let total_secs: f64 = lengths.iter().sum();
     let stage = |stage: StageName| {
-        let gib = times.cost(stage).bytes_per_sec * whole / f64::from(1 << 30);
-        format!("{stage:9}{:>10} of work{gib:8.2} GiB of files", length(times.stage_secs(stage, lengths)))
+        let gib = times.cost(stage).bytes_per_sec * total_secs / f64::from(1 << 30);
+        format!("{stage:9}{:>10} of work{gib:8.2} GiB of files", format_duration(times.stage_secs(stage, lengths)))
     };
     let mut lines: Vec<String> = StageName::ALL.map(stage).into();
     let StageTimes { excerpt_secs, jobs, processor, .. } = times;
@@ -137,16 +137,16 @@ fn told(times: &StageTimes, lengths: &[f64]) -> Vec<String> {
 }
 
 fn stages(times: &StageTimes, lengths: &[f64]) -> Value {
-    let whole: f64 = lengths.iter().sum();
+    let total_secs: f64 = lengths.iter().sum();
     let stage = |stage: StageName| {
-        let bytes = times.cost(stage).bytes_per_sec * whole;
+        let bytes = times.cost(stage).bytes_per_sec * total_secs;
         (stage.to_string(), json!({ "work_secs": times.stage_secs(stage, lengths), "bytes": bytes }))
     };
     StageName::ALL.map(stage).into_iter().collect::<serde_json::Map<String, Value>>().into()
 }
 
-/// A length of time as people say it.
-fn length(secs: f64) -> String {
+/// A duration in readable units.
+fn format_duration(secs: f64) -> String {
     match secs {
         ..100.0 => format!("{secs:.0} s"),
         ..6000.0 => format!("{:.0} min", secs / 60.0),
@@ -154,38 +154,38 @@ fn length(secs: f64) -> String {
     }
 }
 
-/// Prints how far the workers of a plan are: `orator status --plan`.
+/// Prints the progress of the workers of a plan: `orator status --plan`.
 pub(crate) fn show_progress(path: &Path, ui: &Ui) -> Result<Outcome> {
     let plan = ClusterPlan::read(path)?;
-    let told = progress(&plan, path, DEAD_AFTER)?;
-    let next = match told.n_done + told.n_failed == told.n_units {
-        true if told.n_failed > 0 => format!("orator work --plan {} --retry", path.display()),
+    let summary = progress(&plan, path, DEAD_AFTER)?;
+    let next = match summary.n_done + summary.n_failed == summary.n_units {
+        true if summary.n_failed > 0 => format!("orator work --plan {} --retry", path.display()),
         true => plan.datasets_command("orator"),
         false => format!("orator work --plan {}", path.display()),
     };
-    let mut facts = json!(told);
+    let mut facts = json!(summary);
     facts["next"] = json!(next);
-    ui.summary(&progress_text(&told), Some(&next), facts);
+    ui.summary(&progress_text(&summary), Some(&next), facts);
     Ok(Outcome::Done)
 }
 
-fn progress_text(told: &PlanProgress) -> String {
+fn progress_text(progress: &PlanProgress) -> String {
     let hours = |secs: f64| secs / 3600.0;
-    let PlanProgress { n_units, n_done, n_failed, n_claimed, n_left_by_dead, n_taken_over, .. } = told;
-    let n_free = n_units - n_done - n_failed - n_claimed - n_left_by_dead - told.blocked.len();
+    let PlanProgress { n_units, n_done, n_failed, n_claimed, n_left_by_dead, n_taken_over, .. } = progress;
+    let n_free = n_units - n_done - n_failed - n_claimed - n_left_by_dead - progress.blocked.len();
     let mut lines = vec![format!(
         "{n_units} units: {n_done} done, {n_failed} failed, {n_claimed} in work, {n_left_by_dead} left by dead workers, \
          {n_free} free; {n_taken_over} taken over"
     )];
-    let left = told.secs_left.map_or("unknown".to_owned(), |secs| format!("{:.2} h", hours(secs)));
-    let (ended, all) = (hours(told.ended_media_secs), hours(told.media_secs));
+    let left = progress.secs_left.map_or("unknown".to_owned(), |secs| format!("{:.2} h", hours(secs)));
+    let (ended, all) = (hours(progress.ended_media_secs), hours(progress.media_secs));
     lines.push(format!("{ended:.2} of {all:.2} h of video; time left at this pace: {left}"));
     lines.extend(
-        told.blocked.iter().map(|file| format!("blocked by {}: no worker wrote it; remove it", file.display())),
+        progress.blocked.iter().map(|file| format!("blocked by {}: no worker wrote it; remove it", file.display())),
     );
-    lines.extend(told.stopped.iter().map(|reason| format!("all workers have stopped: {reason}")));
-    lines.extend(told.workers.iter().map(worker));
-    lines.extend(told.failures.iter().map(|(reason, units)| {
+    lines.extend(progress.stopped.iter().map(|reason| format!("all workers have stopped: {reason}")));
+    lines.extend(progress.workers.iter().map(worker));
+    lines.extend(progress.failures.iter().map(|(reason, units)| {
         let first = units.first().map(String::as_str).unwrap_or_default();
         format!("failed  {} x {reason} ({first})", units.len())
     }));

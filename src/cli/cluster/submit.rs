@@ -30,7 +30,7 @@ enum To {
     Ssh(SshArgs),
 }
 
-/// Longest time of a worker where nothing is known of the work, hours.
+/// Default time limit of a worker if the work was not timed, hours.
 const UNKNOWN_HOURS: f64 = 12.0;
 
 /// What every kind of job needs.
@@ -130,15 +130,15 @@ pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 }
 
 impl JobArgs {
-    /// The plan, its work folder, and what its jobs are made of.
+    /// Reads the plan; returns it with its work folder and the request for its jobs.
     fn request(&self) -> Result<(ClusterPlan, PathBuf, JobRequest)> {
         let (plan, pipeline) = open(&self.plan)?;
         let work = pipeline.config().settings.work.dir.clone();
         ensure!(self.tasks > 0 && self.cores > 0, "tasks and cores must be more than 0");
         let n_at_once = self.at_once.unwrap_or(self.tasks);
         let lengths: Vec<f64> = plan.videos().iter().filter_map(|video| video.secs).collect();
-        let foretold = StageTimes::read(&work).map(|times| times.limit_hours(&lengths, n_at_once * self.cores));
-        let hours = self.hours.or(foretold).unwrap_or(UNKNOWN_HOURS);
+        let predicted = StageTimes::read(&work).map(|times| times.limit_hours(&lengths, n_at_once * self.cores));
+        let hours = self.hours.or(predicted).unwrap_or(UNKNOWN_HOURS);
         ensure!(hours > 0.0, "hours must be more than 0");
         let program = match &self.program {
             Some(program) => program.clone(),
@@ -168,7 +168,7 @@ impl JobArgs {
 }
 
 impl SlurmArgs {
-    /// What a training may use; none: there is none.
+    /// Resource limits of a training; `None` if no training is requested.
     fn training(&self) -> Result<Option<TaskLimits>> {
         let limits = TaskLimits { cores: self.train_cores, memory_gib: self.train_memory, hours: self.train_hours };
         ensure!(limits.cores > 0 && limits.hours > 0.0, "cores and hours of a training must be more than 0");
@@ -185,7 +185,7 @@ fn to_slurm(args: &SlurmArgs, ui: &Ui) -> Result<Outcome> {
     };
     std::fs::create_dir_all(&folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
     let settings = SlurmSettings { max_array, logs: &folder, options: &args.options };
-    let made = slurm::scripts(&request, &plan, &work, &settings, args.training()?);
+    let scripts = slurm::scripts(&request, &plan, &work, &settings, args.training()?);
     let write = |name: String, script: &String| -> Result<PathBuf> {
         let file = folder.join(name);
         workdir::write_file(&file, script.as_bytes())?;
@@ -194,18 +194,18 @@ fn to_slurm(args: &SlurmArgs, ui: &Ui) -> Result<Outcome> {
     let numbered = |name: &str, scripts: &[String]| -> Result<Vec<PathBuf>> {
         scripts.iter().enumerate().map(|(n, script)| write(format!("{name}-{n}.sh"), script)).collect()
     };
-    let arrays = numbered("array", &made.arrays)?;
-    let last = write("last.sh".to_owned(), &made.last)?;
-    let trainings = numbered("train", &made.trainings)?;
+    let arrays = numbered("array", &scripts.arrays)?;
+    let last = write("last.sh".to_owned(), &scripts.last)?;
+    let trainings = numbered("train", &scripts.trainings)?;
     let mut ids = Vec::new();
     if !args.job.dry_run {
         for file in &arrays {
             ids.push(sbatch(&[], file)?);
         }
-        // After a task that was cancelled or lost too: what it had is in the last job's hands then.
+        // This includes tasks that were cancelled or lost: the last job processes their units.
         let after = |ids: &[String]| format!("--dependency=afterany:{}", ids.join(":"));
         ids.push(sbatch(&[&after(&ids)], &last)?);
-        // Some videos may have failed: a dataset that is not there or not sound stops a training.
+        // Some videos may have failed; a missing or invalid dataset stops its training.
         let datasets = after(&ids[arrays.len()..]);
         for file in &trainings {
             ids.push(sbatch(&[&datasets], file)?);
@@ -213,7 +213,14 @@ fn to_slurm(args: &SlurmArgs, ui: &Ui) -> Result<Outcome> {
     }
     let files: Vec<PathBuf> = arrays.into_iter().chain([last]).chain(trainings).collect();
     let text = match args.job.dry_run {
-        true => made.arrays.iter().chain([&made.last]).chain(&made.trainings).cloned().collect::<Vec<_>>().join("\n"),
+        true => scripts
+            .arrays
+            .iter()
+            .chain([&scripts.last])
+            .chain(&scripts.trainings)
+            .cloned()
+            .collect::<Vec<_>>()
+            .join("\n"),
         false => {
             let trainings = if args.train { ", a training of each speaker" } else { "" };
             format!("sent {} workers, a last job{trainings}: {}", request.n_tasks, ids.join(", "))
@@ -224,7 +231,7 @@ fn to_slurm(args: &SlurmArgs, ui: &Ui) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// MaxArraySize of the cluster: indices are below it.
+/// The cluster's MaxArraySize; array indices are below it.
 fn max_array_size() -> Option<usize> {
     let folder = empty_folder().ok()?;
     let out = command_in(folder.path(), Path::new("scontrol")).ok()?.args(["show", "config"]).output().ok()?;
@@ -233,7 +240,7 @@ fn max_array_size() -> Option<usize> {
     line.split('=').nth(1)?.trim().parse().ok()
 }
 
-/// The program of that name in the absolute folders of PATH, in whose place a file of the working directory never comes.
+/// The program of that name in the absolute folders of PATH, so that a file of the working directory is never run.
 fn installed(name: &str) -> Option<PathBuf> {
     let folders = std::env::var_os("PATH")?;
     let files = std::env::split_paths(&folders).filter(|folder| folder.is_absolute()).map(|folder| folder.join(name));
@@ -241,7 +248,7 @@ fn installed(name: &str) -> Option<PathBuf> {
     files.into_iter().find(|file| file.metadata().is_ok_and(is_program))
 }
 
-/// Sends a script; the number of its job. The working directory is that of the job as well, so sbatch keeps it.
+/// Submits a script and returns the id of its job. The working directory is that of the job too, so sbatch inherits it.
 fn sbatch(options: &[&str], script: &Path) -> Result<String> {
     let program = installed("sbatch").context("there is no sbatch; --dry-run writes the scripts without it")?;
     let out = Command::new(program).arg("--parsable").args(options).arg(script).output();
@@ -249,7 +256,7 @@ fn sbatch(options: &[&str], script: &Path) -> Result<String> {
     if !out.status.success() {
         bail!("sbatch refused {}: {}", script.display(), String::from_utf8_lossy(&out.stderr).trim());
     }
-    // JOB, or JOB;CLUSTER.
+    // The output is JOB or JOB;CLUSTER.
     let id = String::from_utf8_lossy(&out.stdout).trim().split(';').next().unwrap_or_default().to_owned();
     Ok(id)
 }
@@ -298,7 +305,8 @@ fn to_ssh(args: &SshArgs, ui: &Ui) -> Result<Outcome> {
     }
     let folder = empty_folder()?;
     let start = |host: &String| {
-        // Without a terminal, a worker whose connection is lost works on; its end is seen in the plan's folder.
+        // Without a terminal, a worker continues if its connection is lost; its result is visible in the folder of the
+        // plan.
         let child = command_in(folder.path(), Path::new("ssh"))?
             .args(["-o", "BatchMode=yes", host, &line])
             .stdin(Stdio::null())
@@ -310,7 +318,7 @@ fn to_ssh(args: &SshArgs, ui: &Ui) -> Result<Outcome> {
     let mut bad = Vec::new();
     for (host, mut worker) in workers {
         let status = worker.wait().with_context(|| format!("ssh to {host} is lost"))?;
-        // 2: some units failed, of which the status tells.
+        // Exit code 2 means that some units failed, which `status` reports.
         if !matches!(status.code(), Some(0 | 2)) {
             bad.push(format!("{host}: {status}"));
         }

@@ -61,7 +61,7 @@ pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         beat: secs(args.beat),
         dead_after: secs(args.dead_after),
     };
-    ui.listens_for_stop(
+    ui.enable_stop_requests(
         "stopping after this unit; the next signal ends at once",
         "every stage of a video that is done is kept, and the same command goes on from there",
     );

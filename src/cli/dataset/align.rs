@@ -1,7 +1,7 @@
 //! `orator align`.
 
 use crate::cli::Outcome;
-use crate::cli::confine::confine;
+use crate::cli::sandbox::enter_sandbox;
 use crate::cli::ui::Ui;
 use anyhow::{Context, Result, ensure};
 use orator_base::stage::progress::Progress;
@@ -12,7 +12,7 @@ use orator_media::aligner::Aligner;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Words that do not fit and are named in the summary.
+/// Maximum number of unaligned words that the summary lists.
 const SHOWN: usize = 8;
 
 /// Find the word times of an English transcript by forced alignment.
@@ -38,7 +38,7 @@ pub struct Args {
     python: Option<PathBuf>,
 }
 
-/// The Python that aligns, where the command line names none.
+/// The Python interpreter used for alignment if the command line names none.
 pub fn default_python() -> PathBuf {
     let named = std::env::var_os("ORATOR_PYTHON").filter(|name| !name.is_empty());
     named.map_or_else(|| "python3".into(), PathBuf::from)
@@ -51,7 +51,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         |path: &Path| path.canonicalize().is_ok_and(|path| args.out.canonicalize().is_ok_and(|out| out == path));
     ensure!(!is_same(&args.transcript) && !is_same(&args.sound), "--out names what is read, {}", args.out.display());
     let aligner = Aligner::start(&args.python.unwrap_or_else(default_python))?;
-    confine([args.out.as_path()], []);
+    enter_sandbox([args.out.as_path()], []);
     let transcript = Transcript::read(&args.transcript)?;
     if !transcript.words.is_empty() {
         transcript.notes.iter().for_each(|note| ui.say(&format!("{}: {note}", args.transcript.display())));

@@ -41,7 +41,7 @@ pub struct Args {
     dry_run: bool,
 }
 
-/// What is to be done, and where the search looks.
+/// What to remove, and where to search for remains.
 struct ForgetTask {
     removals: Vec<Removal>,
     titles: Vec<String>,
@@ -51,7 +51,7 @@ struct ForgetTask {
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    // Until the search is over, nobody brings anything back.
+    // The locks are held until the search is over, so that no other process recreates anything.
     let mut locks = Vec::new();
     let task = match &args.dataset {
         Some(dir) => of_dataset(dir, args.video.as_deref().unwrap_or_default(), args.dry_run, &mut locks)?,
@@ -74,7 +74,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     }
     let terms: Vec<_> = task.removals.iter().flat_map(|removal| removal.terms.clone()).collect();
     let mut searched = search(&task.folders, &terms).context("nothing is proved")?;
-    // A model that is kept lists what it learnt from; it is named as kept.
+    // A retained model lists its training videos; it is reported as retained instead.
     searched.places.retain(|place| !kept.iter().any(|model| Path::new(&place.file).starts_with(model)));
     let mut text = match lines.is_empty() {
         true => vec![format!("nothing of {what} was there")],
@@ -102,13 +102,13 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     Ok(if places.is_empty() { Outcome::Done } else { Outcome::Wrong })
 }
 
-/// What to say of a folder that others work with.
-const NOT_NOW: &str = "nothing was forgotten; what is at work would bring it back";
+/// Error context if a folder is in use.
+const IN_USE: &str = "nothing was forgotten; what is at work would bring it back";
 
 fn of_dataset(dir: &Path, wanted: &str, dry_run: bool, locks: &mut Vec<FolderLock>) -> Result<ForgetTask> {
     let dir = std::path::absolute(dir)?;
     if !dry_run {
-        locks.push(FolderLock::exclusive(&dir).context(NOT_NOW)?);
+        locks.push(FolderLock::exclusive(&dir).context(IN_USE)?);
     }
     let all = known::of_dataset(&dir)?;
     let video = known::one(&all, wanted, None)?;
@@ -130,13 +130,13 @@ fn of_project(args: &Args, locks: &mut Vec<FolderLock>) -> Result<ForgetTask> {
     let work = &config.settings.work.dir;
     let is_locked = !args.dry_run && work.exists();
     if is_locked {
-        locks.push(workdir::lock(work).context(NOT_NOW)?);
-        locks.push(FolderLock::exclusive(work).context(NOT_NOW)?);
+        locks.push(workdir::lock(work).context(IN_USE)?);
+        locks.push(FolderLock::exclusive(work).context(IN_USE)?);
         for entry in std::fs::read_dir(work.join(StageName::Dataset.as_str())).into_iter().flatten().flatten() {
             let name = entry.file_name().to_string_lossy().into_owned();
             let hidden = name.strip_prefix('.').and_then(|name| name.strip_suffix(".old"));
             if let Some(speaker) = hidden.or(Some(&*name).filter(|name| !name.starts_with('.'))) {
-                // A killed forget may have left a video there that nothing else knows any more.
+                // A killed `forget` may have left a video there that is recorded nowhere else.
                 workdir::recover_folder(&speaker_dir(work, StageName::Dataset, speaker))?;
             }
         }
@@ -155,7 +155,7 @@ fn of_project(args: &Args, locks: &mut Vec<FolderLock>) -> Result<ForgetTask> {
             .chain(&models_dirs(work, &speaker))
             .filter(|folder| folder.parent().is_some_and(Path::exists))
         {
-            locks.push(FolderLock::exclusive(folder).context(NOT_NOW)?);
+            locks.push(FolderLock::exclusive(folder).context(IN_USE)?);
         }
     }
     let others: Vec<&KnownVideo> = all.iter().filter(|k| !videos.contains(k)).collect();
@@ -164,7 +164,7 @@ fn of_project(args: &Args, locks: &mut Vec<FolderLock>) -> Result<ForgetTask> {
     if is_locked {
         let own = models_dirs(work, &speaker);
         for folder in removal.models.iter().filter(|folder| !own.contains(folder)) {
-            locks.push(FolderLock::exclusive(folder).context(NOT_NOW)?);
+            locks.push(FolderLock::exclusive(folder).context(IN_USE)?);
         }
     }
     let mut advice: Vec<String> = Vec::new();
@@ -180,13 +180,13 @@ fn of_project(args: &Args, locks: &mut Vec<FolderLock>) -> Result<ForgetTask> {
             format!("{} has the same content and stays: forget it too, if it shows the same", twin.title())
         }));
     }
-    advice.extend(how_to_keep_away(&config, &speaker, &videos, whole));
+    advice.extend(prevention_advice(&config, &speaker, &videos, whole));
     let titles = if whole { vec![speaker] } else { videos.iter().map(|video| video.title()).collect() };
     Ok(ForgetTask { titles, removals: vec![removal], folders: vec![work.clone()], advice })
 }
 
-/// What keeps the next run from bringing the videos back; nothing, where it would not.
-fn how_to_keep_away(config: &Config, speaker: &str, gone: &[&KnownVideo], whole: bool) -> Option<String> {
+/// Advice that prevents the next run from recreating the videos; `None` if it would not.
+fn prevention_advice(config: &Config, speaker: &str, gone: &[&KnownVideo], whole: bool) -> Option<String> {
     let named =
         videos::of(config).into_iter().filter(|videos| videos.speaker == speaker).flat_map(|videos| videos.units);
     let back: Vec<PathBuf> =

@@ -1,7 +1,7 @@
 //! `orator import`.
 
 use crate::cli::Outcome;
-use crate::cli::confine::confine;
+use crate::cli::sandbox::enter_sandbox;
 use crate::cli::ui::Ui;
 use anyhow::{Result, ensure};
 use clap::ValueEnum;
@@ -80,17 +80,21 @@ enum ImportKind {
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    confine([args.out.as_path()], args.sources.iter().chain([&args.out]).map(PathBuf::as_path));
+    enter_sandbox([args.out.as_path()], args.sources.iter().chain([&args.out]).map(PathBuf::as_path));
     let plan = plan(&args)?;
     let out = std::path::absolute(&args.out)?;
     let _lock = FolderLock::exclusive(&out)?;
-    let taken = workdir::has_files(&out);
+    let is_occupied = workdir::has_files(&out);
     ensure!(
-        !taken || args.force,
+        !is_occupied || args.force,
         "{} is not empty; choose another folder, or --force replaces the dataset",
         out.display()
     );
-    ensure!(!taken || out.join(INFO).is_file(), "{} holds no dataset, so --force does not replace it", out.display());
+    ensure!(
+        !is_occupied || out.join(INFO).is_file(),
+        "{} holds no dataset, so --force does not replace it",
+        out.display()
+    );
     for source in &args.sources {
         let inside = out.exists() && out.starts_with(std::path::absolute(source)?);
         ensure!(!inside, "{} lies in {}, which is imported; choose another folder", out.display(), source.display());
@@ -161,7 +165,7 @@ pub fn verify_deep(dataset: &Path) -> String {
     format!("orator dataset verify --deep {}", dataset.display())
 }
 
-/// The command that trains on a dataset anywhere.
+/// The command that trains on a dataset in any folder.
 pub fn train_gan(dataset: &Path) -> String {
     format!("orator train gan --dataset {0} --out {0}-gan", dataset.display())
 }

@@ -1,4 +1,4 @@
-//! The verbs of a dataset: `dataset`, `import`, `forget`, `align`.
+//! Verbs for datasets: `dataset`, `import`, `forget`, `align`.
 
 pub mod align;
 pub mod forget;

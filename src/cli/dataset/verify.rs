@@ -1,8 +1,8 @@
-//! `orator dataset`: what is in a dataset, and whether it is what was written.
+//! `orator dataset`: contents and integrity of a dataset.
 
 use super::import::{train_gan, verify_deep};
 use crate::cli::Outcome;
-use crate::cli::confine::confine;
+use crate::cli::sandbox::enter_sandbox;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator_dataset::config::SplitUnit;
@@ -40,7 +40,7 @@ enum DatasetVerb {
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let (DatasetVerb::Verify { dir, .. } | DatasetVerb::Info { dir }) = &args.verb;
-    confine([], [dir.as_path()]);
+    enter_sandbox([], [dir.as_path()]);
     match args.verb {
         DatasetVerb::Verify { dir, deep } => check(&dir, deep, ui),
         DatasetVerb::Info { dir } => info(&dir, ui),

@@ -1,9 +1,9 @@
-//! `orator evaluate`, and `compare` of two results.
+//! `orator evaluate`, and its verb `compare` for two results.
 
 use crate::cli::Outcome;
 use crate::cli::config_args::split;
-use crate::cli::confine::confine;
 use crate::cli::moved::MovedVerb;
+use crate::cli::sandbox::enter_sandbox;
 use crate::cli::ui::Ui;
 use anyhow::{Result, bail, ensure};
 use orator_base::stage::workdir::{self, FolderLock};
@@ -91,7 +91,7 @@ struct MotionArgs {
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let MotionArgs { report, dataset, checkpoint, .. } = &args.motion;
-    confine(report.as_deref(), dataset.iter().chain(checkpoint).map(PathBuf::as_path));
+    enter_sandbox(report.as_deref(), dataset.iter().chain(checkpoint).map(PathBuf::as_path));
     match args.what {
         Some(What::Lifter(args)) => args.refuse("evaluate lifter"),
         Some(What::Compare(args)) => compare_results(&args, ui),
@@ -105,7 +105,7 @@ fn convention(name: &str) -> std::result::Result<Convention, String> {
     known.map_err(|error: serde::de::value::Error| error.to_string())
 }
 
-/// The page is a page, and none of what is read.
+/// Checks that the report is an HTML file and does not overwrite an input.
 fn check_report(args: &MotionArgs) -> Result<()> {
     let Some(path) = &args.report else { return Ok(()) };
     let is_page = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("html"));
@@ -116,7 +116,7 @@ fn check_report(args: &MotionArgs) -> Result<()> {
 
 fn motion(args: &MotionArgs, ui: &Ui) -> Result<Outcome> {
     check_report(args)?;
-    // The folder of a dataset is one that this process writes in (its lock is there).
+    // The folder of a dataset is writable in the sandbox because it contains the dataset's lock.
     let in_dataset = |folder: &PathBuf| MotionStore::in_folder(folder, HELD_BYTES);
     let store = args.dataset.as_ref().map_or_else(MotionStore::in_memory, in_dataset);
     let settings = MetricSettings {
@@ -125,7 +125,7 @@ fn motion(args: &MotionArgs, ui: &Ui) -> Result<Outcome> {
         with_neck: args.with_neck,
         ..MetricSettings::default()
     };
-    // The page names what was read, so that nothing of it is forgotten before the page is written.
+    // The page lists its inputs, so the locks prevent `orator forget` from removing them before the page is written.
     let _dataset = args.dataset.as_deref().map(FolderLock::shared).transpose()?;
     let _models: Vec<FolderLock> = args.checkpoint.iter().map(|path| model_lock(path)).collect::<Result<_>>()?;
     let evaluation = evaluation(args, &store, ui)?;
@@ -143,7 +143,7 @@ fn motion(args: &MotionArgs, ui: &Ui) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// What is measured, in a few words: names, no folders of this machine.
+/// Title of the evaluation: names of the inputs without folders of this machine.
 fn title(args: &MotionArgs) -> String {
     let name = |path: &PathBuf| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     match (&args.dataset, &args.prediction) {
@@ -155,7 +155,7 @@ fn title(args: &MotionArgs) -> String {
     }
 }
 
-/// What is measured, from files or from a dataset.
+/// The evaluation of files or of a dataset.
 fn evaluation(args: &MotionArgs, store: &MotionStore, ui: &Ui) -> Result<Evaluation> {
     if let Some(dataset) = &args.dataset {
         let dataset = Dataset::open(dataset)?;

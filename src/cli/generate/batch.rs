@@ -1,7 +1,7 @@
-//! Many sounds to motions in one call.
+//! Motion for many audio files in one call.
 
 use crate::cli::Outcome;
-use crate::cli::confine::confine;
+use crate::cli::sandbox::enter_sandbox;
 use crate::cli::signals;
 use crate::cli::ui::Ui;
 use anyhow::Result;
@@ -9,13 +9,13 @@ use orator_base::stage::counted;
 use orator_gesture::batch::{BatchReport, BatchState, SpeechBatch};
 use serde_json::json;
 
-/// Sounds of the closing table at most, failures not counted.
-const MOST_LISTED: usize = 30;
+/// Maximum number of files in the final table, not counting failures.
+const MAX_LISTED: usize = 30;
 
 pub fn run(batch: &SpeechBatch, ui: &Ui) -> Result<Outcome> {
     let checkpoints = batch.sounds.iter().filter_map(|sound| sound.checkpoint.as_deref());
-    confine([batch.folder.as_path()], checkpoints.chain(batch.checkpoint.as_deref()));
-    signals::tell_when_stopped("every sound that is done is kept, and the same command goes on from there");
+    enter_sandbox([batch.folder.as_path()], checkpoints.chain(batch.checkpoint.as_deref()));
+    signals::exit_on_signal("every sound that is done is kept, and the same command goes on from there");
     let report = batch.run(ui)?;
     ui.summary(&text(&report), None, json!(report));
     Ok(if report.failed > 0 { Outcome::SomeFailed } else { Outcome::Done })
@@ -35,7 +35,7 @@ fn text(report: &BatchReport) -> String {
             }
         };
         n_listed += 1;
-        if n_listed <= MOST_LISTED {
+        if n_listed <= MAX_LISTED {
             let note = facts("note").as_str().map_or(String::new(), |note| format!("  note: {note}"));
             text += &format!(
                 "{:width$}  {word:10}  {:8.1} s {:7} frames  {}{note}\n",
@@ -46,8 +46,8 @@ fn text(report: &BatchReport) -> String {
             );
         }
     }
-    if n_listed > MOST_LISTED {
-        text += &format!("and {} more\n", n_listed - MOST_LISTED);
+    if n_listed > MAX_LISTED {
+        text += &format!("and {} more\n", n_listed - MAX_LISTED);
     }
     let BatchReport { made, fresh, failed, out_folder, sounds } = report;
     let sounds = counted(sounds.len(), "sound");

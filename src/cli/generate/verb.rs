@@ -1,10 +1,10 @@
-//! `orator generate`: one sound to files (here), or a folder or table of sounds (`batch`).
+//! `orator generate`: one audio file (here), or a folder or table of them (`batch`).
 
 use super::batch;
 use crate::cli::Outcome;
-use crate::cli::confine::confine;
 use crate::cli::figure_args::FigureArgs;
-use crate::cli::outputs::{OutputFiles, is_same_file, names, next_output, of_take, outputs};
+use crate::cli::outputs::{OutputFiles, is_same_file, names, next_output, outputs, variant_path};
+use crate::cli::sandbox::enter_sandbox;
 use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, bail, ensure};
 use orator_base::stage::progress::Progress as _;
@@ -77,9 +77,9 @@ pub struct Args {
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let Some(audio) = &args.audio else { return batch::run(&batch(args)?, ui) };
-    let takes = takes(&args);
-    let files: Vec<Vec<PathBuf>> = takes.iter().map(|take| take.files(&args.out)).collect();
-    confine(files.iter().flatten().map(PathBuf::as_path), args.checkpoint.as_deref());
+    let variants = variants(&args);
+    let files: Vec<Vec<PathBuf>> = variants.iter().map(|variant| variant.files(&args.out)).collect();
+    enter_sandbox(files.iter().flatten().map(PathBuf::as_path), args.checkpoint.as_deref());
     let Some(given) = &args.checkpoint else { bail!("give --checkpoint") };
     let outputs: Vec<OutputFiles> = files
         .iter()
@@ -93,19 +93,20 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let _lock = model_lock(&checkpoint)?;
     let (seams, figure) = (seams(args.carry_state), args.figure.options());
     let source = SpeechSource { audio, transcript: args.transcript.as_deref(), seams, figure };
-    let mut made = Vec::new();
-    for (take, outputs) in takes.iter().zip(&outputs) {
-        let choice = GenerationChoice { speaker: args.speaker.clone(), seed: take.seed };
+    let mut results = Vec::new();
+    for (variant, outputs) in variants.iter().zip(&outputs) {
+        let choice = GenerationChoice { speaker: args.speaker.clone(), seed: variant.seed };
         let trained = TrainedSpeaker::open_as(&checkpoint, &choice)?;
-        made.push((motion_files::write(&trained, &source, outputs, ui)?, trained));
+        results.push((motion_files::write(&trained, &source, outputs, ui)?, trained));
     }
-    let Some((written, trained)) = made.first() else { bail!("no take was asked for") };
-    let speed = written.secs * made.len() as f64 / made.iter().map(|made| made.0.motion_secs).sum::<f64>().max(1e-6);
+    let Some((written, trained)) = results.first() else { bail!("no take was asked for") };
+    let speed =
+        written.secs * results.len() as f64 / results.iter().map(|result| result.0.motion_secs).sum::<f64>().max(1e-6);
     let names: Vec<String> = outputs.iter().flat_map(names).collect();
     let note = written.note.as_ref().map_or(String::new(), |note| format!("note: {note}\n"));
-    let n_takes = if made.len() > 1 { format!("{} takes of ", made.len()) } else { String::new() };
+    let n_variants = if results.len() > 1 { format!("{} takes of ", results.len()) } else { String::new() };
     let text = format!(
-        "{n_takes}{:.1} s of speech, {} frames of {} at {}, {speed:.0} x real time\n{note}{}wrote {}",
+        "{n_variants}{:.1} s of speech, {} frames of {} at {}, {speed:.0} x real time\n{note}{}wrote {}",
         written.secs,
         written.n_frames,
         trained.name(),
@@ -113,16 +114,17 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         written.segments.as_ref().map(segments).unwrap_or_default(),
         names.join(", ")
     );
-    let said = args.transcript.as_ref().map_or(String::new(), |path| format!(" --transcript {}", path.display()));
-    let said = args.speaker.as_ref().map_or(said.clone(), |name| format!("{said} --speaker {name}"));
+    let flags = args.transcript.as_ref().map_or(String::new(), |path| format!(" --transcript {}", path.display()));
+    let flags = args.speaker.as_ref().map_or(flags.clone(), |name| format!("{flags} --speaker {name}"));
     let carried = if args.carry_state { " --carry-state" } else { "" };
-    let seed = takes.first().and_then(|take| take.seed).map_or(String::new(), |seed| format!(" --seed {seed}"));
-    // A captured skeleton is written as .bvh alone.
+    let seed =
+        variants.first().and_then(|variant| variant.seed).map_or(String::new(), |seed| format!(" --seed {seed}"));
+    // Motion on a captured skeleton can be written as .bvh only.
     let next = outputs.first().and_then(next_output).filter(|_| !trained.is_captured()).map(|out| {
         let (checkpoint, audio, out) = (given.display(), audio.display(), out.display());
-        format!("orator generate --checkpoint {checkpoint} --audio {audio}{said}{carried}{seed} --out {out}")
+        format!("orator generate --checkpoint {checkpoint} --audio {audio}{flags}{carried}{seed} --out {out}")
     });
-    let seeds: Vec<Option<u64>> = takes.iter().map(|take| take.seed).collect();
+    let seeds: Vec<Option<u64>> = variants.iter().map(|variant| variant.seed).collect();
     let facts = json!({
         "audio_secs": written.secs,
         "n_frames": written.n_frames,
@@ -140,35 +142,35 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// A take of the speech.
-struct Take {
-    /// `None`: the network as it was trained.
+/// A variant of the motion for one speech.
+struct Variant {
+    /// Seed of the variant; `None` for the complete network.
     seed: Option<u64>,
-    /// From 1, where there are several.
+    /// Number from 1 if there are several variants.
     number: Option<usize>,
 }
 
-impl Take {
-    /// Files of this take.
+impl Variant {
+    /// Output files of this variant.
     fn files(&self, out: &[PathBuf]) -> Vec<PathBuf> {
-        let file = |path: &PathBuf| self.number.map_or_else(|| path.clone(), |number| of_take(path, number));
+        let file = |path: &PathBuf| self.number.map_or_else(|| path.clone(), |number| variant_path(path, number));
         out.iter().map(file).collect()
     }
 }
 
-/// The takes asked for.
-fn takes(args: &Args) -> Vec<Take> {
+/// The requested variants.
+fn variants(args: &Args) -> Vec<Variant> {
     match (args.seed, args.variants) {
-        (seed, None) => vec![Take { seed, number: None }],
+        (seed, None) => vec![Variant { seed, number: None }],
         (seed, Some(n)) => {
             let first = seed.unwrap_or(1);
-            let take = |i: u64| Take { seed: Some(first.wrapping_add(i)), number: Some(i as usize + 1) };
-            (0..n).map(take).collect()
+            let variant = |i: u64| Variant { seed: Some(first.wrapping_add(i)), number: Some(i as usize + 1) };
+            (0..n).map(variant).collect()
         }
     }
 }
 
-/// Lines on seams, and on the words that were read.
+/// Lines about jumps at segment boundaries, and about the words of the transcript.
 fn segments(facts: &SegmentFacts) -> String {
     let SegmentFacts { state, seam_jump: [raw, smoothed], other_seam_jump: [other_raw, other_smoothed], words } = facts;
     let other = match state {

@@ -1,7 +1,7 @@
 //! `orator lift`.
 
 use crate::cli::Outcome;
-use crate::cli::confine::confine;
+use crate::cli::sandbox::enter_sandbox;
 use crate::cli::ui::Ui;
 use anyhow::{Context, Result, bail, ensure};
 use orator_avatar::animate::export::file::ExportFormat;
@@ -67,7 +67,8 @@ fn size(text: &str) -> Result<[u32; 2], String> {
     config::image_size(text).ok_or_else(|| "expected width and height in pixels, like 1280x720".to_owned())
 }
 
-/// Whether the file is one of this program's; of a `.npz` file that cannot be opened its reader says why.
+/// Whether the file has this program's format. An unreadable `.npz` file counts as such, so that its reader reports
+/// why.
 fn is_ours(path: &Path) -> bool {
     match Npz::open(path) {
         Ok(npz) => npz.has("body"),
@@ -75,8 +76,8 @@ fn is_ours(path: &Path) -> bool {
     }
 }
 
-/// Keypoints of ours, with what is to be said of them.
-fn ours(args: &Args) -> Result<(Keypoints, Vec<String>)> {
+/// Reads keypoints in this program's format, with notes for the user.
+fn read_own(args: &Args) -> Result<(Keypoints, Vec<String>)> {
     let (mut keypoints, mut notes) = keypoints_npz::read_sized(&args.keypoints, args.size)?;
     range::check_pixels(range::coordinates(&keypoints)).with_context(|| args.keypoints.display().to_string())?;
     if let Some(fps) = args.fps {
@@ -86,8 +87,8 @@ fn ours(args: &Args) -> Result<(Keypoints, Vec<String>)> {
     Ok((keypoints, notes))
 }
 
-/// Keypoints of another program at their own rate, with what is to be said of them.
-fn taken(args: &Args) -> Result<(Keypoints, Vec<String>)> {
+/// Reads keypoints of another program at their own frame rate, with notes for the user.
+fn read_foreign(args: &Args) -> Result<(Keypoints, Vec<String>)> {
     let file = args.keypoints.display();
     let found = keypoints::read(&args.keypoints)?;
     let fps = args.fps.or(found.fps);
@@ -101,13 +102,13 @@ fn taken(args: &Args) -> Result<(Keypoints, Vec<String>)> {
         }
         None => bail!("{file}: it does not say its picture's size; give it with --size, like --size 1280x720"),
     };
-    let taken = take_in(found, fps, size, fps)?;
-    notes.extend(taken.notes);
-    Ok((taken.keypoints, notes))
+    let imported = take_in(found, fps, size, fps)?;
+    notes.extend(imported.notes);
+    Ok((imported.keypoints, notes))
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    confine([Some(&args.out), args.extra.as_ref()].into_iter().flatten().map(PathBuf::as_path), []);
+    enter_sandbox([Some(&args.out), args.extra.as_ref()].into_iter().flatten().map(PathBuf::as_path), []);
     let format = ExportFormat::from_path(&args.out).ok().filter(|format| format.holds_joints());
     let format = format.with_context(|| {
         format!("{}: joints are written as .npz, .npy or .txt; name such a file", args.out.display())
@@ -119,7 +120,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     for sigma in [args.smooth_arms, args.smooth_hands] {
         ensure!((0.0..=100.0).contains(&sigma), "a smoothing of {sigma} frames; it must lie between 0 and 100");
     }
-    let (keypoints, mut notes) = if is_ours(&args.keypoints) { ours(&args)? } else { taken(&args)? };
+    let (keypoints, mut notes) = if is_ours(&args.keypoints) { read_own(&args)? } else { read_foreign(&args)? };
     let settings = config::LiftConfig {
         body_weights: args.body_weights.unwrap_or_default(),
         hand_weights: args.hand_weights.unwrap_or_default(),

@@ -1,4 +1,4 @@
-//! The verbs of keypoints and joints: `lift`, `sheet`.
+//! Verbs for keypoints and joints: `lift`, `sheet`.
 
 pub mod lift;
 pub mod sheet;

@@ -2,7 +2,7 @@
 
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
-use crate::cli::confine::confine;
+use crate::cli::sandbox::enter_sandbox;
 use crate::cli::ui::Ui;
 use anyhow::{Result, bail, ensure};
 use orator_avatar::animate::{AnimationOptions, perform};
@@ -85,7 +85,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             of_run(&pipeline, &args)?
         }
     };
-    confine(clips.iter().map(|files| files.out.as_path()), locked.as_deref());
+    enter_sandbox(clips.iter().map(|files| files.out.as_path()), locked.as_deref());
     let (mut text, mut facts, mut n_failed, mut next) = (String::new(), Vec::new(), 0, None);
     for files in &clips {
         match draw(files, args.every, args.figure, ui) {
@@ -111,7 +111,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     Ok(if n_failed > 0 { Outcome::SomeFailed } else { Outcome::Done })
 }
 
-/// The lifted clips of a run that are asked for.
+/// The requested lifted clips of a run.
 fn of_run(pipeline: &Pipeline, args: &Args) -> Result<Vec<SheetFiles>> {
     let config = pipeline.config();
     let work = &config.settings.work.dir;
@@ -150,11 +150,11 @@ fn of_run(pipeline: &Pipeline, args: &Args) -> Result<Vec<SheetFiles>> {
     Ok(lifted)
 }
 
-/// Draws one clip; the pictures written, and its figures.
+/// Draws one clip; returns the written images and the statistics of the clip.
 fn draw(files: &SheetFiles, every_secs: f64, figure: bool, ui: &Ui) -> Result<(Vec<PathBuf>, ClipStatistics)> {
     let (keypoints, notes) = keypoints_npz::read_noting(&files.keypoints)?;
     notes.iter().for_each(|note| ui.say(&format!("{}: {note}", files.keypoints.display())));
-    // A file without a rate is taken to run as the keypoints do.
+    // A file without a frame rate is assumed to have that of the keypoints.
     let motion = motion_file::read(&files.joints, Some(keypoints.fps))?.motion;
     let figure = figure.then(|| perform(&motion, None, &AnimationOptions::default()).motion());
     let figure = figure.as_ref();
@@ -178,7 +178,7 @@ fn numbered(path: &Path, number: usize) -> PathBuf {
 
 type Row = (&'static str, &'static str, fn(&ArmStatistics) -> f64);
 
-/// Name in the table, name in JSON, value.
+/// Label in the table, key in JSON, value.
 const ROWS: [Row; 8] = [
     ("upper arm, m", "upper_arm_metres", |a| a.upper_arm_metres),
     ("forearm, m", "forearm_metres", |a| a.forearm_metres),

@@ -1,4 +1,4 @@
-//! The verbs of a project folder: `init`, `run`, `status`, `report`.
+//! Verbs for a project folder: `init`, `run`, `status`, `report`.
 
 pub mod init;
 pub mod report;

@@ -2,7 +2,7 @@
 
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
-use crate::cli::confine::confine;
+use crate::cli::sandbox::enter_sandbox;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator_base::stage::artifacts;
@@ -38,7 +38,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let (videos, settings) = (pipeline.videos(&args.speaker)?, &pipeline.config().settings);
     let _lock = FolderLock::shared(&settings.work.dir)?;
     let out = args.out.unwrap_or_else(|| settings.work.dir.join("report.html"));
-    confine([out.as_path(), &artifacts::hashes(&settings.work.dir)], [&*settings.work.dir]);
+    enter_sandbox([out.as_path(), &artifacts::hashes(&settings.work.dir)], [&*settings.work.dir]);
     let request = ReportRequest { settings, videos: &videos, n_pictures: args.pictures };
     let page = report::make(&request, ui);
     workdir::write_file(&out, page.html.as_bytes())?;

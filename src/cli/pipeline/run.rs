@@ -2,7 +2,7 @@
 
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
-use crate::cli::confine::this_program;
+use crate::cli::sandbox::this_program;
 use crate::cli::setup::models::fetch;
 use crate::cli::signals;
 use crate::cli::ui::Ui;
@@ -47,7 +47,7 @@ pub struct Args {
     force: bool,
 }
 
-/// Reads a stage's name of the command line; a former name is an alias.
+/// Parser for the name of a stage; former names are aliases.
 fn stage_parser() -> impl TypedValueParser<Value = StageName> {
     let name = |stage: StageName| PossibleValue::new(stage.as_str()).aliases(stage.former());
     PossibleValuesParser::new(StageName::ALL.map(name)).try_map(|name| name.parse::<StageName>())
@@ -63,9 +63,9 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let (from, to) = (args.from.unwrap_or(default.from), args.to.unwrap_or(default.to));
     let selection = Selection { from, to, speakers: args.speaker, jobs: args.jobs, force: args.force };
     let pipeline = Pipeline::open(args.config.load()?)?.with_processes(this_program());
-    signals::tell_when_stopped("every stage of a video that is done is kept, and the same command goes on from there");
+    signals::exit_on_signal("every stage of a video that is done is kept, and the same command goes on from there");
     let mut report = match pipeline.run(&selection, ui) {
-        Err(error) if is_missing_model(&error) && ui.asks(&format!("{error:#}\nget the models now?")) => {
+        Err(error) if is_missing_model(&error) && ui.confirm(&format!("{error:#}\nget the models now?")) => {
             let settings = &pipeline.config().settings;
             let Settings { models, pose2d, .. } = settings;
             let wanted: Vec<_> = wanted(pose2d).into_iter().chain(SpeechDetector::wanted(settings)).collect();
@@ -76,7 +76,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     };
 
     if selection.from == StageName::Dataset {
-        // The videos of a plan were worked on before: one that is gone since is missing in the dataset.
+        // Videos of a plan were processed before: one that has been removed since is missing from the dataset.
         let plan = pipeline.config().settings.work.dir.join("plan.json");
         for unit in ClusterPlan::missing_videos(&plan, &pipeline)? {
             if !selection.speakers.is_empty() && !selection.speakers.contains(&unit.speaker) {

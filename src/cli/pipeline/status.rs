@@ -3,7 +3,7 @@
 use crate::cli::Outcome;
 use crate::cli::cluster::plan::show_progress;
 use crate::cli::config_args::ConfigArgs;
-use crate::cli::confine::confine;
+use crate::cli::sandbox::enter_sandbox;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator_base::stage::artifacts;
@@ -13,7 +13,7 @@ use orator_pipeline::{Pipeline, StagePlan, StatusReport, TimeAccount, UnitState,
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Reasons of a stage's plan that are written out; `--json` has all.
+/// Maximum number of reasons shown for a stage; `--json` lists all.
 const REASONS_SHOWN: usize = 3;
 
 /// Show the state of every stage and the use of every second of video.
@@ -41,7 +41,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     }
     let pipeline = Pipeline::open(args.config.load()?)?;
     let work = &pipeline.config().settings.work.dir;
-    confine([artifacts::hashes(work).as_path()], [&**work]);
+    enter_sandbox([artifacts::hashes(work).as_path()], [&**work]);
     let report = pipeline.status(&args.speaker)?;
     let verb = if report.datasets_are_fresh() { "train gan" } else { "run" };
     let next = format!("orator {verb}{}", args.config.flags());
@@ -92,7 +92,7 @@ fn seconds(account: &TimeAccount, width: usize) -> String {
     format!("{:width$}{secs}  {}", account.of, longest_first(&account.refused)).trim_end().to_owned()
 }
 
-/// Whether all seconds add up.
+/// Line that states whether all seconds are accounted for.
 fn verdict(total: &TimeAccount) -> String {
     let unknown = match total.n_unknown {
         0 => String::new(),
@@ -104,7 +104,7 @@ fn verdict(total: &TimeAccount) -> String {
     }
 }
 
-/// What `orator run` would do at a stage, and why.
+/// What `orator run` would do for a stage, and why.
 fn plan(plan: &StagePlan) -> String {
     let StagePlan { stage, stay_fresh, would_run, because } = plan;
     let shown: Vec<&str> = because.iter().map(String::as_str).take(REASONS_SHOWN).collect();

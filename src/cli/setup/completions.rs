@@ -1,4 +1,4 @@
-//! `orator guide`, `orator completions` and `orator man`: what people, shells and `man` read about the program.
+//! `orator guide`, `orator completions` and `orator man`: documentation for users, shells and `man`.
 
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
@@ -41,7 +41,7 @@ pub struct GuideArgs {
     topic: Option<String>,
 }
 
-/// Prints the script of a shell; `command` is the program's own command line.
+/// Prints the completion script of a shell; `command` is the program's own command line.
 pub fn run(args: &Args, mut command: Command, ui: &Ui) -> Result<Outcome> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut command, "orator", &mut script);
@@ -65,7 +65,7 @@ pub fn run_man(args: &ManArgs, command: Command, ui: &Ui) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Prints a page or the list.
+/// Prints a page of the guide, or the list of pages.
 pub fn run_guide(args: &GuideArgs, ui: &Ui) -> Result<Outcome> {
     let facts = |topic: &Topic| json!({ "topic": topic.name, "summary": topic.summary });
     match TOPICS.iter().find(|topic| Some(topic.name) == args.topic.as_deref()) {

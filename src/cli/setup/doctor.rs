@@ -3,8 +3,8 @@
 use super::words;
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
-use crate::cli::confine::this_program;
 use crate::cli::dataset::align::default_python;
+use crate::cli::sandbox::this_program;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator_base::stage::workdir;
@@ -28,11 +28,11 @@ pub struct Args {
     config: ConfigArgs,
 }
 
-/// One thing looked at: what was found, or what is wrong with the command that fixes it.
+/// Result of one check: what was found, or what is missing and the command that fixes it.
 struct Check {
     name: String,
     found: Result<String, (String, String)>,
-    /// Whether what was found is all that could be there.
+    /// Whether the check found everything that can be installed.
     is_full: bool,
 }
 
@@ -88,7 +88,8 @@ fn wrong(name: &str, what: String, fix: &str) -> Check {
     Check { name: name.to_owned(), found: Err((what, fix.to_owned())), is_full: false }
 }
 
-/// How far a process that reads videos is restricted here. Where it is not, work goes on: nothing is missing.
+/// Restrictions of processes that read videos on this machine. They are optional, so nothing counts as missing without
+/// them.
 fn sandbox(is_wanted: bool) -> Check {
     let (is_active, found) = match probe(&this_program()) {
         _ if !is_wanted => (false, "not active: work.sandbox = false".to_owned()),
@@ -98,7 +99,7 @@ fn sandbox(is_wanted: bool) -> Check {
     Check { is_full: is_active, ..ok("sandbox", found) }
 }
 
-/// The aligner of words, which `orator align` alone needs: nothing is missing without it.
+/// The word aligner. Only `orator align` needs it, so nothing counts as missing without it.
 fn aligner() -> Check {
     let python = default_python();
     match Aligner::version(&python) {
@@ -110,7 +111,7 @@ fn aligner() -> Check {
     }
 }
 
-/// ONNX Runtime, and the models the configuration chooses.
+/// ONNX Runtime, and the models that the configuration selects.
 fn model_checks(settings: &Settings) -> Vec<Check> {
     let dir = &settings.models.dir;
     let runtime = match Runtime::load(&settings.models.onnxruntime, dir) {
@@ -148,7 +149,7 @@ fn model_checks(settings: &Settings) -> Vec<Check> {
     checks
 }
 
-/// Tables of word vectors. Without any, words begin as the seed makes them: nothing is missing.
+/// Tables of word vectors. Without a table, word embeddings are initialised randomly, so nothing counts as missing.
 fn word_checks(models: &Path) -> Vec<Check> {
     let tables = words::opened(models);
     if tables.is_empty() {
@@ -167,7 +168,7 @@ fn word_checks(models: &Path) -> Vec<Check> {
     tables.into_iter().map(check).collect()
 }
 
-/// The work folder: can it be written, and do locks hold there?
+/// The work folder: whether it is writable and supports locks.
 fn work(dir: &Path) -> Check {
     let existing = dir.ancestors().find(|folder| folder.exists()).unwrap_or(dir);
     match workdir::locks_work(existing) {

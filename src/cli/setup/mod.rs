@@ -1,4 +1,4 @@
-//! The verbs of an installation: `models`, `words`, `doctor`, `guide`, `completions`, `man`.
+//! Verbs for the installation: `models`, `words`, `doctor`, `guide`, `completions`, `man`.
 
 pub mod completions;
 pub mod doctor;

@@ -1,4 +1,4 @@
-//! `orator models`: which ONNX models there are, getting them, registering others, checking them.
+//! `orator models`: lists, fetches, registers and checks ONNX models.
 
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
@@ -118,7 +118,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     }
 }
 
-/// Says under which terms the models are that come, gets them, and says what was had.
+/// Prints the licences of the models, fetches them, and prints the result.
 pub fn fetch(store: &ModelStore, wanted: &[Wanted], mirror: Option<&Path>, ui: &Ui) -> Result<Outcome> {
     let mut terms = String::new();
     for entry in store.missing(wanted)? {
@@ -157,7 +157,7 @@ fn settings(args: &Args) -> Result<Settings> {
     Ok(settings)
 }
 
-/// What is printed of a model that was fetched or checked.
+/// Output line for a model that was fetched or checked.
 struct ModelLine {
     text: String,
     facts: Value,
@@ -165,14 +165,14 @@ struct ModelLine {
 }
 
 impl ModelLine {
-    /// `key` is the name of the flag `good` for programs.
+    /// `key` is the JSON key of the flag `good`.
     fn new(entry: &ModelEntry, key: &str, good: bool, message: String) -> Self {
         let text = format!("{:<26} {message}", entry.id);
         Self { text, facts: json!({ "id": entry.id, key: good, "said": message }), is_failure: !good }
     }
 }
 
-/// Prints the lines; `next` is the command to type after success and after a failure, empty: none.
+/// Prints the lines; `next` holds the commands to suggest after success and after failure, empty for none.
 fn close(lines: &[ModelLine], next: [&str; 2], store: &ModelStore, ui: &Ui) -> Result<Outcome> {
     let has_failed = lines.iter().any(|line| line.is_failure);
     let text: Vec<&str> = lines.iter().map(|line| line.text.as_str()).collect();

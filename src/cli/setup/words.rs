@@ -1,4 +1,4 @@
-//! `orator words`: word vectors, got or made from a file, and how many words of transcripts they know.
+//! `orator words`: fetches word vectors or imports them from a file, and checks their coverage of transcripts.
 
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-/// Folder of the tables within that of the models.
+/// Folder of the tables within the models folder.
 const FOLDER: &str = "words";
 /// Name of the fetched table.
 const GLOVE: &str = "glove-6b-100d";
@@ -67,17 +67,17 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             let store = ModelStore::open(&models)?;
             if let Ok(there) = WordVectors::open(&table) {
                 let _ = store.sweep();
-                return Ok(made(&table, &there, "there already", ui));
+                return Ok(report_table(&table, &there, "there already", ui));
             }
             let terms = store.manifest().words.as_ref().map(|words| words.licence.clone()).unwrap_or_default();
             std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
             let had = store.fetch_words(mirror.as_deref(), ui, |json, source| {
-                // The table comes last: where it is, nothing is missing.
+                // The table is written last: if it exists, its licence file does too.
                 workdir::write_file(&table.with_extension("licence.txt"), format!("{terms}\n").as_bytes())?;
                 make(json, &table)?;
                 Ok(source.to_string())
             })?;
-            Ok(made(&table, &WordVectors::open(&table)?, &had, ui))
+            Ok(report_table(&table, &WordVectors::open(&table)?, &had, ui))
         }
         WordsVerb::Add { file, name } => {
             let stem = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -88,7 +88,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
             let table = path_of(&folder, &name);
             make(file, &table)?;
-            Ok(made(&table, &WordVectors::open(&table)?, &format!("made from {}", file.display()), ui))
+            Ok(report_table(&table, &WordVectors::open(&table)?, &format!("made from {}", file.display()), ui))
         }
         WordsVerb::Check { transcripts } => check(&folder, transcripts, ui),
     }
@@ -98,7 +98,7 @@ fn path_of(folder: &Path, name: &str) -> PathBuf {
     folder.join(format!("{name}.safetensors"))
 }
 
-/// Makes the table of a file of vectors.
+/// Converts a file of vectors into a table.
 fn make(file: &Path, table: &Path) -> Result<()> {
     let reader = input::open(file).with_context(|| format!("cannot read {}", file.display()))?;
     let reader = BufReader::with_capacity(1 << 20, reader);
@@ -110,7 +110,7 @@ fn make(file: &Path, table: &Path) -> Result<()> {
     converted.with_context(|| format!("{} holds no word vectors", file.display()))
 }
 
-fn made(path: &Path, table: &WordVectors, how: &str, ui: &Ui) -> Outcome {
+fn report_table(path: &Path, table: &WordVectors, how: &str, ui: &Ui) -> Outcome {
     let text = format!("{}: {} words of {} numbers, {how}", path.display(), table.n_words(), table.dim());
     let hash = sha256_of(path).unwrap_or_default();
     let facts = json!({ "file": path, "words": table.n_words(), "dim": table.dim(), "sha256": hash });
@@ -118,7 +118,7 @@ fn made(path: &Path, table: &WordVectors, how: &str, ui: &Ui) -> Outcome {
     Outcome::Done
 }
 
-/// Tables in a folder, by name.
+/// Tables in a folder, sorted by name.
 fn tables(folder: &Path) -> Vec<PathBuf> {
     let mut tables: Vec<PathBuf> =
         std::fs::read_dir(folder).into_iter().flatten().flatten().map(|e| e.path()).collect();
@@ -127,7 +127,7 @@ fn tables(folder: &Path) -> Vec<PathBuf> {
     tables
 }
 
-/// Tables in the folder of the models, each opened.
+/// Tables in the models folder, each opened.
 pub(super) fn opened(models: &Path) -> Vec<(PathBuf, Result<WordVectors>)> {
     let tables = tables(&models.join(FOLDER)).into_iter();
     tables.map(|path| (path.clone(), WordVectors::open(&path))).collect()
@@ -145,7 +145,7 @@ fn check(folder: &Path, transcripts: &[PathBuf], ui: &Ui) -> Result<Outcome> {
         for (file, transcript) in &texts {
             let words: Vec<&str> = transcript.text.split_whitespace().collect();
             let (n_words, n_known) = (words.len(), table.n_known(words));
-            let said = match (n_words, n_known) {
+            let coverage = match (n_words, n_known) {
                 (0, _) => "it holds no word".to_owned(),
                 (_, 0) => format!("none of its {n_words} words is known: is it in the language of the vectors?"),
                 _ => {
@@ -153,8 +153,8 @@ fn check(folder: &Path, transcripts: &[PathBuf], ui: &Ui) -> Result<Outcome> {
                 }
             };
             is_wrong |= n_known == 0;
-            lines.push(format!("  {}: {said}", file.display()));
-            known.push(json!({ "file": file, "words": n_words, "known": n_known, "said": said }));
+            lines.push(format!("  {}: {coverage}", file.display()));
+            known.push(json!({ "file": file, "words": n_words, "known": n_known, "said": coverage }));
         }
         facts.push(json!({ "file": path, "words": table.n_words(), "dim": table.dim(), "transcripts": known }));
     }

@@ -1,7 +1,7 @@
 //! `orator study analyse`.
 
 use crate::cli::Outcome;
-use crate::cli::confine::confine;
+use crate::cli::sandbox::enter_sandbox;
 use crate::cli::ui::Ui;
 use anyhow::{Context, Result, ensure};
 use orator_base::stage::workdir;
@@ -74,7 +74,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     }
     check_report(args)?;
     let outputs = args.report.iter().chain(&args.methods).map(PathBuf::as_path);
-    confine(outputs, args.source.is_dir().then_some(args.source.as_path()));
+    enter_sandbox(outputs, args.source.is_dir().then_some(args.source.as_path()));
     let analysis = analysis(args)?;
     let mut shown = text::text(&analysis);
     if let Some(path) = &args.report {
@@ -94,7 +94,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     Ok(if analysis.refused.is_empty() { Outcome::Done } else { Outcome::SomeFailed })
 }
 
-/// The page and the paragraph replace nothing that is read.
+/// Checks that the page and the paragraph do not overwrite an input.
 fn check_report(args: &Args) -> Result<()> {
     for (path, ending) in [(&args.report, "html"), (&args.methods, "txt")] {
         let Some(path) = path else { continue };
@@ -130,7 +130,7 @@ fn analysis(args: &Args) -> Result<StudyAnalysis> {
         .with_context(|| args.source.display().to_string())
 }
 
-/// Name of a file or folder, without the folders of this machine.
+/// Name of a file or folder without its parent folders.
 fn name(path: &Path) -> Result<String> {
     let path = path.canonicalize().with_context(|| path.display().to_string())?;
     Ok(path.file_name().unwrap_or_default().to_string_lossy().into_owned())

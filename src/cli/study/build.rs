@@ -1,7 +1,7 @@
 //! `orator study build`.
 
 use crate::cli::Outcome;
-use crate::cli::confine::confine;
+use crate::cli::sandbox::enter_sandbox;
 use crate::cli::signals;
 use crate::cli::ui::Ui;
 use anyhow::Result;
@@ -13,8 +13,8 @@ use serde_json::json;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-/// Refused pieces of speech that are listed at most; all are in `clips/clips.json`.
-const MOST_LISTED: usize = 10;
+/// Maximum number of rejected audio pieces that are listed; `clips/clips.json` has all.
+const MAX_LISTED: usize = 10;
 
 /// Make the films of a study, plan who sees what, and seal both before the first participant comes.
 ///
@@ -33,7 +33,7 @@ pub struct Args {
 pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     let file = StudyFile::read(&args.study)?;
     let out = args.out.clone().unwrap_or_else(|| args.study.with_extension(""));
-    // The folder itself, beneath which all is written, and the locks of what is read.
+    // Writes are allowed in the output folder itself and for the locks of the inputs.
     let checkpoints = file.speaker.iter().flat_map(|speaker| {
         file.condition.iter().filter_map(|condition| match &condition.source {
             ConditionSource::Checkpoint(path) => Some(filled(path, &speaker.name, "")),
@@ -42,8 +42,8 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     });
     let datasets = file.speaker.iter().filter_map(|speaker| speaker.dataset.clone());
     let locked: Vec<PathBuf> = checkpoints.chain(datasets).collect();
-    confine([out.as_path()], locked.iter().map(PathBuf::as_path));
-    signals::tell_when_stopped("every film that is done is kept, and the same command goes on from there");
+    enter_sandbox([out.as_path()], locked.iter().map(PathBuf::as_path));
+    signals::exit_on_signal("every film that is done is kept, and the same command goes on from there");
     let built = build(&file, &out, SIZE, ui)?;
     let next = format!("orator study serve {}", built.folder.display());
     let mut facts = json!(built);
@@ -65,11 +65,11 @@ fn text(built: &BuiltStudy) -> String {
             let _ = write!(text, ", {loud} cut within speech, for want of pauses");
         }
         text += "\n";
-        for refused in refused.iter().take(MOST_LISTED) {
+        for refused in refused.iter().take(MAX_LISTED) {
             let _ = writeln!(text, "  no clip of {}: {}", refused.name, refused.reason);
         }
-        if refused.len() > MOST_LISTED {
-            let _ = writeln!(text, "  and of {} more pieces of speech", refused.len() - MOST_LISTED);
+        if refused.len() > MAX_LISTED {
+            let _ = writeln!(text, "  and of {} more pieces of speech", refused.len() - MAX_LISTED);
         }
     }
     for line in &built.balance {

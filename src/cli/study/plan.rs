@@ -86,7 +86,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Task that is named, or the first whose answers have a chance level.
+/// The named task, or the first whose answers have a chance level.
 fn task<'s>(args: &Args, study: &'s StudyFile) -> Result<&'s StudyTask> {
     let has_chance = |task: &&StudyTask| !matches!(task.design, TaskDesign::Preference | TaskDesign::Sliders);
     let names = || study.task.iter().map(|task| task.name.as_str()).collect::<Vec<_>>().join(", ");
@@ -112,7 +112,7 @@ fn task<'s>(args: &Args, study: &'s StudyFile) -> Result<&'s StudyTask> {
     Ok(found)
 }
 
-/// Clips of all speakers, at least as many as a participant sees.
+/// Number of clips of all speakers, at least as many as a participant is shown.
 fn n_clips(study: &StudyFile, task: &StudyTask) -> usize {
     let written: usize = study.speaker.iter().filter_map(|speaker| speaker.clips).sum();
     written.max(task.trials)

@@ -1,4 +1,4 @@
-//! `orator study`: its verbs, with `serve` and `export`.
+//! `orator study` and its verbs, among them `serve` and `export`.
 
 use super::{analyse, build, plan};
 use crate::cli::Outcome;

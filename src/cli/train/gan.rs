@@ -1,6 +1,6 @@
 //! `orator train gan`.
 
-use super::watched::{ALL, Places, WatchedPage, middle, shown};
+use super::training::{ALL, TrainingFolders, TrainingPage, middle, page_samples};
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
 use crate::cli::ui::Ui;
@@ -66,7 +66,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     Ok(if trained.has_page { Outcome::Done } else { Outcome::SomeFailed })
 }
 
-/// A model for each speaker of the configuration.
+/// Trains a model for each speaker of the configuration.
 fn run_all(args: &Args, config: &Config, ui: &Ui) -> Result<Outcome> {
     let (mut text, mut facts, mut next, mut n_failed) = (String::new(), Vec::new(), None, 0);
     for speaker in config.settings.speaker.iter().map(|speaker| &speaker.name) {
@@ -94,7 +94,7 @@ fn run_all(args: &Args, config: &Config, ui: &Ui) -> Result<Outcome> {
     Ok(if n_failed == 0 { Outcome::Done } else { Outcome::SomeFailed })
 }
 
-/// A training as it ended.
+/// Result of a completed training.
 struct TrainedModel {
     text: String,
     next: String,
@@ -105,7 +105,7 @@ struct TrainedModel {
 
 fn train_one(args: &Args, speaker: Option<&String>, config: &Config, ui: &Ui) -> Result<TrainedModel> {
     let out = &args.out;
-    let places = Places { config, speaker, dataset: args.dataset.first(), out: out.as_ref() };
+    let places = TrainingFolders { config, speaker, dataset: args.dataset.first(), out: out.as_ref() };
     let is_named = |name: &String| config.settings.speaker.iter().any(|of| of.name == *name);
     let are_all = args.dataset.is_empty() && speaker.is_some_and(|name| name == ALL && !is_named(name));
     let (datasets, out) = if are_all || args.dataset.len() > 1 {
@@ -132,7 +132,7 @@ fn train_one(args: &Args, speaker: Option<&String>, config: &Config, ui: &Ui) ->
         }
         Ok(all)
     };
-    let mut page = WatchedPage::new(&out, names.clone(), Box::new(poses), ui);
+    let mut page = TrainingPage::new(&out, names.clone(), Box::new(poses), ui);
     let validated = &mut |at| page.update(at);
     let outcome = train::train_watched(&datasets, &settings, args.from.as_deref(), &out, ui, validated)?;
     let steps_per_sec = (outcome.steps - outcome.began_at) as f64 / start.elapsed().as_secs_f64().max(1e-9);
@@ -149,7 +149,7 @@ fn train_one(args: &Args, speaker: Option<&String>, config: &Config, ui: &Ui) ->
         metrics(&outcome.validation),
         outcome.newest.display(),
         outcome.best_step,
-        // Judged before the first step only where a training begins with a model.
+        // Step 0 is evaluated only if the training was initialised from a model.
         if outcome.best_step == 0 { ", the model it began with: this speech did not make it better" } else { "" },
         outcome.best.display(),
         page.as_ref().map(|page| format!("\ncurves and poses  {}", page.display())).unwrap_or_default(),
@@ -175,7 +175,7 @@ fn train_one(args: &Args, speaker: Option<&String>, config: &Config, ui: &Ui) ->
     Ok(TrainedModel { text, next, facts, has_page: page.is_some() })
 }
 
-/// The last validation as a table, with the warnings that are due.
+/// The last validation as a table, with applicable warnings.
 fn metrics(validation: &Validation) -> String {
     let (predicted, still) = (&validation.generator, &validation.mean_pose);
     let row = |name: &str, predicted: f64, still: f64| format!("{name:24}{predicted:9.3}   {still:9.3}\n");
@@ -203,9 +203,9 @@ fn metrics(validation: &Validation) -> String {
     text
 }
 
-/// True and generated poses of a few intervals, of which so many speakers share the page.
+/// True and generated poses of a few intervals; `n_speakers` speakers share the page.
 fn pairs(dataset: &Dataset, speaker: &GestureGenerator, n_speakers: usize) -> Result<Vec<HeldOutPair>> {
-    let mut samples = shown(dataset);
+    let mut samples = page_samples(dataset);
     samples.truncate(samples.len().div_ceil(n_speakers));
     let intervals = held_out::read(dataset, &samples, &speaker.metadata.normalisation)?;
     let pair = |interval: HeldOutInterval| {

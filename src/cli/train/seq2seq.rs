@@ -1,6 +1,6 @@
 //! `orator train seq2seq`.
 
-use super::watched::{Places, WatchedPage, middle, shown};
+use super::training::{TrainingFolders, TrainingPage, middle, page_samples};
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
 use crate::cli::ui::Ui;
@@ -68,7 +68,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let vectors = args.words.as_deref().map(WordVectors::open).transpose()?;
     let start = Instant::now();
     let train = |source: TrainingSource, out: &Path, poses| {
-        let mut page = WatchedPage::new(out, source.name(), poses, ui);
+        let mut page = TrainingPage::new(out, source.name(), poses, ui);
         let validated = &mut |at| page.update(at);
         let outcome = train::train_watched(source, vectors.as_ref(), &settings, out, ui, validated)?;
         let page = page.finish(ValidatedStep { step: outcome.steps, best_step: outcome.best_step });
@@ -82,7 +82,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         _ => {
             let Args { speaker, dataset, out, .. } = &args;
             let (speaker, dataset, out) = (speaker.as_ref(), dataset.as_ref(), out.as_ref());
-            let (dataset, out) = Places { config: &config, speaker, dataset, out }.open("seq2seq")?;
+            let (dataset, out) = TrainingFolders { config: &config, speaker, dataset, out }.open("seq2seq")?;
             let poses = || pairs(&dataset, &SequenceGenerator::open(&out.join(train::BEST))?);
             train(TrainingSource::Dataset(&dataset), &out, Box::new(poses))?
         }
@@ -144,5 +144,5 @@ fn pairs(dataset: &Dataset, speaker: &SequenceGenerator) -> Result<Vec<HeldOutPa
         let HeldOutInterval { key, ground_truth, .. } = interval.cut(frames);
         Ok(HeldOutPair { name: key, start_secs, ground_truth, predicted })
     };
-    held_out::read(dataset, &shown(dataset), normalisation)?.into_iter().map(pair).collect()
+    held_out::read(dataset, &page_samples(dataset), normalisation)?.into_iter().map(pair).collect()
 }

@@ -1,4 +1,4 @@
-//! What is said of a training that was asked to end, and did.
+//! Report of a training that stopped on request.
 
 use crate::StoppedTraining;
 use crate::cli::Outcome;
@@ -8,8 +8,8 @@ use orator_cluster::job::shell;
 use serde_json::json;
 use std::path::Path;
 
-/// The closing words of a training that ended by request; any other error stays one.
-pub fn told(error: anyhow::Error, ui: &Ui) -> Result<Outcome> {
+/// Prints the report of a training that stopped on request; returns any other error.
+pub fn report_stopped(error: anyhow::Error, ui: &Ui) -> Result<Outcome> {
     let stopped: StoppedTraining = error.downcast()?;
     let StoppedTraining { step, steps, newest, best } = &stopped;
     let mut text = format!("stopped after step {step} of {steps}");
@@ -34,7 +34,7 @@ pub fn told(error: anyhow::Error, ui: &Ui) -> Result<Outcome> {
     Ok(Outcome::Stopped)
 }
 
-/// The command as it was typed, for a shell.
+/// The command as it was typed, quoted for a shell.
 fn same_command() -> String {
     let mut words = std::env::args_os().map(|word| word.to_string_lossy().into_owned());
     let program = words.next().and_then(|path| Some(Path::new(&path).file_name()?.to_string_lossy().into_owned()));

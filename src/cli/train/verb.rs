@@ -1,4 +1,4 @@
-//! `orator train`: one file a network.
+//! `orator train`, with one file per network.
 
 use super::{gan, seq2seq, stopped};
 use crate::cli::Outcome;
@@ -29,7 +29,7 @@ enum Network {
 pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
     const STOPPING: &str = "stopping after this step, with a checkpoint; the next signal ends at once";
     const KEPT: &str = "the newest checkpoint is kept, and the same command goes on from it";
-    ui.listens_for_stop(STOPPING, KEPT);
+    ui.enable_stop_requests(STOPPING, KEPT);
     let ended = match args.network {
         Network::Gan(args) => gan::run(args, ui),
         Network::Seq2seq(args) => seq2seq::run(args, ui),
@@ -38,5 +38,5 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
         Network::Lifter(args) => args.refuse("train lifter"),
         Network::Noise(args) => args.refuse("train noise"),
     };
-    ended.or_else(|error| stopped::told(error, ui))
+    ended.or_else(|error| stopped::report_stopped(error, ui))
 }

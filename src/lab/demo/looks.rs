@@ -1,7 +1,7 @@
 //! Random looks of rendered people, and the points of their faces.
 
 use orator_avatar::animate::avatar::Appearance;
-use orator_avatar::animate::avatar::appearance::{Hairstyle, Reflectance, Top, Weave, lips_of};
+use orator_avatar::animate::avatar::appearance::{Hairstyle, Reflectance, Top, Weave, lip_colour_of};
 use orator_avatar::animate::avatar::head::{EAR, EYE, EYE_RADIUS, HeadForm};
 use orator_avatar::animate::avatar::stance::Stance;
 use orator_avatar::animate::rig::rig::Rig;
@@ -110,7 +110,7 @@ pub fn random(seed: u64) -> Appearance {
         brows: near(&mut rng, if woman { 0.8 } else { 1.15 }, 0.2),
         face: true,
         skin,
-        lip_colour: lips_of(skin, if painted { 1.0 } else { rng.random_range(0.3..0.6) }),
+        lip_colour: lip_colour_of(skin, if painted { 1.0 } else { rng.random_range(0.3..0.6) }),
         iris: IRISES[if dark { 0 } else { rng.random_range(0..IRISES.len()) }],
         hair,
         hair_colour,

@@ -33,7 +33,7 @@ pub fn background(camera: &PinholeCamera, meshes: &[&Mesh], light: &Light, behin
     let size = camera.size;
     let (mut surfaces, mut shading) = (Surfaces::default(), Shading::default());
     surfaces.set(camera, meshes, light);
-    shading.open(&surfaces);
+    shading.reset(&surfaces);
     let mut shadows = ShadowMap::new(SHADOW_TEXELS);
     shadows.cast(surfaces.casters(meshes), true);
     let srgb = Srgb::tables();
@@ -50,7 +50,7 @@ pub fn background(camera: &PinholeCamera, meshes: &[&Mesh], light: &Light, behin
             }
             nearness[at] = band.nearness[there];
             let mut pixel = shading.light(&surfaces, (triangles, &nearness[at]), [x, y]);
-            let lit = shadows.lit(shadows.asking(pixel.asking));
+            let lit = shadows.lit(shadows.query(pixel.shadow_point));
             let there = srgb.linears(image.pixel(x, y));
             let uncovered = 1.0 - pixel.cover;
             pixel.own.iter_mut().zip(there).for_each(|(own, there)| *own += uncovered * there);
@@ -92,7 +92,8 @@ impl StaticScene for Scenery {
                     if pixel.cover == 0.0 {
                         continue;
                     }
-                    let (open, lit) = (shadows.open_share(pixel.asking), shadows.lit(shadows.asking(pixel.asking)));
+                    let (open, lit) =
+                        (shadows.open_share(pixel.shadow_point), shadows.lit(shadows.query(pixel.shadow_point)));
                     if open < 1.0 || lit < 1.0 {
                         pixel.own.iter_mut().for_each(|v| *v *= open);
                         image.data[3 * at..3 * at + 3].copy_from_slice(&srgb.bytes(compressed(pixel.sum(lit))));
@@ -109,8 +110,8 @@ fn blocks([width, height]: [usize; 2], pixels: &[PixelLight]) -> Vec<[[f32; 2]; 
     for (at, pixel) in pixels.iter().enumerate().filter(|(_, pixel)| pixel.cover > 0.0) {
         let [low, high] = &mut blocks[at / width / BLOCK * n_columns + at % width / BLOCK];
         for k in 0..2 {
-            low[k] = low[k].min(pixel.asking[k]);
-            high[k] = high[k].max(pixel.asking[k]);
+            low[k] = low[k].min(pixel.shadow_point[k]);
+            high[k] = high[k].max(pixel.shadow_point[k]);
         }
     }
     blocks

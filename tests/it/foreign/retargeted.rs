@@ -71,7 +71,7 @@ fn nodes_that_do_not_move_take_no_memory_a_frame_and_too_many_are_refused() {
     };
     let performance = perform(&swinging(5, 600), None, &AnimationOptions::default());
     let rig = RetargetRig::open(&with_nodes(9_000)).unwrap();
-    let map = BoneMap::found(rig.rig()).unwrap();
+    let map = BoneMap::detect(rig.rig()).unwrap();
     let out = folder.path().join("moved.glb");
     let memory = allocation_counter::measure(|| rig.write(&out, &performance, &map).unwrap());
     // The rotations of all nodes in all frames alone are 165 MiB.
@@ -91,7 +91,7 @@ fn blender_has_the_joints_where_we_put_them() {
     // Metres and centimetres to millimetres; places of a BVH are taken from its root.
     for (given, mm) in [(PathBuf::from(BVH), 10.0), (under_an_armature(folder.path()), 1000.0)] {
         let rig = RetargetRig::open(&given).unwrap();
-        let map = BoneMap::found(rig.rig()).unwrap();
+        let map = BoneMap::detect(rig.rig()).unwrap();
         let out = folder.path().join("moved").with_extension(given.extension().unwrap());
         rig.write(&out, &performance, &map).unwrap();
         let (frames, moves) = rig.moved(&performance, &map).unwrap();
@@ -126,7 +126,7 @@ fn the_wrists_keep_their_places_and_a_map_can_be_edited() {
     let performance = motion();
     let ours = &performance.rig.skeleton;
     let rig = RetargetRig::open(Path::new(BVH)).unwrap();
-    let map = BoneMap::found(rig.rig()).unwrap();
+    let map = BoneMap::detect(rig.rig()).unwrap();
     let (frames, _) = rig.moved(&performance, &map).unwrap();
     let at = |own: &str| map.joint(own).unwrap();
     let rest = rig.rig().positions(&vec![Rotation::IDENTITY; rig.rig().joints.len()]);

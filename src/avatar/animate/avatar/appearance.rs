@@ -1,17 +1,17 @@
-//! Looks of an avatar: build, skin, face, hair, clothes and their colours. Lengths scale with the rig; colours are
+//! Appearance of an avatar: build, skin, face, hair, clothes and their colours. Lengths scale with the rig; colours are
 //! linear RGB reflectances.
 
 /// Linear RGB reflectance, 0..1.
 pub type Reflectance = [f32; 3];
 
-/// Hair on the head.
+/// Hairstyle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Hairstyle {
     Bald,
     Short,
-    /// Down to the shoulders.
+    /// Shoulder-length.
     Long,
-    /// Combed back into a knot.
+    /// Combed back into a bun.
     Tied,
 }
 
@@ -25,7 +25,7 @@ pub enum Top {
     Jacket,
 }
 
-/// Weave of the upper garment.
+/// Pattern of the upper garment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Weave {
     Plain,
@@ -34,14 +34,14 @@ pub enum Weave {
     Checks,
 }
 
-/// Everything by which two avatars of one rig differ. Factors are relative to the plain figure.
+/// Everything in which two avatars of one rig may differ. Factors are relative to the plain avatar.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Appearance {
     /// Girth of the trunk.
     pub trunk: f64,
     /// Girth of arms and legs.
     pub limbs: f64,
-    /// Girth of the waist and of the hips, on top of the trunk's.
+    /// Girth of the waist and of the hips, relative to the trunk's.
     pub waist: f64,
     pub hips: f64,
     /// Depth of the bust, 0 (none) .. 1.
@@ -50,12 +50,12 @@ pub struct Appearance {
     pub neck: f64,
     /// Width, height and depth of the head.
     pub head: [f64; 3],
-    /// Width of the jaw, size of the nose, fullness of the lips and weight of the brows.
+    /// Width of the jaw, size of the nose, fullness of the lips and thickness of the brows.
     pub jaw: f64,
     pub nose: f64,
     pub lips: f64,
     pub brows: f64,
-    /// Whether there are eyes, brows and a mouth; without them the head is that of a mannequin.
+    /// Whether to model eyes, brows and a mouth; without them the head is a mannequin's.
     pub face: bool,
     pub skin: Reflectance,
     pub lip_colour: Reflectance,
@@ -64,16 +64,16 @@ pub struct Appearance {
     pub hair_colour: Reflectance,
     /// Thickness of the hair.
     pub hair_volume: f64,
-    /// How far the hair hangs into the forehead, cm, and how much farther on the right than on the left, -1 .. 1.
+    /// How far the hair covers the forehead, cm, and how much farther on the right than on the left, -1 .. 1.
     pub fringe: f64,
     pub parting: f64,
     /// Density of the beard, 0 (shaven) .. 1.
     pub beard: f64,
-    /// Colour of the glasses' frames.
+    /// Colour of the frames of glasses; `None` without glasses.
     pub glasses: Option<Reflectance>,
     pub top: Top,
     pub top_colour: Reflectance,
-    /// Stripes and checks, or the shirt below a jacket.
+    /// Colour of stripes and checks, or of the shirt under a jacket.
     pub second_colour: Reflectance,
     pub weave: Weave,
     /// Whether the shirt has a collar.
@@ -87,7 +87,7 @@ pub struct Appearance {
 const SKIN: Reflectance = [0.60, 0.42, 0.33];
 
 impl Appearance {
-    /// The figure of an exported animation: a calm face, a shirt, no particular person.
+    /// Default avatar of exported animations: a neutral face and a shirt.
     pub fn plain() -> Self {
         Self {
             trunk: 1.0,
@@ -103,7 +103,7 @@ impl Appearance {
             brows: 1.0,
             face: true,
             skin: SKIN,
-            lip_colour: lips_of(SKIN, 0.5),
+            lip_colour: lip_colour_of(SKIN, 0.5),
             iris: [0.10, 0.055, 0.025],
             hair: Hairstyle::Short,
             hair_colour: [0.050, 0.028, 0.016],
@@ -123,14 +123,14 @@ impl Appearance {
         }
     }
 
-    /// The plain figure with a mannequin's head: no face to read.
+    /// The plain avatar with a mannequin's head, without a face.
     pub fn faceless() -> Self {
         Self { face: false, ..Self::plain() }
     }
 }
 
-/// Lips of a skin: redder, by `strength` 0 (like the skin) .. 1 (painted).
-pub fn lips_of(skin: Reflectance, strength: f32) -> Reflectance {
+/// Lip colour for a skin colour; `strength` runs from 0 (skin colour) to 1 (lipstick).
+pub fn lip_colour_of(skin: Reflectance, strength: f32) -> Reflectance {
     let red = [0.36 + 0.25 * skin[0], 0.05 + 0.12 * skin[1], 0.06 + 0.12 * skin[2]];
     std::array::from_fn(|k| skin[k] + strength * (red[k] - skin[k]))
 }

@@ -1,9 +1,9 @@
-//! Surfaces of one person by material, with weights and colours, in the stance.
+//! Surfaces of one avatar in the stance, grouped by material, with weights and colours.
 
 use super::appearance::{Appearance, Reflectance, Top, Weave};
 use super::body::BodyForm;
 use super::face::Feature;
-use super::field::{Form, around, joined};
+use super::field::{Form, bounding_box, smooth_union};
 use super::hand::HandForm;
 use super::head::HeadForm;
 use super::jaw::{jaw_share, opening};
@@ -15,17 +15,17 @@ use std::collections::BTreeMap;
 
 /// Cell sizes of the surface meshes, cm.
 const SHIRT_CELL: f64 = 1.9;
-/// Cells of a shirt with a pattern.
-const WOVEN_CELL: f64 = 1.65;
+/// Cell size of a shirt with a pattern.
+const PATTERN_CELL: f64 = 1.65;
 const LEGS_CELL: f64 = 2.4;
 const SHOE_CELL: f64 = 1.8;
 const PALM_CELL: f64 = 0.62;
 const CUFF_CELL: f64 = 0.9;
 const FINGER_CELL: f64 = 0.46;
-/// Width over which the light of a hand is seen, as a share of a cell.
-const FINE: f64 = 0.1;
-/// Radius within which the cells of a bare arm are as small as the palm's, cm.
-const ARM_EVEN: f64 = 7.0;
+/// Width over which the normals of a hand are computed, as a fraction of a cell.
+const NORMAL_WIDTH: f64 = 0.1;
+/// Radius around the wrist in which the cells of a bare arm hardly grow, cm.
+const ARM_FOCUS_RADIUS: f64 = 7.0;
 
 /// Mesh of one material in the stance.
 #[derive(Default)]
@@ -33,9 +33,9 @@ pub struct PosedMesh {
     pub surface: Surface,
     pub weights: Vec<Weights>,
     pub colours: Vec<Reflectance>,
-    /// Way of each vertex to the open mouth, cm; shorter than the points where nothing more moves.
+    /// Displacement of each vertex when the mouth is fully open, cm; vertices beyond its end do not move.
     pub mouth: Vec<Vec3>,
-    /// Place of each vertex along its forearm, 0 (elbow) .. 1 (wrist); shorter than the points where none is bare.
+    /// Position of each vertex along its forearm, 0 (elbow) .. 1 (wrist); 0 for vertices beyond its end.
     pub twist: Vec<f32>,
 }
 
@@ -47,7 +47,7 @@ impl PosedMesh {
     }
 }
 
-/// Meshes of one person by material.
+/// Meshes of one avatar, by material.
 pub struct Assembly<'a> {
     body: &'a BodyForm<'a>,
     looks: &'a Appearance,
@@ -56,13 +56,13 @@ pub struct Assembly<'a> {
 
 impl<'a> Assembly<'a> {
     pub fn new(body: &'a BodyForm<'a>, head: &HeadForm, hands: &[HandForm; 2]) -> Self {
-        let mut whole = Self { body, looks: body.looks, meshes: BTreeMap::new() };
-        whole.clothes();
+        let mut assembly = Self { body, looks: body.looks, meshes: BTreeMap::new() };
+        assembly.clothes();
         for (side, hand) in hands.iter().enumerate() {
-            whole.hand(side, hand);
+            assembly.hand(side, hand);
         }
-        whole.head(head);
-        whole
+        assembly.head(head);
+        assembly
     }
 
     fn add(&mut self, material: Material, weights: Vec<Weights>, surface: Surface, colour: Reflectance) {
@@ -74,8 +74,8 @@ impl<'a> Assembly<'a> {
         let (body, looks) = (self.body, self.looks);
         let cm = body.stance.scale;
         let shirt = body.shirt();
-        let cell = cm * if looks.weave == Weave::Plain { SHIRT_CELL } else { WOVEN_CELL };
-        let surface = Surface::from_field(&shirt, body.shirt_bounds(), cell).lit(&shirt, cell);
+        let cell = cm * if looks.weave == Weave::Plain { SHIRT_CELL } else { PATTERN_CELL };
+        let surface = Surface::from_field(&shirt, body.shirt_bounds(), cell).with_normals_of(&shirt, cell);
         let colours = body.cloth(&surface.points, &surface.normals);
         self.meshes.entry(Material::Shirt).or_default().add(body.shirt_weights(&surface), surface, colours);
         let jacket = looks.top == Top::Jacket;
@@ -102,25 +102,25 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// Hand with the wrist, and the arm where the sleeve is short.
+    /// Adds a hand with its wrist, with the arm if the sleeve is short, otherwise with the cuff.
     fn hand(&mut self, side: usize, hand: &HandForm) {
         let (body, looks) = (self.body, self.looks);
         let size = hand.scale;
         let (palm, finger) = (PALM_CELL * size, FINGER_CELL * size);
         let arm = body.bare_arm(side);
-        let on_arm = |d: f64, at: Vec3| arm.as_ref().map_or(d, |arm| joined(d, arm.distance(at), 1.0 * size));
-        let light = |at: Vec3| on_arm(hand.whole(at), at);
+        let on_arm = |d: f64, at: Vec3| arm.as_ref().map_or(d, |arm| smooth_union(d, arm.distance(at), 1.0 * size));
+        let normals = |at: Vec3| on_arm(hand.blended(at), at);
         let field = |at: Vec3| on_arm(hand.palm(at), at);
         let bounds = hand.bounds(None);
         let surface = match &arm {
             None => Surface::from_field(&field, bounds, palm),
             Some(arm) => {
                 let middle = body.stance.positions[body.rig.arms[side].hand];
-                let whole = around([bounds, arm.bounds()].into_iter());
-                Surface::focused(&field, whole, palm, (middle, ARM_EVEN * size))
+                let arm_bounds = bounding_box([bounds, arm.bounds()].into_iter());
+                Surface::focused(&field, arm_bounds, palm, (middle, ARM_FOCUS_RADIUS * size))
             }
         };
-        let surface = surface.lit(&light, FINE * palm);
+        let surface = surface.with_normals_of(&normals, NORMAL_WIDTH * palm);
         if arm.is_some() {
             let places = self.along_forearm(side, &surface.points);
             let mesh = self.meshes.entry(Material::Skin).or_default();
@@ -129,8 +129,8 @@ impl<'a> Assembly<'a> {
         }
         self.add(Material::Skin, body.palm_weights(side, size, &surface), surface, looks.skin);
         for n in 1..5 {
-            let surface =
-                Surface::from_field(&|at| hand.finger(n, at), hand.bounds(Some(n)), finger).lit(&light, FINE * finger);
+            let surface = Surface::from_field(&|at| hand.finger(n, at), hand.bounds(Some(n)), finger)
+                .with_normals_of(&normals, NORMAL_WIDTH * finger);
             self.add(Material::Skin, body.finger_weights(side, n, size, &surface), surface, looks.skin);
         }
         if arm.is_none() {
@@ -141,15 +141,16 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// Place of points along a forearm, 0 at the elbow .. 1 at the wrist.
+    /// Position of points along a forearm, 0 (elbow) .. 1 (wrist).
     fn along_forearm(&self, side: usize, points: &[Vec3]) -> Vec<f32> {
         let (arm, places) = (&self.body.rig.arms[side], &self.body.stance.positions);
-        let way = sub(places[arm.hand], places[arm.fore]);
-        let share = |at: &Vec3| (dot(sub(*at, places[arm.fore]), way) / dot(way, way)).clamp(0.0, 1.0) as f32;
+        let forearm = sub(places[arm.hand], places[arm.fore]);
+        let share =
+            |at: &Vec3| (dot(sub(*at, places[arm.fore]), forearm) / dot(forearm, forearm)).clamp(0.0, 1.0) as f32;
         points.iter().map(share).collect()
     }
 
-    /// Head, ears, hair and the features of the face.
+    /// Adds head, ears, hair and facial features.
     fn head(&mut self, head: &HeadForm) {
         let (body, looks) = (self.body, self.looks);
         let skin = head.skin_surface();
@@ -163,20 +164,20 @@ impl<'a> Assembly<'a> {
             features.push(Feature { material: Material::Face, surface, colours, shares: Vec::new() });
         }
         if let Some(surface) = head.hair_surface() {
-            let colours = surface.points.iter().map(|&at| strand(looks.hair_colour, at)).collect();
+            let colours = surface.points.iter().map(|&at| hair_colour_at(looks.hair_colour, at)).collect();
             features.push(Feature { material: Material::Hair, surface, colours, shares: Vec::new() });
         }
         for (n, Feature { material, surface, colours, shares }) in features.into_iter().enumerate() {
-            let ways = surface.points.iter().zip(shares).map(|(&at, share)| head.scaled(opening(at, share)));
-            let ways: Vec<Vec3> = ways.collect();
-            let hangs = n == 0 || material == Material::Hair;
+            let displacements = surface.points.iter().zip(shares).map(|(&at, share)| head.scaled(opening(at, share)));
+            let displacements: Vec<Vec3> = displacements.collect();
+            let is_skinned = n == 0 || material == Material::Hair;
             let surface = head.placed(surface);
             let weights =
-                if hangs { body.head_weights(&surface) } else { vec![rigid(body.rig.head); surface.points.len()] };
+                if is_skinned { body.head_weights(&surface) } else { vec![rigid(body.rig.head); surface.points.len()] };
             let mesh = self.meshes.entry(material).or_default();
-            if !ways.is_empty() {
+            if !displacements.is_empty() {
                 mesh.mouth.resize(mesh.surface.points.len(), [0.0; 3]);
-                mesh.mouth.extend(ways);
+                mesh.mouth.extend(displacements);
             }
             mesh.add(weights, surface, colours);
         }
@@ -185,11 +186,11 @@ impl<'a> Assembly<'a> {
 
 fn surface_of(form: &Form, cell: f64) -> Surface {
     let field = |at: Vec3| form.distance(at);
-    Surface::from_field(&field, form.bounds(), cell).lit(&field, cell)
+    Surface::from_field(&field, form.bounds(), cell).with_normals_of(&field, cell)
 }
 
-/// Colour of the hair at a point: lighter and darker strands.
-fn strand(colour: Reflectance, [x, y, z]: Vec3) -> Reflectance {
+/// Hair colour at a point, with lighter and darker strands.
+fn hair_colour_at(colour: Reflectance, [x, y, z]: Vec3) -> Reflectance {
     let light = 1.0 + 0.16 * (3.1 * x + 0.4 * y).sin() * (1.3 * z + 0.7 * y).cos();
     colour.map(|v| v * light as f32)
 }

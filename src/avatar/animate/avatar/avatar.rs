@@ -1,5 +1,5 @@
 //! Skinned avatar of a rig. Its shape is a signed distance field around the bones in a relaxed stance; the surface
-//! mesh, the skinning weights and the vertices in T-pose (by inverse linear skinning) follow from it.
+//! mesh, the skinning weights and the T-pose vertices (by inverse linear blend skinning) are derived from it.
 
 use super::appearance::{Appearance, Reflectance};
 use super::assembly::{Assembly, PosedMesh};
@@ -14,7 +14,7 @@ use crate::animate::rig::rig::Rig;
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::{Vec3, add, cross, dot, sub, unit};
 
-/// Triangles of one material in the T-pose (cm, in the figure's axes, the soles at y = 0), with their joints.
+/// Mesh of one material in the T-pose (cm, in the rig's axes, soles at y = 0), with skinning weights.
 #[derive(Clone, Debug)]
 pub struct AvatarMesh {
     pub material: Material,
@@ -22,18 +22,18 @@ pub struct AvatarMesh {
     pub normals: Vec<Vec3>,
     pub colours: Vec<Reflectance>,
     pub triangles: Vec<[u32; 3]>,
-    /// Number of the first triangles that enclose volumes.
+    /// The first `n_closed` triangles form closed surfaces.
     pub n_closed: usize,
-    /// Four joints a vertex with weights that sum to 1, largest first.
+    /// Four joints per vertex with weights that sum to 1, largest first.
     pub weights: Vec<Weights>,
-    /// Way of each vertex from the closed to the open mouth, cm; empty where nothing moves.
+    /// Displacement of each vertex when the mouth is fully open, cm; empty if no vertex moves.
     pub mouth: Vec<Vec3>,
-    /// Place of each vertex along a bare forearm, 0 (elbow) .. 1 (wrist), by which it turns with the hand; empty where
-    /// no forearm is bare.
+    /// Position of each vertex along a bare forearm, 0 (elbow) .. 1 (wrist), which sets how far it turns with the hand;
+    /// empty if no forearm is bare.
     pub twist: Vec<f32>,
 }
 
-/// Meshes that together cover a rig.
+/// All meshes of an avatar.
 #[derive(Clone, Debug)]
 pub struct Avatar {
     pub parts: Vec<AvatarMesh>,
@@ -46,14 +46,14 @@ impl Avatar {
         let body = BodyForm::new(rig, &stance, hands.each_ref().map(|hand| hand.scale), looks);
         let head = HeadForm::new(rig, &stance, looks);
         let meshes = Assembly::new(&body, &head, &hands).meshes;
-        let parts = meshes.into_iter().map(|(material, mesh)| AvatarMesh::rested(material, mesh, &stance)).collect();
+        let parts = meshes.into_iter().map(|(material, mesh)| AvatarMesh::to_t_pose(material, mesh, &stance)).collect();
         Self { parts }
     }
 }
 
 impl AvatarMesh {
-    /// Mesh in the T-pose; linear skinning of it with the stance gives the posed mesh exactly.
-    fn rested(material: Material, mesh: PosedMesh, stance: &Stance) -> Self {
+    /// Maps a mesh from the stance to the T-pose; linear blend skinning with the stance restores it exactly.
+    fn to_t_pose(material: Material, mesh: PosedMesh, stance: &Stance) -> Self {
         let n_closed = mesh.surface.n_closed();
         let Surface { points, normals, triangles } = mesh.surface;
         let (points, normals): (Vec<Vec3>, Vec<Vec3>) = points
@@ -63,8 +63,8 @@ impl AvatarMesh {
             .map(|((point, normal), weights)| {
                 let turn = Blend::new(stance, weights);
                 // point = sum of w (R (rest - rest joint) + joint)
-                let rest = turn.back(sub(point, turn.shift));
-                (rest, unit(turn.back(normal), 1e-9).unwrap_or(normal))
+                let rest = turn.apply_inverse(sub(point, turn.shift));
+                (rest, unit(turn.apply_inverse(normal), 1e-9).unwrap_or(normal))
             })
             .unzip();
         let PosedMesh { colours, weights, mut mouth, mut twist, .. } = mesh;
@@ -78,7 +78,7 @@ impl AvatarMesh {
     }
 }
 
-/// Linear map of linear blend skinning at one vertex.
+/// The affine map of linear blend skinning at one vertex.
 struct Blend {
     /// Columns of the 3 x 3 matrix.
     columns: [Vec3; 3],
@@ -99,8 +99,8 @@ impl Blend {
         blend
     }
 
-    /// Inverse of the linear part (Cramer's rule).
-    fn back(&self, a: Vec3) -> Vec3 {
+    /// Applies the inverse of the linear part (Cramer's rule).
+    fn apply_inverse(&self, a: Vec3) -> Vec3 {
         let [x, y, z] = self.columns;
         let volume = dot(x, cross(y, z));
         [dot(a, cross(y, z)) / volume, dot(x, cross(a, z)) / volume, dot(x, cross(y, a)) / volume]
@@ -114,7 +114,7 @@ mod tests {
     use orator_base::math::vec3::{norm, scale};
 
     #[test]
-    fn skinning_brings_the_rest_into_the_stance_and_both_sides_are_alike() {
+    fn skinning_maps_the_rest_into_the_stance_and_both_sides_match() {
         let rig = default_rig();
         let (avatar, stance) = (Avatar::new(&rig, &Appearance::plain()), Stance::new(&rig));
         let shirt = &avatar.parts[1];
@@ -140,7 +140,7 @@ mod tests {
 
     #[test]
     fn bent_joints_do_not_collapse() {
-        // The thinnest place around a finger's middle joint and around an elbow, straight and bent by 90 degrees.
+        // Minimum thickness around a finger's middle joint and around an elbow, straight and bent by 90 degrees.
         let rig = default_rig();
         let avatar = Avatar::new(&rig, &Appearance::plain());
         let arm = &rig.arms[0];
@@ -155,7 +155,7 @@ mod tests {
                 let world = rig.skeleton.world(&local);
                 let positions = rig.skeleton.positions(rig.root, &local);
                 let rest = rig.skeleton.positions(rig.root, &vec![Rotation::IDENTITY; local.len()]);
-                // On the side that the bend stretches, how far the skin is from the joint.
+                // Distance from the joint to the skin on the stretched side of the bend.
                 let half = Rotation::about(axis, f64::to_radians(degrees / 2.0));
                 let along = unit(sub(rest[next], rest[joint]), 0.0).unwrap();
                 let out = half.turn(cross(along, axis));
@@ -172,7 +172,7 @@ mod tests {
                 reach
             };
             let (straight, bent) = (thickness(0.0), thickness(90.0));
-            // Linear skinning keeps 0.71 at a right angle; a collapse would be far below.
+            // Linear blend skinning retains a factor of 0.71 at a right angle; a collapsed joint would be far below.
             assert!(bent > 0.6 * straight && straight > 0.0, "{straight} cm straight, {bent} cm bent");
         }
     }

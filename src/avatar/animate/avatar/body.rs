@@ -1,38 +1,38 @@
-//! Shape of the body in its stance: shirt, bare arms, trousers or skirt, shoes. Numbers are cm of a body of 1.78 m, in
-//! the axes of the joint they belong to (x to its left, y up, z forward); hands are in `hand`.
+//! Shape of the body in the stance: shirt, bare arms, trousers or skirt, shoes (hands are in `hand`). Lengths are cm
+//! for a body of 1.78 m, in the axes of the joint in question (x to its left, y up, z forward).
 
 use super::appearance::{Appearance, Top};
-use super::field::{Form, RoundCone, around, joined};
+use super::field::{Form, RoundCone, bounding_box, smooth_union};
 use super::stance::{HIPS, Stance};
 use crate::animate::rig::rig::{Rig, RigArm};
 use orator_base::math::vec3::{Vec3, add, dot, norm, scale, sub, unit};
 
-/// Half of the shoulder width that the numbers below belong to, cm.
-const SHOULDERS: f64 = 16.5;
+/// Half of the reference shoulder width, cm.
+const HALF_SHOULDERS: f64 = 16.5;
 /// Distance of the sleeve's end from the wrist, and its radius there, cm, for a hand of size 1.
-const BARE: f64 = 1.9;
-const SLEEVE: f64 = 3.05;
+const SLEEVE_GAP: f64 = 1.9;
+const SLEEVE_RADIUS: f64 = 3.05;
 
 /// Shapes of a rig in its stance.
 pub struct BodyForm<'a> {
     pub rig: &'a Rig,
     pub stance: &'a Stance,
-    /// Shoulder width relative to the shape's.
-    broad: f64,
-    /// Sizes of the hands relative to the shape's.
-    hands: [f64; 2],
+    /// Shoulder width relative to the reference body.
+    shoulder_scale: f64,
+    /// Hand sizes relative to the reference hand.
+    hand_sizes: [f64; 2],
     pub looks: &'a Appearance,
 }
 
 impl<'a> BodyForm<'a> {
-    pub fn new(rig: &'a Rig, stance: &'a Stance, hands: [f64; 2], looks: &'a Appearance) -> Self {
+    pub fn new(rig: &'a Rig, stance: &'a Stance, hand_sizes: [f64; 2], looks: &'a Appearance) -> Self {
         let half = |arm: &RigArm| norm(rig.skeleton.joints[arm.upper].offset) / 2.0;
         let half: f64 = rig.arms.iter().map(half).sum();
-        let broad = (half / SHOULDERS / stance.scale).clamp(0.75, 1.3);
-        Self { rig, stance, broad, hands, looks }
+        let shoulder_scale = (half / HALF_SHOULDERS / stance.scale).clamp(0.75, 1.3);
+        Self { rig, stance, shoulder_scale, hand_sizes, looks }
     }
 
-    /// Tapered limb between two points of the shape's size in the axes of `joint`.
+    /// Tapered limb between two points in the axes of `joint`, cm of the reference body.
     pub fn limb(&self, joint: usize, ends: [Vec3; 2], radii: [f64; 2]) -> RoundCone {
         RoundCone::new(ends.map(|end| self.stance.at(joint, end)), radii.map(|r| r * self.stance.scale))
     }
@@ -45,8 +45,8 @@ impl<'a> BodyForm<'a> {
     pub fn trunk(&self) -> Form {
         let (hips, neck, looks) = (HIPS, self.rig.neck, self.looks);
         let girth = looks.trunk;
-        let wide = |x: f64| x * self.broad;
-        // A jacket lies over a shirt.
+        let wide = |x: f64| x * self.shoulder_scale;
+        // A jacket is worn over a shirt, so it is wider.
         let cloth = if looks.top == Top::Jacket { 0.6 } else { 0.0 };
         let across = |y: f64, x: f64, z: f64, r: f64, girth: f64| {
             let (x, r) = (x * girth, r * girth + cloth);
@@ -73,7 +73,7 @@ impl<'a> BodyForm<'a> {
         form.with(self.limb(neck, [[0.0, -4.0, -1.8], [0.0, 8.0, -0.4]], [low, high]), self.cm(4.0))
     }
 
-    /// One sleeve, open at the wrist or above the elbow.
+    /// One sleeve, which ends at the wrist or above the elbow.
     pub fn sleeve(&self, side: usize) -> Form {
         let arm = &self.rig.arms[side];
         let out = arm.sign;
@@ -89,7 +89,7 @@ impl<'a> BodyForm<'a> {
                 .cut(end, self.stance.direction(arm.upper, arm.fore), self.cm(1.0));
         }
         let end = self.sleeve_end(side);
-        let wrist = SLEEVE * self.hands[side] / self.stance.scale + cloth;
+        let wrist = SLEEVE_RADIUS * self.hand_sizes[side] / self.stance.scale + cloth;
         let on_fore = |from: Vec3, to: Vec3, radii: [f64; 2]| self.limb(arm.fore, [from, to], radii);
         Form::default()
             .with(on_upper([out * 0.6, -0.3, 0.0], [out * upper, 0.0, 0.0], [4.5, 3.9]), 0.0)
@@ -99,7 +99,7 @@ impl<'a> BodyForm<'a> {
             .cut(end, self.stance.direction(arm.fore, arm.hand), self.cm(0.5))
     }
 
-    /// Bare arm from inside the sleeve to the wrist; `None` under long sleeves.
+    /// Bare arm from inside the sleeve to the wrist; `None` with long sleeves.
     pub fn bare_arm(&self, side: usize) -> Option<Form> {
         if self.looks.top != Top::ShortSleeves {
             return None;
@@ -108,7 +108,7 @@ impl<'a> BodyForm<'a> {
         let out = arm.sign;
         let (upper, fore) = (self.length(arm.upper, arm.fore), self.length(arm.fore, arm.hand));
         let wide = |radii: [f64; 2]| radii.map(|r| r * self.looks.limbs);
-        let wrist = 2.4 * self.hands[side] / self.stance.scale;
+        let wrist = 2.4 * self.hand_sizes[side] / self.stance.scale;
         let back = self.stance.world[arm.hand].turn([0.0, 1.0, 0.0]);
         let on_upper = |from: Vec3, to: Vec3, radii: [f64; 2]| self.limb(arm.upper, [from, to], wide(radii));
         let on_fore = |from: Vec3, to: Vec3, radii: [f64; 2]| self.limb(arm.fore, [from, to], radii);
@@ -118,26 +118,32 @@ impl<'a> BodyForm<'a> {
             .with(on_fore([0.0; 3], [out * 0.28 * fore, 0.1, 0.3], wide([3.3, 3.6])), self.cm(1.6))
             .with(
                 on_fore([out * 0.28 * fore, 0.1, 0.3], [out * 0.95 * fore, 0.0, 0.0], [wide([3.6; 2])[0], wrist])
-                    .flat(back, 0.84),
+                    .flattened(back, 0.84),
                 self.cm(2.0),
             );
         Some(form)
     }
 
-    /// The band at a sleeve's end.
+    /// The cuff at the end of a sleeve.
     pub fn cuff(&self, side: usize) -> Form {
         let arm = &self.rig.arms[side];
         let along = self.stance.direction(arm.fore, arm.hand);
-        let (end, hand) = (self.sleeve_end(side), self.hands[side]);
+        let (end, hand) = (self.sleeve_end(side), self.hand_sizes[side]);
         let jacket = self.looks.top == Top::Jacket;
-        // The cuff of a shirt looks out of a jacket's sleeve.
+        // A shirt cuff protrudes from the sleeve of a jacket.
         let (far_by, loose) = if jacket { (0.9, 0.0) } else { (0.25, 0.2) };
         let [near, far] = [-2.6 * hand, far_by * hand].map(|cm| add(end, scale(along, cm)));
         // The sleeve widens towards the elbow.
-        let wider = (self.cm(4.0) - SLEEVE * hand).max(0.0) * (2.6 + BARE) * hand
+        let wider = (self.cm(4.0) - SLEEVE_RADIUS * hand).max(0.0) * (2.6 + SLEEVE_GAP) * hand
             / (0.7 * self.cm(self.length(arm.fore, arm.hand)));
         Form::default()
-            .with(RoundCone::new([near, far], [(SLEEVE + loose + 0.12) * hand + wider, (SLEEVE + loose) * hand]), 0.0)
+            .with(
+                RoundCone::new(
+                    [near, far],
+                    [(SLEEVE_RADIUS + loose + 0.12) * hand + wider, (SLEEVE_RADIUS + loose) * hand],
+                ),
+                0.0,
+            )
             .cut(far, along, 0.35 * hand)
             .cut(near, scale(along, -1.0), 0.35 * hand)
     }
@@ -145,15 +151,15 @@ impl<'a> BodyForm<'a> {
     fn sleeve_end(&self, side: usize) -> Vec3 {
         let arm = &self.rig.arms[side];
         let along = self.stance.direction(arm.fore, arm.hand);
-        sub(self.stance.positions[arm.hand], scale(along, BARE * self.hands[side]))
+        sub(self.stance.positions[arm.hand], scale(along, SLEEVE_GAP * self.hand_sizes[side]))
     }
 
-    /// The whole shirt.
+    /// Signed distance to the complete shirt.
     pub fn shirt(&self) -> impl Fn(Vec3) -> f64 + Sync + use<'_> {
         let trunk = self.trunk();
         let sleeves = [0, 1].map(|side| self.sleeve(side));
         let collar = self.stance.at(self.rig.neck, [0.0, 5.4, 0.0]);
-        // A shirt is worn over trousers and inside a skirt.
+        // A shirt is worn over trousers but inside a skirt.
         let low = match (self.looks.skirt, self.looks.top) {
             (_, Top::Jacket) => -10.0,
             (true, _) => 2.0,
@@ -163,26 +169,27 @@ impl<'a> BodyForm<'a> {
         let tilt = unit([0.0, 1.0, 0.42], 0.0).unwrap_or([0.0, 1.0, 0.0]);
         let (armpit, edge) = (self.cm(2.6), self.cm(1.5));
         move |at| {
-            let grown = sleeves.iter().fold(trunk.distance(at), |d, sleeve| joined(d, sleeve.distance(at), armpit));
+            let grown =
+                sleeves.iter().fold(trunk.distance(at), |d, sleeve| smooth_union(d, sleeve.distance(at), armpit));
             [(collar, tilt), (hem, [0.0, -1.0, 0.0])]
                 .into_iter()
-                .fold(grown, |d, (point, normal)| -joined(-d, -dot(sub(at, point), normal), edge))
+                .fold(grown, |d, (point, normal)| -smooth_union(-d, -dot(sub(at, point), normal), edge))
         }
     }
 
-    /// Corners of a box around the shirt.
+    /// Corners of the bounding box of the shirt.
     pub fn shirt_bounds(&self) -> [Vec3; 2] {
         let sleeves = [0, 1].map(|side| self.sleeve(side).bounds()).into_iter();
-        around(sleeves.chain([self.trunk().bounds()]))
+        bounding_box(sleeves.chain([self.trunk().bounds()]))
     }
 
-    /// Trousers from the waist to the ankles; below a skirt the legs.
+    /// Trousers from the waist to the ankles, or bare legs under a skirt.
     pub fn trousers(&self) -> Form {
         let (hips, looks) = (HIPS, self.looks);
         let seat = looks.trunk * looks.hips;
         let x = 5.4 * seat;
         let mut form = Form::default().with(self.limb(hips, [[-x, -3.5, -0.5], [x, -3.5, -0.5]], [8.6 * seat; 2]), 0.0);
-        // Thighs keep within narrow hips.
+        // Limits the thighs to the width of narrow hips.
         let girth = looks.limbs.min(seat + 0.05) * if looks.skirt { 0.84 } else { 1.0 };
         let narrow = 9.0 * (1.0 - seat).max(0.0);
         for (side, [upper, lower, foot, _]) in [1.0, -1.0].into_iter().zip(self.rig.legs) {
@@ -231,7 +238,7 @@ impl<'a> BodyForm<'a> {
             .cut(ground, [0.0, -1.0, 0.0], self.cm(1.2))
     }
 
-    /// Distance of two joints in the form's size.
+    /// Distance of two joints, cm of the reference body.
     fn length(&self, from: usize, to: usize) -> f64 {
         norm(scale(sub(self.stance.positions[to], self.stance.positions[from]), 1.0 / self.stance.scale))
     }

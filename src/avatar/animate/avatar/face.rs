@@ -1,34 +1,34 @@
-//! Features that are drawn on the face point by point: eyes with lids, brows, lips, teeth, and glasses. All in the axes of
-//! the head's shape.
+//! Facial features modelled point by point: eyes with lids, brows, lips, teeth, and glasses, in the axes of the
+//! reference head.
 
 use super::appearance::{Appearance, Reflectance};
 use super::head::{EAR, EYE, EYE_RADIUS, HeadForm};
-use super::jaw::{MOUTH_HALF, MOUTH_Y, jaw_share, rise};
+use super::jaw::{MOUTH_HALF, MOUTH_Y, jaw_share, smooth_step};
 use super::material::Material;
 use super::surface::Surface;
 use orator_base::math::vec3::{Vec3, add, scale, sub, unit};
 
-/// Degrees of the lids' edges above and below the middle of the eye, and of the corners beside it.
+/// Angles from the centre of the eye to the edges of the upper and lower lid and to the corners of the eye, degrees.
 const UPPER_LID: f64 = 21.5;
 const LOWER_LID: f64 = 17.0;
 const CORNER: f64 = 66.0;
 /// Thickness of a lid, cm.
 const LID: f64 = 0.13;
-/// Degrees from the middle of the iris to the edges of pupil and iris.
+/// Angles from the centre of the iris to the edges of the pupil and the iris, degrees.
 const PUPIL: f64 = 9.0;
 const IRIS: f64 = 25.5;
 
-/// Part of the face in the head's axes.
+/// A facial feature in the axes of the head.
 pub struct Feature {
     pub material: Material,
     pub surface: Surface,
     pub colours: Vec<Reflectance>,
-    /// Share of each vertex in the jaw's turn; empty where nothing moves.
+    /// Fraction of the jaw rotation that each vertex follows, 0..1; empty if no vertex moves.
     pub shares: Vec<f64>,
 }
 
 impl Feature {
-    fn still(material: Material, surface: Surface, colours: Vec<Reflectance>) -> Self {
+    fn fixed(material: Material, surface: Surface, colours: Vec<Reflectance>) -> Self {
         Self { material, surface, colours, shares: Vec::new() }
     }
 
@@ -43,7 +43,7 @@ pub fn mix(a: Reflectance, b: Reflectance, share: f64) -> Reflectance {
 }
 
 impl HeadForm<'_> {
-    /// All features of the face.
+    /// All features of the face; none for a mannequin's head.
     pub fn features(&self, looks: &Appearance) -> Vec<Feature> {
         let mut all = Vec::new();
         if !looks.face {
@@ -73,13 +73,13 @@ impl HeadForm<'_> {
         let surface = Surface::net(&rows);
         let colour = mix(looks.hair_colour.map(|v| 0.7 * v), looks.skin, 0.12);
         let colours = vec![colour; surface.points.len()];
-        Feature::still(Material::Hair, surface, colours)
+        Feature::fixed(Material::Hair, surface, colours)
     }
 
-    /// Upper or lower lip from its border to its inner edge and a little inwards.
+    /// Upper or lower lip, from its border to its inner edge and slightly inwards.
     fn lip(&self, looks: &Appearance, upper: bool) -> Feature {
         let side = if upper { 1.0 } else { -1.0 };
-        // Share of the way from the inner edge to the border, height over the skin, share of the lip's colour.
+        // Position from the inner edge (0) to the border (1), height over the skin (cm), strength of the lip colour.
         let across = [
             (-0.2, -0.55, 1.0),
             (0.0, -0.02, 1.0),
@@ -130,7 +130,7 @@ impl HeadForm<'_> {
         };
         let surface = Surface::net(&[row(MOUTH_Y - 0.3, 0.12), row(MOUTH_Y - 0.22, 0.0), row(MOUTH_Y + 0.75, 0.0)]);
         let colours = vec![[0.62, 0.58, 0.50]; surface.points.len()];
-        Feature::still(Material::Eyes, surface, colours)
+        Feature::fixed(Material::Eyes, surface, colours)
     }
 
     /// Frames of glasses: two rims, the bridge between them, and the temples.
@@ -154,11 +154,11 @@ impl HeadForm<'_> {
             (-4..=4).map(|k| f64::from(k) * 0.24).map(|x| [x, 11.0 - 0.25 * x * x, bent(x) + 0.1]).collect();
         surface.extend(Surface::tube(&bridge, false, 0.16, 5));
         let colours = vec![colour; surface.points.len()];
-        Feature::still(Material::Frames, surface, colours)
+        Feature::fixed(Material::Frames, surface, colours)
     }
 }
 
-/// Left eyeball: pupil, iris and white in rings about its axis.
+/// Left eyeball, with rings for pupil, iris and white around its axis.
 fn eyeball(looks: &Appearance) -> Feature {
     let (black, white) = ([0.004; 3], [0.66, 0.63, 0.60]);
     let rim = looks.iris.map(|v| 0.35 * v);
@@ -178,22 +178,22 @@ fn eyeball(looks: &Appearance) -> Feature {
         .map(|(degrees, _)| {
             let (sin, cos) = f64::to_radians(*degrees).sin_cos();
             let around = (0..=18).map(|k| (f64::from(k) / 18.0 * std::f64::consts::TAU).sin_cos());
-            // Clockwise seen from in front: along the row, then outwards, then to the front.
+            // The order is clockwise from the front: along the row, then outwards, then to the front.
             around.map(|(y, x)| add(EYE, scale([-sin * x, sin * y, cos], EYE_RADIUS))).collect()
         })
         .collect();
     let colours = rings.iter().flat_map(|(_, colour)| [*colour; 19]).collect();
-    Feature::still(Material::Eyes, Surface::net(&rows), colours)
+    Feature::fixed(Material::Eyes, Surface::net(&rows), colours)
 }
 
-/// Upper or lower lid of the left eye: a part of a shell around the eyeball, with its edge.
+/// Upper or lower lid of the left eye: part of a shell around the eyeball, with its edge.
 fn lid(looks: &Appearance, upper: bool) -> Feature {
     let side = if upper { 1.0 } else { -1.0 };
     let lash =
         if upper { mix(looks.hair_colour.map(|v| 0.5 * v), [0.01; 3], 0.6) } else { looks.skin.map(|v| 0.5 * v) };
     let fold = looks.skin.map(|v| 0.86 * v);
     let moist = mix(looks.skin, [0.45, 0.14, 0.12], 0.5);
-    // Degrees beyond the edge, height over the eyeball, colour.
+    // Angle beyond the edge (degrees), height over the eyeball (cm), colour.
     let rows = [
         (0.0, -0.02, moist),
         (0.0, LID, lash),
@@ -210,10 +210,11 @@ fn lid(looks: &Appearance, upper: bool) -> Feature {
         for k in -12..=12 {
             let u = f64::from(k) / 10.0;
             let turn = CORNER * u;
-            // The highest place of the upper lid is nearer to the nose, that of the lower lid farther from it.
+            // The highest point of the upper lid is nearer to the nose, the lowest point of the lower lid farther from
+            // it.
             let skewed = (u + side * 0.12 * (1.0 - u * u)).clamp(-1.0, 1.0);
             let open = (1.0 - skewed * skewed).max(0.0).powf(0.72) * if upper { UPPER_LID } else { LOWER_LID };
-            // The outer corner stands a little higher.
+            // The outer corner is slightly higher.
             let tilt = 2.5 * u;
             let up = side * (open + beyond) + tilt;
             let ((sin_x, cos_x), (sin_y, cos_y)) = (turn.to_radians().sin_cos(), up.to_radians().sin_cos());
@@ -229,18 +230,18 @@ fn lid(looks: &Appearance, upper: bool) -> Feature {
         colours = colours.chunks(width).rev().flatten().copied().collect();
     }
     let mut surface = Surface::net(&net);
-    // Where a lid passes into the skin, its light does too.
+    // Normals of the lid approach those of the skin where the two meet.
     for (at, normal) in surface.points.iter().zip(&mut surface.normals) {
         let from = scale(sub(*at, EYE), 1.0 / EYE_RADIUS);
         let skin = [0.3, 0.0, 0.95];
-        let share = 0.75 * rise((from[1].abs() - 0.55) / 0.25);
+        let share = 0.75 * smooth_step((from[1].abs() - 0.55) / 0.25);
         *normal = unit(add(scale(*normal, 1.0 - share), scale(skin, share)), 1e-9).unwrap_or(skin);
     }
-    Feature::still(Material::Face, surface, colours)
+    Feature::fixed(Material::Face, surface, colours)
 }
 
 impl HeadForm<'_> {
-    /// Colour of the skin of the head at a point.
+    /// Skin colour of the head at a point.
     pub fn complexion(&self, at: Vec3, looks: &Appearance) -> Reflectance {
         if !looks.face {
             return looks.skin;
@@ -250,13 +251,14 @@ impl HeadForm<'_> {
         }
         let [x, y, z] = [at[0].abs(), at[1], at[2]];
         let mut colour = looks.skin;
-        // Cheeks and the tip of the nose have more blood.
-        let blood = rise(1.0 - ((x - 4.2).hypot(y - 7.0) / 2.0)) * rise((z - 5.0) / 2.0);
-        let tip = rise(1.0 - x.hypot(y - 7.4) / 1.1) * rise((z - 10.3) / 0.5);
+        // Cheeks and the tip of the nose are redder.
+        let blood = smooth_step(1.0 - ((x - 4.2).hypot(y - 7.0) / 2.0)) * smooth_step((z - 5.0) / 2.0);
+        let tip = smooth_step(1.0 - x.hypot(y - 7.4) / 1.1) * smooth_step((z - 10.3) / 0.5);
         let red = [0.95 * colour[0], 0.74 * colour[1], 0.72 * colour[2]];
         colour = mix(colour, red, 0.55 * (blood + tip).min(1.0));
         // Nostrils are dark.
-        let nostril = rise(1.6 - ((x - 0.62 * looks.nose) / 0.24).hypot((y - 6.75) / 0.35).hypot((z - 10.0) / 0.6));
+        let nostril =
+            smooth_step(1.6 - ((x - 0.62 * looks.nose) / 0.24).hypot((y - 6.75) / 0.35).hypot((z - 10.0) / 0.6));
         colour = mix(colour, looks.skin.map(|v| 0.25 * v), 0.9 * nostril);
         mix(colour, mix(looks.hair_colour, looks.skin, 0.15), beard([x, y, z], looks))
     }
@@ -268,9 +270,10 @@ fn beard([x, y, z]: Vec3, looks: &Appearance) -> f64 {
         return 0.0;
     }
     let cheek = 5.0 + 0.6 * (x - 2.6).max(0.0) + 0.5 * (4.0 - z).max(0.0);
-    let jaw = rise((cheek - y) / 0.5) * rise((x - 2.2) / 0.5);
-    let chin = rise((MOUTH_Y - 1.1 - y) / 0.3);
-    let moustache = rise((y - MOUTH_Y - 0.55) / 0.2) * rise((6.0 - y) / 0.3) * rise((2.9 - x) / 0.4);
-    let front = rise((z - 1.0) / 1.4) * rise((y + 1.4) / 1.2);
+    let jaw = smooth_step((cheek - y) / 0.5) * smooth_step((x - 2.2) / 0.5);
+    let chin = smooth_step((MOUTH_Y - 1.1 - y) / 0.3);
+    let moustache =
+        smooth_step((y - MOUTH_Y - 0.55) / 0.2) * smooth_step((6.0 - y) / 0.3) * smooth_step((2.9 - x) / 0.4);
+    let front = smooth_step((z - 1.0) / 1.4) * smooth_step((y + 1.4) / 1.2);
     looks.beard * (jaw.max(chin).max(moustache) * front)
 }

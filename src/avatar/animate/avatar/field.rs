@@ -1,13 +1,13 @@
-//! Shapes as signed distance fields (cm, negative inside): tapered limbs joined with smooth unions and cut by planes.
+//! Shapes as signed distance fields (cm, negative inside): tapered limbs, joined by smooth unions and cut by planes.
 
 use orator_base::math::vec3::{Vec3, add, dot, norm, scale, sub};
 
-/// Rounded cone between two points with a radius at each.
+/// Rounded cone between two points, with a radius at each.
 #[derive(Clone, Copy, Debug)]
 pub struct RoundCone {
     ends: [Vec3; 2],
     radii: [f64; 2],
-    /// Unit vector along which the limb is thinner (or thicker), and the factor.
+    /// Unit vector and factor by which the radii are scaled along it.
     flat: Option<(Vec3, f64)>,
 }
 
@@ -16,12 +16,12 @@ impl RoundCone {
         Self { ends, radii, flat: None }
     }
 
-    /// Multiplies all radii along the unit vector `axis` by `factor`.
-    pub fn flat(self, axis: Vec3, factor: f64) -> Self {
+    /// Scales all radii along the unit vector `axis` by `factor`.
+    pub fn flattened(self, axis: Vec3, factor: f64) -> Self {
         Self { flat: Some((axis, factor)), ..self }
     }
 
-    /// Signed distance of a point, exact for a limb of one radius and no flattening.
+    /// Signed distance of a point; exact for equal radii without flattening.
     pub fn distance(&self, point: Vec3) -> f64 {
         let [a, b] = self.ends;
         let along = sub(b, a);
@@ -30,7 +30,7 @@ impl RoundCone {
         let radius = self.radii[0] + share * (self.radii[1] - self.radii[0]);
         let far = norm(from);
         let Some((axis, factor)) = self.flat else { return far - radius };
-        // In a space stretched along the axis the limb is round; the ratio of the lengths brings it back.
+        // The limb is round in a space stretched along the axis; the ratio of the lengths maps the distance back.
         let stretched = norm(add(from, scale(axis, dot(from, axis) * (1.0 / factor - 1.0))));
         if stretched < 1e-9 { -radius * factor.min(1.0) } else { (stretched - radius) * far / stretched }
     }
@@ -43,8 +43,8 @@ impl RoundCone {
     }
 }
 
-/// The union of two distances, rounded where they meet within `blend`.
-pub fn joined(a: f64, b: f64, blend: f64) -> f64 {
+/// Smooth union of two distances, rounded within `blend` cm of their intersection.
+pub fn smooth_union(a: f64, b: f64, blend: f64) -> f64 {
     let near = (blend - (a - b).abs()).max(0.0);
     a.min(b) - near * near / (4.0 * blend.max(1e-9))
 }
@@ -52,9 +52,9 @@ pub fn joined(a: f64, b: f64, blend: f64) -> f64 {
 /// Smooth union of limbs, cut by planes.
 #[derive(Clone, Debug, Default)]
 pub struct Form {
-    /// Limb and the width of its blend with those before it, cm.
+    /// Each limb with the width of its blend with the previous ones, cm.
     limbs: Vec<(RoundCone, f64)>,
-    /// Point of the plane, outward unit normal, roundness of the edge, cm.
+    /// Each plane as a point, its outward unit normal and the rounding of the edge, cm.
     cuts: Vec<(Vec3, Vec3, f64)>,
 }
 
@@ -65,7 +65,7 @@ impl Form {
         self
     }
 
-    /// Cuts off the side that `normal` points to.
+    /// Removes the side that `normal` points to.
     #[must_use]
     pub fn cut(mut self, point: Vec3, normal: Vec3, edge: f64) -> Self {
         self.cuts.push((point, normal, edge));
@@ -74,22 +74,22 @@ impl Form {
 
     pub fn distance(&self, point: Vec3) -> f64 {
         let grown = self.limbs.iter().fold(f64::INFINITY, |d, (limb, blend)| {
-            if d.is_finite() { joined(d, limb.distance(point), *blend) } else { limb.distance(point) }
+            if d.is_finite() { smooth_union(d, limb.distance(point), *blend) } else { limb.distance(point) }
         });
-        self.cuts.iter().fold(grown, |d, (at, normal, edge)| -joined(-d, -dot(sub(point, *at), *normal), *edge))
+        self.cuts.iter().fold(grown, |d, (at, normal, edge)| -smooth_union(-d, -dot(sub(point, *at), *normal), *edge))
     }
 
     /// Corners of the axis-aligned bounding box.
     pub fn bounds(&self) -> [Vec3; 2] {
-        around(self.limbs.iter().map(|(limb, blend)| {
+        bounding_box(self.limbs.iter().map(|(limb, blend)| {
             let [low, high] = limb.bounds();
             [low.map(|v| v - blend / 4.0), high.map(|v| v + blend / 4.0)]
         }))
     }
 }
 
-/// Corners of the bounding box of boxes.
-pub fn around(boxes: impl Iterator<Item = [Vec3; 2]>) -> [Vec3; 2] {
+/// Corners of the bounding box of several boxes.
+pub fn bounding_box(boxes: impl Iterator<Item = [Vec3; 2]>) -> [Vec3; 2] {
     boxes.fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[low, high], [a, b]| {
         [[0, 1, 2].map(|k| low[k].min(a[k])), [0, 1, 2].map(|k| high[k].max(b[k]))]
     })
@@ -100,14 +100,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn distances_are_those_of_the_form() {
+    fn distances_match_the_shape() {
         let limb = RoundCone::new([[0.0; 3], [4.0, 0.0, 0.0]], [1.0, 1.0]);
         assert!((limb.distance([2.0, 3.0, 0.0]) - 2.0).abs() < 1e-12);
         assert!((limb.distance([6.0, 0.0, 0.0]) - 1.0).abs() < 1e-12);
-        let flat = limb.flat([0.0, 0.0, 1.0], 0.5);
-        assert!(flat.distance([1.0, 0.0, 0.5]).abs() < 1e-12 && flat.distance([1.0, 1.0, 0.0]).abs() < 1e-12);
+        let flattened = limb.flattened([0.0, 0.0, 1.0], 0.5);
+        assert!(flattened.distance([1.0, 0.0, 0.5]).abs() < 1e-12 && flattened.distance([1.0, 1.0, 0.0]).abs() < 1e-12);
         let form = Form::default().with(limb, 0.0).cut([3.0, 0.0, 0.0], [1.0, 0.0, 0.0], 1e-6);
         assert!(form.distance([3.5, 0.0, 0.0]) > 0.49 && form.distance([2.9, 0.0, 0.0]) < 0.0);
-        assert!(joined(0.1, 0.1, 1.0) < 0.1 && (joined(0.1, 2.0, 1.0) - 0.1).abs() < 1e-12);
+        assert!(smooth_union(0.1, 0.1, 1.0) < 0.1 && (smooth_union(0.1, 2.0, 1.0) - 0.1).abs() < 1e-12);
     }
 }

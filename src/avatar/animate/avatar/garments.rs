@@ -1,33 +1,33 @@
-//! What is worn over the shirt's field: collar and lapels, given point by point, and the colours of the cloth.
+//! Garment details over the shirt's field: collar and lapels, modelled point by point, and the colours of the cloth.
 
 use super::appearance::{Appearance, Reflectance, Top, Weave};
 use super::body::BodyForm;
-use super::jaw::rise;
+use super::jaw::smooth_step;
 use super::stance::HIPS;
 use super::surface::Surface;
 use orator_base::math::vec3::{Vec3, dot, sub};
 
-/// Height above the hips at which a jacket is buttoned, and at which its lapels begin, cm.
+/// Heights of a jacket's button and of the top of its lapels above the hips, cm.
 const BUTTON: f64 = 13.0;
 const THROAT: f64 = 53.0;
-/// Largest half width of the shirt that a jacket shows, cm.
-const OPEN: f64 = 6.2;
-/// Length of a stripe with its space, and of a check, cm.
+/// Maximum half width of the opening of a jacket, cm.
+const MAX_OPENING: f64 = 6.2;
+/// Period of the stripes and of the checks, cm.
 const STRIPE: f64 = 10.0;
 const CHECK: f64 = 10.0;
 
-/// Half width of the jacket's opening at a height above the hips, cm.
+/// Half width of a jacket's opening at a height above the hips, cm.
 fn opening(y: f64) -> f64 {
-    OPEN * ((y - BUTTON) / (THROAT - BUTTON)).clamp(0.0, 1.0).powf(0.85)
+    MAX_OPENING * ((y - BUTTON) / (THROAT - BUTTON)).clamp(0.0, 1.0).powf(0.85)
 }
 
-/// Width of a lapel at a share of its length: widest below the notch, narrow as a collar above, cm.
+/// Width of a lapel at a fraction of its length, cm: widest below the notch, narrow above it.
 fn lapel(share: f64) -> f64 {
     if share < 0.74 { 0.6 + 7.6 * share } else { 3.6 }
 }
 
 impl BodyForm<'_> {
-    /// Point of the shirt in front of the hips' (x, y), `over` cm above the cloth, in the stance.
+    /// Point `over` cm above the front of the shirt at (x, y) in the axes of the hips, in the stance.
     fn on_chest(&self, shirt: &dyn Fn(Vec3) -> f64, [x, y]: [f64; 2], over: f64) -> Vec3 {
         let mut z = 22.0;
         for _ in 0..60 {
@@ -40,7 +40,7 @@ impl BodyForm<'_> {
         self.stance.at(HIPS, [x, y, z + over])
     }
 
-    /// Lapels of a jacket, left and right.
+    /// Left and right lapel of a jacket.
     pub fn lapels(&self, shirt: &dyn Fn(Vec3) -> f64) -> Surface {
         let side = |sign: f64| {
             let mut rows: Vec<Vec<Vec3>> = Vec::new();
@@ -70,7 +70,7 @@ impl BodyForm<'_> {
         both
     }
 
-    /// Collar of a shirt, folded over, open in front.
+    /// Folded shirt collar, open in front.
     pub fn collar(&self) -> Surface {
         let neck = self.rig.neck;
         let size = self.looks.neck.max(0.9) * self.looks.head[0].max(1.0);
@@ -98,7 +98,7 @@ impl BodyForm<'_> {
         Surface::net(&rows)
     }
 
-    /// Colours of the shirt's points.
+    /// Colours of the shirt's vertices.
     pub fn cloth(&self, points: &[Vec3], normals: &[Vec3]) -> Vec<Reflectance> {
         let looks = self.looks;
         let trunk = self.trunk();
@@ -107,15 +107,15 @@ impl BodyForm<'_> {
         let colour = |(&at, normal): (&Vec3, &Vec3)| {
             let local = sub(at, stance.positions[HIPS]).map(|v| v / stance.scale);
             if looks.top == Top::Jacket {
-                // Above the lapels the jacket lies on the shoulders, at the side of the neck.
+                // Above the lapels the jacket covers the shoulders up to the sides of the neck.
                 let narrow = 0.8 * (local[1] - THROAT + 5.0).max(0.0);
-                // The colours meet below the lapel, a cell away from its outer edge.
+                // The colours meet under the lapel, one cell from its outer edge.
                 let under = (lapel((local[1] - BUTTON) / (THROAT - BUTTON)) - 2.4).min(0.9);
                 let shown =
                     normal[2] > 0.15 && local[1] > BUTTON + 1.0 && local[0].abs() < opening(local[1]) + under - narrow;
                 return if shown { looks.second_colour } else { looks.top_colour };
             }
-            // Along the trunk, or along the arm whose sleeve is nearer; and around.
+            // Coordinates along and around the trunk, or the arm if its sleeve is nearer.
             let on_trunk = trunk.distance(at);
             let arm = (0..2).find(|&side| sleeves[side].distance(at) < on_trunk);
             let [along, around] = arm.map_or([local[1], local[0]], |side| {
@@ -123,15 +123,15 @@ impl BodyForm<'_> {
                 let from = sub(at, stance.positions[arm.upper]).map(|v| v / stance.scale);
                 [dot(from, stance.direction(arm.upper, arm.fore)) + 0.5 * STRIPE, from[2]]
             });
-            woven(looks, along, around)
+            cloth_colour(looks, along, around)
         };
         points.iter().zip(normals).map(colour).collect()
     }
 }
 
-/// Colour of the cloth at a place along and around the body, cm.
-fn woven(looks: &Appearance, along: f64, around: f64) -> Reflectance {
-    let wave = |at: f64, period: f64| rise(1.5 * (at / period * std::f64::consts::TAU).sin());
+/// Colour of the cloth at a position along and around the body, cm.
+fn cloth_colour(looks: &Appearance, along: f64, around: f64) -> Reflectance {
+    let wave = |at: f64, period: f64| smooth_step(1.5 * (at / period * std::f64::consts::TAU).sin());
     let share = match looks.weave {
         Weave::Plain => 0.0,
         Weave::Stripes => wave(along, STRIPE),

@@ -1,23 +1,23 @@
-//! Shape of a hand in its stance on the rig's own bones: a palm over the metacarpals, five fingers that blend with the
-//! palm but not with each other, and the wrist inside the sleeve.
+//! Shape of a hand in the stance, built on the rig's own bones: a palm over the metacarpals, five fingers that blend
+//! with the palm but not with each other, and the wrist inside the sleeve.
 
-use super::field::{Form, RoundCone, around, joined};
+use super::field::{Form, RoundCone, bounding_box, smooth_union};
 use super::stance::{Stance, finger_joints};
 use crate::animate::rig::rig::Rig;
 use orator_base::math::vec3::{Vec3, add, cross, norm, scale, sub, unit};
 
 /// Mean length of the four metacarpals of the reference hand, cm.
-const METACARPAL: f64 = 7.5;
-/// Length of the reference hand's middle finger from the knuckle to the end joint, cm.
-const MIDDLE: f64 = 9.8;
-/// Radius of each finger at its knuckle (thumb to little finger), and its share at the further joints.
-const FINGERS: [f64; 5] = [1.10, 0.88, 0.90, 0.85, 0.76];
-const ALONG: [f64; 4] = [1.0, 0.90, 0.80, 0.66];
-const THUMB_ALONG: [f64; 4] = [1.10, 1.0, 0.93, 0.74];
-/// Largest radius of a finger as a share of the distance of two knuckles.
-const CROWDED: f64 = 0.47;
+const METACARPAL_CM: f64 = 7.5;
+/// Length of the reference hand's middle finger from the knuckle to the tip joint, cm.
+const MIDDLE_CM: f64 = 9.8;
+/// Radius of each finger at its knuckle (thumb to little finger), cm, and factors for its joints from knuckle to tip.
+const FINGER_RADII: [f64; 5] = [1.10, 0.88, 0.90, 0.85, 0.76];
+const TAPER: [f64; 4] = [1.0, 0.90, 0.80, 0.66];
+const THUMB_TAPER: [f64; 4] = [1.10, 1.0, 0.93, 0.74];
+/// Maximum radius of a finger relative to the distance between neighbouring knuckles.
+const MAX_RADIUS_RATIO: f64 = 0.47;
 
-/// One hand.
+/// Shape of one hand.
 pub struct HandForm {
     palm: Form,
     fingers: [Form; 5],
@@ -34,7 +34,7 @@ impl HandForm {
         let metacarpals = (1..5).map(|f| norm(sub(knuckle(f), wrist))).sum::<f64>() / 4.0;
         let middle: f64 =
             fingers[2].windows(2).map(|bone| norm(sub(stance.positions[bone[1]], stance.positions[bone[0]]))).sum();
-        let size = (metacarpals + middle) / (METACARPAL + MIDDLE);
+        let size = (metacarpals + middle) / (METACARPAL_CM + MIDDLE_CM);
         let along = unit(sub(scale(add(knuckle(2), knuckle(3)), 0.5), wrist), 1e-6).unwrap_or([arm.sign, 0.0, 0.0]);
         let to_thumb = sub(knuckle(1), knuckle(4));
         let back = unit(scale(cross(along, to_thumb), -arm.sign), 1e-6).unwrap_or([0.0, 1.0, 0.0]);
@@ -48,7 +48,7 @@ impl HandForm {
                 .into_iter()
                 .filter(|&n| finger > 0 && n != finger)
                 .map(|n| norm(sub(knuckle(n), knuckle(finger))));
-            room.fold(cm(FINGERS[finger]), |r, gap| r.min(CROWDED * gap))
+            room.fold(cm(FINGER_RADII[finger]), |r, gap| r.min(MAX_RADIUS_RATIO * gap))
         });
         let mut palm = Form::default();
         for (finger, radius) in radius.iter().enumerate().skip(1) {
@@ -57,7 +57,7 @@ impl HandForm {
             palm = palm.with(RoundCone::new([start, end], [cm(1.25), radius * 1.08]), cm(0.9));
         }
         let thumb = fingers[0].map(|joint| stance.positions[joint]);
-        // Balls of the thumb and of the little finger; web between thumb and index finger.
+        // Thenar and hypothenar eminences, and the web between thumb and index finger.
         let thumb_ball = [inwards(mix(wrist, thumb[0], 0.7), 0.2), mix(thumb[0], thumb[1], 0.7)];
         let little_ball = [0.3, 0.8].map(|share| inwards(mix(wrist, knuckle(4), share), 0.42));
         palm = palm
@@ -67,16 +67,16 @@ impl HandForm {
             let web = [mix(thumb[0], thumb[1], on_thumb), inwards(mix(wrist, knuckle(1), on_index), 0.2)];
             palm = palm.with(RoundCone::new(web, [cm(0.85), cm(0.85)]), cm(1.6));
         }
-        // Wrist, wider than thick, up into the sleeve.
+        // The wrist is wider than it is thick and reaches into the sleeve.
         let elbow = stance.positions[arm.fore];
         let stub = [mix(wrist, elbow, 0.30), mix(wrist, elbow, -0.03)];
-        palm = palm.with(RoundCone::new(stub, [cm(2.5), cm(2.4)]).flat(back, 0.76), cm(2.0));
+        palm = palm.with(RoundCone::new(stub, [cm(2.5), cm(2.4)]).flattened(back, 0.76), cm(2.0));
 
         let fingers = std::array::from_fn(|finger| {
             let positions = fingers[finger].map(|joint| stance.positions[joint]);
-            let shares = if finger == 0 { THUMB_ALONG } else { ALONG };
+            let shares = if finger == 0 { THUMB_TAPER } else { TAPER };
             (0..3).fold(Form::default(), |form, k| {
-                // The joint of the tip lies under the nail.
+                // The tip joint is below the nail.
                 let end = if k == 2 { mix(positions[3], positions[2], 0.12) } else { positions[k + 1] };
                 let radii = [radius[finger] * shares[k], radius[finger] * shares[k + 1]];
                 form.with(RoundCone::new([positions[k], end], radii), cm(0.25))
@@ -85,27 +85,27 @@ impl HandForm {
         Self { palm, fingers, scale: size }
     }
 
-    /// The palm with the thumb and the wrist.
+    /// Signed distance to the palm with the thumb and the wrist.
     pub fn palm(&self, at: Vec3) -> f64 {
-        joined(self.palm.distance(at), self.fingers[0].distance(at), 1.2 * self.scale)
+        smooth_union(self.palm.distance(at), self.fingers[0].distance(at), 1.2 * self.scale)
     }
 
-    /// One of the four fingers beside the thumb.
+    /// Signed distance to one of the four fingers other than the thumb.
     pub fn finger(&self, finger: usize, at: Vec3) -> f64 {
         self.fingers[finger].distance(at)
     }
 
-    /// Distance to the whole hand with fingers blended into the palm; its gradient gives the normals.
-    pub fn whole(&self, at: Vec3) -> f64 {
+    /// Signed distance to the complete hand with fingers blended into the palm; its gradient gives the normals.
+    pub fn blended(&self, at: Vec3) -> f64 {
         let palm = self.palm(at);
-        (1..5).fold(palm, |d, finger| d.min(joined(palm, self.finger(finger, at), 0.6 * self.scale)))
+        (1..5).fold(palm, |d, finger| d.min(smooth_union(palm, self.finger(finger, at), 0.6 * self.scale)))
     }
 
-    /// Corners of a box around the palm with the thumb, or around a finger.
+    /// Corners of the bounding box of the palm with the thumb, or of a finger.
     pub fn bounds(&self, finger: Option<usize>) -> [Vec3; 2] {
         match finger {
             Some(finger) => self.fingers[finger].bounds(),
-            None => around([self.palm.bounds(), self.fingers[0].bounds()].into_iter()),
+            None => bounding_box([self.palm.bounds(), self.fingers[0].bounds()].into_iter()),
         }
     }
 }

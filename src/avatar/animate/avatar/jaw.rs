@@ -1,34 +1,35 @@
-//! Opening of the mouth in the axes of the head: what lies below the mouth's line turns down about the jaw's hinge.
+//! Opening of the mouth, in the axes of the head: the part below the mouth line rotates down about the hinge of the
+//! jaw.
 
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::{Vec3, add, scale, sub};
 
-/// Line of the closed mouth and half its width, cm.
+/// Height of the closed mouth, and half its width, cm.
 pub const MOUTH_Y: f64 = 4.45;
 pub const MOUTH_HALF: f64 = 2.5;
-/// Hinge of the jaw (y, z), and its angle with the mouth fully open, degrees.
+/// Hinge of the jaw (y, z), cm, and its rotation with the mouth fully open, degrees.
 const HINGE: [f64; 2] = [7.5, 0.4];
-const WIDEST: f64 = 17.0;
+const MAX_JAW_DEGREES: f64 = 17.0;
 
 /// Smooth step from 0 at -1 to 1 at 1.
-pub fn rise(at: f64) -> f64 {
+pub fn smooth_step(at: f64) -> f64 {
     let t = ((at + 1.0) / 2.0).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
-/// Share, 0..1, of the jaw's turn that a point of the head takes part in.
+/// Fraction of the jaw rotation that a point of the head follows, 0..1.
 pub fn jaw_share([x, y, z]: Vec3) -> f64 {
-    // At the lips a step; towards the cheeks ever more gradual.
-    let gradual = 0.22 + 0.9 * (x.abs() - 2.1).max(0.0) + 0.5 * (7.5 - z).max(0.0) * rise(x.abs() - 2.5);
-    let below = rise((MOUTH_Y - y) / gradual);
-    // The nape, the ears and the throat stay.
-    below * rise((z - 2.6) / 2.8) * rise((y + 2.2) / 1.6)
+    // The transition is sharp at the lips and ever more gradual towards the cheeks.
+    let gradual = 0.22 + 0.9 * (x.abs() - 2.1).max(0.0) + 0.5 * (7.5 - z).max(0.0) * smooth_step(x.abs() - 2.5);
+    let below = smooth_step((MOUTH_Y - y) / gradual);
+    // The nape, the ears and the throat do not move.
+    below * smooth_step((z - 2.6) / 2.8) * smooth_step((y + 2.2) / 1.6)
 }
 
-/// Way of a point from the closed to the fully open mouth when it takes part by `share`, cm.
+/// Displacement of a point when the mouth opens fully, for a given jaw fraction, cm.
 pub fn opening(at: Vec3, share: f64) -> Vec3 {
     let hinge = [0.0, HINGE[0], HINGE[1]];
-    let turned = Rotation::about([1.0, 0.0, 0.0], WIDEST.to_radians()).turn(sub(at, hinge));
+    let turned = Rotation::about([1.0, 0.0, 0.0], MAX_JAW_DEGREES.to_radians()).turn(sub(at, hinge));
     scale(sub(add(turned, hinge), at), share)
 }
 
@@ -38,12 +39,12 @@ mod tests {
 
     #[test]
     fn the_chin_drops_and_the_upper_face_stays() {
-        let way = |at: Vec3| opening(at, jaw_share(at));
-        assert!(way([0.0, 1.0, 8.5])[1] < -2.0 && way([0.0, 3.8, 9.5])[1] < -2.2);
-        for still in [[0.0, 5.4, 9.5], [3.1, 10.5, 8.5], [0.0, -5.0, 4.0], [7.5, 9.6, 0.0], [0.0, 5.0, -7.0]] {
-            assert!(way(still)[1].abs() < 0.02, "{still:?}");
+        let displacement = |at: Vec3| opening(at, jaw_share(at));
+        assert!(displacement([0.0, 1.0, 8.5])[1] < -2.0 && displacement([0.0, 3.8, 9.5])[1] < -2.2);
+        for fixed in [[0.0, 5.4, 9.5], [3.1, 10.5, 8.5], [0.0, -5.0, 4.0], [7.5, 9.6, 0.0], [0.0, 5.0, -7.0]] {
+            assert!(displacement(fixed)[1].abs() < 0.02, "{fixed:?}");
         }
-        let cheeks = [6.0, 5.0, 4.4, 4.0, 3.0].map(|y| way([4.0, y, 7.0])[1]);
+        let cheeks = [6.0, 5.0, 4.4, 4.0, 3.0].map(|y| displacement([4.0, y, 7.0])[1]);
         assert!(cheeks.windows(2).all(|pair| pair[1] < pair[0]));
     }
 }

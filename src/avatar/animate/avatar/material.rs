@@ -1,4 +1,4 @@
-//! Materials of an avatar.
+//! Materials of an avatar's meshes.
 
 /// Material of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -7,7 +7,7 @@ pub enum Material {
     Shirt,
     Trousers,
     Shoes,
-    /// Skin of head and neck with the lips.
+    /// Skin of head, neck and lips.
     Face,
     /// Eyes and teeth.
     Eyes,
@@ -17,7 +17,7 @@ pub enum Material {
 }
 
 impl Material {
-    /// Strength of the highlight, 0 .. 1.
+    /// Specular strength, 0 .. 1.
     pub fn gloss(self) -> f32 {
         match self {
             Self::Skin | Self::Face => 0.12,

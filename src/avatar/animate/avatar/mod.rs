@@ -1,5 +1,5 @@
-//! Skinned avatar of a rig: its looks, distance fields (`field`, `body`, `hand`), their surfaces, the stance they are
-//! built in, skinning weights, and poses.
+//! Skinned avatar of a rig: appearance, distance fields (`field`, `body`, `hand`, `head`), their surfaces, the stance
+//! in which they are built, skinning weights, and poses.
 
 pub mod appearance;
 pub mod assembly;

@@ -1,11 +1,11 @@
-//! Small surfaces given point by point: nets of rows, and tubes along a line.
+//! Small surfaces defined by points: grids of rows, and tubes along a line.
 
 use super::surface::Surface;
 use orator_base::math::vec3::{Vec3, add, cross, scale, sub, unit};
 
 impl Surface {
-    /// Net of points in rows of one length; the direction along a row, that from row to row and the outward normal are
-    /// right-handed.
+    /// Surface over a grid of points in rows of equal length. The direction along a row, the direction from row to row
+    /// and the outward normal are right-handed.
     pub fn net(rows: &[Vec<Vec3>]) -> Self {
         let width = rows.first().map_or(0, Vec::len);
         let mut triangles = Vec::new();
@@ -19,7 +19,7 @@ impl Surface {
         Self { normals: face_normals(&points, &triangles), points, triangles }
     }
 
-    /// Tube of this radius along a line, with `sides` sides; closed on itself or open at the ends.
+    /// Tube along a line, closed into a ring or open at the ends.
     pub fn tube(line: &[Vec3], closed: bool, radius: f64, sides: usize) -> Self {
         let n = line.len();
         let mut rows = Vec::with_capacity(n + 1);
@@ -56,7 +56,7 @@ impl Surface {
     }
 }
 
-/// Normals of the vertices: the mean of their triangles', weighted by area.
+/// Vertex normals: the area-weighted mean of the adjacent triangles' normals.
 fn face_normals(points: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
     let mut sums = vec![[0.0; 3]; points.len()];
     for triangle in triangles {

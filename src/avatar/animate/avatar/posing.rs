@@ -1,4 +1,4 @@
-//! Avatar in a pose: linear blend skinning into the world.
+//! Poses of an avatar by linear blend skinning.
 
 use super::avatar::{Avatar, AvatarMesh};
 use crate::animate::rig::rig::Rig;
@@ -6,16 +6,16 @@ use crate::render::Mesh;
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::{Vec3, sub};
 
-/// Affine map of a joint from the T-pose into the world: the matrix's columns and the shift.
+/// Affine map of a joint from the T-pose into the world: the columns of the matrix and the translation.
 type JointMap = [[f32; 3]; 4];
 
 /// Number of maps along a forearm.
-const TWISTS: usize = 9;
+const N_TWISTS: usize = 9;
 
-/// Maps of a forearm that turns with the hand, from the elbow, where it does not, to the wrist.
+/// Maps along a forearm whose twist increases from 0 at the elbow to the hand's twist at the wrist.
 struct TwistedForearm {
     joint: usize,
-    maps: [JointMap; TWISTS],
+    maps: [JointMap; N_TWISTS],
 }
 
 impl TwistedForearm {
@@ -25,8 +25,8 @@ impl TwistedForearm {
         let [x, y, z, shift] = maps[arm.fore];
         let elbow = rest[arm.fore].map(|v| v as f32);
         let turned = |step: usize| {
-            // The bone lies along x: y and z turn about the line through the elbow.
-            let (sin, cos) = (angle as f32 * step as f32 / (TWISTS - 1) as f32).sin_cos();
+            // The bone is along x, so y and z rotate about the line through the elbow.
+            let (sin, cos) = (angle as f32 * step as f32 / (N_TWISTS - 1) as f32).sin_cos();
             let (u, v): ([f32; 3], [f32; 3]) =
                 (std::array::from_fn(|k| cos * y[k] + sin * z[k]), std::array::from_fn(|k| cos * z[k] - sin * y[k]));
             let moved = |k: usize| (y[k] - u[k]) * elbow[1] + (z[k] - v[k]) * elbow[2];
@@ -35,25 +35,25 @@ impl TwistedForearm {
         Self { joint: arm.fore, maps: std::array::from_fn(turned) }
     }
 
-    /// Map at a place along the forearm, 0 .. 1.
+    /// Map at a position along the forearm, 0 .. 1.
     fn at(&self, place: f32) -> JointMap {
-        let at = place.clamp(0.0, 1.0) * (TWISTS - 1) as f32;
-        let (low, share) = ((at as usize).min(TWISTS - 2), at - (at as usize).min(TWISTS - 2) as f32);
+        let at = place.clamp(0.0, 1.0) * (N_TWISTS - 1) as f32;
+        let (low, share) = ((at as usize).min(N_TWISTS - 2), at - (at as usize).min(N_TWISTS - 2) as f32);
         let (a, b) = (&self.maps[low], &self.maps[low + 1]);
         std::array::from_fn(|c| std::array::from_fn(|k| a[c][k] + share * (b[c][k] - a[c][k])))
     }
 }
 
 impl Avatar {
-    /// Meshes in a pose, in world axes (cm, y up): the hips at `root`, a local rotation for every joint of the rig, the
-    /// mouth open by `mouth` (0 closed .. 1).
+    /// Meshes of a pose in world axes (cm, y up), with the hips at `root`, a local rotation for each joint of the rig,
+    /// and the mouth opened by `mouth` (0 closed .. 1 fully open).
     pub fn posed(&self, rig: &Rig, root: Vec3, local: &[Rotation], mouth: f64) -> Vec<Mesh> {
         let mut meshes = Vec::new();
         self.pose_into(rig, root, local, mouth, &mut meshes);
         meshes
     }
 
-    /// Writes the meshes of a pose into `meshes`, whose memory is used again.
+    /// Writes the meshes of a pose into `meshes` and reuses their memory.
     pub fn pose_into(&self, rig: &Rig, root: Vec3, local: &[Rotation], mouth: f64, meshes: &mut Vec<Mesh>) {
         let (turns, places) = (rig.skeleton.world(local), rig.skeleton.positions(root, local));
         let rest = rig.skeleton.positions(rig.root, &vec![Rotation::IDENTITY; local.len()]);
@@ -119,7 +119,7 @@ mod tests {
     use orator_base::math::vec3::norm;
 
     #[test]
-    fn at_rest_the_pose_is_the_avatar_and_the_mouth_opens() {
+    fn the_rest_pose_is_the_avatar_and_the_mouth_opens() {
         let rig = default_rig();
         let avatar = Avatar::new(&rig, &Appearance::plain());
         let mut local = vec![Rotation::IDENTITY; rig.skeleton.joints.len()];
@@ -130,11 +130,11 @@ mod tests {
                 assert!(norm(sub(*point, posed.map(f64::from))) < 1e-3);
             }
         }
-        // The head turned to its left; the same memory holds the new pose.
+        // The head turns to its left; the second pose reuses the memory of the first.
         local[rig.head] = Rotation::about([0.0, 1.0, 0.0], 0.5);
         avatar.pose_into(&rig, rig.root, &local, 0.0, &mut meshes);
         assert_eq!(meshes, avatar.posed(&rig, rig.root, &local, 0.0));
-        // The mouth opens about the jaw's hinge.
+        // The mouth opens about the hinge of the jaw.
         let lowered = |mouth: f64| {
             let open = avatar.posed(&rig, rig.root, &local, mouth);
             let points = meshes.iter().zip(&open).flat_map(|(a, b)| a.points.iter().zip(&b.points));
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn the_plain_face_is_the_same_on_both_sides() {
+    fn the_plain_face_is_symmetric() {
         let rig = default_rig();
         let plain = Avatar::new(&rig, &Appearance::plain());
         for material in [Material::Face, Material::Eyes] {
@@ -163,7 +163,7 @@ mod tests {
         let looks = Appearance { top: Top::ShortSleeves, ..Appearance::plain() };
         let avatar = Avatar::new(&rig, &looks);
         let arm = &rig.arms[0];
-        // Mean distance from the forearm's axis of the skin in slices from its middle to the wrist.
+        // Mean distance of the skin from the forearm's axis, in slices from its middle to the wrist.
         let girth = |turn: Rotation| {
             let mut local = vec![Rotation::IDENTITY; rig.skeleton.joints.len()];
             local[arm.hand] = turn;

@@ -1,8 +1,8 @@
-//! Skinning weights. Along a chain of joints a vertex passes smoothly from one joint to the next where the bone bends,
-//! between chains it belongs to the nearer one; all weights are smoothed over the surface.
+//! Skinning weights. Along a chain of joints, weights change smoothly from one joint to the next where the bone bends;
+//! between chains, a vertex belongs to the nearer one. All weights are smoothed over the surface.
 
 use super::body::BodyForm;
-use super::jaw::rise;
+use super::jaw::smooth_step;
 use super::stance::{HIPS, finger_joints};
 use super::surface::Surface;
 use orator_base::math::vec3::{Vec3, dot, norm, sub};
@@ -10,26 +10,30 @@ use orator_base::math::vec3::{Vec3, dot, norm, sub};
 /// Joints of a vertex with their weights, which sum to 1.
 pub type Weights = [(usize, f64); 4];
 
-/// Weights of a vertex that follows one joint.
+/// Weights of a vertex that follows a single joint.
 pub fn rigid(joint: usize) -> Weights {
     [(joint, 1.0), (0, 0.0), (0, 0.0), (0, 0.0)]
 }
 
-/// Sparse weights of one vertex by joint.
+/// Sparse weights of one vertex, by joint.
 type Shares = Vec<(usize, f64)>;
 
-/// Joints of a chain and the transitions between them.
+/// A chain of joints and the transitions between them.
 struct WeightChain {
     joints: Vec<usize>,
-    /// For each joint but the first: position, normal of the transition plane, half the width of the transition (cm).
-    passes: Vec<(Vec3, Vec3, f64)>,
+    /// For each joint but the first: position and normal of the transition plane, and half the width of the transition
+    /// (cm).
+    transitions: Vec<(Vec3, Vec3, f64)>,
 }
 
 impl WeightChain {
     fn shares(&self, at: Vec3, whole: f64, into: &mut Shares) {
         let mut left = whole;
         for (k, &joint) in self.joints.iter().enumerate() {
-            let on = self.passes.get(k).map_or(0.0, |(place, normal, half)| rise(dot(sub(at, *place), *normal) / half));
+            let on = self
+                .transitions
+                .get(k)
+                .map_or(0.0, |(place, normal, half)| smooth_step(dot(sub(at, *place), *normal) / half));
             add_share(into, joint, left * (1.0 - on));
             left *= on;
         }
@@ -46,21 +50,21 @@ fn add_share(into: &mut Shares, joint: usize, share: f64) {
 }
 
 impl BodyForm<'_> {
-    /// Chain whose transition planes bisect the bones at each joint; `halves` in cm of the rig.
+    /// Chain whose transition planes bisect the angle between the bones at each joint; `halves` in cm of the rig.
     fn chain(&self, before: usize, joints: &[usize], after: usize, halves: &[f64]) -> WeightChain {
         let stance = self.stance;
         let at = |k: usize| joints.get(k).copied().unwrap_or(after);
-        let passes = (1..joints.len()).map(|k| {
+        let transitions = (1..joints.len()).map(|k| {
             let previous = if stance.positions[at(k)] == stance.positions[at(k - 1)] { before } else { at(k - 1) };
             let (a, b) = (stance.direction(previous, at(k)), stance.direction(at(k), at(k + 1)));
             let normal = [0, 1, 2].map(|i| a[i] + b[i]);
             let length = norm(normal).max(1e-6);
             (stance.positions[at(k)], normal.map(|v| v / length), halves[k - 1])
         });
-        WeightChain { joints: joints.to_vec(), passes: passes.collect() }
+        WeightChain { joints: joints.to_vec(), transitions: transitions.collect() }
     }
 
-    /// Hips, spine, chest; up to the head.
+    /// Chain of hips, spine, chest, neck and head.
     fn spine(&self) -> WeightChain {
         let rig = self.rig;
         let cm = self.stance.scale;
@@ -71,39 +75,40 @@ impl BodyForm<'_> {
         let jaw = (self.stance.at(rig.head, [0.0, -1.0, 0.0]), [0.0, 0.876, 0.482], 3.2 * cm);
         WeightChain {
             joints: vec![HIPS, rig.spine, rig.chest, rig.neck, rig.head],
-            passes: vec![up(rig.spine, 0.0, 7.0), up(rig.chest, 0.0, 8.0), up(rig.neck, 5.0, 3.5), jaw],
+            transitions: vec![up(rig.spine, 0.0, 7.0), up(rig.chest, 0.0, 8.0), up(rig.neck, 5.0, 3.5), jaw],
         }
     }
 
     /// Weights of the head and the neck.
     pub fn head_weights(&self, surface: &Surface) -> Vec<Weights> {
         let spine = self.spine();
-        settled(surface, 2, |at, shares| spine.shares(at, 1.0, shares))
+        smoothed_weights(surface, 2, |at, shares| spine.shares(at, 1.0, shares))
     }
 
     /// Weights of the shirt.
     pub fn shirt_weights(&self, surface: &Surface) -> Vec<Weights> {
         let cm = self.stance.scale;
         let mut spine = self.spine();
-        // The collar stays with the chest.
+        // The collar follows the chest.
         spine.joints.truncate(3);
-        spine.passes.truncate(2);
+        spine.transitions.truncate(2);
         let trunk = self.trunk();
         let arms = [0, 1].map(|side| {
             let arm = &self.rig.arms[side];
             let chain = self.chain(arm.clavicle, &[arm.upper, arm.fore], arm.hand, &[4.2 * cm]);
             (arm, self.sleeve(side), chain)
         });
-        settled(surface, 14, |at, shares| {
+        smoothed_weights(surface, 14, |at, shares| {
             let mut left = 1.0;
-            let on_trunk = trunk.distance(at);
+            let trunk_distance = trunk.distance(at);
             for (arm, sleeve, chain) in &arms {
                 let shoulder = self.stance.positions[arm.upper];
                 let out = arm.sign * (at[0] - shoulder[0]) / cm;
-                let on_arm = rise((on_trunk - sleeve.distance(at)) / (1.5 * cm) - 0.6) * rise((out + 1.0) / 3.0);
-                // The clavicle carries the top of the trunk, increasingly towards the shoulder.
-                let high = rise((at[1] - shoulder[1] + 9.0 * cm) / (9.0 * cm));
-                let on_shoulder = high * rise((out + 7.0) / 6.0);
+                let on_arm = smooth_step((trunk_distance - sleeve.distance(at)) / (1.5 * cm) - 0.6)
+                    * smooth_step((out + 1.0) / 3.0);
+                // The clavicle moves the top of the trunk, increasingly towards the shoulder.
+                let high = smooth_step((at[1] - shoulder[1] + 9.0 * cm) / (9.0 * cm));
+                let on_shoulder = high * smooth_step((out + 7.0) / 6.0);
                 chain.shares(at, left * on_arm, shares);
                 add_share(shares, arm.clavicle, left * (1.0 - on_arm) * on_shoulder);
                 left *= (1.0 - on_arm) * (1.0 - on_shoulder);
@@ -118,28 +123,28 @@ impl BodyForm<'_> {
         let chains = self.rig.legs.map(|[upper, lower, foot, end]| {
             self.chain(HIPS, &[HIPS, upper, lower, foot], end, &[6.0 * cm, 5.0 * cm, 2.5 * cm])
         });
-        settled(surface, 3, |at, shares| {
+        smoothed_weights(surface, 3, |at, shares| {
             let side = usize::from(at[0] < 0.0);
             chains[side].shares(at, 1.0, shares);
         })
     }
 
-    /// Weights of a skirt: the hips', towards the hem the nearer thigh's.
+    /// Weights of a skirt: the hips, and towards the hem increasingly the nearer thigh.
     pub fn skirt_weights(&self, surface: &Surface) -> Vec<Weights> {
         let cm = self.stance.scale;
         let top = self.stance.positions[HIPS];
-        settled(surface, 10, |at, shares| {
+        smoothed_weights(surface, 10, |at, shares| {
             let thigh = self.rig.legs[usize::from(at[0] < 0.0)][0];
-            let low = 0.75 * rise((top[1] - at[1] - 22.0 * cm) / (18.0 * cm));
+            let low = 0.75 * smooth_step((top[1] - at[1] - 22.0 * cm) / (18.0 * cm));
             add_share(shares, thigh, low);
             add_share(shares, HIPS, 1.0 - low);
         })
     }
 
-    /// Weights of one of the fingers beside the thumb; `scale` is the hand's size.
+    /// Weights of one of the four fingers; `scale` is the size of the hand.
     pub fn finger_weights(&self, side: usize, finger: usize, scale: f64, surface: &Surface) -> Vec<Weights> {
         let chain = self.finger(side, finger, scale);
-        settled(surface, 1, |at, shares| chain.shares(at, 1.0, shares))
+        smoothed_weights(surface, 1, |at, shares| chain.shares(at, 1.0, shares))
     }
 
     fn finger(&self, side: usize, finger: usize, scale: f64) -> WeightChain {
@@ -149,7 +154,7 @@ impl BodyForm<'_> {
         self.chain(arm.fore, &[arm.hand, a, b, c], tip, &halves.map(|half| half * scale))
     }
 
-    /// Weights of a palm with its thumb, the wrist and a bare arm; `scale` is the hand's size.
+    /// Weights of a palm with its thumb, the wrist and a bare arm; `scale` is the size of the hand.
     pub fn palm_weights(&self, side: usize, scale: f64, surface: &Surface) -> Vec<Weights> {
         let arm = &self.rig.arms[side];
         let thumb = self.finger(side, 0, scale);
@@ -158,10 +163,11 @@ impl BodyForm<'_> {
         let wrist = self.chain(arm.clavicle, &[arm.upper, arm.fore, arm.hand], knuckles[2], &bends);
         let positions = &self.stance.positions;
         let thumb_line = finger_joints(self.rig, side, 0).map(|joint| positions[joint]);
-        settled(surface, 4, |at, shares| {
-            let on_thumb = thumb_line.windows(2).map(|ends| to_segment(at, ends[0], ends[1]));
+        smoothed_weights(surface, 4, |at, shares| {
+            let on_thumb = thumb_line.windows(2).map(|ends| distance_to_segment(at, ends[0], ends[1]));
             let on_thumb = on_thumb.fold(f64::INFINITY, f64::min);
-            let on_palm = knuckles[1..].iter().map(|&knuckle| to_segment(at, positions[arm.hand], positions[knuckle]));
+            let on_palm =
+                knuckles[1..].iter().map(|&knuckle| distance_to_segment(at, positions[arm.hand], positions[knuckle]));
             let on_palm = on_palm.fold(f64::INFINITY, f64::min);
             let mut on_hand = Shares::new();
             wrist.shares(at, 1.0, &mut on_hand);
@@ -176,14 +182,14 @@ impl BodyForm<'_> {
     }
 }
 
-fn to_segment(at: Vec3, a: Vec3, b: Vec3) -> f64 {
+fn distance_to_segment(at: Vec3, a: Vec3, b: Vec3) -> f64 {
     let along = sub(b, a);
     let share = (dot(sub(at, a), along) / dot(along, along).max(1e-12)).clamp(0.0, 1.0);
     norm([0, 1, 2].map(|k| at[k] - a[k] - share * along[k]))
 }
 
-/// Weights of every vertex, smoothed `rounds` times over its neighbours, the four largest kept.
-fn settled(surface: &Surface, rounds: usize, of: impl Fn(Vec3, &mut Shares)) -> Vec<Weights> {
+/// Computes the weights of every vertex, smooths them `rounds` times over its neighbours, and retains the four largest.
+fn smoothed_weights(surface: &Surface, rounds: usize, of: impl Fn(Vec3, &mut Shares)) -> Vec<Weights> {
     let mut all: Vec<Shares> = surface
         .points
         .iter()

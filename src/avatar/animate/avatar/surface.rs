@@ -1,21 +1,21 @@
-//! Closed triangle mesh of a distance field by surface nets (Gibson 1998): one vertex in every cell that the surface
-//! crosses, a quad around every edge that crosses it; vertices are then projected onto the surface and relaxed over it.
-//! Normals are the field's gradient.
+//! Triangle mesh of a distance field by surface nets (Gibson 1998): one vertex in each cell that the surface crosses,
+//! and one quad around each grid edge that it crosses. Vertices are then projected onto the surface and relaxed along
+//! it. Normals are the gradient of the field.
 
 use orator_base::math::vec3::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use rayon::prelude::*;
 use std::collections::HashSet;
 
-/// Cells of a block that is skipped as a whole where the surface is far away.
+/// Width in cells of the blocks that are skipped where the surface is far away.
 const BLOCK: usize = 4;
-/// Largest step of a vertex towards the surface, as a share of a cell.
-const REACH: f64 = 0.9;
-/// Step of the gradient's differences, as a share of a cell.
-const FINE: f64 = 0.02;
-/// Rounds of moving vertices towards the middle of their neighbours.
-const ROUNDS: usize = 3;
+/// Maximum distance that projection moves a vertex, as a fraction of a cell.
+const MAX_STEP: f64 = 0.9;
+/// Step of the gradient's finite differences, as a fraction of a cell.
+const GRADIENT_STEP: f64 = 0.02;
+/// Number of relaxation rounds, in which vertices move towards the mean of their neighbours.
+const RELAXATION_ROUNDS: usize = 3;
 
-/// Triangle mesh, counter-clockwise seen from outside.
+/// Triangle mesh, counter-clockwise from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Surface {
     pub points: Vec<Vec3>,
@@ -38,21 +38,22 @@ impl Surface {
         Self::on_grid(&FieldGrid::sample(field, bounds, cell), &|at| at, field, cell)
     }
 
-    /// Surface of `field` inside the box `bounds`, with cells of `cell` cm at `focus` that grow with the distance from it
-    /// (twice as large at about 1.7 `even` cm).
+    /// Surface of `field` inside the box `bounds`, with cells of `cell` cm at `focus` that grow with the distance from
+    /// it (twice as large at about 1.7 `even` cm).
     pub fn focused(
         field: &(dyn Fn(Vec3) -> f64 + Sync),
         bounds: [Vec3; 2],
         cell: f64,
         (focus, even): (Vec3, f64),
     ) -> Self {
-        // In the grid's space, where all cells are of one size, a point at `even` sinh(r / even) lies at r.
+        // The grid has uniform cells in a warped space, in which a point at distance `even` sinh(r / even) is at
+        // distance r.
         let space = |at: Vec3| {
             let far = norm(at) / even;
             add(focus, scale(at, if far > 1e-9 { far.sinh() / far } else { 1.0 }))
         };
         let [low, high] = bounds.map(|corner| sub(corner, focus).map(|v| even * (v / even).asinh() / cell));
-        // Whole cells, so that a box which is the same on both sides has a grid which is.
+        // Rounding to full cells makes the grid of a symmetric box symmetric.
         let bounds = [low.map(|v| v.floor() * cell), high.map(|v| v.ceil() * cell)];
         let steepest = bounds.map(|corner| norm(corner) / even).into_iter().fold(0.0, f64::max).cosh();
         let grid = FieldGrid::sample(&|at| field(space(at)) / steepest, bounds, cell);
@@ -82,8 +83,8 @@ impl Surface {
         let apart = |i: u32, j: u32| norm(sub(surface.points[i as usize], surface.points[j as usize]));
         let shorter = |quad: &[u32; 4]| halves(quad)[usize::from(apart(quad[0], quad[2]) > apart(quad[1], quad[3]))];
         surface.triangles = quads.iter().flat_map(shorter).collect();
-        surface.settle(field, cell);
-        // Of a quad's diagonals the one whose triangles face outwards more.
+        surface.relax(field, cell);
+        // Selects the diagonal of each quad whose triangles face outwards more.
         let split = |quad: &[u32; 4]| {
             let outwards = halves(quad).map(|pair| surface.facing(pair[0]).min(surface.facing(pair[1])));
             halves(quad)[usize::from(outwards[0] < outwards[1])]
@@ -92,7 +93,7 @@ impl Surface {
         surface
     }
 
-    /// Cosine of the angle between a triangle's normal and the mean of those of its vertices; 0 without an area.
+    /// Cosine between a triangle's normal and the mean of its vertex normals; 0 for a degenerate triangle.
     fn facing(&self, triangle: [u32; 3]) -> f64 {
         let [a, b, c] = triangle.map(|v| self.points[v as usize]);
         let mean = triangle.iter().fold([0.0; 3], |sum, &v| add(sum, self.normals[v as usize]));
@@ -101,24 +102,24 @@ impl Surface {
     }
 
     /// Projects the vertices onto the surface and distributes them evenly.
-    fn settle(&mut self, field: &(dyn Fn(Vec3) -> f64 + Sync), cell: f64) {
+    fn relax(&mut self, field: &(dyn Fn(Vec3) -> f64 + Sync), cell: f64) {
         let near = self.neighbours();
-        for round in 0..=ROUNDS {
+        for round in 0..=RELAXATION_ROUNDS {
             let points = &self.points;
-            let even = |(n, &point): (usize, &Vec3)| {
+            let relaxed = |(n, &point): (usize, &Vec3)| {
                 let sum = near[n].iter().fold([0.0; 3], |sum, &other| add(sum, points[other as usize]));
                 let middle = scale(sum, 1.0 / near[n].len().max(1) as f64);
                 let from = if round == 0 { point } else { scale(add(point, middle), 0.5) };
-                onto(field, from, cell, if round == 0 { 3 } else { 1 })
+                project_onto(field, from, cell, if round == 0 { 3 } else { 1 })
             };
-            let drawn: Vec<(Vec3, Vec3)> = points.par_iter().enumerate().map(even).collect();
-            (self.points, self.normals) = drawn.into_iter().unzip();
+            let moved: Vec<(Vec3, Vec3)> = points.par_iter().enumerate().map(relaxed).collect();
+            (self.points, self.normals) = moved.into_iter().unzip();
         }
     }
 
-    /// Replaces the normals by those of another field at the vertices, seen over `width` cm.
+    /// Replaces the normals by the gradient of another field, with differences over `width` cm.
     #[must_use]
-    pub fn lit(mut self, field: &(dyn Fn(Vec3) -> f64 + Sync), width: f64) -> Self {
+    pub fn with_normals_of(mut self, field: &(dyn Fn(Vec3) -> f64 + Sync), width: f64) -> Self {
         let normals = self
             .points
             .iter()
@@ -128,7 +129,8 @@ impl Surface {
         self
     }
 
-    /// Number of the first triangles that enclose volumes: they have no open edge and no vertex of those after them.
+    /// Number of leading triangles that form closed surfaces: they have no open edge and share no vertex with later
+    /// ones.
     pub fn n_closed(&self) -> usize {
         let edges = |[a, b, c]: [u32; 3]| [[a, b], [b, c], [c, a]];
         let all: HashSet<[u32; 2]> = self.triangles.iter().flat_map(|triangle| edges(*triangle)).collect();
@@ -144,7 +146,7 @@ impl Surface {
         }
     }
 
-    /// Vertices that share an edge with each vertex, in order.
+    /// Neighbours of each vertex along edges, sorted.
     pub fn neighbours(&self) -> Vec<Vec<u32>> {
         let mut all = vec![Vec::new(); self.points.len()];
         for &[a, b, c] in &self.triangles {
@@ -161,21 +163,21 @@ impl Surface {
     }
 }
 
-/// Point of the surface near `point`, and the outward normal there.
-fn onto(field: &(dyn Fn(Vec3) -> f64 + Sync), point: Vec3, cell: f64, steps: usize) -> (Vec3, Vec3) {
+/// Projects `point` onto the surface; returns the position and the outward normal there.
+fn project_onto(field: &(dyn Fn(Vec3) -> f64 + Sync), point: Vec3, cell: f64, steps: usize) -> (Vec3, Vec3) {
     let mut at = point;
     for _ in 0..steps {
-        let slope = gradient(field, at, FINE * cell);
+        let slope = gradient(field, at, GRADIENT_STEP * cell);
         let steep = dot(slope, slope);
         let next = sub(at, scale(slope, field(at) / steep.max(0.05)));
-        if norm(sub(next, point)) < REACH * cell {
+        if norm(sub(next, point)) < MAX_STEP * cell {
             at = next;
         }
     }
-    (at, unit(gradient(field, at, FINE * cell), 1e-9).unwrap_or([0.0, 1.0, 0.0]))
+    (at, unit(gradient(field, at, GRADIENT_STEP * cell), 1e-9).unwrap_or([0.0, 1.0, 0.0]))
 }
 
-/// Gradient of the field by central differences, `step` to each side.
+/// Gradient of the field by central differences with step `step`.
 fn gradient(field: &(dyn Fn(Vec3) -> f64 + Sync), at: Vec3, step: f64) -> Vec3 {
     std::array::from_fn(|k| {
         let mut shift = [0.0; 3];
@@ -197,7 +199,7 @@ impl FieldGrid {
                     let half = (BLOCK - 1) as f64 / 2.0 * cell;
                     let first = place([x0, y0, slab * BLOCK]);
                     let middle = field([0, 1, 2].map(|k| low[k] + first[k] + half));
-                    // Gradients of the fields are not much larger than 1.
+                    // This relies on gradients not much larger than 1.
                     let far = (middle.abs() > 1.4 * half * 3f64.sqrt() + cell).then_some(middle as f32);
                     for z in 0..values.len() / layer {
                         for y in y0..(y0 + BLOCK).min(n[1]) {
@@ -218,7 +220,7 @@ impl FieldGrid {
         (z * self.n[1] + y) * self.n[0] + x
     }
 
-    /// Mean of the surface's crossings of a cell's edges.
+    /// Mean of the points where the surface crosses the edges of a cell.
     fn vertex(&self, cell: [usize; 3]) -> Option<Vec3> {
         let corner = |bits: usize| [0, 1, 2].map(|k| cell[k] + (bits >> k & 1));
         let values: [f32; 8] = std::array::from_fn(|bits| self.values[self.index(corner(bits))]);
@@ -237,8 +239,9 @@ impl FieldGrid {
         (n > 0.0).then(|| add(self.low, scale(sum, self.cell / n)))
     }
 
-    /// Calls `see` with the four cells (by index) around every edge that crosses the surface.
-    fn quads(&self, mut see: impl FnMut([usize; 4], bool)) {
+    /// Calls `each` for every grid edge that crosses the surface, with the four cells around it (by index) and whether
+    /// the surface faces against the axis.
+    fn quads(&self, mut each: impl FnMut([usize; 4], bool)) {
         for axis in 0..3 {
             let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
             let step = |k: usize| [1, self.n[0], self.n[0] * self.n[1]][k];
@@ -251,7 +254,7 @@ impl FieldGrid {
                 let inside = self.values[here] < 0.0;
                 if inside != (self.values[here + step(axis)] < 0.0) {
                     let cells = [here - step(u) - step(v), here - step(v), here, here - step(u)];
-                    see(cells, !inside);
+                    each(cells, !inside);
                 }
             }
         }
@@ -264,15 +267,15 @@ mod tests {
     use crate::animate::avatar::field::RoundCone;
 
     #[test]
-    fn a_ball_is_round_closed_and_faces_outwards() {
+    fn a_sphere_mesh_is_closed_accurate_and_faces_outwards() {
         let ball = RoundCone::new([[0.3, -0.2, 0.1]; 2], [2.0; 2]);
         let surface = Surface::from_field(&|at| ball.distance(at), [[-1.7, -2.2, -1.9], [2.3, 1.8, 2.1]], 0.3);
-        // positive where the triangles face outwards
-        let six = |corners: &[u32; 3]| {
+        // Six times the signed volume, positive where triangles face outwards.
+        let six_volumes = |corners: &[u32; 3]| {
             let [a, b, c] = corners.map(|i| surface.points[i as usize]);
             dot(a, cross(b, c))
         };
-        let volume = surface.triangles.iter().map(six).sum::<f64>() / 6.0;
+        let volume = surface.triangles.iter().map(six_volumes).sum::<f64>() / 6.0;
         assert!((volume - 4.0 / 3.0 * std::f64::consts::PI * 8.0).abs() < 0.6);
         for (&point, &normal) in surface.points.iter().zip(&surface.normals) {
             assert!(ball.distance(point).abs() < 1e-3);

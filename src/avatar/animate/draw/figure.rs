@@ -1,12 +1,12 @@
-//! Pose drawn as a figure: arms and hands as tapered limbs, left and right in two colours, darker where nearer, over a
-//! plain trunk and head that no data describes. Missing joints are left out.
+//! Drawing of a pose: arms and hands as tapered limbs, left and right in two colours, darker where nearer, over a
+//! schematic trunk and head (no data describes them). Missing joints are omitted.
 
 use ndarray::ArrayView2;
 use orator_base::types::image::Image;
 use orator_base::types::skeleton::{self, L_HAND, L_SHOULDER, L_WRIST, N_JOINTS, R_HAND, R_SHOULDER, R_WRIST, Side};
 use orator_media::opencv::draw;
 
-/// Background colour of all pictures.
+/// Background colour of all images.
 pub const PAPER: [u8; 3] = [248, 247, 244];
 /// Colour of text and marks.
 pub const INK: [u8; 3] = [92, 98, 106];
@@ -16,34 +16,34 @@ pub const RIGHT: [u8; 3] = [214, 98, 38];
 const TRUNK: [u8; 3] = [212, 214, 216];
 const HEAD: [u8; 3] = [196, 199, 203];
 
-/// Number of pieces an arm bone is drawn in, so that its shade can change along it.
+/// Number of pieces into which an arm bone is divided, so that its shade can change along it.
 const PIECES: usize = 12;
-/// Distance nearer or further than the neck, metres, beyond which the shade no longer changes.
+/// Depth relative to the neck, metres, beyond which the shade no longer changes.
 const SHADE_METRES: f32 = 0.45;
 
-/// Viewpoint of a figure and its position in the picture.
+/// View of a pose and its position in the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FigureView {
     /// Pixel position of the neck.
     pub neck_px: [f32; 2],
     pub px_per_metre: f32,
-    /// Yaw of the view; 0: from the front, 90: from the speaker's left.
+    /// Yaw of the view: 0 from the front, 90 from the speaker's left.
     pub yaw_degrees: f32,
-    /// Distance of the camera from the neck, metres; infinite: no perspective.
+    /// Distance of the camera from the neck, metres; infinite for an orthographic view.
     pub camera_metres: f32,
-    /// Size of trunk and head relative to an adult of 0.55 m from shoulder to wrist; 0: none.
+    /// Size of trunk and head relative to an adult with 0.55 m from shoulder to wrist; 0 draws neither.
     pub trunk: f32,
-    /// Colour of a seam that separates a limb from what is behind it.
+    /// Colour of the outline that separates a limb from what is behind it.
     pub seam: Option<[u8; 3]>,
 }
 
 impl FigureView {
-    /// A view on paper from the front with the neck in the middle of the picture's width.
+    /// Front view on `PAPER` with the neck at `neck_px`.
     pub fn front(neck_px: [f32; 2], px_per_metre: f32) -> Self {
         Self { neck_px, px_per_metre, yaw_degrees: 0.0, camera_metres: 3.0, trunk: 1.0, seam: Some(PAPER) }
     }
 
-    /// Position in px and depth in metres (away from the camera, 0 at the neck) of a point in metres.
+    /// Position in px, and depth in metres (away from the camera, 0 at the neck), of a point in metres.
     pub fn project(&self, [x, y, z]: [f32; 3]) -> ([f32; 2], f32) {
         let (sin, cos) = self.yaw_degrees.to_radians().sin_cos();
         let (across, depth) = (cos * x + sin * z, cos * z - sin * x);
@@ -57,7 +57,7 @@ impl FigureView {
     }
 }
 
-/// Draws one frame [49, 3] (metres, joints in the order of `types::skeleton`).
+/// Draws one frame [49, 3] (metres, joint order of `types::skeleton`).
 pub fn draw_pose(image: &mut Image, joints: ArrayView2<f32>, view: &FigureView) -> anyhow::Result<()> {
     let place = |joint: usize| -> [f32; 3] { std::array::from_fn(|k| joints[[joint, k]]) };
     let mut limbs: Vec<DrawnLimb> = (1..N_JOINTS).flat_map(|joint| limbs_to(joint, place)).collect();
@@ -80,17 +80,18 @@ pub fn draw_pose(image: &mut Image, joints: ArrayView2<f32>, view: &FigureView) 
     Ok(())
 }
 
-/// Piece of a bone: two ends in metres, their radii, a colour at mean depth.
+/// Piece of a bone: two ends in metres, their radii, and a colour for the mean depth.
 struct DrawnLimb {
     ends: [[f32; 3]; 2],
     radii: [f32; 2],
     left: bool,
     rgb: [u8; 3],
-    /// Share of its length at which the seam begins (1: none); nearer the joint it would cut the parent limb.
+    /// Fraction of the length at which the outline begins (1: no outline); an earlier one would cut into the parent
+    /// limb.
     seam_from: f32,
 }
 
-/// The pieces of the bone to `joint`, radii in metres.
+/// The pieces of the bone that ends at `joint`, radii in metres.
 fn limbs_to(joint: usize, place: impl Fn(usize) -> [f32; 3]) -> Vec<DrawnLimb> {
     let Some(parent) = skeleton::parent(joint) else { return Vec::new() };
     let left = skeleton::side(joint) == Side::Left;
@@ -100,7 +101,7 @@ fn limbs_to(joint: usize, place: impl Fn(usize) -> [f32; 3]) -> Vec<DrawnLimb> {
         L_HAND | R_HAND | L_SHOULDER | R_SHOULDER => return Vec::new(),
         L_WRIST | R_WRIST => ([0.034, 0.023], PIECES),
         _ if joint < L_HAND => ([0.043, 0.035], PIECES),
-        // Wrist to base: the palm; then three phalanges.
+        // The first bone is the palm (wrist to knuckle), then come three phalanges.
         _ => (
             match (joint - root - 1) % 4 {
                 0 => [0.021, 0.0145],
@@ -112,7 +113,7 @@ fn limbs_to(joint: usize, place: impl Fn(usize) -> [f32; 3]) -> Vec<DrawnLimb> {
         ),
     };
     let is_hand = joint > L_HAND;
-    // Neighbouring fingers differ a little in shade.
+    // Neighbouring fingers differ slightly in shade.
     let rgb = if is_hand && (joint - root - 1) / 4 % 2 == 1 { mix(rgb, [0; 3], 0.14) } else { rgb };
     let (from, to) = (place(parent), place(joint));
     let at = |share: f32| -> [f32; 3] { std::array::from_fn(|k| from[k] + share * (to[k] - from[k])) };
@@ -130,7 +131,7 @@ fn limbs_to(joint: usize, place: impl Fn(usize) -> [f32; 3]) -> Vec<DrawnLimb> {
         .collect()
 }
 
-/// Share of the length at which the seam of a finger's four bones begins.
+/// Fraction of the length at which the outline begins, for each of a finger's four bones.
 const SEAM_FROM: [f32; 4] = [1.0, 0.15, 0.2, 0.2];
 
 impl DrawnLimb {
@@ -139,7 +140,7 @@ impl DrawnLimb {
         let radius = |k: usize, depth: f32| (self.radii[k] * view.px_per_metre * view.nearness(depth)).max(1.0);
         let (ra, rb) = (radius(0, near), radius(1, far));
         if let Some(seam) = view.seam.filter(|_| self.seam_from < 1.0) {
-            // Seams run along the sides only, so that they do not cut the parent limb.
+            // Outlines run along the sides only, so that they do not cut into the parent limb.
             let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
             let length = dx.hypot(dy).max(1e-3);
             let (nx, ny) = (-dy / length, dx / length);
@@ -161,12 +162,12 @@ fn shade(rgb: [u8; 3], depth: f32) -> [u8; 3] {
     if share > 0.0 { mix(rgb, PAPER, 0.55 * share) } else { mix(rgb, [0; 3], -0.28 * share) }
 }
 
-/// Colour at `share` of the way from `a` to `b`.
+/// Colour at fraction `share` from `a` to `b`.
 pub fn mix(a: [u8; 3], b: [u8; 3], share: f32) -> [u8; 3] {
     std::array::from_fn(|k| (f32::from(a[k]) + share * (f32::from(b[k]) - f32::from(a[k]))).round() as u8)
 }
 
-/// Draws trunk, neck and head, upright under and over the neck joint, turned with the shoulders.
+/// Draws trunk, neck and head, upright and centred on the neck joint, turned with the shoulders.
 fn draw_trunk(image: &mut Image, view: &FigureView, left: [f32; 3], right: [f32; 3]) -> anyhow::Result<()> {
     let size = view.trunk;
     let seen = left.iter().chain(&right).all(|v| v.is_finite());
@@ -177,7 +178,7 @@ fn draw_trunk(image: &mut Image, view: &FigureView, left: [f32; 3], right: [f32;
     let side = |metres: f32, down: f32| [dx / width * metres, down * size, dz / width * metres];
     let ahead = |metres: f32, down: f32| [dz / width * metres * size, down * size, -dx / width * metres * size];
 
-    // The hem without perspective: seen from the side it is one level line.
+    // The hem is drawn without perspective, so that it is one level line in a side view.
     let plain = FigureView { camera_metres: f32::INFINITY, ..*view };
     let hem = [side(-0.115 * size, 0.52), side(0.115 * size, 0.52)].map(|corner| plain.project(corner).0);
     let corners = [view.project(left).0, view.project(right).0, hem[0], hem[1]];

@@ -1,4 +1,4 @@
-//! Poses drawn as pictures: a skeleton from a view, and keypoints over a video frame.
+//! Drawings of poses: a skeleton from a given view, and keypoints over a video frame.
 
 pub mod figure;
 pub mod overlay;

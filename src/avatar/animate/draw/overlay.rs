@@ -1,5 +1,5 @@
-//! 2D keypoints drawn over the picture they were found in, left and right in their colours. Points that were not found
-//! are not drawn, nor the bones that end in them.
+//! 2D keypoints drawn over the image in which they were detected, left and right in their colours. Missing points, and
+//! bones that end in them, are not drawn.
 
 use super::figure::{INK, LEFT, RIGHT};
 use anyhow::Result;
@@ -9,18 +9,18 @@ use orator_base::types::image::Image;
 use orator_base::types::pose2d::{Keypoints, N_HAND, SEEN_SCORE};
 use orator_media::opencv::draw;
 
-/// Bones between the points of COCO-17 that are drawn.
+/// COCO-17 bones that are drawn, as pairs of keypoints.
 const BONES: [(usize, usize); 10] =
     [(5, 6), (5, 7), (7, 9), (6, 8), (8, 10), (5, 11), (6, 12), (11, 12), (0, 1), (0, 2)];
 
-/// Transform of the video's pixels into the picture drawn on: `scale * px + shift`, by axis.
+/// Transform of video pixels into the target image: `scale * px + shift`, per axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImageTransform {
     pub scale: [f32; 2],
     pub shift: [f32; 2],
 }
 
-/// Draws the keypoints of one frame, bones `width_px` wide (fingers half of it).
+/// Draws the keypoints of one frame, with bones `width_px` wide (fingers half of it).
 pub fn draw_keypoints(
     image: &mut Image,
     keypoints: &Keypoints,
@@ -57,8 +57,8 @@ pub fn draw_keypoints(
     Ok(())
 }
 
-/// Bounding box of the upper body and the hands over the whole clip without each point's outermost positions (one frame
-/// in fifty on each side): left, top, right, bottom in px; `None` where nothing was found.
+/// Bounding box of the upper body and the hands over the complete clip, without each point's outermost positions (one
+/// frame in fifty on each side): left, top, right, bottom in px; `None` if nothing was detected.
 pub fn extent(keypoints: &Keypoints) -> Option<[f32; 4]> {
     const N_UPPER: usize = 11;
     let mut extent: Option<[f32; 4]> = None;

@@ -1,4 +1,4 @@
-//! Motion file of any kind, chosen by its name's extension, written atomically.
+//! Motion file of any format, selected by the file extension and written atomically.
 
 use super::film_avatar::FilmCamera;
 use super::{fbx, film, glb_scene, json, vrm};
@@ -17,59 +17,62 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write as _};
 use std::path::Path;
 
-/// Content of a file beside the performance.
+/// Optional content of a file in addition to the performance.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ExportContent<'a> {
-    /// The sound of a film.
+    /// Audio track of a film.
     pub sound: Option<&'a Sound>,
-    /// Bone names, in formats that have names.
+    /// Naming convention of the bones, for formats with bone names.
     pub names: Names,
-    /// What a film shows beside the avatar.
+    /// What a film shows besides the avatar.
     pub beside: film::SecondPanel<'a>,
     /// Viewpoint of a film.
     pub camera: FilmCamera,
-    /// Frames a second of a film; `None`: interpolated to 30 or more (`film::smooth_rate`).
+    /// Frame rate of a film; `None` interpolates to at least 30 fps (`film::smooth_rate`).
     pub film_fps: Option<FrameRate>,
-    /// Angles of head and trunk that a speaker generated, at their rate, for JSON.
+    /// Generated angles of head and trunk, at their own rate, for JSON.
     pub posture: Option<(FrameRate, &'a Posture)>,
 }
 
-/// What a user chooses of the figure in a file.
+/// Options of the figure in a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FigureOptions {
-    /// Bone names, in formats that have names.
+    /// Naming convention of the bones, for formats with bone names.
     pub names: Names,
-    /// Frame rate; `None`: that of the motion.
+    /// Frame rate; `None` for that of the motion.
     pub fps: Option<FrameRate>,
 }
 
 /// Format of a motion file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExportFormat {
-    /// Joints [T, 49, 3] f32, their rate beside them (`formats::joints_description`).
+    /// Joints [T, 49, 3] f32, with the rate in a file next to it (`formats::joints_description`).
     Npy,
     /// Joints with rate and mask.
     Npz,
-    /// Text layout of Rebol et al. (2021): 147 numbers a line, their rate beside them.
+    /// Text layout of Rebol et al. (2021): 147 numbers per line, with the rate in a file next to it.
     AuthorsTxt,
-    /// Bone rotations of the whole rig.
+    /// Bone rotations of the complete rig.
     Bvh,
-    /// The skinned avatar with its motion.
+    /// Skinned avatar with its motion.
     Glb,
-    /// The skinned avatar with its motion, binary FBX 7.4.
+    /// Skinned avatar with its motion, binary FBX 7.4.
     Fbx,
-    /// The skinned avatar as a humanoid of VRM 1.0, without motion.
+    /// Skinned avatar as a VRM 1.0 humanoid, without motion.
     Vrm,
-    /// The motion for humanoids of VRM 1.0.
+    /// Motion for VRM 1.0 humanoids.
     Vrma,
     /// Joints and rotations as JSON (`export::json`).
     Json,
-    /// A film of the body with the sound.
+    /// Film of the avatar with audio.
     Mp4,
 }
 
 impl ExportFormat {
-    /// The format of a file by its extension, upper or lower case.
+    /// The format of a file by its extension, in upper or lower case.
+    ///
+    /// # Errors
+    /// No or an unknown extension.
     pub fn from_path(path: &Path) -> anyhow::Result<Self> {
         let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         match extension.as_str() {
@@ -92,17 +95,17 @@ impl ExportFormat {
         }
     }
 
-    /// Whether the format has bones that other programs call by other names.
+    /// Whether the format has bone names that a user may choose.
     pub fn has_names(self) -> bool {
         matches!(self, Self::Bvh | Self::Glb | Self::Fbx | Self::Json)
     }
 
-    /// Whether the format holds joints and no rig.
+    /// Whether the format holds joint positions without a rig.
     pub fn holds_joints(self) -> bool {
         matches!(self, Self::Npy | Self::Npz | Self::AuthorsTxt)
     }
 
-    /// Writes a performance; only a film uses the sound.
+    /// Writes a performance; only a film uses the audio.
     pub fn write(
         self,
         path: &Path,
@@ -115,7 +118,7 @@ impl ExportFormat {
             Self::Bvh => {
                 let skeleton = FileSkeleton::new(&performance.rig.skeleton, sources.names, RestAxes::World);
                 let clip = skeleton.clip(&performance.clip);
-                streamed(path, |text| clip.write_bvh(text))
+                write_text(path, |text| clip.write_bvh(text))
             }
             Self::Glb | Self::Fbx | Self::Vrm => {
                 let (rig, clip) = (&performance.rig, &performance.clip);
@@ -128,7 +131,7 @@ impl ExportFormat {
                 workdir::write_file(path, &bytes)
             }
             Self::Vrma => workdir::write_file(path, &vrm::motion(&performance.rig, &performance.clip)),
-            Self::Json => streamed(path, |text| json::write(text, performance, sources.names, sources.posture)),
+            Self::Json => write_text(path, |text| json::write(text, performance, sources.names, sources.posture)),
             Self::Mp4 => {
                 let fps = sources.film_fps.unwrap_or_else(|| film::smooth_rate(performance.clip.fps));
                 let resampled = (fps != performance.clip.fps).then(|| performance.resampled(fps));
@@ -140,7 +143,10 @@ impl ExportFormat {
         }
     }
 
-    /// Writes joints unchanged, which only the joint formats can hold, with their rate.
+    /// Writes joint positions unchanged, with their rate.
+    ///
+    /// # Errors
+    /// The format does not hold joint positions, or the file cannot be written.
     pub fn write_joints(self, path: &Path, motion: &Motion) -> anyhow::Result<()> {
         let (fps, shape) = (motion.fps, motion.joints.shape());
         match self {
@@ -154,8 +160,8 @@ impl ExportFormat {
     }
 }
 
-/// Writes a text through a buffered writer.
-fn streamed(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> anyhow::Result<()> {
+/// Writes a text file through a buffered writer.
+fn write_text(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> anyhow::Result<()> {
     workdir::replace(path, |attempt| {
         let mut text = BufWriter::new(File::create(attempt)?);
         write(&mut text)?;
@@ -168,7 +174,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_extension_chooses() {
+    fn the_extension_selects_the_format() {
         assert_eq!(ExportFormat::from_path(Path::new("a/b.BVH")).unwrap(), ExportFormat::Bvh);
         assert_eq!(ExportFormat::from_path(Path::new("a.Glb")).unwrap(), ExportFormat::Glb);
         assert_eq!(ExportFormat::from_path(Path::new("a.b/c.npy")).unwrap(), ExportFormat::Npy);

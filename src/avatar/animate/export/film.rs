@@ -1,5 +1,5 @@
-//! Motion as a film: the avatar, alone or beside the source video or another motion; below, the sound's waveform with a
-//! position marker.
+//! Motion as a film: the avatar, alone or next to the source video or another motion, above the waveform of the audio
+//! with a position marker.
 
 use super::film_avatar::{AvatarView, FilmCamera};
 use super::film_source::SourceCamera;
@@ -18,28 +18,28 @@ use std::sync::mpsc::sync_channel;
 
 /// Left, top, right, bottom of an area, px.
 type FilmArea = [f32; 4];
-/// Size of the picture in px.
+/// Size of the image, px.
 pub const SIZE: [usize; 2] = [1280, 720];
-const WHOLE: FilmArea = [0.0, 0.0, 1280.0, 620.0];
-const HALVES: [FilmArea; 2] = [[30.0, 66.0, 630.0, 610.0], [650.0, 66.0, 1250.0, 610.0]];
-const WAVE: FilmArea = [40.0, 636.0, 1240.0, 684.0];
-const WORDS_PX: f32 = 11.0;
-/// How far the mouth is open at the loudest, 0..1.
-const WIDEST_MOUTH: f64 = 0.7;
-/// Frames that are drawn ahead of the encoder.
-const N_AHEAD: usize = 3;
+const FULL_AREA: FilmArea = [0.0, 0.0, 1280.0, 620.0];
+const HALF_AREAS: [FilmArea; 2] = [[30.0, 66.0, 630.0, 610.0], [650.0, 66.0, 1250.0, 610.0]];
+const WAVE_AREA: FilmArea = [40.0, 636.0, 1240.0, 684.0];
+const TEXT_PX: f32 = 11.0;
+/// Opening of the mouth at the loudest frame, 0..1.
+const MAX_MOUTH_OPENING: f64 = 0.7;
+/// Number of frames drawn ahead of the encoder.
+const N_BUFFERED: usize = 3;
 
-/// Least rate of a film that is given none, frames a second; NTSC's 29.97 passes.
-const LEAST_FPS: f64 = 29.9;
+/// Minimum default frame rate of a film; NTSC's 29.97 is accepted.
+const MIN_FPS: f64 = 29.9;
 
-/// Rate of a film of a motion: the motion's own, or its smallest multiple from 30 frames a second on, so that every
-/// frame of the motion is one of the film's. A rate whose multiple is no number of 32 bits stays.
+/// Default rate of a film of a motion: the motion's rate, or its smallest multiple of at least 30 fps, so that every
+/// frame of the motion is a frame of the film. If the multiple exceeds 32 bits, the rate is unchanged.
 pub fn smooth_rate(fps: FrameRate) -> FrameRate {
-    let times = (LEAST_FPS / fps.per_sec()).ceil().clamp(1.0, 1000.0);
+    let times = (MIN_FPS / fps.per_sec()).ceil().clamp(1.0, 1000.0);
     fps.num.checked_mul(times as u32).map_or(fps, |num| FrameRate::new(num, fps.den))
 }
 
-/// What a film shows.
+/// Content of a film.
 #[derive(Clone, Copy, Debug)]
 pub struct FilmSource<'a> {
     pub performance: &'a Performance,
@@ -48,35 +48,35 @@ pub struct FilmSource<'a> {
     pub beside: SecondPanel<'a>,
 }
 
-/// Content of the picture's second half.
+/// Content of the second half of the image.
 #[derive(Clone, Copy, Debug, Default)]
 pub enum SecondPanel<'a> {
-    /// None: the avatar fills the picture.
+    /// No second half: the avatar fills the image.
     #[default]
     Itself,
-    /// Frames of a video from `from_secs` on; given its camera, the avatar is drawn over them at the position of the person.
+    /// Frames of a video from `from_secs` on. If its camera is given, the avatar is drawn over the person in the video.
     Video { path: &'a Path, from_secs: f64, camera: Option<&'a SourceCamera> },
-    /// Another avatar, drawn in the same size; the labels of the two, the other last.
+    /// Another avatar at the same size; the labels of the two, the other one last.
     Motion { performance: &'a Performance, labels: [&'a str; 2] },
 }
 
-/// Renderer of a film's frames.
+/// Renderer of the frames of a film.
 pub struct Film<'a> {
     fps: FrameRate,
     n_frames: usize,
     panels: Vec<LabelledPanel<'a>>,
-    over: Option<OverVideo<'a>>,
-    /// Loudness of each column of the waveform, 0..1; empty without sound.
+    overlay: Option<VideoOverlay<'a>>,
+    /// Loudness of each column of the waveform, 0..1; empty without audio.
     wave: Vec<f32>,
-    /// Loudness of each frame, 0..1; empty without sound.
+    /// Loudness of each frame, 0..1; empty without audio.
     voice: Vec<f32>,
 }
 
-/// One avatar in the picture.
+/// An avatar in its area of the image.
 struct LabelledPanel<'a> {
     performance: &'a Performance,
     view: AvatarView<'a>,
-    /// Left top corner of the view, px.
+    /// Top left corner of the view, px.
     corner: [usize; 2],
     label: &'a str,
     /// Left edge of the label, px.
@@ -84,7 +84,7 @@ struct LabelledPanel<'a> {
 }
 
 impl<'a> LabelledPanel<'a> {
-    /// Panel of the first of the `shown` performances, in which all of them fit.
+    /// Panel of the first of the `shown` performances, framed so that all of them fit.
     fn new(shown: &[&'a Performance], camera: FilmCamera, area: FilmArea, label: &'a str) -> Self {
         let [left, top, right, bottom] = area.map(|px| px as usize);
         let view = AvatarView::new(shown[0], shown, [right - left, bottom - top], camera);
@@ -94,57 +94,57 @@ impl<'a> LabelledPanel<'a> {
 }
 
 impl<'a> Film<'a> {
-    /// Film with one view in which every frame of the body fits.
+    /// Film with a fixed view in which every frame of the body fits.
     pub fn new(content: FilmSource<'a>) -> Self {
         let FilmSource { performance, camera, sound, beside } = content;
         let panel = |shown: &[&'a Performance], area, label| LabelledPanel::new(shown, camera, area, label);
         let panels = match beside {
             SecondPanel::Video { camera: Some(_), .. } => Vec::new(),
-            SecondPanel::Itself => vec![panel(&[performance], WHOLE, "")],
-            SecondPanel::Video { camera: None, .. } => vec![panel(&[performance], HALVES[1], "")],
+            SecondPanel::Itself => vec![panel(&[performance], FULL_AREA, "")],
+            SecondPanel::Video { camera: None, .. } => vec![panel(&[performance], HALF_AREAS[1], "")],
             SecondPanel::Motion { performance: other, labels } => vec![
-                panel(&[performance, other], HALVES[0], labels[0]),
-                panel(&[other, performance], HALVES[1], labels[1]),
+                panel(&[performance, other], HALF_AREAS[0], labels[0]),
+                panel(&[other, performance], HALF_AREAS[1], labels[1]),
             ],
         };
-        let over = match beside {
+        let overlay = match beside {
             SecondPanel::Video { path, from_secs, camera: Some(camera) } => {
-                Some(OverVideo { performance, path, from_secs, camera, open: None })
+                Some(VideoOverlay { performance, path, from_secs, camera, open: None })
             }
             _ => None,
         };
         let (fps, n_frames) = (performance.clip.fps, performance.clip.n_frames());
         let secs = fps.secs(n_frames);
         let loudness = |n_parts: usize| sound.map(|sound| loudness(sound, secs, n_parts)).unwrap_or_default();
-        let wave = loudness(((WAVE[2] - WAVE[0]) / COLUMN_PX) as usize);
-        Self { fps, n_frames, panels, over, wave, voice: loudness(n_frames) }
+        let wave = loudness(((WAVE_AREA[2] - WAVE_AREA[0]) / COLUMN_PX) as usize);
+        Self { fps, n_frames, panels, overlay, wave, voice: loudness(n_frames) }
     }
 
-    /// Picture of one frame, `SIZE` px; an empty area in place of a video.
+    /// Image of one frame, `SIZE` px; the area of a separate video is left empty.
     pub fn frame(&mut self, frame_idx: usize) -> anyhow::Result<Image> {
         let mut image = Image::filled(SIZE[0], SIZE[1], PAPER);
         let secs = self.fps.secs(frame_idx);
-        let mouth = self.voice.get(frame_idx).map_or(0.0, |loudness| WIDEST_MOUTH * f64::from(*loudness));
+        let mouth = self.voice.get(frame_idx).map_or(0.0, |loudness| MAX_MOUTH_OPENING * f64::from(*loudness));
         for LabelledPanel { performance, view, corner, label, label_px } in &mut self.panels {
-            // The other motion's frame nearest in time, none after its end.
+            // The nearest frame in time of the other motion; none after its end.
             let clip = &performance.clip;
             let shown = if clip.fps == self.fps { frame_idx } else { (secs * clip.fps.per_sec()).round() as usize };
             if shown < clip.n_frames() {
                 draw::paste(&mut image, &view.frame(shown, mouth), *corner);
             }
-            draw::text(&mut image, label, [*label_px, 50.0], WORDS_PX, INK)?;
+            draw::text(&mut image, label, [*label_px, 50.0], TEXT_PX, INK)?;
         }
-        if let Some(over) = &mut self.over {
-            over.draw(&mut image, frame_idx, mouth)?;
+        if let Some(overlay) = &mut self.overlay {
+            overlay.draw(&mut image, frame_idx, mouth)?;
         }
         self.draw_wave(&mut image, frame_idx)?;
         let clock = format!("{} / {}", clock(secs), clock(self.fps.secs(self.n_frames)));
-        draw::text(&mut image, &clock, [WAVE[0], 706.0], WORDS_PX, INK)?;
+        draw::text(&mut image, &clock, [WAVE_AREA[0], 706.0], TEXT_PX, INK)?;
         Ok(image)
     }
 
     fn draw_wave(&self, image: &mut Image, frame_idx: usize) -> anyhow::Result<()> {
-        let [left, top, right, bottom] = WAVE;
+        let [left, top, right, bottom] = WAVE_AREA;
         let middle = (top + bottom) / 2.0;
         let faint = mix(INK, PAPER, 0.65);
         let now = left + (right - left) * (frame_idx as f32 + 0.5) / self.n_frames.max(1) as f32;
@@ -159,24 +159,27 @@ impl<'a> Film<'a> {
     }
 }
 
-/// Writes the film as an mp4 with the sound, in place; callers wrap it in `stage::workdir::replace`. Frames are drawn on
-/// a thread of their own while those before are encoded.
+/// Writes the film as an mp4 with audio directly to `path`; callers wrap it in `stage::workdir::replace`. Frames are
+/// drawn on a separate thread while earlier ones are encoded.
+///
+/// # Errors
+/// A video cannot be read or is too short, or the film cannot be written.
 pub fn write(path: &Path, content: FilmSource, progress: &dyn Progress) -> anyhow::Result<()> {
     let FilmSource { performance, sound, beside, .. } = content;
     let (fps, n_frames) = (performance.clip.fps, performance.clip.n_frames());
     let mut footage = match beside {
         SecondPanel::Video { path, from_secs, camera: None } => {
-            Some(FilmFootage::open(path, fps, from_secs, HALVES[0])?)
+            Some(FilmFootage::open(path, fps, from_secs, HALF_AREAS[0])?)
         }
         _ => None,
     };
     let task = progress.begin("drawing", n_frames as u64);
     let mut writer = VideoWriter::create(path, SIZE[0], SIZE[1], fps, sound)?;
-    let (sender, pictures) = sync_channel(N_AHEAD);
+    let (sender, pictures) = sync_channel(N_BUFFERED);
     std::thread::scope(|scope| -> anyhow::Result<()> {
         scope.spawn(move || {
             let mut film = Film::new(content);
-            // A writer that failed takes no more.
+            // Sending fails if the writer has failed.
             let _ = (0..n_frames).try_for_each(|frame_idx| sender.send(film.frame(frame_idx)));
         });
         for picture in pictures {
@@ -192,8 +195,8 @@ pub fn write(path: &Path, content: FilmSource, progress: &dyn Progress) -> anyho
     writer.finish()
 }
 
-/// Avatar before the video that its motion was lifted from; frames are drawn one after the other.
-struct OverVideo<'a> {
+/// Avatar drawn over the video from which its motion was lifted; frames are drawn in order.
+struct VideoOverlay<'a> {
     performance: &'a Performance,
     path: &'a Path,
     from_secs: f64,
@@ -201,13 +204,13 @@ struct OverVideo<'a> {
     open: Option<(FilmFootage, Box<AvatarView<'a>>)>,
 }
 
-impl OverVideo<'_> {
-    /// Draws the next frame of the video with the avatar; nothing after the video's last one.
+impl VideoOverlay<'_> {
+    /// Draws the next frame of the video with the avatar; does nothing after the end of the video.
     fn draw(&mut self, image: &mut Image, frame_idx: usize, mouth: f64) -> anyhow::Result<()> {
         let (footage, view) = match &mut self.open {
             Some(open) => open,
             closed => {
-                let footage = FilmFootage::open(self.path, self.performance.clip.fps, self.from_secs, WHOLE)?;
+                let footage = FilmFootage::open(self.path, self.performance.clip.fps, self.from_secs, FULL_AREA)?;
                 let view = AvatarView::new(self.performance, &[], footage.size, FilmCamera::Front);
                 closed.insert((footage, Box::new(view)))
             }
@@ -219,11 +222,11 @@ impl OverVideo<'_> {
     }
 }
 
-/// Frames of a video in step with a motion.
+/// Frames of a video, synchronised with a motion.
 struct FilmFootage {
     frames: FrameReader,
     area: FilmArea,
-    /// Width and height of its pictures in the film, px.
+    /// Width and height of its frames in the film, px.
     size: [usize; 2],
     ended: bool,
 }
@@ -245,7 +248,7 @@ impl FilmFootage {
         Ok(Self { frames, area, size, ended: false })
     }
 
-    /// Draws the next frame into its area; nothing after the last one.
+    /// Draws the next frame into its area; does nothing after the last one.
     fn show(&mut self, image: &mut Image) -> anyhow::Result<()> {
         if let Some(picture) = self.picture()? {
             self.paste(image, &picture);
@@ -253,13 +256,13 @@ impl FilmFootage {
         Ok(())
     }
 
-    /// Next frame; none after the last one.
+    /// The next frame; `None` after the last one.
     fn picture(&mut self) -> anyhow::Result<Option<Image>> {
         self.ended = self.ended || self.frames.advance()?.is_none();
         if self.ended { Ok(None) } else { Ok(Some(self.frames.picture(Some(self.size))?)) }
     }
 
-    /// Puts a picture in the middle of the area.
+    /// Draws an image centred in the area.
     fn paste(&self, image: &mut Image, picture: &Image) {
         let [left, top, right, bottom] = self.area.map(|px| px as usize);
         let (x0, y0) = (left + (right - left - picture.width) / 2, top + (bottom - top - picture.height) / 2);
@@ -267,10 +270,10 @@ impl FilmFootage {
     }
 }
 
-/// Width of a column of the wave.
+/// Width of a column of the waveform, px.
 const COLUMN_PX: f32 = 4.0;
 
-/// Root mean square of the sound in `n_parts` equal parts of a time, the loudest 1; 0 after its end.
+/// Root mean square of the audio in `n_parts` equal parts of `secs` seconds, with maximum 1; 0 after its end.
 fn loudness(sound: &Sound, secs: f64, n_parts: usize) -> Vec<f32> {
     let samples = secs * f64::from(sound.rate) / n_parts as f64;
     let mut parts: Vec<f32> = (0..n_parts)
@@ -296,7 +299,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_film_has_thirty_frames_and_every_one_of_its_motion() {
+    fn the_default_rate_is_a_multiple_of_at_least_30_fps() {
         let rates = [(15, 1, 30, 1), (25, 1, 50, 1), (24, 1, 48, 1), (30_000, 1001, 30_000, 1001), (10, 1, 30, 1)];
         for (num, den, film_num, film_den) in rates {
             assert_eq!(smooth_rate(FrameRate::new(num, den)), FrameRate::new(film_num, film_den));

@@ -1,4 +1,4 @@
-//! Avatar of a performance before a plain backdrop, framed so that head, hips and every gesture fit.
+//! Avatar of a performance over a plain backdrop, framed so that head, hips and every gesture fit.
 
 use super::film_source::SourceCamera;
 use crate::animate::avatar::{Appearance, Avatar};
@@ -9,17 +9,17 @@ use orator_base::math::vec3::{Vec3, add, scale};
 use orator_base::types::image::Image;
 use orator_base::types::skeleton::N_JOINTS;
 
-/// Where a film sees the avatar from.
+/// Viewpoint of a film.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum FilmCamera {
     #[default]
     Front,
-    /// From the speaker's left and a little above.
+    /// From the speaker's left and slightly above.
     ThreeQuarter,
 }
 
 impl FilmCamera {
-    /// Yaw towards the speaker's left and height of the view, degrees.
+    /// Azimuth towards the speaker's left and elevation of the view, degrees.
     fn degrees(self) -> [f64; 2] {
         match self {
             Self::Front => [0.0, 3.0],
@@ -27,35 +27,35 @@ impl FilmCamera {
         }
     }
 
-    /// Turn about the vertical.
+    /// Rotation about the vertical axis.
     fn turn(self) -> Rotation {
         Rotation::about([0.0, 1.0, 0.0], self.degrees()[0].to_radians())
     }
 
-    /// Camera of `size` px that sees all of these performances.
+    /// Camera of `size` px in which all of these performances fit.
     fn framing(self, shown: &[&Performance], size: [usize; 2]) -> PinholeCamera {
         let upwards = Rotation::about([1.0, 0.0, 0.0], -self.degrees()[1].to_radians());
         let towards_camera = self.turn().turn(upwards.turn([0.0, 0.0, 1.0]));
         let points: Vec<Vec3> = shown.iter().flat_map(|performance| extremes(performance)).collect();
-        framed(&points, towards_camera, size)
+        fit_camera(&points, towards_camera, size)
     }
 }
 
-/// Focal length over the picture's height: a lens that does not distort hands that reach forward.
-const FOCAL: f64 = 2.2;
-/// Space around what has to fit, as a share of the picture.
-const SPACE: f64 = 0.06;
-/// Flesh around a joint, cm.
-const FLESH_CM: f64 = 4.0;
-/// Direction of the key light from a body seen from the front.
+/// Focal length relative to the image height; long enough not to distort hands that reach forward.
+const FOCAL_RATIO: f64 = 2.2;
+/// Margin around the content, as a fraction of the image.
+const MARGIN: f64 = 0.06;
+/// Radius of the body around a joint, cm.
+const BODY_RADIUS_CM: f64 = 4.0;
+/// Direction of the key light for a front view.
 const TO_KEY: Vec3 = [-0.5, 0.8, 0.7];
 /// Colours of the backdrop.
-const ABOVE: [u8; 3] = [206, 211, 216];
-const BELOW: [u8; 3] = [146, 152, 158];
-/// Frames that the framing looks at.
-const N_FRAMED: usize = 600;
+const TOP_COLOUR: [u8; 3] = [206, 211, 216];
+const BOTTOM_COLOUR: [u8; 3] = [146, 152, 158];
+/// Maximum number of frames that determine the framing.
+const MAX_FRAMED: usize = 600;
 
-/// Body before a camera, which films of several performances on one rig share.
+/// Avatar and camera that films of several performances on one rig share.
 #[derive(Clone, Debug)]
 pub struct AvatarStage {
     avatar: Avatar,
@@ -64,7 +64,8 @@ pub struct AvatarStage {
 }
 
 impl AvatarStage {
-    /// Body of the performances' rig, seen in pictures of `size` px in which all of them fit; `None` without a performance.
+    /// Avatar of the performances' rig, with a camera of `size` px in which all of them fit; `None` without a
+    /// performance.
     pub fn new(shown: &[&Performance], looks: &Appearance, size: [usize; 2], from: FilmCamera) -> Option<Self> {
         let avatar = Avatar::new(&shown.first()?.rig, looks);
         Some(Self { avatar, camera: from.framing(shown, size), from })
@@ -89,7 +90,7 @@ impl<'a> AvatarView<'a> {
         Self::on(&AvatarStage { avatar, camera: from.framing(shown, size), from }, performance)
     }
 
-    /// View of a performance on the rig of the stage.
+    /// View of a performance whose rig is that of the stage.
     pub fn on(stage: &AvatarStage, performance: &'a Performance) -> Self {
         let AvatarStage { avatar, camera, from } = stage.clone();
         let size = camera.size;
@@ -98,18 +99,18 @@ impl<'a> AvatarView<'a> {
             avatar,
             camera,
             light: Light::studio(from.turn().turn(TO_KEY)),
-            backdrop: Background::gradient(size, ABOVE, BELOW),
+            backdrop: Background::gradient(size, TOP_COLOUR, BOTTOM_COLOUR),
             renderer: Renderer::new(size),
             meshes: Vec::new(),
         }
     }
 
-    /// Triangles of the avatar.
+    /// Number of triangles of the avatar.
     pub fn n_triangles(&self) -> usize {
         self.avatar.parts.iter().map(|part| part.triangles.len()).sum()
     }
 
-    /// Picture of one frame with the mouth open by `mouth`, 0..1.
+    /// Image of one frame with the mouth opened by `mouth`, 0..1.
     pub fn frame(&mut self, frame_idx: usize, mouth: f64) -> Image {
         let Performance { rig, clip, .. } = self.performance;
         self.avatar.pose_into(rig, clip.root_at(frame_idx), &clip.local[frame_idx], mouth, &mut self.meshes);
@@ -117,53 +118,56 @@ impl<'a> AvatarView<'a> {
         self.renderer.draw(&self.camera, &meshes, &self.light, &self.backdrop)
     }
 
-    /// Picture of one frame before the picture of a video, of the view's size, from the video's camera.
-    pub fn frame_over(&mut self, behind: Image, frame_idx: usize, mouth: f64, source: &SourceCamera) -> Image {
+    /// Image of one frame over a video frame of the view's size, from the camera of the video.
+    pub fn frame_over(&mut self, video_frame: Image, frame_idx: usize, mouth: f64, source: &SourceCamera) -> Image {
         let Performance { rig, clip, .. } = self.performance;
         let neck = clip.positions(frame_idx)[rig.neck];
         self.camera = source.at(clip.fps.secs(frame_idx), neck, self.camera.size);
-        self.backdrop = Background::picture(behind);
+        self.backdrop = Background::picture(video_frame);
         self.frame(frame_idx, mouth)
     }
 }
 
-/// Points that must be seen: of all frames the arms and hands, the top of the head, and the hips.
+/// Points that must be visible: arms, hands, the top of the head and the hips in all frames.
 fn extremes(performance: &Performance) -> Vec<Vec3> {
     let Performance { rig, clip, .. } = performance;
     let n_frames = clip.n_frames();
-    let step = n_frames.div_ceil(N_FRAMED).max(1);
+    let step = n_frames.div_ceil(MAX_FRAMED).max(1);
     let mut points = Vec::new();
     for frame_idx in (0..n_frames).step_by(step) {
         let places = clip.positions(frame_idx);
         let body = (places[rig.head][1] - places[0][1]).abs();
         points.extend((0..N_JOINTS).map(|joint| places[rig.positions[joint]]));
-        // The crown is about as far above the head's joint as a third of the way from there to the hips.
+        // The crown is about as far above the head joint as a third of the distance from there to the hips.
         points.extend([-0.18, 0.18].map(|aside| add(places[rig.head], [aside * body, 0.36 * body, 0.0])));
         points.push(add(places[0], [0.0, -0.12 * body, 0.0]));
     }
     points
 }
 
-/// Camera in the direction `towards_camera` from which all points are seen, as near as that allows.
-fn framed(points: &[Vec3], towards_camera: Vec3, size: [usize; 2]) -> PinholeCamera {
-    let focal_px = FOCAL * size[1] as f64;
+/// The nearest camera in direction `towards_camera` from which all points are visible.
+fn fit_camera(points: &[Vec3], towards_camera: Vec3, size: [usize; 2]) -> PinholeCamera {
+    let focal_px = FOCAL_RATIO * size[1] as f64;
     let at = |target: Vec3, away: f64| {
         PinholeCamera::looking_at(size, focal_px, add(target, scale(towards_camera, away)), target, 0.0)
     };
-    // Axes of the view; the points' middle across it is the target.
+    // Axes of the view; the camera aims at the centre of the points.
     let plain = at([0.0; 3], 1.0);
-    let seen: Vec<Vec3> = points.iter().map(|point| plain.axes.turn(*point)).collect();
+    let points: Vec<Vec3> = points.iter().map(|point| plain.axes.turn(*point)).collect();
     let ends = [0, 1, 2].map(|k| {
-        let values = || seen.iter().map(|point| point[k]);
-        [values().fold(f64::INFINITY, f64::min) - FLESH_CM, values().fold(f64::NEG_INFINITY, f64::max) + FLESH_CM]
+        let values = || points.iter().map(|point| point[k]);
+        [
+            values().fold(f64::INFINITY, f64::min) - BODY_RADIUS_CM,
+            values().fold(f64::NEG_INFINITY, f64::max) + BODY_RADIUS_CM,
+        ]
     });
     if ends.iter().flatten().any(|v| !v.is_finite()) {
         return at([0.0, 120.0, 0.0], 300.0);
     }
     let middle = ends.map(|[low, high]| (low + high) / 2.0);
-    let per_depth = [0, 1].map(|k| focal_px / ((0.5 - SPACE) * size[k] as f64));
-    let away = seen.iter().map(|point| {
-        let across = |k: usize| per_depth[k] * ((point[k] - middle[k]).abs() + FLESH_CM);
+    let per_depth = [0, 1].map(|k| focal_px / ((0.5 - MARGIN) * size[k] as f64));
+    let away = points.iter().map(|point| {
+        let across = |k: usize| per_depth[k] * ((point[k] - middle[k]).abs() + BODY_RADIUS_CM);
         across(0).max(across(1)) - (point[2] - middle[2])
     });
     at(plain.axes.inverse().turn(middle), away.fold(0.0, f64::max))

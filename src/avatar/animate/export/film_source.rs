@@ -1,4 +1,5 @@
-//! Camera of the video that a motion was lifted from: with a conventional lens, where the body stands before it.
+//! Camera of the video from which a motion was lifted, with an assumed focal length, and the position of the body in
+//! front of it.
 
 use crate::render::PinholeCamera;
 use anyhow::{Context as _, ensure};
@@ -9,9 +10,9 @@ use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST, R_ELBOW, R_SHOULDER, R_WRIST};
 use orator_base::types::time::FrameRate;
 
-/// Focal length over the longer side of the picture: that of a plain lens. Where it is wrong, the body stands nearer or
-/// further away.
-const FOCAL: f64 = 1.2;
+/// Assumed focal length relative to the longer side of the image. If it is wrong, the body is estimated too near or too
+/// far.
+const FOCAL_RATIO: f64 = 1.2;
 /// Joints with their keypoints.
 const PAIRS: [[usize; 2]; 6] = [
     [L_SHOULDER, coco::L_SHOULDER],
@@ -21,29 +22,32 @@ const PAIRS: [[usize; 2]; 6] = [
     [L_WRIST, coco::L_WRIST],
     [R_WRIST, coco::R_WRIST],
 ];
-/// Fewest of them from which a place follows.
-const LEAST_SEEN: usize = 4;
-/// Nearest depth of a neck, metres.
-const NEAREST: f64 = 0.2;
-/// Time over which places are averaged to each side, s.
-const EVEN_SECS: f64 = 0.1;
+/// Minimum number of these correspondences for a position estimate.
+const MIN_CORRESPONDENCES: usize = 4;
+/// Minimum depth of a neck, metres.
+const MIN_DEPTH_METRES: f64 = 0.2;
+/// Half width of the window in which positions are averaged, s.
+const AVERAGING_SECS: f64 = 0.1;
 
-/// Camera of a video, and the neck's place before it in every frame of the motion.
+/// Camera of a video, and the position of the neck in front of it in every frame of the motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SourceCamera {
     fps: FrameRate,
-    /// Width and height of the video's picture, px.
+    /// Width and height of the video frame, px.
     image_size: [f64; 2],
-    /// In camera axes (x right, y down, z away), metres.
+    /// Neck positions in camera axes (x right, y down, z forward), metres.
     necks: Vec<Vec3>,
 }
 
-/// One joint as it was lifted (metres from the neck, camera axes) and as it is seen (focal lengths from the middle).
-type Sight = (Vec3, [f64; 2]);
+/// A lifted joint (metres from the neck, camera axes) and its keypoint (focal lengths from the image centre).
+type Correspondence = (Vec3, [f64; 2]);
 
 impl SourceCamera {
-    /// Camera from which the joints of a motion are seen at the keypoints of the same frames; the depth of the neck is one
-    /// for all frames.
+    /// Fits the camera that projects the joints of a motion onto the keypoints of the same frames; the depth of the
+    /// neck is constant.
+    ///
+    /// # Errors
+    /// The numbers of frames differ, or no frame shows enough keypoints.
     pub fn fit(motion: &Motion, keypoints: &Keypoints) -> anyhow::Result<Self> {
         let n_frames = motion.n_frames();
         ensure!(
@@ -52,52 +56,53 @@ impl SourceCamera {
             keypoints.n_frames()
         );
         let image_size = keypoints.image_size.map(f64::from);
-        let focal_px = FOCAL * image_size[0].max(image_size[1]);
-        let frames: Vec<Vec<Sight>> = (0..n_frames)
+        let focal_px = FOCAL_RATIO * image_size[0].max(image_size[1]);
+        let frames: Vec<Vec<Correspondence>> = (0..n_frames)
             .map(|t| {
-                let sight = |[joint, point]: [usize; 2]| {
+                let correspondence = |[joint, point]: [usize; 2]| {
                     let at = [0, 1, 2].map(|k| f64::from(motion.joints[[t, joint, k]]));
                     let px = [0, 1].map(|k| f64::from(keypoints.body[[t, point, k]]));
                     let seen = [0, 1].map(|k| (px[k] - (image_size[k] - 1.0) / 2.0) / focal_px);
                     let is_known = keypoints.body[[t, point, 2]] >= SEEN_SCORE;
                     (is_known && at.iter().chain(&seen).all(|v| v.is_finite())).then_some((at, seen))
                 };
-                PAIRS.into_iter().filter_map(sight).collect()
+                PAIRS.into_iter().filter_map(correspondence).collect()
             })
             .collect();
-        let depths = frames.iter().filter_map(|sights| depth(sights));
+        let depths = frames.iter().filter_map(|matches| depth(matches));
         let depth = median(depths).context(
             "no frame shows shoulders, elbows and wrists well enough to say where the camera of the video stands",
         )?;
-        let places: Vec<Option<[f64; 2]>> = frames.iter().map(|sights| across(sights, depth)).collect();
-        let reach = (EVEN_SECS * motion.fps.per_sec()).round() as usize;
-        let even = |t: usize| mean(places[t.saturating_sub(reach)..(t + reach + 1).min(n_frames)].iter().flatten());
-        let known: Vec<(usize, [f64; 2])> = (0..n_frames).filter_map(|t| Some((t, even(t)?))).collect();
+        let places: Vec<Option<[f64; 2]>> = frames.iter().map(|matches| lateral_position(matches, depth)).collect();
+        let half_width = (AVERAGING_SECS * motion.fps.per_sec()).round() as usize;
+        let averaged =
+            |t: usize| mean(places[t.saturating_sub(half_width)..(t + half_width + 1).min(n_frames)].iter().flatten());
+        let known: Vec<(usize, [f64; 2])> = (0..n_frames).filter_map(|t| Some((t, averaged(t)?))).collect();
         let necks = (0..n_frames).filter_map(|t| between(&known, t)).map(|[x, y]| [x, y, depth]).collect();
         Ok(Self { fps: motion.fps, image_size, necks })
     }
 
-    /// Camera for pictures of `size` px at a time of the motion, for a body whose neck is at `neck` (cm) in the world.
+    /// Camera for images of `size` px at a time of the motion, for a body whose neck is at `neck` (cm) in the world.
     pub fn at(&self, secs: f64, neck: Vec3, size: [usize; 2]) -> PinholeCamera {
         let frame = (secs * self.fps.per_sec()).max(0.0);
         let at = |frame: usize| self.necks.get(frame).or(self.necks.last()).copied().unwrap_or([0.0, 0.0, 1.0]);
         let (before, after) = (at(frame as usize), at(frame as usize + 1));
         let [x, y, z] = [0, 1, 2].map(|k| before[k] + frame.fract() * (after[k] - before[k]));
         let longer = usize::from(self.image_size[1] > self.image_size[0]);
-        let focal_px = FOCAL * size[longer] as f64;
+        let focal_px = FOCAL_RATIO * size[longer] as f64;
         let position = add(neck, [-100.0 * x, 100.0 * y, 100.0 * z]);
         PinholeCamera::looking_at(size, focal_px, position, add(position, [0.0, 0.0, -100.0]), 0.0)
     }
 }
 
-/// Depth of the neck at which the joints are seen where they were, by least squares over its place.
-fn depth(sights: &[Sight]) -> Option<f64> {
-    if sights.len() < LEAST_SEEN {
+/// Least-squares depth of the neck at which the joints project onto their keypoints.
+fn depth(matches: &[Correspondence]) -> Option<f64> {
+    if matches.len() < MIN_CORRESPONDENCES {
         return None;
     }
-    // Each sight says: place · row = value, across and down.
+    // Each correspondence gives two equations, position · row = value, for x and y.
     let rows =
-        sights.iter().flat_map(|&([x, y, z], [u, v])| [([1.0, 0.0, -u], u * z - x), ([0.0, 1.0, -v], v * z - y)]);
+        matches.iter().flat_map(|&([x, y, z], [u, v])| [([1.0, 0.0, -u], u * z - x), ([0.0, 1.0, -v], v * z - y)]);
     let (mut columns, mut right) = ([[0.0; 3]; 3], [0.0; 3]);
     for (row, value) in rows {
         for k in 0..3 {
@@ -107,14 +112,14 @@ fn depth(sights: &[Sight]) -> Option<f64> {
     }
     let [a, b, c] = columns;
     let depth = dot(a, cross(b, right)) / dot(a, cross(b, c));
-    (depth > NEAREST && depth.is_finite()).then_some(depth)
+    (depth > MIN_DEPTH_METRES && depth.is_finite()).then_some(depth)
 }
 
-/// Place of the neck across the view at a depth.
-fn across(sights: &[Sight], depth: f64) -> Option<[f64; 2]> {
+/// Position of the neck parallel to the image plane, at a given depth, metres.
+fn lateral_position(matches: &[Correspondence], depth: f64) -> Option<[f64; 2]> {
     let places: Vec<[f64; 2]> =
-        sights.iter().map(|&(at, seen)| [0, 1].map(|k| seen[k] * (at[2] + depth) - at[k])).collect();
-    if places.len() < LEAST_SEEN { None } else { mean(places.iter()) }
+        matches.iter().map(|&(at, seen)| [0, 1].map(|k| seen[k] * (at[2] + depth) - at[k])).collect();
+    if places.len() < MIN_CORRESPONDENCES { None } else { mean(places.iter()) }
 }
 
 fn mean<'a>(places: impl Iterator<Item = &'a [f64; 2]>) -> Option<[f64; 2]> {
@@ -122,7 +127,7 @@ fn mean<'a>(places: impl Iterator<Item = &'a [f64; 2]>) -> Option<[f64; 2]> {
     (n > 0.0).then(|| sum.map(|v| v / n))
 }
 
-/// Place at a frame on the straight way between the known frames around it.
+/// Position at frame `t`, interpolated linearly between the nearest known frames.
 fn between(known: &[(usize, [f64; 2])], t: usize) -> Option<[f64; 2]> {
     let after = known.partition_point(|(frame, _)| *frame < t);
     let next = known.get(after).or(known.last())?;
@@ -141,9 +146,9 @@ mod tests {
     use orator_base::types::skeleton::N_JOINTS;
 
     #[test]
-    fn a_body_that_walks_is_seen_where_it_was_and_gaps_are_bridged() {
+    fn a_walking_body_projects_onto_its_keypoints_and_gaps_are_bridged() {
         let (n, size) = (12, [640u32, 360]);
-        let focal_px = FOCAL * 640.0;
+        let focal_px = FOCAL_RATIO * 640.0;
         let place = |t: usize| [0.004 * t as f64 - 0.1, 0.05, 1.4];
         let joint = |j: usize, t: usize| {
             let side = if [L_SHOULDER, L_ELBOW, L_WRIST].contains(&j) { 1.0 } else { -1.0 };
@@ -169,17 +174,17 @@ mod tests {
         let camera = SourceCamera::fit(&motion, &keypoints).unwrap();
         let neck = [3.0, 140.0, 2.0];
         for t in 1..n - 1 {
-            let seen = camera.at(fps.secs(t), neck, [640, 360]);
+            let view = camera.at(fps.secs(t), neck, [640, 360]);
             for [j, point] in PAIRS {
                 let [x, y, z] = joint(j, t).map(|v| 100.0 * v);
-                let px = seen.pixel(seen.see(add(neck, [x, -y, -z])));
+                let px = view.pixel(view.see(add(neck, [x, -y, -z])));
                 let known = [0, 1].map(|k| f64::from(keypoints.body[[t, point, k]]));
                 assert!((px[0] - known[0]).hypot(px[1] - known[1]) < 3.0, "frame {t}: {px:?} for {known:?}");
             }
         }
-        let mut blind = keypoints.clone();
-        blind.body.fill(0.0);
-        let error = SourceCamera::fit(&motion, &blind).unwrap_err().to_string();
+        let mut undetected = keypoints.clone();
+        undetected.body.fill(0.0);
+        let error = SourceCamera::fit(&motion, &undetected).unwrap_err().to_string();
         assert!(error.contains("where the camera of the video stands"), "{error}");
     }
 }

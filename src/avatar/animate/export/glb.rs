@@ -1,8 +1,8 @@
-//! Binary glTF 2.0 container: one buffer, its views and accessors, and the two chunks around it and the scene's JSON.
+//! Binary glTF 2.0 container: one buffer with its views and accessors, and the file of the buffer and the scene's JSON.
 
 use serde_json::{Value, json};
 
-/// Target of a buffer view.
+/// Purpose of a buffer view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BufferUse {
     Vertices = 34_962,
@@ -11,7 +11,7 @@ pub enum BufferUse {
     Other = 0,
 }
 
-/// Buffer under construction with its views and accessors.
+/// Buffer under construction, with its views and accessors.
 #[derive(Debug, Default)]
 pub struct GlbBuffer {
     bytes: Vec<u8>,
@@ -20,14 +20,14 @@ pub struct GlbBuffer {
 }
 
 impl GlbBuffer {
-    /// The buffer of a scene that was read, with its data, so that more can be added.
-    pub fn reopened(scene: &Value, bytes: Vec<u8>) -> Self {
+    /// The buffer of an existing scene with its data, so that more can be appended.
+    pub fn from_scene(scene: &Value, bytes: Vec<u8>) -> Self {
         let list = |key: &str| scene[key].as_array().cloned().unwrap_or_default();
         Self { bytes, views: list("bufferViews"), accessors: list("accessors") }
     }
 
-    /// Adds vectors of `N` floats with their minimum and maximum; returns the accessor's index. `kind` is one of
-    /// `SCALAR`, `VEC3`, `VEC4`, `MAT4`.
+    /// Appends vectors of `N` floats with their minimum and maximum; returns the index of the accessor. `kind` is one
+    /// of `SCALAR`, `VEC3`, `VEC4`, `MAT4`.
     pub fn floats<const N: usize>(&mut self, values: &[[f32; N]], kind: &str, purpose: BufferUse) -> usize {
         let bound = |pick: fn(f32, f32) -> f32| -> Vec<f32> {
             (0..N).map(|k| values.iter().map(|value| value[k]).reduce(pick).unwrap_or(0.0)).collect()
@@ -39,19 +39,19 @@ impl GlbBuffer {
         self.add(values.iter().flatten().flat_map(|v| v.to_le_bytes()), purpose, accessor)
     }
 
-    /// Adds vectors of four bytes (joints); returns the accessor's index.
+    /// Appends vectors of four bytes (joint indices); returns the index of the accessor.
     pub fn bytes4(&mut self, values: &[[u8; 4]]) -> usize {
         let accessor = json!({ "componentType": 5121, "count": values.len(), "type": "VEC4" });
         self.add(values.iter().flatten().copied(), BufferUse::Vertices, accessor)
     }
 
-    /// Adds vectors of four 16-bit fixed-point fractions (weights, colours); returns the accessor's index.
+    /// Appends vectors of four normalised 16-bit fractions (weights, colours); returns the index of the accessor.
     pub fn shares4(&mut self, values: &[[u16; 4]]) -> usize {
         let accessor = json!({ "componentType": 5123, "normalized": true, "count": values.len(), "type": "VEC4" });
         self.add(values.iter().flatten().flat_map(|v| v.to_le_bytes()), BufferUse::Vertices, accessor)
     }
 
-    /// Adds triangle corners, as 16-bit numbers where they fit; returns the accessor's index.
+    /// Appends triangle corners, as 16-bit numbers if they fit; returns the index of the accessor.
     pub fn indices(&mut self, triangles: &[[u32; 3]]) -> usize {
         let flat = || triangles.iter().flatten();
         let accessor = |kind: u32| json!({ "componentType": kind, "count": 3 * triangles.len(), "type": "SCALAR" });
@@ -62,7 +62,7 @@ impl GlbBuffer {
         }
     }
 
-    /// Adds a view of these bytes and its accessor; returns the accessor's index.
+    /// Appends a view of these bytes and its accessor; returns the index of the accessor.
     fn add(&mut self, bytes: impl Iterator<Item = u8>, purpose: BufferUse, accessor: Value) -> usize {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         let offset = self.bytes.len();

@@ -1,5 +1,5 @@
-//! Performance as a glTF scene: the rig's joints as nodes in T-pose (metres, y up, facing +z), the avatar as
-//! skinned meshes, the clip as one animation. Joints that do not turn have one key.
+//! A performance as a glTF scene: the rig's joints as nodes in T-pose (metres, y up, facing +z), the avatar as skinned
+//! meshes, and the clip as one animation. Static joints have a single key.
 
 use super::glb::{BufferUse, GlbBuffer};
 use super::vrm;
@@ -13,9 +13,9 @@ use orator_formats::bvh::write::BvhClip;
 use serde_json::{Value, json};
 
 const METRES: f64 = 0.01;
-/// Largest difference of the quaternions of a joint that does not turn.
-const STILL: f64 = 1e-7;
-/// Bytes of the GLB file of a clip on its rig with `avatar` as its skin; under the names of VRM it is a humanoid of VRM.
+/// Maximum difference between the quaternions of a static joint.
+const STATIC_DIFFERENCE: f64 = 1e-7;
+/// Bytes of the GLB file of a clip on its rig, with `avatar` as its skin. With VRM names it is also a VRM humanoid.
 pub fn file(rig: &Rig, clip: &BvhClip, avatar: &Avatar, names: Names) -> Vec<u8> {
     let skeleton = FileSkeleton::new(&rig.skeleton, names, RestAxes::Convention);
     let mut buffer = GlbBuffer::default();
@@ -29,11 +29,11 @@ pub fn file(rig: &Rig, clip: &BvhClip, avatar: &Avatar, names: Names) -> Vec<u8>
     buffer.file(scene)
 }
 
-/// Scene of the figure at rest, the hips at `root`: a node a joint, then those of the body's and the face's mesh.
+/// Scene of the avatar at rest with the hips at `root`: one node per joint, then the nodes of the body and face meshes.
 pub fn scene(buffer: &mut GlbBuffer, skeleton: &FileSkeleton, root: Vec3, avatar: &Avatar) -> Value {
     let n_joints = skeleton.rest.len();
     let mut nodes = joint_nodes(skeleton, root);
-    // The face is a mesh of its own, since all parts of a mesh have the same morph targets.
+    // The face is a separate mesh because all primitives of a mesh must have the same morph targets.
     let (faces, body): (Vec<_>, Vec<_>) = avatar.parts.iter().enumerate().partition(|(_, part)| !part.mouth.is_empty());
     nodes.push(json!({ "name": "Avatar", "mesh": 0, "skin": 0 }));
     nodes.push(json!({ "name": "Face", "mesh": 1, "skin": 0 }));
@@ -59,7 +59,7 @@ pub fn scene(buffer: &mut GlbBuffer, skeleton: &FileSkeleton, root: Vec3, avatar
     })
 }
 
-/// Version of the format and name of the program.
+/// The `asset` object: format version and generator.
 pub fn asset() -> Value {
     json!({ "version": "2.0", "generator": concat!("orator ", env!("CARGO_PKG_VERSION")) })
 }
@@ -87,7 +87,7 @@ fn metres(cm: Vec3) -> [f32; 3] {
     cm.map(|v| (v * METRES) as f32)
 }
 
-/// Colour of all vertices; `None` where they differ.
+/// The common colour of all vertices; `None` if they differ.
 fn one_colour(part: &AvatarMesh) -> Option<[f32; 3]> {
     let first = *part.colours.first()?;
     part.colours.iter().all(|colour| *colour == first).then_some(first)
@@ -107,7 +107,7 @@ fn primitive(buffer: &mut GlbBuffer, part: &AvatarMesh, material: usize, of_rig:
     let points: Vec<[f32; 3]> = part.points.iter().map(|&point| metres(point)).collect();
     let normals: Vec<[f32; 3]> = part.normals.iter().map(|normal| normal.map(|v| v as f32)).collect();
     let (joints, weights): (Vec<[u8; 4]>, Vec<[u16; 4]>) =
-        part.weights.iter().map(|weights| whole_shares(weights, of_rig)).unzip();
+        part.weights.iter().map(|weights| quantised_weights(weights, of_rig)).unzip();
     let mut primitive = json!({
         "attributes": {
             "POSITION": buffer.floats(&points, "VEC3", BufferUse::Vertices),
@@ -131,8 +131,8 @@ fn primitive(buffer: &mut GlbBuffer, part: &AvatarMesh, material: usize, of_rig:
     primitive
 }
 
-/// Weights as 16-bit fractions that sum to 65535, largest first; a joint with weight 0 is joint 0.
-fn whole_shares(weights: &Weights, of_rig: &[usize]) -> ([u8; 4], [u16; 4]) {
+/// Weights as 16-bit fractions that sum to 65535, largest first; joints with weight 0 are set to joint 0.
+fn quantised_weights(weights: &Weights, of_rig: &[usize]) -> ([u8; 4], [u16; 4]) {
     let mut shares = weights.map(|(_, weight)| (weight * 65_535.0).round() as u16);
     let others: u16 = shares[1..].iter().sum();
     shares[0] = u16::MAX - others;
@@ -165,8 +165,9 @@ pub fn animation(buffer: &mut GlbBuffer, clip: &BvhClip) -> Value {
     let mut samplers = vec![json!({ "input": input, "output": buffer.floats(roots, "VEC3", BufferUse::Other) })];
     let mut channels = vec![json!({ "sampler": 0, "target": { "node": 0, "path": "translation" } })];
     for joint in (0..clip.skeleton.joints.len()).filter(|&joint| !clip.skeleton.joints[joint].end) {
-        let track = signed(clip.local.iter().map(|local| local[joint]));
-        let moves = track.iter().any(|q| (0..4).any(|k| (f64::from(q[k]) - f64::from(track[0][k])).abs() > STILL));
+        let track = with_continuous_signs(clip.local.iter().map(|local| local[joint]));
+        let moves =
+            track.iter().any(|q| (0..4).any(|k| (f64::from(q[k]) - f64::from(track[0][k])).abs() > STATIC_DIFFERENCE));
         let (input, output) = if moves {
             (*every.get_or_insert_with(|| buffer.floats(&times, "SCALAR", BufferUse::Other)), &track[..])
         } else {
@@ -179,8 +180,8 @@ pub fn animation(buffer: &mut GlbBuffer, clip: &BvhClip) -> Value {
     json!({ "name": "Gesture", "samplers": samplers, "channels": channels })
 }
 
-/// Quaternions (x, y, z, w) of a joint over time, each with the sign nearest to the one before.
-pub fn signed(rotations: impl Iterator<Item = Rotation>) -> Vec<[f32; 4]> {
+/// Quaternions (x, y, z, w) of a joint over time, each with the sign that is nearer to its predecessor.
+pub fn with_continuous_signs(rotations: impl Iterator<Item = Rotation>) -> Vec<[f32; 4]> {
     let mut before = [0.0, 0.0, 0.0, 1.0];
     let next = |rotation: Rotation| {
         let Rotation { w, v: [x, y, z] } = rotation;

@@ -1,9 +1,9 @@
-//! Performance as one JSON object: `format` "orator motion", `version` 1, `fps` [numerator, denominator], `n_frames`,
+//! A performance as one JSON object: `format` "orator motion", `version` 1, `fps` [numerator, denominator], `n_frames`,
 //! `units`, `axes`; `names`, `parents` (index or null) and `offsets` (from the parent in T-pose) of the joints, bone
-//! ends included; `joints49`, the joint for each of the 49 joints of a motion; `positions` [frame][joint][x, y, z] to
-//! 1e-6 m, the soles at y = 0; `rotations` [frame][joint][x, y, z, w], unit quaternions relative to the parent, to
-//! 1e-7. Of a speaker who learnt head or trunk, `posture` has their angles as learnt, before they turn the figure: `fps`, and
-//! `head` and `trunk` [frame][yaw, pitch, roll] in radians, null for what was not learnt.
+//! ends included; `joints49`, the joint index of each of a motion's 49 joints; `positions` [frame][joint][x, y, z] to
+//! 1e-6 m, soles at y = 0; `rotations` [frame][joint][x, y, z, w], unit quaternions relative to the parent, to 1e-7.
+//! `posture` holds generated angles before they are applied: `fps`, `head` and `trunk` [frame][yaw, pitch, roll] in
+//! radians, null if not modelled.
 
 use crate::animate::performance::Performance;
 use crate::animate::rig::names::Names;
@@ -14,7 +14,7 @@ use orator_base::types::time::FrameRate;
 use serde_json::json;
 use std::io::{self, Write};
 
-/// Writes the file's text.
+/// Writes the text of the file.
 pub fn write(
     text: &mut impl Write,
     performance: &Performance,
@@ -56,7 +56,7 @@ pub fn write(
     text.write_all(b"]}\n")
 }
 
-/// Writes a line a frame of what `shown` makes of every joint.
+/// Writes one line per frame with the value of `shown` for every joint.
 fn rows<T>(
     text: &mut impl Write,
     frames: impl Iterator<Item = Vec<T>>,

@@ -1,4 +1,4 @@
-//! Files that other programs open: FBX, GLB, JSON, MP4, and the choice of format by file name.
+//! Files for other programs: FBX, GLB, VRM, JSON, MP4, and the choice of format by file extension.
 
 pub mod fbx;
 pub mod file;

@@ -1,5 +1,5 @@
-//! VRM 1.0: the avatar as a humanoid (`.vrm`, extension `VRMC_vrm`) and its motion (`.vrma`, `VRMC_vrm_animation`), both
-//! glTF under further rules: T-pose at rest, metres, y up, facing +z, no rotations at rest here.
+//! VRM 1.0: the avatar as a humanoid (`.vrm`, extension `VRMC_vrm`) and its motion (`.vrma`, `VRMC_vrm_animation`).
+//! Both are glTF with further rules: T-pose at rest without rotations, metres, y up, facing +z.
 
 use super::glb::GlbBuffer;
 use super::glb_scene;
@@ -11,10 +11,10 @@ use orator_base::motion::fk::Skeleton;
 use orator_formats::bvh::write::BvhClip;
 use serde_json::{Map, Value, json};
 
-/// Licence address that the format requires.
+/// Licence URL that the format requires.
 const LICENSE: &str = "https://vrm.dev/licenses/1.0/";
 
-/// Bytes of the `.vrm` file of the avatar on its rig, without motion.
+/// Bytes of the `.vrm` file of an avatar on its rig, without motion.
 pub fn avatar(rig: &Rig, avatar: &Avatar) -> Vec<u8> {
     let skeleton = FileSkeleton::new(&rig.skeleton, Names::Vrm, RestAxes::Convention);
     let mut buffer = GlbBuffer::default();
@@ -23,7 +23,8 @@ pub fn avatar(rig: &Rig, avatar: &Avatar) -> Vec<u8> {
     buffer.file(scene)
 }
 
-/// Bytes of the `.vrma` file of a clip: the joints without a skin, the animation, and which joint is which bone.
+/// Bytes of the `.vrma` file of a clip: joints without a skin, the animation, and the mapping of humanoid bones to
+/// nodes.
 pub fn motion(rig: &Rig, clip: &BvhClip) -> Vec<u8> {
     let skeleton = FileSkeleton::new(&rig.skeleton, Names::Vrm, RestAxes::Convention);
     let mut buffer = GlbBuffer::default();
@@ -42,8 +43,8 @@ pub fn motion(rig: &Rig, clip: &BvhClip) -> Vec<u8> {
     buffer.file(scene)
 }
 
-/// Makes a scene of VRM's names a humanoid: its bones, the open mouth of the face, the avatar's author and what the licence
-/// allows: everything.
+/// Turns a scene with VRM names into a humanoid: adds the bones, the open-mouth expression, and metadata with author
+/// and permissions.
 pub fn make_humanoid(scene: &mut Value, named: &Skeleton) {
     // The last node is the face.
     let face = named.joints.len() + 1;
@@ -74,7 +75,7 @@ pub fn make_humanoid(scene: &mut Value, named: &Skeleton) {
     scene["extensions"] = json!({ "VRMC_vrm": extension });
 }
 
-/// Node of every bone of the humanoid.
+/// Node of each humanoid bone.
 fn bones(named: &Skeleton) -> Map<String, Value> {
     let moving = named.joints.iter().enumerate().filter(|(_, joint)| !joint.end);
     moving.map(|(node, joint)| (joint.name.clone(), json!({ "node": node }))).collect()

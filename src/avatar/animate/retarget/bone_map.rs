@@ -1,5 +1,5 @@
-//! Which joint of a user's skeleton is which of ours: found by names, or read from a text that people edit, a line
-//! `LeftArm = "upperarm_l"` a bone.
+//! Mapping between our bones and the joints of a user's skeleton, found by name or read from an editable text with one
+//! line `LeftArm = "upperarm_l"` per bone.
 
 use super::bone_names;
 use super::user_rig::UserRig;
@@ -7,33 +7,37 @@ use anyhow::{Context as _, Result, bail, ensure};
 use orator_base::motion::fk::Skeleton;
 use std::collections::BTreeMap;
 
-/// Bones without which no gesture can be put on a skeleton.
-const NEEDED: [&str; 7] = ["Hips", "LeftArm", "LeftForeArm", "LeftHand", "RightArm", "RightForeArm", "RightHand"];
-/// Names that an error lists at most.
-const MOST_LISTED: usize = 60;
+/// Bones that a skeleton must have to receive a gesture.
+const REQUIRED: [&str; 7] = ["Hips", "LeftArm", "LeftForeArm", "LeftHand", "RightArm", "RightForeArm", "RightHand"];
+/// Maximum number of names that an error lists.
+const MAX_LISTED: usize = 60;
 
-/// Joints of a user's skeleton by the names of ours.
+/// Joints of a user's skeleton, by the names of our bones.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoneMap {
     joints: BTreeMap<String, usize>,
 }
 
 impl BoneMap {
-    /// Finds the joints by their names; the chest is the joint that carries both arms and the neck. Errors: hips, an
-    /// arm, forearm or hand that no name is like.
-    pub fn found(rig: &UserRig) -> Result<Self> {
-        // Names of what cannot move match nothing.
+    /// Finds the joints by name; the chest is the joint that carries both arms and the neck.
+    ///
+    /// # Errors
+    /// No joint name matches the hips, an arm, forearm or hand.
+    pub fn detect(rig: &UserRig) -> Result<Self> {
+        // Empty names exclude joints that cannot move.
         let names: Vec<&str> =
             rig.joints.iter().map(|joint| if joint.moves { joint.name.as_str() } else { "" }).collect();
-        let mut joints: BTreeMap<String, usize> = bone_names::found(&names).into_iter().collect();
+        let mut joints: BTreeMap<String, usize> = bone_names::match_names(&names).into_iter().collect();
         if let Some(chest) = chest(rig, &joints) {
             joints.insert("Chest".to_owned(), chest);
         }
-        Self { joints }.whole(rig)
+        Self { joints }.checked(rig)
     }
 
-    /// Reads the text of a map. Errors: no TOML, a bone that we have not, a joint that the skeleton has not, a bone
-    /// missing that is needed.
+    /// Parses the text of a map.
+    ///
+    /// # Errors
+    /// The text is not TOML, names a bone or joint that does not exist, or lacks a required bone.
     pub fn parse(text: &str, rig: &UserRig, ours: &Skeleton) -> Result<Self> {
         let table: BTreeMap<String, String> =
             toml::from_str(text).context("expected lines like LeftArm = \"upperarm_l\"")?;
@@ -47,10 +51,10 @@ impl BoneMap {
             let joint = found.with_context(|| format!("{own}: the skeleton has no joint {name}; {}", listed(rig)))?;
             joints.insert(own, joint);
         }
-        Self { joints }.whole(rig)
+        Self { joints }.checked(rig)
     }
 
-    /// Text of the map, in the order of our bones; those without a joint as remarks.
+    /// Text of the map in the order of our bones; bones without a joint are commented out.
     pub fn text(&self, rig: &UserRig, ours: &Skeleton) -> String {
         let line = |own: &str| match self.joint(own) {
             Some(joint) => format!("{own} = {:?}\n", rig.joints[joint].name),
@@ -61,7 +65,7 @@ impl BoneMap {
         head.to_owned() + &bones.collect::<String>()
     }
 
-    /// Joint of the user's skeleton for a bone of ours.
+    /// Joint of the user's skeleton for one of our bones.
     pub fn joint(&self, own: &str) -> Option<usize> {
         self.joints.get(own).copied()
     }
@@ -71,8 +75,8 @@ impl BoneMap {
         self.joints.len()
     }
 
-    fn whole(self, rig: &UserRig) -> Result<Self> {
-        let missing: Vec<&str> = NEEDED.into_iter().filter(|own| !self.joints.contains_key(*own)).collect();
+    fn checked(self, rig: &UserRig) -> Result<Self> {
+        let missing: Vec<&str> = REQUIRED.into_iter().filter(|own| !self.joints.contains_key(*own)).collect();
         if !missing.is_empty() {
             bail!("no joint for {}; {}; name them with --bone-map", missing.join(", "), listed(rig));
         }
@@ -100,5 +104,5 @@ fn chest(rig: &UserRig, joints: &BTreeMap<String, usize>) -> Option<usize> {
 
 fn listed(rig: &UserRig) -> String {
     let names: Vec<&str> = rig.joints.iter().filter(|joint| joint.moves).map(|joint| joint.name.as_str()).collect();
-    format!("its joints are: {}", names[..names.len().min(MOST_LISTED)].join(" "))
+    format!("its joints are: {}", names[..names.len().min(MAX_LISTED)].join(" "))
 }

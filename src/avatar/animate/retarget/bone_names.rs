@@ -1,5 +1,5 @@
-//! What bones are called in the skeletons that people have: ours, Mixamo, Unity, VRM, Unreal, Rigify, Character Creator,
-//! Biped, Daz, SMPL, CMU, Bandai-Namco. Names are compared as in `formats::bvh::joint_names`.
+//! Bone names of common skeletons: ours, Mixamo, Unity, VRM, Unreal, Rigify, Character Creator, Biped, Daz, SMPL, CMU,
+//! Bandai-Namco. Names are compared after the normalisation of `formats::bvh::joint_names`.
 
 use orator_formats::bvh::joint_names::plain;
 
@@ -18,7 +18,7 @@ const SIDED: [(&str, &[&str]); 7] = [
     ("Leg", &["leg", "lowerleg", "lowleg", "calf", "shin", "tibia", "knee"]),
     ("Foot", &["foot", "ankle"]),
 ];
-/// Rigify calls the trunk by one name from the hips to the head.
+/// Rigify numbers the trunk under a single name from the hips to the head.
 const RIGIFY: [(&str, &str); 4] =
     [("Hips", "spine"), ("Spine", "spine001"), ("Neck", "spine004"), ("Head", "spine006")];
 const FINGERS: [(&str, &[&str]); 5] = [
@@ -30,8 +30,8 @@ const FINGERS: [(&str, &[&str]); 5] = [
 ];
 const BONES: [&str; 3] = ["proximal", "intermediate", "distal"];
 
-/// For each of our joints, the chest excepted, the index of the name that is its.
-pub fn found(names: &[&str]) -> Vec<(String, usize)> {
+/// For each of our joints except the chest, the index of the name that matches it.
+pub fn match_names(names: &[&str]) -> Vec<(String, usize)> {
     let plain: Vec<String> = names.iter().map(|name| plain(name)).collect();
     let at = |wanted: &str| plain.iter().position(|name| name == wanted);
     let mut found = Vec::new();
@@ -51,16 +51,16 @@ pub fn found(names: &[&str]) -> Vec<(String, usize)> {
         let limb = |stems: &[&str]| stems.iter().find_map(|stem| sided(stem));
         let arm = limb(SIDED[1].1);
         for (own, stems) in SIDED {
-            // A shoulder that is the arm's own joint is no collar bone.
+            // A shoulder that is also the joint of the upper arm is not a clavicle.
             let joint = limb(stems).filter(|joint| own != "Shoulder" || Some(*joint) != arm);
             found.extend(joint.map(|joint| (format!("{side}{own}"), joint)));
         }
-        // VRM's thumb begins with a metacarpal, Unity's with a proximal bone.
+        // The thumb starts with a metacarpal bone in VRM and with a proximal bone in Unity.
         let is_vrm = sided("thumbmetacarpal").is_some();
         for (own, stems) in FINGERS {
             let bones = if is_vrm && own == "Thumb" { ["metacarpal", "proximal", "distal"] } else { BONES };
             for (k, bone) in bones.into_iter().enumerate() {
-                let joint = stems.iter().flat_map(|stem| spelt(stem, k + 1, bone)).find_map(|stem| sided(&stem));
+                let joint = stems.iter().flat_map(|stem| spellings(stem, k + 1, bone)).find_map(|stem| sided(&stem));
                 found.extend(joint.map(|joint| (format!("{side}Hand{own}{}", k + 1), joint)));
             }
         }
@@ -68,8 +68,8 @@ pub fn found(names: &[&str]) -> Vec<(String, usize)> {
     found
 }
 
-/// Spellings of a finger's bone, side aside.
-fn spelt(stem: &str, k: usize, bone: &str) -> [String; 7] {
+/// Spellings of a finger bone without its side.
+fn spellings(stem: &str, k: usize, bone: &str) -> [String; 7] {
     [
         format!("hand{stem}{k}"),
         format!("{stem}{k}"),
@@ -88,12 +88,12 @@ mod tests {
     use crate::animate::rig::rig::tests::default_rig;
 
     #[test]
-    fn every_convention_of_ours_is_found_whole() {
+    fn every_naming_convention_is_matched_completely() {
         let rig = default_rig().skeleton;
         for names in Names::ALL {
-            let called = names.of(&rig);
-            let called: Vec<&str> = called.iter().map(String::as_str).collect();
-            let found = found(&called);
+            let file_names = names.of(&rig);
+            let file_names: Vec<&str> = file_names.iter().map(String::as_str).collect();
+            let found = match_names(&file_names);
             let expected = rig.joints.iter().filter(|joint| !joint.end && joint.name != "Chest").count();
             assert_eq!(found.len(), expected, "{names:?}");
             for (own, joint) in found {
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn the_skeletons_of_others_are_found() {
+    fn skeletons_of_other_programs_are_matched() {
         for (names, n) in [
             (
                 "root pelvis spine_01 spine_02 spine_03 clavicle_l upperarm_l lowerarm_l hand_l index_01_l thumb_03_l \

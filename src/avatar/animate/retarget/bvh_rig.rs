@@ -1,4 +1,4 @@
-//! A user's skeleton in a BVH file, and motion written in it: joints, offsets, channels and their order stay.
+//! A user's skeleton in a BVH file, and motion written to it; joints, offsets, channels and their order are preserved.
 
 use super::user_rig::{UserJoint, UserRig};
 use anyhow::{Result, ensure};
@@ -7,16 +7,19 @@ use orator_base::types::time::FrameRate;
 use orator_formats::bvh::read::Bvh;
 use orator_formats::bvh::skeleton::{BvhSkeleton, JointChannels};
 
-/// Skeleton of a BVH file with the positions that it has channels for.
+/// Skeleton of a BVH file with the initial values of its channels.
 #[derive(Clone, Debug)]
 pub struct BvhRig {
     skeleton: BvhSkeleton,
-    /// Channels of the first frame: the place of the root, and of joints that have one.
+    /// Channel values of the first frame, from which positions of the root and other joints are copied.
     first: Vec<f64>,
 }
 
 impl BvhRig {
-    /// The skeleton of a file. Errors: a joint whose rotation channels are not three about different axes.
+    /// Reads the skeleton of a file.
+    ///
+    /// # Errors
+    /// A joint does not have three rotation channels about different axes.
     pub fn new(bvh: &Bvh) -> Result<Self> {
         let skeleton = BvhSkeleton::of(bvh);
         skeleton.check()?;
@@ -44,7 +47,7 @@ impl BvhRig {
         UserRig { joints: self.skeleton.joints.iter().map(joint).collect(), standing: self.first_frame() }
     }
 
-    /// Text of the file with this motion: for each frame the local rotations of all joints.
+    /// Text of the file with new motion: the local rotations of all joints for each frame.
     pub fn text(&self, fps: FrameRate, frames: impl ExactSizeIterator<Item = Vec<Rotation>>) -> String {
         self.skeleton.to_bvh(fps, frames.map(|local| self.channels(&local)))
     }

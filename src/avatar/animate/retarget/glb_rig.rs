@@ -1,8 +1,9 @@
-//! A user's skeleton in a GLB file, and the file with an animation added: nodes, meshes and animations stay.
+//! A user's skeleton in a GLB file, and the file with an animation appended; nodes, meshes and animations are
+//! preserved.
 
 use super::user_rig::{UserJoint, UserRig};
 use crate::animate::export::glb::{BufferUse, GlbBuffer};
-use crate::animate::export::glb_scene::signed;
+use crate::animate::export::glb_scene::with_continuous_signs;
 use anyhow::{Context as _, Result, ensure};
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::Vec3;
@@ -12,24 +13,27 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 
-/// Largest relative difference of the three scales of a node.
-const UNEVEN: f64 = 1e-3;
-/// Most bytes of the JSON that describes the scene, which takes several times as much memory once parsed.
-const MOST_SCENE_BYTES: u32 = 32 << 20;
+/// Maximum relative difference of the three scale factors of a node.
+const MAX_SCALE_DIFFERENCE: f64 = 1e-3;
+/// Maximum size of the scene's JSON, which takes several times as much memory once parsed, bytes.
+const MAX_SCENE_BYTES: u32 = 32 << 20;
 
-/// A GLB file taken apart.
+/// The contents of a GLB file and its skeleton.
 #[derive(Clone, Debug)]
 pub struct GlbRig {
     scene: Value,
     bytes: Vec<u8>,
-    /// Node of each joint.
+    /// Node index of each joint.
     nodes: Vec<usize>,
     rig: UserRig,
 }
 
 impl GlbRig {
-    /// Reads the bytes of a file. Errors: no GLB, buffers in other files, nodes that are no tree, scaled unevenly or
-    /// given as a matrix.
+    /// Parses a file.
+    ///
+    /// # Errors
+    /// The bytes are not a GLB file, buffers are in other files, the nodes do not form a tree, or a node is scaled
+    /// non-uniformly or placed by a matrix.
     pub fn new(file: &[u8]) -> Result<Self> {
         let (scene, bytes) = chunks(file)?;
         let buffers = scene["buffers"].as_array().map_or(0, Vec::len);
@@ -42,24 +46,24 @@ impl GlbRig {
             SceneNode::deserialize(node).with_context(|| format!("node {n} is not as glTF 2.0 describes nodes"))
         });
         let nodes: Vec<SceneNode> = nodes.collect::<Result<_>>()?;
-        let of_skins = list("skins").flat_map(|skin| skin["joints"].as_array().into_iter().flatten());
-        let of_skins: BTreeSet<u64> = of_skins.filter_map(Value::as_u64).collect();
+        let skin_joints = list("skins").flat_map(|skin| skin["joints"].as_array().into_iter().flatten());
+        let skin_joints: BTreeSet<u64> = skin_joints.filter_map(Value::as_u64).collect();
         let has_skin = list("skins").next().is_some();
         let mut is_child = vec![false; nodes.len()];
         for &child in nodes.iter().flat_map(|node| &node.children) {
-            let known =
+            let has_parent =
                 is_child.get_mut(child).with_context(|| format!("a node has the child {child}, which is missing"))?;
-            ensure!(!*known, "node {child} has two parents");
-            *known = true;
+            ensure!(!*has_parent, "node {child} has two parents");
+            *has_parent = true;
         }
-        let mut ahead: Vec<(usize, Option<usize>)> =
+        let mut stack: Vec<(usize, Option<usize>)> =
             (0..nodes.len()).rev().filter(|&node| !is_child[node]).map(|node| (node, None)).collect();
         let (mut order, mut joints) = (Vec::new(), Vec::new());
-        while let Some((node, parent)) = ahead.pop() {
+        while let Some((node, parent)) = stack.pop() {
             let at = joints.len();
-            joints.push(nodes[node].joint(node, parent, !has_skin || of_skins.contains(&(node as u64)))?);
+            joints.push(nodes[node].joint(node, parent, !has_skin || skin_joints.contains(&(node as u64)))?);
             order.push(node);
-            ahead.extend(nodes[node].children.iter().rev().map(|&child| (child, Some(at))));
+            stack.extend(nodes[node].children.iter().rev().map(|&child| (child, Some(at))));
         }
         ensure!(joints.len() == nodes.len(), "its nodes are no tree");
         Ok(Self { nodes: order, rig: UserRig { joints, standing: Vec::new() }, scene, bytes })
@@ -70,8 +74,8 @@ impl GlbRig {
         &self.rig
     }
 
-    /// Bytes of the file with an animation of the joints that move; `frames`: for each frame the local rotations of all
-    /// joints, of which only those of moving joints are kept.
+    /// Bytes of the file with an appended animation; `frames` yields the local rotations of all joints for each frame,
+    /// of which those of moving joints are used.
     pub fn file(
         &self,
         fps: FrameRate,
@@ -79,7 +83,7 @@ impl GlbRig {
         moves: impl Fn(usize) -> bool,
     ) -> Vec<u8> {
         let mut scene = self.scene.clone();
-        let mut buffer = GlbBuffer::reopened(&scene, self.bytes.clone());
+        let mut buffer = GlbBuffer::from_scene(&scene, self.bytes.clone());
         let n_frames = frames.len();
         let mut tracks: Vec<(usize, Vec<Rotation>)> = (0..self.rig.joints.len())
             .filter(|&joint| moves(joint))
@@ -93,7 +97,7 @@ impl GlbRig {
             let input = buffer.floats(&times, "SCALAR", BufferUse::Other);
             let (mut samplers, mut channels) = (Vec::new(), Vec::new());
             for (joint, track) in tracks {
-                let output = buffer.floats(&signed(track.into_iter()), "VEC4", BufferUse::Other);
+                let output = buffer.floats(&with_continuous_signs(track.into_iter()), "VEC4", BufferUse::Other);
                 let target = json!({ "node": self.nodes[joint], "path": "rotation" });
                 channels.push(json!({ "sampler": samplers.len(), "target": target }));
                 samplers.push(json!({ "input": input, "output": output, "interpolation": "LINEAR" }));
@@ -108,12 +112,15 @@ impl GlbRig {
     }
 }
 
-/// The scene and the data of a GLB file. Errors: another file, or one whose scene is described in more bytes than
-/// `MAX_JOINTS` nodes with their meshes and animations need.
+/// Splits a GLB file into its scene and its binary data.
+///
+/// # Errors
+/// The bytes are not a GLB file, or the JSON exceeds `MAX_SCENE_BYTES`, which suffices for `MAX_JOINTS` nodes with
+/// their meshes and animations.
 fn chunks(file: &[u8]) -> Result<(Value, Vec<u8>)> {
     let length = file.get(12..16).map_or(0, |word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]));
     let mib = length >> 20;
-    ensure!(length <= MOST_SCENE_BYTES, "its scene is described in {mib} MiB of JSON: export the figure alone");
+    ensure!(length <= MAX_SCENE_BYTES, "its scene is described in {mib} MiB of JSON: export the figure alone");
     parsed_chunks(file).context("no binary glTF 2.0 (.glb)")
 }
 
@@ -160,8 +167,8 @@ impl SceneNode {
         ensure!(length > 1e-6, "the rotation of {name} is {:?}, expected a unit quaternion", self.rotation);
         let rest = Rotation { w: w / length, v: [x / length, y / length, z / length] };
         let [x, y, z] = self.scale;
-        let is_even = (x - y).abs().max((x - z).abs()) <= UNEVEN * x.abs();
-        ensure!(is_even && x > 0.0, "{name} is scaled by {x}, {y}, {z}; apply its scale and export it again");
+        let is_uniform = (x - y).abs().max((x - z).abs()) <= MAX_SCALE_DIFFERENCE * x.abs();
+        ensure!(is_uniform && x > 0.0, "{name} is scaled by {x}, {y}, {z}; apply its scale and export it again");
         Ok(UserJoint { name, parent, offset: self.translation, rest, scale: x, moves })
     }
 }

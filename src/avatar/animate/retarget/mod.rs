@@ -1,11 +1,11 @@
-//! Motion on a user's own skeleton: which of its joints is which of ours, and rotations that put its bones in our
-//! directions and its hands at our places.
+//! Retargeting to a user's own skeleton: the mapping of its joints to ours, and rotations that reproduce our bone
+//! directions and wrist positions.
 
 pub mod bone_map;
 pub mod bone_names;
 pub mod bvh_rig;
 pub mod glb_rig;
-pub mod reach;
 pub mod retargeted;
 pub mod transfer;
+pub mod two_bone;
 pub mod user_rig;

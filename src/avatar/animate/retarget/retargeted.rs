@@ -1,4 +1,4 @@
-//! Motion onto the skeleton of a user's file: what `--retarget` does.
+//! Motion on the skeleton of a user's file, the implementation of `--retarget`.
 
 use super::bone_map::BoneMap;
 use super::bvh_rig::BvhRig;
@@ -13,7 +13,7 @@ use orator_base::stage::workdir;
 use orator_formats::bvh::read::Bvh;
 use std::path::Path;
 
-/// The skeleton of a user's file, with the map of its bones.
+/// The skeleton of a user's file.
 #[derive(Clone, Debug)]
 pub struct RetargetRig {
     file: RigFile,
@@ -28,14 +28,17 @@ enum RigFile {
 
 impl RetargetRig {
     /// Reads a .bvh or .glb file.
+    ///
+    /// # Errors
+    /// The file cannot be read, or contains no usable skeleton.
     pub fn open(path: &Path) -> Result<Self> {
-        let no_rig = || format!("{} gives no skeleton", path.display());
-        let file = match ending(path).as_str() {
-            "bvh" => RigFile::Bvh(BvhRig::new(&Bvh::read(path)?).with_context(no_rig)?),
+        let invalid_rig = || format!("{} gives no skeleton", path.display());
+        let file = match extension(path).as_str() {
+            "bvh" => RigFile::Bvh(BvhRig::new(&Bvh::read(path)?).with_context(invalid_rig)?),
             "glb" => {
                 let bytes =
                     input::read(path, input::MOST_DATA).with_context(|| format!("cannot read {}", path.display()))?;
-                RigFile::Glb(GlbRig::new(&bytes).with_context(no_rig)?)
+                RigFile::Glb(GlbRig::new(&bytes).with_context(invalid_rig)?)
             }
             _ => bail!("{}: the skeleton to move is given as .bvh or .glb", path.display()),
         };
@@ -51,13 +54,16 @@ impl RetargetRig {
         &self.rig
     }
 
-    /// Errors unless `path` ends like the skeleton's own file.
+    /// Checks that `path` has the same extension as the skeleton's own file.
+    ///
+    /// # Errors
+    /// The extensions differ.
     pub fn check_output(&self, path: &Path) -> Result<()> {
         let own = match self.file {
             RigFile::Bvh(_) => "bvh",
             RigFile::Glb(_) => "glb",
         };
-        ensure!(ending(path) == own, "{}: a skeleton from a .{own} is written as .{own}", path.display());
+        ensure!(extension(path) == own, "{}: a skeleton from a .{own} is written as .{own}", path.display());
         Ok(())
     }
 
@@ -72,7 +78,7 @@ impl RetargetRig {
     pub fn write(&self, path: &Path, performance: &Performance, map: &BoneMap) -> Result<()> {
         self.check_output(path)?;
         let (transfer, clip) = (Transfer::new(&performance.rig, &self.rig, map)?, &performance.clip);
-        // One frame of all joints at a time: a file may have many more joints than those that move.
+        // Frames are streamed because a file may have many more joints than those that move.
         let frames = (0..clip.n_frames()).map(|frame| transfer.frame(clip, frame));
         match &self.file {
             RigFile::Bvh(bvh) => workdir::write_file(path, bvh.text(clip.fps, frames).as_bytes()),
@@ -81,6 +87,6 @@ impl RetargetRig {
     }
 }
 
-fn ending(path: &Path) -> String {
+fn extension(path: &Path) -> String {
     path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
 }

@@ -9,57 +9,57 @@ pub struct UserJoint {
     pub name: String,
     /// Index of the parent, smaller than the joint's own.
     pub parent: Option<usize>,
-    /// From the parent, in the parent's axes and unit.
+    /// Offset from the parent, in the parent's axes and unit.
     pub offset: Vec3,
     /// Local rotation at rest.
     pub rest: Rotation,
-    /// Factor of everything below it, relative to its parent.
+    /// Scale factor of the joint's descendants, relative to its parent.
     pub scale: f64,
-    /// Whether motion may be put on it (the end of a bone, a camera or a mesh is none).
+    /// Whether the joint may be animated; false for bone ends, cameras and meshes.
     pub moves: bool,
 }
 
-/// Where a joint is in the world.
+/// World transform of a joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Placed {
+pub struct JointTransform {
     pub turn: Rotation,
-    pub place: Vec3,
-    /// Factor from the joint's unit to the world's.
+    pub position: Vec3,
+    /// Scale factor from the joint's unit to the world's.
     pub scale: f64,
 }
 
-/// A user's skeleton, parents before their children.
+/// A user's skeleton, with parents before their children.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct UserRig {
     pub joints: Vec<UserJoint>,
-    /// Local rotations of a pose in which the figure stands in the file's world: a zero pose may lie in it. Empty: the rest
-    /// pose.
+    /// Local rotations of a pose that is upright in the world of the file, since a zero pose may lie down. Empty if the
+    /// rest pose is to be used.
     pub standing: Vec<Rotation>,
 }
 
 impl UserRig {
-    /// Places of the joints; `turn(joint, parent)` is a joint's world rotation, given its parent's.
-    pub fn placed(&self, turn: impl Fn(usize, Rotation) -> Rotation) -> Vec<Placed> {
-        let mut placed: Vec<Placed> = Vec::with_capacity(self.joints.len());
+    /// World transforms of the joints; `turn(joint, parent)` returns a joint's world rotation, given its parent's.
+    pub fn placed(&self, turn: impl Fn(usize, Rotation) -> Rotation) -> Vec<JointTransform> {
+        let mut placed: Vec<JointTransform> = Vec::with_capacity(self.joints.len());
         for (n, joint) in self.joints.iter().enumerate() {
-            let none = Placed { turn: Rotation::IDENTITY, place: [0.0; 3], scale: 1.0 };
+            let none = JointTransform { turn: Rotation::IDENTITY, position: [0.0; 3], scale: 1.0 };
             let parent = joint.parent.map_or(none, |parent| placed[parent]);
-            placed.push(Placed {
+            placed.push(JointTransform {
                 turn: turn(n, parent.turn),
-                place: add(parent.place, scale(parent.turn.turn(joint.offset), parent.scale)),
+                position: add(parent.position, scale(parent.turn.turn(joint.offset), parent.scale)),
                 scale: parent.scale * joint.scale,
             });
         }
         placed
     }
 
-    /// Places of the joints at rest.
-    pub fn at_rest(&self) -> Vec<Placed> {
+    /// World transforms of the joints at rest.
+    pub fn at_rest(&self) -> Vec<JointTransform> {
         self.placed(|joint, parent| parent * self.joints[joint].rest)
     }
 
-    /// Places of the joints of the standing figure.
-    pub fn standing(&self) -> Vec<Placed> {
+    /// World transforms of the joints in the standing pose.
+    pub fn standing(&self) -> Vec<JointTransform> {
         if self.standing.is_empty() {
             self.at_rest()
         } else {
@@ -67,12 +67,12 @@ impl UserRig {
         }
     }
 
-    /// Places of all joints for local rotations.
+    /// World positions of all joints for local rotations.
     pub fn positions(&self, local: &[Rotation]) -> Vec<Vec3> {
-        self.placed(|joint, parent| parent * local[joint]).into_iter().map(|placed| placed.place).collect()
+        self.placed(|joint, parent| parent * local[joint]).into_iter().map(|placed| placed.position).collect()
     }
 
-    /// Whether `joint` hangs, over any number of joints, on `above`.
+    /// Whether `joint` is a descendant of `above`.
     pub fn is_below(&self, joint: usize, above: usize) -> bool {
         std::iter::successors(self.joints[joint].parent, |&at| self.joints[at].parent).any(|at| at == above)
     }

@@ -1,22 +1,22 @@
-//! Plausibility constraints (Rebol et al. 2021): joint limits, and neighbouring fingers that curl together. Each frame
-//! is changed by itself; angles within the limits stay, changed ones are counted by kind, and a continuous motion stays
-//! continuous. The limits are in `limits`.
+//! Plausibility constraints (Rebol et al. 2021): joint limits, and neighbouring fingers that curl together. Frames are
+//! changed independently; angles within the limits are unchanged, clamped ones are counted by kind, and continuous
+//! motion stays continuous. The limits are defined in `limits`.
 
 use super::hinge::Bend;
-use super::limits::{self, CURL_COHERENCE, Limit, turn, within};
+use super::limits::{self, CURL_COHERENCE, Limit, clamp_circular, turn};
 use super::rig::Rig;
 use crate::animate::solve::arm_pose::ArmPose;
 use crate::animate::solve::track::smoothstep;
 use orator_base::math::rotation::Rotation;
 use serde::Serialize;
 
-/// Constraints that are applied.
+/// Constraints to apply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Constraints {
-    /// Limits of every joint.
+    /// Whether to apply the limits of every joint.
     pub limits: bool,
-    /// Fingers within 10 degrees of the mean curl of the four; a pointing finger is bent with the others, so
-    /// that it is not the default.
+    /// Whether to keep fingers within 10 degrees of the mean curl of the four. This also bends a pointing finger, so it
+    /// is off by default.
     pub curl_coherence: bool,
 }
 
@@ -41,7 +41,7 @@ impl Constraints {
                 limit(&mut pose, tally);
             }
             if self.curl_coherence {
-                cohere(&mut pose, tally);
+                limit_curl_spread(&mut pose, tally);
             }
             pose.write(arm, local);
         }
@@ -71,17 +71,17 @@ const WRIST: usize = 3;
 const FINGER: usize = 5;
 const THUMB: usize = 11;
 const COHERENCE: usize = 13;
-/// Smallest change that counts as a clamp, degrees; less is rounding.
-const LEAST_DEGREES: f64 = 1e-6;
+/// Minimum change that counts as a clamp, degrees; smaller ones are rounding errors.
+const MIN_CLAMP_DEGREES: f64 = 1e-6;
 
 /// Clamps of one kind.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Clamps {
     pub kind: &'static str,
-    /// Number of clamped angles, and their share of all angles of this kind.
+    /// Number of clamped angles, and the fraction of all angles of this kind.
     pub joint_frames: usize,
     pub share: f64,
-    /// Mean amount by which the clamped angles exceeded their limit.
+    /// Mean and maximum amount by which the clamped angles exceeded their limit.
     pub mean_excess_degrees: f64,
     pub largest_excess_degrees: f64,
 }
@@ -90,14 +90,14 @@ pub struct Clamps {
 #[derive(Clone, Debug, Default)]
 pub struct ClampTally {
     n_frames: usize,
-    /// Count, sum and maximum of the excess by kind.
+    /// Count, sum and maximum of the excess (degrees), by kind.
     kinds: [(usize, f64, f64); KINDS.len()],
 }
 
 impl ClampTally {
     fn changed(&mut self, kind: usize, from: f64, to: f64) -> f64 {
         let excess = turn(from - to).abs();
-        if excess > LEAST_DEGREES {
+        if excess > MIN_CLAMP_DEGREES {
             let (n, sum, largest) = &mut self.kinds[kind];
             *n += 1;
             *sum += excess;
@@ -106,7 +106,7 @@ impl ClampTally {
         to
     }
 
-    /// Counts of every kind, zero counts included.
+    /// Statistics of every kind, including those without clamps.
     pub fn clamps(&self) -> Vec<Clamps> {
         let kinds = KINDS.into_iter().zip(self.kinds);
         kinds
@@ -123,10 +123,10 @@ impl ClampTally {
 
 fn limit(pose: &mut ArmPose, tally: &mut ClampTally) {
     pose.elbow = bend(pose.elbow, limits::ELBOW, ELBOW, tally);
-    // An angle tracked beyond half a turn is still beyond the same end.
+    // An angle tracked beyond half a turn still exceeds the same limit.
     let [pronated, supinated] = limits::SUPINATION;
     let turned = pose.supination.clamp(pronated, supinated);
-    // A hand bent across the forearm: turn and flexion are not distinguishable.
+    // For a hand bent sideways across the forearm, forearm rotation and wrist flexion cannot be distinguished.
     let turned = turned * certainty(pose.wrist.side);
     pose.supination = tally.changed(TURN, pose.supination, turned);
     pose.wrist = bend(pose.wrist, limits::WRIST, WRIST, tally);
@@ -138,24 +138,24 @@ fn limit(pose: &mut ArmPose, tally: &mut ClampTally) {
     }
 }
 
-/// Bend clamped to its limits; `kind` counts the flexion, the next one the side.
+/// Clamps a bend to its limits; `kind` counts the flexion, `kind + 1` the side.
 fn bend(given: Bend, limit: Limit, kind: usize, tally: &mut ClampTally) -> Bend {
     let middle = (limit.flexion[0] + limit.flexion[1]) / 2.0;
-    let flexion = middle + certainty(given.side) * (within(limit.flexion, given.flexion) - middle);
+    let flexion = middle + certainty(given.side) * (clamp_circular(limit.flexion, given.flexion) - middle);
     Bend {
         flexion: tally.changed(kind, given.flexion, flexion),
         side: tally.changed(kind + 1, given.side, given.side.clamp(limit.side[0], limit.side[1])),
     }
 }
 
-/// Certainty of a flexion: 1, falling from 60 degrees of sideways bend on to 0 at 90.
+/// Certainty of a flexion: 1, falling from a sideways bend of 60 degrees to 0 at 90.
 fn certainty(side: f64) -> f64 {
     1.0 - smoothstep([60.0, 90.0], side.abs())
 }
 
-/// Brings the four fingers' flexion, level by level, within reach of their mean; the mean is that of the result, so a
+/// Clamps the four fingers' flexion, level by level, to a range around their mean. The mean is that of the result, so a
 /// second application changes nothing.
-fn cohere(pose: &mut ArmPose, tally: &mut ClampTally) {
+fn limit_curl_spread(pose: &mut ArmPose, tally: &mut ClampTally) {
     for k in 0..3 {
         let given = [1, 2, 3, 4].map(|finger: usize| pose.fingers[finger][k].flexion);
         let mean = coherent_mean(given);
@@ -166,8 +166,9 @@ fn cohere(pose: &mut ArmPose, tally: &mut ClampTally) {
     }
 }
 
-/// Mean of four angles that is also the mean of them clamped around it; of several the one nearest to the plain mean.
-/// `rise(m)`, the mean of the clamped angles minus m, decreases with m and is bisected from the plain mean on.
+/// Mean of four angles that is also the mean after clamping around it; if there are several, the one nearest to the
+/// plain mean. `rise(m)`, the mean of the clamped angles minus m, decreases with m; its root is bisected from the plain
+/// mean.
 fn coherent_mean(given: [f64; 4]) -> f64 {
     let rise = |m: f64| given.iter().map(|f| (f - m).clamp(-CURL_COHERENCE, CURL_COHERENCE)).sum::<f64>() / 4.0;
     let mean = given.iter().sum::<f64>() / 4.0;

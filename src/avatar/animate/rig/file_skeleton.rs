@@ -1,5 +1,5 @@
-//! Skeleton of a file: the rig's bones under a convention's names, with the bones that only the convention has, and the
-//! axes that its joints have at rest. Positions are those of the rig in every frame.
+//! Skeleton of a file: the rig's bones under the names of a convention, with additional bones of that convention and
+//! its rest axes. Positions equal those of the rig in every frame.
 
 use super::names::Names;
 use orator_base::math::rotation::Rotation;
@@ -10,27 +10,27 @@ use orator_formats::bvh::write::BvhClip;
 /// Axes of the joints at rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RestAxes {
-    /// Parallel to the world's.
+    /// Parallel to the world axes.
     World,
-    /// Those of the convention where it has its own: of Mixamo's y runs along the bone, so that rotations transfer as
-    /// they are. Other conventions: the world's.
+    /// Those of the convention, if it defines any: in Mixamo, y runs along the bone, so that rotations transfer
+    /// directly. World axes for all other conventions.
     Convention,
 }
 
-/// Skeleton of a file with its joints' axes at rest.
+/// Skeleton of a file with the rest axes of its joints.
 #[derive(Clone, Debug)]
 pub struct FileSkeleton {
-    /// Joints with the names of the file, bone ends included; offsets in cm in the parent's axes at rest.
+    /// Joints with the names of the file, bone ends included; offsets in cm in the parent's rest axes.
     pub skeleton: Skeleton,
-    /// World axes of each joint at rest.
+    /// World rotation of each joint at rest.
     pub rest: Vec<Rotation>,
-    /// For each joint of the rig its joint here.
+    /// Index in this skeleton of each joint of the rig.
     pub of_rig: Vec<usize>,
-    /// For each joint that of the rig; `None`: the bone is the convention's alone and moves with its parent.
+    /// Joint of the rig for each joint of this skeleton; `None` for additional bones, which move with their parent.
     source: Vec<Option<usize>>,
 }
 
-/// A joint of the file before it has its place in the list.
+/// A joint of the file before indices are assigned.
 struct Planned {
     joint: Joint,
     source: Option<usize>,
@@ -40,8 +40,8 @@ impl FileSkeleton {
     /// Skeleton of `rig` under the names of a convention.
     pub fn new(rig: &Skeleton, names: Names, axes: RestAxes) -> Self {
         let (planned, of_rig) = match names {
-            Names::Mixamo => all_of_mixamo(rig),
-            _ => (rig.joints.iter().enumerate().map(|(n, joint)| taken(n, joint.clone())).collect(), identity(rig)),
+            Names::Mixamo => mixamo_joints(rig),
+            _ => (rig.joints.iter().enumerate().map(|(n, joint)| from_rig(n, joint.clone())).collect(), identity(rig)),
         };
         let (joints, source): (Vec<Joint>, Vec<_>) = planned.into_iter().map(|p| (p.joint, p.source)).unzip();
         let mut skeleton = Skeleton { joints };
@@ -49,8 +49,8 @@ impl FileSkeleton {
             (RestAxes::Convention, Names::Mixamo) => bone_axes(&skeleton),
             _ => vec![Rotation::IDENTITY; skeleton.joints.len()],
         };
-        let called = names.of(&skeleton);
-        for (joint, name) in skeleton.joints.iter_mut().zip(called) {
+        let file_names = names.of(&skeleton);
+        for (joint, name) in skeleton.joints.iter_mut().zip(file_names) {
             joint.name = name;
             if let Some(parent) = joint.parent {
                 joint.offset = rest[parent].inverse().turn(joint.offset);
@@ -59,7 +59,7 @@ impl FileSkeleton {
         Self { skeleton, rest, of_rig, source }
     }
 
-    /// Rotation of every joint at rest in its parent's axes.
+    /// Local rotation of every joint at rest.
     pub fn rest_local(&self) -> Vec<Rotation> {
         let own = |(joint, &rest): (&Joint, &Rotation)| {
             joint.parent.map_or(rest, |parent| self.rest[parent].inverse() * rest)
@@ -67,14 +67,14 @@ impl FileSkeleton {
         self.skeleton.joints.iter().zip(&self.rest).map(own).collect()
     }
 
-    /// The rig's clip on this skeleton.
+    /// Converts a clip of the rig to this skeleton.
     pub fn clip(&self, clip: &BvhClip) -> BvhClip {
         let turned = |local: &Vec<Rotation>| -> Vec<Rotation> {
             let joint = |(n, joint): (usize, &Joint)| {
                 let before = joint.parent.map_or(Rotation::IDENTITY, |parent| self.rest[parent]);
                 let moved = self.source[n].filter(|_| !joint.end).map_or(Rotation::IDENTITY, |rig| local[rig]);
                 let is_plain = before == Rotation::IDENTITY && self.rest[n] == Rotation::IDENTITY;
-                // no product, so that not even the sign of a zero changes
+                // The product is skipped so that not even the sign of a zero changes.
                 if is_plain { moved } else { before.inverse() * moved * self.rest[n] }
             };
             self.skeleton.joints.iter().enumerate().map(joint).collect()
@@ -88,7 +88,7 @@ impl FileSkeleton {
         }
     }
 
-    /// Positions of the joints at rest, the root at `root`.
+    /// Positions of the joints at rest, with the root at `root`.
     pub fn rest_positions(&self, root: Vec3) -> Vec<Vec3> {
         self.skeleton.positions(root, &self.rest_local())
     }
@@ -98,13 +98,13 @@ fn identity(rig: &Skeleton) -> Vec<usize> {
     (0..rig.joints.len()).collect()
 }
 
-fn taken(source: usize, joint: Joint) -> Planned {
+fn from_rig(source: usize, joint: Joint) -> Planned {
     Planned { joint, source: Some(source) }
 }
 
-/// The rig's joints with the two bones that Mixamo's have beside them: `Spine2`, half way from our chest to the neck,
-/// which carries neck and shoulders, and the toes' end.
-fn all_of_mixamo(rig: &Skeleton) -> (Vec<Planned>, Vec<usize>) {
+/// The rig's joints with Mixamo's additional bones: `Spine2`, half way from our chest to the neck, which carries the
+/// neck and the shoulders, and the ends of the toes.
+fn mixamo_joints(rig: &Skeleton) -> (Vec<Planned>, Vec<usize>) {
     let (chest, neck) = (rig.find("Chest"), rig.find("Neck"));
     let mut planned: Vec<Planned> = Vec::with_capacity(rig.joints.len() + 3);
     let mut of_rig = Vec::with_capacity(rig.joints.len());
@@ -128,21 +128,21 @@ fn all_of_mixamo(rig: &Skeleton) -> (Vec<Planned>, Vec<usize>) {
         of_rig.push(planned.len());
         let side = foot.as_deref().and_then(|foot| foot.strip_suffix("Foot")).map(str::to_owned);
         let Some(side) = side else {
-            planned.push(taken(n, joint));
+            planned.push(from_rig(n, joint));
             continue;
         };
         let [_, _, ahead] = joint.offset;
         let base = Joint { name: format!("{side}ToeBase"), end: false, ..joint };
-        planned.push(taken(n, base));
+        planned.push(from_rig(n, base));
         let end = Joint { name: String::new(), parent: Some(of_rig[n]), offset: [0.0, 0.0, 0.4 * ahead], end: true };
         planned.push(Planned { joint: end, source: None });
     }
     (planned, of_rig)
 }
 
-/// World axes of Mixamo's joints in T-pose. y runs along the bone; the turn about it is that of the trunk's, the arms'
-/// and the legs' axes: x to the back in the left arm and to the front in the right one, to the figure's right in the
-/// legs (pre-rotations of Mixamo's skeleton as in the walkTools of D. Wooldridge, 2014).
+/// World rotations of Mixamo's joints in T-pose. y runs along the bone; the rotation about it is that of the trunk, arm
+/// or leg axes: x points backwards in the left arm, forwards in the right arm, and to the character's right in the legs
+/// (pre-rotations of Mixamo's skeleton as in the walkTools of D. Wooldridge, 2014).
 fn bone_axes(skeleton: &Skeleton) -> Vec<Rotation> {
     let mut axes: Vec<Rotation> = Vec::with_capacity(skeleton.joints.len());
     for (n, joint) in skeleton.joints.iter().enumerate() {
@@ -162,7 +162,7 @@ fn bone_axes(skeleton: &Skeleton) -> Vec<Rotation> {
     axes
 }
 
-/// Axes of a limb that hangs or reaches straight.
+/// Axes of a limb that hangs or reaches out straight; the identity for the trunk.
 fn limb_axes(own: &str) -> Rotation {
     let is_of = |parts: &[&str]| parts.iter().any(|part| own.contains(part));
     let left = own.starts_with("Left");
@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn the_bones_of_mixamo_run_along_y_and_are_65() {
+    fn mixamo_has_65_bones_along_y() {
         let rig = default_rig();
         let file = FileSkeleton::new(&rig.skeleton, Names::Mixamo, RestAxes::Convention);
         assert_eq!(file.skeleton.joints.len(), 65);

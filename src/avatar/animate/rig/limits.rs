@@ -1,7 +1,6 @@
-//! Joint limits in degrees, for the left side, wide enough for what captured people do: the normal ranges of an adult
-//! (American Academy of Orthopaedic Surgeons, Joint Motion, 1965; Norkin and White, Measurement of Joint Motion; fingers
-//! of Rebol et al. 2021), widened where 0.1 % of the frames of a capture lie beyond. The captures, and what they reach:
-//! `orator guide animation`.
+//! Joint limits in degrees, for the left side: the normal ranges of an adult (American Academy of Orthopaedic Surgeons,
+//! Joint Motion, 1965; Norkin and White, Measurement of Joint Motion; fingers by Rebol et al. 2021), widened where more
+//! than 0.1 % of the frames of a motion capture exceed them. `orator guide animation` lists the captures.
 
 /// Ranges of a hinge joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,17 +14,17 @@ const fn limit(flexion: [f64; 2], side: [f64; 2]) -> Limit {
     Limit { flexion, side }
 }
 
-/// Forearm against upper arm; to the side 10 degrees of carrying angle, since a nearly straight arm does not show its
-/// plane of flexion.
+/// Forearm relative to upper arm. The sideways range of 10 degrees is the carrying angle; in a nearly straight arm the
+/// plane of flexion is not observable.
 pub const ELBOW: Limit = limit([0.0, 175.0], [-10.0, 10.0]);
-/// Rotation of the hand about the forearm from pronation to supination, 0 with the palm along the elbow's axis: 80 both
-/// ways by AAOS. The axis is seen only in a bent arm, and other skeletons turn theirs against ours, so that people who
-/// were captured are found up to 60 degrees further.
+/// Rotation of the hand about the forearm from pronation to supination; 0 with the palm along the elbow axis. The AAOS
+/// range is 80 both ways. The axis is observable only in a bent arm, and other skeletons define it differently, so that
+/// captured persons exceed this range by up to 60 degrees.
 pub const SUPINATION: [f64; 2] = [-140.0, 140.0];
 /// Extension to flexion; ulnar to radial deviation.
 pub const WRIST: Limit = limit([-80.0, 90.0], [-45.0, 35.0]);
-/// Thumb to little finger, each from the knuckle to the end joint. Angles of the thumb are relative to its resting line
-/// (`rig::finger_hinge`).
+/// Thumb to little finger, each from the knuckle to the end joint. Angles of the thumb are relative to its rest
+/// direction (`rig::finger_hinge`).
 pub const FINGERS: [[Limit; 3]; 5] = [
     [limit([-35.0, 45.0], [-45.0, 35.0]), limit([-25.0, 60.0], SIDE), limit([-20.0, 80.0], SIDE)],
     finger([-45.0, 20.0], SIDE, SIDE),
@@ -33,18 +32,18 @@ pub const FINGERS: [[Limit; 3]; 5] = [
     finger([-20.0, 25.0], SIDE, SIDE),
     finger([-30.0, 60.0], [-60.0, 25.0], [-25.0, 32.0]),
 ];
-/// Sideways range of a joint that does not bend sideways: what the axes of fingers differ by from person to person.
+/// Sideways range of a joint that does not bend sideways: variation of finger axes between persons.
 const SIDE: [f64; 2] = [-25.0, 25.0];
-/// Largest difference of a finger's flexion from the mean of the four fingers at the same level (Rebol et al. 2021).
+/// Maximum difference of a finger's flexion from the mean of the four fingers at the same joint (Rebol et al. 2021).
 pub const CURL_COHERENCE: f64 = 10.0;
 
 const fn finger(spread: [f64; 2], middle_side: [f64; 2], end_side: [f64; 2]) -> [Limit; 3] {
     [limit([-20.0, 122.0], spread), limit([-5.0, 110.0], middle_side), limit([-10.0, 80.0], end_side)]
 }
 
-/// Angle in `range` for an angle on the circle: itself within, the nearer end beyond. Near the point opposite the range
-/// the result blends from one end to the other, so that it is continuous.
-pub fn within([low, high]: [f64; 2], degrees: f64) -> f64 {
+/// Clamps a circular angle to a range. Near the point opposite the range the result blends from one end to the other,
+/// so that it is continuous.
+pub fn clamp_circular([low, high]: [f64; 2], degrees: f64) -> f64 {
     let (middle, half) = ((low + high) / 2.0, (high - low) / 2.0);
     let off = turn(degrees - middle);
     if off.abs() <= half {
@@ -54,7 +53,7 @@ pub fn within([low, high]: [f64; 2], degrees: f64) -> f64 {
     middle + half.copysign(off) * share
 }
 
-/// Share of the forbidden arc, around its middle, over which the ends blend.
+/// Fraction of the forbidden arc, around its middle, over which the ends blend.
 const OPPOSITE_SHARE: f64 = 0.4;
 
 /// Equivalent angle in -180..=180.
@@ -67,18 +66,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn within_is_the_angle_or_the_nearer_end_and_never_jumps() {
+    fn clamping_keeps_inner_angles_and_is_continuous() {
         let range = [-20.0, 90.0];
         for (given, expected) in
             [(-20.0, -20.0), (0.0, 0.0), (90.0, 90.0), (120.0, 90.0), (-60.0, -20.0), (380.0, 20.0)]
         {
-            assert!((within(range, given) - expected).abs() < 1e-9, "{given}");
+            assert!((clamp_circular(range, given) - expected).abs() < 1e-9, "{given}");
         }
-        let mut last = within(range, -180.0);
+        let mut last = clamp_circular(range, -180.0);
         for step in -18_000..=18_000 {
-            let now = within(range, f64::from(step) / 100.0);
+            let now = clamp_circular(range, f64::from(step) / 100.0);
             assert!((now - last).abs() < 0.05 && (-20.0..=90.0).contains(&now));
-            assert_eq!(within(range, now), now);
+            assert_eq!(clamp_circular(range, now), now);
             last = now;
         }
     }

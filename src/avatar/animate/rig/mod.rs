@@ -1,4 +1,4 @@
-//! The skeleton that is animated: bones and their frames, bone names of other programs, limits of every joint.
+//! The animated skeleton: bones and their axes, bone names of other programs, and joint limits.
 
 pub mod constraints;
 pub mod file_skeleton;

@@ -1,4 +1,5 @@
-//! Bone names in files: our own, Mixamo's, Unity's humanoid, VRM 1.0, Unreal's. What else a convention has is in `file_skeleton`.
+//! Bone names in files: our own, Mixamo's, Unity's humanoid, VRM 1.0, Unreal's. Additional bones of a convention are in
+//! `file_skeleton`.
 
 use orator_base::motion::fk::Skeleton;
 
@@ -14,7 +15,8 @@ pub enum Names {
     UnityHumanoid,
     /// Humanoid bones of VRM 1.0 (`VRMC_vrm`).
     Vrm,
-    /// Body of Unreal's Manny and of MetaHumans; our chest is `spine_05`, the spines between and `neck_02` do not occur.
+    /// Body of Unreal's Manny and of MetaHumans; our chest is `spine_05`, and `spine_02` to `spine_04` and `neck_02`
+    /// are absent.
     Unreal,
 }
 
@@ -32,7 +34,7 @@ impl Names {
         }
     }
 
-    /// Names of all joints of a skeleton, bone ends included (a finger's fourth, `HeadEnd`, `LeftFootEnd`).
+    /// Names of all joints of a skeleton, including bone ends (a finger's fourth, `HeadEnd`, `LeftFootEnd`).
     pub fn of(self, skeleton: &Skeleton) -> Vec<String> {
         let own = |joint: usize| -> String {
             let bone = &skeleton.joints[joint];
@@ -134,7 +136,7 @@ mod tests {
     const FINGERS: [&str; 5] = ["Thumb", "Index", "Middle", "Ring", "Little"];
 
     #[test]
-    fn unreals_names_have_their_side_at_the_end() {
+    fn unreal_names_end_with_the_side() {
         let called = Names::Unreal.of(&default_rig().skeleton);
         let trunk = "pelvis spine_01 spine_05 neck_01 head".split(' ').map(String::from);
         let limbs = ["clavicle", "upperarm", "lowerarm", "hand", "thigh", "calf", "foot", "ball"].map(String::from);
@@ -149,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn the_bones_of_every_convention_are_all_there() {
+    fn every_convention_has_all_its_bones() {
         let limbs = ["UpperLeg", "LowerLeg", "Foot", "Shoulder", "UpperArm", "LowerArm", "Hand"];
         let bones = ["Proximal", "Intermediate", "Distal"];
         let thumb = ["ThumbMetacarpal", "ThumbProximal", "ThumbDistal"].map(String::from);
@@ -160,11 +162,11 @@ mod tests {
         let mixamos_trunk = "Hips Spine Spine1 Spine2 Neck Head HeadTop_End";
         let vrms_fingers = [&thumb[..], &fingers(&FINGERS[1..])].concat();
         for (names, n, start, trunk, limbs, fingers) in [
-            // HumanBodyBones without those it calls optional and we have nothing for: eyes, jaw, toes, UpperChest.
+            // `HumanBodyBones` without optional ones for which we have no joint: eyes, jaw, toes, UpperChest.
             (Names::UnityHumanoid, 49, "", "Hips Spine Chest Neck Head", &limbs[..], fingers(&FINGERS)),
-            // VRM 1.0, humanoid.md, without upperChest, eyes, jaw and toes, which it does not require.
+            // Bones of VRM 1.0 (humanoid.md) without the optional upperChest, eyes, jaw and toes.
             (Names::Vrm, 49, "", "hips spine chest neck head", &limbs[..], vrms_fingers),
-            // X Bot and Y Bot.
+            // Skeleton of X Bot and Y Bot.
             (Names::Mixamo, 65, "mixamorig:", mixamos_trunk, &mixamo[..], mixamos_fingers.collect()),
         ] {
             let sides = if names == Names::Vrm { ["left", "right"] } else { ["Left", "Right"] };

@@ -1,6 +1,6 @@
-//! Rig that motion is put on: a whole body in T-pose (y up, facing +z, palms down) with Hips to Head, fixed legs, both
-//! arms and all fingers. Arms and hands have the motion's median bone lengths and palm shapes and are rigid; trunk,
-//! head and legs, which the joints do not describe, are in proportion to the arms. Lengths in cm.
+//! Rig that motion is applied to: a complete body in T-pose (y up, facing +z, palms down) from Hips to Head, with legs,
+//! both arms and all fingers. Arms and hands have the motion's median bone lengths and palm shapes and are rigid;
+//! trunk, head and legs, which the joints do not describe, are proportional to the arms. Lengths in cm.
 
 use super::hinge::Hinge;
 use crate::animate::solve::positions::{JointPositions, palm_frame};
@@ -10,9 +10,9 @@ use orator_base::motion::fk::Skeleton;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::{self, L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, N_JOINTS, NECK, R_HAND};
 
-/// Centimetres in a metre.
+/// Centimetres per metre.
 pub const CM: f64 = 100.0;
-/// Length of upper arm and forearm of the body whose trunk and legs are given below, metres.
+/// Length of upper arm plus forearm for the trunk and leg proportions below, metres.
 const ARM_METRES: f64 = 0.55;
 const FINGERS: [&str; 5] = ["Thumb", "Index", "Middle", "Ring", "Pinky"];
 /// Default bone lengths of the left side, metres: joints 4..=6, then the hand 8..=27.
@@ -24,19 +24,19 @@ const DEFAULT_FINGERS: [[f64; 4]; 5] = [
     [0.073, 0.043, 0.027, 0.023],
     [0.070, 0.034, 0.020, 0.020],
 ];
-/// Default direction of a finger's base: degrees from the hand's axis towards the thumb's side.
+/// Default direction of a finger's base: degrees from the axis of the hand towards the thumb.
 const SPREAD_DEGREES: [f64; 5] = [50.0, 16.0, 5.0, -6.0, -17.0];
-/// Least cosine between a metacarpal and the hand's axis: 60 degrees; those of the default palm are within 17.
-const LEAST_ALONG: f64 = 0.5;
-/// Direction of the left thumb at rest and of its flexion, close to the medians of speaking hands.
+/// Minimum cosine between a metacarpal and the axis of the hand (60 degrees); the default palm has at most 17 degrees.
+const MIN_METACARPAL_COS: f64 = 0.5;
+/// Directions of the left thumb at rest and towards which it flexes, close to the medians of speakers' hands.
 const THUMB_ALONG: Vec3 = [0.74, -0.35, 0.57];
-const THUMB_BENDS: Vec3 = [0.0, -0.5, -0.87];
+const THUMB_FLEXION: Vec3 = [0.0, -0.5, -0.87];
 const X: Vec3 = [1.0, 0.0, 0.0];
 
 /// Joint indices of one arm in the skeleton.
 #[derive(Clone, Debug)]
 pub struct RigArm {
-    /// +1 left, -1 right: the sign of x.
+    /// +1 for left, -1 for right: the sign of x.
     pub sign: f64,
     pub clavicle: usize,
     pub upper: usize,
@@ -46,11 +46,11 @@ pub struct RigArm {
     pub fingers: [[usize; 3]; 5],
 }
 
-/// Skeleton with the meaning of its joints.
+/// Skeleton with the roles of its joints.
 #[derive(Clone, Debug)]
 pub struct Rig {
     pub skeleton: Skeleton,
-    /// Position of the hips, cm; the soles at y = 0.
+    /// Position of the hips, cm; the soles are at y = 0.
     pub root: Vec3,
     pub spine: usize,
     pub chest: usize,
@@ -58,15 +58,15 @@ pub struct Rig {
     pub head: usize,
     /// Left, right.
     pub arms: [RigArm; 2],
-    /// Left, right: upper leg, leg, foot, the end of the foot.
+    /// Left, right: upper leg, lower leg, foot, end of the foot.
     pub legs: [[usize; 4]; 2],
-    /// For each of the 49 joints of a motion the joint of the skeleton at its position (bone ends included).
+    /// Joint of the skeleton at the position of each of a motion's 49 joints (bone ends included).
     pub positions: [usize; N_JOINTS],
 }
 
 impl Rig {
-    /// Rig for a motion: bone lengths and palms are medians over its frames. A palm that is no hand's
-    /// is that of the other hand, else a flat one with metacarpals of the same lengths.
+    /// Rig for a motion: bone lengths and palms are medians over its frames. An implausible palm is replaced by that of
+    /// the other hand, or by a flat one with metacarpals of the same lengths.
     pub fn from_motion(motion: &Motion) -> Self {
         let (positions, metres) = (JointPositions::from_motion(motion), bone_metres(motion));
         let [left, right] = [median_palm(&positions), median_palm(&positions.mirrored())];
@@ -74,8 +74,8 @@ impl Rig {
         Self::with_measures(&metres, &palms)
     }
 
-    /// Rig with given bone lengths in metres (entry `j`: from joint `j` to its parent) and palms: the bases of the
-    /// fingers in the hand's frame, metres, left and right, the right one mirrored.
+    /// Rig with given bone lengths in metres (entry `j`: from joint `j` to its parent) and palms: the positions of the
+    /// finger bases in the hand's frame, metres, left and right, the right one mirrored.
     pub fn with_measures(metres: &[f64; N_JOINTS], palms: &[[Vec3; 5]; 2]) -> Self {
         let arm = |shoulder: usize| metres[shoulder + 1] + metres[shoulder + 2];
         let body = (arm(L_SHOULDER) + arm(skeleton::R_SHOULDER)) / 2.0 / ARM_METRES * CM;
@@ -142,19 +142,19 @@ fn push_arm(
     RigArm { sign, clavicle, upper, fore, hand, fingers }
 }
 
-/// Hinge of a finger's joints in the axes of the left hand: four fingers along x about the knuckle line, the thumb
-/// across the palm.
+/// Hinge of a finger's joints in the axes of the left hand: the four fingers point along x and flex about the knuckle
+/// line, the thumb flexes across the palm.
 pub fn finger_hinge(finger: usize) -> Hinge {
     if finger > 0 {
         return Hinge::new(X, [0.0, 0.0, -1.0]);
     }
     let along = scale(THUMB_ALONG, 1.0 / norm(THUMB_ALONG));
-    let bends = across(THUMB_BENDS, along);
+    let bends = across(THUMB_FLEXION, along);
     Hinge::new(along, scale(cross(along, bends), 1.0 / norm(bends)))
 }
 
-/// Medians over the frames of the finger bases in the left hand's frame; `None` if never seen, or where they are no
-/// hand's.
+/// Medians over the frames of the finger bases in the left hand's frame, metres; `None` if they were never detected or
+/// are implausible.
 fn median_palm(positions: &JointPositions) -> Option<[Vec3; 5]> {
     let seen: Vec<_> = (0..positions.n_frames()).filter_map(|t| positions.palm(t)).collect();
     let middle = |finger: usize, axis: usize| upper_median(seen.iter().filter_map(|palm| Some(palm[finger]?[axis])));
@@ -164,15 +164,15 @@ fn median_palm(positions: &JointPositions) -> Option<[Vec3; 5]> {
             *place = middle(finger, axis)?;
         }
     }
-    // Result in the frame of its own knuckles, like every frame's palm.
-    let out_of_palm = palm_frame(&palm)?.inverse();
-    Some(palm.map(|base| out_of_palm.turn(base))).filter(is_palm)
+    // The result is expressed in the frame of its own knuckles, as the palms of single frames are.
+    let from_palm = palm_frame(&palm)?.inverse();
+    Some(palm.map(|base| from_palm.turn(base))).filter(is_palm)
 }
 
-/// Whether the four metacarpals beside the thumb point along the hand. Those of a network that has hardly learnt may
-/// point anywhere, and a body of them would come apart.
+/// Whether the four metacarpals other than the thumb's point along the hand. A hardly trained network may produce
+/// others, for which the mesh of the hand would be torn.
 fn is_palm(palm: &[Vec3; 5]) -> bool {
-    palm[1..].iter().all(|base| base[0] >= LEAST_ALONG * norm(*base))
+    palm[1..].iter().all(|base| base[0] >= MIN_METACARPAL_COS * norm(*base))
 }
 
 /// Flat palm with metacarpals of these lengths.
@@ -183,8 +183,8 @@ fn default_palm(metres: &[f64; N_JOINTS]) -> [Vec3; 5] {
     })
 }
 
-/// Median length over the frames of the bone to each joint, metres; that of the other side where never seen, else a
-/// default.
+/// Median length over the frames of the bone to each joint, metres; that of the other side or a default if never
+/// detected.
 pub fn bone_metres(motion: &Motion) -> [f64; N_JOINTS] {
     let seen: [Option<f64>; N_JOINTS] = std::array::from_fn(|joint| {
         let parent = skeleton::parent(joint)?;
@@ -210,17 +210,17 @@ fn default_metres(joint: usize) -> f64 {
 pub(crate) mod tests {
     use super::*;
 
-    /// Rig of the default bones.
+    /// Rig with default bone lengths.
     pub(crate) fn default_rig() -> Rig {
-        let unseen = ndarray::Array3::from_elem((1, N_JOINTS, 3), f32::NAN);
-        Rig::from_motion(&Motion::from_joints(orator_base::types::time::FrameRate::new(15, 1), unseen))
+        let missing = ndarray::Array3::from_elem((1, N_JOINTS, 3), f32::NAN);
+        Rig::from_motion(&Motion::from_joints(orator_base::types::time::FrameRate::new(15, 1), missing))
     }
 
     #[test]
-    fn a_palm_points_along_the_hand() {
+    fn a_plausible_palm_points_along_the_hand() {
         let metres: [f64; N_JOINTS] = std::array::from_fn(default_metres);
         assert!(is_palm(&default_palm(&metres)));
-        // Medians of what a network gave after 30 steps: the little finger begins behind the wrist.
+        // Medians of a network's output after 30 training steps: the base of the little finger is behind the wrist.
         let star = [
             [0.021, -0.029, 0.002],
             [0.064, -0.019, 0.061],

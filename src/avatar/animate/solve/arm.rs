@@ -1,12 +1,12 @@
-//! Joint positions to bone rotations: the shoulders' yaw goes half to the spine and half to the chest, and each arm is
-//! solved as a left arm, shoulder to finger tips. Bones take their smoothed directions; the upper
-//! arm's roll puts the elbow's axis across upper arm and forearm and is interpolated where the arm is straight; the
-//! hand's frame comes from its knuckles, and half of its turn about the forearm belongs to the forearm. Fingers bend
-//! without twist.
+//! Joint positions to bone rotations. The shoulders' yaw is shared equally by spine and chest, and each arm is solved
+//! as a left arm from shoulder to finger tips. Bones take their smoothed directions; the roll of the upper arm aligns
+//! the elbow axis with the normal of the arm's plane and is interpolated where the arm is straight; the hand's frame is
+//! computed from its knuckles, and half of its rotation about the forearm is given to the forearm. Fingers bend without
+//! twist.
 
 use super::arm_pose::{ArmPose, elbow};
 use super::positions::JointPositions;
-use super::roll::elbow_axes;
+use super::roll::upper_arm_rotations;
 use super::smoothing::{Filter, Smoothing};
 use super::track::{ObservedTrack, RotationTrack, filled, mirrored, world};
 use crate::animate::rig::hinge::Bend;
@@ -19,12 +19,12 @@ use orator_base::types::time::FrameRate;
 const X: Vec3 = [1.0, 0.0, 0.0];
 /// Time in which a missing hand relaxes, seconds.
 const RELAX_SECS: f64 = 0.5;
-/// Flexion of the relaxed hand's joints, degrees, thumb first.
-const RELAXED: [[f64; 3]; 5] =
+/// Flexion of the joints of a relaxed hand, degrees, thumb first.
+const RELAXED_DEGREES: [[f64; 3]; 5] =
     [[8.0, 10.0, 10.0], [20.0, 26.0, 16.0], [20.0, 26.0, 16.0], [20.0, 26.0, 16.0], [20.0, 26.0, 16.0]];
-/// Degrees beyond half a turn from the middle of its range up to which a hand's turn is tracked before it counts as a
-/// turn the other way.
-const FOLLOWED: f64 = 60.0;
+/// Degrees beyond half a turn from the centre of its range up to which the rotation of a hand is tracked before it
+/// counts as a rotation the other way.
+const MAX_TRACKED_DEGREES: f64 = 60.0;
 
 /// Frame rate and the filters for it.
 pub struct SolveFilters {
@@ -43,7 +43,7 @@ impl SolveFilters {
 
 type Directions = Vec<Option<Vec3>>;
 
-/// Local rotations by joint of the rig. Hips, neck, head and legs rest.
+/// Local rotations, by joint of the rig. Hips, neck, head and legs keep their rest rotation.
 pub fn rotations(positions: &JointPositions, rig: &Rig, filters: &SolveFilters) -> Vec<RotationTrack> {
     let n_frames = positions.n_frames();
     let mut local: Vec<RotationTrack> = vec![vec![Rotation::IDENTITY; n_frames]; rig.skeleton.joints.len()];
@@ -66,7 +66,8 @@ pub fn rotations(positions: &JointPositions, rig: &Rig, filters: &SolveFilters) 
     local
 }
 
-/// Solves the arm as a left arm, whichever `arm` is, and writes its tracks into `local` (one a joint of the skeleton).
+/// Solves `arm` as a left arm (right arms are given mirrored) and writes its tracks into `local`, one track per joint
+/// of the skeleton.
 fn solve(
     positions: &JointPositions,
     arm: &RigArm,
@@ -77,8 +78,8 @@ fn solve(
     let n_frames = positions.n_frames();
     let relax_frames = Some(RELAX_SECS * filters.fps);
     let smooth = |parent: &RotationTrack, from: usize, to: usize| -> Directions {
-        let seen = |t: usize| Some(parent[t].inverse().turn(positions.direction(t, from, to)?));
-        let mut track: Directions = (0..n_frames).map(seen).collect();
+        let local_direction = |t: usize| Some(parent[t].inverse().turn(positions.direction(t, from, to)?));
+        let mut track: Directions = (0..n_frames).map(local_direction).collect();
         filters.arms.directions(&mut track, &[]);
         track
     };
@@ -87,7 +88,7 @@ fn solve(
     let clavicle = world(chest, &local[arm.clavicle]);
 
     let (along, fore) = (smooth(&clavicle, L_SHOULDER, L_ELBOW), smooth(&clavicle, L_ELBOW, L_WRIST));
-    let upper: ObservedTrack = elbow_axes(&along, &fore);
+    let upper: ObservedTrack = upper_arm_rotations(&along, &fore);
     let hanging = Rotation::between(X, [0.17, -0.985, 0.0]);
     local[arm.upper] = filled(upper, hanging, None);
     let bent = |(upper, fore): (&Rotation, &Option<Vec3>)| {
@@ -104,28 +105,28 @@ fn solve(
         Rotation::IDENTITY,
         relax_frames,
     );
-    let mut followed = 0.0;
+    let mut previous = 0.0;
     for t in 0..n_frames {
-        let (supination, wrist) = ArmPose::hand_angles(hand[t], followed, FOLLOWED);
-        followed = supination;
+        let (supination, wrist) = ArmPose::hand_angles(hand[t], previous, MAX_TRACKED_DEGREES);
+        previous = supination;
         (local[arm.fore][t], local[arm.hand][t]) = ArmPose::shared(fore[t], supination, wrist);
     }
     for (finger, joints) in arm.fingers.iter().enumerate() {
         let bones = solve_finger(positions, &frames, finger, &filters.fingers);
-        for ((&joint, bone), relaxed) in joints.iter().zip(bones).zip(RELAXED[finger]) {
+        for ((&joint, bone), relaxed) in joints.iter().zip(bones).zip(RELAXED_DEGREES[finger]) {
             let rest = finger_hinge(finger).rotation(Bend { flexion: relaxed, side: 0.0 });
             local[joint] = filled(bone, rest, relax_frames);
         }
     }
 }
 
-/// Hand rotations relative to the untwisted forearm, smoothed by their three angles: within the limits these are
-/// unique, while directions would cancel out between palm up and palm down.
+/// Hand rotations relative to the untwisted forearm, smoothed as three angles. These are unique within the limits,
+/// while smoothed directions would cancel out between palm up and palm down.
 fn smooth_hand(forearm: &RotationTrack, frames: &ObservedTrack, filter: &Filter, error: &[f64]) -> ObservedTrack {
-    let mut followed = 0.0;
+    let mut previous = 0.0;
     let mut angle = |(hand, fore): (&Option<Rotation>, &Rotation)| {
-        let (supination, wrist) = ArmPose::hand_angles(fore.inverse() * (*hand)?, followed, FOLLOWED);
-        followed = supination;
+        let (supination, wrist) = ArmPose::hand_angles(fore.inverse() * (*hand)?, previous, MAX_TRACKED_DEGREES);
+        previous = supination;
         Some([supination, wrist.flexion, wrist.side].map(f64::to_radians))
     };
     let mut angles: Vec<Option<Vec3>> = frames.iter().zip(forearm).map(&mut angle).collect();
@@ -137,8 +138,8 @@ fn smooth_hand(forearm: &RotationTrack, frames: &ObservedTrack, filter: &Filter,
     angles.into_iter().map(|angles| angles.map(rotation)).collect()
 }
 
-/// Local rotations of a finger's three joints. Bones are smoothed in the axes of the observed hand, so that noise of
-/// the whole hand does not reach them.
+/// Local rotations of a finger's three joints. Bones are smoothed in the axes of the observed hand, which removes noise
+/// of the hand as a whole.
 fn solve_finger(
     positions: &JointPositions,
     frames: &ObservedTrack,
@@ -148,8 +149,9 @@ fn solve_finger(
     let (hinge, base) = (finger_hinge(finger), L_HAND + 1 + 4 * finger);
     let mut parent: ObservedTrack = vec![Some(Rotation::IDENTITY); frames.len()];
     [0, 1, 2].map(|k| {
-        let seen = |t: usize| Some(frames[t]?.inverse().turn(positions.direction(t, base + k, base + k + 1)?));
-        let mut track: Directions = (0..frames.len()).map(seen).collect();
+        let local_direction =
+            |t: usize| Some(frames[t]?.inverse().turn(positions.direction(t, base + k, base + k + 1)?));
+        let mut track: Directions = (0..frames.len()).map(local_direction).collect();
         filter.directions(&mut track, positions.hand_error());
         let bone = |(parent, to): (&Option<Rotation>, Option<Vec3>)| {
             Some(hinge.rotation(hinge.bend((*parent)?.inverse().turn(to?))))

@@ -1,5 +1,5 @@
 //! Angles of a left arm below its upper arm, and their conversion to and from local rotations of the rig. Half of the
-//! hand's turn about the forearm belongs to the forearm.
+//! hand's rotation about the forearm is given to the forearm.
 
 use crate::animate::rig::hinge::{Bend, Hinge, flexed, sideways};
 use crate::animate::rig::limits::turn;
@@ -13,11 +13,11 @@ const X: Vec3 = [1.0, 0.0, 0.0];
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ArmPose {
     pub elbow: Bend,
-    /// Turn of the hand about the forearm; 0: palm along the elbow's axis, positive: supination.
+    /// Rotation of the hand about the forearm; 0 with the palm along the elbow axis, positive in supination.
     pub supination: f64,
-    /// Wrist; positive flexion: towards the palm, positive side: radial.
+    /// Wrist; flexion is positive towards the palm, `side` is positive in radial deviation.
     pub wrist: Bend,
-    /// Fingers, thumb to little finger, knuckle to end joint.
+    /// Fingers, thumb to little finger, each from knuckle to end joint.
     pub fingers: [[Bend; 3]; 5],
 }
 
@@ -27,7 +27,8 @@ pub fn elbow() -> Hinge {
 }
 
 impl ArmPose {
-    /// Angles of the arm in a frame's local rotations. Twist of the fingers, which no joint shows, is left out.
+    /// Angles of the arm in a frame's local rotations. The twist of fingers, which joint positions do not determine, is
+    /// dropped.
     pub fn from_rotations(arm: &RigArm, local: &[Rotation]) -> Self {
         let of = |joint: usize| on_left(arm, local[joint]);
         let (fore, hand) = (of(arm.fore), of(arm.hand));
@@ -55,17 +56,17 @@ impl ArmPose {
         }
     }
 
-    /// Supination and wrist angles of a hand relative to the untwisted forearm. The turn is the one nearest to
-    /// `followed`, unless that exceeds half a turn plus `leave` from the palm along the elbow's axis.
-    pub fn hand_angles(hand: Rotation, followed: f64, leave: f64) -> (f64, Bend) {
-        // hand = about x (supination) * sideways * flexed: the flexion's axis -z gives the first two.
+    /// Supination and wrist angles of a hand relative to the untwisted forearm. The supination is the equivalent angle
+    /// nearest to `previous`, unless its magnitude exceeds 180 + `tolerance` degrees.
+    pub fn hand_angles(hand: Rotation, previous: f64, tolerance: f64) -> (f64, Bend) {
+        // hand = about x (supination) * sideways * flexed: the image of the flexion axis -z gives the first two.
         let [x, y, z] = hand.turn([0.0, 0.0, 1.0]);
         let pronation = (-y).atan2(z).to_degrees();
         let along = (about_x(pronation).inverse() * hand).turn(X);
         let side = (-x).clamp(-1.0, 1.0).asin().to_degrees();
         let [x, y, _] = sideways(side).inverse().turn(along);
-        let near = followed + turn(-pronation - followed);
-        let supination = if leave > 0.0 && near.abs() > 180.0 + leave { -pronation } else { near };
+        let near = previous + turn(-pronation - previous);
+        let supination = if tolerance > 0.0 && near.abs() > 180.0 + tolerance { -pronation } else { near };
         (supination, Bend { flexion: (-y).atan2(x).to_degrees(), side })
     }
 
@@ -74,7 +75,7 @@ impl ArmPose {
         about_x(-supination) * sideways(wrist.side) * flexed(wrist.flexion)
     }
 
-    /// Local rotations of forearm and hand; `bent` is the untwisted forearm.
+    /// Local rotations of forearm and hand; `bent` is the rotation of the untwisted forearm.
     pub fn shared(bent: Rotation, supination: f64, wrist: Bend) -> (Rotation, Rotation) {
         let half = about_x(-supination / 2.0);
         (bent * half, half * sideways(wrist.side) * flexed(wrist.flexion))
@@ -85,7 +86,7 @@ fn about_x(degrees: f64) -> Rotation {
     Rotation::about(X, degrees.to_radians())
 }
 
-/// Rotation mirrored between this arm and a left arm, in either direction.
+/// Mirrors a rotation between `arm` and a left arm, in either direction.
 fn on_left(arm: &RigArm, rotation: Rotation) -> Rotation {
     if arm.sign < 0.0 { rotation.mirrored() } else { rotation }
 }

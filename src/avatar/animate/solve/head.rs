@@ -1,4 +1,5 @@
-//! Head and neck from a posture: both share the head's turn against the chest equally; unseen, they rest.
+//! Head and neck from a posture: both share the head's rotation relative to the chest equally; if not detected, they
+//! relax.
 
 use super::arm::SolveFilters;
 use super::track::{ObservedTrack, RotationTrack, filled};
@@ -9,12 +10,12 @@ use orator_base::motion::face::rotation;
 use orator_base::motion::posture::angles_of;
 use orator_base::types::posture::Posture;
 
-/// Largest yaw, pitch and roll against the chest, degrees (normal range of the neck, AAOS: 80, 45, 45).
+/// Maximum yaw, pitch and roll relative to the chest, degrees (normal range of the neck, AAOS: 80, 45, 45).
 const LIMITS: Vec3 = [80.0, 45.0, 45.0];
-/// Time in which an unseen head returns to rest, seconds.
+/// Time in which an undetected head returns to rest, seconds.
 const RELAX_SECS: f64 = 0.5;
 
-/// Turns neck and head; returns the number of frames in which the head was seen.
+/// Rotates neck and head; returns the number of frames in which the head was detected.
 pub fn turn(posture: &Posture, rig: &Rig, filters: &SolveFilters, local: &mut [RotationTrack]) -> usize {
     let n_frames = local[rig.head].len();
     let mut angles = angles_of(posture.head.view(), n_frames);

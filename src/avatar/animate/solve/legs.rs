@@ -1,30 +1,31 @@
-//! Legs under hips that turn: feet stay planted on the floor, thighs and shins reach them with two bones, and who stands
-//! moves the hips against the lean, so that the weight stays above the feet.
+//! Legs below moving hips: feet stay planted on the floor and two-bone inverse kinematics bends the legs to them. When
+//! standing, the hips move against the lean, so that the centre of mass stays above the feet.
 
 use crate::animate::rig::rig::Rig;
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::{Vec3, add, cross, norm, scale, sub, unit};
 use orator_formats::bvh::write::BvhClip;
 
-/// Lower body of a figure.
+/// Posture of the lower body.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Legs {
-    /// Upright, the feet under the hips. Without a posture the legs are straight and rest.
+    /// Upright with the feet below the hips. If the hips do not rotate, the legs stay straight.
     #[default]
     Standing,
-    /// Thighs level, shins upright.
+    /// Thighs horizontal, shins vertical.
     Seated,
-    /// Hips and legs rest, whatever the trunk does.
+    /// Hips and legs keep their rest pose.
     None,
 }
 
-/// Share of its length to which a standing leg is stretched at most, so that no knee snaps straight.
-const STRETCH: f64 = 0.99;
-/// Way of the hips against the way of the trunk's top: the trunk is half of the weight, its middle half as far out.
+/// Maximum extension of a standing leg relative to its length, so that the knee does not snap straight.
+const MAX_STRETCH: f64 = 0.99;
+/// Displacement of the hips relative to that of the top of the trunk: the trunk has half of the body's mass, and its
+/// centre moves half as far.
 const BALANCE: f64 = 0.25;
 const DOWN: Vec3 = [0.0, -1.0, 0.0];
 const ACROSS: Vec3 = [1.0, 0.0, 0.0];
-const AHEAD: Vec3 = [0.0, 0.0, 1.0];
+const FORWARD: Vec3 = [0.0, 0.0, 1.0];
 
 /// Joints of a leg.
 struct Leg {
@@ -39,12 +40,13 @@ impl Leg {
         [self.lower, self.foot].map(|joint| norm(rig.skeleton.joints[joint].offset))
     }
 
-    /// Turns the leg so that it reaches from its socket to the ankle, the knee ahead, the foot level.
-    fn reach(&self, rig: &Rig, hips: Rotation, way: Vec3, local: &mut [Rotation]) {
+    /// Rotates the leg so that it reaches by `way` from the hip joint to the ankle, with the knee forward and the foot
+    /// level.
+    fn reach_ankle(&self, rig: &Rig, hips: Rotation, way: Vec3, local: &mut [Rotation]) {
         let [thigh, shin] = self.lengths(rig);
         let far = norm(way).clamp((thigh - shin).abs() + 1e-6, thigh + shin - 1e-6);
         let along = unit(way, 1e-9).unwrap_or(DOWN);
-        let hinge = unit(cross(AHEAD, along), 1e-6).unwrap_or(ACROSS);
+        let hinge = unit(cross(FORWARD, along), 1e-6).unwrap_or(ACROSS);
         let bends = cross(along, hinge);
         let cos = ((thigh * thigh + far * far - shin * shin) / (2.0 * thigh * far)).clamp(-1.0, 1.0);
         let to_knee = add(scale(along, cos), scale(bends, (1.0 - cos * cos).sqrt()));
@@ -58,10 +60,10 @@ impl Leg {
 }
 
 impl Legs {
-    /// Plants the feet of a clip under its hips, whose travel follows.
+    /// Plants the feet of a clip under its hips and sets the travel of the hips.
     pub fn plant(self, rig: &Rig, clip: &mut BvhClip) {
-        let still = clip.local.iter().all(|local| local[0] == Rotation::IDENTITY);
-        if self == Self::None || (self == Self::Standing && still) {
+        let is_static = clip.local.iter().all(|local| local[0] == Rotation::IDENTITY);
+        if self == Self::None || (self == Self::Standing && is_static) {
             return;
         }
         let legs = rig.legs.map(|[upper, lower, foot, _]| Leg { upper, lower, foot });
@@ -86,14 +88,14 @@ impl Legs {
                     let aside = [clip.root[0] - x, 0.0, clip.root[2] - z];
                     let height = |n: usize| {
                         let [dx, _, dz] = sub(ankles[n], add(aside, sockets[n]));
-                        let reach = STRETCH * legs[n].lengths(rig).iter().sum::<f64>();
+                        let reach = MAX_STRETCH * legs[n].lengths(rig).iter().sum::<f64>();
                         ankles[n][1] - sockets[n][1] + (reach * reach - dx * dx - dz * dz).max(0.0).sqrt()
                     };
                     [aside[0], height(0).min(height(1)), aside[2]]
                 }
             };
             for n in 0..2 {
-                legs[n].reach(rig, hips, sub(ankles[n], add(root, sockets[n])), local);
+                legs[n].reach_ankle(rig, hips, sub(ankles[n], add(root, sockets[n])), local);
             }
             sub(root, clip.root)
         });

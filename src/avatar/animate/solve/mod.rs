@@ -1,4 +1,4 @@
-//! Joint positions to joint rotations: arms, roll, head, hands, and their smoothing.
+//! Joint positions to joint rotations: arms, upper arm roll, hands, head, trunk, legs, and their smoothing.
 
 pub mod arm;
 pub mod arm_pose;

@@ -1,7 +1,7 @@
-//! Smoothing before rotations are solved. Every bone's direction is smoothed as a vector in the axes of its parent
-//! (trunk for arms, hand for fingers) and normalised again; a hand by its three angles relative to the forearm. Bones
-//! keep their length, no angle jumps through half a turn, and the elbow's plane, which follows from smooth directions,
-//! is less noisy than if it were smoothed itself. Gaps separate runs.
+//! Smoothing before rotations are solved. The direction of each bone is smoothed as a vector in the axes of its parent
+//! (trunk for arms, hand for fingers) and normalised; a hand is smoothed as three angles relative to the forearm. Bones
+//! keep their length, no angle jumps by half a turn, and the elbow plane, derived from smooth directions, is less noisy
+//! than if it were smoothed itself. Gaps separate runs.
 
 use orator_base::math::local_fit::LocalFit;
 use orator_base::math::savitzky_golay::SavitzkyGolay;
@@ -12,13 +12,12 @@ use orator_base::types::time::FrameRate;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Smoothing {
     None,
-    /// Local fits as wide as the noise of each bone in the clip allows. `strength` 1 changes a motion without noise by no
-    /// more than a few millimetres; it is a factor of the noise and of that tolerance, 0 removes nothing.
+    /// Local fits whose width adapts to the noise of each bone in the clip. With `strength` 1 a noise-free motion
+    /// changes by at most a few millimetres; `strength` scales the noise and that tolerance, and 0 removes nothing.
     Adaptive {
         strength: f64,
     },
-    /// Cubic Savitzky-Golay filter over 0.6 s for arms (9 frames at 15 fps) and 1 s (15 frames) for hands, without
-    /// delay.
+    /// Zero-phase cubic Savitzky-Golay filter over 0.6 s for arms (9 frames at 15 fps) and 1 s (15 frames) for hands.
     SavitzkyGolay,
 }
 
@@ -33,13 +32,13 @@ const ORDER: usize = 3;
 /// Half a window minus half a frame, seconds.
 const ARMS_HALF_SECS: f64 = 4.0 / 15.0;
 const HANDS_HALF_SECS: f64 = 7.0 / 15.0;
-/// Tolerances of the adaptive filter, radians: 1.5 mm at the end of an upper arm or forearm, 1 mm at the end of a
-/// hand, 0.6 mm at the end of a phalanx.
+/// Tolerances of the adaptive filter, radians: 1.5 mm at the end of an upper arm or forearm, 1 mm at the end of a hand,
+/// 0.6 mm at the end of a phalanx.
 const ARMS_RADIANS: f64 = 0.005;
 const HANDS_RADIANS: f64 = 0.006;
 const FINGERS_RADIANS: f64 = 0.015;
 
-/// Filter for tracks of one rate.
+/// Filter for tracks at one frame rate.
 pub enum Filter {
     None,
     Adaptive(LocalFit),
@@ -47,17 +46,17 @@ pub enum Filter {
 }
 
 impl Smoothing {
-    /// Filter for trunk, head and arms at this rate.
+    /// Filter for trunk, head and arms.
     pub fn arms(self, fps: FrameRate) -> Filter {
         self.filter(fps, ARMS_HALF_SECS, ARMS_RADIANS)
     }
 
-    /// Filter for the turns of hands against their forearms at this rate, radians.
+    /// Filter for hand angles relative to the forearm, radians.
     pub fn hands(self, fps: FrameRate) -> Filter {
         self.filter(fps, HANDS_HALF_SECS, HANDS_RADIANS)
     }
 
-    /// Filter for fingers at this rate.
+    /// Filter for fingers.
     pub fn fingers(self, fps: FrameRate) -> Filter {
         self.filter(fps, HANDS_HALF_SECS, FINGERS_RADIANS)
     }
@@ -77,14 +76,14 @@ impl Smoothing {
 }
 
 impl Filter {
-    /// Smooths the directions of each run of seen frames; a frame whose neighbours cancel out gets no direction.
+    /// Smooths the directions in each run of detected frames; a frame whose neighbours cancel out gets no direction.
     pub fn directions(&self, track: &mut [Option<Vec3>], known: &[f64]) {
         self.runs(track, known);
         track.iter_mut().for_each(|seen| *seen = seen.and_then(|v| unit(v, 1e-3)));
     }
 
-    /// Smooths vectors of any length in each run of seen frames. `known`: deviation of the noise that is known
-    /// beforehand, by frame, or empty.
+    /// Smooths vectors of any length in each run of detected frames. `known` is the known standard deviation of the
+    /// noise by frame, or empty.
     pub fn runs(&self, track: &mut [Option<Vec3>], known: &[f64]) {
         let mut start = 0;
         while start < track.len() {
@@ -105,7 +104,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_gap_divides_and_the_window_keeps_its_time() {
+    fn gaps_separate_runs_and_the_window_has_constant_duration() {
         let mut track: Vec<Option<Vec3>> = (0..40).map(|t| Some([1.0, f64::from(t % 2), 0.0])).collect();
         track[20] = None;
         track[21..].iter_mut().flatten().for_each(|v| v[2] = 100.0);

@@ -1,14 +1,14 @@
-//! Rotation tracks of a joint, and their completion: gaps between seen frames are interpolated the shortest way, before
-//! and after them the nearest rotation is held.
+//! Rotation tracks of a joint. Gaps between detected frames are interpolated along the shortest path; before and after
+//! them the nearest rotation is held.
 
 use orator_base::math::rotation::Rotation;
 
-/// Rotations of one joint, frame by frame.
+/// Rotations of one joint, by frame.
 pub type RotationTrack = Vec<Rotation>;
-/// Rotations of one joint by frame; `None` where it is not seen.
+/// Rotations of one joint by frame; `None` where it was not detected.
 pub type ObservedTrack = Vec<Option<Rotation>>;
 
-/// World rotations of a joint from its parent's and its own local ones.
+/// World rotations of a joint from its parent's world rotations and its local ones.
 pub fn world(parent: &RotationTrack, local: &RotationTrack) -> RotationTrack {
     parent.iter().zip(local).map(|(&parent, &local)| parent * local).collect()
 }
@@ -19,15 +19,15 @@ pub fn mirrored(mut track: RotationTrack) -> RotationTrack {
     track
 }
 
-/// Track without gaps; `rest` if nothing is seen. With `relax_frames` it moves to `rest` within that many frames of the
-/// nearest seen one.
-pub fn filled(seen: ObservedTrack, rest: Rotation, relax_frames: Option<f64>) -> RotationTrack {
-    let (mut before, mut after) = (None, next_seen(&seen, 0));
-    let mut track = RotationTrack::with_capacity(seen.len());
-    for (t, now) in seen.iter().enumerate() {
+/// Fills the gaps of a track; `rest` if nothing was detected. With `relax_frames` it moves to `rest` within that many
+/// frames of the nearest detected one.
+pub fn filled(observed: ObservedTrack, rest: Rotation, relax_frames: Option<f64>) -> RotationTrack {
+    let (mut before, mut after) = (None, next_observed(&observed, 0));
+    let mut track = RotationTrack::with_capacity(observed.len());
+    for (t, now) in observed.iter().enumerate() {
         if let Some(rotation) = *now {
             before = Some((t, rotation));
-            after = next_seen(&seen, t + 1);
+            after = next_observed(&observed, t + 1);
             track.push(rotation);
             continue;
         }
@@ -47,9 +47,9 @@ pub fn filled(seen: ObservedTrack, rest: Rotation, relax_frames: Option<f64>) ->
     track
 }
 
-/// First seen frame from `start` on.
-fn next_seen(seen: &ObservedTrack, start: usize) -> Option<(usize, Rotation)> {
-    seen[start..].iter().position(Option::is_some).and_then(|ahead| Some((start + ahead, seen[start + ahead]?)))
+/// First detected frame from `start` on.
+fn next_observed(observed: &ObservedTrack, start: usize) -> Option<(usize, Rotation)> {
+    observed[start..].iter().position(Option::is_some).and_then(|ahead| Some((start + ahead, observed[start + ahead]?)))
 }
 
 /// Smooth step from 0 below `low` to 1 above `high`.

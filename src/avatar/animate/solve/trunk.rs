@@ -1,5 +1,5 @@
-//! Lean and roll of the trunk, and its breath: hips, spine and chest turn, while arms and head keep their place in the
-//! world and so every joint its way from the neck.
+//! Lean and roll of the trunk, and breathing: hips, spine and chest rotate, while arms and head keep their world
+//! rotation, so that joint positions relative to the neck do not change.
 
 use super::arm::SolveFilters;
 use super::legs::Legs;
@@ -10,23 +10,23 @@ use orator_base::math::vec3::{Vec3, norm};
 use orator_base::types::posture::Posture;
 use orator_formats::bvh::write::BvhClip;
 
-/// Shares of lean and roll by which hips, spine and chest are turned in the world, such that the line from the hips to
-/// the neck leans by the whole; without and with the hips.
+/// Fractions of lean and roll by which hips, spine and chest rotate in the world, so that the line from the hips to the
+/// neck leans by the complete angle; without and with the hips.
 const ABOVE_HIPS: [f64; 3] = [0.0, 1.15, 1.35];
 const WITH_HIPS: [f64; 3] = [0.7, 1.05, 1.1];
 /// Range of lean and roll, degrees.
 const LEAN: [f64; 2] = [-20.0, 60.0];
 const ROLL: [f64; 2] = [-30.0, 30.0];
-/// Time in which an unseen trunk returns to upright, seconds.
+/// Time in which an undetected trunk returns to upright, seconds.
 const RELAX_SECS: f64 = 1.0;
-/// By how much a breath moves the neck, cm.
+/// Displacement of the neck by a breath, cm.
 const BREATH_CM: f64 = 0.3;
-/// Time of a breath at rest, seconds.
+/// Duration of a breath at rest, seconds.
 const BREATH_SECS: f64 = 4.2;
 const X: Vec3 = [1.0, 0.0, 0.0];
 const Z: Vec3 = [0.0, 0.0, 1.0];
 
-/// Turns the trunk of a clip at rest but for its yaw.
+/// Rotates the trunk of a clip whose only trunk rotation so far is yaw.
 pub fn turn(
     posture: Option<&Posture>,
     legs: Legs,
@@ -68,12 +68,12 @@ pub fn turn(
     }
 }
 
-/// Way of the neck by a breath, cm.
+/// Displacement of the neck by breathing, cm.
 fn breath(secs: f64) -> f64 {
     BREATH_CM * (1.0 - (std::f64::consts::TAU * secs / BREATH_SECS).cos()) / 2.0
 }
 
-/// Rotations by one angle of the trunk, smoothed and without gaps; `None` where it was never seen.
+/// Rotations by one angle of the trunk, smoothed and without gaps; `None` if it was never detected.
 fn angle_track(
     posture: &Posture,
     column: usize,

@@ -3,7 +3,7 @@
 use super::{lifter, people};
 use anyhow::Result;
 use orator::cli::Outcome;
-use orator::cli::confine::confine;
+use orator::cli::sandbox::enter_sandbox;
 use orator::cli::ui::Ui;
 
 /// Measure the lifters on motion with known truth, and the whole pipeline on rendered people.
@@ -23,7 +23,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     match args.subject {
         Subject::Lifter(args) => lifter::run(args, ui),
         Subject::People(args) => {
-            confine(args.report.as_deref(), []);
+            enter_sandbox(args.report.as_deref(), []);
             people::run(&args, ui)
         }
     }

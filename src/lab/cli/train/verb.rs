@@ -26,8 +26,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     const STOPPING: &str = "stopping after this step, with a checkpoint; the next signal ends at once";
     const RETAINED: &str = "the newest checkpoint is retained, and the same command continues from it";
     match args.network {
-        Network::Basis(_) | Network::Noise(_) => signals::tell_when_stopped("unfinished work is discarded"),
-        _ => ui.listens_for_stop(STOPPING, RETAINED),
+        Network::Basis(_) | Network::Noise(_) => signals::exit_on_signal("unfinished work is discarded"),
+        _ => ui.enable_stop_requests(STOPPING, RETAINED),
     }
     let ended = match args.network {
         Network::Basis(args) => basis::run(args, ui),

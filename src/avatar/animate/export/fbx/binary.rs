@@ -1,12 +1,12 @@
-//! Binary FBX container, version 7.4: a tree of named nodes with typed properties, between a fixed head and foot. All
-//! numbers are little-endian, arrays are stored uncompressed, offsets count from the start of the file.
+//! Binary FBX container, version 7.4: a tree of named nodes with typed properties, between a fixed header and footer.
+//! All numbers are little-endian, arrays are stored uncompressed, and offsets count from the start of the file.
 
-/// Version in the head of the file.
+/// Version in the header of the file.
 pub const VERSION: i32 = 7400;
-/// Identity that goes with `CREATION_TIME`: readers that check one against the other accept the pair.
+/// File id that matches `CREATION_TIME`: readers that check one against the other accept the pair.
 pub const FILE_ID: [u8; 16] =
     [0x28, 0xb3, 0x2a, 0xeb, 0xb6, 0x24, 0xcc, 0xc2, 0xbf, 0xc8, 0xb0, 0x2a, 0xa9, 0x2b, 0xfc, 0xf1];
-/// Time in every file, always this one, so that equal motion gives equal bytes.
+/// Creation time of every file. It is constant so that equal motion gives equal bytes.
 pub const CREATION_TIME: &str = "1970-01-01 10:00:00:000";
 
 const HEAD: &[u8; 23] = b"Kaydara FBX Binary  \0\x1a\0";
@@ -14,7 +14,7 @@ const FOOT_ID: [u8; 16] =
     [0xfa, 0xbc, 0xab, 0x09, 0xd0, 0xc8, 0xd4, 0x66, 0xb1, 0x76, 0xfb, 0x83, 0x1c, 0xf7, 0x26, 0x7e];
 const FOOT_END: [u8; 16] =
     [0xf8, 0x5a, 0x8c, 0x6a, 0xde, 0xf5, 0xd9, 0x7e, 0xec, 0xe9, 0x0c, 0xe3, 0x75, 0x8f, 0x29, 0x0b];
-/// Bytes of a node without name, which ends a list.
+/// An empty node, which ends a list of nodes.
 const NULL_NODE: [u8; 13] = [0; 13];
 
 /// Property of a node.
@@ -52,17 +52,17 @@ pub struct FbxNode {
 }
 
 impl FbxNode {
-    /// Node with these properties.
+    /// Creates a node with these properties.
     pub fn new(name: &'static str, values: Vec<FbxValue>) -> Self {
         Self { name, values, children: Vec::new() }
     }
 
-    /// Node with one property.
+    /// Creates a node with one property.
     pub fn one(name: &'static str, value: impl Into<FbxValue>) -> Self {
         Self::new(name, vec![value.into()])
     }
 
-    /// The node with these children.
+    /// Appends children to the node.
     pub fn with(mut self, children: impl IntoIterator<Item = FbxNode>) -> Self {
         self.children.extend(children);
         self
@@ -122,7 +122,7 @@ impl FbxValue {
     }
 }
 
-/// Bytes of the file of these top nodes.
+/// Bytes of a file with these top-level nodes.
 pub fn file(nodes: &[FbxNode]) -> Vec<u8> {
     let mut bytes = HEAD.to_vec();
     bytes.extend(VERSION.to_le_bytes());
@@ -142,14 +142,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_node_holds_its_end_its_properties_and_its_children() {
+    fn a_node_stores_its_end_properties_and_children() {
         let bytes = file(&[FbxNode::one("A", 7).with([FbxNode::new("Bc", vec![FbxValue::Ints(vec![1, 2])])])]);
         let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
         assert_eq!((&bytes[..18], word(23)), (&b"Kaydara FBX Binary"[..], 7400));
-        // Head of A: its end, one property of five bytes, a name of one byte.
+        // Header of A: the offset of its end, one property of five bytes, and a name of one byte.
         assert_eq!((word(27), word(31), word(35), bytes[39], bytes[40]), (95, 1, 5, 1, b'A'));
         assert_eq!((bytes[41], word(42)), (b'I', 7));
-        // Bc ends before the node without name that ends the children of A.
+        // Bc ends before the empty node that ends the children of A.
         assert_eq!((word(46), word(50), word(54), &bytes[58..61]), (82, 1, 21, &b"\x02Bc"[..]));
         assert_eq!((bytes[61], word(62), word(66), word(70), word(74), word(78)), (b'i', 2, 0, 8, 1, 2));
         assert!(bytes[82..].starts_with(&[0; 26]));

@@ -1,6 +1,6 @@
-//! Rotations over time as FBX curves, and the way of the hips: angles about x, y and z in degrees, a key a frame, linear between. Of the two triples
-//! of angles that give a rotation, and their whole turns, the one nearest to the frame before is taken, so that the curves
-//! have no jumps.
+//! Joint rotations and the hip translation over time as FBX curves: Euler angles about x, y and z in degrees, one key
+//! per frame, linear between keys. Two triples of angles (plus full turns) give each rotation; the one nearest to the
+//! previous frame is used, so that the curves have no jumps.
 
 use super::binary::{FbxNode, FbxValue};
 use super::document::{FbxObjects, properties, property, ticks};
@@ -10,13 +10,13 @@ use orator_formats::bvh::write::BvhClip;
 
 /// Name of the animation.
 pub const TAKE: &str = "Gesture";
-/// Largest change of the angles of a joint that does not turn, degrees; it has one key.
-const STILL: f64 = 1e-5;
-/// Linear interpolation, the same at every key.
+/// Maximum change of the angles of a static joint, degrees; a static joint has a single key.
+const STATIC_DEGREES: f64 = 1e-5;
+/// Linear interpolation at every key.
 const LINEAR: i32 = 4;
 const KEY_VERSION: i32 = 4008;
 
-/// Adds the animation of a clip whose joints are these models.
+/// Adds the animation of a clip; `models` are the ids of its joints.
 pub fn add(objects: &mut FbxObjects, clip: &BvhClip, models: &[i64]) {
     let last = ticks(clip.fps, clip.n_frames().saturating_sub(1));
     let span = [("LocalStart", 0), ("LocalStop", last), ("ReferenceStart", 0), ("ReferenceStop", last)]
@@ -31,18 +31,18 @@ pub fn add(objects: &mut FbxObjects, clip: &BvhClip, models: &[i64]) {
         }
         let angles = degrees(clip.local.iter().map(|local| local[joint]));
         let Some(&first) = angles.first() else { continue };
-        let moves = angles.iter().any(|now| (0..3).any(|k| (now[k] - first[k]).abs() > STILL));
+        let moves = angles.iter().any(|now| (0..3).any(|k| (now[k] - first[k]).abs() > STATIC_DEGREES));
         let angles = if moves { &angles[..] } else { &angles[..1] };
-        drive(objects, (layer, model), ("R", "Lcl Rotation"), angles, &times);
+        add_curves(objects, (layer, model), ("R", "Lcl Rotation"), angles, &times);
     }
     if let Some(&hips) = models.first().filter(|_| !clip.travel.is_empty()) {
         let places: Vec<Vec3> = (0..clip.n_frames()).map(|frame| clip.root_at(frame)).collect();
-        drive(objects, (layer, hips), ("T", "Lcl Translation"), &places, &times);
+        add_curves(objects, (layer, hips), ("T", "Lcl Translation"), &places, &times);
     }
 }
 
-/// Adds the curves of three values over time, of which one stands for all times, to a model.
-fn drive(
+/// Connects curves of three values over time to a model. A single value stands for all times.
+fn add_curves(
     objects: &mut FbxObjects,
     (layer, model): (i64, i64),
     (name, of_model): (&'static str, &'static str),
@@ -57,7 +57,7 @@ fn drive(
         .collect();
     let node = objects.add("AnimationCurveNode", (name, "AnimCurveNode", ""), [properties(channels)]);
     objects.connect(node, layer);
-    objects.drive(node, model, of_model);
+    objects.connect_property(node, model, of_model);
     for (axis, channel) in ["d|X", "d|Y", "d|Z"].into_iter().enumerate() {
         let values: Vec<f32> = track.iter().map(|now| now[axis] as f32).collect();
         let keys = [
@@ -70,17 +70,17 @@ fn drive(
             FbxNode::one("KeyValueFloat", FbxValue::Floats(values)),
         ];
         let curve = objects.add("AnimationCurve", ("", "AnimCurve", ""), keys);
-        objects.drive(curve, node, channel);
+        objects.connect_property(curve, node, channel);
     }
 }
 
-/// Angles about x, y and z, degrees, such that a rotation is that about z after y after x.
+/// Euler angles about x, y and z, degrees, of a rotation that applies x first, then y, then z.
 pub fn angles(rotation: Rotation) -> Vec3 {
     let [z, y, x] = rotation.euler([2, 1, 0]);
     [x, y, z].map(f64::to_degrees)
 }
 
-/// Angles over time, without jumps.
+/// Euler angles over time without jumps, degrees.
 fn degrees(rotations: impl Iterator<Item = Rotation>) -> Vec<Vec3> {
     let mut before: Option<Vec3> = None;
     let next = |rotation: Rotation| {
@@ -104,7 +104,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn angles_run_on_through_a_half_turn_and_through_the_pole() {
+    fn angles_stay_continuous_through_half_turns_and_gimbal_lock() {
         let given: Vec<Rotation> = (0..60)
             .map(|t| {
                 let share = f64::from(t) / 59.0;

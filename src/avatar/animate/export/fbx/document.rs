@@ -1,19 +1,19 @@
-//! What stands around the objects of an FBX file: header, global settings (cm, y up, facing +z, the rate), counts of the
-//! objects by kind, connections.
+//! The parts of an FBX file around its objects: header, global settings (cm, y up, facing +z, frame rate), object
+//! counts by kind, and connections.
 
 use super::binary::{CREATION_TIME, FILE_ID, FbxNode, FbxValue, VERSION};
 use orator_base::types::time::FrameRate;
 
-/// Units of time in a second.
+/// Time units per second.
 const TICKS: i128 = 46_186_158_000;
 const CREATOR: &str = concat!("orator ", env!("CARGO_PKG_VERSION"));
-/// Rates that have a number of their own (`TimeMode`); another one is given as a number of frames.
+/// Frame rates with a `TimeMode` of their own; other rates are given as a number of frames per second.
 const RATES: [(u32, i32); 8] = [(120, 1), (100, 2), (60, 3), (50, 4), (48, 5), (30, 6), (25, 10), (24, 11)];
-const OWN_RATE: i32 = 14;
-/// Number of the document.
+const CUSTOM_RATE: i32 = 14;
+/// Id of the document.
 const DOCUMENT: i64 = 1;
 
-/// Objects of a file and what they are connected to.
+/// Objects of a file and their connections.
 #[derive(Debug)]
 pub struct FbxObjects {
     objects: Vec<FbxNode>,
@@ -24,12 +24,12 @@ pub struct FbxObjects {
 }
 
 impl FbxObjects {
-    /// No objects yet.
+    /// Creates an empty list of objects.
     pub fn new() -> Self {
         Self { objects: Vec::new(), connections: Vec::new(), counts: Vec::new(), next: DOCUMENT + 1 }
     }
 
-    /// Adds an object called `name` of a kind (name of its node), a class and a sub-class; gives its number.
+    /// Adds an object with a kind (the name of its node), name, class and sub-class; returns its id.
     pub fn add(
         &mut self,
         kind: &'static str,
@@ -48,39 +48,39 @@ impl FbxObjects {
         number
     }
 
-    /// Connects an object below another (0: the scene).
+    /// Connects an object as a child of another (0 is the scene).
     pub fn connect(&mut self, child: i64, parent: i64) {
         self.connections.push(FbxNode::new("C", vec!["OO".into(), child.into(), parent.into()]));
     }
 
     /// Connects an object to a property of another.
-    pub fn drive(&mut self, child: i64, parent: i64, property: &str) {
+    pub fn connect_property(&mut self, child: i64, parent: i64, property: &str) {
         let values = vec!["OP".into(), child.into(), parent.into(), property.into()];
         self.connections.push(FbxNode::new("C", values));
     }
 
-    /// Top nodes of a file of these objects at a rate, `n_frames` long, whose animation is called `take`.
+    /// Top-level nodes of a file with these objects, a frame rate, `n_frames` frames and an animation called `take`.
     pub fn document(self, fps: FrameRate, n_frames: usize, take: &str) -> Vec<FbxNode> {
         let rate =
-            RATES.into_iter().find(|&(rate, _)| FrameRate::new(rate, 1) == fps).map_or(OWN_RATE, |found| found.1);
-        let whole = |name: &str, value: i32| property(name, ["int", "Integer", ""], vec![value.into()]);
+            RATES.into_iter().find(|&(rate, _)| FrameRate::new(rate, 1) == fps).map_or(CUSTOM_RATE, |found| found.1);
+        let integer = |name: &str, value: i32| property(name, ["int", "Integer", ""], vec![value.into()]);
         let number = |name: &str, value: f64| property(name, ["double", "Number", ""], vec![value.into()]);
         let time = |name: &str, frame: usize| property(name, ["KTime", "Time", ""], vec![ticks(fps, frame).into()]);
         let settings = [
-            whole("UpAxis", 1),
-            whole("UpAxisSign", 1),
-            whole("FrontAxis", 2),
-            whole("FrontAxisSign", 1),
-            whole("CoordAxis", 0),
-            whole("CoordAxisSign", 1),
-            whole("OriginalUpAxis", 1),
-            whole("OriginalUpAxisSign", 1),
+            integer("UpAxis", 1),
+            integer("UpAxisSign", 1),
+            integer("FrontAxis", 2),
+            integer("FrontAxisSign", 1),
+            integer("CoordAxis", 0),
+            integer("CoordAxisSign", 1),
+            integer("OriginalUpAxis", 1),
+            integer("OriginalUpAxisSign", 1),
             number("UnitScaleFactor", 1.0),
             number("OriginalUnitScaleFactor", 1.0),
             property("TimeMode", ["enum", "", ""], vec![rate.into()]),
             time("TimeSpanStart", 0),
             time("TimeSpanStop", n_frames.saturating_sub(1)),
-            number("CustomFrameRate", if rate == OWN_RATE { fps.per_sec() } else { -1.0 }),
+            number("CustomFrameRate", if rate == CUSTOM_RATE { fps.per_sec() } else { -1.0 }),
         ];
         let stamp = [("Version", 1000), ("Year", 1970), ("Month", 1), ("Day", 1), ("Hour", 10), ("Minute", 0)];
         let stamp = stamp.into_iter().chain([("Second", 0), ("Millisecond", 0)]);
@@ -115,7 +115,7 @@ impl FbxObjects {
     }
 }
 
-/// Time of a frame.
+/// Time of a frame in FBX time units.
 pub fn ticks(fps: FrameRate, frame: usize) -> i64 {
     let (num, den) = (i128::from(fps.num.max(1)), i128::from(fps.den));
     ((frame as i128 * den * TICKS + num / 2) / num) as i64
@@ -126,7 +126,7 @@ pub fn properties(list: impl IntoIterator<Item = FbxNode>) -> FbxNode {
     FbxNode::new("Properties70", vec![]).with(list)
 }
 
-/// Property with its type, its label and its flags.
+/// A property with its type, label and flags.
 pub fn property(name: &str, [kind, label, flags]: [&str; 3], values: Vec<FbxValue>) -> FbxNode {
     let head = vec![name.into(), kind.into(), label.into(), flags.into()];
     FbxNode::new("P", head.into_iter().chain(values).collect())

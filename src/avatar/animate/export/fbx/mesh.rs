@@ -1,4 +1,4 @@
-//! Skinned meshes of an avatar in an FBX file: one mesh a material, each bound to the joints that carry it.
+//! Skinned meshes of an avatar in an FBX file, one per material.
 
 use super::binary::{FbxNode, FbxValue};
 use super::document::{FbxObjects, properties, property};
@@ -6,18 +6,18 @@ use crate::animate::avatar::AvatarMesh;
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::Vec3;
 
-/// Bones that a mesh is bound to.
+/// Joints to which a mesh is bound.
 #[derive(Clone, Copy, Debug)]
 pub struct BoundBones<'a> {
-    /// Model of each joint of the file.
+    /// Model id of each joint of the file.
     pub models: &'a [i64],
-    /// For each joint of the rig its joint in the file.
+    /// Joint of the file for each joint of the rig.
     pub of_rig: &'a [usize],
-    /// World axes and places, cm, of the joints of the file at rest.
+    /// World rotation and position (cm) of each joint of the file at rest.
     pub rest: &'a [(Rotation, Vec3)],
 }
 
-/// Adds a part of the avatar; gives the number of its model.
+/// Adds a part of the avatar; returns the id of its model.
 pub fn add(objects: &mut FbxObjects, part: &AvatarMesh, bones: BoundBones) -> i64 {
     let name = format!("{:?}", part.material);
     let at_origin = [("Lcl Translation", 0.0), ("Lcl Rotation", 0.0), ("Lcl Scaling", 1.0)];
@@ -65,7 +65,7 @@ pub fn add(objects: &mut FbxObjects, part: &AvatarMesh, bones: BoundBones) -> i6
     model
 }
 
-/// Matrix by columns that turns, then moves.
+/// Column-major 4 x 4 matrix of a rotation followed by a translation.
 pub fn matrix(turn: Rotation, place: Vec3) -> Vec<f64> {
     let [x, y, z] = turn.axes();
     [(x, 0.0), (y, 0.0), (z, 0.0), (place, 1.0)].into_iter().flat_map(|([a, b, c], d)| [a, b, c, d]).collect()
@@ -73,7 +73,7 @@ pub fn matrix(turn: Rotation, place: Vec3) -> Vec<f64> {
 
 fn geometry(part: &AvatarMesh) -> Vec<FbxNode> {
     let flat = |vectors: &[Vec3]| FbxValue::Doubles(vectors.iter().flatten().copied().collect());
-    // The last corner of a polygon is stored as its complement.
+    // The last corner of a polygon is stored as its bitwise complement.
     let corners = part.triangles.iter().flat_map(|&[a, b, c]| [a as i32, b as i32, !(c as i32)]);
     let colours = part.colours.iter().flat_map(|&[r, g, b]| [r, g, b, 1.0]).map(f64::from).collect();
     let layer = |kind: &'static str, mapping: &str, reference: &str, content: FbxNode| {

@@ -1,4 +1,4 @@
-//! FBX, binary, version 7.4: its container, and a performance in it.
+//! Binary FBX 7.4: the container, and a performance in it.
 
 pub mod binary;
 pub mod curves;

@@ -1,5 +1,5 @@
-//! Performance as an FBX scene: joints as limb nodes in T-pose (cm, y up, facing +z) with their bind pose, the avatar as
-//! skinned meshes, the clip as one animation.
+//! A performance as an FBX scene: joints as limb nodes in T-pose (cm, y up, facing +z) with their bind pose, the avatar
+//! as skinned meshes, and the clip as one animation.
 
 use super::binary::{self, FbxNode, FbxValue};
 use super::curves;
@@ -13,7 +13,7 @@ use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::Vec3;
 use orator_formats::bvh::write::BvhClip;
 
-/// Bytes of the FBX file of a clip on its rig with `avatar` as its skin.
+/// Bytes of the FBX file of a clip on its rig, with `avatar` as its skin.
 pub fn file(rig: &Rig, clip: &BvhClip, avatar: &Avatar, names: Names) -> Vec<u8> {
     let skeleton = FileSkeleton::new(&rig.skeleton, names, RestAxes::Convention);
     let places = skeleton.rest_positions(clip.root);
@@ -41,7 +41,7 @@ pub fn file(rig: &Rig, clip: &BvhClip, avatar: &Avatar, names: Names) -> Vec<u8>
     binary::file(&objects.document(clip.fps, clip.n_frames(), curves::TAKE))
 }
 
-/// Adds the joints; gives the number of each one's model.
+/// Adds the joints; returns the model id of each.
 fn add_bones(objects: &mut FbxObjects, skeleton: &FileSkeleton, root: Vec3) -> Vec<i64> {
     let three = |values: Vec3| values.map(FbxValue::from).to_vec();
     let mut models: Vec<i64> = Vec::with_capacity(skeleton.rest.len());

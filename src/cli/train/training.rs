@@ -1,4 +1,4 @@
-//! What `orator train gan` and `orator train seq2seq` share: where a training lies, and its page while it goes on.
+//! Parts shared by `orator train gan` and `orator train seq2seq`: folders of a training, and its page during training.
 
 use crate::cli::ui::Ui;
 use anyhow::{Context, Result, bail};
@@ -13,36 +13,36 @@ use orator_report::training::live::{LivePage, PosesOfBest};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// Name that stands for all speakers of the configuration, unless one is called so.
+/// Name that stands for all speakers of the configuration, unless a speaker has this name.
 pub(super) const ALL: &str = "all";
-/// Intervals on the page of a training, and how much of each is generated.
+/// Number of intervals on the page of a training, and duration generated for each.
 const N_PAIRS: usize = 3;
 const PAIR_SECS: f64 = 8.0;
 
-/// Folders of a training as the command line has them.
-pub(super) struct Places<'a> {
+/// Folders of a training as given on the command line.
+pub(super) struct TrainingFolders<'a> {
     pub config: &'a Config,
     pub speaker: Option<&'a String>,
     pub dataset: Option<&'a PathBuf>,
     pub out: Option<&'a PathBuf>,
 }
 
-impl Places<'_> {
-    /// Opens the datasets of `speakers`, and says where what is learnt of all goes: `work/ROOM/all` unless told.
-    pub(super) fn open_several(&self, room: &str, datasets: &[PathBuf]) -> Result<(Vec<Dataset>, PathBuf)> {
+impl TrainingFolders<'_> {
+    /// Opens the datasets of several speakers; returns them with the output folder, by default `work/NETWORK/all`.
+    pub(super) fn open_several(&self, network: &str, datasets: &[PathBuf]) -> Result<(Vec<Dataset>, PathBuf)> {
         let work = &self.config.settings.work.dir;
         let folders: Vec<PathBuf> = match datasets {
             [] => self.config.settings.speaker.iter().map(|of| work.join("dataset").join(&of.name)).collect(),
             given => given.to_vec(),
         };
         let open = |folder: &PathBuf| Dataset::open(folder).context("`orator run` makes the datasets to train on");
-        let out = self.out.cloned().unwrap_or_else(|| work.join(room).join(ALL));
+        let out = self.out.cloned().unwrap_or_else(|| work.join(network).join(ALL));
         Ok((folders.iter().map(open).collect::<Result<_>>()?, out))
     }
 
-    /// Opens the dataset, and says where what is learnt goes: `work/ROOM/SPEAKER` unless told. A dataset named without a
-    /// speaker is of its own.
-    pub(super) fn open(&self, room: &str) -> Result<(Dataset, PathBuf)> {
+    /// Opens the dataset; returns it with the output folder, by default `work/NETWORK/SPEAKER`. A dataset given without
+    /// a speaker determines the speaker.
+    pub(super) fn open(&self, network: &str) -> Result<(Dataset, PathBuf)> {
         let work = &self.config.settings.work.dir;
         let named = match self.dataset {
             Some(_) => self.speaker.cloned(),
@@ -57,14 +57,14 @@ impl Places<'_> {
             Some(out) => out.clone(),
             None => {
                 let name = FileName::new(named.unwrap_or_else(|| dataset.info().speaker.clone()));
-                work.join(room).join(&*name.context("the speaker names no folder: say --out")?)
+                work.join(network).join(&*name.context("the speaker names no folder: say --out")?)
             }
         };
         Ok((dataset, out))
     }
 }
 
-/// The speaker's name: given, or the only one configured.
+/// The speaker's name: the given one, or the only configured one.
 fn speaker(given: Option<&String>, config: &Config) -> Result<String> {
     let names: Vec<&str> = config.settings.speaker.iter().map(|speaker| speaker.name.as_str()).collect();
     match (given, names.as_slice()) {
@@ -76,29 +76,29 @@ fn speaker(given: Option<&String>, config: &Config) -> Result<String> {
     }
 }
 
-/// The page of a training. What hinders it is said, once on the way, and ends nothing.
-pub(super) struct WatchedPage<'a> {
+/// The page of a training. Failing to write it is reported once and does not stop the training.
+pub(super) struct TrainingPage<'a> {
     page: LivePage<'a>,
     ui: &'a Ui,
-    is_told: bool,
+    has_reported: bool,
 }
 
-impl<'a> WatchedPage<'a> {
+impl<'a> TrainingPage<'a> {
     pub(super) fn new(folder: &'a Path, speaker: String, poses: PosesOfBest<'a>, ui: &'a Ui) -> Self {
-        Self { page: LivePage::new(folder, speaker, poses), ui, is_told: false }
+        Self { page: LivePage::new(folder, speaker, poses), ui, has_reported: false }
     }
 
-    /// Writes the page behind a validation.
+    /// Updates the page after a validation.
     pub(super) fn update(&mut self, at: ValidatedStep) {
         if let Err(error) = self.page.write(at)
-            && !self.is_told
+            && !self.has_reported
         {
-            self.is_told = true;
+            self.has_reported = true;
             self.ui.say(&format!("no page of this training yet: {error:#}"));
         }
     }
 
-    /// Writes the page of a training that is done; `None`: it cannot be written.
+    /// Writes the page of a completed training; `None` if that failed.
     pub(super) fn finish(mut self, at: ValidatedStep) -> Option<PathBuf> {
         let written = self.page.write(at).inspect_err(|error| {
             self.ui.say(&format!("no page of this training: {error:#}"));
@@ -107,15 +107,15 @@ impl<'a> WatchedPage<'a> {
     }
 }
 
-/// A few intervals that were not trained on; of the training split where there are no others.
-pub(super) fn shown(dataset: &Dataset) -> Vec<SampleRef> {
+/// A few intervals that were not trained on, or of the training split if there are no others.
+pub(super) fn page_samples(dataset: &Dataset) -> Vec<SampleRef> {
     let splits = [Split::Validation, Split::Train].map(|split| dataset.samples(split));
     let samples = splits.into_iter().find(|samples| !samples.is_empty()).unwrap_or_default();
     let n = samples.len().min(N_PAIRS);
     (0..n).map(|i| samples[i * samples.len() / n].clone()).collect()
 }
 
-/// Frames in the middle of so many.
+/// Range of up to `PAIR_SECS` in the middle of `n_frames` frames.
 pub(super) fn middle(n_frames: usize, fps: FrameRate) -> Range<usize> {
     let span = ((PAIR_SECS * fps.per_sec()) as usize).min(n_frames);
     let first = (n_frames - span) / 2;

@@ -1,18 +1,18 @@
-//! Two bones whose end is put at a place.
+//! Two-bone inverse kinematics.
 
 use orator_base::math::vec3::{Vec3, across, add, any_across, norm, scale, sub, unit};
 
-/// Share of the whole length to which an arm stretches at most.
-const STRETCHED: f64 = 0.9995;
+/// Maximum extension of an arm relative to its total length.
+const MAX_STRETCH: f64 = 0.9995;
 
-/// Places of the middle joint and the end of two bones of these lengths that start at `from`, the end at `to` or, where
-/// that is out of reach, as near as it can be; the middle joint on the side of `elbow`.
-pub fn reach(from: Vec3, elbow: Vec3, to: Vec3, [upper, fore]: [f64; 2]) -> [Vec3; 2] {
+/// Positions of the middle joint and the end of two bones with the given lengths that start at `from`. The end is at
+/// `to`, or as near as possible if that is out of reach; the middle joint is on the side of `elbow`.
+pub fn solve_two_bone(from: Vec3, elbow: Vec3, to: Vec3, [upper, fore]: [f64; 2]) -> [Vec3; 2] {
     let way = sub(to, from);
     let towards = sub(elbow, from);
     let along = unit(way, 1e-9).or_else(|| unit(towards, 1e-9)).unwrap_or([1.0, 0.0, 0.0]);
-    let far = (upper + fore) * STRETCHED;
-    let near = (upper - fore).abs() / STRETCHED;
+    let far = (upper + fore) * MAX_STRETCH;
+    let near = (upper - fore).abs() / MAX_STRETCH;
     let distance = norm(way).clamp(near.min(far), far).max(1e-9);
     let side = across(towards, along);
     let side = unit(side, 1e-9).unwrap_or_else(|| any_across(along));
@@ -27,12 +27,12 @@ mod tests {
     use orator_base::math::vec3::dot;
 
     #[test]
-    fn the_end_is_where_it_should_be_and_the_bones_keep_their_length() {
+    fn the_end_reaches_its_target_and_bones_keep_their_length() {
         let (from, elbow) = ([1.0, 2.0, 3.0], [1.3, 1.0, 2.0]);
         for (to, lengths) in
             [([2.0, 2.5, 3.0], [1.0, 1.2]), ([1.1, 2.0, 3.0], [1.0, 0.95]), ([9.0, 2.0, 3.0], [1.0, 1.0])]
         {
-            let [middle, end] = reach(from, elbow, to, lengths);
+            let [middle, end] = solve_two_bone(from, elbow, to, lengths);
             assert!((norm(sub(middle, from)) - lengths[0]).abs() < 1e-9);
             assert!((norm(sub(end, middle)) - lengths[1]).abs() < 1e-6);
             let is_near = norm(sub(to, from)) < lengths[0] + lengths[1];
