@@ -39,6 +39,11 @@ impl Claim {
         Self { epoch: self.epoch + 1, ..self }
     }
 
+    /// The claim of the previous epoch; `None` for the first.
+    pub fn previous(self) -> Option<Self> {
+        (self.epoch > 1).then(|| Self { epoch: self.epoch - 1, ..self })
+    }
+
     /// Path of the file of a kind (`claim` or `end`) in the shared folder.
     fn file(self, kind: &str) -> String {
         let Self { unit, epoch } = self;

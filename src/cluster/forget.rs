@@ -5,6 +5,7 @@ use super::timing;
 use anyhow::{Context, Result};
 use orator_dataset::forget::search::{SearchTerm, search};
 use std::collections::BTreeSet;
+use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -34,7 +35,11 @@ pub fn plans_naming(work: &Path, terms: &[SearchTerm]) -> Result<Vec<PathBuf>> {
             found.insert(path.clone());
         }
     }
-    found.extend(Some(work.join(timing::FOLDER)).filter(|folder| folder.is_dir()));
+    let excerpts = work.join(timing::FOLDER);
+    let is_excerpt = |entry: &fs::DirEntry| Path::new(&entry.file_name()).extension().is_some_and(|it| it == "mkv");
+    if fs::read_dir(&excerpts).is_ok_and(|mut entries| entries.all(|entry| entry.is_ok_and(|e| is_excerpt(&e)))) {
+        found.insert(excerpts);
+    }
     Ok(found.into_iter().collect())
 }
 
@@ -50,7 +55,10 @@ fn is_plan(path: &Path) -> bool {
 fn plan_of(folder: &Path) -> Option<PathBuf> {
     let (stem, seal) = folder.file_name()?.to_str()?.rsplit_once('-')?;
     let is_seal = seal.len() == 12 && seal.bytes().all(|byte| byte.is_ascii_hexdigit());
-    (is_seal && folder.is_dir()).then(|| folder.with_file_name(format!("{stem}.json")))
+    // The name alone could be a date: every entry must be one that workers and `orator submit` create.
+    let is_known = |name: &OsStr| ["claims", "workers", "jobs", "stop"].iter().any(|known| name == *known);
+    let holds_only = |mut entries: fs::ReadDir| entries.all(|entry| entry.is_ok_and(|e| is_known(&e.file_name())));
+    (is_seal && folder.read_dir().is_ok_and(holds_only)).then(|| folder.with_file_name(format!("{stem}.json")))
 }
 
 #[cfg(test)]
@@ -73,6 +81,9 @@ mod tests {
         write("other-0123456789ab/workers/w.json", "/v/b.mp4");
         write("stage_times.json", "\"/v/a.mp4\"");
         write("timing/00.mkv", "an excerpt");
+        write("takes-202403051430/a.mp4", "/v/a.mp4");
+        write("other-bbbbbbbbbbbb/workers/w.json", "/v/a.mp4");
+        write("other-bbbbbbbbbbbb/notes.txt", "a user's own");
         let terms = SearchTerm::name("path", "/v/a.mp4");
         let found = plans_naming(work, &terms).unwrap();
         let expected = ["plan-0123456789ab", "plan-aaaaaaaaaaaa", "plan.json", "timing"].map(|name| work.join(name));

@@ -62,6 +62,10 @@ impl SharedFolder for DiskFolder {
             Ok(bytes) => Ok(Some(bytes)),
             Err(error) if is_gone(&error) && !path.is_symlink() => Ok(None),
             Err(error) if is_gone(&error) || is_not_regular(&error) => Ok(Some(Vec::new())),
+            // A live worker of another user wrote it: this is no foreign file, and must not be removed.
+            Err(error) if error.kind() == ErrorKind::PermissionDenied => Err(error).with_context(|| {
+                format!("cannot read {}: all workers of a plan need one group and a umask such as 002", path.display())
+            }),
             Err(error) => Err(error).with_context(|| format!("cannot read {}", path.display())),
         }
     }
@@ -91,10 +95,10 @@ fn is_gone(error: &std::io::Error) -> bool {
     error.kind() == ErrorKind::NotFound || error.kind() == ErrorKind::StaleNetworkFileHandle
 }
 
-/// The name belongs to a folder, a pipe, a socket, a cycle of links, or a file without read permission.
+/// The name belongs to a folder, a pipe, a socket, or a cycle of links.
 fn is_not_regular(error: &std::io::Error) -> bool {
     let is_other = |errno: Errno| error.raw_os_error() == Some(errno.raw_os_error());
-    let kinds = [ErrorKind::IsADirectory, ErrorKind::InvalidInput, ErrorKind::PermissionDenied];
+    let kinds = [ErrorKind::IsADirectory, ErrorKind::InvalidInput];
     kinds.contains(&error.kind()) || is_other(Errno::NXIO) || is_other(Errno::LOOP)
 }
 

@@ -1,7 +1,7 @@
 //! A worker claims units of a plan one after the other and runs their stages until every unit has ended or it is asked
 //! to stop. Any number of workers on any machines may share a plan.
 
-use super::claims::{Claim, ClaimOptions, Claims, NextUnit, UnitEnd};
+use super::claims::{Claim, ClaimOptions, Claims, NextUnit, UnitEnd, read_states};
 use super::heartbeat::{BeatWatch, Heartbeat, this_machine};
 use super::plan::{ClusterPlan, PlannedUnit, UnitShare};
 use super::shared_folder::{DiskFolder, SharedFolder};
@@ -50,6 +50,8 @@ pub struct WorkReport {
     pub fresh: usize,
     /// Units that failed, each with its error.
     pub failed: Vec<(String, String)>,
+    /// Units that had failed in an earlier session and were not processed again, once every unit has ended.
+    pub failed_before: Vec<String>,
     /// Number of units taken over from dead workers.
     pub taken_over: usize,
     /// Number of units given up because other workers had taken them over.
@@ -120,7 +122,10 @@ pub fn work(
     // Hashes that cannot be saved are computed again next time.
     let _ = hashes.save();
     ended?;
-    Ok(session.report.into_inner().unwrap_or_else(PoisonError::into_inner))
+    let failed_before = session.failed_before()?;
+    let mut report = session.report.into_inner().unwrap_or_else(PoisonError::into_inner);
+    report.failed_before = failed_before;
+    Ok(report)
 }
 
 /// A unique worker name: host name, process id, a counter and a random number.
@@ -208,6 +213,25 @@ impl Session<'_> {
         Ok(())
     }
 
+    /// Units whose last claim ended with an error before this session; none while units have not ended.
+    fn failed_before(&self) -> Result<Vec<String>> {
+        let report = self.report();
+        let mut failed = Vec::new();
+        if !report.all_ended {
+            return Ok(failed);
+        }
+        let states = read_states(&self.folder, self.plan.units.len())?;
+        for unit in self.order() {
+            let claim = Claim { unit, epoch: states[unit].epoch };
+            let name = self.plan.units[unit].to_string();
+            let is_new = report.failed.iter().any(|(failed, _)| *failed == name);
+            if !is_new && claim.read_end(&self.folder)?.is_some_and(|end| end.error.is_some()) {
+                failed.push(name);
+            }
+        }
+        Ok(failed)
+    }
+
     /// Waits for `time`, or until the program is asked to stop.
     fn rest(&self, time: Duration) {
         let begun = Instant::now();
@@ -285,8 +309,9 @@ impl Session<'_> {
         let error = failed.filter(|_| is_whole).map(|error| format!("{error:#}"));
         let secs = begun.elapsed().as_secs_f64();
         let is_mine = claims.end(claim, &UnitEnd { worker: name.to_owned(), error: error.clone(), secs })?;
+        let was_retried = claim.previous().map_or(Ok(None), |before| before.read_end(&self.folder))?.is_some();
         let mut report = self.report();
-        report.taken_over += usize::from(claim.epoch > 1);
+        report.taken_over += usize::from(claim.epoch > 1 && !was_retried);
         report.laid_aside += usize::from(!is_mine);
         let mut content = heartbeat.content();
         match error {

@@ -67,7 +67,7 @@ pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     );
     let report = work(&plan, &args.plan, &pipeline, &options, ui)?;
     let path = args.plan.display();
-    let has_failed = !report.failed.is_empty();
+    let has_failed = !report.failed.is_empty() || !report.failed_before.is_empty();
     let next = match report.all_ended {
         true if has_failed => format!("orator work --plan {path} --retry"),
         true => plan.datasets_command("orator"),
@@ -93,6 +93,7 @@ fn text(report: &WorkReport) -> String {
         ));
     }
     lines.extend(report.failed.iter().map(|(unit, error)| format!("failed  {unit}: {error}")));
+    lines.extend(report.failed_before.iter().map(|unit| format!("failed  {unit}: in an earlier session")));
     lines.extend(report.blocked.iter().map(|what| format!("blocked {what}; remove it and start a worker again")));
     let rest = if report.all_ended { "every unit has ended" } else { "others have the rest, or it is left" };
     lines.push(rest.to_owned());

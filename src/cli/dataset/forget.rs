@@ -168,12 +168,13 @@ fn of_project(args: &Args, locks: &mut Vec<FolderLock>) -> Result<ForgetTask> {
         }
     }
     let mut advice: Vec<String> = Vec::new();
-    if !plans.is_empty() {
+    if plans.iter().any(|path| path.extension().is_some_and(|it| it == "json")) {
         advice.push(
             "a plan listed it and is removed: write it anew with `orator plan` before more workers start".to_owned(),
         );
     }
     removal.paths.extend(plans);
+    advice.push("plans written outside the work folder (`orator plan --out`) are not searched: delete them".to_owned());
     for video in &videos {
         let twins = others.iter().filter(|other| video.content.is_some() && other.content == video.content);
         advice.extend(twins.map(|twin| {

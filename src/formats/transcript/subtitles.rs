@@ -66,7 +66,10 @@ fn push_cue(words: &mut Vec<Word>, text: &str, start: f64, end: f64) -> Result<(
 fn inline_time(part: &str) -> Option<(f64, &str)> {
     let (time, rest) = part.split_once('>')?;
     let is_time = time.contains(':') && time.bytes().all(|byte| byte.is_ascii_digit() || b":.".contains(&byte));
-    Some((seconds(time).ok().filter(|_| is_time)?, rest))
+    if !is_time {
+        return None;
+    }
+    Some((seconds(time).ok()?, rest))
 }
 
 /// Parses hours, minutes and seconds separated by `:`, with a decimal comma or point.

@@ -55,7 +55,8 @@ impl Aligner {
         let version = String::from_utf8_lossy(&output.stdout).trim().to_owned();
         ensure!(
             output.status.success() && !version.is_empty(),
-            "`{name}` has no package pocketsphinx ({}): {remedy}",
+            "`{name}` has no package pocketsphinx ({}; PYTHONPATH, the user site and .python-version are not used): \
+             {remedy}",
             last_line(&output.stderr)
         );
         Ok(version)

@@ -88,6 +88,9 @@ pub(crate) fn restrict() -> Result<(), Error> {
     // Anonymous shared memory is not counted by `RLIMIT_DATA`.
     let shared = u64::from((libc::MAP_SHARED | libc::MAP_ANONYMOUS).unsigned_abs());
     deny(libc::SYS_mmap, 3, SeccompCmpOp::MaskedEq(shared), shared)?;
+    // Neither are stacks that grow by themselves.
+    let grows = u64::from(libc::MAP_GROWSDOWN.unsigned_abs());
+    deny(libc::SYS_mmap, 3, SeccompCmpOp::MaskedEq(grows), grows)?;
     // Injection of input into the user's terminal.
     deny(libc::SYS_ioctl, 1, SeccompCmpOp::Eq, libc::TIOCSTI)?;
     deny(libc::SYS_ioctl, 1, SeccompCmpOp::Eq, libc::TIOCLINUX)?;

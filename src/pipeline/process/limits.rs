@@ -97,6 +97,18 @@ impl Limits {
         ))
     }
 
+    /// Message for a process that uses `bytes` of memory, if that is too much.
+    pub fn exceeded_by(&self, bytes: u64) -> Option<String> {
+        (bytes > self.memory).then(|| {
+            format!(
+                "used more than the {} MB of memory allowed for {} and was ended: the file may be damaged, or made to do \
+                 harm; encode it again, smaller if that is not enough",
+                self.memory >> 20,
+                self.basis
+            )
+        })
+    }
+
     /// Which limit a process has passed that used `cpu` seconds of processor time, `quiet` of them since its last report,
     /// in `passed` seconds, the last `idle` of them without either.
     pub fn passed(&self, [cpu, quiet]: [f64; 2], [passed, idle]: [u64; 2]) -> Option<String> {
@@ -184,6 +196,9 @@ mod tests {
         assert_eq!(explained("no such file"), "no such file");
         let text = explained("cannot decode a.mp4: Cannot allocate memory");
         assert!(text.starts_with("a.mp4: reading it takes more than the ") && text.ends_with("Cannot allocate memory"));
+        let of_header = Limits::of_header();
+        assert_eq!(of_header.exceeded_by(of_header.memory), None);
+        assert!(of_header.exceeded_by(of_header.memory + 1).unwrap().contains("MB of memory allowed for the header"));
         assert!(text.contains(" MB of memory that is allowed for the header of a file"), "{text}");
     }
 }

@@ -123,13 +123,16 @@ fn watch(pid: Pid, limits: &Limits, n_reads: &AtomicU64, ended: Receiver<()>) ->
     let (mut reads_before, mut cpu_before, mut cpu_at_report) = (0, 0.0, 0.0);
     let [mut passed, mut idle] = [0_u64; 2];
     while matches!(ended.recv_timeout(TICK), Err(RecvTimeoutError::Timeout)) {
-        let (reads, cpu) = (n_reads.load(Ordering::Relaxed), cpu_secs(pid).unwrap_or(cpu_before));
+        let reads = n_reads.load(Ordering::Relaxed);
+        let (cpu, is_blocked) = cpu_secs(pid).unwrap_or((cpu_before, true));
         // A process whose reports nobody reads, since the terminal is stopped, has to wait.
-        let has_report = reads != reads_before || reads % 2 == 0;
-        idle = if has_report || cpu > cpu_before { 0 } else { idle + 1 };
+        let has_report = reads != reads_before || reads.is_multiple_of(2);
+        // Storage that does not answer (a tape library, a network file system) is waited for.
+        idle = if has_report || is_blocked || cpu > cpu_before { 0 } else { idle + 1 };
         cpu_at_report = if has_report { cpu } else { cpu_at_report };
         (reads_before, cpu_before, passed) = (reads, cpu, passed + 1);
-        let verdict = limits.passed([cpu, cpu - cpu_at_report], [passed, idle]);
+        let memory = anonymous_bytes(pid).and_then(|bytes| limits.exceeded_by(bytes));
+        let verdict = memory.or_else(|| limits.passed([cpu, cpu - cpu_at_report], [passed, idle]));
         if verdict.is_some() {
             // The process is not waited for before this thread has ended: the id is still its own.
             let _ = kill_process(pid, Signal::KILL);
@@ -139,13 +142,22 @@ fn watch(pid: Pid, limits: &Limits, n_reads: &AtomicU64, ended: Receiver<()>) ->
     None
 }
 
-/// Seconds of processor time that the process has used, in the program and in the kernel.
-fn cpu_secs(pid: Pid) -> Option<f64> {
+/// Seconds of processor time that the process has used, in the program and in the kernel, and whether it is in
+/// uninterruptible sleep, as during a read from storage. `None`: unknown.
+fn cpu_secs(pid: Pid) -> Option<(f64, bool)> {
     let stat = std::fs::read_to_string(format!("/proc/{}/stat", pid.as_raw_nonzero())).ok()?;
     // The name may hold anything. After it stand the state as field 3 and the two times as fields 14 and 15.
     let (_, fields) = stat.rsplit_once(')')?;
     let ticks = fields.split_whitespace().skip(11).take(2).map(|ticks| ticks.parse::<u64>().ok());
-    Some(ticks.sum::<Option<u64>>()? as f64 / CLOCK_TICKS)
+    let is_blocked = fields.trim_start().starts_with('D');
+    Some((ticks.sum::<Option<u64>>()? as f64 / CLOCK_TICKS, is_blocked))
+}
+
+/// Bytes of memory in use by the process that no file backs. `RLIMIT_DATA` counts only what is writable at the moment.
+fn anonymous_bytes(pid: Pid) -> Option<u64> {
+    let status = std::fs::read_to_string(format!("/proc/{}/status", pid.as_raw_nonzero())).ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("RssAnon:"))?;
+    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?.checked_mul(1024)
 }
 
 /// The last bytes that the process writes before it ends.

@@ -116,7 +116,8 @@ fn a_bad_video_fails_alone_and_a_plan_is_kept() {
     assert_eq!(status.json["failures"].as_object().unwrap().len(), 1);
     // Nothing is left to do; the failed one is taken again when that is asked for, but only with the content that was planned.
     let again = project.answer(&["work", "--plan", "work/plan.json"]);
-    assert_eq!((again.code, again.json["done"].as_u64()), (0, Some(0)));
+    assert_eq!((again.code, again.json["done"].as_u64()), (2, Some(0)));
+    assert_eq!(again.json["failed_before"].as_array().unwrap().len(), 1);
     std::fs::copy(project.clips().pop().unwrap(), project.video("broken.mp4")).unwrap();
     let retried = project.answer(&["work", "--plan", "work/plan.json", "--retry"]);
     assert_eq!((retried.code, retried.json["done"].as_u64()), (2, Some(0)), "another video: {}", retried.errors);

@@ -128,7 +128,7 @@ mod tests {
             ("hip abdomen neck head lShldr lForeArm lHand lThigh lShin lFoot", 10),
         ] {
             let names: Vec<&str> = names.split_whitespace().collect();
-            let found = found(&names);
+            let found = match_names(&names);
             assert_eq!(found.len(), n, "{found:?} of {names:?}");
             let of = |own: &str| found.iter().find(|(name, _)| name == own).map(|(_, joint)| names[*joint]);
             assert!(of("LeftArm").is_some() && of("LeftArm") != of("LeftShoulder"), "{found:?}");

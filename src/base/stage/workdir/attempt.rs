@@ -161,11 +161,14 @@ fn name_parts(target: &Path) -> [OsString; 2] {
     [start, end]
 }
 
-/// Returns whether `path` has not changed for at least `RECENT`. A modification time in the future is not old.
+/// Returns whether nothing at `path`, a file or a folder with its files, has changed for at least `RECENT`. A
+/// modification time in the future is not old.
 fn is_old(path: &Path) -> bool {
-    let changed = path.symlink_metadata().and_then(|meta| meta.modified());
-    let age = changed.ok().and_then(|time| SystemTime::now().duration_since(time).ok());
-    age.is_some_and(|age| age >= RECENT)
+    let Ok(meta) = path.symlink_metadata() else { return false };
+    let age = meta.modified().ok().and_then(|time| SystemTime::now().duration_since(time).ok());
+    // A folder's own time does not change while a file in it is written.
+    let mut files = Some(path).filter(|_| meta.is_dir()).and_then(|path| path.read_dir().ok()).into_iter().flatten();
+    age.is_some_and(|age| age >= RECENT) && files.all(|file| file.is_ok_and(|file| is_old(&file.path())))
 }
 
 #[cfg(test)]
@@ -253,6 +256,13 @@ mod tests {
                 assert_eq!(path.exists(), !goes, "{}", path.display());
             }
             assert!(deep.exists(), "deeper than asked for");
+            if is_folder {
+                let written = folder.join(format!(".a.attempt-{elsewhere}-4.npz"));
+                plant(&written.join("now"));
+                change(&written, old);
+                sweep_folder(dir.path(), 2);
+                assert!(written.exists(), "a file in it was written just now");
+            }
             fs::remove_dir_all(dir.path().join("stage")).unwrap();
             fs::remove_dir_all(dir.path().join("a")).unwrap();
         }

@@ -35,5 +35,5 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         Network::Lifter(args) => lifter::run(args, ui),
         Network::Noise(args) => noise::run(&args, ui),
     };
-    ended.or_else(|error| stopped::told(error, ui))
+    ended.or_else(|error| stopped::report_stopped(error, ui))
 }
