@@ -2,7 +2,7 @@
 //! refused seconds from all splits.
 
 use super::joint_stats::JointMoments;
-use super::write::part::VideoEntry;
+use super::write::entry::VideoEntry;
 use super::{STRIDE_FRAMES, WINDOW_FRAMES};
 use anyhow::{Result, ensure};
 use ndarray::Array2;
@@ -134,19 +134,19 @@ impl Default for StatsCollector {
 
 impl StatsCollector {
     /// Adds a video.
-    pub fn push(&mut self, part: &VideoEntry) {
+    pub fn push(&mut self, entry: &VideoEntry) {
         // Of a video in several splits they are those of its training samples.
-        let trains = part.split.map_or(!part.samples.is_empty(), |split| split == Split::Train);
+        let trains = entry.split.map_or(!entry.samples.is_empty(), |split| split == Split::Train);
         if trains {
-            self.moments.merge(&part.moments);
+            self.moments.merge(&entry.moments);
         }
-        if let Some(posture) = &part.posture {
+        if let Some(posture) = &entry.posture {
             let moments = self.posture.get_or_insert_with(JointMoments::of_posture);
             if trains {
                 moments.merge(posture);
             }
         }
-        for sample in &part.samples {
+        for sample in &entry.samples {
             let interval = Interval { start: 0, end: sample.n_frames };
             let add = |counts: &mut BTreeMap<String, usize>, n| {
                 *counts.entry(sample.split.name().to_owned()).or_default() += n;
@@ -156,16 +156,16 @@ impl StatsCollector {
         }
         let footage = &mut self.footage;
         footage.n_videos += 1;
-        footage.n_intervals += part.samples.len();
-        footage.secs += part.ledger.duration_secs;
-        footage.kept_secs += part.ledger.kept_secs();
-        footage.failed_secs += part.ledger.failed_secs();
-        footage.n_of_unknown_length += usize::from(part.ledger.duration_secs == 0.0 && part.failure.is_some());
-        footage.padded_sound_secs += part.padded_sound_secs;
-        if let Some(words) = &part.ledger.words {
+        footage.n_intervals += entry.samples.len();
+        footage.secs += entry.ledger.duration_secs;
+        footage.kept_secs += entry.ledger.kept_secs();
+        footage.failed_secs += entry.ledger.failed_secs();
+        footage.n_of_unknown_length += usize::from(entry.ledger.duration_secs == 0.0 && entry.failure.is_some());
+        footage.padded_sound_secs += entry.padded_sound_secs;
+        if let Some(words) = &entry.ledger.words {
             *footage.words.get_or_insert_default() += words.count;
         }
-        for (reason, secs) in part.ledger.refused_secs() {
+        for (reason, secs) in entry.ledger.refused_secs() {
             *footage.refused_secs.entry(reason).or_default() += secs;
         }
     }

@@ -6,7 +6,7 @@ use crate::info::DatasetInfo;
 use crate::leakage::Leakage;
 use crate::split::SplitBy;
 use crate::write::assemble::assemble;
-use crate::write::part::{self, VideoEntry};
+use crate::write::entry::{self, VideoEntry};
 use crate::{INFO, LEAKAGE};
 use crate::{pretty, read_json};
 use anyhow::{Context, Result, ensure};
@@ -19,7 +19,7 @@ const FORGOTTEN: &str = "a video that was forgotten";
 
 /// Whether the video has samples in the dataset; true if its entry cannot be read, since it may have some.
 pub fn has_samples(dir: &Path, name: &str) -> bool {
-    VideoEntry::read(&VideoEntry::path(dir, name)).map_or(true, |part| !part.samples.is_empty())
+    VideoEntry::read(&VideoEntry::path(dir, name)).map_or(true, |entry| !entry.samples.is_empty())
 }
 
 /// Checks that the files of all videos except `names` match `checksums.b3`: assembling the dataset again would give
@@ -28,12 +28,13 @@ pub fn has_samples(dir: &Path, name: &str) -> bool {
 /// # Errors
 /// A file of a remaining video that does not match its checksum.
 pub fn ensure_intact_without(dir: &Path, names: &BTreeSet<String>) -> Result<()> {
-    if !dir.join(part::FOLDER).is_dir() {
+    if !dir.join(entry::FOLDER).is_dir() {
         return Ok(());
     }
-    let stated = part::stated_hashes(dir);
-    for name in part::names(dir)?.into_iter().filter(|name| !names.contains(name)) {
-        let is_intact = VideoEntry::read(&VideoEntry::path(dir, &name)).is_ok_and(|part| part.is_intact(dir, &stated));
+    let stated = entry::stated_hashes(dir);
+    for name in entry::names(dir)?.into_iter().filter(|name| !names.contains(name)) {
+        let is_intact =
+            VideoEntry::read(&VideoEntry::path(dir, &name)).is_ok_and(|entry| entry.is_intact(dir, &stated));
         ensure!(
             is_intact,
             "{name}, which stays, is damaged in the dataset {}: nothing was removed. Make it anew with `orator run` \
@@ -52,8 +53,8 @@ pub fn without(dir: &Path, names: &BTreeSet<String>) -> Result<()> {
     if !dir.exists() {
         return Ok(());
     }
-    let remaining: Vec<String> = if dir.join(part::FOLDER).is_dir() {
-        part::names(dir)?.into_iter().filter(|name| !names.contains(name)).collect()
+    let remaining: Vec<String> = if dir.join(entry::FOLDER).is_dir() {
+        entry::names(dir)?.into_iter().filter(|name| !names.contains(name)).collect()
     } else {
         Vec::new()
     };
@@ -67,10 +68,10 @@ pub fn without(dir: &Path, names: &BTreeSet<String>) -> Result<()> {
         let mut compared = leakage.compared();
         compared.shared.retain(|shared| !names.contains(&shared.a) && !names.contains(&shared.b));
         for name in &remaining {
-            let part = VideoEntry::read(&VideoEntry::path(dir, name))?;
-            let redacted_entry = redacted(&part, names);
-            part.take_over(dir, &attempt)?;
-            if redacted_entry != part {
+            let entry = VideoEntry::read(&VideoEntry::path(dir, name))?;
+            let redacted_entry = redacted(&entry, names);
+            entry.link_into(dir, &attempt)?;
+            if redacted_entry != entry {
                 // A new file, since writing through the hard link would change the old dataset.
                 workdir::write_file(&VideoEntry::path(&attempt, name), &pretty(&redacted_entry)?)?;
             }
@@ -88,7 +89,7 @@ pub fn without(dir: &Path, names: &BTreeSet<String>) -> Result<()> {
 /// Removes a dataset, the entries of its videos last: after a kill, a second `forget` reads from them what is left to
 /// remove.
 fn remove_dataset(dir: &Path) -> std::io::Result<()> {
-    let entries = dir.join(part::FOLDER);
+    let entries = dir.join(entry::FOLDER);
     for folder in [dir, &entries].into_iter().filter(|folder| folder.is_dir()) {
         for entry in std::fs::read_dir(folder)? {
             let path = entry?.path();
@@ -102,14 +103,14 @@ fn remove_dataset(dir: &Path) -> std::io::Result<()> {
 }
 
 /// Copy of the entry without the names of the forgotten videos.
-fn redacted(part: &VideoEntry, names: &BTreeSet<String>) -> VideoEntry {
-    let mut part = part.clone();
-    if matches!(&part.split_by, SplitBy::SoundOf(other) if names.contains(other)) {
+fn redacted(entry: &VideoEntry, names: &BTreeSet<String>) -> VideoEntry {
+    let mut entry = entry.clone();
+    if matches!(&entry.split_by, SplitBy::SoundOf(other) if names.contains(other)) {
         // The video stays in its split; only the reason changes.
-        part.split_by = SplitBy::Share;
+        entry.split_by = SplitBy::Share;
     }
-    for refused in &mut part.ledger.refused {
+    for refused in &mut entry.ledger.refused {
         names.iter().for_each(|name| refused.message = refused.message.replace(name.as_str(), FORGOTTEN));
     }
-    part
+    entry
 }

@@ -4,7 +4,7 @@
 use crate::config::{Config, videos};
 use crate::file_name;
 use crate::split::SplitRecord;
-use crate::write::part::{self, VideoEntry};
+use crate::write::entry::{self, VideoEntry};
 use anyhow::{Result, bail, ensure};
 use orator_base::stage::artifacts::{self, StageName, speaker_dir};
 use orator_base::stage::fingerprint::hash_file;
@@ -124,7 +124,7 @@ fn speakers_on_record(work: &Path) -> Vec<String> {
 /// # Errors
 /// `dir` is not a dataset.
 pub fn dataset_videos(dir: &Path) -> Result<Vec<KnownVideo>> {
-    ensure!(dir.join(part::FOLDER).is_dir(), "{} is no dataset: it has no folder {}", dir.display(), part::FOLDER);
+    ensure!(dir.join(entry::FOLDER).is_dir(), "{} is no dataset: it has no folder {}", dir.display(), entry::FOLDER);
     let mut known = Vec::new();
     add_dataset(dir, "", &mut known)?;
     Ok(known)
@@ -132,13 +132,13 @@ pub fn dataset_videos(dir: &Path) -> Result<Vec<KnownVideo>> {
 
 /// Adds the videos of a dataset; one whose name or content is already known is merged into that video.
 fn add_dataset(dir: &Path, speaker: &str, known: &mut Vec<KnownVideo>) -> Result<()> {
-    if !dir.join(part::FOLDER).is_dir() {
+    if !dir.join(entry::FOLDER).is_dir() {
         return Ok(());
     }
-    for name in part::names(dir)? {
+    for name in entry::names(dir)? {
         // The name is known even if the entry is damaged, so such a video can be forgotten too.
-        let part = VideoEntry::read(&VideoEntry::path(dir, &name)).ok();
-        let (content, file) = part.map(|part| (part.content, part.file)).unwrap_or_default();
+        let entry = VideoEntry::read(&VideoEntry::path(dir, &name)).ok();
+        let (content, file) = entry.map(|entry| (entry.content, entry.file)).unwrap_or_default();
         let own = |k: &&mut KnownVideo| k.speaker == speaker && k.work.is_some();
         let called = known.iter_mut().filter(own).find(|k| k.work.as_ref() == Some(&name));
         let called = called.map(|k| k.parts.insert(name.clone()));

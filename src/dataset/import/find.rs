@@ -3,7 +3,7 @@
 
 use crate::INFO;
 use crate::config::patterns::OF_SOUNDS;
-use crate::write::part;
+use crate::write::entry;
 use anyhow::{Context, Result, ensure};
 use orator_base::input;
 use orator_formats::mocap::captured::MotionKind;
@@ -84,7 +84,7 @@ fn walk(path: &Path, files: &mut Vec<PathBuf>, datasets: &mut Vec<PathBuf>) -> R
         return Ok(());
     }
     let mut enter = |folder: &Path| {
-        let is_dataset = folder.join(INFO).is_file() && folder.join(part::FOLDER).is_dir();
+        let is_dataset = folder.join(INFO).is_file() && folder.join(entry::FOLDER).is_dir();
         datasets.extend(is_dataset.then(|| folder.to_owned()));
         !is_dataset
     };

@@ -11,7 +11,7 @@ use crate::info::DatasetInfo;
 use crate::shared_sound::SharedSound;
 use crate::split::{Assignment, SplitBy, TimeBlock};
 use crate::write::assemble::DatasetWriter;
-use crate::write::part::{self, VideoEntry, VideoSource};
+use crate::write::entry::{self, VideoEntry, VideoSource};
 use crate::{INFO, Split, file_name, read_json};
 use anyhow::{Result, ensure};
 use orator_base::audio::fingerprint::Fingerprinter;
@@ -56,7 +56,7 @@ impl ImportItem {
     pub fn all(sources: &ImportSources) -> (Vec<Self>, Vec<String>) {
         let mut items: Vec<Self> = sources.takes.iter().cloned().map(Self::Take).collect();
         for dir in &sources.datasets {
-            match part::names(dir) {
+            match entry::names(dir) {
                 Ok(names) => items.extend(names.into_iter().map(|name| Self::Part(dir.clone(), name))),
                 Err(error) => items.push(Self::Unknown(dir.clone(), format!("{error:#}"))),
             }
@@ -118,7 +118,7 @@ impl ImportItem {
             if content.is_empty() { blake3::hash(stem.as_bytes()).to_hex().to_string() } else { content.clone() };
         let source = VideoSource {
             name: name
-                .filter(|name| part::check_name(name).is_ok())
+                .filter(|name| entry::check_name(name).is_ok())
                 .unwrap_or_else(|| format!("{}-{}", slug(&stem), hash.get(..8).unwrap_or_default())),
             file: file_name(&path),
             content,
@@ -139,12 +139,12 @@ impl ImportItem {
         let source = inspected.source.clone();
         let assignment = inspected.split.clone().filter(|_| inspected.is_kept());
         if let (Self::Part(dir, name), Some(_)) = (self, &assignment) {
-            return VideoEntry::read(&VideoEntry::path(dir, name))?.take_over(dir, out);
+            return VideoEntry::read(&VideoEntry::path(dir, name))?.link_into(dir, out);
         }
-        let (whole, mut part) = match assignment {
+        let (whole, mut entry) = match assignment {
             Some(Assignment::In(split, by)) => (Some(split), writer.video(source, split, by)?),
             Some(Assignment::Blocks(blocks)) => (None, writer.video_in_blocks(source, blocks)?),
-            Some(Assignment::Nowhere(_)) | None => {
+            Some(Assignment::Excluded(_)) | None => {
                 writer.video(source, Split::Train, SplitBy::Share)?.finish(None)?;
                 return Ok(());
             }
@@ -154,18 +154,18 @@ impl ImportItem {
                 let TakeOutcome::Kept(kept) = ImportedTake::read(found, &plan.limits)?.outcome else {
                     anyhow::bail!("{} changed while it was imported", found.motion.display());
                 };
-                part.push(&kept.sample, 0.0)?;
+                entry.push(&kept.sample, 0.0)?;
             }
             Self::Loose(video) => {
                 for loose_sample in &video.samples {
                     let (sample, json) = loose_sample.read()?;
                     let split = whole.or(loose_sample.split()).unwrap_or(Split::Train);
-                    part.push_as_it_was(split, &sample, json)?;
+                    entry.push_with_json(split, &sample, json)?;
                 }
             }
             Self::Part(..) | Self::Unknown(..) => {}
         }
-        part.finish(inspected.sound.clone())?;
+        entry.finish(inspected.sound.clone())?;
         Ok(())
     }
 }
@@ -237,18 +237,18 @@ fn inspect_entry(dir: &Path, name: &str, plan: &ImportPlan) -> Result<InspectedI
         dir.display(),
         info.fps
     );
-    part::check_name(name)?;
-    let part = VideoEntry::read(&VideoEntry::path(dir, name))?;
+    entry::check_name(name)?;
+    let entry = VideoEntry::read(&VideoEntry::path(dir, name))?;
     ensure!(
-        part.is_sound(dir, &part::stated_hashes(dir)),
+        entry.is_intact(dir, &entry::stated_hashes(dir)),
         "{name}: its files are not what was written; orator dataset verify says what is wrong"
     );
-    let codes = part.codes(dir)?;
-    let split = match part.split {
-        Some(split) => Some(Assignment::In(split, part.split_by.clone())),
-        None => Some(Assignment::Blocks(part.blocks.clone())).filter(|_| !part.samples.is_empty()),
+    let codes = entry.codes(dir)?;
+    let split = match entry.split {
+        Some(split) => Some(Assignment::In(split, entry.split_by.clone())),
+        None => Some(Assignment::Blocks(entry.blocks.clone())).filter(|_| !entry.samples.is_empty()),
     };
-    let VideoEntry { name, file, content, made_from, ledger, bones, failure, .. } = part;
+    let VideoEntry { name, file, content, made_from, ledger, bones, failure, .. } = entry;
     let source = VideoSource { name: name.to_string(), file, content, made_from, ledger, bones, failure };
     Ok(InspectedItem {
         source,
@@ -259,7 +259,7 @@ fn inspect_entry(dir: &Path, name: &str, plan: &ImportPlan) -> Result<InspectedI
 }
 
 fn inspect_loose(video: &LooseVideo, plan: &ImportPlan) -> Result<InspectedItem> {
-    part::check_name(&video.name)?;
+    entry::check_name(&video.name)?;
     let fps = plan.limits.fps;
     let (mut spans, mut bone_sets, mut fingerprinter) =
         (Vec::<(f64, f64)>::new(), Vec::new(), Fingerprinter::default());

@@ -10,7 +10,7 @@ use crate::leakage::SoundComparison;
 use crate::split::{self, Assignment, RecordedSplit, SplitBy, SplitPlan, SplitRule, Unassigned, blocks};
 use crate::stats::DatasetStats;
 use crate::write::assemble::DatasetWriter;
-use crate::write::part;
+use crate::write::entry;
 use crate::{INFO, shared_sound};
 use anyhow::{Context, Result, ensure};
 use orator_base::input;
@@ -65,7 +65,7 @@ pub fn import(plan: &ImportPlan, out: &Path, progress: &dyn Progress) -> Result<
             one = one.refuse_duplicate_name();
         }
         if let (Some(codes), true) = (&one.codes, one.is_kept()) {
-            one.sound = Some(part::write_sound(out, &one.source.name, codes)?);
+            one.sound = Some(entry::write_sound(out, &one.source.name, codes)?);
             one.codes = None;
         }
         inspected.push(one);
@@ -85,8 +85,8 @@ pub fn import(plan: &ImportPlan, out: &Path, progress: &dyn Progress) -> Result<
     for (&at, assigned) in kept.iter().zip(assign(&inspected, &kept, &compared, &plan.dataset)) {
         match assigned {
             Assignment::In(..) | Assignment::Blocks(_) => inspected[at].split = Some(assigned),
-            Assignment::Nowhere(with) => {
-                part::remove_sound(out, &inspected[at].source.name)?;
+            Assignment::Excluded(with) => {
+                entry::remove_sound(out, &inspected[at].source.name)?;
                 inspected[at].refuse_shared(&with, plan.dataset.duplicate_secs);
             }
         }
@@ -113,7 +113,7 @@ fn compare(inspected: &[InspectedItem], kept: &[usize], out: &Path, duplicate_se
     let audible = kept.iter().filter(|&&at| inspected[at].sound.is_some());
     let mut names: Vec<String> = audible.map(|&at| inspected[at].source.name.clone()).collect();
     names.sort();
-    let shared = shared_sound::find(&names, |n| part::read_sound(out, &names[n]), duplicate_secs)?;
+    let shared = shared_sound::find(&names, |n| entry::read_sound(out, &names[n]), duplicate_secs)?;
     Ok(SoundComparison { duplicate_secs, shared })
 }
 
@@ -125,19 +125,19 @@ fn assign(
     settings: &config::DatasetConfig,
 ) -> Vec<Assignment> {
     let recorded: Vec<Option<RecordedSplit>> = kept.iter().map(|&at| recorded(&inspected[at])).collect();
-    let unassigned = kept.iter().zip(&recorded).map(|(&at, before)| {
+    let unassigned = kept.iter().zip(&recorded).map(|(&at, recorded)| {
         let InspectedItem { source, split, .. } = &inspected[at];
         // Without a content hash, the name breaks ties.
         let content = if source.content.is_empty() { &source.name } else { &source.content };
         let named = match split {
             Some(Assignment::In(split, _)) => Some(*split),
-            Some(Assignment::Blocks(_) | Assignment::Nowhere(_)) | None => None,
+            Some(Assignment::Blocks(_) | Assignment::Excluded(_)) | None => None,
         };
         let (duration_secs, kept) = (source.ledger.duration_secs, spans(&source.ledger));
-        Unassigned { name: &source.name, content, duration_secs, kept, named, before: before.as_ref() }
+        Unassigned { name: &source.name, content, duration_secs, kept, named, recorded: recorded.as_ref() }
     });
     let config::DatasetConfig { validation, test, .. } = *settings;
-    let plan = SplitPlan { unit: SplitUnit::Video, validation, test, guard_secs: 0.0, least_secs: 0.0 };
+    let plan = SplitPlan { unit: SplitUnit::Video, validation, test, guard_secs: 0.0, min_block_secs: 0.0 };
     let assigned = split::assign(&unassigned.collect::<Vec<_>>(), &compared.shared, &plan);
     let stated_or_assigned = |(at, assigned): (&usize, Assignment)| inspected[*at].split.clone().unwrap_or(assigned);
     kept.iter().zip(assigned).map(stated_or_assigned).collect()
@@ -150,7 +150,7 @@ fn recorded(item: &InspectedItem) -> Option<RecordedSplit> {
             let (name, blocks) = (item.source.name.clone(), blocks.clone());
             Some(RecordedSplit { name, split: None, by: SplitBy::Time, blocks })
         }
-        Some(Assignment::In(..) | Assignment::Nowhere(_)) | None => None,
+        Some(Assignment::In(..) | Assignment::Excluded(_)) | None => None,
     }
 }
 
@@ -165,7 +165,7 @@ fn rule(inspected: &[InspectedItem]) -> SplitRule {
     for item in inspected {
         if let Some(Assignment::Blocks(blocks)) = &item.split {
             unit = SplitUnit::Time;
-            let gap = blocks::least_gap(blocks, &spans(&item.source.ledger));
+            let gap = blocks::min_gap(blocks, &spans(&item.source.ledger));
             guard_secs = [guard_secs, gap].into_iter().flatten().min_by(f64::total_cmp);
         }
     }
