@@ -188,7 +188,7 @@ fn of_project(args: &Args, locks: &mut Vec<FolderLock>) -> Result<ForgetTask> {
 /// What keeps the next run from bringing the videos back; nothing, where it would not.
 fn how_to_keep_away(config: &Config, speaker: &str, gone: &[&KnownVideo], whole: bool) -> Option<String> {
     let named =
-        videos::of(config).into_iter().filter(|videos| videos.speaker == speaker).flat_map(|videos| videos.units);
+        videos::all(config).into_iter().filter(|videos| videos.speaker == speaker).flat_map(|videos| videos.units);
     let back: Vec<PathBuf> =
         named.map(|unit| unit.source).filter(|source| gone.iter().any(|k| k.source.as_ref() == Some(source))).collect();
     if back.is_empty() {

@@ -61,7 +61,7 @@ pub fn project_videos(config: &Config) -> Result<Vec<KnownVideo>> {
     let mut all = config.clone();
     all.settings.speaker.iter_mut().for_each(|speaker| speaker.exclude.clear());
     let mut known: Vec<KnownVideo> = Vec::new();
-    for unit in videos::of(&all).into_iter().flat_map(|videos| videos.units) {
+    for unit in videos::all(&all).into_iter().flat_map(|videos| videos.units) {
         let content = content(work, &unit.speaker, &unit.video);
         let file = file_name(&unit.source);
         let (speaker, work, source) = (unit.speaker, Some(unit.video), Some(unit.source));

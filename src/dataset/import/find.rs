@@ -2,7 +2,7 @@
 //! with the sound and transcript of the same name in its own folder or in a sibling folder (`bvh/`, `wav/`, `tsv/`).
 
 use crate::INFO;
-use crate::config::patterns::OF_SOUNDS;
+use crate::config::patterns::SOUND_EXTENSIONS;
 use crate::write::entry;
 use anyhow::{Context, Result, ensure};
 use orator_base::input;
@@ -121,7 +121,7 @@ fn with_companions(kind: MotionKind, motion: PathBuf) -> TakeFiles {
     let mut stems = vec![stem.as_str()];
     // The sound of gt_interval_3821.txt is 3821.wav.
     stems.extend(["gt_interval_", "prediction_interval_"].iter().filter_map(|prefix| stem.strip_prefix(prefix)));
-    let sound = find_companion(&motion, &stems, &OF_SOUNDS, SOUND_FOLDERS);
+    let sound = find_companion(&motion, &stems, &SOUND_EXTENSIONS, SOUND_FOLDERS);
     let transcript = find_companion(&motion, &stems, &transcript::ENDINGS, TRANSCRIPT_FOLDERS);
     TakeFiles { kind, motion, sound, transcript }
 }
