@@ -1,4 +1,5 @@
-//! Slider for each threshold, and the table behind it; `page.js` moves what is built here.
+//! Report section with a slider for each threshold, and the table of precomputed results; `page.js` makes them
+//! interactive.
 
 use super::thresholds::{THRESHOLDS, ThresholdGrid};
 use super::video::VideoSummary;
@@ -9,7 +10,7 @@ use crate::html::{Node, node};
 use orator_dataset::config::SegmentConfig;
 use serde_json::{Value, json};
 
-/// Seconds kept of all videos, by threshold and value.
+/// Accepted seconds of all videos, by threshold and value.
 fn sums(kept: &[Option<KeptByThreshold>], rules: &SegmentConfig) -> KeptByThreshold {
     let zeros =
         || THRESHOLDS.iter().map(|threshold| vec![0.0; threshold.grid(rules).0.len()]).collect::<KeptByThreshold>();
@@ -21,7 +22,8 @@ fn sums(kept: &[Option<KeptByThreshold>], rules: &SegmentConfig) -> KeptByThresh
     })
 }
 
-/// Data of the script: thresholds with their values and sums, videos with their seconds (in tenths, by threshold).
+/// Data for the script: thresholds with their values and total seconds, and videos with their accepted tenths of a
+/// second by threshold and value.
 pub fn data(kept: &[Option<KeptByThreshold>], videos: &[VideoSummary], rules: &SegmentConfig) -> Value {
     let milli = |secs: f64| (secs * 1000.0).round() / 1000.0;
     let row = |(threshold, sums): (&ThresholdGrid, &Vec<f64>)| {
@@ -43,7 +45,7 @@ pub fn data(kept: &[Option<KeptByThreshold>], videos: &[VideoSummary], rules: &S
     json!({ "thresholds": thresholds, "videos": judged.collect::<Vec<_>>() })
 }
 
-/// Section of sliders.
+/// Section with the sliders.
 pub fn sliders(kept: &[Option<KeptByThreshold>], rules: &SegmentConfig) -> Vec<Node> {
     if kept.iter().all(Option::is_none) {
         return vec![node("p").class("empty").text("No video has been judged yet: orator run.")];

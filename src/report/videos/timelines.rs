@@ -1,4 +1,4 @@
-//! Timeline of each video: kept seconds, and the reasons of the others.
+//! Report section with a timeline of each video: accepted seconds, and the reasons for the others.
 
 use super::reasons;
 use super::reasons::WAITING;
@@ -11,16 +11,17 @@ use orator_base::stage::counted;
 use orator_base::stage::ledger::Kept;
 use std::collections::BTreeSet;
 
-/// Largest number of parts of all timelines together, which bounds the page, and smallest number of each.
-const MOST: usize = 40_000;
-const LEAST: usize = 50;
-/// Smallest width of a timeline as a share of the longest one's.
-const NARROWEST: f64 = 0.05;
+/// Maximum number of intervals of all timelines together, which bounds the size of the page.
+const MAX_SPANS: usize = 40_000;
+/// Number of intervals that each timeline may have in any case.
+const MIN_SPANS: usize = 50;
+/// Minimum width of a timeline relative to the longest.
+const MIN_WIDTH: f64 = 0.05;
 
-/// Timelines of all videos under their legend.
+/// Section with the timelines of all videos and their legend.
 pub fn lines(videos: &[VideoSummary]) -> Vec<Node> {
     let longest = videos.iter().map(|video| video.ledger.duration_secs).fold(0.0, f64::max).max(1e-9);
-    let most = (MOST / videos.len().max(1)).max(LEAST);
+    let most = (MAX_SPANS / videos.len().max(1)).max(MIN_SPANS);
     let wide = node("label")
         .class("wide small")
         .child(node("input").attr("type", "checkbox").id("wide"))
@@ -46,10 +47,10 @@ pub fn lines(videos: &[VideoSummary]) -> Vec<Node> {
             length(ledger.duration_secs),
             counted(ledger.kept.len(), "interval")
         );
-        let share = (ledger.duration_secs / longest).max(NARROWEST);
+        let share = (ledger.duration_secs / longest).max(MIN_WIDTH);
         let title = node("h3").child(node("span").text(&video.file)).child(node("small").text(about));
         let line = if ledger.duration_secs > 0.0 {
-            timeline(&format!("Timeline of {}", video.file), ledger.duration_secs, &stretches(video), most)
+            timeline(&format!("Timeline of {}", video.file), ledger.duration_secs, &spans(video), most)
         } else {
             node("p").class("empty").text("Nothing is known of its seconds.")
         };
@@ -60,8 +61,8 @@ pub fn lines(videos: &[VideoSummary]) -> Vec<Node> {
     shown
 }
 
-/// Parts of a ledger in order.
-fn stretches(video: &VideoSummary) -> Vec<TimelineSpan> {
+/// Intervals of a ledger, sorted by start.
+fn spans(video: &VideoSummary) -> Vec<TimelineSpan> {
     let ledger = &video.ledger;
     let stretch = |start_secs: f64, end_secs: f64, class: String, word: &str, description: String| TimelineSpan {
         start_secs,

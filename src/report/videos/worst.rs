@@ -1,5 +1,5 @@
-//! Frames that best show what a rule refuses: of each refused span the frame farthest from the threshold, of each rule
-//! the worst spans. Ties follow the order of the videos, so the choice is deterministic.
+//! Choice of the frames that best illustrate a rule: in each refused span the frame furthest from the threshold, and
+//! for each rule the worst spans. Ties follow the order of the videos, so the choice is deterministic.
 
 use super::reasons;
 use crate::html::numbers::number;
@@ -11,29 +11,29 @@ use orator_pipeline::segment::Measures;
 use orator_pipeline::segment::table::{Bound, frame_rules, piece_rules};
 use std::collections::BTreeMap;
 
-/// Moment with a picture.
+/// Moment that is shown as a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Moment {
     /// Index of the video in the report.
     pub video: usize,
-    /// Frame, preceded by the one it is compared with where a rule compares two.
+    /// Frame, preceded by the previous frame if the rule compares two.
     pub frames: Vec<usize>,
     pub secs: f64,
-    /// Excess over the threshold.
+    /// Distance from the threshold.
     beyond: f64,
-    /// Sentence of the refusal.
+    /// Message of the refusal.
     pub description: String,
-    /// Value in this frame; empty where the rule is not about frames.
+    /// Text with the value in this frame; empty for rules that are not about frames.
     pub here: String,
 }
 
-/// Index in the order, reason and unit: `turned` and `hands` are two rules each.
+/// Rank of the reason, reason and unit; the unit distinguishes the two rules each of `turned` and `hands`.
 type Rule = (usize, String, String);
 
-/// Worst moments of every rule.
+/// Collection of the worst moments of every rule.
 pub struct Worst {
     pub rules: BTreeMap<Rule, Vec<Moment>>,
-    /// Largest number of moments of a rule.
+    /// Maximum number of moments per rule.
     most: usize,
 }
 
@@ -42,7 +42,7 @@ impl Worst {
         Self { rules: BTreeMap::new(), most }
     }
 
-    /// Adds a video's refused spans; `bone_change` may be empty.
+    /// Adds the refused spans of a video; `bone_change` is empty if the video is not lifted.
     pub fn add(
         &mut self,
         video: usize,
@@ -62,7 +62,7 @@ impl Worst {
         self.rules.retain(|_, moments| !moments.is_empty());
     }
 
-    /// Frames needed of a video, ascending.
+    /// Frames of a video that pictures need, in ascending order.
     pub fn frames_of(&self, video: usize) -> Vec<usize> {
         let moments = self.rules.values().flatten().filter(|moment| moment.video == video);
         let mut frames: Vec<usize> = moments.flat_map(|moment| moment.frames.iter().copied()).collect();
@@ -90,7 +90,7 @@ fn moment(
             let score = if refusal == Refusal::Cut { &measures.shot_score } else { &measures.identity };
             let ends = [start, end.min(n_frames - 1)].into_iter().filter(|t| *t > 0);
             let t = ends.max_by(|a, b| score[*a].total_cmp(&score[*b]).then(b.cmp(a)))?;
-            (t, mean, said(refusal, f64::from(score[t])))
+            (t, mean, value_text(refusal, f64::from(score[t])))
         }
         Some(Refusal::Bones) if bone_change.len() == n_frames => {
             let (t, value) = extreme(bone_change, start..end, false);
@@ -98,7 +98,7 @@ fn moment(
         }
         Some(refusal) => match farthest(refusal, measures, rules, start..end) {
             Some((t, value, bound, is_mean)) => {
-                (t, if is_mean { (value - bound.threshold()).abs() } else { mean }, said(refusal, value))
+                (t, if is_mean { (value - bound.threshold()).abs() } else { mean }, value_text(refusal, value))
             }
             None => (start.midpoint(end - 1), mean, String::new()),
         },
@@ -110,7 +110,8 @@ fn moment(
     Some(Moment { video, frames, secs: judged.fps.secs(t), beyond, description: stretch.message.clone(), here })
 }
 
-/// Frame that breaks the refusal's rules most: index, value, bound, and whether the ledger means that value.
+/// Frame that violates the rules of the refusal most: index, value, bound, and whether the ledger measures that value
+/// rather than a duration or share.
 fn farthest(
     refusal: Refusal,
     measures: &Measures,
@@ -119,7 +120,8 @@ fn farthest(
 ) -> Option<(usize, f64, Bound, bool)> {
     let on_frames = frame_rules(rules).into_iter().filter(|rule| rule.refusal == refusal);
     let on_frames = on_frames.map(|rule| (rule.values, rule.bound, !rule.measures_secs));
-    // For a minimum share the frames that do not count are the bad ones; for a maximum share those that do.
+    // If the rule requires a minimum share, frames that do not count are bad; for a maximum share, those that count
+    // are.
     let on_pieces = piece_rules(rules).into_iter().filter(|rule| rule.refusal == refusal).map(|rule| {
         let bad = match rule.share {
             Bound::AtLeast(_) => rule.counted,
@@ -137,7 +139,8 @@ fn farthest(
     known.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, found)| found)
 }
 
-/// Smallest (or largest) known value of the frames; of equal ones that nearest the middle.
+/// Frame with the smallest (or largest) known value, ties going to the one nearest the middle, and the value; NaN if no
+/// value is known.
 fn extreme(values: &[f32], frames: std::ops::Range<usize>, lowest: bool) -> (usize, f64) {
     let middle = frames.start.midpoint(frames.end.saturating_sub(1));
     let known = frames.filter(|t| !values[*t].is_nan());
@@ -146,8 +149,8 @@ fn extreme(values: &[f32], frames: std::ops::Range<usize>, lowest: bool) -> (usi
     t.map_or((middle, f64::NAN), |t| (t, f64::from(values[t])))
 }
 
-/// Value of a frame, in words.
-fn said(refusal: Refusal, value: f64) -> String {
+/// Text with the value in a frame.
+fn value_text(refusal: Refusal, value: f64) -> String {
     let value = number(value);
     match refusal {
         Refusal::Quiet => format!("{value} dB here"),
@@ -174,7 +177,7 @@ mod tests {
     use orator_base::types::time::FrameRate;
 
     #[test]
-    fn the_worst_frame_of_the_worst_stretches_is_taken() {
+    fn the_worst_frame_of_the_worst_spans_is_chosen() {
         let of = |value: f32| vec![value; 100];
         let mut measures = Measures { person: of(0.9), left_hand: of(0.9), right_hand: of(0.9), ..Measures::default() };
         measures.jump = of(0.1);
