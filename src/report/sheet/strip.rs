@@ -1,4 +1,5 @@
-//! Chart under a contact sheet: height and depth of both wrists over time, filled frames paler than seen ones.
+//! Chart below a contact sheet: height and depth of both wrists over time; filled-in frames are paler than visible
+//! ones.
 
 use anyhow::Result;
 use orator_avatar::animate::draw::figure::{INK, LEFT, PAPER, RIGHT, mix};
@@ -10,12 +11,12 @@ use std::ops::Range;
 
 /// Height of the chart, px.
 pub const STRIP_PX: usize = 260;
-/// Width of the labels at the left.
+/// Width of the labels at the left, px.
 const MARGIN_PX: f32 = 60.0;
-/// Axis of a lane, its range in metres from top to bottom, and its label.
+/// Lanes of the chart: axis, range from top to bottom in metres, and label.
 const LANES: [(usize, [f32; 2], &str); 2] = [(1, [-0.3, 0.7], "height"), (2, [-0.7, 0.1], "depth")];
 
-/// Draws the wrists over the frames `frames` from row `top` on, with a mark at each of `marks`.
+/// Draws the wrists over `frames` in the pixel rows from `top` on, with a vertical line at each frame in `marks`.
 pub fn draw_strip(image: &mut Image, top: usize, motion: &Motion, frames: Range<usize>, marks: &[usize]) -> Result<()> {
     let lane_px = (STRIP_PX as f32 - 30.0) / LANES.len() as f32;
     let (left, right) = (MARGIN_PX, image.width as f32 - 10.0);
