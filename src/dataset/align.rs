@@ -9,7 +9,7 @@ use orator_media::ffmpeg::sound_stream::SoundStream;
 use std::path::Path;
 
 /// Minimum share of words that must be aligned; with fewer, the transcript probably belongs to another sound.
-const MIN_FITTING: f64 = 0.25;
+const MIN_ALIGNED: f64 = 0.25;
 
 /// Words with times, and the words that could not be aligned.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,7 +26,7 @@ pub struct Alignment {
 /// within them. `on_progress` is called with the seconds of each processed piece of sound.
 ///
 /// # Errors
-/// A transcript without words, a file without sound, fewer aligned words than `MIN_FITTING`.
+/// A transcript without words, a file without sound, fewer aligned words than `MIN_ALIGNED`.
 pub fn align(
     aligner: Aligner,
     sound: &Path,
@@ -58,11 +58,11 @@ pub fn align(
         }
     })?;
     let unfit: Vec<usize> = (0..texts.len()).filter(|&n| found[n].is_none() && has_letters(texts[n])).collect();
-    let n_fitting = n_words - unfit.len();
+    let n_aligned = n_words - unfit.len();
     let sound_secs = n_samples as f64 / f64::from(SAMPLE_RATE);
     ensure!(
-        n_fitting as f64 >= MIN_FITTING * n_words as f64,
-        "only {n_fitting} of {n_words} words fit the {sound_secs:.1} s of sound: it is silent, or the text is that of \
+        n_aligned as f64 >= MIN_ALIGNED * n_words as f64,
+        "only {n_aligned} of {n_words} words fit the {sound_secs:.1} s of sound: it is silent, or the text is that of \
          another sound, or not in English"
     );
     Ok(Alignment { words: with_times(&texts, &found, sound_secs), unfit, sound_secs })

@@ -37,8 +37,8 @@ impl VideoBones {
 /// A number of lengths other than 48, or a length outside [0, 10) metres.
 pub(crate) fn check_lengths(name: &str, lengths: &[f64]) -> Result<()> {
     ensure!(lengths.len() == N_BONES, "`{name}` has {} lengths, expected {N_BONES}", lengths.len());
-    let wrong = lengths.iter().find(|length| !(0.0..10.0).contains(*length));
-    ensure!(wrong.is_none(), "`{name}` has the length {:?}, expected 0 to 10 metres", wrong.unwrap_or(&0.0));
+    let invalid = lengths.iter().find(|length| !(0.0..10.0).contains(*length));
+    ensure!(invalid.is_none(), "`{name}` has the length {:?}, expected 0 to 10 metres", invalid.unwrap_or(&0.0));
     Ok(())
 }
 
@@ -62,10 +62,10 @@ mod tests {
     fn impossible_lengths_are_rejected_and_the_field_is_named() {
         let check = |lengths: &[f64]| check_lengths("lengths_metres", lengths).map_err(|error| error.to_string());
         assert_eq!(check(&[0.0; N_BONES]), Ok(()));
-        for wrong in [-0.1, f64::NAN, f64::INFINITY, 10.0] {
+        for invalid in [-0.1, f64::NAN, f64::INFINITY, 10.0] {
             let mut lengths = [0.2; N_BONES];
-            lengths[7] = wrong;
-            assert!(check(&lengths).unwrap_err().starts_with(&format!("`lengths_metres` has the length {wrong:?}")));
+            lengths[7] = invalid;
+            assert!(check(&lengths).unwrap_err().starts_with(&format!("`lengths_metres` has the length {invalid:?}")));
         }
         assert!(check(&[0.2]).unwrap_err().contains("has 1 lengths"));
     }

@@ -129,16 +129,16 @@ mod tests {
     #[test]
     fn merged_moments_equal_those_of_all_frames() {
         let xs = [0.5, -1.0, 7.0, 7.5, 8.0, -30.0, 2.0];
-        let mut whole = JointMoments::default();
-        whole.add_motion(&motion(&xs, &[]));
+        let mut all_frames = JointMoments::default();
+        all_frames.add_motion(&motion(&xs, &[]));
         let mut merged = JointMoments::default();
         for part in [&xs[..2], &[], &xs[2..3], &xs[3..]] {
             let mut moments = JointMoments::default();
             moments.add_motion(&motion(part, &[]));
             merged.merge(&moments);
         }
-        assert_eq!((&merged.n_seen, &merged.min, &merged.max), (&whole.n_seen, &whole.min, &whole.max));
-        assert!((merged.mean[1][0] - whole.mean[1][0]).abs() < 1e-12);
-        assert!((merged.std()[1][0] - whole.std()[1][0]).abs() < 1e-12);
+        assert_eq!((&merged.n_seen, &merged.min, &merged.max), (&all_frames.n_seen, &all_frames.min, &all_frames.max));
+        assert!((merged.mean[1][0] - all_frames.mean[1][0]).abs() < 1e-12);
+        assert!((merged.std()[1][0] - all_frames.std()[1][0]).abs() < 1e-12);
     }
 }

@@ -190,11 +190,11 @@ impl Dataset {
 
     /// Reads a range of audio samples of a sample, without checking the hash.
     pub fn sound(&self, sample: &SampleRef, range: Range<usize>) -> Result<Sound> {
-        let place = || format!("reading {}.wav in {}", sample.key, self.dir.join(&sample.shard).display());
+        let location = || format!("reading {}.wav in {}", sample.key, self.dir.join(&sample.shard).display());
         let (rate, at) = (self.info.sound_rate, sample.wav.offset + wav::HEADER_BYTES as u64);
         let head = ByteRange { offset: sample.wav.offset, size: sample.wav.size.min(wav::HEADER_BYTES as u64) };
-        let n_samples = wav::n_samples(&self.bytes(sample, head)?, sample.wav.size, rate).with_context(place)?;
-        ensure!(range.end <= n_samples, "{}: it holds {n_samples} samples, not {}", place(), range.end);
+        let n_samples = wav::n_samples(&self.bytes(sample, head)?, sample.wav.size, rate).with_context(location)?;
+        ensure!(range.end <= n_samples, "{}: it holds {n_samples} samples, not {}", location(), range.end);
         let span = ByteRange { offset: at + 2 * range.start as u64, size: 2 * range.len() as u64 };
         Ok(Sound { rate, samples: wav::samples(&self.bytes(sample, span)?) })
     }
@@ -208,13 +208,13 @@ impl Dataset {
         row: &[usize],
         frames: Range<usize>,
     ) -> Result<Vec<u8>> {
-        let place = || format!("reading an array of {} in {}", sample.key, self.dir.join(&sample.shard).display());
+        let location = || format!("reading an array of {} in {}", sample.key, self.dir.join(&sample.shard).display());
         let head = ByteRange { offset: span.offset, size: span.size.min(npy::HEADER_BYTES as u64) };
-        let layout = Layout::parse(&self.bytes(sample, head)?, span.size, element, row).with_context(place)?;
+        let layout = Layout::parse(&self.bytes(sample, head)?, span.size, element, row).with_context(location)?;
         ensure!(
             frames.start <= frames.end && frames.end <= layout.n_rows,
             "{}: it has {} frames, {}..{} were asked for",
-            place(),
+            location(),
             layout.n_rows,
             frames.start,
             frames.end
@@ -224,12 +224,12 @@ impl Dataset {
     }
 
     fn bytes(&self, sample: &SampleRef, span: ByteRange) -> Result<Vec<u8>> {
-        let place = || format!("reading {} in {}", sample.key, self.dir.join(&sample.shard).display());
-        let file = self.shards.get(&sample.shard).with_context(place)?;
+        let location = || format!("reading {} in {}", sample.key, self.dir.join(&sample.shard).display());
+        let file = self.shards.get(&sample.shard).with_context(location)?;
         // The size of a sample is bounded by its shard (checked by `open`), which bounds the allocation.
-        ensure!(span.size <= sample.size, "{}: {} bytes of a smaller sample were asked for", place(), span.size);
+        ensure!(span.size <= sample.size, "{}: {} bytes of a smaller sample were asked for", location(), span.size);
         let mut bytes = vec![0; span.size as usize];
-        file.read_exact_at(&mut bytes, span.offset).with_context(place)?;
+        file.read_exact_at(&mut bytes, span.offset).with_context(location)?;
         Ok(bytes)
     }
 }

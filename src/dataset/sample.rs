@@ -92,10 +92,10 @@ impl Sample {
     }
 
     fn words_member(&self) -> Result<Option<Vec<u8>>> {
-        let Some(said) = &self.words else { return Ok(None) };
+        let Some(words) = &self.words else { return Ok(None) };
         let secs = self.motion.fps.secs(self.n_frames());
-        words::check(said, secs).with_context(|| self.key.clone())?;
-        let mut json = serde_json::to_vec(said).context("writing a sample's words as JSON")?;
+        words::check(words, secs).with_context(|| self.key.clone())?;
+        let mut json = serde_json::to_vec(words).context("writing a sample's words as JSON")?;
         json.push(b'\n');
         Ok(Some(json))
     }

@@ -65,8 +65,8 @@ pub fn find(names: &[String], codes: impl Fn(usize) -> Result<Vec<u32>>, min_sec
     let mut landmarks: Vec<Landmark> = Vec::new();
     for video in 0..names.len() {
         let chosen = |code: u32| code != 0 && code.wrapping_mul(0x9E37_79B1) >> 30 == 0;
-        let places = codes(video)?.into_iter().zip(0u32..).filter(|(code, _)| chosen(*code));
-        landmarks.extend(places.map(|(code, place)| (code, video as u32, place)));
+        let positions = codes(video)?.into_iter().zip(0u32..).filter(|(code, _)| chosen(*code));
+        landmarks.extend(positions.map(|(code, position)| (code, video as u32, position)));
     }
     landmarks.sort_unstable();
     let mut found = Vec::new();
@@ -78,11 +78,11 @@ pub fn find(names: &[String], codes: impl Fn(usize) -> Result<Vec<u32>>, min_sec
             _ => codes(a)?,
         };
         let second = codes(b)?;
-        let stretches = offsets.into_iter().filter_map(|offset| longest_near(&first, &second, offset));
-        if let Some((start, offset, n)) = stretches.max_by_key(|(_, _, n)| *n) {
+        let matches = offsets.into_iter().filter_map(|offset| longest_near(&first, &second, offset));
+        if let Some((start, offset, n)) = matches.max_by_key(|(_, _, n)| *n) {
             let secs = n as f64 / PER_SEC;
             if secs >= min_secs {
-                let at = |place: i64| place as f64 / PER_SEC;
+                let at = |position: i64| position as f64 / PER_SEC;
                 let (a_secs, b_secs) = (at(start), at(start + offset));
                 found.push(SharedSound { a: names[a].clone(), b: names[b].clone(), a_secs, b_secs, secs });
             }
@@ -96,9 +96,9 @@ pub fn find(names: &[String], codes: impl Fn(usize) -> Result<Vec<u32>>, min_sec
 /// least `MIN_VOTES`.
 fn votes(landmarks: &[Landmark]) -> Vec<((u32, u32), Vec<i64>)> {
     let mut votes: Vec<((u32, u32), i64)> = Vec::new();
-    for same in landmarks.chunk_by(|x, y| x.0 == y.0).filter(|same| same.len() <= MAX_OCCURRENCES) {
-        for (n, x) in same.iter().enumerate() {
-            let others = same[n + 1..].iter().filter(|y| y.1 != x.1);
+    for group in landmarks.chunk_by(|x, y| x.0 == y.0).filter(|group| group.len() <= MAX_OCCURRENCES) {
+        for (n, x) in group.iter().enumerate() {
+            let others = group[n + 1..].iter().filter(|y| y.1 != x.1);
             votes.extend(others.map(|y| ((x.1, y.1), i64::from(y.2) - i64::from(x.2))));
         }
     }
@@ -124,38 +124,39 @@ fn longest_near(a: &[u32], b: &[u32], offset: i64) -> Option<(i64, i64, usize)> 
     (offset - 1..=offset + 2).filter_map(|offset| longest_at(a, b, offset)).max_by_key(|(_, _, n)| *n)
 }
 
+/// Longest shared sound at exactly this offset, as `longest_near`.
 fn longest_at(a: &[u32], b: &[u32], offset: i64) -> Option<(i64, i64, usize)> {
     let window = (WINDOW_SECS * PER_SEC) as usize;
     let (a_start, b_start) = ((-offset).max(0) as usize, offset.max(0) as usize);
     let pairs: Vec<(u32, u32)> =
         a.iter().skip(a_start).zip(b.iter().skip(b_start)).map(|(x, y)| bit_errors(*x, *y)).collect();
-    let (mut bits, mut wrong, mut run, mut best) = (0, 0, 0, None);
+    let (mut bits, mut n_errors, mut run, mut best) = (0, 0, 0, None);
     for end in 0..pairs.len() {
         bits += pairs[end].0;
-        wrong += pairs[end].1;
+        n_errors += pairs[end].1;
         if end >= window {
             bits -= pairs[end - window].0;
-            wrong -= pairs[end - window].1;
+            n_errors -= pairs[end - window].1;
         }
-        let same = end + 1 >= window
+        let is_match = end + 1 >= window
             && bits as usize >= 16 * window
-            && f64::from(wrong) <= MAX_BIT_ERROR_RATE * f64::from(bits);
-        run = if same { run + 1 } else { 0 };
+            && f64::from(n_errors) <= MAX_BIT_ERROR_RATE * f64::from(bits);
+        run = if is_match { run + 1 } else { 0 };
         let n = run + window - 1;
-        if same && best.is_none_or(|(_, _, longest)| n > longest) {
+        if is_match && best.is_none_or(|(_, _, longest)| n > longest) {
             best = Some(((a_start + end + 1 - n) as i64, offset, n));
         }
     }
     best.map(|(start, offset, n)| {
         // A window may extend past the ends of shared sound, so shorter windows locate the ends.
-        let place = (start as usize).saturating_sub(a_start);
+        let position = (start as usize).saturating_sub(a_start);
         let differs = |piece: &[(u32, u32)]| {
-            let (bits, wrong) = piece.iter().fold((0, 0), |sum, pair| (sum.0 + pair.0, sum.1 + pair.1));
-            (bits as usize) < 16 * EDGE_CODES || f64::from(wrong) > MAX_BIT_ERROR_RATE * f64::from(bits)
+            let (bits, n_errors) = piece.iter().fold((0, 0), |sum, pair| (sum.0 + pair.0, sum.1 + pair.1));
+            (bits as usize) < 16 * EDGE_CODES || f64::from(n_errors) > MAX_BIT_ERROR_RATE * f64::from(bits)
         };
-        let same = &pairs[place..place + n];
-        let skip = same.windows(EDGE_CODES).take_while(|piece| differs(piece)).count();
-        let cut = same[skip.min(n)..].windows(EDGE_CODES).rev().take_while(|piece| differs(piece)).count();
+        let matched = &pairs[position..position + n];
+        let skip = matched.windows(EDGE_CODES).take_while(|piece| differs(piece)).count();
+        let cut = matched[skip.min(n)..].windows(EDGE_CODES).rev().take_while(|piece| differs(piece)).count();
         (start + skip as i64, offset, n.saturating_sub(skip + cut))
     })
 }

@@ -111,9 +111,13 @@ impl DatasetStats {
 
 /// Checks the values of the field `name`, metres or radians; those of a field that ends in `std` must not be negative.
 fn check_numbers<'a>(name: &str, mut numbers: impl Iterator<Item = &'a f64>) -> Result<()> {
-    let least = if name.ends_with("std") { 0.0 } else { -MAX_MAGNITUDE };
-    let wrong = numbers.find(|number| !(least..=MAX_MAGNITUDE).contains(*number));
-    ensure!(wrong.is_none(), "`{name}` holds {:?}, expected {least} to {MAX_MAGNITUDE}", wrong.unwrap_or(&0.0));
+    let lower_bound = if name.ends_with("std") { 0.0 } else { -MAX_MAGNITUDE };
+    let invalid = numbers.find(|number| !(lower_bound..=MAX_MAGNITUDE).contains(*number));
+    ensure!(
+        invalid.is_none(),
+        "`{name}` holds {:?}, expected {lower_bound} to {MAX_MAGNITUDE}",
+        invalid.unwrap_or(&0.0)
+    );
     Ok(())
 }
 
@@ -131,8 +135,8 @@ pub struct StatsCollector {
 
 impl Default for StatsCollector {
     fn default() -> Self {
-        let nothing = || Split::ALL.map(|split| (split.name().to_owned(), 0)).into();
-        let (strided, apart) = (nothing(), nothing());
+        let zeros = || Split::ALL.map(|split| (split.name().to_owned(), 0)).into();
+        let (strided, apart) = (zeros(), zeros());
         let windows = WindowCount { n_frames: WINDOW_FRAMES, stride: STRIDE_FRAMES, strided, apart };
         Self { moments: JointMoments::default(), posture: None, windows, footage: FootageCount::default() }
     }

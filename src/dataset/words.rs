@@ -37,9 +37,9 @@ impl VideoWords {
         let words = Transcript::read(path).and_then(|transcript| Self::new(transcript, path, sound_secs, shift_secs));
         // Local folder names must not end up in the dataset.
         let folder = path.parent().map(|folder| format!("{}/", folder.display())).filter(|folder| folder != "/");
-        let said =
-            |error: anyhow::Error| folder.iter().fold(format!("{error:#}"), |said, folder| said.replace(folder, ""));
-        words.unwrap_or_else(|error| none(said(error)))
+        let without_folder =
+            |error: anyhow::Error| folder.iter().fold(format!("{error:#}"), |text, folder| text.replace(folder, ""));
+        words.unwrap_or_else(|error| none(without_folder(error)))
     }
 
     /// Words of a transcript that has been read from `path`; the other arguments are those of `read`.
@@ -137,26 +137,28 @@ mod tests {
         let words = transcript("0.1 0.3 a\n0.9 1.3 b\n1.5 1.6 c\n2.9 3.0 d\n9 10 e\n");
         let path = Path::new("talk.tsv");
         assert!(VideoWords::new(words.clone(), path, 0.5, 0.0).unwrap_err().to_string().contains("4 of 5 words"));
-        let said = VideoWords::new(words.clone(), path, 10.0, 0.0).unwrap();
+        let video_words = VideoWords::new(words.clone(), path, 10.0, 0.0).unwrap();
         let samples = [(0.0, 1.0), (1.0, 2.0)];
         let at = |n: usize| {
-            let words = said.within(samples[n].0, samples[n].1);
+            let words = video_words.within(samples[n].0, samples[n].1);
             words.iter().map(|w| format!("{} {} {}", w.word, w.start_secs, w.end_secs)).collect::<Vec<_>>()
         };
         assert_eq!((at(0), at(1)), (vec!["a 0.1 0.3".to_owned()], vec!["b 0 0.3".to_owned(), "c 0.5 0.6".to_owned()]));
-        let WordCount { n_words, n_kept, n_refused, n_outside } = said.account(samples).count;
+        let WordCount { n_words, n_kept, n_refused, n_outside } = video_words.account(samples).count;
         assert_eq!((n_words, n_kept, n_refused, n_outside), (5, 3, 2, 0));
         let shifted = VideoWords::new(words, path, 10.0, 0.5).unwrap();
         assert_eq!(shifted.within(1.0, 2.0).len(), 1);
-        assert!(check(&said.within(1.0, 2.0), 1.0).is_ok() && check(&said.within(1.0, 2.0), 0.5).is_err());
+        assert!(
+            check(&video_words.within(1.0, 2.0), 1.0).is_ok() && check(&video_words.within(1.0, 2.0), 0.5).is_err()
+        );
     }
 
     #[test]
     fn a_few_words_after_the_end_are_dropped_with_a_note() {
         let rows: String = (0..20).map(|n| format!("{n} {} w\n", n + 1)).collect();
-        let said = VideoWords::new(transcript(&rows), Path::new("a.tsv"), 19.0, 0.0).unwrap().account([(0.0, 19.0)]);
-        assert_eq!((said.count.n_kept, said.count.n_outside), (19, 1));
-        assert!(said.notes[0].contains("`w` at 19.00 s"));
+        let account = VideoWords::new(transcript(&rows), Path::new("a.tsv"), 19.0, 0.0).unwrap().account([(0.0, 19.0)]);
+        assert_eq!((account.count.n_kept, account.count.n_outside), (19, 1));
+        assert!(account.notes[0].contains("`w` at 19.00 s"));
         let missing = VideoWords::read(Some(Path::new("/none/a.tsv")), 1.0, 0.0).account([]);
         assert!(missing.notes[0].starts_with("cannot read a.tsv"), "{:?}", missing.notes);
         assert!(VideoWords::read(None, 1.0, 0.0).account([]).notes[0].contains("no transcript"));

@@ -21,7 +21,7 @@ pub fn section(settings: &Settings, videos: &[Videos]) -> Vec<Node> {
     videos
         .iter()
         .flat_map(|of| {
-            let is_stated = settings.speaker.iter().any(|said| said.name == of.speaker && said.same_person);
+            let is_stated = settings.speaker.iter().any(|speaker| speaker.name == of.speaker && speaker.same_person);
             let seen: Vec<PersonSeen> = of.units.iter().map(|unit| PersonSeen::read(work, unit)).collect();
             let groups = if is_stated { vec![seen.iter().collect()] } else { people::groups(&seen) };
             of_speaker(work, &of.speaker, &groups, is_stated)

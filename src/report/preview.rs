@@ -33,14 +33,14 @@ impl MotionPreview {
         let longest = intervals.iter().max_by_key(|interval| (interval.n_frames(), usize::MAX - interval.start))?;
         let fps = motion.fps.per_sec();
         let step = (fps / MAX_FPS).ceil().max(1.0) as usize;
-        let most = (MAX_SECS * fps) as usize;
-        let end = longest.end.min(longest.start + most).min(motion.n_frames());
+        let max_frames = (MAX_SECS * fps) as usize;
+        let end = longest.end.min(longest.start + max_frames).min(motion.n_frames());
         let mut joints = Vec::new();
         for frame in (longest.start..end).step_by(step) {
-            for (joint, seen) in
+            for (joint, is_visible) in
                 motion.joints.index_axis(ndarray::Axis(0), frame).outer_iter().zip(motion.mask.row(frame))
             {
-                let [x, y] = if *seen { [joint[0], joint[1]] } else { [f32::NAN; 2] }.map(to_millimetres);
+                let [x, y] = if *is_visible { [joint[0], joint[1]] } else { [f32::NAN; 2] }.map(to_millimetres);
                 joints.extend([x, y].map(i16::to_le_bytes).concat());
             }
         }

@@ -340,17 +340,17 @@ fn to_integer(value: Value) -> Value {
 
 /// Converts `value` to the type of `default`; the error is a message that states the expected type.
 fn to_type_of(value: &DeValue<'_>, default: &Value) -> Result<Value, String> {
-    let wrong = |expected: &str| Err(format!("expected {expected}, found {}", value.type_str()));
+    let type_error = |expected: &str| Err(format!("expected {expected}, found {}", value.type_str()));
     match (default, value) {
         (Value::Boolean(_), DeValue::Boolean(b)) => Ok(Value::Boolean(*b)),
-        (Value::Boolean(_), _) => wrong("true or false"),
+        (Value::Boolean(_), _) => type_error("true or false"),
         (Value::String(_), DeValue::String(s)) => Ok(Value::String(s.to_string())),
-        (Value::String(_), _) => wrong("a string"),
+        (Value::String(_), _) => type_error("a string"),
         (Value::Integer(_), DeValue::Integer(i)) => match i64::from_str_radix(i.as_str(), i.radix()) {
             Ok(i) if i >= 0 => Ok(Value::Integer(i)),
             _ => Err(format!("{i} is out of range: expected a whole number from 0 up")),
         },
-        (Value::Integer(_), _) => wrong("a whole number"),
+        (Value::Integer(_), _) => type_error("a whole number"),
         (Value::Float(_), DeValue::Integer(_) | DeValue::Float(_)) => {
             let text = match value {
                 DeValue::Float(f) => f.as_str().to_owned(),
@@ -362,15 +362,15 @@ fn to_type_of(value: &DeValue<'_>, default: &Value) -> Result<Value, String> {
                 _ => Err(format!("{text} is no finite number")),
             }
         }
-        (Value::Float(_), _) => wrong("a number"),
+        (Value::Float(_), _) => type_error("a number"),
         (Value::Array(_), DeValue::Array(items)) => {
             let model = Value::String(String::new());
             items.iter().map(|item| to_type_of(item.get_ref(), &model)).collect::<Result<_, _>>().map(Value::Array)
         }
         (Value::Array(_), DeValue::String(s)) => Ok(Value::Array(vec![Value::String(s.to_string())])),
-        (Value::Array(_), _) => wrong("a string or a list of strings"),
-        (Value::Table(_), _) => wrong("a table"),
-        (Value::Datetime(_), _) => wrong("another value"),
+        (Value::Array(_), _) => type_error("a string or a list of strings"),
+        (Value::Table(_), _) => type_error("a table"),
+        (Value::Datetime(_), _) => type_error("another value"),
     }
 }
 

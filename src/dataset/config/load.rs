@@ -273,11 +273,11 @@ mod tests {
 
     #[test]
     fn gap_limits_above_what_lift_fills_are_rejected() {
-        let said = problems("", &["segment.max_body_gap_secs=1.5", "segment.max_hand_gap_secs=60"]).join("\n");
+        let messages = problems("", &["segment.max_body_gap_secs=1.5", "segment.max_hand_gap_secs=60"]).join("\n");
         for key in ["segment.max_body_gap_secs: 1.5", "segment.max_hand_gap_secs: 60"] {
             assert!(
-                said.contains(&format!("{key} is out of range: expected 0 to 1 seconds, all that lift fills")),
-                "{said}"
+                messages.contains(&format!("{key} is out of range: expected 0 to 1 seconds, all that lift fills")),
+                "{messages}"
             );
         }
     }

@@ -89,6 +89,6 @@ mod tests {
         assert_eq!(find(&["t/d.srt"], &units[..1]).0, ["a.mp4 d.srt"]);
         let (found, missing) = find(&["gone.srt", "t/*.ctm"], &units);
         assert!(found.is_empty() && missing.len() == 2, "{missing:?}");
-        assert!(missing.iter().any(|said| said.contains("gone.srt is no file")), "{missing:?}");
+        assert!(missing.iter().any(|message| message.contains("gone.srt is no file")), "{missing:?}");
     }
 }

@@ -213,8 +213,8 @@ mod tests {
         assert_eq!((videos.units.len(), videos.missing.len()), (3, 0));
         assert_eq!((split("a-"), split("b-1-"), split("d-")), (Some(Split::Train), Some(Split::Test), None));
         (speaker.validation, speaker.test) = (list(&["a.mp4", "none.mp4"]), list(&[]));
-        let said = of_speaker(&speaker, &root(dir.path())).missing;
-        assert!(said[0].contains("in train and in validation") && said[1].contains("none.mp4"), "{said:?}");
+        let missing = of_speaker(&speaker, &root(dir.path())).missing;
+        assert!(missing[0].contains("in train and in validation") && missing[1].contains("none.mp4"), "{missing:?}");
     }
 
     #[test]
@@ -249,7 +249,7 @@ mod tests {
         for entry in [".", "*.mp4"] {
             let videos = of_speaker(&host(&[entry]), &root(dir.path()));
             assert_eq!((videos.units.len(), videos.missing.len()), (1, 2), "{:?}", videos.missing);
-            assert!(videos.missing.iter().all(|said| said.contains("no text")), "{:?}", videos.missing);
+            assert!(videos.missing.iter().all(|missing| missing.contains("no text")), "{:?}", videos.missing);
         }
     }
 

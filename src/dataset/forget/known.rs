@@ -139,21 +139,21 @@ fn add_dataset(dir: &Path, speaker: &str, known: &mut Vec<KnownVideo>) -> Result
         // The name is known even if the entry is damaged, so such a video can be forgotten too.
         let entry = VideoEntry::read(&VideoEntry::path(dir, &name)).ok();
         let (content, file) = entry.map(|entry| (entry.content, entry.file)).unwrap_or_default();
-        let own = |k: &&mut KnownVideo| k.speaker == speaker && k.work.is_some();
-        let called = known.iter_mut().filter(own).find(|k| k.work.as_ref() == Some(&name));
-        let called = called.map(|k| k.parts.insert(name.clone()));
-        if called.is_some() {
+        let is_in_project = |k: &&mut KnownVideo| k.speaker == speaker && k.work.is_some();
+        let named = known.iter_mut().filter(is_in_project).find(|k| k.work.as_ref() == Some(&name));
+        let named = named.map(|k| k.parts.insert(name.clone()));
+        if named.is_some() {
             continue;
         }
         // Without a record of the extract stage, the video file is hashed to find its content.
-        for k in known.iter_mut().filter(own).filter(|k| k.content.is_none() && k.file == file) {
+        for k in known.iter_mut().filter(is_in_project).filter(|k| k.content.is_none() && k.file == file) {
             k.content = k.source.as_ref().and_then(|source| hash_file(source).ok());
         }
-        let same = |k: &KnownVideo| {
+        let has_same_content = |k: &KnownVideo| {
             k.speaker == speaker && k.work.is_some() && !content.is_empty() && k.content.as_ref() == Some(&content)
         };
-        let exact = known.iter().position(|k| same(k) && k.file == file);
-        let first = exact.or_else(|| known.iter().position(same)).and_then(|at| known.get_mut(at));
+        let exact = known.iter().position(|k| has_same_content(k) && k.file == file);
+        let first = exact.or_else(|| known.iter().position(has_same_content)).and_then(|at| known.get_mut(at));
         match first {
             Some(k) => {
                 k.parts.insert(name);

@@ -68,8 +68,8 @@ pub struct Removal {
 }
 
 impl Removal {
-    /// Plans the removal of the data of `videos` from the work folder; `others` are the remaining videos, and `whole`
-    /// means that all videos of the speaker go.
+    /// Plans the removal of the data of `videos` from the work folder; `others` are the remaining videos, and
+    /// `whole_speaker` means that all videos of the speaker go.
     ///
     /// # Errors
     /// A folder that cannot be listed.
@@ -78,12 +78,12 @@ impl Removal {
         speaker: &str,
         videos: &[&KnownVideo],
         others: &[&KnownVideo],
-        whole: bool,
+        whole_speaker: bool,
     ) -> Result<Self> {
         let mut removal = Self { speaker: speaker.to_owned(), terms: terms(videos, others), ..Self::default() };
         for folder in StageName::OF_VIDEOS.map(StageName::as_str).into_iter().chain(["sheets"]) {
             let folder = work.join(folder).join(speaker);
-            if whole {
+            if whole_speaker {
                 removal.paths.extend(Some(folder).filter(|folder| folder.exists()));
                 continue;
             }
@@ -104,13 +104,13 @@ impl Removal {
         let names: BTreeSet<String> = videos.iter().flat_map(|video| video.parts.iter().cloned()).collect();
         let has_samples = names.iter().any(|name| dataset::has_samples(&dir, name));
         let models = models_dirs(work, speaker).into_iter();
-        removal.models.extend(models.filter(|models| models.exists() && (whole || has_samples)));
+        removal.models.extend(models.filter(|models| models.exists() && (whole_speaker || has_samples)));
         let others = models_trained_on(work, videos)?;
         removal.models.extend(others);
         removal.models.sort();
         removal.models.dedup();
         let left_over = workdir::left_over(&dir);
-        if !names.is_empty() || (whole && dir.exists()) || dir.join(PENDING).exists() {
+        if !names.is_empty() || (whole_speaker && dir.exists()) || dir.join(PENDING).exists() {
             removal.dataset = Some((dir.clone(), names));
             // The record of the dataset stage lists the videos among its inputs, and its failure may name their files.
             removal
@@ -124,7 +124,7 @@ impl Removal {
         removal.paths.extend(workdir::left_over(&splits));
         removal.paths.extend(workdir::left_over(&artifacts::hashes(work)));
         match SplitRecord::read(&splits) {
-            Ok(Some(mut record)) if !whole => {
+            Ok(Some(mut record)) if !whole_speaker => {
                 let n = removal.clean_record(&mut record);
                 removal.splits = (n > 0).then_some((splits, n));
             }

@@ -127,9 +127,9 @@ fn walk(root: &Path, path: &Path, terms: &[&SearchTerm], searched: &mut SearchRe
     searched.n_files += 1;
     let (bytes, found) = scan(input::open(path).with_context(reading)?, terms).with_context(reading)?;
     searched.bytes += bytes;
-    let place = |file: &str, (at, what)| SearchHit { file: file.to_owned(), at: Some(at), what };
+    let to_hit = |file: &str, (at, what)| SearchHit { file: file.to_owned(), at: Some(at), what };
     let file = path.display().to_string();
-    searched.hits.extend(found.into_iter().map(|found| place(&file, found)));
+    searched.hits.extend(found.into_iter().map(|found| to_hit(&file, found)));
     if path.extension().is_some_and(|ending| ending == "npz" || ending == "zip") {
         // A file that is not a valid archive has already been searched as plain bytes.
         let Ok(mut archive) = zip::ZipArchive::new(input::open(path).with_context(reading)?) else { return Ok(()) };
@@ -138,7 +138,7 @@ fn walk(root: &Path, path: &Path, terms: &[&SearchTerm], searched: &mut SearchRe
             let inside = format!("{file}!{}", entry.name());
             let (bytes, found) = scan(entry, terms).with_context(reading)?;
             searched.inside_bytes += bytes;
-            searched.hits.extend(found.into_iter().map(|found| place(&inside, found)));
+            searched.hits.extend(found.into_iter().map(|found| to_hit(&inside, found)));
         }
     }
     Ok(())

@@ -278,12 +278,12 @@ fn inspect_loose(video: &LooseVideo, plan: &ImportPlan) -> Result<InspectedItem>
         spans.push((start, fps.secs(n_frames)));
         bone_sets.push(VideoBones { lengths_metres: bones::measure(&sample.motion).map(f64::from).to_vec(), n_frames });
         fingerprinter.push(&sample.sound.samples);
-        if let Some(said) = &sample.words {
-            let count = WordCount { n_words: said.len(), n_kept: said.len(), ..WordCount::default() };
+        if let Some(sample_words) = &sample.words {
+            let count = WordCount { n_words: sample_words.len(), n_kept: sample_words.len(), ..WordCount::default() };
             words.get_or_insert_default().count += count;
         }
-        if let Some(said) = sample.meta["content"].as_str() {
-            content = said.to_owned();
+        if let Some(hash) = sample.meta["content"].as_str() {
+            content = hash.to_owned();
         }
     }
     let source = VideoSource {

@@ -117,13 +117,13 @@ fn refusal(n_frames: usize, sound: Option<&Sound>, found: &TakeFiles, limits: &T
     }
     let Some(sound) = sound else { return Some(no_sound(found)) };
     let (motion_secs, sound_secs) = (limits.fps.secs(n_frames), sound.secs());
-    let apart = sound_secs - motion_secs;
-    if apart.abs() > limits.max_apart_secs {
+    let difference_secs = sound_secs - motion_secs;
+    if difference_secs.abs() > limits.max_apart_secs {
         return Some(TakeRefusal {
-            why: FrameRefusal::new(Refusal::OutOfStep, apart.abs(), limits.max_apart_secs),
+            why: FrameRefusal::new(Refusal::OutOfStep, difference_secs.abs(), limits.max_apart_secs),
             message: format!(
                 "the sound has {sound_secs:.3} s, the motion {motion_secs:.3} s: {:.3} s apart, at most {} s are believed",
-                apart.abs(),
+                difference_secs.abs(),
                 limits.max_apart_secs
             ),
         });

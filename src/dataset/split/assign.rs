@@ -69,12 +69,12 @@ pub fn assign(videos: &[Unassigned], shared: &[SharedSound], plan: &SplitPlan) -
     let mut new: Vec<usize> = Vec::new();
     for (at, video) in videos.iter().enumerate() {
         match (video.named, video.recorded) {
-            (Some(split), _) => assigner.place(at, Assignment::In(split, SplitBy::Name)),
+            (Some(split), _) => assigner.record_assignment(at, Assignment::In(split, SplitBy::Name)),
             (None, Some(RecordedSplit { split: Some(split), by, .. })) => {
-                assigner.place(at, Assignment::In(*split, by.clone()));
+                assigner.record_assignment(at, Assignment::In(*split, by.clone()));
             }
             (None, Some(RecordedSplit { split: None, blocks, .. })) => {
-                assigner.place(at, Assignment::Blocks(blocks.clone()));
+                assigner.record_assignment(at, Assignment::Blocks(blocks.clone()));
             }
             // A video without accepted seconds; its split does not matter.
             (None, None) if video.secs() <= 0.0 => {
@@ -103,7 +103,7 @@ struct Assigner<'a> {
 }
 
 impl<'a> Assigner<'a> {
-    fn place(&mut self, at: usize, assignment: Assignment) {
+    fn record_assignment(&mut self, at: usize, assignment: Assignment) {
         let video = &self.videos[at];
         let blocks = match &assignment {
             Assignment::In(split, _) => vec![TimeBlock::whole(*split)],
@@ -163,7 +163,7 @@ impl<'a> Assigner<'a> {
                     }
                     (several, _) => Assignment::Excluded(several.iter().map(|(shared, _)| (*shared).clone()).collect()),
                 };
-                self.place(at, assignment);
+                self.record_assignment(at, assignment);
             }
         }
     }
@@ -218,7 +218,7 @@ impl<'a> Assigner<'a> {
             };
             let assignment = cut.map_or_else(whole, Assignment::Blocks);
             let assignment = self.without_shared(at, assignment);
-            self.place(at, assignment);
+            self.record_assignment(at, assignment);
         }
     }
 

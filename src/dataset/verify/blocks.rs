@@ -41,10 +41,10 @@ pub fn check_blocks(entry: &VideoEntry, info: &DatasetInfo) -> Result<()> {
         let Some((next, other, other_key)) = samples[n + 1..].iter().find(|(_, other, _)| other != split) else {
             continue;
         };
-        let apart = info.fps.secs(next.start) - info.fps.secs(frames.end);
+        let gap_secs = info.fps.secs(next.start) - info.fps.secs(frames.end);
         ensure!(
-            apart >= rule.guard_secs - half_frame_secs,
-            "{key} ({}) and {other_key} ({}) are {apart:.2} s apart, two splits must be {:.2} s apart",
+            gap_secs >= rule.guard_secs - half_frame_secs,
+            "{key} ({}) and {other_key} ({}) are {gap_secs:.2} s apart, two splits must be {:.2} s apart",
             split.name(),
             other.name(),
             rule.guard_secs

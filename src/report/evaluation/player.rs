@@ -96,7 +96,7 @@ fn excerpt(word: &str, error: f64, clip: &EvalClip, frames: Range<usize>, fps: f
         fps: fps / step as f64,
         ground_truth: millimetres(clip.ground_truth.view(), &shown),
         predicted: millimetres(clip.predicted.view(), &shown),
-        lanes: lanes_of(clip, frames, fps, samples.as_deref()),
+        lanes: tracks_of(clip, frames, fps, samples.as_deref()),
         sound: samples.map(|samples| to_wav(&samples)).transpose()?,
     })
 }
@@ -116,7 +116,7 @@ fn to_wav(samples: &[i16]) -> Result<Vec<u8>> {
 }
 
 /// Tracks of wrist height and speed, loudness, and motion beats with onsets over time.
-fn lanes_of(clip: &EvalClip, frames: Range<usize>, fps: f64, samples: Option<&[i16]>) -> Vec<Lane> {
+fn tracks_of(clip: &EvalClip, frames: Range<usize>, fps: f64, samples: Option<&[i16]>) -> Vec<Lane> {
     let secs = |t: usize| (t - frames.start) as f64 / fps;
     let both: [(&str, ArrayView3<f32>); 2] = [("real", clip.ground_truth.view()), ("made", clip.predicted.view())];
     let height = |name: &str, joint: usize| Lane {

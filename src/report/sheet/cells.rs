@@ -34,15 +34,15 @@ impl SheetCrop {
     /// Square around all keypoints detected in the clip, in a frame of `image_size` px; the complete frame if there are
     /// none.
     pub fn around(keypoints: &Keypoints, image_size: [usize; 2]) -> Self {
-        let whole = image_size.map(|px| px as f32);
-        let found = overlay::extent(keypoints).unwrap_or([0.0, 0.0, whole[0], whole[1]]);
+        let frame_size = image_size.map(|px| px as f32);
+        let found = overlay::extent(keypoints).unwrap_or([0.0, 0.0, frame_size[0], frame_size[1]]);
         let [left, top, right, bottom] = found;
-        let side = (MARGIN * (right - left).max(bottom - top)).clamp(16.0, whole[0].max(whole[1]) * MARGIN);
+        let side = (MARGIN * (right - left).max(bottom - top)).clamp(16.0, frame_size[0].max(frame_size[1]) * MARGIN);
         let scale = (CELL_PX as f32 / side).min(MAX_MAGNIFICATION);
-        let scaled = whole.map(|px| ((px * scale).round() as usize).clamp(1, 8 * CELL_PX));
-        let scale = [0, 1].map(|axis| scaled[axis] as f32 / whole[axis]);
+        let scaled = frame_size.map(|px| ((px * scale).round() as usize).clamp(1, 8 * CELL_PX));
+        let scale = [0, 1].map(|axis| scaled[axis] as f32 / frame_size[axis]);
         let middle = [(left + right) / 2.0, (top + bottom) / 2.0];
-        let shift = [0, 1].map(|axis| CELL_PX as f32 / 2.0 - scale[axis] * middle[axis].clamp(0.0, whole[axis]));
+        let shift = [0, 1].map(|axis| CELL_PX as f32 / 2.0 - scale[axis] * middle[axis].clamp(0.0, frame_size[axis]));
         Self { scaled, transform: ImageTransform { scale, shift: shift.map(f32::round) } }
     }
 
@@ -78,11 +78,11 @@ pub fn pose_cell(joints: ArrayView2<f32>, from: CellView) -> Result<Image> {
     draw_grid(&mut cell)?;
     draw_head(&mut cell, from)?;
     draw_pose(&mut cell, joints, &view)?;
-    let words = match from {
+    let label = match from {
         CellView::Front => "front",
         CellView::Left => "side, from the left;  <-- faces this way",
     };
-    draw::text(&mut cell, words, [6.0, 16.0], 9.0, INK)?;
+    draw::text(&mut cell, label, [6.0, 16.0], 9.0, INK)?;
     Ok(cell)
 }
 
@@ -99,8 +99,8 @@ fn draw_grid(cell: &mut Image) -> Result<()> {
         draw::line(cell, [at[0], 0.0], [at[0], end], 1.0, rgb)?;
         draw::line(cell, [0.0, at[1]], [end, at[1]], 1.0, rgb)?;
         if decimetre % 5 == 0 && (0.0..end).contains(&at[0]) {
-            let words = format!("{:.1}", f64::from(decimetre) / 10.0);
-            draw::text(cell, &words, [at[0] + 3.0, end - 4.0], 8.0, mix(INK, PAPER, 0.3))?;
+            let label = format!("{:.1}", f64::from(decimetre) / 10.0);
+            draw::text(cell, &label, [at[0] + 3.0, end - 4.0], 8.0, mix(INK, PAPER, 0.3))?;
         }
     }
     Ok(())

@@ -111,9 +111,9 @@ impl SheetClip<'_> {
     fn check_length(&self, reader: &FrameReader) -> Result<()> {
         let (n_frames, fps) = (self.motion.n_frames(), self.motion.fps);
         let Some(expected) = reader.expected_frames() else { return Ok(()) };
-        let apart = fps.secs(n_frames.abs_diff(expected));
+        let difference_secs = fps.secs(n_frames.abs_diff(expected));
         ensure!(
-            apart <= 1.0,
+            difference_secs <= 1.0,
             "the motion has {n_frames} frames at {fps}, {:.2} s, the video {} lasts {:.2} s: they are not of the same clip, \
              or the keypoints' `fps` is wrong",
             fps.secs(n_frames),
@@ -124,9 +124,9 @@ impl SheetClip<'_> {
     }
 
     fn draw_title(&self, page: &mut Image, number: usize, n_pages: usize) -> Result<()> {
-        let words =
+        let title =
             if n_pages > 1 { format!("{}   {}/{n_pages}", self.title, number + 1) } else { self.title.to_owned() };
-        draw::text(page, &words, [8.0, 25.0], 12.0, INK)?;
+        draw::text(page, &title, [8.0, 25.0], 12.0, INK)?;
         let right = page.width as f32;
         draw::text(page, "speaker's right", [right - 330.0, 25.0], 11.0, RIGHT)?;
         draw::text(page, "speaker's left", [right - 160.0, 25.0], 11.0, LEFT)
@@ -186,19 +186,19 @@ impl SheetClip<'_> {
             let names = parts.iter().filter(|part| !part.1 && part.2 == is_found).map(|part| part.0);
             names.collect::<Vec<_>>().join(", ")
         };
-        let mut words = vec![format!("{:.1} s", self.motion.fps.secs(frame_idx))];
+        let mut texts = vec![format!("{:.1} s", self.motion.fps.secs(frame_idx))];
         let jitters =
             [("L", L_WRIST), ("R", R_WRIST)].map(|(side, at)| (side, jitter_around(self.motion, at, frame_idx)));
         let jitters = jitters.into_iter().filter(|(_, mm)| mm.is_finite()).map(|(side, mm)| format!(" {side} {mm:.1}"));
         let jitters: String = jitters.collect();
         if !jitters.is_empty() {
-            words.push(format!("wrists shake{jitters} mm"));
+            texts.push(format!("wrists shake{jitters} mm"));
         }
         for (why, parts) in [("refused", without(true)), ("not seen", without(false))] {
             if !parts.is_empty() {
-                words.push(format!("{why}: {parts}"));
+                texts.push(format!("{why}: {parts}"));
             }
         }
-        words.join("   ")
+        texts.join("   ")
     }
 }

@@ -22,15 +22,15 @@ pub fn draw_strip(image: &mut Image, top: usize, motion: &Motion, frames: Range<
     let (left, right) = (MARGIN_PX, image.width as f32 - 10.0);
     let n_steps = frames.len().saturating_sub(1).max(1) as f32;
     let x_of = |t: usize| left + (right - left) * t.saturating_sub(frames.start) as f32 / n_steps;
-    for (lane, (axis, [above, below], words)) in LANES.into_iter().enumerate() {
+    for (lane, (axis, [above, below], label)) in LANES.into_iter().enumerate() {
         let (start, end) = (top as f32 + lane as f32 * lane_px + 4.0, top as f32 + (lane + 1) as f32 * lane_px - 4.0);
         let y_of = |metres: f32| start + (end - start) * ((metres - above) / (below - above)).clamp(0.0, 1.0);
         for decimetre in (above * 10.0).round() as i32..=(below * 10.0).round() as i32 {
             let metres = decimetre as f32 / 10.0;
-            let pale = if decimetre == 0 { 0.3 } else { 0.85 };
-            draw::line(image, [left, y_of(metres)], [right, y_of(metres)], 1.0, mix(INK, PAPER, pale))?;
+            let paper_share = if decimetre == 0 { 0.3 } else { 0.85 };
+            draw::line(image, [left, y_of(metres)], [right, y_of(metres)], 1.0, mix(INK, PAPER, paper_share))?;
         }
-        draw::text(image, words, [6.0, start + 14.0], 9.0, INK)?;
+        draw::text(image, label, [6.0, start + 14.0], 9.0, INK)?;
         let [first, last] = [above, below].map(|metres| format!("{:+.1} m", if axis == 1 { -metres } else { metres }));
         draw::text(image, &first, [6.0, start + 32.0], 8.0, INK)?;
         draw::text(image, &last, [6.0, end], 8.0, INK)?;
@@ -47,8 +47,8 @@ pub fn draw_strip(image: &mut Image, top: usize, motion: &Motion, frames: Range<
         }
     }
     for &mark in marks {
-        let words = format!("{:.1}", motion.fps.secs(mark));
-        draw::text(image, &words, [x_of(mark) - 8.0, (top + STRIP_PX) as f32 - 8.0], 9.0, INK)?;
+        let label = format!("{:.1}", motion.fps.secs(mark));
+        draw::text(image, &label, [x_of(mark) - 8.0, (top + STRIP_PX) as f32 - 8.0], 9.0, INK)?;
     }
     Ok(())
 }

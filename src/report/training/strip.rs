@@ -50,8 +50,8 @@ fn draw_pair(image: &mut Image, top: usize, pair: &HeldOutPair) -> Result<()> {
     // Take the middle, since intervals often start at rest.
     let first = n_frames.saturating_sub(span) / 2;
     let frame_of = |moment: usize| first + (2 * moment + 1) * span / (2 * N_MOMENTS);
-    let words = format!("{}, from {:.1} s", pair.name, pair.start_secs + fps.secs(first));
-    draw::text(image, &words, [8.0, top as f32 + 17.0], 10.0, INK)?;
+    let title = format!("{}, from {:.1} s", pair.name, pair.start_secs + fps.secs(first));
+    draw::text(image, &title, [8.0, top as f32 + 17.0], 10.0, INK)?;
     for (row, (name, motion)) in [("true", &pair.ground_truth), ("generated", &pair.predicted)].into_iter().enumerate()
     {
         let row_top = top + NAME_PX + row * CELL[1];
@@ -80,8 +80,8 @@ fn draw_pair(image: &mut Image, top: usize, pair: &HeldOutPair) -> Result<()> {
         }
         for (motion, rgb, wide) in [(&pair.ground_truth, mix(INK, PAPER, 0.35), 2.0), (&pair.predicted, rgb, 2.0)] {
             for frame in first + 1..(first + span).min(n_frames) {
-                let place = |frame: usize| [x(frame), y(motion.joints[[frame, joint, 1]])];
-                draw::line(image, place(frame - 1), place(frame), wide, rgb)?;
+                let position = |frame: usize| [x(frame), y(motion.joints[[frame, joint, 1]])];
+                draw::line(image, position(frame - 1), position(frame), wide, rgb)?;
             }
         }
     }
@@ -112,9 +112,9 @@ mod tests {
     #[test]
     fn any_length_is_drawn() {
         let motion = |n_frames: usize, shift: f32| {
-            let place =
+            let position =
                 |(t, joint, k): (usize, usize, usize)| (t as f32 * 0.01 + joint as f32 * 0.01 + shift) * k as f32;
-            Motion::from_joints(FrameRate::new(15, 1), Array3::from_shape_fn((n_frames, N_JOINTS, 3), place))
+            Motion::from_joints(FrameRate::new(15, 1), Array3::from_shape_fn((n_frames, N_JOINTS, 3), position))
         };
         for (n_ground_truth, n_predicted) in [(0, 3), (1, 1), (3, 5), (90, 89)] {
             let pair = HeldOutPair {

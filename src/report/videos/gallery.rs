@@ -39,10 +39,10 @@ fn card(moment: &Moment, video: &VideoSummary, pictures: &Pictures) -> Node {
         None => node("p").class("empty nopicture").text("The picture cannot be read."),
     };
     let link = node("a").attr("href", format!("#{}", video.anchor())).text(at);
-    let description = if moment.here.is_empty() {
+    let description = if moment.frame_value.is_empty() {
         moment.description.clone()
     } else {
-        format!("{}; {}", moment.description, moment.here)
+        format!("{}; {}", moment.description, moment.frame_value)
     };
     node("figure")
         .class(if moment.frames.len() > 1 { "card shot pair" } else { "card shot" })

@@ -52,7 +52,7 @@ pub fn thumbnails(
     };
     let mut reader = has_pictures.then(open).transpose()?;
     let n_wide = |frame: &usize| if moments.iter().any(|m| m.len() > 1 && m.contains(frame)) { 2 } else { 1 };
-    let mut thumbs = BTreeMap::new();
+    let mut thumbnails_by_frame = BTreeMap::new();
     for frame_idx in &frames {
         ensure!(*frame_idx < keypoints.n_frames(), "the keypoints end before frame {frame_idx}");
         while let Some(reader) = &mut reader {
@@ -63,10 +63,11 @@ pub fn thumbnails(
                 break;
             }
         }
-        thumbs.insert(*frame_idx, thumb(reader.as_mut(), &keypoints, *frame_idx, n_wide(frame_idx))?);
+        thumbnails_by_frame
+            .insert(*frame_idx, draw_thumbnail(reader.as_mut(), &keypoints, *frame_idx, n_wide(frame_idx))?);
     }
     let picture = |frames: &Vec<usize>| -> Result<MomentThumbnail> {
-        let image = side_by_side(frames.iter().filter_map(|frame| thumbs.get(frame)));
+        let image = side_by_side(frames.iter().filter_map(|frame| thumbnails_by_frame.get(frame)));
         Ok(MomentThumbnail { size: [image.width, image.height], jpeg: jpeg::encode(&image)? })
     };
     moments.into_iter().map(|frames| Ok((frames.clone(), picture(frames)?))).collect()
@@ -74,11 +75,16 @@ pub fn thumbnails(
 
 /// Current frame of the reader, or an empty picture, overlaid with its keypoints; `n_wide` thumbnails share the maximum
 /// width.
-fn thumb(reader: Option<&mut FrameReader>, keypoints: &Keypoints, frame_idx: usize, n_wide: usize) -> Result<Image> {
+fn draw_thumbnail(
+    reader: Option<&mut FrameReader>,
+    keypoints: &Keypoints,
+    frame_idx: usize,
+    n_wide: usize,
+) -> Result<Image> {
     let size = reader.as_ref().map_or(keypoints.image_size.map(|px| px as usize), |reader| reader.image_size());
-    let whole = size.map(|px| px.max(1) as f64);
-    let scale = (MAX_PX[0] / n_wide as f64 / whole[0]).min(MAX_PX[1] / whole[1]).min(1.0);
-    let small = whole.map(|px| ((px * scale).round() as usize).max(2));
+    let frame_size = size.map(|px| px.max(1) as f64);
+    let scale = (MAX_PX[0] / n_wide as f64 / frame_size[0]).min(MAX_PX[1] / frame_size[1]).min(1.0);
+    let small = frame_size.map(|px| ((px * scale).round() as usize).max(2));
     let mut image = match reader {
         Some(reader) => reader.picture(Some(small))?,
         None => Image::filled(small[0], small[1], EMPTY_RGB),

@@ -54,9 +54,9 @@ pub fn sliders(kept: &[Option<KeptByThreshold>], rules: &SegmentConfig) -> Vec<N
                  every step the rules were applied again to what was measured of all videos. What lifting refused (bones, open) \
                  stays refused, and frames that were never lifted count as good ones; max_bone_change has no slider.";
     let sums = sums(kept, rules);
-    let most = sums.iter().flatten().copied().fold(0.0, f64::max);
+    let max = sums.iter().flatten().copied().fold(0.0, f64::max);
     let cards =
-        THRESHOLDS.iter().zip(&sums).enumerate().map(|(i, (threshold, sums))| card(i, threshold, sums, most, rules));
+        THRESHOLDS.iter().zip(&sums).enumerate().map(|(i, (threshold, sums))| card(i, threshold, sums, max, rules));
     let now = sums.first().map_or(0.0, |row| row[THRESHOLDS[0].grid(rules).1]);
     let toml = node("pre").child(node("code").id("toml").text("# as configured"));
     let result = node("div")
@@ -82,7 +82,7 @@ pub fn sliders(kept: &[Option<KeptByThreshold>], rules: &SegmentConfig) -> Vec<N
     ]
 }
 
-fn card(i: usize, threshold: &ThresholdGrid, sums: &[f64], most: f64, rules: &SegmentConfig) -> Node {
+fn card(i: usize, threshold: &ThresholdGrid, sums: &[f64], max: f64, rules: &SegmentConfig) -> Node {
     let (grid, now) = threshold.grid(rules);
     let id = format!("slider-{}", threshold.key);
     let label = node("label").attr("for", &id).child(node("code").text(threshold.key));
@@ -106,7 +106,7 @@ fn card(i: usize, threshold: &ThresholdGrid, sums: &[f64], most: f64, rules: &Se
         .class("card knob")
         .child(node("h3").child(label))
         .child(node("small").text(threshold.description))
-        .child(curve(&description, sums, most, now))
+        .child(curve(&description, sums, max, now))
         .child(slider)
         .child(values)
 }

@@ -47,8 +47,8 @@ impl VideoSummary {
         }
         if let Ok(media) = MediaInfo::read(&Artifact::MediaInfo.path(work, unit)) {
             media.remarks().iter().for_each(|remark| video.note(&format!("In the file: {remark}.")));
-            if let Some(said) = media.not_judged() {
-                video.note(&format!("Made {said}."));
+            if let Some(reason) = media.not_judged() {
+                video.note(&format!("Made {reason}."));
             }
         }
         if let Some(offset) = sound_offset_json::read(&Artifact::SoundOffset.path(work, unit)).ok().flatten()

@@ -61,12 +61,12 @@ impl JudgedVideo<'_> {
 pub fn open_frames(ledger: &Ledger, video: &MediaInfo) -> Vec<Option<FrameRefusal>> {
     let mut open = vec![None; video.n_frames];
     let is_open = |reason: &str, unit: &str| Refusal::find(reason, unit) == Some(Refusal::Open);
-    for stretch in ledger.refused.iter().filter(|stretch| is_open(&stretch.reason, &stretch.unit)) {
+    for span in ledger.refused.iter().filter(|span| is_open(&span.reason, &span.unit)) {
         let frame = |secs: f64| ((secs * video.fps.per_sec()).round() as usize).min(video.n_frames);
         // The video may end within the last frame.
-        let end = if stretch.end_secs == video.duration_secs { video.n_frames } else { frame(stretch.end_secs) };
-        let why = FrameRefusal::new(Refusal::Open, stretch.measured, stretch.threshold);
-        open[frame(stretch.start_secs).min(end)..end].fill(Some(why));
+        let end = if span.end_secs == video.duration_secs { video.n_frames } else { frame(span.end_secs) };
+        let why = FrameRefusal::new(Refusal::Open, span.measured, span.threshold);
+        open[frame(span.start_secs).min(end)..end].fill(Some(why));
     }
     open
 }

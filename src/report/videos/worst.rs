@@ -24,7 +24,7 @@ pub struct Moment {
     /// Message of the refusal.
     pub description: String,
     /// Text with the value in this frame; empty for rules that are not about frames.
-    pub here: String,
+    pub frame_value: String,
 }
 
 /// Rank of the reason, reason and unit; the unit distinguishes the two rules each of `turned` and `hands`.
@@ -34,12 +34,12 @@ type Rule = (usize, String, String);
 pub struct Worst {
     pub rules: BTreeMap<Rule, Vec<Moment>>,
     /// Maximum number of moments per rule.
-    most: usize,
+    max_moments: usize,
 }
 
 impl Worst {
-    pub fn new(most: usize) -> Self {
-        Self { rules: BTreeMap::new(), most }
+    pub fn new(max_moments: usize) -> Self {
+        Self { rules: BTreeMap::new(), max_moments }
     }
 
     /// Adds the refused spans of a video; `bone_change` is empty if the video is not lifted.
@@ -51,13 +51,13 @@ impl Worst {
         judged: &MediaInfo,
         rules: &SegmentConfig,
     ) {
-        for stretch in &ledger.refused {
-            let Some(moment) = moment(video, stretch, (measures, bone_change), judged, rules) else { continue };
-            let rule = (reasons::order(&stretch.reason), stretch.reason.clone(), stretch.unit.clone());
+        for span in &ledger.refused {
+            let Some(moment) = moment(video, span, (measures, bone_change), judged, rules) else { continue };
+            let rule = (reasons::order(&span.reason), span.reason.clone(), span.unit.clone());
             let moments = self.rules.entry(rule).or_default();
             let at = moments.partition_point(|other| other.beyond >= moment.beyond);
             moments.insert(at, moment);
-            moments.truncate(self.most);
+            moments.truncate(self.max_moments);
         }
         self.rules.retain(|_, moments| !moments.is_empty());
     }
@@ -74,18 +74,18 @@ impl Worst {
 
 fn moment(
     video: usize,
-    stretch: &Refused,
+    span: &Refused,
     (measures, bone_change): (&Measures, &[f32]),
     judged: &MediaInfo,
     rules: &SegmentConfig,
 ) -> Option<Moment> {
     let n_frames = measures.n_frames();
     let frame = |secs: f64| (secs * judged.fps.per_sec()).round() as usize;
-    let start = frame(stretch.start_secs).min(n_frames.checked_sub(1)?);
-    let end = frame(stretch.end_secs).clamp(start + 1, n_frames);
-    let mean = (stretch.measured - stretch.threshold).abs();
-    let refusal = Refusal::find(&stretch.reason, &stretch.unit);
-    let (t, beyond, here) = match refusal {
+    let start = frame(span.start_secs).min(n_frames.checked_sub(1)?);
+    let end = frame(span.end_secs).clamp(start + 1, n_frames);
+    let mean = (span.measured - span.threshold).abs();
+    let refusal = Refusal::find(&span.reason, &span.unit);
+    let (t, beyond, frame_value) = match refusal {
         Some(refusal @ (Refusal::Cut | Refusal::Identity)) => {
             let score = if refusal == Refusal::Cut { &measures.shot_score } else { &measures.identity };
             let ends = [start, end.min(n_frames - 1)].into_iter().filter(|t| *t > 0);
@@ -94,7 +94,7 @@ fn moment(
         }
         Some(Refusal::Bones) if bone_change.len() == n_frames => {
             let (t, value) = extreme(bone_change, start..end, false);
-            (t, (value - stretch.threshold).abs(), format!("{} off its length here", number(value)))
+            (t, (value - span.threshold).abs(), format!("{} off its length here", number(value)))
         }
         Some(refusal) => match farthest(refusal, measures, rules, start..end) {
             Some((t, value, bound, is_mean)) => {
@@ -107,7 +107,7 @@ fn moment(
     let compares = matches!(refusal, Some(Refusal::Cut | Refusal::Identity | Refusal::Jump)) && t > 0;
     let frames = if compares { vec![t - 1, t] } else { vec![t] };
     let beyond = if beyond.is_finite() { beyond } else { 0.0 };
-    Some(Moment { video, frames, secs: judged.fps.secs(t), beyond, description: stretch.message.clone(), here })
+    Some(Moment { video, frames, secs: judged.fps.secs(t), beyond, description: span.message.clone(), frame_value })
 }
 
 /// Frame that violates the rules of the refusal most: index, value, bound, and whether the ledger measures that value
@@ -184,14 +184,14 @@ mod tests {
         (measures.jump[20], measures.jump[50]) = (0.8, 1.8);
         measures.right_hand[70..90].fill(0.2);
         measures.right_hand[74] = 0.1;
-        let stretch = |start: f64, end: f64, refusal: Refusal, measured: f64| {
+        let span = |start: f64, end: f64, refusal: Refusal, measured: f64| {
             Refused::new(start, end, FrameRefusal::new(refusal, measured, 0.5))
         };
         let refused = vec![
-            stretch(2.0, 2.1, Refusal::Jump, 0.8),
-            stretch(5.0, 5.1, Refusal::Jump, 1.8),
-            stretch(7.0, 9.0, Refusal::HandGap, 2.0),
-            stretch(9.0, 9.5, Refusal::TooShort, 0.5),
+            span(2.0, 2.1, Refusal::Jump, 0.8),
+            span(5.0, 5.1, Refusal::Jump, 1.8),
+            span(7.0, 9.0, Refusal::HandGap, 2.0),
+            span(9.0, 9.5, Refusal::TooShort, 0.5),
         ];
         let ledger = Ledger { duration_secs: 10.0, refused, ..Ledger::default() };
         let judged = MediaInfo::new(10.0, 100, FrameRate::new(10, 1));

@@ -11,14 +11,14 @@ const FLOOR: f64 = 50.0;
 const LEFT: f64 = 8.0;
 const RIGHT: f64 = 292.0;
 
-/// Curve of `values` on an axis from 0 to `most`; a script moves the dot from the step `marked` to the positions in
+/// Curve of `values` on an axis from 0 to `max`; a script moves the dot from the step `marked` to the positions in
 /// `data-xs` and `data-ys`.
-pub fn curve(label: &str, values: &[f64], most: f64, marked: usize) -> Node {
+pub fn curve(label: &str, values: &[f64], max: f64, marked: usize) -> Node {
     let x = Scale { low: 0.0, high: values.len().saturating_sub(1) as f64, from: LEFT, to: RIGHT };
-    let y = Scale { low: 0.0, high: most.max(1e-9), from: FLOOR, to: TOP };
+    let y = Scale { low: 0.0, high: max.max(1e-9), from: FLOOR, to: TOP };
     let points: Vec<[f64; 2]> = values.iter().enumerate().map(|(i, &value)| [x.at(i as f64), y.at(value)]).collect();
     let at = points.get(marked).copied().unwrap_or([LEFT, FLOOR]);
-    let all = |axis: usize| points.iter().map(|place| px(place[axis])).collect::<Vec<_>>().join(" ");
+    let all = |axis: usize| points.iter().map(|point| px(point[axis])).collect::<Vec<_>>().join(" ");
     let outline = path_data(points.iter().copied().chain([[RIGHT, FLOOR], [LEFT, FLOOR]])) + "Z";
     drawing(WIDTH, HEIGHT, label)
         .class("curve")

@@ -50,8 +50,8 @@ pub fn forest(label: &str, rows: &[ForestRow], scale: &ForestScale) -> Node {
     if let Some(middle) = scale.middle {
         svg = svg.child(line("none", [x.at(middle), TOP], [x.at(middle), floor]));
     }
-    for (place, row) in rows.iter().enumerate() {
-        let y = TOP + ROW * (place as f64 + 0.5);
+    for (index, row) in rows.iter().enumerate() {
+        let y = TOP + ROW * (index as f64 + 0.5);
         svg = svg.child(text_at("name", [LEFT - 12.0, y + 4.0], "end", &row.name));
         let mut drawn =
             node("g").class(row.class).child(node("title").text(format!("{}: {}", row.name, row.value_text)));

@@ -74,13 +74,13 @@ const RIGHT: f64 = 332.0;
 /// Histogram as SVG. Heights follow the square root of the share, so that rare values remain visible.
 pub fn histogram(label: &str, counts: &Counts, unit: &str, threshold: Option<ThresholdLine>) -> Node {
     let x = Scale { low: counts.low, high: counts.high, from: LEFT, to: RIGHT };
-    let most = counts.bins.iter().copied().max().unwrap_or(0).max(1) as f64;
+    let max_count = counts.bins.iter().copied().max().unwrap_or(0).max(1) as f64;
     let mut svg = drawing(WIDTH, HEIGHT, label);
     for (bin, &count) in counts.bins.iter().enumerate().filter(|(_, count)| **count > 0) {
         let (from, to) = (counts.edge(bin), counts.edge(bin + 1));
         let middle = (from + to) / 2.0;
         let fails = threshold.is_some_and(|t| if t.is_least { middle < t.value } else { middle > t.value });
-        let height = ((count as f64 / most).sqrt() * (FLOOR - TOP)).max(1.0);
+        let height = ((count as f64 / max_count).sqrt() * (FLOOR - TOP)).max(1.0);
         let class = if fails { "bin fails" } else { "bin" };
         let (left, right) = (x.at(from), x.at(to));
         svg = svg.child(rect(class, [left + 0.4, FLOOR - height], [(right - left - 0.8).max(0.5), height]));

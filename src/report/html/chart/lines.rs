@@ -51,11 +51,11 @@ impl LineChart {
     /// Ranges of the axes: first to last step, and 0 (or the smallest value below it) to the largest value.
     fn ranges(&self) -> [[f64; 2]; 2] {
         let levels = self.levels.iter().map(|level| level.value).filter(|value| value.is_finite());
-        let around = |values: &mut dyn Iterator<Item = f64>, low: f64| {
+        let range_of = |values: &mut dyn Iterator<Item = f64>, low: f64| {
             values.fold([low, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
         };
-        let steps = around(&mut self.points().map(|[step, _]| step), f64::INFINITY);
-        let values = around(&mut self.points().map(|[_, value]| value).chain(levels), 0.0);
+        let steps = range_of(&mut self.points().map(|[step, _]| step), f64::INFINITY);
+        let values = range_of(&mut self.points().map(|[_, value]| value).chain(levels), 0.0);
         [steps, values]
             .map(|[low, high]| if high > low { [low, high] } else { [low.min(0.0), low.max(0.0) + 1.0] })
             .map(|range| if range.iter().all(|v| v.is_finite()) { range } else { [0.0, 1.0] })
@@ -99,7 +99,7 @@ impl LineChart {
             svg = svg.child(line(&class, [LEFT, y.at(level.value)], [RIGHT, y.at(level.value)]));
         }
         for drawn in &self.lines {
-            let finite = drawn.points.iter().filter(|place| place.iter().all(|v| v.is_finite()));
+            let finite = drawn.points.iter().filter(|point| point.iter().all(|v| v.is_finite()));
             let points: Vec<[f64; 2]> = finite.map(|[step, value]| [x.at(*step), y.at(*value)]).collect();
             if !points.is_empty() {
                 svg = svg.child(stroke(&format!("colour-{}", drawn.colour), points.iter().copied()));
@@ -113,7 +113,7 @@ impl LineChart {
 
     fn points(&self) -> impl Iterator<Item = [f64; 2]> {
         let all = self.lines.iter().flat_map(|line| line.points.iter().copied());
-        all.filter(|place| place.iter().all(|v| v.is_finite()))
+        all.filter(|point| point.iter().all(|v| v.is_finite()))
     }
 }
 

@@ -28,9 +28,9 @@ fn profile(label: &str, unit: &str, lines: &[(&str, &Counts)]) -> Node {
     let x = Scale { low: first.low, high: first.high, from: LEFT, to: RIGHT };
     let share = |counts: &Counts, bin: usize| counts.bins[bin] as f64 / counts.total().max(1) as f64;
     let shares = |counts: &Counts| (0..counts.bins.len()).map(|bin| share(counts, bin)).fold(0.0, f64::max);
-    let most = lines.iter().map(|(_, counts)| shares(counts)).fold(1e-9, f64::max);
+    let max = lines.iter().map(|(_, counts)| shares(counts)).fold(1e-9, f64::max);
     for (class, counts) in lines.iter().filter(|(_, counts)| counts.total() > 0) {
-        let y = |bin: usize| FLOOR - (share(counts, bin) / most).sqrt() * (FLOOR - TOP);
+        let y = |bin: usize| FLOOR - (share(counts, bin) / max).sqrt() * (FLOOR - TOP);
         let middle = |bin: usize| (counts.edge(bin) + counts.edge(bin + 1)) / 2.0;
         svg = svg.child(stroke(class, (0..counts.bins.len()).map(|bin| [x.at(middle(bin)), y(bin)])));
         let median = x.at(counts.quantile(0.5));

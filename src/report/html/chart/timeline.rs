@@ -16,27 +16,27 @@ pub struct TimelineSpan {
     pub description: String,
 }
 
-/// Timeline of a video of `duration_secs`; `label` is for screen readers. If there are more than `most` intervals,
-/// neighbouring short ones are merged, which leaves at most about twice `most`.
-pub fn timeline(label: &str, duration_secs: f64, spans: &[TimelineSpan], most: usize) -> Node {
-    let whole = duration_secs.max(1e-9);
-    let share = |secs: f64| format!("{:.3}%", 100.0 * (secs / whole).clamp(0.0, 1.0));
+/// Timeline of a video of `duration_secs`; `label` is for screen readers. If there are more than `max_spans` intervals,
+/// neighbouring short ones are merged, which leaves at most about twice `max_spans`.
+pub fn timeline(label: &str, duration_secs: f64, spans: &[TimelineSpan], max_spans: usize) -> Node {
+    let total_secs = duration_secs.max(1e-9);
+    let share = |secs: f64| format!("{:.3}%", 100.0 * (secs / total_secs).clamp(0.0, 1.0));
     let list = node("ol").class("timeline").attr("tabindex", "0").attr("aria-label", label);
-    list.children(drawn(spans, whole, most).into_iter().map(|span| {
-        let place = format!("left:{};width:{}", share(span.start_secs), share(span.end_secs - span.start_secs));
+    list.children(drawn(spans, total_secs, max_spans).into_iter().map(|span| {
+        let style = format!("left:{};width:{}", share(span.start_secs), share(span.end_secs - span.start_secs));
         let word = node("span").text(&span.word);
-        node("li").class(&span.class).attr("style", place).attr("title", &span.description).child(word)
+        node("li").class(&span.class).attr("style", style).attr("title", &span.description).child(word)
     }))
 }
 
-/// Intervals to draw: all, or if there are more than `most`, with runs of short ones merged. A merged interval has the
-/// class and label of the longest, and a description with their number.
-fn drawn(spans: &[TimelineSpan], whole: f64, most: usize) -> Vec<TimelineSpan> {
-    if spans.len() <= most {
+/// Intervals to draw: all, or if there are more than `max_spans`, with runs of short ones merged. A merged interval has
+/// the class and label of the longest, and a description with their number.
+fn drawn(spans: &[TimelineSpan], total_secs: f64, max_spans: usize) -> Vec<TimelineSpan> {
+    if spans.len() <= max_spans {
         return spans.to_vec();
     }
     let secs = |span: &TimelineSpan| span.end_secs - span.start_secs;
-    let is_short = |span: &TimelineSpan| secs(span) * (most as f64) < whole;
+    let is_short = |span: &TimelineSpan| secs(span) * (max_spans as f64) < total_secs;
     // Each interval with the number of short intervals merged in it, and the seconds of the longest of them.
     let mut drawn: Vec<(TimelineSpan, usize, f64)> = Vec::new();
     for span in spans {

@@ -34,13 +34,13 @@ pub fn lanes(label: &str, secs: f64, lanes: &[Lane]) -> Node {
         let floor = top + LANE;
         svg = svg.child(text_at("name", [LEFT, top - 6.0], "start", &lane.name));
         svg = svg.child(line("grid", [LEFT, floor], [RIGHT, floor]));
-        let values = lane.lines.iter().flat_map(|(_, points)| points.iter().map(|place| place[1]));
+        let values = lane.lines.iter().flat_map(|(_, points)| points.iter().map(|point| point[1]));
         let [low, high] = values
             .filter(|value| value.is_finite())
             .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)]);
         let y = Scale { low, high, from: floor - 2.0, to: top };
         for (class, points) in &lane.lines {
-            let runs = points.split(|place| place.iter().any(|v| !v.is_finite())).filter(|run| run.len() > 1);
+            let runs = points.split(|point| point.iter().any(|v| !v.is_finite())).filter(|run| run.len() > 1);
             let drawn: Vec<String> =
                 runs.map(|run| path_data(run.iter().map(|[secs, value]| [x.at(*secs), y.at(*value)]))).collect();
             if !drawn.is_empty() {
