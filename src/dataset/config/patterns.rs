@@ -124,7 +124,7 @@ fn add_below(folder: &Path, depth: usize, visited: &mut BTreeSet<PathBuf>, folde
 }
 
 /// Files whose names are not UTF-8 and would match the last part of the pattern; only the folder before its first
-/// wildcard is searched. `glob` does not report such files.
+/// wildcard is searched. `glob` never matches such files.
 fn non_utf8_files(entry: &str, folder: &Path) -> Vec<PathBuf> {
     let parts: Vec<&str> = entry.split('/').collect();
     let n_plain = parts.iter().take_while(|part| !part.contains(['*', '?', '['])).count();

@@ -112,7 +112,8 @@ impl Removal {
         let left_over = workdir::left_over(&dir);
         if !names.is_empty() || (whole_speaker && dir.exists()) || dir.join(PENDING).exists() {
             removal.dataset = Some((dir.clone(), names));
-            // The record of the dataset stage lists the videos among its inputs, and its failure may name their files.
+            // The record of the dataset stage lists the videos among its inputs; its results, or a failure, may name their
+            // files.
             removal
                 .paths
                 .extend([record::record_path(&dir), record::failure_path(&dir)].into_iter().filter(|p| p.exists()));

@@ -72,8 +72,8 @@ pub fn import(plan: &ImportPlan, out: &Path, progress: &dyn Progress) -> Result<
         task.advance(1);
     }
     drop(task);
-    // Accepted items keep their names; failed and refused ones are renamed. The numbers are even, so that the names
-    // equal those of earlier versions.
+    // Accepted items keep their names; failed and refused ones are renamed if theirs is in use. The numbers are even,
+    // so that the names equal those of earlier versions.
     for (nth, one) in inspected.iter_mut().enumerate().filter(|(_, one)| !one.is_kept()) {
         while !names.insert(one.source.name.clone()) {
             one.rename(2 * nth);
