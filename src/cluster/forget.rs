@@ -22,7 +22,7 @@ pub fn plans_naming(work: &Path, terms: &[SearchTerm]) -> Result<Vec<PathBuf>> {
     let entries = fs::read_dir(work).with_context(listing)?.map(|entry| Ok(entry?.path()));
     let entries = entries.collect::<Result<BTreeSet<PathBuf>>>().with_context(listing)?;
     let holds_one =
-        |path: &PathBuf| -> Result<bool> { Ok(!search(std::slice::from_ref(path), terms)?.places.is_empty()) };
+        |path: &PathBuf| -> Result<bool> { Ok(!search(std::slice::from_ref(path), terms)?.hits.is_empty()) };
     let mut found = BTreeSet::new();
     for path in entries.iter().filter(|path| is_plan(path)) {
         if holds_one(path)? {

@@ -1,4 +1,4 @@
-//! Word times of a transcript that has none, by forced alignment with its sound.
+//! Word times for a transcript, by forced alignment with its sound.
 
 use anyhow::{Result, ensure};
 use orator_base::types::sound::SAMPLE_RATE;
@@ -8,30 +8,36 @@ use orator_media::ffmpeg::UnreadableMedia;
 use orator_media::ffmpeg::sound_stream::SoundStream;
 use std::path::Path;
 
-/// Fewest words that fit, as a share of all: with fewer it is the text of another sound.
-const MIN_FITTING: f64 = 0.25;
+/// Minimum share of words that must be aligned; with fewer, the transcript probably belongs to another sound.
+const MIN_ALIGNED: f64 = 0.25;
 
-/// Words with times, and what did not fit.
+/// Words with times, and the words that could not be aligned.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Alignment {
-    /// Every word of the text, in its order: aligned, or interpolated with confidence 0 where it does not fit.
+    /// All words of the text in order: aligned, or interpolated with confidence 0 if alignment failed.
     pub words: Vec<Word>,
-    /// Indices of the words that do not fit; signs without letters are none.
+    /// Indices of the words that could not be aligned; tokens without letters or digits are not counted.
     pub unfit: Vec<usize>,
-    /// Length of the sound.
+    /// Length of the sound, seconds.
     pub sound_secs: f64,
 }
 
-/// Aligns the words of a transcript with the sound of `sound`; `heard` is told the seconds of every piece that was taken.
+/// Aligns the words of a transcript with the sound in the file `sound`. Words that already have times are searched for
+/// within them. `on_progress` is called with the seconds of each processed piece of sound.
 ///
 /// # Errors
-/// A text without words, a file without sound, a text that does not fit.
-pub fn align(aligner: Aligner, sound: &Path, transcript: &Transcript, mut heard: impl FnMut(f64)) -> Result<Alignment> {
+/// A transcript without words, a file without sound, fewer aligned words than `MIN_ALIGNED`.
+pub fn align(
+    aligner: Aligner,
+    sound: &Path,
+    transcript: &Transcript,
+    mut on_progress: impl FnMut(f64),
+) -> Result<Alignment> {
     let texts: Vec<&str> = transcript.text.split_whitespace().collect();
     let n_words = texts.iter().filter(|text| has_letters(text)).count();
     ensure!(n_words > 0, "the transcript holds no word");
     let within = |nth: usize| transcript.words.get(nth).map(|word| (word.start_secs, word.end_secs));
-    // Texts of words with times are those words.
+    // If the transcript has word times, the tokens of its text are exactly those words.
     let is_timed = transcript.words.len() == texts.len();
     let spoken = texts
         .iter()
@@ -43,7 +49,7 @@ pub fn align(aligner: Aligner, sound: &Path, transcript: &Transcript, mut heard:
         for piece in SoundStream::open(sound, SAMPLE_RATE) {
             let piece = piece?;
             n_samples += piece.len();
-            heard(piece.len() as f64 / f64::from(SAMPLE_RATE));
+            on_progress(piece.len() as f64 / f64::from(SAMPLE_RATE));
             take(&piece)?;
         }
         match n_samples {
@@ -52,22 +58,22 @@ pub fn align(aligner: Aligner, sound: &Path, transcript: &Transcript, mut heard:
         }
     })?;
     let unfit: Vec<usize> = (0..texts.len()).filter(|&n| found[n].is_none() && has_letters(texts[n])).collect();
-    let n_fitting = n_words - unfit.len();
+    let n_aligned = n_words - unfit.len();
     let sound_secs = n_samples as f64 / f64::from(SAMPLE_RATE);
     ensure!(
-        n_fitting as f64 >= MIN_FITTING * n_words as f64,
-        "only {n_fitting} of {n_words} words fit the {sound_secs:.1} s of sound: it is silent, or the text is that of \
+        n_aligned as f64 >= MIN_ALIGNED * n_words as f64,
+        "only {n_aligned} of {n_words} words fit the {sound_secs:.1} s of sound: it is silent, or the text is that of \
          another sound, or not in English"
     );
-    Ok(Alignment { words: placed(&texts, &found, sound_secs), unfit, sound_secs })
+    Ok(Alignment { words: with_times(&texts, &found, sound_secs), unfit, sound_secs })
 }
 
 fn has_letters(text: &str) -> bool {
     text.chars().any(char::is_alphanumeric)
 }
 
-/// The words with their times; those without share the time between their neighbours.
-fn placed(texts: &[&str], found: &[Option<AlignedWord>], sound_secs: f64) -> Vec<Word> {
+/// Combines texts and times; words without times evenly share the time between their neighbours.
+fn with_times(texts: &[&str], found: &[Option<AlignedWord>], sound_secs: f64) -> Vec<Word> {
     let mut words: Vec<Word> = Vec::with_capacity(texts.len());
     while words.len() < texts.len() {
         let first = words.len();
@@ -94,10 +100,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_that_do_not_fit_lie_between_their_neighbours() {
+    fn unaligned_words_are_interpolated_between_their_neighbours() {
         let at = |start_secs, end_secs| Some(AlignedWord { start_secs, end_secs, confidence: 0.9 });
         let found = [None, at(1.0, 1.5), None, None, at(2.5, 3.1), None];
-        let words = placed(&["a", "b", "c", "d", "e", "f"], &found, 3.0);
+        let words = with_times(&["a", "b", "c", "d", "e", "f"], &found, 3.0);
         let times: Vec<_> = words.iter().map(|word| (word.start_secs, word.end_secs)).collect();
         assert_eq!(times, [(0.0, 1.0), (1.0, 1.5), (1.5, 2.0), (2.0, 2.5), (2.5, 3.0), (3.0, 3.0)]);
         let unfit: Vec<usize> = (0..6).filter(|&n| words[n].confidence == Some(0.0)).collect();

@@ -1,5 +1,5 @@
-//! Bone lengths: constant within a video's shards (`bones.json`, written by the lift stage), and one set for the
-//! speaker, the frame-weighted median over the videos.
+//! Bone lengths: one set per video, constant within its shards (`bones.json`, written by the lift stage), and one set
+//! per speaker, the frame-weighted median over the videos.
 
 use anyhow::{Context, Result, ensure};
 use orator_base::input;
@@ -13,12 +13,15 @@ use std::path::Path;
 pub struct VideoBones {
     /// Lengths from joints 1..=48 to their parents, metres; 0: not measured.
     pub lengths_metres: Vec<f64>,
-    /// Number of frames of the measurement.
+    /// Number of frames that the lengths were measured in.
     pub n_frames: usize,
 }
 
 impl VideoBones {
     /// Reads `bones.json`.
+    ///
+    /// # Errors
+    /// An unreadable file, or invalid lengths (`check_lengths`).
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = input::read(path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
         let bones: Self =
@@ -28,18 +31,19 @@ impl VideoBones {
     }
 }
 
-/// Checks the bone lengths in the field `name`.
+/// Checks bone lengths; `name` is the field named in the message.
 ///
 /// # Errors
-/// Another number of lengths than 48, or one outside 0 to 10 metres.
+/// A number of lengths other than 48, or a length outside [0, 10) metres.
 pub(crate) fn check_lengths(name: &str, lengths: &[f64]) -> Result<()> {
     ensure!(lengths.len() == N_BONES, "`{name}` has {} lengths, expected {N_BONES}", lengths.len());
-    let wrong = lengths.iter().find(|length| !(0.0..10.0).contains(*length));
-    ensure!(wrong.is_none(), "`{name}` has the length {:?}, expected 0 to 10 metres", wrong.unwrap_or(&0.0));
+    let invalid = lengths.iter().find(|length| !(0.0..10.0).contains(*length));
+    ensure!(invalid.is_none(), "`{name}` has the length {:?}, expected 0 to 10 metres", invalid.unwrap_or(&0.0));
     Ok(())
 }
 
-/// Weighted median of each bone over the videos in which it was measured; 0 where it never was.
+/// Length of each bone of the speaker, metres: the median over the videos in which it was measured, weighted by frames;
+/// 0 if it was measured in none.
 pub fn of_speaker(videos: &[VideoBones]) -> [f32; N_BONES] {
     std::array::from_fn(|bone| {
         let lengths = videos.iter().filter_map(|video| {
@@ -55,15 +59,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lengths_of_no_body_are_refused_by_their_field() {
-        let says = |lengths: &[f64]| check_lengths("lengths_metres", lengths).map_err(|error| error.to_string());
-        assert_eq!(says(&[0.0; N_BONES]), Ok(()));
-        for wrong in [-0.1, f64::NAN, f64::INFINITY, 10.0] {
+    fn impossible_lengths_are_rejected_and_the_field_is_named() {
+        let check = |lengths: &[f64]| check_lengths("lengths_metres", lengths).map_err(|error| error.to_string());
+        assert_eq!(check(&[0.0; N_BONES]), Ok(()));
+        for invalid in [-0.1, f64::NAN, f64::INFINITY, 10.0] {
             let mut lengths = [0.2; N_BONES];
-            lengths[7] = wrong;
-            assert!(says(&lengths).unwrap_err().starts_with(&format!("`lengths_metres` has the length {wrong:?}")));
+            lengths[7] = invalid;
+            assert!(check(&lengths).unwrap_err().starts_with(&format!("`lengths_metres` has the length {invalid:?}")));
         }
-        assert!(says(&[0.2]).unwrap_err().contains("has 1 lengths"));
+        assert!(check(&[0.2]).unwrap_err().contains("has 1 lengths"));
     }
 
     #[test]

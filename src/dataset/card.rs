@@ -1,4 +1,4 @@
-//! Dataset card `README.md`: a YAML header in the hubs' form, and a description for readers.
+//! Dataset card `README.md`: a YAML header in the format of dataset hubs, and a description for readers.
 
 use super::info::{DatasetInfo, ModelUsed};
 use super::leakage::Leakage;
@@ -8,7 +8,7 @@ use crate::config::choices::SplitUnit;
 use orator_base::stage::ledger::WordCount;
 use std::fmt::Write;
 
-/// Text of the card.
+/// Text of the dataset card.
 pub fn text(info: &DatasetInfo, stats: &DatasetStats, leakage: &Leakage) -> String {
     let mut text = header(info);
     let speaker = &info.speaker;
@@ -22,9 +22,9 @@ pub fn text(info: &DatasetInfo, stats: &DatasetStats, leakage: &Leakage) -> Stri
         info.fps
     );
     for split in Split::ALL {
-        if let Some(part) = info.splits.get(split.name()) {
-            let (videos, length) = (part.videos.len(), length(part.secs));
-            let _ = writeln!(text, "| {} | {videos} | {} | {length} |", split.name(), part.samples);
+        if let Some(split_info) = info.splits.get(split.name()) {
+            let (videos, length) = (split_info.videos.len(), length(split_info.secs));
+            let _ = writeln!(text, "| {} | {videos} | {} | {length} |", split.name(), split_info.samples);
         }
     }
     let _ = write!(
@@ -70,16 +70,16 @@ pub fn text(info: &DatasetInfo, stats: &DatasetStats, leakage: &Leakage) -> Stri
         text,
         "\n`ledger.jsonl` says of every second of every video which it was, with what was measured.\n\n## Splits\n\n\
          {} {}\n",
-        splits(info.split_rule.as_ref()),
-        leaks(leakage)
+        describe_splits(info.split_rule.as_ref()),
+        describe_leakage(leakage)
     );
-    let said = |text: &str| if text.is_empty() { "not said".to_owned() } else { text.to_owned() };
+    let or_unstated = |text: &str| if text.is_empty() { "not said".to_owned() } else { text.to_owned() };
     let _ = write!(
         text,
         "\n## Terms\n\nLicence: {}. Consent of the speaker: {}. Source: {}.\n",
-        said(&info.licence),
-        said(&info.consent),
-        said(&info.source)
+        or_unstated(&info.licence),
+        or_unstated(&info.consent),
+        or_unstated(&info.source)
     );
     let terms = |licence: &str| if licence.is_empty() { String::new() } else { format!(", licence {licence}") };
     let model = |model: &ModelUsed| format!("{} ({}{})", model.id, model.role, terms(&model.licence));
@@ -93,8 +93,8 @@ pub fn text(info: &DatasetInfo, stats: &DatasetStats, leakage: &Leakage) -> Stri
     text
 }
 
-/// What the splits are made of.
-fn splits(rule: Option<&SplitRule>) -> String {
+/// Paragraph on how the dataset is divided into splits.
+fn describe_splits(rule: Option<&SplitRule>) -> String {
     match rule {
         None => "A video is in one split as a whole; its content's hash, or the maker, chooses which.".to_owned(),
         Some(SplitRule { unit: SplitUnit::Time, why, guard_secs }) => format!(
@@ -110,7 +110,7 @@ fn splits(rule: Option<&SplitRule>) -> String {
     }
 }
 
-/// YAML header. Values are quoted as JSON, which is valid YAML.
+/// YAML header. Values are quoted as JSON strings, which are valid YAML.
 fn header(info: &DatasetInfo) -> String {
     let quoted = |text: &str| serde_json::Value::from(text).to_string();
     let licence = if info.licence.is_empty() { "unknown" } else { &info.licence };
@@ -136,7 +136,7 @@ fn header(info: &DatasetInfo) -> String {
     text + "---\n\n"
 }
 
-/// Duration for people.
+/// Duration as text for readers.
 fn length(secs: f64) -> String {
     match secs {
         ..120.0 => format!("{secs:.1} s"),
@@ -154,7 +154,8 @@ fn size_category(samples: usize) -> &'static str {
     }
 }
 
-fn leaks(leakage: &Leakage) -> String {
+/// Sentence on sound shared between videos.
+fn describe_leakage(leakage: &Leakage) -> String {
     if leakage.duplicate_secs <= 0.0 {
         return "Whether videos share sound was not looked at.".to_owned();
     }

@@ -1,5 +1,5 @@
-//! Index file `index.jsonl`: a line for each sample with its location in a shard and its BLAKE3 hash, for random access
-//! and checks. Shards are listed in `info.json`.
+//! Index file `index.jsonl`: one line per sample with its location in a shard and its BLAKE3 hash, for random access
+//! and verification. The shards are listed in `info.json`.
 
 use orator_base::types::file_name::FileName;
 use orator_base::types::split::Split;
@@ -7,71 +7,70 @@ use orator_formats::wav;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 
-/// Most samples or frames that a record may speak of: years of motion, and sums of them fit into any integer here.
-const MOST: usize = u32::MAX as usize;
+/// Largest accepted number of samples or frames: years of motion, and sums of such numbers do not overflow.
+const MAX_COUNT: usize = u32::MAX as usize;
 
-/// Reads a number of samples or frames.
+/// Deserialises a number of samples or frames.
 ///
 /// # Errors
-///
-/// Where it is more than any dataset has, so that the record is damaged.
+/// A number above `MAX_COUNT`, which shows that the file is damaged.
 pub fn count<'de, D: Deserializer<'de>>(from: D) -> Result<usize, D::Error> {
     let count = usize::deserialize(from)?;
-    if count > MOST {
-        return Err(D::Error::custom(format!("{count} samples or frames, {MOST} at most: the file is damaged")));
+    if count > MAX_COUNT {
+        return Err(D::Error::custom(format!("{count} samples or frames, {MAX_COUNT} at most: the file is damaged")));
     }
     Ok(count)
 }
 
-/// Tar file of samples.
+/// Tar shard.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ShardRef {
-    /// Name in the dataset's folder.
+    /// File name in the dataset folder.
     pub file: FileName,
-    /// Size.
+    /// Size of the file, bytes.
     pub bytes: u64,
-    /// Samples in it.
+    /// Number of samples in the shard.
     #[serde(deserialize_with = "count")]
     pub n_samples: usize,
-    /// Hash of its content, in hex.
+    /// BLAKE3 of the file, hexadecimal.
     pub blake3: String,
 }
 
-/// Sample with its members; offsets count from the beginning of the shard.
+/// Location of a sample and its members; offsets count from the beginning of the shard.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SampleRef {
-    /// Name, once in the dataset.
+    /// Name, unique in the dataset.
     pub key: FileName,
-    /// The part it belongs to.
+    /// Split that the sample belongs to.
     pub split: Split,
     /// File name of the shard.
     pub shard: FileName,
-    /// Start of the sample with its tar headers, a valid tar stream by itself.
+    /// Start of the sample including its tar headers; the bytes from here on form a valid tar stream.
     pub offset: u64,
-    /// Bytes from `offset` on.
+    /// Number of bytes of the sample from `offset` on.
     pub size: u64,
-    /// Frames of motion.
+    /// Number of frames of motion.
     #[serde(deserialize_with = "count")]
     pub n_frames: usize,
-    /// Hash of the `size` bytes at `offset`.
+    /// BLAKE3 of the `size` bytes at `offset`, hexadecimal.
     pub blake3: String,
-    /// Where it comes from.
+    /// Metadata of the interval (`json`).
     pub json: ByteRange,
-    /// Which joints were seen.
+    /// Visibility mask of the joints (`mask.npy`).
     pub mask: ByteRange,
-    /// Keypoints.
+    /// 2D keypoints (`pose2d.npy`).
     pub pose2d: ByteRange,
-    /// Joints.
+    /// 3D joints (`pose3d.npy`).
     pub pose3d: ByteRange,
-    /// Sound.
+    /// Sound (`wav`).
     pub wav: ByteRange,
-    /// Words; `None`: no transcript was asked for.
+    /// Words (`words.json`); `None`: no transcripts were requested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub words: Option<ByteRange>,
-    /// Angles of the head; `None`: they were not asked for.
+    /// Head angles (`head.npy`); `None`: posture was not requested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub head: Option<ByteRange>,
-    /// Angles of the trunk, where there are those of the head.
+    /// Trunk angles (`trunk.npy`); present if and only if `head` is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub trunk: Option<ByteRange>,
 }
@@ -79,19 +78,19 @@ pub struct SampleRef {
 /// Range of bytes in a shard.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ByteRange {
-    /// The first byte.
+    /// Position of the first byte.
     pub offset: u64,
     /// Number of bytes.
     pub size: u64,
 }
 
 impl SampleRef {
-    /// Samples of sound.
+    /// Number of audio samples, from the size of the 16-bit mono wav.
     pub fn n_sound_samples(&self) -> usize {
         (self.wav.size.saturating_sub(wav::HEADER_BYTES as u64) / 2) as usize
     }
 
-    /// Whether every member lies inside the sample, and the sample inside its shard.
+    /// Whether all members are inside the sample, and the sample is inside a shard of `shard_bytes`.
     pub fn fits(&self, shard_bytes: u64) -> bool {
         let end = |offset: u64, size: u64| offset.checked_add(size);
         let Some(sample_end) = end(self.offset, self.size) else { return false };

@@ -1,4 +1,4 @@
-//! Description file `info.json`: the meaning of all numbers, for readers without this program.
+//! Description file `info.json`: the meaning of all arrays and fields, for readers without this program.
 
 use super::index::{self, ShardRef};
 use super::sample::{N_KEYPOINTS, OPTIONAL_EXTENSIONS, WORDS_EXTENSION};
@@ -16,34 +16,36 @@ pub struct DatasetInfo {
     /// Program that wrote the dataset, with its version.
     pub tool: String,
     pub fps: FrameRate,
-    /// Sound samples a second.
+    /// Audio samples per second.
     pub sound_rate: u32,
-    /// Members of a sample, by extension.
+    /// Members of a sample by extension.
     pub members: BTreeMap<String, Member>,
-    /// Coordinates of `pose3d.npy`.
+    /// Coordinate axes of `pose3d.npy`.
     pub axes: JointAxes,
     pub joints: Vec<SkeletonJoint>,
-    /// Length from joint `n + 1` to its parent, metres, the median over the videos. Within a video bones have the
-    /// constant lengths of `videos/<name>.json`.
+    /// Length of the bone from joint `n + 1` to its parent, metres: the median over the videos. Within a video, bones
+    /// have the constant lengths in `videos/<name>.json`.
     pub bone_lengths_metres: Vec<f64>,
-    /// Names of the 59 points of `pose2d.npy`.
+    /// Names of the 59 keypoints of `pose2d.npy`.
     pub keypoints: Vec<String>,
     /// Models that were applied to the videos.
     pub models: Vec<ModelUsed>,
-    /// Licence identifier, form of the speaker's consent, origin of the videos; empty: not stated.
+    /// Licence identifier; empty: not stated.
     pub licence: String,
+    /// Form of the speaker's consent; empty: not stated.
     pub consent: String,
+    /// Origin of the videos; empty: not stated.
     pub source: String,
     /// Further notes for readers, a sentence each.
     pub notes: Vec<String>,
-    /// Whether silence stands in the place of the sound (`orator import --no-sound`).
+    /// Whether the sound was replaced by silence (`orator import --no-sound`).
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub no_sound: bool,
-    /// What the splits are made of, and why; `None`: an earlier version wrote the dataset.
+    /// How the splits were made; `None`: the dataset was written by an earlier version.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub split_rule: Option<SplitRule>,
     pub splits: BTreeMap<String, SplitInfo>,
-    /// Videos by name, those without a sample too.
+    /// Videos sorted by name, including those without samples.
     pub videos: Vec<DatasetVideo>,
 }
 
@@ -54,17 +56,17 @@ pub struct DatasetVideo {
     pub file: String,
     /// BLAKE3 of the file.
     pub content: String,
-    /// Split; `None`: no sample, or samples in several splits (`blocks`).
+    /// Split; `None`: no samples, or samples in several splits (`blocks`).
     pub split: Option<Split>,
     pub split_by: SplitBy,
-    /// Blocks of time that belong to the splits; empty for a whole video.
+    /// Time blocks with their splits; empty for a video that is in one split.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub blocks: Vec<TimeBlock>,
     pub samples: usize,
     pub secs: f64,
 }
 
-/// Array or file of a sample.
+/// Description of an array or file of a sample.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Member {
     pub shape: String,
@@ -72,7 +74,7 @@ pub struct Member {
     pub meaning: String,
 }
 
-/// Directions and unit of joint coordinates.
+/// Axis directions, unit and origin of joint coordinates.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct JointAxes {
     pub x: String,
@@ -82,7 +84,7 @@ pub struct JointAxes {
     pub origin: String,
 }
 
-/// Joint of the skeleton; `parent` is its index in the list.
+/// Joint of the skeleton; `parent` is an index into the list of joints.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SkeletonJoint {
     pub name: String,
@@ -90,13 +92,13 @@ pub struct SkeletonJoint {
     pub side: String,
 }
 
-/// Model by role (`body`, `hand`, ...), its id in the manifest, and the hash of its file.
+/// Model with its role (`body`, `hand`, ...), its id in the manifest and the hash of its file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ModelUsed {
     pub role: String,
     pub id: String,
     pub sha256: String,
-    /// Terms of the weights; empty in older datasets.
+    /// Licence of the weights; empty in older datasets.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub licence: String,
 }
@@ -113,7 +115,7 @@ pub struct SplitInfo {
     pub secs: f64,
 }
 
-/// Description of a dataset apart from its videos.
+/// Description of a dataset without its videos.
 #[derive(Clone, Debug, PartialEq)]
 pub struct About {
     pub speaker: String,
@@ -129,7 +131,7 @@ pub struct About {
 }
 
 impl About {
-    /// Description of `speaker` at `fps` with all other fields empty.
+    /// Description with the given speaker and frame rate; all other fields are empty.
     pub fn new(speaker: &str, fps: FrameRate) -> Self {
         let (speaker, tool) = (speaker.to_owned(), concat!("orator ", env!("CARGO_PKG_VERSION")).to_owned());
         let (models, notes, no_sound, split_rule) = (Vec::new(), Vec::new(), false, None);
@@ -139,7 +141,7 @@ impl About {
 }
 
 impl DatasetInfo {
-    /// Contents for a dataset `about` with these videos and bones (48 lengths, metres).
+    /// Contents for a dataset; `bones` are the speaker's 48 bone lengths, metres.
     pub fn new(about: &About, bones: &[f32], splits: BTreeMap<Split, SplitInfo>, videos: Vec<DatasetVideo>) -> Self {
         let About { speaker, tool, fps, models, licence, consent, source, notes, no_sound, split_rule } = about.clone();
         Self {
@@ -171,14 +173,14 @@ impl DatasetInfo {
         }
     }
 
-    /// Description apart from the videos.
+    /// Description without the videos.
     pub fn about(&self) -> About {
         let DatasetInfo { speaker, tool, fps, models, licence, consent, source, notes, no_sound, split_rule, .. } =
             self.clone();
         About { speaker, tool, fps, models, licence, consent, source, notes, no_sound, split_rule }
     }
 
-    /// Describes the words of samples.
+    /// Adds the description of the member `words.json`.
     pub fn with_words(mut self) -> Self {
         let meaning = "the words said, each with start_secs and end_secs from the first frame's beginning, the source of \
                        these times (given, shared, aligned, interpolated) and confidence 0..1 or null";
@@ -187,7 +189,7 @@ impl DatasetInfo {
         self
     }
 
-    /// Describes the angles of head and trunk.
+    /// Adds the descriptions of the members `head.npy` and `trunk.npy`.
     pub fn with_posture(mut self) -> Self {
         let [_, head, trunk] = OPTIONAL_EXTENSIONS;
         let angles = "yaw to the person's left, pitch downwards, roll towards the right shoulder, radians, in the axes of the joints; \
@@ -244,7 +246,7 @@ fn joint(joint: usize) -> SkeletonJoint {
 pub fn keypoint_names() -> Vec<String> {
     let paired = ["Eye", "Ear", "Shoulder", "Elbow", "Wrist", "Hip", "Knee", "Ankle"];
     let body = paired.iter().flat_map(|name| [format!("L{name}"), format!("R{name}")]);
-    // Points of a hand are in joint order: wrist, then the fingers, base to tip.
+    // Hand keypoints are in joint order: the wrist, then the fingers from base to tip.
     let hand = |root: usize| (root..root + skeleton::N_HAND_JOINTS).map(skeleton::name);
     let mut names = Vec::with_capacity(N_KEYPOINTS);
     names.push("Nose".to_owned());
@@ -257,7 +259,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_keypoint_has_a_name_of_its_own() {
+    fn keypoint_names_are_unique() {
         let names = keypoint_names();
         assert_eq!(names.len(), N_KEYPOINTS);
         let different: std::collections::BTreeSet<_> = names.iter().collect();

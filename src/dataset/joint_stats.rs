@@ -1,5 +1,5 @@
-//! Mean, deviation and range of a video's joints, mergeable over videos without reading joints again (Chan, Golub,
-//! LeVeque 1979).
+//! Mean, standard deviation and range of a video's joints, which can be merged over videos without reading the joints
+//! again (pairwise update of Chan, Golub and LeVeque 1979).
 
 use ndarray::{ArrayView1, aview1};
 use orator_base::types::pose3d::Motion;
@@ -7,16 +7,18 @@ use orator_base::types::posture::{Posture, PostureChannel};
 use orator_base::types::skeleton::N_JOINTS;
 use serde::{Deserialize, Serialize};
 
-/// Moments over the frames in which a joint was seen; rows are joints, columns x, y, z in metres. Of a posture rows are
-/// its six angles, each of which may be seen alone, in radians in the first column.
+/// Moments over the frames in which a joint is visible; rows are joints, columns x, y, z in metres. For a posture, rows
+/// are its six angles, each with its own visibility, and the first column is the angle in radians.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JointMoments {
+    /// Number of frames in which each row is visible.
     pub n_seen: Vec<u64>,
     pub mean: Vec<[f64; 3]>,
-    /// Sums of squared differences from the mean.
+    /// Sum of squared differences from the mean.
     pub squares: Vec<[f64; 3]>,
-    /// Minimum; 0 where a joint was never seen.
+    /// Minimum; 0 for a joint that is never visible.
     pub min: Vec<[f64; 3]>,
+    /// Maximum; 0 for a joint that is never visible.
     pub max: Vec<[f64; 3]>,
 }
 
@@ -32,30 +34,30 @@ impl JointMoments {
         Self { n_seen: vec![0; n], mean: rows(), squares: rows(), min: rows(), max: rows() }
     }
 
-    /// Moments of postures: rows yaw, pitch, roll of the head, then of the trunk.
+    /// Empty moments of postures; the rows are yaw, pitch and roll of the head, then of the trunk.
     pub fn of_posture() -> Self {
         Self::with_rows(3 * PostureChannel::ALL.len())
     }
 
-    /// Adds the joints that were seen.
-    pub fn learn(&mut self, motion: &Motion) {
+    /// Adds the visible joints of a motion.
+    pub fn add_motion(&mut self, motion: &Motion) {
         for (frame, seen) in motion.joints.outer_iter().zip(motion.mask.outer_iter()) {
             for (joint, row) in frame.outer_iter().enumerate().filter(|(joint, _)| seen[*joint]) {
-                self.learn_row(joint, row);
+                self.add_row(joint, row);
             }
         }
     }
 
-    /// Adds the angles that were seen.
-    pub fn learn_posture(&mut self, posture: &Posture) {
+    /// Adds the visible (non-NaN) angles of a posture.
+    pub fn add_posture(&mut self, posture: &Posture) {
         for (channel, first) in PostureChannel::ALL.into_iter().zip([0, 3]) {
             for ((_, k), angle) in posture.channel(channel).indexed_iter() {
-                self.learn_row(first + k, aview1(&[*angle, 0.0, 0.0]));
+                self.add_row(first + k, aview1(&[*angle, 0.0, 0.0]));
             }
         }
     }
 
-    fn learn_row(&mut self, joint: usize, row: ArrayView1<f32>) {
+    fn add_row(&mut self, joint: usize, row: ArrayView1<f32>) {
         if row.iter().any(|v| !v.is_finite()) {
             return;
         }
@@ -72,7 +74,7 @@ impl JointMoments {
         }
     }
 
-    /// Adds the moments of other frames. Rows that `other` lacks count as never seen.
+    /// Adds the moments of other frames. Rows that `other` lacks count as never visible.
     pub fn merge(&mut self, other: &JointMoments) {
         let rows = other.mean.iter().zip(&other.squares).zip(other.min.iter().zip(&other.max));
         for (joint, ((mean, squares), (min, max))) in rows.enumerate().take(self.n_seen.len()) {
@@ -114,9 +116,9 @@ mod tests {
     }
 
     #[test]
-    fn masked_and_missing_joints_have_no_say() {
+    fn masked_and_missing_joints_are_ignored() {
         let mut moments = JointMoments::default();
-        moments.learn(&motion(&[1.0, 2.0, 6.0, 1000.0], &[3]));
+        moments.add_motion(&motion(&[1.0, 2.0, 6.0, 1000.0], &[3]));
         assert_eq!((moments.n_seen[1], moments.n_seen[2], moments.n_seen[0]), (3, 0, 4));
         assert!((moments.mean[1][0] - 3.0).abs() < 1e-12);
         assert!((moments.std()[1][0] - (14.0f64 / 3.0).sqrt()).abs() < 1e-12);
@@ -125,18 +127,18 @@ mod tests {
     }
 
     #[test]
-    fn parts_together_are_the_whole() {
+    fn merged_moments_equal_those_of_all_frames() {
         let xs = [0.5, -1.0, 7.0, 7.5, 8.0, -30.0, 2.0];
-        let mut whole = JointMoments::default();
-        whole.learn(&motion(&xs, &[]));
+        let mut all_frames = JointMoments::default();
+        all_frames.add_motion(&motion(&xs, &[]));
         let mut merged = JointMoments::default();
         for part in [&xs[..2], &[], &xs[2..3], &xs[3..]] {
             let mut moments = JointMoments::default();
-            moments.learn(&motion(part, &[]));
+            moments.add_motion(&motion(part, &[]));
             merged.merge(&moments);
         }
-        assert_eq!((&merged.n_seen, &merged.min, &merged.max), (&whole.n_seen, &whole.min, &whole.max));
-        assert!((merged.mean[1][0] - whole.mean[1][0]).abs() < 1e-12);
-        assert!((merged.std()[1][0] - whole.std()[1][0]).abs() < 1e-12);
+        assert_eq!((&merged.n_seen, &merged.min, &merged.max), (&all_frames.n_seen, &all_frames.min, &all_frames.max));
+        assert!((merged.mean[1][0] - all_frames.mean[1][0]).abs() < 1e-12);
+        assert!((merged.std()[1][0] - all_frames.std()[1][0]).abs() < 1e-12);
     }
 }

@@ -1,4 +1,5 @@
-//! Leakage file `leakage.json`: videos that share sound, and those of them in different splits.
+//! Leakage file `leakage.json`: pairs of videos that share sound, and the pairs whose shared sound is in different
+//! splits.
 
 use super::shared_sound::SharedSound;
 use super::split::{Split, TimeBlock, blocks};
@@ -8,14 +9,14 @@ use std::collections::BTreeMap;
 /// Contents of `leakage.json`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Leakage {
-    /// Shortest shared sound that counts, seconds; 0: sound was not compared.
+    /// Minimum length of shared sound that counts, seconds; 0: sound was not compared.
     pub duplicate_secs: f64,
-    /// Number of compared videos with samples.
+    /// Number of compared videos.
     pub n_compared: usize,
     /// Pairs of videos that share sound.
     pub shared: Vec<SharedSound>,
-    /// Pairs in different splits, where a test has seen training sound; caused only by splits named in the
-    /// configuration.
+    /// Pairs whose shared sound is in different splits, so that evaluation data may occur in the training data; only
+    /// splits named in the configuration cause them.
     pub leaks: Vec<Leak>,
 }
 
@@ -26,7 +27,7 @@ pub struct Leak {
     pub a_split: Split,
     pub b: String,
     pub b_split: Split,
-    /// Seconds of it in different splits.
+    /// Seconds of the shared sound that are in different splits.
     pub secs: f64,
 }
 
@@ -38,7 +39,7 @@ pub struct SoundComparison {
 }
 
 impl Leakage {
-    /// Report on videos with these blocks of splits.
+    /// Leakage of the compared videos; `splits` are their time blocks by name.
     pub fn new(compared: &SoundComparison, splits: &BTreeMap<String, Vec<TimeBlock>>) -> Self {
         let leak = |shared: &SharedSound| {
             let SharedSound { a, b, a_secs, b_secs, secs } = shared.clone();
@@ -46,7 +47,7 @@ impl Leakage {
             let conflicts = blocks::conflicts(splits.get(&a)?, span, splits.get(&b)?, b_secs - a_secs);
             let (_, a_split, b_split) = *conflicts.first()?;
             let apart: f64 = conflicts.iter().map(|((start, end), ..)| end - start).sum();
-            // Sums of parts are rounded; a whole is not.
+            // The exact length is kept where all shared sound is in conflict; a sum of parts has rounding errors.
             let secs = if conflicts.len() == 1 && conflicts[0].0 == span { secs } else { apart };
             Some(Leak { a, a_split, b, b_split, secs })
         };
@@ -58,7 +59,7 @@ impl Leakage {
         }
     }
 
-    /// Comparison it was made from.
+    /// Comparison that the file was made from.
     pub fn compared(&self) -> SoundComparison {
         SoundComparison { duplicate_secs: self.duplicate_secs, shared: self.shared.clone() }
     }

@@ -1,8 +1,8 @@
-//! Dataset of one speaker on disk. A folder holds WebDataset tar shards of each video (`train-<video>-0000.tar`, ...),
-//! `videos/` (an entry for each video), and common files assembled from the entries: `info.json`, `stats.json`,
-//! `index.jsonl`, `ledger.jsonl`, `leakage.json`, `README.md`, `checksums.b3`. A sample is an interval of continuous
-//! motion with its sound; training draws windows from it. Writing: `sample` -> `write::tar` -> `write::part` ->
-//! `write::assemble`; reading: `read`; splits: `split`, `shared_sound`; checks: `verify`.
+//! Configuration, and the dataset of one speaker on disk. Its folder contains WebDataset tar shards of each video
+//! (`train-<video>-0000.tar`, ...), `videos/` (an entry per video), and common files assembled from the entries:
+//! `info.json`, `stats.json`, `index.jsonl`, `ledger.jsonl`, `leakage.json`, `README.md`, `checksums.b3`. A sample is
+//! an interval of continuous motion with its sound; training draws windows from it. Writing: `sample` -> `write::tar`
+//! -> `write::entry` -> `write::assemble`; reading: `read`; splits: `split`, `shared_sound`; checks: `verify`.
 
 pub mod align;
 pub mod bones;

@@ -1,5 +1,5 @@
-//! Reading of a dataset's folder: any sample, or any range of frames of one. Damaged, missing or foreign files are
-//! errors that name the file and what to do.
+//! Reading of a dataset folder: any sample, or any range of frames of a sample. Errors for damaged, missing or foreign
+//! files name the file and what to do.
 
 use super::bones::check_lengths;
 use super::index::{ByteRange, SampleRef};
@@ -28,23 +28,24 @@ use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
-/// Open dataset; threads may share it without a lock.
+/// Open dataset; threads may share a reference without further locking.
 pub struct Dataset {
     dir: PathBuf,
     info: DatasetInfo,
     stats: DatasetStats,
     samples: Vec<SampleRef>,
     shards: ShardFiles,
-    /// Keeps the folder from being replaced, and its videos from being forgotten.
+    /// Shared lock: the folder is not replaced and its videos are not forgotten while it is held.
     _lock: FolderLock,
 }
 
 impl Dataset {
     /// Opens the folder of one speaker (`work/dataset/<speaker>`): reads its JSON files and checks that every shard
-    /// exists with its size. Contents are checked by `read` and by `verify`. Nobody writes the folder until it is closed.
+    /// exists and has the recorded size. Contents are checked by `read` and `verify`. Other processes cannot write the
+    /// folder while it is open.
     ///
     /// # Errors
-    /// No dataset, a damaged one, one that is being written (`BusyFolder`).
+    /// A folder that is not a dataset, is damaged, or is being written (`BusyFolder`).
     pub fn open(dir: impl AsRef<Path>) -> Result<Dataset> {
         let dir = dir.as_ref().to_owned();
         let lock = FolderLock::shared(&dir)?;
@@ -101,12 +102,15 @@ impl Dataset {
         Ok(Dataset { dir, info, stats, samples, shards, _lock: lock })
     }
 
-    /// Folder of the dataset.
+    /// Dataset folder.
     pub fn dir(&self) -> &Path {
         &self.dir
     }
 
-    /// Hash (BLAKE3, hex) of the dataset's checksums, and so of all its files.
+    /// BLAKE3 (hexadecimal) of `checksums.b3`, which identifies the contents of all files.
+    ///
+    /// # Errors
+    /// An unreadable `checksums.b3`.
     pub fn hash(&self) -> Result<String> {
         let path = self.dir.join(CHECKSUMS);
         let checksums =
@@ -114,22 +118,25 @@ impl Dataset {
         Ok(blake3::hash(&checksums).to_hex().to_string())
     }
 
-    /// Description of the numbers.
+    /// Contents of `info.json`.
     pub fn info(&self) -> &DatasetInfo {
         &self.info
     }
 
-    /// Statistics of the numbers.
+    /// Contents of `stats.json`.
     pub fn stats(&self) -> &DatasetStats {
         &self.stats
     }
 
-    /// Samples of a split, in the order of the shards.
+    /// Samples of a split, in index order.
     pub fn samples(&self, split: Split) -> Vec<SampleRef> {
         self.samples.iter().filter(|sample| sample.split == split).cloned().collect()
     }
 
     /// Reads a sample and checks its hash.
+    ///
+    /// # Errors
+    /// An unreadable or damaged sample; the message names it and its shard.
     pub fn read(&self, sample: &SampleRef) -> Result<Sample> {
         let hash = blake3::hash(&self.bytes(sample, ByteRange { offset: sample.offset, size: sample.size })?);
         ensure!(
@@ -150,14 +157,15 @@ impl Dataset {
         Ok(Sample { key, motion, pose2d, sound, words, posture, meta })
     }
 
-    /// Words of a sample; `None`: no transcript was asked for.
+    /// Reads the words of a sample; `None`: no transcripts were requested.
     pub fn words(&self, sample: &SampleRef) -> Result<Option<Vec<Word>>> {
         let Some(range) = sample.words else { return Ok(None) };
         let words = serde_json::from_slice(&self.bytes(sample, range)?);
         words.with_context(|| format!("reading {}.{WORDS_EXTENSION} in {}", sample.key, sample.shard))
     }
 
-    /// Posture of these frames of a sample; only these are read, no hash is checked. `None`: the dataset has none.
+    /// Reads the posture of a range of frames of a sample, without checking the hash. `None`: the sample has no
+    /// posture.
     pub fn posture(&self, sample: &SampleRef, frames: Range<usize>) -> Result<Option<Posture>> {
         let (Some(head), Some(trunk)) = (sample.head, sample.trunk) else { return Ok(None) };
         let angles = |range: ByteRange| -> Result<Array2<f32>> {
@@ -167,7 +175,7 @@ impl Dataset {
         Ok(Some(Posture { head: angles(head)?, trunk: angles(trunk)? }))
     }
 
-    /// Motion of the frames `frames` of a sample; only these are read, no hash is checked.
+    /// Reads the motion of a range of frames of a sample, without checking the hash.
     pub fn motion(&self, sample: &SampleRef, frames: Range<usize>) -> Result<Motion> {
         let n_frames = frames.len();
         let joints = npy::floats(&self.rows(sample, sample.pose3d, Element::F32, &[N_JOINTS, 3], frames.clone())?);
@@ -180,18 +188,18 @@ impl Dataset {
         motion.in_range().with_context(|| format!("{} in {}", sample.key, self.dir.join(&sample.shard).display()))
     }
 
-    /// These samples of the sound of a sample; only these are read, no hash is checked.
+    /// Reads a range of audio samples of a sample, without checking the hash.
     pub fn sound(&self, sample: &SampleRef, range: Range<usize>) -> Result<Sound> {
-        let place = || format!("reading {}.wav in {}", sample.key, self.dir.join(&sample.shard).display());
+        let location = || format!("reading {}.wav in {}", sample.key, self.dir.join(&sample.shard).display());
         let (rate, at) = (self.info.sound_rate, sample.wav.offset + wav::HEADER_BYTES as u64);
         let head = ByteRange { offset: sample.wav.offset, size: sample.wav.size.min(wav::HEADER_BYTES as u64) };
-        let n_samples = wav::n_samples(&self.bytes(sample, head)?, sample.wav.size, rate).with_context(place)?;
-        ensure!(range.end <= n_samples, "{}: it holds {n_samples} samples, not {}", place(), range.end);
+        let n_samples = wav::n_samples(&self.bytes(sample, head)?, sample.wav.size, rate).with_context(location)?;
+        ensure!(range.end <= n_samples, "{}: it holds {n_samples} samples, not {}", location(), range.end);
         let span = ByteRange { offset: at + 2 * range.start as u64, size: 2 * range.len() as u64 };
         Ok(Sound { rate, samples: wav::samples(&self.bytes(sample, span)?) })
     }
 
-    /// Bytes of the rows `frames` of an array.
+    /// Reads the bytes of the rows `frames` of an array.
     fn rows(
         &self,
         sample: &SampleRef,
@@ -200,13 +208,13 @@ impl Dataset {
         row: &[usize],
         frames: Range<usize>,
     ) -> Result<Vec<u8>> {
-        let place = || format!("reading an array of {} in {}", sample.key, self.dir.join(&sample.shard).display());
+        let location = || format!("reading an array of {} in {}", sample.key, self.dir.join(&sample.shard).display());
         let head = ByteRange { offset: span.offset, size: span.size.min(npy::HEADER_BYTES as u64) };
-        let layout = Layout::parse(&self.bytes(sample, head)?, span.size, element, row).with_context(place)?;
+        let layout = Layout::parse(&self.bytes(sample, head)?, span.size, element, row).with_context(location)?;
         ensure!(
             frames.start <= frames.end && frames.end <= layout.n_rows,
             "{}: it has {} frames, {}..{} were asked for",
-            place(),
+            location(),
             layout.n_rows,
             frames.start,
             frames.end
@@ -216,12 +224,12 @@ impl Dataset {
     }
 
     fn bytes(&self, sample: &SampleRef, span: ByteRange) -> Result<Vec<u8>> {
-        let place = || format!("reading {} in {}", sample.key, self.dir.join(&sample.shard).display());
-        let file = self.shards.get(&sample.shard).with_context(place)?;
-        // Ranges lie inside the file (checked on opening and by the array headers), which bounds the allocation.
-        ensure!(span.size <= sample.size, "{}: {} bytes of a smaller sample were asked for", place(), span.size);
+        let location = || format!("reading {} in {}", sample.key, self.dir.join(&sample.shard).display());
+        let file = self.shards.get(&sample.shard).with_context(location)?;
+        // The size of a sample is bounded by its shard (checked by `open`), which bounds the allocation.
+        ensure!(span.size <= sample.size, "{}: {} bytes of a smaller sample were asked for", location(), span.size);
         let mut bytes = vec![0; span.size as usize];
-        file.read_exact_at(&mut bytes, span.offset).with_context(place)?;
+        file.read_exact_at(&mut bytes, span.offset).with_context(location)?;
         Ok(bytes)
     }
 }
@@ -242,27 +250,27 @@ struct Schema {
     schema: u32,
 }
 
-/// Files held open at a time; programs may have 1,024 by default.
-const MOST_OPEN: usize = 256;
+/// Maximum number of files held open; the usual limit of a process is 1,024.
+const MAX_OPEN: usize = 256;
 
-/// Shards of a folder; threads share it.
+/// Cache of open shard files of a folder, shared by threads.
 pub struct ShardFiles {
     dir: PathBuf,
     names: BTreeSet<FileName>,
-    /// Those open, the one used last in front.
+    /// Open files, the most recently used first.
     open: Mutex<VecDeque<(FileName, Arc<File>)>>,
 }
 
 impl ShardFiles {
-    /// Shards of those names in `dir`.
+    /// Cache for the shards `names` in `dir`; no file is opened yet.
     pub fn new(dir: &Path, names: BTreeSet<FileName>) -> Self {
         Self { dir: dir.to_owned(), names, open: Mutex::default() }
     }
 
-    /// The file of a shard.
+    /// Returns the file of a shard, opening it if necessary.
     ///
     /// # Errors
-    /// A name that is none of its shards'; a file that cannot be opened.
+    /// A name that is not one of the shards; a file that cannot be opened.
     pub fn get(&self, name: &FileName) -> Result<Arc<File>> {
         self.names.get(name).context("no such shard")?;
         let mut open = self.open.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
@@ -280,7 +288,7 @@ impl ShardFiles {
         };
         let file = used.1.clone();
         open.push_front(used);
-        open.truncate(MOST_OPEN);
+        open.truncate(MAX_OPEN);
         Ok(file)
     }
 }

@@ -1,4 +1,4 @@
-//! Sample of the dataset: motion, keypoints, sound and metadata of an interval, and its members as bytes.
+//! Sample of a dataset: motion, keypoints, sound and metadata of an interval, and the encoding of its members.
 
 use super::{pretty, words};
 use anyhow::{Context, Result, ensure};
@@ -11,7 +11,7 @@ use orator_base::types::sound::{SAMPLE_RATE, Sound, sample_at};
 use orator_formats::transcript::Word;
 use orator_formats::{npy, wav};
 
-/// Keypoints of a frame: 17 of the body, 21 of the left hand, 21 of the right hand.
+/// Number of keypoints of a frame: 17 of the body, 21 of the left hand, 21 of the right hand.
 pub const N_KEYPOINTS: usize = N_BODY + 2 * N_HAND;
 
 /// Interval of continuous motion with its sound.
@@ -25,19 +25,20 @@ pub struct Sample {
     pub pose2d: Array3<f32>,
     /// Sound at 16 kHz mono, from the beginning of the first frame to the end of the last.
     pub sound: Sound,
-    /// Words said in it, their times from its beginning; `None`: no transcript was asked for.
+    /// Words of the interval, with times from its start; `None`: no transcripts were requested.
     pub words: Option<Vec<Word>>,
-    /// Angles of head and trunk; `None`: they were not asked for.
+    /// Angles of head and trunk; `None`: posture was not requested.
     pub posture: Option<Posture>,
     /// Metadata: source and properties of the interval.
     pub meta: serde_json::Value,
 }
 
-/// Extensions of the members, in the order of a shard.
+/// Extensions of the required members, in the order of a shard.
 pub const EXTENSIONS: [&str; 5] = ["json", "mask.npy", "pose2d.npy", "pose3d.npy", "wav"];
-/// Extension of the words.
+/// Extension of the member with the words.
 pub const WORDS_EXTENSION: &str = "words.json";
-/// Extensions of members behind `EXTENSIONS`, where a sample has them; head and trunk come together.
+/// Extensions of the optional members, which follow `EXTENSIONS` in a shard; a sample has both `head.npy` and
+/// `trunk.npy` or neither.
 pub const OPTIONAL_EXTENSIONS: [&str; 3] = [WORDS_EXTENSION, "head.npy", "trunk.npy"];
 
 impl Sample {
@@ -46,7 +47,10 @@ impl Sample {
         self.motion.n_frames()
     }
 
-    /// Bytes of each of `EXTENSIONS`. Errors where shapes or lengths contradict each other.
+    /// Encodes the members of `EXTENSIONS`.
+    ///
+    /// # Errors
+    /// An invalid key, or shapes and lengths that contradict each other.
     pub fn members(&self) -> Result<[Vec<u8>; 5]> {
         let (key, n_frames) = (&self.key, self.n_frames());
         let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '_';
@@ -72,7 +76,10 @@ impl Sample {
         ])
     }
 
-    /// Bytes of each of `OPTIONAL_EXTENSIONS` that the sample has. Errors where they contradict the sample.
+    /// Encodes the members of `OPTIONAL_EXTENSIONS` that the sample has.
+    ///
+    /// # Errors
+    /// Words or angles that contradict the length of the sample.
     pub fn optional_members(&self) -> Result<[Option<Vec<u8>>; 3]> {
         let n_frames = self.n_frames();
         let angles = |channel: PostureChannel| -> Result<Option<Vec<u8>>> {
@@ -85,10 +92,10 @@ impl Sample {
     }
 
     fn words_member(&self) -> Result<Option<Vec<u8>>> {
-        let Some(said) = &self.words else { return Ok(None) };
+        let Some(words) = &self.words else { return Ok(None) };
         let secs = self.motion.fps.secs(self.n_frames());
-        words::check(said, secs).with_context(|| self.key.clone())?;
-        let mut json = serde_json::to_vec(said).context("writing a sample's words as JSON")?;
+        words::check(words, secs).with_context(|| self.key.clone())?;
+        let mut json = serde_json::to_vec(words).context("writing a sample's words as JSON")?;
         json.push(b'\n');
         Ok(Some(json))
     }

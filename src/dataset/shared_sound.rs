@@ -1,34 +1,35 @@
-//! Sound shared between videos: a re-upload, a shortened version, the same intro. Fingerprint codes
-//! (`audio::fingerprint`) that are equal in two videos vote for a time offset; along an offset with votes the codes are
-//! compared bit by bit.
+//! Detection of sound shared between videos (re-uploads, shortened versions, intros). Equal fingerprint codes
+//! (`audio::fingerprint`) in two videos vote for a time offset; at offsets with enough votes, the codes are compared
+//! bit by bit.
 //!
-//! Memory: one code in four of every video, 12 bytes each (0.3 MB an hour), and the codes of two videos.
+//! Memory: a quarter of the codes of every video, 12 bytes each (0.3 MB per hour), and all codes of two videos.
 
 use anyhow::Result;
 use orator_base::audio::fingerprint::PER_SEC;
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 
-/// Largest share of different bits within shared sound; unrelated sounds differ in half of the bits, with little
-/// spread.
-const MAX_WRONG: f64 = 0.33;
-/// Window of that share, seconds.
+/// Largest share of different bits within shared sound; unrelated sounds differ in about half of the bits, with little
+/// variation.
+const MAX_BIT_ERROR_RATE: f64 = 0.33;
+/// Window over which the share of different bits is computed, seconds.
 const WINDOW_SECS: f64 = 3.0;
-/// Number of codes that locate the ends of shared sound.
-const EDGE: usize = 16;
-/// Number of equal codes from which an offset is examined.
+/// Number of codes in the shorter window that locates the ends of shared sound.
+const EDGE_CODES: usize = 16;
+/// Minimum number of votes for an offset to be examined.
 const MIN_VOTES: usize = 2;
-/// Number of occurrences above which a code (a hum, a beep) is ignored.
-const MAX_PLACES: usize = 64;
+/// Number of occurrences above which a code is ignored as unspecific (a hum, a beep).
+const MAX_OCCURRENCES: usize = 64;
 
-/// Sound that two videos share.
+/// Sound shared by two videos.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SharedSound {
     /// Names of the videos, in alphabetical order.
     pub a: String,
     pub b: String,
-    /// Start in each video, seconds.
+    /// Start in `a`, seconds.
     pub a_secs: f64,
+    /// Start in `b`, seconds.
     pub b_secs: f64,
     /// Duration, seconds.
     pub secs: f64,
@@ -46,54 +47,58 @@ impl SharedSound {
         }
     }
 
-    /// Order of pairs by name.
+    /// Compares by the names of the videos.
     pub fn cmp_names(&self, other: &Self) -> Ordering {
         (&self.a, &self.b).cmp(&(&other.a, &other.b))
     }
 }
 
-/// Code with its video and position.
+/// Code, index of its video, and position in the codes of the video.
 type Landmark = (u32, u32, u32);
 
-/// Shared sounds of at least `min_secs`, the longest of each pair of videos, in the order of the names. `names` are
-/// sorted; `codes` returns those of the n-th video.
+/// Finds shared sound of at least `min_secs`: the longest of each pair of videos, sorted by name. `names` must be
+/// sorted; `codes` reads the codes of the n-th video.
+///
+/// # Errors
+/// Those of `codes`.
 pub fn find(names: &[String], codes: impl Fn(usize) -> Result<Vec<u32>>, min_secs: f64) -> Result<Vec<SharedSound>> {
     let mut landmarks: Vec<Landmark> = Vec::new();
     for video in 0..names.len() {
         let chosen = |code: u32| code != 0 && code.wrapping_mul(0x9E37_79B1) >> 30 == 0;
-        let places = codes(video)?.into_iter().zip(0u32..).filter(|(code, _)| chosen(*code));
-        landmarks.extend(places.map(|(code, place)| (code, video as u32, place)));
+        let positions = codes(video)?.into_iter().zip(0u32..).filter(|(code, _)| chosen(*code));
+        landmarks.extend(positions.map(|(code, position)| (code, video as u32, position)));
     }
     landmarks.sort_unstable();
     let mut found = Vec::new();
-    let mut at_hand: Option<(usize, Vec<u32>)> = None;
+    let mut last_codes: Option<(usize, Vec<u32>)> = None;
     for ((a, b), offsets) in votes(&landmarks) {
         let (a, b) = (a as usize, b as usize);
-        let first = match at_hand.take() {
+        let first = match last_codes.take() {
             Some((video, codes)) if video == a => codes,
             _ => codes(a)?,
         };
         let second = codes(b)?;
-        let stretches = offsets.into_iter().filter_map(|offset| longest_equal(&first, &second, offset));
-        if let Some((start, offset, n)) = stretches.max_by_key(|(_, _, n)| *n) {
+        let matches = offsets.into_iter().filter_map(|offset| longest_near(&first, &second, offset));
+        if let Some((start, offset, n)) = matches.max_by_key(|(_, _, n)| *n) {
             let secs = n as f64 / PER_SEC;
             if secs >= min_secs {
-                let at = |place: i64| place as f64 / PER_SEC;
+                let at = |position: i64| position as f64 / PER_SEC;
                 let (a_secs, b_secs) = (at(start), at(start + offset));
                 found.push(SharedSound { a: names[a].clone(), b: names[b].clone(), a_secs, b_secs, secs });
             }
         }
-        at_hand = Some((a, first));
+        last_codes = Some((a, first));
     }
     Ok(found)
 }
 
-/// Offsets (second minus first, in codes) with enough votes, for every two videos with equal codes.
+/// For every pair of videos with equal codes, the offsets (position in the second minus position in the first) with at
+/// least `MIN_VOTES`.
 fn votes(landmarks: &[Landmark]) -> Vec<((u32, u32), Vec<i64>)> {
     let mut votes: Vec<((u32, u32), i64)> = Vec::new();
-    for same in landmarks.chunk_by(|x, y| x.0 == y.0).filter(|same| same.len() <= MAX_PLACES) {
-        for (n, x) in same.iter().enumerate() {
-            let others = same[n + 1..].iter().filter(|y| y.1 != x.1);
+    for group in landmarks.chunk_by(|x, y| x.0 == y.0).filter(|group| group.len() <= MAX_OCCURRENCES) {
+        for (n, x) in group.iter().enumerate() {
+            let others = group[n + 1..].iter().filter(|y| y.1 != x.1);
             votes.extend(others.map(|y| ((x.1, y.1), i64::from(y.2) - i64::from(x.2))));
         }
     }
@@ -114,47 +119,50 @@ fn votes(landmarks: &[Landmark]) -> Vec<((u32, u32), Vec<i64>)> {
     pairs
 }
 
-/// Longest shared sound at about this offset: its start in `a`, the offset, its length, in codes.
-fn longest_equal(a: &[u32], b: &[u32], offset: i64) -> Option<(i64, i64, usize)> {
+/// Longest shared sound near an offset: its start in `a`, the exact offset and its length, in codes.
+fn longest_near(a: &[u32], b: &[u32], offset: i64) -> Option<(i64, i64, usize)> {
     (offset - 1..=offset + 2).filter_map(|offset| longest_at(a, b, offset)).max_by_key(|(_, _, n)| *n)
 }
 
+/// Longest shared sound at exactly this offset, as `longest_near`.
 fn longest_at(a: &[u32], b: &[u32], offset: i64) -> Option<(i64, i64, usize)> {
     let window = (WINDOW_SECS * PER_SEC) as usize;
     let (a_start, b_start) = ((-offset).max(0) as usize, offset.max(0) as usize);
     let pairs: Vec<(u32, u32)> =
-        a.iter().skip(a_start).zip(b.iter().skip(b_start)).map(|(x, y)| wrong_bits(*x, *y)).collect();
-    let (mut bits, mut wrong, mut run, mut best) = (0, 0, 0, None);
+        a.iter().skip(a_start).zip(b.iter().skip(b_start)).map(|(x, y)| bit_errors(*x, *y)).collect();
+    let (mut bits, mut n_errors, mut run, mut best) = (0, 0, 0, None);
     for end in 0..pairs.len() {
         bits += pairs[end].0;
-        wrong += pairs[end].1;
+        n_errors += pairs[end].1;
         if end >= window {
             bits -= pairs[end - window].0;
-            wrong -= pairs[end - window].1;
+            n_errors -= pairs[end - window].1;
         }
-        let same = end + 1 >= window && bits as usize >= 16 * window && f64::from(wrong) <= MAX_WRONG * f64::from(bits);
-        run = if same { run + 1 } else { 0 };
+        let is_match = end + 1 >= window
+            && bits as usize >= 16 * window
+            && f64::from(n_errors) <= MAX_BIT_ERROR_RATE * f64::from(bits);
+        run = if is_match { run + 1 } else { 0 };
         let n = run + window - 1;
-        if same && best.is_none_or(|(_, _, longest)| n > longest) {
+        if is_match && best.is_none_or(|(_, _, longest)| n > longest) {
             best = Some(((a_start + end + 1 - n) as i64, offset, n));
         }
     }
     best.map(|(start, offset, n)| {
-        // Windows extend over the edges of shared sound; there, shorter pieces decide.
-        let place = (start as usize).saturating_sub(a_start);
-        let unlike = |piece: &[(u32, u32)]| {
-            let (bits, wrong) = piece.iter().fold((0, 0), |sum, pair| (sum.0 + pair.0, sum.1 + pair.1));
-            (bits as usize) < 16 * EDGE || f64::from(wrong) > MAX_WRONG * f64::from(bits)
+        // A window may extend past the ends of shared sound, so shorter windows locate the ends.
+        let position = (start as usize).saturating_sub(a_start);
+        let differs = |piece: &[(u32, u32)]| {
+            let (bits, n_errors) = piece.iter().fold((0, 0), |sum, pair| (sum.0 + pair.0, sum.1 + pair.1));
+            (bits as usize) < 16 * EDGE_CODES || f64::from(n_errors) > MAX_BIT_ERROR_RATE * f64::from(bits)
         };
-        let same = &pairs[place..place + n];
-        let skip = same.windows(EDGE).take_while(|piece| unlike(piece)).count();
-        let cut = same[skip.min(n)..].windows(EDGE).rev().take_while(|piece| unlike(piece)).count();
+        let matched = &pairs[position..position + n];
+        let skip = matched.windows(EDGE_CODES).take_while(|piece| differs(piece)).count();
+        let cut = matched[skip.min(n)..].windows(EDGE_CODES).rev().take_while(|piece| differs(piece)).count();
         (start + skip as i64, offset, n.saturating_sub(skip + cut))
     })
 }
 
-/// Number of compared and of different bits; silence is not compared.
-fn wrong_bits(x: u32, y: u32) -> (u32, u32) {
+/// Number of compared bits and of different ones; silence (code 0) is not compared.
+fn bit_errors(x: u32, y: u32) -> (u32, u32) {
     if x == 0 || y == 0 { (0, 0) } else { (32, (x ^ y).count_ones()) }
 }
 
@@ -164,7 +172,7 @@ mod tests {
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    /// Codes of `n` windows in which a bit in eight changes from one to the next, as sound has.
+    /// `n` random codes; as in real sound, one bit in eight changes from each code to the next.
     fn sound(n: usize, seed: u64) -> Vec<u32> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut code: u32 = rng.random();
@@ -177,14 +185,14 @@ mod tests {
     }
 
     #[test]
-    fn a_stretch_that_two_share_is_found_where_it_is() {
+    fn shared_sound_is_found_at_its_position() {
         let mut rng = ChaCha8Rng::seed_from_u64(9);
         let mut videos: Vec<Vec<u32>> = (0..6).map(|seed| sound(3_000, seed)).collect();
         let intro: Vec<u32> = videos[1][500..800].to_vec();
-        // a bit in fifteen is wrong
-        let spoilt =
+        // One bit in fifteen is flipped.
+        let noisy =
             intro.iter().map(|code| code ^ (0..32).fold(0, |m, b| m | u32::from(rng.random_bool(1.0 / 15.0)) << b));
-        videos[4].splice(100..400, spoilt);
+        videos[4].splice(100..400, noisy);
         videos[5][..1500].fill(0);
         videos[0][..1500].fill(0);
         let names: Vec<String> = (0..6).map(|n| format!("v{n}")).collect();

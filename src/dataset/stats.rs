@@ -1,8 +1,8 @@
-//! Statistics file `stats.json`. Means and deviations come from joints seen in the training split; hours, windows and
-//! refused seconds from all splits.
+//! Statistics file `stats.json`. Means and standard deviations are those of visible joints in the training split;
+//! seconds and windows are counted over all splits.
 
 use super::joint_stats::JointMoments;
-use super::write::part::VideoEntry;
+use super::write::entry::VideoEntry;
 use super::{STRIDE_FRAMES, WINDOW_FRAMES};
 use anyhow::{Result, ensure};
 use ndarray::Array2;
@@ -14,13 +14,13 @@ use orator_base::types::split::Split;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Largest coordinate or angle of a body, metres or radians.
-const MOST: f64 = 1000.0;
+/// Largest plausible magnitude of a coordinate or angle, metres or radians.
+const MAX_MAGNITUDE: f64 = 1000.0;
 
-/// Contents of `stats.json`. Rows are joints, columns x, y, z in metres; a joint never seen has zeros.
+/// Contents of `stats.json`. Rows are joints, columns x, y, z in metres; the row of a joint that is never visible is 0.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DatasetStats {
-    /// Frames of the training split in which each joint was seen.
+    /// Number of frames of the training split in which each joint is visible.
     pub n_seen: Vec<u64>,
     pub mean: Vec<[f64; 3]>,
     /// Population standard deviation.
@@ -29,15 +29,15 @@ pub struct DatasetStats {
     pub max: Vec<[f64; 3]>,
     pub windows: WindowCount,
     pub footage: FootageCount,
-    /// Angles of head and trunk by their names; `None`: no sample has any.
+    /// Statistics of the angles of head and trunk; `None`: no sample has angles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub posture: Option<BTreeMap<PostureChannel, AngleStats>>,
 }
 
-/// Statistics of the angles of head or trunk in the training split: yaw, pitch, roll in radians.
+/// Statistics of the angles (yaw, pitch, roll) of head or trunk in the training split, radians.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AngleStats {
-    /// Frames in which each was seen.
+    /// Number of frames in which each angle is visible.
     pub n_seen: [u64; 3],
     pub mean: [f64; 3],
     /// Population standard deviation.
@@ -46,12 +46,14 @@ pub struct AngleStats {
     pub max: [f64; 3],
 }
 
-/// Number of windows in each split: at the training stride, and without overlap.
+/// Number of windows in each split.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct WindowCount {
     pub n_frames: usize,
     pub stride: usize,
+    /// Windows at `stride`, by split.
     pub strided: BTreeMap<String, usize>,
+    /// Windows without overlap, by split.
     pub apart: BTreeMap<String, usize>,
 }
 
@@ -65,11 +67,11 @@ pub struct FootageCount {
     /// Refused seconds by reason.
     pub refused_secs: BTreeMap<String, f64>,
     pub failed_secs: f64,
-    /// Videos that failed before their length was known.
+    /// Number of videos that failed before their length was known.
     pub n_of_unknown_length: usize,
     /// Seconds of silence appended where the sound ended before the motion.
     pub padded_sound_secs: f64,
-    /// Words of the transcripts; `None`: none was asked for.
+    /// Word counts of the transcripts; `None`: no transcripts were requested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub words: Option<WordCount>,
 }
@@ -80,12 +82,16 @@ impl DatasetStats {
         table(&self.mean)
     }
 
-    /// Standard deviation of each joint coordinate, [49, 3], metres; 0 for the neck and for joints never seen.
+    /// Standard deviation of each joint coordinate, [49, 3], metres; 0 for the neck and for joints that are never
+    /// visible.
     pub fn std(&self) -> Array2<f32> {
         table(&self.std)
     }
 
-    /// Errors unless every table has one row for each joint, within the range of a body, and no deviation is negative.
+    /// Checks the tables.
+    ///
+    /// # Errors
+    /// A table without one row per joint, values out of range, negative standard deviations.
     pub(crate) fn check(&self) -> Result<()> {
         ensure!(self.n_seen.len() == N_JOINTS, "`n_seen` has {} rows, expected {N_JOINTS}", self.n_seen.len());
         let tables = [("mean", &self.mean), ("std", &self.std), ("min", &self.min), ("max", &self.max)];
@@ -103,11 +109,15 @@ impl DatasetStats {
     }
 }
 
-/// Checks numbers of the field `name`, metres or radians.
+/// Checks the values of the field `name`, metres or radians; those of a field that ends in `std` must not be negative.
 fn check_numbers<'a>(name: &str, mut numbers: impl Iterator<Item = &'a f64>) -> Result<()> {
-    let least = if name.ends_with("std") { 0.0 } else { -MOST };
-    let wrong = numbers.find(|number| !(least..=MOST).contains(*number));
-    ensure!(wrong.is_none(), "`{name}` holds {:?}, expected {least} to {MOST}", wrong.unwrap_or(&0.0));
+    let lower_bound = if name.ends_with("std") { 0.0 } else { -MAX_MAGNITUDE };
+    let invalid = numbers.find(|number| !(lower_bound..=MAX_MAGNITUDE).contains(*number));
+    ensure!(
+        invalid.is_none(),
+        "`{name}` holds {:?}, expected {lower_bound} to {MAX_MAGNITUDE}",
+        invalid.unwrap_or(&0.0)
+    );
     Ok(())
 }
 
@@ -115,7 +125,7 @@ fn table(rows: &[[f64; 3]]) -> Array2<f32> {
     Array2::from_shape_fn((N_JOINTS, 3), |(joint, k)| rows.get(joint).map_or(0.0, |row| row[k] as f32))
 }
 
-/// Accumulator over the videos of a dataset.
+/// Accumulator of the statistics over the videos of a dataset.
 pub struct StatsCollector {
     moments: JointMoments,
     posture: Option<JointMoments>,
@@ -125,8 +135,8 @@ pub struct StatsCollector {
 
 impl Default for StatsCollector {
     fn default() -> Self {
-        let nothing = || Split::ALL.map(|split| (split.name().to_owned(), 0)).into();
-        let (strided, apart) = (nothing(), nothing());
+        let zeros = || Split::ALL.map(|split| (split.name().to_owned(), 0)).into();
+        let (strided, apart) = (zeros(), zeros());
         let windows = WindowCount { n_frames: WINDOW_FRAMES, stride: STRIDE_FRAMES, strided, apart };
         Self { moments: JointMoments::default(), posture: None, windows, footage: FootageCount::default() }
     }
@@ -134,19 +144,19 @@ impl Default for StatsCollector {
 
 impl StatsCollector {
     /// Adds a video.
-    pub fn push(&mut self, part: &VideoEntry) {
-        // Of a video in several splits they are those of its training samples.
-        let trains = part.split.map_or(!part.samples.is_empty(), |split| split == Split::Train);
-        if trains {
-            self.moments.merge(&part.moments);
+    pub fn push(&mut self, entry: &VideoEntry) {
+        // The moments of a video in several splits are those of its training samples.
+        let is_training = entry.split.map_or(!entry.samples.is_empty(), |split| split == Split::Train);
+        if is_training {
+            self.moments.merge(&entry.moments);
         }
-        if let Some(posture) = &part.posture {
+        if let Some(posture) = &entry.posture {
             let moments = self.posture.get_or_insert_with(JointMoments::of_posture);
-            if trains {
+            if is_training {
                 moments.merge(posture);
             }
         }
-        for sample in &part.samples {
+        for sample in &entry.samples {
             let interval = Interval { start: 0, end: sample.n_frames };
             let add = |counts: &mut BTreeMap<String, usize>, n| {
                 *counts.entry(sample.split.name().to_owned()).or_default() += n;
@@ -156,21 +166,21 @@ impl StatsCollector {
         }
         let footage = &mut self.footage;
         footage.n_videos += 1;
-        footage.n_intervals += part.samples.len();
-        footage.secs += part.ledger.duration_secs;
-        footage.kept_secs += part.ledger.kept_secs();
-        footage.failed_secs += part.ledger.failed_secs();
-        footage.n_of_unknown_length += usize::from(part.ledger.duration_secs == 0.0 && part.failure.is_some());
-        footage.padded_sound_secs += part.padded_sound_secs;
-        if let Some(words) = &part.ledger.words {
+        footage.n_intervals += entry.samples.len();
+        footage.secs += entry.ledger.duration_secs;
+        footage.kept_secs += entry.ledger.kept_secs();
+        footage.failed_secs += entry.ledger.failed_secs();
+        footage.n_of_unknown_length += usize::from(entry.ledger.duration_secs == 0.0 && entry.failure.is_some());
+        footage.padded_sound_secs += entry.padded_sound_secs;
+        if let Some(words) = &entry.ledger.words {
             *footage.words.get_or_insert_default() += words.count;
         }
-        for (reason, secs) in part.ledger.refused_secs() {
+        for (reason, secs) in entry.ledger.refused_secs() {
             *footage.refused_secs.entry(reason).or_default() += secs;
         }
     }
 
-    /// Finished statistics.
+    /// Returns the statistics.
     pub fn finish(self) -> DatasetStats {
         let std = self.moments.std();
         let JointMoments { n_seen, mean, min, max, .. } = self.moments;

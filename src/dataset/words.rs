@@ -1,5 +1,5 @@
-//! Words of a video in its samples: a word belongs to the sample that holds its middle, so that each stands in one at
-//! most, and its times count from that sample's beginning.
+//! Assignment of a video's transcript words to its samples. A word belongs to the sample that contains its midpoint, so
+//! each word is in at most one sample; its times count from the start of that sample.
 
 use super::file_name;
 use anyhow::{Result, ensure};
@@ -7,22 +7,24 @@ use orator_base::stage::ledger::{TranscriptAccount, WordCount};
 use orator_formats::transcript::{Transcript, Word};
 use std::path::Path;
 
-/// Words that may lie after the end of the sound, and their share; more of both, and it is the transcript of another.
+/// Number and share of words that may be after the end of the sound; if both are exceeded, the transcript belongs to
+/// another sound.
 const MAX_OUTSIDE: (usize, f64) = (3, 0.1);
-/// Seconds by which a sample may end before a word of it does: the rounding of both.
+/// Tolerance for the end of a word after the end of its sample, seconds: both are rounded.
 const ROUNDING_SECS: f64 = 1e-5;
 
-/// Words of a video, those within its sound, on the clock of its frames.
+/// Words of a video that are within its sound, with times on the clock of its frames.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VideoWords {
-    /// In the order of their middles.
+    /// Words sorted by midpoint.
     words: Vec<Word>,
     account: TranscriptAccount,
 }
 
 impl VideoWords {
-    /// Words of the transcript in `path` of a sound of `sound_secs`, which the frames lag behind by `shift_secs`. One that
-    /// cannot be read gives no words and a note.
+    /// Reads the transcript in `path` of a sound of `sound_secs`; `shift_secs` is subtracted from all times to convert
+    /// from the clock of the sound to that of the frames. A missing or unreadable transcript yields no words and a
+    /// note.
     pub fn read(path: Option<&Path>, sound_secs: f64, shift_secs: f64) -> Self {
         let none = |note: String| {
             let file = path.map(file_name);
@@ -33,14 +35,14 @@ impl VideoWords {
         };
         let Some(path) = path else { return none("no transcript has the name of the video".to_owned()) };
         let words = Transcript::read(path).and_then(|transcript| Self::new(transcript, path, sound_secs, shift_secs));
-        // Local folders must not influence the dataset.
+        // Local folder names must not end up in the dataset.
         let folder = path.parent().map(|folder| format!("{}/", folder.display())).filter(|folder| folder != "/");
-        let said =
-            |error: anyhow::Error| folder.iter().fold(format!("{error:#}"), |said, folder| said.replace(folder, ""));
-        words.unwrap_or_else(|error| none(said(error)))
+        let without_folder =
+            |error: anyhow::Error| folder.iter().fold(format!("{error:#}"), |text, folder| text.replace(folder, ""));
+        words.unwrap_or_else(|error| none(without_folder(error)))
     }
 
-    /// Words of a transcript, as `read`.
+    /// Words of a transcript that has been read from `path`; the other arguments are those of `read`.
     ///
     /// # Errors
     /// Too many words after the end of the sound.
@@ -48,8 +50,8 @@ impl VideoWords {
         let Transcript { mut words, mut notes, .. } = transcript;
         let n_words = words.len();
         let last_secs = words.iter().map(|word| word.end_secs).fold(0.0, f64::max);
-        let outside = words.iter().find(|word| middle(word) >= sound_secs).cloned();
-        words.retain(|word| middle(word) < sound_secs);
+        let outside = words.iter().find(|word| midpoint_secs(word) >= sound_secs).cloned();
+        words.retain(|word| midpoint_secs(word) < sound_secs);
         let n_outside = n_words - words.len();
         ensure!(
             n_outside <= MAX_OUTSIDE.0 || n_outside as f64 <= MAX_OUTSIDE.1 * n_words as f64,
@@ -68,15 +70,16 @@ impl VideoWords {
             word.start_secs -= shift_secs;
             word.end_secs -= shift_secs;
         }
-        words.sort_by(|a, b| middle(a).total_cmp(&middle(b)));
+        words.sort_by(|a, b| midpoint_secs(a).total_cmp(&midpoint_secs(b)));
         let count = WordCount { n_words, n_outside, ..WordCount::default() };
         Ok(Self { words, account: TranscriptAccount { file: Some(file_name(path)), count, notes } })
     }
 
-    /// Words of the sample from `start_secs` to `end_secs`, in the order of their beginnings.
+    /// Words of the sample from `start_secs` to `end_secs`, sorted by start; times count from the start of the sample
+    /// and are rounded to microseconds.
     pub fn within(&self, start_secs: f64, end_secs: f64) -> Vec<Word> {
-        let from = self.words.partition_point(|word| middle(word) < start_secs);
-        let words = self.words[from..].iter().take_while(|word| middle(word) < end_secs);
+        let from = self.words.partition_point(|word| midpoint_secs(word) < start_secs);
+        let words = self.words[from..].iter().take_while(|word| midpoint_secs(word) < end_secs);
         let micro = |secs: f64| (secs.clamp(0.0, end_secs - start_secs) * 1e6).round() / 1e6;
         let in_sample = |word: &Word| Word {
             start_secs: micro(word.start_secs - start_secs),
@@ -88,7 +91,7 @@ impl VideoWords {
         words
     }
 
-    /// Account of the words in samples over these seconds.
+    /// Transcript account with the words counted that are in samples with these start and end times, seconds.
     pub fn account(&self, samples: impl IntoIterator<Item = (f64, f64)>) -> TranscriptAccount {
         let n_kept = samples.into_iter().map(|(start, end)| self.within(start, end).len()).sum();
         let mut account = self.account.clone();
@@ -101,7 +104,8 @@ impl VideoWords {
 /// Checks the words of a sample of `secs` seconds.
 ///
 /// # Errors
-/// The number and text of a word outside the sample, out of order or empty.
+/// A word that is empty, contains whitespace, is outside the sample or out of order, or has an invalid confidence; the
+/// message gives its number and text.
 pub fn check(words: &[Word], secs: f64) -> Result<()> {
     let mut before = 0.0;
     for (n, word) in words.iter().enumerate() {
@@ -116,7 +120,7 @@ pub fn check(words: &[Word], secs: f64) -> Result<()> {
     Ok(())
 }
 
-fn middle(word: &Word) -> f64 {
+fn midpoint_secs(word: &Word) -> f64 {
     f64::midpoint(word.start_secs, word.end_secs)
 }
 
@@ -133,26 +137,28 @@ mod tests {
         let words = transcript("0.1 0.3 a\n0.9 1.3 b\n1.5 1.6 c\n2.9 3.0 d\n9 10 e\n");
         let path = Path::new("talk.tsv");
         assert!(VideoWords::new(words.clone(), path, 0.5, 0.0).unwrap_err().to_string().contains("4 of 5 words"));
-        let said = VideoWords::new(words.clone(), path, 10.0, 0.0).unwrap();
+        let video_words = VideoWords::new(words.clone(), path, 10.0, 0.0).unwrap();
         let samples = [(0.0, 1.0), (1.0, 2.0)];
         let at = |n: usize| {
-            let words = said.within(samples[n].0, samples[n].1);
+            let words = video_words.within(samples[n].0, samples[n].1);
             words.iter().map(|w| format!("{} {} {}", w.word, w.start_secs, w.end_secs)).collect::<Vec<_>>()
         };
         assert_eq!((at(0), at(1)), (vec!["a 0.1 0.3".to_owned()], vec!["b 0 0.3".to_owned(), "c 0.5 0.6".to_owned()]));
-        let WordCount { n_words, n_kept, n_refused, n_outside } = said.account(samples).count;
+        let WordCount { n_words, n_kept, n_refused, n_outside } = video_words.account(samples).count;
         assert_eq!((n_words, n_kept, n_refused, n_outside), (5, 3, 2, 0));
         let shifted = VideoWords::new(words, path, 10.0, 0.5).unwrap();
         assert_eq!(shifted.within(1.0, 2.0).len(), 1);
-        assert!(check(&said.within(1.0, 2.0), 1.0).is_ok() && check(&said.within(1.0, 2.0), 0.5).is_err());
+        assert!(
+            check(&video_words.within(1.0, 2.0), 1.0).is_ok() && check(&video_words.within(1.0, 2.0), 0.5).is_err()
+        );
     }
 
     #[test]
-    fn a_few_words_after_the_end_are_left_out_with_a_note() {
+    fn a_few_words_after_the_end_are_dropped_with_a_note() {
         let rows: String = (0..20).map(|n| format!("{n} {} w\n", n + 1)).collect();
-        let said = VideoWords::new(transcript(&rows), Path::new("a.tsv"), 19.0, 0.0).unwrap().account([(0.0, 19.0)]);
-        assert_eq!((said.count.n_kept, said.count.n_outside), (19, 1));
-        assert!(said.notes[0].contains("`w` at 19.00 s"));
+        let account = VideoWords::new(transcript(&rows), Path::new("a.tsv"), 19.0, 0.0).unwrap().account([(0.0, 19.0)]);
+        assert_eq!((account.count.n_kept, account.count.n_outside), (19, 1));
+        assert!(account.notes[0].contains("`w` at 19.00 s"));
         let missing = VideoWords::read(Some(Path::new("/none/a.tsv")), 1.0, 0.0).account([]);
         assert!(missing.notes[0].starts_with("cannot read a.tsv"), "{:?}", missing.notes);
         assert!(VideoWords::read(None, 1.0, 0.0).account([]).notes[0].contains("no transcript"));

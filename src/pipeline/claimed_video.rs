@@ -96,7 +96,7 @@ impl Pipeline {
     /// # Errors
     /// What is missing, and where it comes from.
     pub fn check(&self) -> Result<()> {
-        if self.all_videos().iter().any(orator_dataset::config::videos::Videos::have_pictures) {
+        if self.all_videos().iter().any(orator_dataset::config::videos::Videos::has_video_files) {
             stages::check_models(&self.config().settings)?;
         }
         StageName::OF_VIDEOS.into_iter().try_for_each(|name| self.stage(name, &[]).map(drop))

@@ -25,7 +25,7 @@ impl Pipeline {
     /// # Errors
     /// A configuration without speakers.
     pub fn open(config: Config) -> Result<Self> {
-        let videos = videos::of(&config);
+        let videos = videos::all(&config);
         ensure!(!videos.is_empty(), "{} names no [[speaker]]", config.file.display());
         Ok(Self { config, videos, program: None })
     }

@@ -137,7 +137,7 @@ impl Pipeline {
         ensure!(from <= to, "--from {from} comes after --to {to}");
         let mut alive = self.videos(&selection.speakers)?;
         let settings = &self.config().settings;
-        if selection.has(StageName::Pose2d) && alive.iter().any(Videos::have_pictures) {
+        if selection.has(StageName::Pose2d) && alive.iter().any(Videos::has_video_files) {
             stages::check_models(settings)?;
         }
         // What a stage needs (weights, the manifest) is looked at before hours of work, not after.

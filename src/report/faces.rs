@@ -1,4 +1,5 @@
-//! Section on whom the videos show: one face a video, side by side where the videos seem to show several people.
+//! Report section on the persons in the videos: one face per video, in a row per person if the videos seem to show
+//! several.
 
 use crate::html::{Node, jpeg, node};
 use anyhow::Result;
@@ -11,25 +12,25 @@ use orator_pipeline::dataset::people;
 use orator_pipeline::dataset::people::PersonSeen;
 use std::path::Path;
 
-/// Faces that are shown of one person.
-const MOST_FACES: usize = 24;
+/// Maximum number of faces shown per person.
+const MAX_FACES: usize = 24;
 
-/// The section; empty where no face was seen.
+/// Content of the section; empty if no face was detected.
 pub fn section(settings: &Settings, videos: &[Videos]) -> Vec<Node> {
     let work = &settings.work.dir;
     videos
         .iter()
         .flat_map(|of| {
-            let is_said = settings.speaker.iter().any(|said| said.name == of.speaker && said.same_person);
+            let is_stated = settings.speaker.iter().any(|speaker| speaker.name == of.speaker && speaker.same_person);
             let seen: Vec<PersonSeen> = of.units.iter().map(|unit| PersonSeen::read(work, unit)).collect();
-            let groups = if is_said { vec![seen.iter().collect()] } else { people::groups(&seen) };
-            of_speaker(work, &of.speaker, &groups, is_said)
+            let groups = if is_stated { vec![seen.iter().collect()] } else { people::groups(&seen) };
+            of_speaker(work, &of.speaker, &groups, is_stated)
         })
         .collect()
 }
 
-fn of_speaker(work: &Path, speaker: &str, groups: &[Vec<&PersonSeen>], is_said: bool) -> Vec<Node> {
-    let about = match (is_said, groups.len()) {
+fn of_speaker(work: &Path, speaker: &str, groups: &[Vec<&PersonSeen>], is_stated: bool) -> Vec<Node> {
+    let about = match (is_stated, groups.len()) {
         (true, _) => format!("{speaker}: the configuration says that all videos show one person."),
         (false, 0 | 1) => format!("{speaker}: nothing speaks against one person."),
         (false, n) => format!(
@@ -40,7 +41,7 @@ fn of_speaker(work: &Path, speaker: &str, groups: &[Vec<&PersonSeen>], is_said: 
     };
     let rows = groups.iter().enumerate().filter_map(|(at, group)| {
         let cards: Vec<Node> =
-            group.iter().take(MOST_FACES).filter_map(|video| card(work, video).ok().flatten()).collect();
+            group.iter().take(MAX_FACES).filter_map(|video| card(work, video).ok().flatten()).collect();
         let title = node("h3").class("rule").child(node("span").text(format!("{speaker}, person {}", at + 1)));
         (!cards.is_empty())
             .then(|| node("div").class("gallery").child(title).child(node("div").class("shots").children(cards)))

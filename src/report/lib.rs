@@ -1,5 +1,5 @@
-//! Pages and pictures for people: `videos` (a speaker's videos), `training`, `evaluation`, rendered `people`,
-//! and contact sheets (`sheet`), all written with `html`.
+//! HTML reports and pictures: pages on a speaker's `videos`, on a `training` and on an `evaluation`, written with
+//! `html`, and contact sheets (`sheet`).
 
 pub mod evaluation;
 pub mod faces;

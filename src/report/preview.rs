@@ -1,5 +1,5 @@
-//! A few seconds of a kept interval as a figure that moves: joints from the front in whole millimetres, which bounds the
-//! page's size.
+//! Animated previews of accepted intervals: a few seconds of the joints from the front, in whole millimetres to bound
+//! the size of the page.
 
 use crate::evaluation::player::{bones, to_millimetres};
 use crate::html::{Node, node};
@@ -9,13 +9,14 @@ use orator_base::types::interval::Interval;
 use orator_base::types::pose3d::Motion;
 use serde_json::{Value, json};
 
-/// Longest preview, seconds, and its highest frame rate.
-const MOST_SECS: f64 = 8.0;
-const MOST_FPS: f64 = 10.0;
-/// Most previews on a page: 12 of them take 0.5 MB.
-pub const MOST_PREVIEWS: usize = 12;
+/// Maximum duration of a preview, seconds.
+const MAX_SECS: f64 = 8.0;
+/// Maximum frame rate of a preview.
+const MAX_FPS: f64 = 10.0;
+/// Maximum number of previews on a page; 12 take 0.5 MB.
+pub const MAX_PREVIEWS: usize = 12;
 
-/// Beginning of the longest kept interval of a video.
+/// Start of the longest accepted interval of a video.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotionPreview {
     name: String,
@@ -26,19 +27,20 @@ pub struct MotionPreview {
 }
 
 impl MotionPreview {
-    /// Preview of the longest of `intervals`; none without an interval. `anchor` is the video's place on the page.
+    /// Preview of the longest of `intervals`; `None` without intervals. `anchor` is the anchor of the video on the
+    /// page.
     pub fn new(name: &str, anchor: String, motion: &Motion, intervals: &[Interval]) -> Option<Self> {
         let longest = intervals.iter().max_by_key(|interval| (interval.n_frames(), usize::MAX - interval.start))?;
         let fps = motion.fps.per_sec();
-        let step = (fps / MOST_FPS).ceil().max(1.0) as usize;
-        let most = (MOST_SECS * fps) as usize;
-        let end = longest.end.min(longest.start + most).min(motion.n_frames());
+        let step = (fps / MAX_FPS).ceil().max(1.0) as usize;
+        let max_frames = (MAX_SECS * fps) as usize;
+        let end = longest.end.min(longest.start + max_frames).min(motion.n_frames());
         let mut joints = Vec::new();
         for frame in (longest.start..end).step_by(step) {
-            for (joint, seen) in
+            for (joint, is_visible) in
                 motion.joints.index_axis(ndarray::Axis(0), frame).outer_iter().zip(motion.mask.row(frame))
             {
-                let [x, y] = if *seen { [joint[0], joint[1]] } else { [f32::NAN; 2] }.map(to_millimetres);
+                let [x, y] = if *is_visible { [joint[0], joint[1]] } else { [f32::NAN; 2] }.map(to_millimetres);
                 joints.extend([x, y].map(i16::to_le_bytes).concat());
             }
         }
@@ -50,12 +52,12 @@ impl MotionPreview {
     }
 }
 
-/// Data of the page's script.
+/// Data for the page's script.
 pub fn data(previews: &[MotionPreview]) -> Value {
     json!({ "bones": bones(), "motions": previews.iter().map(MotionPreview::data).collect::<Vec<_>>() })
 }
 
-/// Section of previews; each moves while it is in view, and stands still where the reader asks for less motion.
+/// Section of previews; each is animated while it is visible, and static if the reader prefers reduced motion.
 pub fn section(previews: &[MotionPreview]) -> Vec<Node> {
     if previews.is_empty() {
         return vec![node("p").class("empty").text("No interval is kept and lifted yet.")];
@@ -68,7 +70,7 @@ pub fn section(previews: &[MotionPreview]) -> Vec<Node> {
         node("figure").class("preview card").child(canvas.attr("data-preview", i)).child(node("figcaption").child(link))
     };
     let about = format!(
-        "The beginning of the longest kept interval of each video (the first {MOST_PREVIEWS}), at most {MOST_SECS} s, as \
+        "The beginning of the longest kept interval of each video (the first {MAX_PREVIEWS}), at most {MAX_SECS} s, as \
          the camera sees it. Joints that are not seen are left out."
     );
     let shown = node("div").class("previews").children(previews.iter().enumerate().map(figure));
@@ -83,7 +85,7 @@ mod tests {
     use orator_base::types::time::FrameRate;
 
     #[test]
-    fn the_longest_interval_is_shown_from_its_beginning() {
+    fn the_longest_interval_is_shown_from_its_start() {
         let mut motion = Motion {
             fps: FrameRate::new(20, 1),
             joints: Array3::from_shape_fn(

@@ -12,7 +12,7 @@ use orator_dataset::bones::VideoBones;
 use orator_dataset::sample::{N_KEYPOINTS, Sample};
 use orator_dataset::split::SplitBy;
 use orator_dataset::write::assemble::DatasetWriter;
-use orator_dataset::write::part::VideoSource;
+use orator_dataset::write::entry::VideoSource;
 use orator_formats::transcript::Word;
 use serde_json::{Value, json};
 

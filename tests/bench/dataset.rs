@@ -12,7 +12,7 @@ use orator_dataset::config;
 use orator_dataset::info::About;
 use orator_dataset::split::SplitBy;
 use orator_dataset::write::assemble::DatasetWriter;
-use orator_dataset::write::part::VideoSource;
+use orator_dataset::write::entry::VideoSource;
 use orator_dataset::{Dataset, Sample, Split};
 use orator_gesture::train::gan::train;
 use orator_gesture::train::gan::windows::WindowLoader;

@@ -112,7 +112,7 @@ fn make(clip: &Path, dir: &Path, n_videos: usize) -> Result<()> {
     }
     let units = |dir: &Path| -> Result<(config::Config, Vec<Unit>)> {
         let config = config::load(&dir.join("pipeline.toml"), &[])?;
-        let units = config::videos::of(&config).into_iter().flat_map(|videos| videos.units).collect();
+        let units = config::videos::all(&config).into_iter().flat_map(|videos| videos.units).collect();
         Ok((config, units))
     };
     let (pattern, (config, units)) = (units(clip)?.1, units(dir)?);

@@ -10,7 +10,7 @@ use orator_cluster::forget::plans_naming;
 use orator_dataset::config::{Config, videos};
 use orator_dataset::forget::known::{self, KnownVideo};
 use orator_dataset::forget::removal::{Removal, models_dirs};
-use orator_dataset::forget::search::{Searched, search};
+use orator_dataset::forget::search::{SearchReport, search};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -75,31 +75,31 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let terms: Vec<_> = task.removals.iter().flat_map(|removal| removal.terms.clone()).collect();
     let mut searched = search(&task.folders, &terms).context("nothing is proved")?;
     // A retained model lists its training videos; it is reported as retained instead.
-    searched.places.retain(|place| !kept.iter().any(|model| Path::new(&place.file).starts_with(model)));
+    searched.hits.retain(|place| !kept.iter().any(|model| Path::new(&place.file).starts_with(model)));
     let mut text = match lines.is_empty() {
         true => vec![format!("nothing of {what} was there")],
         false => vec![format!("forgotten: {what}"), format!("  {}", lines.join("\n  "))],
     };
     text.extend(kept.iter().map(|model| format!("kept, though it was trained with it: {}", model.display())));
     text.extend(task.advice.iter().cloned());
-    text.extend(searched.places.iter().map(|found| match found.at {
+    text.extend(searched.hits.iter().map(|found| match found.at {
         Some(at) => format!("FOUND   {} at byte {at}: {}", found.file, found.what),
         None => format!("FOUND   {}: {} in its name", found.file, found.what),
     }));
-    let Searched { n_files, bytes, inside_bytes, places } = &searched;
+    let SearchReport { n_files, bytes, inside_bytes, hits } = &searched;
     text.push(format!(
         "searched {n_files} files, {bytes} bytes and {inside_bytes} more inside archives, for {} names and hashes: {} found",
         terms.len(),
-        places.len()
+        hits.len()
     ));
     let found: Vec<_> =
-        places.iter().map(|place| json!({ "file": place.file, "at": place.at, "what": place.what })).collect();
+        hits.iter().map(|place| json!({ "file": place.file, "at": place.at, "what": place.what })).collect();
     let facts = json!({
         "videos": task.titles, "removed": lines, "kept_models": kept, "advice": task.advice, "found": found,
         "searched": { "files": n_files, "bytes": bytes, "inside_bytes": inside_bytes, "marks": terms.len() },
     });
     ui.summary(&text.join("\n"), None, facts);
-    Ok(if places.is_empty() { Outcome::Done } else { Outcome::Wrong })
+    Ok(if hits.is_empty() { Outcome::Done } else { Outcome::Wrong })
 }
 
 /// Error context if a folder is in use.
@@ -110,15 +110,15 @@ fn of_dataset(dir: &Path, wanted: &str, dry_run: bool, locks: &mut Vec<FolderLoc
     if !dry_run {
         locks.push(FolderLock::exclusive(&dir).context(IN_USE)?);
     }
-    let all = known::of_dataset(&dir)?;
-    let video = known::one(&all, wanted, None)?;
+    let all = known::dataset_videos(&dir)?;
+    let video = known::find_one(&all, wanted, None)?;
     let others: Vec<&KnownVideo> = all.iter().filter(|k| *k != video).collect();
     let removal = Removal::of_dataset(&dir, &[video], &others);
     let mut folders = vec![dir.clone()];
     folders.extend(workdir::left_over(&dir));
     let advice = vec!["models trained with this dataset, and its copies, are not looked for".to_owned()];
     Ok(ForgetTask {
-        titles: vec![video.title().trim_start_matches('/').to_owned()],
+        titles: vec![video.display_name().trim_start_matches('/').to_owned()],
         removals: vec![removal],
         folders,
         advice,
@@ -141,10 +141,10 @@ fn of_project(args: &Args, locks: &mut Vec<FolderLock>) -> Result<ForgetTask> {
             }
         }
     }
-    let all = known::of_project(&config)?;
+    let all = known::project_videos(&config)?;
     let (videos, whole) = match (&args.video, &args.speaker) {
-        (Some(video), speaker) => (vec![known::one(&all, video, speaker.as_deref())?], false),
-        (None, Some(speaker)) => (known::of_speaker(&all, speaker)?, true),
+        (Some(video), speaker) => (vec![known::find_one(&all, video, speaker.as_deref())?], false),
+        (None, Some(speaker)) => (known::speaker_videos(&all, speaker)?, true),
         (None, None) => bail!("say --video or --speaker"),
     };
     let speaker = videos.first().map(|video| video.speaker.clone()).unwrap_or_default();
@@ -178,18 +178,18 @@ fn of_project(args: &Args, locks: &mut Vec<FolderLock>) -> Result<ForgetTask> {
     for video in &videos {
         let twins = others.iter().filter(|other| video.content.is_some() && other.content == video.content);
         advice.extend(twins.map(|twin| {
-            format!("{} has the same content and stays: forget it too, if it shows the same", twin.title())
+            format!("{} has the same content and stays: forget it too, if it shows the same", twin.display_name())
         }));
     }
     advice.extend(prevention_advice(&config, &speaker, &videos, whole));
-    let titles = if whole { vec![speaker] } else { videos.iter().map(|video| video.title()).collect() };
+    let titles = if whole { vec![speaker] } else { videos.iter().map(|video| video.display_name()).collect() };
     Ok(ForgetTask { titles, removals: vec![removal], folders: vec![work.clone()], advice })
 }
 
 /// Advice that prevents the next run from recreating the videos; `None` if it would not.
 fn prevention_advice(config: &Config, speaker: &str, gone: &[&KnownVideo], whole: bool) -> Option<String> {
     let named =
-        videos::of(config).into_iter().filter(|videos| videos.speaker == speaker).flat_map(|videos| videos.units);
+        videos::all(config).into_iter().filter(|videos| videos.speaker == speaker).flat_map(|videos| videos.units);
     let back: Vec<PathBuf> =
         named.map(|unit| unit.source).filter(|source| gone.iter().any(|k| k.source.as_ref() == Some(source))).collect();
     if back.is_empty() {

@@ -7,7 +7,7 @@ use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator_dataset::config::SplitUnit;
 use orator_dataset::split::SplitRule;
-use orator_dataset::verify::verify::{self, accounts};
+use orator_dataset::verify::verify::{self, read_ledgers};
 use orator_dataset::{Dataset, Split};
 use serde_json::json;
 use std::path::PathBuf;
@@ -115,7 +115,7 @@ fn info(dir: &std::path::Path, ui: &Ui) -> Result<Outcome> {
         "  failed: {:.1} s, and {} videos of unknown length",
         footage.failed_secs, footage.n_of_unknown_length
     ));
-    for account in accounts(dir)? {
+    for account in read_ledgers(dir)? {
         lines.push(format!(
             "  {:40} {:10} kept {:7.1} of {:7.1} s{}",
             account.name,

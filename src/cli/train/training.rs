@@ -9,7 +9,7 @@ use orator_dataset::config::Config;
 use orator_dataset::index::SampleRef;
 use orator_dataset::{Dataset, Split};
 use orator_gesture::train::epochs::ValidatedStep;
-use orator_report::training::live::{LivePage, PosesOfBest};
+use orator_report::training::live::{BestPosesFn, LivePage};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -84,7 +84,7 @@ pub(super) struct TrainingPage<'a> {
 }
 
 impl<'a> TrainingPage<'a> {
-    pub(super) fn new(folder: &'a Path, speaker: String, poses: PosesOfBest<'a>, ui: &'a Ui) -> Self {
+    pub(super) fn new(folder: &'a Path, speaker: String, poses: BestPosesFn<'a>, ui: &'a Ui) -> Self {
         Self { page: LivePage::new(folder, speaker, poses), ui, has_reported: false }
     }
 

@@ -1,32 +1,32 @@
-//! A number of the configuration that may be left to the program: `"auto"`, or the number itself.
+//! Type of numeric settings that the program may choose: `"auto"`, or a number.
 
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// The word that stands for a number which the program chooses.
+/// Configuration value that leaves a number to the program.
 pub const AUTO: &str = "auto";
 
-/// A number, or the word `"auto"`.
+/// Number, or `"auto"`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(untagged, expecting = "expected \"auto\" or a number of this kind")]
 pub enum Auto<T> {
-    /// The program chooses.
+    /// `"auto"`: the program chooses the value.
     #[default]
-    #[serde(serialize_with = "write_word", deserialize_with = "read_word")]
+    #[serde(serialize_with = "serialize_auto", deserialize_with = "deserialize_auto")]
     Chosen,
     Given(T),
 }
 
-fn write_word<S: Serializer>(serializer: S) -> Result<S::Ok, S::Error> {
+fn serialize_auto<S: Serializer>(serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(AUTO)
 }
 
-fn read_word<'de, D: Deserializer<'de>>(deserializer: D) -> Result<(), D::Error> {
+fn deserialize_auto<'de, D: Deserializer<'de>>(deserializer: D) -> Result<(), D::Error> {
     if String::deserialize(deserializer)? == AUTO { Ok(()) } else { Err(D::Error::custom("another word")) }
 }
 
 impl<T> Auto<T> {
-    /// The number given; `None`: the program chooses.
+    /// The given value; `None` for `"auto"`.
     pub fn given(self) -> Option<T> {
         match self {
             Self::Chosen => None,
@@ -47,7 +47,7 @@ mod tests {
     use serde_json::json;
 
     #[test]
-    fn a_word_or_a_number() {
+    fn auto_or_a_number() {
         let read = |value| serde_json::from_value::<Auto<usize>>(value).map_err(|error| error.to_string());
         assert_eq!(read(json!("auto")), Ok(Auto::Chosen));
         assert_eq!(read(json!(7)), Ok(Auto::Given(7)));

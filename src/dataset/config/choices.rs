@@ -1,4 +1,4 @@
-//! Settings with few values, as enums: a value that is none of them is refused with the names of those that are.
+//! Enums of settings with a fixed set of values; any other value is rejected with a message that lists the valid ones.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,64 +6,65 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NetworkPreset {
-    /// For CPUs: convolutions run over time only.
+    /// Small network for CPUs: convolutions over time only.
     #[default]
     Light,
-    /// The published network (Rebol et al. 2021): convolutions over time and frequency.
+    /// Network of Rebol et al. (2021): convolutions over time and frequency.
     Paper,
 }
 
-/// Meaning of the generator's numbers.
+/// Representation of a pose in the generator's output.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum MotionRepresentation {
-    /// Directions of bones, whose lengths are constant by construction.
+    /// Bone directions; bone lengths are constant by construction.
     #[default]
     Bones,
-    /// Positions of joints, as in the paper.
+    /// Joint positions, as in Rebol et al. (2021).
     Positions,
 }
 
-/// The game between generator and discriminator.
+/// Adversarial loss of generator and discriminator.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum AdversarialLoss {
-    /// Least squares (Mao et al. 2017), as in the code the paper descends from: real scores towards 1, generated ones
-    /// towards 0.
+    /// Least squares (Mao et al. 2017), as in the code that Rebol et al. (2021) built on: scores of real motion are
+    /// pushed towards 1, scores of generated motion towards 0.
     #[default]
     LeastSquares,
-    /// Cross entropy of the scores as logits (Goodfellow et al. 2014, the paper's equation); the generator's in its
-    /// non-saturating form, -log D(generated) instead of log(1 - D(generated)).
+    /// Cross entropy with the scores as logits (Goodfellow et al. 2014; the equation in Rebol et al. 2021). The
+    /// generator minimises the non-saturating form, -log D(generated) instead of log(1 - D(generated)).
     Log,
 }
 
-/// Whom of several people in view the stage pose2d follows.
+/// Rule by which the stage pose2d selects one of several visible persons.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FollowRule {
-    /// The largest, surest and most central.
+    /// The largest person, with the highest score and closest to the centre.
     #[default]
     Largest,
-    /// The one whose mouth follows the voice, where that is clear, else the largest; needs the face model.
+    /// The person whose mouth moves with the voice if that is unambiguous, otherwise as `Largest`; needs the face
+    /// model.
     Speaking,
 }
 
-/// Sequence-to-sequence network.
+/// Architecture of the sequence-to-sequence network.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SequenceNetwork {
-    /// Sound and words around each pose.
+    /// Input: the sound and words around each pose.
     #[default]
     Contextual,
-    /// Sound of each pose, words of the segment.
+    /// Input: the sound of each pose and the words of the segment.
     Words,
-    /// Sound alone, against a discriminator.
+    /// Input: sound only; trained against a discriminator.
     Adversarial,
-    /// Sound alone, to the codes of an autoencoder of poses.
+    /// Input: sound only; predicts the codes of a pose autoencoder.
     Autoencoder,
 }
 
-/// How far poses are from the real ones.
+/// Reconstruction loss between generated and real poses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DistanceLoss {
@@ -72,7 +73,7 @@ pub enum DistanceLoss {
     Mse,
 }
 
-/// How much poses change from one to the next.
+/// Loss on the change between consecutive poses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ContinuityLoss {
@@ -81,7 +82,7 @@ pub enum ContinuityLoss {
     Poses,
 }
 
-/// How far poses reach, rewarded.
+/// Loss term that rewards a wide range of motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ReachLoss {
@@ -90,49 +91,49 @@ pub enum ReachLoss {
     Variance,
 }
 
-/// What tells speech from other sound.
+/// Method that distinguishes speech from other sound.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SpeechRule {
-    /// The speech model where it is there, else loudness alone.
+    /// Speech model and loudness if the model is installed, otherwise loudness only.
     #[default]
     Auto,
-    /// Loudness alone.
+    /// Loudness only.
     Loudness,
-    /// The speech model beside loudness; without the model nothing runs.
+    /// Speech model and loudness; an error if the model is not installed.
     Vad,
 }
 
-/// What is put into a split.
+/// Unit that is assigned to a split.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SplitUnit {
-    /// Blocks of time for a speaker with few videos, whole videos otherwise; what was chosen first stays.
+    /// Time blocks for a speaker with few videos, whole videos otherwise; the first choice is recorded and kept.
     #[default]
     Auto,
     /// Whole videos.
     Video,
-    /// Blocks of time of each video, with gaps between the splits.
+    /// Time blocks of each video, with gaps between the splits.
     Time,
 }
 
-/// Processor that holds the tensors of a training.
+/// Device on which training runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ComputeDevice {
     #[default]
     Cpu,
-    /// The first NVIDIA card, in a build with the feature `cuda`.
+    /// First NVIDIA GPU; needs a build with the feature `cuda`.
     Cuda,
 }
 
-/// What chooses the settings of a training that are `"auto"`.
+/// Recipe that chooses the training settings that are `"auto"`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum GanRecipe {
-    /// The minutes of speech that the dataset has.
+    /// Chosen by the minutes of speech in the dataset.
     #[default]
     Auto,
-    /// Rebol et al. 2021 and the code they built on: for many hours of speech.
+    /// Settings of Rebol et al. (2021) and the code they built on, for many hours of speech.
     Paper,
 }

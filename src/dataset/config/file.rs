@@ -1,5 +1,5 @@
-//! `pipeline.toml` as written: the text becomes a table laid over the defaults, and every key that is unknown or of
-//! the wrong type is a `Problem` with its line. All problems are found before any is reported.
+//! Parsing of `pipeline.toml`: the parsed table is merged over the defaults, and every key that is unknown or has the
+//! wrong type becomes a `Problem` with its line. All problems are collected before any is reported.
 
 use super::auto::AUTO;
 use super::sections::PATHS;
@@ -11,10 +11,10 @@ use std::path::Path;
 use toml::de::{DeTable, DeValue};
 use toml::{Spanned, Table, Value};
 
-/// An error in one key.
+/// Error in one key.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
-    /// Dotted, `extract.fps`; a speaker's is `speaker[0].name`.
+    /// Dotted key, as in `extract.fps` or `speaker[0].name`; empty if the error is not about a key.
     pub key: String,
     pub location: SourceLocation,
     pub message: String,
@@ -23,7 +23,7 @@ pub struct Problem {
 /// Location at which a key was given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum SourceLocation {
-    /// Line of the file, from 1.
+    /// Line of the file, counted from 1.
     Line(usize),
     CommandLine,
 }
@@ -44,34 +44,34 @@ impl fmt::Display for Problem {
     }
 }
 
-/// Settings as given, the location of every key given, and the errors in the rest.
+/// Result of parsing: settings, the location of every given key, and all errors.
 pub struct Given {
     pub settings: Settings,
     pub locations: BTreeMap<String, SourceLocation>,
     pub problems: Vec<Problem>,
-    /// Keys given under a former name, a line each.
+    /// Notes on keys given under a former name, a line each.
     pub notes: Vec<String>,
 }
 
-/// Table in each section for the keys that few change, which `pipeline.toml` does not list: `[gan.advanced]`. Each key is
-/// accepted there and in the section itself.
+/// Subtable of each section (`[gan.advanced]`) for rarely changed keys, which the default `pipeline.toml` does not
+/// list. Every key is accepted both there and in the section itself.
 const ADVANCED: &str = "advanced";
 
-/// Largest count up to which f64 holds every whole number.
-const MOST_COUNT: f64 = 9_007_199_254_740_992.0;
+/// Largest number up to which f64 represents every integer: 2^53.
+const MAX_EXACT_INTEGER: f64 = 9_007_199_254_740_992.0;
 
-/// Former keys and sections, and what each is called now.
+/// Former names of keys and sections, with their current names.
 const RENAMED: [(&str, &str); 2] = [("shard", "dataset"), ("segment.max_bone_change", "lift.max_bone_change")];
 
-/// Folders that paths count from.
+/// Base folders of relative paths.
 pub struct Folders<'a> {
-    /// Of the configuration file.
+    /// Folder of the configuration file, for paths in the file.
     pub file: &'a str,
-    /// Of the process, for `--set`.
+    /// Working directory, for paths given by `--set`.
     pub current: &'a str,
 }
 
-/// Reads the text of a `pipeline.toml` and `--set key=value` changes over the defaults.
+/// Parses the text of a `pipeline.toml` and `--set key=value` changes, and merges both over the defaults.
 pub fn read(text: &str, sets: &[String], folders: &Folders) -> Given {
     let mut reader = Reader {
         defaults: defaults::<Settings>(),
@@ -84,7 +84,7 @@ pub fn read(text: &str, sets: &[String], folders: &Folders) -> Given {
         Ok(mut document) => {
             let location_at = |span| SourceLocation::Line(line_of(text, span));
             reader.rename(document.get_mut(), &location_at);
-            reader.lay(document.get_ref(), &mut table, "", &location_at);
+            reader.merge(document.get_ref(), &mut table, "", &location_at);
         }
         Err(error) => {
             let line = line_of(text, error.span().map_or(0, |span| span.start));
@@ -98,7 +98,7 @@ pub fn read(text: &str, sets: &[String], folders: &Folders) -> Given {
     for set in sets {
         reader.set(set, &mut table);
     }
-    reader.drop_refused(&mut table);
+    reader.drop_rejected(&mut table);
     reader.resolve_paths(&mut table, folders);
     let settings = table.try_into::<Settings>().unwrap_or_else(|error| {
         reader.problem("", SourceLocation::Line(1), error.message().to_owned());
@@ -107,14 +107,14 @@ pub fn read(text: &str, sets: &[String], folders: &Folders) -> Given {
     Given { settings, locations: reader.locations, problems: reader.problems, notes: reader.notes }
 }
 
-/// Every key with its default.
+/// Table of all keys with their defaults.
 fn defaults<T: Default + Serialize>() -> Table {
-    // The defaults are plain numbers, strings and paths: they always have a TOML form.
+    // This cannot fail: defaults are numbers, strings and paths, which TOML can represent.
     Table::try_from(T::default()).unwrap_or_default()
 }
 
 struct Reader {
-    /// Every key with its default.
+    /// All keys with their defaults.
     defaults: Table,
     locations: BTreeMap<String, SourceLocation>,
     problems: Vec<Problem>,
@@ -122,7 +122,7 @@ struct Reader {
 }
 
 impl Reader {
-    /// Default of `section.key`; `None` for a speaker's.
+    /// Default of the key `section.name`; `None` for keys of speakers and unknown keys.
     fn default_of(&self, key: &str) -> Option<&Value> {
         let (section, name) = key.split_once('.')?;
         self.defaults.get(section)?.get(name)
@@ -132,7 +132,8 @@ impl Reader {
         self.problems.push(Problem { key: key.to_owned(), location, message });
     }
 
-    /// Moves what is written under former names to today's; what is there under both counts as today's says.
+    /// Moves values given under former names to the current names; if both are given, the current name takes
+    /// precedence.
     fn rename(&mut self, written: &mut DeTable<'_>, location_at: &dyn Fn(usize) -> SourceLocation) {
         for (former, now) in RENAMED {
             let (from, old) = former.rsplit_once('.').map_or((None, former), |(section, key)| (Some(section), key));
@@ -162,8 +163,8 @@ impl Reader {
         }
     }
 
-    /// Lays what is written over `table`, key by key.
-    fn lay(
+    /// Merges the parsed table `written` over `table`, key by key.
+    fn merge(
         &mut self,
         written: &DeTable<'_>,
         table: &mut Table,
@@ -174,34 +175,34 @@ impl Reader {
             let key = format!("{prefix}{}", name.get_ref());
             let location = location_at(name.span().start);
             if key == "speaker" {
-                self.lay_speakers(value.get_ref(), table, location, location_at);
+                self.merge_speakers(value.get_ref(), table, location, location_at);
                 continue;
             }
             let is_section = prefix.matches('.').count() == 1 && !prefix.starts_with("speaker[");
             if name.get_ref() == ADVANCED && is_section {
                 match value.get_ref() {
-                    DeValue::Table(written) => self.lay(written, table, &format!("{key}."), location_at),
+                    DeValue::Table(written) => self.merge(written, table, &format!("{key}."), location_at),
                     other => self.problem(&key, location, format!("expected a table, found {}", other.type_str())),
                 }
                 continue;
             }
             let Some(default) = table.get_mut(name.get_ref().as_ref()) else {
                 let advanced = is_section.then(|| ADVANCED.to_owned());
-                let near = nearest(name.get_ref(), table.keys().chain(&advanced));
+                let near = did_you_mean(name.get_ref(), table.keys().chain(&advanced));
                 self.problem(&key, location, format!("unknown key{near}"));
                 continue;
             };
             let plain = key.replacen(&format!(".{ADVANCED}."), ".", 1);
             if let (Value::Table(inner), DeValue::Table(written)) = (&mut *default, value.get_ref()) {
-                self.lay(written, inner, &format!("{key}."), location_at);
+                self.merge(written, inner, &format!("{key}."), location_at);
                 continue;
             }
             let model = self.default_of(&plain).unwrap_or(default).clone();
-            let is_number = takes_number(&plain, &model) && !matches!(value.get_ref(), DeValue::String(_));
-            match typed(value.get_ref(), if is_number { &Value::Float(0.0) } else { &model }) {
+            let is_number = accepts_number(&plain, &model) && !matches!(value.get_ref(), DeValue::String(_));
+            match to_type_of(value.get_ref(), if is_number { &Value::Float(0.0) } else { &model }) {
                 Ok(value) => {
-                    *default = if is_number { count(value) } else { value };
-                    // One file has no key twice, so that the other was written in the other table.
+                    *default = if is_number { to_integer(value) } else { value };
+                    // TOML forbids duplicate keys, so the other occurrence is in the section or its advanced table.
                     if let Some(SourceLocation::Line(line)) = self.locations.insert(plain.clone(), location)
                         && location != SourceLocation::CommandLine
                     {
@@ -215,7 +216,7 @@ impl Reader {
         }
     }
 
-    fn lay_speakers(
+    fn merge_speakers(
         &mut self,
         value: &DeValue<'_>,
         table: &mut Table,
@@ -235,7 +236,7 @@ impl Reader {
             };
             let mut speaker = defaults::<SpeakerConfig>();
             self.locations.insert(key.clone(), location);
-            self.lay(written, &mut speaker, &format!("{key}."), location_at);
+            self.merge(written, &mut speaker, &format!("{key}."), location_at);
             let is_written = |name: &str| written.keys().any(|key| key.get_ref() == name);
             let is_needed = |name: &str| !is_written(name) && (name == "name" || !is_written("keypoints"));
             for name in ["name", "videos"].into_iter().filter(|name| is_needed(name)) {
@@ -247,23 +248,24 @@ impl Reader {
         table.insert("speaker".to_owned(), Value::Array(speakers));
     }
 
-    /// Takes out each value that its setting's type refuses, so that the problem has its key and the others are still
-    /// looked at.
-    fn drop_refused(&mut self, table: &mut Table) {
+    /// Removes each value that the type of its setting rejects, so that the problem names its key and the other values
+    /// are still checked.
+    fn drop_rejected(&mut self, table: &mut Table) {
         for (key, location) in self.locations.clone() {
             let Some((section, name)) = key.split_once('.') else { continue };
             let Some(inner) = table.get_mut(section).and_then(Value::as_table_mut) else { continue };
             let Some(value) = inner.get(name).cloned() else { continue };
-            let alone = Table::from_iter([(name.to_owned(), value.clone())]);
-            let alone = Table::from_iter([(section.to_owned(), Value::Table(alone))]);
-            if let Err(error) = alone.try_into::<Settings>() {
+            let single_key = Table::from_iter([(name.to_owned(), value.clone())]);
+            let single_key = Table::from_iter([(section.to_owned(), Value::Table(single_key))]);
+            if let Err(error) = single_key.try_into::<Settings>() {
                 inner.remove(name);
-                self.problem(&key, location, refused(&value, error.message()));
+                self.problem(&key, location, rejection_message(&value, error.message()));
             }
         }
     }
 
-    /// Makes each path absolute: those of the file within its folder, those of `--set` within the current one.
+    /// Makes all paths absolute: those in the file are relative to its folder, those given by `--set` to the working
+    /// directory.
     fn resolve_paths(&self, table: &mut Table, folders: &Folders) {
         for (section, name) in PATHS.iter().filter_map(|key| key.split_once('.')) {
             let entries = match table.get_mut(section) {
@@ -281,7 +283,7 @@ impl Reader {
         }
     }
 
-    /// One `--set key=value`; a value that is no TOML is a string.
+    /// Applies one `--set key=value`; a value that is not valid TOML is taken as a string.
     fn set(&mut self, set: &str, table: &mut Table) {
         let Some((key, value)) = set.split_once('=') else {
             return self.problem(
@@ -301,14 +303,14 @@ impl Reader {
         match parsed {
             Ok(mut document) if is_key => {
                 self.rename(document.get_mut(), &|_| SourceLocation::CommandLine);
-                self.lay(document.get_ref(), table, "", &|_| SourceLocation::CommandLine);
+                self.merge(document.get_ref(), table, "", &|_| SourceLocation::CommandLine);
             }
             _ => self.problem(key, SourceLocation::CommandLine, "not a key of the configuration".to_owned()),
         }
     }
 }
 
-/// The table of a section; the whole file's without one.
+/// Table of the section `name`; the top-level table for `None`.
 fn section<'t, 'a>(written: &'t mut DeTable<'a>, name: Option<&str>) -> Option<&'t mut DeTable<'a>> {
     match name {
         None => Some(written),
@@ -319,36 +321,36 @@ fn section<'t, 'a>(written: &'t mut DeTable<'a>, name: Option<&str>) -> Option<&
     }
 }
 
-/// Whether a key whose default is the word "auto" takes a number as well.
-fn takes_number(key: &str, default: &Value) -> bool {
+/// Whether a key whose default is "auto" also accepts a number.
+fn accepts_number(key: &str, default: &Value) -> bool {
     let Some((section, name)) = key.split_once('.').filter(|_| default.as_str() == Some(AUTO)) else { return false };
-    let alone = Table::from_iter([(name.to_owned(), Value::Integer(1))]);
-    Table::from_iter([(section.to_owned(), Value::Table(alone))]).try_into::<Settings>().is_ok()
+    let single_key = Table::from_iter([(name.to_owned(), Value::Integer(1))]);
+    Table::from_iter([(section.to_owned(), Value::Table(single_key))]).try_into::<Settings>().is_ok()
 }
 
-/// A number as a whole one where it is one, so that it also fits a count.
-fn count(value: Value) -> Value {
+/// Converts a float without fraction to an integer, so that it is also accepted for a count.
+fn to_integer(value: Value) -> Value {
     match value {
-        Value::Float(number) if number.fract() == 0.0 && (0.0..=MOST_COUNT).contains(&number) => {
+        Value::Float(number) if number.fract() == 0.0 && (0.0..=MAX_EXACT_INTEGER).contains(&number) => {
             Value::Integer(number as i64)
         }
         other => other,
     }
 }
 
-/// `value` in the type of `default`, or what was expected.
-fn typed(value: &DeValue<'_>, default: &Value) -> Result<Value, String> {
-    let wrong = |expected: &str| Err(format!("expected {expected}, found {}", value.type_str()));
+/// Converts `value` to the type of `default`; the error is a message that states the expected type.
+fn to_type_of(value: &DeValue<'_>, default: &Value) -> Result<Value, String> {
+    let type_error = |expected: &str| Err(format!("expected {expected}, found {}", value.type_str()));
     match (default, value) {
         (Value::Boolean(_), DeValue::Boolean(b)) => Ok(Value::Boolean(*b)),
-        (Value::Boolean(_), _) => wrong("true or false"),
+        (Value::Boolean(_), _) => type_error("true or false"),
         (Value::String(_), DeValue::String(s)) => Ok(Value::String(s.to_string())),
-        (Value::String(_), _) => wrong("a string"),
+        (Value::String(_), _) => type_error("a string"),
         (Value::Integer(_), DeValue::Integer(i)) => match i64::from_str_radix(i.as_str(), i.radix()) {
             Ok(i) if i >= 0 => Ok(Value::Integer(i)),
             _ => Err(format!("{i} is out of range: expected a whole number from 0 up")),
         },
-        (Value::Integer(_), _) => wrong("a whole number"),
+        (Value::Integer(_), _) => type_error("a whole number"),
         (Value::Float(_), DeValue::Integer(_) | DeValue::Float(_)) => {
             let text = match value {
                 DeValue::Float(f) => f.as_str().to_owned(),
@@ -360,31 +362,31 @@ fn typed(value: &DeValue<'_>, default: &Value) -> Result<Value, String> {
                 _ => Err(format!("{text} is no finite number")),
             }
         }
-        (Value::Float(_), _) => wrong("a number"),
+        (Value::Float(_), _) => type_error("a number"),
         (Value::Array(_), DeValue::Array(items)) => {
             let model = Value::String(String::new());
-            items.iter().map(|item| typed(item.get_ref(), &model)).collect::<Result<_, _>>().map(Value::Array)
+            items.iter().map(|item| to_type_of(item.get_ref(), &model)).collect::<Result<_, _>>().map(Value::Array)
         }
         (Value::Array(_), DeValue::String(s)) => Ok(Value::Array(vec![Value::String(s.to_string())])),
-        (Value::Array(_), _) => wrong("a string or a list of strings"),
-        (Value::Table(_), _) => wrong("a table"),
-        (Value::Datetime(_), _) => wrong("another value"),
+        (Value::Array(_), _) => type_error("a string or a list of strings"),
+        (Value::Table(_), _) => type_error("a table"),
+        (Value::Datetime(_), _) => type_error("another value"),
     }
 }
 
-/// Message about a value of the right kind that its setting refuses; `message` is serde's.
-pub fn refused(value: &Value, message: &str) -> String {
+/// Message for a value of the right TOML type that its setting rejects; `message` is that of serde.
+pub fn rejection_message(value: &Value, message: &str) -> String {
     if let Some(at) = message.find("expected \"auto\"") {
         return format!("{value} does not fit: {}", message[at..].lines().next().unwrap_or_default());
     }
     let Value::String(text) = value else { return format!("{value} is too large") };
     let expected = message.strip_prefix(&format!("unknown variant `{text}`, ")).unwrap_or(message);
     let known: Vec<String> = expected.split('`').skip(1).step_by(2).map(str::to_owned).collect();
-    format!("{text:?} is not known: {}{}", expected.replace('`', "\""), nearest(text, known.iter()))
+    format!("{text:?} is not known: {}{}", expected.replace('`', "\""), did_you_mean(text, known.iter()))
 }
 
-/// ` (did you mean X?)` where a known key is close.
-pub fn nearest<'k>(name: &str, known: impl Iterator<Item = &'k String>) -> String {
+/// ` (did you mean X?)` if a known key is similar to `name`, otherwise an empty string.
+pub fn did_you_mean<'k>(name: &str, known: impl Iterator<Item = &'k String>) -> String {
     let best = known.map(|key| (strsim::levenshtein(name, key), key)).min();
     match best {
         Some((steps, key)) if steps <= 1 + key.len() / 3 => format!(" (did you mean {key}?)"),
@@ -392,7 +394,7 @@ pub fn nearest<'k>(name: &str, known: impl Iterator<Item = &'k String>) -> Strin
     }
 }
 
-/// Line of a byte of `text`, from 1.
+/// Line number of the byte at `offset` in `text`, counted from 1.
 pub fn line_of(text: &str, offset: usize) -> usize {
     1 + text.as_bytes().iter().take(offset).filter(|byte| **byte == b'\n').count()
 }

@@ -1,6 +1,6 @@
-//! `[gan]`: the training of the speech-to-gesture network. A [`GanConfig`] is what a user asks for, in which numbers may be
-//! `"auto"`; a [`GanSettings`] has every number, as a recipe fills it in and as checkpoints store it. `pipeline.toml` and the
-//! guide (`configuration`) document the keys.
+//! `[gan]`: training of the speech-to-gesture network. A [`GanConfig`] contains the settings as given, in which numbers
+//! may be `"auto"`; in a [`GanSettings`] a recipe has filled in every number, and checkpoints store it. `pipeline.toml`
+//! and the guide (`configuration`) document the keys.
 
 use super::auto::{AUTO, Auto};
 use super::choices::{AdversarialLoss, ComputeDevice, GanRecipe, MotionRepresentation, NetworkPreset};
@@ -9,10 +9,11 @@ use orator_base::types::posture::PostureChannel;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-/// Defines [`GanValues`] with defaults and ranges; `$number` and `$count` are the arguments for what a recipe chooses.
+/// Defines [`GanValues`] with defaults and ranges. `$number` and `$count` name the parameters of `with` that initialise
+/// the settings that a recipe may choose.
 macro_rules! gan_values {
     (|$number:ident, $count:ident| $($key:ident: $type:ty = $default:expr $(=> $range:expr)?,)*) => {
-        /// The keys of `[gan]`; `N` is the type of a number, and `C` that of a count, that a recipe may choose.
+        /// Keys of `[gan]`; `N` and `C` are the types of the numbers and counts that a recipe may choose.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         #[serde(default)]
         pub struct GanValues<N, C> {
@@ -22,7 +23,7 @@ macro_rules! gan_values {
         impl<N: Copy, C: Copy> GanValues<N, C> {
             pub(super) const RANGES: KeyRanges = &[$($((stringify!($key), $range),)?)*];
 
-            /// The defaults, with `number` and `count` for what a recipe chooses.
+            /// Defaults, with the given number and count for all settings that a recipe may choose.
             fn with($number: N, $count: C) -> Self {
                 Self { $($key: $default,)* }
             }
@@ -71,9 +72,9 @@ gan_values! { |number, count|
     device: ComputeDevice = ComputeDevice::Cpu,
 }
 
-/// `[gan]` as a user asks for it.
+/// `[gan]` as given, with numbers that may be `"auto"`.
 pub type GanConfig = GanValues<Auto<f64>, Auto<usize>>;
-/// `[gan]` with every number.
+/// `[gan]` with all numbers filled in.
 pub type GanSettings = GanValues<f64, usize>;
 
 impl Default for GanConfig {
@@ -82,7 +83,8 @@ impl Default for GanConfig {
     }
 }
 
-/// What a checkpoint means that does not state a key: versions without recipes trained as `paper` does.
+/// Values of keys that are missing in a checkpoint: program versions without recipes trained with the settings of
+/// `paper`.
 impl Default for GanSettings {
     fn default() -> Self {
         Self {
@@ -96,10 +98,10 @@ impl Default for GanSettings {
 }
 
 impl GanConfig {
-    /// The settings in which each key that is `"auto"` has the value that `recipe` gives it.
+    /// Settings in which every `"auto"` is replaced by the value of `recipe` for its key.
     ///
     /// # Errors
-    /// A key for which the recipe has no value, or a fraction for a count.
+    /// An `"auto"` key for which the recipe has no value, or a fraction for a count.
     pub fn filled(&self, recipe: impl Fn(&str) -> Option<f64>) -> serde_json::Result<GanSettings> {
         let mut values = serde_json::to_value(self)?;
         for (key, value) in values.as_object_mut().into_iter().flatten() {
@@ -114,25 +116,27 @@ impl GanConfig {
     }
 }
 
-/// A number as JSON; a count stays one.
+/// JSON number; a non-negative value without fraction becomes an integer, so that it is accepted for a count.
 fn number(value: f64) -> Value {
     if value.fract() == 0.0 && value >= 0.0 { json!(value as u64) } else { json!(value) }
 }
 
 impl GanSettings {
-    /// Learning rate of the step after `step` steps: it rises along a line, then falls along half a cosine.
+    /// Learning rate after `step` completed steps: linear warm-up, then cosine decay to `fade_to` times
+    /// `learning_rate`.
     pub fn rate(&self, step: usize) -> f64 {
         let Self { learning_rate, warmup_steps, fade_to, steps, .. } = self;
         if step < *warmup_steps {
             return learning_rate * (step + 1) as f64 / (*warmup_steps + 1) as f64;
         }
-        let n_fading = steps.saturating_sub(*warmup_steps).max(1);
-        let share = ((step - warmup_steps) as f64 / n_fading as f64).min(1.0);
-        let left = 0.5 * (1.0 + (std::f64::consts::PI * share).cos());
-        learning_rate * (fade_to + (1.0 - fade_to) * left)
+        let n_decay_steps = steps.saturating_sub(*warmup_steps).max(1);
+        let progress = ((step - warmup_steps) as f64 / n_decay_steps as f64).min(1.0);
+        let cosine = 0.5 * (1.0 + (std::f64::consts::PI * progress).cos());
+        learning_rate * (fade_to + (1.0 - fade_to) * cosine)
     }
 
-    /// Weight of the adversarial loss of the step after `step` steps; 0: there is none.
+    /// Weight of the adversarial loss after `step` completed steps: 0 before `adversarial_from`, then a linear ramp up
+    /// to `lambda_gan`.
     pub fn adversarial_weight(&self, step: usize) -> f64 {
         let Some(since) = step.checked_sub(self.adversarial_from) else { return 0.0 };
         let share = (since + 1) as f64 / (self.adversarial_ramp + 1) as f64;
@@ -145,26 +149,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_rate_rises_along_a_line_and_falls_along_half_a_cosine() {
+    fn the_rate_has_a_linear_warm_up_and_a_cosine_decay() {
         let base = GanSettings { learning_rate: 1.0, ..GanSettings::default() };
-        let of = GanSettings { warmup_steps: 9, fade_to: 0.1, steps: 109, ..base.clone() };
-        assert_eq!((of.rate(0), of.rate(4), of.rate(9)), (0.1, 0.5, 1.0));
-        assert!((of.rate(59) - 0.55).abs() < 1e-12 && (of.rate(109) - 0.1).abs() < 1e-12);
-        assert!((of.rate(500) - 0.1).abs() < 1e-12, "a training that goes on after its last step");
+        let decaying = GanSettings { warmup_steps: 9, fade_to: 0.1, steps: 109, ..base.clone() };
+        assert_eq!((decaying.rate(0), decaying.rate(4), decaying.rate(9)), (0.1, 0.5, 1.0));
+        assert!((decaying.rate(59) - 0.55).abs() < 1e-12 && (decaying.rate(109) - 0.1).abs() < 1e-12);
+        assert!((decaying.rate(500) - 0.1).abs() < 1e-12, "a training that goes on after its last step");
         assert_eq!((base.rate(0), base.rate(70_000)), (1.0, 1.0));
     }
 
     #[test]
     fn the_adversarial_loss_starts_at_its_step() {
         let always = GanSettings { lambda_gan: 0.5, ..GanSettings::default() };
-        let of = GanSettings { adversarial_from: 100, adversarial_ramp: 9, ..always.clone() };
-        let weights = [0, 99, 100, 104, 109, 1_000].map(|step| of.adversarial_weight(step));
+        let ramped = GanSettings { adversarial_from: 100, adversarial_ramp: 9, ..always.clone() };
+        let weights = [0, 99, 100, 104, 109, 1_000].map(|step| ramped.adversarial_weight(step));
         assert_eq!(weights, [0.0, 0.0, 0.05, 0.25, 0.5, 0.5]);
         assert_eq!(always.adversarial_weight(0), 0.5);
     }
 
     #[test]
-    fn what_is_given_counts_and_a_recipe_fills_the_rest() {
+    fn given_values_are_kept_and_a_recipe_fills_in_the_rest() {
         let asked = GanConfig { steps: 400.into(), dropout: 0.0.into(), ..GanConfig::default() };
         let filled = asked.filled(|key| Some(if key == "augment_noise_db" { -0.5 } else { 7.0 })).unwrap();
         let expected = GanSettings { steps: 400, dropout: 0.0, augment_noise_db: -0.5, ..GanSettings::with(7.0, 7) };

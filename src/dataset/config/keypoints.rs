@@ -1,8 +1,8 @@
-//! From the `keypoints` of a speaker to files and folders, each one video's, with what stands beside them: rate, size of the
-//! picture, sound. A folder of frames (OpenPose) is one video; other folders hold a file or a folder for each.
+//! Resolution of a speaker's `keypoints` entries to files and folders, one per video, with their frame rate, image size
+//! and sound. A folder of per-frame files (OpenPose) is one video; other folders contain a file or folder per video.
 
 use super::SpeakerConfig;
-use super::patterns::{self, OF_SOUNDS, OF_VIDEOS, SearchRoot};
+use super::patterns::{self, SOUND_EXTENSIONS, SearchRoot, VIDEO_EXTENSIONS};
 use orator_base::input;
 use orator_base::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
@@ -10,28 +10,28 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-const ENDINGS: [&str; 3] = ["json", "npz", "npy"];
-/// Bytes at the beginning of a JSON file that tell whether it is one frame.
+const EXTENSIONS: [&str; 3] = ["json", "npz", "npy"];
+/// Number of bytes at the start of a JSON file that are inspected to detect whether it contains a single frame.
 const HEAD_BYTES: u64 = 4096;
-/// Keys of JSON files that hold many frames.
-const OF_MANY_FRAMES: [&str; 6] =
+/// Keys that occur only in JSON files with many frames.
+const MULTI_FRAME_KEYS: [&str; 6] =
     ["\"instance_info\"", "\"meta_info\"", "\"frame_id\"", "\"image_id\"", "\"annotations\"", "\"images\""];
-/// What programs add to the name of the video.
+/// Prefixes and suffixes that pose estimators add to the name of the video.
 const PREFIXES: [&str; 2] = ["results_", "alphapose-"];
 const SUFFIXES: [&str; 5] = ["_keypoints", "-keypoints", "_openpose", "_pose", "_landmarks"];
 
-/// What the configuration says of the keypoints of a video.
+/// Settings of the keypoints of a video.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KeypointSource {
-    /// Frames a second; `None`: the file must say.
+    /// Frame rate; `None`: the keypoint file must state it.
     pub fps: Option<FrameRate>,
-    /// Width and height of the picture in px; `None`: the file must say.
+    /// Width and height of the image, px; `None`: the keypoint file must state them.
     pub image_size: Option<[u32; 2]>,
-    /// The sound, or why there is none.
+    /// Path of the sound, or the reason why there is none.
     pub sound: Result<PathBuf, String>,
 }
 
-/// The speaker's keypoints, each path once. Entries that lead to nothing are `missing`.
+/// All keypoint files and folders of a speaker; messages about entries without keypoints are added to `missing`.
 pub fn of_speaker(
     speaker: &SpeakerConfig,
     root: &SearchRoot,
@@ -39,12 +39,12 @@ pub fn of_speaker(
 ) -> BTreeMap<PathBuf, KeypointSource> {
     let mut paths = BTreeSet::new();
     for entry in &speaker.keypoints {
-        match of_entry(entry, root, missing) {
+        match expand_entry(entry, root, missing) {
             Ok(found) => paths.extend(found),
             Err(message) => missing.push(message),
         }
     }
-    let endings = [&OF_SOUNDS[..], &OF_VIDEOS].concat();
+    let endings = [&SOUND_EXTENSIONS[..], &VIDEO_EXTENSIONS].concat();
     let mut sounds = BTreeSet::new();
     for entry in &speaker.audio {
         match patterns::expand(entry, root, ("sound", &endings), missing) {
@@ -55,8 +55,8 @@ pub fn of_speaker(
     let is_one = paths.len() == 1 && sounds.len() == 1;
     let source =
         |path: PathBuf| {
-            let name = name_of(&path);
-            let sound = sounds.iter().find(|sound| is_one || name_of(sound) == name).cloned();
+            let name = video_name(&path);
+            let sound = sounds.iter().find(|sound| is_one || video_name(sound) == name).cloned();
             let sound = sound.ok_or_else(|| if speaker.audio.is_empty() {
                 "keypoints have no sound; write `audio = [\"FOLDER\"]` beside `keypoints` (a folder, a pattern or a \
                      file; a sound is found by the name of its keypoints)"
@@ -68,57 +68,58 @@ pub fn of_speaker(
     paths.into_iter().map(source).collect()
 }
 
-fn of_entry(entry: &str, root: &SearchRoot, missing: &mut Vec<String>) -> Result<Vec<PathBuf>, String> {
+fn expand_entry(entry: &str, root: &SearchRoot, missing: &mut Vec<String>) -> Result<Vec<PathBuf>, String> {
     let mut found = Vec::new();
     let mut frames_in: BTreeMap<PathBuf, bool> = BTreeMap::new();
     for path in patterns::matches(entry, root, missing)? {
         if path.is_dir() {
-            found.extend(of_folder(&path).map_err(|error| format!("{entry}: cannot list the folder: {error}"))?);
+            found.extend(expand_folder(&path).map_err(|error| format!("{entry}: cannot list the folder: {error}"))?);
             continue;
         }
-        // A pattern may match every frame of a folder.
+        // If a pattern matches the per-frame files of a folder, the folder is the video.
         let parent = path.parent().unwrap_or(&root.folder).to_owned();
         let has_frames = || is_json(&path) && entry.contains(['*', '?', '[']) && is_frame(&path);
         if *frames_in.entry(parent.clone()).or_insert_with(has_frames) { found.push(parent) } else { found.push(path) }
     }
-    let nothing = || format!("{entry}: no keypoints are there ({}, or folders of frames)", ENDINGS.join(", "));
+    let nothing = || format!("{entry}: no keypoints are there ({}, or folders of frames)", EXTENSIONS.join(", "));
     if found.is_empty() { Err(nothing()) } else { Ok(found) }
 }
 
-/// The folder itself where its files are frames, else the files and folders of frames in it.
-fn of_folder(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
+/// The folder itself if it contains per-frame files, otherwise the keypoint files and folders of frames in it.
+fn expand_folder(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let paths = patterns::list(folder)?;
-    if holds_frames(&paths) {
+    if contains_frames(&paths) {
         return Ok(vec![folder.to_owned()]);
     }
     let is_one = |path: &PathBuf| {
         if path.is_dir() {
-            patterns::list(path).is_ok_and(|paths| holds_frames(&paths))
+            patterns::list(path).is_ok_and(|paths| contains_frames(&paths))
         } else {
-            patterns::has_ending(path, &ENDINGS)
+            patterns::has_extension(path, &EXTENSIONS)
         }
     };
     Ok(paths.into_iter().filter(is_one).collect())
 }
 
-fn holds_frames(paths: &[PathBuf]) -> bool {
+fn contains_frames(paths: &[PathBuf]) -> bool {
     paths.iter().find(|path| is_json(path)).is_some_and(|path| is_frame(path))
 }
 
 fn is_json(path: &Path) -> bool {
-    patterns::has_ending(path, &ENDINGS[..1])
+    patterns::has_extension(path, &EXTENSIONS[..1])
 }
 
-/// Whether a JSON file holds the people of one frame; one that cannot be read does not.
+/// Whether a JSON file contains a single frame; false if it cannot be read.
 fn is_frame(path: &Path) -> bool {
     let mut head = Vec::new();
     let read = input::open(path).and_then(|file| file.take(HEAD_BYTES).read_to_end(&mut head));
     let head = String::from_utf8_lossy(&head);
-    read.is_ok() && (head.contains("\"people\"") || !OF_MANY_FRAMES.iter().any(|key| head.contains(key)))
+    read.is_ok() && (head.contains("\"people\"") || !MULTI_FRAME_KEYS.iter().any(|key| head.contains(key)))
 }
 
-/// Name of the video that keypoints or a sound belong to: without ending and what programs add, in small letters.
-fn name_of(path: &Path) -> String {
+/// Name of the video that a keypoint or sound file belongs to: the lower-case file name without extension, `PREFIXES`
+/// and `SUFFIXES`.
+fn video_name(path: &Path) -> String {
     let name = if path.is_dir() { path.file_name() } else { path.file_stem() };
     let name = name.unwrap_or_default().to_string_lossy().to_lowercase();
     let name = PREFIXES.iter().fold(&*name, |name, prefix| name.strip_prefix(prefix).unwrap_or(name));
@@ -135,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn folders_of_frames_and_files_find_their_sounds_by_name() {
+    fn folders_of_frames_and_files_are_matched_to_sounds_by_name() {
         let dir = tempfile::tempdir().unwrap();
         let write = |name: &str, text: &str| {
             let path = dir.path().join(name);
@@ -154,7 +155,7 @@ mod tests {
             let mut missing = Vec::new();
             let found = of_speaker(&speaker(entries, &["sound"]), &SearchRoot::new(dir.path(), &[]), &mut missing);
             let found: Vec<(String, Result<PathBuf, String>)> =
-                found.into_iter().map(|(path, source)| (name_of(&path), source.sound)).collect();
+                found.into_iter().map(|(path, source)| (video_name(&path), source.sound)).collect();
             assert_eq!(missing, Vec::<String>::new());
             let sound = |name: &str| Ok(dir.path().join("sound").join(name));
             let none = Err("no sound called c is in `audio`; name it like the keypoints, as in c.wav".to_owned());
@@ -168,7 +169,7 @@ mod tests {
         assert_eq!((source.fps, source.image_size), (Some(FrameRate::new(30_000, 1001)), None));
         assert!(source.sound.as_ref().unwrap_err().contains("write `audio = "));
         assert!(missing.len() == 1 && missing[0].contains("none/*.npz: no file matches"), "{missing:?}");
-        // One of each belongs together, whatever they are called.
+        // A single keypoint file and a single sound are matched regardless of their names.
         let found =
             of_speaker(&speaker(&["mm/c.json"], &["sound/b.m4a"]), &SearchRoot::new(dir.path(), &[]), &mut missing);
         assert!(found.values().all(|source| source.sound.is_ok()));

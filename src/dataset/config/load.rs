@@ -1,4 +1,4 @@
-//! From the text of a configuration to settings, or to all that is wrong with it.
+//! Loading of a configuration file: resolved and validated settings, or all of its problems at once.
 
 use super::file::{self, Folders, Problem};
 use super::rules;
@@ -8,7 +8,7 @@ use orator_base::input;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// The documented default, embedded: what `orator init` writes.
+/// Documented default configuration, which `orator init` writes.
 pub const DEFAULT_FILE: &str = include_str!("../../../pipeline.toml");
 
 /// A configuration ready to use.
@@ -16,18 +16,18 @@ pub const DEFAULT_FILE: &str = include_str!("../../../pipeline.toml");
 pub struct Config {
     /// Resolved: paths absolute, values in range.
     pub settings: Settings,
-    /// The file it was read from, absolute.
+    /// Absolute path of the file it was read from.
     pub file: PathBuf,
-    /// Keys given under a former name, a line each.
+    /// Notes on keys given under a former name, a line each.
     pub notes: Vec<String>,
 }
 
-/// Everything wrong with a configuration, one line a problem.
+/// All problems of a configuration; the message has a line for each.
 #[derive(Debug, thiserror::Error)]
 pub struct ConfigError {
     /// The file with the problems.
     pub file: PathBuf,
-    /// Every problem, in the order of its lines.
+    /// Problems sorted by line.
     pub problems: Vec<Problem>,
 }
 
@@ -39,8 +39,8 @@ impl fmt::Display for ConfigError {
     }
 }
 
-/// Reads `file` and lays the `--set` changes over it. Paths in the file are relative to its folder, paths given by
-/// `--set` to the current folder.
+/// Reads `file` and applies the `--set` changes to it. Paths in the file are relative to its folder, paths given by
+/// `--set` to the working directory.
 ///
 /// # Errors
 /// A file that cannot be read, or `ConfigError` with every problem at once.
@@ -51,7 +51,7 @@ pub fn load(file: &Path, sets: &[String]) -> Result<Config> {
     resolve(&text, sets, std::path::absolute(file)?)
 }
 
-/// The configuration of an empty file in the place of `file`, with the `--set` changes.
+/// Configuration as if `file` were empty, with the `--set` changes applied.
 ///
 /// # Errors
 /// `ConfigError` with every problem at once.
@@ -59,7 +59,7 @@ pub fn load_default(file: &Path, sets: &[String]) -> Result<Config> {
     resolve("", sets, std::path::absolute(file)?)
 }
 
-/// What the text of `file` gives.
+/// Resolves `text`, the content of `file`, and validates the result.
 fn resolve(text: &str, sets: &[String], file: PathBuf) -> Result<Config> {
     let current = std::env::current_dir()?;
     let unicode = |folder: &Path| -> Result<String> {
@@ -105,7 +105,8 @@ mod tests {
         assert_eq!(listed.union(&advanced).cloned().collect::<BTreeSet<_>>(), keys(&defaults));
     }
 
-    /// `section.key` of the guide's tables, whose defaults and ranges are those of the program.
+    /// `section.key` of all keys in the guide's tables of advanced keys; checks that the documented defaults and ranges
+    /// are those of the program.
     fn advanced_keys() -> BTreeSet<String> {
         let (mut section, mut keys) = ("", BTreeSet::new());
         for line in include_str!("../../guide/configuration.md").lines() {
@@ -164,7 +165,7 @@ mod tests {
         );
     }
 
-    /// `section.key` of all that a file holds.
+    /// `section.key` of all keys in a file.
     fn keys(file: &toml::Table) -> BTreeSet<String> {
         let tables = |value: &toml::Value| match value {
             toml::Value::Array(entries) => entries.iter().filter_map(|entry| entry.as_table().cloned()).collect(),
@@ -238,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn a_value_that_is_not_known_is_refused_with_those_that_are() {
+    fn an_unknown_value_is_rejected_with_a_list_of_valid_ones() {
         for (set, expected) in [
             ("gan.preset=ligth", "\"ligth\" is not known: expected \"light\" or \"paper\" (did you mean light?)"),
             ("gan.representation=anything", "\"anything\" is not known: expected \"bones\" or \"positions\""),
@@ -255,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn paths_count_from_the_file_or_the_current_folder() {
+    fn paths_are_relative_to_the_file_or_the_working_directory() {
         let text = "[models]\nonnxruntime = \"lib/ort.so\"\n[lift]\nbody_weights = \"/abs.safetensors\"\n\
                     [[speaker]]\nname = \"work\"\nvideos = [\"a.mp4\"]\nreference = \"face.jpg\"\nsource = \"disk\"\n";
         let sets = ["lift.hand_weights=hands.safetensors".to_owned()];
@@ -271,18 +272,18 @@ mod tests {
     }
 
     #[test]
-    fn no_gap_is_kept_that_lift_leaves_open() {
-        let said = problems("", &["segment.max_body_gap_secs=1.5", "segment.max_hand_gap_secs=60"]).join("\n");
+    fn gap_limits_above_what_lift_fills_are_rejected() {
+        let messages = problems("", &["segment.max_body_gap_secs=1.5", "segment.max_hand_gap_secs=60"]).join("\n");
         for key in ["segment.max_body_gap_secs: 1.5", "segment.max_hand_gap_secs: 60"] {
             assert!(
-                said.contains(&format!("{key} is out of range: expected 0 to 1 seconds, all that lift fills")),
-                "{said}"
+                messages.contains(&format!("{key} is out of range: expected 0 to 1 seconds, all that lift fills")),
+                "{messages}"
             );
         }
     }
 
     #[test]
-    fn broken_toml_says_where() {
+    fn syntax_errors_name_the_line() {
         assert!(problems("[extract\nfps = 15", &[])[0].starts_with("line 1: not valid TOML"));
         assert!(problems("extract = 3", &[])[0].contains("expected a table"));
         assert!(problems("speaker = 3", &[])[0].contains("[[speaker]]"));

@@ -1,6 +1,6 @@
-//! `pipeline.toml`, twice: as written (`file`: a table with the line of every key) and resolved (`Settings`:
-//! defaults in, paths absolute, every value in its range). Each section is one small struct whose defaults are the
-//! documented ones; the top level `pipeline.toml` documents them and a test holds the two together.
+//! `pipeline.toml` in two forms: parsed (`file`: a table with the line of every key) and resolved (`Settings`: defaults
+//! filled in, paths absolute, all values in range). Each section is a struct with its defaults; the `pipeline.toml` in
+//! the repository root documents them, and a test checks that both agree.
 
 pub mod auto;
 pub mod choices;

@@ -1,19 +1,19 @@
-//! Entries of the configuration that name files: a path, a folder, or a pattern.
+//! Expansion of configuration entries that name files: a path, a folder, or a glob pattern.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Where entries are looked for.
+/// Folder in which entries are searched.
 #[derive(Clone, Debug)]
 pub struct SearchRoot {
-    /// The folder that they count from.
+    /// Folder that relative entries refer to.
     pub folder: PathBuf,
-    /// Folders that the program writes in: patterns pass them over.
+    /// Canonical paths of the folders that the program writes to; patterns do not match files in them.
     own: Vec<PathBuf>,
 }
 
 impl SearchRoot {
-    /// Entries of `folder`; a folder in `own` that everything lies in is not passed over.
+    /// Search root `folder`. Patterns skip the folders `own`, except one that contains `folder` itself.
     pub fn new(folder: &Path, own: &[&Path]) -> Self {
         let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
         let own = own.iter().map(|path| real(path)).filter(|path| !real(folder).starts_with(path)).collect();
@@ -29,24 +29,28 @@ impl SearchRoot {
     }
 }
 
-/// Endings taken for videos when a folder is named.
-pub const OF_VIDEOS: [&str; 10] = ["mp4", "mkv", "mov", "webm", "avi", "m4v", "mpg", "mpeg", "ts", "wmv"];
-/// Endings taken for sounds, beside those of videos.
-pub const OF_SOUNDS: [&str; 12] =
+/// Extensions of video files that are used from a folder.
+pub const VIDEO_EXTENSIONS: [&str; 10] = ["mp4", "mkv", "mov", "webm", "avi", "m4v", "mpg", "mpeg", "ts", "wmv"];
+/// Extensions of sound files; the sound of video files can be used too.
+pub const SOUND_EXTENSIONS: [&str; 12] =
     ["wav", "flac", "mp3", "m4a", "ogg", "opus", "aac", "oga", "aif", "aiff", "wma", "caf"];
 
-/// Endings taken for transcripts.
-pub const OF_TRANSCRIPTS: [&str; 7] = ["json", "srt", "vtt", "textgrid", "ctm", "tsv", "txt"];
+/// Extensions of transcript files.
+pub const TRANSCRIPT_EXTENSIONS: [&str; 7] = ["json", "srt", "vtt", "textgrid", "ctm", "tsv", "txt"];
 
-/// Most folders within each other that `**` looks into.
+/// Maximum nesting depth of folders that `**` enters.
 const MAX_DEPTH: usize = 64;
 
-/// The files an entry names: itself, those of the folder it is that end like one of `endings`, or what its pattern matches.
-/// `what` is a word for such a file. A plain path is taken as it is, so that a missing file fails by itself.
+/// Files that an entry names: the files with one of `extensions` in a folder, the matches of a pattern, or a plain
+/// path, which is returned even if it does not exist, so that the error is reported for that file. `what` names the
+/// kind of file in messages.
+///
+/// # Errors
+/// Those of `matches`, a folder that cannot be listed or has no such file.
 pub fn expand(
     entry: &str,
     root: &SearchRoot,
-    (what, endings): (&str, &[&str]),
+    (what, extensions): (&str, &[&str]),
     missing: &mut Vec<String>,
 ) -> Result<Vec<PathBuf>, String> {
     let path = root.folder.join(entry);
@@ -56,14 +60,17 @@ pub fn expand(
     let paths: Vec<PathBuf> = list(&path)
         .map_err(|error| format!("{entry}: cannot list the folder: {error}"))?
         .into_iter()
-        .filter(|path| has_ending(path, endings))
+        .filter(|path| has_extension(path, extensions))
         .collect();
-    let nothing = || format!("{entry}: the folder holds no {what} ({})", endings.join(", "));
+    let nothing = || format!("{entry}: the folder holds no {what} ({})", extensions.join(", "));
     if paths.is_empty() { Err(nothing()) } else { Ok(paths) }
 }
 
-/// The file or folder that an entry is, or what its pattern matches. A folder that a pattern could not look into is
-/// `missing`, and so is a file whose name is no text. What the program itself wrote matches no pattern.
+/// Files and folders that an entry names: a plain path, or the matches of a pattern, without files that the program
+/// itself wrote. Messages about unreadable folders and file names that are not UTF-8 are added to `missing`.
+///
+/// # Errors
+/// An invalid pattern, or one without matches.
 pub fn matches(entry: &str, root: &SearchRoot, missing: &mut Vec<String>) -> Result<Vec<PathBuf>, String> {
     let folder = &root.folder;
     let path = folder.join(entry);
@@ -77,26 +84,27 @@ pub fn matches(entry: &str, root: &SearchRoot, missing: &mut Vec<String>) -> Res
             let pattern = Path::new(&glob::Pattern::escape(&folder.to_string_lossy())).join(pattern);
             let matches =
                 glob::glob(&pattern.to_string_lossy()).map_err(|error| format!("{entry}: no pattern: {error}"))?;
-            let mut unread = |error: glob::GlobError| missing.push(format!("{entry}: cannot look there: {error}"));
-            paths.extend(matches.filter_map(|found| found.map_err(&mut unread).ok()));
+            let mut report_unreadable =
+                |error: glob::GlobError| missing.push(format!("{entry}: cannot look there: {error}"));
+            paths.extend(matches.filter_map(|found| found.map_err(&mut report_unreadable).ok()));
         }
         Ok(paths)
     };
-    // The library would follow links that lead back without end.
+    // `**` is expanded here, since `glob` would follow circular links without end.
     let (mut folders, mut rest) = (vec![folder.to_owned()], entry);
     while let Some((before, after)) =
         rest.split_once("**/").filter(|(before, _)| before.is_empty() || before.ends_with('/'))
     {
         let tops = if before.is_empty() { folders } else { found(&folders, before)? };
         folders = Vec::new();
-        let mut seen = BTreeSet::new();
-        tops.iter().for_each(|top| add_below(top, MAX_DEPTH, &mut seen, &mut folders));
+        let mut visited = BTreeSet::new();
+        tops.iter().for_each(|top| add_below(top, MAX_DEPTH, &mut visited, &mut folders));
         rest = after;
     }
     let mut paths = found(&folders, rest)?;
     paths.retain(|path| !root.is_own(path));
-    let nameless = folders.iter().flat_map(|folder| nameless(rest, folder));
-    missing.extend(nameless.filter(|path| !root.is_own(path)).map(|path| no_text(&path)));
+    let non_utf8 = folders.iter().flat_map(|folder| non_utf8_files(rest, folder));
+    missing.extend(non_utf8.filter(|path| !root.is_own(path)).map(|path| not_utf8_message(&path)));
     if paths.is_empty() && missing.len() == n_missing {
         Err(format!("{entry}: no file matches, looked in {}", folder.display()))
     } else {
@@ -104,35 +112,37 @@ pub fn matches(entry: &str, root: &SearchRoot, missing: &mut Vec<String>) -> Res
     }
 }
 
-/// Adds `folder` and the folders below it, each once, whatever links lead to it; hidden ones too.
-fn add_below(folder: &Path, depth: usize, seen: &mut BTreeSet<PathBuf>, folders: &mut Vec<PathBuf>) {
-    let is_new = folder.canonicalize().is_ok_and(|path| path.is_dir() && seen.insert(path));
+/// Adds `folder` and all folders below it, including hidden ones; a folder that is reachable by several links is added
+/// once.
+fn add_below(folder: &Path, depth: usize, visited: &mut BTreeSet<PathBuf>, folders: &mut Vec<PathBuf>) {
+    let is_new = folder.canonicalize().is_ok_and(|path| path.is_dir() && visited.insert(path));
     if is_new && depth > 0 {
         folders.push(folder.to_owned());
-        // A folder that cannot be listed is reported where its files are looked for.
-        list(folder).unwrap_or_default().iter().for_each(|path| add_below(path, depth - 1, seen, folders));
+        // A folder that cannot be listed is reported when its files are matched.
+        list(folder).unwrap_or_default().iter().for_each(|path| add_below(path, depth - 1, visited, folders));
     }
 }
 
-/// Files whose names are no text, in the folder where the pattern begins; patterns do not match them.
-fn nameless(entry: &str, folder: &Path) -> Vec<PathBuf> {
+/// Files whose names are not UTF-8 and would match the last part of the pattern; only the folder before its first
+/// wildcard is searched. `glob` never matches such files.
+fn non_utf8_files(entry: &str, folder: &Path) -> Vec<PathBuf> {
     let parts: Vec<&str> = entry.split('/').collect();
     let n_plain = parts.iter().take_while(|part| !part.contains(['*', '?', '['])).count();
-    let begin = parts[..n_plain].iter().fold(folder.to_owned(), |folder, part| folder.join(part));
+    let start_folder = parts[..n_plain].iter().fold(folder.to_owned(), |folder, part| folder.join(part));
     let last = parts.last().and_then(|last| glob::Pattern::new(last).ok());
     let matches = |path: &PathBuf| {
         let name = path.file_name().unwrap_or_default();
         name.to_str().is_none() && last.as_ref().is_some_and(|last| last.matches(&name.to_string_lossy()))
     };
-    list(&begin).unwrap_or_default().into_iter().filter(matches).collect()
+    list(&start_folder).unwrap_or_default().into_iter().filter(matches).collect()
 }
 
-/// What is wrong with a path that is no text, and what to do.
-pub fn no_text(path: &Path) -> String {
+/// Message for a path that is not valid UTF-8.
+pub fn not_utf8_message(path: &Path) -> String {
     format!("{}: its name is no text (UTF-8); rename it", path.display())
 }
 
-/// What lies in a folder, sorted.
+/// Sorted paths of the entries of a folder.
 pub fn list(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let mut paths: Vec<PathBuf> =
         std::fs::read_dir(folder)?.filter_map(|entry| entry.ok().map(|entry| entry.path())).collect();
@@ -140,10 +150,10 @@ pub fn list(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// Whether a file's name has one of the endings, in small letters or large.
-pub fn has_ending(path: &Path, endings: &[&str]) -> bool {
+/// Whether a path has one of the extensions (given in lower case), ignoring case.
+pub fn has_extension(path: &Path, extensions: &[&str]) -> bool {
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
-    ending.is_some_and(|ending| endings.contains(&ending.as_str()))
+    ending.is_some_and(|ending| extensions.contains(&ending.as_str()))
 }
 
 #[cfg(test)]
@@ -153,7 +163,7 @@ mod tests {
     use std::os::unix::fs::symlink;
 
     #[test]
-    fn folders_that_lead_back_are_looked_into_once() {
+    fn folders_with_circular_links_are_searched_once() {
         let dir = tempfile::tempdir().unwrap();
         let at = |name: &str| dir.path().join(name);
         std::fs::create_dir_all(at("a/b/c")).unwrap();

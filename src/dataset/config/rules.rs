@@ -1,4 +1,4 @@
-//! Ranges of the settings, as the sections state them, and what no range says.
+//! Validation of settings: the ranges stated in the sections, and rules that are not ranges.
 
 use super::auto::AUTO;
 use super::file::{Problem, SourceLocation};
@@ -9,7 +9,7 @@ use orator_base::stage::artifacts::StageName;
 use std::collections::{BTreeMap, BTreeSet};
 use toml::{Table, Value};
 
-/// Least and greatest value of each number by its key, and its unit.
+/// Minimum, maximum and unit of every number, by key.
 pub(super) fn ranges() -> impl Iterator<Item = (String, (f64, f64, &'static str))> {
     let sections = [
         ("work", WorkConfig::RANGES),
@@ -28,17 +28,17 @@ pub(super) fn ranges() -> impl Iterator<Item = (String, (f64, f64, &'static str)
     sections.into_iter().flat_map(of_section)
 }
 
-/// Every value out of its range, with what was expected.
+/// Checks all settings; returns a problem for each invalid value.
 pub fn check(settings: &Settings, locations: &BTreeMap<String, SourceLocation>) -> Vec<Problem> {
     let mut rules = Rules { locations, problems: Vec::new() };
-    // Settings are plain numbers, strings and paths: they always have a TOML form.
+    // This cannot fail: settings are numbers, strings and paths, which TOML can represent.
     let values = Table::try_from(settings).unwrap_or_default();
     for (key, (low, high, unit)) in ranges() {
         let value = key.split_once('.').and_then(|(section, name)| values.get(section)?.get(name));
         let value = match value {
             Some(Value::Integer(value)) => *value as f64,
             Some(Value::Float(value)) => *value,
-            // Left to a recipe.
+            // A recipe chooses the value.
             Some(Value::String(text)) if text == AUTO => continue,
             _ => f64::NAN,
         };
@@ -88,7 +88,7 @@ impl Rules<'_> {
                     format!("{:?} is no size: expected width and height in pixels, \"1280x720\"", speaker.size);
                 self.problem(&format!("speaker[{at}].size"), message);
             }
-            // Where neither is written, the missing key has been told.
+            // If neither key is given, the parser has already reported the missing key.
             let is_written = |name: &str| self.locations.contains_key(&format!("speaker[{at}].{name}"));
             let is_empty = speaker.videos.is_empty() && speaker.keypoints.is_empty();
             if is_empty && (is_written("videos") || is_written("keypoints")) {

@@ -1,5 +1,5 @@
-//! The sections of `pipeline.toml` with their types and defaults. `pipeline.toml` and the guide (`configuration`) document
-//! meaning and unit of each key.
+//! Sections of `pipeline.toml` with the type, default and range of each key. `pipeline.toml` and the guide
+//! (`configuration`) document the meaning and unit of each key.
 
 use super::choices::{FollowRule, SpeechRule, SplitUnit};
 use super::gan::GanConfig;
@@ -8,15 +8,15 @@ use orator_base::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// Keys that are paths; an empty one is none.
+/// Keys whose values are paths; an empty value means that no path is set.
 pub(super) const PATHS: [&str; 6] =
     ["work.dir", "models.dir", "models.onnxruntime", "lift.body_weights", "lift.hand_weights", "speaker.reference"];
 
-/// The keys of a section that are numbers: least and greatest value, unit.
+/// Numeric keys of a section with (minimum, maximum, unit).
 pub(super) type KeyRanges = &'static [(&'static str, (f64, f64, &'static str))];
 
-/// A section of the configuration: each key with its type, its default and, of a number, its range. Unknown keys are
-/// refused.
+/// Defines a section of the configuration: each key with its type, default and, for a number, its range. Unknown keys
+/// are rejected.
 macro_rules! section {
     ($(#[$doc:meta])* $name:ident { $($key:ident: $type:ty = $default:expr $(=> $range:expr)?,)* }) => {
         $(#[$doc])*
@@ -39,7 +39,7 @@ macro_rules! section {
 }
 pub(super) use section;
 
-/// Everything a run needs to know. Paths are absolute once resolved.
+/// All settings of a run. Paths are absolute once resolved.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
@@ -55,7 +55,7 @@ pub struct Settings {
     pub speaker: Vec<SpeakerConfig>,
 }
 
-/// `[[speaker]]`: one person, with the videos that show them, or keypoints of such videos.
+/// `[[speaker]]`: one person, with videos of them or keypoints of such videos.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SpeakerConfig {
@@ -79,13 +79,13 @@ pub struct SpeakerConfig {
 }
 
 impl SpeakerConfig {
-    /// `size` as width and height; `None` where it is empty or no size.
+    /// Width and height in `size`, px; `None` if it is empty or invalid.
     pub fn image_size(&self) -> Option<[u32; 2]> {
         image_size(&self.size)
     }
 }
 
-/// Width and height in px of `1280x720`; `None`: it is no size.
+/// Parses an image size such as `1280x720` into width and height, px, each 1 to 100,000; `None` if it is invalid.
 pub fn image_size(text: &str) -> Option<[u32; 2]> {
     let (width, height) = text.split_once('x')?;
     let px = |text: &str| text.trim().parse().ok().filter(|px| (1..=100_000).contains(px));
@@ -120,15 +120,15 @@ section! {
 }
 
 impl ExtractConfig {
-    /// The dataset rate.
+    /// Frame rate of the dataset.
     pub fn rate(&self) -> FrameRate {
         FrameRate::new(self.fps, 1)
     }
 }
 
 section! {
-    /// `[pose2d]`: which models look at a frame (ids of `models/manifest.toml`; `auto`: the best that is there), and the
-    /// tracking of the one speaker.
+    /// `[pose2d]`: which models look at a frame (ids of `models/manifest.toml`; `auto`: the best that is there), and
+    /// the tracking of the one speaker.
     Pose2dConfig {
         person: String = "auto".into(),
         body: String = "auto".into(),

@@ -1,5 +1,5 @@
-//! `[seq2seq]`: training of the sequence-to-sequence networks. `pipeline.toml` and the guide (`configuration`) document the
-//! keys.
+//! `[seq2seq]`: training of the sequence-to-sequence networks. `pipeline.toml` and the guide (`configuration`) document
+//! the keys.
 
 use super::choices::{ContinuityLoss, DistanceLoss, ReachLoss, SequenceNetwork};
 use super::sections::section;
@@ -35,7 +35,8 @@ section! {
 }
 
 impl Seq2seqConfig {
-    /// Learning rate of a step, counted from 0.
+    /// Learning rate of a step (counted from 0): constant, then linear decay from step `fade_from` on; `fade_from` 0:
+    /// no decay.
     pub fn rate(&self, step: usize) -> f64 {
         let Self { learning_rate, fade_from, steps, .. } = *self;
         if fade_from == 0 || step < fade_from || fade_from >= steps {
@@ -50,7 +51,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_learning_rate_falls_to_nothing_from_a_step_on() {
+    fn the_learning_rate_decays_linearly_from_a_step_on() {
         let settings = Seq2seqConfig { learning_rate: 1.0, fade_from: 6, steps: 10, ..Seq2seqConfig::default() };
         assert_eq!([0, 5, 6, 8, 9, 12].map(|step| settings.rate(step)), [1.0, 1.0, 1.0, 0.5, 0.25, 0.25]);
         assert_eq!(Seq2seqConfig::default().rate(19_999), 1e-3);

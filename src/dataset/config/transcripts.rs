@@ -1,14 +1,14 @@
-//! From the `transcripts` of a speaker to the video of each: the file is called like its video, with or without more behind
-//! a dot (`talk.srt`, `talk.en.vtt`).
+//! Matching of a speaker's `transcripts` to videos by file name: the name of the video, optionally followed by a dot
+//! and more (`talk.srt`, `talk.en.vtt`).
 
 use super::SpeakerConfig;
-use super::patterns::{self, OF_TRANSCRIPTS, SearchRoot};
+use super::patterns::{self, SearchRoot, TRANSCRIPT_EXTENSIONS};
 use orator_base::stage::Unit;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// The transcript of each video that has one, by its work name. Entries that lead to nothing, transcripts of no video and
-/// second ones of a video are `missing`.
+/// Transcripts of the speaker's videos, by the work name of the video. Messages about entries without files,
+/// transcripts without a video and further transcripts of a video are added to `missing`.
 pub fn of_speaker(
     speaker: &SpeakerConfig,
     units: &[Unit],
@@ -17,15 +17,19 @@ pub fn of_speaker(
 ) -> BTreeMap<String, PathBuf> {
     let mut paths = BTreeSet::new();
     for entry in &speaker.transcripts {
-        match patterns::expand(entry, root, ("transcript", &OF_TRANSCRIPTS), missing) {
+        match patterns::expand(entry, root, ("transcript", &TRANSCRIPT_EXTENSIONS), missing) {
             Ok(found) => paths.extend(found),
             Err(message) => missing.push(format!("transcripts: {message}")),
         }
     }
     let mut found: BTreeMap<String, PathBuf> = BTreeMap::new();
     for path in &paths {
-        let named =
-            || units.iter().filter(|unit| is_of(path, &unit.source)).max_by_key(|unit| unit.source.as_os_str().len());
+        let named = || {
+            units
+                .iter()
+                .filter(|unit| is_transcript_of(path, &unit.source))
+                .max_by_key(|unit| unit.source.as_os_str().len())
+        };
         let unit = if paths.len() == 1 && units.len() == 1 { units.first() } else { named() };
         let file = path.display();
         match unit {
@@ -43,8 +47,8 @@ pub fn of_speaker(
     found
 }
 
-/// Whether a transcript has the name of a video or of its keypoints, in small letters or large.
-fn is_of(transcript: &Path, video: &Path) -> bool {
+/// Whether the name of a transcript matches that of a video or its keypoints, ignoring case.
+fn is_transcript_of(transcript: &Path, video: &Path) -> bool {
     let stem = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
     let (name, video) = (stem(transcript), if video.is_dir() { folder_name(video) } else { stem(video) });
     name == video || name.strip_prefix(&video).is_some_and(|more| more.starts_with('.'))
@@ -59,7 +63,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn transcripts_find_their_videos_by_name() {
+    fn transcripts_are_matched_to_videos_by_name() {
         let dir = tempfile::tempdir().unwrap();
         let files =
             ["a.mp4", "a.b.mp4", "c.mp4", "t/A.en.srt", "t/a.b.json", "t/c.vtt", "t/c.txt", "t/d.srt", "t/x.pdf"];
@@ -81,10 +85,10 @@ mod tests {
         let (found, missing) = find(&["t"], &units);
         assert_eq!(found, ["a.b.mp4 a.b.json", "a.mp4 A.en.srt", "c.mp4 c.txt"]);
         assert!(missing[0].contains("c.txt and ") && missing[1].contains("d.srt"), "{missing:?}");
-        // One of each belongs together, whatever they are called.
+        // A single transcript and a single video are matched regardless of their names.
         assert_eq!(find(&["t/d.srt"], &units[..1]).0, ["a.mp4 d.srt"]);
         let (found, missing) = find(&["gone.srt", "t/*.ctm"], &units);
         assert!(found.is_empty() && missing.len() == 2, "{missing:?}");
-        assert!(missing.iter().any(|said| said.contains("gone.srt is no file")), "{missing:?}");
+        assert!(missing.iter().any(|message| message.contains("gone.srt is no file")), "{missing:?}");
     }
 }

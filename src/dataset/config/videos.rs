@@ -1,5 +1,6 @@
-//! From the `videos` of the speakers to units: patterns are expanded, folders listed, and every video gets its work
-//! name. What names no video is a unit too, so that its failure is reported and the others go on.
+//! Resolution of the speakers' `videos` entries to units: patterns are expanded, folders are listed, and every video
+//! gets its work name. A path that does not exist becomes a unit too, so that it fails by itself and the others are
+//! processed.
 
 use super::keypoints::{self, KeypointSource};
 use super::patterns::{self, SearchRoot};
@@ -9,31 +10,31 @@ use orator_base::types::split::Split;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// The videos of one speaker.
+/// Videos of one speaker.
 #[derive(Clone, Debug, Default)]
 pub struct Videos {
     pub speaker: String,
-    /// Sorted by their work names, each once.
+    /// Units sorted by work name, each once.
     pub units: Vec<Unit>,
-    /// The videos that are keypoints of other programs, by their work names.
+    /// Videos given as keypoints of other programs, by work name.
     pub keypoints: BTreeMap<String, KeypointSource>,
-    /// The transcript of each video that has one, by its work name.
+    /// Paths of transcripts, by the work name of the video.
     pub transcripts: BTreeMap<String, PathBuf>,
-    /// The split of each video that the configuration puts into one, by its work name.
+    /// Splits named in the configuration, by the work name of the video.
     pub splits: BTreeMap<String, Split>,
-    /// Entries of the configuration that lead to no video, each with what to do.
+    /// Messages about entries of the configuration that have no effect, each with advice.
     pub missing: Vec<String>,
 }
 
 impl Videos {
-    /// Whether the models have pictures to look at: not all are keypoints.
-    pub fn have_pictures(&self) -> bool {
+    /// Whether the pose models may be needed: false only if all videos are given as keypoints.
+    pub fn has_video_files(&self) -> bool {
         self.keypoints.is_empty() || self.units.len() > self.keypoints.len()
     }
 }
 
-/// The videos of every speaker of the configuration.
-pub fn of(config: &Config) -> Vec<Videos> {
+/// Videos of all speakers of the configuration.
+pub fn all(config: &Config) -> Vec<Videos> {
     let settings = &config.settings;
     let folder = config.file.parent().unwrap_or(Path::new("."));
     let root = SearchRoot::new(folder, &[&settings.work.dir, &settings.models.dir]);
@@ -45,7 +46,7 @@ fn of_speaker(speaker: &SpeakerConfig, root: &SearchRoot) -> Videos {
     let mut found = BTreeMap::new();
     let mut missing = Vec::new();
     for entry in &speaker.videos {
-        let videos = ("video", &patterns::OF_VIDEOS[..]);
+        let videos = ("video", &patterns::VIDEO_EXTENSIONS[..]);
         let paths = patterns::expand(entry, root, videos, &mut missing).unwrap_or_else(|message| {
             missing.push(message);
             Vec::new()
@@ -92,10 +93,13 @@ fn of_speaker(speaker: &SpeakerConfig, root: &SearchRoot) -> Videos {
     Videos { speaker: speaker.name.clone(), units, keypoints: given, transcripts, splits, missing }
 }
 
-/// Adds a video under its work name, which is returned. Errors where its path is no text, or another has the name.
+/// Adds a video under its work name and returns the name.
+///
+/// # Errors
+/// A path that is not UTF-8, or a work name that another video already has.
 fn add(found: &mut BTreeMap<String, Unit>, speaker: &str, path: PathBuf, folder: &Path) -> Result<String, String> {
     if path.to_str().is_none() {
-        return Err(patterns::no_text(&path));
+        return Err(patterns::not_utf8_message(&path));
     }
     let video = work_name(&path, folder);
     let new = || Unit { speaker: speaker.to_owned(), video: video.clone(), source: path.clone() };
@@ -107,7 +111,7 @@ fn add(found: &mut BTreeMap<String, Unit>, speaker: &str, path: PathBuf, folder:
     Err(format!("{first} and {second} would both be called {video} in the work folder; rename the second"))
 }
 
-/// Whether an entry means the video: its path, its file name, or a pattern of one of them.
+/// Whether an entry refers to the video: by its path, its file name, or a pattern for one of them.
 pub fn names(entry: &str, video: &Path, folder: &Path) -> bool {
     let file_name = video.file_name().unwrap_or_default().to_string_lossy();
     if folder.join(entry) == video || *entry == *file_name {
@@ -117,8 +121,8 @@ pub fn names(entry: &str, video: &Path, folder: &Path) -> bool {
     glob::Pattern::new(entry).is_ok_and(|pattern| pattern.matches(&relative) || pattern.matches(&file_name))
 }
 
-/// `<slug of the stem>-<8 hex of BLAKE3 of the path relative to the configuration>`: stable when other videos come,
-/// different for equal names in two folders.
+/// Work name `<slug of the stem>-<8 hex of BLAKE3 of the path relative to the configuration>`: it does not change when
+/// videos are added, and differs for equal file names in two folders.
 fn work_name(path: &Path, folder: &Path) -> String {
     let relative = path.strip_prefix(folder).unwrap_or(path).to_string_lossy().replace('\\', "/");
     let hash = blake3::hash(relative.as_bytes()).to_hex();
@@ -126,7 +130,8 @@ fn work_name(path: &Path, folder: &Path) -> String {
     format!("{}-{}", slug(&stem), &hash[..8])
 }
 
-/// Lower case letters, digits and single dashes, at most 40 of them; `video` where nothing is left.
+/// Converts text to lower-case ASCII letters, digits and single dashes, at most 40 characters; `video` if nothing is
+/// left.
 pub fn slug(text: &str) -> String {
     let mut slug = String::new();
     for c in text.chars().flat_map(char::to_lowercase) {
@@ -177,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn the_folder_of_the_configuration_is_no_pattern() {
+    fn the_folder_of_the_configuration_is_not_a_pattern() {
         let dir = tempfile::tempdir().unwrap();
         let folder = dir.path().join("talks [2024] *");
         std::fs::create_dir(&folder).unwrap();
@@ -195,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn videos_are_left_out_and_put_into_splits_by_name() {
+    fn videos_are_excluded_and_assigned_to_splits_by_name() {
         let dir = tempfile::tempdir().unwrap();
         for name in ["a.mp4", "b [1].mp4", "c.mp4", "d.mp4"] {
             std::fs::write(dir.path().join(name), "").unwrap();
@@ -208,13 +213,13 @@ mod tests {
         assert_eq!((videos.units.len(), videos.missing.len()), (3, 0));
         assert_eq!((split("a-"), split("b-1-"), split("d-")), (Some(Split::Train), Some(Split::Test), None));
         (speaker.validation, speaker.test) = (list(&["a.mp4", "none.mp4"]), list(&[]));
-        let said = of_speaker(&speaker, &root(dir.path())).missing;
-        assert!(said[0].contains("in train and in validation") && said[1].contains("none.mp4"), "{said:?}");
+        let missing = of_speaker(&speaker, &root(dir.path())).missing;
+        assert!(missing[0].contains("in train and in validation") && missing[1].contains("none.mp4"), "{missing:?}");
     }
 
     #[test]
-    fn two_videos_never_become_one_without_a_word() {
-        // Names of which nothing is left in the work name, until two have the same eight digits.
+    fn equal_work_names_are_reported() {
+        // Names whose slug is empty, tried until two have the same eight hash digits.
         let mut known = BTreeMap::new();
         let stem = |n: u32| (0..20).map(|bit| if n >> bit & 1 == 0 { 'é' } else { 'è' }).collect::<String>();
         let collides = |n: u32| {
@@ -235,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_that_is_no_text_is_an_error() {
+    fn a_file_name_that_is_not_utf8_is_an_error() {
         use std::os::unix::ffi::OsStrExt as _;
         let dir = tempfile::tempdir().unwrap();
         for name in [&b"a.mp4"[..], b"b\xfe.mp4", b"b\xff.mp4", b"b\xff.txt"] {
@@ -244,12 +249,12 @@ mod tests {
         for entry in [".", "*.mp4"] {
             let videos = of_speaker(&host(&[entry]), &root(dir.path()));
             assert_eq!((videos.units.len(), videos.missing.len()), (1, 2), "{:?}", videos.missing);
-            assert!(videos.missing.iter().all(|said| said.contains("no text")), "{:?}", videos.missing);
+            assert!(videos.missing.iter().all(|missing| missing.contains("no text")), "{:?}", videos.missing);
         }
     }
 
     #[test]
-    fn a_pattern_passes_over_what_the_program_wrote() {
+    fn a_pattern_skips_files_that_the_program_wrote() {
         let dir = tempfile::tempdir().unwrap();
         for file in ["a.mp4", "talks/b.mp4", "work/extract/host/a-1/audio.wav", "work/report.html", "models/m.onnx"] {
             let path = dir.path().join(file);
@@ -267,7 +272,7 @@ mod tests {
         let expected = ["a.mp4", "talks/b.mp4"].map(PathBuf::from);
         assert_eq!(files("**/*", &own), expected);
         assert_eq!(files("**/*", &[dir.path()]).len(), 5, "videos inside the work folder itself");
-        // What is named is meant.
+        // A file named explicitly is not skipped.
         assert_eq!(files("work/report.html", &own).len(), 1);
     }
 }

@@ -1,12 +1,12 @@
-//! Dataset without some of its videos: the entries of the others are linked byte for byte into a new folder, references
-//! to the forgotten ones are removed from them, the common files are assembled again, and the new folder replaces the
-//! old one.
+//! Removal of videos from a dataset: the files of the remaining videos are hard-linked into a new folder, references to
+//! the forgotten videos are removed from their entries, the common files are assembled again, and the new folder
+//! replaces the old one.
 
 use crate::info::DatasetInfo;
 use crate::leakage::Leakage;
 use crate::split::SplitBy;
 use crate::write::assemble::assemble;
-use crate::write::part::{self, VideoEntry};
+use crate::write::entry::{self, VideoEntry};
 use crate::{INFO, LEAKAGE};
 use crate::{pretty, read_json};
 use anyhow::{Context, Result, ensure};
@@ -14,28 +14,29 @@ use orator_base::stage::workdir;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// Replacement of a forgotten video's name in the entries of others.
+/// Replacement for the name of a forgotten video in the entries of other videos.
 const FORGOTTEN: &str = "a video that was forgotten";
 
-/// Whether the video has samples in the dataset; one whose entry is damaged may have.
+/// Whether the video has samples in the dataset; true if its entry cannot be read, since it may have some.
 pub fn has_samples(dir: &Path, name: &str) -> bool {
-    VideoEntry::read(&VideoEntry::path(dir, name)).map_or(true, |part| !part.samples.is_empty())
+    VideoEntry::read(&VideoEntry::path(dir, name)).map_or(true, |entry| !entry.samples.is_empty())
 }
 
-/// Checks that the files of `dir` without the videos `names` match their checksums; assembling damaged files would give
-/// them new ones.
+/// Checks that the files of all videos except `names` match `checksums.b3`: assembling the dataset again would give
+/// damaged files new, matching checksums.
 ///
 /// # Errors
-/// A file of another video that does not match `checksums.b3`.
-pub fn ensure_sound_without(dir: &Path, names: &BTreeSet<String>) -> Result<()> {
-    if !dir.join(part::FOLDER).is_dir() {
+/// A file of a remaining video that does not match its checksum.
+pub fn ensure_intact_without(dir: &Path, names: &BTreeSet<String>) -> Result<()> {
+    if !dir.join(entry::FOLDER).is_dir() {
         return Ok(());
     }
-    let stated = part::stated_hashes(dir);
-    for name in part::names(dir)?.into_iter().filter(|name| !names.contains(name)) {
-        let is_sound = VideoEntry::read(&VideoEntry::path(dir, &name)).is_ok_and(|part| part.is_sound(dir, &stated));
+    let stated = entry::stated_hashes(dir);
+    for name in entry::names(dir)?.into_iter().filter(|name| !names.contains(name)) {
+        let is_intact =
+            VideoEntry::read(&VideoEntry::path(dir, &name)).is_ok_and(|entry| entry.is_intact(dir, &stated));
         ensure!(
-            is_sound,
+            is_intact,
             "{name}, which stays, is damaged in the dataset {}: nothing was removed. Make it anew with `orator run` \
              (`orator dataset verify --deep` names its files), or forget it too",
             dir.display()
@@ -44,7 +45,7 @@ pub fn ensure_sound_without(dir: &Path, names: &BTreeSet<String>) -> Result<()> 
     Ok(())
 }
 
-/// Replaces `dir` by the dataset without the videos `names`; without any video left, `dir` is removed.
+/// Replaces the dataset in `dir` by one without the videos `names`; if no video remains, `dir` is removed.
 ///
 /// # Errors
 /// An entry that cannot be read, a folder that cannot be written.
@@ -52,42 +53,43 @@ pub fn without(dir: &Path, names: &BTreeSet<String>) -> Result<()> {
     if !dir.exists() {
         return Ok(());
     }
-    let left: Vec<String> = if dir.join(part::FOLDER).is_dir() {
-        part::names(dir)?.into_iter().filter(|name| !names.contains(name)).collect()
+    let remaining: Vec<String> = if dir.join(entry::FOLDER).is_dir() {
+        entry::names(dir)?.into_iter().filter(|name| !names.contains(name)).collect()
     } else {
         Vec::new()
     };
-    if left.is_empty() {
-        return remove_whole(dir).with_context(|| format!("cannot remove {}", dir.display()));
+    if remaining.is_empty() {
+        return remove_dataset(dir).with_context(|| format!("cannot remove {}", dir.display()));
     }
     let attempt = workdir::attempt_folder(dir)?;
-    let made = || -> Result<()> {
+    let rebuild = || -> Result<()> {
         let info: DatasetInfo = read_json(&dir.join(INFO))?;
         let leakage: Leakage = read_json(&dir.join(LEAKAGE))?;
         let mut compared = leakage.compared();
         compared.shared.retain(|shared| !names.contains(&shared.a) && !names.contains(&shared.b));
-        for name in &left {
-            let part = VideoEntry::read(&VideoEntry::path(dir, name))?;
-            let silent = silenced(&part, names);
-            part.take_over(dir, &attempt)?;
-            if silent != part {
-                // Written anew, since the old file is linked into the old dataset.
-                workdir::write_file(&VideoEntry::path(&attempt, name), &pretty(&silent)?)?;
+        for name in &remaining {
+            let entry = VideoEntry::read(&VideoEntry::path(dir, name))?;
+            let redacted_entry = redacted(&entry, names);
+            entry.link_into(dir, &attempt)?;
+            if redacted_entry != entry {
+                // A new file, since writing through the hard link would change the old dataset.
+                workdir::write_file(&VideoEntry::path(&attempt, name), &pretty(&redacted_entry)?)?;
             }
         }
         assemble(&attempt, &info.about(), &compared)?;
         workdir::replace_folder(&attempt, dir)
     };
-    let made = made().with_context(|| format!("cannot make the dataset {} anew", dir.display()));
-    if made.is_err() {
+    let result = rebuild().with_context(|| format!("cannot make the dataset {} anew", dir.display()));
+    if result.is_err() {
         let _ = std::fs::remove_dir_all(&attempt);
     }
-    made
+    result
 }
 
-/// Removes a dataset, the entries of its videos last: by them another forget after a kill knows what is to go.
-fn remove_whole(dir: &Path) -> std::io::Result<()> {
-    let entries = dir.join(part::FOLDER);
+/// Removes a dataset, the entries of its videos last: after a kill, a second `forget` reads from them what is left to
+/// remove.
+fn remove_dataset(dir: &Path) -> std::io::Result<()> {
+    let entries = dir.join(entry::FOLDER);
     for folder in [dir, &entries].into_iter().filter(|folder| folder.is_dir()) {
         for entry in std::fs::read_dir(folder)? {
             let path = entry?.path();
@@ -100,15 +102,15 @@ fn remove_whole(dir: &Path) -> std::io::Result<()> {
     std::fs::remove_dir_all(dir)
 }
 
-/// Entry without the names of the forgotten videos.
-fn silenced(part: &VideoEntry, names: &BTreeSet<String>) -> VideoEntry {
-    let mut part = part.clone();
-    if matches!(&part.split_by, SplitBy::SoundOf(other) if names.contains(other)) {
-        // Its split does not change.
-        part.split_by = SplitBy::Share;
+/// Copy of the entry without the names of the forgotten videos.
+fn redacted(entry: &VideoEntry, names: &BTreeSet<String>) -> VideoEntry {
+    let mut entry = entry.clone();
+    if matches!(&entry.split_by, SplitBy::SoundOf(other) if names.contains(other)) {
+        // The video stays in its split; only the reason changes.
+        entry.split_by = SplitBy::Share;
     }
-    for refused in &mut part.ledger.refused {
+    for refused in &mut entry.ledger.refused {
         names.iter().for_each(|name| refused.message = refused.message.replace(name.as_str(), FORGOTTEN));
     }
-    part
+    entry
 }

@@ -1,10 +1,10 @@
-//! Videos of a project, from its configuration, its work folder and its datasets, and the choice of one by path, file
-//! name or work name.
+//! List of all videos of a project, collected from its configuration, work folder and datasets, and selection of one by
+//! path, file name, work name or dataset name.
 
 use crate::config::{Config, videos};
 use crate::file_name;
 use crate::split::SplitRecord;
-use crate::write::part::{self, VideoEntry};
+use crate::write::entry::{self, VideoEntry};
 use anyhow::{Result, bail, ensure};
 use orator_base::stage::artifacts::{self, StageName, speaker_dir};
 use orator_base::stage::fingerprint::hash_file;
@@ -13,30 +13,30 @@ use orator_base::stage::record::Record;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Video with all its names.
+/// Video with all the names under which its data is stored.
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct KnownVideo {
     pub speaker: String,
-    /// Work name; `None`: known from a dataset only.
+    /// Work name; `None`: known only from a dataset or a split record.
     pub work: Option<String>,
     /// Path in the configuration.
     pub source: Option<PathBuf>,
-    /// BLAKE3 of the content, where it is recorded.
+    /// BLAKE3 of the content; `None`: not recorded.
     pub content: Option<String>,
-    /// File name.
+    /// File name; empty for a video known only from the folders of stages.
     pub file: String,
     /// Names in the speaker's dataset.
     pub parts: BTreeSet<String>,
 }
 
 impl KnownVideo {
-    /// Name for people.
-    pub fn title(&self) -> String {
+    /// `speaker/name`, shown to the user.
+    pub fn display_name(&self) -> String {
         let name = self.work.as_ref().or(self.parts.first()).cloned().unwrap_or_else(|| self.file.clone());
         format!("{}/{name}", self.speaker)
     }
 
-    fn is_called(&self, wanted: &str) -> bool {
+    fn matches(&self, wanted: &str) -> bool {
         let path = Path::new(wanted);
         let same_path = |source: &PathBuf| {
             source == path
@@ -52,16 +52,16 @@ impl KnownVideo {
     }
 }
 
-/// Videos of a project, excluded ones too.
+/// All videos of a project, including those that the configuration excludes.
 ///
 /// # Errors
 /// A folder that cannot be listed.
-pub fn of_project(config: &Config) -> Result<Vec<KnownVideo>> {
+pub fn project_videos(config: &Config) -> Result<Vec<KnownVideo>> {
     let work = &config.settings.work.dir;
     let mut all = config.clone();
     all.settings.speaker.iter_mut().for_each(|speaker| speaker.exclude.clear());
     let mut known: Vec<KnownVideo> = Vec::new();
-    for unit in videos::of(&all).into_iter().flat_map(|videos| videos.units) {
+    for unit in videos::all(&all).into_iter().flat_map(|videos| videos.units) {
         let content = content(work, &unit.speaker, &unit.video);
         let file = file_name(&unit.source);
         let (speaker, work, source) = (unit.speaker, Some(unit.video), Some(unit.source));
@@ -70,8 +70,8 @@ pub fn of_project(config: &Config) -> Result<Vec<KnownVideo>> {
     for stage in StageName::OF_VIDEOS {
         for speaker in folders(&work.join(stage.as_str())) {
             for video in entries(&speaker_dir(work, stage, &speaker)) {
-                let there = known.iter().any(|k| k.speaker == speaker && k.work.as_ref() == Some(&video));
-                if !there {
+                let is_known = known.iter().any(|k| k.speaker == speaker && k.work.as_ref() == Some(&video));
+                if !is_known {
                     let content = content(work, &speaker, &video);
                     known.push(KnownVideo {
                         speaker: speaker.clone(),
@@ -86,7 +86,7 @@ pub fn of_project(config: &Config) -> Result<Vec<KnownVideo>> {
     for speaker in folders(&work.join(StageName::Dataset.as_str())) {
         add_dataset(&speaker_dir(work, StageName::Dataset, &speaker), &speaker, &mut known)?;
     }
-    for speaker in recorded(work) {
+    for speaker in speakers_on_record(work) {
         let Ok(Some(record)) = SplitRecord::read(&artifacts::splits(work, &speaker)) else { continue };
         for (content, video) in record.videos {
             let is_it = |k: &KnownVideo| {
@@ -108,8 +108,8 @@ pub fn of_project(config: &Config) -> Result<Vec<KnownVideo>> {
     Ok(known)
 }
 
-/// Speakers with a record of splits.
-fn recorded(work: &Path) -> Vec<String> {
+/// Names of the speakers that have a split record.
+fn speakers_on_record(work: &Path) -> Vec<String> {
     let files = artifacts::splits(work, "");
     let entries = std::fs::read_dir(files.parent().unwrap_or(work)).into_iter().flatten().flatten();
     let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
@@ -119,41 +119,41 @@ fn recorded(work: &Path) -> Vec<String> {
         .collect()
 }
 
-/// Videos of the dataset in `dir`.
+/// All videos of the dataset in `dir`.
 ///
 /// # Errors
-/// No dataset in `dir`.
-pub fn of_dataset(dir: &Path) -> Result<Vec<KnownVideo>> {
-    ensure!(dir.join(part::FOLDER).is_dir(), "{} is no dataset: it has no folder {}", dir.display(), part::FOLDER);
+/// `dir` is not a dataset.
+pub fn dataset_videos(dir: &Path) -> Result<Vec<KnownVideo>> {
+    ensure!(dir.join(entry::FOLDER).is_dir(), "{} is no dataset: it has no folder {}", dir.display(), entry::FOLDER);
     let mut known = Vec::new();
     add_dataset(dir, "", &mut known)?;
     Ok(known)
 }
 
-/// Merges the videos of a dataset with the known ones of equal content or name.
+/// Adds the videos of a dataset; one whose name or content is already known is merged into that video.
 fn add_dataset(dir: &Path, speaker: &str, known: &mut Vec<KnownVideo>) -> Result<()> {
-    if !dir.join(part::FOLDER).is_dir() {
+    if !dir.join(entry::FOLDER).is_dir() {
         return Ok(());
     }
-    for name in part::names(dir)? {
-        // A damaged entry still has a name that can be forgotten.
-        let part = VideoEntry::read(&VideoEntry::path(dir, &name)).ok();
-        let (content, file) = part.map(|part| (part.content, part.file)).unwrap_or_default();
-        let own = |k: &&mut KnownVideo| k.speaker == speaker && k.work.is_some();
-        let called = known.iter_mut().filter(own).find(|k| k.work.as_ref() == Some(&name));
-        let called = called.map(|k| k.parts.insert(name.clone()));
-        if called.is_some() {
+    for name in entry::names(dir)? {
+        // The name is known even if the entry is damaged, so such a video can be forgotten too.
+        let entry = VideoEntry::read(&VideoEntry::path(dir, &name)).ok();
+        let (content, file) = entry.map(|entry| (entry.content, entry.file)).unwrap_or_default();
+        let is_in_project = |k: &&mut KnownVideo| k.speaker == speaker && k.work.is_some();
+        let named = known.iter_mut().filter(is_in_project).find(|k| k.work.as_ref() == Some(&name));
+        let named = named.map(|k| k.parts.insert(name.clone()));
+        if named.is_some() {
             continue;
         }
-        // Without a record of its first stage the content is hashed from the video itself.
-        for k in known.iter_mut().filter(own).filter(|k| k.content.is_none() && k.file == file) {
+        // Without a record of the extract stage, the video file is hashed to find its content.
+        for k in known.iter_mut().filter(is_in_project).filter(|k| k.content.is_none() && k.file == file) {
             k.content = k.source.as_ref().and_then(|source| hash_file(source).ok());
         }
-        let same = |k: &KnownVideo| {
+        let has_same_content = |k: &KnownVideo| {
             k.speaker == speaker && k.work.is_some() && !content.is_empty() && k.content.as_ref() == Some(&content)
         };
-        let exact = known.iter().position(|k| same(k) && k.file == file);
-        let first = exact.or_else(|| known.iter().position(same)).and_then(|at| known.get_mut(at));
+        let exact = known.iter().position(|k| has_same_content(k) && k.file == file);
+        let first = exact.or_else(|| known.iter().position(has_same_content)).and_then(|at| known.get_mut(at));
         match first {
             Some(k) => {
                 k.parts.insert(name);
@@ -168,7 +168,7 @@ fn add_dataset(dir: &Path, speaker: &str, known: &mut Vec<KnownVideo>) -> Result
     Ok(())
 }
 
-/// Content hash of a video from the record of the stage that read it.
+/// Content hash of a video from the record of the extract stage.
 fn content(work: &Path, speaker: &str, video: &str) -> Option<String> {
     let record = Record::read(&speaker_dir(work, StageName::Extract, speaker).join(video))?;
     record.fingerprint.inputs.get("video").cloned()
@@ -182,7 +182,7 @@ fn folders(dir: &Path) -> Vec<String> {
     names
 }
 
-/// Units in a stage's folder, from folders, records, failures and unfinished attempts.
+/// Names of the units in a stage's folder, from result folders, records, failures and unfinished attempts.
 fn entries(dir: &Path) -> BTreeSet<String> {
     let entries = std::fs::read_dir(dir).into_iter().flatten().flatten();
     let name = |name: String| {
@@ -194,20 +194,20 @@ fn entries(dir: &Path) -> BTreeSet<String> {
     names.filter(|name| !name.is_empty()).collect()
 }
 
-/// Video that `wanted` names.
+/// Finds the only video that the path or name `wanted` refers to, among those of `speaker` if given.
 ///
 /// # Errors
-/// None or several videos; the message lists them.
-pub fn one<'a>(known: &'a [KnownVideo], wanted: &str, speaker: Option<&str>) -> Result<&'a KnownVideo> {
+/// No video or several; the message lists them.
+pub fn find_one<'a>(known: &'a [KnownVideo], wanted: &str, speaker: Option<&str>) -> Result<&'a KnownVideo> {
     let all: Vec<&KnownVideo> = known.iter().filter(|k| speaker.is_none_or(|speaker| k.speaker == speaker)).collect();
     let list = |videos: &[&KnownVideo]| {
         let line = |k: &&KnownVideo| match &k.source {
-            Some(source) => format!("\n  {}  {}", k.title(), source.display()),
-            None => format!("\n  {}  {}", k.title(), k.file),
+            Some(source) => format!("\n  {}  {}", k.display_name(), source.display()),
+            None => format!("\n  {}  {}", k.display_name(), k.file),
         };
         videos.iter().map(line).collect::<Vec<_>>().concat()
     };
-    let called: Vec<&KnownVideo> = all.iter().copied().filter(|k| k.is_called(wanted)).collect();
+    let called: Vec<&KnownVideo> = all.iter().copied().filter(|k| k.matches(wanted)).collect();
     match called.as_slice() {
         [one] => Ok(one),
         [] => bail!("no video is called {wanted}; there are:{}", list(&all)),
@@ -215,11 +215,11 @@ pub fn one<'a>(known: &'a [KnownVideo], wanted: &str, speaker: Option<&str>) -> 
     }
 }
 
-/// Videos of a speaker.
+/// All videos of a speaker.
 ///
 /// # Errors
 /// An unknown speaker; the message lists the speakers.
-pub fn of_speaker<'a>(known: &'a [KnownVideo], speaker: &str) -> Result<Vec<&'a KnownVideo>> {
+pub fn speaker_videos<'a>(known: &'a [KnownVideo], speaker: &str) -> Result<Vec<&'a KnownVideo>> {
     let own: Vec<&KnownVideo> = known.iter().filter(|k| k.speaker == speaker).collect();
     let names: BTreeSet<&str> = known.iter().map(|k| k.speaker.as_str()).collect();
     let names = names.into_iter().collect::<Vec<_>>().join(", ");

@@ -1,8 +1,8 @@
-//! Forgetting a video: everything derived from it is removed, the dataset is assembled from the other videos, and a
-//! search proves that nothing is left.
+//! Forgetting a video: everything derived from it is removed, the dataset is assembled again from the other videos, and
+//! a search verifies that nothing is left.
 //!
-//! Steps: `known` (which video) -> `removal` (what is removed, in an order that survives a kill) -> `dataset` (the
-//! dataset without the video) -> `search` (the proof).
+//! Steps: `known` (selects the video) -> `removal` (removes its data, in an order that survives a kill) -> `dataset`
+//! (rebuilds the dataset without the video) -> `search` (verifies the result).
 
 pub mod dataset;
 pub mod known;

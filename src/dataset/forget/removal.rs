@@ -1,6 +1,6 @@
-//! Removal of a video's data. First a marker file in the dataset makes `dataset verify` fail until all is done; then
-//! the stages' files are removed; last the dataset is replaced by one without the video in one step. After a kill at
-//! any point, a second run completes the removal.
+//! Removal of a video's data. First, a marker file in the dataset makes `dataset verify` fail until the removal is
+//! complete; then the files of the stages are removed; last, the dataset is atomically replaced by one without the
+//! video. After a kill at any point, a second run completes the removal.
 
 use super::dataset;
 use super::known::KnownVideo;
@@ -16,26 +16,28 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Marker file in a dataset while one of its videos is being forgotten.
+/// Name of the marker file in a dataset while one of its videos is being forgotten.
 pub const PENDING: &str = "FORGETTING.txt";
 
-/// The folders that a speaker's models are trained into, if no others are named.
+/// Default folders of a speaker's trained models.
 pub fn models_dirs(work: &Path, speaker: &str) -> [PathBuf; 2] {
     ["gan", "seq2seq"].map(|kind| work.join(kind).join(speaker))
 }
 
-/// Folders of models, of any speaker, that say that they learnt from one of the videos, or began with a model that did.
+/// Model folders, of any speaker, whose checkpoint metadata lists one of the videos: the model, or the one that it was
+/// initialised from, was trained on it.
 ///
 /// # Errors
 /// A folder that cannot be listed.
-pub fn models_that_learnt_from(work: &Path, videos: &[&KnownVideo]) -> Result<Vec<PathBuf>> {
+pub fn models_trained_on(work: &Path, videos: &[&KnownVideo]) -> Result<Vec<PathBuf>> {
     let contents: BTreeSet<&str> = videos.iter().filter_map(|video| video.content.as_deref()).collect();
     let mut folders = Vec::new();
     for kind in ["gan", "seq2seq"] {
-        for folder in listed(&work.join(kind))? {
-            let mut checkpoints = listed(&folder)?;
+        for folder in list_sorted(&work.join(kind))? {
+            let mut checkpoints = list_sorted(&folder)?;
             checkpoints.retain(|path| path.extension().is_some_and(|ending| ending == "safetensors"));
-            // All of a folder list the same videos; a file that cannot be read is left to the search.
+            // All checkpoints of a folder list the same videos. An unreadable checkpoint is skipped here; the final
+            // search covers it.
             let facts = checkpoints.iter().find_map(|path| checkpoint::facts(path).ok()).unwrap_or_default();
             let listed = facts["speaker"]["videos"].as_array().into_iter().flatten();
             let mut hashes = listed.filter_map(|video| video["content"].as_str());
@@ -47,26 +49,27 @@ pub fn models_that_learnt_from(work: &Path, videos: &[&KnownVideo]) -> Result<Ve
     Ok(folders)
 }
 
-/// Data to remove for some videos of a speaker, or for all.
+/// Data to remove for some or all videos of a speaker.
 #[derive(Clone, Debug, Default)]
 pub struct Removal {
     pub speaker: String,
-    /// Files and folders of the stages: results, records, failures, attempts, pictures, and reports that name a video.
+    /// Files and folders of the stages (results, records, failures, attempts, pictures) and reports that name a video.
     pub paths: Vec<PathBuf>,
-    /// Folders of models that were trained on the videos.
+    /// Folders of models trained on the videos.
     pub models: Vec<PathBuf>,
-    /// Dataset, and the names of its videos to remove.
+    /// Dataset folder, and the names of the videos to remove from it.
     pub dataset: Option<(PathBuf, BTreeSet<String>)>,
-    /// Table of content hashes, and the number of its entries to remove.
+    /// File of content hashes, and the number of entries to remove from it.
     pub hashes: Option<(PathBuf, usize)>,
-    /// Record of the splits, and the number of its videos to remove.
+    /// Split record, and the number of videos to remove from it.
     pub splits: Option<(PathBuf, usize)>,
-    /// Search terms of the videos.
+    /// Names and hashes of the videos, which must not be found afterwards.
     pub terms: Vec<SearchTerm>,
 }
 
 impl Removal {
-    /// Data of `videos` in the work folder; `others` are the videos that stay.
+    /// Plans the removal of the data of `videos` from the work folder; `others` are the remaining videos, and
+    /// `whole_speaker` means that all videos of the speaker go.
     ///
     /// # Errors
     /// A folder that cannot be listed.
@@ -75,17 +78,17 @@ impl Removal {
         speaker: &str,
         videos: &[&KnownVideo],
         others: &[&KnownVideo],
-        whole: bool,
+        whole_speaker: bool,
     ) -> Result<Self> {
         let mut removal = Self { speaker: speaker.to_owned(), terms: terms(videos, others), ..Self::default() };
         for folder in StageName::OF_VIDEOS.map(StageName::as_str).into_iter().chain(["sheets"]) {
             let folder = work.join(folder).join(speaker);
-            if whole {
+            if whole_speaker {
                 removal.paths.extend(Some(folder).filter(|folder| folder.exists()));
                 continue;
             }
             let own: Vec<&String> = videos.iter().filter_map(|video| video.work.as_ref()).collect();
-            for path in listed(&folder)? {
+            for path in list_sorted(&folder)? {
                 let name = file_name(&path);
                 let name = name.trim_start_matches('.');
                 let is_of = |work: &&String| {
@@ -95,45 +98,46 @@ impl Removal {
             }
         }
         let names_one = |path: &PathBuf| fs::read(path).is_ok_and(|bytes| super::search::is_in(&bytes, &removal.terms));
-        let reports: Vec<PathBuf> = pages(work)?.into_iter().filter(names_one).collect();
+        let reports: Vec<PathBuf> = report_pages(work)?.into_iter().filter(names_one).collect();
         removal.paths.extend(reports);
         let dir = speaker_dir(work, StageName::Dataset, speaker);
         let names: BTreeSet<String> = videos.iter().flat_map(|video| video.parts.iter().cloned()).collect();
         let has_samples = names.iter().any(|name| dataset::has_samples(&dir, name));
         let models = models_dirs(work, speaker).into_iter();
-        removal.models.extend(models.filter(|models| models.exists() && (whole || has_samples)));
-        let others = models_that_learnt_from(work, videos)?;
+        removal.models.extend(models.filter(|models| models.exists() && (whole_speaker || has_samples)));
+        let others = models_trained_on(work, videos)?;
         removal.models.extend(others);
         removal.models.sort();
         removal.models.dedup();
         let left_over = workdir::left_over(&dir);
-        if !names.is_empty() || (whole && dir.exists()) || dir.join(PENDING).exists() {
+        if !names.is_empty() || (whole_speaker && dir.exists()) || dir.join(PENDING).exists() {
             removal.dataset = Some((dir.clone(), names));
-            // The dataset stage names the videos among its inputs, and their files in its report.
+            // The record of the dataset stage lists the videos among its inputs; its results, or a failure, may name their
+            // files.
             removal
                 .paths
                 .extend([record::record_path(&dir), record::failure_path(&dir)].into_iter().filter(|p| p.exists()));
         }
         removal.paths.extend(left_over);
-        // One picture of all videos' faces, which the dataset stage draws again.
+        // One picture shows the faces of all videos; the dataset stage draws it again.
         removal.paths.extend(Some(artifacts::faces(work, speaker)).filter(|picture| picture.exists()));
         let splits = artifacts::splits(work, speaker);
         removal.paths.extend(workdir::left_over(&splits));
         removal.paths.extend(workdir::left_over(&artifacts::hashes(work)));
         match SplitRecord::read(&splits) {
-            Ok(Some(mut record)) if !whole => {
+            Ok(Some(mut record)) if !whole_speaker => {
                 let n = removal.clean_record(&mut record);
                 removal.splits = (n > 0).then_some((splits, n));
             }
             Ok(None) => {}
-            // One that cannot be read may hold the video.
+            // An unreadable record may contain the video.
             Ok(Some(_)) | Err(_) => removal.paths.push(splits),
         }
-        removal.hashes = hashes(&artifacts::hashes(work), &removal);
+        removal.hashes = matching_hashes(&artifacts::hashes(work), &removal);
         Ok(removal)
     }
 
-    /// Data of `videos` in a dataset's folder without a work folder.
+    /// Plans the removal of `videos` from a dataset folder without a work folder.
     pub fn of_dataset(dir: &Path, videos: &[&KnownVideo], others: &[&KnownVideo]) -> Self {
         let names = videos.iter().flat_map(|video| video.parts.iter().cloned()).collect();
         let paths = workdir::left_over(dir);
@@ -149,7 +153,7 @@ impl Removal {
             && self.splits.is_none()
     }
 
-    /// Description of what is removed, a line each.
+    /// One line for each thing that is removed.
     pub fn lines(&self, keep_models: bool) -> Vec<String> {
         let mut lines: Vec<String> = self.paths.iter().map(|path| path.display().to_string()).collect();
         if let Some((path, n)) = &self.hashes {
@@ -167,13 +171,14 @@ impl Removal {
         lines
     }
 
-    /// Carries out the removal, trained models included unless they are kept.
+    /// Carries out the removal, including trained models unless `keep_models`.
     ///
     /// # Errors
-    /// A damaged video among those that stay, before anything is removed; a file that cannot be removed or written.
+    /// A damaged file of a remaining video (detected before anything is removed), or a file that cannot be removed or
+    /// written.
     pub fn carry_out(&self, keep_models: bool) -> Result<()> {
         if let Some((dir, names)) = &self.dataset {
-            dataset::ensure_sound_without(dir, names)?;
+            dataset::ensure_intact_without(dir, names)?;
         }
         if let Some((dir, _)) = self.dataset.as_ref().filter(|(dir, _)| dir.exists()) {
             let text = "A video of this dataset is being forgotten. Run the same `orator forget` again to finish.\n";
@@ -198,7 +203,7 @@ impl Removal {
         Ok(())
     }
 
-    /// Removes the videos from a record of splits; returns how many there were.
+    /// Removes the videos from a split record; returns their number.
     fn clean_record(&self, record: &mut SplitRecord) -> usize {
         let is_named = |name: &str| self.dataset.as_ref().is_some_and(|(_, names)| names.contains(name));
         record.forget(|content, video| {
@@ -212,7 +217,7 @@ impl Removal {
         workdir::write_file(path, &serde_json::to_vec(&table)?)
     }
 
-    /// Whether an entry of the hash table belongs to one of the videos.
+    /// Whether an entry of the hash table belongs to a removed file or names one of the videos.
     fn is_own_hash(&self, file: &str, known: &serde_json::Value) -> bool {
         let entry = format!("{file}\n{known}");
         let gone = self.paths.iter().any(|path| Path::new(file).starts_with(path));
@@ -227,16 +232,16 @@ fn read_table(path: &Path) -> JsonObject {
     fs::read(path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default()
 }
 
-fn hashes(path: &Path, removal: &Removal) -> Option<(PathBuf, usize)> {
+fn matching_hashes(path: &Path, removal: &Removal) -> Option<(PathBuf, usize)> {
     let n = read_table(path).iter().filter(|(file, known)| removal.is_own_hash(file, known)).count();
     (n > 0).then(|| (path.to_owned(), n))
 }
 
-/// Report pages in the work folder, which can be made again.
-fn pages(work: &Path) -> Result<Vec<PathBuf>> {
+/// HTML reports in the work folder, sorted; they can be generated again.
+fn report_pages(work: &Path) -> Result<Vec<PathBuf>> {
     let (mut pages, mut folders) = (Vec::new(), vec![work.to_owned()]);
     while let Some(folder) = folders.pop() {
-        for path in listed(&folder)? {
+        for path in list_sorted(&folder)? {
             if path.is_dir() && !path.is_symlink() {
                 folders.push(path);
             } else if path.extension().is_some_and(|ending| ending == "html") && path.is_file() {
@@ -248,7 +253,7 @@ fn pages(work: &Path) -> Result<Vec<PathBuf>> {
     Ok(pages)
 }
 
-fn listed(folder: &Path) -> Result<Vec<PathBuf>> {
+fn list_sorted(folder: &Path) -> Result<Vec<PathBuf>> {
     if !folder.is_dir() {
         return Ok(Vec::new());
     }
@@ -263,7 +268,8 @@ fn remove(path: &Path) -> Result<()> {
     workdir::remove(path).with_context(|| format!("cannot remove {}", path.display()))
 }
 
-/// Names and hashes of `videos` that no other video shares.
+/// Search terms for `videos`: work names, dataset names and paths, and file names and hashes that no other video
+/// shares.
 fn terms(videos: &[&KnownVideo], others: &[&KnownVideo]) -> Vec<SearchTerm> {
     let mut terms: Vec<SearchTerm> = Vec::new();
     for video in videos {
@@ -290,7 +296,7 @@ mod tests {
     use safetensors::tensor::TensorView;
 
     #[test]
-    fn a_model_that_began_with_one_of_the_videos_is_found() {
+    fn a_model_trained_on_one_of_the_videos_is_found() {
         let work = tempfile::tempdir().unwrap();
         let model = |name: &str, hashes: &[&str]| {
             let videos: Vec<_> =
@@ -305,8 +311,8 @@ mod tests {
         let (both, _other) = (model("ben", &["aa11", "bb22"]), model("cleo", &["cc33"]));
         fs::write(work.path().join("gan/ben/step-0000001.safetensors"), "half").unwrap();
         let video = KnownVideo { content: Some("aa11".to_owned()), ..KnownVideo::default() };
-        assert_eq!(models_that_learnt_from(work.path(), &[&video]).unwrap(), [both]);
+        assert_eq!(models_trained_on(work.path(), &[&video]).unwrap(), [both]);
         let unknown = KnownVideo::default();
-        assert!(models_that_learnt_from(work.path(), &[&unknown]).unwrap().is_empty());
+        assert!(models_trained_on(work.path(), &[&unknown]).unwrap().is_empty());
     }
 }

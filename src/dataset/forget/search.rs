@@ -1,5 +1,5 @@
-//! Search of every byte of every file for a video's names and hashes: as text, as raw bytes, and inside `.npz` archives
-//! (members of tar files are stored uncompressed). Names of files and folders are searched too.
+//! Search of every byte of every file for a video's names and hashes, as text and as raw bytes, also inside `.npz` and
+//! `.zip` archives (members of tar files are stored uncompressed). The names of files and folders are searched too.
 
 use crate::file_name;
 use anyhow::{Context, Result};
@@ -8,43 +8,44 @@ use std::collections::BTreeSet;
 use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
-/// Text or bytes that must not be found.
+/// Text or bytes to search for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SearchTerm {
-    /// Description for people.
+    /// Description shown to the user.
     pub what: String,
     pub bytes: Vec<u8>,
-    /// Whether matches need a boundary: no letter, digit, `-` or `_` before it (`a.mp4` is not in `extra.mp4`).
-    pub whole: bool,
+    /// Whether a match must not follow a letter, digit, `-` or `_` (`a.mp4` does not match `extra.mp4`).
+    pub needs_boundary: bool,
 }
 
 impl SearchTerm {
-    /// Terms for a name, with a boundary: as it is, and as JSON, a page and an error message write it, also one inside the
-    /// other.
+    /// Terms for a name, with a boundary before it: as it is, and as escaped in JSON, in HTML and in error messages,
+    /// also with two of these escapes nested.
     pub fn name(what: &str, name: &str) -> Vec<Self> {
         let mut forms = BTreeSet::from([name.to_owned()]);
         for _ in 0..2 {
             let more: Vec<String> = forms.iter().flat_map(|form| escaped(form)).collect();
             forms.extend(more);
         }
-        let term = |form: String| Self { what: format!("{what} {name}"), bytes: form.into_bytes(), whole: true };
+        let term =
+            |form: String| Self { what: format!("{what} {name}"), bytes: form.into_bytes(), needs_boundary: true };
         forms.into_iter().map(term).collect()
     }
 
-    /// Terms for hexadecimal digits: as text and as the bytes they encode.
+    /// Terms for a hexadecimal hash: as text, and (from 16 bytes on) as the bytes it encodes.
     pub fn hash(what: &str, hex: &str) -> Vec<Self> {
-        let text = Self { what: format!("{what} {hex}"), bytes: hex.as_bytes().to_vec(), whole: false };
+        let text = Self { what: format!("{what} {hex}"), bytes: hex.as_bytes().to_vec(), needs_boundary: false };
         let digit = |byte: u8| char::from(byte).to_digit(16);
         let pairs = hex.as_bytes().as_chunks::<2>().0.iter();
         let raw: Option<Vec<u8>> = pairs.map(|[a, b]| Some((16 * digit(*a)? + digit(*b)?) as u8)).collect();
-        // Four bytes occur by chance in any gigabyte.
+        // Short byte sequences occur by chance: any 4 bytes about once in 4 GiB.
         let raw = raw.filter(|raw| raw.len() >= 16);
-        let raw = raw.map(|bytes| Self { what: format!("{what} {hex}, as bytes"), bytes, whole: false });
+        let raw = raw.map(|bytes| Self { what: format!("{what} {hex}, as bytes"), bytes, needs_boundary: false });
         [text].into_iter().chain(raw).collect()
     }
 }
 
-/// A text as it stands in JSON, in the JSON of a page, in a page, and in an error message.
+/// Escaped forms of a text: JSON inside an HTML page, JSON, HTML, and Rust debug format (error messages).
 fn escaped(text: &str) -> [String; 4] {
     let inside = |quoted: String| quoted[1..quoted.len() - 1].to_owned();
     let json = inside(serde_json::Value::from(text).to_string());
@@ -53,35 +54,36 @@ fn escaped(text: &str) -> [String; 4] {
     [json.replace('<', "\\u003c"), json, page, inside(format!("{text:?}"))]
 }
 
-/// Occurrence of a term.
+/// Match of a term.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SearchHit {
-    /// File; for an archive followed by `!` and the entry.
+    /// Path of the file; for an archive, followed by `!` and the name of the entry.
     pub file: String,
-    /// Offset; `None`: in the name.
+    /// Byte offset of the match; `None`: in the name of the file.
     pub at: Option<u64>,
     pub what: String,
 }
 
 /// Result of a search.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Searched {
+pub struct SearchReport {
     pub n_files: usize,
-    /// Bytes of the files, and of the contents of archives.
+    /// Bytes of the searched files.
     pub bytes: u64,
+    /// Uncompressed bytes of the searched archive entries.
     pub inside_bytes: u64,
-    pub places: Vec<SearchHit>,
+    pub hits: Vec<SearchHit>,
 }
 
 /// Bytes read at a time.
 const PIECE: usize = 1 << 20;
 
-/// Searches everything below `folders`.
+/// Searches everything below `folders`; terms of fewer than 2 bytes are ignored.
 ///
 /// # Errors
-/// A file that cannot be read, since it proves nothing.
-pub fn search(folders: &[PathBuf], terms: &[SearchTerm]) -> Result<Searched> {
-    let mut searched = Searched::default();
+/// A file that cannot be read, since it may contain a term.
+pub fn search(folders: &[PathBuf], terms: &[SearchTerm]) -> Result<SearchReport> {
+    let mut searched = SearchReport::default();
     let terms: Vec<&SearchTerm> = terms.iter().filter(|term| term.bytes.len() >= 2).collect();
     for folder in folders {
         walk(folder, folder, &terms, &mut searched)?;
@@ -89,7 +91,7 @@ pub fn search(folders: &[PathBuf], terms: &[SearchTerm]) -> Result<Searched> {
     Ok(searched)
 }
 
-/// Whether one of the terms is in the bytes.
+/// Whether `bytes` contain one of the terms.
 pub fn is_in(bytes: &[u8], terms: &[SearchTerm]) -> bool {
     let terms: Vec<&SearchTerm> = terms.iter().filter(|term| term.bytes.len() >= 2).collect();
     let mut scan = Scan::new(&terms);
@@ -97,7 +99,7 @@ pub fn is_in(bytes: &[u8], terms: &[SearchTerm]) -> bool {
     !scan.found.is_empty()
 }
 
-fn walk(root: &Path, path: &Path, terms: &[&SearchTerm], searched: &mut Searched) -> Result<()> {
+fn walk(root: &Path, path: &Path, terms: &[&SearchTerm], searched: &mut SearchReport) -> Result<()> {
     let reading = || format!("cannot search {}", path.display());
     if !path.exists() && !path.is_symlink() {
         return Ok(());
@@ -108,7 +110,7 @@ fn walk(root: &Path, path: &Path, terms: &[&SearchTerm], searched: &mut Searched
         scan.piece(name.as_bytes());
         let found =
             scan.found.into_iter().map(|(_, what)| SearchHit { file: path.display().to_string(), at: None, what });
-        searched.places.extend(found);
+        searched.hits.extend(found);
     }
     if path.is_dir() && !path.is_symlink() {
         let entries = std::fs::read_dir(path).with_context(reading)?;
@@ -116,7 +118,7 @@ fn walk(root: &Path, path: &Path, terms: &[&SearchTerm], searched: &mut Searched
         entries.sort();
         return entries.iter().try_for_each(|entry| walk(root, entry, terms, searched));
     }
-    // A pipe, a socket, a link to nothing or to a folder holds no bytes.
+    // Pipes, sockets, dangling links and links to folders have no content.
     match path.metadata() {
         Ok(meta) if !meta.is_file() => return Ok(()),
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
@@ -125,24 +127,24 @@ fn walk(root: &Path, path: &Path, terms: &[&SearchTerm], searched: &mut Searched
     searched.n_files += 1;
     let (bytes, found) = scan(input::open(path).with_context(reading)?, terms).with_context(reading)?;
     searched.bytes += bytes;
-    let place = |file: &str, (at, what)| SearchHit { file: file.to_owned(), at: Some(at), what };
+    let to_hit = |file: &str, (at, what)| SearchHit { file: file.to_owned(), at: Some(at), what };
     let file = path.display().to_string();
-    searched.places.extend(found.into_iter().map(|found| place(&file, found)));
+    searched.hits.extend(found.into_iter().map(|found| to_hit(&file, found)));
     if path.extension().is_some_and(|ending| ending == "npz" || ending == "zip") {
-        // A file that is no archive was searched as it is.
+        // A file that is not a valid archive has already been searched as plain bytes.
         let Ok(mut archive) = zip::ZipArchive::new(input::open(path).with_context(reading)?) else { return Ok(()) };
         for n in 0..archive.len() {
             let entry = archive.by_index(n).with_context(reading)?;
             let inside = format!("{file}!{}", entry.name());
             let (bytes, found) = scan(entry, terms).with_context(reading)?;
             searched.inside_bytes += bytes;
-            searched.places.extend(found.into_iter().map(|found| place(&inside, found)));
+            searched.hits.extend(found.into_iter().map(|found| to_hit(&inside, found)));
         }
     }
     Ok(())
 }
 
-/// Number of bytes read, and offset and description of each term found.
+/// Searches `from`; returns the number of bytes read, and the offset and description of each match.
 fn scan(mut from: impl Read, terms: &[&SearchTerm]) -> Result<(u64, Vec<(u64, String)>)> {
     let mut scan = Scan::new(terms);
     let mut piece = vec![0; PIECE];
@@ -158,25 +160,25 @@ fn scan(mut from: impl Read, terms: &[&SearchTerm]) -> Result<(u64, Vec<(u64, St
     Ok((scan.at, scan.found))
 }
 
-/// Search through bytes that arrive in pieces.
+/// Incremental search through bytes that arrive in pieces.
 struct Scan<'a> {
     terms: &'a [&'a SearchTerm],
-    /// For every pair of bytes, whether a term begins with it.
-    begins: Vec<bool>,
+    /// For every possible pair of bytes (65,536 entries), whether a term starts with it.
+    is_term_start: Vec<bool>,
     longest: usize,
-    /// Last bytes of the previous piece, since a term may span two pieces.
+    /// Last bytes of the previous piece, since a match may span two pieces.
     tail: Vec<u8>,
-    /// Number of bytes before the tail.
+    /// Number of bytes received.
     at: u64,
     found: Vec<(u64, String)>,
 }
 
 impl<'a> Scan<'a> {
     fn new(terms: &'a [&'a SearchTerm]) -> Self {
-        let mut begins = vec![false; 1 << 16];
-        terms.iter().for_each(|term| begins[pair(&term.bytes)] = true);
+        let mut is_term_start = vec![false; 1 << 16];
+        terms.iter().for_each(|term| is_term_start[pair(&term.bytes)] = true);
         let longest = terms.iter().map(|term| term.bytes.len()).max().unwrap_or(0);
-        Self { terms, begins, longest, tail: Vec::new(), at: 0, found: Vec::new() }
+        Self { terms, is_term_start, longest, tail: Vec::new(), at: 0, found: Vec::new() }
     }
 
     fn piece(&mut self, piece: &[u8]) {
@@ -185,22 +187,22 @@ impl<'a> Scan<'a> {
         bytes.extend_from_slice(piece);
         let start = self.at - n_tail as u64;
         for at in 0..bytes.len().saturating_sub(1) {
-            if !self.begins[pair(&bytes[at..])] {
+            if !self.is_term_start[pair(&bytes[at..])] {
                 continue;
             }
             for term in self.terms {
                 let end = at + term.bytes.len();
-                // Matches that end in the tail were found before.
+                // A match that ends within the tail was found with the previous piece.
                 let new = end > n_tail && bytes.get(at..end) == Some(term.bytes.as_slice());
                 let before = at.checked_sub(1).map(|before| bytes[before]);
-                let joined = before.is_some_and(|b| b.is_ascii_alphanumeric() || b == b'-' || b == b'_');
-                if new && !(term.whole && joined) {
+                let is_joined = before.is_some_and(|b| b.is_ascii_alphanumeric() || b == b'-' || b == b'_');
+                if new && !(term.needs_boundary && is_joined) {
                     self.found.push((start + at as u64, term.what.clone()));
                 }
             }
         }
         self.at += piece.len() as u64;
-        // One byte more than the longest term, which decides on the boundary.
+        // As long as the longest term: one byte more than a split match needs, for the boundary check.
         let keep = bytes.len().saturating_sub(self.longest);
         self.tail = bytes.split_off(keep);
     }
@@ -224,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mark_is_found_wherever_it_hides_and_whole_names_only() {
+    fn terms_are_found_in_every_kind_of_file_and_only_as_complete_names() {
         let dir = tempfile::tempdir().unwrap();
         let write = |name: &str, bytes: &[u8]| std::fs::write(dir.path().join(name), bytes).unwrap();
         let hash = blake3::hash(b"a");
@@ -241,17 +243,17 @@ mod tests {
         assert!(std::process::Command::new("mkfifo").arg(dir.path().join("pipe")).status().unwrap().success());
         let searched = search(&[dir.path().to_owned()], &terms()).unwrap();
         let mut files: Vec<String> =
-            searched.places.iter().map(|p| p.file.rsplit('/').next().unwrap().to_owned()).collect();
+            searched.hits.iter().map(|p| p.file.rsplit('/').next().unwrap().to_owned()).collect();
         files.dedup();
         assert!(files.contains(&"x.npz!y.npy".to_owned()) && files.contains(&"a.mp4".to_owned()), "{files:?}");
-        let count = |name: &str| searched.places.iter().filter(|p| p.file.ends_with(name)).count();
+        let count = |name: &str| searched.hits.iter().filter(|p| p.file.ends_with(name)).count();
         assert_eq!([count("text.json"), count("binary.bin"), count("hex.txt"), count("clean.txt")], [1, 1, 1, 0]);
-        assert_eq!(searched.places.iter().find(|p| p.file.ends_with("binary.bin")).unwrap().at, Some(100));
+        assert_eq!(searched.hits.iter().find(|p| p.file.ends_with("binary.bin")).unwrap().at, Some(100));
         assert_eq!(searched.n_files, 5);
     }
 
     #[test]
-    fn a_name_is_found_however_it_is_written() {
+    fn a_name_is_found_in_every_escaped_form() {
         let name = "a \"b\" & <c>\n'd'.mp4";
         let terms = SearchTerm::name("file", name);
         let json = serde_json::json!({ "file": name, "error": format!("cannot read {name:?}") }).to_string();
@@ -264,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mark_across_two_pieces_is_found_once() {
+    fn a_match_across_two_pieces_is_found_once() {
         let terms = terms();
         let terms: Vec<&SearchTerm> = terms.iter().collect();
         let text: Vec<u8> = [&[b' '; 300][..], b"a.mp4", &[b' '; 300]].concat();

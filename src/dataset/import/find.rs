@@ -1,9 +1,9 @@
-//! Motion files below the sources by content, each with the sound and transcript of its name in its own folder or in a
-//! neighbouring one (`bvh/`, `wav/`, `tsv/`).
+//! Search for motion files below the import sources. Files are classified by extension and content; each is matched
+//! with the sound and transcript of the same name in its own folder or in a sibling folder (`bvh/`, `wav/`, `tsv/`).
 
 use crate::INFO;
-use crate::config::patterns::OF_SOUNDS;
-use crate::write::part;
+use crate::config::patterns::SOUND_EXTENSIONS;
+use crate::write::entry;
 use anyhow::{Context, Result, ensure};
 use orator_base::input;
 use orator_formats::mocap::captured::MotionKind;
@@ -28,16 +28,17 @@ pub struct ImportSources {
     pub takes: Vec<TakeFiles>,
     /// Folders of orator datasets.
     pub datasets: Vec<PathBuf>,
-    /// Tar files outside datasets, and files that look like motion but were left out, with the reason.
+    /// Tar files outside dataset folders.
     pub tars: Vec<PathBuf>,
+    /// Files that look like motion but cannot be imported, with the reason.
     pub unknown: Vec<(PathBuf, String)>,
 }
 
-/// Names of neighbouring folders, in lower case.
+/// Names of sibling folders that hold sounds or transcripts, in lower case.
 const SOUND_FOLDERS: &str = "wav wavs audio audios sound speech";
 const TRANSCRIPT_FOLDERS: &str = "ctm tsv transcript transcripts text texts txt json words textgrid srt vtt subtitles";
 
-/// Searches `sources`, files or folders; with `only`, files of other kinds are left out.
+/// Searches `sources` (files or folders); with `only`, files of other kinds are ignored.
 ///
 /// # Errors
 /// A source that does not exist, or sources without any motion.
@@ -60,15 +61,15 @@ pub fn find(sources: &[PathBuf], only: Option<MotionKind>) -> Result<ImportSourc
             Ok(None) => {}
             Ok(Some(kind)) if only.is_some_and(|only| only != kind) => {}
             Ok(Some(MotionKind::Shards)) => found.tars.push(path),
-            Ok(Some(kind)) => found.takes.push(with_company(kind, path)),
+            Ok(Some(kind)) => found.takes.push(with_companions(kind, path)),
             Err(_) if only.is_some_and(|only| only != MotionKind::Ted) => {}
             Err(why) => found.unknown.push((path, why)),
         }
     }
-    let nothing =
+    let is_empty =
         found.takes.is_empty() && found.datasets.is_empty() && found.tars.is_empty() && found.unknown.is_empty();
     ensure!(
-        !nothing,
+        !is_empty,
         "nothing to import in {sources:?}{}: expected text clips of 147 numbers a line, .npz with `human_joints`, .bvh, \
          or .tar shards",
         only.map(|kind| format!(" of the kind {}", kind.name())).unwrap_or_default()
@@ -76,14 +77,14 @@ pub fn find(sources: &[PathBuf], only: Option<MotionKind>) -> Result<ImportSourc
     Ok(found)
 }
 
-/// Files below `path`; folders of datasets are not entered.
+/// Adds the files below `path` to `files`; dataset folders are added to `datasets` and not entered.
 fn walk(path: &Path, files: &mut Vec<PathBuf>, datasets: &mut Vec<PathBuf>) -> Result<()> {
     if !path.is_dir() {
         files.push(path.to_owned());
         return Ok(());
     }
     let mut enter = |folder: &Path| {
-        let is_dataset = folder.join(INFO).is_file() && folder.join(part::FOLDER).is_dir();
+        let is_dataset = folder.join(INFO).is_file() && folder.join(entry::FOLDER).is_dir();
         datasets.extend(is_dataset.then(|| folder.to_owned()));
         !is_dataset
     };
@@ -91,7 +92,7 @@ fn walk(path: &Path, files: &mut Vec<PathBuf>, datasets: &mut Vec<PathBuf>) -> R
     Ok(())
 }
 
-/// Kind of a file; `None`: no motion; an error: not readable as motion although its name suggests it.
+/// Kind of a file. `None`: not a motion file; `Err`: the name suggests motion, but the file cannot be read as such.
 fn kind(path: &Path) -> std::result::Result<Option<MotionKind>, String> {
     match ending(path).as_str() {
         "bvh" => Ok(Some(MotionKind::Bvh)),
@@ -115,31 +116,32 @@ fn has_147_numbers(path: &Path) -> bool {
     read.is_ok() && line.split_whitespace().count() == 147 && line.split_whitespace().all(|w| w.parse::<f64>().is_ok())
 }
 
-fn with_company(kind: MotionKind, motion: PathBuf) -> TakeFiles {
+fn with_companions(kind: MotionKind, motion: PathBuf) -> TakeFiles {
     let stem = motion.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let mut stems = vec![stem.as_str()];
     // The sound of gt_interval_3821.txt is 3821.wav.
     stems.extend(["gt_interval_", "prediction_interval_"].iter().filter_map(|prefix| stem.strip_prefix(prefix)));
-    let sound = beside(&motion, &stems, &OF_SOUNDS, SOUND_FOLDERS);
-    let transcript = beside(&motion, &stems, &transcript::ENDINGS, TRANSCRIPT_FOLDERS);
+    let sound = find_companion(&motion, &stems, &SOUND_EXTENSIONS, SOUND_FOLDERS);
+    let transcript = find_companion(&motion, &stems, &transcript::ENDINGS, TRANSCRIPT_FOLDERS);
     TakeFiles { kind, motion, sound, transcript }
 }
 
-/// File of one of these names and endings in the motion's own folder or in a neighbouring folder of those names.
-fn beside(motion: &Path, stems: &[&str], endings: &[&str], folders: &str) -> Option<PathBuf> {
-    let own = motion.parent()?;
-    let mut places = vec![own.to_owned()];
-    let above = if own.as_os_str().is_empty() { Path::new("..") } else { own.parent()? };
-    let above = if above.as_os_str().is_empty() { Path::new(".") } else { above };
+/// First existing file `<stem>.<ending>` in the folder of `motion`, then in its sibling folders named in `folders`
+/// (separated by spaces).
+fn find_companion(motion: &Path, stems: &[&str], endings: &[&str], folders: &str) -> Option<PathBuf> {
+    let own_folder = motion.parent()?;
+    let mut folders_to_search = vec![own_folder.to_owned()];
+    let parent = if own_folder.as_os_str().is_empty() { Path::new("..") } else { own_folder.parent()? };
+    let parent = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
     let mut siblings: Vec<PathBuf> =
-        std::fs::read_dir(above).into_iter().flatten().flatten().map(|e| e.path()).collect();
+        std::fs::read_dir(parent).into_iter().flatten().flatten().map(|e| e.path()).collect();
     siblings.sort();
-    let called = |path: &PathBuf| {
+    let is_named = |path: &PathBuf| {
         let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
         folders.split(' ').any(|folder| folder == name)
     };
-    places.extend(siblings.into_iter().filter(called));
-    let candidates = places.iter().flat_map(|place| {
+    folders_to_search.extend(siblings.into_iter().filter(is_named));
+    let candidates = folders_to_search.iter().flat_map(|place| {
         stems.iter().flat_map(move |stem| endings.iter().map(move |ending| place.join(format!("{stem}.{ending}"))))
     });
     candidates.filter(|path| path != motion).find(|path| path.is_file())
@@ -154,7 +156,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn files_of_one_take_find_each_other() {
+    fn files_of_one_take_are_matched() {
         let dir = tempfile::tempdir().unwrap();
         let file = |name: &str, content: &str| {
             let path = dir.path().join(name);

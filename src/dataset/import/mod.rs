@@ -1,8 +1,8 @@
-//! Import of captured motion with its sound into a dataset: text clips of Rebol et al. (2021), TED Expressive, BVH with
-//! sound, and WebDataset shards of orator.
+//! Import of captured motion and its sound into a dataset: text clips of Rebol et al. (2021), TED Expressive, BVH with
+//! sound, and WebDataset shards written by orator.
 //!
-//! Steps of a take: `find` (files) -> `mocap` (joints at the source's rate) -> `motion::resample` (the dataset's rate)
-//! -> `take` (bones, sound, cut; a sample or a refusal) -> `write` (the dataset). `shards` imports tar members
+//! Steps for a take: `find` (files) -> `mocap` (joints at the source's rate) -> `motion::resample` (the dataset's rate)
+//! -> `take` (bones, sound, trimming; a sample or a refusal) -> `write` (the dataset). `shards` imports tar members
 //! unchanged.
 
 pub mod find;

@@ -1,5 +1,5 @@
-//! Tar shards outside a dataset folder: members are found by name, in any order and any tar; other files are left out
-//! and noted. Bytes of members stay unchanged wherever a dataset can hold them.
+//! Tar shards outside a dataset folder. Members are found by name, in any order and in any tar; other files are skipped
+//! with a note. The bytes of members are kept unchanged wherever the dataset format allows it.
 
 use crate::sample::{EXTENSIONS, N_KEYPOINTS, OPTIONAL_EXTENSIONS, Sample, WORDS_EXTENSION};
 use crate::{Split, file_name};
@@ -19,7 +19,7 @@ use std::collections::BTreeMap;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-/// Location of a member.
+/// Location of a member in a tar file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct MemberLocation {
     tar: PathBuf,
@@ -27,7 +27,8 @@ struct MemberLocation {
     bytes: u64,
 }
 
-/// Sample to be read: its members in the order of `EXTENSIONS`, then of `OPTIONAL_EXTENSIONS`.
+/// Sample that has not been read yet; members are in the order of `EXTENSIONS`, optional ones in that of
+/// `OPTIONAL_EXTENSIONS`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LooseSample {
     pub key: String,
@@ -35,35 +36,35 @@ pub struct LooseSample {
     optional: [Option<MemberLocation>; 3],
 }
 
-/// Samples whose keys differ only behind the last dash.
+/// Samples whose keys differ only after the last dash.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LooseVideo {
     pub name: String,
-    /// Samples in the order of their keys.
+    /// Samples sorted by key.
     pub samples: Vec<LooseSample>,
 }
 
-/// Contents of tars.
+/// Contents of the tar files.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Loose {
+pub struct LooseTars {
     pub videos: Vec<LooseVideo>,
-    /// Notes on what was left out, a sentence each.
+    /// Notes on skipped files, a sentence each.
     pub notes: Vec<String>,
     /// Unreadable tars, with the error.
     pub failed: Vec<(PathBuf, String)>,
 }
 
 impl LooseVideo {
-    /// Tars that hold its samples.
+    /// Tar files that hold the samples of this video.
     pub fn tars(&self) -> Vec<&PathBuf> {
         let members = self.samples.iter().flat_map(|sample| sample.members.iter().chain(&sample.optional));
-        members.flatten().map(|place| &place.tar).collect()
+        members.flatten().map(|location| &location.tar).collect()
     }
 }
 
-/// Lists the tars without reading any member.
-pub fn open(tars: &[PathBuf]) -> Loose {
-    let mut loose = Loose::default();
+/// Lists the tar files; members are read only to compare two with the same name.
+pub fn open(tars: &[PathBuf]) -> LooseTars {
+    let mut loose = LooseTars::default();
     let mut samples: BTreeMap<String, LooseSample> = BTreeMap::new();
     for tar in tars {
         let mut unknown = BTreeMap::<String, usize>::new();
@@ -87,7 +88,11 @@ pub fn open(tars: &[PathBuf]) -> Loose {
     loose
 }
 
-/// Adds the members of a tar; returns the number of files in it.
+/// Adds the members of a tar file to `samples`, and counts files of other extensions in `unknown`. Returns the number
+/// of files in the tar.
+///
+/// # Errors
+/// A file that is not a readable tar, a truncated member, two members with the same name and different bytes.
 fn list(
     tar: &Path,
     samples: &mut BTreeMap<String, LooseSample>,
@@ -112,59 +117,60 @@ fn list(
             *unknown.entry(ending.to_owned()).or_default() += 1;
             continue;
         };
-        let place = MemberLocation { tar: tar.to_owned(), offset: entry.raw_file_position(), bytes: entry.size() };
-        ensure!(place.offset.saturating_add(place.bytes) <= length, "{}: {name} is cut off", reading());
-        let fresh = || LooseSample { key: key.to_owned(), members: [const { None }; 5], optional: [const { None }; 3] };
-        let sample = samples.entry(key.to_owned()).or_insert_with(fresh);
+        let location = MemberLocation { tar: tar.to_owned(), offset: entry.raw_file_position(), bytes: entry.size() };
+        ensure!(location.offset.saturating_add(location.bytes) <= length, "{}: {name} is cut off", reading());
+        let new_sample =
+            || LooseSample { key: key.to_owned(), members: [const { None }; 5], optional: [const { None }; 3] };
+        let sample = samples.entry(key.to_owned()).or_insert_with(new_sample);
         let Some(known) = sample.members.iter_mut().chain(&mut sample.optional).nth(member) else { continue };
         if let Some(first) = known {
-            let same = read_place(first)? == read_place(&place)?;
-            ensure!(same, "{name} lies in {} and in {} with other bytes", first.tar.display(), tar.display());
+            let is_equal = read_member(first)? == read_member(&location)?;
+            ensure!(is_equal, "{name} lies in {} and in {} with other bytes", first.tar.display(), tar.display());
         }
-        known.get_or_insert(place);
+        known.get_or_insert(location);
     }
     Ok(n_files)
 }
 
-/// Split of a tar by its name, `train-...tar`.
+/// Split in the name of a tar file (`train-...tar`).
 fn split_of(tar: &Path) -> Option<Split> {
     let name = tar.file_name()?.to_string_lossy().into_owned();
     Split::ALL.into_iter().find(|split| name.starts_with(&format!("{}-", split.name())))
 }
 
-fn read_place(place: &MemberLocation) -> Result<Vec<u8>> {
+fn read_member(location: &MemberLocation) -> Result<Vec<u8>> {
     let read = || -> std::io::Result<Vec<u8>> {
-        let mut file = input::open(&place.tar)?;
-        file.seek(SeekFrom::Start(place.offset))?;
+        let mut file = input::open(&location.tar)?;
+        file.seek(SeekFrom::Start(location.offset))?;
         let mut bytes = Vec::new();
-        file.take(place.bytes).read_to_end(&mut bytes)?;
+        file.take(location.bytes).read_to_end(&mut bytes)?;
         Ok(bytes)
     };
-    read().with_context(|| format!("cannot read {}", place.tar.display()))
+    read().with_context(|| format!("cannot read {}", location.tar.display()))
 }
 
 impl LooseSample {
-    /// Split by the names of its tars; `None`: unknown.
+    /// Split in the name of a tar file of the sample; `None`: no name states one.
     pub fn split(&self) -> Option<Split> {
-        self.members.iter().flatten().find_map(|place| split_of(&place.tar))
+        self.members.iter().flatten().find_map(|location| split_of(&location.tar))
     }
 
-    /// Sample, and the unchanged bytes of its JSON.
+    /// Reads the sample, and the unchanged bytes of its JSON.
     ///
     /// # Errors
-    /// A member that is missing or damaged; the message names it and its tar.
+    /// A missing or damaged member; the message names the member and its tar file.
     pub fn read(&self) -> Result<(Sample, Vec<u8>)> {
         let mut members = [const { Vec::new() }; 5];
         let mut tar = String::new();
-        for ((place, extension), bytes) in self.members.iter().zip(EXTENSIONS).zip(&mut members) {
-            let Some(place) = place else { bail!("the sample {} has no {}.{extension}", self.key, self.key) };
-            tar = place.tar.display().to_string();
-            *bytes = read_place(place)?;
+        for ((location, extension), bytes) in self.members.iter().zip(EXTENSIONS).zip(&mut members) {
+            let Some(location) = location else { bail!("the sample {} has no {}.{extension}", self.key, self.key) };
+            tar = location.tar.display().to_string();
+            *bytes = read_member(location)?;
         }
         let [json, mask, pose2d, pose3d, sound] = &members;
         let [words, head, trunk] = &self.optional;
         let sample = || -> Result<Sample> {
-            let words = words.as_ref().map(read_place).transpose()?;
+            let words = words.as_ref().map(read_member).transpose()?;
             let words = words.map(|bytes| serde_json::from_slice(&bytes).context(WORDS_EXTENSION)).transpose()?;
             let posture = match (head, trunk) {
                 (Some(head), Some(trunk)) => Some(Posture { head: angles(head)?, trunk: angles(trunk)? }),
@@ -203,14 +209,14 @@ impl LooseSample {
     }
 }
 
-/// Angles [T, 3] of head or trunk.
-fn angles(place: &MemberLocation) -> Result<Array2<f32>> {
-    let bytes = read_place(place)?;
+/// Reads the angles of head or trunk, [T, 3], radians.
+fn angles(location: &MemberLocation) -> Result<Array2<f32>> {
+    let bytes = read_member(location)?;
     let layout = Layout::parse(&bytes, bytes.len() as u64, Element::F32, &[3]).context("head.npy or trunk.npy")?;
     Array2::from_shape_vec((layout.n_rows, 3), npy::floats(&bytes[layout.data_at..])).context("shaping angles")
 }
 
-/// Sound of a 16-bit mono wav at the dataset's rate, with any header.
+/// Reads a 16-bit mono wav at `SAMPLE_RATE`, with a header of any length.
 fn read_wav(bytes: &[u8]) -> Result<Sound> {
     if wav::n_samples(bytes, bytes.len() as u64, SAMPLE_RATE).is_ok() {
         return Ok(Sound { rate: SAMPLE_RATE, samples: wav::samples(&bytes[wav::HEADER_BYTES..]) });
@@ -228,7 +234,8 @@ fn read_wav(bytes: &[u8]) -> Result<Sound> {
     samples.map(|samples| Sound { rate: SAMPLE_RATE, samples }).map_err(|error: hound::Error| error.into())
 }
 
-/// Ledger of a video of which only these samples (start, seconds) are known.
+/// Ledger of a video of which only the samples are known, each as (start, duration) in seconds; the gaps between them
+/// are refused as not imported.
 pub fn ledger(samples: &[(f64, f64)]) -> Ledger {
     let mut ledger = Ledger::default();
     for &(start, secs) in samples {

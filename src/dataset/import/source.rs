@@ -1,5 +1,5 @@
-//! Items of an import: a take, a video of another dataset, or the samples of a video in loose tars. Each is inspected
-//! first (outcome, ledger, sound codes) and written once its split is known.
+//! Items of an import: a take, a video of another dataset, or the samples of a video in loose tar files. Each item is
+//! inspected first (outcome, ledger, sound codes) and written after its split has been assigned.
 
 use super::find::{ImportSources, TakeFiles};
 use super::shards::{self, LooseSample, LooseVideo};
@@ -11,7 +11,7 @@ use crate::info::DatasetInfo;
 use crate::shared_sound::SharedSound;
 use crate::split::{Assignment, SplitBy, TimeBlock};
 use crate::write::assemble::DatasetWriter;
-use crate::write::part::{self, VideoEntry, VideoSource};
+use crate::write::entry::{self, VideoEntry, VideoSource};
 use crate::{INFO, Split, file_name, read_json};
 use anyhow::{Result, ensure};
 use orator_base::audio::fingerprint::Fingerprinter;
@@ -23,39 +23,40 @@ use orator_formats::joints_description::path_of;
 use orator_formats::mocap::bvh;
 use std::path::{Path, PathBuf};
 
-/// Median movement of the joints of a take, mm, above which a remark is given.
-const MUCH_MOVED_MM: f64 = 5.0;
+/// Median shift of a take's joints by fixing the bone lengths, mm, above which a remark is given.
+const NOTABLE_SHIFT_MM: f64 = 5.0;
 
 /// Item to import.
 #[derive(Clone, Debug)]
 pub enum ImportItem {
     Take(TakeFiles),
-    /// Video of this name in a dataset's folder.
+    /// Dataset folder, and the name of a video in it.
     Part(PathBuf, String),
     Loose(LooseVideo),
-    /// File that looks like motion but is not readable, with the reason.
+    /// Unreadable file that looks like motion, with the reason.
     Unknown(PathBuf, String),
 }
 
-/// Result of the inspection of an item.
+/// Result of inspecting an item.
 #[derive(Clone, Debug, Default)]
 pub struct InspectedItem {
     pub source: VideoSource,
-    /// Split, or blocks, of the source, later the assigned one.
+    /// Split or blocks stated by the source; replaced by the assigned ones later.
     pub split: Option<Assignment>,
+    /// Sound fingerprint codes; `None`: no sound, or the codes are already written.
     pub codes: Option<Vec<u32>>,
-    /// Remark for the user on a kept take.
+    /// Remark for the user on an accepted take; may be empty.
     pub remark: String,
-    /// Hash of the written sound codes.
+    /// BLAKE3 of the written sound codes.
     pub sound: Option<String>,
 }
 
 impl ImportItem {
-    /// Items in the sources, and notes on what was left out of their tars.
+    /// All items of the sources, and notes on the files skipped in their tar files.
     pub fn all(sources: &ImportSources) -> (Vec<Self>, Vec<String>) {
         let mut items: Vec<Self> = sources.takes.iter().cloned().map(Self::Take).collect();
         for dir in &sources.datasets {
-            match part::names(dir) {
+            match entry::names(dir) {
                 Ok(names) => items.extend(names.into_iter().map(|name| Self::Part(dir.clone(), name))),
                 Err(error) => items.push(Self::Unknown(dir.clone(), format!("{error:#}"))),
             }
@@ -67,7 +68,7 @@ impl ImportItem {
         (items, loose.notes)
     }
 
-    /// Name for people.
+    /// Name shown to the user.
     pub fn file(&self) -> String {
         match self {
             Self::Take(TakeFiles { motion: path, .. }) | Self::Unknown(path, _) => path.display().to_string(),
@@ -76,7 +77,7 @@ impl ImportItem {
         }
     }
 
-    /// Folders of its files.
+    /// Folders that hold the item's files, sorted, each once.
     fn folders(&self) -> Vec<String> {
         let files: Vec<&PathBuf> = match self {
             Self::Take(found) => {
@@ -92,12 +93,12 @@ impl ImportItem {
         folders
     }
 
-    /// Inspects the item; what cannot be read is a failure.
+    /// Inspects the item; an unreadable item yields a failure.
     pub fn inspect(&self, plan: &ImportPlan) -> InspectedItem {
         let inspected = match self {
-            Self::Take(found) => look_at_take(found, plan),
-            Self::Part(dir, name) => look_at_part(dir, name, plan),
-            Self::Loose(video) => look_at_loose(video, plan),
+            Self::Take(found) => inspect_take(found, plan),
+            Self::Part(dir, name) => inspect_entry(dir, name, plan),
+            Self::Loose(video) => inspect_loose(video, plan),
             Self::Unknown(_, why) => Err(anyhow::anyhow!("{why}")),
         };
         inspected.unwrap_or_else(|error| self.failed(&format!("{error:#}")))
@@ -109,16 +110,16 @@ impl ImportItem {
             Self::Part(dir, name) => (dir.clone(), Some(name.clone())),
             Self::Loose(video) => (PathBuf::from(&video.name), Some(video.name.clone())),
         };
-        // Local folders must not influence the dataset.
+        // Local folder names must not end up in the dataset.
         let error = self.folders().iter().fold(error.to_owned(), |error, dir| error.replace(&format!("{dir}/"), ""));
         let content = hash_file(&path).unwrap_or_default();
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        let marks =
+        let hash =
             if content.is_empty() { blake3::hash(stem.as_bytes()).to_hex().to_string() } else { content.clone() };
         let source = VideoSource {
             name: name
-                .filter(|name| part::check_name(name).is_ok())
-                .unwrap_or_else(|| format!("{}-{}", slug(&stem), marks.get(..8).unwrap_or_default())),
+                .filter(|name| entry::check_name(name).is_ok())
+                .unwrap_or_else(|| format!("{}-{}", slug(&stem), hash.get(..8).unwrap_or_default())),
             file: file_name(&path),
             content,
             failure: Some(format!("import: {error}")),
@@ -136,40 +137,40 @@ impl ImportItem {
         out: &Path,
     ) -> Result<()> {
         let source = inspected.source.clone();
-        let placed = inspected.split.clone().filter(|_| inspected.is_kept());
-        if let (Self::Part(dir, name), Some(_)) = (self, &placed) {
-            return VideoEntry::read(&VideoEntry::path(dir, name))?.take_over(dir, out);
+        let assignment = inspected.split.clone().filter(|_| inspected.is_kept());
+        if let (Self::Part(dir, name), Some(_)) = (self, &assignment) {
+            return VideoEntry::read(&VideoEntry::path(dir, name))?.link_into(dir, out);
         }
-        let (whole, mut part) = match placed {
+        let (whole, mut entry) = match assignment {
             Some(Assignment::In(split, by)) => (Some(split), writer.video(source, split, by)?),
             Some(Assignment::Blocks(blocks)) => (None, writer.video_in_blocks(source, blocks)?),
-            Some(Assignment::Nowhere(_)) | None => {
+            Some(Assignment::Excluded(_)) | None => {
                 writer.video(source, Split::Train, SplitBy::Share)?.finish(None)?;
                 return Ok(());
             }
         };
         match self {
             Self::Take(found) => {
-                let TakeOutcome::Kept(kept) = ImportedTake::read(found, &plan.limits)?.ended else {
+                let TakeOutcome::Kept(kept) = ImportedTake::read(found, &plan.limits)?.outcome else {
                     anyhow::bail!("{} changed while it was imported", found.motion.display());
                 };
-                part.push(&kept.sample, 0.0)?;
+                entry.push(&kept.sample, 0.0)?;
             }
             Self::Loose(video) => {
-                for waiting in &video.samples {
-                    let (sample, json) = waiting.read()?;
-                    let split = whole.or(waiting.split()).unwrap_or(Split::Train);
-                    part.push_as_it_was(split, &sample, json)?;
+                for loose_sample in &video.samples {
+                    let (sample, json) = loose_sample.read()?;
+                    let split = whole.or(loose_sample.split()).unwrap_or(Split::Train);
+                    entry.push_with_json(split, &sample, json)?;
                 }
             }
             Self::Part(..) | Self::Unknown(..) => {}
         }
-        part.finish(inspected.sound.clone())?;
+        entry.finish(inspected.sound.clone())?;
         Ok(())
     }
 }
 
-fn look_at_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
+fn inspect_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
     let take = ImportedTake::read(found, &plan.limits)?;
     let duration_secs = plan.limits.fps.secs(take.n_frames);
     let mut source = VideoSource {
@@ -180,7 +181,7 @@ fn look_at_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
         ledger: Ledger { duration_secs, ..Ledger::default() },
         ..VideoSource::default()
     };
-    match take.ended {
+    match take.outcome {
         TakeOutcome::Refused(refusal) => {
             source.ledger.refused.push(Refused::with_message(0.0, duration_secs, refusal.why, refusal.message));
             Ok(InspectedItem { source, ..InspectedItem::default() })
@@ -195,8 +196,8 @@ fn look_at_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
             }
             source.bones = VideoBones { lengths_metres: kept.lengths.map(f64::from).to_vec(), n_frames };
             let bones = match kept.moved_mm {
-                moved if moved > MUCH_MOVED_MM => {
-                    Some(format!("its bones vary: one length each moved its joints by {moved} mm (median)"))
+                moved_mm if moved_mm > NOTABLE_SHIFT_MM => {
+                    Some(format!("its bones vary: one length each moved its joints by {moved_mm} mm (median)"))
                 }
                 _ => None,
             };
@@ -212,7 +213,7 @@ fn look_at_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
     }
 }
 
-/// Hash of the files and of the settings that the sample depends on.
+/// Hash of the files and settings that determine the sample.
 fn made_from(found: &TakeFiles, plan: &ImportPlan) -> Result<String> {
     let described = Some(path_of(&found.motion)).filter(|path| path.is_file());
     let files = [Some(&found.motion), found.sound.as_ref(), found.transcript.as_ref(), described.as_ref()];
@@ -227,7 +228,7 @@ fn made_from(found: &TakeFiles, plan: &ImportPlan) -> Result<String> {
     Ok(blake3::hash(all.to_string().as_bytes()).to_hex().to_string())
 }
 
-fn look_at_part(dir: &Path, name: &str, plan: &ImportPlan) -> Result<InspectedItem> {
+fn inspect_entry(dir: &Path, name: &str, plan: &ImportPlan) -> Result<InspectedItem> {
     let info: DatasetInfo = read_json(&dir.join(INFO))?;
     let fps = plan.limits.fps;
     ensure!(
@@ -236,18 +237,18 @@ fn look_at_part(dir: &Path, name: &str, plan: &ImportPlan) -> Result<InspectedIt
         dir.display(),
         info.fps
     );
-    part::check_name(name)?;
-    let part = VideoEntry::read(&VideoEntry::path(dir, name))?;
+    entry::check_name(name)?;
+    let entry = VideoEntry::read(&VideoEntry::path(dir, name))?;
     ensure!(
-        part.is_sound(dir, &part::stated_hashes(dir)),
+        entry.is_intact(dir, &entry::stated_hashes(dir)),
         "{name}: its files are not what was written; orator dataset verify says what is wrong"
     );
-    let codes = part.codes(dir)?;
-    let split = match part.split {
-        Some(split) => Some(Assignment::In(split, part.split_by.clone())),
-        None => Some(Assignment::Blocks(part.blocks.clone())).filter(|_| !part.samples.is_empty()),
+    let codes = entry.codes(dir)?;
+    let split = match entry.split {
+        Some(split) => Some(Assignment::In(split, entry.split_by.clone())),
+        None => Some(Assignment::Blocks(entry.blocks.clone())).filter(|_| !entry.samples.is_empty()),
     };
-    let VideoEntry { name, file, content, made_from, ledger, bones, failure, .. } = part;
+    let VideoEntry { name, file, content, made_from, ledger, bones, failure, .. } = entry;
     let source = VideoSource { name: name.to_string(), file, content, made_from, ledger, bones, failure };
     Ok(InspectedItem {
         source,
@@ -257,49 +258,49 @@ fn look_at_part(dir: &Path, name: &str, plan: &ImportPlan) -> Result<InspectedIt
     })
 }
 
-fn look_at_loose(video: &LooseVideo, plan: &ImportPlan) -> Result<InspectedItem> {
-    part::check_name(&video.name)?;
+fn inspect_loose(video: &LooseVideo, plan: &ImportPlan) -> Result<InspectedItem> {
+    entry::check_name(&video.name)?;
     let fps = plan.limits.fps;
-    let (mut stretches, mut measured, mut fingerprinter) =
+    let (mut spans, mut bone_sets, mut fingerprinter) =
         (Vec::<(f64, f64)>::new(), Vec::new(), Fingerprinter::default());
     let mut blocks: Vec<TimeBlock> = Vec::new();
     let mut content = String::new();
     let mut words: Option<TranscriptAccount> = None;
-    for waiting in &video.samples {
-        let (sample, _) = waiting.read()?;
-        let (key, own) = (&sample.key, sample.motion.fps);
-        ensure!(own == fps, "{key} runs at {own}, the dataset at {fps}: import it with the same --fps");
+    for loose_sample in &video.samples {
+        let (sample, _) = loose_sample.read()?;
+        let (key, own_fps) = (&sample.key, sample.motion.fps);
+        ensure!(own_fps == fps, "{key} runs at {own_fps}, the dataset at {fps}: import it with the same --fps");
         let n_frames = sample.n_frames();
         let start = sample.meta["start_secs"].as_f64().unwrap_or(0.0);
-        let start_secs = stretches.last().map_or(start, |(before, secs)| start.max(before + secs));
+        let start_secs = spans.last().map_or(start, |(before, secs)| start.max(before + secs));
         let end_secs = start_secs + fps.secs(n_frames);
-        blocks.push(TimeBlock { split: waiting.split().or(Some(Split::Train)), start_secs, end_secs });
-        stretches.push((start, fps.secs(n_frames)));
-        measured.push(VideoBones { lengths_metres: bones::measure(&sample.motion).map(f64::from).to_vec(), n_frames });
+        blocks.push(TimeBlock { split: loose_sample.split().or(Some(Split::Train)), start_secs, end_secs });
+        spans.push((start, fps.secs(n_frames)));
+        bone_sets.push(VideoBones { lengths_metres: bones::measure(&sample.motion).map(f64::from).to_vec(), n_frames });
         fingerprinter.push(&sample.sound.samples);
-        if let Some(said) = &sample.words {
-            let count = WordCount { n_words: said.len(), n_kept: said.len(), ..WordCount::default() };
+        if let Some(sample_words) = &sample.words {
+            let count = WordCount { n_words: sample_words.len(), n_kept: sample_words.len(), ..WordCount::default() };
             words.get_or_insert_default().count += count;
         }
-        if let Some(said) = sample.meta["content"].as_str() {
-            content = said.to_owned();
+        if let Some(hash) = sample.meta["content"].as_str() {
+            content = hash.to_owned();
         }
     }
     let source = VideoSource {
         name: video.name.clone(),
         file: video.name.clone(),
         content,
-        ledger: Ledger { words, ..shards::ledger(&stretches) },
+        ledger: Ledger { words, ..shards::ledger(&spans) },
         bones: VideoBones {
-            lengths_metres: of_speaker(&measured).map(f64::from).to_vec(),
-            n_frames: measured.iter().map(|bones| bones.n_frames).sum(),
+            lengths_metres: of_speaker(&bone_sets).map(f64::from).to_vec(),
+            n_frames: bone_sets.iter().map(|bones| bones.n_frames).sum(),
         },
         ..VideoSource::default()
     };
-    let mut named: Vec<Option<Split>> = video.samples.iter().map(LooseSample::split).collect();
-    named.sort();
-    named.dedup();
-    let split = match named.as_slice() {
+    let mut named_splits: Vec<Option<Split>> = video.samples.iter().map(LooseSample::split).collect();
+    named_splits.sort();
+    named_splits.dedup();
+    let split = match named_splits.as_slice() {
         [] | [None] => None,
         [Some(split)] | [None, Some(split)] => Some(Assignment::In(*split, SplitBy::Name)),
         _ => Some(Assignment::Blocks(blocks)),
@@ -308,19 +309,19 @@ fn look_at_loose(video: &LooseVideo, plan: &ImportPlan) -> Result<InspectedItem>
 }
 
 impl InspectedItem {
-    /// Whether it has a sample.
+    /// Whether the item has a sample to write.
     pub fn is_kept(&self) -> bool {
         !self.source.ledger.kept.is_empty() && self.source.failure.is_none()
     }
 
-    /// Refuses a repeated name.
-    pub fn twice(mut self) -> Self {
+    /// Refuses an item whose name another item already has.
+    pub fn refuse_duplicate_name(mut self) -> Self {
         let message = format!("{} is there already", self.source.name);
         self.refuse(self.source.ledger.kept_secs(), 0.0, &message);
         self
     }
 
-    /// Replaces a name that is taken by one that depends on the number `nth`.
+    /// Replaces a name that is already in use by one derived from it and the number `nth`.
     pub fn rename(&mut self, nth: usize) {
         let first = &self.source.name;
         let mark = blake3::hash(format!("{first} {nth}").as_bytes()).to_hex();
@@ -328,7 +329,7 @@ impl InspectedItem {
         self.source.name = format!("{stem}-{}", &mark[..8]);
     }
 
-    /// Refuses an item that shares sound with videos of different splits.
+    /// Refuses an item that shares sound with videos in different splits.
     pub fn refuse_shared(&mut self, with: &[SharedSound], threshold: f64) {
         let name = self.source.name.clone();
         let others: Vec<&str> = with.iter().filter_map(|shared| shared.other(&name)).collect();
@@ -342,10 +343,10 @@ impl InspectedItem {
     fn refuse(&mut self, measured: f64, threshold: f64, message: &str) {
         let ledger = &mut self.source.ledger;
         let why = FrameRefusal::new(Refusal::Duplicate, measured, threshold);
-        let refused = |kept: Kept| Refused::with_message(kept.start_secs, kept.end_secs, why, message.to_owned());
-        let all: Vec<Refused> = ledger.kept.drain(..).map(refused).collect();
-        ledger.refused.extend(all);
-        ledger.refused.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
+        let to_refused = |kept: Kept| Refused::with_message(kept.start_secs, kept.end_secs, why, message.to_owned());
+        let all_refused: Vec<Refused> = ledger.kept.drain(..).map(to_refused).collect();
+        ledger.to_refused.extend(all_refused);
+        ledger.to_refused.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
         self.codes = None;
     }
 

@@ -1,5 +1,5 @@
-//! Conversion of one take to a sample: motion at the dataset's rate with constant bones, sound, and the cut to their
-//! common length; or the reason of a refusal. A take is one continuous interval.
+//! Conversion of one mocap take to a sample (motion at the dataset's rate with constant bone lengths, and sound, both
+//! trimmed to their common length), or the reason for refusing it. A take is one continuous interval.
 
 use super::find::TakeFiles;
 use crate::config::videos::slug;
@@ -27,11 +27,11 @@ use serde_json::{Value, json};
 pub struct TakeLimits {
     /// Frame rate of the dataset.
     pub fps: FrameRate,
-    /// Shortest take, in frames of the dataset.
+    /// Minimum length of a take, in frames of the dataset.
     pub min_frames: usize,
     /// Largest difference between the lengths of sound and motion, seconds.
     pub max_apart_secs: f64,
-    /// Whether sound is left out: every take gets silence.
+    /// Whether sound files are ignored and every take gets silence.
     pub no_sound: bool,
 }
 
@@ -42,9 +42,9 @@ pub struct ImportedTake {
     pub name: String,
     /// BLAKE3 of the motion file.
     pub content: String,
-    /// Frames of the motion at the dataset's rate, before the cut.
+    /// Frames of the motion at the dataset's rate, before trimming.
     pub n_frames: usize,
-    pub ended: TakeOutcome,
+    pub outcome: TakeOutcome,
 }
 
 /// Outcome of a take.
@@ -54,27 +54,28 @@ pub enum TakeOutcome {
     Refused(TakeRefusal),
 }
 
-/// Sample, and the bone lengths of its motion (metres; 0: not there).
+/// Accepted take.
 #[derive(Clone, Debug)]
 pub struct KeptTake {
-    /// Median movement of the joints by making bones constant, mm.
+    /// Median shift of the joints by fixing the bone lengths, mm.
     pub moved_mm: f64,
     pub sample: Sample,
-    /// Account of the words of its transcript, if it has one with times.
+    /// Word counts of the transcript, if there is one with word times.
     pub words: Option<TranscriptAccount>,
+    /// Bone lengths, metres; 0: not measured.
     pub lengths: [f32; N_BONES],
 }
 
-/// Reason why a take is refused.
+/// Reason for refusing a take.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TakeRefusal {
     pub why: FrameRefusal,
-    /// Reason for people, a sentence.
+    /// Sentence shown to the user.
     pub message: String,
 }
 
 impl TakeRefusal {
-    /// A refusal in the words of its reason.
+    /// Refusal with the standard message of `refusal`.
     pub fn new(refusal: Refusal, measured: f64, threshold: f64) -> Self {
         let message = refusal.message(measured, threshold);
         Self { why: FrameRefusal::new(refusal, measured, threshold), message }
@@ -82,7 +83,10 @@ impl TakeRefusal {
 }
 
 impl ImportedTake {
-    /// Reads the files of a take. Errors name the file that is not as expected.
+    /// Reads the files of a take and converts or refuses it.
+    ///
+    /// # Errors
+    /// An unreadable file; the message names it.
     pub fn read(found: &TakeFiles, limits: &TakeLimits) -> Result<Self> {
         let content = hash_file(&found.motion)?;
         let stem = found.motion.file_stem().unwrap_or_default().to_string_lossy();
@@ -98,11 +102,11 @@ impl ImportedTake {
             Some(path) => audio::read_mono(path, SAMPLE_RATE)?.filter(|sound| !sound.samples.is_empty()),
             None => None,
         };
-        let ended = match (refusal(n_frames, sound.as_ref(), found, limits), sound) {
-            (None, Some(sound)) => TakeOutcome::Kept(Box::new(keep(&name, found, &captured, motion, sound)?)),
+        let outcome = match (refusal(n_frames, sound.as_ref(), found, limits), sound) {
+            (None, Some(sound)) => TakeOutcome::Kept(Box::new(to_kept(&name, found, &captured, motion, sound)?)),
             (refusal, _) => TakeOutcome::Refused(refusal.unwrap_or_else(|| no_sound(found))),
         };
-        Ok(Self { name, content, n_frames, ended })
+        Ok(Self { name, content, n_frames, outcome })
     }
 }
 
@@ -113,13 +117,13 @@ fn refusal(n_frames: usize, sound: Option<&Sound>, found: &TakeFiles, limits: &T
     }
     let Some(sound) = sound else { return Some(no_sound(found)) };
     let (motion_secs, sound_secs) = (limits.fps.secs(n_frames), sound.secs());
-    let apart = sound_secs - motion_secs;
-    if apart.abs() > limits.max_apart_secs {
+    let difference_secs = sound_secs - motion_secs;
+    if difference_secs.abs() > limits.max_apart_secs {
         return Some(TakeRefusal {
-            why: FrameRefusal::new(Refusal::LengthMismatch, apart.abs(), limits.max_apart_secs),
+            why: FrameRefusal::new(Refusal::LengthMismatch, difference_secs.abs(), limits.max_apart_secs),
             message: format!(
                 "the sound has {sound_secs:.3} s, the motion {motion_secs:.3} s: {:.3} s apart, at most {} s are believed",
-                apart.abs(),
+                difference_secs.abs(),
                 limits.max_apart_secs
             ),
         });
@@ -137,12 +141,12 @@ fn no_sound(found: &TakeFiles) -> TakeRefusal {
     TakeRefusal { why: FrameRefusal::new(Refusal::NoSoundFile, 0.0, 0.0), message }
 }
 
-/// Number of frames within the motion and wholly within the sound.
+/// Number of frames of the motion that lie completely within the sound.
 fn n_common(n_frames: usize, sound: &Sound, fps: FrameRate) -> usize {
     n_frames.min((sound.secs() * fps.per_sec() + 1e-6).floor() as usize)
 }
 
-fn keep(
+fn to_kept(
     name: &str,
     found: &TakeFiles,
     captured: &CapturedMotion,
@@ -165,11 +169,12 @@ fn keep(
     };
     let end_secs = fps.secs(n_frames);
     let timed = found.transcript.as_ref().filter(|_| !transcript.words.is_empty());
-    let said = timed.map(|path| VideoWords::new(transcript.clone(), path, sound_secs, 0.0)).transpose()?;
-    let words = said.as_ref().map(|said| said.account([(0.0, end_secs)]));
+    let video_words = timed.map(|path| VideoWords::new(transcript.clone(), path, sound_secs, 0.0)).transpose()?;
+    let words = video_words.as_ref().map(|words| words.account([(0.0, end_secs)]));
     let transcript = transcript.until(end_secs);
-    let in_meta = |word: &Word| json!({ "start_secs": word.start_secs, "end_secs": word.end_secs, "word": word.word });
-    let seen = |root: usize| {
+    let word_json =
+        |word: &Word| json!({ "start_secs": word.start_secs, "end_secs": word.end_secs, "word": word.word });
+    let visible_share = |root: usize| {
         let hand = motion.mask.slice(s![.., root..root + N_HAND_JOINTS]);
         hand.iter().filter(|&&seen| seen).count() as f64 / hand.len().max(1) as f64
     };
@@ -181,8 +186,8 @@ fn keep(
         "start_secs": 0.0,
         "end_secs": fps.secs(n_frames),
         "image_size": null,
-        "left_hand_seen": seen(L_HAND),
-        "right_hand_seen": seen(R_HAND),
+        "left_hand_seen": visible_share(L_HAND),
+        "right_hand_seen": visible_share(R_HAND),
         "sound_samples_padded": 0,
         "imported": {
             "kind": found.kind.name(),
@@ -194,20 +199,20 @@ fn keep(
             "bones_moved_mm": { "median": moved[0], "largest": moved[1] },
         },
         "text": transcript.text,
-        "words": transcript.words.iter().map(in_meta).collect::<Vec<_>>(),
+        "words": transcript.words.iter().map(word_json).collect::<Vec<_>>(),
     });
     if let Some(imported) = meta.get_mut("imported").and_then(Value::as_object_mut) {
         imported.extend(captured.facts.clone());
     }
     let pose2d = Array3::zeros((n_frames, N_KEYPOINTS, 3));
     let key = format!("{name}-{:06}", 0);
-    let in_sample = said.map(|said| said.within(0.0, end_secs));
+    let in_sample = video_words.map(|words| words.within(0.0, end_secs));
     let sample = Sample { key, motion, pose2d, sound, words: in_sample, posture: None, meta };
     sample.members().with_context(|| format!("{} makes no sample", found.motion.display()))?;
     Ok(KeptTake { moved_mm: moved[0], sample, words, lengths })
 }
 
-/// Movement of the joints by making bones constant: median and maximum, mm to a hundredth.
+/// Shift of the joints between `before` and `after`: median and maximum, mm, rounded to 0.01.
 fn moved_mm(before: &Array3<f32>, after: &Array3<f32>) -> [f64; 2] {
     let moved = (0..before.shape()[0])
         .flat_map(|t| (1..N_JOINTS).map(move |joint| (t, joint)))

@@ -1,5 +1,5 @@
-//! Import in two passes: every item is inspected first (outcome, sound codes), so that splits can be assigned without
-//! leaks, then read again and written. Memory: one take, and the codes of all sound.
+//! Import in two passes: all items are inspected first (outcome, sound codes), so that splits can be assigned without
+//! leaks, then each item is read again and written. Memory: one take, and the codes of all sound.
 
 use super::find::{self, TakeFiles};
 use super::source::{ImportItem, InspectedItem};
@@ -10,7 +10,7 @@ use crate::leakage::SoundComparison;
 use crate::split::{self, Assignment, RecordedSplit, SplitBy, SplitPlan, SplitRule, Unassigned, blocks};
 use crate::stats::DatasetStats;
 use crate::write::assemble::DatasetWriter;
-use crate::write::part;
+use crate::write::entry;
 use crate::{INFO, shared_sound};
 use anyhow::{Context, Result, ensure};
 use orator_base::input;
@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug)]
 pub struct Imported {
     pub lines: Vec<ImportOutcome>,
-    /// Notes on what was left out of tars.
+    /// Notes on files skipped in tar files.
     pub notes: Vec<String>,
     pub info: DatasetInfo,
     pub stats: DatasetStats,
@@ -38,11 +38,11 @@ pub fn rate_of(sources: &[PathBuf]) -> Option<orator_base::types::time::FrameRat
     serde_json::from_slice::<DatasetInfo>(&info).ok().map(|info| info.fps)
 }
 
-/// Note on a dataset of silent captures.
+/// Note for readers of a dataset imported without sound.
 const NO_SOUND: &str =
     "There is no sound: silence stands in its place. The motion serves lifters and evaluation, not speech to gesture.";
 
-/// Imports into the empty folder `out`.
+/// Imports the sources of `plan` into the empty folder `out`.
 ///
 /// # Errors
 /// Nothing to import, or nothing kept; files that cannot be written. A failed take is an outcome, not an error.
@@ -62,17 +62,18 @@ pub fn import(plan: &ImportPlan, out: &Path, progress: &dyn Progress) -> Result<
         task.detail(&item.file());
         let mut one = item.inspect(plan);
         if one.is_kept() && !names.insert(one.source.name.clone()) {
-            one = one.twice();
+            one = one.refuse_duplicate_name();
         }
         if let (Some(codes), true) = (&one.codes, one.is_kept()) {
-            one.sound = Some(part::write_sound(out, &one.source.name, codes)?);
+            one.sound = Some(entry::write_sound(out, &one.source.name, codes)?);
             one.codes = None;
         }
         inspected.push(one);
         task.advance(1);
     }
     drop(task);
-    // What failed or is refused takes no name from what is kept. Numbers are even, as in earlier versions.
+    // Accepted items keep their names; failed and refused ones are renamed if theirs is in use. The numbers are even,
+    // so that the names equal those of earlier versions.
     for (nth, one) in inspected.iter_mut().enumerate().filter(|(_, one)| !one.is_kept()) {
         while !names.insert(one.source.name.clone()) {
             one.rename(2 * nth);
@@ -84,8 +85,8 @@ pub fn import(plan: &ImportPlan, out: &Path, progress: &dyn Progress) -> Result<
     for (&at, assigned) in kept.iter().zip(assign(&inspected, &kept, &compared, &plan.dataset)) {
         match assigned {
             Assignment::In(..) | Assignment::Blocks(_) => inspected[at].split = Some(assigned),
-            Assignment::Nowhere(with) => {
-                part::remove_sound(out, &inspected[at].source.name)?;
+            Assignment::Excluded(with) => {
+                entry::remove_sound(out, &inspected[at].source.name)?;
                 inspected[at].refuse_shared(&with, plan.dataset.duplicate_secs);
             }
         }
@@ -112,11 +113,11 @@ fn compare(inspected: &[InspectedItem], kept: &[usize], out: &Path, duplicate_se
     let audible = kept.iter().filter(|&&at| inspected[at].sound.is_some());
     let mut names: Vec<String> = audible.map(|&at| inspected[at].source.name.clone()).collect();
     names.sort();
-    let shared = shared_sound::find(&names, |n| part::read_sound(out, &names[n]), duplicate_secs)?;
+    let shared = shared_sound::find(&names, |n| entry::read_sound(out, &names[n]), duplicate_secs)?;
     Ok(SoundComparison { duplicate_secs, shared })
 }
 
-/// Assigns each kept video to a split; one of a dataset keeps its split or its blocks.
+/// Assigns each accepted video to a split; a video of another dataset keeps its split or its blocks.
 fn assign(
     inspected: &[InspectedItem],
     kept: &[usize],
@@ -124,32 +125,32 @@ fn assign(
     settings: &config::DatasetConfig,
 ) -> Vec<Assignment> {
     let recorded: Vec<Option<RecordedSplit>> = kept.iter().map(|&at| recorded(&inspected[at])).collect();
-    let waiting = kept.iter().zip(&recorded).map(|(&at, before)| {
+    let unassigned = kept.iter().zip(&recorded).map(|(&at, recorded)| {
         let InspectedItem { source, split, .. } = &inspected[at];
-        // Without a content hash the name decides.
+        // Without a content hash, the name breaks ties.
         let content = if source.content.is_empty() { &source.name } else { &source.content };
         let named = match split {
             Some(Assignment::In(split, _)) => Some(*split),
-            Some(Assignment::Blocks(_) | Assignment::Nowhere(_)) | None => None,
+            Some(Assignment::Blocks(_) | Assignment::Excluded(_)) | None => None,
         };
         let (duration_secs, kept) = (source.ledger.duration_secs, spans(&source.ledger));
-        Unassigned { name: &source.name, content, duration_secs, kept, named, before: before.as_ref() }
+        Unassigned { name: &source.name, content, duration_secs, kept, named, recorded: recorded.as_ref() }
     });
     let config::DatasetConfig { validation, test, .. } = *settings;
-    let plan = SplitPlan { unit: SplitUnit::Video, validation, test, guard_secs: 0.0, least_secs: 0.0 };
-    let assigned = split::assign(&waiting.collect::<Vec<_>>(), &compared.shared, &plan);
-    let as_before = |(at, assigned): (&usize, Assignment)| inspected[*at].split.clone().unwrap_or(assigned);
-    kept.iter().zip(assigned).map(as_before).collect()
+    let plan = SplitPlan { unit: SplitUnit::Video, validation, test, guard_secs: 0.0, min_block_secs: 0.0 };
+    let assigned = split::assign(&unassigned.collect::<Vec<_>>(), &compared.shared, &plan);
+    let stated_or_assigned = |(at, assigned): (&usize, Assignment)| inspected[*at].split.clone().unwrap_or(assigned);
+    kept.iter().zip(assigned).map(stated_or_assigned).collect()
 }
 
-/// Blocks of a video that came in several splits.
+/// Recorded blocks of an item whose source states several splits.
 fn recorded(item: &InspectedItem) -> Option<RecordedSplit> {
     match &item.split {
         Some(Assignment::Blocks(blocks)) => {
             let (name, blocks) = (item.source.name.clone(), blocks.clone());
             Some(RecordedSplit { name, split: None, by: SplitBy::Time, blocks })
         }
-        Some(Assignment::In(..) | Assignment::Nowhere(_)) | None => None,
+        Some(Assignment::In(..) | Assignment::Excluded(_)) | None => None,
     }
 }
 
@@ -157,14 +158,14 @@ fn spans(ledger: &Ledger) -> Vec<(f64, f64)> {
     ledger.kept.iter().map(|kept| (kept.start_secs, kept.end_secs)).collect()
 }
 
-/// What the splits of the assigned videos are made of: divided by time where a dataset was, else whole.
+/// Split rule of the imported dataset: by time if any source dataset was divided by time, otherwise by whole videos.
 fn rule(inspected: &[InspectedItem]) -> SplitRule {
     let mut guard_secs: Option<f64> = None;
     let mut unit = SplitUnit::Video;
     for item in inspected {
         if let Some(Assignment::Blocks(blocks)) = &item.split {
             unit = SplitUnit::Time;
-            let gap = blocks::least_gap(blocks, &spans(&item.source.ledger));
+            let gap = blocks::min_gap(blocks, &spans(&item.source.ledger));
             guard_secs = [guard_secs, gap].into_iter().flatten().min_by(f64::total_cmp);
         }
     }
@@ -172,10 +173,10 @@ fn rule(inspected: &[InspectedItem]) -> SplitRule {
     SplitRule { unit, why: why.to_owned(), guard_secs: guard_secs.unwrap_or(0.0) }
 }
 
-/// Notes on the kinds of sources for readers of the dataset.
+/// Notes for readers of the dataset on the kinds of imported sources.
 fn notes(takes: &[TakeFiles]) -> Vec<String> {
-    let there: BTreeSet<MotionKind> = takes.iter().map(|take| take.kind).collect();
-    let mut notes: Vec<String> = there
+    let kinds: BTreeSet<MotionKind> = takes.iter().map(|take| take.kind).collect();
+    let mut notes: Vec<String> = kinds
         .into_iter()
         .map(|kind| match kind {
             MotionKind::Authors => {
@@ -202,21 +203,21 @@ fn notes(takes: &[TakeFiles]) -> Vec<String> {
     notes
 }
 
-/// First few reasons why nothing is kept, and the number of the others.
+/// At most two messages per reason why nothing was accepted, and the number of the others.
 fn first_reasons(items: &[ImportItem], inspected: &[InspectedItem]) -> String {
-    let mut reasons: BTreeMap<String, usize> = BTreeMap::new();
+    let mut n_by_reason: BTreeMap<String, usize> = BTreeMap::new();
     let lines = items.iter().zip(inspected).map(|(item, inspected)| inspected.line(&item.file()));
-    let mut said: Vec<String> = Vec::new();
+    let mut messages: Vec<String> = Vec::new();
     for line in lines {
-        let n = reasons.entry(line.reason.clone()).or_default();
+        let n = n_by_reason.entry(line.reason.clone()).or_default();
         *n += 1;
         if *n <= 2 {
-            said.push(format!("{}: {}", line.file, line.message));
+            messages.push(format!("{}: {}", line.file, line.message));
         }
     }
-    let n_others = inspected.len() - said.len();
+    let n_others = inspected.len() - messages.len();
     let others = if n_others > 0 { format!("; and {}", counted(n_others, "other")) } else { String::new() };
-    said.join("; ") + &others
+    messages.join("; ") + &others
 }
 
 /// Request of an import.
@@ -232,7 +233,7 @@ pub struct ImportPlan {
     pub dataset: config::DatasetConfig,
 }
 
-/// Outcome of a take, or of a video of other shards.
+/// Outcome of an imported item.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ImportOutcome {
     pub file: String,

@@ -1,74 +1,76 @@
-//! A video in blocks of time, each of one split. Between blocks of different splits lies a guard gap, which is cut off
-//! both of them when samples are cut, so that a longer gap moves no block.
+//! Time blocks of a video, each in one split. The guard gap between blocks of different splits is taken from both of
+//! them only when samples are cut, so the block boundaries do not depend on its length.
 
 use orator_base::types::interval::Interval;
 use orator_base::types::split::{Split, TimeBlock};
 use orator_base::types::time::FrameRate;
 
-/// Kept seconds after which a long video has another block of every split.
+/// Accepted seconds per cycle; in each cycle of a long video every split gets a block.
 const CYCLE_SECS: f64 = 600.0;
-/// Uncertainty of where shared sound begins and ends, seconds.
+/// Uncertainty of the ends of shared sound, seconds.
 const SHARED_EDGE_SECS: f64 = 1.0;
 
-/// Stretch of seconds.
+/// Start and end, seconds.
 pub type Span = (f64, f64);
 
-/// Lengths of blocks of `splits` (with shares) that share `secs` with a gap between each two; a block is raised to
-/// `least_secs` at the cost of the longest. `None`: that does not fit.
+/// Lengths of one block for each of `splits` (with their shares), in seconds: `secs` minus the gaps between the blocks
+/// is divided by share. With `may_raise`, shorter blocks are raised to `min_secs` at the expense of the longest.
+/// `None`: a block would be shorter than `min_secs`.
 pub fn lengths(
     secs: f64,
     splits: &[(Split, f64)],
     guard_secs: f64,
-    least_secs: f64,
+    min_secs: f64,
     may_raise: bool,
 ) -> Option<Vec<(Split, f64)>> {
-    let left = secs - guard_secs * splits.len().saturating_sub(1) as f64;
-    let all: f64 = splits.iter().map(|(_, share)| share).sum();
-    let wanted: Vec<(Split, f64)> = splits.iter().map(|(split, share)| (*split, left * share / all)).collect();
-    let is_short = |(_, secs): &(Split, f64)| *secs < least_secs;
-    if wanted.iter().any(is_short) && !may_raise {
+    let available_secs = secs - guard_secs * splits.len().saturating_sub(1) as f64;
+    let total_share: f64 = splits.iter().map(|(_, share)| share).sum();
+    let by_share: Vec<(Split, f64)> =
+        splits.iter().map(|(split, share)| (*split, available_secs * share / total_share)).collect();
+    let is_short = |(_, secs): &(Split, f64)| *secs < min_secs;
+    if by_share.iter().any(is_short) && !may_raise {
         return None;
     }
-    let missing: f64 = wanted.iter().map(|(_, secs)| (least_secs - secs).max(0.0)).sum();
-    let longest = wanted.iter().map(|(_, secs)| *secs).fold(f64::MIN, f64::max);
-    let longest = wanted.iter().position(|(_, secs)| *secs == longest)?;
-    let mut raised: Vec<(Split, f64)> = wanted.iter().map(|(split, secs)| (*split, secs.max(least_secs))).collect();
-    raised[longest].1 -= missing;
+    let missing_secs: f64 = by_share.iter().map(|(_, secs)| (min_secs - secs).max(0.0)).sum();
+    let longest = by_share.iter().map(|(_, secs)| *secs).fold(f64::MIN, f64::max);
+    let longest = by_share.iter().position(|(_, secs)| *secs == longest)?;
+    let mut raised: Vec<(Split, f64)> = by_share.iter().map(|(split, secs)| (*split, secs.max(min_secs))).collect();
+    raised[longest].1 -= missing_secs;
     (!raised.iter().any(is_short)).then_some(raised)
 }
 
-/// Cuts a video of which `kept` is kept into blocks of all `splits` in turn, each split once in about ten minutes.
-/// `None`: it is too short for blocks of `least_secs`.
+/// Divides a video with the accepted spans `kept` into blocks of all `splits` in turn, each split about once per
+/// `CYCLE_SECS`. `None`: the video is too short for blocks of `min_secs`.
 pub fn cut(
     kept: &[Span],
     duration_secs: f64,
     splits: &[(Split, f64)],
     guard_secs: f64,
-    least_secs: f64,
+    min_secs: f64,
 ) -> Option<Vec<TimeBlock>> {
     let secs: f64 = kept.iter().map(|(start, end)| end - start).sum();
     let n_cycles = ((secs / CYCLE_SECS) as usize).max(1);
-    // The gap between the last block of a cycle and the first of the next is one more.
-    let of_cycle = (secs + guard_secs) / n_cycles as f64 - guard_secs;
-    let lengths = lengths(of_cycle, splits, guard_secs, least_secs, false)?;
-    Some(in_turn(kept, duration_secs, &lengths.repeat(n_cycles), guard_secs))
+    // Each cycle except the last also contains the gap before the next one.
+    let cycle_secs = (secs + guard_secs) / n_cycles as f64 - guard_secs;
+    let lengths = lengths(cycle_secs, splits, guard_secs, min_secs, false)?;
+    Some(consecutive(kept, duration_secs, &lengths.repeat(n_cycles), guard_secs))
 }
 
-/// Blocks of these lengths of kept seconds, one after the other with half a gap on either side of each boundary.
-pub fn in_turn(kept: &[Span], duration_secs: f64, lengths: &[(Split, f64)], guard_secs: f64) -> Vec<TimeBlock> {
+/// Consecutive blocks with the given lengths in accepted seconds, plus half a gap on either side of each boundary.
+pub fn consecutive(kept: &[Span], duration_secs: f64, lengths: &[(Split, f64)], guard_secs: f64) -> Vec<TimeBlock> {
     let mut blocks: Vec<TimeBlock> = Vec::new();
     let mut until = 0.0;
     for (n, (split, secs)) in lengths.iter().enumerate() {
         until += secs + if n == 0 { guard_secs / 2.0 } else { guard_secs };
         let start_secs = blocks.last().map_or(0.0, |block| block.end_secs);
-        let end_secs = if n + 1 == lengths.len() { duration_secs } else { at_kept(kept, until) };
+        let end_secs = if n + 1 == lengths.len() { duration_secs } else { time_at_kept(kept, until) };
         blocks.push(TimeBlock { split: Some(*split), start_secs, end_secs });
     }
     blocks
 }
 
-/// Time at which `secs` of `kept` are over.
-fn at_kept(kept: &[Span], secs: f64) -> f64 {
+/// Time at which `secs` accepted seconds have passed.
+fn time_at_kept(kept: &[Span], secs: f64) -> f64 {
     let mut left = secs;
     for (start, end) in kept {
         if left <= end - start {
@@ -79,21 +81,21 @@ fn at_kept(kept: &[Span], secs: f64) -> f64 {
     kept.last().map_or(0.0, |(_, end)| *end)
 }
 
-/// Split at a time; `None` in what is left out.
+/// Split at the time `secs`; `None` outside all blocks or in an excluded one.
 fn split_at(blocks: &[TimeBlock], secs: f64) -> Option<Split> {
     blocks.iter().find(|block| (block.start_secs..block.end_secs).contains(&secs)).and_then(|block| block.split)
 }
 
-/// Smallest distance of kept stretches of different splits; `None`: there is only one split.
-pub fn least_gap(blocks: &[TimeBlock], kept: &[Span]) -> Option<f64> {
+/// Smallest gap between consecutive accepted spans in different splits, seconds; `None`: there is no such pair.
+pub fn min_gap(blocks: &[TimeBlock], kept: &[Span]) -> Option<f64> {
     let placed = |(start, end): &Span| Some((*start, *end, split_at(blocks, f64::midpoint(*start, *end))?));
     let placed: Vec<(f64, f64, Split)> = kept.iter().filter_map(placed).collect();
     let apart = placed.windows(2).filter(|pair| pair[0].2 != pair[1].2).map(|pair| pair[1].0 - pair[0].1);
     apart.min_by(f64::total_cmp)
 }
 
-/// Stretches of `shared` (in `own` time; the other video's time is `to_other` later) that two videos have in different
-/// splits, with both splits: own, other.
+/// Parts of the shared sound `shared` that are in different splits in the two videos, each with its span and both
+/// splits (own, other). Times are those of the own video; the other video's times are larger by `to_other`, seconds.
 pub fn conflicts(own: &[TimeBlock], shared: Span, other: &[TimeBlock], to_other: f64) -> Vec<(Span, Split, Split)> {
     let inside = |secs: &f64| shared.0 < *secs && *secs < shared.1;
     let own_edges = own.iter().flat_map(|block| [block.start_secs, block.end_secs]);
@@ -108,7 +110,7 @@ pub fn conflicts(own: &[TimeBlock], shared: Span, other: &[TimeBlock], to_other:
     edges.windows(2).filter_map(conflict).collect()
 }
 
-/// Blocks without the stretches `holes`, which belong to no split any more; a second on either side goes with them.
+/// Blocks with the spans `holes`, extended by `SHARED_EDGE_SECS` on either side, excluded from every split.
 pub fn without(blocks: &[TimeBlock], holes: &[Span]) -> Vec<TimeBlock> {
     let mut blocks = blocks.to_vec();
     for (start, end) in holes {
@@ -129,8 +131,8 @@ pub fn without(blocks: &[TimeBlock], holes: &[Span]) -> Vec<TimeBlock> {
     blocks
 }
 
-/// Frames of each split that samples may be cut from: blocks of different splits are at least `guard_frames` apart,
-/// half of what is missing is cut off each.
+/// Frame intervals of each split that samples may be cut from. Neighbouring intervals of different splits are at least
+/// `guard_frames` apart; about half of a missing gap is taken from each.
 pub fn usable(blocks: &[TimeBlock], fps: FrameRate, n_frames: usize, guard_frames: usize) -> Vec<(Split, Interval)> {
     let frame = |secs: f64| ((secs * fps.per_sec()).round() as usize).min(n_frames);
     let mut usable: Vec<(Split, Interval)> = Vec::new();
@@ -175,14 +177,14 @@ mod tests {
         }
         assert_eq!(cut(&[(0.0, 60.0)], 60.0, &SHARES, 8.0, 8.0), None);
         assert_eq!(cut(&[(0.0, 3_000.0)], 3_000.0, &SHARES, 8.0, 8.0).unwrap().len(), 15);
-        // raised to the least at the cost of the longest
+        // Short blocks are raised to the minimum at the expense of the longest.
         let raised = lengths(60.0, &SHARES, 8.0, 8.0, true).unwrap();
         assert!((raised[0].1 - 28.0).abs() < 1e-9 && raised[1].1 == 8.0 && raised[2].1 == 8.0, "{raised:?}");
         assert_eq!(lengths(30.0, &SHARES, 8.0, 8.0, true), None);
     }
 
     #[test]
-    fn neighbours_of_different_splits_are_a_gap_apart() {
+    fn adjacent_blocks_of_different_splits_are_a_gap_apart() {
         let block = |split, start_secs, end_secs| TimeBlock { split: Some(split), start_secs, end_secs };
         let blocks = [
             block(Split::Train, 0.0, 10.0),
@@ -205,11 +207,11 @@ mod tests {
     }
 
     #[test]
-    fn sound_that_two_videos_share_is_left_out_where_their_splits_differ() {
+    fn shared_sound_is_excluded_where_the_splits_differ() {
         let block = |split, start_secs, end_secs| TimeBlock { split: Some(split), start_secs, end_secs };
         let own = [block(Split::Train, 0.0, 60.0), block(Split::Test, 60.0, 100.0)];
         let other = [block(Split::Train, 0.0, 40.0), block(Split::Validation, 40.0, 90.0)];
-        // 10 s of own time are 20 s of the other's
+        // 10 s in the own video correspond to 20 s in the other.
         let found = conflicts(&own, (10.0, 70.0), &other, 10.0);
         let expected =
             [((30.0, 60.0), Split::Train, Split::Validation), ((60.0, 70.0), Split::Test, Split::Validation)];

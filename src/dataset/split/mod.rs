@@ -1,5 +1,5 @@
-//! Division of a speaker's videos into splits: `blocks` (a video in blocks of time),
-//! `assign` (all videos), `record` (what stays when others are added, and why).
+//! Division of a speaker's videos into splits: `blocks` (time blocks of one video), `assign` (assignment of all
+//! videos), `record` (stored assignments, which stay when videos are added).
 
 pub mod assign;
 pub mod blocks;

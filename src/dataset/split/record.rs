@@ -1,5 +1,5 @@
-//! What stays when videos are added: the split, or the blocks, of every video, and why. It lies outside the dataset's
-//! folder, which is replaced as a whole.
+//! Split record: the split or time blocks of every video and the reason, so that they stay when videos are added. The
+//! file is outside the dataset folder, since that folder is replaced as a whole.
 
 use crate::config::choices::SplitUnit;
 use crate::pretty;
@@ -14,69 +14,69 @@ use std::path::Path;
 /// Version of the file's layout.
 const SCHEMA: u32 = 1;
 
-/// Reason of a video's split.
+/// Reason for a video's split.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SplitBy {
-    /// Content hash, in datasets of earlier versions.
+    /// The content hash chose the split, in datasets of earlier versions.
     Content,
-    /// Configuration or source dataset.
+    /// The configuration or the source dataset names the split.
     Name,
-    /// Shared sound with the video of this name, whose split it follows.
+    /// The video shares sound with the video of this name and is in the same split.
     SoundOf(String),
-    /// Seconds that the split lacked of its share.
+    /// The split was the furthest below its share of the seconds.
     #[default]
     Share,
-    /// Blocks of time in several splits.
+    /// The video is divided into time blocks in several splits.
     Time,
 }
 
-/// What a dataset's splits are made of.
+/// Rule by which a dataset is divided into splits.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SplitRule {
-    /// Whole videos, or blocks of time.
+    /// Unit of the division: whole videos, or time blocks.
     pub unit: SplitUnit,
-    /// Reason in words.
+    /// Reason for the rule, for readers.
     pub why: String,
-    /// Least distance between two splits of a video, seconds; 0 for whole videos.
+    /// Minimum gap between two splits of a video, seconds; 0 for whole videos.
     pub guard_secs: f64,
 }
 
-/// Split of a video on record.
+/// Recorded split of a video.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RecordedSplit {
     /// Name in the dataset, `<slug of the file's name>-<8 hex of its content>`.
     pub name: String,
-    /// Split; `None`: blocks in several.
+    /// Split; `None`: time blocks in several splits.
     pub split: Option<Split>,
     pub by: SplitBy,
-    /// Blocks of time; empty for a whole video.
+    /// Time blocks; empty for a video that is in one split.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub blocks: Vec<TimeBlock>,
 }
 
-/// Splits of a speaker's videos on record.
+/// Recorded splits of a speaker's videos.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SplitRecord {
     pub schema: u32,
-    /// Whole videos, or blocks of time.
+    /// Unit of the division: whole videos, or time blocks.
     pub unit: SplitUnit,
-    /// Reason of the choice in words.
+    /// Reason for the choice of the unit, for readers.
     pub why: String,
-    /// Videos by the BLAKE3 of their file.
+    /// Recorded splits by the BLAKE3 of the video file.
     pub videos: BTreeMap<String, RecordedSplit>,
 }
 
 impl SplitRecord {
-    /// Record without a video.
+    /// Record without videos.
     pub fn new(unit: SplitUnit, why: String) -> Self {
         Self { schema: SCHEMA, unit, why, videos: BTreeMap::new() }
     }
 
-    /// Reads a record; `None` where there is none.
+    /// Reads a record; `None` if the file does not exist.
     ///
     /// # Errors
-    /// A damaged file: without it videos would move to other splits.
+    /// A damaged file: ignoring it would move videos to other splits.
     pub fn read(path: &Path) -> Result<Option<Self>> {
         if !path.exists() {
             return Ok(None);
@@ -95,7 +95,7 @@ impl SplitRecord {
         Ok(Some(record))
     }
 
-    /// Writes the record in one step.
+    /// Writes the record atomically.
     ///
     /// # Errors
     /// A folder that cannot be written.
@@ -103,7 +103,8 @@ impl SplitRecord {
         workdir::write_file(path, &pretty(self)?)
     }
 
-    /// Forgets videos by content or by name; what followed one of them keeps its split. Returns how many went.
+    /// Removes the videos for which `is_gone` (given content hash and record) holds; videos that were placed by sound
+    /// shared with one of them keep their split. Returns the number of removed videos.
     pub fn forget(&mut self, is_gone: impl Fn(&str, &RecordedSplit) -> bool) -> usize {
         let n_before = self.videos.len();
         let (gone, kept): (BTreeMap<_, _>, BTreeMap<_, _>) =

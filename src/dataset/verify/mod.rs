@@ -1,4 +1,4 @@
-//! Check of a dataset: checksums, splits, samples, arrays.
+//! Verification of a dataset: checksums, splits, samples, arrays.
 
 pub mod blocks;
 pub mod sample;

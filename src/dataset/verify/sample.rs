@@ -1,18 +1,22 @@
-//! Consistency of a sample: matching shapes, joints present where the mask says so, constant bones, keypoints in range.
+//! Consistency checks of a sample: matching shapes, joints present where the mask is set, constant bone lengths, values
+//! in range.
 
 use crate::sample::Sample;
 use anyhow::{Result, ensure};
 use orator_base::types::posture::PostureChannel;
 use orator_base::types::skeleton::{L_HAND, N_JOINTS, NECK, R_HAND, parent};
 
-/// Largest deviation of a bone from its length, metres: the rounding of float32 half a metre from the neck.
+/// Largest deviation of a bone from its length, metres: float32 rounding half a metre from the neck.
 const BONE_TOLERANCE: f64 = 1e-5;
-/// Largest angle of head or trunk, radians: half a turn and its rounding.
-const MOST_RADIANS: f32 = std::f32::consts::PI + 1e-4;
+/// Largest angle of head or trunk, radians: half a turn plus rounding.
+const MAX_RADIANS: f32 = std::f32::consts::PI + 1e-4;
 
-/// Checks a sample whose video has these bone lengths (metres; 0: not measured).
+/// Checks a sample; `lengths` are the bone lengths of its video (metres; 0: not measured).
+///
+/// # Errors
+/// The first inconsistency, with its frame and joint.
 pub fn check_sample(sample: &Sample, lengths: &[f64]) -> Result<()> {
-    // A sample that cannot be written is damaged.
+    // Encoding checks the shapes.
     sample.members()?;
     sample.optional_members()?;
     let (joints, mask) = (&sample.motion.joints, &sample.motion.mask);
@@ -29,22 +33,22 @@ pub fn check_sample(sample: &Sample, lengths: &[f64]) -> Result<()> {
             else {
                 continue;
             };
-            let own = distance(at(parent), position);
-            if !own.is_finite() {
+            let measured = distance(at(parent), position);
+            if !measured.is_finite() {
                 continue;
             }
             let root = joint == L_HAND || joint == R_HAND;
-            let wanted = if root { 0.0 } else { length };
+            let expected = if root { 0.0 } else { length };
             ensure!(
-                (!root && length == 0.0) || (own - wanted).abs() < BONE_TOLERANCE,
-                "frame {t}: the bone to joint {joint} is {own:.6} m, the video's is {wanted:.6} m"
+                (!root && length == 0.0) || (measured - expected).abs() < BONE_TOLERANCE,
+                "frame {t}: the bone to joint {joint} is {measured:.6} m, the video's is {expected:.6} m"
             );
         }
         ensure!(at(NECK) == [0.0; 3] || at(NECK)[0].is_nan(), "frame {t}: the neck is not the origin");
     }
     for channel in PostureChannel::ALL {
         for ((t, _), angle) in sample.posture.iter().flat_map(|posture| posture.channel(channel).indexed_iter()) {
-            let is_angle = angle.is_nan() || angle.abs() <= MOST_RADIANS;
+            let is_angle = angle.is_nan() || angle.abs() <= MAX_RADIANS;
             ensure!(is_angle, "frame {t}: an angle of the {} is {angle} radians", channel.name());
         }
     }

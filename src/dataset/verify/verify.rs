@@ -1,8 +1,9 @@
-//! Check of a dataset. Fast: every file exists with its size, small files and all checksums are right, every second of
-//! every video is accounted for. Deep: every hash, and shape, values and bones of every array.
+//! Verification of a dataset. Fast: every file exists, shards have their size, the hashes of small files match, and
+//! every second of every video is accounted for. Deep: the hashes of all files, and the shapes, values and bones of all
+//! arrays.
 //!
-//! Files assembled from the entries of the videos are assembled again and compared, which detects wrong numbers in any
-//! of them.
+//! The files that are assembled from the entries of the videos are assembled again and compared, which detects wrong
+//! numbers in any of them.
 
 use super::blocks;
 use super::sample::check_sample;
@@ -10,7 +11,7 @@ use crate::info::DatasetInfo;
 use crate::leakage::Leakage;
 use crate::read::Dataset;
 use crate::write::assemble::{LedgerLine, assemble_into};
-use crate::write::part::{self, VideoEntry};
+use crate::write::entry::{self, VideoEntry};
 use crate::{CHECKSUMS, INFO, LEAKAGE, README, read_json};
 use anyhow::{Context, Result, ensure};
 use orator_base::input;
@@ -24,15 +25,15 @@ use std::io::Write;
 use std::path::Path;
 use std::rc::Rc;
 
-/// Deviation from what was written.
+/// Problem found in a dataset.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct DatasetProblem {
-    /// Path in the dataset's folder.
+    /// Path in the dataset folder.
     pub file: String,
     pub what: String,
 }
 
-/// Result of a check.
+/// Result of a verification.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Verified {
     pub problems: Vec<DatasetProblem>,
@@ -46,38 +47,38 @@ pub struct Verified {
 }
 
 impl Verified {
-    fn wrong(&mut self, file: &str, what: impl Into<String>) {
+    fn add_problem(&mut self, file: &str, what: impl Into<String>) {
         self.problems.push(DatasetProblem { file: file.to_owned(), what: what.into() });
     }
 
-    fn note(&mut self, file: &str, result: Result<()>) {
+    fn add_error(&mut self, file: &str, result: Result<()>) {
         if let Err(error) = result {
-            self.wrong(file, format!("{error:#}"));
+            self.add_problem(file, format!("{error:#}"));
         }
     }
 }
 
-/// Checks the dataset in `dir`; the problems are sorted and unique.
+/// Verifies the dataset in `dir`; the problems are sorted and unique.
 ///
 /// # Errors
-/// A folder that cannot be listed, is no dataset, or is being written (`BusyFolder`).
+/// A folder that cannot be listed, is not a dataset, or is being written (`BusyFolder`).
 pub fn verify(dir: &Path, deep: bool, progress: &dyn Progress) -> Result<Verified> {
     let is_dataset = [INFO, CHECKSUMS].iter().any(|name| dir.join(name).exists());
     ensure!(is_dataset, "{} is no dataset: it has neither {INFO} nor {CHECKSUMS}", dir.display());
     let _lock = FolderLock::shared(dir)?;
     let mut found = Verified::default();
-    let there = files_of(dir)?;
-    found.n_files = there.len();
-    let wanted = assembled(dir, &there, &mut found).unwrap_or_else(|error| {
-        found.wrong(INFO, format!("{error:#}"));
+    let present = files_of(dir)?;
+    found.n_files = present.len();
+    let expected = assemble_again(dir, &present, &mut found).unwrap_or_else(|error| {
+        found.add_problem(INFO, format!("{error:#}"));
         BTreeMap::new()
     });
-    if !wanted.is_empty() {
-        listed(&there, &wanted, &mut found);
-        videos(dir, &mut found)?;
-        hashes(dir, &wanted, deep, &mut found, progress);
+    if !expected.is_empty() {
+        check_files(&present, &expected, &mut found);
+        check_videos(dir, &mut found)?;
+        check_hashes(dir, &expected, deep, &mut found, progress);
         if deep {
-            samples(dir, &mut found, progress);
+            check_samples(dir, &mut found, progress);
         }
     }
     found.problems.sort();
@@ -85,8 +86,12 @@ pub fn verify(dir: &Path, deep: bool, progress: &dyn Progress) -> Result<Verifie
     Ok(found)
 }
 
-/// Assembles the dataset again: the expected hash of every file, by its path.
-fn assembled(dir: &Path, there: &BTreeMap<String, u64>, found: &mut Verified) -> Result<BTreeMap<String, String>> {
+/// Assembles the dataset again; returns the expected hash of every file, by path.
+fn assemble_again(
+    dir: &Path,
+    present: &BTreeMap<String, u64>,
+    found: &mut Verified,
+) -> Result<BTreeMap<String, String>> {
     let info: DatasetInfo = read_json(&dir.join(INFO))?;
     let leakage: Leakage = read_json(&dir.join(LEAKAGE))?;
     let written: Rc<RefCell<Vec<u8>>> = Rc::default();
@@ -100,29 +105,30 @@ fn assembled(dir: &Path, there: &BTreeMap<String, u64>, found: &mut Verified) ->
     {
         text = text.replace(&now, &card);
     }
-    let wanted: BTreeMap<String, String> =
+    let expected: BTreeMap<String, String> =
         text.lines().filter_map(|line| line.split_once("  ")).map(|(hash, file)| (file.into(), hash.into())).collect();
-    if there.contains_key(CHECKSUMS) {
+    if present.contains_key(CHECKSUMS) {
         let stated =
             input::read(dir.join(CHECKSUMS), input::MOST_TEXT).with_context(|| format!("reading {CHECKSUMS}"))?;
         if stated != text.as_bytes() {
             let text_of = String::from_utf8_lossy(&stated).into_owned();
             let named = text_of.lines().filter_map(|line| line.split_once("  ")).map(|(_, file)| file);
-            for file in named.filter(|file| !there.contains_key(*file)) {
-                found.wrong(file, format!("it is missing ({CHECKSUMS} names it)"));
+            for file in named.filter(|file| !present.contains_key(*file)) {
+                found.add_problem(file, format!("it is missing ({CHECKSUMS} names it)"));
             }
             let stated: BTreeSet<&[u8]> = stated.split(|byte| *byte == b'\n').collect();
-            let unlike =
+            let differing =
                 text.lines().filter(|line| !stated.contains(line.as_bytes())).filter_map(|line| line.split_once("  "));
-            let unlike: Vec<&str> = unlike.map(|(_, file)| file).collect();
-            let files = if unlike.is_empty() { "the form of its lines".to_owned() } else { unlike.join(", ") };
-            found.wrong(CHECKSUMS, format!("it does not agree with the videos' own files about {files}"));
+            let differing: Vec<&str> = differing.map(|(_, file)| file).collect();
+            let files = if differing.is_empty() { "the form of its lines".to_owned() } else { differing.join(", ") };
+            found.add_problem(CHECKSUMS, format!("it does not agree with the videos' own files about {files}"));
         }
     }
-    Ok(wanted)
+    Ok(expected)
 }
 
-/// Line of the card in the dataset's list of checksums: its words are those of the version that wrote it.
+/// Line of the dataset card in the stored checksums: the text of the card differs between program versions, so its
+/// stored hash is accepted.
 fn card_line(dir: &Path) -> Option<String> {
     let stated = input::read_text(dir.join(CHECKSUMS), input::MOST_TEXT).ok()?;
     let line = stated.lines().find(|line| is_card(line))?;
@@ -134,7 +140,7 @@ fn is_card(line: &str) -> bool {
     line.split_once("  ").is_some_and(|(_, file)| file == README)
 }
 
-/// Writer into shared memory.
+/// Writer into a shared buffer.
 struct SharedBuffer(Rc<RefCell<Vec<u8>>>);
 
 impl Write for SharedBuffer {
@@ -149,99 +155,106 @@ impl Write for SharedBuffer {
 }
 
 /// Checks that exactly the listed files exist.
-fn listed(there: &BTreeMap<String, u64>, wanted: &BTreeMap<String, String>, found: &mut Verified) {
-    for file in wanted.keys().map(String::as_str).chain([CHECKSUMS]).filter(|file| !there.contains_key(*file)) {
-        found.wrong(file, "it is missing");
+fn check_files(present: &BTreeMap<String, u64>, expected: &BTreeMap<String, String>, found: &mut Verified) {
+    for file in expected.keys().map(String::as_str).chain([CHECKSUMS]).filter(|file| !present.contains_key(*file)) {
+        found.add_problem(file, "it is missing");
     }
-    for file in there.keys().filter(|file| !wanted.contains_key(*file) && *file != CHECKSUMS) {
-        found.wrong(file, "it does not belong to the dataset");
+    for file in present.keys().filter(|file| !expected.contains_key(*file) && *file != CHECKSUMS) {
+        found.add_problem(file, "it does not belong to the dataset");
     }
 }
 
-/// Checks the sums of each video.
-fn videos(dir: &Path, found: &mut Verified) -> Result<()> {
+/// Checks the entry of each video: shards, samples, ledger, blocks, words.
+fn check_videos(dir: &Path, found: &mut Verified) -> Result<()> {
     let info = read_json::<DatasetInfo>(&dir.join(INFO))?;
     let fps = info.fps;
     let mut keys = BTreeSet::new();
-    for name in part::names(dir)? {
-        let file = format!("{}/{name}.json", part::FOLDER);
-        let part = match VideoEntry::read(&VideoEntry::path(dir, &name)) {
-            Ok(part) => part,
+    for name in entry::names(dir)? {
+        let file = format!("{}/{name}.json", entry::FOLDER);
+        let entry = match VideoEntry::read(&VideoEntry::path(dir, &name)) {
+            Ok(entry) => entry,
             Err(error) => {
-                found.wrong(&file, format!("{error:#}"));
+                found.add_problem(&file, format!("{error:#}"));
                 continue;
             }
         };
         found.n_videos += 1;
-        found.n_samples += part.samples.len();
-        found.secs += fps.secs(part.samples.iter().map(|sample| sample.n_frames).sum());
-        for shard in &part.shards {
+        found.n_samples += entry.samples.len();
+        found.secs += fps.secs(entry.samples.iter().map(|sample| sample.n_frames).sum());
+        for shard in &entry.shards {
             let bytes = std::fs::metadata(dir.join(&shard.file)).map_or(0, |meta| meta.len());
             if bytes != shard.bytes {
-                found.wrong(&shard.file, format!("it has {bytes} bytes, {} were written", shard.bytes));
+                found.add_problem(&shard.file, format!("it has {bytes} bytes, {} were written", shard.bytes));
             }
-            let n_samples = part.samples.iter().filter(|sample| sample.shard == shard.file).count();
+            let n_samples = entry.samples.iter().filter(|sample| sample.shard == shard.file).count();
             if n_samples != shard.n_samples {
-                found.wrong(&file, format!("{n_samples} samples of {} in {}", shard.n_samples, shard.file));
+                found.add_problem(&file, format!("{n_samples} samples of {} in {}", shard.n_samples, shard.file));
             }
         }
-        for sample in &part.samples {
-            let in_shard = part.shards.iter().any(|shard| shard.file == sample.shard && sample.fits(shard.bytes));
-            let same_split = part.split.is_none_or(|split| split == sample.split);
+        for sample in &entry.samples {
+            let in_shard = entry.shards.iter().any(|shard| shard.file == sample.shard && sample.fits(shard.bytes));
+            let same_split = entry.split.is_none_or(|split| split == sample.split);
             let same_split = same_split && sample.shard.starts_with(sample.split.name());
             if !in_shard || !same_split || !sample.key.starts_with(&name) || !keys.insert(sample.key.clone()) {
-                found.wrong(&file, format!("the place of the sample {} cannot be", sample.key));
+                found.add_problem(&file, format!("the place of the sample {} cannot be", sample.key));
             }
         }
-        found.note(&file, account(&part, fps));
-        found.note(&file, blocks::check_blocks(&part, &info));
-        found.note(&file, words_accounted(&part));
+        found.add_error(&file, check_ledger(&entry, fps));
+        found.add_error(&file, blocks::check_blocks(&entry, &info));
+        found.add_error(&file, check_word_counts(&entry));
     }
     Ok(())
 }
 
-/// Checks that the ledger of a video covers every second, and its samples every kept second, to a frame each.
-fn account(part: &VideoEntry, fps: FrameRate) -> Result<()> {
-    let ledger = &part.ledger;
-    let unknown = ledger.duration_secs == 0.0 && part.failure.is_some();
+/// Checks that the ledger of a video covers every second, and that its samples cover the accepted seconds, to within a
+/// frame per sample.
+fn check_ledger(entry: &VideoEntry, fps: FrameRate) -> Result<()> {
+    let ledger = &entry.ledger;
+    let unknown = ledger.duration_secs == 0.0 && entry.failure.is_some();
     ensure!(ledger.is_whole() || unknown, "its ledger does not fill {} s end to end", ledger.duration_secs);
-    let frames: usize = part.samples.iter().map(|sample| sample.n_frames).sum();
-    let off = (ledger.kept_secs() - fps.secs(frames)).abs();
-    let allowed = fps.secs(1) * part.samples.len().max(1) as f64 + 1e-6;
+    let frames: usize = entry.samples.iter().map(|sample| sample.n_frames).sum();
+    let deviation = (ledger.kept_secs() - fps.secs(frames)).abs();
+    let allowed = fps.secs(1) * entry.samples.len().max(1) as f64 + 1e-6;
     ensure!(
-        off <= allowed && ledger.kept.len() == part.samples.len(),
+        deviation <= allowed && ledger.kept.len() == entry.samples.len(),
         "its ledger keeps {:.3} s in {} stretches, its samples hold {:.3} s in {}",
         ledger.kept_secs(),
         ledger.kept.len(),
         fps.secs(frames),
-        part.samples.len()
+        entry.samples.len()
     );
     Ok(())
 }
 
-/// Checks that the ledger of a video accounts for every word.
-fn words_accounted(part: &VideoEntry) -> Result<()> {
-    let has_words = part.samples.iter().any(|sample| sample.words.is_some());
-    ensure!(part.ledger.words.is_some() || !has_words, "its samples have words, its ledger none");
-    let is_whole = part.ledger.words.as_ref().is_none_or(|words| words.count.is_whole());
+/// Checks that the ledger of a video accounts for every word of its transcript.
+fn check_word_counts(entry: &VideoEntry) -> Result<()> {
+    let has_words = entry.samples.iter().any(|sample| sample.words.is_some());
+    ensure!(entry.ledger.words.is_some() || !has_words, "its samples have words, its ledger none");
+    let is_whole = entry.ledger.words.as_ref().is_none_or(|words| words.count.is_whole());
     ensure!(is_whole, "its ledger does not account for every word of the transcript");
     Ok(())
 }
 
-/// Checks the hash of every small file; of the large ones only if `deep`.
-fn hashes(dir: &Path, wanted: &BTreeMap<String, String>, deep: bool, found: &mut Verified, progress: &dyn Progress) {
-    let task = progress.begin("hashes", wanted.len() as u64);
-    for (file, hash) in wanted {
-        let large = [".tar", ".sound"].iter().any(|ending| file.ends_with(ending));
+/// Checks the hash of every small file, and with `deep` those of large files too.
+fn check_hashes(
+    dir: &Path,
+    expected: &BTreeMap<String, String>,
+    deep: bool,
+    found: &mut Verified,
+    progress: &dyn Progress,
+) {
+    let task = progress.begin("hashes", expected.len() as u64);
+    for (file, hash) in expected {
+        let is_large = [".tar", ".sound"].iter().any(|ending| file.ends_with(ending));
         let path = dir.join(file);
-        // A pipe or a device in the place of a large file is reported without its content.
-        if (deep || !large || !path.is_file()) && path.exists() {
+        // `hash_file` reports a pipe or device in the place of a large file without reading it.
+        if (deep || !is_large || !path.is_file()) && path.exists() {
             found.bytes += std::fs::metadata(&path).map_or(0, |meta| meta.len());
             match hash_file(&path) {
                 Ok(now) if now == *hash => {}
-                Ok(_) if large => found.wrong(file, "its hash is not the one written"),
-                Ok(_) => found.wrong(file, "it is not what the videos' own files add up to"),
-                Err(error) => found.wrong(file, format!("{error:#}")),
+                Ok(_) if is_large => found.add_problem(file, "its hash is not the one written"),
+                Ok(_) => found.add_problem(file, "it is not what the videos' own files add up to"),
+                Err(error) => found.add_problem(file, format!("{error:#}")),
             }
         }
         task.advance(1);
@@ -249,30 +262,30 @@ fn hashes(dir: &Path, wanted: &BTreeMap<String, String>, deep: bool, found: &mut
 }
 
 /// Checks every array of every sample.
-fn samples(dir: &Path, found: &mut Verified, progress: &dyn Progress) {
+fn check_samples(dir: &Path, found: &mut Verified, progress: &dyn Progress) {
     let dataset = match Dataset::open(dir) {
         Ok(dataset) => dataset,
-        Err(error) => return found.wrong(INFO, format!("{error:#}")),
+        Err(error) => return found.add_problem(INFO, format!("{error:#}")),
     };
     let task = progress.begin("samples", found.n_samples as u64);
-    for name in part::names(dir).unwrap_or_default() {
-        let Ok(part) = VideoEntry::read(&VideoEntry::path(dir, &name)) else { continue };
+    for name in entry::names(dir).unwrap_or_default() {
+        let Ok(entry) = VideoEntry::read(&VideoEntry::path(dir, &name)) else { continue };
         let mut n_words = 0;
-        for sample in &part.samples {
+        for sample in &entry.samples {
             let read = dataset.read(sample).inspect(|read| n_words += read.words.as_ref().map_or(0, Vec::len));
-            let checked = read.and_then(|read| check_sample(&read, &part.bones.lengths_metres));
-            found.note(&sample.shard, checked.with_context(|| sample.key.clone()));
+            let checked = read.and_then(|read| check_sample(&read, &entry.bones.lengths_metres));
+            found.add_error(&sample.shard, checked.with_context(|| sample.key.clone()));
             task.advance(1);
         }
-        let n_kept = part.ledger.words.as_ref().map_or(0, |words| words.count.n_kept);
+        let n_kept = entry.ledger.words.as_ref().map_or(0, |words| words.count.n_kept);
         if n_words != n_kept {
-            let file = format!("{}/{name}.json", part::FOLDER);
-            found.wrong(&file, format!("its ledger keeps {n_kept} words, its samples hold {n_words}"));
+            let file = format!("{}/{name}.json", entry::FOLDER);
+            found.add_problem(&file, format!("its ledger keeps {n_kept} words, its samples hold {n_words}"));
         }
     }
 }
 
-/// Files below `dir` by path, with sizes.
+/// Paths and sizes of the files below `dir`.
 fn files_of(dir: &Path) -> Result<BTreeMap<String, u64>> {
     let mut files = BTreeMap::new();
     let mut folders = vec![(dir.to_owned(), String::new())];
@@ -292,8 +305,11 @@ fn files_of(dir: &Path) -> Result<BTreeMap<String, u64>> {
     Ok(files)
 }
 
-/// Ledgers of all videos of the dataset in `dir`.
-pub fn accounts(dir: &Path) -> Result<Vec<LedgerLine>> {
+/// Reads the ledgers of all videos of the dataset in `dir`.
+///
+/// # Errors
+/// An unreadable or damaged `ledger.jsonl`.
+pub fn read_ledgers(dir: &Path) -> Result<Vec<LedgerLine>> {
     let path = dir.join(crate::LEDGER);
     let text = input::read_text(&path, input::MOST_TEXT).with_context(|| format!("reading {}", path.display()))?;
     let parse = |line: &str| serde_json::from_str(line).with_context(|| format!("{} is damaged", path.display()));

@@ -1,9 +1,9 @@
-//! Common files of a dataset, assembled from the entries of its videos: `index.jsonl`, `ledger.jsonl`, `info.json`,
-//! `stats.json`, `leakage.json`, `README.md`, and `checksums.b3` with the BLAKE3 of every other file in the form of
-//! `b3sum`. The bytes depend on the videos alone, so a dataset grows, forgets and is verified by assembling it again.
-//! Memory: one video, and a line for each.
+//! Assembly of a dataset's common files from the entries of its videos: `index.jsonl`, `ledger.jsonl`, `info.json`,
+//! `stats.json`, `leakage.json`, `README.md`, and `checksums.b3` with the BLAKE3 of every other file in the format of
+//! `b3sum`. The bytes depend only on the videos, the description and the comparison of their sound, so assembling again
+//! is how videos are added or forgotten and how a dataset is verified. Memory: one entry, and a summary of each video.
 
-use super::part::{self, EntryWriter, VideoEntry, VideoSource};
+use super::entry::{self, EntryWriter, VideoEntry, VideoSource};
 use crate::bones::{VideoBones, of_speaker};
 use crate::info::{About, DatasetInfo, DatasetVideo, SplitInfo};
 use crate::leakage::{Leakage, SoundComparison};
@@ -19,24 +19,24 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// Line of `ledger.jsonl`: the account of every second of a video.
+/// Line of `ledger.jsonl`: the ledger of a video, which accounts for every second.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LedgerLine {
     pub name: String,
     pub file: String,
-    /// Split; `None`: no sample, or samples in several splits (`blocks`).
+    /// Split; `None`: no samples, or samples in several splits (`blocks`).
     pub split: Option<Split>,
-    /// Blocks of time that belong to the splits; empty for a whole video.
+    /// Time blocks with their splits; empty for a video that is in one split.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub blocks: Vec<TimeBlock>,
-    /// Reason why the video has no result.
+    /// Stage that failed, and its error; `None`: no failure.
     pub failure: Option<String>,
     #[serde(flatten)]
     pub ledger: Ledger,
 }
 
-/// Opener of an assembled file by name.
-pub type Open<'a> = dyn FnMut(&str) -> Result<Box<dyn Write>> + 'a;
+/// Factory of the writer for an assembled file, by file name.
+pub type FileFactory<'a> = dyn FnMut(&str) -> Result<Box<dyn Write>> + 'a;
 
 /// Assembles the dataset in `dir` in place.
 pub fn assemble(dir: &Path, about: &About, compared: &SoundComparison) -> Result<(DatasetInfo, DatasetStats)> {
@@ -47,35 +47,36 @@ pub fn assemble(dir: &Path, about: &About, compared: &SoundComparison) -> Result
     })
 }
 
-/// Assembles the dataset in `dir` into files that `open` provides.
+/// Assembles the dataset in `dir` into the writers that `open` returns.
 pub fn assemble_into(
     dir: &Path,
     about: &About,
     compared: &SoundComparison,
-    open: &mut Open,
+    open: &mut FileFactory,
 ) -> Result<(DatasetInfo, DatasetStats)> {
     let mut checksums = BTreeMap::new();
     let mut index = HashedFile::new(INDEX, open)?;
     let mut ledger = HashedFile::new(LEDGER, open)?;
     let mut splits: BTreeMap<Split, SplitInfo> = Split::ALL.map(|split| (split, SplitInfo::default())).into();
-    let (mut videos, mut bones, mut gatherer) = (Vec::new(), Vec::<VideoBones>::new(), StatsCollector::default());
-    let mut placed: BTreeMap<String, Vec<TimeBlock>> = BTreeMap::new();
-    for name in part::names(dir)? {
+    let (mut videos, mut bones, mut stats_collector) =
+        (Vec::new(), Vec::<VideoBones>::new(), StatsCollector::default());
+    let mut blocks_by_video: BTreeMap<String, Vec<TimeBlock>> = BTreeMap::new();
+    for name in entry::names(dir)? {
         let path = VideoEntry::path(dir, &name);
-        let part = VideoEntry::read(&path)?;
-        checksums.extend(part.files());
-        checksums.insert(format!("{}/{name}.json", part::FOLDER), orator_base::stage::fingerprint::hash_file(&path)?);
-        gatherer.push(&part);
-        part.samples.iter().try_for_each(|sample| index.line(sample))?;
-        let n_frames: usize = part.samples.iter().map(|sample| sample.n_frames).sum();
-        if !part.samples.is_empty() {
-            bones.push(part.bones.clone());
-            placed.insert(name.clone(), part.placed());
+        let entry = VideoEntry::read(&path)?;
+        checksums.extend(entry.files());
+        checksums.insert(format!("{}/{name}.json", entry::FOLDER), orator_base::stage::fingerprint::hash_file(&path)?);
+        stats_collector.push(&entry);
+        entry.samples.iter().try_for_each(|sample| index.line(sample))?;
+        let n_frames: usize = entry.samples.iter().map(|sample| sample.n_frames).sum();
+        if !entry.samples.is_empty() {
+            bones.push(entry.bones.clone());
+            blocks_by_video.insert(name.clone(), entry.blocks_with_splits());
         }
-        for split in Split::ALL.into_iter().filter(|split| part.samples.iter().any(|sample| sample.split == *split)) {
-            let own = part.samples.iter().filter(|sample| sample.split == split);
+        for split in Split::ALL.into_iter().filter(|split| entry.samples.iter().any(|sample| sample.split == *split)) {
+            let own = entry.samples.iter().filter(|sample| sample.split == split);
             let info = splits.entry(split).or_default();
-            info.shards.extend(part.shards.iter().filter(|shard| part.split_of(shard) == Some(split)).cloned());
+            info.shards.extend(entry.shards.iter().filter(|shard| entry.split_of(shard) == Some(split)).cloned());
             info.videos.push(name.clone());
             info.samples += own.clone().count();
             info.frames += own.map(|sample| sample.n_frames).sum::<usize>();
@@ -83,22 +84,22 @@ pub fn assemble_into(
         }
         videos.push(DatasetVideo {
             name: name.clone(),
-            file: part.file.clone(),
-            content: part.content,
-            split: part.split,
-            split_by: part.split_by,
-            blocks: part.blocks.clone(),
-            samples: part.samples.len(),
+            file: entry.file.clone(),
+            content: entry.content,
+            split: entry.split,
+            split_by: entry.split_by,
+            blocks: entry.blocks.clone(),
+            samples: entry.samples.len(),
             secs: about.fps.secs(n_frames),
         });
-        let (file, split, failure, of_video) = (part.file, part.split, part.failure, part.ledger);
-        let blocks = part.blocks;
+        let (file, split, failure, of_video) = (entry.file, entry.split, entry.failure, entry.ledger);
+        let blocks = entry.blocks;
         ledger.line(&LedgerLine { name, file, split, blocks, failure, ledger: of_video })?;
     }
     checksums.insert(INDEX.to_owned(), index.finish()?);
     checksums.insert(LEDGER.to_owned(), ledger.finish()?);
-    let leakage = Leakage::new(compared, &placed);
-    let stats = gatherer.finish();
+    let leakage = Leakage::new(compared, &blocks_by_video);
+    let stats = stats_collector.finish();
     let info = DatasetInfo::new(about, &of_speaker(&bones), splits, videos);
     let info = if stats.footage.words.is_some() { info.with_words() } else { info };
     let info = if stats.posture.is_some() { info.with_posture() } else { info };
@@ -121,7 +122,7 @@ pub fn assemble_into(
     Ok((info, stats))
 }
 
-/// File with a running hash.
+/// Writer that hashes what it writes.
 struct HashedFile {
     name: &'static str,
     to: Box<dyn Write>,
@@ -129,7 +130,7 @@ struct HashedFile {
 }
 
 impl HashedFile {
-    fn new(name: &'static str, open: &mut Open) -> Result<Self> {
+    fn new(name: &'static str, open: &mut FileFactory) -> Result<Self> {
         Ok(Self { name, to: open(name)?, hasher: blake3::Hasher::new() })
     }
 
@@ -150,7 +151,7 @@ impl HashedFile {
     }
 }
 
-/// Writer of a dataset. Memory: one sample, and the locations of a video's samples.
+/// Writer of a dataset. Memory: one sample, and the index entries of one video's samples.
 pub struct DatasetWriter {
     dir: PathBuf,
     about: About,
@@ -159,29 +160,29 @@ pub struct DatasetWriter {
 }
 
 impl DatasetWriter {
-    /// Begins a dataset in the existing, empty folder `dir`. A shard is closed before it would exceed
+    /// Starts a dataset in the existing, empty folder `dir`. A shard is closed before it would exceed
     /// `max_shard_bytes`.
     pub fn new(dir: &Path, about: About, max_shard_bytes: u64) -> Self {
         Self { dir: dir.to_owned(), about, max_shard_bytes, compared: SoundComparison::default() }
     }
 
-    /// Sets the comparison of the videos' sound.
+    /// Sets the result of comparing the videos' sound.
     pub fn with_compared(self, compared: SoundComparison) -> Self {
         Self { compared, ..self }
     }
 
-    /// Begins a video, which `finish` of the result ends. Videos may be written in any order.
+    /// Starts a video; call `finish` on the result. Videos may be written in any order.
     pub fn video(&self, source: VideoSource, split: Split, split_by: SplitBy) -> Result<EntryWriter> {
         EntryWriter::new(&self.dir, source, Some(split), split_by, self.max_shard_bytes)
     }
 
-    /// Begins a video with samples in several splits, cut from `blocks`.
+    /// Starts a video with samples in several splits, cut from `blocks`.
     pub fn video_in_blocks(&self, source: VideoSource, blocks: Vec<TimeBlock>) -> Result<EntryWriter> {
         let writer = EntryWriter::new(&self.dir, source, None, SplitBy::Time, self.max_shard_bytes)?;
         Ok(writer.with_blocks(blocks))
     }
 
-    /// Assembles the dataset from its videos.
+    /// Assembles the common files of the dataset.
     pub fn finish(self) -> Result<(DatasetInfo, DatasetStats)> {
         assemble(&self.dir, &self.about, &self.compared)
     }

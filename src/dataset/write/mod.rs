@@ -1,5 +1,5 @@
-//! Writing of a dataset: shards and entry of a video, and the common files.
+//! Writing of a dataset: the shards and entry of each video, and the common files.
 
 pub mod assemble;
-pub mod part;
+pub mod entry;
 pub mod tar;

@@ -1,5 +1,5 @@
-//! Tar shards with reproducible bytes (ustar, no times, no owners). A sample is never divided; its location and hash
-//! are recorded while writing.
+//! Tar shards with reproducible bytes (ustar, no times, no owners). A sample is never divided between shards; its
+//! location and hash are recorded while writing.
 
 use crate::index::{ByteRange, SampleRef, ShardRef};
 use crate::sample::{EXTENSIONS, OPTIONAL_EXTENSIONS, Sample};
@@ -12,7 +12,8 @@ use std::path::{Path, PathBuf};
 
 const BLOCK: usize = 512;
 
-/// Writer of one video's samples into `<split>-<video>-0000.tar`, `<split>-<video>-0001.tar`, ... of a folder.
+/// Writer of one video's samples into the shards `<split>-<video>-0000.tar`, `<split>-<video>-0001.tar`, ... of a
+/// folder.
 pub struct ShardWriter {
     dir: PathBuf,
     video: String,
@@ -31,7 +32,7 @@ struct OpenShard {
 }
 
 impl ShardWriter {
-    /// Writer that closes a shard before it would exceed `max_bytes`; a longer sample gets a shard of its own.
+    /// Creates a writer that closes a shard before it would exceed `max_bytes`; a larger sample gets its own shard.
     pub fn new(dir: &Path, video: &str, split: Split, max_bytes: u64) -> Self {
         let (dir, video) = (dir.to_owned(), video.to_owned());
         Self { dir, video, split, max_bytes, open: None, shards: Vec::new(), samples: Vec::new() }
@@ -46,7 +47,7 @@ impl ShardWriter {
         self.push_members(sample, &sample.members()?)
     }
 
-    /// Appends a sample with these bytes as members, and those that only some samples have.
+    /// Appends a sample with `members` as the bytes of its required members; the optional ones are encoded here.
     pub fn push_members(&mut self, sample: &Sample, members: &[Vec<u8>; 5]) -> Result<()> {
         let optional = sample.optional_members()?;
         let members = members.iter().map(Some).chain(optional.iter().map(Option::as_ref));
@@ -74,9 +75,9 @@ impl ShardWriter {
             let padding = [0; BLOCK];
             let padding = &padding[..member.len().next_multiple_of(BLOCK) - member.len()];
             *range = Some(ByteRange { offset: open.bytes + BLOCK as u64, size: member.len() as u64 });
-            for part in [header.as_bytes().as_slice(), member, padding] {
-                hasher.update(part);
-                open.push(part).with_context(|| format!("writing {}", path.display()))?;
+            for chunk in [header.as_bytes().as_slice(), member, padding] {
+                hasher.update(chunk);
+                open.push(chunk).with_context(|| format!("writing {}", path.display()))?;
             }
         }
         open.n_samples += 1;
@@ -108,7 +109,7 @@ impl ShardWriter {
         let written =
             open.push(&[0; 2 * BLOCK]).and_then(|()| open.file.into_inner().map_err(|error| error.into_error()));
         let shard = written.with_context(|| format!("writing {}", self.dir.join(&file).display()))?;
-        // Every file is flushed when the folder is put in place; this only starts the disk early.
+        // All files are synced again when the folder is put in place; this thread only starts the disk writes early.
         drop(std::thread::spawn(move || shard.sync_all()));
         self.shards.push(ShardRef {
             file,
@@ -119,7 +120,7 @@ impl ShardWriter {
         Ok(())
     }
 
-    /// Closes and flushes the last shard; returns shards and samples in order.
+    /// Closes the last shard; returns all shards and samples in order.
     pub fn finish(mut self) -> Result<(Vec<ShardRef>, Vec<SampleRef>)> {
         self.close()?;
         Ok((self.shards, self.samples))
@@ -135,7 +136,7 @@ impl OpenShard {
     }
 }
 
-/// Header of a member in ustar form, readable by all, without owner and time.
+/// Ustar header of a member: mode 0644, no owner, no time.
 fn header(name: &str, size: usize) -> Result<tar::Header> {
     let mut header = tar::Header::new_ustar();
     header.set_path(name).with_context(|| format!("`{name}` does not fit a tar header"))?;

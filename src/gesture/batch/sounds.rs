@@ -4,7 +4,7 @@
 use anyhow::{Context, Result, bail, ensure};
 use orator_avatar::animate::export::file::ExportFormat;
 use orator_base::input;
-use orator_dataset::config::patterns::{OF_SOUNDS, OF_VIDEOS, has_ending};
+use orator_dataset::config::patterns::{SOUND_EXTENSIONS, VIDEO_EXTENSIONS, has_extension};
 use orator_formats::search;
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
@@ -34,8 +34,8 @@ pub fn of_folder(folder: &Path, out: &Path) -> Result<Vec<BatchSound>> {
         folder.join("motions").display()
     );
     let mut enter = |folder: &Path| folder.canonicalize().ok() != out;
-    let endings = [&OF_SOUNDS[..], &OF_VIDEOS].concat();
-    let sounds = |path: &PathBuf| has_ending(path, &endings);
+    let endings = [&SOUND_EXTENSIONS[..], &VIDEO_EXTENSIONS].concat();
+    let sounds = |path: &PathBuf| has_extension(path, &endings);
     let named = |path: PathBuf| (path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().into_owned(), path);
     let files: Vec<(String, PathBuf)> =
         search::files(folder, &mut enter)?.into_iter().filter(sounds).map(named).collect();

@@ -121,14 +121,14 @@ impl Division {
             duration_secs: video.ledger.duration_secs,
             kept: video.ledger.kept.iter().map(|kept| (kept.start_secs, kept.end_secs)).collect(),
             named: named.get(video.unit.video.as_str()).copied(),
-            before: self.record.videos.get(&video.content),
+            recorded: self.record.videos.get(&video.content),
         });
         let plan = SplitPlan {
             unit: self.record.unit,
             validation: settings.validation,
             test: settings.test,
             guard_secs: fps.secs(self.guard_frames),
-            least_secs: fps.secs(LEAST_WINDOWS * self.least_frames),
+            min_block_secs: fps.secs(LEAST_WINDOWS * self.least_frames),
         };
         let assigned = assign(&waiting.collect::<Vec<_>>(), shared, &plan);
         for (video, assignment) in videos.iter().zip(&assigned) {
@@ -136,7 +136,7 @@ impl Division {
                 _ if video.ledger.kept.is_empty() => continue,
                 Assignment::In(split, by) => (Some(*split), by.clone(), Vec::new()),
                 Assignment::Blocks(blocks) => (None, SplitBy::Time, blocks.clone()),
-                Assignment::Nowhere(_) => continue,
+                Assignment::Excluded(_) => continue,
             };
             let recorded = RecordedSplit { name: video.name.clone(), split, by, blocks };
             self.record.videos.insert(video.content.clone(), recorded);

@@ -12,7 +12,7 @@ use orator_dataset::leakage::SoundComparison;
 use orator_dataset::shared_sound;
 use orator_dataset::split::Assignment;
 use orator_dataset::write::assemble::DatasetWriter;
-use orator_dataset::write::part::{self, VideoEntry, VideoSource};
+use orator_dataset::write::entry::{self, VideoEntry, VideoSource};
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -49,7 +49,7 @@ impl<'a> DatasetRun<'a> {
                 _ => video.sound_codes()?,
             };
             if let Some(codes) = codes {
-                hashes.insert(video.name.clone(), part::write_sound(self.out, &video.name, &codes)?);
+                hashes.insert(video.name.clone(), entry::write_sound(self.out, &video.name, &codes)?);
             }
             task.advance(1);
         }
@@ -63,7 +63,7 @@ impl<'a> DatasetRun<'a> {
         }
         let audible = videos.iter().filter(|v| !v.intervals.intervals.is_empty() && sounds.contains_key(&v.name));
         let names: Vec<String> = audible.map(|video| video.name.clone()).collect();
-        let shared = shared_sound::find(&names, |n| part::read_sound(self.out, &names[n]), duplicate_secs)?;
+        let shared = shared_sound::find(&names, |n| entry::read_sound(self.out, &names[n]), duplicate_secs)?;
         Ok(SoundComparison { duplicate_secs, shared })
     }
 
@@ -85,7 +85,7 @@ impl<'a> DatasetRun<'a> {
                 let divided = division.divide(&video.intervals, &video.ledger, blocks)?;
                 (json!(blocks), json!([division.guard_frames, division.least_frames]), divided)
             }
-            Assignment::Nowhere(_) => return Ok(()),
+            Assignment::Excluded(_) => return Ok(()),
         };
         let inputs =
             json!([orator_dataset::SCHEMA, video.file, video.files_hash, placement, rule, self.settings.max_mb]);
@@ -107,7 +107,7 @@ impl<'a> DatasetRun<'a> {
         let mut part = match placed {
             Assignment::Blocks(blocks) => writer.video_in_blocks(source, blocks)?,
             Assignment::In(split, by) => writer.video(source, split, by)?,
-            Assignment::Nowhere(_) => return Ok(()),
+            Assignment::Excluded(_) => return Ok(()),
         };
         if let Some(mut samples) = video.samples(&intervals)? {
             for (split, _) in divided.pieces {
@@ -125,7 +125,7 @@ impl<'a> DatasetRun<'a> {
             return Ok(false);
         };
         self.n_taken_over += 1;
-        part.take_over(self.old, self.out)?;
+        part.link_into(self.old, self.out)?;
         Ok(true)
     }
 
@@ -148,8 +148,8 @@ impl<'a> DatasetRun<'a> {
 
 /// The videos of the dataset that is there; one with a damaged file is as good as not there.
 fn parts_of(dir: &Path) -> BTreeMap<String, VideoEntry> {
-    let stated = part::stated_hashes(dir);
-    let parts = part::names(dir).unwrap_or_default().into_iter();
+    let stated = entry::stated_hashes(dir);
+    let parts = entry::names(dir).unwrap_or_default().into_iter();
     let parts = parts.filter_map(|name| VideoEntry::read(&VideoEntry::path(dir, &name)).ok().map(|part| (name, part)));
-    parts.filter(|(_, part)| part.is_sound(dir, &stated)).collect()
+    parts.filter(|(_, part)| part.is_intact(dir, &stated)).collect()
 }

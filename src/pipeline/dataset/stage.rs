@@ -19,7 +19,7 @@ use orator_dataset::config::{self, Settings};
 use orator_dataset::info::{About, ModelUsed};
 use orator_dataset::split::{Assignment, Split, SplitBy, SplitRule};
 use orator_dataset::write::assemble::DatasetWriter;
-use orator_dataset::write::part::{self, VideoSource};
+use orator_dataset::write::entry::{self, VideoSource};
 use orator_formats::media_json::MediaInfo;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -289,8 +289,8 @@ impl Stage for DatasetStage {
         for (video, assignment) in kept.iter().zip(assigned) {
             task.detail(&video.name);
             match assignment {
-                Assignment::Nowhere(with) => {
-                    part::remove_sound(out, &video.name)?;
+                Assignment::Excluded(with) => {
+                    entry::remove_sound(out, &video.name)?;
                     let secs = with.first().map_or(0.0, |shared| shared.secs);
                     let others: Vec<&str> = with.iter().filter_map(|shared| shared.other(&video.name)).collect();
                     left_out.push((video, run.duplicate(video, &others.join(" and "), secs)));

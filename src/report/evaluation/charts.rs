@@ -1,5 +1,5 @@
-//! Charts of an evaluation: share of correct keypoints by joint, drawn on a body and two hands, and distributions of
-//! speed and jerk of prediction and ground truth.
+//! Charts of an evaluation: the share of correct keypoints of each joint, drawn on a body and two hands, and the
+//! distributions of speed and jerk of prediction and ground truth.
 
 use crate::html::chart::dots::{ChartDot, dots};
 use crate::html::chart::histogram::Counts;
@@ -12,29 +12,29 @@ use orator_base::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_SH
 use orator_gesture::evaluate::clips::clips::{EvalClip, EvalClips};
 use orator_gesture::evaluate::table::table::Table;
 
-/// Charts of the share of correct frames of every joint, on a body and two hands.
+/// Drawing of a body and two hands with the share of correct frames of each joint.
 pub fn joints(table: &Table, clips: &EvalClips) -> Vec<Node> {
     let alpha = table.settings.alphas.first().copied().unwrap_or(0.2);
     let shares = shares(clips, alpha);
     let body = |joint: usize| joint <= L_WRIST;
-    let place = |joint: usize| if body(joint) { body_place(joint) } else { hand_place(joint) };
+    let position = |joint: usize| if body(joint) { body_position(joint) } else { hand_position(joint) };
     let mut edges = Vec::new();
     let mut all = Vec::new();
     for joint in (0..N_JOINTS).filter(|joint| !is_duplicate(*joint)) {
-        // A finger's first bone begins at the wrist of the large hand.
+        // The first bone of a finger starts at the wrist of the large hand drawing.
         let parent = skeleton::parent(joint);
-        edges.extend(parent.map(|parent| [place(parent), place(joint)]));
+        edges.extend(parent.map(|parent| [position(parent), position(joint)]));
         if joint == NECK {
             continue;
         }
         let share = if shares[joint].is_nan() { "never seen" } else { &format!("{:.0} %", 100.0 * shares[joint]) };
         let description = format!("{}: {share}", skeleton::name(joint));
         let radius = if body(joint) { 9.0 } else { 6.0 };
-        all.push(ChartDot { at: place(joint), share: shares[joint], radius, description });
+        all.push(ChartDot { at: position(joint), share: shares[joint], radius, description });
     }
     let mean = |joints: &mut dyn Iterator<Item = usize>| {
-        let known: Vec<f64> = joints.map(|joint| shares[joint]).filter(|share| share.is_finite()).collect();
-        known.iter().sum::<f64>() / known.len() as f64
+        let finite_shares: Vec<f64> = joints.map(|joint| shares[joint]).filter(|share| share.is_finite()).collect();
+        finite_shares.iter().sum::<f64>() / finite_shares.len() as f64
     };
     let label = |at: [f64; 2], what: &str, share: f64| (at, format!("{what} {:.0} %", 100.0 * share));
     let hand = |root: usize| mean(&mut (root + 1..root + skeleton::N_HAND_JOINTS));
@@ -56,9 +56,10 @@ pub fn joints(table: &Table, clips: &EvalClips) -> Vec<Node> {
     vec![node("p").text(about), node("div").class("card scroll wide").child(drawing), scale]
 }
 
-/// Share of correct frames of each joint, NaN where never seen.
+/// Share of frames in which each joint is correct (PCK with the threshold `alpha`); NaN for a joint that is never
+/// visible.
 fn shares(clips: &EvalClips, alpha: f64) -> Vec<f64> {
-    let (mut right, mut seen) = (vec![0.0; N_JOINTS], vec![0.0; N_JOINTS]);
+    let (mut n_correct, mut n_visible) = (vec![0.0; N_JOINTS], vec![0.0; N_JOINTS]);
     for clip in &clips.clips {
         for t in 0..clip.n_frames() {
             let joints: Vec<usize> = (NECK + 1..N_JOINTS).filter(|joint| clip.mask[[t, *joint]]).collect();
@@ -70,25 +71,25 @@ fn shares(clips: &EvalClips, alpha: f64) -> Vec<f64> {
             };
             let radius = alpha * (0..3).map(side).fold(0.0, f64::max);
             for joint in joints {
-                let apart =
+                let squared_difference =
                     |k: usize| f64::from(clip.predicted[[t, joint, k]] - clip.ground_truth[[t, joint, k]]).powi(2);
-                seen[joint] += 1.0;
-                right[joint] += f64::from(u8::from((0..3).map(apart).sum::<f64>().sqrt() <= radius));
+                n_visible[joint] += 1.0;
+                n_correct[joint] += f64::from(u8::from((0..3).map(squared_difference).sum::<f64>().sqrt() <= radius));
             }
         }
     }
-    right.iter().zip(&seen).map(|(right, seen)| right / seen).collect()
+    n_correct.iter().zip(&n_visible).map(|(n_correct, n_visible)| n_correct / n_visible).collect()
 }
 
-/// Position of a body joint in the chart; the speaker's right is on the left.
-fn body_place(joint: usize) -> [f64; 2] {
+/// Position of a body joint in the drawing; the speaker's right is on the left.
+fn body_position(joint: usize) -> [f64; 2] {
     let places =
         [[180.0, 60.0], [120.0, 72.0], [84.0, 150.0], [112.0, 222.0], [240.0, 72.0], [276.0, 150.0], [248.0, 222.0]];
     places[joint.min(L_WRIST)]
 }
 
-/// Position of a hand joint in the chart, fingers up, thumbs inside; the root of a hand stands for its wrist.
-fn hand_place(joint: usize) -> [f64; 2] {
+/// Position of a hand joint in the drawing, with fingers up and thumbs inside; the root of a hand is its wrist.
+fn hand_position(joint: usize) -> [f64; 2] {
     let (root, sign, x) = if joint >= R_HAND { (R_HAND, 1.0, 405.0) } else { (L_HAND, -1.0, 640.0) };
     let wrist = [x, 228.0];
     if joint == root {
@@ -101,7 +102,7 @@ fn hand_place(joint: usize) -> [f64; 2] {
     [wrist[0] + sign * length * angle.sin(), wrist[1] - length * angle.cos()]
 }
 
-/// Distributions of speed and jerk of wrists and finger tips.
+/// Charts of the speed and jerk distributions of wrists and finger tips.
 pub fn speeds(clips: &EvalClips) -> Vec<Node> {
     let wrists = [skeleton::R_WRIST, L_WRIST];
     let tips: Vec<usize> = [L_HAND, R_HAND].iter().flat_map(|root| (1..=5).map(move |k| root + 4 * k)).collect();
@@ -131,10 +132,11 @@ pub fn speeds(clips: &EvalClips) -> Vec<Node> {
     };
     let about = "How often each value occurs (heights go with the square root of the share, so that rare values are seen; the \
                  last bin holds what is beyond). Dashed: the medians.";
-    vec![node("p").text(about), colours(), node("div").class("grid").children(charts.into_iter().map(card))]
+    vec![node("p").text(about), colour_legend(), node("div").class("grid").children(charts.into_iter().map(card))]
 }
 
-/// Norms of a joint's differences of this order, per second to that power, where it is seen throughout.
+/// Norm of the finite difference of a joint's position of this order (1 or 3), m/s^order, at every frame where the
+/// joint is visible in all frames of the difference.
 fn derivative<'a>(
     clip: &'a EvalClip,
     joints: ArrayView3<'a, f32>,
@@ -143,8 +145,8 @@ fn derivative<'a>(
     fps: f64,
 ) -> impl Iterator<Item = f64> + 'a {
     let signs: &[f64] = if order == 1 { &[-1.0, 1.0] } else { &[-1.0, 3.0, -3.0, 1.0] };
-    let seen = move |t: &usize| (0..signs.len()).all(|k| clip.mask[[t + k, joint]]);
-    (0..clip.n_frames().saturating_sub(signs.len() - 1)).filter(seen).map(move |t| {
+    let is_visible = move |t: &usize| (0..signs.len()).all(|k| clip.mask[[t + k, joint]]);
+    (0..clip.n_frames().saturating_sub(signs.len() - 1)).filter(is_visible).map(move |t| {
         let difference = |axis: usize| -> f64 {
             signs.iter().enumerate().map(|(k, sign)| sign * f64::from(joints[[t + k, joint, axis]])).sum()
         };
@@ -152,7 +154,7 @@ fn derivative<'a>(
     })
 }
 
-/// Legend of the colours.
-pub fn colours() -> Node {
+/// Legend of ground truth and prediction colours.
+pub fn colour_legend() -> Node {
     legend([("line real", "truth"), ("line made", "prediction")])
 }

@@ -1,4 +1,4 @@
-//! Page of an evaluation: table, charts, and the player of ground truth beside prediction.
+//! Page of an evaluation: table, charts, and a player that shows ground truth and prediction side by side.
 
 pub mod charts;
 pub mod page;

@@ -1,5 +1,5 @@
 //! Page of an evaluation: conclusions, the table with its baselines, charts, and a player with sound. The bytes depend
-//! on the table and the clips alone.
+//! only on the table and the clips.
 
 use super::charts::{joints, speeds};
 use super::player;
@@ -15,7 +15,7 @@ use orator_gesture::evaluate::verdict::text;
 use orator_gesture::evaluate::verdict::verdict::{Answer, Verdict, better_than_nothing, hears};
 use serde_json::json;
 
-/// Whole page.
+/// HTML of the page.
 pub fn html(table: &Table, clips: &EvalClips, title: &str) -> Result<String> {
     let excerpts = player::choose(clips)?;
     let section = |id, title, body| Section { id, title, body };
@@ -24,10 +24,10 @@ pub fn html(table: &Table, clips: &EvalClips, title: &str) -> Result<String> {
         lead: lead(table),
         sections: vec![
             section("meaning", "What it means", meaning(table)),
-            section("watch", "Truth and prediction", of_first(table, player::body(&excerpts, table))),
+            section("watch", "Truth and prediction", with_checkpoint_note(table, player::body(&excerpts, table))),
             section("figures", "All figures", table::body(table)),
-            section("joints", "Which joints are right", of_first(table, joints(table, clips))),
-            section("speeds", "How fast it moves", of_first(table, speeds(clips))),
+            section("joints", "Which joints are right", with_checkpoint_note(table, joints(table, clips))),
+            section("speeds", "How fast it moves", with_checkpoint_note(table, speeds(clips))),
             section("definitions", "Exact definitions", table::definitions(table)),
         ],
         style: include_str!("page.css"),
@@ -51,14 +51,14 @@ fn lead(table: &Table) -> String {
     )
 }
 
-/// What a section shows of the first of several checkpoints, which is said above it.
-fn of_first(table: &Table, body: Vec<Node>) -> Vec<Node> {
+/// Adds a note above a section that shows only the first of the checkpoints; unchanged without checkpoints.
+fn with_checkpoint_note(table: &Table, body: Vec<Node>) -> Vec<Node> {
     let first = table.predictions().find_map(|own| own.checkpoint.as_ref());
-    let said = first.map(|of| node("p").text(format!("The prediction here is that of {}, given first.", of.name)));
-    said.into_iter().chain(body).collect()
+    let note = first.map(|of| node("p").text(format!("The prediction here is that of {}, given first.", of.name)));
+    note.into_iter().chain(body).collect()
 }
 
-/// Conclusions with the votes behind them, and assumptions.
+/// Conclusions with the votes that support them, the compared predictors, and notes.
 fn meaning(table: &Table) -> Vec<Node> {
     let card = |(own, verdict): (&PredictorRow, Verdict)| {
         let class = format!("card verdict {}", verdict.word.replace(' ', "-"));

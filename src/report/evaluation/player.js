@@ -1,4 +1,4 @@
-// The player: truth and prediction side by side, in step with the sound where there is one.
+// Player: ground truth and prediction side by side, synchronised with the sound if there is one.
 (() => {
   const at = (id) => document.getElementById(id);
   if (!at("player")) return;
@@ -16,7 +16,7 @@
   };
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
-  // One scale for both figures of an excerpt, so that they can be compared.
+  // Both figures of an excerpt share one scale, so that they can be compared.
   const extent = () => {
     let [left, right, top, bottom] = [-300, 300, -250, 350];
     for (const side of sides) {
@@ -53,7 +53,7 @@
         const x = numbers[i] * Math.cos(turn) - numbers[i + 2] * Math.sin(turn);
         return [canvas.width / 2 + scale * x, above + scale * (numbers[i + 1] - box.top)];
       };
-      // a head, so that it is seen who this is
+      // A head makes the figure recognisable as a person.
       const neck = place(0);
       pen.lineCap = pen.lineJoin = "round";
       if (neck) {
@@ -84,9 +84,9 @@
   const tick = () => {
     if (!playing) return;
     const clock = performance.now() / 1000;
-    const heard = sound && !sound.paused && sound.readyState > 1;
-    secs = heard ? sound.currentTime : clock - started;
-    if (heard) started = clock - secs;
+    const isAudible = sound && !sound.paused && sound.readyState > 1;
+    secs = isAudible ? sound.currentTime : clock - started;
+    if (isAudible) started = clock - secs;
     if (secs >= excerpts[which].secs) {
       secs = excerpts[which].secs;
       pause();

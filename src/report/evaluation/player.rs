@@ -1,8 +1,8 @@
-//! Excerpts of an evaluation: the best, the typical and the worst by joint error, ground truth and prediction side by
-//! side with the sound, and charts of wrists and beats over time. At most a minute in all and motion in whole
-//! millimetres, which bounds the page's size.
+//! Excerpts of an evaluation for the player: the best, a typical and the worst by joint error, with ground truth and
+//! prediction side by side, sound, and charts of wrists and beats over time. The excerpts last at most a minute in
+//! total, and motion is in whole millimetres, which bounds the size of the page.
 
-use super::charts::colours;
+use super::charts::colour_legend;
 use crate::html::chart::tracks::{Lane, lanes};
 use crate::html::numbers::clock;
 use crate::html::{Node, node};
@@ -20,43 +20,44 @@ use orator_gesture::metrics::beat::consistency;
 use serde_json::{Value, json};
 use std::ops::Range;
 
-/// Longest excerpt, seconds, and its highest frame rate.
-const MOST_SECS: f64 = 20.0;
-const MOST_FPS: f64 = 30.0;
-/// Value of a missing joint.
+/// Maximum duration of an excerpt, seconds.
+const MAX_SECS: f64 = 20.0;
+/// Maximum frame rate of an excerpt.
+const MAX_FPS: f64 = 30.0;
+/// Coordinate value of a missing joint.
 pub const MISSING: i16 = i16::MIN;
-/// Half window of a motion beat, as in beat consistency: a local minimum of speed over 7 frames at 30 fps on either
-/// side.
+/// Half window of a motion beat, seconds, as in beat consistency: a local minimum of speed over 7 frames at 30 fps on
+/// either side.
 const BEAT_SECS: f64 = 7.0 / 30.0;
 
-/// Part of a clip in the player.
+/// Part of a clip that the player shows.
 pub struct Excerpt {
     pub name: String,
     pub secs: f64,
     fps: f64,
-    /// Joints [T, 49, 3] in millimetres, i16, little endian.
+    /// Joints [T, 49, 3] in millimetres, i16 little endian.
     ground_truth: Vec<u8>,
     predicted: Vec<u8>,
-    /// Sound as a wav file.
+    /// Sound as the bytes of a wav file.
     sound: Option<Vec<u8>>,
     lanes: Vec<Lane>,
 }
 
-/// Excerpts with the smallest, median and largest error among all parts of at most `MOST_SECS`.
+/// Excerpts with the smallest, median and largest joint error among all parts of clips of at most `MAX_SECS`.
 pub fn choose(clips: &EvalClips) -> Result<Vec<Excerpt>> {
-    let mut stretches: Vec<(f64, usize, Range<usize>)> = Vec::new();
+    let mut candidates: Vec<(f64, usize, Range<usize>)> = Vec::new();
     for (i, clip) in clips.clips.iter().enumerate() {
-        let n = (clips.fps.secs(clip.n_frames()) / MOST_SECS).ceil().max(1.0) as usize;
+        let n = (clips.fps.secs(clip.n_frames()) / MAX_SECS).ceil().max(1.0) as usize;
         for k in 0..n {
             let frames = k * clip.n_frames() / n..(k + 1) * clip.n_frames() / n;
             let error = error_mm(clip, frames.clone());
             if error.is_finite() && frames.len() > 1 {
-                stretches.push((error, i, frames));
+                candidates.push((error, i, frames));
             }
         }
     }
-    stretches.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2.start).cmp(&(b.1, b.2.start))));
-    let n = stretches.len();
+    candidates.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2.start).cmp(&(b.1, b.2.start))));
+    let n = candidates.len();
     let chosen: &[(&str, usize)] = match n {
         0 => &[],
         1 => &[("all of it", 0)],
@@ -64,19 +65,20 @@ pub fn choose(clips: &EvalClips) -> Result<Vec<Excerpt>> {
         n => &[("best", 0), ("typical", n / 2), ("worst", n - 1)],
     };
     let chosen = chosen.iter().map(|(word, at)| {
-        let (error, clip, frames) = &stretches[*at];
+        let (error, clip, frames) = &candidates[*at];
         excerpt(word, *error, &clips.clips[*clip], frames.clone(), clips.fps.per_sec())
     });
     chosen.collect()
 }
 
-/// Mean error of the joints, mm; NaN where nothing is seen.
+/// Mean joint error, mm; NaN if no joint is visible.
 fn error_mm(clip: &EvalClip, frames: Range<usize>) -> f64 {
     let (mut sum, mut n) = (0.0, 0.0);
     for t in frames {
         for joint in (1..N_JOINTS).filter(|joint| clip.mask[[t, *joint]]) {
-            let apart = |k: usize| f64::from(clip.predicted[[t, joint, k]] - clip.ground_truth[[t, joint, k]]).powi(2);
-            sum += 1000.0 * (0..3).map(apart).sum::<f64>().sqrt();
+            let squared_difference =
+                |k: usize| f64::from(clip.predicted[[t, joint, k]] - clip.ground_truth[[t, joint, k]]).powi(2);
+            sum += 1000.0 * (0..3).map(squared_difference).sum::<f64>().sqrt();
             n += 1.0;
         }
     }
@@ -85,7 +87,7 @@ fn error_mm(clip: &EvalClip, frames: Range<usize>) -> f64 {
 
 fn excerpt(word: &str, error: f64, clip: &EvalClip, frames: Range<usize>, fps: f64) -> Result<Excerpt> {
     let (start, end) = (frames.start as f64 / fps, frames.end as f64 / fps);
-    let step = (fps / MOST_FPS).ceil().max(1.0) as usize;
+    let step = (fps / MAX_FPS).ceil().max(1.0) as usize;
     let samples = clip.audio.as_ref().map(|audio| audio.samples(start, end)).transpose()?;
     let shown: Vec<usize> = frames.clone().step_by(step).collect();
     Ok(Excerpt {
@@ -94,12 +96,12 @@ fn excerpt(word: &str, error: f64, clip: &EvalClip, frames: Range<usize>, fps: f
         fps: fps / step as f64,
         ground_truth: millimetres(clip.ground_truth.view(), &shown),
         predicted: millimetres(clip.predicted.view(), &shown),
-        lanes: lanes_of(clip, frames, fps, samples.as_deref()),
+        lanes: tracks_of(clip, frames, fps, samples.as_deref()),
         sound: samples.map(|samples| to_wav(&samples)).transpose()?,
     })
 }
 
-/// A coordinate in whole millimetres.
+/// Coordinate in whole millimetres; `MISSING` if it is not finite.
 pub fn to_millimetres(metres: f32) -> i16 {
     if metres.is_finite() { (1000.0 * metres).round().clamp(-32_000.0, 32_000.0) as i16 } else { MISSING }
 }
@@ -113,8 +115,8 @@ fn to_wav(samples: &[i16]) -> Result<Vec<u8>> {
     wav::to_bytes(&Sound { rate: SAMPLE_RATE, samples: samples.iter().map(|s| f32::from(*s) / 32_768.0).collect() })
 }
 
-/// Charts of wrist height and speed over time, loudness with onsets, and motion beats.
-fn lanes_of(clip: &EvalClip, frames: Range<usize>, fps: f64, samples: Option<&[i16]>) -> Vec<Lane> {
+/// Tracks of wrist height and speed, loudness, and motion beats with onsets over time.
+fn tracks_of(clip: &EvalClip, frames: Range<usize>, fps: f64, samples: Option<&[i16]>) -> Vec<Lane> {
     let secs = |t: usize| (t - frames.start) as f64 / fps;
     let both: [(&str, ArrayView3<f32>); 2] = [("real", clip.ground_truth.view()), ("made", clip.predicted.view())];
     let height = |name: &str, joint: usize| Lane {
@@ -130,13 +132,13 @@ fn lanes_of(clip: &EvalClip, frames: Range<usize>, fps: f64, samples: Option<&[i
     let mut all = vec![height("right wrist, up and down", R_WRIST), height("left wrist, up and down", L_WRIST)];
     if let Some(samples) = samples {
         let per_point = (SAMPLE_RATE / 25) as usize;
-        let loud = samples.chunks(per_point).enumerate().map(|(i, piece)| {
+        let loudness = samples.chunks(per_point).enumerate().map(|(i, piece)| {
             let power = piece.iter().map(|s| (f64::from(*s) / 32_768.0).powi(2)).sum::<f64>() / piece.len() as f64;
             [i as f64 / 25.0, power.sqrt()]
         });
         all.push(Lane {
             name: "loudness of the sound".to_owned(),
-            lines: vec![("sound", loud.collect())],
+            lines: vec![("sound", loudness.collect())],
             marks: Vec::new(),
         });
     }
@@ -170,14 +172,14 @@ fn wrist_speed(clip: &EvalClip, joints: ArrayView3<f32>, frames: &Range<usize>, 
         if !(clip.mask[[before, joint]] && clip.mask[[after, joint]]) {
             return f64::NAN;
         }
-        let apart = |k: usize| f64::from(joints[[after, joint, k]] - joints[[before, joint, k]]).powi(2);
-        (0..3).map(apart).sum::<f64>().sqrt() * fps / (after - before).max(1) as f64
+        let squared_difference = |k: usize| f64::from(joints[[after, joint, k]] - joints[[before, joint, k]]).powi(2);
+        (0..3).map(squared_difference).sum::<f64>().sqrt() * fps / (after - before).max(1) as f64
     };
     (of(R_WRIST) + of(L_WRIST)) / 2.0
 }
 
 impl Excerpt {
-    /// Data of the page's script.
+    /// Data for the page's script.
     pub fn data(&self) -> Value {
         json!({
             "secs": self.secs,
@@ -189,7 +191,7 @@ impl Excerpt {
     }
 }
 
-/// Child, parent and side (0 middle, 1 left, 2 right) of every bone.
+/// Child joint, parent joint and side (0 centre, 1 left, 2 right) of every bone.
 pub fn bones() -> Vec<[usize; 3]> {
     let bone = |joint: usize| {
         let side = match skeleton::side(joint) {
@@ -202,7 +204,7 @@ pub fn bones() -> Vec<[usize; 3]> {
     (0..N_JOINTS).filter(|joint| !is_duplicate(*joint)).filter_map(bone).collect()
 }
 
-/// Player and the charts under it.
+/// Player, with the charts below it.
 pub fn body(excerpts: &[Excerpt], table: &Table) -> Vec<Node> {
     if excerpts.is_empty() {
         return vec![node("p").class("empty").text("There is no interval with motion on both sides to show.")];
@@ -246,5 +248,5 @@ pub fn body(excerpts: &[Excerpt], table: &Table) -> Vec<Node> {
          you{}. The lines under them are of the same excerpt.",
         if table.with_sound { "" } else { "; no sound was given" }
     );
-    [node("p").text(about), player, colours()].into_iter().chain(charts).collect()
+    [node("p").text(about), player, colour_legend()].into_iter().chain(charts).collect()
 }

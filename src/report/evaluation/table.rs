@@ -8,7 +8,7 @@ use orator_gesture::evaluate::verdict::labels;
 use orator_gesture::evaluate::verdict::verdict::{Answer, against_nothing};
 use orator_gesture::metrics::catalogue::Definition;
 
-/// Groups of metrics by the prefixes of their names; the last takes the rest.
+/// Groups of metrics by prefixes of their names; the last group contains the rest.
 const GROUPS: [(&str, &[&str]); 4] = [
     ("Where the joints are", &["pck", "l1", "mpjpe", "p_mpjpe", "maje", "acceleration_error"]),
     ("Which poses and movements", &["frechet", "l1div", "average_pairwise", "cca"]),
@@ -16,7 +16,7 @@ const GROUPS: [(&str, &[&str]); 4] = [
     ("Sound and the rest", &[""]),
 ];
 
-/// Table by group.
+/// Table of all metrics, grouped.
 pub fn body(table: &Table) -> Vec<Node> {
     let head = |text: &str| node("th").attr("scope", "col").class("num").text(text);
     let heads = table.rows.iter().map(|row| head(&row.name()));
@@ -47,15 +47,15 @@ pub fn body(table: &Table) -> Vec<Node> {
 }
 
 fn group_of(definition: &Definition) -> usize {
-    // The longest prefix counts: acceleration_error is a position error, acceleration is not.
+    // The longest matching prefix decides: acceleration_error is a position error, acceleration is not.
     let starts =
         GROUPS.iter().enumerate().flat_map(|(group, (_, starts))| starts.iter().map(move |start| (group, *start)));
     let fitting = starts.filter(|(_, start)| definition.name.starts_with(start));
     fitting.max_by_key(|(_, start)| start.len()).map_or(GROUPS.len() - 1, |(group, _)| group)
 }
 
-/// Row of a metric; `None` without any value. A metric that differs from the `last` in its body part alone shows only
-/// the part.
+/// Row of a metric; `None` if it is not shown. A metric that differs from the previous one (`last`) only in its body
+/// part shows only the part.
 fn row(table: &Table, index: usize, last: &mut String) -> Option<Node> {
     let definition = &table.definitions[index];
     if !table.is_shown(index) {
@@ -101,7 +101,7 @@ fn row(table: &Table, index: usize, last: &mut String) -> Option<Node> {
     Some(node("tr").child(name).children(against).children(cells))
 }
 
-/// Every definition with its parameters and hash, those of the ground truth alone included.
+/// All definitions with their parameters and hashes, including those of metrics of the ground truth alone.
 pub fn definitions(table: &Table) -> Vec<Node> {
     let item = |definition: &Definition| {
         let name = node("summary").text(labels::name(definition));

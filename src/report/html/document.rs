@@ -1,5 +1,5 @@
-//! Whole file: head, navigation, sections, and the style and script that all pages share. A page refers to no other
-//! file, and its content security policy forbids loading any.
+//! HTML document: head, navigation, sections, and the style and script shared by all pages. A page does not refer to
+//! other files, and its content security policy forbids loading any.
 
 use super::node::{Node, node};
 use base64::Engine as _;
@@ -17,16 +17,17 @@ pub struct Page {
     /// Sentence under the title.
     pub lead: String,
     pub sections: Vec<Section>,
-    /// Style and script of this page, after the shared ones.
+    /// Style of this page, after the shared one.
     pub style: &'static str,
+    /// Script of this page, after the shared one.
     pub script: &'static str,
-    /// Data of its script (element `data`).
+    /// Data for the script (element `data`).
     pub data: Value,
 }
 
 /// Section of a page.
 pub struct Section {
-    /// Anchor; letters and dashes.
+    /// Anchor: letters and dashes only.
     pub id: &'static str,
     pub title: &'static str,
     pub body: Vec<Node>,
@@ -41,7 +42,7 @@ impl Page {
             let title = node("h2").text(section.title);
             node("section").id(section.id).child(title).children(section.body.iter().cloned())
         });
-        // Within JSON `<` stands only in strings, where the escape is equivalent.
+        // In JSON, `<` occurs only inside strings, where the escape is equivalent; it cannot close the script element.
         let data = self.data.to_string().replace('<', "\\u003c");
         let head = node("head")
             .child(node("meta").attr("charset", "utf-8"))
@@ -65,7 +66,7 @@ impl Page {
     }
 }
 
-/// JPEG of `width` x `height` px, loaded when it comes into view, with `description` as its alternative text.
+/// Embedded JPEG image of `width` x `height` px, loaded lazily, with `description` as its alternative text.
 pub fn jpeg(bytes: &[u8], [width, height]: [usize; 2], description: &str) -> Node {
     node("img")
         .attr("src", format!("data:image/jpeg;base64,{}", STANDARD.encode(bytes)))
@@ -80,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_page_closes_what_it_opens_and_its_data_closes_nothing() {
+    fn elements_are_balanced_and_data_cannot_close_the_script() {
         let section = Section { id: "a", title: "A & b", body: vec![node("p").text("x < y")] };
         let data = serde_json::json!({ "name": "</script><b>" });
         let title = "\"<i>\"".to_owned();

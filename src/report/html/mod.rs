@@ -1,6 +1,6 @@
-//! HTML pages for people, the only folder that writes markup. `node` builds elements and escapes text, `document` makes
-//! a self-contained file and embeds JPEG, `numbers` formats numbers, `chart` draws SVG charts. Contents are decided by
-//! the pages (`videos`, `training`, `evaluation`).
+//! Generation of HTML; no other module writes markup. `node` builds elements and escapes text, `document` creates a
+//! self-contained page and embeds JPEG images, `numbers` formats numbers, `chart` draws SVG charts. The modules
+//! `videos`, `training` and `evaluation` decide what the pages contain.
 
 pub mod chart;
 pub mod document;

@@ -1,5 +1,5 @@
-//! HTML elements. Text and attribute values are escaped here and nowhere else; markup comes from `Node` alone, so no
-//! text of a user can become markup.
+//! HTML elements. Text and attribute values are escaped only here, and only `Node` writes markup, so no user text can
+//! become markup.
 
 use std::fmt::{self, Display, Write as _};
 
@@ -16,7 +16,7 @@ pub fn node(name: &'static str) -> Node {
     Node { name, attributes: String::new(), inner: String::new() }
 }
 
-/// Legend of colours: the CSS classes of each swatch and its meaning.
+/// Legend of colours: the CSS class of each swatch and its meaning.
 pub fn legend<C: Display, M: Display>(keys: impl IntoIterator<Item = (C, M)>) -> Node {
     let key = |(class, meaning): (C, M)| {
         let swatch = node("span").class(format!("swatch {class}"));
@@ -25,7 +25,7 @@ pub fn legend<C: Display, M: Display>(keys: impl IntoIterator<Item = (C, M)>) ->
     node("ul").class("legend").children(keys.into_iter().map(key))
 }
 
-/// Table of the class `name` with the cells of its head and its rows.
+/// Table of the CSS class `name` with the given header cells and rows.
 pub fn table(name: &str, head: impl IntoIterator<Item = Node>, rows: impl IntoIterator<Item = Node>) -> Node {
     let head = node("thead").child(node("tr").children(head));
     node("table").class(name).child(head).child(node("tbody").children(rows))
@@ -49,7 +49,7 @@ pub fn escape(text: &str) -> String {
 }
 
 impl Node {
-    /// Adds an attribute; the name is a constant, the value any text.
+    /// Adds an attribute; `name` must be a constant, `value` may be any text.
     pub fn attr(mut self, name: &str, value: impl Display) -> Self {
         let _ = write!(self.attributes, " {name}=\"{}\"", escape(&value.to_string()));
         self
@@ -84,7 +84,7 @@ impl Node {
         children.into_iter().fold(self, Node::child)
     }
 
-    /// Sets the content of a style or script, which has no escapes; `text` is a constant without the closing tag.
+    /// Appends unescaped content of a style or script element; `text` must not contain the closing tag.
     pub(crate) fn verbatim(mut self, text: &str) -> Self {
         self.inner.push_str(text);
         self
@@ -107,7 +107,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_word_becomes_markup() {
+    fn user_text_does_not_become_markup() {
         let evil = "</p><script>alert(\"x\")</script> & 'y'";
         let shown = node("p").attr("title", evil).text(evil).child(node("br")).to_string();
         assert_eq!(shown.matches('<').count(), 3, "{shown}");

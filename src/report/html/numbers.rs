@@ -1,8 +1,8 @@
-//! Numbers formatted for people.
+//! Formatting of numbers and durations for readers.
 
 /// Duration: `41.2 s`, `12.4 min`, `3.27 h`, like `length` in `page.js`.
 pub fn length(secs: f64) -> String {
-    // An empty sum is -0.
+    // Adding 0 turns -0, the sum of no values, into 0.
     let secs = secs + 0.0;
     match secs.abs() {
         n if n < 120.0 => format!("{secs:.1} s"),
@@ -19,7 +19,7 @@ pub fn clock(secs: f64) -> String {
     if hours > 0 { format!("{hours}:{minutes:02}:{seconds}") } else { format!("{minutes}:{seconds}") }
 }
 
-/// Number with at least three significant digits and no trailing zeros.
+/// Number with about three significant digits, at most three decimals and no trailing zeros; `unknown` if not finite.
 pub fn number(value: f64) -> String {
     if !value.is_finite() {
         return "unknown".to_owned();
@@ -40,7 +40,7 @@ pub fn with_unit(value: f64, unit: &str) -> String {
     format!("{} {unit}", number(value)).trim_end().to_owned()
 }
 
-/// Share of a whole in percent; a dash for an empty whole.
+/// Share of `part` in `whole` in percent; a dash if `whole` is not positive.
 pub fn percent(part: f64, whole: f64) -> String {
     if whole > 0.0 { format!("{:.1} %", 100.0 * part / whole + 0.0) } else { "\u{2013}".to_owned() }
 }

@@ -1,9 +1,9 @@
 "use strict";
-// Timelines: what a stretch says shows under the pointer, on touch, and while walking it with the arrow keys.
+// Timelines: the description of an interval is shown under the pointer, on touch, and while moving with the arrow keys.
 (() => {
   const tip = document.getElementById("tip");
   for (const part of document.querySelectorAll(".timeline > li")) {
-    part.dataset.says = part.title;
+    part.dataset.description = part.title;
     part.removeAttribute("title");
   }
   let shown = null;
@@ -14,7 +14,7 @@
   };
   const show = (part, x) => {
     if (shown && shown !== part) shown.classList.remove("at");
-    if (shown !== part) tip.textContent = part.dataset.says;
+    if (shown !== part) tip.textContent = part.dataset.description;
     shown = part;
     part.classList.add("at");
     tip.hidden = false;

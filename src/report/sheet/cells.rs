@@ -1,5 +1,5 @@
-//! Cells of a contact sheet: the video frame under its keypoints, and the 3D pose on a decimetre grid from the front or
-//! from the left, at constant scale.
+//! Cells of a contact sheet: the video frame overlaid with its keypoints, and the 3D pose at constant scale on a
+//! decimetre grid, from the front or from the left.
 
 use anyhow::{Context, Result};
 use ndarray::ArrayView2;
@@ -11,47 +11,49 @@ use orator_base::types::pose2d::Keypoints;
 use orator_media::ffmpeg::frames::FrameReader;
 use orator_media::opencv::{draw, warp};
 
-/// Side of a cell, px.
+/// Width and height of a cell, px.
 pub const CELL_PX: usize = 340;
-/// Scale of the 3D cells, and the position of the neck in them.
+/// Scale of the 3D cells.
 const PX_PER_METRE: f32 = 270.0;
+/// Position of the neck in the 3D cells, px.
 const NECK_PX: [f32; 2] = [CELL_PX as f32 / 2.0, 125.0];
-/// Size of the crop relative to the extent of the keypoints.
+/// Side of the crop relative to the extent of the keypoints.
 const MARGIN: f32 = 1.15;
-/// Largest magnification of a frame.
-const MAX_ENLARGED: f32 = 4.0;
+/// Maximum magnification of a frame.
+const MAX_MAGNIFICATION: f32 = 4.0;
 
-/// Square crop of the video that all cells of a clip show.
+/// Square crop of the video that all frame cells of a clip show.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SheetCrop {
-    /// Size of the whole frame after scaling, px.
+    /// Size of the complete frame after scaling, px.
     scaled: [usize; 2],
-    place: ImageTransform,
+    transform: ImageTransform,
 }
 
 impl SheetCrop {
-    /// Square around all keypoints found in the clip, in a frame of `image_size` px; the whole frame without keypoints.
+    /// Square around all keypoints detected in the clip, in a frame of `image_size` px; the complete frame if there are
+    /// none.
     pub fn around(keypoints: &Keypoints, image_size: [usize; 2]) -> Self {
-        let whole = image_size.map(|px| px as f32);
-        let found = overlay::extent(keypoints).unwrap_or([0.0, 0.0, whole[0], whole[1]]);
+        let frame_size = image_size.map(|px| px as f32);
+        let found = overlay::extent(keypoints).unwrap_or([0.0, 0.0, frame_size[0], frame_size[1]]);
         let [left, top, right, bottom] = found;
-        let side = (MARGIN * (right - left).max(bottom - top)).clamp(16.0, whole[0].max(whole[1]) * MARGIN);
-        let scale = (CELL_PX as f32 / side).min(MAX_ENLARGED);
-        let scaled = whole.map(|px| ((px * scale).round() as usize).clamp(1, 8 * CELL_PX));
-        let scale = [0, 1].map(|axis| scaled[axis] as f32 / whole[axis]);
+        let side = (MARGIN * (right - left).max(bottom - top)).clamp(16.0, frame_size[0].max(frame_size[1]) * MARGIN);
+        let scale = (CELL_PX as f32 / side).min(MAX_MAGNIFICATION);
+        let scaled = frame_size.map(|px| ((px * scale).round() as usize).clamp(1, 8 * CELL_PX));
+        let scale = [0, 1].map(|axis| scaled[axis] as f32 / frame_size[axis]);
         let middle = [(left + right) / 2.0, (top + bottom) / 2.0];
-        let shift = [0, 1].map(|axis| CELL_PX as f32 / 2.0 - scale[axis] * middle[axis].clamp(0.0, whole[axis]));
-        Self { scaled, place: ImageTransform { scale, shift: shift.map(f32::round) } }
+        let shift = [0, 1].map(|axis| CELL_PX as f32 / 2.0 - scale[axis] * middle[axis].clamp(0.0, frame_size[axis]));
+        Self { scaled, transform: ImageTransform { scale, shift: shift.map(f32::round) } }
     }
 
-    /// Current frame of the reader, cropped, under its keypoints.
+    /// Current frame of the reader, cropped and overlaid with its keypoints.
     pub fn cell(&self, reader: &mut FrameReader, keypoints: &Keypoints, frame_idx: usize) -> Result<Image> {
         let picture = reader.picture(Some(self.scaled))?;
         let mut cell = Image::filled(CELL_PX, CELL_PX, PAPER);
-        let shift = self.place.shift.map(f64::from);
+        let shift = self.transform.shift.map(f64::from);
         let src_from_dst = warp::SrcFromDst([[1.0, 0.0, -shift[0]], [0.0, 1.0, -shift[1]]]);
         warp::warp(&picture, &src_from_dst, &mut cell).context("cutting out a part of a frame")?;
-        overlay::draw_keypoints(&mut cell, keypoints, frame_idx, self.place, 3.0)?;
+        overlay::draw_keypoints(&mut cell, keypoints, frame_idx, self.transform, 3.0)?;
         Ok(cell)
     }
 }
@@ -60,11 +62,11 @@ impl SheetCrop {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CellView {
     Front,
-    /// The speaker's left: forward is to the left of the cell.
+    /// From the speaker's left: forward is to the left of the cell.
     Left,
 }
 
-/// Pose [49, 3] on its grid, without perspective.
+/// Pose [49, 3] on the grid, in orthographic projection.
 pub fn pose_cell(joints: ArrayView2<f32>, from: CellView) -> Result<Image> {
     let mut cell = Image::filled(CELL_PX, CELL_PX, PAPER);
     let view = FigureView {
@@ -76,15 +78,15 @@ pub fn pose_cell(joints: ArrayView2<f32>, from: CellView) -> Result<Image> {
     draw_grid(&mut cell)?;
     draw_head(&mut cell, from)?;
     draw_pose(&mut cell, joints, &view)?;
-    let words = match from {
+    let label = match from {
         CellView::Front => "front",
         CellView::Left => "side, from the left;  <-- faces this way",
     };
-    draw::text(&mut cell, words, [6.0, 16.0], 9.0, INK)?;
+    draw::text(&mut cell, label, [6.0, 16.0], 9.0, INK)?;
     Ok(cell)
 }
 
-/// Draws a line every 0.1 m, a stronger one every 0.5 m, the strongest through the neck.
+/// Draws grid lines every 0.1 m, stronger ones every 0.5 m and the strongest through the neck.
 fn draw_grid(cell: &mut Image) -> Result<()> {
     let end = CELL_PX as f32;
     for decimetre in -15..=15_i32 {
@@ -97,14 +99,14 @@ fn draw_grid(cell: &mut Image) -> Result<()> {
         draw::line(cell, [at[0], 0.0], [at[0], end], 1.0, rgb)?;
         draw::line(cell, [0.0, at[1]], [end, at[1]], 1.0, rgb)?;
         if decimetre % 5 == 0 && (0.0..end).contains(&at[0]) {
-            let words = format!("{:.1}", f64::from(decimetre) / 10.0);
-            draw::text(cell, &words, [at[0] + 3.0, end - 4.0], 8.0, mix(INK, PAPER, 0.3))?;
+            let label = format!("{:.1}", f64::from(decimetre) / 10.0);
+            draw::text(cell, &label, [at[0] + 3.0, end - 4.0], 8.0, mix(INK, PAPER, 0.3))?;
         }
     }
     Ok(())
 }
 
-/// Draws the outline of a head above the neck, always upright, since no data describes it.
+/// Draws the outline of a head above the neck, always upright since the pose has no head joints.
 fn draw_head(cell: &mut Image, from: CellView) -> Result<()> {
     let rgb = mix(INK, PAPER, 0.6);
     let at = |across: f32, down: f32| [NECK_PX[0] + across * PX_PER_METRE, NECK_PX[1] + down * PX_PER_METRE];
@@ -122,7 +124,7 @@ mod tests {
     use orator_base::types::time::FrameRate;
 
     #[test]
-    fn forward_is_left_in_the_side_view_and_the_left_arm_is_in_its_colour() {
+    fn forward_is_left_in_the_side_view_and_the_left_arm_has_its_colour() {
         let mut joints = Array2::from_elem((N_JOINTS, 3), f32::NAN);
         joints.row_mut(0).fill(0.0);
         for (joint, place) in
@@ -141,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn the_crop_holds_what_was_found() {
+    fn the_crop_contains_all_keypoints() {
         let mut body = Array3::zeros((10, 17, 3));
         for t in 0..10 {
             body.slice_mut(s![t, 5, ..]).assign(&ndarray::arr1(&[800.0, 300.0, 1.0]));
@@ -150,11 +152,11 @@ mod tests {
         let hand = Array3::zeros((10, 21, 3));
         let (fps, image_size) = (FrameRate::new(15, 1), [1280, 720]);
         let keypoints = Keypoints { fps, image_size, body, left_hand: hand.clone(), right_hand: hand };
-        let ImageTransform { scale, shift } = SheetCrop::around(&keypoints, [1280, 720]).place;
+        let ImageTransform { scale, shift } = SheetCrop::around(&keypoints, [1280, 720]).transform;
         let at = |x: f32, y: f32| [scale[0] * x + shift[0], scale[1] * y + shift[1]];
         assert!((at(700.0, 350.0)[0] - 170.0).abs() < 1.0 && (at(700.0, 350.0)[1] - 170.0).abs() < 1.0);
         assert!((20.0..30.0).contains(&at(600.0, 350.0)[0]));
         let nothing = Keypoints { body: Array3::zeros((10, 17, 3)), ..keypoints };
-        assert!(SheetCrop::around(&nothing, [1280, 720]).place.scale[0] < 0.3);
+        assert!(SheetCrop::around(&nothing, [1280, 720]).transform.scale[0] < 0.3);
     }
 }

@@ -1,6 +1,6 @@
-//! Contact sheets of a lifted clip: at regular moments the frame with its keypoints, the 3D pose from the front and
-//! from the left, and on request the animated rig, with a chart of the wrists on each page. The video is streamed; only
-//! one page is in memory.
+//! Contact sheet of a lifted clip: at regular moments the frame with its keypoints, the 3D pose from the front and from
+//! the left, optionally the animated rig, and on each page a chart of the wrists. The video is streamed; only one page
+//! is in memory.
 
 use super::cells::{CELL_PX, CellView, SheetCrop, pose_cell};
 use super::strip::{STRIP_PX, draw_strip};
@@ -19,27 +19,29 @@ use std::path::Path;
 
 /// Rows of moments on a page.
 const ROWS: usize = 5;
-/// Height of a moment: a line of text, its cells, a gap.
-const WORDS_PX: usize = 22;
+const TEXT_PX: usize = 22;
 const GAP_PX: usize = 16;
-const MOMENT_HIGH_PX: usize = WORDS_PX + CELL_PX + 6;
+/// Height of a moment: a line of text, its cells, a gap.
+const MOMENT_HEIGHT_PX: usize = TEXT_PX + CELL_PX + 6;
 const TITLE_PX: usize = 36;
 
 /// Content of a contact sheet.
 pub struct SheetClip<'a> {
     pub title: &'a str,
     pub video: &'a Path,
-    /// How its pictures are read.
+    /// Options for reading the frames.
     pub pictures: PictureOptions,
     pub keypoints: &'a Keypoints,
     pub motion: &'a Motion,
-    /// Motion of the animated rig, frame by frame that of `motion`, if it is shown too.
+    /// Motion of the animated rig in the same frames as `motion`; `None`: it is not shown.
     pub figure: Option<&'a Motion>,
 }
 
 impl SheetClip<'_> {
-    /// Draws a moment every `every_secs` and hands out page after page (page, number of pages, picture). Errors: no
-    /// frames; keypoints, motion and video of unequal lengths or rates; a step shorter than a frame.
+    /// Draws a moment every `every_secs` and passes each page to `page_done` (page index, number of pages, picture).
+    ///
+    /// # Errors
+    /// No frames; keypoints, motion and video of different lengths or rates; `every_secs` shorter than a frame.
     pub fn pages(
         &self,
         every_secs: f64,
@@ -55,13 +57,13 @@ impl SheetClip<'_> {
         for (number, moments) in pages.iter().enumerate() {
             let end = pages.get(number + 1).and_then(|next| next.first()).copied().unwrap_or(self.motion.n_frames());
             let n_rows = moments.len().div_ceil(self.n_columns());
-            let strip_top = TITLE_PX + n_rows * MOMENT_HIGH_PX;
+            let strip_top = TITLE_PX + n_rows * MOMENT_HEIGHT_PX;
             let mut page =
-                Image::filled(self.n_columns() * self.moment_wide_px() - GAP_PX, strip_top + STRIP_PX, PAPER);
+                Image::filled(self.n_columns() * self.moment_width_px() - GAP_PX, strip_top + STRIP_PX, PAPER);
             self.draw_title(&mut page, number, pages.len())?;
             for (n, &moment) in moments.iter().enumerate() {
                 let (column, row) = (n % self.n_columns(), n / self.n_columns());
-                let corner = [column * self.moment_wide_px(), TITLE_PX + row * MOMENT_HIGH_PX];
+                let corner = [column * self.moment_width_px(), TITLE_PX + row * MOMENT_HEIGHT_PX];
                 self.draw_moment(&mut page, corner, moment, &mut reader, &crop)?;
                 task.advance(1);
             }
@@ -77,12 +79,12 @@ impl SheetClip<'_> {
         if self.figure.is_some() { 1 } else { 2 }
     }
 
-    fn moment_wide_px(&self) -> usize {
+    fn moment_width_px(&self) -> usize {
         let n_cells = if self.figure.is_some() { 5 } else { 3 };
         n_cells * CELL_PX + GAP_PX
     }
 
-    /// Frames that are drawn.
+    /// Indices of the frames to draw.
     fn moments(&self, every_secs: f64) -> Result<Vec<usize>> {
         let (n_frames, fps) = (self.motion.n_frames(), self.motion.fps);
         ensure!(n_frames > 0, "the motion has no frames: nothing to draw");
@@ -104,13 +106,14 @@ impl SheetClip<'_> {
         Ok(moments.collect())
     }
 
-    /// Checks that the video is as long as the motion, as far as its headers tell.
+    /// Checks that video and motion differ in length by at most 1 s; skipped if the headers of the video do not state
+    /// it.
     fn check_length(&self, reader: &FrameReader) -> Result<()> {
         let (n_frames, fps) = (self.motion.n_frames(), self.motion.fps);
         let Some(expected) = reader.expected_frames() else { return Ok(()) };
-        let apart = fps.secs(n_frames.abs_diff(expected));
+        let difference_secs = fps.secs(n_frames.abs_diff(expected));
         ensure!(
-            apart <= 1.0,
+            difference_secs <= 1.0,
             "the motion has {n_frames} frames at {fps}, {:.2} s, the video {} lasts {:.2} s: they are not of the same clip, \
              or the keypoints' `fps` is wrong",
             fps.secs(n_frames),
@@ -121,9 +124,9 @@ impl SheetClip<'_> {
     }
 
     fn draw_title(&self, page: &mut Image, number: usize, n_pages: usize) -> Result<()> {
-        let words =
+        let title =
             if n_pages > 1 { format!("{}   {}/{n_pages}", self.title, number + 1) } else { self.title.to_owned() };
-        draw::text(page, &words, [8.0, 25.0], 12.0, INK)?;
+        draw::text(page, &title, [8.0, 25.0], 12.0, INK)?;
         let right = page.width as f32;
         draw::text(page, "speaker's right", [right - 330.0, 25.0], 11.0, RIGHT)?;
         draw::text(page, "speaker's left", [right - 160.0, 25.0], 11.0, LEFT)
@@ -161,41 +164,41 @@ impl SheetClip<'_> {
             }
         }
         for (column, cell) in cells.iter().enumerate() {
-            draw::paste(page, cell, [left + column * CELL_PX, top + WORDS_PX]);
+            draw::paste(page, cell, [left + column * CELL_PX, top + TEXT_PX]);
         }
-        draw::text(page, &self.words(frame_idx), [left as f32 + 6.0, (top + WORDS_PX - 6) as f32], 10.0, INK)
+        draw::text(page, &self.caption(frame_idx), [left as f32 + 6.0, (top + TEXT_PX - 6) as f32], 10.0, INK)
     }
 
-    /// Text over a moment: `3.0 s   wrists shake L 2.1 R 0.9 mm   refused: left hand`:
-    /// keypoints were found there, the joints are left out. A wrist that has no joints has no shake.
-    fn words(&self, frame_idx: usize) -> String {
+    /// Text above a moment, as in `3.0 s   wrists shake L 2.1 R 0.9 mm   refused: left hand`. A part is refused if its
+    /// keypoints were detected but its joints are masked. No jitter is printed for a wrist without joints.
+    fn caption(&self, frame_idx: usize) -> String {
         let mask = self.motion.mask.row(frame_idx);
-        let half_seen = |root: usize| (1..N_HAND_JOINTS).filter(|j| mask[root + j]).count() * 2 >= N_HAND_JOINTS;
+        let is_half_visible = |root: usize| (1..N_HAND_JOINTS).filter(|j| mask[root + j]).count() * 2 >= N_HAND_JOINTS;
         let Keypoints { body, left_hand, right_hand, .. } = self.keypoints;
         let found = |points: &Array3<f32>, point: usize| points[[frame_idx, point, 2]] > 0.0;
         let parts = [
             ("right wrist", mask[R_WRIST], found(body, coco::R_WRIST)),
             ("left wrist", mask[L_WRIST], found(body, coco::L_WRIST)),
-            ("right hand", half_seen(R_HAND), found(right_hand, 0)),
-            ("left hand", half_seen(L_HAND), found(left_hand, 0)),
+            ("right hand", is_half_visible(R_HAND), found(right_hand, 0)),
+            ("left hand", is_half_visible(L_HAND), found(left_hand, 0)),
         ];
         let without = |is_found: bool| {
             let names = parts.iter().filter(|part| !part.1 && part.2 == is_found).map(|part| part.0);
             names.collect::<Vec<_>>().join(", ")
         };
-        let mut words = vec![format!("{:.1} s", self.motion.fps.secs(frame_idx))];
-        let shakes =
+        let mut texts = vec![format!("{:.1} s", self.motion.fps.secs(frame_idx))];
+        let jitters =
             [("L", L_WRIST), ("R", R_WRIST)].map(|(side, at)| (side, jitter_around(self.motion, at, frame_idx)));
-        let shakes = shakes.into_iter().filter(|(_, mm)| mm.is_finite()).map(|(side, mm)| format!(" {side} {mm:.1}"));
-        let shakes: String = shakes.collect();
-        if !shakes.is_empty() {
-            words.push(format!("wrists shake{shakes} mm"));
+        let jitters = jitters.into_iter().filter(|(_, mm)| mm.is_finite()).map(|(side, mm)| format!(" {side} {mm:.1}"));
+        let jitters: String = jitters.collect();
+        if !jitters.is_empty() {
+            texts.push(format!("wrists shake{jitters} mm"));
         }
         for (why, parts) in [("refused", without(true)), ("not seen", without(false))] {
             if !parts.is_empty() {
-                words.push(format!("{why}: {parts}"));
+                texts.push(format!("{why}: {parts}"));
             }
         }
-        words.join("   ")
+        texts.join("   ")
     }
 }

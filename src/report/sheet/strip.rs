@@ -1,4 +1,5 @@
-//! Chart under a contact sheet: height and depth of both wrists over time, filled frames paler than seen ones.
+//! Chart below a contact sheet: height and depth of both wrists over time; filled-in frames are paler than visible
+//! ones.
 
 use anyhow::Result;
 use orator_avatar::animate::draw::figure::{INK, LEFT, PAPER, RIGHT, mix};
@@ -10,26 +11,26 @@ use std::ops::Range;
 
 /// Height of the chart, px.
 pub const STRIP_PX: usize = 260;
-/// Width of the labels at the left.
+/// Width of the labels at the left, px.
 const MARGIN_PX: f32 = 60.0;
-/// Axis of a lane, its range in metres from top to bottom, and its label.
+/// Lanes of the chart: axis, range from top to bottom in metres, and label.
 const LANES: [(usize, [f32; 2], &str); 2] = [(1, [-0.3, 0.7], "height"), (2, [-0.7, 0.1], "depth")];
 
-/// Draws the wrists over the frames `frames` from row `top` on, with a mark at each of `marks`.
+/// Draws the wrists over `frames` in the pixel rows from `top` on, with a vertical line at each frame in `marks`.
 pub fn draw_strip(image: &mut Image, top: usize, motion: &Motion, frames: Range<usize>, marks: &[usize]) -> Result<()> {
     let lane_px = (STRIP_PX as f32 - 30.0) / LANES.len() as f32;
     let (left, right) = (MARGIN_PX, image.width as f32 - 10.0);
     let n_steps = frames.len().saturating_sub(1).max(1) as f32;
     let x_of = |t: usize| left + (right - left) * t.saturating_sub(frames.start) as f32 / n_steps;
-    for (lane, (axis, [above, below], words)) in LANES.into_iter().enumerate() {
+    for (lane, (axis, [above, below], label)) in LANES.into_iter().enumerate() {
         let (start, end) = (top as f32 + lane as f32 * lane_px + 4.0, top as f32 + (lane + 1) as f32 * lane_px - 4.0);
         let y_of = |metres: f32| start + (end - start) * ((metres - above) / (below - above)).clamp(0.0, 1.0);
         for decimetre in (above * 10.0).round() as i32..=(below * 10.0).round() as i32 {
             let metres = decimetre as f32 / 10.0;
-            let pale = if decimetre == 0 { 0.3 } else { 0.85 };
-            draw::line(image, [left, y_of(metres)], [right, y_of(metres)], 1.0, mix(INK, PAPER, pale))?;
+            let paper_share = if decimetre == 0 { 0.3 } else { 0.85 };
+            draw::line(image, [left, y_of(metres)], [right, y_of(metres)], 1.0, mix(INK, PAPER, paper_share))?;
         }
-        draw::text(image, words, [6.0, start + 14.0], 9.0, INK)?;
+        draw::text(image, label, [6.0, start + 14.0], 9.0, INK)?;
         let [first, last] = [above, below].map(|metres| format!("{:+.1} m", if axis == 1 { -metres } else { metres }));
         draw::text(image, &first, [6.0, start + 32.0], 8.0, INK)?;
         draw::text(image, &last, [6.0, end], 8.0, INK)?;
@@ -46,8 +47,8 @@ pub fn draw_strip(image: &mut Image, top: usize, motion: &Motion, frames: Range<
         }
     }
     for &mark in marks {
-        let words = format!("{:.1}", motion.fps.secs(mark));
-        draw::text(image, &words, [x_of(mark) - 8.0, (top + STRIP_PX) as f32 - 8.0], 9.0, INK)?;
+        let label = format!("{:.1}", motion.fps.secs(mark));
+        draw::text(image, &label, [x_of(mark) - 8.0, (top + STRIP_PX) as f32 - 8.0], 9.0, INK)?;
     }
     Ok(())
 }

@@ -1,18 +1,18 @@
-//! Curves of a training from the lines of its log.
+//! Learning curves of a training run from its log.
 
 use crate::html::chart::lines::{ChartLevel, ChartLine, LineChart};
 use serde_json::Value;
 
-/// Largest number of points of a curve; neighbours of a longer one are averaged.
-const MOST_POINTS: usize = 240;
+/// Maximum number of points of a curve; neighbouring points of a longer one are averaged.
+const MAX_POINTS: usize = 240;
 
-/// Parsed log of a training.
+/// Parsed log of a training run.
 pub struct TrainingLog<'a> {
-    /// Lines of training steps.
+    /// Log lines of training steps.
     steps: Vec<&'a Value>,
-    /// Lines of validations.
+    /// Log lines of validations.
     pub epochs: Vec<&'a Value>,
-    /// Validation with the best (smallest) score.
+    /// Log line of the validation with the best (smallest) score.
     pub best: Option<&'a Value>,
 }
 
@@ -24,15 +24,15 @@ impl<'a> TrainingLog<'a> {
         Self { steps, epochs, best }
     }
 
-    /// Curves that are not 0 throughout.
+    /// Charts of all curves that are not 0 throughout.
     pub fn charts(&self) -> Vec<LineChart> {
-        let trained = |name: &str, colour, of: &str| curve(&self.steps, name, colour, |line| line[of].as_f64());
-        let made = |name: &str, colour, of: &str| {
+        let training = |name: &str, colour, of: &str| curve(&self.steps, name, colour, |line| line[of].as_f64());
+        let generated = |name: &str, colour, of: &str| {
             curve(&self.epochs, name, colour, |line| metrics(&line["validation"], of)[0].as_f64())
         };
         let level = |name: &str, colour, value| ChartLevel { name: name.to_owned(), colour, value };
-        // the mean pose's value, which all validations share
-        let still = |name: &str, colour, of: &str| {
+        // Value of the mean pose, which is the same in all validations.
+        let mean_pose = |name: &str, colour, of: &str| {
             let last = self.epochs.last().and_then(|line| metrics(&line["validation"], of)[1].as_f64());
             level(name, colour, last.unwrap_or(f64::NAN))
         };
@@ -47,25 +47,25 @@ impl<'a> TrainingLog<'a> {
             chart(
                 "L1 error",
                 "Of normalised coordinates; lower is better.",
-                vec![trained("training", 2, "l1"), made("held out", 0, "l1")],
-                vec![still("mean pose, held out", 0, "l1")],
+                vec![training("training", 2, "l1"), generated("held out", 0, "l1")],
+                vec![mean_pose("mean pose, held out", 0, "l1")],
             ),
             chart(
                 "Correct keypoints (PCK 0.2)",
                 "Share within a fifth of the pose's extent; higher is better.",
-                vec![made("arms", 0, "pck_body"), made("fingers", 1, "pck_hands")],
-                vec![still("arms, mean pose", 0, "pck_body"), still("fingers, mean pose", 1, "pck_hands")],
+                vec![generated("arms", 0, "pck_body"), generated("fingers", 1, "pck_hands")],
+                vec![mean_pose("arms, mean pose", 0, "pck_body"), mean_pose("fingers, mean pose", 1, "pck_hands")],
             ),
             chart(
                 "Frechet distance, cm\u{b2}",
                 "Of single held-out poses; lower is better, and few poses make it too large.",
-                vec![made("held out", 0, "frechet")],
-                vec![still("mean pose", 0, "frechet")],
+                vec![generated("held out", 0, "frechet")],
+                vec![mean_pose("mean pose", 0, "frechet")],
             ),
             chart(
                 "Motion energy",
                 "As a share of the data's: 1 moves as much as the speaker, 0 stands still.",
-                vec![made("held out", 0, "energy")],
+                vec![generated("held out", 0, "energy")],
                 vec![level("the data's", 2, 1.0), level("collapse alarm", 1, 0.3)],
             ),
             chart(
@@ -77,29 +77,30 @@ impl<'a> TrainingLog<'a> {
             chart(
                 "Adversarial losses",
                 "Of the generator against the discriminator, and of the discriminator itself.",
-                vec![trained("generator", 0, "adversarial"), trained("discriminator", 1, "discriminator")],
+                vec![training("generator", 0, "adversarial"), training("discriminator", 1, "discriminator")],
                 vec![],
             ),
             chart(
                 "Bone and velocity losses",
                 "",
-                vec![trained("bone lengths", 0, "bone"), trained("velocity", 1, "velocity")],
+                vec![training("bone lengths", 0, "bone"), training("velocity", 1, "velocity")],
                 vec![],
             ),
-            chart("Gradient norm", "Before clipping.", vec![trained("generator", 0, "gradient_norm")], vec![]),
+            chart("Gradient norm", "Before clipping.", vec![training("generator", 0, "gradient_norm")], vec![]),
         ];
-        let says_something =
-            |chart: &LineChart| chart.lines.iter().flat_map(|line| &line.places).any(|[_, value]| *value != 0.0);
-        let mut charts: Vec<LineChart> = charts.into_iter().filter(says_something).collect();
+        let is_nonzero =
+            |chart: &LineChart| chart.lines.iter().flat_map(|line| &line.points).any(|[_, value]| *value != 0.0);
+        let mut charts: Vec<LineChart> = charts.into_iter().filter(is_nonzero).collect();
         for chart in &mut charts {
-            chart.lines.retain(|line| !line.places.is_empty());
+            chart.lines.retain(|line| !line.points.is_empty());
             chart.levels.retain(|level| level.value.is_finite());
         }
         charts
     }
 }
 
-/// A metric of the network and of the mean pose in a validation; those of sequences are in no group of their own.
+/// Metric of the network and of the mean pose in a validation. Logs of sequence networks have no objects `generator`
+/// and `mean_pose` but prefixed keys.
 pub fn metrics<'v>(validation: &'v Value, of: &str) -> [&'v Value; 2] {
     if validation["generator"].is_object() {
         return ["generator", "mean_pose"].map(|row| &validation[row][of]);
@@ -107,16 +108,16 @@ pub fn metrics<'v>(validation: &'v Value, of: &str) -> [&'v Value; 2] {
     [&validation[of], &validation[format!("mean_pose_{of}")]]
 }
 
-/// Curve of a value of lines.
+/// Curve of a value in log lines.
 fn curve(lines: &[&Value], name: &str, colour: usize, value: impl Fn(&Value) -> Option<f64>) -> ChartLine {
-    let places = lines.iter().filter_map(|line| Some([line["step"].as_f64()?, value(line)?]));
-    ChartLine { name: name.to_owned(), colour, places: thinned(&places.collect::<Vec<_>>()) }
+    let points = lines.iter().filter_map(|line| Some([line["step"].as_f64()?, value(line)?]));
+    ChartLine { name: name.to_owned(), colour, points: thinned(&points.collect::<Vec<_>>()) }
 }
 
-fn thinned(places: &[[f64; 2]]) -> Vec<[f64; 2]> {
-    let together = places.len().div_ceil(MOST_POINTS).max(1);
-    let mean = |places: &[[f64; 2]]| [0, 1].map(|k| places.iter().map(|p| p[k]).sum::<f64>() / places.len() as f64);
-    places.chunks(together).map(mean).collect()
+fn thinned(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let n_averaged = points.len().div_ceil(MAX_POINTS).max(1);
+    let mean = |points: &[[f64; 2]]| [0, 1].map(|k| points.iter().map(|p| p[k]).sum::<f64>() / points.len() as f64);
+    points.chunks(n_averaged).map(mean).collect()
 }
 
 #[cfg(test)]
@@ -132,12 +133,12 @@ mod tests {
             let validation = json!({"score": score, "generator": {"l1": score / 2.0}, "mean_pose": still});
             lines.push(json!({"step": step, "epoch": 1, "validation": validation}));
         }
-        let told = TrainingLog::parse(&lines);
-        assert_eq!(told.best.unwrap()["step"], 7000);
-        let charts = told.charts();
+        let log = TrainingLog::parse(&lines);
+        assert_eq!(log.best.unwrap()["step"], 7000);
+        let charts = log.charts();
         let titles: Vec<&str> = charts.iter().map(|chart| chart.title.as_str()).collect();
         assert_eq!(titles, ["L1 error", "Score"]);
-        assert!(charts[0].lines[0].places.len() <= MOST_POINTS && charts[0].lines[1].places.len() == 3);
+        assert!(charts[0].lines[0].points.len() <= MAX_POINTS && charts[0].lines[1].points.len() == 3);
         assert_eq!((charts[0].levels[0].value, charts[0].marked), (0.8, Some(7000.0)));
         assert!(TrainingLog::parse(&[]).charts().is_empty());
     }
@@ -152,6 +153,6 @@ mod tests {
         let charts = TrainingLog::parse(&lines).charts();
         let titles: Vec<&str> = charts.iter().map(|chart| chart.title.as_str()).collect();
         assert_eq!(titles, ["L1 error", "Motion energy", "Score", "Gradient norm"]);
-        assert_eq!((charts[0].levels[0].value, charts[0].lines[1].places[0]), (0.5, [90.0, 0.4]));
+        assert_eq!((charts[0].levels[0].value, charts[0].lines[1].points[0]), (0.5, [90.0, 0.4]));
     }
 }

@@ -1,4 +1,4 @@
-//! The page of a training that goes on: written anew behind each validation.
+//! Page of a running training: it is written again after each validation.
 
 use super::page;
 use super::strip::HeldOutPair;
@@ -6,30 +6,33 @@ use anyhow::Result;
 use orator_gesture::train::epochs::ValidatedStep;
 use std::path::{Path, PathBuf};
 
-/// Makes true and generated poses of held-out intervals, with the best checkpoint of a training.
-pub type PosesOfBest<'a> = Box<dyn Fn() -> Result<Vec<HeldOutPair>> + 'a>;
+/// Function that generates poses of held-out intervals with the best checkpoint, paired with the true ones.
+pub type BestPosesFn<'a> = Box<dyn Fn() -> Result<Vec<HeldOutPair>> + 'a>;
 
-/// The page of a training in its folder. Poses are made once for each best checkpoint.
+/// Page in the folder of a running training. Poses are generated once per best checkpoint.
 pub struct LivePage<'a> {
     folder: &'a Path,
     speaker: String,
-    poses: PosesOfBest<'a>,
+    poses: BestPosesFn<'a>,
     of_best: Option<(usize, Vec<HeldOutPair>)>,
     written: Option<ValidatedStep>,
 }
 
 impl<'a> LivePage<'a> {
-    /// The page of the training of `speaker` in `folder`, not written yet.
-    pub fn new(folder: &'a Path, speaker: String, poses: PosesOfBest<'a>) -> Self {
+    /// Page of the training of `speaker` in `folder`; nothing is written yet.
+    pub fn new(folder: &'a Path, speaker: String, poses: BestPosesFn<'a>) -> Self {
         Self { folder, speaker, poses, of_best: None, written: None }
     }
 
-    /// The file.
+    /// Path of the page.
     pub fn path(&self) -> PathBuf {
         self.folder.join(page::PAGE)
     }
 
-    /// Writes the page as it is with this validation, unless it has been written so. Errors name the file.
+    /// Writes the page after the validation `at`, unless it has already been written for it.
+    ///
+    /// # Errors
+    /// Failed generation of poses, or a page that cannot be written.
     pub fn write(&mut self, at: ValidatedStep) -> Result<()> {
         if self.written == Some(at) {
             return Ok(());

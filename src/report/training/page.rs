@@ -1,5 +1,5 @@
-//! Page of a training beside its checkpoints: the curves of its log with the best epoch marked, the best epoch's
-//! metrics beside the mean pose's, and generated against true poses.
+//! Page of a training run, next to its checkpoints: learning curves with the best epoch marked, the metrics of the best
+//! epoch and of the mean pose, and generated beside true poses.
 
 use super::charts::{TrainingLog, metrics};
 use super::strip::{HeldOutPair, strip};
@@ -18,8 +18,8 @@ use std::path::Path;
 /// File name of the page.
 pub const PAGE: &str = "training.html";
 
-/// Metric of a validation: name, key, whether in percent.
-const FIGURES: [(&str, &str, bool); 6] = [
+/// Metrics of a validation: name, key, whether in percent.
+const METRICS: [(&str, &str, bool); 6] = [
     ("L1 error (normalised)", "l1", false),
     ("PCK 0.2", "pck", true),
     ("PCK 0.2, arms", "pck_body", true),
@@ -28,8 +28,11 @@ const FIGURES: [(&str, &str, bool); 6] = [
     ("Motion energy as a share of the data's", "energy", true),
 ];
 
-/// Writes `training.html` into the folder of a training, from its log and poses of held-out intervals (possibly none).
-/// The bytes depend on log and poses only.
+/// Writes `training.html` into the folder of a training run from its log and poses of held-out intervals (may be
+/// empty). The bytes depend only on log and poses.
+///
+/// # Errors
+/// An unreadable log, or a page that cannot be written.
 pub fn write(folder: &Path, speaker: &str, pairs: &[HeldOutPair]) -> Result<()> {
     let lines = log::read(folder)?;
     let training_log = TrainingLog::parse(&lines);
@@ -79,7 +82,7 @@ fn lead(training_log: &TrainingLog) -> String {
     )
 }
 
-/// Table of the best epoch, and warnings where they are due.
+/// Table of the best epoch's metrics, with warnings if necessary.
 fn best(training_log: &TrainingLog) -> Vec<Node> {
     let Some(best) = training_log.best.map(|line| &line["validation"]) else {
         return vec![node("p").class("empty").text("The log has no validation.")];
@@ -100,7 +103,7 @@ fn best(training_log: &TrainingLog) -> Vec<Node> {
     let head = ["", "generator", "mean pose"].map(|name| node("th").attr("scope", "col").class("num").text(name));
     let table = node("table")
         .child(node("thead").child(node("tr").children(head)))
-        .child(node("tbody").children(FIGURES.into_iter().filter(is_measured).map(row)));
+        .child(node("tbody").children(METRICS.into_iter().filter(is_measured).map(row)));
     let about = match best["n_poses"].as_u64() {
         Some(poses) => format!(
             "The mean pose never moves. Behind each Frechet distance are {}; the smaller that count, the larger it is.",
@@ -109,8 +112,8 @@ fn best(training_log: &TrainingLog) -> Vec<Node> {
         None => "The mean pose never moves.".to_owned(),
     };
     let pair = |of: &str| {
-        let [model, still] = metrics(best, of).map(Value::as_f64);
-        Some([model?, still?])
+        let [model, mean_pose] = metrics(best, of).map(Value::as_f64);
+        Some([model?, mean_pose?])
     };
     let below = pair("l1").and_then(|l1| below_mean_pose(l1, pair("pck")));
     let below = below.map(|below| node("p").class("note").text(below));

@@ -1,4 +1,4 @@
-//! Generated against true poses of held-out intervals: the figure at a few moments, true above generated, and the
+//! Picture of generated and true poses of held-out intervals: figures at a few moments, true above generated, and the
 //! height of both wrists over time.
 
 use anyhow::Result;
@@ -10,7 +10,7 @@ use orator_base::types::skeleton::{L_WRIST, R_WRIST};
 use orator_media::opencv::draw;
 use std::ops::Range;
 
-/// Ground truth and generated motion of a held-out interval, of one rate and, up to rounding, one length.
+/// Ground truth and generated motion of a held-out interval, with the same rate and, up to rounding, the same length.
 pub struct HeldOutPair {
     pub name: String,
     /// Start within the interval, seconds.
@@ -22,12 +22,13 @@ pub struct HeldOutPair {
 const N_MOMENTS: usize = 8;
 const EVERY_SECS: f64 = 0.5;
 const CELL: [usize; 2] = [136, 150];
-/// Width of the labels at the left, and height of the name above, px.
+/// Width of the labels at the left, px.
 const MARGIN: usize = 84;
+/// Height of the name above a pair, px.
 const NAME_PX: usize = 24;
 const LANE_PX: usize = 64;
 const PAIR_PX: usize = NAME_PX + 2 * CELL[1] + 2 * LANE_PX + 14;
-/// Smallest height range of a lane, metres.
+/// Minimum range of heights that a lane shows, metres.
 const LANE_METRES: f32 = 0.15;
 
 /// Width of the picture, px.
@@ -46,11 +47,11 @@ fn draw_pair(image: &mut Image, top: usize, pair: &HeldOutPair) -> Result<()> {
     let fps = pair.ground_truth.fps;
     let n_frames = pair.ground_truth.n_frames().min(pair.predicted.n_frames());
     let span = ((N_MOMENTS as f64 * EVERY_SECS * fps.per_sec()).round() as usize).clamp(1, n_frames.max(1));
-    // From the middle, since an interval often begins at rest.
+    // Take the middle, since intervals often start at rest.
     let first = n_frames.saturating_sub(span) / 2;
     let frame_of = |moment: usize| first + (2 * moment + 1) * span / (2 * N_MOMENTS);
-    let words = format!("{}, from {:.1} s", pair.name, pair.start_secs + fps.secs(first));
-    draw::text(image, &words, [8.0, top as f32 + 17.0], 10.0, INK)?;
+    let title = format!("{}, from {:.1} s", pair.name, pair.start_secs + fps.secs(first));
+    draw::text(image, &title, [8.0, top as f32 + 17.0], 10.0, INK)?;
     for (row, (name, motion)) in [("true", &pair.ground_truth), ("generated", &pair.predicted)].into_iter().enumerate()
     {
         let row_top = top + NAME_PX + row * CELL[1];
@@ -79,15 +80,15 @@ fn draw_pair(image: &mut Image, top: usize, pair: &HeldOutPair) -> Result<()> {
         }
         for (motion, rgb, wide) in [(&pair.ground_truth, mix(INK, PAPER, 0.35), 2.0), (&pair.predicted, rgb, 2.0)] {
             for frame in first + 1..(first + span).min(n_frames) {
-                let place = |frame: usize| [x(frame), y(motion.joints[[frame, joint, 1]])];
-                draw::line(image, place(frame - 1), place(frame), wide, rgb)?;
+                let position = |frame: usize| [x(frame), y(motion.joints[[frame, joint, 1]])];
+                draw::line(image, position(frame - 1), position(frame), wide, rgb)?;
             }
         }
     }
     Ok(())
 }
 
-/// Largest and smallest height of a wrist in either motion, metres below the neck.
+/// Highest and lowest position of a wrist in either motion, metres below the neck, extended to at least `LANE_METRES`.
 fn range(pair: &HeldOutPair, joint: usize, frames: Range<usize>) -> [f32; 2] {
     let heights = [&pair.ground_truth, &pair.predicted].into_iter().flat_map(|motion| {
         frames.clone().map(|frame| motion.joints[[frame, joint, 1]]).filter(|height| height.is_finite())
@@ -111,9 +112,9 @@ mod tests {
     #[test]
     fn any_length_is_drawn() {
         let motion = |n_frames: usize, shift: f32| {
-            let place =
+            let position =
                 |(t, joint, k): (usize, usize, usize)| (t as f32 * 0.01 + joint as f32 * 0.01 + shift) * k as f32;
-            Motion::from_joints(FrameRate::new(15, 1), Array3::from_shape_fn((n_frames, N_JOINTS, 3), place))
+            Motion::from_joints(FrameRate::new(15, 1), Array3::from_shape_fn((n_frames, N_JOINTS, 3), position))
         };
         for (n_ground_truth, n_predicted) in [(0, 3), (1, 1), (3, 5), (90, 89)] {
             let pair = HeldOutPair {

@@ -1,4 +1,4 @@
-//! Worst frames of every rule as pictures.
+//! Report section with pictures of the worst frames of every rule.
 
 use super::pictures::MomentThumbnail;
 use super::reasons;
@@ -9,10 +9,10 @@ use crate::html::{Node, jpeg, node};
 use orator_base::stage::counted;
 use std::collections::BTreeMap;
 
-/// Pictures by video and by the frames of their moment.
+/// Pictures by video index and frames of the moment.
 pub type Pictures = BTreeMap<(usize, Vec<usize>), MomentThumbnail>;
 
-/// Row of pictures for each rule.
+/// Section with a row of pictures for each rule.
 pub fn gallery(worst: &Worst, pictures: &Pictures, videos: &[VideoSummary]) -> Vec<Node> {
     if worst.rules.is_empty() {
         return vec![node("p").class("empty").text("Nothing was refused, or no pictures were asked for.")];
@@ -39,10 +39,10 @@ fn card(moment: &Moment, video: &VideoSummary, pictures: &Pictures) -> Node {
         None => node("p").class("empty nopicture").text("The picture cannot be read."),
     };
     let link = node("a").attr("href", format!("#{}", video.anchor())).text(at);
-    let description = if moment.here.is_empty() {
+    let description = if moment.frame_value.is_empty() {
         moment.description.clone()
     } else {
-        format!("{}; {}", moment.description, moment.here)
+        format!("{}; {}", moment.description, moment.frame_value)
     };
     node("figure")
         .class(if moment.frames.len() > 1 { "card shot pair" } else { "card shot" })

@@ -1,5 +1,5 @@
-//! Single pass over the videos, one at a time, that collects all data of the report. Of a video only its ledger is
-//! kept.
+//! Collection of all data of the report in a single pass over the videos. Only the summary of a video with its ledger
+//! stays in memory.
 
 use super::movement::MovementCounts;
 use super::spread::MeasureCounts;
@@ -7,7 +7,7 @@ use super::thresholds::THRESHOLDS;
 use super::video::VideoSummary;
 use super::what_if::{JudgedVideo, KeptByThreshold, open_frames};
 use super::worst::Worst;
-use crate::preview::{MOST_PREVIEWS, MotionPreview};
+use crate::preview::{MAX_PREVIEWS, MotionPreview};
 use anyhow::{Context, Result, ensure};
 use orator_base::stage::Unit;
 use orator_base::stage::artifacts::Artifact;
@@ -24,20 +24,20 @@ use std::path::Path;
 /// Data of a report.
 pub struct ReportData {
     pub videos: Vec<VideoSummary>,
-    /// Results of `what_if` by video; `None`: nothing to judge.
+    /// Results of `what_if` by video; `None`: the video has no measures.
     pub kept: Vec<Option<KeptByThreshold>>,
     pub spread: MeasureCounts,
     pub movement: MovementCounts,
     pub worst: Worst,
-    /// Moving previews of the first videos that have kept motion.
+    /// Animated previews of the first videos with accepted motion.
     pub previews: Vec<MotionPreview>,
-    /// Entries of the configuration without a video.
+    /// Messages about entries of the configuration that have no effect.
     pub missing: Vec<String>,
-    /// Videos whose sound the speech model listened to, and videos that were measured.
-    pub n_heard: (usize, usize),
+    /// Number of videos to which the speech model was applied, and number of measured videos.
+    pub n_speech_model: (usize, usize),
 }
 
-/// Collects the data of all `videos`, at most `n_pictures` moments a rule.
+/// Collects the data of all `videos`, with at most `n_pictures` moments per rule.
 pub fn gather(settings: &Settings, videos: &[Videos], n_pictures: usize, progress: &dyn Progress) -> ReportData {
     let missing = videos.iter().flat_map(|of| of.missing.iter().map(move |text| format!("{}: {text}", of.speaker)));
     let mut all = ReportData {
@@ -48,7 +48,7 @@ pub fn gather(settings: &Settings, videos: &[Videos], n_pictures: usize, progres
         worst: Worst::new(n_pictures),
         previews: Vec::new(),
         missing: missing.collect(),
-        n_heard: (0, 0),
+        n_speech_model: (0, 0),
     };
     let units: Vec<&Unit> = videos.iter().flat_map(|of| &of.units).collect();
     let task = progress.begin("reading", units.len() as u64);
@@ -68,20 +68,20 @@ pub fn gather(settings: &Settings, videos: &[Videos], n_pictures: usize, progres
 }
 
 impl ReportData {
-    /// Adds the measures of a video; what cannot be read becomes a note.
+    /// Adds the measures of a video; unreadable data becomes a note. Returns the results of `what_if`.
     fn add(&mut self, settings: &Settings, video: &mut VideoSummary) -> Option<KeptByThreshold> {
         let rules = &settings.segment;
         let (work, unit) = (&settings.work.dir, video.unit.clone());
         self.spread.add_kept(&video.ledger);
-        let (measures, judged) = match measured(work, &unit) {
+        let (measures, judged) = match read_measures(work, &unit) {
             Ok(found) => found,
             Err(error) => {
                 video.note(&format!("It is in no histogram and under no slider: {error:#}"));
                 return None;
             }
         };
-        self.n_heard.0 += usize::from(measures.speech.iter().any(|share| !share.is_nan()));
-        self.n_heard.1 += 1;
+        self.n_speech_model.0 += usize::from(measures.speech.iter().any(|share| !share.is_nan()));
+        self.n_speech_model.1 += 1;
         self.spread.add_frames(&measures);
         let bones = if video.is_lifted { bone_change(work, &unit) } else { Ok(Vec::new()) };
         let bone_change = bones.unwrap_or_else(|error| {
@@ -94,7 +94,7 @@ impl ReportData {
             match motion(work, &unit) {
                 Ok((motion, intervals)) => {
                     self.movement.add(&motion, &intervals.intervals);
-                    if self.previews.len() < MOST_PREVIEWS {
+                    if self.previews.len() < MAX_PREVIEWS {
                         let preview = MotionPreview::new(&video.file, video.anchor(), &motion, &intervals.intervals);
                         self.previews.extend(preview);
                     }
@@ -123,7 +123,7 @@ impl ReportData {
     }
 }
 
-fn measured(work: &Path, unit: &Unit) -> Result<(Measures, MediaInfo)> {
+fn read_measures(work: &Path, unit: &Unit) -> Result<(Measures, MediaInfo)> {
     let judged = MediaInfo::read(&Artifact::MediaInfo.path(work, unit))?;
     let measures = Measures::read(&Artifact::Measures.path(work, unit))?;
     ensure!(

@@ -1,6 +1,6 @@
-//! Page of a speaker's videos. Data (`gather`, one pass over the videos): `video`, `what_if`, `spread`, `movement`,
-//! `worst`, `pictures`. Sections: `summary`, `timelines`, `gallery`, `spread`, `sliders`, `motion`; `page` joins
-//! them.
+//! Report on the videos of speakers. Data (`gather`, one pass over the videos): `video`, `what_if`, `spread`,
+//! `movement`, `worst`, `pictures`. Sections: `summary`, `timelines`, `gallery`, `spread`, `sliders`, `motion`; `page`
+//! combines them.
 
 pub mod gallery;
 pub mod gather;

@@ -1,4 +1,4 @@
-//! Charts of joint positions and speeds.
+//! Report section with charts of joint positions and speeds.
 
 use super::movement::{MovementCounts, PAIRS};
 use crate::html::chart::profile;
@@ -7,7 +7,7 @@ use crate::html::numbers::number;
 use crate::html::{Node, legend, node};
 use orator_base::stage::counted;
 
-/// Axis with the labels of its ends.
+/// Axes with the labels of their ends.
 const AXES: [(&str, [&str; 2]); 3] = [
     ("across", ["speaker's right", "speaker's left"]),
     ("height", ["up", "down"]),
@@ -15,7 +15,7 @@ const AXES: [(&str, [&str; 2]); 3] = [
 ];
 const SIDES: [&str; 2] = ["left", "right"];
 
-/// Charts of ranges and of speeds.
+/// Section with charts of position ranges and speeds.
 pub fn motion(movement: &MovementCounts) -> Vec<Node> {
     if movement.n_frames == 0 {
         return vec![node("p").class("empty").text("No frame is kept and lifted, so there is no motion to show.")];
@@ -65,7 +65,7 @@ fn range_card(
             })
         })
         .collect();
-    // One scale for the three axes, so that they are comparable.
+    // The three axes share one scale, so that they are comparable.
     let all = pairs().flat_map(|(joints, _)| joints).flat_map(|joint| [0, 1, 2].map(|axis| joint.marks(axis)));
     let farthest = all.flatten().filter(|mark| mark.is_finite()).fold(0.05, |a: f64, b| a.max(b.abs()));
     let end = (farthest * 20.0).ceil() / 20.0;

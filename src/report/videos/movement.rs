@@ -1,16 +1,17 @@
-//! Positions and speeds of joints in the kept frames. Arms are measured from the neck, finger tips from their wrist.
+//! Positions and speeds of joints in accepted frames. Arms are measured relative to the neck, finger tips relative to
+//! their wrist.
 
 use crate::html::chart::histogram::Counts;
 use orator_base::types::interval::Interval;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::{L_ELBOW, L_HAND, L_WRIST, NECK, R_ELBOW, R_HAND, R_WRIST};
 
-/// Largest distance of a joint from its reference, metres.
-const REACH: f64 = 1.2;
-/// Largest counted speed, metres a second.
-const FASTEST: f64 = 3.0;
+/// Largest counted distance of a joint from its reference along an axis, metres.
+const MAX_DISTANCE: f64 = 1.2;
+/// Largest counted speed, m/s.
+const MAX_SPEED: f64 = 3.0;
 
-/// Joint of each side (left, right) and the joints they are measured from.
+/// Joint on both sides (left, right), with the joints they are measured from.
 #[derive(Clone, Copy)]
 pub struct JointPair {
     pub name: &'static str,
@@ -32,36 +33,36 @@ pub const PAIRS: [JointPair; 5] = [
     tip("little tip", 4),
 ];
 
-/// Positions of a joint by axis (x to the speaker's left, y down, z away from the camera), and its speeds.
+/// Positions of a joint by axis (x to the speaker's left, y down, z away from the camera), metres, and its speeds.
 pub struct JointMovement {
-    places: [Counts; 3],
+    positions: [Counts; 3],
     ends: [[f64; 2]; 3],
-    /// Speeds, metres a second.
+    /// Speeds, m/s.
     pub speeds: Counts,
 }
 
 impl JointMovement {
     fn new() -> Self {
-        let places = || Counts::new(-REACH, REACH, 480);
+        let positions = || Counts::new(-MAX_DISTANCE, MAX_DISTANCE, 480);
         Self {
-            places: [places(), places(), places()],
+            positions: [positions(), positions(), positions()],
             ends: [[f64::INFINITY, f64::NEG_INFINITY]; 3],
-            speeds: Counts::new(0.0, FASTEST, 50),
+            speeds: Counts::new(0.0, MAX_SPEED, 50),
         }
     }
 
-    /// Minimum, 5 %, median, 95 %, maximum on an axis, metres; NaN where never measured.
+    /// Minimum, 5 %, median, 95 %, maximum along an axis, metres; NaN if the joint was never measured.
     pub fn marks(&self, axis: usize) -> [f64; 5] {
-        if self.places[axis].total() == 0 {
+        if self.positions[axis].total() == 0 {
             return [f64::NAN; 5];
         }
         let [lowest, highest] = self.ends[axis];
-        let at = |share: f64| self.places[axis].quantile(share).clamp(lowest, highest);
+        let at = |share: f64| self.positions[axis].quantile(share).clamp(lowest, highest);
         [lowest, at(0.05), at(0.5), at(0.95), highest]
     }
 }
 
-/// Left and right joint of every pair.
+/// Movement of the left and right joint of every pair.
 pub struct MovementCounts {
     pub pairs: Vec<[JointMovement; 2]>,
     pub n_frames: usize,
@@ -72,7 +73,7 @@ impl MovementCounts {
         Self { pairs: PAIRS.iter().map(|_| [JointMovement::new(), JointMovement::new()]).collect(), n_frames: 0 }
     }
 
-    /// Counts the frames of a video's kept intervals.
+    /// Counts the frames of a video's accepted intervals.
     pub fn add(&mut self, motion: &Motion, intervals: &[Interval]) {
         let n_frames = motion.n_frames();
         for interval in intervals.iter().filter(|interval| interval.end <= n_frames) {
@@ -96,13 +97,13 @@ impl JointMovement {
                 continue;
             }
             for (axis, value) in at.into_iter().enumerate() {
-                self.places[axis].add(value);
+                self.positions[axis].add(value);
                 let [lowest, highest] = &mut self.ends[axis];
                 (*lowest, *highest) = (lowest.min(value), highest.max(value));
             }
             if let Some(before) = before {
-                let way = at.iter().zip(before).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
-                self.speeds.add(way * motion.fps.per_sec());
+                let distance = at.iter().zip(before).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+                self.speeds.add(distance * motion.fps.per_sec());
             }
             before = Some(at);
         }
@@ -117,7 +118,7 @@ mod tests {
     use orator_base::types::time::FrameRate;
 
     #[test]
-    fn a_wrist_that_goes_one_metre_a_second_is_measured_so() {
+    fn positions_and_speed_of_a_wrist_are_measured() {
         let fps = FrameRate::new(10, 1);
         let mut joints = Array3::zeros((10, N_JOINTS, 3));
         (0..10).for_each(|t| joints[[t, L_WRIST, 0]] = t as f32 * 0.1);

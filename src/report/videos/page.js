@@ -1,4 +1,4 @@
-// The sliders: each picks an entry of the table that was computed with the report.
+// Sliders: each selects an entry of the table that was computed with the report.
 (() => {
   const { thresholds, videos } = JSON.parse(document.getElementById("data").textContent);
   const sliders = [...document.querySelectorAll("input[data-threshold]")];
@@ -77,7 +77,7 @@
   });
 })();
 
-// The previews: each figure moves while it is in view.
+// Previews: each figure is animated while it is visible.
 (() => {
   const { previews } = JSON.parse(document.getElementById("data").textContent);
   const JOINTS = 49, MISSING = -32768;

@@ -1,4 +1,4 @@
-//! Whole page of a speaker's videos.
+//! Report page on the videos of speakers.
 
 use super::gallery::{Pictures, gallery};
 use super::gather::{ReportData, gather};
@@ -19,19 +19,19 @@ use serde_json::json;
 pub struct ReportRequest<'a> {
     pub settings: &'a Settings,
     pub videos: &'a [Videos],
-    /// Largest number of pictures of a rule; 0: no video is opened.
+    /// Maximum number of pictures per rule; 0: no video is opened.
     pub n_pictures: usize,
 }
 
-/// Report as a page and as numbers.
+/// Report as a page and as data.
 pub struct ReportPage {
     pub html: String,
     pub sums: ReportTotals,
-    /// Contents as JSON.
+    /// Totals as JSON.
     pub facts: serde_json::Value,
 }
 
-/// Makes the report. Missing data is named on the page.
+/// Creates the report. Missing data is noted on the page and is not an error.
 pub fn make(request: &ReportRequest, progress: &dyn Progress) -> ReportPage {
     let ReportRequest { settings, videos, n_pictures } = *request;
     let mut gathered = gather(settings, videos, n_pictures, progress);
@@ -71,15 +71,15 @@ fn draw(settings: &Settings, gathered: &mut ReportData, progress: &dyn Progress)
 fn page(request: &ReportRequest, gathered: &ReportData, pictures: &Pictures, sums: &ReportTotals) -> Page {
     let rules = &request.settings.segment;
     let per_sec = request.settings.extract.rate().per_sec();
-    let ReportData { videos, kept, spread, movement, worst, previews, missing, n_heard } = gathered;
+    let ReportData { videos, kept, spread, movement, worst, previews, missing, n_speech_model } = gathered;
     let splits = summary::video_splits(request.settings, request.videos);
     let mut data = sliders::data(kept, videos, rules);
     data["previews"] = preview::data(previews);
     let names: Vec<&str> = request.videos.iter().map(|videos| videos.speaker.as_str()).collect();
     let section = |id, title, body| Section { id, title, body };
     let mut reasons = summary::by_reason(sums);
-    if n_heard.1 > 0 {
-        reasons.push(summary::speech(*n_heard));
+    if n_speech_model.1 > 0 {
+        reasons.push(summary::speech(*n_speech_model));
     }
     let people = faces::section(request.settings, request.videos);
     let people = (!people.is_empty()).then(|| section("people", "People", people));

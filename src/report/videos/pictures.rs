@@ -1,5 +1,5 @@
-//! Thumbnails of the chosen moments: small video frames under their keypoints. A video is read once, up to its last
-//! moment. Keypoints of other programs stand on an empty picture.
+//! Thumbnails of the chosen moments: small video frames overlaid with their keypoints. A video is read once, up to its
+//! last moment. Keypoints of other programs are drawn on an empty picture.
 
 use super::worst::Worst;
 use anyhow::{Context, Result, ensure};
@@ -18,8 +18,8 @@ use orator_pipeline::extract::picture_options;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Largest width and height of a thumbnail, px.
-const MOST_PX: [f64; 2] = [400.0, 260.0];
+/// Maximum width and height of a thumbnail, px.
+const MAX_PX: [f64; 2] = [400.0, 260.0];
 const GAP_PX: usize = 4;
 const GAP_RGB: [u8; 3] = [255; 3];
 const EMPTY_RGB: [u8; 3] = [70; 3];
@@ -31,7 +31,10 @@ pub struct MomentThumbnail {
     pub size: [usize; 2],
 }
 
-/// Pictures of video number `video`, by the frames of their moments.
+/// Pictures of the video with index `video`, by the frames of their moments.
+///
+/// # Errors
+/// Unreadable keypoints or video, or one that ends before a chosen frame.
 pub fn thumbnails(
     work: &Path,
     unit: &Unit,
@@ -49,7 +52,7 @@ pub fn thumbnails(
     };
     let mut reader = has_pictures.then(open).transpose()?;
     let n_wide = |frame: &usize| if moments.iter().any(|m| m.len() > 1 && m.contains(frame)) { 2 } else { 1 };
-    let mut thumbs = BTreeMap::new();
+    let mut thumbnails_by_frame = BTreeMap::new();
     for frame_idx in &frames {
         ensure!(*frame_idx < keypoints.n_frames(), "the keypoints end before frame {frame_idx}");
         while let Some(reader) = &mut reader {
@@ -60,21 +63,28 @@ pub fn thumbnails(
                 break;
             }
         }
-        thumbs.insert(*frame_idx, thumb(reader.as_mut(), &keypoints, *frame_idx, n_wide(frame_idx))?);
+        thumbnails_by_frame
+            .insert(*frame_idx, draw_thumbnail(reader.as_mut(), &keypoints, *frame_idx, n_wide(frame_idx))?);
     }
     let picture = |frames: &Vec<usize>| -> Result<MomentThumbnail> {
-        let image = side_by_side(frames.iter().filter_map(|frame| thumbs.get(frame)));
+        let image = side_by_side(frames.iter().filter_map(|frame| thumbnails_by_frame.get(frame)));
         Ok(MomentThumbnail { size: [image.width, image.height], jpeg: jpeg::encode(&image)? })
     };
     moments.into_iter().map(|frames| Ok((frames.clone(), picture(frames)?))).collect()
 }
 
-/// Current frame under its keypoints, `n_wide` of which stand side by side; without a reader an empty picture.
-fn thumb(reader: Option<&mut FrameReader>, keypoints: &Keypoints, frame_idx: usize, n_wide: usize) -> Result<Image> {
+/// Current frame of the reader, or an empty picture, overlaid with its keypoints; `n_wide` thumbnails share the maximum
+/// width.
+fn draw_thumbnail(
+    reader: Option<&mut FrameReader>,
+    keypoints: &Keypoints,
+    frame_idx: usize,
+    n_wide: usize,
+) -> Result<Image> {
     let size = reader.as_ref().map_or(keypoints.image_size.map(|px| px as usize), |reader| reader.image_size());
-    let whole = size.map(|px| px.max(1) as f64);
-    let scale = (MOST_PX[0] / n_wide as f64 / whole[0]).min(MOST_PX[1] / whole[1]).min(1.0);
-    let small = whole.map(|px| ((px * scale).round() as usize).max(2));
+    let frame_size = size.map(|px| px.max(1) as f64);
+    let scale = (MAX_PX[0] / n_wide as f64 / frame_size[0]).min(MAX_PX[1] / frame_size[1]).min(1.0);
+    let small = frame_size.map(|px| ((px * scale).round() as usize).max(2));
     let mut image = match reader {
         Some(reader) => reader.picture(Some(small))?,
         None => Image::filled(small[0], small[1], EMPTY_RGB),

@@ -1,5 +1,5 @@
-//! The reasons of a ledger as the page shows them: their order, and the class of each one's colour. One colour is one kind of
-//! thing; of two reasons of a kind one is striped (`page.css`).
+//! Order, heading and CSS class of the refusal reasons on the page. Each colour stands for a kind of reason; the second
+//! reason of a kind is striped (`page.css`).
 
 use orator_base::stage::refusal::Refusal;
 
@@ -10,12 +10,12 @@ fn find(reason: &str) -> Option<usize> {
     Refusal::JUDGED.iter().position(|known| known.reason() == reason)
 }
 
-/// The rank in the order of the page; unknown reasons come last.
+/// Rank of a reason in the order of the page; unknown reasons come last.
 pub fn order(reason: &str) -> usize {
     find(reason).unwrap_or(Refusal::JUDGED.len())
 }
 
-/// What the reason means; empty for unknown ones.
+/// Heading of a reason; empty for unknown reasons.
 pub fn heading(reason: &str) -> &'static str {
     find(reason).map_or("", |at| Refusal::JUDGED[at].heading())
 }
@@ -30,7 +30,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_reason_has_its_heading_and_its_colour() {
+    fn every_reason_has_a_heading_and_a_colour() {
         let style = include_str!("page.css");
         for reason in Refusal::JUDGED.map(Refusal::reason) {
             assert!(!heading(reason).is_empty(), "{reason}");

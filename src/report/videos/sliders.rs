@@ -1,4 +1,5 @@
-//! Slider for each threshold, and the table behind it; `page.js` moves what is built here.
+//! Report section with a slider for each threshold, and the table of precomputed results; `page.js` makes them
+//! interactive.
 
 use super::thresholds::{THRESHOLDS, ThresholdGrid};
 use super::video::VideoSummary;
@@ -9,7 +10,7 @@ use crate::html::{Node, node};
 use orator_dataset::config::SegmentConfig;
 use serde_json::{Value, json};
 
-/// Seconds kept of all videos, by threshold and value.
+/// Accepted seconds of all videos, by threshold and value.
 fn sums(kept: &[Option<KeptByThreshold>], rules: &SegmentConfig) -> KeptByThreshold {
     let zeros =
         || THRESHOLDS.iter().map(|threshold| vec![0.0; threshold.grid(rules).0.len()]).collect::<KeptByThreshold>();
@@ -21,7 +22,8 @@ fn sums(kept: &[Option<KeptByThreshold>], rules: &SegmentConfig) -> KeptByThresh
     })
 }
 
-/// Data of the script: thresholds with their values and sums, videos with their seconds (in tenths, by threshold).
+/// Data for the script: thresholds with their values and total seconds, and videos with their accepted tenths of a
+/// second by threshold and value.
 pub fn data(kept: &[Option<KeptByThreshold>], videos: &[VideoSummary], rules: &SegmentConfig) -> Value {
     let milli = |secs: f64| (secs * 1000.0).round() / 1000.0;
     let row = |(threshold, sums): (&ThresholdGrid, &Vec<f64>)| {
@@ -43,7 +45,7 @@ pub fn data(kept: &[Option<KeptByThreshold>], videos: &[VideoSummary], rules: &S
     json!({ "thresholds": thresholds, "videos": judged.collect::<Vec<_>>() })
 }
 
-/// Section of sliders.
+/// Section with the sliders.
 pub fn sliders(kept: &[Option<KeptByThreshold>], rules: &SegmentConfig) -> Vec<Node> {
     if kept.iter().all(Option::is_none) {
         return vec![node("p").class("empty").text("No video has been judged yet: orator run.")];
@@ -52,9 +54,9 @@ pub fn sliders(kept: &[Option<KeptByThreshold>], rules: &SegmentConfig) -> Vec<N
                  every step the rules were applied again to what was measured of all videos. What lifting refused (bones, open) \
                  stays refused, and frames that were never lifted count as good ones; max_bone_change has no slider.";
     let sums = sums(kept, rules);
-    let most = sums.iter().flatten().copied().fold(0.0, f64::max);
+    let max = sums.iter().flatten().copied().fold(0.0, f64::max);
     let cards =
-        THRESHOLDS.iter().zip(&sums).enumerate().map(|(i, (threshold, sums))| card(i, threshold, sums, most, rules));
+        THRESHOLDS.iter().zip(&sums).enumerate().map(|(i, (threshold, sums))| card(i, threshold, sums, max, rules));
     let now = sums.first().map_or(0.0, |row| row[THRESHOLDS[0].grid(rules).1]);
     let toml = node("pre").child(node("code").id("toml").text("# as configured"));
     let result = node("div")
@@ -80,7 +82,7 @@ pub fn sliders(kept: &[Option<KeptByThreshold>], rules: &SegmentConfig) -> Vec<N
     ]
 }
 
-fn card(i: usize, threshold: &ThresholdGrid, sums: &[f64], most: f64, rules: &SegmentConfig) -> Node {
+fn card(i: usize, threshold: &ThresholdGrid, sums: &[f64], max: f64, rules: &SegmentConfig) -> Node {
     let (grid, now) = threshold.grid(rules);
     let id = format!("slider-{}", threshold.key);
     let label = node("label").attr("for", &id).child(node("code").text(threshold.key));
@@ -104,7 +106,7 @@ fn card(i: usize, threshold: &ThresholdGrid, sums: &[f64], most: f64, rules: &Se
         .class("card knob")
         .child(node("h3").child(label))
         .child(node("small").text(threshold.description))
-        .child(curve(&description, sums, most, now))
+        .child(curve(&description, sums, max, now))
         .child(slider)
         .child(values)
 }

@@ -1,5 +1,5 @@
-//! Distributions of every measure over all frames of all videos, and of the lengths of kept intervals, as histograms
-//! with their thresholds.
+//! Histograms, with their thresholds, of every measure over all frames of all videos and of the lengths of accepted
+//! intervals.
 
 use super::thresholds::THRESHOLDS;
 use crate::html::chart::histogram::{Counts, ThresholdLine, histogram};
@@ -10,16 +10,16 @@ use orator_base::stage::ledger::Ledger;
 use orator_dataset::config::Settings;
 use orator_pipeline::segment::Measures;
 
-/// Measure of a frame, or of a kept interval.
+/// Measure of a frame or of an accepted interval.
 pub struct Measure {
-    /// Its array in `measures.npz`, or `BONES` or `LENGTHS`.
+    /// Name of the array in `measures.npz`, or `BONES` or `LENGTHS`.
     name: &'static str,
     pub title: &'static str,
     pub unit: &'static str,
-    /// Range of its histogram, and the number of bins.
+    /// Range of the histogram.
     ends: [f64; 2],
     n_bins: usize,
-    /// Threshold in `[segment]`, or `max_bone_change` of `[lift]`.
+    /// Key of the threshold in `[segment]`, or `max_bone_change` of `[lift]`.
     pub key: &'static str,
 }
 
@@ -34,39 +34,39 @@ const fn row(
     Measure { name, title, unit, ends, n_bins, key }
 }
 
-const ONE: [f64; 2] = [0.0, 1.0];
-/// Names of what is not in `measures.npz` of the segment stage.
+const UNIT_RANGE: [f64; 2] = [0.0, 1.0];
+/// Names of measures that are not in `measures.npz`.
 const BONES: &str = "bone_change";
 const LENGTHS: &str = "interval_secs";
 
 const ROWS: [Measure; 18] = [
     row("sound_db", "Loudness of the second", "dB", [-100.0, 0.0], 50, "min_sound_db"),
-    row("speech", "Share of speech in the 4 s around", "", ONE, 50, "min_speech"),
+    row("speech", "Share of speech in the 4 s around", "", UNIT_RANGE, 50, "min_speech"),
     row("lip_sync", "Mouth and voice in the 8 s around", "correlation", [-1.0, 1.0], 50, "min_lip_sync"),
     row("still", "Change of the picture", "8-bit steps", [0.0, 4.0], 80, "min_change"),
-    row("person", "Best score of face and arms", "", ONE, 40, "joint_score"),
+    row("person", "Best score of face and arms", "", UNIT_RANGE, 40, "joint_score"),
     row("shoulder_px", "Between the shoulders", "px", [0.0, 600.0], 60, "min_shoulder_px"),
-    row("face", "Score of nose and eyes", "", ONE, 40, "joint_score"),
+    row("face", "Score of nose and eyes", "", UNIT_RANGE, 40, "joint_score"),
     row("facing", "Width of the shoulders", "neck-nose", [-2.0, 4.0], 60, "min_facing"),
     row("nose_off", "Nose beside the neck", "half shoulders", [0.0, 3.0], 60, "max_nose_off"),
-    row("arms", "Lowest score of shoulders and elbows", "", ONE, 40, "joint_score"),
-    row("left_hand", "Score of the left hand", "", ONE, 40, "joint_score"),
-    row("right_hand", "Score of the right hand", "", ONE, 40, "joint_score"),
-    row("rest", "Wrists that lie together move", "shoulder widths", ONE, 50, "max_rest_move"),
+    row("arms", "Lowest score of shoulders and elbows", "", UNIT_RANGE, 40, "joint_score"),
+    row("left_hand", "Score of the left hand", "", UNIT_RANGE, 40, "joint_score"),
+    row("right_hand", "Score of the right hand", "", UNIT_RANGE, 40, "joint_score"),
+    row("rest", "Wrists that lie together move", "shoulder widths", UNIT_RANGE, 50, "max_rest_move"),
     row("jump", "Step of the neck", "shoulder widths", [0.0, 1.5], 60, "max_jump"),
-    row("shot_score", "Shot score", "", ONE, 50, "shot_threshold"),
+    row("shot_score", "Shot score", "", UNIT_RANGE, 50, "shot_threshold"),
     row("n_people", "People in view", "people", [-0.5, 10.5], 11, "max_people"),
     row(BONES, "Lifted bone off its length", "of its length", [0.0, 1.5], 60, "max_bone_change"),
     row(LENGTHS, "Length of kept intervals", "s", [0.0, 60.0], 60, "min_frames"),
 ];
 
 impl Measure {
-    /// Noun of what is counted.
+    /// Noun for what the histogram counts.
     pub fn of(&self) -> &'static str {
         if self.name == LENGTHS { "interval" } else { "frame" }
     }
 
-    /// Threshold under `settings`, for videos of `per_sec` frames a second.
+    /// Configured threshold, for videos with `per_sec` frames per second.
     pub fn threshold(&self, settings: &Settings, per_sec: f64) -> ThresholdLine {
         let of_segment = THRESHOLDS.iter().find(|threshold| threshold.key == self.key);
         let value = of_segment.map_or(settings.lift.max_bone_change, |threshold| (threshold.get)(&settings.segment));
@@ -75,7 +75,7 @@ impl Measure {
     }
 }
 
-/// Counts of all measures.
+/// Histograms of all measures.
 pub struct MeasureCounts(Vec<Counts>);
 
 impl MeasureCounts {
@@ -101,18 +101,18 @@ impl MeasureCounts {
         }
     }
 
-    /// Counts the bone changes of a video's frames.
+    /// Counts the bone length changes of a video's frames.
     pub fn add_bones(&mut self, bone_change: &[f32]) {
         self.add(BONES, bone_change.iter().map(|value| f64::from(*value)));
     }
 
-    /// Counts the intervals that a video keeps.
+    /// Counts the accepted intervals of a video.
     pub fn add_kept(&mut self, ledger: &Ledger) {
         self.add(LENGTHS, ledger.kept.iter().map(|kept| kept.end_secs - kept.start_secs));
     }
 }
 
-/// Card for each measure.
+/// Section with a card for each measure.
 pub fn distributions(spread: &MeasureCounts, settings: &Settings, per_sec: f64) -> Vec<Node> {
     let about = "Of all frames of all videos, also the refused ones. The side that does not pass is in the other colour; \
                  heights go with the square root of the share, so that rare values can be seen; what lies beyond an end is in \
@@ -151,7 +151,7 @@ mod tests {
     use orator_base::stage::ledger::Kept;
 
     #[test]
-    fn every_measure_is_counted_but_those_that_are_yes_or_no() {
+    fn every_measure_is_counted_except_boolean_ones() {
         let names = Measures::default().arrays().map(|(name, _)| name);
         let missing: Vec<&str> = names.into_iter().filter(|name| ROWS.iter().all(|row| row.name != *name)).collect();
         assert_eq!(missing, ["sound", "left_other", "right_other", "identity"]);

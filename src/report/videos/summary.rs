@@ -1,4 +1,4 @@
-//! First sections: totals, seconds by reason, and a table of videos.
+//! First sections of the report: totals, seconds by reason, and a table of videos.
 
 use super::reasons;
 use super::reasons::WAITING;
@@ -15,14 +15,18 @@ use orator_dataset::config::videos::Videos;
 use orator_dataset::info::{DatasetInfo, DatasetVideo};
 use std::collections::BTreeMap;
 
-/// Seconds of all videos together.
+/// Total seconds over all videos.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReportTotals {
+    /// All footage.
     pub whole: f64,
     pub kept: f64,
     pub failed: f64,
+    /// Not processed yet.
     pub waiting: f64,
+    /// By reason.
     pub refused: BTreeMap<String, f64>,
+    /// Number of accepted intervals.
     pub n_kept: usize,
 }
 
@@ -49,7 +53,7 @@ impl ReportTotals {
     }
 }
 
-/// Totals as tiles, with notes.
+/// Section of totals: tiles, a table of speakers, and notes.
 pub fn totals(sums: &ReportTotals, videos: &[VideoSummary], missing: &[String]) -> Vec<Node> {
     let tile = |name: &str, id: &str, secs: f64, description: String| {
         let value = node("b").id(id).attr("data-secs", format!("{secs:.3}")).text(length(secs));
@@ -71,9 +75,9 @@ pub fn totals(sums: &ReportTotals, videos: &[VideoSummary], missing: &[String]) 
     std::iter::once(node("div").class("tiles").children(tiles)).chain(speakers).chain(notes).collect()
 }
 
-/// What told speech from other sound.
-pub fn speech((n_heard, n_videos): (usize, usize)) -> Node {
-    let text = match n_heard {
+/// Note on how speech was detected.
+pub fn speech((n_speech_model, n_videos): (usize, usize)) -> Node {
+    let text = match n_speech_model {
         0 => "Speech was told by loudness alone; min_speech changes nothing.".to_owned(),
         n if n == n_videos => "Speech was told by the speech model beside loudness.".to_owned(),
         n => {
@@ -83,10 +87,10 @@ pub fn speech((n_heard, n_videos): (usize, usize)) -> Node {
     node("p").class("note").text(text)
 }
 
-/// Part of all seconds: name, CSS class of its colour, seconds, and its meaning in a sentence, which may be empty.
+/// Part of all footage: name, CSS class of its colour, seconds, and its description, which may be empty.
 type Part<'a> = (&'a str, String, f64, &'static str);
 
-/// Bar for each reason, the longest first.
+/// Section with a bar for each reason, the longest first.
 pub fn by_reason(sums: &ReportTotals) -> Vec<Node> {
     let of_reason =
         |(reason, secs): (&'_ String, &f64)| (reason.clone(), reasons::class(reason), *secs, reasons::heading(reason));
@@ -106,7 +110,7 @@ pub fn by_reason(sums: &ReportTotals) -> Vec<Node> {
     vec![node("table").class("bars").child(caption).child(node("tbody").children(rows))]
 }
 
-/// Row of a part; its bar is relative to the `longest`, its share to the `whole`.
+/// Table row of a part; the bar is relative to `longest`, the percentage to `whole`.
 fn bar((name, class, secs, description): &Part, longest: f64, whole: f64) -> Node {
     let style = format!("width:{:.2}%", 100.0 * secs / longest);
     let name = node("th").attr("scope", "row").text(name);
@@ -116,7 +120,7 @@ fn bar((name, class, secs, description): &Part, longest: f64, whole: f64) -> Nod
     node("tr").child(name).child(node("td").class("barcell").child(drawn)).children(cells)
 }
 
-/// Table of the speakers, where there are several.
+/// Table of speakers; `None` if there is only one.
 fn by_speaker(videos: &[VideoSummary]) -> Option<Node> {
     let mut of_speakers: BTreeMap<&str, Vec<VideoSummary>> = BTreeMap::new();
     for video in videos {
@@ -138,7 +142,7 @@ fn head((name, class): (&str, &str)) -> Node {
     node("th").class(class).attr("scope", "col").text(name)
 }
 
-/// Table of videos, linked to their timelines. `splits` are the splits of each, where a dataset has it.
+/// Table of videos, linked to their timelines. `splits` names the splits of videos that are in a dataset.
 pub fn table(videos: &[VideoSummary], splits: &VideoSplits) -> Vec<Node> {
     let heads =
         [("Video", ""), ("Length", "num"), ("Kept", "num"), ("", "num"), ("Split", ""), ("Most refused for", "")];
@@ -169,24 +173,24 @@ pub fn table(videos: &[VideoSummary], splits: &VideoSplits) -> Vec<Node> {
     vec![around.child(html::table("videos", heads.map(head), videos.iter().map(row)))]
 }
 
-/// The splits of each video in words, by `speaker/video`.
+/// Names of the splits of each video, by `speaker/video`.
 pub type VideoSplits = BTreeMap<String, String>;
 
 /// Splits of all videos that are in a dataset; a speaker without a dataset has none.
 pub fn video_splits(settings: &Settings, videos: &[Videos]) -> VideoSplits {
     let mut splits = VideoSplits::new();
     for Videos { speaker, .. } in videos {
-        // One file, which is whole also while a run replaces the dataset.
+        // A single file is read, which is consistent even while a run replaces the dataset.
         let info = std::fs::read(speaker_dir(&settings.work.dir, StageName::Dataset, speaker).join(INFO));
         let info: Option<DatasetInfo> = info.ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
         let named = info.iter().flat_map(|info| &info.videos).filter(|video| video.samples > 0);
-        splits.extend(named.map(|video| (format!("{speaker}/{}", video.name), split_words(video))));
+        splits.extend(named.map(|video| (format!("{speaker}/{}", video.name), split_names(video))));
     }
     splits
 }
 
-/// Split of a video, or those of its blocks of time.
-fn split_words(video: &DatasetVideo) -> String {
+/// Names of the splits of a video or of its time blocks.
+fn split_names(video: &DatasetVideo) -> String {
     let has =
         |split: &Split| video.split == Some(*split) || video.blocks.iter().any(|block| block.split == Some(*split));
     Split::ALL.into_iter().filter(has).map(Split::name).collect::<Vec<_>>().join(", ")

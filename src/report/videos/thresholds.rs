@@ -1,16 +1,16 @@
-//! Thresholds of `[segment]` with sliders: meaning, and grid of values.
+//! Thresholds of `[segment]` that have sliders, with their descriptions and grids of values.
 
 use orator_dataset::config::SegmentConfig;
 
-/// Steps between the ends of a grid.
+/// Number of steps between the ends of a grid.
 const N_STEPS: u32 = 20;
 
-/// Threshold with its grid.
+/// Threshold with its grid of values.
 pub struct ThresholdGrid {
     /// Key in `[segment]`.
     pub key: &'static str,
     pub description: &'static str,
-    /// Unit; empty for a score or a share, 0 to 1.
+    /// Unit; empty for a score or share in 0..1.
     pub unit: &'static str,
     /// Ends of the grid.
     pub low: f64,
@@ -19,7 +19,7 @@ pub struct ThresholdGrid {
     pub set: fn(&mut SegmentConfig, f64),
 }
 
-/// A field as f64, where it is a whole number.
+/// Converts a field to f64; the second argument is the type of an integer field.
 macro_rules! as_number {
     ($value:expr, usize) => {
         $value as f64
@@ -32,7 +32,7 @@ macro_rules! as_number {
     };
 }
 
-/// Grid of a threshold: key, sentence, unit, ends, and the type of the field where it is a whole number.
+/// Defines a [`ThresholdGrid`]: key, description, unit, ends of the grid, and the type of an integer field.
 macro_rules! row {
     ($key:ident, $description:literal, $unit:literal, $low:literal, $high:literal $(, $whole:ident)?) => {
         ThresholdGrid {
@@ -47,7 +47,7 @@ macro_rules! row {
     };
 }
 
-/// Thresholds of `[segment]`.
+/// All thresholds with sliders.
 pub const THRESHOLDS: [ThresholdGrid; 19] = [
     row!(min_sound_db, "least loudness of the second around a frame", "dB of full scale", -90.0, -10.0),
     row!(min_speech, "least share of speech in the 4 s around a frame", "", 0.0, 1.0),
@@ -77,7 +77,7 @@ pub const THRESHOLDS: [ThresholdGrid; 19] = [
 ];
 
 impl ThresholdGrid {
-    /// Values of the grid, ascending, and the index of the configured one.
+    /// Values of the grid in ascending order, including the configured one, and the index of the latter.
     pub fn grid(&self, rules: &SegmentConfig) -> (Vec<f64>, usize) {
         let configured = (self.get)(rules);
         let step = (self.high - self.low) / f64::from(N_STEPS);
@@ -96,7 +96,7 @@ impl ThresholdGrid {
         other
     }
 
-    /// Value as written in `pipeline.toml`.
+    /// Value in the format of `pipeline.toml`.
     pub fn written(&self, value: f64) -> String {
         match self.key {
             "max_people" | "min_frames" => format!("{value:.0}"),

@@ -1,4 +1,4 @@
-//! Timeline of each video: kept seconds, and the reasons of the others.
+//! Report section with a timeline of each video: accepted seconds, and the reasons for the others.
 
 use super::reasons;
 use super::reasons::WAITING;
@@ -11,16 +11,17 @@ use orator_base::stage::counted;
 use orator_base::stage::ledger::Kept;
 use std::collections::BTreeSet;
 
-/// Largest number of parts of all timelines together, which bounds the page, and smallest number of each.
-const MOST: usize = 40_000;
-const LEAST: usize = 50;
-/// Smallest width of a timeline as a share of the longest one's.
-const NARROWEST: f64 = 0.05;
+/// Maximum number of intervals of all timelines together, which bounds the size of the page.
+const MAX_SPANS: usize = 40_000;
+/// Number of intervals that each timeline may have in any case.
+const MIN_SPANS: usize = 50;
+/// Minimum width of a timeline relative to the longest.
+const MIN_WIDTH: f64 = 0.05;
 
-/// Timelines of all videos under their legend.
+/// Section with the timelines of all videos and their legend.
 pub fn lines(videos: &[VideoSummary]) -> Vec<Node> {
     let longest = videos.iter().map(|video| video.ledger.duration_secs).fold(0.0, f64::max).max(1e-9);
-    let most = (MOST / videos.len().max(1)).max(LEAST);
+    let max_spans = (MAX_SPANS / videos.len().max(1)).max(MIN_SPANS);
     let wide = node("label")
         .class("wide small")
         .child(node("input").attr("type", "checkbox").id("wide"))
@@ -46,10 +47,10 @@ pub fn lines(videos: &[VideoSummary]) -> Vec<Node> {
             length(ledger.duration_secs),
             counted(ledger.kept.len(), "interval")
         );
-        let share = (ledger.duration_secs / longest).max(NARROWEST);
+        let share = (ledger.duration_secs / longest).max(MIN_WIDTH);
         let title = node("h3").child(node("span").text(&video.file)).child(node("small").text(about));
         let line = if ledger.duration_secs > 0.0 {
-            timeline(&format!("Timeline of {}", video.file), ledger.duration_secs, &stretches(video), most)
+            timeline(&format!("Timeline of {}", video.file), ledger.duration_secs, &spans(video), max_spans)
         } else {
             node("p").class("empty").text("Nothing is known of its seconds.")
         };
@@ -60,10 +61,10 @@ pub fn lines(videos: &[VideoSummary]) -> Vec<Node> {
     shown
 }
 
-/// Parts of a ledger in order.
-fn stretches(video: &VideoSummary) -> Vec<TimelineSpan> {
+/// Intervals of a ledger, sorted by start.
+fn spans(video: &VideoSummary) -> Vec<TimelineSpan> {
     let ledger = &video.ledger;
-    let stretch = |start_secs: f64, end_secs: f64, class: String, word: &str, description: String| TimelineSpan {
+    let timeline_span = |start_secs: f64, end_secs: f64, class: String, word: &str, description: String| TimelineSpan {
         start_secs,
         end_secs,
         class,
@@ -82,18 +83,26 @@ fn stretches(video: &VideoSummary) -> Vec<TimelineSpan> {
         let span = |rest: &Kept| format!("hands at rest {} to {}", clock(rest.start_secs), clock(rest.end_secs));
         ledger.resting.iter().filter(inside).map(span).collect::<Vec<_>>().join("\n")
     };
-    let kept =
-        ledger.kept.iter().map(|kept| stretch(kept.start_secs, kept.end_secs, "kept".to_owned(), "kept", rests(kept)));
+    let kept = ledger
+        .kept
+        .iter()
+        .map(|kept| timeline_span(kept.start_secs, kept.end_secs, "kept".to_owned(), "kept", rests(kept)));
     let refused = ledger.refused.iter().map(|refused| {
         let (measured, threshold) = (refused.measured, with_unit(refused.threshold, &refused.unit));
         let description =
             format!("{}\nmeasured {}, threshold {threshold}", refused.message, with_unit(measured, &refused.unit));
-        stretch(refused.start_secs, refused.end_secs, reasons::class(&refused.reason), &refused.reason, description)
+        timeline_span(
+            refused.start_secs,
+            refused.end_secs,
+            reasons::class(&refused.reason),
+            &refused.reason,
+            description,
+        )
     });
     let failed = ledger.failed.iter().map(|failed| {
         let (class, word) = if failed.stage == WAITING { ("waiting", WAITING) } else { ("failed", "failed") };
         let description = video.notes.first().cloned().unwrap_or_default();
-        stretch(failed.start_secs, failed.end_secs, class.to_owned(), word, description)
+        timeline_span(failed.start_secs, failed.end_secs, class.to_owned(), word, description)
     });
     let mut all: Vec<TimelineSpan> = kept.chain(refused).chain(failed).collect();
     all.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));

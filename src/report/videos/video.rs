@@ -1,4 +1,4 @@
-//! State of a video: its ledger after the last finished stage, or the reason why there is none.
+//! State of a video in the report: its ledger after the last completed stage, or the reason why there is none.
 
 use super::reasons::WAITING;
 use orator_base::stage::Unit;
@@ -9,26 +9,26 @@ use orator_formats::media_json::MediaInfo;
 use orator_formats::sound_offset_json;
 use std::path::Path;
 
-/// Video of the report.
+/// Summary of a video in the report.
 #[derive(Clone, Debug)]
 pub struct VideoSummary {
     pub unit: Unit,
     /// File name.
     pub file: String,
-    /// Ledger of the whole video; empty where not even its length is known.
+    /// Ledger of the video; empty if its length is unknown.
     pub ledger: Ledger,
     /// Whether the lift stage has finished.
     pub is_lifted: bool,
     /// Whether a stage failed.
     pub has_failed: bool,
-    /// Missing data, in sentences.
+    /// Notes on missing data and on properties of the file, a sentence each.
     pub notes: Vec<String>,
-    /// Local folders and their replacements on the page.
+    /// Local folder names and their replacements on the page.
     folders: [(String, &'static str); 2],
 }
 
 impl VideoSummary {
-    /// Reads the state of `unit` from the folder `work`. What cannot be read is a note.
+    /// Reads the state of `unit` from the folder `work`; unreadable data becomes a note.
     pub fn read(work: &Path, unit: &Unit) -> Self {
         let file = unit.source.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let folders = [(work, "work"), (unit.source.parent().unwrap_or(work), "")];
@@ -47,8 +47,8 @@ impl VideoSummary {
         }
         if let Ok(media) = MediaInfo::read(&Artifact::MediaInfo.path(work, unit)) {
             media.remarks().iter().for_each(|remark| video.note(&format!("In the file: {remark}.")));
-            if let Some(said) = media.not_judged() {
-                video.note(&format!("Made {said}."));
+            if let Some(reason) = media.not_judged() {
+                video.note(&format!("Made {reason}."));
             }
         }
         if let Some(offset) = sound_offset_json::read(&Artifact::SoundOffset.path(work, unit)).ok().flatten()
@@ -60,7 +60,7 @@ impl VideoSummary {
             .into_iter()
             .find_map(|stage| Some((stage, Failure::read(&dir(work, stage, unit))?.error)));
         if let Some((stage, error)) = failure {
-            video.lose(work, stage.as_str(), &error);
+            video.mark_unavailable(work, stage.as_str(), &error);
             return video;
         }
         for file in [Artifact::LiftLedger, Artifact::SegmentLedger] {
@@ -79,12 +79,12 @@ impl VideoSummary {
                 Err(error) => video.note(&format!("{error:#}")),
             }
         }
-        video.lose(work, WAITING, "no verdict yet: orator run");
+        video.mark_unavailable(work, WAITING, "no verdict yet: orator run");
         video
     }
 
-    /// Records a failed stage.
-    fn lose(&mut self, work: &Path, stage: &str, error: &str) {
+    /// Marks all seconds as failed in `stage` or, for `WAITING`, as not processed yet.
+    fn mark_unavailable(&mut self, work: &Path, stage: &str, error: &str) {
         let media = MediaInfo::read(&Artifact::MediaInfo.path(work, &self.unit));
         let secs = media.ok().map(|media| media.duration_secs).filter(|secs| *secs > 0.0);
         self.ledger = secs.map_or_else(Ledger::default, |secs| Ledger::failed(secs, stage, error));
@@ -98,7 +98,7 @@ impl VideoSummary {
         }
     }
 
-    /// Adds a note without local folder names.
+    /// Adds a note with local folder names replaced.
     pub fn note(&mut self, text: &str) {
         let text = self.folders.iter().fold(text.to_owned(), |text, (folder, name)| {
             if name.is_empty() { text.replace(&format!("{folder}/"), "") } else { text.replace(folder, name) }
@@ -106,7 +106,7 @@ impl VideoSummary {
         self.notes.push(text);
     }
 
-    /// Anchor of its timeline.
+    /// Anchor of the video's timeline on the page.
     pub fn anchor(&self) -> String {
         format!("video-{}-{}", self.unit.speaker, self.unit.video)
     }

@@ -1,6 +1,6 @@
-//! What other thresholds would keep: `segment` judges the stored measures again and `lift` takes frames out again, with one
-//! threshold at each value of its grid and the others as they are configured. Frames that lifting left open stay refused;
-//! frames that were never lifted count as good ones.
+//! Accepted seconds with other thresholds: the rules of `segment` are applied again to the stored measures, and those
+//! of `lift` to the stored bone changes, with one threshold at each value of its grid and the others as configured.
+//! Frames that lifting left open stay refused; frames that were never lifted count as good.
 
 use super::thresholds::THRESHOLDS;
 use orator_base::stage::ledger::Ledger;
@@ -12,23 +12,23 @@ use orator_pipeline::segment;
 use orator_pipeline::segment::Measures;
 use rayon::prelude::*;
 
-/// Seconds kept of one video: by threshold, by value of its grid.
+/// Accepted seconds of one video, by threshold and by value of its grid.
 pub type KeptByThreshold = Vec<Vec<f64>>;
 
-/// A video as far as the rules look at it.
+/// Data of a video that the rules depend on.
 pub struct JudgedVideo<'a> {
     pub measures: &'a Measures,
     pub video: &'a MediaInfo,
-    /// What lifting measured of each frame's bones; empty where the video is not lifted.
+    /// Relative change of bone length in each frame, measured by the lift stage; empty if the video is not lifted.
     pub bone_change: &'a [f32],
-    /// Farthest that a bone may be off its length.
+    /// Largest accepted relative change of a bone's length.
     pub max_bone_change: f64,
-    /// Frames that lifting left open; empty where the video is not lifted.
+    /// Refusals of the frames that the lift stage left open; empty if the video is not lifted.
     pub open: &'a [Option<FrameRefusal>],
 }
 
 impl JudgedVideo<'_> {
-    /// The account under `rules`.
+    /// Ledger of the video under `rules`.
     pub fn ledger(&self, rules: &SegmentConfig) -> Ledger {
         let (mut intervals, mut ledger) = segment::judge(self.measures, self.video, rules);
         let bones = bone_refusals(self.bone_change, self.max_bone_change, max_gap_frames(rules, self.video.fps));
@@ -42,12 +42,12 @@ impl JudgedVideo<'_> {
         ledger
     }
 
-    /// Seconds kept under `rules`.
+    /// Accepted seconds under `rules`.
     pub fn kept_secs(&self, rules: &SegmentConfig) -> f64 {
         self.ledger(rules).kept_secs()
     }
 
-    /// Seconds kept at every value of every threshold, on all cores.
+    /// Accepted seconds at every value of every threshold, computed on all cores.
     pub fn table(&self, rules: &SegmentConfig) -> KeptByThreshold {
         let row = |threshold: &super::thresholds::ThresholdGrid| -> Vec<f64> {
             let (grid, _) = threshold.grid(rules);
@@ -57,16 +57,16 @@ impl JudgedVideo<'_> {
     }
 }
 
-/// The frames of a lifted video's ledger that were left open.
+/// Refusal of each frame that the ledger of a lifted video lists as left open.
 pub fn open_frames(ledger: &Ledger, video: &MediaInfo) -> Vec<Option<FrameRefusal>> {
     let mut open = vec![None; video.n_frames];
     let is_open = |reason: &str, unit: &str| Refusal::find(reason, unit) == Some(Refusal::MissingJoints);
-    for stretch in ledger.refused.iter().filter(|stretch| is_open(&stretch.reason, &stretch.unit)) {
+    for span in ledger.refused.iter().filter(|span| is_open(&span.reason, &span.unit)) {
         let frame = |secs: f64| ((secs * video.fps.per_sec()).round() as usize).min(video.n_frames);
-        // The last frame may be cut off by the video's end.
-        let end = if stretch.end_secs == video.duration_secs { video.n_frames } else { frame(stretch.end_secs) };
-        let why = FrameRefusal::new(Refusal::MissingJoints, stretch.measured, stretch.threshold);
-        open[frame(stretch.start_secs).min(end)..end].fill(Some(why));
+        // The video may end within the last frame.
+        let end = if span.end_secs == video.duration_secs { video.n_frames } else { frame(span.end_secs) };
+        let why = FrameRefusal::new(Refusal::MissingJoints, span.measured, span.threshold);
+        open[frame(span.start_secs).min(end)..end].fill(Some(why));
     }
     open
 }
@@ -77,7 +77,7 @@ mod tests {
     use orator_base::stage::ledger::Refused;
     use orator_base::types::time::FrameRate;
 
-    /// 300 good frames but for a jump at 200.
+    /// Measures of 300 good frames, except for a jump at frame 200.
     fn measures() -> Measures {
         let of = |value: f32| vec![value; 300];
         let mut jump = of(0.0);
@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn other_thresholds_keep_what_the_rules_say_and_what_lifting_refused_stays_out() {
+    fn other_thresholds_change_what_is_accepted_and_open_frames_stay_refused() {
         let video = MediaInfo::new(19.99, 300, FrameRate::new(15, 1));
         let (measures, rules) = (measures(), SegmentConfig::default());
         let max_bone_change = 0.4;
@@ -121,7 +121,7 @@ mod tests {
         bone_change[150..165].fill(0.9);
         bone_change[20] = 0.9;
         let some = JudgedVideo { bone_change: &bone_change, open: &open, ..none };
-        // frames 0..150 and 201..285: what is left between 165 and 180, and to 200, is too short
+        // Accepted are the frames 0..150 and 201..285; the remaining frames 165..180 and 195..200 are too short.
         assert!((some.kept_secs(&rules) - (10.0 + 84.0 / 15.0)).abs() < 1e-9);
         let table = some.table(&rules);
         for (threshold, row) in THRESHOLDS.iter().zip(&table) {

@@ -1,5 +1,5 @@
-//! Frames that best show what a rule refuses: of each refused span the frame farthest from the threshold, of each rule
-//! the worst spans. Ties follow the order of the videos, so the choice is deterministic.
+//! Choice of the frames that best illustrate a rule: in each refused span the frame furthest from the threshold, and
+//! for each rule the worst spans. Ties follow the order of the videos, so the choice is deterministic.
 
 use super::reasons;
 use crate::html::numbers::number;
@@ -11,38 +11,38 @@ use orator_pipeline::segment::Measures;
 use orator_pipeline::segment::table::{Bound, frame_rules, piece_rules};
 use std::collections::BTreeMap;
 
-/// Moment with a picture.
+/// Moment that is shown as a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Moment {
     /// Index of the video in the report.
     pub video: usize,
-    /// Frame, preceded by the one it is compared with where a rule compares two.
+    /// Frame, preceded by the previous frame if the rule compares two.
     pub frames: Vec<usize>,
     pub secs: f64,
-    /// Excess over the threshold.
+    /// Distance from the threshold.
     beyond: f64,
-    /// Sentence of the refusal.
+    /// Message of the refusal.
     pub description: String,
-    /// Value in this frame; empty where the rule is not about frames.
-    pub here: String,
+    /// Text with the value in this frame; empty for rules that are not about frames.
+    pub frame_value: String,
 }
 
-/// Index in the order, reason and unit: `turned` and `hands` are two rules each.
+/// Rank of the reason, reason and unit; the unit distinguishes the two rules each of `turned` and `hands`.
 type Rule = (usize, String, String);
 
-/// Worst moments of every rule.
+/// Collection of the worst moments of every rule.
 pub struct Worst {
     pub rules: BTreeMap<Rule, Vec<Moment>>,
-    /// Largest number of moments of a rule.
-    most: usize,
+    /// Maximum number of moments per rule.
+    max_moments: usize,
 }
 
 impl Worst {
-    pub fn new(most: usize) -> Self {
-        Self { rules: BTreeMap::new(), most }
+    pub fn new(max_moments: usize) -> Self {
+        Self { rules: BTreeMap::new(), max_moments }
     }
 
-    /// Adds a video's refused spans; `bone_change` may be empty.
+    /// Adds the refused spans of a video; `bone_change` is empty if the video is not lifted.
     pub fn add(
         &mut self,
         video: usize,
@@ -51,18 +51,18 @@ impl Worst {
         judged: &MediaInfo,
         rules: &SegmentConfig,
     ) {
-        for stretch in &ledger.refused {
-            let Some(moment) = moment(video, stretch, (measures, bone_change), judged, rules) else { continue };
-            let rule = (reasons::order(&stretch.reason), stretch.reason.clone(), stretch.unit.clone());
+        for span in &ledger.refused {
+            let Some(moment) = moment(video, span, (measures, bone_change), judged, rules) else { continue };
+            let rule = (reasons::order(&span.reason), span.reason.clone(), span.unit.clone());
             let moments = self.rules.entry(rule).or_default();
             let at = moments.partition_point(|other| other.beyond >= moment.beyond);
             moments.insert(at, moment);
-            moments.truncate(self.most);
+            moments.truncate(self.max_moments);
         }
         self.rules.retain(|_, moments| !moments.is_empty());
     }
 
-    /// Frames needed of a video, ascending.
+    /// Frames of a video that pictures need, in ascending order.
     pub fn frames_of(&self, video: usize) -> Vec<usize> {
         let moments = self.rules.values().flatten().filter(|moment| moment.video == video);
         let mut frames: Vec<usize> = moments.flat_map(|moment| moment.frames.iter().copied()).collect();
@@ -74,31 +74,31 @@ impl Worst {
 
 fn moment(
     video: usize,
-    stretch: &Refused,
+    span: &Refused,
     (measures, bone_change): (&Measures, &[f32]),
     judged: &MediaInfo,
     rules: &SegmentConfig,
 ) -> Option<Moment> {
     let n_frames = measures.n_frames();
     let frame = |secs: f64| (secs * judged.fps.per_sec()).round() as usize;
-    let start = frame(stretch.start_secs).min(n_frames.checked_sub(1)?);
-    let end = frame(stretch.end_secs).clamp(start + 1, n_frames);
-    let mean = (stretch.measured - stretch.threshold).abs();
-    let refusal = Refusal::find(&stretch.reason, &stretch.unit);
-    let (t, beyond, here) = match refusal {
+    let start = frame(span.start_secs).min(n_frames.checked_sub(1)?);
+    let end = frame(span.end_secs).clamp(start + 1, n_frames);
+    let mean = (span.measured - span.threshold).abs();
+    let refusal = Refusal::find(&span.reason, &span.unit);
+    let (t, beyond, frame_value) = match refusal {
         Some(refusal @ (Refusal::Cut | Refusal::Identity)) => {
             let score = if refusal == Refusal::Cut { &measures.shot_score } else { &measures.identity };
             let ends = [start, end.min(n_frames - 1)].into_iter().filter(|t| *t > 0);
             let t = ends.max_by(|a, b| score[*a].total_cmp(&score[*b]).then(b.cmp(a)))?;
-            (t, mean, said(refusal, f64::from(score[t])))
+            (t, mean, value_text(refusal, f64::from(score[t])))
         }
         Some(Refusal::Bones) if bone_change.len() == n_frames => {
             let (t, value) = extreme(bone_change, start..end, false);
-            (t, (value - stretch.threshold).abs(), format!("{} off its length here", number(value)))
+            (t, (value - span.threshold).abs(), format!("{} off its length here", number(value)))
         }
         Some(refusal) => match farthest(refusal, measures, rules, start..end) {
             Some((t, value, bound, is_mean)) => {
-                (t, if is_mean { (value - bound.threshold()).abs() } else { mean }, said(refusal, value))
+                (t, if is_mean { (value - bound.threshold()).abs() } else { mean }, value_text(refusal, value))
             }
             None => (start.midpoint(end - 1), mean, String::new()),
         },
@@ -107,10 +107,11 @@ fn moment(
     let compares = matches!(refusal, Some(Refusal::Cut | Refusal::Identity | Refusal::Jump)) && t > 0;
     let frames = if compares { vec![t - 1, t] } else { vec![t] };
     let beyond = if beyond.is_finite() { beyond } else { 0.0 };
-    Some(Moment { video, frames, secs: judged.fps.secs(t), beyond, description: stretch.message.clone(), here })
+    Some(Moment { video, frames, secs: judged.fps.secs(t), beyond, description: span.message.clone(), frame_value })
 }
 
-/// Frame that breaks the refusal's rules most: index, value, bound, and whether the ledger means that value.
+/// Frame that violates the rules of the refusal most: index, value, bound, and whether the ledger measures that value
+/// rather than a duration or share.
 fn farthest(
     refusal: Refusal,
     measures: &Measures,
@@ -119,7 +120,8 @@ fn farthest(
 ) -> Option<(usize, f64, Bound, bool)> {
     let on_frames = frame_rules(rules).into_iter().filter(|rule| rule.refusal == refusal);
     let on_frames = on_frames.map(|rule| (rule.values, rule.bound, !rule.measures_secs));
-    // For a minimum share the frames that do not count are the bad ones; for a maximum share those that do.
+    // If the rule requires a minimum share, frames that do not count are bad; for a maximum share, those that count
+    // are.
     let on_pieces = piece_rules(rules).into_iter().filter(|rule| rule.refusal == refusal).map(|rule| {
         let bad = match rule.share {
             Bound::AtLeast(_) => rule.counted,
@@ -137,7 +139,8 @@ fn farthest(
     known.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, found)| found)
 }
 
-/// Smallest (or largest) known value of the frames; of equal ones that nearest the middle.
+/// Frame with the smallest (or largest) known value, ties going to the one nearest the middle, and the value; NaN if no
+/// value is known.
 fn extreme(values: &[f32], frames: std::ops::Range<usize>, lowest: bool) -> (usize, f64) {
     let middle = frames.start.midpoint(frames.end.saturating_sub(1));
     let known = frames.filter(|t| !values[*t].is_nan());
@@ -146,8 +149,8 @@ fn extreme(values: &[f32], frames: std::ops::Range<usize>, lowest: bool) -> (usi
     t.map_or((middle, f64::NAN), |t| (t, f64::from(values[t])))
 }
 
-/// Value of a frame, in words.
-fn said(refusal: Refusal, value: f64) -> String {
+/// Text with the value in a frame.
+fn value_text(refusal: Refusal, value: f64) -> String {
     let value = number(value);
     match refusal {
         Refusal::Quiet => format!("{value} dB here"),
@@ -174,21 +177,21 @@ mod tests {
     use orator_base::types::time::FrameRate;
 
     #[test]
-    fn the_worst_frame_of_the_worst_stretches_is_taken() {
+    fn the_worst_frame_of_the_worst_spans_is_chosen() {
         let of = |value: f32| vec![value; 100];
         let mut measures = Measures { person: of(0.9), left_hand: of(0.9), right_hand: of(0.9), ..Measures::default() };
         measures.jump = of(0.1);
         (measures.jump[20], measures.jump[50]) = (0.8, 1.8);
         measures.right_hand[70..90].fill(0.2);
         measures.right_hand[74] = 0.1;
-        let stretch = |start: f64, end: f64, refusal: Refusal, measured: f64| {
+        let span = |start: f64, end: f64, refusal: Refusal, measured: f64| {
             Refused::new(start, end, FrameRefusal::new(refusal, measured, 0.5))
         };
         let refused = vec![
-            stretch(2.0, 2.1, Refusal::Jump, 0.8),
-            stretch(5.0, 5.1, Refusal::Jump, 1.8),
-            stretch(7.0, 9.0, Refusal::HandGap, 2.0),
-            stretch(9.0, 9.5, Refusal::TooShort, 0.5),
+            span(2.0, 2.1, Refusal::Jump, 0.8),
+            span(5.0, 5.1, Refusal::Jump, 1.8),
+            span(7.0, 9.0, Refusal::HandGap, 2.0),
+            span(9.0, 9.5, Refusal::TooShort, 0.5),
         ];
         let ledger = Ledger { duration_secs: 10.0, refused, ..Ledger::default() };
         let judged = MediaInfo::new(10.0, 100, FrameRate::new(10, 1));

@@ -6,7 +6,7 @@ use super::study_file::{StudyFile, fill_in};
 use anyhow::{Context, Result};
 use orator_base::input;
 use orator_base::stage::workdir;
-use orator_dataset::config::file::{line_of, nearest, refused};
+use orator_dataset::config::file::{did_you_mean, line_of, rejection_message};
 use orator_dataset::config::{ConfigError, Problem, SourceLocation};
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -81,7 +81,7 @@ fn preset_of(written: &DeTable<'_>) -> Result<Option<StudyPreset>, (usize, Strin
     preset.map(Some).ok_or_else(|| {
         let known = StudyPreset::ALL.map(|preset| preset.name().to_owned());
         let message = format!("preset: {name:?} is not known: expected {}", known.join(" or "));
-        (value.span().start, message + &nearest(name, known.iter()))
+        (value.span().start, message + &did_you_mean(name, known.iter()))
     })
 }
 
@@ -94,12 +94,12 @@ fn worded(text: &str, error: &toml::de::Error, spans: &BTreeMap<String, Range<us
     let quoted: Vec<String> = message.split('`').skip(1).step_by(2).map(str::to_owned).collect();
     let message = if message.starts_with("unknown field") {
         let (name, known) = quoted.split_first().map_or(("", &[][..]), |(name, known)| (name.as_str(), known));
-        let near = nearest(name, known.iter());
+        let near = did_you_mean(name, known.iter());
         let is_named = key.rsplit('.').next() == Some(name);
         let listed = format!("the keys here are {}", known.join(", "));
         if is_named { format!("unknown key{near}; {listed}") } else { format!("unknown key {name}{near}; {listed}") }
     } else if message.starts_with("unknown variant") {
-        refused(&toml::Value::String(quoted.first().cloned().unwrap_or_default()), message)
+        rejection_message(&toml::Value::String(quoted.first().cloned().unwrap_or_default()), message)
     } else if message.starts_with("missing field") {
         format!("the key {} is missing", quoted.first().map_or("", String::as_str))
     } else {

@@ -4,7 +4,7 @@ use super::condition::{ConditionSource, StudyCondition};
 use super::study_file::{HypothesisKind, StudyFile, StudyHypothesis, StudyTask};
 use crate::pages::page_texts::text_keys;
 use crate::plan::TaskDesign;
-use orator_dataset::config::file::nearest;
+use orator_dataset::config::file::did_you_mean;
 use std::collections::BTreeSet;
 
 /// Keys of a file that break a rule, with what was expected and what to do.
@@ -85,7 +85,7 @@ impl StudyRules<'_> {
         let known = text_keys(file.task.iter().map(|task| task.name.as_str()));
         let keys = file.texts.iter().flat_map(|(language, texts)| texts.keys().map(move |key| (language, key)));
         for (language, key) in keys.filter(|(_, key)| !known.contains(key)) {
-            let message = format!("the page has no such text{}", nearest(key, known.iter()));
+            let message = format!("the page has no such text{}", did_you_mean(key, known.iter()));
             self.say(format!("texts.{language}.{key}"), message);
         }
         if file.task.is_empty() {
@@ -131,7 +131,7 @@ impl StudyRules<'_> {
         let known: Vec<String> = self.file.condition.iter().map(|condition| condition.name.clone()).collect();
         let is_known = known.iter().any(|other| other == name);
         if !is_known {
-            let near = nearest(name, known.iter());
+            let near = did_you_mean(name, known.iter());
             self.say(key, format!("no condition is called {name:?}{near}; there are: {}", known.join(", ")));
         }
         is_known
@@ -199,7 +199,7 @@ impl StudyRules<'_> {
         let scales = ["human-likeness", "appropriateness"];
         match task.design {
             TaskDesign::Sliders if !scales.contains(&task.scale.as_str()) => {
-                let near = nearest(&task.scale, scales.map(str::to_owned).iter());
+                let near = did_you_mean(&task.scale, scales.map(str::to_owned).iter());
                 self.say(key("scale"), format!("{:?}: expected {}{near}", task.scale, scales.join(" or ")));
             }
             TaskDesign::Sliders => {}
@@ -218,7 +218,7 @@ impl StudyRules<'_> {
         let key = |key: &str| format!("hypothesis[{at}].{key}");
         let known: Vec<String> = self.file.task.iter().map(|task| task.name.clone()).collect();
         let Some(task) = self.file.task.iter().find(|task| task.name == hypothesis.task) else {
-            let near = nearest(&hypothesis.task, known.iter());
+            let near = did_you_mean(&hypothesis.task, known.iter());
             let message = format!("no task is called {:?}{near}; there are: {}", hypothesis.task, known.join(", "));
             return self.say(key("task"), message);
         };

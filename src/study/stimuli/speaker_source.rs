@@ -7,7 +7,7 @@ use orator_base::types::sound::Sound;
 use orator_base::types::split::Split;
 use orator_base::types::time::FrameRate;
 use orator_dataset::Dataset;
-use orator_dataset::config::patterns::{OF_SOUNDS, OF_TRANSCRIPTS, SearchRoot, expand};
+use orator_dataset::config::patterns::{SOUND_EXTENSIONS, SearchRoot, TRANSCRIPT_EXTENSIONS, expand};
 use orator_dataset::index::SampleRef;
 use orator_formats::transcript::{Transcript, Word};
 use orator_media::ffmpeg::audio;
@@ -76,7 +76,7 @@ impl SpeakerSource {
     pub fn of_sounds(name: &str, pattern: &Path, fps: FrameRate) -> Result<Self> {
         let (mut missing, entry) = (Vec::new(), pattern.to_string_lossy());
         let root = SearchRoot::new(Path::new("/"), &[]);
-        let found = expand(&entry, &root, ("sound", &OF_SOUNDS), &mut missing).map_err(anyhow::Error::msg);
+        let found = expand(&entry, &root, ("sound", &SOUND_EXTENSIONS), &mut missing).map_err(anyhow::Error::msg);
         let mut files = found.with_context(|| format!("sounds of the speaker {name}"))?;
         ensure!(missing.is_empty(), "sounds of the speaker {name}: {}", missing.join("; "));
         files.sort();
@@ -123,5 +123,5 @@ impl SpeakerSource {
 
 /// Transcript of the sound's own name in its folder.
 fn transcript_beside(sound: &Path) -> Option<PathBuf> {
-    OF_TRANSCRIPTS.iter().map(|ending| sound.with_extension(ending)).find(|path| path.is_file())
+    TRANSCRIPT_EXTENSIONS.iter().map(|ending| sound.with_extension(ending)).find(|path| path.is_file())
 }

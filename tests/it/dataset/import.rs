@@ -11,7 +11,7 @@ use orator_dataset::import::take::TakeLimits;
 use orator_dataset::import::write::ImportPlan;
 use orator_dataset::import::{Imported, import, shards};
 use orator_dataset::info::About;
-use orator_dataset::verify::verify::{accounts, verify};
+use orator_dataset::verify::verify::{read_ledgers, verify};
 use orator_dataset::{Dataset, Sample};
 use orator_formats::mocap::captured;
 use orator_formats::mocap::captured::CapturedMotion;
@@ -127,7 +127,7 @@ fn a_folder_of_bvh_and_sound_becomes_a_dataset() {
     let says = |stem: &str| answer.lines.iter().find(|line| line.file.contains(stem)).unwrap().message.clone();
     assert!(says("broken").contains("broken.bvh"), "{}", says("broken"));
     assert!(says("apart").contains("1.333 s apart"), "{}", says("apart"));
-    for account in accounts(&out).unwrap().iter().filter(|account| account.failure.is_none()) {
+    for account in read_ledgers(&out).unwrap().iter().filter(|account| account.failure.is_none()) {
         assert!(account.ledger.is_whole(), "{account:?}");
     }
 

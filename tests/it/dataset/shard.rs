@@ -10,7 +10,7 @@ use orator_base::types::skeleton::{L_HAND, parent};
 use orator_base::types::sound::samples_of;
 use orator_dataset::config::SplitUnit;
 use orator_dataset::split::SplitBy;
-use orator_dataset::verify::verify::{accounts, verify};
+use orator_dataset::verify::verify::{read_ledgers, verify};
 use orator_dataset::{Dataset, Split};
 use orator_test_support::project::files_under;
 use std::fs;
@@ -193,7 +193,7 @@ fn what_is_not_there_is_said() {
     assert!(line.contains("1 video left out, a stage before failed"), "{line}");
     assert!(line.contains("1 video left out, the same content is there already"), "{line}");
     assert_eq!(Dataset::open(&out).unwrap().info().splits["train"].videos.len(), 1);
-    let accounts = accounts(&out).unwrap();
+    let accounts = read_ledgers(&out).unwrap();
     let of = |name: &str| accounts.iter().find(|account| account.file == format!("{name}.mp4")).unwrap();
     assert_eq!(of("never").failure.as_deref(), Some("run: not every stage is done"));
     let twice = if of("twin").split.is_none() { of("twin") } else { of("good") };

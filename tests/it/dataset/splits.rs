@@ -14,10 +14,10 @@ use std::fs;
 use std::path::Path;
 
 const PLAN: SplitPlan =
-    SplitPlan { unit: SplitUnit::Video, validation: 0.15, test: 0.1, guard_secs: 8.0, least_secs: 9.0 };
+    SplitPlan { unit: SplitUnit::Video, validation: 0.15, test: 0.1, guard_secs: 8.0, min_block_secs: 9.0 };
 
 fn new(name: &str, secs: f64) -> Unassigned<'_> {
-    Unassigned { name, content: name, duration_secs: secs, kept: vec![(0.0, secs)], named: None, before: None }
+    Unassigned { name, content: name, duration_secs: secs, kept: vec![(0.0, secs)], named: None, recorded: None }
 }
 
 #[test]

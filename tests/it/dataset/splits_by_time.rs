@@ -9,7 +9,7 @@ use orator_base::stage::progress::Silent;
 use orator_base::types::sound::samples_of;
 use orator_dataset::config::{LiftConfig, SplitUnit};
 use orator_dataset::verify::verify::verify;
-use orator_dataset::write::part::VideoEntry;
+use orator_dataset::write::entry::VideoEntry;
 use orator_dataset::{Dataset, Split};
 use orator_gesture::train::gan::begin::normalisation;
 use orator_gesture::train::gan::windows::WindowLoader;

@@ -12,7 +12,7 @@ use orator_dataset::import::import;
 use orator_dataset::import::take::TakeLimits;
 use orator_dataset::import::write::ImportPlan;
 use orator_dataset::info::About;
-use orator_dataset::verify::verify::{accounts, verify};
+use orator_dataset::verify::verify::{read_ledgers, verify};
 use orator_dataset::{Dataset, Split};
 use orator_formats::transcript::Word;
 use orator_test_support::project::files_under;
@@ -64,7 +64,7 @@ fn words(dir: &Path) -> BTreeMap<String, Option<Vec<Word>>> {
 }
 
 fn account(dir: &Path, name: &str) -> TranscriptAccount {
-    let lines = accounts(dir).unwrap().into_iter();
+    let lines = read_ledgers(dir).unwrap().into_iter();
     lines.filter(|line| line.file.starts_with(name)).find_map(|line| line.ledger.words).unwrap()
 }
 

@@ -6,8 +6,8 @@ use orator_base::stage::progress::Silent;
 use orator_dataset::import::shards;
 use orator_dataset::split::SplitRecord;
 use orator_dataset::verify::verify::verify;
-use orator_dataset::write::part;
-use orator_dataset::write::part::VideoEntry;
+use orator_dataset::write::entry;
+use orator_dataset::write::entry::VideoEntry;
 use orator_dataset::{Dataset, Split};
 
 #[test]
@@ -18,7 +18,7 @@ fn folder() {
                 let _ = dataset.read(&sample);
             }
         }
-        for name in part::names(dir).unwrap_or_default() {
+        for name in entry::names(dir).unwrap_or_default() {
             if let Ok(entry) = VideoEntry::read(&VideoEntry::path(dir, &name)) {
                 let _ = entry.codes(dir);
             }

@@ -1,7 +1,7 @@
 //! Pairs of files by name: ground truth, prediction and sound of a clip. No file is opened here.
 
 use anyhow::{Context, Result, bail, ensure};
-use orator_dataset::config::patterns::{self, OF_SOUNDS, OF_VIDEOS};
+use orator_dataset::config::patterns::{self, SOUND_EXTENSIONS, VIDEO_EXTENSIONS};
 use orator_formats::mocap::motion_file;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -106,7 +106,7 @@ fn folders(truth: &Path, prediction: &Path) -> Result<FilePairs> {
 }
 
 fn by_name(found: &mut FilePairs, audio: &Path) -> Result<()> {
-    let mut sounds = by_key(files(audio, &[&OF_SOUNDS[..], &OF_VIDEOS].concat())?)?;
+    let mut sounds = by_key(files(audio, &[&SOUND_EXTENSIONS[..], &VIDEO_EXTENSIONS].concat())?)?;
     for pair in &mut found.pairs {
         pair.sound = sounds.remove(&pair.name);
         if pair.sound.is_none() {
@@ -125,7 +125,8 @@ fn by_name(found: &mut FilePairs, audio: &Path) -> Result<()> {
 /// Files of a folder with one of these endings, hidden ones left out, in the order of their names.
 fn files(folder: &Path, endings: &[&str]) -> Result<Vec<PathBuf>> {
     let paths = patterns::list(folder).with_context(|| format!("cannot look into {}", folder.display()))?;
-    let is_one = |path: &PathBuf| path.is_file() && !stem(path).starts_with('.') && patterns::has_ending(path, endings);
+    let is_one =
+        |path: &PathBuf| path.is_file() && !stem(path).starts_with('.') && patterns::has_extension(path, endings);
     Ok(paths.into_iter().filter(is_one).collect())
 }
 

@@ -300,7 +300,7 @@ fn speak(
 
 fn draw_sheet(dir: &Path, out: &Path, generated: Option<&Path>, ui: &Ui) -> Result<Outcome> {
     let config = config::load(&dir.join("pipeline.toml"), &[])?;
-    let units = config::videos::of(&config);
+    let units = config::videos::all(&config);
     let Some(unit) = units.iter().flat_map(|videos| &videos.units).next() else {
         bail!("{} names no video", dir.join("pipeline.toml").display());
     };

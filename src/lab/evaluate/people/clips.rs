@@ -106,7 +106,7 @@ pub fn read(dir: &Path, config_file: &Path, part: Option<&str>) -> Result<Vec<Re
 }
 
 fn units(config: &Config) -> Vec<Unit> {
-    config::videos::of(config).into_iter().flat_map(|videos| videos.units).collect()
+    config::videos::all(config).into_iter().flat_map(|videos| videos.units).collect()
 }
 
 fn read_clip(dir: &Path, listed: &ListedClip, units: &[Unit], config: &Config) -> Result<RenderedClip> {

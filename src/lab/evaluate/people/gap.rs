@@ -35,7 +35,7 @@ pub struct KeypointLook {
 /// Look of the keypoints of a configuration's videos; a video without keypoints is left out. Errors: there are none.
 pub fn look(config_file: &Path) -> Result<KeypointLook> {
     let config = config::load(config_file, &[])?;
-    let units = config::videos::of(&config).into_iter().flat_map(|videos| videos.units);
+    let units = config::videos::all(&config).into_iter().flat_map(|videos| videos.units);
     let files =
         units.map(|unit| Artifact::Keypoints.path(&config.settings.work.dir, &unit)).filter(|path| path.is_file());
     let clips = files.map(|path| keypoints_npz::read(&path)).collect::<Result<Vec<_>>>()?;

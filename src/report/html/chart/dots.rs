@@ -1,6 +1,6 @@
-//! Dots on a line drawing, each coloured by a share.
+//! Line drawing with dots that are coloured by a share.
 
-use super::scale::{circle, drawing, line, words};
+use super::scale::{circle, drawing, line, text_at};
 use crate::html::node::{Node, node};
 
 /// Dot of the drawing.
@@ -14,7 +14,7 @@ pub struct ChartDot {
     pub description: String,
 }
 
-/// Drawing of `size` units, with words at some places.
+/// Drawing of `size` (width, height) units with edges, dots and labels at positions.
 pub fn dots(
     label: &str,
     size: [f64; 2],
@@ -33,7 +33,7 @@ pub fn dots(
         svg = svg.child(node("g").child(node("title").text(&dot.description)).child(drawn));
     }
     for (at, text) in labels {
-        svg = svg.child(words("name", *at, "middle", text));
+        svg = svg.child(text_at("name", *at, "middle", text));
     }
     svg
 }
@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_dot_has_its_share_and_its_words() {
+    fn a_dot_has_its_share_and_description() {
         let dot = |share| ChartDot { at: [3.0, 4.0], share, radius: 2.0, description: "R<Wrist>: 40 %".to_owned() };
         let labels = [([1.0, 1.0], "hand".to_owned())];
         let drawn = dots("a", [9.0, 9.0], &[[[0.0, 0.0], [3.0, 4.0]]], &[dot(0.4), dot(f64::NAN)], &labels).to_string();

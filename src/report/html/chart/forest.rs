@@ -1,7 +1,7 @@
-//! Estimates with their intervals below one another on one scale, a line where there is no difference and a band of
-//! differences that count as none.
+//! Forest plot: estimates with their intervals below one another on one scale, with a line at no difference and a band
+//! of equivalence.
 
-use super::scale::{Scale, circle, drawing, line, rect, words};
+use super::scale::{Scale, circle, drawing, line, rect, text_at};
 use crate::html::node::{Node, node};
 use crate::html::numbers::number;
 
@@ -13,8 +13,8 @@ pub struct ForestRow {
     pub class: &'static str,
     pub value: f64,
     pub interval: Option<[f64; 2]>,
-    /// Text at the right end.
-    pub said: String,
+    /// Text to the right of the plot.
+    pub value_text: String,
 }
 
 /// Scale of the chart.
@@ -24,7 +24,7 @@ pub struct ForestScale {
     pub high: f64,
     /// Value of no difference.
     pub middle: Option<f64>,
-    /// Values that count as no difference.
+    /// Equivalence band: values that count as no difference.
     pub band: Option<[f64; 2]>,
     pub unit: &'static str,
 }
@@ -35,7 +35,7 @@ const TOP: f64 = 8.0;
 const LEFT: f64 = 230.0;
 const RIGHT: f64 = 560.0;
 
-/// Chart of the rows from top to bottom.
+/// Forest plot of the rows from top to bottom.
 pub fn forest(label: &str, rows: &[ForestRow], scale: &ForestScale) -> Node {
     let x = Scale { low: scale.low, high: scale.high, from: LEFT, to: RIGHT };
     let floor = TOP + ROW * rows.len() as f64;
@@ -45,15 +45,16 @@ pub fn forest(label: &str, rows: &[ForestRow], scale: &ForestScale) -> Node {
     }
     for tick in x.ticks(5) {
         svg = svg.child(line("grid", [x.at(tick), TOP], [x.at(tick), floor]));
-        svg = svg.child(words("tick", [x.at(tick), floor + 15.0], "middle", &number(tick)));
+        svg = svg.child(text_at("tick", [x.at(tick), floor + 15.0], "middle", &number(tick)));
     }
     if let Some(middle) = scale.middle {
         svg = svg.child(line("none", [x.at(middle), TOP], [x.at(middle), floor]));
     }
-    for (place, row) in rows.iter().enumerate() {
-        let y = TOP + ROW * (place as f64 + 0.5);
-        svg = svg.child(words("name", [LEFT - 12.0, y + 4.0], "end", &row.name));
-        let mut drawn = node("g").class(row.class).child(node("title").text(format!("{}: {}", row.name, row.said)));
+    for (index, row) in rows.iter().enumerate() {
+        let y = TOP + ROW * (index as f64 + 0.5);
+        svg = svg.child(text_at("name", [LEFT - 12.0, y + 4.0], "end", &row.name));
+        let mut drawn =
+            node("g").class(row.class).child(node("title").text(format!("{}: {}", row.name, row.value_text)));
         if let Some([low, high]) = row.interval.map(|ends| ends.map(|end| x.at(end))) {
             drawn = drawn.child(line("range", [low, y], [high, y]));
             for end in [low, high] {
@@ -61,9 +62,9 @@ pub fn forest(label: &str, rows: &[ForestRow], scale: &ForestScale) -> Node {
             }
         }
         svg = svg.child(drawn.child(circle("point", [x.at(row.value), y], 4.5)));
-        svg = svg.child(words("tick", [RIGHT + 12.0, y + 4.0], "start", &row.said));
+        svg = svg.child(text_at("tick", [RIGHT + 12.0, y + 4.0], "start", &row.value_text));
     }
-    let unit = words("tick", [RIGHT, floor + 29.0], "end", scale.unit);
+    let unit = text_at("tick", [RIGHT, floor + 29.0], "end", scale.unit);
     svg.child(line("axis", [LEFT, floor], [RIGHT, floor])).child(unit)
 }
 
@@ -78,7 +79,7 @@ mod tests {
             class: "a",
             value,
             interval,
-            said: "50 %".to_owned(),
+            value_text: "50 %".to_owned(),
         };
         let rows = [row("<all>", 50.0, Some([40.0, 60.0])), row("b", 75.0, None)];
         let scale = ForestScale { low: 0.0, high: 100.0, middle: Some(50.0), band: Some([40.0, 60.0]), unit: "%" };

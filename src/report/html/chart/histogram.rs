@@ -1,16 +1,16 @@
-//! Histogram with a threshold; the side that fails has another colour.
+//! Histogram with a threshold; bins on the failing side have another colour.
 
-use super::scale::{Scale, drawing, line, px, rect, words};
+use super::scale::{Scale, drawing, line, px, rect, text_at};
 use crate::html::node::Node;
 use crate::html::numbers::{number, with_unit};
 
-/// Counts in bins of equal width from `low` to `high`; the outer bins include values beyond.
+/// Counts in bins of equal width from `low` to `high`; the outer bins include values outside the range.
 #[derive(Clone, Debug)]
 pub struct Counts {
     pub low: f64,
     pub high: f64,
     pub bins: Vec<u64>,
-    /// Number of unknown values.
+    /// Number of NaN values.
     pub unknown: u64,
 }
 
@@ -19,7 +19,7 @@ impl Counts {
         Self { low, high, bins: vec![0; n_bins.max(1)], unknown: 0 }
     }
 
-    /// Counts a value; NaN as unknown.
+    /// Counts a value; NaN counts as unknown.
     pub fn add(&mut self, value: f64) {
         if value.is_nan() {
             self.unknown += 1;
@@ -40,7 +40,7 @@ impl Counts {
         self.low + (self.high - self.low) * bin as f64 / self.bins.len() as f64
     }
 
-    /// Value below which `share` of all lie, with values spread evenly within a bin; NaN without values.
+    /// Quantile `share` (0..1), interpolated linearly within its bin; NaN without values.
     pub fn quantile(&self, share: f64) -> f64 {
         let wanted = share * self.total() as f64;
         let mut before = 0.0;
@@ -56,11 +56,11 @@ impl Counts {
     }
 }
 
-/// Threshold in a histogram.
+/// Threshold drawn in a histogram.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThresholdLine {
     pub value: f64,
-    /// Whether values below it fail; otherwise those above.
+    /// Whether values below the threshold fail; otherwise values above it fail.
     pub is_least: bool,
 }
 
@@ -74,13 +74,13 @@ const RIGHT: f64 = 332.0;
 /// Histogram as SVG. Heights follow the square root of the share, so that rare values remain visible.
 pub fn histogram(label: &str, counts: &Counts, unit: &str, threshold: Option<ThresholdLine>) -> Node {
     let x = Scale { low: counts.low, high: counts.high, from: LEFT, to: RIGHT };
-    let most = counts.bins.iter().copied().max().unwrap_or(0).max(1) as f64;
+    let max_count = counts.bins.iter().copied().max().unwrap_or(0).max(1) as f64;
     let mut svg = drawing(WIDTH, HEIGHT, label);
     for (bin, &count) in counts.bins.iter().enumerate().filter(|(_, count)| **count > 0) {
         let (from, to) = (counts.edge(bin), counts.edge(bin + 1));
         let middle = (from + to) / 2.0;
         let fails = threshold.is_some_and(|t| if t.is_least { middle < t.value } else { middle > t.value });
-        let height = ((count as f64 / most).sqrt() * (FLOOR - TOP)).max(1.0);
+        let height = ((count as f64 / max_count).sqrt() * (FLOOR - TOP)).max(1.0);
         let class = if fails { "bin fails" } else { "bin" };
         let (left, right) = (x.at(from), x.at(to));
         svg = svg.child(rect(class, [left + 0.4, FLOOR - height], [(right - left - 0.8).max(0.5), height]));
@@ -94,14 +94,14 @@ pub fn histogram(label: &str, counts: &Counts, unit: &str, threshold: Option<Thr
             _ => "middle",
         };
         svg = svg.child(line("axis", [at, FLOOR], [at, FLOOR + 4.0]));
-        svg = svg.child(words("tick", [at, FLOOR + 17.0], anchor, &number(tick)));
+        svg = svg.child(text_at("tick", [at, FLOOR + 17.0], anchor, &number(tick)));
     }
     if let Some(ThresholdLine { value, is_least }) = threshold {
         let at = x.at(value);
         let anchor = if at > (LEFT + RIGHT) / 2.0 { "end" } else { "start" };
         let description = format!("at {} {}", if is_least { "least" } else { "most" }, with_unit(value, unit));
         svg = svg.child(line("threshold", [at, TOP - 8.0], [at, FLOOR]).attr("data-x", px(at)));
-        svg = svg.child(words(
+        svg = svg.child(text_at(
             "mark",
             [if anchor == "end" { at - 4.0 } else { at + 4.0 }, TOP - 9.0],
             anchor,
@@ -116,7 +116,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_value_is_counted_and_quantiles_lie_where_they_should() {
+    fn every_value_is_counted_and_quantiles_are_right() {
         let mut counts = Counts::new(0.0, 1.0, 10);
         (0..100).for_each(|i| counts.add(f64::from(i) / 100.0));
         [f64::NAN, -3.0, 7.0].into_iter().for_each(|value| counts.add(value));

@@ -1,6 +1,6 @@
-//! Lines over the steps of a training, with constant levels for comparison and one step marked.
+//! Line chart over training steps, with horizontal lines for comparison and one step marked.
 
-use super::scale::{Scale, circle, drawing, line, stroke, words};
+use super::scale::{Scale, circle, drawing, line, stroke, text_at};
 use crate::html::node::{Node, legend, node};
 use crate::html::numbers::number;
 
@@ -15,7 +15,7 @@ const RIGHT: f64 = 350.0;
 #[derive(Clone, Debug, Default)]
 pub struct LineChart {
     pub title: String,
-    /// Meaning in a sentence.
+    /// Sentence under the title; may be empty.
     pub description: String,
     pub lines: Vec<ChartLine>,
     /// Horizontal lines across the whole width.
@@ -30,8 +30,8 @@ pub struct ChartLine {
     pub name: String,
     /// Index of the colour.
     pub colour: usize,
-    /// Step and value, by step; non-finite values are left out.
-    pub places: Vec<[f64; 2]>,
+    /// Step and value of each point, sorted by step; non-finite points are skipped.
+    pub points: Vec<[f64; 2]>,
 }
 
 /// Horizontal line of a chart.
@@ -43,19 +43,19 @@ pub struct ChartLevel {
 }
 
 impl LineChart {
-    /// Whether there is nothing to show.
+    /// Whether the chart has no finite point.
     pub fn is_empty(&self) -> bool {
-        self.places().next().is_none()
+        self.points().next().is_none()
     }
 
     /// Ranges of the axes: first to last step, and 0 (or the smallest value below it) to the largest value.
     fn ranges(&self) -> [[f64; 2]; 2] {
         let levels = self.levels.iter().map(|level| level.value).filter(|value| value.is_finite());
-        let around = |values: &mut dyn Iterator<Item = f64>, low: f64| {
+        let range_of = |values: &mut dyn Iterator<Item = f64>, low: f64| {
             values.fold([low, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
         };
-        let steps = around(&mut self.places().map(|[step, _]| step), f64::INFINITY);
-        let values = around(&mut self.places().map(|[_, value]| value).chain(levels), 0.0);
+        let steps = range_of(&mut self.points().map(|[step, _]| step), f64::INFINITY);
+        let values = range_of(&mut self.points().map(|[_, value]| value).chain(levels), 0.0);
         [steps, values]
             .map(|[low, high]| if high > low { [low, high] } else { [low.min(0.0), low.max(0.0) + 1.0] })
             .map(|range| if range.iter().all(|v| v.is_finite()) { range } else { [0.0, 1.0] })
@@ -67,7 +67,7 @@ impl LineChart {
         Scale { low, high, from: 0.0, to: 1.0 }.ticks(4)
     }
 
-    /// Card of title, drawing and legend.
+    /// Card with title, description, drawing and legend.
     pub fn card(&self) -> Node {
         let mut card = node("div").class("card chart").child(node("h3").text(&self.title));
         if !self.description.is_empty() {
@@ -85,10 +85,10 @@ impl LineChart {
         let mut svg = drawing(WIDTH, HEIGHT, &format!("{} over the steps", self.title));
         for tick in self.ticks() {
             svg = svg.child(line("grid", [LEFT, y.at(tick)], [RIGHT, y.at(tick)]));
-            svg = svg.child(words("tick", [LEFT - 6.0, y.at(tick) + 4.0], "end", &number(tick)));
+            svg = svg.child(text_at("tick", [LEFT - 6.0, y.at(tick) + 4.0], "end", &number(tick)));
         }
         for tick in x.ticks(4) {
-            svg = svg.child(words("tick", [x.at(tick), FLOOR + 16.0], "middle", &number(tick)));
+            svg = svg.child(text_at("tick", [x.at(tick), FLOOR + 16.0], "middle", &number(tick)));
         }
         svg = svg.child(line("axis", [LEFT, FLOOR], [RIGHT, FLOOR]));
         if let Some(step) = self.marked {
@@ -99,21 +99,21 @@ impl LineChart {
             svg = svg.child(line(&class, [LEFT, y.at(level.value)], [RIGHT, y.at(level.value)]));
         }
         for drawn in &self.lines {
-            let finite = drawn.places.iter().filter(|place| place.iter().all(|v| v.is_finite()));
-            let places: Vec<[f64; 2]> = finite.map(|[step, value]| [x.at(*step), y.at(*value)]).collect();
-            if !places.is_empty() {
-                svg = svg.child(stroke(&format!("colour-{}", drawn.colour), places.iter().copied()));
+            let finite = drawn.points.iter().filter(|point| point.iter().all(|v| v.is_finite()));
+            let points: Vec<[f64; 2]> = finite.map(|[step, value]| [x.at(*step), y.at(*value)]).collect();
+            if !points.is_empty() {
+                svg = svg.child(stroke(&format!("colour-{}", drawn.colour), points.iter().copied()));
             }
-            if let ([only], 1) = (&places[..], drawn.places.len()) {
+            if let ([only], 1) = (&points[..], drawn.points.len()) {
                 svg = svg.child(circle("dot", *only, 3.0));
             }
         }
         svg
     }
 
-    fn places(&self) -> impl Iterator<Item = [f64; 2]> {
-        let all = self.lines.iter().flat_map(|line| line.places.iter().copied());
-        all.filter(|place| place.iter().all(|v| v.is_finite()))
+    fn points(&self) -> impl Iterator<Item = [f64; 2]> {
+        let all = self.lines.iter().flat_map(|line| line.points.iter().copied());
+        all.filter(|point| point.iter().all(|v| v.is_finite()))
     }
 }
 
@@ -122,11 +122,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_levels_and_the_mark_are_drawn() {
-        let places = vec![[0.0, 4.0], [50.0, f64::NAN], [100.0, 2.0]];
+    fn lines_levels_and_the_marked_step_are_drawn() {
+        let points = vec![[0.0, 4.0], [50.0, f64::NAN], [100.0, 2.0]];
         let chart = LineChart {
             title: "A < b".to_owned(),
-            lines: vec![ChartLine { name: "made".to_owned(), colour: 0, places }],
+            lines: vec![ChartLine { name: "made".to_owned(), colour: 0, points }],
             levels: vec![ChartLevel { name: "mean pose".to_owned(), colour: 1, value: 1.0 }],
             marked: Some(100.0),
             ..LineChart::default()

@@ -1,4 +1,4 @@
-//! Charts as SVG, drawn without a script.
+//! SVG charts that need no script.
 
 pub mod curve;
 pub mod dots;

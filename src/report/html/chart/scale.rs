@@ -2,7 +2,7 @@
 
 use crate::html::node::{Node, node};
 
-/// Linear scale: `low` is drawn at `from`, `high` at `to` (units of the drawing).
+/// Linear scale that maps `low` to `from` and `high` to `to` (units of the drawing).
 #[derive(Clone, Copy, Debug)]
 pub struct Scale {
     pub low: f64,
@@ -12,7 +12,7 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// Position of `value`, clamped to the ends; NaN is at the start.
+    /// Position of `value`, clamped to the ends; NaN maps to `from`.
     pub fn at(&self, value: f64) -> f64 {
         let width = self.high - self.low;
         let share = if width > 0.0 { (value - self.low) / width } else { 0.5 };
@@ -20,7 +20,7 @@ impl Scale {
         self.from + share * (self.to - self.from)
     }
 
-    /// About `n` round numbers from `low` to `high`.
+    /// About `n` round values from `low` to `high`.
     pub fn ticks(&self, n: usize) -> Vec<f64> {
         let width = self.high - self.low;
         if !(width.is_finite() && width > 0.0) || n == 0 {
@@ -34,13 +34,13 @@ impl Scale {
     }
 }
 
-/// Coordinate as short text.
+/// Coordinate with at most one decimal.
 pub fn px(value: f64) -> String {
     let text = format!("{value:.1}");
     text.strip_suffix(".0").unwrap_or(&text).to_owned()
 }
 
-/// SVG of `width` x `height` units that shrinks with its column; `label` is for screen readers.
+/// SVG of `width` x `height` units that scales with its column; `label` is for screen readers.
 pub fn drawing(width: f64, height: f64, label: &str) -> Node {
     node("svg")
         .attr("viewBox", format!("0 0 {} {}", px(width), px(height)))
@@ -49,15 +49,15 @@ pub fn drawing(width: f64, height: f64, label: &str) -> Node {
         .attr("style", format!("aspect-ratio:{} / {}", px(width), px(height)))
 }
 
-/// Path through these points, as the attribute `d`.
-pub fn through(points: impl IntoIterator<Item = [f64; 2]>) -> String {
+/// Attribute `d` of a path through the points.
+pub fn path_data(points: impl IntoIterator<Item = [f64; 2]>) -> String {
     let points: Vec<String> = points.into_iter().map(|[x, y]| format!("{} {}", px(x), px(y))).collect();
     format!("M{}", points.join(" L"))
 }
 
-/// Line through these points.
+/// Path element through the points.
 pub fn stroke(class: &str, points: impl IntoIterator<Item = [f64; 2]>) -> Node {
-    node("path").class(format!("stroke {class}").trim_end()).attr("d", through(points))
+    node("path").class(format!("stroke {class}").trim_end()).attr("d", path_data(points))
 }
 
 pub fn circle(class: &str, [x, y]: [f64; 2], radius: f64) -> Node {
@@ -74,8 +74,8 @@ pub fn line(class: &str, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2]) -> Node {
     ends.into_iter().fold(node("line").class(class), |line, (name, value)| line.attr(name, px(value)))
 }
 
-/// Text with its `anchor` (`start`, `middle`, `end`) at a point.
-pub fn words(class: &str, [x, y]: [f64; 2], anchor: &str, text: &str) -> Node {
+/// Text element at a point; `anchor` is `start`, `middle` or `end`.
+pub fn text_at(class: &str, [x, y]: [f64; 2], anchor: &str, text: &str) -> Node {
     node("text").class(class).attr("x", px(x)).attr("y", px(y)).attr("text-anchor", anchor).text(text)
 }
 

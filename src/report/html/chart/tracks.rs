@@ -1,7 +1,7 @@
-//! Tracks below one another over the same seconds: lines, and events as short strokes. A script may move the line `at`
-//! over them (`data-left`, `data-right`: positions of the first and last second).
+//! Tracks below one another on a common time axis: lines, and events as short strokes. A script may move the line `at`
+//! over them; `data-left` and `data-right` are the positions of the first and last second.
 
-use super::scale::{Scale, drawing, line, px, through, words};
+use super::scale::{Scale, drawing, line, path_data, px, text_at};
 use crate::html::node::{Node, node};
 use crate::html::numbers::number;
 
@@ -17,13 +17,13 @@ const RIGHT: f64 = 716.0;
 pub struct Lane {
     /// Name with unit.
     pub name: String,
-    /// Class and points (second, value) of each line; values go up. Non-finite values are gaps.
+    /// CSS class and points (second, value) of each line; larger values are higher, non-finite values are gaps.
     pub lines: Vec<(&'static str, Vec<[f64; 2]>)>,
-    /// Class and seconds of events, drawn at the bottom of the track, later ones on top.
+    /// CSS class and times of events, seconds. The first set is drawn at the bottom of the track, the others above it.
     pub marks: Vec<(&'static str, Vec<f64>)>,
 }
 
-/// Chart of `secs` seconds.
+/// Chart with a time axis of `secs` seconds.
 pub fn lanes(label: &str, secs: f64, lanes: &[Lane]) -> Node {
     let height = lanes.len() as f64 * (LANE + GAP) + FOOT;
     let x = Scale { low: 0.0, high: secs.max(1e-9), from: LEFT, to: RIGHT };
@@ -32,24 +32,24 @@ pub fn lanes(label: &str, secs: f64, lanes: &[Lane]) -> Node {
     for (i, lane) in lanes.iter().enumerate() {
         let top = i as f64 * (LANE + GAP) + GAP;
         let floor = top + LANE;
-        svg = svg.child(words("name", [LEFT, top - 6.0], "start", &lane.name));
+        svg = svg.child(text_at("name", [LEFT, top - 6.0], "start", &lane.name));
         svg = svg.child(line("grid", [LEFT, floor], [RIGHT, floor]));
-        let values = lane.lines.iter().flat_map(|(_, places)| places.iter().map(|place| place[1]));
+        let values = lane.lines.iter().flat_map(|(_, points)| points.iter().map(|point| point[1]));
         let [low, high] = values
             .filter(|value| value.is_finite())
             .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)]);
         let y = Scale { low, high, from: floor - 2.0, to: top };
-        for (class, places) in &lane.lines {
-            let runs = places.split(|place| place.iter().any(|v| !v.is_finite())).filter(|run| run.len() > 1);
+        for (class, points) in &lane.lines {
+            let runs = points.split(|point| point.iter().any(|v| !v.is_finite())).filter(|run| run.len() > 1);
             let drawn: Vec<String> =
-                runs.map(|run| through(run.iter().map(|[secs, value]| [x.at(*secs), y.at(*value)]))).collect();
+                runs.map(|run| path_data(run.iter().map(|[secs, value]| [x.at(*secs), y.at(*value)]))).collect();
             if !drawn.is_empty() {
                 svg = svg.child(node("path").class(format!("stroke {class}")).attr("d", drawn.join(" ")));
             }
         }
         let n = lane.marks.len().max(1) as f64;
         for (k, (class, moments)) in lane.marks.iter().enumerate() {
-            // Full height without lines, else above one another.
+            // The marks share the full height of a track without lines.
             let part = if lane.lines.is_empty() { LANE / n } else { 12.0 };
             let base = floor - k as f64 * part;
             let drawn: Vec<String> = moments
@@ -64,7 +64,7 @@ pub fn lanes(label: &str, secs: f64, lanes: &[Lane]) -> Node {
     let foot = height - FOOT;
     for tick in x.ticks(10) {
         let anchor = if tick <= 0.0 { "start" } else { "middle" };
-        svg = svg.child(words("tick", [x.at(tick), foot + 15.0], anchor, &format!("{} s", number(tick))));
+        svg = svg.child(text_at("tick", [x.at(tick), foot + 15.0], anchor, &format!("{} s", number(tick))));
     }
     svg.child(line("at", [LEFT, GAP], [LEFT, foot]))
 }
@@ -74,7 +74,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_have_gaps_and_marks_stand_in_their_lane() {
+    fn lines_have_gaps_and_marks_are_in_their_track() {
         let lane = Lane {
             name: "height <m>".to_owned(),
             lines: vec![("made", vec![[0.0, 1.0], [1.0, 2.0], [2.0, f64::NAN], [3.0, 1.0], [4.0, 2.0]])],

@@ -54,7 +54,7 @@ fn shares(task: &TaskAnalysis, analysis: &StudyAnalysis) -> Vec<Node> {
             class,
             value: percent(share.share),
             interval: scaled(share.figures.interval(method), 100.0),
-            said: format!("{:.1} %{}", percent(share.share), p.unwrap_or_default()),
+            value_text: format!("{:.1} %{}", percent(share.share), p.unwrap_or_default()),
         }
     };
     let mut rows = Vec::new();
@@ -108,7 +108,7 @@ fn scores(task: &TaskAnalysis) -> Vec<Node> {
             class: "own",
             value: row.mean,
             interval: scaled(row.figures.interval(FigureMethod::Crossed), 1.0),
-            said: match row.figures.interval(FigureMethod::Median) {
+            value_text: match row.figures.interval(FigureMethod::Median) {
                 Some(interval) => format!("median {} [{}, {}]", row.median, interval.low, interval.high),
                 None => format!("median {}", row.median),
             },
@@ -129,7 +129,7 @@ fn pairs(task: &TaskAnalysis) -> Vec<Node> {
             class: "own",
             value: factor * pair.difference,
             interval: scaled(pair.figures.interval(FigureMethod::Crossed), factor),
-            said: format!("{:+.2}{}", factor * pair.difference, p.unwrap_or_default()),
+            value_text: format!("{:+.2}{}", factor * pair.difference, p.unwrap_or_default()),
         }
     };
     let rows: Vec<ForestRow> = task.pairs.iter().map(row).collect();
@@ -178,7 +178,7 @@ fn strengths(task: &TaskAnalysis) -> Vec<Node> {
             class: "own",
             value: row.log_strength,
             interval: scaled(row.interval.as_ref().map(|interval| interval.ends), 1.0),
-            said: format!("{:+.2}, Elo {:.0}", row.log_strength, row.elo),
+            value_text: format!("{:+.2}, Elo {:.0}", row.log_strength, row.elo),
         })
         .collect();
     let [low, high] = ends(rows.iter().flat_map(|row| row.interval.unwrap_or([row.value; 2])));

@@ -1,6 +1,6 @@
 //! Entry of a video in a dataset: its shards, its sound codes (`videos/<name>.sound`, u32 little endian), and
-//! `videos/<name>.json` with origin and totals. All other files are assembled from the entries (`assemble`), so that a
-//! video is added or forgotten without touching another.
+//! `videos/<name>.json` with its origin and totals. All other files are assembled from the entries (`assemble`), so a
+//! video can be added or forgotten without changing the files of another.
 
 use super::tar::ShardWriter;
 use crate::bones::{VideoBones, check_lengths};
@@ -20,7 +20,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Folder of the entries within the dataset.
+/// Folder of the entries in the dataset folder.
 pub const FOLDER: &str = "videos";
 
 /// Video of a dataset.
@@ -31,19 +31,19 @@ pub struct VideoEntry {
     pub name: FileName,
     /// File name of the video.
     pub file: String,
-    /// BLAKE3 of the video file; empty: unreadable.
+    /// BLAKE3 of the video file; empty if it could not be read.
     pub content: String,
-    /// BLAKE3 of all inputs of its shards; shards of equal inputs are reused.
+    /// BLAKE3 of everything the shards depend on; shards with an equal hash are reused.
     pub made_from: String,
-    /// Split; `None`: no sample, or samples in several splits (`blocks`).
+    /// Split; `None`: no samples, or samples in several splits (`blocks`).
     pub split: Option<Split>,
-    /// Reason of the split.
+    /// Reason for the split.
     pub split_by: SplitBy,
-    /// Blocks of time that belong to the splits; empty for a whole video.
+    /// Time blocks with their splits; empty for a video that is in one split.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub blocks: Vec<TimeBlock>,
     pub ledger: Ledger,
-    /// Reason without result: the stage and its error.
+    /// Stage that failed, and its error; `None`: no failure.
     pub failure: Option<String>,
     /// Bone lengths of the samples.
     pub bones: VideoBones,
@@ -53,14 +53,14 @@ pub struct VideoEntry {
     pub samples: Vec<SampleRef>,
     /// Silence appended where the sound ended before the motion, seconds.
     pub padded_sound_secs: f64,
-    /// Moments of the samples; of a video in several splits, those of its training samples.
+    /// Joint statistics of the samples; for a video in several splits, of its training samples.
     pub moments: JointMoments,
-    /// Moments of head and trunk of the same samples; `None`: they have no angles.
+    /// Statistics of the head and trunk angles of the same samples; `None`: the samples have no angles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub posture: Option<JointMoments>,
 }
 
-/// Properties of a video known before its samples.
+/// Properties of a video that are known before its samples are written.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VideoSource {
     /// Name; [a-z0-9_-] only.
@@ -73,18 +73,21 @@ pub struct VideoSource {
     pub failure: Option<String>,
 }
 
-/// Writer of one video.
+/// Writer of one video's entry.
 pub struct EntryWriter {
     dir: PathBuf,
-    part: VideoEntry,
+    entry: VideoEntry,
     max_shard_bytes: u64,
     /// Shards of each split.
     shards: BTreeMap<Split, ShardWriter>,
 }
 
 impl EntryWriter {
-    /// Begins a video of the dataset in `dir`: in `split` as a whole, or (`None`) with samples in several. A shard is
-    /// closed before it would exceed `max_shard_bytes`.
+    /// Starts the entry of a video in the dataset in `dir`. All its samples are in `split`, or (`None`) in several
+    /// splits. A shard is closed before it would exceed `max_shard_bytes`.
+    ///
+    /// # Errors
+    /// An invalid name, or one that another video of the dataset has.
     pub fn new(
         dir: &Path,
         source: VideoSource,
@@ -98,7 +101,7 @@ impl EntryWriter {
             !VideoEntry::path(dir, &name).exists(),
             "two videos would be called {name} in the dataset; rename the file {file} or leave it out"
         );
-        let part = VideoEntry {
+        let entry = VideoEntry {
             schema: crate::SCHEMA,
             name: FileName::new(name)?,
             file,
@@ -117,66 +120,66 @@ impl EntryWriter {
             moments: JointMoments::default(),
             posture: None,
         };
-        Ok(Self { dir: dir.to_owned(), part, max_shard_bytes, shards: BTreeMap::new() })
+        Ok(Self { dir: dir.to_owned(), entry, max_shard_bytes, shards: BTreeMap::new() })
     }
 
-    /// Names the blocks of time that the samples are cut from.
+    /// Sets the time blocks that the samples are cut from.
     pub fn with_blocks(mut self, blocks: Vec<TimeBlock>) -> Self {
-        self.part.blocks = blocks;
+        self.entry.blocks = blocks;
         self
     }
 
-    /// Adds an interval; shards keep the order of the calls. `padded_secs` of its sound are appended silence.
+    /// Appends a sample to the shards; `padded_secs` of its sound are appended silence.
     pub fn push(&mut self, sample: &Sample, padded_secs: f64) -> Result<()> {
-        self.push_to(self.part.split.unwrap_or(Split::Train), sample, padded_secs)
+        self.push_to(self.entry.split.unwrap_or(Split::Train), sample, padded_secs)
     }
 
-    /// Adds an interval to a split, where the video is in several.
+    /// Appends a sample to the shards of `split`, for a video in several splits.
     pub fn push_to(&mut self, split: Split, sample: &Sample, padded_secs: f64) -> Result<()> {
-        self.part.padded_sound_secs += padded_secs;
+        self.entry.padded_sound_secs += padded_secs;
         self.push_members(split, sample, &sample.members()?)
     }
 
-    /// Adds an interval of another dataset with its JSON unchanged.
-    pub fn push_as_it_was(&mut self, split: Split, sample: &Sample, json: Vec<u8>) -> Result<()> {
+    /// Appends a sample of another dataset with the bytes of its JSON unchanged.
+    pub fn push_with_json(&mut self, split: Split, sample: &Sample, json: Vec<u8>) -> Result<()> {
         let mut members = sample.members()?;
         members[0] = json;
         self.push_members(split, sample, &members)
     }
 
     fn push_members(&mut self, split: Split, sample: &Sample, members: &[Vec<u8>; 5]) -> Result<()> {
-        let name = &self.part.name;
+        let name = &self.entry.name;
         ensure!(sample.key.starts_with(&**name), "the key {} does not begin with its video's name {name}", sample.key);
         let (dir, max_bytes) = (&self.dir, self.max_shard_bytes);
         let shards = self.shards.entry(split).or_insert_with(|| ShardWriter::new(dir, name, split, max_bytes));
         shards.push_members(sample, members)?;
-        let counts = self.part.split.is_some() || split == Split::Train;
-        if counts {
-            self.part.moments.learn(&sample.motion);
+        let is_counted = self.entry.split.is_some() || split == Split::Train;
+        if is_counted {
+            self.entry.moments.add_motion(&sample.motion);
         }
         if let Some(posture) = &sample.posture {
-            let moments = self.part.posture.get_or_insert_with(JointMoments::of_posture);
-            if counts {
-                moments.learn_posture(posture);
+            let moments = self.entry.posture.get_or_insert_with(JointMoments::of_posture);
+            if is_counted {
+                moments.add_posture(posture);
             }
         }
         Ok(())
     }
 
-    /// Closes the shards and writes the video's JSON; `sound` is the result of `write_sound`, if it has sound. A video
-    /// without a sample has no split.
+    /// Closes the shards and writes the video's JSON. `sound` is the result of `write_sound`, if the video has sound. A
+    /// video without samples gets no split.
     pub fn finish(mut self, sound: Option<String>) -> Result<VideoEntry> {
         for shards in std::mem::take(&mut self.shards).into_values() {
             let (shards, samples) = shards.finish()?;
-            self.part.shards.extend(shards);
-            self.part.samples.extend(samples);
+            self.entry.shards.extend(shards);
+            self.entry.samples.extend(samples);
         }
-        self.part.split = self.part.split.filter(|_| !self.part.samples.is_empty());
+        self.entry.split = self.entry.split.filter(|_| !self.entry.samples.is_empty());
         let folder = self.dir.join(FOLDER);
         fs::create_dir_all(&folder).with_context(|| format!("making the folder {}", folder.display()))?;
-        self.part.sound = sound;
-        self.part.write(&self.dir)?;
-        Ok(self.part)
+        self.entry.sound = sound;
+        self.entry.write(&self.dir)?;
+        Ok(self.entry)
     }
 }
 
@@ -186,26 +189,29 @@ impl VideoEntry {
         dir.join(FOLDER).join(format!("{name}.json"))
     }
 
-    /// Reads an entry; its ledger must be complete and its layout current.
+    /// Reads an entry.
+    ///
+    /// # Errors
+    /// An unreadable file, another layout version, another video's name or shards, values out of range.
     pub fn read(path: &Path) -> Result<Self> {
-        let part: Self = read_json(path)?;
-        ensure!(part.schema == crate::SCHEMA, "{} has layout version {}", path.display(), part.schema);
+        let entry: Self = read_json(path)?;
+        ensure!(entry.schema == crate::SCHEMA, "{} has layout version {}", path.display(), entry.schema);
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        ensure!(part.name == *stem, "{} speaks of the video {:?}", path.display(), part.name);
-        let is_own = |shard: &&ShardRef| {
+        ensure!(entry.name == *stem, "{} speaks of the video {:?}", path.display(), entry.name);
+        let is_of_video = |shard: &&ShardRef| {
             let rest = Split::ALL.iter().find_map(|split| shard.file.strip_prefix(split.name())?.strip_prefix('-'));
-            rest.is_some_and(|rest| rest.starts_with(&*part.name) && rest.strip_suffix(".tar").is_some())
+            rest.is_some_and(|rest| rest.starts_with(&*entry.name) && rest.strip_suffix(".tar").is_some())
         };
-        if !part.bones.lengths_metres.is_empty() {
-            check_lengths("bones.lengths_metres", &part.bones.lengths_metres)
+        if !entry.bones.lengths_metres.is_empty() {
+            check_lengths("bones.lengths_metres", &entry.bones.lengths_metres)
                 .with_context(|| path.display().to_string())?;
         }
-        let silence = part.padded_sound_secs;
+        let silence = entry.padded_sound_secs;
         ensure!(silence >= 0.0, "{}: `padded_sound_secs` is {silence}, expected 0 or more", path.display());
-        if let Some(other) = part.shards.iter().find(|shard| !is_own(shard)) {
+        if let Some(other) = entry.shards.iter().find(|shard| !is_of_video(shard)) {
             bail!("{} names the shard {}, which is none of its video's", path.display(), other.file);
         }
-        Ok(part)
+        Ok(entry)
     }
 
     fn write(&self, dir: &Path) -> Result<()> {
@@ -213,33 +219,34 @@ impl VideoEntry {
         fs::write(&path, pretty(self)?).with_context(|| format!("writing {}", path.display()))
     }
 
-    /// Sound codes from the dataset in `dir`; empty without sound.
+    /// Reads the sound codes from the dataset in `dir`; empty without sound.
     pub fn codes(&self, dir: &Path) -> Result<Vec<u32>> {
         if self.sound.is_none() { Ok(Vec::new()) } else { read_sound(dir, &self.name) }
     }
 
-    /// Split of one of its shards, that of its samples.
+    /// Split of the samples in a shard; `None`: none of this video's samples are in it.
     pub fn split_of(&self, shard: &ShardRef) -> Option<Split> {
         self.samples.iter().find(|sample| sample.shard == shard.file).map(|sample| sample.split)
     }
 
-    /// Stretches of it that belong to a split; a whole video has one that it does not outlast.
-    pub fn placed(&self) -> Vec<TimeBlock> {
+    /// Time blocks with their splits; for a video in one split, a single unbounded block.
+    pub fn blocks_with_splits(&self) -> Vec<TimeBlock> {
         match self.split {
             Some(split) => vec![TimeBlock::whole(split)],
             None => self.blocks.clone(),
         }
     }
 
-    /// Files by path in the dataset's folder, without the JSON, with their hashes.
+    /// Paths in the dataset folder and BLAKE3 hashes of all files of the video except its JSON.
     pub fn files(&self) -> Vec<(String, String)> {
         let shards = self.shards.iter().map(|shard| (shard.file.to_string(), shard.blake3.clone()));
         let sound = self.sound.iter().map(|hash| (format!("{FOLDER}/{}.sound", self.name), hash.clone()));
         shards.chain(sound).collect()
     }
 
-    /// Copies this video's files from the dataset in `from` into that in `to`, by hard links where possible.
-    pub fn take_over(&self, from: &Path, to: &Path) -> Result<()> {
+    /// Links this video's files from the dataset in `from` into the one in `to`, or copies them where hard links fail;
+    /// existing files are kept.
+    pub fn link_into(&self, from: &Path, to: &Path) -> Result<()> {
         fs::create_dir_all(to.join(FOLDER)).with_context(|| format!("making {}", to.join(FOLDER).display()))?;
         let json = format!("{FOLDER}/{}.json", self.name);
         for file in self.files().into_iter().map(|(file, _)| file).chain([json]) {
@@ -254,8 +261,8 @@ impl VideoEntry {
         Ok(())
     }
 
-    /// Whether all its files in the dataset in `dir` match `stated` (hashes by path, as in `checksums.b3`).
-    pub fn is_sound(&self, dir: &Path, stated: &BTreeMap<String, String>) -> bool {
+    /// Whether all files of the video in the dataset in `dir` match `stated` (hashes by path, as in `checksums.b3`).
+    pub fn is_intact(&self, dir: &Path, stated: &BTreeMap<String, String>) -> bool {
         let json = format!("{FOLDER}/{}.json", self.name);
         let as_stated =
             |file: &str| stated.get(file).is_some_and(|hash| hash_file(&dir.join(file)).is_ok_and(|now| now == *hash));
@@ -269,7 +276,7 @@ pub fn stated_hashes(dir: &Path) -> BTreeMap<String, String> {
     text.lines().filter_map(|line| line.split_once("  ")).map(|(hash, file)| (file.into(), hash.into())).collect()
 }
 
-/// Checks the name of a video.
+/// Checks the name of a video: 1 to 64 characters of [a-z0-9_-].
 pub fn check_name(name: &str) -> Result<()> {
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '_';
     ensure!(
@@ -309,7 +316,7 @@ pub fn read_sound(dir: &Path, name: &str) -> Result<Vec<u32>> {
     Ok(bytes.as_chunks::<4>().0.iter().map(|code| u32::from_le_bytes(*code)).collect())
 }
 
-/// Removes the sound codes of a video that is left out.
+/// Removes the sound codes of a video that is excluded.
 pub fn remove_sound(dir: &Path, name: &str) -> Result<()> {
     let path = sound_path(dir, name);
     fs::remove_file(&path).with_context(|| format!("removing {}", path.display()))
