@@ -345,8 +345,8 @@ impl InspectedItem {
         let why = FrameRefusal::new(Refusal::Duplicate, measured, threshold);
         let to_refused = |kept: Kept| Refused::with_message(kept.start_secs, kept.end_secs, why, message.to_owned());
         let all_refused: Vec<Refused> = ledger.kept.drain(..).map(to_refused).collect();
-        ledger.to_refused.extend(all_refused);
-        ledger.to_refused.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
+        ledger.refused.extend(all_refused);
+        ledger.refused.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
         self.codes = None;
     }
 
