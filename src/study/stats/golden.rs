@@ -1,4 +1,4 @@
-//! Statistics beside those of scipy, statsmodels and krippendorff (`fixtures/reference/study_stats.py`).
+//! Compares statistics with scipy, statsmodels and krippendorff (`fixtures/reference/study_stats.py`).
 
 use super::equivalence::Equivalence;
 use super::estimate::{StudentEstimate, holm};
@@ -7,7 +7,7 @@ use super::rank::{MeasurementScale, alpha, friedman, median_interval, signed_ran
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-/// Cases of a statistic.
+/// Golden cases of a statistic.
 fn cases(statistic: &str) -> Vec<Value> {
     let golden: Value =
         serde_json::from_str(include_str!("../../../fixtures/reference/study_stats_golden.json")).unwrap();
@@ -18,7 +18,7 @@ fn of<T: DeserializeOwned>(case: &Value, name: &str) -> T {
     serde_json::from_value(case[name].clone()).unwrap()
 }
 
-/// Numbers that were found beside those of the case with these names.
+/// Asserts that the computed values are near those with these names in the case.
 fn near<const N: usize>(case: &Value, names: [&str; N], found: [f64; N], relative: f64, least: f64) {
     for (found, name) in found.into_iter().zip(names) {
         let expected: f64 = of(case, name);
@@ -59,7 +59,7 @@ fn means_and_their_equivalence() {
     for case in cases("t_quantile") {
         let [freedom, share, expected]: [f64; 3] = serde_json::from_value(case).unwrap();
         let found = StudentEstimate::new(0.0, 1.0, freedom).unwrap().quantile(share);
-        // Beyond 10,000 degrees of freedom an expansion is used.
+        // Above 10,000 degrees of freedom `quantile` uses an expansion.
         let bound = if freedom < 1e4 { 1e-10 } else { 1e-7 };
         assert!((found / expected - 1.0).abs() < bound, "{freedom} {share} {found} {expected}");
     }

@@ -1,16 +1,16 @@
-//! Minimum of a smooth function of a few parameters whose curvature is about 1: quasi-Newton steps (Broyden, Fletcher,
-//! Goldfarb, Shanno 1970) with central differences, and the curvature at the minimum.
+//! Minimisation of a smooth function of a few parameters with curvature of about 1: BFGS (Broyden, Fletcher, Goldfarb,
+//! Shanno 1970) with central differences, and the Hessian at the minimum.
 
 use ndarray::{Array1, Array2};
 
 const MOST: usize = 200;
-/// Step of the differences for slopes and for curvatures.
+/// Steps of the finite differences for gradients and Hessians.
 const SLOPE_STEP: f64 = 1e-3;
 const CURVATURE_STEP: f64 = 0.02;
-/// Largest slope at a minimum.
+/// Maximum gradient component at convergence.
 const FLAT: f64 = 1e-4;
 
-/// Where the search ended.
+/// Result of the search.
 pub(super) struct Minimum {
     pub at: Array1<f64>,
     pub value: f64,
@@ -29,7 +29,7 @@ fn slopes(f: &mut impl FnMut(&Array1<f64>) -> f64, at: &Array1<f64>) -> Array1<f
         .collect()
 }
 
-/// Searches from `start`; a step is at most 5 long in each parameter.
+/// Minimises `f` from `start`; a step is at most 5 in each parameter.
 pub(super) fn minimum(mut f: impl FnMut(&Array1<f64>) -> f64, start: Array1<f64>) -> Minimum {
     let n = start.len();
     let (mut at, mut inverse) = (start, Array2::<f64>::eye(n));
@@ -55,7 +55,7 @@ pub(super) fn minimum(mut f: impl FnMut(&Array1<f64>) -> f64, start: Array1<f64>
             }
             share *= 0.4;
             if share < 1e-7 {
-                // No way down that differences can tell.
+                // Finite differences cannot resolve a descent direction.
                 let converged = slope.iter().all(|v| v.abs() < 100.0 * FLAT);
                 return Minimum { at, value, converged };
             }
@@ -77,7 +77,7 @@ pub(super) fn minimum(mut f: impl FnMut(&Array1<f64>) -> f64, start: Array1<f64>
     Minimum { at, value, converged: false }
 }
 
-/// Second derivatives [n, n].
+/// Hessian [n, n] by central differences.
 pub(super) fn curvature(mut f: impl FnMut(&Array1<f64>) -> f64, at: &Array1<f64>) -> Array2<f64> {
     let (n, h) = (at.len(), CURVATURE_STEP);
     let centre = f(at);
