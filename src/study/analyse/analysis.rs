@@ -1,4 +1,4 @@
-//! Analysis of a whole study: exclusions, every task with and without them, marks of what was registered, notes.
+//! Analysis of a study: exclusions, every task with and without them, registration status, notes.
 
 use super::exclusion::exclude;
 use super::methods::methods;
@@ -11,7 +11,10 @@ use crate::preregistration::RegisteredHypothesis;
 use crate::vote::StudyVote;
 use anyhow::{Result, ensure};
 
-/// Analysis of the votes of `source`, which is called `title`.
+/// Analyses the votes of the study `title`, read from `source`.
+///
+/// # Errors
+/// There is no vote of the main phase, the exclusion rules exclude all of them, or a task has votes of several designs.
 pub fn analyse(
     [title, source]: [&str; 2],
     read: &VotesRead,
@@ -50,7 +53,7 @@ pub fn analyse(
     Ok(analysis)
 }
 
-/// Tasks in the order of their first vote.
+/// Analyses the tasks in the order of their first votes.
 fn tasks(
     votes: &[&StudyVote],
     hypotheses: &[RegisteredHypothesis],
@@ -73,7 +76,7 @@ fn tasks(
     names.into_iter().map(one).collect()
 }
 
-/// What a reader must know beside the figures.
+/// Notes that a reader must know in addition to the statistics.
 fn notes(analysis: &StudyAnalysis, read: &VotesRead, registration: Option<&Registration>) -> Vec<String> {
     let mut notes = Vec::new();
     if !read.refused.is_empty() {

@@ -1,4 +1,4 @@
-//! Whose votes are left out, by rules that were fixed before, and how many each rule leaves out by itself.
+//! Exclusion of votes by predefined rules, with the number that each rule alone excludes.
 
 use super::votes::read::VotesRead;
 use crate::file::ExclusionRules;
@@ -7,7 +7,7 @@ use crate::vote::StudyVote;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What the rules leave out. Votes are those of the main phase.
+/// Summary of the exclusions. Counts refer to votes of the main phase.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ExclusionAccount {
     /// Whether the rules were registered before the data were seen.
@@ -19,20 +19,20 @@ pub struct ExclusionAccount {
     pub rules: Vec<ExclusionCount>,
 }
 
-/// What one rule leaves out by itself.
+/// Effect of one rule alone.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ExclusionCount {
     pub rule: String,
-    /// Participants left out whole.
+    /// Participants excluded entirely.
     pub n_participants: usize,
-    /// Votes left out, those of such participants with them.
+    /// Votes excluded, including those of excluded participants.
     pub n_votes: usize,
-    /// Why the rule cannot be applied.
+    /// Reason why the rule cannot be applied.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unknown: Option<String>,
 }
 
-/// Rule with the fields it looks at.
+/// Exclusion rule with the field that it needs.
 struct ExclusionTest<'r> {
     words: String,
     field: &'static str,
@@ -40,13 +40,13 @@ struct ExclusionTest<'r> {
 }
 
 enum LeftOut<'r> {
-    /// Participants that are left out.
+    /// Identifiers of excluded participants.
     Participants(BTreeSet<&'r str>),
-    /// Whether a vote is left out.
+    /// Predicate of excluded votes.
     Votes(Box<dyn Fn(&StudyVote) -> bool>),
 }
 
-/// Votes of the main phase that all rules keep, and the account.
+/// Votes of the main phase that no rule excludes, and a summary of the exclusions.
 pub fn exclude<'v>(read: &'v VotesRead, rules: Option<&ExclusionRules>) -> (Vec<&'v StudyVote>, ExclusionAccount) {
     let main: Vec<&StudyVote> = read.votes.iter().filter(|vote| vote.phase == TrialPhase::Main).collect();
     let applied = rules.map(|rules| of_rules(rules, &read.votes)).unwrap_or_default();
@@ -107,7 +107,7 @@ fn of_rules<'v>(rules: &ExclusionRules, votes: &'v [StudyVote]) -> Vec<Exclusion
 }
 
 impl ExclusionAccount {
-    /// Whether any vote was left out.
+    /// Whether any vote was excluded.
     pub fn leaves_out(&self) -> bool {
         self.n_votes_kept < self.n_votes
     }

@@ -1,47 +1,47 @@
-//! Figures of an analysis: intervals, tests and tests of equivalence of one number by several methods, each with where it
-//! comes from, and what could not be computed.
+//! Statistics of an analysis: intervals, tests and equivalence tests of one quantity by several methods, each with its
+//! origin, and those that could not be computed.
 
 use crate::stats::equivalence::Equivalence;
 use crate::stats::estimate::{ConfidenceInterval, StatisticsError, StudentEstimate, holm};
 use serde::Serialize;
 
-/// How a figure was got.
+/// Method of a statistic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FigureMethod {
-    /// Crossed standard error, t distribution: holds for other participants and other clips.
+    /// Crossed standard error and t distribution: generalises to other participants and other clips.
     Crossed,
-    /// Sign flips of participants and clips.
+    /// Sign flips of all votes of a participant or of a clip.
     SignFlip,
-    /// Exact test over the plan's own draw of sides.
+    /// Exact test over the plan's random assignment of sides.
     Sides,
-    /// t test of participants' means: clips as given.
+    /// t test of participants' means, with fixed clips.
     Participants,
-    /// Logistic regression with random participants and clips.
+    /// Logistic regression with random intercepts of participants and clips.
     MixedModel,
-    /// Signed ranks of participants' mean differences.
+    /// Signed-rank test of participants' mean differences.
     Wilcoxon,
-    /// Signed ranks of single votes, taken for independent.
+    /// Signed-rank test of single votes, treated as independent.
     WilcoxonVotes,
-    /// Ranks of participants' mean scores.
+    /// Friedman's test of participants' mean scores.
     Friedman,
-    /// Order statistics of single scores, taken for independent.
+    /// Order statistics of single scores, treated as independent.
     Median,
-    /// Score interval of single votes, taken for independent.
+    /// Score interval of single votes, treated as independent.
     Wilson,
-    /// Exact binomial test of single votes, taken for independent.
+    /// Exact binomial test of single votes, treated as independent.
     Binomial,
-    /// Strengths with participants as clusters.
+    /// Bradley-Terry strengths, with participants resampled as clusters.
     BradleyTerry,
 }
 
 impl FigureMethod {
-    /// Whether votes are taken for independent, which votes of one participant or about one clip are not.
+    /// Whether the method treats votes as independent. Votes of one participant or about one clip are not.
     pub fn is_naive(self) -> bool {
         matches!(self, Self::WilcoxonVotes | Self::Median | Self::Wilson | Self::Binomial)
     }
 
-    /// Name for people.
+    /// Display name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Crossed => "participants and clips crossed",
@@ -60,18 +60,18 @@ impl FigureMethod {
     }
 }
 
-/// Where a figure comes from: its method, and whether that was written down before.
+/// Origin of a statistic: its method and whether it was registered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct FigureOrigin {
     pub method: FigureMethod,
-    /// Whether votes are taken for independent.
+    /// Whether the method treats votes as independent.
     pub naive: bool,
-    /// Whether it was not pre-registered.
+    /// Whether the statistic was not pre-registered.
     pub exploratory: bool,
 }
 
 impl FigureOrigin {
-    /// Origin of a figure that nobody registered.
+    /// Origin of a statistic that was not registered.
     pub fn new(method: FigureMethod) -> Self {
         Self { method, naive: method.is_naive(), exploratory: true }
     }
@@ -86,7 +86,7 @@ pub struct IntervalFigure {
     pub ends: ConfidenceInterval,
 }
 
-/// Test of the hypothesis that there is no difference.
+/// Test of the null hypothesis of no difference.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TestFigure {
     #[serde(flatten)]
@@ -95,15 +95,15 @@ pub struct TestFigure {
     pub statistic: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub degrees_of_freedom: Option<f64>,
-    /// Two-sided.
+    /// Two-sided p value.
     pub p: f64,
-    /// By Holm's method among the tests of this method on the other parts of the task.
+    /// Holm-adjusted p value, if the test belongs to a family: the tests of this method on the other parts of the task.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub adjusted_p: Option<f64>,
 }
 
 impl TestFigure {
-    /// Test without more than its p value.
+    /// Test result with only a p value.
     pub fn new(method: FigureMethod, p: f64) -> Self {
         Self { origin: FigureOrigin::new(method), statistic: None, degrees_of_freedom: None, p, adjusted_p: None }
     }
@@ -117,7 +117,7 @@ impl TestFigure {
         }
     }
 
-    /// p value, adjusted where the test is one of several.
+    /// p value, adjusted if the test belongs to a family.
     pub fn final_p(&self) -> f64 {
         self.adjusted_p.unwrap_or(self.p)
     }
@@ -137,14 +137,14 @@ pub struct EquivalenceFigure {
     pub passes: bool,
 }
 
-/// Figures about one number, the first of each kind the one to look at first.
+/// Statistics of one quantity; the first of each kind is the most important.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct FigureSet {
     pub intervals: Vec<IntervalFigure>,
     pub tests: Vec<TestFigure>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub equivalence: Vec<EquivalenceFigure>,
-    /// What could not be computed, and why.
+    /// Statistics that could not be computed, with reasons.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub missing: Vec<String>,
 }
@@ -162,7 +162,7 @@ impl FigureSet {
         self.equivalence.iter().find(|test| test.origin.method == method)
     }
 
-    /// Figures method by method, those with an interval first.
+    /// Statistics by method, those with an interval first.
     pub fn rows(&self) -> impl Iterator<Item = FigureRow<'_>> {
         let of_interval = |&IntervalFigure { origin, ends }: &IntervalFigure| FigureRow {
             origin,
@@ -174,12 +174,12 @@ impl FigureSet {
         self.intervals.iter().map(of_interval).chain(alone)
     }
 
-    /// p value of the crossed test, adjusted where it is one of several.
+    /// p value of the crossed test, adjusted if it belongs to a family.
     pub fn crossed_p(&self) -> Option<f64> {
         self.test(FigureMethod::Crossed).map(TestFigure::final_p)
     }
 
-    /// Notes why a value is missing, or gives it.
+    /// Returns the value, or records the reason why it is missing.
     pub fn known<T>(&mut self, method: FigureMethod, value: Result<T, StatisticsError>) -> Option<T> {
         value.map_err(|error| self.missing.push(format!("{}: {error}", method.name()))).ok()
     }
@@ -223,7 +223,7 @@ impl FigureSet {
         tests.for_each(|test| test.origin.exploratory = false);
     }
 
-    /// Keeps intervals within `low` to `high`, over which a t distribution may carry them.
+    /// Clamps intervals to `low..=high`, which a t distribution may exceed.
     pub fn clamp(&mut self, low: f64, high: f64) {
         for IntervalFigure { ends, .. } in &mut self.intervals {
             *ends = ConfidenceInterval { low: ends.low.clamp(low, high), high: ends.high.clamp(low, high) };
@@ -238,7 +238,7 @@ pub struct FigureRow<'s> {
     pub test: Option<&'s TestFigure>,
 }
 
-/// Adjusts the tests of several sets, method by method, as one family each (Holm 1979). A single set is left alone.
+/// Adjusts the tests of several sets, each method being one family (Holm 1979). A single set is left unchanged.
 pub fn adjust(sets: &mut [&mut FigureSet]) {
     if sets.len() < 2 {
         return;

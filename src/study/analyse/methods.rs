@@ -1,4 +1,4 @@
-//! Paragraph for the methods section of a paper, from the analysis alone: plain text, sources in brackets.
+//! Generates a paragraph for the methods section of a paper from an analysis: plain text with citations in parentheses.
 
 use super::figure::FigureMethod;
 use super::result::{ShareMeasure, StudyAnalysis, TaskAnalysis};
@@ -6,10 +6,10 @@ use super::words::{count, list, p_value, percent, percents, points};
 use crate::plan::TaskDesign;
 use std::fmt::Write as _;
 
-/// Sources, a line each: as a method cites it, and in full.
+/// References, one per line: the citation as used in the text, and the full reference.
 const SOURCES: &str = include_str!("sources.txt");
 
-/// The paragraph, and the list of its sources.
+/// Methods paragraph with its list of references.
 pub fn methods(analysis: &StudyAnalysis) -> String {
     let mut text = participants(analysis);
     text += &exclusions(analysis);
@@ -138,7 +138,7 @@ fn statistics(analysis: &StudyAnalysis) -> String {
     text
 }
 
-/// Bounds of the equivalence tests, points of percent.
+/// Bounds of the equivalence tests, percentage points.
 fn bounds(analysis: &StudyAnalysis) -> Vec<String> {
     let tests = analysis.tasks.iter().flat_map(|task| &task.shares).flat_map(|share| &share.figures.equivalence);
     let mut bounds: Vec<String> = tests.map(|test| points(test.bound)).collect();
@@ -157,7 +157,7 @@ fn registered(analysis: &StudyAnalysis) -> String {
     }
 }
 
-/// Headline figures.
+/// Sentences with the headline statistics.
 fn results(analysis: &StudyAnalysis) -> String {
     let mut text = String::new();
     for task in &analysis.tasks {

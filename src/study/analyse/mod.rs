@@ -1,6 +1,6 @@
-//! Analysis of a study's votes. `votes` reads them, `exclusion` leaves out what was agreed, `outcome` turns answers to
-//! numbers, `share` and `pair` judge them by `stats`, `task` and `analysis` gather all in the one `result`, from which
-//! `verdict`, `methods`, `text` and `page` speak.
+//! Analysis of a study's votes. `votes` reads them, `exclusion` applies the exclusion rules, `outcome` converts
+//! responses to scores, `share` and `pair` test them with `stats`, `task` and `analysis` collect everything in a
+//! `result`, which `verdict`, `methods`, `text` and `page` present.
 
 pub mod analysis;
 pub mod exclusion;

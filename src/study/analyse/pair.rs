@@ -1,5 +1,5 @@
-//! Two conditions that the same participants judged: preferences in steps, scores of one page, how often single films were
-//! taken for real. Scores of conditions by themselves are medians and means.
+//! Comparison of two conditions: preference steps, differences of scores on one page, or proportions of single films
+//! judged real. Also medians and means of the scores of single conditions.
 
 use super::figure::{FigureMethod, FigureSet, TestFigure, adjust};
 use super::outcome::{BinaryVote, Numbering, differences, distinct, mean_score, name_pairs, scores};
@@ -14,10 +14,10 @@ use crate::vote::StudyVote;
 use orator_base::math::order::Ordered;
 use std::collections::BTreeSet;
 
-/// Draws of sign flips for one of many pairs.
+/// Maximum number of sign-flip draws per pair.
 const MOST_PAIR_DRAWS: usize = 2000;
 
-/// All pairs of `conditions` that votes compared, the first named less the second.
+/// Analyses all pairs of `conditions` that votes compare; differences are first less second.
 pub fn pairs(
     votes: &[&StudyVote],
     numbering: &Numbering,
@@ -32,7 +32,7 @@ pub fn pairs(
     family(compared.collect(), settings.level())
 }
 
-/// Pairs of conditions in how often single films of each were taken for real.
+/// Analyses all pairs of conditions by how often single films of each were judged real.
 pub fn single_pairs(votes: &[BinaryVote], conditions: &[&str], settings: &FigureSettings) -> Vec<PairAnalysis> {
     let of = |name: &str| -> Vec<ClipVote> {
         votes.iter().filter(|vote| vote.condition == name).map(|vote| vote.vote).collect()
@@ -50,7 +50,7 @@ pub fn single_pairs(votes: &[BinaryVote], conditions: &[&str], settings: &Figure
     family(name_pairs(conditions).map(pair).collect(), settings.level())
 }
 
-/// Adjusts the tests of pairs as one family, and draws the conclusions from the crossed tests.
+/// Adjusts the tests of all pairs as one family, and draws the conclusions from the crossed tests.
 fn family(mut pairs: Vec<PairAnalysis>, level: f64) -> Vec<PairAnalysis> {
     adjust(&mut pairs.iter_mut().map(|pair| &mut pair.figures).collect::<Vec<_>>());
     for pair in &mut pairs {
@@ -59,7 +59,7 @@ fn family(mut pairs: Vec<PairAnalysis>, level: f64) -> Vec<PairAnalysis> {
     pairs
 }
 
-/// Pair with its figures, without orders and steps.
+/// Pair with its statistics, without orders and steps.
 fn pair_of<'v>(
     [first, second]: [&str; 2],
     votes: impl Iterator<Item = &'v ClipVote> + Clone,
@@ -81,7 +81,7 @@ fn pair_of<'v>(
     }
 }
 
-/// Pair by the `differences` of votes that judged both.
+/// Analyses a pair by the `differences` of votes that judged both.
 fn compared_pair(
     names: [&str; 2],
     differences: &[ClipVote],
@@ -109,7 +109,7 @@ fn compared_pair(
     }
 }
 
-/// Scores of each condition, the highest median first.
+/// Scores of each condition, highest median first.
 pub fn score_table(
     votes: &[&StudyVote],
     numbering: &Numbering,
@@ -142,7 +142,7 @@ pub fn score_table(
     rows
 }
 
-/// Friedman's test of participants' mean scores, over those who scored every condition.
+/// Friedman's test of participants' mean scores, over participants who scored every condition.
 pub fn overall(
     votes: &[&StudyVote],
     numbering: &Numbering,

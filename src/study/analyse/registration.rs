@@ -1,5 +1,4 @@
-//! What was written down before the data were seen: read from a sealed study, marked in the figures, and what became of
-//! each hypothesis.
+//! Registration: read from a sealed study, marked in the statistics, with the outcome of each hypothesis.
 
 use super::figure::{FigureMethod, FigureSet};
 use super::result::{JudgedClaim, JudgedHypothesis, PairAnalysis, ShareAnalysis, TaskAnalysis};
@@ -10,13 +9,13 @@ use crate::preregistration::{Preregistration, RegisteredHypothesis};
 use crate::seal::StudySeal;
 use anyhow::Result;
 
-/// What was fixed before the data were seen.
+/// Specification fixed before the data were seen.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Registration {
     pub title: String,
-    /// Hash over the sealed study; none where its files are not as they were sealed.
+    /// Combined hash of the sealed study; `None` if the seal does not hold.
     pub seal: Option<String>,
-    /// What a reader must know about it.
+    /// Notes on the validity of the registration.
     pub notes: Vec<String>,
     pub hypotheses: Vec<RegisteredHypothesis>,
     pub exclusion: ExclusionRules,
@@ -24,11 +23,11 @@ pub struct Registration {
 }
 
 impl Registration {
-    /// Registration of a study's folder. A seal that does not hold is noted, with the files that differ, and then nothing
-    /// counts as registered: the hypotheses may have been written after the data were seen.
+    /// Reads the registration of a study folder. If the seal does not hold, a note names the files that differ, and
+    /// nothing counts as registered: the hypotheses may have been written after the data were seen.
     ///
     /// # Errors
-    /// No pre-registration, or one that is damaged.
+    /// The pre-registration is missing or damaged.
     pub fn of_folder(folder: &StudyFolder) -> Result<Self> {
         let registered = Preregistration::read(&folder.preregistration())?;
         let broken = match StudySeal::read(folder) {
@@ -53,8 +52,8 @@ impl Registration {
     }
 }
 
-/// Outcome of each hypothesis, by the crossed figures that were registered for it, at the error of the first kind `level`.
-/// These figures lose the mark of exploration.
+/// Outcome of each hypothesis at significance level `level`, from the crossed statistics registered for it. These
+/// statistics are no longer marked as exploratory.
 pub fn judge(tasks: &mut [TaskAnalysis], hypotheses: &[RegisteredHypothesis], level: f64) -> Vec<JudgedHypothesis> {
     let mut one = |RegisteredHypothesis { claim, statistic }: &RegisteredHypothesis| {
         let found = tasks.iter_mut().find(|task| task.task == claim.task);
@@ -98,7 +97,7 @@ fn claims(task: &mut TaskAnalysis, claim: &StudyHypothesis, level: f64) -> Vec<J
     task.shares.iter_mut().filter(|share| is_about(share, claim, has_conditions)).map(judged).collect()
 }
 
-/// A hypothesis in words.
+/// Description of a hypothesis.
 fn words(claim: &StudyHypothesis) -> String {
     let who = if claim.per_speaker { ", each speaker by itself" } else { "" };
     let which = match &claim.conditions[..] {

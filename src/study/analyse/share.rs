@@ -1,4 +1,4 @@
-//! Share of successes against chance, by every method from the naive to the crossed one.
+//! Proportion of successes compared with chance, by every method from the naive to the crossed one.
 
 use super::figure::{FigureMethod, FigureSet, TestFigure};
 use super::outcome::{BinaryVote, distinct};
@@ -11,10 +11,10 @@ use crate::stats::glmm::fit::MixedLogit;
 use crate::stats::proportion::BinomialCount;
 use std::collections::BTreeMap;
 
-/// Share where nothing is known.
+/// Proportion of successes by guessing.
 pub const CHANCE: f64 = 0.5;
 
-/// Votes that a share is of.
+/// Votes of one proportion.
 #[derive(Clone, Debug)]
 pub struct ShareCell<'v> {
     pub measure: ShareMeasure,
@@ -23,7 +23,7 @@ pub struct ShareCell<'v> {
     pub votes: Vec<BinaryVote<'v>>,
 }
 
-/// Analysis of a cell. Films taken for real have intervals alone: half of them is no expectation.
+/// Analyses a cell. The proportion of films judged real gets intervals only, because it has no chance level.
 pub fn share(cell: &ShareCell, settings: &FigureSettings) -> ShareAnalysis {
     let votes: Vec<ClipVote> = cell.votes.iter().map(|vote| vote.vote).collect();
     let n_successes = votes.iter().filter(|vote| vote.score == 1.0).count() as u64;
@@ -56,7 +56,7 @@ pub fn share(cell: &ShareCell, settings: &FigureSettings) -> ShareAnalysis {
     analysis
 }
 
-/// Methods that know participants and clips.
+/// Adds the methods that account for participants and clips.
 fn add_clustered(found: &mut FigureSet, cell: &ShareCell, votes: &[ClipVote], settings: &FigureSettings) {
     let confidence = settings.confidence;
     if let Some(estimate) = found.known(FigureMethod::Crossed, crossed_estimate(votes)) {
@@ -76,7 +76,7 @@ fn add_clustered(found: &mut FigureSet, cell: &ShareCell, votes: &[ClipVote], se
     }
 }
 
-/// Methods that take votes for independent.
+/// Adds the methods that treat votes as independent.
 fn add_naive(found: &mut FigureSet, n_successes: u64, n_votes: u64, settings: &FigureSettings) {
     let Some(count) = found.known(FigureMethod::Binomial, BinomialCount::new(n_successes, n_votes)) else { return };
     found.add_interval(FigureMethod::Wilson, count.wilson(settings.confidence));
@@ -84,13 +84,13 @@ fn add_naive(found: &mut FigureSet, n_successes: u64, n_votes: u64, settings: &F
     found.add_equivalence(FigureMethod::Binomial, Equivalence::of_count(&count, CHANCE, settings.bound));
 }
 
-/// Draws the conclusion from the crossed test, adjusted where it is one of several, and the crossed equivalence.
+/// Draws the conclusion from the crossed test, adjusted if it belongs to a family, and the crossed equivalence test.
 pub fn conclude(analysis: &mut ShareAnalysis, level: f64) {
     let is_equivalent = analysis.figures.equivalence(FigureMethod::Crossed).is_some_and(|test| test.passes);
     analysis.conclusion = Conclusion::new(analysis.figures.crossed_p(), level, analysis.share - CHANCE, is_equivalent);
 }
 
-/// Trials of each participant by sides; none where the sides are not known, as in tables that say only what was right.
+/// Trials of each participant by side; `None` if sides are unknown, as in tables that report correctness only.
 fn side_blocks(votes: &[BinaryVote]) -> Option<Vec<SideBlock>> {
     let mut blocks: BTreeMap<usize, SideBlock> = BTreeMap::new();
     let mut seen = [false; 2];
@@ -102,9 +102,9 @@ fn side_blocks(votes: &[BinaryVote]) -> Option<Vec<SideBlock>> {
     (seen == [true; 2]).then(|| blocks.into_values().collect())
 }
 
-/// Fits the model of an intercept with random participants and clips to votes with scores 0 and 1. Its interval is of
-/// the share over all participants and clips, its test of the intercept against log odds of 0, with one degree of
-/// freedom less than the smaller number of participants and clips.
+/// Fits a mixed logistic model with crossed random intercepts to votes with scores 0 and 1. The interval is that of the
+/// marginal proportion; the test compares the intercept with log odds of 0, with min(participants, clips) - 1 degrees
+/// of freedom.
 fn mixed_model(votes: &[ClipVote], found: &mut FigureSet, confidence: f64) -> Option<ModelFigure> {
     let model = found.known(FigureMethod::MixedModel, MixedLogit::fit(votes))?;
     let (share, interval) = found.known(FigureMethod::MixedModel, model.share(confidence))?;

@@ -1,4 +1,4 @@
-//! Analysis of one task: the cells of its design, its families of tests, the agreement of its participants.
+//! Analysis of one task: the cells of its design, its families of tests, inter-rater agreement.
 
 use super::figure::{FigureMethod, adjust};
 use super::outcome::{BinaryVote, Numbering, binary, conditions, differences, measure, name_pairs, scores};
@@ -15,7 +15,10 @@ use crate::vote::StudyVote;
 use anyhow::{Context, Result, bail};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Analysis of the votes of a task, which must have one design.
+/// Analyses the votes of a task, which must all have the same design.
+///
+/// # Errors
+/// There are no votes, or votes of two designs.
 pub fn task(name: &str, votes: &[&StudyVote], settings: &FigureSettings) -> Result<TaskAnalysis> {
     let design = votes.first().with_context(|| format!("the task {name} has no vote"))?.design;
     if let Some(other) = votes.iter().find(|vote| vote.design != design) {
@@ -53,7 +56,7 @@ pub fn task(name: &str, votes: &[&StudyVote], settings: &FigureSettings) -> Resu
     Ok(analysis)
 }
 
-/// Shares of all votes, by speaker and by condition.
+/// Analyses proportions of all votes, by speaker and by condition.
 fn binary_task(
     analysis: &mut TaskAnalysis,
     votes: &[&StudyVote],
@@ -98,7 +101,7 @@ fn family(analysis: &mut TaskAnalysis, level: f64, cells: impl FnOnce(&TaskAnaly
     analysis.shares.extend(cells);
 }
 
-/// Preferences and sliders: pairs, scores, strengths.
+/// Analyses preferences and sliders: pairs, scores, strengths.
 fn compared_task(analysis: &mut TaskAnalysis, votes: &[&StudyVote], numbering: &Numbering, settings: &FigureSettings) {
     if analysis.design == TaskDesign::Sliders {
         analysis.scores = score_table(votes, numbering, &analysis.conditions, settings);
@@ -115,7 +118,7 @@ fn compared_task(analysis: &mut TaskAnalysis, votes: &[&StudyVote], numbering: &
     }
 }
 
-/// Krippendorff's alpha: participants rate clips, each condition or pair of them by itself.
+/// Krippendorff's alpha: participants are raters, and each combination of a clip with a condition or a pair is a unit.
 fn agreement(votes: &[&StudyVote], numbering: &Numbering, analysis: &TaskAnalysis) -> Result<f64, StatisticsError> {
     let names = &analysis.conditions;
     let (scale, groups): (_, Vec<Vec<ClipVote>>) = match analysis.design {
@@ -127,7 +130,7 @@ fn agreement(votes: &[&StudyVote], numbering: &Numbering, analysis: &TaskAnalysi
             (MeasurementScale::Ordinal, name_pairs(names).map(of_pair).collect())
         }
         design => {
-            // Of single films, answers are compared, not whether they were right.
+            // For single films, agreement is measured on the responses, not on their correctness.
             let measure = measure(design).filter(|measure| *measure != ShareMeasure::Correct);
             let measure = measure.unwrap_or(ShareMeasure::TakenForReal);
             let mut groups: BTreeMap<&str, Vec<ClipVote>> = BTreeMap::new();

@@ -6,10 +6,10 @@ use super::verdict::scope;
 use super::words::{bare_p, count, p_value, percent, percents, points};
 use std::fmt::Write as _;
 
-/// Rows without a vote that are named.
+/// Maximum number of refused rows that are listed.
 const MOST_REFUSED: usize = 20;
 
-/// Summary: verdicts first, then the headline figures, marks, exclusions and notes.
+/// Summary: verdicts with the headline statistics, exclusions and notes.
 pub fn text(analysis: &StudyAnalysis) -> String {
     let mut text = String::new();
     let account = &analysis.exclusions;
@@ -67,7 +67,7 @@ pub fn text(analysis: &StudyAnalysis) -> String {
     text
 }
 
-/// Headline figures of a task.
+/// Lines with the headline statistics of a task.
 fn rows(task: &TaskAnalysis) -> String {
     let mut text = String::new();
     let mark = |is_exploratory: bool| if is_exploratory { "*" } else { " " };

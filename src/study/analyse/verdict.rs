@@ -1,14 +1,14 @@
-//! What can be concluded from a task and what cannot, in sentences.
+//! Verdicts: sentences on what can be concluded from a task and what cannot.
 
 use super::figure::FigureMethod;
 use super::result::{Conclusion, FigureSettings, PairAnalysis, ShareAnalysis, ShareMeasure, TaskAnalysis};
 use super::words::{count, p_value, percent, percents, points};
 use crate::plan::TaskDesign;
 
-/// Pairs that have a sentence of their own.
+/// Maximum number of pairs with individual sentences.
 const MOST_PAIRS: usize = 6;
 
-/// Sentences about a task, the main one first.
+/// Sentences about a task, the most important first.
 pub fn verdicts(task: &TaskAnalysis, settings: &FigureSettings) -> Vec<String> {
     let mut said: Vec<String> = Vec::new();
     let shares = task.shares.iter().filter(|share| share.measure != ShareMeasure::TakenForReal);
@@ -21,7 +21,7 @@ pub fn verdicts(task: &TaskAnalysis, settings: &FigureSettings) -> Vec<String> {
     said
 }
 
-/// Who or what a share is about.
+/// Part of the votes that a proportion covers.
 pub fn scope(share: &ShareAnalysis) -> String {
     match (&share.speaker, &share.condition) {
         (Some(speaker), _) => format!("speaker {speaker}"),
@@ -51,7 +51,7 @@ fn of_share(share: &ShareAnalysis, settings: &FigureSettings) -> String {
     )
 }
 
-/// Meaning of a conclusion, with what it rests on.
+/// Sentence that explains a conclusion, with its p values.
 fn meaning(share: &ShareAnalysis) -> String {
     let p = share.figures.crossed_p().map(p_value).unwrap_or_default();
     let test = share.figures.equivalence(FigureMethod::Crossed);
@@ -93,7 +93,7 @@ fn meaning(share: &ShareAnalysis) -> String {
     }
 }
 
-/// What the binomial test would say, where it says something else.
+/// Remark on the naive binomial test if it contradicts the crossed test.
 fn naive(share: &ShareAnalysis, level: f64) -> String {
     let Some((p, naive)) = share.figures.crossed_p().zip(share.figures.test(FigureMethod::Binomial)) else {
         return String::new();

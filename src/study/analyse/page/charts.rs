@@ -1,4 +1,4 @@
-//! Charts of a task: shares and differences with their intervals, scores, steps of preference, strengths.
+//! Charts of a task: proportions and differences with intervals, scores, preference steps, strengths.
 
 use crate::analyse::figure::FigureMethod;
 use crate::analyse::result::{PairAnalysis, ShareAnalysis, ShareMeasure, StudyAnalysis, TaskAnalysis};
@@ -9,7 +9,7 @@ use crate::stats::estimate::ConfidenceInterval;
 use orator_report::html::chart::forest::{ForestRow, ForestScale, forest};
 use orator_report::html::{Node, legend, node, table};
 
-/// Names of the five steps, from the second condition to the first.
+/// Names of the five preference steps, from the second condition to the first.
 const STEPS: [&str; 5] = ["second clearly", "second", "neither", "first", "first clearly"];
 
 /// Charts of a task.
@@ -28,7 +28,7 @@ fn card(chart: Node) -> Node {
     node("div").class("card scroll wide").attr("tabindex", "0").child(chart)
 }
 
-/// Low and high end with some room around all values.
+/// Axis limits with a margin around all finite values.
 fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let [low, high] = values
         .filter(|value| value.is_finite())
@@ -40,7 +40,7 @@ fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
     [low - room, high + room]
 }
 
-/// Ends of an interval, each times `factor`.
+/// Ends of an interval, multiplied by `factor`.
 fn scaled(interval: Option<ConfidenceInterval>, factor: f64) -> Option<[f64; 2]> {
     interval.map(|ends| [factor * ends.low, factor * ends.high])
 }
@@ -188,7 +188,7 @@ fn strengths(task: &TaskAnalysis) -> Vec<Node> {
     vec![node("p").text(about), card(forest("Strengths", &rows, &scale))]
 }
 
-/// `= 0.027`, `< 1e-99`.
+/// p value with its relation sign: `= 0.027`, `< 1e-99`.
 fn equal(p: f64) -> String {
     let text = bare_p(p);
     if text.starts_with('<') { text } else { format!("= {text}") }

@@ -1,4 +1,4 @@
-//! Whole page. Its bytes depend on the analysis alone.
+//! Assembles the page. The output depends on the analysis only.
 
 use super::{charts, tables};
 use crate::analyse::result::{Conclusion, StudyAnalysis, TaskAnalysis};
@@ -6,7 +6,7 @@ use crate::analyse::words::{count, list};
 use orator_report::html::{Node, Page, Section, node};
 use serde_json::Value;
 
-/// Text of the page.
+/// HTML of the page.
 pub fn html(analysis: &StudyAnalysis) -> String {
     let section = |id, title, body| Section { id, title, body };
     let mut sections = vec![section("meaning", "What can be concluded", meaning(analysis))];
@@ -45,7 +45,7 @@ fn lead(analysis: &StudyAnalysis) -> String {
     )
 }
 
-/// Body of each task under its name, which is left out where there is one task.
+/// Body of each task under its name; the name is omitted if there is only one task.
 fn per_task(tasks: &[TaskAnalysis], body: impl Fn(&TaskAnalysis) -> Vec<Node>) -> Vec<Node> {
     let title = |task: &TaskAnalysis| (tasks.len() > 1).then(|| node("h3").text(&task.task));
     tasks.iter().flat_map(|task| title(task).into_iter().chain(body(task))).collect()

@@ -1,4 +1,4 @@
-//! Every figure of a task in a table with its mark, and the account of exclusions.
+//! Tables of all statistics of a task with their registration status, of the hypotheses and of the exclusions.
 
 use crate::analyse::figure::{FigureOrigin, FigureRow, FigureSet, TestFigure};
 use crate::analyse::result::{ShareAnalysis, ShareMeasure, StudyAnalysis, TaskAnalysis};
@@ -8,10 +8,10 @@ use crate::analyse::words::{bare_p, count, percent};
 use crate::stats::estimate::ConfidenceInterval;
 use orator_report::html::{Node, node, table};
 
-/// Columns of the table of figures.
+/// Columns of the table of statistics.
 const COLUMNS: [&str; 6] = ["Method", "Interval", "Statistic", "p", "p after Holm", "Mark"];
 
-/// Table of a task's figures, grouped by the number that they are about.
+/// Table of a task's statistics, grouped by quantity.
 pub(super) fn task(task: &TaskAnalysis) -> Vec<Node> {
     let mut rows = Vec::new();
     for share in &task.shares {
@@ -77,7 +77,7 @@ fn group(title: &str) -> Node {
     node("tr").class("group").child(node("th").attr("colspan", COLUMNS.len()).attr("scope", "rowgroup").text(title))
 }
 
-/// Rows of a set: a method's interval and test together, then equivalence.
+/// Rows of a set: one per method with its interval and test, then equivalence tests.
 fn figure_rows(set: &FigureSet, factor: f64, unit: &str) -> Vec<Node> {
     let ends = |ends: ConfidenceInterval| format!("{:.2} to {:.2}{unit}", factor * ends.low, factor * ends.high);
     let row = |FigureRow { origin, interval, test }| figure_row(origin, interval.map(ends), test, None);
@@ -131,7 +131,7 @@ pub(super) fn hypotheses(analysis: &StudyAnalysis) -> Vec<Node> {
     vec![node("p").text(about), node("div").class("scroll").attr("tabindex", "0").child(table("figures", head, rows))]
 }
 
-/// Rules with what each leaves out by itself, and rows that are no votes.
+/// Rules with what each alone excludes, and refused rows.
 pub(super) fn exclusions(analysis: &StudyAnalysis) -> Vec<Node> {
     let account = &analysis.exclusions;
     let number = |n: usize| node("td").class("num").text(count(n));

@@ -1,5 +1,5 @@
-//! Columns of a table of votes, what they are called in the given file, and its rows. Text of columns: comma, semicolon or
-//! tab, quoted or not, with or without a byte order mark. JSON Lines: one object a line, its keys the columns.
+//! Columns of a table of votes, their names in a file, and its rows. Delimited text: comma, semicolon or tab, quoted or
+//! not, with or without a byte order mark. JSON Lines: one object per line whose keys are the columns.
 
 use super::row::{MOST_ROWS, RowCells};
 use crate::vote::VOTE_COLUMNS;
@@ -7,20 +7,23 @@ use anyhow::{Context, Result, bail, ensure};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 
-/// Short forms of tables by others: one condition, whether the answer was right, one score, a step of preference.
+/// Additional columns of simpler tables: one condition, whether the answer was correct, one score, a preference step.
 const SHORT_FORMS: [&str; 4] = ["condition", "correct", "score", "step"];
 
-/// Everything that a column can mean.
+/// Names of all known fields.
 fn fields() -> impl Iterator<Item = &'static str> {
     VOTE_COLUMNS.into_iter().chain(SHORT_FORMS)
 }
 
-/// Names of columns that differ from those of the fields, by field.
+/// File-specific column names by field.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ColumnNames(BTreeMap<&'static str, String>);
 
 impl ColumnNames {
     /// Parses `participant=worker,clip=stimulus`.
+    ///
+    /// # Errors
+    /// A pair has no `=`, its field is unknown or repeated, or its name is empty.
     pub fn parse(text: &str) -> Result<Self> {
         let mut names = BTreeMap::new();
         for pair in text.split(',').map(str::trim).filter(|pair| !pair.is_empty()) {
@@ -39,12 +42,12 @@ impl ColumnNames {
         Ok(Self(names))
     }
 
-    /// Name in the file of a field.
+    /// Column name of a field in the file.
     fn of(&self, field: &'static str) -> &str {
         self.0.get(field).map_or(field, String::as_str)
     }
 
-    /// Places of the fields in a header, by field. Names are compared without regard to case and outer space.
+    /// Column indices of the fields in a header. Names are compared ignoring case and surrounding whitespace.
     fn places(&self, header: &[String]) -> Result<BTreeMap<&'static str, usize>> {
         let is = |name: &str, cell: &String| cell.trim().to_lowercase() == name.to_lowercase();
         let mut places = BTreeMap::new();
@@ -64,7 +67,7 @@ impl ColumnNames {
         Ok(places)
     }
 
-    /// What a table must have: who, what, and an answer.
+    /// Checks that a table has the required columns: participant, clip and an answer.
     fn check(fields: &[&str], header: &[String]) -> Result<()> {
         let lacks = |field: &str| !fields.contains(&field);
         for field in ["participant", "clip"] {
@@ -92,16 +95,20 @@ fn near(field: &str, cell: &str) -> f64 {
     strsim::jaro_winkler(field, &cell.trim().to_lowercase())
 }
 
-/// Header in an error, at most 20 names of it.
+/// Column names for an error message, at most 20.
 fn shown(header: &[String]) -> String {
     let names: Vec<String> = header.iter().take(20).map(|name| name.trim().chars().take(40).collect()).collect();
     format!("{}{}", names.join(", "), if header.len() > 20 { ", ..." } else { "" })
 }
 
-/// Rows with their line, or why one cannot be read.
+/// Rows with line numbers, or the reason why a row cannot be read.
 pub type LinedRows = Vec<(u64, std::result::Result<RowCells, String>)>;
 
-/// Rows of a table. A row that is no text or has another number of cells than the header is given with the reason.
+/// Reads the rows of delimited text. Rows that are not UTF-8 or whose number of cells differs from the header are
+/// returned with the reason.
+///
+/// # Errors
+/// The text is UTF-16 or empty, required columns are missing, or there are too many rows.
 pub fn delimited_rows(bytes: &[u8], names: &ColumnNames) -> Result<LinedRows> {
     ensure!(!bytes.starts_with(&[0xff, 0xfe]) && !bytes.starts_with(&[0xfe, 0xff]), "it is UTF-16; save it as UTF-8");
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
@@ -141,7 +148,7 @@ fn cells(
     Ok(RowCells { values, has_decimal_comma })
 }
 
-/// Delimiter that occurs most often in the first line outside quotes.
+/// Most frequent delimiter in the first line, outside quotes.
 fn delimiter(bytes: &[u8]) -> u8 {
     let mut counts = [(b',', 0), (b';', 0), (b'\t', 0)];
     let mut is_quoted = false;
@@ -152,7 +159,10 @@ fn delimiter(bytes: &[u8]) -> u8 {
     counts.iter().rev().max_by_key(|(_, n)| *n).map_or(b',', |(delimiter, _)| *delimiter)
 }
 
-/// Rows of JSON Lines. A line that is no object is given with the reason.
+/// Reads the rows of JSON Lines. Lines that are not objects are returned with the reason.
+///
+/// # Errors
+/// The text is empty, the first object lacks required columns, or there are too many rows.
 pub fn json_rows(bytes: &[u8], names: &ColumnNames) -> Result<LinedRows> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let mut rows: LinedRows = Vec::new();
@@ -182,7 +192,7 @@ fn json_cells(object: &Map<String, Value>, names: &ColumnNames) -> RowCells {
     RowCells { values, has_decimal_comma: false }
 }
 
-/// Value as the cell of a table would have it.
+/// JSON value as text of a table cell.
 fn text(value: &Value) -> String {
     match value {
         Value::Null => String::new(),

@@ -1,5 +1,5 @@
-//! File of votes: CSV or JSON Lines, of this program or of another. A row that cannot be used is kept with its line and
-//! the reason.
+//! Reads a file of votes: CSV or JSON Lines, from this or another program. Unusable rows are reported with their line
+//! and the reason.
 
 use super::columns::{ColumnNames, delimited_rows, json_rows};
 use super::row::{check, vote};
@@ -11,19 +11,19 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// Bytes of the largest file.
+/// Maximum file size, bytes.
 const MOST_BYTES: u64 = 1 << 30;
 
-/// Votes of a source.
+/// Votes read from a source.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VotesRead {
     pub votes: Vec<StudyVote>,
     pub refused: Vec<RefusedRow>,
-    /// Fields of exported votes that the source lacks: exclusion rules on them cannot hold.
+    /// Fields of exported votes that the source lacks; exclusion rules that need them cannot be applied.
     pub absent: Vec<&'static str>,
 }
 
-/// Row of a table that is no vote.
+/// Row of a table that is not a valid vote.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RefusedRow {
     /// Line in the file, from 1.
@@ -32,7 +32,7 @@ pub struct RefusedRow {
 }
 
 impl VotesRead {
-    /// Votes that are known to be whole, such as those of a study's own store.
+    /// Checks votes that are already parsed, such as those of a study's own database.
     pub fn of_votes(votes: Vec<StudyVote>) -> Self {
         let mut read = Self::default();
         for (row, vote) in votes.into_iter().enumerate() {
@@ -44,7 +44,10 @@ impl VotesRead {
         read
     }
 
-    /// Reads a file. `design` is that of rows that do not say theirs.
+    /// Reads a file. `design` applies to rows without a design.
+    ///
+    /// # Errors
+    /// The file cannot be read, is not a table of votes, or contains no valid vote.
     pub fn of_file(path: &Path, names: &ColumnNames, design: Option<TaskDesign>) -> Result<Self> {
         let place = || path.display().to_string();
         let bytes = input::read(path, MOST_BYTES).with_context(place)?;
@@ -90,12 +93,12 @@ impl VotesRead {
     }
 }
 
-/// Pages of sliders whose scores stand in rows of their own.
+/// Merges slider scores in separate rows into one vote per page.
 #[derive(Default)]
 struct SliderPages(BTreeMap<(String, String, String, u32), usize>);
 
 impl SliderPages {
-    /// Adds a score to its page: the one of the participant, task, clip and trial.
+    /// Adds a score to the page with the same participant, task, clip and trial.
     fn add(&mut self, vote: StudyVote, votes: &mut Vec<StudyVote>) -> std::result::Result<(), String> {
         let key = (vote.participant.clone(), vote.task.clone(), vote.clip.clone(), vote.trial);
         let page = *self.0.entry(key).or_insert(votes.len());
@@ -115,7 +118,7 @@ impl SliderPages {
     }
 }
 
-/// Gives votes without a trial their place among those of the participant.
+/// Numbers votes without a trial by their position among the participant's votes.
 fn number_trials(votes: &mut [StudyVote]) {
     let mut n_trials: BTreeMap<String, u32> = BTreeMap::new();
     for vote in votes {

@@ -1,4 +1,4 @@
-//! Row of a table to a vote.
+//! Converts a row of a table to a vote.
 
 use crate::plan::{TaskDesign, TrialPhase};
 use crate::vote::{Response, ScreenSide, StudyVote};
@@ -6,20 +6,20 @@ use serde::Deserialize;
 use serde::de::IntoDeserializer as _;
 use std::collections::BTreeMap;
 
-/// Rows of the longest table.
+/// Maximum number of rows.
 pub const MOST_ROWS: usize = 2_000_000;
 
-/// Conditions that a table of others need not name.
+/// Default condition names for tables that do not name them.
 const NATURAL: &str = "natural";
 const GENERATED: &str = "generated";
-/// Letters of the longest name.
+/// Maximum length of a name, characters.
 const LONGEST: usize = 200;
 
-/// Cells of a row by field, without outer space.
+/// Cells of a row by field, trimmed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RowCells {
     pub values: BTreeMap<&'static str, String>,
-    /// Whether `0,5` is a number.
+    /// Whether the comma is a decimal separator (`0,5`).
     pub has_decimal_comma: bool,
 }
 
@@ -73,7 +73,7 @@ impl RowCells {
             .transpose()
     }
 
-    /// Value of a field that is spelt as in JSON.
+    /// Value of a field with the same spelling as in JSON.
     fn keyword<T: for<'a> Deserialize<'a>>(&self, field: &str, words: &str) -> Read<Option<T>> {
         let Some(cell) = self.get(field) else { return Ok(None) };
         let word: serde::de::value::StrDeserializer<serde::de::value::Error> = cell.into_deserializer();
@@ -81,8 +81,8 @@ impl RowCells {
     }
 }
 
-/// Vote of a row, or why there is none. `design` holds where no column says it. A row of one score is a vote of one
-/// condition; a row without a trial has the trial 0.
+/// Converts a row to a vote, or gives the reason why it is not one. `design` applies if no column gives a design. A row
+/// with one score becomes a vote on one condition; a row without a trial gets trial 0.
 pub fn vote(cells: &RowCells, design: Option<TaskDesign>) -> Read<StudyVote> {
     let words = "turing, turing-single, preference, sliders or mismatch";
     let is_score = cells.get("score").is_some();
@@ -116,7 +116,7 @@ pub fn vote(cells: &RowCells, design: Option<TaskDesign>) -> Read<StudyVote> {
     Ok(vote)
 }
 
-/// Name of a task without one.
+/// Default name of a task.
 fn title(design: TaskDesign) -> &'static str {
     match design {
         TaskDesign::Turing => "real-or-generated",
@@ -127,7 +127,7 @@ fn title(design: TaskDesign) -> &'static str {
     }
 }
 
-/// Conditions, response and right response of a row.
+/// Conditions, response and expected response of a row.
 fn answer(cells: &RowCells, design: TaskDesign, phase: TrialPhase) -> Read<(Vec<String>, Response, Option<Response>)> {
     let names = cells.get("conditions").map(|names| names.split('|').map(|name| name.trim().to_owned()).collect());
     let condition = cells.name("condition")?;
@@ -154,7 +154,7 @@ fn answer(cells: &RowCells, design: TaskDesign, phase: TrialPhase) -> Read<(Vec<
     }
 }
 
-/// Response as JSON or in plain words: `left`, `real`, `-1`, `70|20`.
+/// Parses a response given as JSON or as text: `left`, `real`, `-1`, `70|20`.
 fn response(field: &str, cell: &str, design: TaskDesign, phase: TrialPhase) -> Read<Response> {
     if cell.starts_with('{') {
         return serde_json::from_str(cell).map_err(|_| expected(field, cell, "an answer like {\"side\":\"left\"}"));
@@ -188,7 +188,7 @@ fn response(field: &str, cell: &str, design: TaskDesign, phase: TrialPhase) -> R
     read.ok_or_else(|| expected(field, cell, words))
 }
 
-/// What a vote of the main phase must be for the analysis of its design.
+/// Checks that a vote of the main phase fits the analysis of its design.
 pub fn check(vote: &StudyVote) -> Read<()> {
     if vote.phase != TrialPhase::Main {
         return Ok(());
