@@ -1,19 +1,20 @@
-//! Whether an answer fits its trial: its form, its numbers, and whether it passes a check.
+//! Validation of answers: whether the response fits the design of its trial, whether numbers are in range, and whether
+//! an attention check is passed.
 
 use super::reply::ApiError;
 use crate::plan::{PlannedTask, TaskDesign, Trial, TrialPhase};
 use crate::store::answers::GivenAnswer;
 use crate::vote::Response;
 
-/// Seconds that a page may report: a day.
+/// Maximum duration that a page may report, seconds: one day.
 const MOST_SECS: f64 = 86_400.0;
-/// How often films are played at most.
+/// Maximum number of plays that a page may report.
 const MOST_PLAYS: u32 = 1000;
 
-/// Checks an answer to `trial`, one of `task`.
+/// Validates an answer to `trial`, which belongs to `task`.
 ///
 /// # Errors
-/// Says which part of the answer the trial does not take.
+/// The response does not fit the design, or a number is out of range.
 pub fn check(answer: &GivenAnswer, trial: &Trial, task: &PlannedTask) -> Result<(), ApiError> {
     if !fits(&answer.response, trial, task) {
         return Err(ApiError::bad("The response does not fit the trial's task."));
@@ -42,12 +43,12 @@ fn fits(response: &Response, trial: &Trial, task: &PlannedTask) -> bool {
     }
 }
 
-/// Whether `response` is wrong in an attention check.
+/// Whether `response` fails an attention check; false for other trials.
 pub fn fails_check(response: &Response, trial: &Trial) -> bool {
     trial.phase == TrialPhase::AttentionCheck && trial.expected.as_ref().is_some_and(|right| right != response)
 }
 
-/// Right response, which a practice or training trial tells after its answer.
+/// Correct response that a practice or training trial shows after its answer.
 pub fn feedback(trial: &Trial) -> Option<&Response> {
     let tells = matches!(trial.phase, TrialPhase::Practice | TrialPhase::Training);
     trial.expected.as_ref().filter(|_| tells)

@@ -1,5 +1,5 @@
-//! The interface of the pages: a participant begins, answers trial by trial, and may withdraw; the operator sees how many
-//! take part and how far they are. Films, as a whole or in ranges.
+//! HTTP API of the pages: a participant begins, answers trial by trial and may withdraw; the operator sees the progress
+//! of all participants. Films are served in full or in byte ranges.
 
 use super::answer::{check, fails_check, feedback};
 use super::reply::{ApiError, JsonBody, bearer, header_text, json_reply, not_found, unauthorized};
@@ -21,15 +21,15 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use tower_http::services::ServeFile;
 
-/// Letters of what recruiting sites give along.
+/// Maximum length of a recruiting site's parameter, bytes.
 const LONGEST_PARAMETER: usize = 128;
 
 type Shared = State<Arc<App>>;
 
-/// Where a participant stands, as the page reads it.
+/// State of a participant's session as sent to the page.
 #[derive(Serialize)]
 struct SessionState<'a> {
-    /// Trials answered.
+    /// Number of answered trials.
     position: u32,
     n_trials: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -68,7 +68,7 @@ fn session_state<'a>(study: &'a ServedStudy, participant: &Participant) -> Sessi
     }
 }
 
-/// Who asks: session and name, by a token that was signed here and does not ask too often.
+/// Participant who sent the request, identified by a token that this server signed, within the rate limit.
 pub struct AuthenticatedSession {
     session: u32,
     id: String,
@@ -226,7 +226,7 @@ pub async fn operator(State(app): Shared, headers: HeaderMap) -> Result<HttpResp
             "position": participant.position,
             "n_trials": app.study.trials(participant.session).len(),
             "idle_secs": (now_ms - participant.given_ms).max(0) / 1000,
-            // For participants who cannot open the browser where they began.
+            // For participants who can no longer use the browser in which they began.
             "token": may_go_on.then(|| app.secret.token(participant.session, &participant.id)),
         })
     };
@@ -239,7 +239,7 @@ pub async fn operator(State(app): Shared, headers: HeaderMap) -> Result<HttpResp
     })))
 }
 
-/// `GET /films/{16 hexadecimal digits}.mp4`, as a whole or in one range of bytes.
+/// `GET /films/{16 hexadecimal digits}.mp4`, in full or as one byte range.
 pub async fn film(State(app): Shared, Path(name): Path<String>, mut request: Request) -> HttpResponse {
     let Some(film) = name.strip_suffix(".mp4").and_then(|name| app.study.film(name)) else {
         return not_found().await.into_response();
@@ -257,7 +257,7 @@ pub async fn film(State(app): Shared, Path(name): Path<String>, mut request: Req
     reply.map(Body::new)
 }
 
-/// Whether the header `Range` asks for one range of bytes, like `bytes=2-5`; a server may ignore all others (RFC 9110,
+/// Whether a `Range` header requests a single byte range such as `bytes=2-5`; a server may ignore all others (RFC 9110,
 /// section 14.2).
 fn is_one_range(range: &str) -> bool {
     let ends = range.strip_prefix("bytes=").and_then(|ends| ends.split_once('-'));

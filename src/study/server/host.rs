@@ -1,5 +1,5 @@
-//! The hosts that requests may name. Without this check another site could point its own name at this server's address
-//! (DNS rebinding) and read the study from a visitor's browser.
+//! Allowed hosts of requests. Without this check another site could point its own name at this server's address (DNS
+//! rebinding) and read the study from a visitor's browser.
 
 use super::reply::header_text;
 use anyhow::{Result, ensure};
@@ -15,7 +15,7 @@ const MISDIRECTED: &str = "This server is not known under the host name of this 
     Open it at the address that `orator study serve` printed. To serve it under another name, or through a proxy that \
     passes one on, start it with --host-name NAME.\n";
 
-/// Hosts under which the study is served: the address listened at, and a public name.
+/// Hosts under which the study is served: the listening address and an optional public name.
 #[derive(Debug)]
 pub struct AllowedHosts {
     listened: IpAddr,
@@ -23,10 +23,10 @@ pub struct AllowedHosts {
 }
 
 impl AllowedHosts {
-    /// Hosts of a server that listens at `listened` and is known by `name`.
+    /// Hosts of a server that listens on `listened` and is known by `name`.
     ///
     /// # Errors
-    /// A `name` with a scheme, port or path.
+    /// `name` has a scheme, port or path.
     pub fn new(listened: IpAddr, name: Option<String>) -> Result<Self> {
         if let Some(name) = &name {
             let is_host = name.parse::<Authority>().is_ok_and(|authority| authority.host() == name);
@@ -36,7 +36,8 @@ impl AllowedHosts {
     }
 
     /// Whether `authority`, a host with or without a port, names this server. The port is ignored, because tunnels and
-    /// proxies change it. On all addresses (0.0.0.0, ::) every literal address does: only names can be rebound.
+    /// proxies change it. A server that listens on all addresses (0.0.0.0, ::) accepts every IP address: only names can
+    /// be rebound.
     fn allow(&self, authority: &str) -> bool {
         let Ok(authority) = authority.parse::<Authority>() else { return false };
         let host = authority.host();
@@ -49,7 +50,7 @@ impl AllowedHosts {
     }
 }
 
-/// Answers 421 to a request that names another host, and passes on all others.
+/// Middleware that answers 421 to requests that name another host.
 pub async fn check_host(State(hosts): State<Arc<AllowedHosts>>, request: Request, next: Next) -> HttpResponse {
     let in_target = request.uri().authority().map(Authority::as_str);
     let named = in_target.or_else(|| header_text(request.headers(), header::HOST));

@@ -1,10 +1,10 @@
-//! How often one may ask: a bucket of tokens for each participant, and one for all who begin.
+//! Rate limits: a token bucket for each participant, and one shared by all requests to begin.
 
 use std::collections::HashMap;
 use std::sync::Mutex;
 use std::time::Instant;
 
-/// Tokens of requests: how many there are at most, how many come a second, and how many are left.
+/// Token bucket: capacity, refill rate per second and tokens left.
 #[derive(Clone, Copy, Debug)]
 struct Bucket {
     most: f64,
@@ -18,12 +18,12 @@ impl Bucket {
         Self { most, a_second, left: most, at: Instant::now() }
     }
 
-    /// Bucket of one participant, who needs about two tokens a trial.
+    /// Bucket of one participant, who needs about two tokens per trial.
     fn of_participant() -> Self {
         Self::full(100.0, 5.0)
     }
 
-    /// Takes one token, if there is one.
+    /// Takes one token if available; returns whether it did.
     fn takes(&mut self, now: Instant) -> bool {
         let refilled = self.left + self.a_second * now.saturating_duration_since(self.at).as_secs_f64();
         (self.left, self.at) = (refilled.min(self.most), now);
@@ -33,7 +33,8 @@ impl Bucket {
     }
 }
 
-/// Buckets of those who take part. There are as many as there are signed tokens in use.
+/// Token buckets of the server. The map of participants is bounded, because entries are created for verified tokens
+/// only.
 #[derive(Debug)]
 pub struct RateLimits {
     participants: Mutex<HashMap<String, Bucket>>,
@@ -45,18 +46,18 @@ impl RateLimits {
         Self { participants: Mutex::default(), begin: Mutex::new(Bucket::full(500.0, 10.0)) }
     }
 
-    /// Whether the participant `id`, whose token was verified, may ask now.
+    /// Whether the participant `id`, whose token was verified, may send a request now.
     pub fn allow_participant(&self, id: &str) -> bool {
         let Ok(mut buckets) = self.participants.lock() else { return false };
         buckets.entry(id.to_owned()).or_insert_with(Bucket::of_participant).takes(Instant::now())
     }
 
-    /// Whether someone may begin now.
+    /// Whether a new session may begin now.
     pub fn allow_begin(&self) -> bool {
         self.begin.lock().is_ok_and(|mut bucket| bucket.takes(Instant::now()))
     }
 
-    /// Drops the bucket of who has gone.
+    /// Drops the bucket of a participant who withdrew.
     pub fn forget(&self, id: &str) {
         if let Ok(mut buckets) = self.participants.lock() {
             buckets.remove(id);

@@ -1,4 +1,4 @@
-//! Connections: how many at once, how long each may take, and how all of them end.
+//! Accepts connections: limits their number and duration, and shuts all of them down at the end.
 
 use super::peers::PeerLimit;
 use super::write_timeout::WriteTimeout;
@@ -16,26 +16,26 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{Semaphore, watch};
 use tokio::time::{sleep, timeout};
 
-/// Connections at once, where the system lets a process have so many.
+/// Maximum number of simultaneous connections, if the limit on open files permits.
 const MOST_CONNECTIONS: usize = 2048;
-/// Connections that a peer may have in any case: a browser opens six.
+/// Minimum limit per peer: browsers open up to six connections.
 const LEAST_PER_PEER: usize = 8;
-/// Reply to a connection beyond those of its peer.
+/// Reply to a connection above the limit of its peer.
 const TOO_MANY: &[u8] = b"HTTP/1.1 503 Service Unavailable\r\nRetry-After: 10\r\nConnection: close\r\n\r\n";
-/// Time in which the head of a request must come; an idle connection is closed after it.
+/// Time limit for receiving the head of a request; also closes idle connections.
 const HEAD_TIME: Duration = Duration::from_secs(10);
-/// Bytes of the head of a request, and its headers.
+/// Maximum size of a request head in bytes, and of the number of its headers.
 const MOST_HEAD: usize = 16 * 1024;
 const MOST_HEADERS: usize = 64;
-/// Time without a byte written after which a reply, and its connection, ends.
+/// Time without write progress after which a connection is closed.
 const WRITE_TIME: Duration = Duration::from_secs(30);
-/// Time after which a connection takes no request more.
+/// Time after which a connection accepts no further request.
 const CONNECTION_TIME: Duration = Duration::from_secs(600);
-/// Time that a reply on its way has left when the connection or the server ends.
+/// Time that a reply in progress has left when its connection or the server shuts down.
 const GRACE: Duration = Duration::from_secs(5);
 
-/// Serves `router` until `stop`, then lets the replies on their way end. A peer has at most a quarter of the connections,
-/// unless all are those of a proxy (`is_proxied`).
+/// Serves `router` until `stop`, then lets replies in progress finish. Each peer gets at most a quarter of the
+/// connections, unless all come from a proxy (`is_proxied`).
 pub async fn serve(listener: TcpListener, router: Router, is_proxied: bool, stop: impl Future<Output = ()>) {
     let n_places = most_connections();
     let peers = PeerLimit::new(if is_proxied { n_places } else { (n_places / 4).max(LEAST_PER_PEER) });
@@ -52,12 +52,12 @@ pub async fn serve(listener: TcpListener, router: Router, is_proxied: bool, stop
             () = stop.as_mut() => break,
         };
         let (Ok((stream, address)), Ok(place)) = (accepted, place) else {
-            // No more files: others must end first.
+            // Typically out of file descriptors: wait for other connections to end.
             sleep(Duration::from_millis(50)).await;
             continue;
         };
         let Some(counted) = peers.admit(address.ip()) else {
-            // An empty send buffer takes it at once.
+            // The write does not block, because the send buffer is empty.
             let _ = stream.into_std().and_then(|mut stream| stream.write(TOO_MANY));
             continue;
         };
@@ -73,7 +73,7 @@ pub async fn serve(listener: TcpListener, router: Router, is_proxied: bool, stop
     let _ = timeout(2 * GRACE, places.acquire_many(all)).await;
 }
 
-/// Serves one connection. What breaks it concerns its other end alone.
+/// Serves one connection. Errors are ignored: they concern the client only.
 async fn connection(stream: TcpStream, router: Router, mut stopped: watch::Receiver<()>) {
     let _ = stream.set_nodelay(true);
     let mut builder = http1::Builder::new();
@@ -84,7 +84,7 @@ async fn connection(stream: TcpStream, router: Router, mut stopped: watch::Recei
     let mut connection = pin!(builder.serve_connection(stream, service));
     tokio::select! {
         _ = connection.as_mut() => return,
-        // The sender is dropped when the server stops.
+        // Completes when the sender is dropped, which happens when the server stops.
         _ = stopped.changed() => {}
         () = sleep(CONNECTION_TIME) => {}
     }
@@ -92,7 +92,8 @@ async fn connection(stream: TcpStream, router: Router, mut stopped: watch::Recei
     let _ = timeout(GRACE, connection).await;
 }
 
-/// Half of the files that this process may open, each connection with a film; as many as it may are asked for.
+/// Maximum number of connections: half of the process's file descriptors, because each connection may have a film open.
+/// Raises the soft limit of descriptors to the hard limit first.
 fn most_connections() -> usize {
     let limit = getrlimit(Resource::Nofile);
     let raised = rustix::process::Rlimit { current: limit.maximum, ..limit };

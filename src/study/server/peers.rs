@@ -1,11 +1,11 @@
-//! How many connections each peer has, so that no peer takes them all. Addresses are held only while connections are
-//! open, and never written.
+//! Limit of connections per peer, so that no peer can occupy all of them. Addresses are kept in memory while
+//! connections are open, and never logged.
 
 use std::collections::HashMap;
 use std::net::{IpAddr, Ipv6Addr};
 use std::sync::{Arc, Mutex};
 
-/// Open connections by peer: an IPv4 address, or an IPv6 network of 64 bits, the least that a provider assigns.
+/// Number of open connections by peer: an IPv4 address, or an IPv6 /64 network, the smallest that providers assign.
 #[derive(Debug)]
 pub struct PeerLimit {
     most: usize,
@@ -13,12 +13,12 @@ pub struct PeerLimit {
 }
 
 impl PeerLimit {
-    /// Limit of `most` connections for each peer.
+    /// Limit of `most` connections per peer.
     pub fn new(most: usize) -> Arc<Self> {
         Arc::new(Self { most, open: Mutex::default() })
     }
 
-    /// Counts a connection from `address` until the result is dropped. `None`: its peer has as many as it may.
+    /// Counts a connection from `address` until the result is dropped; `None` if its peer has reached the limit.
     pub fn admit(self: &Arc<Self>, address: IpAddr) -> Option<PeerConnection> {
         let peer = peer(address);
         let mut open = self.open.lock().ok()?;

@@ -1,4 +1,4 @@
-//! The secret of a study's server: a key that signs the tokens of participants, and the operator's token.
+//! Secrets of a study's server: the key that signs participants' tokens, and the operator's token.
 
 use anyhow::{Context, Result, ensure};
 use base64::Engine;
@@ -10,14 +10,14 @@ use std::io::Read;
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
-/// Bytes of a participant's random name.
+/// Length of a participant's random identifier, bytes.
 const ID: usize = 12;
-/// Bytes of a token: session, name, signature.
+/// Length of a token, bytes: session, identifier, signature.
 const TOKEN: usize = 4 + ID + blake3::OUT_LEN;
-/// Letters of a completion code, without those that look alike.
+/// Characters of a completion code, without those that look alike.
 const CODE_LETTERS: &[u8; 32] = b"ABCDEFGHJKLMNPQRSTUVWXYZ23456789";
 
-/// Bytes that nobody can foretell.
+/// Cryptographically secure random bytes.
 pub fn random<const N: usize>() -> Result<[u8; N]> {
     let mut bytes = [0; N];
     let read = File::open("/dev/urandom").and_then(|mut source| source.read_exact(&mut bytes));
@@ -25,17 +25,17 @@ pub fn random<const N: usize>() -> Result<[u8; N]> {
     Ok(bytes)
 }
 
-/// A random completion code, ten letters.
+/// Random completion code of ten characters.
 pub fn completion_code() -> Result<String> {
     Ok(random::<10>()?.into_iter().map(|byte| char::from(CODE_LETTERS[usize::from(byte % 32)])).collect())
 }
 
-/// A random name of a participant.
+/// Random identifier of a participant, in hexadecimal digits.
 pub fn participant_id() -> Result<String> {
     Ok(hex(&random::<ID>()?))
 }
 
-/// Key and operator's token of one study.
+/// Signing key and operator's token of one study.
 #[derive(Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StudySecret {
@@ -44,10 +44,10 @@ pub struct StudySecret {
 }
 
 impl StudySecret {
-    /// Reads the secret at `path`; makes it the first time.
+    /// Reads the secret at `path`; creates it if it does not exist.
     ///
     /// # Errors
-    /// A file that others can read, or that is none of these.
+    /// The file is readable by users other than its owner, or is not a valid secret.
     pub fn open(path: &Path) -> Result<Self> {
         if !path.exists() {
             let secret = Self { key: random()?, operator_token: hex(&random::<16>()?) };
@@ -69,12 +69,12 @@ impl StudySecret {
         &self.operator_token
     }
 
-    /// Whether `token` is the operator's; the time it takes tells nothing of it.
+    /// Whether `token` is the operator's token. Keyed hashes are compared, so timing reveals nothing about the token.
     pub fn is_operator(&self, token: &str) -> bool {
         self.sign(token.as_bytes()) == self.sign(self.operator_token.as_bytes())
     }
 
-    /// Token of the participant `id`, a name of [`participant_id`], in `session`.
+    /// Token of the participant `id` (from [`participant_id`]) in `session`.
     pub fn token(&self, session: u32, id: &str) -> String {
         let mut bytes = session.to_le_bytes().to_vec();
         bytes.extend(unhex(id));
@@ -83,13 +83,14 @@ impl StudySecret {
         URL_SAFE_NO_PAD.encode(bytes)
     }
 
-    /// Session and name of the participant whom a token was made for; `None`: it was not made here.
+    /// Session and identifier of the participant to whom a token was issued; `None` if this study's key did not sign
+    /// it.
     pub fn verify(&self, token: &str) -> Option<(u32, String)> {
         let bytes: [u8; TOKEN] = URL_SAFE_NO_PAD.decode(token).ok()?.try_into().ok()?;
         let (said, signature) = bytes.split_at(4 + ID);
         let (session, id) = said.split_at(4);
         let signature = blake3::Hash::from_bytes(signature.try_into().ok()?);
-        // The comparison of hashes takes the same time wherever they differ.
+        // `blake3::Hash` compares in constant time.
         let is_signed = self.sign(said) == signature;
         is_signed.then(|| Some((u32::from_le_bytes(session.try_into().ok()?), hex(id)))).flatten()
     }

@@ -1,4 +1,4 @@
-//! A study's server from its folder to its end, and its addresses.
+//! Opens, runs and shuts down a study's server; routes of its API and pages.
 
 use super::clock::Clock;
 use super::host::{AllowedHosts, check_host};
@@ -27,12 +27,12 @@ use tokio::signal::unix::{SignalKind, signal};
 use tower_http::set_header::SetResponseHeaderLayer;
 use tower_http::timeout::TimeoutLayer;
 
-/// Bytes of a body at most.
+/// Maximum size of a request body, bytes.
 const MOST_BODY: usize = 16 * 1024;
-/// Time that a request may take until its reply begins, the reading of its body with it.
+/// Time limit for a request up to the start of its reply, including reading the body.
 const REQUEST_TIME: Duration = Duration::from_secs(10);
 
-/// What the handlers share: the study, where its responses go, and who may ask how often.
+/// State shared by the request handlers.
 pub struct App {
     pub study: ServedStudy,
     pub store: ResponseStore,
@@ -41,18 +41,18 @@ pub struct App {
     pub clock: Clock,
 }
 
-/// Server of one study, not listening yet.
+/// Server of one study that does not listen yet.
 pub struct StudyServer {
     app: App,
     writer: JoinHandle<()>,
 }
 
 impl StudyServer {
-    /// Opens the study in `folder`, its responses and its secret. `abandoned_secs`: time without an answer after which a
-    /// place is given again.
+    /// Opens the study in `folder`, its responses and its secret. `abandoned_secs`: time without an answer after which
+    /// a session may be reassigned.
     ///
     /// # Errors
-    /// A study that is not as it was sealed, or whose secret or responses are not its own.
+    /// The study does not match its seal, or its secret or responses are unusable or belong to another plan.
     pub fn open(folder: &StudyFolder, abandoned_secs: f64) -> Result<Self> {
         StudySeal::verify(folder)?;
         let study = ServedStudy::open(folder, abandoned_secs)?;
@@ -71,11 +71,12 @@ impl StudyServer {
         self.app.secret.operator_token()
     }
 
-    /// Serves at `address` until Ctrl-C or a request to terminate. `listening` is told where, once it does. `host_name`:
-    /// name by which a proxy serves the study; it is then the proxy that limits the connections of each peer.
+    /// Serves on `address` until SIGINT or SIGTERM. `listening` is called with the actual address once the socket is
+    /// bound. `host_name`: name under which a proxy serves the study; the proxy is then responsible for limiting the
+    /// connections of each peer.
     ///
     /// # Errors
-    /// An address that cannot be listened at, or a `host_name` that is more than a name.
+    /// The address cannot be bound, or `host_name` is more than a host name.
     pub fn run(self, address: SocketAddr, host_name: Option<String>, listening: impl FnOnce(SocketAddr)) -> Result<()> {
         let is_proxied = host_name.is_some();
         let hosts = AllowedHosts::new(address.ip(), host_name)?;
@@ -97,13 +98,13 @@ impl StudyServer {
             anyhow::Ok(())
         })?;
         drop(runtime);
-        // The last handle of the store is gone: its thread ends after what it was given.
+        // Dropping the runtime dropped the last handle of the store, so its thread ends after the queued work.
         let _ = self.writer.join();
         Ok(())
     }
 }
 
-/// The addresses of a study's server, each served under the names of `hosts`.
+/// Routes of the server, restricted to the allowed `hosts`.
 fn router(app: App, hosts: AllowedHosts) -> Router {
     let mut router = Router::new()
         .route("/api/study", get(api::study))
