@@ -1,59 +1,60 @@
-//! Answers: each trial has one, in the order of the session, and it stays as it was given.
+//! Stored answers: one per trial, in the order of the session, never changed.
 
 use super::participants::{Participant, Status, find};
 use crate::vote::Response;
 use rusqlite::{Connection, OptionalExtension, Row, params};
 use serde::{Deserialize, Serialize};
 
-/// Answer to a trial as a page sends it.
+/// Answer to a trial as sent by a page.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GivenAnswer {
     /// Index of the trial in its session.
     pub position: u32,
     pub response: Response,
-    /// How often the films were played.
+    /// Number of times the films were played.
     pub plays: u32,
-    /// Seconds in which a film had stopped for want of data.
+    /// Seconds during which playback was stalled for lack of data.
     pub stalled_secs: f64,
-    /// Seconds in which the page was not in front.
+    /// Seconds during which the page was hidden or unfocused.
     pub unfocused_secs: f64,
     /// Seconds from the end of the films to the answer.
     pub response_secs: f64,
 }
 
-/// What a trial asks of its answer.
+/// Properties of a trial that decide how its answer is recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TrialTerms {
-    /// Milliseconds from the trial's first appearance before which its films cannot have been seen.
+    /// Minimum time from the first presentation of the trial to its answer, milliseconds: before, its films cannot have
+    /// been watched.
     pub least_ms: i64,
-    /// Whether it is the session's last.
+    /// Whether the trial is the last of its session.
     pub is_last: bool,
     /// Whether the answer fails an attention check.
     pub fails_check: bool,
 }
 
-/// What became of an answer.
+/// Result of recording an answer.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Recorded {
-    /// Stored, now or before; where the participant stands.
+    /// The answer is stored, now or earlier; current state of the participant.
     Stored(Participant),
-    /// No participant of that name: withdrawn.
+    /// The participant is unknown: withdrawn.
     Unknown,
-    /// The place was given to another.
+    /// The session was reassigned to another participant.
     Replaced,
-    /// Another answer is stored at its position.
+    /// A different answer is stored at this position.
     Differs,
-    /// The trial has not been given out yet.
+    /// The trial has not been presented yet.
     OutOfTurn,
-    /// Films cannot have been seen yet; milliseconds until then.
+    /// The films cannot have been watched yet; remaining milliseconds.
     TooSoon(i64),
 }
 
 /// Stores `answer` of the participant `id`.
 ///
 /// # Errors
-/// A database that fails; nothing is stored.
+/// The database fails; nothing is stored.
 pub fn record(
     db: &Connection,
     id: &str,
@@ -89,10 +90,10 @@ pub fn record(
     Ok(Recorded::Stored(after))
 }
 
-/// Adds the row of an answer.
+/// Inserts the row of an answer.
 ///
 /// # Errors
-/// A database that fails, or an answer at that position.
+/// The database fails, or an answer exists at that position.
 pub fn insert(db: &Connection, id: &str, answer: &GivenAnswer) -> rusqlite::Result<()> {
     let response = serde_json::to_string(&answer.response).unwrap_or_default();
     let sql = "INSERT INTO answer VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)";
@@ -120,20 +121,20 @@ fn at(db: &Connection, id: &str, position: u32) -> rusqlite::Result<Option<Given
     db.query_row(&sql, params![id, position], of_row).optional()
 }
 
-/// Answers of a participant in the order of the session.
+/// Answers of a participant by position.
 pub fn of(db: &Connection, id: &str) -> rusqlite::Result<Vec<GivenAnswer>> {
     let sql = format!("SELECT {COLUMNS} FROM answer WHERE participant = ?1 ORDER BY position");
     db.prepare(&sql)?.query_map([id], of_row)?.collect()
 }
 
-/// Answers whose films stopped for want of data, and for how long.
+/// Number and total duration of stalls.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct StallCount {
     pub trials: u32,
     pub secs: f64,
 }
 
-/// Counts the answers whose films stopped.
+/// Counts the answers with stalled films.
 pub fn stalls(db: &Connection) -> rusqlite::Result<StallCount> {
     let sql = "SELECT COUNT(*), TOTAL(stalled_secs) FROM answer WHERE stalled_secs > 0";
     db.query_row(sql, [], |row| Ok(StallCount { trials: row.get(0)?, secs: row.get(1)? }))

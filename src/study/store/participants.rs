@@ -1,32 +1,32 @@
-//! Who takes part: places are given out in the plan's order, those of who left are given again.
+//! Participants: sessions are assigned in the plan's order, and those of participants who left are reassigned.
 
 use super::database::count_up;
 use rusqlite::types::{FromSql, FromSqlError, FromSqlResult, ToSql, ToSqlOutput, ValueRef};
 use rusqlite::{Connection, OptionalExtension, Row, params};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What recruiting sites give along (Prolific, Mechanical Turk).
+/// URL parameters of recruiting sites (Prolific, Mechanical Turk).
 pub const PARAMETERS: [&str; 6] = ["PROLIFIC_PID", "STUDY_ID", "SESSION_ID", "workerId", "assignmentId", "hitId"];
 
-/// Those of them that are the ID of a person.
+/// Parameters that identify a person.
 const PERSON: [&str; 2] = ["PROLIFIC_PID", "workerId"];
 
-/// Where a participant stands.
+/// Status of a participant's session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Status {
-    /// Answers; or has stopped to, and may go on until the place is given to another.
+    /// In progress; an abandoned session stays active until it is reassigned.
     Active,
-    /// Answered every trial.
+    /// Every trial is answered.
     Completed,
-    /// Had stopped to answer, and the place was given to another.
+    /// Abandoned and reassigned to another participant.
     Replaced,
 }
 
 impl Status {
     const ALL: [Self; 3] = [Self::Active, Self::Completed, Self::Replaced];
 
-    /// Word in the database and in exports.
+    /// Name in the database and in exports.
     pub fn word(self) -> &'static str {
         match self {
             Self::Active => "active",
@@ -52,22 +52,22 @@ impl FromSql for Status {
 /// Participant as stored.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Participant {
-    /// Random name.
+    /// Random identifier.
     pub id: String,
     /// Index into the plan's sessions.
     pub session: u32,
     pub language: String,
-    /// What the recruiting site gave along, such as `PROLIFIC_PID`.
+    /// Parameters of the recruiting site, such as `PROLIFIC_PID`.
     pub parameters: BTreeMap<String, String>,
-    /// Proof of completion, shown at the end.
+    /// Completion code, shown at the end.
     pub code: String,
     pub status: Status,
     pub begun_ms: i64,
-    /// Number of answers: the index of the next trial.
+    /// Number of answers, which is the index of the next trial.
     pub position: u32,
-    /// When that trial was first given out.
+    /// Time at which that trial was first presented, milliseconds since 1970.
     pub given_ms: i64,
-    /// Attention checks answered wrongly.
+    /// Number of failed attention checks.
     pub failed_checks: u32,
 }
 
@@ -92,40 +92,41 @@ impl Participant {
     }
 }
 
-/// How places are given out.
+/// Rules for assigning sessions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Quota {
-    /// Sessions of the plan.
+    /// Number of sessions of the plan.
     pub n_sessions: u32,
-    /// Participants wanted: completed, and not excluded for failed checks.
+    /// Target number of participants who complete the study and are not excluded for failed checks.
     pub wanted: u32,
-    /// Failed attention checks from which on a participant is excluded.
+    /// Minimum number of failed attention checks that excludes a participant; `None`: no exclusion.
     pub excluded_from: Option<u32>,
-    /// Milliseconds without a further answer after which a place is given again.
+    /// Time without a further answer after which a session may be reassigned, milliseconds.
     pub abandoned_ms: i64,
-    /// Milliseconds without the first answer after which a place is given again, if `abandoned_ms` is not less.
+    /// Time without the first answer after which a session may be reassigned, milliseconds; `abandoned_ms` applies if
+    /// it is shorter.
     pub unanswered_ms: i64,
 }
 
-/// How many participants there are, by how far they came.
+/// Number of participants by status.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct QuotaCounts {
     pub wanted: u32,
-    /// Answered every trial, and not excluded.
+    /// Completed and not excluded.
     pub completed: u32,
-    /// Answered every trial, and excluded for failed checks.
+    /// Completed, but excluded for failed checks.
     pub excluded: u32,
     pub active: u32,
-    /// Without an answer for so long that their place is free.
+    /// Active, but idle for so long that the session may be reassigned.
     pub abandoned: u32,
-    /// Whose place was given to another.
+    /// Replaced by another participant.
     pub replaced: u32,
-    /// Whose data was deleted at their wish.
+    /// Data deleted on request.
     pub withdrawn: u32,
 }
 
 impl Quota {
-    /// Whether `participant` has a place that nobody else may take.
+    /// Whether the session of `participant` must not be reassigned.
     fn holds(&self, participant: &Participant, now_ms: i64) -> bool {
         match participant.status {
             Status::Active => {
@@ -138,7 +139,7 @@ impl Quota {
         }
     }
 
-    /// Counts `participants`, of whom `withdrawn` have gone.
+    /// Counts `participants` by status; `withdrawn` participants are no longer among them.
     pub fn count(&self, participants: &[Participant], withdrawn: u32, now_ms: i64) -> QuotaCounts {
         let mut counts = QuotaCounts { wanted: self.wanted, withdrawn, ..QuotaCounts::default() };
         for participant in participants {
@@ -155,7 +156,7 @@ impl Quota {
     }
 }
 
-/// Who begins.
+/// Participant who requests a session.
 #[derive(Clone, Debug)]
 pub struct NewParticipant {
     pub id: String,
@@ -165,37 +166,38 @@ pub struct NewParticipant {
 }
 
 impl NewParticipant {
-    /// IDs that a recruiting site gave, by their parameter.
+    /// IDs from recruiting sites, by parameter.
     fn ids(&self) -> impl Iterator<Item = (&str, &String)> {
         PERSON.into_iter().filter_map(|name| Some((name, self.parameters.get(name).filter(|id| !id.is_empty())?)))
     }
 
-    /// Whether a recruiting site gave an ID.
+    /// Whether the request has an ID from a recruiting site.
     pub fn has_id(&self) -> bool {
         self.ids().next().is_some()
     }
 
-    /// Whether `participant` has the same ID.
+    /// Whether `participant` has the same ID from a recruiting site.
     fn is(&self, participant: &Participant) -> bool {
         self.ids().any(|(name, id)| participant.parameters.get(name) == Some(id))
     }
 }
 
-/// What became of a request to begin.
+/// Result of a request to begin.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BeginOutcome {
     Begun(Participant),
-    /// A session with answers has the same ID; only its token opens it, because anybody can send an ID.
+    /// A session with answers has the same ID. Only its token resumes it, because anybody can send an ID.
     Known,
-    /// The study has all the participants wanted.
+    /// The study has all its participants.
     Full,
 }
 
-/// Gives the first free session to `newcomer`; whoever had abandoned it is replaced. A session of the same ID that has no
-/// answer yet is given up for the new one: the page may have been opened in another browser, or the reply was lost.
+/// Assigns the first free session to `newcomer` and marks an abandoned participant of that session as replaced.
+/// Sessions without answers that have the same ID are given up in favour of the new one: the page was opened in another
+/// browser, or the reply was lost.
 ///
 /// # Errors
-/// A database that fails; nothing is stored.
+/// The database fails; nothing is stored.
 pub fn begin(db: &Connection, newcomer: &NewParticipant, quota: Quota, now_ms: i64) -> rusqlite::Result<BeginOutcome> {
     let (own, others): (Vec<_>, Vec<_>) = all(db)?.into_iter().partition(|participant| newcomer.is(participant));
     let is_current = |participant: &Participant| participant.status != Status::Replaced;
@@ -221,19 +223,19 @@ pub fn begin(db: &Connection, newcomer: &NewParticipant, quota: Quota, now_ms: i
     find(db, &newcomer.id)?.map(BeginOutcome::Begun).ok_or(rusqlite::Error::QueryReturnedNoRows)
 }
 
-/// Participant of that name; `None`: never begun, or withdrawn.
+/// Participant with this identifier; `None` if unknown or withdrawn.
 pub fn find(db: &Connection, id: &str) -> rusqlite::Result<Option<Participant>> {
     let sql = format!("SELECT {} FROM participant WHERE id = ?1", Participant::COLUMNS);
     db.query_row(&sql, [id], Participant::of_row).optional()
 }
 
-/// All participants, the first to begin first.
+/// All participants in order of start time.
 pub fn all(db: &Connection) -> rusqlite::Result<Vec<Participant>> {
     let sql = format!("SELECT {} FROM participant ORDER BY begun_ms, id", Participant::COLUMNS);
     db.prepare(&sql)?.query_map([], Participant::of_row)?.collect()
 }
 
-/// Deletes all of a participant and counts the withdrawal; `false`: there is none of that name.
+/// Deletes all data of a participant and counts the withdrawal; `false` if the identifier is unknown.
 pub fn withdraw(db: &Connection, id: &str) -> rusqlite::Result<bool> {
     db.execute("DELETE FROM answer WHERE participant = ?1", [id])?;
     let is_known = db.execute("DELETE FROM participant WHERE id = ?1", [id])? > 0;
@@ -243,7 +245,7 @@ pub fn withdraw(db: &Connection, id: &str) -> rusqlite::Result<bool> {
     Ok(is_known)
 }
 
-/// Latest time in milliseconds since 1970 at which a participant began or answered; 0 without any participant.
+/// Latest time at which a participant began or answered, milliseconds since 1970; 0 without participants.
 pub fn latest_ms(db: &Connection) -> rusqlite::Result<i64> {
     let sql = "SELECT COALESCE(MAX(MAX(begun_ms, given_ms)), 0) FROM participant";
     db.query_row(sql, [], |row| row.get(0))
@@ -264,7 +266,7 @@ mod tests {
     const QUOTA: Quota =
         Quota { n_sessions: 3, wanted: 2, excluded_from: None, abandoned_ms: 3_600_000, unanswered_ms: 300_000 };
 
-    /// Begins a session `name` with that ID at a recruiting site.
+    /// Begins the session `name` with this ID of a recruiting site.
     fn begin_as(db: &Connection, name: &str, pid: &str, now_ms: i64) -> BeginOutcome {
         let parameters = BTreeMap::from([("PROLIFIC_PID".to_owned(), pid.to_owned())]);
         let (id, language) = (name.to_owned(), "en".to_owned());
