@@ -1,5 +1,5 @@
-//! Clips of equal length out of a speaker's speech: they begin and end in pauses, have speech in them, and were seen.
-//! Better ones come first; those that no choice of ends makes good are refused with the reason.
+//! Cuts clips of equal length from a speaker's speech: they start and end in pauses, contain speech, and have visible
+//! joints. Better clips come first; segments without any acceptable clip are refused with a reason.
 
 use super::speaker_source::{SpeakerSource, SpokenPiece};
 use anyhow::Result;
@@ -10,62 +10,62 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
-/// Loudest level at the ends of a clip, dB from the speech, and largest share of joints not seen, from the best clips to
-/// the last that are taken.
+/// Grades of clips from best to worst: maximum sound level at the ends in dB relative to the speech level, and maximum
+/// proportion of invisible joints.
 const GRADES: [(f32, f64); 4] =
     [(-25.0, 0.0), (-25.0, MOST_UNSEEN), (-15.0, MOST_UNSEEN), (f32::INFINITY, MOST_UNSEEN)];
-/// Largest share of the joints of a clip that may be hidden in all its films.
+/// Maximum proportion of joints of a clip that may be hidden in all its films.
 const MOST_UNSEEN: f64 = 0.25;
-/// Least share of a clip in which there is speech.
+/// Minimum proportion of speech in a clip.
 const LEAST_SPEECH: f64 = 0.3;
 
 /// Clip of a speaker's speech.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StudyClip {
-    /// `piece-frame`, once in the speaker.
+    /// Name `segment-frame`, unique per speaker.
     pub name: String,
-    /// Number of the piece it is cut from.
+    /// Index of the segment from which the clip is cut.
     #[serde(skip)]
     pub piece: usize,
-    /// Frames of the piece.
+    /// Frame range within the segment.
     pub frames: Range<usize>,
-    /// Level of the speech at the louder of its ends, dB from that of the speech.
+    /// Sound level at the louder end, dB relative to the speech level.
     pub cut_db: f32,
-    /// Share of the joints that were not seen, and are hidden in every film of the clip.
+    /// Proportion of joints that were not detected; they are hidden in every film of the clip.
     pub unseen: f64,
 }
 
 impl StudyClip {
-    /// Whether it begins and ends in a pause.
+    /// Whether the clip starts and ends in a pause.
     pub fn ends_in_pauses(&self) -> bool {
         self.cut_db <= GRADES[2].0
     }
 }
 
-/// Piece of speech without a clip.
+/// Segment of speech without a clip.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RefusedPiece {
     pub name: String,
     pub reason: String,
 }
 
-/// Clips of a speaker in the order of the speech, and the pieces that have none.
+/// Clips of a speaker in the order of the speech, and the segments without clips.
 #[derive(Debug)]
 pub struct CutSpeech {
     pub clips: Vec<StudyClip>,
-    /// Names of the clips, the best first.
+    /// Names of the clips, best first.
     pub best_first: Vec<String>,
     pub refused: Vec<RefusedPiece>,
 }
 
-/// Clip as it could be cut.
+/// Candidate for a clip.
 struct CutCandidate {
     start: usize,
     cut_db: f32,
     unseen: f64,
 }
 
-/// Cuts `n_wanted` clips of `n_frames`, fewer where there are no more; `rank` orders clips that are equally good.
+/// Cuts `n_wanted` clips of `n_frames`, or fewer if there are no more; `rank` orders clips of equal grade.
 pub fn cut(source: &SpeakerSource, n_frames: usize, n_wanted: usize, rank: impl Fn(&str) -> u64) -> Result<CutSpeech> {
     let looked_at = (0..source.n_pieces()).into_par_iter().map(|piece| {
         let piece = source.read(piece)?;
@@ -85,7 +85,7 @@ pub fn cut(source: &SpeakerSource, n_frames: usize, n_wanted: usize, rank: impl 
         for (piece, name, candidates) in &pieces {
             let taken = clips.iter().filter(|clip| clip.piece == *piece).map(|clip| clip.frames.clone());
             let mut taken: Vec<Range<usize>> = taken.collect();
-            // The earliest end first leaves room for the most clips of one length.
+            // Greedy choice by earliest end maximises the number of disjoint clips of equal length.
             for &CutCandidate { start, cut_db, unseen } in candidates {
                 let frames = start..start + n_frames;
                 let is_free = taken.iter().all(|other| other.end <= frames.start || frames.end <= other.start);
@@ -104,7 +104,7 @@ pub fn cut(source: &SpeakerSource, n_frames: usize, n_wanted: usize, rank: impl 
     Ok(CutSpeech { clips, best_first, refused })
 }
 
-/// Clips that could be cut from a piece, or why there is none.
+/// Candidate clips of a segment, or the reason why there is none.
 fn candidates(piece: &SpokenPiece, fps: FrameRate, n_frames: usize) -> std::result::Result<Vec<CutCandidate>, String> {
     let secs = |frames: usize| fps.secs(frames);
     if piece.n_frames < n_frames {
@@ -134,7 +134,7 @@ fn candidates(piece: &SpokenPiece, fps: FrameRate, n_frames: usize) -> std::resu
     if spoken.is_empty() { Err(format!("no stretch in which {least:.0} % is speech")) } else { Ok(spoken) }
 }
 
-/// Number of joints not seen before each frame and after the last.
+/// Cumulative number of undetected joints before each frame, with the total as the last element.
 fn unseen_before(piece: &SpokenPiece) -> Vec<u64> {
     let mut sums = vec![0; piece.n_frames + 1];
     let Some((motion, _)) = &piece.natural else { return sums };
@@ -145,7 +145,7 @@ fn unseen_before(piece: &SpokenPiece) -> Vec<u64> {
     sums
 }
 
-/// Joints that can be seen or not: all but the origin and those that stand at the place of another.
+/// Joints whose visibility counts: all but the origin and those that duplicate another joint.
 fn seen_joints() -> impl Iterator<Item = usize> {
     (0..N_JOINTS).filter(|joint| *joint != NECK && !is_duplicate(*joint))
 }

@@ -1,5 +1,5 @@
-//! Speakers with their clips, each condition's performance of each clip, and the clips' sounds at one loudness: all that
-//! films are drawn from.
+//! Speakers with their clips, the performance of each condition for each clip, and the clips' sounds at equal loudness:
+//! everything that is rendered into films.
 
 use super::alike::{CommonBody, CommonSight};
 use super::condition_motion::{ConditionModels, ShownMotion, motions, sound_of};
@@ -23,38 +23,38 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
-/// Loudness of all films, LUFS (EBU R 128), less where a clip would be clipped.
+/// Target loudness of all films, LUFS (EBU R 128); lowered if a clip would exceed [`PEAK`].
 const LOUDNESS_LUFS: f64 = -23.0;
-/// Largest amplitude.
+/// Maximum amplitude, relative to full scale.
 const PEAK: f64 = 0.9;
-/// Seconds over which a sound comes and goes at its ends, so that a cut does not click.
+/// Duration of the fades at the ends of a sound, which avoid clicks, seconds.
 const FADE_SECS: f64 = 0.01;
 
-/// Sound check: frequency in Hz, which small loudspeakers play too, and amplitude.
+/// Tones of the sound check: frequency in Hz, audible on small loudspeakers too, and amplitude.
 const HZ: f64 = 700.0;
 const AMPLITUDE: f64 = 0.1;
-/// Seconds of the longest tone, and over which a tone comes and goes.
+/// Maximum duration of a tone, and duration of its fades, seconds.
 const LONGEST: f64 = 0.4;
 const TONE_FADE_SECS: f64 = 0.02;
 
-/// Speaker whose speech is cut.
+/// Speaker whose speech has been cut into clips.
 pub struct CutSpeaker {
     source: SpeakerSource,
     models: ConditionModels,
     pub cut: CutSpeech,
     /// Sounds of the clips, as long as the films.
     pub sounds: Vec<Sound>,
-    /// Sound of the sound check, as long; none where there is no clip.
+    /// Sound of the sound check, equally long; `None` without clips.
     pub tones: Option<Sound>,
 }
 
-/// Speaker whose films can be drawn.
+/// Speaker whose films can be rendered.
 pub struct FilmedSpeaker {
     clips: Vec<StudyClip>,
     sounds: Vec<Sound>,
     tones: Option<Sound>,
     film_fps: FrameRate,
-    /// By condition, then by clip: the clip of the motion, and the motion on the rig.
+    /// By condition, then by clip: index of the clip of the motion, and the motion on the rig.
     performances: BTreeMap<String, Vec<(usize, Performance)>>,
     stage: AvatarStage,
 }
@@ -64,10 +64,10 @@ impl CutSpeaker {
         &self.source.name
     }
 
-    /// Cuts `n_clips` clips of a speaker, fewer where there are no more; `rank` orders clips that are equally good.
+    /// Cuts `n_clips` clips of a speaker, or fewer if there are no more; `rank` orders clips of equal grade.
     ///
     /// # Errors
-    /// No dataset, sound or checkpoint where the file has one.
+    /// A dataset, sound or checkpoint of the study file cannot be read.
     pub fn new(file: &StudyFile, speaker: &StudySpeaker, n_clips: usize, rank: impl Fn(&str) -> u64) -> Result<Self> {
         let name = &speaker.name;
         let models = ConditionModels::open(&file.condition, name)?;
@@ -93,10 +93,10 @@ impl CutSpeaker {
         Ok(Self { source, models, cut, sounds, tones })
     }
 
-    /// Puts the motion of every condition on the rig that all share, for films of `size` px.
+    /// Retargets the motion of every condition to the common rig, for films of `size` px.
     ///
     /// # Errors
-    /// A condition without motion for a clip.
+    /// A condition has no motion for a clip.
     pub fn filmed(self, file: &StudyFile, size: [usize; 2], progress: &dyn Progress) -> Result<FilmedSpeaker> {
         let Self { source, models, cut, sounds, tones } = self;
         let n_pieces = cut.clips.chunk_by(|a, b| a.piece == b.piece).count();
@@ -131,7 +131,7 @@ impl CutSpeaker {
     }
 }
 
-/// Brings all sounds to one loudness, which is returned, LUFS; a silent one stays.
+/// Normalises all sounds to the same loudness and returns it, LUFS; silent sounds are left unchanged.
 pub fn equally_loud<'s>(sounds: impl Iterator<Item = &'s mut Sound>) -> f64 {
     let measured: Vec<(&mut Sound, f64)> =
         sounds.filter_map(|sound| loudness::integrated(sound).map(|lufs| (sound, lufs))).collect();
@@ -148,16 +148,16 @@ pub fn equally_loud<'s>(sounds: impl Iterator<Item = &'s mut Sound>) -> f64 {
 }
 
 impl FilmedSpeaker {
-    /// Number of the clip `speaker/clip`.
+    /// Index of the clip `speaker/clip`.
     fn find(&self, clip: &str) -> Option<usize> {
         let name = clip.rsplit('/').next().unwrap_or(clip);
         self.clips.iter().position(|known| known.name == name)
     }
 
-    /// Name `speaker/clip` of the clip whose motion the condition of that content shows.
+    /// Name `speaker/clip` of the clip whose motion is shown in the film with this content.
     ///
     /// # Errors
-    /// A clip or a condition that the speaker does not have.
+    /// The speaker does not have the clip or the condition.
     pub fn motion_of(&self, content: &FilmContent) -> Result<String> {
         let (of, _) = self.shown(content)?;
         Ok(format!("{}/{}", content.speaker, self.clips[*of].name))
@@ -169,16 +169,16 @@ impl FilmedSpeaker {
         self.performances.get(&content.condition).and_then(|of_condition| of_condition.get(clip)).with_context(missing)
     }
 
-    /// Performance of the film of that content, at the film's rate.
+    /// Performance of the film with this content, at the film's rate.
     ///
     /// # Errors
-    /// A clip or a condition that the speaker does not have.
+    /// The speaker does not have the clip or the condition.
     pub fn performance(&self, content: &FilmContent) -> Result<Performance> {
         let (_, performance) = self.shown(content)?;
         Ok(performance.resampled(self.film_fps))
     }
 
-    /// Scene of the film of that content with its performance.
+    /// Scene of the film with this content.
     pub fn scene<'a>(&'a self, content: &FilmContent, performance: &'a Performance) -> FilmScene<'a> {
         let sound = match content.sound {
             FilmSound::Speech => self.find(&content.clip).and_then(|clip| self.sounds.get(clip)),
@@ -200,7 +200,8 @@ fn faded(mut sound: Sound) -> Sound {
     sound
 }
 
-/// Sound of the sound check, which a participant counts: `n` tones with as much silence around each, over `length` samples.
+/// Sound of the sound check: `n` evenly spaced tones separated by silence of at least their duration, over `length`
+/// samples.
 fn tones(n: usize, rate: u32, length: usize) -> Sound {
     let rate_hz = f64::from(rate.max(1));
     let apart = length as f64 / rate_hz / (n + 1) as f64;
@@ -246,7 +247,7 @@ mod tests {
     fn so_many_tones_are_heard_in_films_of_any_length() {
         for secs in [1, 12] {
             let sound = tones(3, 16_000, 16_000 * secs);
-            // Loudness of steps of 20 ms.
+            // Whether each step of 20 ms is loud.
             let loud: Vec<bool> = sound.samples.chunks(320).map(|step| step.iter().any(|v| v.abs() > 0.05)).collect();
             let n_begun = loud.windows(2).filter(|pair| !pair[0] && pair[1]).count();
             assert_eq!((n_begun, loud[0], loud[loud.len() - 1]), (3, false, false));

@@ -1,4 +1,4 @@
-//! Speech of a speaker: intervals of a dataset, or sound files. What is read is kept only as long as it is looked at.
+//! Speech of a speaker: intervals of a dataset, or sound files. Data are read on demand and not cached.
 
 use anyhow::{Context, Result, bail, ensure};
 use orator_base::types::pose3d::Motion;
@@ -13,18 +13,18 @@ use orator_formats::transcript::{Transcript, Word};
 use orator_media::ffmpeg::audio;
 use std::path::{Path, PathBuf};
 
-/// Where the speech of one speaker comes from.
+/// Source of the speech of one speaker.
 pub struct SpeakerSource {
     pub name: String,
-    /// Rate of the motion.
+    /// Frame rate of the motion.
     pub fps: FrameRate,
-    /// Bones of the speaker, metres, 0 where they are not known; none of a speaker without a dataset.
+    /// Bone lengths of the speaker, metres, 0 if unknown; empty without a dataset.
     pub bone_lengths: Vec<f32>,
     pub dataset: Option<Dataset>,
     pieces: Vec<Piece>,
 }
 
-/// Continuous piece of speech.
+/// Continuous segment of speech.
 struct Piece {
     name: String,
     place: Place,
@@ -35,22 +35,22 @@ enum Place {
     File(PathBuf),
 }
 
-/// A piece of speech in memory.
+/// Segment of speech in memory.
 pub struct SpokenPiece {
-    /// Name, once among those of the speaker.
+    /// Name, unique for the speaker.
     pub name: String,
     pub sound: Sound,
-    /// Words with their times from the beginning of the sound.
+    /// Words with times relative to the start of the sound.
     pub words: Vec<Word>,
     pub n_frames: usize,
     pub natural: Option<(Motion, Option<Posture>)>,
 }
 
 impl SpeakerSource {
-    /// Intervals of a split of the dataset at `dir`.
+    /// Source with the intervals of a split of the dataset at `dir`.
     ///
     /// # Errors
-    /// No dataset, or none of its intervals in that split.
+    /// There is no dataset, or it has no interval in that split.
     pub fn of_dataset(name: &str, dir: &Path, split: Split) -> Result<Self> {
         let dataset = Dataset::open(dir)?;
         let samples = dataset.samples(split);
@@ -69,10 +69,10 @@ impl SpeakerSource {
         Ok(Self { name: name.to_owned(), fps: dataset.info().fps, bone_lengths, dataset: Some(dataset), pieces })
     }
 
-    /// Sound files that `pattern` names, with the transcripts beside them, for motion at `fps`.
+    /// Source with the sound files that match `pattern` and the transcripts next to them, for motion at `fps`.
     ///
     /// # Errors
-    /// No file; two of one name.
+    /// No file matches, or two have the same name.
     pub fn of_sounds(name: &str, pattern: &Path, fps: FrameRate) -> Result<Self> {
         let (mut missing, entry) = (Vec::new(), pattern.to_string_lossy());
         let root = SearchRoot::new(Path::new("/"), &[]);
@@ -94,7 +94,7 @@ impl SpeakerSource {
         self.pieces.len()
     }
 
-    /// Reads a piece.
+    /// Reads the segment with this index.
     pub fn read(&self, piece: usize) -> Result<SpokenPiece> {
         let Piece { name, place } = &self.pieces[piece];
         match (place, &self.dataset) {
@@ -121,7 +121,7 @@ impl SpeakerSource {
     }
 }
 
-/// Transcript of the sound's own name in its folder.
+/// Transcript with the sound's file name in the same folder.
 fn transcript_beside(sound: &Path) -> Option<PathBuf> {
     OF_TRANSCRIPTS.iter().map(|ending| sound.with_extension(ending)).find(|path| path.is_file())
 }
