@@ -1,4 +1,4 @@
-//! Design of a study, from its file and its clips.
+//! Designs a study from its file and its clips.
 
 use super::clip_deck::{ClipDeck, stream};
 use super::clip_needs::{ClipNeeds, SharedClips};
@@ -11,21 +11,22 @@ use anyhow::Result;
 use rand::seq::SliceRandom;
 use std::collections::BTreeMap;
 
-/// Version of the plan's file.
+/// Version of the plan file format.
 const VERSION: u32 = 1;
 
-/// Plan of a study, and how equally its votes are spread.
+/// Plan of a study and the balance of its votes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DesignedStudy {
     pub plan: StudyPlan,
     pub balance: Vec<TaskBalance>,
 }
 
-/// Designs the sessions of a study. `clips`: names `speaker/clip` by speaker, the best first, each with motion of every
-/// condition; of all speakers as many are taken. `film` names the film of a content whose `motion_of` it knows itself.
+/// Designs the sessions of a study. `clips` holds names `speaker/clip` by speaker, best first, each with motion for
+/// every condition; the same number is used of every speaker. `film` returns the opaque name of the film with the given
+/// content and determines `motion_of` itself.
 ///
 /// # Errors
-/// Too few clips, with the number needed; what `film` refuses.
+/// A speaker has too few clips, or `film` fails.
 pub fn design(
     file: &StudyFile,
     clips: &BTreeMap<String, Vec<String>>,
@@ -75,7 +76,7 @@ mod tests {
     use std::fmt::Write as _;
     use std::path::Path;
 
-    /// Film by the name that the tests give it.
+    /// Film content by the name that the tests give it.
     type Films = BTreeMap<String, FilmContent>;
 
     fn designed(file: &StudyFile, n_clips: &[usize]) -> Result<(DesignedStudy, Films)> {
@@ -93,7 +94,8 @@ mod tests {
         Ok((designed, films))
     }
 
-    /// Study file of tasks, each a design, trials, training and the number of models.
+    /// Study file with `tasks` of (design, trials, training trials) and `n_models` models, each with a mismatched
+    /// condition.
     fn file(tasks: &[(TaskDesign, usize, usize)], n_speakers: usize, n_models: usize, more: &str) -> StudyFile {
         let mut text = format!("title = \"t\"\n{more}\n[[condition]]\nname = \"real\"\nkind = \"natural\"\n");
         for model in 0..n_models {
@@ -121,7 +123,7 @@ mod tests {
         StudyFile::read(Path::new(&path)).unwrap()
     }
 
-    /// Everything that must hold in any design.
+    /// Asserts the invariants of every design.
     fn check(file: &StudyFile, designed: &DesignedStudy, films: &Films) {
         let plan = &designed.plan;
         assert_eq!(plan.sessions.len(), file.n_sessions());
@@ -168,7 +170,7 @@ mod tests {
         }
     }
 
-    /// Counts votes of cells anew, from what the films show.
+    /// Counts the votes per cell from the contents of the films and asserts that they are balanced.
     fn balanced(file: &StudyFile, sessions: &[PlannedSession], films: &Films) {
         for (at, task) in file.task.iter().enumerate() {
             let (mut cells, mut sides) = (BTreeMap::<_, usize>::new(), BTreeMap::<_, usize>::new());

@@ -1,11 +1,12 @@
-//! Orders in which everything stands equally often in every place and after every other (Williams 1949).
+//! Latin squares balanced for first-order carry-over: every item occurs equally often in every position and after every
+//! other item (Williams 1949).
 
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
-/// Rows of a Latin square of `n` things, balanced for what comes before: `n` rows, twice as many for an odd `n`.
+/// Rows of a carry-over-balanced Latin square of `n` items: `n` rows, or twice as many for an odd `n`.
 pub(super) fn williams(n: usize) -> Vec<Vec<usize>> {
-    // 0, 1, n - 1, 2, n - 2, ...: neighbours differ by each number once.
+    // First row 0, 1, n - 1, 2, n - 2, ...: the differences of neighbours are all distinct modulo n.
     let first: Vec<usize> =
         (0..n).map(|place| if place % 2 == 1 { place / 2 + 1 } else { (n - place / 2) % n }).collect();
     let mut rows: Vec<Vec<usize>> =
@@ -17,7 +18,7 @@ pub(super) fn williams(n: usize) -> Vec<Vec<usize>> {
     rows
 }
 
-/// Rows of a square, handed out one a session: each once before any comes again.
+/// Rows of a square, one per session in random order; every row is used once before any repeats.
 pub struct SquareRows {
     square: Vec<Vec<usize>>,
     order: Vec<usize>,
@@ -35,7 +36,7 @@ impl SquareRows {
         self.square.len()
     }
 
-    /// Number of the next row.
+    /// Index of the next row.
     pub fn deal(&mut self) -> usize {
         let n_rows = self.square.len().max(1);
         if self.n_given.is_multiple_of(n_rows) {
@@ -45,7 +46,7 @@ impl SquareRows {
         self.order.get((self.n_given - 1) % n_rows).copied().unwrap_or(0)
     }
 
-    /// Row of that number, counted on from the last to the first.
+    /// Row with this index, modulo the number of rows.
     pub fn row(&self, number: usize) -> &[usize] {
         self.square.get(number % self.square.len().max(1)).map_or(&[], Vec::as_slice)
     }
