@@ -1,4 +1,4 @@
-//! Presets, and how a study file is laid over one.
+//! Presets, and merging a study file onto one.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -6,7 +6,7 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue};
 
-/// Published study whose design a file takes over.
+/// Published study whose design serves as a preset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StudyPreset {
@@ -26,7 +26,7 @@ impl StudyPreset {
         }
     }
 
-    /// Its study file, without speakers and models.
+    /// Study file of the preset, without speakers and models.
     pub const fn text(self) -> &'static str {
         match self {
             Self::Rebol => include_str!("rebol.toml"),
@@ -35,7 +35,8 @@ impl StudyPreset {
     }
 }
 
-/// Lays `written` over `below`: tables key by key, lists of named tables by name, all else as a whole.
+/// Merges `written` onto `below`: tables key by key, lists of named tables by name; other values replace those of
+/// `below`.
 pub(super) fn lay<'t>(written: DeTable<'t>, below: &mut DeTable<'t>) {
     for (key, value) in written {
         let Some(under) = below.get_mut(key.get_ref().as_ref()) else {
@@ -56,12 +57,12 @@ pub(super) fn lay<'t>(written: DeTable<'t>, below: &mut DeTable<'t>) {
             }
             (_, value) => value,
         };
-        // The place of an error is that of what is written.
+        // Errors are located at the text of the study file, not of the preset.
         *under = Spanned::new(span, merged);
     }
 }
 
-/// Lays a table of a list over that of its name, or puts it at the end.
+/// Merges a list entry onto the entry with the same name, or appends it.
 fn lay_entry<'t>(entry: Spanned<DeValue<'t>>, below: &mut DeArray<'t>) {
     let span = entry.span();
     let place = below.iter_mut().find(|other| name_of(other) == name_of(&entry));
@@ -86,7 +87,7 @@ fn name_of<'v>(entry: &'v Spanned<DeValue<'_>>) -> Option<&'v str> {
     }
 }
 
-/// Byte ranges of all that is written, by key: `clips.seconds`, `task[NAME].trials`, `hypothesis[0].kind`.
+/// Byte ranges of all values in the file, by key: `clips.seconds`, `task[NAME].trials`, `hypothesis[0].kind`.
 pub(super) fn spans(table: &DeTable<'_>) -> BTreeMap<String, Range<usize>> {
     let mut found = BTreeMap::new();
     collect(table, "", &mut found);

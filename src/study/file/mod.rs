@@ -1,4 +1,4 @@
-//! The study file: what a researcher writes, laid over a preset, with every default filled in and every rule held.
+//! The study file written by a researcher: merged onto a preset, completed with defaults and validated.
 
 mod condition;
 mod layers;

@@ -1,4 +1,4 @@
-//! A study file read over its preset, and the resolved one written.
+//! Reads a study file on top of its preset, and writes the resolved file.
 
 use super::layers::{self, StudyPreset};
 use super::rules;
@@ -15,14 +15,14 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// A documented study file.
+/// Documented example of a study file.
 pub const EXAMPLE: &str = include_str!("example.toml");
 
 impl StudyFile {
-    /// Reads `file` over its preset; paths in it count from its folder.
+    /// Reads `file` on top of its preset; paths in it are relative to its folder.
     ///
     /// # Errors
-    /// A file that cannot be read, or [`ConfigError`] with what is wrong in it.
+    /// The file cannot be read, or [`ConfigError`] lists its problems.
     pub fn read(file: &Path) -> Result<Self> {
         let text = input::read_text(file, input::MOST_TEXT).with_context(|| {
             format!("cannot read the study file {}; `orator guide study` shows one", file.display())
@@ -31,13 +31,13 @@ impl StudyFile {
         resolve(&text, &file).map_err(|problems| ConfigError { file, problems }.into())
     }
 
-    /// Writes the file with every default in it, atomically.
+    /// Writes the resolved file atomically.
     pub fn write(&self, file: &Path) -> Result<()> {
         workdir::write_file(file, toml::to_string_pretty(self)?.as_bytes())
     }
 }
 
-/// Study file of a text, or all that is wrong with it.
+/// Parses and resolves the text of a study file, or returns all its problems.
 pub(super) fn resolve(text: &str, file: &Path) -> Result<StudyFile, Vec<Problem>> {
     let whole = |at: usize, message: String| {
         vec![Problem { key: String::new(), location: SourceLocation::Line(line_of(text, at)), message }]
@@ -71,7 +71,7 @@ pub(super) fn resolve(text: &str, file: &Path) -> Result<StudyFile, Vec<Problem>
     if problems.is_empty() { Ok(study) } else { Err(problems) }
 }
 
-/// Preset that the file names, or the place and what was expected.
+/// Preset named by the file, or the byte offset and message of an error.
 fn preset_of(written: &DeTable<'_>) -> Result<Option<StudyPreset>, (usize, String)> {
     let Some(value) = written.get("preset") else { return Ok(None) };
     let DeValue::String(name) = value.get_ref() else {
@@ -85,7 +85,7 @@ fn preset_of(written: &DeTable<'_>) -> Result<Option<StudyPreset>, (usize, Strin
     })
 }
 
-/// Problem for an error of serde: the key at its place and what was expected.
+/// Converts a deserialisation error: the key at its position and what was expected.
 fn worded(text: &str, error: &toml::de::Error, spans: &BTreeMap<String, Range<usize>>) -> Problem {
     let at = error.span().map_or(0, |span| span.start);
     let around = spans.iter().filter(|(_, span)| span.contains(&at)).min_by_key(|(_, span)| span.len());

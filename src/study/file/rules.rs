@@ -1,4 +1,4 @@
-//! What a study file must hold beyond its types: a key and what was expected, for each rule that is broken.
+//! Rules for study files beyond their types. Each violation gives a key and what was expected.
 
 use super::condition::{ConditionSource, StudyCondition};
 use super::study_file::{HypothesisKind, StudyFile, StudyHypothesis, StudyTask};
@@ -7,7 +7,7 @@ use crate::plan::TaskDesign;
 use orator_dataset::config::file::nearest;
 use std::collections::BTreeSet;
 
-/// Keys of a file that break a rule, with what was expected and what to do.
+/// Violated rules: the key, what was expected and how to fix it.
 pub(super) fn check(file: &StudyFile) -> Vec<(String, String)> {
     let mut rules = StudyRules { file, broken: Vec::new() };
     rules.whole();
@@ -92,7 +92,7 @@ impl StudyRules<'_> {
             self.say("task", "no task is left: expected a [[task]], or a preset with its tasks");
         }
         let trials: usize = file.task.iter().map(|task| task.trials).sum();
-        // Two trials before the first check, one between two of them and one after the last.
+        // At least two trials precede the first check, one separates two checks, and one follows the last.
         let most = trials.saturating_sub(2) / 2;
         if file.attention_checks > most && trials > 0 {
             let message = format!("{} checks among {trials} trials: expected at most {most}", file.attention_checks);
@@ -126,7 +126,7 @@ impl StudyRules<'_> {
         }
     }
 
-    /// Whether there is a condition of that name; says so otherwise.
+    /// Whether a condition with this name exists; reports a problem otherwise.
     fn is_condition(&mut self, key: &str, name: &str) -> bool {
         let known: Vec<String> = self.file.condition.iter().map(|condition| condition.name.clone()).collect();
         let is_known = known.iter().any(|other| other == name);
