@@ -1,4 +1,4 @@
-// The server of the study.
+// Client of the study's server.
 
 import { recall } from "./memory.js";
 
@@ -6,7 +6,7 @@ const PARAMETERS = ["PROLIFIC_PID", "STUDY_ID", "SESSION_ID", "workerId", "assig
 const REQUEST_MS = 20_000;
 const LONGEST_WAIT_SECS = 30;
 
-// A server that refuses, with its sentence.
+// Error reply of the server, with its sentence.
 export class Refusal extends Error {
   constructor(status, { error, reason }, retrySecs) {
     super(error ?? `${status}`);
@@ -27,7 +27,7 @@ async function ask(url, options = {}) {
   return value;
 }
 
-// Does `work` until it succeeds or is refused for good; `onwait(secs)` before each new attempt.
+// Retries `work` until it succeeds or is refused permanently; calls `onwait(secs)` before each retry.
 export async function patiently(work, onwait) {
   for (let attempt = 0; ; attempt += 1) {
     try {
@@ -44,7 +44,7 @@ export async function patiently(work, onwait) {
   }
 }
 
-// What a recruiting site gave along in the address.
+// Parameters of a recruiting site in the address.
 function parameters() {
   const given = new URLSearchParams(location.search);
   const pairs = PARAMETERS.filter((name) => given.has(name)).map((name) => [name, given.get(name).slice(0, 128)]);

@@ -1,5 +1,5 @@
-// What the page keeps in the browser, so that a reload or a crash goes on where it was: the participant's token, the
-// language, an answer on its way. Nothing of it tells the browser or the person.
+// State stored in the browser, so that a session survives a reload or a crash: the participant's token, the language,
+// the number of plays, a pending answer. None of it identifies the browser or the person.
 
 const name = `orator-study ${location.pathname}`;
 
@@ -12,7 +12,7 @@ function read() {
 }
 
 let kept = read();
-// Another tab of the same browser goes on with the same session.
+// Other tabs of the same browser share the session.
 window.addEventListener("storage", () => (kept = read()));
 
 export const recall = (key) => kept[key];
@@ -22,7 +22,7 @@ export function keep(key, value) {
   try {
     localStorage.setItem(name, JSON.stringify(kept));
   } catch {
-    // A browser that keeps nothing: the session then ends with the page.
+    // Storage is unavailable: the session then ends with the page.
   }
 }
 
@@ -31,6 +31,6 @@ export function forget() {
   try {
     localStorage.removeItem(name);
   } catch {
-    // Nothing was kept.
+    // Nothing was stored.
   }
 }
