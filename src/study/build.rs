@@ -1,6 +1,7 @@
-//! A study folder from a study file: clips, motion, films, plan and key, and the seal last. A build that was stopped goes
-//! on from the films that are there; the same input gives the same bytes, whatever the number of workers. All films have
-//! one length in bytes: an mp4 is made longer by a `free` box at its end, which players skip.
+//! Builds a study folder from a study file: clips, motion, films, plan and key, and last the seal. An interrupted build
+//! reuses the films that are complete. Output is deterministic for any number of workers. All films have the same size
+//! in bytes, so that size does not reveal the condition: an mp4 is padded with a `free` box at its end, which players
+//! skip.
 
 use super::design::{ClipNeeds, design};
 use super::file::{StudyFile, StudySpeaker};
@@ -21,27 +22,27 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What was built.
+/// Summary of a built study.
 #[derive(Clone, Debug, Serialize)]
 pub struct BuiltStudy {
     pub folder: PathBuf,
-    /// Hash over all that is sealed.
+    /// Combined hash of the seal.
     pub seal: String,
-    /// Whether it was there already.
+    /// Whether the study had been built before.
     pub up_to_date: bool,
     pub n_sessions: usize,
     pub n_trials: usize,
     pub n_films: usize,
-    /// Bytes of each film.
+    /// Size of each film, bytes.
     pub film_bytes: u64,
     /// Loudness of the films, LUFS.
     pub loudness_lufs: f64,
-    /// How equally votes are spread, a sentence a task; empty where nothing was planned now.
+    /// Balance of votes, one sentence per task; empty if the study had been built before.
     pub balance: Vec<String>,
     pub speakers: Vec<BuiltSpeaker>,
 }
 
-/// Name of the account of clips, beside their sounds.
+/// File that describes the clips, in the folder of their sounds.
 const CLIPS: &str = "clips.json";
 
 /// Clips of a speaker.
@@ -49,14 +50,15 @@ const CLIPS: &str = "clips.json";
 pub struct BuiltSpeaker {
     pub name: String,
     pub clips: Vec<StudyClip>,
-    /// Pieces of speech that gave no clip.
+    /// Segments of speech from which no clip could be cut.
     pub refused: Vec<RefusedPiece>,
 }
 
-/// Builds the study of a file in the folder `out`, with films of `size` px (`film::SIZE` but for tests).
+/// Builds the study of `file` in the folder `out`, with films of `size` px, width and height
+/// ([`super::stimuli::film::SIZE`] except in tests).
 ///
 /// # Errors
-/// No encoder for browsers; a folder with another study or with responses; speech or motion that is missing or too short.
+/// No H.264 encoder; the folder holds another study or responses; speech or motion is missing or too short.
 pub fn build(file: &StudyFile, out: &Path, size: [usize; 2], progress: &dyn Progress) -> Result<BuiltStudy> {
     check_encoder()?;
     let folder = StudyFolder::new(out);
@@ -114,10 +116,10 @@ pub fn build(file: &StudyFile, out: &Path, size: [usize; 2], progress: &dyn Prog
     Ok(built)
 }
 
-/// A study that was built before.
+/// Summary of a study that is already built.
 ///
 /// # Errors
-/// It is another one than that of the file.
+/// The folder holds a study built from a different file.
 fn sealed(file: &StudyFile, folder: &StudyFolder) -> Result<BuiltStudy> {
     let there = StudyFile::read(&folder.study_file())?;
     ensure!(
@@ -131,7 +133,7 @@ fn sealed(file: &StudyFile, folder: &StudyFolder) -> Result<BuiltStudy> {
     account.built(folder, true, Vec::new())
 }
 
-/// What `clips.json` tells.
+/// Content of `clips.json`.
 #[derive(Serialize, Deserialize)]
 struct ClipAccount {
     /// Loudness of the films, LUFS.
@@ -140,7 +142,7 @@ struct ClipAccount {
 }
 
 impl ClipAccount {
-    /// Account of the study that lies in the folder.
+    /// Summary of the study in `folder`.
     fn built(self, folder: &StudyFolder, up_to_date: bool, balance: Vec<String>) -> Result<BuiltStudy> {
         let plan: StudyPlan = read_json(&folder.plan())?;
         let key: StudyKey = read_json(&folder.key())?;
@@ -168,7 +170,7 @@ impl BuiltSpeaker {
     }
 }
 
-/// Writes the clips' sounds, for other systems to move to, and how they were cut.
+/// Writes the sound of every clip, from which other systems can generate motion, and `clips.json`.
 fn write_clips(folder: &StudyFolder, account: &ClipAccount, speakers: &[CutSpeaker]) -> Result<()> {
     let clips = clips_folder(folder);
     for speaker in speakers {
@@ -180,7 +182,8 @@ fn write_clips(folder: &StudyFolder, account: &ClipAccount, speakers: &[CutSpeak
     write_json(&clips.join(CLIPS), account)
 }
 
-/// Makes the films of the key in a hidden folder, those that are there already excepted, and gives their files.
+/// Renders the films of the key into a hidden folder, except those that exist, and returns their paths by opaque name.
+/// File names are hashes of the content, so an interrupted build can resume.
 fn make_films(
     folder: &StudyFolder,
     key: &StudyKey,
@@ -206,7 +209,7 @@ fn make_films(
     key.films.par_iter().map(film).collect()
 }
 
-/// Puts the films, all of one length in bytes, where participants reach them, and nothing else there.
+/// Replaces `public/` by the films, padded to the same size.
 fn publish(folder: &StudyFolder, films: &BTreeMap<String, PathBuf>) -> Result<()> {
     let length = |path: &PathBuf| Ok(usize::try_from(fs::metadata(path)?.len())?);
     let lengths = films.values().map(length).collect::<Result<Vec<usize>>>();
@@ -227,26 +230,26 @@ fn clips_folder(folder: &StudyFolder) -> PathBuf {
     folder.dir().join("clips")
 }
 
-/// Where films lie until all of them are made.
+/// Folder of the films until all are rendered.
 fn made_films(folder: &StudyFolder) -> PathBuf {
     folder.dir().join(".films")
 }
 
-/// Least length of a box: its own length and its type.
+/// Minimum size of an mp4 box: its size and type fields.
 const HEADER_BYTES: usize = 8;
-/// Lengths are rounded up to a multiple of this.
+/// Film sizes are rounded up to a multiple of this.
 const STEP_BYTES: usize = 4096;
 
-/// Length that films of these lengths can all have.
+/// Smallest multiple of 4096 bytes to which films of these lengths can all be padded.
 pub fn common_bytes(lengths: impl IntoIterator<Item = usize>) -> usize {
     let longest = lengths.into_iter().max().unwrap_or(0);
     (longest + HEADER_BYTES).next_multiple_of(STEP_BYTES)
 }
 
-/// Appends a box of zeros to an mp4, so that it has `n_bytes`.
+/// Appends a `free` box of zeros to an mp4, so that its size is `n_bytes`.
 ///
 /// # Errors
-/// A film that is longer, or shorter by less than a box or by more than 4 GB.
+/// The film is longer than `n_bytes` less a box header, or shorter by 4 GiB or more.
 pub fn padded(mut film: Vec<u8>, n_bytes: usize) -> Result<Vec<u8>> {
     let missing = n_bytes.checked_sub(film.len()).filter(|missing| *missing >= HEADER_BYTES);
     let size = missing.and_then(|missing| u32::try_from(missing).ok());

@@ -1,4 +1,4 @@
-//! Responses as tables: each answer with what its films showed, and who took part.
+//! Export of responses as tables: each answer with the content of its films, and the participants.
 
 use super::design::right_response;
 use super::file::StudyFile;
@@ -16,16 +16,16 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// Columns of the table of participants, before those of what recruiting sites give along.
+/// Columns of the table of participants, followed by the parameters of recruiting sites.
 const PARTICIPANT_COLUMNS: [&str; 8] =
     ["participant", "place", "language", "status", "answers", "failed_checks", "begun_ms", "code"];
 
-/// Form of the tables.
+/// Format of the tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TableForm {
-    /// Columns; several conditions or scores are joined by `|`.
+    /// Comma-separated values; multiple conditions or scores are joined by `|`.
     Csv,
-    /// JSON Lines, one object a row.
+    /// JSON Lines, one object per row.
     Jsonl,
 }
 
@@ -38,7 +38,7 @@ impl TableForm {
     }
 }
 
-/// Tables that were written.
+/// Paths and sizes of the tables written.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Exported {
     pub votes: PathBuf,
@@ -47,11 +47,11 @@ pub struct Exported {
     pub n_participants: usize,
 }
 
-/// Writes the responses of a study into the folder `out`: `votes` and `participants`. Participants come in the order in
-/// which they began, their answers in that of their session.
+/// Writes the responses of a study into the folder `out` as the tables `votes` and `participants`. Participants are
+/// ordered by start time, their answers by position in the session.
 ///
 /// # Errors
-/// A study without responses, a file of it that cannot be read, a folder that cannot be written.
+/// The study has no responses, one of its files cannot be read, or the folder cannot be written.
 pub fn export(folder: &StudyFolder, form: TableForm, out: &Path) -> Result<Exported> {
     let (participants, votes) = responses(folder)?;
     let path = |name: &str| out.join(name).with_extension(form.extension());
@@ -67,14 +67,14 @@ pub fn export(folder: &StudyFolder, form: TableForm, out: &Path) -> Result<Expor
     })
 }
 
-/// Participants of a study in the order in which they began, and all of their votes.
+/// Participants of a study in order of start time, and all votes.
 ///
 /// # Errors
-/// A study without responses, a file of it that cannot be read.
+/// The study has no responses, or one of its files cannot be read.
 pub fn responses(folder: &StudyFolder) -> Result<(Vec<Participant>, Vec<StudyVote>)> {
     let joined = JoinedPlan::read(folder)?;
     let db = database::open_to_read(&folder.responses())?;
-    // One moment of the database for participants and answers.
+    // A single read transaction gives a consistent snapshot of participants and answers.
     db.execute_batch("BEGIN")?;
     let (all, mut votes) = (participants::all(&db)?, Vec::new());
     for participant in &all {
@@ -85,7 +85,7 @@ pub fn responses(folder: &StudyFolder) -> Result<(Vec<Participant>, Vec<StudyVot
     Ok((all, votes))
 }
 
-/// Plan, key and study file, by which an answer becomes a vote.
+/// Plan, key and study file, joined to turn an answer into a vote.
 struct JoinedPlan {
     plan: StudyPlan,
     key: StudyKey,
@@ -98,7 +98,7 @@ impl JoinedPlan {
         Ok(Self { plan: read_json(&folder.plan())?, key: read_json(&folder.key())?, file })
     }
 
-    /// Right response of an analysed trial: the real film's, the matched film's.
+    /// Correct response of an analysed trial, from the conditions of its films.
     fn right_response(&self, design: TaskDesign, films: &[&FilmContent]) -> Option<Response> {
         let shown: Option<Vec<_>> = films.iter().map(|film| self.file.find_condition(&film.condition)).collect();
         right_response(design, &shown?)
@@ -148,7 +148,7 @@ fn participant_row(participant: &Participant) -> Map<String, Value> {
     columns.zip(own.into_iter().chain(given)).collect()
 }
 
-/// Writes a table whose rows serialize as objects with these columns.
+/// Writes a table atomically; each row must serialise as an object with these columns.
 fn write_table(path: &Path, form: TableForm, columns: &[&str], rows: &[impl Serialize]) -> Result<()> {
     workdir::replace(path, |attempt| {
         let mut file = BufWriter::new(File::create(attempt)?);
@@ -173,7 +173,8 @@ fn write_table(path: &Path, form: TableForm, columns: &[&str], rows: &[impl Seri
     })
 }
 
-/// Value in a cell; several are joined by `|`, and a response is its value: `left`, `real`, `-1`, `70|20`, `42`.
+/// Text of a CSV cell. Array elements are joined by `|`; a response is reduced to its value: `left`, `real`, `-1`,
+/// `70|20`, `42`.
 fn cell(value: &Value) -> String {
     match value {
         Value::Null => String::new(),

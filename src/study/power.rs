@@ -1,6 +1,6 @@
-//! Participants that a wanted power needs, by simulated studies that go through the very analysis: the crossed test
-//! against chance and the crossed test of equivalence. More participants cannot make up for few clips: where the power
-//! stays below what is wanted, that is said.
+//! Number of participants for a required power, by simulated studies analysed like real ones: the crossed test against
+//! chance and the crossed equivalence test. More participants cannot compensate for too few clips; the result reports
+//! when the power stays below the requirement.
 
 use super::analyse::figure::FigureMethod;
 use super::analyse::outcome::BinaryVote;
@@ -18,31 +18,31 @@ use statrs::distribution::{ContinuousCDF, Normal};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-/// Fewest and most participants that are tried.
+/// Range of the search for the number of participants.
 const FEWEST: usize = 5;
 const MOST: usize = 1280;
-/// Level of all tests.
+/// Significance level of all tests.
 const LEVEL: f64 = 0.05;
 
-/// What is asked.
+/// Assumptions and requirements of a power analysis.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PowerQuestion {
-    /// Votes of each participant.
+    /// Votes per participant.
     pub n_trials: usize,
     pub n_clips: usize,
     pub sd_participants: f64,
     pub sd_clips: f64,
-    /// Wanted power, a share.
+    /// Required power, 0 to 1.
     pub power: f64,
-    /// True share that is to be found different from chance.
+    /// True proportion that the test should distinguish from chance, 0 to 1.
     pub effect: f64,
-    /// Bound of equivalence, a share.
+    /// Equivalence bound on either side of chance, as a proportion.
     pub bound: f64,
     pub n_simulations: usize,
     pub seed: u64,
 }
 
-/// Power of a number of participants.
+/// Simulated power for one number of participants.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PowerRow {
     pub n_participants: usize,
@@ -53,21 +53,22 @@ pub struct PowerRow {
     pub ends: ConfidenceInterval,
 }
 
-/// Answer for one test.
+/// Power curve of one test.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PowerCurve {
-    /// True share.
+    /// True proportion.
     pub share: f64,
-    /// Fewest participants of which the simulated power reaches the wanted one; none of those tried.
+    /// Smallest tried number of participants with the required power; `None` if no tried number has it.
     pub n_participants: Option<usize>,
     pub rows: Vec<PowerRow>,
-    /// Votes by the formula that takes them for independent.
+    /// Number of votes from the closed formula for independent votes.
     pub naive_votes: u64,
-    /// Simulated power of that many votes, in whole participants.
+    /// Simulated power for that number of votes, rounded up to whole participants and limited to the range of the
+    /// search.
     pub at_naive: PowerRow,
 }
 
-/// Answer: difference from chance and equivalence with it.
+/// Result: the test for a difference from chance and the equivalence test.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PowerPlan {
     pub question: PowerQuestion,
@@ -75,7 +76,10 @@ pub struct PowerPlan {
     pub equivalence: PowerCurve,
 }
 
-/// Participants needed for both tests; `tell` hears of each number that was tried.
+/// Searches the number of participants for both tests; `tell` is called with each number tried.
+///
+/// # Errors
+/// A quantity of `question` is out of its range.
 pub fn plan(question: &PowerQuestion, tell: &(dyn Fn(&PowerRow) + Sync)) -> Result<PowerPlan> {
     ensure!(question.n_trials > 0 && question.n_clips > 1, "a participant has at least one trial, a study two clips");
     let (trials, clips) = (question.n_trials, question.n_clips);
@@ -100,7 +104,7 @@ pub fn plan(question: &PowerQuestion, tell: &(dyn Fn(&PowerRow) + Sync)) -> Resu
     })
 }
 
-/// Power of `n_participants`: share of simulated studies of which the outcome holds.
+/// Power for `n_participants`: proportion of simulated studies for whose analysis `holds` returns true.
 pub fn power(
     question: &PowerQuestion,
     n_participants: usize,
@@ -125,7 +129,7 @@ pub fn power(
     }
 }
 
-/// Analysis of a simulated study.
+/// Simulates one study and analyses it.
 pub fn simulated(
     design: &CrossedDesign,
     effects: &CrossedEffects,
@@ -138,7 +142,7 @@ pub fn simulated(
     share(&ShareCell { measure: ShareMeasure::GeneratedChosen, speaker: None, condition: None, votes }, settings)
 }
 
-/// Doubles participants until the power is reached, then halves the interval to within a twentieth.
+/// Doubles the number of participants until the power is reached, then bisects to within 5 %.
 fn curve(
     question: &PowerQuestion,
     share: f64,
@@ -174,7 +178,7 @@ fn curve(
     }
 }
 
-/// Table for people.
+/// Table for the terminal.
 pub fn text(plan: &PowerPlan) -> String {
     let question = &plan.question;
     let mut text = format!(

@@ -1,5 +1,5 @@
-//! What is fixed before the first participant: number of participants, tasks, hypotheses with the statistic that judges
-//! each, exclusion rules, settings of the analysis. The analysis marks all else as exploratory.
+//! Pre-registration, fixed before the first participant: number of participants, tasks, hypotheses with their test
+//! statistics, exclusion rules and analysis settings. The analysis marks everything else as exploratory.
 
 use super::file::{AnalysisSettings, ExclusionRules, HypothesisKind, StudyFile, StudyHypothesis};
 use super::plan::TaskDesign;
@@ -8,19 +8,19 @@ use orator_base::stage::workdir;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// Version of the file.
+/// Version of the file format.
 const VERSION: u32 = 1;
 
 /// Pre-registration of a study.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Preregistration {
     pub version: u32,
-    /// Program that made it and its version.
+    /// Program and version that wrote the file.
     pub program: String,
     pub title: String,
-    /// Participants whose responses are wanted; collection ends when as many were not left out.
+    /// Target number of participants who complete the study and are not excluded; collection ends when it is reached.
     pub participants: usize,
-    /// Sessions that are planned at most.
+    /// Number of planned sessions.
     pub sessions: usize,
     pub tasks: Vec<RegisteredTask>,
     pub hypotheses: Vec<RegisteredHypothesis>,
@@ -28,22 +28,22 @@ pub struct Preregistration {
     pub analysis: AnalysisSettings,
 }
 
-/// Task with the votes that it will bring.
+/// Task with its expected number of votes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RegisteredTask {
     pub name: String,
     pub design: TaskDesign,
     pub conditions: Vec<String>,
-    /// Analysed trials a participant.
+    /// Analysed trials per participant.
     pub trials: usize,
     pub votes: usize,
 }
 
-/// Hypothesis with what judges it.
+/// Hypothesis with the statistic that decides it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RegisteredHypothesis {
     pub claim: StudyHypothesis,
-    /// In words: estimate, error, test, adjustment.
+    /// Description: estimate, standard error, test, adjustment.
     pub statistic: String,
 }
 
@@ -73,15 +73,15 @@ impl Preregistration {
         }
     }
 
-    /// Writes the file, atomically.
+    /// Writes the file atomically.
     pub fn write(&self, path: &Path) -> Result<()> {
         workdir::write_file(path, &serde_json::to_vec_pretty(self)?)
     }
 
-    /// Reads the file.
+    /// Reads a pre-registration.
     ///
     /// # Errors
-    /// A file that is missing, damaged or of a later version.
+    /// The file is missing, damaged or of another version.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).with_context(|| {
             format!("cannot read the pre-registration {}; `orator study build` writes one", path.display())
@@ -97,7 +97,7 @@ impl Preregistration {
     }
 }
 
-/// Words for what judges a hypothesis.
+/// Description of the statistic that decides a hypothesis.
 fn statistic(claim: &StudyHypothesis, design: Option<TaskDesign>, alpha: f64) -> String {
     let error = "with the standard error of participants and clips crossed and a t distribution";
     let share = match design {

@@ -1,5 +1,5 @@
-//! Seal of a study: a BLAKE3 hash of each file that was there before the first participant, and one over all, which is
-//! what a researcher publishes beforehand.
+//! Seal of a study: a BLAKE3 hash of each file that exists before the first participant, and a combined hash that a
+//! researcher publishes in advance.
 
 use super::folder::StudyFolder;
 use anyhow::{Context, Result, bail, ensure};
@@ -11,7 +11,7 @@ use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Version of the file.
+/// Version of the file format.
 const VERSION: u32 = 1;
 
 /// Hashes of a study's files.
@@ -19,13 +19,13 @@ const VERSION: u32 = 1;
 #[serde(deny_unknown_fields)]
 pub struct StudySeal {
     pub version: u32,
-    /// BLAKE3 over the lines `FILE HASH` of all files, in their order.
+    /// BLAKE3 of the lines `FILE HASH` of all files in the order of `files`, in hexadecimal digits.
     pub seal: String,
-    /// BLAKE3 of each file, in hexadecimal digits, by its path in the study's folder.
+    /// BLAKE3 of each file in hexadecimal digits, by its path relative to the study folder.
     pub files: BTreeMap<String, String>,
 }
 
-/// Files of a study that are not as they were sealed.
+/// Differences between the files of a study and its seal.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct BrokenSeal {
     pub changed: Vec<String>,
@@ -65,7 +65,7 @@ impl StudySeal {
         Ok(Self { version: VERSION, seal: over_all(&files), files })
     }
 
-    /// Writes the seal, atomically: the last file of a build.
+    /// Writes the seal atomically. Written last, so its presence marks a finished build.
     pub fn write(&self, folder: &StudyFolder) -> Result<()> {
         workdir::write_file(&folder.seal(), &serde_json::to_vec_pretty(self)?)
     }
@@ -73,7 +73,7 @@ impl StudySeal {
     /// Reads the seal of a study.
     ///
     /// # Errors
-    /// No seal, one that is damaged, of a later version, or changed itself.
+    /// The seal is missing, damaged, of another version, or does not match its own combined hash.
     pub fn read(folder: &StudyFolder) -> Result<Self> {
         let path = folder.seal();
         let bytes = fs::read(&path).with_context(|| {
@@ -91,10 +91,10 @@ impl StudySeal {
         Ok(read)
     }
 
-    /// Reads the seal and holds every file to it.
+    /// Reads the seal and checks every file against it.
     ///
     /// # Errors
-    /// The files that were changed, added or lost.
+    /// The seal cannot be read, or files were changed, added or removed; the error names them.
     pub fn verify(folder: &StudyFolder) -> Result<Self> {
         let seal = Self::read(folder)?;
         let broken = seal.compare(folder)?;
@@ -106,7 +106,7 @@ impl StudySeal {
         Ok(seal)
     }
 
-    /// Files that are not as they were sealed.
+    /// Compares the study's files with the seal.
     pub fn compare(&self, folder: &StudyFolder) -> Result<BrokenSeal> {
         let mut broken = BrokenSeal::default();
         let listed = sealed_files(folder)?;
@@ -129,8 +129,8 @@ fn over_all(files: &BTreeMap<String, String>) -> String {
     blake3::hash(lines.as_bytes()).to_hex().to_string()
 }
 
-/// Files that a seal covers, by name: the four of the study, whether there or not, and all that participants can reach.
-/// Hidden files are passed over; nobody is served one.
+/// Paths covered by a seal, by relative name: the four files of the study, whether they exist or not, and all files
+/// below `public/`. Hidden files are ignored, because the server never serves them.
 fn sealed_files(folder: &StudyFolder) -> Result<BTreeMap<String, PathBuf>> {
     let mut paths = vec![folder.study_file(), folder.plan(), folder.key(), folder.preregistration()];
     collect(&folder.public(), &mut paths)?;
@@ -164,7 +164,7 @@ fn collect(dir: &Path, paths: &mut Vec<PathBuf>) -> Result<()> {
 mod tests {
     use super::*;
 
-    /// Study of four files and two films.
+    /// Study folder with the four sealed files and two films.
     fn study() -> (tempfile::TempDir, StudyFolder) {
         let dir = tempfile::tempdir().unwrap();
         let folder = StudyFolder::new(dir.path());
