@@ -73,7 +73,7 @@ pub fn export(folder: &StudyFolder, form: TableForm, out: &Path) -> Result<Expor
 /// The study has no responses, or one of its files cannot be read.
 pub fn responses(folder: &StudyFolder) -> Result<(Vec<Participant>, Vec<StudyVote>)> {
     let joined = JoinedPlan::read(folder)?;
-    let db = database::open_to_read(&folder.responses())?;
+    let db = database::open_for_reading(&folder.responses())?;
     // A single read transaction gives a consistent snapshot of participants and answers.
     db.execute_batch("BEGIN")?;
     let (all, mut votes) = (participants::all(&db)?, Vec::new());
@@ -105,13 +105,13 @@ impl JoinedPlan {
     }
 
     fn vote(&self, participant: &Participant, answer: GivenAnswer) -> Result<StudyVote> {
-        let place = || format!("answer {} of {}: not in plan.json and key.json", answer.position + 1, participant.id);
-        let session = self.plan.sessions.get(participant.session as usize).with_context(place)?;
-        let trial = session.trials.get(answer.position as usize).with_context(place)?;
-        let task = self.plan.tasks.get(trial.task).with_context(place)?;
+        let context = || format!("answer {} of {}: not in plan.json and key.json", answer.position + 1, participant.id);
+        let session = self.plan.sessions.get(participant.session as usize).with_context(context)?;
+        let trial = session.trials.get(answer.position as usize).with_context(context)?;
+        let task = self.plan.tasks.get(trial.task).with_context(context)?;
         let films = trial.films.iter().map(|film| self.key.films.get(film));
-        let films = films.collect::<Option<Vec<_>>>().with_context(place)?;
-        let first = films.first().with_context(place)?;
+        let films = films.collect::<Option<Vec<_>>>().with_context(context)?;
+        let first = films.first().with_context(context)?;
         Ok(StudyVote {
             participant: participant.id.clone(),
             task: task.name.clone(),

@@ -2,11 +2,11 @@
 //! chance and the crossed equivalence test. More participants cannot compensate for too few clips; the result reports
 //! when the power stays below the requirement.
 
-use super::analyse::figure::FigureMethod;
+use super::analyse::number_format::percent;
 use super::analyse::outcome::BinaryVote;
-use super::analyse::result::{FigureSettings, ShareAnalysis, ShareMeasure};
+use super::analyse::result::{ShareAnalysis, ShareMeasure, StatisticSettings};
 use super::analyse::share::{CHANCE, ShareCell, share};
-use super::analyse::words::percent;
+use super::analyse::statistic::StatisticMethod;
 use super::simulate::{CrossedDesign, CrossedEffects, crossed_votes};
 use super::stats::equivalence::votes_needed;
 use super::stats::estimate::ConfidenceInterval;
@@ -19,8 +19,8 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 /// Range of the search for the number of participants.
-const FEWEST: usize = 5;
-const MOST: usize = 1280;
+const MIN_PARTICIPANTS: usize = 5;
+const MAX_PARTICIPANTS: usize = 1280;
 /// Significance level of all tests.
 const LEVEL: f64 = 0.05;
 
@@ -76,11 +76,11 @@ pub struct PowerPlan {
     pub equivalence: PowerCurve,
 }
 
-/// Searches the number of participants for both tests; `tell` is called with each number tried.
+/// Searches the number of participants for both tests; `on_row` is called with each number tried.
 ///
 /// # Errors
 /// A quantity of `question` is out of its range.
-pub fn plan(question: &PowerQuestion, tell: &(dyn Fn(&PowerRow) + Sync)) -> Result<PowerPlan> {
+pub fn plan(question: &PowerQuestion, on_row: &(dyn Fn(&PowerRow) + Sync)) -> Result<PowerPlan> {
     ensure!(question.n_trials > 0 && question.n_clips > 1, "a participant has at least one trial, a study two clips");
     let (trials, clips) = (question.n_trials, question.n_clips);
     let few = "a participant sees no clip twice; give more clips or fewer trials";
@@ -93,14 +93,16 @@ pub fn plan(question: &PowerQuestion, tell: &(dyn Fn(&PowerRow) + Sync)) -> Resu
     ensure!(deviations.iter().all(|sd| (0.0..=5.0).contains(sd)), "standard deviations are 0 to 5 log odds");
     let z = |share: f64| Normal::standard().inverse_cdf(share);
     let naive = ((z(1.0 - LEVEL / 2.0) + z(question.power)) / (question.effect - CHANCE)).powi(2) / 4.0;
-    let found =
-        |analysis: &ShareAnalysis| analysis.figures.test(FigureMethod::Crossed).is_some_and(|test| test.p < LEVEL);
-    let equivalent =
-        |analysis: &ShareAnalysis| analysis.figures.equivalence(FigureMethod::Crossed).is_some_and(|test| test.passes);
+    let found = |analysis: &ShareAnalysis| {
+        analysis.statistics.test(StatisticMethod::Crossed).is_some_and(|test| test.p < LEVEL)
+    };
+    let equivalent = |analysis: &ShareAnalysis| {
+        analysis.statistics.equivalence(StatisticMethod::Crossed).is_some_and(|test| test.passes)
+    };
     Ok(PowerPlan {
         question: question.clone(),
-        difference: curve(question, question.effect, naive.ceil() as u64, &found, tell),
-        equivalence: curve(question, CHANCE, votes_needed(question.bound, question.power)?, &equivalent, tell),
+        difference: curve(question, question.effect, naive.ceil() as u64, &found, on_row),
+        equivalence: curve(question, CHANCE, votes_needed(question.bound, question.power)?, &equivalent, on_row),
     })
 }
 
@@ -115,7 +117,7 @@ pub fn power(
     let effects =
         CrossedEffects { share: share_of_all, sd_participants: question.sd_participants, sd_clips: question.sd_clips };
     let settings =
-        FigureSettings { bound: question.bound, n_draws: 0, with_models: false, ..FigureSettings::default() };
+        StatisticSettings { bound: question.bound, n_draws: 0, with_models: false, ..StatisticSettings::default() };
     let stream = |k: usize| ((n_participants as u64) << 32) + k as u64;
     let one = |k: &usize| holds(&simulated(&design, &effects, &settings, question.seed, stream(*k)));
     let n_found = (0..question.n_simulations).into_par_iter().filter(one).count() as u64;
@@ -133,7 +135,7 @@ pub fn power(
 pub fn simulated(
     design: &CrossedDesign,
     effects: &CrossedEffects,
-    settings: &FigureSettings,
+    settings: &StatisticSettings,
     seed: u64,
     stream: u64,
 ) -> ShareAnalysis {
@@ -148,18 +150,18 @@ fn curve(
     share: f64,
     naive_votes: u64,
     holds: &(dyn Fn(&ShareAnalysis) -> bool + Sync),
-    tell: &(dyn Fn(&PowerRow) + Sync),
+    on_row: &(dyn Fn(&PowerRow) + Sync),
 ) -> PowerCurve {
     let mut rows: BTreeMap<usize, PowerRow> = BTreeMap::new();
     let mut at = |n: usize| -> PowerRow {
         *rows.entry(n).or_insert_with(|| {
             let row = power(question, n, share, holds);
-            tell(&row);
+            on_row(&row);
             row
         })
     };
-    let (mut low, mut high) = (0, FEWEST);
-    while at(high).power < question.power && high < MOST {
+    let (mut low, mut high) = (0, MIN_PARTICIPANTS);
+    while at(high).power < question.power && high < MAX_PARTICIPANTS {
         (low, high) = (high, 2 * high);
     }
     let is_reached = at(high).power >= question.power;
@@ -167,7 +169,7 @@ fn curve(
         let middle = low + (high - low) / 2;
         if at(middle).power >= question.power { high = middle } else { low = middle }
     }
-    let naive = (naive_votes as usize).div_ceil(question.n_trials).clamp(2, MOST);
+    let naive = (naive_votes as usize).div_ceil(question.n_trials).clamp(2, MAX_PARTICIPANTS);
     let at_naive = at(naive);
     PowerCurve {
         share,
@@ -204,7 +206,7 @@ pub fn text(plan: &PowerPlan) -> String {
         text += &match curve.n_participants {
             Some(n) => format!("  {n} participants for a power of {}\n", percent(question.power)),
             None => format!(
-                "  not with {MOST} participants: the {} clips leave too much to chance; take more clips\n",
+                "  not with {MAX_PARTICIPANTS} participants: the {} clips leave too much to chance; take more clips\n",
                 question.n_clips
             ),
         };
@@ -234,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn enough_participants_are_found_and_the_formula_is_too_hopeful() {
+    fn a_sufficient_number_is_found_and_the_formula_is_too_optimistic() {
         let plan = plan(&question(), &|_| {}).unwrap();
         let needed = plan.difference.n_participants.unwrap();
         assert!((15..120).contains(&needed), "{needed}");
@@ -245,10 +247,10 @@ mod tests {
     }
 
     #[test]
-    fn few_clips_bound_the_power() {
+    fn few_clips_limit_the_power() {
         let few = PowerQuestion { n_trials: 4, n_clips: 4, sd_clips: 1.0, n_simulations: 100, ..question() };
         let curve = power(&few, 320, 0.58, &|analysis| {
-            analysis.figures.test(FigureMethod::Crossed).is_some_and(|test| test.p < LEVEL)
+            analysis.statistics.test(StatisticMethod::Crossed).is_some_and(|test| test.p < LEVEL)
         });
         assert!(curve.power < 0.5, "{curve:?}");
         assert!(plan(&PowerQuestion { n_trials: 9, ..few.clone() }, &|_| {}).is_err());

@@ -104,7 +104,7 @@ fn statistic(claim: &StudyHypothesis, design: Option<TaskDesign>, alpha: f64) ->
         Some(TaskDesign::Mismatch) => "share of votes for the matched film",
         _ => "share of right responses",
     };
-    let judged = match claim.kind {
+    let test = match claim.kind {
         HypothesisKind::DiffersFromChance => format!("two-sided test of the {share} against 50 %, {error}"),
         HypothesisKind::GreaterThanChance => {
             format!("two-sided test of the {share} against 50 %, {error}; the share must be above 50 %")
@@ -125,11 +125,11 @@ fn statistic(claim: &StudyHypothesis, design: Option<TaskDesign>, alpha: f64) ->
         }
     };
     let is_one = !claim.per_speaker && claim.conditions.is_empty() && claim.kind != HypothesisKind::Differs;
-    let adjusted = match is_one || claim.kind == HypothesisKind::Equivalence {
+    let adjustment = match is_one || claim.kind == HypothesisKind::Equivalence {
         true => "",
         false => ", p adjusted by Holm where the task has several such tests",
     };
-    format!("{judged}, alpha {alpha}{adjusted}")
+    format!("{test}, alpha {alpha}{adjustment}")
 }
 
 #[cfg(test)]
@@ -138,29 +138,30 @@ mod tests {
     use crate::file::EXAMPLE;
 
     #[test]
-    fn it_holds_what_the_file_says_and_comes_back() {
+    fn a_registration_matches_the_file_and_round_trips() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("study.toml");
         std::fs::write(&path, EXAMPLE).unwrap();
         let file = StudyFile::read(&path).unwrap();
-        let made = Preregistration::new(&file);
-        assert_eq!((made.participants, made.sessions), (100, 150));
-        assert_eq!(made.tasks.iter().map(|task| task.votes).collect::<Vec<_>>(), [2000, 1000]);
-        assert!(made.hypotheses.iter().map(|hypothesis| &hypothesis.claim).eq(&file.hypothesis));
+        let registration = Preregistration::new(&file);
+        assert_eq!((registration.participants, registration.sessions), (100, 150));
+        assert_eq!(registration.tasks.iter().map(|task| task.votes).collect::<Vec<_>>(), [2000, 1000]);
+        assert!(registration.hypotheses.iter().map(|hypothesis| &hypothesis.claim).eq(&file.hypothesis));
         assert!(
-            made.hypotheses[0]
+            registration.hypotheses[0]
                 .statistic
                 .starts_with("two one-sided tests of the share of right responses against 50 % - 10")
         );
         let path = dir.path().join("preregistration.json");
-        made.write(&path).unwrap();
-        assert_eq!(Preregistration::read(&path).unwrap(), made);
-        for (damage, said) in [("{", "is damaged"), ("{}", "is damaged"), (r#""version": 1"#, "version 9")] {
-            let whole = std::fs::read_to_string(&path).unwrap();
-            let damaged = if damage.len() > 2 { whole.replace(damage, r#""version": 9"#) } else { damage.to_owned() };
+        registration.write(&path).unwrap();
+        assert_eq!(Preregistration::read(&path).unwrap(), registration);
+        for (damage, message) in [("{", "is damaged"), ("{}", "is damaged"), (r#""version": 1"#, "version 9")] {
+            let original = std::fs::read_to_string(&path).unwrap();
+            let damaged =
+                if damage.len() > 2 { original.replace(damage, r#""version": 9"#) } else { damage.to_owned() };
             std::fs::write(&path, damaged).unwrap();
-            assert!(Preregistration::read(&path).unwrap_err().to_string().contains(said));
-            std::fs::write(&path, whole).unwrap();
+            assert!(Preregistration::read(&path).unwrap_err().to_string().contains(message));
+            std::fs::write(&path, original).unwrap();
         }
     }
 }

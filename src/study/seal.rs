@@ -27,26 +27,26 @@ pub struct StudySeal {
 
 /// Differences between the files of a study and its seal.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct BrokenSeal {
+pub struct SealMismatch {
     pub changed: Vec<String>,
     pub added: Vec<String>,
     pub missing: Vec<String>,
 }
 
-impl BrokenSeal {
-    pub fn is_whole(&self) -> bool {
+impl SealMismatch {
+    pub fn is_empty(&self) -> bool {
         self.changed.is_empty() && self.added.is_empty() && self.missing.is_empty()
     }
 }
 
-impl fmt::Display for BrokenSeal {
+impl fmt::Display for SealMismatch {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let kinds = [("changed", &self.changed), ("added", &self.added), ("missing", &self.missing)];
-        let said = kinds.iter().filter(|(_, files)| !files.is_empty()).map(|(kind, files)| {
+        let parts = kinds.iter().filter(|(_, files)| !files.is_empty()).map(|(kind, files)| {
             let more = if files.len() > 8 { format!(" and {} more", files.len() - 8) } else { String::new() };
             format!("{kind}: {}{more}", files[..files.len().min(8)].join(", "))
         });
-        write!(f, "{}", said.collect::<Vec<_>>().join("; "))
+        write!(f, "{}", parts.collect::<Vec<_>>().join("; "))
     }
 }
 
@@ -62,7 +62,7 @@ impl StudySeal {
         }
         let files: BTreeMap<String, String> =
             listed.iter().map(|(name, path)| Ok((name.clone(), hash_file(path)?))).collect::<Result<_>>()?;
-        Ok(Self { version: VERSION, seal: over_all(&files), files })
+        Ok(Self { version: VERSION, seal: combined_hash(&files), files })
     }
 
     /// Writes the seal atomically. Written last, so its presence marks a finished build.
@@ -87,7 +87,11 @@ impl StudySeal {
             "{path} has version {} and this program reads {VERSION}: use the one that wrote it",
             read.version
         );
-        ensure!(read.seal == over_all(&read.files), "{path} was changed itself: its hashes do not give {}", read.seal);
+        ensure!(
+            read.seal == combined_hash(&read.files),
+            "{path} was changed itself: its hashes do not give {}",
+            read.seal
+        );
         Ok(read)
     }
 
@@ -97,34 +101,34 @@ impl StudySeal {
     /// The seal cannot be read, or files were changed, added or removed; the error names them.
     pub fn verify(folder: &StudyFolder) -> Result<Self> {
         let seal = Self::read(folder)?;
-        let broken = seal.compare(folder)?;
+        let mismatch = seal.compare(folder)?;
         ensure!(
-            broken.is_whole(),
-            "{} is not as it was sealed ({broken}): restore those files, or build the study in a new folder",
+            mismatch.is_empty(),
+            "{} is not as it was sealed ({mismatch}): restore those files, or build the study in a new folder",
             folder.dir().display()
         );
         Ok(seal)
     }
 
     /// Compares the study's files with the seal.
-    pub fn compare(&self, folder: &StudyFolder) -> Result<BrokenSeal> {
-        let mut broken = BrokenSeal::default();
+    pub fn compare(&self, folder: &StudyFolder) -> Result<SealMismatch> {
+        let mut mismatch = SealMismatch::default();
         let listed = sealed_files(folder)?;
         for (name, path) in &listed {
             match self.files.get(name) {
                 _ if !path.is_file() => {}
                 Some(hash) if *hash == hash_file(path)? => {}
-                Some(_) => broken.changed.push(name.clone()),
-                None => broken.added.push(name.clone()),
+                Some(_) => mismatch.changed.push(name.clone()),
+                None => mismatch.added.push(name.clone()),
             }
         }
-        let is_there = |name: &String| listed.get(name).is_some_and(|path| path.is_file());
-        broken.missing = self.files.keys().filter(|name| !is_there(name)).cloned().collect();
-        Ok(broken)
+        let exists = |name: &String| listed.get(name).is_some_and(|path| path.is_file());
+        mismatch.missing = self.files.keys().filter(|name| !exists(name)).cloned().collect();
+        Ok(mismatch)
     }
 }
 
-fn over_all(files: &BTreeMap<String, String>) -> String {
+fn combined_hash(files: &BTreeMap<String, String>) -> String {
     let lines: String = files.iter().map(|(name, hash)| format!("{name} {hash}\n")).collect();
     blake3::hash(lines.as_bytes()).to_hex().to_string()
 }
@@ -133,7 +137,7 @@ fn over_all(files: &BTreeMap<String, String>) -> String {
 /// below `public/`. Hidden files are ignored, because the server never serves them.
 fn sealed_files(folder: &StudyFolder) -> Result<BTreeMap<String, PathBuf>> {
     let mut paths = vec![folder.study_file(), folder.plan(), folder.key(), folder.preregistration()];
-    collect(&folder.public(), &mut paths)?;
+    collect_files(&folder.public(), &mut paths)?;
     let named = paths.into_iter().map(|path| {
         let name = path.strip_prefix(folder.dir()).unwrap_or(&path).to_string_lossy().replace('\\', "/");
         (name, path)
@@ -141,7 +145,7 @@ fn sealed_files(folder: &StudyFolder) -> Result<BTreeMap<String, PathBuf>> {
     Ok(named.collect())
 }
 
-fn collect(dir: &Path, paths: &mut Vec<PathBuf>) -> Result<()> {
+fn collect_files(dir: &Path, paths: &mut Vec<PathBuf>) -> Result<()> {
     let unreadable = || format!("cannot list {}", dir.display());
     for entry in fs::read_dir(dir).with_context(unreadable)? {
         let entry = entry.with_context(unreadable)?;
@@ -150,7 +154,7 @@ fn collect(dir: &Path, paths: &mut Vec<PathBuf>) -> Result<()> {
             continue;
         }
         if kind.is_dir() {
-            collect(&entry.path(), paths)?;
+            collect_files(&entry.path(), paths)?;
         } else {
             let path = entry.path();
             ensure!(kind.is_file(), "{} is no plain file: put the film itself in its place", path.display());
@@ -177,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_changed_added_or_lost_is_named() {
+    fn changed_added_and_missing_files_are_reported() {
         let (_dir, folder) = study();
         let seal = StudySeal::of(&folder).unwrap();
         assert_eq!(seal.files.len(), 6);
@@ -189,10 +193,10 @@ mod tests {
         fs::write(folder.plan(), "another").unwrap();
         fs::write(folder.film("02"), "more").unwrap();
         fs::remove_file(folder.film("00")).unwrap();
-        let said = StudySeal::verify(&folder).unwrap_err().to_string();
+        let message = StudySeal::verify(&folder).unwrap_err().to_string();
         assert!(
-            said.contains("(changed: plan.json; added: public/films/02.mp4; missing: public/films/00.mp4)"),
-            "{said}"
+            message.contains("(changed: plan.json; added: public/films/02.mp4; missing: public/films/00.mp4)"),
+            "{message}"
         );
         fs::remove_file(folder.key()).unwrap();
         assert!(StudySeal::of(&folder).unwrap_err().to_string().contains("has no key.json"));
@@ -200,27 +204,27 @@ mod tests {
     }
 
     #[test]
-    fn a_damaged_or_changed_seal_is_refused() {
+    fn a_damaged_or_modified_seal_is_refused() {
         let (_dir, folder) = study();
         StudySeal::of(&folder).unwrap().write(&folder).unwrap();
-        let whole = fs::read_to_string(folder.seal()).unwrap();
-        let digit = whole.find("plan.json\": \"").unwrap() + 13;
-        let mut forged = whole.clone();
-        forged.replace_range(digit..=digit, if &whole[digit..=digit] == "0" { "1" } else { "0" });
-        for (text, said) in [
-            (whole[..whole.len() / 2].to_owned(), "is damaged"),
+        let original = fs::read_to_string(folder.seal()).unwrap();
+        let digit = original.find("plan.json\": \"").unwrap() + 13;
+        let mut forged = original.clone();
+        forged.replace_range(digit..=digit, if &original[digit..=digit] == "0" { "1" } else { "0" });
+        for (text, message) in [
+            (original[..original.len() / 2].to_owned(), "is damaged"),
             ("[]".to_owned(), "is damaged"),
             (forged, "was changed itself"),
-            (whole.replace("\"version\": 1", "\"version\": 2"), "version 2"),
+            (original.replace("\"version\": 1", "\"version\": 2"), "version 2"),
         ] {
             fs::write(folder.seal(), text).unwrap();
             let error = StudySeal::verify(&folder).unwrap_err().to_string();
-            assert!(error.contains(said), "{error}");
+            assert!(error.contains(message), "{error}");
         }
     }
 
     #[test]
-    fn a_link_in_the_place_of_a_film_is_refused() {
+    fn a_symlink_instead_of_a_film_is_refused() {
         let (_dir, folder) = study();
         std::os::unix::fs::symlink("/etc/hostname", folder.film("03")).unwrap();
         assert!(StudySeal::of(&folder).unwrap_err().to_string().contains("no plain file"));

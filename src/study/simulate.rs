@@ -47,19 +47,19 @@ impl CrossedEffects {
 pub fn crossed_votes(design: &CrossedDesign, effects: &CrossedEffects, seed: u64, stream: u64) -> Vec<ClipVote> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(stream);
-    let mut drawn =
+    let mut draw =
         |n: usize, sd: f64| -> Vec<f64> { (0..n).map(|_| sd * rng.sample::<f64, _>(StandardNormal)).collect() };
-    let participants = drawn(design.n_participants, effects.sd_participants);
-    let clips = drawn(design.n_clips, effects.sd_clips);
+    let participants = draw(design.n_participants, effects.sd_participants);
+    let clips = draw(design.n_clips, effects.sd_clips);
     let mean = effects.log_odds();
-    let places =
+    let assignments =
         (0..design.n_participants).flat_map(|participant| (0..design.n_trials).map(move |trial| (participant, trial)));
     let mut vote = |(participant, trial): (usize, usize)| {
         let clip = (participant * design.n_trials + trial) % design.n_clips.max(1);
         let is_success = rng.random::<f64>() < logistic(mean + participants[participant] + clips[clip]);
         ClipVote { participant, clip, score: f64::from(u8::from(is_success)) }
     };
-    places.map(&mut vote).collect()
+    assignments.map(&mut vote).collect()
 }
 
 #[cfg(test)]
@@ -67,7 +67,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn shares_and_balance_are_those_asked_for() {
+    fn simulated_shares_and_balance_match_the_design() {
         let effects = CrossedEffects { share: 0.6, sd_participants: 0.5, sd_clips: 0.5 };
         assert!(effects.log_odds() > (0.6f64 / 0.4).ln());
         assert!(CrossedEffects { share: 0.5, ..effects }.log_odds().abs() < 1e-9);

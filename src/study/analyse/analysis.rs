@@ -3,7 +3,7 @@
 use super::exclusion::exclude;
 use super::methods::methods;
 use super::registration::{Registration, judge};
-use super::result::{FigureSettings, StudyAnalysis, TaskAnalysis};
+use super::result::{StatisticSettings, StudyAnalysis, TaskAnalysis};
 use super::task::task;
 use super::votes::read::VotesRead;
 use crate::file::{HypothesisKind, StudyHypothesis};
@@ -19,7 +19,7 @@ pub fn analyse(
     [title, source]: [&str; 2],
     read: &VotesRead,
     registration: Option<&Registration>,
-    settings: &FigureSettings,
+    settings: &StatisticSettings,
 ) -> Result<StudyAnalysis> {
     let (kept, mut exclusions) = exclude(read, registration.map(|registration| &registration.exclusion));
     exclusions.registered = registration.is_some_and(|registration| registration.seal.is_some());
@@ -28,7 +28,7 @@ pub fn analyse(
     let hypotheses = registration.map(|registration| &registration.hypotheses[..]).unwrap_or_default();
     let mut tasks = tasks(&kept, hypotheses, settings)?;
     let judged = judge(&mut tasks, hypotheses, settings.level());
-    let without_exclusions = match exclusions.leaves_out() {
+    let without_exclusions = match exclusions.any_excluded() {
         true => self::tasks(&exclude(read, None).0, &[], settings)?,
         false => Vec::new(),
     };
@@ -57,7 +57,7 @@ pub fn analyse(
 fn tasks(
     votes: &[&StudyVote],
     hypotheses: &[RegisteredHypothesis],
-    settings: &FigureSettings,
+    settings: &StatisticSettings,
 ) -> Result<Vec<TaskAnalysis>> {
     let mut names: Vec<&str> = Vec::new();
     for vote in votes {
@@ -71,7 +71,7 @@ fn tasks(
         let mut claims = hypotheses.iter().map(|hypothesis| &hypothesis.claim);
         let bound = claims.find(equivalence).and_then(|claim| claim.points);
         let bound = bound.map_or(settings.bound, |points| points / 100.0);
-        task(name, &own, &FigureSettings { bound, ..settings.clone() })
+        task(name, &own, &StatisticSettings { bound, ..settings.clone() })
     };
     names.into_iter().map(one).collect()
 }

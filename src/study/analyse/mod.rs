@@ -4,20 +4,20 @@
 
 pub mod analysis;
 pub mod exclusion;
-pub mod figure;
 pub mod methods;
+pub mod number_format;
 pub mod outcome;
 pub mod page;
 pub mod pair;
 pub mod registration;
 pub mod result;
 pub mod share;
+pub mod statistic;
 pub mod strength;
 pub mod task;
 pub mod text;
 pub mod verdict;
 pub mod votes;
-pub mod words;
 
 pub use analysis::analyse;
 pub use registration::Registration;

@@ -90,8 +90,9 @@ pub fn binary<'v>(votes: &[&'v StudyVote], numbering: &Numbering, measure: Share
                 let sides = [expected, chosen].map(|side| *side == ScreenSide::Left);
                 (vote.conditions.get(shown)?, is_success, Some(sides))
             }
-            (Response::Real(said), Response::Real(is_real)) => {
-                let is_success = if measure == ShareMeasure::TakenForReal { *said } else { said == is_real };
+            (Response::Real(answered_real), Response::Real(is_real)) => {
+                let is_success =
+                    if measure == ShareMeasure::TakenForReal { *answered_real } else { answered_real == is_real };
                 (vote.conditions.first()?, is_success, None)
             }
             _ => return None,

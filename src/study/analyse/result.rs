@@ -1,8 +1,8 @@
 //! Result of an analysis, the source of the page, the summary and the methods paragraph. Every statistic states its
 //! method, whether it was registered before the data were seen, and whether it treats votes as independent.
 
-use super::exclusion::ExclusionAccount;
-use super::figure::{FigureOrigin, FigureSet, IntervalFigure, TestFigure};
+use super::exclusion::ExclusionSummary;
+use super::statistic::{IntervalEstimate, StatisticOrigin, StatisticSet, TestResult};
 use super::votes::read::RefusedRow;
 use crate::file::AnalysisSettings;
 use crate::plan::TaskDesign;
@@ -17,10 +17,10 @@ pub struct StudyAnalysis {
     pub source: String,
     /// Combined hash of the sealed study; `None` for votes without a sealed study.
     pub seal: Option<String>,
-    pub settings: FigureSettings,
+    pub settings: StatisticSettings,
     /// Rows of the source that are not valid votes.
     pub refused: Vec<RefusedRow>,
-    pub exclusions: ExclusionAccount,
+    pub exclusions: ExclusionSummary,
     /// Outcome of each registered hypothesis.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub hypotheses: Vec<JudgedHypothesis>,
@@ -67,7 +67,7 @@ impl JudgedClaim {
 
 /// Settings of an analysis.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct FigureSettings {
+pub struct StatisticSettings {
     /// Confidence level of the intervals.
     pub confidence: f64,
     /// Equivalence bound as a proportion: 0.1 is 10 percentage points.
@@ -79,14 +79,14 @@ pub struct FigureSettings {
     pub with_models: bool,
 }
 
-impl FigureSettings {
+impl StatisticSettings {
     /// Significance level of the tests on which conclusions are based.
     pub fn level(&self) -> f64 {
         1.0 - self.confidence
     }
 }
 
-impl From<&AnalysisSettings> for FigureSettings {
+impl From<&AnalysisSettings> for StatisticSettings {
     /// Converts registered settings.
     fn from(registered: &AnalysisSettings) -> Self {
         let AnalysisSettings { alpha, resamples, seed } = *registered;
@@ -94,7 +94,7 @@ impl From<&AnalysisSettings> for FigureSettings {
     }
 }
 
-impl Default for FigureSettings {
+impl Default for StatisticSettings {
     fn default() -> Self {
         Self { confidence: 0.95, bound: 0.1, n_draws: 10_000, seed: 1, with_models: true }
     }
@@ -123,10 +123,10 @@ pub struct TaskAnalysis {
     pub pairs: Vec<PairAnalysis>,
     /// Test whether any condition differs from the others. Sliders only.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub overall: Option<TestFigure>,
+    pub overall: Option<TestResult>,
     /// Strengths of the conditions, highest first. Preferences and sliders.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub strengths: Vec<StrengthFigure>,
+    pub strengths: Vec<StrengthEstimate>,
     /// Krippendorff's alpha of the participants: 1 for perfect agreement, 0 for chance.
     pub agreement: Option<f64>,
     /// Statistics that could not be computed, with reasons.
@@ -162,9 +162,9 @@ pub struct ShareAnalysis {
     pub n_clips: usize,
     pub share: f64,
     #[serde(flatten)]
-    pub figures: FigureSet,
+    pub statistics: StatisticSet,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub model: Option<ModelFigure>,
+    pub model: Option<ModelEstimate>,
     pub conclusion: Conclusion,
 }
 
@@ -190,7 +190,7 @@ pub struct ScoreAnalysis {
     pub median: f64,
     pub mean: f64,
     #[serde(flatten)]
-    pub figures: FigureSet,
+    pub statistics: StatisticSet,
 }
 
 /// Comparison of two conditions.
@@ -211,24 +211,24 @@ pub struct PairAnalysis {
     /// Mean of the first less the second, in the unit of the scale.
     pub difference: f64,
     #[serde(flatten)]
-    pub figures: FigureSet,
+    pub statistics: StatisticSet,
     pub conclusion: Conclusion,
 }
 
 /// Bradley-Terry strength of a condition.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct StrengthFigure {
+pub struct StrengthEstimate {
     pub condition: String,
     /// Log odds of being preferred to a condition of mean strength (Bradley and Terry 1952).
     pub log_strength: f64,
-    pub interval: Option<IntervalFigure>,
+    pub interval: Option<IntervalEstimate>,
     /// Strength on the Elo scale, with mean 1000.
     pub elo: f64,
 }
 
 /// Mixed logistic regression of a proportion.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ModelFigure {
+pub struct ModelEstimate {
     pub exploratory: bool,
     /// Marginal proportion over all participants and clips.
     pub share: f64,
@@ -279,21 +279,21 @@ impl TaskAnalysis {
         self.shares.iter().find(|share| share.speaker.is_none() && share.condition.is_none())
     }
 
-    fn figure_sets(&self) -> impl Iterator<Item = &FigureSet> {
-        let shares = self.shares.iter().map(|share| &share.figures);
-        let scores = self.scores.iter().map(|row| &row.figures);
-        shares.chain(scores).chain(self.pairs.iter().map(|pair| &pair.figures))
+    fn statistic_sets(&self) -> impl Iterator<Item = &StatisticSet> {
+        let shares = self.shares.iter().map(|share| &share.statistics);
+        let scores = self.scores.iter().map(|row| &row.statistics);
+        shares.chain(scores).chain(self.pairs.iter().map(|pair| &pair.statistics))
     }
 
     /// All tests of the task.
-    pub fn tests(&self) -> impl Iterator<Item = &TestFigure> {
-        self.figure_sets().flat_map(|set| &set.tests).chain(&self.overall)
+    pub fn tests(&self) -> impl Iterator<Item = &TestResult> {
+        self.statistic_sets().flat_map(|set| &set.tests).chain(&self.overall)
     }
 
     /// Origins of all intervals and tests of the task.
-    pub fn origins(&self) -> impl Iterator<Item = FigureOrigin> {
-        let intervals = self.figure_sets().flat_map(|set| &set.intervals).map(|interval| interval.origin);
-        let equivalence = self.figure_sets().flat_map(|set| &set.equivalence).map(|test| test.origin);
+    pub fn origins(&self) -> impl Iterator<Item = StatisticOrigin> {
+        let intervals = self.statistic_sets().flat_map(|set| &set.intervals).map(|interval| interval.origin);
+        let equivalence = self.statistic_sets().flat_map(|set| &set.equivalence).map(|test| test.origin);
         intervals.chain(equivalence).chain(self.tests().map(|test| test.origin))
     }
 }

@@ -1,14 +1,14 @@
 //! Bradley-Terry strengths of conditions from votes that rank them.
 
-use super::figure::{FigureMethod, FigureOrigin, IntervalFigure};
 use super::outcome::Numbering;
-use super::result::{FigureSettings, StrengthFigure};
+use super::result::{StatisticSettings, StrengthEstimate};
+use super::statistic::{IntervalEstimate, StatisticMethod, StatisticOrigin};
 use crate::stats::bradley_terry::{self, PairedVote, elo, strength_intervals};
 use crate::stats::estimate::StatisticsError;
 use crate::vote::{Response, StudyVote};
 
 /// Maximum number of bootstrap draws of participants for the intervals.
-const MOST_DRAWS: usize = 2000;
+const MAX_DRAWS: usize = 2000;
 
 /// Strengths of the conditions, highest first, with bootstrap intervals over participants.
 ///
@@ -18,25 +18,25 @@ pub fn strengths(
     votes: &[&StudyVote],
     numbering: &Numbering,
     conditions: &[String],
-    settings: &FigureSettings,
-) -> Result<Vec<StrengthFigure>, StatisticsError> {
+    settings: &StatisticSettings,
+) -> Result<Vec<StrengthEstimate>, StatisticsError> {
     let paired: Vec<PairedVote> = votes.iter().flat_map(|vote| paired(vote, numbering, conditions)).collect();
     let n = conditions.len();
     let strengths = bradley_terry::strengths(&paired, n)?;
-    let n_draws = settings.n_draws.min(MOST_DRAWS);
+    let n_draws = settings.n_draws.min(MAX_DRAWS);
     let intervals = match n_draws {
         0 => None,
         // If too few draws have finite strengths, strengths are reported without intervals.
         _ => strength_intervals(&paired, n, settings.confidence, n_draws, settings.seed).ok(),
     };
-    let origin = FigureOrigin::new(FigureMethod::BradleyTerry);
-    let row = |k: usize| StrengthFigure {
+    let origin = StatisticOrigin::new(StatisticMethod::BradleyTerry);
+    let row = |k: usize| StrengthEstimate {
         condition: conditions[k].clone(),
         log_strength: strengths[k],
-        interval: intervals.as_ref().map(|all| IntervalFigure { origin, ends: all[k] }),
+        interval: intervals.as_ref().map(|all| IntervalEstimate { origin, ends: all[k] }),
         elo: elo(strengths[k]),
     };
-    let mut rows: Vec<StrengthFigure> = (0..n).map(row).collect();
+    let mut rows: Vec<StrengthEstimate> = (0..n).map(row).collect();
     rows.sort_by(|a, b| b.log_strength.total_cmp(&a.log_strength));
     Ok(rows)
 }
@@ -71,7 +71,7 @@ mod tests {
     #[test]
     fn steps_and_scores_rank_conditions() {
         let names = ["bad", "good", "natural"].map(str::to_owned);
-        let settings = FigureSettings { n_draws: 200, ..FigureSettings::default() };
+        let settings = StatisticSettings { n_draws: 200, ..StatisticSettings::default() };
         let mut steps = Vec::new();
         let mut pages = Vec::new();
         for n in 0..30 {

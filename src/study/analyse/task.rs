@@ -1,10 +1,10 @@
 //! Analysis of one task: the cells of its design, its families of tests, inter-rater agreement.
 
-use super::figure::{FigureMethod, adjust};
 use super::outcome::{BinaryVote, Numbering, binary, conditions, differences, measure, name_pairs, scores};
 use super::pair::{overall, pairs, score_table, single_pairs};
-use super::result::{FigureSettings, ShareAnalysis, ShareMeasure, TaskAnalysis};
+use super::result::{ShareAnalysis, ShareMeasure, StatisticSettings, TaskAnalysis};
 use super::share::{ShareCell, conclude, share};
+use super::statistic::{StatisticMethod, adjust};
 use super::strength::strengths;
 use super::verdict::verdicts;
 use crate::plan::TaskDesign;
@@ -19,7 +19,7 @@ use std::collections::{BTreeMap, BTreeSet};
 ///
 /// # Errors
 /// There are no votes, or votes of two designs.
-pub fn task(name: &str, votes: &[&StudyVote], settings: &FigureSettings) -> Result<TaskAnalysis> {
+pub fn task(name: &str, votes: &[&StudyVote], settings: &StatisticSettings) -> Result<TaskAnalysis> {
     let design = votes.first().with_context(|| format!("the task {name} has no vote"))?.design;
     if let Some(other) = votes.iter().find(|vote| vote.design != design) {
         bail!("the task {name} has votes of two designs ({design:?}, {:?}); name them as two tasks", other.design)
@@ -62,7 +62,7 @@ fn binary_task(
     votes: &[&StudyVote],
     numbering: &Numbering,
     measure: ShareMeasure,
-    settings: &FigureSettings,
+    settings: &StatisticSettings,
 ) {
     let all = binary(votes, numbering, measure);
     let cell = |measure, speaker: Option<&str>, condition: Option<&str>, votes: Vec<BinaryVote>| {
@@ -96,25 +96,30 @@ fn pick<'v>(votes: &[BinaryVote<'v>], is_kept: impl Fn(&BinaryVote) -> bool) -> 
 /// Adds cells whose tests are adjusted as one family.
 fn family(analysis: &mut TaskAnalysis, level: f64, cells: impl FnOnce(&TaskAnalysis) -> Vec<ShareAnalysis>) {
     let mut cells = cells(analysis);
-    adjust(&mut cells.iter_mut().map(|cell| &mut cell.figures).collect::<Vec<_>>());
+    adjust(&mut cells.iter_mut().map(|cell| &mut cell.statistics).collect::<Vec<_>>());
     cells.iter_mut().for_each(|cell| conclude(cell, level));
     analysis.shares.extend(cells);
 }
 
 /// Analyses preferences and sliders: pairs, scores, strengths.
-fn compared_task(analysis: &mut TaskAnalysis, votes: &[&StudyVote], numbering: &Numbering, settings: &FigureSettings) {
+fn compared_task(
+    analysis: &mut TaskAnalysis,
+    votes: &[&StudyVote],
+    numbering: &Numbering,
+    settings: &StatisticSettings,
+) {
     if analysis.design == TaskDesign::Sliders {
         analysis.scores = score_table(votes, numbering, &analysis.conditions, settings);
         analysis.conditions = analysis.scores.iter().map(|row| row.condition.clone()).collect();
         match overall(votes, numbering, &analysis.conditions) {
             Ok(test) => analysis.overall = Some(test),
-            Err(error) => analysis.missing.push(format!("{}: {error}", FigureMethod::Friedman.name())),
+            Err(error) => analysis.missing.push(format!("{}: {error}", StatisticMethod::Friedman.name())),
         }
     }
     analysis.pairs = pairs(votes, numbering, &analysis.conditions, analysis.design, settings);
     match strengths(votes, numbering, &analysis.conditions, settings) {
         Ok(found) => analysis.strengths = found,
-        Err(error) => analysis.missing.push(format!("{}: {error}", FigureMethod::BradleyTerry.name())),
+        Err(error) => analysis.missing.push(format!("{}: {error}", StatisticMethod::BradleyTerry.name())),
     }
 }
 

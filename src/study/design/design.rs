@@ -131,11 +131,11 @@ mod tests {
         for session in &plan.sessions {
             let trials = &session.trials;
             assert_eq!(trials.len(), plan.sessions[0].trials.len());
-            let mut heard = BTreeSet::new();
+            let mut heard_speech = BTreeSet::new();
             for trial in trials {
                 assert!(trial.films.iter().all(|film| films[film].clip == speech(trial)));
                 let block = if file.clips.reuse == ClipReuse::Never { 0 } else { trial.task };
-                assert!(heard.insert((block, speech(trial))), "{} is heard twice", speech(trial));
+                assert!(heard_speech.insert((block, speech(trial))), "{} is heard twice", speech(trial));
                 let is_told = trial.phase == TrialPhase::Training && file.task[trial.task].feedback;
                 assert_eq!(trial.expected.is_some(), is_told || trial.phase == TrialPhase::AttentionCheck);
             }
@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn the_papers_study_is_equal_in_every_cell() {
+    fn the_papers_study_is_balanced_in_every_cell() {
         let tasks = [(TaskDesign::Turing, 20, 3), (TaskDesign::Mismatch, 10, 3)];
         let file = file(&tasks, 2, 1, "participants = 100\ntask_order = \"written\"");
         let needed = ClipNeeds::of(&file).total();
@@ -201,8 +201,8 @@ mod tests {
         check(&file, &study, &films);
         assert_eq!((study.balance[0].votes, study.balance[0].arranged), ([100, 100], [50, 50]));
         assert_eq!((study.balance[1].votes, study.balance[1].arranged), ([100, 100], [50, 50]));
-        let said = "t0: 100 votes of each of 20 cells, 50 in each order of films";
-        assert_eq!(study.balance[0].to_string(), said);
+        let expected_text = "t0: 100 votes of each of 20 cells, 50 in each order of films";
+        assert_eq!(study.balance[0].to_string(), expected_text);
         for session in &study.plan.sessions {
             let is_left = |trial: &&Trial| {
                 trial.task == 0 && trial.phase == TrialPhase::Main && films[&trial.films[0]].condition == "real"
@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn every_clip_comes_in_every_place_about_equally_often() {
+    fn every_clip_occurs_equally_often_in_every_position() {
         let file =
             file(&[(TaskDesign::Turing, 8, 0)], 1, 1, "participants = 80\nattention_checks = 0\npractice = false");
         let (study, films) = designed(&file, &[ClipNeeds::of(&file).total()]).unwrap();
@@ -266,7 +266,7 @@ mod tests {
     proptest::proptest! {
         #![proptest_config(proptest::test_runner::Config::with_cases(48))]
         #[test]
-        fn any_design_is_balanced_and_comes_again_by_its_seed(
+        fn any_design_is_balanced_and_reproducible_by_its_seed(
             tasks in proptest::collection::vec((0usize..5, 3usize..12, 0usize..4), 1..4),
             n_speakers in 1usize..4, n_models in 1usize..4, participants in 1usize..25, seed in 0u64..1000,
             more in 0usize..7, n_checks in 0usize..3, reuse in proptest::bool::ANY, practice in proptest::bool::ANY,

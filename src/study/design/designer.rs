@@ -43,8 +43,8 @@ impl Designer<'_> {
             TaskOrder::Written => (0..self.tasks.len()).collect(),
         };
         let n_main = self.file.task.iter().map(|task| task.trials).sum();
-        let places = places(n_main, self.file.attention_checks, &mut self.rng);
-        let mut checks = deal(&mut self.check_decks, places.len(), session);
+        let check_positions = check_positions(n_main, self.file.attention_checks, &mut self.rng);
+        let mut checks = deal(&mut self.check_decks, check_positions.len(), session);
         checks.shuffle(&mut self.rng);
         let (mut trials, mut n_before) = (Vec::new(), 0);
         for (nth, at) in order.into_iter().enumerate() {
@@ -63,7 +63,7 @@ impl Designer<'_> {
                 self.balance[at].count(&main);
             }
             for trial in main {
-                if places.contains(&n_before)
+                if check_positions.contains(&n_before)
                     && let Some(check) = checks.pop()
                 {
                     trials.push(self.check(at, check)?);
@@ -86,9 +86,9 @@ impl Designer<'_> {
         let comparison = &task.comparisons[trial.dealt.comparison];
         let row = task.arrangements.row(trial.dealt.arrangement);
         let shown: Vec<&StudyCondition> = row.iter().map(|place| comparison[*place]).collect();
-        let (design, sound) = (task.task.design, heard(task.task));
-        let tells = phase == TrialPhase::Training && task.task.feedback;
-        let expected = if tells { right_response(design, &shown) } else { None };
+        let (design, sound) = (task.task.design, film_sound(task.task));
+        let shows_feedback = phase == TrialPhase::Training && task.task.feedback;
+        let expected = if shows_feedback { right_response(design, &shown) } else { None };
         let shown = shown.iter().map(|condition| (condition.name.clone(), None)).collect();
         Ok(Trial { task: at, phase, films: self.films(&clip, shown, sound)?, expected })
     }
@@ -103,7 +103,7 @@ impl Designer<'_> {
         let row = task.arrangements.row(self.rng.random_range(0..task.arrangements.n_rows()));
         let shown = |place: &usize| (comparison[*place].name.clone(), (*place == numbered).then_some(number));
         let shown = row.iter().map(shown).collect();
-        let sound = heard(task.task);
+        let sound = film_sound(task.task);
         let clip = self.clip(check.speaker, self.shared[check.speaker].checks.get(check.dealt.clip))?;
         let films = self.films(&clip, shown, sound)?;
         Ok(Trial { task: at, phase: TrialPhase::AttentionCheck, films, expected: Some(Response::Number(number)) })
@@ -129,7 +129,7 @@ impl Designer<'_> {
 }
 
 /// Audio track of the films of a task.
-fn heard(task: &StudyTask) -> FilmSound {
+fn film_sound(task: &StudyTask) -> FilmSound {
     if task.sound { FilmSound::Speech } else { FilmSound::Silence }
 }
 
@@ -139,10 +139,10 @@ pub(super) const N_VARIANTS: usize = 4;
 
 /// Indices of the main trials before which attention checks are inserted, ascending: spread evenly over the session,
 /// none before the third trial, none adjacent.
-pub(super) fn places(n_main: usize, n_checks: usize, rng: &mut ChaCha8Rng) -> Vec<usize> {
+pub(super) fn check_positions(n_main: usize, n_checks: usize, rng: &mut ChaCha8Rng) -> Vec<usize> {
     let n_checks = n_checks.min(n_main.saturating_sub(2));
-    let border = |at: usize| 2 + (n_main - 2) * at / n_checks;
-    (0..n_checks).map(|at| rng.random_range(border(at)..border(at + 1))).collect()
+    let boundary = |at: usize| 2 + (n_main - 2) * at / n_checks;
+    (0..n_checks).map(|at| rng.random_range(boundary(at)..boundary(at + 1))).collect()
 }
 
 /// Distinct two-digit numbers, drawn uniformly.

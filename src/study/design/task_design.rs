@@ -170,12 +170,12 @@ impl TaskBalance {
                 *votes += 1;
             }
         }
-        self.votes = extent(self.cells.values().map(|cell| cell.iter().sum()));
-        self.arranged = extent(self.cells.values().flatten().copied());
+        self.votes = min_max(self.cells.values().map(|cell| cell.iter().sum()));
+        self.arranged = min_max(self.cells.values().flatten().copied());
     }
 }
 
-fn extent(counts: impl Iterator<Item = usize>) -> [usize; 2] {
+fn min_max(counts: impl Iterator<Item = usize>) -> [usize; 2] {
     let counts: Vec<usize> = counts.collect();
     [counts.iter().min(), counts.iter().max()].map(|count| count.copied().unwrap_or(0))
 }

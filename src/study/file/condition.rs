@@ -46,7 +46,7 @@ impl ConditionSource {
 }
 
 /// Replaces `{speaker}` and `{clip}` in `pattern`; of a clip name `speaker/clip` only the last part is used.
-pub fn filled(pattern: &Path, speaker: &str, clip: &str) -> PathBuf {
+pub fn fill_pattern(pattern: &Path, speaker: &str, clip: &str) -> PathBuf {
     let clip = clip.rsplit('/').next().unwrap_or(clip);
     pattern.to_string_lossy().replace("{speaker}", speaker).replace("{clip}", clip).into()
 }

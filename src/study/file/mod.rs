@@ -6,7 +6,7 @@ mod read;
 mod rules;
 mod study_file;
 
-pub use condition::{ConditionSource, StudyCondition, filled};
+pub use condition::{ConditionSource, StudyCondition, fill_pattern};
 pub use layers::StudyPreset;
 pub use read::EXAMPLE;
 pub use study_file::{

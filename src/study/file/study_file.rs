@@ -255,7 +255,7 @@ impl StudyFile {
 }
 
 /// Drops tasks without trials and fills in defaults: sources of mismatched conditions, conditions of tasks, hypotheses.
-pub(super) fn fill_in(file: &mut StudyFile) {
+pub(super) fn fill_defaults(file: &mut StudyFile) {
     let empty: Vec<String> = file.task.iter().filter(|task| task.trials == 0).map(|task| task.name.clone()).collect();
     file.task.retain(|task| task.trials > 0);
     file.hypothesis.retain(|hypothesis| !empty.contains(&hypothesis.task));
@@ -263,22 +263,22 @@ pub(super) fn fill_in(file: &mut StudyFile) {
         |source: &ConditionSource| matches!(source, ConditionSource::Checkpoint(_) | ConditionSource::Files(_));
     let models = file.condition.iter().filter(|condition| is_model(&condition.source) && !condition.real);
     if let [model] = &models.map(|condition| condition.name.clone()).collect::<Vec<_>>()[..] {
-        let unsaid = file.condition.iter_mut().filter(|condition| condition.source.mismatch_of() == Some(""));
-        unsaid.for_each(|condition| condition.source = ConditionSource::Mismatched(model.clone()));
+        let unspecified = file.condition.iter_mut().filter(|condition| condition.source.mismatch_of() == Some(""));
+        unspecified.for_each(|condition| condition.source = ConditionSource::Mismatched(model.clone()));
     }
     for at in 0..file.task.len() {
         if file.task[at].conditions.is_empty() {
-            file.task[at].conditions = compared(file, &file.task[at]);
+            file.task[at].conditions = default_conditions(file, &file.task[at]);
         }
     }
     if file.hypothesis.is_empty() {
-        file.hypothesis = file.task.iter().flat_map(|task| hypotheses(task, file.speaker.len() > 1)).collect();
+        file.hypothesis = file.task.iter().flat_map(|task| default_hypotheses(task, file.speaker.len() > 1)).collect();
     }
 }
 
 /// Default conditions of a task: mismatched ones and their counterparts for the mismatch design, all for sliders with
 /// sound, otherwise all but the mismatched ones.
-fn compared(file: &StudyFile, task: &StudyTask) -> Vec<String> {
+fn default_conditions(file: &StudyFile, task: &StudyTask) -> Vec<String> {
     let mismatch_of = |name: &str| file.find_condition(name).and_then(|condition| condition.source.mismatch_of());
     let is_counterpart = |name: &str| file.condition.iter().any(|other| other.source.mismatch_of() == Some(name));
     let fits = |name: &str| match task.design {
@@ -292,7 +292,7 @@ fn compared(file: &StudyFile, task: &StudyTask) -> Vec<String> {
 }
 
 /// Default hypotheses of a task, for all speakers together and, if there are several, for each separately.
-fn hypotheses(task: &StudyTask, has_speakers: bool) -> Vec<StudyHypothesis> {
+fn default_hypotheses(task: &StudyTask, has_speakers: bool) -> Vec<StudyHypothesis> {
     let kinds: &[HypothesisKind] = match task.design {
         TaskDesign::Turing | TaskDesign::TuringSingle => {
             &[HypothesisKind::DiffersFromChance, HypothesisKind::Equivalence]

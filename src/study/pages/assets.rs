@@ -30,7 +30,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     #[test]
-    fn pages_load_what_is_here_and_nothing_stands_inline() {
+    fn pages_load_only_assets_and_have_no_inline_code() {
         for (path, content_type, text) in ASSETS {
             for quoted in text.split('"').skip(1).step_by(2).filter(|quoted| quoted.starts_with("./")) {
                 let module = quoted.trim_start_matches('.');

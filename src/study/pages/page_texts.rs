@@ -44,26 +44,26 @@ mod tests {
     use std::collections::BTreeSet;
 
     /// Placeholder names in braces.
-    fn blanks(text: &str) -> BTreeSet<&str> {
+    fn placeholders(text: &str) -> BTreeSet<&str> {
         text.split('{').skip(1).filter_map(|rest| Some(rest.split_once('}')?.0)).collect()
     }
 
     #[test]
-    fn every_language_has_every_text_with_the_same_blanks() {
+    fn every_language_has_every_text_with_the_same_placeholders() {
         let english = built_in("en");
         assert!(english.len() > 80);
         for (language, _) in BUILT_IN {
             let texts = built_in(language);
             assert!(texts.keys().eq(english.keys()), "{language}");
             for (key, text) in &texts {
-                assert_eq!(blanks(text), blanks(&english[key]), "{language}: {key}");
+                assert_eq!(placeholders(text), placeholders(&english[key]), "{language}: {key}");
                 assert_eq!(text.is_empty(), english[key].is_empty(), "{language}: {key}");
             }
         }
     }
 
     #[test]
-    fn a_studys_texts_lie_over_the_built_in_ones() {
+    fn a_studys_texts_override_the_built_in_ones() {
         let of_french = PageTexts::from([("continue".to_owned(), "Continuer".to_owned())]);
         let written = BTreeMap::from([("fr".to_owned(), of_french)]);
         let texts = page_texts(&["de".to_owned(), "fr".to_owned()], &written);

@@ -22,7 +22,7 @@ use std::sync::Arc;
 use tower_http::services::ServeFile;
 
 /// Maximum length of a recruiting site's parameter, bytes.
-const LONGEST_PARAMETER: usize = 128;
+const MAX_PARAMETER_BYTES: usize = 128;
 
 type Shared = State<Arc<App>>;
 
@@ -79,7 +79,7 @@ impl FromRequestParts<Arc<App>> for AuthenticatedSession {
 
     async fn from_request_parts(parts: &mut Parts, app: &Arc<App>) -> Result<Self, ApiError> {
         let (session, id) = app.secret.verify(bearer(&parts.headers)?).ok_or_else(unauthorized)?;
-        if app.limits.allow_participant(&id) { Ok(Self { session, id }) } else { Err(ApiError::too_often()) }
+        if app.limits.allow_participant(&id) { Ok(Self { session, id }) } else { Err(ApiError::too_many_requests()) }
     }
 }
 
@@ -110,44 +110,49 @@ pub struct StartRequest {
 /// `POST /api/begin`
 pub async fn begin(State(app): Shared, JsonBody(body): JsonBody<StartRequest>) -> Result<HttpResponse, ApiError> {
     if !app.limits.allow_begin() {
-        return Err(ApiError::too_often());
+        return Err(ApiError::too_many_requests());
     }
     if !body.consent {
-        return Err(ApiError::bad("Nobody takes part without consent."));
+        return Err(ApiError::bad_request("Nobody takes part without consent."));
     }
     if !app.study.languages.contains(&body.language) {
-        return Err(ApiError::bad("The study does not have that language."));
+        return Err(ApiError::bad_request("The study does not have that language."));
     }
     if !body.parameters.iter().all(|(name, value)| is_parameter(name, value)) {
-        return Err(ApiError::bad("A parameter is unknown, too long, or holds other than letters, digits and -_.:@."));
+        return Err(ApiError::bad_request(
+            "A parameter is unknown, too long, or holds other than letters, digits and -_.:@.",
+        ));
     }
     let named = || anyhow::Ok((participant_id()?, completion_code()?));
     let (id, code) = named().map_err(|_| ApiError::not_stored())?;
-    let newcomer = NewParticipant { id, language: body.language, parameters: body.parameters, code };
-    if app.study.requires_id && !newcomer.has_id() {
+    let new_participant = NewParticipant { id, language: body.language, parameters: body.parameters, code };
+    if app.study.requires_id && !new_participant.has_id() {
         let sentence = "The address lacks the participant ID of a recruiting site; open the study by its link there.";
-        return Err(ApiError::new(StatusCode::FORBIDDEN, sentence).because("id-missing"));
+        return Err(ApiError::new(StatusCode::FORBIDDEN, sentence).with_reason("id-missing"));
     }
     let (quota, clock) = (app.study.quota, app.clock);
-    let participant = match app.store.write(move |db| participants::begin(db, &newcomer, quota, clock.now_ms())).await?
-    {
-        BeginOutcome::Begun(participant) => participant,
-        BeginOutcome::Known => {
-            let sentence = "This participant ID has been used already; go on in the browser where you began.";
-            return Err(ApiError::conflict(sentence).because("known"));
-        }
-        BeginOutcome::Full => {
-            return Err(ApiError::conflict("The study has all its participants. Thank you.").because("full"));
-        }
-    };
+    let participant =
+        match app.store.write(move |db| participants::begin(db, &new_participant, quota, clock.now_ms())).await? {
+            BeginOutcome::Begun(participant) => participant,
+            BeginOutcome::Known => {
+                let sentence = "This participant ID has been used already; go on in the browser where you began.";
+                return Err(ApiError::conflict(sentence).with_reason("known"));
+            }
+            BeginOutcome::Full => {
+                return Err(ApiError::conflict("The study has all its participants. Thank you.").with_reason("full"));
+            }
+        };
     let token = app.secret.token(participant.session, &participant.id);
     Ok(json_reply(&json!({ "token": token, "state": session_state(&app.study, &participant) })))
 }
 
 fn is_parameter(name: &str, value: &str) -> bool {
     let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.:@".contains(&byte);
-    let begins_plain = value.bytes().next().is_none_or(|byte| byte.is_ascii_alphanumeric());
-    PARAMETERS.contains(&name) && value.len() <= LONGEST_PARAMETER && begins_plain && value.bytes().all(is_plain)
+    let starts_alphanumeric = value.bytes().next().is_none_or(|byte| byte.is_ascii_alphanumeric());
+    PARAMETERS.contains(&name)
+        && value.len() <= MAX_PARAMETER_BYTES
+        && starts_alphanumeric
+        && value.bytes().all(is_plain)
 }
 
 /// `GET /api/state`
@@ -273,7 +278,7 @@ mod tests {
     use super::is_one_range;
 
     #[test]
-    fn ranges_that_are_served_in_part() {
+    fn single_ranges_are_recognised() {
         let one = ["bytes=0-0", "bytes=2-5", "bytes=2-", "bytes=-3", "bytes=-0", "bytes=10-"];
         assert!(one.into_iter().all(is_one_range));
         let others = ["5-2", "-", "", "0-1,3-4", "a-b", "+1-2", " 1-2"].map(|ends| format!("bytes={ends}"));

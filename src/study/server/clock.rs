@@ -31,7 +31,7 @@ mod tests {
     use std::time::Duration;
 
     #[test]
-    fn time_goes_on_from_the_wall_clock_or_the_latest_stored_time() {
+    fn time_continues_from_the_wall_clock_or_the_latest_stored_time() {
         let wall_ms = Clock::start(0).now_ms();
         assert!(wall_ms > 1_700_000_000_000, "{wall_ms}");
         let ahead_ms = wall_ms + 3_600_000;

@@ -17,46 +17,46 @@ use tokio::sync::{Semaphore, watch};
 use tokio::time::{sleep, timeout};
 
 /// Maximum number of simultaneous connections, if the limit on open files permits.
-const MOST_CONNECTIONS: usize = 2048;
+const MAX_CONNECTIONS: usize = 2048;
 /// Minimum limit per peer: browsers open up to six connections.
-const LEAST_PER_PEER: usize = 8;
+const MIN_PER_PEER: usize = 8;
 /// Reply to a connection above the limit of its peer.
 const TOO_MANY: &[u8] = b"HTTP/1.1 503 Service Unavailable\r\nRetry-After: 10\r\nConnection: close\r\n\r\n";
 /// Time limit for receiving the head of a request; also closes idle connections.
-const HEAD_TIME: Duration = Duration::from_secs(10);
+const HEAD_TIMEOUT: Duration = Duration::from_secs(10);
 /// Maximum size of a request head in bytes, and of the number of its headers.
-const MOST_HEAD: usize = 16 * 1024;
-const MOST_HEADERS: usize = 64;
+const MAX_HEAD_BYTES: usize = 16 * 1024;
+const MAX_HEADERS: usize = 64;
 /// Time without write progress after which a connection is closed.
-const WRITE_TIME: Duration = Duration::from_secs(30);
+const WRITE_TIMEOUT: Duration = Duration::from_secs(30);
 /// Time after which a connection accepts no further request.
-const CONNECTION_TIME: Duration = Duration::from_secs(600);
+const MAX_CONNECTION_TIME: Duration = Duration::from_secs(600);
 /// Time that a reply in progress has left when its connection or the server shuts down.
-const GRACE: Duration = Duration::from_secs(5);
+const GRACE_PERIOD: Duration = Duration::from_secs(5);
 
 /// Serves `router` until `stop`, then lets replies in progress finish. Each peer gets at most a quarter of the
 /// connections, unless all come from a proxy (`is_proxied`).
 pub async fn serve(listener: TcpListener, router: Router, is_proxied: bool, stop: impl Future<Output = ()>) {
-    let n_places = most_connections();
-    let peers = PeerLimit::new(if is_proxied { n_places } else { (n_places / 4).max(LEAST_PER_PEER) });
-    let places = Arc::new(Semaphore::new(n_places));
+    let n_permits = max_connections();
+    let peers = PeerLimit::new(if is_proxied { n_permits } else { (n_permits / 4).max(MIN_PER_PEER) });
+    let permits = Arc::new(Semaphore::new(n_permits));
     let (stopping, stopped) = watch::channel(());
     let mut stop = pin!(stop);
     loop {
         let accepted = async {
-            let place = places.clone().acquire_owned().await;
-            (listener.accept().await, place)
+            let permit = permits.clone().acquire_owned().await;
+            (listener.accept().await, permit)
         };
-        let (accepted, place) = tokio::select! {
+        let (accepted, permit) = tokio::select! {
             accepted = accepted => accepted,
             () = stop.as_mut() => break,
         };
-        let (Ok((stream, address)), Ok(place)) = (accepted, place) else {
+        let (Ok((stream, address)), Ok(permit)) = (accepted, permit) else {
             // Typically out of file descriptors: wait for other connections to end.
             sleep(Duration::from_millis(50)).await;
             continue;
         };
-        let Some(counted) = peers.admit(address.ip()) else {
+        let Some(peer_connection) = peers.admit(address.ip()) else {
             // The write does not block, because the send buffer is empty.
             let _ = stream.into_std().and_then(|mut stream| stream.write(TOO_MANY));
             continue;
@@ -64,40 +64,40 @@ pub async fn serve(listener: TcpListener, router: Router, is_proxied: bool, stop
         let (router, stopped) = (router.clone(), stopped.clone());
         tokio::spawn(async move {
             connection(stream, router, stopped).await;
-            drop((place, counted));
+            drop((permit, peer_connection));
         });
     }
     drop(listener);
     drop(stopping);
-    let all = u32::try_from(n_places).unwrap_or(u32::MAX);
-    let _ = timeout(2 * GRACE, places.acquire_many(all)).await;
+    let all = u32::try_from(n_permits).unwrap_or(u32::MAX);
+    let _ = timeout(2 * GRACE_PERIOD, permits.acquire_many(all)).await;
 }
 
 /// Serves one connection. Errors are ignored: they concern the client only.
 async fn connection(stream: TcpStream, router: Router, mut stopped: watch::Receiver<()>) {
     let _ = stream.set_nodelay(true);
     let mut builder = http1::Builder::new();
-    builder.timer(TokioTimer::new()).header_read_timeout(HEAD_TIME);
-    builder.max_buf_size(MOST_HEAD).max_headers(MOST_HEADERS);
+    builder.timer(TokioTimer::new()).header_read_timeout(HEAD_TIMEOUT);
+    builder.max_buf_size(MAX_HEAD_BYTES).max_headers(MAX_HEADERS);
     let service = TowerToHyperService::new(router);
-    let stream = TokioIo::new(WriteTimeout::new(stream, WRITE_TIME));
+    let stream = TokioIo::new(WriteTimeout::new(stream, WRITE_TIMEOUT));
     let mut connection = pin!(builder.serve_connection(stream, service));
     tokio::select! {
         _ = connection.as_mut() => return,
         // Completes when the sender is dropped, which happens when the server stops.
         _ = stopped.changed() => {}
-        () = sleep(CONNECTION_TIME) => {}
+        () = sleep(MAX_CONNECTION_TIME) => {}
     }
     connection.as_mut().graceful_shutdown();
-    let _ = timeout(GRACE, connection).await;
+    let _ = timeout(GRACE_PERIOD, connection).await;
 }
 
 /// Maximum number of connections: half of the process's file descriptors, because each connection may have a film open.
 /// Raises the soft limit of descriptors to the hard limit first.
-fn most_connections() -> usize {
+fn max_connections() -> usize {
     let limit = getrlimit(Resource::Nofile);
     let raised = rustix::process::Rlimit { current: limit.maximum, ..limit };
     let files = if setrlimit(Resource::Nofile, raised).is_ok() { limit.maximum } else { limit.current };
     let half = files.map_or(usize::MAX, |files| (files as usize / 2).saturating_sub(32));
-    half.clamp(16, MOST_CONNECTIONS)
+    half.clamp(16, MAX_CONNECTIONS)
 }

@@ -8,14 +8,14 @@ use std::sync::{Arc, Mutex};
 /// Number of open connections by peer: an IPv4 address, or an IPv6 /64 network, the smallest that providers assign.
 #[derive(Debug)]
 pub struct PeerLimit {
-    most: usize,
+    max_connections: usize,
     open: Mutex<HashMap<IpAddr, usize>>,
 }
 
 impl PeerLimit {
-    /// Limit of `most` connections per peer.
-    pub fn new(most: usize) -> Arc<Self> {
-        Arc::new(Self { most, open: Mutex::default() })
+    /// Limit of `max_connections` connections per peer.
+    pub fn new(max_connections: usize) -> Arc<Self> {
+        Arc::new(Self { max_connections, open: Mutex::default() })
     }
 
     /// Counts a connection from `address` until the result is dropped; `None` if its peer has reached the limit.
@@ -23,7 +23,7 @@ impl PeerLimit {
         let peer = peer(address);
         let mut open = self.open.lock().ok()?;
         let n_open = open.entry(peer).or_default();
-        if *n_open >= self.most {
+        if *n_open >= self.max_connections {
             return None;
         }
         *n_open += 1;
@@ -62,7 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_peer_has_its_number_of_connections_and_no_more() {
+    fn a_peer_cannot_exceed_its_number_of_connections() {
         let limit = PeerLimit::new(2);
         let admit = |address: &str| limit.admit(address.parse().unwrap());
         let [first, second] = ["192.0.2.1", "::ffff:192.0.2.1"].map(admit);

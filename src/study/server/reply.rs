@@ -45,7 +45,7 @@ impl ApiError {
         Self { status, sentence: sentence.into(), reason: None, retry_secs: None }
     }
 
-    pub fn bad(sentence: impl Into<String>) -> Self {
+    pub fn bad_request(sentence: impl Into<String>) -> Self {
         Self::new(StatusCode::BAD_REQUEST, sentence)
     }
 
@@ -55,7 +55,7 @@ impl ApiError {
 
     /// Sets the reason, by which the page shows its text `REASON.text`.
     #[must_use]
-    pub fn because(self, reason: &'static str) -> Self {
+    pub fn with_reason(self, reason: &'static str) -> Self {
         Self { reason: Some(reason), ..self }
     }
 
@@ -65,7 +65,7 @@ impl ApiError {
         Self { retry_secs: Some(secs), ..self }
     }
 
-    pub fn too_often() -> Self {
+    pub fn too_many_requests() -> Self {
         Self::new(StatusCode::TOO_MANY_REQUESTS, "Too many requests; wait a moment.").retry_after(2)
     }
 
@@ -138,7 +138,7 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for JsonBody<T> {
         let bytes = Bytes::from_request(request, state).await;
         let bytes = bytes.map_err(|error| ApiError::new(error.status(), "The body is too large, or broke off."))?;
         let value = serde_json::from_slice(&bytes);
-        value.map(Self).map_err(|_| ApiError::bad("The body is not the JSON that this address takes."))
+        value.map(Self).map_err(|_| ApiError::bad_request("The body is not the JSON that this address takes."))
     }
 }
 

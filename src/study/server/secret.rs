@@ -11,9 +11,9 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
 /// Length of a participant's random identifier, bytes.
-const ID: usize = 12;
+const ID_BYTES: usize = 12;
 /// Length of a token, bytes: session, identifier, signature.
-const TOKEN: usize = 4 + ID + blake3::OUT_LEN;
+const TOKEN_BYTES: usize = 4 + ID_BYTES + blake3::OUT_LEN;
 /// Characters of a completion code, without those that look alike.
 const CODE_LETTERS: &[u8; 32] = b"ABCDEFGHJKLMNPQRSTUVWXYZ23456789";
 
@@ -32,7 +32,7 @@ pub fn completion_code() -> Result<String> {
 
 /// Random identifier of a participant, in hexadecimal digits.
 pub fn participant_id() -> Result<String> {
-    Ok(hex(&random::<ID>()?))
+    Ok(hex(&random::<ID_BYTES>()?))
 }
 
 /// Signing key and operator's token of one study.
@@ -58,8 +58,8 @@ impl StudySecret {
         }
         let read = || -> Result<Self> {
             let mode = path.metadata()?.permissions().mode();
-            let others = mode & 0o077;
-            ensure!(others == 0, "others than its owner can read it; `chmod 600` it");
+            let group_and_other_bits = mode & 0o077;
+            ensure!(group_and_other_bits == 0, "others than its owner can read it; `chmod 600` it");
             Ok(serde_json::from_slice(&fs::read(path)?)?)
         };
         read().with_context(|| format!("cannot use {}", path.display()))
@@ -86,12 +86,12 @@ impl StudySecret {
     /// Session and identifier of the participant to whom a token was issued; `None` if this study's key did not sign
     /// it.
     pub fn verify(&self, token: &str) -> Option<(u32, String)> {
-        let bytes: [u8; TOKEN] = URL_SAFE_NO_PAD.decode(token).ok()?.try_into().ok()?;
-        let (said, signature) = bytes.split_at(4 + ID);
-        let (session, id) = said.split_at(4);
+        let bytes: [u8; TOKEN_BYTES] = URL_SAFE_NO_PAD.decode(token).ok()?.try_into().ok()?;
+        let (payload, signature) = bytes.split_at(4 + ID_BYTES);
+        let (session, id) = payload.split_at(4);
         let signature = blake3::Hash::from_bytes(signature.try_into().ok()?);
         // `blake3::Hash` compares in constant time.
-        let is_signed = self.sign(said) == signature;
+        let is_signed = self.sign(payload) == signature;
         is_signed.then(|| Some((u32::from_le_bytes(session.try_into().ok()?), hex(id)))).flatten()
     }
 
@@ -114,7 +114,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_token_is_taken_whole_or_not_at_all() {
+    fn altered_and_truncated_tokens_are_refused() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("secret.json");
         let secret = StudySecret::open(&path).unwrap();

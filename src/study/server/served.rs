@@ -13,7 +13,7 @@ use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
 /// Tolerance for an answer before the nominal end of its films, milliseconds: players round durations.
-const LEEWAY_MS: f64 = 250.0;
+const END_TOLERANCE_MS: f64 = 250.0;
 /// Time limit for the first answer in addition to twice the length of its films, milliseconds: it includes reading the
 /// task's instructions and loading the films. Consent and the sound check precede the start of a session.
 const UNANSWERED_MS: i64 = 300_000;
@@ -110,7 +110,7 @@ impl ServedStudy {
         let is_rated = self.task(trial).design == TaskDesign::Sliders && trial.phase != TrialPhase::AttentionCheck;
         let secs = trial.films.iter().filter_map(|film| self.film(film)).map(|film| film.secs);
         let secs = if is_rated || trial.films.len() > 2 { secs.sum() } else { secs.fold(0.0, f64::max) };
-        (1000.0 * secs - LEEWAY_MS).max(0.0) as i64
+        (1000.0 * secs - END_TOLERANCE_MS).max(0.0) as i64
     }
 }
 

@@ -28,9 +28,9 @@ use tower_http::set_header::SetResponseHeaderLayer;
 use tower_http::timeout::TimeoutLayer;
 
 /// Maximum size of a request body, bytes.
-const MOST_BODY: usize = 16 * 1024;
+const MAX_BODY_BYTES: usize = 16 * 1024;
 /// Time limit for a request up to the start of its reply, including reading the body.
-const REQUEST_TIME: Duration = Duration::from_secs(10);
+const REQUEST_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// State shared by the request handlers.
 pub struct App {
@@ -58,7 +58,7 @@ impl StudyServer {
         let study = ServedStudy::open(folder, abandoned_secs)?;
         let secret = StudySecret::open(&folder.secret())?;
         let (store, writer) = ResponseStore::open(&folder.responses(), &study.plan_hash)?;
-        let latest_ms = participants::latest_ms(&database::open_to_read(&folder.responses())?)?;
+        let latest_ms = participants::latest_ms(&database::open_for_reading(&folder.responses())?)?;
         let (limits, clock) = (RateLimits::new(), Clock::start(latest_ms));
         Ok(Self { app: App { study, store, secret, limits, clock }, writer })
     }
@@ -71,13 +71,18 @@ impl StudyServer {
         self.app.secret.operator_token()
     }
 
-    /// Serves on `address` until SIGINT or SIGTERM. `listening` is called with the actual address once the socket is
+    /// Serves on `address` until SIGINT or SIGTERM. `on_listening` is called with the actual address once the socket is
     /// bound. `host_name`: name under which a proxy serves the study; the proxy is then responsible for limiting the
     /// connections of each peer.
     ///
     /// # Errors
     /// The address cannot be bound, or `host_name` is more than a host name.
-    pub fn run(self, address: SocketAddr, host_name: Option<String>, listening: impl FnOnce(SocketAddr)) -> Result<()> {
+    pub fn run(
+        self,
+        address: SocketAddr,
+        host_name: Option<String>,
+        on_listening: impl FnOnce(SocketAddr),
+    ) -> Result<()> {
         let is_proxied = host_name.is_some();
         let hosts = AllowedHosts::new(address.ip(), host_name)?;
         let runtime =
@@ -87,7 +92,7 @@ impl StudyServer {
             let mut terminated = signal(SignalKind::terminate()).context("cannot wait for a signal")?;
             let listener = TcpListener::bind(address).await;
             let listener = listener.with_context(|| format!("cannot listen at {address}; choose another --port"))?;
-            listening(listener.local_addr()?);
+            on_listening(listener.local_addr()?);
             let stop = async {
                 tokio::select! {
                     _ = tokio::signal::ctrl_c() => {}
@@ -121,8 +126,8 @@ fn router(app: App, hosts: AllowedHosts) -> Router {
     let mut router = router
         .fallback(not_found)
         .method_not_allowed_fallback(wrong_method)
-        .layer(DefaultBodyLimit::max(MOST_BODY))
-        .layer(TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, REQUEST_TIME))
+        .layer(DefaultBodyLimit::max(MAX_BODY_BYTES))
+        .layer(TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, REQUEST_TIMEOUT))
         .layer(middleware::from_fn_with_state(Arc::new(hosts), check_host))
         .layer(SetResponseHeaderLayer::if_not_present(header::CACHE_CONTROL, no_store));
     for (name, value) in HEADERS {

@@ -13,9 +13,9 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// Maximum number of Newton steps.
-const MOST: usize = 100;
+const MAX_STEPS: usize = 100;
 /// Maximum proportion of bootstrap draws without finite strengths.
-const LEFT_OUT: f64 = 0.05;
+const MAX_FAILED_DRAWS: f64 = 0.05;
 
 /// Vote of one participant between two conditions, given by index.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,8 +61,8 @@ pub fn strengths(votes: &[PairedVote], n_conditions: usize) -> Result<Vec<f64>, 
     }
     let mut strengths = Array1::<f64>::zeros(n_conditions);
     let mut fit = likelihood(&wins, &strengths);
-    for _ in 0..MOST {
-        let step = cholesky::solve(fit.information.clone(), fit.slope.clone().insert_axis(Axis(1)));
+    for _ in 0..MAX_STEPS {
+        let step = cholesky::solve(fit.information.clone(), fit.gradient.clone().insert_axis(Axis(1)));
         let step = step.remove_axis(Axis(1));
         let mut share = 1.0;
         let (next, next_fit) = loop {
@@ -102,7 +102,7 @@ pub fn strength_intervals(
         strengths(&drawn.collect::<Vec<_>>(), n_conditions).ok()
     };
     let draws: Vec<Vec<f64>> = (0..n_draws as u64).into_par_iter().filter_map(fit).collect();
-    if (draws.len() as f64) < (1.0 - LEFT_OUT) * n_draws as f64 {
+    if (draws.len() as f64) < (1.0 - MAX_FAILED_DRAWS) * n_draws as f64 {
         return Err(StatisticsError::Unconnected { what: "conditions" });
     }
     let interval = |k: usize| interval_of_draws(draws.iter().map(|draw| draw[k]), confidence);
@@ -118,20 +118,20 @@ pub fn elo(log_strength: f64) -> f64 {
 /// information to make it invertible: strengths are determined up to a constant only.
 struct Likelihood {
     log: f64,
-    slope: Array1<f64>,
+    gradient: Array1<f64>,
     information: Array2<f64>,
 }
 
 fn likelihood(wins: &Array2<f64>, strengths: &Array1<f64>) -> Likelihood {
     let n = strengths.len();
     let mut found =
-        Likelihood { log: 0.0, slope: Array1::zeros(n), information: Array2::from_elem((n, n), 1.0 / n as f64) };
+        Likelihood { log: 0.0, gradient: Array1::zeros(n), information: Array2::from_elem((n, n), 1.0 / n as f64) };
     for ((i, j), won) in wins.indexed_iter().filter(|((i, j), _)| i != j) {
         let eta = strengths[i] - strengths[j];
         let share = 1.0 / (1.0 + (-eta).exp());
         found.log -= won * ((-eta).max(0.0) + (-eta.abs()).exp().ln_1p());
-        found.slope[i] += won * (1.0 - share);
-        found.slope[j] -= won * (1.0 - share);
+        found.gradient[i] += won * (1.0 - share);
+        found.gradient[j] -= won * (1.0 - share);
         let weight = won * share * (1.0 - share);
         for (a, b, sign) in [(i, i, 1.0), (j, j, 1.0), (i, j, -1.0), (j, i, -1.0)] {
             found.information[[a, b]] += sign * weight;
@@ -143,15 +143,15 @@ fn likelihood(wins: &Array2<f64>, strengths: &Array1<f64>) -> Likelihood {
 /// Whether every condition reaches every other by a chain of wins: transitive closure by Warshall's algorithm.
 fn is_connected(wins: &Array2<f64>) -> bool {
     let n = wins.nrows();
-    let mut leads = wins.mapv(|won| won > 0.0);
+    let mut reaches = wins.mapv(|won| won > 0.0);
     for via in 0..n {
         for from in 0..n {
             for to in 0..n {
-                leads[[from, to]] |= leads[[from, via]] && leads[[via, to]];
+                reaches[[from, to]] |= reaches[[from, via]] && reaches[[via, to]];
             }
         }
     }
-    leads.iter().all(|leads| *leads)
+    reaches.iter().all(|reaches| *reaches)
 }
 
 #[cfg(test)]
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn strengths_are_those_of_choix() {
+    fn strengths_match_choix() {
         for (votes, expected) in sets() {
             let n = expected.len();
             let found = strengths(&votes, n).unwrap();

@@ -26,8 +26,8 @@ impl Equivalence {
     /// Tests at 5 % whether the true value of `estimate` is less than `bound` away from `expected`.
     pub fn of_estimate(estimate: &StudentEstimate, expected: f64, bound: f64) -> Result<Self, StatisticsError> {
         within("bound", bound, f64::MIN_POSITIVE..=f64::MAX)?;
-        let above = estimate.beyond(estimate.statistic(expected - bound));
-        let below = estimate.beyond(-estimate.statistic(expected + bound));
+        let above = estimate.upper_tail(estimate.statistic(expected - bound));
+        let below = estimate.upper_tail(-estimate.statistic(expected + bound));
         Ok(Self { bound, p: above.max(below), interval: estimate.interval(1.0 - 2.0 * LEVEL)? })
     }
 

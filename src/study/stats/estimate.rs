@@ -100,7 +100,7 @@ impl StudentEstimate {
 
     /// Two-sided p value of the hypothesis that the true value is `expected`.
     pub fn p_value(&self, expected: f64) -> f64 {
-        2.0 * self.beyond(self.statistic(expected).abs())
+        2.0 * self.upper_tail(self.statistic(expected).abs())
     }
 
     pub fn interval(&self, confidence: f64) -> Result<ConfidenceInterval, StatisticsError> {
@@ -109,7 +109,7 @@ impl StudentEstimate {
     }
 
     /// Probability of a statistic above `t`.
-    pub fn beyond(&self, t: f64) -> f64 {
+    pub fn upper_tail(&self, t: f64) -> f64 {
         // Above a million degrees of freedom the two distributions differ by less than 1e-6.
         let student = (self.degrees_of_freedom < 1e6).then(|| StudentsT::new(0.0, 1.0, self.degrees_of_freedom));
         student.and_then(Result::ok).map_or_else(|| Normal::standard().sf(t), |student| student.sf(t))
@@ -147,7 +147,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_has_no_spread_has_no_estimate() {
+    fn values_without_spread_have_no_estimate() {
         assert_eq!(StudentEstimate::of_mean(&[0.3; 7]), Err(StatisticsError::NoSpread { what: "values" }));
         assert!(matches!(StudentEstimate::of_mean(&[0.5]), Err(StatisticsError::TooFew { .. })));
         assert!(matches!(StudentEstimate::of_mean(&[0.5, f64::NAN]), Err(StatisticsError::NotFinite { .. })));

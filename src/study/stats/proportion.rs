@@ -64,10 +64,10 @@ impl BinomialCount {
         let p = if k as f64 == mean {
             1.0
         } else if (k as f64) < mean {
-            let other = first(mean.ceil() as u64, n + 1, is_unlikely);
+            let other = partition_point(mean.ceil() as u64, n + 1, is_unlikely);
             self.at_most(probability)? + tail_from(&distribution, other)
         } else {
-            let other = first(0, mean.floor() as u64 + 1, |outcome| !is_unlikely(outcome));
+            let other = partition_point(0, mean.floor() as u64 + 1, |outcome| !is_unlikely(outcome));
             self.at_least(probability)? + other.checked_sub(1).map_or(0.0, |last| distribution.cdf(last))
         };
         Ok(p.min(1.0))
@@ -97,7 +97,7 @@ fn tail_from(distribution: &Binomial, outcome: u64) -> f64 {
 
 /// Smallest value in `low..high` for which the monotone predicate `holds` is true, by bisection; `high` if there is
 /// none.
-fn first(mut low: u64, mut high: u64, holds: impl Fn(u64) -> bool) -> u64 {
+fn partition_point(mut low: u64, mut high: u64, holds: impl Fn(u64) -> bool) -> u64 {
     while low < high {
         let middle = low + (high - low) / 2;
         if holds(middle) { high = middle } else { low = middle + 1 }
@@ -111,7 +111,7 @@ mod tests {
 
     /// Counts of Rebol, Guetl and Pietroszek 2021, table III, with votes treated as independent.
     #[test]
-    fn votes_of_the_paper_have_their_known_probabilities() {
+    fn p_values_of_the_papers_votes_match() {
         let p = |successes, trials| BinomialCount::new(successes, trials).unwrap().test(0.5).unwrap();
         let near = |found: f64, expected: f64| assert!((found - expected).abs() < 5e-4, "{found} {expected}");
         near(p(1050, 2000), 0.027);
@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn ends_and_refusals() {
+    fn extreme_counts_and_invalid_arguments() {
         let none = BinomialCount::new(0, 20).unwrap();
         let all = BinomialCount::new(20, 20).unwrap();
         assert_eq!((none.exact(0.95).unwrap().low, all.exact(0.95).unwrap().high), (0.0, 1.0));

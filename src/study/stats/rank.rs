@@ -171,7 +171,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn refusals() {
+    fn invalid_arguments_are_refused() {
         assert!(matches!(signed_rank(&[0.0; 4]), Err(StatisticsError::TooFew { .. })));
         assert!(signed_rank(&[]).is_err() && signed_rank(&[1.0, f64::NAN]).is_err());
         assert_eq!(signed_rank(&[3.0]), Ok(RankTest { statistic: 0.0, p: 1.0 }));

@@ -1,7 +1,7 @@
 //! Cuts clips of equal length from a speaker's speech: they start and end in pauses, contain speech, and have visible
 //! joints. Better clips come first; segments without any acceptable clip are refused with a reason.
 
-use super::speaker_source::{SpeakerSource, SpokenPiece};
+use super::speaker_source::{SpeakerSource, SpeechSegment};
 use anyhow::Result;
 use orator_base::audio::pauses::SpeechLevel;
 use orator_base::types::skeleton::{N_JOINTS, NECK, is_duplicate};
@@ -12,12 +12,11 @@ use std::ops::Range;
 
 /// Grades of clips from best to worst: maximum sound level at the ends in dB relative to the speech level, and maximum
 /// proportion of invisible joints.
-const GRADES: [(f32, f64); 4] =
-    [(-25.0, 0.0), (-25.0, MOST_UNSEEN), (-15.0, MOST_UNSEEN), (f32::INFINITY, MOST_UNSEEN)];
+const GRADES: [(f32, f64); 4] = [(-25.0, 0.0), (-25.0, MAX_HIDDEN), (-15.0, MAX_HIDDEN), (f32::INFINITY, MAX_HIDDEN)];
 /// Maximum proportion of joints of a clip that may be hidden in all its films.
-const MOST_UNSEEN: f64 = 0.25;
+const MAX_HIDDEN: f64 = 0.25;
 /// Minimum proportion of speech in a clip.
-const LEAST_SPEECH: f64 = 0.3;
+const MIN_SPEECH: f64 = 0.3;
 
 /// Clip of a speaker's speech.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -26,7 +25,7 @@ pub struct StudyClip {
     pub name: String,
     /// Index of the segment from which the clip is cut.
     #[serde(skip)]
-    pub piece: usize,
+    pub segment: usize,
     /// Frame range within the segment.
     pub frames: Range<usize>,
     /// Sound level at the louder end, dB relative to the speech level.
@@ -44,7 +43,7 @@ impl StudyClip {
 
 /// Segment of speech without a clip.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct RefusedPiece {
+pub struct RefusedSegment {
     pub name: String,
     pub reason: String,
 }
@@ -55,7 +54,7 @@ pub struct CutSpeech {
     pub clips: Vec<StudyClip>,
     /// Names of the clips, best first.
     pub best_first: Vec<String>,
-    pub refused: Vec<RefusedPiece>,
+    pub refused: Vec<RefusedSegment>,
 }
 
 /// Candidate for a clip.
@@ -67,23 +66,23 @@ struct CutCandidate {
 
 /// Cuts `n_wanted` clips of `n_frames`, or fewer if there are no more; `rank` orders clips of equal grade.
 pub fn cut(source: &SpeakerSource, n_frames: usize, n_wanted: usize, rank: impl Fn(&str) -> u64) -> Result<CutSpeech> {
-    let looked_at = (0..source.n_pieces()).into_par_iter().map(|piece| {
-        let piece = source.read(piece)?;
-        let found = candidates(&piece, source.fps, n_frames);
-        Ok((piece.name, found))
+    let looked_at = (0..source.n_segments()).into_par_iter().map(|segment| {
+        let segment = source.read(segment)?;
+        let found = candidates(&segment, source.fps, n_frames);
+        Ok((segment.name, found))
     });
-    let (mut pieces, mut refused) = (Vec::new(), Vec::new());
+    let (mut segments, mut refused) = (Vec::new(), Vec::new());
     for (at, (name, found)) in looked_at.collect::<Result<Vec<_>>>()?.into_iter().enumerate() {
         match found {
-            Ok(candidates) => pieces.push((at, name, candidates)),
-            Err(reason) => refused.push(RefusedPiece { name, reason }),
+            Ok(candidates) => segments.push((at, name, candidates)),
+            Err(reason) => refused.push(RefusedSegment { name, reason }),
         }
     }
     let mut clips: Vec<StudyClip> = Vec::new();
     for (most_db, most_unseen) in GRADES {
         let mut more: Vec<StudyClip> = Vec::new();
-        for (piece, name, candidates) in &pieces {
-            let taken = clips.iter().filter(|clip| clip.piece == *piece).map(|clip| clip.frames.clone());
+        for (segment, name, candidates) in &segments {
+            let taken = clips.iter().filter(|clip| clip.segment == *segment).map(|clip| clip.frames.clone());
             let mut taken: Vec<Range<usize>> = taken.collect();
             // Greedy choice by earliest end maximises the number of disjoint clips of equal length.
             for &CutCandidate { start, cut_db, unseen } in candidates {
@@ -91,7 +90,13 @@ pub fn cut(source: &SpeakerSource, n_frames: usize, n_wanted: usize, rank: impl 
                 let is_free = taken.iter().all(|other| other.end <= frames.start || frames.end <= other.start);
                 if is_free && cut_db <= most_db && unseen <= most_unseen {
                     taken.push(frames.clone());
-                    more.push(StudyClip { name: format!("{name}-{start:05}"), piece: *piece, frames, cut_db, unseen });
+                    more.push(StudyClip {
+                        name: format!("{name}-{start:05}"),
+                        segment: *segment,
+                        frames,
+                        cut_db,
+                        unseen,
+                    });
                 }
             }
         }
@@ -100,21 +105,25 @@ pub fn cut(source: &SpeakerSource, n_frames: usize, n_wanted: usize, rank: impl 
         clips.extend(more);
     }
     let best_first = clips.iter().map(|clip| clip.name.clone()).collect();
-    clips.sort_by_key(|clip| (clip.piece, clip.frames.start));
+    clips.sort_by_key(|clip| (clip.segment, clip.frames.start));
     Ok(CutSpeech { clips, best_first, refused })
 }
 
 /// Candidate clips of a segment, or the reason why there is none.
-fn candidates(piece: &SpokenPiece, fps: FrameRate, n_frames: usize) -> std::result::Result<Vec<CutCandidate>, String> {
+fn candidates(
+    segment: &SpeechSegment,
+    fps: FrameRate,
+    n_frames: usize,
+) -> std::result::Result<Vec<CutCandidate>, String> {
     let secs = |frames: usize| fps.secs(frames);
-    if piece.n_frames < n_frames {
-        return Err(format!("{:.1} s long, shorter than a film of {:.1} s", secs(piece.n_frames), secs(n_frames)));
+    if segment.n_frames < n_frames {
+        return Err(format!("{:.1} s long, shorter than a film of {:.1} s", secs(segment.n_frames), secs(n_frames)));
     }
-    let level = SpeechLevel::of(&piece.sound);
-    let at_ends: Vec<f32> = (0..=piece.n_frames).map(|frame| level.around(secs(frame))).collect();
-    let unseen = unseen_before(piece);
-    let n_joints = seen_joints().count() as f64;
-    let all: Vec<CutCandidate> = (0..=piece.n_frames - n_frames)
+    let level = SpeechLevel::of(&segment.sound);
+    let at_ends: Vec<f32> = (0..=segment.n_frames).map(|frame| level.around(secs(frame))).collect();
+    let unseen = cumulative_hidden(segment);
+    let n_joints = counted_joints().count() as f64;
+    let all: Vec<CutCandidate> = (0..=segment.n_frames - n_frames)
         .map(|start| {
             let end = start + n_frames;
             let unseen = (unseen[end] - unseen[start]) as f64 / (n_joints * n_frames as f64);
@@ -122,30 +131,30 @@ fn candidates(piece: &SpokenPiece, fps: FrameRate, n_frames: usize) -> std::resu
         })
         .collect();
     let least = all.iter().map(|candidate| candidate.unseen).fold(f64::INFINITY, f64::min);
-    if least > MOST_UNSEEN {
-        let (least, most) = (100.0 * least, 100.0 * MOST_UNSEEN);
+    if least > MAX_HIDDEN {
+        let (least, most) = (100.0 * least, 100.0 * MAX_HIDDEN);
         return Err(format!("{least:.0} % of the joints or more are not seen in any stretch: at most {most:.0} %"));
     }
     let is_spoken = |candidate: &CutCandidate| {
-        level.speech_share(secs(candidate.start)..secs(candidate.start + n_frames)) >= LEAST_SPEECH
+        level.speech_share(secs(candidate.start)..secs(candidate.start + n_frames)) >= MIN_SPEECH
     };
     let spoken: Vec<CutCandidate> = all.into_iter().filter(is_spoken).collect();
-    let least = 100.0 * LEAST_SPEECH;
+    let least = 100.0 * MIN_SPEECH;
     if spoken.is_empty() { Err(format!("no stretch in which {least:.0} % is speech")) } else { Ok(spoken) }
 }
 
 /// Cumulative number of undetected joints before each frame, with the total as the last element.
-fn unseen_before(piece: &SpokenPiece) -> Vec<u64> {
-    let mut sums = vec![0; piece.n_frames + 1];
-    let Some((motion, _)) = &piece.natural else { return sums };
-    for frame in 0..piece.n_frames {
-        let n = seen_joints().filter(|joint| !motion.mask[[frame, *joint]]).count();
+fn cumulative_hidden(segment: &SpeechSegment) -> Vec<u64> {
+    let mut sums = vec![0; segment.n_frames + 1];
+    let Some((motion, _)) = &segment.natural else { return sums };
+    for frame in 0..segment.n_frames {
+        let n = counted_joints().filter(|joint| !motion.mask[[frame, *joint]]).count();
         sums[frame + 1] = sums[frame] + n as u64;
     }
     sums
 }
 
 /// Joints whose visibility counts: all but the origin and those that duplicate another joint.
-fn seen_joints() -> impl Iterator<Item = usize> {
+fn counted_joints() -> impl Iterator<Item = usize> {
     (0..N_JOINTS).filter(|joint| *joint != NECK && !is_duplicate(*joint))
 }

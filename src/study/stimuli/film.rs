@@ -16,14 +16,14 @@ pub const SIZE: [usize; 2] = [800, 600];
 /// Camera of all films of a study.
 pub const CAMERA: FilmCamera = FilmCamera::Front;
 /// Key derivation context of the film names.
-const NAMES: &str = "orator study 2026 names of films";
+const NAME_CONTEXT: &str = "orator study 2026 names of films";
 /// Incremented when the same content gives different bytes.
 const VERSION: u32 = 1;
 /// Constant rate factor. Films have equal quality rather than equal bit rate, which would degrade lively motion.
 const CRF: u32 = 20;
 /// Height of the digits as a fraction of the picture height, and margin of the plate as a fraction of the digit height.
-const DIGITS: f32 = 0.18;
-const BORDER: f32 = 0.27;
+const DIGIT_HEIGHT: f32 = 0.18;
+const PLATE_MARGIN: f32 = 0.27;
 
 /// Content of a film.
 pub struct FilmScene<'a> {
@@ -38,7 +38,7 @@ pub struct FilmScene<'a> {
 /// Opaque name of the film with this content: 16 hexadecimal digits of a hash keyed by the seed, which do not reveal
 /// the content.
 pub fn film_name(seed: u64, content: &FilmContent) -> String {
-    let key = blake3::derive_key(NAMES, &seed.to_le_bytes());
+    let key = blake3::derive_key(NAME_CONTEXT, &seed.to_le_bytes());
     let FilmContent { clip, speaker, condition, motion_of, number, sound } = content;
     let number = number.map_or(String::new(), |number| number.to_string());
     let sound = match sound {
@@ -110,10 +110,10 @@ impl FilmScene<'_> {
 /// Draws the number on a plate in the centre of the picture.
 fn draw_number(image: &mut Image, number: u16) -> Result<()> {
     let text = number.to_string();
-    let digits = DIGITS * image.height as f32;
+    let digits = DIGIT_HEIGHT * image.height as f32;
     let width = draw::text_width(&text, digits)?;
     let [x, y] = [image.width as f32 / 2.0, image.height as f32 / 2.0];
-    let [half, tall] = [width, digits].map(|length| length / 2.0 + BORDER * digits);
+    let [half, tall] = [width, digits].map(|length| length / 2.0 + PLATE_MARGIN * digits);
     draw::polygon(
         image,
         &[[x - half, y - tall], [x + half, y - tall], [x + half, y + tall], [x - half, y + tall]],

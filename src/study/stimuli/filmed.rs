@@ -1,7 +1,7 @@
 //! Speakers with their clips, the performance of each condition for each clip, and the clips' sounds at equal loudness:
 //! everything that is rendered into films.
 
-use super::alike::{CommonBody, CommonSight};
+use super::common_motion::{CommonBody, CommonVisibility};
 use super::condition_motion::{ConditionModels, ShownMotion, motions, sound_of};
 use super::cut::{CutSpeech, StudyClip, cut};
 use super::film::{CAMERA, FilmScene};
@@ -23,18 +23,18 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
-/// Target loudness of all films, LUFS (EBU R 128); lowered if a clip would exceed [`PEAK`].
+/// Target loudness of all films, LUFS (EBU R 128); lowered if a clip would exceed [`MAX_AMPLITUDE`].
 const LOUDNESS_LUFS: f64 = -23.0;
 /// Maximum amplitude, relative to full scale.
-const PEAK: f64 = 0.9;
+const MAX_AMPLITUDE: f64 = 0.9;
 /// Duration of the fades at the ends of a sound, which avoid clicks, seconds.
 const FADE_SECS: f64 = 0.01;
 
 /// Tones of the sound check: frequency in Hz, audible on small loudspeakers too, and amplitude.
-const HZ: f64 = 700.0;
-const AMPLITUDE: f64 = 0.1;
+const TONE_HZ: f64 = 700.0;
+const TONE_AMPLITUDE: f64 = 0.1;
 /// Maximum duration of a tone, and duration of its fades, seconds.
-const LONGEST: f64 = 0.4;
+const MAX_TONE_SECS: f64 = 0.4;
 const TONE_FADE_SECS: f64 = 0.02;
 
 /// Speaker whose speech has been cut into clips.
@@ -80,13 +80,13 @@ impl CutSpeaker {
         let cut = cut(&source, fps.frames_in(file.clips.seconds), n_clips, rank)?;
         let film_fps = smooth_rate(fps);
         let mut sounds = Vec::new();
-        for of_piece in cut.clips.chunk_by(|a, b| a.piece == b.piece) {
-            let piece = source.read(of_piece[0].piece)?;
-            for clip in of_piece {
+        for of_segment in cut.clips.chunk_by(|a, b| a.segment == b.segment) {
+            let segment = source.read(of_segment[0].segment)?;
+            for clip in of_segment {
                 let n_film_frames = film_fps.frames_in(fps.secs(clip.frames.len()));
-                let mut samples = sound_of(&piece, clip, fps);
-                samples.resize(sample_at(film_fps, piece.sound.rate, n_film_frames), 0.0);
-                sounds.push(faded(Sound { rate: piece.sound.rate, samples }));
+                let mut samples = sound_of(&segment, clip, fps);
+                samples.resize(sample_at(film_fps, segment.sound.rate, n_film_frames), 0.0);
+                sounds.push(fade_ends(Sound { rate: segment.sound.rate, samples }));
             }
         }
         let tones = sounds.first().map(|sound| tones(SOUND_CHECK_TONES, sound.rate, sound.samples.len()));
@@ -99,23 +99,23 @@ impl CutSpeaker {
     /// A condition has no motion for a clip.
     pub fn filmed(self, file: &StudyFile, size: [usize; 2], progress: &dyn Progress) -> Result<FilmedSpeaker> {
         let Self { source, models, cut, sounds, tones } = self;
-        let n_pieces = cut.clips.chunk_by(|a, b| a.piece == b.piece).count();
-        let task = progress.begin(&format!("motion of {}", source.name), n_pieces as u64);
+        let n_segments = cut.clips.chunk_by(|a, b| a.segment == b.segment).count();
+        let task = progress.begin(&format!("motion of {}", source.name), n_segments as u64);
         let motions = motions(&source, &cut.clips, &file.condition, &models, &|| task.advance(1))?;
         drop(task);
         let all: Vec<&ShownMotion> = motions.values().flatten().collect();
         let body = CommonBody::of(&source.bone_lengths, &all);
-        let sight = |clip: usize| {
+        let visibility = |clip: usize| {
             let of_clip: Vec<&ShownMotion> = motions.values().map(|of_condition| &of_condition[clip]).collect();
-            CommonSight::of(&of_clip).context("the study has no condition")
+            CommonVisibility::of(&of_clip).context("the study has no condition")
         };
-        let sights: Vec<CommonSight> = (0..cut.clips.len()).map(sight).collect::<Result<_>>()?;
+        let visibilities: Vec<CommonVisibility> = (0..cut.clips.len()).map(visibility).collect::<Result<_>>()?;
         let task = progress.begin(&format!("avatar of {}", source.name), all.len() as u64);
         let performances: BTreeMap<String, Vec<(usize, Performance)>> = motions
             .iter()
             .map(|(condition, shown)| {
-                let performed = shown.par_iter().zip(&sights).map(|(shown, sight)| {
-                    let performance = sight.performance(shown, &body);
+                let performed = shown.par_iter().zip(&visibilities).map(|(shown, visibility)| {
+                    let performance = visibility.performance(shown, &body);
                     task.advance(1);
                     (shown.of, performance)
                 });
@@ -132,12 +132,12 @@ impl CutSpeaker {
 }
 
 /// Normalises all sounds to the same loudness and returns it, LUFS; silent sounds are left unchanged.
-pub fn equally_loud<'s>(sounds: impl Iterator<Item = &'s mut Sound>) -> f64 {
+pub fn normalise_loudness<'s>(sounds: impl Iterator<Item = &'s mut Sound>) -> f64 {
     let measured: Vec<(&mut Sound, f64)> =
         sounds.filter_map(|sound| loudness::integrated(sound).map(|lufs| (sound, lufs))).collect();
     let loudest = |(sound, lufs): &(&mut Sound, f64)| {
         let peak = sound.samples.iter().map(|v| f64::from(v.abs())).fold(1e-9, f64::max);
-        lufs + 20.0 * (PEAK / peak).log10()
+        lufs + 20.0 * (MAX_AMPLITUDE / peak).log10()
     };
     let target = measured.iter().map(loudest).fold(LOUDNESS_LUFS, f64::min);
     for (sound, lufs) in measured {
@@ -189,7 +189,7 @@ impl FilmedSpeaker {
     }
 }
 
-fn faded(mut sound: Sound) -> Sound {
+fn fade_ends(mut sound: Sound) -> Sound {
     let n = ((FADE_SECS * f64::from(sound.rate)) as usize).min(sound.samples.len());
     let length = sound.samples.len();
     for at in 0..n {
@@ -205,14 +205,14 @@ fn faded(mut sound: Sound) -> Sound {
 fn tones(n: usize, rate: u32, length: usize) -> Sound {
     let rate_hz = f64::from(rate.max(1));
     let apart = length as f64 / rate_hz / (n + 1) as f64;
-    let secs = (apart / 2.0).min(LONGEST);
+    let secs = (apart / 2.0).min(MAX_TONE_SECS);
     let fade = TONE_FADE_SECS.min(secs / 4.0);
     let sample = |at: usize| {
         let time = at as f64 / rate_hz;
         let nearest = (time / apart).round().clamp(1.0, n.max(1) as f64);
         let left = secs / 2.0 - (time - nearest * apart).abs();
         let gain = if n == 0 { 0.0 } else { (left / fade).clamp(0.0, 1.0) };
-        (AMPLITUDE * (0.5 - 0.5 * (PI * gain).cos()) * (TAU * HZ * time).sin()) as f32
+        (TONE_AMPLITUDE * (0.5 - 0.5 * (PI * gain).cos()) * (TAU * TONE_HZ * time).sin()) as f32
     };
     Sound { rate, samples: (0..length).map(sample).collect() }
 }
@@ -222,7 +222,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sounds_become_equally_loud_without_being_clipped() {
+    fn sounds_are_normalised_without_clipping() {
         let noise = |gain: f32, peak: f32| {
             let mut samples: Vec<f32> =
                 (0..48_000u64).map(|i| gain * ((i * i * 7_919 % 2_003) as f32 / 1_001.5 - 1.0)).collect();
@@ -231,7 +231,7 @@ mod tests {
         };
         for (peak, expected) in [(0.05, LOUDNESS_LUFS..LOUDNESS_LUFS + 0.01), (1.0, -45.0..LOUDNESS_LUFS)] {
             let mut sounds = [noise(0.3, 0.3), noise(0.02, 0.02), noise(0.01, peak)];
-            let target = equally_loud(sounds.iter_mut());
+            let target = normalise_loudness(sounds.iter_mut());
             assert!(expected.contains(&target), "{target}");
             for sound in &sounds {
                 assert!((loudness::integrated(sound).unwrap() - target).abs() < 0.2);
@@ -239,12 +239,12 @@ mod tests {
             }
         }
         let mut silent = [Sound { rate: 16_000, samples: vec![0.0; 16_000] }];
-        assert_eq!(equally_loud(silent.iter_mut()), LOUDNESS_LUFS);
+        assert_eq!(normalise_loudness(silent.iter_mut()), LOUDNESS_LUFS);
         assert!(silent[0].samples.iter().all(|v| *v == 0.0));
     }
 
     #[test]
-    fn so_many_tones_are_heard_in_films_of_any_length() {
+    fn the_number_of_tones_is_correct_for_any_length() {
         for secs in [1, 12] {
             let sound = tones(3, 16_000, 16_000 * secs);
             // Whether each step of 20 ms is loud.

@@ -21,22 +21,22 @@ pub struct SpeakerSource {
     /// Bone lengths of the speaker, metres, 0 if unknown; empty without a dataset.
     pub bone_lengths: Vec<f32>,
     pub dataset: Option<Dataset>,
-    pieces: Vec<Piece>,
+    segments: Vec<Segment>,
 }
 
 /// Continuous segment of speech.
-struct Piece {
+struct Segment {
     name: String,
-    place: Place,
+    location: SegmentLocation,
 }
 
-enum Place {
+enum SegmentLocation {
     Sample(Box<SampleRef>),
     File(PathBuf),
 }
 
 /// Segment of speech in memory.
-pub struct SpokenPiece {
+pub struct SpeechSegment {
     /// Name, unique for the speaker.
     pub name: String,
     pub sound: Sound,
@@ -64,9 +64,12 @@ impl SpeakerSource {
             );
         }
         let bone_lengths = dataset.info().bone_lengths_metres.iter().map(|metres| *metres as f32).collect();
-        let piece = |sample: SampleRef| Piece { name: sample.key.to_string(), place: Place::Sample(Box::new(sample)) };
-        let pieces = samples.into_iter().map(piece).collect();
-        Ok(Self { name: name.to_owned(), fps: dataset.info().fps, bone_lengths, dataset: Some(dataset), pieces })
+        let segment = |sample: SampleRef| Segment {
+            name: sample.key.to_string(),
+            location: SegmentLocation::Sample(Box::new(sample)),
+        };
+        let segments = samples.into_iter().map(segment).collect();
+        Ok(Self { name: name.to_owned(), fps: dataset.info().fps, bone_lengths, dataset: Some(dataset), segments })
     }
 
     /// Source with the sound files that match `pattern` and the transcripts next to them, for motion at `fps`.
@@ -80,28 +83,32 @@ impl SpeakerSource {
         let mut files = found.with_context(|| format!("sounds of the speaker {name}"))?;
         ensure!(missing.is_empty(), "sounds of the speaker {name}: {}", missing.join("; "));
         files.sort();
-        let mut pieces: Vec<Piece> = Vec::new();
+        let mut segments: Vec<Segment> = Vec::new();
         for file in files {
             let stem = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-            let twice = pieces.iter().any(|piece| piece.name == stem);
-            ensure!(!twice, "{}: two sounds of the speaker {name} are called {stem}; rename one", file.display());
-            pieces.push(Piece { name: stem, place: Place::File(file) });
+            let is_duplicate = segments.iter().any(|segment| segment.name == stem);
+            ensure!(
+                !is_duplicate,
+                "{}: two sounds of the speaker {name} are called {stem}; rename one",
+                file.display()
+            );
+            segments.push(Segment { name: stem, location: SegmentLocation::File(file) });
         }
-        Ok(Self { name: name.to_owned(), fps, bone_lengths: Vec::new(), dataset: None, pieces })
+        Ok(Self { name: name.to_owned(), fps, bone_lengths: Vec::new(), dataset: None, segments })
     }
 
-    pub fn n_pieces(&self) -> usize {
-        self.pieces.len()
+    pub fn n_segments(&self) -> usize {
+        self.segments.len()
     }
 
     /// Reads the segment with this index.
-    pub fn read(&self, piece: usize) -> Result<SpokenPiece> {
-        let Piece { name, place } = &self.pieces[piece];
-        match (place, &self.dataset) {
-            (Place::Sample(sample), Some(dataset)) => {
+    pub fn read(&self, segment: usize) -> Result<SpeechSegment> {
+        let Segment { name, location } = &self.segments[segment];
+        match (location, &self.dataset) {
+            (SegmentLocation::Sample(sample), Some(dataset)) => {
                 let sample = dataset.read(sample)?;
                 let n_frames = sample.n_frames();
-                Ok(SpokenPiece {
+                Ok(SpeechSegment {
                     name: name.clone(),
                     sound: sample.sound,
                     words: sample.words.unwrap_or_default(),
@@ -109,14 +116,14 @@ impl SpeakerSource {
                     natural: Some((sample.motion, sample.posture)),
                 })
             }
-            (Place::File(file), _) => {
+            (SegmentLocation::File(file), _) => {
                 let sound = audio::read_sound(file)?;
                 let words = transcript_beside(file).map(|path| Transcript::read(&path)).transpose()?;
                 let n_frames = (sound.secs() * self.fps.per_sec() + 1e-6) as usize;
                 let words = words.map(|transcript| transcript.words).unwrap_or_default();
-                Ok(SpokenPiece { name: name.clone(), sound, words, n_frames, natural: None })
+                Ok(SpeechSegment { name: name.clone(), sound, words, n_frames, natural: None })
             }
-            (Place::Sample(_), None) => bail!("{name}: its dataset is closed"),
+            (SegmentLocation::Sample(_), None) => bail!("{name}: its dataset is closed"),
         }
     }
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::time::Duration;
 
 /// Time that a connection waits for locks of other processes.
-const PATIENCE: Duration = Duration::from_secs(10);
+const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Times are milliseconds since 1970. `position`: number of answers, which is the index of the next trial; `given_ms`:
 /// when that trial was first presented. `status`: see [`super::participants::Status`].
@@ -32,7 +32,7 @@ const TABLES: &str = "
 pub fn open(path: &Path, plan: &str) -> Result<Connection> {
     let opened = || -> Result<Connection> {
         let db = Connection::open(path)?;
-        db.busy_timeout(PATIENCE)?;
+        db.busy_timeout(BUSY_TIMEOUT)?;
         db.pragma_update(None, "secure_delete", true)?;
         db.pragma_update(None, "temp_store", "memory")?;
         let mode: String = db.query_row("PRAGMA journal_mode = wal", [], |row| row.get(0))?;
@@ -54,13 +54,13 @@ pub fn open(path: &Path, plan: &str) -> Result<Connection> {
 ///
 /// # Errors
 /// There is no database at `path`.
-pub fn open_to_read(path: &Path) -> Result<Connection> {
+pub fn open_for_reading(path: &Path) -> Result<Connection> {
     ensure!(path.is_file(), "{} is not there: nobody has taken part yet", path.display());
     // Writable, because a reader also has to recover the write-ahead log of a killed server.
     let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     let opened = || -> rusqlite::Result<Connection> {
         let db = Connection::open_with_flags(path, flags)?;
-        db.busy_timeout(PATIENCE)?;
+        db.busy_timeout(BUSY_TIMEOUT)?;
         db.query_row("SELECT value FROM about WHERE name = 'plan'", [], |row| row.get::<_, String>(0)).optional()?;
         Ok(db)
     };
@@ -82,6 +82,6 @@ pub fn erase_deleted(db: &Connection) -> rusqlite::Result<()> {
 }
 
 /// Increments a counter of the table `about`.
-pub fn count_up(db: &Connection, name: &str) -> rusqlite::Result<()> {
+pub fn increment(db: &Connection, name: &str) -> rusqlite::Result<()> {
     db.execute("UPDATE about SET value = value + 1 WHERE name = ?1", params![name]).map(drop)
 }

@@ -1,6 +1,6 @@
 //! Participants: sessions are assigned in the plan's order, and those of participants who left are reassigned.
 
-use super::database::count_up;
+use super::database::increment;
 use rusqlite::types::{FromSql, FromSqlError, FromSqlResult, ToSql, ToSqlOutput, ValueRef};
 use rusqlite::{Connection, OptionalExtension, Row, params};
 use std::collections::{BTreeMap, BTreeSet};
@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 pub const PARAMETERS: [&str; 6] = ["PROLIFIC_PID", "STUDY_ID", "SESSION_ID", "workerId", "assignmentId", "hitId"];
 
 /// Parameters that identify a person.
-const PERSON: [&str; 2] = ["PROLIFIC_PID", "workerId"];
+const PERSON_IDS: [&str; 2] = ["PROLIFIC_PID", "workerId"];
 
 /// Status of a participant's session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -27,7 +27,7 @@ impl Status {
     const ALL: [Self; 3] = [Self::Active, Self::Completed, Self::Replaced];
 
     /// Name in the database and in exports.
-    pub fn word(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Self::Active => "active",
             Self::Completed => "completed",
@@ -38,14 +38,14 @@ impl Status {
 
 impl ToSql for Status {
     fn to_sql(&self) -> rusqlite::Result<ToSqlOutput<'_>> {
-        Ok(self.word().into())
+        Ok(self.name().into())
     }
 }
 
 impl FromSql for Status {
     fn column_result(value: ValueRef<'_>) -> FromSqlResult<Self> {
-        let word = value.as_str()?;
-        Self::ALL.into_iter().find(|status| status.word() == word).ok_or(FromSqlError::InvalidType)
+        let name = value.as_str()?;
+        Self::ALL.into_iter().find(|status| status.name() == name).ok_or(FromSqlError::InvalidType)
     }
 }
 
@@ -168,7 +168,7 @@ pub struct NewParticipant {
 impl NewParticipant {
     /// IDs from recruiting sites, by parameter.
     fn ids(&self) -> impl Iterator<Item = (&str, &String)> {
-        PERSON.into_iter().filter_map(|name| Some((name, self.parameters.get(name).filter(|id| !id.is_empty())?)))
+        PERSON_IDS.into_iter().filter_map(|name| Some((name, self.parameters.get(name).filter(|id| !id.is_empty())?)))
     }
 
     /// Whether the request has an ID from a recruiting site.
@@ -177,7 +177,7 @@ impl NewParticipant {
     }
 
     /// Whether `participant` has the same ID from a recruiting site.
-    fn is(&self, participant: &Participant) -> bool {
+    fn has_same_id(&self, participant: &Participant) -> bool {
         self.ids().any(|(name, id)| participant.parameters.get(name) == Some(id))
     }
 }
@@ -192,14 +192,20 @@ pub enum BeginOutcome {
     Full,
 }
 
-/// Assigns the first free session to `newcomer` and marks an abandoned participant of that session as replaced.
+/// Assigns the first free session to `new_participant` and marks an abandoned participant of that session as replaced.
 /// Sessions without answers that have the same ID are given up in favour of the new one: the page was opened in another
 /// browser, or the reply was lost.
 ///
 /// # Errors
 /// The database fails; nothing is stored.
-pub fn begin(db: &Connection, newcomer: &NewParticipant, quota: Quota, now_ms: i64) -> rusqlite::Result<BeginOutcome> {
-    let (own, others): (Vec<_>, Vec<_>) = all(db)?.into_iter().partition(|participant| newcomer.is(participant));
+pub fn begin(
+    db: &Connection,
+    new_participant: &NewParticipant,
+    quota: Quota,
+    now_ms: i64,
+) -> rusqlite::Result<BeginOutcome> {
+    let (own, others): (Vec<_>, Vec<_>) =
+        all(db)?.into_iter().partition(|participant| new_participant.has_same_id(participant));
     let is_current = |participant: &Participant| participant.status != Status::Replaced;
     let own: Vec<Participant> = own.into_iter().filter(is_current).collect();
     if own.iter().any(|participant| participant.position > 0) {
@@ -216,11 +222,22 @@ pub fn begin(db: &Connection, newcomer: &NewParticipant, quota: Quota, now_ms: i
             params![replaced, given_up, active],
         )?;
     }
-    let parameters = serde_json::to_string(&newcomer.parameters).unwrap_or_default();
+    let parameters = serde_json::to_string(&new_participant.parameters).unwrap_or_default();
     let sql =
         format!("INSERT INTO participant ({}) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, 0, ?7, 0)", Participant::COLUMNS);
-    db.execute(&sql, params![newcomer.id, session, newcomer.language, parameters, newcomer.code, active, now_ms])?;
-    find(db, &newcomer.id)?.map(BeginOutcome::Begun).ok_or(rusqlite::Error::QueryReturnedNoRows)
+    db.execute(
+        &sql,
+        params![
+            new_participant.id,
+            session,
+            new_participant.language,
+            parameters,
+            new_participant.code,
+            active,
+            now_ms
+        ],
+    )?;
+    find(db, &new_participant.id)?.map(BeginOutcome::Begun).ok_or(rusqlite::Error::QueryReturnedNoRows)
 }
 
 /// Participant with this identifier; `None` if unknown or withdrawn.
@@ -240,7 +257,7 @@ pub fn withdraw(db: &Connection, id: &str) -> rusqlite::Result<bool> {
     db.execute("DELETE FROM answer WHERE participant = ?1", [id])?;
     let is_known = db.execute("DELETE FROM participant WHERE id = ?1", [id])? > 0;
     if is_known {
-        count_up(db, "withdrawn")?;
+        increment(db, "withdrawn")?;
     }
     Ok(is_known)
 }
@@ -290,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn an_id_opens_no_session_with_answers_and_gives_up_one_without() {
+    fn an_id_cannot_resume_a_session_with_answers_and_replaces_one_without() {
         let dir = tempfile::tempdir().unwrap();
         let db = database::open(&dir.path().join("responses.sqlite"), "plan").unwrap();
         assert_eq!(session(&begin_as(&db, "first", "p", 1000)), Some(0));
@@ -307,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn a_session_without_an_answer_is_given_again_after_minutes() {
+    fn a_session_without_answers_is_reassigned_after_minutes() {
         let dir = tempfile::tempdir().unwrap();
         let db = database::open(&dir.path().join("responses.sqlite"), "plan").unwrap();
         assert_eq!(latest_ms(&db).unwrap(), 0);

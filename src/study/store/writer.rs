@@ -10,15 +10,15 @@ use tokio::sync::{mpsc, oneshot};
 use tokio::time::timeout;
 
 /// Maximum number of jobs per commit.
-const MOST_IN_A_COMMIT: usize = 256;
+const MAX_JOBS_PER_COMMIT: usize = 256;
 /// Maximum number of queued jobs; further callers wait to enqueue.
-const MOST_WAITING: usize = 1024;
+const MAX_QUEUED: usize = 1024;
 
 /// Timeout of a job including its time in the queue. Shorter than the timeout of a request, so that the client gets a
 /// reply.
-const STORE_TIME: Duration = Duration::from_secs(8);
+const STORE_TIMEOUT: Duration = Duration::from_secs(8);
 /// Time that a transaction waits for locks of other processes.
-const LOCK_TIME: Duration = Duration::from_secs(3);
+const LOCK_TIMEOUT: Duration = Duration::from_secs(3);
 
 /// Notifies the caller that the work is committed.
 type Acknowledge = Box<dyn FnOnce() + Send>;
@@ -49,10 +49,10 @@ impl ResponseStore {
     /// The database cannot be opened (see [`database::open`]), or the thread cannot be started.
     pub fn open(path: &Path, plan: &str) -> Result<(Self, JoinHandle<()>)> {
         let mut db = database::open(path, plan)?;
-        db.busy_timeout(LOCK_TIME)?;
-        let (jobs, mut waiting) = mpsc::channel(MOST_WAITING);
+        db.busy_timeout(LOCK_TIMEOUT)?;
+        let (jobs, mut queue) = mpsc::channel(MAX_QUEUED);
         let thread = std::thread::Builder::new().name("responses".to_owned());
-        let thread = thread.spawn(move || write_all(&mut db, &mut waiting)).context("cannot start a thread")?;
+        let thread = thread.spawn(move || run_jobs(&mut db, &mut queue)).context("cannot start a thread")?;
         Ok((Self { jobs }, thread))
     }
 
@@ -65,7 +65,7 @@ impl ResponseStore {
         &self,
         work: impl FnOnce(&Connection) -> rusqlite::Result<T> + Send + 'static,
     ) -> Result<T, NotStored> {
-        self.hand_in(false, work).await
+        self.submit(false, work).await
     }
 
     /// Runs `work`, which deletes data, and returns its value once no file contains a byte of the deleted data.
@@ -76,10 +76,10 @@ impl ResponseStore {
         &self,
         work: impl FnOnce(&Connection) -> rusqlite::Result<T> + Send + 'static,
     ) -> Result<T, NotStored> {
-        self.hand_in(true, work).await
+        self.submit(true, work).await
     }
 
-    async fn hand_in<T: Send + 'static>(
+    async fn submit<T: Send + 'static>(
         &self,
         erases: bool,
         work: impl FnOnce(&Connection) -> rusqlite::Result<T> + Send + 'static,
@@ -97,15 +97,15 @@ impl ResponseStore {
             self.jobs.send(Job { work, erases }).await.map_err(|_| NotStored)?;
             answered.await.map_err(|_| NotStored)
         };
-        timeout(STORE_TIME, stored).await.unwrap_or(Err(NotStored))
+        timeout(STORE_TIMEOUT, stored).await.unwrap_or(Err(NotStored))
     }
 }
 
-fn write_all(db: &mut Connection, waiting: &mut mpsc::Receiver<Job>) {
+fn run_jobs(db: &mut Connection, queue: &mut mpsc::Receiver<Job>) {
     let mut holds_deleted = false;
-    while let Some(first) = waiting.blocking_recv() {
-        let more = std::iter::from_fn(|| waiting.try_recv().ok());
-        let batch = std::iter::once(first).chain(more).take(MOST_IN_A_COMMIT);
+    while let Some(first) = queue.blocking_recv() {
+        let more = std::iter::from_fn(|| queue.try_recv().ok());
+        let batch = std::iter::once(first).chain(more).take(MAX_JOBS_PER_COMMIT);
         // On failure, callers are notified by their dropped channels.
         let Ok((committed, erases)) = commit(db, batch) else { continue };
         holds_deleted |= erases;
@@ -135,13 +135,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn work_is_answered_after_its_commit_and_a_failure_stores_nothing() {
+    fn work_is_acknowledged_after_its_commit_and_a_failure_stores_nothing() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("responses.sqlite");
         let (store, thread) = ResponseStore::open(&path, "plan").unwrap();
         let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap();
         let add = |db: &Connection| {
-            database::count_up(db, "withdrawn")?;
+            database::increment(db, "withdrawn")?;
             db.query_row("SELECT value FROM about WHERE name = 'withdrawn'", [], |row| row.get::<_, String>(0))
         };
         assert_eq!(runtime.block_on(store.write(add)).unwrap(), "1");

@@ -1,9 +1,9 @@
 //! Charts of a task: proportions and differences with intervals, scores, preference steps, strengths.
 
-use crate::analyse::figure::FigureMethod;
+use crate::analyse::number_format::bare_p;
 use crate::analyse::result::{PairAnalysis, ShareAnalysis, ShareMeasure, StudyAnalysis, TaskAnalysis};
+use crate::analyse::statistic::StatisticMethod;
 use crate::analyse::verdict::scope;
-use crate::analyse::words::bare_p;
 use crate::plan::TaskDesign;
 use crate::stats::estimate::ConfidenceInterval;
 use orator_report::html::chart::forest::{ForestRow, ForestScale, forest};
@@ -47,28 +47,29 @@ fn scaled(interval: Option<ConfidenceInterval>, factor: f64) -> Option<[f64; 2]>
 
 fn shares(task: &TaskAnalysis, analysis: &StudyAnalysis) -> Vec<Node> {
     let percent = |share: f64| 100.0 * share;
-    let row = |share: &ShareAnalysis, class: &'static str, more: &str, method: FigureMethod| {
-        let p = share.figures.test(method).map(|test| format!(", p {}", equal(test.final_p())));
+    let row = |share: &ShareAnalysis, class: &'static str, more: &str, method: StatisticMethod| {
+        let p = share.statistics.test(method).map(|test| format!(", p {}", equal(test.final_p())));
         ForestRow {
             name: format!("{}{more}", scope(share)),
             class,
             value: percent(share.share),
-            interval: scaled(share.figures.interval(method), 100.0),
+            interval: scaled(share.statistics.interval(method), 100.0),
             said: format!("{:.1} %{}", percent(share.share), p.unwrap_or_default()),
         }
     };
     let mut rows = Vec::new();
     let chance = task.shares.iter().filter(|share| share.measure != ShareMeasure::TakenForReal);
     for (place, share) in chance.enumerate() {
-        rows.push(row(share, if place == 0 { "own" } else { "part" }, "", FigureMethod::Crossed));
+        rows.push(row(share, if place == 0 { "own" } else { "part" }, "", StatisticMethod::Crossed));
         if place == 0 {
-            rows.push(row(share, "naive", ", naive", FigureMethod::Wilson));
+            rows.push(row(share, "naive", ", naive", StatisticMethod::Wilson));
             let other = analysis.without_exclusions.iter().find(|other| other.task == task.task);
             let other = other.and_then(TaskAnalysis::pooled);
-            rows.extend(other.map(|other| row(other, "beside", ", nobody excluded", FigureMethod::Crossed)));
+            rows.extend(other.map(|other| row(other, "beside", ", nobody excluded", StatisticMethod::Crossed)));
         }
     }
-    let bound = task.pooled().and_then(|share| share.figures.equivalence(FigureMethod::Crossed)).map(|test| test.bound);
+    let bound =
+        task.pooled().and_then(|share| share.statistics.equivalence(StatisticMethod::Crossed)).map(|test| test.bound);
     let band = bound.map(|bound| [percent(0.5 - bound), percent(0.5 + bound)]);
     let values = rows.iter().flat_map(|row| row.interval.unwrap_or([row.value; 2])).chain(band.into_iter().flatten());
     let [low, high] = ends(values);
@@ -89,7 +90,7 @@ fn shares(task: &TaskAnalysis, analysis: &StudyAnalysis) -> Vec<Node> {
         .shares
         .iter()
         .filter(|share| share.measure == ShareMeasure::TakenForReal)
-        .map(|share| row(share, "part", "", FigureMethod::Crossed))
+        .map(|share| row(share, "part", "", StatisticMethod::Crossed))
         .collect();
     if !single.is_empty() {
         let scale = ForestScale { low: 0.0, high: 100.0, middle: None, band: None, unit: "% of votes" };
@@ -107,8 +108,8 @@ fn scores(task: &TaskAnalysis) -> Vec<Node> {
             name: row.condition.clone(),
             class: "own",
             value: row.mean,
-            interval: scaled(row.figures.interval(FigureMethod::Crossed), 1.0),
-            said: match row.figures.interval(FigureMethod::Median) {
+            interval: scaled(row.statistics.interval(StatisticMethod::Crossed), 1.0),
+            said: match row.statistics.interval(StatisticMethod::Median) {
                 Some(interval) => format!("median {} [{}, {}]", row.median, interval.low, interval.high),
                 None => format!("median {}", row.median),
             },
@@ -123,12 +124,12 @@ fn scores(task: &TaskAnalysis) -> Vec<Node> {
 fn pairs(task: &TaskAnalysis) -> Vec<Node> {
     let factor = if task.design == TaskDesign::TuringSingle { 100.0 } else { 1.0 };
     let row = |pair: &PairAnalysis| {
-        let p = pair.figures.crossed_p().map(|p| format!(", p {}", equal(p)));
+        let p = pair.statistics.crossed_p().map(|p| format!(", p {}", equal(p)));
         ForestRow {
             name: format!("{} \u{2212} {}", pair.first, pair.second),
             class: "own",
             value: factor * pair.difference,
-            interval: scaled(pair.figures.interval(FigureMethod::Crossed), factor),
+            interval: scaled(pair.statistics.interval(StatisticMethod::Crossed), factor),
             said: format!("{:+.2}{}", factor * pair.difference, p.unwrap_or_default()),
         }
     };

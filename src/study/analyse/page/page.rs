@@ -1,8 +1,8 @@
 //! Assembles the page. The output depends on the analysis only.
 
 use super::{charts, tables};
+use crate::analyse::number_format::{count, list};
 use crate::analyse::result::{Conclusion, StudyAnalysis, TaskAnalysis};
-use crate::analyse::words::{count, list};
 use orator_report::html::{Node, Page, Section, node};
 use serde_json::Value;
 
@@ -15,7 +15,7 @@ pub fn html(analysis: &StudyAnalysis) -> String {
     }
     sections.extend([
         section("charts", "Estimates and intervals", per_task(&analysis.tasks, |task| charts::task(task, analysis))),
-        section("figures", "All figures", figures(analysis)),
+        section("figures", "All figures", statistics(analysis)),
         section("exclusions", "Exclusions", tables::exclusions(analysis)),
         section("methods", "Methods paragraph", methods(analysis)),
     ]);
@@ -31,16 +31,16 @@ pub fn html(analysis: &StudyAnalysis) -> String {
 }
 
 fn lead(analysis: &StudyAnalysis) -> String {
-    let account = &analysis.exclusions;
+    let summary = &analysis.exclusions;
     let tasks: Vec<String> = analysis.tasks.iter().map(|task| task.task.clone()).collect();
-    let left_out = match account.leaves_out() {
-        true => format!(" ({} votes were excluded)", count(account.n_votes - account.n_votes_kept)),
+    let left_out = match summary.any_excluded() {
+        true => format!(" ({} votes were excluded)", count(summary.n_votes - summary.n_votes_kept)),
         false => String::new(),
     };
     format!(
         "{} votes of {} participants{left_out}: {}.",
-        count(account.n_votes_kept),
-        count(account.n_participants_kept),
+        count(summary.n_votes_kept),
+        count(summary.n_participants_kept),
         list(&tasks)
     )
 }
@@ -72,7 +72,7 @@ fn meaning(analysis: &StudyAnalysis) -> Vec<Node> {
     body
 }
 
-fn figures(analysis: &StudyAnalysis) -> Vec<Node> {
+fn statistics(analysis: &StudyAnalysis) -> Vec<Node> {
     let about = "Registered: written down and sealed before the first participant. Exploratory: everything else; it can \
                  suggest, not show. Naive: votes are taken for independent, which votes of one participant or about one clip \
                  are not; such figures are here because others print them.";

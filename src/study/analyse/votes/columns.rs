@@ -1,7 +1,7 @@
 //! Columns of a table of votes, their names in a file, and its rows. Delimited text: comma, semicolon or tab, quoted or
 //! not, with or without a byte order mark. JSON Lines: one object per line whose keys are the columns.
 
-use super::row::{MOST_ROWS, RowCells};
+use super::row::{MAX_ROWS, RowCells};
 use crate::vote::VOTE_COLUMNS;
 use anyhow::{Context, Result, bail, ensure};
 use serde_json::{Map, Value};
@@ -102,14 +102,14 @@ fn shown(header: &[String]) -> String {
 }
 
 /// Rows with line numbers, or the reason why a row cannot be read.
-pub type LinedRows = Vec<(u64, std::result::Result<RowCells, String>)>;
+pub type NumberedRows = Vec<(u64, std::result::Result<RowCells, String>)>;
 
 /// Reads the rows of delimited text. Rows that are not UTF-8 or whose number of cells differs from the header are
 /// returned with the reason.
 ///
 /// # Errors
 /// The text is UTF-16 or empty, required columns are missing, or there are too many rows.
-pub fn delimited_rows(bytes: &[u8], names: &ColumnNames) -> Result<LinedRows> {
+pub fn delimited_rows(bytes: &[u8], names: &ColumnNames) -> Result<NumberedRows> {
     ensure!(!bytes.starts_with(&[0xff, 0xfe]) && !bytes.starts_with(&[0xfe, 0xff]), "it is UTF-16; save it as UTF-8");
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let delimiter = delimiter(bytes);
@@ -125,7 +125,7 @@ pub fn delimited_rows(bytes: &[u8], names: &ColumnNames) -> Result<LinedRows> {
         if record.iter().all(<[u8]>::is_empty) {
             continue;
         }
-        ensure!(rows.len() < MOST_ROWS, "it has more than {MOST_ROWS} rows");
+        ensure!(rows.len() < MAX_ROWS, "it has more than {MAX_ROWS} rows");
         rows.push((line, cells(&record, header.len(), &places, delimiter == b';')));
     }
     Ok(rows)
@@ -163,14 +163,14 @@ fn delimiter(bytes: &[u8]) -> u8 {
 ///
 /// # Errors
 /// The text is empty, the first object lacks required columns, or there are too many rows.
-pub fn json_rows(bytes: &[u8], names: &ColumnNames) -> Result<LinedRows> {
+pub fn json_rows(bytes: &[u8], names: &ColumnNames) -> Result<NumberedRows> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    let mut rows: LinedRows = Vec::new();
+    let mut rows: NumberedRows = Vec::new();
     for (line, text) in bytes.split(|byte| *byte == b'\n').enumerate() {
         if text.iter().all(u8::is_ascii_whitespace) {
             continue;
         }
-        ensure!(rows.len() < MOST_ROWS, "it has more than {MOST_ROWS} rows");
+        ensure!(rows.len() < MAX_ROWS, "it has more than {MAX_ROWS} rows");
         let object = serde_json::from_slice::<Map<String, Value>>(text);
         let row = match object {
             Ok(object) if rows.is_empty() => {

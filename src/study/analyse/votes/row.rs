@@ -7,13 +7,13 @@ use serde::de::IntoDeserializer as _;
 use std::collections::BTreeMap;
 
 /// Maximum number of rows.
-pub const MOST_ROWS: usize = 2_000_000;
+pub const MAX_ROWS: usize = 2_000_000;
 
 /// Default condition names for tables that do not name them.
 const NATURAL: &str = "natural";
 const GENERATED: &str = "generated";
 /// Maximum length of a name, characters.
-const LONGEST: usize = 200;
+const MAX_NAME_CHARS: usize = 200;
 
 /// Cells of a row by field, trimmed.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,26 +23,28 @@ pub struct RowCells {
     pub has_decimal_comma: bool,
 }
 
-type Read<T> = std::result::Result<T, String>;
+type RowResult<T> = std::result::Result<T, String>;
 
 impl RowCells {
     fn get(&self, field: &str) -> Option<&str> {
         self.values.get(field).map(String::as_str).filter(|cell| !cell.is_empty())
     }
 
-    fn name(&self, field: &str) -> Read<Option<String>> {
+    fn name(&self, field: &str) -> RowResult<Option<String>> {
         match self.get(field) {
-            Some(name) if name.chars().count() > LONGEST => Err(format!("{field} is longer than {LONGEST} letters")),
+            Some(name) if name.chars().count() > MAX_NAME_CHARS => {
+                Err(format!("{field} is longer than {MAX_NAME_CHARS} letters"))
+            }
             Some(name) if name.contains(char::is_control) => Err(format!("{field} has a control character")),
             name => Ok(name.map(str::to_owned)),
         }
     }
 
-    fn needed(&self, field: &str) -> Read<String> {
+    fn needed(&self, field: &str) -> RowResult<String> {
         self.name(field)?.ok_or_else(|| format!("{field} is empty"))
     }
 
-    fn number(&self, field: &str) -> Read<Option<f64>> {
+    fn number(&self, field: &str) -> RowResult<Option<f64>> {
         let Some(cell) = self.get(field) else { return Ok(None) };
         let point = if self.has_decimal_comma { cell.replace(',', ".") } else { cell.to_owned() };
         match point.parse::<f64>() {
@@ -52,7 +54,7 @@ impl RowCells {
     }
 
     /// Whole number from `low` to `high`.
-    fn whole(&self, field: &str, [low, high]: [i64; 2]) -> Read<Option<i64>> {
+    fn whole(&self, field: &str, [low, high]: [i64; 2]) -> RowResult<Option<i64>> {
         let Some(number) = self.number(field)? else { return Ok(None) };
         let is_right = number.fract() == 0.0 && number >= low as f64 && number <= high as f64;
         is_right
@@ -60,21 +62,21 @@ impl RowCells {
             .ok_or_else(|| format!("{field} is {number}; expected a whole number from {low} to {high}"))
     }
 
-    fn secs(&self, field: &str) -> Read<f64> {
+    fn secs(&self, field: &str) -> RowResult<f64> {
         match self.number(field)?.unwrap_or(0.0) {
             secs if secs >= 0.0 => Ok(secs),
             secs => Err(format!("{field} is {secs}; expected seconds")),
         }
     }
 
-    fn yes_or_no(&self, field: &str) -> Read<Option<bool>> {
+    fn yes_or_no(&self, field: &str) -> RowResult<Option<bool>> {
         self.get(field)
             .map(|cell| truth(cell).ok_or_else(|| expected(field, cell, "1 or 0, true or false")))
             .transpose()
     }
 
     /// Value of a field with the same spelling as in JSON.
-    fn keyword<T: for<'a> Deserialize<'a>>(&self, field: &str, words: &str) -> Read<Option<T>> {
+    fn keyword<T: for<'a> Deserialize<'a>>(&self, field: &str, words: &str) -> RowResult<Option<T>> {
         let Some(cell) = self.get(field) else { return Ok(None) };
         let word: serde::de::value::StrDeserializer<serde::de::value::Error> = cell.into_deserializer();
         T::deserialize(word).map(Some).map_err(|_| expected(field, cell, words))
@@ -83,7 +85,7 @@ impl RowCells {
 
 /// Converts a row to a vote, or gives the reason why it is not one. `design` applies if no column gives a design. A row
 /// with one score becomes a vote on one condition; a row without a trial gets trial 0.
-pub fn vote(cells: &RowCells, design: Option<TaskDesign>) -> Read<StudyVote> {
+pub fn vote(cells: &RowCells, design: Option<TaskDesign>) -> RowResult<StudyVote> {
     let words = "turing, turing-single, preference, sliders or mismatch";
     let is_score = cells.get("score").is_some();
     let default = match (design, is_score, cells.get("step").is_some()) {
@@ -128,7 +130,11 @@ fn title(design: TaskDesign) -> &'static str {
 }
 
 /// Conditions, response and expected response of a row.
-fn answer(cells: &RowCells, design: TaskDesign, phase: TrialPhase) -> Read<(Vec<String>, Response, Option<Response>)> {
+fn answer(
+    cells: &RowCells,
+    design: TaskDesign,
+    phase: TrialPhase,
+) -> RowResult<(Vec<String>, Response, Option<Response>)> {
     let names = cells.get("conditions").map(|names| names.split('|').map(|name| name.trim().to_owned()).collect());
     let condition = cells.name("condition")?;
     let names: Option<Vec<String>> = names.or_else(|| condition.clone().map(|name| vec![name]));
@@ -155,7 +161,7 @@ fn answer(cells: &RowCells, design: TaskDesign, phase: TrialPhase) -> Read<(Vec<
 }
 
 /// Parses a response given as JSON or as text: `left`, `real`, `-1`, `70|20`.
-fn response(field: &str, cell: &str, design: TaskDesign, phase: TrialPhase) -> Read<Response> {
+fn response(field: &str, cell: &str, design: TaskDesign, phase: TrialPhase) -> RowResult<Response> {
     if cell.starts_with('{') {
         return serde_json::from_str(cell).map_err(|_| expected(field, cell, "an answer like {\"side\":\"left\"}"));
     }
@@ -189,7 +195,7 @@ fn response(field: &str, cell: &str, design: TaskDesign, phase: TrialPhase) -> R
 }
 
 /// Checks that a vote of the main phase fits the analysis of its design.
-pub fn check(vote: &StudyVote) -> Read<()> {
+pub fn check(vote: &StudyVote) -> RowResult<()> {
     if vote.phase != TrialPhase::Main {
         return Ok(());
     }

@@ -168,8 +168,8 @@ mod tests {
     fn full_crossing_gives_the_analysis_of_variance() {
         let (n_p, n_c) = (9, 7);
         let votes = crossed(1, n_p, 0..n_c);
-        let mean = |kept: &dyn Fn(&ClipVote) -> bool| {
-            let scores: Vec<f64> = votes.iter().filter(|vote| kept(vote)).map(|vote| vote.score).collect();
+        let mean = |is_kept: &dyn Fn(&ClipVote) -> bool| {
+            let scores: Vec<f64> = votes.iter().filter(|vote| is_kept(vote)).map(|vote| vote.score).collect();
             scores.iter().sum::<f64>() / scores.len() as f64
         };
         let grand = mean(&|_| true);

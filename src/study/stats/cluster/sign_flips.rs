@@ -106,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn threads_change_nothing() {
+    fn results_do_not_depend_on_threads() {
         let (votes, alone) = (votes(1, 0.5), rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap());
         let p = || sign_flip_p(&votes, 0.5, 99, 3).unwrap();
         assert_eq!(p(), alone.install(p));
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn extremes_and_refusals() {
+    fn extreme_scores_and_invalid_arguments() {
         let all: Vec<ClipVote> = votes(4, 0.5).iter().map(|vote| ClipVote { score: 1.0, ..*vote }).collect();
         assert!(sign_flip_p(&all, 0.5, 999, 1).unwrap() < 0.01);
         assert_eq!(sign_flip_p(&all, 1.0, 99, 1), Ok(1.0));
@@ -142,7 +142,7 @@ mod tests {
     /// Two blocks of three trials with one and two real films on the left: compares with the enumeration of all nine
     /// assignments.
     #[test]
-    fn p_is_the_share_of_all_draws() {
+    fn p_is_the_share_of_all_assignments() {
         let (first, second) = ([true, false, false], [true, true, false]);
         for chosen in 0..64u32 {
             let chosen: Vec<bool> = (0..6).map(|k| chosen >> k & 1 == 1).collect();
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn who_always_chooses_left_shows_nothing() {
+    fn always_choosing_left_is_no_evidence() {
         let left = block(&[(true, true), (false, true), (true, true), (false, true)]);
         assert_eq!(side_p(&[left, SideBlock::default()]), Ok(1.0));
         assert!(side_p(&[]).is_err() && side_p(&[SideBlock::default()]).is_err());

@@ -10,9 +10,9 @@ use ndarray::{Array1, Array2, array};
 use orator_base::math::cholesky;
 
 /// Initial standard deviation of the search, log odds.
-const FIRST_SD: f64 = 0.4;
+const INITIAL_SD: f64 = 0.4;
 /// Standard deviation below which a variance component is set to 0, log odds.
-const NO_SD: f64 = 1e-3;
+const MIN_SD: f64 = 1e-3;
 
 /// Fitted model.
 #[derive(Clone, Debug)]
@@ -55,10 +55,10 @@ impl MixedLogit {
             let parameters = at * &units;
             laplace.negative_log_likelihood(parameters[2], [parameters[0], parameters[1]])
         };
-        let first = array![FIRST_SD, FIRST_SD, (share / (1.0 - share)).ln()] / &units;
+        let first = array![INITIAL_SD, INITIAL_SD, (share / (1.0 - share)).ln()] / &units;
         let mut best = minimum(&mut value, first);
         for k in 0..2 {
-            if (best.at[k] * units[k]).abs() < NO_SD {
+            if (best.at[k] * units[k]).abs() < MIN_SD {
                 best.at[k] = 0.0;
                 best.value = value(&best.at);
             }
@@ -114,7 +114,7 @@ pub fn integrated(mean: f64, sd: f64) -> (f64, f64, f64) {
 /// Inverse of the Hessian. If it is not positive definite, the standard deviations are treated as known and their
 /// covariances with the intercept as 0.
 fn inverse(mut second: Array2<f64>) -> Array2<f64> {
-    if !is_positive(&second) {
+    if !is_positive_definite(&second) {
         for k in 0..2 {
             second.row_mut(k).fill(0.0);
             second.column_mut(k).fill(0.0);
@@ -126,7 +126,7 @@ fn inverse(mut second: Array2<f64>) -> Array2<f64> {
     cholesky::solve(second, Array2::eye(n))
 }
 
-fn is_positive(matrix: &Array2<f64>) -> bool {
+fn is_positive_definite(matrix: &Array2<f64>) -> bool {
     let n = matrix.nrows();
     let mut rest = matrix.clone();
     for k in 0..n {
@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn fits_are_those_of_lme4_whatever_the_order_of_votes() {
+    fn fits_match_lme4_in_any_order_of_votes() {
         let text = include_str!("../../../../fixtures/reference/study_glmm_golden.json");
         let golden: BTreeMap<String, Value> = serde_json::from_str(text).unwrap();
         for (name, set) in &golden {
@@ -209,7 +209,7 @@ mod tests {
 
     /// 40 studies with wide bounds; with `ORATOR_LONG` set, 2,000 studies with narrow bounds.
     #[test]
-    fn tests_err_as_often_as_they_say_and_intervals_cover() {
+    fn error_rates_and_coverage_are_nominal() {
         let is_long = std::env::var_os("ORATOR_LONG").is_some();
         let (n_studies, least, most) = if is_long { (2000, 0.03, 0.07) } else { (40, 0.0, 0.2) };
         for n_clips in if is_long { vec![40, 20] } else { vec![40] } {

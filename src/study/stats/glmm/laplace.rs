@@ -5,7 +5,7 @@
 use crate::stats::cluster::votes::{CLIP, PARTICIPANT, VoteGroups};
 
 /// Maximum number of iterations for the random intercepts.
-const MOST: usize = 50;
+const MAX_ITERATIONS: usize = 50;
 
 /// Vote with its outcome, 1 or 0, and its levels of the larger and the smaller of the two factors.
 struct Observation {
@@ -63,7 +63,7 @@ impl Laplace {
             self.intercepts.fill(0.0);
             value = self.penalised(&self.intercepts, fixed, sds);
         }
-        for _ in 0..MOST {
+        for _ in 0..MAX_ITERATIONS {
             let (gradient, curvature) = self.derivatives(fixed, sds);
             let step = self.solve(&curvature, gradient);
             let size = step.iter().fold(0.0f64, |most, v| most.max(v.abs()));

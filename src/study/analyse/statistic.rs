@@ -8,7 +8,7 @@ use serde::Serialize;
 /// Method of a statistic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum FigureMethod {
+pub enum StatisticMethod {
     /// Crossed standard error and t distribution: generalises to other participants and other clips.
     Crossed,
     /// Sign flips of all votes of a participant or of a clip.
@@ -35,7 +35,7 @@ pub enum FigureMethod {
     BradleyTerry,
 }
 
-impl FigureMethod {
+impl StatisticMethod {
     /// Whether the method treats votes as independent. Votes of one participant or about one clip are not.
     pub fn is_naive(self) -> bool {
         matches!(self, Self::WilcoxonVotes | Self::Median | Self::Wilson | Self::Binomial)
@@ -62,35 +62,35 @@ impl FigureMethod {
 
 /// Origin of a statistic: its method and whether it was registered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct FigureOrigin {
-    pub method: FigureMethod,
+pub struct StatisticOrigin {
+    pub method: StatisticMethod,
     /// Whether the method treats votes as independent.
     pub naive: bool,
     /// Whether the statistic was not pre-registered.
     pub exploratory: bool,
 }
 
-impl FigureOrigin {
+impl StatisticOrigin {
     /// Origin of a statistic that was not registered.
-    pub fn new(method: FigureMethod) -> Self {
+    pub fn new(method: StatisticMethod) -> Self {
         Self { method, naive: method.is_naive(), exploratory: true }
     }
 }
 
 /// Confidence interval.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct IntervalFigure {
+pub struct IntervalEstimate {
     #[serde(flatten)]
-    pub origin: FigureOrigin,
+    pub origin: StatisticOrigin,
     #[serde(flatten)]
     pub ends: ConfidenceInterval,
 }
 
 /// Test of the null hypothesis of no difference.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct TestFigure {
+pub struct TestResult {
     #[serde(flatten)]
-    pub origin: FigureOrigin,
+    pub origin: StatisticOrigin,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub statistic: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -102,14 +102,14 @@ pub struct TestFigure {
     pub adjusted_p: Option<f64>,
 }
 
-impl TestFigure {
+impl TestResult {
     /// Test result with only a p value.
-    pub fn new(method: FigureMethod, p: f64) -> Self {
-        Self { origin: FigureOrigin::new(method), statistic: None, degrees_of_freedom: None, p, adjusted_p: None }
+    pub fn new(method: StatisticMethod, p: f64) -> Self {
+        Self { origin: StatisticOrigin::new(method), statistic: None, degrees_of_freedom: None, p, adjusted_p: None }
     }
 
     /// Test of an estimate against `expected`.
-    pub fn of_estimate(method: FigureMethod, estimate: &StudentEstimate, expected: f64) -> Self {
+    pub fn of_estimate(method: StatisticMethod, estimate: &StudentEstimate, expected: f64) -> Self {
         Self {
             statistic: Some(estimate.statistic(expected)),
             degrees_of_freedom: Some(estimate.degrees_of_freedom),
@@ -125,9 +125,9 @@ impl TestFigure {
 
 /// Two one-sided tests that the difference lies within the bound.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct EquivalenceFigure {
+pub struct EquivalenceResult {
     #[serde(flatten)]
-    pub origin: FigureOrigin,
+    pub origin: StatisticOrigin,
     pub bound: f64,
     /// Larger of the two p values.
     pub p: f64,
@@ -139,117 +139,123 @@ pub struct EquivalenceFigure {
 
 /// Statistics of one quantity; the first of each kind is the most important.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct FigureSet {
-    pub intervals: Vec<IntervalFigure>,
-    pub tests: Vec<TestFigure>,
+pub struct StatisticSet {
+    pub intervals: Vec<IntervalEstimate>,
+    pub tests: Vec<TestResult>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub equivalence: Vec<EquivalenceFigure>,
+    pub equivalence: Vec<EquivalenceResult>,
     /// Statistics that could not be computed, with reasons.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub missing: Vec<String>,
 }
 
-impl FigureSet {
-    pub fn interval(&self, method: FigureMethod) -> Option<ConfidenceInterval> {
+impl StatisticSet {
+    pub fn interval(&self, method: StatisticMethod) -> Option<ConfidenceInterval> {
         self.intervals.iter().find(|interval| interval.origin.method == method).map(|interval| interval.ends)
     }
 
-    pub fn test(&self, method: FigureMethod) -> Option<&TestFigure> {
+    pub fn test(&self, method: StatisticMethod) -> Option<&TestResult> {
         self.tests.iter().find(|test| test.origin.method == method)
     }
 
-    pub fn equivalence(&self, method: FigureMethod) -> Option<&EquivalenceFigure> {
+    pub fn equivalence(&self, method: StatisticMethod) -> Option<&EquivalenceResult> {
         self.equivalence.iter().find(|test| test.origin.method == method)
     }
 
     /// Statistics by method, those with an interval first.
-    pub fn rows(&self) -> impl Iterator<Item = FigureRow<'_>> {
-        let of_interval = |&IntervalFigure { origin, ends }: &IntervalFigure| FigureRow {
+    pub fn rows(&self) -> impl Iterator<Item = StatisticRow<'_>> {
+        let of_interval = |&IntervalEstimate { origin, ends }: &IntervalEstimate| StatisticRow {
             origin,
             interval: Some(ends),
             test: self.test(origin.method),
         };
         let alone = self.tests.iter().filter(|test| self.interval(test.origin.method).is_none());
-        let alone = alone.map(|test| FigureRow { origin: test.origin, interval: None, test: Some(test) });
+        let alone = alone.map(|test| StatisticRow { origin: test.origin, interval: None, test: Some(test) });
         self.intervals.iter().map(of_interval).chain(alone)
     }
 
     /// p value of the crossed test, adjusted if it belongs to a family.
     pub fn crossed_p(&self) -> Option<f64> {
-        self.test(FigureMethod::Crossed).map(TestFigure::final_p)
+        self.test(StatisticMethod::Crossed).map(TestResult::final_p)
     }
 
     /// Returns the value, or records the reason why it is missing.
-    pub fn known<T>(&mut self, method: FigureMethod, value: Result<T, StatisticsError>) -> Option<T> {
+    pub fn ok_or_record<T>(&mut self, method: StatisticMethod, value: Result<T, StatisticsError>) -> Option<T> {
         value.map_err(|error| self.missing.push(format!("{}: {error}", method.name()))).ok()
     }
 
-    pub fn add_interval(&mut self, method: FigureMethod, interval: Result<ConfidenceInterval, StatisticsError>) {
-        if let Some(ends) = self.known(method, interval) {
-            self.intervals.push(IntervalFigure { origin: FigureOrigin::new(method), ends });
+    pub fn add_interval(&mut self, method: StatisticMethod, interval: Result<ConfidenceInterval, StatisticsError>) {
+        if let Some(ends) = self.ok_or_record(method, interval) {
+            self.intervals.push(IntervalEstimate { origin: StatisticOrigin::new(method), ends });
         }
     }
 
-    pub fn add_test(&mut self, method: FigureMethod, p: Result<f64, StatisticsError>) {
-        if let Some(p) = self.known(method, p) {
-            self.tests.push(TestFigure::new(method, p));
+    pub fn add_test(&mut self, method: StatisticMethod, p: Result<f64, StatisticsError>) {
+        if let Some(p) = self.ok_or_record(method, p) {
+            self.tests.push(TestResult::new(method, p));
         }
     }
 
-    pub fn add_equivalence(&mut self, method: FigureMethod, test: Result<Equivalence, StatisticsError>) {
-        if let Some(test) = self.known(method, test) {
-            let (origin, passes) = (FigureOrigin::new(method), test.passes());
+    pub fn add_equivalence(&mut self, method: StatisticMethod, test: Result<Equivalence, StatisticsError>) {
+        if let Some(test) = self.ok_or_record(method, test) {
+            let (origin, passes) = (StatisticOrigin::new(method), test.passes());
             let Equivalence { bound, p, interval } = test;
-            self.equivalence.push(EquivalenceFigure { origin, bound, p, ends: interval, passes });
+            self.equivalence.push(EquivalenceResult { origin, bound, p, ends: interval, passes });
         }
     }
 
     /// Adds the interval of an estimate and its test against `expected`.
-    pub fn add_estimate(&mut self, method: FigureMethod, estimate: &StudentEstimate, expected: f64, confidence: f64) {
+    pub fn add_estimate(
+        &mut self,
+        method: StatisticMethod,
+        estimate: &StudentEstimate,
+        expected: f64,
+        confidence: f64,
+    ) {
         self.add_interval(method, estimate.interval(confidence));
-        self.tests.push(TestFigure::of_estimate(method, estimate, expected));
+        self.tests.push(TestResult::of_estimate(method, estimate, expected));
     }
 
     /// Marks intervals and tests of a method as registered before the data were seen.
-    pub fn register(&mut self, method: FigureMethod) {
+    pub fn register(&mut self, method: StatisticMethod) {
         let intervals = self.intervals.iter_mut().map(|interval| &mut interval.origin);
         let origins = intervals.chain(self.tests.iter_mut().map(|test| &mut test.origin));
         origins.filter(|origin| origin.method == method).for_each(|origin| origin.exploratory = false);
     }
 
     /// Marks the equivalence test of a method as registered before the data were seen.
-    pub fn register_equivalence(&mut self, method: FigureMethod) {
+    pub fn register_equivalence(&mut self, method: StatisticMethod) {
         let tests = self.equivalence.iter_mut().filter(|test| test.origin.method == method);
         tests.for_each(|test| test.origin.exploratory = false);
     }
 
     /// Clamps intervals to `low..=high`, which a t distribution may exceed.
     pub fn clamp(&mut self, low: f64, high: f64) {
-        for IntervalFigure { ends, .. } in &mut self.intervals {
+        for IntervalEstimate { ends, .. } in &mut self.intervals {
             *ends = ConfidenceInterval { low: ends.low.clamp(low, high), high: ends.high.clamp(low, high) };
         }
     }
 }
 
 /// Interval and test of one method.
-pub struct FigureRow<'s> {
-    pub origin: FigureOrigin,
+pub struct StatisticRow<'s> {
+    pub origin: StatisticOrigin,
     pub interval: Option<ConfidenceInterval>,
-    pub test: Option<&'s TestFigure>,
+    pub test: Option<&'s TestResult>,
 }
 
 /// Adjusts the tests of several sets, each method being one family (Holm 1979). A single set is left unchanged.
-pub fn adjust(sets: &mut [&mut FigureSet]) {
+pub fn adjust(sets: &mut [&mut StatisticSet]) {
     if sets.len() < 2 {
         return;
     }
-    let mut methods: Vec<FigureMethod> =
+    let mut methods: Vec<StatisticMethod> =
         sets.iter().flat_map(|set| set.tests.iter().map(|test| test.origin.method)).collect();
     methods.sort_unstable();
     methods.dedup();
     for method in methods {
         let tests = sets.iter_mut().filter_map(|set| set.tests.iter_mut().find(|test| test.origin.method == method));
-        let tests: Vec<&mut TestFigure> = tests.collect();
+        let tests: Vec<&mut TestResult> = tests.collect();
         if let Ok(adjusted) = holm(&tests.iter().map(|test| test.p).collect::<Vec<_>>()) {
             tests.into_iter().zip(adjusted).for_each(|(test, p)| test.adjusted_p = Some(p));
         }
@@ -262,15 +268,15 @@ mod tests {
 
     #[test]
     fn tests_of_one_method_are_a_family() {
-        let set = |p: &[(FigureMethod, f64)]| FigureSet {
-            tests: p.iter().map(|(method, p)| TestFigure::new(*method, *p)).collect(),
-            ..FigureSet::default()
+        let set = |p: &[(StatisticMethod, f64)]| StatisticSet {
+            tests: p.iter().map(|(method, p)| TestResult::new(*method, *p)).collect(),
+            ..StatisticSet::default()
         };
-        let (crossed, wilson) = (FigureMethod::Crossed, FigureMethod::Binomial);
+        let (crossed, wilson) = (StatisticMethod::Crossed, StatisticMethod::Binomial);
         let mut sets = [set(&[(crossed, 0.01), (wilson, 0.03)]), set(&[(crossed, 0.04)]), set(&[(wilson, 0.02)])];
         let [a, b, c] = &mut sets;
         adjust(&mut [a, b, c]);
-        let adjusted = |set: &FigureSet| set.tests.iter().filter_map(|test| test.adjusted_p).collect::<Vec<_>>();
+        let adjusted = |set: &StatisticSet| set.tests.iter().filter_map(|test| test.adjusted_p).collect::<Vec<_>>();
         assert_eq!([&sets[0], &sets[1], &sets[2]].map(adjusted), [vec![0.02, 0.04], vec![0.04], vec![0.04]]);
         adjust(&mut [&mut sets[1]]);
         assert_eq!(adjusted(&sets[1]), [0.04]);

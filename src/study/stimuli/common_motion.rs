@@ -15,14 +15,14 @@ use orator_formats::mocap::motion_file::USUAL_FPS;
 
 /// Visibility shared by all films of one clip.
 #[derive(Clone, Debug)]
-pub struct CommonSight {
+pub struct CommonVisibility {
     /// Mask [T, 49] of the joints that are visible in every condition.
     joints: Array2<bool>,
     /// Masks [T, 3] of the angles of head and trunk that every condition has.
     angles: [Array2<bool>; 2],
 }
 
-impl CommonSight {
+impl CommonVisibility {
     /// Intersection of the visibility of these motions, which must have equal lengths; `None` without motions.
     pub fn of(shown: &[&ShownMotion]) -> Option<Self> {
         let (n_frames, n_joints) = shown.first()?.motion.mask.dim();
