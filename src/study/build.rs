@@ -11,7 +11,7 @@ use super::preregistration::Preregistration;
 use super::seal::StudySeal;
 use super::stimuli::cut::{RefusedSegment, StudyClip};
 use super::stimuli::film::{check_encoder, film_name};
-use super::stimuli::filmed::{CutSpeaker, FilmedSpeaker, normalise_loudness};
+use super::stimuli::filmed_speaker::{CutSpeaker, FilmedSpeaker, normalise_loudness};
 use anyhow::{Context, Result, ensure};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir::{self, lock, write_file};

@@ -4,7 +4,7 @@ use super::design::right_response;
 use super::file::StudyFile;
 use super::folder::{StudyFolder, read_json};
 use super::plan::{FilmContent, StudyKey, StudyPlan, TaskDesign};
-use super::store::answers::{self, GivenAnswer};
+use super::store::answers::{self, SubmittedAnswer};
 use super::store::database;
 use super::store::participants::{self, PARAMETERS, Participant, Status};
 use super::vote::{Response, StudyVote, VOTE_COLUMNS};
@@ -40,7 +40,7 @@ impl TableForm {
 
 /// Paths and sizes of the tables written.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Exported {
+pub struct ExportSummary {
     pub votes: PathBuf,
     pub participants: PathBuf,
     pub n_votes: usize,
@@ -52,14 +52,14 @@ pub struct Exported {
 ///
 /// # Errors
 /// The study has no responses, one of its files cannot be read, or the folder cannot be written.
-pub fn export(folder: &StudyFolder, form: TableForm, out: &Path) -> Result<Exported> {
+pub fn export(folder: &StudyFolder, form: TableForm, out: &Path) -> Result<ExportSummary> {
     let (participants, votes) = responses(folder)?;
     let path = |name: &str| out.join(name).with_extension(form.extension());
     let (votes_file, participants_file) = (path("votes"), path("participants"));
     write_table(&votes_file, form, &VOTE_COLUMNS, &votes)?;
     let rows: Vec<Map<String, Value>> = participants.iter().map(participant_row).collect();
     write_table(&participants_file, form, &[&PARTICIPANT_COLUMNS[..], &PARAMETERS].concat(), &rows)?;
-    Ok(Exported {
+    Ok(ExportSummary {
         votes: votes_file,
         participants: participants_file,
         n_votes: votes.len(),
@@ -104,7 +104,7 @@ impl JoinedPlan {
         right_response(design, &shown?)
     }
 
-    fn vote(&self, participant: &Participant, answer: GivenAnswer) -> Result<StudyVote> {
+    fn vote(&self, participant: &Participant, answer: SubmittedAnswer) -> Result<StudyVote> {
         let context = || format!("answer {} of {}: not in plan.json and key.json", answer.position + 1, participant.id);
         let session = self.plan.sessions.get(participant.session as usize).with_context(context)?;
         let trial = session.trials.get(answer.position as usize).with_context(context)?;

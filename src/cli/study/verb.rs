@@ -6,7 +6,7 @@ use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator_study::export::{TableForm, export};
 use orator_study::folder::StudyFolder;
-use orator_study::server::start::StudyServer;
+use orator_study::server::study_server::StudyServer;
 use serde_json::json;
 use std::net::{IpAddr, SocketAddr};
 use std::path::PathBuf;

@@ -3,7 +3,7 @@
 
 use super::reply::ApiError;
 use crate::plan::{PlannedTask, TaskDesign, Trial, TrialPhase};
-use crate::store::answers::GivenAnswer;
+use crate::store::answers::SubmittedAnswer;
 use crate::vote::Response;
 
 /// Maximum duration that a page may report, seconds: one day.
@@ -15,7 +15,7 @@ const MAX_PLAYS: u32 = 1000;
 ///
 /// # Errors
 /// The response does not fit the design, or a number is out of range.
-pub fn check(answer: &GivenAnswer, trial: &Trial, task: &PlannedTask) -> Result<(), ApiError> {
+pub fn check(answer: &SubmittedAnswer, trial: &Trial, task: &PlannedTask) -> Result<(), ApiError> {
     if !fits(&answer.response, trial, task) {
         return Err(ApiError::bad_request("The response does not fit the trial's task."));
     }
@@ -88,7 +88,7 @@ mod tests {
 
     #[test]
     fn numbers_must_be_in_range() {
-        let given = |response, plays, secs| GivenAnswer {
+        let given = |response, plays, secs| SubmittedAnswer {
             position: 0,
             response,
             plays,

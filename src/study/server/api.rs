@@ -4,10 +4,10 @@
 use super::answer::{check, fails_check, feedback};
 use super::reply::{ApiError, JsonBody, bearer, header_text, json_reply, not_found, unauthorized};
 use super::secret::{completion_code, participant_id};
-use super::served::ServedStudy;
-use super::start::App;
+use super::served_study::ServedStudy;
+use super::study_server::App;
 use crate::plan::TrialPhase;
-use crate::store::answers::{self, GivenAnswer, Recorded, TrialTerms, record};
+use crate::store::answers::{self, RecordOutcome, SubmittedAnswer, TrialTerms, record};
 use crate::store::participants::{self, BeginOutcome, NewParticipant, PARAMETERS, Participant, Status};
 use crate::vote::Response;
 use axum::body::Body;
@@ -171,7 +171,7 @@ pub async fn state(
 pub async fn answer(
     State(app): Shared,
     AuthenticatedSession { session, id }: AuthenticatedSession,
-    JsonBody(answer): JsonBody<GivenAnswer>,
+    JsonBody(answer): JsonBody<SubmittedAnswer>,
 ) -> Result<HttpResponse, ApiError> {
     let trials = app.study.trials(session);
     let out_of_turn = || ApiError::conflict("That trial has not been given out.");
@@ -184,14 +184,14 @@ pub async fn answer(
     };
     let clock = app.clock;
     match app.store.write(move |db| record(db, &id, &answer, terms, clock.now_ms())).await? {
-        Recorded::Stored(participant) => {
+        RecordOutcome::Stored(participant) => {
             Ok(json_reply(&Acknowledged { feedback: feedback(trial), state: session_state(&app.study, &participant) }))
         }
-        Recorded::Unknown => Err(withdrawn()),
-        Recorded::Replaced => Err(gone()),
-        Recorded::Differs => Err(ApiError::conflict("That trial has another answer already.")),
-        Recorded::OutOfTurn => Err(out_of_turn()),
-        Recorded::TooSoon(left_ms) => {
+        RecordOutcome::Unknown => Err(withdrawn()),
+        RecordOutcome::Replaced => Err(gone()),
+        RecordOutcome::Differs => Err(ApiError::conflict("That trial has another answer already.")),
+        RecordOutcome::OutOfTurn => Err(out_of_turn()),
+        RecordOutcome::TooSoon(left_ms) => {
             let sentence = "The films cannot have been seen yet.";
             Err(ApiError::new(StatusCode::TOO_EARLY, sentence).retry_after(left_ms / 1000 + 1))
         }

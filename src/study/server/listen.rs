@@ -1,6 +1,6 @@
 //! Accepts connections: limits their number and duration, and shuts all of them down at the end.
 
-use super::peers::PeerLimit;
+use super::peer_limit::PeerLimit;
 use super::write_timeout::WriteTimeout;
 use axum::Router;
 use hyper::server::conn::http1;

@@ -5,5 +5,5 @@ pub mod common_motion;
 pub mod condition_motion;
 pub mod cut;
 pub mod film;
-pub mod filmed;
+pub mod filmed_speaker;
 pub mod speaker_source;

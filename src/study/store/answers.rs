@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// Answer to a trial as sent by a page.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct GivenAnswer {
+pub struct SubmittedAnswer {
     /// Index of the trial in its session.
     pub position: u32,
     pub response: Response,
@@ -36,7 +36,7 @@ pub struct TrialTerms {
 
 /// Result of recording an answer.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Recorded {
+pub enum RecordOutcome {
     /// The answer is stored, now or earlier; current state of the participant.
     Stored(Participant),
     /// The participant is unknown: withdrawn.
@@ -58,24 +58,24 @@ pub enum Recorded {
 pub fn record(
     db: &Connection,
     id: &str,
-    answer: &GivenAnswer,
+    answer: &SubmittedAnswer,
     terms: TrialTerms,
     now_ms: i64,
-) -> rusqlite::Result<Recorded> {
-    let Some(participant) = find(db, id)? else { return Ok(Recorded::Unknown) };
+) -> rusqlite::Result<RecordOutcome> {
+    let Some(participant) = find(db, id)? else { return Ok(RecordOutcome::Unknown) };
     if answer.position < participant.position {
         let is_same = at(db, id, answer.position)?.is_some_and(|stored| stored == *answer);
-        return Ok(if is_same { Recorded::Stored(participant) } else { Recorded::Differs });
+        return Ok(if is_same { RecordOutcome::Stored(participant) } else { RecordOutcome::Differs });
     }
     if participant.status == Status::Replaced {
-        return Ok(Recorded::Replaced);
+        return Ok(RecordOutcome::Replaced);
     }
     if answer.position > participant.position || participant.status == Status::Completed {
-        return Ok(Recorded::OutOfTurn);
+        return Ok(RecordOutcome::OutOfTurn);
     }
     let left_ms = terms.least_ms - (now_ms - participant.given_ms);
     if left_ms > 0 {
-        return Ok(Recorded::TooSoon(left_ms));
+        return Ok(RecordOutcome::TooSoon(left_ms));
     }
     insert(db, id, answer)?;
     let after = Participant {
@@ -87,14 +87,14 @@ pub fn record(
     };
     let sql = "UPDATE participant SET position = ?2, given_ms = ?3, failed_checks = ?4, status = ?5 WHERE id = ?1";
     db.execute(sql, params![id, after.position, after.given_ms, after.failed_checks, after.status])?;
-    Ok(Recorded::Stored(after))
+    Ok(RecordOutcome::Stored(after))
 }
 
 /// Inserts the row of an answer.
 ///
 /// # Errors
 /// The database fails, or an answer exists at that position.
-pub fn insert(db: &Connection, id: &str, answer: &GivenAnswer) -> rusqlite::Result<()> {
+pub fn insert(db: &Connection, id: &str, answer: &SubmittedAnswer) -> rusqlite::Result<()> {
     let response = serde_json::to_string(&answer.response).unwrap_or_default();
     let sql = "INSERT INTO answer VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)";
     let secs = [answer.stalled_secs, answer.unfocused_secs, answer.response_secs];
@@ -103,10 +103,10 @@ pub fn insert(db: &Connection, id: &str, answer: &GivenAnswer) -> rusqlite::Resu
 
 const COLUMNS: &str = "position, response, plays, stalled_secs, unfocused_secs, response_secs";
 
-fn of_row(row: &Row) -> rusqlite::Result<GivenAnswer> {
+fn of_row(row: &Row) -> rusqlite::Result<SubmittedAnswer> {
     let response: String = row.get(1)?;
     let unreadable = |error| rusqlite::Error::FromSqlConversionFailure(1, rusqlite::types::Type::Text, Box::new(error));
-    Ok(GivenAnswer {
+    Ok(SubmittedAnswer {
         position: row.get(0)?,
         response: serde_json::from_str(&response).map_err(unreadable)?,
         plays: row.get(2)?,
@@ -116,13 +116,13 @@ fn of_row(row: &Row) -> rusqlite::Result<GivenAnswer> {
     })
 }
 
-fn at(db: &Connection, id: &str, position: u32) -> rusqlite::Result<Option<GivenAnswer>> {
+fn at(db: &Connection, id: &str, position: u32) -> rusqlite::Result<Option<SubmittedAnswer>> {
     let sql = format!("SELECT {COLUMNS} FROM answer WHERE participant = ?1 AND position = ?2");
     db.query_row(&sql, params![id, position], of_row).optional()
 }
 
 /// Answers of a participant by position.
-pub fn of(db: &Connection, id: &str) -> rusqlite::Result<Vec<GivenAnswer>> {
+pub fn of(db: &Connection, id: &str) -> rusqlite::Result<Vec<SubmittedAnswer>> {
     let sql = format!("SELECT {COLUMNS} FROM answer WHERE participant = ?1 ORDER BY position");
     db.prepare(&sql)?.query_map([id], of_row)?.collect()
 }

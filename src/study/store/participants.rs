@@ -275,7 +275,7 @@ pub fn n_withdrawn(db: &Connection) -> rusqlite::Result<u32> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::answers::{GivenAnswer, Recorded, TrialTerms, record};
+    use super::super::answers::{RecordOutcome, SubmittedAnswer, TrialTerms, record};
     use super::super::database;
     use super::*;
     use crate::vote::Response;
@@ -295,10 +295,10 @@ mod tests {
     }
 
     /// Answers the first trial of the session `name`.
-    fn answer(db: &Connection, name: &str, now_ms: i64) -> Recorded {
+    fn answer(db: &Connection, name: &str, now_ms: i64) -> RecordOutcome {
         let response = Response::Number(42);
         let [stalled_secs, unfocused_secs, response_secs] = [0.0; 3];
-        let given = GivenAnswer { position: 0, response, plays: 1, stalled_secs, unfocused_secs, response_secs };
+        let given = SubmittedAnswer { position: 0, response, plays: 1, stalled_secs, unfocused_secs, response_secs };
         record(db, name, &given, TrialTerms { least_ms: 0, is_last: false, fails_check: false }, now_ms).unwrap()
     }
 
@@ -312,8 +312,8 @@ mod tests {
         let db = database::open(&dir.path().join("responses.sqlite"), "plan").unwrap();
         assert_eq!(session(&begin_as(&db, "first", "p", 1000)), Some(0));
         assert_eq!(session(&begin_as(&db, "second", "p", 2000)), Some(0), "no place more for the same person");
-        assert_eq!((status(&db, "first"), answer(&db, "first", 3000)), (Status::Replaced, Recorded::Replaced));
-        assert!(matches!(answer(&db, "second", 3000), Recorded::Stored(_)));
+        assert_eq!((status(&db, "first"), answer(&db, "first", 3000)), (Status::Replaced, RecordOutcome::Replaced));
+        assert!(matches!(answer(&db, "second", 3000), RecordOutcome::Stored(_)));
         assert_eq!(begin_as(&db, "third", "p", 4000), BeginOutcome::Known);
         assert_eq!(begin_as(&db, "third", "p", 4_000_000), BeginOutcome::Known, "abandoned, but not replaced");
         assert_eq!(session(&begin_as(&db, "other", "q", 4_000_000)), Some(0), "the abandoned place");
@@ -331,11 +331,14 @@ mod tests {
         for name in ["silent", "answers"] {
             assert!(session(&begin_as(&db, name, "", 0)).is_some());
         }
-        assert!(matches!(answer(&db, "answers", 10_000), Recorded::Stored(_)));
+        assert!(matches!(answer(&db, "answers", 10_000), RecordOutcome::Stored(_)));
         assert_eq!(begin_as(&db, "early", "", 299_999), BeginOutcome::Full);
         let counts = QUOTA.count(&all(&db).unwrap(), 0, 300_000);
         assert_eq!((counts.active, counts.abandoned), (1, 1));
-        assert!(matches!(answer(&db, "silent", 300_000), Recorded::Stored(_)), "late, but the place is not given away");
+        assert!(
+            matches!(answer(&db, "silent", 300_000), RecordOutcome::Stored(_)),
+            "late, but the place is not given away"
+        );
         assert_eq!(begin_as(&db, "later", "", 3_609_999), BeginOutcome::Full, "an answer holds it for an hour");
         assert_eq!(session(&begin_as(&db, "last", "", 3_610_000)), Some(1));
     }

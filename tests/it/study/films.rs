@@ -10,7 +10,7 @@ use orator_media::ffmpeg::probe::probe;
 use orator_study::build::{common_bytes, padded};
 use orator_study::file::StudyFile;
 use orator_study::plan::{FilmContent, FilmSound};
-use orator_study::stimuli::filmed::{CutSpeaker, normalise_loudness};
+use orator_study::stimuli::filmed_speaker::{CutSpeaker, normalise_loudness};
 use orator_test_support::rule::dataset::{RULE, SpokenClip};
 
 const STUDY: &str = r#"

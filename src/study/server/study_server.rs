@@ -5,7 +5,7 @@ use super::host::{AllowedHosts, check_host};
 use super::limits::RateLimits;
 use super::reply::{HEADERS, not_found, text_reply, wrong_method};
 use super::secret::StudySecret;
-use super::served::ServedStudy;
+use super::served_study::ServedStudy;
 use super::{api, listen};
 use crate::folder::StudyFolder;
 use crate::pages::assets::ASSETS;
