@@ -20,8 +20,8 @@ impl<'v> Numbering<'v> {
             numbering.participants.insert(&vote.participant, 0);
             numbering.clips.insert((&vote.speaker, &vote.clip), 0);
         }
-        numbering.participants.values_mut().enumerate().for_each(|(number, place)| *place = number);
-        numbering.clips.values_mut().enumerate().for_each(|(number, place)| *place = number);
+        numbering.participants.values_mut().enumerate().for_each(|(number, index)| *index = number);
+        numbering.clips.values_mut().enumerate().for_each(|(number, index)| *index = number);
         numbering
     }
 
@@ -113,8 +113,8 @@ pub fn conditions(votes: &[&StudyVote]) -> Vec<String> {
 /// that of `second`.
 pub fn differences(votes: &[&StudyVote], numbering: &Numbering, [first, second]: [&str; 2]) -> Vec<ClipVote> {
     let one = |vote: &&StudyVote| {
-        let place = |name: &str| vote.conditions.iter().position(|condition| condition == name);
-        let (a, b) = (place(first)?, place(second)?);
+        let index = |name: &str| vote.conditions.iter().position(|condition| condition == name);
+        let (a, b) = (index(first)?, index(second)?);
         let difference = match &vote.response {
             // Steps are negative for the left film, positive for the right film.
             Response::Step(step) => f64::from(*step) * if a > b { 1.0 } else { -1.0 },
@@ -129,9 +129,9 @@ pub fn differences(votes: &[&StudyVote], numbering: &Numbering, [first, second]:
 /// Scores of one condition.
 pub fn scores(votes: &[&StudyVote], numbering: &Numbering, condition: &str) -> Vec<ClipVote> {
     let one = |vote: &&StudyVote| {
-        let place = vote.conditions.iter().position(|name| name == condition)?;
+        let index = vote.conditions.iter().position(|name| name == condition)?;
         let Response::Scores(scores) = &vote.response else { return None };
-        Some(numbering.vote(vote, f64::from(*scores.get(place)?)))
+        Some(numbering.vote(vote, f64::from(*scores.get(index)?)))
     };
     votes.iter().filter_map(one).collect()
 }

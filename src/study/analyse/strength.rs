@@ -43,8 +43,8 @@ pub fn strengths(
 
 /// Pairwise comparisons of a vote: its preference step as a share of a win, or which of two scores is higher.
 fn paired(vote: &StudyVote, numbering: &Numbering, conditions: &[String]) -> Vec<PairedVote> {
-    let place = |name: &String| conditions.iter().position(|condition| condition == name);
-    let Some(shown) = vote.conditions.iter().map(place).collect::<Option<Vec<usize>>>() else { return Vec::new() };
+    let index = |name: &String| conditions.iter().position(|condition| condition == name);
+    let Some(shown) = vote.conditions.iter().map(index).collect::<Option<Vec<usize>>>() else { return Vec::new() };
     let participant = numbering.vote(vote, 0.0).participant;
     let pair = |a: usize, b: usize, share: f64| PairedVote { participant, first: shown[a], second: shown[b], share };
     match &vote.response {

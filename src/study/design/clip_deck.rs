@@ -60,11 +60,11 @@ impl ClipDeck {
                 self.order.shuffle(&mut self.rng);
                 self.order.sort_by_key(|clip| hand.iter().any(|dealt| dealt.clip == *clip));
             }
-            let (place, visit) = (at % n_clips, at / n_clips);
+            let (slot, visit) = (at % n_clips, at / n_clips);
             let turn = (at + at / n_turns) % n_comparisons;
             let comparison = (turn + self.offset) % n_comparisons;
-            let arrangement = (visit / n_comparisons + place / n_comparisons + turn + self.offset) % n_arrangements;
-            hand.push(DealtClip { clip: self.order[place], comparison, arrangement });
+            let arrangement = (visit / n_comparisons + slot / n_comparisons + turn + self.offset) % n_arrangements;
+            hand.push(DealtClip { clip: self.order[slot], comparison, arrangement });
             self.n_dealt += 1;
         }
         hand

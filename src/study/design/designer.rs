@@ -85,7 +85,7 @@ impl Designer<'_> {
         let task = &self.tasks[at];
         let comparison = &task.comparisons[trial.dealt.comparison];
         let row = task.arrangements.row(trial.dealt.arrangement);
-        let shown: Vec<&StudyCondition> = row.iter().map(|place| comparison[*place]).collect();
+        let shown: Vec<&StudyCondition> = row.iter().map(|index| comparison[*index]).collect();
         let (design, sound) = (task.task.design, film_sound(task.task));
         let shows_feedback = phase == TrialPhase::Training && task.task.feedback;
         let expected = if shows_feedback { right_response(design, &shown) } else { None };
@@ -101,7 +101,7 @@ impl Designer<'_> {
         let comparison = &task.comparisons[variant % task.comparisons.len()];
         let numbered = variant / task.comparisons.len() % comparison.len();
         let row = task.arrangements.row(self.rng.random_range(0..task.arrangements.n_rows()));
-        let shown = |place: &usize| (comparison[*place].name.clone(), (*place == numbered).then_some(number));
+        let shown = |index: &usize| (comparison[*index].name.clone(), (*index == numbered).then_some(number));
         let shown = row.iter().map(shown).collect();
         let sound = film_sound(task.task);
         let clip = self.clip(check.speaker, self.shared[check.speaker].checks.get(check.dealt.clip))?;

@@ -223,7 +223,7 @@ pub async fn operator(State(app): Shared, headers: HeaderMap) -> Result<HttpResp
     let read = |db: &_| Ok((participants::all(db)?, participants::n_withdrawn(db)?, answers::stalls(db)?));
     let (all, withdrawn, stalls) = app.store.write(read).await?;
     let now_ms = app.clock.now_ms();
-    let place = |participant: &Participant| {
+    let participant_row = |participant: &Participant| {
         let may_go_on = participant.status == Status::Active;
         json!({
             "place": participant.session + 1,
@@ -240,7 +240,7 @@ pub async fn operator(State(app): Shared, headers: HeaderMap) -> Result<HttpResp
         "quota": app.study.quota.count(&all, withdrawn, now_ms),
         "answers": all.iter().map(|participant| participant.position).sum::<u32>(),
         "stalls": stalls,
-        "participants": all.iter().map(place).collect::<Vec<_>>(),
+        "participants": all.iter().map(participant_row).collect::<Vec<_>>(),
     })))
 }
 

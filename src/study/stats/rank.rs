@@ -159,10 +159,10 @@ fn squared_distances(scale: MeasurementScale, values: Vec<f64>, totals: &[f64]) 
         before += total;
         before - total / 2.0
     };
-    let places = if scale == MeasurementScale::Ordinal { totals.iter().map(middle).collect() } else { values };
+    let positions = if scale == MeasurementScale::Ordinal { totals.iter().map(middle).collect() } else { values };
     move |a, b| match scale {
         MeasurementScale::Nominal => f64::from(u8::from(a != b)),
-        _ => (places[a] - places[b]).powi(2),
+        _ => (positions[a] - positions[b]).powi(2),
     }
 }
 

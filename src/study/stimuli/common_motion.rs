@@ -30,8 +30,11 @@ impl CommonVisibility {
         let mut angles = [(); 2].map(|()| Array2::from_elem((n_frames, 3), true));
         let unseen = Posture::unseen(n_frames);
         for ShownMotion { motion, posture, .. } in shown {
-            let there = motion.joints.map_axis(Axis(2), |place| place.iter().all(|v| v.is_finite()));
-            Zip::from(&mut joints).and(&motion.mask).and(&there).for_each(|all, seen, there| *all &= *seen && *there);
+            let finite = motion.joints.map_axis(Axis(2), |coordinates| coordinates.iter().all(|v| v.is_finite()));
+            Zip::from(&mut joints)
+                .and(&motion.mask)
+                .and(&finite)
+                .for_each(|all, seen, finite| *all &= *seen && *finite);
             let posture = posture.as_ref().unwrap_or(&unseen);
             for (all, channel) in angles.iter_mut().zip(PostureChannel::ALL) {
                 all.zip_mut_with(posture.channel(channel), |all, angle| *all &= angle.is_finite());

@@ -59,9 +59,9 @@ fn shares(task: &TaskAnalysis, analysis: &StudyAnalysis) -> Vec<Node> {
     };
     let mut rows = Vec::new();
     let chance = task.shares.iter().filter(|share| share.measure != ShareMeasure::TakenForReal);
-    for (place, share) in chance.enumerate() {
-        rows.push(row(share, if place == 0 { "own" } else { "part" }, "", StatisticMethod::Crossed));
-        if place == 0 {
+    for (index, share) in chance.enumerate() {
+        rows.push(row(share, if index == 0 { "own" } else { "part" }, "", StatisticMethod::Crossed));
+        if index == 0 {
             rows.push(row(share, "naive", ", naive", StatisticMethod::Wilson));
             let other = analysis.without_exclusions.iter().find(|other| other.task == task.task);
             let other = other.and_then(TaskAnalysis::pooled);

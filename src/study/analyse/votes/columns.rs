@@ -48,14 +48,14 @@ impl ColumnNames {
     }
 
     /// Column indices of the fields in a header. Names are compared ignoring case and surrounding whitespace.
-    fn places(&self, header: &[String]) -> Result<BTreeMap<&'static str, usize>> {
+    fn indices(&self, header: &[String]) -> Result<BTreeMap<&'static str, usize>> {
         let is = |name: &str, cell: &String| cell.trim().to_lowercase() == name.to_lowercase();
-        let mut places = BTreeMap::new();
+        let mut indices = BTreeMap::new();
         for field in fields() {
             let name = self.of(field);
-            let mut found = (0..header.len()).filter(|place| is(name, &header[*place]));
+            let mut found = (0..header.len()).filter(|index| is(name, &header[*index]));
             match (found.next(), found.next()) {
-                (Some(place), None) => drop(places.insert(field, place)),
+                (Some(index), None) => drop(indices.insert(field, index)),
                 (Some(_), Some(_)) => bail!("two columns are called \"{name}\"; rename one of them"),
                 (None, _) if self.0.contains_key(field) => {
                     bail!("there is no column \"{name}\"; the columns are {}", shown(header))
@@ -63,8 +63,8 @@ impl ColumnNames {
                 (None, _) => {}
             }
         }
-        Self::check(&places.keys().copied().collect::<Vec<_>>(), header)?;
-        Ok(places)
+        Self::check(&indices.keys().copied().collect::<Vec<_>>(), header)?;
+        Ok(indices)
     }
 
     /// Checks that a table has the required columns: participant, clip and an answer.
@@ -72,9 +72,9 @@ impl ColumnNames {
         let lacks = |field: &str| !fields.contains(&field);
         for field in ["participant", "clip"] {
             if lacks(field) {
-                let near = header.iter().max_by(|a, b| near(field, a).total_cmp(&near(field, b)));
+                let nearest = header.iter().max_by(|a, b| similarity(field, a).total_cmp(&similarity(field, b)));
                 let example =
-                    near.map(|near| format!(", such as --columns {field}={}", near.trim())).unwrap_or_default();
+                    nearest.map(|name| format!(", such as --columns {field}={}", name.trim())).unwrap_or_default();
                 bail!("there is no column \"{field}\"; the columns are {}. Name it{example}", shown(header));
             }
         }
@@ -91,7 +91,7 @@ impl ColumnNames {
 }
 
 /// Similarity of two names, 0 to 1.
-fn near(field: &str, cell: &str) -> f64 {
+fn similarity(field: &str, cell: &str) -> f64 {
     strsim::jaro_winkler(field, &cell.trim().to_lowercase())
 }
 
@@ -118,7 +118,7 @@ pub fn delimited_rows(bytes: &[u8], names: &ColumnNames) -> Result<NumberedRows>
     let mut record = csv::ByteRecord::new();
     ensure!(reader.read_byte_record(&mut record)?, "it is empty; the first line names the columns");
     let header: Vec<String> = record.iter().map(|cell| String::from_utf8_lossy(cell).into_owned()).collect();
-    let places = names.places(&header)?;
+    let indices = names.indices(&header)?;
     let mut rows = Vec::new();
     while reader.read_byte_record(&mut record).context("a row cannot be read")? {
         let line = record.position().map_or(0, csv::Position::line);
@@ -126,7 +126,7 @@ pub fn delimited_rows(bytes: &[u8], names: &ColumnNames) -> Result<NumberedRows>
             continue;
         }
         ensure!(rows.len() < MAX_ROWS, "it has more than {MAX_ROWS} rows");
-        rows.push((line, cells(&record, header.len(), &places, delimiter == b';')));
+        rows.push((line, cells(&record, header.len(), &indices, delimiter == b';')));
     }
     Ok(rows)
 }
@@ -134,15 +134,15 @@ pub fn delimited_rows(bytes: &[u8], names: &ColumnNames) -> Result<NumberedRows>
 fn cells(
     record: &csv::ByteRecord,
     width: usize,
-    places: &BTreeMap<&'static str, usize>,
+    indices: &BTreeMap<&'static str, usize>,
     has_decimal_comma: bool,
 ) -> std::result::Result<RowCells, String> {
     if record.len() != width {
         return Err(format!("it has {} cells where the header has {width}", record.len()));
     }
     let mut values = BTreeMap::new();
-    for (field, place) in places {
-        let cell = std::str::from_utf8(&record[*place]).map_err(|_| format!("{field} is no UTF-8"))?;
+    for (field, index) in indices {
+        let cell = std::str::from_utf8(&record[*index]).map_err(|_| format!("{field} is no UTF-8"))?;
         values.insert(*field, cell.trim().to_owned());
     }
     Ok(RowCells { values, has_decimal_comma })
@@ -174,7 +174,7 @@ pub fn json_rows(bytes: &[u8], names: &ColumnNames) -> Result<NumberedRows> {
         let object = serde_json::from_slice::<Map<String, Value>>(text);
         let row = match object {
             Ok(object) if rows.is_empty() => {
-                names.places(&object.keys().cloned().collect::<Vec<_>>())?;
+                names.indices(&object.keys().cloned().collect::<Vec<_>>())?;
                 Ok(json_cells(&object, names))
             }
             Ok(object) => Ok(json_cells(&object, names)),

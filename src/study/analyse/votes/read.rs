@@ -102,17 +102,17 @@ impl SliderPages {
     fn add(&mut self, vote: StudyVote, votes: &mut Vec<StudyVote>) -> std::result::Result<(), String> {
         let key = (vote.participant.clone(), vote.task.clone(), vote.clip.clone(), vote.trial);
         let page = *self.0.entry(key).or_insert(votes.len());
-        let Some(whole) = votes.get_mut(page) else {
+        let Some(page_vote) = votes.get_mut(page) else {
             votes.push(vote);
             return Ok(());
         };
-        if vote.conditions.iter().any(|condition| whole.conditions.contains(condition)) {
+        if vote.conditions.iter().any(|condition| page_vote.conditions.contains(condition)) {
             let StudyVote { participant, conditions, clip, .. } = vote;
             return Err(format!("{participant} gave {} of {clip} a score above", conditions.join(", ")));
         }
-        if let (Response::Scores(all), Response::Scores(one)) = (&mut whole.response, vote.response) {
+        if let (Response::Scores(all), Response::Scores(one)) = (&mut page_vote.response, vote.response) {
             all.extend(one);
-            whole.conditions.extend(vote.conditions);
+            page_vote.conditions.extend(vote.conditions);
         }
         Ok(())
     }

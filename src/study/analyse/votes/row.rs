@@ -54,7 +54,7 @@ impl RowCells {
     }
 
     /// Whole number from `low` to `high`.
-    fn whole(&self, field: &str, [low, high]: [i64; 2]) -> RowResult<Option<i64>> {
+    fn whole_number(&self, field: &str, [low, high]: [i64; 2]) -> RowResult<Option<i64>> {
         let Some(number) = self.number(field)? else { return Ok(None) };
         let is_right = number.fract() == 0.0 && number >= low as f64 && number <= high as f64;
         is_right
@@ -102,7 +102,7 @@ pub fn vote(cells: &RowCells, design: Option<TaskDesign>) -> RowResult<StudyVote
         task: cells.name("task")?.unwrap_or_else(|| title(design).to_owned()),
         design,
         phase,
-        trial: cells.whole("trial", [0, i64::from(u32::MAX)])?.unwrap_or(0) as u32,
+        trial: cells.whole_number("trial", [0, i64::from(u32::MAX)])?.unwrap_or(0) as u32,
         clip: if phase == TrialPhase::Main { cells.needed("clip")? } else { cells.name("clip")?.unwrap_or_default() },
         speaker: cells.name("speaker")?.unwrap_or_default(),
         conditions,
@@ -111,7 +111,7 @@ pub fn vote(cells: &RowCells, design: Option<TaskDesign>) -> RowResult<StudyVote
         stalled_secs: cells.secs("stalled_secs")?,
         unfocused_secs: cells.secs("unfocused_secs")?,
         response_secs: cells.secs("response_secs")?,
-        plays: cells.whole("plays", [0, i64::from(u32::MAX)])?.unwrap_or(0) as u32,
+        plays: cells.whole_number("plays", [0, i64::from(u32::MAX)])?.unwrap_or(0) as u32,
         completed: cells.yes_or_no("completed")?.unwrap_or(true),
     };
     check(&vote)?;
@@ -151,10 +151,10 @@ fn answer(
         let chosen = if is_correct { ScreenSide::Left } else { ScreenSide::Right };
         return Ok((conditions, Response::Side(chosen), Some(Response::Side(ScreenSide::Left))));
     }
-    if let Some(step) = cells.whole("step", [-2, 2])? {
+    if let Some(step) = cells.whole_number("step", [-2, 2])? {
         return Ok((names.unwrap_or_default(), Response::Step(step as i8), None));
     }
-    match cells.whole("score", [0, 100])? {
+    match cells.whole_number("score", [0, 100])? {
         Some(score) => Ok((names.unwrap_or_default(), Response::Scores(vec![score as u8]), None)),
         None => Err("it has no answer".to_owned()),
     }
