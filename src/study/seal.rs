@@ -111,6 +111,9 @@ impl StudySeal {
     }
 
     /// Compares the study's files with the seal.
+    ///
+    /// # Errors
+    /// A file cannot be listed or read.
     pub fn compare(&self, folder: &StudyFolder) -> Result<SealMismatch> {
         let mut mismatch = SealMismatch::default();
         let listed = sealed_files(folder)?;

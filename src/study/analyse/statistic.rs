@@ -150,14 +150,17 @@ pub struct StatisticSet {
 }
 
 impl StatisticSet {
+    /// Interval by `method`, if it was computed.
     pub fn interval(&self, method: StatisticMethod) -> Option<ConfidenceInterval> {
         self.intervals.iter().find(|interval| interval.origin.method == method).map(|interval| interval.ends)
     }
 
+    /// Test by `method`, if it was computed.
     pub fn test(&self, method: StatisticMethod) -> Option<&TestResult> {
         self.tests.iter().find(|test| test.origin.method == method)
     }
 
+    /// Equivalence test by `method`, if it was computed.
     pub fn equivalence(&self, method: StatisticMethod) -> Option<&EquivalenceResult> {
         self.equivalence.iter().find(|test| test.origin.method == method)
     }
@@ -184,18 +187,21 @@ impl StatisticSet {
         value.map_err(|error| self.missing.push(format!("{}: {error}", method.name()))).ok()
     }
 
+    /// Adds an interval, or records the reason why it is missing.
     pub fn add_interval(&mut self, method: StatisticMethod, interval: Result<ConfidenceInterval, StatisticsError>) {
         if let Some(ends) = self.ok_or_record(method, interval) {
             self.intervals.push(IntervalEstimate { origin: StatisticOrigin::new(method), ends });
         }
     }
 
+    /// Adds a p value, or records the reason why it is missing.
     pub fn add_test(&mut self, method: StatisticMethod, p: Result<f64, StatisticsError>) {
         if let Some(p) = self.ok_or_record(method, p) {
             self.tests.push(TestResult::new(method, p));
         }
     }
 
+    /// Adds an equivalence test, or records the reason why it is missing.
     pub fn add_equivalence(&mut self, method: StatisticMethod, test: Result<Equivalence, StatisticsError>) {
         if let Some(test) = self.ok_or_record(method, test) {
             let (origin, passes) = (StatisticOrigin::new(method), test.passes());

@@ -24,6 +24,9 @@ pub struct Equivalence {
 
 impl Equivalence {
     /// Tests at 5 % whether the true value of `estimate` is less than `bound` away from `expected`.
+    ///
+    /// # Errors
+    /// `bound` is not positive.
     pub fn of_estimate(estimate: &StudentEstimate, expected: f64, bound: f64) -> Result<Self, StatisticsError> {
         within("bound", bound, f64::MIN_POSITIVE..=f64::MAX)?;
         let above = estimate.upper_tail(estimate.statistic(expected - bound));
@@ -32,6 +35,9 @@ impl Equivalence {
     }
 
     /// Exact binomial version for independent trials; both bounds must lie between 0 and 1.
+    ///
+    /// # Errors
+    /// A bound is outside 0 to 1.
     pub fn of_count(count: &BinomialCount, expected: f64, bound: f64) -> Result<Self, StatisticsError> {
         within("bound", bound, f64::MIN_POSITIVE..=1.0)?;
         let p = count.at_least(expected - bound)?.max(count.at_most(expected + bound)?);
@@ -46,6 +52,9 @@ impl Equivalence {
 
 /// Number of independent votes for which two one-sided tests at 5 % pass with probability `power` if the true
 /// proportion is one half: (z(0.95) + z((1 + power) / 2))^2 / (4 bound^2), rounded up.
+///
+/// # Errors
+/// `bound` is outside 1e-6 to 0.5, or `power` is outside 0 to below 1.
 pub fn votes_needed(bound: f64, power: f64) -> Result<u64, StatisticsError> {
     within("bound", bound, 1e-6..=0.5)?;
     within("power", power, 0.0..=1.0 - f64::EPSILON)?;

@@ -103,6 +103,7 @@ impl StudentEstimate {
         2.0 * self.upper_tail(self.statistic(expected).abs())
     }
 
+    /// Two-sided confidence interval; `confidence` must lie strictly between 0 and 1.
     pub fn interval(&self, confidence: f64) -> Result<ConfidenceInterval, StatisticsError> {
         let half = self.quantile(1.0 - tail(confidence)?) * self.standard_error;
         Ok(ConfidenceInterval { low: self.value - half, high: self.value + half })
@@ -129,6 +130,9 @@ impl StudentEstimate {
 
 /// Holm-adjusted p values in the given order: a hypothesis is rejected at a level if its adjusted p value is at most
 /// that level.
+///
+/// # Errors
+/// A p value is outside 0 to 1.
 pub fn holm(p_values: &[f64]) -> Result<Vec<f64>, StatisticsError> {
     p_values.iter().try_for_each(|p| within("p value", *p, 0.0..=1.0))?;
     let mut order: Vec<usize> = (0..p_values.len()).collect();

@@ -102,6 +102,9 @@ impl SpeakerSource {
     }
 
     /// Reads the segment with this index.
+    ///
+    /// # Errors
+    /// The segment's sound, motion or transcript cannot be read.
     pub fn read(&self, segment: usize) -> Result<SpeechSegment> {
         let Segment { name, location } = &self.segments[segment];
         match (location, &self.dataset) {
