@@ -67,7 +67,7 @@ pub fn check_encoder() -> Result<()> {
 }
 
 impl FilmScene<'_> {
-    /// Hash of all inputs that determine the bytes of the film.
+    /// Hash of the inputs in which films differ: number, rate, camera, skeleton, motion and sound samples.
     pub fn hash(&self) -> String {
         let mut hasher = blake3::Hasher::new();
         let mut numbers = |values: &[f64]| {

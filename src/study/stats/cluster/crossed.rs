@@ -10,7 +10,7 @@ use std::ops::Range;
 /// Mean of all votes with equal weights.
 ///
 /// # Errors
-/// There are fewer than two participants or clips, a score is not finite, or all scores are equal.
+/// There are fewer than two participants or clips, a score is not finite, or the estimated variance is 0.
 pub fn crossed_estimate(votes: &[ClipVote]) -> Result<StudentEstimate, StatisticsError> {
     estimate(&[votes], &[1.0])
 }
