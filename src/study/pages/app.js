@@ -2,7 +2,7 @@
 
 import { backend, patiently, Refusal } from "./backend.js";
 import { button, byId, el, paragraphs, say, show } from "./dom.js";
-import { forget, keep, recall } from "./memory.js";
+import { forget, keep, recall, takeLinkedToken } from "./memory.js";
 import { checkSound } from "./sound.js";
 import { currentLanguage, firstText, has, nameOfLanguage, preferredLanguage, t, useLanguage, useTexts } from "./texts.js";
 import { runTrial } from "./trial.js";
@@ -33,18 +33,10 @@ async function start() {
   const kept = recall("language");
   useLanguage(study.languages.includes(kept) ? kept : preferredLanguage(study.languages));
   entitle();
+  // From a link of the researcher, for participants who can no longer use the browser in which they began.
   takeLinkedToken();
   if (recall("token")) await resume();
   else consent();
-}
-
-// Stores the token of a link from the researcher, for participants who can no longer use the browser in which they
-// began.
-function takeLinkedToken() {
-  const token = new URLSearchParams(location.hash.slice(1)).get("resume");
-  if (!token || recall("token")) return;
-  keep("token", token);
-  history.replaceState(null, "", location.pathname + location.search);
 }
 
 function entitle() {

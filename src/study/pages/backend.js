@@ -1,6 +1,6 @@
 // Client of the study's server.
 
-import { recall } from "./memory.js";
+import { keep, recall } from "./memory.js";
 
 const PARAMETERS = ["PROLIFIC_PID", "STUDY_ID", "SESSION_ID", "workerId", "assignmentId", "hitId"];
 const REQUEST_MS = 20_000;
@@ -51,6 +51,13 @@ function parameters() {
   return Object.fromEntries(pairs);
 }
 
+// Random number by which the server recognises a repeated request to begin, where its reply was lost.
+function attempt() {
+  const digits = (byte) => byte.toString(16).padStart(2, "0");
+  if (!recall("attempt")) keep("attempt", Array.from(crypto.getRandomValues(new Uint8Array(16)), digits).join(""));
+  return recall("attempt");
+}
+
 async function post(path, body) {
   const headers = { "Content-Type": "application/json" };
   if (recall("token")) headers.Authorization = `Bearer ${recall("token")}`;
@@ -59,7 +66,7 @@ async function post(path, body) {
 
 export const backend = {
   study: () => ask("api/study"),
-  begin: (language) => post("api/begin", { consent: true, language, parameters: parameters() }),
+  begin: (language) => post("api/begin", { consent: true, language, parameters: parameters(), attempt: attempt() }),
   state: () => ask("api/state", { headers: { Authorization: `Bearer ${recall("token")}` } }),
   answer: (answer) => post("api/answer", answer),
   withdraw: () => post("api/withdraw", {}),

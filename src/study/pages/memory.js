@@ -17,16 +17,29 @@ window.addEventListener("storage", () => (kept = read()));
 
 export const recall = (key) => kept[key];
 
+const linkOf = (token) => `#resume=${token}`;
+const setFragment = (fragment) => history.replaceState(null, "", location.pathname + location.search + fragment);
+
+// Stores a value; returns false where storage is unavailable. The address then holds the token, which survives a reload.
 export function keep(key, value) {
   kept = { ...kept, [key]: value };
   try {
     localStorage.setItem(name, JSON.stringify(kept));
+    return true;
   } catch {
-    // Storage is unavailable: the session then ends with the page.
+    if (key === "token") setFragment(linkOf(value));
+    return false;
   }
 }
 
+// Takes the token out of a link to resume a session. The address keeps it where it cannot be stored.
+export function takeLinkedToken() {
+  const token = new URLSearchParams(location.hash.slice(1)).get("resume");
+  if (token && !kept.token && keep("token", token)) setFragment("");
+}
+
 export function forget() {
+  if (location.hash === linkOf(kept.token)) setFragment("");
   kept = {};
   try {
     localStorage.removeItem(name);

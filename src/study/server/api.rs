@@ -3,7 +3,7 @@
 
 use super::answer::{check, fails_check, feedback};
 use super::reply::{ApiError, JsonBody, bearer, header_text, json_reply, not_found, unauthorized};
-use super::secret::{completion_code, participant_id};
+use super::secret::{completion_code, is_attempt, participant_id};
 use super::served_study::ServedStudy;
 use super::study_server::App;
 use crate::plan::TrialPhase;
@@ -89,8 +89,10 @@ fn gone() -> ApiError {
     ApiError::new(StatusCode::GONE, sentence)
 }
 
-fn withdrawn() -> ApiError {
-    ApiError::new(StatusCode::GONE, "This session was withdrawn; nothing of it is kept.")
+fn unknown() -> ApiError {
+    let sentence =
+        "Nothing of this session is stored: it was withdrawn, or had no answer when its place was given away.";
+    ApiError::new(StatusCode::GONE, sentence)
 }
 
 /// `GET /api/study`
@@ -105,6 +107,8 @@ pub struct StartRequest {
     language: String,
     #[serde(default)]
     parameters: BTreeMap<String, String>,
+    /// Random number of the page; a repeated request with it gets the same session.
+    attempt: Option<String>,
 }
 
 /// `POST /api/begin`
@@ -123,7 +127,11 @@ pub async fn begin(State(app): Shared, JsonBody(body): JsonBody<StartRequest>) -
             "A parameter is unknown, too long, or holds other than letters, digits and -_.:@.",
         ));
     }
-    let named = || anyhow::Ok((participant_id()?, completion_code()?));
+    if body.attempt.as_deref().is_some_and(|attempt| !is_attempt(attempt)) {
+        return Err(ApiError::bad_request("The attempt must be 32 hexadecimal digits."));
+    }
+    let id_of = |attempt: &String| Ok(app.secret.id_of_attempt(attempt));
+    let named = || anyhow::Ok((body.attempt.as_ref().map_or_else(participant_id, id_of)?, completion_code()?));
     let (id, code) = named().map_err(|_| ApiError::not_stored())?;
     let new_participant = NewParticipant { id, language: body.language, parameters: body.parameters, code };
     if app.study.requires_id && !new_participant.has_id() {
@@ -134,8 +142,10 @@ pub async fn begin(State(app): Shared, JsonBody(body): JsonBody<StartRequest>) -
     let participant =
         match app.store.write(move |db| participants::begin(db, &new_participant, quota, clock.now_ms())).await? {
             BeginOutcome::Begun(participant) => participant,
+            BeginOutcome::Replaced => return Err(gone()),
             BeginOutcome::Known => {
-                let sentence = "This participant ID has been used already; go on in the browser where you began.";
+                let sentence = "This participant ID has been used already; go on in the browser where you began. \
+                    Without an answer there you can begin here some minutes later.";
                 return Err(ApiError::conflict(sentence).with_reason("known"));
             }
             BeginOutcome::Full => {
@@ -158,12 +168,13 @@ fn is_parameter(name: &str, value: &str) -> bool {
 /// `GET /api/state`
 pub async fn state(
     State(app): Shared,
-    AuthenticatedSession { id, .. }: AuthenticatedSession,
+    AuthenticatedSession { session, id }: AuthenticatedSession,
 ) -> Result<HttpResponse, ApiError> {
-    match app.store.write(move |db| participants::find(db, &id)).await? {
+    let found = app.store.write(move |db| participants::find(db, &id)).await?;
+    match found.filter(|participant| participant.session == session) {
         Some(participant) if participant.status == Status::Replaced => Err(gone()),
         Some(participant) => Ok(json_reply(&session_state(&app.study, &participant))),
-        None => Err(withdrawn()),
+        None => Err(unknown()),
     }
 }
 
@@ -178,6 +189,7 @@ pub async fn answer(
     let trial = trials.get(answer.position as usize).ok_or_else(out_of_turn)?;
     check(&answer, trial, app.study.task(trial))?;
     let terms = TrialTerms {
+        session,
         least_ms: app.study.least_ms(trial),
         is_last: answer.position as usize + 1 == trials.len(),
         fails_check: fails_check(&answer.response, trial),
@@ -187,7 +199,7 @@ pub async fn answer(
         RecordOutcome::Stored(participant) => {
             Ok(json_reply(&Acknowledged { feedback: feedback(trial), state: session_state(&app.study, &participant) }))
         }
-        RecordOutcome::Unknown => Err(withdrawn()),
+        RecordOutcome::Unknown => Err(unknown()),
         RecordOutcome::Replaced => Err(gone()),
         RecordOutcome::Differs => Err(ApiError::conflict("That trial has another answer already.")),
         RecordOutcome::OutOfTurn => Err(out_of_turn()),
@@ -212,7 +224,7 @@ pub async fn withdraw(
 ) -> Result<HttpResponse, ApiError> {
     app.limits.forget(&id);
     let known = app.store.erase(move |db| participants::withdraw(db, &id)).await?;
-    if known { Ok(json_reply(&json!({ "withdrawn": true }))) } else { Err(withdrawn()) }
+    if known { Ok(json_reply(&json!({ "withdrawn": true }))) } else { Err(unknown()) }
 }
 
 /// `GET /api/operator`
@@ -224,7 +236,8 @@ pub async fn operator(State(app): Shared, headers: HeaderMap) -> Result<HttpResp
     let (all, withdrawn, stalls) = app.store.write(read).await?;
     let now_ms = app.clock.now_ms();
     let participant_row = |participant: &Participant| {
-        let may_go_on = participant.status == Status::Active;
+        // A completed session still shows its completion code.
+        let is_open = participant.status != Status::Replaced;
         json!({
             "place": participant.session + 1,
             "status": participant.status,
@@ -232,7 +245,7 @@ pub async fn operator(State(app): Shared, headers: HeaderMap) -> Result<HttpResp
             "n_trials": app.study.trials(participant.session).len(),
             "idle_secs": (now_ms - participant.given_ms).max(0) / 1000,
             // For participants who can no longer use the browser in which they began.
-            "token": may_go_on.then(|| app.secret.token(participant.session, &participant.id)),
+            "token": is_open.then(|| app.secret.token(participant.session, &participant.id)),
         })
     };
     Ok(json_reply(&json!({

@@ -35,10 +35,10 @@ const MAX_CONNECTION_TIME: Duration = Duration::from_secs(600);
 const GRACE_PERIOD: Duration = Duration::from_secs(5);
 
 /// Serves `router` until `stop`, then lets replies in progress finish. Each peer gets at most a quarter of the
-/// connections, unless all come from a proxy (`is_proxied`).
+/// connections; behind a proxy (`is_proxied`) loopback and private addresses have no limit.
 pub async fn serve(listener: TcpListener, router: Router, is_proxied: bool, stop: impl Future<Output = ()>) {
     let n_permits = max_connections();
-    let peers = PeerLimit::new(if is_proxied { n_permits } else { (n_permits / 4).max(MIN_PER_PEER) });
+    let peers = PeerLimit::new((n_permits / 4).max(MIN_PER_PEER), is_proxied);
     let permits = Arc::new(Semaphore::new(n_permits));
     let (stopping, stopped) = watch::channel(());
     let mut stop = pin!(stop);

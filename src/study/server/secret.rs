@@ -38,6 +38,11 @@ pub fn participant_id() -> Result<String> {
     Ok(hex(&random::<ID_BYTES>()?))
 }
 
+/// Whether `attempt` has the form of a page's attempt to begin: 128 random bits in hexadecimal digits.
+pub fn is_attempt(attempt: &str) -> bool {
+    attempt.len() == 32 && attempt.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
+}
+
 /// Signing key and operator's token of one study.
 #[derive(Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -77,7 +82,14 @@ impl StudySecret {
         self.sign(token.as_bytes()) == self.sign(self.operator_token.as_bytes())
     }
 
-    /// Token of the participant `id` (from [`participant_id`]) in `session`.
+    /// Identifier of the participant who begins by this `attempt`. It is the same for a repeated request, and the
+    /// attempt, which is as secret as a token, cannot be derived from it.
+    pub fn id_of_attempt(&self, attempt: &str) -> String {
+        let hash = self.sign(format!("attempt {attempt}").as_bytes());
+        hex(hash.as_bytes().split_at(ID_BYTES).0)
+    }
+
+    /// Token of the participant `id` (from [`participant_id`] or [`Self::id_of_attempt`]) in `session`.
     pub fn token(&self, session: u32, id: &str) -> String {
         let mut bytes = session.to_le_bytes().to_vec();
         bytes.extend(unhex(id));
@@ -131,6 +143,11 @@ mod tests {
             assert_eq!(secret.verify(std::str::from_utf8(&letters).unwrap()), None, "letter {k}");
             assert_eq!(secret.verify(&token[..k]), None, "{k} letters");
         }
+        let attempt = "0123456789abcdef0123456789abcdef";
+        let of_attempt = secret.id_of_attempt(attempt);
+        assert_eq!(StudySecret::open(&path).unwrap().id_of_attempt(attempt), of_attempt);
+        assert!(of_attempt.len() == id.len() && of_attempt != secret.id_of_attempt(&attempt.replace('0', "1")));
+        assert!(is_attempt(attempt) && !is_attempt(&attempt.to_uppercase()) && !is_attempt(&attempt[1..]));
         for wrong in ["", "=", "\u{e9}", &format!("{token}="), &format!("{token}AAAA"), &token.repeat(100)] {
             assert_eq!(secret.verify(wrong), None, "{wrong}");
         }

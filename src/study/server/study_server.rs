@@ -72,19 +72,14 @@ impl StudyServer {
     }
 
     /// Serves on `address` until SIGINT or SIGTERM. `on_listening` is called with the actual address once the socket is
-    /// bound. `host_name`: name under which a proxy serves the study; the proxy is then responsible for limiting the
-    /// connections of each peer.
+    /// bound. `host_names`: names under which a proxy serves the study; a proxy at a loopback or private address is
+    /// then responsible for limiting the connections of each peer.
     ///
     /// # Errors
-    /// The address cannot be bound, or `host_name` is more than a host name.
-    pub fn run(
-        self,
-        address: SocketAddr,
-        host_name: Option<String>,
-        on_listening: impl FnOnce(SocketAddr),
-    ) -> Result<()> {
-        let is_proxied = host_name.is_some();
-        let hosts = AllowedHosts::new(address.ip(), host_name)?;
+    /// The address cannot be bound, or one of `host_names` is more than a host name.
+    pub fn run(self, address: SocketAddr, host_names: &[String], on_listening: impl FnOnce(SocketAddr)) -> Result<()> {
+        let is_proxied = !host_names.is_empty();
+        let hosts = AllowedHosts::new(address.ip(), host_names)?;
         let runtime =
             tokio::runtime::Builder::new_multi_thread().enable_all().build().context("cannot start threads")?;
         let router = router(self.app, hosts);

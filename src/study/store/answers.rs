@@ -25,6 +25,8 @@ pub struct SubmittedAnswer {
 /// Properties of a trial that decide how its answer is recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TrialTerms {
+    /// Session of the trial. A participant who began anew may have another one than an earlier token names.
+    pub session: u32,
     /// Minimum time from the first presentation of the trial to its answer, milliseconds: before, its films cannot have
     /// been watched.
     pub least_ms: i64,
@@ -39,7 +41,7 @@ pub struct TrialTerms {
 pub enum RecordOutcome {
     /// The answer is stored, now or earlier; current state of the participant.
     Stored(Participant),
-    /// The participant is unknown: withdrawn.
+    /// The participant is unknown in this session: withdrawn, or deleted before the first answer.
     Unknown,
     /// The session was reassigned to another participant.
     Replaced,
@@ -62,7 +64,8 @@ pub fn record(
     terms: TrialTerms,
     now_ms: i64,
 ) -> rusqlite::Result<RecordOutcome> {
-    let Some(participant) = find(db, id)? else { return Ok(RecordOutcome::Unknown) };
+    let found = find(db, id)?.filter(|participant| participant.session == terms.session);
+    let Some(participant) = found else { return Ok(RecordOutcome::Unknown) };
     if answer.position < participant.position {
         let is_same = at(db, id, answer.position)?.is_some_and(|stored| stored == *answer);
         return Ok(if is_same { RecordOutcome::Stored(participant) } else { RecordOutcome::Differs });

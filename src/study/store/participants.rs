@@ -1,4 +1,5 @@
-//! Participants: sessions are assigned in the plan's order, and those of participants who left are reassigned.
+//! Participants: sessions are assigned in the plan's order, and those of participants who left are reassigned. A
+//! participant without answers who loses the session is deleted, so that requests to begin cannot fill the database.
 
 use super::database::increment;
 use rusqlite::types::{FromSql, FromSqlError, FromSqlResult, ToSql, ToSqlOutput, ValueRef};
@@ -19,7 +20,7 @@ pub enum Status {
     Active,
     /// Every trial is answered.
     Completed,
-    /// Abandoned and reassigned to another participant.
+    /// Abandoned after an answer and reassigned to another participant.
     Replaced,
 }
 
@@ -52,7 +53,7 @@ impl FromSql for Status {
 /// Participant as stored.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Participant {
-    /// Random identifier.
+    /// Random identifier, or the one derived from the page's attempt to begin.
     pub id: String,
     /// Index into the plan's sessions.
     pub session: u32,
@@ -119,7 +120,7 @@ pub struct QuotaCounts {
     pub active: u32,
     /// Active, but idle for so long that the session may be reassigned.
     pub abandoned: u32,
-    /// Replaced by another participant.
+    /// Replaced by another participant after an answer.
     pub replaced: u32,
     /// Data deleted on request.
     pub withdrawn: u32,
@@ -185,16 +186,20 @@ impl NewParticipant {
 /// Result of a request to begin.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BeginOutcome {
+    /// Session assigned now, or earlier to the same identifier.
     Begun(Participant),
-    /// A session with answers has the same ID. Only its token resumes it, because anybody can send an ID.
+    /// The identifier is that of a participant who was replaced.
+    Replaced,
+    /// A session that has answers or is still held has the same ID. Only its token resumes it, because anybody can send
+    /// an ID.
     Known,
     /// The study has all its participants.
     Full,
 }
 
-/// Assigns the first free session to `new_participant` and marks an abandoned participant of that session as replaced.
-/// Sessions without answers that have the same ID are given up in favour of the new one: the page was opened in another
-/// browser, or the reply was lost.
+/// Assigns the first free session to `new_participant`, unless its identifier has a session already: the page repeats a
+/// request whose reply was lost. An abandoned participant of the assigned session is marked as replaced, or deleted if
+/// there are no answers; so is one with the same ID who has not given the first answer in time.
 ///
 /// # Errors
 /// The database fails; nothing is stored.
@@ -204,19 +209,26 @@ pub fn begin(
     quota: Quota,
     now_ms: i64,
 ) -> rusqlite::Result<BeginOutcome> {
+    if let Some(participant) = find(db, &new_participant.id)? {
+        let is_replaced = participant.status == Status::Replaced;
+        return Ok(if is_replaced { BeginOutcome::Replaced } else { BeginOutcome::Begun(participant) });
+    }
+    let (replaced, active) = (Status::Replaced, Status::Active);
+    let current = select(db, &format!("WHERE status <> '{}'", replaced.name()))?;
     let (own, others): (Vec<_>, Vec<_>) =
-        all(db)?.into_iter().partition(|participant| new_participant.has_same_id(participant));
-    let is_current = |participant: &Participant| participant.status != Status::Replaced;
-    let own: Vec<Participant> = own.into_iter().filter(is_current).collect();
-    if own.iter().any(|participant| participant.position > 0) {
+        current.into_iter().partition(|participant| new_participant.has_same_id(participant));
+    if own.iter().any(|participant| participant.position > 0 || quota.holds(participant, now_ms)) {
         return Ok(BeginOutcome::Known);
     }
     let holders = others.into_iter().filter(|participant| quota.holds(participant, now_ms));
     let taken: BTreeSet<u32> = holders.map(|participant| participant.session).collect();
     let free = (0..quota.n_sessions).find(|session| !taken.contains(session));
     let Some(session) = free.filter(|_| taken.len() < quota.wanted as usize) else { return Ok(BeginOutcome::Full) };
-    let (replaced, active) = (Status::Replaced, Status::Active);
     for given_up in own.iter().map(|participant| participant.session).chain([session]) {
+        db.execute(
+            "DELETE FROM participant WHERE session = ?1 AND status = ?2 AND position = 0",
+            params![given_up, active],
+        )?;
         db.execute(
             "UPDATE participant SET status = ?1 WHERE session = ?2 AND status = ?3",
             params![replaced, given_up, active],
@@ -240,7 +252,7 @@ pub fn begin(
     find(db, &new_participant.id)?.map(BeginOutcome::Begun).ok_or(rusqlite::Error::QueryReturnedNoRows)
 }
 
-/// Participant with this identifier; `None` if unknown or withdrawn.
+/// Participant with this identifier; `None` if unknown, withdrawn, or deleted before the first answer.
 pub fn find(db: &Connection, id: &str) -> rusqlite::Result<Option<Participant>> {
     let sql = format!("SELECT {} FROM participant WHERE id = ?1", Participant::COLUMNS);
     db.query_row(&sql, [id], Participant::of_row).optional()
@@ -248,7 +260,12 @@ pub fn find(db: &Connection, id: &str) -> rusqlite::Result<Option<Participant>> 
 
 /// All participants in order of start time.
 pub fn all(db: &Connection) -> rusqlite::Result<Vec<Participant>> {
-    let sql = format!("SELECT {} FROM participant ORDER BY begun_ms, id", Participant::COLUMNS);
+    select(db, "")
+}
+
+/// Participants that fulfil an SQL `condition`, in order of start time.
+fn select(db: &Connection, condition: &str) -> rusqlite::Result<Vec<Participant>> {
+    let sql = format!("SELECT {} FROM participant {condition} ORDER BY begun_ms, id", Participant::COLUMNS);
     db.prepare(&sql)?.query_map([], Participant::of_row)?.collect()
 }
 
@@ -299,28 +316,57 @@ mod tests {
         let response = Response::Number(42);
         let [stalled_secs, unfocused_secs, response_secs] = [0.0; 3];
         let given = SubmittedAnswer { position: 0, response, plays: 1, stalled_secs, unfocused_secs, response_secs };
-        record(db, name, &given, TrialTerms { least_ms: 0, is_last: false, fails_check: false }, now_ms).unwrap()
+        let session = find(db, name).unwrap().map_or(0, |participant| participant.session);
+        record(db, name, &given, TrialTerms { session, least_ms: 0, is_last: false, fails_check: false }, now_ms)
+            .unwrap()
     }
 
-    fn status(db: &Connection, name: &str) -> Status {
-        find(db, name).unwrap().unwrap().status
+    fn status(db: &Connection, name: &str) -> Option<Status> {
+        find(db, name).unwrap().map(|participant| participant.status)
     }
 
     #[test]
-    fn an_id_cannot_resume_a_session_with_answers_and_replaces_one_without() {
+    fn an_id_neither_resumes_a_session_nor_ends_one_before_its_time() {
         let dir = tempfile::tempdir().unwrap();
         let db = database::open(&dir.path().join("responses.sqlite"), "plan").unwrap();
         assert_eq!(session(&begin_as(&db, "first", "p", 1000)), Some(0));
-        assert_eq!(session(&begin_as(&db, "second", "p", 2000)), Some(0), "no place more for the same person");
-        assert_eq!((status(&db, "first"), answer(&db, "first", 3000)), (Status::Replaced, RecordOutcome::Replaced));
-        assert!(matches!(answer(&db, "second", 3000), RecordOutcome::Stored(_)));
-        assert_eq!(begin_as(&db, "third", "p", 4000), BeginOutcome::Known);
+        assert_eq!(session(&begin_as(&db, "first", "p", 2000)), Some(0), "the reply was lost");
+        assert_eq!(begin_as(&db, "second", "p", 300_999), BeginOutcome::Known, "in time for the first answer");
+        assert_eq!(session(&begin_as(&db, "second", "p", 301_000)), Some(0), "no place more for the same person");
+        assert_eq!((status(&db, "first"), answer(&db, "first", 302_000)), (None, RecordOutcome::Unknown));
+        assert!(matches!(answer(&db, "second", 303_000), RecordOutcome::Stored(_)));
+        assert_eq!(begin_as(&db, "third", "p", 304_000), BeginOutcome::Known);
         assert_eq!(begin_as(&db, "third", "p", 4_000_000), BeginOutcome::Known, "abandoned, but not replaced");
         assert_eq!(session(&begin_as(&db, "other", "q", 4_000_000)), Some(0), "the abandoned place");
+        assert_eq!(status(&db, "second"), Some(Status::Replaced), "its answer stays");
+        assert_eq!(begin_as(&db, "second", "p", 4_000_000), BeginOutcome::Replaced);
         assert_eq!(session(&begin_as(&db, "third", "p", 4_000_001)), Some(1), "after the place was given away");
-        assert_eq!(status(&db, "other"), Status::Active, "who has that place now keeps it");
+        assert_eq!(status(&db, "other"), Some(Status::Active), "who has that place now keeps it");
         assert_eq!(begin_as(&db, "last", "r", 4_000_002), BeginOutcome::Full);
         assert_eq!(latest_ms(&db).unwrap(), 4_000_001);
+    }
+
+    #[test]
+    fn repeated_begins_leave_one_row_and_none_of_another_session() {
+        let dir = tempfile::tempdir().unwrap();
+        let db = database::open(&dir.path().join("responses.sqlite"), "plan").unwrap();
+        for k in 0..50 {
+            assert_eq!(session(&begin_as(&db, &format!("own-{k}"), "p", 300_000 * k)), Some(0));
+            assert_eq!(begin_as(&db, "early", "p", 300_000 * k + 299_999), BeginOutcome::Known);
+        }
+        assert_eq!(all(&db).unwrap().len(), 1);
+        for k in 50..100 {
+            assert_eq!(session(&begin_as(&db, &format!("other-{k}"), "", 300_000 * k)), Some(0));
+        }
+        let left = all(&db).unwrap();
+        assert_eq!(left.iter().map(|participant| participant.id.as_str()).collect::<Vec<_>>(), ["other-99"]);
+        // The identifier of a deleted participant may begin anew; a token of the earlier session stores nothing then.
+        assert_eq!(session(&begin_as(&db, "own-0", "p", 29_700_001)), Some(1));
+        let response = Response::Number(42);
+        let [stalled_secs, unfocused_secs, response_secs] = [0.0; 3];
+        let given = SubmittedAnswer { position: 0, response, plays: 1, stalled_secs, unfocused_secs, response_secs };
+        let terms = TrialTerms { session: 0, least_ms: 0, is_last: false, fails_check: false };
+        assert_eq!(record(&db, "own-0", &given, terms, 29_700_002).unwrap(), RecordOutcome::Unknown);
     }
 
     #[test]
