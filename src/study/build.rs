@@ -1,6 +1,7 @@
-//! A study folder from a study file: clips, motion, films, plan and key, and the seal last. A build that was stopped goes
-//! on from the films that are there; the same input gives the same bytes, whatever the number of workers. All films have
-//! one length in bytes: an mp4 is made longer by a `free` box at its end, which players skip.
+//! Builds a study folder from a study file: clips, motion, films, plan and key, and last the seal. An interrupted build
+//! reuses the films that are complete. Output is deterministic for any number of workers. All films have the same size
+//! in bytes, so that size does not reveal the condition: an mp4 is padded with a `free` box at its end, which players
+//! skip.
 
 use super::design::{ClipNeeds, design};
 use super::file::{StudyFile, StudySpeaker};
@@ -8,9 +9,9 @@ use super::folder::{StudyFolder, read_json, write_json};
 use super::plan::{FilmContent, StudyKey, StudyPlan};
 use super::preregistration::Preregistration;
 use super::seal::StudySeal;
-use super::stimuli::cut::{RefusedPiece, StudyClip};
+use super::stimuli::cut::{RefusedSegment, StudyClip};
 use super::stimuli::film::{check_encoder, film_name};
-use super::stimuli::filmed::{CutSpeaker, FilmedSpeaker, equally_loud};
+use super::stimuli::filmed_speaker::{CutSpeaker, FilmedSpeaker, normalise_loudness};
 use anyhow::{Context, Result, ensure};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir::{self, lock, write_file};
@@ -21,49 +22,50 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What was built.
+/// Summary of a built study.
 #[derive(Clone, Debug, Serialize)]
 pub struct BuiltStudy {
     pub folder: PathBuf,
-    /// Hash over all that is sealed.
+    /// Combined hash of the seal.
     pub seal: String,
-    /// Whether it was there already.
+    /// Whether the study had been built before.
     pub up_to_date: bool,
     pub n_sessions: usize,
     pub n_trials: usize,
     pub n_films: usize,
-    /// Bytes of each film.
+    /// Size of each film, bytes.
     pub film_bytes: u64,
     /// Loudness of the films, LUFS.
     pub loudness_lufs: f64,
-    /// How equally votes are spread, a sentence a task; empty where nothing was planned now.
+    /// Balance of votes, one sentence per task; empty if the study had been built before.
     pub balance: Vec<String>,
     pub speakers: Vec<BuiltSpeaker>,
 }
 
-/// Name of the account of clips, beside their sounds.
-const CLIPS: &str = "clips.json";
+/// File that describes the clips, in the folder of their sounds.
+const CLIPS_FILE: &str = "clips.json";
 
 /// Clips of a speaker.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct BuiltSpeaker {
     pub name: String,
     pub clips: Vec<StudyClip>,
-    /// Pieces of speech that gave no clip.
-    pub refused: Vec<RefusedPiece>,
+    /// Segments of speech from which no clip could be cut.
+    pub refused: Vec<RefusedSegment>,
 }
 
-/// Builds the study of a file in the folder `out`, with films of `size` px (`film::SIZE` but for tests).
+/// Builds the study of `file` in the folder `out`, with films of `size` px, width and height
+/// ([`super::stimuli::film::SIZE`] except in tests).
 ///
 /// # Errors
-/// No encoder for browsers; a folder with another study or with responses; speech or motion that is missing or too short.
+/// No H.264 encoder; the folder holds another study or responses; speech or motion is missing or too short.
 pub fn build(file: &StudyFile, out: &Path, size: [usize; 2], progress: &dyn Progress) -> Result<BuiltStudy> {
     check_encoder()?;
     let folder = StudyFolder::new(out);
     ensure!(!out.is_file(), "{} is a file; name a folder for the study", out.display());
     let _lock = lock(out)?;
     if folder.seal().exists() {
-        return sealed(file, &folder);
+        return existing_study(file, &folder);
     }
     let has_responses = folder.responses().exists();
     ensure!(!has_responses, "{} has responses: build into another folder (--out)", out.display());
@@ -81,9 +83,9 @@ pub fn build(file: &StudyFile, out: &Path, size: [usize; 2], progress: &dyn Prog
     let mut cut = cut.collect::<Result<Vec<CutSpeaker>>>()?;
     drop(task);
     let loudness_lufs =
-        equally_loud(cut.iter_mut().flat_map(|speaker| speaker.sounds.iter_mut().chain(&mut speaker.tones)));
-    let account = ClipAccount { loudness_lufs, speakers: cut.iter().map(BuiltSpeaker::of).collect() };
-    write_clips(&folder, &account, &cut)?;
+        normalise_loudness(cut.iter_mut().flat_map(|speaker| speaker.sounds.iter_mut().chain(&mut speaker.tones)));
+    let report = ClipReport { loudness_lufs, speakers: cut.iter().map(BuiltSpeaker::of).collect() };
+    write_clips(&folder, &report, &cut)?;
     let named = |speaker: &CutSpeaker| {
         let clips = speaker.cut.best_first.iter().map(|clip| format!("{}/{clip}", speaker.name()));
         (speaker.name().to_owned(), clips.collect())
@@ -97,50 +99,50 @@ pub fn build(file: &StudyFile, out: &Path, size: [usize; 2], progress: &dyn Prog
         let speaker = filmed.get(&content.speaker).with_context(|| format!("no speaker {}", content.speaker))?;
         content.motion_of = speaker.motion_of(&content)?;
         let name = film_name(file.seed, &content);
-        let same = key.films.insert(name.clone(), content.clone()).is_none_or(|other| other == content);
-        ensure!(same, "two films are called {name}: choose another seed");
+        let is_unique = key.films.insert(name.clone(), content.clone()).is_none_or(|other| other == content);
+        ensure!(is_unique, "two films are called {name}: choose another seed");
         Ok(name)
     })?;
-    let made = make_films(&folder, &key, &filmed, progress)?;
-    publish(&folder, &made)?;
+    let rendered = render_films(&folder, &key, &filmed, progress)?;
+    publish(&folder, &rendered)?;
     file.write(&folder.study_file())?;
     write_json(&folder.plan(), &designed.plan)?;
     write_json(&folder.key(), &key)?;
     Preregistration::new(file).write(&folder.preregistration())?;
     StudySeal::of(&folder)?.write(&folder)?;
     let balance = designed.balance.iter().map(ToString::to_string).collect();
-    let built = account.built(&folder, false, balance)?;
-    remove(&made_films(&folder))?;
+    let built = report.built(&folder, false, balance)?;
+    remove(&unpublished_films_dir(&folder))?;
     Ok(built)
 }
 
-/// A study that was built before.
+/// Summary of a study that is already built.
 ///
 /// # Errors
-/// It is another one than that of the file.
-fn sealed(file: &StudyFile, folder: &StudyFolder) -> Result<BuiltStudy> {
-    let there = StudyFile::read(&folder.study_file())?;
+/// The folder holds a study built from a different file.
+fn existing_study(file: &StudyFile, folder: &StudyFolder) -> Result<BuiltStudy> {
+    let existing = StudyFile::read(&folder.study_file())?;
     ensure!(
-        there == *file,
+        existing == *file,
         "{} is sealed, and {} in it is not this study: build into another folder (--out)",
         folder.dir().display(),
         folder.study_file().display()
     );
-    let account: ClipAccount = read_json(&clips_folder(folder).join(CLIPS))?;
-    remove(&made_films(folder))?;
-    account.built(folder, true, Vec::new())
+    let report: ClipReport = read_json(&clips_dir(folder).join(CLIPS_FILE))?;
+    remove(&unpublished_films_dir(folder))?;
+    report.built(folder, true, Vec::new())
 }
 
-/// What `clips.json` tells.
+/// Content of `clips.json`.
 #[derive(Serialize, Deserialize)]
-struct ClipAccount {
+struct ClipReport {
     /// Loudness of the films, LUFS.
     loudness_lufs: f64,
     speakers: Vec<BuiltSpeaker>,
 }
 
-impl ClipAccount {
-    /// Account of the study that lies in the folder.
+impl ClipReport {
+    /// Summary of the study in `folder`.
     fn built(self, folder: &StudyFolder, up_to_date: bool, balance: Vec<String>) -> Result<BuiltStudy> {
         let plan: StudyPlan = read_json(&folder.plan())?;
         let key: StudyKey = read_json(&folder.key())?;
@@ -168,33 +170,34 @@ impl BuiltSpeaker {
     }
 }
 
-/// Writes the clips' sounds, for other systems to move to, and how they were cut.
-fn write_clips(folder: &StudyFolder, account: &ClipAccount, speakers: &[CutSpeaker]) -> Result<()> {
-    let clips = clips_folder(folder);
+/// Writes the sound of every clip, from which other systems can generate motion, and `clips.json`.
+fn write_clips(folder: &StudyFolder, report: &ClipReport, speakers: &[CutSpeaker]) -> Result<()> {
+    let clips = clips_dir(folder);
     for speaker in speakers {
         for (clip, sound) in speaker.cut.clips.iter().zip(&speaker.sounds) {
             let path = clips.join(speaker.name()).join(format!("{}.wav", clip.name));
             workdir::replace(&path, |attempt| wav::write(attempt, sound))?;
         }
     }
-    write_json(&clips.join(CLIPS), account)
+    write_json(&clips.join(CLIPS_FILE), report)
 }
 
-/// Makes the films of the key in a hidden folder, those that are there already excepted, and gives their files.
-fn make_films(
+/// Renders the films of the key into a hidden folder, except those that exist, and returns their paths by opaque name.
+/// File names are hashes of the content, so an interrupted build can resume.
+fn render_films(
     folder: &StudyFolder,
     key: &StudyKey,
     speakers: &BTreeMap<String, FilmedSpeaker>,
     progress: &dyn Progress,
 ) -> Result<BTreeMap<String, PathBuf>> {
-    let made = made_films(folder);
-    fs::create_dir_all(&made).with_context(|| format!("cannot make the folder {}", made.display()))?;
+    let dir = unpublished_films_dir(folder);
+    fs::create_dir_all(&dir).with_context(|| format!("cannot make the folder {}", dir.display()))?;
     let task = progress.begin("films", key.films.len() as u64);
     let film = |(name, content): (&String, &FilmContent)| -> Result<(String, PathBuf)> {
         let speaker = speakers.get(&content.speaker).with_context(|| format!("no speaker {}", content.speaker))?;
         let performance = speaker.performance(content)?;
         let scene = speaker.scene(content, &performance);
-        let path = made.join(format!("{}.mp4", scene.hash()));
+        let path = dir.join(format!("{}.mp4", scene.hash()));
         if path.is_file() {
             task.skip(1);
         } else {
@@ -206,14 +209,14 @@ fn make_films(
     key.films.par_iter().map(film).collect()
 }
 
-/// Puts the films, all of one length in bytes, where participants reach them, and nothing else there.
+/// Replaces `public/` by the films, padded to the same size.
 fn publish(folder: &StudyFolder, films: &BTreeMap<String, PathBuf>) -> Result<()> {
     let length = |path: &PathBuf| Ok(usize::try_from(fs::metadata(path)?.len())?);
     let lengths = films.values().map(length).collect::<Result<Vec<usize>>>();
     let n_bytes = common_bytes(lengths.with_context(|| format!("films in {}", folder.dir().display()))?);
     remove(&folder.public())?;
-    for (name, made) in films {
-        let film = fs::read(made).with_context(|| format!("cannot read {}", made.display()))?;
+    for (name, path) in films {
+        let film = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
         write_file(&folder.film(name), &padded(film, n_bytes)?)?;
     }
     Ok(())
@@ -223,32 +226,32 @@ fn remove(path: &Path) -> Result<()> {
     workdir::remove(path).with_context(|| format!("cannot remove {}", path.display()))
 }
 
-fn clips_folder(folder: &StudyFolder) -> PathBuf {
+fn clips_dir(folder: &StudyFolder) -> PathBuf {
     folder.dir().join("clips")
 }
 
-/// Where films lie until all of them are made.
-fn made_films(folder: &StudyFolder) -> PathBuf {
+/// Folder of the films until all are rendered.
+fn unpublished_films_dir(folder: &StudyFolder) -> PathBuf {
     folder.dir().join(".films")
 }
 
-/// Least length of a box: its own length and its type.
-const HEADER_BYTES: usize = 8;
-/// Lengths are rounded up to a multiple of this.
-const STEP_BYTES: usize = 4096;
+/// Minimum size of an mp4 box: its size and type fields.
+const BOX_HEADER_BYTES: usize = 8;
+/// Film sizes are rounded up to a multiple of this.
+const SIZE_STEP_BYTES: usize = 4096;
 
-/// Length that films of these lengths can all have.
+/// Smallest multiple of 4096 bytes to which films of these lengths can all be padded.
 pub fn common_bytes(lengths: impl IntoIterator<Item = usize>) -> usize {
     let longest = lengths.into_iter().max().unwrap_or(0);
-    (longest + HEADER_BYTES).next_multiple_of(STEP_BYTES)
+    (longest + BOX_HEADER_BYTES).next_multiple_of(SIZE_STEP_BYTES)
 }
 
-/// Appends a box of zeros to an mp4, so that it has `n_bytes`.
+/// Appends a `free` box of zeros to an mp4, so that its size is `n_bytes`.
 ///
 /// # Errors
-/// A film that is longer, or shorter by less than a box or by more than 4 GB.
+/// The film is longer than `n_bytes` less a box header, or shorter by 4 GiB or more.
 pub fn padded(mut film: Vec<u8>, n_bytes: usize) -> Result<Vec<u8>> {
-    let missing = n_bytes.checked_sub(film.len()).filter(|missing| *missing >= HEADER_BYTES);
+    let missing = n_bytes.checked_sub(film.len()).filter(|missing| *missing >= BOX_HEADER_BYTES);
     let size = missing.and_then(|missing| u32::try_from(missing).ok());
     let size = size.with_context(|| format!("{} bytes cannot become {n_bytes}", film.len()))?;
     film.extend(size.to_be_bytes());
@@ -262,7 +265,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn films_become_equally_long() {
+    fn films_are_padded_to_equal_size() {
         let lengths = [4_080, 4_085, 12, 4_088];
         let n_bytes = common_bytes(lengths);
         assert_eq!((n_bytes, common_bytes([4_089]), common_bytes([])), (4_096, 8_192, 4_096));

@@ -1,10 +1,10 @@
-//! Responses as tables: each answer with what its films showed, and who took part.
+//! Export of responses as tables: each answer with the content of its films, and the participants.
 
 use super::design::right_response;
 use super::file::StudyFile;
 use super::folder::{StudyFolder, read_json};
 use super::plan::{FilmContent, StudyKey, StudyPlan, TaskDesign};
-use super::store::answers::{self, GivenAnswer};
+use super::store::answers::{self, SubmittedAnswer};
 use super::store::database;
 use super::store::participants::{self, PARAMETERS, Participant, Status};
 use super::vote::{Response, StudyVote, VOTE_COLUMNS};
@@ -16,16 +16,16 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// Columns of the table of participants, before those of what recruiting sites give along.
+/// Columns of the table of participants, followed by the parameters of recruiting sites.
 const PARTICIPANT_COLUMNS: [&str; 8] =
     ["participant", "place", "language", "status", "answers", "failed_checks", "begun_ms", "code"];
 
-/// Form of the tables.
+/// Format of the tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TableForm {
-    /// Columns; several conditions or scores are joined by `|`.
+    /// Comma-separated values; multiple conditions or scores are joined by `|`.
     Csv,
-    /// JSON Lines, one object a row.
+    /// JSON Lines, one object per row.
     Jsonl,
 }
 
@@ -38,28 +38,28 @@ impl TableForm {
     }
 }
 
-/// Tables that were written.
+/// Paths and sizes of the tables written.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Exported {
+pub struct ExportSummary {
     pub votes: PathBuf,
     pub participants: PathBuf,
     pub n_votes: usize,
     pub n_participants: usize,
 }
 
-/// Writes the responses of a study into the folder `out`: `votes` and `participants`. Participants come in the order in
-/// which they began, their answers in that of their session.
+/// Writes the responses of a study into the folder `out` as the tables `votes` and `participants`. Participants are
+/// ordered by start time, their answers by position in the session.
 ///
 /// # Errors
-/// A study without responses, a file of it that cannot be read, a folder that cannot be written.
-pub fn export(folder: &StudyFolder, form: TableForm, out: &Path) -> Result<Exported> {
+/// The study has no responses, one of its files cannot be read, or the folder cannot be written.
+pub fn export(folder: &StudyFolder, form: TableForm, out: &Path) -> Result<ExportSummary> {
     let (participants, votes) = responses(folder)?;
     let path = |name: &str| out.join(name).with_extension(form.extension());
     let (votes_file, participants_file) = (path("votes"), path("participants"));
     write_table(&votes_file, form, &VOTE_COLUMNS, &votes)?;
     let rows: Vec<Map<String, Value>> = participants.iter().map(participant_row).collect();
     write_table(&participants_file, form, &[&PARTICIPANT_COLUMNS[..], &PARAMETERS].concat(), &rows)?;
-    Ok(Exported {
+    Ok(ExportSummary {
         votes: votes_file,
         participants: participants_file,
         n_votes: votes.len(),
@@ -67,14 +67,14 @@ pub fn export(folder: &StudyFolder, form: TableForm, out: &Path) -> Result<Expor
     })
 }
 
-/// Participants of a study in the order in which they began, and all of their votes.
+/// Participants of a study in order of start time, and all votes.
 ///
 /// # Errors
-/// A study without responses, a file of it that cannot be read.
+/// The study has no responses, or one of its files cannot be read.
 pub fn responses(folder: &StudyFolder) -> Result<(Vec<Participant>, Vec<StudyVote>)> {
     let joined = JoinedPlan::read(folder)?;
-    let db = database::open_to_read(&folder.responses())?;
-    // One moment of the database for participants and answers.
+    let db = database::open_for_reading(&folder.responses())?;
+    // A single read transaction gives a consistent snapshot of participants and answers.
     db.execute_batch("BEGIN")?;
     let (all, mut votes) = (participants::all(&db)?, Vec::new());
     for participant in &all {
@@ -85,7 +85,7 @@ pub fn responses(folder: &StudyFolder) -> Result<(Vec<Participant>, Vec<StudyVot
     Ok((all, votes))
 }
 
-/// Plan, key and study file, by which an answer becomes a vote.
+/// Plan, key and study file, joined to turn an answer into a vote.
 struct JoinedPlan {
     plan: StudyPlan,
     key: StudyKey,
@@ -98,20 +98,20 @@ impl JoinedPlan {
         Ok(Self { plan: read_json(&folder.plan())?, key: read_json(&folder.key())?, file })
     }
 
-    /// Right response of an analysed trial: the real film's, the matched film's.
+    /// Correct response of an analysed trial, from the conditions of its films.
     fn right_response(&self, design: TaskDesign, films: &[&FilmContent]) -> Option<Response> {
         let shown: Option<Vec<_>> = films.iter().map(|film| self.file.find_condition(&film.condition)).collect();
         right_response(design, &shown?)
     }
 
-    fn vote(&self, participant: &Participant, answer: GivenAnswer) -> Result<StudyVote> {
-        let place = || format!("answer {} of {}: not in plan.json and key.json", answer.position + 1, participant.id);
-        let session = self.plan.sessions.get(participant.session as usize).with_context(place)?;
-        let trial = session.trials.get(answer.position as usize).with_context(place)?;
-        let task = self.plan.tasks.get(trial.task).with_context(place)?;
+    fn vote(&self, participant: &Participant, answer: SubmittedAnswer) -> Result<StudyVote> {
+        let context = || format!("answer {} of {}: not in plan.json and key.json", answer.position + 1, participant.id);
+        let session = self.plan.sessions.get(participant.session as usize).with_context(context)?;
+        let trial = session.trials.get(answer.position as usize).with_context(context)?;
+        let task = self.plan.tasks.get(trial.task).with_context(context)?;
         let films = trial.films.iter().map(|film| self.key.films.get(film));
-        let films = films.collect::<Option<Vec<_>>>().with_context(place)?;
-        let first = films.first().with_context(place)?;
+        let films = films.collect::<Option<Vec<_>>>().with_context(context)?;
+        let first = films.first().with_context(context)?;
         Ok(StudyVote {
             participant: participant.id.clone(),
             task: task.name.clone(),
@@ -148,7 +148,7 @@ fn participant_row(participant: &Participant) -> Map<String, Value> {
     columns.zip(own.into_iter().chain(given)).collect()
 }
 
-/// Writes a table whose rows serialize as objects with these columns.
+/// Writes a table atomically; each row must serialise as an object with these columns.
 fn write_table(path: &Path, form: TableForm, columns: &[&str], rows: &[impl Serialize]) -> Result<()> {
     workdir::replace(path, |attempt| {
         let mut file = BufWriter::new(File::create(attempt)?);
@@ -173,7 +173,8 @@ fn write_table(path: &Path, form: TableForm, columns: &[&str], rows: &[impl Seri
     })
 }
 
-/// Value in a cell; several are joined by `|`, and a response is its value: `left`, `real`, `-1`, `70|20`, `42`.
+/// Text of a CSV cell. Array elements are joined by `|`; a response is reduced to its value: `left`, `real`, `-1`,
+/// `70|20`, `42`.
 fn cell(value: &Value) -> String {
     match value {
         Value::Null => String::new(),

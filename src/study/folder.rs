@@ -1,4 +1,4 @@
-//! Files of a study folder: what participants can reach lies below `public/`, everything else beside it.
+//! Layout of a study folder: participants can reach the files below `public/` only.
 
 use anyhow::{Context, Result};
 use orator_base::stage::workdir;
@@ -7,20 +7,23 @@ use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
 /// Reads a JSON file of a built study.
+///
+/// # Errors
+/// The file cannot be read, or is not valid JSON for `T`.
 pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
     let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     serde_json::from_slice(&bytes)
         .with_context(|| format!("{} is not as `orator study build` writes it", path.display()))
 }
 
-/// Writes a JSON file of a study, atomically.
+/// Writes a JSON file of a study atomically.
 pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     let mut json = serde_json::to_vec_pretty(value)?;
     json.push(b'\n');
     workdir::write_file(path, &json)
 }
 
-/// Folder of a built study.
+/// Paths in the folder of a built study.
 #[derive(Clone, Debug)]
 pub struct StudyFolder(PathBuf);
 
@@ -33,17 +36,17 @@ impl StudyFolder {
         &self.0
     }
 
-    /// Study file with every default written out.
+    /// Resolved study file: every default is written out.
     pub fn study_file(&self) -> PathBuf {
         self.0.join("study.toml")
     }
 
-    /// What each participant sees, [`super::plan::StudyPlan`].
+    /// Trials of each session, [`super::plan::StudyPlan`].
     pub fn plan(&self) -> PathBuf {
         self.0.join("plan.json")
     }
 
-    /// What each film shows, [`super::plan::StudyKey`].
+    /// Content of each film, [`super::plan::StudyKey`].
     pub fn key(&self) -> PathBuf {
         self.0.join("key.json")
     }
@@ -63,17 +66,17 @@ impl StudyFolder {
         self.0.join("public")
     }
 
-    /// Film by its opaque name, 16 hexadecimal digits.
+    /// Path of the film with this opaque name of 16 hexadecimal digits.
     pub fn film(&self, film: &str) -> PathBuf {
         self.public().join("films").join(format!("{film}.mp4"))
     }
 
-    /// Responses, an SQLite database; written by `serve`, not sealed.
+    /// SQLite database of the responses; written by `serve`, not sealed.
     pub fn responses(&self) -> PathBuf {
         self.0.join("responses.sqlite")
     }
 
-    /// Key that signs participants' tokens and the operator's token, readable by its owner alone; written by `serve`.
+    /// Key that signs participants' tokens, and the operator's token. Written by `serve`, readable by its owner only.
     pub fn secret(&self) -> PathBuf {
         self.0.join("secret.json")
     }

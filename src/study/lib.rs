@@ -1,6 +1,7 @@
-//! A user study of gestures, whole: films of several conditions are built and sealed, served to participants, their
-//! responses collected and analysed (Rebol, Guetl, Pietroszek 2021, section V; Kucherenko et al. 2021). `StudyFile` is
-//! what a researcher writes, `folder` what lies on disk, `plan` what each participant sees.
+//! User study of gesture generation: films of several conditions are built and sealed, served to participants in a
+//! browser, and the responses are collected and analysed (Rebol, Guetl, Pietroszek 2021, section V; Kucherenko et al.
+//! 2021). `file` is the study file that a researcher writes, `folder` the layout on disk, `plan` the trials that each
+//! participant sees.
 
 pub mod analyse;
 pub mod build;

@@ -1,12 +1,12 @@
-//! Participants that a wanted power needs, by simulated studies that go through the very analysis: the crossed test
-//! against chance and the crossed test of equivalence. More participants cannot make up for few clips: where the power
-//! stays below what is wanted, that is said.
+//! Number of participants for a required power, by simulated studies analysed like real ones: the crossed test against
+//! chance and the crossed equivalence test. More participants cannot compensate for too few clips; the result reports
+//! when the power stays below the requirement.
 
-use super::analyse::figure::FigureMethod;
+use super::analyse::number_format::percent;
 use super::analyse::outcome::BinaryVote;
-use super::analyse::result::{FigureSettings, ShareAnalysis, ShareMeasure};
+use super::analyse::result::{ShareAnalysis, ShareMeasure, StatisticSettings};
 use super::analyse::share::{CHANCE, ShareCell, share};
-use super::analyse::words::percent;
+use super::analyse::statistic::StatisticMethod;
 use super::simulate::{CrossedDesign, CrossedEffects, crossed_votes};
 use super::stats::equivalence::votes_needed;
 use super::stats::estimate::ConfidenceInterval;
@@ -18,31 +18,31 @@ use statrs::distribution::{ContinuousCDF, Normal};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-/// Fewest and most participants that are tried.
-const FEWEST: usize = 5;
-const MOST: usize = 1280;
-/// Level of all tests.
+/// Range of the search for the number of participants.
+const MIN_PARTICIPANTS: usize = 5;
+const MAX_PARTICIPANTS: usize = 1280;
+/// Significance level of all tests.
 const LEVEL: f64 = 0.05;
 
-/// What is asked.
+/// Assumptions and requirements of a power analysis.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PowerQuestion {
-    /// Votes of each participant.
+    /// Votes per participant.
     pub n_trials: usize,
     pub n_clips: usize,
     pub sd_participants: f64,
     pub sd_clips: f64,
-    /// Wanted power, a share.
+    /// Required power, 0 to 1.
     pub power: f64,
-    /// True share that is to be found different from chance.
+    /// True proportion that the test should distinguish from chance, 0 to 1.
     pub effect: f64,
-    /// Bound of equivalence, a share.
+    /// Equivalence bound on either side of chance, as a proportion.
     pub bound: f64,
     pub n_simulations: usize,
     pub seed: u64,
 }
 
-/// Power of a number of participants.
+/// Simulated power for one number of participants.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PowerRow {
     pub n_participants: usize,
@@ -53,21 +53,22 @@ pub struct PowerRow {
     pub ends: ConfidenceInterval,
 }
 
-/// Answer for one test.
+/// Power curve of one test.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PowerCurve {
-    /// True share.
+    /// True proportion.
     pub share: f64,
-    /// Fewest participants of which the simulated power reaches the wanted one; none of those tried.
+    /// Smallest tried number of participants with the required power; `None` if no tried number has it.
     pub n_participants: Option<usize>,
     pub rows: Vec<PowerRow>,
-    /// Votes by the formula that takes them for independent.
+    /// Number of votes from the closed formula for independent votes.
     pub naive_votes: u64,
-    /// Simulated power of that many votes, in whole participants.
+    /// Simulated power for that number of votes, rounded up to whole participants and limited to the range of the
+    /// search.
     pub at_naive: PowerRow,
 }
 
-/// Answer: difference from chance and equivalence with it.
+/// Result: the test for a difference from chance and the equivalence test.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PowerPlan {
     pub question: PowerQuestion,
@@ -75,8 +76,11 @@ pub struct PowerPlan {
     pub equivalence: PowerCurve,
 }
 
-/// Participants needed for both tests; `tell` hears of each number that was tried.
-pub fn plan(question: &PowerQuestion, tell: &(dyn Fn(&PowerRow) + Sync)) -> Result<PowerPlan> {
+/// Searches the number of participants for both tests; `on_row` is called with each number tried.
+///
+/// # Errors
+/// A quantity of `question` is out of its range.
+pub fn plan(question: &PowerQuestion, on_row: &(dyn Fn(&PowerRow) + Sync)) -> Result<PowerPlan> {
     ensure!(question.n_trials > 0 && question.n_clips > 1, "a participant has at least one trial, a study two clips");
     let (trials, clips) = (question.n_trials, question.n_clips);
     let few = "a participant sees no clip twice; give more clips or fewer trials";
@@ -89,18 +93,20 @@ pub fn plan(question: &PowerQuestion, tell: &(dyn Fn(&PowerRow) + Sync)) -> Resu
     ensure!(deviations.iter().all(|sd| (0.0..=5.0).contains(sd)), "standard deviations are 0 to 5 log odds");
     let z = |share: f64| Normal::standard().inverse_cdf(share);
     let naive = ((z(1.0 - LEVEL / 2.0) + z(question.power)) / (question.effect - CHANCE)).powi(2) / 4.0;
-    let found =
-        |analysis: &ShareAnalysis| analysis.figures.test(FigureMethod::Crossed).is_some_and(|test| test.p < LEVEL);
-    let equivalent =
-        |analysis: &ShareAnalysis| analysis.figures.equivalence(FigureMethod::Crossed).is_some_and(|test| test.passes);
+    let found = |analysis: &ShareAnalysis| {
+        analysis.statistics.test(StatisticMethod::Crossed).is_some_and(|test| test.p < LEVEL)
+    };
+    let equivalent = |analysis: &ShareAnalysis| {
+        analysis.statistics.equivalence(StatisticMethod::Crossed).is_some_and(|test| test.passes)
+    };
     Ok(PowerPlan {
         question: question.clone(),
-        difference: curve(question, question.effect, naive.ceil() as u64, &found, tell),
-        equivalence: curve(question, CHANCE, votes_needed(question.bound, question.power)?, &equivalent, tell),
+        difference: curve(question, question.effect, naive.ceil() as u64, &found, on_row),
+        equivalence: curve(question, CHANCE, votes_needed(question.bound, question.power)?, &equivalent, on_row),
     })
 }
 
-/// Power of `n_participants`: share of simulated studies of which the outcome holds.
+/// Power for `n_participants`: proportion of simulated studies for whose analysis `holds` returns true.
 pub fn power(
     question: &PowerQuestion,
     n_participants: usize,
@@ -111,7 +117,7 @@ pub fn power(
     let effects =
         CrossedEffects { share: share_of_all, sd_participants: question.sd_participants, sd_clips: question.sd_clips };
     let settings =
-        FigureSettings { bound: question.bound, n_draws: 0, with_models: false, ..FigureSettings::default() };
+        StatisticSettings { bound: question.bound, n_draws: 0, with_models: false, ..StatisticSettings::default() };
     let stream = |k: usize| ((n_participants as u64) << 32) + k as u64;
     let one = |k: &usize| holds(&simulated(&design, &effects, &settings, question.seed, stream(*k)));
     let n_found = (0..question.n_simulations).into_par_iter().filter(one).count() as u64;
@@ -125,11 +131,11 @@ pub fn power(
     }
 }
 
-/// Analysis of a simulated study.
+/// Simulates one study and analyses it.
 pub fn simulated(
     design: &CrossedDesign,
     effects: &CrossedEffects,
-    settings: &FigureSettings,
+    settings: &StatisticSettings,
     seed: u64,
     stream: u64,
 ) -> ShareAnalysis {
@@ -138,24 +144,24 @@ pub fn simulated(
     share(&ShareCell { measure: ShareMeasure::GeneratedChosen, speaker: None, condition: None, votes }, settings)
 }
 
-/// Doubles participants until the power is reached, then halves the interval to within a twentieth.
+/// Doubles the number of participants until the power is reached, then bisects to within 5 %.
 fn curve(
     question: &PowerQuestion,
     share: f64,
     naive_votes: u64,
     holds: &(dyn Fn(&ShareAnalysis) -> bool + Sync),
-    tell: &(dyn Fn(&PowerRow) + Sync),
+    on_row: &(dyn Fn(&PowerRow) + Sync),
 ) -> PowerCurve {
     let mut rows: BTreeMap<usize, PowerRow> = BTreeMap::new();
     let mut at = |n: usize| -> PowerRow {
         *rows.entry(n).or_insert_with(|| {
             let row = power(question, n, share, holds);
-            tell(&row);
+            on_row(&row);
             row
         })
     };
-    let (mut low, mut high) = (0, FEWEST);
-    while at(high).power < question.power && high < MOST {
+    let (mut low, mut high) = (0, MIN_PARTICIPANTS);
+    while at(high).power < question.power && high < MAX_PARTICIPANTS {
         (low, high) = (high, 2 * high);
     }
     let is_reached = at(high).power >= question.power;
@@ -163,7 +169,7 @@ fn curve(
         let middle = low + (high - low) / 2;
         if at(middle).power >= question.power { high = middle } else { low = middle }
     }
-    let naive = (naive_votes as usize).div_ceil(question.n_trials).clamp(2, MOST);
+    let naive = (naive_votes as usize).div_ceil(question.n_trials).clamp(2, MAX_PARTICIPANTS);
     let at_naive = at(naive);
     PowerCurve {
         share,
@@ -174,7 +180,7 @@ fn curve(
     }
 }
 
-/// Table for people.
+/// Table for the terminal.
 pub fn text(plan: &PowerPlan) -> String {
     let question = &plan.question;
     let mut text = format!(
@@ -200,7 +206,7 @@ pub fn text(plan: &PowerPlan) -> String {
         text += &match curve.n_participants {
             Some(n) => format!("  {n} participants for a power of {}\n", percent(question.power)),
             None => format!(
-                "  not with {MOST} participants: the {} clips leave too much to chance; take more clips\n",
+                "  not with {MAX_PARTICIPANTS} participants: the {} clips leave too much to chance; take more clips\n",
                 question.n_clips
             ),
         };
@@ -230,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn enough_participants_are_found_and_the_formula_is_too_hopeful() {
+    fn a_sufficient_number_is_found_and_the_formula_is_too_optimistic() {
         let plan = plan(&question(), &|_| {}).unwrap();
         let needed = plan.difference.n_participants.unwrap();
         assert!((15..120).contains(&needed), "{needed}");
@@ -241,10 +247,10 @@ mod tests {
     }
 
     #[test]
-    fn few_clips_bound_the_power() {
+    fn few_clips_limit_the_power() {
         let few = PowerQuestion { n_trials: 4, n_clips: 4, sd_clips: 1.0, n_simulations: 100, ..question() };
         let curve = power(&few, 320, 0.58, &|analysis| {
-            analysis.figures.test(FigureMethod::Crossed).is_some_and(|test| test.p < LEVEL)
+            analysis.statistics.test(StatisticMethod::Crossed).is_some_and(|test| test.p < LEVEL)
         });
         assert!(curve.power < 0.5, "{curve:?}");
         assert!(plan(&PowerQuestion { n_trials: 9, ..few.clone() }, &|_| {}).is_err());

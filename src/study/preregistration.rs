@@ -1,5 +1,5 @@
-//! What is fixed before the first participant: number of participants, tasks, hypotheses with the statistic that judges
-//! each, exclusion rules, settings of the analysis. The analysis marks all else as exploratory.
+//! Pre-registration, fixed before the first participant: number of participants, tasks, hypotheses with their test
+//! statistics, exclusion rules and analysis settings. The analysis marks everything else as exploratory.
 
 use super::file::{AnalysisSettings, ExclusionRules, HypothesisKind, StudyFile, StudyHypothesis};
 use super::plan::TaskDesign;
@@ -8,19 +8,19 @@ use orator_base::stage::workdir;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// Version of the file.
+/// Version of the file format.
 const VERSION: u32 = 1;
 
 /// Pre-registration of a study.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Preregistration {
     pub version: u32,
-    /// Program that made it and its version.
+    /// Program and version that wrote the file.
     pub program: String,
     pub title: String,
-    /// Participants whose responses are wanted; collection ends when as many were not left out.
+    /// Target number of participants who complete the study and are not excluded; collection ends when it is reached.
     pub participants: usize,
-    /// Sessions that are planned at most.
+    /// Number of planned sessions.
     pub sessions: usize,
     pub tasks: Vec<RegisteredTask>,
     pub hypotheses: Vec<RegisteredHypothesis>,
@@ -28,22 +28,22 @@ pub struct Preregistration {
     pub analysis: AnalysisSettings,
 }
 
-/// Task with the votes that it will bring.
+/// Task with its expected number of votes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RegisteredTask {
     pub name: String,
     pub design: TaskDesign,
     pub conditions: Vec<String>,
-    /// Analysed trials a participant.
+    /// Analysed trials per participant.
     pub trials: usize,
     pub votes: usize,
 }
 
-/// Hypothesis with what judges it.
+/// Hypothesis with the statistic that decides it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RegisteredHypothesis {
     pub claim: StudyHypothesis,
-    /// In words: estimate, error, test, adjustment.
+    /// Description: estimate, standard error, test, adjustment.
     pub statistic: String,
 }
 
@@ -73,15 +73,15 @@ impl Preregistration {
         }
     }
 
-    /// Writes the file, atomically.
+    /// Writes the file atomically.
     pub fn write(&self, path: &Path) -> Result<()> {
         workdir::write_file(path, &serde_json::to_vec_pretty(self)?)
     }
 
-    /// Reads the file.
+    /// Reads a pre-registration.
     ///
     /// # Errors
-    /// A file that is missing, damaged or of a later version.
+    /// The file is missing, damaged or of another version.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).with_context(|| {
             format!("cannot read the pre-registration {}; `orator study build` writes one", path.display())
@@ -97,14 +97,14 @@ impl Preregistration {
     }
 }
 
-/// Words for what judges a hypothesis.
+/// Description of the statistic that decides a hypothesis.
 fn statistic(claim: &StudyHypothesis, design: Option<TaskDesign>, alpha: f64) -> String {
     let error = "with the standard error of participants and clips crossed and a t distribution";
     let share = match design {
         Some(TaskDesign::Mismatch) => "share of votes for the matched film",
         _ => "share of right responses",
     };
-    let judged = match claim.kind {
+    let test = match claim.kind {
         HypothesisKind::DiffersFromChance => format!("two-sided test of the {share} against 50 %, {error}"),
         HypothesisKind::GreaterThanChance => {
             format!("two-sided test of the {share} against 50 %, {error}; the share must be above 50 %")
@@ -125,11 +125,11 @@ fn statistic(claim: &StudyHypothesis, design: Option<TaskDesign>, alpha: f64) ->
         }
     };
     let is_one = !claim.per_speaker && claim.conditions.is_empty() && claim.kind != HypothesisKind::Differs;
-    let adjusted = match is_one || claim.kind == HypothesisKind::Equivalence {
+    let adjustment = match is_one || claim.kind == HypothesisKind::Equivalence {
         true => "",
         false => ", p adjusted by Holm where the task has several such tests",
     };
-    format!("{judged}, alpha {alpha}{adjusted}")
+    format!("{test}, alpha {alpha}{adjustment}")
 }
 
 #[cfg(test)]
@@ -138,29 +138,30 @@ mod tests {
     use crate::file::EXAMPLE;
 
     #[test]
-    fn it_holds_what_the_file_says_and_comes_back() {
+    fn a_registration_matches_the_file_and_round_trips() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("study.toml");
         std::fs::write(&path, EXAMPLE).unwrap();
         let file = StudyFile::read(&path).unwrap();
-        let made = Preregistration::new(&file);
-        assert_eq!((made.participants, made.sessions), (100, 150));
-        assert_eq!(made.tasks.iter().map(|task| task.votes).collect::<Vec<_>>(), [2000, 1000]);
-        assert!(made.hypotheses.iter().map(|hypothesis| &hypothesis.claim).eq(&file.hypothesis));
+        let registration = Preregistration::new(&file);
+        assert_eq!((registration.participants, registration.sessions), (100, 150));
+        assert_eq!(registration.tasks.iter().map(|task| task.votes).collect::<Vec<_>>(), [2000, 1000]);
+        assert!(registration.hypotheses.iter().map(|hypothesis| &hypothesis.claim).eq(&file.hypothesis));
         assert!(
-            made.hypotheses[0]
+            registration.hypotheses[0]
                 .statistic
                 .starts_with("two one-sided tests of the share of right responses against 50 % - 10")
         );
         let path = dir.path().join("preregistration.json");
-        made.write(&path).unwrap();
-        assert_eq!(Preregistration::read(&path).unwrap(), made);
-        for (damage, said) in [("{", "is damaged"), ("{}", "is damaged"), (r#""version": 1"#, "version 9")] {
-            let whole = std::fs::read_to_string(&path).unwrap();
-            let damaged = if damage.len() > 2 { whole.replace(damage, r#""version": 9"#) } else { damage.to_owned() };
+        registration.write(&path).unwrap();
+        assert_eq!(Preregistration::read(&path).unwrap(), registration);
+        for (damage, message) in [("{", "is damaged"), ("{}", "is damaged"), (r#""version": 1"#, "version 9")] {
+            let original = std::fs::read_to_string(&path).unwrap();
+            let damaged =
+                if damage.len() > 2 { original.replace(damage, r#""version": 9"#) } else { damage.to_owned() };
             std::fs::write(&path, damaged).unwrap();
-            assert!(Preregistration::read(&path).unwrap_err().to_string().contains(said));
-            std::fs::write(&path, whole).unwrap();
+            assert!(Preregistration::read(&path).unwrap_err().to_string().contains(message));
+            std::fs::write(&path, original).unwrap();
         }
     }
 }

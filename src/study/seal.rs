@@ -1,5 +1,5 @@
-//! Seal of a study: a BLAKE3 hash of each file that was there before the first participant, and one over all, which is
-//! what a researcher publishes beforehand.
+//! Seal of a study: a BLAKE3 hash of each file that exists before the first participant, and a combined hash that a
+//! researcher publishes in advance.
 
 use super::folder::StudyFolder;
 use anyhow::{Context, Result, bail, ensure};
@@ -11,7 +11,7 @@ use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Version of the file.
+/// Version of the file format.
 const VERSION: u32 = 1;
 
 /// Hashes of a study's files.
@@ -19,34 +19,34 @@ const VERSION: u32 = 1;
 #[serde(deny_unknown_fields)]
 pub struct StudySeal {
     pub version: u32,
-    /// BLAKE3 over the lines `FILE HASH` of all files, in their order.
+    /// BLAKE3 of the lines `FILE HASH` of all files in the order of `files`, in hexadecimal digits.
     pub seal: String,
-    /// BLAKE3 of each file, in hexadecimal digits, by its path in the study's folder.
+    /// BLAKE3 of each file in hexadecimal digits, by its path relative to the study folder.
     pub files: BTreeMap<String, String>,
 }
 
-/// Files of a study that are not as they were sealed.
+/// Differences between the files of a study and its seal.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct BrokenSeal {
+pub struct SealMismatch {
     pub changed: Vec<String>,
     pub added: Vec<String>,
     pub missing: Vec<String>,
 }
 
-impl BrokenSeal {
-    pub fn is_whole(&self) -> bool {
+impl SealMismatch {
+    pub fn is_empty(&self) -> bool {
         self.changed.is_empty() && self.added.is_empty() && self.missing.is_empty()
     }
 }
 
-impl fmt::Display for BrokenSeal {
+impl fmt::Display for SealMismatch {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let kinds = [("changed", &self.changed), ("added", &self.added), ("missing", &self.missing)];
-        let said = kinds.iter().filter(|(_, files)| !files.is_empty()).map(|(kind, files)| {
+        let parts = kinds.iter().filter(|(_, files)| !files.is_empty()).map(|(kind, files)| {
             let more = if files.len() > 8 { format!(" and {} more", files.len() - 8) } else { String::new() };
             format!("{kind}: {}{more}", files[..files.len().min(8)].join(", "))
         });
-        write!(f, "{}", said.collect::<Vec<_>>().join("; "))
+        write!(f, "{}", parts.collect::<Vec<_>>().join("; "))
     }
 }
 
@@ -62,10 +62,10 @@ impl StudySeal {
         }
         let files: BTreeMap<String, String> =
             listed.iter().map(|(name, path)| Ok((name.clone(), hash_file(path)?))).collect::<Result<_>>()?;
-        Ok(Self { version: VERSION, seal: over_all(&files), files })
+        Ok(Self { version: VERSION, seal: combined_hash(&files), files })
     }
 
-    /// Writes the seal, atomically: the last file of a build.
+    /// Writes the seal atomically. Written last, so its presence marks a finished build.
     pub fn write(&self, folder: &StudyFolder) -> Result<()> {
         workdir::write_file(&folder.seal(), &serde_json::to_vec_pretty(self)?)
     }
@@ -73,7 +73,7 @@ impl StudySeal {
     /// Reads the seal of a study.
     ///
     /// # Errors
-    /// No seal, one that is damaged, of a later version, or changed itself.
+    /// The seal is missing, damaged, of another version, or does not match its own combined hash.
     pub fn read(folder: &StudyFolder) -> Result<Self> {
         let path = folder.seal();
         let bytes = fs::read(&path).with_context(|| {
@@ -87,53 +87,60 @@ impl StudySeal {
             "{path} has version {} and this program reads {VERSION}: use the one that wrote it",
             read.version
         );
-        ensure!(read.seal == over_all(&read.files), "{path} was changed itself: its hashes do not give {}", read.seal);
+        ensure!(
+            read.seal == combined_hash(&read.files),
+            "{path} was changed itself: its hashes do not give {}",
+            read.seal
+        );
         Ok(read)
     }
 
-    /// Reads the seal and holds every file to it.
+    /// Reads the seal and checks every file against it.
     ///
     /// # Errors
-    /// The files that were changed, added or lost.
+    /// The seal cannot be read, or files were changed, added or removed; the error names them.
     pub fn verify(folder: &StudyFolder) -> Result<Self> {
         let seal = Self::read(folder)?;
-        let broken = seal.compare(folder)?;
+        let mismatch = seal.compare(folder)?;
         ensure!(
-            broken.is_whole(),
-            "{} is not as it was sealed ({broken}): restore those files, or build the study in a new folder",
+            mismatch.is_empty(),
+            "{} is not as it was sealed ({mismatch}): restore those files, or build the study in a new folder",
             folder.dir().display()
         );
         Ok(seal)
     }
 
-    /// Files that are not as they were sealed.
-    pub fn compare(&self, folder: &StudyFolder) -> Result<BrokenSeal> {
-        let mut broken = BrokenSeal::default();
+    /// Compares the study's files with the seal.
+    ///
+    /// # Errors
+    /// A file cannot be listed or read.
+    pub fn compare(&self, folder: &StudyFolder) -> Result<SealMismatch> {
+        let mut mismatch = SealMismatch::default();
         let listed = sealed_files(folder)?;
         for (name, path) in &listed {
             match self.files.get(name) {
                 _ if !path.is_file() => {}
                 Some(hash) if *hash == hash_file(path)? => {}
-                Some(_) => broken.changed.push(name.clone()),
-                None => broken.added.push(name.clone()),
+                Some(_) => mismatch.changed.push(name.clone()),
+                None => mismatch.added.push(name.clone()),
             }
         }
-        let is_there = |name: &String| listed.get(name).is_some_and(|path| path.is_file());
-        broken.missing = self.files.keys().filter(|name| !is_there(name)).cloned().collect();
-        Ok(broken)
+        let exists = |name: &String| listed.get(name).is_some_and(|path| path.is_file());
+        mismatch.missing = self.files.keys().filter(|name| !exists(name)).cloned().collect();
+        Ok(mismatch)
     }
 }
 
-fn over_all(files: &BTreeMap<String, String>) -> String {
+fn combined_hash(files: &BTreeMap<String, String>) -> String {
     let lines: String = files.iter().map(|(name, hash)| format!("{name} {hash}\n")).collect();
     blake3::hash(lines.as_bytes()).to_hex().to_string()
 }
 
-/// Files that a seal covers, by name: the four of the study, whether there or not, and all that participants can reach.
-/// Hidden files are passed over; nobody is served one.
+/// Paths covered by a seal, by relative name: the four files of the study, whether they exist or not, and all files
+/// below `public/`. Hidden files are ignored, because the server never serves them.
 fn sealed_files(folder: &StudyFolder) -> Result<BTreeMap<String, PathBuf>> {
     let mut paths = vec![folder.study_file(), folder.plan(), folder.key(), folder.preregistration()];
-    collect(&folder.public(), &mut paths)?;
+    collect_files(&folder.public(), &mut paths)?;
     let named = paths.into_iter().map(|path| {
         let name = path.strip_prefix(folder.dir()).unwrap_or(&path).to_string_lossy().replace('\\', "/");
         (name, path)
@@ -141,7 +148,7 @@ fn sealed_files(folder: &StudyFolder) -> Result<BTreeMap<String, PathBuf>> {
     Ok(named.collect())
 }
 
-fn collect(dir: &Path, paths: &mut Vec<PathBuf>) -> Result<()> {
+fn collect_files(dir: &Path, paths: &mut Vec<PathBuf>) -> Result<()> {
     let unreadable = || format!("cannot list {}", dir.display());
     for entry in fs::read_dir(dir).with_context(unreadable)? {
         let entry = entry.with_context(unreadable)?;
@@ -150,7 +157,7 @@ fn collect(dir: &Path, paths: &mut Vec<PathBuf>) -> Result<()> {
             continue;
         }
         if kind.is_dir() {
-            collect(&entry.path(), paths)?;
+            collect_files(&entry.path(), paths)?;
         } else {
             let path = entry.path();
             ensure!(kind.is_file(), "{} is no plain file: put the film itself in its place", path.display());
@@ -164,7 +171,7 @@ fn collect(dir: &Path, paths: &mut Vec<PathBuf>) -> Result<()> {
 mod tests {
     use super::*;
 
-    /// Study of four files and two films.
+    /// Study folder with the four sealed files and two films.
     fn study() -> (tempfile::TempDir, StudyFolder) {
         let dir = tempfile::tempdir().unwrap();
         let folder = StudyFolder::new(dir.path());
@@ -177,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_changed_added_or_lost_is_named() {
+    fn changed_added_and_missing_files_are_reported() {
         let (_dir, folder) = study();
         let seal = StudySeal::of(&folder).unwrap();
         assert_eq!(seal.files.len(), 6);
@@ -189,10 +196,10 @@ mod tests {
         fs::write(folder.plan(), "another").unwrap();
         fs::write(folder.film("02"), "more").unwrap();
         fs::remove_file(folder.film("00")).unwrap();
-        let said = StudySeal::verify(&folder).unwrap_err().to_string();
+        let message = StudySeal::verify(&folder).unwrap_err().to_string();
         assert!(
-            said.contains("(changed: plan.json; added: public/films/02.mp4; missing: public/films/00.mp4)"),
-            "{said}"
+            message.contains("(changed: plan.json; added: public/films/02.mp4; missing: public/films/00.mp4)"),
+            "{message}"
         );
         fs::remove_file(folder.key()).unwrap();
         assert!(StudySeal::of(&folder).unwrap_err().to_string().contains("has no key.json"));
@@ -200,27 +207,27 @@ mod tests {
     }
 
     #[test]
-    fn a_damaged_or_changed_seal_is_refused() {
+    fn a_damaged_or_modified_seal_is_refused() {
         let (_dir, folder) = study();
         StudySeal::of(&folder).unwrap().write(&folder).unwrap();
-        let whole = fs::read_to_string(folder.seal()).unwrap();
-        let digit = whole.find("plan.json\": \"").unwrap() + 13;
-        let mut forged = whole.clone();
-        forged.replace_range(digit..=digit, if &whole[digit..=digit] == "0" { "1" } else { "0" });
-        for (text, said) in [
-            (whole[..whole.len() / 2].to_owned(), "is damaged"),
+        let original = fs::read_to_string(folder.seal()).unwrap();
+        let digit = original.find("plan.json\": \"").unwrap() + 13;
+        let mut forged = original.clone();
+        forged.replace_range(digit..=digit, if &original[digit..=digit] == "0" { "1" } else { "0" });
+        for (text, message) in [
+            (original[..original.len() / 2].to_owned(), "is damaged"),
             ("[]".to_owned(), "is damaged"),
             (forged, "was changed itself"),
-            (whole.replace("\"version\": 1", "\"version\": 2"), "version 2"),
+            (original.replace("\"version\": 1", "\"version\": 2"), "version 2"),
         ] {
             fs::write(folder.seal(), text).unwrap();
             let error = StudySeal::verify(&folder).unwrap_err().to_string();
-            assert!(error.contains(said), "{error}");
+            assert!(error.contains(message), "{error}");
         }
     }
 
     #[test]
-    fn a_link_in_the_place_of_a_film_is_refused() {
+    fn a_symlink_instead_of_a_film_is_refused() {
         let (_dir, folder) = study();
         std::os::unix::fs::symlink("/etc/hostname", folder.film("03")).unwrap();
         assert!(StudySeal::of(&folder).unwrap_err().to_string().contains("no plain file"));

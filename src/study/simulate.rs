@@ -1,5 +1,5 @@
-//! Votes of a study that never took place: participants and clips drawn from populations with known effects. Power and
-//! the checks of the analysis rest on them.
+//! Simulated votes: participants and clips are drawn from populations with known effects. Used by the power analysis
+//! and by tests of the analysis.
 
 use super::stats::cluster::votes::ClipVote;
 use super::stats::glmm::fit::{integrated, logistic};
@@ -8,7 +8,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use serde::Serialize;
 
-/// Who votes about what: every participant about as many different clips, every clip about as often.
+/// Assignment of clips to participants. Each participant votes on `n_trials` consecutive clips (cyclically), so that
+/// clips receive nearly equal numbers of votes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct CrossedDesign {
     pub n_participants: usize,
@@ -17,19 +18,20 @@ pub struct CrossedDesign {
     pub n_clips: usize,
 }
 
-/// Population that participants and clips are drawn from.
+/// Distribution from which participants and clips are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CrossedEffects {
-    /// Share of successes over all participants and clips.
+    /// Proportion of successes over all participants and clips, 0 to 1.
     pub share: f64,
-    /// Standard deviation of participants, log odds.
+    /// Standard deviation of the participants' random intercepts, log odds.
     pub sd_participants: f64,
-    /// Standard deviation of clips, log odds.
+    /// Standard deviation of the clips' random intercepts, log odds.
     pub sd_clips: f64,
 }
 
 impl CrossedEffects {
-    /// Log odds of a typical participant and clip that give the share over all, by bisection.
+    /// Fixed intercept (log odds of a participant and clip with effect 0) that gives `share` as the marginal
+    /// proportion, found by bisection.
     pub fn log_odds(&self) -> f64 {
         let sd = self.sd_participants.hypot(self.sd_clips);
         let (mut low, mut high) = (-50.0, 50.0);
@@ -41,23 +43,23 @@ impl CrossedEffects {
     }
 }
 
-/// Votes of a study, drawn anew for each `stream` of the seed.
+/// Votes of one simulated study; each `stream` of the seed is an independent study.
 pub fn crossed_votes(design: &CrossedDesign, effects: &CrossedEffects, seed: u64, stream: u64) -> Vec<ClipVote> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(stream);
-    let mut drawn =
+    let mut draw =
         |n: usize, sd: f64| -> Vec<f64> { (0..n).map(|_| sd * rng.sample::<f64, _>(StandardNormal)).collect() };
-    let participants = drawn(design.n_participants, effects.sd_participants);
-    let clips = drawn(design.n_clips, effects.sd_clips);
+    let participants = draw(design.n_participants, effects.sd_participants);
+    let clips = draw(design.n_clips, effects.sd_clips);
     let mean = effects.log_odds();
-    let places =
+    let assignments =
         (0..design.n_participants).flat_map(|participant| (0..design.n_trials).map(move |trial| (participant, trial)));
     let mut vote = |(participant, trial): (usize, usize)| {
         let clip = (participant * design.n_trials + trial) % design.n_clips.max(1);
         let is_success = rng.random::<f64>() < logistic(mean + participants[participant] + clips[clip]);
         ClipVote { participant, clip, score: f64::from(u8::from(is_success)) }
     };
-    places.map(&mut vote).collect()
+    assignments.map(&mut vote).collect()
 }
 
 #[cfg(test)]
@@ -65,7 +67,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn shares_and_balance_are_those_asked_for() {
+    fn simulated_shares_and_balance_match_the_design() {
         let effects = CrossedEffects { share: 0.6, sd_participants: 0.5, sd_clips: 0.5 };
         assert!(effects.log_odds() > (0.6f64 / 0.4).ln());
         assert!(CrossedEffects { share: 0.5, ..effects }.log_odds().abs() < 1e-9);

@@ -1,9 +1,10 @@
-//! What a participant answers in a trial, and the record of one answered trial, which `serve` exports and the analysis reads.
+//! Response of a participant to a trial, and the record of one answered trial that `serve` exports and the analysis
+//! reads.
 
 use super::plan::{TaskDesign, TrialPhase};
 use serde::{Deserialize, Serialize};
 
-/// Film of a pair.
+/// Position of a film on the screen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ScreenSide {
@@ -17,17 +18,17 @@ pub enum ScreenSide {
 pub enum Response {
     /// Turing test and mismatch: the chosen film.
     Side(ScreenSide),
-    /// Turing test of one film: whether it was taken for real.
+    /// Turing test with a single film: whether it was judged real.
     Real(bool),
-    /// Preference from -2, the left film clearly, to 2, the right film clearly.
+    /// Preference: -2 for the left film clearly to 2 for the right film clearly.
     Step(i8),
-    /// Sliders: one score from 0 to 100 for each film, from left to right.
+    /// Sliders: one score from 0 to 100 for each film, left to right.
     Scores(Vec<u8>),
-    /// Attention check: the number seen, 10 to 99.
+    /// Attention check: the number that the participant read, 10 to 99.
     Number(u16),
 }
 
-/// Columns of a table of votes: the fields of [`StudyVote`] in their order.
+/// Columns of a table of votes: the fields of [`StudyVote`] in declaration order.
 pub const VOTE_COLUMNS: [&str; 15] = [
     "participant",
     "task",
@@ -46,30 +47,31 @@ pub const VOTE_COLUMNS: [&str; 15] = [
     "completed",
 ];
 
-/// One answered trial with all that the analysis needs: a row of `orator study export`.
+/// One answered trial with all data that the analysis needs; one row of `orator study export`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StudyVote {
-    /// Random name of the participant.
+    /// Random identifier of the participant.
     pub participant: String,
     pub task: String,
     pub design: TaskDesign,
     pub phase: TrialPhase,
-    /// Place in the session, from 1.
+    /// Position in the session, from 1.
     pub trial: u32,
     pub clip: String,
     pub speaker: String,
-    /// Conditions of the films from left to right.
+    /// Conditions of the films, left to right.
     pub conditions: Vec<String>,
     pub response: Response,
-    /// Right response, where there is one: the real film's, the matched film's, the shown number.
+    /// Correct response, if the task has one: the side of the real or the matched film, whether a single film is real,
+    /// or the number of an attention check.
     pub expected: Option<Response>,
-    /// Seconds in which a film had stopped for want of data.
+    /// Seconds during which playback was stalled for lack of data.
     pub stalled_secs: f64,
-    /// Seconds in which the page was not in front.
+    /// Seconds during which the page was hidden or unfocused.
     pub unfocused_secs: f64,
     /// Seconds from the end of the films to the answer.
     pub response_secs: f64,
-    /// How often the films were played.
+    /// Number of times the films were played.
     pub plays: u32,
     /// Whether the participant completed the session.
     pub completed: bool,
@@ -77,7 +79,7 @@ pub struct StudyVote {
 
 #[cfg(test)]
 impl StudyVote {
-    /// Vote of the main phase for tests.
+    /// Main-phase vote for unit tests.
     pub fn example(design: TaskDesign, conditions: &[&str], response: Response) -> Self {
         Self {
             participant: "p".to_owned(),

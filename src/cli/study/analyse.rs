@@ -5,7 +5,7 @@ use crate::cli::sandbox::enter_sandbox;
 use crate::cli::ui::Ui;
 use anyhow::{Context, Result, ensure};
 use orator_base::stage::workdir;
-use orator_study::analyse::result::{FigureSettings, StudyAnalysis};
+use orator_study::analyse::result::{StatisticSettings, StudyAnalysis};
 use orator_study::analyse::votes::columns::ColumnNames;
 use orator_study::analyse::votes::read::VotesRead;
 use orator_study::analyse::{Registration, analyse, page, text};
@@ -107,7 +107,7 @@ fn check_report(args: &Args) -> Result<()> {
 
 fn analysis(args: &Args) -> Result<StudyAnalysis> {
     let name = name(&args.source)?;
-    let settings = |registered: FigureSettings| FigureSettings {
+    let settings = |registered: StatisticSettings| StatisticSettings {
         bound: args.bound / 100.0,
         n_draws: args.draws.unwrap_or(registered.n_draws),
         seed: args.seed.unwrap_or(registered.seed),
@@ -115,7 +115,7 @@ fn analysis(args: &Args) -> Result<StudyAnalysis> {
     };
     if !args.source.is_dir() {
         let read = VotesRead::of_file(&args.source, &args.columns, args.design)?;
-        let settings = settings(FigureSettings::default());
+        let settings = settings(StatisticSettings::default());
         return analyse([&name, &name], &read, None, &settings).with_context(|| args.source.display().to_string());
     }
     let options = [(args.design.is_some(), "--design"), (args.columns != ColumnNames::default(), "--columns")];
@@ -125,7 +125,7 @@ fn analysis(args: &Args) -> Result<StudyAnalysis> {
     let folder = StudyFolder::new(&args.source);
     let registration = Registration::of_folder(&folder)?;
     let read = VotesRead::of_votes(export::responses(&folder)?.1);
-    let settings = settings(FigureSettings::from(&registration.settings));
+    let settings = settings(StatisticSettings::from(&registration.settings));
     analyse([&registration.title, &name], &read, Some(&registration), &settings)
         .with_context(|| args.source.display().to_string())
 }

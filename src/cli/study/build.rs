@@ -7,7 +7,7 @@ use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator_base::stage::counted;
 use orator_study::build::{BuiltSpeaker, BuiltStudy, build};
-use orator_study::file::{ConditionSource, StudyFile, filled};
+use orator_study::file::{ConditionSource, StudyFile, fill_pattern};
 use orator_study::stimuli::film::SIZE;
 use serde_json::json;
 use std::fmt::Write as _;
@@ -36,7 +36,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     // Writes are allowed in the output folder itself and for the locks of the inputs.
     let checkpoints = file.speaker.iter().flat_map(|speaker| {
         file.condition.iter().filter_map(|condition| match &condition.source {
-            ConditionSource::Checkpoint(path) => Some(filled(path, &speaker.name, "")),
+            ConditionSource::Checkpoint(path) => Some(fill_pattern(path, &speaker.name, "")),
             _ => None,
         })
     });

@@ -6,7 +6,7 @@ use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator_study::export::{TableForm, export};
 use orator_study::folder::StudyFolder;
-use orator_study::server::start::StudyServer;
+use orator_study::server::study_server::StudyServer;
 use serde_json::json;
 use std::net::{IpAddr, SocketAddr};
 use std::path::PathBuf;
@@ -56,10 +56,11 @@ struct ServeArgs {
     /// Port to listen at; 0: any that is free.
     #[arg(long, default_value_t = 8080)]
     port: u16,
-    /// Name by which a proxy serves the study (study.example.org). Requests that name a host other than this and the
-    /// listened address get status 421; the limit of connections per address is then left to the proxy.
-    #[arg(long, value_name = "NAME")]
-    host_name: Option<String>,
+    /// Name by which a proxy serves the study (study.example.org); may be repeated. Requests that name a host other
+    /// than these and the listened address get status 421; loopback and private addresses, where the proxy is, then have
+    /// no limit of connections.
+    #[arg(long = "host-name", value_name = "NAME")]
+    host_names: Vec<String>,
     /// Minutes without an answer after which a participant's place is given to another; before the first answer 5 minutes
     /// and twice the films' length at most.
     #[arg(long, value_name = "MINUTES", default_value_t = 60)]
@@ -73,7 +74,7 @@ fn serve(args: &ServeArgs, ui: &Ui) -> Result<Outcome> {
     let title = server.study().title.clone();
     let counts = format!("{} sessions, {} films", server.study().plan.sessions.len(), server.study().n_films());
     let token = server.operator_token().to_owned();
-    server.run(SocketAddr::new(args.listen, args.port), args.host_name.clone(), |address| {
+    server.run(SocketAddr::new(args.listen, args.port), &args.host_names, |address| {
         let page = format!("http://{address}/");
         let text = format!("{title}: {counts}\nparticipants: {page}\noperator:     {page}operator, token {token}");
         let facts = json!({ "address": page, "operator_address": format!("{page}operator"), "operator_token": token });

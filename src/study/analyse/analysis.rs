@@ -1,9 +1,9 @@
-//! Analysis of a whole study: exclusions, every task with and without them, marks of what was registered, notes.
+//! Analysis of a study: exclusions, every task with and without them, registration status, notes.
 
 use super::exclusion::exclude;
 use super::methods::methods;
 use super::registration::{Registration, judge};
-use super::result::{FigureSettings, StudyAnalysis, TaskAnalysis};
+use super::result::{StatisticSettings, StudyAnalysis, TaskAnalysis};
 use super::task::task;
 use super::votes::read::VotesRead;
 use crate::file::{HypothesisKind, StudyHypothesis};
@@ -11,12 +11,15 @@ use crate::preregistration::RegisteredHypothesis;
 use crate::vote::StudyVote;
 use anyhow::{Result, ensure};
 
-/// Analysis of the votes of `source`, which is called `title`.
+/// Analyses the votes of the study `title`, read from `source`.
+///
+/// # Errors
+/// There is no vote of the main phase, the exclusion rules exclude all of them, or a task has votes of several designs.
 pub fn analyse(
     [title, source]: [&str; 2],
     read: &VotesRead,
     registration: Option<&Registration>,
-    settings: &FigureSettings,
+    settings: &StatisticSettings,
 ) -> Result<StudyAnalysis> {
     let (kept, mut exclusions) = exclude(read, registration.map(|registration| &registration.exclusion));
     exclusions.registered = registration.is_some_and(|registration| registration.seal.is_some());
@@ -25,7 +28,7 @@ pub fn analyse(
     let hypotheses = registration.map(|registration| &registration.hypotheses[..]).unwrap_or_default();
     let mut tasks = tasks(&kept, hypotheses, settings)?;
     let judged = judge(&mut tasks, hypotheses, settings.level());
-    let without_exclusions = match exclusions.leaves_out() {
+    let without_exclusions = match exclusions.any_excluded() {
         true => self::tasks(&exclude(read, None).0, &[], settings)?,
         false => Vec::new(),
     };
@@ -50,11 +53,11 @@ pub fn analyse(
     Ok(analysis)
 }
 
-/// Tasks in the order of their first vote.
+/// Analyses the tasks in the order of their first votes.
 fn tasks(
     votes: &[&StudyVote],
     hypotheses: &[RegisteredHypothesis],
-    settings: &FigureSettings,
+    settings: &StatisticSettings,
 ) -> Result<Vec<TaskAnalysis>> {
     let mut names: Vec<&str> = Vec::new();
     for vote in votes {
@@ -68,12 +71,12 @@ fn tasks(
         let mut claims = hypotheses.iter().map(|hypothesis| &hypothesis.claim);
         let bound = claims.find(equivalence).and_then(|claim| claim.points);
         let bound = bound.map_or(settings.bound, |points| points / 100.0);
-        task(name, &own, &FigureSettings { bound, ..settings.clone() })
+        task(name, &own, &StatisticSettings { bound, ..settings.clone() })
     };
     names.into_iter().map(one).collect()
 }
 
-/// What a reader must know beside the figures.
+/// Notes that a reader must know in addition to the statistics.
 fn notes(analysis: &StudyAnalysis, read: &VotesRead, registration: Option<&Registration>) -> Vec<String> {
     let mut notes = Vec::new();
     if !read.refused.is_empty() {

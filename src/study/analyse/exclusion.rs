@@ -1,4 +1,4 @@
-//! Whose votes are left out, by rules that were fixed before, and how many each rule leaves out by itself.
+//! Exclusion of votes by predefined rules, with the number that each rule alone excludes.
 
 use super::votes::read::VotesRead;
 use crate::file::ExclusionRules;
@@ -7,9 +7,9 @@ use crate::vote::StudyVote;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What the rules leave out. Votes are those of the main phase.
+/// Summary of the exclusions. Counts refer to votes of the main phase.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct ExclusionAccount {
+pub struct ExclusionSummary {
     /// Whether the rules were registered before the data were seen.
     pub registered: bool,
     pub n_participants: usize,
@@ -19,56 +19,56 @@ pub struct ExclusionAccount {
     pub rules: Vec<ExclusionCount>,
 }
 
-/// What one rule leaves out by itself.
+/// Effect of one rule alone.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ExclusionCount {
     pub rule: String,
-    /// Participants left out whole.
+    /// Participants excluded entirely.
     pub n_participants: usize,
-    /// Votes left out, those of such participants with them.
+    /// Votes excluded, including those of excluded participants.
     pub n_votes: usize,
-    /// Why the rule cannot be applied.
+    /// Reason why the rule cannot be applied.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unknown: Option<String>,
 }
 
-/// Rule with the fields it looks at.
+/// Exclusion rule with the field that it needs.
 struct ExclusionTest<'r> {
-    words: String,
+    description: String,
     field: &'static str,
-    judge: LeftOut<'r>,
+    predicate: Excluded<'r>,
 }
 
-enum LeftOut<'r> {
-    /// Participants that are left out.
+enum Excluded<'r> {
+    /// Identifiers of excluded participants.
     Participants(BTreeSet<&'r str>),
-    /// Whether a vote is left out.
+    /// Predicate of excluded votes.
     Votes(Box<dyn Fn(&StudyVote) -> bool>),
 }
 
-/// Votes of the main phase that all rules keep, and the account.
-pub fn exclude<'v>(read: &'v VotesRead, rules: Option<&ExclusionRules>) -> (Vec<&'v StudyVote>, ExclusionAccount) {
+/// Votes of the main phase that no rule excludes, and a summary of the exclusions.
+pub fn exclude<'v>(read: &'v VotesRead, rules: Option<&ExclusionRules>) -> (Vec<&'v StudyVote>, ExclusionSummary) {
     let main: Vec<&StudyVote> = read.votes.iter().filter(|vote| vote.phase == TrialPhase::Main).collect();
-    let applied = rules.map(|rules| of_rules(rules, &read.votes)).unwrap_or_default();
-    let is_left_out = |rule: &ExclusionTest, vote: &StudyVote| match &rule.judge {
-        LeftOut::Participants(names) => names.contains(vote.participant.as_str()),
-        LeftOut::Votes(judge) => judge(vote),
+    let applied = rules.map(|rules| tests_of_rules(rules, &read.votes)).unwrap_or_default();
+    let is_excluded = |rule: &ExclusionTest, vote: &StudyVote| match &rule.predicate {
+        Excluded::Participants(names) => names.contains(vote.participant.as_str()),
+        Excluded::Votes(predicate) => predicate(vote),
     };
     let count = |rule: &ExclusionTest| {
-        let left_out: Vec<_> = main.iter().filter(|vote| is_left_out(rule, vote)).collect();
-        let n_participants = match &rule.judge {
-            LeftOut::Participants(_) => left_out.iter().map(|vote| &vote.participant).collect::<BTreeSet<_>>().len(),
-            LeftOut::Votes(_) => 0,
+        let excluded: Vec<_> = main.iter().filter(|vote| is_excluded(rule, vote)).collect();
+        let n_participants = match &rule.predicate {
+            Excluded::Participants(_) => excluded.iter().map(|vote| &vote.participant).collect::<BTreeSet<_>>().len(),
+            Excluded::Votes(_) => 0,
         };
         let unknown = read.absent.contains(&rule.field).then(|| format!("there is no column {}", rule.field));
-        ExclusionCount { rule: rule.words.clone(), n_participants, n_votes: left_out.len(), unknown }
+        ExclusionCount { rule: rule.description.clone(), n_participants, n_votes: excluded.len(), unknown }
     };
     let n_participants =
         |votes: &[&StudyVote]| votes.iter().map(|vote| &vote.participant).collect::<BTreeSet<_>>().len();
     let counts = applied.iter().map(count).collect();
     let kept: Vec<&StudyVote> =
-        main.iter().copied().filter(|vote| !applied.iter().any(|rule| is_left_out(rule, vote))).collect();
-    let account = ExclusionAccount {
+        main.iter().copied().filter(|vote| !applied.iter().any(|rule| is_excluded(rule, vote))).collect();
+    let summary = ExclusionSummary {
         registered: rules.is_some(),
         n_participants: n_participants(&main),
         n_votes: main.len(),
@@ -76,12 +76,12 @@ pub fn exclude<'v>(read: &'v VotesRead, rules: Option<&ExclusionRules>) -> (Vec<
         n_votes_kept: kept.len(),
         rules: counts,
     };
-    (kept, account)
+    (kept, summary)
 }
 
-fn of_rules<'v>(rules: &ExclusionRules, votes: &'v [StudyVote]) -> Vec<ExclusionTest<'v>> {
+fn tests_of_rules<'v>(rules: &ExclusionRules, votes: &'v [StudyVote]) -> Vec<ExclusionTest<'v>> {
     let mut applied = Vec::new();
-    let mut add = |words: String, field, judge| applied.push(ExclusionTest { words, field, judge });
+    let mut add = |description: String, field, predicate| applied.push(ExclusionTest { description, field, predicate });
     if let Some(most) = rules.failed_checks {
         let mut n_failed: BTreeMap<&str, u32> = BTreeMap::new();
         let is_failed = |vote: &&StudyVote| {
@@ -89,26 +89,26 @@ fn of_rules<'v>(rules: &ExclusionRules, votes: &'v [StudyVote]) -> Vec<Exclusion
         };
         votes.iter().filter(is_failed).for_each(|vote| *n_failed.entry(&vote.participant).or_default() += 1);
         let names = n_failed.into_iter().filter(|(_, n)| *n >= most.max(1)).map(|(name, _)| name).collect();
-        add(format!("failed {most} or more attention checks"), "phase", LeftOut::Participants(names));
+        add(format!("failed {most} or more attention checks"), "phase", Excluded::Participants(names));
     }
     if rules.incomplete {
         let names = votes.iter().filter(|vote| !vote.completed).map(|vote| vote.participant.as_str()).collect();
-        add("did not complete the session".to_owned(), "completed", LeftOut::Participants(names));
+        add("did not complete the session".to_owned(), "completed", Excluded::Participants(names));
     }
     if let Some(most) = rules.stalled_secs {
-        let judge = LeftOut::Votes(Box::new(move |vote| vote.stalled_secs > most));
-        add(format!("trial: films stalled over {most} s"), "stalled_secs", judge);
+        let predicate = Excluded::Votes(Box::new(move |vote| vote.stalled_secs > most));
+        add(format!("trial: films stalled over {most} s"), "stalled_secs", predicate);
     }
     if let Some(most) = rules.unfocused_secs {
-        let judge = LeftOut::Votes(Box::new(move |vote| vote.unfocused_secs > most));
-        add(format!("trial: page not in front over {most} s"), "unfocused_secs", judge);
+        let predicate = Excluded::Votes(Box::new(move |vote| vote.unfocused_secs > most));
+        add(format!("trial: page not in front over {most} s"), "unfocused_secs", predicate);
     }
     applied
 }
 
-impl ExclusionAccount {
-    /// Whether any vote was left out.
-    pub fn leaves_out(&self) -> bool {
+impl ExclusionSummary {
+    /// Whether any vote was excluded.
+    pub fn any_excluded(&self) -> bool {
         self.n_votes_kept < self.n_votes
     }
 }
@@ -119,7 +119,7 @@ mod tests {
     use crate::analyse::votes::columns::ColumnNames;
 
     #[test]
-    fn each_rule_is_counted_by_itself() {
+    fn each_rule_is_counted_separately() {
         let text = "participant,clip,phase,conditions,response,expected,stalled_secs,unfocused_secs,completed\n\
             a,1,main,x|y,left,right,0,0,1\n\
             a,,attention-check,,42,42,0,0,1\n\
@@ -134,13 +134,13 @@ mod tests {
         std::fs::write(&file, text).unwrap();
         let read = VotesRead::of_file(&file, &ColumnNames::default(), None).unwrap();
         assert_eq!(read.refused, []);
-        let (kept, account) = exclude(&read, Some(&ExclusionRules::default()));
-        let counts: Vec<_> = account.rules.iter().map(|rule| (rule.n_participants, rule.n_votes)).collect();
+        let (kept, summary) = exclude(&read, Some(&ExclusionRules::default()));
+        let counts: Vec<_> = summary.rules.iter().map(|rule| (rule.n_participants, rule.n_votes)).collect();
         assert_eq!(counts, [(1, 1), (1, 1), (0, 1), (0, 1)]);
         assert_eq!(kept.iter().map(|vote| vote.clip.as_str()).collect::<Vec<_>>(), ["1", "3"]);
-        assert_eq!((account.n_participants, account.n_participants_kept), (4, 2));
-        assert_eq!((account.n_votes, account.n_votes_kept, account.leaves_out()), (6, 2, true));
-        let (all, account) = exclude(&read, None);
-        assert_eq!((all.len(), account.rules.len(), account.registered), (6, 0, false));
+        assert_eq!((summary.n_participants, summary.n_participants_kept), (4, 2));
+        assert_eq!((summary.n_votes, summary.n_votes_kept, summary.any_excluded()), (6, 2, true));
+        let (all, summary) = exclude(&read, None);
+        assert_eq!((all.len(), summary.rules.len(), summary.registered), (6, 0, false));
     }
 }

@@ -1,15 +1,15 @@
-//! Paragraph for the methods section of a paper, from the analysis alone: plain text, sources in brackets.
+//! Generates a paragraph for the methods section of a paper from an analysis: plain text with citations in parentheses.
 
-use super::figure::FigureMethod;
+use super::number_format::{count, list, p_value, percent, percents, points};
 use super::result::{ShareMeasure, StudyAnalysis, TaskAnalysis};
-use super::words::{count, list, p_value, percent, percents, points};
+use super::statistic::StatisticMethod;
 use crate::plan::TaskDesign;
 use std::fmt::Write as _;
 
-/// Sources, a line each: as a method cites it, and in full.
+/// References, one per line: the citation as used in the text, and the full reference.
 const SOURCES: &str = include_str!("sources.txt");
 
-/// The paragraph, and the list of its sources.
+/// Methods paragraph with its list of references.
 pub fn methods(analysis: &StudyAnalysis) -> String {
     let mut text = participants(analysis);
     text += &exclusions(analysis);
@@ -25,11 +25,11 @@ pub fn methods(analysis: &StudyAnalysis) -> String {
 }
 
 fn participants(analysis: &StudyAnalysis) -> String {
-    let account = &analysis.exclusions;
+    let summary = &analysis.exclusions;
     let mut text = format!(
         "{} participants gave {} votes in {}. ",
-        count(account.n_participants),
-        count(account.n_votes),
+        count(summary.n_participants),
+        count(summary.n_votes),
         match analysis.tasks.len() {
             1 => "one task".to_owned(),
             n => format!("{n} tasks"),
@@ -43,8 +43,8 @@ fn participants(analysis: &StudyAnalysis) -> String {
 }
 
 fn exclusions(analysis: &StudyAnalysis) -> String {
-    let account = &analysis.exclusions;
-    if account.rules.is_empty() {
+    let summary = &analysis.exclusions;
+    if summary.rules.is_empty() {
         return "No vote was excluded. ".to_owned();
     }
     let rule = |count_of: &super::exclusion::ExclusionCount| match &count_of.unknown {
@@ -58,9 +58,9 @@ fn exclusions(analysis: &StudyAnalysis) -> String {
     format!(
         "By rules fixed before the study, votes were excluded of participants or trials that {}; {} participants and {} \
          votes remain. ",
-        list(&account.rules.iter().map(rule).collect::<Vec<_>>()),
-        count(account.n_participants_kept),
-        count(account.n_votes_kept)
+        list(&summary.rules.iter().map(rule).collect::<Vec<_>>()),
+        count(summary.n_participants_kept),
+        count(summary.n_votes_kept)
     )
 }
 
@@ -95,8 +95,9 @@ fn of_task(task: &TaskAnalysis) -> String {
 
 fn statistics(analysis: &StudyAnalysis) -> String {
     let settings = &analysis.settings;
-    let is_used =
-        |method: FigureMethod| analysis.tasks.iter().any(|task| task.origins().any(|origin| origin.method == method));
+    let is_used = |method: StatisticMethod| {
+        analysis.tasks.iter().any(|task| task.origins().any(|origin| origin.method == method))
+    };
     let mut text = format!(
         "Votes of one participant, and votes about one clip, are not independent (Clark 1973); estimates have standard \
          errors with participants and clips crossed (Cameron et al. 2011), judged by the t distribution with \
@@ -110,19 +111,19 @@ fn statistics(analysis: &StudyAnalysis) -> String {
             list(&bounds(analysis))
         );
     }
-    if is_used(FigureMethod::SignFlip) {
+    if is_used(StatisticMethod::SignFlip) {
         text += "Sign flips of whole participants or clips, whichever are fewer, test the same without a t distribution (MacKinnon et al. 2021). ";
     }
-    if is_used(FigureMethod::Sides) {
+    if is_used(StatisticMethod::Sides) {
         text += "The permutation test of sides is exact, over all assignments of the real film to left and right within a participant. ";
     }
     if analysis.tasks.iter().flat_map(|task| &task.shares).any(|share| share.model.is_some()) {
         text += "Mixed logistic regressions have random intercepts of participants and clips (Laplace approximation, as in Bates et al. 2015). ";
     }
-    if is_used(FigureMethod::Wilcoxon) {
+    if is_used(StatisticMethod::Wilcoxon) {
         text += "Pairs of conditions were also compared by Wilcoxon's signed ranks of participants' mean differences (Wilcoxon 1945). ";
     }
-    if is_used(FigureMethod::Friedman) {
+    if is_used(StatisticMethod::Friedman) {
         text +=
             "All conditions together were compared by Friedman's test of participants' mean scores (Friedman 1937). ";
     }
@@ -138,9 +139,9 @@ fn statistics(analysis: &StudyAnalysis) -> String {
     text
 }
 
-/// Bounds of the equivalence tests, points of percent.
+/// Bounds of the equivalence tests, percentage points.
 fn bounds(analysis: &StudyAnalysis) -> Vec<String> {
-    let tests = analysis.tasks.iter().flat_map(|task| &task.shares).flat_map(|share| &share.figures.equivalence);
+    let tests = analysis.tasks.iter().flat_map(|task| &task.shares).flat_map(|share| &share.statistics.equivalence);
     let mut bounds: Vec<String> = tests.map(|test| points(test.bound)).collect();
     bounds.sort();
     bounds.dedup();
@@ -157,22 +158,22 @@ fn registered(analysis: &StudyAnalysis) -> String {
     }
 }
 
-/// Headline figures.
+/// Sentences with the headline statistics.
 fn results(analysis: &StudyAnalysis) -> String {
     let mut text = String::new();
     for task in &analysis.tasks {
         for share in task.shares.iter().filter(|share| share.measure != ShareMeasure::TakenForReal) {
-            let figures = &share.figures;
+            let statistics = &share.statistics;
             let Some((interval, test)) =
-                figures.interval(FigureMethod::Crossed).zip(figures.test(FigureMethod::Crossed))
+                statistics.interval(StatisticMethod::Crossed).zip(statistics.test(StatisticMethod::Crossed))
             else {
                 continue;
             };
             let freedom = test.degrees_of_freedom.map(|freedom| format!("({freedom:.1})")).unwrap_or_default();
             let statistic = test.statistic.map(|t| format!("t{freedom} = {t:.2}, ")).unwrap_or_default();
             let adjusted = test.adjusted_p.map(|p| format!(", {} after Holm", p_value(p))).unwrap_or_default();
-            let equivalence = figures
-                .equivalence(FigureMethod::Crossed)
+            let equivalence = statistics
+                .equivalence(StatisticMethod::Crossed)
                 .map(|test| format!("; equivalence within \u{b1}{} points {}", points(test.bound), p_value(test.p)));
             let _ = write!(
                 text,
@@ -186,7 +187,7 @@ fn results(analysis: &StudyAnalysis) -> String {
             );
         }
         for row in &task.scores {
-            let interval = row.figures.interval(FigureMethod::Median);
+            let interval = row.statistics.interval(StatisticMethod::Median);
             let interval =
                 interval.map(|interval| format!(" [{}, {}]", interval.low, interval.high)).unwrap_or_default();
             text +=

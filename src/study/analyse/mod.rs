@@ -1,23 +1,23 @@
-//! Analysis of a study's votes. `votes` reads them, `exclusion` leaves out what was agreed, `outcome` turns answers to
-//! numbers, `share` and `pair` judge them by `stats`, `task` and `analysis` gather all in the one `result`, from which
-//! `verdict`, `methods`, `text` and `page` speak.
+//! Analysis of a study's votes. `votes` reads them, `exclusion` applies the exclusion rules, `outcome` converts
+//! responses to scores, `share` and `pair` test them with `stats`, `task` and `analysis` collect everything in a
+//! `result`, which `verdict`, `methods`, `text` and `page` present.
 
 pub mod analysis;
 pub mod exclusion;
-pub mod figure;
 pub mod methods;
+pub mod number_format;
 pub mod outcome;
 pub mod page;
 pub mod pair;
 pub mod registration;
 pub mod result;
 pub mod share;
+pub mod statistic;
 pub mod strength;
 pub mod task;
 pub mod text;
 pub mod verdict;
 pub mod votes;
-pub mod words;
 
 pub use analysis::analyse;
 pub use registration::Registration;

@@ -1,4 +1,4 @@
-//! Votes of a task as numbers: participants and clips numbered, answers turned to scores.
+//! Converts the votes of a task to numbers: indices of participants and clips, and scores.
 
 use super::result::ShareMeasure;
 use crate::plan::TaskDesign;
@@ -6,7 +6,7 @@ use crate::stats::cluster::votes::ClipVote;
 use crate::vote::{Response, ScreenSide, StudyVote};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Numbers of participants and clips by their names, the same for all votes of a task.
+/// Indices of participants and clips by name, common to all votes of a task.
 #[derive(Clone, Debug, Default)]
 pub struct Numbering<'v> {
     participants: BTreeMap<&'v str, usize>,
@@ -20,12 +20,12 @@ impl<'v> Numbering<'v> {
             numbering.participants.insert(&vote.participant, 0);
             numbering.clips.insert((&vote.speaker, &vote.clip), 0);
         }
-        numbering.participants.values_mut().enumerate().for_each(|(number, place)| *place = number);
-        numbering.clips.values_mut().enumerate().for_each(|(number, place)| *place = number);
+        numbering.participants.values_mut().enumerate().for_each(|(number, index)| *index = number);
+        numbering.clips.values_mut().enumerate().for_each(|(number, index)| *index = number);
         numbering
     }
 
-    /// Vote of this score.
+    /// Numeric vote with this score.
     pub fn vote(&self, vote: &StudyVote, score: f64) -> ClipVote {
         let clip = (vote.speaker.as_str(), vote.clip.as_str());
         ClipVote {
@@ -36,36 +36,37 @@ impl<'v> Numbering<'v> {
     }
 }
 
-/// Numbers of participants and of clips that votes are of.
+/// Number of distinct participants and of distinct clips.
 pub fn distinct<'v>(votes: impl IntoIterator<Item = &'v ClipVote> + Clone) -> [usize; 2] {
     let participants: BTreeSet<usize> = votes.clone().into_iter().map(|vote| vote.participant).collect();
     let clips: BTreeSet<usize> = votes.into_iter().map(|vote| vote.clip).collect();
     [participants.len(), clips.len()]
 }
 
-/// Mean score; NaN of no vote.
+/// Mean score; NaN without votes.
 pub fn mean_score(votes: &[ClipVote]) -> f64 {
     votes.iter().map(|vote| vote.score).sum::<f64>() / votes.len() as f64
 }
 
-/// All pairs of names, in their order.
+/// All unordered pairs of names, in the order of the names.
 pub fn name_pairs<S: AsRef<str>>(names: &[S]) -> impl Iterator<Item = [&str; 2]> {
     names.iter().enumerate().flat_map(|(k, a)| names[k + 1..].iter().map(move |b| [a.as_ref(), b.as_ref()]))
 }
 
-/// Vote that is a success or not.
+/// Vote with a binary outcome.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BinaryVote<'v> {
-    /// Score 1 for success, 0 for none.
+    /// Score 1 for success, otherwise 0.
     pub vote: ClipVote,
     pub speaker: &'v str,
-    /// Condition that was judged: the generated one, the one that was matched or not, the one that was seen.
+    /// Condition judged: the generated one of a Turing test, the condition of the expected film of a mismatch task, or
+    /// the one shown.
     pub condition: &'v str,
-    /// Whether the expected film was on the left, and whether the left one was chosen.
+    /// Whether the expected film was on the left, and whether the left film was chosen; `None` for single films.
     pub sides: Option<[bool; 2]>,
 }
 
-/// Measure of a task against chance.
+/// Measure that a design compares with chance; `None` if it has no chance level.
 pub fn measure(design: TaskDesign) -> Option<ShareMeasure> {
     match design {
         TaskDesign::Turing => Some(ShareMeasure::GeneratedChosen),
@@ -75,7 +76,7 @@ pub fn measure(design: TaskDesign) -> Option<ShareMeasure> {
     }
 }
 
-/// Votes of a task as successes of `measure`; what does not fit it is left out.
+/// Binary outcomes of `measure`; votes that do not fit it are dropped.
 pub fn binary<'v>(votes: &[&'v StudyVote], numbering: &Numbering, measure: ShareMeasure) -> Vec<BinaryVote<'v>> {
     let one = |vote: &&'v StudyVote| {
         let (condition, is_success, sides) = match (&vote.response, vote.expected.as_ref()?) {
@@ -89,8 +90,9 @@ pub fn binary<'v>(votes: &[&'v StudyVote], numbering: &Numbering, measure: Share
                 let sides = [expected, chosen].map(|side| *side == ScreenSide::Left);
                 (vote.conditions.get(shown)?, is_success, Some(sides))
             }
-            (Response::Real(said), Response::Real(is_real)) => {
-                let is_success = if measure == ShareMeasure::TakenForReal { *said } else { said == is_real };
+            (Response::Real(answered_real), Response::Real(is_real)) => {
+                let is_success =
+                    if measure == ShareMeasure::TakenForReal { *answered_real } else { answered_real == is_real };
                 (vote.conditions.first()?, is_success, None)
             }
             _ => return None,
@@ -101,20 +103,20 @@ pub fn binary<'v>(votes: &[&'v StudyVote], numbering: &Numbering, measure: Share
     votes.iter().filter_map(one).collect()
 }
 
-/// Conditions in the order of their names.
+/// Conditions in alphabetical order.
 pub fn conditions(votes: &[&StudyVote]) -> Vec<String> {
     let names: BTreeSet<&str> = votes.iter().flat_map(|vote| &vote.conditions).map(String::as_str).collect();
     names.into_iter().map(str::to_owned).collect()
 }
 
-/// Differences between two conditions where one vote judged both: steps towards `first`, or its score less that of
-/// `second`.
+/// Differences between two conditions from votes that judged both: preference steps towards `first`, or its score less
+/// that of `second`.
 pub fn differences(votes: &[&StudyVote], numbering: &Numbering, [first, second]: [&str; 2]) -> Vec<ClipVote> {
     let one = |vote: &&StudyVote| {
-        let place = |name: &str| vote.conditions.iter().position(|condition| condition == name);
-        let (a, b) = (place(first)?, place(second)?);
+        let index = |name: &str| vote.conditions.iter().position(|condition| condition == name);
+        let (a, b) = (index(first)?, index(second)?);
         let difference = match &vote.response {
-            // Steps go from the left film to the right one.
+            // Steps are negative for the left film, positive for the right film.
             Response::Step(step) => f64::from(*step) * if a > b { 1.0 } else { -1.0 },
             Response::Scores(scores) => f64::from(*scores.get(a)?) - f64::from(*scores.get(b)?),
             _ => return None,
@@ -124,12 +126,12 @@ pub fn differences(votes: &[&StudyVote], numbering: &Numbering, [first, second]:
     votes.iter().filter_map(one).collect()
 }
 
-/// Scores of a condition.
+/// Scores of one condition.
 pub fn scores(votes: &[&StudyVote], numbering: &Numbering, condition: &str) -> Vec<ClipVote> {
     let one = |vote: &&StudyVote| {
-        let place = vote.conditions.iter().position(|name| name == condition)?;
+        let index = vote.conditions.iter().position(|name| name == condition)?;
         let Response::Scores(scores) = &vote.response else { return None };
-        Some(numbering.vote(vote, f64::from(*scores.get(place)?)))
+        Some(numbering.vote(vote, f64::from(*scores.get(index)?)))
     };
     votes.iter().filter_map(one).collect()
 }

@@ -1,9 +1,9 @@
-//! Two conditions that the same participants judged: preferences in steps, scores of one page, how often single films were
-//! taken for real. Scores of conditions by themselves are medians and means.
+//! Comparison of two conditions: preference steps, differences of scores on one page, or proportions of single films
+//! judged real. Also medians and means of the scores of single conditions.
 
-use super::figure::{FigureMethod, FigureSet, TestFigure, adjust};
 use super::outcome::{BinaryVote, Numbering, differences, distinct, mean_score, name_pairs, scores};
-use super::result::{Conclusion, FigureSettings, PairAnalysis, ScoreAnalysis};
+use super::result::{Conclusion, PairAnalysis, ScoreAnalysis, StatisticSettings};
+use super::statistic::{StatisticMethod, StatisticSet, TestResult, adjust};
 use crate::plan::TaskDesign;
 use crate::stats::cluster::crossed::{crossed_difference, crossed_estimate};
 use crate::stats::cluster::sign_flips::sign_flip_p;
@@ -14,16 +14,16 @@ use crate::vote::StudyVote;
 use orator_base::math::order::Ordered;
 use std::collections::BTreeSet;
 
-/// Draws of sign flips for one of many pairs.
-const MOST_PAIR_DRAWS: usize = 2000;
+/// Maximum number of sign-flip draws per pair.
+const MAX_PAIR_DRAWS: usize = 2000;
 
-/// All pairs of `conditions` that votes compared, the first named less the second.
+/// Analyses all pairs of `conditions` that votes compare; differences are first less second.
 pub fn pairs(
     votes: &[&StudyVote],
     numbering: &Numbering,
     conditions: &[String],
     design: TaskDesign,
-    settings: &FigureSettings,
+    settings: &StatisticSettings,
 ) -> Vec<PairAnalysis> {
     let compared = name_pairs(conditions).filter_map(|names| {
         let differences = differences(votes, numbering, names);
@@ -32,39 +32,39 @@ pub fn pairs(
     family(compared.collect(), settings.level())
 }
 
-/// Pairs of conditions in how often single films of each were taken for real.
-pub fn single_pairs(votes: &[BinaryVote], conditions: &[&str], settings: &FigureSettings) -> Vec<PairAnalysis> {
+/// Analyses all pairs of conditions by how often single films of each were judged real.
+pub fn single_pairs(votes: &[BinaryVote], conditions: &[&str], settings: &StatisticSettings) -> Vec<PairAnalysis> {
     let of = |name: &str| -> Vec<ClipVote> {
         votes.iter().filter(|vote| vote.condition == name).map(|vote| vote.vote).collect()
     };
     let pair = |names: [&str; 2]| {
         let [a, b] = names.map(of);
-        let mut found = FigureSet::default();
-        if let Some(estimate) = found.known(FigureMethod::Crossed, crossed_difference(&a, &b)) {
-            found.add_estimate(FigureMethod::Crossed, &estimate, 0.0, settings.confidence);
+        let mut found = StatisticSet::default();
+        if let Some(estimate) = found.ok_or_record(StatisticMethod::Crossed, crossed_difference(&a, &b)) {
+            found.add_estimate(StatisticMethod::Crossed, &estimate, 0.0, settings.confidence);
         }
         let ranked = participant_differences(&a, &b).and_then(|means| signed_rank(&means));
-        found.add_test(FigureMethod::Wilcoxon, ranked.map(|test| test.p));
+        found.add_test(StatisticMethod::Wilcoxon, ranked.map(|test| test.p));
         pair_of(names, a.iter().chain(&b), mean_score(&a) - mean_score(&b), found)
     };
     family(name_pairs(conditions).map(pair).collect(), settings.level())
 }
 
-/// Adjusts the tests of pairs as one family, and draws the conclusions from the crossed tests.
+/// Adjusts the tests of all pairs as one family, and draws the conclusions from the crossed tests.
 fn family(mut pairs: Vec<PairAnalysis>, level: f64) -> Vec<PairAnalysis> {
-    adjust(&mut pairs.iter_mut().map(|pair| &mut pair.figures).collect::<Vec<_>>());
+    adjust(&mut pairs.iter_mut().map(|pair| &mut pair.statistics).collect::<Vec<_>>());
     for pair in &mut pairs {
-        pair.conclusion = Conclusion::new(pair.figures.crossed_p(), level, pair.difference, false);
+        pair.conclusion = Conclusion::new(pair.statistics.crossed_p(), level, pair.difference, false);
     }
     pairs
 }
 
-/// Pair with its figures, without orders and steps.
+/// Pair with its statistics, without orders and steps.
 fn pair_of<'v>(
     [first, second]: [&str; 2],
     votes: impl Iterator<Item = &'v ClipVote> + Clone,
     difference: f64,
-    figures: FigureSet,
+    statistics: StatisticSet,
 ) -> PairAnalysis {
     let [n_participants, n_clips] = distinct(votes.clone());
     PairAnalysis {
@@ -76,30 +76,30 @@ fn pair_of<'v>(
         orders: None,
         steps: None,
         difference,
-        figures,
+        statistics,
         conclusion: Conclusion::Untested,
     }
 }
 
-/// Pair by the `differences` of votes that judged both.
+/// Analyses a pair by the `differences` of votes that judged both.
 fn compared_pair(
     names: [&str; 2],
     differences: &[ClipVote],
     design: TaskDesign,
-    settings: &FigureSettings,
+    settings: &StatisticSettings,
 ) -> PairAnalysis {
-    let mut found = FigureSet::default();
-    if let Some(estimate) = found.known(FigureMethod::Crossed, crossed_estimate(differences)) {
-        found.add_estimate(FigureMethod::Crossed, &estimate, 0.0, settings.confidence);
+    let mut found = StatisticSet::default();
+    if let Some(estimate) = found.ok_or_record(StatisticMethod::Crossed, crossed_estimate(differences)) {
+        found.add_estimate(StatisticMethod::Crossed, &estimate, 0.0, settings.confidence);
         if settings.n_draws > 0 {
-            let n_draws = settings.n_draws.min(MOST_PAIR_DRAWS);
-            found.add_test(FigureMethod::SignFlip, sign_flip_p(differences, 0.0, n_draws, settings.seed));
+            let n_draws = settings.n_draws.min(MAX_PAIR_DRAWS);
+            found.add_test(StatisticMethod::SignFlip, sign_flip_p(differences, 0.0, n_draws, settings.seed));
         }
     }
     let all: Vec<f64> = differences.iter().map(|vote| vote.score).collect();
     let ranked = |values: &[f64]| signed_rank(values).map(|test| test.p);
-    found.add_test(FigureMethod::Wilcoxon, participant_means(differences).and_then(|means| ranked(&means)));
-    found.add_test(FigureMethod::WilcoxonVotes, ranked(&all));
+    found.add_test(StatisticMethod::Wilcoxon, participant_means(differences).and_then(|means| ranked(&means)));
+    found.add_test(StatisticMethod::WilcoxonVotes, ranked(&all));
     let count = |is_counted: &dyn Fn(f64) -> bool| all.iter().filter(|score| is_counted(**score)).count() as u64;
     let step = |step: f64| count(&|score| score == step);
     PairAnalysis {
@@ -109,21 +109,21 @@ fn compared_pair(
     }
 }
 
-/// Scores of each condition, the highest median first.
+/// Scores of each condition, highest median first.
 pub fn score_table(
     votes: &[&StudyVote],
     numbering: &Numbering,
     conditions: &[String],
-    settings: &FigureSettings,
+    settings: &StatisticSettings,
 ) -> Vec<ScoreAnalysis> {
     let rows = conditions.iter().filter_map(|condition| {
         let votes = scores(votes, numbering, condition);
         let all: Vec<f64> = votes.iter().map(|vote| vote.score).collect();
         let ordered = Ordered::new(all.iter().copied());
-        let mut found = FigureSet::default();
-        found.add_interval(FigureMethod::Median, median_interval(&all, settings.confidence));
-        if let Some(estimate) = found.known(FigureMethod::Crossed, crossed_estimate(&votes)) {
-            found.add_interval(FigureMethod::Crossed, estimate.interval(settings.confidence));
+        let mut found = StatisticSet::default();
+        found.add_interval(StatisticMethod::Median, median_interval(&all, settings.confidence));
+        if let Some(estimate) = found.ok_or_record(StatisticMethod::Crossed, crossed_estimate(&votes)) {
+            found.add_interval(StatisticMethod::Crossed, estimate.interval(settings.confidence));
         }
         let [n_participants, n_clips] = distinct(&votes);
         Some(ScoreAnalysis {
@@ -134,7 +134,7 @@ pub fn score_table(
             quantiles: [0.0, 0.05, 0.5, 0.95, 1.0].map(|share| ordered.quantile(share).unwrap_or_default()),
             median: ordered.median()?,
             mean: mean_score(&votes),
-            figures: found,
+            statistics: found,
         })
     });
     let mut rows: Vec<ScoreAnalysis> = rows.collect();
@@ -142,12 +142,12 @@ pub fn score_table(
     rows
 }
 
-/// Friedman's test of participants' mean scores, over those who scored every condition.
+/// Friedman's test of participants' mean scores, over participants who scored every condition.
 pub fn overall(
     votes: &[&StudyVote],
     numbering: &Numbering,
     conditions: &[String],
-) -> Result<TestFigure, StatisticsError> {
+) -> Result<TestResult, StatisticsError> {
     let columns: Vec<Vec<ClipVote>> = conditions.iter().map(|name| scores(votes, numbering, name)).collect();
     let participants: BTreeSet<usize> = columns.iter().flatten().map(|vote| vote.participant).collect();
     let mean = |votes: &Vec<ClipVote>, participant: usize| {
@@ -158,5 +158,5 @@ pub fn overall(
     let blocks: Vec<Vec<f64>> = participants.into_iter().filter_map(block).collect();
     let test = friedman(&blocks)?;
     let (statistic, degrees_of_freedom) = (Some(test.statistic), Some(conditions.len() as f64 - 1.0));
-    Ok(TestFigure { statistic, degrees_of_freedom, ..TestFigure::new(FigureMethod::Friedman, test.p) })
+    Ok(TestResult { statistic, degrees_of_freedom, ..TestResult::new(StatisticMethod::Friedman, test.p) })
 }

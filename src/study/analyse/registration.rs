@@ -1,8 +1,7 @@
-//! What was written down before the data were seen: read from a sealed study, marked in the figures, and what became of
-//! each hypothesis.
+//! Registration: read from a sealed study, marked in the statistics, with the outcome of each hypothesis.
 
-use super::figure::{FigureMethod, FigureSet};
 use super::result::{JudgedClaim, JudgedHypothesis, PairAnalysis, ShareAnalysis, TaskAnalysis};
+use super::statistic::{StatisticMethod, StatisticSet};
 use super::verdict::scope;
 use crate::file::{AnalysisSettings, ExclusionRules, HypothesisKind, StudyHypothesis};
 use crate::folder::StudyFolder;
@@ -10,13 +9,13 @@ use crate::preregistration::{Preregistration, RegisteredHypothesis};
 use crate::seal::StudySeal;
 use anyhow::Result;
 
-/// What was fixed before the data were seen.
+/// Specification fixed before the data were seen.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Registration {
     pub title: String,
-    /// Hash over the sealed study; none where its files are not as they were sealed.
+    /// Combined hash of the sealed study; `None` if the seal does not hold.
     pub seal: Option<String>,
-    /// What a reader must know about it.
+    /// Notes on the validity of the registration.
     pub notes: Vec<String>,
     pub hypotheses: Vec<RegisteredHypothesis>,
     pub exclusion: ExclusionRules,
@@ -24,21 +23,21 @@ pub struct Registration {
 }
 
 impl Registration {
-    /// Registration of a study's folder. A seal that does not hold is noted, with the files that differ, and then nothing
-    /// counts as registered: the hypotheses may have been written after the data were seen.
+    /// Reads the registration of a study folder. If the seal does not hold, a note names the files that differ, and
+    /// nothing counts as registered: the hypotheses may have been written after the data were seen.
     ///
     /// # Errors
-    /// No pre-registration, or one that is damaged.
+    /// The pre-registration is missing or damaged.
     pub fn of_folder(folder: &StudyFolder) -> Result<Self> {
         let registered = Preregistration::read(&folder.preregistration())?;
-        let broken = match StudySeal::read(folder) {
+        let mismatch = match StudySeal::read(folder) {
             Ok(seal) => match seal.compare(folder)? {
-                broken if broken.is_whole() => Ok(seal.seal),
-                broken => Err(format!("files of the study are not as they were sealed ({broken})")),
+                mismatch if mismatch.is_empty() => Ok(seal.seal),
+                mismatch => Err(format!("files of the study are not as they were sealed ({mismatch})")),
             },
             Err(error) => Err(format!("{error:#}")),
         };
-        let (seal, notes) = match broken {
+        let (seal, notes) = match mismatch {
             Ok(seal) => (Some(seal), Vec::new()),
             Err(why) => (None, vec![format!("The seal does not hold, so nothing counts as registered: {why}.")]),
         };
@@ -53,25 +52,25 @@ impl Registration {
     }
 }
 
-/// Outcome of each hypothesis, by the crossed figures that were registered for it, at the error of the first kind `level`.
-/// These figures lose the mark of exploration.
+/// Outcome of each hypothesis at significance level `level`, from the crossed statistics registered for it. These
+/// statistics are no longer marked as exploratory.
 pub fn judge(tasks: &mut [TaskAnalysis], hypotheses: &[RegisteredHypothesis], level: f64) -> Vec<JudgedHypothesis> {
     let mut one = |RegisteredHypothesis { claim, statistic }: &RegisteredHypothesis| {
         let found = tasks.iter_mut().find(|task| task.task == claim.task);
         JudgedHypothesis {
             task: claim.task.clone(),
-            claim: words(claim),
+            claim: describe_claim(claim),
             statistic: statistic.clone(),
-            claims: found.map(|task| claims(task, claim, level)).unwrap_or_default(),
+            claims: found.map(|task| judged_claims(task, claim, level)).unwrap_or_default(),
         }
     };
     hypotheses.iter().map(&mut one).collect()
 }
 
-fn claims(task: &mut TaskAnalysis, claim: &StudyHypothesis, level: f64) -> Vec<JudgedClaim> {
-    let tested = |scope: String, figures: &mut FigureSet, is_right_way: bool| {
-        figures.register(FigureMethod::Crossed);
-        let p = figures.crossed_p();
+fn judged_claims(task: &mut TaskAnalysis, claim: &StudyHypothesis, level: f64) -> Vec<JudgedClaim> {
+    let tested = |scope: String, statistics: &mut StatisticSet, is_right_way: bool| {
+        statistics.register(StatisticMethod::Crossed);
+        let p = statistics.crossed_p();
         JudgedClaim { scope, p, holds: p.map(|p| p < level && is_right_way) }
     };
     if claim.kind == HypothesisKind::Differs {
@@ -81,7 +80,7 @@ fn claims(task: &mut TaskAnalysis, claim: &StudyHypothesis, level: f64) -> Vec<J
         };
         let pairs = task.pairs.iter_mut().filter(is_about);
         return pairs
-            .map(|pair| tested(format!("{} and {}", pair.first, pair.second), &mut pair.figures, true))
+            .map(|pair| tested(format!("{} and {}", pair.first, pair.second), &mut pair.statistics, true))
             .collect();
     }
     let has_conditions = task.shares.iter().any(|share| share.condition.is_some());
@@ -89,17 +88,17 @@ fn claims(task: &mut TaskAnalysis, claim: &StudyHypothesis, level: f64) -> Vec<J
         let (scope, is_above) = (scope(share), share.right_share() > 0.5);
         if claim.kind != HypothesisKind::Equivalence {
             let is_right_way = is_above || claim.kind == HypothesisKind::DiffersFromChance;
-            return tested(scope, &mut share.figures, is_right_way);
+            return tested(scope, &mut share.statistics, is_right_way);
         }
-        share.figures.register_equivalence(FigureMethod::Crossed);
-        let test = share.figures.equivalence(FigureMethod::Crossed);
+        share.statistics.register_equivalence(StatisticMethod::Crossed);
+        let test = share.statistics.equivalence(StatisticMethod::Crossed);
         JudgedClaim { scope, p: test.map(|test| test.p), holds: test.map(|test| test.passes) }
     };
     task.shares.iter_mut().filter(|share| is_about(share, claim, has_conditions)).map(judged).collect()
 }
 
-/// A hypothesis in words.
-fn words(claim: &StudyHypothesis) -> String {
+/// Description of a hypothesis.
+fn describe_claim(claim: &StudyHypothesis) -> String {
     let who = if claim.per_speaker { ", each speaker by itself" } else { "" };
     let which = match &claim.conditions[..] {
         [] => String::new(),

@@ -1,8 +1,8 @@
-//! Result of an analysis, from which the page, the summary and the methods paragraph are made. Every figure says how it
-//! was got, whether that was fixed before the data were seen, and whether it takes votes for independent.
+//! Result of an analysis, the source of the page, the summary and the methods paragraph. Every statistic states its
+//! method, whether it was registered before the data were seen, and whether it treats votes as independent.
 
-use super::exclusion::ExclusionAccount;
-use super::figure::{FigureOrigin, FigureSet, IntervalFigure, TestFigure};
+use super::exclusion::ExclusionSummary;
+use super::statistic::{IntervalEstimate, StatisticOrigin, StatisticSet, TestResult};
 use super::votes::read::RefusedRow;
 use crate::file::AnalysisSettings;
 use crate::plan::TaskDesign;
@@ -13,19 +13,19 @@ use serde::Serialize;
 pub struct StudyAnalysis {
     pub version: u32,
     pub title: String,
-    /// File or folder of the votes, its name alone.
+    /// File or folder name of the votes, without its path.
     pub source: String,
-    /// Hash over the sealed study; none of votes that did not come with their study.
+    /// Combined hash of the sealed study; `None` for votes without a sealed study.
     pub seal: Option<String>,
-    pub settings: FigureSettings,
-    /// Rows of the source that are no votes.
+    pub settings: StatisticSettings,
+    /// Rows of the source that are not valid votes.
     pub refused: Vec<RefusedRow>,
-    pub exclusions: ExclusionAccount,
-    /// What became of each registered hypothesis.
+    pub exclusions: ExclusionSummary,
+    /// Outcome of each registered hypothesis.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub hypotheses: Vec<JudgedHypothesis>,
     pub tasks: Vec<TaskAnalysis>,
-    /// Tasks with the votes of everybody.
+    /// Analyses of the tasks without exclusions.
     pub without_exclusions: Vec<TaskAnalysis>,
     pub notes: Vec<String>,
     /// Paragraph for the methods section of a paper.
@@ -36,11 +36,11 @@ pub struct StudyAnalysis {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct JudgedHypothesis {
     pub task: String,
-    /// In words.
+    /// Description of the hypothesis.
     pub claim: String,
-    /// What judges it, as registered.
+    /// Registered statistic.
     pub statistic: String,
-    /// One for each speaker, condition or pair that it is about; none where the task has no vote.
+    /// Outcomes by speaker, condition or pair; empty if the task has no votes.
     pub claims: Vec<JudgedClaim>,
 }
 
@@ -48,14 +48,14 @@ pub struct JudgedHypothesis {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct JudgedClaim {
     pub scope: String,
-    /// Of the registered test, adjusted where it is one of several.
+    /// p value of the registered test, adjusted if it belongs to a family.
     pub p: Option<f64>,
-    /// Whether the votes show it; none where the test could not be made.
+    /// Whether the votes support the claim; `None` if the test could not be computed.
     pub holds: Option<bool>,
 }
 
 impl JudgedClaim {
-    /// Outcome in words. A test that does not reject shows nothing, so the opposite is never said.
+    /// Outcome as text. A non-significant test shows nothing, so the opposite of a claim is never reported.
     pub fn outcome(&self) -> &'static str {
         match self.holds {
             Some(true) => "shown",
@@ -65,36 +65,36 @@ impl JudgedClaim {
     }
 }
 
-/// What an analysis depends on beside the votes.
+/// Settings of an analysis.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct FigureSettings {
-    /// Coverage of the intervals.
+pub struct StatisticSettings {
+    /// Confidence level of the intervals.
     pub confidence: f64,
-    /// Largest difference that counts as none, a share: 0.1 is 10 points of percent.
+    /// Equivalence bound as a proportion: 0.1 is 10 percentage points.
     pub bound: f64,
-    /// Draws of sign flips and of participants; 0 leaves them out.
+    /// Number of sign-flip draws and of bootstrap draws of participants; 0 skips both.
     pub n_draws: usize,
     pub seed: u64,
     /// Whether mixed models are fitted.
     pub with_models: bool,
 }
 
-impl FigureSettings {
-    /// Error of the first kind of the tests that conclusions rest on.
+impl StatisticSettings {
+    /// Significance level of the tests on which conclusions are based.
     pub fn level(&self) -> f64 {
         1.0 - self.confidence
     }
 }
 
-impl From<&AnalysisSettings> for FigureSettings {
-    /// Settings as they were registered.
+impl From<&AnalysisSettings> for StatisticSettings {
+    /// Converts registered settings.
     fn from(registered: &AnalysisSettings) -> Self {
         let AnalysisSettings { alpha, resamples, seed } = *registered;
         Self { confidence: 1.0 - alpha, n_draws: resamples, seed, ..Self::default() }
     }
 }
 
-impl Default for FigureSettings {
+impl Default for StatisticSettings {
     fn default() -> Self {
         Self { confidence: 0.95, bound: 0.1, n_draws: 10_000, seed: 1, with_models: true }
     }
@@ -110,51 +110,51 @@ pub struct TaskAnalysis {
     pub n_clips: usize,
     pub conditions: Vec<String>,
     pub speakers: Vec<String>,
-    /// What can be concluded, and what cannot.
+    /// Sentences on what can be concluded and what cannot.
     pub verdicts: Vec<String>,
-    /// Shares of votes: all together first, then by speaker and by condition. Empty for preferences and sliders.
+    /// Proportions: all votes first, then by speaker and by condition. Empty for preferences and sliders.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub shares: Vec<ShareAnalysis>,
-    /// Scores by condition, the highest median first. Sliders alone.
+    /// Scores by condition, highest median first. Sliders only.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub scores: Vec<ScoreAnalysis>,
-    /// Pairs of conditions. Preferences and sliders, and single films.
+    /// Pairs of conditions. Preferences, sliders and single films.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pairs: Vec<PairAnalysis>,
-    /// Whether any condition differs from the others. Sliders alone.
+    /// Test whether any condition differs from the others. Sliders only.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub overall: Option<TestFigure>,
-    /// Strengths of the conditions, the highest first. Preferences and sliders.
+    pub overall: Option<TestResult>,
+    /// Strengths of the conditions, highest first. Preferences and sliders.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub strengths: Vec<StrengthFigure>,
-    /// Krippendorff's alpha between participants, 1 for agreement and 0 for chance.
+    pub strengths: Vec<StrengthEstimate>,
+    /// Krippendorff's alpha of the participants: 1 for perfect agreement, 0 for chance.
     pub agreement: Option<f64>,
-    /// What could not be computed, and why.
+    /// Statistics that could not be computed, with reasons.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub missing: Vec<String>,
 }
 
-/// What share of votes is counted.
+/// Outcome whose proportion is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ShareMeasure {
-    /// Turing test: the generated film was taken for the real one.
+    /// Turing test: the generated film was chosen as the real one.
     GeneratedChosen,
     /// Mismatch: the film with the motion of its own speech was chosen.
     MatchedChosen,
-    /// Turing test of one film: the answer was right.
+    /// Turing test with a single film: the response was correct.
     Correct,
-    /// Turing test of one film: the film was taken for real, right or wrong.
+    /// Turing test with a single film: the film was judged real, correctly or not.
     TakenForReal,
 }
 
-/// Share of votes, against chance where there is one.
+/// Proportion of votes, compared with chance where chance is defined.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ShareAnalysis {
     pub measure: ShareMeasure,
-    /// None: all speakers.
+    /// Speaker; `None` for all speakers.
     pub speaker: Option<String>,
-    /// None: all conditions.
+    /// Condition; `None` for all conditions.
     pub condition: Option<String>,
     pub n_votes: u64,
     pub n_successes: u64,
@@ -162,14 +162,14 @@ pub struct ShareAnalysis {
     pub n_clips: usize,
     pub share: f64,
     #[serde(flatten)]
-    pub figures: FigureSet,
+    pub statistics: StatisticSet,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub model: Option<ModelFigure>,
+    pub model: Option<ModelEstimate>,
     pub conclusion: Conclusion,
 }
 
 impl ShareAnalysis {
-    /// Share of right responses: the real film found, the matched film chosen.
+    /// Proportion of correct responses: the real film found, the matched film chosen.
     pub fn right_share(&self) -> f64 {
         match self.measure {
             ShareMeasure::GeneratedChosen => 1.0 - self.share,
@@ -185,15 +185,15 @@ pub struct ScoreAnalysis {
     pub n_scores: usize,
     pub n_participants: usize,
     pub n_clips: usize,
-    /// Minimum, 5 %, median, 95 %, maximum.
+    /// Minimum, 5 %, median, 95 % and maximum.
     pub quantiles: [f64; 5],
     pub median: f64,
     pub mean: f64,
     #[serde(flatten)]
-    pub figures: FigureSet,
+    pub statistics: StatisticSet,
 }
 
-/// Two conditions that the same participants saw.
+/// Comparison of two conditions.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PairAnalysis {
     pub first: String,
@@ -201,60 +201,60 @@ pub struct PairAnalysis {
     pub n_votes: usize,
     pub n_participants: usize,
     pub n_clips: usize,
-    /// Votes that put the first above the second, neither, and the second above the first; none where each vote judged
-    /// one of them.
+    /// Numbers of votes for the first condition, undecided, and for the second; `None` if each vote judged only one of
+    /// them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub orders: Option<[u64; 3]>,
-    /// Preferences: votes of each step, from the second clearly to the first clearly.
+    /// Preferences: number of votes per step, from clearly the second to clearly the first condition.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub steps: Option<[u64; 5]>,
-    /// Mean of the first less the second, in the scale's unit.
+    /// Mean of the first less the second, in the unit of the scale.
     pub difference: f64,
     #[serde(flatten)]
-    pub figures: FigureSet,
+    pub statistics: StatisticSet,
     pub conclusion: Conclusion,
 }
 
-/// Strength of a condition among the others.
+/// Bradley-Terry strength of a condition.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct StrengthFigure {
+pub struct StrengthEstimate {
     pub condition: String,
-    /// Log odds of being put above a condition of mean strength (Bradley and Terry 1952).
+    /// Log odds of being preferred to a condition of mean strength (Bradley and Terry 1952).
     pub log_strength: f64,
-    pub interval: Option<IntervalFigure>,
-    /// The strength on the Elo scale; the mean is 1000.
+    pub interval: Option<IntervalEstimate>,
+    /// Strength on the Elo scale, with mean 1000.
     pub elo: f64,
 }
 
-/// Mixed logistic regression of the share.
+/// Mixed logistic regression of a proportion.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ModelFigure {
+pub struct ModelEstimate {
     pub exploratory: bool,
-    /// Share over all participants and clips.
+    /// Marginal proportion over all participants and clips.
     pub share: f64,
-    /// Log odds of a typical participant and clip.
+    /// Log odds of a participant and clip with effect 0.
     pub log_odds: f64,
     pub standard_error: f64,
-    /// Standard deviations of participants and of clips, log odds.
+    /// Standard deviations of the random intercepts of participants and clips, log odds.
     pub sd_participants: f64,
     pub sd_clips: f64,
 }
 
-/// What a headline test and its equivalence test allow to say.
+/// Conclusion from a headline test and its equivalence test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Conclusion {
-    /// Above chance, or the first above the second.
+    /// Above chance, or the first condition above the second.
     Above,
     Below,
-    /// A difference was found, and it lies within the bound.
+    /// Significant difference, but within the equivalence bound.
     AboveWithinBound,
     BelowWithinBound,
-    /// No difference was found, and it lies within the bound.
+    /// No significant difference, and equivalence within the bound is shown.
     Equivalent,
     /// Neither a difference nor equivalence is shown.
     Undecided,
-    /// There is no test.
+    /// No test could be computed.
     Untested,
 }
 
@@ -274,26 +274,26 @@ impl Conclusion {
 }
 
 impl TaskAnalysis {
-    /// Share of all votes of the measure that the task is about.
+    /// Proportion over all votes of the task's main measure.
     pub fn pooled(&self) -> Option<&ShareAnalysis> {
         self.shares.iter().find(|share| share.speaker.is_none() && share.condition.is_none())
     }
 
-    fn figure_sets(&self) -> impl Iterator<Item = &FigureSet> {
-        let shares = self.shares.iter().map(|share| &share.figures);
-        let scores = self.scores.iter().map(|row| &row.figures);
-        shares.chain(scores).chain(self.pairs.iter().map(|pair| &pair.figures))
+    fn statistic_sets(&self) -> impl Iterator<Item = &StatisticSet> {
+        let shares = self.shares.iter().map(|share| &share.statistics);
+        let scores = self.scores.iter().map(|row| &row.statistics);
+        shares.chain(scores).chain(self.pairs.iter().map(|pair| &pair.statistics))
     }
 
     /// All tests of the task.
-    pub fn tests(&self) -> impl Iterator<Item = &TestFigure> {
-        self.figure_sets().flat_map(|set| &set.tests).chain(&self.overall)
+    pub fn tests(&self) -> impl Iterator<Item = &TestResult> {
+        self.statistic_sets().flat_map(|set| &set.tests).chain(&self.overall)
     }
 
     /// Origins of all intervals and tests of the task.
-    pub fn origins(&self) -> impl Iterator<Item = FigureOrigin> {
-        let intervals = self.figure_sets().flat_map(|set| &set.intervals).map(|interval| interval.origin);
-        let equivalence = self.figure_sets().flat_map(|set| &set.equivalence).map(|test| test.origin);
+    pub fn origins(&self) -> impl Iterator<Item = StatisticOrigin> {
+        let intervals = self.statistic_sets().flat_map(|set| &set.intervals).map(|interval| interval.origin);
+        let equivalence = self.statistic_sets().flat_map(|set| &set.equivalence).map(|test| test.origin);
         intervals.chain(equivalence).chain(self.tests().map(|test| test.origin))
     }
 }

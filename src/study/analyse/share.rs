@@ -1,8 +1,8 @@
-//! Share of successes against chance, by every method from the naive to the crossed one.
+//! Proportion of successes compared with chance, by every method from the naive to the crossed one.
 
-use super::figure::{FigureMethod, FigureSet, TestFigure};
 use super::outcome::{BinaryVote, distinct};
-use super::result::{Conclusion, FigureSettings, ModelFigure, ShareAnalysis, ShareMeasure};
+use super::result::{Conclusion, ModelEstimate, ShareAnalysis, ShareMeasure, StatisticSettings};
+use super::statistic::{StatisticMethod, StatisticSet, TestResult};
 use crate::stats::cluster::crossed::crossed_estimate;
 use crate::stats::cluster::sign_flips::{SideBlock, side_p, sign_flip_p};
 use crate::stats::cluster::votes::{ClipVote, participant_estimate};
@@ -11,10 +11,10 @@ use crate::stats::glmm::fit::MixedLogit;
 use crate::stats::proportion::BinomialCount;
 use std::collections::BTreeMap;
 
-/// Share where nothing is known.
+/// Proportion of successes by guessing.
 pub const CHANCE: f64 = 0.5;
 
-/// Votes that a share is of.
+/// Votes of one proportion.
 #[derive(Clone, Debug)]
 pub struct ShareCell<'v> {
     pub measure: ShareMeasure,
@@ -23,12 +23,12 @@ pub struct ShareCell<'v> {
     pub votes: Vec<BinaryVote<'v>>,
 }
 
-/// Analysis of a cell. Films taken for real have intervals alone: half of them is no expectation.
-pub fn share(cell: &ShareCell, settings: &FigureSettings) -> ShareAnalysis {
+/// Analyses a cell. The proportion of films judged real gets intervals only, because it has no chance level.
+pub fn share(cell: &ShareCell, settings: &StatisticSettings) -> ShareAnalysis {
     let votes: Vec<ClipVote> = cell.votes.iter().map(|vote| vote.vote).collect();
     let n_successes = votes.iter().filter(|vote| vote.score == 1.0).count() as u64;
     let [n_participants, n_clips] = distinct(&votes);
-    let mut found = FigureSet::default();
+    let mut found = StatisticSet::default();
     add_clustered(&mut found, cell, &votes, settings);
     add_naive(&mut found, n_successes, votes.len() as u64, settings);
     found.clamp(0.0, 1.0);
@@ -45,52 +45,55 @@ pub fn share(cell: &ShareCell, settings: &FigureSettings) -> ShareAnalysis {
         n_participants,
         n_clips,
         share: n_successes as f64 / votes.len().max(1) as f64,
-        figures: found,
+        statistics: found,
         model: None,
         conclusion: Conclusion::Untested,
     };
     if settings.with_models && has_expectation {
-        analysis.model = mixed_model(&votes, &mut analysis.figures, settings.confidence);
+        analysis.model = mixed_model(&votes, &mut analysis.statistics, settings.confidence);
     }
     conclude(&mut analysis, settings.level());
     analysis
 }
 
-/// Methods that know participants and clips.
-fn add_clustered(found: &mut FigureSet, cell: &ShareCell, votes: &[ClipVote], settings: &FigureSettings) {
+/// Adds the methods that account for participants and clips.
+fn add_clustered(found: &mut StatisticSet, cell: &ShareCell, votes: &[ClipVote], settings: &StatisticSettings) {
     let confidence = settings.confidence;
-    if let Some(estimate) = found.known(FigureMethod::Crossed, crossed_estimate(votes)) {
-        found.add_estimate(FigureMethod::Crossed, &estimate, CHANCE, confidence);
+    if let Some(estimate) = found.ok_or_record(StatisticMethod::Crossed, crossed_estimate(votes)) {
+        found.add_estimate(StatisticMethod::Crossed, &estimate, CHANCE, confidence);
         let equivalence = Equivalence::of_estimate(&estimate, CHANCE, settings.bound);
-        found.add_equivalence(FigureMethod::Crossed, equivalence);
+        found.add_equivalence(StatisticMethod::Crossed, equivalence);
         if settings.n_draws > 0 {
             let flips = sign_flip_p(votes, CHANCE, settings.n_draws, settings.seed);
-            found.add_test(FigureMethod::SignFlip, flips);
+            found.add_test(StatisticMethod::SignFlip, flips);
         }
     }
     if let Some(blocks) = side_blocks(&cell.votes) {
-        found.add_test(FigureMethod::Sides, side_p(&blocks));
+        found.add_test(StatisticMethod::Sides, side_p(&blocks));
     }
-    if let Some(estimate) = found.known(FigureMethod::Participants, participant_estimate(votes)) {
-        found.add_estimate(FigureMethod::Participants, &estimate, CHANCE, confidence);
+    if let Some(estimate) = found.ok_or_record(StatisticMethod::Participants, participant_estimate(votes)) {
+        found.add_estimate(StatisticMethod::Participants, &estimate, CHANCE, confidence);
     }
 }
 
-/// Methods that take votes for independent.
-fn add_naive(found: &mut FigureSet, n_successes: u64, n_votes: u64, settings: &FigureSettings) {
-    let Some(count) = found.known(FigureMethod::Binomial, BinomialCount::new(n_successes, n_votes)) else { return };
-    found.add_interval(FigureMethod::Wilson, count.wilson(settings.confidence));
-    found.add_test(FigureMethod::Binomial, count.test(CHANCE));
-    found.add_equivalence(FigureMethod::Binomial, Equivalence::of_count(&count, CHANCE, settings.bound));
+/// Adds the methods that treat votes as independent.
+fn add_naive(found: &mut StatisticSet, n_successes: u64, n_votes: u64, settings: &StatisticSettings) {
+    let Some(count) = found.ok_or_record(StatisticMethod::Binomial, BinomialCount::new(n_successes, n_votes)) else {
+        return;
+    };
+    found.add_interval(StatisticMethod::Wilson, count.wilson(settings.confidence));
+    found.add_test(StatisticMethod::Binomial, count.test(CHANCE));
+    found.add_equivalence(StatisticMethod::Binomial, Equivalence::of_count(&count, CHANCE, settings.bound));
 }
 
-/// Draws the conclusion from the crossed test, adjusted where it is one of several, and the crossed equivalence.
+/// Draws the conclusion from the crossed test, adjusted if it belongs to a family, and the crossed equivalence test.
 pub fn conclude(analysis: &mut ShareAnalysis, level: f64) {
-    let is_equivalent = analysis.figures.equivalence(FigureMethod::Crossed).is_some_and(|test| test.passes);
-    analysis.conclusion = Conclusion::new(analysis.figures.crossed_p(), level, analysis.share - CHANCE, is_equivalent);
+    let is_equivalent = analysis.statistics.equivalence(StatisticMethod::Crossed).is_some_and(|test| test.passes);
+    analysis.conclusion =
+        Conclusion::new(analysis.statistics.crossed_p(), level, analysis.share - CHANCE, is_equivalent);
 }
 
-/// Trials of each participant by sides; none where the sides are not known, as in tables that say only what was right.
+/// Trials of each participant by side; `None` if sides are unknown, as in tables that report correctness only.
 fn side_blocks(votes: &[BinaryVote]) -> Option<Vec<SideBlock>> {
     let mut blocks: BTreeMap<usize, SideBlock> = BTreeMap::new();
     let mut seen = [false; 2];
@@ -102,19 +105,19 @@ fn side_blocks(votes: &[BinaryVote]) -> Option<Vec<SideBlock>> {
     (seen == [true; 2]).then(|| blocks.into_values().collect())
 }
 
-/// Fits the model of an intercept with random participants and clips to votes with scores 0 and 1. Its interval is of
-/// the share over all participants and clips, its test of the intercept against log odds of 0, with one degree of
-/// freedom less than the smaller number of participants and clips.
-fn mixed_model(votes: &[ClipVote], found: &mut FigureSet, confidence: f64) -> Option<ModelFigure> {
-    let model = found.known(FigureMethod::MixedModel, MixedLogit::fit(votes))?;
-    let (share, interval) = found.known(FigureMethod::MixedModel, model.share(confidence))?;
+/// Fits a mixed logistic model with crossed random intercepts to votes with scores 0 and 1. The interval is that of the
+/// marginal proportion; the test compares the intercept with log odds of 0, with min(participants, clips) - 1 degrees
+/// of freedom.
+fn mixed_model(votes: &[ClipVote], found: &mut StatisticSet, confidence: f64) -> Option<ModelEstimate> {
+    let model = found.ok_or_record(StatisticMethod::MixedModel, MixedLogit::fit(votes))?;
+    let (share, interval) = found.ok_or_record(StatisticMethod::MixedModel, model.share(confidence))?;
     if !model.converged {
-        found.missing.push(format!("{}: the search for its maximum did not end", FigureMethod::MixedModel.name()));
+        found.missing.push(format!("{}: the search for its maximum did not end", StatisticMethod::MixedModel.name()));
         return None;
     }
-    found.add_interval(FigureMethod::MixedModel, Ok(interval));
-    found.tests.push(TestFigure::of_estimate(FigureMethod::MixedModel, &model.intercept, 0.0));
-    Some(ModelFigure {
+    found.add_interval(StatisticMethod::MixedModel, Ok(interval));
+    found.tests.push(TestResult::of_estimate(StatisticMethod::MixedModel, &model.intercept, 0.0));
+    Some(ModelEstimate {
         exploratory: true,
         share,
         log_odds: model.intercept.value,
@@ -134,15 +137,15 @@ mod tests {
         let design = CrossedDesign { n_participants: 60, n_trials: 10, n_clips: 30 };
         let effects = CrossedEffects { share: 0.65, sd_participants: 0.5, sd_clips: 0.3 };
         let votes = crossed_votes(&design, &effects, 4, 0);
-        let mut found = FigureSet::default();
+        let mut found = StatisticSet::default();
         let model = mixed_model(&votes, &mut found, 0.95).unwrap();
-        let interval = found.interval(FigureMethod::MixedModel).unwrap();
+        let interval = found.interval(StatisticMethod::MixedModel).unwrap();
         assert!(interval.low < 0.65 && 0.65 < interval.high, "{interval:?}");
         assert!((model.share - 0.65).abs() < 0.06 && model.log_odds > 0.3, "{model:?}");
-        assert!(found.test(FigureMethod::MixedModel).unwrap().p < 0.01);
+        assert!(found.test(StatisticMethod::MixedModel).unwrap().p < 0.01);
         // Equal votes have no finite log odds.
         let equal: Vec<_> = votes.iter().map(|vote| ClipVote { score: 1.0, ..*vote }).collect();
-        let mut found = FigureSet::default();
+        let mut found = StatisticSet::default();
         assert_eq!(mixed_model(&equal, &mut found, 0.95), None);
         assert_eq!((found.missing.len(), found.tests.len()), (1, 0));
     }

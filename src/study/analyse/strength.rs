@@ -1,54 +1,54 @@
-//! Strengths of conditions from votes that put one above another.
+//! Bradley-Terry strengths of conditions from votes that rank them.
 
-use super::figure::{FigureMethod, FigureOrigin, IntervalFigure};
 use super::outcome::Numbering;
-use super::result::{FigureSettings, StrengthFigure};
+use super::result::{StatisticSettings, StrengthEstimate};
+use super::statistic::{IntervalEstimate, StatisticMethod, StatisticOrigin};
 use crate::stats::bradley_terry::{self, PairedVote, elo, strength_intervals};
 use crate::stats::estimate::StatisticsError;
 use crate::vote::{Response, StudyVote};
 
-/// Draws of participants for the intervals.
-const MOST_DRAWS: usize = 2000;
+/// Maximum number of bootstrap draws of participants for the intervals.
+const MAX_DRAWS: usize = 2000;
 
-/// Strengths of the conditions, the highest first, with intervals by draws of participants.
+/// Strengths of the conditions, highest first, with bootstrap intervals over participants.
 ///
 /// # Errors
-/// Fewer than two conditions, and votes that do not lead from each condition to each other one.
+/// There are fewer than two conditions, or chains of wins do not connect every condition to every other.
 pub fn strengths(
     votes: &[&StudyVote],
     numbering: &Numbering,
     conditions: &[String],
-    settings: &FigureSettings,
-) -> Result<Vec<StrengthFigure>, StatisticsError> {
+    settings: &StatisticSettings,
+) -> Result<Vec<StrengthEstimate>, StatisticsError> {
     let paired: Vec<PairedVote> = votes.iter().flat_map(|vote| paired(vote, numbering, conditions)).collect();
     let n = conditions.len();
     let strengths = bradley_terry::strengths(&paired, n)?;
-    let n_draws = settings.n_draws.min(MOST_DRAWS);
+    let n_draws = settings.n_draws.min(MAX_DRAWS);
     let intervals = match n_draws {
         0 => None,
-        // Without enough draws that have finite strengths there are strengths without intervals.
+        // If too few draws have finite strengths, strengths are reported without intervals.
         _ => strength_intervals(&paired, n, settings.confidence, n_draws, settings.seed).ok(),
     };
-    let origin = FigureOrigin::new(FigureMethod::BradleyTerry);
-    let row = |k: usize| StrengthFigure {
+    let origin = StatisticOrigin::new(StatisticMethod::BradleyTerry);
+    let row = |k: usize| StrengthEstimate {
         condition: conditions[k].clone(),
         log_strength: strengths[k],
-        interval: intervals.as_ref().map(|all| IntervalFigure { origin, ends: all[k] }),
+        interval: intervals.as_ref().map(|all| IntervalEstimate { origin, ends: all[k] }),
         elo: elo(strengths[k]),
     };
-    let mut rows: Vec<StrengthFigure> = (0..n).map(row).collect();
+    let mut rows: Vec<StrengthEstimate> = (0..n).map(row).collect();
     rows.sort_by(|a, b| b.log_strength.total_cmp(&a.log_strength));
     Ok(rows)
 }
 
-/// What a vote says of pairs: its step of preference as a share of a win, or which of two scores is higher.
+/// Pairwise comparisons of a vote: its preference step as a share of a win, or which of two scores is higher.
 fn paired(vote: &StudyVote, numbering: &Numbering, conditions: &[String]) -> Vec<PairedVote> {
-    let place = |name: &String| conditions.iter().position(|condition| condition == name);
-    let Some(shown) = vote.conditions.iter().map(place).collect::<Option<Vec<usize>>>() else { return Vec::new() };
+    let index = |name: &String| conditions.iter().position(|condition| condition == name);
+    let Some(shown) = vote.conditions.iter().map(index).collect::<Option<Vec<usize>>>() else { return Vec::new() };
     let participant = numbering.vote(vote, 0.0).participant;
     let pair = |a: usize, b: usize, share: f64| PairedVote { participant, first: shown[a], second: shown[b], share };
     match &vote.response {
-        // Steps go from the left film, -2, to the right one, 2.
+        // Steps range from -2 for the left film to 2 for the right film.
         Response::Step(step) if shown.len() == 2 => vec![pair(0, 1, (2.0 - f64::from(*step)) / 4.0)],
         Response::Scores(scores) if scores.len() == shown.len() => {
             let pairs = (0..shown.len()).flat_map(|a| (a + 1..scores.len()).map(move |b| (a, b)));
@@ -71,7 +71,7 @@ mod tests {
     #[test]
     fn steps_and_scores_rank_conditions() {
         let names = ["bad", "good", "natural"].map(str::to_owned);
-        let settings = FigureSettings { n_draws: 200, ..FigureSettings::default() };
+        let settings = StatisticSettings { n_draws: 200, ..StatisticSettings::default() };
         let mut steps = Vec::new();
         let mut pages = Vec::new();
         for n in 0..30 {

@@ -1,10 +1,10 @@
-//! Analysis of one task: the cells of its design, its families of tests, the agreement of its participants.
+//! Analysis of one task: the cells of its design, its families of tests, inter-rater agreement.
 
-use super::figure::{FigureMethod, adjust};
 use super::outcome::{BinaryVote, Numbering, binary, conditions, differences, measure, name_pairs, scores};
 use super::pair::{overall, pairs, score_table, single_pairs};
-use super::result::{FigureSettings, ShareAnalysis, ShareMeasure, TaskAnalysis};
+use super::result::{ShareAnalysis, ShareMeasure, StatisticSettings, TaskAnalysis};
 use super::share::{ShareCell, conclude, share};
+use super::statistic::{StatisticMethod, adjust};
 use super::strength::strengths;
 use super::verdict::verdicts;
 use crate::plan::TaskDesign;
@@ -15,8 +15,11 @@ use crate::vote::StudyVote;
 use anyhow::{Context, Result, bail};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Analysis of the votes of a task, which must have one design.
-pub fn task(name: &str, votes: &[&StudyVote], settings: &FigureSettings) -> Result<TaskAnalysis> {
+/// Analyses the votes of a task, which must all have the same design.
+///
+/// # Errors
+/// There are no votes, or votes of two designs.
+pub fn task(name: &str, votes: &[&StudyVote], settings: &StatisticSettings) -> Result<TaskAnalysis> {
     let design = votes.first().with_context(|| format!("the task {name} has no vote"))?.design;
     if let Some(other) = votes.iter().find(|vote| vote.design != design) {
         bail!("the task {name} has votes of two designs ({design:?}, {:?}); name them as two tasks", other.design)
@@ -53,13 +56,13 @@ pub fn task(name: &str, votes: &[&StudyVote], settings: &FigureSettings) -> Resu
     Ok(analysis)
 }
 
-/// Shares of all votes, by speaker and by condition.
+/// Analyses proportions of all votes, by speaker and by condition.
 fn binary_task(
     analysis: &mut TaskAnalysis,
     votes: &[&StudyVote],
     numbering: &Numbering,
     measure: ShareMeasure,
-    settings: &FigureSettings,
+    settings: &StatisticSettings,
 ) {
     let all = binary(votes, numbering, measure);
     let cell = |measure, speaker: Option<&str>, condition: Option<&str>, votes: Vec<BinaryVote>| {
@@ -93,29 +96,34 @@ fn pick<'v>(votes: &[BinaryVote<'v>], is_kept: impl Fn(&BinaryVote) -> bool) -> 
 /// Adds cells whose tests are adjusted as one family.
 fn family(analysis: &mut TaskAnalysis, level: f64, cells: impl FnOnce(&TaskAnalysis) -> Vec<ShareAnalysis>) {
     let mut cells = cells(analysis);
-    adjust(&mut cells.iter_mut().map(|cell| &mut cell.figures).collect::<Vec<_>>());
+    adjust(&mut cells.iter_mut().map(|cell| &mut cell.statistics).collect::<Vec<_>>());
     cells.iter_mut().for_each(|cell| conclude(cell, level));
     analysis.shares.extend(cells);
 }
 
-/// Preferences and sliders: pairs, scores, strengths.
-fn compared_task(analysis: &mut TaskAnalysis, votes: &[&StudyVote], numbering: &Numbering, settings: &FigureSettings) {
+/// Analyses preferences and sliders: pairs, scores, strengths.
+fn compared_task(
+    analysis: &mut TaskAnalysis,
+    votes: &[&StudyVote],
+    numbering: &Numbering,
+    settings: &StatisticSettings,
+) {
     if analysis.design == TaskDesign::Sliders {
         analysis.scores = score_table(votes, numbering, &analysis.conditions, settings);
         analysis.conditions = analysis.scores.iter().map(|row| row.condition.clone()).collect();
         match overall(votes, numbering, &analysis.conditions) {
             Ok(test) => analysis.overall = Some(test),
-            Err(error) => analysis.missing.push(format!("{}: {error}", FigureMethod::Friedman.name())),
+            Err(error) => analysis.missing.push(format!("{}: {error}", StatisticMethod::Friedman.name())),
         }
     }
     analysis.pairs = pairs(votes, numbering, &analysis.conditions, analysis.design, settings);
     match strengths(votes, numbering, &analysis.conditions, settings) {
         Ok(found) => analysis.strengths = found,
-        Err(error) => analysis.missing.push(format!("{}: {error}", FigureMethod::BradleyTerry.name())),
+        Err(error) => analysis.missing.push(format!("{}: {error}", StatisticMethod::BradleyTerry.name())),
     }
 }
 
-/// Krippendorff's alpha: participants rate clips, each condition or pair of them by itself.
+/// Krippendorff's alpha: participants are raters, and each combination of a clip with a condition or a pair is a unit.
 fn agreement(votes: &[&StudyVote], numbering: &Numbering, analysis: &TaskAnalysis) -> Result<f64, StatisticsError> {
     let names = &analysis.conditions;
     let (scale, groups): (_, Vec<Vec<ClipVote>>) = match analysis.design {
@@ -127,7 +135,7 @@ fn agreement(votes: &[&StudyVote], numbering: &Numbering, analysis: &TaskAnalysi
             (MeasurementScale::Ordinal, name_pairs(names).map(of_pair).collect())
         }
         design => {
-            // Of single films, answers are compared, not whether they were right.
+            // For single films, agreement is measured on the responses, not on their correctness.
             let measure = measure(design).filter(|measure| *measure != ShareMeasure::Correct);
             let measure = measure.unwrap_or(ShareMeasure::TakenForReal);
             let mut groups: BTreeMap<&str, Vec<ClipVote>> = BTreeMap::new();

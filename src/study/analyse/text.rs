@@ -1,19 +1,19 @@
 //! Summary of an analysis for the terminal.
 
-use super::figure::{FigureMethod, FigureRow};
+use super::number_format::{bare_p, count, p_value, percent, percents, points};
 use super::result::{StudyAnalysis, TaskAnalysis};
+use super::statistic::{StatisticMethod, StatisticRow};
 use super::verdict::scope;
-use super::words::{bare_p, count, p_value, percent, percents, points};
 use std::fmt::Write as _;
 
-/// Rows without a vote that are named.
-const MOST_REFUSED: usize = 20;
+/// Maximum number of refused rows that are listed.
+const MAX_REFUSED: usize = 20;
 
-/// Summary: verdicts first, then the headline figures, marks, exclusions and notes.
+/// Summary: verdicts with the headline statistics, exclusions and notes.
 pub fn text(analysis: &StudyAnalysis) -> String {
     let mut text = String::new();
-    let account = &analysis.exclusions;
-    let [votes, participants] = [account.n_votes_kept, account.n_participants_kept].map(count);
+    let summary = &analysis.exclusions;
+    let [votes, participants] = [summary.n_votes_kept, summary.n_participants_kept].map(count);
     let _ = writeln!(text, "{}: {votes} votes of {participants} participants", analysis.title);
     if !analysis.hypotheses.is_empty() {
         text += "\nregistered hypotheses\n";
@@ -35,9 +35,9 @@ pub fn text(analysis: &StudyAnalysis) -> String {
     if analysis.tasks.iter().any(|task| task.origins().any(|origin| origin.exploratory)) {
         text += "\n* exploratory: not registered before the data were seen\n";
     }
-    if account.leaves_out() {
+    if summary.any_excluded() {
         text += "\nexcluded, by each rule alone\n";
-        for rule in &account.rules {
+        for rule in &summary.rules {
             let _ =
                 writeln!(text, "  {:<44} {:>6} participants {:>8} votes", rule.rule, rule.n_participants, rule.n_votes);
         }
@@ -57,24 +57,24 @@ pub fn text(analysis: &StudyAnalysis) -> String {
     }
     if !analysis.refused.is_empty() {
         let _ = writeln!(text, "\nrows that are no votes: {}", count(analysis.refused.len()));
-        for row in analysis.refused.iter().take(MOST_REFUSED) {
+        for row in analysis.refused.iter().take(MAX_REFUSED) {
             let _ = writeln!(text, "  line {}: {}", row.line, row.reason);
         }
-        if analysis.refused.len() > MOST_REFUSED {
+        if analysis.refused.len() > MAX_REFUSED {
             text += "  ... (--json has all)\n";
         }
     }
     text
 }
 
-/// Headline figures of a task.
+/// Lines with the headline statistics of a task.
 fn rows(task: &TaskAnalysis) -> String {
     let mut text = String::new();
     let mark = |is_exploratory: bool| if is_exploratory { "*" } else { " " };
     for share in &task.shares {
         let (scope, percent, votes) = (scope(share), percent(share.share), count(share.n_votes as usize));
         let _ = writeln!(text, "\n  {scope:<46} {percent:>8} of {votes:>8} votes");
-        for FigureRow { origin, interval, test } in share.figures.rows() {
+        for StatisticRow { origin, interval, test } in share.statistics.rows() {
             let name = format!("{}{}", origin.method.name(), if origin.naive { ", naive" } else { "" });
             let interval = interval.map(percents).unwrap_or_default();
             let p = test.map(|test| format!("  p {}", bare_p(test.p))).unwrap_or_default();
@@ -87,7 +87,7 @@ fn rows(task: &TaskAnalysis) -> String {
                 model.sd_participants, model.sd_clips
             );
         }
-        for test in &share.figures.equivalence {
+        for test in &share.statistics.equivalence {
             let naive = if test.origin.naive { ", naive" } else { "" };
             let name = format!("equivalence \u{b1}{} points{naive}", points(test.bound));
             let outcome = if test.passes { "shown" } else { "not shown" };
@@ -96,7 +96,7 @@ fn rows(task: &TaskAnalysis) -> String {
         }
     }
     for row in &task.scores {
-        let interval = row.figures.interval(FigureMethod::Median);
+        let interval = row.statistics.interval(StatisticMethod::Median);
         let interval = interval.map(|interval| format!("[{}, {}]", interval.low, interval.high)).unwrap_or_default();
         let _ =
             writeln!(text, "  {:<24} median {:>5} {interval:<12} mean {:>6.2}", row.condition, row.median, row.mean);

@@ -1,27 +1,27 @@
-//! What can be concluded from a task and what cannot, in sentences.
+//! Verdicts: sentences on what can be concluded from a task and what cannot.
 
-use super::figure::FigureMethod;
-use super::result::{Conclusion, FigureSettings, PairAnalysis, ShareAnalysis, ShareMeasure, TaskAnalysis};
-use super::words::{count, p_value, percent, percents, points};
+use super::number_format::{count, p_value, percent, percents, points};
+use super::result::{Conclusion, PairAnalysis, ShareAnalysis, ShareMeasure, StatisticSettings, TaskAnalysis};
+use super::statistic::StatisticMethod;
 use crate::plan::TaskDesign;
 
-/// Pairs that have a sentence of their own.
-const MOST_PAIRS: usize = 6;
+/// Maximum number of pairs with individual sentences.
+const MAX_PAIRS: usize = 6;
 
-/// Sentences about a task, the main one first.
-pub fn verdicts(task: &TaskAnalysis, settings: &FigureSettings) -> Vec<String> {
-    let mut said: Vec<String> = Vec::new();
+/// Sentences about a task, the most important first.
+pub fn verdicts(task: &TaskAnalysis, settings: &StatisticSettings) -> Vec<String> {
+    let mut sentences: Vec<String> = Vec::new();
     let shares = task.shares.iter().filter(|share| share.measure != ShareMeasure::TakenForReal);
-    said.extend(shares.map(|share| of_share(share, settings)));
-    if task.pairs.len() > MOST_PAIRS {
-        said.push(of_many(task));
+    sentences.extend(shares.map(|share| share_sentence(share, settings)));
+    if task.pairs.len() > MAX_PAIRS {
+        sentences.push(many_pairs_sentence(task));
     } else {
-        said.extend(task.pairs.iter().map(|pair| of_pair(pair, task.design)));
+        sentences.extend(task.pairs.iter().map(|pair| pair_sentence(pair, task.design)));
     }
-    said
+    sentences
 }
 
-/// Who or what a share is about.
+/// Part of the votes that a proportion covers.
 pub fn scope(share: &ShareAnalysis) -> String {
     match (&share.speaker, &share.condition) {
         (Some(speaker), _) => format!("speaker {speaker}"),
@@ -30,7 +30,7 @@ pub fn scope(share: &ShareAnalysis) -> String {
     }
 }
 
-fn of_share(share: &ShareAnalysis, settings: &FigureSettings) -> String {
+fn share_sentence(share: &ShareAnalysis, settings: &StatisticSettings) -> String {
     let what = match share.measure {
         ShareMeasure::GeneratedChosen => "the generated motion was taken for the real one in",
         ShareMeasure::MatchedChosen => "the motion of the heard speech was chosen in",
@@ -38,23 +38,23 @@ fn of_share(share: &ShareAnalysis, settings: &FigureSettings) -> String {
         ShareMeasure::TakenForReal => "the film was taken for real in",
     };
     let confidence = format!("{:.0} %", 100.0 * settings.confidence);
-    let first = || share.figures.intervals.first().map(|interval| interval.ends);
-    let interval = share.figures.interval(FigureMethod::Crossed).or_else(first);
+    let first = || share.statistics.intervals.first().map(|interval| interval.ends);
+    let interval = share.statistics.interval(StatisticMethod::Crossed).or_else(first);
     let interval =
         interval.map(|interval| format!(" ({confidence} interval {})", percents(interval))).unwrap_or_default();
     let (n, share_of) = (count(share.n_votes as usize), percent(share.share));
     format!(
         "{}: {what} {share_of} of {n} votes{interval}. {}{}",
-        capital(&scope(share)),
-        meaning(share),
+        capitalise(&scope(share)),
+        conclusion_sentence(share),
         naive(share, settings.level())
     )
 }
 
-/// Meaning of a conclusion, with what it rests on.
-fn meaning(share: &ShareAnalysis) -> String {
-    let p = share.figures.crossed_p().map(p_value).unwrap_or_default();
-    let test = share.figures.equivalence(FigureMethod::Crossed);
+/// Sentence that explains a conclusion, with its p values.
+fn conclusion_sentence(share: &ShareAnalysis) -> String {
+    let p = share.statistics.crossed_p().map(p_value).unwrap_or_default();
+    let test = share.statistics.equivalence(StatisticMethod::Crossed);
     let equivalence = test.map(|test| p_value(test.p)).unwrap_or_default();
     let bound = test.map(|test| points(test.bound)).unwrap_or_default();
     let within = format!(
@@ -87,15 +87,15 @@ fn meaning(share: &ShareAnalysis) -> String {
              (equivalence, {equivalence}). Failing to reject is not passing."
         ),
         Conclusion::Untested => {
-            let why = share.figures.missing.first().map(|why| format!(": {why}")).unwrap_or_default();
+            let why = share.statistics.missing.first().map(|why| format!(": {why}")).unwrap_or_default();
             format!("There is no test that holds for other participants and clips{why}.")
         }
     }
 }
 
-/// What the binomial test would say, where it says something else.
+/// Remark on the naive binomial test if it contradicts the crossed test.
 fn naive(share: &ShareAnalysis, level: f64) -> String {
-    let Some((p, naive)) = share.figures.crossed_p().zip(share.figures.test(FigureMethod::Binomial)) else {
+    let Some((p, naive)) = share.statistics.crossed_p().zip(share.statistics.test(StatisticMethod::Binomial)) else {
         return String::new();
     };
     match (p < level) == (naive.p < level) {
@@ -107,7 +107,7 @@ fn naive(share: &ShareAnalysis, level: f64) -> String {
     }
 }
 
-fn of_pair(pair: &PairAnalysis, design: TaskDesign) -> String {
+fn pair_sentence(pair: &PairAnalysis, design: TaskDesign) -> String {
     let (high, low, sign) = match pair.difference >= 0.0 {
         true => (&pair.first, &pair.second, 1.0),
         false => (&pair.second, &pair.first, -1.0),
@@ -117,12 +117,12 @@ fn of_pair(pair: &PairAnalysis, design: TaskDesign) -> String {
         TaskDesign::TuringSingle => (100.0, "taken for real more often than", "points of percent"),
         _ => (1.0, "preferred to", "steps of a scale from -2 to 2"),
     };
-    let ends = pair.figures.interval(FigureMethod::Crossed).map(|interval| {
+    let ends = pair.statistics.interval(StatisticMethod::Crossed).map(|interval| {
         let mut ends = [sign * scale * interval.low, sign * scale * interval.high];
         ends.sort_by(f64::total_cmp);
         format!(", interval {:.2} to {:.2}", ends[0], ends[1])
     });
-    let test = pair.figures.test(FigureMethod::Crossed);
+    let test = pair.statistics.test(StatisticMethod::Crossed);
     let p = test.map(|test| match test.adjusted_p {
         Some(p) => format!(", {} after Holm", p_value(p)),
         None => format!(", {}", p_value(test.p)),
@@ -138,7 +138,7 @@ fn of_pair(pair: &PairAnalysis, design: TaskDesign) -> String {
     }
 }
 
-fn of_many(task: &TaskAnalysis) -> String {
+fn many_pairs_sentence(task: &TaskAnalysis) -> String {
     let is_found = |pair: &&PairAnalysis| {
         !matches!(pair.conclusion, Conclusion::Undecided | Conclusion::Equivalent | Conclusion::Untested)
     };
@@ -150,7 +150,7 @@ fn of_many(task: &TaskAnalysis) -> String {
     )
 }
 
-fn capital(text: &str) -> String {
+fn capitalise(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
 }

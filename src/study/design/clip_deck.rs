@@ -1,32 +1,33 @@
-//! Clips of one speaker for one task, dealt to sessions with the comparison and the arrangement that each is shown in, and
-//! the random numbers of a design.
+//! Deck of one speaker's clips for one task: deals clips to sessions, each with a comparison and a screen arrangement.
+//! Also the random streams of a design.
 
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
-/// Random numbers of one purpose: a change of one purpose leaves the others as they are.
+/// Random stream of one purpose: a change to the draws of one purpose does not affect the others.
 pub(super) fn stream(seed: u64, purpose: &str) -> ChaCha8Rng {
     ChaCha8Rng::from_seed(*blake3::hash(format!("{seed} {purpose}").as_bytes()).as_bytes())
 }
 
-/// Clip with what it is shown in.
+/// Clip with the comparison and the arrangement in which it is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct DealtClip {
     pub clip: usize,
     pub comparison: usize,
-    /// Row of the square of screen places.
+    /// Row of the Latin square of screen positions.
     pub arrangement: usize,
 }
 
-/// Deck that, however many are dealt, has dealt all clips equally often, to one; within each clip all comparisons, and
-/// within each of them all arrangements.
+/// Deck that stays balanced after any number of dealt clips: counts of clips differ by at most one, and so do the
+/// counts of (clip, comparison) and of (clip, comparison, arrangement).
 pub(super) struct ClipDeck {
     order: Vec<usize>,
     n_comparisons: usize,
     n_arrangements: usize,
-    /// Turns by which this deck is ahead of another: decks dealt side by side do not show all the same at once.
-    ahead: usize,
+    /// Offset of this deck's comparisons and arrangements, so that decks dealt in parallel do not all show the same
+    /// ones at once.
+    offset: usize,
     n_dealt: usize,
     rng: ChaCha8Rng,
 }
@@ -35,33 +36,35 @@ impl ClipDeck {
     pub(super) fn new(
         n_clips: usize,
         [n_comparisons, n_arrangements]: [usize; 2],
-        ahead: usize,
+        offset: usize,
         rng: ChaCha8Rng,
     ) -> Self {
         let (order, n_comparisons, n_arrangements) =
             ((0..n_clips).collect(), n_comparisons.max(1), n_arrangements.max(1));
-        Self { order, n_comparisons, n_arrangements, ahead, n_dealt: 0, rng }
+        Self { order, n_comparisons, n_arrangements, offset, n_dealt: 0, rng }
     }
 
-    /// Clips for one session, none twice: `n` of them, at most as many as there are.
+    /// Deals `n` different clips for one session, at most as many as there are.
     pub(super) fn deal(&mut self, n: usize) -> Vec<DealtClip> {
         let mut hand: Vec<DealtClip> = Vec::new();
         let n_clips = self.order.len();
         let (n_comparisons, n_arrangements) = (self.n_comparisons, self.n_arrangements);
-        // Consecutive cards take turns in their comparison; after this many, clips would meet the same ones again.
+        // Consecutive clips cycle through the comparisons. The cycle shifts by one every `n_turns` clips, where each
+        // clip would otherwise meet the same comparisons again.
         let n_turns = lcm(n_clips.max(1), n_comparisons);
         for _ in 0..n.min(n_clips) {
             let at = self.n_dealt % (n_clips * n_comparisons * n_arrangements);
             if at == 0 {
-                // Everything was dealt equally often. Clips in this hand come last, so that none of them comes twice.
+                // Every combination was dealt equally often, so the order is reshuffled. Clips already in this hand go
+                // last, so that none is dealt twice in one session.
                 self.order.shuffle(&mut self.rng);
                 self.order.sort_by_key(|clip| hand.iter().any(|dealt| dealt.clip == *clip));
             }
-            let (place, visit) = (at % n_clips, at / n_clips);
+            let (slot, visit) = (at % n_clips, at / n_clips);
             let turn = (at + at / n_turns) % n_comparisons;
-            let comparison = (turn + self.ahead) % n_comparisons;
-            let arrangement = (visit / n_comparisons + place / n_comparisons + turn + self.ahead) % n_arrangements;
-            hand.push(DealtClip { clip: self.order[place], comparison, arrangement });
+            let comparison = (turn + self.offset) % n_comparisons;
+            let arrangement = (visit / n_comparisons + slot / n_comparisons + turn + self.offset) % n_arrangements;
+            hand.push(DealtClip { clip: self.order[slot], comparison, arrangement });
             self.n_dealt += 1;
         }
         hand
@@ -83,11 +86,12 @@ mod tests {
 
     proptest::proptest! {
         #[test]
-        fn at_any_time_all_was_dealt_equally_often(
+        fn counts_are_balanced_at_any_time(
             n_clips in 1usize..13, n_comparisons in 1usize..6, n_arrangements in 1usize..5,
-            ahead in 0usize..4, hands in proptest::collection::vec(1usize..13, 1..40), seed in 0u64..100,
+            offset in 0usize..4, hands in proptest::collection::vec(1usize..13, 1..40), seed in 0u64..100,
         ) {
-            let mut deck = ClipDeck::new(n_clips, [n_comparisons, n_arrangements], ahead, ChaCha8Rng::seed_from_u64(seed));
+            let rng = ChaCha8Rng::seed_from_u64(seed);
+            let mut deck = ClipDeck::new(n_clips, [n_comparisons, n_arrangements], offset, rng);
             let mut counts = [(); 3].map(|()| BTreeMap::<DealtClip, usize>::new());
             for clip in 0..n_clips {
                 for comparison in 0..n_comparisons {

@@ -1,24 +1,25 @@
-//! How many clips of each speaker a design needs so that no participant hears one twice, and how they are shared out.
+//! Number of clips per speaker that a design needs so that no participant hears a clip twice, and their allocation to
+//! purposes.
 
 use crate::file::{ClipReuse, StudyFile};
 use anyhow::{Result, ensure};
 use std::collections::BTreeMap;
 
-/// Clips of each speaker, by what they are for.
+/// Number of clips needed of each speaker, by purpose.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ClipNeeds {
     pub reuse: ClipReuse,
-    /// For the sound check and the practice trial.
+    /// Clips for the sound check and the practice trial.
     pub practice: usize,
     pub checks: usize,
-    /// By task.
+    /// Clips for training trials, by task.
     pub training: Vec<usize>,
-    /// By task.
+    /// Clips for main trials, by task.
     pub main: Vec<usize>,
 }
 
 impl ClipNeeds {
-    /// Least numbers that a file allows; trials are shared out evenly between its speakers.
+    /// Minimum numbers for a study file; trials are divided evenly among its speakers.
     pub fn of(file: &StudyFile) -> Self {
         let share = |n: usize| n.div_ceil(file.speaker.len().max(1));
         Self {
@@ -30,7 +31,7 @@ impl ClipNeeds {
         }
     }
 
-    /// Clips that each speaker must have.
+    /// Total number of clips that each speaker needs.
     pub fn total(&self) -> usize {
         let of_tasks = |needs: &[usize]| match self.reuse {
             ClipReuse::Never => needs.iter().sum::<usize>(),
@@ -39,10 +40,10 @@ impl ClipNeeds {
         self.practice + self.checks + of_tasks(&self.training) + of_tasks(&self.main)
     }
 
-    /// That each speaker has them.
+    /// Checks that each speaker has enough clips.
     ///
     /// # Errors
-    /// The speakers that have fewer, with the number needed and what to do.
+    /// Speakers have too few clips; the error names them, the number needed and remedies.
     pub fn check(&self, file: &StudyFile, clips: &BTreeMap<String, Vec<String>>) -> Result<()> {
         let n_clips = |name: &String| clips.get(name).map_or(0, Vec::len);
         let few = file.speaker.iter().filter(|speaker| n_clips(&speaker.name) < self.total());
@@ -71,19 +72,20 @@ impl ClipNeeds {
     }
 }
 
-/// Clips of one speaker by purpose.
+/// Names of one speaker's clips, by purpose.
 #[derive(Clone, Debug)]
 pub struct SharedClips {
     pub practice: Vec<String>,
     pub checks: Vec<String>,
-    /// By task.
+    /// Clips of training trials, by task.
     pub training: Vec<Vec<String>>,
-    /// By task.
+    /// Clips of main trials, by task.
     pub main: Vec<Vec<String>>,
 }
 
 impl SharedClips {
-    /// Shares out `clips`, at least as many as needed; what is left over goes to the trials in proportion.
+    /// Allocates `clips`, which must be at least as many as needed; spare clips go to the main trials in proportion to
+    /// their number.
     pub fn new(needs: &ClipNeeds, mut clips: Vec<String>) -> Self {
         let n_spare = clips.len().saturating_sub(needs.total());
         let mut take = |n: usize| clips.drain(..n.min(clips.len())).collect::<Vec<String>>();
@@ -93,7 +95,7 @@ impl SharedClips {
             ClipReuse::Never => {
                 let training = needs.training.iter().map(|n| take(*n)).collect();
                 let total: usize = needs.main.iter().sum::<usize>().max(1);
-                // Spare clips up to the end of each task's share: the shares add up to all.
+                // Rounding the cumulative share of each task makes the shares add up to all spare clips.
                 let mut n_before = 0;
                 let main = needs.main.iter().map(|n| {
                     let given = n_spare * n_before / total;

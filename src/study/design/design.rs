@@ -1,4 +1,4 @@
-//! Design of a study, from its file and its clips.
+//! Designs a study from its file and its clips.
 
 use super::clip_deck::{ClipDeck, stream};
 use super::clip_needs::{ClipNeeds, SharedClips};
@@ -11,21 +11,22 @@ use anyhow::Result;
 use rand::seq::SliceRandom;
 use std::collections::BTreeMap;
 
-/// Version of the plan's file.
+/// Version of the plan file format.
 const VERSION: u32 = 1;
 
-/// Plan of a study, and how equally its votes are spread.
+/// Plan of a study and the balance of its votes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DesignedStudy {
     pub plan: StudyPlan,
     pub balance: Vec<TaskBalance>,
 }
 
-/// Designs the sessions of a study. `clips`: names `speaker/clip` by speaker, the best first, each with motion of every
-/// condition; of all speakers as many are taken. `film` names the film of a content whose `motion_of` it knows itself.
+/// Designs the sessions of a study. `clips` holds names `speaker/clip` by speaker, best first, each with motion for
+/// every condition; the same number is used of every speaker. `film` returns the opaque name of the film with the given
+/// content and determines `motion_of` itself.
 ///
 /// # Errors
-/// Too few clips, with the number needed; what `film` refuses.
+/// A speaker has too few clips, or `film` fails.
 pub fn design(
     file: &StudyFile,
     clips: &BTreeMap<String, Vec<String>>,
@@ -75,7 +76,7 @@ mod tests {
     use std::fmt::Write as _;
     use std::path::Path;
 
-    /// Film by the name that the tests give it.
+    /// Film content by the name that the tests give it.
     type Films = BTreeMap<String, FilmContent>;
 
     fn designed(file: &StudyFile, n_clips: &[usize]) -> Result<(DesignedStudy, Films)> {
@@ -93,7 +94,8 @@ mod tests {
         Ok((designed, films))
     }
 
-    /// Study file of tasks, each a design, trials, training and the number of models.
+    /// Study file with `tasks` of (design, trials, training trials) and `n_models` models, each with a mismatched
+    /// condition.
     fn file(tasks: &[(TaskDesign, usize, usize)], n_speakers: usize, n_models: usize, more: &str) -> StudyFile {
         let mut text = format!("title = \"t\"\n{more}\n[[condition]]\nname = \"real\"\nkind = \"natural\"\n");
         for model in 0..n_models {
@@ -121,7 +123,7 @@ mod tests {
         StudyFile::read(Path::new(&path)).unwrap()
     }
 
-    /// Everything that must hold in any design.
+    /// Asserts the invariants of every design.
     fn check(file: &StudyFile, designed: &DesignedStudy, films: &Films) {
         let plan = &designed.plan;
         assert_eq!(plan.sessions.len(), file.n_sessions());
@@ -129,11 +131,11 @@ mod tests {
         for session in &plan.sessions {
             let trials = &session.trials;
             assert_eq!(trials.len(), plan.sessions[0].trials.len());
-            let mut heard = BTreeSet::new();
+            let mut heard_speech = BTreeSet::new();
             for trial in trials {
                 assert!(trial.films.iter().all(|film| films[film].clip == speech(trial)));
                 let block = if file.clips.reuse == ClipReuse::Never { 0 } else { trial.task };
-                assert!(heard.insert((block, speech(trial))), "{} is heard twice", speech(trial));
+                assert!(heard_speech.insert((block, speech(trial))), "{} is heard twice", speech(trial));
                 let is_told = trial.phase == TrialPhase::Training && file.task[trial.task].feedback;
                 assert_eq!(trial.expected.is_some(), is_told || trial.phase == TrialPhase::AttentionCheck);
             }
@@ -168,7 +170,7 @@ mod tests {
         }
     }
 
-    /// Counts votes of cells anew, from what the films show.
+    /// Counts the votes per cell from the contents of the films and asserts that they are balanced.
     fn balanced(file: &StudyFile, sessions: &[PlannedSession], films: &Films) {
         for (at, task) in file.task.iter().enumerate() {
             let (mut cells, mut sides) = (BTreeMap::<_, usize>::new(), BTreeMap::<_, usize>::new());
@@ -190,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn the_papers_study_is_equal_in_every_cell() {
+    fn the_papers_study_is_balanced_in_every_cell() {
         let tasks = [(TaskDesign::Turing, 20, 3), (TaskDesign::Mismatch, 10, 3)];
         let file = file(&tasks, 2, 1, "participants = 100\ntask_order = \"written\"");
         let needed = ClipNeeds::of(&file).total();
@@ -199,8 +201,8 @@ mod tests {
         check(&file, &study, &films);
         assert_eq!((study.balance[0].votes, study.balance[0].arranged), ([100, 100], [50, 50]));
         assert_eq!((study.balance[1].votes, study.balance[1].arranged), ([100, 100], [50, 50]));
-        let said = "t0: 100 votes of each of 20 cells, 50 in each order of films";
-        assert_eq!(study.balance[0].to_string(), said);
+        let expected_text = "t0: 100 votes of each of 20 cells, 50 in each order of films";
+        assert_eq!(study.balance[0].to_string(), expected_text);
         for session in &study.plan.sessions {
             let is_left = |trial: &&Trial| {
                 trial.task == 0 && trial.phase == TrialPhase::Main && films[&trial.films[0]].condition == "real"
@@ -216,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn every_clip_comes_in_every_place_about_equally_often() {
+    fn every_clip_occurs_equally_often_in_every_position() {
         let file =
             file(&[(TaskDesign::Turing, 8, 0)], 1, 1, "participants = 80\nattention_checks = 0\npractice = false");
         let (study, films) = designed(&file, &[ClipNeeds::of(&file).total()]).unwrap();
@@ -264,7 +266,7 @@ mod tests {
     proptest::proptest! {
         #![proptest_config(proptest::test_runner::Config::with_cases(48))]
         #[test]
-        fn any_design_is_balanced_and_comes_again_by_its_seed(
+        fn any_design_is_balanced_and_reproducible_by_its_seed(
             tasks in proptest::collection::vec((0usize..5, 3usize..12, 0usize..4), 1..4),
             n_speakers in 1usize..4, n_models in 1usize..4, participants in 1usize..25, seed in 0u64..1000,
             more in 0usize..7, n_checks in 0usize..3, reuse in proptest::bool::ANY, practice in proptest::bool::ANY,

@@ -1,4 +1,5 @@
-//! Sessions one after the other: blocks of tasks, practice, training and main trials, attention checks among them.
+//! Builds sessions one after another: task blocks with practice, training and main trials, and attention checks among
+//! the main trials.
 
 use super::clip_deck::ClipDeck;
 use super::clip_needs::SharedClips;
@@ -15,24 +16,24 @@ use rand_chacha::ChaCha8Rng;
 /// State of a design between sessions.
 pub(super) struct Designer<'a> {
     pub file: &'a StudyFile,
-    /// By speaker.
+    /// Allocated clips, by speaker.
     pub shared: Vec<SharedClips>,
     pub tasks: Vec<TaskDesigner<'a>>,
     pub balance: Vec<TaskBalance>,
-    /// By speaker.
+    /// Decks of the attention checks' clips, by speaker.
     pub check_decks: Vec<ClipDeck>,
-    /// By speaker, check clip and variant.
+    /// Numbers shown, by speaker, check clip and variant.
     pub check_numbers: Vec<Vec<Vec<u16>>>,
     pub task_rows: SquareRows,
     pub rng: ChaCha8Rng,
     pub film: &'a mut dyn FnMut(FilmContent) -> Result<String>,
 }
 
-/// Clip and its speaker, by their names.
+/// Names of a clip and of its speaker.
 type NamedClip = [String; 2];
 
 impl Designer<'_> {
-    /// Session of that number; they are made in their order.
+    /// Builds the session with this index; sessions must be built in ascending order.
     pub(super) fn session(&mut self, session: usize) -> Result<PlannedSession> {
         let order = match self.file.task_order {
             TaskOrder::Balanced => {
@@ -42,8 +43,8 @@ impl Designer<'_> {
             TaskOrder::Written => (0..self.tasks.len()).collect(),
         };
         let n_main = self.file.task.iter().map(|task| task.trials).sum();
-        let places = places(n_main, self.file.attention_checks, &mut self.rng);
-        let mut checks = deal(&mut self.check_decks, places.len(), session);
+        let check_positions = check_positions(n_main, self.file.attention_checks, &mut self.rng);
+        let mut checks = deal(&mut self.check_decks, check_positions.len(), session);
         checks.shuffle(&mut self.rng);
         let (mut trials, mut n_before) = (Vec::new(), 0);
         for (nth, at) in order.into_iter().enumerate() {
@@ -62,7 +63,7 @@ impl Designer<'_> {
                 self.balance[at].count(&main);
             }
             for trial in main {
-                if places.contains(&n_before)
+                if check_positions.contains(&n_before)
                     && let Some(check) = checks.pop()
                 {
                     trials.push(self.check(at, check)?);
@@ -84,15 +85,15 @@ impl Designer<'_> {
         let task = &self.tasks[at];
         let comparison = &task.comparisons[trial.dealt.comparison];
         let row = task.arrangements.row(trial.dealt.arrangement);
-        let shown: Vec<&StudyCondition> = row.iter().map(|place| comparison[*place]).collect();
-        let (design, sound) = (task.task.design, heard(task.task));
-        let tells = phase == TrialPhase::Training && task.task.feedback;
-        let expected = if tells { right_response(design, &shown) } else { None };
+        let shown: Vec<&StudyCondition> = row.iter().map(|index| comparison[*index]).collect();
+        let (design, sound) = (task.task.design, film_sound(task.task));
+        let shows_feedback = phase == TrialPhase::Training && task.task.feedback;
+        let expected = if shows_feedback { right_response(design, &shown) } else { None };
         let shown = shown.iter().map(|condition| (condition.name.clone(), None)).collect();
         Ok(Trial { task: at, phase, films: self.films(&clip, shown, sound)?, expected })
     }
 
-    /// Attention check that looks like a trial of the task until its number comes, in one of the films.
+    /// Attention check that looks like a trial of the task until one of its films shows a number.
     fn check(&mut self, at: usize, check: DealtTrial) -> Result<Trial> {
         let variant = self.rng.random_range(0..N_VARIANTS);
         let number = self.check_numbers[check.speaker][check.dealt.clip][variant];
@@ -100,15 +101,15 @@ impl Designer<'_> {
         let comparison = &task.comparisons[variant % task.comparisons.len()];
         let numbered = variant / task.comparisons.len() % comparison.len();
         let row = task.arrangements.row(self.rng.random_range(0..task.arrangements.n_rows()));
-        let shown = |place: &usize| (comparison[*place].name.clone(), (*place == numbered).then_some(number));
+        let shown = |index: &usize| (comparison[*index].name.clone(), (*index == numbered).then_some(number));
         let shown = row.iter().map(shown).collect();
-        let sound = heard(task.task);
+        let sound = film_sound(task.task);
         let clip = self.clip(check.speaker, self.shared[check.speaker].checks.get(check.dealt.clip))?;
         let films = self.films(&clip, shown, sound)?;
         Ok(Trial { task: at, phase: TrialPhase::AttentionCheck, films, expected: Some(Response::Number(number)) })
     }
 
-    /// Film with tones whose clip is in no trial but practice.
+    /// Film with tones for the sound check; its clip occurs in no trial other than practice.
     pub(super) fn sound_check(&mut self) -> Result<String> {
         let clip = self.clip(0, self.shared.first().and_then(|shared| shared.practice.first()))?;
         let comparison = self.tasks.first().and_then(|task| task.comparisons.first());
@@ -117,7 +118,7 @@ impl Designer<'_> {
         self.films(&clip, shown, FilmSound::Tones).map(|films| films.concat())
     }
 
-    /// Names of the films of a clip: a condition each, and the number that it shows.
+    /// Names of the films of a clip, one per condition with the number that it shows, if any.
     fn films(&mut self, clip: &NamedClip, shown: Vec<(String, Option<u16>)>, sound: FilmSound) -> Result<Vec<String>> {
         let name = |(condition, number)| {
             let [clip, speaker] = clip.clone();
@@ -127,23 +128,24 @@ impl Designer<'_> {
     }
 }
 
-/// What the films of a task let hear.
-fn heard(task: &StudyTask) -> FilmSound {
+/// Audio track of the films of a task.
+fn film_sound(task: &StudyTask) -> FilmSound {
     if task.sound { FilmSound::Speech } else { FilmSound::Silence }
 }
 
-/// Numbered films of one check clip: a participant who tells another the number tells it to few.
+/// Variants per check clip, each with its own number, so that a number passed on between participants helps few of
+/// them.
 pub(super) const N_VARIANTS: usize = 4;
 
-/// Before which main trials of a session checks come, ascending: spread over the session, none before the third trial, no
-/// two beside each other.
-pub(super) fn places(n_main: usize, n_checks: usize, rng: &mut ChaCha8Rng) -> Vec<usize> {
+/// Indices of the main trials before which attention checks are inserted, ascending: spread evenly over the session,
+/// none before the third trial, none adjacent.
+pub(super) fn check_positions(n_main: usize, n_checks: usize, rng: &mut ChaCha8Rng) -> Vec<usize> {
     let n_checks = n_checks.min(n_main.saturating_sub(2));
-    let border = |at: usize| 2 + (n_main - 2) * at / n_checks;
-    (0..n_checks).map(|at| rng.random_range(border(at)..border(at + 1))).collect()
+    let boundary = |at: usize| 2 + (n_main - 2) * at / n_checks;
+    (0..n_checks).map(|at| rng.random_range(boundary(at)..boundary(at + 1))).collect()
 }
 
-/// Different numbers of two digits, equally likely.
+/// Distinct two-digit numbers, drawn uniformly.
 pub(super) fn numbers(rng: &mut ChaCha8Rng) -> Vec<u16> {
     let mut all: Vec<u16> = (10..=99).collect();
     all.shuffle(rng);

@@ -1,5 +1,5 @@
-//! Who sees what in which order: clips shared out to tasks, conditions and sides balanced over the sessions, attention
-//! checks among the trials.
+//! Experimental design: clips are allocated to tasks, conditions and screen sides are balanced over the sessions, and
+//! attention checks are inserted among the trials.
 
 mod clip_deck;
 mod clip_needs;

@@ -1,5 +1,5 @@
-//! One task over all sessions: which conditions its trials compare, which response is right, its decks of clips, the order
-//! of its trials, and how equally votes are spread over what it compares.
+//! Design of one task over all sessions: the comparisons of its trials, their correct responses, its clip decks, the
+//! order of its trials, and the balance of votes over its cells.
 
 use super::clip_deck::{ClipDeck, DealtClip, stream};
 use super::clip_needs::SharedClips;
@@ -10,11 +10,11 @@ use crate::vote::{Response, ScreenSide};
 use std::collections::{BTreeMap, VecDeque};
 use std::fmt;
 
-/// Conditions of one trial.
+/// Conditions compared in one trial.
 pub(super) type ComparedConditions<'a> = Vec<&'a StudyCondition>;
 
-/// Comparisons of a task, each of which takes an equal share of its trials. Where films are judged singly, the real
-/// condition is as frequent as all others together, so that chance is one half.
+/// Comparisons of a task, each of which gets an equal share of the trials. With single films the real condition is as
+/// frequent as all others together, so that chance is one half.
 pub(super) fn comparisons<'a>(file: &'a StudyFile, task: &StudyTask) -> Vec<ComparedConditions<'a>> {
     let all: ComparedConditions = task.conditions.iter().filter_map(|name| file.find_condition(name)).collect();
     let real = all.iter().copied().find(|condition| condition.real);
@@ -34,7 +34,7 @@ pub(super) fn comparisons<'a>(file: &'a StudyFile, task: &StudyTask) -> Vec<Comp
     }
 }
 
-/// Right response to conditions from left to right, where there is one.
+/// Correct response to conditions shown left to right, if the design has one.
 pub fn right_response(design: TaskDesign, shown: &[&StudyCondition]) -> Option<Response> {
     let side = |is_right: fn(&StudyCondition) -> bool| {
         let left = is_right(shown.first()?);
@@ -48,7 +48,7 @@ pub fn right_response(design: TaskDesign, shown: &[&StudyCondition]) -> Option<R
     }
 }
 
-/// Clip of a speaker with what it is shown in.
+/// Clip of a speaker with its comparison and arrangement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct DealtTrial {
     pub speaker: usize,
@@ -59,7 +59,7 @@ pub struct DealtTrial {
 pub struct TaskDesigner<'a> {
     pub task: &'a StudyTask,
     pub comparisons: Vec<ComparedConditions<'a>>,
-    /// Screen places of a comparison's conditions.
+    /// Screen positions of a comparison's conditions.
     pub arrangements: SquareRows,
     number: usize,
     practice: Vec<ClipDeck>,
@@ -106,8 +106,8 @@ impl<'a> TaskDesigner<'a> {
         deal(&mut self.training, self.task.training, session + self.number)
     }
 
-    /// Main trials of a session in their order: speakers and comparisons take turns by one square, clips among those of
-    /// the same speaker and comparison come by another.
+    /// Main trials of a session in order. One square orders the groups (speaker, comparison), another the clips within
+    /// a group.
     pub fn main(&mut self, session: usize) -> Vec<DealtTrial> {
         let dealt = deal(&mut self.main, self.task.trials, session + self.number);
         let mut groups: BTreeMap<usize, VecDeque<DealtTrial>> = BTreeMap::new();
@@ -125,7 +125,7 @@ impl<'a> TaskDesigner<'a> {
     }
 }
 
-/// `n` clips of all speakers, as many of each; those too many go to other speakers in every session.
+/// Deals `n` clips, the same number of each speaker; which speakers give the remainder rotates over the sessions.
 pub(super) fn deal(decks: &mut [ClipDeck], n: usize, session: usize) -> Vec<DealtTrial> {
     let n_speakers = decks.len().max(1);
     let (each, more) = (n / n_speakers, n % n_speakers);
@@ -137,15 +137,15 @@ pub(super) fn deal(decks: &mut [ClipDeck], n: usize, session: usize) -> Vec<Deal
     hands.flatten().collect()
 }
 
-/// Votes of one task, once every wanted participant has answered.
+/// Expected balance of the votes of one task, assuming that every wanted participant answers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TaskBalance {
     pub task: String,
-    /// Clips by compared conditions.
+    /// Number of cells: combinations of a clip and a comparison.
     pub n_cells: usize,
-    /// Fewest and most votes of a cell.
+    /// Minimum and maximum number of votes per cell.
     pub votes: [usize; 2],
-    /// Fewest and most votes of a cell with its films in one arrangement on the screen.
+    /// Minimum and maximum number of votes per cell and arrangement of its films on the screen.
     pub arranged: [usize; 2],
     cells: BTreeMap<(usize, usize, usize), Vec<usize>>,
 }
@@ -170,12 +170,12 @@ impl TaskBalance {
                 *votes += 1;
             }
         }
-        self.votes = extent(self.cells.values().map(|cell| cell.iter().sum()));
-        self.arranged = extent(self.cells.values().flatten().copied());
+        self.votes = min_max(self.cells.values().map(|cell| cell.iter().sum()));
+        self.arranged = min_max(self.cells.values().flatten().copied());
     }
 }
 
-fn extent(counts: impl Iterator<Item = usize>) -> [usize; 2] {
+fn min_max(counts: impl Iterator<Item = usize>) -> [usize; 2] {
     let counts: Vec<usize> = counts.collect();
     [counts.iter().min(), counts.iter().max()].map(|count| count.copied().unwrap_or(0))
 }

@@ -1,35 +1,35 @@
-//! Conditions: where the motion of a film comes from.
+//! Conditions of a study: the sources of the motion in its films.
 
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Compared condition.
+/// Condition of a study.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "WrittenCondition", into = "WrittenCondition")]
 pub struct StudyCondition {
     pub name: String,
     pub source: ConditionSource,
-    /// Whether it is the real one of a Turing test.
+    /// Whether this is the real condition of Turing tests.
     pub real: bool,
 }
 
-/// Source of a condition's motion. In a path `{speaker}` and `{clip}` stand for their names.
+/// Source of a condition's motion. In paths, `{speaker}` and `{clip}` stand for names.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ConditionSource {
     /// Motion of the dataset.
     Natural,
-    /// Motion that a model makes of the speech; folder or file of its checkpoint.
+    /// Motion generated from the speech by a model; path of its checkpoint, a folder or file.
     Checkpoint(PathBuf),
-    /// Motion of the named condition for the speech of another clip; in the file the only model's unless it is said.
+    /// Motion of the named condition for the speech of another clip. If the file names none, the only model is used.
     Mismatched(String),
-    /// Mean pose of the dataset, unmoved.
+    /// Static mean pose of the dataset.
     MeanPose,
-    /// Motion in files, one a clip.
+    /// Motion files, one per clip.
     Files(PathBuf),
 }
 
 impl ConditionSource {
-    /// Condition whose motion a mismatched one takes.
+    /// Name of the condition whose motion a mismatched condition uses.
     pub fn mismatch_of(&self) -> Option<&str> {
         match self {
             Self::Mismatched(of) => Some(of),
@@ -45,9 +45,8 @@ impl ConditionSource {
     }
 }
 
-/// `pattern` with the names of a speaker and a clip in the place of `{speaker}` and `{clip}`; a clip's name in a path is
-/// its last part, `speaker/clip` gives `clip`.
-pub fn filled(pattern: &Path, speaker: &str, clip: &str) -> PathBuf {
+/// Replaces `{speaker}` and `{clip}` in `pattern`; of a clip name `speaker/clip` only the last part is used.
+pub fn fill_pattern(pattern: &Path, speaker: &str, clip: &str) -> PathBuf {
     let clip = clip.rsplit('/').next().unwrap_or(clip);
     pattern.to_string_lossy().replace("{speaker}", speaker).replace("{clip}", clip).into()
 }
@@ -62,7 +61,7 @@ enum ConditionKind {
     Files,
 }
 
-/// Condition as it stands in the file.
+/// Condition as written in the study file.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct WrittenCondition {

@@ -1,4 +1,4 @@
-//! Presets, and how a study file is laid over one.
+//! Presets, and merging a study file onto one.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -6,7 +6,7 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue};
 
-/// Published study whose design a file takes over.
+/// Published study whose design serves as a preset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StudyPreset {
@@ -26,7 +26,7 @@ impl StudyPreset {
         }
     }
 
-    /// Its study file, without speakers and models.
+    /// Study file of the preset, without speakers and models.
     pub const fn text(self) -> &'static str {
         match self {
             Self::Rebol => include_str!("rebol.toml"),
@@ -35,44 +35,45 @@ impl StudyPreset {
     }
 }
 
-/// Lays `written` over `below`: tables key by key, lists of named tables by name, all else as a whole.
-pub(super) fn lay<'t>(written: DeTable<'t>, below: &mut DeTable<'t>) {
+/// Merges `written` onto `base`: tables key by key, lists of named tables by name; other values replace those of
+/// `base`.
+pub(super) fn merge<'t>(written: DeTable<'t>, base: &mut DeTable<'t>) {
     for (key, value) in written {
-        let Some(under) = below.get_mut(key.get_ref().as_ref()) else {
-            below.insert(key, value);
+        let Some(base_value) = base.get_mut(key.get_ref().as_ref()) else {
+            base.insert(key, value);
             continue;
         };
         let span = value.span();
-        let merged = match (std::mem::replace(under.get_mut(), DeValue::Boolean(false)), value.into_inner()) {
-            (DeValue::Table(mut under), DeValue::Table(value)) => {
-                lay(value, &mut under);
-                DeValue::Table(under)
+        let merged = match (std::mem::replace(base_value.get_mut(), DeValue::Boolean(false)), value.into_inner()) {
+            (DeValue::Table(mut base_value), DeValue::Table(value)) => {
+                merge(value, &mut base_value);
+                DeValue::Table(base_value)
             }
-            (DeValue::Array(mut under), DeValue::Array(entries))
-                if under.iter().all(|entry| name_of(entry).is_some()) =>
+            (DeValue::Array(mut base_value), DeValue::Array(entries))
+                if base_value.iter().all(|entry| name_of(entry).is_some()) =>
             {
-                entries.into_iter().for_each(|entry| lay_entry(entry, &mut under));
-                DeValue::Array(under)
+                entries.into_iter().for_each(|entry| merge_entry(entry, &mut base_value));
+                DeValue::Array(base_value)
             }
             (_, value) => value,
         };
-        // The place of an error is that of what is written.
-        *under = Spanned::new(span, merged);
+        // Errors are located at the text of the study file, not of the preset.
+        *base_value = Spanned::new(span, merged);
     }
 }
 
-/// Lays a table of a list over that of its name, or puts it at the end.
-fn lay_entry<'t>(entry: Spanned<DeValue<'t>>, below: &mut DeArray<'t>) {
+/// Merges a list entry onto the entry with the same name, or appends it.
+fn merge_entry<'t>(entry: Spanned<DeValue<'t>>, base: &mut DeArray<'t>) {
     let span = entry.span();
-    let place = below.iter_mut().find(|other| name_of(other) == name_of(&entry));
-    match (place, entry.into_inner()) {
-        (Some(place), DeValue::Table(table)) => {
-            if let DeValue::Table(mut under) = std::mem::replace(place.get_mut(), DeValue::Boolean(false)) {
-                lay(table, &mut under);
-                *place = Spanned::new(span, DeValue::Table(under));
+    let existing = base.iter_mut().find(|other| name_of(other) == name_of(&entry));
+    match (existing, entry.into_inner()) {
+        (Some(existing), DeValue::Table(table)) => {
+            if let DeValue::Table(mut base_value) = std::mem::replace(existing.get_mut(), DeValue::Boolean(false)) {
+                merge(table, &mut base_value);
+                *existing = Spanned::new(span, DeValue::Table(base_value));
             }
         }
-        (_, entry) => below.push(Spanned::new(span, entry)),
+        (_, entry) => base.push(Spanned::new(span, entry)),
     }
 }
 
@@ -86,26 +87,26 @@ fn name_of<'v>(entry: &'v Spanned<DeValue<'_>>) -> Option<&'v str> {
     }
 }
 
-/// Byte ranges of all that is written, by key: `clips.seconds`, `task[NAME].trials`, `hypothesis[0].kind`.
+/// Byte ranges of all values in the file, by key: `clips.seconds`, `task[NAME].trials`, `hypothesis[0].kind`.
 pub(super) fn spans(table: &DeTable<'_>) -> BTreeMap<String, Range<usize>> {
-    let mut found = BTreeMap::new();
-    collect(table, "", &mut found);
-    found
+    let mut spans_by_key = BTreeMap::new();
+    collect(table, "", &mut spans_by_key);
+    spans_by_key
 }
 
-fn collect(table: &DeTable<'_>, prefix: &str, found: &mut BTreeMap<String, Range<usize>>) {
+fn collect(table: &DeTable<'_>, prefix: &str, spans_by_key: &mut BTreeMap<String, Range<usize>>) {
     for (name, value) in table {
         let key = format!("{prefix}{}", name.get_ref());
         let end = value.span().end.max(name.span().end);
-        found.insert(key.clone(), name.span().start..end);
+        spans_by_key.insert(key.clone(), name.span().start..end);
         match value.get_ref() {
-            DeValue::Table(inner) => collect(inner, &format!("{key}."), found),
+            DeValue::Table(inner) => collect(inner, &format!("{key}."), spans_by_key),
             DeValue::Array(entries) => {
                 for (at, entry) in entries.iter().enumerate() {
                     let DeValue::Table(inner) = entry.get_ref() else { continue };
                     let key = name_of(entry).map_or_else(|| format!("{key}[{at}]"), |name| format!("{key}[{name}]"));
-                    found.insert(key.clone(), entry.span());
-                    collect(inner, &format!("{key}."), found);
+                    spans_by_key.insert(key.clone(), entry.span());
+                    collect(inner, &format!("{key}."), spans_by_key);
                 }
             }
             _ => {}

@@ -1,4 +1,4 @@
-//! The study file: what a researcher writes, laid over a preset, with every default filled in and every rule held.
+//! The study file written by a researcher: merged onto a preset, completed with defaults and validated.
 
 mod condition;
 mod layers;
@@ -6,7 +6,7 @@ mod read;
 mod rules;
 mod study_file;
 
-pub use condition::{ConditionSource, StudyCondition, filled};
+pub use condition::{ConditionSource, StudyCondition, fill_pattern};
 pub use layers::StudyPreset;
 pub use read::EXAMPLE;
 pub use study_file::{

@@ -1,8 +1,8 @@
-//! A study file read over its preset, and the resolved one written.
+//! Reads a study file on top of its preset, and writes the resolved file.
 
 use super::layers::{self, StudyPreset};
 use super::rules;
-use super::study_file::{StudyFile, fill_in};
+use super::study_file::{StudyFile, fill_defaults};
 use anyhow::{Context, Result};
 use orator_base::input;
 use orator_base::stage::workdir;
@@ -15,14 +15,14 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// A documented study file.
+/// Documented example of a study file.
 pub const EXAMPLE: &str = include_str!("example.toml");
 
 impl StudyFile {
-    /// Reads `file` over its preset; paths in it count from its folder.
+    /// Reads `file` on top of its preset; paths in it are relative to its folder.
     ///
     /// # Errors
-    /// A file that cannot be read, or [`ConfigError`] with what is wrong in it.
+    /// The file cannot be read, or [`ConfigError`] lists its problems.
     pub fn read(file: &Path) -> Result<Self> {
         let text = input::read_text(file, input::MOST_TEXT).with_context(|| {
             format!("cannot read the study file {}; `orator guide study` shows one", file.display())
@@ -31,39 +31,39 @@ impl StudyFile {
         resolve(&text, &file).map_err(|problems| ConfigError { file, problems }.into())
     }
 
-    /// Writes the file with every default in it, atomically.
+    /// Writes the resolved file atomically.
     pub fn write(&self, file: &Path) -> Result<()> {
         workdir::write_file(file, toml::to_string_pretty(self)?.as_bytes())
     }
 }
 
-/// Study file of a text, or all that is wrong with it.
+/// Parses and resolves the text of a study file, or returns all its problems.
 pub(super) fn resolve(text: &str, file: &Path) -> Result<StudyFile, Vec<Problem>> {
-    let whole = |at: usize, message: String| {
+    let file_problem = |at: usize, message: String| {
         vec![Problem { key: String::new(), location: SourceLocation::Line(line_of(text, at)), message }]
     };
     let written = DeTable::parse(text).map_err(|error| {
-        whole(
+        file_problem(
             error.span().map_or(0, |span| span.start),
             format!("not valid TOML: {}", error.message().replace('\n', ", ")),
         )
     })?;
     let spans = layers::spans(written.get_ref());
     let span = written.span();
-    let preset = preset_of(written.get_ref()).map_err(|(at, message)| whole(at, message))?;
+    let preset = preset_of(written.get_ref()).map_err(|(at, message)| file_problem(at, message))?;
     let mut merged: Spanned<DeTable> =
-        DeTable::parse(preset.map_or("", StudyPreset::text)).map_err(|error| whole(0, error.to_string()))?;
-    layers::lay(written.into_inner(), merged.get_mut());
+        DeTable::parse(preset.map_or("", StudyPreset::text)).map_err(|error| file_problem(0, error.to_string()))?;
+    layers::merge(written.into_inner(), merged.get_mut());
     let read = StudyFile::deserialize(toml::de::Deserializer::from(Spanned::new(span, merged.into_inner())));
-    let mut study = read.map_err(|error| vec![worded(text, &error, &spans)])?;
+    let mut study = read.map_err(|error| vec![problem_of_error(text, &error, &spans)])?;
     study.preset = None;
-    fill_in(&mut study);
+    fill_defaults(&mut study);
     let folder = file.parent().unwrap_or(Path::new(""));
-    paths_of(&mut study).for_each(|path| *path = folder.join(&path));
-    let place = |key: &str| spans.get(key).map(|span| line_of(text, span.start));
+    paths_mut(&mut study).for_each(|path| *path = folder.join(&path));
+    let line_of_key = |key: &str| spans.get(key).map(|span| line_of(text, span.start));
     let problems = rules::check(&study).into_iter().map(|(key, message)| {
-        let entry = || place(key.rsplit_once('.')?.0);
-        let line = place(&key).or_else(entry).or_else(|| place("preset")).unwrap_or(1);
+        let entry = || line_of_key(key.rsplit_once('.')?.0);
+        let line = line_of_key(&key).or_else(entry).or_else(|| line_of_key("preset")).unwrap_or(1);
         Problem { key, location: SourceLocation::Line(line), message }
     });
     let mut problems: Vec<Problem> = problems.collect();
@@ -71,7 +71,7 @@ pub(super) fn resolve(text: &str, file: &Path) -> Result<StudyFile, Vec<Problem>
     if problems.is_empty() { Ok(study) } else { Err(problems) }
 }
 
-/// Preset that the file names, or the place and what was expected.
+/// Preset named by the file, or the byte offset and message of an error.
 fn preset_of(written: &DeTable<'_>) -> Result<Option<StudyPreset>, (usize, String)> {
     let Some(value) = written.get("preset") else { return Ok(None) };
     let DeValue::String(name) = value.get_ref() else {
@@ -85,11 +85,11 @@ fn preset_of(written: &DeTable<'_>) -> Result<Option<StudyPreset>, (usize, Strin
     })
 }
 
-/// Problem for an error of serde: the key at its place and what was expected.
-fn worded(text: &str, error: &toml::de::Error, spans: &BTreeMap<String, Range<usize>>) -> Problem {
+/// Converts a deserialisation error: the key at its position and what was expected.
+fn problem_of_error(text: &str, error: &toml::de::Error, spans: &BTreeMap<String, Range<usize>>) -> Problem {
     let at = error.span().map_or(0, |span| span.start);
-    let around = spans.iter().filter(|(_, span)| span.contains(&at)).min_by_key(|(_, span)| span.len());
-    let key = around.map_or_else(String::new, |(key, _)| key.clone());
+    let enclosing = spans.iter().filter(|(_, span)| span.contains(&at)).min_by_key(|(_, span)| span.len());
+    let key = enclosing.map_or_else(String::new, |(key, _)| key.clone());
     let message = error.message();
     let quoted: Vec<String> = message.split('`').skip(1).step_by(2).map(str::to_owned).collect();
     let message = if message.starts_with("unknown field") {
@@ -108,7 +108,7 @@ fn worded(text: &str, error: &toml::de::Error, spans: &BTreeMap<String, Range<us
     Problem { key, location: SourceLocation::Line(line_of(text, at)), message }
 }
 
-fn paths_of(study: &mut StudyFile) -> impl Iterator<Item = &mut PathBuf> {
+fn paths_mut(study: &mut StudyFile) -> impl Iterator<Item = &mut PathBuf> {
     let speakers = study.speaker.iter_mut().flat_map(|speaker| speaker.dataset.iter_mut().chain(&mut speaker.sounds));
     speakers.chain(study.condition.iter_mut().filter_map(|condition| condition.source.path_mut()))
 }
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn the_smallest_file_takes_all_from_its_preset() {
+    fn a_minimal_file_takes_all_settings_from_its_preset() {
         let file = read(SMALLEST);
         assert_eq!((file.participants, file.n_sessions(), file.task_order), (100, 150, TaskOrder::Written));
         let tasks: Vec<_> = file.task.iter().map(|task| (task.trials, task.training, task.replay)).collect();
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_laid_over_the_preset_by_name() {
+    fn a_file_is_merged_onto_its_preset_by_name() {
         let text = format!(
             "participants = 7\nattention_checks = 1\n{SMALLEST}[[task]]\nname = \"matched-or-mismatched\"\n\
                             trials = 0\n[[task]]\nname = \"real-or-generated\"\ntrials = 5\n[exclusion]\nstalled_secs = 9\n"
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn the_challenges_preset_mismatches_natural_motion_where_there_is_sound() {
+    fn the_challenge_preset_mismatches_natural_motion_in_tasks_with_sound() {
         let file = read(&SMALLEST.replace("rebol", "genea2020"));
         assert_eq!(file.task[0].conditions, ["natural", "model"]);
         assert_eq!(file.task[1].conditions, ["natural", "mismatched", "model"]);
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn the_example_is_read_and_what_is_written_comes_back() {
+    fn the_example_is_valid_and_resolved_files_round_trip() {
         let file = read(EXAMPLE);
         assert_eq!(file.hypothesis[0].points, Some(10.0));
         let dir = tempfile::tempdir().unwrap();
@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn each_problem_names_line_key_and_remedy() {
+    fn each_problem_states_line_key_and_remedy() {
         let one = |text: &str| problems(&format!("{SMALLEST}{text}"));
         assert!(
             one("[clips]\nsecond = 3\n")[0].starts_with("line 11: clips.second: unknown key (did you mean seconds?)")
@@ -223,8 +223,10 @@ mod tests {
         assert!(problems("title = 3\nparticipants = 4\n")[0].starts_with("line 1: title: invalid type"));
         assert!(problems("[x")[0].starts_with("line 1: not valid TOML"));
         let bare = problems("title = \"\"\npreset = \"rebol\"\nseed = 3\n").join("\n");
-        for said in ["title: expected a title", "no speaker is named", "condition[mismatched].of: expected the name"] {
-            assert!(bare.contains(said), "{said}: {bare}");
+        for expected in
+            ["title: expected a title", "no speaker is named", "condition[mismatched].of: expected the name"]
+        {
+            assert!(bare.contains(expected), "{expected}: {bare}");
         }
     }
 

@@ -1,4 +1,4 @@
-//! What a study file must hold beyond its types: a key and what was expected, for each rule that is broken.
+//! Rules for study files beyond their types. Each violation gives a key and what was expected.
 
 use super::condition::{ConditionSource, StudyCondition};
 use super::study_file::{HypothesisKind, StudyFile, StudyHypothesis, StudyTask};
@@ -7,33 +7,33 @@ use crate::plan::TaskDesign;
 use orator_dataset::config::file::did_you_mean;
 use std::collections::BTreeSet;
 
-/// Keys of a file that break a rule, with what was expected and what to do.
+/// Violated rules: the key, what was expected and how to fix it.
 pub(super) fn check(file: &StudyFile) -> Vec<(String, String)> {
-    let mut rules = StudyRules { file, broken: Vec::new() };
-    rules.whole();
+    let mut rules = StudyRules { file, problems: Vec::new() };
+    rules.general();
     rules.speakers();
     rules.names("condition", file.condition.iter().map(|condition| condition.name.as_str()));
     file.condition.iter().for_each(|condition| rules.condition(condition));
     rules.names("task", file.task.iter().map(|task| task.name.as_str()));
     file.task.iter().for_each(|task| rules.task(task));
     file.hypothesis.iter().enumerate().for_each(|(at, hypothesis)| rules.hypothesis(at, hypothesis));
-    rules.broken
+    rules.problems
 }
 
 struct StudyRules<'a> {
     file: &'a StudyFile,
-    broken: Vec<(String, String)>,
+    problems: Vec<(String, String)>,
 }
 
 impl StudyRules<'_> {
-    fn say(&mut self, key: impl Into<String>, message: impl Into<String>) {
-        self.broken.push((key.into(), message.into()));
+    fn report(&mut self, key: impl Into<String>, message: impl Into<String>) {
+        self.problems.push((key.into(), message.into()));
     }
 
     fn within(&mut self, key: impl Into<String>, value: f64, low: f64, high: f64, unit: &str) {
         if !(low..=high).contains(&value) {
             let message = format!("{value} is out of range: expected {low} to {high} {unit}");
-            self.say(key, message.trim_end());
+            self.report(key, message.trim_end());
         }
     }
 
@@ -42,17 +42,17 @@ impl StudyRules<'_> {
         for name in names {
             let key = format!("{list}[{name}].name");
             if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_') {
-                self.say(key, format!("{name:?}: expected letters, digits, - and _"));
+                self.report(key, format!("{name:?}: expected letters, digits, - and _"));
             } else if !seen.insert(name.to_ascii_lowercase()) {
-                self.say(key, format!("{name:?} is there twice: give each its own name"));
+                self.report(key, format!("{name:?} is there twice: give each its own name"));
             }
         }
     }
 
-    fn whole(&mut self) {
+    fn general(&mut self) {
         let file = self.file;
         if file.title.trim().is_empty() {
-            self.say("title", "expected a title, which participants see");
+            self.report("title", "expected a title, which participants see");
         }
         self.within("participants", file.participants as f64, 1.0, 10_000.0, "participants");
         self.within("spare", file.spare, 0.0, 5.0, "(a share of the participants)");
@@ -62,55 +62,60 @@ impl StudyRules<'_> {
         self.within("exclusion.stalled_secs", rules.stalled_secs.unwrap_or(0.0), 0.0, 600.0, "seconds");
         self.within("exclusion.unfocused_secs", rules.unfocused_secs.unwrap_or(0.0), 0.0, 600.0, "seconds");
         if rules.failed_checks == Some(0) {
-            self.say("exclusion.failed_checks", "0 would leave out everybody: expected 1 or more, or no such key");
+            self.report("exclusion.failed_checks", "0 would leave out everybody: expected 1 or more, or no such key");
         }
         self.within("analysis.alpha", file.analysis.alpha, 0.0001, 0.5, "");
         self.within("analysis.resamples", file.analysis.resamples as f64, 100.0, 1e7, "samples");
         if file.return_url.as_ref().is_some_and(|address| !address.starts_with("https://")) {
-            self.say("return_url", "expected an address that begins with https://");
+            self.report("return_url", "expected an address that begins with https://");
         }
         let is_code = |code: &str| {
             let plain = code.chars().all(|c| c.is_ascii_alphanumeric() || c == '-');
             plain && (2..=3).contains(&code.split('-').next().unwrap_or_default().len())
         };
         if file.languages.is_empty() {
-            self.say("languages", "expected at least one language, like [\"en\"]");
+            self.report("languages", "expected at least one language, like [\"en\"]");
         }
         for language in file.languages.iter().filter(|language| !is_code(language)) {
-            self.say("languages", format!("{language:?} is no language code: expected one like \"en\" or \"pt-BR\""));
+            self.report(
+                "languages",
+                format!("{language:?} is no language code: expected one like \"en\" or \"pt-BR\""),
+            );
         }
         for language in file.texts.keys().filter(|language| !file.languages.contains(language)) {
-            self.say(format!("texts.{language}"), format!("{language:?} is not in languages: add it there"));
+            self.report(format!("texts.{language}"), format!("{language:?} is not in languages: add it there"));
         }
         let known = text_keys(file.task.iter().map(|task| task.name.as_str()));
         let keys = file.texts.iter().flat_map(|(language, texts)| texts.keys().map(move |key| (language, key)));
         for (language, key) in keys.filter(|(_, key)| !known.contains(key)) {
             let message = format!("the page has no such text{}", did_you_mean(key, known.iter()));
-            self.say(format!("texts.{language}.{key}"), message);
+            self.report(format!("texts.{language}.{key}"), message);
         }
         if file.task.is_empty() {
-            self.say("task", "no task is left: expected a [[task]], or a preset with its tasks");
+            self.report("task", "no task is left: expected a [[task]], or a preset with its tasks");
         }
         let trials: usize = file.task.iter().map(|task| task.trials).sum();
-        // Two trials before the first check, one between two of them and one after the last.
+        // At least two trials precede the first check, one separates two checks, and one follows the last.
         let most = trials.saturating_sub(2) / 2;
         if file.attention_checks > most && trials > 0 {
             let message = format!("{} checks among {trials} trials: expected at most {most}", file.attention_checks);
-            self.say("attention_checks", message + ", one between two trials and none in the first two");
+            self.report("attention_checks", message + ", one between two trials and none in the first two");
         }
     }
 
     fn speakers(&mut self) {
         let file = self.file;
         if file.speaker.is_empty() {
-            self.say("speaker", "no speaker is named: expected a [[speaker]] with a name and a dataset or sounds");
+            self.report("speaker", "no speaker is named: expected a [[speaker]] with a name and a dataset or sounds");
         }
         self.names("speaker", file.speaker.iter().map(|speaker| speaker.name.as_str()));
         for speaker in &file.speaker {
             let key = |key: &str| format!("speaker[{}].{key}", speaker.name);
             match (&speaker.dataset, &speaker.sounds) {
-                (None, None) => self.say(key("dataset"), "expected dataset = \"FOLDER\" or sounds = \"FOLDER/*.wav\""),
-                (Some(_), Some(_)) => self.say(key("sounds"), "expected a dataset or sounds: remove one of the two"),
+                (None, None) => {
+                    self.report(key("dataset"), "expected dataset = \"FOLDER\" or sounds = \"FOLDER/*.wav\"")
+                }
+                (Some(_), Some(_)) => self.report(key("sounds"), "expected a dataset or sounds: remove one of the two"),
                 _ => {}
             }
             let needs = |condition: &&StudyCondition| {
@@ -118,21 +123,21 @@ impl StudyRules<'_> {
             };
             if let (None, Some(condition)) = (&speaker.dataset, file.condition.iter().find(needs)) {
                 let message = format!("the condition {} needs motion: expected dataset = \"FOLDER\"", condition.name);
-                self.say(key("dataset"), message + ", or a study without that condition");
+                self.report(key("dataset"), message + ", or a study without that condition");
             }
             if speaker.clips == Some(0) {
-                self.say(key("clips"), "expected 1 or more, or no such key for as many as the design needs");
+                self.report(key("clips"), "expected 1 or more, or no such key for as many as the design needs");
             }
         }
     }
 
-    /// Whether there is a condition of that name; says so otherwise.
+    /// Whether a condition with this name exists; reports a problem otherwise.
     fn is_condition(&mut self, key: &str, name: &str) -> bool {
         let known: Vec<String> = self.file.condition.iter().map(|condition| condition.name.clone()).collect();
         let is_known = known.iter().any(|other| other == name);
         if !is_known {
-            let near = did_you_mean(name, known.iter());
-            self.say(key, format!("no condition is called {name:?}{near}; there are: {}", known.join(", ")));
+            let near = nearest(name, known.iter());
+            self.report(key, format!("no condition is called {name:?}{near}; there are: {}", known.join(", ")));
         }
         is_known
     }
@@ -141,19 +146,22 @@ impl StudyRules<'_> {
         let key = format!("condition[{}].of", condition.name);
         match &condition.source {
             ConditionSource::Mismatched(of) if of.is_empty() => {
-                self.say(key, "expected the name of the condition whose motion is mismatched, like of = \"generated\"");
+                self.report(
+                    key,
+                    "expected the name of the condition whose motion is mismatched, like of = \"generated\"",
+                );
             }
             ConditionSource::Mismatched(of) => {
                 let chained = self.file.find_condition(of).is_some_and(|other| other.source.mismatch_of().is_some());
                 if self.is_condition(&key, of) && chained {
-                    self.say(key, format!("{of} is mismatched itself: expected a condition with motion of its own"));
+                    self.report(key, format!("{of} is mismatched itself: expected a condition with motion of its own"));
                 }
             }
             ConditionSource::Checkpoint(_) | ConditionSource::Files(_) => {}
             ConditionSource::Natural | ConditionSource::MeanPose => {}
         }
         if condition.real && condition.source.mismatch_of().is_some() {
-            self.say(format!("condition[{}].real", condition.name), "mismatched motion is not real: remove the key");
+            self.report(format!("condition[{}].real", condition.name), "mismatched motion is not real: remove the key");
         }
     }
 
@@ -161,13 +169,13 @@ impl StudyRules<'_> {
         let key = |key: &str| format!("task[{}].{key}", task.name);
         self.within(key("trials"), task.trials as f64, 1.0, 500.0, "trials");
         self.within(key("training"), task.training as f64, 0.0, 50.0, "trials");
-        let (place, names) = (key("conditions"), &task.conditions);
-        let n_unknown = names.iter().filter(|name| !self.is_condition(&place, name)).count();
+        let (conditions_key, names) = (key("conditions"), &task.conditions);
+        let n_unknown = names.iter().filter(|name| !self.is_condition(&conditions_key, name)).count();
         if n_unknown > 0 {
             return;
         }
         if names.iter().collect::<BTreeSet<_>>().len() < names.len() {
-            return self.say(place, "a condition is there twice: remove one of the two");
+            return self.report(conditions_key, "a condition is there twice: remove one of the two");
         }
         let found: Vec<&StudyCondition> = names.iter().filter_map(|name| self.file.find_condition(name)).collect();
         let n_real = found.iter().filter(|condition| condition.real).count();
@@ -179,38 +187,38 @@ impl StudyRules<'_> {
         });
         match task.design {
             _ if names.len() < 2 => {
-                self.say(place, "expected two or more conditions to compare: add [[condition]] tables");
+                self.report(conditions_key, "expected two or more conditions to compare: add [[condition]] tables");
             }
             TaskDesign::Turing | TaskDesign::TuringSingle if n_real != 1 => {
                 let message = format!("{n_real} real conditions: expected one that is natural or has real = true");
-                self.say(place, message);
+                self.report(conditions_key, message);
             }
             TaskDesign::Mismatch if !has_pairs => {
-                self.say(place, "expected each mismatched condition beside the one that it is of");
+                self.report(conditions_key, "expected each mismatched condition beside the one that it is of");
             }
             TaskDesign::Sliders if names.len() > 16 => {
-                self.say(place, format!("{} conditions on one page: expected at most 16", names.len()));
+                self.report(conditions_key, format!("{} conditions on one page: expected at most 16", names.len()));
             }
             TaskDesign::Sliders if !task.sound && found.iter().any(is_mismatched) => {
-                self.say(place, "without sound nothing is mismatched: expected conditions of other kinds");
+                self.report(conditions_key, "without sound nothing is mismatched: expected conditions of other kinds");
             }
             _ => {}
         }
         let scales = ["human-likeness", "appropriateness"];
         match task.design {
             TaskDesign::Sliders if !scales.contains(&task.scale.as_str()) => {
-                let near = did_you_mean(&task.scale, scales.map(str::to_owned).iter());
-                self.say(key("scale"), format!("{:?}: expected {}{near}", task.scale, scales.join(" or ")));
+                let near = nearest(&task.scale, scales.map(str::to_owned).iter());
+                self.report(key("scale"), format!("{:?}: expected {}{near}", task.scale, scales.join(" or ")));
             }
             TaskDesign::Sliders => {}
-            _ if !task.scale.is_empty() => self.say(key("scale"), "a scale belongs to sliders: remove the key"),
+            _ if !task.scale.is_empty() => self.report(key("scale"), "a scale belongs to sliders: remove the key"),
             _ => {}
         }
         if task.feedback && matches!(task.design, TaskDesign::Preference | TaskDesign::Sliders) {
-            self.say(key("feedback"), "this design has no right response to tell: remove the key");
+            self.report(key("feedback"), "this design has no right response to tell: remove the key");
         }
         if task.design == TaskDesign::Mismatch && !task.sound {
-            self.say(key("sound"), "without sound no speech is heard that motion could fit: remove the key");
+            self.report(key("sound"), "without sound no speech is heard that motion could fit: remove the key");
         }
     }
 
@@ -220,7 +228,7 @@ impl StudyRules<'_> {
         let Some(task) = self.file.task.iter().find(|task| task.name == hypothesis.task) else {
             let near = did_you_mean(&hypothesis.task, known.iter());
             let message = format!("no task is called {:?}{near}; there are: {}", hypothesis.task, known.join(", "));
-            return self.say(key("task"), message);
+            return self.report(key("task"), message);
         };
         let fits = match hypothesis.kind {
             HypothesisKind::Differs => !matches!(task.design, TaskDesign::Turing | TaskDesign::Mismatch),
@@ -231,25 +239,25 @@ impl StudyRules<'_> {
                 HypothesisKind::Differs => "differs-from-chance, greater-than-chance or equivalence",
                 _ => "differs, this design having no response by chance",
             };
-            self.say(key("kind"), format!("does not fit the task {}: expected {others}", task.name));
+            self.report(key("kind"), format!("does not fit the task {}: expected {others}", task.name));
         }
         match hypothesis.points {
             None if hypothesis.kind == HypothesisKind::Equivalence => {
-                self.say(key("points"), "an equivalence needs a bound in percentage points, like points = 10.0");
+                self.report(key("points"), "an equivalence needs a bound in percentage points, like points = 10.0");
             }
             Some(_) if hypothesis.kind != HypothesisKind::Equivalence => {
-                self.say(key("points"), "a bound belongs to an equivalence: remove the key");
+                self.report(key("points"), "a bound belongs to an equivalence: remove the key");
             }
             Some(points) => self.within(key("points"), points, 0.1, 49.0, "percentage points"),
             None => {}
         }
         let names = &hypothesis.conditions;
         if !names.is_empty() && (names.len() != 2 || names[0] == names[1]) {
-            self.say(key("conditions"), "expected two different conditions, or none for every pair of the task");
+            self.report(key("conditions"), "expected two different conditions, or none for every pair of the task");
         }
         for name in names.iter().filter(|name| !task.conditions.contains(name)) {
             let message = format!("{name:?} is not compared in the task {}", task.name);
-            self.say(key("conditions"), format!("{message}; there are: {}", task.conditions.join(", ")));
+            self.report(key("conditions"), format!("{message}; there are: {}", task.conditions.join(", ")));
         }
     }
 }

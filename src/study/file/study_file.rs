@@ -1,5 +1,5 @@
-//! Sections of the study file, and the defaults that follow from the rest of it: compared conditions of a task, hypotheses of
-//! a design.
+//! Sections of the study file, and the defaults derived from the rest of the file: compared conditions of a task,
+//! hypotheses of a design.
 
 use super::condition::{ConditionSource, StudyCondition};
 use super::layers::StudyPreset;
@@ -9,35 +9,35 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// Study file with every default in and every path absolute.
+/// Resolved study file: all defaults are filled in and all paths are absolute.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StudyFile {
     pub title: String,
-    /// Settings that a file is laid over; none in the resolved one, which holds them all.
+    /// Preset that the file is merged onto; `None` in a resolved file, which contains all settings.
     #[serde(default, skip_serializing)]
     pub preset: Option<StudyPreset>,
-    /// Seed of all that is drawn: order, sides, places of attention checks and their numbers.
+    /// Seed of all random draws: order, sides, positions and numbers of attention checks.
     #[serde(default = "one")]
     pub seed: u64,
-    /// Participants whose responses are wanted.
+    /// Target number of participants.
     pub participants: usize,
-    /// Further sessions for those who withdraw or are excluded, as a share of the participants.
+    /// Spare sessions for replacing participants who withdraw or are excluded, as a proportion of the participants.
     #[serde(default = "half")]
     pub spare: f64,
-    /// Languages of the page, the first for those who prefer none of them.
+    /// Languages of the page; the first is the fallback for participants who prefer none of them.
     #[serde(default = "english")]
     pub languages: Vec<String>,
-    /// Address to which participants return at the end; `{code}` in it stands for their completion code.
+    /// URL to which participants return at the end; `{code}` stands for their completion code.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub return_url: Option<String>,
-    /// Whether only those may begin whose address holds the participant ID of a recruiting site.
+    /// Whether starting requires the participant ID of a recruiting site in the URL.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub require_id: bool,
-    /// Whether the first task begins with a trial that only shows how the page works.
+    /// Whether the first task starts with a trial that only shows how the page works.
     #[serde(default = "yes")]
     pub practice: bool,
-    /// Attention checks a session.
+    /// Attention checks per session.
     #[serde(default = "two")]
     pub attention_checks: usize,
     #[serde(default)]
@@ -54,10 +54,10 @@ pub struct StudyFile {
     pub condition: Vec<StudyCondition>,
     #[serde(default)]
     pub task: Vec<StudyTask>,
-    /// What the analysis tests; all else in it is marked as not registered before.
+    /// Hypotheses that the analysis tests; all other results are marked as exploratory.
     #[serde(default)]
     pub hypothesis: Vec<StudyHypothesis>,
-    /// Texts of the page by language and key, in the place of the built-in ones.
+    /// Texts of the page by language and key, which replace the built-in ones.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub texts: BTreeMap<String, BTreeMap<String, String>>,
 }
@@ -89,15 +89,15 @@ pub enum TaskOrder {
     /// Balanced over the sessions (Williams 1949).
     #[default]
     Balanced,
-    /// As the file has them.
+    /// Order of the study file.
     Written,
 }
 
-/// How clips are cut and handed out.
+/// Settings for cutting and allocating clips.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ClipSettings {
-    /// Length of each film in seconds.
+    /// Length of each film, seconds.
     pub seconds: f64,
     pub reuse: ClipReuse,
 }
@@ -108,32 +108,32 @@ impl Default for ClipSettings {
     }
 }
 
-/// Whether a participant may hear one speech again.
+/// Whether a participant may hear the same speech again.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ClipReuse {
-    /// In no other trial of the session.
+    /// Never within a session.
     #[default]
     Never,
-    /// In another task, for speakers with few clips.
+    /// In another task; for speakers with few clips.
     OtherTasks,
 }
 
-/// Speaker whose clips are shown. There is either a dataset or sounds.
+/// Speaker whose clips are shown; either `dataset` or `sounds` is set.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StudySpeaker {
     pub name: String,
-    /// Folder of a dataset: speech and natural motion.
+    /// Folder of a dataset with speech and natural motion.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dataset: Option<PathBuf>,
-    /// Part of the dataset.
+    /// Split of the dataset.
     #[serde(default = "test_split")]
     pub split: Split,
-    /// Pattern of sound files: speech alone.
+    /// Glob pattern of sound files with speech only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sounds: Option<PathBuf>,
-    /// Clips to cut; as many as the design needs where it is absent.
+    /// Number of clips to cut; by default as many as the design needs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub clips: Option<usize>,
 }
@@ -148,43 +148,42 @@ fn test_split() -> Split {
 pub struct StudyTask {
     pub name: String,
     pub design: TaskDesign,
-    /// Names of the compared conditions; those that fit the design where it is empty.
+    /// Names of the compared conditions; if empty, all conditions that fit the design.
     #[serde(default)]
     pub conditions: Vec<String>,
-    /// Analysed trials a participant; a task of a preset with none is left out.
+    /// Analysed trials per participant; 0 removes a task of the preset.
     pub trials: usize,
-    /// Trials before them that are not analysed.
+    /// Training trials before the analysed ones; not analysed.
     #[serde(default)]
     pub training: usize,
-    /// Whether a training trial tells the right response afterwards.
+    /// Whether a training trial shows the correct response afterwards.
     #[serde(default)]
     pub feedback: bool,
-    /// Whether films may be played again.
+    /// Whether films may be replayed.
     #[serde(default)]
     pub replay: bool,
-    /// Whether the films are heard.
+    /// Whether the films have sound.
     #[serde(default = "yes")]
     pub sound: bool,
-    /// What sliders measure: `human-likeness` or `appropriateness`; empty for other designs.
+    /// Scale of the sliders: `human-likeness` or `appropriateness`; empty for other designs.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub scale: String,
 }
 
-/// Whose responses the analysis leaves out. A rule that is absent leaves out nobody; without the section the usual rules
-/// hold.
+/// Exclusion rules of the analysis. An absent rule excludes nothing; without the section the default rules apply.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ExclusionRules {
-    /// Failed attention checks from which on a participant is left out.
+    /// Minimum number of failed attention checks that excludes a participant.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failed_checks: Option<u32>,
-    /// Whether participants are left out who did not come to the end.
+    /// Whether participants who did not complete the session are excluded.
     #[serde(default = "yes")]
     pub incomplete: bool,
-    /// Seconds of stalled films above which a trial is left out.
+    /// Stalled playback above which a trial is excluded, seconds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stalled_secs: Option<f64>,
-    /// Seconds without focus above which a trial is left out.
+    /// Time without focus above which a trial is excluded, seconds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unfocused_secs: Option<f64>,
 }
@@ -199,11 +198,11 @@ impl Default for ExclusionRules {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct AnalysisSettings {
-    /// Error of the first kind: intervals hold 1 - `alpha`.
+    /// Significance level; confidence intervals cover 1 - `alpha`.
     pub alpha: f64,
-    /// Draws of sign flips and of participants.
+    /// Number of sign-flip draws and of bootstrap draws of participants.
     pub resamples: usize,
-    /// Seed of both.
+    /// Seed of these draws.
     pub seed: u64,
 }
 
@@ -219,33 +218,33 @@ impl Default for AnalysisSettings {
 pub struct StudyHypothesis {
     pub task: String,
     pub kind: HypothesisKind,
-    /// The two conditions that it is about; every pair that the task compares where it is empty.
+    /// The two conditions that the hypothesis compares; if empty, every pair of the task.
     #[serde(default)]
     pub conditions: Vec<String>,
-    /// Whether each speaker is tested by itself instead of all together.
+    /// Whether each speaker is tested separately.
     #[serde(default)]
     pub per_speaker: bool,
-    /// Bound of equivalence in percentage points on either side of chance.
+    /// Equivalence bound on either side of chance, percentage points.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub points: Option<f64>,
 }
 
-/// What a hypothesis claims.
+/// Claim of a hypothesis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum HypothesisKind {
-    /// The share of right responses is not 50 %.
+    /// The proportion of correct responses differs from 50 %.
     DiffersFromChance,
-    /// The share of right responses is above 50 %.
+    /// The proportion of correct responses is above 50 %.
     GreaterThanChance,
-    /// The share of right responses lies within `points` of 50 %.
+    /// The proportion of correct responses lies within `points` of 50 %.
     Equivalence,
-    /// Two conditions are rated, preferred or taken for real unequally.
+    /// Two conditions differ in ratings, preference or how often they are judged real.
     Differs,
 }
 
 impl StudyFile {
-    /// Sessions that are planned: one for each participant, and the spare ones.
+    /// Number of planned sessions: one per participant, plus spare ones.
     pub fn n_sessions(&self) -> usize {
         self.participants + (self.participants as f64 * self.spare).ceil() as usize
     }
@@ -255,8 +254,8 @@ impl StudyFile {
     }
 }
 
-/// Drops tasks without trials, and fills in mismatched conditions, conditions of tasks and hypotheses where there are none.
-pub(super) fn fill_in(file: &mut StudyFile) {
+/// Drops tasks without trials and fills in defaults: sources of mismatched conditions, conditions of tasks, hypotheses.
+pub(super) fn fill_defaults(file: &mut StudyFile) {
     let empty: Vec<String> = file.task.iter().filter(|task| task.trials == 0).map(|task| task.name.clone()).collect();
     file.task.retain(|task| task.trials > 0);
     file.hypothesis.retain(|hypothesis| !empty.contains(&hypothesis.task));
@@ -264,22 +263,22 @@ pub(super) fn fill_in(file: &mut StudyFile) {
         |source: &ConditionSource| matches!(source, ConditionSource::Checkpoint(_) | ConditionSource::Files(_));
     let models = file.condition.iter().filter(|condition| is_model(&condition.source) && !condition.real);
     if let [model] = &models.map(|condition| condition.name.clone()).collect::<Vec<_>>()[..] {
-        let unsaid = file.condition.iter_mut().filter(|condition| condition.source.mismatch_of() == Some(""));
-        unsaid.for_each(|condition| condition.source = ConditionSource::Mismatched(model.clone()));
+        let unspecified = file.condition.iter_mut().filter(|condition| condition.source.mismatch_of() == Some(""));
+        unspecified.for_each(|condition| condition.source = ConditionSource::Mismatched(model.clone()));
     }
     for at in 0..file.task.len() {
         if file.task[at].conditions.is_empty() {
-            file.task[at].conditions = compared(file, &file.task[at]);
+            file.task[at].conditions = default_conditions(file, &file.task[at]);
         }
     }
     if file.hypothesis.is_empty() {
-        file.hypothesis = file.task.iter().flat_map(|task| hypotheses(task, file.speaker.len() > 1)).collect();
+        file.hypothesis = file.task.iter().flat_map(|task| default_hypotheses(task, file.speaker.len() > 1)).collect();
     }
 }
 
-/// Conditions that fit a task: mismatched ones and theirs for a mismatch, all for sliders with sound, all but the
-/// mismatched ones otherwise.
-fn compared(file: &StudyFile, task: &StudyTask) -> Vec<String> {
+/// Default conditions of a task: mismatched ones and their counterparts for the mismatch design, all for sliders with
+/// sound, otherwise all but the mismatched ones.
+fn default_conditions(file: &StudyFile, task: &StudyTask) -> Vec<String> {
     let mismatch_of = |name: &str| file.find_condition(name).and_then(|condition| condition.source.mismatch_of());
     let is_counterpart = |name: &str| file.condition.iter().any(|other| other.source.mismatch_of() == Some(name));
     let fits = |name: &str| match task.design {
@@ -292,8 +291,8 @@ fn compared(file: &StudyFile, task: &StudyTask) -> Vec<String> {
     file.condition.iter().map(|condition| condition.name.clone()).filter(|name| fits(name)).collect()
 }
 
-/// Usual hypotheses of a task, about all speakers together and, where there are several, about each.
-fn hypotheses(task: &StudyTask, has_speakers: bool) -> Vec<StudyHypothesis> {
+/// Default hypotheses of a task, for all speakers together and, if there are several, for each separately.
+fn default_hypotheses(task: &StudyTask, has_speakers: bool) -> Vec<StudyHypothesis> {
     let kinds: &[HypothesisKind] = match task.design {
         TaskDesign::Turing | TaskDesign::TuringSingle => {
             &[HypothesisKind::DiffersFromChance, HypothesisKind::Equivalence]

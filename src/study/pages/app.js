@@ -1,21 +1,21 @@
-// The steps of a session: consent, instructions, a check of the sound, the trials, the end.
+// Steps of a session: consent, instructions, sound check, trials, completion.
 
 import { backend, patiently, Refusal } from "./backend.js";
 import { button, byId, el, paragraphs, say, show } from "./dom.js";
-import { forget, keep, recall } from "./memory.js";
+import { forget, keep, recall, takeLinkedToken } from "./memory.js";
 import { checkSound } from "./sound.js";
 import { currentLanguage, firstText, has, nameOfLanguage, preferredLanguage, t, useLanguage, useTexts } from "./texts.js";
 import { runTrial } from "./trial.js";
 
 let study = null;
-// Task whose instructions were shown since the page was loaded.
+// Index of the task whose instructions were shown last since the page was loaded.
 let instructed = null;
 
 const text = (words) => el("div", { class: "text" }, ...paragraphs(words));
 const row = (...nodes) => el("p", { class: "row" }, ...nodes);
 const waits = (secs) => say(t("answer.offline", { seconds: Math.round(secs) }));
 
-// Shows a step with one button, and waits for it.
+// Shows a step with one button and resolves when it is pressed.
 function step(heading, nodes, label) {
   return new Promise((resolve) => show(heading, [...nodes, row(button(label, resolve))]));
 }
@@ -25,7 +25,7 @@ async function start() {
   try {
     study = await backend.study();
   } catch {
-    // The texts come with the study: these words are the only ones without them.
+    // The texts are part of the study, so this message cannot be translated.
     show("The study cannot be reached.", [row(button("Try again", start))]);
     return;
   }
@@ -33,17 +33,10 @@ async function start() {
   const kept = recall("language");
   useLanguage(study.languages.includes(kept) ? kept : preferredLanguage(study.languages));
   entitle();
+  // From a link of the researcher, for participants who can no longer use the browser in which they began.
   takeLinkedToken();
   if (recall("token")) await resume();
   else consent();
-}
-
-// Takes the token of a link from the researcher, for participants who cannot open the browser where they began.
-function takeLinkedToken() {
-  const token = new URLSearchParams(location.hash.slice(1)).get("resume");
-  if (!token || recall("token")) return;
-  keep("token", token);
-  history.replaceState(null, "", location.pathname + location.search);
 }
 
 function entitle() {
@@ -88,7 +81,7 @@ async function instructions() {
 }
 
 async function begin() {
-  // Another tab has begun in the meantime.
+  // Another tab may have begun in the meantime.
   if (recall("token")) return resume();
   let begun;
   try {
@@ -103,7 +96,7 @@ async function begin() {
   await proceed(begun.state);
 }
 
-// Goes on after a reload: first with an answer that was on its way.
+// Resumes after a reload: a pending answer is sent first.
 async function resume() {
   try {
     let state = await patiently(() => backend.state(), waits);
@@ -150,7 +143,7 @@ async function oneTrial({ position, n_trials: total, trial }) {
   return state;
 }
 
-// Sends an answer until it is stored; one that the server has otherwise gives way to what it has.
+// Sends an answer until it is stored. If the server has a different answer or state, that of the server is used.
 async function send(answer) {
   keep("pending", answer);
   say(t("answer.saving"));
@@ -168,7 +161,7 @@ async function send(answer) {
   return reply;
 }
 
-// Tells the right response of a training trial.
+// Shows the correct response of a training trial.
 async function tell(task, given, right) {
   const isRight = JSON.stringify(given) === JSON.stringify(right);
   const [[, value]] = Object.entries(right);
@@ -195,7 +188,7 @@ function complete({ code, return_url: address }) {
   show(t("done.title"), [text(t("done.text")), row(el("label", { for: "code" }, t("done.code")), field, copy), back]);
 }
 
-// The button by which a participant leaves, in the foot of the page.
+// Button in the footer by which a participant withdraws.
 function withdrawal(isShown) {
   const leave = button(t("withdraw.button"), confirmWithdrawal, "quiet");
   byId("footer").replaceChildren(...(isShown ? [leave] : []));
@@ -209,7 +202,7 @@ function confirmWithdrawal() {
     try {
       await patiently(() => backend.withdraw(), (secs) => (note.textContent = t("answer.offline", { seconds: Math.round(secs) })));
     } catch (error) {
-      // Nothing is there to delete.
+      // There is no data to delete.
       if (![401, 410].includes(error.status)) {
         note.textContent = t("error.text", { sentence: error.message });
         confirm.disabled = false;
@@ -228,7 +221,7 @@ function confirmWithdrawal() {
   dialog.showModal();
 }
 
-// Shows why nothing goes on. A session that is over is forgotten.
+// Shows an error that stops the session. A session that has ended is forgotten.
 function refused(error) {
   const isOver = error instanceof Refusal && [401, 404, 410].includes(error.status);
   withdrawal(!isOver && Boolean(recall("token")));

@@ -1,9 +1,9 @@
-//! Files of the pages by their path on the server.
+//! Static files of the pages by path on the server.
 
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 const PAGE: &str = "text/html; charset=utf-8";
 
-/// Path, content type and text of every file.
+/// Path, content type and content of every file.
 pub const ASSETS: [(&str, &str, &str); 13] = [
     ("/", PAGE, include_str!("page.html")),
     ("/app.css", "text/css; charset=utf-8", include_str!("page.css")),
@@ -20,7 +20,7 @@ pub const ASSETS: [(&str, &str, &str); 13] = [
     ("/operator.js", SCRIPT, include_str!("operator.js")),
 ];
 
-/// Tones that the film of the sound check plays; `sound.js` asks for their number.
+/// Number of tones in the film of the sound check; `sound.js` expects the same number.
 pub const SOUND_CHECK_TONES: usize = 3;
 
 #[cfg(test)]
@@ -30,7 +30,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     #[test]
-    fn pages_load_what_is_here_and_nothing_stands_inline() {
+    fn pages_load_only_assets_and_have_no_inline_code() {
         for (path, content_type, text) in ASSETS {
             for quoted in text.split('"').skip(1).step_by(2).filter(|quoted| quoted.starts_with("./")) {
                 let module = quoted.trim_start_matches('.');

@@ -1,12 +1,12 @@
-// The server of the study.
+// Client of the study's server.
 
-import { recall } from "./memory.js";
+import { keep, recall } from "./memory.js";
 
 const PARAMETERS = ["PROLIFIC_PID", "STUDY_ID", "SESSION_ID", "workerId", "assignmentId", "hitId"];
 const REQUEST_MS = 20_000;
 const LONGEST_WAIT_SECS = 30;
 
-// A server that refuses, with its sentence.
+// Error reply of the server, with its sentence.
 export class Refusal extends Error {
   constructor(status, { error, reason }, retrySecs) {
     super(error ?? `${status}`);
@@ -27,7 +27,7 @@ async function ask(url, options = {}) {
   return value;
 }
 
-// Does `work` until it succeeds or is refused for good; `onwait(secs)` before each new attempt.
+// Retries `work` until it succeeds or is refused permanently; calls `onwait(secs)` before each retry.
 export async function patiently(work, onwait) {
   for (let attempt = 0; ; attempt += 1) {
     try {
@@ -44,11 +44,18 @@ export async function patiently(work, onwait) {
   }
 }
 
-// What a recruiting site gave along in the address.
+// Parameters of a recruiting site in the address.
 function parameters() {
   const given = new URLSearchParams(location.search);
   const pairs = PARAMETERS.filter((name) => given.has(name)).map((name) => [name, given.get(name).slice(0, 128)]);
   return Object.fromEntries(pairs);
+}
+
+// Random number by which the server recognises a repeated request to begin, where its reply was lost.
+function attempt() {
+  const digits = (byte) => byte.toString(16).padStart(2, "0");
+  if (!recall("attempt")) keep("attempt", Array.from(crypto.getRandomValues(new Uint8Array(16)), digits).join(""));
+  return recall("attempt");
 }
 
 async function post(path, body) {
@@ -59,7 +66,7 @@ async function post(path, body) {
 
 export const backend = {
   study: () => ask("api/study"),
-  begin: (language) => post("api/begin", { consent: true, language, parameters: parameters() }),
+  begin: (language) => post("api/begin", { consent: true, language, parameters: parameters(), attempt: attempt() }),
   state: () => ask("api/state", { headers: { Authorization: `Bearer ${recall("token")}` } }),
   answer: (answer) => post("api/answer", answer),
   withdraw: () => post("api/withdraw", {}),

@@ -1,6 +1,7 @@
-// Elements, made without any HTML text: what comes from a server or a study file is never read as markup.
+// Helpers that create DOM elements. Strings from the server or a study file are never parsed as HTML.
 
-// An element with attributes (`onclick` and the like are listeners; `true` is an attribute without a value).
+// Creates an element with attributes. Function values such as `onclick` become listeners; `true` sets an attribute
+// without a value.
 export function el(tag, attributes = {}, ...children) {
   const node = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) {
@@ -12,17 +13,17 @@ export function el(tag, attributes = {}, ...children) {
   return node;
 }
 
-// One `p` for each paragraph of a text.
+// One `p` element per paragraph of a text.
 export const paragraphs = (text) => text.split(/\n\s*\n/).map((part) => el("p", {}, part.trim()));
 
 export const byId = (id) => document.getElementById(id);
 
-// Tells the state to everybody, to screen readers too.
+// Shows a status message, which screen readers announce.
 export function say(sentence) {
   byId("status").textContent = sentence;
 }
 
-// Replaces what the page shows, and moves the focus to its heading or to `focus`.
+// Replaces the content of the page and moves the focus to `focus` or the heading.
 export function show(heading, nodes, focus) {
   const h1 = el("h1", { tabindex: "-1" }, heading);
   byId("main").replaceChildren(h1, ...nodes.filter(Boolean));

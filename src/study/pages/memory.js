@@ -1,5 +1,5 @@
-// What the page keeps in the browser, so that a reload or a crash goes on where it was: the participant's token, the
-// language, an answer on its way. Nothing of it tells the browser or the person.
+// State stored in the browser, so that a session survives a reload or a crash: the participant's token, the language,
+// the number of plays, a pending answer. None of it identifies the browser or the person.
 
 const name = `orator-study ${location.pathname}`;
 
@@ -12,25 +12,38 @@ function read() {
 }
 
 let kept = read();
-// Another tab of the same browser goes on with the same session.
+// Other tabs of the same browser share the session.
 window.addEventListener("storage", () => (kept = read()));
 
 export const recall = (key) => kept[key];
 
+const linkOf = (token) => `#resume=${token}`;
+const setFragment = (fragment) => history.replaceState(null, "", location.pathname + location.search + fragment);
+
+// Stores a value; returns false where storage is unavailable. The address then holds the token, which survives a reload.
 export function keep(key, value) {
   kept = { ...kept, [key]: value };
   try {
     localStorage.setItem(name, JSON.stringify(kept));
+    return true;
   } catch {
-    // A browser that keeps nothing: the session then ends with the page.
+    if (key === "token") setFragment(linkOf(value));
+    return false;
   }
 }
 
+// Takes the token out of a link to resume a session. The address keeps it where it cannot be stored.
+export function takeLinkedToken() {
+  const token = new URLSearchParams(location.hash.slice(1)).get("resume");
+  if (token && !kept.token && keep("token", token)) setFragment("");
+}
+
 export function forget() {
+  if (location.hash === linkOf(kept.token)) setFragment("");
   kept = {};
   try {
     localStorage.removeItem(name);
   } catch {
-    // Nothing was kept.
+    // Nothing was stored.
   }
 }

@@ -1,5 +1,5 @@
-//! The pages of a study: what participants and the operator see, and its texts in several languages. Plain ES modules
-//! without any library; nothing is loaded from elsewhere, nothing stands inline.
+//! Web pages of a study for participants and the operator, and their texts in several languages. Plain ES modules
+//! without libraries; nothing is loaded from other hosts, and there are no inline scripts or styles.
 
 pub mod assets;
 pub mod page_texts;

@@ -1,4 +1,4 @@
-// The operator's page: how many take part and how far they are. No answer is shown.
+// Operator's page: number and progress of the participants. No answers are shown.
 
 import { byId, button, el, say, show } from "./dom.js";
 
@@ -64,9 +64,9 @@ function duration(secs) {
   return secs < 5400 ? `${Math.round(secs / 60)} min` : `${Math.round(secs / 3600)} h`;
 }
 
-// Link by which a participant goes on in another browser than the one where they began.
+// Link by which a participant can resume in another browser, or see the completion code again.
 const resumeLink = (token) =>
-  token ? el("a", { href: new URL(`./#resume=${token}`, location.href).href }, "Link to resume the session") : "";
+  token ? el("a", { href: new URL(`./#resume=${token}`, location.href).href }, "Link to the session") : "";
 
 function draw(progress) {
   const { title, quota, answers, participants, stalls } = progress;

@@ -1,19 +1,20 @@
-// Films shown together: started at once, held together to a frame, with what went wrong measured.
+// Synchronised playback of one or two films, with measurement of stalls, lost focus and asynchrony.
 
-// Seconds by which two films may be apart, half a frame at 30 a second; and how near the pace brings them.
+// Asynchrony in seconds above which the mute film's rate is adjusted (half a frame at 30 fps), and below which the rate
+// returns to normal.
 const MOST_APART = 1 / 60;
 const NEAR = 1 / 200;
-// Seconds after the start in which films that are far apart begin anew, and how often they may.
+// Seconds after the start during which films that are far apart are restarted, and the maximum number of restarts.
 const START = 0.4;
 const MOST_RESTARTS = 2;
-// Seconds that are far apart: too many for the mute film to make up by its pace.
+// Asynchrony in seconds that is too large to correct by the playback rate.
 const FAR = 0.12;
 const TICK_MS = 40;
 const LOAD_MS = 60_000;
-// Time in which films that somebody sees do not go on, after which they are taken for broken.
+// Time without progress, while the page is visible, after which films count as broken.
 const STAND_MS = 30_000;
 
-// Sum of the times in which something was the case.
+// Total duration of a condition.
 class Stopwatch {
   #since = null;
   #ms = 0;
@@ -31,7 +32,7 @@ class Stopwatch {
 
 const isInFront = () => !document.hidden && document.hasFocus();
 
-// One film or two. The first is heard, the other is mute: both have the same speech.
+// Playback of one film or two. Only the first has sound, because both have the same speech.
 export class Screening {
   #timer = null;
   #waiting = new Set();
@@ -40,16 +41,17 @@ export class Screening {
   #stalled = new Stopwatch();
   #unfocused = new Stopwatch();
   #settle = null;
-  // Position of the film that is behind, when it last moved, and whether it stood for too long.
+  // Position of the film that lags behind, the time of its last progress, and whether playback made no progress for too
+  // long.
   #progress = { at: 0, since: 0 };
   #hasStood = false;
 
   constructor(urls) {
-    // Told when the films stand still for want of data and when they go on, and when they begin.
+    // Callbacks: playback stalled (true) or continued (false); playback begins.
     this.onstall = (_stands) => {};
     this.onbegin = () => {};
     this.plays = 0;
-    // Largest distance in seconds right after the start, and later.
+    // Maximum asynchrony in seconds right after the start, and later.
     this.apart = { start: 0, most: 0 };
     this.videos = urls.map((url, at) => {
       const video = document.createElement("video");
@@ -86,7 +88,7 @@ export class Screening {
     return this.#unfocused.secs;
   }
 
-  // Waits until every film can be played through. Rejects where one cannot be loaded.
+  // Resolves when every film can be played through; rejects if one cannot be loaded.
   load() {
     if (this.#hasStood) for (const video of this.videos) video.load();
     this.#hasStood = false;
@@ -103,13 +105,13 @@ export class Screening {
       const late = setTimeout(() => (video.readyState >= 3 ? resolve() : reject(new Error("film"))), LOAD_MS);
       video.addEventListener("canplaythrough", end(resolve), { once: true });
       video.addEventListener("error", end(reject), { once: true });
-      // A film that failed, and one that a phone loads only at a touch.
+      // Retries a film that failed, and loads one that a phone loads only after a touch.
       if (video.error || video.readyState < 2) video.load();
     });
   }
 
-  // Plays the films from their beginning to their end. Rejects where they cannot be loaded, the browser refuses, or they
-  // stand still for too long.
+  // Plays the films from start to end. Rejects if they cannot be loaded, the browser refuses, or they make no progress
+  // for too long.
   async play() {
     await this.load();
     this.plays += 1;
@@ -137,14 +139,14 @@ export class Screening {
       }),
     );
     if (!this.playing) return;
-    // A film that is stopped meanwhile, as while the other waits for data, goes on later.
+    // A film may be paused meanwhile, for example while the other waits for data; it continues later.
     const isStopped = (error) => error.name === "AbortError";
     const begin = (video) => video.play().catch((error) => isStopped(error) || Promise.reject(error));
     await Promise.all(this.videos.map(begin));
     this.#starting = false;
   }
 
-  // Whether the films have not gone on for too long, though the page is seen.
+  // Whether the films have made no progress for too long although the page is visible.
   #stands() {
     const at = Math.min(...this.videos.filter((video) => !video.ended).map((video) => video.currentTime));
     const now = performance.now();
@@ -164,7 +166,7 @@ export class Screening {
     after();
   }
 
-  // Ends for good, as when the page shows something else.
+  // Releases the films and listeners; the screening cannot be played again.
   close() {
     if (this.playing) this.#stop(() => {});
     for (const event of ["blur", "focus"]) window.removeEventListener(event, this.watch);
@@ -175,7 +177,7 @@ export class Screening {
     }
   }
 
-  // Notes whether the page is in front. Films that nobody can see stand still until somebody can.
+  // Records whether the page is in front, and pauses the films while it is hidden.
   #look() {
     this.#unfocused.set(this.playing && !isInFront());
     if (!this.playing || this.#starting || this.#waiting.size > 0) return;
@@ -196,7 +198,7 @@ export class Screening {
 
   #tick() {
     if (!this.playing) return;
-    // The page shows something else by now.
+    // The page has replaced its content.
     if (!this.videos[0].isConnected) return this.close();
     if (this.#stands()) return this.#settle.reject(new Error("film"));
     if (this.#starting) return;

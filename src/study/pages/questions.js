@@ -1,15 +1,16 @@
-// Questions: the controls by which a trial is answered, one form for each design.
+// Questions: answer controls of a trial, one form per design.
 
 import { el } from "./dom.js";
 import { firstText, t } from "./texts.js";
 
-// Keys of the question's text, the most special first.
+// Keys of the question's text, most specific first.
 export function questionKeys(task, phase) {
   if (phase === "attention-check") return ["question.attention-check"];
   return [`question.${task.name}`, `question.${task.scale || task.design}`];
 }
 
-// A question: `node` to show, `enable()` when the films were seen, `response()` or `null` while it is not answered.
+// Creates a question: `node` to show, `enable()` to call after the films were seen, `response()`, which is `null` until
+// it is answered.
 export function question(task, trial, onchange) {
   const legend = firstText(...questionKeys(task, trial.phase));
   if (trial.phase === "attention-check") return numberQuestion(legend, onchange);
@@ -29,7 +30,7 @@ export function question(task, trial, onchange) {
   }
 }
 
-// Radio buttons in a row, also chosen by digits and arrows.
+// Row of radio buttons, also operated by digit and arrow keys.
 function choice(legend, kind, options, responseOf, onchange) {
   const inputs = options.map(([value]) => el("input", { type: "radio", name: "answer", value, onchange }));
   const labels = options.map(([, label], at) =>
@@ -73,7 +74,7 @@ function choice(legend, kind, options, responseOf, onchange) {
   };
 }
 
-// The number that an attention check shows.
+// Input for the number of an attention check.
 function numberQuestion(legend, onchange) {
   const input = el("input", {
     type: "number", id: "number", min: "10", max: "99", step: "1", inputmode: "numeric", autocomplete: "off", required: true,
@@ -95,7 +96,7 @@ function numberQuestion(legend, onchange) {
   };
 }
 
-// A slider from 0 to 100 for the film of that number. `score()` is `null` until it was moved.
+// Slider from 0 to 100 for the film with this number. `score()` is `null` until the slider was moved.
 export function slider(number, onchange) {
   let isMoved = false;
   const output = el("output", {}, "\u2013");
@@ -107,7 +108,7 @@ export function slider(number, onchange) {
   const input = el("input", {
     type: "range", min: "0", max: "100", value: "50", "aria-label": t("answer.score", { n: number }),
     oninput: note,
-    // The middle, too, is chosen by a press or a touch.
+    // A press or touch also confirms the initial middle value.
     onpointerup: () => !input.disabled && note(),
     onkeydown: (event) => event.key === " " && (event.preventDefault(), note()),
   });

@@ -1,13 +1,13 @@
-// The check of the sound: a film with some tones, and the question how many there were.
+// Sound check: a film with some tones, which the participant counts.
 
 import { button, el, say, show } from "./dom.js";
 import { Screening } from "./player.js";
 import { t } from "./texts.js";
 
-// Tones in the film of the check.
+// Number of tones in the film.
 const TONES = 3;
 
-// Resolves once the participant has counted the tones.
+// Resolves when the participant has entered the correct number of tones.
 export function checkSound(film) {
   return new Promise((resolve) => {
     const screening = new Screening([film]);

@@ -1,23 +1,23 @@
-// Texts of the page in the language that the participant reads.
+// Texts of the page in the participant's language.
 
 let texts = {};
 let language = "en";
 
 export const currentLanguage = () => language;
 
-// Takes the texts of all languages, `{LANGUAGE: {KEY: TEXT}}`.
+// Sets the texts of all languages, `{LANGUAGE: {KEY: TEXT}}`.
 export function useTexts(all) {
   texts = all;
 }
 
-// Sets the language of the page, its direction with it.
+// Sets the language and the text direction of the page.
 export function useLanguage(wanted) {
   language = wanted;
   document.documentElement.lang = wanted;
   document.documentElement.dir = has("dir") ? t("dir") : "ltr";
 }
 
-// The first of the browser's languages that the study has, or the study's first.
+// First of the browser's preferred languages that the study has, otherwise the study's first language.
 export function preferredLanguage(languages) {
   const base = (code) => code.toLowerCase().split("-")[0];
   for (const wanted of navigator.languages) {
@@ -34,11 +34,11 @@ const find = (key) => texts[language]?.[key] ?? texts.en?.[key];
 
 export const has = (key) => Boolean(find(key));
 
-// Text of a key with `{name}` filled in.
+// Text of a key, with placeholders `{name}` replaced.
 export function t(key, values = {}) {
   const text = find(key) ?? key;
   return text.replace(/\{(\w+)\}/g, (whole, name) => values[name] ?? whole);
 }
 
-// Text of the first key that there is: a task's own before that of its scale or design.
+// Text of the first key that exists: a task's own text precedes that of its scale or design.
 export const firstText = (...keys) => t(keys.find(has) ?? keys.at(-1));

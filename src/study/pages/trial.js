@@ -1,4 +1,4 @@
-// A trial: its films, its question, and what was measured until the answer.
+// Trial: its films, its question, and measurements up to the answer.
 
 import { button, el, say, show } from "./dom.js";
 import { Screening } from "./player.js";
@@ -9,7 +9,7 @@ const filmUrl = (film) => `films/${film}.mp4`;
 const rounded = (secs) => Math.round(secs * 1000) / 1000;
 
 // Shows a trial and resolves with its answer: response, plays, stalled_secs, unfocused_secs, response_secs.
-// `playsBefore`: how often its films were begun before the page was loaded anew; `onplay(plays)` keeps that.
+// `playsBefore`: number of plays before the page was reloaded; `onplay(plays)` saves the count.
 export function runTrial({ task, trial, heading, playsBefore, onplay }) {
   const inTurn = trial.films.length > 2 || (task.design === "sliders" && trial.phase !== "attention-check");
   return new Promise((resolve) => {
@@ -50,7 +50,7 @@ const captioned = (video, label) => {
   return el("figure", {}, video, el("figcaption", { dir: "auto", "aria-hidden": "true" }, label));
 };
 
-// A button that plays a screening; `onseen` after the first time. Without `replay` it plays once.
+// Button that plays a screening; calls `onseen` after the first complete play. Without `replay` the films play once.
 function playButton(screening, labels, replay, { onstart, onbegin, onseen, onend }) {
   let wasSeen = false;
   const press = async () => {
@@ -86,7 +86,7 @@ function playButton(screening, labels, replay, { onstart, onbegin, onseen, onend
   return play;
 }
 
-// One film, or two side by side, started together.
+// One film, or two side by side and in synchrony.
 function filmsTogether(task, trial) {
   const screening = new Screening(trial.films.map(filmUrl));
   const isPair = trial.films.length > 1;
@@ -104,7 +104,7 @@ function filmsTogether(task, trial) {
     onseen: () => asked.enable(),
     onend() {
       view.onend();
-      // What the two films were apart, for who measures the page.
+      // Measured asynchrony of the two films, for tests of the page.
       stage.dataset.startApartMs = Math.round(1000 * screening.apart.start);
       stage.dataset.mostApartMs = Math.round(1000 * screening.apart.most);
     },
@@ -121,7 +121,7 @@ function filmsTogether(task, trial) {
   return view;
 }
 
-// Several films, one after the other in one place, each with its button and its slider.
+// Several films shown in turn at one position, each with a button and a slider.
 function filmsInTurn(task, trial) {
   const isCheck = trial.phase === "attention-check";
   const seen = new Set();
@@ -132,7 +132,7 @@ function filmsInTurn(task, trial) {
   const sliders = isCheck ? [] : screenings.map((_, at) => slider(at + 1, () => view.onchange()));
   const shown = (at) => films.forEach((film, k) => film.classList.toggle("shown", k === at));
   shown(0);
-  // No film begins while another plays.
+  // No film can start while another plays.
   const lock = (on) => plays.forEach((play, at) => (play.disabled = on || (seen.has(at) && !task.replay)));
   const plays = screenings.map((screening, at) => {
     const n = at + 1;
@@ -168,7 +168,7 @@ function filmsInTurn(task, trial) {
     screenings,
     nodes: [stage, head, hint, group, asked?.node, keys].filter(Boolean),
     focus: plays[0],
-    // The most often played film's count, as of films that are played together.
+    // Plays of the film played most often, comparable to films that are played together.
     plays: () => Math.max(...screenings.map((screening) => screening.plays)),
     isPlaying: () => screenings.some((screening) => screening.playing),
     response() {

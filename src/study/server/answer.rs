@@ -1,29 +1,30 @@
-//! Whether an answer fits its trial: its form, its numbers, and whether it passes a check.
+//! Validation of answers: whether the response fits the design of its trial, whether numbers are in range, and whether
+//! an attention check is passed.
 
 use super::reply::ApiError;
 use crate::plan::{PlannedTask, TaskDesign, Trial, TrialPhase};
-use crate::store::answers::GivenAnswer;
+use crate::store::answers::SubmittedAnswer;
 use crate::vote::Response;
 
-/// Seconds that a page may report: a day.
-const MOST_SECS: f64 = 86_400.0;
-/// How often films are played at most.
-const MOST_PLAYS: u32 = 1000;
+/// Maximum duration that a page may report, seconds: one day.
+const MAX_SECS: f64 = 86_400.0;
+/// Maximum number of plays that a page may report.
+const MAX_PLAYS: u32 = 1000;
 
-/// Checks an answer to `trial`, one of `task`.
+/// Validates an answer to `trial`, which belongs to `task`.
 ///
 /// # Errors
-/// Says which part of the answer the trial does not take.
-pub fn check(answer: &GivenAnswer, trial: &Trial, task: &PlannedTask) -> Result<(), ApiError> {
+/// The response does not fit the design, or a number is out of range.
+pub fn check(answer: &SubmittedAnswer, trial: &Trial, task: &PlannedTask) -> Result<(), ApiError> {
     if !fits(&answer.response, trial, task) {
-        return Err(ApiError::bad("The response does not fit the trial's task."));
+        return Err(ApiError::bad_request("The response does not fit the trial's task."));
     }
-    if !(1..=MOST_PLAYS).contains(&answer.plays) {
-        return Err(ApiError::bad("The films must be played before an answer."));
+    if !(1..=MAX_PLAYS).contains(&answer.plays) {
+        return Err(ApiError::bad_request("The films must be played before an answer."));
     }
     let secs = [answer.stalled_secs, answer.unfocused_secs, answer.response_secs];
-    if !secs.iter().all(|secs| (0.0..=MOST_SECS).contains(secs)) {
-        return Err(ApiError::bad("A time must lie between 0 and 86400 seconds."));
+    if !secs.iter().all(|secs| (0.0..=MAX_SECS).contains(secs)) {
+        return Err(ApiError::bad_request("A time must lie between 0 and 86400 seconds."));
     }
     Ok(())
 }
@@ -42,15 +43,15 @@ fn fits(response: &Response, trial: &Trial, task: &PlannedTask) -> bool {
     }
 }
 
-/// Whether `response` is wrong in an attention check.
+/// Whether `response` fails an attention check; false for other trials.
 pub fn fails_check(response: &Response, trial: &Trial) -> bool {
     trial.phase == TrialPhase::AttentionCheck && trial.expected.as_ref().is_some_and(|right| right != response)
 }
 
-/// Right response, which a practice or training trial tells after its answer.
+/// Correct response that a practice or training trial shows after its answer.
 pub fn feedback(trial: &Trial) -> Option<&Response> {
-    let tells = matches!(trial.phase, TrialPhase::Practice | TrialPhase::Training);
-    trial.expected.as_ref().filter(|_| tells)
+    let has_feedback = matches!(trial.phase, TrialPhase::Practice | TrialPhase::Training);
+    trial.expected.as_ref().filter(|_| has_feedback)
 }
 
 #[cfg(test)]
@@ -67,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn each_design_takes_its_own_form_of_response() {
+    fn each_design_accepts_only_its_own_kind_of_response() {
         let (side, real) = (Response::Side(ScreenSide::Left), Response::Real(false));
         let scores = |scores: &[u8]| Response::Scores(scores.to_vec());
         let (step, number) = (Response::Step(-2), Response::Number(42));
@@ -86,8 +87,8 @@ mod tests {
     }
 
     #[test]
-    fn numbers_keep_to_their_ranges() {
-        let given = |response, plays, secs| GivenAnswer {
+    fn numbers_must_be_in_range() {
+        let given = |response, plays, secs| SubmittedAnswer {
             position: 0,
             response,
             plays,
@@ -95,17 +96,17 @@ mod tests {
             unfocused_secs: 0.0,
             response_secs: 0.0,
         };
-        let takes = |design, phase, response, plays, secs| {
+        let accepts = |design, phase, response, plays, secs| {
             check(&given(response, plays, secs), &trial(phase, 1), &task(design)).is_ok()
         };
         use TrialPhase::{AttentionCheck, Main};
-        assert!(takes(TaskDesign::Preference, Main, Response::Step(2), 1, 0.0));
-        assert!(!takes(TaskDesign::Preference, Main, Response::Step(3), 1, 0.0));
-        assert!(!takes(TaskDesign::Sliders, Main, Response::Scores(vec![101]), 1, 0.0));
-        assert!(!takes(TaskDesign::Sliders, Main, Response::Scores(vec![1, 2]), 1, 0.0));
-        assert!(!takes(TaskDesign::Turing, AttentionCheck, Response::Number(9), 1, 0.0));
+        assert!(accepts(TaskDesign::Preference, Main, Response::Step(2), 1, 0.0));
+        assert!(!accepts(TaskDesign::Preference, Main, Response::Step(3), 1, 0.0));
+        assert!(!accepts(TaskDesign::Sliders, Main, Response::Scores(vec![101]), 1, 0.0));
+        assert!(!accepts(TaskDesign::Sliders, Main, Response::Scores(vec![1, 2]), 1, 0.0));
+        assert!(!accepts(TaskDesign::Turing, AttentionCheck, Response::Number(9), 1, 0.0));
         for (plays, secs) in [(0, 0.0), (1001, 0.0), (1, -1.0), (1, f64::NAN), (1, f64::INFINITY), (1, 86_401.0)] {
-            assert!(!takes(TaskDesign::TuringSingle, Main, Response::Real(true), plays, secs), "{plays} {secs}");
+            assert!(!accepts(TaskDesign::TuringSingle, Main, Response::Real(true), plays, secs), "{plays} {secs}");
         }
     }
 }

@@ -1,13 +1,13 @@
-//! The interface of the pages: a participant begins, answers trial by trial, and may withdraw; the operator sees how many
-//! take part and how far they are. Films, as a whole or in ranges.
+//! HTTP API of the pages: a participant begins, answers trial by trial and may withdraw; the operator sees the progress
+//! of all participants. Films are served in full or in byte ranges.
 
 use super::answer::{check, fails_check, feedback};
 use super::reply::{ApiError, JsonBody, bearer, header_text, json_reply, not_found, unauthorized};
-use super::secret::{completion_code, participant_id};
-use super::served::ServedStudy;
-use super::start::App;
+use super::secret::{completion_code, is_attempt, participant_id};
+use super::served_study::ServedStudy;
+use super::study_server::App;
 use crate::plan::TrialPhase;
-use crate::store::answers::{self, GivenAnswer, Recorded, TrialTerms, record};
+use crate::store::answers::{self, RecordOutcome, SubmittedAnswer, TrialTerms, record};
 use crate::store::participants::{self, BeginOutcome, NewParticipant, PARAMETERS, Participant, Status};
 use crate::vote::Response;
 use axum::body::Body;
@@ -21,15 +21,15 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use tower_http::services::ServeFile;
 
-/// Letters of what recruiting sites give along.
-const LONGEST_PARAMETER: usize = 128;
+/// Maximum length of a recruiting site's parameter, bytes.
+const MAX_PARAMETER_BYTES: usize = 128;
 
 type Shared = State<Arc<App>>;
 
-/// Where a participant stands, as the page reads it.
+/// State of a participant's session as sent to the page.
 #[derive(Serialize)]
 struct SessionState<'a> {
-    /// Trials answered.
+    /// Number of answered trials.
     position: u32,
     n_trials: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -68,7 +68,7 @@ fn session_state<'a>(study: &'a ServedStudy, participant: &Participant) -> Sessi
     }
 }
 
-/// Who asks: session and name, by a token that was signed here and does not ask too often.
+/// Participant who sent the request, identified by a token that this server signed, within the rate limit.
 pub struct AuthenticatedSession {
     session: u32,
     id: String,
@@ -79,7 +79,7 @@ impl FromRequestParts<Arc<App>> for AuthenticatedSession {
 
     async fn from_request_parts(parts: &mut Parts, app: &Arc<App>) -> Result<Self, ApiError> {
         let (session, id) = app.secret.verify(bearer(&parts.headers)?).ok_or_else(unauthorized)?;
-        if app.limits.allow_participant(&id) { Ok(Self { session, id }) } else { Err(ApiError::too_often()) }
+        if app.limits.allow_participant(&id) { Ok(Self { session, id }) } else { Err(ApiError::too_many_requests()) }
     }
 }
 
@@ -89,8 +89,10 @@ fn gone() -> ApiError {
     ApiError::new(StatusCode::GONE, sentence)
 }
 
-fn withdrawn() -> ApiError {
-    ApiError::new(StatusCode::GONE, "This session was withdrawn; nothing of it is kept.")
+fn unknown() -> ApiError {
+    let sentence =
+        "Nothing of this session is stored: it was withdrawn, or had no answer when its place was given away.";
+    ApiError::new(StatusCode::GONE, sentence)
 }
 
 /// `GET /api/study`
@@ -105,60 +107,74 @@ pub struct StartRequest {
     language: String,
     #[serde(default)]
     parameters: BTreeMap<String, String>,
+    /// Random number of the page; a repeated request with it gets the same session.
+    attempt: Option<String>,
 }
 
 /// `POST /api/begin`
 pub async fn begin(State(app): Shared, JsonBody(body): JsonBody<StartRequest>) -> Result<HttpResponse, ApiError> {
     if !app.limits.allow_begin() {
-        return Err(ApiError::too_often());
+        return Err(ApiError::too_many_requests());
     }
     if !body.consent {
-        return Err(ApiError::bad("Nobody takes part without consent."));
+        return Err(ApiError::bad_request("Nobody takes part without consent."));
     }
     if !app.study.languages.contains(&body.language) {
-        return Err(ApiError::bad("The study does not have that language."));
+        return Err(ApiError::bad_request("The study does not have that language."));
     }
     if !body.parameters.iter().all(|(name, value)| is_parameter(name, value)) {
-        return Err(ApiError::bad("A parameter is unknown, too long, or holds other than letters, digits and -_.:@."));
+        return Err(ApiError::bad_request(
+            "A parameter is unknown, too long, or holds other than letters, digits and -_.:@.",
+        ));
     }
-    let named = || anyhow::Ok((participant_id()?, completion_code()?));
+    if body.attempt.as_deref().is_some_and(|attempt| !is_attempt(attempt)) {
+        return Err(ApiError::bad_request("The attempt must be 32 hexadecimal digits."));
+    }
+    let id_of = |attempt: &String| Ok(app.secret.id_of_attempt(attempt));
+    let named = || anyhow::Ok((body.attempt.as_ref().map_or_else(participant_id, id_of)?, completion_code()?));
     let (id, code) = named().map_err(|_| ApiError::not_stored())?;
-    let newcomer = NewParticipant { id, language: body.language, parameters: body.parameters, code };
-    if app.study.requires_id && !newcomer.has_id() {
+    let new_participant = NewParticipant { id, language: body.language, parameters: body.parameters, code };
+    if app.study.requires_id && !new_participant.has_id() {
         let sentence = "The address lacks the participant ID of a recruiting site; open the study by its link there.";
-        return Err(ApiError::new(StatusCode::FORBIDDEN, sentence).because("id-missing"));
+        return Err(ApiError::new(StatusCode::FORBIDDEN, sentence).with_reason("id-missing"));
     }
     let (quota, clock) = (app.study.quota, app.clock);
-    let participant = match app.store.write(move |db| participants::begin(db, &newcomer, quota, clock.now_ms())).await?
-    {
-        BeginOutcome::Begun(participant) => participant,
-        BeginOutcome::Known => {
-            let sentence = "This participant ID has been used already; go on in the browser where you began.";
-            return Err(ApiError::conflict(sentence).because("known"));
-        }
-        BeginOutcome::Full => {
-            return Err(ApiError::conflict("The study has all its participants. Thank you.").because("full"));
-        }
-    };
+    let participant =
+        match app.store.write(move |db| participants::begin(db, &new_participant, quota, clock.now_ms())).await? {
+            BeginOutcome::Begun(participant) => participant,
+            BeginOutcome::Replaced => return Err(gone()),
+            BeginOutcome::Known => {
+                let sentence = "This participant ID has been used already; go on in the browser where you began. \
+                    Without an answer there you can begin here some minutes later.";
+                return Err(ApiError::conflict(sentence).with_reason("known"));
+            }
+            BeginOutcome::Full => {
+                return Err(ApiError::conflict("The study has all its participants. Thank you.").with_reason("full"));
+            }
+        };
     let token = app.secret.token(participant.session, &participant.id);
     Ok(json_reply(&json!({ "token": token, "state": session_state(&app.study, &participant) })))
 }
 
 fn is_parameter(name: &str, value: &str) -> bool {
     let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.:@".contains(&byte);
-    let begins_plain = value.bytes().next().is_none_or(|byte| byte.is_ascii_alphanumeric());
-    PARAMETERS.contains(&name) && value.len() <= LONGEST_PARAMETER && begins_plain && value.bytes().all(is_plain)
+    let starts_alphanumeric = value.bytes().next().is_none_or(|byte| byte.is_ascii_alphanumeric());
+    PARAMETERS.contains(&name)
+        && value.len() <= MAX_PARAMETER_BYTES
+        && starts_alphanumeric
+        && value.bytes().all(is_plain)
 }
 
 /// `GET /api/state`
 pub async fn state(
     State(app): Shared,
-    AuthenticatedSession { id, .. }: AuthenticatedSession,
+    AuthenticatedSession { session, id }: AuthenticatedSession,
 ) -> Result<HttpResponse, ApiError> {
-    match app.store.write(move |db| participants::find(db, &id)).await? {
+    let found = app.store.write(move |db| participants::find(db, &id)).await?;
+    match found.filter(|participant| participant.session == session) {
         Some(participant) if participant.status == Status::Replaced => Err(gone()),
         Some(participant) => Ok(json_reply(&session_state(&app.study, &participant))),
-        None => Err(withdrawn()),
+        None => Err(unknown()),
     }
 }
 
@@ -166,27 +182,28 @@ pub async fn state(
 pub async fn answer(
     State(app): Shared,
     AuthenticatedSession { session, id }: AuthenticatedSession,
-    JsonBody(answer): JsonBody<GivenAnswer>,
+    JsonBody(answer): JsonBody<SubmittedAnswer>,
 ) -> Result<HttpResponse, ApiError> {
     let trials = app.study.trials(session);
     let out_of_turn = || ApiError::conflict("That trial has not been given out.");
     let trial = trials.get(answer.position as usize).ok_or_else(out_of_turn)?;
     check(&answer, trial, app.study.task(trial))?;
     let terms = TrialTerms {
+        session,
         least_ms: app.study.least_ms(trial),
         is_last: answer.position as usize + 1 == trials.len(),
         fails_check: fails_check(&answer.response, trial),
     };
     let clock = app.clock;
     match app.store.write(move |db| record(db, &id, &answer, terms, clock.now_ms())).await? {
-        Recorded::Stored(participant) => {
+        RecordOutcome::Stored(participant) => {
             Ok(json_reply(&Acknowledged { feedback: feedback(trial), state: session_state(&app.study, &participant) }))
         }
-        Recorded::Unknown => Err(withdrawn()),
-        Recorded::Replaced => Err(gone()),
-        Recorded::Differs => Err(ApiError::conflict("That trial has another answer already.")),
-        Recorded::OutOfTurn => Err(out_of_turn()),
-        Recorded::TooSoon(left_ms) => {
+        RecordOutcome::Unknown => Err(unknown()),
+        RecordOutcome::Replaced => Err(gone()),
+        RecordOutcome::Differs => Err(ApiError::conflict("That trial has another answer already.")),
+        RecordOutcome::OutOfTurn => Err(out_of_turn()),
+        RecordOutcome::TooSoon(left_ms) => {
             let sentence = "The films cannot have been seen yet.";
             Err(ApiError::new(StatusCode::TOO_EARLY, sentence).retry_after(left_ms / 1000 + 1))
         }
@@ -207,7 +224,7 @@ pub async fn withdraw(
 ) -> Result<HttpResponse, ApiError> {
     app.limits.forget(&id);
     let known = app.store.erase(move |db| participants::withdraw(db, &id)).await?;
-    if known { Ok(json_reply(&json!({ "withdrawn": true }))) } else { Err(withdrawn()) }
+    if known { Ok(json_reply(&json!({ "withdrawn": true }))) } else { Err(unknown()) }
 }
 
 /// `GET /api/operator`
@@ -218,16 +235,17 @@ pub async fn operator(State(app): Shared, headers: HeaderMap) -> Result<HttpResp
     let read = |db: &_| Ok((participants::all(db)?, participants::n_withdrawn(db)?, answers::stalls(db)?));
     let (all, withdrawn, stalls) = app.store.write(read).await?;
     let now_ms = app.clock.now_ms();
-    let place = |participant: &Participant| {
-        let may_go_on = participant.status == Status::Active;
+    let participant_row = |participant: &Participant| {
+        // A completed session still shows its completion code.
+        let is_open = participant.status != Status::Replaced;
         json!({
             "place": participant.session + 1,
             "status": participant.status,
             "position": participant.position,
             "n_trials": app.study.trials(participant.session).len(),
             "idle_secs": (now_ms - participant.given_ms).max(0) / 1000,
-            // For participants who cannot open the browser where they began.
-            "token": may_go_on.then(|| app.secret.token(participant.session, &participant.id)),
+            // For participants who can no longer use the browser in which they began.
+            "token": is_open.then(|| app.secret.token(participant.session, &participant.id)),
         })
     };
     Ok(json_reply(&json!({
@@ -235,11 +253,11 @@ pub async fn operator(State(app): Shared, headers: HeaderMap) -> Result<HttpResp
         "quota": app.study.quota.count(&all, withdrawn, now_ms),
         "answers": all.iter().map(|participant| participant.position).sum::<u32>(),
         "stalls": stalls,
-        "participants": all.iter().map(place).collect::<Vec<_>>(),
+        "participants": all.iter().map(participant_row).collect::<Vec<_>>(),
     })))
 }
 
-/// `GET /films/{16 hexadecimal digits}.mp4`, as a whole or in one range of bytes.
+/// `GET /films/{16 hexadecimal digits}.mp4`, in full or as one byte range.
 pub async fn film(State(app): Shared, Path(name): Path<String>, mut request: Request) -> HttpResponse {
     let Some(film) = name.strip_suffix(".mp4").and_then(|name| app.study.film(name)) else {
         return not_found().await.into_response();
@@ -257,7 +275,7 @@ pub async fn film(State(app): Shared, Path(name): Path<String>, mut request: Req
     reply.map(Body::new)
 }
 
-/// Whether the header `Range` asks for one range of bytes, like `bytes=2-5`; a server may ignore all others (RFC 9110,
+/// Whether a `Range` header requests a single byte range such as `bytes=2-5`; a server may ignore all others (RFC 9110,
 /// section 14.2).
 fn is_one_range(range: &str) -> bool {
     let ends = range.strip_prefix("bytes=").and_then(|ends| ends.split_once('-'));
@@ -273,7 +291,7 @@ mod tests {
     use super::is_one_range;
 
     #[test]
-    fn ranges_that_are_served_in_part() {
+    fn single_ranges_are_recognised() {
         let one = ["bytes=0-0", "bytes=2-5", "bytes=2-", "bytes=-3", "bytes=-0", "bytes=10-"];
         assert!(one.into_iter().all(is_one_range));
         let others = ["5-2", "-", "", "0-1,3-4", "a-b", "+1-2", " 1-2"].map(|ends| format!("bytes={ends}"));

@@ -1,9 +1,9 @@
-//! Time for everything that the server stores and compares. It never jumps: neither a correction of the wall clock nor a
-//! restart after one blocks participants or ends their sessions.
+//! Clock for all times that the server stores and compares. Corrections of the wall clock, even across a restart,
+//! neither block participants nor end their sessions.
 
 use std::time::{Instant, SystemTime};
 
-/// Clock that reads the wall clock once, at its start, and is monotonic from then on.
+/// Clock that reads the wall clock once at the start and is monotonic afterwards.
 #[derive(Clone, Copy, Debug)]
 pub struct Clock {
     start_ms: i64,
@@ -11,7 +11,7 @@ pub struct Clock {
 }
 
 impl Clock {
-    /// Starts at the wall clock's time, or at `latest_ms` (milliseconds since 1970, the latest time that is stored) if that
+    /// Starts at the wall clock's time or at `latest_ms` (the latest stored time, milliseconds since 1970), whichever
     /// is later.
     pub fn start(latest_ms: i64) -> Self {
         let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
@@ -31,7 +31,7 @@ mod tests {
     use std::time::Duration;
 
     #[test]
-    fn time_goes_on_from_the_wall_clock_or_the_latest_stored_time() {
+    fn time_continues_from_the_wall_clock_or_the_latest_stored_time() {
         let wall_ms = Clock::start(0).now_ms();
         assert!(wall_ms > 1_700_000_000_000, "{wall_ms}");
         let ahead_ms = wall_ms + 3_600_000;

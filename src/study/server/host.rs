@@ -1,11 +1,11 @@
-//! The hosts that requests may name. Without this check another site could point its own name at this server's address
-//! (DNS rebinding) and read the study from a visitor's browser.
+//! Allowed hosts of requests. Without this check another site could point its own name at this server's address (DNS
+//! rebinding) and read the study from a visitor's browser.
 
 use super::reply::header_text;
 use anyhow::{Result, ensure};
 use axum::extract::{Request, State};
 use axum::http::uri::Authority;
-use axum::http::{StatusCode, header};
+use axum::http::{StatusCode, Version, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response as HttpResponse};
 use std::net::IpAddr;
@@ -15,45 +15,56 @@ const MISDIRECTED: &str = "This server is not known under the host name of this 
     Open it at the address that `orator study serve` printed. To serve it under another name, or through a proxy that \
     passes one on, start it with --host-name NAME.\n";
 
-/// Hosts under which the study is served: the address listened at, and a public name.
+/// Hosts under which the study is served: the listening address and any public names.
 #[derive(Debug)]
 pub struct AllowedHosts {
     listened: IpAddr,
-    name: Option<String>,
+    names: Vec<String>,
 }
 
 impl AllowedHosts {
-    /// Hosts of a server that listens at `listened` and is known by `name`.
+    /// Hosts of a server that listens on `listened` and is known by `names`.
     ///
     /// # Errors
-    /// A `name` with a scheme, port or path.
-    pub fn new(listened: IpAddr, name: Option<String>) -> Result<Self> {
-        if let Some(name) = &name {
+    /// A name has a scheme, port or path, or letters outside ASCII.
+    pub fn new(listened: IpAddr, names: &[String]) -> Result<Self> {
+        for name in names {
+            let hint = "write it in punycode (xn--...), as browsers send it";
+            ensure!(name.is_ascii(), "--host-name {name:?}: the name has letters outside ASCII; {hint}");
             let is_host = name.parse::<Authority>().is_ok_and(|authority| authority.host() == name);
             ensure!(is_host, "--host-name {name:?}: expected a name alone, such as study.example.org");
         }
-        Ok(Self { listened, name })
+        let names = names.iter().map(|name| without_dot(name).to_owned()).collect();
+        Ok(Self { listened, names })
     }
 
     /// Whether `authority`, a host with or without a port, names this server. The port is ignored, because tunnels and
-    /// proxies change it. On all addresses (0.0.0.0, ::) every literal address does: only names can be rebound.
+    /// proxies change it. A server that listens on all addresses (0.0.0.0, ::) accepts every IP address: only names can
+    /// be rebound.
     fn allow(&self, authority: &str) -> bool {
         let Ok(authority) = authority.parse::<Authority>() else { return false };
-        let host = authority.host();
+        let host = without_dot(authority.host());
         let is_everywhere = self.listened.is_unspecified();
         match host.trim_matches(['[', ']']).parse::<IpAddr>() {
             Ok(address) if is_everywhere || address == self.listened => true,
             Err(_) if host.eq_ignore_ascii_case("localhost") && (is_everywhere || self.listened.is_loopback()) => true,
-            _ => self.name.as_ref().is_some_and(|name| name.eq_ignore_ascii_case(host)),
+            _ => self.names.iter().any(|name| name.eq_ignore_ascii_case(host)),
         }
     }
 }
 
-/// Answers 421 to a request that names another host, and passes on all others.
+/// Host name without the dot that marks it as absolute: `localhost.` is `localhost`.
+fn without_dot(host: &str) -> &str {
+    host.strip_suffix('.').unwrap_or(host)
+}
+
+/// Middleware that answers 421 to requests that name another host, or none. A request of HTTP/1.0 may name none, as
+/// health checks of proxies do: browsers always name one.
 pub async fn check_host(State(hosts): State<Arc<AllowedHosts>>, request: Request, next: Next) -> HttpResponse {
     let in_target = request.uri().authority().map(Authority::as_str);
     let named = in_target.or_else(|| header_text(request.headers(), header::HOST));
-    if named.is_some_and(|host| hosts.allow(host)) {
+    let is_old = request.version() == Version::HTTP_10 && !request.headers().contains_key(header::HOST);
+    if named.map_or(is_old, |host| hosts.allow(host)) {
         next.run(request).await
     } else {
         (StatusCode::MISDIRECTED_REQUEST, MISDIRECTED).into_response()
@@ -65,10 +76,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_listened_address_and_the_given_name_are_allowed() {
+    fn the_listened_address_and_the_given_names_are_allowed() {
         let allowed = |listened: &str, host: &str| {
-            let name = Some("study.example.org".to_owned());
-            AllowedHosts::new(listened.parse().unwrap(), name).unwrap().allow(host)
+            let names = ["study.example.org", "tunnel.example."].map(str::to_owned);
+            AllowedHosts::new(listened.parse().unwrap(), &names).unwrap().allow(host)
         };
         for (listened, host) in [
             ("127.0.0.1", "127.0.0.1:8080"),
@@ -76,6 +87,9 @@ mod tests {
             ("127.0.0.1", "LocalHost:9000"),
             ("127.0.0.1", "Study.Example.Org"),
             ("127.0.0.1", "study.example.org:8443"),
+            ("127.0.0.1", "study.example.org.:8443"),
+            ("127.0.0.1", "tunnel.example"),
+            ("127.0.0.1", "localhost."),
             ("::1", "[::1]:8080"),
             ("::1", "localhost"),
             ("192.0.2.1", "192.0.2.1:8080"),
@@ -91,6 +105,7 @@ mod tests {
             ("127.0.0.1", "127.0.0.1.evil.example"),
             ("127.0.0.1", "localhost.evil.example"),
             ("127.0.0.1", "x.study.example.org"),
+            ("127.0.0.1", "localhost.."),
             ("127.0.0.1", "127.0.0.1/"),
             ("127.0.0.1", "[127.0.0.1"),
             ("127.0.0.1", ""),
@@ -100,9 +115,15 @@ mod tests {
         ] {
             assert!(!allowed(listened, host), "{host} at {listened}");
         }
+        let error_of = |name: &str| {
+            let names = ["study.example.org", name].map(str::to_owned);
+            AllowedHosts::new([127, 0, 0, 1].into(), &names).unwrap_err().to_string()
+        };
         for name in ["https://study.example.org", "study.example.org:443", "study.example.org/", "a b", ""] {
-            let error = AllowedHosts::new([127, 0, 0, 1].into(), Some(name.to_owned())).unwrap_err();
-            assert!(error.to_string().contains("--host-name"), "{error}");
+            let error = error_of(name);
+            assert!(error.contains("--host-name"), "{error}");
         }
+        let error = error_of("m\u{fc}ller.example");
+        assert!(error.contains("--host-name") && error.contains("xn--"), "{error}");
     }
 }

@@ -1,5 +1,5 @@
-//! The server of a study: a page, its films, and the interface by which a page takes part. Participants are known by a
-//! signed token alone; no address and no trace of a browser is stored or written anywhere.
+//! Web server of a study: pages, films and the API of the pages. Participants are identified by a signed token only; no
+//! address and no browser fingerprint is stored or logged.
 
 pub mod answer;
 pub mod api;
@@ -7,9 +7,9 @@ pub mod clock;
 pub mod host;
 pub mod limits;
 pub mod listen;
-pub mod peers;
+pub mod peer_limit;
 pub mod reply;
 pub mod secret;
-pub mod served;
-pub mod start;
+pub mod served_study;
+pub mod study_server;
 pub mod write_timeout;

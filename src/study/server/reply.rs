@@ -1,4 +1,5 @@
-//! Requests and replies: JSON bodies, tokens, errors as a sentence with a status, and the headers of every reply.
+//! Requests and replies: JSON bodies, bearer tokens, errors as a sentence with a status, and the headers of every
+//! reply.
 
 use crate::store::writer::NotStored;
 use axum::body::Bytes;
@@ -10,7 +11,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::json;
 
-/// Headers of every reply: nothing from elsewhere is loaded, nothing is shown within another page.
+/// Security headers of every reply: no external resources, no embedding in other pages.
 pub const HEADERS: [(HeaderName, &str); 7] = [
     (
         header::CONTENT_SECURITY_POLICY,
@@ -28,12 +29,12 @@ pub const HEADERS: [(HeaderName, &str); 7] = [
     ),
 ];
 
-/// Refusal of a request, in a sentence for who sent it.
+/// Error reply with a sentence for the client.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ApiError {
     pub status: StatusCode,
     sentence: String,
-    /// Word by which the page finds its own text.
+    /// Key by which the page finds its own text.
     reason: Option<&'static str>,
     /// Seconds after which the request may succeed.
     retry_secs: Option<i64>,
@@ -44,7 +45,7 @@ impl ApiError {
         Self { status, sentence: sentence.into(), reason: None, retry_secs: None }
     }
 
-    pub fn bad(sentence: impl Into<String>) -> Self {
+    pub fn bad_request(sentence: impl Into<String>) -> Self {
         Self::new(StatusCode::BAD_REQUEST, sentence)
     }
 
@@ -52,19 +53,19 @@ impl ApiError {
         Self::new(StatusCode::CONFLICT, sentence)
     }
 
-    /// For the page's text `REASON.text`.
+    /// Sets the reason, by which the page shows its text `REASON.text`.
     #[must_use]
-    pub fn because(self, reason: &'static str) -> Self {
+    pub fn with_reason(self, reason: &'static str) -> Self {
         Self { reason: Some(reason), ..self }
     }
 
-    /// May be tried again after so many seconds.
+    /// Sets the header `Retry-After`, seconds.
     #[must_use]
     pub fn retry_after(self, secs: i64) -> Self {
         Self { retry_secs: Some(secs), ..self }
     }
 
-    pub fn too_often() -> Self {
+    pub fn too_many_requests() -> Self {
         Self::new(StatusCode::TOO_MANY_REQUESTS, "Too many requests; wait a moment.").retry_after(2)
     }
 
@@ -97,7 +98,7 @@ impl IntoResponse for ApiError {
     }
 }
 
-/// Value as JSON that nobody keeps.
+/// JSON reply that must not be cached.
 pub fn json_reply(value: &impl Serialize) -> HttpResponse {
     with_status(StatusCode::OK, value)
 }
@@ -107,22 +108,22 @@ fn with_status(status: StatusCode, value: &impl Serialize) -> HttpResponse {
     (status, [(header::CONTENT_TYPE, "application/json"), (header::CACHE_CONTROL, "no-store")], text).into_response()
 }
 
-/// Text of the page, looked up anew each time it is opened.
+/// Static text of a page, revalidated each time it is opened.
 pub fn text_reply(content_type: &'static str, text: &'static str) -> HttpResponse {
     ([(header::CONTENT_TYPE, content_type), (header::CACHE_CONTROL, "no-cache")], text).into_response()
 }
 
-/// Reply to a path that is not served.
+/// Reply for unknown paths.
 pub async fn not_found() -> ApiError {
     ApiError::new(StatusCode::NOT_FOUND, "There is nothing at this address.")
 }
 
-/// Reply to a method that a path does not have.
+/// Reply for unsupported methods of a path.
 pub async fn wrong_method() -> ApiError {
     ApiError::new(StatusCode::METHOD_NOT_ALLOWED, "This address does not take that method.")
 }
 
-/// Body of a request, JSON of a known form. Its content type must say so, which a form of another site cannot.
+/// JSON body of a request. Requiring the content type `application/json` rejects HTML forms of other sites.
 pub struct JsonBody<T>(pub T);
 
 impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for JsonBody<T> {
@@ -137,22 +138,25 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for JsonBody<T> {
         let bytes = Bytes::from_request(request, state).await;
         let bytes = bytes.map_err(|error| ApiError::new(error.status(), "The body is too large, or broke off."))?;
         let value = serde_json::from_slice(&bytes);
-        value.map(Self).map_err(|_| ApiError::bad("The body is not the JSON that this address takes."))
+        value.map(Self).map_err(|_| ApiError::bad_request("The body is not the JSON that this address takes."))
     }
 }
 
 /// Token of the header `Authorization: Bearer TOKEN`.
+///
+/// # Errors
+/// The header is missing or malformed.
 pub fn bearer(headers: &HeaderMap) -> Result<&str, ApiError> {
     let token = header_text(headers, header::AUTHORIZATION).and_then(|text| text.strip_prefix("Bearer "));
     token.ok_or_else(unauthorized)
 }
 
-/// Refusal of a token.
+/// Reply for a missing or invalid token.
 pub fn unauthorized() -> ApiError {
     ApiError::new(StatusCode::UNAUTHORIZED, "A valid token is needed.")
 }
 
-/// Header as text; `None`: not there, or not of printable ASCII letters.
+/// Header as text; `None` if it is missing or contains bytes other than visible ASCII.
 pub fn header_text(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
     headers.get(name)?.to_str().ok()
 }

@@ -1,4 +1,4 @@
-//! The secret of a study's server: a key that signs the tokens of participants, and the operator's token.
+//! Secrets of a study's server: the key that signs participants' tokens, and the operator's token.
 
 use anyhow::{Context, Result, ensure};
 use base64::Engine;
@@ -10,14 +10,17 @@ use std::io::Read;
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
-/// Bytes of a participant's random name.
-const ID: usize = 12;
-/// Bytes of a token: session, name, signature.
-const TOKEN: usize = 4 + ID + blake3::OUT_LEN;
-/// Letters of a completion code, without those that look alike.
+/// Length of a participant's random identifier, bytes.
+const ID_BYTES: usize = 12;
+/// Length of a token, bytes: session, identifier, signature.
+const TOKEN_BYTES: usize = 4 + ID_BYTES + blake3::OUT_LEN;
+/// Characters of a completion code, without those that look alike.
 const CODE_LETTERS: &[u8; 32] = b"ABCDEFGHJKLMNPQRSTUVWXYZ23456789";
 
-/// Bytes that nobody can foretell.
+/// Cryptographically secure random bytes.
+///
+/// # Errors
+/// `/dev/urandom` cannot be read.
 pub fn random<const N: usize>() -> Result<[u8; N]> {
     let mut bytes = [0; N];
     let read = File::open("/dev/urandom").and_then(|mut source| source.read_exact(&mut bytes));
@@ -25,17 +28,22 @@ pub fn random<const N: usize>() -> Result<[u8; N]> {
     Ok(bytes)
 }
 
-/// A random completion code, ten letters.
+/// Random completion code of ten characters.
 pub fn completion_code() -> Result<String> {
     Ok(random::<10>()?.into_iter().map(|byte| char::from(CODE_LETTERS[usize::from(byte % 32)])).collect())
 }
 
-/// A random name of a participant.
+/// Random identifier of a participant, in hexadecimal digits.
 pub fn participant_id() -> Result<String> {
-    Ok(hex(&random::<ID>()?))
+    Ok(hex(&random::<ID_BYTES>()?))
 }
 
-/// Key and operator's token of one study.
+/// Whether `attempt` has the form of a page's attempt to begin: 128 random bits in hexadecimal digits.
+pub fn is_attempt(attempt: &str) -> bool {
+    attempt.len() == 32 && attempt.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
+}
+
+/// Signing key and operator's token of one study.
 #[derive(Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StudySecret {
@@ -44,10 +52,10 @@ pub struct StudySecret {
 }
 
 impl StudySecret {
-    /// Reads the secret at `path`; makes it the first time.
+    /// Reads the secret at `path`; creates it if it does not exist.
     ///
     /// # Errors
-    /// A file that others can read, or that is none of these.
+    /// The file is readable by users other than its owner, or is not a valid secret.
     pub fn open(path: &Path) -> Result<Self> {
         if !path.exists() {
             let secret = Self { key: random()?, operator_token: hex(&random::<16>()?) };
@@ -58,8 +66,8 @@ impl StudySecret {
         }
         let read = || -> Result<Self> {
             let mode = path.metadata()?.permissions().mode();
-            let others = mode & 0o077;
-            ensure!(others == 0, "others than its owner can read it; `chmod 600` it");
+            let group_and_other_bits = mode & 0o077;
+            ensure!(group_and_other_bits == 0, "others than its owner can read it; `chmod 600` it");
             Ok(serde_json::from_slice(&fs::read(path)?)?)
         };
         read().with_context(|| format!("cannot use {}", path.display()))
@@ -69,12 +77,19 @@ impl StudySecret {
         &self.operator_token
     }
 
-    /// Whether `token` is the operator's; the time it takes tells nothing of it.
+    /// Whether `token` is the operator's token. Keyed hashes are compared, so timing reveals nothing about the token.
     pub fn is_operator(&self, token: &str) -> bool {
         self.sign(token.as_bytes()) == self.sign(self.operator_token.as_bytes())
     }
 
-    /// Token of the participant `id`, a name of [`participant_id`], in `session`.
+    /// Identifier of the participant who begins by this `attempt`. It is the same for a repeated request, and the
+    /// attempt, which is as secret as a token, cannot be derived from it.
+    pub fn id_of_attempt(&self, attempt: &str) -> String {
+        let hash = self.sign(format!("attempt {attempt}").as_bytes());
+        hex(hash.as_bytes().split_at(ID_BYTES).0)
+    }
+
+    /// Token of the participant `id` (from [`participant_id`] or [`Self::id_of_attempt`]) in `session`.
     pub fn token(&self, session: u32, id: &str) -> String {
         let mut bytes = session.to_le_bytes().to_vec();
         bytes.extend(unhex(id));
@@ -83,14 +98,15 @@ impl StudySecret {
         URL_SAFE_NO_PAD.encode(bytes)
     }
 
-    /// Session and name of the participant whom a token was made for; `None`: it was not made here.
+    /// Session and identifier of the participant to whom a token was issued; `None` if this study's key did not sign
+    /// it.
     pub fn verify(&self, token: &str) -> Option<(u32, String)> {
-        let bytes: [u8; TOKEN] = URL_SAFE_NO_PAD.decode(token).ok()?.try_into().ok()?;
-        let (said, signature) = bytes.split_at(4 + ID);
-        let (session, id) = said.split_at(4);
+        let bytes: [u8; TOKEN_BYTES] = URL_SAFE_NO_PAD.decode(token).ok()?.try_into().ok()?;
+        let (payload, signature) = bytes.split_at(4 + ID_BYTES);
+        let (session, id) = payload.split_at(4);
         let signature = blake3::Hash::from_bytes(signature.try_into().ok()?);
-        // The comparison of hashes takes the same time wherever they differ.
-        let is_signed = self.sign(said) == signature;
+        // `blake3::Hash` compares in constant time.
+        let is_signed = self.sign(payload) == signature;
         is_signed.then(|| Some((u32::from_le_bytes(session.try_into().ok()?), hex(id)))).flatten()
     }
 
@@ -113,7 +129,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_token_is_taken_whole_or_not_at_all() {
+    fn altered_and_truncated_tokens_are_refused() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("secret.json");
         let secret = StudySecret::open(&path).unwrap();
@@ -127,6 +143,11 @@ mod tests {
             assert_eq!(secret.verify(std::str::from_utf8(&letters).unwrap()), None, "letter {k}");
             assert_eq!(secret.verify(&token[..k]), None, "{k} letters");
         }
+        let attempt = "0123456789abcdef0123456789abcdef";
+        let of_attempt = secret.id_of_attempt(attempt);
+        assert_eq!(StudySecret::open(&path).unwrap().id_of_attempt(attempt), of_attempt);
+        assert!(of_attempt.len() == id.len() && of_attempt != secret.id_of_attempt(&attempt.replace('0', "1")));
+        assert!(is_attempt(attempt) && !is_attempt(&attempt.to_uppercase()) && !is_attempt(&attempt[1..]));
         for wrong in ["", "=", "\u{e9}", &format!("{token}="), &format!("{token}AAAA"), &token.repeat(100)] {
             assert_eq!(secret.verify(wrong), None, "{wrong}");
         }

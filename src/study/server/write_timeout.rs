@@ -1,4 +1,4 @@
-//! Write timeout of a connection: a client that stops reading a reply loses its connection.
+//! Write timeout of a connection: a client that stops reading a reply is disconnected.
 
 use std::future::Future;
 use std::io::{self, IoSlice};
@@ -9,8 +9,8 @@ use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::TcpStream;
 use tokio::time::{Sleep, sleep};
 
-/// Stream whose writes fail with [`io::ErrorKind::TimedOut`] once nothing could be written for a given time. Each byte
-/// that is written starts the time anew, so a slow client receives its reply.
+/// Stream whose writes fail with [`io::ErrorKind::TimedOut`] after `limit` without progress. Each written byte restarts
+/// the timer, so a slow client still receives its reply.
 pub struct WriteTimeout {
     stream: TcpStream,
     limit: Duration,
@@ -23,7 +23,7 @@ impl WriteTimeout {
         Self { stream, limit, timer: None }
     }
 
-    /// Passes on the result of a write; a pending write fails at the end of the time limit.
+    /// Returns the result of a write; a pending write fails when the timer expires.
     fn limit(&mut self, written: Poll<io::Result<usize>>, cx: &mut Context<'_>) -> Poll<io::Result<usize>> {
         if written.is_ready() {
             self.timer = None;
@@ -78,8 +78,8 @@ mod tests {
 
     const LIMIT: Duration = Duration::from_secs(1);
 
-    /// Writes to a client that reads a part of it `n_reads` times, every half of the limit, and then stops. Gives the
-    /// error and the seconds until it.
+    /// Writes to a client that reads 8 MiB `n_reads` times at intervals of half the limit and then stops. Returns the
+    /// error and the seconds until it occurred.
     fn write_to_reader(n_reads: u32) -> (io::ErrorKind, f64) {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
         runtime.block_on(async {

@@ -1,7 +1,8 @@
-//! Strengths of conditions such that one is preferred to another with log odds of the difference (Bradley and Terry
-//! 1952), by maximum likelihood, also on the scale of Elo, as the GENEA leaderboard (Nagy et al. 2024) and Chatbot Arena
-//! (Chiang et al. 2024) print them. A tie counts as half a win for each, a strength of preference as its share. Strengths are
-//! finite only where wins lead from each condition to each other one (Ford 1957): no prior makes up for missing votes.
+//! Bradley-Terry model (Bradley and Terry 1952): strengths of conditions whose difference is the log odds that one is
+//! preferred to the other, by maximum likelihood; also on the Elo scale of the GENEA leaderboard (Nagy et al. 2024) and
+//! Chatbot Arena (Chiang et al. 2024). A tie counts as half a win for each side, a graded preference as its share.
+//! There is no prior, so strengths are finite only if every condition reaches every other by a chain of wins (Ford
+//! 1957).
 
 use super::cluster::sign_flips::rng_of_draw;
 use super::estimate::{ConfidenceInterval, StatisticsError, at_least, interval_of_draws, within};
@@ -11,22 +12,26 @@ use rand::Rng;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// Most Newton steps.
-const MOST: usize = 100;
-/// Largest share of draws without finite strengths that an interval may leave out.
-const LEFT_OUT: f64 = 0.05;
+/// Maximum number of Newton steps.
+const MAX_STEPS: usize = 100;
+/// Maximum proportion of bootstrap draws without finite strengths.
+const MAX_FAILED_DRAWS: f64 = 0.05;
 
-/// Vote of one participant between two conditions, by their numbers.
+/// Vote of one participant between two conditions, given by index.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PairedVote {
     pub participant: usize,
     pub first: usize,
     pub second: usize,
-    /// 1 for the first condition, 0 for the second, 0.5 for a tie; strengths of preference lie between.
+    /// 1 for the first condition, 0 for the second, 0.5 for a tie; graded preferences lie between.
     pub share: f64,
 }
 
-/// Refuses votes of a condition with itself, of conditions from `n_conditions` on, and shares outside 0 to 1.
+/// Validates votes.
+///
+/// # Errors
+/// Fewer than two conditions, no votes, a condition compared with itself, a condition index out of range, or a share
+/// outside 0 to 1.
 fn check(votes: &[PairedVote], n_conditions: usize) -> Result<(), StatisticsError> {
     at_least("conditions", 2, n_conditions)?;
     at_least("votes", 1, votes.len())?;
@@ -40,7 +45,10 @@ fn check(votes: &[PairedVote], n_conditions: usize) -> Result<(), StatisticsErro
     Ok(())
 }
 
-/// Strengths in log odds, of mean 0.
+/// Maximum-likelihood strengths in log odds, with mean 0.
+///
+/// # Errors
+/// Invalid votes, or conditions that wins do not connect in both directions.
 pub fn strengths(votes: &[PairedVote], n_conditions: usize) -> Result<Vec<f64>, StatisticsError> {
     check(votes, n_conditions)?;
     let mut wins = Array2::<f64>::zeros((n_conditions, n_conditions));
@@ -53,8 +61,8 @@ pub fn strengths(votes: &[PairedVote], n_conditions: usize) -> Result<Vec<f64>, 
     }
     let mut strengths = Array1::<f64>::zeros(n_conditions);
     let mut fit = likelihood(&wins, &strengths);
-    for _ in 0..MOST {
-        let step = cholesky::solve(fit.information.clone(), fit.slope.clone().insert_axis(Axis(1)));
+    for _ in 0..MAX_STEPS {
+        let step = cholesky::solve(fit.information.clone(), fit.gradient.clone().insert_axis(Axis(1)));
         let step = step.remove_axis(Axis(1));
         let mut share = 1.0;
         let (next, next_fit) = loop {
@@ -74,8 +82,8 @@ pub fn strengths(votes: &[PairedVote], n_conditions: usize) -> Result<Vec<f64>, 
     Ok((strengths - mean).to_vec())
 }
 
-/// Percentile interval of each strength by `n_draws` draws of participants with replacement. Draws without finite
-/// strengths are left out; more than 5 % of them are an error. Results do not depend on the number of threads.
+/// Percentile bootstrap interval of each strength, from `n_draws` resamples of participants. Draws without finite
+/// strengths are ignored; more than 5 % of them are an error. Results do not depend on the number of threads.
 pub fn strength_intervals(
     votes: &[PairedVote],
     n_conditions: usize,
@@ -94,35 +102,36 @@ pub fn strength_intervals(
         strengths(&drawn.collect::<Vec<_>>(), n_conditions).ok()
     };
     let draws: Vec<Vec<f64>> = (0..n_draws as u64).into_par_iter().filter_map(fit).collect();
-    if (draws.len() as f64) < (1.0 - LEFT_OUT) * n_draws as f64 {
+    if (draws.len() as f64) < (1.0 - MAX_FAILED_DRAWS) * n_draws as f64 {
         return Err(StatisticsError::Unconnected { what: "conditions" });
     }
     let interval = |k: usize| interval_of_draws(draws.iter().map(|draw| draw[k]), confidence);
     (0..n_conditions).map(interval).collect()
 }
 
-/// Elo rating of a strength: a difference of 400 is odds of 10, and the mean rating is 1000.
+/// Elo rating of a strength: a difference of 400 corresponds to odds of 10, and the mean rating is 1000.
 pub fn elo(log_strength: f64) -> f64 {
     1000.0 + 400.0 / std::f64::consts::LN_10 * log_strength
 }
 
-/// Log-likelihood, its slope, and the information lifted by 1 / n in all places.
+/// Log-likelihood, its gradient [n], and the Fisher information [n, n]. 1 / n is added to every element of the
+/// information to make it invertible: strengths are determined up to a constant only.
 struct Likelihood {
     log: f64,
-    slope: Array1<f64>,
+    gradient: Array1<f64>,
     information: Array2<f64>,
 }
 
 fn likelihood(wins: &Array2<f64>, strengths: &Array1<f64>) -> Likelihood {
     let n = strengths.len();
     let mut found =
-        Likelihood { log: 0.0, slope: Array1::zeros(n), information: Array2::from_elem((n, n), 1.0 / n as f64) };
+        Likelihood { log: 0.0, gradient: Array1::zeros(n), information: Array2::from_elem((n, n), 1.0 / n as f64) };
     for ((i, j), won) in wins.indexed_iter().filter(|((i, j), _)| i != j) {
         let eta = strengths[i] - strengths[j];
         let share = 1.0 / (1.0 + (-eta).exp());
         found.log -= won * ((-eta).max(0.0) + (-eta.abs()).exp().ln_1p());
-        found.slope[i] += won * (1.0 - share);
-        found.slope[j] -= won * (1.0 - share);
+        found.gradient[i] += won * (1.0 - share);
+        found.gradient[j] -= won * (1.0 - share);
         let weight = won * share * (1.0 - share);
         for (a, b, sign) in [(i, i, 1.0), (j, j, 1.0), (i, j, -1.0), (j, i, -1.0)] {
             found.information[[a, b]] += sign * weight;
@@ -131,18 +140,18 @@ fn likelihood(wins: &Array2<f64>, strengths: &Array1<f64>) -> Likelihood {
     found
 }
 
-/// Whether wins lead from each condition to each other one.
+/// Whether every condition reaches every other by a chain of wins: transitive closure by Warshall's algorithm.
 fn is_connected(wins: &Array2<f64>) -> bool {
     let n = wins.nrows();
-    let mut leads = wins.mapv(|won| won > 0.0);
+    let mut reaches = wins.mapv(|won| won > 0.0);
     for via in 0..n {
         for from in 0..n {
             for to in 0..n {
-                leads[[from, to]] |= leads[[from, via]] && leads[[via, to]];
+                reaches[[from, to]] |= reaches[[from, via]] && reaches[[via, to]];
             }
         }
     }
-    leads.iter().all(|leads| *leads)
+    reaches.iter().all(|reaches| *reaches)
 }
 
 #[cfg(test)]
@@ -150,7 +159,7 @@ mod tests {
     use super::*;
     use serde_json::Value;
 
-    /// Votes and the strengths that choix finds (`fixtures/reference/study_bradley_terry.py`).
+    /// Votes with the strengths computed by choix (`fixtures/reference/study_bradley_terry.py`).
     fn sets() -> Vec<(Vec<PairedVote>, Vec<f64>)> {
         let text = include_str!("../../../fixtures/reference/study_bradley_terry_golden.json");
         let sets: Vec<Value> = serde_json::from_str(text).unwrap();
@@ -163,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn strengths_are_those_of_choix() {
+    fn strengths_match_choix() {
         for (votes, expected) in sets() {
             let n = expected.len();
             let found = strengths(&votes, n).unwrap();

@@ -1,50 +1,60 @@
-//! Two one-sided tests: whether a value lies within a stated bound of another (Schuirmann 1987). A test that finds no
-//! difference does not show that there is none; this one can. The bound is fixed before the data are seen.
+//! Equivalence by two one-sided tests (TOST, Schuirmann 1987): whether a value lies within a bound of another. A
+//! non-significant difference does not show equivalence; this test can. The bound must be fixed before the data are
+//! seen.
 
 use super::estimate::{ConfidenceInterval, StatisticsError, StudentEstimate, within};
 use super::proportion::BinomialCount;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal};
 
-/// Level of each one-sided test.
+/// Significance level of each one-sided test.
 const LEVEL: f64 = 0.05;
 
-/// Outcome of two one-sided tests.
+/// Result of two one-sided tests.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Equivalence {
-    /// Largest difference that counts as none, in the unit of the estimate: 0.05 is 5 points of percent.
+    /// Equivalence bound, in the unit of the estimate: 0.05 is 5 percentage points of a proportion.
     pub bound: f64,
     /// Larger of the two one-sided p values.
     pub p: f64,
-    /// 90 % interval of the value, which lies inside the bounds when the test passes.
+    /// 90 % interval of the value; inside the bounds if and only if the test passes.
     #[serde(flatten)]
     pub interval: ConfidenceInterval,
 }
 
 impl Equivalence {
     /// Tests at 5 % whether the true value of `estimate` is less than `bound` away from `expected`.
+    ///
+    /// # Errors
+    /// `bound` is not positive.
     pub fn of_estimate(estimate: &StudentEstimate, expected: f64, bound: f64) -> Result<Self, StatisticsError> {
         within("bound", bound, f64::MIN_POSITIVE..=f64::MAX)?;
-        let above = estimate.beyond(estimate.statistic(expected - bound));
-        let below = estimate.beyond(-estimate.statistic(expected + bound));
+        let above = estimate.upper_tail(estimate.statistic(expected - bound));
+        let below = estimate.upper_tail(-estimate.statistic(expected + bound));
         Ok(Self { bound, p: above.max(below), interval: estimate.interval(1.0 - 2.0 * LEVEL)? })
     }
 
-    /// Exact binomial form for independent trials: the bounds must lie between 0 and 1.
+    /// Exact binomial version for independent trials; both bounds must lie between 0 and 1.
+    ///
+    /// # Errors
+    /// A bound is outside 0 to 1.
     pub fn of_count(count: &BinomialCount, expected: f64, bound: f64) -> Result<Self, StatisticsError> {
         within("bound", bound, f64::MIN_POSITIVE..=1.0)?;
         let p = count.at_least(expected - bound)?.max(count.at_most(expected + bound)?);
         Ok(Self { bound, p, interval: count.exact(1.0 - 2.0 * LEVEL)? })
     }
 
-    /// Whether equivalence within the bound is shown at 5 %.
+    /// Whether equivalence within the bound is significant at 5 %.
     pub fn passes(&self) -> bool {
         self.p < LEVEL
     }
 }
 
-/// Independent votes from which two one-sided tests at 5 % pass with probability `power` where half of all votes
-/// succeed in truth: (z of 0.95 + z of (1 + power) / 2)^2 / (4 bound^2), rounded up.
+/// Number of independent votes for which two one-sided tests at 5 % pass with probability `power` if the true
+/// proportion is one half: (z(0.95) + z((1 + power) / 2))^2 / (4 bound^2), rounded up.
+///
+/// # Errors
+/// `bound` is outside 1e-6 to 0.5, or `power` is outside 0 to below 1.
 pub fn votes_needed(bound: f64, power: f64) -> Result<u64, StatisticsError> {
     within("bound", bound, 1e-6..=0.5)?;
     within("power", power, 0.0..=1.0 - f64::EPSILON)?;

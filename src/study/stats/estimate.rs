@@ -1,6 +1,6 @@
-//! An estimate with its standard error, judged by Student's t distribution (Student 1908): p value and interval. Several
-//! p values at once: Holm's step-down adjustment (Holm 1979), which bounds the probability of any false rejection whatever
-//! the tests' dependence.
+//! Estimates with standard errors, their p values and intervals by Student's t distribution (Student 1908), and Holm's
+//! step-down adjustment of several p values (Holm 1979), which controls the family-wise error rate under any dependence
+//! of the tests.
 
 pub use orator_base::math::estimate::ConfidenceInterval;
 use orator_base::math::order::Ordered;
@@ -8,7 +8,7 @@ use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 use std::ops::RangeInclusive;
 
-/// Reason for which a statistic cannot be computed.
+/// Reason why a statistic cannot be computed.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum StatisticsError {
     #[error("{found} {what}, at least {least} are needed")]
@@ -23,29 +23,29 @@ pub enum StatisticsError {
     Unconnected { what: &'static str },
 }
 
-/// Refuses fewer than `least` things.
+/// Returns an error if `found` is less than `least`.
 pub fn at_least(what: &'static str, least: usize, found: usize) -> Result<(), StatisticsError> {
     if found < least { Err(StatisticsError::TooFew { what, least, found }) } else { Ok(()) }
 }
 
-/// Refuses a number outside `range`, NaN too.
+/// Returns an error if `value` is outside `range` or NaN.
 pub fn within(what: &'static str, value: f64, range: RangeInclusive<f64>) -> Result<(), StatisticsError> {
     let (least, most) = (*range.start(), *range.end());
     if range.contains(&value) { Ok(()) } else { Err(StatisticsError::OutOfRange { what, value, least, most }) }
 }
 
-/// Refuses NaN and infinite numbers.
+/// Returns an error if a value is NaN or infinite.
 pub fn finite(what: &'static str, values: &[f64]) -> Result<(), StatisticsError> {
     if values.iter().all(|value| value.is_finite()) { Ok(()) } else { Err(StatisticsError::NotFinite { what }) }
 }
 
-/// Share of probability at each end outside an interval of `confidence`, which must lie between 0 and 1.
+/// Tail probability on each side of an interval with this `confidence`, which must lie strictly between 0 and 1.
 pub fn tail(confidence: f64) -> Result<f64, StatisticsError> {
     within("confidence", confidence, f64::EPSILON..=1.0 - f64::EPSILON)?;
     Ok((1.0 - confidence) / 2.0)
 }
 
-/// Percentile interval of `draws`; those that are not finite are left out.
+/// Percentile interval of `draws`; non-finite values are ignored.
 pub fn interval_of_draws(
     draws: impl Iterator<Item = f64>,
     confidence: f64,
@@ -55,18 +55,21 @@ pub fn interval_of_draws(
     Ok(ConfidenceInterval { low: at(tail)?, high: at(1.0 - tail)? })
 }
 
-/// Estimate whose error, divided by its standard error, follows a t distribution.
+/// Estimate whose error divided by its standard error follows a t distribution.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct StudentEstimate {
     pub value: f64,
-    /// Above 0.
+    /// Standard error, above 0.
     pub standard_error: f64,
-    /// Above 0, whole or not; infinite for the normal distribution.
+    /// Above 0, possibly fractional; infinite for the normal distribution.
     pub degrees_of_freedom: f64,
 }
 
 impl StudentEstimate {
-    /// Refuses numbers that are not finite and a standard error of 0.
+    /// Creates an estimate.
+    ///
+    /// # Errors
+    /// A value is not finite, or the standard error or the degrees of freedom are not positive.
     pub fn new(value: f64, standard_error: f64, degrees_of_freedom: f64) -> Result<Self, StatisticsError> {
         finite("values", &[value, standard_error])?;
         if standard_error <= 0.0 {
@@ -78,45 +81,46 @@ impl StudentEstimate {
         Ok(Self { value, standard_error, degrees_of_freedom })
     }
 
-    /// Mean of independent values with n - 1 degrees of freedom.
+    /// Mean of at least two independent values, with n - 1 degrees of freedom.
     pub fn of_mean(values: &[f64]) -> Result<Self, StatisticsError> {
         at_least("values", 2, values.len())?;
         finite("values", values)?;
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
         let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-        // Rounding alone makes equal values differ from their mean by a few last places.
+        // Without this check, rounding would give equal values a tiny standard error above 0.
         let is_constant = values.iter().all(|value| *value == values[0]);
         Self::new(mean, if is_constant { 0.0 } else { (squares / (n * (n - 1.0))).sqrt() }, n - 1.0)
     }
 
-    /// Distance from `expected` in standard errors.
+    /// t statistic: distance from `expected` in standard errors.
     pub fn statistic(&self, expected: f64) -> f64 {
         (self.value - expected) / self.standard_error
     }
 
     /// Two-sided p value of the hypothesis that the true value is `expected`.
     pub fn p_value(&self, expected: f64) -> f64 {
-        2.0 * self.beyond(self.statistic(expected).abs())
+        2.0 * self.upper_tail(self.statistic(expected).abs())
     }
 
+    /// Two-sided confidence interval; `confidence` must lie strictly between 0 and 1.
     pub fn interval(&self, confidence: f64) -> Result<ConfidenceInterval, StatisticsError> {
         let half = self.quantile(1.0 - tail(confidence)?) * self.standard_error;
         Ok(ConfidenceInterval { low: self.value - half, high: self.value + half })
     }
 
     /// Probability of a statistic above `t`.
-    pub fn beyond(&self, t: f64) -> f64 {
-        // Above a million degrees of freedom the distributions differ by less than a millionth.
+    pub fn upper_tail(&self, t: f64) -> f64 {
+        // Above a million degrees of freedom the two distributions differ by less than 1e-6.
         let student = (self.degrees_of_freedom < 1e6).then(|| StudentsT::new(0.0, 1.0, self.degrees_of_freedom));
         student.and_then(Result::ok).map_or_else(|| Normal::standard().sf(t), |student| student.sf(t))
     }
 
-    /// Value which the statistic exceeds with probability 1 - `share`.
+    /// Value that the statistic exceeds with probability 1 - `share`.
     pub(super) fn quantile(&self, share: f64) -> f64 {
         let student = (self.degrees_of_freedom < 1e4).then(|| StudentsT::new(0.0, 1.0, self.degrees_of_freedom));
         let expanded = || {
-            // Expansion about the normal quantile (Fisher and Cornish 1960); its error is below 1e-7 here.
+            // Expansion around the normal quantile (Fisher and Cornish 1960); its error is below 1e-7 here.
             let z = Normal::standard().inverse_cdf(share);
             z + (z.powi(3) + z) / (4.0 * self.degrees_of_freedom)
         };
@@ -124,7 +128,11 @@ impl StudentEstimate {
     }
 }
 
-/// Adjusted p values in the order given: a hypothesis is rejected at a level where its adjusted value is at most that.
+/// Holm-adjusted p values in the given order: a hypothesis is rejected at a level if its adjusted p value is at most
+/// that level.
+///
+/// # Errors
+/// A p value is outside 0 to 1.
 pub fn holm(p_values: &[f64]) -> Result<Vec<f64>, StatisticsError> {
     p_values.iter().try_for_each(|p| within("p value", *p, 0.0..=1.0))?;
     let mut order: Vec<usize> = (0..p_values.len()).collect();
@@ -143,7 +151,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_has_no_spread_has_no_estimate() {
+    fn values_without_spread_have_no_estimate() {
         assert_eq!(StudentEstimate::of_mean(&[0.3; 7]), Err(StatisticsError::NoSpread { what: "values" }));
         assert!(matches!(StudentEstimate::of_mean(&[0.5]), Err(StatisticsError::TooFew { .. })));
         assert!(matches!(StudentEstimate::of_mean(&[0.5, f64::NAN]), Err(StatisticsError::NotFinite { .. })));

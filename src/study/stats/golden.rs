@@ -1,4 +1,4 @@
-//! Statistics beside those of scipy, statsmodels and krippendorff (`fixtures/reference/study_stats.py`).
+//! Compares statistics with scipy, statsmodels and krippendorff (`fixtures/reference/study_stats.py`).
 
 use super::equivalence::Equivalence;
 use super::estimate::{StudentEstimate, holm};
@@ -7,7 +7,7 @@ use super::rank::{MeasurementScale, alpha, friedman, median_interval, signed_ran
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-/// Cases of a statistic.
+/// Golden cases of a statistic.
 fn cases(statistic: &str) -> Vec<Value> {
     let golden: Value =
         serde_json::from_str(include_str!("../../../fixtures/reference/study_stats_golden.json")).unwrap();
@@ -18,8 +18,8 @@ fn of<T: DeserializeOwned>(case: &Value, name: &str) -> T {
     serde_json::from_value(case[name].clone()).unwrap()
 }
 
-/// Numbers that were found beside those of the case with these names.
-fn near<const N: usize>(case: &Value, names: [&str; N], found: [f64; N], relative: f64, least: f64) {
+/// Asserts that the computed values are near those with these names in the case.
+fn assert_near<const N: usize>(case: &Value, names: [&str; N], found: [f64; N], relative: f64, least: f64) {
     for (found, name) in found.into_iter().zip(names) {
         let expected: f64 = of(case, name);
         assert!((found - expected).abs() <= relative * expected.abs().max(least), "{name} {found}: {case}");
@@ -36,11 +36,11 @@ fn proportions_and_their_equivalence() {
         let (wilson, exact) = (count(&case).wilson(0.95).unwrap(), count(&case).exact(0.95).unwrap());
         let p = count(&case).test(of(&case, "probability")).unwrap();
         let names = ["wilson_low", "wilson_high", "exact_low", "exact_high", "p"];
-        near(&case, names, [wilson.low, wilson.high, exact.low, exact.high, p], 1e-9, 1e-6);
+        assert_near(&case, names, [wilson.low, wilson.high, exact.low, exact.high, p], 1e-9, 1e-6);
     }
     for case in cases("binomial_equivalence") {
         let test = Equivalence::of_count(&count(&case), 0.5, of(&case, "bound")).unwrap();
-        near(&case, ["p"], [test.p], 1e-9, 0.0);
+        assert_near(&case, ["p"], [test.p], 1e-9, 0.0);
     }
 }
 
@@ -50,16 +50,16 @@ fn means_and_their_equivalence() {
         let mean = StudentEstimate::of_mean(&of::<Vec<f64>>(&case, "values")).unwrap();
         let interval = mean.interval(0.95).unwrap();
         let found = [mean.value, mean.standard_error, mean.p_value(0.5), interval.low, interval.high];
-        near(&case, ["mean", "standard_error", "p", "low", "high"], found, 1e-9, 1e-3);
+        assert_near(&case, ["mean", "standard_error", "p", "low", "high"], found, 1e-9, 1e-3);
     }
     for case in cases("equivalence") {
         let mean = StudentEstimate::of_mean(&of::<Vec<f64>>(&case, "values")).unwrap();
-        near(&case, ["p"], [Equivalence::of_estimate(&mean, 0.5, of(&case, "bound")).unwrap().p], 1e-9, 0.0);
+        assert_near(&case, ["p"], [Equivalence::of_estimate(&mean, 0.5, of(&case, "bound")).unwrap().p], 1e-9, 0.0);
     }
     for case in cases("t_quantile") {
         let [freedom, share, expected]: [f64; 3] = serde_json::from_value(case).unwrap();
         let found = StudentEstimate::new(0.0, 1.0, freedom).unwrap().quantile(share);
-        // Beyond 10,000 degrees of freedom an expansion is used.
+        // Above 10,000 degrees of freedom `quantile` uses an expansion.
         let bound = if freedom < 1e4 { 1e-10 } else { 1e-7 };
         assert!((found / expected - 1.0).abs() < bound, "{freedom} {share} {found} {expected}");
     }
@@ -77,15 +77,15 @@ fn adjusted_p_values() {
 fn ranks_and_medians() {
     for case in cases("wilcoxon") {
         let test = signed_rank(&of::<Vec<f64>>(&case, "differences")).unwrap();
-        near(&case["wilcox"], ["statistic", "p"], [test.statistic, test.p], 1e-9, 0.0);
+        assert_near(&case["wilcox"], ["statistic", "p"], [test.statistic, test.p], 1e-9, 0.0);
     }
     for case in cases("friedman") {
         let test = friedman(&of::<Vec<Vec<f64>>>(&case, "blocks")).unwrap();
-        near(&case, ["statistic", "p"], [test.statistic, test.p], 1e-9, 0.0);
+        assert_near(&case, ["statistic", "p"], [test.statistic, test.p], 1e-9, 0.0);
     }
     for case in cases("median") {
         let interval = median_interval(&of::<Vec<f64>>(&case, "values"), 0.95).unwrap();
-        near(&case, ["low", "high"], [interval.low, interval.high], 1e-12, 1.0);
+        assert_near(&case, ["low", "high"], [interval.low, interval.high], 1e-12, 1.0);
     }
 }
 
@@ -96,6 +96,6 @@ fn agreement_of_raters() {
         let units: Vec<Vec<f64>> = units.into_iter().map(|unit| unit.into_iter().flatten().collect()).collect();
         let scales = [MeasurementScale::Nominal, MeasurementScale::Ordinal, MeasurementScale::Interval];
         let found = scales.map(|scale| alpha(&units, scale).unwrap());
-        near(&case, ["nominal", "ordinal", "interval"], found, 1e-12, 1.0);
+        assert_near(&case, ["nominal", "ordinal", "interval"], found, 1e-12, 1.0);
     }
 }

@@ -1,7 +1,8 @@
-//! Statistics of a user study as pure functions of numbers: proportions, means, equivalence, clusters of participants
-//! and clips, mixed models, randomisation tests, ranks, strengths, agreement of raters. The headline figures are
-//! `cluster::crossed`, which holds for other participants and other clips, and `cluster::sign_flips::side_p`, the
-//! randomisation test of the plan's own draw, which assumes nothing but that draw.
+//! Statistics of a user study as pure functions: proportions, means, equivalence, clustering by participants and clips,
+//! mixed models, randomisation tests, rank tests, Bradley-Terry strengths, inter-rater agreement. The headline
+//! statistics are `cluster::crossed`, which generalises to other participants and clips, and
+//! `cluster::sign_flips::side_p`, the exact randomisation test of the plan's assignment of sides, which assumes nothing
+//! beyond that randomisation.
 
 pub mod bradley_terry;
 pub mod cluster;

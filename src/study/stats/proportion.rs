@@ -1,14 +1,13 @@
-//! A number of successes among independent trials: Wilson's and the exact interval, the exact binomial test. Votes of
-//! one participant, or about one clip, are not independent: `cluster` is for those.
+//! Proportions of independent trials: Wilson and exact intervals, exact binomial test. Votes of one participant or
+//! about one clip are not independent; use `cluster` for those.
 
 use super::estimate::{ConfidenceInterval, StatisticsError, at_least, tail, within};
 use statrs::distribution::{Beta, Binomial, ContinuousCDF, Discrete, DiscreteCDF, Normal};
 
-/// Outcomes whose probability exceeds that of the observed one by less than this share count as equally likely
-/// (scipy's `binomtest`).
+/// Relative tolerance within which outcomes count as equally likely as the observed one (as in scipy's `binomtest`).
 const EQUALLY_LIKELY: f64 = 1e-7;
 
-/// Successes among independent trials.
+/// Number of successes among independent trials.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BinomialCount {
     successes: u64,
@@ -16,32 +15,35 @@ pub struct BinomialCount {
 }
 
 impl BinomialCount {
-    /// Refuses 0 trials and more successes than trials.
+    /// Creates a count.
+    ///
+    /// # Errors
+    /// No trials, or more successes than trials.
     pub fn new(successes: u64, trials: u64) -> Result<Self, StatisticsError> {
         at_least("votes", 1, trials.min(1) as usize)?;
         within("successes", successes as f64, 0.0..=trials as f64)?;
         Ok(Self { successes, trials })
     }
 
-    /// Share of successes, 0 to 1.
+    /// Proportion of successes, 0 to 1.
     pub fn share(&self) -> f64 {
         self.successes as f64 / self.trials as f64
     }
 
-    /// Interval of the score test (Wilson 1927): covers close to `confidence` on average over shares.
+    /// Score interval (Wilson 1927): its coverage is close to `confidence` on average over proportions.
     pub fn wilson(&self, confidence: f64) -> Result<ConfidenceInterval, StatisticsError> {
         let z = Normal::standard().inverse_cdf(1.0 - tail(confidence)?);
         let (n, share) = (self.trials as f64, self.share());
         let scale = 1.0 + z * z / n;
         let centre = (share + z * z / (2.0 * n)) / scale;
         let half = z / scale * (share * (1.0 - share) / n + z * z / (4.0 * n * n)).sqrt();
-        // The ends are 0 and 1 there but for rounding.
+        // Exactly 0 and 1 in these cases, apart from rounding.
         let low = if self.successes == 0 { 0.0 } else { centre - half };
         let high = if self.successes == self.trials { 1.0 } else { centre + half };
         Ok(ConfidenceInterval { low, high })
     }
 
-    /// Exact interval (Clopper and Pearson 1934): covers at least `confidence` at every share.
+    /// Exact interval (Clopper and Pearson 1934): its coverage is at least `confidence` for every proportion.
     pub fn exact(&self, confidence: f64) -> Result<ConfidenceInterval, StatisticsError> {
         let tail = tail(confidence)?;
         let (k, n) = (self.successes as f64, self.trials as f64);
@@ -51,8 +53,8 @@ impl BinomialCount {
         Ok(ConfidenceInterval { low, high })
     }
 
-    /// Exact two-sided p value of the hypothesis that each trial succeeds with `probability`: that of all outcomes no
-    /// likelier than the observed one.
+    /// Exact two-sided p value of the hypothesis that each trial succeeds with `probability`: the total probability of
+    /// all outcomes that are at most as likely as the observed one.
     pub fn test(&self, probability: f64) -> Result<f64, StatisticsError> {
         let distribution = self.distribution(probability)?;
         let (k, n) = (self.successes, self.trials);
@@ -62,21 +64,21 @@ impl BinomialCount {
         let p = if k as f64 == mean {
             1.0
         } else if (k as f64) < mean {
-            let other = first(mean.ceil() as u64, n + 1, is_unlikely);
+            let other = partition_point(mean.ceil() as u64, n + 1, is_unlikely);
             self.at_most(probability)? + tail_from(&distribution, other)
         } else {
-            let other = first(0, mean.floor() as u64 + 1, |outcome| !is_unlikely(outcome));
+            let other = partition_point(0, mean.floor() as u64 + 1, |outcome| !is_unlikely(outcome));
             self.at_least(probability)? + other.checked_sub(1).map_or(0.0, |last| distribution.cdf(last))
         };
         Ok(p.min(1.0))
     }
 
-    /// Probability of this many successes or fewer where each trial succeeds with `probability`.
+    /// Probability of at most this many successes if each trial succeeds with `probability`.
     pub fn at_most(&self, probability: f64) -> Result<f64, StatisticsError> {
         Ok(self.distribution(probability)?.cdf(self.successes))
     }
 
-    /// Probability of this many successes or more where each trial succeeds with `probability`.
+    /// Probability of at least this many successes if each trial succeeds with `probability`.
     pub fn at_least(&self, probability: f64) -> Result<f64, StatisticsError> {
         Ok(tail_from(&self.distribution(probability)?, self.successes))
     }
@@ -88,13 +90,14 @@ impl BinomialCount {
     }
 }
 
-/// Probability of `outcome` or more.
+/// Probability of at least `outcome` successes.
 fn tail_from(distribution: &Binomial, outcome: u64) -> f64 {
     outcome.checked_sub(1).map_or(1.0, |before| distribution.sf(before))
 }
 
-/// First of `low..high` for which `holds`, which does not change back from there on; `high` if none.
-fn first(mut low: u64, mut high: u64, holds: impl Fn(u64) -> bool) -> u64 {
+/// Smallest value in `low..high` for which the monotone predicate `holds` is true, by bisection; `high` if there is
+/// none.
+fn partition_point(mut low: u64, mut high: u64, holds: impl Fn(u64) -> bool) -> u64 {
     while low < high {
         let middle = low + (high - low) / 2;
         if holds(middle) { high = middle } else { low = middle + 1 }
@@ -106,9 +109,9 @@ fn first(mut low: u64, mut high: u64, holds: impl Fn(u64) -> bool) -> u64 {
 mod tests {
     use super::*;
 
-    /// Counts of Rebol, Guetl and Pietroszek 2021, table III, as if their votes were independent.
+    /// Counts of Rebol, Guetl and Pietroszek 2021, table III, with votes treated as independent.
     #[test]
-    fn votes_of_the_paper_have_their_known_probabilities() {
+    fn p_values_of_the_papers_votes_match() {
         let p = |successes, trials| BinomialCount::new(successes, trials).unwrap().test(0.5).unwrap();
         let near = |found: f64, expected: f64| assert!((found - expected).abs() < 5e-4, "{found} {expected}");
         near(p(1050, 2000), 0.027);
@@ -119,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn ends_and_refusals() {
+    fn extreme_counts_and_invalid_arguments() {
         let none = BinomialCount::new(0, 20).unwrap();
         let all = BinomialCount::new(20, 20).unwrap();
         assert_eq!((none.exact(0.95).unwrap().low, all.exact(0.95).unwrap().high), (0.0, 1.0));

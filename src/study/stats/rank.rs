@@ -1,21 +1,21 @@
-//! Ranks and order statistics: Wilcoxon's signed ranks of two paired conditions, Friedman's test of several (pairs and
-//! blocks are participants, independent of each other), a distribution-free interval of the median, as the GENEA challenges
-//! print their ratings (Kucherenko et al. 2021), and Krippendorff's alpha (Krippendorff 2011), the agreement of raters: 1 for
-//! perfect agreement, 0 for chance.
+//! Rank tests and order statistics: Wilcoxon's signed-rank test of two paired conditions, Friedman's test of several
+//! (pairs and blocks are participants, assumed independent), a distribution-free interval of the median as reported by
+//! the GENEA challenges (Kucherenko et al. 2021), and Krippendorff's alpha (Krippendorff 2011), the agreement of
+//! raters: 1 for perfect agreement, 0 for chance.
 
 use super::estimate::{ConfidenceInterval, StatisticsError, at_least, finite, tail};
 use statrs::distribution::{Binomial, ChiSquared, ContinuousCDF, DiscreteCDF, Normal};
 
-/// Outcome of a test by ranks.
+/// Result of a rank test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RankTest {
-    /// Wilcoxon: smaller of the sums of ranks of positive and of negative differences. Friedman: chi-squared.
+    /// Wilcoxon: the smaller of the rank sums of positive and negative differences. Friedman: chi-squared.
     pub statistic: f64,
     /// Two-sided p value.
     pub p: f64,
 }
 
-/// Ranks from 1, tied values with the mean of theirs, and the sizes of the groups of ties.
+/// Ranks from 1, with mean ranks for ties, and the sizes of the groups of tied values.
 fn ranks(values: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
@@ -30,7 +30,8 @@ fn ranks(values: &[f64]) -> (Vec<f64>, Vec<f64>) {
     (ranks, ties)
 }
 
-/// Probability of each sum of a random half of whole numbers: every one of `sizes` is in it with probability 1/2.
+/// Distribution of the sum of a random subset of `sizes`, in which each element is included with probability 1/2;
+/// indexed by the sum.
 fn half_sums(sizes: &[usize]) -> Vec<f64> {
     let mut sums = vec![1.0];
     for size in sizes {
@@ -44,9 +45,12 @@ fn half_sums(sizes: &[usize]) -> Vec<f64> {
     sums
 }
 
-/// Tests whether paired `differences` are symmetric about 0; differences of 0 are left out (Wilcoxon 1945). Exact for up to
-/// 50 differences without ties and zeros and for up to 13 with them, as scipy's `wilcoxon` chooses; else by the normal
-/// distribution with correction for ties, without correction for continuity.
+/// Tests whether paired `differences` are symmetric about 0 (Wilcoxon 1945); zero differences are dropped. Exact for up
+/// to 50 differences without ties and zeros and for up to 13 with them, like scipy's `wilcoxon`; otherwise by the
+/// normal approximation with tie correction, without continuity correction.
+///
+/// # Errors
+/// A difference is not finite, or all differences are 0.
 pub fn signed_rank(differences: &[f64]) -> Result<RankTest, StatisticsError> {
     finite("differences", differences)?;
     let nonzero: Vec<f64> = differences.iter().copied().filter(|difference| *difference != 0.0).collect();
@@ -58,7 +62,7 @@ pub fn signed_rank(differences: &[f64]) -> Result<RankTest, StatisticsError> {
     let statistic = above.min(below);
     let is_plain = nonzero.len() == differences.len() && ties.iter().all(|n| *n == 1.0);
     let p = if differences.len() <= if is_plain { 50 } else { 13 } {
-        // Ranks of ties are halves.
+        // Tied ranks are multiples of one half, so they are doubled.
         let sums = half_sums(&ranks.iter().map(|rank| (2.0 * rank) as usize).collect::<Vec<_>>());
         2.0 * sums.iter().take(1 + (2.0 * statistic) as usize).sum::<f64>()
     } else {
@@ -70,8 +74,12 @@ pub fn signed_rank(differences: &[f64]) -> Result<RankTest, StatisticsError> {
     Ok(RankTest { statistic, p: p.min(1.0) })
 }
 
-/// Tests whether conditions differ, given for each participant one score of each condition (Friedman 1937, corrected
-/// for ties). By the chi-squared distribution, which holds for more than ten participants.
+/// Tests whether conditions differ (Friedman 1937, with tie correction). Each block holds one participant's scores, one
+/// per condition. The p value is from the chi-squared approximation, valid for more than ten participants.
+///
+/// # Errors
+/// There are fewer than two participants or three conditions, a participant's number of scores differs, a score is not
+/// finite, or every participant gives equal scores to all conditions.
 pub fn friedman(blocks: &[Vec<f64>]) -> Result<RankTest, StatisticsError> {
     at_least("participants", 2, blocks.len())?;
     let k = blocks[0].len();
@@ -98,16 +106,21 @@ pub fn friedman(blocks: &[Vec<f64>]) -> Result<RankTest, StatisticsError> {
     Ok(RankTest { statistic, p: distribution.sf(statistic.max(0.0)) })
 }
 
-/// Interval of the median of independent `values`: the narrowest symmetric pair of order statistics that covers the true
-/// median with at least `confidence`, by the binomial distribution of the values below it (Hahn and Meeker 1991, section
-/// 5.2). Exact for any continuous distribution, conservative where values tie. Six values are needed for 95 %.
+/// Interval of the median of independent `values`: the narrowest symmetric pair of order statistics that covers the
+/// true median with at least `confidence`, by the binomial distribution of the number of values below it (Hahn and
+/// Meeker 1991, section 5.2). Exact for continuous distributions, conservative with ties. 95 % confidence needs at
+/// least six values.
+///
+/// # Errors
+/// There are too few values for `confidence`, a value is not finite, or `confidence` is not between 0 and 1.
 pub fn median_interval(values: &[f64], confidence: f64) -> Result<ConfidenceInterval, StatisticsError> {
     let tail = tail(confidence)?;
     finite("values", values)?;
     let n = values.len();
     let too_few = |least| StatisticsError::TooFew { what: "values", least, found: n };
     let below = Binomial::new(0.5, n as u64).map_err(|_| too_few(1))?;
-    // The interval leaves out `outside` values at each end: fewer than or as many lie below the median in a tail.
+    // `outside` values are excluded at each end: it is the largest rank whose cumulative probability does not exceed
+    // the tail.
     let Some(outside) = (0..n.div_ceil(2)).take_while(|rank| below.cdf(*rank as u64) <= tail).last() else {
         return Err(too_few((-tail.log2()).ceil() as usize));
     };
@@ -116,7 +129,7 @@ pub fn median_interval(values: &[f64], confidence: f64) -> Result<ConfidenceInte
     Ok(ConfidenceInterval { low: sorted[outside], high: sorted[n - 1 - outside] })
 }
 
-/// What differences of values mean.
+/// Scale of measurement, which determines the distance of two ratings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MeasurementScale {
     Nominal,
@@ -124,11 +137,14 @@ pub enum MeasurementScale {
     Interval,
 }
 
-/// Alpha of `units`, each with the ratings that it was given. Units that fewer than two rated tell nothing.
+/// Krippendorff's alpha of `units`, each with its ratings. Units with fewer than two ratings are ignored.
+///
+/// # Errors
+/// No unit has two ratings, a rating is not finite, or all ratings are equal.
 pub fn alpha(units: &[Vec<f64>], scale: MeasurementScale) -> Result<f64, StatisticsError> {
     let rated: Vec<&Vec<f64>> = units.iter().filter(|unit| unit.len() > 1).collect();
     at_least("units with two ratings", 1, rated.len())?;
-    // -0 is 0.
+    // Adding 0 turns -0 into 0.
     let mut values: Vec<f64> = rated.iter().flat_map(|unit| unit.iter().map(|value| value + 0.0)).collect();
     finite("ratings", &values)?;
     values.sort_unstable_by(f64::total_cmp);
@@ -148,18 +164,18 @@ pub fn alpha(units: &[Vec<f64>], scale: MeasurementScale) -> Result<f64, Statist
     if expected > 0.0 { Ok(1.0 - observed / expected) } else { Err(StatisticsError::NoSpread { what: "ratings" }) }
 }
 
-/// Squared distance of two of the ascending `values` by their places; `totals` says how often each occurs.
+/// Squared distance between two of the ascending `values`, given by index; `totals` holds the frequency of each value.
 fn squared_distances(scale: MeasurementScale, values: Vec<f64>, totals: &[f64]) -> impl Fn(usize, usize) -> f64 {
     let mut before = 0.0;
-    // Ordinal: ratings below a value and half of those on it.
+    // Ordinal scale: number of ratings below a value plus half of those equal to it.
     let middle = |total: &f64| {
         before += total;
         before - total / 2.0
     };
-    let places = if scale == MeasurementScale::Ordinal { totals.iter().map(middle).collect() } else { values };
+    let positions = if scale == MeasurementScale::Ordinal { totals.iter().map(middle).collect() } else { values };
     move |a, b| match scale {
         MeasurementScale::Nominal => f64::from(u8::from(a != b)),
-        _ => (places[a] - places[b]).powi(2),
+        _ => (positions[a] - positions[b]).powi(2),
     }
 }
 
@@ -168,7 +184,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn refusals() {
+    fn invalid_arguments_are_refused() {
         assert!(matches!(signed_rank(&[0.0; 4]), Err(StatisticsError::TooFew { .. })));
         assert!(signed_rank(&[]).is_err() && signed_rank(&[1.0, f64::NAN]).is_err());
         assert_eq!(signed_rank(&[3.0]), Ok(RankTest { statistic: 0.0, p: 1.0 }));

@@ -1,8 +1,8 @@
 //! Motion of every condition for the clips of one speaker.
 
 use super::cut::StudyClip;
-use super::speaker_source::{SpeakerSource, SpokenPiece};
-use crate::file::{ConditionSource, StudyCondition, filled};
+use super::speaker_source::{SpeakerSource, SpeechSegment};
+use crate::file::{ConditionSource, StudyCondition, fill_pattern};
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array2, Array3, Axis, s};
 use orator_base::motion::{resample, units};
@@ -16,47 +16,48 @@ use orator_gesture::evaluate::clips::checkpoint::EvaluatedCheckpoint;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Frames by which a file of another system may miss the length of its clip.
+/// Tolerance for the length of another system's motion file, frames.
 const SPARE_FRAMES: usize = 2;
 
-/// What a condition shows for the speech of a clip.
+/// Motion that a condition shows for a clip.
 #[derive(Clone, Debug)]
 pub struct ShownMotion {
-    /// Number of the clip that the motion belongs to: another one's in a mismatched condition.
+    /// Index of the clip to which the motion belongs; another clip in mismatched conditions.
     pub of: usize,
     pub motion: Motion,
     pub posture: Option<Posture>,
 }
 
-/// Models of a speaker's conditions, by the conditions' names.
+/// Models of a speaker by condition name.
 pub struct ConditionModels(BTreeMap<String, EvaluatedCheckpoint>);
 
 impl ConditionModels {
     /// Opens the checkpoints of a speaker.
     ///
     /// # Errors
-    /// A path without a checkpoint; the condition is named.
+    /// A checkpoint cannot be opened; the error names the condition.
     pub fn open(conditions: &[StudyCondition], speaker: &str) -> Result<Self> {
         let mut models = BTreeMap::new();
         for condition in conditions {
             let ConditionSource::Checkpoint(path) = &condition.source else { continue };
-            let opened = EvaluatedCheckpoint::open_all(&[filled(path, speaker, "")], speaker);
+            let opened = EvaluatedCheckpoint::open_all(&[fill_pattern(path, speaker, "")], speaker);
             let opened = opened.with_context(|| format!("condition {} of the speaker {speaker}", condition.name))?;
             models.extend(opened.into_iter().map(|model| (condition.name.clone(), model)));
         }
         Ok(Self(models))
     }
 
-    /// Rate of the first model's motion.
+    /// Frame rate of the first model's motion.
     pub fn fps(&self) -> Option<FrameRate> {
         self.0.values().next().map(|model| model.speaker.fps())
     }
 }
 
-/// Motions by condition, then by clip.
+/// Motions by condition, then by clip. `tick` is called after each segment of speech.
 ///
 /// # Errors
-/// A model that gives none, a file of another system that is missing or of another length, too few clips to mismatch.
+/// A model fails, a file of another system is missing or has the wrong length, or there are too few clips for
+/// mismatching.
 pub fn motions(
     source: &SpeakerSource,
     clips: &[StudyClip],
@@ -66,29 +67,29 @@ pub fn motions(
 ) -> Result<BTreeMap<String, Vec<ShownMotion>>> {
     let mut shown: BTreeMap<String, Vec<ShownMotion>> = BTreeMap::new();
     let own = || conditions.iter().filter(|condition| condition.source.mismatch_of().is_none());
-    // Clips of a piece are neighbours: each piece is read, and heard by each model, once.
-    for of_piece in clips.chunk_by(|a, b| a.piece == b.piece) {
-        let piece = source.read(of_piece[0].piece)?;
+    // Clips are sorted by segment, so each segment is read, and processed by each model, only once.
+    for of_segment in clips.chunk_by(|a, b| a.segment == b.segment) {
+        let segment = source.read(of_segment[0].segment)?;
         for condition in own() {
             let of_condition = shown.entry(condition.name.clone()).or_default();
-            let place = || format!("condition {}, speaker {}, {}", condition.name, source.name, piece.name);
-            let whole = whole_motion(source, &piece, condition, models).with_context(place)?;
-            for clip in of_piece {
+            let context = || format!("condition {}, speaker {}, {}", condition.name, source.name, segment.name);
+            let whole = whole_motion(source, &segment, condition, models).with_context(context)?;
+            for clip in of_segment {
                 let of = of_condition.len();
                 of_condition.push(match (&whole, &condition.source) {
                     (Some((motion, posture)), _) => cut(of, motion, posture.as_ref(), clip),
                     (None, ConditionSource::Files(pattern)) => {
-                        let path = filled(pattern, &source.name, &clip.name);
-                        let motion = of_file(&path, source.fps, clip.frames.len()).with_context(place)?;
+                        let path = fill_pattern(pattern, &source.name, &clip.name);
+                        let motion = of_file(&path, source.fps, clip.frames.len()).with_context(context)?;
                         ShownMotion { of, motion, posture: None }
                     }
-                    (None, _) => constant(of, source, clip.frames.len()).with_context(place)?,
+                    (None, _) => constant(of, source, clip.frames.len()).with_context(context)?,
                 });
             }
         }
         tick();
     }
-    let others = other_clips(clips);
+    let others = mismatched_clips(clips);
     for condition in conditions {
         let Some(of) = condition.source.mismatch_of() else { continue };
         let (name, n) = (&source.name, clips.len());
@@ -98,40 +99,44 @@ pub fn motions(
             condition.name
         );
         let matched = shown.get(of).with_context(|| format!("condition {}: no condition {of}", condition.name))?;
-        let turned = others.iter().map(|other| matched[*other].clone()).collect();
-        shown.insert(condition.name.clone(), turned);
+        let mismatched = others.iter().map(|other| matched[*other].clone()).collect();
+        shown.insert(condition.name.clone(), mismatched);
     }
     Ok(shown)
 }
 
-/// Motion of a condition for a whole piece of speech; `None` of one that is made clip by clip.
+/// Motion of a condition for an entire segment; `None` for conditions whose motion is created per clip.
 fn whole_motion(
     source: &SpeakerSource,
-    piece: &SpokenPiece,
+    segment: &SpeechSegment,
     condition: &StudyCondition,
     models: &ConditionModels,
 ) -> Result<Option<(Motion, Option<Posture>)>> {
     match &condition.source {
         ConditionSource::Natural => {
-            let natural = piece.natural.clone().context("it has no natural motion: give the speaker a dataset")?;
+            let natural = segment.natural.clone().context("it has no natural motion: give the speaker a dataset")?;
             Ok(Some(natural))
         }
         ConditionSource::Checkpoint(_) => {
             let model = models.0.get(&condition.name).context("no model is open")?;
-            Ok(Some(generated(model, piece, source.fps)?))
+            Ok(Some(generated(model, segment, source.fps)?))
         }
         ConditionSource::MeanPose | ConditionSource::Files(_) | ConditionSource::Mismatched(_) => Ok(None),
     }
 }
 
-/// Motion that a model makes of a piece of speech, at `fps`.
-fn generated(model: &EvaluatedCheckpoint, piece: &SpokenPiece, fps: FrameRate) -> Result<(Motion, Option<Posture>)> {
-    let (own, n_frames) = (model.speaker.fps(), piece.n_frames);
+/// Motion generated by a model for a segment of speech, at `fps`.
+fn generated(
+    model: &EvaluatedCheckpoint,
+    segment: &SpeechSegment,
+    fps: FrameRate,
+) -> Result<(Motion, Option<Posture>)> {
+    let (own, n_frames) = (model.speaker.fps(), segment.n_frames);
     if own == fps || model.speaker.is_captured() {
-        return model.motion(&piece.sound, &piece.words, n_frames, fps);
+        return model.motion(&segment.sound, &segment.words, n_frames, fps);
     }
     let n_own = own.frames_in(fps.secs(n_frames.saturating_sub(1))) + 1;
-    let (motion, posture) = model.motion(&piece.sound, &piece.words, n_own, own)?;
+    let (motion, posture) = model.motion(&segment.sound, &segment.words, n_own, own)?;
     let nearest = |frame: usize| ((fps.secs(frame) * own.per_sec()).round() as usize).min(n_own - 1);
     let posture = posture.map(|posture| {
         let frames: Vec<usize> = (0..n_frames).map(nearest).collect();
@@ -150,7 +155,7 @@ fn cut(of: usize, motion: &Motion, posture: Option<&Posture>, clip: &StudyClip) 
     ShownMotion { of, motion, posture: posture.map(|posture| posture.slice(frames)) }
 }
 
-/// Mean pose of the training split, unmoved.
+/// Static mean pose of the training split.
 fn constant(of: usize, source: &SpeakerSource, n_frames: usize) -> Result<ShownMotion> {
     let dataset: &Dataset = source.dataset.as_ref().context("a mean pose needs a dataset: give the speaker one")?;
     let stats = dataset.stats();
@@ -170,7 +175,7 @@ fn constant(of: usize, source: &SpeakerSource, n_frames: usize) -> Result<ShownM
     Ok(ShownMotion { of, motion: Motion::from_joints(source.fps, joints), posture })
 }
 
-/// Motion of a file of another system, which is as long as its clip.
+/// Reads the motion file of another system, which must be as long as its clip up to [`SPARE_FRAMES`].
 fn of_file(path: &Path, fps: FrameRate, n_frames: usize) -> Result<Motion> {
     let read = motion_file::read(path, Some(fps))?.motion;
     units::check(&read).with_context(|| path.display().to_string())?;
@@ -187,18 +192,18 @@ fn of_file(path: &Path, fps: FrameRate, n_frames: usize) -> Result<Motion> {
     Ok(Motion { fps, joints, mask })
 }
 
-/// For each clip the number of another one, of another piece of speech where there are enough; each once.
-fn other_clips(clips: &[StudyClip]) -> Vec<usize> {
+/// For each clip the index of a different one, from another segment if possible; a permutation (a rotation).
+fn mismatched_clips(clips: &[StudyClip]) -> Vec<usize> {
     let n = clips.len();
-    let n_near = |shift: &usize| (0..n).filter(|at| clips[*at].piece == clips[(at + shift) % n].piece).count();
+    let n_near = |shift: &usize| (0..n).filter(|at| clips[*at].segment == clips[(at + shift) % n].segment).count();
     let shift = (1..n).min_by_key(n_near).unwrap_or(0);
     (0..n).map(|at| (at + shift) % n.max(1)).collect()
 }
 
-/// Samples of the sound that belong to a clip.
-pub fn sound_of(piece: &SpokenPiece, clip: &StudyClip, fps: FrameRate) -> Vec<f32> {
-    let range = samples_of(fps, piece.sound.rate, clip.frames.clone());
-    let mut samples = piece.sound.samples.get(range.start..).unwrap_or_default().to_vec();
+/// Sound samples of a clip, zero-padded at the end of the segment.
+pub fn sound_of(segment: &SpeechSegment, clip: &StudyClip, fps: FrameRate) -> Vec<f32> {
+    let range = samples_of(fps, segment.sound.rate, clip.frames.clone());
+    let mut samples = segment.sound.samples.get(range.start..).unwrap_or_default().to_vec();
     samples.resize(range.len(), 0.0);
     samples
 }
@@ -208,14 +213,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_mismatched_clip_is_another_ones_and_of_another_talk_where_there_is_one() {
-        let clip = |piece: usize| StudyClip { name: String::new(), piece, frames: 0..9, cut_db: 0.0, unseen: 0.0 };
-        let of = |pieces: &[usize]| other_clips(&pieces.iter().map(|piece| clip(*piece)).collect::<Vec<_>>());
+    fn mismatched_clips_differ_and_come_from_other_segments_if_possible() {
+        let clip = |segment: usize| StudyClip { name: String::new(), segment, frames: 0..9, cut_db: 0.0, unseen: 0.0 };
+        let of =
+            |segments: &[usize]| mismatched_clips(&segments.iter().map(|segment| clip(*segment)).collect::<Vec<_>>());
         assert_eq!(of(&[0, 0, 1, 1]), [2, 3, 0, 1]);
         assert_eq!(of(&[0, 0, 0]), [1, 2, 0]);
-        let pieces = [0, 0, 0, 1, 2, 2];
-        let others = of(&pieces);
+        let segments = [0, 0, 0, 1, 2, 2];
+        let others = of(&segments);
         assert!((0..6).all(|at| others[at] != at && others.contains(&at)));
-        assert!((0..6).all(|at| pieces[at] != pieces[others[at]]), "{others:?}");
+        assert!((0..6).all(|at| segments[at] != segments[others[at]]), "{others:?}");
     }
 }

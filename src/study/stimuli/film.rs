@@ -1,5 +1,5 @@
-//! One film: the faceless avatar alone before a plain backdrop, with the sound of its clip, and in an attention check a
-//! number. Every film of a study has the same size, rate and length; its mouth does not move.
+//! Renders one film: the faceless avatar before a plain backdrop with the sound of its clip, and a number in attention
+//! checks. All films of a study have the same size, rate and length; the mouth does not move.
 
 use crate::plan::{FilmContent, FilmSound};
 use anyhow::{Result, ensure};
@@ -11,33 +11,34 @@ use orator_media::ffmpeg::write::encode::{VideoWriter, has_h264};
 use orator_media::opencv::draw;
 use std::path::Path;
 
-/// Width and height of the pictures of a study, px.
+/// Width and height of the films of a study, px.
 pub const SIZE: [usize; 2] = [800, 600];
-/// Where all films of a study are seen from.
+/// Camera of all films of a study.
 pub const CAMERA: FilmCamera = FilmCamera::Front;
-/// What the keys of names are made for.
-const NAMES: &str = "orator study 2026 names of films";
-/// Raised where the same content gives other bytes.
+/// Key derivation context of the film names.
+const NAME_CONTEXT: &str = "orator study 2026 names of films";
+/// Incremented when the same content gives different bytes.
 const VERSION: u32 = 1;
-/// Constant rate factor. Equal quality, not an equal bit rate: at an equal rate lively motion would look worse.
+/// Constant rate factor. Films have equal quality rather than equal bit rate, which would degrade lively motion.
 const CRF: u32 = 20;
-/// Height of the number's digits, of the picture's, and the border of its plate, of the digits'.
-const DIGITS: f32 = 0.18;
-const BORDER: f32 = 0.27;
+/// Height of the digits as a fraction of the picture height, and margin of the plate as a fraction of the digit height.
+const DIGIT_HEIGHT: f32 = 0.18;
+const PLATE_MARGIN: f32 = 0.27;
 
-/// What a film shows and lets hear.
+/// Content of a film.
 pub struct FilmScene<'a> {
     pub performance: &'a Performance,
     pub stage: &'a AvatarStage,
-    /// Sound, as long as the film; `None`: it is silent.
+    /// Sound as long as the film; `None` for a silent film.
     pub sound: Option<&'a Sound>,
-    /// Number that is shown in the middle third.
+    /// Number displayed during the middle third.
     pub number: Option<u16>,
 }
 
-/// Name of the film of that content in the study of that seed: 16 hexadecimal digits of a keyed hash, which tell nothing.
+/// Opaque name of the film with this content: 16 hexadecimal digits of a hash keyed by the seed, which do not reveal
+/// the content.
 pub fn film_name(seed: u64, content: &FilmContent) -> String {
-    let key = blake3::derive_key(NAMES, &seed.to_le_bytes());
+    let key = blake3::derive_key(NAME_CONTEXT, &seed.to_le_bytes());
     let FilmContent { clip, speaker, condition, motion_of, number, sound } = content;
     let number = number.map_or(String::new(), |number| number.to_string());
     let sound = match sound {
@@ -47,16 +48,16 @@ pub fn film_name(seed: u64, content: &FilmContent) -> String {
     };
     let mut hasher = blake3::Hasher::new_keyed(&key);
     for part in [clip.as_str(), speaker, condition, motion_of, &number, sound] {
-        // The length keeps neighbouring parts apart.
+        // The length prefix makes the concatenation of parts unambiguous.
         hasher.update(&(part.len() as u64).to_le_bytes()).update(part.as_bytes());
     }
     hasher.finalize().to_hex().as_str()[..16].to_owned()
 }
 
-/// That films can be written which browsers play.
+/// Checks that H.264 films, which browsers play, can be written.
 ///
 /// # Errors
-/// An ffmpeg without libx264.
+/// ffmpeg has no libx264.
 pub fn check_encoder() -> Result<()> {
     ensure!(
         has_h264(),
@@ -66,7 +67,7 @@ pub fn check_encoder() -> Result<()> {
 }
 
 impl FilmScene<'_> {
-    /// Hash of all that the bytes of the film follow from.
+    /// Hash of the inputs in which films differ: number, rate, camera, skeleton, motion and sound samples.
     pub fn hash(&self) -> String {
         let mut hasher = blake3::Hasher::new();
         let mut numbers = |values: &[f64]| {
@@ -90,7 +91,7 @@ impl FilmScene<'_> {
         hasher.finalize().to_hex().to_string()
     }
 
-    /// Writes the mp4, in place.
+    /// Writes the mp4 directly to `path`, not atomically.
     pub fn write(&self, path: &Path) -> Result<()> {
         let clip = &self.performance.clip;
         let mut view = AvatarView::on(self.stage, self.performance);
@@ -106,13 +107,13 @@ impl FilmScene<'_> {
     }
 }
 
-/// Draws the number on a plate in the middle of the picture.
+/// Draws the number on a plate in the centre of the picture.
 fn draw_number(image: &mut Image, number: u16) -> Result<()> {
     let text = number.to_string();
-    let digits = DIGITS * image.height as f32;
+    let digits = DIGIT_HEIGHT * image.height as f32;
     let width = draw::text_width(&text, digits)?;
     let [x, y] = [image.width as f32 / 2.0, image.height as f32 / 2.0];
-    let [half, tall] = [width, digits].map(|length| length / 2.0 + BORDER * digits);
+    let [half, tall] = [width, digits].map(|length| length / 2.0 + PLATE_MARGIN * digits);
     draw::polygon(
         image,
         &[[x - half, y - tall], [x + half, y - tall], [x + half, y + tall], [x - half, y + tall]],

@@ -1,9 +1,9 @@
-//! Films of a study: speech is cut into clips at its pauses, each condition's motion of a clip is put on one rig under one
-//! mask, and each film is written so that nothing but its motion tells the condition.
+//! Films of a study: speech is cut into clips at pauses, the motions of all conditions are put on one rig with the same
+//! visibility, and films are written so that only their motion reveals the condition.
 
-pub mod alike;
+pub mod common_motion;
 pub mod condition_motion;
 pub mod cut;
 pub mod film;
-pub mod filmed;
+pub mod filmed_speaker;
 pub mod speaker_source;

@@ -1,4 +1,4 @@
-//! Speech of a speaker: intervals of a dataset, or sound files. What is read is kept only as long as it is looked at.
+//! Speech of a speaker: intervals of a dataset, or sound files. Data are read on demand and not cached.
 
 use anyhow::{Context, Result, bail, ensure};
 use orator_base::types::pose3d::Motion;
@@ -13,44 +13,44 @@ use orator_formats::transcript::{Transcript, Word};
 use orator_media::ffmpeg::audio;
 use std::path::{Path, PathBuf};
 
-/// Where the speech of one speaker comes from.
+/// Source of the speech of one speaker.
 pub struct SpeakerSource {
     pub name: String,
-    /// Rate of the motion.
+    /// Frame rate of the motion.
     pub fps: FrameRate,
-    /// Bones of the speaker, metres, 0 where they are not known; none of a speaker without a dataset.
+    /// Bone lengths of the speaker, metres, 0 if unknown; empty without a dataset.
     pub bone_lengths: Vec<f32>,
     pub dataset: Option<Dataset>,
-    pieces: Vec<Piece>,
+    segments: Vec<Segment>,
 }
 
-/// Continuous piece of speech.
-struct Piece {
+/// Continuous segment of speech.
+struct Segment {
     name: String,
-    place: Place,
+    location: SegmentLocation,
 }
 
-enum Place {
+enum SegmentLocation {
     Sample(Box<SampleRef>),
     File(PathBuf),
 }
 
-/// A piece of speech in memory.
-pub struct SpokenPiece {
-    /// Name, once among those of the speaker.
+/// Segment of speech in memory.
+pub struct SpeechSegment {
+    /// Name, unique for the speaker.
     pub name: String,
     pub sound: Sound,
-    /// Words with their times from the beginning of the sound.
+    /// Words with times relative to the start of the sound.
     pub words: Vec<Word>,
     pub n_frames: usize,
     pub natural: Option<(Motion, Option<Posture>)>,
 }
 
 impl SpeakerSource {
-    /// Intervals of a split of the dataset at `dir`.
+    /// Source with the intervals of a split of the dataset at `dir`.
     ///
     /// # Errors
-    /// No dataset, or none of its intervals in that split.
+    /// There is no dataset, or it has no interval in that split.
     pub fn of_dataset(name: &str, dir: &Path, split: Split) -> Result<Self> {
         let dataset = Dataset::open(dir)?;
         let samples = dataset.samples(split);
@@ -64,15 +64,18 @@ impl SpeakerSource {
             );
         }
         let bone_lengths = dataset.info().bone_lengths_metres.iter().map(|metres| *metres as f32).collect();
-        let piece = |sample: SampleRef| Piece { name: sample.key.to_string(), place: Place::Sample(Box::new(sample)) };
-        let pieces = samples.into_iter().map(piece).collect();
-        Ok(Self { name: name.to_owned(), fps: dataset.info().fps, bone_lengths, dataset: Some(dataset), pieces })
+        let segment = |sample: SampleRef| Segment {
+            name: sample.key.to_string(),
+            location: SegmentLocation::Sample(Box::new(sample)),
+        };
+        let segments = samples.into_iter().map(segment).collect();
+        Ok(Self { name: name.to_owned(), fps: dataset.info().fps, bone_lengths, dataset: Some(dataset), segments })
     }
 
-    /// Sound files that `pattern` names, with the transcripts beside them, for motion at `fps`.
+    /// Source with the sound files that match `pattern` and the transcripts next to them, for motion at `fps`.
     ///
     /// # Errors
-    /// No file; two of one name.
+    /// No file matches, or two have the same name.
     pub fn of_sounds(name: &str, pattern: &Path, fps: FrameRate) -> Result<Self> {
         let (mut missing, entry) = (Vec::new(), pattern.to_string_lossy());
         let root = SearchRoot::new(Path::new("/"), &[]);
@@ -80,28 +83,35 @@ impl SpeakerSource {
         let mut files = found.with_context(|| format!("sounds of the speaker {name}"))?;
         ensure!(missing.is_empty(), "sounds of the speaker {name}: {}", missing.join("; "));
         files.sort();
-        let mut pieces: Vec<Piece> = Vec::new();
+        let mut segments: Vec<Segment> = Vec::new();
         for file in files {
             let stem = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-            let twice = pieces.iter().any(|piece| piece.name == stem);
-            ensure!(!twice, "{}: two sounds of the speaker {name} are called {stem}; rename one", file.display());
-            pieces.push(Piece { name: stem, place: Place::File(file) });
+            let is_duplicate = segments.iter().any(|segment| segment.name == stem);
+            ensure!(
+                !is_duplicate,
+                "{}: two sounds of the speaker {name} are called {stem}; rename one",
+                file.display()
+            );
+            segments.push(Segment { name: stem, location: SegmentLocation::File(file) });
         }
-        Ok(Self { name: name.to_owned(), fps, bone_lengths: Vec::new(), dataset: None, pieces })
+        Ok(Self { name: name.to_owned(), fps, bone_lengths: Vec::new(), dataset: None, segments })
     }
 
-    pub fn n_pieces(&self) -> usize {
-        self.pieces.len()
+    pub fn n_segments(&self) -> usize {
+        self.segments.len()
     }
 
-    /// Reads a piece.
-    pub fn read(&self, piece: usize) -> Result<SpokenPiece> {
-        let Piece { name, place } = &self.pieces[piece];
-        match (place, &self.dataset) {
-            (Place::Sample(sample), Some(dataset)) => {
+    /// Reads the segment with this index.
+    ///
+    /// # Errors
+    /// The segment's sound, motion or transcript cannot be read.
+    pub fn read(&self, segment: usize) -> Result<SpeechSegment> {
+        let Segment { name, location } = &self.segments[segment];
+        match (location, &self.dataset) {
+            (SegmentLocation::Sample(sample), Some(dataset)) => {
                 let sample = dataset.read(sample)?;
                 let n_frames = sample.n_frames();
-                Ok(SpokenPiece {
+                Ok(SpeechSegment {
                     name: name.clone(),
                     sound: sample.sound,
                     words: sample.words.unwrap_or_default(),
@@ -109,19 +119,19 @@ impl SpeakerSource {
                     natural: Some((sample.motion, sample.posture)),
                 })
             }
-            (Place::File(file), _) => {
+            (SegmentLocation::File(file), _) => {
                 let sound = audio::read_sound(file)?;
                 let words = transcript_beside(file).map(|path| Transcript::read(&path)).transpose()?;
                 let n_frames = (sound.secs() * self.fps.per_sec() + 1e-6) as usize;
                 let words = words.map(|transcript| transcript.words).unwrap_or_default();
-                Ok(SpokenPiece { name: name.clone(), sound, words, n_frames, natural: None })
+                Ok(SpeechSegment { name: name.clone(), sound, words, n_frames, natural: None })
             }
-            (Place::Sample(_), None) => bail!("{name}: its dataset is closed"),
+            (SegmentLocation::Sample(_), None) => bail!("{name}: its dataset is closed"),
         }
     }
 }
 
-/// Transcript of the sound's own name in its folder.
+/// Transcript with the sound's file name in the same folder.
 fn transcript_beside(sound: &Path) -> Option<PathBuf> {
     TRANSCRIPT_EXTENSIONS.iter().map(|ending| sound.with_extension(ending)).find(|path| path.is_file())
 }

@@ -1,80 +1,84 @@
-//! Answers: each trial has one, in the order of the session, and it stays as it was given.
+//! Stored answers: one per trial, in the order of the session, never changed.
 
 use super::participants::{Participant, Status, find};
 use crate::vote::Response;
 use rusqlite::{Connection, OptionalExtension, Row, params};
 use serde::{Deserialize, Serialize};
 
-/// Answer to a trial as a page sends it.
+/// Answer to a trial as sent by a page.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct GivenAnswer {
+pub struct SubmittedAnswer {
     /// Index of the trial in its session.
     pub position: u32,
     pub response: Response,
-    /// How often the films were played.
+    /// Number of times the films were played.
     pub plays: u32,
-    /// Seconds in which a film had stopped for want of data.
+    /// Seconds during which playback was stalled for lack of data.
     pub stalled_secs: f64,
-    /// Seconds in which the page was not in front.
+    /// Seconds during which the page was hidden or unfocused.
     pub unfocused_secs: f64,
     /// Seconds from the end of the films to the answer.
     pub response_secs: f64,
 }
 
-/// What a trial asks of its answer.
+/// Properties of a trial that decide how its answer is recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TrialTerms {
-    /// Milliseconds from the trial's first appearance before which its films cannot have been seen.
+    /// Session of the trial. A participant who began anew may have another one than an earlier token names.
+    pub session: u32,
+    /// Minimum time from the first presentation of the trial to its answer, milliseconds: before, its films cannot have
+    /// been watched.
     pub least_ms: i64,
-    /// Whether it is the session's last.
+    /// Whether the trial is the last of its session.
     pub is_last: bool,
     /// Whether the answer fails an attention check.
     pub fails_check: bool,
 }
 
-/// What became of an answer.
+/// Result of recording an answer.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Recorded {
-    /// Stored, now or before; where the participant stands.
+pub enum RecordOutcome {
+    /// The answer is stored, now or earlier; current state of the participant.
     Stored(Participant),
-    /// No participant of that name: withdrawn.
+    /// The participant is unknown in this session: withdrawn, or deleted before the first answer.
     Unknown,
-    /// The place was given to another.
+    /// The session was reassigned to another participant.
     Replaced,
-    /// Another answer is stored at its position.
+    /// A different answer is stored at this position.
     Differs,
-    /// The trial has not been given out yet.
+    /// The trial has not been presented yet.
     OutOfTurn,
-    /// Films cannot have been seen yet; milliseconds until then.
+    /// The films cannot have been watched yet; remaining milliseconds.
     TooSoon(i64),
 }
 
 /// Stores `answer` of the participant `id`.
 ///
 /// # Errors
-/// A database that fails; nothing is stored.
+/// The database fails; nothing is stored.
 pub fn record(
     db: &Connection,
     id: &str,
-    answer: &GivenAnswer,
+    answer: &SubmittedAnswer,
     terms: TrialTerms,
     now_ms: i64,
-) -> rusqlite::Result<Recorded> {
-    let Some(participant) = find(db, id)? else { return Ok(Recorded::Unknown) };
+) -> rusqlite::Result<RecordOutcome> {
+    let found = find(db, id)?.filter(|participant| participant.session == terms.session);
+    let Some(participant) = found else { return Ok(RecordOutcome::Unknown) };
     if answer.position < participant.position {
         let is_same = at(db, id, answer.position)?.is_some_and(|stored| stored == *answer);
-        return Ok(if is_same { Recorded::Stored(participant) } else { Recorded::Differs });
+        return Ok(if is_same { RecordOutcome::Stored(participant) } else { RecordOutcome::Differs });
     }
     if participant.status == Status::Replaced {
-        return Ok(Recorded::Replaced);
+        return Ok(RecordOutcome::Replaced);
     }
     if answer.position > participant.position || participant.status == Status::Completed {
-        return Ok(Recorded::OutOfTurn);
+        return Ok(RecordOutcome::OutOfTurn);
     }
     let left_ms = terms.least_ms - (now_ms - participant.given_ms);
     if left_ms > 0 {
-        return Ok(Recorded::TooSoon(left_ms));
+        return Ok(RecordOutcome::TooSoon(left_ms));
     }
     insert(db, id, answer)?;
     let after = Participant {
@@ -86,14 +90,14 @@ pub fn record(
     };
     let sql = "UPDATE participant SET position = ?2, given_ms = ?3, failed_checks = ?4, status = ?5 WHERE id = ?1";
     db.execute(sql, params![id, after.position, after.given_ms, after.failed_checks, after.status])?;
-    Ok(Recorded::Stored(after))
+    Ok(RecordOutcome::Stored(after))
 }
 
-/// Adds the row of an answer.
+/// Inserts the row of an answer.
 ///
 /// # Errors
-/// A database that fails, or an answer at that position.
-pub fn insert(db: &Connection, id: &str, answer: &GivenAnswer) -> rusqlite::Result<()> {
+/// The database fails, or an answer exists at that position.
+pub fn insert(db: &Connection, id: &str, answer: &SubmittedAnswer) -> rusqlite::Result<()> {
     let response = serde_json::to_string(&answer.response).unwrap_or_default();
     let sql = "INSERT INTO answer VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)";
     let secs = [answer.stalled_secs, answer.unfocused_secs, answer.response_secs];
@@ -102,10 +106,10 @@ pub fn insert(db: &Connection, id: &str, answer: &GivenAnswer) -> rusqlite::Resu
 
 const COLUMNS: &str = "position, response, plays, stalled_secs, unfocused_secs, response_secs";
 
-fn of_row(row: &Row) -> rusqlite::Result<GivenAnswer> {
+fn of_row(row: &Row) -> rusqlite::Result<SubmittedAnswer> {
     let response: String = row.get(1)?;
     let unreadable = |error| rusqlite::Error::FromSqlConversionFailure(1, rusqlite::types::Type::Text, Box::new(error));
-    Ok(GivenAnswer {
+    Ok(SubmittedAnswer {
         position: row.get(0)?,
         response: serde_json::from_str(&response).map_err(unreadable)?,
         plays: row.get(2)?,
@@ -115,25 +119,25 @@ fn of_row(row: &Row) -> rusqlite::Result<GivenAnswer> {
     })
 }
 
-fn at(db: &Connection, id: &str, position: u32) -> rusqlite::Result<Option<GivenAnswer>> {
+fn at(db: &Connection, id: &str, position: u32) -> rusqlite::Result<Option<SubmittedAnswer>> {
     let sql = format!("SELECT {COLUMNS} FROM answer WHERE participant = ?1 AND position = ?2");
     db.query_row(&sql, params![id, position], of_row).optional()
 }
 
-/// Answers of a participant in the order of the session.
-pub fn of(db: &Connection, id: &str) -> rusqlite::Result<Vec<GivenAnswer>> {
+/// Answers of a participant by position.
+pub fn of(db: &Connection, id: &str) -> rusqlite::Result<Vec<SubmittedAnswer>> {
     let sql = format!("SELECT {COLUMNS} FROM answer WHERE participant = ?1 ORDER BY position");
     db.prepare(&sql)?.query_map([id], of_row)?.collect()
 }
 
-/// Answers whose films stopped for want of data, and for how long.
+/// Number and total duration of stalls.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct StallCount {
     pub trials: u32,
     pub secs: f64,
 }
 
-/// Counts the answers whose films stopped.
+/// Counts the answers with stalled films.
 pub fn stalls(db: &Connection) -> rusqlite::Result<StallCount> {
     let sql = "SELECT COUNT(*), TOTAL(stalled_secs) FROM answer WHERE stalled_secs > 0";
     db.query_row(sql, [], |row| Ok(StallCount { trials: row.get(0)?, secs: row.get(1)? }))

@@ -1,15 +1,15 @@
-//! The database's file: its tables, how it is opened, and how what was deleted is erased from its bytes.
+//! SQLite file of the responses: its tables, opening, and secure erasure of deleted rows.
 
 use anyhow::{Context, Result, ensure};
 use rusqlite::{Connection, OpenFlags, OptionalExtension, params};
 use std::path::Path;
 use std::time::Duration;
 
-/// Time that a writer waits for a reader of another process, and the reverse.
-const PATIENCE: Duration = Duration::from_secs(10);
+/// Time that a connection waits for locks of other processes.
+const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Times are milliseconds since 1970. `position`: the number of answers, which is the index of the next trial;
-/// `given_ms`: when that trial was first given out. `status`: see [`super::participants::Status`].
+/// Times are milliseconds since 1970. `position`: number of answers, which is the index of the next trial; `given_ms`:
+/// when that trial was first presented. `status`: see [`super::participants::Status`].
 const TABLES: &str = "
     CREATE TABLE IF NOT EXISTS about (name TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT, WITHOUT ROWID;
     CREATE TABLE IF NOT EXISTS participant (
@@ -24,52 +24,53 @@ const TABLES: &str = "
     ) STRICT, WITHOUT ROWID;
     INSERT OR IGNORE INTO about VALUES ('withdrawn', '0');";
 
-/// Opens the database at `path` to write, made if missing. `plan`: hash of the plan that its sessions belong to.
+/// Opens the database at `path` for writing and creates it if missing. `plan`: hash of the plan to which its sessions
+/// belong.
 ///
 /// # Errors
-/// No database, one that cannot be written, or one of another plan.
+/// The file is not a database, cannot be written, or belongs to another plan.
 pub fn open(path: &Path, plan: &str) -> Result<Connection> {
     let opened = || -> Result<Connection> {
         let db = Connection::open(path)?;
-        db.busy_timeout(PATIENCE)?;
+        db.busy_timeout(BUSY_TIMEOUT)?;
         db.pragma_update(None, "secure_delete", true)?;
         db.pragma_update(None, "temp_store", "memory")?;
         let mode: String = db.query_row("PRAGMA journal_mode = wal", [], |row| row.get(0))?;
         ensure!(mode == "wal", "its file system cannot hold a write-ahead log (mode {mode}); use a local disk");
-        // A commit is over when its bytes are on the disk.
+        // A commit returns after its data have been flushed to disk.
         db.pragma_update(None, "synchronous", "full")?;
         db.execute_batch(TABLES)?;
         db.execute("INSERT OR IGNORE INTO about VALUES ('plan', ?1)", [plan])?;
         let of: String = db.query_row("SELECT value FROM about WHERE name = 'plan'", [], |row| row.get(0))?;
         ensure!(of == plan, "its responses belong to another plan than plan.json; move it away to begin anew");
-        // A withdrawal that a kill cut short of its erasure.
+        // Completes the erasure of a withdrawal that was interrupted by a kill.
         erase_deleted(&db)?;
         Ok(db)
     };
     opened().with_context(|| format!("cannot open {}", path.display()))
 }
 
-/// Opens the database at `path` to read, beside a server that writes it.
+/// Opens the database at `path` for reading, while a server may be writing it.
 ///
 /// # Errors
-/// No database there.
-pub fn open_to_read(path: &Path) -> Result<Connection> {
+/// There is no database at `path`.
+pub fn open_for_reading(path: &Path) -> Result<Connection> {
     ensure!(path.is_file(), "{} is not there: nobody has taken part yet", path.display());
-    // Writable, because a reader, too, takes a killed server's log into the database.
+    // Writable, because a reader also has to recover the write-ahead log of a killed server.
     let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     let opened = || -> rusqlite::Result<Connection> {
         let db = Connection::open_with_flags(path, flags)?;
-        db.busy_timeout(PATIENCE)?;
+        db.busy_timeout(BUSY_TIMEOUT)?;
         db.query_row("SELECT value FROM about WHERE name = 'plan'", [], |row| row.get::<_, String>(0)).optional()?;
         Ok(db)
     };
     opened().with_context(|| format!("cannot read {}: is it the database of `orator study serve`?", path.display()))
 }
 
-/// Writes the database anew and empties its log, so that no byte of deleted rows is left in either.
+/// Rebuilds the database and truncates its log, so that neither contains bytes of deleted rows.
 ///
 /// # Errors
-/// A full disk, or a reader that does not end.
+/// The disk is full, or a reader blocks the checkpoint.
 pub fn erase_deleted(db: &Connection) -> rusqlite::Result<()> {
     db.execute_batch("VACUUM")?;
     let is_busy: bool = db.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |row| row.get(0))?;
@@ -80,7 +81,7 @@ pub fn erase_deleted(db: &Connection) -> rusqlite::Result<()> {
     Ok(())
 }
 
-/// Adds one to a count of the table `about`.
-pub fn count_up(db: &Connection, name: &str) -> rusqlite::Result<()> {
+/// Increments a counter of the table `about`.
+pub fn increment(db: &Connection, name: &str) -> rusqlite::Result<()> {
     db.execute("UPDATE about SET value = value + 1 WHERE name = ?1", params![name]).map(drop)
 }

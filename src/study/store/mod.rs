@@ -1,5 +1,5 @@
-//! Responses on the disk, an SQLite database: one thread writes, and what comes in while it commits is one commit more.
-//! Who was answered "stored" is stored, whatever happens to the program or the machine.
+//! Storage of the responses in an SQLite database. A single thread writes; requests that arrive during a commit are
+//! batched into the next one. An acknowledged response is durable, whatever happens to the process or the machine.
 
 pub mod answers;
 pub mod database;

@@ -1,33 +1,34 @@
-//! Who takes part: places are given out in the plan's order, those of who left are given again.
+//! Participants: sessions are assigned in the plan's order, and those of participants who left are reassigned. A
+//! participant without answers who loses the session is deleted, so that requests to begin cannot fill the database.
 
-use super::database::count_up;
+use super::database::increment;
 use rusqlite::types::{FromSql, FromSqlError, FromSqlResult, ToSql, ToSqlOutput, ValueRef};
 use rusqlite::{Connection, OptionalExtension, Row, params};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What recruiting sites give along (Prolific, Mechanical Turk).
+/// URL parameters of recruiting sites (Prolific, Mechanical Turk).
 pub const PARAMETERS: [&str; 6] = ["PROLIFIC_PID", "STUDY_ID", "SESSION_ID", "workerId", "assignmentId", "hitId"];
 
-/// Those of them that are the ID of a person.
-const PERSON: [&str; 2] = ["PROLIFIC_PID", "workerId"];
+/// Parameters that identify a person.
+const PERSON_IDS: [&str; 2] = ["PROLIFIC_PID", "workerId"];
 
-/// Where a participant stands.
+/// Status of a participant's session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Status {
-    /// Answers; or has stopped to, and may go on until the place is given to another.
+    /// In progress; an abandoned session stays active until it is reassigned.
     Active,
-    /// Answered every trial.
+    /// Every trial is answered.
     Completed,
-    /// Had stopped to answer, and the place was given to another.
+    /// Abandoned after an answer and reassigned to another participant.
     Replaced,
 }
 
 impl Status {
     const ALL: [Self; 3] = [Self::Active, Self::Completed, Self::Replaced];
 
-    /// Word in the database and in exports.
-    pub fn word(self) -> &'static str {
+    /// Name in the database and in exports.
+    pub fn name(self) -> &'static str {
         match self {
             Self::Active => "active",
             Self::Completed => "completed",
@@ -38,36 +39,36 @@ impl Status {
 
 impl ToSql for Status {
     fn to_sql(&self) -> rusqlite::Result<ToSqlOutput<'_>> {
-        Ok(self.word().into())
+        Ok(self.name().into())
     }
 }
 
 impl FromSql for Status {
     fn column_result(value: ValueRef<'_>) -> FromSqlResult<Self> {
-        let word = value.as_str()?;
-        Self::ALL.into_iter().find(|status| status.word() == word).ok_or(FromSqlError::InvalidType)
+        let name = value.as_str()?;
+        Self::ALL.into_iter().find(|status| status.name() == name).ok_or(FromSqlError::InvalidType)
     }
 }
 
 /// Participant as stored.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Participant {
-    /// Random name.
+    /// Random identifier, or the one derived from the page's attempt to begin.
     pub id: String,
     /// Index into the plan's sessions.
     pub session: u32,
     pub language: String,
-    /// What the recruiting site gave along, such as `PROLIFIC_PID`.
+    /// Parameters of the recruiting site, such as `PROLIFIC_PID`.
     pub parameters: BTreeMap<String, String>,
-    /// Proof of completion, shown at the end.
+    /// Completion code, shown at the end.
     pub code: String,
     pub status: Status,
     pub begun_ms: i64,
-    /// Number of answers: the index of the next trial.
+    /// Number of answers, which is the index of the next trial.
     pub position: u32,
-    /// When that trial was first given out.
+    /// Time at which that trial was first presented, milliseconds since 1970.
     pub given_ms: i64,
-    /// Attention checks answered wrongly.
+    /// Number of failed attention checks.
     pub failed_checks: u32,
 }
 
@@ -92,40 +93,41 @@ impl Participant {
     }
 }
 
-/// How places are given out.
+/// Rules for assigning sessions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Quota {
-    /// Sessions of the plan.
+    /// Number of sessions of the plan.
     pub n_sessions: u32,
-    /// Participants wanted: completed, and not excluded for failed checks.
+    /// Target number of participants who complete the study and are not excluded for failed checks.
     pub wanted: u32,
-    /// Failed attention checks from which on a participant is excluded.
+    /// Minimum number of failed attention checks that excludes a participant; `None`: no exclusion.
     pub excluded_from: Option<u32>,
-    /// Milliseconds without a further answer after which a place is given again.
+    /// Time without a further answer after which a session may be reassigned, milliseconds.
     pub abandoned_ms: i64,
-    /// Milliseconds without the first answer after which a place is given again, if `abandoned_ms` is not less.
+    /// Time without the first answer after which a session may be reassigned, milliseconds; `abandoned_ms` applies if
+    /// it is shorter.
     pub unanswered_ms: i64,
 }
 
-/// How many participants there are, by how far they came.
+/// Number of participants by status.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct QuotaCounts {
     pub wanted: u32,
-    /// Answered every trial, and not excluded.
+    /// Completed and not excluded.
     pub completed: u32,
-    /// Answered every trial, and excluded for failed checks.
+    /// Completed, but excluded for failed checks.
     pub excluded: u32,
     pub active: u32,
-    /// Without an answer for so long that their place is free.
+    /// Active, but idle for so long that the session may be reassigned.
     pub abandoned: u32,
-    /// Whose place was given to another.
+    /// Replaced by another participant after an answer.
     pub replaced: u32,
-    /// Whose data was deleted at their wish.
+    /// Data deleted on request.
     pub withdrawn: u32,
 }
 
 impl Quota {
-    /// Whether `participant` has a place that nobody else may take.
+    /// Whether the session of `participant` must not be reassigned.
     fn holds(&self, participant: &Participant, now_ms: i64) -> bool {
         match participant.status {
             Status::Active => {
@@ -138,7 +140,7 @@ impl Quota {
         }
     }
 
-    /// Counts `participants`, of whom `withdrawn` have gone.
+    /// Counts `participants` by status; `withdrawn` participants are no longer among them.
     pub fn count(&self, participants: &[Participant], withdrawn: u32, now_ms: i64) -> QuotaCounts {
         let mut counts = QuotaCounts { wanted: self.wanted, withdrawn, ..QuotaCounts::default() };
         for participant in participants {
@@ -155,7 +157,7 @@ impl Quota {
     }
 }
 
-/// Who begins.
+/// Participant who requests a session.
 #[derive(Clone, Debug)]
 pub struct NewParticipant {
     pub id: String,
@@ -165,85 +167,119 @@ pub struct NewParticipant {
 }
 
 impl NewParticipant {
-    /// IDs that a recruiting site gave, by their parameter.
+    /// IDs from recruiting sites, by parameter.
     fn ids(&self) -> impl Iterator<Item = (&str, &String)> {
-        PERSON.into_iter().filter_map(|name| Some((name, self.parameters.get(name).filter(|id| !id.is_empty())?)))
+        PERSON_IDS.into_iter().filter_map(|name| Some((name, self.parameters.get(name).filter(|id| !id.is_empty())?)))
     }
 
-    /// Whether a recruiting site gave an ID.
+    /// Whether the request has an ID from a recruiting site.
     pub fn has_id(&self) -> bool {
         self.ids().next().is_some()
     }
 
-    /// Whether `participant` has the same ID.
-    fn is(&self, participant: &Participant) -> bool {
+    /// Whether `participant` has the same ID from a recruiting site.
+    fn has_same_id(&self, participant: &Participant) -> bool {
         self.ids().any(|(name, id)| participant.parameters.get(name) == Some(id))
     }
 }
 
-/// What became of a request to begin.
+/// Result of a request to begin.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BeginOutcome {
+    /// Session assigned now, or earlier to the same identifier.
     Begun(Participant),
-    /// A session with answers has the same ID; only its token opens it, because anybody can send an ID.
+    /// The identifier is that of a participant who was replaced.
+    Replaced,
+    /// A session that has answers or is still held has the same ID. Only its token resumes it, because anybody can send
+    /// an ID.
     Known,
-    /// The study has all the participants wanted.
+    /// The study has all its participants.
     Full,
 }
 
-/// Gives the first free session to `newcomer`; whoever had abandoned it is replaced. A session of the same ID that has no
-/// answer yet is given up for the new one: the page may have been opened in another browser, or the reply was lost.
+/// Assigns the first free session to `new_participant`, unless its identifier has a session already: the page repeats a
+/// request whose reply was lost. An abandoned participant of the assigned session is marked as replaced, or deleted if
+/// there are no answers; so is one with the same ID who has not given the first answer in time.
 ///
 /// # Errors
-/// A database that fails; nothing is stored.
-pub fn begin(db: &Connection, newcomer: &NewParticipant, quota: Quota, now_ms: i64) -> rusqlite::Result<BeginOutcome> {
-    let (own, others): (Vec<_>, Vec<_>) = all(db)?.into_iter().partition(|participant| newcomer.is(participant));
-    let is_current = |participant: &Participant| participant.status != Status::Replaced;
-    let own: Vec<Participant> = own.into_iter().filter(is_current).collect();
-    if own.iter().any(|participant| participant.position > 0) {
+/// The database fails; nothing is stored.
+pub fn begin(
+    db: &Connection,
+    new_participant: &NewParticipant,
+    quota: Quota,
+    now_ms: i64,
+) -> rusqlite::Result<BeginOutcome> {
+    if let Some(participant) = find(db, &new_participant.id)? {
+        let is_replaced = participant.status == Status::Replaced;
+        return Ok(if is_replaced { BeginOutcome::Replaced } else { BeginOutcome::Begun(participant) });
+    }
+    let (replaced, active) = (Status::Replaced, Status::Active);
+    let current = select(db, &format!("WHERE status <> '{}'", replaced.name()))?;
+    let (own, others): (Vec<_>, Vec<_>) =
+        current.into_iter().partition(|participant| new_participant.has_same_id(participant));
+    if own.iter().any(|participant| participant.position > 0 || quota.holds(participant, now_ms)) {
         return Ok(BeginOutcome::Known);
     }
     let holders = others.into_iter().filter(|participant| quota.holds(participant, now_ms));
     let taken: BTreeSet<u32> = holders.map(|participant| participant.session).collect();
     let free = (0..quota.n_sessions).find(|session| !taken.contains(session));
     let Some(session) = free.filter(|_| taken.len() < quota.wanted as usize) else { return Ok(BeginOutcome::Full) };
-    let (replaced, active) = (Status::Replaced, Status::Active);
     for given_up in own.iter().map(|participant| participant.session).chain([session]) {
+        db.execute(
+            "DELETE FROM participant WHERE session = ?1 AND status = ?2 AND position = 0",
+            params![given_up, active],
+        )?;
         db.execute(
             "UPDATE participant SET status = ?1 WHERE session = ?2 AND status = ?3",
             params![replaced, given_up, active],
         )?;
     }
-    let parameters = serde_json::to_string(&newcomer.parameters).unwrap_or_default();
+    let parameters = serde_json::to_string(&new_participant.parameters).unwrap_or_default();
     let sql =
         format!("INSERT INTO participant ({}) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, 0, ?7, 0)", Participant::COLUMNS);
-    db.execute(&sql, params![newcomer.id, session, newcomer.language, parameters, newcomer.code, active, now_ms])?;
-    find(db, &newcomer.id)?.map(BeginOutcome::Begun).ok_or(rusqlite::Error::QueryReturnedNoRows)
+    db.execute(
+        &sql,
+        params![
+            new_participant.id,
+            session,
+            new_participant.language,
+            parameters,
+            new_participant.code,
+            active,
+            now_ms
+        ],
+    )?;
+    find(db, &new_participant.id)?.map(BeginOutcome::Begun).ok_or(rusqlite::Error::QueryReturnedNoRows)
 }
 
-/// Participant of that name; `None`: never begun, or withdrawn.
+/// Participant with this identifier; `None` if unknown, withdrawn, or deleted before the first answer.
 pub fn find(db: &Connection, id: &str) -> rusqlite::Result<Option<Participant>> {
     let sql = format!("SELECT {} FROM participant WHERE id = ?1", Participant::COLUMNS);
     db.query_row(&sql, [id], Participant::of_row).optional()
 }
 
-/// All participants, the first to begin first.
+/// All participants in order of start time.
 pub fn all(db: &Connection) -> rusqlite::Result<Vec<Participant>> {
-    let sql = format!("SELECT {} FROM participant ORDER BY begun_ms, id", Participant::COLUMNS);
+    select(db, "")
+}
+
+/// Participants that fulfil an SQL `condition`, in order of start time.
+fn select(db: &Connection, condition: &str) -> rusqlite::Result<Vec<Participant>> {
+    let sql = format!("SELECT {} FROM participant {condition} ORDER BY begun_ms, id", Participant::COLUMNS);
     db.prepare(&sql)?.query_map([], Participant::of_row)?.collect()
 }
 
-/// Deletes all of a participant and counts the withdrawal; `false`: there is none of that name.
+/// Deletes all data of a participant and counts the withdrawal; `false` if the identifier is unknown.
 pub fn withdraw(db: &Connection, id: &str) -> rusqlite::Result<bool> {
     db.execute("DELETE FROM answer WHERE participant = ?1", [id])?;
     let is_known = db.execute("DELETE FROM participant WHERE id = ?1", [id])? > 0;
     if is_known {
-        count_up(db, "withdrawn")?;
+        increment(db, "withdrawn")?;
     }
     Ok(is_known)
 }
 
-/// Latest time in milliseconds since 1970 at which a participant began or answered; 0 without any participant.
+/// Latest time at which a participant began or answered, milliseconds since 1970; 0 without participants.
 pub fn latest_ms(db: &Connection) -> rusqlite::Result<i64> {
     let sql = "SELECT COALESCE(MAX(MAX(begun_ms, given_ms)), 0) FROM participant";
     db.query_row(sql, [], |row| row.get(0))
@@ -256,7 +292,7 @@ pub fn n_withdrawn(db: &Connection) -> rusqlite::Result<u32> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::answers::{GivenAnswer, Recorded, TrialTerms, record};
+    use super::super::answers::{RecordOutcome, SubmittedAnswer, TrialTerms, record};
     use super::super::database;
     use super::*;
     use crate::vote::Response;
@@ -264,7 +300,7 @@ mod tests {
     const QUOTA: Quota =
         Quota { n_sessions: 3, wanted: 2, excluded_from: None, abandoned_ms: 3_600_000, unanswered_ms: 300_000 };
 
-    /// Begins a session `name` with that ID at a recruiting site.
+    /// Begins the session `name` with this ID of a recruiting site.
     fn begin_as(db: &Connection, name: &str, pid: &str, now_ms: i64) -> BeginOutcome {
         let parameters = BTreeMap::from([("PROLIFIC_PID".to_owned(), pid.to_owned())]);
         let (id, language) = (name.to_owned(), "en".to_owned());
@@ -276,47 +312,79 @@ mod tests {
     }
 
     /// Answers the first trial of the session `name`.
-    fn answer(db: &Connection, name: &str, now_ms: i64) -> Recorded {
+    fn answer(db: &Connection, name: &str, now_ms: i64) -> RecordOutcome {
         let response = Response::Number(42);
         let [stalled_secs, unfocused_secs, response_secs] = [0.0; 3];
-        let given = GivenAnswer { position: 0, response, plays: 1, stalled_secs, unfocused_secs, response_secs };
-        record(db, name, &given, TrialTerms { least_ms: 0, is_last: false, fails_check: false }, now_ms).unwrap()
+        let given = SubmittedAnswer { position: 0, response, plays: 1, stalled_secs, unfocused_secs, response_secs };
+        let session = find(db, name).unwrap().map_or(0, |participant| participant.session);
+        record(db, name, &given, TrialTerms { session, least_ms: 0, is_last: false, fails_check: false }, now_ms)
+            .unwrap()
     }
 
-    fn status(db: &Connection, name: &str) -> Status {
-        find(db, name).unwrap().unwrap().status
+    fn status(db: &Connection, name: &str) -> Option<Status> {
+        find(db, name).unwrap().map(|participant| participant.status)
     }
 
     #[test]
-    fn an_id_opens_no_session_with_answers_and_gives_up_one_without() {
+    fn an_id_neither_resumes_a_session_nor_ends_one_before_its_time() {
         let dir = tempfile::tempdir().unwrap();
         let db = database::open(&dir.path().join("responses.sqlite"), "plan").unwrap();
         assert_eq!(session(&begin_as(&db, "first", "p", 1000)), Some(0));
-        assert_eq!(session(&begin_as(&db, "second", "p", 2000)), Some(0), "no place more for the same person");
-        assert_eq!((status(&db, "first"), answer(&db, "first", 3000)), (Status::Replaced, Recorded::Replaced));
-        assert!(matches!(answer(&db, "second", 3000), Recorded::Stored(_)));
-        assert_eq!(begin_as(&db, "third", "p", 4000), BeginOutcome::Known);
+        assert_eq!(session(&begin_as(&db, "first", "p", 2000)), Some(0), "the reply was lost");
+        assert_eq!(begin_as(&db, "second", "p", 300_999), BeginOutcome::Known, "in time for the first answer");
+        assert_eq!(session(&begin_as(&db, "second", "p", 301_000)), Some(0), "no place more for the same person");
+        assert_eq!((status(&db, "first"), answer(&db, "first", 302_000)), (None, RecordOutcome::Unknown));
+        assert!(matches!(answer(&db, "second", 303_000), RecordOutcome::Stored(_)));
+        assert_eq!(begin_as(&db, "third", "p", 304_000), BeginOutcome::Known);
         assert_eq!(begin_as(&db, "third", "p", 4_000_000), BeginOutcome::Known, "abandoned, but not replaced");
         assert_eq!(session(&begin_as(&db, "other", "q", 4_000_000)), Some(0), "the abandoned place");
+        assert_eq!(status(&db, "second"), Some(Status::Replaced), "its answer stays");
+        assert_eq!(begin_as(&db, "second", "p", 4_000_000), BeginOutcome::Replaced);
         assert_eq!(session(&begin_as(&db, "third", "p", 4_000_001)), Some(1), "after the place was given away");
-        assert_eq!(status(&db, "other"), Status::Active, "who has that place now keeps it");
+        assert_eq!(status(&db, "other"), Some(Status::Active), "who has that place now keeps it");
         assert_eq!(begin_as(&db, "last", "r", 4_000_002), BeginOutcome::Full);
         assert_eq!(latest_ms(&db).unwrap(), 4_000_001);
     }
 
     #[test]
-    fn a_session_without_an_answer_is_given_again_after_minutes() {
+    fn repeated_begins_leave_one_row_and_none_of_another_session() {
+        let dir = tempfile::tempdir().unwrap();
+        let db = database::open(&dir.path().join("responses.sqlite"), "plan").unwrap();
+        for k in 0..50 {
+            assert_eq!(session(&begin_as(&db, &format!("own-{k}"), "p", 300_000 * k)), Some(0));
+            assert_eq!(begin_as(&db, "early", "p", 300_000 * k + 299_999), BeginOutcome::Known);
+        }
+        assert_eq!(all(&db).unwrap().len(), 1);
+        for k in 50..100 {
+            assert_eq!(session(&begin_as(&db, &format!("other-{k}"), "", 300_000 * k)), Some(0));
+        }
+        let left = all(&db).unwrap();
+        assert_eq!(left.iter().map(|participant| participant.id.as_str()).collect::<Vec<_>>(), ["other-99"]);
+        // The identifier of a deleted participant may begin anew; a token of the earlier session stores nothing then.
+        assert_eq!(session(&begin_as(&db, "own-0", "p", 29_700_001)), Some(1));
+        let response = Response::Number(42);
+        let [stalled_secs, unfocused_secs, response_secs] = [0.0; 3];
+        let given = SubmittedAnswer { position: 0, response, plays: 1, stalled_secs, unfocused_secs, response_secs };
+        let terms = TrialTerms { session: 0, least_ms: 0, is_last: false, fails_check: false };
+        assert_eq!(record(&db, "own-0", &given, terms, 29_700_002).unwrap(), RecordOutcome::Unknown);
+    }
+
+    #[test]
+    fn a_session_without_answers_is_reassigned_after_minutes() {
         let dir = tempfile::tempdir().unwrap();
         let db = database::open(&dir.path().join("responses.sqlite"), "plan").unwrap();
         assert_eq!(latest_ms(&db).unwrap(), 0);
         for name in ["silent", "answers"] {
             assert!(session(&begin_as(&db, name, "", 0)).is_some());
         }
-        assert!(matches!(answer(&db, "answers", 10_000), Recorded::Stored(_)));
+        assert!(matches!(answer(&db, "answers", 10_000), RecordOutcome::Stored(_)));
         assert_eq!(begin_as(&db, "early", "", 299_999), BeginOutcome::Full);
         let counts = QUOTA.count(&all(&db).unwrap(), 0, 300_000);
         assert_eq!((counts.active, counts.abandoned), (1, 1));
-        assert!(matches!(answer(&db, "silent", 300_000), Recorded::Stored(_)), "late, but the place is not given away");
+        assert!(
+            matches!(answer(&db, "silent", 300_000), RecordOutcome::Stored(_)),
+            "late, but the place is not given away"
+        );
         assert_eq!(begin_as(&db, "later", "", 3_609_999), BeginOutcome::Full, "an answer holds it for an hour");
         assert_eq!(session(&begin_as(&db, "last", "", 3_610_000)), Some(1));
     }

@@ -1,4 +1,4 @@
-//! The one thread that writes: it takes all that waits, does it in one transaction, and answers after the commit.
+//! Writer thread: takes all queued work, runs it in one transaction, and acknowledges it after the commit.
 
 use super::database;
 use anyhow::{Context, Result};
@@ -9,83 +9,84 @@ use std::time::Duration;
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::timeout;
 
-/// Pieces of work that one commit holds at most.
-const MOST_IN_A_COMMIT: usize = 256;
-/// Pieces of work that wait at most; who brings more waits to hand them in.
-const MOST_WAITING: usize = 1024;
+/// Maximum number of jobs per commit.
+const MAX_JOBS_PER_COMMIT: usize = 256;
+/// Maximum number of queued jobs; further callers wait to enqueue.
+const MAX_QUEUED: usize = 1024;
 
-/// Time until work is refused, the wait of earlier work with it: shorter than a request may take, so that the client is
-/// told.
-const STORE_TIME: Duration = Duration::from_secs(8);
-/// Time that a transaction waits for a lock of another process.
-const LOCK_TIME: Duration = Duration::from_secs(3);
+/// Timeout of a job including its time in the queue. Shorter than the timeout of a request, so that the client gets a
+/// reply.
+const STORE_TIMEOUT: Duration = Duration::from_secs(8);
+/// Time that a transaction waits for locks of other processes.
+const LOCK_TIMEOUT: Duration = Duration::from_secs(3);
 
-/// Tells who waits that the work is committed.
+/// Notifies the caller that the work is committed.
 type Acknowledge = Box<dyn FnOnce() + Send>;
 type Work = Box<dyn FnOnce(&Connection) -> rusqlite::Result<Acknowledge> + Send>;
 
 struct Job {
     work: Work,
-    /// Whether it deletes what must leave no trace.
+    /// Whether the job deletes data that must leave no trace.
     erases: bool,
 }
 
-/// The work was not committed: a full disk, a database that cannot be written or that another process locks.
+/// The work was not committed: the disk is full, or the database is not writable or is locked by another process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the response could not be stored")]
 pub struct NotStored;
 
-/// Handle of the thread that writes; clones share it.
+/// Handle of the writer thread; clones share it.
 #[derive(Clone, Debug)]
 pub struct ResponseStore {
     jobs: mpsc::Sender<Job>,
 }
 
 impl ResponseStore {
-    /// Opens the database at `path` for the plan of that hash and starts its thread, which ends after the last handle.
+    /// Opens the database at `path` for the plan with this hash and starts the writer thread, which ends after the last
+    /// handle is dropped.
     ///
     /// # Errors
-    /// Those of [`database::open`].
+    /// The database cannot be opened (see [`database::open`]), or the thread cannot be started.
     pub fn open(path: &Path, plan: &str) -> Result<(Self, JoinHandle<()>)> {
         let mut db = database::open(path, plan)?;
-        db.busy_timeout(LOCK_TIME)?;
-        let (jobs, mut waiting) = mpsc::channel(MOST_WAITING);
+        db.busy_timeout(LOCK_TIMEOUT)?;
+        let (jobs, mut queue) = mpsc::channel(MAX_QUEUED);
         let thread = std::thread::Builder::new().name("responses".to_owned());
-        let thread = thread.spawn(move || write_all(&mut db, &mut waiting)).context("cannot start a thread")?;
+        let thread = thread.spawn(move || run_jobs(&mut db, &mut queue)).context("cannot start a thread")?;
         Ok((Self { jobs }, thread))
     }
 
-    /// Does `work` in a transaction; its value comes after the commit. What fails takes the other work of its
-    /// transaction with it: `work` refuses by its value and fails only where the database does.
+    /// Runs `work` in a transaction and returns its value after the commit. An error of `work` rolls back the entire
+    /// batch, so `work` must report refusals in its value and fail only when the database fails.
     ///
     /// # Errors
-    /// Nothing of `work` is stored.
+    /// The work was not committed, or not within the timeout.
     pub async fn write<T: Send + 'static>(
         &self,
         work: impl FnOnce(&Connection) -> rusqlite::Result<T> + Send + 'static,
     ) -> Result<T, NotStored> {
-        self.hand_in(false, work).await
+        self.submit(false, work).await
     }
 
-    /// Does `work`, which deletes; its value comes when no file holds a byte of what was deleted.
+    /// Runs `work`, which deletes data, and returns its value once no file contains a byte of the deleted data.
     ///
     /// # Errors
-    /// The work, or the erasure, failed.
+    /// The work or the erasure failed or timed out.
     pub async fn erase<T: Send + 'static>(
         &self,
         work: impl FnOnce(&Connection) -> rusqlite::Result<T> + Send + 'static,
     ) -> Result<T, NotStored> {
-        self.hand_in(true, work).await
+        self.submit(true, work).await
     }
 
-    async fn hand_in<T: Send + 'static>(
+    async fn submit<T: Send + 'static>(
         &self,
         erases: bool,
         work: impl FnOnce(&Connection) -> rusqlite::Result<T> + Send + 'static,
     ) -> Result<T, NotStored> {
         let (answer, answered) = oneshot::channel();
         let work: Work = Box::new(move |db| {
-            // Its client was refused, or has gone; a withdrawal is carried out all the same.
+            // The caller has timed out or disconnected; a withdrawal is carried out nevertheless.
             if answer.is_closed() && !erases {
                 return Ok(Box::new(|| ()));
             }
@@ -96,16 +97,16 @@ impl ResponseStore {
             self.jobs.send(Job { work, erases }).await.map_err(|_| NotStored)?;
             answered.await.map_err(|_| NotStored)
         };
-        timeout(STORE_TIME, stored).await.unwrap_or(Err(NotStored))
+        timeout(STORE_TIMEOUT, stored).await.unwrap_or(Err(NotStored))
     }
 }
 
-fn write_all(db: &mut Connection, waiting: &mut mpsc::Receiver<Job>) {
+fn run_jobs(db: &mut Connection, queue: &mut mpsc::Receiver<Job>) {
     let mut holds_deleted = false;
-    while let Some(first) = waiting.blocking_recv() {
-        let more = std::iter::from_fn(|| waiting.try_recv().ok());
-        let batch = std::iter::once(first).chain(more).take(MOST_IN_A_COMMIT);
-        // Who waits for work that failed is told by the loss of its channel.
+    while let Some(first) = queue.blocking_recv() {
+        let more = std::iter::from_fn(|| queue.try_recv().ok());
+        let batch = std::iter::once(first).chain(more).take(MAX_JOBS_PER_COMMIT);
+        // On failure, callers are notified by their dropped channels.
         let Ok((committed, erases)) = commit(db, batch) else { continue };
         holds_deleted |= erases;
         if holds_deleted {
@@ -119,7 +120,7 @@ fn write_all(db: &mut Connection, waiting: &mut mpsc::Receiver<Job>) {
     }
 }
 
-/// Does a batch in one transaction: what to acknowledge, which of it erases, and whether any does.
+/// Runs a batch in one transaction. Returns the acknowledgements with their erasure flags, and whether any job erases.
 fn commit(db: &mut Connection, batch: impl Iterator<Item = Job>) -> rusqlite::Result<(Vec<(Acknowledge, bool)>, bool)> {
     let transaction = db.transaction_with_behavior(TransactionBehavior::Immediate)?;
     let done = batch.map(|job| Ok(((job.work)(&transaction)?, job.erases)));
@@ -134,13 +135,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn work_is_answered_after_its_commit_and_a_failure_stores_nothing() {
+    fn work_is_acknowledged_after_its_commit_and_a_failure_stores_nothing() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("responses.sqlite");
         let (store, thread) = ResponseStore::open(&path, "plan").unwrap();
         let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap();
         let add = |db: &Connection| {
-            database::count_up(db, "withdrawn")?;
+            database::increment(db, "withdrawn")?;
             db.query_row("SELECT value FROM about WHERE name = 'withdrawn'", [], |row| row.get::<_, String>(0))
         };
         assert_eq!(runtime.block_on(store.write(add)).unwrap(), "1");

@@ -3,8 +3,8 @@
 
 use crate::fixtures::browser::Browser;
 use crate::fixtures::study::votes::{Rng32, counted_votes, votes_of_all_designs};
-use orator_study::analyse::figure::FigureMethod;
-use orator_study::analyse::result::FigureSettings;
+use orator_study::analyse::result::StatisticSettings;
+use orator_study::analyse::statistic::StatisticMethod;
 use orator_study::analyse::votes::columns::ColumnNames;
 use orator_study::analyse::votes::read::VotesRead;
 use orator_study::analyse::{Registration, analyse};
@@ -124,7 +124,7 @@ fn a_known_preference_is_found_in_every_design_and_its_page_is_whole() {
     let Some(mut browser) = Browser::open(&page, [1280, 900]) else { return };
     let mut count = |selector: &str| browser.value(&format!("document.querySelectorAll('{selector}').length"));
     assert_eq!((count(".verdict"), count(".steps")), (5.into(), 3.into()));
-    assert!(count("svg.forest").as_u64().unwrap() >= 7 && count(".figures tbody tr").as_u64().unwrap() > 60);
+    assert!(count("svg.forest").as_u64().unwrap() >= 7 && count(".statistics tbody tr").as_u64().unwrap() > 60);
     assert_eq!(count(".registered"), 0, "nothing was registered");
     for (width, scheme) in [(360, "dark"), (360, "light"), (1280, "dark"), (1280, "light")] {
         browser.resize([width, 800]);
@@ -165,7 +165,7 @@ fn registered_hypotheses_are_judged_and_marked() {
         exclusion: ExclusionRules { failed_checks: None, incomplete: false, stalled_secs: None, unfocused_secs: None },
         settings: AnalysisSettings::default(),
     };
-    let settings = FigureSettings { n_draws: 200, ..FigureSettings::from(&registration.settings) };
+    let settings = StatisticSettings { n_draws: 200, ..StatisticSettings::from(&registration.settings) };
     let analysis = analyse(["Made up", "votes.csv"], &read, Some(&registration), &settings).unwrap();
     let outcomes: Vec<Vec<(&str, Option<bool>)>> = analysis
         .hypotheses
@@ -186,7 +186,7 @@ fn registered_hypotheses_are_judged_and_marked() {
     assert_eq!(marked, [("pick", 3), ("single", 0), ("fit", 4), ("prefer", 0), ("rate", 6)]);
     assert!(analysis.methods.contains("BLAKE3 5ea1"), "{}", analysis.methods);
     let pooled = analysis.tasks[0].pooled().unwrap();
-    assert_eq!(pooled.figures.equivalence(FigureMethod::Crossed).unwrap().bound, 0.05);
+    assert_eq!(pooled.statistics.equivalence(StatisticMethod::Crossed).unwrap().bound, 0.05);
 }
 
 #[test]

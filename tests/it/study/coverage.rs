@@ -1,10 +1,10 @@
 //! Long run: simulated studies with known truth through the very analysis. Coverage of intervals, errors of tests,
 //! power against the plan, and how far the naive binomial test is off.
 
-use orator_study::analyse::figure::FigureMethod;
 use orator_study::analyse::outcome::BinaryVote;
-use orator_study::analyse::result::{FigureSettings, ShareAnalysis, ShareMeasure};
+use orator_study::analyse::result::{ShareAnalysis, ShareMeasure, StatisticSettings};
 use orator_study::analyse::share::{ShareCell, share};
+use orator_study::analyse::statistic::StatisticMethod;
 use orator_study::power::{PowerQuestion, power, simulated};
 use orator_study::simulate::{CrossedDesign, CrossedEffects, crossed_votes};
 use rand::{Rng, SeedableRng};
@@ -17,13 +17,13 @@ const STUDIES: u64 = 2000;
 const FORETOLD: usize = 10_000;
 /// Draws of sign flips in each study.
 const DRAWS: usize = 1000;
-const METHODS: [FigureMethod; 6] = [
-    FigureMethod::Crossed,
-    FigureMethod::SignFlip,
-    FigureMethod::Sides,
-    FigureMethod::Participants,
-    FigureMethod::Wilson,
-    FigureMethod::Binomial,
+const METHODS: [StatisticMethod; 6] = [
+    StatisticMethod::Crossed,
+    StatisticMethod::SignFlip,
+    StatisticMethod::Sides,
+    StatisticMethod::Participants,
+    StatisticMethod::Wilson,
+    StatisticMethod::Binomial,
 ];
 
 /// Shares of studies, percent.
@@ -35,17 +35,17 @@ struct Rates {
     has_test: bool,
 }
 
-fn rates(studies: &[ShareAnalysis], truth: f64, method: FigureMethod) -> Rates {
+fn rates(studies: &[ShareAnalysis], truth: f64, method: StatisticMethod) -> Rates {
     let percent = |n: usize| 100.0 * n as f64 / studies.len() as f64;
     let interval = |study: &&ShareAnalysis| {
-        study.figures.interval(method).is_some_and(|interval| interval.low <= truth && truth <= interval.high)
+        study.statistics.interval(method).is_some_and(|interval| interval.low <= truth && truth <= interval.high)
     };
-    let test = |study: &&ShareAnalysis| study.figures.test(method).is_some_and(|test| test.p < 0.05);
+    let test = |study: &&ShareAnalysis| study.statistics.test(method).is_some_and(|test| test.p < 0.05);
     Rates {
         covered: percent(studies.iter().filter(interval).count()),
         rejected: percent(studies.iter().filter(test).count()),
-        has_interval: studies[0].figures.interval(method).is_some(),
-        has_test: studies[0].figures.test(method).is_some(),
+        has_interval: studies[0].statistics.interval(method).is_some(),
+        has_test: studies[0].statistics.test(method).is_some(),
     }
 }
 
@@ -62,8 +62,8 @@ fn scenario(name: &str, truth: f64, study: impl Fn(u64) -> ShareAnalysis + Sync 
     all
 }
 
-fn settings() -> FigureSettings {
-    FigureSettings { n_draws: DRAWS, with_models: false, ..FigureSettings::default() }
+fn settings() -> StatisticSettings {
+    StatisticSettings { n_draws: DRAWS, with_models: false, ..StatisticSettings::default() }
 }
 
 /// Nobody can tell, and everybody prefers a side.
@@ -115,8 +115,9 @@ fn intervals_cover_tests_err_and_power_is_as_the_analysis_says() {
                     n_simulations: FORETOLD,
                     seed: 11,
                 };
-                let is_found =
-                    |study: &ShareAnalysis| study.figures.test(FigureMethod::Crossed).is_some_and(|test| test.p < 0.05);
+                let is_found = |study: &ShareAnalysis| {
+                    study.statistics.test(StatisticMethod::Crossed).is_some_and(|test| test.p < 0.05)
+                };
                 let foretold = 100.0 * power(&question, design.n_participants, truth, &is_found).power;
                 eprintln!("  power foretold {foretold:.1} %, found {:.1} %", rates[crossed].rejected);
                 assert!((foretold - rates[crossed].rejected).abs() <= 3.0);

@@ -10,7 +10,7 @@ use orator_media::ffmpeg::probe::probe;
 use orator_study::build::{common_bytes, padded};
 use orator_study::file::StudyFile;
 use orator_study::plan::{FilmContent, FilmSound};
-use orator_study::stimuli::filmed::{CutSpeaker, equally_loud};
+use orator_study::stimuli::filmed_speaker::{CutSpeaker, normalise_loudness};
 use orator_test_support::rule::dataset::{RULE, SpokenClip};
 
 const STUDY: &str = r#"
@@ -74,7 +74,7 @@ fn films_of_all_conditions_differ_in_motion_alone() {
             .write_joints(&dir.join(format!("theirs/{}.npy", clip.name)), &motion)
             .unwrap();
     }
-    let lufs = equally_loud(host.sounds.iter_mut());
+    let lufs = normalise_loudness(host.sounds.iter_mut());
     assert!((-40.0..=-23.0).contains(&lufs), "{lufs}");
     let host = host.filmed(&file, SIZE, &Silent).unwrap();
 

@@ -183,7 +183,12 @@ fn a_browser_resumes_by_its_token_and_another_by_the_operators_link() {
     assert_eq!(shown["quota"], json!(quota));
     let places = shown["places"].as_array().unwrap();
     assert_eq!((&places[0][0], &places[0][1], &places[0][2]), (&json!("1"), &json!("active"), &json!("1 of 4")));
-    assert_eq!((&places[1][1], &places[1][4]), (&json!("completed"), &json!("")));
+    assert_eq!((&places[1][1], &places[1][4]), (&json!("completed"), &json!("Link to the session")), "to its code");
     let link = shown["links"][0].as_str().unwrap();
     assert_eq!(visit(link), seen(["Welcome back", "Welcome back"], 0));
+
+    // The first reply is lost, and the browser stores nothing: the address keeps the token.
+    let seen = script(&driver, "visit", &["--url", &page("?PROLIFIC_PID=p3"), "--adverse"]);
+    assert_eq!((&seen["headings"], &seen["begins"]), (&json!(["Which one is real?", "Welcome back"]), &json!(2)));
+    assert!(seen["fragment"].as_str().unwrap().starts_with("#resume="), "{seen}");
 }

@@ -91,10 +91,10 @@ fn places_are_given_in_order_and_those_of_who_left_again() {
     assert_eq!(fifth.begin(&served.address, "e").unwrap().0, 200, "an abandoned place");
     assert_eq!(clients[2].get(&served.address, "/api/state").unwrap().0, 410, "was given to another");
     assert_eq!(clients[2].answer(&served.address, 0, &fitting(0, true)).unwrap().0, 410);
-    assert_eq!(Client::new().begin(&served.address, "c").unwrap().0, 200, "who was replaced may begin anew");
+    assert_eq!(Client::new().begin(&served.address, "c").unwrap().0, 200, "who lost the place may begin anew");
     let operator = Client { token: served.operator_token.clone(), ..Client::new() };
     let quota = operator.get(&served.address, "/api/operator").unwrap().1["quota"].clone();
-    assert_eq!((&quota["excluded"], &quota["withdrawn"], &quota["replaced"]), (&json!(1), &json!(1), &json!(2)));
+    assert_eq!((&quota["excluded"], &quota["withdrawn"], &quota["replaced"]), (&json!(1), &json!(1), &json!(0)));
 }
 
 #[test]

@@ -10,12 +10,14 @@ fn a_known_id_opens_no_session() {
     let study = MadeStudy::new(3, 3, 4, 5);
     let served = study.serve(&[]);
     let address = &served.address;
-    let mut first = Client::new();
-    assert_eq!(first.begin(address, "p1").unwrap().0, 200);
-    // The same person in another browser, before any answer: the session there takes the place of the first.
     let mut own = Client::new();
     assert_eq!(own.begin(address, "p1").unwrap().0, 200);
-    assert_eq!(first.get(address, "/api/state").unwrap().0, 410);
+    // Before any answer, and as often as somebody likes.
+    for _ in 0..20 {
+        let (status, said) = Client::new().begin(address, "p1").unwrap();
+        assert_eq!((status, &said["reason"]), (409, &json!("known")), "{said}");
+    }
+    assert_eq!(study.exported("participants").len(), 1);
     assert_eq!(own.answer(address, 0, &fitting(0, true)).unwrap().0, 200);
 
     let mut stranger = Client::new();
@@ -36,7 +38,34 @@ fn a_known_id_opens_no_session() {
     let people = operator.get(address, "/api/operator").unwrap().1["participants"].take();
     let tokens: Vec<&Value> = people.as_array().unwrap().iter().map(|one| &one["token"]).collect();
     let resumable: Vec<&Value> = tokens.into_iter().filter(|token| !token.is_null()).collect();
-    assert_eq!(resumable, [&json!(other.token)], "the operator can give a link to the one session that is open");
+    let both = [json!(own.token), json!(other.token)];
+    assert_eq!(resumable, both.iter().collect::<Vec<_>>(), "the operator can give a link, also to the completion code");
+}
+
+#[test]
+fn a_repeated_attempt_to_begin_gets_the_same_session() {
+    let study = MadeStudy::new(3, 3, 4, 5);
+    let attempt = |k: u32| format!("{k:032x}");
+    let begin = |address: &str, attempt: &str, parameters: Value| {
+        let body = json!({ "consent": true, "language": "en", "parameters": parameters, "attempt": attempt });
+        Client::new().post(address, "/api/begin", &body).unwrap()
+    };
+    let served = study.serve(&[]);
+    let id = json!({ "PROLIFIC_PID": "p1" });
+    let first = begin(&served.address, &attempt(1), id.clone());
+    assert_eq!(first.0, 200, "{}", first.1);
+    assert_eq!(begin(&served.address, &attempt(1), id.clone()), first);
+    let (status, said) = begin(&served.address, &attempt(2), id.clone());
+    assert_eq!((status, &said["reason"]), (409, &json!("known")), "{said}");
+    let nameless = begin(&served.address, &attempt(3), json!({}));
+    assert_eq!(begin(&served.address, &attempt(3), json!({})), nameless);
+    for wrong in ["", "1", &attempt(1)[1..], &"x".repeat(32), &"A".repeat(32)] {
+        assert_eq!(begin(&served.address, wrong, json!({})).0, 400, "{wrong}");
+    }
+    assert_eq!(served.terminate(), Some(0));
+    let served = study.serve(&[]);
+    assert_eq!(begin(&served.address, &attempt(1), id), first, "also of another server");
+    assert_eq!(study.exported("participants").len(), 2);
 }
 
 #[test]
@@ -106,6 +135,7 @@ fn sessions_without_an_answer_are_given_again_after_minutes() {
     assert_eq!(silent.get(&served.address, "/api/state").unwrap().0, 200, "while nobody wants the place");
     assert_eq!(Client::new().begin(&served.address, "later").unwrap().0, 200);
     assert_eq!(silent.get(&served.address, "/api/state").unwrap().0, 410);
+    assert_eq!(study.exported("participants").len(), 2, "nothing is kept of a session without an answer");
     assert_eq!(Client::new().begin(&served.address, "last").unwrap().0, 409, "who has answered keeps the place");
     assert_eq!(answers.answer(&served.address, 1, &fitting(1, true)).unwrap().0, 200);
     std::fs::remove_file(file).unwrap();

@@ -277,7 +277,12 @@ fn requests_that_name_another_host_are_misdirected() {
     for host in ["evil.example", "evil.example:8080", "study.example.org", "192.0.2.1", "127.0.0.1.evil.example", ""] {
         assert_eq!(status_of(address, host), 421, "{host}");
     }
-    for head in ["GET / HTTP/1.0", "GET http://evil.example/ HTTP/1.1\r\nHost: localhost"] {
+    assert!(reply(address, "GET / HTTP/1.0")[9..].starts_with("200 "), "a health check");
+    for head in [
+        "GET / HTTP/1.1",
+        "GET / HTTP/1.0\r\nHost: evil.example",
+        "GET http://evil.example/ HTTP/1.1\r\nHost: localhost",
+    ] {
         let said = reply(address, head);
         assert!(said[9..].starts_with("421 ") && said.contains("--host-name"), "{said}");
         assert!(
@@ -287,8 +292,10 @@ fn requests_that_name_another_host_are_misdirected() {
     }
     drop(served);
 
-    let served = study.serve(&["--host-name", "study.example.org"]);
-    for (host, status) in [("study.example.org", 200), (&served.address, 200), ("evil.example", 421)] {
+    let served = study.serve(&["--host-name", "study.example.org", "--host-name", "tunnel.example"]);
+    for (host, status) in
+        [("study.example.org.", 200), ("tunnel.example:443", 200), (&served.address, 200), ("evil.example", 421)]
+    {
         assert_eq!(status_of(&served.address, host), status, "{host}");
     }
 }

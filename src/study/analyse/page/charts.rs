@@ -1,15 +1,15 @@
-//! Charts of a task: shares and differences with their intervals, scores, steps of preference, strengths.
+//! Charts of a task: proportions and differences with intervals, scores, preference steps, strengths.
 
-use crate::analyse::figure::FigureMethod;
+use crate::analyse::number_format::bare_p;
 use crate::analyse::result::{PairAnalysis, ShareAnalysis, ShareMeasure, StudyAnalysis, TaskAnalysis};
+use crate::analyse::statistic::StatisticMethod;
 use crate::analyse::verdict::scope;
-use crate::analyse::words::bare_p;
 use crate::plan::TaskDesign;
 use crate::stats::estimate::ConfidenceInterval;
 use orator_report::html::chart::forest::{ForestRow, ForestScale, forest};
 use orator_report::html::{Node, legend, node, table};
 
-/// Names of the five steps, from the second condition to the first.
+/// Names of the five preference steps, from the second condition to the first.
 const STEPS: [&str; 5] = ["second clearly", "second", "neither", "first", "first clearly"];
 
 /// Charts of a task.
@@ -28,7 +28,7 @@ fn card(chart: Node) -> Node {
     node("div").class("card scroll wide").attr("tabindex", "0").child(chart)
 }
 
-/// Low and high end with some room around all values.
+/// Axis limits with a margin around all finite values.
 fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let [low, high] = values
         .filter(|value| value.is_finite())
@@ -40,35 +40,36 @@ fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
     [low - room, high + room]
 }
 
-/// Ends of an interval, each times `factor`.
+/// Ends of an interval, multiplied by `factor`.
 fn scaled(interval: Option<ConfidenceInterval>, factor: f64) -> Option<[f64; 2]> {
     interval.map(|ends| [factor * ends.low, factor * ends.high])
 }
 
 fn shares(task: &TaskAnalysis, analysis: &StudyAnalysis) -> Vec<Node> {
     let percent = |share: f64| 100.0 * share;
-    let row = |share: &ShareAnalysis, class: &'static str, more: &str, method: FigureMethod| {
-        let p = share.figures.test(method).map(|test| format!(", p {}", equal(test.final_p())));
+    let row = |share: &ShareAnalysis, class: &'static str, more: &str, method: StatisticMethod| {
+        let p = share.statistics.test(method).map(|test| format!(", p {}", equal(test.final_p())));
         ForestRow {
             name: format!("{}{more}", scope(share)),
             class,
             value: percent(share.share),
-            interval: scaled(share.figures.interval(method), 100.0),
+            interval: scaled(share.statistics.interval(method), 100.0),
             value_text: format!("{:.1} %{}", percent(share.share), p.unwrap_or_default()),
         }
     };
     let mut rows = Vec::new();
     let chance = task.shares.iter().filter(|share| share.measure != ShareMeasure::TakenForReal);
-    for (place, share) in chance.enumerate() {
-        rows.push(row(share, if place == 0 { "own" } else { "part" }, "", FigureMethod::Crossed));
-        if place == 0 {
-            rows.push(row(share, "naive", ", naive", FigureMethod::Wilson));
+    for (index, share) in chance.enumerate() {
+        rows.push(row(share, if index == 0 { "own" } else { "part" }, "", StatisticMethod::Crossed));
+        if index == 0 {
+            rows.push(row(share, "naive", ", naive", StatisticMethod::Wilson));
             let other = analysis.without_exclusions.iter().find(|other| other.task == task.task);
             let other = other.and_then(TaskAnalysis::pooled);
-            rows.extend(other.map(|other| row(other, "beside", ", nobody excluded", FigureMethod::Crossed)));
+            rows.extend(other.map(|other| row(other, "beside", ", nobody excluded", StatisticMethod::Crossed)));
         }
     }
-    let bound = task.pooled().and_then(|share| share.figures.equivalence(FigureMethod::Crossed)).map(|test| test.bound);
+    let bound =
+        task.pooled().and_then(|share| share.statistics.equivalence(StatisticMethod::Crossed)).map(|test| test.bound);
     let band = bound.map(|bound| [percent(0.5 - bound), percent(0.5 + bound)]);
     let values = rows.iter().flat_map(|row| row.interval.unwrap_or([row.value; 2])).chain(band.into_iter().flatten());
     let [low, high] = ends(values);
@@ -89,7 +90,7 @@ fn shares(task: &TaskAnalysis, analysis: &StudyAnalysis) -> Vec<Node> {
         .shares
         .iter()
         .filter(|share| share.measure == ShareMeasure::TakenForReal)
-        .map(|share| row(share, "part", "", FigureMethod::Crossed))
+        .map(|share| row(share, "part", "", StatisticMethod::Crossed))
         .collect();
     if !single.is_empty() {
         let scale = ForestScale { low: 0.0, high: 100.0, middle: None, band: None, unit: "% of votes" };
@@ -107,8 +108,8 @@ fn scores(task: &TaskAnalysis) -> Vec<Node> {
             name: row.condition.clone(),
             class: "own",
             value: row.mean,
-            interval: scaled(row.figures.interval(FigureMethod::Crossed), 1.0),
-            value_text: match row.figures.interval(FigureMethod::Median) {
+            interval: scaled(row.statistics.interval(StatisticMethod::Crossed), 1.0),
+            value_text: match row.statistics.interval(StatisticMethod::Median) {
                 Some(interval) => format!("median {} [{}, {}]", row.median, interval.low, interval.high),
                 None => format!("median {}", row.median),
             },
@@ -123,12 +124,12 @@ fn scores(task: &TaskAnalysis) -> Vec<Node> {
 fn pairs(task: &TaskAnalysis) -> Vec<Node> {
     let factor = if task.design == TaskDesign::TuringSingle { 100.0 } else { 1.0 };
     let row = |pair: &PairAnalysis| {
-        let p = pair.figures.crossed_p().map(|p| format!(", p {}", equal(p)));
+        let p = pair.statistics.crossed_p().map(|p| format!(", p {}", equal(p)));
         ForestRow {
             name: format!("{} \u{2212} {}", pair.first, pair.second),
             class: "own",
             value: factor * pair.difference,
-            interval: scaled(pair.figures.interval(FigureMethod::Crossed), factor),
+            interval: scaled(pair.statistics.interval(StatisticMethod::Crossed), factor),
             value_text: format!("{:+.2}{}", factor * pair.difference, p.unwrap_or_default()),
         }
     };
@@ -188,7 +189,7 @@ fn strengths(task: &TaskAnalysis) -> Vec<Node> {
     vec![node("p").text(about), card(forest("Strengths", &rows, &scale))]
 }
 
-/// `= 0.027`, `< 1e-99`.
+/// p value with its relation sign: `= 0.027`, `< 1e-99`.
 fn equal(p: f64) -> String {
     let text = bare_p(p);
     if text.starts_with('<') { text } else { format!("= {text}") }

@@ -1,4 +1,5 @@
-//! Page of an analysis: conclusions, charts, every figure with its mark, exclusions, the methods paragraph.
+//! HTML page of an analysis: conclusions, charts, all statistics with their registration status, exclusions, the
+//! methods paragraph.
 
 mod charts;
 mod page;

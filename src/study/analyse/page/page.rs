@@ -1,12 +1,12 @@
-//! Whole page. Its bytes depend on the analysis alone.
+//! Assembles the page. The output depends on the analysis only.
 
 use super::{charts, tables};
+use crate::analyse::number_format::{count, list};
 use crate::analyse::result::{Conclusion, StudyAnalysis, TaskAnalysis};
-use crate::analyse::words::{count, list};
 use orator_report::html::{Node, Page, Section, node};
 use serde_json::Value;
 
-/// Text of the page.
+/// HTML of the page.
 pub fn html(analysis: &StudyAnalysis) -> String {
     let section = |id, title, body| Section { id, title, body };
     let mut sections = vec![section("meaning", "What can be concluded", meaning(analysis))];
@@ -15,7 +15,7 @@ pub fn html(analysis: &StudyAnalysis) -> String {
     }
     sections.extend([
         section("charts", "Estimates and intervals", per_task(&analysis.tasks, |task| charts::task(task, analysis))),
-        section("figures", "All figures", figures(analysis)),
+        section("figures", "All figures", statistics(analysis)),
         section("exclusions", "Exclusions", tables::exclusions(analysis)),
         section("methods", "Methods paragraph", methods(analysis)),
     ]);
@@ -31,21 +31,21 @@ pub fn html(analysis: &StudyAnalysis) -> String {
 }
 
 fn lead(analysis: &StudyAnalysis) -> String {
-    let account = &analysis.exclusions;
+    let summary = &analysis.exclusions;
     let tasks: Vec<String> = analysis.tasks.iter().map(|task| task.task.clone()).collect();
-    let left_out = match account.leaves_out() {
-        true => format!(" ({} votes were excluded)", count(account.n_votes - account.n_votes_kept)),
+    let left_out = match summary.any_excluded() {
+        true => format!(" ({} votes were excluded)", count(summary.n_votes - summary.n_votes_kept)),
         false => String::new(),
     };
     format!(
         "{} votes of {} participants{left_out}: {}.",
-        count(account.n_votes_kept),
-        count(account.n_participants_kept),
+        count(summary.n_votes_kept),
+        count(summary.n_participants_kept),
         list(&tasks)
     )
 }
 
-/// Body of each task under its name, which is left out where there is one task.
+/// Body of each task under its name; the name is omitted if there is only one task.
 fn per_task(tasks: &[TaskAnalysis], body: impl Fn(&TaskAnalysis) -> Vec<Node>) -> Vec<Node> {
     let title = |task: &TaskAnalysis| (tasks.len() > 1).then(|| node("h3").text(&task.task));
     tasks.iter().flat_map(|task| title(task).into_iter().chain(body(task))).collect()
@@ -72,7 +72,7 @@ fn meaning(analysis: &StudyAnalysis) -> Vec<Node> {
     body
 }
 
-fn figures(analysis: &StudyAnalysis) -> Vec<Node> {
+fn statistics(analysis: &StudyAnalysis) -> Vec<Node> {
     let about = "Registered: written down and sealed before the first participant. Exploratory: everything else; it can \
                  suggest, not show. Naive: votes are taken for independent, which votes of one participant or about one clip \
                  are not; such figures are here because others print them.";

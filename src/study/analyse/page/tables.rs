@@ -1,29 +1,29 @@
-//! Every figure of a task in a table with its mark, and the account of exclusions.
+//! Tables of all statistics of a task with their registration status, of the hypotheses and of the exclusions.
 
-use crate::analyse::figure::{FigureOrigin, FigureRow, FigureSet, TestFigure};
+use crate::analyse::number_format::{bare_p, count, percent};
 use crate::analyse::result::{ShareAnalysis, ShareMeasure, StudyAnalysis, TaskAnalysis};
+use crate::analyse::statistic::{StatisticOrigin, StatisticRow, StatisticSet, TestResult};
 use crate::analyse::verdict::scope;
 use crate::analyse::votes::read::RefusedRow;
-use crate::analyse::words::{bare_p, count, percent};
 use crate::stats::estimate::ConfidenceInterval;
 use orator_report::html::{Node, node, table};
 
-/// Columns of the table of figures.
+/// Columns of the table of statistics.
 const COLUMNS: [&str; 6] = ["Method", "Interval", "Statistic", "p", "p after Holm", "Mark"];
 
-/// Table of a task's figures, grouped by the number that they are about.
+/// Table of a task's statistics, grouped by quantity.
 pub(super) fn task(task: &TaskAnalysis) -> Vec<Node> {
     let mut rows = Vec::new();
     for share in &task.shares {
         rows.push(group(&share_title(share)));
-        rows.extend(figure_rows(&share.figures, 100.0, " %"));
+        rows.extend(statistic_rows(&share.statistics, 100.0, " %"));
         rows.extend(share.model.as_ref().map(|model| {
-            let said = format!(
+            let details = format!(
                 "log odds {:.3} \u{b1} {:.3}; standard deviations of participants {:.2}, of clips {:.2}",
                 model.log_odds, model.standard_error, model.sd_participants, model.sd_clips
             );
             let name = node("th").attr("scope", "row").text("mixed model's estimates");
-            node("tr").child(name).child(node("td").attr("colspan", 4).text(said)).child(node("td"))
+            node("tr").child(name).child(node("td").attr("colspan", 4).text(details)).child(node("td"))
         }));
     }
     for row in &task.scores {
@@ -32,7 +32,7 @@ pub(super) fn task(task: &TaskAnalysis) -> Vec<Node> {
             "{}: median {}, mean {:.2} of {scores} scores ({participants} participants, {clips} clips)",
             row.condition, row.median, row.mean
         )));
-        rows.extend(figure_rows(&row.figures, 1.0, ""));
+        rows.extend(statistic_rows(&row.statistics, 1.0, ""));
     }
     for pair in &task.pairs {
         let orders = pair.orders.map(|[above, tied, below]| format!("; {above} above, {tied} neither, {below} below"));
@@ -42,11 +42,11 @@ pub(super) fn task(task: &TaskAnalysis) -> Vec<Node> {
             "{} less {}: {:+.3} in {votes} votes ({participants} participants, {clips} clips{orders})",
             pair.first, pair.second, pair.difference
         )));
-        rows.extend(figure_rows(&pair.figures, 1.0, ""));
+        rows.extend(statistic_rows(&pair.statistics, 1.0, ""));
     }
     if let Some(test) = &task.overall {
         rows.push(group("All conditions"));
-        rows.push(figure_row(test.origin, None, Some(test), None));
+        rows.push(statistic_row(test.origin, None, Some(test), None));
     }
     let head = COLUMNS.iter().map(|title| {
         let class = if ["Method", "Mark"].contains(title) { "" } else { "num" };
@@ -77,23 +77,28 @@ fn group(title: &str) -> Node {
     node("tr").class("group").child(node("th").attr("colspan", COLUMNS.len()).attr("scope", "rowgroup").text(title))
 }
 
-/// Rows of a set: a method's interval and test together, then equivalence.
-fn figure_rows(set: &FigureSet, factor: f64, unit: &str) -> Vec<Node> {
+/// Rows of a set: one per method with its interval and test, then equivalence tests.
+fn statistic_rows(set: &StatisticSet, factor: f64, unit: &str) -> Vec<Node> {
     let ends = |ends: ConfidenceInterval| format!("{:.2} to {:.2}{unit}", factor * ends.low, factor * ends.high);
-    let row = |FigureRow { origin, interval, test }| figure_row(origin, interval.map(ends), test, None);
+    let row = |StatisticRow { origin, interval, test }| statistic_row(origin, interval.map(ends), test, None);
     let mut rows: Vec<Node> = set.rows().map(row).collect();
     rows.extend(set.equivalence.iter().map(|test| {
-        let shown = TestFigure { origin: test.origin, ..TestFigure::new(test.origin.method, test.p) };
+        let shown = TestResult { origin: test.origin, ..TestResult::new(test.origin.method, test.p) };
         let outcome = if test.passes { "shown" } else { "not shown" };
         let (points, method) = (100.0 * test.bound, test.origin.method.name());
         let name = format!("equivalence within \u{b1}{points} points ({method}): {outcome}");
         let interval = format!("90 %: {}", ends(test.ends));
-        figure_row(test.origin, Some(interval), Some(&shown), Some(name))
+        statistic_row(test.origin, Some(interval), Some(&shown), Some(name))
     }));
     rows
 }
 
-fn figure_row(origin: FigureOrigin, interval: Option<String>, test: Option<&TestFigure>, name: Option<String>) -> Node {
+fn statistic_row(
+    origin: StatisticOrigin,
+    interval: Option<String>,
+    test: Option<&TestResult>,
+    name: Option<String>,
+) -> Node {
     let number = |text: String| node("td").class("num").text(text);
     let statistic = test.and_then(|test| {
         let freedom = test.degrees_of_freedom.map(|freedom| format!(" ({freedom:.1})")).unwrap_or_default();
@@ -131,23 +136,23 @@ pub(super) fn hypotheses(analysis: &StudyAnalysis) -> Vec<Node> {
     vec![node("p").text(about), node("div").class("scroll").attr("tabindex", "0").child(table("figures", head, rows))]
 }
 
-/// Rules with what each leaves out by itself, and rows that are no votes.
+/// Rules with what each alone excludes, and refused rows.
 pub(super) fn exclusions(analysis: &StudyAnalysis) -> Vec<Node> {
-    let account = &analysis.exclusions;
+    let summary = &analysis.exclusions;
     let number = |n: usize| node("td").class("num").text(count(n));
-    let cells = |name: &str, participants: usize, votes: usize, said: &str| {
+    let cells = |name: &str, participants: usize, votes: usize, details: &str| {
         let name = node("th").attr("scope", "row").text(name);
-        node("tr").child(name).child(number(participants)).child(number(votes)).child(node("td").text(said))
+        node("tr").child(name).child(number(participants)).child(number(votes)).child(node("td").text(details))
     };
-    let mut rows = vec![cells("answered", account.n_participants, account.n_votes, "")];
-    for rule in &account.rules {
+    let mut rows = vec![cells("answered", summary.n_participants, summary.n_votes, "")];
+    for rule in &summary.rules {
         let unknown = rule.unknown.as_deref().unwrap_or_default();
         rows.push(cells(&rule.rule, rule.n_participants, rule.n_votes, unknown));
     }
-    rows.push(cells("analysed", account.n_participants_kept, account.n_votes_kept, ""));
+    rows.push(cells("analysed", summary.n_participants_kept, summary.n_votes_kept, ""));
     let head = ["", "Participants", "Votes", ""]
         .map(|title| node("th").attr("scope", "col").class(if title.is_empty() { "" } else { "num" }).text(title));
-    let about = match (account.registered, account.rules.is_empty()) {
+    let about = match (summary.registered, summary.rules.is_empty()) {
         (true, _) => "Rules that were registered, with what each leaves out by itself; a vote may fall under several.",
         (false, false) => "Rules of the study, which do not count as registered, with what each leaves out by itself.",
         (false, true) => "No rules were registered; every vote is analysed.",

@@ -1,26 +1,29 @@
-//! Columns of a table of votes, what they are called in the given file, and its rows. Text of columns: comma, semicolon or
-//! tab, quoted or not, with or without a byte order mark. JSON Lines: one object a line, its keys the columns.
+//! Columns of a table of votes, their names in a file, and its rows. Delimited text: comma, semicolon or tab, quoted or
+//! not, with or without a byte order mark. JSON Lines: one object per line whose keys are the columns.
 
-use super::row::{MOST_ROWS, RowCells};
+use super::row::{MAX_ROWS, RowCells};
 use crate::vote::VOTE_COLUMNS;
 use anyhow::{Context, Result, bail, ensure};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 
-/// Short forms of tables by others: one condition, whether the answer was right, one score, a step of preference.
+/// Additional columns of simpler tables: one condition, whether the answer was correct, one score, a preference step.
 const SHORT_FORMS: [&str; 4] = ["condition", "correct", "score", "step"];
 
-/// Everything that a column can mean.
+/// Names of all known fields.
 fn fields() -> impl Iterator<Item = &'static str> {
     VOTE_COLUMNS.into_iter().chain(SHORT_FORMS)
 }
 
-/// Names of columns that differ from those of the fields, by field.
+/// File-specific column names by field.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ColumnNames(BTreeMap<&'static str, String>);
 
 impl ColumnNames {
     /// Parses `participant=worker,clip=stimulus`.
+    ///
+    /// # Errors
+    /// A pair has no `=`, its field is unknown or repeated, or its name is empty.
     pub fn parse(text: &str) -> Result<Self> {
         let mut names = BTreeMap::new();
         for pair in text.split(',').map(str::trim).filter(|pair| !pair.is_empty()) {
@@ -39,20 +42,20 @@ impl ColumnNames {
         Ok(Self(names))
     }
 
-    /// Name in the file of a field.
+    /// Column name of a field in the file.
     fn of(&self, field: &'static str) -> &str {
         self.0.get(field).map_or(field, String::as_str)
     }
 
-    /// Places of the fields in a header, by field. Names are compared without regard to case and outer space.
-    fn places(&self, header: &[String]) -> Result<BTreeMap<&'static str, usize>> {
+    /// Column indices of the fields in a header. Names are compared ignoring case and surrounding whitespace.
+    fn indices(&self, header: &[String]) -> Result<BTreeMap<&'static str, usize>> {
         let is = |name: &str, cell: &String| cell.trim().to_lowercase() == name.to_lowercase();
-        let mut places = BTreeMap::new();
+        let mut indices = BTreeMap::new();
         for field in fields() {
             let name = self.of(field);
-            let mut found = (0..header.len()).filter(|place| is(name, &header[*place]));
+            let mut found = (0..header.len()).filter(|index| is(name, &header[*index]));
             match (found.next(), found.next()) {
-                (Some(place), None) => drop(places.insert(field, place)),
+                (Some(index), None) => drop(indices.insert(field, index)),
                 (Some(_), Some(_)) => bail!("two columns are called \"{name}\"; rename one of them"),
                 (None, _) if self.0.contains_key(field) => {
                     bail!("there is no column \"{name}\"; the columns are {}", shown(header))
@@ -60,18 +63,18 @@ impl ColumnNames {
                 (None, _) => {}
             }
         }
-        Self::check(&places.keys().copied().collect::<Vec<_>>(), header)?;
-        Ok(places)
+        Self::check(&indices.keys().copied().collect::<Vec<_>>(), header)?;
+        Ok(indices)
     }
 
-    /// What a table must have: who, what, and an answer.
+    /// Checks that a table has the required columns: participant, clip and an answer.
     fn check(fields: &[&str], header: &[String]) -> Result<()> {
         let lacks = |field: &str| !fields.contains(&field);
         for field in ["participant", "clip"] {
             if lacks(field) {
-                let near = header.iter().max_by(|a, b| near(field, a).total_cmp(&near(field, b)));
+                let nearest = header.iter().max_by(|a, b| similarity(field, a).total_cmp(&similarity(field, b)));
                 let example =
-                    near.map(|near| format!(", such as --columns {field}={}", near.trim())).unwrap_or_default();
+                    nearest.map(|name| format!(", such as --columns {field}={}", name.trim())).unwrap_or_default();
                 bail!("there is no column \"{field}\"; the columns are {}. Name it{example}", shown(header));
             }
         }
@@ -88,21 +91,25 @@ impl ColumnNames {
 }
 
 /// Similarity of two names, 0 to 1.
-fn near(field: &str, cell: &str) -> f64 {
+fn similarity(field: &str, cell: &str) -> f64 {
     strsim::jaro_winkler(field, &cell.trim().to_lowercase())
 }
 
-/// Header in an error, at most 20 names of it.
+/// Column names for an error message, at most 20.
 fn shown(header: &[String]) -> String {
     let names: Vec<String> = header.iter().take(20).map(|name| name.trim().chars().take(40).collect()).collect();
     format!("{}{}", names.join(", "), if header.len() > 20 { ", ..." } else { "" })
 }
 
-/// Rows with their line, or why one cannot be read.
-pub type LinedRows = Vec<(u64, std::result::Result<RowCells, String>)>;
+/// Rows with line numbers, or the reason why a row cannot be read.
+pub type NumberedRows = Vec<(u64, std::result::Result<RowCells, String>)>;
 
-/// Rows of a table. A row that is no text or has another number of cells than the header is given with the reason.
-pub fn delimited_rows(bytes: &[u8], names: &ColumnNames) -> Result<LinedRows> {
+/// Reads the rows of delimited text. Rows that are not UTF-8 or whose number of cells differs from the header are
+/// returned with the reason.
+///
+/// # Errors
+/// The text is UTF-16 or empty, required columns are missing, or there are too many rows.
+pub fn delimited_rows(bytes: &[u8], names: &ColumnNames) -> Result<NumberedRows> {
     ensure!(!bytes.starts_with(&[0xff, 0xfe]) && !bytes.starts_with(&[0xfe, 0xff]), "it is UTF-16; save it as UTF-8");
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let delimiter = delimiter(bytes);
@@ -111,15 +118,15 @@ pub fn delimited_rows(bytes: &[u8], names: &ColumnNames) -> Result<LinedRows> {
     let mut record = csv::ByteRecord::new();
     ensure!(reader.read_byte_record(&mut record)?, "it is empty; the first line names the columns");
     let header: Vec<String> = record.iter().map(|cell| String::from_utf8_lossy(cell).into_owned()).collect();
-    let places = names.places(&header)?;
+    let indices = names.indices(&header)?;
     let mut rows = Vec::new();
     while reader.read_byte_record(&mut record).context("a row cannot be read")? {
         let line = record.position().map_or(0, csv::Position::line);
         if record.iter().all(<[u8]>::is_empty) {
             continue;
         }
-        ensure!(rows.len() < MOST_ROWS, "it has more than {MOST_ROWS} rows");
-        rows.push((line, cells(&record, header.len(), &places, delimiter == b';')));
+        ensure!(rows.len() < MAX_ROWS, "it has more than {MAX_ROWS} rows");
+        rows.push((line, cells(&record, header.len(), &indices, delimiter == b';')));
     }
     Ok(rows)
 }
@@ -127,21 +134,21 @@ pub fn delimited_rows(bytes: &[u8], names: &ColumnNames) -> Result<LinedRows> {
 fn cells(
     record: &csv::ByteRecord,
     width: usize,
-    places: &BTreeMap<&'static str, usize>,
+    indices: &BTreeMap<&'static str, usize>,
     has_decimal_comma: bool,
 ) -> std::result::Result<RowCells, String> {
     if record.len() != width {
         return Err(format!("it has {} cells where the header has {width}", record.len()));
     }
     let mut values = BTreeMap::new();
-    for (field, place) in places {
-        let cell = std::str::from_utf8(&record[*place]).map_err(|_| format!("{field} is no UTF-8"))?;
+    for (field, index) in indices {
+        let cell = std::str::from_utf8(&record[*index]).map_err(|_| format!("{field} is no UTF-8"))?;
         values.insert(*field, cell.trim().to_owned());
     }
     Ok(RowCells { values, has_decimal_comma })
 }
 
-/// Delimiter that occurs most often in the first line outside quotes.
+/// Most frequent delimiter in the first line, outside quotes.
 fn delimiter(bytes: &[u8]) -> u8 {
     let mut counts = [(b',', 0), (b';', 0), (b'\t', 0)];
     let mut is_quoted = false;
@@ -152,19 +159,22 @@ fn delimiter(bytes: &[u8]) -> u8 {
     counts.iter().rev().max_by_key(|(_, n)| *n).map_or(b',', |(delimiter, _)| *delimiter)
 }
 
-/// Rows of JSON Lines. A line that is no object is given with the reason.
-pub fn json_rows(bytes: &[u8], names: &ColumnNames) -> Result<LinedRows> {
+/// Reads the rows of JSON Lines. Lines that are not objects are returned with the reason.
+///
+/// # Errors
+/// The text is empty, the first object lacks required columns, or there are too many rows.
+pub fn json_rows(bytes: &[u8], names: &ColumnNames) -> Result<NumberedRows> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    let mut rows: LinedRows = Vec::new();
+    let mut rows: NumberedRows = Vec::new();
     for (line, text) in bytes.split(|byte| *byte == b'\n').enumerate() {
         if text.iter().all(u8::is_ascii_whitespace) {
             continue;
         }
-        ensure!(rows.len() < MOST_ROWS, "it has more than {MOST_ROWS} rows");
+        ensure!(rows.len() < MAX_ROWS, "it has more than {MAX_ROWS} rows");
         let object = serde_json::from_slice::<Map<String, Value>>(text);
         let row = match object {
             Ok(object) if rows.is_empty() => {
-                names.places(&object.keys().cloned().collect::<Vec<_>>())?;
+                names.indices(&object.keys().cloned().collect::<Vec<_>>())?;
                 Ok(json_cells(&object, names))
             }
             Ok(object) => Ok(json_cells(&object, names)),
@@ -182,7 +192,7 @@ fn json_cells(object: &Map<String, Value>, names: &ColumnNames) -> RowCells {
     RowCells { values, has_decimal_comma: false }
 }
 
-/// Value as the cell of a table would have it.
+/// JSON value as text of a table cell.
 fn text(value: &Value) -> String {
     match value {
         Value::Null => String::new(),

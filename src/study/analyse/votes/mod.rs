@@ -1,5 +1,6 @@
-//! Votes read from a table, whoever wrote it: `columns` names what is needed and splits a file into rows, `row` makes a vote
-//! of each or gives the reason why not, `read` opens a file and gathers pages of sliders.
+//! Reads votes from tables of this or other programs: `columns` finds the required columns and splits a file into rows,
+//! `row` converts each row to a vote or gives the reason for refusing it, `read` opens a file and merges slider scores
+//! into pages.
 
 pub mod columns;
 pub mod read;

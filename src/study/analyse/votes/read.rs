@@ -1,5 +1,5 @@
-//! File of votes: CSV or JSON Lines, of this program or of another. A row that cannot be used is kept with its line and
-//! the reason.
+//! Reads a file of votes: CSV or JSON Lines, from this or another program. Unusable rows are reported with their line
+//! and the reason.
 
 use super::columns::{ColumnNames, delimited_rows, json_rows};
 use super::row::{check, vote};
@@ -11,19 +11,19 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// Bytes of the largest file.
-const MOST_BYTES: u64 = 1 << 30;
+/// Maximum file size, bytes.
+const MAX_BYTES: u64 = 1 << 30;
 
-/// Votes of a source.
+/// Votes read from a source.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VotesRead {
     pub votes: Vec<StudyVote>,
     pub refused: Vec<RefusedRow>,
-    /// Fields of exported votes that the source lacks: exclusion rules on them cannot hold.
+    /// Fields of exported votes that the source lacks; exclusion rules that need them cannot be applied.
     pub absent: Vec<&'static str>,
 }
 
-/// Row of a table that is no vote.
+/// Row of a table that is not a valid vote.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RefusedRow {
     /// Line in the file, from 1.
@@ -32,7 +32,7 @@ pub struct RefusedRow {
 }
 
 impl VotesRead {
-    /// Votes that are known to be whole, such as those of a study's own store.
+    /// Checks votes that are already parsed, such as those of a study's own database.
     pub fn of_votes(votes: Vec<StudyVote>) -> Self {
         let mut read = Self::default();
         for (row, vote) in votes.into_iter().enumerate() {
@@ -44,13 +44,16 @@ impl VotesRead {
         read
     }
 
-    /// Reads a file. `design` is that of rows that do not say theirs.
+    /// Reads a file. `design` applies to rows without a design.
+    ///
+    /// # Errors
+    /// The file cannot be read, is not a table of votes, or contains no valid vote.
     pub fn of_file(path: &Path, names: &ColumnNames, design: Option<TaskDesign>) -> Result<Self> {
-        let place = || path.display().to_string();
-        let bytes = input::read(path, MOST_BYTES).with_context(place)?;
+        let context = || path.display().to_string();
+        let bytes = input::read(path, MAX_BYTES).with_context(context)?;
         let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
         let is_json = ending == "jsonl" || ending == "ndjson" || ending == "json";
-        Self::of_bytes(&bytes, is_json, names, design).with_context(place)
+        Self::of_bytes(&bytes, is_json, names, design).with_context(context)
     }
 
     fn of_bytes(bytes: &[u8], is_json: bool, names: &ColumnNames, design: Option<TaskDesign>) -> Result<Self> {
@@ -64,8 +67,8 @@ impl VotesRead {
             let is_score =
                 row.as_ref().is_ok_and(|cells| cells.values.get("score").is_some_and(|cell| !cell.is_empty()));
             let read_vote = row.and_then(|cells| vote(&cells, design)).and_then(|vote| {
-                let place = (vote.participant.clone(), vote.task.clone(), vote.trial);
-                match is_score || vote.trial == 0 || seen.insert(place) {
+                let trial_key = (vote.participant.clone(), vote.task.clone(), vote.trial);
+                match is_score || vote.trial == 0 || seen.insert(trial_key) {
                     true => Ok(vote),
                     false => Err(format!("{} answered trial {} of {} above", vote.participant, vote.trial, vote.task)),
                 }
@@ -90,32 +93,32 @@ impl VotesRead {
     }
 }
 
-/// Pages of sliders whose scores stand in rows of their own.
+/// Merges slider scores in separate rows into one vote per page.
 #[derive(Default)]
 struct SliderPages(BTreeMap<(String, String, String, u32), usize>);
 
 impl SliderPages {
-    /// Adds a score to its page: the one of the participant, task, clip and trial.
+    /// Adds a score to the page with the same participant, task, clip and trial.
     fn add(&mut self, vote: StudyVote, votes: &mut Vec<StudyVote>) -> std::result::Result<(), String> {
         let key = (vote.participant.clone(), vote.task.clone(), vote.clip.clone(), vote.trial);
         let page = *self.0.entry(key).or_insert(votes.len());
-        let Some(whole) = votes.get_mut(page) else {
+        let Some(page_vote) = votes.get_mut(page) else {
             votes.push(vote);
             return Ok(());
         };
-        if vote.conditions.iter().any(|condition| whole.conditions.contains(condition)) {
+        if vote.conditions.iter().any(|condition| page_vote.conditions.contains(condition)) {
             let StudyVote { participant, conditions, clip, .. } = vote;
             return Err(format!("{participant} gave {} of {clip} a score above", conditions.join(", ")));
         }
-        if let (Response::Scores(all), Response::Scores(one)) = (&mut whole.response, vote.response) {
+        if let (Response::Scores(all), Response::Scores(one)) = (&mut page_vote.response, vote.response) {
             all.extend(one);
-            whole.conditions.extend(vote.conditions);
+            page_vote.conditions.extend(vote.conditions);
         }
         Ok(())
     }
 }
 
-/// Gives votes without a trial their place among those of the participant.
+/// Numbers votes without a trial by their position among the participant's votes.
 fn number_trials(votes: &mut [StudyVote]) {
     let mut n_trials: BTreeMap<String, u32> = BTreeMap::new();
     for vote in votes {
@@ -153,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn scores_in_rows_of_their_own_become_pages() {
+    fn scores_in_separate_rows_become_pages() {
         let read =
             read("participant,clip,condition,score\na,1,N,80\na,1,M,20\na,2,N,70\nb,1,M,10\nb,1,M,11\n").unwrap();
         assert_eq!(read.votes.len(), 3);
@@ -164,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn exported_votes_come_back_from_both_formats() {
+    fn exported_votes_round_trip_in_both_formats() {
         let vote = StudyVote::example(TaskDesign::Sliders, &["N", "M"], Response::Scores(vec![60, 0]));
         let line = serde_json::to_string(&vote).unwrap();
         let json = VotesRead::of_bytes(line.as_bytes(), true, &ColumnNames::default(), None).unwrap();
@@ -177,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_with_its_line() {
+    fn refused_rows_state_line_and_reason() {
         let head = "participant,clip,design,conditions,response,expected,trial\n";
         let rows = [
             ("a,1,turing,x|y,left,right,1", ""),
@@ -202,8 +205,8 @@ mod tests {
     }
 
     #[test]
-    fn tables_that_are_none_are_errors() {
-        for (text, told) in [
+    fn invalid_tables_are_errors() {
+        for (text, expected) in [
             ("", "it is empty"),
             ("participant,clip,correct\n", "none of 0 rows"),
             ("participant,clip\na,1\n", "there is no answer"),
@@ -212,13 +215,14 @@ mod tests {
             ("participant,clip,correct\na,1,maybe\n", "line 2: correct is \"maybe\"; expected 1 or 0"),
         ] {
             let error = format!("{:#}", read(text).unwrap_err());
-            assert!(error.contains(told), "{told}: {error}");
+            assert!(error.contains(expected), "{expected}: {error}");
         }
         let utf16 = VotesRead::of_bytes(b"\xff\xfea\0", false, &ColumnNames::default(), None).unwrap_err();
         assert!(utf16.to_string().contains("save it as UTF-8"));
-        for (columns, told) in [("worker", "is no pair"), ("who=worker", "no field \"who\""), ("clip=", "has no name")]
+        for (columns, expected) in
+            [("worker", "is no pair"), ("who=worker", "no field \"who\""), ("clip=", "has no name")]
         {
-            assert!(ColumnNames::parse(columns).unwrap_err().to_string().contains(told), "{told}");
+            assert!(ColumnNames::parse(columns).unwrap_err().to_string().contains(expected), "{expected}");
         }
         let names = ColumnNames::parse("clip=video").unwrap();
         let error = VotesRead::of_bytes(b"participant,clip,correct\na,1,1\n", false, &names, None).unwrap_err();
@@ -226,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn no_bytes_make_it_panic() {
+    fn arbitrary_bytes_do_not_panic() {
         let head = b"participant,clip,condition,score,design,trial\n".to_vec();
         let mut state = 1_u32;
         for n in 0..400 {

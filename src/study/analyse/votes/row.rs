@@ -1,4 +1,4 @@
-//! Row of a table to a vote.
+//! Converts a row of a table to a vote.
 
 use crate::plan::{TaskDesign, TrialPhase};
 use crate::vote::{Response, ScreenSide, StudyVote};
@@ -6,43 +6,45 @@ use serde::Deserialize;
 use serde::de::IntoDeserializer as _;
 use std::collections::BTreeMap;
 
-/// Rows of the longest table.
-pub const MOST_ROWS: usize = 2_000_000;
+/// Maximum number of rows.
+pub const MAX_ROWS: usize = 2_000_000;
 
-/// Conditions that a table of others need not name.
+/// Default condition names for tables that do not name them.
 const NATURAL: &str = "natural";
 const GENERATED: &str = "generated";
-/// Letters of the longest name.
-const LONGEST: usize = 200;
+/// Maximum length of a name, characters.
+const MAX_NAME_CHARS: usize = 200;
 
-/// Cells of a row by field, without outer space.
+/// Cells of a row by field, trimmed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RowCells {
     pub values: BTreeMap<&'static str, String>,
-    /// Whether `0,5` is a number.
+    /// Whether the comma is a decimal separator (`0,5`).
     pub has_decimal_comma: bool,
 }
 
-type Read<T> = std::result::Result<T, String>;
+type RowResult<T> = std::result::Result<T, String>;
 
 impl RowCells {
     fn get(&self, field: &str) -> Option<&str> {
         self.values.get(field).map(String::as_str).filter(|cell| !cell.is_empty())
     }
 
-    fn name(&self, field: &str) -> Read<Option<String>> {
+    fn name(&self, field: &str) -> RowResult<Option<String>> {
         match self.get(field) {
-            Some(name) if name.chars().count() > LONGEST => Err(format!("{field} is longer than {LONGEST} letters")),
+            Some(name) if name.chars().count() > MAX_NAME_CHARS => {
+                Err(format!("{field} is longer than {MAX_NAME_CHARS} letters"))
+            }
             Some(name) if name.contains(char::is_control) => Err(format!("{field} has a control character")),
             name => Ok(name.map(str::to_owned)),
         }
     }
 
-    fn needed(&self, field: &str) -> Read<String> {
+    fn needed(&self, field: &str) -> RowResult<String> {
         self.name(field)?.ok_or_else(|| format!("{field} is empty"))
     }
 
-    fn number(&self, field: &str) -> Read<Option<f64>> {
+    fn number(&self, field: &str) -> RowResult<Option<f64>> {
         let Some(cell) = self.get(field) else { return Ok(None) };
         let point = if self.has_decimal_comma { cell.replace(',', ".") } else { cell.to_owned() };
         match point.parse::<f64>() {
@@ -52,7 +54,7 @@ impl RowCells {
     }
 
     /// Whole number from `low` to `high`.
-    fn whole(&self, field: &str, [low, high]: [i64; 2]) -> Read<Option<i64>> {
+    fn whole_number(&self, field: &str, [low, high]: [i64; 2]) -> RowResult<Option<i64>> {
         let Some(number) = self.number(field)? else { return Ok(None) };
         let is_right = number.fract() == 0.0 && number >= low as f64 && number <= high as f64;
         is_right
@@ -60,30 +62,30 @@ impl RowCells {
             .ok_or_else(|| format!("{field} is {number}; expected a whole number from {low} to {high}"))
     }
 
-    fn secs(&self, field: &str) -> Read<f64> {
+    fn secs(&self, field: &str) -> RowResult<f64> {
         match self.number(field)?.unwrap_or(0.0) {
             secs if secs >= 0.0 => Ok(secs),
             secs => Err(format!("{field} is {secs}; expected seconds")),
         }
     }
 
-    fn yes_or_no(&self, field: &str) -> Read<Option<bool>> {
+    fn yes_or_no(&self, field: &str) -> RowResult<Option<bool>> {
         self.get(field)
             .map(|cell| truth(cell).ok_or_else(|| expected(field, cell, "1 or 0, true or false")))
             .transpose()
     }
 
-    /// Value of a field that is spelt as in JSON.
-    fn keyword<T: for<'a> Deserialize<'a>>(&self, field: &str, words: &str) -> Read<Option<T>> {
+    /// Value of a field with the same spelling as in JSON.
+    fn keyword<T: for<'a> Deserialize<'a>>(&self, field: &str, words: &str) -> RowResult<Option<T>> {
         let Some(cell) = self.get(field) else { return Ok(None) };
         let word: serde::de::value::StrDeserializer<serde::de::value::Error> = cell.into_deserializer();
         T::deserialize(word).map(Some).map_err(|_| expected(field, cell, words))
     }
 }
 
-/// Vote of a row, or why there is none. `design` holds where no column says it. A row of one score is a vote of one
-/// condition; a row without a trial has the trial 0.
-pub fn vote(cells: &RowCells, design: Option<TaskDesign>) -> Read<StudyVote> {
+/// Converts a row to a vote, or gives the reason why it is not one. `design` applies if no column gives a design. A row
+/// with one score becomes a vote on one condition; a row without a trial gets trial 0.
+pub fn vote(cells: &RowCells, design: Option<TaskDesign>) -> RowResult<StudyVote> {
     let words = "turing, turing-single, preference, sliders or mismatch";
     let is_score = cells.get("score").is_some();
     let default = match (design, is_score, cells.get("step").is_some()) {
@@ -100,7 +102,7 @@ pub fn vote(cells: &RowCells, design: Option<TaskDesign>) -> Read<StudyVote> {
         task: cells.name("task")?.unwrap_or_else(|| title(design).to_owned()),
         design,
         phase,
-        trial: cells.whole("trial", [0, i64::from(u32::MAX)])?.unwrap_or(0) as u32,
+        trial: cells.whole_number("trial", [0, i64::from(u32::MAX)])?.unwrap_or(0) as u32,
         clip: if phase == TrialPhase::Main { cells.needed("clip")? } else { cells.name("clip")?.unwrap_or_default() },
         speaker: cells.name("speaker")?.unwrap_or_default(),
         conditions,
@@ -109,14 +111,14 @@ pub fn vote(cells: &RowCells, design: Option<TaskDesign>) -> Read<StudyVote> {
         stalled_secs: cells.secs("stalled_secs")?,
         unfocused_secs: cells.secs("unfocused_secs")?,
         response_secs: cells.secs("response_secs")?,
-        plays: cells.whole("plays", [0, i64::from(u32::MAX)])?.unwrap_or(0) as u32,
+        plays: cells.whole_number("plays", [0, i64::from(u32::MAX)])?.unwrap_or(0) as u32,
         completed: cells.yes_or_no("completed")?.unwrap_or(true),
     };
     check(&vote)?;
     Ok(vote)
 }
 
-/// Name of a task without one.
+/// Default name of a task.
 fn title(design: TaskDesign) -> &'static str {
     match design {
         TaskDesign::Turing => "real-or-generated",
@@ -127,8 +129,12 @@ fn title(design: TaskDesign) -> &'static str {
     }
 }
 
-/// Conditions, response and right response of a row.
-fn answer(cells: &RowCells, design: TaskDesign, phase: TrialPhase) -> Read<(Vec<String>, Response, Option<Response>)> {
+/// Conditions, response and expected response of a row.
+fn answer(
+    cells: &RowCells,
+    design: TaskDesign,
+    phase: TrialPhase,
+) -> RowResult<(Vec<String>, Response, Option<Response>)> {
     let names = cells.get("conditions").map(|names| names.split('|').map(|name| name.trim().to_owned()).collect());
     let condition = cells.name("condition")?;
     let names: Option<Vec<String>> = names.or_else(|| condition.clone().map(|name| vec![name]));
@@ -145,17 +151,17 @@ fn answer(cells: &RowCells, design: TaskDesign, phase: TrialPhase) -> Read<(Vec<
         let chosen = if is_correct { ScreenSide::Left } else { ScreenSide::Right };
         return Ok((conditions, Response::Side(chosen), Some(Response::Side(ScreenSide::Left))));
     }
-    if let Some(step) = cells.whole("step", [-2, 2])? {
+    if let Some(step) = cells.whole_number("step", [-2, 2])? {
         return Ok((names.unwrap_or_default(), Response::Step(step as i8), None));
     }
-    match cells.whole("score", [0, 100])? {
+    match cells.whole_number("score", [0, 100])? {
         Some(score) => Ok((names.unwrap_or_default(), Response::Scores(vec![score as u8]), None)),
         None => Err("it has no answer".to_owned()),
     }
 }
 
-/// Response as JSON or in plain words: `left`, `real`, `-1`, `70|20`.
-fn response(field: &str, cell: &str, design: TaskDesign, phase: TrialPhase) -> Read<Response> {
+/// Parses a response given as JSON or as text: `left`, `real`, `-1`, `70|20`.
+fn response(field: &str, cell: &str, design: TaskDesign, phase: TrialPhase) -> RowResult<Response> {
     if cell.starts_with('{') {
         return serde_json::from_str(cell).map_err(|_| expected(field, cell, "an answer like {\"side\":\"left\"}"));
     }
@@ -188,8 +194,8 @@ fn response(field: &str, cell: &str, design: TaskDesign, phase: TrialPhase) -> R
     read.ok_or_else(|| expected(field, cell, words))
 }
 
-/// What a vote of the main phase must be for the analysis of its design.
-pub fn check(vote: &StudyVote) -> Read<()> {
+/// Checks that a vote of the main phase fits the analysis of its design.
+pub fn check(vote: &StudyVote) -> RowResult<()> {
     if vote.phase != TrialPhase::Main {
         return Ok(());
     }

@@ -1,36 +1,43 @@
-//! Mean score with the error that other participants and other clips would bring: crossed variance, a t distribution
-//! with Satterthwaite's degrees of freedom. Assumes that participants and clips are each a sample, drawn independently,
-//! and that votes which share neither are independent. Two of both are needed, some 20 for the t distribution to hold.
+//! Mean score with a standard error that accounts for sampling both participants and clips: crossed variance components
+//! and a t distribution with Satterthwaite's degrees of freedom. Assumes that participants and clips are independent
+//! samples, and that votes which share neither are independent. At least two of both are required; the t approximation
+//! needs about 20 of each.
 
 use super::super::estimate::{StatisticsError, StudentEstimate, at_least};
 use super::votes::{CLIP, ClipVote, PAIR, PARTICIPANT, VoteGroups, scores};
 use std::ops::Range;
 
-/// Mean of all votes, each with the same weight.
+/// Mean of all votes with equal weights.
+///
+/// # Errors
+/// There are fewer than two participants or clips, a score is not finite, or the estimated variance is 0.
 pub fn crossed_estimate(votes: &[ClipVote]) -> Result<StudentEstimate, StatisticsError> {
     estimate(&[votes], &[1.0])
 }
 
-/// Mean of the votes in `first` less that in `second`; participants and clips may occur in both, and what these have
-/// in common then cancels.
+/// Difference of the means of `first` and `second`. Participants and clips may occur in both; their common effects then
+/// cancel.
+///
+/// # Errors
+/// A cell has fewer than two participants or clips, a score is not finite, or the estimated variance is 0.
 pub fn crossed_difference(first: &[ClipVote], second: &[ClipVote]) -> Result<StudentEstimate, StatisticsError> {
     estimate(&[first, second], &[1.0, -1.0])
 }
 
-/// Weighted sum of the cells' means. Degrees of freedom as by Satterthwaite 1946, of an effective number of groups.
+/// Weighted sum of the cells' means, with degrees of freedom by Satterthwaite (1946) from effective numbers of groups.
 fn estimate(cells: &[&[ClipVote]], weights: &[f64]) -> Result<StudentEstimate, StatisticsError> {
     let groups = VoteGroups::new(cells)?;
     let mut start = 0;
     let mut contrast = Contrast(Vec::new());
     for (votes, weight) in cells.iter().zip(weights) {
-        // With two of both there are two votes that share nothing.
+        // Two of both guarantee that some two votes share neither a participant nor a clip.
         let own = VoteGroups::new(&[votes])?;
         at_least("participants", 2, own.n[PARTICIPANT])?;
         at_least("clips", 2, own.n[CLIP])?;
         contrast.0.push((start..start + votes.len(), *weight));
         start += votes.len();
     }
-    // Rounding alone makes equal scores differ from their mean by a few last places.
+    // Without this check, rounding would give equal scores a tiny variance above 0.
     if cells.iter().all(|votes| votes.iter().all(|vote| vote.score == votes[0].score)) {
         return Err(StatisticsError::NoSpread { what: "scores" });
     }
@@ -40,10 +47,10 @@ fn estimate(cells: &[&[ClipVote]], weights: &[f64]) -> Result<StudentEstimate, S
     StudentEstimate::new(contrast.value(&scores), variance.total().sqrt(), freedom)
 }
 
-/// Cells, each a range of the votes, and the weights of their means in a sum.
+/// Linear contrast: cells (ranges of the votes) with the weights of their means.
 pub(in super::super) struct Contrast(pub Vec<(Range<usize>, f64)>);
 
-/// Variance of a contrast: the parts of participants, clips and single votes. A part whose estimate is negative is 0.
+/// Variance components of a contrast: participants, clips and residual (single votes). Negative estimates are set to 0.
 pub(in super::super) struct CrossedVariance {
     parts: [f64; 3],
 }
@@ -53,8 +60,9 @@ impl CrossedVariance {
         self.parts.iter().sum()
     }
 
-    /// Degrees of freedom of the total (Satterthwaite 1946), as of mean squares of participants, of clips and of single
-    /// votes with degrees of freedom `of`; that of participants contains single votes, and so does that of clips.
+    /// Degrees of freedom of the total variance (Satterthwaite 1946) from mean squares of participants, clips and
+    /// residual with degrees of freedom `of`. The expected mean squares of participants and of clips both contain the
+    /// residual.
     fn degrees_of_freedom(&self, of: [f64; 3]) -> f64 {
         let [participants, clips, votes] = self.parts;
         let share = |part: f64, freedom: f64| part * part / freedom;
@@ -73,23 +81,23 @@ impl Contrast {
         self.0.iter().map(|(cell, weight)| weight * mean(&scores[cell.clone()])).sum()
     }
 
-    /// Covariances of votes that share a participant, a clip or both, as means of products of their deviations less the
-    /// mean product of votes that share nothing: without bias where the design is balanced, and then those of the
-    /// analysis of variance. Their sum is the two-way clustered variance of Cameron, Gelbach and Miller 2011 but for its
-    /// divisor. 0 where no two votes share nothing.
+    /// Covariances of votes that share a participant, a clip or both: means of products of deviations, less the mean
+    /// product of votes that share nothing. Unbiased for balanced designs, where they equal those of the analysis of
+    /// variance. Their sum is the two-way clustered variance of Cameron, Gelbach and Miller (2011) up to its divisor.
+    /// If every two votes share something, the mean product subtracted is 0.
     pub(crate) fn variance(&self, groups: &VoteGroups, scores: &[f64]) -> CrossedVariance {
         let sums: Vec<[Vec<(f64, f64)>; 3]> = self.0.iter().map(|(cell, _)| group_sums(cell, groups, scores)).collect();
         let mut parts = [0.0; 3];
         for (a, (cell_a, weight_a)) in sums.iter().zip(&self.0) {
             for (b, (cell_b, weight_b)) in sums.iter().zip(&self.0) {
-                // Pairs of votes and sums of their products; pairs that share both are in all three.
+                // Numbers of pairs of votes and sums of their products; pairs that share both are counted in all three.
                 let [participants, clips, both] = [PARTICIPANT, CLIP, PAIR].map(|kind| {
                     let pairs = a[kind].iter().zip(&b[kind]);
                     pairs.fold((0.0, 0.0), |(n, sum), (a, b)| (n + a.0 * b.0, sum + a.1 * b.1))
                 });
                 let all = (cell_a.len() * cell_b.len()) as f64;
                 let n_apart = all - participants.0 - clips.0 + both.0;
-                // Deviations add up to 0, so that those of all pairs do.
+                // Deviations add up to 0, hence so do the products over all pairs.
                 let apart = if n_apart > 0.0 { (both.1 - participants.1 - clips.1) / n_apart } else { 0.0 };
                 let weight = weight_a * weight_b / all;
                 let covariance = |(n, sum): (f64, f64)| weight * (sum - n * apart);
@@ -101,8 +109,9 @@ impl Contrast {
         CrossedVariance { parts: parts.map(|part| part.max(0.0)) }
     }
 
-    /// Number of participants, clips and pairs, groups with few votes counting less (Carter, Schnepel and Steigerwald
-    /// 2017), less the number of means that separate groups have given.
+    /// Effective numbers of participants, clips and pairs, in which groups with few votes count less (Carter, Schnepel
+    /// and Steigerwald 2017), less the number of estimated means: one if a group occurs in several cells, otherwise one
+    /// per cell.
     fn effective_groups(&self, groups: &VoteGroups) -> [f64; 3] {
         [PARTICIPANT, CLIP, PAIR].map(|kind| {
             let mut shares = vec![0.0; groups.n[kind]];
@@ -122,7 +131,7 @@ impl Contrast {
     }
 }
 
-/// Number of votes and sum of deviations from the cell's mean, for each group.
+/// For each group, the number of its votes and the sum of their deviations from the cell's mean.
 fn group_sums(cell: &Range<usize>, groups: &VoteGroups, scores: &[f64]) -> [Vec<(f64, f64)>; 3] {
     let mean = mean(&scores[cell.clone()]);
     [PARTICIPANT, CLIP, PAIR].map(|kind| {
@@ -146,7 +155,7 @@ mod tests {
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    /// Score with an effect of the participant, one of the clip, and chance; `n` selects another set of numbers.
+    /// Score with participant, clip and residual effects; `n` selects an independent set of effects.
     fn score(n: usize, participant: usize, clip: usize) -> f64 {
         let random = |kind: u64, number: usize| {
             ChaCha8Rng::seed_from_u64(n as u64 * 1_000_000 + kind * 10_000 + number as u64).random::<f64>()
@@ -159,14 +168,14 @@ mod tests {
         votes.map(|(participant, clip)| ClipVote { participant, clip, score: score(n, participant, clip) }).collect()
     }
 
-    /// Where every participant votes on every clip, the variance is that of the two-way analysis of variance:
-    /// (mean square of participants + of clips - of the rest) / votes.
+    /// In a full crossing the variance is that of the two-way analysis of variance: (mean square of participants + of
+    /// clips - residual) / votes.
     #[test]
     fn full_crossing_gives_the_analysis_of_variance() {
         let (n_p, n_c) = (9, 7);
         let votes = crossed(1, n_p, 0..n_c);
-        let mean = |kept: &dyn Fn(&ClipVote) -> bool| {
-            let scores: Vec<f64> = votes.iter().filter(|vote| kept(vote)).map(|vote| vote.score).collect();
+        let mean = |is_kept: &dyn Fn(&ClipVote) -> bool| {
+            let scores: Vec<f64> = votes.iter().filter(|vote| is_kept(vote)).map(|vote| vote.score).collect();
             scores.iter().sum::<f64>() / scores.len() as f64
         };
         let grand = mean(&|_| true);
@@ -183,7 +192,7 @@ mod tests {
         assert!((estimate.value - grand).abs() < 1e-12);
     }
 
-    /// The mean of the estimated variances is the variance of the means, over 400 drawn studies.
+    /// The mean estimated variance equals the variance of the means, over 400 simulated studies.
     #[test]
     fn variance_is_unbiased() {
         for differ in [false, true] {
@@ -225,7 +234,7 @@ mod tests {
         assert_eq!(what(crossed_estimate(&crossed(1, 1, 0..9))), "participants");
         assert_eq!(what(crossed_estimate(&crossed(1, 9, 0..1))), "clips");
         assert_eq!(what(crossed_estimate(&[])), "votes");
-        // Each vote shares its participant or its clip with every other.
+        // Every vote shares a participant or a clip with the first.
         let star =
             [(0, 0), (0, 1), (1, 0)].map(|(participant, clip)| ClipVote { participant, clip, score: clip as f64 });
         assert!(crossed_estimate(&star[..2]).is_err() && crossed_estimate(&star).is_ok());

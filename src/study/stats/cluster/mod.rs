@@ -1,7 +1,7 @@
-//! Votes of which many come from one participant and many are about one clip, so that they are not independent.
-//! Two hypotheses differ: that participants score chance on these very clips (`votes`), and that they would on
-//! average over all clips of which these are a sample (`crossed`, the headline; Clark 1973). The first is rejected
-//! wherever some of the chosen clips happen to be easy, the second is not.
+//! Statistics of clustered votes: votes of one participant and votes about one clip are not independent. Two hypotheses
+//! must be distinguished: chance performance on these particular clips (`votes`), and chance performance on average
+//! over the population of clips from which these are a sample (`crossed`, the headline; Clark 1973). The first is
+//! rejected whenever some of the chosen clips happen to be easy, the second is not.
 
 pub mod crossed;
 pub mod sign_flips;

@@ -1,7 +1,7 @@
-//! Randomisation tests. Sign flips of whole groups of votes where participants and clips are both samples: a wild cluster
-//! bootstrap of the studentised mean with the hypothesis imposed (MacKinnon et al. 2021), asymptotic, for deviations that are
-//! symmetric about the hypothesis. The plan's own draw of sides, exact: it tests the sharp hypothesis that nobody's choice
-//! depends on where the real film is, for any clip; easy clips that hard ones outweigh contradict it.
+//! Randomisation tests. `sign_flip_p`: wild cluster bootstrap of the studentised mean with the null imposed (MacKinnon
+//! et al. 2021), with participants and clips as samples; asymptotic, for deviations symmetric about the null. `side_p`:
+//! exact test over the plan's assignment of sides, under the sharp null that no choice depends on the side of the real
+//! film, for any clip; easy clips that are balanced by hard ones also contradict this null.
 
 use super::super::estimate::{StatisticsError, at_least, finite};
 use super::crossed::Contrast;
@@ -11,15 +11,19 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use statrs::distribution::{Discrete, Hypergeometric};
 
-/// Random numbers of a draw: each has its own stream, so results do not depend on the number of threads.
+/// Generator of one draw. Each draw has its own stream, so results do not depend on the number of threads.
 pub(in super::super) fn rng_of_draw(seed: u64, draw: u64) -> ChaCha8Rng {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(draw);
     rng
 }
 
-/// Two-sided p value of the hypothesis that the mean score is `expected` for other participants and other clips. Flips
-/// the scores less `expected` of all votes of a participant or of a clip, of which there are fewer.
+/// Two-sided p value of the hypothesis that the population mean over participants and clips is `expected`. The
+/// deviations from `expected` are flipped jointly for all votes of a participant, or of a clip if there are fewer
+/// clips.
+///
+/// # Errors
+/// There are fewer than two participants or clips, `n_draws` is 0, or a score or `expected` is not finite.
 pub fn sign_flip_p(votes: &[ClipVote], expected: f64, n_draws: usize, seed: u64) -> Result<f64, StatisticsError> {
     finite("expected scores", &[expected])?;
     at_least("draws", 1, n_draws)?;
@@ -29,7 +33,7 @@ pub fn sign_flip_p(votes: &[ClipVote], expected: f64, n_draws: usize, seed: u64)
     let contrast = Contrast(vec![(0..votes.len(), 1.0)]);
     let statistic = |scores: &[f64]| {
         let mean = contrast.value(scores).abs();
-        // Scores without any spread about a mean of 0 are as near as can be.
+        // Avoids 0 / 0 for scores without spread.
         if mean == 0.0 { 0.0 } else { mean / contrast.variance(&groups, scores).total().sqrt() }
     };
     let scores: Vec<f64> = votes.iter().map(|vote| vote.score - expected).collect();
@@ -45,15 +49,15 @@ pub fn sign_flip_p(votes: &[ClipVote], expected: f64, n_draws: usize, seed: u64)
     Ok((1 + n_far) as f64 / (1 + n_draws) as f64)
 }
 
-/// Trials among which the plan fixed how often the real film is on the left and drew at random in which: those of a
-/// participant, or of a participant and a condition. Of trials whose sides were drawn one by one,
-/// `BinomialCount::test` is the exact test.
+/// Trials of a participant, or of a participant and a condition, for which the plan fixes how often the real film is on
+/// the left and randomises in which trials. If sides were drawn independently per trial, `BinomialCount::test` is the
+/// exact test.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SideBlock {
     trials: u64,
     real_left: u64,
     chosen_left: u64,
-    /// Trials in which the left film was both real and chosen.
+    /// Number of trials in which the left film was both real and chosen.
     left_hits: u64,
 }
 
@@ -67,12 +71,15 @@ impl SideBlock {
     }
 }
 
-/// Two-sided p value of the exact test over all draws of sides that leave the number of real films on the left of each block: a sum of
-/// hypergeometric counts (Fisher 1935), by convolution.
+/// Exact two-sided p value over all assignments of sides that preserve each block's number of real films on the left:
+/// the distribution of a sum of hypergeometric counts (Fisher 1935), by convolution.
+///
+/// # Errors
+/// There are no trials.
 pub fn side_p(blocks: &[SideBlock]) -> Result<f64, StatisticsError> {
     let trials: u64 = blocks.iter().map(|block| block.trials).sum();
     at_least("trials", 1, trials.min(1) as usize)?;
-    // Probabilities of the number of left hits.
+    // Distribution of the total number of left hits.
     let mut distribution = vec![1.0];
     let mut mean = 0.0;
     for block in blocks.iter().filter(|block| block.trials > 0) {
@@ -105,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn threads_change_nothing() {
+    fn results_do_not_depend_on_threads() {
         let (votes, alone) = (votes(1, 0.5), rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap());
         let p = || sign_flip_p(&votes, 0.5, 99, 3).unwrap();
         assert_eq!(p(), alone.install(p));
@@ -122,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn extremes_and_refusals() {
+    fn extreme_scores_and_invalid_arguments() {
         let all: Vec<ClipVote> = votes(4, 0.5).iter().map(|vote| ClipVote { score: 1.0, ..*vote }).collect();
         assert!(sign_flip_p(&all, 0.5, 999, 1).unwrap() < 0.01);
         assert_eq!(sign_flip_p(&all, 1.0, 99, 1), Ok(1.0));
@@ -138,9 +145,10 @@ mod tests {
         block
     }
 
-    /// Two blocks of three trials, one real film on the left in the first, two in the second: all nine draws.
+    /// Two blocks of three trials with one and two real films on the left: compares with the enumeration of all nine
+    /// assignments.
     #[test]
-    fn p_is_the_share_of_all_draws() {
+    fn p_is_the_share_of_all_assignments() {
         let (first, second) = ([true, false, false], [true, true, false]);
         for chosen in 0..64u32 {
             let chosen: Vec<bool> = (0..6).map(|k| chosen >> k & 1 == 1).collect();
@@ -165,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn who_always_chooses_left_shows_nothing() {
+    fn always_choosing_left_is_no_evidence() {
         let left = block(&[(true, true), (false, true), (true, true), (false, true)]);
         assert_eq!(side_p(&[left, SideBlock::default()]), Ok(1.0));
         assert!(side_p(&[]).is_err() && side_p(&[SideBlock::default()]).is_err());

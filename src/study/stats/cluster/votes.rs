@@ -1,14 +1,13 @@
-//! Scores by participant and clip, how they are grouped by them, and means of participants: their scores on the chosen
-//! clips, for other participants of the same kind. Such means assume that participants are independent of each other; the
-//! clips count as given, and the p value is that of the hypothesis that the mean over these clips is chance. Where clips are
-//! a sample, `crossed` is the test: with 100 participants, 20 votes each and 40 clips whose log odds vary by 0.3, a t test of
-//! participants' means rejects a true hypothesis in 14 % of studies instead of 5 %.
+//! Votes grouped by participant and clip, and statistics of participants' means: performance on the chosen clips,
+//! generalised to other participants. Participants are assumed independent, clips are fixed. If clips are a sample, use
+//! `crossed`: with 100 participants, 20 votes each and 40 clips whose log odds have standard deviation 0.3, a t test of
+//! participants' means rejects a true null in 14 % of studies instead of 5 %.
 
 use super::super::estimate::{StatisticsError, StudentEstimate, at_least, finite};
 use std::collections::BTreeMap;
 
-/// Score of one participant in one trial about one clip: 1 and 0 for right and wrong, a rating, a signed preference.
-/// Numbers of participants and clips may have gaps; the cells of a study share them.
+/// Score of one participant in one trial about one clip: 1 or 0 for correct or wrong, a rating, or a signed preference.
+/// Indices of participants and clips may have gaps; all cells of a study share the indices.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClipVote {
     pub participant: usize,
@@ -16,21 +15,24 @@ pub struct ClipVote {
     pub score: f64,
 }
 
-/// What votes may share.
+/// Kinds of groups that votes may share, indices into [`VoteGroups`].
 pub(in super::super) const PARTICIPANT: usize = 0;
 pub(in super::super) const CLIP: usize = 1;
 pub(super) const PAIR: usize = 2;
 
-/// Groups of the votes of all cells of a study, one cell after the other: by participant, by clip, by both. Groups are
-/// numbered in ascending order, without gaps.
+/// Groups of the concatenated votes of all cells: by participant, by clip, by both. Groups are numbered from 0 in
+/// ascending order of their keys, without gaps.
 pub(in super::super) struct VoteGroups {
-    /// Group of each vote.
+    /// Group of each vote, by kind of group.
     pub of: [Vec<usize>; 3],
     pub n: [usize; 3],
 }
 
 impl VoteGroups {
-    /// Refuses cells without votes and scores that are not finite.
+    /// Groups the votes of the cells.
+    ///
+    /// # Errors
+    /// A cell has no votes, or a score is not finite.
     pub(crate) fn new(cells: &[&[ClipVote]]) -> Result<Self, StatisticsError> {
         for votes in cells {
             at_least("votes", 1, votes.len())?;
@@ -48,28 +50,28 @@ impl VoteGroups {
     }
 }
 
-/// Scores of the votes of all cells, one cell after the other.
+/// Scores of the concatenated votes of all cells.
 pub(in super::super) fn scores(cells: &[&[ClipVote]]) -> Vec<f64> {
     cells.iter().flat_map(|votes| votes.iter().map(|vote| vote.score)).collect()
 }
 
-/// Mean score of each participant, in the order of their numbers.
+/// Mean score of each participant, in ascending order of index.
 pub fn participant_means(votes: &[ClipVote]) -> Result<Vec<f64>, StatisticsError> {
     Ok(means_by_cell(&[votes])?.into_iter().map(|means| means[0]).collect())
 }
 
-/// Mean of the participants' mean scores, each participant with the same weight.
+/// Mean of the participants' mean scores, with equal weights.
 pub fn participant_estimate(votes: &[ClipVote]) -> Result<StudentEstimate, StatisticsError> {
     StudentEstimate::of_mean(&participant_means(votes)?)
 }
 
-/// Mean score in `first` less that in `second` of each participant who voted in both.
+/// Difference of the mean scores in `first` and `second`, for each participant who voted in both.
 pub fn participant_differences(first: &[ClipVote], second: &[ClipVote]) -> Result<Vec<f64>, StatisticsError> {
     let differences = means_by_cell(&[first, second])?.into_iter().map(|means| means[0] - means[1]);
     Ok(differences.filter(|difference| difference.is_finite()).collect())
 }
 
-/// Mean score of each participant in each of two cells at most, NaN without a vote.
+/// Mean score of each participant in each of at most two cells; NaN without votes.
 fn means_by_cell(cells: &[&[ClipVote]]) -> Result<Vec<[f64; 2]>, StatisticsError> {
     let groups = VoteGroups::new(cells)?;
     let mut sums = vec![[(0.0, 0.0); 2]; groups.n[PARTICIPANT]];

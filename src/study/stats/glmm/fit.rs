@@ -1,6 +1,6 @@
-//! Mixed logistic regression: log odds of success = intercept + intercept of the participant + intercept of the clip, the
-//! latter two normally distributed. Maximum likelihood by Laplace's approximation, as `glmer(score ~ 1 +
-//! (1 | participant) + (1 | clip), family = binomial)` of lme4 (Bates et al. 2015).
+//! Mixed logistic regression: log odds of success = intercept + random intercept of the participant + random intercept
+//! of the clip, both normally distributed. Fitted by maximum likelihood with the Laplace approximation, like
+//! `glmer(score ~ 1 + (1 | participant) + (1 | clip), family = binomial)` of lme4 (Bates et al. 2015).
 
 use super::laplace::Laplace;
 use super::minimum::{curvature, minimum};
@@ -9,28 +9,31 @@ use crate::stats::estimate::{ConfidenceInterval, StatisticsError, StudentEstimat
 use ndarray::{Array1, Array2, array};
 use orator_base::math::cholesky;
 
-/// Standard deviation, in log odds, from which the search starts.
-const FIRST_SD: f64 = 0.4;
-/// Standard deviation below which a factor has no variance.
-const NO_SD: f64 = 1e-3;
+/// Initial standard deviation of the search, log odds.
+const INITIAL_SD: f64 = 0.4;
+/// Standard deviation below which a variance component is set to 0, log odds.
+const MIN_SD: f64 = 1e-3;
 
 /// Fitted model.
 #[derive(Clone, Debug)]
 pub struct MixedLogit {
-    /// Log odds of a typical participant and clip, by a t distribution of one degree of freedom less than the smaller number
-    /// of participants and clips: Wald's test errs too often with few clips.
+    /// Log odds of a participant and clip with effect 0. Its t distribution has min(participants, clips) - 1 degrees of
+    /// freedom, because Wald's test rejects too often with few clips.
     pub intercept: StudentEstimate,
-    /// Standard deviations of the random intercepts, in log odds; 0 where the votes show none.
+    /// Standard deviations of the random intercepts, log odds; 0 if the fit is singular.
     pub sd_participants: f64,
     pub sd_clips: f64,
     pub log_likelihood: f64,
     pub converged: bool,
-    /// Covariance [3, 3] of both standard deviations and the intercept, in this order.
+    /// Covariance [3, 3] of the two standard deviations and the intercept, in this order.
     covariance: Array2<f64>,
 }
 
 impl MixedLogit {
-    /// Fits votes with scores 0 and 1. Refuses fewer than two participants or clips, and equal votes.
+    /// Fits votes with scores 0 and 1.
+    ///
+    /// # Errors
+    /// Fewer than two participants or clips, scores other than 0 and 1, or all votes equal.
     pub fn fit(votes: &[ClipVote]) -> Result<Self, StatisticsError> {
         let groups = VoteGroups::new(&[votes])?;
         at_least("participants", 2, groups.n[PARTICIPANT])?;
@@ -43,7 +46,7 @@ impl MixedLogit {
         if share == 0.0 || share == 1.0 {
             return Err(StatisticsError::NoSpread { what: "votes" });
         }
-        // Parameters are counted in about their standard errors; the search starts from the model without random intercepts.
+        // Parameters are scaled by their approximate standard errors, so that the curvature is about 1.
         let n_groups = groups.n[PARTICIPANT].min(groups.n[CLIP]) as f64;
         let of_sd = 1.0 / (2.0 * n_groups).sqrt();
         let units = array![of_sd, of_sd, 1.0 / (n * share * (1.0 - share)).sqrt()];
@@ -52,10 +55,10 @@ impl MixedLogit {
             let parameters = at * &units;
             laplace.negative_log_likelihood(parameters[2], [parameters[0], parameters[1]])
         };
-        let first = array![FIRST_SD, FIRST_SD, (share / (1.0 - share)).ln()] / &units;
+        let first = array![INITIAL_SD, INITIAL_SD, (share / (1.0 - share)).ln()] / &units;
         let mut best = minimum(&mut value, first);
         for k in 0..2 {
-            if (best.at[k] * units[k]).abs() < NO_SD {
+            if (best.at[k] * units[k]).abs() < MIN_SD {
                 best.at[k] = 0.0;
                 best.value = value(&best.at);
             }
@@ -75,8 +78,8 @@ impl MixedLogit {
         })
     }
 
-    /// Share of success over all participants and clips: the mean over the random intercepts. The interval is symmetric in
-    /// log odds, by the delta method and the t distribution of the intercept.
+    /// Marginal proportion of successes, averaged over the random intercepts, with an interval that is symmetric in log
+    /// odds (delta method, t distribution of the intercept).
     pub fn share(&self, confidence: f64) -> Result<(f64, ConfidenceInterval), StatisticsError> {
         let sd = self.sd_participants.hypot(self.sd_clips);
         let (share, per_log_odds, per_variance) = integrated(self.intercept.value, sd);
@@ -90,13 +93,14 @@ impl MixedLogit {
     }
 }
 
-/// Probability at these log odds.
+/// Logistic function: probability at these log odds.
 pub fn logistic(log_odds: f64) -> f64 {
     1.0 / (1.0 + (-log_odds).exp())
 }
 
-/// Mean of the logistic function of a normal variable, and its derivatives by mean and by variance (half the second
-/// derivative by the mean). Sum at steps of 1/16 of a standard deviation.
+/// Mean of the logistic function of a normal variable, and its derivatives with respect to the mean and the variance
+/// (the latter is half the second derivative with respect to the mean). Sums over ±8 standard deviations in steps of
+/// 1/16.
 pub fn integrated(mean: f64, sd: f64) -> (f64, f64, f64) {
     let points = (-128..=128).map(|k| f64::from(k) / 16.0);
     let sums = points.fold((0.0, 0.0, 0.0, 0.0), |(total, a, b, c), z| {
@@ -107,14 +111,14 @@ pub fn integrated(mean: f64, sd: f64) -> (f64, f64, f64) {
     (sums.1 / sums.0, sums.2 / sums.0, sums.3 / sums.0)
 }
 
-/// Inverse of a curvature. Where it is not positive definite, the intercept loses what it has in common with the standard
-/// deviations.
+/// Inverse of the Hessian. If it is not positive definite, the standard deviations are treated as known and their
+/// covariances with the intercept as 0.
 fn inverse(mut second: Array2<f64>) -> Array2<f64> {
-    if !is_positive(&second) {
+    if !is_positive_definite(&second) {
         for k in 0..2 {
             second.row_mut(k).fill(0.0);
             second.column_mut(k).fill(0.0);
-            // Infinite information: no variance.
+            // Practically infinite information, hence no variance.
             second[[k, k]] = 1e12;
         }
     }
@@ -122,7 +126,7 @@ fn inverse(mut second: Array2<f64>) -> Array2<f64> {
     cholesky::solve(second, Array2::eye(n))
 }
 
-fn is_positive(matrix: &Array2<f64>) -> bool {
+fn is_positive_definite(matrix: &Array2<f64>) -> bool {
     let n = matrix.nrows();
     let mut rest = matrix.clone();
     for k in 0..n {
@@ -139,7 +143,7 @@ fn is_positive(matrix: &Array2<f64>) -> bool {
     true
 }
 
-/// Fits beside those of lme4 (`fixtures/reference/study_glmm.R`), votes that have none, and simulated studies.
+/// Compares fits with lme4 (`fixtures/reference/study_glmm.R`), and tests votes without a fit and simulated studies.
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -156,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn fits_are_those_of_lme4_whatever_the_order_of_votes() {
+    fn fits_match_lme4_in_any_order_of_votes() {
         let text = include_str!("../../../../fixtures/reference/study_glmm_golden.json");
         let golden: BTreeMap<String, Value> = serde_json::from_str(text).unwrap();
         for (name, set) in &golden {
@@ -197,15 +201,15 @@ mod tests {
         assert!(matches!(alone, StatisticsError::TooFew { what: "participants", .. }));
         assert!(matches!(refused(|v| ClipVote { clip: 3, ..*v }), StatisticsError::TooFew { what: "clips", .. }));
         assert!(matches!(refused(|v| ClipVote { score: 0.5, ..*v }), StatisticsError::OutOfRange { .. }));
-        // Participants who always say the same, and two votes in all: a fit or a reason, no panic.
+        // Participants who always answer alike, and a total of two votes: a fit or an error, no panic.
         let stubborn = changed(|v| ClipVote { score: (v.participant % 2) as f64, ..*v });
         assert!(stubborn.is_ok_and(|model| model.intercept.value.is_finite()));
         let _ = MixedLogit::fit(&[vote(0, 0, 1.0), vote(1, 1, 0.0)]);
     }
 
-    /// 40 studies with wide bounds; `ORATOR_LONG` makes them 2,000 with narrow ones.
+    /// 40 studies with wide bounds; with `ORATOR_LONG` set, 2,000 studies with narrow bounds.
     #[test]
-    fn tests_err_as_often_as_they_say_and_intervals_cover() {
+    fn error_rates_and_coverage_are_nominal() {
         let is_long = std::env::var_os("ORATOR_LONG").is_some();
         let (n_studies, least, most) = if is_long { (2000, 0.03, 0.07) } else { (40, 0.0, 0.2) };
         for n_clips in if is_long { vec![40, 20] } else { vec![40] } {

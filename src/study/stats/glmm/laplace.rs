@@ -1,23 +1,23 @@
-//! Likelihood of a mixed logistic regression by Laplace's approximation (Breslow and Clayton 1993; Bates et al. 2015):
-//! the random intercepts, in units of their standard deviations, at their most probable values, found by penalised
-//! iteratively reweighted least squares, and the curvature there.
+//! Laplace approximation of the likelihood of a mixed logistic regression (Breslow and Clayton 1993; Bates et al.
+//! 2015). The mode of the standardised random intercepts is found by penalised iteratively reweighted least squares;
+//! the determinant of the Hessian at the mode gives the correction.
 
 use crate::stats::cluster::votes::{CLIP, PARTICIPANT, VoteGroups};
 
-/// Most iterations for the random intercepts.
-const MOST: usize = 50;
+/// Maximum number of iterations for the random intercepts.
+const MAX_ITERATIONS: usize = 50;
 
-/// One vote as the likelihood sees it: 1 or 0, and its level in the larger and the smaller of the two factors.
+/// Vote with its outcome, 1 or 0, and its levels of the larger and the smaller of the two factors.
 struct Observation {
     success: f64,
     many: usize,
     few: usize,
 }
 
-/// Likelihood as a function of the fixed intercept and the standard deviations. Keeps the random intercepts of its last call,
-/// from which the next one starts.
+/// Likelihood as a function of the fixed intercept and the standard deviations. Each call starts from the random
+/// intercepts of the previous one.
 pub(super) struct Laplace {
-    /// Sorted by `many`.
+    /// Votes sorted by `many`.
     observations: Vec<Observation>,
     n_many: usize,
     n_few: usize,
@@ -25,7 +25,8 @@ pub(super) struct Laplace {
     intercepts: Vec<f64>,
 }
 
-/// Blocks of the curvature: diagonal of the larger factor, decomposed rest of the smaller one, weights between both.
+/// Block decomposition of the Hessian: the diagonal of the larger factor, the Cholesky factor of the Schur complement
+/// of the smaller one, and the off-diagonal elements in the order of the observations.
 struct Curvature {
     diagonal: Vec<f64>,
     lower: Vec<f64>,
@@ -53,8 +54,8 @@ impl Laplace {
         }
     }
 
-    /// Negative log-likelihood for the fixed part `fixed` of all log odds and the standard deviations of participants and
-    /// clips. Even in both deviations.
+    /// Negative log-likelihood for the intercept `fixed` (log odds) and the standard deviations of participants and
+    /// clips. An even function of both standard deviations.
     pub(super) fn negative_log_likelihood(&mut self, fixed: f64, [participants, clips]: [f64; 2]) -> f64 {
         let sds = if self.clips_are_many { [clips, participants] } else { [participants, clips] };
         let mut value = self.penalised(&self.intercepts, fixed, sds);
@@ -62,7 +63,7 @@ impl Laplace {
             self.intercepts.fill(0.0);
             value = self.penalised(&self.intercepts, fixed, sds);
         }
-        for _ in 0..MOST {
+        for _ in 0..MAX_ITERATIONS {
             let (gradient, curvature) = self.derivatives(fixed, sds);
             let step = self.solve(&curvature, gradient);
             let size = step.iter().fold(0.0f64, |most, v| most.max(v.abs()));
@@ -130,7 +131,7 @@ impl Laplace {
         (gradient, Curvature { diagonal, lower, between })
     }
 
-    /// Curvature inverse times `right`.
+    /// Solves curvature x = `right`.
     fn solve(&self, curvature: &Curvature, mut right: Vec<f64>) -> Vec<f64> {
         for (observation, between) in self.observations.iter().zip(&curvature.between) {
             right[self.n_many + observation.few] -=
@@ -145,8 +146,8 @@ impl Laplace {
     }
 }
 
-/// Lower triangle of a positive definite matrix [n, n] to its Cholesky factor. Pivots that rounding made too small
-/// are lifted.
+/// Replaces the lower triangle of a positive definite matrix [n, n] by its Cholesky factor. Pivots that are too small
+/// because of rounding are raised.
 fn decompose(lower: &mut [f64], n: usize) {
     for i in 0..n {
         for j in 0..=i {

@@ -1,16 +1,16 @@
-//! Minimum of a smooth function of a few parameters whose curvature is about 1: quasi-Newton steps (Broyden, Fletcher,
-//! Goldfarb, Shanno 1970) with central differences, and the curvature at the minimum.
+//! Minimisation of a smooth function of a few parameters with curvature of about 1: BFGS (Broyden, Fletcher, Goldfarb,
+//! Shanno 1970) with central differences, and the Hessian at the minimum.
 
 use ndarray::{Array1, Array2};
 
-const MOST: usize = 200;
-/// Step of the differences for slopes and for curvatures.
-const SLOPE_STEP: f64 = 1e-3;
+const MAX_STEPS: usize = 200;
+/// Steps of the finite differences for gradients and Hessians.
+const GRADIENT_STEP: f64 = 1e-3;
 const CURVATURE_STEP: f64 = 0.02;
-/// Largest slope at a minimum.
-const FLAT: f64 = 1e-4;
+/// Maximum gradient component at convergence.
+const GRADIENT_TOLERANCE: f64 = 1e-4;
 
-/// Where the search ended.
+/// Result of the search.
 pub(super) struct Minimum {
     pub at: Array1<f64>,
     pub value: f64,
@@ -23,45 +23,45 @@ fn moved(at: &Array1<f64>, moves: &[(usize, f64)]) -> Array1<f64> {
     moved
 }
 
-fn slopes(f: &mut impl FnMut(&Array1<f64>) -> f64, at: &Array1<f64>) -> Array1<f64> {
+fn gradient_at(f: &mut impl FnMut(&Array1<f64>) -> f64, at: &Array1<f64>) -> Array1<f64> {
     (0..at.len())
-        .map(|k| (f(&moved(at, &[(k, SLOPE_STEP)])) - f(&moved(at, &[(k, -SLOPE_STEP)]))) / (2.0 * SLOPE_STEP))
+        .map(|k| (f(&moved(at, &[(k, GRADIENT_STEP)])) - f(&moved(at, &[(k, -GRADIENT_STEP)]))) / (2.0 * GRADIENT_STEP))
         .collect()
 }
 
-/// Searches from `start`; a step is at most 5 long in each parameter.
+/// Minimises `f` from `start`; a step is at most 5 in each parameter.
 pub(super) fn minimum(mut f: impl FnMut(&Array1<f64>) -> f64, start: Array1<f64>) -> Minimum {
     let n = start.len();
     let (mut at, mut inverse) = (start, Array2::<f64>::eye(n));
-    let (mut value, mut slope) = (f(&at), slopes(&mut f, &at));
-    for _ in 0..MOST {
-        if slope.iter().all(|v| v.abs() < FLAT) {
+    let (mut value, mut gradient) = (f(&at), gradient_at(&mut f, &at));
+    for _ in 0..MAX_STEPS {
+        if gradient.iter().all(|v| v.abs() < GRADIENT_TOLERANCE) {
             return Minimum { at, value, converged: true };
         }
-        let mut direction = -inverse.dot(&slope);
-        if direction.dot(&slope) >= 0.0 {
+        let mut direction = -inverse.dot(&gradient);
+        if direction.dot(&gradient) >= 0.0 {
             inverse = Array2::eye(n);
-            direction = -slope.clone();
+            direction = -gradient.clone();
         }
         let longest = direction.iter().fold(0.0f64, |most, v| most.max(v.abs()));
         direction *= (5.0 / longest).min(1.0);
-        let fall = direction.dot(&slope);
+        let descent = direction.dot(&gradient);
         let mut share = 1.0;
         let (next, next_value) = loop {
             let next = &at + &(&direction * share);
             let next_value = f(&next);
-            if next_value <= value + 1e-4 * share * fall {
+            if next_value <= value + 1e-4 * share * descent {
                 break (next, next_value);
             }
             share *= 0.4;
             if share < 1e-7 {
-                // No way down that differences can tell.
-                let converged = slope.iter().all(|v| v.abs() < 100.0 * FLAT);
+                // Finite differences cannot resolve a descent direction.
+                let converged = gradient.iter().all(|v| v.abs() < 100.0 * GRADIENT_TOLERANCE);
                 return Minimum { at, value, converged };
             }
         };
-        let next_slope = slopes(&mut f, &next);
-        let (step, change) = (&next - &at, &next_slope - &slope);
+        let next_gradient = gradient_at(&mut f, &next);
+        let (step, change) = (&next - &at, &next_gradient - &gradient);
         let along = step.dot(&change);
         if along > 1e-12 {
             let turned = inverse.dot(&change);
@@ -72,12 +72,12 @@ pub(super) fn minimum(mut f: impl FnMut(&Array1<f64>) -> f64, start: Array1<f64>
                 }
             }
         }
-        (at, value, slope) = (next, next_value, next_slope);
+        (at, value, gradient) = (next, next_value, next_gradient);
     }
     Minimum { at, value, converged: false }
 }
 
-/// Second derivatives [n, n].
+/// Hessian [n, n] by central differences.
 pub(super) fn curvature(mut f: impl FnMut(&Array1<f64>) -> f64, at: &Array1<f64>) -> Array2<f64> {
     let (n, h) = (at.len(), CURVATURE_STEP);
     let centre = f(at);

@@ -1,5 +1,5 @@
-//! Mixed-effects logistic regression of votes with participants and clips as crossed random intercepts: `fit` is the
-//! model, `laplace` its likelihood, `minimum` the search for the best parameters.
+//! Mixed-effects logistic regression of votes with crossed random intercepts of participants and clips: `fit` is the
+//! model, `laplace` its likelihood, `minimum` the optimiser.
 
 mod laplace;
 mod minimum;

@@ -16,8 +16,24 @@ export const launch = () =>
     args: ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run", "--mute-audio"],
   });
 
-// A page at `url`; `touch`: acted on by touch, by keys otherwise.
-export async function open(browser, url, { width = 1280, height = 800, touch = false, scheme = "light", language = "en" }) {
+// Blocks the storage of the page and loses the first reply to a request to begin.
+function makeAdverse() {
+  const blocked = () => {
+    throw new DOMException("blocked", "SecurityError");
+  };
+  Object.defineProperty(window, "localStorage", { get: blocked });
+  const { fetch } = window;
+  let isLost = false;
+  window.fetch = async (url, options) => {
+    const reply = await fetch(url, options);
+    if (isLost || url !== "api/begin") return reply;
+    isLost = true;
+    throw new TypeError("the reply was lost");
+  };
+}
+
+// A page at `url`; `touch`: acted on by touch, by keys otherwise; `adverse`: see `makeAdverse`.
+export async function open(browser, url, { width = 1280, height = 800, touch = false, scheme = "light", language = "en", adverse = false }) {
   const context = await browser.createBrowserContext();
   const page = await context.newPage();
   page.setDefaultTimeout(PATIENCE_MS);
@@ -26,6 +42,7 @@ export async function open(browser, url, { width = 1280, height = 800, touch = f
   await page.evaluateOnNewDocument((code) => {
     Object.defineProperty(navigator, "languages", { get: () => [code] });
   }, language);
+  if (adverse) await page.evaluateOnNewDocument(makeAdverse);
   const session = await page.createCDPSession();
   await session.send("Emulation.setFocusEmulationEnabled", { enabled: true });
   const problems = [];

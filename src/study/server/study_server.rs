@@ -1,11 +1,11 @@
-//! A study's server from its folder to its end, and its addresses.
+//! Opens, runs and shuts down a study's server; routes of its API and pages.
 
 use super::clock::Clock;
 use super::host::{AllowedHosts, check_host};
 use super::limits::RateLimits;
 use super::reply::{HEADERS, not_found, text_reply, wrong_method};
 use super::secret::StudySecret;
-use super::served::ServedStudy;
+use super::served_study::ServedStudy;
 use super::{api, listen};
 use crate::folder::StudyFolder;
 use crate::pages::assets::ASSETS;
@@ -27,12 +27,12 @@ use tokio::signal::unix::{SignalKind, signal};
 use tower_http::set_header::SetResponseHeaderLayer;
 use tower_http::timeout::TimeoutLayer;
 
-/// Bytes of a body at most.
-const MOST_BODY: usize = 16 * 1024;
-/// Time that a request may take until its reply begins, the reading of its body with it.
-const REQUEST_TIME: Duration = Duration::from_secs(10);
+/// Maximum size of a request body, bytes.
+const MAX_BODY_BYTES: usize = 16 * 1024;
+/// Time limit for a request up to the start of its reply, including reading the body.
+const REQUEST_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// What the handlers share: the study, where its responses go, and who may ask how often.
+/// State shared by the request handlers.
 pub struct App {
     pub study: ServedStudy,
     pub store: ResponseStore,
@@ -41,24 +41,24 @@ pub struct App {
     pub clock: Clock,
 }
 
-/// Server of one study, not listening yet.
+/// Server of one study that does not listen yet.
 pub struct StudyServer {
     app: App,
     writer: JoinHandle<()>,
 }
 
 impl StudyServer {
-    /// Opens the study in `folder`, its responses and its secret. `abandoned_secs`: time without an answer after which a
-    /// place is given again.
+    /// Opens the study in `folder`, its responses and its secret. `abandoned_secs`: time without an answer after which
+    /// a session may be reassigned.
     ///
     /// # Errors
-    /// A study that is not as it was sealed, or whose secret or responses are not its own.
+    /// The study does not match its seal, or its secret or responses are unusable or belong to another plan.
     pub fn open(folder: &StudyFolder, abandoned_secs: f64) -> Result<Self> {
         StudySeal::verify(folder)?;
         let study = ServedStudy::open(folder, abandoned_secs)?;
         let secret = StudySecret::open(&folder.secret())?;
         let (store, writer) = ResponseStore::open(&folder.responses(), &study.plan_hash)?;
-        let latest_ms = participants::latest_ms(&database::open_to_read(&folder.responses())?)?;
+        let latest_ms = participants::latest_ms(&database::open_for_reading(&folder.responses())?)?;
         let (limits, clock) = (RateLimits::new(), Clock::start(latest_ms));
         Ok(Self { app: App { study, store, secret, limits, clock }, writer })
     }
@@ -71,14 +71,15 @@ impl StudyServer {
         self.app.secret.operator_token()
     }
 
-    /// Serves at `address` until Ctrl-C or a request to terminate. `listening` is told where, once it does. `host_name`:
-    /// name by which a proxy serves the study; it is then the proxy that limits the connections of each peer.
+    /// Serves on `address` until SIGINT or SIGTERM. `on_listening` is called with the actual address once the socket is
+    /// bound. `host_names`: names under which a proxy serves the study; a proxy at a loopback or private address is
+    /// then responsible for limiting the connections of each peer.
     ///
     /// # Errors
-    /// An address that cannot be listened at, or a `host_name` that is more than a name.
-    pub fn run(self, address: SocketAddr, host_name: Option<String>, listening: impl FnOnce(SocketAddr)) -> Result<()> {
-        let is_proxied = host_name.is_some();
-        let hosts = AllowedHosts::new(address.ip(), host_name)?;
+    /// The address cannot be bound, or one of `host_names` is more than a host name.
+    pub fn run(self, address: SocketAddr, host_names: &[String], on_listening: impl FnOnce(SocketAddr)) -> Result<()> {
+        let is_proxied = !host_names.is_empty();
+        let hosts = AllowedHosts::new(address.ip(), host_names)?;
         let runtime =
             tokio::runtime::Builder::new_multi_thread().enable_all().build().context("cannot start threads")?;
         let router = router(self.app, hosts);
@@ -86,7 +87,7 @@ impl StudyServer {
             let mut terminated = signal(SignalKind::terminate()).context("cannot wait for a signal")?;
             let listener = TcpListener::bind(address).await;
             let listener = listener.with_context(|| format!("cannot listen at {address}; choose another --port"))?;
-            listening(listener.local_addr()?);
+            on_listening(listener.local_addr()?);
             let stop = async {
                 tokio::select! {
                     _ = tokio::signal::ctrl_c() => {}
@@ -97,13 +98,13 @@ impl StudyServer {
             anyhow::Ok(())
         })?;
         drop(runtime);
-        // The last handle of the store is gone: its thread ends after what it was given.
+        // Dropping the runtime dropped the last handle of the store, so its thread ends after the queued work.
         let _ = self.writer.join();
         Ok(())
     }
 }
 
-/// The addresses of a study's server, each served under the names of `hosts`.
+/// Routes of the server, restricted to the allowed `hosts`.
 fn router(app: App, hosts: AllowedHosts) -> Router {
     let mut router = Router::new()
         .route("/api/study", get(api::study))
@@ -120,8 +121,8 @@ fn router(app: App, hosts: AllowedHosts) -> Router {
     let mut router = router
         .fallback(not_found)
         .method_not_allowed_fallback(wrong_method)
-        .layer(DefaultBodyLimit::max(MOST_BODY))
-        .layer(TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, REQUEST_TIME))
+        .layer(DefaultBodyLimit::max(MAX_BODY_BYTES))
+        .layer(TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, REQUEST_TIMEOUT))
         .layer(middleware::from_fn_with_state(Arc::new(hosts), check_host))
         .layer(SetResponseHeaderLayer::if_not_present(header::CACHE_CONTROL, no_store));
     for (name, value) in HEADERS {

@@ -1,8 +1,8 @@
-//! Numbers of an analysis as words.
+//! Formatting of the numbers of an analysis.
 
 use crate::stats::estimate::ConfidenceInterval;
 
-/// Count with commas between thousands.
+/// Count with thousands separators.
 pub fn count(n: usize) -> String {
     let digits = n.to_string();
     let mut text = String::new();
@@ -20,7 +20,7 @@ pub fn p_value(p: f64) -> String {
     format!("p = {}", bare_p(p))
 }
 
-/// p value without its letter.
+/// p value without `p =`.
 pub fn bare_p(p: f64) -> String {
     match p {
         p if p >= 0.9995 => "1".to_owned(),
@@ -30,23 +30,23 @@ pub fn bare_p(p: f64) -> String {
     }
 }
 
-/// Share in percent, one decimal.
+/// Proportion in percent with one decimal.
 pub fn percent(share: f64) -> String {
     format!("{:.1} %", 100.0 * share)
 }
 
-/// Ends of an interval of a share: `50.3 to 54.7 %`.
+/// Interval of a proportion: `50.3 to 54.7 %`.
 pub fn percents(interval: ConfidenceInterval) -> String {
     format!("{:.1} to {:.1} %", 100.0 * interval.low, 100.0 * interval.high)
 }
 
-/// Bound of a share in points of percent: `10`.
+/// Equivalence bound of a proportion in percentage points: `10`.
 pub fn points(bound: f64) -> String {
     let points = (1000.0 * bound).round() / 10.0;
     format!("{points}")
 }
 
-/// Names with commas and a last `and`.
+/// Names joined by commas and a final `and`.
 pub fn list(names: &[String]) -> String {
     match names {
         [] => "none".to_owned(),

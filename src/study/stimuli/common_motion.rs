@@ -1,5 +1,6 @@
-//! Motions of one clip by several conditions, made alike in all but the movement: the same bones, the same joints seen at
-//! the same moments, head and trunk only where all conditions have them, the same smoothing.
+//! Makes the motions of one clip comparable between conditions, so that films differ in the movement only: same bone
+//! lengths, a joint is visible only where it is in all conditions, head and trunk only where all conditions have them,
+//! same smoothing.
 
 use super::condition_motion::ShownMotion;
 use ndarray::{Array2, Array3, Axis, Zip, s};
@@ -12,25 +13,28 @@ use orator_base::types::posture::{Posture, PostureChannel};
 use orator_base::types::skeleton::{N_BONES, N_JOINTS};
 use orator_formats::mocap::motion_file::DEFAULT_FPS;
 
-/// Sight that all films of one speech share.
+/// Visibility shared by all films of one clip.
 #[derive(Clone, Debug)]
-pub struct CommonSight {
-    /// Mask [T, 49] of the joints that every condition shows.
+pub struct CommonVisibility {
+    /// Mask [T, 49] of the joints that are visible in every condition.
     joints: Array2<bool>,
-    /// Masks [T, 3] of the angles of head and trunk.
+    /// Masks [T, 3] of the angles of head and trunk that every condition has.
     angles: [Array2<bool>; 2],
 }
 
-impl CommonSight {
-    /// What all of these motions, which are equally long, show.
+impl CommonVisibility {
+    /// Intersection of the visibility of these motions, which must have equal lengths; `None` without motions.
     pub fn of(shown: &[&ShownMotion]) -> Option<Self> {
         let (n_frames, n_joints) = shown.first()?.motion.mask.dim();
         let mut joints = Array2::from_elem((n_frames, n_joints), true);
         let mut angles = [(); 2].map(|()| Array2::from_elem((n_frames, 3), true));
         let unseen = Posture::unseen(n_frames);
         for ShownMotion { motion, posture, .. } in shown {
-            let there = motion.joints.map_axis(Axis(2), |place| place.iter().all(|v| v.is_finite()));
-            Zip::from(&mut joints).and(&motion.mask).and(&there).for_each(|all, seen, there| *all &= *seen && *there);
+            let finite = motion.joints.map_axis(Axis(2), |coordinates| coordinates.iter().all(|v| v.is_finite()));
+            Zip::from(&mut joints)
+                .and(&motion.mask)
+                .and(&finite)
+                .for_each(|all, seen, finite| *all &= *seen && *finite);
             let posture = posture.as_ref().unwrap_or(&unseen);
             for (all, channel) in angles.iter_mut().zip(PostureChannel::ALL) {
                 all.zip_mut_with(posture.channel(channel), |all, angle| *all &= angle.is_finite());
@@ -39,7 +43,7 @@ impl CommonSight {
         Some(Self { joints, angles })
     }
 
-    /// Performance of a motion as far as all show it, on the body that all share, at its own rate.
+    /// Performance of a motion at its own rate, restricted to the common visibility and on the common body.
     pub fn performance(&self, shown: &ShownMotion, body: &CommonBody) -> Performance {
         let mut motion = shown.motion.clone();
         for ((frame, joint), seen) in self.joints.indexed_iter() {
@@ -62,16 +66,17 @@ impl CommonSight {
     }
 }
 
-/// Body that all films of a speaker show.
+/// Body shared by all films of a speaker.
 #[derive(Clone, Debug)]
 pub struct CommonBody {
-    /// Bones, metres; 0: as the motion has them.
+    /// Bone lengths, metres; 0 keeps the length of the motion.
     lengths: [f32; N_BONES],
     rig: Rig,
 }
 
 impl CommonBody {
-    /// Body with the stated bones (metres), else those of the motion that knows most of them, and the median palms of all.
+    /// Body with the stated bone lengths (metres), or, if none is known, those of the motion with the most measured
+    /// bones; rig from all motions together.
     pub fn of(stated: &[f32], shown: &[&ShownMotion]) -> Self {
         let known = |lengths: &[f32; N_BONES]| lengths.iter().filter(|length| **length > 0.0).count();
         let stated = std::array::from_fn(|bone| stated.get(bone).copied().unwrap_or(0.0));
@@ -84,7 +89,7 @@ impl CommonBody {
             let mut motion = shown.motion.clone();
             bones::with_lengths(&mut motion, &lengths);
             fps = motion.fps;
-            // Equal shapes: nothing to fail.
+            // Cannot fail: the shapes match.
             let _ = all.append(Axis(0), motion.joints.view());
         }
         Self { lengths, rig: Rig::from_motion(&Motion::from_joints(fps, all)) }

@@ -1,7 +1,7 @@
-//! Speakers with their clips, each condition's performance of each clip, and the clips' sounds at one loudness: all that
-//! films are drawn from.
+//! Speakers with their clips, the performance of each condition for each clip, and the clips' sounds at equal loudness:
+//! everything that is rendered into films.
 
-use super::alike::{CommonBody, CommonSight};
+use super::common_motion::{CommonBody, CommonVisibility};
 use super::condition_motion::{ConditionModels, ShownMotion, motions, sound_of};
 use super::cut::{CutSpeech, StudyClip, cut};
 use super::film::{CAMERA, FilmScene};
@@ -23,38 +23,38 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
-/// Loudness of all films, LUFS (EBU R 128), less where a clip would be clipped.
+/// Target loudness of all films, LUFS (EBU R 128); lowered if a clip would exceed [`MAX_AMPLITUDE`].
 const LOUDNESS_LUFS: f64 = -23.0;
-/// Largest amplitude.
-const PEAK: f64 = 0.9;
-/// Seconds over which a sound comes and goes at its ends, so that a cut does not click.
+/// Maximum amplitude, relative to full scale.
+const MAX_AMPLITUDE: f64 = 0.9;
+/// Duration of the fades at the ends of a sound, which avoid clicks, seconds.
 const FADE_SECS: f64 = 0.01;
 
-/// Sound check: frequency in Hz, which small loudspeakers play too, and amplitude.
-const HZ: f64 = 700.0;
-const AMPLITUDE: f64 = 0.1;
-/// Seconds of the longest tone, and over which a tone comes and goes.
-const LONGEST: f64 = 0.4;
+/// Tones of the sound check: frequency in Hz, audible on small loudspeakers too, and amplitude.
+const TONE_HZ: f64 = 700.0;
+const TONE_AMPLITUDE: f64 = 0.1;
+/// Maximum duration of a tone, and duration of its fades, seconds.
+const MAX_TONE_SECS: f64 = 0.4;
 const TONE_FADE_SECS: f64 = 0.02;
 
-/// Speaker whose speech is cut.
+/// Speaker whose speech has been cut into clips.
 pub struct CutSpeaker {
     source: SpeakerSource,
     models: ConditionModels,
     pub cut: CutSpeech,
     /// Sounds of the clips, as long as the films.
     pub sounds: Vec<Sound>,
-    /// Sound of the sound check, as long; none where there is no clip.
+    /// Sound of the sound check, equally long; `None` without clips.
     pub tones: Option<Sound>,
 }
 
-/// Speaker whose films can be drawn.
+/// Speaker whose films can be rendered.
 pub struct FilmedSpeaker {
     clips: Vec<StudyClip>,
     sounds: Vec<Sound>,
     tones: Option<Sound>,
     film_fps: FrameRate,
-    /// By condition, then by clip: the clip of the motion, and the motion on the rig.
+    /// By condition, then by clip: index of the clip of the motion, and the motion on the rig.
     performances: BTreeMap<String, Vec<(usize, Performance)>>,
     stage: AvatarStage,
 }
@@ -64,10 +64,10 @@ impl CutSpeaker {
         &self.source.name
     }
 
-    /// Cuts `n_clips` clips of a speaker, fewer where there are no more; `rank` orders clips that are equally good.
+    /// Cuts `n_clips` clips of a speaker, or fewer if there are no more; `rank` orders clips of equal grade.
     ///
     /// # Errors
-    /// No dataset, sound or checkpoint where the file has one.
+    /// A dataset, sound or checkpoint of the study file cannot be read.
     pub fn new(file: &StudyFile, speaker: &StudySpeaker, n_clips: usize, rank: impl Fn(&str) -> u64) -> Result<Self> {
         let name = &speaker.name;
         let models = ConditionModels::open(&file.condition, name)?;
@@ -80,42 +80,42 @@ impl CutSpeaker {
         let cut = cut(&source, fps.frames_in(file.clips.seconds), n_clips, rank)?;
         let film_fps = smooth_rate(fps);
         let mut sounds = Vec::new();
-        for of_piece in cut.clips.chunk_by(|a, b| a.piece == b.piece) {
-            let piece = source.read(of_piece[0].piece)?;
-            for clip in of_piece {
+        for of_segment in cut.clips.chunk_by(|a, b| a.segment == b.segment) {
+            let segment = source.read(of_segment[0].segment)?;
+            for clip in of_segment {
                 let n_film_frames = film_fps.frames_in(fps.secs(clip.frames.len()));
-                let mut samples = sound_of(&piece, clip, fps);
-                samples.resize(sample_at(film_fps, piece.sound.rate, n_film_frames), 0.0);
-                sounds.push(faded(Sound { rate: piece.sound.rate, samples }));
+                let mut samples = sound_of(&segment, clip, fps);
+                samples.resize(sample_at(film_fps, segment.sound.rate, n_film_frames), 0.0);
+                sounds.push(fade_ends(Sound { rate: segment.sound.rate, samples }));
             }
         }
         let tones = sounds.first().map(|sound| tones(SOUND_CHECK_TONES, sound.rate, sound.samples.len()));
         Ok(Self { source, models, cut, sounds, tones })
     }
 
-    /// Puts the motion of every condition on the rig that all share, for films of `size` px.
+    /// Retargets the motion of every condition to the common rig, for films of `size` px.
     ///
     /// # Errors
-    /// A condition without motion for a clip.
+    /// A condition has no motion for a clip.
     pub fn filmed(self, file: &StudyFile, size: [usize; 2], progress: &dyn Progress) -> Result<FilmedSpeaker> {
         let Self { source, models, cut, sounds, tones } = self;
-        let n_pieces = cut.clips.chunk_by(|a, b| a.piece == b.piece).count();
-        let task = progress.begin(&format!("motion of {}", source.name), n_pieces as u64);
+        let n_segments = cut.clips.chunk_by(|a, b| a.segment == b.segment).count();
+        let task = progress.begin(&format!("motion of {}", source.name), n_segments as u64);
         let motions = motions(&source, &cut.clips, &file.condition, &models, &|| task.advance(1))?;
         drop(task);
         let all: Vec<&ShownMotion> = motions.values().flatten().collect();
         let body = CommonBody::of(&source.bone_lengths, &all);
-        let sight = |clip: usize| {
+        let visibility = |clip: usize| {
             let of_clip: Vec<&ShownMotion> = motions.values().map(|of_condition| &of_condition[clip]).collect();
-            CommonSight::of(&of_clip).context("the study has no condition")
+            CommonVisibility::of(&of_clip).context("the study has no condition")
         };
-        let sights: Vec<CommonSight> = (0..cut.clips.len()).map(sight).collect::<Result<_>>()?;
+        let visibilities: Vec<CommonVisibility> = (0..cut.clips.len()).map(visibility).collect::<Result<_>>()?;
         let task = progress.begin(&format!("avatar of {}", source.name), all.len() as u64);
         let performances: BTreeMap<String, Vec<(usize, Performance)>> = motions
             .iter()
             .map(|(condition, shown)| {
-                let performed = shown.par_iter().zip(&sights).map(|(shown, sight)| {
-                    let performance = sight.performance(shown, &body);
+                let performed = shown.par_iter().zip(&visibilities).map(|(shown, visibility)| {
+                    let performance = visibility.performance(shown, &body);
                     task.advance(1);
                     (shown.of, performance)
                 });
@@ -131,13 +131,13 @@ impl CutSpeaker {
     }
 }
 
-/// Brings all sounds to one loudness, which is returned, LUFS; a silent one stays.
-pub fn equally_loud<'s>(sounds: impl Iterator<Item = &'s mut Sound>) -> f64 {
+/// Normalises all sounds to the same loudness and returns it, LUFS; silent sounds are left unchanged.
+pub fn normalise_loudness<'s>(sounds: impl Iterator<Item = &'s mut Sound>) -> f64 {
     let measured: Vec<(&mut Sound, f64)> =
         sounds.filter_map(|sound| loudness::integrated(sound).map(|lufs| (sound, lufs))).collect();
     let loudest = |(sound, lufs): &(&mut Sound, f64)| {
         let peak = sound.samples.iter().map(|v| f64::from(v.abs())).fold(1e-9, f64::max);
-        lufs + 20.0 * (PEAK / peak).log10()
+        lufs + 20.0 * (MAX_AMPLITUDE / peak).log10()
     };
     let target = measured.iter().map(loudest).fold(LOUDNESS_LUFS, f64::min);
     for (sound, lufs) in measured {
@@ -148,16 +148,16 @@ pub fn equally_loud<'s>(sounds: impl Iterator<Item = &'s mut Sound>) -> f64 {
 }
 
 impl FilmedSpeaker {
-    /// Number of the clip `speaker/clip`.
+    /// Index of the clip `speaker/clip`.
     fn find(&self, clip: &str) -> Option<usize> {
         let name = clip.rsplit('/').next().unwrap_or(clip);
         self.clips.iter().position(|known| known.name == name)
     }
 
-    /// Name `speaker/clip` of the clip whose motion the condition of that content shows.
+    /// Name `speaker/clip` of the clip whose motion is shown in the film with this content.
     ///
     /// # Errors
-    /// A clip or a condition that the speaker does not have.
+    /// The speaker does not have the clip or the condition.
     pub fn motion_of(&self, content: &FilmContent) -> Result<String> {
         let (of, _) = self.shown(content)?;
         Ok(format!("{}/{}", content.speaker, self.clips[*of].name))
@@ -169,16 +169,16 @@ impl FilmedSpeaker {
         self.performances.get(&content.condition).and_then(|of_condition| of_condition.get(clip)).with_context(missing)
     }
 
-    /// Performance of the film of that content, at the film's rate.
+    /// Performance of the film with this content, at the film's rate.
     ///
     /// # Errors
-    /// A clip or a condition that the speaker does not have.
+    /// The speaker does not have the clip or the condition.
     pub fn performance(&self, content: &FilmContent) -> Result<Performance> {
         let (_, performance) = self.shown(content)?;
         Ok(performance.resampled(self.film_fps))
     }
 
-    /// Scene of the film of that content with its performance.
+    /// Scene of the film with this content.
     pub fn scene<'a>(&'a self, content: &FilmContent, performance: &'a Performance) -> FilmScene<'a> {
         let sound = match content.sound {
             FilmSound::Speech => self.find(&content.clip).and_then(|clip| self.sounds.get(clip)),
@@ -189,7 +189,7 @@ impl FilmedSpeaker {
     }
 }
 
-fn faded(mut sound: Sound) -> Sound {
+fn fade_ends(mut sound: Sound) -> Sound {
     let n = ((FADE_SECS * f64::from(sound.rate)) as usize).min(sound.samples.len());
     let length = sound.samples.len();
     for at in 0..n {
@@ -200,18 +200,19 @@ fn faded(mut sound: Sound) -> Sound {
     sound
 }
 
-/// Sound of the sound check, which a participant counts: `n` tones with as much silence around each, over `length` samples.
+/// Sound of the sound check: `n` evenly spaced tones separated by silence of at least their duration, over `length`
+/// samples.
 fn tones(n: usize, rate: u32, length: usize) -> Sound {
     let rate_hz = f64::from(rate.max(1));
     let apart = length as f64 / rate_hz / (n + 1) as f64;
-    let secs = (apart / 2.0).min(LONGEST);
+    let secs = (apart / 2.0).min(MAX_TONE_SECS);
     let fade = TONE_FADE_SECS.min(secs / 4.0);
     let sample = |at: usize| {
         let time = at as f64 / rate_hz;
         let nearest = (time / apart).round().clamp(1.0, n.max(1) as f64);
         let left = secs / 2.0 - (time - nearest * apart).abs();
         let gain = if n == 0 { 0.0 } else { (left / fade).clamp(0.0, 1.0) };
-        (AMPLITUDE * (0.5 - 0.5 * (PI * gain).cos()) * (TAU * HZ * time).sin()) as f32
+        (TONE_AMPLITUDE * (0.5 - 0.5 * (PI * gain).cos()) * (TAU * TONE_HZ * time).sin()) as f32
     };
     Sound { rate, samples: (0..length).map(sample).collect() }
 }
@@ -221,7 +222,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sounds_become_equally_loud_without_being_clipped() {
+    fn sounds_are_normalised_without_clipping() {
         let noise = |gain: f32, peak: f32| {
             let mut samples: Vec<f32> =
                 (0..48_000u64).map(|i| gain * ((i * i * 7_919 % 2_003) as f32 / 1_001.5 - 1.0)).collect();
@@ -230,7 +231,7 @@ mod tests {
         };
         for (peak, expected) in [(0.05, LOUDNESS_LUFS..LOUDNESS_LUFS + 0.01), (1.0, -45.0..LOUDNESS_LUFS)] {
             let mut sounds = [noise(0.3, 0.3), noise(0.02, 0.02), noise(0.01, peak)];
-            let target = equally_loud(sounds.iter_mut());
+            let target = normalise_loudness(sounds.iter_mut());
             assert!(expected.contains(&target), "{target}");
             for sound in &sounds {
                 assert!((loudness::integrated(sound).unwrap() - target).abs() < 0.2);
@@ -238,15 +239,15 @@ mod tests {
             }
         }
         let mut silent = [Sound { rate: 16_000, samples: vec![0.0; 16_000] }];
-        assert_eq!(equally_loud(silent.iter_mut()), LOUDNESS_LUFS);
+        assert_eq!(normalise_loudness(silent.iter_mut()), LOUDNESS_LUFS);
         assert!(silent[0].samples.iter().all(|v| *v == 0.0));
     }
 
     #[test]
-    fn so_many_tones_are_heard_in_films_of_any_length() {
+    fn the_number_of_tones_is_correct_for_any_length() {
         for secs in [1, 12] {
             let sound = tones(3, 16_000, 16_000 * secs);
-            // Loudness of steps of 20 ms.
+            // Whether each step of 20 ms is loud.
             let loud: Vec<bool> = sound.samples.chunks(320).map(|step| step.iter().any(|v| v.abs() > 0.05)).collect();
             let n_begun = loud.windows(2).filter(|pair| !pair[0] && pair[1]).count();
             assert_eq!((n_begun, loud[0], loud[loud.len() - 1]), (3, false, false));

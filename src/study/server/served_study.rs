@@ -1,4 +1,4 @@
-//! What a server serves: the plan's sessions and films, and the texts of the page.
+//! Content that the server serves: sessions and films of the plan, and the texts of the page.
 
 use crate::file::StudyFile;
 use crate::folder::{StudyFolder, read_json};
@@ -12,43 +12,43 @@ use serde_json::json;
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
-/// Milliseconds by which an answer may come before the stated end of its films: players round.
-const LEEWAY_MS: f64 = 250.0;
-/// Milliseconds that a participant has for the first answer, beside twice the length of that trial's films: the task's
-/// instructions are read and films are loaded in it. Consent and the sound check come before a place is given.
+/// Tolerance for an answer before the nominal end of its films, milliseconds: players round durations.
+const END_TOLERANCE_MS: f64 = 250.0;
+/// Time limit for the first answer in addition to twice the length of its films, milliseconds: it includes reading the
+/// task's instructions and loading the films. Consent and the sound check precede the start of a session.
 const UNANSWERED_MS: i64 = 300_000;
 
-/// Film as it is served.
+/// Path and duration of a served film.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ServedFilm {
     pub path: PathBuf,
     secs: f64,
 }
 
-/// Study as it is served.
+/// Served study.
 #[derive(Debug)]
 pub struct ServedStudy {
     pub title: String,
     pub languages: Vec<String>,
     pub plan: StudyPlan,
-    /// BLAKE3 hash of the plan's file.
+    /// BLAKE3 hash of the plan file.
     pub plan_hash: String,
     pub quota: Quota,
-    /// Whether only participants with the ID of a recruiting site may begin.
+    /// Whether starting requires the participant ID of a recruiting site.
     pub requires_id: bool,
-    /// Address to which a participant returns at the end.
+    /// URL to which a participant returns at the end.
     pub return_url: Option<String>,
-    /// Texts and tasks, as the page reads them.
+    /// Texts and tasks in the form that the page reads.
     pub page: serde_json::Value,
-    /// By opaque name.
+    /// Films by opaque name.
     films: HashMap<String, ServedFilm>,
 }
 
 impl ServedStudy {
-    /// Reads the study in `folder`. `abandoned_secs`: time without an answer after which a place is given again.
+    /// Reads the study in `folder`. `abandoned_secs`: time without an answer after which a session may be reassigned.
     ///
     /// # Errors
-    /// A file that is missing or unreadable, a plan that names what is not there.
+    /// A file is missing or unreadable, or the plan refers to a task or film that does not exist.
     pub fn open(folder: &StudyFolder, abandoned_secs: f64) -> Result<Self> {
         let file = StudyFile::read(&folder.study_file())?;
         let plan: StudyPlan = read_json(&folder.plan())?;
@@ -84,32 +84,33 @@ impl ServedStudy {
         Ok(study)
     }
 
-    /// Film of that opaque name; no other file is served.
+    /// Film with this opaque name; no other file can be requested.
     pub fn film(&self, name: &str) -> Option<&ServedFilm> {
         self.films.get(name)
     }
 
-    /// Films of the study.
+    /// Number of films.
     pub fn n_films(&self) -> usize {
         self.films.len()
     }
 
-    /// Trials of a session, in their order.
+    /// Trials of a session in order; empty for an unknown session.
     pub fn trials(&self, session: u32) -> &[Trial] {
         self.plan.sessions.get(session as usize).map_or(&[], |session| &session.trials)
     }
 
-    /// Task of a trial of the plan.
+    /// Task of a trial. Panics if the trial is not from the plan.
     pub fn task(&self, trial: &Trial) -> &PlannedTask {
         &self.plan.tasks[trial.task]
     }
 
-    /// Milliseconds in which the films of a trial can be seen: two together, those of sliders and more than two in turn.
+    /// Minimum time to watch the films of a trial, milliseconds: up to two films play together; those of sliders, and
+    /// more than two, play one after another.
     pub fn least_ms(&self, trial: &Trial) -> i64 {
         let is_rated = self.task(trial).design == TaskDesign::Sliders && trial.phase != TrialPhase::AttentionCheck;
         let secs = trial.films.iter().filter_map(|film| self.film(film)).map(|film| film.secs);
         let secs = if is_rated || trial.films.len() > 2 { secs.sum() } else { secs.fold(0.0, f64::max) };
-        (1000.0 * secs - LEEWAY_MS).max(0.0) as i64
+        (1000.0 * secs - END_TOLERANCE_MS).max(0.0) as i64
     }
 }
 
