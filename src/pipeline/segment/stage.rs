@@ -4,7 +4,7 @@
 use super::judge::judge;
 use super::measure::{self, Measures};
 use super::speech_rule::SpeechDetector;
-use crate::{lips, sound};
+use crate::{lip_sync, sound};
 use anyhow::{Result, ensure};
 use orator_base::stage::artifacts::{Artifact, StageName};
 use orator_base::stage::ledger::{Ledger, longest_first};
@@ -118,10 +118,10 @@ impl SegmentStage {
         let (lip_sync, offset) = match &extras.face {
             Some(face) => {
                 let is_speech: Vec<bool> =
-                    speech.iter().zip(&sound_db).map(|(share, db)| lips::is_speech(*share, *db)).collect();
+                    speech.iter().zip(&sound_db).map(|(share, db)| lip_sync::is_speech(*share, *db)).collect();
                 let voice = sound::openness(&self.file(Artifact::Sound, unit))?;
                 let (opening, secs) = (face.opening.to_vec(), extras.time_secs.to_vec());
-                let found = lips::compare(&opening, &secs, &is_speech, &voice, video.fps);
+                let found = lip_sync::compare(&opening, &secs, &is_speech, &voice, video.fps);
                 (found.score, found.offset)
             }
             None => (vec![f32::NAN; n_frames], None),

@@ -8,7 +8,7 @@ use crate::pose2d::Chain;
 use crate::pose2d::talker::TalkerSearch;
 use crate::pose2d::talker::choice::ShotVoice;
 use crate::pose2d::talker::search::ShotTalker;
-use crate::{lips, sound};
+use crate::{lip_sync, sound};
 use anyhow::{Context, Result};
 use orator_base::stage::progress::{Event, Progress, Task};
 use orator_base::types::pose2d::Pose2d;
@@ -74,7 +74,7 @@ pub fn talkers(
     task: &dyn Task,
 ) -> Result<Vec<ShotTalker>> {
     let (_, sound_db) = sound::levels(sound, video.fps, video.timeline.n_frames())?;
-    let is_speech: Vec<bool> = sound_db.iter().map(|&db| lips::is_speech(f32::NAN, db)).collect();
+    let is_speech: Vec<bool> = sound_db.iter().map(|&db| lip_sync::is_speech(f32::NAN, db)).collect();
     let voice = sound::openness(sound)?;
     let (mut talkers, mut time_secs) = (Vec::new(), Vec::new());
     let mut end_shot = |search: &mut TalkerSearch, time_secs: &mut Vec<f64>, end: usize| {

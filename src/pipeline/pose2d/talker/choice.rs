@@ -1,6 +1,6 @@
 //! Which mouth of a shot the voice is of: the one whose opening agrees best with it, where that is no chance.
 
-use crate::lips::LipVoiceMatch;
+use crate::lip_sync::LipVoiceMatch;
 use orator_base::audio::openness::Openness;
 use orator_base::types::time::FrameRate;
 
@@ -68,7 +68,7 @@ pub fn speaking<'a>(mouths: impl Iterator<Item = &'a MouthOpening>, heard: &Shot
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lips::tests::{FPS, Mouth};
+    use crate::lip_sync::tests::{FPS, Mouth};
 
     const SECS: f64 = 12.0;
 
