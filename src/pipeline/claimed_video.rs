@@ -77,6 +77,9 @@ impl Pipeline {
     }
 
     /// BLAKE3 hashes of the weights that the per-video stages use, by file name.
+    ///
+    /// # Errors
+    /// Weights that cannot be read.
     pub fn model_hashes(&self) -> Result<BTreeMap<String, String>> {
         let settings = &self.config().settings;
         let (chosen, hashes) = (ChosenModels::find(settings)?, self.hashes());

@@ -21,6 +21,9 @@ pub struct Pipeline {
 
 impl Pipeline {
     /// Finds the videos that the configuration names; writes nothing.
+    ///
+    /// # Errors
+    /// A configuration without speakers.
     pub fn open(config: Config) -> Result<Self> {
         let videos = videos::of(&config);
         ensure!(!videos.is_empty(), "{} names no [[speaker]]", config.file.display());

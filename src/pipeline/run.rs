@@ -147,8 +147,8 @@ impl Pipeline {
         let _lock = workdir::lock(&settings.work.dir)
             .context("no run now; another folder is chosen with --set work.dir=FOLDER")?;
         for videos in &remaining {
-            // The record of a dataset is read before the dataset stage runs, so an interrupted replacement is
-            // completed now.
+            // An interrupted replacement of a dataset is undone now, since its record is read before the dataset stage
+            // runs.
             workdir::recover_folder(&speaker_dir(&settings.work.dir, StageName::Dataset, &videos.speaker))?;
         }
         // Stage outputs and the work folder's own files are at most two folders deep.

@@ -105,6 +105,9 @@ impl SubprocessStage<'_> {
 }
 
 /// Reports how far a subprocess of `program` can be sandboxed on this machine.
+///
+/// # Errors
+/// The program cannot be started, or does not answer.
 pub fn probe(program: &Path) -> Result<Restriction> {
     let mut process = UnitProcess::start(program)?;
     process.ask(&Request::Restrict);
