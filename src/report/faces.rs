@@ -8,7 +8,7 @@ use orator_dataset::config::videos::Videos;
 use orator_media::ffmpeg;
 use orator_media::opencv::png;
 use orator_pipeline::dataset::people;
-use orator_pipeline::dataset::people::PersonSeen;
+use orator_pipeline::dataset::people::VideoPerson;
 use std::path::Path;
 
 /// Faces that are shown of one person.
@@ -21,14 +21,14 @@ pub fn section(settings: &Settings, videos: &[Videos]) -> Vec<Node> {
         .iter()
         .flat_map(|of| {
             let is_said = settings.speaker.iter().any(|said| said.name == of.speaker && said.same_person);
-            let seen: Vec<PersonSeen> = of.units.iter().map(|unit| PersonSeen::read(work, unit)).collect();
+            let seen: Vec<VideoPerson> = of.units.iter().map(|unit| VideoPerson::read(work, unit)).collect();
             let groups = if is_said { vec![seen.iter().collect()] } else { people::groups(&seen) };
             of_speaker(work, &of.speaker, &groups, is_said)
         })
         .collect()
 }
 
-fn of_speaker(work: &Path, speaker: &str, groups: &[Vec<&PersonSeen>], is_said: bool) -> Vec<Node> {
+fn of_speaker(work: &Path, speaker: &str, groups: &[Vec<&VideoPerson>], is_said: bool) -> Vec<Node> {
     let about = match (is_said, groups.len()) {
         (true, _) => format!("{speaker}: the configuration says that all videos show one person."),
         (false, 0 | 1) => format!("{speaker}: nothing speaks against one person."),
@@ -49,7 +49,7 @@ fn of_speaker(work: &Path, speaker: &str, groups: &[Vec<&PersonSeen>], is_said: 
     if rows.is_empty() { Vec::new() } else { std::iter::once(node("p").text(about)).chain(rows).collect() }
 }
 
-fn card(work: &Path, video: &PersonSeen) -> Result<Option<Node>> {
+fn card(work: &Path, video: &VideoPerson) -> Result<Option<Node>> {
     let path = Artifact::FacePicture.path(work, &video.unit);
     if !path.exists() {
         return Ok(None);
