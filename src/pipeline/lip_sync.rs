@@ -68,12 +68,13 @@ pub struct LipVoiceMatch {
 impl LipVoiceMatch {
     /// Takes the arguments of `compare`.
     pub fn new(opening: &[f32], time_secs: &[f64], is_speech: &[bool], voice: &Openness, fps: FrameRate) -> Self {
-        let reach = (HIGH_PASS_SECS / 2.0 * fps.per_sec()).round() as usize;
-        let lips = high_pass(&opening.iter().map(|&opening| (opening + LOG_OFFSET).ln()).collect::<Vec<_>>(), reach);
+        let half_window = (HIGH_PASS_SECS / 2.0 * fps.per_sec()).round() as usize;
+        let lips =
+            high_pass(&opening.iter().map(|&opening| (opening + LOG_OFFSET).ln()).collect::<Vec<_>>(), half_window);
         let at_lag = |step: i32| {
             let lag = f64::from(step) * LAG_STEP_SECS;
             let openness: Vec<f32> = time_secs.iter().map(|secs| voice.at(secs + lag + VOICE_DELAY_SECS)).collect();
-            (lag, PairSums::new(&lips, &high_pass(&openness, reach), is_speech))
+            (lag, PairSums::new(&lips, &high_pass(&openness, half_window), is_speech))
         };
         Self { lags: (-N_LAGS..=N_LAGS).map(at_lag).collect(), n_frames: lips.len(), fps }
     }
@@ -101,8 +102,8 @@ impl LipVoiceMatch {
         let correlations = correlations?;
         let (at, correlation) = correlations.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
         // Sub-step refinement: vertex of the parabola through the best lag and its neighbours.
-        let beside = |k: usize| correlations.get(k).copied();
-        let part = match (at.checked_sub(1).and_then(beside), beside(at + 1)) {
+        let neighbour = |k: usize| correlations.get(k).copied();
+        let part = match (at.checked_sub(1).and_then(neighbour), neighbour(at + 1)) {
             (Some(before), Some(after)) if before + after < 2.0 * correlation => {
                 0.5 * (before - after) / (before - 2.0 * correlation + after)
             }
@@ -117,8 +118,8 @@ impl LipVoiceMatch {
     }
 }
 
-/// Subtracts from each value the mean of the finite values within `reach` frames of it; NaN stays NaN.
-fn high_pass(values: &[f32], reach: usize) -> Vec<f32> {
+/// Subtracts from each value the mean of the finite values within `half_window` frames of it; NaN stays NaN.
+fn high_pass(values: &[f32], half_window: usize) -> Vec<f32> {
     let (mut sums, mut counts) = (vec![0.0_f64], vec![0_usize]);
     for value in values {
         let known = value.is_finite();
@@ -126,7 +127,7 @@ fn high_pass(values: &[f32], reach: usize) -> Vec<f32> {
         counts.push(counts[counts.len() - 1] + usize::from(known));
     }
     let local_mean = |t: usize| {
-        let (start, end) = (t.saturating_sub(reach), values.len().min(t + reach + 1));
+        let (start, end) = (t.saturating_sub(half_window), values.len().min(t + half_window + 1));
         (sums[end] - sums[start]) / (counts[end] - counts[start]).max(1) as f64
     };
     values.iter().enumerate().map(|(t, &value)| value - local_mean(t) as f32).collect()
@@ -200,12 +201,12 @@ pub mod tests {
                 .map_or(0.0, |[start, end, open]| open * (TAU / 2.0 * (secs - start) / (end - start)).sin())
         }
 
-        /// Voice of the mouth, delayed by `late` seconds: a murmur, plus harmonics up to 4 kHz scaled by the opening.
-        pub fn voice(&self, secs: f64, late: f64) -> Openness {
+        /// Voice of the mouth, delayed by `delay` seconds: a murmur, plus harmonics up to 4 kHz scaled by the opening.
+        pub fn voice(&self, secs: f64, delay: f64) -> Openness {
             let mut meter = OpennessMeter::default();
             let sample = |n: usize| {
                 let now = n as f64 / 16_000.0;
-                let open = self.at(now - late - VOICE_DELAY_SECS);
+                let open = self.at(now - delay - VOICE_DELAY_SECS);
                 let tone = |hz: f64| (TAU * hz * now).sin();
                 let vowel = [800.0, 1300.0, 2400.0, 3600.0].map(tone).iter().sum::<f64>();
                 (0.1 * (tone(150.0) + tone(450.0)) + 0.1 * open * open * vowel) as f32
@@ -214,32 +215,32 @@ pub mod tests {
             meter.finish()
         }
 
-        /// Measured lip opening with noise; every `unseen`-th frame is missing.
-        pub fn seen(&self, secs: f64, unseen: usize, seed: u64) -> (Vec<f32>, Vec<f64>) {
+        /// Measured lip opening with noise; every `missing_every`-th frame is missing.
+        pub fn measured(&self, secs: f64, missing_every: usize, seed: u64) -> (Vec<f32>, Vec<f64>) {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let times: Vec<f64> = (0..FPS.frames_in(secs)).map(|t| FPS.secs(t)).collect();
             let opening = |(t, secs): (usize, &f64)| {
                 let noise = rng.random_range(-0.02..0.02);
-                if t % unseen == 0 { f32::NAN } else { (0.05 + 0.25 * self.at(*secs) + noise) as f32 }
+                if t % missing_every == 0 { f32::NAN } else { (0.05 + 0.25 * self.at(*secs) + noise) as f32 }
             };
             (times.iter().enumerate().map(opening).collect(), times)
         }
     }
 
-    fn compared(secs: f64, own: bool, late: f64, seed: u64) -> LipSync {
+    fn compared(secs: f64, own: bool, delay: f64, seed: u64) -> LipSync {
         let mouth = Mouth::new(secs, seed);
-        let (opening, times) = mouth.seen(secs, 9, seed);
-        let voice = if own { mouth } else { Mouth::new(secs, seed + 1000) }.voice(secs, late);
+        let (opening, times) = mouth.measured(secs, 9, seed);
+        let voice = if own { mouth } else { Mouth::new(secs, seed + 1000) }.voice(secs, delay);
         compare(&opening, &times, &vec![true; times.len()], &voice, FPS)
     }
 
     #[test]
     fn the_delay_of_the_voice_is_measured() {
-        for (k, late) in [-0.4, -0.21, 0.0, 0.033, 0.1, 0.4].into_iter().enumerate() {
-            let found = compared(10.0, true, late, k as u64);
+        for (k, delay) in [-0.4, -0.21, 0.0, 0.033, 0.1, 0.4].into_iter().enumerate() {
+            let found = compared(10.0, true, delay, k as u64);
             let offset = found.offset.unwrap();
-            assert!((offset.secs - late).abs() < 0.02 && offset.is_sure(), "{late}: {offset:?}");
-            assert!(found.score.iter().all(|score| *score > 0.5), "{late}: {:?}", found.score);
+            assert!((offset.secs - delay).abs() < 0.02 && offset.is_sure(), "{delay}: {offset:?}");
+            assert!(found.score.iter().all(|score| *score > 0.5), "{delay}: {:?}", found.score);
         }
     }
 
@@ -257,10 +258,10 @@ pub mod tests {
     #[test]
     fn missing_mouth_speech_or_movement_gives_no_score() {
         let mouth = Mouth::new(20.0, 5);
-        let ((opening, times), voice) = (mouth.seen(20.0, 999, 5), mouth.voice(20.0, 0.0));
+        let ((opening, times), voice) = (mouth.measured(20.0, 999, 5), mouth.voice(20.0, 0.0));
         let all = vec![true; times.len()];
-        let unseen = vec![f32::NAN; times.len()];
-        for (opening, is_speech) in [(&unseen, &all), (&opening, &vec![false; times.len()])] {
+        let hidden = vec![f32::NAN; times.len()];
+        for (opening, is_speech) in [(&hidden, &all), (&opening, &vec![false; times.len()])] {
             let found = compare(opening, &times, is_speech, &voice, FPS);
             assert!(found.offset.is_none() && found.score.iter().all(|score| score.is_nan()));
         }
@@ -268,8 +269,8 @@ pub mod tests {
         let half: Vec<f32> = (0..300).map(|t| if t < 150 { opening[t] } else { f32::NAN }).collect();
         let found = compare(&half, &times, &all, &voice, FPS);
         assert!(found.score[..110].iter().all(|score| *score > 0.5) && found.score[200..].iter().all(|s| s.is_nan()));
-        let still: Vec<f32> = opening.iter().map(|opening| 0.1 + 0.01 * opening).collect();
-        let found = compare(&still, &times, &all, &voice, FPS);
+        let static_lips: Vec<f32> = opening.iter().map(|opening| 0.1 + 0.01 * opening).collect();
+        let found = compare(&static_lips, &times, &all, &voice, FPS);
         assert!(found.score.iter().all(|score| *score < 0.1) && !found.offset.unwrap().is_sure());
         assert_eq!(compare(&[], &[], &[], &Openness::default(), FPS), LipSync::default());
     }

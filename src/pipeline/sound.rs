@@ -16,7 +16,7 @@ const SILENCE_DB: f64 = -120.0;
 const CHUNK_SAMPLES: usize = 1 << 14;
 
 /// Writes audio track `track` (from 1; 0: automatic choice) of the video `path` to the 16-bit mono wav file `out`.
-/// Returns `None` and writes no file if has_audio is no audio.
+/// Returns `None` and writes no file if there is no audio.
 pub fn extract_wav(path: &Path, track: usize, out: &Path, rate: u32) -> Result<Option<StreamedSound>> {
     let mut wav = None;
     let streamed = stream_mono(path, track, rate, &mut |piece| {
@@ -29,7 +29,7 @@ pub fn extract_wav(path: &Path, track: usize, out: &Path, rate: u32) -> Result<O
     Ok(streamed)
 }
 
-/// Per frame, whether has_audio is audio (1 or 0) and its loudness: the root mean square of the second around it in dB of
+/// Per frame, whether there is audio (1 or 0) and its loudness: the root mean square of the second around it in dB of
 /// full scale, -120 for silence. A missing file counts as no audio.
 pub fn levels(path: &Path, fps: FrameRate, n_frames: usize) -> Result<(Vec<f32>, Vec<f32>)> {
     let (mut n_samples, mut power) = (vec![0_u64; n_frames], vec![0.0_f64; n_frames]);

@@ -77,7 +77,7 @@ pub enum BudgetKind {
 }
 
 impl TimeBudget {
-    /// Empty budget of a speaker, to which the budgets of videos are total.
+    /// Empty budget of a speaker, to which the budgets of videos are added.
     pub(super) fn of_speaker(speaker: &str) -> Self {
         Self { of: speaker.to_owned(), ..Self::default() }
     }

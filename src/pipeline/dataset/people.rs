@@ -105,8 +105,8 @@ mod tests {
     use super::*;
 
     fn person(file: &str, face: Option<f64>, shoulders: Option<f64>) -> VideoPerson {
-        let place = |k: u32, long: f64| [f64::from(k % 5), long * f64::from(k / 5), f64::from(k % 3)];
-        let face = face.map(|long| (0..40).map(|k| place(k, long)).collect());
+        let vertex = |k: u32, long: f64| [f64::from(k % 5), long * f64::from(k / 5), f64::from(k % 3)];
+        let face = face.map(|long| (0..40).map(|k| vertex(k, long)).collect());
         let unit = Unit { speaker: "s".into(), video: file.into(), source: file.into() };
         let portrait = face.map(|face| Portrait { face, n_frames: 9, ..Portrait::default() });
         VideoPerson { unit, file: file.into(), portrait, shoulders }

@@ -127,8 +127,8 @@ impl DatasetStage {
         let is_known =
             self.speakers.iter().any(|configured| configured.name == speaker.speaker && configured.same_person);
         let videos: Vec<&Unit> = if is_known { Vec::new() } else { self.ready(speaker) };
-        let seen: Vec<VideoPerson> = videos.into_iter().map(|video| VideoPerson::read(&self.work, video)).collect();
-        let groups = people::groups(&seen);
+        let persons: Vec<VideoPerson> = videos.into_iter().map(|video| VideoPerson::read(&self.work, video)).collect();
+        let groups = people::groups(&persons);
         let picture = artifacts::faces(&self.work, &speaker.speaker);
         if groups.len() < 2 {
             workdir::remove(&picture)?;

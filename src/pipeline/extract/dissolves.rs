@@ -18,8 +18,8 @@ const MIN_DIRECTNESS: f64 = 0.7;
 /// Least correlation for a block of the middle frame to count as present in A and in B.
 const IN_BOTH: f32 = 0.8;
 
-/// Share of grid cells that change monotonically from one colour to another; `path_length` is the path length of each cell's
-/// colour over the window, in 8-bit steps per channel.
+/// Share of grid cells that change monotonically from one colour to another; `path_length` is the length of the path
+/// of each cell's colour over the window, in 8-bit steps per channel.
 pub fn turned(a: &Thumbnail, b: &Thumbnail, path_length: impl Iterator<Item = [u32; 3]>) -> f64 {
     let cells = a.grid.iter().zip(&b.grid).zip(path_length);
     let n = cells.filter(|((a, b), path_length)| is_monotonic(**a, **b, *path_length).unwrap_or(false)).count();

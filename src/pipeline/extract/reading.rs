@@ -43,8 +43,8 @@ pub fn read(
         timeline.repeated.push(time.repeated);
         let picture = if time.repeated { None } else { Some(thumbnail(reader, area)?) };
         if let (Some(survey), false) = (survey.as_deref_mut(), time.repeated) {
-            let whole = survey.wants_picture().then(|| reader.picture(None)).transpose()?;
-            survey.push(whole, reader.is_flagged_interlaced());
+            let full_picture = survey.wants_picture().then(|| reader.picture(None)).transpose()?;
+            survey.push(full_picture, reader.is_flagged_interlaced());
         }
         checksums.push(picture.as_ref().map_or_else(|| checksums.last().copied().unwrap_or(0), checksum));
         shots.push(picture.clone());
@@ -76,9 +76,9 @@ pub fn checksum(picture: &Image) -> u64 {
 pub fn thumbnail(reader: &mut FrameReader, area: Option<PixelArea>) -> Result<Image> {
     let Some(area) = area else { return reader.picture(Some(THUMBNAIL)) };
     let scales = [(0, area.width), (1, area.height)].map(|(axis, px)| THUMBNAIL[axis] as f64 / px.max(1) as f64);
-    let whole = reader.image_size();
+    let full_size = reader.image_size();
     let scaled = |px: usize, axis: usize| (px as f64 * scales[axis]).round() as usize;
-    let size = [0, 1].map(|axis| scaled(whole[axis], axis).max(THUMBNAIL[axis]));
+    let size = [0, 1].map(|axis| scaled(full_size[axis], axis).max(THUMBNAIL[axis]));
     let corner = [scaled(area.x, 0), scaled(area.y, 1)];
     let [x, y] = [0, 1].map(|axis| corner[axis].min(size[axis] - THUMBNAIL[axis]));
     let [width, height] = THUMBNAIL;

@@ -109,11 +109,11 @@ impl Stage for KeypointExtractStage {
         };
         media.write(&Artifact::MediaInfo.within(out))?;
         let sound = audio_secs.map_or("no sound".to_owned(), |secs| format!("{secs:.1} s of sound"));
-        let said = media.not_judged().into_iter().chain(media.damage.clone()).chain(notes.clone());
-        let said = said.collect::<Vec<_>>().join("; ");
+        let remarks = media.not_judged().into_iter().chain(media.damage.clone()).chain(notes.clone());
+        let remarks = remarks.collect::<Vec<_>>().join("; ");
         let mut facts = serde_json::to_value(&media)?.as_object().cloned().unwrap_or_default();
         facts.insert("notes".into(), notes.into());
-        Ok(Report { line: format!("{n_frames} frames at {fps}, {sound}; {said}"), facts })
+        Ok(Report { line: format!("{n_frames} frames at {fps}, {sound}; {remarks}"), facts })
     }
 }
 

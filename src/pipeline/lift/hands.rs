@@ -31,12 +31,13 @@ pub fn lift(
 ) -> Result<()> {
     let n_frames = points.len_of(Axis(0));
     for start in (0..n_frames).step_by(BATCH) {
-        let or_empty = |seen: SeenHand| if seen.iter().flatten().count() < MIN_POINTS { [None; N_HAND] } else { seen };
-        let seen: Vec<SeenHand> =
+        let or_empty =
+            |visible: SeenHand| if visible.iter().flatten().count() < MIN_POINTS { [None; N_HAND] } else { visible };
+        let visible: Vec<SeenHand> =
             (start..n_frames.min(start + BATCH)).map(|t| or_empty(visible_points(points, t))).collect();
-        for (t, (hand, seen)) in (start..).zip(lifter.lift(&seen, side)?.into_iter().zip(&seen)) {
+        for (t, (hand, visible)) in (start..).zip(lifter.lift(&visible, side)?.into_iter().zip(&visible)) {
             let Some(hand) = hand.as_ref().and_then(unit_size) else { continue };
-            (0..N_HAND).for_each(|j| mask[[t, j]] = seen[j].is_some());
+            (0..N_HAND).for_each(|j| mask[[t, j]] = visible[j].is_some());
             joints.slice_mut(s![t, .., ..]).indexed_iter_mut().for_each(|((j, k), v)| *v = hand[j][k] as f32);
         }
     }

@@ -82,8 +82,8 @@ fn hands(motion: &Motion, forearm: f64) -> Option<[f64; N_HAND]> {
 /// Lengths of a bone in the frames in which both ends are visible. A hand root is visible if any point of the hand is.
 fn visible_lengths(motion: &Motion, from: usize, to: usize) -> Vec<f32> {
     let is_root = from == L_HAND || from == R_HAND;
-    let seen = |t: usize| motion.mask[[t, to]] && (is_root || motion.mask[[t, from]]);
-    (0..motion.n_frames()).filter(|&t| seen(t)).map(|t| bone(motion, t, from, to)).collect()
+    let is_visible = |t: usize| motion.mask[[t, to]] && (is_root || motion.mask[[t, from]]);
+    (0..motion.n_frames()).filter(|&t| is_visible(t)).map(|t| bone(motion, t, from, to)).collect()
 }
 
 fn lifted_lengths(motion: &Motion, from: usize, to: usize) -> Vec<f32> {

@@ -236,7 +236,7 @@ mod tests {
 
     /// A swaying body; from frame `change` its motion is different and it is larger.
     fn keypoints(n_frames: usize, change: usize) -> Keypoints {
-        let places = [
+        let positions = [
             (coco::NOSE, 320.0, 100.0),
             (coco::L_SHOULDER, 380.0, 200.0),
             (coco::R_SHOULDER, 260.0, 200.0),
@@ -255,7 +255,7 @@ mod tests {
             })
         };
         let bodies = bodies(n_frames, [640, 480], |t| {
-            places.map(|(joint, x, y)| {
+            positions.map(|(joint, x, y)| {
                 let [x, y, _] = at(t, x, y);
                 (joint, x, y)
             })
@@ -268,8 +268,8 @@ mod tests {
         let (n_frames, change) = (240, 160);
         let settings = config::LiftConfig::default();
         let lifter = Lifter::new(&settings).unwrap();
-        let whole = [Interval { start: 0, end: n_frames }];
-        let raw = |change| lifter.raw(&keypoints(n_frames, change), &whole, &[]).unwrap().motion;
+        let complete = [Interval { start: 0, end: n_frames }];
+        let raw = |change| lifter.raw(&keypoints(n_frames, change), &complete, &[]).unwrap().motion;
         let (plain, changed) = (raw(n_frames), raw(change));
         let last = change - (reach_secs(&settings) * 15.0).ceil() as usize;
         assert!(last > 80, "a reach of {} s", reach_secs(&settings));

@@ -78,8 +78,8 @@ fn arm(chain: &ArmChain, motion: &Motion, keypoints: &Keypoints) -> ArmStatistic
         median(lengths.filter(|length| length.is_finite()))
     };
     let wrist_error = |t: usize| -> Option<f64> {
-        let (seen, fit) = (found(keypoints, chain.points[2], t)?, Fit::of(motion, keypoints, t)?);
-        Some(MM * distance(&seen, &fit.project(position(motion, wrist, t))) / fit.scale)
+        let (keypoint, fit) = (found(keypoints, chain.points[2], t)?, Fit::of(motion, keypoints, t)?);
+        Some(MM * distance(&keypoint, &fit.project(position(motion, wrist, t))) / fit.scale)
     };
     let share = |count: usize, of: usize| count as f64 / of.max(1) as f64;
     let frames = |holds: &dyn Fn(usize) -> bool| share((0..n_frames).filter(|&t| holds(t)).count(), n_frames);
@@ -181,8 +181,8 @@ mod tests {
         for t in 0..n_frames {
             for (side, chain) in [(1.0, &LEFT), (-1.0, &RIGHT)] {
                 let shake = if side > 0.0 { 0.001 * (1.0 - 2.0 * (t % 2) as f32) } else { 0.0 };
-                let places = [[0.0, 0.0], [0.3, -0.05], [0.5, -0.2]];
-                for (k, [y, z]) in places.into_iter().enumerate() {
+                let positions = [[0.0, 0.0], [0.3, -0.05], [0.5, -0.2]];
+                for (k, [y, z]) in positions.into_iter().enumerate() {
                     let x = side * 0.17 + if k == 2 { shake } else { 0.0 };
                     for (axis, v) in [x, y, z].into_iter().enumerate() {
                         joints[[t, chain.joints[k], axis]] = v;

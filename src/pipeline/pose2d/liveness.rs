@@ -100,7 +100,7 @@ fn without_margin(grown: &[f32]) -> Vec<f32> {
 
 /// Change at the best shift, after subtraction of the mean (lighting).
 fn change(before: &[f32], now: &[f32]) -> f32 {
-    let places = (0..=2 * SHIFT).flat_map(|y| (0..=2 * SHIFT).map(move |x| (x, y)));
+    let shifts = (0..=2 * SHIFT).flat_map(|y| (0..=2 * SHIFT).map(move |x| (x, y)));
     let at = |(x, y): (usize, usize)| {
         let mut steps: Vec<f32> = before.iter().zip(shifted(now, x, y)).map(|(a, b)| b - a).collect();
         let mean = steps.iter().sum::<f32>() / steps.len().max(1) as f32;
@@ -110,7 +110,7 @@ fn change(before: &[f32], now: &[f32]) -> f32 {
         steps.sort_by(|a, b| b.total_cmp(a));
         steps.get((MOVING_SHARE * steps.len() as f64) as usize).copied().unwrap_or(0.0)
     };
-    places.map(at).fold(f32::INFINITY, f32::min)
+    shifts.map(at).fold(f32::INFINITY, f32::min)
 }
 
 #[cfg(test)]
@@ -132,16 +132,17 @@ mod tests {
 
     #[test]
     fn changing_boxes_are_alive() {
-        let place = |x: f32| PersonBox { x, y: 10.0, width: 80.0, height: 80.0, score: 0.9 };
+        let person_at = |x: f32| PersonBox { x, y: 10.0, width: 80.0, height: 80.0, score: 0.9 };
         let mut tracks = LivenessTracks::default();
         let mut last = Vec::new();
         for frame in 0..4 {
             // Changes of light and small camera movement are not liveness.
-            last = tracks.update(&picture(frame, 10 * frame as u8, 3 * (frame % 2)), &[place(10.0), place(115.0)]);
+            last =
+                tracks.update(&picture(frame, 10 * frame as u8, 3 * (frame % 2)), &[person_at(10.0), person_at(115.0)]);
         }
         assert_eq!((last[0].n, last[1].n), (3, 3));
         assert!(last[0].max_change < 6.0 && last[1].max_change > 20.0, "{last:?}");
         assert_eq!(tracks.update(&picture(9, 0, 0), &[])[..], []);
-        assert_eq!(tracks.update(&picture(9, 0, 0), &[place(60.0)])[0].n, 0);
+        assert_eq!(tracks.update(&picture(9, 0, 0), &[person_at(60.0)])[0].n, 0);
     }
 }

@@ -13,8 +13,8 @@ pub fn colours(image: &Image, [x, y, width, height]: [f64; 4], [columns, rows]: 
     }
     let sample_positions = |start: f64, size: f64, n: usize, side: usize| -> Vec<usize> {
         let n = n * POINTS_PER_SIDE;
-        let place = |at: usize| start + size * (at as f64 + 0.5) / n as f64;
-        (0..n).map(|at| (place(at).max(0.0) as usize).min(side - 1)).collect()
+        let position = |at: usize| start + size * (at as f64 + 0.5) / n as f64;
+        (0..n).map(|at| (position(at).max(0.0) as usize).min(side - 1)).collect()
     };
     let xs = sample_positions(x, width, columns, image.width);
     let ys = sample_positions(y, height, rows, image.height);

@@ -143,20 +143,20 @@ impl SpeakerTracker {
         body: &mut BodyModel,
         settings: &config::Pose2dConfig,
     ) -> Result<bool> {
-        let Some(seen) = BodyColours::measure(image, points, settings.joint_score) else { return Ok(false) };
-        let here = SeenPerson { place: self.track.person(), colours: seen.clone() };
-        if self.before.take().is_some_and(|before| is_same_person(&before, &here)) {
+        let Some(current_colours) = BodyColours::measure(image, points, settings.joint_score) else { return Ok(false) };
+        let current = SeenPerson { place: self.track.person(), colours: current_colours.clone() };
+        if self.before.take().is_some_and(|before| is_same_person(&before, &current)) {
             self.track.merge_with_previous();
         }
         if self.first.is_none() && self.track.n_identities() <= 1 {
-            self.first = Some(here);
+            self.first = Some(current);
         }
         let Some(colours) = self.colours.as_mut() else {
-            self.colours = Some(seen);
+            self.colours = Some(current_colours);
             return Ok(false);
         };
-        if !self.several || colours.distance(&seen) <= MAX_COLOUR_DISTANCE {
-            colours.move_towards(&seen, COLOUR_WEIGHT);
+        if !self.several || colours.distance(&current_colours) <= MAX_COLOUR_DISTANCE {
+            colours.move_towards(&current_colours, COLOUR_WEIGHT);
             self.n_deviating = self.n_deviating.min(0);
             return Ok(false);
         }
@@ -209,10 +209,11 @@ impl SpeakerTracker {
 /// is much closer.
 fn is_still_speaker(found: &[Candidate], followed: &PersonBox) -> bool {
     let overlap = |one: &Candidate| boxes::overlap(&one.person, followed);
-    let Some(here) = found.iter().max_by(|a, b| overlap(a).total_cmp(&overlap(b))) else { return false };
+    let Some(tracked) = found.iter().max_by(|a, b| overlap(a).total_cmp(&overlap(b))) else { return false };
     let appearance_distance = |one: &Candidate| one.appearance_distance.unwrap_or(f32::INFINITY);
-    let is_likeliest = || found.iter().all(|one| appearance_distance(one) >= CLOSER_FACTOR * appearance_distance(here));
-    overlap(here) >= MIN_OVERLAP && (here.speaks || is_likeliest())
+    let is_likeliest =
+        || found.iter().all(|one| appearance_distance(one) >= CLOSER_FACTOR * appearance_distance(tracked));
+    overlap(tracked) >= MIN_OVERLAP && (tracked.speaks || is_likeliest())
 }
 
 /// Measures the colour distance of every candidate.
@@ -225,8 +226,8 @@ fn measure(
 ) -> Result<()> {
     for one in found {
         // A box without a detectable body gets the largest distance.
-        let seen = colours_of(image, &one.person, body, least)?;
-        one.appearance_distance = Some(seen.map_or(f32::from(u8::MAX), |seen| seen.distance(colours)));
+        let measured = colours_of(image, &one.person, body, least)?;
+        one.appearance_distance = Some(measured.map_or(f32::from(u8::MAX), |measured| measured.distance(colours)));
     }
     Ok(())
 }

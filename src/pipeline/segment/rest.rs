@@ -77,8 +77,8 @@ mod tests {
             movement(&seated(40.0, |t| if (20..40).contains(&t) { (20 - t.abs_diff(30)) as f32 } else { 0.0 }));
         assert!(stroke[5] == 0.0 && stroke[24] > 0.05, "{stroke:?}");
         assert!(movement(&seated(70.0, |_| 0.0)).iter().all(|&m| m == APART), "apart");
-        let mut unseen = seated(40.0, |_| 0.0);
-        unseen.body.slice_mut(s![.., coco::L_WRIST, 2]).fill(0.1);
-        assert!(movement(&unseen).iter().all(|&m| m == APART));
+        let mut hidden = seated(40.0, |_| 0.0);
+        hidden.body.slice_mut(s![.., coco::L_WRIST, 2]).fill(0.1);
+        assert!(movement(&hidden).iter().all(|&m| m == APART));
     }
 }

@@ -86,7 +86,7 @@ impl Stage for SegmentStage {
         report.facts.insert("speech".to_owned(), rule.into());
         report.facts.insert("sound_offset".to_owned(), serde_json::to_value(offset)?);
         report.line.extend(offset.filter(SoundOffset::is_told).map(|offset| format!("; {offset}")));
-        report.line.extend(video.not_judged().map(|said| format!("; {said}")));
+        report.line.extend(video.not_judged().map(|note| format!("; {note}")));
         Ok(report)
     }
 }

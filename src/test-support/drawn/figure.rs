@@ -136,10 +136,10 @@ fn fingers(arm: &ArmControls, elbow: Vec3, wrist: Vec3, side: f64) -> [Vec3; N_H
     let turn = Rotation::about(along, -side * arm.roll);
     let thumb_side = turn.turn(thumb_up);
     let palm = scale(cross(along, thumb_side), side);
-    let place = |[a, t, p]: Vec3| add(scale(along, a), add(scale(thumb_side, t), scale(palm, p)));
+    let from_hand_axes = |[a, t, p]: Vec3| add(scale(along, a), add(scale(thumb_side, t), scale(palm, p)));
     let mut joints = [wrist; N_HAND_JOINTS];
     for (finger, (base, lengths)) in FINGER_BASES.iter().zip(PHALANGES).enumerate() {
-        let mut at = add(wrist, place(*base));
+        let mut at = add(wrist, from_hand_axes(*base));
         joints[1 + 4 * finger] = at;
         let (bends, across) = if finger == 0 {
             ([0.15, 0.35 * arm.curl, 0.6 * arm.curl], 0.75 - 0.5 * arm.curl + 0.5 * arm.spread)
@@ -151,7 +151,7 @@ fn fingers(arm: &ArmControls, elbow: Vec3, wrist: Vec3, side: f64) -> [Vec3; N_H
         for (bone, length) in lengths.into_iter().enumerate() {
             bend += bends[bone];
             let flat = [bend.cos() * across.cos(), bend.cos() * across.sin(), bend.sin()];
-            at = add(at, scale(place(flat), length));
+            at = add(at, scale(from_hand_axes(flat), length));
             joints[2 + 4 * finger + bone] = at;
         }
     }

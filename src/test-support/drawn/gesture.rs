@@ -44,8 +44,8 @@ impl DrawnGestures {
         let sway = std::array::from_fn(|_| rng.random_range(0.0..2.0 * PI));
         let mut gestures = Self { strokes: Vec::new(), beats: Vec::new(), sway };
         for (number, phrase) in speech.phrases.iter().enumerate() {
-            let said = &speech.syllables[phrase.first..phrase.last];
-            for (k, syllable) in said.iter().enumerate().filter(|(_, s)| s.stress > 0.5) {
+            let phrase_syllables = &speech.syllables[phrase.first..phrase.last];
+            for (k, syllable) in phrase_syllables.iter().enumerate().filter(|(_, s)| s.stress > 0.5) {
                 let one_handed = rng.random_range(0.0..1.0) < 0.35;
                 let side = usize::from(rng.random_range(0.0..1.0) < 0.5);
                 if k < 3 || rng.random_range(0.0..1.0) < 0.5 {
@@ -58,7 +58,9 @@ impl DrawnGestures {
                 let depth = rng.random_range(0.02..0.045) * syllable.stress;
                 gestures.beats.push(BeatGesture { at: (syllable.start + syllable.end) / 2.0, depth, hands });
             }
-            let (Some(end), next) = (said.last().map(|s| s.end), speech.phrases.get(number + 1)) else { continue };
+            let (Some(end), next) = (phrase_syllables.last().map(|s| s.end), speech.phrases.get(number + 1)) else {
+                continue;
+            };
             if next.is_none_or(|next| speech.syllables.get(next.first).is_none_or(|s| s.start - end > 0.6)) {
                 gestures.strokes.push(Stroke { start: end, secs: 0.8, arms: [REST; 2], head: [0.0; 3] });
             }

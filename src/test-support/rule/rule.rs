@@ -73,8 +73,8 @@ struct WristMove {
 /// The right hand leads with d = 0.2 s (peak speed 0.4 s after an onset), the left follows with d = 0.4 s (0.6 s);
 /// nothing depends on the audio of the current frame.
 ///
-/// A word with a gesture (`words`) that begins at t moves its hand to WORD_TARGETS by a stroke at t + 0.3 s, with hold and
-/// return as above; strokes of accents with that hand from 0.4 s before it until the end of the hold are dropped.
+/// A word with a gesture (`words`) that begins at t moves its hand to WORD_TARGETS by a stroke at t + 0.3 s, with hold
+/// and return as above; accent strokes of that hand from 0.4 s before it until the end of the hold are dropped.
 ///
 /// Variation, with a separate seed: skipped accents, strokes without an accent, errors of stroke times and targets, and
 /// sway of arms and torso.
@@ -90,12 +90,12 @@ struct Variation([[[f64; 2]; 2]; 9]);
 
 impl<'a> RuleGestures<'a> {
     /// Predictable part: gestures of the rule for `speech` and the words in it.
-    pub fn new(speech: &'a Speech, said: &[Word]) -> Self {
-        Self::of_habits(&Habits::default(), speech, said)
+    pub fn new(speech: &'a Speech, spoken: &[Word]) -> Self {
+        Self::of_habits(&Habits::default(), speech, spoken)
     }
 
     /// Like `new`, for a speaker with other habits.
-    pub fn of_habits(habits: &Habits, speech: &'a Speech, said: &[Word]) -> Self {
+    pub fn of_habits(habits: &Habits, speech: &'a Speech, spoken: &[Word]) -> Self {
         let mut strokes: [Vec<(f64, ArmTarget)>; 2] = std::array::from_fn(|hand| {
             let accents = speech.syllables.iter().filter(|syllable| syllable.stress > ACCENT);
             let stroke = accents.filter_map(|accent| {
@@ -104,17 +104,17 @@ impl<'a> RuleGestures<'a> {
             });
             stroke.collect()
         });
-        insert_word_strokes(&mut strokes, said, |goal| (0.0, *goal));
+        insert_word_strokes(&mut strokes, spoken, |goal| (0.0, *goal));
         Self { speech, moves: strokes.map(with_returns), sway: None }
     }
 
     /// Gestures of `secs` seconds with random variation.
-    pub fn with_variation(speech: &'a Speech, said: &[Word], secs: f64, rng: &mut ChaCha8Rng) -> Self {
-        Self::varied(&Habits::default(), speech, said, secs, rng)
+    pub fn with_variation(speech: &'a Speech, spoken: &[Word], secs: f64, rng: &mut ChaCha8Rng) -> Self {
+        Self::varied(&Habits::default(), speech, spoken, secs, rng)
     }
 
     /// Like `with_variation`, for a speaker with other habits.
-    pub fn varied(habits: &Habits, speech: &'a Speech, said: &[Word], secs: f64, rng: &mut ChaCha8Rng) -> Self {
+    pub fn varied(habits: &Habits, speech: &'a Speech, spoken: &[Word], secs: f64, rng: &mut ChaCha8Rng) -> Self {
         let mut strokes: [Vec<(f64, ArmTarget)>; 2] = Default::default();
         for accent in speech.syllables.iter().filter(|syllable| syllable.stress > ACCENT) {
             let is_skipped = rng.random_bool(SKIPPED_SHARE);
@@ -139,7 +139,7 @@ impl<'a> RuleGestures<'a> {
             strokes[rng.random_range(0..2)].push((now, goal));
         }
         strokes.iter_mut().for_each(|strokes| strokes.sort_by(|a, b| a.0.total_cmp(&b.0)));
-        insert_word_strokes(&mut strokes, said, |goal| (TIME_SD * standard_normal(rng), perturbed(goal, rng)));
+        insert_word_strokes(&mut strokes, spoken, |goal| (TIME_SD * standard_normal(rng), perturbed(goal, rng)));
         let mut wave = || [rng.random_range(SWAY_HZ), rng.random_range(0.0..TAU)];
         let sway = Variation(std::array::from_fn(|_| [wave(), wave()]));
         Self { speech, moves: strokes.map(with_returns), sway: Some(sway) }
@@ -168,9 +168,9 @@ impl<'a> RuleGestures<'a> {
         let mut joints = Array3::zeros((n_frames, N_JOINTS, 3));
         for frame_idx in 0..n_frames {
             let figure = DrawnFigure::new(&self.controls(fps.secs(frame_idx)));
-            for (joint, &place) in figure.joints.iter().enumerate() {
-                let place = sub(place, figure.joints[NECK]);
-                (0..3).for_each(|k| joints[[frame_idx, joint, k]] = place[k] as f32);
+            for (joint, &position) in figure.joints.iter().enumerate() {
+                let relative = sub(position, figure.joints[NECK]);
+                (0..3).for_each(|k| joints[[frame_idx, joint, k]] = relative[k] as f32);
             }
         }
         Motion::from_joints(fps, joints)
@@ -210,10 +210,10 @@ impl Variation {
 /// its goal.
 fn insert_word_strokes(
     strokes: &mut [Vec<(f64, ArmTarget)>; 2],
-    said: &[Word],
+    spoken: &[Word],
     mut varied: impl FnMut(&ArmTarget) -> (f64, ArmTarget),
 ) {
-    for word in said {
+    for word in spoken {
         let Some(WordGesture { hand, place }) = words::gesture(&word.word) else { continue };
         let (late, goal) = varied(&WORD_TARGETS[place]);
         let start = word.start_secs + WORD_DELAY + late;
@@ -342,11 +342,11 @@ mod tests {
     fn a_word_moves_its_hand_to_its_target() {
         let rng = &mut ChaCha8Rng::seed_from_u64(4);
         let speech = Speech::free(SECS, rng);
-        let said = words::words(&speech, orator_base::types::split::Split::Train, rng);
-        let rule = RuleGestures::new(&speech, &said);
+        let spoken = words::words(&speech, orator_base::types::split::Split::Train, rng);
+        let rule = RuleGestures::new(&speech, &spoken);
         let motion = rule.motion(FPS.frames_in(SECS), FPS);
         let mut n = 0;
-        for word in said.iter().filter(|word| word.end_secs < SECS - 2.0) {
+        for word in spoken.iter().filter(|word| word.end_secs < SECS - 2.0) {
             let Some(gesture) = words::gesture(&word.word) else { continue };
             let t = FPS.frames_in(word.start_secs + WORD_DELAY + STROKE) + 1;
             let wrist = [L_WRIST, R_WRIST][gesture.hand];

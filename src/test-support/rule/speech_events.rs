@@ -30,21 +30,21 @@ pub struct SpeechEvents {
 }
 
 impl SpeechEvents {
-    /// Detects the events in audio with the words `said`.
-    pub fn detect(sound: &Sound, said: &[Word]) -> Self {
+    /// Detects the events in audio with the words `spoken`.
+    pub fn detect(sound: &Sound, spoken: &[Word]) -> Self {
         let envelope = envelope(sound);
         let mut sorted = envelope.clone();
         sorted.sort_by(f64::total_cmp);
         let level = sorted.get(sorted.len() * 9 / 10).copied().unwrap_or(0.0).max(1e-6);
-        let place = |word: &Word| {
+        let target = |word: &Word| {
             let own = word.word.trim_matches(|c: char| !c.is_alphabetic()).to_lowercase();
-            let place = WORDS.iter().position(|words| words.contains(&own.as_str()))?;
-            Some((word.start_secs, place))
+            let target = WORDS.iter().position(|words| words.contains(&own.as_str()))?;
+            Some((word.start_secs, target))
         };
         Self {
             beats: beats(&envelope, level),
             phrases: phrases(&envelope, level),
-            words: said.iter().filter_map(place).collect(),
+            words: spoken.iter().filter_map(target).collect(),
         }
     }
 }
@@ -114,8 +114,8 @@ mod tests {
             source: WordSource::Given,
             confidence: None,
         };
-        let said = [word("The", 0.0), word("River,", 0.2), word("city", 1.7)];
-        let events = SpeechEvents::detect(&Sound { rate: 16_000, samples }, &said);
+        let spoken = [word("The", 0.0), word("River,", 0.2), word("city", 1.7)];
+        let events = SpeechEvents::detect(&Sound { rate: 16_000, samples }, &spoken);
         let times: Vec<f64> = events.beats.iter().map(|beat| (beat.0 * 10.0).round() / 10.0).collect();
         assert_eq!(times.len(), 4, "{events:?}");
         for (time, expected) in times.iter().zip([0.25, 0.85, 1.75, 2.35]) {

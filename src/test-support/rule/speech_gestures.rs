@@ -79,7 +79,7 @@ pub struct SpeechGestures {
 impl SpeechGestures {
     /// Predictable part: the rule without variation.
     pub fn new(events: &SpeechEvents) -> Self {
-        let strokes = events.words.iter().map(|(at, place)| (at + WORD_DELAY, TARGETS[*place]));
+        let strokes = events.words.iter().map(|(at, target_idx)| (at + WORD_DELAY, TARGETS[*target_idx]));
         Self { events: events.clone(), moves: with_returns(strokes.collect()), sway: None }
     }
 
@@ -88,19 +88,19 @@ impl SpeechGestures {
         let normal = |rng: &mut ChaCha8Rng| -> f64 { StandardNormal.sample(rng) };
         let mut varied_events = SpeechEvents { phrases: events.phrases.clone(), ..SpeechEvents::default() };
         for (at, height) in &events.beats {
-            let (is_skipped, late, depth) = (rng.random_bool(SKIPPED_SHARE), normal(rng), normal(rng));
+            let (is_skipped, delay, depth) = (rng.random_bool(SKIPPED_SHARE), normal(rng), normal(rng));
             if !is_skipped {
-                varied_events.beats.push((at + TIME_SD * late, height * (1.0 + DEPTH_SD * depth).max(0.2)));
+                varied_events.beats.push((at + TIME_SD * delay, height * (1.0 + DEPTH_SD * depth).max(0.2)));
             }
         }
         let mut strokes = Vec::new();
-        for (at, place) in &events.words {
-            let (is_skipped, late) = (rng.random_bool(SKIPPED_SHARE), normal(rng));
+        for (at, target_idx) in &events.words {
+            let (is_skipped, delay) = (rng.random_bool(SKIPPED_SHARE), normal(rng));
             let goal = std::array::from_fn(|k| {
-                TARGETS[*place][k] + if k < 3 { TARGET_SD } else { 2.0 * TARGET_SD } * normal(rng)
+                TARGETS[*target_idx][k] + if k < 3 { TARGET_SD } else { 2.0 * TARGET_SD } * normal(rng)
             });
             if !is_skipped {
-                strokes.push((at + WORD_DELAY + TIME_SD * late, goal));
+                strokes.push((at + WORD_DELAY + TIME_SD * delay, goal));
             }
         }
         let sway = std::array::from_fn(|_| [rng.random_range(SWAY_HZ), rng.random_range(0.0..TAU)]);
@@ -158,9 +158,9 @@ impl SpeechGestures {
         let mut joints = Array3::zeros((n_frames, N_JOINTS, 3));
         for t in 0..n_frames {
             let figure = DrawnFigure::new(&self.controls(fps.secs(t)));
-            for (joint, place) in figure.joints.iter().enumerate() {
-                let place = sub(*place, figure.joints[NECK]);
-                (0..3).for_each(|k| joints[[t, joint, k]] = place[k] as f32);
+            for (joint, position) in figure.joints.iter().enumerate() {
+                let relative = sub(*position, figure.joints[NECK]);
+                (0..3).for_each(|k| joints[[t, joint, k]] = relative[k] as f32);
             }
         }
         Motion::from_joints(fps, joints)

@@ -58,21 +58,21 @@ pub fn words(speech: &Speech, split: Split, rng: &mut ChaCha8Rng) -> Vec<Word> {
             at = next;
         }
     }
-    let mut said: Vec<&str> = Vec::with_capacity(spans.len());
+    let mut chosen: Vec<&str> = Vec::with_capacity(spans.len());
     let mut last = None;
     for (n, [start, _]) in spans.iter().enumerate() {
         let is_allowed = last.is_none_or(|last: usize| n > last + 2 && start - spans[last][0] >= MIN_INTERVAL);
         let is_gesture = rng.random_bool(GESTURE_PROBABILITY) && is_allowed;
         last = if is_gesture { Some(n) } else { last };
-        said.push(if is_gesture { GESTURES[rng.random_range(0..2)][rng.random_range(0..N_PLACES)] } else { "" });
+        chosen.push(if is_gesture { GESTURES[rng.random_range(0..2)][rng.random_range(0..N_PLACES)] } else { "" });
     }
     let others: Vec<&str> = OTHERS.split_whitespace().collect();
-    for n in 0..said.len() {
-        if said[n].is_empty() {
-            let neighbours = [n.checked_sub(1).map(|before| said[before]), said.get(n + 1).copied()];
+    for n in 0..chosen.len() {
+        if chosen[n].is_empty() {
+            let neighbours = [n.checked_sub(1).map(|before| chosen[before]), chosen.get(n + 1).copied()];
             let fits = |other: usize| neighbours.iter().flatten().all(|word| is_of_split(word, other, split));
             let fitting: Vec<usize> = (0..others.len()).filter(|other| fits(*other)).collect();
-            said[n] = others[fitting[rng.random_range(0..fitting.len())]];
+            chosen[n] = others[fitting[rng.random_range(0..fitting.len())]];
         }
     }
     let word = |(word, [start_secs, end_secs]): (&str, [f64; 2])| Word {
@@ -82,7 +82,7 @@ pub fn words(speech: &Speech, split: Split, rng: &mut ChaCha8Rng) -> Vec<Word> {
         source: WordSource::Given,
         confidence: None,
     };
-    said.into_iter().zip(spans).map(word).collect()
+    chosen.into_iter().zip(spans).map(word).collect()
 }
 
 /// Whether the pair of `word` and the other word with index `other` belongs to the split; true for a word without

@@ -200,7 +200,7 @@ mod tests {
     /// Face with the chin lowered by `chin`, rotated about the vertical axis and shifted.
     fn face(chin: f64, turn: f64) -> Vec<FacePoint> {
         let (sin, cos) = turn.sin_cos();
-        let place = |k: usize| {
+        let vertex = |k: usize| {
             let (u, v) = ((k % 18) as f64 / 17.0 - 0.5, (k / 18) as f64 / 25.0 - 0.5);
             let [x, y, z] = match k {
                 33 => [-30.0, -20.0, 0.0],
@@ -210,7 +210,7 @@ mod tests {
             };
             [300.0 + x * cos + z * sin, 200.0 + y, z * cos - x * sin]
         };
-        (0..landmarks::N_LANDMARKS).map(place).collect()
+        (0..landmarks::N_LANDMARKS).map(vertex).collect()
     }
 
     fn portrait(chin: f64, skin: u8) -> (Portrait, Image) {

@@ -234,9 +234,9 @@ mod tests {
     /// Shoulders 100 px apart, wrists at x = 190 (left) and 110 (right).
     fn body() -> [ScoredPoint; 17] {
         let mut body = [[0.0, 0.0, 0.9]; 17];
-        let places =
+        let positions =
             [(coco::L_SHOULDER, 200.0), (coco::R_SHOULDER, 100.0), (coco::L_WRIST, 190.0), (coco::R_WRIST, 110.0)];
-        for (joint, x) in places {
+        for (joint, x) in positions {
             body[joint][0] = x;
         }
         body
@@ -260,12 +260,12 @@ mod tests {
         let mut crossed = body();
         crossed[coco::L_WRIST][0] = 120.0;
         assert_eq!(accepted([hand(130.0, 0.1), hand(110.0, 0.9)], &crossed), [true, true]);
-        let mut unseen = body();
-        unseen[coco::L_WRIST][2] = 0.1;
-        assert_eq!(accepted([hand(148.0, 0.1), hand(110.0, 0.9)], &unseen), [true, true], "its wrist is not known");
-        let mut unsure = [hand(192.0, 0.1), None];
-        unsure[0].as_mut().unwrap().score = 0.4;
-        assert_eq!(accepted(unsure, &body()), [false, false]);
+        let mut hidden = body();
+        hidden[coco::L_WRIST][2] = 0.1;
+        assert_eq!(accepted([hand(148.0, 0.1), hand(110.0, 0.9)], &hidden), [true, true], "its wrist is not known");
+        let mut uncertain = [hand(192.0, 0.1), None];
+        uncertain[0].as_mut().unwrap().score = 0.4;
+        assert_eq!(accepted(uncertain, &body()), [false, false]);
     }
 
     #[test]

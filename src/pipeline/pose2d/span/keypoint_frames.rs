@@ -51,8 +51,8 @@ impl KeypointFrames {
             left_hand: points(|pose| &pose.left_hand, N_HAND)?,
             right_hand: points(|pose| &pose.right_hand, N_HAND)?,
         };
-        let of_face = |part: fn(&FaceSeen) -> f32, unseen: f32| {
-            poses().map(|pose| pose.face.as_ref().map_or(unseen, part)).collect::<Array1<f32>>()
+        let of_face = |part: fn(&FaceSeen) -> f32, missing: f32| {
+            poses().map(|pose| pose.face.as_ref().map_or(missing, part)).collect::<Array1<f32>>()
         };
         let face = poses().any(|pose| pose.face.is_some()).then(|| FaceFrames {
             opening: of_face(|face| face.opening, f32::NAN),

@@ -47,10 +47,10 @@ impl VideoFrames<'_> {
         };
         let pick = |reader: &mut FrameReader, time: FrameTime| {
             let is_new = begins_shot(time)? || !time.repeated;
-            let whole = is_new.then(|| reader.picture(None)).transpose()?;
-            Ok(match (whole, self.media.active_area) {
-                (Some(whole), Some(area)) => Some(whole.cropped(area)),
-                (whole, _) => whole,
+            let full_picture = is_new.then(|| reader.picture(None)).transpose()?;
+            Ok(match (full_picture, self.media.active_area) {
+                (Some(full_picture), Some(area)) => Some(full_picture.cropped(area)),
+                (full_picture, _) => full_picture,
             })
         };
         let mut end = self.span.start;

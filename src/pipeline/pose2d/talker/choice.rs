@@ -78,9 +78,9 @@ mod tests {
 
     fn opened(mouth: &Mouth, from: usize) -> MouthOpening {
         let mut opened = MouthOpening::default();
-        let (opening, _) = mouth.seen(SECS, 9, 4);
-        let seen = opening.iter().enumerate().skip(from).filter(|(_, opening)| opening.is_finite());
-        seen.for_each(|(idx, opening)| opened.set(idx, *opening));
+        let (opening, _) = mouth.measured(SECS, 9, 4);
+        let known_frames = opening.iter().enumerate().skip(from).filter(|(_, opening)| opening.is_finite());
+        known_frames.for_each(|(idx, opening)| opened.set(idx, *opening));
         opened
     }
 

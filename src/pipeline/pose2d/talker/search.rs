@@ -74,8 +74,8 @@ impl TalkerSearch {
         let idx = self.n_frames;
         self.n_frames += 1;
         let Some(image) = image else {
-            let here = self.people.iter_mut().filter(|one| one.is_visible);
-            here.for_each(|one| one.mouth.repeat(idx));
+            let visible = self.people.iter_mut().filter(|one| one.is_visible);
+            visible.for_each(|one| one.mouth.repeat(idx));
             return Ok(());
         };
         let is_detection_frame = speaker::is_detection_frame(idx, self.settings.person_every.max(1), self.is_crowd());
@@ -94,8 +94,8 @@ impl TalkerSearch {
             let bbox = bbox.map(|at| [at.x, at.y, at.width, at.height].map(f64::from));
             let body = bbox.map(|bbox| self.body.find(image, bbox)).transpose()?.flatten();
             let points = body.map_or([[0.0; 3]; 17], |body| body.points);
-            if let Some(seen) = one.face.find(&mut self.face, image, &points, least)? {
-                one.mouth.set(idx, seen.opening);
+            if let Some(face) = one.face.find(&mut self.face, image, &points, least)? {
+                one.mouth.set(idx, face.opening);
             }
         }
         Ok(())
@@ -147,7 +147,7 @@ mod tests {
         associate(&mut people, 5, &[at(310.0, 80.0), at(20.0, 100.0)]);
         associate(&mut people, 10, &[at(330.0, 80.0), at(150.0, 90.0)]);
         let last: Vec<f32> = people.iter().map(|one| one.path.last().unwrap().x).collect();
-        let here: Vec<bool> = people.iter().map(|one| one.is_visible).collect();
-        assert_eq!((last, here), (vec![20.0, 330.0, 150.0], vec![false, true, true]));
+        let visible: Vec<bool> = people.iter().map(|one| one.is_visible).collect();
+        assert_eq!((last, visible), (vec![20.0, 330.0, 150.0], vec![false, true, true]));
     }
 }
