@@ -118,7 +118,7 @@ impl PortraitViews {
         true
     }
 
-    /// Drops every other view and doubles the interval.
+    /// Drops every other view and sets the interval to twice the mean spacing.
     fn drop_every_other(&mut self) {
         let (first, last) = (self.views.first(), self.views.last());
         let secs = first.zip(last).map_or(0.0, |(first, last)| last.secs - first.secs);
