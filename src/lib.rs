@@ -50,7 +50,7 @@ pub mod process;
 pub use orator_base::stage::artifacts::StageName;
 pub use orator_base::stage::progress::{Event, Progress, Silent, Task};
 pub use orator_dataset::config::{Config, load as load_config};
-pub use orator_pipeline::{Pipeline, RunReport, Selection, StatusReport, TimeAccount};
+pub use orator_pipeline::{Pipeline, RunReport, Selection, StatusReport, TimeBudget};
 
 // Values.
 pub use orator_base::types::pose2d::Keypoints;

@@ -1,5 +1,5 @@
-//! One video through its stages, for a worker that shares the work folder with workers on other machines: it has claimed
-//! the video, and looks once more whether the claim still is its own before a stage's work is put in its place.
+//! Processing of one claimed video by a worker that shares the work folder with workers on other machines. The claim
+//! is checked again before the output of a stage is moved into place.
 
 use super::pipeline::Pipeline;
 use super::pose2d::models::ChosenModels;
@@ -13,41 +13,41 @@ use orator_base::stage::{Input, Report, Stage, Unit, runner};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Checks that the worker still holds its claim on the video: `Err` of `runner::ClaimLost` where it does not.
+/// Checks that the worker still holds its claim on the video; fails with `runner::ClaimLost` if it does not.
 pub type ClaimCheck<'a> = &'a (dyn Fn() -> Result<()> + Sync);
 
-/// Does the work if the video is the worker's before and after.
-fn around(is_mine: ClaimCheck, work: UnitWork) -> Result<Report> {
-    is_mine()?;
+/// Runs `work` with a claim check before and after.
+fn checked(check_claim: ClaimCheck, work: UnitWork) -> Result<Report> {
+    check_claim()?;
     let report = work()?;
-    is_mine()?;
+    check_claim()?;
     Ok(report)
 }
 
 impl Pipeline {
-    /// These stages of videos for one video of the pipeline; fresh ones are skipped. The answers end with the first failure.
+    /// Runs the given per-video stages for one video; fresh ones are skipped. The outcomes end with the first failure.
     ///
     /// # Errors
-    /// What no video can be worked on without: weights, the manifest.
+    /// Errors that affect every video: missing weights or manifest.
     pub fn run_video(
         &self,
         names: &[StageName],
         unit: &Unit,
         hashes: &HashCache,
-        is_mine: ClaimCheck,
+        check_claim: ClaimCheck,
         progress: &dyn Progress,
     ) -> Result<Vec<StageOutcome>> {
-        let while_mine = |_: &'static str, _: &Unit, work: UnitWork| around(is_mine, work);
-        let stage = |name: &StageName| Ok(HookedStage { stage: self.stage(*name, &[])?, hook: &while_mine });
+        let hook = |_: &'static str, _: &Unit, work: UnitWork| checked(check_claim, work);
+        let stage = |name: &StageName| Ok(HookedStage { stage: self.stage(*name, &[])?, hook: &hook });
         let stages = names.iter().map(stage).collect::<Result<Vec<_>>>()?;
         let stages: Vec<&dyn Stage> = stages.iter().map(|stage| stage as &dyn Stage).collect();
         let work = &self.config().settings.work.dir;
-        let ended = runner::run_stages(&stages, std::slice::from_ref(unit), work, hashes, (1, false), progress);
-        Ok(ended.into_iter().flatten().collect())
+        let outcomes = runner::run_stages(&stages, std::slice::from_ref(unit), work, hashes, (1, false), progress);
+        Ok(outcomes.into_iter().flatten().collect())
     }
 
-    /// Share `idx` of `of` of the parts of a video that has begun; nothing where its stage has no parts. An answer is a
-    /// failure.
+    /// Processes share `share.0` of `share.1` of the parts of a video whose `pose2d` stage is in progress; does
+    /// nothing if it has no parts. The result contains an outcome only on failure.
     ///
     /// # Errors
     /// Those of `run_video`.
@@ -56,28 +56,27 @@ impl Pipeline {
         unit: &Unit,
         share: (usize, usize),
         hashes: &HashCache,
-        is_mine: ClaimCheck,
+        check_claim: ClaimCheck,
         progress: &dyn Progress,
     ) -> Result<Vec<StageOutcome>> {
-        let while_mine = |_: &'static str, _: &Unit, work: UnitWork| around(is_mine, work);
-        let stage = HookedStage { stage: self.stage(StageName::Pose2d, &[])?, hook: &while_mine };
-        let ended = runner::run_parts(&stage, unit, share, &self.config().settings.work.dir, hashes, progress);
-        Ok(ended.err().map(|error| StageOutcome::Failed(Arc::new(error))).into_iter().collect())
+        let hook = |_: &'static str, _: &Unit, work: UnitWork| checked(check_claim, work);
+        let stage = HookedStage { stage: self.stage(StageName::Pose2d, &[])?, hook: &hook };
+        let result = runner::run_parts(&stage, unit, share, &self.config().settings.work.dir, hashes, progress);
+        Ok(result.err().map(|error| StageOutcome::Failed(Arc::new(error))).into_iter().collect())
     }
 
-    /// The files that the first stage reads for each of the videos: the video, or keypoints of another program and their
-    /// sound.
+    /// Input files of the first stage for each unit: the video, or keypoints of another program and their audio.
     ///
     /// # Errors
     /// Those of `run_video`.
     pub fn source_inputs(&self, units: &[Unit]) -> Result<Vec<Vec<Input>>> {
         let stage = self.stage(StageName::Extract, &[])?;
-        // Where no sound belongs to keypoints, the stage says so when its turn comes.
+        // If keypoints have no audio, the stage reports that when it runs.
         let source = |unit: &Unit| vec![Input { role: "video".into(), path: unit.source.clone() }];
         Ok(units.iter().map(|unit| stage.inputs(unit).unwrap_or_else(|_| source(unit))).collect())
     }
 
-    /// BLAKE3 of the weights that the stages of videos ask, by the names of their files.
+    /// BLAKE3 hashes of the weights that the per-video stages use, by file name.
     ///
     /// # Errors
     /// Weights that cannot be read.
@@ -91,10 +90,10 @@ impl Pipeline {
         used.iter().map(hash).collect()
     }
 
-    /// Looks whether the stages have what they need: models, the manifest, weights.
+    /// Checks that the stages have what they need: models, manifest, weights.
     ///
     /// # Errors
-    /// What is missing, and where it comes from.
+    /// The missing file, and where to get it.
     pub fn check(&self) -> Result<()> {
         if self.all_videos().iter().any(orator_dataset::config::videos::Videos::has_video_files) {
             stages::check_models(&self.config().settings)?;

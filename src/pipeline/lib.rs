@@ -1,14 +1,15 @@
-//! The pipeline as a value (`pipeline`, run by `run`, looked at by `status`), its five stages, the `sound` of its videos, whose
-//! voice it is by the `lips`, a `portrait` of the person, and one `claimed_video` of a worker among many. The stages never
-//! import each other: they meet in the files that they write. `keypoints` stands in for the first two where other programs looked at the pictures.
+//! Pipeline from videos to datasets: the five stages and the API that runs them (`pipeline`, `run`, `status`), audio
+//! extraction (`sound`), synchrony of lips and voice (`lip_sync`), a description of the person's face and colours
+//! (`portrait`), and `claimed_video`, which processes one video for a cluster worker. Stages never import each other;
+//! they communicate only through the files that they write. `keypoints` replaces the first two stages where the
+//! keypoints come from another program.
 
-pub mod account;
 pub mod claimed_video;
 pub mod dataset;
 pub mod extract;
 pub mod keypoints;
 pub mod lift;
-pub mod lips;
+pub mod lip_sync;
 pub mod pipeline;
 pub mod portrait;
 pub mod pose2d;
@@ -18,12 +19,13 @@ pub mod segment;
 pub mod sound;
 pub mod stages;
 pub mod status;
+pub mod time_budget;
 pub mod timing;
 
-pub use account::{AccountKind, TimeAccount};
 pub use pipeline::Pipeline;
 pub use run::{RunReport, RunState, Selection, StageCounts, UnitFailure, UnitReport};
 pub use status::{StagePlan, StatusReport, UnitState, UnitStatus};
+pub use time_budget::{BudgetKind, TimeBudget};
 
 #[cfg(test)]
 mod test_keypoints;

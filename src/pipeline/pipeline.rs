@@ -1,4 +1,4 @@
-//! The pipeline as a value: a configuration with the videos it names, to be run and asked how it stands.
+//! The pipeline: a configuration with the videos that it names.
 
 use super::process::SubprocessStage;
 use super::stages;
@@ -11,7 +11,7 @@ use orator_dataset::config::{Config, videos};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-/// Videos to datasets, by one configuration. `run` does the work, `status` says how far it is.
+/// Turns videos into datasets as one configuration describes. `run` processes them, `status` reports the progress.
 #[derive(Clone, Debug)]
 pub struct Pipeline {
     config: Config,
@@ -20,7 +20,7 @@ pub struct Pipeline {
 }
 
 impl Pipeline {
-    /// Looks for the videos that the configuration names; writes nothing.
+    /// Finds the videos that the configuration names; writes nothing.
     ///
     /// # Errors
     /// A configuration without speakers.
@@ -30,23 +30,24 @@ impl Pipeline {
         Ok(Self { config, videos, program: None })
     }
 
-    /// Lets foreign files be read in restricted processes of their own, one a unit and stage, unless `work.sandbox` says
-    /// no: `program` is the program `orator`. Without it a run reads them in this process.
+    /// Processes untrusted files in sandboxed subprocesses, one per unit and stage, unless `work.sandbox` is false.
+    /// `program` is the path of `orator`. By default, files are read in this process.
     pub fn with_processes(self, program: PathBuf) -> Self {
         Self { program: Some(program), ..self }
     }
 
-    /// This pipeline with the program of another.
+    /// Copies the subprocess program of `other` into this pipeline.
     pub fn like(self, other: &Self) -> Self {
         Self { program: other.program.clone(), ..self }
     }
 
-    /// Another configuration and other videos with the same program.
+    /// A pipeline with another configuration and other videos, but the same subprocess program.
     pub(super) fn with(&self, config: Config, videos: Vec<Videos>) -> Self {
         Self { config, videos, program: self.program.clone() }
     }
 
-    /// Videos worked on side by side: so many as asked for, else as the configuration says; 0 is one a processor core.
+    /// Number of videos to process in parallel: `asked`, else the value of the configuration; 0 means one per
+    /// processor core.
     pub fn jobs(&self, asked: Option<usize>) -> usize {
         match asked.unwrap_or(self.config.settings.work.jobs) {
             0 => std::thread::available_parallelism().map_or(1, NonZeroUsize::get),
@@ -59,10 +60,10 @@ impl Pipeline {
         &self.config
     }
 
-    /// The videos of the speakers of those names; of all where none is named.
+    /// Videos of the named speakers, or of all if `speakers` is empty.
     ///
     /// # Errors
-    /// A name the configuration does not have.
+    /// A name that the configuration does not contain.
     pub fn videos(&self, speakers: &[String]) -> Result<Vec<Videos>> {
         for name in speakers {
             let known: Vec<&str> = self.videos.iter().map(|videos| videos.speaker.as_str()).collect();
@@ -72,18 +73,18 @@ impl Pipeline {
         Ok(chosen.cloned().collect())
     }
 
-    /// The videos of all speakers.
+    /// Videos of all speakers.
     pub(super) fn all_videos(&self) -> &[Videos] {
         &self.videos
     }
 
-    /// The program of the processes in which foreign files are read, where they are.
+    /// Program of the sandboxed subprocesses; `None` if they are not used.
     pub(super) fn program(&self) -> Option<&Path> {
         self.program.as_deref().filter(|_| self.config.settings.work.sandbox)
     }
 
-    /// The stage; one that hands foreign files to foreign libraries does so in processes of their own, where the pipeline
-    /// has a program for them. The last two stages read what the first three wrote, in Rust alone.
+    /// Builds a stage. Stages that pass untrusted files to C libraries run in subprocesses if the pipeline has a
+    /// program for them. `lift` and `dataset` only read files of the earlier stages, in Rust.
     pub(super) fn stage(&self, name: StageName, ready: &[Unit]) -> Result<Box<dyn Stage + '_>> {
         let (config, videos) = (self.config(), self.all_videos());
         let stage = stages::build(name, config, videos, ready)?;
@@ -93,7 +94,7 @@ impl Pipeline {
         })
     }
 
-    /// The hashes of files that are known from earlier runs.
+    /// File hashes cached by earlier runs.
     pub fn hashes(&self) -> HashCache {
         HashCache::open(&artifacts::hashes(&self.config.settings.work.dir))
     }

@@ -1,4 +1,4 @@
-//! A run of the pipeline, or of a part of it: the stages of videos, video by video, then the datasets of the speakers.
+//! Running the pipeline or a part of it: the per-video stages, video by video, then the datasets of the speakers.
 
 use super::pipeline::Pipeline;
 use super::pose2d::models;
@@ -19,18 +19,18 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// The part of the pipeline to run; by default every stage for every speaker.
+/// Part of the pipeline to run; by default every stage for every speaker.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Selection {
-    /// First stage.
+    /// First stage, inclusive.
     pub from: StageName,
-    /// Last stage.
+    /// Last stage, inclusive.
     pub to: StageName,
-    /// Names of speakers; empty: all.
+    /// Names of the speakers; all if empty.
     pub speakers: Vec<String>,
-    /// Videos worked on side by side, 0: one a processor core; none: `work.jobs` of the configuration.
+    /// Number of videos processed in parallel; 0: one per processor core; `None`: `work.jobs` of the configuration.
     pub jobs: Option<usize>,
-    /// Whether fresh units are worked on again.
+    /// Whether fresh units are processed again.
     pub force: bool,
 }
 
@@ -42,115 +42,116 @@ impl Default for Selection {
 }
 
 impl Selection {
-    /// One stage alone, for every speaker.
+    /// Selects one stage, for every speaker.
     pub fn only(stage: StageName) -> Self {
         Self { from: stage, to: stage, ..Self::default() }
     }
 
-    /// Whether the stage is one of those to run.
+    /// Whether the stage is selected.
     pub fn has(&self, stage: StageName) -> bool {
         (self.from..=self.to).contains(&stage)
     }
 }
 
-/// How a run ended.
+/// Outcome of a run.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct RunReport {
-    /// Units of each stage by how they ended.
+    /// Number of units per stage and outcome.
     pub stages: BTreeMap<StageName, StageCounts>,
-    /// What failed; the rest is done.
+    /// Failed units and configuration entries without a video; they do not stop the other units.
     pub failures: Vec<UnitFailure>,
-    /// What is done or was fresh.
+    /// Units that were processed or already fresh.
     pub units: Vec<UnitReport>,
-    /// Folders of the datasets that stand.
+    /// Folders of the datasets that are complete.
     pub datasets: Vec<PathBuf>,
-    /// How long each stage worked on each unit.
+    /// Processing time of each stage and unit.
     #[serde(skip)]
     pub times: Vec<StageTime>,
-    /// Number of speakers chosen.
+    /// Number of selected speakers.
     #[serde(skip)]
     pub n_speakers: usize,
 }
 
-/// Units of a stage by how they ended.
+/// Number of units of a stage by outcome.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct StageCounts {
-    /// Worked on.
+    /// Processed in this run.
     pub done: usize,
-    /// Fresh already.
+    /// Already fresh.
     pub fresh: usize,
     /// Failed.
     pub failed: usize,
 }
 
-/// A unit that failed at a stage, or a speaker with an entry that leads to no video.
+/// A unit that failed at a stage, or a configuration entry that matches no video.
 #[derive(Clone, Debug, Serialize)]
 pub struct UnitFailure {
-    /// The speaker, where an entry of the configuration leads to no video.
+    /// The speaker, for a configuration entry that matches no video.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub speaker: Option<String>,
-    /// The unit: `speaker/video`, or `speaker` of a dataset.
+    /// The unit: `speaker/video`; for a dataset, the speaker.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
-    /// Where it failed.
+    /// The stage that failed.
     pub stage: StageName,
-    /// With its causes, for people.
+    /// Error message with its causes.
     pub error: String,
-    /// To be matched by `downcast_ref`: `UnreadableMedia`, `NothingKept`, `NoSpace`, `ModelError`.
+    /// The error itself, for `downcast_ref`: `UnreadableMedia`, `NothingKept`, `NoSpace`, `ModelError`.
     #[serde(skip)]
     pub cause: Option<Arc<anyhow::Error>>,
 }
 
-/// A unit that is fresh at a stage now.
+/// A unit that is fresh at a stage after the run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct UnitReport {
-    /// `speaker/video`, or `speaker` of a dataset.
+    /// `speaker/video`; for a dataset, the speaker.
     pub unit: String,
     /// The stage.
     pub stage: StageName,
-    /// Whether this run did it.
+    /// Whether this run processed the unit.
     pub state: RunState,
-    /// The stage's line for people.
+    /// Summary line of the stage.
     pub line: String,
-    /// The stage's numbers.
+    /// Statistics of the stage.
     pub facts: Map<String, Value>,
 }
 
-/// Whether a unit was worked on.
+/// Whether this run processed a unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum RunState {
-    /// Worked on.
+    /// Processed in this run.
     Done,
-    /// Fresh already.
+    /// Already fresh.
     Fresh,
 }
 
 impl Pipeline {
-    /// Runs the chosen stages; fresh units are skipped, a unit that fails does not stop the others.
+    /// Runs the selected stages. Fresh units are skipped; a unit that fails does not stop the others.
     ///
     /// # Errors
-    /// What stops the whole run: an unknown speaker, a missing model, another run in the same work folder
+    /// Errors that stop the complete run: an unknown speaker, a missing model, another run in the same work folder
     /// (`BusyFolder`), a work folder that cannot be written.
     pub fn run(&self, selection: &Selection, progress: &dyn Progress) -> Result<RunReport> {
         let Selection { from, to, force, .. } = *selection;
         ensure!(from <= to, "--from {from} comes after --to {to}");
-        let mut alive = self.videos(&selection.speakers)?;
+        let mut remaining = self.videos(&selection.speakers)?;
         let settings = &self.config().settings;
-        if selection.has(StageName::Pose2d) && alive.iter().any(Videos::has_video_files) {
+        if selection.has(StageName::Pose2d) && remaining.iter().any(Videos::has_video_files) {
             stages::check_models(settings)?;
         }
-        // What a stage needs (weights, the manifest) is looked at before hours of work, not after.
+        // Missing weights or manifest entries are reported before hours of work, not after.
         for name in StageName::ALL.into_iter().filter(|name| selection.has(*name)) {
             stages::build(name, self.config(), self.all_videos(), &[])?;
         }
         let _lock = workdir::lock(&settings.work.dir)
             .context("no run now; another folder is chosen with --set work.dir=FOLDER")?;
-        for videos in &alive {
-            // What is on record of a dataset counts before its turn comes.
+        for videos in &remaining {
+            // An interrupted replacement of a dataset is undone now, since its record is read before the dataset stage
+            // runs.
             workdir::recover_folder(&speaker_dir(&settings.work.dir, StageName::Dataset, &videos.speaker))?;
         }
-        // Files of the stages and of the work folder lie two folders deep.
+        // Stage outputs and the work folder's own files are at most two folders deep.
         workdir::sweep_folder(&settings.work.dir, 2);
         let jobs = self.jobs(selection.jobs);
         if let Some(line) = SpeechDetector::advice(settings)?.filter(|_| selection.has(StageName::Segment)) {
@@ -160,10 +161,10 @@ impl Pipeline {
         if let Some(line) = advice.filter(|_| selection.has(StageName::Pose2d)) {
             progress.event(&Event::Advice { line });
         }
-        let report = RunReport { n_speakers: alive.len(), ..RunReport::default() };
+        let report = RunReport { n_speakers: remaining.len(), ..RunReport::default() };
         let hashes = self.hashes();
         let mut run = StageRun { pipeline: self, hashes: &hashes, limits: (jobs, force), progress, report };
-        for videos in &alive {
+        for videos in &remaining {
             for error in &videos.missing {
                 progress.event(&Event::NoVideo { speaker: &videos.speaker, error });
                 run.report.failures.push(UnitFailure {
@@ -176,13 +177,13 @@ impl Pipeline {
             }
         }
         let names: Vec<StageName> = StageName::OF_VIDEOS.into_iter().filter(|name| selection.has(*name)).collect();
-        run.stages(&names, &[], &mut alive)?;
+        run.stages(&names, &[], &mut remaining)?;
         if selection.has(StageName::Dataset) {
-            let ready = run.ready(&alive)?;
-            let failed = run.stages(&[StageName::Dataset], &ready, &mut alive)?;
-            let stand = alive.iter().map(|videos| &videos.speaker).filter(|speaker| !failed.contains(speaker));
+            let ready = run.ready(&remaining)?;
+            let failed = run.stages(&[StageName::Dataset], &ready, &mut remaining)?;
+            let complete = remaining.iter().map(|videos| &videos.speaker).filter(|speaker| !failed.contains(speaker));
             run.report.datasets =
-                stand.map(|speaker| speaker_dir(&settings.work.dir, StageName::Dataset, speaker)).collect();
+                complete.map(|speaker| speaker_dir(&settings.work.dir, StageName::Dataset, speaker)).collect();
         }
         Ok(run.report)
     }
@@ -191,42 +192,42 @@ impl Pipeline {
 struct StageRun<'a> {
     pipeline: &'a Pipeline,
     hashes: &'a HashCache,
-    /// Workers, and whether fresh units are worked on again.
+    /// Number of workers, and whether fresh units are processed again.
     limits: (usize, bool),
     progress: &'a dyn Progress,
     report: RunReport,
 }
 
 impl StageRun<'_> {
-    /// Runs stages that have the same units, for everything alive; what fails is not alive for later ones. Gives the
-    /// speakers of what failed.
-    fn stages(&mut self, names: &[StageName], ready: &[Unit], alive: &mut [Videos]) -> Result<Vec<String>> {
+    /// Runs stages that have the same units, for all `remaining` videos. A failed unit is removed from `remaining`.
+    /// Returns the speakers of the failed units.
+    fn stages(&mut self, names: &[StageName], ready: &[Unit], remaining: &mut [Videos]) -> Result<Vec<String>> {
         let Some(&first) = names.first() else { return Ok(Vec::new()) };
         let config = self.pipeline.config();
-        let units: Vec<Unit> = alive.iter().flat_map(|videos| stages::units(first, config, videos)).collect();
+        let units: Vec<Unit> = remaining.iter().flat_map(|videos| stages::units(first, config, videos)).collect();
         let work = &config.settings.work.dir;
         let clock = StageClock::default();
         let hook = |stage: &'static str, unit: &Unit, work: UnitWork<'_>| clock.time(stage, unit, work);
-        let timed = |name: &StageName| Ok(HookedStage { stage: self.pipeline.stage(*name, ready)?, hook: &hook });
-        let stages = names.iter().map(timed).collect::<Result<Vec<_>>>()?;
+        let hooked = |name: &StageName| Ok(HookedStage { stage: self.pipeline.stage(*name, ready)?, hook: &hook });
+        let stages = names.iter().map(hooked).collect::<Result<Vec<_>>>()?;
         let stages: Vec<&dyn Stage> = stages.iter().map(|stage| stage as &dyn Stage).collect();
-        let ended = runner::run_stages(&stages, &units, work, self.hashes, self.limits, self.progress);
+        let all_outcomes = runner::run_stages(&stages, &units, work, self.hashes, self.limits, self.progress);
         self.report.times.extend(clock.take());
         self.hashes.save()?;
         for name in names {
             self.report.stages.entry(*name).or_default();
         }
         let mut failed = Vec::new();
-        for (unit, answers) in units.iter().zip(ended) {
-            for (&stage, answer) in names.iter().zip(answers) {
+        for (unit, outcomes) in units.iter().zip(all_outcomes) {
+            for (&stage, outcome) in names.iter().zip(outcomes) {
                 let counts = self.report.stages.entry(stage).or_default();
-                let (count, state) = match &answer {
+                let (count, state) = match &outcome {
                     StageOutcome::Done(_) => (&mut counts.done, RunState::Done),
                     StageOutcome::Skipped(_) => (&mut counts.fresh, RunState::Fresh),
                     StageOutcome::Failed(_) => (&mut counts.failed, RunState::Done),
                 };
                 *count += 1;
-                match answer {
+                match outcome {
                     StageOutcome::Done(report) | StageOutcome::Skipped(report) => {
                         let (unit, line, facts) = (unit.to_string(), report.line, report.facts);
                         self.report.units.push(UnitReport { unit, stage, state, line, facts });
@@ -240,8 +241,8 @@ impl StageRun<'_> {
                             error: format!("{error:#}"),
                             cause: Some(error),
                         });
-                        for videos in alive.iter_mut().filter(|videos| videos.speaker == unit.speaker) {
-                            videos.units.retain(|alive| alive != unit);
+                        for videos in remaining.iter_mut().filter(|videos| videos.speaker == unit.speaker) {
+                            videos.units.retain(|other| other != unit);
                         }
                     }
                 }
@@ -250,11 +251,11 @@ impl StageRun<'_> {
         Ok(failed)
     }
 
-    /// The videos the datasets are made of. Each that is left out, as a stage before is not up to date, is an event and a
-    /// failure of the run.
-    fn ready(&mut self, alive: &[Videos]) -> Result<Vec<Unit>> {
+    /// Videos that the datasets are built from. A video with an earlier stage that is not fresh is left out, reported
+    /// as an event and recorded as a failure.
+    fn ready(&mut self, remaining: &[Videos]) -> Result<Vec<Unit>> {
         let mut all_ready = Vec::new();
-        for videos in alive {
+        for videos in remaining {
             let ready = stages::ready(self.pipeline.config(), videos, self.hashes)?;
             for unit in videos.units.iter().filter(|unit| !ready.contains(unit)) {
                 self.progress.event(&Event::LeftOut { unit: &unit.to_string() });

@@ -1,5 +1,5 @@
-//! The sound of a video: extracted to a wav file, and from that, read as a stream, its loudness at each frame and how open
-//! the voice sounds. Memory does not grow with the length.
+//! Audio of a video: extraction to a wav file and, streamed from that file, its loudness per frame and the openness of
+//! the voice. Memory use does not grow with the length.
 
 use anyhow::{Context, Result};
 use orator_base::audio::openness::{Openness, OpennessMeter};
@@ -8,15 +8,15 @@ use orator_formats::wav::WavWriter;
 use orator_media::ffmpeg::audio::{StreamedSound, stream_mono};
 use std::path::Path;
 
-/// Loudness is taken over this many seconds around a frame: syllables and short pauses even out.
-const AROUND_SECS: f64 = 1.0;
-/// Digital silence, dB.
-const NOTHING_DB: f64 = -120.0;
-/// Samples read at a time.
-const PIECE: usize = 1 << 14;
+/// Window of the loudness in seconds; it averages over syllables and short pauses.
+const LOUDNESS_SECS: f64 = 1.0;
+/// Loudness of digital silence, dB.
+const SILENCE_DB: f64 = -120.0;
+/// Samples per read.
+const CHUNK_SAMPLES: usize = 1 << 14;
 
-/// Writes the sound track `track` of the video `path` (from 1; 0: the automatic choice) to the 16-bit mono wav `out`; `None`
-/// (and no file) when there is no sound.
+/// Writes audio track `track` (from 1; 0: automatic choice) of the video `path` to the 16-bit mono wav file `out`.
+/// Returns `None` and writes no file if there is no audio.
 pub fn extract_wav(path: &Path, track: usize, out: &Path, rate: u32) -> Result<Option<StreamedSound>> {
     let mut wav = None;
     let streamed = stream_mono(path, track, rate, &mut |piece| {
@@ -29,8 +29,8 @@ pub fn extract_wav(path: &Path, track: usize, out: &Path, rate: u32) -> Result<O
     Ok(streamed)
 }
 
-/// Whether each frame has sound (1 or 0), and its loudness: the root mean square of the second around it in dB
-/// of full scale, -120 where there is none. A file that is not there has no sound.
+/// Per frame, whether there is audio (1 or 0) and its loudness: the root mean square of the second around it in dB of
+/// full scale, -120 for silence. A missing file counts as no audio.
 pub fn levels(path: &Path, fps: FrameRate, n_frames: usize) -> Result<(Vec<f32>, Vec<f32>)> {
     let (mut n_samples, mut power) = (vec![0_u64; n_frames], vec![0.0_f64; n_frames]);
     if path.exists() {
@@ -47,22 +47,22 @@ pub fn levels(path: &Path, fps: FrameRate, n_frames: usize) -> Result<(Vec<f32>,
             power[frame] += level * level;
         }
     }
-    let reach = (AROUND_SECS / 2.0 * fps.per_sec()).round() as usize;
+    let half_window = (LOUDNESS_SECS / 2.0 * fps.per_sec()).round() as usize;
     let loudness = |t: usize| {
-        let around = t.saturating_sub(reach)..n_frames.min(t + reach + 1);
+        let around = t.saturating_sub(half_window)..n_frames.min(t + half_window + 1);
         let n: u64 = n_samples[around.clone()].iter().sum();
         let mean = power[around].iter().sum::<f64>() / n.max(1) as f64;
-        (10.0 * mean.max(1e-30).log10()).max(NOTHING_DB) as f32
+        (10.0 * mean.max(1e-30).log10()).max(SILENCE_DB) as f32
     };
-    let there = n_samples.iter().map(|&n| f32::from(u8::from(n > 0))).collect();
-    Ok((there, (0..n_frames).map(loudness).collect()))
+    let has_audio = n_samples.iter().map(|&n| f32::from(u8::from(n > 0))).collect();
+    Ok((has_audio, (0..n_frames).map(loudness).collect()))
 }
 
-/// How open the voice in a file of 16 kHz sounds; a file that is not there has none.
+/// Openness of the voice in a 16 kHz wav file; empty if the file does not exist.
 pub fn openness(path: &Path) -> Result<Openness> {
     let mut meter = OpennessMeter::default();
     if path.exists() {
-        pieces(path, PIECE, |piece| {
+        pieces(path, CHUNK_SAMPLES, |piece| {
             meter.push(piece);
             Ok(())
         })?;
@@ -70,7 +70,7 @@ pub fn openness(path: &Path) -> Result<Openness> {
     Ok(meter.finish())
 }
 
-/// Passes the samples of a 16-bit mono wav file, -1..1, to `work` in pieces of `n`, the last of which may be shorter.
+/// Passes the samples of a 16-bit mono wav file, -1..1, to `work` in chunks of `n`; the last may be shorter.
 pub fn pieces(path: &Path, n: usize, mut work: impl FnMut(&[f32]) -> Result<()>) -> Result<()> {
     let reading = || format!("cannot read {}", path.display());
     let mut wav = hound::WavReader::open(path).with_context(reading)?;
@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_tone_then_quiet_then_the_end() {
+    fn levels_of_a_tone_then_quiet_then_silence() {
         let path = tempfile::tempdir().unwrap().keep().join("tone.wav");
         let spec = hound::WavSpec {
             channels: 1,
@@ -104,8 +104,8 @@ mod tests {
             wav.write_sample((amplitude * 32_768.0 * (f64::from(n) * 0.3).sin()).round() as i16).unwrap();
         }
         wav.finalize().unwrap();
-        let (there, db) = levels(&path, FrameRate::new(15, 1), 100).unwrap();
-        assert_eq!(there.iter().sum::<f32>(), 90.0);
+        let (has_audio, db) = levels(&path, FrameRate::new(15, 1), 100).unwrap();
+        assert_eq!(has_audio.iter().sum::<f32>(), 90.0);
         assert!((db[20] + 23.0).abs() < 0.1, "{}", db[20]);
         assert!((db[70] + 83.0).abs() < 3.0, "{}", db[70]);
         assert_eq!(db[99], -120.0);

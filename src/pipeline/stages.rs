@@ -1,4 +1,4 @@
-//! The stages by their names, ready to run, and the units each works on.
+//! Construction of the stages by name, and the units that each processes.
 
 use super::dataset::stage::{DatasetInputs, DatasetStage};
 use super::extract::ExtractStage;
@@ -21,10 +21,10 @@ use orator_dataset::info::ModelUsed;
 use orator_onnx::{Model, ModelEntry, Runtime};
 use std::path::Path;
 
-/// The stage, ready to run on `all` videos. `ready` are those the dataset is made of.
+/// Builds a stage for `all` videos. `ready` are the videos that the dataset is built from.
 ///
 /// # Errors
-/// A model the manifest does not have, weights that cannot be read.
+/// A model that the manifest does not list; weights that cannot be read.
 pub fn build(name: StageName, config: &Config, all: &[Videos], ready: &[Unit]) -> Result<Box<dyn Stage>> {
     let settings = &config.settings;
     Ok(match name {
@@ -47,7 +47,7 @@ pub fn build(name: StageName, config: &Config, all: &[Videos], ready: &[Unit]) -
     })
 }
 
-/// What a stage works on: every video, or the speaker as a whole.
+/// Units of a stage: every video, or the speaker for `dataset`.
 pub fn units(name: StageName, config: &Config, videos: &Videos) -> Vec<Unit> {
     if name != StageName::Dataset {
         return videos.units.clone();
@@ -56,7 +56,7 @@ pub fn units(name: StageName, config: &Config, videos: &Videos) -> Vec<Unit> {
     vec![Unit { speaker, video: String::new(), source: config.file.clone() }]
 }
 
-/// The videos of a speaker that are fresh at every stage before the last: those a dataset is made of.
+/// Videos of a speaker that are fresh at every stage before `dataset`: the dataset is built from them.
 ///
 /// # Errors
 /// Those of `build`.
@@ -69,10 +69,10 @@ pub fn ready(config: &Config, videos: &Videos, hashes: &HashCache) -> Result<Vec
     Ok(videos.units.iter().filter(fresh).cloned().collect())
 }
 
-/// Opens every model the configuration chooses, so that a wrong set-up is known before any work.
+/// Opens every model that the configuration selects, so that an invalid setup is reported before any work.
 ///
 /// # Errors
-/// No ONNX Runtime; a model that is missing or not what the manifest says.
+/// ONNX Runtime is missing; a model is missing or does not match the manifest.
 pub fn check_models(settings: &Settings) -> Result<()> {
     let runtime = Runtime::load(&settings.models.onnxruntime, &settings.models.dir)?;
     for (_, entry) in ChosenModels::find(settings)?.used()? {
@@ -87,16 +87,16 @@ fn models_used(settings: &Settings) -> Result<Vec<ModelUsed>> {
         let ModelEntry { id, sha256, origin, .. } = entry.clone();
         ModelUsed { role: role.into(), id, sha256, licence: origin.licence }
     });
-    Ok(named.chain(SpeechDetector::find(settings)?.map(|listener| listener.used())).collect())
+    Ok(named.chain(SpeechDetector::find(settings)?.map(|detector| detector.used())).collect())
 }
 
-/// The work on one unit.
+/// Processing of one unit by a stage.
 pub type UnitWork<'a> = &'a mut dyn FnMut() -> Result<Report>;
 
-/// Called in place of the work on a unit of the stage of this name, which it does.
+/// Called with the stage name, the unit and the processing function, which it calls.
 pub type StageHook<'a> = &'a (dyn Fn(&'static str, &Unit, UnitWork<'_>) -> Result<Report> + Sync);
 
-/// A stage with a hook around every run of it: a claim is checked, the time is taken.
+/// A stage whose `run` and `run_part` go through a hook, e.g. to check a claim or to measure time.
 pub struct HookedStage<'a> {
     pub stage: Box<dyn Stage + 'a>,
     pub hook: StageHook<'a>,

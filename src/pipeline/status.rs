@@ -1,8 +1,9 @@
-//! How every unit stands at every stage, what a run would do, and what became of every second.
+//! Status of a pipeline: the state of every unit at every stage, what a run would do, and the time budget of every
+//! video.
 
-use super::account::{Standing, TimeAccount};
 use super::pipeline::Pipeline;
 use super::stages;
+use super::time_budget::{TimeBudget, VideoProgress};
 use anyhow::Result;
 use orator_base::stage::artifacts::StageName;
 use orator_base::stage::fingerprint::HashCache;
@@ -15,36 +16,36 @@ use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
-/// How a pipeline stands.
+/// Status of a pipeline.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct StatusReport {
-    /// Every unit at every stage: the videos of a speaker, then its dataset.
+    /// Status of every unit at every stage: the videos of a speaker, then the dataset of that speaker.
     pub units: Vec<UnitStatus>,
-    /// What a run would do, a line a stage.
+    /// What a run would do, one entry per stage.
     pub plan: Vec<StagePlan>,
-    /// The seconds of every video, then of its speaker.
-    pub account: Vec<TimeAccount>,
-    /// The seconds of all speakers.
+    /// Time budget of every video, each speaker's total following the speaker's videos.
+    pub account: Vec<TimeBudget>,
+    /// Total over all speakers.
     #[serde(skip)]
-    pub total: TimeAccount,
+    pub total: TimeBudget,
     /// Whether the seconds of every video add up to its duration.
     pub adds_up: bool,
 }
 
-/// How a unit stands at a stage.
+/// State of a unit at a stage.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct UnitStatus {
-    /// `speaker/video`, or `speaker` of a dataset.
+    /// `speaker/video`; for a dataset, the speaker.
     pub unit: String,
     /// The stage.
     pub stage: StageName,
-    /// The word for it.
+    /// State of the unit.
     pub state: UnitState,
-    /// Why it is not fresh; of a fresh unit the stage's line.
+    /// Reason why the unit is not fresh; for a fresh unit, the report line of the stage.
     pub why: String,
 }
 
-/// How a unit stands, in a word.
+/// State of a unit at a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum UnitState {
@@ -52,28 +53,28 @@ pub enum UnitState {
     Fresh,
     /// An input, a setting or the stage changed.
     Stale,
-    /// The last attempt failed, with what is there now.
+    /// The last attempt failed, and nothing it depends on has changed since.
     Failed,
     /// An earlier stage is not fresh.
     Waits,
     /// No attempt was made.
     #[serde(rename = "-")]
     NeverDone,
-    /// An entry of the configuration leads to no video; the unit is the speaker.
+    /// A configuration entry matches no video; the unit is the speaker.
     #[serde(rename = "failed")]
     NoVideo,
 }
 
-/// What a run would do at a stage.
+/// What a run would do at one stage.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct StagePlan {
     /// The stage.
     pub stage: StageName,
-    /// Units that are fresh.
+    /// Number of units that are fresh.
     pub stay_fresh: usize,
-    /// Units that are not.
+    /// Number of units that would be processed.
     pub would_run: usize,
-    /// Why they are not, each reason once.
+    /// Distinct reasons why these units are not fresh.
     pub because: BTreeSet<String>,
 }
 
@@ -97,10 +98,10 @@ impl StatusReport {
 }
 
 impl Pipeline {
-    /// How the speakers of those names stand; all where none is named. Only the table of known hashes is written.
+    /// Status of the named speakers, or of all if `speakers` is empty. Writes nothing but the cache of file hashes.
     ///
     /// # Errors
-    /// An unknown speaker; a video that is being forgotten now (`BusyFolder`).
+    /// An unknown speaker; a video that is being deleted by `forget` (`BusyFolder`).
     pub fn status(&self, speakers: &[String]) -> Result<StatusReport> {
         let _lock = FolderLock::shared(&self.config().settings.work.dir)?;
         let hashes = self.hashes();
@@ -116,25 +117,25 @@ impl Pipeline {
             let check = StatusCheck { pipeline: self, hashes: &hashes, videos: &videos, ready: &ready };
             let of_videos = StageName::OF_VIDEOS.map(|name| (name, check.stage(name)));
             let mut speaker_waits_for = None;
-            let mut total = TimeAccount::of_speaker(&videos.speaker);
+            let mut total = TimeBudget::of_speaker(&videos.speaker);
             for unit in &videos.units {
                 let mut waits_for = None;
-                let at_stages: Vec<UnitStatus> =
+                let stage_statuses: Vec<UnitStatus> =
                     of_videos.iter().map(|(name, stage)| check.at(*name, stage, unit, &mut waits_for)).collect();
-                // The dataset is made without a video that failed; it waits for those that can still come.
-                let failed = at_stages.iter().find(|status| status.state == UnitState::Failed);
+                // A dataset is built without the videos that failed, but waits for those that are still pending.
+                let failed = stage_statuses.iter().find(|status| status.state == UnitState::Failed);
                 speaker_waits_for = speaker_waits_for.or(waits_for.filter(|_| failed.is_none()));
-                let standing = match (failed, waits_for) {
-                    (Some(UnitStatus { stage, why, .. }), _) => Standing::Failed { stage: *stage, error: why },
-                    (None, Some(_)) => Standing::Waiting,
-                    (None, None) => Standing::Judged,
+                let video_progress = match (failed, waits_for) {
+                    (Some(UnitStatus { stage, why, .. }), _) => VideoProgress::Failed { stage: *stage, error: why },
+                    (None, Some(_)) => VideoProgress::Waiting,
+                    (None, None) => VideoProgress::Judged,
                 };
-                let is_extracted = at_stages.first().is_some_and(|status| status.state == UnitState::Fresh);
+                let is_extracted = stage_statuses.first().is_some_and(|status| status.state == UnitState::Fresh);
                 let work = &self.config().settings.work.dir;
-                let account = TimeAccount::of_video(work, unit, standing, is_extracted);
-                total.add(&account);
-                report.account.push(account);
-                report.units.extend(at_stages);
+                let budget = TimeBudget::of_video(work, unit, video_progress, is_extracted);
+                total.add(&budget);
+                report.account.push(budget);
+                report.units.extend(stage_statuses);
             }
             report.total.add(&total);
             report.account.push(total);
@@ -143,18 +144,18 @@ impl Pipeline {
                 report.units.push(check.at(StageName::Dataset, &stage, &unit, &mut speaker_waits_for));
             }
         }
-        // Hashes that cannot be kept are computed again.
+        // Failing to save the hash cache only costs recomputation.
         hashes.save().unwrap_or_default();
         report.plan = plan(&report.units);
         report.adds_up = report.total.n_wrong == 0;
         Ok(report)
     }
 
-    /// What became of every second of every video, and of every speaker after its videos.
+    /// Time budgets of all videos, each speaker's total following the speaker's videos.
     ///
     /// # Errors
     /// An unknown speaker.
-    pub fn account(&self, speakers: &[String]) -> Result<Vec<TimeAccount>> {
+    pub fn time_budgets(&self, speakers: &[String]) -> Result<Vec<TimeBudget>> {
         Ok(self.status(speakers)?.account)
     }
 }
@@ -162,7 +163,7 @@ impl Pipeline {
 struct StatusCheck<'a> {
     pipeline: &'a Pipeline,
     hashes: &'a HashCache,
-    /// All videos of the speaker, and those the dataset is made of.
+    /// All videos of the speaker; `ready` are those that the dataset is built from.
     videos: &'a Videos,
     ready: &'a [Unit],
 }
@@ -172,7 +173,8 @@ impl StatusCheck<'_> {
         stages::build(name, self.pipeline.config(), std::slice::from_ref(self.videos), self.ready)
     }
 
-    /// How `unit` stands at a stage, given the first stage before it that is not fresh.
+    /// State of `unit` at a stage. `waits_for` is the first earlier stage that is not fresh; set to this stage if it
+    /// is not.
     fn at(
         &self,
         name: StageName,

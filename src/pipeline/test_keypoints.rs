@@ -1,10 +1,10 @@
-//! Keypoints of known places, for unit tests.
+//! Synthetic keypoints for unit tests.
 
 use ndarray::{Array3, arr1, s};
 use orator_base::types::pose2d::Keypoints;
 use orator_base::types::time::FrameRate;
 
-/// Keypoints at 15 frames a second whose body points (COCO point, x, y) are those that `at` gives of each frame; no hands.
+/// Keypoints at 15 fps; `at` gives the body points (COCO index, x, y) of each frame. Without hands.
 pub(crate) fn bodies<const N: usize>(
     n_frames: usize,
     image_size: [u32; 2],

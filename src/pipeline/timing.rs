@@ -1,4 +1,4 @@
-//! How long stages take: the time of every unit that a run works on, and the same pipeline on excerpts of its videos.
+//! Timing of stages: the time per unit in a run, and the same pipeline on excerpts of its videos.
 
 use super::pipeline::Pipeline;
 use super::process::message::MediaRequest;
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-/// How long a stage worked on a unit.
+/// Processing time of a stage for one unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StageTime {
     pub stage: StageName,
@@ -20,12 +20,12 @@ pub struct StageTime {
     pub secs: f64,
 }
 
-/// Takes the times of units.
+/// Collects processing times.
 #[derive(Default)]
 pub struct StageClock(Mutex<Vec<StageTime>>);
 
 impl StageClock {
-    /// Does the work on a unit; that of one that fails is timed too.
+    /// Runs `work` and records its time, also if it fails.
     pub fn time(&self, stage: &str, unit: &Unit, work: UnitWork) -> Result<Report> {
         let start = Instant::now();
         let report = work();
@@ -36,18 +36,18 @@ impl StageClock {
         report
     }
 
-    /// The times, in the order in which the work ended.
+    /// Removes and returns the recorded times, in order of completion.
     pub fn take(&self) -> Vec<StageTime> {
         std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
 impl Pipeline {
-    /// The length of a video in seconds, where a header says it, or what was copied of it: see `answer_media`. The video is
-    /// read in a process of its own where the pipeline has a program for it.
+    /// Duration of a video in seconds, if its header states it, or of the excerpt that was copied: see `answer_media`.
+    /// Uses a subprocess if the pipeline has a program for it.
     ///
     /// # Errors
-    /// A video that cannot be read.
+    /// A video that cannot be read; an excerpt that cannot be copied.
     pub fn ask_media(&self, request: &MediaRequest) -> Result<Option<f64>> {
         let header = match self.program() {
             Some(program) => ask_media(program, request, &Limits::of_header()),
@@ -56,8 +56,7 @@ impl Pipeline {
         Ok(header?.secs)
     }
 
-    /// This pipeline with these files, each with the name of its speaker, in place of all videos, and another work
-    /// folder.
+    /// This pipeline with `files`, pairs of speaker and path, instead of its videos, and another work folder.
     pub fn on_excerpts(&self, files: &[(String, PathBuf)], work: &Path) -> Self {
         let mut config = self.config().clone();
         config.settings.work.dir = work.to_owned();

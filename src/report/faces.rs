@@ -9,7 +9,7 @@ use orator_dataset::config::videos::Videos;
 use orator_media::ffmpeg;
 use orator_media::opencv::png;
 use orator_pipeline::dataset::people;
-use orator_pipeline::dataset::people::PersonSeen;
+use orator_pipeline::dataset::people::VideoPerson;
 use std::path::Path;
 
 /// Maximum number of faces shown per person.
@@ -21,16 +21,16 @@ pub fn section(settings: &Settings, videos: &[Videos]) -> Vec<Node> {
     videos
         .iter()
         .flat_map(|of| {
-            let is_stated = settings.speaker.iter().any(|speaker| speaker.name == of.speaker && speaker.same_person);
-            let seen: Vec<PersonSeen> = of.units.iter().map(|unit| PersonSeen::read(work, unit)).collect();
-            let groups = if is_stated { vec![seen.iter().collect()] } else { people::groups(&seen) };
-            of_speaker(work, &of.speaker, &groups, is_stated)
+            let is_said = settings.speaker.iter().any(|said| said.name == of.speaker && said.same_person);
+            let seen: Vec<VideoPerson> = of.units.iter().map(|unit| VideoPerson::read(work, unit)).collect();
+            let groups = if is_said { vec![seen.iter().collect()] } else { people::groups(&seen) };
+            of_speaker(work, &of.speaker, &groups, is_said)
         })
         .collect()
 }
 
-fn of_speaker(work: &Path, speaker: &str, groups: &[Vec<&PersonSeen>], is_stated: bool) -> Vec<Node> {
-    let about = match (is_stated, groups.len()) {
+fn of_speaker(work: &Path, speaker: &str, groups: &[Vec<&VideoPerson>], is_said: bool) -> Vec<Node> {
+    let about = match (is_said, groups.len()) {
         (true, _) => format!("{speaker}: the configuration says that all videos show one person."),
         (false, 0 | 1) => format!("{speaker}: nothing speaks against one person."),
         (false, n) => format!(
@@ -50,7 +50,7 @@ fn of_speaker(work: &Path, speaker: &str, groups: &[Vec<&PersonSeen>], is_stated
     if rows.is_empty() { Vec::new() } else { std::iter::once(node("p").text(about)).chain(rows).collect() }
 }
 
-fn card(work: &Path, video: &PersonSeen) -> Result<Option<Node>> {
+fn card(work: &Path, video: &VideoPerson) -> Result<Option<Node>> {
     let path = Artifact::FacePicture.path(work, &video.unit);
     if !path.exists() {
         return Ok(None);

@@ -1,5 +1,5 @@
-//! Inputs with known truth for tests and benchmarks: a drawn speaker in a suit of coloured markers with the three small
-//! models that detect them (`drawn`), and speakers whose gestures follow a known rule (`rule`).
+//! Synthetic inputs with known ground truth for tests and benchmarks: a drawn speaker in a suit of coloured markers
+//! with three small models that detect them (`drawn`), and speakers whose gestures follow a known rule (`rule`).
 
 pub mod drawn;
 pub mod project;

@@ -1,4 +1,4 @@
-//! A project folder of its own for a test, with clips of the drawn speaker, and the program run in it.
+//! A temporary project folder for a test, with clips of the drawn speaker, in which the program is run.
 
 use crate::drawn::folder::{self, DemoPlan};
 use orator_base::stage::progress::Silent;
@@ -6,17 +6,18 @@ use orator_base::types::time::FrameRate;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-/// Draws one clip of the synthetic speaker, 640x480 at 15 frames a second with sound, and all that `orator-lab demo draw`
-/// puts beside it (truth, marker models, pipeline.toml), into `dir`; gives the video. About 0.2 s a second of clip.
+/// Draws one clip of the synthetic speaker, 640x480 at 15 fps with audio, into `dir`, with the other files that
+/// `orator-lab demo draw` writes (ground truth, marker models, pipeline.toml). Returns the video. Takes about 0.2 s
+/// per second of video.
 pub fn speaker_clip(dir: &Path, secs: f64, seed: u64) -> PathBuf {
     let plan = DemoPlan { n_videos: 1, secs, fps: FrameRate::new(15, 1), size: [640, 480], seed };
     folder::draw(dir, &plan, &Silent).unwrap().remove(0)
 }
 
-/// The built program of that name, beside the folder of the running test.
+/// Path of a built program, located relative to the running test.
 ///
 /// # Panics
-/// When it is not built: `cargo test -p PACKAGE` builds only the programs of that package.
+/// If it is not built: `cargo test -p PACKAGE` builds only the programs of that package.
 pub fn program(name: &str) -> PathBuf {
     let test = std::env::current_exe().unwrap();
     let program = test.ancestors().nth(2).unwrap().join(name);
@@ -24,12 +25,12 @@ pub fn program(name: &str) -> PathBuf {
     program
 }
 
-/// A project folder of its own with clips of the synthetic speaker, worked on by the program itself.
+/// A temporary project folder with clips of the synthetic speaker, processed by the program itself.
 pub struct Project {
     dir: tempfile::TempDir,
 }
 
-/// How the program ended: exit code, its JSON, and what it said on standard error.
+/// Result of the program: exit code, JSON from standard output, and standard error.
 pub struct ProgramAnswer {
     pub code: i32,
     pub json: serde_json::Value,
@@ -37,7 +38,8 @@ pub struct ProgramAnswer {
 }
 
 impl Project {
-    /// `n_clips` clips of `secs` seconds; none: only the configuration and an empty video folder.
+    /// Creates a project with `n_clips` clips of `secs` seconds; with 0, only the configuration and an empty video
+    /// folder.
     pub fn with_clips(name: &str, n_clips: usize, secs: f64) -> Self {
         let plan = DemoPlan { n_videos: n_clips.max(1), secs: secs.max(1.0), ..DemoPlan::default() };
         let project = Self::drawn(name, &plan);
@@ -47,22 +49,22 @@ impl Project {
         project
     }
 
-    /// Clips drawn as `plan` says.
+    /// Creates a project with clips as `plan` describes.
     pub fn drawn(name: &str, plan: &DemoPlan) -> Self {
         let dir = tempfile::Builder::new().prefix(&format!("orator-{name}-")).tempdir().unwrap();
         folder::draw(dir.path(), plan, &Silent).unwrap();
         Self { dir }
     }
 
-    /// A file that the stage of that name wrote of the video whose file is called `stem`.
+    /// Path of an output file of a stage, for the video with the file name `stem`.
     pub fn written(&self, stage: &str, stem: &str, file: &str) -> PathBuf {
         let videos =
             std::fs::read_dir(self.work().join(stage).join("host")).unwrap().map(|entry| entry.unwrap().path());
-        let is_it = |path: &PathBuf| {
+        let matches_stem = |path: &PathBuf| {
             let name = path.file_name().unwrap().to_string_lossy().into_owned();
             path.is_dir() && name.rsplit_once('-').is_some_and(|(slug, _)| slug == stem)
         };
-        videos.into_iter().find(is_it).expect(stem).join(file)
+        videos.into_iter().find(matches_stem).expect(stem).join(file)
     }
 
     pub fn dir(&self) -> &Path {
@@ -73,12 +75,12 @@ impl Project {
         self.dir().join("work")
     }
 
-    /// Where a video of that name belongs.
+    /// Path of the video `name`.
     pub fn video(&self, name: &str) -> PathBuf {
         self.dir().join("videos/host").join(name)
     }
 
-    /// The clips there are, sorted.
+    /// Paths of the clips, sorted.
     pub fn clips(&self) -> Vec<PathBuf> {
         let mut clips: Vec<PathBuf> =
             std::fs::read_dir(self.video("")).unwrap().map(|entry| entry.unwrap().path()).collect();
@@ -86,7 +88,7 @@ impl Project {
         clips
     }
 
-    /// Writes other entries into the `videos` of the configuration.
+    /// Replaces the `videos` entries of the configuration.
     pub fn name_videos(&self, entries: &[&str]) {
         let file = self.dir().join("pipeline.toml");
         let text = std::fs::read_to_string(&file).unwrap();
@@ -95,17 +97,17 @@ impl Project {
         std::fs::write(&file, text.lines().map(renamed).collect::<Vec<_>>().join("\n")).unwrap();
     }
 
-    /// `orator run` in the project's folder.
+    /// Runs `orator run` in the project folder.
     pub fn run(&self, args: &[&str]) -> ProgramAnswer {
         self.answer(&[&["run"], args].concat())
     }
 
-    /// Any verb of `orator` in the project's folder, to its end.
+    /// Runs a verb of `orator` in the project folder to completion.
     pub fn answer(&self, args: &[&str]) -> ProgramAnswer {
         Self::answer_to(self.command(args))
     }
 
-    /// Any verb of another program in the project's folder, to its end.
+    /// Runs a verb of another program in the project folder to completion.
     pub fn answer_of(&self, program: &str, args: &[&str]) -> ProgramAnswer {
         Self::answer_to(self.command_of(Path::new(program), args))
     }
@@ -117,12 +119,12 @@ impl Project {
         ProgramAnswer { code: output.status.code().unwrap_or(-1), json, errors }
     }
 
-    /// Starts a verb without waiting.
+    /// Starts a verb without waiting for it.
     pub fn start(&self, args: &[&str]) -> Child {
         self.command(args).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
     }
 
-    /// A verb to be started.
+    /// Command that runs a verb.
     pub fn command(&self, args: &[&str]) -> Command {
         self.command_of(&program("orator"), args)
     }
@@ -134,7 +136,7 @@ impl Project {
     }
 }
 
-/// Every file under `folder` by its name relative to it.
+/// All files under `folder`, with their names relative to it.
 pub fn files_under(folder: &Path) -> Vec<(String, PathBuf)> {
     let mut files = Vec::new();
     let mut folders = vec![folder.to_owned()];

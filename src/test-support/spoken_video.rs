@@ -1,4 +1,4 @@
-//! Sound and motion of the synthetic speaker as a video of a dataset, though there is no video.
+//! Audio and motion of the synthetic speaker as one video entry of a dataset, without an actual video.
 
 use anyhow::Result;
 use ndarray::Array3;
@@ -16,24 +16,24 @@ use orator_dataset::write::entry::VideoSource;
 use orator_formats::transcript::Word;
 use serde_json::{Value, json};
 
-/// What is said and how the speaker moves.
+/// Speech and motion of one entry.
 pub struct SpokenVideo {
     /// Name in the dataset.
     pub name: String,
-    /// BLAKE3 of what it follows from.
+    /// BLAKE3 of the parameters that determine the content.
     pub content: String,
     pub motion: Motion,
-    /// 16 kHz, as long as the motion.
+    /// Audio at 16 kHz, of the duration of the motion.
     pub sound: Sound,
     pub words: Option<Vec<Word>>,
-    /// Angles of head and trunk, as long as the motion; `None`: not known.
+    /// Angles of head and trunk, of the length of the motion; `None` if unknown.
     pub posture: Option<Posture>,
-    /// More to keep beside the sample: an object.
+    /// Additional metadata of the sample; a JSON object.
     pub meta: Value,
 }
 
 impl SpokenVideo {
-    /// Adds it to a dataset, in this split.
+    /// Adds the entry to a split of a dataset.
     pub fn write(self, writer: &DatasetWriter, split: Split) -> Result<()> {
         let (source, sample) = (self.source(), self.sample());
         let mut video = writer.video(source, split, SplitBy::Name)?;

@@ -9,7 +9,7 @@ use anyhow::Result;
 use orator_base::stage::artifacts;
 use orator_base::stage::artifacts::StageName;
 use orator_base::stage::ledger::longest_first;
-use orator_pipeline::{Pipeline, StagePlan, StatusReport, TimeAccount, UnitState, UnitStatus};
+use orator_pipeline::{Pipeline, StagePlan, StatusReport, TimeBudget, UnitState, UnitStatus};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -68,9 +68,9 @@ fn text(report: &StatusReport, why: bool) -> String {
     lines.extend([String::new(), format!("{:width$}{headings}  refused for", "seconds")]);
     lines.extend(report.account.iter().map(|account| seconds(account, width)));
     lines.push(verdict(&report.total));
-    let not_judged = |account: &TimeAccount| account.not_judged.as_ref().map(|said| format!("{}: {said}", account.of));
+    let not_judged = |account: &TimeBudget| account.not_judged.as_ref().map(|said| format!("{}: {said}", account.of));
     lines.extend(report.account.iter().filter_map(not_judged));
-    let offset = |account: &TimeAccount| account.sound_offset.map(|said| format!("{}: {said}", account.of));
+    let offset = |account: &TimeBudget| account.sound_offset.map(|said| format!("{}: {said}", account.of));
     lines.extend(report.account.iter().filter_map(offset));
     if why {
         lines.push(String::new());
@@ -85,15 +85,15 @@ fn text(report: &StatusReport, why: bool) -> String {
 }
 
 /// A row of the table of seconds.
-fn seconds(account: &TimeAccount, width: usize) -> String {
+fn seconds(account: &TimeBudget, width: usize) -> String {
     let known = account.duration > 0.0 || account.n_unknown == 0;
     let secs = [account.kept, account.refused_secs(), account.failed, account.waiting, account.duration];
     let secs = secs.map(|secs| if known { format!("{secs:9.2}") } else { format!("{:>9}", "?") }).join("");
     format!("{:width$}{secs}  {}", account.of, longest_first(&account.refused)).trim_end().to_owned()
 }
 
-/// Line that states whether all seconds are accounted for.
-fn verdict(total: &TimeAccount) -> String {
+/// Whether all seconds add up.
+fn verdict(total: &TimeBudget) -> String {
     let unknown = match total.n_unknown {
         0 => String::new(),
         n => format!("; the length of {n} that failed is not known (?)"),

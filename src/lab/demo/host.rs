@@ -8,7 +8,7 @@ use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir;
 use orator_base::types::time::FrameRate;
 use orator_formats::wav;
-use orator_test_support::drawn::folder::{DemoPlan, UNHEARD_SECS, pipeline};
+use orator_test_support::drawn::folder::{DemoPlan, SPEECH_ONLY_SECS, pipeline};
 use orator_test_support::drawn::speech::Speech;
 use orator_test_support::rule::rule::RuleGestures;
 use rand::SeedableRng;
@@ -42,7 +42,7 @@ pub fn draw(dir: &Path, plan: &DemoPlan, progress: &dyn Progress) -> Result<Vec<
         truth.context("a rendered clip has no truth")?.write(&dir.join(format!("truth/clip-{number}.npz")))?;
         videos.push(video);
     }
-    let unheard = scene(seed, seed, UNHEARD_SECS, plan.fps);
+    let unheard = scene(seed, seed, SPEECH_ONLY_SECS, plan.fps);
     workdir::replace(&dir.join("speech.wav"), |attempt| wav::write(attempt, unheard.sound()))?;
     let title =
         "The rendered speaker of `orator-lab demo`, seen by the models for real people (`orator models fetch`).";

@@ -1,6 +1,6 @@
-//! Which video, or which block of a video's time, is in which split: what is on record, what the configuration asks, and
-//! the gap between two splits of a video. A window of one split, with all frames that its numbers were made from, ends
-//! before the first frame of a sample of another.
+//! Assignment of videos, or time blocks of a video, to splits: from the record, the configuration, and the guard
+//! interval between two splits of a video. A window of one split, including all frames that influence it, ends before
+//! the first frame of a sample of another split.
 
 use super::video::LiftedVideo;
 use anyhow::{Result, ensure};
@@ -20,48 +20,48 @@ use orator_dataset::{INFO, WINDOW_FRAMES};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Videos from which whole videos are put into splits.
-const MANY_VIDEOS: usize = 8;
-/// Windows that the shortest block has room for.
-const LEAST_WINDOWS: usize = 2;
+/// Least number of videos for splitting by video.
+const MIN_VIDEOS: usize = 8;
+/// Number of windows that fit into the shortest block.
+const MIN_WINDOWS: usize = 2;
 
-/// Division of a speaker's videos.
+/// Division of a speaker's videos into splits.
 pub struct Division {
     pub record: SplitRecord,
-    /// Frames between two splits of a video.
+    /// Guard interval between two splits of a video, frames.
     pub guard_frames: usize,
-    /// Frames of the shortest sample that is cut from a block.
+    /// Least length of a sample that is cut from a block, frames.
     pub least_frames: usize,
 }
 
-/// Samples of a video in blocks, and the account of its seconds.
+/// Samples of a video divided into blocks, and the resulting ledger.
 pub struct DividedVideo {
     pub pieces: Vec<(Split, Interval)>,
     pub ledger: Ledger,
 }
 
-/// Frames of a training window, at least those of the published one.
+/// Length of a training window in frames, at least that of the published model.
 pub fn window_frames(settings: &Settings) -> usize {
     settings.gan.window_frames.max(WINDOW_FRAMES)
 }
 
-/// Frames between two splits of a video: a training window, and the `reach_secs` beside a sample that its joints were
-/// made from. Features of sound look less far, and only at the sample's own sound.
+/// Guard interval in frames: a training window plus `reach_secs`, the context beside a sample that its joints depend
+/// on. Audio features have less context, and use only the sample's own audio.
 pub fn guard_frames(settings: &Settings, reach_secs: f64) -> usize {
     let reach = reach_secs * settings.extract.rate().per_sec();
     window_frames(settings) + reach.ceil() as usize + 1
 }
 
-/// Splits on record: of the work folder, else of the dataset that is there.
+/// Recorded splits: of the work folder, else of the existing dataset.
 ///
 /// # Errors
 /// A damaged record.
-pub fn on_record(work: &Path, speaker: &Unit) -> Result<Option<SplitRecord>> {
+pub fn recorded_splits(work: &Path, speaker: &Unit) -> Result<Option<SplitRecord>> {
     let record = SplitRecord::read(&artifacts::splits(work, &speaker.speaker))?;
     Ok(record.or_else(|| of_dataset(&dir(work, StageName::Dataset, speaker))))
 }
 
-/// Splits of the dataset in `dir`, if it says any.
+/// Splits of the dataset in `dir`, if it states any.
 fn of_dataset(dir: &Path) -> Option<SplitRecord> {
     let info: DatasetInfo = serde_json::from_slice(&std::fs::read(dir.join(INFO)).ok()?).ok()?;
     let (unit, why) = match info.split_rule {
@@ -76,8 +76,8 @@ fn of_dataset(dir: &Path) -> Option<SplitRecord> {
     Some(record).filter(|record| !record.videos.is_empty())
 }
 
-/// Record to go on from: the one there, unless the configuration now asks for another unit; else a new one.
-pub fn chosen(asked: SplitUnit, before: Option<SplitRecord>, n_videos: usize, are_named: bool) -> SplitRecord {
+/// Record to continue: the existing one, unless the configuration now asks for another unit; else a new one.
+pub fn choose_record(asked: SplitUnit, before: Option<SplitRecord>, n_videos: usize, are_named: bool) -> SplitRecord {
     let before = before.filter(|before| !before.videos.is_empty());
     match (asked, before) {
         (SplitUnit::Auto, Some(before)) => before,
@@ -85,10 +85,10 @@ pub fn chosen(asked: SplitUnit, before: Option<SplitRecord>, n_videos: usize, ar
             SplitRecord::new(SplitUnit::Video, "the configuration names the split of videos".to_owned())
         }
         (SplitUnit::Auto, None) => {
-            let few = n_videos < MANY_VIDEOS;
+            let few = n_videos < MIN_VIDEOS;
             let unit = if few { SplitUnit::Time } else { SplitUnit::Video };
             let fewer = if few { "fewer than" } else { "at least" };
-            let why = format!("chosen for {}, {fewer} {MANY_VIDEOS}", counted(n_videos, "video"));
+            let why = format!("chosen for {}, {fewer} {MIN_VIDEOS}", counted(n_videos, "video"));
             SplitRecord::new(unit, why)
         }
         (unit, Some(before)) if before.unit == unit => before,
@@ -97,15 +97,15 @@ pub fn chosen(asked: SplitUnit, before: Option<SplitRecord>, n_videos: usize, ar
 }
 
 impl Division {
-    /// What the splits are made of, and why.
+    /// Rule of the splits, with its reason.
     pub fn rule(&self, fps: FrameRate) -> SplitRule {
         let by_time = self.record.unit == SplitUnit::Time;
         let guard_secs = if by_time { fps.secs(self.guard_frames) } else { 0.0 };
         SplitRule { unit: self.record.unit, why: self.record.why.clone(), guard_secs }
     }
 
-    /// Assigns the videos, in their order, and puts them on record. `named`: splits that the configuration names, by the
-    /// video's name in the work folder.
+    /// Assigns the videos in order and records the splits. `named`: splits from the configuration, by name of the
+    /// video in the work folder.
     pub fn assign(
         &mut self,
         videos: &[&LiftedVideo],
@@ -115,7 +115,7 @@ impl Division {
     ) -> Vec<Assignment> {
         let Some(first) = videos.first() else { return Vec::new() };
         let fps = first.intervals.fps;
-        let waiting = videos.iter().map(|video| Unassigned {
+        let unassigned = videos.iter().map(|video| Unassigned {
             name: &video.name,
             content: &video.content,
             duration_secs: video.ledger.duration_secs,
@@ -128,9 +128,9 @@ impl Division {
             validation: settings.validation,
             test: settings.test,
             guard_secs: fps.secs(self.guard_frames),
-            min_block_secs: fps.secs(LEAST_WINDOWS * self.least_frames),
+            min_block_secs: fps.secs(MIN_WINDOWS * self.least_frames),
         };
-        let assigned = assign(&waiting.collect::<Vec<_>>(), shared, &plan);
+        let assigned = assign(&unassigned.collect::<Vec<_>>(), shared, &plan);
         for (video, assignment) in videos.iter().zip(&assigned) {
             let (split, by, blocks) = match assignment {
                 _ if video.ledger.kept.is_empty() => continue,
@@ -144,10 +144,10 @@ impl Division {
         assigned
     }
 
-    /// Cuts a video's intervals along its blocks.
+    /// Cuts a video's intervals at its blocks.
     ///
     /// # Errors
-    /// Intervals that do not agree with the ledger.
+    /// Intervals that do not match the ledger.
     pub fn divide(&self, intervals: &Intervals, ledger: &Ledger, blocks: &[TimeBlock]) -> Result<DividedVideo> {
         let fps = intervals.fps;
         ensure!(
@@ -165,7 +165,7 @@ impl Division {
                 if piece.n_frames() < self.least_frames.min(interval.n_frames()) {
                     continue;
                 }
-                // The ends of an interval are those of its ledger, where a partly filled last frame counts.
+                // The ends of an interval are those of its ledger entry, where a partial last frame counts.
                 let start_secs = if piece.start == interval.start { kept.start_secs } else { fps.secs(piece.start) };
                 let end_secs = if piece.end == interval.end { kept.end_secs } else { fps.secs(piece.end) };
                 divided.ledger.refused.extend(self.left_out(at, start_secs, blocks, fps));
@@ -182,7 +182,7 @@ impl Division {
         Ok(divided)
     }
 
-    /// Entry of the ledger for seconds between two samples, if there are any.
+    /// Ledger entry for the time between two samples, if there is any.
     fn left_out(&self, start_secs: f64, end_secs: f64, blocks: &[TimeBlock], fps: FrameRate) -> Option<Refused> {
         if end_secs <= start_secs {
             return None;

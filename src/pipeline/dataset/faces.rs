@@ -1,6 +1,6 @@
-//! Picture of one face a video, each person's videos in rows of their own.
+//! Overview picture with one face per video; the videos of each person start a new row.
 
-use super::people::PersonSeen;
+use super::people::VideoPerson;
 use anyhow::Result;
 use orator_base::stage::artifacts::Artifact;
 use orator_base::stage::workdir;
@@ -8,25 +8,25 @@ use orator_base::types::image::Image;
 use orator_media::opencv::{draw, png};
 use std::path::Path;
 
-/// Width and height of a cell, px: the face, and below it the name of the video.
+/// Width and height of a cell in px: the face, and below it the name of the video.
 const CELL: [usize; 2] = [144, 160];
 const FACE_PX: usize = 128;
 const N_COLUMNS: usize = 8;
-/// Rows of the whole picture at most.
-const MOST_ROWS: usize = 40;
+/// Largest number of rows.
+const MAX_ROWS: usize = 40;
 const PAPER: [u8; 3] = [255; 3];
 const RULE: [u8; 3] = [170; 3];
 const INK: [u8; 3] = [30; 3];
 
-/// Writes the faces of groups of videos as a PNG.
+/// Writes the faces of groups of videos as PNG.
 ///
 /// # Errors
 /// A picture that cannot be read or written.
-pub fn write(path: &Path, work: &Path, groups: &[Vec<&PersonSeen>]) -> Result<()> {
-    let rows: Vec<(bool, &[&PersonSeen])> = groups
+pub fn write(path: &Path, work: &Path, groups: &[Vec<&VideoPerson>]) -> Result<()> {
+    let rows: Vec<(bool, &[&VideoPerson])> = groups
         .iter()
         .flat_map(|group| group.chunks(N_COLUMNS).enumerate().map(|(at, row)| (at == 0, row)))
-        .take(MOST_ROWS)
+        .take(MAX_ROWS)
         .collect();
     let mut sheet = Image::filled(N_COLUMNS * CELL[0], rows.len() * CELL[1], PAPER);
     let gap = (CELL[0] - FACE_PX) / 2;
@@ -43,18 +43,18 @@ pub fn write(path: &Path, work: &Path, groups: &[Vec<&PersonSeen>]) -> Result<()
                 let face = png::read(&file)?;
                 draw::paste(&mut sheet, &face, [left + gap, top + gap]);
             }
-            let name = fitting(&video.file)?;
+            let name = truncate_to_cell(&video.file)?;
             draw::text(&mut sheet, &name, [(left + gap) as f32, (top + CELL[1] - 8) as f32], TEXT_PX, INK)?;
         }
     }
     workdir::replace(path, |attempt| png::write(attempt, &sheet))
 }
 
-/// Height of a capital, px.
+/// Height of a capital letter, px.
 const TEXT_PX: f32 = 7.0;
 
-/// Name cut at the front until it fits its cell, as names of one folder begin alike.
-fn fitting(name: &str) -> Result<String> {
+/// Truncates a name at the front to fit its cell, because names within a folder usually share their beginning.
+fn truncate_to_cell(name: &str) -> Result<String> {
     let mut letters: Vec<char> = name.chars().map(|letter| if letter.is_ascii() { letter } else { '?' }).collect();
     while letters.len() > 3 && draw::text_width(&letters.iter().collect::<String>(), TEXT_PX)? > FACE_PX as f32 {
         letters.remove(0);

@@ -1,5 +1,5 @@
-//! Stage 5: everything of a speaker to a dataset. `stage` -> `division` (which video, or which block of it, is in which
-//! split) -> `run` (one video after the other, read by `video`) -> `outcome`. `people` compares who is seen in the videos,
+//! Stage 5: the dataset of a speaker. `stage` -> `division` (assignment of videos or blocks to splits) -> `run`
+//! (writes one video after the other, read by `video`) -> `outcome`. `people` compares the persons in the videos,
 //! `faces` draws them.
 
 pub mod division;

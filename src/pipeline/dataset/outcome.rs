@@ -1,4 +1,4 @@
-//! The report on a dataset just written: how much there is, and what to mend.
+//! Report on a newly written dataset: its size, and problems to fix.
 
 use super::video::LiftedVideo;
 use anyhow::{Context, Result};
@@ -15,30 +15,30 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Videos whose notes on words are told.
+/// Largest number of videos whose notes on words are listed.
 const MAX_NOTED: usize = 5;
-/// People, and videos of each, that are named.
+/// Largest number of persons, and of videos of each, that are named.
 const MAX_PEOPLE: usize = 6;
 const MAX_FILES: usize = 3;
 
-/// Several people whom the videos of one speaker seem to show.
+/// Persons that the videos of one speaker appear to show.
 #[derive(Debug, Serialize)]
 pub struct SeveralPeople {
-    /// Picture of one face a video.
+    /// Overview picture with one face per video.
     pub picture: PathBuf,
-    /// File names of each person's videos.
+    /// File names of the videos of each person.
     pub videos: Vec<Vec<String>>,
 }
 
 impl SeveralPeople {
-    /// What the user should know, and do.
+    /// Warning with what to do.
     fn warning(&self) -> String {
-        let named = |files: &Vec<String>| {
+        let file_list = |files: &Vec<String>| {
             let more = files.len().saturating_sub(MAX_FILES);
             let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
             format!("{}{rest}", files[..files.len().min(MAX_FILES)].join(", "))
         };
-        let people: Vec<String> = self.videos.iter().take(MAX_PEOPLE).map(named).collect();
+        let people: Vec<String> = self.videos.iter().take(MAX_PEOPLE).map(file_list).collect();
         format!(
             "the videos seem to show {} people ({}): look at {}; a video of another person is left out by `exclude`, and \
              where all are one person, `same_person = true` under [[speaker]] says so",
@@ -49,7 +49,7 @@ impl SeveralPeople {
     }
 }
 
-/// How the writing came out.
+/// Outcome of writing a dataset.
 pub struct DatasetOutcome<'a> {
     pub settings: &'a config::DatasetConfig,
     pub rule: &'a SplitRule,
@@ -62,7 +62,10 @@ pub struct DatasetOutcome<'a> {
 }
 
 impl DatasetOutcome<'_> {
-    /// The stage's report on the dataset in `out`.
+    /// Report of the stage on the dataset in `out`.
+    ///
+    /// # Errors
+    /// Files of the dataset that cannot be read.
     pub fn report(&self, out: &Path) -> Result<Report> {
         let info: DatasetInfo = serde_json::from_slice(&std::fs::read(out.join(INFO))?).context(INFO)?;
         let leakage: Leakage = serde_json::from_slice(&std::fs::read(out.join(LEAKAGE))?).context(LEAKAGE)?;
@@ -93,11 +96,11 @@ impl DatasetOutcome<'_> {
         Ok(Report { line, facts: facts.as_object().cloned().unwrap_or_default() })
     }
 
-    /// What the user should know, each with what to do.
+    /// Warnings, each with what to do.
     fn warnings(&self, leakage: &Leakage) -> Vec<String> {
         let Self { videos, stats, n_failed, n_left_out, .. } = *self;
         let mut warnings: Vec<String> = self.several_people.iter().map(SeveralPeople::warning).collect();
-        // The longest is the one to train on; each of the others is proposed once.
+        // The longest video is proposed for training; each of the others is proposed once.
         let mut by_length: Vec<&LiftedVideo> = videos.iter().filter(|video| video.ledger.kept_secs() > 0.0).collect();
         by_length.sort_by(|a, b| b.ledger.kept_secs().total_cmp(&a.ledger.kept_secs()));
         let mut others = by_length.iter().skip(1);
@@ -137,7 +140,7 @@ impl DatasetOutcome<'_> {
             warnings.push(format!("{videos} left out, the same content is there already (ledger.jsonl says where)"));
         }
         let noted = self.videos.iter().filter_map(|video| {
-            let notes = video.account_of_words(std::iter::empty())?.notes;
+            let notes = video.transcript_account(std::iter::empty())?.notes;
             (!notes.is_empty()).then(|| format!("{}: {}", video.file, notes.join("; ")))
         });
         let noted: Vec<String> = noted.collect();

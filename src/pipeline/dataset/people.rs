@@ -1,6 +1,6 @@
-//! Whether the videos of a speaker show one person: the shape of the face and the colours of skin and hair are compared
-//! pair by pair, the bones where a face is not seen from the front. Videos that are near to each other on the whole are
-//! one person's. It is a guess for the user to look at: clothes change, light changes colours, and relatives are alike.
+//! Checks whether the videos of a speaker show one person, by pairwise comparison of the face shape and the colours of
+//! skin and hair, or of the bones where there is no frontal face. Videos are grouped by average linkage. The result is
+//! a suggestion for the user: clothes change, light changes colours, and relatives are alike.
 
 use crate::portrait::Portrait;
 use orator_base::stage::Unit;
@@ -9,31 +9,31 @@ use orator_base::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST, R_ELBOW, R_SHOU
 use orator_dataset::bones::VideoBones;
 use std::path::Path;
 
-/// Videos that are compared; of more, so many evenly spread.
-const MOST_VIDEOS: usize = 200;
-/// Frames of a face below which its shape is not known.
-const LEAST_FRAMES: usize = 3;
-/// Difference of two faces, thousandths of their size, from which on they are two people's, and how much of it a step of
-/// 8-bit colour is worth.
-const OTHER_FACE: f64 = 40.0;
+/// Largest number of videos to compare; more are subsampled evenly.
+const MAX_VIDEOS: usize = 200;
+/// Least number of frames for a known face shape.
+const MIN_FRAMES: usize = 3;
+/// Face difference, in thousandths of the face size, of two different persons, and the contribution of one 8-bit step
+/// of colour distance.
+const FACE_THRESHOLD: f64 = 40.0;
 const COLOUR_STEP: f64 = 0.5;
-/// Difference of two people's bones, in the logarithm of the shoulders' width over the arms' length; one person's differ
-/// by up to 0.02 between videos.
-const OTHER_BONES: f64 = 0.04;
+/// Bone difference of two different persons, as log ratio of shoulder width to arm length; for one person it varies by
+/// up to 0.02 between videos.
+const BONES_THRESHOLD: f64 = 0.04;
 
-/// What is known of the person in a video.
+/// Description of the person in a video.
 #[derive(Clone, Debug)]
-pub struct PersonSeen {
+pub struct VideoPerson {
     pub unit: Unit,
     /// File name of the video.
     pub file: String,
     portrait: Option<Portrait>,
-    /// Logarithm of the shoulders' width over the arms' length; `None`: not measured.
+    /// Log ratio of shoulder width to arm length; `None`: not measured.
     shoulders: Option<f64>,
 }
 
-impl PersonSeen {
-    /// Reads what the stages left of a video; what is not there is not compared.
+impl VideoPerson {
+    /// Reads the outputs of the stages for a video; missing ones are not compared.
     pub fn read(work: &Path, unit: &Unit) -> Self {
         let bones = VideoBones::read(&Artifact::Bones.path(work, unit)).unwrap_or_default();
         let length = |joint: usize| bones.lengths_metres.get(joint - 1).copied().unwrap_or(0.0);
@@ -43,31 +43,31 @@ impl PersonSeen {
         Self {
             unit: unit.clone(),
             file: unit.source.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-            portrait: portrait.filter(|portrait| portrait.n_frames >= LEAST_FRAMES),
+            portrait: portrait.filter(|portrait| portrait.n_frames >= MIN_FRAMES),
             shoulders: Some(ratio.ln()).filter(|ratio| bones.n_frames > 0 && ratio.is_finite()),
         }
     }
 
-    /// How far two videos are from showing one person, 1: as likely two. `None`: there is too little to compare.
+    /// Normalised difference of two videos; above 1 they more likely show two persons. `None`: not comparable.
     fn difference(&self, other: &Self) -> Option<f64> {
-        let of_faces = || {
+        let by_face = || {
             let (a, b) = (self.portrait.as_ref()?, other.portrait.as_ref()?);
-            Some((a.face_distance(b)? + COLOUR_STEP * a.colour_distance(b)) / OTHER_FACE)
+            Some((a.face_distance(b)? + COLOUR_STEP * a.colour_distance(b)) / FACE_THRESHOLD)
         };
-        let of_bones = || Some((self.shoulders? - other.shoulders?).abs() / OTHER_BONES);
-        of_faces().or_else(of_bones)
+        let by_bones = || Some((self.shoulders? - other.shoulders?).abs() / BONES_THRESHOLD);
+        by_face().or_else(by_bones)
     }
 }
 
-/// Groups of videos, each of one person as far as can be seen, the largest first. A video that can be compared with no
-/// other is in the first.
-pub fn groups(videos: &[PersonSeen]) -> Vec<Vec<&PersonSeen>> {
-    let step = videos.len().div_ceil(MOST_VIDEOS).max(1);
-    let compared: Vec<&PersonSeen> = videos.iter().step_by(step).collect();
-    let difference = |a: &PersonSeen, b: &PersonSeen| a.difference(b).filter(|_| a.unit != b.unit);
-    let is_known = |one: &&PersonSeen| compared.iter().any(|other| difference(one, other).is_some());
-    let (known, unknown): (Vec<&PersonSeen>, Vec<&PersonSeen>) = compared.iter().copied().partition(is_known);
-    let mut groups = by_average_linkage(&known, difference);
+/// Groups the videos by person, largest group first. A video that cannot be compared with any other is added to the
+/// first group.
+pub fn groups(videos: &[VideoPerson]) -> Vec<Vec<&VideoPerson>> {
+    let step = videos.len().div_ceil(MAX_VIDEOS).max(1);
+    let compared: Vec<&VideoPerson> = videos.iter().step_by(step).collect();
+    let difference = |a: &VideoPerson, b: &VideoPerson| a.difference(b).filter(|_| a.unit != b.unit);
+    let is_known = |one: &&VideoPerson| compared.iter().any(|other| difference(one, other).is_some());
+    let (known, unknown): (Vec<&VideoPerson>, Vec<&VideoPerson>) = compared.iter().copied().partition(is_known);
+    let mut groups = cluster(&known, difference);
     groups.sort_by_key(|group| std::cmp::Reverse(group.len()));
     match groups.first_mut() {
         Some(first) => first.extend(unknown),
@@ -76,10 +76,11 @@ pub fn groups(videos: &[PersonSeen]) -> Vec<Vec<&PersonSeen>> {
     groups
 }
 
-/// Joins the two nearest groups for as long as the mean of the differences between their members is below 1.
-fn by_average_linkage<'a, T>(items: &[&'a T], difference: impl Fn(&T, &T) -> Option<f64>) -> Vec<Vec<&'a T>> {
+/// Agglomerative clustering with average linkage: merges the two closest groups while their mean difference is below
+/// 1.
+fn cluster<'a, T>(items: &[&'a T], difference: impl Fn(&T, &T) -> Option<f64>) -> Vec<Vec<&'a T>> {
     let mut groups: Vec<Vec<&T>> = items.iter().map(|item| vec![*item]).collect();
-    // Sum and number of the known differences between the members of two groups.
+    // Sum and number of the known differences between two groups.
     let known = |a: &T, b: &T| difference(a, b).map_or([0.0; 2], |difference| [difference, 1.0]);
     let mut sums: Vec<Vec<[f64; 2]>> = items.iter().map(|a| items.iter().map(|b| known(a, b)).collect()).collect();
     loop {
@@ -103,30 +104,30 @@ fn by_average_linkage<'a, T>(items: &[&'a T], difference: impl Fn(&T, &T) -> Opt
 mod tests {
     use super::*;
 
-    fn person(file: &str, face: Option<f64>, shoulders: Option<f64>) -> PersonSeen {
-        let place = |k: u32, long: f64| [f64::from(k % 5), long * f64::from(k / 5), f64::from(k % 3)];
-        let face = face.map(|long| (0..40).map(|k| place(k, long)).collect());
+    fn person(file: &str, face: Option<f64>, shoulders: Option<f64>) -> VideoPerson {
+        let vertex = |k: u32, long: f64| [f64::from(k % 5), long * f64::from(k / 5), f64::from(k % 3)];
+        let face = face.map(|long| (0..40).map(|k| vertex(k, long)).collect());
         let unit = Unit { speaker: "s".into(), video: file.into(), source: file.into() };
         let portrait = face.map(|face| Portrait { face, n_frames: 9, ..Portrait::default() });
-        PersonSeen { unit, file: file.into(), portrait, shoulders }
+        VideoPerson { unit, file: file.into(), portrait, shoulders }
     }
 
-    fn files(seen: &[PersonSeen]) -> Vec<String> {
-        let name = |group: &Vec<&PersonSeen>| {
+    fn files(persons: &[VideoPerson]) -> Vec<String> {
+        let name = |group: &Vec<&VideoPerson>| {
             let mut files: Vec<&str> = group.iter().map(|one| one.file.as_str()).collect();
             files.sort_unstable();
             files.concat()
         };
-        groups(seen).iter().map(name).collect()
+        groups(persons).iter().map(name).collect()
     }
 
     #[test]
-    fn videos_are_put_to_the_person_they_are_most_like() {
+    fn videos_are_grouped_by_person() {
         let same = [person("a", Some(1.0), None), person("b", Some(1.001), Some(-0.4)), person("d", Some(1.002), None)];
         assert_eq!(files(&same), ["abd"]);
         let other = person("c", Some(2.0), None);
         assert_eq!(files(&[same.to_vec(), vec![other]].concat()), ["abd", "c"]);
-        // Without a face the bones are compared where both are known.
+        // Without a face, the bones are compared if both are known.
         let seated = [person("e", None, Some(-0.39)), person("f", None, Some(-0.5)), person("g", None, None)];
         assert_eq!(files(&[same.to_vec(), seated.to_vec()].concat()), ["abdeg", "f"]);
         assert_eq!(files(&seated[2..]), ["g"]);

@@ -1,4 +1,4 @@
-//! Writing of a speaker's dataset, video by video: what the dataset that was there has of a video already is taken over.
+//! Writes a speaker's dataset, video by video; parts of the existing dataset that are unchanged are reused.
 
 use super::division::{DividedVideo, Division};
 use super::video::LiftedVideo;
@@ -17,28 +17,29 @@ use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Hashes of the codes of the videos that have sound.
+/// Hashes of the audio fingerprint codes, by name of the video; only videos with audio.
 pub type Sounds = BTreeMap<String, String>;
 
-/// What is at hand while a dataset is written.
+/// State while a dataset is written.
 pub struct DatasetRun<'a> {
     settings: &'a config::DatasetConfig,
     out: &'a Path,
-    /// The dataset that is there, and its videos.
+    /// Existing dataset, and its videos.
     old: &'a Path,
     before: BTreeMap<String, VideoEntry>,
-    /// Videos that were taken over from it.
+    /// Number of videos reused from it.
     pub n_taken_over: usize,
     progress: &'a dyn Progress,
 }
 
 impl<'a> DatasetRun<'a> {
-    /// Begins a dataset in the folder `out` beside the one in `old`.
+    /// Starts a dataset in the folder `out`, reusing parts of the one in `old`.
     pub fn new(settings: &'a config::DatasetConfig, out: &'a Path, old: &'a Path, progress: &'a dyn Progress) -> Self {
-        Self { settings, out, old, before: parts_of(old), n_taken_over: 0, progress }
+        Self { settings, out, old, before: valid_parts(old), n_taken_over: 0, progress }
     }
 
-    /// Writes the codes of each video's sound, the old dataset's where the content is the same; their hashes.
+    /// Writes the audio fingerprint of each video, reusing that of the old dataset if the content is unchanged.
+    /// Returns the hashes.
     pub fn sounds(&self, videos: &[&LiftedVideo]) -> Result<Sounds> {
         let task = self.progress.begin("sound", videos.len() as u64);
         let mut hashes = Sounds::new();
@@ -67,7 +68,7 @@ impl<'a> DatasetRun<'a> {
         Ok(SoundComparison { duplicate_secs, shared })
     }
 
-    /// Writes a video as a whole or in blocks of time, as it is `placed`, or takes it over from the old dataset.
+    /// Writes a video to one split or in time blocks, as `placed` states, or reuses it from the old dataset.
     pub fn write(
         &mut self,
         writer: &DatasetWriter,
@@ -90,11 +91,11 @@ impl<'a> DatasetRun<'a> {
         let inputs =
             json!([orator_dataset::SCHEMA, video.file, video.files_hash, placement, rule, self.settings.max_mb]);
         let made_from = blake3::hash(inputs.to_string().as_bytes()).to_hex().to_string();
-        if self.is_taken_over(video, &made_from)? {
+        if self.reuse(video, &made_from)? {
             return Ok(());
         }
         let intervals: Vec<Interval> = divided.pieces.iter().map(|(_, interval)| *interval).collect();
-        let words = video.account_of_words(intervals.iter().copied());
+        let words = video.transcript_account(intervals.iter().copied());
         let source = VideoSource {
             name: video.name.clone(),
             file: video.file.clone(),
@@ -119,8 +120,8 @@ impl<'a> DatasetRun<'a> {
         Ok(())
     }
 
-    /// Takes a video over from the old dataset, if it was made from the same there.
-    fn is_taken_over(&mut self, video: &LiftedVideo, made_from: &str) -> Result<bool> {
+    /// Reuses a video of the old dataset if its inputs are unchanged. Returns whether it did.
+    fn reuse(&mut self, video: &LiftedVideo, made_from: &str) -> Result<bool> {
         let Some(part) = self.before.get(&video.name).filter(|part| part.made_from == made_from) else {
             return Ok(false);
         };
@@ -129,10 +130,10 @@ impl<'a> DatasetRun<'a> {
         Ok(true)
     }
 
-    /// A video that is left out, since what it shows is there already: what was kept of it is refused.
+    /// Source entry of a video that is left out as a duplicate: its accepted seconds are rejected.
     pub fn duplicate(&self, video: &LiftedVideo, of: &str, secs: f64) -> VideoSource {
         let threshold = self.settings.duplicate_secs;
-        let words = video.account_of_words(std::iter::empty());
+        let words = video.transcript_account(std::iter::empty());
         let mut ledger = Ledger { words, ..video.ledger.clone() };
         let why = FrameRefusal::new(Refusal::Duplicate, secs, threshold);
         let refused = ledger.kept.drain(..).map(|kept| {
@@ -146,8 +147,8 @@ impl<'a> DatasetRun<'a> {
     }
 }
 
-/// The videos of the dataset that is there; one with a damaged file is as good as not there.
-fn parts_of(dir: &Path) -> BTreeMap<String, VideoEntry> {
+/// Videos of the existing dataset, without those with damaged files.
+fn valid_parts(dir: &Path) -> BTreeMap<String, VideoEntry> {
     let stated = entry::stated_hashes(dir);
     let parts = entry::names(dir).unwrap_or_default().into_iter();
     let parts = parts.filter_map(|name| VideoEntry::read(&VideoEntry::path(dir, &name)).ok().map(|part| (name, part)));

@@ -1,10 +1,10 @@
-//! The stage: all videos of a speaker, as `extract`, `pose2d`, `segment` and `lift` left them, become one dataset.
-//! What the dataset that was there has of a video already is taken over as it is, so that a new video costs itself alone.
+//! Stage `dataset`: combines all videos of a speaker, as processed by the earlier stages, into one dataset. Unchanged
+//! videos of an existing dataset are reused, so that adding a video costs only that video.
 
 use super::division::{self, Division};
 use super::faces;
 use super::outcome::{DatasetOutcome, SeveralPeople};
-use super::people::{self, PersonSeen};
+use super::people::{self, VideoPerson};
 use super::run::DatasetRun;
 use super::video::{FILES, LiftedVideo, POSTURE_VERSION};
 use anyhow::{Result, ensure};
@@ -24,38 +24,39 @@ use orator_formats::media_json::MediaInfo;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// What the readers of a dataset whose sound was shifted should know.
-const FIXED: &str = "Where the lips showed surely that the sound of a video was late or early, it was shifted.";
+/// Note for users of a dataset with shifted audio.
+const OFFSET_NOTE: &str = "Where the lips showed surely that the sound of a video was late or early, it was shifted.";
 
-/// Inputs of a dataset beside the settings.
+/// Inputs of a dataset besides the settings.
 #[derive(Default)]
 pub struct DatasetInputs {
-    /// Videos that came through the stages before, of one speaker or of several.
+    /// Videos that passed the earlier stages, of one or several speakers.
     pub ready: Vec<Unit>,
-    /// All videos there are, with the splits that the configuration names; those not ready stand in the ledger as failed.
+    /// All videos, with the splits that the configuration names; those not in `ready` are listed as failed in the
+    /// ledger.
     pub all: Vec<Videos>,
-    /// Models that looked at the videos, for `info.json`.
+    /// Models that processed the videos, for `info.json`.
     pub models: Vec<ModelUsed>,
-    /// Sentences for the readers of the dataset.
+    /// Notes for users of the dataset.
     pub notes: Vec<String>,
-    /// Keypoints within so many seconds of a frame influence its joints.
+    /// Keypoints within this many seconds of a frame affect its joints.
     pub reach_secs: f64,
 }
 
-/// A speaker's videos to shards. Its unit is the speaker.
+/// Stage `dataset`. Its unit is the speaker.
 pub struct DatasetStage {
     settings: config::DatasetConfig,
     speakers: Vec<config::SpeakerConfig>,
     work: PathBuf,
     inputs: DatasetInputs,
-    /// Whether sound that is surely late or early is shifted.
+    /// Whether a reliably measured audio offset is corrected.
     fixes_offset: bool,
-    /// Frames between two splits of a video that is divided by time.
+    /// Guard interval between two splits of a video that is divided by time, frames.
     guard_frames: usize,
     fps: FrameRate,
-    /// Frames of the shortest sample of such a video.
+    /// Least length of a sample of such a video, frames.
     window_frames: usize,
-    /// State of the work folder at construction, by the name of the speaker.
+    /// State of the work folder at construction, by speaker.
     states: BTreeMap<String, SpeakerState>,
 }
 
@@ -64,15 +65,15 @@ pub struct DatasetStage {
 struct SpeakerState {
     /// Failures of the videos that are not ready, by name.
     others: BTreeMap<String, Option<String>>,
-    /// `None`: the record of the splits is damaged, which is an error of the run.
+    /// Rule of the splits; `None` if the record is damaged, which a run reports as an error.
     rule: Option<SplitRule>,
 }
 
 impl DatasetStage {
-    /// Reads the failures of videos and the records of splits.
+    /// Creates the stage; reads failures and recorded splits from the work folder.
     pub fn new(settings: &Settings, mut inputs: DatasetInputs) -> Self {
         if settings.extract.fix_offset {
-            inputs.notes.insert(0, FIXED.to_owned());
+            inputs.notes.insert(0, OFFSET_NOTE.to_owned());
         }
         let mut stage = Self {
             settings: settings.dataset.clone(),
@@ -109,7 +110,7 @@ impl DatasetStage {
         self.inputs.all.iter().find(|videos| videos.speaker == speaker.speaker)
     }
 
-    /// The videos of which nothing can come, as parts with their failures.
+    /// Source entries of the videos that did not pass all stages, with their failures.
     fn failures(&self, speaker: &Unit, ready: &[&Unit]) -> Vec<VideoSource> {
         let mut failed: Vec<&Unit> =
             self.inputs.ready.iter().filter(|video| video.speaker == speaker.speaker).collect();
@@ -120,39 +121,44 @@ impl DatasetStage {
         failed.into_iter().map(|unit| failure(&self.work, unit)).collect()
     }
 
-    /// The people whom the speaker's videos seem to show, drawn beside the stages' folders; `None`: one.
+    /// Persons that the speaker's videos appear to show, with an overview picture beside the stage folders; `None` if
+    /// there is one.
     fn several_people(&self, speaker: &Unit) -> Result<Option<SeveralPeople>> {
-        let is_known = self.speakers.iter().any(|said| said.name == speaker.speaker && said.same_person);
+        let is_known =
+            self.speakers.iter().any(|configured| configured.name == speaker.speaker && configured.same_person);
         let videos: Vec<&Unit> = if is_known { Vec::new() } else { self.ready(speaker) };
-        let seen: Vec<PersonSeen> = videos.into_iter().map(|video| PersonSeen::read(&self.work, video)).collect();
-        let groups = people::groups(&seen);
+        let persons: Vec<VideoPerson> = videos.into_iter().map(|video| VideoPerson::read(&self.work, video)).collect();
+        let groups = people::groups(&persons);
         let picture = artifacts::faces(&self.work, &speaker.speaker);
         if groups.len() < 2 {
             workdir::remove(&picture)?;
             return Ok(None);
         }
         faces::write(&picture, &self.work, &groups)?;
-        let files = |group: &Vec<&PersonSeen>| group.iter().map(|video| video.file.clone()).collect();
+        let files = |group: &Vec<&VideoPerson>| group.iter().map(|video| video.file.clone()).collect();
         Ok(Some(SeveralPeople { picture, videos: groups.iter().map(files).collect() }))
     }
 
-    /// How the speaker's videos are divided: as they are on record, else as the configuration asks.
+    /// Division of the speaker's videos: as recorded, else as configured.
     fn division(&self, speaker: &Unit) -> Result<Division> {
         let videos = self.videos(speaker);
         let n_videos = videos.map_or_else(|| self.ready(speaker).len(), |videos| videos.units.len());
         let are_named = videos.is_some_and(|videos| !videos.splits.is_empty());
-        let before = division::on_record(&self.work, speaker)?;
-        let record = division::chosen(self.settings.split_by, before, n_videos, are_named);
+        let before = division::recorded_splits(&self.work, speaker)?;
+        let record = division::choose_record(self.settings.split_by, before, n_videos, are_named);
         Ok(Division { record, guard_frames: self.guard_frames, least_frames: self.window_frames })
     }
 
-    /// Opens a video, with its words where the speaker has transcripts.
+    /// Opens a video, with its words if the speaker has transcripts.
     fn open(&self, video: &Unit) -> Result<LiftedVideo> {
         let mut opened = LiftedVideo::open(&self.work, video, self.fixes_offset)?;
         if self.settings.posture {
             opened = opened.with_posture();
         }
-        let has_words = self.speakers.iter().any(|said| said.name == video.speaker && !said.transcripts.is_empty());
+        let has_words = self
+            .speakers
+            .iter()
+            .any(|configured| configured.name == video.speaker && !configured.transcripts.is_empty());
         Ok(if has_words { opened.with_words(self.transcript(video)) } else { opened })
     }
 
@@ -161,14 +167,15 @@ impl DatasetStage {
     }
 
     fn about(&self, speaker: &Unit, first: &LiftedVideo) -> About {
-        let said = self.speakers.iter().find(|said| said.name == speaker.speaker).cloned().unwrap_or_default();
-        let config::SpeakerConfig { licence, consent, source, .. } = said;
+        let configured =
+            self.speakers.iter().find(|configured| configured.name == speaker.speaker).cloned().unwrap_or_default();
+        let config::SpeakerConfig { licence, consent, source, .. } = configured;
         let ready = self.ready(speaker);
         let media = ready.iter().filter_map(|video| MediaInfo::read(&Artifact::MediaInfo.path(&self.work, video)).ok());
         let not_judged: Vec<String> = media.filter_map(|media| media.not_judged()).collect();
         let (mut models, mut notes) = (self.inputs.models.clone(), self.inputs.notes.clone());
         if not_judged.len() == ready.len() {
-            // No model has looked at pictures.
+            // Without pictures, only the speech model was used.
             models.retain(|model| model.role == "speech");
         }
         let kinds: BTreeSet<&String> = not_judged.iter().collect();
@@ -178,7 +185,7 @@ impl DatasetStage {
     }
 }
 
-/// A video that failed at a stage, or that no stage has finished.
+/// Source entry of a video that failed at a stage or is unfinished.
 fn failure(work: &Path, unit: &Unit) -> VideoSource {
     let failure = |stage: StageName| Some((stage.as_str(), Failure::read(&dir(work, stage, unit))?.error));
     let error = StageName::OF_VIDEOS.into_iter().find_map(failure);
@@ -204,30 +211,31 @@ impl Stage for DatasetStage {
     }
 
     fn settings(&self, unit: &Unit) -> serde_json::Value {
-        let said = self.speakers.iter().find(|said| said.name == unit.speaker).cloned().unwrap_or_default();
+        let configured =
+            self.speakers.iter().find(|configured| configured.name == unit.speaker).cloned().unwrap_or_default();
         let videos = self.videos(unit);
-        let nothing = SpeakerState::default();
-        let SpeakerState { others, rule } = self.states.get(&unit.speaker).unwrap_or(&nothing);
+        let no_state = SpeakerState::default();
+        let SpeakerState { others, rule } = self.states.get(&unit.speaker).unwrap_or(&no_state);
         let guard_secs = rule.as_ref().map_or(0.0, |rule| rule.guard_secs);
         let mut settings = serde_json::json!({
             "unit": rule.as_ref().map(|rule| rule.unit), "guard_secs": guard_secs,
             "dataset": self.settings, "models": self.inputs.models, "notes": self.inputs.notes, "tool": env!("CARGO_PKG_VERSION"),
-            "speaker": { "licence": said.licence, "consent": said.consent, "source": said.source },
+            "speaker": { "licence": configured.licence, "consent": configured.consent, "source": configured.source },
             "splits": videos.map(|videos| &videos.splits), "others": others,
         });
         if let (true, Some(settings)) = (self.fixes_offset, settings.as_object_mut()) {
             settings.insert("fix_offset".to_owned(), true.into());
         }
-        // Of datasets without angles the settings are those of the versions that knew none.
+        // Without posture angles, the settings equal those of earlier versions, so that their datasets stay fresh.
         if self.settings.posture {
             settings["estimator"] = POSTURE_VERSION.into();
         } else {
             drop(settings["dataset"].as_object_mut().and_then(|dataset| dataset.shift_remove("posture")));
         }
-        if let (false, Some(settings)) = (said.transcripts.is_empty(), settings.as_object_mut()) {
+        if let (false, Some(settings)) = (configured.transcripts.is_empty(), settings.as_object_mut()) {
             settings.insert("words".to_owned(), true.into());
         }
-        if let (true, Some(settings)) = (said.same_person, settings.as_object_mut()) {
+        if let (true, Some(settings)) = (configured.same_person, settings.as_object_mut()) {
             settings.insert("same_person".to_owned(), true.into());
         }
         settings
@@ -280,7 +288,7 @@ impl Stage for DatasetStage {
         let named =
             self.inputs.all.iter().flat_map(|videos| &videos.splits).map(|(video, split)| (video.as_str(), *split));
         let assigned = division.assign(&kept, &named.collect(), &compared.shared, &self.settings);
-        // From here on the videos stay where they are, also when the run ends before the dataset is in its place.
+        // The assignment is fixed from here on, even if the run stops before the dataset is complete.
         division.record.write(&artifacts::splits(&self.work, &unit.speaker))?;
         let rule = division.rule(fps);
         let about = About { split_rule: Some(rule.clone()), ..self.about(unit, first) };
@@ -321,12 +329,15 @@ impl Stage for DatasetStage {
     }
 }
 
-/// All that a speaker shows was refused, so that there is nothing to make a dataset of. The message has the reasons.
+/// All footage of a speaker was rejected, so there is no dataset. The message lists the reasons.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct NothingKept(pub String);
 
-/// The videos must have something to make a dataset of.
+/// Checks that there is an accepted interval.
+///
+/// # Errors
+/// No video; `NothingKept`.
 fn check(unit: &Unit, work: &Path, videos: &[LiftedVideo]) -> Result<()> {
     ensure!(
         !videos.is_empty(),

@@ -1,4 +1,4 @@
-//! One video of a speaker on its way into the dataset: the files of the stages before, and the samples cut from them.
+//! Input of the dataset for one video: the files of the earlier stages, and the samples cut from them.
 
 use crate::sound;
 use anyhow::{Context, Result, ensure};
@@ -25,36 +25,36 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-/// A video whose stages are done.
+/// A video that passed all stages.
 pub struct LiftedVideo {
-    /// `<slug of the file's name>-<8 hex of its content>`: the beginning of its samples' keys.
+    /// `<slug of the file name>-<8 hex digits of the content hash>`: prefix of its sample keys.
     pub name: String,
     /// File name of the video.
     pub file: String,
     /// BLAKE3 of the video file.
     pub content: String,
-    /// BLAKE3 of the hashes of all files its samples are made of.
+    /// BLAKE3 of the hashes of all files that its samples depend on.
     pub files_hash: String,
     pub intervals: Intervals,
     pub ledger: Ledger,
     pub bones: VideoBones,
-    /// What the stages call it.
+    /// Unit of the video in the stages.
     pub unit: Unit,
-    /// Samples by which the sound is taken later than the frames.
+    /// Number of samples by which the audio is read later than the frames.
     shift: i64,
     sound: PathBuf,
     keypoints: PathBuf,
     joints: PathBuf,
-    /// Its words; `None`: no transcripts were asked for.
+    /// Words of the transcript; `None` if no transcripts are configured.
     pub words: Option<VideoWords>,
-    /// Whether its samples have the angles of head and trunk.
+    /// Whether samples contain the angles of head and trunk.
     has_posture: bool,
 }
 
-/// Version of the angles of head and trunk, for what is made of them.
+/// Version of the estimator of head and trunk angles, for fingerprints.
 pub const POSTURE_VERSION: u32 = 1;
 
-/// The files read of each video, and whether it may be missing.
+/// Files read for each video, and whether each is optional.
 pub const FILES: [(Artifact, bool); 6] = [
     (Artifact::Sound, true),
     (Artifact::Keypoints, false),
@@ -64,25 +64,28 @@ pub const FILES: [(Artifact, bool); 6] = [
     (Artifact::Bones, false),
 ];
 
-/// A sample, and how much silence was appended to its sound.
+/// A sample, and the silence appended to its audio in seconds.
 pub struct CutSample {
     pub sample: Sample,
     pub padded_secs: f64,
 }
 
-/// Samples of sound read at a time.
-const PIECE: usize = 1 << 15;
+/// Audio samples per read.
+const CHUNK_SAMPLES: usize = 1 << 15;
 
-/// BLAKE3 of a file that a stage wrote of the video.
-fn hash_of(file: Artifact, work: &Path, unit: &Unit) -> Result<String> {
+/// BLAKE3 of an output file of a stage, from its record if possible.
+fn output_hash(file: Artifact, work: &Path, unit: &Unit) -> Result<String> {
     let record = Record::read(&dir(work, file.stage(), unit));
     let recorded = record.and_then(|record| record.outputs.into_iter().find(|output| output.file == file.file()));
     recorded.map_or_else(|| hash_file(&file.path(work, unit)), |output| Ok(output.hash))
 }
 
 impl LiftedVideo {
-    /// Reads the small files. Hashes are taken from the records of the stages, where there are any. `fixes_offset`: sound
-    /// that is surely late or early is shifted.
+    /// Reads the small files; hashes come from the records of the stages where possible. `fixes_offset`: correct a
+    /// reliably measured audio offset.
+    ///
+    /// # Errors
+    /// A file that cannot be read; intervals that are unsorted or outside the video.
     pub fn open(work: &Path, unit: &Unit, fixes_offset: bool) -> Result<LiftedVideo> {
         let path_of = |file: Artifact| file.path(work, unit);
         let extracted = Record::read(&dir(work, StageName::Extract, unit));
@@ -93,7 +96,7 @@ impl LiftedVideo {
         let mut hasher = blake3::Hasher::new();
         for (file, optional) in FILES {
             if !optional || path_of(file).exists() {
-                let line = format!("{} {} {}\n", file.stage(), file.file(), hash_of(file, work, unit)?);
+                let line = format!("{} {} {}\n", file.stage(), file.file(), output_hash(file, work, unit)?);
                 hasher.update(line.as_bytes());
             }
         }
@@ -130,46 +133,49 @@ impl LiftedVideo {
         })
     }
 
-    /// Gives the video the words of a transcript, or of none that has its name.
+    /// Adds the words of a transcript; `None` if no transcript matches the video.
     pub fn with_words(mut self, transcript: Option<&Path>) -> Self {
-        let sound_secs = hound::WavReader::open(&self.sound).map_or(0.0, |wav| f64::from(wav.duration()));
+        let n_samples = hound::WavReader::open(&self.sound).map_or(0.0, |wav| f64::from(wav.duration()));
         let rate = f64::from(SAMPLE_RATE);
         let hash = transcript.and_then(|path| hash_file(path).ok()).unwrap_or_default();
         let name = transcript.and_then(Path::file_name).unwrap_or_default().to_string_lossy().into_owned();
         self.files_hash =
             blake3::hash(format!("{} words {name} {hash}\n", self.files_hash).as_bytes()).to_hex().to_string();
-        self.words = Some(VideoWords::read(transcript, sound_secs / rate, self.shift as f64 / rate));
+        self.words = Some(VideoWords::read(transcript, n_samples / rate, self.shift as f64 / rate));
         self
     }
 
-    /// Gives its samples the angles of head and trunk.
+    /// Adds the angles of head and trunk to the samples.
     pub fn with_posture(mut self) -> Self {
-        let made_from = format!("{} posture {POSTURE_VERSION}\n", self.files_hash);
-        self.files_hash = blake3::hash(made_from.as_bytes()).to_hex().to_string();
+        let inputs = format!("{} posture {POSTURE_VERSION}\n", self.files_hash);
+        self.files_hash = blake3::hash(inputs.as_bytes()).to_hex().to_string();
         self.has_posture = true;
         self
     }
 
-    /// Account of the words in samples of these intervals.
-    pub fn account_of_words(&self, intervals: impl Iterator<Item = Interval>) -> Option<TranscriptAccount> {
+    /// Statistics of the words in samples of these intervals.
+    pub fn transcript_account(&self, intervals: impl Iterator<Item = Interval>) -> Option<TranscriptAccount> {
         let fps = self.intervals.fps;
         self.words.as_ref().map(|words| words.account(intervals.map(|i| (fps.secs(i.start), fps.secs(i.end)))))
     }
 
-    /// The codes of its sound (`audio::fingerprint`); `None` without sound. Memory: the codes, 0.45 MB an hour.
+    /// Audio fingerprint codes (`audio::fingerprint`); `None` without audio. Memory: the codes, 0.45 MB per hour.
     pub fn sound_codes(&self) -> Result<Option<Vec<u32>>> {
         if !self.sound.exists() {
             return Ok(None);
         }
         let mut fingerprinter = Fingerprinter::default();
-        sound::pieces(&self.sound, PIECE, |piece| {
+        sound::pieces(&self.sound, CHUNK_SAMPLES, |piece| {
             fingerprinter.push(piece);
             Ok(())
         })?;
         Ok(Some(fingerprinter.finish()))
     }
 
-    /// Opens the large files, to cut samples of `intervals`, which lie within the video's own.
+    /// Opens the large files to cut samples of `intervals`, which lie within the video's own.
+    ///
+    /// # Errors
+    /// A file that cannot be read or has another number of frames or audio format.
     pub fn samples<'a>(&'a self, intervals: &'a [Interval]) -> Result<Option<LiftedSamples<'a>>> {
         if intervals.is_empty() {
             return Ok(None);
@@ -194,24 +200,27 @@ impl LiftedVideo {
                 LiftedBody { joints: Some(motion.joints.view()), extra: extra.as_ref().map(|extra| extra.view()) };
             posture::estimate(keypoints.body.view(), lifted)
         });
-        Ok(Some(LiftedSamples { video: self, keypoints, motion, posture, sound, waiting: intervals.iter() }))
+        Ok(Some(LiftedSamples { video: self, keypoints, motion, posture, sound, remaining: intervals.iter() }))
     }
 }
 
-/// The samples of a video one after the other.
+/// Iterates over the samples of a video.
 pub struct LiftedSamples<'a> {
     video: &'a LiftedVideo,
     keypoints: Keypoints,
     motion: Motion,
     posture: Option<Posture>,
     sound: hound::WavReader<BufReader<File>>,
-    waiting: std::slice::Iter<'a, Interval>,
+    remaining: std::slice::Iter<'a, Interval>,
 }
 
 impl LiftedSamples<'_> {
-    /// The next interval's sample; `None` after the last.
+    /// Sample of the next interval; `None` after the last.
+    ///
+    /// # Errors
+    /// Audio that cannot be read.
     pub fn next_sample(&mut self) -> Result<Option<CutSample>> {
-        self.waiting.next().map(|interval| self.cut(*interval)).transpose()
+        self.remaining.next().map(|interval| self.cut(*interval)).transpose()
     }
 
     fn cut(&mut self, interval: Interval) -> Result<CutSample> {
@@ -225,9 +234,9 @@ impl LiftedSamples<'_> {
         let points = points.map(|part| part.slice(frames));
         let pose2d = concatenate(Axis(1), &points).context("joining the keypoints")?;
         let (sound, n_padded) = self.sound_of(interval)?;
-        let seen = |root: usize| {
+        let visible_share = |root: usize| {
             let hand = motion.mask.slice(s![.., root..root + N_HAND_JOINTS]);
-            hand.iter().filter(|&&seen| seen).count() as f64 / hand.len().max(1) as f64
+            hand.iter().filter(|&&visible| visible).count() as f64 / hand.len().max(1) as f64
         };
         let mut meta = serde_json::json!({
             "video": self.video.name,
@@ -237,8 +246,8 @@ impl LiftedSamples<'_> {
             "start_secs": fps.secs(interval.start),
             "end_secs": fps.secs(interval.end),
             "image_size": self.keypoints.image_size,
-            "left_hand_seen": seen(L_HAND),
-            "right_hand_seen": seen(R_HAND),
+            "left_hand_seen": visible_share(L_HAND),
+            "right_hand_seen": visible_share(R_HAND),
             "sound_samples_padded": n_padded,
         });
         if self.video.shift != 0
@@ -254,13 +263,13 @@ impl LiftedSamples<'_> {
         Ok(CutSample { sample: Sample { key, motion, pose2d, sound, words, posture, meta }, padded_secs })
     }
 
-    /// The sound under an interval, and how many samples of silence stand in for some that are not there.
+    /// Audio of an interval, and the number of missing samples that are replaced by silence.
     fn sound_of(&mut self, interval: Interval) -> Result<(Sound, usize)> {
         let reading = || format!("cannot read {}", self.video.sound.display());
         let range = samples_of(self.video.intervals.fps, SAMPLE_RATE, interval.start..interval.end);
-        let n_held = i64::from(self.sound.duration());
-        let [start, end] = [range.start, range.end].map(|at| (at as i64 + self.video.shift).clamp(0, n_held));
-        // Silence where the shifted sound begins after the interval does.
+        let n_available = i64::from(self.sound.duration());
+        let [start, end] = [range.start, range.end].map(|at| (at as i64 + self.video.shift).clamp(0, n_available));
+        // Silence where the shifted audio begins after the interval does.
         let n_before = (-(range.start as i64 + self.video.shift)).clamp(0, range.len() as i64) as usize;
         let mut samples = vec![0.0; n_before];
         samples.reserve(range.len());

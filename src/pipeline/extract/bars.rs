@@ -1,31 +1,33 @@
-//! Bars beside the picture proper: black ones, or smooth ones (a blurred copy of the picture, a plain colour). They are
-//! the outer columns, or rows, on both sides alike, that are black or without detail in the whole video and end at a
-//! straight seam. Dark or plain walls end at no seam.
+//! Detection of letterbox and pillarbox bars: black bars, or smooth ones (a blurred copy of the picture, a plain
+//! colour). Bars are outer columns or rows of similar width on both sides that are black or without detail in the
+//! entire video and end at a straight seam. Dark or plain walls do not end at a seam.
 
 use orator_base::types::image::{Image, PixelArea};
 
-/// Bands across an axis, in each of which a position has one mean, and pixels of a position that are looked at.
+/// Number of bands across an axis, in each of which a position has one mean; largest number of pixels sampled per
+/// position.
 const BANDS: usize = 32;
-const MOST_ACROSS: usize = 256;
-/// Brightness of a black bar at most, and of a band that is lit at least, 8-bit steps.
+const MAX_SAMPLES: usize = 256;
+/// Largest brightness of a black bar, and least brightness of a lit band, in 8-bit steps.
 const BLACK: f32 = 24.0;
 const LIT: f32 = 48.0;
-/// Difference of neighbours in a smooth bar at most, and across a seam at least, 8-bit steps, means over the video.
+/// Largest difference of neighbours in a smooth bar, and least difference across a seam, in 8-bit steps, averaged over
+/// the video.
 const SMOOTH: f32 = 1.0;
 const SEAM: f32 = 5.0;
-/// Least share of the bands that are lit beside a black bar, and that show the seam of a smooth one.
-const LIT_BANDS: f32 = 0.5;
-const SEAM_BANDS: f32 = 0.6;
-/// Pixels over which an encoder smears a seam, and over which a scaler of the blurred copy does.
-const SMEAR: usize = 4;
-const REACH: usize = 12;
-/// Largest share of an axis by which the bars of its two sides differ.
-const UNEVEN: f32 = 0.02;
-/// Largest share of an axis that is left between smooth bars, and of the picture that is worth a crop.
-const BETWEEN_SMOOTH: f32 = 0.65;
-const WORTH: f32 = 0.8;
+/// Least share of the bands that are lit next to a black bar, and that show the seam of a smooth bar.
+const MIN_LIT_SHARE: f32 = 0.5;
+const MIN_SEAM_SHARE: f32 = 0.6;
+/// Pixels over which an encoder blurs a seam, and over which the scaler of a blurred copy does.
+const CODEC_BLUR_PX: usize = 4;
+const SCALER_BLUR_PX: usize = 12;
+/// Largest difference of the widths of the two bars, as a share of the axis.
+const MAX_ASYMMETRY: f32 = 0.02;
+/// Largest share of the axis between smooth bars, and largest share of the picture at which cropping is worthwhile.
+const MAX_SHARE_BETWEEN_SMOOTH: f32 = 0.65;
+const MAX_CROP_SHARE: f32 = 0.8;
 
-/// Search for bars, fed with some pictures of a video.
+/// Detects bars from a sample of the pictures of a video.
 #[derive(Default)]
 pub struct BarFinder {
     size: [usize; 2],
@@ -34,7 +36,7 @@ pub struct BarFinder {
 }
 
 impl BarFinder {
-    /// Takes in a picture; all have one size.
+    /// Adds a picture; all must have the same size.
     pub fn push(&mut self, image: &Image) {
         let [width, height] = [image.width, image.height];
         let green = |x: usize, y: usize| image.data[3 * (y * width + x) + 1];
@@ -43,33 +45,34 @@ impl BarFinder {
         self.rows.push(height, width, |y, x| green(x, y));
     }
 
-    /// Area between the bars; `None` without any that are worth a crop.
+    /// Area between the bars; `None` if there are no bars that are worth cropping.
     pub fn finish(&self) -> Option<PixelArea> {
         let [width, height] = self.size;
         let ([left, right], [top, bottom]) = (self.columns.bars(), self.rows.bars());
         let area = PixelArea { x: left, y: top, width: width - left - right, height: height - top - bottom };
         let share = (area.width * area.height) as f32 / (width * height).max(1) as f32;
-        (share > 0.0 && share <= WORTH).then_some(area)
+        (share > 0.0 && share <= MAX_CROP_SHARE).then_some(area)
     }
 }
 
-/// Measures of the positions along one axis: its columns from the left, or its rows from the top.
+/// Statistics of the positions along one axis: columns from the left, or rows from the top.
 #[derive(Default)]
 struct AxisProfile {
     n_pictures: usize,
-    /// Brightest mean of each band at each position, band by band.
+    /// Largest mean brightness of each band at each position, [band][position].
     brightest: Vec<f32>,
-    /// Sums over the pictures: mean difference to the next position; difference of each band's mean across each position.
+    /// Sums over the pictures: `detail` is the mean difference to the next position; `seam` the difference of the band
+    /// means across each position, [band][position].
     detail: Vec<f32>,
     seam: Vec<f32>,
 }
 
 impl AxisProfile {
-    /// Takes in `n` positions of `n_px` px each, of which about `MOST_ACROSS` count.
+    /// Adds a picture of `n` positions with `n_px` px each, of which about `MAX_SAMPLES` are sampled.
     fn push(&mut self, n: usize, n_px: usize, value: impl Fn(usize, usize) -> u8) {
-        let step = (n_px / MOST_ACROSS).max(1);
+        let step = (n_px / MAX_SAMPLES).max(1);
         let n_across = n_px / step;
-        if n < 2 * REACH || n_across < BANDS {
+        if n < 2 * SCALER_BLUR_PX || n_across < BANDS {
             return;
         }
         if self.detail.len() != n {
@@ -83,12 +86,12 @@ impl AxisProfile {
             let mut sums = vec![0u32; n];
             for at in across {
                 let at = at * step;
-                let mut before = value(0, at);
+                let mut previous = value(0, at);
                 for (position, sum) in sums.iter_mut().enumerate() {
-                    let here = value(position, at);
-                    *sum += u32::from(here);
-                    self.detail[position.saturating_sub(1)] += f32::from(here.abs_diff(before)) / n_across as f32;
-                    before = here;
+                    let current = value(position, at);
+                    *sum += u32::from(current);
+                    self.detail[position.saturating_sub(1)] += f32::from(current.abs_diff(previous)) / n_across as f32;
+                    previous = current;
                 }
             }
             let mean = |position: usize| sums[position.min(n - 1)] as f32 / n_values;
@@ -100,21 +103,21 @@ impl AxisProfile {
         }
     }
 
-    /// Widths of the bars at both ends, 0 where there are none.
+    /// Widths of the bars at both ends in px; 0 where there is none.
     fn bars(&self) -> [usize; 2] {
         let n = self.detail.len();
-        // One picture alone is no video.
+        // A single picture is not enough: its own content may look like bars.
         if self.n_pictures < 2 {
             return [0; 2];
         }
-        let even = |[low, high]: &[usize; 2]| {
-            low.min(high) > &0 && low + high < n && low.abs_diff(*high) as f32 <= UNEVEN * n as f32 + 2.0
+        let is_symmetric = |[low, high]: &[usize; 2]| {
+            low.min(high) > &0 && low + high < n && low.abs_diff(*high) as f32 <= MAX_ASYMMETRY * n as f32 + 2.0
         };
         let smooth = || {
             let widths = self.smooth_bars()?;
-            ((n - widths[0] - widths[1]) as f32 <= BETWEEN_SMOOTH * n as f32).then_some(widths)
+            ((n - widths[0] - widths[1]) as f32 <= MAX_SHARE_BETWEEN_SMOOTH * n as f32).then_some(widths)
         };
-        self.black_bars().filter(even).or_else(|| smooth().filter(even)).unwrap_or_default()
+        self.black_bars().filter(is_symmetric).or_else(|| smooth().filter(is_symmetric)).unwrap_or_default()
     }
 
     fn black_bars(&self) -> Option<[usize; 2]> {
@@ -124,9 +127,10 @@ impl AxisProfile {
         let low = (0..n).take_while(is_black).count();
         let high = (0..n).rev().take_while(is_black).count();
         let lit = |start: usize, end: usize| {
-            share(|band| (start..end).any(|position| brightest(position, band) >= LIT)) >= LIT_BANDS
+            share(|band| (start..end).any(|position| brightest(position, band) >= LIT)) >= MIN_LIT_SHARE
         };
-        (low + high + SMEAR < n && lit(low, low + SMEAR) && lit(n - high - SMEAR, n - high)).then_some([low, high])
+        (low + high + CODEC_BLUR_PX < n && lit(low, low + CODEC_BLUR_PX) && lit(n - high - CODEC_BLUR_PX, n - high))
+            .then_some([low, high])
     }
 
     fn smooth_bars(&self) -> Option<[usize; 2]> {
@@ -134,23 +138,26 @@ impl AxisProfile {
         let is_smooth = |position: &usize| self.detail[*position] <= SMOOTH * n_pictures;
         let low = (0..n).take_while(is_smooth).count();
         let high = (0..n).rev().skip(1).take_while(is_smooth).count();
-        if low + high + REACH >= n {
+        if low + high + SCALER_BLUR_PX >= n {
             return None;
         }
         let shown = |position: usize| share(|band| self.seam[band * n + position] >= SEAM * n_pictures);
         let strength = |position: &usize| (0..BANDS).map(|band| self.seam[band * n + *position]).sum::<f32>();
-        // From the bar on inward, the strongest of the first few positions that show a seam.
-        let sharpest = |inward: &mut dyn Iterator<Item = usize>| {
-            let seams = inward.take(REACH).skip_while(|position| shown(*position) < SEAM_BANDS).take(SMEAR);
+        // Going inward from the bar, the strongest of the first few positions that show a seam.
+        let strongest_seam = |inward: &mut dyn Iterator<Item = usize>| {
+            let seams = inward
+                .take(SCALER_BLUR_PX)
+                .skip_while(|position| shown(*position) < MIN_SEAM_SHARE)
+                .take(CODEC_BLUR_PX);
             seams.max_by(|a, b| strength(a).total_cmp(&strength(b)))
         };
-        let first = sharpest(&mut (low..n))?;
-        let last = sharpest(&mut (0..n - high).rev())?;
+        let first = strongest_seam(&mut (low..n))?;
+        let last = strongest_seam(&mut (0..n - high).rev())?;
         (first < last).then(|| [first, n - 1 - last])
     }
 }
 
-/// Share of the bands for which `holds`.
+/// Share of the bands that satisfy `holds`.
 fn share(holds: impl Fn(usize) -> bool) -> f32 {
     (0..BANDS).filter(|band| holds(*band)).count() as f32 / BANDS as f32
 }
@@ -159,44 +166,47 @@ fn share(holds: impl Fn(usize) -> bool) -> f32 {
 mod tests {
     use super::*;
 
-    /// Content without pattern between `left` and `right` of 320 x 180, `beside` everywhere else.
-    fn picture(seed: usize, [left, right]: [usize; 2], beside: impl Fn(usize, usize) -> u8) -> Image {
+    /// Noise between `left` and `right` of a 320 x 180 picture, `fill` elsewhere.
+    fn picture(seed: usize, [left, right]: [usize; 2], fill: impl Fn(usize, usize) -> u8) -> Image {
         let mut image = Image::filled(320, 180, [0; 3]);
         for (at, pixel) in image.data.as_chunks_mut::<3>().0.iter_mut().enumerate() {
             let (x, y) = (at % 320, at / 320);
             let bits = ((seed * 64 + x / 3) * 64 + y / 3).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-            *pixel = [if x < left || x >= 320 - right { beside(x, y) } else { (bits >> 40) as u8 }; 3];
+            *pixel = [if x < left || x >= 320 - right { fill(x, y) } else { (bits >> 40) as u8 }; 3];
         }
         image
     }
 
-    fn found(bars: [usize; 2], beside: impl Fn(usize, usize) -> u8) -> Option<PixelArea> {
+    fn found(bars: [usize; 2], fill: impl Fn(usize, usize) -> u8) -> Option<PixelArea> {
         let mut finder = BarFinder::default();
-        (0..5).for_each(|seed| finder.push(&picture(seed, bars, &beside)));
+        (0..5).for_each(|seed| finder.push(&picture(seed, bars, &fill)));
         finder.finish()
     }
 
     #[test]
     fn black_and_smooth_bars_are_found() {
         let smooth = |x: usize, y: usize| (60 + (x + y) / 8) as u8;
-        for beside in [&(|_, _| 3u8) as &dyn Fn(usize, usize) -> u8, &smooth] {
-            let area = found([110, 109], beside).unwrap();
-            assert!(area.x.abs_diff(110) <= SMEAR && (area.x + area.width).abs_diff(211) <= SMEAR, "{area:?}");
+        for fill in [&(|_, _| 3u8) as &dyn Fn(usize, usize) -> u8, &smooth] {
+            let area = found([110, 109], fill).unwrap();
+            assert!(
+                area.x.abs_diff(110) <= CODEC_BLUR_PX && (area.x + area.width).abs_diff(211) <= CODEC_BLUR_PX,
+                "{area:?}"
+            );
             assert_eq!((area.y, area.height), (0, 180));
         }
     }
 
     #[test]
-    fn whole_pictures_have_no_bars() {
+    fn pictures_without_bars_have_none() {
         assert_eq!(found([0, 0], |_, _| 0), None);
-        // Too narrow to be worth a crop, on one side alone, uneven.
+        // Bars that are too narrow, on one side only, or of unequal width.
         assert_eq!(found([10, 10], |_, _| 0), None);
         assert_eq!(found([120, 0], |_, _| 0), None);
         assert_eq!(found([120, 40], |_, _| 0), None);
         let mut dark = BarFinder::default();
         (0..5).for_each(|_| dark.push(&Image::filled(320, 180, [4; 3])));
         assert_eq!(dark.finish(), None);
-        // A lit figure before a dark wall ends at no straight seam.
+        // A lit figure in front of a dark wall does not end at a straight seam.
         let mut figure = BarFinder::default();
         for seed in 0..5 {
             let mut image = picture(seed, [100, 100], |_, _| 2);

@@ -1,45 +1,45 @@
-//! Whether two pictures show the same place, whatever the light and however the camera has moved: normalised
-//! correlation of gray blocks, searched for nearby. Thumbnails come in; when they are compared is not known here.
+//! Block matching of two thumbnails, invariant to lighting and small camera movement: normalised cross-correlation of
+//! gray blocks within a search range.
 
 use super::thumbnail::{THUMBNAIL, Thumbnail};
 
-/// Side of a block, px.
+/// Block size, px.
 const BLOCK: usize = 16;
-/// How far a block is looked for, px to each side.
-const REACH: usize = 8;
-/// A block whose gray deviates less than this, in 8-bit steps, has nothing to be recognised by.
-const FLAT: f32 = 3.0;
-/// Correlation from which on a block has moved there, and what moving must gain over staying.
-const MOVED: f32 = 0.8;
-const MOVE_GAIN: f32 = 0.03;
-/// Blocks to be recognised by that are needed to say anything.
-const LEAST: usize = 3;
+/// Search range, px to each side.
+const SEARCH_RANGE: usize = 8;
+/// Least standard deviation of a block in 8-bit steps; flatter blocks have no texture to match.
+const MIN_DEVIATION: f32 = 3.0;
+/// Least correlation of a moved block, and least gain over the correlation at its original position.
+const MIN_MOVED_CORRELATION: f32 = 0.8;
+const MIN_MOVE_GAIN: f32 = 0.03;
+/// Least number of textured blocks for a result.
+const MIN_BLOCKS: usize = 3;
 
-/// Share of the blocks of `picture` that are not in each of `others` nearby, a correlation of `least` taken for being
-/// there; 1 where there is nothing to recognise.
+/// Share of the blocks of `picture` that are missing in any of `others`, i.e. whose best correlation is below `least`;
+/// 1 if there are too few textured blocks.
 pub fn missing(picture: &Thumbnail, others: &[&Thumbnail], least: f32) -> f64 {
     let (mut n, mut n_missing) = (0, 0);
     for block in blocks(picture) {
         n += 1;
         n_missing += usize::from(others.iter().any(|other| block.search(other).best < least));
     }
-    if n < LEAST { 1.0 } else { n_missing as f64 / n as f64 }
+    if n < MIN_BLOCKS { 1.0 } else { n_missing as f64 / n as f64 }
 }
 
-/// Share of the blocks of `from` that are elsewhere in `to`: near 1 for a moving camera, small for moving people.
+/// Share of the blocks of `from` that have moved in `to`: near 1 for a moving camera, small for moving people.
 pub fn moved(from: &Thumbnail, to: &Thumbnail) -> f64 {
     let (mut n, mut n_moved) = (0, 0);
     for block in blocks(from) {
-        let BlockMatch { best, there } = block.search(to);
+        let BlockMatch { best, at_origin } = block.search(to);
         n += 1;
-        n_moved += usize::from(best >= MOVED && best - there > MOVE_GAIN);
+        n_moved += usize::from(best >= MIN_MOVED_CORRELATION && best - at_origin > MIN_MOVE_GAIN);
     }
-    if n < LEAST { 0.0 } else { n_moved as f64 / n as f64 }
+    if n < MIN_BLOCKS { 0.0 } else { n_moved as f64 / n as f64 }
 }
 
-/// Correlation of the edges of two pictures, place by place, -1..1: near 1 for one scene in another light, near 0 for
-/// two scenes.
-pub fn same_edges(a: &Thumbnail, b: &Thumbnail) -> f64 {
+/// Correlation of the gradients of two pictures at equal positions, -1..1: near 1 for one scene under different light,
+/// near 0 for two scenes.
+pub fn edge_correlation(a: &Thumbnail, b: &Thumbnail) -> f64 {
     let [width, height] = THUMBNAIL;
     let (mut ab, mut aa, mut bb) = (0.0f64, 0.0f64, 0.0f64);
     for y in 0..height - 1 {
@@ -56,19 +56,19 @@ pub fn same_edges(a: &Thumbnail, b: &Thumbnail) -> f64 {
     ab / (aa * bb).sqrt().max(1e-9)
 }
 
-/// A block of a picture without its mean.
+/// A block of a picture, mean subtracted.
 struct PictureBlock {
     x: usize,
     y: usize,
     values: Vec<f32>,
-    /// Root of the sum of squares.
+    /// L2 norm of `values`.
     norm: f32,
 }
 
-/// Correlation at the best place and at the same place.
+/// Largest correlation within the search range, and the correlation at the original position.
 struct BlockMatch {
     best: f32,
-    there: f32,
+    at_origin: f32,
 }
 
 fn blocks(picture: &Thumbnail) -> impl Iterator<Item = PictureBlock> {
@@ -82,25 +82,25 @@ fn blocks(picture: &Thumbnail) -> impl Iterator<Item = PictureBlock> {
             *value -= mean;
         }
         let norm = values.iter().map(|value| value * value).sum::<f32>().sqrt();
-        (norm >= FLAT * BLOCK as f32).then_some(PictureBlock { x, y, values, norm })
+        (norm >= MIN_DEVIATION * BLOCK as f32).then_some(PictureBlock { x, y, values, norm })
     })
 }
 
-/// The rows of the block whose corner is `x`, `y`.
+/// Rows of the block with corner `x`, `y`.
 fn rows(picture: &Thumbnail, x: usize, y: usize) -> impl Iterator<Item = &[f32]> {
     (y..y + BLOCK).map(move |row| &picture.gray[row * THUMBNAIL[0] + x..row * THUMBNAIL[0] + x + BLOCK])
 }
 
 impl PictureBlock {
     fn search(&self, other: &Thumbnail) -> BlockMatch {
-        let around = |at: usize, side: usize| at.saturating_sub(REACH)..=(at + REACH).min(side - BLOCK);
-        let mut found = BlockMatch { best: -1.0, there: -1.0 };
+        let around = |at: usize, side: usize| at.saturating_sub(SEARCH_RANGE)..=(at + SEARCH_RANGE).min(side - BLOCK);
+        let mut found = BlockMatch { best: -1.0, at_origin: -1.0 };
         for y in around(self.y, THUMBNAIL[1]) {
             for x in around(self.x, THUMBNAIL[0]) {
                 let correlation = self.correlation(other, x, y);
                 found.best = found.best.max(correlation);
                 if (x, y) == (self.x, self.y) {
-                    found.there = correlation;
+                    found.at_origin = correlation;
                 }
             }
         }
@@ -118,7 +118,7 @@ impl PictureBlock {
         }
         let n = (BLOCK * BLOCK) as f32;
         let norm = (squares - sum * sum / n).max(0.0).sqrt();
-        product / (self.norm * norm.max(FLAT * BLOCK as f32))
+        product / (self.norm * norm.max(MIN_DEVIATION * BLOCK as f32))
     }
 }
 
@@ -132,9 +132,9 @@ mod tests {
     }
 
     #[test]
-    fn light_changes_nothing_and_a_moved_camera_is_known() {
+    fn light_is_ignored_and_camera_movement_is_detected() {
         let a = scene(1, 0, 1.0);
-        assert!(missing(&a, &[&scene(1, 0, 0.4)], 0.75) == 0.0 && same_edges(&a, &scene(1, 0, 0.4)) > 0.99);
+        assert!(missing(&a, &[&scene(1, 0, 0.4)], 0.75) == 0.0 && edge_correlation(&a, &scene(1, 0, 0.4)) > 0.99);
         assert!(missing(&a, &[&scene(1, 6, 1.0)], 0.75) < 0.3 && moved(&a, &scene(1, 6, 1.0)) > 0.7);
         assert_eq!(moved(&a, &scene(1, 0, 0.7)), 0.0);
     }
@@ -142,9 +142,9 @@ mod tests {
     #[test]
     fn another_scene_is_missing_and_a_flat_one_too() {
         let (a, b) = (scene(1, 0, 1.0), scene(2, 0, 1.0));
-        assert!(missing(&a, &[&b], 0.75) > 0.9 && same_edges(&a, &b) < 0.2 && moved(&a, &b) < 0.1);
+        assert!(missing(&a, &[&b], 0.75) > 0.9 && edge_correlation(&a, &b) < 0.2 && moved(&a, &b) < 0.1);
         let black = scene(1, 0, 0.0);
         assert!(missing(&a, &[&black], 0.75) == 1.0 && missing(&black, &[&a], 0.75) == 1.0);
-        assert_eq!((same_edges(&a, &black), moved(&black, &a)), (0.0, 0.0));
+        assert_eq!((edge_correlation(&a, &black), moved(&black, &a)), (0.0, 0.0));
     }
 }

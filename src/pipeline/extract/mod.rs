@@ -1,7 +1,7 @@
-//! Stage 1: a video to its sound at 16 kHz mono, the frame timeline at the dataset rate, and where shots begin, in one
-//! pass over the pictures (`reading`) and one over the sound. `shots` finds cuts and, with `dissolves`, gradual
-//! transitions, all on `thumbnail`s by `block_match`; `survey` finds interlaced pictures and `bars`; `spans` cuts
-//! a long video into what several workers share; `stage` writes the files.
+//! Stage 1: video to 16 kHz mono audio, the frame timeline at the dataset rate, and shot boundaries, in one pass over
+//! the pictures (`reading`) and one over the audio. `shots` finds cuts and, with `dissolves`, gradual transitions, on
+//! `thumbnail`s compared by `block_match`; `survey` detects interlacing and `bars`; `spans` splits a long video into
+//! parts for several workers; `stage` writes the outputs.
 
 pub mod bars;
 pub mod block_match;

@@ -1,4 +1,4 @@
-//! A pass over the pictures of a video: thumbnails for shots and movement, and, the first time, a survey.
+//! One pass over the pictures of a video: thumbnails for shots and movement and, in the first pass, a survey.
 
 use super::shots::{RESTART, ShotFinder};
 use super::survey::PictureSurvey;
@@ -14,18 +14,19 @@ use std::fs;
 use std::hash::{DefaultHasher, Hasher as _};
 use std::path::Path;
 
-/// What a pass tells.
+/// Result of a pass.
 pub struct PictureReading {
-    /// Of one span.
+    /// Timeline with a single span.
     pub timeline: Timeline,
-    /// Number of times the pictures change their size.
+    /// Number of changes of the picture size.
     pub n_resizes: usize,
-    /// Checksums of the thumbnails, one a frame.
+    /// Checksum of each frame's thumbnail.
     pub checksums: Vec<u64>,
 }
 
-/// Reads the pictures once; of each only a thumbnail of `area` (all of it without) is looked at, unless the survey wants
-/// more. Where the size changes tracking begins anew, where the shape changes a shot begins.
+/// Reads all pictures once. Each is reduced to a thumbnail of `area` (of the full picture if `None`), unless the
+/// survey wants the full picture. Tracking restarts where the size changes; a shot begins where the aspect ratio
+/// changes.
 pub fn read(
     reader: &mut FrameReader,
     rate: FrameRate,
@@ -34,7 +35,7 @@ pub fn read(
     progress: &dyn Progress,
 ) -> Result<PictureReading> {
     let (mut timeline, mut n_resizes) = (Timeline::default(), 0);
-    let (mut shots, mut before) = (ShotFinder::new(rate), None);
+    let (mut shots, mut previous) = (ShotFinder::new(rate), None);
     let (mut resizes, mut checksums) = (Vec::new(), Vec::new());
     let task = progress.begin("frames", reader.expected_frames().unwrap_or(0) as u64);
     while let Some(time) = reader.advance()? {
@@ -42,14 +43,14 @@ pub fn read(
         timeline.repeated.push(time.repeated);
         let picture = if time.repeated { None } else { Some(thumbnail(reader, area)?) };
         if let (Some(survey), false) = (survey.as_deref_mut(), time.repeated) {
-            let whole = survey.wants_picture().then(|| reader.picture(None)).transpose()?;
-            survey.push(whole, reader.is_flagged_interlaced());
+            let full_picture = survey.wants_picture().then(|| reader.picture(None)).transpose()?;
+            survey.push(full_picture, reader.is_flagged_interlaced());
         }
         checksums.push(picture.as_ref().map_or_else(|| checksums.last().copied().unwrap_or(0), checksum));
         shots.push(picture.clone());
-        let pair = before.as_ref().zip(picture.as_ref());
+        let pair = previous.as_ref().zip(picture.as_ref());
         timeline.frame_difference.push(pair.map_or(0.0, |(a, b)| mean_change(a, b)));
-        before = picture.or(before);
+        previous = picture.or(previous);
         n_resizes += usize::from(time.resize != Resize::None);
         resizes.push(time.resize);
         task.advance(1);
@@ -64,27 +65,27 @@ pub fn read(
     Ok(PictureReading { timeline, n_resizes, checksums })
 }
 
-/// Checksum of a picture.
+/// Checksum of the pixels of a picture.
 pub fn checksum(picture: &Image) -> u64 {
     let mut hasher = DefaultHasher::new();
     hasher.write(&picture.data);
     hasher.finish()
 }
 
-/// Small picture of `area`: the whole is scaled so that the area has the size of a thumbnail.
+/// Thumbnail of `area`: the full picture is scaled so that the area has thumbnail size.
 pub fn thumbnail(reader: &mut FrameReader, area: Option<PixelArea>) -> Result<Image> {
     let Some(area) = area else { return reader.picture(Some(THUMBNAIL)) };
     let scales = [(0, area.width), (1, area.height)].map(|(axis, px)| THUMBNAIL[axis] as f64 / px.max(1) as f64);
-    let whole = reader.image_size();
+    let full_size = reader.image_size();
     let scaled = |px: usize, axis: usize| (px as f64 * scales[axis]).round() as usize;
-    let size = [0, 1].map(|axis| scaled(whole[axis], axis).max(THUMBNAIL[axis]));
+    let size = [0, 1].map(|axis| scaled(full_size[axis], axis).max(THUMBNAIL[axis]));
     let corner = [scaled(area.x, 0), scaled(area.y, 1)];
     let [x, y] = [0, 1].map(|axis| corner[axis].min(size[axis] - THUMBNAIL[axis]));
     let [width, height] = THUMBNAIL;
     Ok(reader.picture(Some(size))?.cropped(PixelArea { x, y, width, height }))
 }
 
-/// Writes every picture as PNG into the new folder `folder`.
+/// Writes every picture as PNG into `folder`, which is created.
 pub fn write_pictures(reader: &mut FrameReader, folder: &Path, progress: &dyn Progress) -> Result<()> {
     fs::create_dir(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
     let task = progress.begin("pictures", reader.expected_frames().unwrap_or(0) as u64);

@@ -1,49 +1,49 @@
-//! Shot boundaries. Thumbnails come in one after the other, the last few seconds of them are kept, and each frame gets a
-//! score: how much it looks like the first one of a shot.
+//! Shot boundary detection. Consumes thumbnails frame by frame, retains the last few seconds, and scores how likely
+//! each frame is the first of a shot.
 
 use super::block_match;
-use super::dissolves::{self, LEAST_TURNED, WINDOWS, ramp};
+use super::dissolves::{self, MIN_TURNED, WINDOWS, ramp};
 use super::thumbnail::Thumbnail;
 use orator_base::types::image::Image;
 use orator_base::types::time::FrameRate;
 use std::collections::VecDeque;
 
-/// Score from which on tracking begins anew, whatever counts as a shot later on.
+/// Score from which tracking restarts, whatever threshold is used for shots later.
 pub const RESTART: f64 = 0.1;
-/// Frames beside a cut whose changes are subtracted from its own.
-const AROUND: usize = 2;
-/// Frames at 15 a second within which a picture that is back was only flashed over.
-const FLASH: usize = 5;
-/// Least correlation of a block to be found again after a cut.
-const FOUND_AGAIN: f32 = 0.75;
+/// Frames on either side of a cut whose changes are subtracted from its own.
+const NEIGHBOURS: usize = 2;
+/// Frames at 15 fps within which a reappearing picture means a flash.
+const FLASH_FRAMES: usize = 5;
+/// Least correlation for a block to count as present after a cut.
+const MIN_CORRELATION: f32 = 0.75;
 
-/// Finds where shots begin. A cut is a single step: with `change(n)` the share of cells that differ between frames n - 1 and
-/// n (repeated frames left out), its score is `max(0, change(n) - max(change(n-2), change(n-1), change(n+1), change(n+2)))`,
-/// if the pictures before and after do not match (`block_match`). Gestures, pans and noise go on for several frames and
-/// cancel out; after a flash the picture is back. A gradual transition (`dissolves`) scores at its first frame and at the
-/// first frame after it.
+/// Shot boundary detector. With `change(n)` the share of cells that differ between frames n - 1 and n (repeated frames
+/// left out), the score of a cut is `max(0, change(n) - max(change(n-2), change(n-1), change(n+1), change(n+2)))`, if
+/// the pictures before and after do not match (`block_match`). Gestures, pans and noise last for several frames and
+/// cancel out; after a flash the picture reappears. A gradual transition (`dissolves`) scores at its first frame and
+/// at the first frame after it.
 pub struct ShotFinder {
-    /// Frames of the dataset rate for one at 15 a second.
-    pace: usize,
-    /// Newest frames that repeat none, the oldest first.
+    /// Frames at the dataset rate per frame at 15 fps.
+    frame_step: usize,
+    /// Most recent non-repeated frames, oldest first.
     recent: VecDeque<RecentFrame>,
-    /// Frame numbers of those that repeat none.
+    /// Frame indices of the non-repeated frames.
     frames: Vec<usize>,
     n_frames: usize,
-    /// Share of changed cells against the one before, of each frame that repeats none.
+    /// Share of cells that changed since the previous non-repeated frame, per non-repeated frame.
     changes: Vec<f64>,
-    /// Scores of cuts, of each frame that repeats none, as far as known.
+    /// Cut scores of the non-repeated frames, as far as they are known.
     cuts: Vec<f64>,
     windows: Vec<Transition>,
 }
 
-/// A frame with the way each cell's colour has gone since the film began, modulo 2^32.
+/// A frame with the path length of each cell's colour since the start of the video, modulo 2^32.
 struct RecentFrame {
     thumbnail: Thumbnail,
-    way: Vec<[u32; 3]>,
+    path_length: Vec<[u32; 3]>,
 }
 
-/// A gradual transition from one frame to another, counted among those that repeat none.
+/// A gradual transition; `start` and `end` are indices of non-repeated frames.
 #[derive(Clone, Copy)]
 struct Transition {
     start: usize,
@@ -52,10 +52,10 @@ struct Transition {
 }
 
 impl ShotFinder {
-    /// A finder for frames at `rate`.
+    /// Creates a detector for frames at `rate`.
     pub fn new(rate: FrameRate) -> Self {
         Self {
-            pace: ((rate.per_sec() / 15.0).round() as usize).max(1),
+            frame_step: ((rate.per_sec() / 15.0).round() as usize).max(1),
             recent: VecDeque::new(),
             frames: Vec::new(),
             n_frames: 0,
@@ -65,39 +65,40 @@ impl ShotFinder {
         }
     }
 
-    /// The next frame's thumbnail; `None` when it repeats the frame before.
+    /// Adds the thumbnail of the next frame; `None` if it repeats the previous one.
     pub fn push(&mut self, thumbnail: Option<Image>) {
         let frame = self.n_frames;
         self.n_frames += 1;
         let Some(thumbnail) = thumbnail.map(Thumbnail::new) else { return };
         let last = self.recent.back();
         self.changes.push(last.map_or(0.0, |last| last.thumbnail.change(&thumbnail)));
-        let mut way = last.map_or_else(|| vec![[0; 3]; thumbnail.grid.len()], |last| last.way.clone());
+        let mut path_length = last.map_or_else(|| vec![[0; 3]; thumbnail.grid.len()], |last| last.path_length.clone());
         if let Some(last) = last {
             let steps = last.thumbnail.grid.iter().zip(&thumbnail.grid);
-            for (way, (a, b)) in way.iter_mut().zip(steps) {
+            for (path_length, (a, b)) in path_length.iter_mut().zip(steps) {
                 (0..3).for_each(|channel| {
-                    way[channel] = way[channel].wrapping_add(u32::from(a[channel].abs_diff(b[channel])));
+                    path_length[channel] =
+                        path_length[channel].wrapping_add(u32::from(a[channel].abs_diff(b[channel])));
                 });
             }
         }
         self.frames.push(frame);
-        self.recent.push_back(RecentFrame { thumbnail, way });
-        self.judge(FLASH * self.pace);
-        let longest = WINDOWS.last().map_or(0, |(length, _)| length * self.pace);
-        while self.recent.len() > longest + 2 * FLASH * self.pace + 2 {
+        self.recent.push_back(RecentFrame { thumbnail, path_length });
+        self.judge(FLASH_FRAMES * self.frame_step);
+        let longest = WINDOWS.last().map_or(0, |(length, _)| length * self.frame_step);
+        while self.recent.len() > longest + 2 * FLASH_FRAMES * self.frame_step + 2 {
             self.recent.pop_front();
         }
     }
 
-    /// The score of every frame, 0..1.
+    /// Returns the score of every frame, 0..1.
     pub fn finish(mut self) -> Vec<f64> {
         self.judge(0);
         let mut scores = vec![0.0f64; self.n_frames];
         for (cut, frame) in self.cuts.iter().zip(&self.frames) {
             scores[*frame] = *cut;
         }
-        for window in chosen(self.windows) {
+        for window in suppress_overlaps(self.windows) {
             for edge in [window.start + 1, window.end] {
                 let score = &mut scores[self.frames[edge]];
                 *score = score.max(window.score);
@@ -106,7 +107,7 @@ impl ShotFinder {
         scores
     }
 
-    /// Scores the cuts and windows that are followed by `after` frames; a window may hold no cut.
+    /// Scores the cuts and windows that `after` frames follow; a window may not contain a cut.
     fn judge(&mut self, after: usize) {
         let n = self.frames.len().saturating_sub(after);
         for at in self.cuts.len()..n {
@@ -115,55 +116,57 @@ impl ShotFinder {
         }
     }
 
-    /// The frame `at`, counted among those that repeat none; `None` if it is no longer kept.
+    /// Non-repeated frame number `at`; `None` if it is no longer retained.
     fn recent(&self, at: usize) -> Option<&RecentFrame> {
         let first = self.frames.len() - self.recent.len();
         self.recent.get(at.checked_sub(first)?)
     }
 
     fn cut(&self, at: usize) -> f64 {
-        let around = (at.saturating_sub(AROUND).max(1)..(at + AROUND + 1).min(self.changes.len())).filter(|k| *k != at);
+        let around =
+            (at.saturating_sub(NEIGHBOURS).max(1)..(at + NEIGHBOURS + 1).min(self.changes.len())).filter(|k| *k != at);
         let score = self.changes[at] - around.map(|k| self.changes[k]).fold(0.0, f64::max);
         let before = at.checked_sub(1).and_then(|before| self.recent(before));
         let (Some(before), Some(after)) = (before, self.recent(at)) else { return 0.0 };
-        if score <= 0.0 || self.comes_back(at - 1, at, self.changes[at]) {
+        if score <= 0.0 || self.reappears(at - 1, at, self.changes[at]) {
             return 0.0;
         }
         let (before, after) = (&before.thumbnail, &after.thumbnail);
-        let missing = |a, b| block_match::missing(a, &[b], FOUND_AGAIN);
+        let missing = |a, b| block_match::missing(a, &[b], MIN_CORRELATION);
         score * ramp(missing(after, before).min(missing(before, after)), 0.3, 0.6)
     }
 
-    /// The likeliest transition that ends at the frame `end`.
+    /// Best transition that ends at frame `end`.
     fn transition(&self, end: usize) -> Option<Transition> {
         let last = self.recent(end)?;
         let turned = |length: usize| {
             let first = self.recent(end.checked_sub(length)?)?;
-            let way = first.way.iter().zip(&last.way);
-            let way = way.map(|(a, b)| std::array::from_fn(|channel| b[channel].wrapping_sub(a[channel])));
-            Some(dissolves::turned(&first.thumbnail, &last.thumbnail, way))
+            let path_length = first.path_length.iter().zip(&last.path_length);
+            let path_length =
+                path_length.map(|(a, b)| std::array::from_fn(|channel| b[channel].wrapping_sub(a[channel])));
+            Some(dissolves::turned(&first.thumbnail, &last.thumbnail, path_length))
         };
-        let longest = WINDOWS.last().map_or(0, |(length, _)| length * self.pace);
+        let longest = WINDOWS.last().map_or(0, |(length, _)| length * self.frame_step);
         let near = (end.saturating_sub(longest)..=end).rev();
         let cut = near.into_iter().find(|at| self.cuts.get(*at).is_some_and(|cut| *cut >= RESTART));
-        let windows = WINDOWS.iter().map(|(length, least)| (length * self.pace, *least));
+        let windows = WINDOWS.iter().map(|(length, least)| (length * self.frame_step, *least));
         let open = windows.filter(|(length, _)| cut.is_none_or(|cut| end.saturating_sub(*length) >= cut));
         let open: Vec<_> =
             open.filter_map(|(length, least)| Some((end.checked_sub(length)?, least, turned(length)?))).collect();
         let most = open.iter().map(|(_, _, turned)| *turned).fold(0.0, f64::max);
-        let worth = open.into_iter().filter(|(_, _, turned)| *turned >= LEAST_TURNED.max(0.8 * most));
-        let judged = worth.filter(|(start, _, turned)| !self.comes_back(*start, end, *turned));
+        let worth = open.into_iter().filter(|(_, _, turned)| *turned >= MIN_TURNED.max(0.8 * most));
+        let judged = worth.filter(|(start, _, turned)| !self.reappears(*start, end, *turned));
         let windows = judged.filter_map(|(start, least, turned)| {
             let frames: Option<Vec<_>> = (start..=end).map(|at| Some(&self.recent(at)?.thumbnail)).collect();
             let score = dissolves::score(&frames?, turned, least);
             (score > 0.0).then_some(Transition { start, end, score })
         });
-        tightest(&windows.collect::<Vec<_>>())
+        shortest_good(&windows.collect::<Vec<_>>())
     }
 
-    /// Whether the picture before is soon there again, or the one after was there shortly before.
-    fn comes_back(&self, start: usize, end: usize, turned: f64) -> bool {
-        let near = FLASH * self.pace;
+    /// Whether the picture before the change soon reappears, or the one after it was visible shortly before.
+    fn reappears(&self, start: usize, end: usize, turned: f64) -> bool {
+        let near = FLASH_FRAMES * self.frame_step;
         let like = |a: usize, b: usize| {
             let pair = self.recent(a).zip(self.recent(b));
             pair.is_some_and(|(a, b)| a.thumbnail.change(&b.thumbnail) < 0.5 * turned)
@@ -172,21 +175,21 @@ impl ShotFinder {
     }
 }
 
-/// The windows of which none overlaps a better one.
-fn chosen(mut windows: Vec<Transition>) -> Vec<Transition> {
+/// Non-maximum suppression: windows that do not overlap a better one.
+fn suppress_overlaps(mut windows: Vec<Transition>) -> Vec<Transition> {
     let apart = |a: &Transition, b: &Transition| a.end < b.start || b.end < a.start;
-    let mut chosen = Vec::new();
+    let mut selected = Vec::new();
     windows.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.start.cmp(&b.start)));
     while let Some(best) = windows.first().copied() {
         let (apart, around): (Vec<_>, Vec<_>) = windows.into_iter().partition(|window| apart(window, &best));
-        chosen.extend(tightest(&around));
+        selected.extend(shortest_good(&around));
         windows = apart;
     }
-    chosen
+    selected
 }
 
-/// The shortest of the windows that score nearly as well as the best.
-fn tightest(windows: &[Transition]) -> Option<Transition> {
+/// Shortest of the windows that score nearly as well as the best.
+fn shortest_good(windows: &[Transition]) -> Option<Transition> {
     let best = windows.iter().map(|window| window.score).fold(0.0, f64::max);
     let good = windows.iter().filter(|window| window.score >= 0.9 * best);
     good.min_by(|a, b| (a.end - a.start).cmp(&(b.end - b.start)).then(b.score.total_cmp(&a.score))).copied()
@@ -197,7 +200,7 @@ mod tests {
     use super::*;
     use crate::extract::thumbnail::{THUMBNAIL, scene};
 
-    fn dim(seed: usize, light: f64) -> Option<Image> {
+    fn lit_scene(seed: usize, light: f64) -> Option<Image> {
         Some(scene(seed, 0, light))
     }
 
@@ -216,66 +219,71 @@ mod tests {
         finder.finish()
     }
 
-    fn begins(scores: &[f64]) -> Vec<usize> {
+    fn shot_starts(scores: &[f64]) -> Vec<usize> {
         (0..scores.len()).filter(|n| scores[*n] >= 0.2).collect()
     }
 
-    fn still(seed: usize, n: usize) -> Vec<Option<Image>> {
-        vec![dim(seed, 1.0); n]
+    fn static_scene(seed: usize, n: usize) -> Vec<Option<Image>> {
+        vec![lit_scene(seed, 1.0); n]
     }
 
     #[test]
     fn a_cut_begins_a_shot_at_its_first_frame() {
-        let found = scores(&[still(1, 3), still(900, 4), still(5_000, 7)].concat());
-        assert_eq!(begins(&found), [3, 7]);
+        let found = scores(&[static_scene(1, 3), static_scene(900, 4), static_scene(5_000, 7)].concat());
+        assert_eq!(shot_starts(&found), [3, 7]);
         assert!(found[3] > 0.8 && found[4] == 0.0, "{found:?}");
     }
 
     #[test]
     fn repeated_frames_do_not_hide_a_cut() {
-        let [a, b] = [1, 900].map(|seed| still(seed, 1).remove(0));
-        assert_eq!(begins(&scores(&[a.clone(), None, a, None, b.clone(), None, b, None])), [4]);
+        let [a, b] = [1, 900].map(|seed| static_scene(seed, 1).remove(0));
+        assert_eq!(shot_starts(&scores(&[a.clone(), None, a, None, b.clone(), None, b, None])), [4]);
     }
 
     #[test]
-    fn a_dissolve_is_a_shot_of_its_own() {
+    fn a_dissolve_is_a_separate_shot() {
         for length in [4, 8, 15, 30] {
             let mix = (1..length).map(|step| mixed([1, 900], step as f64 / length as f64));
-            let film: Vec<_> = still(1, 40).into_iter().chain(mix).chain(still(900, 40)).collect();
-            let [start, end] = begins(&scores(&film))[..] else { panic!("{length} frames: {:?}", scores(&film)) };
+            let film: Vec<_> = static_scene(1, 40).into_iter().chain(mix).chain(static_scene(900, 40)).collect();
+            let [start, end] = shot_starts(&scores(&film))[..] else { panic!("{length} frames: {:?}", scores(&film)) };
             let slack = length / 4 + 2;
             assert!(start.abs_diff(41) <= slack && end.abs_diff(40 + length) <= slack, "{length}: {start} {end}");
         }
     }
 
     #[test]
-    fn a_film_through_black_is_cut_and_a_flash_is_not() {
+    fn a_fade_through_black_is_a_boundary_and_a_flash_is_not() {
         let black = || Some(Image::filled(THUMBNAIL[0], THUMBNAIL[1], [0; 3]));
-        let out = (1..8).map(|step| dim(1, 1.0 - f64::from(step) / 8.0));
-        let back = (1..8).map(|step| dim(900, f64::from(step) / 8.0));
-        let film: Vec<_> =
-            still(1, 20).into_iter().chain(out).chain(vec![black(); 10]).chain(back).chain(still(900, 20)).collect();
-        assert!(!begins(&scores(&film)).is_empty());
+        let out = (1..8).map(|step| lit_scene(1, 1.0 - f64::from(step) / 8.0));
+        let back = (1..8).map(|step| lit_scene(900, f64::from(step) / 8.0));
+        let film: Vec<_> = static_scene(1, 20)
+            .into_iter()
+            .chain(out)
+            .chain(vec![black(); 10])
+            .chain(back)
+            .chain(static_scene(900, 20))
+            .collect();
+        assert!(!shot_starts(&scores(&film)).is_empty());
         let white = || Some(Image::filled(THUMBNAIL[0], THUMBNAIL[1], [250; 3]));
         for n in 1..4 {
-            let film = [still(1, 20), vec![white(); n], still(1, 20)].concat();
-            assert_eq!(begins(&scores(&film)), [0; 0], "{n}");
+            let film = [static_scene(1, 20), vec![white(); n], static_scene(1, 20)].concat();
+            assert_eq!(shot_starts(&scores(&film)), [0; 0], "{n}");
         }
     }
 
     #[test]
-    fn another_light_is_no_cut() {
-        let step = [vec![dim(1, 1.0); 20], vec![dim(1, 0.5); 20]].concat();
-        assert_eq!(begins(&scores(&step)), [0; 0]);
-        let slow: Vec<_> = (0..60).map(|n| dim(1, 1.0 - f64::from(n) / 80.0)).collect();
-        assert_eq!(begins(&scores(&slow)), [0; 0]);
+    fn a_change_of_light_is_not_a_cut() {
+        let step = [vec![lit_scene(1, 1.0); 20], vec![lit_scene(1, 0.5); 20]].concat();
+        assert_eq!(shot_starts(&scores(&step)), [0; 0]);
+        let slow: Vec<_> = (0..60).map(|n| lit_scene(1, 1.0 - f64::from(n) / 80.0)).collect();
+        assert_eq!(shot_starts(&scores(&slow)), [0; 0]);
     }
 
     #[test]
     fn short_videos_have_one_shot() {
         assert_eq!(scores(&[]), [0.0; 0]);
-        assert_eq!(scores(&still(1, 1)), [0.0]);
-        assert_eq!(scores(&still(1, 2)), [0.0; 2]);
+        assert_eq!(scores(&static_scene(1, 1)), [0.0]);
+        assert_eq!(scores(&static_scene(1, 2)), [0.0; 2]);
         assert_eq!(scores(&[None, None]), [0.0; 2]);
     }
 }

@@ -1,5 +1,5 @@
-//! Spans of a long video that can be worked on apart, by several workers: they begin at fixed marks of the video's own
-//! time, at a cut where one comes soon, and only where reading that begins there gives the same pictures.
+//! Spans of a long video that several workers can process independently. They begin at fixed intervals, or at a cut
+//! shortly after, and only where decoding from that point yields the same pictures.
 
 use super::reading::{PictureReading, checksum, thumbnail};
 use anyhow::Result;
@@ -7,21 +7,21 @@ use orator_base::types::image::PixelArea;
 use orator_base::types::time::FrameRate;
 use orator_media::ffmpeg::frames::FrameReader;
 
-/// A mark stands at every multiple of so many seconds.
-const APART_SECS: f64 = 120.0;
-/// A cut that comes no later after its mark takes the mark's place.
-const CUT_WITHIN_SECS: f64 = 20.0;
-/// Least length of the last span.
-const LEAST_LAST_SECS: f64 = 60.0;
-/// Frames that are compared where reading begins.
-const COMPARED: usize = 15;
+/// Interval of the marks in seconds.
+const MARK_INTERVAL_SECS: f64 = 120.0;
+/// A cut within this many seconds after a mark replaces it.
+const MAX_CUT_DELAY_SECS: f64 = 20.0;
+/// Least duration of the last span in seconds.
+const MIN_LAST_SECS: f64 = 60.0;
+/// Number of frames to compare after a seek.
+const N_COMPARED: usize = 15;
 
-/// The number of spans of a video of that length, where none of its marks is passed over.
+/// Number of spans of a video of `secs` seconds, if no mark is rejected.
 pub fn count(secs: f64) -> usize {
-    1 + ((secs - LEAST_LAST_SECS).max(0.0) / APART_SECS) as usize
+    1 + ((secs - MIN_LAST_SECS).max(0.0) / MARK_INTERVAL_SECS) as usize
 }
 
-/// Marks in the timeline where spans begin. The reader that `open` gives reads the pictures, of which `area` counts.
+/// Sets `timeline.span` where spans begin. `open` opens a reader of the pictures, of which `area` counts.
 ///
 /// # Errors
 /// Those of `open`.
@@ -37,27 +37,27 @@ pub fn mark(
     }
     let mut reader = open()?;
     for start in starts {
-        // Where the container cannot go the span before goes on.
-        let is_same = is_read_alike(read, &mut reader, area, start).unwrap_or(false);
-        read.timeline.span[start] = is_same;
+        // If the container cannot seek there, the previous span continues.
+        let is_equal = seek_is_exact(read, &mut reader, area, start).unwrap_or(false);
+        read.timeline.span[start] = is_equal;
     }
     Ok(())
 }
 
-/// Frames at which spans would begin.
+/// Frames at which spans may begin.
 fn candidates(restarts: &[bool], rate: FrameRate) -> Vec<usize> {
     let frames = |secs: f64| (secs * rate.per_sec()).round() as usize;
-    let marks = (1..).map(|number| frames(f64::from(number) * APART_SECS));
-    let marks = marks.take_while(|mark| mark + frames(LEAST_LAST_SECS) <= restarts.len());
-    let moved = |mark: usize| {
-        let soon = &restarts[mark..restarts.len().min(mark + frames(CUT_WITHIN_SECS))];
-        mark + soon.iter().position(|restart| *restart).unwrap_or(0)
+    let marks = (1..).map(|number| frames(f64::from(number) * MARK_INTERVAL_SECS));
+    let marks = marks.take_while(|mark| mark + frames(MIN_LAST_SECS) <= restarts.len());
+    let to_cut = |mark: usize| {
+        let following = &restarts[mark..restarts.len().min(mark + frames(MAX_CUT_DELAY_SECS))];
+        mark + following.iter().position(|restart| *restart).unwrap_or(0)
     };
-    marks.map(moved).collect()
+    marks.map(to_cut).collect()
 }
 
-/// Whether reading that begins at the frame `start` gives the frames that reading from the first one gave.
-fn is_read_alike(
+/// Whether decoding from frame `start` yields the same frames as decoding from the first frame.
+fn seek_is_exact(
     read: &PictureReading,
     reader: &mut FrameReader,
     area: Option<PixelArea>,
@@ -65,12 +65,12 @@ fn is_read_alike(
 ) -> Result<bool> {
     let timeline = &read.timeline;
     reader.seek(start, timeline.source_secs[start])?;
-    for idx in start..(start + COMPARED).min(timeline.n_frames()) {
+    for idx in start..(start + N_COMPARED).min(timeline.n_frames()) {
         let Some(time) = reader.advance()? else { return Ok(false) };
-        let is_same = time.frame_idx == idx
+        let is_equal = time.frame_idx == idx
             && time.source_secs.total_cmp(&timeline.source_secs[idx]).is_eq()
             && checksum(&thumbnail(reader, area)?) == read.checksums[idx];
-        if !is_same {
+        if !is_equal {
             return Ok(false);
         }
     }
@@ -82,7 +82,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn spans_begin_at_marks_or_at_a_cut_soon_after_and_the_last_is_no_stub() {
+    fn spans_begin_at_marks_or_following_cuts_and_the_last_is_not_short() {
         let rate = FrameRate::new(10, 1);
         let mut restarts = vec![false; 4199];
         assert_eq!(candidates(&restarts, rate), [1200, 2400]);

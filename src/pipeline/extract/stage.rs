@@ -1,5 +1,5 @@
-//! The stage. Writes the sound (16 kHz mono s16, its first sample at the first picture; absent without sound), the
-//! `Timeline` at the dataset rate, `MediaInfo`, and, only if asked, the pictures as PNG.
+//! Stage `extract`. Writes the audio (16 kHz mono s16, its first sample at the first picture; absent without audio),
+//! the `Timeline` at the dataset rate, `MediaInfo` and, on request, the pictures as PNG.
 
 use super::reading;
 use super::spans;
@@ -18,21 +18,21 @@ use orator_media::ffmpeg::frames::FrameReader;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Video to sound and timeline.
+/// Stage `extract` for videos.
 pub struct ExtractStage {
     settings: config::ExtractConfig,
-    /// Speakers with the entries that name their mirrored videos, and the folder these count from.
+    /// Per speaker, the entries that name mirrored videos; `folder` is the base of relative paths.
     mirrored: Vec<(String, Vec<String>)>,
     folder: PathBuf,
 }
 
 impl ExtractStage {
-    /// No video is mirrored.
+    /// Creates a stage without mirrored videos.
     pub fn new(settings: &config::ExtractConfig) -> Self {
         Self { settings: settings.clone(), mirrored: Vec::new(), folder: PathBuf::new() }
     }
 
-    /// Settings of a whole configuration, with the videos that it calls mirrored.
+    /// Creates the stage from a configuration, with the videos that it marks as mirrored.
     pub fn of_config(config: &Config) -> Self {
         let mirrored = config.settings.speaker.iter().map(|speaker| (speaker.name.clone(), speaker.mirrored.clone()));
         let folder = config.file.parent().unwrap_or(Path::new(".")).to_owned();
@@ -55,7 +55,7 @@ impl Stage for ExtractStage {
     }
 
     fn settings(&self, unit: &Unit) -> serde_json::Value {
-        // The offset of the sound is known later, and shifted by where sound and frames meet.
+        // The audio offset is measured and corrected by later stages, so `fix_offset` does not affect this one.
         let mut settings = json!(self.settings);
         settings.as_object_mut().map(|settings| settings.remove("fix_offset"));
         json!({
@@ -70,7 +70,7 @@ impl Stage for ExtractStage {
         Ok(vec![Input { role: "video".into(), path: unit.source.clone() }])
     }
 
-    /// Reads the pictures once; a second time where only a part of each counts, or where they are kept.
+    /// Reads the pictures once, and again for each of: an active area smaller than the picture, and export as PNG.
     fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> Result<Report> {
         let rate = self.settings.rate();
         let mut pictures = PictureOptions { mirrored: self.is_mirrored(unit), deinterlace: false };
@@ -133,7 +133,7 @@ impl Stage for ExtractStage {
     }
 }
 
-/// How `extract` found that the pictures of `unit` are to be read; as they are where it has not run.
+/// Picture options that `extract` determined for `unit`; the defaults if it has not run.
 pub fn picture_options(work: &Path, unit: &Unit) -> PictureOptions {
     MediaInfo::read(&Artifact::MediaInfo.path(work, unit))
         .map_or_else(|_| PictureOptions::default(), |media| media.pictures)

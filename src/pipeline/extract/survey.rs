@@ -1,29 +1,29 @@
-//! A look at some pictures of a video in full, two in a row each second: whether they are interlaced, and whether bars
-//! stand beside the picture proper.
+//! Survey of full-size pictures, two consecutive ones per second: whether they are interlaced, and whether they have
+//! bars.
 
 use super::bars::BarFinder;
 use orator_base::types::image::{Image, PixelArea};
 use orator_base::types::time::FrameRate;
 
-/// Frames between two looks at the beginning, and the number of those looks.
+/// Frames between the first samples, and the number of those samples.
 const EARLY_STEP: usize = 5;
-const EARLY_LOOKS: usize = 6;
-/// Mean share of combed pixels of a video that is interlaced: where most frames say that they are, and where none does.
-const FLAGGED: f64 = 5e-5;
-const NOT_FLAGGED: f64 = 5e-4;
-/// Least share of the looks that show combs where the frames do not say that they are interlaced.
-const MOST_LOOKS: f64 = 0.25;
+const EARLY_SAMPLES: usize = 6;
+/// Least mean share of combed pixels of an interlaced video: if most frames are flagged as interlaced, and if not.
+const MIN_COMBS_FLAGGED: f64 = 5e-5;
+const MIN_COMBS_NOT_FLAGGED: f64 = 5e-4;
+/// Least share of the samples with combing if the frames are not flagged as interlaced.
+const MIN_COMBED_SHARE: f64 = 0.25;
 
-/// Least difference of neighbouring lines in a comb, 8-bit steps of green.
-const STEP: i32 = 10;
+/// Least difference of neighbouring lines in combing, 8-bit steps of green.
+const MIN_LINE_STEP: i32 = 10;
 
-/// Looks at a video.
+/// Survey of a video.
 pub struct PictureSurvey {
     frames_per_sec: usize,
-    /// New frames so far, and the one at which the next look begins.
+    /// Number of non-repeated frames so far, and the index at which the next sample begins.
     n_frames: usize,
-    next_look: usize,
-    /// First picture of a look.
+    next_sample: usize,
+    /// First picture of a sample.
     first: Option<Image>,
     combs: Vec<f64>,
     n_flagged: usize,
@@ -31,12 +31,12 @@ pub struct PictureSurvey {
 }
 
 impl PictureSurvey {
-    /// A survey of frames at `rate`.
+    /// Creates a survey of frames at `rate`.
     pub fn new(rate: FrameRate) -> Self {
         Self {
             frames_per_sec: (rate.per_sec().round() as usize).max(2),
             n_frames: 0,
-            next_look: 0,
+            next_sample: 0,
             first: None,
             combs: Vec::new(),
             n_flagged: 0,
@@ -44,12 +44,12 @@ impl PictureSurvey {
         }
     }
 
-    /// Whether the next frame's picture is looked at.
+    /// Whether the next frame's picture is needed.
     pub fn wants_picture(&self) -> bool {
-        self.first.is_some() || self.n_frames == self.next_look
+        self.first.is_some() || self.n_frames == self.next_sample
     }
 
-    /// Takes in the next frame that repeats none, with its picture if that is wanted.
+    /// Adds the next non-repeated frame, with its picture if wanted.
     pub fn push(&mut self, picture: Option<Image>, is_flagged: bool) {
         self.n_frames += 1;
         self.n_flagged += usize::from(is_flagged);
@@ -61,24 +61,24 @@ impl PictureSurvey {
             }
             Some(first) => {
                 self.combs.push(comb_share(&first, &picture));
-                let step = if self.combs.len() < EARLY_LOOKS { EARLY_STEP } else { self.frames_per_sec };
-                self.next_look += step.max(2);
+                let step = if self.combs.len() < EARLY_SAMPLES { EARLY_STEP } else { self.frames_per_sec };
+                self.next_sample += step.max(2);
             }
         }
     }
 
-    /// Mean share of combed pixels.
+    /// Mean share of combed pixels over the samples.
     pub fn comb_share(&self) -> f64 {
         self.combs.iter().sum::<f64>() / self.combs.len().max(1) as f64
     }
 
-    /// Whether the pictures are interlaced: they show combs, of which few are enough where the frames say so too.
+    /// Whether the pictures are interlaced. If the frames are flagged as interlaced, less combing is required.
     pub fn is_interlaced(&self) -> bool {
-        let n_combed = self.combs.iter().filter(|share| **share >= NOT_FLAGGED).count();
-        let often = n_combed as f64 >= MOST_LOOKS * self.combs.len() as f64;
+        let n_combed = self.combs.iter().filter(|share| **share >= MIN_COMBS_NOT_FLAGGED).count();
+        let often = n_combed as f64 >= MIN_COMBED_SHARE * self.combs.len() as f64;
         let flagged = 2 * self.n_flagged > self.n_frames;
         let share = self.comb_share();
-        if flagged { share >= FLAGGED } else { often && share >= NOT_FLAGGED }
+        if flagged { share >= MIN_COMBS_FLAGGED } else { often && share >= MIN_COMBS_NOT_FLAGGED }
     }
 
     /// Area between the bars; `None` without bars.
@@ -87,8 +87,8 @@ impl PictureSurvey {
     }
 }
 
-/// Share of the pixels of `image` that are in a comb and have changed in the picture `after` it: lines that alternate
-/// four times, by more than what stands still like a striped cloth explains. Every fourth column is looked at.
+/// Share of combed pixels of `image` that also change in the next picture `after`. Combed: lines alternate four times;
+/// the change excludes static stripes such as cloth. Samples every fourth column.
 pub fn comb_share(image: &Image, after: &Image) -> f64 {
     let [width, height] = [image.width, image.height];
     if height < 5 || width == 0 || [after.width, after.height] != [width, height] {
@@ -102,8 +102,9 @@ pub fn comb_share(image: &Image, after: &Image) -> f64 {
         for at in (1..3 * width).step_by(12) {
             let [a, b, c, d, e] = lines.map(|line| i32::from(line[at]));
             let steps = [b - a, b - c, d - c, d - e];
-            let alternates = steps.iter().all(|step| *step > STEP) || steps.iter().all(|step| *step < -STEP);
-            n_combed += usize::from(alternates && (c - i32::from(next[at])).abs() > STEP);
+            let alternates =
+                steps.iter().all(|step| *step > MIN_LINE_STEP) || steps.iter().all(|step| *step < -MIN_LINE_STEP);
+            n_combed += usize::from(alternates && (c - i32::from(next[at])).abs() > MIN_LINE_STEP);
         }
     }
     n_combed as f64 / (width.div_ceil(4) * (height - 4)) as f64
@@ -113,7 +114,7 @@ pub fn comb_share(image: &Image, after: &Image) -> f64 {
 mod tests {
     use super::*;
 
-    /// A bright disc on a wall with a thin line, 120 x 80; `x`: its centre on even and on odd lines.
+    /// A bright disc on a wall with a thin line, 120 x 80; `x` is the centre on even and on odd lines.
     fn disc(x: [f64; 2]) -> Image {
         let mut image = Image::filled(120, 80, [40; 3]);
         for (at, pixel) in image.data.as_chunks_mut::<3>().0.iter_mut().enumerate() {
@@ -127,9 +128,9 @@ mod tests {
     #[test]
     fn moving_combs_are_measured_and_nothing_else() {
         assert!(comb_share(&disc([50.0, 62.0]), &disc([74.0, 86.0])) > 0.01);
-        let still = disc([50.0; 2]);
-        assert_eq!(comb_share(&still, &disc([62.0; 2])), 0.0);
-        let mut striped = still;
+        let static_disc = disc([50.0; 2]);
+        assert_eq!(comb_share(&static_disc, &disc([62.0; 2])), 0.0);
+        let mut striped = static_disc;
         striped.data.chunks_exact_mut(3 * 120).step_by(2).for_each(|line| line.fill(90));
         assert_eq!(comb_share(&striped, &striped), 0.0);
         for size in [[0, 0], [1, 1], [3, 4], [1, 9]] {

@@ -1,13 +1,13 @@
-//! A frame as the search for shots keeps it: small, in colour and in gray, and as a coarse grid. `block_match`
-//! compares two of them; their mean change from frame to frame is what `segment` knows of movement.
+//! Thumbnail of a frame for shot detection: small colour and gray pictures and a coarse grid. `block_match` compares
+//! two of them; `segment` uses their mean change from frame to frame as a measure of movement.
 
 use orator_base::types::image::Image;
 
-/// Width and height of the pictures to compare, in cells: fine enough that a person who moves is seen to.
+/// Width and height of a thumbnail, px: fine enough to show the movement of a person.
 pub const THUMBNAIL: [usize; 2] = [64, 64];
-/// Cells a side of the grid, each the mean of a block of the picture.
+/// Cells per side of the grid; each is the mean of a block of the picture.
 pub const CELLS: usize = 16;
-/// Steps of 8-bit colour that count as a change: above what compression and soft light do to a cell's mean.
+/// Least change of a cell in 8-bit steps: above the effect of compression and soft light changes on its mean.
 pub const STEP: u8 = 20;
 
 pub struct Thumbnail {
@@ -20,7 +20,7 @@ pub struct Thumbnail {
 }
 
 impl Thumbnail {
-    /// Keeps a picture of `THUMBNAIL` px.
+    /// Creates a thumbnail from a picture of `THUMBNAIL` px.
     pub fn new(image: Image) -> Self {
         let block = THUMBNAIL.map(|side| side / CELLS);
         let mut sums = vec![[0u32; 3]; CELLS * CELLS];
@@ -37,7 +37,7 @@ impl Thumbnail {
         Self { image, gray, grid }
     }
 
-    /// Share of the grid's cells whose colour differs in any channel by more than `STEP`.
+    /// Share of the grid cells whose colour differs by more than `STEP` in any channel.
     pub fn change(&self, other: &Self) -> f64 {
         let cells = self.grid.iter().zip(&other.grid);
         let n_changed = cells.filter(|(a, b)| a.iter().zip(*b).any(|(a, b)| a.abs_diff(*b) > STEP)).count();
@@ -45,14 +45,14 @@ impl Thumbnail {
     }
 }
 
-/// Mean absolute difference of two pictures of one size, in 8-bit steps: near 0 for a slide, a paused video or a drawn
-/// person.
+/// Mean absolute difference of two equally sized pictures, in 8-bit steps: near 0 for a slide, a paused video or a
+/// drawing.
 pub fn mean_change(a: &Image, b: &Image) -> f32 {
     let sum: u64 = a.data.iter().zip(&b.data).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
     sum as f32 / a.data.len().max(1) as f32
 }
 
-/// A picture without pattern of its own `seed`, seen `shift` px to the right and made darker by `light`.
+/// Noise determined by `seed`, shifted by `shift` px to the right and scaled in brightness by `light`.
 #[cfg(test)]
 pub fn scene(seed: usize, shift: usize, light: f64) -> Image {
     let mut image = Image::filled(THUMBNAIL[0], THUMBNAIL[1], [0; 3]);

@@ -1,79 +1,80 @@
-//! Of several people the one to follow: people of neighbouring frames are joined to tracks by overlap, else by nearness; then
-//! the heaviest track (large, sure, central, long) is taken, and what it leaves of the video goes to the next.
+//! Selection of one person among several: detections of neighbouring frames are joined to tracks by overlap or
+//! proximity; the track with the largest weight (size, score, centrality, length) is chosen, and the frames that it
+//! does not cover go to the next.
 
 use crate::pose2d::decode::boxes::overlap;
 use orator_base::types::pose2d::PersonBox;
 use orator_formats::keypoints::FoundPerson;
 
-/// Least overlap of two boxes of the same person.
+/// Least overlap (IoU) of two boxes of the same person.
 const SAME_PERSON: f32 = 0.2;
-/// Largest distance of their centres where they overlap less, in widths of the wider box.
-const NEAR: f32 = 0.5;
-/// Likeness of two boxes with one centre that overlap less: below that of any that overlap enough.
-const NEAR_WEIGHT: f32 = 0.1;
+/// Largest distance of the centres of two boxes with less overlap, in widths of the wider box.
+const MAX_DISTANCE: f32 = 0.5;
+/// Similarity of two boxes with less overlap but equal centres; below that of any two with enough overlap.
+const NEAR_SIMILARITY: f32 = 0.1;
 
-/// The person followed through a video, a value a frame.
+/// The person that is followed through a video; one value per frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FollowedPerson {
-    /// Index among the frame's people.
+    /// Index among the persons of the frame.
     pub chosen: Vec<Option<usize>>,
-    /// Number of the track; goes up where another is followed.
+    /// Identity number; incremented when another person is followed.
     pub identity: Vec<i64>,
-    /// People in view.
+    /// Number of persons in the frame.
     pub n_people: Vec<usize>,
 }
 
-/// People of frames that are one person.
-struct PersonTrackOfBoxes {
-    /// Frame and index among its people, in order.
-    seen: Vec<(usize, usize)>,
+/// Detections of one person over several frames.
+struct BoxTrack {
+    /// Frame and index among its persons, in order of time.
+    detections: Vec<(usize, usize)>,
     last: PersonBox,
     weight: f64,
 }
 
-/// Follows one person through `frames` of a picture `image_width` px wide. A person who is gone for more than `max_gap`
-/// frames is another one.
+/// Follows one person through `frames` of pictures `image_width` px wide. A person who is absent for more than
+/// `max_gap` frames counts as another person.
 pub fn follow(frames: &[Vec<FoundPerson>], image_width: f32, max_gap: usize) -> FollowedPerson {
     let mut tracks = tracks(frames, image_width, max_gap);
-    // A tie goes to the track that begins first.
+    // The sort is stable, so the earlier track wins a tie.
     tracks.sort_by(|a, b| b.weight.total_cmp(&a.weight));
     let mut owner: Vec<Option<usize>> = vec![None; frames.len()];
     let mut chosen = vec![None; frames.len()];
     for (number, track) in tracks.iter().enumerate() {
-        let free: Vec<(usize, usize)> = track.seen.iter().copied().filter(|(t, _)| owner[*t].is_none()).collect();
+        let free: Vec<(usize, usize)> = track.detections.iter().copied().filter(|(t, _)| owner[*t].is_none()).collect();
         for &(t, person) in &free {
             chosen[t] = Some(person);
         }
-        // Frames between two of a track belong to it, so that nobody else is taken while it is hidden.
-        for pair in track.seen.windows(2) {
-            owner[pair[0].0..=pair[1].0].iter_mut().for_each(|place| *place = place.or(Some(number)));
+        // Gaps within a track belong to it, so that nobody else is followed while the person is hidden.
+        for pair in track.detections.windows(2) {
+            owner[pair[0].0..=pair[1].0].iter_mut().for_each(|slot| *slot = slot.or(Some(number)));
         }
         for (t, _) in free {
             owner[t] = Some(number);
         }
     }
-    let (mut identity, mut n_taken, mut before) = (Vec::with_capacity(frames.len()), 0, None);
-    for place in owner {
-        if place.is_some() && place != before {
-            n_taken += i64::from(before.is_some());
-            before = place;
+    let (mut identity, mut n_changes, mut before) = (Vec::with_capacity(frames.len()), 0, None);
+    for slot in owner {
+        if slot.is_some() && slot != before {
+            n_changes += i64::from(before.is_some());
+            before = slot;
         }
-        identity.push(n_taken);
+        identity.push(n_changes);
     }
     FollowedPerson { chosen, identity, n_people: frames.iter().map(Vec::len).collect() }
 }
 
-fn tracks(frames: &[Vec<FoundPerson>], image_width: f32, max_gap: usize) -> Vec<PersonTrackOfBoxes> {
-    let mut tracks: Vec<PersonTrackOfBoxes> = Vec::new();
+fn tracks(frames: &[Vec<FoundPerson>], image_width: f32, max_gap: usize) -> Vec<BoxTrack> {
+    let mut tracks: Vec<BoxTrack> = Vec::new();
     let mut active: Vec<usize> = Vec::new();
     for (t, people) in frames.iter().enumerate() {
-        active.retain(|track| tracks[*track].seen.last().is_some_and(|(last, _)| t - last <= max_gap));
+        active.retain(|track| tracks[*track].detections.last().is_some_and(|(last, _)| t - last <= max_gap));
         let areas: Vec<(usize, PersonBox)> =
             people.iter().enumerate().filter_map(|(k, person)| Some((k, person.area()?))).collect();
         let mut pairs: Vec<(f32, usize, usize)> = Vec::new();
         for (at, (_, area)) in areas.iter().enumerate() {
-            let near = active.iter().map(|track| (likeness(&tracks[*track].last, area), at, *track));
-            pairs.extend(near.filter(|(likeness, _, _)| *likeness > 0.0));
+            let near = active.iter().map(|track| (similarity(&tracks[*track].last, area), at, *track));
+            pairs.extend(near.filter(|(similarity, _, _)| *similarity > 0.0));
         }
         pairs.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.2, a.1).cmp(&(b.2, b.1))));
         let mut track_of: Vec<Option<usize>> = vec![None; areas.len()];
@@ -84,12 +85,12 @@ fn tracks(frames: &[Vec<FoundPerson>], image_width: f32, max_gap: usize) -> Vec<
         }
         for ((person, area), track) in areas.into_iter().zip(track_of) {
             let track = track.unwrap_or_else(|| {
-                tracks.push(PersonTrackOfBoxes { seen: Vec::new(), last: area, weight: 0.0 });
+                tracks.push(BoxTrack { detections: Vec::new(), last: area, weight: 0.0 });
                 active.push(tracks.len() - 1);
                 tracks.len() - 1
             });
             let track = &mut tracks[track];
-            track.seen.push((t, person));
+            track.detections.push((t, person));
             track.last = area;
             track.weight += weight(&area, image_width);
         }
@@ -97,8 +98,8 @@ fn tracks(frames: &[Vec<FoundPerson>], image_width: f32, max_gap: usize) -> Vec<
     tracks
 }
 
-/// How much two boxes look like one person's: their overlap, or little where they are only near; 0: not at all.
-fn likeness(a: &PersonBox, b: &PersonBox) -> f32 {
+/// Similarity of two boxes: their overlap, a small value if they are only close, or 0.
+fn similarity(a: &PersonBox, b: &PersonBox) -> f32 {
     let shared = overlap(a, b);
     if shared >= SAME_PERSON {
         return shared;
@@ -106,10 +107,10 @@ fn likeness(a: &PersonBox, b: &PersonBox) -> f32 {
     let centre = |area: &PersonBox| [area.x + area.width / 2.0, area.y + area.height / 2.0];
     let ([ax, ay], [bx, by]) = (centre(a), centre(b));
     let distance = (ax - bx).hypot(ay - by) / a.width.max(b.width).max(1.0);
-    if distance <= NEAR { NEAR_WEIGHT * (1.0 - distance) } else { 0.0 }
+    if distance <= MAX_DISTANCE { NEAR_SIMILARITY * (1.0 - distance) } else { 0.0 }
 }
 
-/// Weight of a frame of a person: size, score, nearness to the middle.
+/// Weight of a detection: size, score and distance from the centre of the picture.
 fn weight(area: &PersonBox, image_width: f32) -> f64 {
     let middle = image_width / 2.0;
     let off = ((area.x + area.width / 2.0 - middle) / middle.max(1.0)).abs().min(1.0);
@@ -121,7 +122,7 @@ mod tests {
     use super::*;
     use orator_base::types::pose2d::Keypoint;
 
-    /// A body between two corners.
+    /// A body with one point in each of two corners of a square.
     fn at(x: f32, size: f32) -> FoundPerson {
         let mut person = FoundPerson::default();
         person.body[0] = Keypoint { x, y: 10.0, score: 0.9 };
@@ -130,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn the_larger_one_is_followed_whatever_the_order_and_through_a_gap() {
+    fn the_larger_person_is_followed_in_any_order_and_through_a_gap() {
         let frames: Vec<Vec<FoundPerson>> = (0..30)
             .map(|t| {
                 let (speaker, guest) = (at(100.0 + t as f32, 100.0), at(300.0 - t as f32, 60.0));
@@ -147,13 +148,13 @@ mod tests {
             assert_eq!(*chosen, expected, "frame {t}");
         }
         assert!(followed.identity.iter().all(|number| *number == 0) && followed.n_people[0] == 2);
-        // Gone for longer than the gap, the guest is followed in between and each of the three is another person.
+        // Absent for longer than the gap: the guest is followed in between, and each of the three is another identity.
         let followed = follow(&frames, 400.0, 3);
         assert_eq!((followed.chosen[12], followed.identity[9], followed.identity[29]), (Some(0), 0, 2));
     }
 
     #[test]
-    fn a_cut_to_another_place_is_another_person_and_nobody_is_nobody() {
+    fn a_jump_is_another_identity_and_empty_frames_have_none() {
         let frames: Vec<Vec<FoundPerson>> = (0..20).map(|t| vec![at(if t < 10 { 0.0 } else { 500.0 }, 80.0)]).collect();
         let followed = follow(&frames, 600.0, 15);
         assert_eq!((followed.identity[9], followed.identity[10], followed.chosen[10]), (0, 1, Some(0)));

@@ -1,6 +1,6 @@
-//! Keypoints that other programs found, in place of a video's pictures: `follow` chooses one person, `resample` brings them
-//! to the dataset rate, `taken` is both, `stage` writes what `extract` and `pose2d` write of a video, so that the road
-//! goes on from `segment`, and chooses between the two.
+//! Keypoints of other programs, used instead of a video's pictures: `follow` selects one person, `resample`
+//! interpolates to the dataset rate, `taken` combines both, and `stage` writes the outputs of `extract` and `pose2d`
+//! in their place, so that `segment` can continue, and dispatches each unit by its source.
 
 pub mod follow;
 pub mod resample;

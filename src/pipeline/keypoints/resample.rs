@@ -1,38 +1,38 @@
-//! Keypoints between frames: a point lies on the line between its places in the two frames around a moment, where both show
-//! it; else where the nearer frame shows it.
+//! Interpolation of keypoints between frames: linear where both neighbouring frames show the point, else the value of
+//! the nearer frame if that shows it.
 
 use orator_base::types::pose2d::Keypoint;
 use orator_formats::keypoints::FoundPerson;
 
-/// Moments this near to a frame, in frames, are that frame's.
-const SAME: f64 = 1e-4;
+/// Distance in frames within which a time counts as that of a frame.
+const EPSILON: f64 = 1e-4;
 
-/// The person at `place` frames of `frames`; `None` where the frames around it show nobody.
-pub fn person_at(frames: &[Option<&FoundPerson>], place: f64) -> Option<FoundPerson> {
+/// Interpolates the person at the fractional frame index `frame_idx`; `None` where the neighbouring frames show nobody.
+pub fn person_at(frames: &[Option<&FoundPerson>], frame_idx: f64) -> Option<FoundPerson> {
     let at = |frame: usize| frames.get(frame).copied().flatten();
-    let below = place.max(0.0) as usize;
-    let share = place - below as f64;
+    let below = frame_idx.max(0.0) as usize;
+    let share = frame_idx - below as f64;
     match (at(below), at(below + 1)) {
-        (before, _) if share < SAME => before.cloned(),
-        (_, after) if share > 1.0 - SAME => after.cloned(),
+        (before, _) if share < EPSILON => before.cloned(),
+        (_, after) if share > 1.0 - EPSILON => after.cloned(),
         (None, None) => None,
         (before, after) => {
             let none = FoundPerson::default();
             let (before, after) = (before.unwrap_or(&none), after.unwrap_or(&none));
             let share = share as f32;
             Some(FoundPerson {
-                body: std::array::from_fn(|k| between(before.body[k], after.body[k], share)),
-                left_hand: std::array::from_fn(|k| between(before.left_hand[k], after.left_hand[k], share)),
-                right_hand: std::array::from_fn(|k| between(before.right_hand[k], after.right_hand[k], share)),
+                body: std::array::from_fn(|k| interpolate(before.body[k], after.body[k], share)),
+                left_hand: std::array::from_fn(|k| interpolate(before.left_hand[k], after.left_hand[k], share)),
+                right_hand: std::array::from_fn(|k| interpolate(before.right_hand[k], after.right_hand[k], share)),
             })
         }
     }
 }
 
-fn between(a: Keypoint, b: Keypoint, share: f32) -> Keypoint {
-    let mix = |a: f32, b: f32| a + share * (b - a);
+fn interpolate(a: Keypoint, b: Keypoint, share: f32) -> Keypoint {
+    let lerp = |a: f32, b: f32| a + share * (b - a);
     match (a.score > 0.0, b.score > 0.0) {
-        (true, true) => Keypoint { x: mix(a.x, b.x), y: mix(a.y, b.y), score: mix(a.score, b.score) },
+        (true, true) => Keypoint { x: lerp(a.x, b.x), y: lerp(a.y, b.y), score: lerp(a.score, b.score) },
         (true, false) if share <= 0.5 => a,
         (false, true) if share > 0.5 => b,
         _ => Keypoint::default(),
@@ -50,12 +50,15 @@ mod tests {
     }
 
     #[test]
-    fn a_point_that_moves_steadily_is_where_it_is_between_frames() {
+    fn linear_motion_is_interpolated_exactly() {
         let people: Vec<FoundPerson> = (0..10).map(|t| person(3.0 * t as f32)).collect();
         let frames: Vec<Option<&FoundPerson>> = people.iter().map(Some).collect();
-        for place in [0.0, 0.4, 1.0, 2.75, 8.999_99] {
-            let found = person_at(&frames, place).unwrap().body[0];
-            assert!((f64::from(found.x) - 3.0 * place).abs() < 1e-3 && found.x == -found.y, "{place}: {found:?}");
+        for frame_idx in [0.0, 0.4, 1.0, 2.75, 8.999_99] {
+            let found = person_at(&frames, frame_idx).unwrap().body[0];
+            assert!(
+                (f64::from(found.x) - 3.0 * frame_idx).abs() < 1e-3 && found.x == -found.y,
+                "{frame_idx}: {found:?}"
+            );
         }
         assert_eq!(person_at(&frames, 9.4).unwrap().body[0].x, 27.0);
         assert_eq!(person_at(&frames, 9.6).unwrap().body[0].score, 0.0);
@@ -63,10 +66,10 @@ mod tests {
     }
 
     #[test]
-    fn a_point_that_one_frame_shows_is_taken_from_it_for_half_the_way() {
+    fn a_point_in_one_frame_only_is_used_up_to_the_midpoint() {
         let (shown, hidden) = (person(4.0), FoundPerson::default());
         let frames = [Some(&shown), Some(&hidden), None, Some(&shown)];
-        let score = |place: f64| person_at(&frames, place).map(|person| person.body[0].score);
+        let score = |frame_idx: f64| person_at(&frames, frame_idx).map(|person| person.body[0].score);
         assert_eq!([0.3, 0.7, 1.0, 1.5].map(score), [Some(0.5), Some(0.0), Some(0.0), Some(0.0)]);
         assert_eq!((score(2.0), score(2.3), score(2.7), score(3.0)), (None, Some(0.0), Some(0.5), Some(0.5)));
     }

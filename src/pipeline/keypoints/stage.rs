@@ -1,5 +1,6 @@
-//! The first two stages for keypoints of other programs. `extract` reads them and writes sound, timeline and `MediaInfo` as of
-//! a video, and the keypoints at the dataset rate; `pose2d` hands these on. What pictures alone tell is NaN, not known.
+//! The stages `extract` and `pose2d` for keypoints of other programs. `extract` reads them and writes audio, timeline
+//! and `MediaInfo` as for a video, and the keypoints at the dataset rate; `pose2d` copies these. Values that need
+//! pictures are NaN.
 
 use super::taken::{TakenKeypoints, take_in};
 use crate::sound::extract_wav;
@@ -19,17 +20,17 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-/// Version of what is read of other programs' files; goes up when the same file gives other keypoints.
+/// Version of the readers; increased when the same file yields different keypoints.
 const READERS: u32 = 2;
 
-/// Keypoints to sound, timeline and keypoints at the dataset rate.
+/// `extract` for keypoints: audio, timeline and keypoints at the dataset rate.
 pub struct KeypointExtractStage {
     settings: ExtractConfig,
-    /// What the configuration says, by speaker and video.
+    /// Configuration entries by speaker and video.
     sources: BTreeMap<(String, String), KeypointSource>,
 }
 
-/// Keypoints of the stage before, handed on.
+/// `pose2d` for keypoints: copies the keypoints that `extract` wrote.
 pub struct KeypointPose2dStage {
     work: PathBuf,
 }
@@ -93,7 +94,7 @@ impl Stage for KeypointExtractStage {
         let TakenKeypoints { keypoints, extras, duration_secs, notes } = take_in(found, source_fps, image_size, fps)?;
         let n_frames = keypoints.n_frames();
         keypoints_npz::write(&Artifact::Keypoints.within(out), &keypoints, &extras)?;
-        without_pictures(extras.time_secs.to_vec()).write(&Artifact::Timeline.within(out))?;
+        timeline_without_pictures(extras.time_secs.to_vec()).write(&Artifact::Timeline.within(out))?;
         let sound =
             extract_wav(&self.sound(unit)?, self.settings.audio_track, &Artifact::Sound.within(out), SAMPLE_RATE)?;
         let audio_secs = sound.as_ref().map(|sound| sound.secs);
@@ -108,16 +109,16 @@ impl Stage for KeypointExtractStage {
         };
         media.write(&Artifact::MediaInfo.within(out))?;
         let sound = audio_secs.map_or("no sound".to_owned(), |secs| format!("{secs:.1} s of sound"));
-        let said = media.not_judged().into_iter().chain(media.damage.clone()).chain(notes.clone());
-        let said = said.collect::<Vec<_>>().join("; ");
+        let remarks = media.not_judged().into_iter().chain(media.damage.clone()).chain(notes.clone());
+        let remarks = remarks.collect::<Vec<_>>().join("; ");
         let mut facts = serde_json::to_value(&media)?.as_object().cloned().unwrap_or_default();
         facts.insert("notes".into(), notes.into());
-        Ok(Report { line: format!("{n_frames} frames at {fps}, {sound}; {said}"), facts })
+        Ok(Report { line: format!("{n_frames} frames at {fps}, {sound}; {remarks}"), facts })
     }
 }
 
-/// The timeline of frames that no picture was seen of: movement and shots are not known.
-fn without_pictures(source_secs: Vec<f64>) -> Timeline {
+/// Timeline of frames without pictures: movement and shots are unknown.
+fn timeline_without_pictures(source_secs: Vec<f64>) -> Timeline {
     let n_frames = source_secs.len();
     Timeline {
         source_secs,
@@ -130,7 +131,7 @@ fn without_pictures(source_secs: Vec<f64>) -> Timeline {
 }
 
 impl KeypointPose2dStage {
-    fn taken(&self, unit: &Unit) -> PathBuf {
+    fn keypoints_path(&self, unit: &Unit) -> PathBuf {
         Artifact::Keypoints.within(&dir(&self.work, StageName::Extract, unit))
     }
 }
@@ -149,18 +150,18 @@ impl Stage for KeypointPose2dStage {
     }
 
     fn inputs(&self, unit: &Unit) -> Result<Vec<Input>> {
-        Ok(vec![Input { role: "keypoints".into(), path: self.taken(unit) }])
+        Ok(vec![Input { role: "keypoints".into(), path: self.keypoints_path(unit) }])
     }
 
     fn run(&self, unit: &Unit, out: &Path, _progress: &dyn Progress) -> Result<Report> {
-        let (from, to) = (self.taken(unit), Artifact::Keypoints.within(out));
+        let (from, to) = (self.keypoints_path(unit), Artifact::Keypoints.within(out));
         let copy = || std::io::copy(&mut File::open(&from)?, &mut File::create(&to)?);
         copy().with_context(|| format!("cannot copy {} to {}", from.display(), to.display()))?;
         let (keypoints, extras) = (keypoints_npz::read(&to)?, keypoints_npz::read_extras(&to)?);
         let share = |points: &Array3<f32>| {
-            let seen =
+            let n_visible =
                 points.slice(s![.., .., 2]).outer_iter().filter(|scores| scores.iter().any(|s| *s > 0.0)).count();
-            seen as f64 / keypoints.n_frames().max(1) as f64
+            n_visible as f64 / keypoints.n_frames().max(1) as f64
         };
         let [body, left, right] = [&keypoints.body, &keypoints.left_hand, &keypoints.right_hand].map(share);
         let several = extras.n_people.iter().filter(|n| **n > 1).count() as f64 / keypoints.n_frames().max(1) as f64;
@@ -179,7 +180,8 @@ impl Stage for KeypointPose2dStage {
     }
 }
 
-/// A stage that works on videos in one way and on keypoints of other programs in another, and the units that are keypoints.
+/// A stage with one implementation for videos and one for keypoints of other programs, and the set of units that are
+/// keypoints.
 pub struct StageBySource {
     of_videos: Box<dyn Stage>,
     of_keypoints: Box<dyn Stage>,
@@ -190,16 +192,16 @@ impl StageBySource {
     /// The stage `extract`.
     pub fn extract(of_videos: Box<dyn Stage>, settings: &Settings, all: &[Videos]) -> Box<dyn Stage> {
         let of_keypoints = KeypointExtractStage::new(&settings.extract, all);
-        Self::both(of_videos, Box::new(of_keypoints), all)
+        Self::dispatch(of_videos, Box::new(of_keypoints), all)
     }
 
     /// The stage `pose2d`.
     pub fn pose2d(of_videos: Box<dyn Stage>, settings: &Settings, all: &[Videos]) -> Box<dyn Stage> {
-        Self::both(of_videos, Box::new(KeypointPose2dStage { work: settings.work.dir.clone() }), all)
+        Self::dispatch(of_videos, Box::new(KeypointPose2dStage { work: settings.work.dir.clone() }), all)
     }
 
-    /// The way of videos alone where there are no keypoints.
-    fn both(of_videos: Box<dyn Stage>, of_keypoints: Box<dyn Stage>, all: &[Videos]) -> Box<dyn Stage> {
+    /// The video implementation alone, if no unit consists of keypoints.
+    fn dispatch(of_videos: Box<dyn Stage>, of_keypoints: Box<dyn Stage>, all: &[Videos]) -> Box<dyn Stage> {
         let names = |videos: &Videos| {
             videos.keypoints.keys().map(|video| (videos.speaker.clone(), video.clone())).collect::<Vec<_>>()
         };
@@ -209,7 +211,8 @@ impl StageBySource {
 }
 
 impl StageWrapper for StageBySource {
-    /// Version and cost are those of the way of videos; that of keypoints has its own version in the settings.
+    /// Version and cost are those of the video implementation; the version of the keypoint implementation is part of
+    /// its settings.
     fn inner(&self, unit: Option<&Unit>) -> &dyn Stage {
         let is_keypoints =
             unit.is_some_and(|unit| self.keypoints.contains(&(unit.speaker.clone(), unit.video.clone())));

@@ -1,4 +1,4 @@
-//! Keypoints of another program as ours: one person, pixels, the dataset rate.
+//! Conversion of keypoints of another program: one person, pixel coordinates, the dataset rate.
 
 use super::follow::{FollowedPerson, follow};
 use super::resample::person_at;
@@ -9,21 +9,22 @@ use orator_base::types::time::FrameRate;
 use orator_formats::keypoints::{FoundKeypoints, FoundPerson};
 use orator_formats::keypoints_npz::Extras;
 
-/// Seconds for which a person may be gone and still be the same.
+/// Longest absence, in seconds, after which a person keeps the identity.
 const MAX_GAP_SECS: f64 = 1.0;
 
-/// Keypoints at the dataset rate, with what our own files hold beside them.
+/// Keypoints at the dataset rate, with the extra arrays of `keypoints.npz`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TakenKeypoints {
     pub keypoints: Keypoints,
     pub extras: Extras,
-    /// Length of the frames at their own rate.
+    /// Duration of the source frames in seconds.
     pub duration_secs: f64,
-    /// Sentences on what was missing, and on other people.
+    /// Notes on missing data and on other persons in view.
     pub notes: Vec<String>,
 }
 
-/// Takes in keypoints found at `source_fps` in pictures of `image_size`, as keypoints at `fps`.
+/// Converts keypoints detected at `source_fps` in pictures of `image_size` (width, height in px) to keypoints at
+/// `fps`.
 pub fn take_in(
     mut found: FoundKeypoints,
     source_fps: FrameRate,
@@ -39,24 +40,24 @@ pub fn take_in(
     let n_frames = fps.frames_in(duration_secs);
     let mut gathered = KeypointFrames::default();
     for t in 0..n_frames {
-        let place = fps.secs(t) * source_fps.per_sec();
-        let nearest = (place.round() as usize).min(people.len() - 1);
-        // Two people are not mixed.
-        let below = place as usize;
+        let frame_idx = fps.secs(t) * source_fps.per_sec();
+        let nearest = (frame_idx.round() as usize).min(people.len() - 1);
+        // No interpolation between two identities.
+        let below = frame_idx as usize;
         let is_one = followed.identity.get(below) == followed.identity.get(below + 1);
-        let place = if is_one || below + 1 >= people.len() { place } else { nearest as f64 };
-        gathered.push(pose(person_at(&people, place), &followed, nearest), fps.secs(t));
+        let frame_idx = if is_one || below + 1 >= people.len() { frame_idx } else { nearest as f64 };
+        gathered.push(pose(person_at(&people, frame_idx), &followed, nearest), fps.secs(t));
     }
-    // The source is gone before the arrays are there: each takes a kilobyte a frame.
+    // The source is freed before the arrays are allocated: each takes about a kilobyte per frame.
     let mut notes = found.notes;
     drop(people);
     drop(found.frames);
     let (keypoints, extras) = gathered.finish(fps, image_size)?;
-    notes.extend(others(&followed));
+    notes.extend(note_on_others(&followed));
     Ok(TakenKeypoints { keypoints, extras, duration_secs, notes })
 }
 
-/// The frame of our own files; people and identity are those of the source's nearest frame.
+/// One output frame; person count and identity are those of the nearest source frame.
 fn pose(person: Option<FoundPerson>, followed: &FollowedPerson, nearest: usize) -> Pose2d {
     let person = person.unwrap_or_default();
     Pose2d {
@@ -71,8 +72,8 @@ fn pose(person: Option<FoundPerson>, followed: &FollowedPerson, nearest: usize) 
     }
 }
 
-/// Sentence on people beside the one followed.
-fn others(followed: &FollowedPerson) -> Option<String> {
+/// Note on the other persons in view, if there are any.
+fn note_on_others(followed: &FollowedPerson) -> Option<String> {
     let n_frames = followed.n_people.len();
     let n_several = followed.n_people.iter().filter(|n| **n > 1).count();
     let most = followed.n_people.iter().max().filter(|most| **most > 1)?;

@@ -1,13 +1,13 @@
-//! Gaps in a track: short ones are filled over time, long ones stay open. A track is [T, n, k]; a frame of it is there
-//! or missing (its first number NaN) as a whole.
+//! Gaps in a track: short ones are interpolated, long ones stay open. A track is [T, n, k]; a frame is missing as a
+//! whole if its first value is NaN.
 
 use ndarray::{ArrayViewMut3, Axis};
 
-/// Whether each frame lies in a gap of `seen` of more than `longest` frames; gaps at the ends count as well.
-pub fn long_gaps(seen: &[bool], longest: usize) -> Vec<bool> {
-    let mut open = vec![false; seen.len()];
+/// Whether each frame lies in a gap of `visible` of more than `longest` frames, gaps at the ends included.
+pub fn long_gaps(visible: &[bool], longest: usize) -> Vec<bool> {
+    let mut open = vec![false; visible.len()];
     let mut start = 0;
-    for gap in seen.chunk_by(|a, b| a == b) {
+    for gap in visible.chunk_by(|a, b| a == b) {
         let end = start + gap.len();
         if !gap[0] && gap.len() > longest {
             open[start..end].fill(true);
@@ -17,7 +17,7 @@ pub fn long_gaps(seen: &[bool], longest: usize) -> Vec<bool> {
     open
 }
 
-/// Fills each gap of up to `longest` frames between two frames that are there, in proportion to the time.
+/// Linearly interpolates each gap of up to `longest` frames between two present frames.
 pub fn bridge(mut track: ArrayViewMut3<f32>, longest: usize) {
     let mut last: Option<usize> = None;
     for t in 0..track.len_of(Axis(0)) {
@@ -34,11 +34,13 @@ pub fn bridge(mut track: ArrayViewMut3<f32>, longest: usize) {
     }
 }
 
-/// Fills a gap of up to `longest` frames before the first and after the last frame that is there with that frame.
+/// Extends the first and last present frame over gaps of up to `longest` frames at the ends.
 pub fn hold_ends(mut track: ArrayViewMut3<f32>, longest: usize) {
     let n_frames = track.len_of(Axis(0));
-    let there = |t: &usize| !track[[*t, 0, 0]].is_nan();
-    let (Some(first), Some(last)) = ((0..n_frames).find(there), (0..n_frames).rev().find(there)) else { return };
+    let is_present = |t: &usize| !track[[*t, 0, 0]].is_nan();
+    let (Some(first), Some(last)) = ((0..n_frames).find(is_present), (0..n_frames).rev().find(is_present)) else {
+        return;
+    };
     for mut lane in track.lanes_mut(Axis(0)) {
         let (a, b) = (lane[first], lane[last]);
         if first <= longest {
@@ -57,9 +59,9 @@ mod tests {
 
     #[test]
     fn only_long_gaps_stay_open() {
-        let seen = [false, true, false, false, true, false, false, false];
-        assert_eq!(long_gaps(&seen, 2), [false, false, false, false, false, true, true, true]);
-        assert_eq!(long_gaps(&seen, 0), seen.map(|s| !s));
+        let visible = [false, true, false, false, true, false, false, false];
+        assert_eq!(long_gaps(&visible, 2), [false, false, false, false, false, true, true, true]);
+        assert_eq!(long_gaps(&visible, 0), visible.map(|s| !s));
         assert!(long_gaps(&[], 3).is_empty());
     }
 

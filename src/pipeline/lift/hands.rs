@@ -1,8 +1,8 @@
-//! Hands in 3D: one hand over an interval through the hand lifter, then freed of wrong sides and single wrong
-//! frames.
+//! 3D lifting of hands: one hand over an interval through the hand lifter, then correction of the depth ambiguity and
+//! of single outliers.
 
 use super::hand_depth;
-use super::observed::FARTHEST_PX;
+use super::observed::MAX_PX;
 use anyhow::Result;
 use ndarray::{ArrayView3, ArrayViewMut2, ArrayViewMut3, Axis, s};
 use orator_base::math::vec3;
@@ -11,13 +11,16 @@ use orator_base::types::pose2d::{HAND_SEEN_SCORE, N_HAND};
 use orator_base::types::skeleton::Side;
 use orator_nn::lifter::hand::HandLifter;
 
-/// A hand with fewer points seen is not lifted.
-const LEAST_POINTS: usize = 12;
-/// Hands that go through the network together.
+/// Least number of visible points of a hand that is lifted.
+const MIN_POINTS: usize = 12;
+/// Batch size of the network.
 const BATCH: usize = 1024;
 
-/// Lifts one hand from `points` [T, 21, 3] into `joints` [T, 21, 3]: the wrist at 0, all bones together 1 long; NaN
-/// where the hand is missing. `mask` [T, 21] says what was seen.
+/// Lifts one hand from `points` [T, 21, 3] (x, y in px, score) into `joints` [T, 21, 3]: wrist at 0, sum of the bone
+/// lengths 1; NaN where the hand is missing. `mask` [T, 21] marks the visible points.
+///
+/// # Errors
+/// Those of the network.
 pub fn lift(
     lifter: &HandLifter,
     points: &ArrayView3<f32>,
@@ -28,35 +31,36 @@ pub fn lift(
 ) -> Result<()> {
     let n_frames = points.len_of(Axis(0));
     for start in (0..n_frames).step_by(BATCH) {
-        let enough = |seen: SeenHand| if seen.iter().flatten().count() < LEAST_POINTS { [None; N_HAND] } else { seen };
-        let seen: Vec<SeenHand> =
-            (start..n_frames.min(start + BATCH)).map(|t| enough(seen_points(points, t))).collect();
-        for (t, (hand, seen)) in (start..).zip(lifter.lift(&seen, side)?.into_iter().zip(&seen)) {
+        let or_empty =
+            |visible: SeenHand| if visible.iter().flatten().count() < MIN_POINTS { [None; N_HAND] } else { visible };
+        let visible: Vec<SeenHand> =
+            (start..n_frames.min(start + BATCH)).map(|t| or_empty(visible_points(points, t))).collect();
+        for (t, (hand, visible)) in (start..).zip(lifter.lift(&visible, side)?.into_iter().zip(&visible)) {
             let Some(hand) = hand.as_ref().and_then(unit_size) else { continue };
-            (0..N_HAND).for_each(|j| mask[[t, j]] = seen[j].is_some());
+            (0..N_HAND).for_each(|j| mask[[t, j]] = visible[j].is_some());
             joints.slice_mut(s![t, .., ..]).indexed_iter_mut().for_each(|((j, k), v)| *v = hand[j][k] as f32);
         }
     }
-    hand_depth::settle(joints.view_mut(), frame_secs);
-    steady(joints.view_mut());
+    hand_depth::resolve(joints.view_mut(), frame_secs);
+    median_filter(joints.view_mut());
     Ok(())
 }
 
-fn seen_points(points: &ArrayView3<f32>, t: usize) -> SeenHand {
+fn visible_points(points: &ArrayView3<f32>, t: usize) -> SeenHand {
     std::array::from_fn(|j| {
         let [x, y, score] = [0, 1, 2].map(|k| points[[t, j, k]]);
-        (score >= HAND_SEEN_SCORE && x.abs() <= FARTHEST_PX && y.abs() <= FARTHEST_PX).then_some([x, y])
+        (score >= HAND_SEEN_SCORE && x.abs() <= MAX_PX && y.abs() <= MAX_PX).then_some([x, y])
     })
 }
 
-/// The hand with all its bones together 1 long; `None` of a hand without extent.
+/// Scales a hand to a sum of bone lengths of 1; `None` for a hand without extent.
 fn unit_size(hand: &HandJoints) -> Option<HandJoints> {
     let bones: f64 = (1..N_HAND).map(|j| vec3::norm(vec3::sub(hand[j], hand[parent(j)]))).sum();
     (bones.is_finite() && bones > 1e-9).then(|| hand.map(|p| vec3::scale(p, 1.0 / bones)))
 }
 
-/// Each number the median of its frame and the two beside it, where all three are there: takes single wrong shapes out.
-fn steady(mut track: ArrayViewMut3<f32>) {
+/// Median filter over three frames, where all are present; removes single outliers.
+fn median_filter(mut track: ArrayViewMut3<f32>) {
     for mut lane in track.lanes_mut(Axis(0)) {
         let mut before = f32::NAN;
         for t in 0..lane.len().saturating_sub(1) {
@@ -76,13 +80,13 @@ mod tests {
     use ndarray::Array3;
 
     #[test]
-    fn a_single_wrong_frame_goes() {
+    fn a_single_outlier_is_removed() {
         let numbers = [1.0, 2.0, 90.0, 4.0, f32::NAN, 6.0, 0.0, 9.0, 8.0];
         let mut track = Array3::from_shape_fn((numbers.len(), 1, 1), |(t, _, _)| numbers[t]);
-        steady(track.view_mut());
-        let said = track.iter().map(|v| format!("{v}")).collect::<Vec<_>>().join(" ");
-        assert_eq!(said, "1 2 4 4 NaN 6 6 8 8");
-        steady(Array3::zeros((0, 1, 1)).view_mut());
+        median_filter(track.view_mut());
+        let text = track.iter().map(|v| format!("{v}")).collect::<Vec<_>>().join(" ");
+        assert_eq!(text, "1 2 4 4 NaN 6 6 8 8");
+        median_filter(Array3::zeros((0, 1, 1)).view_mut());
     }
 
     #[test]

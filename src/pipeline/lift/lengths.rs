@@ -1,5 +1,6 @@
-//! The bone lengths of a video: one set over all its intervals, from what was lifted and smoothed. Sizes are a convention,
-//! as no picture tells them: the body is of the reference size, a hand has the size its forearm sets.
+//! Bone lengths of a video: one set for all its intervals, from the lifted and smoothed joints. Absolute size is a
+//! convention, since a picture does not show it: the body has the reference size, and the hand size follows from the
+//! forearm.
 
 use orator_base::math::order::{lower_median, lower_quantile};
 use orator_base::motion::upper_body::REFERENCE_SIZE;
@@ -10,24 +11,24 @@ use orator_base::types::skeleton::{
     L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, N_BONES, R_ELBOW, R_HAND, R_SHOULDER, R_WRIST,
 };
 
-/// Quantile of a bone's lifted lengths that counts: bones that point at the
-/// camera come out short. Chosen on bodies of known proportions with an earlier body lifter, where it came nearer than
-/// the median, the common adult, a mean of both, and the longest appearance in the picture.
+/// Quantile of a bone's lifted lengths: bones that point at the camera come out too short. Chosen on bodies of known
+/// proportions with an earlier body lifter, where it was more accurate than the median, average adult lengths, the
+/// mean of both, and the longest projection.
 const QUANTILE: f64 = 0.7;
-/// Shoulders, upper arm and forearm of a common adult, metres, together of the reference size.
-const COMMON: [f64; 3] = [0.354, 0.293, 0.253];
-/// How far a measured bone may be from the common one, as a ratio: adults differ by 5 %, and where a bone points at the
-/// camera throughout it is lifted much too short.
-const BELIEVED: (f64, f64) = (0.9, 1.12);
-/// The middle finger's first phalanx in forearms (house measure: 48 mm for a forearm of 0.24 m).
+/// Shoulder width, upper arm and forearm of an average adult in metres; their sum is the reference size.
+const ADULT_LENGTHS: [f64; 3] = [0.354, 0.293, 0.253];
+/// Range of the ratio of a measured bone to the average one: adults vary by 5 %, but a bone that always points at the
+/// camera comes out far too short.
+const LENGTH_RATIO_RANGE: (f64, f64) = (0.9, 1.12);
+/// Length of the first phalanx of the middle finger relative to the forearm (48 mm for a forearm of 0.24 m).
 const PHALANX_OF_FOREARM: f64 = 0.20;
-/// That phalanx in bones of the hand together (the means that `train::hand_shape` cites), and how far from it the lifted
-/// one is believed, as a ratio: a finger that points at the camera throughout must not make the hand large.
+/// Length of that phalanx relative to the sum of all hand bones (means cited in `train::hand_shape`), and range of the
+/// ratio of the lifted to this length: a finger that always points at the camera must not enlarge the hand.
 const PHALANX_OF_HAND: f64 = 1.0 / 18.0;
-const PHALANX_BELIEVED: (f64, f64) = (0.85, 1.2);
+const PHALANX_RATIO_RANGE: (f64, f64) = (0.85, 1.2);
 
-/// The lengths in metres of bones 1..=48 of a lifted motion (hands of any one size, each in its own frame with the
-/// root at 0); 0: a hand never seen, and the hand roots.
+/// Lengths in metres of bones 1..=48 of a lifted motion (hands of any size, each in its own frame with the root at 0).
+/// 0 for a hand that is never visible, and for the hand roots.
 pub fn measure(motion: &Motion) -> [f32; N_BONES] {
     let [shoulders, upper_arm, forearm] = arms(motion);
     let hand = hands(motion, forearm);
@@ -43,7 +44,7 @@ pub fn measure(motion: &Motion) -> [f32; N_BONES] {
     })
 }
 
-/// Shoulders, upper arm and forearm, the same on both sides.
+/// Shoulder width, upper arm and forearm in metres, equal on both sides.
 fn arms(motion: &Motion) -> [f64; 3] {
     let sides: [&[(usize, usize)]; 3] = [
         &[(R_SHOULDER, L_SHOULDER)],
@@ -52,43 +53,44 @@ fn arms(motion: &Motion) -> [f64; 3] {
     ];
     let mut lengths = [0.0; 3];
     for (i, bones) in sides.iter().enumerate() {
-        let all = bones.iter().flat_map(|&(a, b)| seen_lengths(motion, a, b));
-        let [least, most] = [BELIEVED.0, BELIEVED.1].map(|ratio| ratio * COMMON[i]);
-        lengths[i] = lower_quantile(all, QUANTILE).map_or(COMMON[i], |length| f64::from(length).clamp(least, most));
+        let all = bones.iter().flat_map(|&(a, b)| visible_lengths(motion, a, b));
+        let [least, most] = [LENGTH_RATIO_RANGE.0, LENGTH_RATIO_RANGE.1].map(|ratio| ratio * ADULT_LENGTHS[i]);
+        lengths[i] =
+            lower_quantile(all, QUANTILE).map_or(ADULT_LENGTHS[i], |length| f64::from(length).clamp(least, most));
     }
-    let grow = REFERENCE_SIZE / lengths.iter().sum::<f64>();
-    lengths.map(|length| length * grow)
+    let scale = REFERENCE_SIZE / lengths.iter().sum::<f64>();
+    lengths.map(|length| length * scale)
 }
 
-/// A hand's bones, the same on both sides: medians, of the size that the middle finger's first phalanx sets. `None` when
-/// no hand was seen. Entry j: the bone from its parent to j.
+/// Bone lengths of the hands, equal on both sides: medians, scaled by the first phalanx of the middle finger. Entry j
+/// is the bone from the parent of j to j. `None` if no hand is visible.
 fn hands(motion: &Motion, forearm: f64) -> Option<[f64; N_HAND]> {
     let mut lengths = [0.0; N_HAND];
     for (j, length) in lengths.iter_mut().enumerate().skip(1) {
-        let of_roots = |lengths: fn(&Motion, usize, usize) -> Vec<f32>| {
+        let both_hands = |lengths: fn(&Motion, usize, usize) -> Vec<f32>| {
             let both = [L_HAND, R_HAND].into_iter();
             lower_median(both.flat_map(|root| lengths(motion, root + parent(j), root + j)))
         };
-        // A bone that is never seen (a detector may leave points out) is as long as it was lifted.
-        *length = of_roots(seen_lengths).or_else(|| of_roots(lifted_lengths))?.into();
+        // A bone that is never visible (some detectors omit points) keeps its lifted length.
+        *length = both_hands(visible_lengths).or_else(|| both_hands(lifted_lengths))?.into();
     }
-    let usual = PHALANX_OF_HAND * lengths.iter().sum::<f64>();
-    let phalanx = lengths[10].clamp(PHALANX_BELIEVED.0 * usual, PHALANX_BELIEVED.1 * usual);
+    let expected = PHALANX_OF_HAND * lengths.iter().sum::<f64>();
+    let phalanx = lengths[10].clamp(PHALANX_RATIO_RANGE.0 * expected, PHALANX_RATIO_RANGE.1 * expected);
     (phalanx > 1e-9).then(|| lengths.map(|length| length * PHALANX_OF_FOREARM * forearm / phalanx))
 }
 
-/// The bone's length in each frame that shows both ends. The root of a hand is seen where any of it is.
-fn seen_lengths(motion: &Motion, from: usize, to: usize) -> Vec<f32> {
+/// Lengths of a bone in the frames in which both ends are visible. A hand root is visible if any point of the hand is.
+fn visible_lengths(motion: &Motion, from: usize, to: usize) -> Vec<f32> {
     let is_root = from == L_HAND || from == R_HAND;
-    let seen = |t: usize| motion.mask[[t, to]] && (is_root || motion.mask[[t, from]]);
-    (0..motion.n_frames()).filter(|&t| seen(t)).map(|t| bone(motion, t, from, to)).collect()
+    let is_visible = |t: usize| motion.mask[[t, to]] && (is_root || motion.mask[[t, from]]);
+    (0..motion.n_frames()).filter(|&t| is_visible(t)).map(|t| bone(motion, t, from, to)).collect()
 }
 
 fn lifted_lengths(motion: &Motion, from: usize, to: usize) -> Vec<f32> {
     (0..motion.n_frames()).map(|t| bone(motion, t, from, to)).collect()
 }
 
-/// Metres between two joints of a frame.
+/// Distance of two joints in a frame, in metres.
 pub fn bone(motion: &Motion, t: usize, from: usize, to: usize) -> f32 {
     let square = |k: usize| (motion.joints[[t, to, k]] - motion.joints[[t, from, k]]).powi(2);
     (0..3).map(square).sum::<f32>().sqrt()

@@ -1,6 +1,6 @@
-//! The lifter: intervals of keypoints to motion, each interval by itself, all with the same bone lengths.
+//! The lifter: 2D keypoints to 3D motion, each interval independently, with one set of bone lengths for all.
 
-use super::body::{SIZE_FRAMES, STRAY_FRAMES, TRAINED_FPS};
+use super::body::{OUTLIER_FRAMES, SIZE_FRAMES, TRAINED_FPS};
 use super::camera::CameraTilt;
 use super::{body, gaps, hands, lengths, rest, weights};
 use anyhow::{Result, ensure};
@@ -15,23 +15,23 @@ use orator_dataset::config;
 use orator_nn::lifter::body::BodyLifter;
 use orator_nn::lifter::hand::HandLifter;
 
-/// A gap up to this long is filled; a longer one stays open. `config` lets `[segment]` keep no longer ones.
+/// Longest gap that is filled, in seconds. `config` limits the gaps that `[segment]` accepts to this.
 pub(crate) const MAX_GAP_SECS: f64 = 1.0;
 
-/// Seconds before and after a frame whose keypoints have a say in its joints: strays are told by the frames around, gaps
-/// are filled from both sides, the network has a window, the size of the body is a median, and the result is smoothed.
-/// Beyond that the frames of a video share their bone lengths, the way the camera was held, and the choice between two
-/// mirrored shapes of a hand.
+/// Temporal context in seconds: how far before and after a frame keypoints can affect its joints. It covers outlier
+/// detection, gap filling, the receptive field of the network, the median of the body size, and smoothing. Beyond
+/// that, all frames of a video share the bone lengths, the camera tilt, and the choice between the mirror images of a
+/// hand.
 pub fn reach_secs(settings: &config::LiftConfig) -> f64 {
-    // Weights that cannot be read are an error of the stage itself.
+    // Unreadable weights are reported by the stage itself.
     let window =
-        weights::body(&settings.body_weights).map_or(weights::MOST_FRAMES, |body| body.net.config().receptive_field());
+        weights::body(&settings.body_weights).map_or(weights::MAX_FRAMES, |body| body.net.config().receptive_field());
     let smooth = (3.0 * settings.smooth_arms.max(settings.smooth_hands)).ceil();
-    let frames = STRAY_FRAMES + (window / 2) as f64 + SIZE_FRAMES + smooth;
+    let frames = OUTLIER_FRAMES + (window / 2) as f64 + SIZE_FRAMES + smooth;
     MAX_GAP_SECS + frames / TRAINED_FPS
 }
 
-/// Turns 2D keypoints into 3D motion.
+/// Lifts 2D keypoints to 3D motion.
 pub struct Lifter {
     body: BodyLifter,
     hands: HandLifter,
@@ -40,21 +40,22 @@ pub struct Lifter {
     level: bool,
 }
 
-/// A video lifted.
+/// A lifted video.
 pub struct Lifted {
-    /// NaN outside the intervals.
+    /// The motion; NaN outside the intervals.
     pub motion: Motion,
-    /// Nose, right hip, left hip, [T, 3, 3], in metres and axes of the joints; NaN where not seen for long.
+    /// Nose, right hip, left hip, [T, 3, 3], in the coordinates of the joints (metres); NaN in long gaps.
     pub extra: Array3<f32>,
-    /// The video's bone lengths in metres, of joints 1..=48; 0: never seen (and the hand roots).
+    /// Bone lengths of the video in metres, for joints 1..=48; 0 for bones that are never visible and for the hand
+    /// roots.
     pub lengths: [f32; N_BONES],
-    /// How the camera was held, an entry an interval.
+    /// Camera tilt of each interval.
     pub cameras: Vec<CameraTilt>,
-    /// Frames that have arms.
+    /// Number of frames with a body.
     pub n_frames: usize,
 }
 
-/// The frames of one interval of a `Lifted`.
+/// Mutable view of one interval of a `Lifted`.
 pub struct IntervalView<'a> {
     pub joints: ArrayViewMut3<'a, f32>,
     pub extra: ArrayViewMut3<'a, f32>,
@@ -62,56 +63,67 @@ pub struct IntervalView<'a> {
 }
 
 impl Lifter {
-    /// Loads the networks that `settings` name, or the built-in ones. Errors name the file.
+    /// Loads the networks that `settings` name, or the built-in ones.
+    ///
+    /// # Errors
+    /// Weights that cannot be loaded, with the name of the file.
     pub fn new(settings: &config::LiftConfig) -> Result<Self> {
         let (body, hands) = (weights::body(&settings.body_weights)?, weights::hands(&settings.hand_weights)?);
         let config::LiftConfig { smooth_arms, smooth_hands, level, .. } = *settings;
         Ok(Self { body, hands, smooth_arms, smooth_hands, level })
     }
 
-    /// The motion of the whole video, taken as one continuous stretch.
+    /// Lifts a complete video as one interval and returns its motion.
+    ///
+    /// # Errors
+    /// Those of `lift_intervals`.
     pub fn lift(&self, keypoints: &Keypoints) -> Result<Motion> {
         Ok(self.lift_all(keypoints)?.motion)
     }
 
-    /// The whole video, taken as one continuous stretch.
+    /// Lifts a complete video as one interval.
+    ///
+    /// # Errors
+    /// Those of `lift_intervals`.
     pub fn lift_all(&self, keypoints: &Keypoints) -> Result<Lifted> {
         self.lift_intervals(keypoints, &[Interval { start: 0, end: keypoints.n_frames() }])
     }
 
-    /// The motion inside each interval, each lifted and smoothed by itself, all with the same bone lengths.
-    /// Errors: an interval outside the video, keypoints of unequal lengths.
+    /// Lifts and smooths each interval independently, then applies one set of bone lengths to all.
+    ///
+    /// # Errors
+    /// An interval outside the video; keypoint arrays of unequal lengths.
     pub fn lift_intervals(&self, keypoints: &Keypoints, intervals: &[Interval]) -> Result<Lifted> {
         let raw = self.raw(keypoints, intervals, &[])?;
         Ok(self.finish(raw, intervals))
     }
 
-    /// Each interval lifted and smoothed by itself; bones as long as they came out, hands each in its own frame. Hands are
-    /// filled however long they are not seen in the stretches `resting`.
+    /// Lifts and smooths each interval independently, without adjusting bone lengths; each hand is in its own frame.
+    /// In the intervals `resting`, hands are filled however long they are hidden.
     pub(crate) fn raw(&self, keypoints: &Keypoints, intervals: &[Interval], resting: &[Interval]) -> Result<Lifted> {
         let n_frames = keypoints.n_frames();
         for hand in [&keypoints.left_hand, &keypoints.right_hand] {
             ensure!(hand.shape()[0] == n_frames, "{n_frames} frames of body keypoints, {} of a hand", hand.shape()[0]);
         }
-        let mut lifted = Lifted::nothing(keypoints);
+        let mut lifted = Lifted::empty(keypoints);
         for &interval in intervals {
             let Interval { start, end } = interval;
             ensure!(start <= end && end <= n_frames, "interval {start}..{end} of a video of {n_frames} frames");
-            self.lift_stretch(keypoints, interval, resting, lifted.stretch(interval))?;
+            self.lift_interval(keypoints, interval, resting, lifted.view(interval))?;
         }
         Ok(lifted)
     }
 
-    /// One length a bone over all `intervals` (parts of those that `lifted` was lifted for), hands joined at the wrists;
-    /// frames in none of them are NaN.
+    /// Applies one length per bone over all `intervals` (parts of those that `lifted` was created for) and attaches
+    /// the hands to the wrists. Frames outside are set to NaN.
     pub(crate) fn finish(&self, mut lifted: Lifted, intervals: &[Interval]) -> Lifted {
-        lifted.keep_only(intervals);
+        lifted.clear_outside(intervals);
         lifted.lengths = lengths::measure(&lifted.motion);
         for &interval in intervals {
-            let mut stretch = lifted.stretch(interval);
-            let camera = CameraTilt::estimate(interval, &stretch);
+            let mut view = lifted.view(interval);
+            let camera = CameraTilt::estimate(interval, &view);
             if self.level {
-                camera.level(&mut stretch);
+                camera.level(&mut view);
             }
             lifted.cameras.push(camera);
         }
@@ -126,8 +138,8 @@ impl Lifter {
         lifted
     }
 
-    /// One interval, smoothed, of about the reference size; each hand in its own frame, the root at 0.
-    fn lift_stretch(
+    /// Lifts and smooths one interval at roughly the reference size; each hand is in its own frame with the root at 0.
+    fn lift_interval(
         &self,
         keypoints: &Keypoints,
         interval: Interval,
@@ -160,7 +172,7 @@ impl Lifter {
 }
 
 impl Lifted {
-    fn nothing(keypoints: &Keypoints) -> Self {
+    fn empty(keypoints: &Keypoints) -> Self {
         let n_frames = keypoints.n_frames();
         let joints = Array3::from_elem((n_frames, N_JOINTS, 3), f32::NAN);
         let mask = Array2::from_elem((n_frames, N_JOINTS), false);
@@ -173,14 +185,14 @@ impl Lifted {
         }
     }
 
-    /// Forgets the frames that are in none of `intervals`.
-    fn keep_only(&mut self, intervals: &[Interval]) {
+    /// Clears the frames outside `intervals`.
+    fn clear_outside(&mut self, intervals: &[Interval]) {
         let mut end = 0;
         let after_all = self.motion.n_frames();
         for next in intervals.iter().copied().chain([Interval { start: after_all, end: after_all }]) {
             if end < next.start {
-                let stretch = self.stretch(Interval { start: end, end: next.start });
-                let IntervalView { mut joints, mut extra, mut mask } = stretch;
+                let view = self.view(Interval { start: end, end: next.start });
+                let IntervalView { mut joints, mut extra, mut mask } = view;
                 joints.fill(f32::NAN);
                 extra.fill(f32::NAN);
                 mask.fill(false);
@@ -189,7 +201,7 @@ impl Lifted {
         }
     }
 
-    fn stretch(&mut self, interval: Interval) -> IntervalView<'_> {
+    fn view(&mut self, interval: Interval) -> IntervalView<'_> {
         let frames = interval.start..interval.end;
         IntervalView {
             joints: self.motion.joints.slice_mut(s![frames.clone(), .., ..]),
@@ -199,10 +211,10 @@ impl Lifted {
     }
 }
 
-/// Why joints are missing (NaN), in a sentence; nothing when all are there.
+/// Explains why joints are missing (NaN); `None` if all are present.
 pub fn notes(keypoints: &Keypoints, lifted: &Lifted) -> Option<String> {
     let n_frames = keypoints.n_frames();
-    let unseen = |j: usize| {
+    let n_hidden = |j: usize| {
         let scores = keypoints.body.slice(s![.., j, 2]);
         scores.iter().filter(|score| score.is_nan() || **score < SEEN_SCORE).count()
     };
@@ -211,8 +223,8 @@ pub fn notes(keypoints: &Keypoints, lifted: &Lifted) -> Option<String> {
             "no body in {} of {n_frames} frames (NaN): it is lifted where both shoulders are seen within {MAX_GAP_SECS} s; \
              the right shoulder is not seen in {} frames, the left in {}",
             n_frames - lifted.n_frames,
-            unseen(coco::R_SHOULDER),
-            unseen(coco::L_SHOULDER)
+            n_hidden(coco::R_SHOULDER),
+            n_hidden(coco::L_SHOULDER)
         )
     })
 }
@@ -222,9 +234,9 @@ mod tests {
     use super::*;
     use crate::test_keypoints::bodies;
 
-    /// A body that sways; from frame `change` on it moves otherwise and is larger.
+    /// A swaying body; from frame `change` its motion is different and it is larger.
     fn keypoints(n_frames: usize, change: usize) -> Keypoints {
-        let places = [
+        let positions = [
             (coco::NOSE, 320.0, 100.0),
             (coco::L_SHOULDER, 380.0, 200.0),
             (coco::R_SHOULDER, 260.0, 200.0),
@@ -243,7 +255,7 @@ mod tests {
             })
         };
         let bodies = bodies(n_frames, [640, 480], |t| {
-            places.map(|(joint, x, y)| {
+            positions.map(|(joint, x, y)| {
                 let [x, y, _] = at(t, x, y);
                 (joint, x, y)
             })
@@ -252,12 +264,12 @@ mod tests {
     }
 
     #[test]
-    fn keypoints_beyond_the_reach_have_no_say() {
+    fn keypoints_beyond_the_context_are_ignored() {
         let (n_frames, change) = (240, 160);
         let settings = config::LiftConfig::default();
         let lifter = Lifter::new(&settings).unwrap();
-        let whole = [Interval { start: 0, end: n_frames }];
-        let raw = |change| lifter.raw(&keypoints(n_frames, change), &whole, &[]).unwrap().motion;
+        let complete = [Interval { start: 0, end: n_frames }];
+        let raw = |change| lifter.raw(&keypoints(n_frames, change), &complete, &[]).unwrap().motion;
         let (plain, changed) = (raw(n_frames), raw(change));
         let last = change - (reach_secs(&settings) * 15.0).ceil() as usize;
         assert!(last > 80, "a reach of {} s", reach_secs(&settings));

@@ -1,8 +1,8 @@
-//! Stage 4: 2D keypoints to 3D joints, for each interval `observed` (what is seen, strays out) -> `body` and `hands` (the
-//! networks, `hand_depth`) -> smoothing -> `lengths` (one set for the whole video) -> `camera` (levelled on request) -> every
-//! bone given its length, hands joined at the wrists, all in place in the arrays that come out. A joint not seen for up to
-//! a second is filled and masked; one missing for longer is NaN, with all that hangs on it. Size is a convention
-//! (`upper_body::REFERENCE_SIZE`), as no picture tells it. `refuse` takes frames out that lifting shows to be wrong.
+//! Stage 4: 2D keypoints to 3D joints. Per interval: `observed` (visible points without outliers) -> `body` and
+//! `hands` (the networks, `hand_depth`) -> smoothing; then `lengths` (one set per video) -> `camera` (levelling on
+//! request) -> bone lengths applied, hands attached to the wrists. A joint hidden for up to a second is filled and
+//! masked; one missing for longer is NaN, with its descendants. Size is a convention (`upper_body::REFERENCE_SIZE`).
+//! `refuse` rejects frames in which lifting reveals errors.
 
 pub mod body;
 pub mod camera;

@@ -1,5 +1,5 @@
-//! Statistics of a lifted clip that need no ground truth: lengths of its arms, how steady its wrists are, whether the pose
-//! agrees with the picture it was lifted from, and how much of it was seen.
+//! Statistics of a lifted clip that need no ground truth: arm lengths, wrist jitter, reprojection error, and
+//! visibility.
 
 use anyhow::{Result, ensure};
 use orator_base::math::order;
@@ -9,25 +9,25 @@ use orator_base::types::skeleton::{self, L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, N
 
 const MM: f64 = 1000.0;
 
-/// Statistics of one arm; NaN where the clip shows nothing to measure.
+/// Statistics of one arm; NaN where nothing can be measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArmStatistics {
-    /// Median lengths in 3D.
+    /// Median lengths in 3D, metres.
     pub upper_arm_metres: f64,
     pub forearm_metres: f64,
-    /// Median length of the wrist's second difference, mm a frame a frame.
+    /// Median norm of the second difference of the wrist, mm per frame squared.
     pub jitter_mm: f64,
-    /// Median distance of the wrist in the picture from the projected 3D wrist, mm at the body's scale.
+    /// Median reprojection error of the wrist, mm at the scale of the body.
     pub wrist_off_mm: f64,
-    /// Share of frames in which the wrist has no position, and in which it was not seen (filled positions included).
+    /// Share of frames in which the wrist has no position, and in which it is not visible (filled positions included).
     pub missing: f64,
     pub masked: f64,
-    /// Share of hand joints that have a position, and that were seen.
+    /// Share of hand joints that have a position, and that are visible.
     pub hand_there: f64,
     pub hand_seen: f64,
 }
 
-/// Statistics of a clip: its left arm, its right arm.
+/// Statistics of the left and right arm of a clip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClipStatistics {
     pub left: ArmStatistics,
@@ -52,7 +52,10 @@ const RIGHT: ArmChain = ArmChain {
     hand: skeleton::R_HAND,
 };
 
-/// Measures a motion against the keypoints it was lifted from. Errors: no frames, unequal lengths.
+/// Compares a motion with the keypoints that it was lifted from.
+///
+/// # Errors
+/// No frames; unequal numbers of frames.
 pub fn measure(motion: &Motion, keypoints: &Keypoints) -> Result<ClipStatistics> {
     let (n_frames, n_keypoints) = (motion.n_frames(), keypoints.n_frames());
     ensure!(n_frames > 0, "the motion has no frames");
@@ -60,7 +63,7 @@ pub fn measure(motion: &Motion, keypoints: &Keypoints) -> Result<ClipStatistics>
     Ok(ClipStatistics { left: arm(&LEFT, motion, keypoints), right: arm(&RIGHT, motion, keypoints) })
 }
 
-/// Median over a second around each frame of the second difference of a joint, mm; NaN where it is missing.
+/// Median norm of the second difference of a joint over the second around a frame, mm; NaN if the joint is missing.
 pub fn jitter_around(motion: &Motion, joint: usize, frame_idx: usize) -> f64 {
     let half = (motion.fps.per_sec() / 2.0).round() as usize;
     let range = frame_idx.saturating_sub(half)..(frame_idx + half + 1).min(motion.n_frames());
@@ -74,9 +77,9 @@ fn arm(chain: &ArmChain, motion: &Motion, keypoints: &Keypoints) -> ArmStatistic
         let lengths = (0..n_frames).map(|t| distance(&position(motion, from, t), &position(motion, to, t)));
         median(lengths.filter(|length| length.is_finite()))
     };
-    let off = |t: usize| -> Option<f64> {
-        let (seen, fit) = (found(keypoints, chain.points[2], t)?, Fit::of(motion, keypoints, t)?);
-        Some(MM * distance(&seen, &fit.project(position(motion, wrist, t))) / fit.scale)
+    let wrist_error = |t: usize| -> Option<f64> {
+        let (keypoint, fit) = (found(keypoints, chain.points[2], t)?, Fit::of(motion, keypoints, t)?);
+        Some(MM * distance(&keypoint, &fit.project(position(motion, wrist, t))) / fit.scale)
     };
     let share = |count: usize, of: usize| count as f64 / of.max(1) as f64;
     let frames = |holds: &dyn Fn(usize) -> bool| share((0..n_frames).filter(|&t| holds(t)).count(), n_frames);
@@ -89,7 +92,7 @@ fn arm(chain: &ArmChain, motion: &Motion, keypoints: &Keypoints) -> ArmStatistic
         upper_arm_metres: length(shoulder, elbow),
         forearm_metres: length(elbow, wrist),
         jitter_mm: median((0..n_frames).filter_map(|t| second_difference(motion, wrist, t))),
-        wrist_off_mm: median((0..n_frames).filter_map(off)),
+        wrist_off_mm: median((0..n_frames).filter_map(wrist_error)),
         missing: frames(&|t| !position(motion, wrist, t)[0].is_finite()),
         masked: frames(&|t| !motion.mask[[t, wrist]]),
         hand_there: share(hand.len(), n_hand),
@@ -97,15 +100,15 @@ fn arm(chain: &ArmChain, motion: &Motion, keypoints: &Keypoints) -> ArmStatistic
     }
 }
 
-/// How the body of one frame lies in the picture: `px = scale * metres + shift`, the least squares over shoulders,
-/// elbows and wrists.
+/// Weak-perspective projection of one frame: `px = scale * metres + shift`, least squares over shoulders, elbows and
+/// wrists.
 struct Fit {
     scale: f64,
     shift: [f64; 2],
 }
 
 impl Fit {
-    /// `None` with fewer than three points, or where they show no size.
+    /// Fits the projection; `None` with fewer than three points or a degenerate scale.
     fn of(motion: &Motion, keypoints: &Keypoints, t: usize) -> Option<Self> {
         let pairs: Vec<([f64; 3], [f64; 2])> = [&LEFT, &RIGHT]
             .iter()
@@ -169,8 +172,8 @@ mod tests {
     use ndarray::Array3;
     use orator_base::types::time::FrameRate;
 
-    /// Arms of 0.3 and 0.25 m hanging, the forearms bent toward the camera; the left wrist shakes by 2 mm. Seen at 500 px
-    /// a metre without perspective.
+    /// Hanging arms of 0.3 and 0.25 m, the forearms bent toward the camera; the left wrist shakes by 2 mm.
+    /// Orthographic projection at 500 px per metre.
     fn clip() -> (Motion, Keypoints) {
         let n_frames = 60;
         let mut joints = Array3::zeros((n_frames, skeleton::N_JOINTS, 3));
@@ -178,8 +181,8 @@ mod tests {
         for t in 0..n_frames {
             for (side, chain) in [(1.0, &LEFT), (-1.0, &RIGHT)] {
                 let shake = if side > 0.0 { 0.001 * (1.0 - 2.0 * (t % 2) as f32) } else { 0.0 };
-                let places = [[0.0, 0.0], [0.3, -0.05], [0.5, -0.2]];
-                for (k, [y, z]) in places.into_iter().enumerate() {
+                let positions = [[0.0, 0.0], [0.3, -0.05], [0.5, -0.2]];
+                for (k, [y, z]) in positions.into_iter().enumerate() {
                     let x = side * 0.17 + if k == 2 { shake } else { 0.0 };
                     for (axis, v) in [x, y, z].into_iter().enumerate() {
                         joints[[t, chain.joints[k], axis]] = v;
@@ -209,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_missing_counts_as_missing() {
+    fn missing_joints_are_counted() {
         let (mut motion, keypoints) = clip();
         motion.joints.slice_mut(ndarray::s![..15, .., ..]).fill(f32::NAN);
         motion.mask.slice_mut(ndarray::s![..30, ..]).fill(false);

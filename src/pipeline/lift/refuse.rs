@@ -1,5 +1,5 @@
-//! Frames that lifting refuses, taken out of intervals and ledger; and the pieces that this leaves too short. The report's
-//! sliders decide by the same functions.
+//! Removal of rejected frames from intervals and ledger, and of pieces that become too short. The sliders of the
+//! report use the same functions.
 
 use super::gaps::long_gaps;
 use anyhow::{Result, ensure};
@@ -9,13 +9,13 @@ use orator_base::types::interval::{Interval, Intervals};
 use orator_base::types::time::FrameRate;
 use orator_dataset::config;
 
-/// Whole frames of the longest gap of the body that is filled.
+/// Longest gap of the body that is filled, in complete frames.
 pub fn max_gap_frames(rules: &config::SegmentConfig, fps: FrameRate) -> usize {
     (rules.max_body_gap_secs * fps.per_sec() + 1e-6) as usize
 }
 
-/// Refuses the frames of runs longer than `max_gap` in which a bone is more than `most` off its length. `bone_change` [T]:
-/// the farthest that a bone of the frame is from its length, as a share of it; NaN: not known, and no reason to refuse.
+/// Rejects the frames of runs longer than `max_gap` in which a bone deviates by more than `most`. `bone_change` [T] is
+/// the largest relative deviation of a bone in each frame; NaN: unknown, not rejected.
 pub fn bone_refusals(bone_change: &[f32], most: f64, max_gap: usize) -> Vec<Option<FrameRefusal>> {
     let fine: Vec<bool> = bone_change.iter().map(|&change| !exceeds(change, most)).collect();
     let long = long_gaps(&fine, max_gap);
@@ -24,13 +24,15 @@ pub fn bone_refusals(bone_change: &[f32], most: f64, max_gap: usize) -> Vec<Opti
     bone_change.iter().zip(&long).map(refused).collect()
 }
 
-/// Whether a bone that is `change` off its length is more than `most` off.
+/// Whether a relative deviation `change` exceeds `most`.
 pub fn exceeds(change: f32, most: f64) -> bool {
     f64::from(change.abs()) > most
 }
 
-/// Takes the refused frames out of `intervals` and moves their seconds in `ledger` from kept to refused. The ledger keeps
-/// one stretch an interval, in the same order. Errors: it does not.
+/// Removes the rejected frames from `intervals` and moves their seconds in `ledger` from accepted to rejected.
+///
+/// # Errors
+/// The ledger does not contain one accepted stretch per interval, in the same order.
 pub fn exclude_frames(
     intervals: &Intervals,
     ledger: &Ledger,
@@ -68,7 +70,8 @@ pub fn exclude_frames(
     Ok((left, reduced))
 }
 
-/// An interval as pieces end to end, each kept (`None`), or refused for one reason with the mean of what was measured.
+/// Splits an interval into consecutive pieces, each accepted (`None`) or rejected for one reason with the mean of the
+/// measured value.
 fn pieces(interval: Interval, refusals: &[Option<FrameRefusal>]) -> Vec<(Interval, Option<FrameRefusal>)> {
     let Interval { start, end } = interval;
     let reason = |refused: &Option<FrameRefusal>| refused.map(|refused| refused.refusal);
@@ -87,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn refused_frames_go_and_every_second_stays_accounted_for() {
+    fn rejected_frames_are_removed_and_every_second_is_accounted_for() {
         let fps = FrameRate::new(15, 1);
         let intervals =
             Intervals::new(fps, 300, vec![Interval { start: 0, end: 100 }, Interval { start: 120, end: 300 }]);

@@ -1,6 +1,6 @@
-//! The stage: reads the keypoints of a video and the intervals worth keeping, writes `joints.npz`,
-//! `bones.json` and `camera.json` (roll and pitch of each interval), what `outliers` looked at
-//! (`bone_change.npz`), and the final `intervals.json` and `ledger.json`.
+//! Stage `lift`: reads the keypoints and accepted intervals of a video; writes `joints.npz`, `bones.json`,
+//! `camera.json` (roll and pitch per interval), `bone_change.npz` (input of the outlier detection), and the final
+//! `intervals.json` and `ledger.json`.
 
 use super::outliers::{self, BoneChange};
 use super::refuse::{exclude_frames, max_gap_frames};
@@ -19,19 +19,22 @@ use orator_formats::{joints_npz, keypoints_npz, npz};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Lifts videos.
+/// Stage `lift`.
 pub struct LiftStage {
     lifter: Lifter,
     settings: config::LiftConfig,
     rules: config::SegmentConfig,
     work: PathBuf,
-    /// Hashes of the built-in weights of body and hands; `file` for those of a file, which is an input.
+    /// Hashes of the built-in body and hand weights; `file` if weights come from a file, which is an input.
     weights: [String; 2],
 }
 
 impl LiftStage {
-    /// Lifts and judges the bones as `settings` say; pieces and gaps are judged by `rules`. Reads the earlier stages' files under the folder `work`.
-    /// Errors: weights that cannot be loaded.
+    /// Creates the stage. `settings` control lifting and the check of the bones, `rules` the lengths of pieces and
+    /// gaps. Earlier stages' files are read under `work`.
+    ///
+    /// # Errors
+    /// Weights that cannot be loaded.
     pub fn new(settings: &config::LiftConfig, rules: &config::SegmentConfig, work: &Path) -> Result<Self> {
         let lifter = Lifter::new(settings)?;
         let hash = |file: &Path, builtin: &[u8]| {
@@ -98,7 +101,7 @@ impl Stage for LiftStage {
             timeline.display(),
             repeated.len()
         );
-        unsee(&mut keypoints, &repeated);
+        hide_repeated_frames(&mut keypoints, &repeated);
         let path = self.file(Artifact::SegmentIntervals, unit);
         let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
         let intervals: Intervals =
@@ -119,9 +122,9 @@ impl Stage for LiftStage {
         write_json(&Artifact::Camera.within(out), &camera)?;
         write_json(&Artifact::LiftIntervals.within(out), &intervals)?;
         write_json(&Artifact::LiftLedger.within(out), &ledger)?;
-        let seen = lifted.motion.mask.iter().filter(|m| **m).count();
-        let told = lifted.motion.joints.iter().filter(|v| v.is_finite()).count() / 3;
-        let filled = 100.0 * (1.0 - seen as f64 / told.max(1) as f64);
+        let n_visible = lifted.motion.mask.iter().filter(|m| **m).count();
+        let n_known = lifted.motion.joints.iter().filter(|v| v.is_finite()).count() / 3;
+        let filled = 100.0 * (1.0 - n_visible as f64 / n_known.max(1) as f64);
         let line = match lifted.n_frames {
             0 => "nothing to lift".to_owned(),
             n => format!("{n} frames in {} intervals, {filled:.1} % of the joints filled", intervals.intervals.len()),
@@ -132,8 +135,8 @@ impl Stage for LiftStage {
 }
 
 impl LiftStage {
-    /// Lifts, and takes out of intervals and ledger what lifting shows to be wrong; writes `bone_change.npz`: `bone_change` f32
-    /// [T], the farthest that a bone of the frame is from its length in the video, as a share of it.
+    /// Lifts, and removes frames with errors from intervals and ledger. Writes `bone_change.npz`: `bone_change` f32
+    /// [T], the largest relative deviation of a bone in each frame from its length in the video.
     fn lift(
         &self,
         keypoints: &mut Keypoints,
@@ -151,15 +154,15 @@ impl LiftStage {
         }
         let open = outliers::open_refusals(&raw.motion, &intervals.intervals);
         (intervals, ledger) = exclude_frames(&intervals, &ledger, &open, min_frames)?;
-        let farthest = Array1::from_vec(change.farthest());
-        npz::write(&Artifact::BoneChange.within(out), |npz| npz.add_array("bone_change", &farthest))?;
+        let largest = Array1::from_vec(change.largest());
+        npz::write(&Artifact::BoneChange.within(out), |npz| npz.add_array("bone_change", &largest))?;
         Ok((self.lifter.finish(raw, &intervals.intervals), intervals, ledger))
     }
 }
 
-/// A frame that only repeats the one before shows nothing new: its points count as not seen, so that the motion between
-/// its neighbours is filled in, and masked, instead of standing still.
-fn unsee(keypoints: &mut Keypoints, repeated: &[bool]) {
+/// Hides the points of repeated frames, so that the motion between their neighbours is interpolated and masked instead
+/// of stopping.
+fn hide_repeated_frames(keypoints: &mut Keypoints, repeated: &[bool]) {
     for points in [&mut keypoints.body, &mut keypoints.left_hand, &mut keypoints.right_hand] {
         for (mut frame, _) in points.outer_iter_mut().zip(repeated).filter(|(_, repeated)| **repeated) {
             frame.slice_mut(s![.., 2]).fill(0.0);
@@ -175,9 +178,9 @@ mod tests {
     use orator_base::types::pose2d::coco::{L_ELBOW, L_SHOULDER, L_WRIST, NOSE, R_ELBOW, R_SHOULDER, R_WRIST};
     use orator_base::types::skeleton;
 
-    /// An arm that rises steadily, filmed at 10 frames a second and shown at 15: every third frame is the one before.
+    /// A steadily rising arm, filmed at 10 fps and played at 15: every third frame repeats the previous one.
     #[test]
-    fn repeated_frames_are_masked_and_do_not_stutter() {
+    fn repeated_frames_are_masked_and_interpolated() {
         let n_frames = 45;
         let repeated: Vec<bool> = (0..n_frames).map(|t| t % 3 == 1).collect();
         let mut keypoints = bodies(n_frames, [640, 480], |t| {
@@ -192,7 +195,7 @@ mod tests {
                 (R_WRIST, 240.0, 390.0),
             ]
         });
-        unsee(&mut keypoints, &repeated);
+        hide_repeated_frames(&mut keypoints, &repeated);
         let motion = Lifter::new(&config::LiftConfig::default()).unwrap().lift(&keypoints).unwrap();
         let wrist = skeleton::L_WRIST;
         for (t, is_repeated) in repeated.iter().enumerate().take(n_frames - 3).skip(3) {

@@ -1,4 +1,4 @@
-//! The lifters' weights: built into the program, or from files of `orator-lab train lifter`.
+//! Lifter weights: built into the program, or from files written by `orator-lab train lifter`.
 
 use anyhow::{Context, Result, ensure};
 use orator_base::input;
@@ -10,25 +10,25 @@ use orator_nn::weights::Contents;
 use serde::de::DeserializeOwned;
 use std::path::Path;
 
-/// The built-in weights; `models/body_lifter.md` says how they were made.
+/// Built-in weights; `models/body_lifter.md` documents their training.
 pub const BODY: &[u8] = include_bytes!("../../../models/body_lifter.safetensors");
 pub const HANDS: &[u8] = include_bytes!("../../../models/hand_lifter.safetensors");
-/// Widest layer that is believed; the published ones have 1024 channels.
-const MOST_WIDTH: usize = 2048;
-/// Longest window that is believed, in frames; the published ones have up to 243.
-pub const MOST_FRAMES: usize = 729;
+/// Largest accepted layer width; the published networks have 1024 channels.
+const MAX_WIDTH: usize = 2048;
+/// Longest accepted receptive field in frames; the published networks have up to 243.
+pub const MAX_FRAMES: usize = 729;
 
-/// The body lifter of a file, or the built-in one where `path` is empty.
+/// Loads the body lifter from a file, or the built-in one if `path` is empty.
+///
+/// # Errors
+/// A file that cannot be read or does not contain a body lifter within the limits.
 pub fn body(path: &Path) -> Result<BodyLifter> {
     load(path, BODY, "body-lifter", "body", |contents, params| {
         let config: temporal::Config = config(contents)?;
-        let own = BodyLifter::config(config.channels.clamp(1, MOST_WIDTH), &config.widths);
+        let expected = BodyLifter::config(config.channels.clamp(1, MAX_WIDTH), &config.widths);
         let window = config.receptive_field();
-        ensure!(
-            (1..=MOST_FRAMES).contains(&window),
-            "its network looks at {window} frames, expected 1 to {MOST_FRAMES}"
-        );
-        ensure!(config == own, "its network is {config:?}, expected {own:?}");
+        ensure!((1..=MAX_FRAMES).contains(&window), "its network looks at {window} frames, expected 1 to {MAX_FRAMES}");
+        ensure!(config == expected, "its network is {config:?}, expected {expected:?}");
         let (channels, blocks) = (config.channels, config.widths.len().saturating_sub(1));
         let first = config.n_in * channels * config.widths.first().copied().unwrap_or(1);
         contents.expect_numbers(first.saturating_add(blocks.saturating_mul(channels * channels)))?;
@@ -36,12 +36,15 @@ pub fn body(path: &Path) -> Result<BodyLifter> {
     })
 }
 
-/// The hand lifter of a file, or the built-in one where `path` is empty.
+/// Loads the hand lifter from a file, or the built-in one if `path` is empty.
+///
+/// # Errors
+/// A file that cannot be read or does not contain a hand lifter within the limits.
 pub fn hands(path: &Path) -> Result<HandLifter> {
     load(path, HANDS, "hand-lifter", "hands", |contents, params| {
         let config: hand::Config = config(contents)?;
-        let own = hand::Config { hidden: config.hidden.clamp(1, MOST_WIDTH), ..hand::Config::default() };
-        ensure!(config == own, "its network is {config:?}, expected {own:?}");
+        let expected = hand::Config { hidden: config.hidden.clamp(1, MAX_WIDTH), ..hand::Config::default() };
+        ensure!(config == expected, "its network is {config:?}, expected {expected:?}");
         contents.expect_numbers(config.hidden * config.hidden)?;
         Ok(HandLifter::new(params, hand::NAME, &config)?)
     })
@@ -89,17 +92,21 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_file_says_what_is_wrong() {
+    fn a_wrong_file_is_reported_with_the_reason() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("w.safetensors");
         std::fs::write(&path, HANDS).unwrap();
         hands(&path).unwrap();
-        let says = |path: &Path| format!("{:#}", body(path).err().unwrap());
-        assert!(says(&path).contains("hand-lifter") && says(&path).contains("w.safetensors"), "{}", says(&path));
+        let error_of = |path: &Path| format!("{:#}", body(path).err().unwrap());
+        assert!(
+            error_of(&path).contains("hand-lifter") && error_of(&path).contains("w.safetensors"),
+            "{}",
+            error_of(&path)
+        );
         std::fs::write(&path, &HANDS[..HANDS.len() / 2]).unwrap();
-        assert!(says(&path).contains("w.safetensors"));
+        assert!(error_of(&path).contains("w.safetensors"));
         std::fs::write(&path, b"text").unwrap();
-        assert!(says(&path).contains("w.safetensors"));
-        assert!(says(&dir.path().join("none")).contains("cannot read"));
+        assert!(error_of(&path).contains("w.safetensors"));
+        assert!(error_of(&dir.path().join("none")).contains("cannot read"));
     }
 }

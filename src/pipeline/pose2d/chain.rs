@@ -1,4 +1,4 @@
-//! The way of one frame: person box (every n-th frame, followed between), body, hands, face.
+//! Pose estimation for one frame: person box (detected every n-th frame, tracked in between), body, hands, face.
 
 use super::body::{BodyModel, DetectedBody};
 use super::decode::ScoredPoint;
@@ -7,7 +7,7 @@ use super::face::FaceTrack;
 use super::face::landmarks::FacePoint;
 use super::face::model::FaceModel;
 use super::hand::{DetectedHand, HandModel};
-use super::hands::{self, HandTracker, SeenHands};
+use super::hands::{self, HandTracker, VisibleHands};
 use super::model_input::ModelInput;
 use super::speaker::{SeenPerson, SpeakerTracker};
 use super::talker::TalkerPath;
@@ -17,7 +17,7 @@ use orator_base::types::pose2d::{Keypoint, Pose2d};
 use orator_dataset::config;
 use orator_onnx::{ModelRole, ModelStore, Runtime};
 
-/// The models that look at a frame, and what is followed from frame to frame. One a worker: it runs on one thread.
+/// The models and the tracking state between frames. One instance per worker; runs on one thread.
 pub struct Chain {
     settings: config::Pose2dConfig,
     speaker: SpeakerTracker,
@@ -25,13 +25,13 @@ pub struct Chain {
     hands: Option<HandTracker>,
     face: Option<FaceModel>,
     face_track: FaceTrack,
-    body_seen: bool,
-    /// Frames since the shot began.
+    body_visible: bool,
+    /// Number of frames since the start of the shot.
     n_frames: usize,
 }
 
 impl Chain {
-    /// Opens the models the settings name, from the folder of `store`.
+    /// Opens the models that the settings name, from the folder of `store`.
     ///
     /// # Errors
     /// An id that is not in the manifest or has another role; a model that cannot be opened (`onnx::OpenError`).
@@ -58,74 +58,76 @@ impl Chain {
             hands: hand.map(|hand| HandTracker::new(hand, palm)),
             face: face.map(|face| FaceModel::open(runtime, face, dir)).transpose()?,
             face_track: FaceTrack::default(),
-            body_seen: false,
+            body_visible: false,
             n_frames: 0,
         })
     }
 
-    /// A picture that shows the speaker, as its largest person: who looks like that is preferred. Errors: nobody is
-    /// found in it.
+    /// Sets the reference picture: candidates who look like its largest person are preferred.
+    ///
+    /// # Errors
+    /// No person is found in the picture.
     pub fn set_reference(&mut self, image: &Image) -> Result<()> {
         self.speaker.set_reference(image, &mut self.body, self.settings.joint_score)
     }
 
-    /// A new shot begins, in which the one who goes this way is followed, if it is known; nothing of the shot before is.
+    /// Starts a new shot and resets tracking. `talker` is the path of the person to follow, if known.
     pub fn begin_shot(&mut self, talker: Option<TalkerPath>) {
-        self.speaker.begin_anew(talker);
-        self.body_seen = false;
-        self.forget_details();
+        self.speaker.reset(talker);
+        self.body_visible = false;
+        self.reset_details();
         self.n_frames = 0;
     }
 
-    /// Points of the face that was seen in the last frame.
+    /// Face landmarks of the last frame, if a face was detected.
     pub fn face_points(&self) -> Option<&[FacePoint]> {
         self.face_track.points()
     }
 
-    /// The number of people taken so far, the first of them as first recognised, and the one followed now.
+    /// Number of identities so far, the first of them when first recognised, and the person followed now.
     pub fn people(&self) -> (i64, [Option<SeenPerson>; 2]) {
         self.speaker.people()
     }
 
-    /// Seconds inside ONNX Runtime so far, over all models.
+    /// Total inference time in ONNX Runtime so far, in seconds.
     pub fn secs_inside(&self) -> f64 {
         self.inputs().into_iter().flatten().map(ModelInput::secs_inside).sum()
     }
 
-    /// How often the models of person, body, hand, palm and face were asked so far.
+    /// Number of inferences of the person, body, hand, palm and face model.
     pub fn n_runs(&self) -> [u64; 5] {
         self.inputs().map(|input| input.map_or(0, ModelInput::n_runs))
     }
 
-    /// Person, body, hand, palm, face.
+    /// Inputs of the person, body, hand, palm and face model.
     fn inputs(&self) -> [Option<&ModelInput>; 5] {
         let hands = self.hands.as_ref();
         [
-            self.speaker.detector.as_ref().map(|detector| &detector.feed),
-            Some(&self.body.feed),
-            hands.map(|hands| &hands.model.feed),
-            hands.and_then(|hands| hands.palm.as_ref()).map(|palm| &palm.feed),
-            self.face.as_ref().map(|face| &face.feed),
+            self.speaker.detector.as_ref().map(|detector| &detector.input),
+            Some(&self.body.input),
+            hands.map(|hands| &hands.model.input),
+            hands.and_then(|hands| hands.palm.as_ref()).map(|palm| &palm.input),
+            self.face.as_ref().map(|face| &face.input),
         ]
     }
 
-    /// Hands and face are looked for anew.
-    fn forget_details(&mut self) {
-        self.hands.iter_mut().for_each(HandTracker::begin_anew);
+    /// Resets the tracking of hands and face.
+    fn reset_details(&mut self) {
+        self.hands.iter_mut().for_each(HandTracker::reset);
         self.face_track = FaceTrack::default();
     }
 
-    /// What is seen of the speaker in the next frame of the shot.
+    /// Estimates the pose of the speaker in the next frame of the shot.
     pub fn frame(&mut self, image: &Image) -> Result<Pose2d> {
         let idx = self.n_frames;
         self.n_frames += 1;
-        self.speaker.look(image, idx, &mut self.body, self.body_seen, &self.settings)?;
-        let mut found = self.look_for_body(image)?;
+        self.speaker.update(image, idx, &mut self.body, self.body_visible, &self.settings)?;
+        let mut found = self.detect_body(image)?;
         if let Some(body) = &found
             && self.speaker.recognise(image, &body.points, &mut self.body, &self.settings)?
         {
-            self.forget_details();
-            found = self.look_for_body(image)?;
+            self.reset_details();
+            found = self.detect_body(image)?;
         }
         let followed = &self.speaker.track;
         let mut pose = Pose2d {
@@ -135,23 +137,23 @@ impl Chain {
             ..Pose2d::default()
         };
         let Some(mut body) = found else {
-            self.forget_details();
-            self.body_seen = false;
+            self.reset_details();
+            self.body_visible = false;
             return Ok(pose);
         };
         let mean = body.points.iter().map(|point| point[2]).sum::<f64>() / body.points.len() as f64;
-        self.body_seen = mean >= self.settings.joint_score / 2.0;
+        self.body_visible = mean >= self.settings.joint_score / 2.0;
         let hands = match (&mut self.hands, body.hands) {
             (Some(hands), _) => hands.find(image, &body.points, &self.settings)?,
             (None, Some(given)) => {
                 let mut given = given.map(|points| Some(DetectedHand::from_points(points)));
-                hands::guard(&mut given, &body.points, &self.settings);
+                hands::reject_implausible(&mut given, &body.points, &self.settings);
                 given
             }
             (None, None) => [None, None],
         };
         // Visibility is judged last: tracking continues from all that was found.
-        let SeenHands { hands: [left, right], others } = SeenHands::judge(hands, &mut body.points, image);
+        let VisibleHands { hands: [left, right], others } = VisibleHands::judge(hands, &mut body.points, image);
         pose.other_hand = others;
         if let Some(face) = &mut self.face {
             pose.face = self.face_track.find(face, image, &body.points, self.settings.joint_score)?;
@@ -162,12 +164,12 @@ impl Chain {
         Ok(pose)
     }
 
-    fn look_for_body(&mut self, image: &Image) -> Result<Option<DetectedBody>> {
-        self.speaker.track.place.map_or(Ok(None), |place| self.body.find(image, place))
+    fn detect_body(&mut self, image: &Image) -> Result<Option<DetectedBody>> {
+        self.speaker.track.bbox.map_or(Ok(None), |bbox| self.body.find(image, bbox))
     }
 }
 
 fn keypoint([x, y, score]: ScoredPoint) -> Keypoint {
-    // The peak of a heat-map may reach a little over 1.
+    // A heatmap peak may slightly exceed 1.
     Keypoint { x: x as f32, y: y as f32, score: score.clamp(0.0, 1.0) as f32 }
 }

@@ -1,5 +1,4 @@
-//! The detectors: all persons of a picture, among whom `tracker` chooses the speaker, and squares where hands may be, asked
-//! for when a hand is lost.
+//! Detectors: all persons in a picture, among whom `tracker` chooses the speaker, and palms, used when a hand is lost.
 
 use super::decode::{boxes, ssd_anchors, yolox_grid};
 use super::model_input::ModelInput;
@@ -11,21 +10,21 @@ use orator_media::opencv::warp::Region;
 use orator_onnx::{Decode, ModelEntry, Runtime};
 use std::path::Path;
 
-/// Finds persons in a picture.
+/// Person detector.
 pub struct Detector {
-    pub feed: ModelInput,
+    pub input: ModelInput,
     decode: Decode,
 }
 
 impl Detector {
     pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self> {
-        Ok(Self { feed: ModelInput::open(runtime, entry, dir)?, decode: entry.decode.clone() })
+        Ok(Self { input: ModelInput::open(runtime, entry, dir)?, decode: entry.decode.clone() })
     }
 
-    /// The people in the picture, surest first, in px.
+    /// Persons in the picture, in px, by descending score.
     pub fn find(&mut self, image: &Image) -> Result<Vec<PersonBox>> {
-        let size = self.feed.size();
-        let (src_from_dst, outputs) = self.feed.whole(image)?;
+        let size = self.input.size();
+        let (src_from_dst, outputs) = self.input.run_letterboxed(image)?;
         let found = match &self.decode {
             Decode::Detections { boxes: output, labels, person, min_score, max_overlap } => {
                 let (shape, rows) = outputs.floats(output)?;
@@ -42,45 +41,45 @@ impl Detector {
             }
             other => bail!("a person detector cannot be read as {other:?}"),
         };
-        let place = |person: PersonBox| {
+        let to_picture = |person: PersonBox| {
             let at = |x: f32, y: f32| src_from_dst.apply([f64::from(x), f64::from(y)]).map(|px| px as f32);
             let [x, y] = at(person.x, person.y);
             let [right, bottom] = at(person.x + person.width, person.y + person.height);
             PersonBox { x, y, width: right - x, height: bottom - y, score: person.score }
         };
-        Ok(found.into_iter().map(place).collect())
+        Ok(found.into_iter().map(to_picture).collect())
     }
 }
 
-/// Finds palms in a picture.
+/// Palm detector.
 pub struct PalmDetector {
-    pub feed: ModelInput,
+    pub input: ModelInput,
     decode: Decode,
     anchors: Vec<[f64; 2]>,
 }
 
 impl PalmDetector {
     pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self> {
-        let feed = ModelInput::open(runtime, entry, dir)?;
+        let input = ModelInput::open(runtime, entry, dir)?;
         let anchors = match &entry.decode {
-            Decode::SsdAnchors { strides, .. } => ssd_anchors::anchors(feed.size()[0], strides),
+            Decode::SsdAnchors { strides, .. } => ssd_anchors::anchors(input.size()[0], strides),
             _ => Vec::new(),
         };
-        Ok(Self { feed, decode: entry.decode.clone(), anchors })
+        Ok(Self { input, decode: entry.decode.clone(), anchors })
     }
 
-    /// The squares around the palms of the picture, surest first.
+    /// Hand regions around the palms in the picture, by descending score.
     pub fn find(&mut self, image: &Image) -> Result<Vec<Region>> {
-        let size = self.feed.size()[0];
-        let (src_from_dst, outputs) = self.feed.whole(image)?;
+        let size = self.input.size()[0];
+        let (src_from_dst, outputs) = self.input.run_letterboxed(image)?;
         let Decode::SsdAnchors { regressors, scores, min_score, max_overlap, wrist, middle, .. } = &self.decode else {
             bail!("a palm detector cannot be read as {:?}", self.decode)
         };
         let (rows, logits) = (outputs.floats(regressors)?.1, outputs.floats(scores)?.1);
         let found = ssd_anchors::decode(rows, logits, &self.anchors, size, *min_score, *max_overlap)?;
         let region = |palm: ssd_anchors::Detection| {
-            let place = |at: usize| palm.places.get(at).map(|place| src_from_dst.apply(*place));
-            Some(region::around_palm(place(0)?, place(1)?, place(2 + wrist)?, place(2 + middle)?))
+            let point = |at: usize| palm.points.get(at).map(|point| src_from_dst.apply(*point));
+            Some(region::around_palm(point(0)?, point(1)?, point(2 + wrist)?, point(2 + middle)?))
         };
         Ok(found.into_iter().filter_map(region).collect())
     }

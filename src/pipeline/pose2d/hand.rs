@@ -1,7 +1,7 @@
-//! The hand model: 21 points of the hand in a rotated square, how sure it is that there is one, and which hand it is
-//! where the model says so.
+//! Hand model: 21 points of the hand in a rotated square, the presence score, and the handedness if the model predicts
+//! it.
 
-use super::body::{PointReader, placed};
+use super::body::{PointReader, map_points};
 use super::decode::{ScoredPoint, points};
 use super::model_input::ModelInput;
 use super::region;
@@ -15,32 +15,32 @@ use std::path::Path;
 #[derive(Clone, Debug)]
 pub struct DetectedHand {
     pub points: [ScoredPoint; 21],
-    /// 0..1; the mean of the points' scores where the model gives no other.
+    /// Presence score, 0..1; the mean score of the points if the model has none.
     pub score: f64,
     /// Probability that it is a right hand.
     pub right: Option<f64>,
 }
 
 impl DetectedHand {
-    /// A hand from points that each have a score.
+    /// Creates a hand from points that each have a score.
     pub fn from_points(points: [ScoredPoint; 21]) -> Self {
         Self { score: points.iter().map(|point| point[2]).sum::<f64>() / 21.0, points, right: None }
     }
 
-    /// x, y of the points.
-    pub fn places(&self) -> [[f64; 2]; 21] {
+    /// Coordinates x, y of the points.
+    pub fn positions(&self) -> [[f64; 2]; 21] {
         self.points.map(|[x, y, _]| [x, y])
     }
 
-    /// The square to look in for it in the next frame.
+    /// Square to search in the next frame.
     pub fn next_region(&self) -> Region {
-        region::around_hand(&self.places())
+        region::around_hand(&self.positions())
     }
 }
 
-/// The hand model with its way of reading.
+/// Hand model with its decoder.
 pub struct HandModel {
-    pub feed: ModelInput,
+    pub input: ModelInput,
     reader: PointReader,
     decode: Decode,
     map: Vec<usize>,
@@ -49,23 +49,23 @@ pub struct HandModel {
 impl HandModel {
     pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self> {
         let (reader, map) = (PointReader::new(&entry.decode), entry.points.hand.clone());
-        Ok(Self { feed: ModelInput::open(runtime, entry, dir)?, reader, decode: entry.decode.clone(), map })
+        Ok(Self { input: ModelInput::open(runtime, entry, dir)?, reader, decode: entry.decode.clone(), map })
     }
 
-    /// The hand in the square; None where the square is no place in a picture or the model's numbers are none.
+    /// Hand in the square; `None` if the square is degenerate or the outputs are not finite.
     pub fn find(&mut self, image: &Image, region: &Region) -> Result<Option<DetectedHand>> {
-        let size = self.feed.size();
+        let size = self.input.size();
         let Some(src_from_dst) = region.src_from_dst(size[0]) else { return Ok(None) };
-        let outputs = self.feed.part(image, &src_from_dst)?;
+        let outputs = self.input.run_crop(image, &src_from_dst)?;
         let single = |name: &str| -> Result<f32> { Ok(outputs.floats(name)?.1.first().copied().unwrap_or(0.0)) };
         let hand = if let Decode::Regression { landmarks, score, logit, right } = &self.decode {
             let score = points::regression_score(single(score)?, *logit);
             let n_points = self.map.iter().max().map_or(0, |largest| largest + 1);
             let points = points::regression(outputs.floats(landmarks)?.1, score, n_points.max(21))?;
             let right = right.as_ref().map(|name| single(name)).transpose()?.map(f64::from);
-            DetectedHand { points: placed(&points, &self.map, &src_from_dst), score: f64::from(score), right }
+            DetectedHand { points: map_points(&points, &self.map, &src_from_dst), score: f64::from(score), right }
         } else {
-            DetectedHand::from_points(placed(&self.reader.points(&outputs, size)?, &self.map, &src_from_dst))
+            DetectedHand::from_points(map_points(&self.reader.points(&outputs, size)?, &self.map, &src_from_dst))
         };
         Ok((hand.score > 0.0 && hand.score.is_finite()).then_some(hand))
     }

@@ -1,8 +1,8 @@
-//! Stage 2: frames to 2D keypoints of the one speaker: person box, body, both hands, tracked through each shot.
-//! `decode` reads the models' outputs, one file a kind; `detector`, `body` and `hand` ask the models; `speaker`
-//! says who is tracked, with `tracker` (the choice), `liveness` and `appearance` (on a `patch` of the picture); `region`
-//! and `hands` say where to look for a hand and when; `face` sees the mouth, `talker` finds whose mouth the voice is of;
-//! `chain` is the way of one frame, `span` that of a part of a video; `stage` joins the parts.
+//! Stage 2: 2D keypoints of the one speaker in each frame: person box, body, both hands, tracked through each shot.
+//! `decode` decodes the model outputs, one file per kind; `detector`, `body` and `hand` run the models; `speaker`
+//! decides who is tracked, with `tracker` (choice), `liveness` and `appearance` (both on a `patch` of the picture);
+//! `region` and `hands` locate hands; `face` measures the mouth, `talker` finds the active speaker; `chain` processes
+//! a frame, `span` a part of a video; `stage` joins the parts.
 
 pub mod appearance;
 pub mod body;

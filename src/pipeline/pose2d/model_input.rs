@@ -1,5 +1,5 @@
-//! A model with the picture it is fed: the crop or letterbox goes into a canvas that is kept, and from there, made
-//! numbers as the manifest says, into the model's input.
+//! A model with its input buffer: the crop or letterboxed picture is drawn into a reused canvas, normalised as the
+//! manifest specifies and passed to the model.
 
 use anyhow::Result;
 use orator_base::types::image::Image;
@@ -31,18 +31,18 @@ impl ModelInput {
         [self.canvas.height, self.canvas.width]
     }
 
-    /// Seconds inside ONNX Runtime so far.
+    /// Inference time in ONNX Runtime so far, in seconds.
     pub fn secs_inside(&self) -> f64 {
         self.model.secs_inside()
     }
 
-    /// How often the model ran so far.
+    /// Number of inferences so far.
     pub fn n_runs(&self) -> u64 {
         self.model.n_runs()
     }
 
-    /// Runs the model on the whole picture, letterboxed as its description says.
-    pub fn whole(&mut self, image: &Image) -> Result<(SrcFromDst, Outputs<'_>)> {
+    /// Runs the model on the full picture, letterboxed as the manifest specifies.
+    pub fn run_letterboxed(&mut self, image: &Image) -> Result<(SrcFromDst, Outputs<'_>)> {
         let src_from_dst = match self.model.entry().fit {
             PictureFit::Letterbox { anchor: Anchor::Centre, pad } => {
                 warp::letterbox_centre(image, &mut self.canvas, pad)?
@@ -53,8 +53,8 @@ impl ModelInput {
         Ok((src_from_dst, self.run()?))
     }
 
-    /// Runs the model on the part of the picture the transform names.
-    pub fn part(&mut self, image: &Image, src_from_dst: &SrcFromDst) -> Result<Outputs<'_>> {
+    /// Runs the model on the crop that the transform defines.
+    pub fn run_crop(&mut self, image: &Image, src_from_dst: &SrcFromDst) -> Result<Outputs<'_>> {
         warp::warp(image, src_from_dst, &mut self.canvas)?;
         self.run()
     }

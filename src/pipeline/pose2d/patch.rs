@@ -1,34 +1,33 @@
-//! A part of a picture as a few colours: the mean of each cell of a grid laid over a box. What the colours say of the
-//! person in the box is known to `liveness` and `appearance`.
+//! Downsampled part of a picture: mean colours of the cells of a grid over a box. Used by `liveness` and `appearance`.
 
 use orator_base::types::image::Image;
 
-/// Points a side that are looked at in each cell.
-const POINTS: usize = 4;
+/// Sampled points per side of each cell.
+const POINTS_PER_SIDE: usize = 4;
 
-/// Mean colours, 0..255 a channel, of `columns` by `rows` cells over the box (x, y, width, height in px), row by row.
-/// What lies outside of the picture has the colour of its edge; an empty picture is black.
+/// Mean colours, 0..255 per channel, of `columns` x `rows` cells over the box (x, y, width, height in px), row-major.
+/// Outside the picture, edge pixels are repeated; an empty picture is black.
 pub fn colours(image: &Image, [x, y, width, height]: [f64; 4], [columns, rows]: [usize; 2]) -> Vec<[f32; 3]> {
     if image.width == 0 || image.height == 0 {
         return vec![[0.0; 3]; columns * rows];
     }
-    let across = |start: f64, size: f64, n: usize, side: usize| -> Vec<usize> {
-        let n = n * POINTS;
-        let place = |at: usize| start + size * (at as f64 + 0.5) / n as f64;
-        (0..n).map(|at| (place(at).max(0.0) as usize).min(side - 1)).collect()
+    let sample_positions = |start: f64, size: f64, n: usize, side: usize| -> Vec<usize> {
+        let n = n * POINTS_PER_SIDE;
+        let position = |at: usize| start + size * (at as f64 + 0.5) / n as f64;
+        (0..n).map(|at| (position(at).max(0.0) as usize).min(side - 1)).collect()
     };
-    let xs = across(x, width, columns, image.width);
-    let ys = across(y, height, rows, image.height);
+    let xs = sample_positions(x, width, columns, image.width);
+    let ys = sample_positions(y, height, rows, image.height);
     let cell = |at: usize| {
-        let (column, row) = (at % columns * POINTS, at / columns * POINTS);
+        let (column, row) = (at % columns * POINTS_PER_SIDE, at / columns * POINTS_PER_SIDE);
         let mut sum = [0.0f32; 3];
-        for &y in &ys[row..row + POINTS] {
-            for &x in &xs[column..column + POINTS] {
+        for &y in &ys[row..row + POINTS_PER_SIDE] {
+            for &x in &xs[column..column + POINTS_PER_SIDE] {
                 let pixel = image.pixel(x, y);
                 (0..3).for_each(|channel| sum[channel] += f32::from(pixel[channel]));
             }
         }
-        sum.map(|sum| sum / (POINTS * POINTS) as f32)
+        sum.map(|sum| sum / (POINTS_PER_SIDE * POINTS_PER_SIDE) as f32)
     };
     (0..columns * rows).map(cell).collect()
 }
@@ -38,7 +37,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cells_are_means_and_edges_go_on() {
+    fn cells_are_means_and_edges_are_repeated() {
         let mut image = Image::filled(8, 8, [0; 3]);
         image.data.as_chunks_mut::<3>().0.iter_mut().enumerate().for_each(|(at, p)| *p = [10 * (at % 8) as u8; 3]);
         let found = colours(&image, [0.0, 0.0, 8.0, 8.0], [2, 1]);

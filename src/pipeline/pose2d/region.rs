@@ -1,23 +1,23 @@
-//! Where to look for a hand: the rotated square around one, from its own points of the frame before, from the arm, or
-//! from a palm. The numbers are MediaPipe's (hand_landmark_landmarks_to_roi, palm_detection_detection_to_roi) and, for
-//! the arm, measured on it.
+//! Hand regions: the rotated square to search for a hand, from its points in the previous frame, from the arm, or from
+//! a palm. Constants are those of MediaPipe (hand_landmark_landmarks_to_roi, palm_detection_detection_to_roi); those
+//! for the arm were measured on its output.
 
 use orator_media::opencv::warp::Region;
 use std::f64::consts::{PI, TAU};
 
-/// Points of a hand that say where it is: wrist, thumb to its first joint, and the two lower joints of each finger.
-const STEADY: [usize; 12] = [0, 1, 2, 3, 5, 6, 9, 10, 13, 14, 17, 18];
+/// Stable points of a hand: wrist, thumb up to its first joint, and the two lower joints of each finger.
+const STABLE_POINTS: [usize; 12] = [0, 1, 2, 3, 5, 6, 9, 10, 13, 14, 17, 18];
 
-/// The square around a hand whose 21 points are known.
+/// Square around a hand with 21 known points.
 pub fn around_hand(points: &[[f64; 2]; 21]) -> Region {
     let half = |a: [f64; 2], b: [f64; 2]| [(a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0];
     let knuckles = half(half(points[5], points[13]), points[9]);
     let rotation = upright([knuckles[0] - points[0][0], knuckles[1] - points[0][1]]);
-    let steady = STEADY.map(|at| points[at]);
-    let (low, high) = extent(&steady);
+    let stable = STABLE_POINTS.map(|at| points[at]);
+    let (low, high) = extent(&stable);
     let centre = half(low, high);
     let (sin, cos) = rotation.sin_cos();
-    let turned = steady.map(|[x, y]| {
+    let turned = stable.map(|[x, y]| {
         let (x, y) = (x - centre[0], y - centre[1]);
         [x * cos + y * sin, y * cos - x * sin]
     });
@@ -32,28 +32,29 @@ pub fn around_hand(points: &[[f64; 2]; 21]) -> Region {
     }
 }
 
-/// The square where the hand of an arm should be.
+/// Square in which the hand of an arm is expected.
 pub fn beyond_wrist(elbow: [f64; 2], wrist: [f64; 2], shoulder_px: f64) -> Region {
     let along = [wrist[0] - elbow[0], wrist[1] - elbow[1]];
     let length = along[0].hypot(along[1]);
     let unit = along.map(|part| part / (length + 1e-6));
-    let reach = 0.27 * length.max(0.45 * shoulder_px);
+    let offset = 0.27 * length.max(0.45 * shoulder_px);
     Region {
-        centre: [wrist[0] + unit[0] * reach, wrist[1] + unit[1] * reach],
+        centre: [wrist[0] + unit[0] * offset, wrist[1] + unit[1] * offset],
         side: 0.8 * shoulder_px,
         rotation: upright(unit),
     }
 }
 
-/// Whether two squares show a hand so much alike that a look at the second tells nothing new: middles within a tenth of
-/// the side, sides within a fifth, 20 degrees.
-pub fn are_alike(a: &Region, b: &Region) -> bool {
+/// Whether two squares are so similar that a second inference adds nothing: centres within a tenth of the side, sides
+/// within a fifth, rotations within 20 degrees.
+pub fn are_similar(a: &Region, b: &Region) -> bool {
     let away = (a.centre[0] - b.centre[0]).hypot(a.centre[1] - b.centre[1]);
     let turned = (a.rotation - b.rotation).rem_euclid(TAU);
     away < 0.1 * b.side && (a.side - b.side).abs() < 0.2 * b.side && turned.min(TAU - turned) < PI / 9.0
 }
 
-/// The square around a hand whose palm was detected: its box's corners, its wrist and the base of its middle finger.
+/// Square around the hand of a detected palm, from the corners of its box, its wrist and the base of its middle
+/// finger.
 pub fn around_palm(low: [f64; 2], high: [f64; 2], wrist: [f64; 2], middle: [f64; 2]) -> Region {
     let (width, height) = (high[0] - low[0], high[1] - low[1]);
     let rotation = upright([middle[0] - wrist[0], middle[1] - wrist[1]]);
@@ -65,7 +66,7 @@ pub fn around_palm(low: [f64; 2], high: [f64; 2], wrist: [f64; 2], middle: [f64;
     }
 }
 
-/// The rotation that makes `direction` point up in the crop, -pi..pi.
+/// Rotation that makes `direction` point up in the crop, -pi..pi.
 fn upright([x, y]: [f64; 2]) -> f64 {
     let angle = PI / 2.0 - (-y).atan2(x);
     angle - TAU * ((angle + PI) / TAU).floor()
@@ -98,16 +99,16 @@ mod tests {
     }
 
     #[test]
-    fn squares_are_alike_by_middle_side_and_turn() {
+    fn squares_are_similar_by_centre_side_and_rotation() {
         let square = |x: f64, side: f64, rotation: f64| Region { centre: [x, 0.0], side, rotation };
         let one = square(0.0, 100.0, 3.1);
-        assert!(are_alike(&one, &square(5.0, 110.0, -3.1)));
-        assert!(!are_alike(&one, &square(15.0, 100.0, 3.1)) && !are_alike(&one, &square(0.0, 60.0, 3.1)));
-        assert!(!are_alike(&one, &square(0.0, 100.0, 2.5)) && !are_alike(&one, &square(f64::NAN, 100.0, 3.1)));
+        assert!(are_similar(&one, &square(5.0, 110.0, -3.1)));
+        assert!(!are_similar(&one, &square(15.0, 100.0, 3.1)) && !are_similar(&one, &square(0.0, 60.0, 3.1)));
+        assert!(!are_similar(&one, &square(0.0, 100.0, 2.5)) && !are_similar(&one, &square(f64::NAN, 100.0, 3.1)));
     }
 
     #[test]
-    fn nonsense_gives_no_place() {
+    fn degenerate_input_gives_no_transform() {
         assert_eq!(around_hand(&[[f64::NAN; 2]; 21]).src_from_dst(224), None);
         assert_eq!(around_hand(&[[3.0; 2]; 21]).src_from_dst(224), None);
         assert_eq!(beyond_wrist([1.0; 2], [1.0; 2], 0.0).src_from_dst(224), None);

@@ -1,4 +1,4 @@
-//! The stage: the spans of a video, each looked at by itself, and joined into `keypoints.npz` and the portrait.
+//! Stage `pose2d`: processes the spans of a video independently and joins them into `keypoints.npz` and the portrait.
 
 use super::chain::Chain;
 use super::models::{ChosenModels, check_follow};
@@ -29,17 +29,17 @@ pub struct Pose2dStage {
     models: config::ModelsConfig,
     fps: FrameRate,
     work: PathBuf,
-    /// The picture that shows a speaker, by the speaker's name.
+    /// Reference picture by name of the speaker.
     references: BTreeMap<String, PathBuf>,
     /// Version of ONNX Runtime, or `missing`.
     onnxruntime: String,
 }
 
 impl Pose2dStage {
-    /// Loads ONNX Runtime, if it is there, and opens no model.
+    /// Loads ONNX Runtime if it is installed; opens no model.
     ///
     /// # Errors
-    /// Those of `ChosenModels::find`; `follow = "speaking"` without the models that find who speaks.
+    /// Those of `ChosenModels::find`; `follow = "speaking"` without the models that it needs.
     pub fn new(settings: &Settings) -> Result<Self> {
         let named = settings.speaker.iter().filter(|speaker| !speaker.reference.as_os_str().is_empty());
         let references = named.map(|speaker| (speaker.name.clone(), speaker.reference.clone())).collect();
@@ -85,7 +85,7 @@ impl Stage for Pose2dStage {
             .map(|(key, entry)| (key.to_owned(), read(entry)))
             .collect();
         let mut pose2d = json!(self.chosen.settings);
-        // The largest was followed before there was a choice: what was made then is what would be made now.
+        // `follow = "largest"` is left out, so that the output of versions without this setting stays fresh.
         if let Some(keys) = pose2d.as_object_mut().filter(|_| !self.follows_talker()) {
             keys.remove("follow");
         }
@@ -127,29 +127,29 @@ impl Stage for Pose2dStage {
         Ok(self.timeline(unit)?.spans().len())
     }
 
-    /// Looks at one span of the video.
+    /// Processes one span of the video.
     fn run_part(&self, unit: &Unit, part: usize, out: &Path, progress: &dyn Progress) -> Result<()> {
         let timeline = self.timeline(unit)?;
         let span = timeline.spans().into_iter().nth(part).with_context(|| format!("there is no span {part}"))?;
-        self.look(unit, &timeline, span, progress)?.write(out)
+        self.process_span(unit, &timeline, span, progress)?.write(out)
     }
 
     fn join(&self, unit: &Unit, parts: &[PathBuf], out: &Path) -> Result<Report> {
-        let mut whole = PoseSpan::default();
+        let mut joined = PoseSpan::default();
         for (part, span) in parts.iter().zip(self.timeline(unit)?.spans()) {
-            whole.append(PoseSpan::read(part, span.len())?);
+            joined.append(PoseSpan::read(part, span.len())?);
         }
-        whole.finish(self.fps, out)
+        joined.finish(self.fps, out)
     }
 
-    /// The spans one after the other.
+    /// Processes all spans in order.
     fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> Result<Report> {
         let timeline = self.timeline(unit)?;
-        let mut whole = PoseSpan::default();
+        let mut joined = PoseSpan::default();
         for span in timeline.spans() {
-            whole.append(self.look(unit, &timeline, span, progress)?);
+            joined.append(self.process_span(unit, &timeline, span, progress)?);
         }
-        whole.finish(self.fps, out)
+        joined.finish(self.fps, out)
     }
 }
 
@@ -162,7 +162,13 @@ impl Pose2dStage {
         Timeline::read(&Artifact::Timeline.path(&self.work, unit))
     }
 
-    fn look(&self, unit: &Unit, timeline: &Timeline, span: Range<usize>, progress: &dyn Progress) -> Result<PoseSpan> {
+    fn process_span(
+        &self,
+        unit: &Unit,
+        timeline: &Timeline,
+        span: Range<usize>,
+        progress: &dyn Progress,
+    ) -> Result<PoseSpan> {
         let media = MediaInfo::read(&Artifact::MediaInfo.path(&self.work, unit))?;
         let n_passes = 1 + u64::from(self.follows_talker());
         let task = progress.begin(&unit.to_string(), n_passes * span.len() as u64);
@@ -171,10 +177,10 @@ impl Pose2dStage {
             let search = TalkerSearch::new(&self.runtime()?, &self.chosen.store, &self.chosen.settings)?;
             pass::talkers(&video, &Artifact::Sound.path(&self.work, unit), search, &*task)
         });
-        pass::look(&video, self.chain(unit)?, talkers.transpose()?.as_deref(), progress, &*task)
+        pass::estimate_poses(&video, self.chain(unit)?, talkers.transpose()?.as_deref(), progress, &*task)
     }
 
-    /// The models, with the picture that shows the speaker.
+    /// Opens the models and sets the reference picture of the speaker.
     fn chain(&self, unit: &Unit) -> Result<Chain> {
         let mut chain = Chain::new(&self.runtime()?, &self.chosen.store, &self.chosen.settings)?;
         if let Some(path) = self.references.get(&unit.speaker) {

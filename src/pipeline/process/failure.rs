@@ -1,5 +1,5 @@
-//! An error on its way from a unit's process to the run: its texts, without what would steer a terminal, and the type that
-//! a program may match.
+//! Errors sent from a subprocess to the run: message texts without terminal control characters, and the error type, so
+//! that callers can still match it.
 
 use anyhow::{Error, anyhow};
 use orator_base::stage::workdir::NoSpace;
@@ -7,15 +7,15 @@ use orator_media::ffmpeg::UnreadableMedia;
 use orator_onnx::ModelError;
 use serde::{Deserialize, Serialize};
 
-/// An error as it is sent.
+/// Serialised form of an error.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct SentFailure {
-    /// The message and its causes, outermost first.
+    /// Messages of the error and its causes, outermost first.
     texts: Vec<String>,
     kind: FailureKind,
 }
 
-/// The type beneath, with the index of its text where it stands at one of them.
+/// Type of the error; for a type that is part of the cause chain, also the index of its text.
 #[derive(Debug, Serialize, Deserialize)]
 enum FailureKind {
     Other,
@@ -25,7 +25,7 @@ enum FailureKind {
 }
 
 impl SentFailure {
-    /// Takes an error apart.
+    /// Serialises an error.
     pub fn of(error: &Error) -> Self {
         let texts: Vec<String> = error.chain().map(ToString::to_string).collect();
         let at = |text: String| texts.iter().position(|other| *other == text).unwrap_or(0);
@@ -41,7 +41,7 @@ impl SentFailure {
         Self { texts, kind }
     }
 
-    /// Puts the error together again: the same texts, the same type by `downcast_ref`.
+    /// Restores the error with its texts and a type that `downcast_ref` finds.
     pub fn into_error(self) -> Error {
         let kind = match self.kind {
             FailureKind::Model(_, model) if plain(&model.to_string()) != model.to_string() => FailureKind::Other,
@@ -50,10 +50,10 @@ impl SentFailure {
         let mut error: Option<Error> = None;
         for (at, text) in self.texts.iter().map(|text| plain(text)).enumerate().rev() {
             error = Some(match (&kind, error) {
-                (FailureKind::Media(place), None) if *place == at => UnreadableMedia(text).into(),
-                (FailureKind::Media(place), Some(cause)) if *place == at => cause.context(UnreadableMedia(text)),
-                (FailureKind::Model(place, model), None) if *place == at => model.clone().into(),
-                (FailureKind::Model(place, model), Some(cause)) if *place == at => cause.context(model.clone()),
+                (FailureKind::Media(index), None) if *index == at => UnreadableMedia(text).into(),
+                (FailureKind::Media(index), Some(cause)) if *index == at => cause.context(UnreadableMedia(text)),
+                (FailureKind::Model(index, model), None) if *index == at => model.clone().into(),
+                (FailureKind::Model(index, model), Some(cause)) if *index == at => cause.context(model.clone()),
                 (_, None) => anyhow!(text),
                 (_, Some(cause)) => cause.context(text),
             });
@@ -63,7 +63,7 @@ impl SentFailure {
     }
 }
 
-/// Text without what would steer a terminal.
+/// Replaces terminal control characters (all but newline and tab) by U+FFFD.
 pub fn plain(text: &str) -> String {
     text.chars().map(|c| if c.is_control() && c != '\n' && c != '\t' { '\u{fffd}' } else { c }).collect()
 }
@@ -74,7 +74,7 @@ mod tests {
     use anyhow::Context as _;
     use orator_base::stage::workdir;
 
-    /// There and back.
+    /// Sends an error through the serialised form and checks its texts.
     fn sent(error: &Error) -> Error {
         let bytes = rmp_serde::to_vec(&SentFailure::of(error)).unwrap();
         let failure: SentFailure = rmp_serde::from_slice(&bytes).unwrap();
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn a_terminal_is_not_steered() {
+    fn terminal_control_characters_are_replaced() {
         assert_eq!(plain("a\u{1b}[2Jb\nc"), "a\u{fffd}[2Jb\nc");
     }
 }

@@ -1,5 +1,5 @@
-//! Limits of memory and time for the process of a unit, from the size of the pictures and the length of the video. They
-//! are several times what real videos take (the guide has the measurements), so that only a hostile or broken file meets
+//! Memory and time limits of a subprocess, derived from the picture size and the duration of the video. They are
+//! several times what real videos need (measurements are in the guide), so that only malicious or broken files reach
 //! them.
 
 use super::message::MediaHeader;
@@ -9,59 +9,60 @@ use orator_media::ffmpeg::source::MAX_SECS;
 use rustix::process::{Resource, Rlimit, setrlimit};
 use std::path::Path;
 
-/// Bytes for the program, its libraries, and the tensors of the models.
+/// Base allowance in bytes: program, libraries and model tensors.
 const BASE_BYTES: f64 = (2_u64 << 30) as f64;
-/// Bytes a pixel: a decoder's 16 reference pictures and those that wait for display, at 6 bytes a pixel, and copies as RGB.
+/// Bytes per pixel: 16 reference pictures and the display queue of the decoder at 6 bytes per pixel, and RGB copies.
 const BYTES_PER_PIXEL: f64 = 128.0;
-/// Bytes a frame at the dataset rate: keypoints, times and scores.
+/// Bytes per frame at the dataset rate: keypoints, times and scores.
 const BYTES_PER_FRAME: f64 = 4096.0;
-/// Bytes of memory for each byte of a model or of an earlier stage's result.
+/// Bytes of memory per byte of a model or of an earlier stage's output.
 const MEMORY_PER_BYTE: f64 = 8.0;
-/// Most share of the machine's memory that one process takes.
+/// Largest share of the machine's memory for one process.
 const MACHINE_SHARE: f64 = 0.75;
-/// Seconds of processor time for loading libraries and models.
+/// CPU seconds for loading libraries and models.
 const BASE_SECS: f64 = 3600.0;
-/// Seconds of processor time for each frame of the file, and for each megapixel of it.
+/// CPU seconds per frame of the file, and per megapixel of a frame.
 const SECS_PER_FRAME: f64 = 1.0;
 const SECS_PER_MEGAPIXEL: f64 = 0.5;
-/// Frame rates that are assumed at least and at most.
+/// Range to which the stated frame rate is clamped, fps.
 const FPS: [f64; 2] = [60.0, 240.0];
-/// Seconds in which a process gets no processor time and reports nothing before it counts as hanging.
+/// Seconds without CPU use and without a report after which a process counts as hanging.
 const IDLE_SECS: u64 = 900;
 
-/// Limits of one process.
+/// Limits of one subprocess.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Limits {
     /// Bytes of private writable memory.
     pub memory: u64,
-    /// Seconds of processor time; ten times as much may pass.
+    /// CPU seconds; the limit of elapsed time is ten times this.
     pub cpu_secs: u64,
-    /// Seconds of processor time between two reports of progress.
+    /// CPU seconds between two progress reports.
     pub quiet_secs: u64,
-    /// Seconds without processor time and without a report.
+    /// Seconds without CPU use and without a report.
     pub idle_secs: u64,
-    /// Whose reading the limits are meant for, for messages.
+    /// Input that the limits were derived from, for messages.
     pub basis: String,
 }
 
 impl Limits {
-    /// For reading a header or copying an excerpt: no size is known.
+    /// Limits for reading a header or copying an excerpt, when the size is not known yet.
     pub fn of_header() -> Self {
         Self::new(BASE_BYTES, BASE_SECS, "the header of a file".to_owned())
     }
 
-    /// For files that are no videos: keypoints of other programs.
+    /// Limits for keypoints of other programs, which have no video header.
     pub fn of_machine() -> Self {
         let longest = FPS[1] * MAX_SECS;
         Self::new(f64::INFINITY, BASE_SECS + longest * SECS_PER_FRAME, "a file on this machine".to_owned())
     }
 
-    /// For a video with this header that becomes frames at `rate` a second, beside `n_bytes` of models and other inputs.
+    /// Limits for a video with this header, sampled at `rate` frames per second; `n_bytes` is the size of models and
+    /// other inputs.
     pub fn of_video(header: &MediaHeader, rate: f64, n_bytes: u64) -> Self {
         let [width, height] = header.image_size;
         let pixels = width.saturating_mul(height).min(MAX_PIXELS as usize) as f64;
         let stated = header.secs.filter(|secs| secs.is_finite() && *secs > 0.0);
-        // The reader goes on for a minute after the stated end.
+        // The reader continues for up to a minute past the stated end.
         let secs = stated.map_or(MAX_SECS, |secs| MAX_SECS.min(secs + 60.0));
         let memory =
             BASE_BYTES + BYTES_PER_PIXEL * pixels + BYTES_PER_FRAME * secs * rate + MEMORY_PER_BYTE * n_bytes as f64;
@@ -83,7 +84,7 @@ impl Limits {
         }
     }
 
-    /// The error, with the limit in front where it is that memory ran out while `source` was read.
+    /// Adds the memory limit to the message of an out-of-memory error; other errors are returned unchanged.
     pub fn explain(&self, source: &Path, error: Error) -> Error {
         if !is_out_of_memory(&format!("{error:#}")) {
             return error;
@@ -97,7 +98,7 @@ impl Limits {
         ))
     }
 
-    /// Message for a process that uses `bytes` of memory, if that is too much.
+    /// Returns the message for a process that uses `bytes` of memory; `None`: within the limit.
     pub fn exceeded_by(&self, bytes: u64) -> Option<String> {
         (bytes > self.memory).then(|| {
             format!(
@@ -109,8 +110,8 @@ impl Limits {
         })
     }
 
-    /// Which limit a process has passed that used `cpu` seconds of processor time, `quiet` of them since its last report,
-    /// in `passed` seconds, the last `idle` of them without either.
+    /// Describes the limit that a process has exceeded, or `None`. `cpu`: CPU seconds used, `quiet`: CPU seconds since
+    /// the last report, `passed`: seconds elapsed, `idle`: seconds without CPU use and without a report.
     pub fn passed(&self, [cpu, quiet]: [f64; 2], [passed, idle]: [u64; 2]) -> Option<String> {
         let most = if idle >= self.idle_secs {
             format!("did nothing for {}", span(self.idle_secs))
@@ -127,12 +128,12 @@ impl Limits {
     }
 }
 
-/// Limits the memory of this process for good.
+/// Limits the private memory of this process irrevocably.
 pub fn limit_memory(bytes: u64) -> Result<()> {
     Ok(setrlimit(Resource::Data, Rlimit { current: Some(bytes), maximum: Some(bytes) })?)
 }
 
-/// How Rust, the C library, ffmpeg, OpenCV and ONNX Runtime report that memory ran out.
+/// Whether a message reports memory exhaustion, as worded by Rust, the C library, ffmpeg, OpenCV or ONNX Runtime.
 fn is_out_of_memory(text: &str) -> bool {
     let text = text.to_lowercase();
     let reports = [
@@ -147,7 +148,7 @@ fn is_out_of_memory(text: &str) -> bool {
     reports.iter().any(|report| text.contains(report))
 }
 
-/// `90 s`, `15 min`, `30 h`.
+/// Formats a duration: `90 s`, `15 min`, `30 h`.
 fn span(secs: u64) -> String {
     match secs {
         0..120 => format!("{secs} s"),
@@ -166,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn limits_grow_with_the_video_and_no_header_lifts_them() {
+    fn limits_grow_with_the_video_and_stay_bounded() {
         let of = |secs, size| Limits::of_video(&header(secs, size, 30.0), 15.0, 0);
         let (small, long) = (of(10.0, [320, 180]), of(3600.0, [320, 180]));
         assert!(long.cpu_secs > 10 * small.cpu_secs && long.memory > small.memory);
@@ -179,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn the_limit_that_is_passed_is_named() {
+    fn the_exceeded_limit_is_named() {
         let limits = Limits::of_video(&header(10.0, [320, 180], 30.0), 15.0, 0);
         let passed = |cpu, time| limits.passed(cpu, time).unwrap_or_default();
         assert_eq!(passed([3000.0, 3000.0], [30_000, 800]), "");
@@ -190,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn lack_of_memory_is_explained() {
+    fn out_of_memory_errors_are_explained() {
         let limits = Limits::of_header();
         let explained = |text: &'static str| format!("{:#}", limits.explain(Path::new("a.mp4"), anyhow!(text)));
         assert_eq!(explained("no such file"), "no such file");

@@ -1,5 +1,4 @@
-//! What is said between a run and the process of a unit. A process that was taken over may send anything: lengths are
-//! bounded.
+//! Messages between a run and a subprocess. A compromised process may send anything, so message lengths are bounded.
 
 use super::failure::SentFailure;
 use anyhow::{Context, Result};
@@ -12,29 +11,29 @@ use std::ffi::OsString;
 use std::io::{Read, Write};
 use std::path::PathBuf;
 
-/// Bytes of the longest message.
+/// Largest message, bytes.
 const MAX_BYTES: u64 = 16 << 20;
 
-/// What the process is asked.
+/// Request to a subprocess.
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Request {
-    /// To restrict itself and to say how far that went.
+    /// Enter the sandbox and report how far it applies.
     Restrict,
-    /// To work on a unit.
+    /// Process a unit.
     Unit(Box<UnitRequest>),
-    /// To read the header of a video, or to copy an excerpt of it.
+    /// Read the header of a video, or copy an excerpt of it.
     Media {
         wanted: MediaRequest,
-        /// Most bytes of memory.
+        /// Memory limit, bytes.
         memory: u64,
     },
 }
 
-/// What is wanted of a video before any stage.
+/// Request concerning a video, before any stage.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MediaRequest {
     pub source: PathBuf,
-    /// The excerpt to copy; without it the header is read.
+    /// Excerpt to copy; `None`: read the header.
     pub excerpt: Option<ExcerptRequest>,
 }
 
@@ -43,22 +42,22 @@ pub struct MediaRequest {
 pub struct ExcerptRequest {
     pub start_secs: f64,
     pub secs: f64,
-    /// The file to write, in a folder that is there.
+    /// Output file; its folder exists.
     pub to: PathBuf,
 }
 
-/// The header of a video as far as limits depend on it; of an excerpt, its length alone.
+/// Fields of a video header that the limits depend on; for an excerpt only its duration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MediaHeader {
-    /// Length in seconds, if stated.
+    /// Duration in seconds, if stated.
     pub secs: Option<f64>,
-    /// Width and height in px as coded; 0 without pictures.
+    /// Coded width and height in px; 0 without a video stream.
     pub image_size: [usize; 2],
-    /// Average frames a second, if stated.
+    /// Average frame rate, if stated.
     pub fps: Option<f64>,
 }
 
-/// A unit at a stage, with all that the stage is built of.
+/// A unit to process, with everything that is needed to build the stage.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct UnitRequest {
     /// Name of the stage.
@@ -66,23 +65,23 @@ pub struct UnitRequest {
     pub speaker: String,
     pub video: String,
     pub source: OsString,
-    /// The part to work on; none: the unit as a whole.
+    /// Part to process; `None`: the complete unit.
     pub part: Option<usize>,
-    /// Settings with the unit's speaker alone.
+    /// Settings, reduced to the speaker of the unit.
     pub settings: Settings,
-    /// The configuration file, which is not read.
+    /// Path of the configuration file, which the subprocess does not read.
     pub config_file: PathBuf,
-    /// Where the unit is keypoints of another program.
+    /// Set if the unit consists of keypoints of another program.
     pub keypoints: Option<KeypointSource>,
-    /// Files and folders that the stage reads.
+    /// Files and folders that the stage may read.
     pub reads: Vec<OsString>,
-    /// The empty folder that it writes into.
+    /// Empty output folder.
     pub out: OsString,
-    /// Most bytes of memory.
+    /// Memory limit, bytes.
     pub memory: u64,
 }
 
-/// What the process says. Tasks of its progress have numbers.
+/// Message from a subprocess. Progress tasks are numbered.
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Message {
     Restricted(Restriction),
@@ -122,7 +121,10 @@ pub fn send(to: &mut impl Write, message: &impl Serialize) -> Result<()> {
     Ok(to.flush()?)
 }
 
-/// Receives one message. Errors: the end, or something else than a message.
+/// Receives one message.
+///
+/// # Errors
+/// End of the stream; data that is not a valid message.
 pub fn receive<T: DeserializeOwned>(from: &mut impl Read) -> Result<T> {
     rmp_serde::from_read(from.take(MAX_BYTES)).context("no message")
 }

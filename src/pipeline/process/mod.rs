@@ -1,6 +1,7 @@
-//! Stages that hand foreign files to foreign libraries, each unit in a process of its own that is restricted before it
-//! reads: `stage` stands for the stage in the run, `subprocess` starts the process and follows it within its `limits`, `unit`
-//! is what happens in it, `message` goes between them as MessagePack, `failure` carries errors over with their types.
+//! Sandboxed subprocesses, one per unit, for stages that pass untrusted files to C libraries: `stage` wraps a stage so
+//! that it runs in a subprocess, `subprocess` starts the process and supervises it within its `limits`, `unit` is the
+//! code of the subprocess, `message` is the protocol between them (MessagePack), `failure` transfers errors with their
+//! types.
 
 pub mod failure;
 pub mod limits;

@@ -1,4 +1,4 @@
-//! A stage that works on each unit in a subprocess. To a run it is the stage itself.
+//! A stage wrapper that processes each unit in a subprocess.
 
 use super::failure::plain;
 use super::limits::Limits;
@@ -18,10 +18,10 @@ use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::Path;
 
-/// Most tasks under way at a time that a process is believed.
+/// Largest number of concurrent progress tasks accepted from a subprocess.
 const MAX_TASKS: usize = 16;
 
-/// A stage of videos, with the program that works on its units.
+/// A per-video stage, with the program that processes its units.
 pub struct SubprocessStage<'a> {
     pub stage: Box<dyn Stage>,
     pub program: &'a Path,
@@ -47,10 +47,10 @@ impl SubprocessStage<'_> {
     fn work(&self, unit: &Unit, part: Option<usize>, out: &Path, progress: &dyn Progress) -> Result<Report> {
         let limits = self.limits(unit)?;
         let request = Request::Unit(Box::new(self.request(unit, part, out, limits.memory)?));
-        asked(self.program, &request, &unit.source, &limits, |answers| relay(answers, progress))
+        answer_from(self.program, &request, &unit.source, &limits, |answers| relay(answers, progress))
     }
 
-    /// Limits of a process for the unit: by the header of the video, or by what `extract` found of it.
+    /// Limits of the subprocess: from the header of the video, or from the output of `extract` once that has run.
     fn limits(&self, unit: &Unit) -> Result<Limits> {
         let settings = &self.config.settings;
         let header = if self.name() != StageName::Extract.as_str() {
@@ -65,13 +65,13 @@ impl SubprocessStage<'_> {
         } else {
             None
         };
-        let beside = self.stage.inputs(unit)?.into_iter().filter(|input| input.path != unit.source);
-        let n_bytes = beside.filter_map(|input| std::fs::metadata(input.path).ok()).map(|meta| meta.len()).sum();
+        let other_inputs = self.stage.inputs(unit)?.into_iter().filter(|input| input.path != unit.source);
+        let n_bytes = other_inputs.filter_map(|input| std::fs::metadata(input.path).ok()).map(|meta| meta.len()).sum();
         let rate = settings.extract.rate().per_sec();
         Ok(header.map_or_else(Limits::of_machine, |header| Limits::of_video(&header, rate, n_bytes)))
     }
 
-    /// What the configuration says of a unit that is keypoints of another program.
+    /// Configuration entry of a unit that consists of keypoints of another program.
     fn keypoints(&self, unit: &Unit) -> Option<&KeypointSource> {
         let of_speaker = self.videos.iter().find(|videos| videos.speaker == unit.speaker);
         of_speaker.and_then(|videos| videos.keypoints.get(&unit.video))
@@ -82,7 +82,8 @@ impl SubprocessStage<'_> {
         settings.speaker.retain(|speaker| speaker.name == unit.speaker);
         let mut reads: Vec<_> = self.stage.inputs(unit)?.into_iter().map(|input| input.path.into()).collect();
         reads.push(settings.models.dir.as_os_str().to_owned());
-        // The search for the library leads to folders that the process cannot list.
+        // The sandboxed process cannot list the folders that the library search goes through, so the library is found
+        // here.
         if let Ok(library) = find_library(&settings.models.onnxruntime, &settings.models.dir) {
             reads.push(library.clone().into());
             settings.models.onnxruntime = library;
@@ -103,7 +104,7 @@ impl SubprocessStage<'_> {
     }
 }
 
-/// How far a process that `program` starts is restricted here.
+/// Reports how far a subprocess of `program` can be sandboxed on this machine.
 ///
 /// # Errors
 /// The program cannot be started, or does not answer.
@@ -117,22 +118,22 @@ pub fn probe(program: &Path) -> Result<Restriction> {
     }
 }
 
-/// What a restricted process that `program` starts finds of a video: see `answer_media`.
+/// Lets a sandboxed subprocess of `program` run `answer_media`.
 ///
 /// # Errors
-/// Those of `answer_media`; a process that is lost, or ended by its limits.
+/// Those of `answer_media`; a subprocess that crashes or exceeds its limits.
 pub fn ask_media(program: &Path, request: &MediaRequest, limits: &Limits) -> Result<MediaHeader> {
     let source = &request.source;
     let request = Request::Media { wanted: request.clone(), memory: limits.memory };
-    asked(program, &request, source, limits, |answers| match receive(answers)? {
+    answer_from(program, &request, source, limits, |answers| match receive(answers)? {
         Message::Media(header) => Ok(Ok(header)),
         Message::Failed(failure) => Ok(Err(failure.into_error())),
         _ => bail!("no answer to the request"),
     })
 }
 
-/// The answer of a process that `program` starts and that reads `source`, as `read` understands it.
-fn asked<T>(
+/// Starts `program`, sends the request concerning `source` and parses the answer with `read`.
+fn answer_from<T>(
     program: &Path,
     request: &Request,
     source: &Path,
@@ -141,11 +142,11 @@ fn asked<T>(
 ) -> Result<T> {
     let mut process = UnitProcess::start(program)?;
     process.ask(request);
-    let lost = |death| Err(anyhow!("{}: the process that read it {death}", source.display()));
-    process.follow(limits, read).unwrap_or_else(lost).map_err(|error| limits.explain(source, error))
+    let process_error = |death| Err(anyhow!("{}: the process that read it {death}", source.display()));
+    process.follow(limits, read).unwrap_or_else(process_error).map_err(|error| limits.explain(source, error))
 }
 
-/// Hands the progress on until the process has a result. Errors: its end, or what is no message.
+/// Forwards progress until the subprocess sends its result. Fails if the stream ends or contains an invalid message.
 fn relay(from: &mut impl Read, progress: &dyn Progress) -> Result<Result<Report>> {
     let mut tasks: BTreeMap<u32, Box<dyn Task + '_>> = BTreeMap::new();
     loop {

@@ -1,5 +1,5 @@
-//! The process of a unit: it restricts itself, builds the stage, works, and says how that goes on standard output. It dies
-//! with the run that started it.
+//! Subprocess side: enters the sandbox, builds the stage, processes the unit and reports on standard output. The
+//! process exits when the run that started it does.
 
 use super::failure::SentFailure;
 use super::limits::limit_memory;
@@ -20,16 +20,16 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// The argument by which the program becomes the process of a unit. It stands in no help text.
+/// Command-line argument that turns the program into a subprocess; not documented in the help.
 pub const VERB: &str = "work-unit";
 
-/// Least time between two messages of a task's progress.
-const PACE: Duration = Duration::from_millis(50);
+/// Least time between two progress messages of a task.
+const MESSAGE_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Answers the request on standard input. It must come before the process starts threads.
+/// Answers the request on standard input. Must be called before the process starts threads.
 ///
 /// # Errors
-/// No request, or nobody who reads the answer.
+/// No valid request; the answer cannot be written.
 pub fn serve() -> Result<()> {
     rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL))?;
     let out = Messages(Mutex::new(std::io::stdout()));
@@ -53,15 +53,15 @@ pub fn serve() -> Result<()> {
     }
 }
 
-/// Sends the message that `work` ends with, for as long as the process that asked is there.
+/// Sends the result of `work`. The process aborts if its parent exits first.
 fn answer(out: &Messages, work: impl FnOnce() -> Result<Message>) -> Result<()> {
-    let watched = std::thread::Builder::new().spawn(end_with_parent);
-    let work = || watched.context("cannot allocate memory for a thread").and_then(|_| work());
+    let parent_watch = std::thread::Builder::new().spawn(end_with_parent);
+    let work = || parent_watch.context("cannot allocate memory for a thread").and_then(|_| work());
     let failed = |error| Message::Failed(SentFailure::of(&workdir::full_disk(error)));
     out.send(&attempt::catch_panics(work).unwrap_or_else(failed))
 }
 
-/// Ends the process when the other end of standard input is gone.
+/// Aborts the process when the other end of standard input is closed.
 fn end_with_parent() {
     let mut byte = [0];
     while matches!(std::io::stdin().lock().read(&mut byte), Ok(1..)) {}
@@ -84,10 +84,10 @@ fn work(request: UnitRequest, out: &Messages) -> Result<Report> {
     }
 }
 
-/// The header of a video; the length of an excerpt that it copies.
+/// Reads the header of a video, or copies an excerpt and returns its duration.
 ///
 /// # Errors
-/// A video that cannot be read, an excerpt that cannot be copied.
+/// A video that cannot be read; an excerpt that cannot be copied.
 pub fn answer_media(request: &MediaRequest) -> Result<MediaHeader> {
     if let Some(wanted) = &request.excerpt {
         let secs = excerpt::copy(&request.source, &wanted.to, wanted.start_secs, wanted.secs)?;
@@ -99,7 +99,7 @@ pub fn answer_media(request: &MediaRequest) -> Result<MediaHeader> {
     Ok(MediaHeader { secs: media.duration_secs, image_size, fps })
 }
 
-/// Standard output.
+/// Locked standard output, for messages.
 struct Messages(Mutex<Stdout>);
 
 impl Messages {
@@ -109,13 +109,13 @@ impl Messages {
         Ok(out.flush()?)
     }
 
-    /// Sends what may be lost: a run that is gone ends this process anyway.
-    fn tell(&self, message: &Message) {
+    /// Sends a message that may be lost: if the run has exited, this process ends anyway.
+    fn send_progress(&self, message: &Message) {
         let _ = self.send(message);
     }
 }
 
-/// Progress that goes to the run.
+/// Progress sink that sends messages to the run.
 struct SentProgress<'a> {
     out: &'a Messages,
     next: AtomicU32,
@@ -124,17 +124,17 @@ struct SentProgress<'a> {
 impl Progress for SentProgress<'_> {
     fn begin(&self, _label: &str, total: u64) -> Box<dyn Task + '_> {
         let task = self.next.fetch_add(1, Ordering::Relaxed);
-        self.out.tell(&Message::Begin { task, total });
+        self.out.send_progress(&Message::Begin { task, total });
         Box::new(SentTask { out: self.out, task, waiting: Mutex::new((0, Instant::now())) })
     }
 
     fn say(&self, line: &str) {
-        self.out.tell(&Message::Say { line: line.to_owned() });
+        self.out.send_progress(&Message::Say { line: line.to_owned() });
     }
 
     fn event(&self, event: &Event<'_>) {
         match event {
-            Event::Estimate { line } => self.out.tell(&Message::Estimate { line: (*line).to_owned() }),
+            Event::Estimate { line } => self.out.send_progress(&Message::Estimate { line: (*line).to_owned() }),
             event => event.message().iter().for_each(|line| self.say(line)),
         }
     }
@@ -151,19 +151,19 @@ impl Task for SentTask<'_> {
     fn advance(&self, steps: u64) {
         let Ok(mut waiting) = self.waiting.lock() else { return };
         waiting.0 += steps;
-        if waiting.1.elapsed() >= PACE {
-            self.out.tell(&Message::Advance { task: self.task, steps: waiting.0 });
+        if waiting.1.elapsed() >= MESSAGE_INTERVAL {
+            self.out.send_progress(&Message::Advance { task: self.task, steps: waiting.0 });
             *waiting = (0, Instant::now());
         }
     }
 
     fn detail(&self, text: &str) {
-        self.out.tell(&Message::Detail { task: self.task, text: text.to_owned() });
+        self.out.send_progress(&Message::Detail { task: self.task, text: text.to_owned() });
     }
 }
 
 impl Drop for SentTask<'_> {
     fn drop(&mut self) {
-        self.out.tell(&Message::End { task: self.task });
+        self.out.send_progress(&Message::End { task: self.task });
     }
 }

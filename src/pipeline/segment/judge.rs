@@ -1,6 +1,6 @@
-//! The verdict: measures of a video to intervals and a ledger, by the rows of `table`. A frame is refused for the first
-//! rule that it breaks for longer than a gap may be; what is left is divided where a shot or another person begins, and
-//! pieces that are too short, or that break a rule on pieces, are refused whole.
+//! Decision: turns the measures of a video into intervals and a ledger, by the rules of `table`. A frame is rejected
+//! by the first rule that fails for longer than its gap allows. The rest is split at shot boundaries and identity
+//! changes; pieces that are too short or violate a rule on pieces are rejected as a whole.
 
 use super::measure::Measures;
 use super::table::{FrameRule, Gap, frame_rules, piece_rules};
@@ -11,7 +11,7 @@ use orator_base::types::time::FrameRate;
 use orator_dataset::config;
 use orator_formats::media_json::MediaInfo;
 
-/// Judges a whole video.
+/// Segments a complete video.
 pub fn judge(measures: &Measures, video: &MediaInfo, rules: &config::SegmentConfig) -> (Intervals, Ledger) {
     let n_frames = measures.n_frames();
     let begins_shot = |t: usize| {
@@ -24,8 +24,8 @@ pub fn judge(measures: &Measures, video: &MediaInfo, rules: &config::SegmentConf
     for rule in frame_rules(rules) {
         let holds = |t: usize| {
             rule.bound.holds(f64::from((rule.values)(measures)[t]))
-                || (rule.compares && begins_shot[t])
-                || (rule.spares_rest && rests[t])
+                || (rule.compares_frames && begins_shot[t])
+                || (rule.allows_rest && rests[t])
         };
         apply(&rule, holds, &mut refusals, measures, &begins_shot, video.fps);
     }
@@ -37,7 +37,7 @@ pub fn judge(measures: &Measures, video: &MediaInfo, rules: &config::SegmentConf
     (intervals, ledger)
 }
 
-/// Refuses the frames in which `rule` does not hold for too long, where no earlier rule has refused them.
+/// Rejects the frames of runs in which `rule` fails for too long, unless an earlier rule has rejected them.
 fn apply(
     rule: &FrameRule,
     holds: impl Fn(usize) -> bool,
@@ -48,10 +48,10 @@ fn apply(
 ) {
     let (values, n_frames) = ((rule.values)(measures), refusals.len());
     for run in runs(n_frames, |t| !holds(t), |t| begins_shot[t]) {
-        let inside = run.start > 0 && run.end < n_frames && !begins_shot[run.start] && !begins_shot[run.end];
+        let is_inside = run.start > 0 && run.end < n_frames && !begins_shot[run.start] && !begins_shot[run.end];
         let (longest, threshold) = match rule.gap {
             Gap::Anywhere(secs) => (frames_within(secs, fps), secs),
-            Gap::Inside(secs) => (if inside { frames_within(secs, fps) } else { 0 }, secs),
+            Gap::Inside(secs) => (if is_inside { frames_within(secs, fps) } else { 0 }, secs),
         };
         if run.n_frames() <= longest {
             continue;
@@ -67,7 +67,7 @@ fn apply(
     }
 }
 
-/// Stretches end to end over all frames: kept (`None`) or refused.
+/// Consecutive pieces covering all frames, accepted (`None`) or rejected.
 fn pieces(
     refusals: &[Option<FrameRefusal>],
     measures: &Measures,
@@ -84,16 +84,15 @@ fn pieces(
                 let measured = FrameRefusal::mean_measured(&refusals[piece.start..piece.end]);
                 Some(FrameRefusal { measured, ..refused })
             }
-            None => {
-                too_short(piece, measures, begins_shot, fps, rules).or_else(|| broken_by_piece(piece, measures, rules))
-            }
+            None => too_short(piece, measures, begins_shot, fps, rules)
+                .or_else(|| violated_piece_rule(piece, measures, rules)),
         };
         (piece, refused)
     });
     judged.collect()
 }
 
-/// Whether a piece of good frames is shorter than an interval, with what made it so.
+/// Rejection of a piece of good frames that is shorter than the least interval, with the cause.
 fn too_short(
     piece: Interval,
     measures: &Measures,
@@ -117,23 +116,23 @@ fn too_short(
     Some(FrameRefusal::new(refusal, fps.secs(piece.n_frames()), fps.secs(rules.min_frames)))
 }
 
-/// The first rule on pieces that a piece of good frames breaks.
-fn broken_by_piece(piece: Interval, measures: &Measures, rules: &config::SegmentConfig) -> Option<FrameRefusal> {
+/// Rejection by the first rule on pieces that a piece of good frames violates.
+fn violated_piece_rule(piece: Interval, measures: &Measures, rules: &config::SegmentConfig) -> Option<FrameRefusal> {
     piece_rules(rules).into_iter().find_map(|rule| {
         let values = (rule.values)(measures);
-        let rests = |t: usize| rule.spares_rest && f64::from(measures.rest[t]) < rules.max_rest_move;
-        let counts = |&t: &usize| rule.counted.holds(f64::from(values[t])) || rests(t);
-        let n = (piece.start..piece.end).filter(counts).count();
+        let rests = |t: usize| rule.allows_rest && f64::from(measures.rest[t]) < rules.max_rest_move;
+        let is_counted = |&t: &usize| rule.counted.holds(f64::from(values[t])) || rests(t);
+        let n = (piece.start..piece.end).filter(is_counted).count();
         let share = n as f64 / piece.n_frames().max(1) as f64;
         (!rule.share.holds(share)).then(|| FrameRefusal::new(rule.refusal, share, rule.share.threshold()))
     })
 }
 
-/// The pieces as seconds. The last one ends with the video, so that a partly filled last frame is not lost.
+/// Converts pieces to seconds. The last one ends with the video, so that a partial last frame is counted.
 fn ledger(pieces: &[(Interval, Option<FrameRefusal>)], n_frames: usize, video: &MediaInfo) -> Ledger {
     let mut ledger = Ledger { duration_secs: video.duration_secs, ..Ledger::default() };
-    let nothing = [(Interval { start: 0, end: 0 }, Some(FrameRefusal::new(Refusal::NoPerson, 0.0, 0.0)))];
-    let pieces = if pieces.is_empty() { &nothing[..] } else { pieces };
+    let no_frames = [(Interval { start: 0, end: 0 }, Some(FrameRefusal::new(Refusal::NoPerson, 0.0, 0.0)))];
+    let pieces = if pieces.is_empty() { &no_frames[..] } else { pieces };
     for (piece, refused) in pieces {
         let start_secs = video.fps.secs(piece.start).min(video.duration_secs);
         let end_secs = if piece.end == n_frames {
@@ -152,7 +151,7 @@ fn ledger(pieces: &[(Interval, Option<FrameRefusal>)], n_frames: usize, video: &
     ledger
 }
 
-/// Longest runs of frames for which `holds`, divided before each frame that `divides`.
+/// Maximal runs of frames that satisfy `holds`, split before each frame that satisfies `divides`.
 fn runs(n_frames: usize, holds: impl Fn(usize) -> bool, divides: impl Fn(usize) -> bool) -> Vec<Interval> {
     let mut runs: Vec<Interval> = Vec::new();
     for frame in (0..n_frames).filter(|&frame| holds(frame)) {
@@ -164,7 +163,7 @@ fn runs(n_frames: usize, holds: impl Fn(usize) -> bool, divides: impl Fn(usize) 
     runs
 }
 
-/// Whole frames within `secs`.
+/// Number of complete frames within `secs`.
 fn frames_within(secs: f64, fps: FrameRate) -> usize {
     (secs * fps.per_sec() + 1e-6) as usize
 }

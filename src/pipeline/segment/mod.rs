@@ -1,6 +1,6 @@
-//! Stage 3: keypoints to intervals worth keeping. `measure` and `rest` and, by `speech_rule`,
-//! `speech_activity` turn what the stages before wrote into a few numbers a frame (`store` keeps them), `table` has the
-//! rules, a row each, `judge` applies them, `stage` reads and writes the files.
+//! Stage 3: keypoints to accepted intervals. `measure`, `rest` and, if selected by `speech_rule`, `speech_activity`
+//! compute per-frame measures from the outputs of earlier stages (`store` saves them), `table` defines the rules,
+//! `judge` applies them, `stage` reads and writes the files.
 
 pub mod judge;
 pub mod measure;

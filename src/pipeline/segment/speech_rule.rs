@@ -1,4 +1,4 @@
-//! Whether a speech model detects speech: what the configuration asks for, and whether the model is there.
+//! Choice of the speech detector: what the configuration asks for, and whether the model is installed.
 
 use super::speech_activity;
 use anyhow::{Context, Result};
@@ -9,7 +9,7 @@ use orator_onnx::speech::SpeechModel;
 use orator_onnx::{ModelEntry, ModelError, ModelRole, ModelState, ModelStore, Runtime, Wanted};
 use std::path::{Path, PathBuf};
 
-/// The speech model of a configuration, found but not opened.
+/// Speech model of a configuration, located but not opened.
 #[derive(Clone, Debug)]
 pub struct SpeechDetector {
     entry: ModelEntry,
@@ -18,10 +18,10 @@ pub struct SpeechDetector {
 }
 
 impl SpeechDetector {
-    /// The model where it is asked for and there; `None`: loudness alone is the rule.
+    /// Finds the model if it is requested and installed; `None`: speech is detected by loudness only.
     ///
     /// # Errors
-    /// A manifest that is not sound; the model is asked for by name and not there.
+    /// An invalid manifest; a model that is requested explicitly and not installed.
     pub fn find(settings: &Settings) -> Result<Option<Self>> {
         if settings.segment.speech == SpeechRule::Loudness {
             return Ok(None);
@@ -39,12 +39,15 @@ impl SpeechDetector {
         Ok(Some(Self { entry: entry.clone(), models, library }))
     }
 
-    /// The model for `ModelStore::fetch`, unless loudness alone is asked for.
+    /// Model to pass to `ModelStore::fetch`, unless only loudness is requested.
     pub fn wanted(settings: &Settings) -> Option<Wanted> {
         (settings.segment.speech != SpeechRule::Loudness).then_some(Wanted::Role(ModelRole::Speech))
     }
 
-    /// What to say once of a run without the model that might have it.
+    /// Advice to print once in a run without the optional model.
+    ///
+    /// # Errors
+    /// Those of `find`.
     pub fn advice(settings: &Settings) -> Result<Option<&'static str>> {
         let is_missing = settings.segment.speech == SpeechRule::Auto && Self::find(settings)?.is_none();
         Ok(is_missing.then_some(
@@ -53,32 +56,32 @@ impl SpeechDetector {
         ))
     }
 
-    /// How speech was detected, for the card of a dataset.
+    /// Description of the speech detection, for the data card.
     ///
     /// # Errors
     /// Those of `find`.
     pub fn note(settings: &Settings) -> Result<String> {
         Ok(match Self::find(settings)? {
-            Some(listener) => format!(
+            Some(detector) => format!(
                 "Kept sound is speech as the model {} tells it, at least {:.0} % of the 4 s around each frame.",
-                listener.entry.id,
+                detector.entry.id,
                 100.0 * settings.segment.min_speech
             ),
             None => "Speech was told by loudness alone: kept sound may be music or applause.".to_owned(),
         })
     }
 
-    /// Share of speech around each frame of the sound in the file at `path`.
+    /// Share of speech around each frame, from the audio file `path`.
     ///
     /// # Errors
-    /// What is wrong with the model or the file.
+    /// A model that cannot be opened or fails; a file that cannot be read.
     pub fn shares(&self, path: &Path, fps: FrameRate, n_frames: usize) -> Result<Vec<f32>> {
         let runtime = Runtime::load(&self.library, &self.models)?;
         let mut model = SpeechModel::open(&runtime, &self.entry, &self.models)?;
         speech_activity::shares(path, &mut model, fps, n_frames)
     }
 
-    /// The model as it is named in a dataset.
+    /// Description of the model for `info.json`.
     pub fn used(&self) -> ModelUsed {
         let ModelEntry { id, sha256, origin, .. } = self.entry.clone();
         ModelUsed { role: "speech".into(), id, sha256, licence: origin.licence }

@@ -1,10 +1,10 @@
-//! The stage: reads what `extract` and `pose2d` wrote of a video, judges it, writes `intervals.json`, `ledger.json`,
-//! `measures.npz` and `sound_offset.json`.
+//! Stage `segment`: reads the outputs of `extract` and `pose2d`, applies the rules, writes `intervals.json`,
+//! `ledger.json`, `measures.npz` and `sound_offset.json`.
 
 use super::judge::judge;
 use super::measure::{self, Measures};
 use super::speech_rule::SpeechDetector;
-use crate::{lips, sound};
+use crate::{lip_sync, sound};
 use anyhow::{Result, ensure};
 use orator_base::stage::artifacts::{Artifact, StageName};
 use orator_base::stage::ledger::{Ledger, longest_first};
@@ -19,21 +19,21 @@ use orator_formats::timeline_npz::Timeline;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Keypoints to intervals worth keeping.
+/// Stage `segment`.
 pub struct SegmentStage {
     rules: config::SegmentConfig,
     work: PathBuf,
-    /// The speech model; `None`: loudness alone tells speech.
+    /// Speech detector; `None`: speech is detected by loudness only.
     speech: Option<SpeechDetector>,
 }
 
 impl SegmentStage {
-    /// Judges by `rules`; reads the earlier stages' files under the folder `work`.
+    /// Creates the stage with `rules`; earlier stages' files are read under `work`.
     pub fn new(rules: &config::SegmentConfig, work: &Path) -> Self {
         Self { rules: rules.clone(), work: work.to_owned(), speech: None }
     }
 
-    /// Listens for speech with this model.
+    /// Sets the speech detector.
     pub fn with_speech(self, speech: Option<SpeechDetector>) -> Self {
         Self { speech, ..self }
     }
@@ -86,7 +86,7 @@ impl Stage for SegmentStage {
         report.facts.insert("speech".to_owned(), rule.into());
         report.facts.insert("sound_offset".to_owned(), serde_json::to_value(offset)?);
         report.line.extend(offset.filter(SoundOffset::is_reportable).map(|offset| format!("; {offset}")));
-        report.line.extend(video.not_judged().map(|said| format!("; {said}")));
+        report.line.extend(video.not_judged().map(|note| format!("; {note}")));
         Ok(report)
     }
 }
@@ -110,34 +110,34 @@ impl SegmentStage {
             timeline.n_frames()
         );
         let (sound, sound_db) = sound::levels(&self.file(Artifact::Sound, unit), video.fps, n_frames)?;
-        let of_body = Measures::from_keypoints(&keypoints);
+        let from_keypoints = Measures::from_keypoints(&keypoints);
         let speech = match &self.speech {
-            Some(listener) => listener.shares(&self.file(Artifact::Sound, unit), video.fps, n_frames)?,
+            Some(detector) => detector.shares(&self.file(Artifact::Sound, unit), video.fps, n_frames)?,
             None => vec![f32::NAN; n_frames],
         };
         let (lip_sync, offset) = match &extras.face {
             Some(face) => {
                 let is_speech: Vec<bool> =
-                    speech.iter().zip(&sound_db).map(|(share, db)| lips::is_speech(*share, *db)).collect();
+                    speech.iter().zip(&sound_db).map(|(share, db)| lip_sync::is_speech(*share, *db)).collect();
                 let voice = sound::openness(&self.file(Artifact::Sound, unit))?;
                 let (opening, secs) = (face.opening.to_vec(), extras.time_secs.to_vec());
-                let found = lips::compare(&opening, &secs, &is_speech, &voice, video.fps);
+                let found = lip_sync::compare(&opening, &secs, &is_speech, &voice, video.fps);
                 (found.score, found.offset)
             }
             None => (vec![f32::NAN; n_frames], None),
         };
         let measures = Measures {
-            left_other: measure::others(&of_body.left_hand, |t| extras.other_hand[[t, 0]]),
-            right_other: measure::others(&of_body.right_hand, |t| extras.other_hand[[t, 1]]),
+            left_other: measure::duplicate_share(&from_keypoints.left_hand, |t| extras.other_hand[[t, 0]]),
+            right_other: measure::duplicate_share(&from_keypoints.right_hand, |t| extras.other_hand[[t, 1]]),
             sound,
             sound_db,
             speech,
             lip_sync,
             frame_difference: timeline.frame_difference,
             n_people: extras.n_people.iter().map(|&n| n as f32).collect(),
-            identity: measure::identity(&extras.identity.to_vec(), &timeline.restart, &of_body.jump),
+            identity: measure::identity(&extras.identity.to_vec(), &timeline.restart, &from_keypoints.jump),
             shot_score: timeline.shot_score.iter().map(|&score| score as f32).collect(),
-            ..of_body
+            ..from_keypoints
         };
         Ok((measures, offset))
     }

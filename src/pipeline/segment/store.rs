@@ -1,4 +1,4 @@
-//! `measures.npz`: every array of `Measures` by its name, float32 [T].
+//! `measures.npz`: the arrays of `Measures` by name, float32 [T].
 
 use super::measure::Measures;
 use anyhow::Result;
@@ -6,10 +6,10 @@ use ndarray::aview1;
 use orator_formats::npz::{self, Npz};
 use std::path::Path;
 
-/// Arrays that files of earlier versions lack: speech, mouths, and hands at rest.
-const NEWER: [&str; 5] = ["speech", "lip_sync", "left_other", "right_other", "rest"];
+/// Arrays that files of earlier versions lack: speech, lip synchrony, and resting hands.
+const OPTIONAL: [&str; 5] = ["speech", "lip_sync", "left_other", "right_other", "rest"];
 
-/// Every array of measures with its name, in the order of the rules.
+/// Names and arrays of measures, in the order of the rules.
 macro_rules! arrays {
     ($of:ident, $($borrow:tt)+) => {
         [
@@ -38,7 +38,7 @@ macro_rules! arrays {
 }
 
 impl Measures {
-    /// Every array with its name, in the order of the rules.
+    /// Names and arrays, in the order of the rules.
     pub fn arrays(&self) -> [(&'static str, &[f32]); 20] {
         arrays!(self, &)
     }
@@ -50,13 +50,16 @@ impl Measures {
         })
     }
 
-    /// Reads `measures.npz`. Errors name the file and the array that is missing or of another length.
+    /// Reads `measures.npz`.
+    ///
+    /// # Errors
+    /// The file with the array that is missing or has another length.
     pub fn read(path: &Path) -> Result<Self> {
         let mut npz = Npz::open(path)?;
         let n_frames = npz.floats("person", &[None])?.len();
         let mut read = Self::default();
         for (name, values) in arrays!(read, &mut) {
-            *values = if NEWER.contains(&name) && !npz.has(name) {
+            *values = if OPTIONAL.contains(&name) && !npz.has(name) {
                 vec![f32::NAN; n_frames]
             } else {
                 npz.floats(name, &[Some(n_frames)])?.into_iter().collect()

@@ -113,7 +113,7 @@ impl StudyRules<'_> {
             let key = |key: &str| format!("speaker[{}].{key}", speaker.name);
             match (&speaker.dataset, &speaker.sounds) {
                 (None, None) => {
-                    self.report(key("dataset"), "expected dataset = \"FOLDER\" or sounds = \"FOLDER/*.wav\"")
+                    self.report(key("dataset"), "expected dataset = \"FOLDER\" or sounds = \"FOLDER/*.wav\"");
                 }
                 (Some(_), Some(_)) => self.report(key("sounds"), "expected a dataset or sounds: remove one of the two"),
                 _ => {}
@@ -136,7 +136,7 @@ impl StudyRules<'_> {
         let known: Vec<String> = self.file.condition.iter().map(|condition| condition.name.clone()).collect();
         let is_known = known.iter().any(|other| other == name);
         if !is_known {
-            let near = nearest(name, known.iter());
+            let near = did_you_mean(name, known.iter());
             self.report(key, format!("no condition is called {name:?}{near}; there are: {}", known.join(", ")));
         }
         is_known
@@ -207,7 +207,7 @@ impl StudyRules<'_> {
         let scales = ["human-likeness", "appropriateness"];
         match task.design {
             TaskDesign::Sliders if !scales.contains(&task.scale.as_str()) => {
-                let near = nearest(&task.scale, scales.map(str::to_owned).iter());
+                let near = did_you_mean(&task.scale, scales.map(str::to_owned).iter());
                 self.report(key("scale"), format!("{:?}: expected {}{near}", task.scale, scales.join(" or ")));
             }
             TaskDesign::Sliders => {}

@@ -1,6 +1,6 @@
-//! Body of the drawn figure: controls (wrists, turn and curl of the hands, lean of torso and head) to joints in metres.
-//! World axes are those of a frontal camera: x to the figure's left (image right), y down, z away from the viewer; the
-//! figure faces -z with its neck near the origin.
+//! Body of the drawn figure: controls (wrists, rotation and curl of the hands, lean of torso and head) to joints in
+//! metres. World axes are those of a frontal camera: x to the figure's left (image right), y down, z away from the
+//! viewer; the figure faces -z with its neck near the origin.
 
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::{Vec3, add, cross, dot, norm, scale, sub};
@@ -10,35 +10,35 @@ use orator_base::types::skeleton::{L_HAND, L_SHOULDER, N_HAND_JOINTS, N_JOINTS, 
 pub const SHOULDER_WIDTH: f64 = 0.35;
 pub const UPPER_ARM: f64 = 0.29;
 pub const FOREARM: f64 = 0.25;
-/// Nose, left and right eye, left and right ear relative to the neck, metres; the nose is 0.21 m away.
+/// Nose, left and right eye, left and right ear relative to the neck, metres; the nose is at a distance of 0.21 m.
 const HEAD: [Vec3; 5] =
     [[0.0, -0.19, -0.09], [0.034, -0.23, -0.07], [-0.034, -0.23, -0.07], [0.078, -0.205, 0.01], [-0.078, -0.205, 0.01]];
 /// Centre of the head's rotation.
 const SKULL_BASE: Vec3 = [0.0, -0.08, 0.02];
 /// Left and right hip relative to the neck.
 const HIPS: [Vec3; 2] = [[0.11, 0.5, 0.02], [-0.11, 0.5, 0.02]];
-/// First joint of thumb to little finger relative to the wrist, in the hand's axes: along the fingers, towards the
-/// thumb, out of the palm.
+/// First joints of thumb to little finger relative to the wrist, in hand axes: along the fingers, towards the thumb,
+/// out of the palm; metres.
 pub const FINGER_BASES: [Vec3; 5] =
     [[0.026, 0.028, 0.012], [0.09, 0.026, 0.0], [0.094, 0.003, 0.0], [0.087, -0.018, 0.0], [0.078, -0.037, 0.003]];
-/// The three bones of each finger beyond its base; the middle finger's first is 48 mm.
+/// Lengths of the three bones of each finger beyond its base, metres.
 pub const PHALANGES: [[f64; 3]; 5] =
     [[0.044, 0.034, 0.028], [0.044, 0.027, 0.021], [0.048, 0.03, 0.022], [0.044, 0.028, 0.022], [0.036, 0.021, 0.019]];
 
-/// Direction of the elbows in torso axes: outwards, down, away. Elbows are then 0.27 m beside and below the neck and
-/// hardly before or behind it, as measured on speakers of talks.
+/// Direction of the elbows in torso axes: outwards, down, away. It puts the elbows 0.27 m beside and below the neck
+/// and almost in its plane, as measured on speakers of talks.
 const ELBOW_POLE: [f64; 3] = [0.3, 0.95, 0.0];
 
 /// Controls of one arm, mirrored for the right side.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ArmControls {
-    /// Wrist from the neck in torso axes: outwards, down, away from the viewer; metres.
+    /// Wrist position relative to the neck in torso axes: outwards, down, away from the viewer; metres.
     pub wrist: [f64; 3],
-    /// Turn about the hand's length; 0: thumb up, positive: palm up. Radians.
+    /// Rotation about the hand's long axis in radians; 0: thumb up, positive: palm up.
     pub roll: f64,
-    /// Tangent of the angle of the hand above the forearm's line.
+    /// Tangent of the angle of the hand above the line of the forearm.
     pub raise: f64,
-    /// Flexion of index to little finger, 0 straight .. 1 fist.
+    /// Flexion of index to little finger, 0 (straight) to 1 (fist).
     pub curl: f64,
     /// Additional flexion of the index finger; negative: pointing.
     pub index: f64,
@@ -46,7 +46,7 @@ pub struct ArmControls {
     pub spread: f64,
 }
 
-/// Number of controls of an arm.
+/// Number of controls per arm.
 pub const N_ARM: usize = 8;
 
 impl From<[f64; N_ARM]> for ArmControls {
@@ -55,12 +55,12 @@ impl From<[f64; N_ARM]> for ArmControls {
     }
 }
 
-/// Controls of the whole figure; angles in radians.
+/// Controls of the complete figure; angles in radians.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Controls {
     /// Left, right.
     pub arms: [ArmControls; 2],
-    /// Turn about the vertical, lean forward, lean to the figure's left.
+    /// Rotation about the vertical axis, lean forward, lean to the figure's left.
     pub torso: [f64; 3],
     /// Rotation of the head relative to the torso, in the same order.
     pub head: [f64; 3],
@@ -68,7 +68,7 @@ pub struct Controls {
     pub neck: Vec3,
 }
 
-/// Points of the figure, world metres.
+/// Points of the figure in world coordinates, metres.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DrawnFigure {
     /// Joints in the order of `types::skeleton`.
@@ -82,7 +82,7 @@ pub struct DrawnFigure {
 }
 
 impl DrawnFigure {
-    /// Figure in the posture of its controls.
+    /// Computes the figure from its controls.
     pub fn new(controls: &Controls) -> Self {
         let torso = lean(controls.torso);
         let skull = torso * lean(controls.head);
@@ -96,7 +96,7 @@ impl DrawnFigure {
             let to_world = |[out, down, away]: Vec3| torso.turn([side * out, down, away]);
             let start = at([side * SHOULDER_WIDTH / 2.0, 0.0, 0.0]);
             let (elbow, wrist) =
-                reach([UPPER_ARM, FOREARM], start, add(controls.neck, to_world(arm.wrist)), to_world(ELBOW_POLE));
+                solve_arm([UPPER_ARM, FOREARM], start, add(controls.neck, to_world(arm.wrist)), to_world(ELBOW_POLE));
             joints[shoulder] = start;
             joints[shoulder + 1] = elbow;
             joints[shoulder + 2] = wrist;
@@ -112,14 +112,14 @@ fn lean([turn, forward, sideways]: [f64; 3]) -> Rotation {
         * Rotation::about([0.0, 0.0, 1.0], sideways)
 }
 
-/// Elbow and wrist of an arm (lengths of upper arm and forearm) from `shoulder` that reaches for `target`, the elbow
-/// towards `pole`.
-pub fn reach([upper, fore]: [f64; 2], shoulder: Vec3, target: Vec3, pole: Vec3) -> (Vec3, Vec3) {
-    let way = sub(target, shoulder);
-    let wanted = norm(way).max(1e-6);
-    let axis = scale(way, 1.0 / wanted);
-    let distance = wanted.clamp(0.3 * (upper + fore), 0.97 * (upper + fore));
-    // Along the axis to the foot of the elbow, and out from it (law of cosines).
+/// Two-bone inverse kinematics: elbow and wrist of an arm (lengths of upper arm and forearm) from `shoulder` to
+/// `target`, with the elbow towards `pole`.
+pub fn solve_arm([upper, fore]: [f64; 2], shoulder: Vec3, target: Vec3, pole: Vec3) -> (Vec3, Vec3) {
+    let to_target = sub(target, shoulder);
+    let target_distance = norm(to_target).max(1e-6);
+    let axis = scale(to_target, 1.0 / target_distance);
+    let distance = target_distance.clamp(0.3 * (upper + fore), 0.97 * (upper + fore));
+    // Distance along the axis to the perpendicular foot of the elbow, and from there to the elbow (law of cosines).
     let along = (distance * distance + upper * upper - fore * fore) / (2.0 * distance);
     let out = (upper * upper - along * along).max(0.0).sqrt();
     let side = direction(sub(pole, scale(axis, dot(pole, axis))));
@@ -127,7 +127,7 @@ pub fn reach([upper, fore]: [f64; 2], shoulder: Vec3, target: Vec3, pole: Vec3) 
     (elbow, add(shoulder, scale(axis, distance)))
 }
 
-/// The 21 joints of a hand: wrist, then thumb to little finger, each base to tip.
+/// The 21 joints of a hand: wrist, then thumb to little finger, each from base to tip.
 fn fingers(arm: &ArmControls, elbow: Vec3, wrist: Vec3, side: f64) -> [Vec3; N_HAND_JOINTS] {
     let forearm = direction(sub(wrist, elbow));
     let along = direction(add(forearm, [0.0, -arm.raise, 0.0]));
@@ -136,10 +136,10 @@ fn fingers(arm: &ArmControls, elbow: Vec3, wrist: Vec3, side: f64) -> [Vec3; N_H
     let turn = Rotation::about(along, -side * arm.roll);
     let thumb_side = turn.turn(thumb_up);
     let palm = scale(cross(along, thumb_side), side);
-    let place = |[a, t, p]: Vec3| add(scale(along, a), add(scale(thumb_side, t), scale(palm, p)));
+    let from_hand_axes = |[a, t, p]: Vec3| add(scale(along, a), add(scale(thumb_side, t), scale(palm, p)));
     let mut joints = [wrist; N_HAND_JOINTS];
     for (finger, (base, lengths)) in FINGER_BASES.iter().zip(PHALANGES).enumerate() {
-        let mut at = add(wrist, place(*base));
+        let mut at = add(wrist, from_hand_axes(*base));
         joints[1 + 4 * finger] = at;
         let (bends, across) = if finger == 0 {
             ([0.15, 0.35 * arm.curl, 0.6 * arm.curl], 0.75 - 0.5 * arm.curl + 0.5 * arm.spread)
@@ -151,7 +151,7 @@ fn fingers(arm: &ArmControls, elbow: Vec3, wrist: Vec3, side: f64) -> [Vec3; N_H
         for (bone, length) in lengths.into_iter().enumerate() {
             bend += bends[bone];
             let flat = [bend.cos() * across.cos(), bend.cos() * across.sin(), bend.sin()];
-            at = add(at, scale(place(flat), length));
+            at = add(at, scale(from_hand_axes(flat), length));
             joints[2 + 4 * finger + bone] = at;
         }
     }
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn bones_have_their_lengths_and_hands_hang_on_wrists() {
+    fn bones_have_their_lengths_and_hands_start_at_the_wrists() {
         let figure = DrawnFigure::new(&posture());
         let length = |a: usize, b: usize| norm(sub(figure.joints[a], figure.joints[b]));
         assert!((length(L_SHOULDER, L_ELBOW) - UPPER_ARM).abs() < 1e-9);

@@ -1,5 +1,5 @@
-//! Demo folder: videos of the synthetic speaker, their ground truth, the marker models, and a configuration for `orator
-//! run`.
+//! Demo folder: videos of the synthetic speaker, their ground truth, the marker models, and a configuration for
+//! `orator run`.
 
 use super::scene::DrawnScene;
 use super::truth::DrawnTruth;
@@ -10,10 +10,10 @@ use orator_base::types::time::FrameRate;
 use orator_formats::wav;
 use std::path::{Path, PathBuf};
 
-/// Frame rate of the dataset and of the truth.
+/// Frame rate of the dataset and of the ground truth.
 pub const DATASET_FPS: FrameRate = FrameRate::new(15, 1);
-/// Seconds of speech without video for `orator generate`.
-pub const UNHEARD_SECS: f64 = 10.0;
+/// Duration of the speech without video, for `orator generate`, seconds.
+pub const SPEECH_ONLY_SECS: f64 = 10.0;
 
 const MODELS: [(&str, &[u8]); 3] = [
     ("marker_person.onnx", include_bytes!("../../../models/marker_person.onnx")),
@@ -21,7 +21,7 @@ const MODELS: [(&str, &[u8]); 3] = [
     ("marker_hand.onnx", include_bytes!("../../../models/marker_hand.onnx")),
 ];
 
-/// Configuration of a demo: `TITLE`, `SPLITS`, `SOURCE` and `MODELS` stand for what differs.
+/// Configuration template of a demo; `TITLE`, `SPLITS`, `SOURCE` and `MODELS` are replaced.
 const PIPELINE: &str = r#"# TITLE
 [[speaker]]
 name = "host"
@@ -48,7 +48,7 @@ face = ""                          # it has no face
 
 "#;
 
-/// Configuration of a demo of `n_videos` videos: a title, where the videos are from, and the section of its models.
+/// Configuration of a demo with `n_videos` videos: a title, the origin of the videos, and the section of its models.
 pub fn pipeline(title: &str, source: &str, models: &str, n_videos: usize) -> String {
     let filled = PIPELINE.replace("TITLE", title).replace("SOURCE", source).replace("MODELS", models);
     filled.replace("SPLITS", &splits(n_videos))
@@ -58,9 +58,9 @@ pub fn pipeline(title: &str, source: &str, models: &str, n_videos: usize) -> Str
 #[derive(Clone, Debug)]
 pub struct DemoPlan {
     pub n_videos: usize,
-    /// Length of each video.
+    /// Duration of each video, seconds.
     pub secs: f64,
-    /// Frames a second of the videos.
+    /// Frame rate of the videos.
     pub fps: FrameRate,
     /// Width and height in px, both even.
     pub size: [usize; 2],
@@ -74,7 +74,10 @@ impl Default for DemoPlan {
 }
 
 impl DemoPlan {
-    /// Errors: no videos or too many, too short or too long ones.
+    /// Checks the ranges of the values.
+    ///
+    /// # Errors
+    /// A number of videos outside 1..=1000 or a duration outside 1..=3600 s.
     pub fn check(&self) -> anyhow::Result<()> {
         ensure!((1..=1000).contains(&self.n_videos), "between 1 and 1000 videos can be drawn, not {}", self.n_videos);
         ensure!((1.0..=3600.0).contains(&self.secs), "a video lasts 1 to 3600 seconds, not {}", self.secs);
@@ -97,15 +100,16 @@ pub fn draw(dir: &Path, plan: &DemoPlan, progress: &dyn Progress) -> anyhow::Res
         DrawnTruth::new(&scene, DATASET_FPS).write(&dir.join(format!("truth/clip-{number}.npz")))?;
         videos.push(video);
     }
-    let unheard = DrawnScene::new(plan.seed.wrapping_mul(1000), UNHEARD_SECS, plan.size).sound();
-    workdir::replace(&dir.join("speech.wav"), |attempt| wav::write(attempt, &unheard))?;
+    let speech_only = DrawnScene::new(plan.seed.wrapping_mul(1000), SPEECH_ONLY_SECS, plan.size).sound();
+    workdir::replace(&dir.join("speech.wav"), |attempt| wav::write(attempt, &speech_only))?;
     let title = "The synthetic speaker of `orator-lab demo`: the marker models know its suit and no real person.";
     let pipeline = pipeline(title, "drawn by orator demo", MARKER_MODELS, plan.n_videos);
     workdir::write_file(&dir.join("pipeline.toml"), pipeline.as_bytes())?;
     Ok(videos)
 }
 
-/// Configuration lines for the splits: the last third tests, one video before it validates; fewer than three all train.
+/// Configuration lines for the splits: the last third of the videos is the test split, the one before it the
+/// validation split; fewer than three are all training.
 fn splits(n_videos: usize) -> String {
     if n_videos < 3 {
         return "train = [\"*.mp4\"]".to_owned();

@@ -1,5 +1,5 @@
-//! Gestures for speech: every phrase has strokes to new positions in front of the body, every stressed syllable a beat
-//! of hands and head, every longer pause a rest. Controls are smooth functions of time.
+//! Gestures for speech: each phrase has strokes to new positions in front of the body, each stressed syllable a beat
+//! of hands and head, each longer pause a rest. Controls are smooth functions of time.
 
 use super::figure::{ArmControls, Controls, N_ARM};
 use super::speech::Speech;
@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 /// Rest pose: hands folded low in front of the body.
 const REST: [f64; N_ARM] = [0.17, 0.35, -0.19, 0.6, 0.45, 0.35, 0.0, 0.06];
 
-/// Movement of the arms to `arms` from `start` on within `secs`.
+/// Movement of the arms to `arms`, beginning at `start` and lasting `secs`.
 #[derive(Clone, Debug)]
 struct Stroke {
     start: f64,
@@ -20,12 +20,12 @@ struct Stroke {
     head: [f64; 3],
 }
 
-/// Short dip of hands and head around a stressed syllable.
+/// Short downward movement of hands and head around a stressed syllable.
 #[derive(Clone, Debug)]
 struct BeatGesture {
     at: f64,
     depth: f64,
-    /// Shares of left and right hand.
+    /// Share of the depth for the left and right hand.
     hands: [f64; 2],
 }
 
@@ -39,13 +39,13 @@ pub struct DrawnGestures {
 }
 
 impl DrawnGestures {
-    /// Strokes and beats of a speech.
+    /// Generates the strokes and beats of a speech.
     pub fn new(speech: &Speech, rng: &mut ChaCha8Rng) -> Self {
         let sway = std::array::from_fn(|_| rng.random_range(0.0..2.0 * PI));
         let mut gestures = Self { strokes: Vec::new(), beats: Vec::new(), sway };
         for (number, phrase) in speech.phrases.iter().enumerate() {
-            let said = &speech.syllables[phrase.first..phrase.last];
-            for (k, syllable) in said.iter().enumerate().filter(|(_, s)| s.stress > 0.5) {
+            let phrase_syllables = &speech.syllables[phrase.first..phrase.last];
+            for (k, syllable) in phrase_syllables.iter().enumerate().filter(|(_, s)| s.stress > 0.5) {
                 let one_handed = rng.random_range(0.0..1.0) < 0.35;
                 let side = usize::from(rng.random_range(0.0..1.0) < 0.5);
                 if k < 3 || rng.random_range(0.0..1.0) < 0.5 {
@@ -58,7 +58,9 @@ impl DrawnGestures {
                 let depth = rng.random_range(0.02..0.045) * syllable.stress;
                 gestures.beats.push(BeatGesture { at: (syllable.start + syllable.end) / 2.0, depth, hands });
             }
-            let (Some(end), next) = (said.last().map(|s| s.end), speech.phrases.get(number + 1)) else { continue };
+            let (Some(end), next) = (phrase_syllables.last().map(|s| s.end), speech.phrases.get(number + 1)) else {
+                continue;
+            };
             if next.is_none_or(|next| speech.syllables.get(next.first).is_none_or(|s| s.start - end > 0.6)) {
                 gestures.strokes.push(Stroke { start: end, secs: 0.8, arms: [REST; 2], head: [0.0; 3] });
             }
@@ -66,9 +68,9 @@ impl DrawnGestures {
         gestures
     }
 
-    /// Adds a stroke to a new position of both hands, or of one while the other rests.
+    /// Adds a stroke to a new position of both hands, or of one hand while the other rests.
     fn stroke(&mut self, start: f64, only: Option<usize>, rng: &mut ChaCha8Rng) {
-        let place = |rng: &mut ChaCha8Rng| -> [f64; N_ARM] {
+        let position = |rng: &mut ChaCha8Rng| -> [f64; N_ARM] {
             [
                 rng.random_range(0.16..0.3),
                 rng.random_range(0.12..0.36),
@@ -80,10 +82,10 @@ impl DrawnGestures {
                 rng.random_range(0.04..0.16),
             ]
         };
-        let first = place(rng);
-        // Two-handed gestures are mostly nearly symmetric.
+        let first = position(rng);
+        // Two-handed gestures are usually nearly symmetric.
         let second = std::array::from_fn(|k| 0.85 * first[k] + 0.15 * REST[k]);
-        let mut arms = if rng.random_range(0.0..1.0) < 0.6 { [first, second] } else { [first, place(rng)] };
+        let mut arms = if rng.random_range(0.0..1.0) < 0.6 { [first, second] } else { [first, position(rng)] };
         if let Some(side) = only {
             arms[1 - side] = REST;
         }
@@ -137,19 +139,19 @@ mod tests {
     use rand::SeedableRng;
 
     #[test]
-    fn hands_move_like_a_speakers_and_keep_apart() {
+    fn hand_speeds_are_realistic_and_hands_stay_separated() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let speech = Speech::new(20.0, &mut rng);
         let gestures = DrawnGestures::new(&speech, &mut rng);
         let figures: Vec<DrawnFigure> =
             (0..600).map(|n| DrawnFigure::new(&gestures.controls(f64::from(n) / 30.0))).collect();
-        let mut way = 0.0;
+        let mut path_length = 0.0;
         for pair in figures.windows(2) {
             let step = norm(sub(pair[1].joints[R_WRIST], pair[0].joints[R_WRIST]));
             assert!(step < 0.06, "a wrist moved {step} m in a frame");
-            way += step;
+            path_length += step;
         }
-        let mean_speed = way / 20.0;
+        let mean_speed = path_length / 20.0;
         assert!((0.05..0.6).contains(&mean_speed), "{mean_speed} m/s");
         assert!(figures.iter().all(|f| norm(sub(f.joints[L_WRIST], f.joints[R_WRIST])) > 0.2));
     }

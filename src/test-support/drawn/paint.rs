@@ -1,4 +1,4 @@
-//! Picture of the figure: a grey mannequin in a marker suit on a plain ground, one colour for each joint.
+//! Rendering of the figure: a grey mannequin in a marker suit on a plain background, one colour per joint.
 
 use super::camera::DemoCamera;
 use super::figure::DrawnFigure;
@@ -19,12 +19,12 @@ const HEAD: [u8; 3] = [186, 187, 191];
 const RIM: [u8; 3] = [118, 121, 127];
 const MOUTH: [u8; 3] = [84, 84, 90];
 
-/// Radii in metres.
+/// Marker radii in metres.
 const BODY_MARKER: f64 = 0.02;
 const FACE_MARKER: f64 = 0.0145;
 const FINGER_MARKER: f64 = 0.0095;
 
-/// Draws the figure; `mouth` is its opening, 0..1.
+/// Draws the figure; `mouth` is the opening of the mouth, 0..1.
 pub fn picture(figure: &DrawnFigure, camera: &DemoCamera, mouth: f64) -> anyhow::Result<Image> {
     let mut canvas = Canvas { image: Image::filled(camera.width, camera.height, GROUND), camera };
     canvas.floor()?;
@@ -56,11 +56,11 @@ struct Canvas<'a> {
 
 impl Canvas<'_> {
     fn depth(&self, point: Vec3) -> f64 {
-        self.camera.see(point)[2]
+        self.camera.to_camera(point)[2]
     }
 
-    fn place(&self, point: Vec3) -> [f32; 2] {
-        self.camera.pixel(self.camera.see(point)).map(|v| v as f32)
+    fn project(&self, point: Vec3) -> [f32; 2] {
+        self.camera.pixel(self.camera.to_camera(point)).map(|v| v as f32)
     }
 
     fn px(&self, metres: f64, at: Vec3) -> f32 {
@@ -76,13 +76,13 @@ impl Canvas<'_> {
         )
     }
 
-    /// Draws a chain of limbs with one outline: (from, radius, to, radius) in metres.
+    /// Draws a chain of limbs with one outline: (start, radius, end, radius) in metres.
     fn limbs(&mut self, parts: &[(Vec3, f64, Vec3, f64)], rgb: [u8; 3]) -> anyhow::Result<()> {
         let line = (self.camera.height as f32 / 400.0).max(1.0);
         for (grow, colour) in [(line, OUTLINE), (0.0, rgb)] {
             for &(from, from_radius, to, to_radius) in parts {
                 let radii = [self.px(from_radius, from) + grow, self.px(to_radius, to) + grow];
-                let ends = [self.place(from), self.place(to)];
+                let ends = [self.project(from), self.project(to)];
                 draw::capsule(&mut self.image, ends[0], radii[0], ends[1], radii[1], colour)?;
             }
         }
@@ -127,8 +127,8 @@ impl Canvas<'_> {
         let thick = 0.004 + 0.011 * mouth;
         let (left, right) = (add(below_nose, half), sub(below_nose, half));
         let radius = self.px(thick, below_nose);
-        let [l_end, r_end] = [left, right].map(|end| self.place(along(end, 0.006)));
-        let middle = self.place(along(below_nose, -0.004));
+        let [l_end, r_end] = [left, right].map(|end| self.project(along(end, 0.006)));
+        let middle = self.project(along(below_nose, -0.004));
         for end in [l_end, r_end] {
             draw::capsule(&mut self.image, end, 0.6 * radius, middle, radius, MOUTH)?;
         }
@@ -152,7 +152,7 @@ impl Canvas<'_> {
         self.limbs(&parts, HAND)
     }
 
-    /// Draws all markers, far ones first, each with a grey rim against its neighbours.
+    /// Draws all markers from far to near, each with a grey rim that separates it from its neighbours.
     fn markers(&mut self, figure: &DrawnFigure) -> anyhow::Result<()> {
         let body = coco(figure);
         let mut all: Vec<(Vec3, f64, [u8; 3])> = Vec::with_capacity(N_BODY_MARKERS + 2 * N_FINGER_MARKERS);
@@ -165,9 +165,9 @@ impl Canvas<'_> {
         }
         all.sort_by(|a, b| self.depth(b.0).total_cmp(&self.depth(a.0)));
         for (point, metres, rgb) in all {
-            let (place, radius) = (self.place(point), self.px(metres, point));
-            draw::circle(&mut self.image, place, radius + 0.25 * radius.min(6.0), RIM)?;
-            draw::circle(&mut self.image, place, radius - 0.5, rgb)?;
+            let (centre, radius) = (self.project(point), self.px(metres, point));
+            draw::circle(&mut self.image, centre, radius + 0.25 * radius.min(6.0), RIM)?;
+            draw::circle(&mut self.image, centre, radius - 0.5, rgb)?;
         }
         Ok(())
     }

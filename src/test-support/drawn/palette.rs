@@ -1,16 +1,16 @@
-//! Colours of the marker suit, read from `fixtures/marker_palette.txt`, from which the marker models are made too.
+//! Colours of the marker suit, read from `fixtures/marker_palette.txt`, which also defines the marker models.
 
 use std::sync::LazyLock;
 
 const FILE: &str = include_str!("../../../fixtures/marker_palette.txt");
 /// Number of body markers: the first 13 points of COCO-17.
 pub const N_BODY_MARKERS: usize = 13;
-/// Number of markers of a hand without its wrist, which is a body marker.
+/// Number of markers per hand, without the wrist, which is a body marker.
 pub const N_FINGER_MARKERS: usize = 20;
-/// Number of colours: the body's, then the fingers', which both hands share.
+/// Number of colours: body markers, then finger markers, which are shared by both hands.
 pub const N_COLOURS: usize = N_BODY_MARKERS + N_FINGER_MARKERS;
 
-/// RGB of each marker: COCO points 0..13, then thumb to little finger, each base to tip.
+/// RGB of each marker: COCO points 0..13, then thumb to little finger, each from base to tip.
 pub static COLOURS: LazyLock<[[u8; 3]; N_COLOURS]> = LazyLock::new(|| {
     let mut colours = [[0; 3]; N_COLOURS];
     let lines = FILE.lines().filter(|line| !line.starts_with('#') && !line.trim().is_empty());

@@ -24,7 +24,7 @@ pub struct DrawnScene {
 }
 
 impl DrawnScene {
-    /// Clip of a seed; the camera stands a little aside and above.
+    /// Creates the clip of a seed; the camera is slightly to the side and above.
     pub fn new(seed: u64, secs: f64, size: [usize; 2]) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let speech = Speech::new(secs, &mut rng);
@@ -38,7 +38,7 @@ impl DrawnScene {
         Self { secs, camera, seed, speech, gestures }
     }
 
-    /// Figure at a time, in world axes.
+    /// Figure at a time, in world coordinates.
     pub fn figure(&self, secs: f64) -> DrawnFigure {
         DrawnFigure::new(&self.gestures.controls(secs))
     }
@@ -48,7 +48,7 @@ impl DrawnScene {
         paint::picture(&self.figure(secs), &self.camera, self.speech.loudness(secs))
     }
 
-    /// Sound of the clip.
+    /// Audio of the clip.
     pub fn sound(&self) -> Sound {
         self.speech.sound(self.secs, &mut ChaCha8Rng::seed_from_u64(self.seed ^ 0x50EA))
     }

@@ -1,5 +1,5 @@
-//! Speech of the synthetic speaker: phrases of syllables with stresses and pauses, and their sound, a pulse train
-//! through three formants with a little noise at the onsets.
+//! Speech of the synthetic speaker: phrases of syllables with stress and pauses, and their audio, a pulse train
+//! through three formant filters with some noise at the onsets.
 
 use orator_base::types::sound::{SAMPLE_RATE, Sound};
 use rand::Rng;
@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
-/// First three formants of a few vowels, Hz (Peterson and Barney 1952, men).
+/// First three formants of five vowels, Hz (Peterson and Barney 1952, men).
 const VOWELS: [[f64; 3]; 5] = [
     [730.0, 1090.0, 2440.0],
     [530.0, 1840.0, 2480.0],
@@ -45,7 +45,7 @@ pub struct Speech {
 }
 
 impl Speech {
-    /// Phrases that fill `secs` seconds, each followed by a pause.
+    /// Generates phrases that fill `secs` seconds, each followed by a pause.
     pub fn new(secs: f64, rng: &mut ChaCha8Rng) -> Self {
         let stress = |k: i32, _: f64, rng: &mut ChaCha8Rng| match k % 3 {
             1 => rng.random_range(0.7..1.0),
@@ -54,8 +54,8 @@ impl Speech {
         Self::phrases([0.25, secs], 5..13, 0.3..0.9, |_| 1.0, stress, rng)
     }
 
-    /// Free speech of `secs` seconds: phrases of any length, soft and loud, with irregular accents (stress at least
-    /// 0.7, all others at most 0.2) at least half a second apart.
+    /// Generates free speech of `secs` seconds: phrases of any length and loudness, with irregular accents (stress at
+    /// least 0.7, all others at most 0.2) that are at least half a second apart.
     pub fn free(secs: f64, rng: &mut ChaCha8Rng) -> Self {
         let (start, mut last_accent) = (rng.random_range(0.2..0.8), f64::NEG_INFINITY);
         let stress = |_: i32, now: f64, rng: &mut ChaCha8Rng| {
@@ -68,8 +68,8 @@ impl Speech {
         Self::phrases([start, secs], 5..22, 0.3..1.5, |rng| rng.random_range(0.7..1.0), stress, rng)
     }
 
-    /// Phrases from one second to another: ranges of the number of syllables and of the pause, seconds; the volume of a
-    /// phrase; the stress of its syllable `k` at a second.
+    /// Generates phrases in a time range from ranges of the number of syllables and of the pause in seconds, the
+    /// volume of a phrase, and the stress of its syllable `k` at a time.
     fn phrases(
         [mut now, secs]: [f64; 2],
         counts: Range<i32>,
@@ -100,18 +100,18 @@ impl Speech {
         speech
     }
 
-    /// Loudness of the voice at `secs`, 0..1, also the opening of the mouth.
+    /// Loudness of the voice at `secs`, 0..1; also the opening of the mouth.
     pub fn loudness(&self, secs: f64) -> f64 {
         let next = self.syllables.partition_point(|s| s.end <= secs);
         self.syllables.get(next).filter(|s| s.start <= secs).map_or(0.0, |s| s.loudness(secs))
     }
 
-    /// Sound of `secs` seconds.
+    /// Audio of `secs` seconds.
     pub fn sound(&self, secs: f64, rng: &mut ChaCha8Rng) -> Sound {
         self.sound_of_tract(secs, 1.0, rng)
     }
 
-    /// Sound of `secs` seconds by a vocal tract whose formants are `formants` times those of the table.
+    /// Audio of `secs` seconds by a vocal tract whose formants are scaled by `formants`.
     pub fn sound_of_tract(&self, secs: f64, formants: f64, rng: &mut ChaCha8Rng) -> Sound {
         let rate = f64::from(SAMPLE_RATE);
         let mut samples = vec![0.0f32; (secs * rate).round().max(0.0) as usize];
@@ -143,7 +143,7 @@ impl Syllable {
     }
 }
 
-/// Voice pulses through three resonators in series.
+/// Glottal pulses through three resonators in series.
 struct VoiceSource {
     phase: f64,
     pitch: f64,
@@ -158,7 +158,7 @@ impl VoiceSource {
 
     fn next(&mut self, rate: f64) -> f64 {
         self.phase += self.pitch / rate;
-        // Rounded sawtooth: the flow through the glottis opens slowly and closes fast.
+        // Rounded sawtooth: the glottal flow rises slowly and stops abruptly.
         self.phase -= self.phase.floor();
         let flow = self.phase - (self.phase / 0.95).powi(12);
         self.formants.iter_mut().fold(flow - 0.45, |sound, formant| formant.next(sound))
@@ -193,7 +193,7 @@ mod tests {
     use rand::SeedableRng;
 
     #[test]
-    fn it_is_loud_in_syllables_and_silent_in_pauses() {
+    fn audio_is_loud_in_syllables_and_silent_in_pauses() {
         let mut rng = ChaCha8Rng::seed_from_u64(7);
         let speech = Speech::new(8.0, &mut rng);
         let sound = speech.sound(8.0, &mut rng);

@@ -1,5 +1,4 @@
-//! Ground truth of a clip: every joint in 3D and its pixel, at the dataset's frame rate, as one `.npz` file for each
-//! video.
+//! Ground truth of a clip: every joint in 3D and in px, at the dataset's frame rate, in one `.npz` file per video.
 
 use super::paint;
 use super::scene::DrawnScene;
@@ -15,7 +14,7 @@ use std::path::Path;
 /// Ground truth of a clip.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DrawnTruth {
-    /// Joints in camera axes, metres, the neck at the origin of every frame.
+    /// Joints in camera axes relative to the neck, metres.
     pub motion: Motion,
     /// COCO points 0..13, [T, 13, 2] px.
     pub body: Array3<f32>,
@@ -35,15 +34,15 @@ impl DrawnTruth {
         let camera = &scene.camera;
         for frame_idx in 0..n_frames {
             let figure = scene.figure(fps.secs(frame_idx));
-            let seen: Vec<Vec3> = figure.joints.iter().map(|&joint| camera.see(joint)).collect();
-            for (joint, &point) in seen.iter().enumerate() {
-                let rooted = sub(point, seen[NECK]);
+            let in_camera: Vec<Vec3> = figure.joints.iter().map(|&joint| camera.to_camera(joint)).collect();
+            for (joint, &point) in in_camera.iter().enumerate() {
+                let rooted = sub(point, in_camera[NECK]);
                 (0..3).for_each(|k| joints[[frame_idx, joint, k]] = rooted[k] as f32);
                 let px = camera.pixel(point);
                 (0..2).for_each(|k| pixels[[frame_idx, joint, k]] = px[k] as f32);
             }
-            for (point, place) in paint::coco(&figure).into_iter().enumerate() {
-                let px = camera.pixel(camera.see(place));
+            for (point, position) in paint::coco(&figure).into_iter().enumerate() {
+                let px = camera.pixel(camera.to_camera(position));
                 (0..2).for_each(|k| body[[frame_idx, point, k]] = px[k] as f32);
             }
         }
@@ -65,7 +64,7 @@ impl DrawnTruth {
         })
     }
 
-    /// Reads a file of `write`.
+    /// Reads a file written by `write`.
     pub fn read(path: &Path) -> anyhow::Result<Self> {
         let mut npz = Npz::open(path)?;
         let fps = npz.frame_rate("fps")?;
@@ -86,7 +85,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_reads_back_and_the_neck_is_the_middle_of_the_shoulders() {
+    fn files_round_trip_and_the_neck_is_between_the_shoulders() {
         let truth = DrawnTruth::new(&DrawnScene::new(3, 1.0, [640, 480]), FrameRate::new(15, 1));
         assert_eq!(truth.motion.n_frames(), 15);
         let joints = &truth.motion.joints;

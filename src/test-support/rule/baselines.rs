@@ -1,7 +1,7 @@
-//! Baselines for a speaker trained on the rule, learnt from the training split: ridge regression from the sound of the
-//! same frame and of a second, the training window with the nearest sound, and the mean pose.
+//! Baselines for models of a rule-based speaker, fitted to the training split: ridge regression from the audio of the
+//! same frame and of one second, nearest neighbour by audio, and the mean pose.
 
-use super::ridge_listener::{HeardFrames, RidgeListener, TrainingClip};
+use super::context_ridge::{AudioContext, ContextRidge, TrainingClip};
 use anyhow::{Result, ensure};
 use ndarray::{Array2, Array3, ArrayView3, Axis, concatenate, s};
 use orator_base::audio::mel;
@@ -11,14 +11,14 @@ use orator_base::types::time::FrameRate;
 use orator_dataset::{Dataset, Sample, Split};
 use rayon::prelude::*;
 
-/// Frames of a window of the nearest neighbour.
+/// Window length of the nearest neighbour, frames.
 const WINDOW: usize = 64;
-/// What the two ridge regressions hear: the frame alone, and a second, most of it before the frame.
-const FRAME: HeardFrames = HeardFrames { before: 0, behind: 0 };
-const SECOND: HeardFrames = HeardFrames { before: 13, behind: 1 };
+/// Audio context of the two ridge regressions: the frame alone, and one second, mostly before the frame.
+const FRAME: AudioContext = AudioContext { before: 0, after: 0 };
+const SECOND: AudioContext = AudioContext { before: 13, after: 1 };
 
-/// Log-mel spectrogram by motion frame [T, 64]: the mean over the hops that begin in the frame.
-pub fn sound_of_frames(sound: &Sound, n_frames: usize, fps: FrameRate) -> Array2<f64> {
+/// Log-mel spectrogram per motion frame, [T, 64]: mean over the hops that begin in the frame.
+pub fn frame_log_mel(sound: &Sound, n_frames: usize, fps: FrameRate) -> Array2<f64> {
     let mut samples = sound.samples.clone();
     samples.resize(sample_at(fps, sound.rate, n_frames) + mel::WINDOW, 0.0);
     let mels = mel::log_mel(&samples);
@@ -34,16 +34,19 @@ pub fn sound_of_frames(sound: &Sound, n_frames: usize, fps: FrameRate) -> Array2
 
 /// Baselines fitted to the training split.
 pub struct RuleBaselines {
-    /// Hears the frame, and a second of sound.
-    pub ridges: [RidgeListener; 2],
-    /// Sound [64 x 64] and motion of the training windows.
+    /// Regressions from the audio of the frame, and of one second.
+    pub ridges: [ContextRidge; 2],
+    /// Audio features [64, 64] and joints [64, 49, 3] of the training windows.
     windows: Vec<(Array2<f64>, Array3<f32>)>,
     mean: Array2<f32>,
 }
 
 impl RuleBaselines {
-    /// Fits to the training split, with penalties from the validation split.
-    pub fn learn(dataset: &Dataset) -> Result<Self> {
+    /// Fits to the training split; the validation split selects the penalties.
+    ///
+    /// # Errors
+    /// An empty split; samples that cannot be read.
+    pub fn fit(dataset: &Dataset) -> Result<Self> {
         let fps = dataset.info().fps;
         let (train, validation) = (clips(dataset, Split::Train)?, clips(dataset, Split::Validation)?);
         ensure!(!train.is_empty() && !validation.is_empty(), "{}: a split is empty", dataset.dir().display());
@@ -55,13 +58,13 @@ impl RuleBaselines {
             })
         });
         Ok(Self {
-            ridges: [FRAME, SECOND].map(|heard| RidgeListener::learn(heard, &train, &validation, fps)),
+            ridges: [FRAME, SECOND].map(|context| ContextRidge::fit(context, &train, &validation, fps)),
             windows: windows.collect(),
             mean: dataset.stats().mean(),
         })
     }
 
-    /// Joints of the training windows with the nearest sound, in windows of 64 frames.
+    /// Joints of the training windows with the nearest audio, in windows of 64 frames.
     pub fn nearest(&self, sound: &Array2<f64>) -> Array3<f32> {
         let starts: Vec<usize> = (0..sound.nrows()).step_by(WINDOW).collect();
         let parts: Vec<Array3<f32>> = starts.par_iter().map(|&t| self.nearest_window(sound, t)).collect();
@@ -76,18 +79,18 @@ impl RuleBaselines {
             window.iter().zip(other.slice(s![..n, ..])).map(|(a, b)| (a - b).powi(2)).sum()
         };
         let nearest = self.windows.iter().min_by(|a, b| distance(&a.0).total_cmp(&distance(&b.0)));
-        nearest.map_or_else(|| self.still(n), |(_, joints)| joints.slice(s![..n, .., ..]).to_owned())
+        nearest.map_or_else(|| self.mean_pose(n), |(_, joints)| joints.slice(s![..n, .., ..]).to_owned())
     }
 
-    /// Mean pose for `n_frames`.
-    pub fn still(&self, n_frames: usize) -> Array3<f32> {
+    /// Mean pose, repeated for `n_frames`.
+    pub fn mean_pose(&self, n_frames: usize) -> Array3<f32> {
         Array3::from_shape_fn((n_frames, N_JOINTS, 3), |(_, joint, k)| self.mean[[joint, k]])
     }
 }
 
 fn clips(dataset: &Dataset, split: Split) -> Result<Vec<TrainingClip>> {
     let clip = |sample: Sample| TrainingClip {
-        sound: sound_of_frames(&sample.sound, sample.n_frames(), sample.motion.fps),
+        sound: frame_log_mel(&sample.sound, sample.n_frames(), sample.motion.fps),
         joints: sample.motion.joints,
     };
     dataset.samples(split).par_iter().map(|sample| Ok(clip(dataset.read(sample)?))).collect()

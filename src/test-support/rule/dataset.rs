@@ -1,6 +1,6 @@
-//! Hours of the synthetic speaker without video: a dataset of sound and motion by `rule`, laid out as by the pipeline.
-//! Each clip follows from seed, split and number alone, so splits share neither speech nor variation, and its
-//! predictable part can be computed again.
+//! Datasets of the synthetic speaker without video: audio and motion by `rule`, in the layout of the pipeline. Each
+//! clip is determined by seed, split and number alone, so splits share neither speech nor variation, and the
+//! predictable part of a clip can be recomputed.
 
 use super::habits::Habits;
 use super::rule::RuleGestures;
@@ -24,19 +24,19 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::path::Path;
 
-/// Versions of the rule and of its speech: by the sound alone, and with words. Others are refused where the predictable
-/// part is needed.
+/// Versions of the rule and of its speech: depending on audio only, and with words. Other versions are rejected where
+/// the predictable part is needed.
 pub const RULE: u32 = 1;
 pub const RULE_OF_WORDS: u32 = 2;
 pub const NAME: &str = "synthetic";
 const FPS: FrameRate = FrameRate::new(15, 1);
-/// Frames of a clip (a minute).
+/// Length of a clip in frames (one minute).
 const CLIP_FRAMES: usize = 900;
-/// Clips of the validation and the test split (minutes), and of the test split where the rule has words.
+/// Number of clips (minutes) of the validation and test split, and of the test split if the rule has words.
 const HELD_OUT_CLIPS: usize = 10;
 const TEST_CLIPS_OF_WORDS: usize = 30;
-/// Amplitude of the room noise.
-const ROOM: f32 = 0.001;
+/// Amplitude of the background noise.
+const NOISE: f32 = 0.001;
 const SHARD_BYTES: u64 = 256 << 20;
 
 /// Parameters of a clip, stored in its sample's JSON under `rule`.
@@ -47,7 +47,7 @@ pub struct SpokenClip {
     pub split: Split,
     pub number: usize,
     pub n_frames: usize,
-    /// Number of the speaker's habits.
+    /// Number of the speaker's habits, see `Habits::numbered`.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub habits: u64,
 }
@@ -82,7 +82,7 @@ impl SpokenClip {
         Speech::free(self.secs(), &mut self.rng("speech"))
     }
 
-    /// Words of the clip; none where the rule has none.
+    /// Words of the clip; empty if the rule has none.
     pub fn words(&self) -> Vec<Word> {
         match self.rule {
             RULE_OF_WORDS => words::words(&self.speech(), self.split, &mut self.rng("words")),
@@ -90,12 +90,12 @@ impl SpokenClip {
         }
     }
 
-    /// Sound of the clip with room noise.
+    /// Audio of the clip with background noise.
     pub fn sound(&self) -> Sound {
         let mut rng = self.rng("sound");
         let mut sound = self.speech().sound(self.secs(), &mut rng);
         sound.samples.resize(sample_at(FPS, SAMPLE_RATE, self.n_frames), 0.0);
-        sound.samples.iter_mut().for_each(|sample| *sample += ROOM * rng.random_range(-1.0..1.0));
+        sound.samples.iter_mut().for_each(|sample| *sample += NOISE * rng.random_range(-1.0..1.0));
         sound
     }
 
@@ -111,7 +111,7 @@ impl SpokenClip {
         RuleGestures::of_habits(&self.habits(), &self.speech(), &self.words()).motion(self.n_frames, FPS)
     }
 
-    /// BLAKE3 of the clip's parameters; the text is fixed by existing datasets.
+    /// BLAKE3 of the clip's parameters; the hashed text must stay the same for existing datasets.
     fn content_hash(&self) -> String {
         let Self { rule, seed, split, number, n_frames, habits } = self;
         let habits = if *habits == 0 { String::new() } else { format!(", habits: {habits}") };
@@ -121,7 +121,10 @@ impl SpokenClip {
         blake3::hash(text.as_bytes()).to_hex().to_string()
     }
 
-    /// Clip that a sample of the dataset was made from.
+    /// Clip that a sample of the dataset was generated from.
+    ///
+    /// # Errors
+    /// A sample of another speaker or of an unknown version of the rule.
     pub fn from_sample(sample: &Sample) -> Result<Self> {
         let clip: Self =
             serde_json::from_value(sample.meta.get("rule").cloned().unwrap_or_default()).with_context(|| {
@@ -150,15 +153,15 @@ impl SpokenClip {
     }
 }
 
-/// Clips of `hours` of training, ten minutes of validation, and ten of test, thirty where the rule has words.
+/// Clips for `hours` of training, ten minutes of validation, and ten of test, or thirty if the rule has words.
 pub fn clips(hours: f64, seed: u64, rule: u32, habits: u64) -> Result<Vec<SpokenClip>> {
     ensure!((0.01..=100.0).contains(&hours), "--hours {hours}: expected 0.01 to 100");
     let n_train = (hours * 3600.0 / FPS.secs(CLIP_FRAMES)).ceil() as usize;
-    let of =
+    let clips_of =
         |split, n| (0..n).map(move |number| SpokenClip { rule, seed, split, number, n_frames: CLIP_FRAMES, habits });
     let n_test = if rule == RULE_OF_WORDS { TEST_CLIPS_OF_WORDS } else { HELD_OUT_CLIPS };
     let parts = [(Split::Train, n_train), (Split::Validation, HELD_OUT_CLIPS), (Split::Test, n_test)];
-    Ok(parts.into_iter().flat_map(|(split, n)| of(split, n)).collect())
+    Ok(parts.into_iter().flat_map(|(split, n)| clips_of(split, n)).collect())
 }
 
 /// Writes `clips` as a dataset into the existing, empty folder `dir`.
@@ -195,7 +198,7 @@ mod tests {
     use orator_dataset::verify::verify::verify;
 
     #[test]
-    fn a_dataset_is_sound_and_its_predictable_part_is_made_again() {
+    fn a_dataset_is_valid_and_its_predictable_part_is_reproducible() {
         verify_rule(RULE);
         verify_rule(RULE_OF_WORDS);
     }
@@ -227,9 +230,9 @@ mod tests {
     fn no_two_clips_share_speech() {
         let clips = clips(0.1, 3, RULE, 0).unwrap();
         assert_eq!(clips.len(), 6 + 2 * HELD_OUT_CLIPS);
-        let said: Vec<_> = clips.iter().map(|clip| format!("{:?}", clip.speech().syllables)).collect();
-        let different: std::collections::BTreeSet<&String> = said.iter().collect();
-        assert_eq!(different.len(), said.len());
+        let speeches: Vec<_> = clips.iter().map(|clip| format!("{:?}", clip.speech().syllables)).collect();
+        let different: std::collections::BTreeSet<&String> = speeches.iter().collect();
+        assert_eq!(different.len(), speeches.len());
         assert!(super::clips(f64::NAN, 1, RULE, 0).is_err() && super::clips(0.0, 1, RULE, 0).is_err());
     }
 }

@@ -1,10 +1,11 @@
-//! Hours of a speaker whose motion follows from its sound, and if asked its words, by a known rule; a second rule for any speech; baselines for both.
+//! Speakers whose motion follows from their audio, and optionally their words, by a known rule; a second rule for
+//! arbitrary speech; baselines for both.
 
 pub mod baselines;
+pub mod context_ridge;
 pub mod dataset;
 pub mod habits;
 pub mod ridge;
-pub mod ridge_listener;
 pub mod rule;
 pub mod speech_dataset;
 pub mod speech_events;

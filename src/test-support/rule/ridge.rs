@@ -1,12 +1,12 @@
-//! Ridge regression from the sound of a frame to the motion of the same frame. Without context, its error shows how
-//! much of a rule depends on the present moment alone.
+//! Ridge regression from the audio of a frame to the motion of the same frame. Without context, its error shows how
+//! much of a rule depends on the current frame alone.
 
 use ndarray::{Array2, ArrayView1, ArrayView2, Axis};
 use orator_base::math::cholesky::solve;
 
-/// Sums over frames that determine a regression of any penalty.
+/// Sums over frames that determine the regression for any penalty.
 pub struct RidgeSums {
-    /// Products [n + 1, n + 1] of the inputs and a constant 1.
+    /// Gram matrix [n + 1, n + 1] of the inputs and a constant 1.
     inputs: Array2<f64>,
     /// Products [n + 1, m] of inputs and outputs.
     products: Array2<f64>,
@@ -16,7 +16,7 @@ pub struct RidgeSums {
 pub struct Ridge(Array2<f64>);
 
 impl RidgeSums {
-    /// Sums of `n` inputs and `m` outputs.
+    /// Empty sums for `n` inputs and `m` outputs.
     pub fn new(n: usize, m: usize) -> Self {
         Self { inputs: Array2::zeros((n + 1, n + 1)), products: Array2::zeros((n + 1, m)) }
     }
@@ -29,7 +29,8 @@ impl RidgeSums {
         self.products += &inputs.t().dot(&outputs);
     }
 
-    /// Regression with the penalty `strength` times the mean square of an input, on all weights but the offset.
+    /// Solves the regression with a penalty of `strength` times the mean square of an input, on all weights except the
+    /// offset.
     pub fn ridge(&self, strength: f64) -> Ridge {
         let n = self.inputs.nrows() - 1;
         let scale = (0..n).map(|k| self.inputs[[k, k]]).sum::<f64>() / n.max(1) as f64;
@@ -40,14 +41,14 @@ impl RidgeSums {
 }
 
 impl Ridge {
-    /// Outputs [T, m] of inputs [T, n].
+    /// Predicts outputs [T, m] from inputs [T, n].
     pub fn predict(&self, inputs: ArrayView2<f64>) -> Array2<f64> {
         let n = self.0.nrows() - 1;
         inputs.dot(&self.0.slice(ndarray::s![..n, ..])) + self.0.row(n)
     }
 }
 
-/// Pearson correlation of two series; 0 where one of them is constant.
+/// Pearson correlation of two series; 0 if one of them is constant.
 pub fn correlation(a: ArrayView1<f64>, b: ArrayView1<f64>) -> f64 {
     let n = a.len().min(b.len()).max(1) as f64;
     let mean = |x: ArrayView1<f64>| x.sum() / n;
@@ -66,7 +67,7 @@ mod tests {
     use ndarray::array;
 
     #[test]
-    fn it_finds_a_line_and_shrinks_with_strength() {
+    fn a_linear_map_is_recovered_and_shrinks_with_the_penalty() {
         let inputs = Array2::from_shape_fn((50, 2), |(t, k)| ((t * (k + 3)) as f64 * 0.7).sin());
         let outputs = Array2::from_shape_fn((50, 1), |(t, _)| 2.0 * inputs[[t, 0]] - inputs[[t, 1]] + 5.0);
         let mut sums = RidgeSums::new(2, 1);

@@ -1,5 +1,5 @@
-//! Gesture rule of the synthetic speaker: a deterministic function of its speech (the predictable part), and random
-//! variation on top.
+//! Gesture rule of the synthetic speaker: a deterministic function of its speech (the predictable part), plus random
+//! variation.
 
 use super::habits::{ArmTarget, CENTRE, HIGH, Habits, POINT, REST, WIDE};
 use super::words::{self, N_PLACES, WordGesture};
@@ -21,34 +21,35 @@ use std::f64::consts::TAU;
 pub const STROKE: f64 = 0.4;
 pub const HOLD: f64 = 0.5;
 pub const RETURN: f64 = 0.6;
-/// Range of delays through which the envelope lifts the wrists, seconds, and the lift, metres.
+/// Range of delays of the envelope that lifts the wrists, in seconds, and the lift in metres.
 const LIFT_DELAYS: [f64; 2] = [0.2, 0.8];
 const LIFT: f64 = 0.2;
 /// Stress above which a syllable is an accent.
 const ACCENT: f64 = 0.5;
 
-/// Seconds from the beginning of a word to the stroke it causes.
+/// Delay from the start of a word to its stroke, seconds.
 pub const WORD_DELAY: f64 = 0.3;
-/// Where words send the left or the right hand.
-const WORD_PLACES: [ArmTarget; N_PLACES] = [
+/// Stroke targets of words.
+const WORD_TARGETS: [ArmTarget; N_PLACES] = [
     [0.34, -0.2, -0.16, 0.3, 0.9, 0.1, 0.0, 0.1],
     [0.52, 0.1, -0.1, -0.5, 0.4, 0.1, 0.0, 0.16],
     [0.44, 0.4, -0.05, 0.7, 0.1, 0.6, -0.2, 0.04],
     [0.02, 0.1, -0.16, 0.9, 0.9, 0.4, 0.0, 0.02],
 ];
 
-/// Variation: share of skipped accents, rate of strokes without an accent (1/s), deviations of a stroke's time
-/// (seconds), target (metres) and hand shape, and the sway of wrists (metres) and torso (radians) with its frequencies.
-const PASSED_OVER: f64 = 0.12;
-const FIDGETS: f64 = 0.12;
-const LATE: f64 = 0.06;
-const MISSED: f64 = 0.035;
-const SHAPE: f64 = 0.1;
-const SWAY: f64 = 0.012;
-const TORSO: f64 = 0.03;
+/// Variation: share of skipped accents, rate of strokes without an accent (1/s), standard deviations of a stroke's
+/// time (seconds), target (metres) and hand shape, and sway of wrists (metres) and torso (radians) with its
+/// frequencies.
+const SKIPPED_SHARE: f64 = 0.12;
+const SPONTANEOUS_HZ: f64 = 0.12;
+const TIME_SD: f64 = 0.06;
+const TARGET_SD: f64 = 0.035;
+const SHAPE_SD: f64 = 0.1;
+const WRIST_SWAY: f64 = 0.012;
+const TORSO_SWAY: f64 = 0.03;
 const SWAY_HZ: std::ops::Range<f64> = 0.3..1.5;
 
-/// Movement of a hand to `goal` from `start` on within `secs`.
+/// Movement of a hand to `goal`, beginning at `start` and lasting `secs`.
 #[derive(Clone, Debug)]
 struct WristMove {
     start: f64,
@@ -60,86 +61,85 @@ struct WristMove {
 ///
 /// The speech gives the envelope E(t), 0..1 (`Speech::loudness`), and the accents k: onsets t_k of stressed syllables
 /// with peak loudness a_k and vowel v_k, all of them audible. Hand h follows a target x_h(t) of wrist position,
-/// rotation and hand shape in body coordinates. With the minimum-jerk profile u, the rest pose REST and PLACES[v][h],
+/// rotation and hand shape in body coordinates. With the minimum-jerk profile u, the rest pose REST and TARGETS[v][h],
 /// the target of vowel v:
 ///
 /// * stroke: from s = t_k + d_h for 0.4 s, x_h <- x_h + u((t - s) / 0.4) (goal - x_h), goal = REST + g_k
-///   (PLACES[v_k][h] - REST), g_k = 0.45 + 0.4 (a_k - 0.4) / 0.6;
+///   (TARGETS[v_k][h] - REST), g_k = 0.45 + 0.4 (a_k - 0.4) / 0.6;
 /// * hold for 0.5 s, then return over 0.6 s with goal = REST, unless the next stroke of the hand begins;
 /// * lift: both wrists rise by 0.2 m times L(t) = integral of E(t - r) w(r) dr, w a raised cosine over
 ///   r = 0.2 .. 0.8 s.
 ///
 /// The right hand leads with d = 0.2 s (peak speed 0.4 s after an onset), the left follows with d = 0.4 s (0.6 s);
-/// nothing depends on the sound of the present moment.
+/// nothing depends on the audio of the current frame.
 ///
-/// A word with a gesture (`words`) that begins at t sends its hand to WORD_PLACES by a stroke from t + 0.3 s on, with hold
-/// and return as above; strokes of that hand that accents would begin from 0.4 s before it until the hold's end are left
-/// out.
+/// A word with a gesture (`words`) that begins at t moves its hand to WORD_TARGETS by a stroke at t + 0.3 s, with hold
+/// and return as above; accent strokes of that hand from 0.4 s before it until the end of the hold are dropped.
 ///
-/// Variation, with a seed of its own: skipped accents, strokes
-/// without an accent, errors of stroke times and targets, and sway of arms and torso.
+/// Variation, with a separate seed: skipped accents, strokes without an accent, errors of stroke times and targets, and
+/// sway of arms and torso.
 pub struct RuleGestures<'a> {
     speech: &'a Speech,
-    /// Left, right; in order of time.
+    /// Movements of the left and right hand, in order of time.
     moves: [Vec<WristMove>; 2],
     sway: Option<Variation>,
 }
 
-/// Two sine waves for each of: left wrist 0..3, right wrist 3..6, torso 6..9; frequency (Hz) and phase.
+/// Frequency (Hz) and phase of two sine waves for each of: left wrist 0..3, right wrist 3..6, torso 6..9.
 struct Variation([[[f64; 2]; 2]; 9]);
 
 impl<'a> RuleGestures<'a> {
-    /// Predictable part: gestures of the rule for `speech` and the words said in it.
-    pub fn new(speech: &'a Speech, said: &[Word]) -> Self {
-        Self::of_habits(&Habits::default(), speech, said)
+    /// Predictable part: gestures of the rule for `speech` and the words in it.
+    pub fn new(speech: &'a Speech, spoken: &[Word]) -> Self {
+        Self::of_habits(&Habits::default(), speech, spoken)
     }
 
-    /// As `new`, for a speaker of other habits.
-    pub fn of_habits(habits: &Habits, speech: &'a Speech, said: &[Word]) -> Self {
+    /// Like `new`, for a speaker with other habits.
+    pub fn of_habits(habits: &Habits, speech: &'a Speech, spoken: &[Word]) -> Self {
         let mut strokes: [Vec<(f64, ArmTarget)>; 2] = std::array::from_fn(|hand| {
             let accents = speech.syllables.iter().filter(|syllable| syllable.stress > ACCENT);
             let stroke = accents.filter_map(|accent| {
-                let place = habits.places.get(accent.vowel)?[hand]?;
-                Some((accent.start + habits.delays[hand], towards(&place, reach(accent))))
+                let place = habits.targets.get(accent.vowel)?[hand]?;
+                Some((accent.start + habits.delays[hand], scaled_target(&place, amplitude(accent))))
             });
             stroke.collect()
         });
-        put_words(&mut strokes, said, |goal| (0.0, *goal));
+        insert_word_strokes(&mut strokes, spoken, |goal| (0.0, *goal));
         Self { speech, moves: strokes.map(with_returns), sway: None }
     }
 
     /// Gestures of `secs` seconds with random variation.
-    pub fn with_variation(speech: &'a Speech, said: &[Word], secs: f64, rng: &mut ChaCha8Rng) -> Self {
-        Self::varied(&Habits::default(), speech, said, secs, rng)
+    pub fn with_variation(speech: &'a Speech, spoken: &[Word], secs: f64, rng: &mut ChaCha8Rng) -> Self {
+        Self::varied(&Habits::default(), speech, spoken, secs, rng)
     }
 
-    /// As `with_variation`, for a speaker of other habits.
-    pub fn varied(habits: &Habits, speech: &'a Speech, said: &[Word], secs: f64, rng: &mut ChaCha8Rng) -> Self {
+    /// Like `with_variation`, for a speaker with other habits.
+    pub fn varied(habits: &Habits, speech: &'a Speech, spoken: &[Word], secs: f64, rng: &mut ChaCha8Rng) -> Self {
         let mut strokes: [Vec<(f64, ArmTarget)>; 2] = Default::default();
         for accent in speech.syllables.iter().filter(|syllable| syllable.stress > ACCENT) {
-            let passed_over = rng.random_bool(PASSED_OVER);
-            let late = LATE * normal(rng);
-            let reach = reach(accent) * rng.random_range(0.85..1.15);
-            for (hand, place) in habits.places.get(accent.vowel).into_iter().flatten().enumerate() {
+            let is_skipped = rng.random_bool(SKIPPED_SHARE);
+            let late = TIME_SD * standard_normal(rng);
+            let amplitude = amplitude(accent) * rng.random_range(0.85..1.15);
+            for (hand, place) in habits.targets.get(accent.vowel).into_iter().flatten().enumerate() {
                 let Some(place) = place else { continue };
-                let goal = missed(&towards(place, reach), rng);
-                if !passed_over {
+                let goal = perturbed(&scaled_target(place, amplitude), rng);
+                if !is_skipped {
                     strokes[hand].push((accent.start + habits.delays[hand] + late, goal));
                 }
             }
         }
         let mut now = 0.0;
         loop {
-            now -= rng.random_range(f64::EPSILON..1.0).ln() / FIDGETS;
+            now -= rng.random_range(f64::EPSILON..1.0).ln() / SPONTANEOUS_HZ;
             if now >= secs {
                 break;
             }
             let place = [WIDE, HIGH, POINT, CENTRE][rng.random_range(0..4)];
-            let goal = missed(&towards(&place, rng.random_range(0.6..1.0)), rng);
+            let goal = perturbed(&scaled_target(&place, rng.random_range(0.6..1.0)), rng);
             strokes[rng.random_range(0..2)].push((now, goal));
         }
         strokes.iter_mut().for_each(|strokes| strokes.sort_by(|a, b| a.0.total_cmp(&b.0)));
-        put_words(&mut strokes, said, |goal| (LATE * normal(rng), missed(goal, rng)));
+        insert_word_strokes(&mut strokes, spoken, |goal| (TIME_SD * standard_normal(rng), perturbed(goal, rng)));
         let mut wave = || [rng.random_range(SWAY_HZ), rng.random_range(0.0..TAU)];
         let sway = Variation(std::array::from_fn(|_| [wave(), wave()]));
         Self { speech, moves: strokes.map(with_returns), sway: Some(sway) }
@@ -156,38 +156,39 @@ impl<'a> RuleGestures<'a> {
                 place
             });
             place[1] -= lift;
-            (0..3).for_each(|k| place[k] += SWAY * sway(3 * hand + k));
+            (0..3).for_each(|k| place[k] += WRIST_SWAY * sway(3 * hand + k));
             ArmControls::from(place)
         };
-        let torso = [0, 1, 2].map(|k| TORSO * sway(6 + k));
+        let torso = [0, 1, 2].map(|k| TORSO_SWAY * sway(6 + k));
         Controls { arms: [arm(0), arm(1)], torso, ..Controls::default() }
     }
 
-    /// Joints at the frames of `fps`, the neck at the origin.
+    /// Joints at the frames of `fps`, relative to the neck, metres.
     pub fn motion(&self, n_frames: usize, fps: FrameRate) -> Motion {
         let mut joints = Array3::zeros((n_frames, N_JOINTS, 3));
         for frame_idx in 0..n_frames {
             let figure = DrawnFigure::new(&self.controls(fps.secs(frame_idx)));
-            for (joint, &place) in figure.joints.iter().enumerate() {
-                let place = sub(place, figure.joints[NECK]);
-                (0..3).for_each(|k| joints[[frame_idx, joint, k]] = place[k] as f32);
+            for (joint, &position) in figure.joints.iter().enumerate() {
+                let relative = sub(position, figure.joints[NECK]);
+                (0..3).for_each(|k| joints[[frame_idx, joint, k]] = relative[k] as f32);
             }
         }
         Motion::from_joints(fps, joints)
     }
 
-    /// Wrist from the neck, metres, at the place that a gesture means: the rule's pose at `secs` but for this arm.
+    /// Wrist position relative to the neck, metres, at the target of a gesture; the rest of the pose is that of the
+    /// rule at `secs`.
     pub fn wrist_at(&self, gesture: WordGesture, secs: f64) -> Vec3 {
         let WordGesture { hand, place } = gesture;
         let mut controls = self.controls(secs);
-        let mut target = WORD_PLACES[place];
+        let mut target = WORD_TARGETS[place];
         target[1] -= LIFT * self.slow_envelope(secs);
         controls.arms[hand] = ArmControls::from(target);
         let figure = DrawnFigure::new(&controls);
         sub(figure.joints[[L_WRIST, R_WRIST][hand]], figure.joints[NECK])
     }
 
-    /// Lift L(t): the delayed, averaged envelope.
+    /// Lift L(t): delayed and averaged envelope.
     fn slow_envelope(&self, secs: f64) -> f64 {
         const N: usize = 24;
         let [first, last] = LIFT_DELAYS;
@@ -205,15 +206,16 @@ impl Variation {
     }
 }
 
-/// Puts the strokes of words among those of accents, in order of time. `varied`: how late a stroke is, and its goal.
-fn put_words(
+/// Inserts the strokes of words among those of accents, in order of time. `varied` returns the delay of a stroke and
+/// its goal.
+fn insert_word_strokes(
     strokes: &mut [Vec<(f64, ArmTarget)>; 2],
-    said: &[Word],
+    spoken: &[Word],
     mut varied: impl FnMut(&ArmTarget) -> (f64, ArmTarget),
 ) {
-    for word in said {
+    for word in spoken {
         let Some(WordGesture { hand, place }) = words::gesture(&word.word) else { continue };
-        let (late, goal) = varied(&WORD_PLACES[place]);
+        let (late, goal) = varied(&WORD_TARGETS[place]);
         let start = word.start_secs + WORD_DELAY + late;
         strokes[hand].retain(|(other, _)| !(start - STROKE..start + STROKE + HOLD).contains(other));
         let at = strokes[hand].partition_point(|(other, _)| *other < start);
@@ -221,7 +223,7 @@ fn put_words(
     }
 }
 
-/// Strokes (start and goal, in order of time) with the returns between them.
+/// Strokes (start and goal, in order of time) with the return movements between them.
 fn with_returns(strokes: Vec<(f64, ArmTarget)>) -> Vec<WristMove> {
     let mut moves = Vec::with_capacity(2 * strokes.len());
     for (n, (start, goal)) in strokes.iter().enumerate() {
@@ -234,28 +236,28 @@ fn with_returns(strokes: Vec<(f64, ArmTarget)>) -> Vec<WristMove> {
     moves
 }
 
-/// Reach g of an accent; louder accents reach farther.
-fn reach(accent: &Syllable) -> f64 {
+/// Amplitude g of an accent; louder accents have larger strokes.
+fn amplitude(accent: &Syllable) -> f64 {
     0.45 + 0.4 * (accent.peak() - 0.4) / 0.6
 }
 
-/// Target at the share `reach` of the way from the rest pose to `place`.
-fn towards(place: &ArmTarget, reach: f64) -> ArmTarget {
-    std::array::from_fn(|k| REST[k] + reach * (place[k] - REST[k]))
+/// Target at the share `amplitude` of the way from the rest pose to `place`.
+fn scaled_target(place: &ArmTarget, amplitude: f64) -> ArmTarget {
+    std::array::from_fn(|k| REST[k] + amplitude * (place[k] - REST[k]))
 }
 
-fn missed(goal: &ArmTarget, rng: &mut ChaCha8Rng) -> ArmTarget {
-    std::array::from_fn(|k| goal[k] + if k < 3 { MISSED } else { SHAPE } * normal(rng))
+fn perturbed(goal: &ArmTarget, rng: &mut ChaCha8Rng) -> ArmTarget {
+    std::array::from_fn(|k| goal[k] + if k < 3 { TARGET_SD } else { SHAPE_SD } * standard_normal(rng))
 }
 
-fn normal(rng: &mut ChaCha8Rng) -> f64 {
+fn standard_normal(rng: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(rng)
 }
 
-/// Left and right wrist.
+/// Joints of the left and right wrist.
 pub const WRISTS: [usize; 2] = [L_WRIST, R_WRIST];
 
-/// Speed of each wrist from each frame to the next, [T - 1, 2], m/s, no smoothing.
+/// Speed of each wrist between consecutive frames, [T - 1, 2], m/s, unsmoothed.
 pub fn wrist_speeds(joints: ArrayView3<f32>, fps: FrameRate) -> Array2<f64> {
     Array2::from_shape_fn((joints.shape()[0].saturating_sub(1), 2), |(t, hand)| {
         let step = |k: usize| f64::from(joints[[t + 1, WRISTS[hand], k]] - joints[[t, WRISTS[hand], k]]);
@@ -277,18 +279,18 @@ mod tests {
         Speech::free(SECS, &mut ChaCha8Rng::seed_from_u64(seed))
     }
 
-    /// Delay, seconds, with the best correlation of a wrist's speed and the onsets of accents (each as a bump of 0.1
+    /// Delay in seconds with the largest correlation of a wrist's speed with the onsets of accents (each a bump of 0.1
     /// s).
     fn delay(hand: usize) -> f64 {
         let speech = speech(1);
         let n_frames = FPS.frames_in(SECS);
         let speeds = wrist_speeds(RuleGestures::new(&speech, &[]).motion(n_frames, FPS).joints.view(), FPS);
         let accents =
-            speech.syllables.iter().filter(|s| s.stress > ACCENT && Habits::default().places[s.vowel][hand].is_some());
+            speech.syllables.iter().filter(|s| s.stress > ACCENT && Habits::default().targets[s.vowel][hand].is_some());
         let onsets: Vec<f64> = accents.map(|accent| accent.start).collect();
         let at = |delay: f64| {
             let bump = |secs: f64| -> f64 { onsets.iter().map(|t| (-((secs - t - delay) / 0.1).powi(2)).exp()).sum() };
-            // Speed is at the middle between two frames.
+            // A speed belongs to the midpoint between two frames.
             let expected = Array1::from_shape_fn(n_frames - 1, |t| bump(FPS.secs(t) + 0.5 * FPS.secs(1)));
             correlation(expected.view(), speeds.slice(s![.., hand]))
         };
@@ -297,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn strokes_come_as_late_as_the_rule_says() {
+    fn strokes_have_the_delays_of_the_rule() {
         for (hand, expected) in [0.6, 0.4].into_iter().enumerate() {
             let measured = delay(hand);
             assert!((measured - expected).abs() <= 0.04, "hand {hand}: {measured} s");
@@ -305,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn a_seed_gives_its_variation_and_another_seed_another() {
+    fn variation_is_determined_by_the_seed() {
         let speech = speech(2);
         let with = |seed| {
             RuleGestures::with_variation(&speech, &[], SECS, &mut ChaCha8Rng::seed_from_u64(seed))
@@ -319,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn bones_are_constant_and_silence_is_rest() {
+    fn bones_are_constant_and_silence_gives_the_rest_pose() {
         let speech = speech(3);
         let rng = &mut ChaCha8Rng::seed_from_u64(3);
         let motion = RuleGestures::with_variation(&speech, &[], SECS, rng).motion(900, FrameRate::new(15, 1));
@@ -332,19 +334,19 @@ mod tests {
             }
         }
         let silent = Speech::default();
-        let still = RuleGestures::new(&silent, &[]).motion(30, FrameRate::new(15, 1));
-        assert!(wrist_speeds(still.joints.view(), still.fps).iter().all(|speed| *speed == 0.0));
+        let motionless = RuleGestures::new(&silent, &[]).motion(30, FrameRate::new(15, 1));
+        assert!(wrist_speeds(motionless.joints.view(), motionless.fps).iter().all(|speed| *speed == 0.0));
     }
 
     #[test]
-    fn a_word_sends_its_hand_to_its_place() {
+    fn a_word_moves_its_hand_to_its_target() {
         let rng = &mut ChaCha8Rng::seed_from_u64(4);
         let speech = Speech::free(SECS, rng);
-        let said = words::words(&speech, orator_base::types::split::Split::Train, rng);
-        let rule = RuleGestures::new(&speech, &said);
+        let spoken = words::words(&speech, orator_base::types::split::Split::Train, rng);
+        let rule = RuleGestures::new(&speech, &spoken);
         let motion = rule.motion(FPS.frames_in(SECS), FPS);
         let mut n = 0;
-        for word in said.iter().filter(|word| word.end_secs < SECS - 2.0) {
+        for word in spoken.iter().filter(|word| word.end_secs < SECS - 2.0) {
             let Some(gesture) = words::gesture(&word.word) else { continue };
             let t = FPS.frames_in(word.start_secs + WORD_DELAY + STROKE) + 1;
             let wrist = [L_WRIST, R_WRIST][gesture.hand];

@@ -1,4 +1,4 @@
-//! Speech with the times of its words as a dataset whose motion follows the second rule, `speech_gestures`.
+//! Dataset from recorded speech with word times, with motion by the second rule, `speech_gestures`.
 
 use super::speech_events::SpeechEvents;
 use super::speech_gestures::SpeechGestures;
@@ -18,7 +18,7 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Version of the rule, under `rule` in a sample's JSON.
+/// Version of the rule, stored under `rule` in the JSON of a sample.
 pub const RULE_OF_SPEECH: u32 = 3;
 const NAME: &str = "spoken";
 const FPS: FrameRate = FrameRate::new(15, 1);
@@ -29,16 +29,16 @@ pub fn is_by_speech(sample: &Sample) -> bool {
     sample.meta.pointer("/rule/rule").and_then(serde_json::Value::as_u64) == Some(u64::from(RULE_OF_SPEECH))
 }
 
-/// Predictable part of a sample's motion: the rule alone for its sound and words.
+/// Predictable part of a sample's motion: the rule without variation, for its audio and words.
 pub fn predictable(sample: &Sample) -> orator_base::types::pose3d::Motion {
-    let events = SpeechEvents::hear(&sample.sound, sample.words.as_deref().unwrap_or_default());
+    let events = SpeechEvents::detect(&sample.sound, sample.words.as_deref().unwrap_or_default());
     SpeechGestures::new(&events).motion(sample.n_frames(), sample.motion.fps)
 }
 
-/// Speech of a folder: `NAME.wav` with `NAME.tsv`, in the split that its name begins with, else to train on.
+/// Speech in a folder: `NAME.wav` with `NAME.tsv`. The split is the one that the name begins with, else train.
 ///
 /// # Errors
-/// A folder without speech, or a sound without words; the file is named.
+/// A folder without speech, or audio without words, with the name of the file.
 pub fn speech_of(folder: &Path) -> Result<Vec<(PathBuf, Split)>> {
     let entries = std::fs::read_dir(folder).with_context(|| format!("cannot read the folder {}", folder.display()))?;
     let mut sounds: Vec<PathBuf> = entries.map(|entry| Ok(entry?.path())).collect::<Result<_>>()?;
@@ -65,7 +65,7 @@ pub fn speech_of(folder: &Path) -> Result<Vec<(PathBuf, Split)>> {
     Ok(sounds.into_iter().map(|sound| (sound.clone(), split(&sound))).collect())
 }
 
-/// Writes the speech as a dataset into the existing, empty folder `dir`; `seed` is the variation's.
+/// Writes the speech as a dataset into the existing, empty folder `dir`; `seed` determines the variation.
 pub fn write(dir: &Path, speech: &[(PathBuf, Split)], seed: u64, progress: &dyn Progress) -> Result<DatasetInfo> {
     let about = About {
         licence: "cc0-1.0".to_owned(),
@@ -92,7 +92,7 @@ fn spoken(file: &Path, seed: u64) -> Result<SpokenVideo> {
     let transcript = Transcript::read(&file.with_extension("tsv"))?;
     let words: Vec<_> = transcript.words.into_iter().filter(|word| word.end_secs <= sound.secs()).collect();
     let hash = blake3::hash(format!("{RULE_OF_SPEECH} {seed} {name}").as_bytes());
-    let events = SpeechEvents::hear(&sound, &words);
+    let events = SpeechEvents::detect(&sound, &words);
     let gestures = SpeechGestures::varied(&events, &mut ChaCha8Rng::from_seed(*hash.as_bytes()));
     Ok(SpokenVideo {
         content: hash.to_hex().to_string(),

@@ -1,55 +1,55 @@
-//! What the second rule hears in any speech: loud syllables, phrases, and words of its list.
+//! Speech events that the second rule depends on: loud syllables, phrases, and words of its list.
 
 use orator_base::types::sound::Sound;
 use orator_formats::transcript::Word;
 
-/// Seconds between two values of the envelope, and over which each is taken.
+/// Step and window of the envelope, seconds.
 const STEP: f64 = 0.01;
 const WINDOW: f64 = 0.05;
-/// Shares of the speech's loud level (90 % of the envelope lies below) above which a peak is a loud syllable, and below which
+/// Shares of the loud level (0.9 quantile of the envelope) above which a peak is a loud syllable, and below which
 /// there is a pause.
-const LOUD: f64 = 0.85;
-const SILENT: f64 = 0.08;
-/// Seconds between two loud syllables, and of a pause between two phrases, at least.
-const BEATS_APART: f64 = 0.45;
-const PAUSE: f64 = 0.22;
+const MIN_LOUD: f64 = 0.85;
+const MAX_SILENT: f64 = 0.08;
+/// Least interval between two loud syllables, and least pause between two phrases, in seconds.
+const MIN_BEAT_INTERVAL: f64 = 0.45;
+const MIN_PAUSE: f64 = 0.22;
 
-/// Words that send the left hand to each of four places.
+/// Words that move the left hand to each of four targets.
 pub const WORDS: [[&str; 2]; 4] =
     [["river", "mountain"], ["garden", "window"], ["letter", "money"], ["morning", "city"]];
 
-/// Events of a speech, seconds, in order of time.
+/// Events of a speech, in seconds and in order of time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SpeechEvents {
-    /// Peaks of loud syllables, with their height over the loud level.
+    /// Times of the peaks of loud syllables, and their heights relative to the loud level.
     pub beats: Vec<(f64, f64)>,
-    /// Begin and end of the phrases.
+    /// Start and end of the phrases.
     pub phrases: Vec<[f64; 2]>,
-    /// Begins of words of [`WORDS`], with their place.
+    /// Starts of words of [`WORDS`], with the index of their target.
     pub words: Vec<(f64, usize)>,
 }
 
 impl SpeechEvents {
-    /// Events of a sound and what is said in it.
-    pub fn hear(sound: &Sound, said: &[Word]) -> Self {
+    /// Detects the events in audio with the words `spoken`.
+    pub fn detect(sound: &Sound, spoken: &[Word]) -> Self {
         let envelope = envelope(sound);
         let mut sorted = envelope.clone();
         sorted.sort_by(f64::total_cmp);
         let level = sorted.get(sorted.len() * 9 / 10).copied().unwrap_or(0.0).max(1e-6);
-        let place = |word: &Word| {
+        let target = |word: &Word| {
             let own = word.word.trim_matches(|c: char| !c.is_alphabetic()).to_lowercase();
-            let place = WORDS.iter().position(|words| words.contains(&own.as_str()))?;
-            Some((word.start_secs, place))
+            let target = WORDS.iter().position(|words| words.contains(&own.as_str()))?;
+            Some((word.start_secs, target))
         };
         Self {
             beats: beats(&envelope, level),
             phrases: phrases(&envelope, level),
-            words: said.iter().filter_map(place).collect(),
+            words: spoken.iter().filter_map(target).collect(),
         }
     }
 }
 
-/// Root mean square of the sound about each hundredth of a second.
+/// Root mean square of the audio around each hundredth of a second.
 fn envelope(sound: &Sound) -> Vec<f64> {
     let rate = f64::from(sound.rate);
     let n = (sound.secs() / STEP) as usize;
@@ -67,8 +67,8 @@ fn beats(envelope: &[f64], level: f64) -> Vec<(f64, f64)> {
     let mut beats: Vec<(f64, f64)> = Vec::new();
     for (i, three) in envelope.windows(3).enumerate() {
         let now = (i + 1) as f64 * STEP;
-        let is_peak = three[1] >= LOUD * level && three[1] > three[0] && three[1] >= three[2];
-        if is_peak && beats.last().is_none_or(|last| now - last.0 >= BEATS_APART) {
+        let is_peak = three[1] >= MIN_LOUD * level && three[1] > three[0] && three[1] >= three[2];
+        if is_peak && beats.last().is_none_or(|last| now - last.0 >= MIN_BEAT_INTERVAL) {
             beats.push((now, (three[1] / level).min(1.5)));
         }
     }
@@ -77,10 +77,10 @@ fn beats(envelope: &[f64], level: f64) -> Vec<(f64, f64)> {
 
 fn phrases(envelope: &[f64], level: f64) -> Vec<[f64; 2]> {
     let mut phrases: Vec<[f64; 2]> = Vec::new();
-    for (i, _) in envelope.iter().enumerate().filter(|(_, value)| **value >= SILENT * level) {
+    for (i, _) in envelope.iter().enumerate().filter(|(_, value)| **value >= MAX_SILENT * level) {
         let now = i as f64 * STEP;
         match phrases.last_mut() {
-            Some(last) if now - last[1] < PAUSE => last[1] = now,
+            Some(last) if now - last[1] < MIN_PAUSE => last[1] = now,
             _ => phrases.push([now, now]),
         }
     }
@@ -93,8 +93,8 @@ mod tests {
     use orator_formats::transcript::WordSource;
 
     #[test]
-    fn loud_syllables_phrases_and_words_are_heard() {
-        // Bursts of 0.1 s: two phrases of 1 s with a burst each 0.2 s, every third loud.
+    fn loud_syllables_phrases_and_words_are_detected() {
+        // Bursts of 0.1 s: two phrases of 1 s with a burst every 0.2 s, every third one loud.
         let loudness = |secs: f64| match secs % 1.5 {
             of_phrase if of_phrase < 1.0 && of_phrase % 0.2 < 0.1 => {
                 if (of_phrase / 0.2) as usize % 3 == 1 {
@@ -114,16 +114,16 @@ mod tests {
             source: WordSource::Given,
             confidence: None,
         };
-        let said = [word("The", 0.0), word("River,", 0.2), word("city", 1.7)];
-        let heard = SpeechEvents::hear(&Sound { rate: 16_000, samples }, &said);
-        let times: Vec<f64> = heard.beats.iter().map(|beat| (beat.0 * 10.0).round() / 10.0).collect();
-        assert_eq!(times.len(), 4, "{heard:?}");
+        let spoken = [word("The", 0.0), word("River,", 0.2), word("city", 1.7)];
+        let events = SpeechEvents::detect(&Sound { rate: 16_000, samples }, &spoken);
+        let times: Vec<f64> = events.beats.iter().map(|beat| (beat.0 * 10.0).round() / 10.0).collect();
+        assert_eq!(times.len(), 4, "{events:?}");
         for (time, expected) in times.iter().zip([0.25, 0.85, 1.75, 2.35]) {
-            assert!((time - expected).abs() <= 0.1, "{heard:?}");
+            assert!((time - expected).abs() <= 0.1, "{events:?}");
         }
-        assert_eq!(heard.phrases.len(), 2, "{heard:?}");
-        assert!((heard.phrases[0][1] - 0.92).abs() < 0.05 && (heard.phrases[1][0] - 1.48).abs() < 0.05, "{heard:?}");
-        assert_eq!(heard.words, [(0.2, 0), (1.7, 3)]);
-        assert_eq!(SpeechEvents::hear(&Sound { rate: 16_000, samples: Vec::new() }, &[]), SpeechEvents::default());
+        assert_eq!(events.phrases.len(), 2, "{events:?}");
+        assert!((events.phrases[0][1] - 0.92).abs() < 0.05 && (events.phrases[1][0] - 1.48).abs() < 0.05, "{events:?}");
+        assert_eq!(events.words, [(0.2, 0), (1.7, 3)]);
+        assert_eq!(SpeechEvents::detect(&Sound { rate: 16_000, samples: Vec::new() }, &[]), SpeechEvents::default());
     }
 }

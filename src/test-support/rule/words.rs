@@ -1,4 +1,4 @@
-//! Words of the synthetic speaker, which the sound does not tell apart: some of them send a hand to a place of their own.
+//! Words of the synthetic speaker, which are independent of the audio: some of them move a hand to a specific target.
 
 use crate::drawn::speech::Speech;
 use orator_base::types::split::Split;
@@ -6,16 +6,16 @@ use orator_formats::transcript::{Word, WordSource};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// Seconds between the beginnings of two words with gestures, at least.
-const APART: f64 = 1.5;
-/// Share of such words where there may be one.
-const SHARE: f64 = 0.12;
-/// Most syllables of a word.
-const SYLLABLES: usize = 3;
-/// Number of places of a hand that words send it to.
+/// Least interval between the starts of two words with gestures, seconds.
+const MIN_INTERVAL: f64 = 1.5;
+/// Probability of such a word where one is allowed.
+const GESTURE_PROBABILITY: f64 = 0.12;
+/// Largest number of syllables of a word.
+const MAX_SYLLABLES: usize = 3;
+/// Number of targets per hand.
 pub const N_PLACES: usize = 4;
 
-/// Words that send the left and the right hand to each of its places.
+/// Words that move the left and right hand to each of their targets.
 const GESTURES: [[&str; N_PLACES]; 2] = [["over", "away", "deep", "self"], ["high", "aside", "low", "here"]];
 /// All other words.
 const OTHERS: &str = "the of and a to in is you that it he was for on are as with his they I at be this have from or one \
@@ -27,51 +27,52 @@ const OTHERS: &str = "the of and a to in is you that it he was for on are as wit
     small set put end does another well large must big even such because turn here's why ask went men read need land \
     different home us move try kind hand picture again change off play spell air animal house point page letter mother \
     answer found study still learn should world";
-/// Of so many classes of pairs of a word with a gesture and its neighbour, one is that of the held-out splits alone.
+/// Pairs of a word with a gesture and a neighbouring word are divided into this many classes; one of them is reserved
+/// for the held-out splits.
 const PAIR_CLASSES: usize = 5;
 
-/// Where a word sends a hand.
+/// Gesture of a word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WordGesture {
     /// 0: left, 1: right.
     pub hand: usize,
-    /// Number of the place, below [`N_PLACES`].
+    /// Index of the target, below [`N_PLACES`].
     pub place: usize,
 }
 
-/// Gesture of a word; `None`: it has none.
+/// Gesture of a word; `None` if it has none.
 pub fn gesture(word: &str) -> Option<WordGesture> {
     let of_hand = |hand: usize| GESTURES[hand].iter().position(|own| *own == word);
     (0..2).find_map(|hand| of_hand(hand).map(|place| WordGesture { hand, place }))
 }
 
-/// Words for the syllables of a speech, one to three syllables each, drawn whatever the syllables are. Pairs of a word with
-/// a gesture and its neighbour that the training split has are not in the others, and the reverse.
+/// Words for the syllables of a speech, one to three syllables each, drawn independently of the syllables. Training
+/// and held-out splits share no pair of a word with a gesture and a neighbouring word.
 pub fn words(speech: &Speech, split: Split, rng: &mut ChaCha8Rng) -> Vec<Word> {
     let mut spans: Vec<[f64; 2]> = Vec::new();
     for phrase in &speech.phrases {
         let mut at = phrase.first;
         while at < phrase.last {
-            let next = (at + rng.random_range(1..=SYLLABLES)).min(phrase.last);
+            let next = (at + rng.random_range(1..=MAX_SYLLABLES)).min(phrase.last);
             spans.push([speech.syllables[at].start, speech.syllables[next - 1].end]);
             at = next;
         }
     }
-    let mut said: Vec<&str> = Vec::with_capacity(spans.len());
+    let mut chosen: Vec<&str> = Vec::with_capacity(spans.len());
     let mut last = None;
     for (n, [start, _]) in spans.iter().enumerate() {
-        let may = last.is_none_or(|last: usize| n > last + 2 && start - spans[last][0] >= APART);
-        let is_gesture = rng.random_bool(SHARE) && may;
+        let is_allowed = last.is_none_or(|last: usize| n > last + 2 && start - spans[last][0] >= MIN_INTERVAL);
+        let is_gesture = rng.random_bool(GESTURE_PROBABILITY) && is_allowed;
         last = if is_gesture { Some(n) } else { last };
-        said.push(if is_gesture { GESTURES[rng.random_range(0..2)][rng.random_range(0..N_PLACES)] } else { "" });
+        chosen.push(if is_gesture { GESTURES[rng.random_range(0..2)][rng.random_range(0..N_PLACES)] } else { "" });
     }
     let others: Vec<&str> = OTHERS.split_whitespace().collect();
-    for n in 0..said.len() {
-        if said[n].is_empty() {
-            let neighbours = [n.checked_sub(1).map(|before| said[before]), said.get(n + 1).copied()];
+    for n in 0..chosen.len() {
+        if chosen[n].is_empty() {
+            let neighbours = [n.checked_sub(1).map(|before| chosen[before]), chosen.get(n + 1).copied()];
             let fits = |other: usize| neighbours.iter().flatten().all(|word| is_of_split(word, other, split));
             let fitting: Vec<usize> = (0..others.len()).filter(|other| fits(*other)).collect();
-            said[n] = others[fitting[rng.random_range(0..fitting.len())]];
+            chosen[n] = others[fitting[rng.random_range(0..fitting.len())]];
         }
     }
     let word = |(word, [start_secs, end_secs]): (&str, [f64; 2])| Word {
@@ -81,10 +82,11 @@ pub fn words(speech: &Speech, split: Split, rng: &mut ChaCha8Rng) -> Vec<Word> {
         source: WordSource::Given,
         confidence: None,
     };
-    said.into_iter().zip(spans).map(word).collect()
+    chosen.into_iter().zip(spans).map(word).collect()
 }
 
-/// Whether the pair of `word` with the other word of this number is one of the split's; true of a word without gesture.
+/// Whether the pair of `word` and the other word with index `other` belongs to the split; true for a word without
+/// gesture.
 fn is_of_split(word: &str, other: usize, split: Split) -> bool {
     let Some(WordGesture { hand, place }) = gesture(word) else { return true };
     let is_held_out = (3 * (N_PLACES * hand + place) + other).is_multiple_of(PAIR_CLASSES);
@@ -104,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn splits_share_no_pair_of_a_word_with_a_gesture_and_its_neighbour() {
+    fn splits_share_no_pair_of_a_gesture_word_and_its_neighbour() {
         let pairs = |words: &[Word]| -> BTreeSet<(String, String)> {
             let of_two = |two: &[Word]| {
                 let is_one = two.iter().any(|word| gesture(&word.word).is_some());
@@ -117,10 +119,10 @@ mod tests {
     }
 
     #[test]
-    fn words_with_gestures_are_apart_and_each_is_there() {
+    fn gesture_words_are_spaced_and_all_occur() {
         let words = of_split(Split::Train, 3);
         let strokes: Vec<&Word> = words.iter().filter(|word| gesture(&word.word).is_some()).collect();
-        assert!(strokes.windows(2).all(|two| two[1].start_secs - two[0].start_secs >= APART));
+        assert!(strokes.windows(2).all(|two| two[1].start_secs - two[0].start_secs >= MIN_INTERVAL));
         let different: BTreeSet<&str> = strokes.iter().map(|word| word.word.as_str()).collect();
         assert_eq!(different.len(), 2 * N_PLACES);
         assert!(words.iter().all(|word| word.end_secs > word.start_secs && !word.word.is_empty()));

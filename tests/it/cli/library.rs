@@ -48,7 +48,7 @@ fn a_program_runs_the_pipeline_and_asks_how_it_stands() {
     assert_eq!(status.units[0].state, UnitState::NoVideo);
     assert_eq!((status.units[1].stage, status.units[1].state), (StageName::Extract, UnitState::NeverDone));
     assert!(!status.datasets_are_fresh());
-    assert_eq!(pipeline.account(&[]).unwrap(), status.account);
+    assert_eq!(pipeline.time_budgets(&[]).unwrap(), status.account);
     assert!(pipeline.status(&["guest".to_owned()]).is_err());
 }
 

@@ -142,7 +142,7 @@ fn imported(dir: &Path, name: &str) -> Sample {
     let [motion, sound, transcript] = ["bvh", "wav", "tsv"].map(file);
     let files = TakeFiles { kind: MotionKind::Bvh, motion: motion.unwrap(), sound, transcript };
     let limits = TakeLimits { fps: FPS, min_frames: 30, max_apart_secs: 0.5, no_sound: false };
-    match ImportedTake::read(&files, &limits).unwrap().ended {
+    match ImportedTake::read(&files, &limits).unwrap().outcome {
         TakeOutcome::Kept(kept) => kept.sample,
         TakeOutcome::Refused(refusal) => panic!("{refusal:?}"),
     }

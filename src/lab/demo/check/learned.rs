@@ -14,7 +14,7 @@ use orator_gesture::generate::seq2seq::architecture::Architecture;
 use orator_gesture::generate::trained::TrainedSpeaker;
 use orator_gesture::metrics::movement::energy::MotionEnergy;
 use orator_gesture::metrics::position::pck::{CorrectKeypoints, PckAxes};
-use orator_test_support::rule::baselines::{RuleBaselines, sound_of_frames};
+use orator_test_support::rule::baselines::{RuleBaselines, frame_log_mel};
 use orator_test_support::rule::dataset::{RULE_OF_WORDS, SpokenClip};
 use orator_test_support::rule::ridge::correlation;
 use orator_test_support::rule::rule::RuleGestures;
@@ -101,7 +101,7 @@ pub fn measure(dataset: &Dataset, speaker: Option<&TrainedSpeaker>, progress: &d
     let fps = dataset.info().fps;
     let judge = Judge { tests: &tests, std: dataset.stats().std(), fps };
     let task = progress.begin("listen", 0);
-    let baselines = RuleBaselines::learn(dataset)?;
+    let baselines = RuleBaselines::fit(dataset)?;
     let row = |predictor, predicted: Vec<Array3<f32>>| judge.row(predictor, &predicted);
     let each = |predict: &dyn Fn(&TestClip) -> Array3<f32>| tests.iter().map(predict).collect::<Vec<_>>();
     let (mut rows, mut first) = (Vec::new(), None);
@@ -135,7 +135,7 @@ pub fn measure(dataset: &Dataset, speaker: Option<&TrainedSpeaker>, progress: &d
             rows.push(row("generator, no words", with_words(None)?));
         }
     }
-    rows.push(row("mean pose", each(&|test| baselines.still(test.sample.n_frames()))));
+    rows.push(row("mean pose", each(&|test| baselines.mean_pose(test.sample.n_frames()))));
     let names = [
         ["ridge of the frame, to poses", "ridge of the frame, to speeds"],
         ["ridge of a second, to poses", "ridge of a second, to speeds"],
@@ -192,7 +192,7 @@ impl TestClip {
     fn new(sample: Sample) -> Result<Self> {
         let clip = (!is_by_speech(&sample)).then(|| SpokenClip::from_sample(&sample)).transpose()?;
         let predictable = clip.map_or_else(|| predictable(&sample), |clip| clip.predictable()).joints;
-        let sound = sound_of_frames(&sample.sound, sample.n_frames(), sample.motion.fps);
+        let sound = frame_log_mel(&sample.sound, sample.n_frames(), sample.motion.fps);
         let all = || Array2::from_elem((sample.n_frames().saturating_sub(1), 2), true);
         let of_beats = clip.map_or_else(all, |clip| places::of_beats(&clip, sample.motion.fps));
         Ok(Self { sample, clip, predictable, sound, of_beats })

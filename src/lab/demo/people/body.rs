@@ -8,7 +8,7 @@ use orator_base::math::vec3::{Vec3, add, cross, scale, sub, unit};
 use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::{L_HAND, L_SHOULDER, N_HAND_JOINTS, N_JOINTS, R_HAND, R_SHOULDER};
 use orator_base::types::time::FrameRate;
-use orator_test_support::drawn::figure::{FINGER_BASES, PHALANGES, reach};
+use orator_test_support::drawn::figure::{FINGER_BASES, PHALANGES, solve_arm};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
@@ -156,7 +156,7 @@ pub fn joints(build: &Build, arms: &[ArmPosture; 2], wrists: [Vec3; 2]) -> [Vec3
         let start = [sign * build.shoulder_width / 2.0, 0.0, 0.0];
         let [out, down, away] = wrists[side];
         let pole = [sign * arm.elbow, 0.95, 0.1 - arm.forward];
-        let (elbow, wrist) = reach([build.upper_arm, build.forearm], start, [sign * out, down, away], pole);
+        let (elbow, wrist) = solve_arm([build.upper_arm, build.forearm], start, [sign * out, down, away], pole);
         joints[shoulder] = start;
         joints[shoulder + 1] = elbow;
         joints[shoulder + 2] = wrist;

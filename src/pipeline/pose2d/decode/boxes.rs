@@ -1,8 +1,8 @@
-//! Boxes with scores, and which of several that overlap stays.
+//! Scored boxes and non-maximum suppression.
 
 use orator_base::types::pose2d::PersonBox;
 
-/// Shared area over joint area of two boxes, 0..1; 0 where either has none.
+/// Intersection over union of two boxes, 0..1; 0 if it is undefined.
 pub fn overlap(a: &PersonBox, b: &PersonBox) -> f32 {
     let shared = |a0: f32, aw: f32, b0: f32, bw: f32| ((a0 + aw).min(b0 + bw) - a0.max(b0)).max(0.0);
     let both = shared(a.x, a.width, b.x, b.width) * shared(a.y, a.height, b.y, b.height);
@@ -10,8 +10,9 @@ pub fn overlap(a: &PersonBox, b: &PersonBox) -> f32 {
     if both > 0.0 && either > 0.0 { both / either } else { 0.0 }
 }
 
-/// The boxes by falling score, without those that overlap a better one by more than `max_overlap`.
-pub fn best(mut boxes: Vec<PersonBox>, max_overlap: f32) -> Vec<PersonBox> {
+/// Non-maximum suppression: boxes by descending score, without those that overlap a better one by more than
+/// `max_overlap`.
+pub fn non_max_suppression(mut boxes: Vec<PersonBox>, max_overlap: f32) -> Vec<PersonBox> {
     boxes.sort_by(|a, b| b.score.total_cmp(&a.score));
     let mut kept: Vec<PersonBox> = Vec::new();
     for candidate in boxes {
@@ -22,14 +23,15 @@ pub fn best(mut boxes: Vec<PersonBox>, max_overlap: f32) -> Vec<PersonBox> {
     kept
 }
 
-/// A box from two corners, if its numbers are finite and it has an area.
+/// Box from two corners; `None` if a value is not finite or the area is empty.
 pub fn from_corners([x0, y0, x1, y1]: [f32; 4], score: f32) -> Option<PersonBox> {
     let found = PersonBox { x: x0, y: y0, width: x1 - x0, height: y1 - y0, score };
-    let sound = [x0, y0, x1, y1, score].iter().all(|number| number.is_finite());
-    (sound && found.width > 0.0 && found.height > 0.0).then_some(found)
+    let is_valid = [x0, y0, x1, y1, score].iter().all(|number| number.is_finite());
+    (is_valid && found.width > 0.0 && found.height > 0.0).then_some(found)
 }
 
-/// Finished boxes of a detector (RTMDet and the like): those in `rows` (5 numbers each) scoring above `min_score` whose label is `person`; no labels: all of them.
+/// Boxes of a detector with built-in decoding (RTMDet and similar): the rows (x0, y0, x1, y1, score) above `min_score`
+/// with the label `person`, or all if there are no labels.
 pub fn detections(
     rows: &[f32],
     labels: Option<&[i64]>,
@@ -39,7 +41,10 @@ pub fn detections(
 ) -> Vec<PersonBox> {
     let wanted = |idx: usize| labels.is_none_or(|labels| labels.get(idx) == Some(&person));
     let found = rows.chunks_exact(5).enumerate().filter(|(idx, row)| row[4] > min_score && wanted(*idx));
-    best(found.filter_map(|(_, row)| from_corners([row[0], row[1], row[2], row[3]], row[4])).collect(), max_overlap)
+    non_max_suppression(
+        found.filter_map(|(_, row)| from_corners([row[0], row[1], row[2], row[3]], row[4])).collect(),
+        max_overlap,
+    )
 }
 
 #[cfg(test)]
@@ -47,17 +52,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn of_overlapping_boxes_the_better_stays() {
+    fn of_overlapping_boxes_the_better_is_retained() {
         let at = |x: f32, score: f32| from_corners([x, 0.0, x + 10.0, 10.0], score).unwrap();
         assert!((overlap(&at(0.0, 1.0), &at(5.0, 1.0)) - 1.0 / 3.0).abs() < 1e-6);
-        let kept = best(vec![at(0.0, 0.5), at(1.0, 0.9), at(8.0, 0.7)], 0.45);
+        let kept = non_max_suppression(vec![at(0.0, 0.5), at(1.0, 0.9), at(8.0, 0.7)], 0.45);
         assert_eq!(kept.iter().map(|b| b.score).collect::<Vec<_>>(), [0.9, 0.7]);
         assert_eq!(from_corners([0.0, 0.0, f32::NAN, 1.0], 1.0), None);
         assert_eq!(from_corners([5.0, 0.0, 5.0, 1.0], 1.0), None);
     }
 
     #[test]
-    fn only_people_with_a_score_and_an_area() {
+    fn only_persons_with_a_score_and_an_area() {
         let rows = [
             [10.0, 20.0, 30.0, 60.0, 0.8],
             [0.0; 5],

@@ -1,16 +1,19 @@
-//! One heat-map a keypoint: the peak's cell is the place, its height the score, and the neighbourhood places it between
-//! the cells. `dark` is the decoding of Zhang et al. 2020, "Distribution-Aware Coordinate Representation for Human Pose
+//! Heatmap decoding, one map per keypoint: position and score of the peak, refined to sub-cell precision from its
+//! neighbourhood. `dark` follows Zhang et al. 2020, "Distribution-Aware Coordinate Representation for Human Pose
 //! Estimation", section 3.2: blur, then one Newton step on the logarithm.
 
-use super::points::{LARGEST, ScoredPoint, finite, peak};
+use super::points::{MAX_AXIS_LEN, ScoredPoint, finite, peak};
 use anyhow::{Result, ensure};
 use orator_media::opencv::blur::GaussianBlur;
 use orator_onnx::Refine;
 
-/// A Newton step further than this many cells is not believed.
+/// Largest plausible Newton step, in cells.
 const MAX_STEP: f64 = 1.5;
 
-/// The keypoints of maps of shape [1, K, rows, columns], in pixels of an input of `[height, width]`.
+/// Keypoints from maps of shape [1, K, rows, columns], in px of an input of `[height, width]`.
+///
+/// # Errors
+/// An invalid shape.
 pub fn decode(
     shape: &[i64],
     maps: &[f32],
@@ -18,13 +21,13 @@ pub fn decode(
     refine: Refine,
     gaussian: &GaussianBlur,
 ) -> Result<Vec<ScoredPoint>> {
-    let &[1, _, rows @ 1..=LARGEST, columns @ 1..=LARGEST] = shape else {
+    let &[1, _, rows @ 1..=MAX_AXIS_LEN, columns @ 1..=MAX_AXIS_LEN] = shape else {
         anyhow::bail!("heat-maps must have the shape [1, K, rows, columns], not {shape:?}")
     };
     let (rows, columns) = (rows as usize, columns as usize);
     ensure!(maps.len().is_multiple_of(rows * columns), "{} numbers are no maps of {rows}x{columns}", maps.len());
     let cell_px = [input_size[1] as f64 / columns as f64, input_size[0] as f64 / rows as f64];
-    let place = |map: &[f32]| {
+    let position = |map: &[f32]| {
         let Some((at, height)) = peak(map) else { return [0.0; 3] };
         let (x, y) = (at % columns, at / columns);
         let [dx, dy] = match refine {
@@ -34,10 +37,10 @@ pub fn decode(
         };
         finite([(x as f64 + dx) * cell_px[0], (y as f64 + dy) * cell_px[1], f64::from(height)])
     };
-    Ok(maps.chunks_exact(rows * columns).map(place).collect())
+    Ok(maps.chunks_exact(rows * columns).map(position).collect())
 }
 
-/// A quarter cell towards the higher neighbour, on each axis.
+/// Offset of a quarter cell towards the higher neighbour on each axis.
 fn quarter(map: &[f32], columns: usize, x: usize, y: usize) -> [f64; 2] {
     let rows = map.len() / columns;
     if x == 0 || y == 0 || x + 1 >= columns || y + 1 >= rows {
@@ -56,7 +59,7 @@ fn quarter(map: &[f32], columns: usize, x: usize, y: usize) -> [f64; 2] {
     [towards(at(x - 1, y), at(x + 1, y)), towards(at(x, y - 1), at(x, y + 1))]
 }
 
-/// The Newton step from the peak's cell; none at the edge, or where it is not believed.
+/// Newton step from the peak cell; zero at the edge or if it is implausible.
 fn dark(map: &[f32], columns: usize, x: usize, y: usize, gaussian: &GaussianBlur) -> [f64; 2] {
     let rows = map.len() / columns;
     if x < 2 || y < 2 || x + 2 >= columns || y + 2 >= rows {
@@ -66,21 +69,21 @@ fn dark(map: &[f32], columns: usize, x: usize, y: usize, gaussian: &GaussianBlur
         let value = gaussian.at(map, columns, x.wrapping_add_signed(dx), y.wrapping_add_signed(dy));
         f64::from(value.max(1e-10)).ln()
     };
-    let here = 2.0 * log(0, 0);
+    let centre = 2.0 * log(0, 0);
     let (gx, gy) = (0.5 * (log(1, 0) - log(-1, 0)), 0.5 * (log(0, 1) - log(0, -1)));
-    let (gxx, gyy) = (0.25 * (log(2, 0) - here + log(-2, 0)), 0.25 * (log(0, 2) - here + log(0, -2)));
+    let (gxx, gyy) = (0.25 * (log(2, 0) - centre + log(-2, 0)), 0.25 * (log(0, 2) - centre + log(0, -2)));
     let gxy = 0.25 * (log(1, 1) - log(-1, 1) - log(1, -1) + log(-1, -1));
     let determinant = gxx * gyy - gxy * gxy;
     let step = [-(gyy * gx - gxy * gy) / determinant, -(gxx * gy - gxy * gx) / determinant];
-    let believed = determinant.abs() > 1e-12 && step.iter().all(|cells| cells.abs() < MAX_STEP);
-    if believed { step } else { [0.0; 2] }
+    let is_plausible = determinant.abs() > 1e-12 && step.iter().all(|cells| cells.abs() < MAX_STEP);
+    if is_plausible { step } else { [0.0; 2] }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn bell(columns: usize, rows: usize, [x, y]: [f64; 2]) -> Vec<f32> {
+    fn gaussian_map(columns: usize, rows: usize, [x, y]: [f64; 2]) -> Vec<f32> {
         let value = |at: usize| {
             let (dx, dy) = ((at % columns) as f64 - x, (at / columns) as f64 - y);
             (0.9 * (-(dx * dx + dy * dy) / (2.0 * 2.0 * 2.0)).exp()) as f32
@@ -89,24 +92,27 @@ mod tests {
     }
 
     #[test]
-    fn dark_finds_a_known_peak_between_the_cells() {
-        for place in [[20.3, 30.8], [10.0, 12.5], [5.49, 40.1]] {
-            let map = bell(48, 64, place);
+    fn dark_locates_a_peak_between_cells() {
+        for position in [[20.3, 30.8], [10.0, 12.5], [5.49, 40.1]] {
+            let map = gaussian_map(48, 64, position);
             let points = decode(&[1, 1, 64, 48], &map, [256, 192], Refine::Dark, &GaussianBlur::new(3)).unwrap();
             let [x, y, score] = points[0];
-            assert!((x / 4.0 - place[0]).abs() <= 0.05 && (y / 4.0 - place[1]).abs() <= 0.05, "{place:?} {x} {y}");
+            assert!(
+                (x / 4.0 - position[0]).abs() <= 0.05 && (y / 4.0 - position[1]).abs() <= 0.05,
+                "{position:?} {x} {y}"
+            );
             assert!(score > 0.8 && score <= 0.9);
         }
     }
 
     #[test]
     fn other_refinements_and_edges() {
-        let map = bell(48, 64, [20.3, 30.8]);
+        let map = gaussian_map(48, 64, [20.3, 30.8]);
         let found =
             |map: &[f32], refine| decode(&[1, 1, 64, 48], map, [64, 48], refine, &GaussianBlur::new(3)).unwrap()[0];
         assert_eq!(found(&map, Refine::None)[..2], [20.0, 31.0]);
         assert_eq!(found(&map, Refine::Quarter)[..2], [20.25, 30.75]);
-        assert_eq!(found(&bell(48, 64, [0.2, 63.0]), Refine::Dark)[..2], [0.0, 63.0]);
+        assert_eq!(found(&gaussian_map(48, 64, [0.2, 63.0]), Refine::Dark)[..2], [0.0, 63.0]);
         assert_eq!(found(&[f32::NAN; 48 * 64], Refine::Dark), [0.0; 3]);
         let mut holed = map.clone();
         holed[30 * 48 + 21] = f32::NAN;

@@ -1,5 +1,5 @@
-//! What the numbers a model gives mean, one file a kind of output. Slices in, places in pixels of the model's input out;
-//! no model, no picture, nothing remembered. Numbers that are not finite are not found, never a panic.
+//! Decoding of model outputs, one file per kind of output. Pure functions from slices to positions in px of the model
+//! input. Non-finite values count as not detected and never panic.
 
 pub mod boxes;
 pub mod heatmap;

@@ -1,21 +1,21 @@
-//! Outputs that give one position a keypoint. SimCC (Li et al. 2022): x and y of each are two classifications over bins finer
-//! than a pixel (RTMPose, RTMW, DWPose). Regression: a row of numbers a point, x and y first, in pixels of the input, and one
-//! score for them all (MediaPipe's hand and face).
+//! Outputs with one position per keypoint. SimCC (Li et al. 2022): x and y are two classifications over sub-pixel bins
+//! (RTMPose, RTMW, DWPose). Regression: one row of values per point, x and y first, in px of the input, and one score
+//! for all points (MediaPipe's hand and face).
 
 use anyhow::{Result, bail, ensure};
 
-/// The longest axis of an output that is believed.
-pub(crate) const LARGEST: i64 = 1 << 20;
+/// Largest accepted axis length of an output.
+pub(crate) const MAX_AXIS_LEN: i64 = 1 << 20;
 
-/// A keypoint in pixels of the model's input: x, y, score. All zero where it is not finite.
+/// Keypoint x, y, score in px of the model input; all zero if not finite.
 pub type ScoredPoint = [f64; 3];
 
-/// The point, or zeros where one of its numbers is not finite.
+/// The point, or zeros if a value is not finite.
 pub(crate) fn finite(point: ScoredPoint) -> ScoredPoint {
     if point.iter().all(|number| number.is_finite()) { point } else { [0.0; 3] }
 }
 
-/// Index and value of the first largest number; numbers that are not finite are passed over. None: there is none.
+/// Index and value of the first maximum, ignoring non-finite values; `None` if there is no finite value.
 pub(crate) fn peak(numbers: &[f32]) -> Option<(usize, f32)> {
     let mut best: Option<(usize, f32)> = None;
     for (at, value) in numbers.iter().copied().enumerate() {
@@ -26,26 +26,32 @@ pub(crate) fn peak(numbers: &[f32]) -> Option<(usize, f32)> {
     best
 }
 
-/// SimCC: the keypoints of `x` [1, K, bins] and `y` [1, K, bins], `split` bins a pixel. The fullest bin is the
-/// position; the score is the lower of the two peaks.
+/// SimCC: keypoints from `x` [1, K, bins] and `y` [1, K, bins] with `split` bins per pixel. The position is that of
+/// the peaks, the score the lower of the two.
+///
+/// # Errors
+/// Invalid or unequal shapes.
 pub fn simcc(x: (&[i64], &[f32]), y: (&[i64], &[f32]), split: f64) -> Result<Vec<ScoredPoint>> {
-    let (&[1, n_points, x_bins @ 1..=LARGEST], &[1, y_points, y_bins @ 1..=LARGEST]) = (x.0, y.0) else {
+    let (&[1, n_points, x_bins @ 1..=MAX_AXIS_LEN], &[1, y_points, y_bins @ 1..=MAX_AXIS_LEN]) = (x.0, y.0) else {
         bail!("SimCC outputs must have the shape [1, K, bins], not {:?} and {:?}", x.0, y.0)
     };
     if n_points != y_points {
         bail!("SimCC gives {n_points} keypoints in x and {y_points} in y");
     }
     let rows = x.1.chunks_exact(x_bins as usize).zip(y.1.chunks_exact(y_bins as usize));
-    let place = |(x, y): (&[f32], &[f32])| match (peak(x), peak(y)) {
+    let point = |(x, y): (&[f32], &[f32])| match (peak(x), peak(y)) {
         (Some((x, x_score)), Some((y, y_score))) => {
             finite([x as f64 / split, y as f64 / split, f64::from(x_score.min(y_score)).max(0.0)])
         }
         _ => [0.0; 3],
     };
-    Ok(rows.map(place).collect())
+    Ok(rows.map(point).collect())
 }
 
-/// Regression: `n_points` points of `landmarks`, each with the one `score`; all zero if any number is not finite.
+/// Regression: `n_points` points of `landmarks`, all with the same `score`; all zero if any value is not finite.
+///
+/// # Errors
+/// A number of values that does not fit `n_points`.
 pub fn regression(landmarks: &[f32], score: f32, n_points: usize) -> Result<Vec<ScoredPoint>> {
     let fits = n_points > 0 && landmarks.len().is_multiple_of(n_points) && landmarks.len() / n_points >= 2;
     ensure!(fits, "{} numbers are no {n_points} points", landmarks.len());
@@ -56,7 +62,7 @@ pub fn regression(landmarks: &[f32], score: f32, n_points: usize) -> Result<Vec<
     Ok(rows.map(|row| [f64::from(row[0]), f64::from(row[1]), f64::from(score)]).collect())
 }
 
-/// The score 0..1 that a model gives outright or as a logit.
+/// Score 0..1 from an output that is a probability or a logit.
 pub fn regression_score(number: f32, is_logit: bool) -> f32 {
     if is_logit { 1.0 / (1.0 + (-number).exp()) } else { number }
 }
@@ -66,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_fullest_bins_are_the_place() {
+    fn simcc_positions_are_the_peaks() {
         let mut x = vec![0.0; 2 * 384];
         let mut y = vec![0.0; 2 * 512];
         (x[101], y[77]) = (0.8, 0.6);
@@ -79,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_of_any_length_are_points() {
+    fn regression_accepts_rows_of_any_length() {
         let rows = [1.0, 2.0, 9.0, 3.0, 4.0, 9.0];
         assert_eq!(regression(&rows, 0.5, 2).unwrap(), [[1.0, 2.0, 0.5], [3.0, 4.0, 0.5]]);
         assert_eq!(regression(&rows, f32::NAN, 2).unwrap(), [[0.0; 3]; 2]);

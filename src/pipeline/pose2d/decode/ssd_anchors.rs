@@ -1,37 +1,37 @@
-//! MediaPipe's single-shot detectors: offsets of a box and of points from fixed anchors, a logit each. Boxes that
-//! overlap are averaged by their scores, not dropped.
+//! MediaPipe's SSD detectors: a box and points as offsets from fixed anchors, with one logit each. Overlapping boxes
+//! are averaged, weighted by score, instead of suppressed.
 
 use super::boxes;
 use anyhow::{Result, ensure};
 use orator_base::types::pose2d::PersonBox;
 
-/// A detection in pixels of the input: two corners of its box, then its points.
+/// Detection in px of the input: two corners of its box, then its points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Detection {
     pub score: f64,
-    pub places: Vec<[f64; 2]>,
+    pub points: Vec<[f64; 2]>,
 }
 
-/// Centres of the anchors, in shares of the input's side: neighbours of equal stride share a grid, two anchors a cell
-/// each, row-major.
+/// Anchor centres as shares of the input side: layers of equal stride share a grid, with two anchors per cell and
+/// layer, row-major.
 pub fn anchors(size: usize, strides: &[usize]) -> Vec<[f64; 2]> {
     let mut centres = Vec::new();
-    for same in strides.chunk_by(|a, b| a == b) {
-        let grid = size.div_ceil(same[0].max(1));
+    for layers in strides.chunk_by(|a, b| a == b) {
+        let grid = size.div_ceil(layers[0].max(1));
         let share = |cell: usize| (cell as f64 + 0.5) / grid as f64;
         for cell in 0..grid * grid {
             let centre = [share(cell % grid), share(cell / grid)];
-            centres.extend(std::iter::repeat_n(centre, 2 * same.len()));
+            centres.extend(std::iter::repeat_n(centre, 2 * layers.len()));
         }
     }
     centres
 }
 
-/// The detections whose probability is at least `min_score`, best first. `regressors`: a row of box centre, box size
-/// and points an anchor, in pixels of an input of `size`.
+/// Detections with a probability of at least `min_score`, best first. `regressors` has one row per anchor: box centre,
+/// box size and points, in px of an input of side `size`.
 ///
 /// # Errors
-/// The numbers are not as many as the anchors need.
+/// A number of values that does not match the anchors.
 pub fn decode(
     regressors: &[f32],
     logits: &[f32],
@@ -55,7 +55,7 @@ pub fn decode(
     for ((row, logit), centre) in regressors.chunks_exact(row_len).zip(logits).zip(anchors) {
         let score = 1.0 / (1.0 + (-f64::from(logit.clamp(-100.0, 100.0))).exp());
         if score >= f64::from(min_score) && row.iter().all(|number| number.is_finite()) {
-            found.push(Detection { score, places: places(row, centre.map(|share| share * size as f64)) });
+            found.push(Detection { score, points: decode_points(row, centre.map(|share| share * size as f64)) });
         }
     }
     found.sort_by(|a, b| b.score.total_cmp(&a.score));
@@ -63,17 +63,17 @@ pub fn decode(
     while !found.is_empty() {
         let best = bounds(&found[0]);
         let mut first = true;
-        let (same, rest): (Vec<_>, Vec<_>) = found
+        let (overlapping, rest): (Vec<_>, Vec<_>) = found
             .into_iter()
             .partition(|other| std::mem::take(&mut first) || boxes::overlap(&best, &bounds(other)) > max_overlap);
-        merged.push(average(&same));
+        merged.push(average(&overlapping));
         found = rest;
     }
     Ok(merged)
 }
 
-/// Corners of the box, then the points.
-fn places(row: &[f32], centre: [f64; 2]) -> Vec<[f64; 2]> {
+/// Corners of the box, followed by the points.
+fn decode_points(row: &[f32], centre: [f64; 2]) -> Vec<[f64; 2]> {
     let pair = |at: usize| [f64::from(row[at]), f64::from(row[at + 1])];
     let ([x, y], [width, height]) = (pair(0), pair(2));
     let (x, y) = (x + centre[0], y + centre[1]);
@@ -83,18 +83,18 @@ fn places(row: &[f32], centre: [f64; 2]) -> Vec<[f64; 2]> {
 }
 
 fn bounds(detection: &Detection) -> PersonBox {
-    let ([x0, y0], [x1, y1]) = (detection.places[0], detection.places[1]);
+    let ([x0, y0], [x1, y1]) = (detection.points[0], detection.points[1]);
     PersonBox { x: x0 as f32, y: y0 as f32, width: (x1 - x0) as f32, height: (y1 - y0) as f32, score: 0.0 }
 }
 
-/// The places of detections of one thing, averaged by their scores; the best score.
-fn average(same: &[Detection]) -> Detection {
-    let sum: f64 = same.iter().map(|detection| detection.score).sum();
-    let place = |at: usize| {
-        let along = |axis: usize| same.iter().map(|one| one.places[at][axis] * one.score).sum::<f64>() / sum;
+/// Score-weighted average of the positions of overlapping detections, with the best score.
+fn average(overlapping: &[Detection]) -> Detection {
+    let sum: f64 = overlapping.iter().map(|detection| detection.score).sum();
+    let point = |at: usize| {
+        let along = |axis: usize| overlapping.iter().map(|one| one.points[at][axis] * one.score).sum::<f64>() / sum;
         [along(0), along(1)]
     };
-    Detection { score: same[0].score, places: (0..same[0].places.len()).map(place).collect() }
+    Detection { score: overlapping[0].score, points: (0..overlapping[0].points.len()).map(point).collect() }
 }
 
 #[cfg(test)]
@@ -102,7 +102,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn as_many_anchors_as_the_models_have() {
+    fn anchors_match_those_of_the_models() {
         assert_eq!(anchors(192, &[8, 16, 16, 16]).len(), 2016);
         assert_eq!(anchors(224, &[8, 16, 32, 32, 32]).len(), 2254);
         let palm = anchors(192, &[8, 16, 16, 16]);
@@ -121,8 +121,8 @@ mod tests {
         }
         let found = decode(&rows, &logits, &anchors, 32, 0.5, 0.3).unwrap();
         assert_eq!(found.len(), 2);
-        assert_eq!(found[0].places, [[3.5, 4.0], [13.5, 12.0], [10.5, 11.0]]);
-        assert!((found[1].places[2][0] - 26.0).abs() < 1e-9 && (found[1].places[2][1] - 27.0).abs() < 1e-9);
+        assert_eq!(found[0].points, [[3.5, 4.0], [13.5, 12.0], [10.5, 11.0]]);
+        assert!((found[1].points[2][0] - 26.0).abs() < 1e-9 && (found[1].points[2][1] - 27.0).abs() < 1e-9);
         rows[0] = f32::NAN;
         assert_eq!(decode(&rows, &logits, &anchors, 32, 0.5, 0.3).unwrap().len(), 2);
         assert!(decode(&rows[6..], &logits, &anchors, 32, 0.5, 0.3).is_err());

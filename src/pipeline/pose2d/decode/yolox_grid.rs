@@ -1,14 +1,14 @@
-//! YOLOX: one row a cell of a grid for each stride, row-major: centre offset in cells, logarithm of the size in cells,
-//! objectness, class probabilities (class 0 is a person).
+//! YOLOX: one row per grid cell and stride, row-major: centre offset in cells, logarithm of the size in cells,
+//! objectness, class probabilities (class 0: person).
 
 use super::boxes;
 use anyhow::{Result, ensure};
 use orator_base::types::pose2d::PersonBox;
 
-/// The people in `rows` of `row_len` numbers, for an input of `width` x `height` px.
+/// Persons from `rows` of `row_len` values, for an input of `width` x `height` px.
 ///
 /// # Errors
-/// The number of rows is not that of the grids' cells.
+/// A number of rows that does not match the grids.
 pub fn decode(
     rows: &[f32],
     row_len: usize,
@@ -38,7 +38,7 @@ pub fn decode(
             }
         }
     }
-    Ok(boxes::best(found, max_overlap))
+    Ok(boxes::non_max_suppression(found, max_overlap))
 }
 
 #[cfg(test)]

@@ -1,25 +1,25 @@
-//! What the 468 points of a face say, as MediaPipe's face mesh counts them. Every distance is one in space, so that a
-//! turned or nodding head measures as a frontal one does.
+//! Measurements on the 468 points of MediaPipe's face mesh. The lip opening uses distances in space, so that head
+//! rotation does not change it.
 
 use orator_base::math::vec3;
 use orator_media::opencv::warp::Region;
 
-/// Points of a face.
+/// Number of landmarks.
 pub const N_LANDMARKS: usize = 468;
-/// Outer corners of the eyes, the right one first.
+/// Outer corners of the eyes, right first.
 const EYES: [usize; 2] = [33, 263];
-/// Points in the middle of the inner upper lip, each above one of the lower lip.
+/// Points in the middle of the inner upper lip, each paired with one of the lower lip.
 const UPPER_LIP: [usize; 3] = [82, 13, 312];
 const LOWER_LIP: [usize; 3] = [87, 14, 317];
 /// Tip of the nose.
 pub const NOSE_TIP: usize = 1;
-/// Side of the square around a face in sizes of the face (MediaPipe's face_landmark_landmarks_to_roi).
-const ROOM: f64 = 1.5;
+/// Side of the face square relative to the face size (MediaPipe's face_landmark_landmarks_to_roi).
+const CROP_SCALE: f64 = 1.5;
 
-/// A point in px of the picture, depth in px of the same size.
+/// Point x, y in px of the picture, depth in units of the same size.
 pub type FacePoint = [f64; 3];
 
-/// Distance of the lips in distances between the outer corners of the eyes; 0: closed. None: no size to measure by.
+/// Lip distance relative to the distance of the outer eye corners; 0: closed. `None` if it is not finite.
 pub fn opening(points: &[FacePoint]) -> Option<f64> {
     let middle = |lip: [usize; 3]| {
         let sum = lip.iter().try_fold([0.0; 3], |sum, at| Some(vec3::add(sum, *points.get(*at)?)));
@@ -30,8 +30,8 @@ pub fn opening(points: &[FacePoint]) -> Option<f64> {
     Some(lips / eyes).filter(|opening| opening.is_finite())
 }
 
-/// How far a face is seen from the side: the tip of the nose from the middle of the eyes along their line, in their
-/// distance in the picture; 0: from the front. None: no size to measure by.
+/// How far a face is turned sideways: offset of the nose tip from the midpoint of the eyes along the eye line,
+/// relative to the eye distance in the picture; 0: frontal. `None` if it is not finite.
 pub fn turn(points: &[FacePoint]) -> Option<f64> {
     let flat = |at: usize| points.get(at).map(|[x, y, _]| [*x, *y, 0.0]);
     let ([right, left], nose) = ([flat(EYES[0])?, flat(EYES[1])?], flat(NOSE_TIP)?);
@@ -40,7 +40,7 @@ pub fn turn(points: &[FacePoint]) -> Option<f64> {
     Some(turn).filter(|turn| turn.is_finite())
 }
 
-/// The square around a face whose points are known, turned as its eyes are.
+/// Square around a face, rotated with its eye line.
 pub fn region(points: &[FacePoint]) -> Region {
     let eye = |at: usize| points.get(at).copied().unwrap_or([f64::NAN; 3]);
     let ([right, left], mut low, mut high) = (EYES.map(eye), [f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
@@ -54,7 +54,7 @@ pub fn region(points: &[FacePoint]) -> Region {
     let [x, y] = [(low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0];
     Region {
         centre: [x * cos - y * sin, x * sin + y * cos],
-        side: ROOM * (high[0] - low[0]).max(high[1] - low[1]),
+        side: CROP_SCALE * (high[0] - low[0]).max(high[1] - low[1]),
         rotation,
     }
 }
@@ -63,7 +63,8 @@ pub fn region(points: &[FacePoint]) -> Region {
 mod tests {
     use super::*;
 
-    /// A face 100 px wide and 140 high around (200, 100), eyes 60 px apart, the lips `open` px apart, turned by `angle`.
+    /// A face 100 px wide and 140 px high around (200, 100), eyes 60 px apart, lips `open` px apart, rotated by
+    /// `angle`.
     fn face(open: f64, angle: f64) -> Vec<FacePoint> {
         let mut points: Vec<FacePoint> = (0..N_LANDMARKS)
             .map(|k| {
@@ -80,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn an_open_mouth_is_measured_by_the_eyes() {
+    fn mouth_opening_is_relative_to_the_eyes() {
         assert!((opening(&face(12.0, 0.3)).unwrap() - 0.2).abs() < 1e-9);
         assert_eq!(opening(&face(0.0, 0.0)), Some(0.0));
         assert_eq!((opening(&[]), opening(&vec![[1.0; 3]; N_LANDMARKS])), (None, None));

@@ -1,6 +1,5 @@
-//! The face of the person followed: `model` finds 468 points in a square of the picture, `landmarks` says how far the
-//! mouth is open and where the face will be next, `tracker` follows it from frame to frame, `views` sums up whose
-//! face it is.
+//! Face of the followed person: `model` predicts 468 points in a square of the picture, `landmarks` measures the mouth
+//! opening and the next region, `tracker` follows the face between frames, `views` builds the portrait.
 
 pub mod landmarks;
 pub mod model;

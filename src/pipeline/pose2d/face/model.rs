@@ -1,4 +1,4 @@
-//! The face model: 468 points of the face in a rotated square, and how sure it is that there is one.
+//! Face model: 468 points of the face in a rotated square, and the presence score.
 
 use super::landmarks::{FacePoint, N_LANDMARKS};
 use crate::pose2d::decode::points;
@@ -9,45 +9,45 @@ use orator_media::opencv::warp::Region;
 use orator_onnx::{Decode, ModelEntry, Runtime};
 use std::path::Path;
 
-/// One face.
+/// A detected face.
 pub struct DetectedFace {
-    /// 468 points.
+    /// The 468 landmarks.
     pub points: Vec<FacePoint>,
-    /// 0..1.
+    /// Presence score, 0..1.
     pub score: f64,
 }
 
-/// The face model with its way of reading.
+/// Face model with its decoder.
 pub struct FaceModel {
-    pub feed: ModelInput,
+    pub input: ModelInput,
     decode: Decode,
 }
 
 impl FaceModel {
     pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self> {
-        Ok(Self { feed: ModelInput::open(runtime, entry, dir)?, decode: entry.decode.clone() })
+        Ok(Self { input: ModelInput::open(runtime, entry, dir)?, decode: entry.decode.clone() })
     }
 
-    /// The face in the square; None where the square is no place in a picture or the model's numbers are none.
+    /// Face in the square; `None` if the square is degenerate or the outputs are not finite.
     pub fn find(&mut self, image: &Image, region: &Region) -> Result<Option<DetectedFace>> {
-        let size = self.feed.size()[0];
+        let size = self.input.size()[0];
         let Some(src_from_dst) = region.src_from_dst(size) else { return Ok(None) };
-        let outputs = self.feed.part(image, &src_from_dst)?;
+        let outputs = self.input.run_crop(image, &src_from_dst)?;
         let Decode::Regression { landmarks, score, logit, .. } = &self.decode else {
             bail!("a face cannot be read as {:?}", self.decode)
         };
         let score = outputs.floats(score)?.1.first().copied().unwrap_or(f32::NAN);
         let score = points::regression_score(score, *logit);
-        let numbers = outputs.floats(landmarks)?.1;
-        ensure!(numbers.len() == 3 * N_LANDMARKS, "{} numbers are no {N_LANDMARKS} points of a face", numbers.len());
-        if !score.is_finite() || numbers.iter().any(|number| !number.is_finite()) {
+        let values = outputs.floats(landmarks)?.1;
+        ensure!(values.len() == 3 * N_LANDMARKS, "{} numbers are no {N_LANDMARKS} points of a face", values.len());
+        if !score.is_finite() || values.iter().any(|number| !number.is_finite()) {
             return Ok(None);
         }
-        let px = region.side / size as f64;
-        let place = |row: &[f32]| {
+        let scale = region.side / size as f64;
+        let to_picture = |row: &[f32]| {
             let [x, y] = src_from_dst.apply([f64::from(row[0]), f64::from(row[1])]);
-            [x, y, f64::from(row[2]) * px]
+            [x, y, f64::from(row[2]) * scale]
         };
-        Ok(Some(DetectedFace { points: numbers.chunks_exact(3).map(place).collect(), score: f64::from(score) }))
+        Ok(Some(DetectedFace { points: values.chunks_exact(3).map(to_picture).collect(), score: f64::from(score) }))
     }
 }

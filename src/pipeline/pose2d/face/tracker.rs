@@ -1,4 +1,4 @@
-//! The face of the person followed from frame to frame: looked for where the body's eyes and nose are, then where it was.
+//! Face tracking: initialised from the eyes and nose of the body, then from the face of the previous frame.
 
 use super::landmarks::{self, FacePoint};
 use super::model::{DetectedFace, FaceModel};
@@ -8,12 +8,13 @@ use orator_base::types::image::Image;
 use orator_base::types::pose2d::{FaceSeen, coco};
 use orator_media::opencv::warp::Region;
 
-/// A face is one from this score on.
-const LEAST_SCORE: f64 = 0.5;
-/// A face whose nose is further from the body's, in sides of its square, is somebody else's.
-const SAME_NOSE: f64 = 0.15;
+/// Least presence score of a face.
+const MIN_SCORE: f64 = 0.5;
+/// Largest distance of the face's nose from the body's, in sides of the square; beyond it the face is another
+/// person's.
+const MAX_NOSE_DISTANCE: f64 = 0.15;
 
-/// Where a face was in the frame before.
+/// Tracking state: region for the next frame and landmarks of the last.
 #[derive(Default)]
 pub struct FaceTrack {
     region: Option<Region>,
@@ -21,12 +22,12 @@ pub struct FaceTrack {
 }
 
 impl FaceTrack {
-    /// Points of the face in the last frame, where it was seen.
+    /// Landmarks of the last frame, if a face was detected.
     pub fn points(&self) -> Option<&[FacePoint]> {
         self.points.as_deref()
     }
 
-    /// The face of the body whose points are given, of which those that score `least` are seen.
+    /// Detects the face of the person with the keypoints `body`; those that score at least `least` count as visible.
     pub fn find(
         &mut self,
         model: &mut FaceModel,
@@ -34,30 +35,30 @@ impl FaceTrack {
         body: &[ScoredPoint; 17],
         least: f64,
     ) -> Result<Option<FaceSeen>> {
-        let mut face_of = |region: &Region| face_of(model, image, region, body, least);
+        let mut detect = |region: &Region| detect(model, image, region, body, least);
         self.points = None;
         let mut found = match self.region.take() {
-            Some(region) => face_of(&region)?,
+            Some(region) => detect(&region)?,
             None => None,
         };
         if found.is_none()
-            && let Some(region) = around_eyes(body, least)
-            && let Some(first) = face_of(&region)?
+            && let Some(region) = region_from_eyes(body, least)
+            && let Some(first) = detect(&region)?
         {
-            // The first square is a guess, one around the face found is not.
-            found = face_of(&landmarks::region(&first.points))?;
+            // The first square is only an estimate, so the model runs again on the square around the detected face.
+            found = detect(&landmarks::region(&first.points))?;
         }
         let Some(face) = found else { return Ok(None) };
         self.region = Some(landmarks::region(&face.points));
-        let seen = |opening: f64| FaceSeen { score: face.score as f32, opening: opening as f32 };
-        let seen = landmarks::opening(&face.points).map(seen);
+        let measured = |opening: f64| FaceSeen { score: face.score as f32, opening: opening as f32 };
+        let face_seen = landmarks::opening(&face.points).map(measured);
         self.points = Some(face.points);
-        Ok(seen)
+        Ok(face_seen)
     }
 }
 
-/// The face in a square, if there is one and it is the body's.
-fn face_of(
+/// Face in a square, if present and belonging to the body.
+fn detect(
     model: &mut FaceModel,
     image: &Image,
     region: &Region,
@@ -67,23 +68,23 @@ fn face_of(
     let Some(face) = model.find(image, region)? else { return Ok(None) };
     let [x, y, _] = face.points[landmarks::NOSE_TIP];
     let nose = body[coco::NOSE];
-    let is_here = nose[2] < least || (x - nose[0]).hypot(y - nose[1]) <= SAME_NOSE * region.side;
-    Ok(Some(face).filter(|face| face.score >= LEAST_SCORE && is_here))
+    let is_same_person = nose[2] < least || (x - nose[0]).hypot(y - nose[1]) <= MAX_NOSE_DISTANCE * region.side;
+    Ok(Some(face).filter(|face| face.score >= MIN_SCORE && is_same_person))
 }
 
-/// Where the face of a body should be: the square below the line of its eyes, as large as eyes, nose and ears say.
-fn around_eyes(body: &[ScoredPoint; 17], least: f64) -> Option<Region> {
+/// Expected face region of a body: the square below its eye line, sized by eyes, nose and ears.
+fn region_from_eyes(body: &[ScoredPoint; 17], least: f64) -> Option<Region> {
     let [nose, left, right] = [coco::NOSE, coco::L_EYE, coco::R_EYE].map(|at| body[at]);
     if nose[2].min(left[2]).min(right[2]) < least {
         return None;
     }
-    let apart = |a: ScoredPoint, b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+    let distance = |a: ScoredPoint, b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
     let eyes = [(left[0] + right[0]) / 2.0, (left[1] + right[1]) / 2.0];
-    // A turned head narrows the eyes, not the way to the nose.
-    let mut size = apart(left, [right[0], right[1]]).max(1.3 * apart(nose, eyes));
+    // Head rotation shortens the eye distance, but not the distance to the nose.
+    let mut size = distance(left, [right[0], right[1]]).max(1.3 * distance(nose, eyes));
     let [left_ear, right_ear] = [coco::L_EAR, coco::R_EAR].map(|at| body[at]);
     if left_ear[2].min(right_ear[2]) >= least {
-        size = size.max(0.45 * apart(left_ear, [right_ear[0], right_ear[1]]));
+        size = size.max(0.45 * distance(left_ear, [right_ear[0], right_ear[1]]));
     }
     let rotation = (left[1] - right[1]).atan2(left[0] - right[0]);
     let (sin, cos) = rotation.sin_cos();
@@ -96,21 +97,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_face_is_below_the_eyes_whatever_its_turn() {
+    fn the_face_region_rotates_with_the_eyes() {
         let mut body = [[0.0; 3]; 17];
         body[coco::NOSE] = [100.0, 120.0, 0.9];
         body[coco::L_EYE] = [120.0, 100.0, 0.9];
         body[coco::R_EYE] = [80.0, 100.0, 0.9];
-        let upright = around_eyes(&body, 0.3).unwrap();
+        let upright = region_from_eyes(&body, 0.3).unwrap();
         assert_eq!((upright.centre, upright.side, upright.rotation), ([100.0, 118.0], 160.0, 0.0));
         body[coco::L_EAR] = [150.0, 100.0, 0.9];
         body[coco::R_EAR] = [50.0, 100.0, 0.9];
-        assert_eq!(around_eyes(&body, 0.3).unwrap().side, 180.0);
-        // Lying on the side: the right eye above the left one, the face to the left of both.
+        assert_eq!(region_from_eyes(&body, 0.3).unwrap().side, 180.0);
+        // Lying on the side: the right eye is above the left, the face to the left of both.
         (body[coco::L_EYE], body[coco::R_EYE]) = ([100.0, 120.0, 0.9], [100.0, 80.0, 0.9]);
-        let lying = around_eyes(&body, 0.3).unwrap();
+        let lying = region_from_eyes(&body, 0.3).unwrap();
         assert!(lying.centre[0] < 100.0 && (lying.rotation - std::f64::consts::FRAC_PI_2).abs() < 1e-9);
         body[coco::R_EYE][2] = 0.1;
-        assert_eq!(around_eyes(&body, 0.3), None);
+        assert_eq!(region_from_eyes(&body, 0.3), None);
     }
 }

@@ -1,5 +1,4 @@
-//! Gathers the portrait of a video's person from frames all over the video that show the face from the front, in a
-//! memory that does not grow with the video.
+//! Builds the portrait of a video's person from frontal views throughout the video, with constant memory.
 
 use super::landmarks::{self, FacePoint};
 use crate::portrait::Portrait;
@@ -12,23 +11,23 @@ use orator_base::types::image::Image;
 use orator_media::opencv::warp::{self, Region};
 use serde::{Deserialize, Serialize};
 
-/// A face turned no further than this (`landmarks::turn`) is seen from the front, than the second nearly so; the shape
-/// of one turned further is not known well enough.
+/// Largest `landmarks::turn` of a frontal view, and of a nearly frontal one; beyond that the face shape is not
+/// accurate enough.
 const FRONTAL: f64 = 0.1;
 const NEARLY_FRONTAL: f64 = 0.15;
-/// Views that are kept, and the fewest that a portrait is made of, the most frontal ones, where there are so many.
+/// Largest number of retained views, and least number of (most frontal) views for a portrait, if available.
 const N_VIEWS: usize = 48;
-const LEAST_VIEWS: usize = 12;
-/// Cells of a region that are looked at.
+const MIN_VIEWS: usize = 12;
+/// Sampling grid of a region: columns, rows.
 const CELLS: [usize; 2] = [10, 6];
-/// Width and height of the picture, px, and its side in sides of the square around the face.
+/// Side of the face picture in px, and relative to the square around the face.
 const PICTURE_PX: usize = 128;
-const PICTURE_ROOM: f64 = 1.15;
+const PICTURE_SCALE: f64 = 1.15;
 
-/// One frame of a face.
+/// A view of the face in one frame.
 #[derive(Serialize, Deserialize)]
 struct FaceView {
-    /// `FRONTAL`: seen from the front; more: from the side.
+    /// `landmarks::turn`, at least `FRONTAL`.
     turn: f64,
     secs: f64,
     face: Vec<FacePoint>,
@@ -37,29 +36,29 @@ struct FaceView {
 }
 
 impl FaceView {
-    /// Numbers of points and colours: views of one video agree in them.
+    /// Array lengths; equal for all views of a video.
     fn sizes(&self) -> [usize; 3] {
         [self.face.len(), self.skin.len(), self.hair.len()]
     }
 }
 
-/// Views of a video so far.
+/// Views of a video collected so far.
 #[derive(Default, Serialize, Deserialize)]
 pub struct PortraitViews {
     views: Vec<FaceView>,
-    /// Time between two views, s: it doubles when there are too many frontal ones.
+    /// Least time between two views in seconds; doubled when there are too many frontal views.
     apart_secs: f64,
-    /// Picture of the view that is most from the front, and its turn.
+    /// Picture of the most frontal view, and its turn.
     picture: Option<(f64, Image)>,
 }
 
 impl PortraitViews {
-    /// Takes in the face found in a picture at a time of the video.
-    pub fn look(&mut self, image: &Image, points: &[FacePoint], secs: f64) -> Result<()> {
-        let Some((turn, face)) = landmarks::turn(points).zip(of_unit_size(points)) else { return Ok(()) };
+    /// Adds the face found in a picture at `secs` of the video.
+    pub fn add(&mut self, image: &Image, points: &[FacePoint], secs: f64) -> Result<()> {
+        let Some((turn, face)) = landmarks::turn(points).zip(normalise_shape(points)) else { return Ok(()) };
         if self.picture.as_ref().is_none_or(|(best, _)| turn < *best) {
             let around = landmarks::region(points);
-            let square = Region { side: PICTURE_ROOM * around.side, rotation: 0.0, ..around };
+            let square = Region { side: PICTURE_SCALE * around.side, rotation: 0.0, ..around };
             if let Some(transform) = square.src_from_dst(PICTURE_PX) {
                 let mut picture = Image::filled(PICTURE_PX, PICTURE_PX, [0; 3]);
                 warp::warp(image, &transform, &mut picture)?;
@@ -67,28 +66,28 @@ impl PortraitViews {
             }
         }
         let turn = turn.max(FRONTAL);
-        if self.makes_room(turn, secs) {
+        if self.accepts(turn, secs) {
             let [skin, hair] = regions(points).map(|region| colours(image, region));
             self.views.push(FaceView { turn, secs, face, skin, hair });
         }
         Ok(())
     }
 
-    /// Whether all views have as many numbers, and the picture its size.
-    pub fn is_sound(&self) -> bool {
-        let is_whole = |image: &Image| {
+    /// Whether all views have equal array lengths and the picture has its expected size.
+    pub fn is_valid(&self) -> bool {
+        let has_expected_size = |image: &Image| {
             [image.width, image.height] == [PICTURE_PX; 2] && image.data.len() == 3 * PICTURE_PX * PICTURE_PX
         };
         self.views.len() <= N_VIEWS
             && self.views.windows(2).all(|pair| pair[0].sizes() == pair[1].sizes())
-            && self.picture.iter().all(|(_, picture)| is_whole(picture))
+            && self.picture.iter().all(|(_, picture)| has_expected_size(picture))
     }
 
-    /// Adds the views of what follows, as far as they have the points of those before.
+    /// Adds the views of the following part, if their array lengths match.
     pub fn append(&mut self, next: Self) {
         let sizes = self.views.first().map(FaceView::sizes);
         for view in next.views.into_iter().filter(|view| sizes.is_none_or(|sizes| sizes == view.sizes())) {
-            if self.makes_room(view.turn, view.secs) {
+            if self.accepts(view.turn, view.secs) {
                 self.views.push(view);
             }
         }
@@ -98,8 +97,8 @@ impl PortraitViews {
         }
     }
 
-    /// Whether a view of that turn and time is kept; another one goes for it where there are enough.
-    fn makes_room(&mut self, turn: f64, secs: f64) -> bool {
+    /// Whether a view with this turn and time is accepted; removes another view if necessary.
+    fn accepts(&mut self, turn: f64, secs: f64) -> bool {
         if let Some(last) = self.views.last().filter(|last| secs - last.secs < self.apart_secs) {
             if last.turn <= turn {
                 return false;
@@ -113,14 +112,14 @@ impl PortraitViews {
             } else if turn > FRONTAL {
                 return false;
             } else {
-                self.thin_out();
+                self.drop_every_other();
             }
         }
         true
     }
 
-    /// Drops every other view; those to come stand as far apart.
-    fn thin_out(&mut self) {
+    /// Drops every other view and sets the interval to twice the mean spacing.
+    fn drop_every_other(&mut self) {
         let (first, last) = (self.views.first(), self.views.last());
         let secs = first.zip(last).map_or(0.0, |(first, last)| last.secs - first.secs);
         self.apart_secs = 2.0 * secs / N_VIEWS as f64;
@@ -131,11 +130,11 @@ impl PortraitViews {
         });
     }
 
-    /// Portrait and a picture of the face; none where no face was seen.
+    /// Portrait and face picture; `None` if no face was detected.
     pub fn finish(mut self) -> Option<(Portrait, Image)> {
         self.views.sort_by(|a, b| a.turn.total_cmp(&b.turn));
         let n_frontal = self.views.iter().filter(|view| view.turn <= FRONTAL).count();
-        self.views.truncate(n_frontal.max(LEAST_VIEWS));
+        self.views.truncate(n_frontal.max(MIN_VIEWS));
         self.views.retain(|view| view.turn <= NEARLY_FRONTAL);
         let face = median_shape(&self.views).unwrap_or_default();
         let mean = |colours: Vec<&Vec<f32>>| {
@@ -153,8 +152,8 @@ impl PortraitViews {
     }
 }
 
-/// Points with their mean at the origin and a root mean square distance of 1 from it.
-fn of_unit_size(points: &[FacePoint]) -> Option<Vec<FacePoint>> {
+/// Centres the points and scales them to a root mean square distance of 1.
+fn normalise_shape(points: &[FacePoint]) -> Option<Vec<FacePoint>> {
     let n = points.len() as f64;
     let middle = vec3::scale(points.iter().fold([0.0; 3], |sum, point| vec3::add(sum, *point)), 1.0 / n);
     let centred: Vec<FacePoint> = points.iter().map(|point| vec3::sub(*point, middle)).collect();
@@ -162,20 +161,20 @@ fn of_unit_size(points: &[FacePoint]) -> Option<Vec<FacePoint>> {
     (size > 1e-6 && size.is_finite()).then(|| centred.into_iter().map(|point| vec3::scale(point, 1.0 / size)).collect())
 }
 
-/// Median of each coordinate over all views, each laid onto the first, then onto their median.
+/// Coordinate-wise median over all views, aligned to the first view, then to their median.
 fn median_shape(views: &[FaceView]) -> Option<Vec<FacePoint>> {
     let mut shape = views.first()?.face.clone();
     for _ in 0..2 {
-        let laid = views.iter().filter_map(|view| {
+        let aligned = views.iter().filter_map(|view| {
             let fit = similarity(&view.face, &shape)?;
             Some(view.face.iter().map(|point| fit.apply(*point)).collect())
         });
-        let laid: Vec<Vec<FacePoint>> = laid.collect();
-        let middle = |at: usize, axis: usize| median(laid.iter().map(|face| face[at][axis]));
+        let aligned: Vec<Vec<FacePoint>> = aligned.collect();
+        let middle = |at: usize, axis: usize| median(aligned.iter().map(|face| face[at][axis]));
         let medians = (0..shape.len()).map(|at| Some([middle(at, 0)?, middle(at, 1)?, middle(at, 2)?]));
-        shape = of_unit_size(&medians.collect::<Option<Vec<_>>>()?)?;
+        shape = normalise_shape(&medians.collect::<Option<Vec<_>>>()?)?;
     }
-    // Six digits hold all that is measured.
+    // Six digits exceed the accuracy of the measurement.
     Some(shape.into_iter().map(|point| point.map(|v| (v * 1e6).round() / 1e6)).collect())
 }
 
@@ -198,10 +197,10 @@ fn colours(image: &Image, region: [f64; 4]) -> Vec<f32> {
 mod tests {
     use super::*;
 
-    /// Face with a chin that hangs `chin` lower, turned about the vertical and moved.
+    /// Face with the chin lowered by `chin`, rotated about the vertical axis and shifted.
     fn face(chin: f64, turn: f64) -> Vec<FacePoint> {
         let (sin, cos) = turn.sin_cos();
-        let place = |k: usize| {
+        let vertex = |k: usize| {
             let (u, v) = ((k % 18) as f64 / 17.0 - 0.5, (k / 18) as f64 / 25.0 - 0.5);
             let [x, y, z] = match k {
                 33 => [-30.0, -20.0, 0.0],
@@ -211,7 +210,7 @@ mod tests {
             };
             [300.0 + x * cos + z * sin, 200.0 + y, z * cos - x * sin]
         };
-        (0..landmarks::N_LANDMARKS).map(place).collect()
+        (0..landmarks::N_LANDMARKS).map(vertex).collect()
     }
 
     fn portrait(chin: f64, skin: u8) -> (Portrait, Image) {
@@ -219,16 +218,16 @@ mod tests {
         let mut views = PortraitViews::default();
         for t in 0..200 {
             let turn = 0.0125 * f64::from(t % 40);
-            views.look(&image, &face(chin, turn), f64::from(t) / 15.0).unwrap();
+            views.add(&image, &face(chin, turn), f64::from(t) / 15.0).unwrap();
         }
         assert!(views.views.len() <= N_VIEWS);
         views.finish().unwrap()
     }
 
     #[test]
-    fn a_face_is_itself_from_every_side_and_another_chin_is_another_face() {
+    fn face_shape_is_independent_of_rotation_and_distinguishes_chins() {
         let ((one, picture), (other, _)) = (portrait(0.0, 150), portrait(12.0, 60));
-        assert!((LEAST_VIEWS..=N_VIEWS).contains(&one.n_frames) && picture.width == PICTURE_PX);
+        assert!((MIN_VIEWS..=N_VIEWS).contains(&one.n_frames) && picture.width == PICTURE_PX);
         assert!(one.face_distance(&portrait(0.0, 90).0).unwrap() < 1.0);
         assert!(one.face_distance(&other).unwrap() > 20.0);
         assert!(one.face_distance(&portrait(0.0, 90).0).is_some() && one.colour_distance(&other) > 15.0);
@@ -236,12 +235,12 @@ mod tests {
     }
 
     #[test]
-    fn points_that_are_none_make_no_portrait() {
+    fn invalid_points_give_no_portrait() {
         let image = Image::filled(64, 48, [1; 3]);
         let mut views = PortraitViews::default();
-        views.look(&image, &[], 0.0).unwrap();
-        views.look(&image, &vec![[f64::NAN; 3]; landmarks::N_LANDMARKS], 0.1).unwrap();
-        views.look(&image, &vec![[7.0; 3]; landmarks::N_LANDMARKS], 0.2).unwrap();
+        views.add(&image, &[], 0.0).unwrap();
+        views.add(&image, &vec![[f64::NAN; 3]; landmarks::N_LANDMARKS], 0.1).unwrap();
+        views.add(&image, &vec![[7.0; 3]; landmarks::N_LANDMARKS], 0.2).unwrap();
         assert!(views.finish().is_none());
     }
 }

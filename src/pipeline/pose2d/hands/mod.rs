@@ -1,7 +1,8 @@
-//! Both hands of the speaker: `tracker` finds them from frame to frame, `visibility` decides which of the found points are visible.
+//! Hands of the speaker: `tracker` detects them from frame to frame, `visibility` decides which of the detected points
+//! are visible.
 
 pub mod tracker;
 pub mod visibility;
 
-pub use tracker::{HandTracker, guard};
-pub use visibility::SeenHands;
+pub use tracker::{HandTracker, reject_implausible};
+pub use visibility::VisibleHands;

@@ -1,51 +1,51 @@
-//! Visibility of the found hands: a hand model returns 21 points for any crop, also for a hand that is hidden or outside the
-//! picture. A hand found at the other hand is that other hand; points outside the picture or behind the other hand are
-//! not visible, nor is a wrist that the body model put on the other hand.
+//! Visibility of detected hands: a hand model returns 21 points for any crop, even if the hand is hidden or outside
+//! the picture. A hand detected at the position of the other is a duplicate; points outside the picture or behind the
+//! other hand are not visible, nor is a wrist that the body model placed on the other hand.
 
 use crate::pose2d::decode::ScoredPoint;
 use crate::pose2d::hand::DetectedHand;
 use orator_base::types::image::Image;
 use orator_base::types::pose2d::coco;
 
-/// Two hands whose middles are nearer than this, in palms of the larger, are one, and the less sure one is not seen. On
-/// rendered people 42 of 45 stolen hands are, and 0.5 % of the true ones.
-const SAME_PLACE: f64 = 0.65;
-/// A hand as sure as this is seen all the same: hands that touch, neither before the other.
-const SURE: f64 = 0.95;
-/// A hand with fewer points in the picture is not seen: lifting asks for as many.
-const LEAST_POINTS: usize = 12;
-/// A wrist no surer than this, and so near to the other hand's in shoulder widths, is that one's where its own hand is
-/// not found. At 0.3 it would be true wrists of hands that rest beside each other.
-const UNSURE_WRIST: f64 = 0.5;
-const OTHERS_WRIST: f64 = 0.15;
+/// Two hands whose centres are closer than this, in palm lengths of the larger, are one, and the less certain one is
+/// rejected. On rendered people this rejects 42 of 45 duplicates and 0.5 % of the true hands.
+const MIN_DISTANCE: f64 = 0.65;
+/// Score from which a hand is accepted even so: hands that touch without occlusion.
+const CERTAIN_SCORE: f64 = 0.95;
+/// Least number of points inside the picture; `lift` requires as many.
+const MIN_POINTS: usize = 12;
+/// A wrist with at most this score, and within this many shoulder widths of the other hand's wrist, belongs to that
+/// hand if its own hand is not detected. At 0.3, true wrists of hands resting beside each other would be affected.
+const MAX_WRIST_SCORE: f64 = 0.5;
+const MAX_WRIST_DISTANCE: f64 = 0.15;
 
-/// What is seen of a frame's hands, left and right.
+/// Visible hands of a frame, left and right.
 #[derive(Clone, Debug)]
-pub struct SeenHands {
+pub struct VisibleHands {
     pub hands: [Option<DetectedHand>; 2],
-    /// Whether what was found was the other hand.
+    /// Whether the detection was a duplicate of the other hand.
     pub others: [bool; 2],
 }
 
-impl SeenHands {
-    /// Judges found hands. What is not seen of `hands` and of the wrists of `body` has the score 0.
+impl VisibleHands {
+    /// Determines the visibility of detected hands. Invisible points of `hands` and wrists of `body` get the score 0.
     pub fn judge(mut hands: [Option<DetectedHand>; 2], body: &mut [ScoredPoint; 17], image: &Image) -> Self {
         let mut others = [false; 2];
         if let [Some(left), Some(right)] = &hands {
-            let unsure = usize::from(right.score < left.score);
-            // The left one of two equally sure ones.
-            let (doubted, sure) = if unsure == 0 { (left, right) } else { (right, left) };
-            let apart = distance(middle(doubted), middle(sure)) / palm(doubted).max(palm(sure)).max(1.0);
-            if apart < SAME_PLACE && doubted.score < SURE {
-                hands[unsure] = None;
-                others[unsure] = true;
+            let uncertain = usize::from(right.score < left.score);
+            // On a tie, the left hand counts as the less certain one.
+            let (weaker, stronger) = if uncertain == 0 { (left, right) } else { (right, left) };
+            let separation = distance(centre(weaker), centre(stronger)) / palm(weaker).max(palm(stronger)).max(1.0);
+            if separation < MIN_DISTANCE && weaker.score < CERTAIN_SCORE {
+                hands[uncertain] = None;
+                others[uncertain] = true;
             } else {
-                let outline = sure.places();
+                let outline = stronger.positions();
                 let behind = |point: &ScoredPoint| is_inside([point[0], point[1]], &outline);
-                let hidden: Vec<usize> = (0..21).filter(|&i| behind(&doubted.points[i])).collect();
-                if let Some(doubted) = &mut hands[unsure] {
+                let hidden: Vec<usize> = (0..21).filter(|&i| behind(&weaker.points[i])).collect();
+                if let Some(weaker) = &mut hands[uncertain] {
                     for i in hidden {
-                        doubted.points[i][2] = 0.0;
+                        weaker.points[i][2] = 0.0;
                     }
                 }
             }
@@ -60,7 +60,7 @@ impl SeenHands {
                         point[2] = 0.0;
                     }
                 }
-                n_inside < LEAST_POINTS
+                n_inside < MIN_POINTS
             });
         }
         for wrist in [coco::L_WRIST, coco::R_WRIST] {
@@ -68,17 +68,17 @@ impl SeenHands {
                 body[wrist][2] = 0.0;
             }
         }
-        (0..2).for_each(|side| forget_others_wrist(side, &hands, body));
+        (0..2).for_each(|side| hide_misplaced_wrist(side, &hands, body));
         Self { hands, others }
     }
 }
 
-/// Makes a wrist that lies on that of the other hand unseen.
-fn forget_others_wrist(side: usize, hands: &[Option<DetectedHand>; 2], body: &mut [ScoredPoint; 17]) {
+/// Hides a wrist that lies on that of the other hand.
+fn hide_misplaced_wrist(side: usize, hands: &[Option<DetectedHand>; 2], body: &mut [ScoredPoint; 17]) {
     let (None, Some(other)) = (&hands[side], &hands[1 - side]) else { return };
     let shoulders = distance(body[coco::L_SHOULDER], body[coco::R_SHOULDER]);
     let wrist = &mut body[[coco::L_WRIST, coco::R_WRIST][side]];
-    if wrist[2] <= UNSURE_WRIST && distance(*wrist, other.points[0]) < OTHERS_WRIST * shoulders {
+    if wrist[2] <= MAX_WRIST_SCORE && distance(*wrist, other.points[0]) < MAX_WRIST_DISTANCE * shoulders {
         wrist[2] = 0.0;
     }
 }
@@ -87,8 +87,7 @@ fn is_in_picture([x, y, _]: ScoredPoint, image: &Image) -> bool {
     (0.0..image.width as f64).contains(&x) && (0.0..image.height as f64).contains(&y)
 }
 
-/// Whether `point` lies inside the convex outline of `points`: it does not where, seen from it, they all lie within half a
-/// turn.
+/// Whether `point` lies inside the convex hull of `points`: outside, all points lie within a half-plane of directions.
 fn is_inside(point: [f64; 2], points: &[[f64; 2]; 21]) -> bool {
     let mut angles = points.map(|[x, y]| (y - point[1]).atan2(x - point[0]));
     angles.sort_by(f64::total_cmp);
@@ -96,14 +95,14 @@ fn is_inside(point: [f64; 2], points: &[[f64; 2]; 21]) -> bool {
     angles.windows(2).map(|pair| pair[1] - pair[0]).fold(around, f64::max) < std::f64::consts::PI
 }
 
-/// Length of the palm in px: wrist to middle knuckle, or its width where that looks longer.
+/// Palm length in px: wrist to middle knuckle, or 1.2 times the palm width if that is larger (foreshortening).
 fn palm(hand: &DetectedHand) -> f64 {
     let length = |a: usize, b: usize| distance(hand.points[a], hand.points[b]);
     length(0, 9).max(1.2 * length(5, 17))
 }
 
-/// Mean of a hand's points.
-pub fn middle(hand: &DetectedHand) -> ScoredPoint {
+/// Mean of the points of a hand.
+pub fn centre(hand: &DetectedHand) -> ScoredPoint {
     let sum = hand.points.iter().fold([0.0; 2], |sum, point| [sum[0] + point[0], sum[1] + point[1]]);
     [sum[0] / 21.0, sum[1] / 21.0, 0.0]
 }
@@ -134,42 +133,48 @@ mod tests {
         body
     }
 
-    fn judged(hands: [Option<DetectedHand>; 2], body: &mut [ScoredPoint; 17]) -> ([Option<usize>; 2], [bool; 2]) {
-        let sight = SeenHands::judge(hands, body, &Image::filled(400, 400, [0; 3]));
-        let n_seen = |hand: &DetectedHand| hand.points.iter().filter(|point| point[2] > 0.0).count();
-        (sight.hands.each_ref().map(|hand| hand.as_ref().map(n_seen)), sight.others)
+    fn visibility(hands: [Option<DetectedHand>; 2], body: &mut [ScoredPoint; 17]) -> ([Option<usize>; 2], [bool; 2]) {
+        let visible = VisibleHands::judge(hands, body, &Image::filled(400, 400, [0; 3]));
+        let n_visible = |hand: &DetectedHand| hand.points.iter().filter(|point| point[2] > 0.0).count();
+        (visible.hands.each_ref().map(|hand| hand.as_ref().map(n_visible)), visible.others)
     }
 
     #[test]
-    fn of_two_hands_in_one_place_the_less_sure_one_is_the_other() {
-        let told = |left, right| judged([left, right], &mut body());
-        assert_eq!(told(hand(300.0, 300.0, 0.9), hand(100.0, 300.0, 0.99)), ([Some(21); 2], [false; 2]));
-        assert_eq!(told(hand(110.0, 300.0, 0.8), hand(100.0, 300.0, 0.99)), ([None, Some(21)], [true, false]));
-        assert_eq!(told(hand(110.0, 300.0, 0.9), hand(100.0, 300.0, 0.7)), ([Some(21), None], [false, true]));
-        let (both, others) = told(hand(110.0, 300.0, 0.97), hand(100.0, 300.0, 0.99));
+    fn of_two_hands_in_one_position_the_less_certain_is_a_duplicate() {
+        let visible_points = |left, right| visibility([left, right], &mut body());
+        assert_eq!(visible_points(hand(300.0, 300.0, 0.9), hand(100.0, 300.0, 0.99)), ([Some(21); 2], [false; 2]));
+        assert_eq!(
+            visible_points(hand(110.0, 300.0, 0.8), hand(100.0, 300.0, 0.99)),
+            ([None, Some(21)], [true, false])
+        );
+        assert_eq!(visible_points(hand(110.0, 300.0, 0.9), hand(100.0, 300.0, 0.7)), ([Some(21), None], [false, true]));
+        let (both, others) = visible_points(hand(110.0, 300.0, 0.97), hand(100.0, 300.0, 0.99));
         assert!(both[0].is_some() && others == [false; 2], "both are sure");
     }
 
     #[test]
-    fn points_behind_the_other_hand_or_outside_the_picture_are_not_seen() {
-        let left = judged([hand(130.0, 290.0, 0.96), hand(100.0, 300.0, 0.99)], &mut body()).0;
+    fn points_behind_the_other_hand_or_outside_the_picture_are_invisible() {
+        let left = visibility([hand(130.0, 290.0, 0.96), hand(100.0, 300.0, 0.99)], &mut body()).0;
         assert!(left[0].is_some_and(|n| (12..21).contains(&n)) && left[1] == Some(21), "{left:?}");
-        let told = |y: f64| judged([hand(300.0, y, 0.9), None], &mut body()).0[0];
-        assert_eq!((told(399.0), told(421.0), told(445.0)), (Some(21), Some(20), Some(15)));
-        assert_eq!(told(470.0), None, "five points are no hand");
+        let visible_points = |y: f64| visibility([hand(300.0, y, 0.9), None], &mut body()).0[0];
+        assert_eq!(
+            (visible_points(399.0), visible_points(421.0), visible_points(445.0)),
+            (Some(21), Some(20), Some(15))
+        );
+        assert_eq!(visible_points(470.0), None, "five points are no hand");
     }
 
     #[test]
-    fn an_unsure_wrist_on_the_other_hand_is_that_ones() {
+    fn an_uncertain_wrist_on_the_other_hand_is_hidden() {
         let mut body = body();
         body[coco::L_WRIST] = [120.0, 290.0, 0.4];
-        judged([None, hand(100.0, 300.0, 0.99)], &mut body);
+        visibility([None, hand(100.0, 300.0, 0.99)], &mut body);
         assert_eq!(body[coco::L_WRIST][2], 0.0);
         body[coco::L_WRIST][2] = 0.8;
-        judged([None, hand(100.0, 300.0, 0.99)], &mut body);
+        visibility([None, hand(100.0, 300.0, 0.99)], &mut body);
         assert_eq!(body[coco::L_WRIST][2], 0.8, "a sure wrist may lie there");
         body[coco::L_WRIST] = [300.0, 290.0, 0.4];
-        judged([None, hand(100.0, 300.0, 0.99)], &mut body);
+        visibility([None, hand(100.0, 300.0, 0.99)], &mut body);
         assert_eq!(body[coco::L_WRIST][2], 0.4, "far from the other hand");
     }
 }

@@ -1,4 +1,4 @@
-//! The keypoints of a video as they are gathered, frame by frame.
+//! Accumulates the keypoints of a video frame by frame.
 
 use anyhow::Result;
 use ndarray::{Array1, Array2, Array3};
@@ -7,33 +7,36 @@ use orator_base::types::time::FrameRate;
 use orator_formats::keypoints_npz::{Extras, FaceFrames};
 use serde::{Deserialize, Serialize};
 
-/// Frames so far, 1 kB each, with the times of the source frames that they show.
+/// Frames so far, about 1 kB each, with the times of their source frames in seconds.
 #[derive(Default, Serialize, Deserialize)]
 pub struct KeypointFrames(Vec<(Pose2d, f64)>);
 
 impl KeypointFrames {
-    /// Adds a frame and the time of the source frame it shows.
+    /// Adds a frame and the time of its source frame.
     pub fn push(&mut self, pose: Pose2d, source_secs: f64) {
         self.0.push((pose, source_secs));
     }
 
-    /// Adds the frames that follow, whose first person has the number `n_before`.
+    /// Adds the frames of the following part; `n_before` is added to their identities.
     pub fn append(&mut self, next: Self, n_before: i64) {
         let renumbered = |pose: Pose2d| Pose2d { identity: pose.identity.saturating_add(n_before), ..pose };
         self.0.extend(next.0.into_iter().map(|(pose, secs)| (renumbered(pose), secs)));
     }
 
-    /// Number of frames T.
+    /// Number of frames.
     pub fn n_frames(&self) -> usize {
         self.0.len()
     }
 
-    /// Share of the frames for which `holds`.
+    /// Share of the frames that satisfy `holds`.
     pub fn share(&self, holds: impl Fn(&Pose2d) -> bool) -> f64 {
         self.0.iter().filter(|(pose, _)| holds(pose)).count() as f64 / self.n_frames().max(1) as f64
     }
 
-    /// The whole video's keypoints, and what stands beside them in the file.
+    /// Keypoints of the complete video, and the extra arrays of `keypoints.npz`.
+    ///
+    /// # Errors
+    /// Arrays of unequal lengths.
     pub fn finish(self, fps: FrameRate, image_size: [u32; 2]) -> Result<(Keypoints, Extras)> {
         let n_frames = self.n_frames();
         let poses = || self.0.iter().map(|(pose, _)| pose);
@@ -48,8 +51,8 @@ impl KeypointFrames {
             left_hand: points(|pose| &pose.left_hand, N_HAND)?,
             right_hand: points(|pose| &pose.right_hand, N_HAND)?,
         };
-        let of_face = |part: fn(&FaceSeen) -> f32, unseen: f32| {
-            poses().map(|pose| pose.face.as_ref().map_or(unseen, part)).collect::<Array1<f32>>()
+        let of_face = |part: fn(&FaceSeen) -> f32, missing: f32| {
+            poses().map(|pose| pose.face.as_ref().map_or(missing, part)).collect::<Array1<f32>>()
         };
         let face = poses().any(|pose| pose.face.is_some()).then(|| FaceFrames {
             opening: of_face(|face| face.opening, f32::NAN),

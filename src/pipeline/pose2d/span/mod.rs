@@ -1,5 +1,5 @@
-//! A video in spans, which several workers share: `video_frames` reads the frames of one, `pass` looks at them, into
-//! `keypoint_frames`; `pose_span` is what was seen, and how one span is joined to those before.
+//! Spans of a video, which several workers share: `video_frames` reads the frames of a span, `pass` processes them
+//! into `keypoint_frames`; `pose_span` stores the result and joins the spans.
 
 pub mod keypoint_frames;
 pub mod pass;

@@ -1,6 +1,6 @@
-//! The way of a span: its frames at the dataset rate, one after the other, through a `Chain` that begins anew at each shot.
-//! A frame that repeats the one before is not looked at again. To follow who speaks, a `TalkerSearch` sees the whole span
-//! first.
+//! Processing of a span: its frames at the dataset rate pass in order through a `Chain`, which restarts at each shot.
+//! Repeated frames reuse the previous result. To follow the active speaker, a `TalkerSearch` processes the complete
+//! span first.
 
 use super::PoseSpan;
 use super::video_frames::VideoFrames;
@@ -8,46 +8,47 @@ use crate::pose2d::Chain;
 use crate::pose2d::talker::TalkerSearch;
 use crate::pose2d::talker::choice::ShotVoice;
 use crate::pose2d::talker::search::ShotTalker;
-use crate::{lips, sound};
+use crate::{lip_sync, sound};
 use anyhow::{Context, Result};
 use orator_base::stage::progress::{Event, Progress, Task};
 use orator_base::types::pose2d::Pose2d;
 use std::path::Path;
 use std::time::Instant;
 
-/// Frames after which the time that a video takes is told.
-const N_MEASURED: usize = 150;
+/// Number of frames after which the estimate of the processing time is reported.
+const ESTIMATE_AFTER_FRAMES: usize = 150;
 
-/// Looks at the frames of `video`. `talkers` are those found in its shots, if they were looked for.
+/// Estimates the poses in the frames of `video`. `talkers` are the active speakers of its shots, if they were
+/// searched.
 ///
 /// # Errors
 /// A video that cannot be read; a model that fails.
-pub fn look(
+pub fn estimate_poses(
     video: &VideoFrames,
     mut chain: Chain,
     talkers: Option<&[ShotTalker]>,
     progress: &dyn Progress,
     task: &dyn Task,
 ) -> Result<PoseSpan> {
-    let mut ways = talkers.unwrap_or_default().iter().map(|shot| shot.path.clone());
+    let mut paths = talkers.unwrap_or_default().iter().map(|shot| shot.path.clone());
     let corner = video.media.active_area.map_or([0; 2], |area| [area.x, area.y]);
-    let (begun, n_frames) = (Instant::now(), video.timeline.n_frames());
+    let (start, n_frames) = (Instant::now(), video.timeline.n_frames());
     let mut span = PoseSpan::default();
     let mut pose = Pose2d::default();
     span.image_size = video.each(|time, begins_shot, picture| {
         let idx = time.frame_idx;
         if begins_shot {
-            chain.begin_shot(ways.next().flatten());
+            chain.begin_shot(paths.next().flatten());
         }
         if let Some(picture) = picture {
-            let seen = chain.frame(&picture).with_context(|| format!("frame {idx}"))?;
+            let estimated = chain.frame(&picture).with_context(|| format!("frame {idx}"))?;
             if let Some(points) = chain.face_points() {
-                span.portrait.look(&picture, points, time.source_secs)?;
+                span.portrait.add(&picture, points, time.source_secs)?;
             }
-            pose = seen.moved(corner);
+            pose = estimated.moved(corner);
         }
-        if idx + 1 == N_MEASURED && n_frames >= 6 * N_MEASURED {
-            let hours = begun.elapsed().as_secs_f64() / (N_MEASURED as f64 / video.fps.per_sec());
+        if idx + 1 == ESTIMATE_AFTER_FRAMES && n_frames >= 6 * ESTIMATE_AFTER_FRAMES {
+            let hours = start.elapsed().as_secs_f64() / (ESTIMATE_AFTER_FRAMES as f64 / video.fps.per_sec());
             let line = format!("an hour of video takes about {hours:.1} h here, one at a time");
             progress.event(&Event::Estimate { line: &line });
         }
@@ -63,10 +64,10 @@ pub fn look(
     Ok(span)
 }
 
-/// Who speaks in each shot of `video`, by its sound at `sound`.
+/// Finds the active speaker of each shot of `video`, using its audio file `sound`.
 ///
 /// # Errors
-/// A video or sound that cannot be read; a model that fails.
+/// A video or audio that cannot be read; a model that fails.
 pub fn talkers(
     video: &VideoFrames,
     sound: &Path,
@@ -74,7 +75,7 @@ pub fn talkers(
     task: &dyn Task,
 ) -> Result<Vec<ShotTalker>> {
     let (_, sound_db) = sound::levels(sound, video.fps, video.timeline.n_frames())?;
-    let is_speech: Vec<bool> = sound_db.iter().map(|&db| lips::is_speech(f32::NAN, db)).collect();
+    let is_speech: Vec<bool> = sound_db.iter().map(|&db| lip_sync::is_speech(f32::NAN, db)).collect();
     let voice = sound::openness(sound)?;
     let (mut talkers, mut time_secs) = (Vec::new(), Vec::new());
     let mut end_shot = |search: &mut TalkerSearch, time_secs: &mut Vec<f64>, end: usize| {

@@ -1,5 +1,5 @@
-//! What was seen in a span of a video, in a file, and how the spans of a video become one. Tracking begins anew at a span;
-//! whether it shows whom the one before showed is told as at a cut, by box and colours.
+//! Result of a span of a video, its file, and the joining of spans. Tracking restarts at a span; as at a cut, box and
+//! colours decide whether the span continues the previous identity.
 
 use super::keypoint_frames::KeypointFrames;
 use crate::pose2d::face::views::PortraitViews;
@@ -16,42 +16,47 @@ use serde_json::json;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// The frames of one span, or of several joined.
+/// Results of one span, or of several joined ones.
 #[derive(Default, Serialize, Deserialize)]
 pub struct PoseSpan {
     pub frames: KeypointFrames,
-    /// Shots with several people, and those of them where the one who speaks is followed; `None`: the largest is.
+    /// Number of shots with several people, and of those in which the active speaker is followed; `None`: the largest
+    /// person is.
     pub followed: Option<[usize; 2]>,
     pub portrait: PortraitViews,
     /// Width and height of the picture, px.
     pub image_size: [u32; 2],
-    /// People taken so far.
+    /// Number of identities so far.
     pub n_taken: i64,
-    /// The first person taken, as first recognised, and the one at the end.
+    /// The first identity, when first recognised, and the last.
     pub first: Option<SeenPerson>,
     pub last: Option<SeenPerson>,
 }
 
 impl PoseSpan {
-    /// Reads the file of a span of `n_frames` in `folder`. The process that wrote it may have been taken over by a video.
+    /// Reads the file of a span of `n_frames` in `folder`. The content is validated, since a malicious video may have
+    /// compromised the process that wrote it.
     ///
     /// # Errors
-    /// No such file, or one that holds no such span.
+    /// A missing file, or one that does not contain such a span.
     pub fn read(folder: &Path, n_frames: usize) -> Result<Self> {
         let path = Artifact::PoseSpan.within(folder);
         let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
         let no_span = || format!("{} holds no keypoints of a span of {n_frames} frames", path.display());
         let span: Self = rmp_serde::from_slice(&bytes).with_context(no_span)?;
-        ensure!(span.frames.n_frames() == n_frames && span.portrait.is_sound(), no_span());
+        ensure!(span.frames.n_frames() == n_frames && span.portrait.is_valid(), no_span());
         Ok(span)
     }
 
     /// Writes the file of a span into `folder`.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
     pub fn write(&self, folder: &Path) -> Result<()> {
         workdir::write_file(&Artifact::PoseSpan.within(folder), &rmp_serde::to_vec(self)?)
     }
 
-    /// Adds the span that follows.
+    /// Appends the following span.
     pub fn append(&mut self, next: Self) {
         let pair = self.last.as_ref().zip(next.first.as_ref());
         let is_same = pair.is_some_and(|(last, first)| is_same_person(last, first));
@@ -68,7 +73,7 @@ impl PoseSpan {
         self.last = next.last;
     }
 
-    /// Writes the files of the whole video into `out`.
+    /// Writes the files of the complete video into `out`.
     ///
     /// # Errors
     /// Arrays of unequal lengths; a folder that cannot be written.
@@ -83,7 +88,7 @@ impl PoseSpan {
         Ok(report)
     }
 
-    /// How often each part of the speaker was found, for people and programs.
+    /// Share of the frames in which each part of the speaker was detected.
     fn report(&self) -> Report {
         let any = |points: &[Keypoint]| points.iter().any(|point| point.score > 0.0);
         let n_frames = self.frames.n_frames();

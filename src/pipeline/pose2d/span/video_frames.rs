@@ -11,25 +11,25 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::mpsc;
 
-/// Number of frames that may wait.
-const WAITING: usize = 3;
+/// Capacity of the queue of decoded frames.
+const QUEUE_LEN: usize = 3;
 
-/// A video that was extracted, and a span of it.
+/// A span of an extracted video.
 pub struct VideoFrames<'a> {
     pub unit: &'a Unit,
     pub timeline: &'a Timeline,
     pub media: &'a MediaInfo,
     pub fps: FrameRate,
-    /// One of the timeline's spans, frames.
+    /// Frame range of the span, one of the timeline's.
     pub span: Range<usize>,
 }
 
 impl VideoFrames<'_> {
-    /// Calls `work` with each frame's time, whether it begins a shot (as the first of the span does), and its picture if
-    /// that is not the one before again. Returns the width and height of the whole picture in px.
+    /// Calls `work` with each frame's time, whether it begins a shot (true for the first frame of the span), and its
+    /// picture unless it repeats the previous one. Returns the width and height of the full picture in px.
     ///
     /// # Errors
-    /// A video that cannot be read or does not have the frames of the timeline.
+    /// A video that cannot be read, or whose frames do not match the timeline.
     pub fn each(&self, mut work: impl FnMut(FrameTime, bool, Option<Image>) -> Result<()>) -> Result<[u32; 2]> {
         let (source, n_expected) = (&self.unit.source, self.timeline.n_frames());
         let mut reader = FrameReader::open(source, self.fps)?.with_options(self.media.pictures);
@@ -47,16 +47,16 @@ impl VideoFrames<'_> {
         };
         let pick = |reader: &mut FrameReader, time: FrameTime| {
             let is_new = begins_shot(time)? || !time.repeated;
-            let whole = is_new.then(|| reader.picture(None)).transpose()?;
-            Ok(match (whole, self.media.active_area) {
-                (Some(whole), Some(area)) => Some(whole.cropped(area)),
-                (whole, _) => whole,
+            let full_picture = is_new.then(|| reader.picture(None)).transpose()?;
+            Ok(match (full_picture, self.media.active_area) {
+                (Some(full_picture), Some(area)) => Some(full_picture.cropped(area)),
+                (full_picture, _) => full_picture,
             })
         };
         let mut end = self.span.start;
         for_each_ahead(reader, pick, |time, picture| {
             end = time.frame_idx + 1;
-            // Reading that began in the middle shows what reading from the start showed.
+            // After a seek, the times must equal those of a sequential read.
             let known = self.timeline.source_secs.get(time.frame_idx);
             ensure!(
                 self.span.start == 0 || known.is_some_and(|known| known.total_cmp(&time.source_secs).is_eq()),
@@ -75,15 +75,15 @@ fn frame_count_mismatch(video: &Path, found: usize, expected: usize) -> String {
     format!("{} gave {found} frames, its timeline has {expected}: run extract again", video.display())
 }
 
-/// Decoding in parallel with other work: reads all frames of `reader` in a thread, where `pick` selects what is needed of
-/// each, and passes the selections to `work` in order. Memory: five selections.
+/// Decodes ahead: reads all frames of `reader` in a thread, where `pick` selects what is needed of each, and passes
+/// the selections to `work` in order. At most five selections are in memory.
 fn for_each_ahead<T: Send>(
     mut reader: FrameReader,
     mut pick: impl FnMut(&mut FrameReader, FrameTime) -> Result<T> + Send,
     mut work: impl FnMut(FrameTime, T) -> Result<()>,
 ) -> Result<()> {
     std::thread::scope(|scope| {
-        let (sender, picks) = mpsc::sync_channel(WAITING);
+        let (sender, picks) = mpsc::sync_channel(QUEUE_LEN);
         scope.spawn(move || {
             loop {
                 let next = reader.advance().and_then(|time| {
@@ -92,7 +92,7 @@ fn for_each_ahead<T: Send>(
                 });
                 let Some(next) = next.transpose() else { break };
                 let has_failed = next.is_err();
-                // The receiver is gone once the work has failed.
+                // The receiver is dropped when `work` fails.
                 if sender.send(next).is_err() || has_failed {
                     break;
                 }

@@ -1,5 +1,5 @@
-//! Who of several people speaks (`[pose2d] follow = "speaking"`), found before the keypoints are: `search` sees the mouths
-//! of everybody in a shot, `choice` holds them against the voice, `path` is the way of the one who was chosen.
+//! Active speaker detection (`[pose2d] follow = "speaking"`), run before pose estimation: `search` measures the mouths
+//! of all people in a shot, `choice` compares them with the voice, `path` is the path of the chosen person.
 
 pub mod choice;
 pub mod path;

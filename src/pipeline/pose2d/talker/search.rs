@@ -1,9 +1,9 @@
-//! The mouths of everybody in a shot: people are looked for every few frames and tied by overlap, and while two or more
-//! are in view the face model sees each one's mouth in every frame. Kept are one number a frame and person and the boxes
-//! of the looks.
+//! Mouth tracks of all people in a shot: people are detected every few frames and associated by overlap; while two or
+//! more are visible, the face model measures each mouth in every frame. Only one value per frame and person and the
+//! detected boxes are retained.
 
 use super::choice::{self, MouthOpening, ShotVoice};
-use super::path::{SAME_WAY, TalkerPath};
+use super::path::{MIN_OVERLAP, TalkerPath};
 use crate::pose2d::body::BodyModel;
 use crate::pose2d::decode::boxes;
 use crate::pose2d::detector::Detector;
@@ -16,29 +16,29 @@ use orator_base::types::pose2d::PersonBox;
 use orator_dataset::config::Pose2dConfig;
 use orator_onnx::{ModelRole, ModelStore, Runtime};
 
-/// People smaller than this share of the largest are in the background.
-const RELEVANT: f32 = 0.2;
-/// A point of a body is seen from this score on, whatever the configuration says: between looks no point is known.
-const LEAST_SCORE: f64 = 1e-6;
+/// Persons smaller than this share of the largest are background.
+const MIN_RELATIVE_AREA: f32 = 0.2;
+/// Least score of a visible body point, whatever the configuration: without a detection all points score 0.
+const MIN_SCORE: f64 = 1e-6;
 
-/// Looks at one shot after the other.
+/// Searches the active speaker, shot by shot.
 pub struct TalkerSearch {
     detector: Detector,
     body: BodyModel,
     face: FaceModel,
     settings: Pose2dConfig,
     people: Vec<Talker>,
-    /// Frames of the shot so far.
+    /// Number of frames of the shot so far.
     n_frames: usize,
     several: bool,
 }
 
-/// What a shot told.
+/// Result for a shot.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ShotTalker {
-    /// More than one person was in view.
+    /// More than one person was visible.
     pub several: bool,
-    /// The way of the one who speaks; `None`: nobody's mouth clearly follows the voice.
+    /// Path of the active speaker; `None` if nobody's mouth clearly matches the voice.
     pub path: Option<TalkerPath>,
 }
 
@@ -47,12 +47,12 @@ struct Talker {
     path: TalkerPath,
     mouth: MouthOpening,
     face: FaceTrack,
-    /// Found at the last look.
-    is_here: bool,
+    /// Found in the last detection.
+    is_visible: bool,
 }
 
 impl TalkerSearch {
-    /// Opens the models for persons, bodies and faces that the settings name.
+    /// Opens the person, body and face models that the settings name.
     ///
     /// # Errors
     /// An id that is not in the manifest or has another role; a model that cannot be opened.
@@ -69,69 +69,69 @@ impl TalkerSearch {
         })
     }
 
-    /// Takes in the next frame of the shot; `None`: it repeats the one before.
+    /// Processes the next frame of the shot; `None` if it repeats the previous one.
     pub fn frame(&mut self, image: Option<&Image>) -> Result<()> {
         let idx = self.n_frames;
         self.n_frames += 1;
         let Some(image) = image else {
-            let here = self.people.iter_mut().filter(|one| one.is_here);
-            here.for_each(|one| one.mouth.repeat(idx));
+            let visible = self.people.iter_mut().filter(|one| one.is_visible);
+            visible.for_each(|one| one.mouth.repeat(idx));
             return Ok(());
         };
-        let is_look = speaker::is_look(idx, self.settings.person_every.max(1), self.is_crowd());
-        if is_look {
+        let is_detection_frame = speaker::is_detection_frame(idx, self.settings.person_every.max(1), self.is_crowd());
+        if is_detection_frame {
             let found = self.detector.find(image)?;
-            tie(&mut self.people, idx, &found);
+            associate(&mut self.people, idx, &found);
             self.several |= self.is_crowd();
         }
         if !self.is_crowd() {
             self.people.iter_mut().for_each(|one| one.face = FaceTrack::default());
             return Ok(());
         }
-        let least = self.settings.joint_score.max(LEAST_SCORE);
-        for one in self.people.iter_mut().filter(|one| one.is_here) {
-            let place = one.path.last().filter(|_| is_look);
-            let place = place.map(|at| [at.x, at.y, at.width, at.height].map(f64::from));
-            let body = place.map(|place| self.body.find(image, place)).transpose()?.flatten();
+        let least = self.settings.joint_score.max(MIN_SCORE);
+        for one in self.people.iter_mut().filter(|one| one.is_visible) {
+            let bbox = one.path.last().filter(|_| is_detection_frame);
+            let bbox = bbox.map(|at| [at.x, at.y, at.width, at.height].map(f64::from));
+            let body = bbox.map(|bbox| self.body.find(image, bbox)).transpose()?.flatten();
             let points = body.map_or([[0.0; 3]; 17], |body| body.points);
-            if let Some(seen) = one.face.find(&mut self.face, image, &points, least)? {
-                one.mouth.set(idx, seen.opening);
+            if let Some(face) = one.face.find(&mut self.face, image, &points, least)? {
+                one.mouth.set(idx, face.opening);
             }
         }
         Ok(())
     }
 
-    /// Ends the shot: who spoke in it. The next frame begins another.
-    pub fn end_shot(&mut self, heard: &ShotVoice) -> ShotTalker {
+    /// Ends the shot and returns its active speaker. The next frame begins another shot.
+    pub fn end_shot(&mut self, shot: &ShotVoice) -> ShotTalker {
         let mut people = std::mem::take(&mut self.people);
-        let speaking = choice::speaking(people.iter().map(|one| &one.mouth), heard);
+        let speaking = choice::find_speaking(people.iter().map(|one| &one.mouth), shot);
         self.n_frames = 0;
         let several = std::mem::take(&mut self.several);
         ShotTalker { several, path: speaking.map(|at| people.swap_remove(at).path) }
     }
 
     fn is_crowd(&self) -> bool {
-        self.people.iter().filter(|one| one.is_here).count() > 1
+        self.people.iter().filter(|one| one.is_visible).count() > 1
     }
 }
 
-/// Ties the people found at a look to those known; who overlaps with nobody is new.
-fn tie(people: &mut Vec<Talker>, idx: usize, found: &[PersonBox]) {
+/// Associates detections with known people; a detection without overlap is a new person.
+fn associate(people: &mut Vec<Talker>, idx: usize, found: &[PersonBox]) {
     let area = |one: &PersonBox| one.width * one.height;
     let largest = found.iter().map(area).fold(0.0, f32::max);
     for one in people.iter_mut() {
-        one.is_here = false;
+        one.is_visible = false;
     }
-    for one in found.iter().filter(|one| area(one) >= RELEVANT * largest) {
+    for one in found.iter().filter(|one| area(one) >= MIN_RELATIVE_AREA * largest) {
         let overlap = |known: &Talker| known.path.last().map_or(0.0, |last| boxes::overlap(last, one));
-        let free = (0..people.len()).filter(|&at| !people[at].is_here);
+        let free = (0..people.len()).filter(|&at| !people[at].is_visible);
         let nearest = free.max_by(|&a, &b| overlap(&people[a]).total_cmp(&overlap(&people[b])));
-        let at = nearest.filter(|&at| overlap(&people[at]) >= SAME_WAY).unwrap_or_else(|| {
+        let at = nearest.filter(|&at| overlap(&people[at]) >= MIN_OVERLAP).unwrap_or_else(|| {
             people.push(Talker::default());
             people.len() - 1
         });
         people[at].path.push(idx, *one);
-        people[at].is_here = true;
+        people[at].is_visible = true;
     }
 }
 
@@ -140,14 +140,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn people_are_tied_by_overlap_and_the_background_is_left_out() {
+    fn people_are_associated_by_overlap_and_the_background_is_ignored() {
         let at = |x: f32, width: f32| PersonBox { x, y: 0.0, width, height: 200.0, score: 0.9 };
         let mut people = Vec::new();
-        tie(&mut people, 0, &[at(0.0, 100.0), at(300.0, 80.0), at(600.0, 10.0)]);
-        tie(&mut people, 5, &[at(310.0, 80.0), at(20.0, 100.0)]);
-        tie(&mut people, 10, &[at(330.0, 80.0), at(150.0, 90.0)]);
+        associate(&mut people, 0, &[at(0.0, 100.0), at(300.0, 80.0), at(600.0, 10.0)]);
+        associate(&mut people, 5, &[at(310.0, 80.0), at(20.0, 100.0)]);
+        associate(&mut people, 10, &[at(330.0, 80.0), at(150.0, 90.0)]);
         let last: Vec<f32> = people.iter().map(|one| one.path.last().unwrap().x).collect();
-        let here: Vec<bool> = people.iter().map(|one| one.is_here).collect();
-        assert_eq!((last, here), (vec![20.0, 330.0, 150.0], vec![false, true, true]));
+        let visible: Vec<bool> = people.iter().map(|one| one.is_visible).collect();
+        assert_eq!((last, visible), (vec![20.0, 330.0, 150.0], vec![false, true, true]));
     }
 }

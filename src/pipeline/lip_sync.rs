@@ -1,50 +1,51 @@
-//! Whether the voice is that of the mouth that is seen, and by how much sound and picture are apart: the opening of the
-//! lips beside how open the voice sounds, both without what changes slowly, correlated at every lag.
+//! Audio-visual synchrony: whether the voice belongs to the visible mouth, and the offset between audio and video. The
+//! lip opening and the openness of the voice, both high-pass filtered, are correlated over a range of lags.
 
 use orator_base::audio::openness::Openness;
 use orator_base::types::sound::SoundOffset;
 use orator_base::types::time::FrameRate;
 
-/// Lags that are tried, in steps of `LAG_STEP_SECS` on either side of none.
+/// Number of lags on either side of zero, in steps of `LAG_STEP_SECS`.
 const N_LAGS: i32 = 22;
 const LAG_STEP_SECS: f64 = 1.0 / 30.0;
-/// Seconds by which a voice follows its lips, as in the mean of talking clips.
-const FOLLOWS_SECS: f64 = 0.025;
-/// What changes more slowly than over so many seconds is taken out: the turn of the head, the loudness of a sentence.
-const SLOW_SECS: f64 = 0.7;
-/// Added to the opening before its logarithm, so that a closed mouth does not count for all.
-const CLOSED: f32 = 0.1;
-/// Seconds around a frame that are compared, and the least share of them in which mouth and speech are known.
-const AROUND_SECS: f64 = 8.0;
-const LEAST_KNOWN: f64 = 0.75;
-/// Seconds that must be known for an offset of the whole video.
-const LEAST_SECS: f64 = 3.0;
-/// Lips whose logarithmic opening deviates less than this hardly move: what they match is chance.
-const STILL_LIPS: f64 = 0.06;
-/// Seconds on either side of the lag of the video that are tried for a frame; more where that lag is not sure and less
-/// than `WIDE_BELOW_SECS` could be compared.
+/// Delay of the voice after the lips in seconds: the mean over clips of talking people.
+const VOICE_DELAY_SECS: f64 = 0.025;
+/// Window of the moving average that is subtracted, in seconds: removes head rotation and the loudness of a sentence.
+const HIGH_PASS_SECS: f64 = 0.7;
+/// Added to the lip opening before its logarithm, so that closed-mouth frames do not dominate.
+const LOG_OFFSET: f32 = 0.1;
+/// Window of a per-frame score in seconds, and the least share of its frames in which mouth and speech are known.
+const WINDOW_SECS: f64 = 8.0;
+const MIN_KNOWN_SHARE: f64 = 0.75;
+/// Least duration of known frames, in seconds, for the offset of a complete video.
+const MIN_KNOWN_SECS: f64 = 3.0;
+/// Standard deviation of the log opening below which the score is reduced: the correlation of nearly static lips is
+/// chance.
+const MIN_LIP_DEVIATION: f64 = 0.06;
+/// Lags within this many seconds of the video's lag are searched for a per-frame score; `WIDE_SECS` where that lag is
+/// unreliable and less than `WIDE_BELOW_SECS` could be compared.
 pub const NEAR_SECS: f64 = 0.07;
 const WIDE_SECS: f64 = 0.25;
 const WIDE_BELOW_SECS: f64 = 20.0;
-/// Share of speech, or loudness, from which a frame counts as one with speech.
+/// Least speech probability of a frame with speech, or loudness in dB where that probability is unknown.
 const SPEECH_SHARE: f32 = 0.4;
 const SPEECH_DB: f32 = -50.0;
 
-/// What lips and voice have in common.
+/// Result of comparing lips and voice.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LipSync {
-    /// Correlation in the seconds around each frame, -1..1; NaN: mouth or speech is not known for long enough.
+    /// Correlation in the window around each frame, -1..1; NaN where mouth or speech is unknown for too long.
     pub score: Vec<f32>,
-    /// None: too little could be compared.
+    /// Offset of the complete video; `None` if too few frames could be compared.
     pub offset: Option<SoundOffset>,
 }
 
-/// Whether there is speech in a frame, by the share of speech around it where it is known, else by loudness, dB.
+/// Whether a frame contains speech: by the share of speech around it, 0..1, or by loudness in dB if the share is NaN.
 pub fn is_speech(share: f32, sound_db: f32) -> bool {
     if share.is_nan() { sound_db >= SPEECH_DB } else { share >= SPEECH_SHARE }
 }
 
-/// Compares the lips at `time_secs` (`opening`, NaN: not seen) with `voice`, in frames in which there is speech.
+/// Compares the lip opening at `time_secs` (NaN: not visible) with `voice`, over the frames that contain speech.
 pub fn compare(opening: &[f32], time_secs: &[f64], is_speech: &[bool], voice: &Openness, fps: FrameRate) -> LipSync {
     let matched = LipVoiceMatch::new(opening, time_secs, is_speech, voice, fps);
     let offset = matched.offset();
@@ -53,32 +54,33 @@ pub fn compare(opening: &[f32], time_secs: &[f64], is_speech: &[bool], voice: &O
         Some(offset) if offset.compared_secs >= WIDE_BELOW_SECS => (0.0, NEAR_SECS),
         _ => (0.0, WIDE_SECS),
     };
-    LipSync { score: matched.scores(AROUND_SECS, middle_secs, near_secs), offset }
+    LipSync { score: matched.scores(WINDOW_SECS, middle_secs, near_secs), offset }
 }
 
-/// Lips beside a voice at every lag.
+/// Correlation sums of lips and voice for every lag.
 pub struct LipVoiceMatch {
-    /// Sums over the frames, by lag in seconds.
+    /// Lag in seconds, and prefix sums over the frames at that lag.
     lags: Vec<(f64, PairSums)>,
     n_frames: usize,
     fps: FrameRate,
 }
 
 impl LipVoiceMatch {
-    /// Of what `compare` compares.
+    /// Takes the arguments of `compare`.
     pub fn new(opening: &[f32], time_secs: &[f64], is_speech: &[bool], voice: &Openness, fps: FrameRate) -> Self {
-        let reach = (SLOW_SECS / 2.0 * fps.per_sec()).round() as usize;
-        let lips = without_slow(&opening.iter().map(|&opening| (opening + CLOSED).ln()).collect::<Vec<_>>(), reach);
+        let half_window = (HIGH_PASS_SECS / 2.0 * fps.per_sec()).round() as usize;
+        let lips =
+            high_pass(&opening.iter().map(|&opening| (opening + LOG_OFFSET).ln()).collect::<Vec<_>>(), half_window);
         let at_lag = |step: i32| {
             let lag = f64::from(step) * LAG_STEP_SECS;
-            let heard: Vec<f32> = time_secs.iter().map(|secs| voice.at(secs + lag + FOLLOWS_SECS)).collect();
-            (lag, PairSums::new(&lips, &without_slow(&heard, reach), is_speech))
+            let openness: Vec<f32> = time_secs.iter().map(|secs| voice.at(secs + lag + VOICE_DELAY_SECS)).collect();
+            (lag, PairSums::new(&lips, &high_pass(&openness, half_window), is_speech))
         };
         Self { lags: (-N_LAGS..=N_LAGS).map(at_lag).collect(), n_frames: lips.len(), fps }
     }
 
-    /// Correlation in the `around_secs` around each frame, at the best lag within `near_secs` of `middle_secs`; NaN where
-    /// mouth or speech is not known for long enough.
+    /// Correlation in a window of `around_secs` around each frame, at the best lag within `near_secs` of
+    /// `middle_secs`; NaN where mouth or speech is unknown for too long.
     pub fn scores(&self, around_secs: f64, middle_secs: f64, near_secs: f64) -> Vec<f32> {
         let around = ((around_secs * self.fps.per_sec()).round() as usize).max(1);
         let is_tried = |(lag, _): &&(f64, PairSums)| (lag - middle_secs).abs() <= near_secs + 1e-9;
@@ -86,52 +88,52 @@ impl LipVoiceMatch {
         let score = |t: usize| {
             let start = t.saturating_sub(around / 2).min(self.n_frames.saturating_sub(around));
             let end = (start + around).min(self.n_frames);
-            let scores = tried.iter().filter_map(|sums| sums.score(start, end, LEAST_KNOWN * around as f64));
+            let scores = tried.iter().filter_map(|sums| sums.score(start, end, MIN_KNOWN_SHARE * around as f64));
             scores.fold(f64::NAN, f64::max) as f32
         };
         (0..self.n_frames).map(score).collect()
     }
 
-    /// The lag at which all frames match best; `None`: too few could be compared.
+    /// Lag of the largest correlation over all frames; `None` if too few frames could be compared.
     pub fn offset(&self) -> Option<SoundOffset> {
         let (lags, fps) = (&self.lags, self.fps);
-        let least = LEAST_SECS * fps.per_sec();
-        let all: Option<Vec<f64>> = lags.iter().map(|(_, sums)| sums.score(0, self.n_frames, least)).collect();
-        let all = all?;
-        let (at, correlation) = all.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
-        // A parabola through the best lag and its neighbours.
-        let beside = |k: usize| all.get(k).copied();
-        let part = match (at.checked_sub(1).and_then(beside), beside(at + 1)) {
+        let least = MIN_KNOWN_SECS * fps.per_sec();
+        let correlations: Option<Vec<f64>> = lags.iter().map(|(_, sums)| sums.score(0, self.n_frames, least)).collect();
+        let correlations = correlations?;
+        let (at, correlation) = correlations.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        // Sub-step refinement: vertex of the parabola through the best lag and its neighbours.
+        let neighbour = |k: usize| correlations.get(k).copied();
+        let part = match (at.checked_sub(1).and_then(neighbour), neighbour(at + 1)) {
             (Some(before), Some(after)) if before + after < 2.0 * correlation => {
                 0.5 * (before - after) / (before - 2.0 * correlation + after)
             }
             _ => 0.0,
         };
         let compared_secs = lags[at].1.n(0, self.n_frames) / fps.per_sec();
-        // The best of all lags of a stranger's voice, times the root of the seconds, is distributed about so (Gumbel;
-        // measured on 2900 pairs of talking clips and sounds of others, 4 to 20 s).
+        // For an unrelated voice, the largest correlation over all lags times the square root of the duration follows
+        // roughly this Gumbel distribution (fitted to 2900 unrelated pairs of clips and voices, 4 to 20 s).
         let best = correlation * compared_secs.sqrt();
         let confidence = (-(-(best - 0.6) / 0.133).exp()).exp();
         Some(SoundOffset { secs: lags[at].0 + part * LAG_STEP_SECS, correlation, confidence, compared_secs })
     }
 }
 
-/// `values` less their mean over the `reach` frames on either side; NaN stays out of it.
-fn without_slow(values: &[f32], reach: usize) -> Vec<f32> {
+/// Subtracts from each value the mean of the finite values within `half_window` frames of it; NaN stays NaN.
+fn high_pass(values: &[f32], half_window: usize) -> Vec<f32> {
     let (mut sums, mut counts) = (vec![0.0_f64], vec![0_usize]);
     for value in values {
         let known = value.is_finite();
         sums.push(sums[sums.len() - 1] + if known { f64::from(*value) } else { 0.0 });
         counts.push(counts[counts.len() - 1] + usize::from(known));
     }
-    let slow = |t: usize| {
-        let (start, end) = (t.saturating_sub(reach), values.len().min(t + reach + 1));
+    let local_mean = |t: usize| {
+        let (start, end) = (t.saturating_sub(half_window), values.len().min(t + half_window + 1));
         (sums[end] - sums[start]) / (counts[end] - counts[start]).max(1) as f64
     };
-    values.iter().enumerate().map(|(t, &value)| value - slow(t) as f32).collect()
+    values.iter().enumerate().map(|(t, &value)| value - local_mean(t) as f32).collect()
 }
 
-/// Sums over the frames before each, of those in which both sides are known: count, x, y, xx, yy, xy.
+/// Prefix sums over the frames in which lips and voice are both known: count, x, y, xx, yy, xy.
 struct PairSums(Vec<[f64; 6]>);
 
 impl PairSums {
@@ -148,20 +150,21 @@ impl PairSums {
         Self(sums)
     }
 
-    /// Frames known.
+    /// Number of known frames in `start..end`.
     fn n(&self, start: usize, end: usize) -> f64 {
         self.0[end][0] - self.0[start][0]
     }
 
-    /// Correlation in the frames `start..end`, less where the lips hardly move; `None`: fewer than `least` are known.
+    /// Correlation over the frames `start..end`, scaled down where the lips hardly move; `None` if fewer than `least`
+    /// are known.
     fn score(&self, start: usize, end: usize, least: f64) -> Option<f64> {
         let [n, x, y, xx, yy, xy]: [f64; 6] = std::array::from_fn(|k| self.0[end][k] - self.0[start][k]);
         if n < least.max(2.0) {
             return None;
         }
-        let (of_lips, of_voice) = ((xx - x * x / n).max(0.0), (yy - y * y / n).max(0.0));
-        let correlation = (xy - x * y / n) / (of_lips * of_voice).sqrt().max(1e-9);
-        Some(correlation.clamp(-1.0, 1.0) * ((of_lips / n).sqrt() / STILL_LIPS).min(1.0))
+        let (lip_variance, voice_variance) = ((xx - x * x / n).max(0.0), (yy - y * y / n).max(0.0));
+        let correlation = (xy - x * y / n) / (lip_variance * voice_variance).sqrt().max(1e-9);
+        Some(correlation.clamp(-1.0, 1.0) * ((lip_variance / n).sqrt() / MIN_LIP_DEVIATION).min(1.0))
     }
 }
 
@@ -175,7 +178,7 @@ pub mod tests {
 
     pub const FPS: FrameRate = FrameRate::new(15, 1);
 
-    /// How open a mouth is that says four syllables a second of its own lengths and widths: 0..1.
+    /// Synthetic mouth opening, 0..1, for about four syllables a second of random length and width.
     pub struct Mouth(Vec<[f64; 3]>);
 
     impl Mouth {
@@ -198,12 +201,12 @@ pub mod tests {
                 .map_or(0.0, |[start, end, open]| open * (TAU / 2.0 * (secs - start) / (end - start)).sin())
         }
 
-        /// Its voice, `late` seconds later: a murmur, and harmonics up to 4 kHz as far as the mouth is open.
-        pub fn voice(&self, secs: f64, late: f64) -> Openness {
+        /// Voice of the mouth, delayed by `delay` seconds: a murmur, plus harmonics up to 4 kHz scaled by the opening.
+        pub fn voice(&self, secs: f64, delay: f64) -> Openness {
             let mut meter = OpennessMeter::default();
             let sample = |n: usize| {
                 let now = n as f64 / 16_000.0;
-                let open = self.at(now - late - FOLLOWS_SECS);
+                let open = self.at(now - delay - VOICE_DELAY_SECS);
                 let tone = |hz: f64| (TAU * hz * now).sin();
                 let vowel = [800.0, 1300.0, 2400.0, 3600.0].map(tone).iter().sum::<f64>();
                 (0.1 * (tone(150.0) + tone(450.0)) + 0.1 * open * open * vowel) as f32
@@ -212,37 +215,37 @@ pub mod tests {
             meter.finish()
         }
 
-        /// The opening that is seen, with noise, every `unseen`-th frame missing.
-        pub fn seen(&self, secs: f64, unseen: usize, seed: u64) -> (Vec<f32>, Vec<f64>) {
+        /// Measured lip opening with noise; every `missing_every`-th frame is missing.
+        pub fn measured(&self, secs: f64, missing_every: usize, seed: u64) -> (Vec<f32>, Vec<f64>) {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let times: Vec<f64> = (0..FPS.frames_in(secs)).map(|t| FPS.secs(t)).collect();
             let opening = |(t, secs): (usize, &f64)| {
                 let noise = rng.random_range(-0.02..0.02);
-                if t % unseen == 0 { f32::NAN } else { (0.05 + 0.25 * self.at(*secs) + noise) as f32 }
+                if t % missing_every == 0 { f32::NAN } else { (0.05 + 0.25 * self.at(*secs) + noise) as f32 }
             };
             (times.iter().enumerate().map(opening).collect(), times)
         }
     }
 
-    fn compared(secs: f64, own: bool, late: f64, seed: u64) -> LipSync {
+    fn compared(secs: f64, own: bool, delay: f64, seed: u64) -> LipSync {
         let mouth = Mouth::new(secs, seed);
-        let (opening, times) = mouth.seen(secs, 9, seed);
-        let voice = if own { mouth } else { Mouth::new(secs, seed + 1000) }.voice(secs, late);
+        let (opening, times) = mouth.measured(secs, 9, seed);
+        let voice = if own { mouth } else { Mouth::new(secs, seed + 1000) }.voice(secs, delay);
         compare(&opening, &times, &vec![true; times.len()], &voice, FPS)
     }
 
     #[test]
-    fn a_voice_that_is_late_or_early_is_found_to_be_so() {
-        for (k, late) in [-0.4, -0.21, 0.0, 0.033, 0.1, 0.4].into_iter().enumerate() {
-            let found = compared(10.0, true, late, k as u64);
+    fn the_delay_of_the_voice_is_measured() {
+        for (k, delay) in [-0.4, -0.21, 0.0, 0.033, 0.1, 0.4].into_iter().enumerate() {
+            let found = compared(10.0, true, delay, k as u64);
             let offset = found.offset.unwrap();
-            assert!((offset.secs - late).abs() < 0.02 && offset.is_sure(), "{late}: {offset:?}");
-            assert!(found.score.iter().all(|score| *score > 0.5), "{late}: {:?}", found.score);
+            assert!((offset.secs - delay).abs() < 0.02 && offset.is_sure(), "{delay}: {offset:?}");
+            assert!(found.score.iter().all(|score| *score > 0.5), "{delay}: {:?}", found.score);
         }
     }
 
     #[test]
-    fn the_voice_of_another_matches_less_and_nowhere_surely() {
+    fn an_unrelated_voice_scores_lower_and_is_not_confident() {
         let mut n_sure = 0;
         for seed in 0..12 {
             let (own, other) = (compared(12.0, true, 0.0, seed), compared(12.0, false, 0.0, seed));
@@ -253,21 +256,21 @@ pub mod tests {
     }
 
     #[test]
-    fn where_mouth_speech_or_movement_lack_nothing_is_told() {
+    fn missing_mouth_speech_or_movement_gives_no_score() {
         let mouth = Mouth::new(20.0, 5);
-        let ((opening, times), voice) = (mouth.seen(20.0, 999, 5), mouth.voice(20.0, 0.0));
+        let ((opening, times), voice) = (mouth.measured(20.0, 999, 5), mouth.voice(20.0, 0.0));
         let all = vec![true; times.len()];
-        let unseen = vec![f32::NAN; times.len()];
-        for (opening, is_speech) in [(&unseen, &all), (&opening, &vec![false; times.len()])] {
+        let hidden = vec![f32::NAN; times.len()];
+        for (opening, is_speech) in [(&hidden, &all), (&opening, &vec![false; times.len()])] {
             let found = compare(opening, &times, is_speech, &voice, FPS);
             assert!(found.offset.is_none() && found.score.iter().all(|score| score.is_nan()));
         }
-        // The second half is not seen: its frames are known as far as 6 of the 8 s around them are.
+        // The second half is not visible. A frame has a score if 6 of the 8 s around it are visible.
         let half: Vec<f32> = (0..300).map(|t| if t < 150 { opening[t] } else { f32::NAN }).collect();
         let found = compare(&half, &times, &all, &voice, FPS);
         assert!(found.score[..110].iter().all(|score| *score > 0.5) && found.score[200..].iter().all(|s| s.is_nan()));
-        let still: Vec<f32> = opening.iter().map(|opening| 0.1 + 0.01 * opening).collect();
-        let found = compare(&still, &times, &all, &voice, FPS);
+        let static_lips: Vec<f32> = opening.iter().map(|opening| 0.1 + 0.01 * opening).collect();
+        let found = compare(&static_lips, &times, &all, &voice, FPS);
         assert!(found.score.iter().all(|score| *score < 0.1) && !found.offset.unwrap().is_sure());
         assert_eq!(compare(&[], &[], &[], &Openness::default(), FPS), LipSync::default());
     }
