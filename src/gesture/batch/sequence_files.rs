@@ -13,8 +13,8 @@ use orator_nn::seq2seq::predict::StateAtSeams;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Motion of a speaker for one sound, written to `outputs`. A network that learnt captures writes its own skeleton, as .bvh
-/// alone.
+/// Motion of a speaker for one sound, written to `outputs`. A network that learnt captures writes its own skeleton, as
+/// .bvh alone.
 ///
 /// # Errors
 /// A sound or transcript that cannot be read, a sound shorter than a frame, another format for a captured skeleton.
@@ -45,14 +45,14 @@ pub fn write_sequence(
     let sound = sound.with_context(|| format!("{} has no sound", audio.display()))?;
     let words = said.as_ref().map_or(&[][..], |said| &said.words);
     let no_motion = || format!("no motion for {}", audio.display());
-    let heard = speaker.hear(&sound, words).with_context(no_motion)?;
-    let poses = speaker.speak(&heard, seams).with_context(no_motion)?;
+    let heard = speaker.prepare(&sound, words).with_context(no_motion)?;
+    let poses = speaker.generate(&heard, seams).with_context(no_motion)?;
     let motion_secs = started.elapsed().as_secs_f64();
     let other = match seams {
         StateAtSeams::Renewed => StateAtSeams::Carried,
         StateAtSeams::Carried => StateAtSeams::Renewed,
     };
-    let other_seam_jump = speaker.speak(&heard, other).with_context(no_motion)?.seam_jump;
+    let other_seam_jump = speaker.generate(&heard, other).with_context(no_motion)?.seam_jump;
     drop((task, heard));
     if is_captured {
         let text = speaker.bvh(&poses)?;
@@ -64,7 +64,7 @@ pub fn write_sequence(
     let notes = transcript.zip(said).map(|(path, said)| notes(speaker, path, &said, sound.secs()));
     Ok(SpokenMotion {
         secs: sound.secs(),
-        n_frames: poses.numbers.nrows(),
+        n_frames: poses.features.nrows(),
         motion_secs,
         note: notes.filter(|notes| !notes.is_empty()).map(|notes| notes.join("; ")),
         segments: Some(SegmentFacts {

@@ -12,7 +12,7 @@ use crate::evaluate::baseline::constant_pose::ConstantPoses;
 use crate::evaluate::baseline::neighbour::{self, Library, Query};
 use crate::evaluate::baseline::predictor;
 use crate::generate::normalisation::{N_FEATURES, Normalisation};
-use crate::train::gan::begin::normalisation;
+use crate::train::gan::speaker_metadata::normalisation;
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array2, Array3, Axis, s};
 use orator_base::motion::bones;
@@ -246,7 +246,7 @@ fn channels(
 
 /// The mean posture of a checkpoint's training split, one frame; `None`: it learns none.
 fn mean_posture(normal: &Normalisation) -> Option<Posture> {
-    normal.posture(Array2::zeros((normal.n_numbers(), 1)).view())
+    normal.posture(Array2::zeros((normal.n_features(), 1)).view())
 }
 
 /// Mean and median pose of the training split, both with the mean posture.
