@@ -113,7 +113,7 @@ fn the_neighbour_by_sound_is_found_where_it_was_taken_from() {
         features,
         audio: None,
     };
-    let clips = EvalClips { fps, clips: vec![clip], notes: Vec::new(), learnt: false, channels: Vec::new() };
+    let clips = EvalClips { fps, clips: vec![clip], notes: Vec::new(), trained_on: false, channels: Vec::new() };
     let found = copied(&dataset, &normal, &clips, Split::Validation, &MotionStore::in_memory()).unwrap().unwrap();
     let ClipMotion::Motion(found) = &found[0] else { panic!("it stands still") };
     let apart = found.view().iter().zip(&ground_truth.joints).filter(|(a, b)| (*a - *b).abs() > 1e-3).count();
