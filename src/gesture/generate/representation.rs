@@ -26,8 +26,8 @@ pub enum Representation {
 }
 
 impl Representation {
-    /// `Bones`, with mean and standard deviation of the unit directions in these poses (from [`Normalisation::features`])
-    /// over the frames in which both ends of the bone are visible.
+    /// `Bones`, with mean and standard deviation of the unit directions in these poses (from
+    /// [`Normalisation::features`]) over the frames in which both ends of the bone are visible.
     ///
     /// # Errors
     /// The first error of `poses`.

@@ -21,8 +21,8 @@ pub fn counts(n_blocks: usize, n_draws: usize) -> Array2<f64> {
     counts
 }
 
-/// `value` over all blocks with its 95 % interval from the quantiles of `drawn`. The draws are shifted so that their median is
-/// `value`, since repeated blocks bias distances between distributions. Non-finite draws are ignored.
+/// `value` over all blocks with its 95 % interval from the quantiles of `drawn`. The draws are shifted so that their
+/// median is `value`, since repeated blocks bias distances between distributions. Non-finite draws are ignored.
 pub fn estimate(value: f64, drawn: &[f64]) -> Estimate {
     let drawn = Ordered::new(drawn.iter().copied());
     let at = |share: f64| drawn.quantile(share).unwrap_or(f64::NAN);
