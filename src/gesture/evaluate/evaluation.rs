@@ -24,8 +24,7 @@ pub struct Evaluation {
 impl Evaluation {
     /// Reads motion files: `truth` and `prediction` are two files, or two folders whose files have the same names;
     /// `audio` is a sound or a folder of sounds. `fps` is the frame rate of files that do not state one. The motions
-    /// are saved in
-    /// `store`.
+    /// are saved in `store`.
     ///
     /// # Errors
     /// Files that do not match or cannot be read.

@@ -45,8 +45,7 @@ impl BlockGroups {
     }
 
     /// Contribution of each group in the unit of `value`, which is also their mean. `value` is the metric over all
-    /// blocks,
-    /// `without` the metric without each group.
+    /// blocks, `without` the metric without each group.
     pub fn contributions(&self, value: f64, without: &[f64]) -> Vec<f64> {
         let n = self.shares.len() as f64;
         let own = |(share, without): (&f64, &f64)| n * (1.0 - share) * (value - without);

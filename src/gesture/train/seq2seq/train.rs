@@ -40,8 +40,7 @@ const WORD_DIM: usize = 100;
 /// # Errors
 /// Data that cannot be read, with the name of the file; no segment to train on; a checkpoint of other data; another
 /// training running in `folder`; a loss that is not finite or explodes (the last good checkpoint is kept);
-/// `StoppedTraining` if
-/// `progress` requests a stop.
+/// `StoppedTraining` if `progress` requests a stop.
 pub fn train(
     source: TrainingSource,
     vectors: Option<&WordVectors>,
