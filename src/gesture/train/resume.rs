@@ -68,7 +68,7 @@ pub fn newest<T>(
     Ok(Some((stored, contents)))
 }
 
-/// Fails, listing all losses, if a loss is not finite or exceeds [`LOSS_LIMIT`], or if the gradient norm is not finite.
+/// Fails, listing all losses, if a loss is not finite or exceeds `LOSS_LIMIT`, or if the gradient norm is not finite.
 pub fn ensure_not_diverged(step: usize, losses: &[(&str, f64)], gradient_norm: f64) -> Result<()> {
     let is_bounded = losses.iter().all(|(_, loss)| loss.is_finite() && loss.abs() < LOSS_LIMIT);
     let listed: Vec<String> = losses.iter().map(|(name, loss)| format!("{name} {loss}")).collect();

@@ -3,7 +3,7 @@
 //! 2,000 of each.
 
 use orator_gesture::evaluate::table::block_length::BlockLength;
-use orator_gesture::evaluate::table::left_out::BlockGroups;
+use orator_gesture::evaluate::table::jackknife::BlockGroups;
 use orator_gesture::evaluate::table::sign_flips::{self, LEVEL};
 use orator_gesture::metrics::catalogue::n_blocks;
 use rand::{Rng, SeedableRng};
