@@ -219,7 +219,7 @@ fn loader(args: &Args, dir: &Path, out: &Path) -> Result<Loaded> {
     let examples = WindowLoader::load(
         &dataset,
         Split::Train,
-        &orator_gesture::train::gan::begin::normalisation(&dataset)?,
+        &orator_gesture::train::gan::speaker_metadata::normalisation(&dataset)?,
         64,
         5,
     )?;

@@ -134,7 +134,7 @@ fn evaluate(speaker: Vec<Unheard>, watch: &Stopwatch) -> Result<(table::Table, S
         EvalClip { name: format!("clip {number}"), ground_truth, predicted, mask, features, audio: None }
     };
     let clips = speaker.into_par_iter().enumerate().map(clip).collect();
-    let clips = EvalClips { fps: FPS, clips, notes: Vec::new(), learnt: false, channels: Vec::new() };
+    let clips = EvalClips { fps: FPS, clips, notes: Vec::new(), trained_on: false, channels: Vec::new() };
     watch.detail("making the baselines");
     let mut predictors = vec![Predictor::prediction(&clips, "what the rule alone would do")];
     predictors.extend(baselines::from_files(&clips, &MotionStore::in_memory())?.0);

@@ -11,7 +11,7 @@ use orator_base::types::time::FrameRate;
 use orator_dataset::{Dataset, Split};
 use orator_gesture::evaluate::Evaluation;
 use orator_gesture::evaluate::clips::checkpoint::EvaluatedCheckpoint;
-use orator_gesture::evaluate::clips::motion_store::{HELD_BYTES, MotionStore};
+use orator_gesture::evaluate::clips::motion_store::{MEMORY_BYTES, MotionStore};
 use orator_gesture::evaluate::table::result::StoredResult;
 use orator_gesture::evaluate::table::{compare, result};
 use orator_gesture::evaluate::verdict::text;
@@ -117,7 +117,7 @@ fn check_report(args: &MotionArgs) -> Result<()> {
 fn motion(args: &MotionArgs, ui: &Ui) -> Result<Outcome> {
     check_report(args)?;
     // The folder of a dataset is writable in the sandbox because it contains the dataset's lock.
-    let in_dataset = |folder: &PathBuf| MotionStore::in_folder(folder, HELD_BYTES);
+    let in_dataset = |folder: &PathBuf| MotionStore::in_folder(folder, MEMORY_BYTES);
     let store = args.dataset.as_ref().map_or_else(MotionStore::in_memory, in_dataset);
     let settings = MetricSettings {
         convention: args.convention,

@@ -8,7 +8,7 @@ use crate::cli::sandbox::enter_sandbox;
 use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, bail, ensure};
 use orator_base::stage::progress::Progress as _;
-use orator_gesture::batch::spoken::{SegmentFacts, SpeechSource};
+use orator_gesture::batch::speech::{SegmentFacts, SpeechSource};
 use orator_gesture::batch::{SpeechBatch, motion_files, sounds, transcripts};
 use orator_gesture::generate::model::GenerationChoice;
 use orator_gesture::generate::model::{checkpoint_file, model_lock};

@@ -134,7 +134,7 @@ fn train_one(args: &Args, speaker: Option<&String>, config: &Config, ui: &Ui) ->
     };
     let mut page = TrainingPage::new(&out, names.clone(), Box::new(poses), ui);
     let validated = &mut |at| page.update(at);
-    let outcome = train::train_watched(&datasets, &settings, args.from.as_deref(), &out, ui, validated)?;
+    let outcome = train::train_with_callback(&datasets, &settings, args.from.as_deref(), &out, ui, validated)?;
     let steps_per_sec = (outcome.steps - outcome.began_at) as f64 / start.elapsed().as_secs_f64().max(1e-9);
     let page = page.finish(ValidatedStep { step: outcome.steps, best_step: outcome.best_step });
     let text = format!(

@@ -13,7 +13,7 @@ use orator_formats::word_vectors::WordVectors;
 use orator_gesture::evaluate::clips::held_out;
 use orator_gesture::evaluate::clips::held_out::HeldOutInterval;
 use orator_gesture::generate::seq2seq::SequenceGenerator;
-use orator_gesture::generate::seq2seq::poses::PoseNumbers;
+use orator_gesture::generate::seq2seq::poses::PoseFormat;
 use orator_gesture::train::epochs::ValidatedStep;
 use orator_gesture::train::gan::score::below_mean_pose;
 use orator_gesture::train::seq2seq::captures::CaptureFolder;
@@ -70,7 +70,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let train = |source: TrainingSource, out: &Path, poses| {
         let mut page = TrainingPage::new(out, source.name(), poses, ui);
         let validated = &mut |at| page.update(at);
-        let outcome = train::train_watched(source, vectors.as_ref(), &settings, out, ui, validated)?;
+        let outcome = train::train_with_callback(source, vectors.as_ref(), &settings, out, ui, validated)?;
         let page = page.finish(ValidatedStep { step: outcome.steps, best_step: outcome.best_step });
         anyhow::Ok((outcome, page))
     };
@@ -134,7 +134,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 
 /// True and generated poses of a few intervals, from the middle of each.
 fn pairs(dataset: &Dataset, speaker: &SequenceGenerator) -> Result<Vec<HeldOutPair>> {
-    let PoseNumbers::Joints { normalisation, .. } = &speaker.metadata.poses else { return Ok(Vec::new()) };
+    let PoseFormat::Joints { normalisation, .. } = &speaker.metadata.poses else { return Ok(Vec::new()) };
     let fps = speaker.fps();
     let pair = |interval: HeldOutInterval| {
         let predicted = speaker.motion(&speaker.poses(&interval.sound, &interval.words)?)?;

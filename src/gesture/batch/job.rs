@@ -1,4 +1,4 @@
-//! A batch of sounds as a value: what to make, run as a stage, reported sound by sound.
+//! A batch of sounds: its settings, the run as a stage, and a report with the outcome of each sound.
 
 use super::sounds::BatchSound;
 use super::stage::BatchStage;
@@ -16,82 +16,83 @@ use std::path::PathBuf;
 /// Folder of the records, below that of the motions.
 const RECORDS: &str = ".made";
 
-/// Sounds to be made into motion files.
+/// Sounds for which motion files are to be generated.
 #[derive(Clone, Debug, Default)]
 pub struct SpeechBatch {
     /// The sounds (`sounds::of_folder`, `sounds::of_table`).
     pub sounds: Vec<BatchSound>,
-    /// Where the motions go.
+    /// Output folder.
     pub folder: PathBuf,
-    /// Endings of the files of each motion: npy, txt, json, bvh, fbx, glb, vrm, vrma, mp4.
+    /// File extensions of the output formats: npy, txt, json, bvh, fbx, glb, vrm, vrma, mp4.
     pub formats: Vec<String>,
-    /// A checkpoint or a training's folder, for sounds that name none.
+    /// Checkpoint, or folder of a training, for sounds without their own.
     pub checkpoint: Option<PathBuf>,
-    /// What sequence-to-sequence networks begin a segment with.
+    /// Initial decoder state of each segment, for sequence-to-sequence networks.
     pub seams: StateAtSeams,
-    /// Bone names and rate of the figures.
+    /// Bone names and frame rate of exported figures.
     pub figure: FigureOptions,
-    /// Whether motions are made again where nothing changed.
+    /// Whether up-to-date motions are generated again.
     pub again: bool,
 }
 
-/// How a batch ended.
+/// Result of a batch.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct BatchReport {
-    /// Sounds whose motion was made.
+    /// Number of sounds whose motion was generated.
     pub made: usize,
-    /// Sounds whose motion was there.
+    /// Number of sounds whose motion was up to date.
     pub fresh: usize,
-    /// Sounds that failed.
+    /// Number of sounds that failed.
     pub failed: usize,
-    /// Where the motions are.
+    /// Output folder.
     pub out_folder: PathBuf,
-    /// Every sound, in the order of the batch.
+    /// Outcome of every sound, in the order of the batch.
     pub sounds: Vec<BatchOutcome>,
 }
 
-/// How a sound of a batch ended.
+/// Outcome of a sound of a batch.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BatchOutcome {
-    /// The sound.
+    /// Sound file.
     pub audio: PathBuf,
-    /// The motion's name below the folder, without an ending.
+    /// Path of the motion below the output folder, without an extension.
     pub out: String,
     /// Made, fresh or failed.
     pub ended: BatchState,
-    /// Of a failure.
+    /// Error message of a failure.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
-    /// `secs` of sound, `n_frames` of motion, `speaker`, `note`, of segments `segments`; empty of a failure.
+    /// `secs` of sound, `n_frames` of motion, `speaker`, `note`, and `segments` of a sequence-to-sequence network;
+    /// empty if the sound failed.
     #[serde(flatten)]
     pub facts: Map<String, Value>,
 }
 
-/// How a sound of a batch ended, in a word.
+/// State of a sound after the run of a batch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum BatchState {
-    /// Its motion was made.
+    /// The motion was generated.
     Made,
-    /// Its motion was there already.
+    /// The motion was already up to date.
     Fresh,
-    /// Failed; the others are not stopped.
+    /// The sound failed, which does not stop the others.
     Failed,
 }
 
 impl SpeechBatch {
-    /// Makes what is missing or changed.
+    /// Generates motions that are missing or out of date.
     ///
     /// # Errors
-    /// What stops all: a format that is unknown, a common checkpoint that cannot be read, another batch in the same
-    /// folder.
+    /// Errors that affect all sounds: an unknown format, a common checkpoint that cannot be read, another batch running
+    /// in the same folder.
     pub fn run(&self, progress: &dyn Progress) -> Result<BatchReport> {
         let stage = BatchStage::new(self)?;
         let records = self.folder.join(RECORDS);
         let _lock = workdir::lock(&records)?;
         let hashes = HashCache::open(&artifacts::hashes(&records));
         let units: Vec<_> = self.sounds.iter().map(BatchStage::unit).collect();
-        // One sound at a time: the network itself takes all cores.
+        // One sound at a time, since the network itself uses all cores.
         let ended = runner::run(&stage, &units, &records, &hashes, (1, self.again), progress);
         hashes.save()?;
         let mut report = BatchReport { out_folder: self.folder.clone(), ..BatchReport::default() };

@@ -1,11 +1,11 @@
-//! Speech to motion files: one sound, or a folder or table of sounds as units of a stage, so that what is there already is
-//! not made again.
+//! Generation of motion files from speech: for a single sound, or for a folder or table of sounds as units of a stage,
+//! so that up-to-date files are not generated again.
 
 pub mod job;
 pub mod motion_files;
 pub mod sequence_files;
 pub mod sounds;
-pub mod spoken;
+pub mod speech;
 pub mod stage;
 pub mod transcripts;
 

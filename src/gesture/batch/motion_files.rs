@@ -1,8 +1,8 @@
-//! One sound to motion to files. The sound is streamed, so that its length takes no memory but for its motion; only a film,
-//! which holds the sound, reads it whole.
+//! Generates the motion for one sound and writes it to files. The sound is streamed, so that apart from the motion,
+//! memory does not grow with its length; only a film, which contains the sound, reads it completely.
 
 use super::sequence_files::write_sequence;
-use super::spoken::{SpeechSource, SpokenMotion};
+use super::speech::{MotionReport, SpeechSource};
 use crate::generate::GestureGenerator;
 use crate::generate::generator::CHUNK;
 use crate::generate::trained::TrainedSpeaker;
@@ -20,13 +20,13 @@ use orator_nn::seq2seq::predict::StateAtSeams;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Writes the motion of `speaker` for a sound to `outputs`. Errors name the sound.
+/// Generates motion for a sound with a GAN and writes it to `outputs`. Errors name the sound.
 pub fn write_motion(
     speaker: &GestureGenerator,
     speech: &SpeechSource,
     outputs: &[(PathBuf, ExportFormat)],
     progress: &dyn Progress,
-) -> Result<SpokenMotion> {
+) -> Result<MotionReport> {
     let audio = speech.audio;
     let started = Instant::now();
     let task = progress.begin("speech to motion", 0);
@@ -44,17 +44,17 @@ pub fn write_motion(
     drop(task);
     let motion_secs = started.elapsed().as_secs_f64();
     write_outputs((motion, posture), speech, outputs, progress)?;
-    Ok(SpokenMotion { secs, n_frames, motion_secs, note, segments: None })
+    Ok(MotionReport { secs, n_frames, motion_secs, note, segments: None })
 }
 
-/// Writes motion for a sound to files of all formats.
+/// Writes motion to files of all formats.
 pub(super) fn write_outputs(
     (motion, posture): (Motion, Option<Posture>),
     &SpeechSource { audio, figure, .. }: &SpeechSource,
     outputs: &[(PathBuf, ExportFormat)],
     progress: &dyn Progress,
 ) -> Result<()> {
-    // Files of joints hold what the network gave, before it is put on a figure.
+    // Joint files contain the network output, before it is applied to a figure.
     let (joints, figures): (Vec<_>, Vec<_>) = outputs.iter().partition(|(_, format)| format.holds_joints());
     for (path, format) in joints {
         format.write_joints(path, &motion)?;
@@ -80,7 +80,10 @@ pub(super) fn write_outputs(
     Ok(())
 }
 
-/// Number of samples of the sound at 16 kHz, and what a user should know of it.
+/// Number of samples of the sound at 16 kHz, and a note about its quality, if any.
+///
+/// # Errors
+/// A path that is not a file, or a file without sound.
 pub(super) fn measure(path: &Path) -> Result<(usize, Option<String>)> {
     ensure!(path.exists(), "{} is not there", path.display());
     ensure!(path.is_file(), "{} is no file", path.display());
@@ -99,7 +102,7 @@ pub(super) fn measure(path: &Path) -> Result<(usize, Option<String>)> {
     }
 }
 
-/// The note on a sample rate too low for the spectrogram.
+/// Note if the sample rate (Hz) is too low for the spectrogram.
 fn narrow_band_note(rate: u32) -> Option<String> {
     let highest_hz = f64::from(rate) / 2.0;
     if rate == 0 || highest_hz >= mel::HIGHEST_HZ {
@@ -113,13 +116,14 @@ fn narrow_band_note(rate: u32) -> Option<String> {
     ))
 }
 
-/// Writes the motion for a sound to `outputs`. Errors name the sound, or what this kind of network cannot do.
+/// Generates motion for a sound and writes it to `outputs`. Errors name the sound, or the option that this kind of
+/// network does not support.
 pub fn write(
     speaker: &TrainedSpeaker,
     speech: &SpeechSource,
     outputs: &[(PathBuf, ExportFormat)],
     progress: &dyn Progress,
-) -> Result<SpokenMotion> {
+) -> Result<MotionReport> {
     match speaker {
         TrainedSpeaker::Gan(speaker) => {
             let name = speaker.name();
@@ -139,7 +143,7 @@ mod tests {
     use super::narrow_band_note;
 
     #[test]
-    fn a_telephone_gives_a_note() {
+    fn narrow_band_sound_gives_a_note() {
         assert_eq!(narrow_band_note(16_000), None);
         assert_eq!(narrow_band_note(44_100), None);
         let text = narrow_band_note(8000).unwrap();

@@ -1,7 +1,8 @@
-//! One sound, and where there is one its transcript, to motion by a sequence-to-sequence network, to files.
+//! Generates motion for one sound and its optional transcript with a sequence-to-sequence network, and writes it to
+//! files.
 
 use super::motion_files::{measure, write_outputs};
-use super::spoken::{SegmentFacts, SpeechSource, SpokenMotion};
+use super::speech::{MotionReport, SegmentFacts, SpeechSource};
 use crate::generate::seq2seq::SequenceGenerator;
 use anyhow::{Context as _, Result, bail, ensure};
 use orator_avatar::animate::export::file::{ExportFormat, FigureOptions};
@@ -13,17 +14,17 @@ use orator_nn::seq2seq::predict::StateAtSeams;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Motion of a speaker for one sound, written to `outputs`. A network that learnt captures writes its own skeleton, as .bvh
-/// alone.
+/// Generates motion for one sound and writes it to `outputs`. Motion of a captured skeleton can only be written as BVH.
 ///
 /// # Errors
-/// A sound or transcript that cannot be read, a sound shorter than a frame, another format for a captured skeleton.
+/// A sound or transcript that cannot be read; a sound shorter than a frame; another format than BVH, or figure options,
+/// for a captured skeleton.
 pub fn write_sequence(
     speaker: &SequenceGenerator,
     speech: &SpeechSource,
     outputs: &[(PathBuf, ExportFormat)],
     progress: &dyn Progress,
-) -> Result<SpokenMotion> {
+) -> Result<MotionReport> {
     let &SpeechSource { audio, transcript, seams, figure } = speech;
     let started = Instant::now();
     let is_captured = speaker.is_captured();
@@ -38,33 +39,33 @@ pub fn write_sequence(
         "this network moves the skeleton of the BVH files it was trained on, whose names and rate are kept: leave out \
          --names and --fps"
     );
-    let said = transcript.map(Transcript::read).transpose()?;
+    let parsed = transcript.map(Transcript::read).transpose()?;
     let task = progress.begin("speech to motion", 0);
     measure(audio)?;
     let sound = audio::read_mono(audio, speaker.metadata.rate)?;
     let sound = sound.with_context(|| format!("{} has no sound", audio.display()))?;
-    let words = said.as_ref().map_or(&[][..], |said| &said.words);
+    let words = parsed.as_ref().map_or(&[][..], |parsed| &parsed.words);
     let no_motion = || format!("no motion for {}", audio.display());
-    let heard = speaker.hear(&sound, words).with_context(no_motion)?;
-    let poses = speaker.speak(&heard, seams).with_context(no_motion)?;
+    let input = speaker.prepare(&sound, words).with_context(no_motion)?;
+    let poses = speaker.generate(&input, seams).with_context(no_motion)?;
     let motion_secs = started.elapsed().as_secs_f64();
     let other = match seams {
         StateAtSeams::Renewed => StateAtSeams::Carried,
         StateAtSeams::Carried => StateAtSeams::Renewed,
     };
-    let other_seam_jump = speaker.speak(&heard, other).with_context(no_motion)?.seam_jump;
-    drop((task, heard));
+    let other_seam_jump = speaker.generate(&input, other).with_context(no_motion)?.seam_jump;
+    drop((task, input));
     if is_captured {
         let text = speaker.bvh(&poses)?;
         outputs.iter().try_for_each(|(path, _)| workdir::write_file(path, text.as_bytes()))?;
     } else {
         write_outputs((speaker.motion(&poses)?, None), speech, outputs, progress)?;
     }
-    let known = said.as_ref().map(|said| [said.words.len(), speaker.metadata.vocabulary.n_known(&said.words)]);
-    let notes = transcript.zip(said).map(|(path, said)| notes(speaker, path, &said, sound.secs()));
-    Ok(SpokenMotion {
+    let known = parsed.as_ref().map(|parsed| [parsed.words.len(), speaker.metadata.vocabulary.n_known(&parsed.words)]);
+    let notes = transcript.zip(parsed).map(|(path, parsed)| notes(speaker, path, &parsed, sound.secs()));
+    Ok(MotionReport {
         secs: sound.secs(),
-        n_frames: poses.numbers.nrows(),
+        n_frames: poses.features.nrows(),
         motion_secs,
         note: notes.filter(|notes| !notes.is_empty()).map(|notes| notes.join("; ")),
         segments: Some(SegmentFacts {
@@ -76,17 +77,17 @@ pub fn write_sequence(
     })
 }
 
-/// What a user should know of a transcript.
-fn notes(speaker: &SequenceGenerator, path: &Path, said: &Transcript, sound_secs: f64) -> Vec<String> {
+/// Notes about problems of a transcript.
+fn notes(speaker: &SequenceGenerator, path: &Path, parsed: &Transcript, sound_secs: f64) -> Vec<String> {
     if !speaker.reads_words() {
         return vec![format!("the network reads no words: {} was not used", path.display())];
     }
-    let is_unknown = !said.words.is_empty() && speaker.metadata.vocabulary.n_known(&said.words) == 0;
+    let is_unknown = !parsed.words.is_empty() && speaker.metadata.vocabulary.n_known(&parsed.words) == 0;
     let unknown = is_unknown.then(|| {
         format!(
             "none of the {} words was trained with: is the transcript in the language of the training?",
-            said.words.len()
+            parsed.words.len()
         )
     });
-    said.notes.iter().cloned().chain(after_end(&said.words, sound_secs)).chain(unknown).collect()
+    parsed.notes.iter().cloned().chain(after_end(&parsed.words, sound_secs)).chain(unknown).collect()
 }

@@ -1,5 +1,5 @@
-//! Which sounds a batch has and what each motion is called: from a folder, or from a table of comma-separated values (RFC 4180;
-//! semicolons and tabs are understood too).
+//! The sounds of a batch and the names of their motions, from a folder or from a table of comma-separated values (RFC
+//! 4180; semicolons and tabs are accepted too).
 
 use anyhow::{Context, Result, bail, ensure};
 use orator_avatar::animate::export::file::ExportFormat;
@@ -12,18 +12,21 @@ use std::path::{Component, Path, PathBuf};
 /// A sound of a batch.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BatchSound {
-    /// A file with sound.
+    /// Sound or video file.
     pub audio: PathBuf,
-    /// The motion's name below the folder of outputs, `/` between folders, without an ending.
+    /// Path of the motion below the output folder, with `/` between folders and without an extension.
     pub name: String,
-    /// The checkpoint, if it is not that of the command.
+    /// Checkpoint, if it differs from that of the batch.
     pub checkpoint: Option<PathBuf>,
-    /// What is said in it, for a network that reads words.
+    /// Transcript, for networks that read words.
     pub transcript: Option<PathBuf>,
 }
 
-/// All that sounds below `folder`, each called as its file; where two would be called the same, with their endings. What is
-/// below `out`, where motions go, is none of it: films sound too.
+/// All sounds below `folder`, named after their files, including the extension if two names would be equal. Files below
+/// the output folder `out` are skipped, since generated films contain sound too.
+///
+/// # Errors
+/// A path that is not a folder, a folder without sounds, or `out` equal to `folder`.
 pub fn of_folder(folder: &Path, out: &Path) -> Result<Vec<BatchSound>> {
     ensure!(folder.is_dir(), "{} is no folder", folder.display());
     let out = out.canonicalize().ok();
@@ -36,18 +39,18 @@ pub fn of_folder(folder: &Path, out: &Path) -> Result<Vec<BatchSound>> {
     let mut enter = |folder: &Path| folder.canonicalize().ok() != out;
     let endings = [&SOUND_EXTENSIONS[..], &VIDEO_EXTENSIONS].concat();
     let sounds = |path: &PathBuf| has_extension(path, &endings);
-    let named = |path: PathBuf| (path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().into_owned(), path);
+    let relative = |path: PathBuf| (path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().into_owned(), path);
     let files: Vec<(String, PathBuf)> =
-        search::files(folder, &mut enter)?.into_iter().filter(sounds).map(named).collect();
+        search::files(folder, &mut enter)?.into_iter().filter(sounds).map(relative).collect();
     ensure!(!files.is_empty(), "{} holds no file that sounds ({})", folder.display(), endings.join(", "));
     let stem = |file: &str| file.rsplit_once('.').map_or(file, |(stem, _)| stem).to_owned();
-    let mut called = BTreeMap::<String, usize>::new();
-    files.iter().for_each(|(file, _)| *called.entry(stem(file).to_lowercase()).or_default() += 1);
+    let mut name_counts = BTreeMap::<String, usize>::new();
+    files.iter().for_each(|(file, _)| *name_counts.entry(stem(file).to_lowercase()).or_default() += 1);
     let rows = files.into_iter().map(|(file, audio)| {
-        let alone = called.get(&stem(&file).to_lowercase()) == Some(&1);
+        let is_unique = name_counts.get(&stem(&file).to_lowercase()) == Some(&1);
         BatchSound {
             audio,
-            name: if alone { stem(&file) } else { file.replacen('.', "_", usize::MAX) },
+            name: if is_unique { stem(&file) } else { file.replacen('.', "_", usize::MAX) },
             checkpoint: None,
             transcript: None,
         }
@@ -55,8 +58,8 @@ pub fn of_folder(folder: &Path, out: &Path) -> Result<Vec<BatchSound>> {
     distinct(rows.collect())
 }
 
-/// The rows of the table `path`: columns `audio`, and if they are there `out`, `checkpoint` (or `speaker`) and `transcript`. Paths count
-/// from the table's folder. Errors name the line.
+/// Sounds of the table `path` with the column `audio`, and optionally `out`, `checkpoint` (or `speaker`) and
+/// `transcript`. Paths are relative to the folder of the table. Errors name the line.
 pub fn of_table(path: &Path) -> Result<Vec<BatchSound>> {
     let bytes = input::read(path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
     let text = std::str::from_utf8(&bytes).with_context(|| format!("{} is no text in UTF-8", path.display()))?;
@@ -67,8 +70,9 @@ pub fn of_table(path: &Path) -> Result<Vec<BatchSound>> {
 fn parse(text: &str, folder: &Path) -> Result<Vec<BatchSound>> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let heads = text.lines().next().unwrap_or_default();
-    let comma = [',', ';', '\t'].into_iter().max_by_key(|c| heads.matches(*c).count()).filter(|c| heads.contains(*c));
-    let mut lines = fields(text, comma.unwrap_or(','))?.into_iter();
+    let delimiter =
+        [',', ';', '\t'].into_iter().max_by_key(|c| heads.matches(*c).count()).filter(|c| heads.contains(*c));
+    let mut lines = fields(text, delimiter.unwrap_or(','))?.into_iter();
     let (_, heads) =
         lines.next().context("it is empty; its first line names the columns: audio,out,checkpoint,transcript")?;
     let heads: Vec<String> = heads.iter().map(|head| head.trim().to_lowercase()).collect();
@@ -86,8 +90,8 @@ fn parse(text: &str, folder: &Path) -> Result<Vec<BatchSound>> {
         ensure!(n.0 <= n.1, "line {line}: {} fields under {} columns", n.0, n.1);
         let Some(file) = field(Some(audio)) else { bail!("line {line}: no audio is named") };
         let name = match field(out) {
-            Some(out) => named(out).with_context(|| format!("line {line}"))?,
-            None => named(&Path::new(file).file_stem().unwrap_or_default().to_string_lossy())
+            Some(out) => motion_name(out).with_context(|| format!("line {line}"))?,
+            None => motion_name(&Path::new(file).file_stem().unwrap_or_default().to_string_lossy())
                 .with_context(|| format!("line {line}"))?,
         };
         rows.push(BatchSound {
@@ -101,8 +105,8 @@ fn parse(text: &str, folder: &Path) -> Result<Vec<BatchSound>> {
     Ok(rows)
 }
 
-/// A motion's name as given: relative, below the folder of outputs, without the ending of a format.
-fn named(out: &str) -> Result<String> {
+/// Name of a motion as given in a table: a relative path below the output folder, without the extension of a format.
+fn motion_name(out: &str) -> Result<String> {
     let path = Path::new(out);
     let path = if ExportFormat::from_path(path).is_ok() { path.with_extension("") } else { path.to_owned() };
     let parts: Option<Vec<String>> = path
@@ -115,7 +119,7 @@ fn named(out: &str) -> Result<String> {
     Ok(parts.join("/"))
 }
 
-/// Errors where two motions would be one file, upper and lower case being the same on many disks.
+/// Fails if two motions would be written to the same file; case is ignored, as by many file systems.
 fn distinct(rows: Vec<BatchSound>) -> Result<Vec<BatchSound>> {
     let mut seen = BTreeMap::new();
     for row in &rows {
@@ -126,14 +130,17 @@ fn distinct(rows: Vec<BatchSound>) -> Result<Vec<BatchSound>> {
     Ok(rows)
 }
 
-/// Fields of each line with something on it, and its number.
-fn fields(text: &str, comma: char) -> Result<Vec<(usize, Vec<String>)>> {
-    let mut table =
-        csv::ReaderBuilder::new().delimiter(comma as u8).has_headers(false).flexible(true).from_reader(text.as_bytes());
+/// Line number and fields of each line that is not empty.
+fn fields(text: &str, delimiter: char) -> Result<Vec<(usize, Vec<String>)>> {
+    let mut table = csv::ReaderBuilder::new()
+        .delimiter(delimiter as u8)
+        .has_headers(false)
+        .flexible(true)
+        .from_reader(text.as_bytes());
     let (mut rows, mut last) = (Vec::new(), (1, ""));
     for record in table.records() {
         let record = record?;
-        // The position is before the empty lines that lead to the record.
+        // The position is before any empty lines that precede the record.
         let (line, rest) = record.position().map_or((1, text), |at| (at.line() as usize, &text[at.byte() as usize..]));
         let body = rest.trim_start_matches(['\r', '\n']);
         let line = line + rest[..rest.len() - body.len()].matches('\n').count();
@@ -151,7 +158,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn tables_of_every_kind_are_read() {
+    fn tables_of_all_dialects_are_read() {
         let row = |audio: &str, name: &str, checkpoint: Option<&str>| BatchSound {
             audio: PathBuf::from(audio),
             name: name.into(),
@@ -167,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_named_with_its_line() {
+    fn errors_name_the_line() {
         for (text, words) in [
             ("", "empty"),
             ("out\na", "no column `audio`"),
@@ -186,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folders_sounds_keep_apart() {
+    fn sounds_of_a_folder_have_unique_names() {
         let dir = tempfile::tempdir().unwrap();
         std::fs::create_dir(dir.path().join("sub")).unwrap();
         for file in ["a.wav", "A.mp3", "b.WAV", "notes.txt", ".hidden.wav", "sub/a.wav"] {

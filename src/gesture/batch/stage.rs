@@ -1,9 +1,9 @@
-//! The stage: one unit a sound, whose motion goes into the common folder in each of the formats.
+//! The batch as a stage with one unit per sound, whose motion is written to a common folder in all formats.
 
 use super::job::SpeechBatch;
 use super::motion_files;
 use super::sounds::BatchSound;
-use super::spoken::SpeechSource;
+use super::speech::SpeechSource;
 use crate::generate::model::{checkpoint_file, model_lock};
 use crate::generate::seq2seq::metadata::is_sequence;
 use crate::generate::trained::TrainedSpeaker;
@@ -19,23 +19,23 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
-/// Sounds to motion files.
+/// Stage that generates motion files for sounds.
 pub struct BatchStage<'a> {
     batch: &'a SpeechBatch,
     sounds: BTreeMap<&'a str, &'a BatchSound>,
-    /// Endings with their formats.
+    /// Formats with their file extensions.
     formats: Vec<(String, ExportFormat)>,
-    /// File of the checkpoint of the sounds that name none.
+    /// Checkpoint file for sounds without their own.
     checkpoint: Option<PathBuf>,
-    /// The models in use, with the locks of their folders.
+    /// Loaded models by checkpoint file, with the locks of their folders.
     speakers: Mutex<BTreeMap<PathBuf, (Arc<TrainedSpeaker>, FolderLock)>>,
 }
 
 impl<'a> BatchStage<'a> {
-    /// The stage of a batch.
+    /// Stage of a batch.
     ///
     /// # Errors
-    /// An ending that is unknown or named twice, a sound without a checkpoint, a common checkpoint that cannot be read.
+    /// A format that is unknown or given twice, a sound without a checkpoint, a common checkpoint that cannot be read.
     pub fn new(batch: &'a SpeechBatch) -> Result<Self> {
         let checkpoint = batch.checkpoint.as_deref().map(checkpoint_file).transpose()?;
         if checkpoint.is_none()
@@ -46,12 +46,12 @@ impl<'a> BatchStage<'a> {
         let sounds = batch.sounds.iter().map(|sound| (sound.name.as_str(), sound)).collect();
         let formats = formats(&batch.formats)?;
         let stage = Self { batch, sounds, formats, checkpoint, speakers: Mutex::default() };
-        // A common checkpoint that cannot be read fails all sounds, and does so before any.
+        // Loaded immediately, because a broken common checkpoint would fail all sounds.
         stage.checkpoint.as_deref().map(|path| stage.speaker(path)).transpose()?;
         Ok(stage)
     }
 
-    /// The unit of a sound.
+    /// Unit of a sound.
     pub fn unit(sound: &BatchSound) -> Unit {
         Unit { speaker: String::new(), video: sound.name.clone(), source: sound.audio.clone() }
     }
@@ -60,7 +60,7 @@ impl<'a> BatchStage<'a> {
         self.sounds.get(unit.video.as_str()).copied().with_context(|| format!("{unit} is no sound of this batch"))
     }
 
-    /// The transcript of a sound, which a sequence-to-sequence network alone reads.
+    /// Transcript of a sound, if its checkpoint is a sequence-to-sequence network; others do not read it.
     fn transcript_of(&self, unit: &Unit) -> Result<Option<&Path>> {
         let transcript = self.sound(unit)?.transcript.as_deref();
         Ok(transcript.filter(|_| self.checkpoint_of(unit).and_then(|path| is_sequence(&path)).unwrap_or(false)))
@@ -139,7 +139,7 @@ impl Stage for BatchStage<'_> {
     }
 }
 
-/// The formats by their endings.
+/// Formats for file extensions.
 fn formats(endings: &[String]) -> Result<Vec<(String, ExportFormat)>> {
     let mut formats: Vec<(String, ExportFormat)> = Vec::new();
     for ending in endings {

@@ -1,25 +1,26 @@
-//! Transcripts of the sounds of a batch, found by name.
+//! Search for the transcripts of the sounds of a batch by name.
 
 use super::sounds::BatchSound;
 use anyhow::{Result, ensure};
 use orator_formats::transcript::ENDINGS;
 use std::path::{Path, PathBuf};
 
-/// Names the transcript of every sound that names none: called as the motion or the sound in `folder`, or, without a folder,
-/// as the sound beside it. A sound may have none.
+/// Finds the transcript of every sound without one: in `folder`, with the name of the motion or of the sound, or else
+/// next to the sound with its name. A sound may have no transcript.
 ///
 /// # Errors
-/// A `folder` that is none, or without a transcript of any of the sounds.
+/// A `folder` that is not a folder, or that has no transcript for any of the sounds.
 pub fn find(sounds: &mut [BatchSound], folder: Option<&Path>) -> Result<()> {
     if let Some(folder) = folder {
         ensure!(folder.is_dir(), "{} is no folder; for many sounds --transcript is one", folder.display());
     }
     for sound in sounds.iter_mut().filter(|sound| sound.transcript.is_none()) {
         sound.transcript = match folder {
-            None => with_ending(&sound.audio.with_extension("")),
+            None => with_transcript_extension(&sound.audio.with_extension("")),
             Some(folder) => {
                 let stem = sound.audio.file_stem().unwrap_or_default();
-                with_ending(&folder.join(&sound.name)).or_else(|| with_ending(&folder.join(stem)))
+                with_transcript_extension(&folder.join(&sound.name))
+                    .or_else(|| with_transcript_extension(&folder.join(stem)))
             }
         };
     }
@@ -34,8 +35,8 @@ pub fn find(sounds: &mut [BatchSound], folder: Option<&Path>) -> Result<()> {
     Ok(())
 }
 
-/// The first file with the ending of a transcript behind `path`.
-fn with_ending(path: &Path) -> Option<PathBuf> {
+/// First existing file whose name is `path` followed by a transcript extension.
+fn with_transcript_extension(path: &Path) -> Option<PathBuf> {
     let named = |ending: &&str| PathBuf::from(format!("{}.{ending}", path.display()));
     ENDINGS.iter().map(named).find(|path| path.is_file())
 }
@@ -45,7 +46,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn transcripts_lie_beside_the_sound_or_in_a_folder() {
+    fn transcripts_are_found_next_to_the_sound_or_in_a_folder() {
         let dir = tempfile::tempdir().unwrap();
         let at = |name: &str| dir.path().join(name);
         std::fs::create_dir_all(at("said/sub")).unwrap();

@@ -1,10 +1,10 @@
-//! An evaluation as a value: motions beside their ground truth, with the simple predictors measured beside them.
+//! An evaluation: motions with their ground truth, and the baselines that are measured with them.
 
 use super::baseline::baselines::{self, Predictor};
 use super::clips::checkpoint::EvaluatedCheckpoint;
 use super::clips::clips::{self, EvalClips};
 use super::clips::motion_store::MotionStore;
-use super::clips::{of_speaker, pairs};
+use super::clips::{from_checkpoints, pairs};
 use super::table::table::{self, Table};
 use crate::metrics::settings::MetricSettings;
 use anyhow::{Result, ensure};
@@ -13,21 +13,21 @@ use orator_base::types::time::FrameRate;
 use orator_dataset::{Dataset, Split};
 use std::path::Path;
 
-/// Motions to be measured beside their ground truth.
+/// Motions to be evaluated against their ground truth.
 pub struct Evaluation {
-    /// The ground truth, cut into clips, with its sound.
+    /// Clips with ground truth and sound.
     pub clips: EvalClips,
-    /// The motions under test first, then the simple predictors.
+    /// The motions under test, followed by the baselines.
     pub predictors: Vec<Predictor>,
 }
 
 impl Evaluation {
-    /// Reads files of motion: `truth` and `prediction` are two files, or two folders whose files have the same names;
-    /// `audio` is a sound or a folder of sounds. `fps` is the rate of files that do not state one. `store` keeps
-    /// the motions.
+    /// Reads motion files: `truth` and `prediction` are two files, or two folders whose files have the same names;
+    /// `audio` is a sound or a folder of sounds. `fps` is the frame rate of files that do not state one. The motions
+    /// are saved in `store`.
     ///
     /// # Errors
-    /// Files that do not belong together or cannot be read.
+    /// Files that do not match or cannot be read.
     pub fn from_files(
         truth: &Path,
         prediction: &Path,
@@ -51,13 +51,14 @@ impl Evaluation {
         Ok(Self { clips, predictors })
     }
 
-    /// Generates motion with each checkpoint for the sounds and words of a split of the dataset, whose own motion is the
-    /// ground truth: joints [T, 49, 3] in metres at the dataset's rate. Where a checkpoint moves a captured skeleton, all
-    /// predictors are measured on the joints that it has, and a note says which.
+    /// Generates motion with each checkpoint for the sounds and words of a split of the dataset, whose motion is the
+    /// ground truth: joints [T, 49, 3] in metres at the dataset's frame rate. If a checkpoint animates a captured
+    /// skeleton, all predictors are measured on the joints that it has, which a note lists. The motions are saved in
+    /// `store`.
     ///
     /// # Errors
-    /// No checkpoint, a split without samples, a dataset of another rate than a checkpoint's (that of a captured skeleton
-    /// is resampled). `store` keeps the motions.
+    /// No checkpoint; a split without samples; a dataset of another frame rate than a checkpoint (motion of a captured
+    /// skeleton is resampled instead).
     pub fn of_generators(
         dataset: &Dataset,
         checkpoints: &[EvaluatedCheckpoint],
@@ -66,14 +67,14 @@ impl Evaluation {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let task = progress.begin("evaluating", 0);
-        let (clips, predictors) = of_speaker::prepare(dataset, checkpoints, split, store, &*task)?;
+        let (clips, predictors) = from_checkpoints::prepare(dataset, checkpoints, split, store, &*task)?;
         Ok(Self { clips, predictors })
     }
 
     /// Measures every predictor.
     ///
     /// # Errors
-    /// Settings that fit no clip.
+    /// Settings that the metric catalogue rejects; no frame to measure.
     pub fn measure(&self, settings: &MetricSettings, progress: &dyn Progress) -> Result<Table> {
         table::measure(&self.clips, settings, &self.predictors, &*progress.begin("evaluating", 0))
     }

@@ -1,7 +1,6 @@
-//! Evaluation of what is trained. `lifter`: errors of the lifters on motion with known truth seen by random cameras;
-//! `people`: of the whole pipeline on rendered people.
-//! For gestures: `clips` (from pairs of files, or from a dataset and a checkpoint), `baseline` (predictors to compare
-//! with), `table` (metrics in blocks, bootstrap intervals, results, comparison) and `verdict` (conclusions in words).
+//! Evaluation of generated gestures: `clips` (from pairs of files, or from a dataset and checkpoints), `baseline`
+//! (predictors to compare with), `table` (metrics in blocks, bootstrap intervals, results, comparison) and `verdict`
+//! (conclusions as text).
 
 pub mod baseline;
 pub mod clips;

@@ -1,4 +1,4 @@
-//! Speech to motion with a trained speaker, chunk by chunk: memory does not grow with the sound.
+//! Generation of motion from speech with a trained GAN, chunk by chunk, so that memory does not grow with the sound.
 
 use super::mel_stream::{MelStream, mel_frames};
 use super::model::{self, GenerationChoice, SpeakerMetadata, checkpoint_file};
@@ -13,61 +13,64 @@ use orator_nn::gan::generator::{FRAMES_MULTIPLE, Generator};
 use orator_nn::gan::streaming::StreamingGenerator;
 use std::path::Path;
 
-/// Frames generated at once; the 256 context frames that are computed beside them and dropped are a small part.
+/// Frames generated at once, many more than the 256 context frames that are computed in addition and dropped.
 pub const CHUNK: usize = 2048;
 
-/// A trained speaker.
+/// A trained GAN generator of one speaker.
 pub struct GestureGenerator {
-    /// What the checkpoint says of it.
+    /// Metadata stored in the checkpoint.
     pub metadata: SpeakerMetadata,
     pub generator: Generator,
 }
 
 impl GestureGenerator {
-    /// Opens a checkpoint of `orator train gan`: a file, or the folder of a training (its best checkpoint).
+    /// Opens a checkpoint of `orator train gan`: a file, or the best checkpoint in the folder of a training.
     pub fn open(path: &Path) -> Result<Self> {
         Self::open_as(path, &GenerationChoice::default())
     }
 
-    /// As `open`, as this speaker and take. Errors as well on a speaker that the network does not know, and on takes of one that was
-    /// trained without dropout.
+    /// Like `open`, for the chosen speaker and variant. Also fails for a speaker that the network does not have, and
+    /// for variants of a network that was trained without dropout.
     pub fn open_as(path: &Path, choice: &GenerationChoice) -> Result<Self> {
         let (metadata, generator) = model::load(&checkpoint_file(path)?, choice)?;
         Ok(Self { metadata, generator })
     }
 
-    /// The speaker's name.
+    /// Name of the speaker.
     pub fn name(&self) -> &str {
         &self.metadata.name
     }
 
-    /// The rate of the motion it makes.
+    /// Frame rate of the generated motion.
     pub fn fps(&self) -> FrameRate {
         self.metadata.fps
     }
 
-    /// Motion for `sound` (16 kHz): as many whole frames as fit into it, bones of the speaker's lengths. Errors on another
-    /// rate, and on sound shorter than a frame.
+    /// Motion for `sound` (16 kHz) with the speaker's bone lengths, as many complete frames as fit into the sound.
+    /// Fails for another sample rate, and for sound shorter than a frame.
     pub fn motion(&self, sound: &Sound) -> Result<Motion> {
         Ok(self.motion_and_posture(sound)?.0)
     }
 
-    /// As `motion`, with the angles of head and trunk where they were learnt.
+    /// Like `motion`, with the angles of head and trunk if the network was trained on them.
     pub fn motion_and_posture(&self, sound: &Sound) -> Result<(Motion, Option<Posture>)> {
         ensure!(sound.rate == SAMPLE_RATE, "the sound has {} Hz, expected {SAMPLE_RATE}", sound.rate);
         let pieces = sound.samples.chunks(SAMPLE_RATE as usize).map(|piece| Ok(piece.to_vec()));
         self.motion_of_pieces(pieces, sound.samples.len(), CHUNK, &mut |_| ())
     }
 
-    /// Motion and posture for `n_samples` at 16 kHz that come piece by piece, made `chunk` frames at a time: memory does not grow with
-    /// the sound, except for the motion. `made` is called with the number of frames of each chunk. Errors of `motion`,
-    /// pieces that are not `n_samples` together, and a `chunk` that is no multiple of 32.
+    /// Motion and posture for a stream of sound pieces (16 kHz, `n_samples` in total), generated in chunks of `chunk`
+    /// frames. Apart from the motion, memory does not grow with the sound. `on_chunk` is called with the number of
+    /// frames of each chunk.
+    ///
+    /// # Errors
+    /// Errors of `motion`; fewer samples than `n_samples`; a `chunk` that is not a multiple of 32.
     pub fn motion_of_pieces(
         &self,
         pieces: impl Iterator<Item = Result<Vec<f32>>>,
         n_samples: usize,
         chunk: usize,
-        made: &mut dyn FnMut(usize),
+        on_chunk: &mut dyn FnMut(usize),
     ) -> Result<(Motion, Option<Posture>)> {
         let n_frames = self.n_frames(n_samples)?;
         let mut joints = Array3::zeros((n_frames, N_JOINTS, 3));
@@ -85,14 +88,14 @@ impl GestureGenerator {
                 }
             }
             first += poses.ncols();
-            made(poses.ncols());
+            on_chunk(poses.ncols());
         }
         Ok((Motion::from_joints(self.fps(), joints), posture))
     }
 
-    /// Raw output of the network for sound that comes as in [`Self::motion_of_pieces`], [numbers, T] of one chunk after another,
-    /// `chunk` frames or less each, which [`SpeakerMetadata::motion`] turns into motion. The sound is continued by its
-    /// mirror image up to a multiple of 32 frames.
+    /// Raw network output [features, T] in chunks of at most `chunk` frames, which [`SpeakerMetadata::motion`] converts
+    /// to motion, for sound pieces as in [`Self::motion_of_pieces`]. The sound is extended by its mirror image to a
+    /// multiple of 32 frames.
     pub fn features(
         &self,
         pieces: impl Iterator<Item = Result<Vec<f32>>>,
@@ -117,7 +120,7 @@ impl GestureGenerator {
         }))
     }
 
-    /// Frames of motion for so many samples.
+    /// Number of complete frames of motion for `n_samples` samples at 16 kHz. Fails if there is none.
     pub fn n_frames(&self, n_samples: usize) -> Result<usize> {
         let secs = n_samples as f64 / f64::from(SAMPLE_RATE);
         let n_frames = (secs * self.fps().per_sec() + 1e-6) as usize;

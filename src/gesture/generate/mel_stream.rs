@@ -1,6 +1,6 @@
-//! The sound on its way into the network: pieces come in one after the other, spectrogram frames are asked for in order, and
-//! what is not needed any more is let go. Behind its end the sound goes on as its mirror image, for
-//! which the tail is kept.
+//! Streaming spectrogram of a sound: pieces are read one after another as spectrogram frames are requested in order,
+//! and samples that are no longer needed are dropped. Beyond its end the sound is extended by its mirror image, for
+//! which the tail is retained.
 
 use anyhow::Result;
 use candle_core::{Device, Tensor};
@@ -9,19 +9,21 @@ use orator_base::types::sound::sample_at;
 use orator_base::types::time::FrameRate;
 use std::ops::Range;
 
-/// Sound of a known length in pieces of any.
+/// Spectrogram stream of a sound of known length that is read in pieces of any length.
 pub struct MelStream<I> {
     pieces: I,
     n_samples: usize,
-    /// The samples at hand, and which is the first of them.
+    /// Buffered samples.
     samples: Vec<f32>,
+    /// Index in the sound of the first buffered sample.
     first: usize,
-    /// From here on samples are kept to the end.
+    /// Index from which samples are never dropped, as the mirror image needs them.
     tail: usize,
 }
 
 impl<I: Iterator<Item = Result<Vec<f32>>>> MelStream<I> {
-    /// `pieces` of `n_samples` together, of which `n_mel_frames` spectrogram frames will be asked for.
+    /// Stream over `pieces` of `n_samples` samples in total, of which `n_mel_frames` spectrogram frames will be
+    /// requested.
     pub fn new(pieces: I, n_samples: usize, n_mel_frames: usize) -> Self {
         let end = mel::n_samples(n_mel_frames);
         let period = period(n_samples);
@@ -29,7 +31,8 @@ impl<I: Iterator<Item = Result<Vec<f32>>>> MelStream<I> {
         Self { pieces, n_samples, samples: Vec::new(), first: 0, tail }
     }
 
-    /// These spectrogram frames, [1, 64, T]. They may begin before the end of those asked for last, not before their beginning.
+    /// Log-mels [1, 64, T] of these spectrogram frames. Successive ranges may overlap, but their starts must not
+    /// decrease.
     pub fn log_mels(&mut self, frames: Range<usize>) -> Result<Tensor> {
         let first = frames.start * mel::HOP;
         let mels = mel::log_mel(&self.mirrored(first..first + mel::n_samples(frames.len()))?);
@@ -37,7 +40,7 @@ impl<I: Iterator<Item = Result<Vec<f32>>>> MelStream<I> {
         Ok(Tensor::from_iter(mels.t().iter().copied(), &Device::Cpu)?.reshape(shape)?)
     }
 
-    /// These samples of the sound, then its mirror image, then the sound again, as long as needed.
+    /// These samples of the sound extended periodically by its mirror image.
     fn mirrored(&mut self, range: Range<usize>) -> Result<Vec<f32>> {
         let needed = range.start.min(self.tail);
         if needed > self.first {
@@ -45,10 +48,10 @@ impl<I: Iterator<Item = Result<Vec<f32>>>> MelStream<I> {
             self.first = needed;
         }
         while self.first + self.samples.len() < range.end.min(self.n_samples) {
-            let there = self.first + self.samples.len();
+            let n_read = self.first + self.samples.len();
             let Some(piece) = self.pieces.next() else {
                 anyhow::bail!(
-                    "the sound ended after {there} of {} samples: it changed while it was read",
+                    "the sound ended after {n_read} of {} samples: it changed while it was read",
                     self.n_samples
                 )
             };
@@ -62,12 +65,12 @@ impl<I: Iterator<Item = Result<Vec<f32>>>> MelStream<I> {
     }
 }
 
-/// Samples after which a sound and its mirror image begin anew.
+/// Period in samples of a sound that is extended by its mirror image.
 fn period(n_samples: usize) -> usize {
     (2 * n_samples).saturating_sub(2).max(1)
 }
 
-/// Spectrogram frames that span `n_frames` frames of motion: the nearest whole number of 10 ms hops.
+/// Number of spectrogram frames (10 ms hops) that span `n_frames` frames of motion, rounded to the nearest integer.
 pub fn mel_frames(fps: FrameRate, n_frames: usize) -> usize {
     let rate = orator_base::types::sound::SAMPLE_RATE;
     (sample_at(fps, rate, n_frames) + mel::HOP / 2) / mel::HOP
@@ -91,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn little_is_kept_and_nothing_is_lost() {
+    fn streaming_equals_the_complete_spectrogram_with_a_small_buffer() {
         let samples: Vec<f32> = (0..200_000).map(|i| ((i * 7919) % 1009) as f32 / 1009.0 - 0.5).collect();
         let n_mel_frames = mel::n_frames(210_000);
         let whole = stream(&samples, 200_000, n_mel_frames).log_mels(0..n_mel_frames).unwrap();
@@ -109,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sound_that_became_shorter_is_found_out() {
+    fn a_sound_that_became_shorter_is_an_error() {
         let mut stream = stream(&[0.1; 5000], 999, mel::n_frames(6000));
         stream.n_samples = 6000;
         let text = stream.log_mels(0..mel::n_frames(6000)).unwrap_err().to_string();

@@ -1,4 +1,4 @@
-//! Speech to motion with a trained speaker, chunk by chunk: memory does not grow with the sound.
+//! Generation of motion from speech with a trained model.
 
 pub mod generator;
 pub mod mel_stream;

@@ -1,4 +1,4 @@
-//! What a checkpoint of the generator means: the metadata that generation needs, and the network itself.
+//! Checkpoints of the GAN generator: the metadata that generation needs, and loading of the network.
 
 use super::normalisation::Normalisation;
 use super::representation::Representation;
@@ -20,19 +20,19 @@ use orator_nn::weights::Contents;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Tensors of the generator in a checkpoint begin with this.
+/// Prefix of the generator's tensors in a checkpoint.
 pub const GENERATOR: &str = "generator.";
-/// Name and version of the layout; another is refused.
+/// Name and version of the checkpoint layout; any other is rejected.
 const KIND: &str = "orator speaker 2";
 const SKELETON: &str = "49 joints, house order";
-/// Most channels of a network that is believed; the published one has 256.
-const MOST_WIDTH: usize = 1024;
+/// Largest accepted number of channels; the published network has 256.
+const MAX_WIDTH: usize = 1024;
 
-/// Everything beside the tensors that generation needs. Stored under `speaker` in a checkpoint's metadata.
+/// Everything that generation needs besides the tensors. Stored under `speaker` in the metadata of a checkpoint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpeakerMetadata {
     pub kind: String,
-    /// The speaker's name.
+    /// Name of the speaker.
     pub name: String,
     pub fps: FrameRate,
     pub skeleton: String,
@@ -40,18 +40,18 @@ pub struct SpeakerMetadata {
     pub audio: SpectrogramSettings,
     pub normalisation: Normalisation,
     pub representation: Representation,
-    /// Hash of the dataset it learnt from.
+    /// Hash of the training dataset.
     pub dataset: String,
-    /// Videos it learnt from, those of the models that it began from among them.
+    /// Training videos, including those of the models that this one was initialised from.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub videos: Vec<TrainedVideo>,
 }
 
-/// A video that a model learnt from.
+/// A video that a model was trained on.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct TrainedVideo {
     pub speaker: String,
-    /// BLAKE3 of the file, as the dataset has it.
+    /// BLAKE3 hash of the file, as stored in the dataset.
     pub content: String,
 }
 
@@ -83,7 +83,8 @@ impl SpectrogramSettings {
 }
 
 impl SpeakerMetadata {
-    /// Metadata with the current skeleton and spectrogram; `name` and `fps` of the speaker, `dataset` as its hash.
+    /// Metadata with the current skeleton and spectrogram settings. `name` and `fps` are those of the speaker,
+    /// `dataset` is the hash of the dataset.
     pub fn new(
         name: &str,
         fps: FrameRate,
@@ -106,14 +107,14 @@ impl SpeakerMetadata {
         }
     }
 
-    /// Adds videos to those it learnt from.
+    /// Adds training videos, without duplicates.
     pub fn add_videos(&mut self, videos: Vec<TrainedVideo>) {
         self.videos.extend(videos);
         self.videos.sort();
         self.videos.dedup();
     }
 
-    /// The generator's numbers [144 or more, T] as motion whose bones have the speaker's lengths in every frame.
+    /// Converts network output [144 or more, T] to motion with the speaker's bone lengths in every frame.
     pub fn motion(&self, raw: ArrayView2<f32>) -> Motion {
         let mut motion = Motion::from_joints(self.fps, self.representation.joints(raw, &self.normalisation));
         bones::with_lengths(&mut motion, &self.normalisation.lengths());
@@ -121,28 +122,28 @@ impl SpeakerMetadata {
     }
 }
 
-/// What generates where a checkpoint leaves a choice.
+/// Choice of speaker and variant for generation.
 #[derive(Clone, Debug, Default)]
 pub struct GenerationChoice {
-    /// Name of the speaker; needed where a network knows several.
+    /// Name of the speaker; required for networks of several speakers.
     pub speaker: Option<String>,
-    /// Which take of a speech (`variant`); `None`: the network as it was trained.
+    /// Seed of the variant (see `variant`); `None`: the complete network.
     pub seed: Option<u64>,
 }
 
-/// Reads a checkpoint of `orator train gan`, as a network of one speaker. Errors name the file and what is wrong with it.
+/// Loads a checkpoint of `orator train gan` as a network of one speaker. Errors name the file and the cause.
 pub fn load(path: &Path, choice: &GenerationChoice) -> Result<(SpeakerMetadata, Generator)> {
     let mut contents = Contents::read(path)?;
-    let is_none = || format!("{} is no checkpoint of `orator train gan`", path.display());
-    check(&contents.facts["speaker"]).with_context(is_none)?;
-    choose(&mut contents, choice.speaker.as_deref()).with_context(|| path.display().to_string())?;
+    let context = || format!("{} is no checkpoint of `orator train gan`", path.display());
+    check(&contents.facts["speaker"]).with_context(context)?;
+    select_speaker(&mut contents, choice.speaker.as_deref()).with_context(|| path.display().to_string())?;
     if let Some(seed) = choice.seed {
         variant::vary(&mut contents, GENERATOR, seed).with_context(|| format!("{} has no takes", path.display()))?;
     }
-    build(&contents).with_context(is_none)
+    build(&contents).with_context(context)
 }
 
-/// The speakers that a checkpoint of `orator train gan` knows, in the order of their numbers.
+/// Speakers of a checkpoint of `orator train gan` in the order of their indices, from its metadata `facts`.
 pub fn speakers(facts: &serde_json::Value) -> Result<Vec<SpeakerMetadata>> {
     check(&facts["speaker"])?;
     let first = [facts["speaker"].clone()];
@@ -154,8 +155,8 @@ pub fn speakers(facts: &serde_json::Value) -> Result<Vec<SpeakerMetadata>> {
     Ok(all)
 }
 
-/// Leaves one speaker of a network of several.
-fn choose(contents: &mut Contents, name: Option<&str>) -> Result<()> {
+/// Reduces a network of several speakers to one speaker.
+fn select_speaker(contents: &mut Contents, name: Option<&str>) -> Result<()> {
     let all = speakers(&contents.facts)?;
     let names = || all.iter().map(|speaker| speaker.name.as_str()).collect::<Vec<_>>().join(", ");
     let number = match name {
@@ -176,7 +177,7 @@ fn choose(contents: &mut Contents, name: Option<&str>) -> Result<()> {
     Ok(())
 }
 
-/// Errors unless these facts of a speaker are of a checkpoint that this program reads.
+/// Fails unless the metadata of a speaker is of a checkpoint kind that this program reads.
 fn check(facts: &serde_json::Value) -> Result<()> {
     let kind = &facts["kind"];
     ensure!(!is_sequence_kind(kind), "it is one of `orator train seq2seq`, with which `orator generate` speaks");
@@ -194,11 +195,11 @@ fn build(contents: &Contents) -> Result<(SpeakerMetadata, Generator)> {
         "its audio settings are others than this program's: {:?}",
         metadata.audio
     );
-    let (n_out, n_numbers) = (metadata.network.n_out, metadata.normalisation.n_numbers());
-    ensure!(n_out == n_numbers, "it makes {n_out} numbers a pose, not {n_numbers}");
+    let (n_out, n_features) = (metadata.network.n_out, metadata.normalisation.n_features());
+    ensure!(n_out == n_features, "it makes {n_out} numbers a pose, not {n_features}");
     let (network, fps) = (&metadata.network, metadata.fps);
     ensure!(network.n_mels == mel::N_MELS, "it reads {} mel bands, not {}", network.n_mels, mel::N_MELS);
-    ensure!((4..=MOST_WIDTH).contains(&network.width), "its width is {}, expected 4 to {MOST_WIDTH}", network.width);
+    ensure!((4..=MAX_WIDTH).contains(&network.width), "its width is {}, expected 4 to {MAX_WIDTH}", network.width);
     ensure!(network.n_speakers <= 1, "it knows {} speakers", network.n_speakers);
     contents.expect_numbers(network.width * network.width)?;
     ensure!(fps.is_plausible(), "it moves at {fps}, expected 1 to 1000 frames a second");
@@ -210,13 +211,13 @@ fn build(contents: &Contents) -> Result<(SpeakerMetadata, Generator)> {
     Ok((metadata, generator))
 }
 
-/// The best checkpoint by the validation's score: the generator alone, to generate with.
+/// File name of the checkpoint with the best validation score, which holds only the generator.
 pub const BEST: &str = "best.safetensors";
 
-/// The checkpoint file meant by a file or a training's folder: its best, else its newest.
+/// Checkpoint file for a path: the file itself, or the best, else the newest checkpoint in the folder of a training.
 ///
 /// # Errors
-/// A path that is not there, a folder without checkpoints.
+/// A path that does not exist, or a folder without checkpoints.
 pub fn checkpoint_file(path: &Path) -> Result<PathBuf> {
     ensure!(
         path.exists(),
@@ -231,7 +232,8 @@ pub fn checkpoint_file(path: &Path) -> Result<PathBuf> {
     newest.with_context(|| format!("{} holds no checkpoint (best.safetensors or step-*.safetensors)", path.display()))
 }
 
-/// Keeps the model of a checkpoint, a file or a training's folder, from being forgotten while it is in use.
+/// Shared lock on the model of a checkpoint (a file, or the folder of a training), so that `forget` cannot remove it
+/// while it is in use.
 pub fn model_lock(checkpoint: &Path) -> Result<FolderLock> {
     FolderLock::shared(if checkpoint.is_dir() { checkpoint } else { checkpoint.parent().unwrap_or(checkpoint) })
 }
@@ -245,7 +247,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     #[test]
-    fn facts_that_no_training_writes_are_refused() {
+    fn implausible_metadata_is_rejected() {
         let table = vec![1.0; N_FEATURES];
         let normal =
             Normalisation { mean: table.clone(), std: table, bone_lengths: vec![0.1; N_BONES], channels: Vec::new() };
@@ -257,7 +259,7 @@ mod tests {
         let mut contents = Contents { facts: serde_json::json!({ "speaker": facts }), tensors: BTreeMap::new() };
         contents.add(GENERATOR, params.tensors().unwrap());
         build(&contents).unwrap();
-        for (place, value) in [
+        for (pointer, value) in [
             ("/speaker/network/width", 1_000_000),
             ("/speaker/network/width", 0),
             ("/speaker/network/n_mels", 1_000_000),
@@ -267,9 +269,9 @@ mod tests {
             ("/speaker/normalisation/std/3", 0),
         ] {
             let mut facts = contents.facts.clone();
-            *facts.pointer_mut(place).unwrap() = value.into();
+            *facts.pointer_mut(pointer).unwrap() = value.into();
             let wrong = Contents { facts, tensors: contents.tensors.clone() };
-            assert!(build(&wrong).is_err(), "{place} {value}");
+            assert!(build(&wrong).is_err(), "{pointer} {value}");
         }
         for (field, value) in [("bone_lengths", -0.1), ("std", -1.0), ("mean", 1e300)] {
             let mut facts = contents.facts.clone();

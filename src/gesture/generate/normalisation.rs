@@ -1,6 +1,6 @@
-//! The numbers the generator and the discriminator see: 48 joints (all but the neck) x 3, and where they are learnt the
-//! angles of head and trunk, each with mean 0 and deviation 1 over the training split; and the way back to metres and
-//! radians.
+//! Normalised features of generator and discriminator: the coordinates of 48 joints (all but the neck), and optionally
+//! the angles of head and trunk, each with mean 0 and standard deviation 1 over the training split; and the conversion
+//! back to metres and radians.
 
 use anyhow::ensure;
 use ndarray::{Array2, Array3, ArrayView2};
@@ -9,27 +9,29 @@ use orator_base::types::posture::{Posture, PostureChannel};
 use orator_base::types::skeleton::{L_HAND, L_WRIST, N_BONES, N_JOINTS, NECK, R_HAND, R_WRIST, is_duplicate};
 use serde::{Deserialize, Serialize};
 
-/// Numbers of the joints of a pose, before those of channels. Number `3 * (joint - 1) + k` is coordinate k of a joint.
+/// Features of the joints of a pose, which precede those of the channels. Feature `3 * (joint - 1) + k` is coordinate k
+/// of a joint.
 pub const N_FEATURES: usize = 3 * N_BONES;
-/// Least deviation a coordinate is divided by, metres: what hardly moves is not blown up.
-const LEAST_STD: f32 = 0.01;
-/// Least deviation of an angle, radians.
-const LEAST_STD_RADIANS: f32 = 0.01;
+/// Smallest standard deviation of a coordinate, metres, so that joints that hardly move are not amplified.
+const MIN_STD: f32 = 0.01;
+/// Smallest standard deviation of an angle, radians.
+const MIN_STD_RADIANS: f32 = 0.01;
 
-/// Mean and deviation of every number, metres, and the speaker's bone lengths.
+/// Mean and standard deviation of every feature, metres, and the speaker's bone lengths.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Normalisation {
     pub mean: Vec<f32>,
     pub std: Vec<f32>,
-    /// Bone of joint `n + 1` to its parent, metres; 0 where it was never measured.
+    /// Length of the bone from joint `n + 1` to its parent, metres; 0 if it was never measured.
     pub bone_lengths: Vec<f32>,
-    /// What is learnt beside the joints: three numbers each, behind theirs.
+    /// Posture channels, three features each, which follow those of the joints.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub channels: Vec<ChannelNormalisation>,
 }
 
-/// Mean and deviation of the angles of a channel, radians; deviation 0 of one that was never seen and is not learnt. Angles are taken as they are, not as sine and cosine: those of
-/// a speaker before a camera stay far from half a turn, where they would jump.
+/// Mean and standard deviation of the angles of a channel, radians; a deviation of 0 marks an angle that was never
+/// visible and is not trained. Angles are not converted to sine and cosine: those of a speaker facing a camera stay far
+/// from the jump at half a turn.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChannelNormalisation {
     pub channel: PostureChannel,
@@ -38,22 +40,22 @@ pub struct ChannelNormalisation {
 }
 
 impl ChannelNormalisation {
-    /// From mean and deviation, radians, of angles seen in so many frames.
+    /// Normalisation from mean and standard deviation (radians) of the angles; `n_seen` frames show each angle.
     pub fn new(channel: PostureChannel, n_seen: [u64; 3], mean: [f64; 3], std: [f64; 3]) -> Self {
-        let std = |k: usize| if n_seen[k] > 0 { (std[k] as f32).max(LEAST_STD_RADIANS) } else { 0.0 };
+        let std = |k: usize| if n_seen[k] > 0 { (std[k] as f32).max(MIN_STD_RADIANS) } else { 0.0 };
         Self { channel, mean: mean.map(|v| v as f32), std: std::array::from_fn(std) }
     }
 }
 
 impl Normalisation {
-    /// From the statistics of a dataset, [49, 3] each.
+    /// Normalisation from the statistics of a dataset, [49, 3] each.
     pub fn new(mean: &Array2<f32>, std: &Array2<f32>, bone_lengths: Vec<f32>) -> Self {
         let features = |table: &Array2<f32>| table.iter().skip(3).copied().collect::<Vec<f32>>();
-        let std = features(std).into_iter().map(|v| v.max(LEAST_STD)).collect();
+        let std = features(std).into_iter().map(|v| v.max(MIN_STD)).collect();
         Self { mean: features(mean), std, bone_lengths, channels: Vec::new() }
     }
 
-    /// Errors unless the tables have the lengths they should.
+    /// Fails unless the tables have the expected lengths and plausible values, and the channels are sorted and unique.
     pub fn check(&self) -> anyhow::Result<()> {
         let lengths = [self.mean.len(), self.std.len(), self.bone_lengths.len()];
         ensure!(lengths == [N_FEATURES, N_FEATURES, N_BONES], "its normalisation has {lengths:?} numbers");
@@ -71,18 +73,18 @@ impl Normalisation {
         Ok(())
     }
 
-    /// Bone of joint `n + 1` to its parent, metres; 0: not known.
+    /// Length of the bone from joint `n + 1` to its parent, metres; 0: unknown.
     pub fn lengths(&self) -> [f32; N_BONES] {
         std::array::from_fn(|bone| self.bone_lengths.get(bone).copied().unwrap_or(0.0))
     }
 
-    /// Numbers of a pose with those of the channels.
-    pub fn n_numbers(&self) -> usize {
+    /// Number of features per pose, including those of the channels.
+    pub fn n_features(&self) -> usize {
         N_FEATURES + 3 * self.channels.len()
     }
 
-    /// Motion [T, 49, 3] to numbers [144, T], and which joints but the neck to learn from [48, T]: those that are seen,
-    /// without the hand roots. A number that is missing is 0.
+    /// Converts motion [T, 49, 3] to features [144, T] and a mask [48, T] of the joints (all but the neck) to train on:
+    /// those that are visible, without the hand roots. Missing features are 0.
     pub fn features(&self, motion: &Motion) -> (Array2<f32>, Array2<bool>) {
         let n_frames = motion.n_frames();
         let mut features = Array2::zeros((N_FEATURES, n_frames));
@@ -101,8 +103,8 @@ impl Normalisation {
         (features, mask)
     }
 
-    /// `features` with the channels of `posture` behind the joints: numbers [`n_numbers`, T], and which joints and angles to
-    /// learn from [48 + 3 x channels, T].
+    /// Like `features`, followed by the channels of `posture`: features [`n_features`, T] and a mask
+    /// [48 + 3 x channels, T] of the joints and angles to train on.
     pub fn features_with_channels(&self, motion: &Motion, posture: Option<&Posture>) -> (Array2<f32>, Array2<bool>) {
         let (mut features, mut mask) = self.features(motion);
         let n_frames = motion.n_frames();
@@ -112,14 +114,14 @@ impl Normalisation {
                 0.0 => f32::NAN,
                 std => angles.map_or(f32::NAN, |angles| (angles[[t, k]] - of.mean[k]) / std),
             };
-            let numbers = Array2::from_shape_fn((3, n_frames), |(k, t)| value(k, t));
-            features = stacked(&features, &numbers.mapv(|v| if v.is_finite() { v } else { 0.0 }));
-            mask = stacked(&mask, &numbers.mapv(f32::is_finite));
+            let values = Array2::from_shape_fn((3, n_frames), |(k, t)| value(k, t));
+            features = stacked(&features, &values.mapv(|v| if v.is_finite() { v } else { 0.0 }));
+            mask = stacked(&mask, &values.mapv(f32::is_finite));
         }
         (features, mask)
     }
 
-    /// Angles of the channels in numbers [`n_numbers`, T], NaN for those that are not learnt; `None`: none is.
+    /// Angles of the channels in features [`n_features`, T], NaN for untrained ones; `None` if there are no channels.
     pub fn posture(&self, features: ArrayView2<f32>) -> Option<Posture> {
         if self.channels.is_empty() {
             return None;
@@ -136,7 +138,7 @@ impl Normalisation {
         Some(posture)
     }
 
-    /// Numbers [144, T] to joints [T, 49, 3] in metres: the neck at 0, the hand roots at the wrists.
+    /// Converts features [144, T] to joints [T, 49, 3] in metres, with the neck at 0 and the hand roots at the wrists.
     pub fn joints(&self, features: ArrayView2<f32>) -> Array3<f32> {
         Array3::from_shape_fn((features.ncols(), N_JOINTS, 3), |(t, joint, k)| {
             let joint = match joint {
@@ -151,7 +153,7 @@ impl Normalisation {
     }
 }
 
-/// Rows of both, of as many columns.
+/// Stacks the rows of two arrays with equal numbers of columns.
 fn stacked<T: Clone>(above: &Array2<T>, below: &Array2<T>) -> Array2<T> {
     let (n, n_below, n_frames) = (above.nrows(), below.nrows(), above.ncols());
     Array2::from_shape_fn((n + n_below, n_frames), |(i, t)| {
@@ -165,7 +167,7 @@ mod tests {
     use orator_base::types::time::FrameRate;
 
     #[test]
-    fn there_and_back() {
+    fn features_round_trip() {
         let value = |t: usize, joint: usize, k: usize| (t + 3 * joint + 7 * k) as f32 * 0.01;
         let mut joints = Array3::from_shape_fn((5, N_JOINTS, 3), |(t, joint, k)| value(t, joint, k));
         for t in 0..5 {
@@ -194,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn channels_go_there_and_back_masked() {
+    fn channels_round_trip_with_masks() {
         let table = |value| Array2::from_elem((N_JOINTS, 3), value);
         let mut normal = Normalisation::new(&table(0.1), &table(0.2), vec![0.0; N_BONES]);
         let motion = Motion::from_joints(FrameRate::new(15, 1), Array3::from_elem((5, N_JOINTS, 3), 0.1));
@@ -211,8 +213,8 @@ mod tests {
         ];
         normal.check().unwrap();
         let (features, mask) = normal.features_with_channels(&motion, Some(&posture));
-        assert_eq!((features.dim(), mask.dim(), normal.n_numbers()), ((150, 5), (54, 5), 150));
-        // The head was not seen, roll of the trunk never in training.
+        assert_eq!((features.dim(), mask.dim(), normal.n_features()), ((150, 5), (54, 5), 150));
+        // The head is not visible here, and the roll of the trunk was never visible in training.
         assert!([48, 49, 50, 53].iter().all(|row| mask.row(*row).iter().all(|seen| !seen)));
         assert_eq!(mask.row(51).to_vec(), [true; 5]);
         assert_eq!(mask.row(52).to_vec(), [true, true, false, true, true]);

@@ -1,6 +1,6 @@
-//! What the generator's numbers mean, and the way from them to joints: the positions themselves (Rebol et al. 2021), or
-//! directions of the bones, which forward kinematics turns into joints with the speaker's own lengths. The second way
-//! exists twice: on tensors, to train through, and on arrays, to generate with.
+//! Motion representations of the generator output, and their conversion to joints: joint positions (Rebol et al. 2021),
+//! or bone directions, which forward kinematics turns into joints with the speaker's bone lengths. Forward kinematics
+//! is implemented on tensors for training, and on arrays for generation.
 
 use super::normalisation::{N_FEATURES, Normalisation};
 use anyhow::{bail, ensure};
@@ -10,27 +10,27 @@ use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::{N_BONES, N_JOINTS, NECK, is_duplicate, parent};
 use serde::{Deserialize, Serialize};
 
-/// Least deviation of a direction's coordinate: what hardly turns is not blown up.
-const LEAST_STD: f64 = 0.05;
-/// Added to a direction's squared length: the root has no slope at 0.
+/// Smallest standard deviation of a direction coordinate, so that bones that hardly turn are not amplified.
+const MIN_STD: f64 = 0.05;
+/// Added to the squared length of a direction, because the derivative of the square root is infinite at 0.
 const EPS: f64 = 1e-12;
 
-/// What the 144 numbers of a pose are.
+/// Meaning of the 144 joint features of a pose.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Representation {
-    /// Joints but the neck, normalised: mean 0, deviation 1.
+    /// Normalised positions of all joints but the neck: mean 0, standard deviation 1.
     Positions,
-    /// Number `3 * bone + k` times `std` plus `mean` is coordinate k of the bone's direction, of any length.
+    /// Feature `3 * bone + k` times `std` plus `mean` is coordinate k of the bone's direction, a vector of any length.
     Bones { mean: Vec<f32>, std: Vec<f32> },
 }
 
 impl Representation {
-    /// `bones`, with mean and deviation of the unit directions of these poses (as [`Normalisation::numbers`] gives them)
-    /// over the frames where both ends of the bone are seen.
+    /// `Bones`, with mean and standard deviation of the unit directions in these poses (from
+    /// [`Normalisation::features`]) over the frames in which both ends of the bone are visible.
     ///
     /// # Errors
-    /// The first of the poses.
+    /// The first error of `poses`.
     pub fn bones(
         normal: &Normalisation,
         poses: impl Iterator<Item = anyhow::Result<(Array2<f32>, Array2<bool>)>>,
@@ -40,12 +40,12 @@ impl Representation {
             let (features, mask) = pose?;
             let joints = normal.joints(features.view());
             for (t, joints) in joints.outer_iter().enumerate() {
-                let seen = |joint: usize| joint == NECK || mask[[joint - 1, t]];
-                for joint in (1..N_JOINTS).filter(|joint| !is_duplicate(*joint) && seen(*joint)) {
+                let is_visible = |joint: usize| joint == NECK || mask[[joint - 1, t]];
+                for joint in (1..N_JOINTS).filter(|joint| !is_duplicate(*joint) && is_visible(*joint)) {
                     let from = real_parent(joint);
                     let bone: [f64; 3] = std::array::from_fn(|k| f64::from(joints[[joint, k]] - joints[[from, k]]));
                     let length = bone.iter().map(|v| v * v).sum::<f64>().sqrt();
-                    if !seen(from) || length < 1e-6 {
+                    if !is_visible(from) || length < 1e-6 {
                         continue;
                     }
                     n[joint - 1] += 1.0;
@@ -57,15 +57,15 @@ impl Representation {
             }
         }
         let of = |i: usize| match n[i / 3] {
-            // never seen: straight down, as good as any
-            0.0 => (f64::from(u8::from(i % 3 == 1)), LEAST_STD),
-            n => (sum[i] / n, (squares[i] / n - (sum[i] / n).powi(2)).max(0.0).sqrt().max(LEAST_STD)),
+            // A bone that was never visible gets an arbitrary direction: the y axis.
+            0.0 => (f64::from(u8::from(i % 3 == 1)), MIN_STD),
+            n => (sum[i] / n, (squares[i] / n - (sum[i] / n).powi(2)).max(0.0).sqrt().max(MIN_STD)),
         };
         let (mean, std) = (0..N_FEATURES).map(of).map(|(mean, std)| (mean as f32, std as f32)).unzip();
         Ok(Self::Bones { mean, std })
     }
 
-    /// The name in the configuration.
+    /// Name in the configuration.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Positions => "positions",
@@ -73,12 +73,12 @@ impl Representation {
         }
     }
 
-    /// Whether bones keep their lengths whatever the numbers.
+    /// Whether bone lengths are constant for any network output.
     pub fn keeps_lengths(&self) -> bool {
         matches!(self, Self::Bones { .. })
     }
 
-    /// Errors unless the tables have the lengths they should and hold finite numbers.
+    /// Fails unless the tables have the expected lengths and finite values.
     pub fn check(&self) -> anyhow::Result<()> {
         if let Self::Bones { mean, std } = self {
             let lengths = [mean.len(), std.len()];
@@ -90,8 +90,9 @@ impl Representation {
         Ok(())
     }
 
-    /// Raw numbers [144, T] to joints [T, 49, 3] in metres: the neck at 0, the hand roots at the wrists; with `bones`
-    /// every bone has its length of `normal` in every frame.
+    /// Converts raw features [144, T] to joints [T, 49, 3] in metres, with the neck at 0 and the hand roots at the
+    /// wrists.
+    /// `Bones` gives every bone its length of `normal` in every frame.
     pub fn joints(&self, raw: ArrayView2<f32>, normal: &Normalisation) -> Array3<f32> {
         let Self::Bones { mean, std } = self else { return normal.joints(raw) };
         let mut joints = Array3::<f32>::zeros((raw.ncols(), N_JOINTS, 3));
@@ -101,7 +102,7 @@ impl Representation {
                     let i = 3 * (joint - 1) + k;
                     f64::from(raw[[i, t]]) * f64::from(std[i]) + f64::from(mean[i])
                 });
-                let length = f64::from(length_of(joint, normal));
+                let length = f64::from(bone_length(joint, normal));
                 let scale = length / (direction.iter().map(|v| v * v).sum::<f64>() + EPS).sqrt();
                 let from = real_parent(joint);
                 for k in 0..3 {
@@ -112,12 +113,13 @@ impl Representation {
         joints
     }
 
-    /// Directions of the bones of motion as raw numbers [T, 144], and which of them are known: both ends of the bone are
-    /// seen. The others are 0, and so are those of the hand roots, which are known. All unknown for `positions`.
+    /// Bone directions of motion as raw features [T, 144], and a mask of the known ones, for which both ends of the
+    /// bone are visible. Unknown features are 0; those of the hand roots are 0 and known. For `Positions` all are
+    /// unknown.
     pub fn directions(&self, motion: &Motion) -> (Array2<f32>, Array2<bool>) {
         let shape = (motion.n_frames(), N_FEATURES);
-        let (mut numbers, mut known) = (Array2::zeros(shape), Array2::from_elem(shape, false));
-        let Self::Bones { mean, std } = self else { return (numbers, known) };
+        let (mut features, mut known) = (Array2::zeros(shape), Array2::from_elem(shape, false));
+        let Self::Bones { mean, std } = self else { return (features, known) };
         for (t, joint) in (0..motion.n_frames()).flat_map(|t| (1..N_JOINTS).map(move |joint| (t, joint))) {
             let columns = 3 * (joint - 1)..3 * joint;
             let from = real_parent(joint);
@@ -127,25 +129,25 @@ impl Representation {
             for (k, i) in columns.enumerate() {
                 known[[t, i]] = is_known || is_duplicate(joint);
                 if is_known && !is_duplicate(joint) {
-                    numbers[[t, i]] = (bone[k] / length - mean[i]) / std[i];
+                    features[[t, i]] = (bone[k] / length - mean[i]) / std[i];
                 }
             }
         }
-        (numbers, known)
+        (features, known)
     }
 
-    /// The way from raw features to normalised positions on tensors.
+    /// Differentiable conversion from raw features to normalised positions.
     pub fn decoder(&self, normal: &Normalisation, dtype: DType, device: &Device) -> Result<PoseDecoder> {
         let Self::Bones { mean, std } = self else { return Ok(PoseDecoder { kinematics: None }) };
         let table = |values: Vec<f64>, shape: &[usize]| Tensor::from_vec(values, shape, device)?.to_dtype(dtype);
         let column = |values: &[f32]| table(values.iter().map(|v| f64::from(*v)).collect(), &[1, N_FEATURES, 1]);
-        let lengths = (1..N_JOINTS).map(|joint| f64::from(length_of(joint, normal))).collect();
-        // Row `joint`: 1 at every bone on the way from the neck to it.
-        let mut way = vec![0.0; N_BONES * N_BONES];
+        let lengths = (1..N_JOINTS).map(|joint| f64::from(bone_length(joint, normal))).collect();
+        // The row of a joint is 1 at every bone on the path from the neck to the joint.
+        let mut path = vec![0.0; N_BONES * N_BONES];
         for joint in 1..N_JOINTS {
             let mut at = joint;
             while at != NECK {
-                way[(joint - 1) * N_BONES + at - 1] = 1.0;
+                path[(joint - 1) * N_BONES + at - 1] = 1.0;
                 at = parent(at).unwrap_or(NECK);
             }
         }
@@ -154,7 +156,7 @@ impl Representation {
                 direction_mean: column(mean)?,
                 direction_std: column(std)?,
                 lengths: table(lengths, &[1, N_BONES, 1, 1])?,
-                way: table(way, &[1, N_BONES, N_BONES])?,
+                path: table(path, &[1, N_BONES, N_BONES])?,
                 mean: column(&normal.mean)?,
                 std: column(&normal.std)?,
             }),
@@ -162,17 +164,17 @@ impl Representation {
     }
 }
 
-/// The joint a bone begins at; a finger begins at the wrist, whose copy the hand root is.
+/// Parent of a joint without duplicates: fingers start at the wrist, which the hand root duplicates.
 fn real_parent(joint: usize) -> usize {
     let from = parent(joint).unwrap_or(NECK);
     if is_duplicate(from) { parent(from).unwrap_or(NECK) } else { from }
 }
 
-fn length_of(joint: usize, normal: &Normalisation) -> f32 {
+fn bone_length(joint: usize, normal: &Normalisation) -> f32 {
     if is_duplicate(joint) { 0.0 } else { normal.bone_lengths.get(joint - 1).copied().unwrap_or(0.0) }
 }
 
-/// Raw numbers to normalised positions, differentiable.
+/// Differentiable conversion from raw features to normalised positions.
 pub struct PoseDecoder {
     kinematics: Option<Kinematics>,
 }
@@ -180,29 +182,29 @@ pub struct PoseDecoder {
 struct Kinematics {
     direction_mean: Tensor,
     direction_std: Tensor,
-    /// [1, 48, 1, 1]
+    /// Bone lengths [1, 48, 1, 1].
     lengths: Tensor,
-    /// [1, 48, 48]
-    way: Tensor,
+    /// Bones between the neck and each joint [1, 48, 48], 0 or 1.
+    path: Tensor,
     mean: Tensor,
     std: Tensor,
 }
 
 impl PoseDecoder {
-    /// Raw numbers [B, 144, T] to normalised positions [B, 144, T]; those of channels behind them stay as they are.
+    /// Converts raw features [B, 144 or more, T] to normalised positions; trailing channels are passed through.
     pub fn poses(&self, raw: &Tensor) -> Result<Tensor> {
         let Some(k) = &self.kinematics else { return Ok(raw.clone()) };
-        let (batch, n_numbers, n_frames) = raw.dims3()?;
-        if n_numbers > N_FEATURES {
-            let channels = raw.narrow(1, N_FEATURES, n_numbers - N_FEATURES)?;
+        let (batch, n_features, n_frames) = raw.dims3()?;
+        if n_features > N_FEATURES {
+            let channels = raw.narrow(1, N_FEATURES, n_features - N_FEATURES)?;
             return Tensor::cat(&[self.poses(&raw.narrow(1, 0, N_FEATURES)?)?, channels], 1);
         }
         let directions = raw.broadcast_mul(&k.direction_std)?.broadcast_add(&k.direction_mean)?;
         let directions = directions.reshape((batch, N_BONES, 3, n_frames))?;
         let norms = (directions.sqr()?.sum_keepdim(2)? + EPS)?.sqrt()?;
         let bones = directions.broadcast_div(&norms)?.broadcast_mul(&k.lengths)?;
-        let way = k.way.broadcast_as((batch, N_BONES, N_BONES))?.contiguous()?;
-        let joints = way.matmul(&bones.reshape((batch, N_BONES, 3 * n_frames))?)?;
+        let path = k.path.broadcast_as((batch, N_BONES, N_BONES))?.contiguous()?;
+        let joints = path.matmul(&bones.reshape((batch, N_BONES, 3 * n_frames))?)?;
         joints.reshape((batch, N_FEATURES, n_frames))?.broadcast_sub(&k.mean)?.broadcast_div(&k.std)
     }
 }
@@ -222,7 +224,7 @@ mod tests {
         Normalisation::new(&table(0.1), &table(0.1), (0..N_BONES).map(length).collect())
     }
 
-    /// Numbers of a pose in motion, seen but for a few.
+    /// Features and mask of moving poses with one hidden joint.
     fn poses(normal: &Normalisation) -> (Array2<f32>, Array2<bool>) {
         let value = |i: usize, t: usize| (i as f32 * 1.7 + t as f32 * 0.3).sin();
         let mut motion = Motion::from_joints(
@@ -236,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn gradients_are_right() -> anyhow::Result<()> {
+    fn gradients_match_finite_differences() -> anyhow::Result<()> {
         let normal = normal();
         let (features, mask) = poses(&normal);
         let bones = Representation::bones(&normal, [Ok((features.clone(), mask.clone()))].into_iter())?;
@@ -252,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn tensors_and_arrays_agree_and_bones_keep_their_lengths() -> anyhow::Result<()> {
+    fn tensors_and_arrays_agree_and_bone_lengths_are_constant() -> anyhow::Result<()> {
         let normal = normal();
         let (features, mask) = poses(&normal);
         let bones = Representation::bones(&normal, [Ok((features.clone(), mask.clone()))].into_iter())?;
@@ -274,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn directions_of_the_data_give_the_data_back() -> anyhow::Result<()> {
+    fn directions_round_trip() -> anyhow::Result<()> {
         let normal = normal();
         let (features, mask) = poses(&normal);
         let bones = Representation::bones(&normal, [Ok((features.clone(), mask.clone()))].into_iter())?;
@@ -294,7 +296,7 @@ mod tests {
         for ((t, i), number) in numbers.indexed_iter().filter(|((_, i), _)| !is_duplicate(i / 3 + 1)) {
             assert!((number - raw[[i, t]]).abs() < 1e-4, "{number} {}", raw[[i, t]]);
         }
-        // Number 0 is seen in all 40 frames: mean 0, deviation 1.
+        // Feature 0 is visible in all 40 frames: mean 0, deviation 1.
         let row = raw.row(0);
         assert!((row.sum() / 40.0).abs() < 1e-4 && (row.mapv(|v| v * v).sum() / 40.0 - 1.0).abs() < 1e-3);
         Ok(())

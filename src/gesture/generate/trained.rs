@@ -1,4 +1,4 @@
-//! A trained speaker of either kind: sound, and where it reads them words, to motion of the 49 joints.
+//! A trained model of either kind, which generates motion of the 49 joints from sound and, for some networks, words.
 
 use super::GestureGenerator;
 use super::model::{GenerationChoice, checkpoint_file};
@@ -21,13 +21,13 @@ pub enum TrainedSpeaker {
 }
 
 impl TrainedSpeaker {
-    /// Opens a checkpoint of one speaker, or the best one of a folder. Errors name the file.
+    /// Opens a checkpoint of one speaker: a file, or the best, else the newest one of a folder. Errors name the file.
     pub fn open(path: &Path) -> Result<Self> {
         Self::open_as(path, &GenerationChoice::default())
     }
 
-    /// Opens a checkpoint as `open` does, as this speaker and take. Errors where a network does not know the speaker, or has one
-    /// take only.
+    /// Like `open`, for the chosen speaker and variant. Also fails if the network does not have the speaker, or has no
+    /// variants.
     pub fn open_as(path: &Path, choice: &GenerationChoice) -> Result<Self> {
         let file = checkpoint_file(path)?;
         let kind = &checkpoint::facts(&file)?["speaker"]["kind"];
@@ -51,7 +51,7 @@ impl TrainedSpeaker {
         Ok(Self::Sequence(Box::new(speaker)))
     }
 
-    /// Opens a checkpoint as `open` does; of a network of several speakers the one of this name.
+    /// Like `open`; selects the speaker of this name if the network has several.
     pub fn open_for(path: &Path, speaker: &str) -> Result<Self> {
         let file = checkpoint_file(path)?;
         let is_of_several = checkpoint::facts(&file)?["other_speakers"].is_array();
@@ -59,7 +59,7 @@ impl TrainedSpeaker {
         Self::open_as(&file, &GenerationChoice { speaker, seed: None })
     }
 
-    /// The speaker's name.
+    /// Name of the speaker.
     pub fn name(&self) -> &str {
         match self {
             Self::Gan(speaker) => speaker.name(),
@@ -67,12 +67,12 @@ impl TrainedSpeaker {
         }
     }
 
-    /// Whether it moves a captured skeleton, which is written as .bvh alone.
+    /// Whether the model animates a captured skeleton, which can only be written as BVH.
     pub fn is_captured(&self) -> bool {
         matches!(self, Self::Sequence(speaker) if speaker.is_captured())
     }
 
-    /// Rate of the motion it makes.
+    /// Frame rate of the generated motion.
     pub fn fps(&self) -> FrameRate {
         match self {
             Self::Gan(speaker) => speaker.fps(),
@@ -80,7 +80,7 @@ impl TrainedSpeaker {
         }
     }
 
-    /// Samples a second of the sound that it hears.
+    /// Sample rate of the input audio, Hz.
     pub fn rate(&self) -> u32 {
         match self {
             Self::Gan(_) => SAMPLE_RATE,
@@ -88,7 +88,7 @@ impl TrainedSpeaker {
         }
     }
 
-    /// Number of the words that it knows; 0: it reads none.
+    /// Size of the vocabulary; 0 if the model does not read words.
     pub fn n_words(&self) -> usize {
         match self {
             Self::Gan(_) => 0,
@@ -96,7 +96,7 @@ impl TrainedSpeaker {
         }
     }
 
-    /// Normalisation of the dataset that it learnt from; `None`: it learnt a captured skeleton.
+    /// Normalisation of the training dataset; `None` for a captured skeleton.
     pub fn normalisation(&self) -> Option<&Normalisation> {
         match self {
             Self::Gan(speaker) => Some(&speaker.metadata.normalisation),
@@ -104,7 +104,7 @@ impl TrainedSpeaker {
         }
     }
 
-    /// Network of a sequence-to-sequence checkpoint.
+    /// Architecture of a sequence-to-sequence network; `None` for a GAN.
     pub fn architecture(&self) -> Option<Architecture> {
         match self {
             Self::Gan(_) => None,
@@ -112,13 +112,15 @@ impl TrainedSpeaker {
         }
     }
 
-    /// Whether it reads words.
+    /// Whether the model reads words.
     pub fn reads_words(&self) -> bool {
         self.architecture().is_some_and(|of| architecture::word_encoder(of).is_some())
     }
 
-    /// Motion for a sound and what is said in it. Errors: sound too short or of another rate, or a speaker that moves a
-    /// captured skeleton.
+    /// Motion for a sound and its words.
+    ///
+    /// # Errors
+    /// Sound that is too short or of another rate; a model of a captured skeleton.
     pub fn motion(&self, sound: &Sound, words: &[Word]) -> Result<Motion> {
         match self {
             Self::Gan(speaker) => speaker.motion(sound),

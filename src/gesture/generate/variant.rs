@@ -1,6 +1,6 @@
-//! Different takes of one speech: channels of the encoded sound that training learnt to do without (`dropout`, Srivastava
-//! et al. 2014) are left out for the whole of a take. Each take is then one network of those that were trained, hears as
-//! they do, and has no seams, however long the sound.
+//! Variants of the motion for one speech: random channels of the encoded audio are dropped for the complete sound, as
+//! in training with `dropout` (Srivastava et al. 2014). Each variant is one sub-network of the dropout ensemble, so no
+//! cross-fades are needed for any length of sound.
 
 use anyhow::{Result, ensure};
 use candle_core::{DType, Tensor};
@@ -8,20 +8,21 @@ use orator_nn::weights::Contents;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Channels are left out with this multiple of the probability of training, at most [`MOST_LEFT_OUT`]. Of a speaker of ten
-/// minutes, trained with 0.3, takes hear as well as the whole network up to 0.6 (correlation of wrist speeds 0.82 and
-/// 0.82, wrists 12 mm apart), not with 0.8 (0.74).
-const OF_TRAINING: f64 = 2.0;
-const MOST_LEFT_OUT: f64 = 0.9;
+/// Drop probability as a multiple of the dropout in training. For a speaker of ten minutes trained with a dropout of
+/// 0.3, variants correlate with the speech as well as the complete network up to 0.6 (wrist speeds 0.82 and 0.82,
+/// wrists 12 mm apart), but not at 0.8 (0.74).
+const DROP_FACTOR: f64 = 2.0;
+/// Largest drop probability.
+const MAX_DROP: f64 = 0.9;
 
-/// The layer that reads the encoded sound, [out, channels, kernel].
+/// Weights of the layer that reads the encoded audio, [out, channels, kernel].
 const FIRST_LAYER: &str = "enter.0.conv.weight";
 
-/// Leaves out channels of the encoded sound of a checkpoint of `orator train gan`, by this seed, each with twice the
-/// probability of its training's dropout. The same seed leaves out the same. The names of the generator's tensors begin with `prefix`.
+/// Drops random channels of the encoded audio from a checkpoint of `orator train gan`, each with twice the dropout
+/// probability of its training; the seed determines which. `prefix` is the prefix of the generator's tensor names.
 ///
 /// # Errors
-/// A checkpoint that was trained without dropout, whose takes would only be worse.
+/// A checkpoint that was trained without dropout, whose variants would only be worse.
 pub fn vary(contents: &mut Contents, prefix: &str, seed: u64) -> Result<()> {
     let dropout = contents.facts["settings"]["dropout"].as_f64().unwrap_or(0.0);
     ensure!(
@@ -32,11 +33,11 @@ pub fn vary(contents: &mut Contents, prefix: &str, seed: u64) -> Result<()> {
     let name = format!("{prefix}{FIRST_LAYER}");
     let Some(weight) = contents.tensors.get_mut(&name) else { anyhow::bail!("tensor {name} is missing") };
     let (_, n_channels, _) = weight.dims3()?;
-    let share = (OF_TRAINING * dropout).min(MOST_LEFT_OUT);
+    let share = (DROP_FACTOR * dropout).min(MAX_DROP);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let kept = (0..n_channels).map(|_| if rng.random_bool(share) { 0.0 } else { 1.0 / (1.0 - share) });
-    let kept = Tensor::from_iter(kept, weight.device())?.to_dtype(DType::F32)?.reshape((1, n_channels, 1))?;
-    *weight = weight.broadcast_mul(&kept)?;
+    let factors = (0..n_channels).map(|_| if rng.random_bool(share) { 0.0 } else { 1.0 / (1.0 - share) });
+    let factors = Tensor::from_iter(factors, weight.device())?.to_dtype(DType::F32)?.reshape((1, n_channels, 1))?;
+    *weight = weight.broadcast_mul(&factors)?;
     Ok(())
 }
 
@@ -55,7 +56,7 @@ mod tests {
     }
 
     #[test]
-    fn a_seed_leaves_out_its_channels_whole() -> Result<()> {
+    fn a_seed_drops_complete_channels() -> Result<()> {
         let varied = |seed| -> Result<Vec<f32>> {
             let mut contents = contents(0.25);
             vary(&mut contents, "generator.", seed)?;

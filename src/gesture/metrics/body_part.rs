@@ -1,13 +1,13 @@
-//! Parts of the body: which points a metric is about, and what they are measured from.
+//! Parts of the body: the points of a metric, and the origins of their coordinates.
 
 use orator_base::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_SHOULDER, R_WRIST, is_duplicate};
 
 /// A part of the body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BodyPart {
-    /// The 48 joints without the neck; the two hand roots, which are the wrists again, count.
+    /// The 48 joints without the neck, including the two hand roots, which duplicate the wrists.
     All,
-    /// All 49 joints, the neck among them, which stands still.
+    /// All 49 joints, including the neck, which is static.
     WithNeck,
     /// Shoulders, elbows, wrists: joints 1 to 6.
     Body,
@@ -19,7 +19,7 @@ pub enum BodyPart {
     FingersFromWrist,
 }
 
-/// A joint, and what it is measured from (the neck, at the origin, where nothing is named).
+/// A joint, and the joint that its position is relative to (`None`: the neck, at the origin).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct MeasuredPoint {
     pub joint: usize,
@@ -38,7 +38,7 @@ impl BodyPart {
         }
     }
 
-    /// The joints of the part.
+    /// Joints of the part.
     pub fn joints(self) -> Vec<usize> {
         match self {
             Self::All => (NECK + 1..N_JOINTS).collect(),
@@ -49,7 +49,7 @@ impl BodyPart {
         }
     }
 
-    /// The joints with what each is measured from.
+    /// Joints of the part with their origins.
     pub(crate) fn points(self) -> Vec<MeasuredPoint> {
         let origin = |joint| match self {
             Self::FingersFromWrist if joint < R_HAND => Some(L_WRIST),
@@ -65,7 +65,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parts_have_the_joints_they_say() {
+    fn parts_have_their_documented_joints() {
         let n = |part: BodyPart| part.joints().len();
         assert_eq!(
             [BodyPart::All, BodyPart::WithNeck, BodyPart::Body, BodyPart::Hands, BodyPart::Wrists].map(n),

@@ -1,5 +1,5 @@
-//! Which numbers there are, under which convention, and the two steps to each: measure every interval (sums that add),
-//! then read the values off any sum of intervals. A metric's own arithmetic is in its own file.
+//! The catalogue of all metrics of a convention, and their computation in two steps: measuring every interval as
+//! additive sums, and computing values from the sum of any intervals. The arithmetic of each metric is in its own file.
 
 use super::convention;
 use super::definition::MetricFamily;
@@ -16,30 +16,34 @@ pub use super::pair::MotionPair;
 pub use super::settings::Convention;
 pub use super::sums::MetricSums;
 
-/// Numbers that stand before the cheap sums: predicted joints that are not finite, frames of another rate.
-const N_FACTS: usize = 2;
+/// Number of diagnostics at the start of the cheap sums: predicted joints that are not finite, frames of another frame
+/// rate.
+const N_DIAGNOSTICS: usize = 2;
 
-/// All numbers of one convention.
+/// All metrics of one convention.
 pub struct Catalogue {
     metrics: Vec<MetricFamily>,
     definitions: Vec<Definition>,
     fps: FrameRate,
 }
 
-/// One interval, whole and in blocks.
+/// Sums of one interval, in total and in blocks.
 #[derive(Clone, Debug, Default)]
 pub struct IntervalSums {
     pub whole: MetricSums,
     pub blocks: Vec<MetricSums>,
 }
 
-/// Number of equal blocks of about `length` frames that fit `n_frames` best, at least 1.
+/// Number of equal blocks of about `length` frames into which `n_frames` are divided, at least 1.
 pub fn n_blocks(n_frames: usize, length: usize) -> usize {
     ((n_frames as f64 / length.max(1) as f64).round() as usize).max(1)
 }
 
 impl Catalogue {
-    /// Errors: an alpha that is not above 0.
+    /// Catalogue of the metrics for these settings.
+    ///
+    /// # Errors
+    /// An alpha that is not a positive number.
     pub fn new(settings: &MetricSettings) -> anyhow::Result<Self> {
         for alpha in &settings.alphas {
             ensure!(
@@ -56,40 +60,41 @@ impl Catalogue {
         Ok(Self { metrics, definitions, fps: settings.fps })
     }
 
-    /// What `values` gives, in order.
+    /// Definitions of `values`, in the same order.
     pub fn definitions(&self) -> &[Definition] {
         &self.definitions
     }
 
-    /// Whether definition `index` is of those for which few draws are taken.
+    /// Whether definition `index` is costly to compute, so that fewer draws are taken.
     pub fn is_costly(&self, index: usize) -> bool {
         let mut of_each = self.metrics.iter().flat_map(|metric| metric.definitions.iter().map(|_| metric.is_costly));
         of_each.nth(index) == Some(true)
     }
 
-    /// Index of the metric of the ground truth that a metric better near it is compared with.
+    /// Index of the ground truth's metric for a metric that is better the nearer it is to it (`Better::NearerTruth`).
     pub fn truth_of(&self, index: usize) -> Option<usize> {
         let of = self.definitions.get(index).filter(|definition| definition.better == Better::NearerTruth)?;
         let name = format!("{}_of_real", of.name);
         self.definitions.iter().position(|other| other.name == name && other.part == of.part)
     }
 
-    /// The sums of one interval. Frames beyond the shortest of its arrays are not looked at. An interval of another
-    /// frame rate than the settings' makes every value NaN.
+    /// Sums of one interval. Frames beyond the shortest of its arrays are ignored. An interval whose frame rate differs
+    /// from that of the settings makes every value NaN.
     pub fn measure(&self, interval: &MotionPair) -> MetricSums {
         self.measure_blocks(interval, usize::MAX).whole
     }
 
-    /// Sums of one interval, whole and as blocks of about `n_frames` frames: what begins in a block is counted there, whatever it reaches
-    /// into, so that the blocks add up to the whole and no value depends on how long they are.
+    /// Sums of one interval, in total and in blocks of about `n_frames` frames. Windows that start in a block are
+    /// counted there, even if they extend beyond it, so that the blocks add up to the total and no value depends on
+    /// their length.
     pub fn measure_blocks(&self, interval: &MotionPair, n_frames: usize) -> IntervalSums {
         let pair = PairedFrames::new(interval);
         let n = n_blocks(pair.n_frames(), n_frames);
-        let mut facts = BlockSums::new(n, N_FACTS, pair.n_frames(), 0.0);
+        let mut diagnostics = BlockSums::new(n, N_DIAGNOSTICS, pair.n_frames(), 0.0);
         let other_rate = interval.fps != self.fps;
         for t in 0..pair.n_frames() {
-            facts.at(t)[0] += pair.n_broken(t) as f64;
-            facts.at(t)[1] += f64::from(u8::from(other_rate));
+            diagnostics.at(t)[0] += pair.n_non_finite(t) as f64;
+            diagnostics.at(t)[1] += f64::from(u8::from(other_rate));
         }
         let start = if other_rate { f64::NAN } else { 0.0 };
         let measure = |metric: &MetricFamily| {
@@ -98,7 +103,7 @@ impl Catalogue {
             (metric.is_costly, blocks)
         };
         let of_each: Vec<_> = self.metrics.par_iter().map(measure).collect();
-        let (mut cheap, mut costly) = (vec![facts], Vec::new());
+        let (mut cheap, mut costly) = (vec![diagnostics], Vec::new());
         for (is_costly, blocks) in of_each {
             if is_costly { &mut costly } else { &mut cheap }.push(blocks);
         }
@@ -113,33 +118,33 @@ impl Catalogue {
         measured
     }
 
-    /// One value a definition; NaN where undefined.
+    /// One value per definition; NaN if undefined.
     pub fn values(&self, sums: &MetricSums) -> Vec<f64> {
         self.read(Some(&sums.cheap), Some(&sums.costly.row()))
     }
 
-    /// Values [n_draws, n_definitions] of draws of blocks with replacement, NaN in place of costly ones. `counts`
-    /// [n_draws, n_blocks]: how often each block was drawn. Much faster than adding `MetricSums` one by one.
+    /// Values [n_draws, n_definitions] of draws of blocks with replacement, NaN for costly metrics. `counts`
+    /// [n_draws, n_blocks] is the multiplicity of each block. Much faster than adding `MetricSums` one by one.
     pub fn draw_cheap(&self, blocks: &[MetricSums], counts: ArrayView2<f64>) -> Array2<f64> {
         let drawn = sums::draw_cheap(blocks, counts);
         self.rows(drawn.outer_iter().map(|row| row.to_vec()).collect(), |row| self.read(Some(row), None))
     }
 
-    /// Costly values of draws of blocks, as in [`Self::draw_cheap`], NaN in place of the others.
+    /// Values of costly metrics for draws of blocks as in [`Self::draw_cheap`], NaN for all others.
     pub fn draw_costly(&self, blocks: &[MetricSums], counts: ArrayView2<f64>) -> Array2<f64> {
         let drawn = sums::draw_costly(blocks, counts);
         self.rows(drawn.outer_iter().map(|row| row.to_vec()).collect(), |row| self.read(None, Some(row)))
     }
 
-    /// Why value `index` of these sums is NaN.
+    /// Reason why value `index` of these sums is NaN.
     pub fn reason(&self, sums: &MetricSums, index: usize) -> String {
-        match sums.cheap.get(..N_FACTS) {
+        match sums.cheap.get(..N_DIAGNOSTICS) {
             None => "nothing was measured".to_owned(),
             Some([_, n_other]) if *n_other > 0.0 => {
                 format!("{n_other} frames are of another frame rate than {}", self.fps.per_sec())
             }
-            Some([n_broken, _]) if *n_broken > 0.0 => {
-                format!("{n_broken} joints of the made motion are not finite where the real ones are seen")
+            Some([n_non_finite, _]) if *n_non_finite > 0.0 => {
+                format!("{n_non_finite} joints of the made motion are not finite where the real ones are seen")
             }
             Some(_) => self.definitions.get(index).map_or("", |definition| definition.undefined).to_owned(),
         }
@@ -147,12 +152,12 @@ impl Catalogue {
 
     fn rows(&self, rows: Vec<Vec<f64>>, read: impl Fn(&[f64]) -> Vec<f64> + Sync) -> Array2<f64> {
         let values: Vec<f64> = rows.par_iter().flat_map_iter(|row| read(row)).collect();
-        // as many as asked for, by construction
+        // `read` returns one value per definition, so the shape always fits.
         Array2::from_shape_vec((rows.len(), self.definitions.len()), values).unwrap_or_default()
     }
 
     fn read(&self, cheap: Option<&[f64]>, costly: Option<&[f64]>) -> Vec<f64> {
-        let (mut at_cheap, mut at_costly) = (N_FACTS, 0);
+        let (mut at_cheap, mut at_costly) = (N_DIAGNOSTICS, 0);
         let mut values = Vec::with_capacity(self.definitions.len());
         for metric in &self.metrics {
             let (row, at) = if metric.is_costly { (costly, &mut at_costly) } else { (cheap, &mut at_cheap) };
@@ -178,7 +183,7 @@ mod tests {
         [Orator, Speech2gesture, Genea, Emage, Trimodal, Aist]
     };
 
-    /// Two motions without meaning, [T, 49, 3].
+    /// Two pseudo-random motions, [T, 49, 3].
     fn motions(n_frames: usize) -> (Array3<f32>, Array3<f32>) {
         let ground_truth = Array3::from_shape_fn((n_frames, N_JOINTS, 3), |(t, joint, k)| {
             ((t * 7919 + joint * 104_729 + k * 611_953) % 1009) as f32 / 1009.0 - 0.5
@@ -212,15 +217,15 @@ mod tests {
             }
             let hash = ((joint * 7919 + k * 104_729) % 1009) as f64 / 1009.0;
             let (t, phase) = (t as f64, (joint + k) as f64);
-            let place = hash - 0.5
+            let position = hash - 0.5
                 + 0.08 * (t * (0.07 + 0.05 * hash + 0.01 * kind) + 6.0 * hash).sin()
                 + 0.02 * (0.9 * t + joint as f64).sin();
-            (if predicted { 1.1 * place + 0.03 * (0.4 * t + phase).cos() } else { place }) as f32
+            (if predicted { 1.1 * position + 0.03 * (0.4 * t + phase).cos() } else { position }) as f32
         })
     }
 
     #[test]
-    fn figures_are_those_of_the_reference_script() {
+    fn values_match_the_reference_script() {
         let golden: serde_json::Value =
             serde_json::from_str(include_str!("../../../fixtures/reference/metrics_golden.json")).unwrap();
         let onsets: Vec<f64> = serde_json::from_value(golden["motion"]["onsets"].clone()).unwrap();
@@ -256,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn drawing_blocks_is_adding_them() {
+    fn drawing_blocks_equals_adding_them() {
         let catalogue = Catalogue::new(&MetricSettings::default()).unwrap();
         let blocks = [measured(&catalogue, 0..60), measured(&catalogue, 60..120)];
         let mut sums = blocks[0].clone();
@@ -275,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn every_figure_is_another_and_a_wrong_setting_is_told() {
+    fn hashes_are_unique_and_invalid_settings_are_rejected() {
         let catalogue = Catalogue::new(&MetricSettings { with_neck: true, ..MetricSettings::default() }).unwrap();
         let hashes: std::collections::BTreeSet<_> = catalogue.definitions().iter().map(Definition::hash).collect();
         assert_eq!(hashes.len(), catalogue.definitions().len());
@@ -287,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn a_made_joint_that_is_not_finite_is_told() {
+    fn a_predicted_joint_that_is_not_finite_is_reported() {
         let catalogue = Catalogue::new(&MetricSettings::default()).unwrap();
         let (mut predicted, ground_truth) = motions(30);
         predicted[[3, 20, 1]] = f32::NAN;
@@ -308,8 +313,8 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_seen_changes_nothing() {
-        // the left hand is hidden for a second, the right wrist now and then
+    fn hidden_joints_do_not_affect_values() {
+        // The left hand is hidden for a second, and the right wrist in some frames.
         let mask = Array2::from_shape_fn((90, N_JOINTS), |(t, joint)| {
             !((20..35).contains(&t) && (7..28).contains(&joint) || t % 40 == 13 && joint == 3)
         });
@@ -331,7 +336,7 @@ mod tests {
             });
             for ((a, b), definition) in first.iter().zip(&second).zip(catalogue.definitions()) {
                 assert!(same(*a, *b), "{convention:?} {}: {a} {b}", definition.label());
-                // too few frames, or too few in a row
+                // These metrics have too few frames, or too few consecutive ones.
                 let few = definition.name == "frechet_embedding"
                     || definition.name == "cca" && convention == Convention::Genea;
                 assert!(a.is_finite() || few, "{convention:?} {}: {a}", definition.label());

@@ -1,6 +1,6 @@
-//! Metrics of each convention: the one table. What a convention counts in frames of its own frame rate is turned into
-//! seconds and back into the nearest number of frames of the data; the definitions say both. What is peculiar to each
-//! convention stands in the guide (`evaluation`).
+//! Table of the metrics of each convention. Numbers of frames that a convention defines for its own frame rate are
+//! converted to seconds, and back to the nearest number of frames of the data; the definitions state both.
+//! Peculiarities of each convention are documented in the guide (`evaluation`).
 
 use super::beat::{aist, angles, consistency};
 use super::body_part::BodyPart;
@@ -11,7 +11,7 @@ use super::position::pck::{self, PckAxes};
 use super::position::{errors, p_mpjpe};
 use super::settings::{Convention, MetricSettings};
 
-/// The metrics of the settings' convention.
+/// Metrics of the convention in the settings.
 pub(crate) fn metrics(settings: &MetricSettings) -> Vec<MetricFamily> {
     let fps = settings.fps.per_sec();
     match settings.convention {

@@ -1,49 +1,51 @@
-//! What a number means: its name, its part of the body, its formula and every parameter, with a hash over all of it.
-//! Values under different hashes are different things. And what every metric is: sums that add, and numbers from them.
+//! Definition of a metric: name, part of the body, formula and all parameters, with a hash over them; values with
+//! different hashes are not comparable. Also the common structure of all metrics: additive sums, and values computed
+//! from them.
 
 use super::pair::PairedFrames;
 use super::sums::BlockSums;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-/// Which way a value is good.
+/// Direction in which a value is better.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Better {
     Higher,
     Lower,
-    /// Better the nearer it is to the metric of the ground truth, which is the definition `<name>_of_real` of the same part.
+    /// Better the nearer it is to the value of the ground truth, which is the metric `<name>_of_real` of the same part.
     NearerTruth,
-    /// A metric of the ground truth alone: says nothing of the predicted one.
+    /// A metric of the ground truth only, which does not rate the prediction.
     Neither,
 }
 
-/// One number exactly.
+/// Exact definition of a metric.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Definition {
-    /// For instance `pck_3d`, `mpjpe`, `frechet_pose`.
+    /// Name such as `pck_3d`, `mpjpe`, `frechet_pose`.
     pub name: &'static str,
-    /// `all`: the 48 joints without the neck (the two hand roots, which are the wrists again, included). `body`: shoulders,
-    /// elbows, wrists. `hands`: the 40 finger joints. More in `part`.
+    /// Part of the body. `all`: the 48 joints without the neck, including the two hand roots, which duplicate the
+    /// wrists.
+    /// `body`: shoulders, elbows, wrists. `hands`: the 40 finger joints. All parts are in `body_part`.
     pub part: &'static str,
-    /// `1` for a share or a ratio.
+    /// Unit; `1` for a share or a ratio.
     pub unit: &'static str,
     pub better: Better,
-    /// The exact definition in words: g ground truth, p predicted, t frame, j joint.
+    /// Exact definition as text: g ground truth, p predicted, t frame, j joint.
     pub formula: &'static str,
-    /// When there is no value (NaN).
+    /// Condition under which there is no value (NaN).
     pub undefined: &'static str,
-    /// All that can be set, and what it is set to.
+    /// Values of all parameters.
     pub parameters: Value,
 }
 
 impl Definition {
-    /// A number without parameters, whose formula the caller adds.
+    /// Definition without parameters; the caller adds `formula` and `undefined`.
     pub fn new(name: &'static str, part: &'static str, unit: &'static str, better: Better) -> Self {
         Self { name, part, unit, better, formula: "", undefined: "", parameters: Value::Object(Map::new()) }
     }
 
-    /// First 16 hexadecimal digits of blake3 over name, part, unit, formula and parameters (keys in order).
+    /// First 16 hexadecimal digits of the BLAKE3 hash of name, part, unit, formula and parameters (with sorted keys).
     pub fn hash(&self) -> String {
         let mut hasher = blake3::Hasher::new();
         for word in [self.name, self.part, self.unit, self.formula, &canonical(&self.parameters)] {
@@ -53,13 +55,13 @@ impl Definition {
         hasher.finalize().to_hex()[..16].to_owned()
     }
 
-    /// This definition and, under the name `of_real`, the same number of the ground truth.
+    /// This definition and, with the name `of_real`, that of the same metric of the ground truth.
     pub fn with_truth(self, of_real: &'static str) -> [Self; 2] {
         let truth = Self { name: of_real, better: Better::Neither, ..self.clone() };
         [self, truth]
     }
 
-    /// For people: name, what it is set to where one name has several, part; `pck_3d@0.2 hands`.
+    /// Short label of name, alpha (for PCK) and part, such as `pck_3d@0.2 hands`.
     pub fn label(&self) -> String {
         match self.parameters.get("alpha") {
             Some(alpha) => format!("{}@{alpha} {}", self.name, self.part),
@@ -68,7 +70,7 @@ impl Definition {
     }
 }
 
-/// JSON without spaces, keys sorted.
+/// JSON without spaces and with sorted keys.
 fn canonical(value: &Value) -> String {
     match value {
         Value::Object(map) => {
@@ -85,21 +87,21 @@ fn canonical(value: &Value) -> String {
     }
 }
 
-/// Adds one interval to the sums of its blocks, which start at 0. What belongs to several frames goes to the block of
-/// the first.
+/// Function that adds an interval to the sums of its blocks, which start at 0. Values over several frames belong to the
+/// block of the first frame.
 type IntervalMeasure = Box<dyn Fn(&PairedFrames, &mut BlockSums) + Send + Sync>;
-/// The numbers from added sums; NaN where undefined.
+/// Function that computes values from added sums; NaN if undefined.
 type SumValues = Box<dyn Fn(&[f64]) -> Vec<f64> + Send + Sync>;
 
-/// A family of numbers that share their sums.
+/// A family of metrics that share their sums.
 pub(crate) struct MetricFamily {
-    /// What `values` gives, in order.
+    /// Definitions of `values`, in the same order.
     pub definitions: Vec<Definition>,
-    /// How many sums it takes.
+    /// Number of sums.
     pub n_sums: usize,
     pub measure: IntervalMeasure,
     pub values: SumValues,
-    /// Whether the sums are large and the numbers slow (matrices): fewer draws.
+    /// Whether the sums are large and the values slow to compute (matrices), so that fewer draws are taken.
     pub is_costly: bool,
 }
 
@@ -113,7 +115,7 @@ impl MetricFamily {
         Self { definitions, n_sums, measure: Box::new(measure), values: Box::new(values), is_costly: false }
     }
 
-    /// One number: the first sum over the second.
+    /// Family of one metric: the first sum divided by the second.
     pub(crate) fn mean(
         definition: Definition,
         measure: impl Fn(&PairedFrames, &mut BlockSums) + Send + Sync + 'static,
@@ -121,7 +123,7 @@ impl MetricFamily {
         Self::new(vec![definition], 2, measure, |sums| vec![sums[0] / sums[1]])
     }
 
-    /// A number of the prediction and that of the ground truth: the first two sums over the third.
+    /// Family of a metric of the prediction and of the ground truth: the first two sums divided by the third.
     pub(crate) fn mean_of_both(
         definitions: [Definition; 2],
         measure: impl Fn(&PairedFrames, &mut BlockSums) + Send + Sync + 'static,
@@ -136,7 +138,7 @@ mod tests {
     use serde_json::json;
 
     #[test]
-    fn the_hash_sees_all_but_the_order_of_keys() {
+    fn the_hash_depends_on_everything_but_the_order_of_keys() {
         let definition = |parameters| Definition {
             formula: "share",
             undefined: "never",

@@ -1,7 +1,7 @@
-//! How good predicted motion is beside the ground truth: pure functions of joints [T, 49, 3] in metres with a mask [T, 49] of
-//! the real joints that were seen. Every metric is a sum that merges, so that it can be resampled; what to compare
-//! with what is not said here. `catalogue` is the way in: it lists all metrics with their definitions, measures intervals and
-//! reads values off their sums.
+//! Metrics of predicted motion against the ground truth: pure functions of joints [T, 49, 3] in metres with a mask [T,
+//! 49] of the visible real joints. Every metric is computed from additive sums, so that it can be resampled; baselines
+//! are not part of this module. The entry point is `catalogue`: it lists all metrics with their definitions, measures
+//! intervals, and computes values from their sums.
 
 pub mod beat;
 pub mod body_part;

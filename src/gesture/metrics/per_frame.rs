@@ -1,5 +1,5 @@
-//! Windows of a few frames in a row in which one point is seen: what most metrics take a number of, and the mean of
-//! these numbers over all there are.
+//! Windows of a few consecutive frames in which a point is visible, from which most metrics compute a value, and the
+//! mean of these values over all windows.
 
 use super::body_part::{BodyPart, MeasuredPoint};
 use super::definition::{Definition, MetricFamily};
@@ -7,7 +7,7 @@ use super::pair::PairedFrames;
 use orator_base::math::vec3::{self, Vec3};
 use orator_base::types::skeleton::N_JOINTS;
 
-/// One point in a few frames in a row, all of them seen.
+/// A point that is visible in a few consecutive frames.
 pub(crate) struct PointWindow<'a, 'b> {
     pair: &'a PairedFrames<'b>,
     /// First frame.
@@ -15,7 +15,7 @@ pub(crate) struct PointWindow<'a, 'b> {
     point: MeasuredPoint,
 }
 
-/// All windows of `n_frames` frames from frame `first` on, by frame and point.
+/// All windows of `n_frames` frames that start at frame `first` or later, ordered by frame and point.
 pub(crate) fn windows<'a, 'b>(
     pair: &'a PairedFrames<'b>,
     points: &'a [MeasuredPoint],
@@ -24,14 +24,14 @@ pub(crate) fn windows<'a, 'b>(
 ) -> impl Iterator<Item = PointWindow<'a, 'b>> {
     let at = move |t: usize| points.iter().map(move |&point| PointWindow { pair, t, point });
     let is_seen = move |window: &PointWindow| {
-        let seen = |joint| pair.sees(window.t, n_frames, joint);
-        seen(window.point.joint) && window.point.origin.is_none_or(seen)
+        let visible = |joint| pair.is_visible(window.t, n_frames, joint);
+        visible(window.point.joint) && window.point.origin.is_none_or(visible)
     };
     (first..(pair.n_frames() + 1).saturating_sub(n_frames)).flat_map(at).filter(is_seen)
 }
 
 impl PointWindow<'_, '_> {
-    /// Frames a second.
+    /// Frames per second.
     pub(crate) fn fps(&self) -> f64 {
         self.pair.fps
     }
@@ -41,13 +41,13 @@ impl PointWindow<'_, '_> {
         self.at(&self.pair.predicted, k)
     }
 
-    /// Where the real point is in frame `k` of the window.
+    /// Position of the real point in frame `k` of the window.
     pub(crate) fn ground_truth(&self, k: usize) -> Vec3 {
         self.at(&self.pair.ground_truth, k)
     }
 
-    /// Prediction minus ground truth.
-    pub(crate) fn apart(&self, k: usize) -> Vec3 {
+    /// Prediction minus ground truth in frame `k` of the window.
+    pub(crate) fn difference(&self, k: usize) -> Vec3 {
         vec3::sub(self.predicted(k), self.ground_truth(k))
     }
 
@@ -60,7 +60,7 @@ impl PointWindow<'_, '_> {
     }
 }
 
-/// Mean of `of` over all points of `part` and all `n_frames` frames in a row from frame `first` on.
+/// Metric that averages `of` over all points of `part` and all windows of `n_frames` frames from frame `first` on.
 pub(crate) fn mean(
     definition: Definition,
     part: BodyPart,

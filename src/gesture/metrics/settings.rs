@@ -1,23 +1,23 @@
-//! Under which convention metrics are taken, and their parameters.
+//! Convention and parameters of the metrics.
 
 use orator_base::types::posture::PostureChannel;
 use orator_base::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
 
-/// What the numbers are set to.
+/// Settings of the metrics.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MetricSettings {
-    /// Whose definitions count.
+    /// Convention whose definitions apply.
     pub convention: Convention,
-    /// Shares of the pose's largest extent for PCK, each > 0.
+    /// Tolerances of PCK as shares of the largest extent of the pose, each > 0.
     pub alphas: Vec<f64>,
     /// Frame rate of all motion.
     pub fps: FrameRate,
-    /// Whether errors and speeds are also given over 49 joints, the neck included.
+    /// Whether errors and speeds are also measured over all 49 joints, including the neck.
     pub with_neck: bool,
-    /// Whether any finger is seen; where none is, numbers of whole poses are of the arms.
+    /// Whether any finger is visible; otherwise metrics of complete poses are restricted to the arms.
     pub has_fingers: bool,
-    /// What is measured beside the joints.
+    /// Posture channels that are measured in addition to the joints.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub channels: Vec<PostureChannel>,
 }
@@ -35,7 +35,7 @@ impl Default for MetricSettings {
     }
 }
 
-/// Whose definitions.
+/// Convention, named after the publication or project that defines it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Convention {

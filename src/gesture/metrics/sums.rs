@@ -1,19 +1,19 @@
-//! All sums of some intervals: two rows of numbers, so that resampling intervals with replacement is adding rows.
+//! Additive sums of all metrics over intervals: two rows of values, so that resampling intervals is adding rows.
 
 use ndarray::{Array2, ArrayView2, Axis};
 use rayon::prelude::*;
 use std::ops::AddAssign;
 
-/// What one interval, or many added, come to. `Default` is nothing. Costly sums (packed matrices) stand apart, since
-/// they are large and fewer draws are taken of them.
+/// Sums over one or more intervals; `Default` is the empty sum. Costly sums (packed matrices) are separate, since they
+/// are large and fewer draws are taken of them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MetricSums {
     pub(crate) cheap: Vec<f64>,
     pub(crate) costly: CostlySums,
 }
 
-/// Large sums: of one block in f32 (half the memory; the rounding of 6e-8 is nothing beside drawing blocks), of
-/// anything added in f64.
+/// Large sums: those of a single block in f32 (half the memory; a rounding error of 6e-8 is negligible compared with
+/// the sampling of blocks), added ones in f64.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum CostlySums {
     Block(Vec<f32>),
@@ -42,7 +42,7 @@ impl CostlySums {
         }
     }
 
-    /// All numbers as f64.
+    /// All sums as f64.
     pub(crate) fn row(&self) -> Vec<f64> {
         (0..self.len()).map(|i| self.at(i)).collect()
     }
@@ -56,7 +56,7 @@ impl CostlySums {
 }
 
 impl MetricSums {
-    /// These sums as one block's, the costly ones rounded to f32.
+    /// Converts these sums to those of a block, with the costly ones rounded to f32.
     pub fn into_block(self) -> Self {
         let costly = CostlySums::Block(self.costly.row().into_iter().map(|v| v as f32).collect());
         Self { costly, ..self }
@@ -72,29 +72,29 @@ impl AddAssign<&Self> for MetricSums {
     }
 }
 
-/// What is not there yet is 0.
+/// Adds `others` to `own`, which is extended by zeros if it is shorter.
 fn add(own: &mut Vec<f64>, others: &[f64]) {
     own.resize(own.len().max(others.len()), 0.0);
     own.iter_mut().zip(others).for_each(|(own, other)| *own += other);
 }
 
 impl BlockSums {
-    /// `n` blocks of `width` numbers, all `start`, over an interval of `n_frames`.
+    /// Sums of `n` blocks of `width` values, all initialised to `start`, over an interval of `n_frames`.
     pub(crate) fn new(n: usize, width: usize, n_frames: usize, start: f64) -> Self {
         Self { n_frames, width, rows: vec![start; n * width] }
     }
 
-    /// How many blocks.
+    /// Number of blocks.
     pub(crate) fn n(&self) -> usize {
         self.rows.len().checked_div(self.width).unwrap_or(0)
     }
 
-    /// The block that frame `t` belongs to.
+    /// Index of the block of frame `t`.
     pub(crate) fn of(&self, t: usize) -> usize {
         (t * self.n() / self.n_frames.max(1)).min(self.n().saturating_sub(1))
     }
 
-    /// The sums of the block of frame `t`.
+    /// Sums of the block of frame `t`.
     pub(crate) fn at(&mut self, t: usize) -> &mut [f64] {
         let block = self.of(t);
         self.row(block)
@@ -105,20 +105,19 @@ impl BlockSums {
     }
 }
 
-/// One row of cheap sums for each draw [n_draws, n_cheap]. `counts` [n_draws, n_blocks] says how often a block was
-/// drawn.
+/// Cheap sums of each draw [n_draws, n_cheap]. `counts` [n_draws, n_blocks] is the multiplicity of each block.
 pub(crate) fn draw_cheap(blocks: &[MetricSums], counts: ArrayView2<f64>) -> Array2<f64> {
     let width = blocks.iter().map(|sums| sums.cheap.len()).max().unwrap_or(0);
     drawn(width, blocks, counts, |sums, i| sums.cheap.get(i).copied().unwrap_or(0.0))
 }
 
-/// One row of costly sums for each draw [n_draws, n_costly].
+/// Costly sums of each draw [n_draws, n_costly].
 pub(crate) fn draw_costly(blocks: &[MetricSums], counts: ArrayView2<f64>) -> Array2<f64> {
     let width = blocks.iter().map(|sums| sums.costly.len()).max().unwrap_or(0);
     drawn(width, blocks, counts, |sums, i| sums.costly.at(i))
 }
 
-/// Columns at a time, so that the copy stays small.
+/// Columns that are processed at a time, so that the copy of them stays small.
 const N_COLUMNS: usize = 1024;
 
 fn drawn(

@@ -1,9 +1,9 @@
-//! The loop of a training whose best step is chosen by validation: steps, at the end of each epoch a validation,
-//! checkpoints on the way. Who asks for an end gets it after the step at hand, with a checkpoint.
+//! Training loop that selects the best step by validation: optimiser steps, a validation after each epoch, and periodic
+//! checkpoints. A stop request takes effect after the current step, with a checkpoint.
 
 use super::log::MetricsLog;
-use super::pace::TrainingPace;
-use super::resume::kept;
+use super::progress_log::ProgressLog;
+use super::resume::kept_checkpoint;
 use crate::generate::model::BEST;
 use anyhow::{Context, Result, bail};
 use orator_base::stage::progress::Progress;
@@ -12,53 +12,57 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// Steps between two lines of the log.
+/// Steps between two lines of `metrics.jsonl`.
 const LOG_EVERY: usize = 10;
 
-/// When what is done, in steps.
+/// Intervals of the loop, in steps unless stated otherwise.
 #[derive(Clone, Copy, Debug)]
 pub struct EpochSchedule {
     pub steps: usize,
     pub epoch_steps: usize,
     pub checkpoint_every: usize,
-    /// Epochs after which a training ends whose score has not become better; 0: never.
+    /// Early stopping: epochs without a better score after which the training ends; 0: never.
     pub patience: usize,
 }
 
-/// What a step says: its line of the log, and a few words for the progress.
+/// Result of a step: its line of the log, and a short summary of the losses for the progress display.
 pub struct StepReport {
     pub line: Value,
-    pub words: String,
+    pub summary: String,
 }
 
-/// A network in training, its data and its validation.
+/// A network in training with its data and its validation.
 pub trait ValidatedTraining {
-    /// What a validation says.
+    /// Metrics of a validation.
     type Validation: Serialize;
 
-    /// The speaker's name, and the section of the configuration.
+    /// Name of the speaker, and section of the configuration.
     fn names(&self) -> (&str, &'static str);
     fn schedule(&self) -> EpochSchedule;
-    /// Whether it begins with what another training learnt, so that its first step may make it worse.
-    fn has_learnt(&self) -> bool {
+    /// Whether the weights come from another training; `run` then validates them before the first step, which may make
+    /// them worse.
+    fn is_pretrained(&self) -> bool {
         false
     }
-    /// Steps done.
+    /// Number of completed steps.
     fn n_done(&self) -> usize;
     /// Step and score of the best validation so far.
     fn best(&mut self) -> &mut Option<(usize, f32)>;
-    /// One step. Errors when a loss is not finite or has exploded.
+    /// Runs one optimiser step.
+    ///
+    /// # Errors
+    /// A loss that is not finite or has exploded.
     fn step(&mut self) -> Result<StepReport>;
     fn validate(&self) -> Result<Self::Validation>;
-    /// The score, lower is better, and why the network has collapsed, if it has.
-    fn judged(validation: &Self::Validation) -> (f64, Option<&str>);
-    /// A validation's figures in a few words.
-    fn words(validation: &Self::Validation) -> String;
+    /// Score (lower is better), and a message if the network has collapsed.
+    fn score_and_alarm(validation: &Self::Validation) -> (f64, Option<&str>);
+    /// Short text with the main metrics of a validation.
+    fn summary(validation: &Self::Validation) -> String;
     fn save(&self, folder: &Path) -> Result<()>;
     fn save_best(&self, folder: &Path, validation: &Self::Validation) -> Result<()>;
 }
 
-/// A validation that is logged, behind it a checkpoint that is written.
+/// A validation that has been logged and whose checkpoint has been written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ValidatedStep {
     pub step: usize,
@@ -66,32 +70,35 @@ pub struct ValidatedStep {
     pub best_step: usize,
 }
 
-/// How a training ended.
+/// Result of a training.
 #[derive(Clone, Debug)]
 pub struct TrainingOutcome<V> {
-    /// Steps of this training altogether, and the step this run began at.
+    /// Completed steps over all runs of this training.
     pub steps: usize,
+    /// Step after which this run started.
     pub began_at: usize,
-    /// Whether it ended before its last step since the score had not become better for as many epochs as its patience.
+    /// Whether early stopping (`patience`) ended the training before its last step.
     pub stopped_early: bool,
-    /// Windows or segments that were trained on.
+    /// Number of training windows or segments.
     pub n_examples: usize,
     pub n_parameters: usize,
-    /// Words that were trained with.
+    /// Size of the vocabulary; 0 for networks without words.
     pub n_words: usize,
-    /// Share of the time of the steps that they waited for their batch, 0..1; validation and checkpoints do not count.
+    /// Share of the step time spent waiting for the batch, 0..1; validation and checkpoints do not count.
     pub waiting: f64,
-    /// Of the newest checkpoint.
+    /// Validation of the newest checkpoint.
     pub validation: V,
     pub newest: PathBuf,
-    /// Best by the validation's score.
+    /// Checkpoint with the best score.
     pub best: PathBuf,
     pub best_step: usize,
 }
 
-/// Trains to the last step, or until the score no longer becomes better; `validated` is called after each validation. The
-/// outcome has no examples, parameters, words and waiting yet.
-/// Errors: those of a step, with the checkpoint that is kept; no step to do and no checkpoint; `StoppedTraining`.
+/// Trains to the last step, or until early stopping; `validated` is called after each validation. The caller fills in
+/// `n_examples`, `n_parameters`, `n_words` and `waiting` of the outcome.
+///
+/// # Errors
+/// Errors of a step, with the path of the last checkpoint; no step to run and no checkpoint; `StoppedTraining`.
 pub fn run<T: ValidatedTraining>(
     training: &mut T,
     folder: &Path,
@@ -104,13 +111,13 @@ pub fn run<T: ValidatedTraining>(
     let mut log = MetricsLog::open(folder, began_at)?;
     let task = progress.begin(&format!("train {}", training.names().0), steps as u64);
     task.advance(began_at.min(steps) as u64);
-    let mut pace = TrainingPace::new(began_at, steps);
+    let mut progress_log = ProgressLog::new(began_at, steps);
     let (mut last, mut saved_at) = (None, began_at);
-    if began_at == 0 && training.has_learnt() {
+    if began_at == 0 && training.is_pretrained() {
         let validation = training.validate()?;
         log.write(&json!({ "step": 0, "epoch": 0, "validation": validation }))?;
-        let score = T::judged(&validation).0 as f32;
-        progress.say(&format!("before the first step: {}, score {score:.3}", T::words(&validation)));
+        let score = T::score_and_alarm(&validation).0 as f32;
+        progress.say(&format!("before the first step: {}, score {score:.3}", T::summary(&validation)));
         *training.best() = Some((0, score));
         training.save_best(folder, &validation)?;
     }
@@ -121,14 +128,14 @@ pub fn run<T: ValidatedTraining>(
             }
             return Err(stopped(training, folder)?.into());
         }
-        let report = training.step().with_context(|| kept(folder, section))?;
+        let report = training.step().with_context(|| kept_checkpoint(folder, section))?;
         let step = training.n_done();
         task.advance(1);
         if step.is_multiple_of(LOG_EVERY) {
-            task.detail(&format!("{}  {:.2} steps/s", report.words, pace.per_sec(step)));
+            task.detail(&format!("{}  {:.2} steps/s", report.summary, progress_log.per_sec(step)));
             log.write(&report.line)?;
         }
-        if let Some(line) = pace.line(step, &report.words) {
+        if let Some(line) = progress_log.line(step, &report.summary) {
             task.milestone(&line);
         }
         let is_last = step == steps;
@@ -136,19 +143,19 @@ pub fn run<T: ValidatedTraining>(
         if is_validated {
             let validation = training.validate()?;
             log.write(&json!({ "step": step, "epoch": step.div_ceil(epoch_steps), "validation": validation }))?;
-            let (score, alarm) = T::judged(&validation);
-            // In f32, whose decimals come back exactly from JSON.
+            let (score, alarm) = T::score_and_alarm(&validation);
+            // f32 values survive the round trip through the JSON of a checkpoint exactly.
             let score = score as f32;
-            let before = *training.best();
-            let standing = match before {
+            let previous_best = *training.best();
+            let comparison = match previous_best {
                 Some((best_step, best)) if best <= score => format!("best {best:.3} at step {best_step}"),
                 _ => "the best so far".to_owned(),
             };
-            progress.say(&format!("step {step}: {}, score {score:.3} ({standing})", T::words(&validation)));
+            progress.say(&format!("step {step}: {}, score {score:.3} ({comparison})", T::summary(&validation)));
             if let (Some(alarm), true) = (alarm, step > epoch_steps) {
                 progress.say(&format!("step {step}: {alarm}"));
             }
-            if before.is_none_or(|(_, best)| score < best) {
+            if previous_best.is_none_or(|(_, best)| score < best) {
                 *training.best() = Some((step, score));
                 training.save_best(folder, &validation)?;
             }
@@ -187,32 +194,33 @@ pub fn run<T: ValidatedTraining>(
     })
 }
 
-/// What is kept of a training that ends here.
+/// Error that reports the checkpoints of a training stopped on request.
 fn stopped(training: &mut impl ValidatedTraining, folder: &Path) -> Result<StoppedTraining> {
     let newest = checkpoint::list(folder)?.pop().map(|(_, path)| path);
     let best = training.best().map(|(step, _)| (step, folder.join(BEST)));
     Ok(StoppedTraining { step: training.n_done(), steps: training.schedule().steps, newest, best })
 }
 
-/// Whether the score has not become better for as many epochs as the patience allows.
+/// Whether early stopping ends the training: no better score for `patience` epochs.
 fn is_over(training: &mut impl ValidatedTraining) -> bool {
     let EpochSchedule { patience, epoch_steps, .. } = training.schedule();
     let done = training.n_done();
-    let since = done - training.best().map_or(done, |(step, _)| step.min(done));
-    patience > 0 && since >= patience * epoch_steps
+    let n_since_best = done - training.best().map_or(done, |(step, _)| step.min(done));
+    patience > 0 && n_since_best >= patience * epoch_steps
 }
 
-/// A training that ended before its last step since it was asked to. Started again, it goes on behind `step`.
+/// Error of a training that was stopped on request before its last step. Started again, it resumes after `step`.
 #[derive(Clone, Debug, thiserror::Error)]
 #[error("stopped after step {step} of {steps}{}", self.checkpoint())]
 pub struct StoppedTraining {
-    /// Steps done, and steps of the whole training.
+    /// Completed steps.
     pub step: usize,
-    /// Steps of the whole training.
+    /// Steps of the complete training.
     pub steps: usize,
-    /// Checkpoint of this step; `None`: there was no step.
+    /// Checkpoint of this step; `None` if no step was completed.
     pub newest: Option<PathBuf>,
-    /// Best checkpoint so far, and its step; `None`: nothing was validated yet, or this training chooses none.
+    /// Step and path of the best checkpoint so far; `None` before the first validation, or if the training selects
+    /// none.
     pub best: Option<(usize, PathBuf)>,
 }
 

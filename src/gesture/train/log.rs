@@ -1,6 +1,6 @@
-//! The log of a training: `metrics.jsonl`, one JSON object a line, each with its `step`, and the same numbers as an event
-//! file for TensorBoard. A resumed training drops the lines that its checkpoint has not seen, so that both files are
-//! those of an undisturbed training.
+//! Log of a training: `metrics.jsonl`, one JSON object with a `step` per line, and the same values as an event file for
+//! TensorBoard. A resumed training drops the lines after its checkpoint's step, so both files are identical to those of
+//! an uninterrupted training.
 
 use anyhow::{Context, Result};
 use orator_base::stage::workdir;
@@ -11,17 +11,17 @@ use std::fs::{File, OpenOptions};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-/// The lines, in the folder of a training.
+/// Name of the JSON lines file in the folder of a training.
 pub const FILE: &str = "metrics.jsonl";
 
-/// The open log.
+/// An open log, to which lines are appended.
 pub struct MetricsLog {
     lines: AppendedFile,
     events: Option<AppendedFile>,
 }
 
 impl MetricsLog {
-    /// Opens the log in `folder`, made if missing, with the lines up to `step`.
+    /// Opens the log in `folder`, creating it if missing, and keeps the lines up to `step`.
     pub fn open(folder: &Path, step: usize) -> Result<Self> {
         let mut log = Self::lines_alone(&folder.join(FILE), step)?;
         let records = read(folder)?.iter().filter_map(tfevents::record).collect();
@@ -30,20 +30,20 @@ impl MetricsLog {
         Ok(log)
     }
 
-    /// Opens the file `path` as a log without events.
+    /// Opens the file `path` as a log without an event file, and keeps the lines up to `step`.
     pub fn lines_alone(path: &Path, step: usize) -> Result<Self> {
         let text = text(path)?;
-        // A training without a checkpoint begins anew, with its validation before the first step.
-        let seen = |line: &&str| step > 0 && parsed(line).is_some_and(|line| step_of(&line) <= step as u64);
-        let kept: String = text.lines().filter(seen).map(|line| format!("{line}\n")).collect();
+        // A training without a checkpoint starts over, including the validation before its first step.
+        let is_kept = |line: &&str| step > 0 && parsed(line).is_some_and(|line| step_of(&line) <= step as u64);
+        let kept: String = text.lines().filter(is_kept).map(|line| format!("{line}\n")).collect();
         Ok(Self { lines: AppendedFile::open(path, kept.as_bytes())?, events: None })
     }
 
-    /// Adds a line.
+    /// Appends a line to both files.
     pub fn write(&mut self, line: &Value) -> Result<()> {
         let text = line.to_string();
         self.lines.add(format!("{text}\n").as_bytes())?;
-        // From the text, as on resuming: a number read back may differ in its last digit.
+        // The event is built from the parsed text, as on resuming: a number read back may differ in its last digit.
         match (&mut self.events, parsed(&text).as_ref().and_then(tfevents::record)) {
             (Some(events), Some(record)) => events.add(&record),
             _ => Ok(()),
@@ -51,7 +51,7 @@ impl MetricsLog {
     }
 }
 
-/// A line of the log: a step with its losses.
+/// Log line of a step: the serialised losses with the key `step`.
 pub fn line(step: usize, losses: &impl Serialize) -> Value {
     let mut line = json!({ "step": step });
     if let (Some(line), Ok(Value::Object(losses))) = (line.as_object_mut(), serde_json::to_value(losses)) {
@@ -60,7 +60,7 @@ pub fn line(step: usize, losses: &impl Serialize) -> Value {
     line
 }
 
-/// The whole lines of the log in `folder`, none where there is no log.
+/// Complete lines of the log in `folder`; empty if there is no log.
 pub fn read(folder: &Path) -> Result<Vec<Value>> {
     Ok(text(&folder.join(FILE))?.lines().filter_map(parsed).collect())
 }
@@ -72,7 +72,7 @@ fn text(path: &Path) -> Result<String> {
     }
 }
 
-/// A line of a log; `None` of half a line.
+/// Parsed line of a log; `None` for a line that was only partly written.
 fn parsed(line: &str) -> Option<Value> {
     serde_json::from_str::<Value>(line).ok().filter(|line| line["step"].is_u64())
 }
@@ -81,7 +81,7 @@ fn step_of(line: &Value) -> u64 {
     line["step"].as_u64().unwrap_or(u64::MAX)
 }
 
-/// A file that only grows.
+/// A file opened for appending.
 struct AppendedFile {
     path: PathBuf,
     file: File,
@@ -104,7 +104,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn resuming_drops_what_the_checkpoint_has_not_seen() -> Result<()> {
+    fn resuming_drops_lines_after_the_checkpoint() -> Result<()> {
         let (folder, other) = (tempfile::tempdir()?, tempfile::tempdir()?);
         let mut log = MetricsLog::open(folder.path(), 0)?;
         for step in [10, 20, 30] {
@@ -119,8 +119,8 @@ mod tests {
         let text = bytes(folder.path(), FILE)?;
         let expected = "{\"step\":10,\"l1\":0.30000000000000004}\n{\"step\":20,\"l1\":0.30000000000000004}\n{\"step\":30,\"l1\":0.25}\n";
         assert_eq!(text, expected.as_bytes());
-        let mut undisturbed = MetricsLog::open(other.path(), 0)?;
-        read(folder.path())?.iter().try_for_each(|line| undisturbed.write(line))?;
+        let mut uninterrupted = MetricsLog::open(other.path(), 0)?;
+        read(folder.path())?.iter().try_for_each(|line| uninterrupted.write(line))?;
         assert_eq!(bytes(folder.path(), tfevents::FILE)?, bytes(other.path(), tfevents::FILE)?);
         Ok(())
     }

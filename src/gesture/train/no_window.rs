@@ -1,21 +1,21 @@
-//! Why a split of a dataset gives no window to train or validate on, and what mends it.
+//! Explains why a split of a dataset has no window to train or validate on, and suggests a remedy.
 
 use anyhow::{Result, bail};
 use orator_base::stage::counted;
 use orator_dataset::info::DatasetInfo;
 use orator_dataset::{Dataset, Split};
 
-/// What is cut out of the intervals of a dataset.
+/// Windows or segments that are cut out of the intervals of a dataset.
 #[derive(Clone, Copy, Debug)]
 pub struct NeededFrames {
-    /// What it is called: "a window".
+    /// Name in messages, such as "a window".
     pub name: &'static str,
     pub n_frames: usize,
-    /// Key of the configuration that says how long it is, and what its values are multiples of.
+    /// Configuration key of the length in frames, and the number its values must be multiples of.
     pub key: Option<(&'static str, usize)>,
 }
 
-/// Errors where the training split has no interval that is long enough, with cause and remedy.
+/// Fails with cause and remedy if no interval of the training split is long enough.
 pub fn ensure_window(dataset: &Dataset, needed: NeededFrames) -> Result<()> {
     match cause(dataset, Split::Train, needed) {
         Some(cause) => bail!("{}: nothing to train on: {cause}", dataset.dir().display()),
@@ -23,7 +23,7 @@ pub fn ensure_window(dataset: &Dataset, needed: NeededFrames) -> Result<()> {
     }
 }
 
-/// Why `split` has no interval that is long enough, with the numbers and what mends it; `None`: it has one.
+/// Message with cause and remedy if no interval of `split` is long enough; `None` if one is.
 pub fn cause(dataset: &Dataset, split: Split, needed: NeededFrames) -> Option<String> {
     let samples = dataset.samples(split);
     let Some(longest) = samples.iter().map(|sample| sample.n_frames).max() else {
@@ -49,7 +49,7 @@ pub fn cause(dataset: &Dataset, split: Split, needed: NeededFrames) -> Option<St
     Some(format!("{found}, {name} needs {}; {remedy}", long(n_frames)))
 }
 
-/// That a split is empty, what the others hold, and the line that fills it.
+/// Message that a split is empty, with the contents of the other splits and the setting that fills it.
 fn empty(info: &DatasetInfo, split: Split) -> String {
     let (mut others, mut is_all_empty) = (Vec::new(), true);
     for other in Split::ALL.into_iter().filter(|other| *other != split) {
@@ -58,7 +58,7 @@ fn empty(info: &DatasetInfo, split: Split) -> String {
         others.push(format!("{} {} of {secs:.1} s", other.name(), counted(n, "interval")));
     }
     let name = split.name();
-    // What the models of `orator run` saw comes from videos; imports and captures have none.
+    // `models` lists the models of `orator run`, which processes videos; it is empty for imports and captures.
     let remedy = if is_all_empty {
         "add footage, and `orator report` shows what was refused".to_owned()
     } else if info.models.is_empty() {

@@ -1,4 +1,5 @@
-//! What trainings that go on from a checkpoint share: windows of a step, settings that count, advice when one breaks.
+//! Shared parts of resumable trainings: the random numbers and windows of a step, merging of stored and requested
+//! settings, the newest checkpoint, and checks of the losses.
 
 use anyhow::{Context, Result, ensure};
 use orator_base::stage::progress::Progress;
@@ -11,47 +12,49 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::path::Path;
 
-/// Loss beyond which a training has exploded.
+/// Absolute loss above which a training counts as diverged.
 const LOSS_LIMIT: f64 = 1e4;
 
-/// Random numbers of a step, which depend on the seed and the step alone.
-pub fn stream(seed: u64, step: usize) -> ChaCha8Rng {
+/// Random number generator of a step, which depends only on the seed and the step.
+pub fn step_rng(seed: u64, step: usize) -> ChaCha8Rng {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(step as u64 + 1);
     rng
 }
 
-/// Windows of a step, `n` of `n_windows`, drawn with replacement.
+/// Indices of the `n` windows of a step, drawn with replacement from `n_windows`.
 pub fn sample_windows(seed: u64, step: usize, n: usize, n_windows: usize) -> Vec<usize> {
-    let mut rng = stream(seed, step);
+    let mut rng = step_rng(seed, step);
     (0..n).map(|_| rng.random_range(0..n_windows as u64) as usize).collect()
 }
 
-/// Settings to go on with: the checkpoint's, but for those named in `free`; and a line for each difference, its key
-/// behind the name of the section. What is requested as `"auto"` is what the checkpoint has.
+/// Settings of a resumed training: those of the checkpoint, except for the keys in `overridable`, which come from
+/// `requested`. Also returns a message for each other difference, with its key `section.key`. A requested value of
+/// `"auto"` never overrides the checkpoint's.
 pub fn settings<T: Serialize + DeserializeOwned>(
     stored: &T,
     requested: &impl Serialize,
     section: &str,
-    free: &[&str],
+    overridable: &[&str],
 ) -> Result<(T, Vec<String>)> {
-    let (mut kept, requested) = (serde_json::to_value(stored)?, serde_json::to_value(requested)?);
+    let (mut merged, requested) = (serde_json::to_value(stored)?, serde_json::to_value(requested)?);
     let mut differences = Vec::new();
     for (key, value) in requested.as_object().into_iter().flatten() {
         if value.as_str() == Some(AUTO) {
             continue;
         }
-        if free.contains(&key.as_str()) {
-            kept[key].clone_from(value);
-        } else if kept[key] != *value {
-            differences.push(format!("{section}.{key} is {value} now, {} in the checkpoint, which counts", kept[key]));
+        if overridable.contains(&key.as_str()) {
+            merged[key].clone_from(value);
+        } else if merged[key] != *value {
+            differences
+                .push(format!("{section}.{key} is {value} now, {} in the checkpoint, which counts", merged[key]));
         }
     }
-    Ok((serde_json::from_value(kept)?, differences))
+    Ok((serde_json::from_value(merged)?, differences))
 }
 
-/// The newest checkpoint of a folder, and what `read` makes of it; said, with a line for each difference that `read` finds.
-/// `None`: there is none. Errors name the checkpoint.
+/// Newest checkpoint of a folder with the state that `read` parses from it, or `None` if the folder has no checkpoint.
+/// Reports the checkpoint and the differences returned by `read` to `progress`. Errors name the checkpoint.
 pub fn newest<T>(
     folder: &Path,
     progress: &dyn Progress,
@@ -65,20 +68,20 @@ pub fn newest<T>(
     Ok(Some((stored, contents)))
 }
 
-/// Errors, stating all of them, when a loss is not finite or has exploded.
-pub fn ensure_sound(step: usize, losses: &[(&str, f64)], gradient_norm: f64) -> Result<()> {
-    let is_sound = losses.iter().all(|(_, loss)| loss.is_finite() && loss.abs() < LOSS_LIMIT);
+/// Fails, listing all losses, if a loss is not finite or exceeds `LOSS_LIMIT`, or if the gradient norm is not finite.
+pub fn ensure_not_diverged(step: usize, losses: &[(&str, f64)], gradient_norm: f64) -> Result<()> {
+    let is_bounded = losses.iter().all(|(_, loss)| loss.is_finite() && loss.abs() < LOSS_LIMIT);
     let listed: Vec<String> = losses.iter().map(|(name, loss)| format!("{name} {loss}")).collect();
     ensure!(
-        is_sound && gradient_norm.is_finite(),
+        is_bounded && gradient_norm.is_finite(),
         "the training broke at step {step}: {}, norm of the gradient {gradient_norm}",
         listed.join(", ")
     );
     Ok(())
 }
 
-/// Which checkpoint is kept when a training breaks, and what may help.
-pub fn kept(folder: &Path, section: &str) -> String {
+/// Error context of a diverged training: the newest checkpoint and advice.
+pub fn kept_checkpoint(folder: &Path, section: &str) -> String {
     let advice = format!("a smaller {section}.learning_rate may help");
     match checkpoint::list(folder).ok().and_then(|mut all| all.pop()) {
         Some((step, path)) => format!("the checkpoint of step {step} is kept: {}; {advice}", path.display()),

@@ -9,7 +9,7 @@ use orator_gesture::train::epochs::StoppedTraining;
 use orator_gesture::train::log::MetricsLog;
 use orator_gesture::train::optim::adam;
 use orator_gesture::train::optim::adam::Adam;
-use orator_gesture::train::pace::TrainingPace;
+use orator_gesture::train::progress_log::ProgressLog;
 use orator_nn::Mode;
 use orator_nn::params::Params;
 use orator_nn::weights::Contents;
@@ -171,7 +171,7 @@ fn train_until(
     let task = progress.begin("training", (schedule.steps - start.min(schedule.steps)) as u64);
     let measure_every = schedule.steps.div_ceil(MEASURES);
     let (mut sum, mut n_summed) = (0.0, 0);
-    let mut pace = TrainingPace::new(start, schedule.steps);
+    let mut progress_log = ProgressLog::new(start, schedule.steps);
     for step in start..end {
         let (x, y) = batch(training_task, schedule, step, n_points)?;
         // the running statistics settle as the training does: 0.1 falls to 0.001
@@ -197,7 +197,7 @@ fn train_until(
             log.write(&json!({ "step": step + 1, "errors": errors }))?;
             (sum, n_summed) = (0.0, 0);
         }
-        if let Some(line) = pace.line(step + 1, &format!("loss {loss:.4}")) {
+        if let Some(line) = progress_log.line(step + 1, &format!("loss {loss:.4}")) {
             task.milestone(&line);
         }
         let is_to_stop = progress.is_to_stop() && step + 1 < schedule.steps;

@@ -12,7 +12,7 @@ use orator_base::stage::counted;
 use orator_gesture::evaluate::clips::clips::EvalClips;
 use orator_gesture::evaluate::table::table::{PredictorRow, Table};
 use orator_gesture::evaluate::verdict::text;
-use orator_gesture::evaluate::verdict::verdict::{Answer, Verdict, better_than_nothing, hears};
+use orator_gesture::evaluate::verdict::verdict::{Answer, Verdict, better_than_nothing, depends_on_audio};
 use serde_json::json;
 
 /// HTML of the page.
@@ -75,7 +75,7 @@ fn meaning(table: &Table) -> Vec<Node> {
         let card = node("div").class(class).child(node("p").text(format!("{of}{}", verdict.sentence)));
         card.child(node("ul").class("votes").children(votes))
     };
-    let verdicts = |own| [(own, better_than_nothing(table, own)), (own, hears(table, own))];
+    let verdicts = |own| [(own, better_than_nothing(table, own)), (own, depends_on_audio(table, own))];
     let mut body = vec![node("div").class("verdicts").children(table.predictions().flat_map(verdicts).map(card))];
     let rows = table.rows.iter().map(|row| {
         let name = node("th").attr("scope", "row").text(row.name());

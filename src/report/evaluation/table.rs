@@ -5,7 +5,7 @@ use crate::html::{Node, node};
 use orator_gesture::evaluate::baseline::baselines::PredictorKind;
 use orator_gesture::evaluate::table::table::{N_COSTLY_DRAWS, N_DRAWS, Table};
 use orator_gesture::evaluate::verdict::labels;
-use orator_gesture::evaluate::verdict::verdict::{Answer, against_nothing};
+use orator_gesture::evaluate::verdict::verdict::{Answer, against_constant_pose};
 use orator_gesture::metrics::catalogue::Definition;
 
 /// Groups of metrics by prefixes of their names; the last group contains the rest.
@@ -61,7 +61,7 @@ fn row(table: &Table, index: usize, last: &mut String) -> Option<Node> {
     if !table.is_shown(index) {
         return None;
     }
-    let whole = labels::whole_name(definition);
+    let whole = labels::name_without_part(definition);
     let is_part = *last == whole && !labels::part(definition).is_empty();
     let name = node("th").attr("scope", "row").attr("title", definition.formula);
     let name = if is_part {
@@ -74,7 +74,7 @@ fn row(table: &Table, index: usize, last: &mut String) -> Option<Node> {
     };
     *last = whole;
     let against = table.predictions().map(|own| {
-        let (class, words) = match against_nothing(table, own, index) {
+        let (class, words) = match against_constant_pose(table, own, index) {
             Some(Answer::Yes) => ("yes", "better"),
             Some(Answer::No) => ("no", "worse"),
             Some(Answer::Undecided) => ("undecided", "not told apart"),

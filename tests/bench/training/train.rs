@@ -16,7 +16,7 @@ use orator_gesture::generate::mel_stream::mel_frames;
 use orator_gesture::generate::model::SpeakerMetadata;
 use orator_gesture::generate::normalisation::{N_FEATURES, Normalisation};
 use orator_gesture::generate::representation::Representation;
-use orator_gesture::train::gan::recipe::{self, TrainingMaterial, TrainingStart};
+use orator_gesture::train::gan::recipe::{self, InitialWeights, TrainingMaterial};
 use orator_gesture::train::gan::step::{GanTrainer, Losses, MAX_NORM};
 use orator_gesture::train::gan::windows::WindowBatch;
 use orator_nn::cpu::thread_team::with_spinning_workers;
@@ -69,7 +69,7 @@ impl Fixed {
         let settings = recipe::settings(
             &asked,
             &TrainingMaterial { train_secs: 0.0, validation_secs: 0.0, n_speakers: 1 },
-            TrainingStart::Nothing,
+            InitialWeights::Random,
         )?;
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let table = |value: f32| ndarray::Array2::from_elem((N_JOINTS, 3), value);

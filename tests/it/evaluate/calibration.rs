@@ -3,7 +3,7 @@
 //! 2,000 of each.
 
 use orator_gesture::evaluate::table::block_length::BlockLength;
-use orator_gesture::evaluate::table::left_out::BlockGroups;
+use orator_gesture::evaluate::table::jackknife::BlockGroups;
 use orator_gesture::evaluate::table::sign_flips::{self, LEVEL};
 use orator_gesture::metrics::catalogue::n_blocks;
 use rand::{Rng, SeedableRng};
@@ -88,7 +88,7 @@ impl Setting {
         let differences: Vec<Vec<f64>> = all.iter().map(of_metric).collect();
         let inflation = length.variance_inflation(secs / groups.len() as f64);
         let tested = sign_flips::test(&differences, inflation);
-        (groups.len() >= sign_flips::FEWEST_BLOCKS).then(|| tested.iter().any(|metric| metric.p <= LEVEL))
+        (groups.len() >= sign_flips::MIN_BLOCKS).then(|| tested.iter().any(|metric| metric.p <= LEVEL))
     }
 
     /// Number of verdicts, and of evaluations with too few blocks.

@@ -9,11 +9,11 @@ use orator_base::types::time::FrameRate;
 use orator_dataset::{Dataset, Split};
 use orator_gesture::evaluate::baseline::baselines::ClipMotion;
 use orator_gesture::evaluate::clips::clips::{EvalClip, EvalClips};
+use orator_gesture::evaluate::clips::from_checkpoints::nearest_neighbours;
 use orator_gesture::evaluate::clips::held_out;
 use orator_gesture::evaluate::clips::motion_store::{MotionStore, StoredMotion};
-use orator_gesture::evaluate::clips::of_speaker::copied;
 use orator_gesture::evaluate::clips::sound_features::from_samples;
-use orator_gesture::train::gan::begin::normalisation;
+use orator_gesture::train::gan::speaker_metadata::normalisation;
 use orator_test_support::project::Project;
 use std::path::Path;
 
@@ -113,8 +113,9 @@ fn the_neighbour_by_sound_is_found_where_it_was_taken_from() {
         features,
         audio: None,
     };
-    let clips = EvalClips { fps, clips: vec![clip], notes: Vec::new(), learnt: false, channels: Vec::new() };
-    let found = copied(&dataset, &normal, &clips, Split::Validation, &MotionStore::in_memory()).unwrap().unwrap();
+    let clips = EvalClips { fps, clips: vec![clip], notes: Vec::new(), trained_on: false, channels: Vec::new() };
+    let found =
+        nearest_neighbours(&dataset, &normal, &clips, Split::Validation, &MotionStore::in_memory()).unwrap().unwrap();
     let ClipMotion::Motion(found) = &found[0] else { panic!("it stands still") };
     let apart = found.view().iter().zip(&ground_truth.joints).filter(|(a, b)| (*a - *b).abs() > 1e-3).count();
     assert!(apart < found.view().len() / 20, "{apart} of {} numbers are others", found.view().len());

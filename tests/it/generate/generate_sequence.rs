@@ -92,31 +92,31 @@ fn words_are_heard_and_none_is_as_no_transcript() {
     for network in ["contextual", "words", "adversarial", "autoencoder"] {
         let speaker = SequenceGenerator::open(&folder.path().join(format!("{network}.safetensors"))).unwrap();
         let (sound, silence) = (tone(4.37, 0.0), Sound { rate: 16_000, samples: vec![0.0; 16_000 * 437 / 100] });
-        let none = speaker.poses(&sound, &[]).unwrap().numbers;
+        let none = speaker.poses(&sound, &[]).unwrap().features;
         assert_eq!(none.nrows(), 87);
         // Words after the end, in any order, change nothing; those within it do.
         let mut late = words(40).split_off(8);
         late.reverse();
-        assert_eq!(speaker.poses(&sound, &late).unwrap().numbers, none);
+        assert_eq!(speaker.poses(&sound, &late).unwrap().features, none);
         let said = words(4);
         let backwards: Vec<Word> = said.iter().rev().cloned().collect();
-        let spoken = speaker.poses(&sound, &said).unwrap().numbers;
+        let spoken = speaker.poses(&sound, &said).unwrap().features;
         assert_eq!(
-            (spoken != none, &speaker.poses(&sound, &backwards).unwrap().numbers),
+            (spoken != none, &speaker.poses(&sound, &backwards).unwrap().features),
             (speaker.reads_words(), &spoken)
         );
         // What is said later changes nothing before a segment may read it.
-        let more = speaker.poses(&sound, &words(5)).unwrap().numbers;
+        let more = speaker.poses(&sound, &words(5)).unwrap().features;
         assert!(more.rows().into_iter().zip(spoken.rows()).take(30).all(|(a, b)| a == b), "{network}");
         // Silence is spoken too; the shortest sound has one frame, a shorter one none.
         let still = speaker.poses(&silence, &[]).unwrap();
-        assert!(still.numbers.iter().all(|v| v.is_finite()) && still.numbers != none && still.numbers.nrows() == 87);
-        assert_eq!(speaker.poses(&tone(0.05, 0.0), &[]).unwrap().numbers.nrows(), 1);
+        assert!(still.features.iter().all(|v| v.is_finite()) && still.features != none && still.features.nrows() == 87);
+        assert_eq!(speaker.poses(&tone(0.05, 0.0), &[]).unwrap().features.nrows(), 1);
         let error = speaker.poses(&tone(0.049, 0.0), &[]).unwrap_err().to_string();
         assert!(error.contains("too short for one frame"), "{error}");
-        let heard = speaker.hear(&tone(0.9, 0.0), &[]).unwrap();
-        let ways = [StateAtSeams::Renewed, StateAtSeams::Carried].map(|way| speaker.speak(&heard, way).unwrap());
-        assert_eq!((&ways[0].numbers, ways[0].seam_jump), (&ways[1].numbers, [1.0, 1.0]), "one segment has no seam");
+        let heard = speaker.prepare(&tone(0.9, 0.0), &[]).unwrap();
+        let ways = [StateAtSeams::Renewed, StateAtSeams::Carried].map(|way| speaker.generate(&heard, way).unwrap());
+        assert_eq!((&ways[0].features, ways[0].seam_jump), (&ways[1].features, [1.0, 1.0]), "one segment has no seam");
     }
 }
 

@@ -214,8 +214,8 @@ fn the_losses_are_those_of_pytorch() -> anyhow::Result<()> {
         ("mse", &|made| candle_nn::loss::mse(made, real)),
         ("continuity_of_numbers", &losses::continuity_of_numbers),
         ("continuity_of_poses", &losses::continuity_of_poses),
-        ("excursion", &losses::excursion),
-        ("variance", &losses::variance),
+        ("excursion", &losses::variance_loss_of_code),
+        ("variance", &losses::variance_loss_of_paper),
         ("discriminator", &|made| losses::discriminator(made, real)),
         ("adversarial", &|made| generator_loss(AdversarialLoss::Log, made)),
     ];

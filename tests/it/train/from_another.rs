@@ -11,7 +11,7 @@ use orator_formats::checkpoint;
 use orator_gesture::generate::GestureGenerator;
 use orator_gesture::generate::model::BEST;
 use orator_gesture::train::epochs::ValidatedStep;
-use orator_gesture::train::gan::train::{train, train_watched};
+use orator_gesture::train::gan::train::{train, train_with_callback};
 use std::path::Path;
 
 fn speaker(folder: &Path, name: &str, phase: f64) -> Dataset {
@@ -39,7 +39,7 @@ fn it_takes_the_weights_and_keeps_its_own_body() {
     let stop = Stop::at(u64::MAX);
     let ignore = &mut |_: ValidatedStep| ();
     let of_ben = dir.join("ben-gan");
-    train_watched(&[&ben], &settings(), Some(&of_anna), &of_ben, &Shared(stop.clone()), ignore).unwrap();
+    train_with_callback(&[&ben], &settings(), Some(&of_anna), &of_ben, &Shared(stop.clone()), ignore).unwrap();
     let said = stop.said.lock().unwrap().join("\n");
     assert!(said.contains("beginning with what") && said.contains("learnt of anna"), "{said}");
 
@@ -59,10 +59,17 @@ fn it_takes_the_weights_and_keeps_its_own_body() {
     let parts = dir.join("ben-parts");
     let half = GanConfig { warmup_steps: 0.into(), fade_to: 1.0.into(), ..settings() };
     let whole = dir.join("ben-whole");
-    train_watched(&[&ben], &half, Some(&of_anna), &whole, &Silent, ignore).unwrap();
-    train_watched(&[&ben], &GanConfig { steps: 3.into(), ..half.clone() }, Some(&of_anna), &parts, &Silent, ignore)
-        .unwrap();
-    train_watched(&[&ben], &half, None, &parts, &Silent, ignore).unwrap();
+    train_with_callback(&[&ben], &half, Some(&of_anna), &whole, &Silent, ignore).unwrap();
+    train_with_callback(
+        &[&ben],
+        &GanConfig { steps: 3.into(), ..half.clone() },
+        Some(&of_anna),
+        &parts,
+        &Silent,
+        ignore,
+    )
+    .unwrap();
+    train_with_callback(&[&ben], &half, None, &parts, &Silent, ignore).unwrap();
     let last = |out: &Path| std::fs::read(checkpoint::path(out, 6)).unwrap();
     assert!(last(&whole) == last(&parts));
     assert!(bytes(&whole).iter().any(|(name, _)| name == BEST));
@@ -74,7 +81,7 @@ fn what_cannot_be_begun_with_is_named() {
     let dir = folder.path();
     let (anna, ben) = (speaker(dir, "anna", 0.0), speaker(dir, "ben", 1.5));
     let fails = |from: &Path, settings: &GanConfig| {
-        let result = train_watched(&[&ben], settings, Some(from), &dir.join("out"), &Silent, &mut |_| ());
+        let result = train_with_callback(&[&ben], settings, Some(from), &dir.join("out"), &Silent, &mut |_| ());
         format!("{:#}", result.unwrap_err())
     };
     assert!(fails(&dir.join("nowhere"), &settings()).contains("nowhere"));

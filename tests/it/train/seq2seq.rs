@@ -103,7 +103,7 @@ fn the_loss_falls_and_the_dataset_is_spoken() {
     let speaker = SequenceGenerator::open(&out).unwrap();
     let poses = speaker.poses(&sample("a-00000000-000000", 99, 0.0).sound, &[]).unwrap();
     let motion = speaker.motion(&poses).unwrap();
-    assert_eq!((motion.n_frames(), poses.numbers.dim()), (99, (99, 144)));
+    assert_eq!((motion.n_frames(), poses.features.dim()), (99, (99, 144)));
     assert!(motion.joints.iter().all(|v| v.is_finite()) && poses.seam_jump.iter().all(|jump| jump.is_finite()));
     assert!(speaker.bvh(&poses).is_err());
     assert!(speaker.poses(&orator_base::types::sound::Sound { rate: 8_000, samples: vec![0.0; 8_000] }, &[]).is_err());
@@ -130,10 +130,10 @@ fn captures_with_and_without_words_speak_for_sounds_of_any_length() {
         for (secs, n_frames) in [(0.9, 18), (7.33, 146), (70.0, 1400)] {
             let sound = tone(secs, 1.0);
             let (silent, said) = (speaker.poses(&sound, &[]).unwrap(), speaker.poses(&sound, &words).unwrap());
-            assert_eq!((silent.numbers.nrows(), said.numbers.nrows()), (n_frames, n_frames));
-            assert!(said.numbers != silent.numbers, "{network:?} does not hear words");
+            assert_eq!((silent.features.nrows(), said.features.nrows()), (n_frames, n_frames));
+            assert!(said.features != silent.features, "{network:?} does not hear words");
             for poses in [silent, said] {
-                assert!(poses.numbers.iter().all(|v| v.is_finite()));
+                assert!(poses.features.iter().all(|v| v.is_finite()));
                 let back = Bvh::parse(&speaker.bvh(&poses).unwrap()).unwrap();
                 assert_eq!((back.n_frames, back.joints[0].name.as_str()), (n_frames, "Hips"));
                 assert!(speaker.motion(&poses).is_err());

@@ -15,10 +15,10 @@ use orator_formats::{checkpoint, wav};
 use orator_gesture::generate::GestureGenerator;
 use orator_gesture::generate::model::{BEST, GENERATOR, GenerationChoice};
 use orator_gesture::train::epochs::ValidatedStep;
-use orator_gesture::train::gan::begin;
-use orator_gesture::train::gan::recipe::{self, TrainingMaterial, TrainingStart};
-use orator_gesture::train::gan::start::StartingModel;
-use orator_gesture::train::gan::train::{train, train_watched};
+use orator_gesture::train::gan::pretrained::PretrainedModel;
+use orator_gesture::train::gan::recipe::{self, InitialWeights, TrainingMaterial};
+use orator_gesture::train::gan::speaker_metadata;
+use orator_gesture::train::gan::train::{train, train_with_callback};
 use orator_gesture::train::gan::windows::JoinedWindows;
 use orator_gesture::train::gan::windows::WindowLoader;
 use orator_nn::gan::speaker_layer::{SPEAKER, SPEAKER_EMBEDDING, SPEAKER_WEIGHT};
@@ -77,7 +77,7 @@ fn each_speaks_with_a_body_of_its_own() {
     let (anna, ben) = (speaker(dir, "anna", 0.0, 1.0), speaker(dir, "ben", 1.5, 1.2));
     let ignore = &mut |_: ValidatedStep| ();
     let both = dir.join("both");
-    train_watched(&[&anna, &ben], &settings(), None, &both, &Silent, ignore).unwrap();
+    train_with_callback(&[&anna, &ben], &settings(), None, &both, &Silent, ignore).unwrap();
 
     let said = Sound { rate: 16_000, samples: (0..48_000).map(|n| (n as f32 * 0.05).sin() * 0.3).collect() };
     let motion = |name: &str| -> Array3<f32> {
@@ -99,10 +99,10 @@ fn each_speaks_with_a_body_of_its_own() {
     // Stopped and gone on with, it ends with the same bytes.
     let parts = dir.join("parts");
     let half = GanConfig { steps: 3.into(), ..settings() };
-    train_watched(&[&anna, &ben], &half, None, &parts, &Silent, ignore).unwrap();
+    train_with_callback(&[&anna, &ben], &half, None, &parts, &Silent, ignore).unwrap();
     let error = train(&anna, &settings(), &parts, &Silent).unwrap_err();
     assert!(format!("{error:#}").contains("2 speakers"), "{error:#}");
-    train_watched(&[&anna, &ben], &settings(), None, &parts, &Silent, ignore).unwrap();
+    train_with_callback(&[&anna, &ben], &settings(), None, &parts, &Silent, ignore).unwrap();
     let last = |out: &Path| std::fs::read(checkpoint::path(out, 6)).unwrap();
     assert!(last(&both) == last(&parts));
     let names = |out: &Path| bytes(out).into_iter().map(|(name, _)| name).collect::<Vec<_>>();
@@ -112,24 +112,25 @@ fn each_speaks_with_a_body_of_its_own() {
     let carl = speaker(dir, "carl", 0.7, 0.9);
     begins_as_the_nearest(&both, &carl);
     let of_carl = dir.join("carl-gan");
-    train_watched(&[&carl], &settings(), Some(&both), &of_carl, &Silent, ignore).unwrap();
+    train_with_callback(&[&carl], &settings(), Some(&both), &of_carl, &Silent, ignore).unwrap();
     let model = GestureGenerator::open(&of_carl).unwrap().metadata;
     assert_eq!((model.name.as_str(), model.network.n_speakers), ("carl", 1));
     let learnt: Vec<&str> = model.videos.iter().map(|video| video.speaker.as_str()).collect();
     assert!(["anna", "ben", "carl"].iter().all(|name| learnt.contains(name)), "{learnt:?}");
     learns_its_layer_alone(&both, &carl, &dir.join("layer"));
     // And the other way round.
-    train_watched(&[&anna, &ben], &settings(), Some(&of_carl), &dir.join("all"), &Silent, ignore).unwrap();
+    train_with_callback(&[&anna, &ben], &settings(), Some(&of_carl), &dir.join("all"), &Silent, ignore).unwrap();
     assert_eq!(as_speaker(&dir.join("all"), "ben").unwrap().metadata.network.n_speakers, 1);
 
-    let error = train_watched(&[&anna, &anna], &settings(), None, &dir.join("twice"), &Silent, ignore).unwrap_err();
+    let error =
+        train_with_callback(&[&anna, &anna], &settings(), None, &dir.join("twice"), &Silent, ignore).unwrap_err();
     assert!(format!("{error:#}").contains("both of anna"), "{error:#}");
 }
 
 /// What all speakers share stays as it was where it has no rate.
 fn learns_its_layer_alone(both: &Path, new: &Dataset, out: &Path) {
     let settings = GanConfig { shared_rate: 0.0.into(), ..settings() };
-    train_watched(&[new], &settings, Some(both), out, &Silent, &mut |_| ()).unwrap();
+    train_with_callback(&[new], &settings, Some(both), out, &Silent, &mut |_| ()).unwrap();
     let begun = Contents::read(&both.join(BEST)).unwrap().part(GENERATOR);
     let learnt = Contents::read(&checkpoint::path(out, 6)).unwrap().part("training.generator.");
     let values = |tensor: &Tensor| tensor.flatten_all().unwrap().to_vec1::<f32>().unwrap();
@@ -141,13 +142,13 @@ fn learns_its_layer_alone(both: &Path, new: &Dataset, out: &Path) {
 
 /// A new speaker begins with that layer of those a model knows, or their mean, by which the error is least.
 fn begins_as_the_nearest(both: &Path, new: &Dataset) {
-    let normal = begin::normalisation(new).unwrap();
+    let normal = speaker_metadata::normalisation(new).unwrap();
     let loader = WindowLoader::load(new, Split::Train, &normal, 32, 5).unwrap();
     let of =
-        recipe::settings(&settings(), &TrainingMaterial::measure(&[new], 32), TrainingStart::SeveralSpeakers).unwrap();
-    let metadata = begin::metadata(new, &normal, &loader, &of, 1).unwrap();
+        recipe::settings(&settings(), &TrainingMaterial::measure(&[new], 32), InitialWeights::SeveralSpeakers).unwrap();
+    let metadata = speaker_metadata::metadata(new, &normal, &loader, &of, 1).unwrap();
     let windows = JoinedWindows::new(vec![loader]);
-    let trainer = StartingModel::read(both).unwrap().begin(vec![metadata], of, &windows).unwrap();
+    let trainer = PretrainedModel::read(both).unwrap().trainer(vec![metadata], of, &windows).unwrap();
     let batch = windows.batch_changed(&(0..windows.len()).collect::<Vec<_>>(), &[]).unwrap();
     let begun = trainer.error(&batch).unwrap();
 
@@ -159,7 +160,7 @@ fn begins_as_the_nearest(both: &Path, new: &Dataset) {
         [|table| table.narrow(0, 0, 1), |table| table.narrow(0, 1, 1), |table| table.mean_keepdim(0)];
     let errors = of.map(|of| {
         let layer = layers.iter().map(|(name, table)| (name.clone(), of(table).unwrap())).collect();
-        trainer.begin_with(&model, Some(&layer)).unwrap();
+        trainer.initialise_from(&model, Some(&layer)).unwrap();
         trainer.error(&batch).unwrap()
     });
     let least = errors.into_iter().fold(f64::INFINITY, f64::min);

@@ -5,8 +5,8 @@ use orator_base::types::posture::PostureChannel;
 use orator_dataset::Split;
 use orator_dataset::config::{GanConfig, GanRecipe};
 use orator_gesture::train::gan::augment::changes;
-use orator_gesture::train::gan::begin::normalisation_with_channels;
-use orator_gesture::train::gan::recipe::{self, TrainingMaterial, TrainingStart};
+use orator_gesture::train::gan::recipe::{self, InitialWeights, TrainingMaterial};
+use orator_gesture::train::gan::speaker_metadata::normalisation_with_channels;
 use orator_gesture::train::gan::windows::{WindowBatch, WindowLoader};
 
 fn values(batch: &WindowBatch) -> Vec<Vec<f32>> {
@@ -33,7 +33,7 @@ fn windows_from_shards_are_those_from_memory() {
         augment_mirror: 0.5,
         ..GanConfig::default()
     };
-    let settings = recipe::settings(&config, &material, TrainingStart::Nothing).unwrap();
+    let settings = recipe::settings(&config, &material, InitialWeights::Random).unwrap();
     for step in 0..20 {
         let changes = changes(&settings, step, dataset.info().fps);
         // First, last and others.

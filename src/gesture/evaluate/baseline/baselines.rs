@@ -1,6 +1,5 @@
-//! Baselines that the prediction is compared with: two constant poses, the nearest neighbour by sound (copying),
-//! mismatched motion (realistic, but unrelated to the sound), and the ground truth itself, the upper bound of every
-//! metric.
+//! Baselines for the prediction: two constant poses, the nearest neighbour by sound (copying), mismatched motion
+//! (realistic, but unrelated to the sound), and the ground truth itself, which bounds every metric.
 
 use super::constant_pose::ConstantPoses;
 use super::neighbour::{self, Library, Query};
@@ -10,8 +9,8 @@ use anyhow::Result;
 use ndarray::{Array2, Array3, ArrayView3, s};
 use serde::Serialize;
 
-/// Smallest shift of a mismatched motion, seconds.
-const LEAST_SHIFT_SECS: f64 = 3.0;
+/// Smallest time shift of a mismatched motion, seconds.
+const MIN_SHIFT_SECS: f64 = 3.0;
 
 /// Source of the predicted motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -31,7 +30,7 @@ pub enum PredictorKind {
 }
 
 impl PredictorKind {
-    /// Name for people.
+    /// Human-readable name.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Prediction => "prediction",
@@ -52,16 +51,16 @@ impl PredictorKind {
     }
 }
 
-/// One of several checkpoints that are measured together.
+/// One of several checkpoints that are evaluated together.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NumberedCheckpoint {
-    /// From 1 on.
+    /// Number, starting at 1.
     pub number: usize,
     pub name: String,
 }
 
 impl NumberedCheckpoint {
-    /// Name for people of a predictor that is, or may be, of one of several checkpoints.
+    /// Human-readable name of a predictor; `checkpoint` is given if there are several.
     pub fn name_of(kind: PredictorKind, checkpoint: Option<&Self>) -> String {
         match (kind, checkpoint) {
             (PredictorKind::Prediction, Some(of)) => of.name.clone(),
@@ -70,7 +69,7 @@ impl NumberedCheckpoint {
         }
     }
 
-    /// Its key in a result file: the first checkpoint's is that of a single one.
+    /// Key of a predictor in a result file; that of the first checkpoint is the same as for a single one.
     pub fn key_of(kind: PredictorKind, checkpoint: Option<&Self>) -> String {
         match checkpoint {
             Some(of) if of.number > 1 => format!("{}_{}", kind.key(), of.number),
@@ -96,16 +95,16 @@ pub enum ClipMotion {
 #[derive(Clone, Debug)]
 pub struct Predictor {
     pub kind: PredictorKind,
-    /// Whose motion it is, where several checkpoints are measured.
+    /// Checkpoint that generated the motion, if several are evaluated.
     pub checkpoint: Option<NumberedCheckpoint>,
-    /// Description in a sentence.
+    /// Description in one sentence.
     pub description: String,
-    /// One motion a clip.
+    /// One motion per clip.
     pub motions: Vec<ClipMotion>,
 }
 
 impl Predictor {
-    /// Predictor that is of no one of several checkpoints.
+    /// Predictor that does not belong to one of several checkpoints.
     pub fn new(kind: PredictorKind, description: String, motions: Vec<ClipMotion>) -> Self {
         Self { kind, checkpoint: None, description, motions }
     }
@@ -121,18 +120,18 @@ impl Predictor {
         }
     }
 
-    /// With the poses of `still` in place of missing values.
+    /// Replaces missing values by the constant poses of `fallback`.
     ///
     /// # Errors
-    /// The disk of temporary files is full.
-    pub fn filled(mut self, still: &Self, store: &MotionStore) -> Result<Self> {
-        for (predicted, still) in self.motions.iter_mut().zip(&still.motions) {
-            if let (ClipMotion::Motion(motion), ClipMotion::Constant(pose)) = (predicted, still)
+    /// The temporary file cannot be written.
+    pub fn filled(mut self, fallback: &Self, store: &MotionStore) -> Result<Self> {
+        for (predicted, fallback) in self.motions.iter_mut().zip(&fallback.motions) {
+            if let (ClipMotion::Motion(motion), ClipMotion::Constant(pose)) = (predicted, fallback)
                 && motion.view().iter().any(|v| !v.is_finite())
             {
                 let mut joints = motion.view().to_owned();
                 for mut frame in joints.outer_iter_mut() {
-                    frame.zip_mut_with(pose, |v, still| *v = if v.is_finite() { *v } else { *still });
+                    frame.zip_mut_with(pose, |v, fallback| *v = if v.is_finite() { *v } else { *fallback });
                 }
                 *motion = store.keep(joints)?;
             }
@@ -152,7 +151,7 @@ impl Predictor {
     }
 }
 
-/// Baselines that files alone allow, and a sentence for each that is left out.
+/// Baselines that can be computed from files, and a note for each that is left out.
 pub fn from_files(clips: &EvalClips, store: &MotionStore) -> Result<(Vec<Predictor>, Vec<String>)> {
     let (mut all, mut left_out) = (constant_poses(clips), Vec::new());
     match neighbours(clips, &all[0], store)? {
@@ -174,52 +173,52 @@ pub fn from_files(clips: &EvalClips, store: &MotionStore) -> Result<(Vec<Predict
             None => left_out.push(too_short(kind)),
         }
         if kind == PredictorKind::MismatchedPrediction && clips.clips.len() > 1 {
-            all.push(late(clips, &all[0], store)?);
+            all.push(late_prediction(clips, &all[0], store)?);
         }
     }
     Ok((all, left_out))
 }
 
-/// Each clip's own prediction, shifted by half of the clip with wrap-around. The posture of the clip is right, unlike
-/// in another clip's motion; only the moment of the sound is wrong.
-fn late(clips: &EvalClips, still: &Predictor, store: &MotionStore) -> Result<Predictor> {
+/// Each clip's own prediction, shifted by half of the clip with wrap-around. Unlike the motion of another clip it has
+/// the right posture, and only its timing is wrong.
+fn late_prediction(clips: &EvalClips, fallback: &Predictor, store: &MotionStore) -> Result<Predictor> {
     let of = |clip: &EvalClip| {
         let n_frames = clip.n_frames();
         let later = (0..n_frames).map(|t| (t + n_frames / 2) % n_frames);
-        Ok(ClipMotion::Motion(store.keep(taken(&clip.predicted, later))?))
+        Ok(ClipMotion::Motion(store.keep(select_frames(&clip.predicted, later))?))
     };
     let description = "the clip's own prediction half of the clip later, and from the beginning again".to_owned();
     let motions = clips.clips.iter().map(of).collect::<Result<_>>()?;
-    Predictor::new(PredictorKind::LatePrediction, description, motions).filled(still, store)
+    Predictor::new(PredictorKind::LatePrediction, description, motions).filled(fallback, store)
 }
 
-/// Reason why a mismatched motion is left out.
+/// Note that a mismatched motion is left out because the only clip is too short.
 pub fn too_short(kind: PredictorKind) -> String {
-    format!("{}: left out, since the only clip is shorter than {:.0} s", kind.name(), 2.0 * LEAST_SHIFT_SECS)
+    format!("{}: left out, since the only clip is shorter than {:.0} s", kind.name(), 2.0 * MIN_SHIFT_SECS)
 }
 
-/// Mean and median pose of the other clips; of a single clip its own, which no predictor can know.
+/// Mean and median pose of the other clips; for a single clip those of its own ground truth, which no predictor knows.
 fn constant_poses(clips: &EvalClips) -> Vec<Predictor> {
     let mut all = ConstantPoses::default();
     clips.clips.iter().for_each(|clip| all.add(clip.ground_truth.view(), clip.mask.view()));
-    let is_alone = clips.clips.len() == 1;
+    let is_single = clips.clips.len() == 1;
     let (mut means, mut medians) = (Vec::new(), Vec::new());
     for clip in &clips.clips {
-        if !is_alone {
-            all.take_away(clip.ground_truth.view(), clip.mask.view());
+        if !is_single {
+            all.subtract(clip.ground_truth.view(), clip.mask.view());
         }
         let (mut mean, mut median) = (all.mean(), all.median());
-        if !is_alone {
+        if !is_single {
             all.add(clip.ground_truth.view(), clip.mask.view());
-            // Joints that no other clip has.
-            complete(&mut mean, || all.mean());
-            complete(&mut median, || all.median());
+            // Joints that are not visible in any other clip come from the clip itself.
+            fill_missing(&mut mean, || all.mean());
+            fill_missing(&mut median, || all.median());
         }
         means.push(ClipMotion::Constant(mean));
         medians.push(ClipMotion::Constant(median));
     }
     let description = |what: &str| {
-        if is_alone {
+        if is_single {
             format!("the {what} of this very truth in every frame (oracle: no predictor knows it), which never moves")
         } else {
             format!("the {what} of the other clips' truths in every frame, which never moves")
@@ -231,13 +230,13 @@ fn constant_poses(clips: &EvalClips) -> Vec<Predictor> {
     ]
 }
 
-fn complete(pose: &mut Array2<f32>, from: impl FnOnce() -> Array2<f32>) {
+fn fill_missing(pose: &mut Array2<f32>, from: impl FnOnce() -> Array2<f32>) {
     if pose.iter().any(|v| v.is_nan()) {
         pose.zip_mut_with(&from(), |v, other| *v = if v.is_nan() { *other } else { *v });
     }
 }
 
-fn neighbours(clips: &EvalClips, still: &Predictor, store: &MotionStore) -> Result<Option<Predictor>> {
+fn neighbours(clips: &EvalClips, fallback: &Predictor, store: &MotionStore) -> Result<Option<Predictor>> {
     let query: Option<Vec<Query>> = clips
         .clips
         .iter()
@@ -246,7 +245,7 @@ fn neighbours(clips: &EvalClips, still: &Predictor, store: &MotionStore) -> Resu
     let Some(query) = query.filter(|query| query.len() > 1) else { return Ok(None) };
     let library = Library {
         n: clips.clips.len(),
-        asks_itself: true,
+        excludes_self: true,
         features: &|entry| {
             let clip = &clips.clips[entry];
             Ok(clip.features.as_ref().map(|features| (features.rows.clone(), clip.n_frames())))
@@ -256,18 +255,20 @@ fn neighbours(clips: &EvalClips, still: &Predictor, store: &MotionStore) -> Resu
     let Some(predicted) = neighbour::motions(&query, &library, clips.fps, store)? else { return Ok(None) };
     let description = "for each 4 s of sound the motion of the part of another clip that sounds most alike".to_owned();
     let motions = predicted.into_iter().map(ClipMotion::Motion).collect();
-    Ok(Some(Predictor::new(PredictorKind::NearestNeighbour, description, motions).filled(still, store)?))
+    Ok(Some(Predictor::new(PredictorKind::NearestNeighbour, description, motions).filled(fallback, store)?))
 }
 
-/// For each clip the motion (`Prediction` or `Truth`) of another, played back and forth where it is shorter; for a
-/// single clip its own, shifted by half of it with wrap-around. `still` fills missing values.
+/// For each clip the motion of another one (predicted, or the ground truth for `MismatchedTruth`), played back and
+/// forth if it is shorter; for a single clip its own, shifted by half of it with wrap-around. `None` if a single clip
+/// is too short.
+/// `fallback` fills missing values.
 ///
 /// # Errors
-/// The disk of temporary files is full.
+/// The temporary file cannot be written.
 pub fn mismatched(
     clips: &EvalClips,
     kind: PredictorKind,
-    still: &Predictor,
+    fallback: &Predictor,
     store: &MotionStore,
 ) -> Result<Option<Predictor>> {
     let of = |clip: usize| match kind {
@@ -279,7 +280,7 @@ pub fn mismatched(
     let (motions, description): (Vec<ClipMotion>, String) = if n > 1 {
         let motions = lengths.enumerate().map(|(i, n_frames)| {
             let from = of((i + n / 2) % n);
-            let motion = taken(from, (0..n_frames).map(|t| back_and_forth(t, from.n_frames())));
+            let motion = select_frames(from, (0..n_frames).map(|t| back_and_forth(t, from.n_frames())));
             Ok(ClipMotion::Motion(store.keep(motion)?))
         });
         (
@@ -289,17 +290,17 @@ pub fn mismatched(
     } else {
         let n_frames = lengths.sum::<usize>();
         let shift = n_frames / 2;
-        if clips.fps.secs(shift) < LEAST_SHIFT_SECS {
+        if clips.fps.secs(shift) < MIN_SHIFT_SECS {
             return Ok(None);
         }
         let description = format!("the same {:.1} s later, and from the beginning again", clips.fps.secs(shift));
-        let motion = store.keep(taken(of(0), (0..n_frames).map(|t| (t + shift) % n_frames)))?;
+        let motion = store.keep(select_frames(of(0), (0..n_frames).map(|t| (t + shift) % n_frames)))?;
         (vec![ClipMotion::Motion(motion)], description)
     };
-    Ok(Some(Predictor::new(kind, description, motions).filled(still, store)?))
+    Ok(Some(Predictor::new(kind, description, motions).filled(fallback, store)?))
 }
 
-fn taken(from: &StoredMotion, frames: impl Iterator<Item = usize>) -> Array3<f32> {
+fn select_frames(from: &StoredMotion, frames: impl Iterator<Item = usize>) -> Array3<f32> {
     let from = from.view();
     let frames: Vec<usize> = frames.collect();
     let mut to = Array3::zeros((frames.len(), from.shape()[1], 3));
@@ -323,7 +324,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_short_motion_turns_round_at_its_ends() {
+    fn a_short_motion_is_played_back_and_forth() {
         let walk = |n: usize| (0..8).map(|t| back_and_forth(t, n)).collect::<Vec<_>>();
         assert_eq!(walk(3), [0, 1, 2, 1, 0, 1, 2, 1]);
         assert_eq!(walk(1), [0; 8]);

@@ -1,15 +1,16 @@
-//! Constant poses: mean and median of many poses, joint by joint. Values are counted in fine bins, so that memory does
-//! not grow with the data and the contribution of one clip can be subtracted again.
+//! Mean and median of many poses, coordinate by coordinate. Values are counted in fine bins, so that memory does not
+//! grow with the data and the contribution of a clip can be subtracted again.
 
 use ndarray::{Array2, ArrayView2, ArrayView3};
 use orator_base::types::skeleton::N_JOINTS;
 
-const N_NUMBERS: usize = 3 * N_JOINTS;
-/// Range of the bins on either side, metres, and their number: 0.25 mm each.
-const REACH: f64 = 1.5;
+const N_COORDINATES: usize = 3 * N_JOINTS;
+/// The bins cover coordinates from -`RANGE` to `RANGE`, metres.
+const RANGE: f64 = 1.5;
+/// Number of bins, 0.25 mm each.
 const N_BINS: usize = 12_000;
 
-/// Counts of poses.
+/// Histograms and sums of all coordinates of poses.
 #[derive(Clone)]
 pub struct ConstantPoses {
     n: Vec<u64>,
@@ -20,7 +21,7 @@ pub struct ConstantPoses {
 
 impl Default for ConstantPoses {
     fn default() -> Self {
-        Self { n: vec![0; N_NUMBERS], sum: vec![0.0; N_NUMBERS], bins: vec![0; N_NUMBERS * N_BINS] }
+        Self { n: vec![0; N_COORDINATES], sum: vec![0.0; N_COORDINATES], bins: vec![0; N_COORDINATES * N_BINS] }
     }
 }
 
@@ -31,7 +32,7 @@ impl ConstantPoses {
     }
 
     /// Subtracts joints that were added before.
-    pub fn take_away(&mut self, joints: ArrayView3<f32>, mask: ArrayView2<bool>) {
+    pub fn subtract(&mut self, joints: ArrayView3<f32>, mask: ArrayView2<bool>) {
         self.count(joints, mask, false);
     }
 
@@ -53,25 +54,25 @@ impl ConstantPoses {
         }
     }
 
-    /// Mean pose [49, 3], metres; NaN where nothing was seen.
+    /// Mean pose [49, 3], metres; NaN for joints that were never visible.
     pub fn mean(&self) -> Array2<f32> {
         pose(|i| if self.n[i] > 0 { self.sum[i] / self.n[i] as f64 } else { f64::NAN })
     }
 
-    /// Median pose [49, 3], metres, to 0.25 mm; NaN where nothing was seen.
+    /// Median pose [49, 3], metres, accurate to 0.25 mm; NaN for joints that were never visible.
     pub fn median(&self) -> Array2<f32> {
-        // For an even count the mean of the two values in the middle.
+        // The median of an even count is the mean of the two middle values.
         pose(|i| (self.ranked(i, self.n[i].saturating_sub(1) / 2) + self.ranked(i, self.n[i] / 2)) / 2.0)
     }
 
-    /// Value of coordinate `i` with rank `rank`, spread evenly within its bin.
+    /// Value of rank `rank` of coordinate `i`, assuming an even distribution within its bin.
     fn ranked(&self, i: usize, rank: u64) -> f64 {
         let mut before = 0;
         for (bin, count) in self.bins[i * N_BINS..(i + 1) * N_BINS].iter().enumerate() {
             let count = u64::from(*count);
             if before + count > rank {
                 let inside = (rank - before) as f64 + 0.5;
-                return (bin as f64 + inside / count as f64) / N_BINS as f64 * 2.0 * REACH - REACH;
+                return (bin as f64 + inside / count as f64) / N_BINS as f64 * 2.0 * RANGE - RANGE;
             }
             before += count;
         }
@@ -80,7 +81,7 @@ impl ConstantPoses {
 }
 
 fn bin_of(value: f64) -> usize {
-    (((value + REACH) / (2.0 * REACH) * N_BINS as f64).max(0.0) as usize).min(N_BINS - 1)
+    (((value + RANGE) / (2.0 * RANGE) * N_BINS as f64).max(0.0) as usize).min(N_BINS - 1)
 }
 
 fn pose(number: impl Fn(usize) -> f64) -> Array2<f32> {
@@ -93,7 +94,7 @@ mod tests {
     use ndarray::{Array3, s};
 
     #[test]
-    fn mean_and_median_are_those_of_what_is_left() {
+    fn mean_and_median_follow_additions_and_subtractions() {
         let joints = Array3::from_shape_fn((101, N_JOINTS, 3), |(t, joint, k)| {
             ((t * 37 % 101) as f32).powi(2) * 1e-4 + (joint + k) as f32 * 0.001
         });
@@ -107,7 +108,7 @@ mod tests {
         assert!((f64::from(median[[5, 0]]) - values[50]).abs() < 3e-4, "{}", median[[5, 0]]);
         assert!(mean[[9, 0]].is_nan() && median[[9, 2]].is_nan());
         let part = s![40.., .., ..];
-        constant_poses.take_away(joints.slice(part), mask.slice(s![40.., ..]));
+        constant_poses.subtract(joints.slice(part), mask.slice(s![40.., ..]));
         let mut rest = ConstantPoses::default();
         rest.add(joints.slice(s![..40, .., ..]), mask.slice(s![..40, ..]));
         assert!((&constant_poses.mean() - &rest.mean()).iter().all(|v| v.is_nan() || v.abs() < 1e-6));

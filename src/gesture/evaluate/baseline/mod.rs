@@ -1,4 +1,4 @@
-//! Predictors that know less than a trained one: constant poses, the nearest neighbour by sound, mismatched motion.
+//! Baseline predictors: constant poses, the nearest neighbour by sound, and mismatched motion.
 
 pub mod baselines;
 pub mod constant_pose;

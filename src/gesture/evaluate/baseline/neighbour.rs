@@ -1,5 +1,5 @@
-//! Nearest-neighbour baseline: for each 4 s of sound the poses of the library window whose log-mel spectrogram is
-//! nearest.
+//! Nearest-neighbour baseline: for each 4 s of sound the poses of the library window with the nearest log-mel
+//! spectrogram.
 
 use crate::evaluate::clips::motion_store::{MotionStore, StoredMotion};
 use crate::evaluate::clips::sound_features::POOLED;
@@ -13,7 +13,7 @@ use std::ops::Range;
 
 /// Length of a window, seconds.
 const WINDOW_SECS: f64 = 4.0;
-/// Rows between two candidate windows.
+/// Spectrogram rows between two candidate windows.
 const STRIDE: usize = 2;
 
 /// Sound to find poses for: rows of pooled spectrogram (`sound_features::SoundFeatures`), and its number of motion
@@ -28,11 +28,11 @@ pub struct Query<'a> {
 pub struct Library<'a> {
     /// Number of entries.
     pub n: usize,
-    /// Whether the queries are the entries, in the same order: a clip must not copy itself.
-    pub asks_itself: bool,
+    /// Whether the queries are the entries in the same order, so that an entry must not match itself.
+    pub excludes_self: bool,
     /// Pooled spectrogram of an entry and its number of motion frames; `None`: no sound.
     pub features: &'a (dyn Fn(usize) -> Result<Option<(Vec<f32>, usize)>> + Sync),
-    /// Joints of these frames of an entry [T, 49, 3], angles of head and trunk behind them where they are compared.
+    /// Joints of these frames of an entry [T, 49, 3], followed by the angles of head and trunk if they are compared.
     pub joints: &'a dyn Fn(usize, Range<usize>) -> Result<Array3<f32>>,
 }
 
@@ -46,7 +46,7 @@ struct QueryWindow<'a> {
 /// Best match so far: squared distance, entry of the library, first frame.
 type NearestMatch = (f32, usize, usize);
 
-/// Motion [T, 49, 3] for each query, NaN where the library's is; `None` where a window finds nothing long enough.
+/// Motion [T, 49, 3] for each query, NaN where that of the library is; `None` if no entry is long enough for a window.
 pub fn motions(
     queries: &[Query],
     library: &Library,
@@ -55,13 +55,13 @@ pub fn motions(
 ) -> Result<Option<Vec<StoredMotion>>> {
     let windows: Vec<QueryWindow> =
         queries.iter().enumerate().flat_map(|(i, query)| query_windows(i, query, fps)).collect();
-    let Library { n, asks_itself, features, joints } = *library;
+    let Library { n, excludes_self, features, joints } = *library;
     let best = (0..n)
         .into_par_iter()
         .map(|entry| -> Result<Vec<Option<NearestMatch>>> {
             let Some((rows, n_frames)) = features(entry)? else { return Ok(vec![None; windows.len()]) };
             let find = |window: &QueryWindow| {
-                if asks_itself && window.query == entry { None } else { nearest(&rows, n_frames, window, entry) }
+                if excludes_self && window.query == entry { None } else { nearest(&rows, n_frames, window, entry) }
             };
             Ok(windows.par_iter().map(find).collect())
         })
@@ -70,7 +70,7 @@ pub fn motions(
             |a, b| Ok(a.into_iter().zip(b).map(|(a, b)| nearer(a, b)).collect()),
         )?;
     let mut predicted = Vec::new();
-    // The windows stand in the order of the queries.
+    // The windows are in the order of the queries.
     let mut found = windows.iter().zip(best).peekable();
     for (number, query) in queries.iter().enumerate() {
         let mut motion: Option<Array3<f32>> = None;
@@ -99,15 +99,15 @@ fn query_windows<'a>(query: usize, sound: &Query<'a>, fps: FrameRate) -> Vec<Que
 
 /// Best match of a window within one entry.
 fn nearest(rows: &[f32], n_frames: usize, window: &QueryWindow, entry: usize) -> Option<NearestMatch> {
-    let places = (0..).step_by(STRIDE).take_while(|row| row * POOLED + window.frames.len() <= n_frames);
-    let of_place = |row: usize| {
+    let rows_of_windows = (0..).step_by(STRIDE).take_while(|row| row * POOLED + window.frames.len() <= n_frames);
+    let match_at = |row: usize| {
         let sound = rows.get(row * mel::N_MELS..)?.get(..window.rows.len())?;
         Some((distance(sound, window.rows), entry, row * POOLED))
     };
-    places.map(of_place).fold(None, nearer)
+    rows_of_windows.map(match_at).fold(None, nearer)
 }
 
-/// Squared distance, summed in eight lanes.
+/// Squared Euclidean distance, summed in eight lanes; elements beyond a multiple of eight are ignored.
 fn distance(a: &[f32], b: &[f32]) -> f32 {
     let mut sums = [0.0f32; 8];
     for (a, b) in a.chunks_exact(8).zip(b.chunks_exact(8)) {
@@ -118,7 +118,7 @@ fn distance(a: &[f32], b: &[f32]) -> f32 {
     sums.iter().sum()
 }
 
-/// Nearer of two matches; of equals the one that comes first in the library.
+/// Nearer of two matches; equally near ones are ordered by entry and frame, so that results are deterministic.
 fn nearer(a: Option<NearestMatch>, b: Option<NearestMatch>) -> Option<NearestMatch> {
     let order = |a: &NearestMatch, b: &NearestMatch| a.0.total_cmp(&b.0).then_with(|| (a.1, a.2).cmp(&(b.1, b.2)));
     a.into_iter().chain(b).min_by(order)

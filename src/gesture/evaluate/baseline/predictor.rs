@@ -1,4 +1,4 @@
-//! Motion that a trained speaker generates for a sound of a given length.
+//! Generation of motion of a given length, and mismatched sounds and words as inputs for comparison.
 
 use crate::generate::GestureGenerator;
 use anyhow::{Result, ensure};
@@ -9,54 +9,54 @@ use orator_base::types::sound::{SAMPLE_RATE, Sound, sample_at};
 use orator_formats::transcript::Word;
 use std::ops::Range;
 
-/// Generated motion for one sound, exactly `n_frames` long, with the posture where it is learnt.
+/// Generates motion of exactly `n_frames` frames for a sound, with posture if the network was trained on it.
 pub fn motion(speaker: &GestureGenerator, sound: &Sound, n_frames: usize) -> Result<(Motion, Option<Posture>)> {
-    let wanted = sample_at(speaker.fps(), SAMPLE_RATE, n_frames) + 1;
+    let n_needed = sample_at(speaker.fps(), SAMPLE_RATE, n_frames) + 1;
     let mut sound = sound.clone();
-    sound.samples.resize(sound.samples.len().max(wanted), 0.0);
+    sound.samples.resize(sound.samples.len().max(n_needed), 0.0);
     let (predicted, posture) = speaker.motion_and_posture(&sound)?;
     ensure!(predicted.n_frames() >= n_frames, "{} frames of motion for {n_frames} of sound", predicted.n_frames());
     let motion = Motion::from_joints(predicted.fps, predicted.joints.slice(s![..n_frames, .., ..]).to_owned());
     Ok((motion, posture.map(|posture| posture.slice(0..n_frames))))
 }
 
-/// Mismatched sound for sound `which`, as long as it: what follows half of all sounds later, with wrap-around, and so
-/// most often another video.
+/// Mismatched sound for sound `which` of the same length: the concatenation of all sounds, shifted by half of its
+/// length with wrap-around, so that it mostly comes from another video.
 ///
-/// `lengths`: samples of each sound; `read` gives samples of one.
+/// `lengths` are the numbers of samples of all sounds; `read` returns a range of samples of a sound.
 ///
 /// # Errors
-/// Those of `read`.
-pub fn turned(
+/// Errors of `read`.
+pub fn mismatched_sound(
     lengths: &[usize],
     which: usize,
     read: impl Fn(usize, Range<usize>) -> Result<Vec<f32>>,
 ) -> Result<Vec<f32>> {
-    let parts = turned_parts(lengths, which).into_iter();
+    let parts = mismatched_parts(lengths, which).into_iter();
     Ok(parts.map(|(sound, range)| read(sound, range)).collect::<Result<Vec<_>>>()?.concat())
 }
 
-/// Words said in the mismatched sound for sound `which`, each at its time there; `words` of each sound count from its
-/// beginning. A word that a seam cuts is left out.
-pub fn turned_words(lengths: &[usize], rate: u32, words: &[Vec<Word>], which: usize) -> Vec<Word> {
+/// Words of the mismatched sound for sound `which`, with times in that sound; the times in `words` are relative to the
+/// start of each sound. Words that are cut by a seam are dropped.
+pub fn mismatched_words(lengths: &[usize], rate: u32, words: &[Vec<Word>], which: usize) -> Vec<Word> {
     let secs = |n_samples: usize| n_samples as f64 / f64::from(rate);
-    let (mut said, mut n_before) = (Vec::new(), 0);
-    for (of, range) in turned_parts(lengths, which) {
+    let (mut shifted, mut n_before) = (Vec::new(), 0);
+    for (of, range) in mismatched_parts(lengths, which) {
         let (start, end, later) = (secs(range.start), secs(range.end), secs(n_before));
         let inside = words[of].iter().filter(|word| word.start_secs >= start && word.end_secs <= end);
         let moved = |secs: f64| secs - start + later;
-        said.extend(inside.map(|word| Word {
+        shifted.extend(inside.map(|word| Word {
             start_secs: moved(word.start_secs),
             end_secs: moved(word.end_secs),
             ..word.clone()
         }));
         n_before += range.len();
     }
-    said
+    shifted
 }
 
-/// Sounds and their samples that make up the mismatched sound for sound `which`.
-fn turned_parts(lengths: &[usize], which: usize) -> Vec<(usize, Range<usize>)> {
+/// Sounds and sample ranges that make up the mismatched sound for sound `which`.
+fn mismatched_parts(lengths: &[usize], which: usize) -> Vec<(usize, Range<usize>)> {
     let (all, before) = (lengths.iter().sum::<usize>(), lengths[..which].iter().sum::<usize>());
     let mut wanted = lengths[which];
     let mut skipped = (before + all / 2) % all.max(1);
@@ -85,17 +85,17 @@ mod tests {
     use orator_formats::transcript::WordSource;
 
     #[test]
-    fn every_sound_becomes_another_one_of_its_length() {
+    fn mismatched_sounds_have_the_same_length() {
         let all = [vec![1.0, 2.0, 3.0], vec![], vec![4.0, 5.0, 6.0, 7.0]];
         let lengths = all.each_ref().map(Vec::len);
         let read = |at: usize, range: Range<usize>| Ok(all[at][range].to_vec());
-        let turned: Vec<Vec<f32>> = (0..3).map(|i| turned(&lengths, i, read).unwrap()).collect();
-        assert_eq!(turned, [vec![4.0, 5.0, 6.0], vec![], vec![7.0, 1.0, 2.0, 3.0]]);
-        assert!(super::turned(&[0], 0, read).unwrap().is_empty());
+        let mismatched_sound: Vec<Vec<f32>> = (0..3).map(|i| mismatched_sound(&lengths, i, read).unwrap()).collect();
+        assert_eq!(mismatched_sound, [vec![4.0, 5.0, 6.0], vec![], vec![7.0, 1.0, 2.0, 3.0]]);
+        assert!(super::mismatched_sound(&[0], 0, read).unwrap().is_empty());
     }
 
     #[test]
-    fn words_go_with_their_sound() {
+    fn words_follow_their_sound() {
         let word = |text: &str, start_secs: f64| Word {
             word: text.into(),
             start_secs,
@@ -105,10 +105,10 @@ mod tests {
         };
         let lengths = [4, 2].map(|secs| secs * SAMPLE_RATE as usize);
         let words = [vec![word("a", 0.2), word("cut", 0.8), word("b", 3.2)], vec![word("c", 1.0)]];
-        // 3 s later: the last second of the first, the second, the first second of the first
-        let said = turned_words(&lengths, SAMPLE_RATE, &words, 0);
-        let said: Vec<(&str, f64)> =
-            said.iter().map(|word| (word.word.as_str(), (100.0 * word.start_secs).round() / 100.0)).collect();
-        assert_eq!(said, [("b", 0.2), ("c", 2.0), ("a", 3.2)]);
+        // Shifted by 3 s: the last second of sound 0, all of sound 1, the first second of sound 0.
+        let shifted = mismatched_words(&lengths, SAMPLE_RATE, &words, 0);
+        let shifted: Vec<(&str, f64)> =
+            shifted.iter().map(|word| (word.word.as_str(), (100.0 * word.start_secs).round() / 100.0)).collect();
+        assert_eq!(shifted, [("b", 0.2), ("c", 2.0), ("a", 3.2)]);
     }
 }

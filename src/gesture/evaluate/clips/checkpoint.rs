@@ -1,5 +1,5 @@
-//! Checkpoints under evaluation: a trained network of either kind, its name in the table, and its motion of the 49
-//! joints for the sound and the words of an interval.
+//! Checkpoints under evaluation: a trained network of either kind, its name in the table, and the motion of the 49
+//! joints that it generates for the sound and the words of an interval.
 
 use crate::evaluate::baseline::predictor;
 use crate::generate::GestureGenerator;
@@ -19,33 +19,37 @@ use orator_formats::transcript::Word;
 use orator_media::ffmpeg::audio;
 use std::path::{Path, PathBuf};
 
-/// Frames of silence behind the sound of a captured skeleton, so that its motion covers the interval at another rate.
+/// Frames of silence appended to the sound for a captured skeleton, so that the resampled motion covers the interval.
 const SPARE_FRAMES: usize = 2;
 
-/// Checkpoint to be measured.
+/// Checkpoint under evaluation.
 pub struct EvaluatedCheckpoint {
-    /// Name in a table of several.
+    /// Name in a table of several checkpoints.
     pub name: String,
     pub speaker: TrainedSpeaker,
 }
 
 impl EvaluatedCheckpoint {
     /// Opens checkpoints of `orator train gan` and `orator train seq2seq`: files, or folders of trainings (the best
-    /// checkpoint, else the newest); of networks of several speakers the one of this name. Each is named by its kind, and
-    /// where several are of one kind by its folder too.
+    /// checkpoint, else the newest). `speaker` selects the speaker of networks of several. Each checkpoint is named by
+    /// its kind, extended by network, folder and file as far as needed for unique names.
     ///
     /// # Errors
-    /// A path that is not there, a checkpoint of another kind, one that is given twice.
+    /// A path that does not exist; a checkpoint of another kind; a checkpoint that is given twice.
     pub fn open_all(paths: &[PathBuf], speaker: &str) -> Result<Vec<Self>> {
         let files: Vec<PathBuf> = paths.iter().map(|path| checkpoint_file(path)).collect::<Result<_>>()?;
-        let places: Vec<PathBuf> = files.iter().map(std::fs::canonicalize).collect::<std::io::Result<_>>()?;
-        for (at, place) in places.iter().enumerate() {
-            let earlier = places[..at].iter().position(|other| other == place);
+        let paths_on_disk: Vec<PathBuf> = files.iter().map(std::fs::canonicalize).collect::<std::io::Result<_>>()?;
+        for (at, path_on_disk) in paths_on_disk.iter().enumerate() {
+            let earlier = paths_on_disk[..at].iter().position(|other| other == path_on_disk);
             ensure!(earlier.is_none(), "{} is given twice: give each checkpoint once", paths[at].display());
         }
         let speakers: Vec<TrainedSpeaker> =
             files.iter().map(|file| TrainedSpeaker::open_for(file, speaker)).collect::<Result<_>>()?;
-        let names = speakers.iter().zip(&places).map(|(speaker, place)| names(speaker, place)).collect::<Vec<_>>();
+        let names = speakers
+            .iter()
+            .zip(&paths_on_disk)
+            .map(|(speaker, path_on_disk)| names(speaker, path_on_disk))
+            .collect::<Vec<_>>();
         let opened = speakers.into_iter().enumerate().map(|(at, speaker)| {
             let is_alone = |level: &usize| names.iter().filter(|of| of[*level] == names[at][*level]).count() == 1;
             let last = names[at].len() - 1;
@@ -71,12 +75,12 @@ impl From<SequenceGenerator> for EvaluatedCheckpoint {
     }
 }
 
-/// Names from the shortest to the most exact.
-fn names(speaker: &TrainedSpeaker, place: &Path) -> [String; 4] {
+/// Candidate names from the shortest to the most specific.
+fn names(speaker: &TrainedSpeaker, path_on_disk: &Path) -> [String; 4] {
     let name = |path: Option<&Path>| {
         path.and_then(Path::file_name).map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
     };
-    let (folder, file) = (name(place.parent()), place.with_extension(""));
+    let (folder, file) = (name(path_on_disk.parent()), path_on_disk.with_extension(""));
     let (kind, network) = match speaker.architecture() {
         None => ("gan", "gan".to_owned()),
         Some(architecture) => ("seq2seq", format!("seq2seq {}", format!("{architecture:?}").to_lowercase())),
@@ -86,11 +90,12 @@ fn names(speaker: &TrainedSpeaker, place: &Path) -> [String; 4] {
 }
 
 impl EvaluatedCheckpoint {
-    /// Motion and, where it is learnt, posture for the sound of an interval, `n_frames` at `fps`, which is its own rate but for a captured skeleton. That one
-    /// is read as its captures are imported, and has no fingers (NaN): it holds them as in its first file.
+    /// Generates motion and, if the network was trained on it, posture for the sound of an interval: `n_frames` at
+    /// `fps`, the network's own frame rate except for captured skeletons, which are resampled. Motion of a captured
+    /// skeleton is converted like imported captures; its fingers, which are constant, are missing (NaN).
     ///
     /// # Errors
-    /// Numbers that are not finite; a captured skeleton that is no speaker's.
+    /// Network output that is not finite; a captured skeleton that cannot be imported.
     pub fn motion(
         &self,
         sound: &Sound,
@@ -104,9 +109,9 @@ impl EvaluatedCheckpoint {
         };
         let rate = network.metadata.rate;
         let spare = if network.is_captured() { SPARE_FRAMES } else { 0 };
-        let wanted = sample_at(fps, rate, n_frames) + sample_at(network.fps(), rate, spare) + 1;
+        let n_needed = sample_at(fps, rate, n_frames) + sample_at(network.fps(), rate, spare) + 1;
         let mut sound = audio::at_rate(sound, rate)?;
-        sound.samples.resize(sound.samples.len().max(wanted), 0.0);
+        sound.samples.resize(sound.samples.len().max(n_needed), 0.0);
         let poses = network.poses(&sound, words)?;
         let motion = if network.is_captured() {
             let captured = bvh::from_text(&network.bvh(&poses)?).context("its skeleton is no speaker's")?;
@@ -114,13 +119,13 @@ impl EvaluatedCheckpoint {
         } else {
             network.motion(&poses)?
         };
-        let n_made = motion.n_frames();
-        ensure!(n_made >= n_frames, "{n_made} frames of motion for {n_frames} of sound");
+        let n_generated = motion.n_frames();
+        ensure!(n_generated >= n_frames, "{n_generated} frames of motion for {n_frames} of sound");
         Ok((Motion::from_joints(fps, motion.joints.slice_move(s![..n_frames, .., ..])), None))
     }
 }
 
-/// Motion whose fingers are missing.
+/// Motion with all finger joints set to missing.
 fn without_fingers(mut motion: Motion) -> Motion {
     for joint in (L_HAND..N_JOINTS).filter(|joint| !is_duplicate(*joint)) {
         motion.joints.slice_mut(s![.., joint, ..]).fill(f32::NAN);

@@ -1,5 +1,5 @@
 //! Evaluation clips of one frame rate: ground truth, prediction of the same frames, and sound features. This file reads
-//! them from files; `of_speaker` makes them from a dataset and a checkpoint.
+//! them from files; `from_checkpoints` generates them with checkpoints from a dataset.
 
 use super::motion_store::{MotionStore, StoredMotion};
 use super::pairs::FilePair;
@@ -22,12 +22,13 @@ use rayon::prelude::*;
 use std::os::unix::fs::FileExt as _;
 use std::path::PathBuf;
 
-/// Largest difference in length of one clip's files: a second, or this share of the longer.
-const MOST_APART_SECS: f64 = 1.0;
-const MOST_APART: f64 = 0.05;
-/// Largest share of the ground-truth joints that a prediction may miss.
-const MOST_MISSING: f64 = 0.05;
-/// Largest distance of a neck from the origin, metres, that is left as it is.
+/// Largest accepted difference in length of the files of a clip, seconds, unless `MAX_LENGTH_DIFFERENCE` allows more.
+const MAX_LENGTH_DIFFERENCE_SECS: f64 = 1.0;
+/// Largest accepted difference in length of the files of a clip as a share of the longer one.
+const MAX_LENGTH_DIFFERENCE: f64 = 0.05;
+/// Largest share of the ground-truth joints that may be missing in a prediction.
+const MAX_MISSING: f64 = 0.05;
+/// Largest distance of the neck from the origin, metres, that is not corrected.
 const NECK_METRES: f32 = 1e-3;
 /// Ratio of median bone lengths from which another unit is assumed.
 const OTHER_UNIT: f64 = 2.5;
@@ -36,22 +37,22 @@ const OTHER_UNIT: f64 = 2.5;
 #[derive(Clone, Debug)]
 pub struct EvalClip {
     pub name: String,
-    /// Joints [T, 49, 3], metres, the neck at the origin; behind them, where the clips have channels, head and trunk as rows
-    /// 49 and 50: yaw, pitch, roll in radians, NaN where not seen.
+    /// Joints [T, 49, 3], metres, the neck at the origin. Clips with posture channels also have head and trunk as rows
+    /// 49 and 50: yaw, pitch and roll in radians, NaN where not visible.
     pub ground_truth: StoredMotion,
     pub predicted: StoredMotion,
-    /// Mask [T, 49] of the compared joints, those seen in the ground truth.
+    /// Mask [T, 49] of the compared joints, which are those visible in the ground truth.
     pub mask: Array2<bool>,
     pub features: Option<SoundFeatures>,
     /// Sound for the player of the report.
     pub audio: Option<ClipAudio>,
 }
 
-/// Sound that can be read again.
+/// Location of the sound of a clip, from which it can be read again.
 #[derive(Clone, Debug)]
 pub enum ClipAudio {
     File(PathBuf),
-    /// 16-bit samples at 16 kHz in a file, from a byte on.
+    /// 16-bit samples at 16 kHz in a file, starting at byte `offset`.
     Within {
         path: PathBuf,
         offset: u64,
@@ -60,7 +61,7 @@ pub enum ClipAudio {
 }
 
 impl ClipAudio {
-    /// The sound of a sample, in its shard.
+    /// Sound of a dataset sample in its shard.
     pub fn of_sample(dataset: &Dataset, sample: &SampleRef) -> Self {
         Self::Within {
             path: dataset.dir().join(&sample.shard),
@@ -69,7 +70,7 @@ impl ClipAudio {
         }
     }
 
-    /// Samples at 16 kHz from second `start` to `end`, fewer where the sound ends before.
+    /// Samples at 16 kHz from second `start` to `end`; fewer if the sound ends earlier.
     pub fn samples(&self, start: f64, end: f64) -> Result<Vec<i16>> {
         let at = |secs: f64| (secs.max(0.0) * f64::from(SAMPLE_RATE)).round() as usize;
         let (from, to) = (at(start), at(end));
@@ -115,11 +116,11 @@ impl EvalClip {
 pub struct EvalClips {
     pub fps: FrameRate,
     pub clips: Vec<EvalClip>,
-    /// Assumptions, changes and omissions, in sentences.
+    /// Assumptions, changes and omissions, one sentence each.
     pub notes: Vec<String>,
-    /// Whether the model was trained on these clips, so that they prove nothing.
-    pub learnt: bool,
-    /// What is compared beside the joints.
+    /// Whether the model was trained on these clips, so that the metrics measure memorisation.
+    pub trained_on: bool,
+    /// Posture channels that are compared in addition to the joints.
     pub channels: Vec<PostureChannel>,
 }
 
@@ -136,7 +137,7 @@ impl EvalClips {
     pub fn truth(&self) -> String {
         let mut hasher = blake3::Hasher::new();
         for clip in &self.clips {
-            let seen = clip.mask.indexed_iter().filter(|(_, seen)| **seen).map(|(place, _)| place);
+            let seen = clip.mask.indexed_iter().filter(|(_, seen)| **seen).map(|(index, _)| index);
             for (t, joint) in seen {
                 for k in 0..3 {
                     hasher.update(&clip.ground_truth[[t, joint, k]].to_le_bytes());
@@ -162,11 +163,11 @@ impl EvalClips {
     }
 }
 
-/// Reads pairs of files at the frame rate of the first ground truth. `fps` is for files without a rate.
+/// Reads pairs of files, resampled to the frame rate of the first ground truth. `fps` is the rate of files without one.
 ///
 /// # Errors
 /// A file without motion; a prediction much longer or shorter than its ground truth, or with many missing joints. The
-/// message names the clip and what to do.
+/// message names the clip and a remedy.
 pub fn read(pairs: &[FilePair], fps: Option<FrameRate>, store: &MotionStore) -> Result<EvalClips> {
     let first = pairs.first().context("there is no pair to measure")?;
     let rate = motion_file::read(&first.truth, fps)?.motion.fps;
@@ -177,7 +178,7 @@ pub fn read(pairs: &[FilePair], fps: Option<FrameRate>, store: &MotionStore) -> 
         fps: rate,
         clips,
         notes: notes.into_iter().flatten().collect(),
-        learnt: false,
+        trained_on: false,
         channels: Vec::new(),
     })
 }
@@ -202,18 +203,18 @@ fn clip(
             notes.push(format!("{}: the {what} at {} was resampled to {fps}", pair.name, motion.fps));
             motion = resample::at_rate(&motion, fps);
         }
-        if let Some(far) = neck_to_origin(&mut motion) {
-            notes.push(format!("{}: the {what}'s neck stands {far:.2} m from the origin: moved there", pair.name));
+        if let Some(distance) = neck_to_origin(&mut motion) {
+            notes.push(format!("{}: the {what}'s neck stands {distance:.2} m from the origin: moved there", pair.name));
         }
         Ok(motion)
     };
     let (mut ground_truth, predicted) = (side(&pair.truth, "truth")?, side(&pair.prediction, "prediction")?);
     let (n_ground_truth, n_predicted) = (ground_truth.n_frames(), predicted.n_frames());
-    let (real_secs, made_secs) = (fps.secs(n_ground_truth), fps.secs(n_predicted));
-    let apart = (real_secs - made_secs).abs();
+    let (truth_secs, predicted_secs) = (fps.secs(n_ground_truth), fps.secs(n_predicted));
+    let difference = (truth_secs - predicted_secs).abs();
     ensure!(
-        apart <= MOST_APART_SECS.max(MOST_APART * real_secs.max(made_secs)),
-        "the truth lasts {real_secs:.2} s ({n_ground_truth} frames at {fps}) and the prediction {made_secs:.2} s ({n_predicted} frames): \
+        difference <= MAX_LENGTH_DIFFERENCE_SECS.max(MAX_LENGTH_DIFFERENCE * truth_secs.max(predicted_secs)),
+        "the truth lasts {truth_secs:.2} s ({n_ground_truth} frames at {fps}) and the prediction {predicted_secs:.2} s ({n_predicted} frames): \
          more than a second and 5 % apart, so they are not of the same sound, or a rate is wrong (--fps)"
     );
     let n_frames = n_ground_truth.min(n_predicted);
@@ -231,12 +232,12 @@ fn clip(
     let n_seen = ground_truth.mask.iter().filter(|seen| **seen).count().max(1);
     let share = n_missing as f64 / n_seen as f64;
     ensure!(
-        share <= MOST_MISSING,
+        share <= MAX_MISSING,
         "the prediction {} has no number (NaN) for {:.1} % of the joints that the truth has: at most {:.0} % can be \
          held over, or a prediction could leave out what it cannot do",
         pair.prediction.display(),
         100.0 * share,
-        100.0 * MOST_MISSING
+        100.0 * MAX_MISSING
     );
     if n_missing > 0 {
         notes.push(format!(
@@ -254,7 +255,7 @@ fn clip(
                 notes.push(format!("{name} holds no sound: {} is not part of what needs sound", pair.name));
             }
             Some(features) => ensure!(
-                features.secs >= secs - MOST_APART_SECS.max(MOST_APART * secs),
+                features.secs >= secs - MAX_LENGTH_DIFFERENCE_SECS.max(MAX_LENGTH_DIFFERENCE * secs),
                 "{} lasts {:.2} s, the motion {secs:.2} s: is it the sound of another clip?",
                 path.display(),
                 features.secs
@@ -275,14 +276,16 @@ fn clip(
     ))
 }
 
-/// Mask of the compared joints, those seen in the ground truth, and the number of them that the prediction misses.
-/// Missing predictions keep their last position (the neck's before the first one).
+/// Mask of the compared joints, which are those visible in the ground truth, and the number of them that are missing in
+/// the prediction. Missing joints of the prediction are replaced by their last position (before the first: by the
+/// neck's).
 pub fn compared(ground_truth: &Array3<f32>, seen: &Array2<bool>, predicted: &mut Array3<f32>) -> (Array2<bool>, usize) {
-    let there = |joints: &Array3<f32>, t: usize, joint: usize| (0..3).all(|k| joints[[t, joint, k]].is_finite());
-    let mask = Array2::from_shape_fn(seen.raw_dim(), |(t, joint)| seen[[t, joint]] && there(ground_truth, t, joint));
+    let is_present = |joints: &Array3<f32>, t: usize, joint: usize| (0..3).all(|k| joints[[t, joint, k]].is_finite());
+    let mask =
+        Array2::from_shape_fn(seen.raw_dim(), |(t, joint)| seen[[t, joint]] && is_present(ground_truth, t, joint));
     let mut n_missing = 0;
     for ((t, joint), range) in mask.indexed_iter() {
-        if !there(predicted, t, joint) {
+        if !is_present(predicted, t, joint) {
             n_missing += usize::from(*range);
             (0..3).for_each(|k| predicted[[t, joint, k]] = if t > 0 { predicted[[t - 1, joint, k]] } else { 0.0 });
         }
@@ -290,26 +293,26 @@ pub fn compared(ground_truth: &Array3<f32>, seen: &Array2<bool>, predicted: &mut
     (mask, n_missing)
 }
 
-/// Moves the neck to the origin; returns its largest distance from there where it matters.
+/// Moves the neck to the origin; returns its largest distance from the origin, if it was more than `NECK_METRES`.
 fn neck_to_origin(motion: &mut Motion) -> Option<f32> {
-    let mut far = 0.0f32;
+    let mut distance = 0.0f32;
     for mut frame in motion.joints.outer_iter_mut() {
         let neck: [f32; 3] = std::array::from_fn(|k| frame[[NECK, k]]);
         let length = neck.iter().map(|v| v * v).sum::<f32>().sqrt();
         if length.is_finite() && length > NECK_METRES {
-            far = far.max(length);
+            distance = distance.max(length);
             for joint in 0..N_JOINTS {
                 (0..3).for_each(|k| frame[[joint, k]] -= neck[k]);
             }
         }
     }
-    (far > 0.0).then_some(far)
+    (distance > 0.0).then_some(distance)
 }
 
-/// Note where the bone lengths of the prediction indicate another unit.
+/// Note if the bone lengths of the prediction indicate another unit.
 fn other_unit(ground_truth: &Motion, predicted: &Motion) -> Option<String> {
     let size = |motion: &Motion| bones::measure(motion).iter().take(6).map(|v| f64::from(*v)).sum::<f64>();
-    let times = size(predicted) / size(ground_truth);
-    (times.is_finite() && times > 0.0 && !(1.0 / OTHER_UNIT..OTHER_UNIT).contains(&times))
-        .then(|| format!("the prediction's arms are {times:.2} times as long as the truth's: are both in metres?"))
+    let ratio = size(predicted) / size(ground_truth);
+    (ratio.is_finite() && ratio > 0.0 && !(1.0 / OTHER_UNIT..OTHER_UNIT).contains(&ratio))
+        .then(|| format!("the prediction's arms are {ratio:.2} times as long as the truth's: are both in metres?"))
 }

@@ -1,4 +1,4 @@
-//! Held-out intervals that a speaker is evaluated on: ground truth and sound.
+//! Held-out intervals for evaluation: ground truth, posture, sound and words.
 
 use crate::generate::normalisation::Normalisation;
 use anyhow::{Result, bail};
@@ -17,16 +17,17 @@ use std::ops::Range;
 /// Interval of the dataset with its sound.
 pub struct HeldOutInterval {
     pub key: String,
-    /// Motion with the speaker's bone lengths, as in training; each video has its own.
+    /// Motion with the speaker's bone lengths, as in training, instead of those of the video.
     pub ground_truth: Motion,
     /// Angles of head and trunk.
     pub posture: Option<Posture>,
     pub sound: Sound,
-    /// Words said in it, their times from its beginning.
+    /// Words with times in seconds from the start of the interval.
     pub words: Vec<Word>,
 }
 
-/// Samples of `split` in the dataset's order. Errors where there are none, naming the splits that have some.
+/// Samples of `split` in the order of the dataset. Fails if there are none, with the names of the splits that have
+/// some.
 pub fn samples(dataset: &Dataset, split: Split) -> Result<Vec<SampleRef>> {
     let samples = dataset.samples(split);
     if samples.is_empty() {
@@ -42,11 +43,11 @@ pub fn samples(dataset: &Dataset, split: Split) -> Result<Vec<SampleRef>> {
     Ok(samples)
 }
 
-/// Joints [T, 49, 3] of some frames of a sample, with the speaker's bone lengths and, where they are compared, the angles
-/// of head and trunk behind them.
+/// Joints [T, 49, 3] of some frames of a sample with the speaker's bone lengths, followed by the angles of head and
+/// trunk if `has_channels`.
 ///
 /// # Errors
-/// A sample that cannot be read; no hash is checked.
+/// A sample that cannot be read; its hash is not checked.
 pub fn joints(
     dataset: &Dataset,
     sample: &SampleRef,
@@ -63,10 +64,10 @@ pub fn joints(
     }
 }
 
-/// Reads a sample.
+/// Reads a sample with the speaker's bone lengths.
 ///
 /// # Errors
-/// A sample that cannot be read, or is damaged.
+/// A sample that cannot be read or is damaged.
 pub fn interval(dataset: &Dataset, sample: &SampleRef, normal: &Normalisation) -> Result<HeldOutInterval> {
     let mut sample = dataset.read(sample)?;
     bones::with_lengths(&mut sample.motion, &normal.lengths());
@@ -75,12 +76,12 @@ pub fn interval(dataset: &Dataset, sample: &SampleRef, normal: &Normalisation) -
     Ok(HeldOutInterval { key, ground_truth, posture, sound, words })
 }
 
-/// Reads the samples.
+/// Reads all samples in parallel.
 pub fn read(dataset: &Dataset, samples: &[SampleRef], normal: &Normalisation) -> Result<Vec<HeldOutInterval>> {
     samples.par_iter().map(|sample| interval(dataset, sample, normal)).collect()
 }
 
-/// Joints [T, 49, 3] with the angles of head and trunk behind them as rows 49 and 50, NaN where there are none.
+/// Joints [T, 49, 3] followed by the angles of head and trunk as rows 49 and 50, NaN without posture.
 pub fn with_posture(joints: &Array3<f32>, posture: Option<&Posture>) -> Array3<f32> {
     let n_rows = N_JOINTS + PostureChannel::ALL.len();
     Array3::from_shape_fn((joints.shape()[0], n_rows, 3), |(t, row, k)| match row.checked_sub(N_JOINTS) {
@@ -90,7 +91,7 @@ pub fn with_posture(joints: &Array3<f32>, posture: Option<&Posture>) -> Array3<f
 }
 
 impl HeldOutInterval {
-    /// Part of the interval: these frames and their sound.
+    /// Part of the interval: these frames with their sound and the words that lie completely within them.
     pub fn cut(&self, frames: Range<usize>) -> Self {
         let ground_truth = &self.ground_truth;
         let (start, end) = (ground_truth.fps.secs(frames.start), ground_truth.fps.secs(frames.end));

@@ -2,9 +2,9 @@
 
 pub mod checkpoint;
 pub mod clips;
+pub mod from_checkpoints;
 pub mod held_out;
 pub mod motion_store;
 pub mod notes;
-pub mod of_speaker;
 pub mod pairs;
 pub mod sound_features;

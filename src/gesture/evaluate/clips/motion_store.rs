@@ -1,5 +1,5 @@
-//! Motion of many clips: in memory while it is little, else in a temporary file where one can be made, so that an
-//! evaluation's memory does not grow with what is evaluated.
+//! Storage for the motion of many clips: in memory up to a limit, then in a temporary file if one can be created, so
+//! that the memory of an evaluation does not grow with the number of clips.
 
 use anyhow::Result;
 use ndarray::{Array3, ArrayView1, ArrayView3};
@@ -8,19 +8,19 @@ use std::ops::Index;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
-/// Bytes that are held in memory.
-pub const HELD_BYTES: usize = 192 << 20;
+/// Default limit of the bytes that are stored in memory.
+pub const MEMORY_BYTES: usize = 192 << 20;
 
-/// Keeps motions.
+/// Storage for motions.
 pub struct MotionStore(Mutex<StoreState>);
 
 struct StoreState {
-    /// Bytes that may still be held in memory.
+    /// Bytes that may still be stored in memory.
     left: usize,
     file: Option<FileMemory>,
 }
 
-/// Joints [T, n, 3], metres, kept somewhere.
+/// Joints [T, n, 3], metres, in memory or in a file.
 #[derive(Clone, Debug)]
 pub enum StoredMotion {
     /// In memory.
@@ -30,42 +30,43 @@ pub enum StoredMotion {
 }
 
 impl MotionStore {
-    /// Keeps all in memory.
+    /// Store that holds everything in memory.
     pub fn in_memory() -> Self {
         Self(Mutex::new(StoreState { left: usize::MAX, file: None }))
     }
 
-    /// Keeps what is more than `held` bytes in a temporary file in `folder`, which is opened at once, since a process may
-    /// lose the right to make one. All is kept in memory if none can be made.
-    pub fn in_folder(folder: &Path, held: usize) -> Self {
+    /// Store that holds `memory_bytes` in memory and everything else in a temporary file in `folder`. The file is
+    /// opened immediately, since the process may lose the permission later. If it cannot be created, everything is held
+    /// in memory.
+    pub fn in_folder(folder: &Path, memory_bytes: usize) -> Self {
         match FileMemory::new(folder) {
-            Ok(file) => Self(Mutex::new(StoreState { left: held, file: Some(file) })),
+            Ok(file) => Self(Mutex::new(StoreState { left: memory_bytes, file: Some(file) })),
             Err(_) => Self::in_memory(),
         }
     }
 
-    /// Keeps joints [T, n, 3].
+    /// Saves joints [T, n, 3].
     ///
     /// # Errors
-    /// The disk of temporary files is full.
+    /// The temporary file cannot be written, for instance because the disk is full.
     pub fn keep(&self, joints: Array3<f32>) -> Result<StoredMotion> {
         let mut state = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let left = state.left.checked_sub(joints.len() * size_of::<f32>());
         state.left = left.unwrap_or(state.left);
         let Some(file) = state.file.as_mut().filter(|_| left.is_none()) else { return Ok(StoredMotion::Held(joints)) };
         let (n_frames, n_rows, n_axes) = joints.dim();
-        let numbers: Vec<f32> = joints.iter().copied().collect();
-        let kept = file.append(bytemuck::cast_slice(&numbers))?;
-        Ok(StoredMotion::InFile([n_frames, n_rows, n_axes], kept))
+        let values: Vec<f32> = joints.iter().copied().collect();
+        let bytes = file.append(bytemuck::cast_slice(&values))?;
+        Ok(StoredMotion::InFile([n_frames, n_rows, n_axes], bytes))
     }
 }
 
 impl StoredMotion {
-    /// The joints [T, n, 3].
+    /// View of the joints [T, n, 3].
     pub fn view(&self) -> ArrayView3<'_, f32> {
         match self {
             Self::Held(joints) => joints.view(),
-            // `keep` wrote as many numbers as the shape has.
+            // `keep` wrote exactly the values of this shape.
             Self::InFile(shape, bytes) => ArrayView1::from(bytemuck::cast_slice(bytes.as_slice()))
                 .into_shape_with_order(*shape)
                 .unwrap_or_else(|error| panic!("a motion of another length was kept: {error}")),
@@ -101,7 +102,7 @@ mod tests {
     use ndarray::s;
 
     #[test]
-    fn motions_come_back_from_memory_and_from_the_file() {
+    fn motions_round_trip_through_memory_and_file() {
         let motion = |n: usize| Array3::from_shape_fn((n, 49, 3), |(t, j, k)| (1000 * n + 100 * t + 3 * j + k) as f32);
         let store = MotionStore::in_folder(&std::env::temp_dir(), 3 * 49 * 3 * 4);
         let kept: Vec<StoredMotion> = (0..6).map(|n| store.keep(motion(n)).unwrap()).collect();
@@ -112,7 +113,7 @@ mod tests {
             assert_eq!((kept.view(), kept.n_frames()), (motion(n).view(), n));
         }
         assert_eq!(kept[5][[4, 48, 2]], motion(5)[[4, 48, 2]]);
-        // Cut out of longer ones, or not in the order of memory.
+        // Slices of longer motions, and arrays that are not in standard layout.
         let store = MotionStore::in_folder(&std::env::temp_dir(), 0);
         for part in [
             motion(5).slice_move(s![1..3, ..;2, ..]),

@@ -1,4 +1,4 @@
-//! What a reader of the table has to know of checkpoints and joints, in sentences.
+//! Notes below the table about checkpoints and compared joints.
 
 use super::checkpoint::EvaluatedCheckpoint;
 use super::clips::EvalClips;
@@ -7,7 +7,8 @@ use orator_base::types::skeleton::{self, L_HAND, N_JOINTS, NECK, is_duplicate};
 use orator_base::types::sound::SAMPLE_RATE;
 use orator_dataset::{Dataset, Split};
 
-/// How the data of the checkpoints differ from the split that they are measured on, which `has_words` or none.
+/// Notes on how the training data of the checkpoints differ from the evaluated split; `has_words`: whether the split
+/// has any.
 pub fn of_checkpoints(
     dataset: &Dataset,
     checkpoints: &[EvaluatedCheckpoint],
@@ -21,22 +22,23 @@ pub fn of_checkpoints(
     let (host, fps) = (&dataset.info().speaker, dataset.info().fps);
     let first_of_dataset = checkpoints.iter().position(|of| of.speaker.normalisation().is_some());
     for (at, EvaluatedCheckpoint { name, speaker }) in checkpoints.iter().enumerate() {
-        let (learnt, is_first) = (speaker.name(), first_of_dataset == Some(at));
+        let (model_speaker, is_first) = (speaker.name(), first_of_dataset == Some(at));
         if speaker.normalisation().is_none() {
             notes.push(format!(
-                "{name} learnt the captures {learnt}, not this dataset: hold out there the takes of this split, else it knows \
+                "{name} learnt the captures {model_speaker}, not this dataset: hold out there the takes of this split, else it knows \
                  them; its motion was read as the captures' import reads them, its bones put on the lengths of the others"
             ));
             if speaker.fps() != fps {
                 notes.push(format!("{name} moves at {}: resampled to {fps}", speaker.fps()));
             }
-        } else if host != learnt && is_first {
+        } else if host != model_speaker && is_first {
             notes.push(format!(
-                "the dataset is of {host}, the checkpoint of {learnt}: its bones were put on the checkpoint's lengths"
+                "the dataset is of {host}, the checkpoint of {model_speaker}: its bones were put on the checkpoint's lengths"
             ));
-        } else if host != learnt {
-            notes
-                .push(format!("{name} is of {learnt}, not of {host}: its bones were put on the lengths of the others"));
+        } else if host != model_speaker {
+            notes.push(format!(
+                "{name} is of {model_speaker}, not of {host}: its bones were put on the lengths of the others"
+            ));
         }
         if speaker.rate() != SAMPLE_RATE {
             notes.push(format!(
@@ -53,7 +55,7 @@ pub fn of_checkpoints(
     notes
 }
 
-/// Which joints of clips are compared, where not all are, and how often all of them are seen.
+/// Note on the joints that are compared, if not all are, and on how often all of these are visible.
 pub fn of_joints(clips: &EvalClips, common: &[usize]) -> String {
     let missing = || (NECK + 1..N_JOINTS).filter(|joint| !common.contains(joint));
     let is_finger = |joint: &usize| *joint > L_HAND && !is_duplicate(*joint);

@@ -1,4 +1,4 @@
-//! Pairs of files by name: ground truth, prediction and sound of a clip. No file is opened here.
+//! Matching of files by name: ground truth, prediction and sound of each clip. No file is opened here.
 
 use anyhow::{Context, Result, bail, ensure};
 use orator_dataset::config::patterns::{self, SOUND_EXTENSIONS, VIDEO_EXTENSIONS};
@@ -6,8 +6,9 @@ use orator_formats::mocap::motion_file;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Prefixes that name the side of a file; the rest is the clip's name.
+/// Prefixes of ground-truth files; the rest of the stem is the name of the clip.
 const TRUTH: [&str; 7] = ["gt_interval_", "ground_truth_", "truth_", "real_", "gt_", "true_", "natural_"];
+/// Prefixes of prediction files.
 const PREDICTION: [&str; 8] =
     ["prediction_interval_", "prediction_", "predicted_", "generated_", "pred_", "made_", "output_", "synthetic_"];
 
@@ -20,18 +21,18 @@ pub struct FilePair {
     pub sound: Option<PathBuf>,
 }
 
-/// Pairs in the order of their names, and a sentence for each file without a partner.
+/// Pairs sorted by name, and a note for each file without a partner.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FilePairs {
     pub pairs: Vec<FilePair>,
     pub notes: Vec<String>,
 }
 
-/// Pairs the files of both sides: two files, or two folders (which may be one: `gt_interval_7.txt` belongs to
-/// `prediction_interval_7.txt`). `audio` is a file for all of them, or a folder.
+/// Pairs ground truth and predictions: two files, or two folders, which may be the same folder (`gt_interval_7.txt`
+/// matches `prediction_interval_7.txt`). `audio` is the sound of the only pair, or a folder of sounds.
 ///
 /// # Errors
-/// A path that is not there, a file beside a folder, two files of one name, or no pair at all.
+/// A path that does not exist; a file given with a folder; two files for one clip; no pair.
 pub fn find(truth: &Path, prediction: &Path, audio: Option<&Path>) -> Result<FilePairs> {
     for path in [Some(truth), Some(prediction), audio].into_iter().flatten() {
         ensure!(path.exists(), "{} is not there", path.display());
@@ -39,7 +40,7 @@ pub fn find(truth: &Path, prediction: &Path, audio: Option<&Path>) -> Result<Fil
     let mut found = match (truth.is_dir(), prediction.is_dir()) {
         (false, false) => {
             ensure!(
-                !same(truth, prediction),
+                !is_same_file(truth, prediction),
                 "{} is given as truth and as prediction: a motion beside itself says nothing",
                 truth.display()
             );
@@ -69,15 +70,16 @@ pub fn find(truth: &Path, prediction: &Path, audio: Option<&Path>) -> Result<Fil
     Ok(found)
 }
 
-fn same(a: &Path, b: &Path) -> bool {
+fn is_same_file(a: &Path, b: &Path) -> bool {
     a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b))
 }
 
 fn folders(truth: &Path, prediction: &Path) -> Result<FilePairs> {
-    let one = same(truth, prediction);
+    let is_same_folder = is_same_file(truth, prediction);
     let side = |folder: &Path, own: &[&str]| -> Result<BTreeMap<String, PathBuf>> {
         let files = files(folder, &motion_file::ENDINGS)?;
-        let files = files.into_iter().filter(|file| !one || own.iter().any(|start| stem(file).starts_with(start)));
+        let files =
+            files.into_iter().filter(|file| !is_same_folder || own.iter().any(|start| stem(file).starts_with(start)));
         by_key(files)
     };
     let (truths, mut predictions) = (side(truth, &TRUTH)?, side(prediction, &PREDICTION)?);
@@ -85,12 +87,12 @@ fn folders(truth: &Path, prediction: &Path) -> Result<FilePairs> {
     for (name, truth) in truths {
         match predictions.remove(&name) {
             Some(prediction) => found.pairs.push(FilePair { name, truth, prediction, sound: None }),
-            None => found.notes.push(format!("{} has no prediction of its name: left out", told_share(&truth))),
+            None => found.notes.push(format!("{} has no prediction of its name: left out", file_name_of(&truth))),
         }
     }
     found
         .notes
-        .extend(predictions.values().map(|path| format!("{} has no truth of its name: left out", told_share(path))));
+        .extend(predictions.values().map(|path| format!("{} has no truth of its name: left out", file_name_of(path))));
     ensure!(
         !found.pairs.is_empty(),
         "no motion file of {} has a partner of its name in {}{}: expected for instance {}",
@@ -100,7 +102,7 @@ fn folders(truth: &Path, prediction: &Path) -> Result<FilePairs> {
             0 => " (there is none at all)".to_owned(),
             n => format!(" ({n} without, like {})", found.notes[0]),
         },
-        if one { "gt_interval_7.txt and prediction_interval_7.txt" } else { "a.npy in both" }
+        if is_same_folder { "gt_interval_7.txt and prediction_interval_7.txt" } else { "a.npy in both" }
     );
     Ok(found)
 }
@@ -122,7 +124,7 @@ fn by_name(found: &mut FilePairs, audio: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Files of a folder with one of these endings, hidden ones left out, in the order of their names.
+/// Files of a folder with one of these extensions, sorted by name, without hidden files.
 fn files(folder: &Path, endings: &[&str]) -> Result<Vec<PathBuf>> {
     let paths = patterns::list(folder).with_context(|| format!("cannot look into {}", folder.display()))?;
     let is_one =
@@ -140,7 +142,7 @@ fn by_key(files: impl IntoIterator<Item = PathBuf>) -> Result<BTreeMap<String, P
     Ok(named)
 }
 
-/// Clip of a file: its name without the ending and the prefix of its side.
+/// Clip name of a file: its stem without the prefix for ground truth or prediction.
 fn key(path: &Path) -> String {
     let stem = stem(path);
     let start = TRUTH.iter().chain(&PREDICTION).find(|start| stem.starts_with(**start) && stem.len() > start.len());
@@ -151,7 +153,7 @@ fn stem(path: &Path) -> String {
     path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-fn told_share(path: &Path) -> String {
+fn file_name_of(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
@@ -169,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn files_meet_by_their_names() {
+    fn files_are_matched_by_name() {
         let dir = folder("t/a.npy t/gt_b.txt t/c.bvh t/notes.md t/.hidden.npy p/a.bvh p/pred_b.npy p/d.npy s/a.wav");
         let at = |name: &str| dir.path().join(name);
         let found = find(&at("t"), &at("p"), Some(&at("s"))).unwrap();
@@ -193,19 +195,19 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_paired_is_refused() {
+    fn unmatched_inputs_are_rejected() {
         let dir = folder("t/a.npy t/b.npy p/c.npy q/a.npy q/a.bvh e/x.md s/z.wav r/a.npy r/b.npy");
-        let said = |truth: &str, prediction: &str, audio: Option<&str>| {
+        let error = |truth: &str, prediction: &str, audio: Option<&str>| {
             let at = |name: &str| dir.path().join(name);
             format!("{:#}", find(&at(truth), &at(prediction), audio.map(at).as_deref()).unwrap_err())
         };
-        assert!(said("t", "p", None).contains("without, like a.npy has no prediction"));
-        assert!(said("t", "q", None).contains("keep one of them"));
-        assert!(said("e", "e", None).contains("none at all"));
-        assert!(said("t", "p/c.npy", None).contains("two files or two folders"));
-        assert!(said("t/a.npy", "t/a.npy", None).contains("beside itself"));
-        assert!(said("gone", "p", None).contains("not there"));
-        assert!(said("t", "r", Some("s")).contains("expected a name like a.wav"));
-        assert!(said("t", "r", Some("s/z.wav")).contains("one sound for 2 clips"));
+        assert!(error("t", "p", None).contains("without, like a.npy has no prediction"));
+        assert!(error("t", "q", None).contains("keep one of them"));
+        assert!(error("e", "e", None).contains("none at all"));
+        assert!(error("t", "p/c.npy", None).contains("two files or two folders"));
+        assert!(error("t/a.npy", "t/a.npy", None).contains("beside itself"));
+        assert!(error("gone", "p", None).contains("not there"));
+        assert!(error("t", "r", Some("s")).contains("expected a name like a.wav"));
+        assert!(error("t", "r", Some("s/z.wav")).contains("one sound for 2 clips"));
     }
 }

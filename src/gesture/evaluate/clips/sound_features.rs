@@ -1,5 +1,5 @@
-//! Sound features for evaluation, computed in a stream: onsets for the beat metrics, a pooled spectrogram for the
-//! nearest neighbour. Samples are not kept.
+//! Sound features for evaluation, computed on a stream of samples that are not retained: onsets for the beat metrics,
+//! and a pooled spectrogram for the nearest neighbour.
 
 use crate::generate::mel_stream::mel_frames;
 use anyhow::{Context, Result};
@@ -21,7 +21,7 @@ pub struct SoundFeatures {
     pub secs: f64,
     /// Onset times, seconds from the start.
     pub onsets: Vec<f64>,
-    /// Mean of the log-mel spectrogram over every `POOLED` motion frames: rows of `mel::N_MELS` numbers.
+    /// Mean of the log-mel spectrogram over every `POOLED` motion frames: rows of `mel::N_MELS` values.
     pub rows: Vec<f32>,
 }
 
@@ -31,10 +31,11 @@ pub struct SoundFeatureExtractor {
     n_samples: usize,
     onsets: Option<Onsets>,
     /// Buffered samples, starting with spectrogram frame `n_mels`.
-    waiting: Vec<f32>,
+    buffered: Vec<f32>,
     n_mels: usize,
-    /// Sum of the spectrogram over the current row, and its number of frames.
+    /// Sum of the spectrogram frames of the current row.
     row: [f32; mel::N_MELS],
+    /// Number of spectrogram frames in the current row.
     n_in_row: usize,
     rows: Vec<f32>,
 }
@@ -46,7 +47,7 @@ impl SoundFeatureExtractor {
             fps,
             n_samples: 0,
             onsets: loudest_db.map(Onsets::new),
-            waiting: Vec::new(),
+            buffered: Vec::new(),
             n_mels: 0,
             row: [0.0; mel::N_MELS],
             n_in_row: 0,
@@ -60,8 +61,8 @@ impl SoundFeatureExtractor {
         if let Some(onsets) = &mut self.onsets {
             onsets.push(samples);
         }
-        self.waiting.extend_from_slice(samples);
-        if self.waiting.len() >= PIECE {
+        self.buffered.extend_from_slice(samples);
+        if self.buffered.len() >= PIECE {
             self.pool();
         }
     }
@@ -71,8 +72,8 @@ impl SoundFeatureExtractor {
         let secs = self.n_samples as f64 / f64::from(SAMPLE_RATE);
         let n_rows = n_frames.div_ceil(POOLED);
         let range = mel::n_samples(mel_frames(self.fps, n_rows * POOLED) + 1);
-        let more = range.saturating_sub(self.n_mels * mel::HOP + self.waiting.len());
-        self.waiting.resize(self.waiting.len() + more, 0.0);
+        let more = range.saturating_sub(self.n_mels * mel::HOP + self.buffered.len());
+        self.buffered.resize(self.buffered.len() + more, 0.0);
         self.pool();
         self.rows.truncate(n_rows * mel::N_MELS);
         let until = self.fps.secs(n_frames);
@@ -82,12 +83,12 @@ impl SoundFeatureExtractor {
     }
 
     fn pool(&mut self) {
-        let mels = mel::log_mel(&self.waiting);
+        let mels = mel::log_mel(&self.buffered);
         for frame in mels.outer_iter() {
             self.row.iter_mut().zip(frame).for_each(|(sum, v)| *sum += v);
             self.n_in_row += 1;
             self.n_mels += 1;
-            // Several rows where motion has more frames a second than the spectrogram.
+            // One frame completes several rows if the motion has a higher frame rate than the spectrogram.
             while self.n_mels >= mel_frames(self.fps, (self.rows.len() / mel::N_MELS + 1) * POOLED) {
                 match self.n_in_row {
                     0 => self.rows.extend_from_within(self.rows.len() - mel::N_MELS..),
@@ -97,7 +98,7 @@ impl SoundFeatureExtractor {
                 self.n_in_row = 0;
             }
         }
-        self.waiting.drain(..(mels.nrows() * mel::HOP).min(self.waiting.len()));
+        self.buffered.drain(..(mels.nrows() * mel::HOP).min(self.buffered.len()));
     }
 }
 
@@ -105,16 +106,16 @@ impl SoundFeatureExtractor {
 pub fn from_samples(samples: &[f32], fps: FrameRate, n_frames: usize) -> SoundFeatures {
     let mut loudest = Loudest::default();
     loudest.push(samples);
-    let mut listener = SoundFeatureExtractor::new(fps, Some(loudest.finish()));
-    listener.push(samples);
-    listener.finish(n_frames)
+    let mut extractor = SoundFeatureExtractor::new(fps, Some(loudest.finish()));
+    extractor.push(samples);
+    extractor.finish(n_frames)
 }
 
-/// Features of a file for `n_frames` of motion, read twice; later sound is not decoded. `None`: no sound.
+/// Features of a file for `n_frames` of motion. The file is decoded twice, only as far as needed. `None`: no sound.
 pub fn extract(path: &Path, fps: FrameRate, n_frames: usize) -> Result<Option<SoundFeatures>> {
     // One second more, so that an onset at the end stands out from what follows.
     let n_wanted = ((fps.secs(n_frames) + 1.0) * f64::from(SAMPLE_RATE)).ceil() as usize;
-    let listen = |sink: &mut dyn FnMut(&[f32])| -> Result<usize> {
+    let decode = |sink: &mut dyn FnMut(&[f32])| -> Result<usize> {
         let mut n = 0;
         for piece in SoundStream::open(path, SAMPLE_RATE) {
             let piece = piece.with_context(|| format!("the sound {}", path.display()))?;
@@ -127,12 +128,12 @@ pub fn extract(path: &Path, fps: FrameRate, n_frames: usize) -> Result<Option<So
         Ok(n)
     };
     let mut loudest = Loudest::default();
-    if listen(&mut |samples| loudest.push(samples))? == 0 {
+    if decode(&mut |samples| loudest.push(samples))? == 0 {
         return Ok(None);
     }
-    let mut listener = SoundFeatureExtractor::new(fps, Some(loudest.finish()));
-    listen(&mut |samples| listener.push(samples))?;
-    Ok(Some(listener.finish(n_frames)))
+    let mut extractor = SoundFeatureExtractor::new(fps, Some(loudest.finish()));
+    decode(&mut |samples| extractor.push(samples))?;
+    Ok(Some(extractor.finish(n_frames)))
 }
 
 #[cfg(test)]
@@ -140,7 +141,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pieces_of_any_length_are_heard_as_the_whole() {
+    fn features_do_not_depend_on_the_length_of_pieces() {
         let fps = FrameRate::new(15, 1);
         let sound: Vec<f32> =
             (0..400_000).map(|i| (i as f32 * 0.05).sin() * if i % 16_000 < 2000 { 0.5 } else { 0.001 }).collect();
@@ -148,9 +149,9 @@ mod tests {
         loudest.push(&sound);
         let loudest = loudest.finish();
         let features = |piece: usize| {
-            let mut listener = SoundFeatureExtractor::new(fps, Some(loudest));
-            sound.chunks(piece).for_each(|samples| listener.push(samples));
-            listener.finish(375)
+            let mut extractor = SoundFeatureExtractor::new(fps, Some(loudest));
+            sound.chunks(piece).for_each(|samples| extractor.push(samples));
+            extractor.finish(375)
         };
         let whole = features(sound.len());
         assert_eq!(whole.rows.len(), 188 * mel::N_MELS);
@@ -170,14 +171,14 @@ mod tests {
     }
 
     #[test]
-    fn sound_that_ends_early_is_silence_and_sound_that_goes_on_is_cut() {
+    fn short_sound_is_padded_and_long_sound_is_cut() {
         let fps = FrameRate::new(15, 1);
-        let mut listener = SoundFeatureExtractor::new(fps, None);
-        listener.push(&[0.1; 16_000]);
-        assert_eq!(listener.finish(60).rows.len(), 30 * mel::N_MELS);
-        let mut listener = SoundFeatureExtractor::new(fps, None);
-        listener.push(&[0.1; 64_000]);
-        assert_eq!(listener.finish(15).rows.len(), 8 * mel::N_MELS);
+        let mut extractor = SoundFeatureExtractor::new(fps, None);
+        extractor.push(&[0.1; 16_000]);
+        assert_eq!(extractor.finish(60).rows.len(), 30 * mel::N_MELS);
+        let mut extractor = SoundFeatureExtractor::new(fps, None);
+        extractor.push(&[0.1; 64_000]);
+        assert_eq!(extractor.finish(15).rows.len(), 8 * mel::N_MELS);
         assert_eq!(SoundFeatureExtractor::new(fps, None).finish(0), SoundFeatures::default());
     }
 }

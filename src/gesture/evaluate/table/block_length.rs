@@ -1,34 +1,34 @@
-//! How long the blocks of an evaluation are: long enough that the errors of neighbouring blocks hardly depend on each
-//! other, and where that allows, short enough that there are some. The dependence is the integrated autocorrelation time with
-//! an automatic window (Sokal 1997, Monte Carlo Methods in Statistical Mechanics, section 3).
+//! Choice of the block length of an evaluation: long enough that the errors of neighbouring blocks are almost
+//! independent, and otherwise short enough that there are several blocks. Dependence is measured by the integrated
+//! autocorrelation time with an automatic window (Sokal 1997, Monte Carlo Methods in Statistical Mechanics, section 3).
 
-/// A block is at least so many decorrelation times long.
-const TIMES: f64 = 1.5;
-/// Where the decorrelation time allows it, short motion has this many blocks of 2 to 4 s. Movements of a second must
-/// fit.
-const N_WANTED: f64 = 16.0;
+/// Smallest block length in decorrelation times.
+const MIN_TIMES: f64 = 1.5;
+/// Number of blocks of short motion, if the decorrelation time allows it.
+const N_BLOCKS: f64 = 16.0;
+/// Range of the usual block length, seconds; movements of one second must fit.
 const BLOCK_SECS: [f64; 2] = [2.0, 4.0];
-/// Above an hour of motion blocks become longer, which bounds their number.
-const MOST_SECS: f64 = 3600.0;
+/// Duration of motion, seconds, above which blocks become longer, which bounds their number.
+const MAX_SECS: f64 = 3600.0;
 
 /// Length of blocks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BlockLength {
-    /// Seconds.
+    /// Length in seconds.
     pub secs: f64,
     /// Integrated autocorrelation time of the differences between two predictors' errors, seconds.
     pub decorrelation_secs: f64,
 }
 
 impl BlockLength {
-    /// Length for `secs` of motion at `fps`. `differences`: series that are compared, each in pieces, one number a
-    /// frame; the slowest counts.
+    /// Block length for `secs` of motion at `fps`. `differences`: the compared error series, each in pieces with one
+    /// value per frame; the one with the longest decorrelation time counts.
     pub fn new(secs: f64, fps: f64, differences: &[Vec<Vec<f64>>]) -> Self {
         let times = differences.iter().map(|pieces| integrated_time(pieces));
         let decorrelation_secs = times.fold(1.0, f64::max) / fps;
         let [least, most] = BLOCK_SECS;
-        let usual = (secs / N_WANTED).clamp(least, most) * (secs / MOST_SECS).ceil().max(1.0);
-        Self { secs: usual.max(TIMES * decorrelation_secs), decorrelation_secs }
+        let usual = (secs / N_BLOCKS).clamp(least, most) * (secs / MAX_SECS).ceil().max(1.0);
+        Self { secs: usual.max(MIN_TIMES * decorrelation_secs), decorrelation_secs }
     }
 
     /// Length in frames, at least 1.
@@ -36,10 +36,11 @@ impl BlockLength {
         ((self.secs * fps).round() as usize).max(1)
     }
 
-    /// How much more the mean of blocks of `block_secs` varies than that of independent ones: `1 + 2 r` with the
-    /// correlation r of the means of neighbouring blocks of a first-order autoregression of this decorrelation time.
+    /// Variance of the mean of blocks of `block_secs` relative to that of independent blocks: `1 + 2 r` with the
+    /// correlation r of the means of neighbouring blocks of a first-order autoregressive process with this
+    /// decorrelation time.
     pub fn variance_inflation(&self, block_secs: f64) -> f64 {
-        // In constants of the exponential decay.
+        // Length of a block in time constants of the exponential decay.
         let length = 2.0 * block_secs / self.decorrelation_secs;
         if length.is_nan() || length <= 1e-3 {
             return 3.0;
@@ -49,30 +50,31 @@ impl BlockLength {
     }
 }
 
-/// The window ends at this many times half the time found so far (Sokal's c, whose times are half of these).
+/// Sokal's window constant c: the window ends at c times half of the time so far (Sokal's times are half of these).
 const WINDOW: f64 = 5.0;
-/// Least share of the time that the removed mean may seem to have left.
-const LEAST_LEFT: f64 = 0.1;
+/// Smallest assumed share of the time that remains after subtracting the sample mean.
+const MIN_REMAINING: f64 = 0.1;
 
-/// `1 + 2 * (sum of the autocorrelations)` of a series in pieces, in frames, at least 1 and at most all frames: the mean
-/// of N frames varies as that of N / time independent ones. Lags stay within a piece; the mean is that of all pieces, so
-/// that pieces of different level count as slow. Frames that are not finite are left out. Corrected for the mean, which
-/// is the series' own. 1 of a constant series.
+/// Integrated autocorrelation time in frames, `1 + 2 * (sum of the autocorrelations)`, of a series in pieces: the mean
+/// of N frames has the variance of that of N / time independent frames. It is at least 1 and at most the number of
+/// frames; 1 for a constant series. Lags do not cross pieces, but the mean is that of all pieces, so that pieces of
+/// different level give a long time. Frames that are not finite are ignored. The result is corrected for the use of the
+/// sample mean.
 pub fn integrated_time(pieces: &[Vec<f64>]) -> f64 {
     let (time, window, n) = windowed(pieces);
     if window == 0 {
         return 1.0;
     }
-    let left = 1.0 - (2.0 * window as f64 + 1.0) / n.max(1) as f64;
-    (time.max(1.0) / left.max(LEAST_LEFT)).min(n.max(1) as f64)
+    let remaining = 1.0 - (2.0 * window as f64 + 1.0) / n.max(1) as f64;
+    (time.max(1.0) / remaining.max(MIN_REMAINING)).min(n.max(1) as f64)
 }
 
-/// Time before the correction, its window (last lag), and the number of frames.
+/// Uncorrected time, its window (last lag), and the number of frames.
 fn windowed(pieces: &[Vec<f64>]) -> (f64, usize, usize) {
     let all = || pieces.iter().flatten().filter(|value| value.is_finite());
     let n = all().count();
     let mean = all().sum::<f64>() / n.max(1) as f64;
-    // What is missing adds nothing to any product.
+    // Missing values are set to 0, so that they add nothing to the products.
     let centred = |piece: &Vec<f64>| -> Vec<f64> {
         piece.iter().map(|value| if value.is_finite() { value - mean } else { 0.0 }).collect()
     };
@@ -100,7 +102,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn slow_errors_make_long_blocks() {
+    fn slowly_varying_errors_give_long_blocks() {
         let series = |period: usize, n: usize| vec![(0..n).map(|t| f64::from((t / period % 2) as u32)).collect()];
         let fast = BlockLength::new(20.0, 15.0, &[series(1, 300)]);
         assert_eq!((fast.secs, fast.frames(15.0)), (2.0, 30));
@@ -111,9 +113,9 @@ mod tests {
     }
 
     #[test]
-    fn long_blocks_are_as_good_as_independent() {
+    fn long_blocks_are_almost_independent() {
         let length = BlockLength { secs: 2.0, decorrelation_secs: 1.0 };
-        // Means of two blocks of 30 frames of an autoregression, from its autocorrelations.
+        // Means of two neighbouring blocks of an autoregressive process, from its autocorrelations.
         let (frames, decay): (i32, f64) = (2000, (-4.0 * 2.0 / 2000.0_f64).exp());
         let correlation = |gap: i32| {
             let pairs = (-frames..frames).map(|lag| f64::from(frames - lag.abs()) * decay.powi((lag + gap).abs()));
@@ -126,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn times_are_those_of_emcee() {
+    fn times_match_emcee() {
         let golden: serde_json::Value =
             serde_json::from_str(include_str!("../../../../fixtures/reference/verdict_golden.json")).unwrap();
         for case in golden["integrated_time"].as_array().unwrap() {
@@ -139,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn pieces_of_different_level_are_slow_and_constants_are_not() {
+    fn pieces_of_different_level_have_a_long_time_and_constants_do_not() {
         let wave = |level: f64| (0..75).map(|t| level + f64::from(t * 7919 % 101) / 101.0).collect::<Vec<f64>>();
         let alike = integrated_time(&[wave(0.0), wave(0.0), wave(0.0)]);
         let apart = integrated_time(&[wave(0.0), wave(5.0), wave(-3.0)]);

@@ -1,5 +1,5 @@
-//! Metrics in blocks, the units of the bootstrap and of tests, since neighbouring frames are correlated. The blocks add
-//! up to the whole, and none reaches over the end of a clip.
+//! Metric sums in blocks, which are the units of the bootstrap and of tests, since neighbouring frames are correlated.
+//! The blocks add up to the total, and none extends beyond the end of a clip.
 
 use crate::evaluate::baseline::baselines::Predictor;
 use crate::evaluate::clips::clips::EvalClips;
@@ -8,16 +8,17 @@ use ndarray::s;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Length of the blocks of the truth's halves, seconds, whatever is compared with it.
+/// Length of the blocks in the comparison of the ground-truth halves, seconds.
 const HALVES_SECS: f64 = 4.0;
-/// Most pairs of them, those of an hour, that are drawn one by one; of more, neighbours are added up, which bounds memory.
-const MOST_PAIRS: usize = 450;
-/// Length, seconds, of the pieces in which longer clips are measured in parallel and in bounded memory; differences
-/// across a border are not counted.
+/// Largest number of pairs of such blocks (one hour) that are kept separately; if there are more, neighbours are
+/// summed, which bounds memory.
+const MAX_PAIRS: usize = 450;
+/// Length, seconds, of the pieces in which longer clips are measured, in parallel and with bounded memory; differences
+/// across a boundary are not counted.
 const PIECE_SECS: f64 = 600.0;
 
-/// Metric sums of a predictor over all clips and their blocks of about `length` frames, independent of the number of
-/// threads.
+/// Metric sums of a predictor over all clips and their blocks of about `length` frames. The result does not depend on
+/// the number of threads.
 pub fn measure(catalogue: &Catalogue, clips: &EvalClips, predictor: &Predictor, length: usize) -> IntervalSums {
     let all: Vec<IntervalSums> = pieces(clips)
         .into_par_iter()
@@ -44,10 +45,10 @@ pub fn measure(catalogue: &Catalogue, clips: &EvalClips, predictor: &Predictor, 
             catalogue.measure_blocks(&interval, length)
         })
         .collect();
-    together(all)
+    total(all)
 }
 
-/// Clips with their frames, long ones in equal pieces.
+/// Clip indices and frame ranges; long clips are split into equal pieces.
 fn pieces(clips: &EvalClips) -> Vec<(usize, Range<usize>)> {
     let of_clip = |clip: usize| {
         let n_frames = clips.clips[clip].n_frames();
@@ -57,7 +58,7 @@ fn pieces(clips: &EvalClips) -> Vec<(usize, Range<usize>)> {
     (0..clips.clips.len()).flat_map(of_clip).collect()
 }
 
-/// Frames of each block of about `length` frames.
+/// Number of frames of each block of about `length` frames.
 pub fn frames(clips: &EvalClips, length: usize) -> Vec<usize> {
     let of_piece = |(_, frames): (usize, Range<usize>)| {
         let (n, n_frames) = (n_blocks(frames.len(), length), frames.len());
@@ -67,8 +68,8 @@ pub fn frames(clips: &EvalClips, length: usize) -> Vec<usize> {
     pieces(clips).into_iter().flat_map(of_piece).collect()
 }
 
-/// Mean distance of the joints that are seen from the ground truth's, metres, of every frame of every clip. NaN where
-/// no joint is seen.
+/// Mean distance between predicted and ground-truth joints, metres, for every frame of every clip, over the visible
+/// joints; NaN if no joint is visible.
 pub fn frame_errors(clips: &EvalClips, predictor: &Predictor) -> Vec<Vec<f64>> {
     let of_clip = |clip: usize| {
         let (of, Some(predicted)) = (&clips.clips[clip], predictor.motion(clips, clip)) else { return Vec::new() };
@@ -86,13 +87,13 @@ pub fn frame_errors(clips: &EvalClips, predictor: &Predictor) -> Vec<Vec<f64>> {
     (0..clips.clips.len()).into_par_iter().map(of_clip).collect()
 }
 
-/// One half of the ground truth against the other: every second block is treated as the prediction of the one before
-/// it.
+/// Compares one half of the ground truth with the other: every second block is treated as the prediction of the
+/// previous block.
 pub fn halves(catalogue: &Catalogue, clips: &EvalClips) -> IntervalSums {
     let length = ((HALVES_SECS * clips.fps.per_sec()).round() as usize).max(1);
     let stretches = |clip: usize| (0..clips.clips[clip].n_frames() / length).map(move |i| (clip, i * length));
     let all: Vec<(usize, usize)> = (0..clips.clips.len()).flat_map(stretches).collect();
-    let beside = |pair: &[(usize, usize)]| {
+    let measure_pair = |pair: &[(usize, usize)]| {
         let part = |(clip, start): (usize, usize)| {
             let (clip, frames) = (&clips.clips[clip], start..start + length);
             (clip.ground_truth.view().slice_move(s![frames.clone(), .., ..]), clip.mask.slice(s![frames, ..]))
@@ -102,17 +103,17 @@ pub fn halves(catalogue: &Catalogue, clips: &EvalClips) -> IntervalSums {
         mask.zip_mut_with(&also, |seen, also| *seen &= also);
         catalogue.measure(&MotionPair { predicted, ground_truth, mask: mask.view(), fps: clips.fps, onsets: None })
     };
-    let n_joined = (all.len() / 2).div_ceil(MOST_PAIRS).max(1);
-    let joined = |neighbours: &[(usize, usize)]| {
+    let n_merged = (all.len() / 2).div_ceil(MAX_PAIRS).max(1);
+    let merged = |neighbours: &[(usize, usize)]| {
         let mut whole = MetricSums::default();
-        neighbours.chunks_exact(2).for_each(|pair| whole += &beside(pair));
+        neighbours.chunks_exact(2).for_each(|pair| whole += &measure_pair(pair));
         IntervalSums { blocks: vec![whole.clone().into_block()], whole }
     };
-    together(all[..all.len() / 2 * 2].par_chunks(2 * n_joined).map(joined).collect())
+    total(all[..all.len() / 2 * 2].par_chunks(2 * n_merged).map(merged).collect())
 }
 
-/// Sum of measurements in their order.
-fn together(all: Vec<IntervalSums>) -> IntervalSums {
+/// Sum of measurements, with the blocks in order.
+fn total(all: Vec<IntervalSums>) -> IntervalSums {
     let mut sum = IntervalSums::default();
     for one in all {
         sum.whole += &one.whole;

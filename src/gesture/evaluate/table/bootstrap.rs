@@ -6,12 +6,12 @@ use orator_base::math::order::Ordered;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Share of the draws outside the interval at each end.
+/// Share of the draws beyond each end of the interval.
 const TAIL: f64 = 0.025;
 const SEED: u64 = 1;
 
-/// How often each block occurs in each of `n_draws` draws of `n_blocks` blocks with replacement [n_draws, n_blocks], from a
-/// fixed seed, so that two metrics can be compared draw by draw.
+/// Multiplicity of each block in each of `n_draws` draws of `n_blocks` blocks with replacement, [n_draws, n_blocks].
+/// The seed is fixed, so that two metrics can be compared draw by draw.
 pub fn counts(n_blocks: usize, n_draws: usize) -> Array2<f64> {
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
     let mut counts = Array2::zeros((n_draws, n_blocks));
@@ -21,8 +21,8 @@ pub fn counts(n_blocks: usize, n_draws: usize) -> Array2<f64> {
     counts
 }
 
-/// `value` of all blocks with its 95 % interval, the spread of `drawn` around their median. The draws are shifted so that their
-/// median is the value, since repeated blocks bias distances between distributions. Non-finite draws are left out.
+/// `value` over all blocks with its 95 % interval from the quantiles of `drawn`. The draws are shifted so that their
+/// median is `value`, since repeated blocks bias distances between distributions. Non-finite draws are ignored.
 pub fn estimate(value: f64, drawn: &[f64]) -> Estimate {
     let drawn = Ordered::new(drawn.iter().copied());
     let at = |share: f64| drawn.quantile(share).unwrap_or(f64::NAN);

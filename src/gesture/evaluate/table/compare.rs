@@ -1,5 +1,5 @@
-//! Comparison of two results. Values are compared only where their definitions agree to the last parameter; elsewhere
-//! the difference is named.
+//! Comparison of two results. Values are only compared if their definitions agree in all parameters; otherwise the
+//! differences are reported.
 
 use super::result::{StoredMetric, StoredResult};
 use crate::evaluate::baseline::baselines::PredictorKind;
@@ -9,7 +9,7 @@ use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-/// Metric that both results have.
+/// Metric that is present in both results.
 #[derive(Clone, Debug, Serialize)]
 pub struct MetricPair {
     pub name: String,
@@ -22,12 +22,12 @@ pub struct MetricPair {
 /// Outcome of a comparison.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Comparison {
-    /// Warning where the results have different ground truth.
+    /// Warning if the results have different ground truth.
     pub warning: Option<String>,
     pub beside: Vec<MetricPair>,
-    /// Sentences for metrics of one name whose definitions differ.
+    /// Messages for metrics with equal names but different definitions.
     pub refused: Vec<String>,
-    /// Metrics that only one of them has.
+    /// Metrics that are only present in A, or only in B.
     pub only_in_a: Vec<String>,
     pub only_in_b: Vec<String>,
 }
@@ -40,7 +40,7 @@ pub fn compare(a: &StoredResult, b: &StoredResult) -> Comparison {
     );
     let mut compared = Comparison { warning: (a.truth != b.truth).then_some(warning), ..Comparison::default() };
     let mut rest: Vec<&StoredMetric> = b.metrics.iter().collect();
-    let mut alone: Vec<&StoredMetric> = Vec::new();
+    let mut unmatched: Vec<&StoredMetric> = Vec::new();
     for metric in &a.metrics {
         match rest.iter().position(|other| other.hash == metric.hash) {
             Some(at) => {
@@ -53,10 +53,10 @@ pub fn compare(a: &StoredResult, b: &StoredResult) -> Comparison {
                     b: other.value(PredictorKind::Prediction),
                 });
             }
-            None => alone.push(metric),
+            None => unmatched.push(metric),
         }
     }
-    for metric in alone {
+    for metric in unmatched {
         match rest.iter().position(|other| (&other.name, &other.part) == (&metric.name, &metric.part)) {
             Some(at) => compared.refused.push(refusal(metric, rest.remove(at))),
             None => compared.only_in_a.push(metric.plain_name.clone()),
@@ -66,7 +66,7 @@ pub fn compare(a: &StoredResult, b: &StoredResult) -> Comparison {
     compared
 }
 
-/// Sentence like `mpjpe (all), joint error, is not comparable: fps is 15.0 in A and 30.0 in B (hash ... and ...)`.
+/// Message such as `mpjpe (all), joint error, is not comparable: fps is 15.0 in A and 30.0 in B (hash ... and ...)`.
 fn refusal(a: &StoredMetric, b: &StoredMetric) -> String {
     let mut differ = Vec::new();
     differences("", &a.parameters, &b.parameters, &mut differ);
@@ -88,9 +88,9 @@ fn differences(path: &str, a: &Value, b: &Value, differ: &mut Vec<String>) {
         (Value::Object(of_a), Value::Object(of_b)) => {
             let keys: BTreeSet<&String> = of_a.keys().chain(of_b.keys()).collect();
             for key in keys {
-                let place = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+                let key_path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
                 let of = |map: &serde_json::Map<String, Value>| map.get(key).cloned().unwrap_or(Value::Null);
-                differences(&place, &of(of_a), &of(of_b), differ);
+                differences(&key_path, &of(of_a), &of(of_b), differ);
             }
         }
         _ if a == b => {}
@@ -101,7 +101,7 @@ fn differences(path: &str, a: &Value, b: &Value, differ: &mut Vec<String>) {
     }
 }
 
-/// Table of both as text.
+/// Formats the comparison as a text table.
 pub fn text(compared: &Comparison) -> String {
     let cell = |estimate: &Option<Estimate>| match estimate {
         Some(Estimate { value, interval }) if interval.low.is_finite() => {

@@ -1,10 +1,10 @@
-//! Table as JSON and back. Each value has its definition, parameters and their hash; only values of one hash are
-//! comparable.
+//! Result file: the table as JSON. Each value has its definition, parameters and their hash; only values with equal
+//! hashes are comparable.
 
 use super::table::{PredictorRow, Table};
 use crate::evaluate::baseline::baselines::PredictorKind;
 use crate::evaluate::verdict::labels;
-use crate::evaluate::verdict::verdict::{better_than_nothing, hears};
+use crate::evaluate::verdict::verdict::{better_than_nothing, depends_on_audio};
 use anyhow::{Context, Result, ensure};
 use orator_base::input;
 use orator_base::math::estimate::Estimate;
@@ -12,10 +12,11 @@ use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
-/// Version of the JSON's layout.
+/// Version of the JSON layout.
 pub const VERSION: u64 = 1;
 
-/// Result as JSON. Of several checkpoints the first has the keys of a single one, the others end in their number.
+/// Result as JSON. The keys of the first checkpoint are the same as for a single one; those of the others end in their
+/// number.
 pub fn json(table: &Table) -> Value {
     let metrics = (0..table.definitions.len()).map(|index| metric(table, index));
     let predictors = table.rows.iter().map(|row| {
@@ -29,7 +30,7 @@ pub fn json(table: &Table) -> Value {
         json!({
             "predictor": own.key(),
             "better_than_nothing": better_than_nothing(table, own),
-            "hears": hears(table, own),
+            "hears": depends_on_audio(table, own),
         })
     };
     let own = table.predictions().next().map(verdicts).unwrap_or_default();
@@ -45,7 +46,7 @@ pub fn json(table: &Table) -> Value {
         "secs": table.secs,
         "with_sound": table.with_sound,
         "truth": table.truth,
-        "learnt_from_these_clips": table.learnt,
+        "learnt_from_these_clips": table.trained_on,
         "notes": table.notes,
         "predictors": predictors.collect::<Vec<_>>(),
         "metrics": metrics.collect::<Vec<_>>(),
@@ -100,7 +101,7 @@ pub struct StoredMetric {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct StoredResult {
     evaluation: u64,
-    /// Hash of the ground truth behind the values, and the number of its clips.
+    /// Hash of the ground truth.
     pub truth: String,
     pub n_clips: usize,
     pub metrics: Vec<StoredMetric>,

@@ -1,37 +1,37 @@
-//! Test whether paired differences of blocks are symmetric about 0, by flipping the signs of whole blocks (Fisher 1935;
-//! for dependent data in blocks: Canay, Romano and Shaikh 2017). Several metrics are flipped together, and each is held
-//! against the largest of all (Westfall and Young 1993), so that the level is that of all of them at once.
+//! Sign-flip test whether paired differences of blocks are symmetric about 0 (Fisher 1935; for dependent data in
+//! blocks: Canay, Romano and Shaikh 2017). Several metrics are flipped together, and each statistic is compared with
+//! the largest of all metrics (Westfall and Young 1993), which controls the family-wise error rate.
 
 use orator_base::math::estimate::Estimate;
 use rand::{RngCore, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Level of a test. Half of 5 %, since the decorrelation time is an estimate and leaves some dependence: simulated rates
-/// of false verdicts stay below 5 % with it.
+/// Significance level of a test. It is half of 5 %, since the decorrelation time is an estimate and leaves some
+/// dependence; with it the simulated rates of false verdicts stay below 5 %.
 pub const LEVEL: f64 = 0.025;
-/// Fewest blocks with which a test can reject: of all flips, the observed one and its negative are 2 of 2^n.
-pub const FEWEST_BLOCKS: usize = 7;
-/// Most blocks whose flips are all counted.
-const MOST_EXACT: usize = 16;
-/// Random flips of more blocks; the observed one is added to them (Phipson and Smyth 2010).
+/// Smallest number of blocks with which a test can reject: the observed signs and their negative are 2 of 2^n flips.
+pub const MIN_BLOCKS: usize = 7;
+/// Largest number of blocks for which all flips are enumerated.
+const MAX_EXACT: usize = 16;
+/// Number of random flips for more blocks; the observed signs are added to them (Phipson and Smyth 2010).
 const N_RANDOM: usize = 9999;
 const SEED: u64 = 1;
-/// Rounding up to which two statistics are equal.
+/// Tolerance within which two statistics count as equal.
 const ROUNDING: f64 = 1e-9;
 
-/// Mean difference with what a test says of it.
+/// Mean difference with the result of its test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TestedDifference {
-    /// Mean with the simultaneous interval: 0 lies outside where `p` is at most [`LEVEL`]. Infinite where no mean could
-    /// be rejected.
+    /// Mean with the simultaneous interval, which excludes 0 if `p` is at most [`LEVEL`]. The interval is infinite if
+    /// no mean could be rejected.
     pub mean: Estimate,
     /// Two-sided p value, adjusted for the number of metrics.
     pub p: f64,
 }
 
-/// Tests metrics together. `differences`: one number a block for each metric, all of one length. `inflation` (at least
-/// 1): how much more the mean of the blocks varies than that of independent ones. Metrics with numbers that are not
-/// finite have p = 1 and no interval.
+/// Tests several metrics together. `differences` has one value per block for each metric, all of equal length.
+/// `inflation` (at least 1) is the variance of the mean of the blocks relative to independent blocks. Metrics with
+/// values that are not finite have p = 1 and no interval.
 pub fn test(differences: &[Vec<f64>], inflation: f64) -> Vec<TestedDifference> {
     let n = differences.iter().map(Vec::len).min().unwrap_or(0);
     let units: Vec<Option<Vec<f64>>> = differences.iter().map(|metric| unit(&metric[..n])).collect();
@@ -49,20 +49,21 @@ pub fn test(differences: &[Vec<f64>], inflation: f64) -> Vec<TestedDifference> {
             let none = if mean == 0.0 { 0.0 } else { f64::NAN };
             return TestedDifference { mean: Estimate::new(mean, none, none), p: 1.0 };
         };
-        // The sum of unit length is a function of Student's t, which is what the inflation divides.
+        // The sum of the unit vector is a monotonic function of Student's t, whose square is divided by the inflation.
         let size = unit.iter().sum::<f64>().abs();
         let rest = (1.0 - size * size / blocks).max(0.0);
         let deflated = size / (rest * inflation + size * size / blocks).sqrt();
         let p = n_beyond(deflated) as f64 / n_flips as f64;
         let spread: f64 = metric[..n].iter().map(|value| (value - mean).powi(2)).sum();
-        let room = blocks - critical * critical;
-        let half = if room > 0.0 { critical * (inflation * spread / (blocks * room)).sqrt() } else { f64::INFINITY };
-        TestedDifference { mean: Estimate::new(mean, mean - half, mean + half), p }
+        let remainder = blocks - critical * critical;
+        let half_width =
+            if remainder > 0.0 { critical * (inflation * spread / (blocks * remainder)).sqrt() } else { f64::INFINITY };
+        TestedDifference { mean: Estimate::new(mean, mean - half_width, mean + half_width), p }
     };
     differences.iter().zip(&units).map(of_metric).collect()
 }
 
-/// Numbers scaled to a sum of squares of 1; `None` where there is none, or one is not finite.
+/// Values scaled to a sum of squares of 1; `None` if all are 0, or one is not finite.
 fn unit(values: &[f64]) -> Option<Vec<f64>> {
     let largest = values.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
     if !(largest > 0.0 && values.iter().all(|value| value.is_finite())) {
@@ -72,7 +73,7 @@ fn unit(values: &[f64]) -> Option<Vec<f64>> {
     Some(values.iter().map(|value| value / largest / length).collect())
 }
 
-/// Largest magnitude of the metrics' sums for every flip of the signs, or for the observed signs and random ones.
+/// Largest absolute sum over the metrics for every flip of the signs, or for the observed signs and random flips.
 fn largest_sums(units: &[&Vec<f64>], n: usize) -> Vec<f64> {
     let largest = |is_negative: &dyn Fn(usize) -> bool| {
         let sum = |unit: &&Vec<f64>| {
@@ -81,10 +82,10 @@ fn largest_sums(units: &[&Vec<f64>], n: usize) -> Vec<f64> {
         };
         units.iter().map(sum).fold(0.0, f64::max)
     };
-    if n <= MOST_EXACT {
-        // Flips and their negatives have one magnitude: the last sign stays.
-        let half = (0..1_u64 << n.saturating_sub(1)).map(|flip| largest(&|i| flip >> i & 1 == 1));
-        return half.flat_map(|sum| [sum; 2]).collect();
+    if n <= MAX_EXACT {
+        // A flip and its negative have the same magnitude, so the last sign is fixed and each sum counts twice.
+        let half_sums = (0..1_u64 << n.saturating_sub(1)).map(|flip| largest(&|i| flip >> i & 1 == 1));
+        return half_sums.flat_map(|sum| [sum; 2]).collect();
     }
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
     let mut bits = vec![0_u64; n.div_ceil(64)];
@@ -101,13 +102,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn p_values_are_those_of_scipy() {
+    fn p_values_match_scipy() {
         let golden: serde_json::Value =
             serde_json::from_str(include_str!("../../../../fixtures/reference/verdict_golden.json")).unwrap();
         for case in golden["sign_flips"].as_array().unwrap() {
             let differences: Vec<Vec<f64>> = serde_json::from_value(case["differences"].clone()).unwrap();
             let expected: Vec<f64> = serde_json::from_value(case["p"].clone()).unwrap();
-            let exact = differences[0].len() <= MOST_EXACT;
+            let exact = differences[0].len() <= MAX_EXACT;
             for (found, p) in test(&differences, 1.0).iter().zip(expected) {
                 // Four standard deviations of the random flips.
                 let bound = if exact { 1e-12 } else { 4.0 * (p * (1.0 - p) / 1e4).sqrt() + 1e-4 };
@@ -129,7 +130,7 @@ mod tests {
                     tested.mean.interval.low <= tested.mean.value && tested.mean.value <= tested.mean.interval.high
                 );
                 assert_eq!(tested.p <= LEVEL, tested.mean.interval.excludes_zero(), "{tested:?}");
-                assert!(n >= FEWEST_BLOCKS || tested.p > LEVEL, "{tested:?}");
+                assert!(n >= MIN_BLOCKS || tested.p > LEVEL, "{tested:?}");
                 n_rejected += usize::from(tested.p <= LEVEL);
             }
         }
@@ -137,10 +138,10 @@ mod tests {
     }
 
     #[test]
-    fn extremes() {
-        let alike = test(&[vec![0.2; FEWEST_BLOCKS]], 1.0)[0];
+    fn extreme_inputs_have_valid_p_values() {
+        let alike = test(&[vec![0.2; MIN_BLOCKS]], 1.0)[0];
         assert!(alike.p == 2.0 / 128.0 && alike.mean.interval.excludes_zero(), "{alike:?}");
-        assert!(!test(&[vec![0.2; FEWEST_BLOCKS - 1]], 1.0)[0].mean.interval.excludes_zero());
+        assert!(!test(&[vec![0.2; MIN_BLOCKS - 1]], 1.0)[0].mean.interval.excludes_zero());
         assert_eq!(test(&[vec![0.0; 9]], 1.0)[0].p, 1.0);
         let broken = test(&[vec![f64::NAN; 9], vec![1e300; 9], vec![]], 1.0);
         assert!(broken.iter().all(|tested| tested.p == 1.0), "{broken:?}");

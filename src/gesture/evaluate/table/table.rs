@@ -1,7 +1,7 @@
-//! Table of every metric of every predictor with its interval, on the same clips and the same draws.
+//! Table of all metrics of all predictors with confidence intervals, computed on the same clips and the same draws.
 
 use super::block_length::BlockLength;
-use super::left_out::BlockGroups;
+use super::jackknife::BlockGroups;
 use super::sign_flips::{self, TestedDifference};
 use super::{blocks, bootstrap};
 use crate::evaluate::baseline::baselines::{NumberedCheckpoint, Predictor, PredictorKind};
@@ -13,26 +13,27 @@ use ndarray::{Array2, s};
 use orator_base::math::estimate::Estimate;
 use orator_base::stage::progress::Task;
 
-/// Number of draws behind an interval; costly metrics (Frechet distances, correlations) take fewer.
+/// Number of bootstrap draws for an interval.
 pub const N_DRAWS: usize = 1000;
+/// Number of draws for costly metrics (Frechet distances, correlations).
 pub const N_COSTLY_DRAWS: usize = 100;
-/// Number of blocks below which bootstrap intervals say little.
+/// Number of blocks below which bootstrap intervals are unreliable.
 pub const FEW_BLOCKS: usize = 10;
 
 /// Metrics of one predictor.
 #[derive(Clone, Debug)]
 pub struct PredictorRow {
     pub kind: PredictorKind,
-    /// Whose motion it is, where several checkpoints are measured.
+    /// Checkpoint that generated the motion, if several are evaluated.
     pub checkpoint: Option<NumberedCheckpoint>,
-    /// Description in a sentence.
+    /// Description in one sentence.
     pub description: String,
-    /// One estimate a definition.
+    /// One estimate per definition.
     pub values: Vec<Estimate>,
-    /// Reasons of missing values; empty where there is a value.
+    /// Reasons for missing values; empty where there is a value.
     pub reasons: Vec<String>,
-    /// Values without each group of blocks [groups, definitions]. Empty where blocks are missing.
-    left_out: Array2<f64>,
+    /// Values without each group of blocks [groups, definitions]; empty if blocks are missing.
+    without_group: Array2<f64>,
 }
 
 /// Metrics of all predictors.
@@ -40,27 +41,27 @@ pub struct PredictorRow {
 pub struct Table {
     pub settings: MetricSettings,
     pub definitions: Vec<Definition>,
-    /// For a metric that should match the ground truth's: index of the ground truth's value.
+    /// For metrics that should match the ground truth: index of the metric with the ground truth's value.
     pub truth_of: Vec<Option<usize>>,
     pub n_clips: usize,
     pub n_blocks: usize,
-    /// Approximate length of the blocks; a clip has the number of equal blocks that fits best.
+    /// Approximate length of the blocks; each clip is divided into equal blocks of about this length.
     pub block_length: BlockLength,
     groups: BlockGroups,
     pub n_frames: usize,
     pub secs: f64,
     pub with_sound: bool,
     /// Whether the model was trained on these clips.
-    pub learnt: bool,
+    pub trained_on: bool,
     /// Hash of the ground truth and of its compared joints.
     pub truth: String,
-    /// Rows, the predictions first, the ground truth last.
+    /// Rows: predictions first, ground truth last.
     pub rows: Vec<PredictorRow>,
     pub notes: Vec<String>,
 }
 
-/// Measures the prediction, the baselines and the ground truth itself, one predictor at a time to bound memory; results
-/// are independent of the number of threads.
+/// Measures the predictions, the baselines and the ground truth itself, one predictor at a time to bound memory. The
+/// results do not depend on the number of threads.
 ///
 /// # Errors
 /// Settings that the catalogue rejects; no frame to measure.
@@ -83,7 +84,7 @@ pub fn measure(
         task.detail(&NumberedCheckpoint::name_of(predictor.kind, predictor.checkpoint.as_ref()));
         let measured = blocks::measure(&catalogue, clips, predictor, block_length.frames(fps));
         let row = row(&catalogue, predictor.kind, &predictor.description, &measured);
-        let left_out = if measured.blocks.len() == frames.len() {
+        let without_group = if measured.blocks.len() == frames.len() {
             let counts = groups.counts_without();
             let mut values = catalogue.draw_cheap(&measured.blocks, counts.view());
             let costly = catalogue.draw_costly(&measured.blocks, counts.view());
@@ -94,13 +95,13 @@ pub fn measure(
         } else {
             Array2::default((0, 0))
         };
-        rows.push(PredictorRow { checkpoint: predictor.checkpoint.clone(), left_out, ..row });
+        rows.push(PredictorRow { checkpoint: predictor.checkpoint.clone(), without_group, ..row });
         task.advance(1);
     }
     task.detail("truth");
     rows.extend(halves(&catalogue, clips));
     let truth = Predictor::truth(clips);
-    // Without blocks, since the ground truth has no draws.
+    // The ground truth is measured without blocks, since it needs no bootstrap draws.
     let whole = blocks::measure(&catalogue, clips, &truth, usize::MAX).whole;
     rows.push(row(&catalogue, PredictorKind::Truth, &truth.description, &IntervalSums { whole, blocks: Vec::new() }));
     task.advance(1);
@@ -117,15 +118,15 @@ pub fn measure(
         n_frames: clips.n_frames(),
         secs: clips.secs(),
         with_sound: clips.have_sound(),
-        learnt: clips.learnt,
+        trained_on: clips.trained_on,
         truth: clips.truth(),
         rows,
         notes: clips.notes.clone(),
     })
 }
 
-/// Differences between the errors of a prediction and of what verdicts compare it with, metres, of every frame of every
-/// clip.
+/// Differences in metres, for every frame of every clip, between the errors of a prediction and those of each predictor
+/// that verdicts compare it with.
 fn differences(clips: &EvalClips, predictors: &[Predictor]) -> Vec<Vec<Vec<f64>>> {
     use PredictorKind::{LatePrediction, MeanPose, MedianPose, MismatchedPrediction, Prediction};
     let errors: Vec<_> = predictors.iter().map(|predictor| blocks::frame_errors(clips, predictor)).collect();
@@ -143,7 +144,8 @@ fn differences(clips: &EvalClips, predictors: &[Predictor]) -> Vec<Vec<Vec<f64>>
     differences
 }
 
-/// One half of the ground truth against the other, for metrics of whole sets only, since frames have no partner.
+/// Row that compares one half of the ground truth with the other; only for metrics of sets of frames, since the frames
+/// of the halves do not correspond.
 fn halves(catalogue: &Catalogue, clips: &EvalClips) -> Option<PredictorRow> {
     let measured = blocks::halves(catalogue, clips);
     if measured.blocks.is_empty() {
@@ -172,7 +174,7 @@ fn row(catalogue: &Catalogue, kind: PredictorKind, description: &str, measured: 
     } else {
         let counts = bootstrap::counts(n_blocks, N_DRAWS);
         let mut drawn = catalogue.draw_cheap(&measured.blocks, counts.view());
-        // A prefix of the same draws.
+        // Costly metrics use a prefix of the same draws.
         let costly = catalogue.draw_costly(&measured.blocks, counts.slice(s![..N_COSTLY_DRAWS, ..]));
         for index in (0..values.len()).filter(|index| catalogue.is_costly(*index)) {
             drawn.column_mut(index).fill(f64::NAN);
@@ -194,12 +196,12 @@ fn row(catalogue: &Catalogue, kind: PredictorKind, description: &str, measured: 
         description: description.to_owned(),
         reasons: values.iter().enumerate().map(reason).collect(),
         values: values.iter().enumerate().map(estimate).collect(),
-        left_out: Array2::default((0, 0)),
+        without_group: Array2::default((0, 0)),
     }
 }
 
 impl PredictorRow {
-    /// Name for people.
+    /// Human-readable name.
     pub fn name(&self) -> String {
         NumberedCheckpoint::name_of(self.kind, self.checkpoint.as_ref())
     }
@@ -211,12 +213,12 @@ impl PredictorRow {
 }
 
 impl Table {
-    /// Rows of the motions under test, one of each checkpoint.
+    /// Rows of the motions under test, one per checkpoint.
     pub fn predictions(&self) -> impl Iterator<Item = &PredictorRow> {
         self.rows.iter().filter(|row| row.kind == PredictorKind::Prediction)
     }
 
-    /// Row of a predictor, if it was measured; of several checkpoints the first one's.
+    /// Row of a predictor, if it was measured; that of the first checkpoint if there are several.
     pub fn row(&self, kind: PredictorKind) -> Option<&PredictorRow> {
         self.rows.iter().find(|row| row.kind == kind)
     }
@@ -227,30 +229,31 @@ impl Table {
         self.definitions[index].better != Better::Neither && has_value
     }
 
-    /// Gain of `a` over `b` in a metric, in its unit, positive where `a` is better. NaN where neither direction of the
-    /// metric is better.
+    /// Gain of `a` over `b` in a metric, in its unit, positive if `a` is better. NaN if neither direction of the metric
+    /// is better.
     pub fn gain(&self, a: &PredictorRow, b: &PredictorRow, index: usize) -> f64 {
         let value = |row: &PredictorRow, index: usize| row.values[index].value;
-        self.good(index, |index| value(a, index)) - self.good(index, |index| value(b, index))
+        self.quality(index, |index| value(a, index)) - self.quality(index, |index| value(b, index))
     }
 
-    /// Gains of `a` over other rows in metrics, `(index, row)`, tested together: the level is that of all of them.
+    /// Gains of `a` over other rows, each `(metric index, row)`, tested together: the level holds for all of them.
     pub fn tested_gains(&self, a: &PredictorRow, others: &[(usize, &PredictorRow)]) -> Vec<TestedDifference> {
         let n = self.groups.len();
         let contributions = |(index, b): &(usize, &PredictorRow)| {
-            if a.left_out.nrows() != n || b.left_out.nrows() != n {
+            if a.without_group.nrows() != n || b.without_group.nrows() != n {
                 return vec![f64::NAN; n];
             }
-            let good = |row: &PredictorRow, group: usize| self.good(*index, |index| row.left_out[[group, index]]);
-            let without: Vec<f64> = (0..n).map(|group| good(a, group) - good(b, group)).collect();
+            let quality =
+                |row: &PredictorRow, group: usize| self.quality(*index, |index| row.without_group[[group, index]]);
+            let without: Vec<f64> = (0..n).map(|group| quality(a, group) - quality(b, group)).collect();
             self.groups.contributions(self.gain(a, b, *index), &without)
         };
         let inflation = self.block_length.variance_inflation(self.secs / n.max(1) as f64);
         sign_flips::test(&others.iter().map(contributions).collect::<Vec<_>>(), inflation)
     }
 
-    /// How good values are in a metric: more is better.
-    fn good(&self, index: usize, value: impl Fn(usize) -> f64) -> f64 {
+    /// Quality of a value in a metric, where more is better.
+    fn quality(&self, index: usize, value: impl Fn(usize) -> f64) -> f64 {
         let truth = self.truth_of.get(index).copied().flatten().unwrap_or(index);
         match self.definitions.get(index).map(|definition| definition.better) {
             Some(Better::Higher) => value(index),

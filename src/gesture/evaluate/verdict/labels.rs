@@ -1,10 +1,10 @@
-//! Labels of metrics for people: name, unit, rounded value, interval in brackets.
+//! Human-readable labels of metrics: name, unit, rounded value, interval in brackets.
 
 use crate::metrics::catalogue::{Better, Definition};
 use orator_base::math::estimate::Estimate;
 use std::fmt::Write as _;
 
-/// Names of metric families; of common prefixes the longest comes first.
+/// Names of metric families by prefix; the longest matching prefix applies.
 const NAMES: [(&str, &str); 25] = [
     ("pck_3d", "correct keypoints"),
     ("pck_2d", "correct keypoints, front view"),
@@ -36,13 +36,13 @@ const NAMES: [(&str, &str); 25] = [
 /// Name with the part of the body, like `correct keypoints at 0.2, fingers`.
 pub fn name(definition: &Definition) -> String {
     match part(definition) {
-        "" => whole_name(definition),
-        part => format!("{}, {part}", whole_name(definition)),
+        "" => name_without_part(definition),
+        part => format!("{}, {part}", name_without_part(definition)),
     }
 }
 
 /// Name without the part of the body.
-pub fn whole_name(definition: &Definition) -> String {
+pub fn name_without_part(definition: &Definition) -> String {
     let known =
         NAMES.iter().filter(|(start, _)| definition.name.starts_with(start)).max_by_key(|(start, _)| start.len());
     let mut name = match known {
@@ -74,7 +74,7 @@ pub fn part(definition: &Definition) -> &'static str {
     }
 }
 
-/// Short sign of the better direction: more, less, as the ground truth.
+/// Short text for the better direction: more, less, or as the ground truth.
 pub const fn direction(better: Better) -> &'static str {
     match better {
         Better::Higher => "more is better",
@@ -104,7 +104,7 @@ fn is_share(definition: &Definition) -> bool {
     definition.name.starts_with("pck")
 }
 
-/// Value alone, `-` where there is none.
+/// Value without interval; `-` if it is not finite.
 pub fn number(definition: &Definition, value: f64) -> String {
     let value = if is_share(definition) { 100.0 * value } else { value };
     if !value.is_finite() {
@@ -117,7 +117,7 @@ pub fn number(definition: &Definition, value: f64) -> String {
         n if n >= 10.0 => 1,
         n if n >= 1.0 => 2,
         n if n >= 0.001 => (2.0 - n.log10().floor()) as usize,
-        // Smaller values are rounding.
+        // Smaller values are rounding errors.
         _ => 4,
     };
     let text = format!("{value:.digits$}");
@@ -143,7 +143,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     #[test]
-    fn every_figure_has_a_plain_name_of_its_own() {
+    fn every_metric_has_a_unique_readable_name() {
         let catalogue = Catalogue::new(&MetricSettings::default()).unwrap();
         let names: Vec<String> = catalogue.definitions().iter().map(name).collect();
         assert_eq!(names.iter().collect::<BTreeSet<_>>().len(), names.len(), "{names:#?}");

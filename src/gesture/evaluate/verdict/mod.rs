@@ -1,4 +1,4 @@
-//! Conclusions in words: the verdict on a result, labels of metrics, and the text for the terminal.
+//! Conclusions as text: the verdict on a result, labels of metrics, and the table for the terminal.
 
 pub mod labels;
 pub mod text;

@@ -1,15 +1,15 @@
-//! Table as text for a terminal.
+//! Formats the table as text for a terminal.
 
 use super::labels;
-use super::verdict::{better_than_nothing, hears};
+use super::verdict::{better_than_nothing, depends_on_audio};
 use crate::evaluate::baseline::baselines::PredictorKind;
 use crate::evaluate::table::table::{FEW_BLOCKS, N_COSTLY_DRAWS, N_DRAWS, PredictorRow, Table};
 use crate::metrics::catalogue::Better;
 use std::fmt::Write as _;
 
-/// Table, descriptions of its columns, and conclusions.
+/// Text with the table, descriptions of its columns, and conclusions.
 ///
-/// `all` shows every metric; otherwise arms, fingers and wrists are shown for correct keypoints and joint errors only.
+/// `all` shows every metric; otherwise arms, fingers and wrists are only shown for correct keypoints and joint errors.
 pub fn text(table: &Table, all: bool) -> String {
     let Table { n_clips, n_blocks, n_frames, secs, .. } = table;
     let clips = if *n_clips == 1 { "clip" } else { "clips" };
@@ -19,7 +19,7 @@ pub fn text(table: &Table, all: bool) -> String {
     );
     let is_shown = |i: &usize| (all || is_main(table, *i)) && table.is_shown(*i);
     let shown: Vec<usize> = (0..table.definitions.len()).filter(is_shown).collect();
-    let first: Vec<String> = shown.iter().map(|i| named(table, *i)).collect();
+    let first: Vec<String> = shown.iter().map(|i| row_label(table, *i)).collect();
     let width = first.iter().map(|name| name.chars().count()).max().unwrap_or(0);
     let columns: Vec<Vec<String>> = table.rows.iter().map(|row| column(table, row, &shown)).collect();
     let widths: Vec<usize> =
@@ -54,7 +54,7 @@ pub fn text(table: &Table, all: bool) -> String {
     }
     for own in table.predictions() {
         let _ = writeln!(text);
-        for verdict in [better_than_nothing(table, own), hears(table, own)] {
+        for verdict in [better_than_nothing(table, own), depends_on_audio(table, own)] {
             let of = own.checkpoint.as_ref().map(|of| format!("{}: ", of.name)).unwrap_or_default();
             let _ = writeln!(text, "{of}{}", verdict.text());
         }
@@ -77,19 +77,19 @@ pub fn undefined(table: &Table) -> Vec<String> {
     by_reason.into_iter().map(|(reason, names)| format!("{}: {reason}", names.join(", "))).collect()
 }
 
-/// Whether a metric is shown without `all`: the whole body, else the first part that has a value, or a part of the first
-/// position metrics.
+/// Whether a metric is shown without `all`: one for the whole body, or else for the first part that has a value; a
+/// posture channel; or a part of the main position metrics.
 fn is_main(table: &Table, index: usize) -> bool {
     let definition = &table.definitions[index];
-    let name = labels::whole_name(definition);
-    let has_name = |i: &usize| labels::whole_name(&table.definitions[*i]) == name && table.is_shown(*i);
+    let name = labels::name_without_part(definition);
+    let has_name = |i: &usize| labels::name_without_part(&table.definitions[*i]) == name && table.is_shown(*i);
     let first = (0..table.definitions.len()).find(has_name);
-    let is_place = ["pck_3d", "mpjpe"].iter().any(|start| definition.name.starts_with(start));
+    let is_position = ["pck_3d", "mpjpe"].iter().any(|start| definition.name.starts_with(start));
     let is_angle = table.settings.channels.iter().any(|channel| channel.name() == definition.part);
-    first == Some(index) || is_angle || (is_place && ["body", "hands"].contains(&definition.part))
+    first == Some(index) || is_angle || (is_position && ["body", "hands"].contains(&definition.part))
 }
 
-fn named(table: &Table, index: usize) -> String {
+fn row_label(table: &Table, index: usize) -> String {
     let definition = &table.definitions[index];
     let sign = match definition.better {
         Better::Higher => "more",
@@ -102,7 +102,7 @@ fn named(table: &Table, index: usize) -> String {
     format!("{sign}  {}{unit}", labels::name(definition))
 }
 
-/// Head in two lines and a cell a metric; the prediction's cells have intervals.
+/// Column head in two lines, followed by one cell per metric; the cells of predictions have intervals.
 fn column(table: &Table, row: &PredictorRow, shown: &[usize]) -> Vec<String> {
     let cell = |index: &usize| {
         let (definition, estimate) = (&table.definitions[*index], &row.values[*index]);

@@ -1,10 +1,10 @@
-//! Conclusions from a table: whether the prediction is better than no motion, and whether it follows the sound. Several
-//! metrics vote, tested together on their paired differences by sign flips of blocks, since one alone is misleading (a constant pose has
-//! many correct keypoints).
+//! Conclusions from a table: whether the prediction is better than a constant pose, and whether it depends on the
+//! audio. Several metrics vote, since a single one can mislead (a constant pose has many correct keypoints). Their
+//! paired differences are tested together by sign flips of blocks.
 
 use super::labels;
 use crate::evaluate::baseline::baselines::PredictorKind;
-use crate::evaluate::table::sign_flips::{FEWEST_BLOCKS, TestedDifference};
+use crate::evaluate::table::sign_flips::{MIN_BLOCKS, TestedDifference};
 use crate::evaluate::table::table::{PredictorRow, Table};
 use crate::metrics::catalogue::Better;
 use orator_base::math::estimate::Estimate;
@@ -43,13 +43,13 @@ pub struct Vote {
     /// Predictor of the comparison.
     pub against: PredictorKind,
     pub answer: Answer,
-    /// Gain in the metric's unit with the interval of all votes together; below 0: worse.
+    /// Gain in the unit of the metric with its simultaneous interval over all votes; below 0: worse.
     pub gain: Estimate,
-    /// p value among all votes of the verdict.
+    /// p value, adjusted for all votes of the verdict.
     pub p: f64,
 }
 
-/// Question with its conclusion.
+/// Answer to a question with the votes behind it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Verdict {
     /// One of `yes`, `no`, `in part`, `undecided`.
@@ -63,36 +63,36 @@ pub struct Verdict {
 /// Compares the prediction with the better of the constant poses.
 pub fn better_than_nothing(table: &Table, own: &PredictorRow) -> Verdict {
     let question = "Is it better than doing nothing?";
-    let asked = [Aspect::Position, Aspect::Poses, Aspect::Movement];
-    let votes = votes(table, own, &asked, |index| better_constant_pose(table, index));
-    if let Some(why) = hindrance(table, &votes) {
+    let aspects = [Aspect::Position, Aspect::Poses, Aspect::Movement];
+    let votes = votes(table, own, &aspects, |index| better_constant_pose(table, index));
+    if let Some(why) = inconclusive_because(table, &votes) {
         return undecided(question, &why);
     }
     let of = |aspect: Aspect| votes.iter().filter(move |vote| vote.aspect == aspect);
     let others = || votes.iter().filter(|vote| vote.aspect != Aspect::Position);
-    let rest = match summed(others()) {
-        // A constant pose that fits better wins by its poses, and has no movement.
-        Answer::Yes if of(Aspect::Movement).next().is_some() && summed(of(Aspect::Movement)) != Answer::Yes => {
+    let rest = match combined(others()) {
+        // A constant pose may fit better in its poses, but it has no movement.
+        Answer::Yes if of(Aspect::Movement).next().is_some() && combined(of(Aspect::Movement)) != Answer::Yes => {
             Answer::Undecided
         }
         rest => rest,
     };
-    // `None`: the convention has no metric of it.
-    let place = of(Aspect::Position).next().map(|_| summed(of(Aspect::Position)));
+    // `None`: the convention has no metric of this aspect.
+    let position = of(Aspect::Position).next().map(|_| combined(of(Aspect::Position)));
     let rest = others().next().map(|_| rest);
-    let position = match place {
+    let position_text = match position {
         Some(Answer::Yes) => "it is nearer to where the speaker is than a pose that never moves",
         Some(Answer::No) => "a pose that never moves is nearer to where the speaker is",
         Some(Answer::Undecided) => "it is not shown to be nearer to where the speaker is than a pose that never moves",
         None => "no metric of this convention compares positions with a pose that never moves",
     };
-    let motion = match rest {
+    let motion_text = match rest {
         Some(Answer::Yes) => "its poses and movements are more like the speaker's",
         Some(Answer::No) => "its poses or movements are less like the speaker's",
         Some(Answer::Undecided) => "its poses and movements are not shown to be more like the speaker's",
         None => "no metric of this convention compares poses and movements",
     };
-    let answers = [place, rest];
+    let answers = [position, rest];
     let word = match answers.iter().filter(|answer| **answer == Some(Answer::Yes)).count() {
         2 => "yes",
         1 => "in part",
@@ -102,7 +102,11 @@ pub fn better_than_nothing(table: &Table, own: &PredictorRow) -> Verdict {
     let oracle = table.row(PredictorKind::MeanPose).is_some_and(|row| row.description.contains("oracle"));
     let oracle =
         if oracle { " (The pose is taken from the truth itself, which no predictor knows: a hard rival.)" } else { "" };
-    Verdict { word, sentence: format!("{question} {}: {position}; {motion}.{oracle}", capital(word)), votes }
+    Verdict {
+        word,
+        sentence: format!("{question} {}: {position_text}; {motion_text}.{oracle}", capitalised(word)),
+        votes,
+    }
 }
 
 /// Better of the constant poses in a metric.
@@ -113,10 +117,11 @@ fn better_constant_pose(table: &Table, index: usize) -> Option<&PredictorRow> {
     constant_poses.reduce(|a, b| if better(a, b) { a } else { b })
 }
 
-/// Comparison of the prediction with the better of the constant poses in one metric alone, whatever its aspect.
-pub fn against_nothing(table: &Table, own: &PredictorRow, index: usize) -> Option<Answer> {
+/// Comparison of the prediction with the better of the constant poses in a single metric of any aspect; `None` without
+/// a finite difference or with too few blocks.
+pub fn against_constant_pose(table: &Table, own: &PredictorRow, index: usize) -> Option<Answer> {
     let tested = table.tested_gains(own, &[(index, better_constant_pose(table, index)?)]).into_iter().next()?;
-    (tested.mean.value.is_finite() && table.n_blocks >= FEWEST_BLOCKS).then(|| answer(&tested))
+    (tested.mean.value.is_finite() && table.n_blocks >= MIN_BLOCKS).then(|| answer(&tested))
 }
 
 fn answer(tested: &TestedDifference) -> Answer {
@@ -127,19 +132,19 @@ fn answer(tested: &TestedDifference) -> Answer {
     }
 }
 
-/// Compares the prediction with a mismatched one. Its own shifted prediction is preferred where there is one, since
-/// another clip's motion also has another posture.
-pub fn hears(table: &Table, own: &PredictorRow) -> Verdict {
+/// Compares the prediction with a mismatched one: its own shifted prediction if there is one, since the motion of
+/// another clip also differs in posture.
+pub fn depends_on_audio(table: &Table, own: &PredictorRow) -> Verdict {
     let question = "Does it hear?";
     let of_own =
         |kind: PredictorKind| table.rows.iter().find(|row| row.kind == kind && row.checkpoint == own.checkpoint);
     let other = of_own(PredictorKind::LatePrediction).or_else(|| of_own(PredictorKind::MismatchedPrediction));
     let Some(other) = other else { return undecided(question, "there is nothing to hold it against") };
     let votes = votes(table, own, &[Aspect::Position, Aspect::Beat], |_| Some(other));
-    if let Some(why) = hindrance(table, &votes) {
+    if let Some(why) = inconclusive_because(table, &votes) {
         return undecided(question, &why);
     }
-    let (word, description) = match summed(votes.iter()) {
+    let (word, description) = match combined(votes.iter()) {
         Answer::Yes => ("yes", "its motion fits its own sound better than a motion made for another sound or moment"),
         Answer::No => ("no", "a motion made for another sound or moment fits better"),
         Answer::Undecided if votes.iter().any(|vote| vote.answer == Answer::Yes) => {
@@ -150,16 +155,16 @@ pub fn hears(table: &Table, own: &PredictorRow) -> Verdict {
             "its motion is not shown to fit its own sound better than a motion made for another sound or moment",
         ),
     };
-    Verdict { word, sentence: format!("{question} {}: {description}.", capital(word)), votes }
+    Verdict { word, sentence: format!("{question} {}: {description}.", capitalised(word)), votes }
 }
 
 fn undecided(question: &str, why: &str) -> Verdict {
     Verdict { word: "undecided", sentence: format!("{question} Undecided: {why}."), votes: Vec::new() }
 }
 
-/// Why these votes say nothing.
-fn hindrance(table: &Table, votes: &[Vote]) -> Option<String> {
-    if table.learnt {
+/// Reason why no conclusion can be drawn from these votes, if any.
+fn inconclusive_because(table: &Table, votes: &[Vote]) -> Option<String> {
+    if table.trained_on {
         return Some("the speaker was trained on these very clips; use another split".to_owned());
     }
     if votes.is_empty() {
@@ -167,27 +172,27 @@ fn hindrance(table: &Table, votes: &[Vote]) -> Option<String> {
     }
     let (n_blocks, secs) = (table.n_blocks, table.block_length.secs);
     let (blocks, are) = if n_blocks == 1 { ("block", "is") } else { ("blocks", "are") };
-    (n_blocks < FEWEST_BLOCKS).then(|| {
-        let least = FEWEST_BLOCKS;
+    (n_blocks < MIN_BLOCKS).then(|| {
+        let least = MIN_BLOCKS;
         format!(
             "{n_blocks} {blocks} of about {secs:.1} s {are} too few to say (at least {least}); hold out more motion"
         )
     })
 }
 
-/// Votes of the metrics of these aspects, each against its own row.
+/// Votes of the metrics of these aspects; `against` gives the row that each metric is compared with.
 fn votes<'a>(
     table: &'a Table,
     own: &PredictorRow,
     aspects: &[Aspect],
     against: impl Fn(usize) -> Option<&'a PredictorRow>,
 ) -> Vec<Vote> {
-    let asked = |index: usize| {
+    let considered = |index: usize| {
         let aspect = aspect(table, index).filter(|aspect| aspects.contains(aspect))?;
         let other = against(index)?;
         table.gain(own, other, index).is_finite().then_some((aspect, (index, other)))
     };
-    let (aspects, compared): (Vec<_>, Vec<_>) = (0..table.definitions.len()).filter_map(asked).unzip();
+    let (aspects, compared): (Vec<_>, Vec<_>) = (0..table.definitions.len()).filter_map(considered).unzip();
     let tested = table.tested_gains(own, &compared);
     let vote = |((aspect, (index, other)), tested): ((Aspect, (usize, &PredictorRow)), TestedDifference)| Vote {
         metric: labels::name(&table.definitions[index]),
@@ -200,17 +205,17 @@ fn votes<'a>(
     aspects.into_iter().zip(compared).zip(tested).map(vote).collect()
 }
 
-/// Aspect of a metric; `None` for metrics that repeat another.
+/// Aspect of a metric; `None` for metrics that are redundant or do not vote.
 fn aspect(table: &Table, index: usize) -> Option<Aspect> {
     let definition = &table.definitions[index];
     let is_first = |start: &str| table.definitions.iter().position(|d| d.name.starts_with(start)) == Some(index);
     let starts = |start: &str| definition.name.starts_with(start);
-    // Whole body, or the first part that has a value.
+    // The metric for the whole body, or else for the first part that has a value.
     let has_name = |i: &usize| table.definitions[*i].name == definition.name && table.is_shown(*i);
     let is_whole = (0..table.definitions.len()).find(has_name) == Some(index);
     match definition.better {
         Better::Neither => None,
-        // First of several shares, planes and parts.
+        // Only the first of several thresholds, planes and parts.
         _ if starts("pck") => is_first("pck").then_some(Aspect::Position),
         _ if starts("maje") => Some(Aspect::Position),
         _ if starts("mpjpe") => is_first("mpjpe").then_some(Aspect::Position),
@@ -222,8 +227,8 @@ fn aspect(table: &Table, index: usize) -> Option<Aspect> {
     }
 }
 
-/// Yes or no where some votes say so and none the contrary.
-fn summed<'a>(votes: impl Iterator<Item = &'a Vote>) -> Answer {
+/// Combined answer: yes or no if some votes agree and none contradicts.
+fn combined<'a>(votes: impl Iterator<Item = &'a Vote>) -> Answer {
     let (mut yes, mut no) = (false, false);
     for vote in votes {
         yes |= vote.answer == Answer::Yes;
@@ -237,7 +242,7 @@ fn summed<'a>(votes: impl Iterator<Item = &'a Vote>) -> Answer {
 }
 
 impl Verdict {
-    /// Sentence with the votes: `... (better: a, b; worse: c; not told apart: d)`.
+    /// Sentence, followed by a line for each kind of vote, such as `better: a; b`.
     pub fn text(&self) -> String {
         let of = |answer: Answer| {
             let names: Vec<&str> =
@@ -250,7 +255,7 @@ impl Verdict {
     }
 }
 
-fn capital(word: &str) -> String {
+fn capitalised(word: &str) -> String {
     let mut letters = word.chars();
     letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
 }

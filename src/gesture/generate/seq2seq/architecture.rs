@@ -1,4 +1,4 @@
-//! The networks by name: sizes for a rate of motion, the network itself, and the words that each reads of a segment.
+//! The network architectures: sizes for a frame rate, construction, and the words and audio features of a segment.
 
 use super::vocabulary::{NumberedWord, PADDING};
 use candle_core::{Device, Result, Tensor};
@@ -13,25 +13,27 @@ use orator_nn::seq2seq::config::Config;
 use orator_nn::seq2seq::networks::{ContextSeq2Seq, WordsSeq2Seq};
 use orator_nn::seq2seq::predict::GesturePredictor;
 
-/// Seconds that are predicted at once, seconds of poses before them, and seconds of audio on either side of a pose.
+/// Seconds of motion predicted per segment.
 const PREDICTED_SECS: f64 = 1.0;
+/// Seconds of previous poses that a segment starts from.
 const PREVIOUS_SECS: f64 = 0.5;
-const HEARD_SECS: f64 = 1.5;
-/// Seconds on either side of a pose whose words `contextual` reads.
+/// Seconds of audio context on either side of a pose.
+const AUDIO_CONTEXT_SECS: f64 = 1.5;
+/// Word context of `contextual` on either side of a pose, seconds.
 const AROUND_POSE_SECS: f64 = 1.5;
-/// Seconds on either side of a segment whose words `words` reads in the authors' code.
+/// Word context of `words` on either side of a segment in the authors' code, seconds.
 pub const AROUND_SEGMENT_SECS: f64 = 2.0;
-/// Rounding of times, seconds.
+/// Tolerance of word times against rounding errors, seconds.
 const ROUNDING_SECS: f64 = 1e-6;
 
-/// Sizes at a rate, all others as published: `pose` numbers of a pose, `vocabulary` words of `word` numbers, states of
-/// `hidden`.
+/// Network configuration for a frame rate, with published values for everything else: `pose` features per pose,
+/// `vocabulary` word indices with embeddings of dimension `word`, and hidden states of dimension `hidden`.
 pub fn network_config(fps: FrameRate, pose: usize, vocabulary: usize, [hidden, word]: [usize; 2]) -> Config {
     let frames = |secs: f64| ((secs * fps.per_sec()).round() as usize).max(2);
     Config {
         pose,
         audio: N_CEPSTRA,
-        context: 2 * frames(HEARD_SECS) + 1,
+        context: 2 * frames(AUDIO_CONTEXT_SECS) + 1,
         previous: frames(PREVIOUS_SECS),
         predicted: frames(PREDICTED_SECS),
         hidden,
@@ -41,7 +43,7 @@ pub fn network_config(fps: FrameRate, pose: usize, vocabulary: usize, [hidden, w
     }
 }
 
-/// A network whose tensors are added to `params`.
+/// Builds a network, and adds its tensors to `params`.
 pub fn network(of: Architecture, params: &mut Params, config: &Config) -> Result<Box<dyn GesturePredictor>> {
     Ok(match of {
         Architecture::Contextual => Box::new(ContextSeq2Seq::new(params, config)?),
@@ -51,25 +53,26 @@ pub fn network(of: Architecture, params: &mut Params, config: &Config) -> Result
     })
 }
 
-/// Name of the encoder that holds the table of word vectors; `None`: no words are read.
+/// Name of the encoder with the word embedding table; `None` if the network does not read words.
 pub fn word_encoder(of: Architecture) -> Option<&'static str> {
     matches!(of, Architecture::Contextual | Architecture::Words).then_some("word_encoder")
 }
 
-/// Words of a segment whose first predicted pose is `first`: one row a pose, one row of those so many seconds `around`
-/// the segment, or no row. `said` in the order of beginnings.
+/// Word indices that the network reads for a segment whose first predicted pose is `first`: one row per pose
+/// (`contextual`), one row of the words up to `around` seconds around the segment (`words`), or no row. `spoken_words`
+/// are sorted by start time.
 pub fn words(
     of: Architecture,
-    said: &[NumberedWord],
+    spoken_words: &[NumberedWord],
     [first, predicted]: [usize; 2],
     fps: FrameRate,
     around: f64,
 ) -> Vec<Vec<u32>> {
     let within = |start: f64, end: f64| {
         let (start, end) = (start - ROUNDING_SECS, end + ROUNDING_SECS);
-        let first = said.partition_point(|word| word.start_secs < start);
-        let begun = said[first..].iter().take_while(|word| word.start_secs <= end);
-        begun.filter(|word| word.end_secs <= end).map(|word| word.number).collect::<Vec<u32>>()
+        let first = spoken_words.partition_point(|word| word.start_secs < start);
+        let started = spoken_words[first..].iter().take_while(|word| word.start_secs <= end);
+        started.filter(|word| word.end_secs <= end).map(|word| word.number).collect::<Vec<u32>>()
     };
     match of {
         Architecture::Contextual => (first..first + predicted)
@@ -83,27 +86,27 @@ pub fn words(
     }
 }
 
-/// Words of segments side by side, padded at their ends to the longest row and to one word at least: [B, predicted, W]
-/// or [B, W].
+/// Batch of the words of segments, padded at the end to the longest row and at least one word: [B, predicted, W]
+/// (`contextual`) or [B, W] (`words`); `None` for networks without words.
 pub fn words_tensor(of: Architecture, segments: &[Vec<Vec<u32>>]) -> Result<Option<Tensor>> {
     let rows = || segments.iter().flatten();
     let n_words = rows().map(Vec::len).max().unwrap_or(0).max(1);
     let padded = rows().flat_map(|row| row.iter().copied().chain(std::iter::repeat(PADDING)).take(n_words));
-    let numbers: Vec<u32> = padded.collect();
+    let indices: Vec<u32> = padded.collect();
     let n_rows = segments.first().map_or(0, Vec::len);
     match of {
         Architecture::Contextual => {
-            Tensor::from_vec(numbers, (segments.len(), n_rows, n_words), &Device::Cpu).map(Some)
+            Tensor::from_vec(indices, (segments.len(), n_rows, n_words), &Device::Cpu).map(Some)
         }
-        Architecture::Words => Tensor::from_vec(numbers, (segments.len(), n_words), &Device::Cpu).map(Some),
+        Architecture::Words => Tensor::from_vec(indices, (segments.len(), n_words), &Device::Cpu).map(Some),
         Architecture::Adversarial | Architecture::Autoencoder => Ok(None),
     }
 }
 
-/// Lowest and highest rate of a sound, samples a second.
+/// Supported sample rates, Hz.
 pub const RATES: std::ops::RangeInclusive<u32> = 8_000..=48_000;
 
-/// Cepstra of `n_frames` poses of a sound, filled up with silence to `n_padded`, and half a context of silence on either
+/// Cepstra of a sound for `n_frames` poses, padded with silence to `n_padded` frames and by half a context on either
 /// side: [n_padded + context - 1, 26].
 pub fn audio_features(sound: &Sound, fps: FrameRate, n_frames: usize, n_padded: usize, context: usize) -> Array2<f32> {
     let silence = mfcc::silence(sound.rate);
@@ -117,7 +120,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sizes_are_the_published_ones_at_20_frames_a_second() {
+    fn sizes_at_20_fps_are_the_published_ones() {
         let config = network_config(FrameRate::new(20, 1), 45, 2, [150, 100]);
         assert_eq!(config, Config::default());
         let config = network_config(FrameRate::new(15, 1), 144, 2, [150, 100]);
@@ -127,16 +130,16 @@ mod tests {
     #[test]
     fn words_around_a_pose_and_around_a_segment() -> Result<()> {
         let word = |number, start_secs: f64| NumberedWord { number, start_secs, end_secs: start_secs + 0.5 };
-        let said = [word(2, 0.0), word(3, 2.0), word(4, 4.0), word(5, 7.0)];
+        let spoken_words = [word(2, 0.0), word(3, 2.0), word(4, 4.0), word(5, 7.0)];
         let fps = FrameRate::new(20, 1);
-        // the segment from 3 s to 4 s; the words from 1 s to 6 s
-        let of_words = words(Architecture::Words, &said, [60, 20], fps, AROUND_SEGMENT_SECS);
+        // The segment is at 3 s to 4 s, its word context at 1 s to 6 s.
+        let of_words = words(Architecture::Words, &spoken_words, [60, 20], fps, AROUND_SEGMENT_SECS);
         assert_eq!(of_words, [[3, 4]]);
-        // from 2.6 s to 4.4 s no word is whole, from 1.9 s to 5.1 s two are
-        assert_eq!(words(Architecture::Words, &said, [60, 20], fps, 0.4), [Vec::<u32>::new()]);
-        assert_eq!(words(Architecture::Words, &said, [60, 20], fps, 1.1), [[3, 4]]);
-        // the pose at 3 s reads from 1.5 s to 4.5 s, the one at 3.55 s from 2.05 s
-        let around = words(Architecture::Contextual, &said, [60, 20], fps, AROUND_SEGMENT_SECS);
+        // No complete word lies between 2.6 s and 4.4 s, two lie between 1.9 s and 5.1 s.
+        assert_eq!(words(Architecture::Words, &spoken_words, [60, 20], fps, 0.4), [Vec::<u32>::new()]);
+        assert_eq!(words(Architecture::Words, &spoken_words, [60, 20], fps, 1.1), [[3, 4]]);
+        // The word context of the pose at 3 s is 1.5 s to 4.5 s, that of the pose at 3.55 s starts at 2.05 s.
+        let around = words(Architecture::Contextual, &spoken_words, [60, 20], fps, AROUND_SEGMENT_SECS);
         assert_eq!((around.len(), &around[0][..], &around[11][..]), (20, &[3, 4][..], &[4][..]));
         let tensor = words_tensor(Architecture::Words, &[of_words, vec![Vec::new()]])?;
         assert_eq!(tensor.map(|t| t.to_vec2::<u32>()).transpose()?, Some(vec![vec![3, 4], vec![0, 0]]));

@@ -1,7 +1,7 @@
-//! What a checkpoint of a sequence-to-sequence network says beside its tensors, and the network it describes.
+//! Metadata in the checkpoint of a sequence-to-sequence network, and loading of the network it describes.
 
 use super::architecture::{self, AROUND_SEGMENT_SECS, Architecture, RATES, network_config};
-use super::poses::PoseNumbers;
+use super::poses::PoseFormat;
 use super::vocabulary::{NumberedWord, Vocabulary};
 use anyhow::{Context, Result, ensure};
 use orator_base::types::time::FrameRate;
@@ -12,52 +12,59 @@ use orator_nn::weights::Contents;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// Tensors of the network in a checkpoint begin with this.
+/// Prefix of the network's tensors in a checkpoint.
 pub const NETWORK: &str = "network.";
-/// Name and version of the layout; another is refused.
+/// Name and version of the checkpoint layout; any other is rejected.
 const KIND: &str = "orator sequence 1";
-/// Most numbers of a state or a word that are believed.
-const MOST_WIDTH: usize = 4096;
+/// Largest accepted dimension of hidden states and word embeddings.
+const MAX_WIDTH: usize = 4096;
 
-/// Everything beside the tensors that generation needs. Stored under `speaker` in a checkpoint's metadata.
+/// Everything that generation needs besides the tensors. Stored under `speaker` in the metadata of a checkpoint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SequenceMetadata {
     pub kind: String,
     /// Name of the speaker, or of the folder of captures.
     pub name: String,
     pub fps: FrameRate,
-    /// Samples a second of the sound that is heard.
+    /// Sample rate of the input audio, Hz.
     pub rate: u32,
     pub architecture: Architecture,
     pub network: Config,
-    pub poses: PoseNumbers,
+    pub poses: PoseFormat,
     pub vocabulary: Vocabulary,
-    /// Seconds on either side of a segment whose words `words` reads.
+    /// Word context of the network `words` on either side of a segment, seconds.
     #[serde(default = "around_segment_secs")]
     pub words_around_secs: f64,
-    /// Hash of the data it learnt from.
+    /// Hash of the training data.
     pub dataset: String,
 }
 
 impl SequenceMetadata {
-    /// Name of the current layout.
+    /// Name of the current checkpoint layout.
     pub fn kind() -> String {
         KIND.to_owned()
     }
 
-    /// Words that the network reads of a segment whose first predicted pose is `first`, of those in order of beginnings.
-    pub fn words_of_segment(&self, said: &[NumberedWord], first: usize) -> Vec<Vec<u32>> {
-        architecture::words(self.architecture, said, [first, self.network.predicted], self.fps, self.words_around_secs)
+    /// Word indices that the network reads for a segment whose first predicted pose is `first`; `spoken_words` are
+    /// sorted by start time.
+    pub fn words_of_segment(&self, spoken_words: &[NumberedWord], first: usize) -> Vec<Vec<u32>> {
+        architecture::words(
+            self.architecture,
+            spoken_words,
+            [first, self.network.predicted],
+            self.fps,
+            self.words_around_secs,
+        )
     }
 
-    /// Errors unless the facts fit each other and this program.
+    /// Fails unless the metadata is consistent and supported by this program.
     fn check(&self) -> Result<()> {
         let (fps, network) = (self.fps, &self.network);
         ensure!(fps.is_plausible(), "it moves at {fps}, expected 1 to 1000 frames a second");
         ensure!(RATES.contains(&self.rate), "it hears sound at {} Hz, expected {RATES:?}", self.rate);
         ensure!(
-            (1..=MOST_WIDTH).contains(&network.hidden) && (1..=MOST_WIDTH).contains(&network.word),
-            "its states have {} numbers and its words {}, expected 1 to {MOST_WIDTH}",
+            (1..=MAX_WIDTH).contains(&network.hidden) && (1..=MAX_WIDTH).contains(&network.word),
+            "its states have {} numbers and its words {}, expected 1 to {MAX_WIDTH}",
             network.hidden,
             network.word
         );
@@ -65,7 +72,7 @@ impl SequenceMetadata {
         ensure!((0.0..=60.0).contains(&around), "it reads words {around} s around a segment, expected 0 to 60");
         self.poses.check(fps)?;
         ensure!(self.vocabulary.is_sorted(), "its vocabulary is not sorted");
-        let (pose, words) = (self.poses.n_numbers(), self.vocabulary.n_numbers());
+        let (pose, words) = (self.poses.n_features(), self.vocabulary.n_indices());
         let sizes = network_config(fps, pose, words, [network.hidden, network.word]);
         let expected = Config { hears_context: network.hears_context, ..sizes };
         ensure!(*network == expected, "its network has other sizes than this program's: {network:?}");
@@ -77,18 +84,18 @@ const fn around_segment_secs() -> f64 {
     AROUND_SEGMENT_SECS
 }
 
-/// Whether a file is a checkpoint of a sequence-to-sequence network. Errors: it cannot be read, or is no checkpoint.
+/// Whether a file is a checkpoint of a sequence-to-sequence network. Fails if it cannot be read or is not a checkpoint.
 pub fn is_sequence(path: &Path) -> Result<bool> {
     let facts = orator_formats::checkpoint::facts(path)?;
     Ok(is_sequence_kind(&facts["speaker"]["kind"]))
 }
 
-/// Whether a kind is that of these checkpoints, of whatever version.
+/// Whether a kind denotes checkpoints of sequence-to-sequence networks of any version.
 pub fn is_sequence_kind(kind: &serde_json::Value) -> bool {
     kind.as_str().is_some_and(|kind| kind.starts_with("orator sequence"))
 }
 
-/// Reads a checkpoint of `orator train seq2seq`. Errors name the file and what is wrong with it.
+/// Loads a checkpoint of `orator train seq2seq`. Errors name the file and the cause.
 pub fn load(path: &Path) -> Result<(SequenceMetadata, Box<dyn GesturePredictor>)> {
     let contents = Contents::read(path)?;
     build(&contents).with_context(|| format!("{} is no checkpoint of `orator train seq2seq`", path.display()))

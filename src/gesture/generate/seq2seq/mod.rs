@@ -1,5 +1,5 @@
-//! Speech to motion with FineMotion's sequence-to-sequence networks: what a trained one is (`metadata`), what it reads
-//! (`architecture`, `vocabulary`) and makes (`poses`), and the generation segment after segment (`generator`).
+//! Generation of motion from speech with FineMotion's sequence-to-sequence networks: the checkpoint (`metadata`), the
+//! inputs (`architecture`, `vocabulary`), the output format (`poses`), and generation segment by segment (`generator`).
 
 pub mod architecture;
 pub mod generator;

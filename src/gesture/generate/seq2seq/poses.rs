@@ -1,4 +1,4 @@
-//! What the numbers of a pose mean: exponential maps of captured joints, or directions of the bones of the 49 joints.
+//! Output formats of the sequence networks: exponential maps of captured joints, or bone directions of the 49 joints.
 
 use crate::generate::normalisation::{N_FEATURES, Normalisation};
 use crate::generate::representation::Representation;
@@ -10,30 +10,30 @@ use orator_base::types::time::FrameRate;
 use orator_formats::bvh::exponential_maps::{ExponentialMaps, FPS};
 use serde::{Deserialize, Serialize};
 
-/// Meaning of the numbers of a pose.
+/// Format of the pose features.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum PoseNumbers {
-    /// Of the skeleton of BVH files, 20 frames a second.
+pub enum PoseFormat {
+    /// Exponential maps for the skeleton of BVH files, 20 frames per second.
     Captured(ExponentialMaps),
-    /// Of this program's datasets.
+    /// The 49 joints of this program's datasets.
     Joints {
         normalisation: Normalisation,
-        /// Directions of bones.
+        /// Bone directions.
         representation: Representation,
     },
 }
 
-impl PoseNumbers {
-    /// Numbers of a pose.
-    pub fn n_numbers(&self) -> usize {
+impl PoseFormat {
+    /// Number of features per pose.
+    pub fn n_features(&self) -> usize {
         match self {
             Self::Captured(maps) => maps.n_columns(),
             Self::Joints { .. } => N_FEATURES,
         }
     }
 
-    /// Normalisation of the 49 joints; `None`: poses of a captured skeleton.
+    /// Normalisation of the 49 joints; `None` for a captured skeleton.
     pub fn normalisation(&self) -> Option<&Normalisation> {
         match self {
             Self::Captured(_) => None,
@@ -41,7 +41,7 @@ impl PoseNumbers {
         }
     }
 
-    /// Errors unless the tables fit each other and the rate, as those of a checkpoint may not.
+    /// Fails unless the tables of a checkpoint are consistent with each other and with the frame rate.
     pub fn check(&self, fps: FrameRate) -> Result<()> {
         match self {
             Self::Captured(maps) => {
@@ -56,20 +56,20 @@ impl PoseNumbers {
         }
     }
 
-    /// BVH text in the captured skeleton for numbers [T, C]. Errors for poses of the 49 joints.
-    pub fn bvh(&self, numbers: ArrayView2<f32>) -> Result<String> {
+    /// BVH text in the captured skeleton for features [T, C]. Fails for poses of the 49 joints.
+    pub fn bvh(&self, features: ArrayView2<f32>) -> Result<String> {
         match self {
-            Self::Captured(maps) => Ok(maps.to_bvh(numbers)),
+            Self::Captured(maps) => Ok(maps.to_bvh(features)),
             Self::Joints { .. } => bail!("its poses are those of the 49 joints, of no BVH skeleton"),
         }
     }
 
-    /// Motion of the 49 joints, bones of the speaker's lengths, for numbers [T, C]. Errors for poses of a captured skeleton.
-    pub fn motion(&self, numbers: ArrayView2<f32>, fps: FrameRate) -> Result<Motion> {
+    /// Motion of the 49 joints with the speaker's bone lengths for features [T, C]. Fails for a captured skeleton.
+    pub fn motion(&self, features: ArrayView2<f32>, fps: FrameRate) -> Result<Motion> {
         let Self::Joints { normalisation, representation } = self else {
             bail!("it moves the skeleton of the BVH files it was trained on, which is written as .bvh alone");
         };
-        let mut motion = Motion::from_joints(fps, representation.joints(numbers.t(), normalisation));
+        let mut motion = Motion::from_joints(fps, representation.joints(features.t(), normalisation));
         bones::with_lengths(&mut motion, &normalisation.lengths());
         Ok(motion)
     }

@@ -1,5 +1,5 @@
-//! Beat alignment of AIST++ (Li et al. 2021, `tools/calculate_beat_scores.py` of their repository): how near the beats
-//! of the motion are to those of the sound. A motion with one well placed beat scores 1.
+//! Beat alignment of AIST++ (Li et al. 2021, `tools/calculate_beat_scores.py` in their repository): how near the beats
+//! of the motion are to those of the sound. A motion with a single aligned beat scores 1.
 
 use super::consistency::{minima, nearness};
 use crate::metrics::body_part::BodyPart;
@@ -9,12 +9,12 @@ use orator_base::math::vec3::{self, Vec3};
 use orator_base::types::skeleton::N_JOINTS;
 use serde_json::json;
 
-/// Frame rate of what follows.
+/// Frame rate of the original code, in which `SIGMA_FRAMES` and `ORDER` are given.
 const FPS: f64 = 60.0;
 const SIGMA_FRAMES: f64 = 3.0;
 const ORDER: f64 = 10.0;
 
-/// For data of this frame rate.
+/// Beat alignment for data at `fps`.
 pub(crate) fn metric(fps: f64) -> MetricFamily {
     let order = ((ORDER / FPS * fps).round() as usize).max(1);
     let definition = Definition {
@@ -42,22 +42,23 @@ pub(crate) fn metric(fps: f64) -> MetricFamily {
                 blocks.at(t)[i] += nearness(t as f64, &onsets, sigma) / beats.len() as f64;
             }
         }
-        if (0..n).any(|t| pair.n_broken(t) > 0) {
+        if (0..n).any(|t| pair.n_non_finite(t) > 0) {
             blocks.at(0)[0] = f64::NAN;
         }
-        // every frame has its share of the interval's weight
+        // The weight of the interval is spread evenly over its frames.
         for t in 0..n {
             blocks.at(t)[2] += 1.0 / n as f64;
         }
     })
 }
 
-/// Sum over joints 1-6 of the way since the frame before, 0 in the first; NaN where one is not seen.
+/// Sum of the distances that joints 1-6 moved since the previous frame, 0 in the first frame; NaN where one is not
+/// visible.
 fn envelope(pair: &PairedFrames, poses: &[[Vec3; N_JOINTS]]) -> Vec<f64> {
     let joints = BodyPart::Body.joints();
     let at = |t: usize| match t {
         0 => 0.0,
-        _ if joints.iter().all(|joint| pair.sees(t - 1, 2, *joint)) => {
+        _ if joints.iter().all(|joint| pair.is_visible(t - 1, 2, *joint)) => {
             joints.iter().map(|joint| vec3::norm(vec3::sub(poses[t][*joint], poses[t - 1][*joint]))).sum()
         }
         _ => f64::NAN,

@@ -1,5 +1,5 @@
-//! Beat consistency: whether motion has beats where the sound has onsets. This project's own, and that of the emage
-//! convention (Liu et al. 2024), of which it is a plainer form.
+//! Beat consistency: whether motion has beats at the onsets of the sound. The metric of the emage convention (Liu et
+//! al. 2024), and a simpler one of this project.
 
 use crate::metrics::body_part::BodyPart;
 use crate::metrics::definition::{Better, Definition, MetricFamily};
@@ -8,8 +8,8 @@ use orator_base::math::vec3::{self, Vec3};
 use orator_base::types::skeleton::{L_ELBOW, L_WRIST, N_JOINTS, R_ELBOW, R_WRIST};
 use serde_json::json;
 
-/// Indices of the strict local minima: lower than all of `order` neighbours on either side (fewer at the borders, but never
-/// the first or last), as scipy's `argrelextrema(np.less)`. No number lies below NaN.
+/// Indices of the strict local minima, which are lower than `order` neighbours on either side (fewer at the borders,
+/// but never the first or last), as in scipy's `argrelextrema(np.less)`. No value is lower than NaN.
 pub fn minima(values: &[f64], order: usize) -> Vec<usize> {
     let is_lowest = |i: &usize| {
         let last = values.len() - 1;
@@ -18,15 +18,15 @@ pub fn minima(values: &[f64], order: usize) -> Vec<usize> {
     (0..values.len()).filter(is_lowest).collect()
 }
 
-/// `exp(-d^2 / 2 sigma^2)` with the distance to the nearest of `times`, which are in order; 0 when there are none.
+/// `exp(-d^2 / 2 sigma^2)` with the distance d to the nearest of the sorted `times`; 0 if there are none.
 pub(crate) fn nearness(time: f64, times: &[f64], sigma: f64) -> f64 {
     let after = times.partition_point(|other| *other < time);
-    let beside = times.iter().skip(after.saturating_sub(1)).take(2);
-    let nearest = beside.map(|other| (other - time).abs()).fold(f64::INFINITY, f64::min);
+    let neighbours = times.iter().skip(after.saturating_sub(1)).take(2);
+    let nearest = neighbours.map(|other| (other - time).abs()).fold(f64::INFINITY, f64::min);
     (-nearest * nearest / (2.0 * sigma * sigma)).exp()
 }
 
-/// Speeds by central differences, one-sided at the two ends, m/s; NaN where a frame is missing.
+/// Speeds in m/s by central differences (one-sided at both ends); NaN where a frame is missing.
 fn speeds(track: &[Vec3], fps: f64) -> Vec<f64> {
     let at = |t: usize| {
         let (before, after) = (t.saturating_sub(1), (t + 1).min(track.len() - 1));
@@ -35,21 +35,25 @@ fn speeds(track: &[Vec3], fps: f64) -> Vec<f64> {
     (0..track.len()).map(at).collect()
 }
 
-/// Places of a joint, NaN where it is not seen.
+/// Positions of a joint, NaN where it is not visible.
 fn track(pair: &PairedFrames, poses: &[[Vec3; N_JOINTS]], joint: usize) -> Vec<Vec3> {
-    poses.iter().zip(&pair.seen).map(|(pose, seen)| if seen[joint] { pose[joint] } else { [f64::NAN; 3] }).collect()
+    poses
+        .iter()
+        .zip(&pair.visible)
+        .map(|(pose, visible)| if visible[joint] { pose[joint] } else { [f64::NAN; 3] })
+        .collect()
 }
 
 const OF_REAL: &str = "beat_consistency_of_real";
-/// Joints whose speed has beats.
+/// Joints whose beats are measured.
 const JOINTS: [usize; 4] = [R_ELBOW, R_WRIST, L_ELBOW, L_WRIST];
-/// How near a beat must be to an onset, seconds.
+/// Width of the Gaussian kernel of the time between beat and onset, seconds.
 const SIGMA: f64 = 0.1;
-/// Frames on either side that are faster, of 30 a second.
+/// Number of faster frames on either side of a beat, at `ORDER_FPS`.
 const ORDER: f64 = 7.0;
 const ORDER_FPS: f64 = 30.0;
 
-/// For data of this frame rate.
+/// Beat consistency of this project, for data at `fps`.
 pub(crate) fn metric(fps: f64) -> MetricFamily {
     let order = order(fps);
     let definition = Definition {
@@ -70,10 +74,10 @@ pub(crate) fn metric(fps: f64) -> MetricFamily {
             });
             for &onset in onsets {
                 let t = (onset * pair.fps) as usize;
-                if pair.sees(t, 1, joint) {
+                if pair.is_visible(t, 1, joint) {
                     let sums = blocks.at(t);
-                    let broken = pair.predicted[t][joint].iter().any(|v| !v.is_finite());
-                    sums[0] += if broken { f64::NAN } else { nearness(onset, &predicted, SIGMA) };
+                    let is_non_finite = pair.predicted[t][joint].iter().any(|v| !v.is_finite());
+                    sums[0] += if is_non_finite { f64::NAN } else { nearness(onset, &predicted, SIGMA) };
                     sums[1] += nearness(onset, &ground_truth, SIGMA);
                     sums[2] += 1.0;
                 }
@@ -88,10 +92,10 @@ fn order(fps: f64) -> usize {
 
 const EMAGE_SIGMA: f64 = 0.3;
 const EMAGE_THRESHOLD: f64 = 0.3;
-/// What is left out at both ends, seconds.
+/// Duration that is excluded at both ends, seconds.
 const EMAGE_CUT: f64 = 2.0;
 
-/// Emage's, for data of this frame rate.
+/// Beat consistency of the emage convention, for data at `fps`.
 pub(crate) fn emage(fps: f64) -> MetricFamily {
     let (order, cut) = (order(fps), (EMAGE_CUT * fps).round() as usize);
     let definition = Definition {
@@ -121,22 +125,23 @@ pub(crate) fn emage(fps: f64) -> MetricFamily {
                 continue;
             }
             let mean_speed = real.iter().sum::<f64>() / real.len() as f64;
-            // times of the beats from the cut on
-            let beats = |places: &[Vec3]| -> Vec<f64> {
-                let speeds = speeds(&folded(places), pair.fps);
+            // Times of the beats relative to the cut.
+            let beats = |positions: &[Vec3]| -> Vec<f64> {
+                let speeds = speeds(&abs_deviations(positions), pair.fps);
                 let speeds: Vec<f64> = speeds.iter().map(|speed| speed / mean_speed).collect();
                 let inner = speeds.get(cut..speeds.len().saturating_sub(cut)).unwrap_or_default();
-                // theirs looks the threshold up at the index within the cut, so 2 s early
+                // As in the original code, the threshold is applied at the index within the cut, which is 2 s early.
                 let beats = minima(inner, order).into_iter().filter(|t| speeds[*t] > EMAGE_THRESHOLD);
                 beats.map(|t| t as f64 / pair.fps).collect()
             };
             let (predicted, ground_truth) = (beats(&track(pair, &pair.predicted, joint)), beats(&ground_truth));
-            let broken = (0..pair.n_frames()).any(|t| pair.seen[t][joint] && !pair.predicted[t][joint][0].is_finite());
+            let is_non_finite =
+                (0..pair.n_frames()).any(|t| pair.visible[t][joint] && !pair.predicted[t][joint][0].is_finite());
             let weight = n_inner as f64 / inner.len() as f64;
             for onset in &inner {
                 let sums = blocks.at((onset * pair.fps) as usize);
                 let time = onset - from;
-                sums[0] += if broken { f64::NAN } else { weight * nearness(time, &predicted, EMAGE_SIGMA) };
+                sums[0] += if is_non_finite { f64::NAN } else { weight * nearness(time, &predicted, EMAGE_SIGMA) };
                 sums[1] += weight * nearness(time, &ground_truth, EMAGE_SIGMA);
                 sums[2] += weight;
             }
@@ -144,11 +149,12 @@ pub(crate) fn emage(fps: f64) -> MetricFamily {
     })
 }
 
-/// Distances from the mean by coordinate, which is what L1div leaves in the array that is then searched for beats.
-fn folded(places: &[Vec3]) -> Vec<Vec3> {
-    let seen: Vec<&Vec3> = places.iter().filter(|p| p.iter().all(|v| v.is_finite())).collect();
-    let mean: Vec3 = std::array::from_fn(|k| seen.iter().map(|p| p[k]).sum::<f64>() / seen.len() as f64);
-    places.iter().map(|p| std::array::from_fn(|k| (p[k] - mean[k]).abs())).collect()
+/// Absolute deviations from the mean by coordinate. The original code computes L1div in place, and searches the
+/// modified array for beats.
+fn abs_deviations(positions: &[Vec3]) -> Vec<Vec3> {
+    let visible: Vec<&Vec3> = positions.iter().filter(|p| p.iter().all(|v| v.is_finite())).collect();
+    let mean: Vec3 = std::array::from_fn(|k| visible.iter().map(|p| p[k]).sum::<f64>() / visible.len() as f64);
+    positions.iter().map(|p| std::array::from_fn(|k| (p[k] - mean[k]).abs())).collect()
 }
 
 #[cfg(test)]
@@ -156,7 +162,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn minima_are_those_of_scipy() {
+    fn minima_match_scipy() {
         let golden: serde_json::Value =
             serde_json::from_str(include_str!("../../../../fixtures/reference/metrics_golden.json")).unwrap();
         let values: Vec<f64> = serde_json::from_value(golden["minima"]["values"].clone()).unwrap();
@@ -169,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn a_beat_on_the_onset_counts_one() {
+    fn nearness_is_a_gaussian_of_the_distance() {
         assert_eq!(nearness(1.0, &[1.0, 3.0], 0.1), 1.0);
         assert!((nearness(1.0, &[1.1], 0.1) - (-0.5f64).exp()).abs() < 1e-9);
         assert_eq!(nearness(1.0, &[], 0.1), 0.0);

@@ -1,4 +1,4 @@
-//! Metrics of beats: how well those of the motion fall on those of the sound.
+//! Beat metrics: alignment of the beats of the motion with those of the sound.
 
 pub mod aist;
 pub mod angles;

@@ -1,8 +1,8 @@
-//! Frechet distance between two sets of single poses, each taken for a normal distribution (Dowson and Landau 1982;
-//! on raw poses as in the GENEA evaluation, without a trained network). It compares which poses occur and how they
-//! vary together, not their order. With few poses it is too large, and not comparable between sets of other sizes.
-//! Training validates on 138 numbers a pose, without the hand roots; `frechet_pose` of the catalogue
-//! (`frechet_metrics`) has all 144. The two are not comparable.
+//! Frechet distance between two sets of poses, each modelled as a normal distribution (Dowson and Landau 1982; on raw
+//! poses as in the GENEA evaluation, without a trained network). It compares the poses and their covariance, not their
+//! order. Few poses bias it upwards, so that sets of different sizes are not comparable. The validation of training
+//! uses 138 coordinates per pose, without the hand roots, and `frechet_pose` of the catalogue (`frechet_metrics`) all
+//! 144; the two are not comparable.
 
 use ndarray::{Array1, Array2, ArrayView2, ArrayView3, Axis};
 use orator_base::math::eigen;
@@ -11,31 +11,31 @@ use std::ops::AddAssign;
 
 const CM: f64 = 100.0;
 
-/// The normal distribution of a set of rows.
+/// Normal distribution fitted to a set of rows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GaussianFit {
     /// Number of rows.
     pub n: usize,
     pub mean: Array1<f64>,
-    /// Sum over the rows of the outer products of what is left after subtracting the mean.
+    /// Scatter matrix: sum over the rows of the outer products of their deviations from the mean.
     scatter: Array2<f64>,
 }
 
-/// The joints to compare poses by: those that are true in at least half of the frames of all `masks` [T, 49] together, but
-/// the neck and the hand roots. A dataset that has no finger tips is compared without them.
+/// Joints by which poses are compared: those that are visible in at least half of the frames of all `masks` [T, 49],
+/// except the neck and the hand roots. A dataset without finger tips is compared without them.
 pub fn joints<'a>(masks: impl IntoIterator<Item = ArrayView2<'a, bool>>) -> Vec<usize> {
     let (mut n_seen, mut n_frames) = ([0; N_JOINTS], 0);
     for mask in masks {
         n_frames += mask.nrows();
         for frame in mask.outer_iter() {
-            n_seen.iter_mut().zip(frame).for_each(|(n, seen)| *n += usize::from(*seen));
+            n_seen.iter_mut().zip(frame).for_each(|(n, visible)| *n += usize::from(*visible));
         }
     }
     (NECK + 1..N_JOINTS).filter(|joint| !is_duplicate(*joint) && n_seen[*joint] * 2 >= n_frames.max(1)).collect()
 }
 
-/// The poses of `motion` [T, 49, 3], metres, in which `mask` [T, 49] is true for all of `joints`: rows of x, y, z of each,
-/// centimetres. For a predicted motion the mask is that of the ground truth beside it.
+/// Rows of the coordinates of `joints` in centimetres, for the frames of `motion` [T, 49, 3] (metres) in which `mask`
+/// [T, 49] is true for all of them. The mask of a prediction is that of its ground truth.
 pub fn poses(motion: ArrayView3<f32>, mask: ArrayView2<bool>, joints: &[usize]) -> Array2<f64> {
     let is_whole = |t: &usize| !joints.is_empty() && joints.iter().all(|joint| mask[[*t, *joint]]);
     let whole: Vec<usize> = (0..mask.nrows()).filter(is_whole).collect();
@@ -45,11 +45,11 @@ pub fn poses(motion: ArrayView3<f32>, mask: ArrayView2<bool>, joints: &[usize]) 
 }
 
 impl GaussianFit {
-    /// Of rows [n, d].
+    /// Fits a normal distribution to rows [n, d].
     pub fn fit(rows: ArrayView2<f64>) -> Self {
         let mean = rows.mean_axis(Axis(0)).unwrap_or_else(|| Array1::zeros(rows.ncols()));
-        let rest = &rows - &mean;
-        Self { n: rows.nrows(), scatter: rest.t().dot(&rest), mean }
+        let deviations = &rows - &mean;
+        Self { n: rows.nrows(), scatter: deviations.t().dot(&deviations), mean }
     }
 
     /// Unbiased covariance [d, d]; zero for fewer than two rows.
@@ -59,7 +59,7 @@ impl GaussianFit {
 }
 
 impl AddAssign<&Self> for GaussianFit {
-    /// Both sets together (Chan, Golub, LeVeque 1979). Both must have rows of the same length.
+    /// Fit of the union of both sets (Chan, Golub, LeVeque 1979), whose rows must have the same length.
     fn add_assign(&mut self, other: &Self) {
         if self.n == 0 || other.n == 0 {
             if other.n > 0 {
@@ -69,17 +69,17 @@ impl AddAssign<&Self> for GaussianFit {
         }
         let n = (self.n + other.n) as f64;
         let (own, others) = (self.n as f64 / n, other.n as f64 / n);
-        let apart = &other.mean - &self.mean;
+        let difference = &other.mean - &self.mean;
         self.scatter += &other.scatter;
-        let column = apart.view().insert_axis(Axis(1));
+        let column = difference.view().insert_axis(Axis(1));
         self.scatter.scaled_add(own * others * n, &column.dot(&column.t()));
-        self.mean.scaled_add(others, &apart);
+        self.mean.scaled_add(others, &difference);
         self.n += other.n;
     }
 }
 
-/// `|m1 - m2|^2 + tr(C1 + C2 - 2 sqrt(C1 C2))`, at least 0; for poses in square centimetres. NaN where a number is, or
-/// where either set is empty.
+/// Frechet distance `|m1 - m2|^2 + tr(C1 + C2 - 2 sqrt(C1 C2))`, at least 0; for poses in square centimetres. NaN if a
+/// value is NaN, or a set is empty.
 pub fn frechet(a: &GaussianFit, b: &GaussianFit) -> f64 {
     if a.n == 0 || b.n == 0 {
         return f64::NAN;
@@ -87,16 +87,17 @@ pub fn frechet(a: &GaussianFit, b: &GaussianFit) -> f64 {
     between((&a.mean, &a.covariance()), (&b.mean, &b.covariance()))
 }
 
-/// Frechet distance of two means and covariances. The trace of the root is the sum of the roots of the eigenvalues of `fᵀ C2 f` with
-/// `C1 = f fᵀ`, which are those of `C1 C2`: no matrix is inverted, and fewer rows than numbers are no hindrance.
+/// Frechet distance of two means and covariances. The trace of the matrix root is the sum of the roots of the
+/// eigenvalues of `fᵀ C2 f` with `C1 = f fᵀ`, which are those of `C1 C2`. No matrix is inverted, so singular
+/// covariances (fewer rows than dimensions) are supported.
 pub fn between(a: (&Array1<f64>, &Array2<f64>), b: (&Array1<f64>, &Array2<f64>)) -> f64 {
     let ((mean_a, of_a), (mean_b, of_b)) = (a, b);
-    let apart = mean_a - mean_b;
+    let difference = mean_a - mean_b;
     let factor = eigen::factor(of_a);
     let eigenvalues = eigen::eigenvalues(factor.t().dot(of_b).dot(&factor));
-    // what is below 0 is rounding
+    // Negative eigenvalues are rounding errors.
     let root: f64 = eigenvalues.iter().map(|value| value.max(0.0).sqrt()).sum();
-    let distance = apart.dot(&apart) + of_a.diag().sum() + of_b.diag().sum() - 2.0 * root;
+    let distance = difference.dot(&difference) + of_a.diag().sum() + of_b.diag().sum() - 2.0 * root;
     if distance.is_nan() { distance } else { distance.max(0.0) }
 }
 
@@ -114,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn the_distance_is_that_of_scipy() {
+    fn the_distance_matches_scipy() {
         let golden: serde_json::Value =
             serde_json::from_str(include_str!("../../../../fixtures/reference/metrics_golden.json")).unwrap();
         for case in golden["frechet"].as_array().unwrap() {
@@ -129,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn a_set_is_nowhere_from_itself_and_parts_make_the_whole() {
+    fn a_set_has_no_distance_from_itself_and_parts_add_up() {
         let all = rows(200, 30, 1);
         let whole = GaussianFit::fit(all.view());
         assert!(frechet(&whole, &whole) < 1e-5);
@@ -145,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pose_counts_when_all_of_it_was_seen() {
+    fn only_completely_visible_poses_count() {
         let joints = Array3::from_shape_fn((3, N_JOINTS, 3), |(t, joint, k)| (100 * t + joint + k) as f32);
         let mut mask = Array2::from_elem((3, N_JOINTS), true);
         mask[[0, 48]] = false;

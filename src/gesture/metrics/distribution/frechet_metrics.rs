@@ -1,5 +1,5 @@
-//! Frechet distances of the catalogue: the normal distributions of predicted and of ground-truth rows as packed moments. A row is a
-//! single pose, or a window as numbers of a fixed space.
+//! Frechet distances of the catalogue, computed from packed moments of predicted and of ground-truth rows. A row is a
+//! single pose, or a window in a fixed space.
 
 use super::frechet::between;
 use super::moments;
@@ -17,18 +17,18 @@ use serde_json::json;
 
 const CM: f64 = 100.0;
 
-/// A family of one distance of rows of `n_numbers`.
+/// Family of one Frechet distance of rows of length `n_features`.
 fn family(
     definition: Definition,
-    n_numbers: usize,
+    n_features: usize,
     measure: impl Fn(&PairedFrames, &mut BlockSums) + Send + Sync + 'static,
 ) -> MetricFamily {
-    let n_sums = 2 * moments::packed_len(n_numbers);
-    let values = move |sums: &[f64]| vec![distance(sums, n_numbers)];
+    let n_sums = 2 * moments::packed_len(n_features);
+    let values = move |sums: &[f64]| vec![distance(sums, n_features)];
     MetricFamily { is_costly: true, ..MetricFamily::new(vec![definition], n_sums, measure, values) }
 }
 
-/// Distance of single poses, of all 48 joints (144 numbers) or of the body (18).
+/// Frechet distance of single poses of all 48 joints (144 coordinates) or of the body (18).
 pub(crate) fn poses(part: BodyPart) -> MetricFamily {
     let joints = part.joints();
     let d = 3 * joints.len();
@@ -44,7 +44,7 @@ pub(crate) fn poses(part: BodyPart) -> MetricFamily {
         let rows = |poses: &[[Vec3; N_JOINTS]], frames: &[usize]| {
             Array2::from_shape_fn((frames.len(), d), |(row, i)| CM * poses[frames[row]][joints[i / 3]][i % 3])
         };
-        for (block, frames) in pair.whole_frames(&joints, blocks).iter().enumerate() {
+        for (block, frames) in pair.complete_frames(&joints, blocks).iter().enumerate() {
             let (predicted, ground_truth) = blocks.row(block).split_at_mut(moments::packed_len(d));
             moments::add(rows(&pair.predicted, frames).view(), predicted);
             moments::add(rows(&pair.ground_truth, frames).view(), ground_truth);
@@ -52,19 +52,19 @@ pub(crate) fn poses(part: BodyPart) -> MetricFamily {
     })
 }
 
-/// Windows in a fixed space.
+/// Frechet distance of windows in a fixed space.
 struct FixedSpace {
     name: &'static str,
     formula: &'static str,
     hash: String,
-    /// Rows of windows of joints, mask and frame rate.
+    /// Computes the rows of all windows from joints, mask and frame rate.
     windows: fn(ArrayView3<f32>, ArrayView2<bool>, FrameRate) -> Array2<f64>,
     n_frames: usize,
     stride: usize,
-    n_numbers: usize,
+    n_features: usize,
 }
 
-/// Of windows of 15 frames in the fixed basis.
+/// Frechet distance of windows of 15 frames in the fixed basis.
 pub(crate) fn basis() -> MetricFamily {
     in_space(FixedSpace {
         name: "frechet_window",
@@ -75,11 +75,11 @@ pub(crate) fn basis() -> MetricFamily {
         windows: basis::windows,
         n_frames: basis::WINDOW,
         stride: basis::STRIDE,
-        n_numbers: basis::N,
+        n_features: basis::N,
     })
 }
 
-/// Of windows in the embedding that is shipped.
+/// Frechet distance of windows of 34 frames in the built-in embedding.
 pub(crate) fn embedding() -> MetricFamily {
     in_space(FixedSpace {
         name: "frechet_embedding",
@@ -90,31 +90,31 @@ pub(crate) fn embedding() -> MetricFamily {
         windows: embedding::windows,
         n_frames: embedding::WINDOW,
         stride: embedding::STRIDE,
-        n_numbers: embedding::N,
+        n_features: embedding::N,
     })
 }
 
 fn in_space(space: FixedSpace) -> MetricFamily {
-    let FixedSpace { name, formula, hash, windows, n_frames, stride, n_numbers } = space;
+    let FixedSpace { name, formula, hash, windows, n_frames, stride, n_features } = space;
     let definition = Definition {
         formula,
         undefined: "fewer than 2 windows are wholly seen",
-        parameters: json!({"n_frames": n_frames, "stride": stride, "n_numbers": n_numbers, "space": hash}),
+        parameters: json!({"n_frames": n_frames, "stride": stride, "n_numbers": n_features, "space": hash}),
         ..Definition::new(name, "all", "1", Better::Lower)
     };
-    family(definition, n_numbers, move |pair, blocks| {
+    family(definition, n_features, move |pair, blocks| {
         let interval = &pair.interval;
-        // what one of both lacks is left out of both
+        // Joints that are missing in one motion are masked in both.
         let mut mask = interval.mask.to_owned();
-        for ((t, joint), seen) in mask.indexed_iter_mut() {
-            *seen &= pair.seen.get(t).is_some_and(|seen| seen.get(joint) == Some(&true));
+        for ((t, joint), visible) in mask.indexed_iter_mut() {
+            *visible &= pair.visible.get(t).is_some_and(|visible| visible.get(joint) == Some(&true));
         }
         let starts = Frames::new(interval.ground_truth, mask.view(), interval.fps).starts(n_frames, stride);
-        let length = moments::packed_len(n_numbers);
+        let length = moments::packed_len(n_features);
         for (i, joints) in [interval.predicted, interval.ground_truth].into_iter().enumerate() {
             let rows = windows(joints, mask.view(), interval.fps);
             if rows.nrows() != starts.len() {
-                // a predicted joint that is not finite breaks its window
+                // A predicted joint that is not finite makes its windows incomplete.
                 blocks.at(0)[i * length] = f64::NAN;
                 continue;
             }
@@ -127,12 +127,12 @@ fn in_space(space: FixedSpace) -> MetricFamily {
     })
 }
 
-/// Of two packed moments of rows of `d` numbers, one after the other.
+/// Frechet distance of two consecutive packed moments of rows of length `d`.
 fn distance(sums: &[f64], d: usize) -> f64 {
     let (predicted, ground_truth) = sums.split_at(moments::packed_len(d));
     match (moments::read(predicted, d), moments::read(ground_truth, d)) {
-        (Some((_, of_made, predicted)), Some((_, of_real, ground_truth))) => {
-            between((&of_made, &predicted), (&of_real, &ground_truth))
+        (Some((_, mean_predicted, predicted)), Some((_, mean_truth, ground_truth))) => {
+            between((&mean_predicted, &predicted), (&mean_truth, &ground_truth))
         }
         _ => f64::NAN,
     }

@@ -1,4 +1,4 @@
-//! Metrics of distributions: Frechet distances, diversity, distances of pairs.
+//! Metrics of distributions: Frechet distances, diversity, pairwise distances.
 
 pub mod diversity;
 pub mod frechet;

@@ -1,9 +1,9 @@
-//! Sums from which mean and covariance of rows come, packed: number of rows, sums, and the upper triangle of the sums of
-//! products. Sums of different rows add, which is all that resampling needs.
+//! Packed moments, from which mean and covariance of rows are computed: the number of rows, the sums, and the upper
+//! triangle of the sums of products. They are additive, as resampling requires.
 
 use ndarray::{Array1, Array2, ArrayView2};
 
-/// How many numbers the moments of rows of `d` take.
+/// Length of the packed moments of rows of length `d`.
 pub(crate) const fn packed_len(d: usize) -> usize {
     1 + d + d * (d + 1) / 2
 }
@@ -51,7 +51,7 @@ mod tests {
     use ndarray::{array, s};
 
     #[test]
-    fn parts_give_mean_and_covariance_of_the_whole() {
+    fn moments_of_parts_add_up() {
         let rows = array![[1.0, 2.0], [3.0, 5.0], [4.0, -1.0], [0.0, 2.0]];
         let mut packed = vec![0.0; packed_len(2)];
         add(rows.slice(s![..1, ..]), &mut packed);

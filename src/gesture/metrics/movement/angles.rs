@@ -1,5 +1,5 @@
-//! Angles of head and trunk beside the true ones: errors, speeds, correlations. They stand behind the joints of a motion
-//! as rows 49 (head) and 50 (trunk), radians: yaw, pitch, roll; NaN where they are not seen.
+//! Metrics of head and trunk angles: errors, speeds, correlations. The angles follow the joints of a motion as rows 49
+//! (head) and 50 (trunk): yaw, pitch, roll in radians; NaN where they are not visible.
 
 use crate::metrics::definition::{Better, Definition, MetricFamily};
 use crate::metrics::movement::hellinger;
@@ -8,20 +8,20 @@ use orator_base::types::posture::PostureChannel;
 use orator_base::types::skeleton::N_JOINTS;
 use serde_json::json;
 
-/// Bins of angular speed: their width, degrees a second, and their number.
+/// Width of the bins of angular speed, degrees per second.
 const BIN: f64 = 5.0;
 const N_BINS: usize = 72;
-/// Variance of an angle that moves, square degrees.
-const LEAST_VARIANCE: f64 = 1e-6;
+/// Smallest variance of an angle that counts as moving, square degrees.
+const MIN_VARIANCE: f64 = 1e-6;
 
-/// Predicted and true angle `k` of frame `t` in degrees; `None` where one is missing.
+/// Predicted and true angle `k` of frame `t` in degrees; `None` if one is missing.
 fn both(pair: &MotionPair, t: usize, row: usize, k: usize) -> Option<[f64; 2]> {
     let angles = [pair.predicted, pair.ground_truth]
         .map(|motion| motion.get([t, row, k]).map_or(f64::NAN, |angle| f64::from(*angle).to_degrees()));
     angles.iter().all(|angle| angle.is_finite()).then_some(angles)
 }
 
-/// Predicted and true angular speed from frame `t` to the next, degrees a second, of the angles that are there.
+/// Predicted and true angular speed from frame `t` to the next, degrees per second, over the angles that are present.
 fn speeds(pair: &MotionPair, t: usize, row: usize) -> Option<[f64; 2]> {
     let turns = (0..3).filter_map(|k| {
         let (now, next) = (both(pair, t, row, k)?, both(pair, t + 1, row, k)?);
@@ -32,12 +32,12 @@ fn speeds(pair: &MotionPair, t: usize, row: usize) -> Option<[f64; 2]> {
     (!turns.is_empty()).then(|| [speed(0), speed(1)])
 }
 
-/// Turn within half a turn either way, degrees.
+/// Angle in degrees, wrapped to the range -180 to 180.
 fn turn(degrees: f64) -> f64 {
     degrees - 360.0 * (degrees / 360.0).round()
 }
 
-/// Metrics of a channel.
+/// Metrics of a posture channel.
 pub(crate) fn metrics(channel: PostureChannel) -> [MetricFamily; 4] {
     let row = N_JOINTS + usize::from(channel == PostureChannel::Trunk);
     let definition = |name, unit, better, formula, undefined| Definition {
@@ -125,8 +125,8 @@ pub(crate) fn metrics(channel: PostureChannel) -> [MetricFamily; 4] {
                     let n = sums[0].max(1.0);
                     let [p, g, pp, gg, pg] = std::array::from_fn(|i| sums[i + 1] / n);
                     let [of_p, of_g] = [pp - p * p, gg - g * g];
-                    // A constant varies by rounding alone.
-                    (of_p.min(of_g) > LEAST_VARIANCE).then(|| (pg - p * g) / (of_p * of_g).sqrt())
+                    // The variance of a constant is only a rounding error.
+                    (of_p.min(of_g) > MIN_VARIANCE).then(|| (pg - p * g) / (of_p * of_g).sqrt())
                 };
                 let moving: Vec<f64> = sums.chunks_exact(6).filter_map(of).collect();
                 vec![moving.iter().sum::<f64>() / moving.len() as f64]
@@ -135,7 +135,7 @@ pub(crate) fn metrics(channel: PostureChannel) -> [MetricFamily; 4] {
     ]
 }
 
-/// Every frame with every angle.
+/// All pairs of frame and angle.
 fn angles(pair: &PairedFrames) -> impl Iterator<Item = (usize, usize)> + use<> {
     (0..pair.n_frames()).flat_map(|t| (0..3).map(move |k| (t, k)))
 }
@@ -147,7 +147,7 @@ mod tests {
     use crate::metrics::settings::MetricSettings;
     use ndarray::{Array2, Array3};
 
-    /// Motion whose head turns by `yaw` radians, which is unseen in frame 3.
+    /// Motion whose head is at `yaw` radians as a function of seconds, and not visible in frame 3.
     fn turning(yaw: impl Fn(f32) -> f32) -> Array3<f32> {
         let mut motion = Array3::zeros((60, N_JOINTS + 2, 3));
         for t in 0..60 {
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn figures_are_what_their_formulas_say() {
+    fn metrics_match_their_formulas() {
         let channels = vec![PostureChannel::Head];
         let catalogue = Catalogue::new(&MetricSettings { channels, ..MetricSettings::default() }).unwrap();
         let mask = Array2::from_elem((60, N_JOINTS), true);
@@ -172,17 +172,17 @@ mod tests {
         let degrees = |degrees: f32| degrees.to_radians();
         let (slow, fast) = (turning(|secs| degrees(10.0 * secs)), turning(|secs| degrees(22.0 * secs + 6.0)));
         let near = |value: f64, expected: f64| assert!((value - expected).abs() < 1e-3, "{value} {expected}");
-        // 6 degrees and 12 more a second, in all frames but one; the other two angles are right in all 60.
-        let apart: f64 = (0..60).filter(|t| *t != 3).map(|t| 6.0 + 12.0 * f64::from(t) / 15.0).sum();
-        near(value(&fast, &slow, "angle_error"), apart / 179.0);
-        // Two of 59 steps have no yaw, so that nothing turns.
+        // The error grows from 6 degrees by 12 per second in all frames but one; the other two angles have no error.
+        let total_error: f64 = (0..60).filter(|t| *t != 3).map(|t| 6.0 + 12.0 * f64::from(t) / 15.0).sum();
+        near(value(&fast, &slow, "angle_error"), total_error / 179.0);
+        // Two of the 59 steps have no yaw, so that their speed is 0.
         near(value(&fast, &slow, "angular_speed"), 22.0 * 57.0 / 59.0);
         near(value(&fast, &slow, "angular_speed_of_real"), 10.0 * 57.0 / 59.0);
         near(value(&fast, &slow, "hellinger_angular_speed"), (1.0 - 2.0f64 / 59.0).sqrt());
         near(value(&slow, &slow, "hellinger_angular_speed"), 0.0);
         near(value(&fast, &slow, "angle_correlation"), 1.0);
         near(value(&turning(|secs| -secs), &slow, "angle_correlation"), -1.0);
-        // Across half a turn.
+        // Errors wrap around at half a turn.
         let (left, right) = (turning(|_| degrees(179.0)), turning(|_| degrees(-179.0)));
         near(value(&left, &right, "angle_error"), 2.0 * 59.0 / 179.0);
         assert!(value(&left, &right, "angle_correlation").is_nan());

@@ -1,4 +1,4 @@
-//! How much bones change their length, which real ones do not: from frame to frame, and over time.
+//! Changes of bone lengths, which are constant in reality: between consecutive frames, and over time.
 
 use crate::metrics::body_part::BodyPart;
 use crate::metrics::definition::{Better, Definition, MetricFamily};
@@ -8,7 +8,8 @@ use orator_base::math::vec3::{self, Vec3};
 use orator_base::types::skeleton::{N_JOINTS, parent};
 use serde_json::json;
 
-/// Sums of a bone of one motion: lengths, their squares, changes from frame to frame; then the counts of both.
+/// Layout of the sums of a bone: lengths, squared lengths and changes between frames of both motions, then the numbers
+/// of lengths and of changes.
 const LENGTH: usize = 0;
 const SQUARE: usize = 1;
 const CHANGE: usize = 2;
@@ -20,7 +21,7 @@ const N_OF_BONE: usize = N_CHANGES + 1;
 const PARTS: [BodyPart; 2] = [BodyPart::Body, BodyPart::Hands];
 
 pub(crate) fn metric() -> MetricFamily {
-    // the joint at the end of each bone, and its parent
+    // Far joint of each bone, and its parent.
     let joints = PARTS.iter().flat_map(|part| part.joints());
     let bones: Vec<(usize, usize)> = joints.filter_map(|joint| Some((joint, parent(joint)?))).collect();
     let n_sums = bones.len() * N_OF_BONE;
@@ -28,8 +29,8 @@ pub(crate) fn metric() -> MetricFamily {
         for t in 0..pair.n_frames() {
             let sums = blocks.at(t);
             for (sums, &(joint, parent)) in sums.chunks_exact_mut(N_OF_BONE).zip(&bones) {
-                let seen = |n| pair.sees(t, n, joint) && pair.sees(t, n, parent);
-                if !seen(1) {
+                let visible = |n| pair.is_visible(t, n, joint) && pair.is_visible(t, n, parent);
+                if !visible(1) {
                     continue;
                 }
                 for (i, poses) in [&pair.predicted, &pair.ground_truth].into_iter().enumerate() {
@@ -37,12 +38,12 @@ pub(crate) fn metric() -> MetricFamily {
                     let own = &mut sums[i * N_OF_MOTION..(i + 1) * N_OF_MOTION];
                     own[LENGTH] += length(&poses[t]);
                     own[SQUARE] += length(&poses[t]).powi(2);
-                    if seen(2) {
+                    if visible(2) {
                         own[CHANGE] += (length(&poses[t + 1]) - length(&poses[t])).abs();
                     }
                 }
                 sums[N_LENGTHS] += 1.0;
-                sums[N_CHANGES] += f64::from(u8::from(seen(2)));
+                sums[N_CHANGES] += f64::from(u8::from(visible(2)));
             }
         }
     };
@@ -83,7 +84,7 @@ fn values(part: &[f64]) -> Vec<f64> {
     [changes, shares, both.map(|i| 100.0 * mean(&|bone| deviation(bone, i), N_LENGTHS))].concat()
 }
 
-/// Name, name of the ground truth's, unit, formula.
+/// Name, name for the ground truth, unit, formula.
 const METRICS: [(&str, &str, &str, &str); 3] = [
     (
         "bone_change",

@@ -1,5 +1,6 @@
-//! First canonical correlation of predicted and ground-truth poses over time: the largest correlation that a weighted sum of all predicted
-//! coordinates has with one of all ground-truth coordinates. With few frames for many coordinates it is near 1 for anything.
+//! First canonical correlation of predicted and ground-truth poses over time: the largest correlation between a
+//! weighted sum of all predicted coordinates and one of all ground-truth coordinates. With few frames and many
+//! coordinates it is near 1 for any motion.
 
 use crate::metrics::body_part::BodyPart;
 use crate::metrics::definition::{Better, Definition, MetricFamily};
@@ -10,9 +11,9 @@ use ndarray::{Array2, ArrayView2, s};
 use orator_base::math::eigen;
 use serde_json::json;
 
-/// A coordinate with less standard deviation, metres, is constant.
+/// Standard deviation, metres, up to which a coordinate counts as constant.
 const CONSTANT: f64 = 1e-8;
-/// A coordinate that the others determine up to this share of its variance is left out.
+/// Share of unexplained variance up to which a coordinate counts as determined by the others and is dropped.
 const DETERMINED: f64 = 1e-10;
 
 pub(crate) fn metric(part: BodyPart) -> MetricFamily {
@@ -28,7 +29,7 @@ pub(crate) fn metric(part: BodyPart) -> MetricFamily {
         ..Definition::new("cca", part.name(), "1", Better::Higher)
     };
     let measure = move |pair: &PairedFrames, blocks: &mut BlockSums| {
-        for (block, frames) in pair.whole_frames(&joints, blocks).iter().enumerate() {
+        for (block, frames) in pair.complete_frames(&joints, blocks).iter().enumerate() {
             let rows = Array2::from_shape_fn((frames.len(), 2 * d), |(row, i)| {
                 let poses = if i < d { &pair.predicted } else { &pair.ground_truth };
                 poses[frames[row]][joints[i % d / 3]][i % 3]
@@ -44,7 +45,7 @@ pub(crate) fn metric(part: BodyPart) -> MetricFamily {
     MetricFamily { is_costly: true, ..family }
 }
 
-/// First canonical correlation of the first `d` dimensions with the others; NaN where nothing varies on one side.
+/// First canonical correlation of the first `d` dimensions with the others; NaN if nothing varies on one side.
 pub(crate) fn correlation(covariance: ArrayView2<f64>, d: usize) -> f64 {
     if covariance.iter().any(|v| !v.is_finite()) {
         return f64::NAN;
@@ -65,7 +66,7 @@ pub(crate) fn correlation(covariance: ArrayView2<f64>, d: usize) -> f64 {
     eigen::eigenvalues(smaller).into_iter().fold(0.0, f64::max).sqrt().min(1.0)
 }
 
-/// Dimensions that say all, with the Cholesky factor of their correlation.
+/// Linearly independent dimensions, with the Cholesky factor of their correlation matrix.
 struct IndependentDimensions {
     which: Vec<usize>,
     /// Standard deviation of each.
@@ -75,21 +76,22 @@ struct IndependentDimensions {
 }
 
 impl IndependentDimensions {
-    /// Of a range of dimensions: Cholesky's with pivots, ended where what is left is determined.
+    /// Selects independent dimensions of a range by pivoted Cholesky decomposition, which stops when all remaining
+    /// dimensions are determined.
     fn select(covariance: ArrayView2<f64>, range: std::ops::Range<usize>) -> Self {
-        let mut left: Vec<usize> = range.filter(|i| covariance[[*i, *i]].max(0.0).sqrt() > CONSTANT).collect();
+        let mut remaining: Vec<usize> = range.filter(|i| covariance[[*i, *i]].max(0.0).sqrt() > CONSTANT).collect();
         let scale_of = |i: usize| covariance[[i, i]].sqrt();
-        let mut rest: Vec<f64> = vec![1.0; left.len()];
-        let mut rows: Vec<Vec<f64>> = vec![Vec::new(); left.len()];
+        let mut rest: Vec<f64> = vec![1.0; remaining.len()];
+        let mut rows: Vec<Vec<f64>> = vec![Vec::new(); remaining.len()];
         let (mut which, mut factor) = (Vec::new(), Vec::new());
-        while let Some((pivot, most)) = rest.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1)) {
-            if most <= DETERMINED {
+        while let Some((pivot, largest)) = rest.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1)) {
+            if largest <= DETERMINED {
                 break;
             }
-            let (chosen, mut row) = (left.swap_remove(pivot), rows.swap_remove(pivot));
+            let (chosen, mut row) = (remaining.swap_remove(pivot), rows.swap_remove(pivot));
             rest.swap_remove(pivot);
-            let root = most.sqrt();
-            for ((own, rest), other) in rows.iter_mut().zip(&mut rest).zip(&left) {
+            let root = largest.sqrt();
+            for ((own, rest), other) in rows.iter_mut().zip(&mut rest).zip(&remaining) {
                 let correlation = covariance[[chosen, *other]] / (scale_of(chosen) * scale_of(*other));
                 let entry = (correlation - row.iter().zip(own.iter()).map(|(a, b)| a * b).sum::<f64>()) / root;
                 *rest -= entry * entry;
@@ -141,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn the_correlation_is_that_of_scikit_learn() {
+    fn the_correlation_matches_scikit_learn() {
         let golden: serde_json::Value =
             serde_json::from_str(include_str!("../../../../fixtures/reference/metrics_golden.json")).unwrap();
         for case in golden["cca"].as_array().unwrap() {
@@ -156,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_move_has_no_correlation() {
+    fn constant_motion_has_no_correlation() {
         let mut covariance = Array2::<f64>::zeros((4, 4));
         covariance[[2, 2]] = 1.0;
         assert!(correlation(covariance.view(), 2).is_nan());

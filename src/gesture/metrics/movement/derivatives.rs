@@ -1,12 +1,12 @@
-//! How fast, how accelerated and how jerky a motion is: mean norms of its first three differences over time, of the made
-//! and of the ground truth. A predicted motion that stands still has the least error of a poor one; here it shows.
+//! Speed, acceleration and jerk of predicted and real motion: mean norms of the first three differences over time. They
+//! reveal predictions that hardly move, which have a small position error.
 
 use crate::metrics::body_part::BodyPart;
 use crate::metrics::definition::{Better, Definition, MetricFamily};
 use crate::metrics::per_frame::windows;
 use orator_base::math::vec3::{self, Vec3};
 
-/// How often positions are differentiated.
+/// Number of differentiations of the positions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum DerivativeOrder {
     Speed,
@@ -17,7 +17,7 @@ pub(crate) enum DerivativeOrder {
 impl DerivativeOrder {
     pub(crate) const ALL: [Self; 3] = [Self::Speed, Self::Acceleration, Self::Jerk];
 
-    /// Weights of the frames, first to last.
+    /// Finite-difference weights of the frames, first to last.
     const fn weights(self) -> &'static [f64] {
         match self {
             Self::Speed => &[-1.0, 1.0],
@@ -35,7 +35,7 @@ impl DerivativeOrder {
     }
 }
 
-/// Mean over frames and joints.
+/// Metric that averages over all frames and joints.
 pub(crate) fn metric(order: DerivativeOrder, part: BodyPart) -> MetricFamily {
     let (unit, formula) = match order {
         DerivativeOrder::Speed => ("m/s", "mean over t and j of |x(t+1) - x(t)| * fps, x seen in both frames"),
@@ -49,7 +49,7 @@ pub(crate) fn metric(order: DerivativeOrder, part: BodyPart) -> MetricFamily {
     family(order, part, unit, formula, false)
 }
 
-/// Mean over intervals of the means of each (GENEA): every interval weighs the same, in centimetres.
+/// Metric of GENEA: mean over intervals of the mean of each interval, so that all have the same weight; in centimetres.
 pub(crate) fn by_interval(order: DerivativeOrder) -> MetricFamily {
     let unit = ["cm/s", "cm/s^2", "cm/s^3"][order.weights().len() - 2];
     let formula = "|n-th difference of x| * fps^n (n = 2 acceleration, 3 jerk) in centimetres, mean over the frames \

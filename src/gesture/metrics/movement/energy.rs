@@ -1,11 +1,11 @@
-//! How much a motion moves: mean squared speed of its joints. A predicted motion that falls back to the mean pose hardly
-//! moves, whatever its error; the ratio of both energies says so.
+//! Motion energy: the mean squared speed of the joints. The ratio of predicted to real energy detects predictions that
+//! collapse to the mean pose.
 
 use ndarray::{ArrayView2, ArrayView3};
 use orator_base::types::skeleton::{N_JOINTS, NECK, is_duplicate};
 use orator_base::types::time::FrameRate;
 
-/// Squared speeds so far.
+/// Accumulated squared speeds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MotionEnergy {
     /// Sum of squared speeds, (m/s)^2.
@@ -15,9 +15,9 @@ pub struct MotionEnergy {
 }
 
 impl MotionEnergy {
-    /// Adds the steps from frame to frame of `joints` [T, 49, 3], metres: of each joint but the neck and the hand
-    /// roots, where `mask` [T, 49] is true in both frames. For a predicted motion the mask is that of the ground truth beside
-    /// it, so that both are measured at the same places.
+    /// Adds the steps between consecutive frames of `joints` [T, 49, 3] in metres, for all joints but the neck and the
+    /// hand roots, where `mask` [T, 49] is true in both frames. The mask of a prediction is that of its ground truth,
+    /// so that both are measured on the same joints and frames.
     pub fn add(&mut self, joints: ArrayView3<f32>, mask: ArrayView2<bool>, fps: FrameRate) {
         let per_sec = fps.per_sec();
         for t in 1..joints.shape()[0] {
@@ -31,13 +31,12 @@ impl MotionEnergy {
         }
     }
 
-    /// Mean squared speed, (m/s)^2; 0 of nothing.
+    /// Mean squared speed, (m/s)^2; 0 if nothing was added.
     pub fn mean(&self) -> f64 {
         self.sum / self.n.max(1) as f64
     }
 
-    /// This motion's energy as a share of the ground truth's, 1 when they move as much; NaN where the ground truth stands
-    /// still.
+    /// Ratio of this energy to that of the ground truth; NaN if the ground truth is static.
     pub fn relative_to(&self, ground_truth: &Self) -> f64 {
         if ground_truth.sum > 0.0 { self.mean() / ground_truth.mean() } else { f64::NAN }
     }
@@ -51,7 +50,8 @@ mod tests {
 
     #[test]
     fn steady_motion_has_the_square_of_its_speed() {
-        // the right wrist at 0.3 m/s along x and 0.4 along z; the left hand's root, which is not counted, jumps
+        // The right wrist moves at 0.3 m/s along x and 0.4 m/s along z. The left hand root, which is not counted,
+        // jumps.
         let joints = Array3::from_shape_fn((4, N_JOINTS, 3), |(t, joint, k)| match (joint, k) {
             (R_WRIST, 0) => 0.3 * t as f32 / 15.0,
             (R_WRIST, 2) => 0.4 * t as f32 / 15.0,

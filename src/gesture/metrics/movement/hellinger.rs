@@ -1,4 +1,4 @@
-//! How far apart the distributions of speeds are: Hellinger distance of two histograms, 0 the same, 1 nothing in common.
+//! Hellinger distance between the histograms of predicted and real speeds: 0 for equal histograms, 1 for disjoint ones.
 
 use crate::metrics::body_part::BodyPart;
 use crate::metrics::definition::{Better, Definition, MetricFamily};
@@ -8,13 +8,13 @@ use orator_base::math::vec3::{self, Vec3};
 use orator_base::types::skeleton::N_JOINTS;
 use serde_json::{Value, json};
 
-/// The first of the joints that `[:, 8:]` leaves of 49.
+/// First of the 49 joints that remains after `[:, 8:]` in the GENEA script.
 const GENEA_FIRST: usize = 8;
-/// Width of a bin, m/s, and their number.
+/// Width of a bin, m/s.
 const GENEA_BIN: f64 = 0.0005;
 const GENEA_BINS: usize = 980;
 
-/// Bins of 0.05 m/s up to 6 m/s.
+/// Metric with bins of 0.05 m/s up to 6 m/s.
 pub(crate) fn metric(part: BodyPart) -> MetricFamily {
     let (bin, n_bins) = (0.05, 120);
     let formula = "sqrt(1 - sum over bins of sqrt(h_p h_g)), h the shares of speeds |x(t+1) - x(t)| * fps over t and \
@@ -22,8 +22,8 @@ pub(crate) fn metric(part: BodyPart) -> MetricFamily {
     family((part.name(), part.joints()), bin, n_bins, formula, json!({"bin_m_per_s": bin, "n_bins": n_bins}))
 }
 
-/// Histograms of the GENEA evaluation, at the bins of its script for the distance (0.05 cm/s). Its cut leaves no arm, so
-/// that without fingers the arms are counted in its place.
+/// Metric of the GENEA evaluation with the bins of its script (0.05 cm/s). Its selection of joints excludes the arms,
+/// so that the arms are used instead if there are no fingers.
 pub(crate) fn genea(has_fingers: bool) -> MetricFamily {
     if !has_fingers {
         let formula = "sqrt(1 - sum over bins of sqrt(h_p h_g)), h the shares of speeds |x(t+1) - x(t)| * fps of the \
@@ -39,7 +39,7 @@ pub(crate) fn genea(has_fingers: bool) -> MetricFamily {
     family(("from_joint_8", (GENEA_FIRST..N_JOINTS).collect()), GENEA_BIN, GENEA_BINS, formula, parameters)
 }
 
-/// Of the joints of a named part; `bin` in m/s.
+/// Metric of the joints of a named part; `bin` is in m/s.
 fn family(
     (part, joints): (&'static str, Vec<usize>),
     bin: f64,
@@ -56,12 +56,12 @@ fn family(
     let measure = move |pair: &PairedFrames, blocks: &mut BlockSums| {
         for t in 0..pair.n_frames().saturating_sub(1) {
             let sums = blocks.at(t);
-            for &joint in joints.iter().filter(|joint| pair.sees(t, 2, **joint)) {
+            for &joint in joints.iter().filter(|joint| pair.is_visible(t, 2, **joint)) {
                 let mut count = |poses: &[[Vec3; N_JOINTS]], from: usize| {
                     let speed = vec3::norm(vec3::sub(poses[t + 1][joint], poses[t][joint])) * pair.fps;
                     match (speed / bin).floor() {
                         at if at < n_bins as f64 => sums[from + at as usize] += 1.0,
-                        // a predicted joint that is not finite: no distance
+                        // A predicted joint that is not finite makes the distance undefined.
                         at if at.is_nan() => sums[from] = f64::NAN,
                         _ => {}
                     }
@@ -78,10 +78,10 @@ fn family(
     MetricFamily::new(vec![definition], 2 * n_bins, measure, values)
 }
 
-/// Of two histograms of counts; NaN where one is empty.
+/// Hellinger distance of two histograms of counts; NaN if one is empty.
 pub(crate) fn distance(a: &[f64], b: &[f64]) -> f64 {
     let both = a.iter().sum::<f64>() * b.iter().sum::<f64>();
     let overlap = a.iter().zip(b).map(|(a, b)| (a * b).sqrt()).sum::<f64>() / both.sqrt();
-    // rounding may leave it above 1
+    // Rounding errors may make the overlap larger than 1.
     if overlap.is_nan() { f64::NAN } else { (1.0 - overlap).max(0.0).sqrt() }
 }

@@ -1,5 +1,5 @@
-//! Errors of positions and of accelerations, each the mean of a number of one point in one or three frames; among them
-//! the two of the trimodal convention (Yoon et al. 2020, `train.py` of their repository).
+//! Position and acceleration errors, averaged over points and windows of one or three frames, including the two of the
+//! trimodal convention (Yoon et al. 2020, `train.py` in their repository).
 
 use crate::metrics::body_part::BodyPart;
 use crate::metrics::definition::{Better, Definition, MetricFamily};
@@ -7,17 +7,17 @@ use crate::metrics::per_frame::{self, PointWindow};
 use orator_base::math::vec3::{self, Vec3};
 use serde_json::json;
 
-/// Mean absolute difference of coordinates, metres: what the L1 loss of training measures.
+/// Mean absolute error of the coordinates, metres, as in the L1 loss of training.
 pub(crate) fn l1(part: BodyPart) -> MetricFamily {
     let definition = Definition {
         formula: "mean over t, j and the coordinates x, y, z of |p - g|",
         undefined: "no joint of the part is seen",
         ..Definition::new("l1", part.name(), "m", Better::Lower)
     };
-    per_frame::mean(definition, part, 1, 0, |window| mean_size(window.apart(0)))
+    per_frame::mean(definition, part, 1, 0, |window| mean_abs(window.difference(0)))
 }
 
-/// Mean per-joint position error, millimetres, from the neck, or from the own wrist.
+/// Mean per-joint position error (MPJPE), millimetres, relative to the neck or to the wrist of the same side.
 pub(crate) fn mpjpe(part: BodyPart) -> MetricFamily {
     let definition = Definition {
         formula: "1000 times the mean over t and j of the distance |p - g|, positions from the neck (part \
@@ -25,10 +25,10 @@ pub(crate) fn mpjpe(part: BodyPart) -> MetricFamily {
         undefined: "no joint of the part is seen",
         ..Definition::new("mpjpe", part.name(), "mm", Better::Lower)
     };
-    per_frame::mean(definition, part, 1, 0, |window| 1000.0 * vec3::norm(window.apart(0)))
+    per_frame::mean(definition, part, 1, 0, |window| 1000.0 * vec3::norm(window.difference(0)))
 }
 
-/// How far the accelerations of the predicted motion are from the ground truth.
+/// Mean norm of the difference between predicted and real accelerations.
 pub(crate) fn acceleration(part: BodyPart) -> MetricFamily {
     let definition = Definition {
         formula: "mean over t and j of |a_p - a_g| with a(t) = (x(t) - 2 x(t+1) + x(t+2)) * fps^2, where the joint is seen \
@@ -40,7 +40,7 @@ pub(crate) fn acceleration(part: BodyPart) -> MetricFamily {
     per_frame::mean(definition, part, 3, 0, of)
 }
 
-/// Trimodal: per coordinate and frame.
+/// Acceleration error of the trimodal convention: mean over coordinates, in units per frame^2.
 pub(crate) fn acceleration_by_coordinate() -> MetricFamily {
     let definition = Definition {
         formula: "mean over t, j and the coordinates x, y, z of |d2 p - d2 g|, d2 the second difference from frame to frame, \
@@ -48,14 +48,14 @@ pub(crate) fn acceleration_by_coordinate() -> MetricFamily {
         undefined: "no joint is seen in 3 frames in a row",
         ..Definition::new("acceleration_error", BodyPart::All.name(), "m/frame^2", Better::Lower)
     };
-    per_frame::mean(definition, BodyPart::All, 3, 0, |window| mean_size(second_difference(window)))
+    per_frame::mean(definition, BodyPart::All, 3, 0, |window| mean_abs(second_difference(window)))
 }
 
-/// Frames given as a seed, of the trimodal convention's 15 a second.
+/// Number of seed frames given to the generator in the trimodal convention, at `SEED_FPS`.
 const N_SEED: f64 = 4.0;
 const SEED_FPS: f64 = 15.0;
 
-/// Trimodal: L1 without the seed, for data of this frame rate.
+/// Mean absolute joint error (MAJE) of the trimodal convention: L1 without the seed frames, for data at `fps`.
 pub(crate) fn maje(fps: f64) -> MetricFamily {
     let n_seed = (N_SEED / SEED_FPS * fps).round() as usize;
     let definition = Definition {
@@ -65,16 +65,16 @@ pub(crate) fn maje(fps: f64) -> MetricFamily {
         parameters: json!({"n_seed_frames": n_seed}),
         ..Definition::new("maje", BodyPart::All.name(), "m", Better::Lower)
     };
-    per_frame::mean(definition, BodyPart::All, 1, n_seed, |window| mean_size(window.apart(0)))
+    per_frame::mean(definition, BodyPart::All, 1, n_seed, |window| mean_abs(window.difference(0)))
 }
 
-/// Mean absolute coordinate.
-fn mean_size(v: Vec3) -> f64 {
+/// Mean absolute value of the coordinates.
+fn mean_abs(v: Vec3) -> f64 {
     v.iter().map(|v| v.abs()).sum::<f64>() / 3.0
 }
 
 /// Second difference of prediction minus ground truth over three frames.
 fn second_difference(window: &PointWindow) -> Vec3 {
-    let [a, b, c] = [0, 1, 2].map(|k| window.apart(k));
+    let [a, b, c] = [0, 1, 2].map(|k| window.difference(k));
     std::array::from_fn(|k| a[k] - 2.0 * b[k] + c[k])
 }

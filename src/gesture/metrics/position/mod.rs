@@ -1,4 +1,4 @@
-//! Metrics of where joints are: L1, MPJPE, Procrustes-aligned MPJPE, PCK, acceleration error.
+//! Metrics of joint positions: L1, MPJPE, Procrustes-aligned MPJPE, PCK, acceleration error.
 
 pub mod errors;
 pub mod p_mpjpe;

@@ -1,5 +1,5 @@
-//! Position error after the best turn, scale and shift of every frame's predicted pose: what is wrong with the pose itself,
-//! not with where it looks.
+//! Procrustes-aligned position error (P-MPJPE): the error after the best rotation, scale and translation of the
+//! predicted pose of every frame, which measures the pose itself regardless of its orientation.
 
 use crate::metrics::body_part::BodyPart;
 use crate::metrics::definition::{Better, Definition, MetricFamily};
@@ -8,9 +8,9 @@ use orator_base::math::vec3::{self, Vec3};
 use orator_base::types::skeleton::{L_HAND, N_HAND_JOINTS, R_HAND};
 use serde_json::json;
 
-/// All, body, or each hand (its 21 joints) for itself.
+/// P-MPJPE of all joints, the body, or the hands, of which each (21 joints) is aligned separately.
 pub(crate) fn metric(part: BodyPart) -> MetricFamily {
-    // what is laid onto the real joints together
+    // Groups of joints that are aligned together.
     let groups: Vec<Vec<usize>> = match part {
         BodyPart::Hands => [L_HAND, R_HAND].map(|root| (root..root + N_HAND_JOINTS).collect()).to_vec(),
         _ => vec![part.joints()],
@@ -26,9 +26,9 @@ pub(crate) fn metric(part: BodyPart) -> MetricFamily {
     MetricFamily::mean(definition, move |pair, blocks| {
         for t in 0..pair.n_frames() {
             for group in &groups {
-                let seen = group.iter().copied().filter(|joint| pair.seen[t][*joint]);
+                let visible = group.iter().copied().filter(|joint| pair.visible[t][*joint]);
                 let (predicted, ground_truth): (Vec<Vec3>, Vec<Vec3>) =
-                    seen.map(|joint| (pair.predicted[t][joint], pair.ground_truth[t][joint])).unzip();
+                    visible.map(|joint| (pair.predicted[t][joint], pair.ground_truth[t][joint])).unzip();
                 if predicted.len() >= 3 {
                     let sums = blocks.at(t);
                     sums[0] += 1000.0 * error(&predicted, &ground_truth);
@@ -39,18 +39,18 @@ pub(crate) fn metric(part: BodyPart) -> MetricFamily {
     })
 }
 
-/// Sum of the distances after the best similarity; NaN where a predicted point is not finite.
+/// Sum of the distances after the best similarity transform; NaN if a predicted point is not finite.
 fn error(predicted: &[Vec3], ground_truth: &[Vec3]) -> f64 {
     if predicted.iter().flatten().any(|v| !v.is_finite()) {
         return f64::NAN;
     }
     match similarity(predicted, ground_truth) {
         Some(best) => predicted.iter().zip(ground_truth).map(|(p, g)| vec3::norm(vec3::sub(best.apply(*p), *g))).sum(),
-        // all predicted points in one place: the best is the middle of the ground truth
+        // If all predicted points coincide, they are aligned to the centroid of the ground truth.
         None => {
             let n = ground_truth.len() as f64;
-            let middle: Vec3 = std::array::from_fn(|k| ground_truth.iter().map(|g| g[k]).sum::<f64>() / n);
-            ground_truth.iter().map(|g| vec3::norm(vec3::sub(middle, *g))).sum()
+            let centroid: Vec3 = std::array::from_fn(|k| ground_truth.iter().map(|g| g[k]).sum::<f64>() / n);
+            ground_truth.iter().map(|g| vec3::norm(vec3::sub(centroid, *g))).sum()
         }
     }
 }

@@ -1,6 +1,6 @@
-//! Share of correct keypoints (Ginosar et al. 2019, section 5; Rebol et al. 2021): a joint is correct when it lies within
-//! a share of the real pose's largest extent from the ground truth. `CorrectKeypoints` counts at a fifth, for training; the metric has any
-//! share, in the plane and in space.
+//! Percentage of correct keypoints, PCK (Ginosar et al. 2019, section 5; Rebol et al. 2021): a joint is correct if its
+//! distance from the ground truth is at most alpha times the largest extent of the real pose. `CorrectKeypoints` uses
+//! an alpha of 0.2 for training; the metrics support any alpha, in the image plane and in 3D.
 
 use crate::metrics::body_part::BodyPart;
 use crate::metrics::definition::{Better, Definition, MetricFamily};
@@ -10,38 +10,38 @@ use ndarray::{ArrayView2, ArrayView3, NdFloat};
 use orator_base::types::skeleton::{L_WRIST, N_JOINTS, NECK, R_SHOULDER, is_duplicate};
 use serde_json::json;
 
-/// A joint is correct up to this share of the pose's largest extent.
+/// Tolerance of a correct joint as a share of the largest extent of the pose.
 pub const ALPHA: f32 = 0.2;
 
-/// Correct and counted keypoints of one part of the body.
+/// Numbers of correct and of all keypoints of one part of the body.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct KeypointCount {
     pub n_correct: usize,
     pub n: usize,
 }
 
-/// Correct and counted keypoints.
+/// Numbers of correct and of all keypoints by part of the body.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CorrectKeypoints {
-    /// The published metric: every joint but the neck, the two hand roots (the wrists again) included.
+    /// Published metric: every joint but the neck, including the two hand roots, which duplicate the wrists.
     pub all: KeypointCount,
     /// Shoulders, elbows and wrists.
     pub body: KeypointCount,
-    /// The joints of both hands but their roots.
+    /// Joints of both hands except their roots.
     pub hands: KeypointCount,
 }
 
-/// In how many of the axes x, y, z distances and extents are taken.
+/// Axes in which distances and extents are measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PckAxes {
-    /// The picture's: as in the first publication.
+    /// Image plane, as in the first publication.
     Xy,
-    /// Space.
+    /// 3D space.
     Xyz,
 }
 
 impl KeypointCount {
-    /// Share of correct keypoints, 0..1; 0 of none.
+    /// Share of correct keypoints, 0..1; 0 if there are none.
     pub fn share(&self) -> f64 {
         self.n_correct as f64 / self.n.max(1) as f64
     }
@@ -52,7 +52,7 @@ impl KeypointCount {
     }
 }
 
-/// For each of `axes`, each alpha and each of `parts` one share.
+/// PCK for each combination of `axes`, `alphas` and `parts`.
 pub(crate) fn metric(axes: &[PckAxes], parts: &[BodyPart], alphas: &[f64]) -> MetricFamily {
     let mut variants = Vec::new();
     for axes in axes {
@@ -63,18 +63,18 @@ pub(crate) fn metric(axes: &[PckAxes], parts: &[BodyPart], alphas: &[f64]) -> Me
     family(variants, false, false)
 }
 
-/// PCK of speech2gesture (Ginosar et al. 2019, `common/evaluation.py` of their repository): every frame weighs the same,
-/// however many joints are seen.
+/// PCK of speech2gesture (Ginosar et al. 2019, `common/evaluation.py` in their repository): every frame has the same
+/// weight for any number of visible joints.
 pub(crate) fn by_frame(alphas: &[f64]) -> MetricFamily {
     family(alphas.iter().map(|alpha| (PckAxes::Xy, BodyPart::All, *alpha)).collect(), false, true)
 }
 
-/// In space, of all joints, with the neck in the box.
+/// PCK in 3D of all joints, with the neck included in the bounding box.
 pub(crate) fn neck_in_box(alphas: &[f64]) -> MetricFamily {
     family(alphas.iter().map(|alpha| (PckAxes::Xyz, BodyPart::All, *alpha)).collect(), true, false)
 }
 
-/// One share of each variant.
+/// Family with one PCK per variant.
 fn family(variants: Vec<(PckAxes, BodyPart, f64)>, neck_in_box: bool, by_frame: bool) -> MetricFamily {
     let definition = |(axes, part, alpha): &(PckAxes, BodyPart, f64)| {
         let (name, formula) = match axes {
@@ -112,13 +112,13 @@ fn family(variants: Vec<(PckAxes, BodyPart, f64)>, neck_in_box: bool, by_frame: 
     let first_boxed = if neck_in_box { NECK } else { NECK + 1 };
     let measure = move |pair: &PairedFrames, blocks: &mut BlockSums| {
         for t in 0..pair.n_frames() {
-            let (predicted, ground_truth, seen) = (&pair.predicted[t], &pair.ground_truth[t], &pair.seen[t]);
+            let (predicted, ground_truth, visible) = (&pair.predicted[t], &pair.ground_truth[t], &pair.visible[t]);
             for (row, (axes, joints, alpha)) in blocks.at(t).chunks_exact_mut(2).zip(&variants) {
-                let boxed = (first_boxed..N_JOINTS).filter(|joint| seen[*joint]);
+                let boxed = (first_boxed..N_JOINTS).filter(|joint| visible[*joint]);
                 let radius = alpha * extent(*axes, boxed, |joint, k| ground_truth[joint][k]);
-                let n_seen = joints.iter().filter(|joint| seen[**joint]).count();
+                let n_seen = joints.iter().filter(|joint| visible[**joint]).count();
                 let weight = if by_frame { 1.0 / n_seen as f64 } else { 1.0 };
-                for &joint in joints.iter().filter(|joint| seen[**joint]) {
+                for &joint in joints.iter().filter(|joint| visible[**joint]) {
                     let correct = distance(*axes, |k| predicted[joint][k], |k| ground_truth[joint][k]) <= radius;
                     row[0] += if correct { weight } else { 0.0 };
                     row[1] += weight;
@@ -139,7 +139,7 @@ impl PckAxes {
     }
 }
 
-/// Largest side of the box around these joints of a pose.
+/// Largest side of the bounding box of these joints of a pose.
 fn extent<F: NdFloat>(
     axes: PckAxes,
     joints: impl Iterator<Item = usize> + Clone,
@@ -153,7 +153,7 @@ fn extent<F: NdFloat>(
     (0..axes.n()).map(side).fold(F::zero(), F::max)
 }
 
-/// Distance of two points, whose coordinates `a` and `b` give.
+/// Distance of two points, given by functions `a` and `b` that return coordinate k.
 fn distance<F: NdFloat>(axes: PckAxes, a: impl Fn(usize) -> F, b: impl Fn(usize) -> F) -> F {
     (0..axes.n()).map(|k| (a(k) - b(k)).powi(2)).fold(F::zero(), |sum, square| sum + square).sqrt()
 }
@@ -164,10 +164,10 @@ impl CorrectKeypoints {
         self.all.share()
     }
 
-    /// Counts the joints of `predicted` [T, 49, 3] beside `ground_truth` [T, 49, 3], both metres, where `mask` [T, 49] is
-    /// true: correct when the distance is at most `ALPHA` of the largest side of the box around all real joints of
-    /// the frame that are seen, the neck left out, both in these axes. The radius is the same for every part. A
-    /// predicted joint that is not finite is wrong.
+    /// Counts the joints of `predicted` [T, 49, 3] against `ground_truth` [T, 49, 3], both in metres, where `mask` [T,
+    /// 49] is true. A joint is correct if its distance is at most `ALPHA` times the largest side of the bounding box of
+    /// all visible real joints of the frame except the neck, both in these axes. The radius is the same for all parts.
+    /// A predicted joint that is not finite is wrong.
     pub fn count(
         &mut self,
         axes: PckAxes,
@@ -178,9 +178,9 @@ impl CorrectKeypoints {
         for ((predicted, ground_truth), mask) in
             predicted.outer_iter().zip(ground_truth.outer_iter()).zip(mask.outer_iter())
         {
-            let seen: Vec<usize> = (NECK + 1..N_JOINTS).filter(|joint| mask[*joint]).collect();
-            let radius = ALPHA * extent(axes, seen.iter().copied(), |joint, k| ground_truth[[joint, k]]);
-            for joint in seen {
+            let visible: Vec<usize> = (NECK + 1..N_JOINTS).filter(|joint| mask[*joint]).collect();
+            let radius = ALPHA * extent(axes, visible.iter().copied(), |joint, k| ground_truth[[joint, k]]);
+            for joint in visible {
                 let correct = distance(axes, |k| predicted[[joint, k]], |k| ground_truth[[joint, k]]) <= radius;
                 self.all.add(correct);
                 match joint {
@@ -199,7 +199,7 @@ mod tests {
     use ndarray::{Array2, Array3};
 
     #[test]
-    fn the_radius_is_a_fifth_of_the_largest_extent() {
+    fn the_radius_is_alpha_times_the_largest_extent() {
         let mut ground_truth = Array3::<f32>::zeros((1, N_JOINTS, 3));
         ground_truth[[0, 1, 2]] = 1.0;
         let mut predicted = ground_truth.clone();
@@ -213,7 +213,7 @@ mod tests {
         correct.count(PckAxes::Xyz, predicted.view(), ground_truth.view(), mask.view());
         let count = |n_correct, n| KeypointCount { n_correct, n };
         assert_eq!(correct, CorrectKeypoints { all: count(45, 47), body: count(4, 5), hands: count(39, 40) });
-        // without z, the box is a point
+        // In the image plane the bounding box is a point.
         let mut flat = CorrectKeypoints::default();
         flat.count(PckAxes::Xy, predicted.view(), ground_truth.view(), mask.view());
         assert_eq!(flat.body, count(3, 5));

@@ -1,11 +1,11 @@
-//! Windows of 15 poses as rows of 64 numbers in a fixed orthonormal basis: the principal components of free captured
-//! motion and motion made by rule (`models/motion_basis.md`). No network: a row is one matrix product.
+//! Windows of 15 poses as 64 coordinates in a fixed orthonormal basis: the principal components of freely available
+//! motion capture and of rule-based motion (`models/motion_basis.md`). A row is one matrix product, without a network.
 //!
-//! A pose is 46 joints in centimetres, arms from the neck and fingers from their own wrist, each joint times a fixed
-//! weight, which makes the fingers' variance over the corpus that of the arms: else hands would be lost among
-//! the principal components.
+//! A pose is 46 joints in centimetres, arms relative to the neck and fingers relative to their wrist. Fixed weights
+//! give the fingers the same variance over the corpus as the arms, since the principal components would ignore the
+//! hands otherwise.
 
-use super::fixed_rate::{Frames, N_JOINTS_USED, N_NUMBERS, joints_used};
+use super::fixed_rate::{Frames, N_COORDINATES, N_JOINTS_USED, joints_used};
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array1, Array2, ArrayView2, ArrayView3, s};
 use orator_base::types::skeleton::{L_HAND, L_WRIST, NECK, R_HAND, R_WRIST};
@@ -13,42 +13,42 @@ use orator_base::types::time::FrameRate;
 use safetensors::{Dtype, SafeTensors};
 use std::sync::LazyLock;
 
-/// Frames of a window, at 15 a second: one second.
+/// Frames per window, 1 s at 15 fps.
 pub const WINDOW: usize = 15;
 /// Frames between the starts of two windows.
 pub const STRIDE: usize = 4;
-/// Numbers of a row.
+/// Dimensions of a row.
 pub const N: usize = 64;
 
 const FILE: &[u8] = include_bytes!("../../../../models/motion_basis.safetensors");
 const CM: f32 = 100.0;
-/// Windows multiplied at once.
+/// Windows per matrix product.
 const ROWS: usize = 256;
 
-/// Directions in the space of windows.
+/// Orthonormal basis of a subspace of windows.
 pub struct Basis {
-    /// Of each joint.
+    /// Weight of each joint.
     weights: Array1<f32>,
-    /// [window x numbers, N], a direction a column.
+    /// Basis vectors as columns [window x coordinates, N].
     directions: Array2<f32>,
 }
 
 static BUILT_IN: LazyLock<Option<Basis>> = LazyLock::new(|| Basis::parse(FILE).ok());
 
-/// Rows [n, 64] of the wholly seen windows of `joints` [T, 49, 3] (metres), `mask` [T, 49]; weighted centimetres. For
-/// a predicted motion the mask is that of the ground truth beside it.
+/// Rows [n, 64] in weighted centimetres of the completely visible windows of `joints` [T, 49, 3] in metres with `mask`
+/// [T, 49]; the mask of a prediction is that of its ground truth.
 pub fn windows(joints: ArrayView3<f32>, mask: ArrayView2<bool>, fps: FrameRate) -> Array2<f64> {
-    // a test holds that the built-in file is whole
+    // A test guarantees that the built-in file is valid.
     BUILT_IN.as_ref().map_or_else(|| Array2::zeros((0, N)), |basis| basis.rows(&Frames::new(joints, mask, fps)))
 }
 
-/// Hash of the basis' numbers, hex: values of another basis are not comparable.
+/// Hash of the basis, hexadecimal; values of different bases are not comparable.
 pub fn hash() -> String {
     blake3::hash(FILE).to_hex().to_string()
 }
 
 impl Basis {
-    /// From the bytes of a file of `orator-lab train basis`. Errors on tensors that are missing or of another shape.
+    /// Basis from the bytes of a file of `orator-lab train basis`. Fails if tensors are missing or of another shape.
     pub fn parse(bytes: &[u8]) -> Result<Self> {
         let file = SafeTensors::deserialize(bytes)?;
         let numbers = |name: &str, shape: &[usize]| -> Result<Vec<f32>> {
@@ -63,7 +63,8 @@ impl Basis {
             Ok(bytes.map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
         };
         let weights = Array1::from_vec(numbers("weights", &[N_JOINTS_USED])?);
-        let rows = Array2::from_shape_vec((N, WINDOW * N_NUMBERS), numbers("basis", &[N, WINDOW * N_NUMBERS])?)?;
+        let rows =
+            Array2::from_shape_vec((N, WINDOW * N_COORDINATES), numbers("basis", &[N, WINDOW * N_COORDINATES])?)?;
         Ok(Self { weights, directions: rows.reversed_axes().as_standard_layout().into_owned() })
     }
 
@@ -74,7 +75,7 @@ impl Basis {
         }
         let starts = frames.starts(WINDOW, STRIDE);
         let mut rows = Array2::zeros((starts.len(), N));
-        let mut windows = Array2::zeros((ROWS.min(starts.len()), WINDOW * N_NUMBERS));
+        let mut windows = Array2::zeros((ROWS.min(starts.len()), WINDOW * N_COORDINATES));
         for (first, starts) in starts.chunks(ROWS).enumerate() {
             for (&start, mut window) in starts.iter().zip(windows.outer_iter_mut()) {
                 let part = poses.slice(s![start..start + WINDOW, ..]);
@@ -87,10 +88,10 @@ impl Basis {
     }
 }
 
-/// Poses [T, 138] of joints [T, 49, 3] in metres: centimetres, arms from the neck, fingers from their wrist, not
-/// weighted yet.
+/// Unweighted poses [T, 138] in centimetres of joints [T, 49, 3] in metres: arms relative to the neck, fingers relative
+/// to their wrist.
 pub fn poses(joints: ArrayView3<f32>) -> Array2<f32> {
-    let mut poses = Array2::zeros((joints.shape()[0], N_NUMBERS));
+    let mut poses = Array2::zeros((joints.shape()[0], N_COORDINATES));
     for (mut pose, frame) in poses.outer_iter_mut().zip(joints.outer_iter()) {
         for (i, joint) in joints_used().enumerate() {
             let from = origin(joint);
@@ -100,7 +101,7 @@ pub fn poses(joints: ArrayView3<f32>) -> Array2<f32> {
     poses
 }
 
-/// Whether the joint is a finger's.
+/// Whether the joint belongs to a finger.
 pub fn is_finger(joint: usize) -> bool {
     joint > L_HAND
 }
@@ -132,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_are_the_products_of_their_windows() {
+    fn rows_match_products_of_single_windows() {
         let (joints, mask) = (moving(1200), Array2::from_elem((1200, N_JOINTS), true));
         let rows = windows(joints.view(), mask.view(), FPS);
         assert_eq!(rows.dim(), ((1200 - 15) / 4 + 1, N));
@@ -141,7 +142,7 @@ mod tests {
             let window = poses(joints.slice(s![4 * n..4 * n + 15, .., ..]));
             for k in [0, 17, 63] {
                 let number = |(i, v): (usize, &f32)| {
-                    f64::from(*v) * f64::from(basis.weights[i % N_NUMBERS / 3] * basis.directions[[i, k]])
+                    f64::from(*v) * f64::from(basis.weights[i % N_COORDINATES / 3] * basis.directions[[i, k]])
                 };
                 let sum: f64 = window.iter().enumerate().map(number).sum();
                 assert!((sum - rows[[n, k]]).abs() < 1e-3 * (1.0 + sum.abs()), "{n} {k}: {sum} {}", rows[[n, k]]);
@@ -150,11 +151,11 @@ mod tests {
     }
 
     #[test]
-    fn an_offset_of_the_whole_body_changes_nothing() {
+    fn translation_of_the_body_has_no_effect() {
         let (joints, mask) = (moving(40), Array2::from_elem((40, N_JOINTS), true));
-        let there = windows(joints.view(), mask.view(), FPS);
-        let elsewhere = windows((joints + 2.0).view(), mask.view(), FPS);
-        assert!(there.iter().zip(&elsewhere).all(|(a, b)| (a - b).abs() < 1e-2));
-        assert_eq!(there.nrows(), 7);
+        let original = windows(joints.view(), mask.view(), FPS);
+        let translated = windows((joints + 2.0).view(), mask.view(), FPS);
+        assert!(original.iter().zip(&translated).all(|(a, b)| (a - b).abs() < 1e-2));
+        assert_eq!(original.nrows(), 7);
     }
 }

@@ -1,8 +1,8 @@
-//! Windows of 34 poses as rows of 32 numbers of a fixed trained encoder (`nn::motion_encoder`,
-//! `models/motion_embedding.md`), after Yoon et al. 2020. It looks at the directions of the bones, so a speaker's size
-//! says nothing and every bone of a finger as much as an upper arm.
+//! Embedding of windows of 34 poses in 32 dimensions by a fixed trained encoder (`nn::motion_encoder`,
+//! `models/motion_embedding.md`), after Yoon et al. 2020. Its input are bone directions, so the size of a speaker does
+//! not matter, and a finger bone has the same weight as an upper arm.
 
-use super::fixed_rate::{FPS, Frames, N_NUMBERS, joints_used};
+use super::fixed_rate::{FPS, Frames, N_COORDINATES, joints_used};
 use anyhow::{Context, Result, ensure};
 use candle_core::safetensors::load_buffer;
 use candle_core::{Device, Tensor};
@@ -14,34 +14,34 @@ use orator_nn::params::Params;
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
-/// Frames of a window, at 15 a second: 2.3 s.
+/// Frames per window, 2.3 s at 15 fps.
 pub const WINDOW: usize = motion_encoder::WINDOW;
 /// Frames between the starts of two windows.
 pub const STRIDE: usize = 4;
-/// Numbers of a row.
+/// Dimensions of the embedding.
 pub const N: usize = motion_encoder::N_CODE;
 /// Kind of the weights file.
 pub const KIND: &str = "motion-embedding";
 
 const FILE: &[u8] = include_bytes!("../../../../models/motion_embedding.safetensors");
-/// Windows that go through the network together.
-const TOGETHER: usize = 256;
+/// Windows per batch of the network.
+const BATCH: usize = 256;
 
 static BUILT_IN: LazyLock<Option<MotionEncoder>> = LazyLock::new(|| parse(FILE).ok());
 
-/// Rows [n, 32] of the wholly seen windows of `joints` [T, 49, 3] (metres), `mask` [T, 49]. For a predicted motion the mask is
-/// that of the ground truth beside it. Where numbers are beyond all sense the row is NaN.
+/// Embeddings [n, 32] of the completely visible windows of `joints` [T, 49, 3] in metres with `mask` [T, 49]; the mask
+/// of a prediction is that of its ground truth. Rows are NaN if the encoder fails.
 pub fn windows(joints: ArrayView3<f32>, mask: ArrayView2<bool>, fps: FrameRate) -> Array2<f64> {
-    // a test holds that the built-in file is whole
+    // A test guarantees that the built-in file is valid.
     BUILT_IN.as_ref().map_or_else(|| Array2::zeros((0, N)), |encoder| rows(encoder, &Frames::new(joints, mask, fps)))
 }
 
-/// Hash of the encoder's numbers, hex: values of another encoder are not comparable.
+/// Hash of the encoder weights, hexadecimal; values of different encoders are not comparable.
 pub fn hash() -> String {
     blake3::hash(FILE).to_hex().to_string()
 }
 
-/// The encoder of a file of `orator-lab train embedding`.
+/// Encoder from the bytes of a file of `orator-lab train embedding`.
 pub fn parse(bytes: &[u8]) -> Result<MotionEncoder> {
     let (_, header) = safetensors::SafeTensors::read_metadata(bytes)?;
     let facts = header.metadata().as_ref().and_then(|m| m.get("orator")).context("it was not written by orator")?;
@@ -58,15 +58,15 @@ pub fn parse(bytes: &[u8]) -> Result<MotionEncoder> {
     Ok(encoder)
 }
 
-/// Rows [n, 32] of these frames by this encoder.
+/// Embeddings [n, 32] of all windows of these frames by this encoder.
 pub fn rows(encoder: &MotionEncoder, frames: &Frames) -> Array2<f64> {
     let directions = directions(frames.joints.view());
     let mut parts = Vec::new();
-    for whole in &frames.whole {
-        let n = (whole.len() + 1).saturating_sub(WINDOW).div_ceil(STRIDE);
-        for first in (0..n).step_by(TOGETHER) {
-            let n = TOGETHER.min(n - first);
-            let start = whole.start + first * STRIDE;
+    for range in &frames.complete {
+        let n = (range.len() + 1).saturating_sub(WINDOW).div_ceil(STRIDE);
+        for first in (0..n).step_by(BATCH) {
+            let n = BATCH.min(n - first);
+            let start = range.start + first * STRIDE;
             let part = directions.slice(s![start..start + (n - 1) * STRIDE + WINDOW, ..]);
             let codes = encoder.codes(part, STRIDE).unwrap_or_else(|_| Array2::from_elem((n, N), f32::NAN));
             parts.push(codes.mapv(f64::from));
@@ -76,10 +76,10 @@ pub fn rows(encoder: &MotionEncoder, frames: &Frames) -> Array2<f64> {
     concatenate(ndarray::Axis(0), &views).unwrap_or_else(|_| Array2::zeros((0, N)))
 }
 
-/// Unit vectors [T, 138] of the bones that end in the joints that say something; a bone without length is 0.
+/// Unit vectors [T, 138] of the bones that end in the joints used; 0 for a bone without length.
 pub fn directions(joints: ArrayView3<f32>) -> Array2<f32> {
     let bones: Vec<(usize, usize)> = joints_used().filter_map(|joint| Some((parent(joint)?, joint))).collect();
-    let mut directions = Array2::zeros((joints.shape()[0], N_NUMBERS));
+    let mut directions = Array2::zeros((joints.shape()[0], N_COORDINATES));
     for (mut row, frame) in directions.outer_iter_mut().zip(joints.outer_iter()) {
         for (i, &(from, to)) in bones.iter().enumerate() {
             let bone: [f32; 3] = std::array::from_fn(|k| frame[[to, k]] - frame[[from, k]]);
@@ -99,7 +99,7 @@ mod tests {
     use orator_base::types::skeleton::N_JOINTS;
 
     #[test]
-    fn rows_do_not_depend_on_what_lies_beside_their_window_nor_on_size() {
+    fn rows_depend_on_their_window_only_and_not_on_size() {
         let joints = moving(1100);
         let mut mask = Array2::from_elem((1100, N_JOINTS), true);
         let rows = windows(joints.view(), mask.view(), FPS);
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn the_bits_do_not_depend_on_threads() {
+    fn results_are_bitwise_independent_of_threads() {
         let joints = moving(700);
         let mask = Array2::from_elem((700, N_JOINTS), true);
         let with = |n: usize| {
@@ -133,11 +133,11 @@ mod tests {
     }
 
     #[test]
-    fn the_built_in_weights_fit() {
+    fn the_built_in_weights_are_valid() {
         parse(FILE).unwrap();
         assert!(FILE.len() < 1_000_000);
-        let says = |bytes: &[u8]| format!("{:#}", parse(bytes).err().unwrap());
-        assert!(says(include_bytes!("../../../../models/hand_lifter.safetensors")).contains("motion-embedding"));
-        says(&FILE[..1000]);
+        let error = |bytes: &[u8]| format!("{:#}", parse(bytes).err().unwrap());
+        assert!(error(include_bytes!("../../../../models/hand_lifter.safetensors")).contains("motion-embedding"));
+        error(&FILE[..1000]);
     }
 }

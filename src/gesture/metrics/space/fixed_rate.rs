@@ -1,33 +1,34 @@
-//! Motion as the two fixed spaces (`basis`, `embedding`) look at it: 15 frames a second whatever the file's rate, joints
-//! seen from the neck, and the stretches in which nothing is missing.
+//! Input of the two fixed spaces (`basis`, `embedding`): motion resampled to 15 fps, joints relative to the neck, and
+//! the ranges of frames in which nothing is missing.
 
 use ndarray::{Array3, ArrayView2, ArrayView3};
 use orator_base::types::skeleton::{N_JOINTS, NECK, is_duplicate};
 use orator_base::types::time::FrameRate;
 use std::ops::Range;
 
-/// The rate of the fixed spaces.
+/// Frame rate of the fixed spaces.
 pub const FPS: FrameRate = FrameRate::new(15, 1);
-/// Joints that say something: all but the neck and the two hand roots.
+/// Number of joints used: all but the neck and the two hand roots.
 pub const N_JOINTS_USED: usize = 46;
-/// Numbers of a frame.
-pub const N_NUMBERS: usize = 3 * N_JOINTS_USED;
+/// Coordinates per frame.
+pub const N_COORDINATES: usize = 3 * N_JOINTS_USED;
 
-/// The joints that say something, in house order.
+/// The joints used, in skeleton order.
 pub fn joints_used() -> impl Iterator<Item = usize> {
     (NECK + 1..N_JOINTS).filter(|joint| !is_duplicate(*joint))
 }
 
-/// Joints [T, 49, 3] at 15 frames a second, metres, the neck at the origin.
+/// Motion at 15 fps.
 pub struct Frames {
+    /// Joints [T, 49, 3], metres, the neck at the origin.
     pub joints: Array3<f32>,
-    /// Stretches of frames in which neck and every joint that says something were seen and are finite.
-    pub whole: Vec<Range<usize>>,
+    /// Ranges of frames in which all joints used are visible, and they and the neck are finite.
+    pub complete: Vec<Range<usize>>,
 }
 
 impl Frames {
-    /// Of `joints` [T, 49, 3] with `mask` [T, 49]. At another rate a frame lies on the straight line between the two
-    /// beside it, and is whole where both are.
+    /// Resamples `joints` [T, 49, 3] with `mask` [T, 49] to 15 fps. Frames are interpolated linearly between their two
+    /// neighbours, and complete if both are.
     pub fn new(joints: ArrayView3<f32>, mask: ArrayView2<bool>, fps: FrameRate) -> Self {
         let n = joints.shape()[0].min(mask.nrows());
         let is_whole = |t: usize| {
@@ -37,9 +38,9 @@ impl Frames {
         let source: Vec<bool> = (0..n).map(is_whole).collect();
         let per_frame = fps.per_sec() / FPS.per_sec();
         let n_out = if n == 0 { 0 } else { ((n - 1) as f64 / per_frame + 1e-9) as usize + 1 };
-        let beside = |t: usize| {
+        let neighbour = |t: usize| {
             let at = t as f64 * per_frame;
-            // a place this near to a frame is that frame
+            // Positions this close to a frame are that frame.
             let (before, along) = (at as usize, at.fract());
             match along {
                 _ if along < 1e-6 || before + 1 >= n => (before.min(n - 1), 0.0),
@@ -48,11 +49,11 @@ impl Frames {
             }
         };
         let mut out = Array3::zeros((n_out, N_JOINTS, 3));
-        let mut seen = vec![false; n_out];
-        for (t, (mut frame, seen)) in out.outer_iter_mut().zip(&mut seen).enumerate() {
-            let (a, along) = beside(t);
+        let mut visible = vec![false; n_out];
+        for (t, (mut frame, visible)) in out.outer_iter_mut().zip(&mut visible).enumerate() {
+            let (a, along) = neighbour(t);
             let b = if along > 0.0 { a + 1 } else { a };
-            *seen = source[a] && source[b];
+            *visible = source[a] && source[b];
             let at = |joint: usize, k: usize| {
                 let (from, to) = (joints[[a, joint, k]], joints[[b, joint, k]]);
                 from + along * (to - from)
@@ -61,21 +62,20 @@ impl Frames {
                 (0..3).for_each(|k| frame[[joint, k]] = at(joint, k) - at(NECK, k));
             }
         }
-        Self { joints: out, whole: stretches(&seen) }
+        Self { joints: out, complete: true_ranges(&visible) }
     }
 
-    /// First frames of the windows of `window` frames, each `stride` after the one before, counted anew in every whole
-    /// stretch.
+    /// First frames of the windows of `window` frames, every `stride` frames within each complete range.
     pub fn starts(&self, window: usize, stride: usize) -> Vec<usize> {
-        let of = |whole: &Range<usize>| (whole.start..(whole.end + 1).saturating_sub(window)).step_by(stride);
-        self.whole.iter().flat_map(of).collect()
+        let of = |range: &Range<usize>| (range.start..(range.end + 1).saturating_sub(window)).step_by(stride);
+        self.complete.iter().flat_map(of).collect()
     }
 }
 
-fn stretches(seen: &[bool]) -> Vec<Range<usize>> {
+fn true_ranges(visible: &[bool]) -> Vec<Range<usize>> {
     let mut found = Vec::new();
     let mut from = 0;
-    for part in seen.chunk_by(|a, b| a == b) {
+    for part in visible.chunk_by(|a, b| a == b) {
         if part.first() == Some(&true) {
             found.push(from..from + part.len());
         }
@@ -84,7 +84,7 @@ fn stretches(seen: &[bool]) -> Vec<Range<usize>> {
     found
 }
 
-/// Motion without meaning in which every joint moves, [n, 49, 3].
+/// Artificial motion in which every joint moves, [n, 49, 3].
 #[cfg(test)]
 pub(super) fn moving(n: usize) -> Array3<f32> {
     Array3::from_shape_fn((n, N_JOINTS, 3), |(t, joint, k)| {
@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn other_rates_become_fifteen_and_the_neck_the_origin() {
+    fn motion_is_resampled_and_relative_to_the_neck() {
         assert_eq!(joints_used().count(), N_JOINTS_USED);
         for (num, n, expected) in [(15, 31, 31), (30, 61, 31), (60, 121, 31), (25, 51, 31), (10, 21, 31), (30, 60, 30)]
         {
@@ -113,7 +113,7 @@ mod tests {
             let frames =
                 Frames::new(joints.view(), Array2::from_elem((n, N_JOINTS), true).view(), FrameRate::new(num, 1));
             assert_eq!(frames.joints.shape()[0], expected, "{num} fps");
-            assert!(frames.whole.iter().eq(std::iter::once(&(0..expected))), "{num} fps: {:?}", frames.whole);
+            assert!(frames.complete.iter().eq(std::iter::once(&(0..expected))), "{num} fps: {:?}", frames.complete);
             for t in 0..expected {
                 let found = frames.joints[[t, R_WRIST, 1]];
                 assert!((found - (3.0 + t as f32)).abs() < 1e-4, "{num} fps, frame {t}: {found}");
@@ -122,18 +122,18 @@ mod tests {
     }
 
     #[test]
-    fn windows_are_wholly_seen() {
+    fn windows_are_completely_visible() {
         let mut mask = Array2::from_elem((40, N_JOINTS), true);
         mask[[20, R_WRIST]] = false;
         mask[[5, L_HAND]] = false;
         let mut joints = line(40, 0.1);
         joints[[39, 48, 2]] = f32::NAN;
         let frames = Frames::new(joints.view(), mask.view(), FPS);
-        assert_eq!(frames.whole, [0..20, 21..39]);
+        assert_eq!(frames.complete, [0..20, 21..39]);
         assert_eq!(frames.starts(15, 4), [0, 4, 21]);
         assert_eq!(frames.starts(30, 1), [0; 0]);
         let half = Frames::new(joints.view(), mask.view(), FrameRate::new(30, 1));
-        assert_eq!(half.whole, [0..10, 11..20]);
-        assert!(Frames::new(line(0, 0.0).view(), Array2::default((0, N_JOINTS)).view(), FPS).whole.is_empty());
+        assert_eq!(half.complete, [0..10, 11..20]);
+        assert!(Frames::new(line(0, 0.0).view(), Array2::default((0, N_JOINTS)).view(), FPS).complete.is_empty());
     }
 }

@@ -1,4 +1,5 @@
-//! Spaces of movement of fixed length, in which Frechet distances are taken: a linear basis and a learnt embedding.
+//! Feature spaces for windows of fixed length, in which Frechet distances are computed: a linear basis and a trained
+//! embedding.
 
 pub mod basis;
 pub mod embedding;

@@ -1,6 +1,6 @@
-//! Random changes of a training window that a speaker's gestures do not depend on, so that little speech is not learnt by
-//! heart: other moments and speeds, other loudness and pitch, room noise, hidden bands and moments (Park et al. 2019),
-//! the body in a mirror.
+//! Augmentation of training windows, against overfitting to little speech: changes that a speaker's gestures do not
+//! depend on. Time shift and speed, gain and pitch, background noise, masked bands and frames (SpecAugment, Park et al.
+//! 2019), and mirrored poses.
 
 use crate::generate::mel_stream::mel_frames;
 use crate::generate::normalisation::Normalisation;
@@ -14,38 +14,38 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// Spectrogram frames a second.
+/// Spectrogram frames per second.
 const MEL_RATE: f64 = 100.0;
-/// Tells the random numbers of changes from those that choose windows.
-const CHANGES: u64 = 0x6368_616e_6765;
-/// Numbers the noise's spectrum has along the bands, between which it is linear.
+/// Seed modifier that makes augmentation independent of the choice of windows.
+const SEED_OF_CHANGES: u64 = 0x6368_616e_6765;
+/// Knots of the piecewise linear noise spectrum over the bands.
 const NOISE_KNOTS: usize = 5;
 
-/// A window's change.
+/// Random augmentation of a window.
 #[derive(Clone, Debug, Default)]
 pub struct WindowChange {
-    /// Seconds by which the window begins later, or earlier, than the one drawn.
+    /// Offset of the start of the window, seconds; negative is earlier.
     pub shift_secs: f64,
-    /// Seconds of the interval that a second of the window holds.
+    /// Playback speed: seconds of the interval per second of the window.
     pub speed: f64,
     pub is_mirrored: bool,
     pitch_bands: f64,
     gain: f32,
-    /// Mean magnitude of the noise as a share of the window's; 0: none.
+    /// Mean magnitude of the noise relative to that of the window; 0: no noise.
     noise: f32,
     masked_bands: [usize; 2],
     masked_frames: [usize; 2],
     seed: u64,
 }
 
-/// A window in rows: spectrogram [64, mel frames], poses [numbers, T], mask of the numbers [numbers, T].
+/// Augmented window: spectrogram [64, mel frames], poses [features, T] and their mask [features, T].
 pub struct WindowRows {
     pub mels: Array2<f32>,
     pub poses: Array2<f32>,
     pub mask: Array2<f32>,
 }
 
-/// Changes of the windows of the step after `step` steps; empty where nothing is to be changed.
+/// Changes of the windows of the step after `step` completed steps; empty if the settings disable all augmentation.
 pub fn changes(settings: &GanSettings, step: usize, fps: FrameRate) -> Vec<WindowChange> {
     let of = settings;
     let is_changing = of.augment_speed > 0.0
@@ -58,23 +58,23 @@ pub fn changes(settings: &GanSettings, step: usize, fps: FrameRate) -> Vec<Windo
     if !is_changing {
         return Vec::new();
     }
-    let mut rng = resume::stream(settings.seed ^ CHANGES, step);
-    let reach = 0.5 * fps.secs(settings.stride_frames);
+    let mut rng = resume::step_rng(settings.seed ^ SEED_OF_CHANGES, step);
+    let max_shift = 0.5 * fps.secs(settings.stride_frames);
     let n_mels = mel_frames(fps, settings.window_frames);
-    (0..settings.batch).map(|_| WindowChange::draw(settings, reach, n_mels, &mut rng)).collect()
+    (0..settings.batch).map(|_| WindowChange::draw(settings, max_shift, n_mels, &mut rng)).collect()
 }
 
 impl WindowChange {
-    fn draw(of: &GanSettings, reach: f64, n_mels: usize, rng: &mut ChaCha8Rng) -> Self {
-        let mut within = |reach: f64| (2.0 * rng.random::<f64>() - 1.0) * reach;
-        let shift_secs = within(reach);
+    fn draw(of: &GanSettings, max_shift: f64, n_mels: usize, rng: &mut ChaCha8Rng) -> Self {
+        let mut within = |limit: f64| (2.0 * rng.random::<f64>() - 1.0) * limit;
+        let shift_secs = within(max_shift);
         let speed = within(of.augment_speed).exp();
         let pitch_bands = within(of.augment_pitch);
         let gain = (within(of.augment_gain_db) * std::f64::consts::LN_10 / 20.0) as f32;
         let noise_db = of.augment_noise_db - 15.0 * (1.0 + within(1.0));
         let noise = if of.augment_noise_db > -120.0 { 10f64.powf(noise_db / 20.0) as f32 } else { 0.0 };
-        let mut span = |most: usize, n: usize| {
-            let length = rng.random_range(0..=most.min(n) as u64) as usize;
+        let mut span = |longest: usize, n: usize| {
+            let length = rng.random_range(0..=longest.min(n) as u64) as usize;
             let first = rng.random_range(0..=(n - length) as u64) as usize;
             [first, first + length]
         };
@@ -85,7 +85,7 @@ impl WindowChange {
         Self { shift_secs, speed, is_mirrored, pitch_bands, gain, noise, masked_bands, masked_frames, seed }
     }
 
-    /// Changes the sound of a window in place, [64, mel frames].
+    /// Applies the audio changes in place to the log-mels [64, mel frames] of a window.
     pub fn change_sound(&self, mels: &mut Array2<f32>) {
         let silence = mel::FLOOR.ln();
         if self.pitch_bands != 0.0 {
@@ -113,7 +113,7 @@ impl WindowChange {
         mels.slice_mut(s![.., first..last]).fill(mean);
     }
 
-    /// Magnitudes of noise with a random, smooth spectrum.
+    /// Adds noise magnitudes with a random, smooth spectrum.
     fn add_noise(&self, mels: &mut Array2<f32>) {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         let level = self.noise * mels.iter().map(|x| x.exp()).sum::<f32>() / mels.len().max(1) as f32;
@@ -124,7 +124,7 @@ impl WindowChange {
             let (low, share) = (at as usize, at.fract());
             let height = level * (knots[low] + share * (knots[(low + 1).min(NOISE_KNOTS - 1)] - knots[low]));
             row.mapv_inplace(|x| {
-                // Magnitudes of a band of noise vary little beside their mean.
+                // The magnitudes of a noise band vary little around their mean.
                 let magnitude = height * (0.75 + 0.5 * rng.random::<f32>());
                 (x.exp() + magnitude).ln()
             });
@@ -132,20 +132,20 @@ impl WindowChange {
     }
 }
 
-/// Poses [144 or more, T] and their mask of a body in a mirror: left and right change places, x its sign.
+/// Mirrors normalised poses [features, T] and their mask in place: swaps left and right, and flips the sign of x.
 pub fn mirror(poses: &mut Array2<f32>, mask: &mut Array2<f32>, normal: &Normalisation) {
-    let (own, seen) = (poses.clone(), mask.clone());
+    let (source, source_mask) = (poses.clone(), mask.clone());
     for joint in 1..N_JOINTS {
         for k in 0..3 {
             let (to, from) = (3 * (joint - 1) + k, 3 * (skeleton::mirror(joint) - 1) + k);
             let sign = if k == 0 { -1.0 } else { 1.0 };
             let (mean, std) = (normal.mean[to], normal.std[to].max(1e-6));
-            let metres = own.row(from).mapv(|x| sign * (x * normal.std[from] + normal.mean[from]));
+            let metres = source.row(from).mapv(|x| sign * (x * normal.std[from] + normal.mean[from]));
             poses.row_mut(to).assign(&metres.mapv(|x| (x - mean) / std));
-            mask.row_mut(to).assign(&seen.row(from));
+            mask.row_mut(to).assign(&source_mask.row(from));
         }
     }
-    // Of angles yaw and roll change their sign.
+    // Yaw and roll change their sign, pitch does not.
     for (n, of) in normal.channels.iter().enumerate() {
         for k in [0, 2] {
             let row = 3 * (N_JOINTS - 1) + 3 * n + k;
@@ -156,9 +156,9 @@ pub fn mirror(poses: &mut Array2<f32>, mask: &mut Array2<f32>, normal: &Normalis
     poses.zip_mut_with(mask, |x, seen| *x *= seen);
 }
 
-/// Noise of this deviation on `x`, from the stream of a step.
+/// `n` samples of Gaussian noise with standard deviation `std`, determined by seed and step.
 pub fn gaussian(n: usize, std: f64, seed: u64, step: usize) -> Vec<f32> {
-    let mut rng = resume::stream(seed ^ !CHANGES, step);
+    let mut rng = resume::step_rng(seed ^ !SEED_OF_CHANGES, step);
     (0..n).map(|_| (std * <StandardNormal as Distribution<f64>>::sample(&StandardNormal, &mut rng)) as f32).collect()
 }
 
@@ -169,7 +169,7 @@ mod tests {
     use orator_base::types::skeleton::{L_WRIST, R_WRIST};
     use orator_dataset::config::GanRecipe;
 
-    fn still() -> WindowChange {
+    fn unchanged() -> WindowChange {
         WindowChange { speed: 1.0, seed: 1, ..WindowChange::default() }
     }
 
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_always_has_the_same_changes_within_their_bounds() {
+    fn changes_are_reproducible_and_within_their_bounds() {
         let (of, fps) = (of_minutes(GanRecipe::Auto, 10.0), FrameRate::new(15, 1));
         let text = |step| format!("{:?}", changes(&of, step, fps));
         assert!(text(3) == text(3) && text(3) != text(4));
@@ -192,27 +192,27 @@ mod tests {
     }
 
     #[test]
-    fn each_change_does_what_it_says() {
+    fn each_change_has_its_effect() {
         let changed = |change: WindowChange| {
             let mut mels = sound();
             change.change_sound(&mut mels);
             mels
         };
-        assert_eq!(changed(still()), sound());
-        let louder = changed(WindowChange { gain: 0.5, ..still() });
+        assert_eq!(changed(unchanged()), sound());
+        let louder = changed(WindowChange { gain: 0.5, ..unchanged() });
         assert!((&louder - &sound()).iter().all(|gain| (gain - 0.5).abs() < 1e-6));
-        let higher = changed(WindowChange { pitch_bands: 2.0, ..still() });
+        let higher = changed(WindowChange { pitch_bands: 2.0, ..unchanged() });
         assert_eq!(higher.row(10), sound().row(8));
-        let noisy = changed(WindowChange { noise: 0.1, ..still() });
+        let noisy = changed(WindowChange { noise: 0.1, ..unchanged() });
         assert!(noisy.iter().zip(&sound()).all(|(noisy, own)| noisy > own && noisy - own < 3.0));
-        let masked = changed(WindowChange { masked_bands: [4, 9], masked_frames: [10, 20], ..still() });
+        let masked = changed(WindowChange { masked_bands: [4, 9], masked_frames: [10, 20], ..unchanged() });
         let mean = sound().mean().unwrap();
         assert!(masked.slice(s![4..9, ..]).iter().all(|x| *x == mean) && masked[[30, 15]] == mean);
         assert_eq!(masked[[3, 9]], sound()[[3, 9]]);
     }
 
     #[test]
-    fn a_mirror_swaps_the_hands_and_twice_is_none() {
+    fn mirroring_swaps_the_hands_and_is_an_involution() {
         let mean = Array2::from_shape_fn((N_JOINTS, 3), |(joint, k)| 0.01 * joint as f32 - 0.1 * k as f32);
         let std = Array2::from_shape_fn((N_JOINTS, 3), |(joint, k)| 0.1 + 0.001 * (joint + k) as f32);
         let normal = Normalisation::new(&mean, &std, vec![0.1; N_JOINTS - 1]);

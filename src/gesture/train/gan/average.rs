@@ -1,21 +1,21 @@
-//! Exponential mean of a network's numbers over the steps (Polyak & Juditsky 1992; Tarvainen & Valpola 2017): it moves
-//! less than the last step's, and is what is validated and generates.
+//! Exponential moving average (EMA) of the weights over the steps (Polyak & Juditsky 1992; Tarvainen & Valpola 2017).
+//! It fluctuates less than the weights of the last step, and is used for validation and generation.
 
 use candle_core::{CpuStorage, InplaceOp2, Layout, Result};
 use orator_nn::cpu::thread_team::parallel_for;
 use orator_nn::params::Params;
 use std::sync::Mutex;
 
-/// Numbers one task updates.
+/// Elements per task.
 const GRAIN: usize = 32 * 1024;
 
-/// Moves each tensor of `mean` towards that of the same name in `now`: decay x mean + (1 - decay) x now, the decay after
-/// `step` steps at most (1 + step) / (10 + step), so that the first weights are soon forgotten.
+/// Updates each tensor of `mean` with the tensor of the same name in `now`: decay x mean + (1 - decay) x now. The decay
+/// after `step` steps is at most (1 + step) / (10 + step), so that the initial weights soon lose their influence.
 pub fn update(mean: &Params, now: &Params, decay: f64, step: usize) -> Result<()> {
     let decay = decay.min((1.0 + step as f64) / (10.0 + step as f64));
     for ((_, mean), (_, now)) in mean.all().zip(now.all()) {
         if mean.device().is_cpu() {
-            mean.inplace_op2(now.as_tensor(), &TowardsMean(decay as f32))?;
+            mean.inplace_op2(now.as_tensor(), &EmaUpdate(decay as f32))?;
         } else {
             mean.set(&((mean.as_detached_tensor() * decay)? + (now.as_detached_tensor() * (1.0 - decay))?)?)?;
         }
@@ -23,10 +23,10 @@ pub fn update(mean: &Params, now: &Params, decay: f64, step: usize) -> Result<()
     Ok(())
 }
 
-/// a <- decay a + (1 - decay) b.
-struct TowardsMean(f32);
+/// In-place operator a <- decay a + (1 - decay) b with the decay as field.
+struct EmaUpdate(f32);
 
-impl InplaceOp2 for TowardsMean {
+impl InplaceOp2 for EmaUpdate {
     fn name(&self) -> &'static str {
         "exponential-mean"
     }
@@ -39,7 +39,7 @@ impl InplaceOp2 for TowardsMean {
         let pieces = mean[start..end].chunks_mut(GRAIN).zip(now.chunks(GRAIN));
         let pieces: Vec<_> = pieces.map(Mutex::new).collect();
         parallel_for(pieces.len(), |piece| {
-            // Every piece is taken once: the lock is free.
+            // Each piece is locked by exactly one task, so the lock is never contended.
             let Ok(mut piece) = pieces[piece].lock() else { return };
             let (mean, now) = &mut *piece;
             mean.iter_mut().zip(now.iter()).for_each(|(mean, now)| *mean = decay * *mean + (1.0 - decay) * now);
@@ -54,14 +54,14 @@ mod tests {
     use orator_nn::params::Init;
 
     #[test]
-    fn it_follows_the_formula() -> anyhow::Result<()> {
+    fn the_average_follows_the_formula() -> anyhow::Result<()> {
         let (mut mean, mut now) = (Params::frozen(), Params::new(1));
         mean.trainable("w", &[3], Init::Constant(0.0))?;
         now.trainable("w", &[3], Init::Constant(2.0))?;
         update(&mean, &now, 0.9, 1_000)?;
         assert!((mean.tensors()?["w"].to_vec1::<f32>()?[0] - 0.2).abs() < 1e-6);
         update(&mean, &now, 0.9, 0)?;
-        // (1 + 0) / (10 + 0) of 0.2, the rest of 2.
+        // At step 0 the decay is (1 + 0) / (10 + 0) = 0.1: 0.1 x 0.2 + 0.9 x 2.
         assert!((mean.tensors()?["w"].to_vec1::<f32>()?[2] - (0.02 + 1.8)).abs() < 1e-6);
         Ok(())
     }

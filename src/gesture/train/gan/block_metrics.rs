@@ -1,4 +1,4 @@
-//! Sums over the held-out blocks that the metrics of a validation are made of.
+//! Accumulators over held-out blocks, from which the metrics of a validation are computed.
 
 use super::score::{ChannelError, ErrorReduction, ValidationMetrics};
 use super::windows::WindowBatch;
@@ -11,30 +11,30 @@ use ndarray::{Array2, Array3, ArrayView2, ArrayView3};
 use orator_base::types::skeleton::{N_JOINTS, NECK, is_duplicate, parent};
 use orator_base::types::time::FrameRate;
 
-/// A held-out block: the prediction for its sound, and the ground truth. [T, 49, 3] metres; mask [T, 49].
+/// Held-out block: the prediction for its sound and the ground truth, each [T, 49, 3] in metres, and the mask [T, 49].
 pub struct HeldOutBlock {
     pub predicted: Array3<f32>,
     pub ground_truth: Array3<f32>,
     pub mask: Array2<bool>,
 }
 
-/// Rate of the poses, and the joints that poses are compared by.
+/// Frame rate of the poses, and the joints that enter the Frechet distance.
 pub struct BlockSettings {
     pub fps: FrameRate,
     pub joints: Vec<usize>,
 }
 
-/// Mean absolute errors of normalised numbers, block by block.
+/// Collects normalised blocks, for mean absolute errors per block.
 #[derive(Default)]
 pub struct BlockErrors {
     blocks: Vec<NormalisedBlock>,
 }
 
-/// Numbers of a block, each [numbers, T], normalised.
+/// Normalised features of a block, each [features, T].
 pub struct NormalisedBlock {
     pub predicted: Array2<f32>,
     pub ground_truth: Array2<f32>,
-    /// 1 where the number counts.
+    /// 1 where the ground truth is known, 0 elsewhere.
     pub mask: Array2<f32>,
 }
 
@@ -43,11 +43,12 @@ impl BlockErrors {
         self.blocks.push(block);
     }
 
-    /// Summed error of each block and how many numbers count there, of what `of` predicts for it.
-    fn sums<'a>(&'a self, of: impl Fn(usize) -> Option<ArrayView2<'a, f32>>) -> Vec<[f64; 2]> {
+    /// Sum of the absolute errors of each block and the number of its known features, for the predictions given by
+    /// `prediction` (`None`: zeros, the mean pose).
+    fn sums<'a>(&'a self, prediction: impl Fn(usize) -> Option<ArrayView2<'a, f32>>) -> Vec<[f64; 2]> {
         let sum = |(i, block): (usize, &NormalisedBlock)| {
             let mut sum = [0.0; 2];
-            let predicted = of(i);
+            let predicted = prediction(i);
             for ((at, truth), mask) in block.ground_truth.indexed_iter().zip(&block.mask) {
                 let value = predicted.as_ref().map_or(0.0, |values| values[at]);
                 sum[0] += f64::from((value - truth).abs() * mask);
@@ -58,41 +59,42 @@ impl BlockErrors {
         self.blocks.iter().enumerate().map(sum).collect()
     }
 
-    /// Errors by block of the prediction, of the mean pose, and of the prediction for the sound half of the blocks away.
+    /// Error sums per block (see `sums`) of the predictions, of the mean pose, and of mismatched predictions: those for
+    /// the sound of the block half of all blocks further on.
     pub fn by_block(&self) -> [Vec<[f64; 2]>; 3] {
         let n = self.blocks.len();
         let own = self.sums(|i| Some(self.blocks[i].predicted.view()));
         let mean_pose = self.sums(|_| None);
-        let other = self.sums(|i| Some(self.blocks[(i + n / 2) % n.max(1)].predicted.view()));
-        [own, mean_pose, other]
+        let mismatched = self.sums(|i| Some(self.blocks[(i + n / 2) % n.max(1)].predicted.view()));
+        [own, mean_pose, mismatched]
     }
 }
 
-/// Mean error over all numbers of all blocks.
+/// Mean error over all features of all blocks, from the error sums per block.
 pub fn mean_error(blocks: &[[f64; 2]]) -> f64 {
     let [sum, n] = blocks.iter().fold([0.0; 2], |[sum, n], block| [sum + block[0], n + block[1]]);
     sum / n.max(1.0)
 }
 
-/// How far `own` errors are below the `other` ones of the same blocks, as a share, with the interval of 95 % that a ratio of
-/// two means over blocks has (Cochran 1977, section 6.4).
+/// Relative reduction of the mean error from `other` to `own` on the same blocks, with the 95 % confidence interval of
+/// a ratio estimator over blocks (Cochran 1977, section 6.4).
 pub fn reduction(own: &[[f64; 2]], other: &[[f64; 2]]) -> ErrorReduction {
     let (of_own, of_other) = (mean_error(own), mean_error(other).max(1e-9));
     let ratio = of_own / of_other;
     let n = own.len() as f64;
     let weight = own.iter().map(|block| block[1]).sum::<f64>() / n.max(1.0);
     let squares = own.iter().zip(other).map(|(own, other)| ((own[0] - ratio * other[0]) / weight.max(1.0)).powi(2));
-    let reach = match own.len() {
+    let half_width = match own.len() {
         0 | 1 => f64::INFINITY,
         _ => 1.96 * (squares.sum::<f64>() / (n - 1.0) / n).sqrt() / of_other,
     };
     let value = 1.0 - ratio;
-    // JSON has no infinity: a single block says nothing.
+    // JSON cannot represent the infinite interval of a single block.
     let bound = |bound: f64| bound.is_finite().then_some(bound);
-    ErrorReduction { value, low: bound(value - reach), high: bound(value + reach) }
+    ErrorReduction { value, low: bound(value - half_width), high: bound(value + half_width) }
 }
 
-/// A predictor's sums so far.
+/// Accumulated metrics of a predictor.
 #[derive(Default)]
 pub struct PredictorSums {
     correct: CorrectKeypoints,
@@ -107,7 +109,7 @@ impl PredictorSums {
         self.poses += &GaussianFit::fit(frechet::poses(predicted, window.mask.view(), &of.joints).view());
     }
 
-    /// The metrics; `l1` comes from [`BlockErrors`].
+    /// Metrics relative to the ground truth; `l1` comes from [`BlockErrors`].
     pub fn metrics(&self, ground_truth: &Self, l1: f64) -> ValidationMetrics {
         ValidationMetrics {
             l1,
@@ -122,7 +124,7 @@ impl PredictorSums {
     }
 }
 
-/// Errors of the angles of a channel so far, degrees.
+/// Accumulated angle errors of a posture channel, degrees.
 #[derive(Default)]
 pub struct AngleSums {
     generator: RunningMean,
@@ -130,15 +132,14 @@ pub struct AngleSums {
 }
 
 impl AngleSums {
-    /// Adds a batch whose angles begin at number `first`, with these deviations in radians.
+    /// Adds a batch whose angles are the features `first..first + 3`; `std` are their standard deviations in radians.
     pub fn add(&mut self, poses: &Tensor, batch: &WindowBatch, first: usize, std: [f32; 3]) -> Result<()> {
         for (k, std) in std.into_iter().enumerate() {
-            let numbers =
-                |x: &Tensor| -> Result<Vec<f32>> { Ok(x.get_on_dim(1, first + k)?.flatten_all()?.to_vec1()?) };
-            let [made, real, mask] = [numbers(poses)?, numbers(&batch.poses)?, numbers(&batch.mask)?];
+            let values = |x: &Tensor| -> Result<Vec<f32>> { Ok(x.get_on_dim(1, first + k)?.flatten_all()?.to_vec1()?) };
+            let [predicted, real, mask] = [values(poses)?, values(&batch.poses)?, values(&batch.mask)?];
             let degrees = |normalised: f32| f64::from((normalised * std).abs().to_degrees());
-            for ((made, real), _) in made.iter().zip(&real).zip(&mask).filter(|(_, seen)| **seen > 0.0) {
-                self.generator.add([degrees(made - real)]);
+            for ((predicted, real), _) in predicted.iter().zip(&real).zip(&mask).filter(|(_, seen)| **seen > 0.0) {
+                self.generator.add([degrees(predicted - real)]);
                 self.mean_pose.add([degrees(*real)]);
             }
         }
@@ -150,7 +151,7 @@ impl AngleSums {
     }
 }
 
-/// A running mean.
+/// Running mean.
 #[derive(Default)]
 pub struct RunningMean {
     sum: f64,
@@ -170,7 +171,7 @@ impl RunningMean {
     }
 }
 
-/// How far windows that follow each other in the set lie apart, at the same frame, where both are seen.
+/// Mean distance between the joints of consecutive windows at the same frame, where both are visible.
 #[derive(Default)]
 pub struct BlockSpread {
     last: Option<(Array3<f32>, Array3<f32>, Array2<bool>)>,
@@ -194,13 +195,13 @@ impl BlockSpread {
         self.last = Some((window.predicted.clone(), window.ground_truth.clone(), window.mask.clone()));
     }
 
-    /// 1 for a single window, which has none to differ from.
-    pub fn share(&self) -> f64 {
+    /// Ratio of the distances of the predictions to those of the ground truth; 1 for a single window.
+    pub fn ratio(&self) -> f64 {
         if self.ground_truth.mean() > 0.0 { self.predicted.mean() / self.ground_truth.mean() } else { 1.0 }
     }
 }
 
-/// Changes of every bone's length from frame to frame, metres.
+/// Absolute change of the length of every bone between consecutive frames, metres.
 pub fn bone_changes(joints: ArrayView3<f32>) -> Vec<f64> {
     let length = |t: usize, joint: usize| {
         let from = parent(joint).unwrap_or(NECK);

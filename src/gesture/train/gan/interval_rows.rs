@@ -1,5 +1,5 @@
-//! The intervals of a split as rows of numbers: held in memory where they are few, read from the shards for every window
-//! where they are many, so that memory does not grow with the dataset. Both give the same numbers.
+//! Features and spectrograms of the intervals of a split. Small splits are cached in memory; large ones are read from
+//! the shards for every window, so that memory does not grow with the dataset. Both ways return the same values.
 
 use crate::generate::mel_stream::mel_frames;
 use crate::generate::normalisation::Normalisation;
@@ -13,17 +13,18 @@ use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;
 
-/// Some frames of an interval.
+/// Features of a range of frames of an interval.
 #[derive(Clone)]
 pub struct IntervalRows {
-    /// [numbers, T]: 144 and those of the channels.
+    /// [features, T]: 144 of the joints, then those of the posture channels.
     pub features: Array2<f32>,
-    /// [48 + 3 x channels, T]: whether the joint (all but the neck), or the angle, is to be learnt there.
+    /// [48 + 3 x channels, T]: whether the joint (all but the neck), or the angle, is known and trained on.
     pub mask: Array2<bool>,
     /// [64, mel frames]
     pub mels: Array2<f32>,
-    /// Place of the first frame, and of the first of the spectrogram, in the interval.
+    /// Index in the interval of the first frame of motion.
     pub first_frame: usize,
+    /// Index in the interval of the first spectrogram frame.
     pub first_mel: usize,
 }
 
@@ -32,30 +33,30 @@ pub struct TrainingIntervals<'d> {
     dataset: &'d Dataset,
     samples: Vec<SampleRef>,
     normal: Normalisation,
-    /// All of them, where they are few.
-    held: Option<Vec<IntervalRows>>,
+    /// All intervals, if they fit into memory.
+    cached: Option<Vec<IntervalRows>>,
 }
 
 impl<'d> TrainingIntervals<'d> {
-    /// The intervals of these samples, in memory if they take no more than `most_bytes`.
+    /// The intervals of these samples, cached in memory if they take at most `max_bytes`.
     ///
     /// # Errors
-    /// A sample that is damaged; of those that stay in the shards it is found when it is read.
+    /// A damaged sample; if samples are not cached, it is only found when it is read.
     pub fn open(
         dataset: &'d Dataset,
         samples: Vec<SampleRef>,
         normal: &Normalisation,
-        most_bytes: usize,
+        max_bytes: usize,
     ) -> Result<Self> {
-        let mut intervals = Self { dataset, samples, normal: normal.clone(), held: None };
-        let bytes = |i| intervals.n_frames(i) * 5 * normal.n_numbers() + intervals.n_mels(i) * 4 * mel::N_MELS;
-        if (0..intervals.n_intervals()).map(bytes).sum::<usize>() <= most_bytes {
+        let mut intervals = Self { dataset, samples, normal: normal.clone(), cached: None };
+        let bytes = |i| intervals.n_frames(i) * 5 * normal.n_features() + intervals.n_mels(i) * 4 * mel::N_MELS;
+        if (0..intervals.n_intervals()).map(bytes).sum::<usize>() <= max_bytes {
             let whole = |i| {
-                // Looks whether the sample is as it was written.
+                // `read` verifies the checksum of the sample.
                 intervals.dataset.read(&intervals.samples[i])?;
                 intervals.read(i, 0..intervals.n_frames(i), 0..intervals.n_mels(i))
             };
-            intervals.held = Some((0..intervals.n_intervals()).into_par_iter().map(whole).collect::<Result<_>>()?);
+            intervals.cached = Some((0..intervals.n_intervals()).into_par_iter().map(whole).collect::<Result<_>>()?);
         }
         Ok(intervals)
     }
@@ -70,18 +71,18 @@ impl<'d> TrainingIntervals<'d> {
         self.samples[interval].n_frames
     }
 
-    /// Number of spectrogram frames of an interval: at least those of its motion.
+    /// Number of spectrogram frames of an interval, at least enough for its motion.
     pub fn n_mels(&self, interval: usize) -> usize {
         let sample = &self.samples[interval];
-        // Rounding may ask for one spectrogram frame more than the sound has windows for.
+        // Because of rounding, the motion may need one spectrogram frame more than the sound has.
         let enough = mel::n_samples(mel_frames(self.dataset.info().fps, sample.n_frames) + 1);
         mel::n_frames(enough.max(sample.n_sound_samples()))
     }
 
-    /// Rows that hold these frames, and these of the spectrogram; maybe more.
+    /// Rows that contain at least these frames of motion and these spectrogram frames.
     pub fn rows(&self, interval: usize, frames: Range<usize>, mels: Range<usize>) -> Result<Cow<'_, IntervalRows>> {
-        Ok(match &self.held {
-            Some(held) => Cow::Borrowed(&held[interval]),
+        Ok(match &self.cached {
+            Some(cached) => Cow::Borrowed(&cached[interval]),
             None => Cow::Owned(self.read(interval, frames, mels)?),
         })
     }
@@ -90,14 +91,15 @@ impl<'d> TrainingIntervals<'d> {
         let sample = &self.samples[interval];
         let (first_frame, first_mel) = (frames.start, mels.start);
         let mut motion = self.dataset.motion(sample, frames.clone())?;
-        // Every video has its own constant lengths; the generator learns one body.
+        // Bone lengths differ between videos, but the generator learns one body.
         bones::with_lengths(&mut motion, &self.normal.lengths());
         let posture = if self.normal.channels.is_empty() { None } else { self.dataset.posture(sample, frames)? };
         let (features, mask) = self.normal.features_with_channels(&motion, posture.as_ref());
         let start = mels.start * mel::HOP;
         let n_samples = mel::n_samples(mels.len());
-        let there = sample.n_sound_samples();
-        let mut samples = self.dataset.sound(sample, start.min(there)..(start + n_samples).min(there))?.samples;
+        let n_available = sample.n_sound_samples();
+        let mut samples =
+            self.dataset.sound(sample, start.min(n_available)..(start + n_samples).min(n_available))?.samples;
         samples.resize(n_samples, 0.0);
         let mels = mel::log_mel(&samples).reversed_axes().as_standard_layout().into_owned();
         Ok(IntervalRows { features, mask, mels, first_frame, first_mel })

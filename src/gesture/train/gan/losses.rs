@@ -1,4 +1,4 @@
-//! What the networks are trained to make small: pure functions of tensors.
+//! Loss functions of the GAN, as pure functions of tensors.
 
 use crate::generate::normalisation::{N_FEATURES, Normalisation};
 use candle_core::{DType, Device, Result, Tensor};
@@ -6,62 +6,62 @@ use orator_base::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_WR
 use orator_dataset::config::AdversarialLoss;
 use orator_nn::gan::discriminator::motion;
 
-/// Value of a scalar.
+/// Value of a scalar f32 tensor.
 pub fn number(scalar: &Tensor) -> anyhow::Result<f64> {
     Ok(f64::from(scalar.to_scalar::<f32>()?))
 }
 
-/// Mean absolute difference over the numbers whose mask is 1; all three of one shape.
-pub fn l1(made: &Tensor, real: &Tensor, mask: &Tensor) -> Result<Tensor> {
+/// Mean absolute error over the elements whose mask is 1; all tensors have the same shape.
+pub fn l1(generated: &Tensor, real: &Tensor, mask: &Tensor) -> Result<Tensor> {
     let n = mask.sum_all()?.maximum(1.0)?;
-    ((made - real)?.abs()? * mask)?.sum_all()? / n
+    ((generated - real)?.abs()? * mask)?.sum_all()? / n
 }
 
-/// Mean absolute difference of the frame-to-frame differences, over the numbers whose mask is 1 in both frames; all
-/// three [B, C, T].
-pub fn velocity(made: &Tensor, real: &Tensor, mask: &Tensor) -> Result<Tensor> {
-    l1(&motion(made)?, &motion(real)?, &both_seen(mask)?)
+/// Mean absolute error of the frame-to-frame differences, over the elements whose mask is 1 in both frames; all tensors
+/// are [B, C, T].
+pub fn velocity(generated: &Tensor, real: &Tensor, mask: &Tensor) -> Result<Tensor> {
+    l1(&motion(generated)?, &motion(real)?, &both_visible(mask)?)
 }
 
-/// Mean squared difference of the joints' speeds, as a share of the mean squared real speed: how much a joint moves, wherever
-/// it goes. All three [B, C, T] with the three coordinates of each joint in the first 144 rows; a joint counts where all its
-/// coordinates do, in both frames.
-pub fn speed(made: &Tensor, real: &Tensor, mask: &Tensor) -> Result<Tensor> {
-    let mask = per_joint(&both_seen(mask)?)?.min(2)?;
-    // The root has no slope at 0; a thousandth of a deviation a frame is rest.
+/// Mean squared error of the joint speeds, divided by the mean squared real speed; independent of the direction of
+/// motion. All tensors are [B, C, T] with the three coordinates of each joint in the first 144 rows; a joint counts
+/// where the mask of all its coordinates is 1 in both frames.
+pub fn speed(generated: &Tensor, real: &Tensor, mask: &Tensor) -> Result<Tensor> {
+    let mask = per_joint(&both_visible(mask)?)?.min(2)?;
+    // The derivative of the root is infinite at 0. The offset is a speed of 0.001 standard deviations per frame.
     let speeds = |poses: &Tensor| (per_joint(&motion(poses)?)?.sqr()?.sum(2)? + 1e-6)?.sqrt();
     let real = speeds(real)?;
     let scale = (real.sqr()? * &mask)?.sum_all()?.maximum(1e-6)?;
-    ((speeds(made)? - real)?.sqr()? * mask)?.sum_all()? / scale
+    ((speeds(generated)? - real)?.sqr()? * mask)?.sum_all()? / scale
 }
 
-/// How far the mean squared speed of each joint is from the real one's, |ln(generated / real)|, mean over the joints: absolute
-/// errors alone give motion that is too slow, since it is not known when exactly a hand will move. The mean is
-/// over all windows and frames in which a joint is seen, as a statistic that generator and data share (feature matching,
-/// Salimans et al. 2016). Tensors as in [`speed`].
-pub fn energy(made: &Tensor, real: &Tensor, mask: &Tensor) -> Result<Tensor> {
-    let mask = per_joint(&both_seen(mask)?)?.min(2)?;
-    // A thousandth of a deviation a frame is rest.
+/// Difference of the log motion energies, |ln(generated / real)| of the mean squared speed of each joint, averaged over
+/// the joints. L1 losses alone give motion that is too slow, since the exact time of a gesture is uncertain. The energy
+/// is a statistic over all windows and frames in which a joint is visible (feature matching, Salimans et al. 2016).
+/// Tensors as in [`speed`].
+pub fn energy(generated: &Tensor, real: &Tensor, mask: &Tensor) -> Result<Tensor> {
+    let mask = per_joint(&both_visible(mask)?)?.min(2)?;
+    // The offset is a speed of 0.001 standard deviations per frame.
     let energies = |poses: &Tensor| {
         let squares = (per_joint(&motion(poses)?)?.sqr()?.sum(2)? * &mask)?;
         (squares.sum(2)?.sum(0)? / mask.sum(2)?.sum(0)?.maximum(1.0)?)? + 1e-6
     };
-    (energies(made)?.log()? - energies(real)?.log()?)?.abs()?.mean_all()
+    (energies(generated)?.log()? - energies(real)?.log()?)?.abs()?.mean_all()
 }
 
-/// [B, C, T] to [B, joints, 3, T], without what follows the joints.
+/// [B, C, T] to [B, joints, 3, T], without the posture channels that follow the joints.
 fn per_joint(rows: &Tensor) -> Result<Tensor> {
     let (batch, _, n_frames) = rows.dims3()?;
     rows.narrow(1, 0, N_FEATURES)?.reshape((batch, N_FEATURES / 3, 3, n_frames))
 }
 
-/// 1 where the mask is 1 in a frame and in the one before: [B, C, T] to [B, C, T - 1].
-pub fn both_seen(mask: &Tensor) -> Result<Tensor> {
+/// Mask that is 1 where `mask` is 1 in a frame and in the previous one: [B, C, T] to [B, C, T - 1].
+pub fn both_visible(mask: &Tensor) -> Result<Tensor> {
     let n = mask.dim(2)?.saturating_sub(1);
     mask.narrow(2, 1, n)? * mask.narrow(2, 0, n)?
 }
 
-/// Loss of the discriminator on its scores of real and of generated motion, of any shape; a scalar.
+/// Scalar loss of the discriminator for its scores (of any shape) of real and of generated motion.
 pub fn discriminator_loss(loss: AdversarialLoss, real_scores: &Tensor, generated_scores: &Tensor) -> Result<Tensor> {
     match loss {
         AdversarialLoss::LeastSquares => {
@@ -71,7 +71,7 @@ pub fn discriminator_loss(loss: AdversarialLoss, real_scores: &Tensor, generated
     }
 }
 
-/// Adversarial loss of the generator on the discriminator's scores of generated motion, of any shape; a scalar.
+/// Scalar adversarial loss of the generator for the discriminator's scores (of any shape) of generated motion.
 pub fn generator_loss(loss: AdversarialLoss, generated_scores: &Tensor) -> Result<Tensor> {
     match loss {
         AdversarialLoss::LeastSquares => (generated_scores - 1.0)?.sqr()?.mean_all(),
@@ -79,25 +79,26 @@ pub fn generator_loss(loss: AdversarialLoss, generated_scores: &Tensor) -> Resul
     }
 }
 
-/// log(1 + e^x), without overflow.
+/// log(1 + e^x) without overflow.
 fn softplus(x: &Tensor) -> Result<Tensor> {
     x.relu()? + (x.abs()?.neg()?.exp()? + 1.0)?.log()?
 }
 
-/// Constancy of bone lengths (Rebol et al. 2021, eq. 1): how much each bone changes its length from frame to frame,
-/// as a share of the speaker's length of that bone. Holds the tables it needs.
+/// Bone length constancy loss (Rebol et al. 2021, eq. 1): mean absolute change of each bone's length between
+/// consecutive frames, relative to the speaker's length of that bone. Holds the tables for the computation.
 pub struct BoneConstancy {
     mean: Tensor,
     std: Tensor,
-    /// Rows of joint coordinates (the neck's included) at the two ends of the bones.
+    /// Coordinate rows (including the neck's) of the joints at the far ends of the bones.
     children: Tensor,
+    /// Coordinate rows of the joints at the near ends.
     parents: Tensor,
     /// 1 / length, [1, n_bones, 1].
     inverse_lengths: Tensor,
 }
 
 impl BoneConstancy {
-    /// For the bones that were measured, without those to the hand roots, which are the wrists.
+    /// Loss over the bones of known length, without those to the hand roots, which coincide with the wrists.
     pub fn new(normal: &Normalisation, dtype: DType, device: &Device) -> Result<Self> {
         let (mut children, mut parents, mut inverse) = (Vec::new(), Vec::new(), Vec::new());
         for joint in 1..N_JOINTS {
@@ -124,11 +125,11 @@ impl BoneConstancy {
         })
     }
 
-    /// The loss of normalised poses [B, 144, T]; channels behind them have no say.
+    /// Loss of normalised poses [B, 144 or more, T]; trailing channels (head, trunk) are ignored.
     pub fn loss(&self, poses: &Tensor) -> Result<Tensor> {
-        let (batch, n_numbers, n_frames) = poses.dims3()?;
+        let (batch, n_features, n_frames) = poses.dims3()?;
         let n_bones = self.inverse_lengths.dim(1)?;
-        if n_bones == 0 || n_frames < 2 || n_numbers < N_FEATURES {
+        if n_bones == 0 || n_frames < 2 || n_features < N_FEATURES {
             return poses.zeros_like()?.mean_all();
         }
         let poses = poses.narrow(1, 0, N_FEATURES)?;
@@ -137,7 +138,7 @@ impl BoneConstancy {
         let joints = Tensor::cat(&[neck, metres], 1)?;
         let bones = (joints.index_select(&self.children, 1)? - joints.index_select(&self.parents, 1)?)?;
         let squares = bones.reshape((batch, n_bones, 3, n_frames))?.sqr()?.sum(2)?;
-        // The root has no slope at 0; a bone of 0.1 mm is as good as none.
+        // The derivative of the root is infinite at 0. The offset is a length of 0.1 mm.
         let lengths = (squares + 1e-8)?.sqrt()?.broadcast_mul(&self.inverse_lengths)?;
         let change = (lengths.narrow(2, 1, n_frames - 1)? - lengths.narrow(2, 0, n_frames - 1)?)?;
         change.abs()?.mean_all()
@@ -156,15 +157,15 @@ mod tests {
     }
 
     #[test]
-    fn gradients_are_right() -> Result<()> {
+    fn gradients_match_finite_differences() -> Result<()> {
         let shape = [2, 3, 4];
-        let (made, real) = (pattern(&shape, 0.0)?, pattern(&shape, 3.0)?);
+        let (generated, real) = (pattern(&shape, 0.0)?, pattern(&shape, 3.0)?);
         let mask = pattern(&shape, 9.0)?.gt(0.0)?.to_dtype(DType::F64)?;
-        assert!(worst(std::slice::from_ref(&made), |v| l1(&v[0], &real, &mask))? < 1e-7);
-        assert!(worst(std::slice::from_ref(&made), |v| velocity(&v[0], &real, &mask))? < 1e-7);
-        for game in [AdversarialLoss::LeastSquares, AdversarialLoss::Log] {
-            assert!(worst(&[made.clone(), real.clone()], |v| discriminator_loss(game, &v[0], &v[1]))? < 1e-7);
-            assert!(worst(std::slice::from_ref(&made), |v| generator_loss(game, &v[0]))? < 1e-7);
+        assert!(worst(std::slice::from_ref(&generated), |v| l1(&v[0], &real, &mask))? < 1e-7);
+        assert!(worst(std::slice::from_ref(&generated), |v| velocity(&v[0], &real, &mask))? < 1e-7);
+        for loss in [AdversarialLoss::LeastSquares, AdversarialLoss::Log] {
+            assert!(worst(&[generated.clone(), real.clone()], |v| discriminator_loss(loss, &v[0], &v[1]))? < 1e-7);
+            assert!(worst(std::slice::from_ref(&generated), |v| generator_loss(loss, &v[0]))? < 1e-7);
         }
         let shape = [2, N_FEATURES + 2, 4];
         let (poses, real) = (pattern(&shape, 1.0)?, pattern(&shape, 5.0)?);
@@ -177,44 +178,45 @@ mod tests {
     }
 
     #[test]
-    fn masked_numbers_have_no_say() -> Result<()> {
+    fn masked_elements_are_ignored() -> Result<()> {
         let row = |values: [f64; 4]| Tensor::new(&values, &Device::Cpu);
-        let (made, real) = (row([1.0, 2.0, 3.0, 4.0])?, row([1.0, 4.0, 100.0, 5.0])?);
-        let loss = |mask| -> Result<f64> { l1(&made, &real, &row(mask)?)?.to_scalar() };
+        let (generated, real) = (row([1.0, 2.0, 3.0, 4.0])?, row([1.0, 4.0, 100.0, 5.0])?);
+        let loss = |mask| -> Result<f64> { l1(&generated, &real, &row(mask)?)?.to_scalar() };
         assert_eq!(loss([1.0, 1.0, 0.0, 1.0])?, 1.0);
         assert_eq!(loss([0.0; 4])?, 0.0);
         Ok(())
     }
 
     #[test]
-    fn losses_are_what_their_formulas_say() -> Result<()> {
+    fn losses_match_hand_computed_values() -> Result<()> {
         let row = |values: [f64; 3]| Tensor::new(&[[values]], &Device::Cpu);
         let number = |loss: Result<Tensor>| loss?.to_scalar::<f64>();
-        let (real, made) = (row([0.5, -1.0, 90.0])?, row([2.0, 0.0, -90.0])?);
+        let (real, generated) = (row([0.5, -1.0, 90.0])?, row([2.0, 0.0, -90.0])?);
         let log = |x: f64| -(1.0 / (1.0 + (-x).exp())).ln();
         let expected = (log(0.5) + log(-1.0)) / 3.0 + (log(-2.0) + log(0.0)) / 3.0;
-        assert!((number(discriminator_loss(AdversarialLoss::Log, &real, &made))? - expected).abs() < 1e-12);
+        assert!((number(discriminator_loss(AdversarialLoss::Log, &real, &generated))? - expected).abs() < 1e-12);
         assert!(
-            (number(generator_loss(AdversarialLoss::Log, &made))? - (log(2.0) + log(0.0) + 90.0) / 3.0).abs() < 1e-12
+            (number(generator_loss(AdversarialLoss::Log, &generated))? - (log(2.0) + log(0.0) + 90.0) / 3.0).abs()
+                < 1e-12
         );
         assert_eq!(number(generator_loss(AdversarialLoss::LeastSquares, &row([2.0, 0.0, 1.0])?))?, 2.0 / 3.0);
-        // Speeds 1, -2 against 0, 3, of which the second is not seen.
+        // Differences 1, -2 against 0, 3; the second is masked.
         let loss = velocity(&row([1.0, 2.0, 0.0])?, &row([1.0, 1.0, 4.0])?, &row([1.0, 1.0, 0.0])?);
         assert_eq!(number(loss)?, 1.0);
         Ok(())
     }
 
     #[test]
-    fn speeds_count_and_not_where_they_lead() -> Result<()> {
-        // One joint moves by (3, 4, 0), another by (0, 0, 2), a third is not seen.
+    fn the_speed_loss_ignores_the_direction() -> Result<()> {
+        // In `generated` one joint moves by (3, 4, 0); another is masked.
         let moved = |by: &[(usize, f64)]| -> Result<Tensor> {
             let mut numbers = vec![0.0; 2 * (N_FEATURES + 1)];
             by.iter().for_each(|(number, value)| numbers[2 * number + 1] = *value);
             Tensor::from_vec(numbers, (1, N_FEATURES + 1, 2), &Device::Cpu)
         };
-        let made = moved(&[(0, 3.0), (1, 4.0), (6, 9.0), (N_FEATURES, 9.0)])?;
+        let generated = moved(&[(0, 3.0), (1, 4.0), (6, 9.0), (N_FEATURES, 9.0)])?;
         let seen = (moved(&[(7, -1.0)])? + 1.0)?;
-        let of = |real: &[(usize, f64)]| -> Result<f64> { speed(&made, &moved(real)?, &seen)?.to_scalar() };
+        let of = |real: &[(usize, f64)]| -> Result<f64> { speed(&generated, &moved(real)?, &seen)?.to_scalar() };
         let close = |loss: f64, expected: f64| assert!((loss - expected).abs() < 5e-3, "{loss}, expected {expected}");
         close(of(&[(5, 2.0)])?, (25.0 + 4.0) / 4.0);
         close(of(&[(2, 5.0), (5, 2.0)])?, 4.0 / 29.0);
@@ -223,15 +225,15 @@ mod tests {
     }
 
     #[test]
-    fn energy_is_that_of_all_windows() -> Result<()> {
+    fn energy_is_averaged_over_all_windows() -> Result<()> {
         let real = pattern(&[2, N_FEATURES, 5], 0.0)?;
-        let of = |made: &Tensor, mask: &Tensor| -> Result<f64> { energy(made, &real, mask)?.to_scalar() };
+        let of = |generated: &Tensor, mask: &Tensor| -> Result<f64> { energy(generated, &real, mask)?.to_scalar() };
         let all = real.ones_like()?;
         assert!(of(&real, &all)? < 1e-12);
-        // Twice as fast is four times the energy; the other direction and another offset are the same.
+        // Doubled speed is four times the energy; direction and offset do not matter.
         assert!((of(&(&real * 2.0)?, &all)? - 4.0f64.ln()).abs() < 1e-4);
         assert!(of(&(real.neg()? + 3.0)?, &all)? < 1e-9);
-        // A window as slow as the other is fast, and a joint that is not seen.
+        // Swapped windows have the same energy; masked joints are ignored.
         let swapped = Tensor::cat(&[real.narrow(0, 1, 1)?, real.narrow(0, 0, 1)?], 0)?;
         assert!(of(&swapped, &all)? < 1e-9);
         let hidden = Tensor::cat(&[all.narrow(1, 0, 3)?.zeros_like()?, all.narrow(1, 3, N_FEATURES - 3)?], 1)?;
@@ -241,10 +243,10 @@ mod tests {
     }
 
     #[test]
-    fn only_changing_bones_cost() -> Result<()> {
+    fn only_changing_bone_lengths_are_penalised() -> Result<()> {
         let bones = BoneConstancy::new(&normal(), DType::F64, &Device::Cpu)?;
-        let still = pattern(&[1, N_FEATURES, 1], 0.0)?.broadcast_as((1, N_FEATURES, 5))?.contiguous()?;
-        assert!(bones.loss(&still)?.to_scalar::<f64>()? < 1e-12);
+        let constant = pattern(&[1, N_FEATURES, 1], 0.0)?.broadcast_as((1, N_FEATURES, 5))?.contiguous()?;
+        assert!(bones.loss(&constant)?.to_scalar::<f64>()? < 1e-12);
         let moving = pattern(&[1, N_FEATURES, 5], 0.0)?;
         let loss = bones.loss(&moving)?.to_scalar::<f64>()?;
         let with_channels = Tensor::cat(&[&moving, &pattern(&[1, 6, 5], 7.0)?], 1)?;

@@ -1,33 +1,34 @@
-//! Recipes: what fills the keys of `[gan]` that are `"auto"`. `paper` is Rebol et al. 2021 and the code they built on (Ginosar
-//! et al. 2019): 300 epochs of 300 steps, weights of 1, nothing else. `auto` follows the minutes of training speech.
+//! Recipes: values for the keys of `[gan]` that are `"auto"`. The recipe `paper` follows Rebol et al. 2021 and the code
+//! they built on (Ginosar et al. 2019): 300 epochs of 300 steps, loss weights of 1, no regularisation. The recipe
+//! `auto` depends on the minutes of training speech.
 
 use anyhow::{Context, Result};
 use orator_dataset::config::{GanConfig, GanRecipe, GanSettings};
 use orator_dataset::{Dataset, Split};
 
-/// Speech of the datasets of a training.
+/// Amount of speech in the datasets of a training.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrainingMaterial {
-    /// Seconds to train on, in intervals that hold a window.
+    /// Seconds of the training split, in intervals of at least one window.
     pub train_secs: f64,
-    /// Seconds held out for validation, likewise.
+    /// Seconds of the validation split, in intervals of at least one window.
     pub validation_secs: f64,
-    /// Speakers, a dataset each; at least 1.
+    /// Number of speakers, one dataset each; at least 1.
     pub n_speakers: usize,
 }
 
-/// What the network has learnt before the first step.
+/// Weights of the network before the first step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TrainingStart {
-    Nothing,
-    /// Another speaker's motion.
+pub enum InitialWeights {
+    Random,
+    /// Weights of a model of another speaker.
     AnotherSpeaker,
-    /// What several speakers have in common; the layer of one new speaker (`SpeakerLayer`) is to be learnt.
+    /// Weights of a model of several speakers; only the layer of one new speaker (`SpeakerLayer`) has to be trained.
     SeveralSpeakers,
 }
 
 impl TrainingMaterial {
-    /// Seconds of datasets in intervals of `window_frames` at least.
+    /// Seconds of the datasets in intervals of at least `window_frames` frames.
     pub fn measure(datasets: &[&Dataset], window_frames: usize) -> Self {
         let of_dataset = |dataset: &Dataset, split: Split| -> f64 {
             let fps = dataset.info().fps;
@@ -43,13 +44,13 @@ impl TrainingMaterial {
     }
 }
 
-/// Values of a key in each recipe.
+/// Values of a key in all recipes.
 struct RecipeRow {
     key: &'static str,
     paper: f64,
-    /// Training of the layer of a new speaker in a network of several speakers.
+    /// Value for training the layer of a new speaker in a network of several speakers.
     new_layer: f64,
-    /// At the minutes of [`MINUTES`].
+    /// Values at the minutes of [`MINUTES`].
     auto: [f64; 4],
 }
 
@@ -57,17 +58,17 @@ const fn row(key: &'static str, paper: f64, new_layer: f64, auto: [f64; 4]) -> R
     RecipeRow { key, paper, new_layer, auto }
 }
 
-/// Minutes of training speech at the columns of `auto`.
+/// Minutes of training speech for the columns of `auto`.
 const MINUTES: [f64; 4] = [2.0, 10.0, 30.0, 120.0];
 
-/// At ten minutes the rate is ten times the paper's, since there is no time for 90,000 steps. The mean of the weights, the
-/// changes of the windows and, most of all, a strong decay (decoupled from the gradient, Loshchilov & Hutter 2019) keep the
-/// network from overfitting. With a decay of 3, or half the channels dropped, or more of the sound hidden, it does not always
-/// find the words that move a hand (22 examples each, `demo speaker --speech`); it finds them after a thousand steps, with
-/// errors that rise before: hence the patience. At half an hour they were not found with the decay, dropout and steps of ten
-/// minutes. The layer of a new speaker is one part in sixty of the weights, learnt within a hundred steps; the network has the
-/// others' energy already. PCK and correlations of the wrists' speeds after two minutes: with the layer alone 76.1 %,
-/// .90 / .85; with 0.006 of the rate for the rest 77.0 %, .89 / .86; with 0.017 76.5 %, .88 / .86; with one rate 72.5 %, .73 / .80.
+/// The learning rate of `auto` is ten times the paper's, because it runs far fewer than 90,000 steps. Weight averaging,
+/// augmentation and, most of all, strong weight decay (decoupled, Loshchilov & Hutter 2019) prevent overfitting. With
+/// 10 minutes of `demo speaker --speech`, a weight decay of 3, a dropout of 0.5 or more masking do not reliably learn
+/// the words that move a hand (22 examples each); they are learnt after about 1,000 steps, before which the errors
+/// rise, hence the patience. With 30 minutes the decay, dropout and steps of 10 minutes do not learn them. The layer of
+/// a new speaker is 1/60 of the weights and is learnt within 100 steps; the motion energy is already that of the
+/// others. PCK and correlations of the wrist speeds with 2 minutes: layer only 76.1 %, .90 / .85; `shared_rate` 0.006:
+/// 77.0 %, .89 / .86; 0.017: 76.5 %, .88 / .86; 1: 72.5 %, .73 / .80.
 #[rustfmt::skip]
 const RECIPES: [RecipeRow; 23] = [
     //   key                  paper     new layer  auto: 2, 10, 30, 120 minutes
@@ -96,50 +97,53 @@ const RECIPES: [RecipeRow; 23] = [
     row("augment_pose_noise", 0.0,      0.0,       [0.0; 4]),
 ];
 
-/// Keys against overfitting that follow ten minutes where several speakers are trained: after five of twenty minutes each with
-/// the decay of a hundred minutes, two minutes of a new one were learnt to PCK 75.2 %, with that of ten 76.9 %.
-const OF_TEN_MINUTES: [&str; 2] = ["dropout", "weight_decay"];
-/// Minutes of a new speaker up to which the layer alone is learnt: after five others of sixty minutes each, twenty of a seventh
-/// were learnt to PCK 78.1 % by the layer; alone 77.4 %.
-const MOST_LAYER_MINUTES: f64 = 20.0;
-/// Learning rate of a network all of which learns another speaker, as a share of that of a new network. After a network of five
-/// others that knew them by a vector each, two minutes of a sixth were learnt to PCK 74 % with 0.2, 70 % with 0.5.
-const RATE_OF_A_START: f64 = 0.2;
+/// Regularisation keys that keep their 10 minute values if several speakers are trained. PCK of a new speaker of 2
+/// minutes after a training of five speakers of 20 minutes each: 76.9 % with the decay for 10 minutes, 75.2 % with that
+/// for 100.
+const KEYS_OF_TEN_MINUTES: [&str; 2] = ["dropout", "weight_decay"];
+/// Minutes of a new speaker up to which only the layer is trained. PCK of a new speaker of 20 minutes: 78.1 % with the
+/// layer after a training of five speakers of 60 minutes each, 77.4 % with a network of its own.
+const MAX_LAYER_MINUTES: f64 = 20.0;
+/// Factor of the learning rate for fine-tuning all weights of another speaker's network. PCK of a new speaker of 2
+/// minutes, fine-tuned from a network of five others with one embedding vector each: 74 % with 0.2, 70 % with 0.5.
+const FINE_TUNING_RATE: f64 = 0.2;
 
-/// The settings of a training: `asked`, with what its recipe chooses for this much speech and this start.
+/// Settings of a training: `requested`, with the recipe's values for this amount of speech and these initial weights
+/// filled in.
 ///
 /// # Errors
-/// A key that the recipe does not know.
-pub fn settings(asked: &GanConfig, material: &TrainingMaterial, start: TrainingStart) -> Result<GanSettings> {
+/// An `"auto"` key that is missing in the recipe.
+pub fn settings(requested: &GanConfig, material: &TrainingMaterial, initial: InitialWeights) -> Result<GanSettings> {
     let minutes = material.train_secs / 60.0;
-    let learns_layer = start == TrainingStart::SeveralSpeakers && minutes <= MOST_LAYER_MINUTES;
-    let value = |row: &RecipeRow| match asked.recipe {
+    let is_layer_only = initial == InitialWeights::SeveralSpeakers && minutes <= MAX_LAYER_MINUTES;
+    let value = |row: &RecipeRow| match requested.recipe {
         GanRecipe::Paper => row.paper,
-        GanRecipe::Auto if learns_layer => row.new_layer,
-        GanRecipe::Auto if material.n_speakers > 1 && OF_TEN_MINUTES.contains(&row.key) => auto(row, 10.0),
-        GanRecipe::Auto if start != TrainingStart::Nothing && row.key == "learning_rate" => {
-            auto(row, minutes) * RATE_OF_A_START
+        GanRecipe::Auto if is_layer_only => row.new_layer,
+        GanRecipe::Auto if material.n_speakers > 1 && KEYS_OF_TEN_MINUTES.contains(&row.key) => auto(row, 10.0),
+        GanRecipe::Auto if initial != InitialWeights::Random && row.key == "learning_rate" => {
+            auto(row, minutes) * FINE_TUNING_RATE
         }
         GanRecipe::Auto => auto(row, minutes),
     };
-    let settings = asked.filled(|key| RECIPES.iter().find(|row| row.key == key).map(value));
+    let settings = requested.filled(|key| RECIPES.iter().find(|row| row.key == key).map(value));
     let mut settings = settings.context("the recipe does not fit the keys of [gan]")?;
-    if start != TrainingStart::SeveralSpeakers {
-        // All weights are to be learnt; with 0 none would be.
+    if initial != InitialWeights::SeveralSpeakers {
+        // All weights are trained here; a rate of 0 would freeze the network.
         settings.shared_rate = 1.0;
     }
     Ok(settings)
 }
 
-/// Value of `auto` at so many minutes: between two columns linear in the logarithm of the minutes, beyond the table its last
-/// column. Epochs and patience are those of the later column, and steps are a multiple of its epochs.
+/// Value of `auto` for this many minutes: interpolated between the columns linearly in the logarithm of the minutes,
+/// and clamped to the first and last column. Epoch steps and patience are those of the upper column; steps are rounded
+/// to a multiple of its epoch steps.
 fn auto(row: &RecipeRow, minutes: f64) -> f64 {
     let after = MINUTES.iter().position(|column| *column >= minutes).unwrap_or(MINUTES.len() - 1);
     let before = after.saturating_sub(1);
     let [from, to] = [MINUTES[before], MINUTES[after]];
     let share = if to > from { ((minutes / from).ln() / (to / from).ln()).clamp(0.0, 1.0) } else { 0.0 };
     let [low, high] = [row.auto[before], row.auto[after]];
-    // From the later column, so that it is met to the last bit.
+    // Computed from the upper column, so that the columns are reproduced exactly.
     let between = high - (1.0 - share) * (high - low);
     match row.key {
         "epoch_steps" | "patience" => high,
@@ -152,10 +156,10 @@ fn auto(row: &RecipeRow, minutes: f64) -> f64 {
     }
 }
 
-/// Three lines on the settings of a training that begins; `secs_a_step`: time of a step on this machine, where it was measured.
+/// Three lines that describe the settings of a new training; `secs_a_step`: measured seconds per step on this machine.
 ///
 /// # Errors
-/// Settings that have no JSON form.
+/// Settings that cannot be serialised.
 pub fn lines(of: &GanSettings, material: &TrainingMaterial, secs_a_step: Option<f64>) -> Result<Vec<String>> {
     let minutes = |secs: f64| format!("{:.1} min", secs / 60.0);
     let values = serde_json::to_value(of)?;
@@ -185,26 +189,26 @@ pub fn lines(of: &GanSettings, material: &TrainingMaterial, secs_a_step: Option<
 pub(super) mod tests {
     use super::*;
 
-    /// Settings of `recipe` for so many minutes of one speaker.
+    /// Settings of `recipe` for this many minutes of one speaker.
     pub(crate) fn of_minutes(recipe: GanRecipe, minutes: f64) -> GanSettings {
         let material = TrainingMaterial { train_secs: 60.0 * minutes, validation_secs: 60.0, n_speakers: 1 };
-        settings(&GanConfig { recipe, ..GanConfig::default() }, &material, TrainingStart::Nothing).unwrap()
+        settings(&GanConfig { recipe, ..GanConfig::default() }, &material, InitialWeights::Random).unwrap()
     }
 
-    /// Hashes of the settings as JSON, recorded before recipes were a table: `auto` for one speaker and for three, `paper`.
+    /// Recorded hashes of the settings as JSON: `auto` for one speaker and for three speakers, and `paper`.
     const GOLDEN: [&str; 3] = ["34dfe6e2091b5e2c", "15dbe717d7be6096", "ef3cdefcbf93b7b6"];
 
     #[test]
-    fn settings_are_those_of_earlier_versions() {
-        let starts = [TrainingStart::Nothing, TrainingStart::AnotherSpeaker, TrainingStart::SeveralSpeakers];
+    fn settings_do_not_change() {
+        let starts = [InitialWeights::Random, InitialWeights::AnotherSpeaker, InitialWeights::SeveralSpeakers];
         let mut hashes = Vec::new();
         for (recipe, n_speakers) in [(GanRecipe::Auto, 1), (GanRecipe::Auto, 3), (GanRecipe::Paper, 1)] {
             let mut hasher = blake3::Hasher::new();
             for minutes in [0.0, 0.5, 2.0, 3.7, 5.0, 10.0, 17.3, 20.0, 30.0, 61.0, 90.0, 120.0, 400.0] {
-                for start in starts {
+                for initial in starts {
                     let material = TrainingMaterial { train_secs: 60.0 * minutes, validation_secs: 0.0, n_speakers };
-                    let asked = GanConfig { recipe, ..GanConfig::default() };
-                    let mut settings = serde_json::to_value(settings(&asked, &material, start).unwrap()).unwrap();
+                    let requested = GanConfig { recipe, ..GanConfig::default() };
+                    let mut settings = serde_json::to_value(settings(&requested, &material, initial).unwrap()).unwrap();
                     settings.as_object_mut().unwrap().shift_remove("channels");
                     hasher.update(settings.to_string().as_bytes());
                 }
@@ -215,7 +219,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn rows_are_met_and_what_is_between_is_between() {
+    fn columns_are_reproduced_and_interpolated() {
         let of = |minutes| of_minutes(GanRecipe::Auto, minutes);
         assert_eq!((of(0.1), of(10_000.0)), (of(2.0), of(120.0)));
         let (few, some, many) = (of(2.0), of(4.472), of(10.0));
@@ -230,11 +234,11 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn the_papers_recipe_is_the_papers() {
+    fn the_paper_recipe_has_the_published_values() {
         let paper = of_minutes(GanRecipe::Paper, 10.0);
         assert_eq!((paper.batch, paper.learning_rate, paper.lambda_gan, paper.steps), (32, 1e-4, 1.0, 90_000));
         assert_eq!((paper.rate(0), paper.rate(70_000)), (1e-4, 1e-4));
-        // The defaults of checkpoints without recipes are the paper's too.
+        // Defaults for old checkpoints without a recipe are the published values too.
         let mut stored = serde_json::to_value(&paper).unwrap();
         let written = stored.clone();
         for key in ["recipe", "shared_rate", "warmup_steps", "fade_to", "adversarial_from", "ema_decay", "dropout"] {
@@ -245,11 +249,11 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn what_speakers_share_may_stand_still_only_where_it_has_been_learnt() {
+    fn shared_weights_may_be_frozen_only_after_training_on_several_speakers() {
         let material = TrainingMaterial { train_secs: 120.0, validation_secs: 60.0, n_speakers: 1 };
-        let asked = GanConfig { shared_rate: 0.0.into(), ..GanConfig::default() };
-        let rate = |start| settings(&asked, &material, start).unwrap().shared_rate;
-        let starts = [TrainingStart::Nothing, TrainingStart::AnotherSpeaker, TrainingStart::SeveralSpeakers];
+        let requested = GanConfig { shared_rate: 0.0.into(), ..GanConfig::default() };
+        let rate = |initial| settings(&requested, &material, initial).unwrap().shared_rate;
+        let starts = [InitialWeights::Random, InitialWeights::AnotherSpeaker, InitialWeights::SeveralSpeakers];
         assert_eq!(starts.map(rate), [1.0, 1.0, 0.0]);
     }
 }

@@ -1,40 +1,42 @@
-//! What a validation says of a generator: metrics beside those of the pose that never moves from the mean, the one
-//! score that chooses the best checkpoint, and the alarm of a collapse.
+//! Validation of a generator: its metrics beside those of a constant mean pose, the score that selects the best
+//! checkpoint, and the detection of a collapse.
 
 use orator_base::types::posture::PostureChannel;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Generated motion with less than this share of the data's energy hardly moves.
-const LEAST_ENERGY: f64 = 0.3;
-/// Windows of generated motion that differ by less than this share of what real windows differ by are alike.
-const LEAST_SPREAD: f64 = 0.1;
+/// Motion energy relative to the data below which the generator has collapsed to the mean pose.
+const MIN_ENERGY: f64 = 0.3;
+/// Spread relative to real windows below which the generator has collapsed to one motion.
+const MIN_SPREAD: f64 = 0.1;
 
-/// A predictor's metrics on the held-out windows.
+/// Metrics of a predictor on the held-out windows.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ValidationMetrics {
     /// Mean absolute error of normalised coordinates.
     pub l1: f64,
-    /// Share of correct keypoints, 0..1: all, of shoulders, elbows and wrists, of the fingers.
+    /// Percentage of correct keypoints (PCK) of all joints, 0..1.
     pub pck: f64,
+    /// PCK of shoulders, elbows and wrists, 0..1.
     pub pck_body: f64,
+    /// PCK of the fingers, 0..1.
     pub pck_hands: f64,
-    /// Frechet distance of single poses to the real ones, square centimetres; too few poses make it too large.
+    /// Frechet distance between single predicted and real poses, cm2; few poses bias it upwards.
     pub frechet: Option<f64>,
-    /// Mean squared speed of the joints as a share of the data's.
+    /// Mean squared speed of the joints relative to the data.
     pub energy: f64,
 }
 
-/// Mean absolute error of the angles of a channel, degrees, where they are seen.
+/// Mean absolute error of the visible angles of a posture channel, degrees.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChannelError {
     pub generator: f64,
-    /// Of the mean posture in every frame.
+    /// Error of a constant mean posture.
     pub mean_pose: f64,
 }
 
-/// Share by which an error is below another, 1: there is none left, with the ends of the interval of 95 % over blocks;
-/// `None`: too few blocks.
+/// Relative reduction of an error compared with another one (1: no error left), and the ends of its 95 % confidence
+/// interval over blocks; `None` if there are too few blocks.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ErrorReduction {
     pub value: f64,
@@ -43,60 +45,61 @@ pub struct ErrorReduction {
 }
 
 impl ErrorReduction {
-    /// Whether the whole interval is above 0.
-    pub fn is_sure(&self) -> bool {
+    /// Whether the confidence interval lies above 0.
+    pub fn is_significant(&self) -> bool {
         self.low.is_some_and(|low| low > 0.0)
     }
 }
 
-/// The generator beside the mean pose, on the same windows.
+/// Metrics of the generator and of the mean pose on the same windows.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Validation {
-    /// The split they were measured on.
+    /// Evaluated split.
     pub split: String,
     pub n_windows: usize,
-    /// Poses behind the Frechet distance.
+    /// Number of poses in the Frechet distance.
     pub n_poses: usize,
     pub generator: ValidationMetrics,
     pub mean_pose: ValidationMetrics,
-    /// L1 error of the generator's poses for another sound of the same speaker.
+    /// L1 error of the poses generated for mismatched sound of the same speaker.
     #[serde(default)]
     pub other_sound: f64,
-    /// How far the generator's L1 error is below the mean pose's, and below that for another sound.
+    /// Reduction of the generator's L1 error compared with the mean pose.
     #[serde(default)]
     pub below_mean_pose: Option<ErrorReduction>,
+    /// Reduction of the generator's L1 error compared with mismatched sound.
     #[serde(default)]
     pub below_other_sound: Option<ErrorReduction>,
-    /// Of what is learnt beside the joints.
+    /// Errors of the posture channels.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub channels: BTreeMap<PostureChannel, ChannelError>,
-    /// Mean change of a bone's length from frame to frame in the network's own output, mm.
+    /// Mean absolute change of the bone lengths between consecutive frames of the raw network output, mm.
     pub bone_change_mm: f64,
-    /// How much windows of different sound differ from each other, as a share of what real windows differ by.
+    /// Mean distance between windows of different sound, relative to real windows.
     pub spread: f64,
-    /// What chooses the best checkpoint, see [`score`].
+    /// Score that selects the best checkpoint, see [`score`].
     pub score: f64,
-    /// Why this generator has collapsed, if it has.
+    /// Message if this generator has collapsed.
     pub alarm: Option<String>,
 }
 
 impl Validation {
-    /// The figures in a line, those of the mean pose in brackets.
-    pub fn words(&self) -> String {
-        let (own, still) = (&self.generator, &self.mean_pose);
-        let share = |share: f64| format!("{:.0} %", 100.0 * share);
-        let frechet = match (own.frechet, still.frechet) {
-            (Some(own), Some(still)) => format!(", Frechet {own:.0} cm2 ({still:.0})"),
+    /// The main metrics in one line, those of the mean pose in brackets.
+    pub fn summary(&self) -> String {
+        let (own, mean_pose) = (&self.generator, &self.mean_pose);
+        let percent = |share: f64| format!("{:.0} %", 100.0 * share);
+        let frechet = match (own.frechet, mean_pose.frechet) {
+            (Some(own), Some(mean_pose)) => format!(", Frechet {own:.0} cm2 ({mean_pose:.0})"),
             _ => String::new(),
         };
         format!(
             "{} L1 {:.3} (mean pose {:.3}), PCK {} ({}){frechet}, energy {}",
             self.split,
             own.l1,
-            still.l1,
-            share(own.pck),
-            share(still.pck),
-            share(own.energy)
+            mean_pose.l1,
+            percent(own.pck),
+            percent(mean_pose.pck),
+            percent(own.energy)
         )
     }
 }
@@ -104,41 +107,43 @@ impl Validation {
 /// Weight of the motion energy in the score.
 const ENERGY_WEIGHT: f64 = 0.15;
 
-/// The score, lower is better: the L1 error as a share of the mean pose's, the same error as a share of that of the motion
-/// for another sound, the Frechet distance as a share of the mean pose's, and the distance of the motion energy from the
-/// data's, 0.15 |ln(energy)|. The first asks for the right pose at the right time, the second for motion that comes from
-/// what is heard, the third for poses like the speaker's, the fourth for as much motion. Energy weighs little: a network
-/// that learns its windows by heart moves ever more like the data and hears ever less. The adversarial loss has no part in
-/// it: it measures the two networks against each other. Without a Frechet distance its share is 1.
+/// Score of a validation, lower is better. The sum of
+/// - the L1 error relative to the mean pose: the right pose at the right time,
+/// - the L1 error relative to that for mismatched sound: motion that depends on the audio,
+/// - the Frechet distance relative to the mean pose (1 if it is missing): poses like the speaker's,
+/// - 0.15 |ln(energy)|: as much motion as the data. Its weight is small, because the energy of a network that overfits
+///   approaches that of the data while its motion depends less and less on the audio.
+///
+/// The adversarial loss is not part of it, since it compares the two networks with each other.
 pub fn score(generator: &ValidationMetrics, mean_pose: &ValidationMetrics, other_sound: f64) -> f64 {
     let frechet = match (generator.frechet, mean_pose.frechet) {
-        (Some(own), Some(still)) if still > 0.0 => own / still,
+        (Some(own), Some(mean)) if mean > 0.0 => own / mean,
         _ => 1.0,
     };
-    let hearing = generator.l1 / other_sound.max(1e-9);
+    let audio_dependence = generator.l1 / other_sound.max(1e-9);
     let energy = generator.energy.max(1e-6).ln().abs();
-    generator.l1 / mean_pose.l1.max(1e-9) + hearing + frechet + ENERGY_WEIGHT * energy
+    generator.l1 / mean_pose.l1.max(1e-9) + audio_dependence + frechet + ENERGY_WEIGHT * energy
 }
 
-/// Says that a model is below the mean pose, if it is: by the L1 error or by the share of correct keypoints, each `[model,
-/// mean pose]`, where measured. Shares are in 0..1.
+/// Message if a model is worse than the mean pose in the L1 error or in the PCK (0..1, if measured), each given as
+/// `[model, mean pose]`.
 pub fn below_mean_pose(l1: [f64; 2], pck: Option<[f64; 2]>) -> Option<String> {
     let error = (l1[0] > l1[1]).then(|| format!("L1 {:.3} against {:.3}", l1[0], l1[1]));
-    let share = pck.filter(|[model, still]| model < still);
-    let share = share.map(|[model, still]| format!("PCK {:.1} % against {:.1} %", 100.0 * model, 100.0 * still));
-    let what: Vec<String> = error.into_iter().chain(share).collect();
-    let what = (!what.is_empty()).then(|| what.join(", "))?;
+    let share = pck.filter(|[model, mean]| model < mean);
+    let share = share.map(|[model, mean]| format!("PCK {:.1} % against {:.1} %", 100.0 * model, 100.0 * mean));
+    let metrics: Vec<String> = error.into_iter().chain(share).collect();
+    let metrics = (!metrics.is_empty()).then(|| metrics.join(", "))?;
     Some(format!(
-        "The model is below the mean pose: a pose that never moves is nearer to where the speaker is ({what})."
+        "The model is below the mean pose: a pose that never moves is nearer to where the speaker is ({metrics})."
     ))
 }
 
-/// Says what is wrong with a generator that hardly moves, or moves alike whatever it hears.
+/// Message if a generator hardly moves, or moves alike for any audio; arguments as in [`Validation`].
 pub fn alarm(energy: f64, spread: f64) -> Option<String> {
-    if energy < LEAST_ENERGY {
+    if energy < MIN_ENERGY {
         let percent = 100.0 * energy;
         Some(format!("the motion has collapsed towards the mean pose: it has {percent:.0} % of the data's energy"))
-    } else if spread < LEAST_SPREAD {
+    } else if spread < MIN_SPREAD {
         let percent = 100.0 * spread;
         Some(format!("the motion is alike whatever the sound: windows differ by {percent:.0} % of what real ones do"))
     } else {
@@ -151,37 +156,37 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_score_wants_all_three() {
-        let still =
+    fn each_term_of_the_score_counts() {
+        let mean_pose =
             ValidationMetrics { l1: 0.8, pck: 0.3, pck_body: 0.3, pck_hands: 0.3, frechet: Some(200.0), energy: 0.0 };
-        let good = ValidationMetrics { l1: 0.4, frechet: Some(50.0), energy: 1.0, ..still };
-        assert!((score(&good, &still, 0.8) - 1.25).abs() < 1e-12);
-        assert!(score(&good, &still, 0.5) > score(&good, &still, 0.8), "another sound does as well");
+        let good = ValidationMetrics { l1: 0.4, frechet: Some(50.0), energy: 1.0, ..mean_pose };
+        assert!((score(&good, &mean_pose, 0.8) - 1.25).abs() < 1e-12);
+        assert!(score(&good, &mean_pose, 0.5) > score(&good, &mean_pose, 0.8), "another sound does as well");
         for worse in [
             ValidationMetrics { l1: 0.5, ..good },
             ValidationMetrics { frechet: Some(90.0), ..good },
             ValidationMetrics { energy: 0.5, ..good },
             ValidationMetrics { energy: 2.0, ..good },
             ValidationMetrics { frechet: None, ..good },
-            still,
+            mean_pose,
         ] {
-            assert!(score(&worse, &still, 0.8) > score(&good, &still, 0.8), "{worse:?}");
+            assert!(score(&worse, &mean_pose, 0.8) > score(&good, &mean_pose, 0.8), "{worse:?}");
         }
     }
 
     #[test]
-    fn a_model_below_the_mean_pose_is_named() {
+    fn a_model_below_the_mean_pose_is_reported() {
         assert_eq!(below_mean_pose([0.4, 0.5], Some([0.6, 0.3])), None);
         assert_eq!(below_mean_pose([0.4, 0.5], None), None);
         assert_eq!(below_mean_pose([f64::NAN, 0.5], Some([f64::NAN, 0.3])), None);
-        let said = below_mean_pose([0.8, 0.5], Some([0.25, 0.3])).unwrap();
-        assert!(said.ends_with("(L1 0.800 against 0.500, PCK 25.0 % against 30.0 %)."), "{said}");
-        assert!(below_mean_pose([0.4, 0.5], Some([0.2, 0.3])).is_some_and(|said| !said.contains("L1")));
-        assert!(below_mean_pose([0.6, 0.5], None).is_some_and(|said| !said.contains("PCK")));
+        let message = below_mean_pose([0.8, 0.5], Some([0.25, 0.3])).unwrap();
+        assert!(message.ends_with("(L1 0.800 against 0.500, PCK 25.0 % against 30.0 %)."), "{message}");
+        assert!(below_mean_pose([0.4, 0.5], Some([0.2, 0.3])).is_some_and(|message| !message.contains("L1")));
+        assert!(below_mean_pose([0.6, 0.5], None).is_some_and(|message| !message.contains("PCK")));
     }
 
     #[test]
-    fn collapses_are_named() {
+    fn collapses_are_reported() {
         assert!(alarm(0.29, 1.0).is_some_and(|text| text.contains("29 %")));
         assert!(alarm(1.0, 0.05).is_some_and(|text| text.contains("alike")));
         assert_eq!(alarm(0.7, 0.5), None);

@@ -1,4 +1,4 @@
-//! The speakers of a training, one or several: what the network's numbers mean of each, and the way from them to poses.
+//! The speakers of a training, one or several: their metadata, and the decoders from network outputs to poses.
 
 use super::losses::BoneConstancy;
 use crate::generate::model::SpeakerMetadata;
@@ -7,18 +7,19 @@ use anyhow::{Result, ensure};
 use candle_core::{DType, Device, Tensor};
 use orator_nn::gan::generator::Config;
 
-/// Speakers by their numbers in the network's table.
-pub struct LearntSpeakers {
+/// Speakers in the order of their rows in the network's speaker table.
+pub struct SpeakerSet {
     of: Vec<SpeakerMetadata>,
     decoders: Vec<PoseDecoder>,
     bones: Vec<BoneConstancy>,
 }
 
-impl LearntSpeakers {
-    /// Speakers of one network.
+impl SpeakerSet {
+    /// Set of the speakers of one network.
     ///
     /// # Errors
-    /// None, or as many as the network does not know; other channels, rates or representations than the first one's.
+    /// No speaker, or another number than the network has; a speaker whose channels, frame rate or network differ from
+    /// the first one's.
     pub fn new(of: Vec<SpeakerMetadata>, device: &Device) -> Result<Self> {
         ensure!(!of.is_empty(), "there is no speaker to learn");
         let first = &of[0];
@@ -47,27 +48,28 @@ impl LearntSpeakers {
         })
     }
 
-    /// Every one of them.
+    /// Metadata of all speakers.
     pub fn all(&self) -> &[SpeakerMetadata] {
         &self.of
     }
 
-    /// Shape of the network.
+    /// Configuration of the network.
     pub fn network(&self) -> &Config {
         &self.of[0].network
     }
 
-    /// Their names.
+    /// Names of the speakers, separated by commas.
     pub fn names(&self) -> String {
         self.of.iter().map(|of| of.name.as_str()).collect::<Vec<_>>().join(", ")
     }
 
-    /// Numbers of a pose.
-    pub fn n_numbers(&self) -> usize {
-        self.of[0].normalisation.n_numbers()
+    /// Number of features of a pose.
+    pub fn n_features(&self) -> usize {
+        self.of[0].normalisation.n_features()
     }
 
-    /// The network's numbers [B, numbers, T] to normalised poses [B, numbers, T]; `speakers` has the number of each window's.
+    /// Decodes network outputs [B, features, T] to normalised poses [B, features, T]; `speakers` is the speaker index
+    /// of each window.
     pub fn poses(&self, raw: &Tensor, speakers: &[u32]) -> Result<Tensor> {
         if let [decoder] = &self.decoders[..] {
             return Ok(decoder.poses(raw)?);
@@ -77,8 +79,8 @@ impl LearntSpeakers {
         Ok(Tensor::cat(&poses, 0)?)
     }
 
-    /// Mean change of the bones' lengths (`BoneConstancy`) of normalised poses [B, numbers, T]; `None` where the
-    /// representation keeps the lengths.
+    /// Bone length constancy loss (`BoneConstancy`) of normalised poses [B, features, T]; `None` if the representation
+    /// keeps the lengths constant.
     pub fn bone_loss(&self, poses: &Tensor, speakers: &[u32]) -> Result<Option<Tensor>> {
         if self.of[0].representation.keeps_lengths() {
             return Ok(None);
@@ -95,7 +97,7 @@ impl LearntSpeakers {
     }
 }
 
-/// Windows of one speaker that stand side by side in a batch.
+/// Consecutive windows of one speaker in a batch.
 struct Run {
     speaker: usize,
     first: usize,
@@ -126,19 +128,19 @@ mod tests {
     fn speaker(mean: f32, representation: Representation, n_speakers: usize) -> SpeakerMetadata {
         let table = |value: f32| Array2::from_shape_fn((N_JOINTS, 3), |(j, k)| value + 0.01 * (j + 2 * k) as f32);
         let normal = Normalisation::new(&table(mean), &table(0.3), vec![0.1 + mean; N_BONES]);
-        let network = Config { n_speakers, ..Config::from_preset(Preset::Light, normal.n_numbers()) };
+        let network = Config { n_speakers, ..Config::from_preset(Preset::Light, normal.n_features()) };
         SpeakerMetadata::new("host", FrameRate::new(15, 1), "", network, normal, representation)
     }
 
-    /// Each window of a batch comes out as it would alone.
+    /// Windows of a mixed batch are decoded as by a network of one speaker.
     #[test]
-    fn every_speaker_has_a_body_of_its_own() -> Result<()> {
+    fn every_speaker_has_a_separate_decoder() -> Result<()> {
         let bones = || Representation::Bones { mean: vec![0.1; 3 * N_BONES], std: vec![0.5; 3 * N_BONES] };
         for representation in [bones, || Representation::Positions] {
             let two = |n_speakers| [0.1, 0.4].map(|mean| speaker(mean, representation(), n_speakers));
-            let both = LearntSpeakers::new(two(2).to_vec(), &Device::Cpu)?;
-            let alone: Vec<LearntSpeakers> =
-                two(0).into_iter().map(|of| LearntSpeakers::new(vec![of], &Device::Cpu)).collect::<Result<_>>()?;
+            let both = SpeakerSet::new(two(2).to_vec(), &Device::Cpu)?;
+            let alone: Vec<SpeakerSet> =
+                two(0).into_iter().map(|of| SpeakerSet::new(vec![of], &Device::Cpu)).collect::<Result<_>>()?;
             let raw = pattern(&[4, 3 * N_BONES, 6], 0.0)?.to_dtype(DType::F32)?;
             let speakers = [0, 1, 1, 0];
             let poses = both.poses(&raw, &speakers)?;
@@ -154,9 +156,9 @@ mod tests {
             let loss = both.bone_loss(&poses, &speakers)?.map_or(Ok(0.0), |loss| loss.to_scalar::<f32>())?;
             assert!((loss - losses).abs() <= 1e-5 * losses, "{loss} {losses}");
         }
-        assert!(LearntSpeakers::new(Vec::new(), &Device::Cpu).is_err());
+        assert!(SpeakerSet::new(Vec::new(), &Device::Cpu).is_err());
         let other = SpeakerMetadata { fps: FrameRate::new(25, 1), ..speaker(0.1, bones(), 2) };
-        let error = LearntSpeakers::new(vec![speaker(0.1, bones(), 2), other], &Device::Cpu).err();
+        let error = SpeakerSet::new(vec![speaker(0.1, bones(), 2), other], &Device::Cpu).err();
         assert!(error.is_some_and(|error| error.to_string().contains("25")));
         Ok(())
     }

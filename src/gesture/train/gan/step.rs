@@ -1,10 +1,10 @@
-//! A generator and its discriminator in training: one step, and all of it to a checkpoint and back.
+//! A generator and its discriminator in training: one optimiser step, and saving to and loading from checkpoints.
 
 use super::augment;
 use super::average;
 use super::losses::{self, number};
 use super::score::Validation;
-use super::speakers::LearntSpeakers;
+use super::speakers::SpeakerSet;
 use super::windows::WindowBatch;
 use crate::generate::model::{BEST, GENERATOR, SpeakerMetadata};
 use crate::train::optim::adam::{self, Adam};
@@ -24,24 +24,24 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// The generator of the last step, where the generator of the checkpoint is a mean over steps.
+/// Prefix of the generator without averaging, if the generator of the checkpoint is the average over the steps (EMA).
 const LAST_STEP: &str = "training.generator.";
 const DISCRIMINATOR: &str = "discriminator.";
 const ADAM_G: &str = "adam.generator.";
 const ADAM_D: &str = "adam.discriminator.";
-/// Tells the random numbers of dropout from the others of a step.
+/// Seed modifier that makes dropout independent of the other random numbers of a step.
 const DROPOUT: u64 = 0x6472_6f70;
-/// Norm to which the gradient of each network is clipped.
+/// Largest gradient norm of each network; larger gradients are clipped.
 pub const MAX_NORM: f64 = 10.0;
 
-/// Settings that may change between two runs of one training; of the others the checkpoint's count.
-const FREE: [&str; 5] = ["steps", "patience", "checkpoint_every", "keep_checkpoints", "device"];
+/// Settings that a resumed training takes from the configuration; all others come from the checkpoint.
+const OVERRIDABLE_ON_RESUME: [&str; 5] = ["steps", "patience", "checkpoint_every", "keep_checkpoints", "device"];
 
-/// Losses of one step, unweighted, and the norm of the generator's gradient.
+/// Unweighted losses of one step, and the gradient norm of the generator.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
 pub struct Losses {
     pub l1: f64,
-    /// Not measured where it has no weight.
+    /// `None` if its weight is 0, and so for `energy`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub speed: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -53,56 +53,56 @@ pub struct Losses {
     pub gradient_norm: f64,
 }
 
-/// What a checkpoint says beside its tensors.
+/// Metadata of a checkpoint.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct TrainerState {
     pub speaker: SpeakerMetadata,
-    /// The others of a training of several.
+    /// All further speakers of a training of several.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub other_speakers: Vec<SpeakerMetadata>,
     pub settings: GanSettings,
-    /// Steps done.
+    /// Number of completed steps.
     pub step: usize,
     /// Step and score of the best validation so far.
     pub best: Option<(usize, f32)>,
 }
 
-/// Networks, optimisers and where they are.
+/// Networks and optimisers of a training, with its step count.
 pub struct GanTrainer {
-    pub speakers: LearntSpeakers,
+    pub speakers: SpeakerSet,
     pub settings: GanSettings,
     pub generator: Generator,
     generator_params: Params,
-    /// Mean of the generator over the steps, where the settings want one.
-    mean: Option<(Generator, Params)>,
+    /// Exponential moving average of the generator, if `ema_decay` is above 0.
+    ema: Option<(Generator, Params)>,
     discriminator: Discriminator,
     discriminator_params: Params,
     adam_g: Adam,
     adam_d: Adam,
-    /// Steps done.
+    /// Number of completed steps.
     pub step: usize,
     /// Step and score of the best validation so far.
     pub best: Option<(usize, f32)>,
 }
 
 impl GanTrainer {
-    /// Networks as the seed makes them, for one speaker or several.
+    /// Networks for one speaker or several, with random initial weights determined by the seed.
     pub fn new(speakers: Vec<SpeakerMetadata>, settings: GanSettings) -> Result<Self> {
         let device = open_device(settings.device == ComputeDevice::Cuda)?;
         let mut generator_params = Params::new(settings.seed).on(&device);
-        let speakers = LearntSpeakers::new(speakers, &device)?;
+        let speakers = SpeakerSet::new(speakers, &device)?;
         let generator = Generator::new(&mut generator_params, speakers.network())?;
-        let mean = if settings.ema_decay > 0.0 {
+        let ema = if settings.ema_decay > 0.0 {
             let mut params = Params::frozen().on(&device);
-            let mean = Generator::new(&mut params, speakers.network())?;
+            let ema = Generator::new(&mut params, speakers.network())?;
             params.load(&generator_params.tensors()?)?;
-            Some((mean, params))
+            Some((ema, params))
         } else {
             None
         };
-        // Another seed, or tensors of the same name would begin alike.
+        // Inverted seed, so that equally named tensors of the two networks are initialised differently.
         let mut discriminator_params = Params::new(!settings.seed).on(&device);
-        let discriminator = Discriminator::new(&mut discriminator_params, speakers.n_numbers())?;
+        let discriminator = Discriminator::new(&mut discriminator_params, speakers.n_features())?;
         let adam = adam::Config { max_norm: Some(MAX_NORM), ..adam::Config::default() };
         let decaying = adam::Config { weight_decay: settings.weight_decay, ..adam };
         let share = |name: &str| if name.starts_with(SPEAKER) { 1.0 } else { settings.shared_rate };
@@ -111,7 +111,7 @@ impl GanTrainer {
             adam_d: Adam::new(&discriminator_params, adam)?,
             generator_params,
             generator,
-            mean,
+            ema,
             discriminator_params,
             discriminator,
             speakers,
@@ -121,41 +121,42 @@ impl GanTrainer {
         })
     }
 
-    /// Numbers the optimiser moves in the generator.
+    /// Number of trainable parameters of the generator.
     pub fn n_parameters(&self) -> usize {
         self.generator_params.n_parameters()
     }
 
-    /// Where the tensors are.
+    /// Device of the tensors.
     pub fn device(&self) -> &Device {
         self.generator_params.device()
     }
 
-    /// One step of the discriminator, then one of the generator, on the same windows.
+    /// Runs one step of the discriminator, then one of the generator, on the same windows.
     pub fn step(&mut self, batch: &WindowBatch) -> Result<Losses> {
         self.step_in_phases(batch, &mut |_| ())
     }
 
-    /// `step`, with a call at the end of each phase, by its name: for measuring where the time goes.
+    /// Like `step`; calls `phase` with its name at the end of each phase, for profiling.
     pub fn step_in_phases(&mut self, batch: &WindowBatch, phase: &mut dyn FnMut(&'static str)) -> Result<Losses> {
         let batch = batch.on(self.device())?;
         let GanSettings { lambda_l1, lambda_speed, lambda_energy, lambda_velocity, lambda_bone, .. } = self.settings;
         let (lambda_gan, learning_rate) = (self.settings.adversarial_weight(self.step), self.settings.rate(self.step));
         let raw = self.predict(&batch)?;
         let generated = self.speakers.poses(&raw, &batch.speakers)?;
-        // Differences count where both frames do, so that a missing joint looks the same in both.
-        let mask = losses::both_seen(&batch.mask)?;
+        // Differences are masked where either frame is, so that missing joints look the same in real and generated
+        // motion.
+        let mask = losses::both_visible(&batch.mask)?;
         let generated_motion = (motion(&generated)? * &mask)?;
         phase("generator forward");
 
-        let mut of_discriminator = 0.0;
+        let mut discriminator_loss_value = 0.0;
         let generated_motion = if lambda_gan > 0.0 { self.with_noise(generated_motion, 0)? } else { generated_motion };
         if lambda_gan > 0.0 {
             let real_motion = self.with_noise((motion(&batch.poses)? * &mask)?, 1)?;
             let real_scores = self.discriminator.forward(&real_motion, true)?;
             let generated_scores = self.discriminator.forward(&generated_motion.detach(), true)?;
             let loss = losses::discriminator_loss(self.settings.adversarial, &real_scores, &generated_scores)?;
-            of_discriminator = number(&loss)?;
+            discriminator_loss_value = number(&loss)?;
             self.adam_d.step(&loss.backward()?, learning_rate)?;
         }
         phase("discriminator's step");
@@ -191,22 +192,32 @@ impl GanTrainer {
         phase("generator backward");
         let gradient_norm = self.adam_g.step(&gradients, learning_rate)?;
         phase("generator's Adam");
-        if let Some((_, mean)) = &self.mean {
-            average::update(mean, &self.generator_params, self.settings.ema_decay, self.step)?;
+        if let Some((_, ema)) = &self.ema {
+            average::update(ema, &self.generator_params, self.settings.ema_decay, self.step)?;
         }
         self.step += 1;
         let l1 = number(&l1)?;
-        Ok(Losses { l1, speed, energy, velocity, bone, adversarial, discriminator: of_discriminator, gradient_norm })
+        Ok(Losses {
+            l1,
+            speed,
+            energy,
+            velocity,
+            bone,
+            adversarial,
+            discriminator: discriminator_loss_value,
+            gradient_norm,
+        })
     }
 
-    /// L1 error of the generator that generates on a batch of windows.
+    /// L1 error of the averaged generator (`ema_generator`) on a batch of windows.
     pub fn error(&self, batch: &WindowBatch) -> Result<f64> {
         let batch = batch.on(self.device())?;
-        let raw = self.listener().forward(&batch.mels, &batch.speakers, self.settings.window_frames, false)?.detach();
+        let raw =
+            self.ema_generator().forward(&batch.mels, &batch.speakers, self.settings.window_frames, false)?.detach();
         number(&losses::l1(&self.speakers.poses(&raw, &batch.speakers)?, &batch.poses, &batch.mask)?)
     }
 
-    /// Raw poses of a batch while training: channels of the encoded sound are dropped.
+    /// Raw poses of a batch in training mode, with dropout of whole channels of the encoded audio.
     fn predict(&self, batch: &WindowBatch) -> Result<Tensor> {
         let (n_frames, dropout) = (self.settings.window_frames, self.settings.dropout);
         if dropout == 0.0 {
@@ -214,14 +225,15 @@ impl GanTrainer {
         }
         let encoded = resize::linear(&self.generator.encode(&batch.mels, &batch.speakers, true)?, n_frames)?;
         let (n_windows, _, n_channels) = encoded.dims3()?;
-        let mut rng = resume::stream(self.settings.seed ^ DROPOUT, self.step);
-        let of = |_| if rng.random_bool(dropout) { 0.0 } else { 1.0 / (1.0 - dropout) as f32 };
-        let kept: Vec<f32> = (0..n_windows * n_channels).map(of).collect();
-        let kept = Tensor::from_vec(kept, (n_windows, 1, n_channels), encoded.device())?;
-        Ok(self.generator.decode(&encoded.broadcast_mul(&kept)?, true)?)
+        let mut rng = resume::step_rng(self.settings.seed ^ DROPOUT, self.step);
+        let factor = |_| if rng.random_bool(dropout) { 0.0 } else { 1.0 / (1.0 - dropout) as f32 };
+        let factors: Vec<f32> = (0..n_windows * n_channels).map(factor).collect();
+        let factors = Tensor::from_vec(factors, (n_windows, 1, n_channels), encoded.device())?;
+        Ok(self.generator.decode(&encoded.broadcast_mul(&factors)?, true)?)
     }
 
-    /// Motion as the discriminator sees it: noise keeps it from learning the windows by heart (Arjovsky & Bottou 2017).
+    /// Input of the discriminator: motion with noise, which keeps the discriminator from memorising the windows
+    /// (Arjovsky & Bottou 2017). `which` selects the random numbers.
     fn with_noise(&self, motion: Tensor, which: u64) -> Result<Tensor> {
         let std = self.settings.augment_pose_noise;
         if std == 0.0 {
@@ -231,21 +243,21 @@ impl GanTrainer {
         Ok((&motion + Tensor::from_vec(noise, motion.shape(), motion.device())?)?)
     }
 
-    /// The generator that is validated and generates: the mean over the steps, where there is one.
-    pub fn listener(&self) -> &Generator {
-        self.mean.as_ref().map_or(&self.generator, |(mean, _)| mean)
+    /// Generator for validation and generation: the average over the steps if there is one, else that of the last step.
+    pub fn ema_generator(&self) -> &Generator {
+        self.ema.as_ref().map_or(&self.generator, |(ema, _)| ema)
     }
 
-    /// Its numbers.
-    fn listener_tensors(&self) -> Result<BTreeMap<String, Tensor>> {
-        Ok(self.mean.as_ref().map_or(&self.generator_params, |(_, params)| params).tensors()?)
+    /// Tensors of `ema_generator`.
+    fn ema_tensors(&self) -> Result<BTreeMap<String, Tensor>> {
+        Ok(self.ema.as_ref().map_or(&self.generator_params, |(_, params)| params).tensors()?)
     }
 
-    /// Writes the checkpoint of this step; old ones go.
+    /// Writes the checkpoint of this step, and deletes old ones beyond `keep_checkpoints`.
     pub fn save(&self, folder: &Path) -> Result<()> {
         let mut contents = Contents { facts: self.stored()?, tensors: BTreeMap::new() };
-        contents.add(GENERATOR, self.listener_tensors()?);
-        if self.mean.is_some() {
+        contents.add(GENERATOR, self.ema_tensors()?);
+        if self.ema.is_some() {
             contents.add(LAST_STEP, self.generator_params.tensors()?);
         }
         contents.add(DISCRIMINATOR, self.discriminator_params.tensors()?);
@@ -255,12 +267,12 @@ impl GanTrainer {
         checkpoint::prune(folder, self.settings.keep_checkpoints)
     }
 
-    /// Writes the generator of this step as the best.
+    /// Writes the generator of this step as the best checkpoint.
     pub fn save_best(&self, folder: &Path, validation: &Validation) -> Result<()> {
         let mut facts = self.stored()?;
         facts["validation"] = serde_json::to_value(validation)?;
         let mut contents = Contents { facts, tensors: BTreeMap::new() };
-        contents.add(GENERATOR, self.listener_tensors()?);
+        contents.add(GENERATOR, self.ema_tensors()?);
         contents.write(&folder.join(BEST))
     }
 
@@ -274,23 +286,23 @@ impl GanTrainer {
         if state.settings.channels.is_empty()
             && let Some(settings) = facts["settings"].as_object_mut()
         {
-            // A key of trainings with channels alone.
+            // The key is only written for trainings with channels.
             settings.shift_remove("channels");
         }
         Ok(facts)
     }
 
-    /// Takes over the weights of another speaker's generator, and of the discriminator where its checkpoint has one.
-    /// `layer`: the speaker's layer, tensors by name; `None`: as it is.
-    pub fn begin_with(&self, other: &Contents, layer: Option<&BTreeMap<String, Tensor>>) -> Result<()> {
+    /// Copies the weights of another model's generator, and those of its discriminator if the checkpoint has one. The
+    /// tensors of the speaker layer come from `layer`; `None` leaves them as they are.
+    pub fn initialise_from(&self, other: &Contents, layer: Option<&BTreeMap<String, Tensor>>) -> Result<()> {
         let is_of_speakers = |name: &String| name.starts_with(SPEAKER);
         let mut generator = other.part(GENERATOR);
         generator.retain(|name, _| !is_of_speakers(name));
         generator.extend(self.generator_params.tensors()?.into_iter().filter(|(name, _)| is_of_speakers(name)));
         generator.extend(layer.into_iter().flatten().map(|(name, tensor)| (name.clone(), tensor.clone())));
         self.generator_params.load(&generator)?;
-        if let Some((_, mean)) = &self.mean {
-            mean.load(&generator)?;
+        if let Some((_, ema)) = &self.ema {
+            ema.load(&generator)?;
         }
         let discriminator = other.part(DISCRIMINATOR);
         if !discriminator.is_empty() {
@@ -299,11 +311,11 @@ impl GanTrainer {
         Ok(())
     }
 
-    /// Takes up the tensors and the place of a checkpoint.
+    /// Restores the tensors, the step and the best score of a checkpoint.
     pub fn load(&mut self, stored: &TrainerState, contents: &Contents) -> Result<()> {
-        match &self.mean {
-            Some((_, mean)) => {
-                mean.load(&contents.part(GENERATOR))?;
+        match &self.ema {
+            Some((_, ema)) => {
+                ema.load(&contents.part(GENERATOR))?;
                 self.generator_params.load(&contents.part(LAST_STEP))?;
             }
             None => self.generator_params.load(&contents.part(GENERATOR))?,
@@ -317,7 +329,7 @@ impl GanTrainer {
 }
 
 impl TrainerState {
-    /// What a checkpoint of a training says. Errors when it is none, or of another program's version.
+    /// Reads the metadata of a training checkpoint. Fails if it is of another kind or program version.
     pub fn from_checkpoint(contents: &Contents) -> Result<Self> {
         ensure!(
             contents.facts["settings"].is_object(),
@@ -333,19 +345,19 @@ impl TrainerState {
         Ok(state)
     }
 
-    /// All speakers, in the order of their numbers.
+    /// All speakers in the order of their indices.
     pub fn speakers(&self) -> Vec<SpeakerMetadata> {
         std::iter::once(&self.speaker).chain(&self.other_speakers).cloned().collect()
     }
 
-    /// The settings to go on with: the checkpoint's, but for those that may change; and a line for each difference.
-    pub fn settings(&self, asked: &GanConfig) -> Result<(GanSettings, Vec<String>)> {
-        resume::settings(&self.settings, asked, "gan", &FREE)
+    /// Settings of the resumed training, and a message for each difference from `requested`.
+    pub fn settings(&self, requested: &GanConfig) -> Result<(GanSettings, Vec<String>)> {
+        resume::settings(&self.settings, requested, "gan", &OVERRIDABLE_ON_RESUME)
     }
 }
 
 impl Losses {
-    /// Losses by name, to look whether the training is sound.
+    /// Losses by name, for the check that the training has not diverged.
     pub fn named(&self) -> [(&'static str, f64); 5] {
         [
             ("L1", self.l1),

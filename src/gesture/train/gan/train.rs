@@ -1,13 +1,13 @@
-//! Training a speaker's generator against the motion discriminator. The same dataset, settings and
-//! seed give the same checkpoints, also when the training was interrupted: the windows of a step depend on the seed
-//! and the step alone (the place of the loader is the step), everything else is in the checkpoint.
+//! Training of a speaker's generator against the motion discriminator. The same dataset, settings and seed give the
+//! same checkpoints, even if the training was interrupted: the windows of a step depend only on the seed and the step,
+//! and everything else is stored in the checkpoint.
 
 use super::augment;
-use super::batches::{self, BatchesAhead};
-use super::begin;
-use super::recipe::{self, TrainingMaterial, TrainingStart};
+use super::batches::{self, BatchPrefetcher};
+use super::pretrained::PretrainedModel;
+use super::recipe::{self, InitialWeights, TrainingMaterial};
 use super::score::Validation;
-use super::start::StartingModel;
+use super::speaker_metadata;
 use super::step::{GanTrainer, Losses, TrainerState};
 use super::validate::ValidationIntervals;
 use super::windows::{JoinedWindows, WindowLoader, needed};
@@ -30,25 +30,25 @@ use orator_nn::weights::Contents;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Trains on `dataset` until `wanted.steps`, going on from the newest checkpoint in `folder`; what the settings of that
-/// checkpoint say counts, and differences are reported.
+/// Trains on `dataset` until `requested.steps`, resuming from the newest checkpoint in `folder` if there is one; then
+/// the settings of that checkpoint apply, and differences are reported.
 ///
 /// # Errors
-/// No window to train on; a checkpoint of another speaker or version; another training at work in `folder`; a loss that
-/// is not finite or explodes (the last good checkpoint stays); `StoppedTraining` where `progress` asks for an end.
+/// No window to train on; a checkpoint of another speaker or version; another training running in `folder`; a loss that
+/// is not finite or explodes (the last good checkpoint is kept); `StoppedTraining` if `progress` requests a stop.
 pub fn train(
     dataset: &Dataset,
     requested: &GanConfig,
     folder: &Path,
     progress: &dyn Progress,
 ) -> Result<TrainingOutcome<Validation>> {
-    train_watched(&[dataset], requested, None, folder, progress, &mut |_| ())
+    train_with_callback(&[dataset], requested, None, folder, progress, &mut |_| ())
 }
 
-/// [`train`] of one speaker or several, a dataset each, with a call behind each validation, when log and checkpoints are
-/// written. `from`: the checkpoint of another speaker, or its folder, that a training begins with; one that goes on has
-/// begun.
-pub fn train_watched(
+/// Like [`train`], for one speaker or several, a dataset each; calls `validated` after each validation, when its log
+/// line and checkpoint have been written. `from`: checkpoint, or folder of checkpoints, that a new training is
+/// initialised from; a resumed training ignores it.
+pub fn train_with_callback(
     datasets: &[&Dataset],
     requested: &GanConfig,
     from: Option<&Path>,
@@ -57,18 +57,18 @@ pub fn train_watched(
     validated: &mut dyn FnMut(ValidatedStep),
 ) -> Result<TrainingOutcome<Validation>> {
     check(requested)?;
-    begin::check(datasets)?;
-    // Others may listen to the model while it learns, and nobody may forget it.
+    speaker_metadata::check(datasets)?;
+    // Shared lock: `generate` may load the model during training; `forget` may not remove it.
     let _model = FolderLock::shared(folder)?;
     let _lock = workdir::lock(folder)?;
     workdir::sweep_folder(folder, 0);
     let resumed = resume(datasets, requested, folder, progress)?;
-    let start = from.filter(|_| resumed.is_none()).map(StartingModel::read).transpose()?;
-    if let Some(start) = &start {
-        progress.say(&format!("beginning with {}", start.account()));
+    let pretrained_model = from.filter(|_| resumed.is_none()).map(PretrainedModel::read).transpose()?;
+    if let Some(pretrained_model) = &pretrained_model {
+        progress.say(&format!("beginning with {}", pretrained_model.description()));
     }
     let window_frames = resumed.as_ref().map_or(requested.window_frames, |(stored, _)| stored.settings.window_frames);
-    // Before the statistics, of which an empty split has none.
+    // Checked before the statistics are read, which an empty split does not have.
     datasets.iter().try_for_each(|dataset| no_window::ensure_window(dataset, needed(window_frames)))?;
     let (settings, normals) = match &resumed {
         Some((stored, _)) => {
@@ -76,14 +76,17 @@ pub fn train_watched(
         }
         None => {
             let material = TrainingMaterial::measure(datasets, window_frames);
-            let begins_with = start.as_ref().map_or(TrainingStart::Nothing, |start| start.kind(datasets.len()));
-            let settings = recipe::settings(requested, &material, begins_with)?;
-            let normal = |dataset: &&Dataset| begin::normalisation_with_channels(dataset, &requested.channels);
+            let initial_weights = pretrained_model
+                .as_ref()
+                .map_or(InitialWeights::Random, |pretrained_model| pretrained_model.kind(datasets.len()));
+            let settings = recipe::settings(requested, &material, initial_weights)?;
+            let normal =
+                |dataset: &&Dataset| speaker_metadata::normalisation_with_channels(dataset, &requested.channels);
             (settings, datasets.iter().map(normal).collect::<Result<Vec<_>>>()?)
         }
     };
-    let spoken: Vec<(&Dataset, Normalisation)> = datasets.iter().copied().zip(normals).collect();
-    let loaders: Vec<WindowLoader> = spoken
+    let normalised_datasets: Vec<(&Dataset, Normalisation)> = datasets.iter().copied().zip(normals).collect();
+    let loaders: Vec<WindowLoader> = normalised_datasets
         .iter()
         .map(|(dataset, normal)| {
             WindowLoader::load(dataset, Split::Train, normal, settings.window_frames, settings.stride_frames)
@@ -92,22 +95,22 @@ pub fn train_watched(
     let n_windows: usize = loaders.iter().map(WindowLoader::len).sum();
     let places = datasets.iter().map(|dataset| dataset.dir().display().to_string()).collect::<Vec<_>>().join(", ");
     progress.say(&format!("{n_windows} windows of {places}; what is learnt goes to {}", folder.display()));
-    let held_out = ValidationIntervals::load(&spoken, &settings, progress)?;
+    let held_out = ValidationIntervals::load(&normalised_datasets, &settings, progress)?;
     let metadata = |((dataset, normal), loader): (&(&Dataset, Normalisation), &WindowLoader)| {
-        begin::metadata(dataset, normal, loader, &settings, datasets.len())
+        speaker_metadata::metadata(dataset, normal, loader, &settings, datasets.len())
     };
     let speakers: Vec<SpeakerMetadata> = match &resumed {
         Some((stored, _)) => stored.speakers(),
-        None => spoken.iter().zip(&loaders).map(metadata).collect::<Result<_>>()?,
+        None => normalised_datasets.iter().zip(&loaders).map(metadata).collect::<Result<_>>()?,
     };
     let loader = JoinedWindows::new(loaders);
-    let mut trainer = match &start {
+    let mut trainer = match &pretrained_model {
         None => GanTrainer::new(speakers, settings)?,
-        Some(start) => start.begin(speakers, settings, &loader)?,
+        Some(pretrained_model) => pretrained_model.trainer(speakers, settings, &loader)?,
     };
     if let Some((stored, contents)) = &resumed {
         trainer.load(stored, contents)?;
-        // One too many is left by a kill before the oldest was removed.
+        // A process killed before removing the oldest checkpoint leaves one too many.
         checkpoint::prune(folder, trainer.settings.keep_checkpoints)?;
     }
     if resumed.is_none() {
@@ -120,26 +123,26 @@ pub fn train_watched(
         let which = sample_windows(settings.seed, step, settings.batch, loader.len());
         loader.batch_changed(&which, &augment::changes(&settings, step, loader.fps()))
     };
-    let (end, waiting) = batches::read_ahead(settings.steps, &batch, |batches| {
+    let (outcome, waiting) = batches::prefetch(settings.steps, &batch, |batches| {
         let mut training = GanTraining {
             names: trainer.speakers.names(),
-            has_learnt: start.is_some(),
+            is_pretrained: pretrained_model.is_some(),
             trainer: &mut trainer,
             batches,
             held_out: &held_out,
             stepping: Duration::ZERO,
             waiting: Duration::ZERO,
         };
-        let end = with_spinning_workers(|| epochs::run(&mut training, folder, progress, validated))?;
-        Ok((end, training.waiting.as_secs_f64() / training.stepping.as_secs_f64().max(1e-9)))
+        let outcome = with_spinning_workers(|| epochs::run(&mut training, folder, progress, validated))?;
+        Ok((outcome, training.waiting.as_secs_f64() / training.stepping.as_secs_f64().max(1e-9)))
     })?;
-    Ok(TrainingOutcome { n_examples: loader.len(), n_parameters: trainer.n_parameters(), waiting, ..end })
+    Ok(TrainingOutcome { n_examples: loader.len(), n_parameters: trainer.n_parameters(), waiting, ..outcome })
 }
 
-/// Seconds of a step on this machine, measured on networks that are dropped; `None` of a training of few steps.
+/// Seconds per step on this machine, measured on a temporary copy of the networks; `None` for trainings of few steps.
 fn secs_a_step(trainer: &GanTrainer, loader: &JoinedWindows) -> Result<Option<f64>> {
-    const FEW: usize = 100;
-    if trainer.settings.steps < FEW {
+    const MIN_STEPS: usize = 100;
+    if trainer.settings.steps < MIN_STEPS {
         return Ok(None);
     }
     let mut trial = GanTrainer::new(trainer.speakers.all().to_vec(), trainer.settings.clone())?;
@@ -154,16 +157,17 @@ fn secs_a_step(trainer: &GanTrainer, loader: &JoinedWindows) -> Result<Option<f6
     })
 }
 
-/// A trainer with its windows.
+/// A trainer with its training batches and validation intervals.
 struct GanTraining<'a, 'b> {
     names: String,
-    /// Whether it begins with another model.
-    has_learnt: bool,
+    /// Whether the training was initialised from another model in this run.
+    is_pretrained: bool,
     trainer: &'a mut GanTrainer,
-    batches: &'a mut BatchesAhead<'b>,
+    batches: &'a mut BatchPrefetcher<'b>,
     held_out: &'a ValidationIntervals,
-    /// Time of the steps, and of it until their batches were there.
+    /// Total time of the steps, including the wait for their batches.
     stepping: Duration,
+    /// Time spent waiting for batches.
     waiting: Duration,
 }
 
@@ -179,8 +183,8 @@ impl ValidatedTraining for GanTraining<'_, '_> {
         EpochSchedule { steps, epoch_steps, checkpoint_every, patience }
     }
 
-    fn has_learnt(&self) -> bool {
-        self.has_learnt
+    fn is_pretrained(&self) -> bool {
+        self.is_pretrained
     }
 
     fn n_done(&self) -> usize {
@@ -198,21 +202,21 @@ impl ValidatedTraining for GanTraining<'_, '_> {
         let losses = self.trainer.step(&batch)?;
         self.stepping += before.elapsed();
         let Losses { l1, adversarial, discriminator, gradient_norm, .. } = losses;
-        resume::ensure_sound(self.trainer.step, &losses.named(), gradient_norm)?;
-        let words = format!("L1 {l1:.3} adv {adversarial:.3} D {discriminator:.3}");
-        Ok(StepReport { line: log::line(self.trainer.step, &losses), words })
+        resume::ensure_not_diverged(self.trainer.step, &losses.named(), gradient_norm)?;
+        let summary = format!("L1 {l1:.3} adv {adversarial:.3} D {discriminator:.3}");
+        Ok(StepReport { line: log::line(self.trainer.step, &losses), summary })
     }
 
     fn validate(&self) -> Result<Validation> {
         self.held_out.validate(self.trainer)
     }
 
-    fn judged(validation: &Validation) -> (f64, Option<&str>) {
+    fn score_and_alarm(validation: &Validation) -> (f64, Option<&str>) {
         (validation.score, validation.alarm.as_deref())
     }
 
-    fn words(validation: &Validation) -> String {
-        validation.words()
+    fn summary(validation: &Validation) -> String {
+        validation.summary()
     }
 
     fn save(&self, folder: &Path) -> Result<()> {
@@ -224,7 +228,8 @@ impl ValidatedTraining for GanTraining<'_, '_> {
     }
 }
 
-/// The newest checkpoint, and what it says with the settings that count now. Tells where these differ from `requested`.
+/// Newest checkpoint and its state, with the settings of the resumed training. Reports where these differ from
+/// `requested`.
 fn resume(
     datasets: &[&Dataset],
     requested: &GanConfig,
@@ -243,7 +248,7 @@ fn resume(
         );
         let speakers = std::iter::once(&mut stored.speaker).chain(&mut stored.other_speakers);
         for (metadata, dataset) in speakers.zip(datasets) {
-            begin::go_on(metadata, dataset, &mut differences)?;
+            speaker_metadata::resume(metadata, dataset, &mut differences)?;
         }
         Ok((stored, differences))
     })

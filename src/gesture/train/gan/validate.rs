@@ -1,5 +1,5 @@
-//! The generator on held-out intervals, each heard whole as in generation and judged in blocks of a window's length,
-//! beside the pose that never moves from the mean.
+//! Validation of the generator on held-out intervals, in comparison with a constant mean pose. Each interval is
+//! generated as a whole, as in `generate`, and evaluated in blocks of the window length.
 
 use super::block_metrics::{
     AngleSums, BlockErrors, BlockSettings, BlockSpread, HeldOutBlock, NormalisedBlock, PredictorSums, RunningMean,
@@ -20,23 +20,24 @@ use orator_dataset::config::GanSettings;
 use orator_dataset::{Dataset, Split};
 use orator_nn::gan::generator::FRAMES_MULTIPLE;
 
-/// Most frames a validation looks at (18 minutes at 15 fps), and most that are heard at once.
-const MOST_FRAMES: usize = 16_384;
+/// Largest number of frames in a validation, 18 minutes at 15 fps.
+const MAX_FRAMES: usize = 16_384;
+/// Largest number of frames generated at once.
 const PIECE: usize = 2_048;
 
-/// The intervals to validate on.
+/// Intervals to validate on.
 pub struct ValidationIntervals {
     split: Split,
-    /// Frames of a block.
+    /// Frames per block.
     n_frames: usize,
-    /// One interval, or a part of a long one, each: [1, ...], the sound longer than the poses by less than 32 frames.
+    /// One interval, or a part of a long one, per batch of size 1; the sound is up to 31 frames longer than the poses.
     pieces: Vec<WindowBatch>,
     settings: BlockSettings,
 }
 
 impl ValidationIntervals {
-    /// Intervals of the validation splits, evenly chosen where they are many, or where one has none of its training split,
-    /// which is said. The speakers have their numbers in the order of `datasets`.
+    /// Intervals of the validation splits, evenly spaced if there are many. For a dataset without a validation window
+    /// those of its training split are used, which is reported. Speaker indices follow the order of `datasets`.
     pub fn load(
         datasets: &[(&Dataset, Normalisation)],
         settings: &GanSettings,
@@ -44,8 +45,8 @@ impl ValidationIntervals {
     ) -> Result<Self> {
         let mut all: Option<Self> = None;
         for (speaker, (dataset, normal)) in (0..).zip(datasets) {
-            let most = MOST_FRAMES / datasets.len();
-            let own = Self::of_speaker(dataset, settings, normal, speaker, most, progress)?;
+            let max_frames = MAX_FRAMES / datasets.len();
+            let own = Self::of_speaker(dataset, settings, normal, speaker, max_frames, progress)?;
             all = Some(match all {
                 None => own,
                 Some(mut all) => {
@@ -64,7 +65,7 @@ impl ValidationIntervals {
         settings: &GanSettings,
         normal: &Normalisation,
         speaker: u32,
-        most_frames: usize,
+        max_frames: usize,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let n_frames = settings.window_frames;
@@ -79,22 +80,22 @@ impl ValidationIntervals {
         let longest = PIECE.max(n_frames);
         let parts: Vec<_> = loader.parts(longest).into_iter().filter(|part| part.1.len() >= n_frames).collect();
         let all: usize = parts.iter().map(|part| part.1.len()).sum();
-        let n = (parts.len() * most_frames).div_ceil(all.max(most_frames)).min(parts.len());
+        let n = (parts.len() * max_frames).div_ceil(all.max(max_frames)).min(parts.len());
         let chosen = (0..n).map(|i| parts[i * parts.len() / n].clone());
         let piece =
             |(interval, frames)| anyhow::Ok(WindowBatch { speakers: vec![speaker], ..loader.part(interval, frames)? });
         let pieces: Vec<WindowBatch> = chosen.map(piece).collect::<Result<_>>()?;
         let mut masks = Vec::new();
         for piece in &pieces {
-            masks.push(joints_seen(features(&piece.mask, 0)?.view()));
+            masks.push(visible_joints(features(&piece.mask, 0)?.view()));
         }
         let joints = frechet::joints(masks.iter().map(|mask| mask.view()));
         Ok(Self { split, n_frames, pieces, settings: BlockSettings { fps: dataset.info().fps, joints } })
     }
 
-    /// Both predictors on the same blocks.
+    /// Metrics of the generator and of the mean pose on the same blocks.
     pub fn validate(&self, trainer: &GanTrainer) -> Result<Validation> {
-        let (generator, speakers) = (trainer.listener(), trainer.speakers.all());
+        let (generator, speakers) = (trainer.ema_generator(), trainer.speakers.all());
         let (mut predicted, mut mean_pose, mut ground_truth) =
             (PredictorSums::default(), PredictorSums::default(), PredictorSums::default());
         let (mut change, mut spread) = (RunningMean::default(), BlockSpread::default());
@@ -104,10 +105,10 @@ impl ValidationIntervals {
         let mut n_windows = 0;
         for piece in &self.pieces {
             let piece = &piece.on(trainer.device())?;
-            let n_heard = piece.poses.dim(2)?.next_multiple_of(FRAMES_MULTIPLE);
+            let n_padded = piece.poses.dim(2)?.next_multiple_of(FRAMES_MULTIPLE);
             let Some(speaker) = piece.speakers.first().map(|speaker| *speaker as usize) else { continue };
             let normal = &speakers[speaker].normalisation;
-            let raw = generator.forward(&piece.mels, &piece.speakers, n_heard, false)?.detach();
+            let raw = generator.forward(&piece.mels, &piece.speakers, n_padded, false)?.detach();
             let poses = trainer.speakers.poses(&raw, &piece.speakers)?;
             let batch = &WindowBatch {
                 mels: piece.mels.clone(),
@@ -135,11 +136,12 @@ impl ValidationIntervals {
                 n_windows += 1;
             }
         }
-        // Another sound is one of the same speaker.
-        let [own, still, other] = errors.iter().map(BlockErrors::by_block).fold([const { Vec::new() }; 3], joined);
+        // The blocks of a speaker are only compared with mismatched sound of the same speaker.
+        let [own, of_mean_pose, mismatched] =
+            errors.iter().map(BlockErrors::by_block).fold([const { Vec::new() }; 3], joined);
         let generator = predicted.metrics(&ground_truth, mean_error(&own));
-        let mean_pose = mean_pose.metrics(&ground_truth, mean_error(&still));
-        let other_sound = mean_error(&other);
+        let mean_pose = mean_pose.metrics(&ground_truth, mean_error(&of_mean_pose));
+        let other_sound = mean_error(&mismatched);
         Ok(Validation {
             split: self.split.name().to_owned(),
             n_windows,
@@ -147,33 +149,33 @@ impl ValidationIntervals {
             generator,
             mean_pose,
             other_sound,
-            below_mean_pose: Some(reduction(&own, &still)),
-            below_other_sound: Some(reduction(&own, &other)),
+            below_mean_pose: Some(reduction(&own, &of_mean_pose)),
+            below_other_sound: Some(reduction(&own, &mismatched)),
             channels: channels.iter().zip(&angles).map(|(of, sums)| (of.channel, sums.error())).collect(),
             bone_change_mm: 1e3 * change.mean(),
-            spread: spread.share(),
+            spread: spread.ratio(),
             score: score::score(&generator, &mean_pose, other_sound),
-            alarm: score::alarm(generator.energy, spread.share()),
+            alarm: score::alarm(generator.energy, spread.ratio()),
         })
     }
 
-    /// Numbers [1, numbers, T] as blocks [n, numbers, frames of a block]; what is left at the end has no say.
-    fn blocks(&self, numbers: &Tensor) -> Result<Tensor> {
-        let (_, n_numbers, n_frames) = numbers.dims3()?;
+    /// Splits [1, features, T] into blocks [n, features, frames of a block]; an incomplete last block is dropped.
+    fn blocks(&self, x: &Tensor) -> Result<Tensor> {
+        let (_, n_features, n_frames) = x.dims3()?;
         let n = n_frames / self.n_frames;
-        let whole = numbers.narrow(2, 0, n * self.n_frames)?.reshape((n_numbers, n, self.n_frames))?;
+        let whole = x.narrow(2, 0, n * self.n_frames)?.reshape((n_features, n, self.n_frames))?;
         Ok(whole.transpose(0, 1)?.contiguous()?)
     }
 }
 
-/// Figures by block of one speaker behind those of others.
+/// Appends the error sums per block of a speaker to those of the others.
 fn joined(mut all: [Vec<[f64; 2]>; 3], own: [Vec<[f64; 2]>; 3]) -> [Vec<[f64; 2]>; 3] {
     all.iter_mut().zip(own).for_each(|(all, own)| all.extend(own));
     all
 }
 
 fn block(predicted: &Tensor, batch: &WindowBatch, i: usize, normal: &Normalisation) -> Result<HeldOutBlock> {
-    let mask = joints_seen(features(&batch.mask, i)?.view());
+    let mask = visible_joints(features(&batch.mask, i)?.view());
     Ok(HeldOutBlock { predicted: joints(predicted, i, normal)?, ground_truth: joints(&batch.poses, i, normal)?, mask })
 }
 
@@ -183,12 +185,12 @@ fn joints(poses: &Tensor, i: usize, normal: &Normalisation) -> Result<Array3<f32
 
 fn features(x: &Tensor, i: usize) -> Result<Array2<f32>> {
     let values = x.get(i)?.flatten_all()?.to_vec1::<f32>()?;
-    let n_numbers = x.dim(1)?;
-    Ok(Array2::from_shape_vec((n_numbers, values.len() / n_numbers), values)?)
+    let n_features = x.dim(1)?;
+    Ok(Array2::from_shape_vec((n_features, values.len() / n_features), values)?)
 }
 
-/// Mask of numbers [144 or more, T] to mask of joints [T, 49]; the hand roots are seen where the wrists are.
-fn joints_seen(mask: ArrayView2<f32>) -> Array2<bool> {
+/// Mask of features [144 or more, T] to mask of joints [T, 49]; the hand roots are visible where the wrists are.
+fn visible_joints(mask: ArrayView2<f32>) -> Array2<bool> {
     Array2::from_shape_fn((mask.ncols(), N_JOINTS), |(t, joint)| match joint {
         NECK => true,
         L_HAND => mask[[3 * (L_WRIST - 1), t]] > 0.0,

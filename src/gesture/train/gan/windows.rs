@@ -1,4 +1,4 @@
-//! What training reads: windows of the intervals of a split as batches of normalised poses and log-mels.
+//! Training data: windows of the intervals of a split, as batches of normalised poses and log-mels.
 
 use super::augment::{self, WindowChange, WindowRows};
 use super::interval_rows::{IntervalRows, TrainingIntervals};
@@ -18,40 +18,40 @@ use orator_nn::gan::generator::FRAMES_MULTIPLE;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Bytes of intervals that are held in memory.
-pub const HELD_BYTES: usize = 384 << 20;
+/// Largest number of bytes of intervals that are cached in memory.
+pub const CACHE_BYTES: usize = 384 << 20;
 
 /// All windows of a split.
 pub struct WindowLoader<'d> {
     fps: FrameRate,
     n_frames: usize,
-    /// Numbers of a pose.
-    n_numbers: usize,
+    /// Features of a pose.
+    n_features: usize,
     normal: Normalisation,
     intervals: TrainingIntervals<'d>,
     /// Interval and first frame of every window.
     starts: Vec<(usize, usize)>,
 }
 
-/// Windows side by side, f32.
+/// Batch of windows, f32.
 pub struct WindowBatch {
     /// [B, 64, mel frames]
     pub mels: Tensor,
-    /// [B, numbers, n_frames], normalised; 0 where missing.
+    /// [B, features, n_frames], normalised; 0 where missing.
     pub poses: Tensor,
-    /// [B, numbers, n_frames], 1 where the number is to be learnt.
+    /// [B, features, n_frames], 1 where the feature is known and trained on.
     pub mask: Tensor,
-    /// Number of each window's speaker, [B].
+    /// Speaker index of each window, [B].
     pub speakers: Vec<u32>,
 }
 
-/// A window of so many frames, as it is cut out of an interval.
+/// Description of a window of `n_frames` frames, for messages about missing windows.
 pub const fn needed(n_frames: usize) -> NeededFrames {
     NeededFrames { name: "a window", n_frames, key: Some(("gan.window_frames", FRAMES_MULTIPLE)) }
 }
 
 impl WindowBatch {
-    /// Copy of the batch on this device.
+    /// Copy of the batch on `device`.
     pub fn on(&self, device: &Device) -> Result<Self> {
         let on = |tensor: &Tensor| tensor.to_device(device);
         let (mels, poses, mask) = (on(&self.mels)?, on(&self.poses)?, on(&self.mask)?);
@@ -60,7 +60,7 @@ impl WindowBatch {
 }
 
 impl<'d> WindowLoader<'d> {
-    /// Opens the intervals of `split` that hold a window of `n_frames`; one begins every `stride` frames.
+    /// Opens the intervals of `split` of at least `n_frames` frames; a window starts every `stride` frames.
     pub fn load(
         dataset: &'d Dataset,
         split: Split,
@@ -68,12 +68,12 @@ impl<'d> WindowLoader<'d> {
         n_frames: usize,
         stride: usize,
     ) -> Result<Self> {
-        Self::load_within(HELD_BYTES, dataset, split, normal, n_frames, stride)
+        Self::load_within(CACHE_BYTES, dataset, split, normal, n_frames, stride)
     }
 
-    /// `load`, which holds no more than so many bytes of intervals in memory.
+    /// Like `load`, with at most `max_bytes` of intervals cached in memory.
     pub fn load_within(
-        most_bytes: usize,
+        max_bytes: usize,
         dataset: &'d Dataset,
         split: Split,
         normal: &Normalisation,
@@ -83,17 +83,17 @@ impl<'d> WindowLoader<'d> {
         ensure!(n_frames > 0 && stride > 0, "a window needs at least one frame, and a stride of at least one");
         let fps = dataset.info().fps;
         let long = dataset.samples(split).into_iter().filter(|sample| sample.n_frames >= n_frames).collect();
-        let intervals = TrainingIntervals::open(dataset, long, normal, most_bytes)?;
+        let intervals = TrainingIntervals::open(dataset, long, normal, max_bytes)?;
         let of_interval = |i: usize| {
             let n_windows = Span { start: 0, end: intervals.n_frames(i) }.n_windows(n_frames, stride);
             (0..n_windows).map(move |window| (i, window * stride))
         };
         let starts = (0..intervals.n_intervals()).flat_map(of_interval).collect();
-        Ok(Self { fps, n_frames, n_numbers: normal.n_numbers(), normal: normal.clone(), intervals, starts })
+        Ok(Self { fps, n_frames, n_features: normal.n_features(), normal: normal.clone(), intervals, starts })
     }
 
-    /// Poses as normalised numbers [144 or more, T] with the joints seen [48 or more, T], in the order of the intervals, the
-    /// long ones in parts of `longest` frames.
+    /// Normalised poses [features, T] and masks [48 or more, T] (joints, then angles), in the order of the intervals;
+    /// long intervals are split into parts of `longest` frames.
     pub fn poses(&self, longest: usize) -> impl Iterator<Item = Result<(Array2<f32>, Array2<bool>)>> {
         self.parts(longest).into_iter().map(|(interval, frames)| {
             let rows = self.intervals.rows(interval, frames.clone(), 0..0)?;
@@ -103,7 +103,7 @@ impl<'d> WindowLoader<'d> {
         })
     }
 
-    /// Intervals, each with its frames, the long ones in parts of `longest` frames.
+    /// Interval indices and frame ranges; long intervals are split into parts of `longest` frames.
     pub fn parts(&self, longest: usize) -> Vec<(usize, Range<usize>)> {
         let of_interval = |i: usize| {
             let n = self.intervals.n_frames(i);
@@ -112,22 +112,22 @@ impl<'d> WindowLoader<'d> {
         (0..self.intervals.n_intervals()).flat_map(of_interval).collect()
     }
 
-    /// These frames of an interval as a batch of one. The sound goes on to a multiple of 32 frames, behind the interval's
-    /// end by its mirror image.
+    /// These frames of an interval as a batch of size 1. The sound is extended to a multiple of 32 frames, and mirrored
+    /// at the end of the interval if needed.
     pub fn part(&self, interval: usize, frames: Range<usize>) -> Result<WindowBatch> {
         let (first, n_mels) = (mel_frames(self.fps, frames.start), mel_frames(self.fps, frames.len()));
-        let n_heard = mel_frames(self.fps, frames.len().next_multiple_of(FRAMES_MULTIPLE)).max(n_mels);
+        let n_padded = mel_frames(self.fps, frames.len().next_multiple_of(FRAMES_MULTIPLE)).max(n_mels);
         let last = self.intervals.n_mels(interval) - 1;
-        let heard = |k: usize| if first + k <= last { first + k } else { (2 * last).saturating_sub(first + k) };
-        let lowest = (0..n_heard).map(heard).min().unwrap_or(first);
-        let rows = self.intervals.rows(interval, frames.clone(), lowest..(first + n_heard).min(last + 1))?;
+        let source = |k: usize| if first + k <= last { first + k } else { (2 * last).saturating_sub(first + k) };
+        let lowest = (0..n_padded).map(source).min().unwrap_or(first);
+        let rows = self.intervals.rows(interval, frames.clone(), lowest..(first + n_padded).min(last + 1))?;
         let IntervalRows { features, mask, mels, first_frame, first_mel } = &*rows;
-        let heard = |k: usize| heard(k) - first_mel;
+        let source = |k: usize| source(k) - first_mel;
         let frames = frames.start - first_frame..frames.end - first_frame;
-        let sound = Array2::from_shape_fn((mel::N_MELS, n_heard), |(band, k)| mels[[band, heard(k)]]);
-        let shape = (self.n_numbers, frames.len());
-        let poses = Array2::from_shape_fn(shape, |(number, t)| features[[number, frames.start + t]]);
-        let mask = Array2::from_shape_fn(shape, |(number, t)| f32::from(mask[[row_of(number), frames.start + t]]));
+        let sound = Array2::from_shape_fn((mel::N_MELS, n_padded), |(band, k)| mels[[band, source(k)]]);
+        let shape = (self.n_features, frames.len());
+        let poses = Array2::from_shape_fn(shape, |(i, t)| features[[i, frames.start + t]]);
+        let mask = Array2::from_shape_fn(shape, |(i, t)| f32::from(mask[[mask_row(i), frames.start + t]]));
         let tensor = |of: Array2<f32>| -> Result<Tensor> {
             let (rows, columns) = of.dim();
             Ok(Tensor::from_vec(of.into_raw_vec_and_offset().0, (1, rows, columns), &Device::Cpu)?)
@@ -135,7 +135,7 @@ impl<'d> WindowLoader<'d> {
         Ok(WindowBatch { mels: tensor(sound)?, poses: tensor(poses)?, mask: tensor(mask)?, speakers: vec![0] })
     }
 
-    /// Rate of the poses.
+    /// Frame rate of the poses.
     pub fn fps(&self) -> FrameRate {
         self.fps
     }
@@ -149,7 +149,7 @@ impl<'d> WindowLoader<'d> {
         self.starts.is_empty()
     }
 
-    /// The windows of these numbers (each below `len`) as one batch, each with its change.
+    /// Batch of the windows with these indices (each below `len`), augmented by `changes`, one per window or empty.
     pub fn batch_changed(&self, which: &[usize], changes: &[WindowChange]) -> Result<WindowBatch> {
         if changes.is_empty() {
             return self.batch(which);
@@ -171,11 +171,11 @@ impl<'d> WindowLoader<'d> {
         })
     }
 
-    /// A window that begins about frame `start` of an interval, changed.
+    /// Augmented window that starts near frame `start` of an interval.
     fn changed(&self, (interval, start): (usize, usize), change: &WindowChange) -> Result<WindowRows> {
         let (last, last_mel) = (self.intervals.n_frames(interval) - 1, self.intervals.n_mels(interval) - 1);
         let n = self.n_frames;
-        // As much of the interval as it has.
+        // The window must not be longer than the interval.
         let speed = change.speed.min(last as f64 / (n - 1).max(1) as f64);
         let latest = last as f64 - (n - 1) as f64 * speed;
         let first = (start as f64 + change.shift_secs * self.fps.per_sec()).clamp(0.0, latest);
@@ -184,20 +184,20 @@ impl<'d> WindowLoader<'d> {
         let n_mels = mel_frames(self.fps, n);
         let mel_at = |t: usize| first_mel + t as f64 * speed;
         let frames = between(at(0), last).0..between(at(n - 1), last).1 + 1;
-        let heard = between(mel_at(0), last_mel).0..between(mel_at(n_mels.max(1) - 1), last_mel).1 + 1;
-        let rows = self.intervals.rows(interval, frames, heard)?;
+        let mel_range = between(mel_at(0), last_mel).0..between(mel_at(n_mels.max(1) - 1), last_mel).1 + 1;
+        let rows = self.intervals.rows(interval, frames, mel_range)?;
         let IntervalRows { features, mask, mels, .. } = &*rows;
-        let mut poses = Array2::zeros((self.n_numbers, n));
-        let mut seen = Array2::zeros((self.n_numbers, n));
+        let mut poses = Array2::zeros((self.n_features, n));
+        let mut known = Array2::zeros((self.n_features, n));
         for t in 0..n {
             let (low, high, share) = between(at(t), last);
             let (low, high) = (low - rows.first_frame, high - rows.first_frame);
-            for number in 0..self.n_numbers {
-                let row = row_of(number);
+            for feature in 0..self.n_features {
+                let row = mask_row(feature);
                 if mask[[row, low]] && (share == 0.0 || mask[[row, high]]) {
-                    let (before, after) = (features[[number, low]], features[[number, high]]);
-                    poses[[number, t]] = before + share * (after - before);
-                    seen[[number, t]] = 1.0;
+                    let (before, after) = (features[[feature, low]], features[[feature, high]]);
+                    poses[[feature, t]] = before + share * (after - before);
+                    known[[feature, t]] = 1.0;
                 }
             }
         }
@@ -211,12 +211,12 @@ impl<'d> WindowLoader<'d> {
         }
         change.change_sound(&mut sound);
         if change.is_mirrored {
-            augment::mirror(&mut poses, &mut seen, &self.normal);
+            augment::mirror(&mut poses, &mut known, &self.normal);
         }
-        Ok(WindowRows { mels: sound, poses, mask: seen })
+        Ok(WindowRows { mels: sound, poses, mask: known })
     }
 
-    /// The windows of these numbers (each below `len`) as one batch.
+    /// Batch of the windows with these indices (each below `len`).
     pub fn batch(&self, which: &[usize]) -> Result<WindowBatch> {
         ensure!(!which.is_empty() && which.iter().all(|i| *i < self.len()), "windows {which:?} of {}", self.len());
         let n_mels = mel_frames(self.fps, self.n_frames);
@@ -229,34 +229,34 @@ impl<'d> WindowLoader<'d> {
         };
         for (rows, start, first_mel) in which.par_iter().map(read).collect::<Result<Vec<_>>>()? {
             let start = start - rows.first_frame;
-            take(&mut mels, &rows.mels, first_mel - rows.first_mel, n_mels);
-            take(&mut poses, &rows.features, start, self.n_frames);
-            let seen = rows.mask.slice_axis(Axis(1), Slice::from(start..start + self.n_frames));
-            for (row, seen) in seen.outer_iter().enumerate() {
-                let n_numbers = if row < N_BONES { 3 } else { 1 };
-                (0..n_numbers).for_each(|_| mask.extend(seen.iter().map(|seen| f32::from(*seen))));
+            append_columns(&mut mels, &rows.mels, first_mel - rows.first_mel, n_mels);
+            append_columns(&mut poses, &rows.features, start, self.n_frames);
+            let known = rows.mask.slice_axis(Axis(1), Slice::from(start..start + self.n_frames));
+            for (row, known) in known.outer_iter().enumerate() {
+                let n_features = if row < N_BONES { 3 } else { 1 };
+                (0..n_features).for_each(|_| mask.extend(known.iter().map(|known| f32::from(*known))));
             }
         }
         let tensor = |values, rows, columns| Tensor::from_vec(values, (which.len(), rows, columns), &Device::Cpu);
         Ok(WindowBatch {
             mels: tensor(mels, mel::N_MELS, n_mels)?,
-            poses: tensor(poses, self.n_numbers, self.n_frames)?,
-            mask: tensor(mask, self.n_numbers, self.n_frames)?,
+            poses: tensor(poses, self.n_features, self.n_frames)?,
+            mask: tensor(mask, self.n_features, self.n_frames)?,
             speakers: vec![0; which.len()],
         })
     }
 }
 
-/// The windows of all speakers of a training, those of one speaker after those of the other.
+/// Windows of all speakers of a training, ordered by speaker.
 pub struct JoinedWindows<'d>(Vec<WindowLoader<'d>>);
 
 impl<'d> JoinedWindows<'d> {
-    /// Loaders by the numbers of their speakers, one at least.
+    /// Joins the loaders of all speakers, in the order of the speaker indices; at least one.
     pub fn new(loaders: Vec<WindowLoader<'d>>) -> Self {
         Self(loaders)
     }
 
-    /// Number of the windows.
+    /// Number of windows.
     pub fn len(&self) -> usize {
         self.0.iter().map(WindowLoader::len).sum()
     }
@@ -265,13 +265,13 @@ impl<'d> JoinedWindows<'d> {
         self.len() == 0
     }
 
-    /// Rate of the poses.
+    /// Frame rate of the poses.
     pub fn fps(&self) -> FrameRate {
         self.0[0].fps()
     }
 
-    /// The windows of these numbers (each below `len`) as one batch, each with its change; `changes` may be empty. The
-    /// windows of a batch stand in order of their speakers.
+    /// Batch of the windows with these indices (each below `len`), augmented by `changes`, one per window or empty. The
+    /// windows of the batch are ordered by speaker.
     pub fn batch_changed(&self, which: &[usize], changes: &[WindowChange]) -> Result<WindowBatch> {
         if let [only] = &self.0[..] {
             return only.batch_changed(which, changes);
@@ -280,9 +280,9 @@ impl<'d> JoinedWindows<'d> {
         let mut parts = Vec::new();
         for (speaker, loader) in (0u32..).zip(&self.0) {
             let own = |i: &usize| (first..first + loader.len()).contains(i);
-            let places: Vec<usize> = (0..which.len()).filter(|n| own(&which[*n])).collect();
-            let windows: Vec<usize> = places.iter().map(|n| which[*n] - first).collect();
-            let changes: Vec<WindowChange> = places.iter().filter_map(|n| changes.get(*n).cloned()).collect();
+            let positions: Vec<usize> = (0..which.len()).filter(|n| own(&which[*n])).collect();
+            let windows: Vec<usize> = positions.iter().map(|n| which[*n] - first).collect();
+            let changes: Vec<WindowChange> = positions.iter().filter_map(|n| changes.get(*n).cloned()).collect();
             first += loader.len();
             if !windows.is_empty() {
                 parts.push(WindowBatch {
@@ -305,18 +305,18 @@ fn joined(parts: &[WindowBatch]) -> Result<WindowBatch> {
     })
 }
 
-/// Row of a number in the mask of joints and angles.
-fn row_of(number: usize) -> usize {
-    if number < N_FEATURES { number / 3 } else { number - N_FEATURES + N_BONES }
+/// Row of a feature in the mask of joints and angles.
+fn mask_row(feature: usize) -> usize {
+    if feature < N_FEATURES { feature / 3 } else { feature - N_FEATURES + N_BONES }
 }
 
-/// Neighbours of a moment between frames, none behind `last`, and how far it is on the way to the second, 0..1.
+/// Neighbouring frames of a fractional frame position, at most `last`, and the weight 0..1 of the second one.
 fn between(at: f64, last: usize) -> (usize, usize, f32) {
     let low = (at.max(0.0) as usize).min(last);
     (low, (low + 1).min(last), if low < last { (at - low as f64) as f32 } else { 0.0 })
 }
 
-fn take(to: &mut Vec<f32>, from: &Array2<f32>, first: usize, n: usize) {
+fn append_columns(to: &mut Vec<f32>, from: &Array2<f32>, first: usize, n: usize) {
     to.extend(from.slice_axis(Axis(1), Slice::from(first..first + n)).iter());
 }
 
@@ -325,7 +325,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn mel_frames_keep_step_with_the_motion() {
+    fn mel_frames_cover_the_motion() {
         let fps = FrameRate::new(15, 1);
         assert_eq!(mel_frames(fps, 64), 427);
         assert_eq!(mel_frames(fps, 1_500), 10_000);

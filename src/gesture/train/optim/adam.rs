@@ -1,5 +1,6 @@
-//! Adam (Kingma & Ba 2015), optionally AMSGrad (Reddi 2018), as an optimiser of candle, with moments that can be saved and
-//! clipping of the gradient's norm. One pass over the memory of each tensor; the same bits for any number of threads.
+//! Adam (Kingma & Ba 2015), optionally AMSGrad (Reddi et al. 2018), as a candle optimiser with moments that can be
+//! saved and gradient norm clipping. Each tensor is updated in one pass over its memory, bit for bit the same for any
+//! number of threads.
 
 use super::adam_fallback::{self, AdamScalars};
 use anyhow::{Context, ensure};
@@ -12,20 +13,20 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
-/// Numbers one task updates.
+/// Elements per task; fixed, so that results do not depend on the number of threads.
 const GRAIN: usize = 32 * 1024;
 
-/// The optimiser's settings.
+/// Settings of the optimiser.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config {
     pub beta1: f64,
     pub beta2: f64,
     pub eps: f64,
-    /// Divide by the largest second moment seen so far instead of the present one.
+    /// Divide by the largest second moment so far instead of the current one.
     pub amsgrad: bool,
-    /// Gradients with a larger Euclidean norm, over all tensors together, are scaled down to it.
+    /// Gradients whose Euclidean norm over all tensors is larger are scaled down to this norm.
     pub max_norm: Option<f64>,
-    /// Share of each weight (a tensor of two axes or more) that a step of rate 1 takes away (Loshchilov & Hutter 2019).
+    /// Decoupled weight decay per step at learning rate 1 (Loshchilov & Hutter 2019), for tensors of two or more axes.
     pub weight_decay: f64,
 }
 
@@ -35,11 +36,11 @@ impl Default for Config {
     }
 }
 
-/// Moves the trainable tensors of one [`Params`].
+/// Optimiser of the trainable tensors of one [`Params`].
 pub struct Adam {
     config: Config,
     learning_rate: f64,
-    /// Updates done.
+    /// Number of updates so far.
     step: u64,
     /// Norm of the last gradient, before clipping.
     norm: f64,
@@ -49,15 +50,15 @@ pub struct Adam {
 struct AdamSlot {
     name: String,
     var: Var,
-    /// Of the learning rate.
+    /// Factor of the learning rate for this tensor.
     share: f64,
     moments: MomentStorage,
 }
 
-/// Where the moments are.
+/// Moments of a tensor, on its device.
 enum MomentStorage {
     Cpu(RefCell<AdamMoments>),
-    /// Elsewhere, beside their tensor.
+    /// Tensors on another device, updated by the fallback.
     Device(adam_fallback::DeviceMoments),
 }
 
@@ -70,12 +71,12 @@ struct AdamMoments {
 }
 
 impl Adam {
-    /// Moments of zero for every trainable tensor (f32).
+    /// Optimiser with zero moments for every trainable tensor (f32).
     pub fn new(params: &Params, config: Config) -> Result<Self> {
         Self::with_rates(params, config, |_| 1.0)
     }
 
-    /// As `new`, with a share of the learning rate for each tensor by its name; one of 0 stays as it is.
+    /// Like `new`, with a factor of the learning rate for each tensor by its name; a tensor of factor 0 is frozen.
     pub fn with_rates(params: &Params, config: Config, share: impl Fn(&str) -> f64) -> Result<Self> {
         let (names, vars): (Vec<&str>, Vec<Var>) = params.trainables().map(|(name, var)| (name, var.clone())).unzip();
         let mut adam = <Self as Optimizer>::new(vars, config)?;
@@ -85,18 +86,18 @@ impl Adam {
         Ok(adam)
     }
 
-    /// One update at this learning rate. A tensor without gradient stays. Returns the gradient's norm before
-    /// clipping; when that is not finite nothing is changed.
+    /// Runs one update at this learning rate; a tensor without a gradient is unchanged. Returns the gradient norm
+    /// before clipping; if it is not finite, nothing is updated.
     pub fn step(&mut self, gradients: &GradStore, learning_rate: f64) -> Result<f64> {
         self.learning_rate = learning_rate;
         Optimizer::step(self, gradients)?;
         Ok(self.norm)
     }
 
-    /// Moments and step count, to save: `<prefix><tensor>.first`, `.second`, `.largest`, and `<prefix>step`.
+    /// Moments and step count for a checkpoint: `<prefix><tensor>.first`, `.second`, `.largest`, and `<prefix>step`.
     pub fn tensors(&self, prefix: &str) -> Result<BTreeMap<String, Tensor>> {
         let mut tensors = BTreeMap::new();
-        // Two halves of 24 bits are exact in f32, the one type of a checkpoint.
+        // f32, the only type in a checkpoint, represents two halves of 24 bits exactly.
         let halves = [(self.step >> 24) as f32, (self.step & 0xff_ffff) as f32];
         tensors.insert(format!("{prefix}step"), Tensor::new(&halves, &Device::Cpu)?);
         for slot in &self.slots {
@@ -107,7 +108,7 @@ impl Adam {
         Ok(tensors)
     }
 
-    /// Takes up where [`Adam::tensors`] left off. Errors, naming the tensor, when one is missing or does not fit.
+    /// Restores the state saved by [`Adam::tensors`]. Fails, naming the tensor, if one is missing or has another size.
     pub fn load(&mut self, prefix: &str, tensors: &BTreeMap<String, Tensor>) -> anyhow::Result<()> {
         let values = |name: String, n: usize| -> anyhow::Result<Vec<f32>> {
             let tensor = tensors.get(&name).with_context(|| format!("tensor {name} is missing"))?;
@@ -140,7 +141,7 @@ impl Adam {
 impl Optimizer for Adam {
     type Config = Config;
 
-    /// Tensors without names, at a rate of 0.001.
+    /// Optimiser of unnamed tensors with learning rate 0.001.
     fn new(vars: Vec<Var>, config: Config) -> Result<Self> {
         let slot = |var: Var| -> Result<AdamSlot> {
             let moments = MomentStorage::zeros(&var, config.amsgrad)?;
@@ -217,7 +218,7 @@ impl MomentStorage {
 }
 
 impl AdamSlot {
-    /// The moments that there are, by kind, on the CPU.
+    /// CPU copies of the existing moments by kind.
     fn kinds(&self) -> Result<Vec<(&'static str, Tensor)>> {
         let moments = match &self.moments {
             MomentStorage::Cpu(moments) => moments.borrow(),
@@ -229,7 +230,7 @@ impl AdamSlot {
     }
 }
 
-/// In pieces of fixed size, so that the order of summing does not depend on the threads.
+/// Sum of squares over pieces of fixed size, so that the order of summation does not depend on the number of threads.
 fn sum_of_squares(values: &[f32]) -> f64 {
     let of_piece = |piece: &[f32]| {
         let mut lanes = [0.0f32; 16];
@@ -276,7 +277,7 @@ impl InplaceOp2 for AdamUpdate<'_> {
         let mut largest = moments.largest.chunks_mut(GRAIN);
         let pieces: Vec<_> = both.map(|piece| Mutex::new((piece, largest.next()))).collect();
         parallel_for(pieces.len(), |piece| {
-            // Every piece is taken once: the lock is free.
+            // Each piece is locked by exactly one task, so the lock is never contended.
             let Ok(mut piece) = pieces[piece].lock() else { return };
             let piece = &mut *piece;
             let (((values, grad), first), second) = &mut piece.0;
@@ -297,8 +298,8 @@ mod tests {
     use super::*;
     use orator_nn::params::Init;
 
-    /// The update as written in the papers, one number, f64.
-    fn by_the_book(gradients: &[f64], rate: f64, amsgrad: bool) -> f64 {
+    /// Reference implementation for one f64 parameter that starts at 1.
+    fn reference(gradients: &[f64], rate: f64, amsgrad: bool) -> f64 {
         let (mut x, mut m, mut v, mut largest) = (1.0, 0.0, 0.0, 0.0f64);
         for (t, g) in (1..).zip(gradients) {
             m = 0.9 * m + 0.1 * g;
@@ -331,14 +332,14 @@ mod tests {
         for amsgrad in [false, true] {
             let config = Config { amsgrad, ..Config::default() };
             let w = descend(config, &gradients, None)?;
-            assert!((f64::from(w) - by_the_book(&gradients, 0.1, amsgrad)).abs() < 1e-5);
+            assert!((f64::from(w) - reference(&gradients, 0.1, amsgrad)).abs() < 1e-5);
             assert_eq!(w.to_bits(), descend(config, &gradients, Some(3))?.to_bits());
         }
         Ok(())
     }
 
     #[test]
-    fn a_tensor_has_its_share_of_the_rate() -> anyhow::Result<()> {
+    fn rates_of_tensors_are_scaled() -> anyhow::Result<()> {
         let mut params = Params::new(0);
         let shares = [("all", 1.0), ("some", 0.25), ("none", 0.0)];
         let tensors = shares.map(|(name, _)| params.trainable(name, &[2, 1], Init::Constant(1.0)));
@@ -352,13 +353,13 @@ mod tests {
         }
         for (w, (name, share)) in tensors.iter().zip(shares) {
             let w = f64::from(w.flatten_all()?.to_vec1::<f32>()?[1]);
-            assert!((w - by_the_book(&gradients, 0.1 * share, false)).abs() < 1e-5, "{name}: {w}");
+            assert!((w - reference(&gradients, 0.1 * share, false)).abs() < 1e-5, "{name}: {w}");
         }
         Ok(())
     }
 
     #[test]
-    fn the_composed_update_is_the_own_one() -> anyhow::Result<()> {
+    fn the_fallback_agrees_with_the_fused_update() -> anyhow::Result<()> {
         for amsgrad in [false, true] {
             let config = Config { amsgrad, max_norm: Some(2.0), ..Config::default() };
             let descend_through = |by_fallback: bool| -> anyhow::Result<Vec<f32>> {
@@ -367,7 +368,7 @@ mod tests {
                 let mut adam = Adam::new(&params, config)?;
                 for step in 0..6 {
                     if by_fallback && step % 3 == 0 {
-                        // Elsewhere from the beginning, and again from what was saved.
+                        // Use the fallback from the first step, and restore its saved moments later.
                         let saved = adam.tensors("")?;
                         adam.slots[0].moments =
                             MomentStorage::Device(adam_fallback::DeviceMoments::zeros(&w, amsgrad)?);
@@ -377,14 +378,14 @@ mod tests {
                 }
                 Ok(w.flatten_all()?.to_vec1()?)
             };
-            let (own, by_fallback) = (descend_through(false)?, descend_through(true)?);
-            assert!(own.iter().zip(&by_fallback).all(|(a, b)| (a - b).abs() < 1e-6), "{own:?} {by_fallback:?}");
+            let (fused, by_fallback) = (descend_through(false)?, descend_through(true)?);
+            assert!(fused.iter().zip(&by_fallback).all(|(a, b)| (a - b).abs() < 1e-6), "{fused:?} {by_fallback:?}");
         }
         Ok(())
     }
 
     #[test]
-    fn large_gradients_are_clipped_and_broken_ones_change_nothing() -> anyhow::Result<()> {
+    fn large_gradients_are_clipped_and_non_finite_ones_are_ignored() -> anyhow::Result<()> {
         let mut params = Params::new(0);
         let w = params.trainable("w", &[4], Init::Constant(1.0))?;
         let mut adam = Adam::new(&params, Config { max_norm: Some(1.0), ..Config::default() })?;

@@ -1,9 +1,9 @@
-//! The update of Adam made of the framework's operators, for tensors that are not on the CPU: the same numbers but for
-//! rounding, several passes over the memory instead of one.
+//! Adam update composed of candle operators, for tensors that are not on the CPU. Its results equal those of the fused
+//! kernel up to rounding; it reads the memory several times instead of once.
 
 use candle_core::{Device, Result, Tensor, Var};
 
-/// First moment, second moment, largest second moment (with AMSGrad), each of the tensor's shape and on its device.
+/// First moment, second moment and (with AMSGrad) largest second moment of a parameter, with its shape and device.
 pub struct DeviceMoments {
     first: Tensor,
     second: Tensor,
@@ -16,14 +16,14 @@ impl DeviceMoments {
         Ok(Self { first: like.zeros_like()?.detach(), second: like.zeros_like()?.detach(), largest })
     }
 
-    /// By kind, on the CPU, to save.
+    /// CPU copies of the moments by kind, for a checkpoint.
     pub fn tensors(&self) -> Result<Vec<(&'static str, Tensor)>> {
         let kinds = [("first", Some(&self.first)), ("second", Some(&self.second)), ("largest", self.largest.as_ref())];
         let there = kinds.into_iter().filter_map(|(kind, tensor)| Some((kind, tensor?)));
         there.map(|(kind, tensor)| Ok((kind, tensor.to_device(&Device::Cpu)?))).collect()
     }
 
-    /// Takes up where `tensors` left off; `of_kind` gives the numbers of a kind.
+    /// Restores the moments saved by `tensors`; `of_kind` returns the values of a kind, given their number.
     pub fn load(&mut self, mut of_kind: impl FnMut(&str, usize) -> anyhow::Result<Vec<f32>>) -> anyhow::Result<()> {
         let (shape, device) = (self.first.shape().clone(), self.first.device().clone());
         let mut read = |kind: &str| -> anyhow::Result<Tensor> {
@@ -34,9 +34,9 @@ impl DeviceMoments {
         Ok(())
     }
 
-    /// Moves `var` against `grad`.
-    pub fn update(&mut self, var: &Var, grad: &Tensor, numbers: &AdamScalars) -> Result<()> {
-        let AdamScalars { beta1, beta2, eps, scale, rate, correction, keep } = *numbers;
+    /// Updates the moments, and moves `var` against `grad`.
+    pub fn update(&mut self, var: &Var, grad: &Tensor, scalars: &AdamScalars) -> Result<()> {
+        let AdamScalars { beta1, beta2, eps, scale, rate, correction, keep } = *scalars;
         let of = f64::from;
         let grad = (grad.detach() * of(scale))?;
         self.first = ((&self.first * of(beta1))? + (&grad * of(1.0 - beta1))?)?;
@@ -53,23 +53,23 @@ impl DeviceMoments {
     }
 }
 
-/// The sum of the squares of a gradient.
+/// Sum of the squared elements of a gradient.
 pub fn sum_of_squares(grad: &Tensor) -> Result<f64> {
     grad.sqr()?.sum_all()?.to_scalar::<f32>().map(f64::from)
 }
 
-/// The numbers of one update.
+/// Scalars of one update.
 #[derive(Clone, Copy)]
 pub struct AdamScalars {
     pub beta1: f32,
     pub beta2: f32,
     pub eps: f32,
-    /// What gradients are multiplied with, to clip them.
+    /// Factor that clips the gradients.
     pub scale: f32,
-    /// Learning rate over the first moment's bias correction.
+    /// Learning rate divided by the bias correction of the first moment.
     pub rate: f32,
-    /// Square root of the second moment's bias correction.
+    /// Square root of the inverse bias correction of the second moment.
     pub correction: f32,
-    /// What is left of the weights by their decay.
+    /// Factor of the weights that applies the weight decay.
     pub keep: f32,
 }

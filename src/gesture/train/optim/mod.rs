@@ -1,4 +1,4 @@
-//! The optimiser: Adam over all parameters at once, and its form for devices without the kernels.
+//! The optimiser: Adam with a fused CPU kernel, and its fallback for devices without that kernel.
 
 pub mod adam;
 pub mod adam_fallback;

@@ -1,4 +1,4 @@
-//! A folder of captures: of each `NAME.bvh` with its sound `NAME.wav`, and where there is one a transcript of that name.
+//! A folder of motion captures: `NAME.bvh` with its sound `NAME.wav`, and optionally a transcript with the same stem.
 
 use super::sequence::{PoseSequence, SequenceSplits};
 use crate::generate::seq2seq::architecture;
@@ -14,11 +14,11 @@ use orator_media::ffmpeg::{audio, probe};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
-/// Captures, some of which are held out for validation.
+/// Folder of motion captures, some of which are held out for validation.
 #[derive(Clone, Debug)]
 pub struct CaptureFolder {
     dir: PathBuf,
-    /// Samples a second of the sound that is heard: those of the first capture's, within what is possible.
+    /// Sample rate of the network's audio, Hz: that of the first capture, clamped to the supported range.
     pub rate: u32,
     mapping: JointMapping,
     captures: Vec<Capture>,
@@ -33,10 +33,11 @@ struct Capture {
 }
 
 impl CaptureFolder {
-    /// Lists a folder. `hold_out`: names of captures (without ending) to validate on.
+    /// Lists a folder. `hold_out`: names (without extension) of the captures to validate on.
     ///
     /// # Errors
-    /// Motion without sound, sound without motion, no capture, none left to train on, a name to hold out that is not there.
+    /// Motion without sound, sound without motion, no capture, none left to train on, a held-out name that does not
+    /// exist.
     pub fn open(dir: &Path, hold_out: &[String], mapping: JointMapping) -> Result<Self> {
         let entries = std::fs::read_dir(dir).with_context(|| format!("cannot list {}", dir.display()))?;
         let paths = entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<PathBuf>>>()?;
@@ -73,12 +74,12 @@ impl CaptureFolder {
         dir.file_name().map_or_else(|| "captures".to_owned(), |name| name.to_string_lossy().into_owned())
     }
 
-    /// The folder.
+    /// Path of the folder.
     pub fn dir(&self) -> &Path {
         &self.dir
     }
 
-    /// Hash of the names, contents and parts of the files.
+    /// Hash of the names and contents of all files, and of which of them are held out.
     pub fn hash(&self) -> Result<String> {
         let line = |capture: &Capture| -> Result<String> {
             let files = [Some(&capture.bvh), Some(&capture.wav), capture.transcript.as_ref()].into_iter().flatten();
@@ -92,29 +93,29 @@ impl CaptureFolder {
         Ok(blake3::hash(lines.as_bytes()).to_hex().to_string())
     }
 
-    /// The way from the motion of these captures to numbers, from those to train on.
+    /// Mapping from motion to exponential map features, fitted to the captures that are trained on.
     pub fn exponential_maps(&self) -> Result<ExponentialMaps> {
         let trained = self.captures.iter().filter(|capture| !capture.is_held_out);
         let read = |capture: &Capture| Ok((capture.bvh.display().to_string(), Bvh::read(&capture.bvh)?));
         ExponentialMaps::of(trained.map(read), &self.mapping)
     }
 
-    /// All captures as sequences, heard in contexts of so many frames.
+    /// All captures as sequences, with audio features for contexts of `context` frames.
     pub fn sequences(&self, maps: &ExponentialMaps, context: usize) -> Result<SequenceSplits> {
         let read = |capture: &Capture| Ok((capture.is_held_out, self.sequence(capture, maps, context)?));
         let all = self.captures.par_iter().map(read).collect::<Result<Vec<_>>>()?;
         let (held_out, train): (Vec<_>, Vec<_>) = all.into_iter().partition(|(is_held_out, _)| *is_held_out);
         let mut notes = Vec::new();
-        let mut plain = |part: Vec<(bool, (PoseSequence, Vec<String>))>| {
+        let mut without_notes = |part: Vec<(bool, (PoseSequence, Vec<String>))>| {
             let (part, of_files): (Vec<_>, Vec<_>) = part.into_iter().map(|(_, sequence)| sequence).unzip();
             notes.extend(of_files.concat());
             part
         };
-        let (train, held_out) = (plain(train), plain(held_out));
+        let (train, held_out) = (without_notes(train), without_notes(held_out));
         Ok(SequenceSplits { train, held_out, notes })
     }
 
-    /// A capture, and what is doubtful about its transcript.
+    /// Sequence of a capture, and warnings about its transcript.
     fn sequence(
         &self,
         capture: &Capture,

@@ -1,11 +1,12 @@
-//! What is learnt from: a dataset of this program, or a folder of captures; both become sequences of poses.
+//! Training data of the sequence networks: a dataset of this program, or a folder of captures. Both become pose
+//! sequences.
 
 use super::captures::CaptureFolder;
 use super::sequence::{PoseSequence, SequenceSplits};
 use crate::generate::representation::Representation;
 use crate::generate::seq2seq::architecture;
-use crate::generate::seq2seq::poses::PoseNumbers;
-use crate::train::gan::begin::normalisation;
+use crate::generate::seq2seq::poses::PoseFormat;
+use crate::train::gan::speaker_metadata::normalisation;
 use anyhow::{Result, bail, ensure};
 use orator_base::types::sound::SAMPLE_RATE;
 use orator_base::types::time::FrameRate;
@@ -14,7 +15,7 @@ use orator_dataset::{Dataset, Split};
 use orator_formats::bvh::exponential_maps::FPS;
 use rayon::prelude::*;
 
-/// Data to learn from.
+/// Training data.
 #[derive(Clone, Copy)]
 pub enum TrainingSource<'a> {
     Dataset(&'a Dataset),
@@ -22,7 +23,7 @@ pub enum TrainingSource<'a> {
 }
 
 impl TrainingSource<'_> {
-    /// Name of the speaker, or of the folder.
+    /// Name of the speaker, or of the folder of captures.
     pub fn name(&self) -> String {
         match self {
             Self::Dataset(dataset) => dataset.info().speaker.clone(),
@@ -30,15 +31,15 @@ impl TrainingSource<'_> {
         }
     }
 
-    /// The folder, as a text.
-    pub fn place(&self) -> String {
+    /// Path of the folder, for messages.
+    pub fn path(&self) -> String {
         match self {
             Self::Dataset(dataset) => dataset.dir().display().to_string(),
             Self::Captures(captures) => captures.dir().display().to_string(),
         }
     }
 
-    /// Poses a second.
+    /// Frame rate of the poses.
     pub fn fps(&self) -> FrameRate {
         match self {
             Self::Dataset(dataset) => dataset.info().fps,
@@ -46,7 +47,7 @@ impl TrainingSource<'_> {
         }
     }
 
-    /// Samples of sound a second.
+    /// Sample rate of the sound, Hz.
     pub fn rate(&self) -> u32 {
         match self {
             Self::Dataset(_) => SAMPLE_RATE,
@@ -62,8 +63,8 @@ impl TrainingSource<'_> {
         }
     }
 
-    /// Meaning of the numbers of a pose, with means and scales of the data to train on. Errors name the file.
-    pub fn pose_numbers(&self) -> Result<PoseNumbers> {
+    /// Format of the pose features, with means and scales of the training data. Errors name the file.
+    pub fn pose_format(&self) -> Result<PoseFormat> {
         match self {
             Self::Dataset(dataset) => {
                 ensure!(
@@ -77,16 +78,19 @@ impl TrainingSource<'_> {
                 let all = samples.par_iter().map(features).collect::<Result<Vec<_>>>()?;
                 let poses = all.into_iter().map(Ok);
                 let representation = Representation::bones(&normalisation, poses)?;
-                Ok(PoseNumbers::Joints { normalisation, representation })
+                Ok(PoseFormat::Joints { normalisation, representation })
             }
-            Self::Captures(captures) => Ok(PoseNumbers::Captured(captures.exponential_maps()?)),
+            Self::Captures(captures) => Ok(PoseFormat::Captured(captures.exponential_maps()?)),
         }
     }
 
-    /// All sequences in these numbers, heard in contexts of so many frames. Errors name the file.
-    pub fn sequences(&self, numbers: &PoseNumbers, context: usize) -> Result<SequenceSplits> {
-        match (self, numbers) {
-            (Self::Dataset(dataset), PoseNumbers::Joints { representation, .. }) => {
+    /// All sequences in this format, with audio features for contexts of `context` frames.
+    ///
+    /// # Errors
+    /// A file that cannot be read, with its name; a format of the other kind of data.
+    pub fn sequences(&self, format: &PoseFormat, context: usize) -> Result<SequenceSplits> {
+        match (self, format) {
+            (Self::Dataset(dataset), PoseFormat::Joints { representation, .. }) => {
                 let of_split = |split| of_split(dataset, split, representation, context);
                 Ok(SequenceSplits {
                     train: of_split(Split::Train)?,
@@ -94,7 +98,7 @@ impl TrainingSource<'_> {
                     notes: Vec::new(),
                 })
             }
-            (Self::Captures(captures), PoseNumbers::Captured(maps)) => captures.sequences(maps, context),
+            (Self::Captures(captures), PoseFormat::Captured(maps)) => captures.sequences(maps, context),
             _ => bail!("the checkpoint is of the other kind of data; choose another --out"),
         }
     }
@@ -108,10 +112,10 @@ fn of_split(
 ) -> Result<Vec<PoseSequence>> {
     let read = |sample: &SampleRef| -> Result<PoseSequence> {
         let sample = dataset.read(sample)?;
-        let (numbers, known) = representation.directions(&sample.motion);
+        let (directions, known) = representation.directions(&sample.motion);
         let n = sample.motion.n_frames();
         let audio = architecture::audio_features(&sample.sound, sample.motion.fps, n, n, context);
-        Ok(PoseSequence::new(numbers, known, audio, sample.words.unwrap_or_default()))
+        Ok(PoseSequence::new(directions, known, audio, sample.words.unwrap_or_default()))
     };
     dataset.samples(split).par_iter().map(read).collect()
 }

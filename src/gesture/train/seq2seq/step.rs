@@ -1,4 +1,4 @@
-//! A sequence-to-sequence network in training: one step, and all of it to a checkpoint and back.
+//! A sequence-to-sequence network in training: one optimiser step, and saving to and loading from checkpoints.
 
 use super::losses;
 use super::segments::SegmentBatch;
@@ -31,38 +31,38 @@ use std::path::Path;
 const DISCRIMINATOR: &str = "discriminator.";
 const ADAM: &str = "adam.network.";
 const ADAM_D: &str = "adam.discriminator.";
-/// Settings that may change between two runs of one training; of the others the checkpoint's count.
-const FREE: [&str; 4] = ["steps", "patience", "checkpoint_every", "keep_checkpoints"];
+/// Settings that a resumed training takes from the configuration; all others come from the checkpoint.
+const OVERRIDABLE_ON_RESUME: [&str; 4] = ["steps", "patience", "checkpoint_every", "keep_checkpoints"];
 
-/// Losses of one step: the weighted sum, parts of it unweighted, and the norm of the network's gradient.
+/// Losses of one step: the weighted sum, some of its terms unweighted, and the gradient norm of the network.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct SequenceLosses {
     pub total: f64,
-    /// `None`: no pose was made, as the audio baseline learns codes.
+    /// `None` for the audio baseline, which predicts codes instead of poses.
     pub l1: Option<f64>,
     pub discriminator: f64,
     pub gradient_norm: f64,
 }
 
-/// What a checkpoint says beside its tensors.
+/// Metadata of a checkpoint.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SequenceState {
     pub speaker: SequenceMetadata,
     pub settings: Seq2seqConfig,
-    /// Steps done.
+    /// Number of completed steps.
     pub step: usize,
     /// Step and score of the best validation so far.
     pub best: Option<(usize, f32)>,
 }
 
-/// The discriminator of the adversarial network.
+/// Discriminator of the adversarial network, with its optimiser.
 struct Adversary {
     network: SegmentDiscriminator,
     params: Params,
     adam: Adam,
 }
 
-/// Networks, optimisers and where they are.
+/// Networks and optimisers of a training, with its step count.
 pub struct SequenceTrainer {
     pub metadata: SequenceMetadata,
     pub settings: Seq2seqConfig,
@@ -70,32 +70,32 @@ pub struct SequenceTrainer {
     params: Params,
     adam: Adam,
     adversary: Option<Adversary>,
-    /// Settings of the loss.
+    /// Settings of the loss, which differ from `settings` for the adversarial network.
     loss: Seq2seqConfig,
-    /// Steps done.
+    /// Number of completed steps.
     pub step: usize,
     /// Step and score of the best validation so far.
     pub best: Option<(usize, f32)>,
 }
 
 impl SequenceTrainer {
-    /// Networks as the seed makes them.
+    /// Networks with random initial weights, determined by the seed.
     pub fn new(metadata: SequenceMetadata, settings: Seq2seqConfig) -> Result<Self> {
         let mut params = Params::new(settings.seed);
         let network = architecture::network(metadata.architecture, &mut params, &metadata.network)?;
         let is_adversarial = metadata.architecture == Architecture::Adversarial;
         let beta1 = if is_adversarial { 0.5 } else { 0.9 };
-        let of_adam =
+        let adam_config =
             adam::Config { beta1, beta2: if is_adversarial { 0.9 } else { 0.999 }, ..adam::Config::default() };
         let adversary = |seed: u64| -> Result<Adversary> {
             let mut params = Params::new(seed);
             let network = SegmentDiscriminator::new(&mut params, &metadata.network)?;
-            Ok(Adversary { network, adam: Adam::new(&params, of_adam)?, params })
+            Ok(Adversary { network, adam: Adam::new(&params, adam_config)?, params })
         };
-        let loss = if is_adversarial { losses::of_adversarial(&settings) } else { settings.clone() };
+        let loss = if is_adversarial { losses::adversarial_settings(&settings) } else { settings.clone() };
         Ok(Self {
-            adam: Adam::new(&params, of_adam)?,
-            // Another seed, or tensors of the same name would begin alike.
+            adam: Adam::new(&params, adam_config)?,
+            // Inverted seed, so that equally named tensors of the two networks are initialised differently.
             adversary: is_adversarial.then(|| adversary(!settings.seed)).transpose()?,
             params,
             network,
@@ -107,16 +107,16 @@ impl SequenceTrainer {
         })
     }
 
-    /// Tensors of the network.
+    /// Parameters of the network.
     pub fn params(&self) -> &Params {
         &self.params
     }
 
-    /// One step, the discriminator's first where there is one.
+    /// Runs one training step; the discriminator, if there is one, is updated before the network.
     pub fn step(&mut self, batch: &SegmentBatch) -> Result<SequenceLosses> {
         let rate = self.settings.rate(self.step);
-        // Another seed than that of the windows.
-        let mut rng = resume::stream(!self.settings.seed, self.step);
+        // The segments of the step are drawn with the seed itself.
+        let mut rng = resume::step_rng(!self.settings.seed, self.step);
         if let Some(baseline) = self.network.audio_baseline() {
             let total = if self.step < self.settings.autoencoder_steps {
                 baseline.pose_loss(&batch.real, &normal_like(&batch.real, &mut rng)?)?
@@ -131,23 +131,23 @@ impl SequenceTrainer {
         let words = batch.segment.words.as_ref();
         let words = words.map(|words| drop_words(words, self.settings.word_dropout, &mut rng)).transpose()?;
         let segment = Segment { words, ..batch.segment.clone() };
-        let made = batch.completed(&self.network.forward(&segment, &mut Mode::Train(&mut rng))?)?;
+        let predicted = batch.completed(&self.network.forward(&segment, &mut Mode::Train(&mut rng))?)?;
         let (mut discriminator, mut logits) = (0.0, None);
         if let Some(Adversary { network, adam, .. }) = &mut self.adversary {
-            let of_made = network.forward(&made.detach(), true)?;
-            let loss = losses::discriminator(&of_made, &network.forward(&batch.real, true)?)?;
+            let predicted_logits = network.forward(&predicted.detach(), true)?;
+            let loss = losses::discriminator(&predicted_logits, &network.forward(&batch.real, true)?)?;
             discriminator = number(&loss)?;
             adam.step(&loss.backward()?, rate)?;
-            logits = Some(network.forward(&made, true)?);
+            logits = Some(network.forward(&predicted, true)?);
         }
-        let total = losses::total(&self.loss, &made, &batch.real, logits.as_ref())?;
+        let total = losses::total(&self.loss, &predicted, &batch.real, logits.as_ref())?;
         let gradient_norm = self.adam.step(&total.backward()?, rate)?;
         self.step += 1;
-        let l1 = Some(number(&losses::l1(&made, &batch.real)?)?);
+        let l1 = Some(number(&losses::l1(&predicted, &batch.real)?)?);
         Ok(SequenceLosses { total: number(&total)?, l1, discriminator, gradient_norm })
     }
 
-    /// Writes the checkpoint of this step; old ones go.
+    /// Writes the checkpoint of this step, and deletes old ones beyond `keep_checkpoints`.
     pub fn save(&self, folder: &Path) -> Result<()> {
         let mut contents = Contents { facts: self.stored()?, tensors: BTreeMap::new() };
         contents.add(NETWORK, self.params.tensors()?);
@@ -160,7 +160,7 @@ impl SequenceTrainer {
         checkpoint::prune(folder, self.settings.keep_checkpoints)
     }
 
-    /// Writes the network of this step as the best.
+    /// Writes the network of this step as the best checkpoint.
     pub fn save_best(&self, folder: &Path, validation: &SequenceValidation) -> Result<()> {
         let mut facts = self.stored()?;
         facts["validation"] = serde_json::to_value(validation)?;
@@ -174,7 +174,7 @@ impl SequenceTrainer {
         Ok(serde_json::to_value(SequenceState { speaker, settings, step: self.step, best: self.best })?)
     }
 
-    /// Takes up the tensors and the place of a checkpoint.
+    /// Restores the tensors, the step and the best score of a checkpoint.
     pub fn load(&mut self, stored: &SequenceState, contents: &Contents) -> Result<()> {
         self.params.load(&contents.part(NETWORK))?;
         self.adam.load(ADAM, &contents.tensors)?;
@@ -188,7 +188,7 @@ impl SequenceTrainer {
 }
 
 impl SequenceState {
-    /// What a checkpoint of a training says. Errors when it is none, or of another program's version.
+    /// Reads the metadata of a training checkpoint. Fails if it is of another kind or program version.
     pub fn from_checkpoint(contents: &Contents) -> Result<Self> {
         let kind = SequenceMetadata::kind();
         ensure!(
@@ -199,39 +199,39 @@ impl SequenceState {
         serde_json::from_value(contents.facts.clone()).context("its facts are not those of this program's version")
     }
 
-    /// The settings to go on with, and a line for each difference.
+    /// Settings of the resumed training, and a message for each difference from `requested`.
     pub fn settings(&self, requested: &Seq2seqConfig) -> Result<(Seq2seqConfig, Vec<String>)> {
-        resume::settings(&self.settings, requested, "seq2seq", &FREE)
+        resume::settings(&self.settings, requested, "seq2seq", &OVERRIDABLE_ON_RESUME)
     }
 }
 
 impl SequenceLosses {
-    /// Losses by name, to look whether the training is sound.
+    /// Losses by name, for the check that the training has not diverged.
     pub fn named(&self) -> [(&'static str, f64); 3] {
         [("loss", self.total), ("L1", self.l1.unwrap_or(0.0)), ("discriminator", self.discriminator)]
     }
 }
 
-/// Words [B, ...] with a share of those of each segment replaced by the unknown one, a word wherever it stands in the
-/// segment.
+/// Word dropout: in each segment of `words` [B, ...], replaces each distinct word by `UNKNOWN` with probability
+/// `share`, at all its occurrences in the segment.
 fn drop_words(words: &Tensor, share: f64, rng: &mut ChaCha8Rng) -> Result<Tensor> {
     if share == 0.0 {
         return Ok(words.clone());
     }
-    let mut numbers = words.flatten_all()?.to_vec1::<u32>()?;
-    let n_words = numbers.len() / words.dim(0)?.max(1);
-    for segment in numbers.chunks_mut(n_words.max(1)) {
+    let mut indices = words.flatten_all()?.to_vec1::<u32>()?;
+    let n_words = indices.len() / words.dim(0)?.max(1);
+    for segment in indices.chunks_mut(n_words.max(1)) {
         let mut is_dropped = BTreeMap::new();
-        for number in segment.iter_mut().filter(|number| **number != PADDING) {
-            if *is_dropped.entry(*number).or_insert_with(|| rng.random_bool(share)) {
-                *number = UNKNOWN;
+        for index in segment.iter_mut().filter(|index| **index != PADDING) {
+            if *is_dropped.entry(*index).or_insert_with(|| rng.random_bool(share)) {
+                *index = UNKNOWN;
             }
         }
     }
-    Ok(Tensor::from_vec(numbers, words.shape(), words.device())?)
+    Ok(Tensor::from_vec(indices, words.shape(), words.device())?)
 }
 
-/// Normal random numbers in the shape of a tensor.
+/// Standard normal random numbers in the shape of a tensor.
 fn normal_like(tensor: &Tensor, rng: &mut ChaCha8Rng) -> Result<Tensor> {
     let numbers: Vec<f32> = (0..tensor.elem_count()).map(|_| StandardNormal.sample(rng)).collect();
     Ok(Tensor::from_vec(numbers, tensor.shape(), tensor.device())?)
@@ -244,7 +244,7 @@ mod tests {
     use rand::SeedableRng;
 
     #[test]
-    fn a_share_of_the_words_becomes_unknown_wherever_it_stands() {
+    fn dropped_words_are_unknown_at_all_their_occurrences() {
         let numbers: Vec<u32> = (0..64 * 10 * 4).map(|i| [0, 2, 3, 4 + (i / 40) % 5][i as usize % 4]).collect();
         let words = Tensor::from_vec(numbers, (64, 10, 4), &Device::Cpu).unwrap();
         let rng = &mut ChaCha8Rng::seed_from_u64(1);

@@ -1,8 +1,8 @@
-//! Training of a sequence-to-sequence network. The same data, settings and seed give the same
-//! checkpoints, also when the training was interrupted: segments and dropout of a step depend on the seed and the step
-//! alone, everything else is in the checkpoint.
+//! Training of a sequence-to-sequence network. The same data, settings and seed give the same checkpoints, even if the
+//! training was interrupted: the segments and the dropout of a step depend only on the seed and the step, and
+//! everything else is stored in the checkpoint.
 
-use super::own_previous::begin_with_own;
+use super::rollout_previous::roll_out_previous;
 use super::segments::SegmentLoader;
 use super::sequence::{PoseSequence, SequenceSplits};
 use super::source::TrainingSource;
@@ -15,7 +15,7 @@ use crate::generate::seq2seq::vocabulary::{PADDING, UNKNOWN, Vocabulary};
 use crate::train::epochs::{self, EpochSchedule, StepReport, TrainingOutcome, ValidatedStep, ValidatedTraining};
 use crate::train::log;
 use crate::train::no_window::{self, NeededFrames};
-use crate::train::resume::{self, sample_windows, stream};
+use crate::train::resume::{self, sample_windows, step_rng};
 use anyhow::{Context, Result, ensure};
 use candle_core::{Device, Tensor};
 use orator_base::stage::progress::Progress;
@@ -30,16 +30,17 @@ use orator_nn::seq2seq::encoders::set_word_vectors;
 use orator_nn::weights::Contents;
 use std::path::Path;
 
-/// Numbers of a word where no table of vectors is given.
-const WORD: usize = 100;
+/// Dimension of the word embeddings if no word vectors are given.
+const WORD_DIM: usize = 100;
 
-/// Trains until `requested.steps`, going on from the newest checkpoint in `folder`; what the settings of that checkpoint say
-/// counts, and differences are told. `vectors`: what words begin with; else the seed.
+/// Trains until `requested.steps`, resuming from the newest checkpoint in `folder` if there is one; then the settings
+/// of that checkpoint apply, and differences are reported. `vectors` initialise the word embeddings; without them they
+/// are random.
 ///
 /// # Errors
-/// Data that cannot be read, by the name of its file; no segment to train on; a checkpoint of other data; another training
-/// at work in `folder`; a loss that is not finite or explodes (the last good checkpoint stays); `StoppedTraining` where
-/// `progress` asks for an end.
+/// Data that cannot be read, with the name of the file; no segment to train on; a checkpoint of other data; another
+/// training running in `folder`; a loss that is not finite or explodes (the last good checkpoint is kept);
+/// `StoppedTraining` if `progress` requests a stop.
 pub fn train(
     source: TrainingSource,
     vectors: Option<&WordVectors>,
@@ -47,11 +48,11 @@ pub fn train(
     folder: &Path,
     progress: &dyn Progress,
 ) -> Result<TrainingOutcome<SequenceValidation>> {
-    train_watched(source, vectors, requested, folder, progress, &mut |_| ())
+    train_with_callback(source, vectors, requested, folder, progress, &mut |_| ())
 }
 
-/// [`train`], with a call behind each validation, when log and checkpoints are written.
-pub fn train_watched(
+/// Like [`train`]; calls `validated` after each validation, when its log line and checkpoint have been written.
+pub fn train_with_callback(
     source: TrainingSource,
     vectors: Option<&WordVectors>,
     requested: &Seq2seqConfig,
@@ -63,10 +64,10 @@ pub fn train_watched(
     let Config { previous, predicted, .. } = network_config(source.fps(), 0, 0, [0, 0]);
     let needed = NeededFrames { name: "a segment", n_frames: previous + predicted, key: None };
     if let TrainingSource::Dataset(dataset) = source {
-        // Before the statistics, of which an empty split has none.
+        // Checked before the statistics are read, which an empty split does not have.
         no_window::ensure_window(dataset, needed)?;
     }
-    // Others may listen to the model while it learns, and nobody may forget it.
+    // Shared lock: `generate` may load the model during training; `forget` may not remove it.
     let _model = FolderLock::shared(folder)?;
     let _lock = workdir::lock(folder)?;
     workdir::sweep_folder(folder, 0);
@@ -74,30 +75,30 @@ pub fn train_watched(
     let (mut trainer, splits) = match &resumed {
         Some((stored, contents)) => {
             let SequenceMetadata { poses, network, .. } = &stored.speaker;
-            let other = vectors.filter(|vectors| vectors.dim() != network.word);
+            let mismatched = vectors.filter(|vectors| vectors.dim() != network.word);
             ensure!(
-                other.is_none(),
+                mismatched.is_none(),
                 "the word vectors have {} numbers, the words of the checkpoint in {} {}: leave them out, or choose another \
                  --out",
-                other.map_or(0, WordVectors::dim),
+                mismatched.map_or(0, WordVectors::dim),
                 folder.display(),
                 network.word
             );
             let splits = source.sequences(poses, network.context)?;
             let mut trainer = SequenceTrainer::new(stored.speaker.clone(), stored.settings.clone())?;
             trainer.load(stored, contents)?;
-            // One too many is left by a kill before the oldest was removed.
+            // A process killed before removing the oldest checkpoint leaves one too many.
             checkpoint::prune(folder, trainer.settings.keep_checkpoints)?;
             (trainer, splits)
         }
         None => {
-            let begun = begin(source, vectors, requested)?;
+            let initial = initialise(source, vectors, requested)?;
             if let Some(vectors) = vectors {
-                let words = begun.0.metadata.vocabulary.words();
+                let words = initial.0.metadata.vocabulary.words();
                 let n_known = vectors.n_known(words.iter().map(String::as_str));
                 progress.say(&format!("{n_known} of {} words begin with their vectors", words.len()));
             }
-            begun
+            initial
         }
     };
     splits.notes.iter().for_each(|note| progress.say(note));
@@ -105,13 +106,13 @@ pub fn train_watched(
     ensure!(
         !train.is_empty(),
         "{}: no motion to train on is as long as a segment of {} frames",
-        source.place(),
+        source.path(),
         needed.n_frames
     );
     progress.say(&format!(
         "{} segments of {}; what is learnt goes to {}",
         train.len(),
-        source.place(),
+        source.path(),
         folder.display()
     ));
     let held_out = SegmentLoader::new(splits.held_out, &trainer.metadata, 0);
@@ -126,22 +127,22 @@ pub fn train_watched(
     }
     let held_out = ValidationSegments::new(&held_out, &train, trainer.settings.batch)?;
     let mut training = SequenceTraining { trainer: &mut trainer, loader: &train, held_out: &held_out };
-    let end = with_spinning_workers(|| epochs::run(&mut training, folder, progress, validated))?;
+    let outcome = with_spinning_workers(|| epochs::run(&mut training, folder, progress, validated))?;
     let (n_parameters, n_words) = (trainer.params().n_parameters(), trainer.metadata.vocabulary.words().len());
-    Ok(TrainingOutcome { n_examples: train.len(), n_parameters, n_words, ..end })
+    Ok(TrainingOutcome { n_examples: train.len(), n_parameters, n_words, ..outcome })
 }
 
-/// A trainer as the seed and the word vectors make it, and the data.
-fn begin(
+/// Initial trainer of a new training, and its data.
+fn initialise(
     source: TrainingSource,
     vectors: Option<&WordVectors>,
     settings: &Seq2seqConfig,
 ) -> Result<(SequenceTrainer, SequenceSplits)> {
-    let (fps, poses) = (source.fps(), source.pose_numbers()?);
-    let word = vectors.map_or(WORD, WordVectors::dim);
+    let (fps, poses) = (source.fps(), source.pose_format()?);
+    let word = vectors.map_or(WORD_DIM, WordVectors::dim);
     let sizes = |n_words| Config {
         hears_context: settings.hears_context,
-        ..network_config(fps, poses.n_numbers(), n_words, [settings.hidden, word])
+        ..network_config(fps, poses.n_features(), n_words, [settings.hidden, word])
     };
     let splits = source.sequences(&poses, sizes(0).context)?;
     let vocabulary = match architecture::word_encoder(settings.network) {
@@ -154,20 +155,20 @@ fn begin(
         fps,
         rate: source.rate(),
         architecture: settings.network,
-        network: sizes(vocabulary.n_numbers()),
+        network: sizes(vocabulary.n_indices()),
         poses,
         vocabulary,
         words_around_secs: settings.words_around_secs,
         dataset: source.hash()?,
     };
     let trainer = SequenceTrainer::new(metadata, settings.clone())?;
-    begin_words(&trainer, vectors)?;
-    begin_codes(&trainer, &splits.train)?;
+    initialise_words(&trainer, vectors)?;
+    initialise_scales(&trainer, &splits.train)?;
     Ok((trainer, splits))
 }
 
-/// Padding begins with zeros, the unknown word with ones, the others with their vectors where there are some.
-fn begin_words(trainer: &SequenceTrainer, vectors: Option<&WordVectors>) -> Result<()> {
+/// Initialises the word embeddings: zeros for padding, ones for the unknown word, and the given vectors for all others.
+fn initialise_words(trainer: &SequenceTrainer, vectors: Option<&WordVectors>) -> Result<()> {
     let SequenceMetadata { architecture, vocabulary, network, .. } = &trainer.metadata;
     let Some(encoder) = architecture::word_encoder(*architecture) else { return Ok(()) };
     let found = trainer.params().trainables().find(|(name, _)| *name == format!("{encoder}.embedding.weight"));
@@ -180,23 +181,23 @@ fn begin_words(trainer: &SequenceTrainer, vectors: Option<&WordVectors>) -> Resu
             rows[vocabulary.number(word) as usize] = vectors.vector(vectors.index(word))?;
         }
     }
-    let numbers: Vec<f32> = rows.concat();
-    let table = Tensor::from_vec(numbers, (vocabulary.n_numbers(), network.word), table.device())?;
+    let weights: Vec<f32> = rows.concat();
+    let table = Tensor::from_vec(weights, (vocabulary.n_indices(), network.word), table.device())?;
     Ok(set_word_vectors(trainer.params(), encoder, &table)?)
 }
 
-/// Deviation of the noise that is added to a pose, as a share of the data's (published).
+/// Standard deviation of the noise that is added to poses, as a share of that of the data (published value).
 const NOISE: f32 = 0.01;
 
-/// The audio baseline is told how far the numbers to train on reach from 0, where that is farther than tanh does, and how
-/// much of them is noise.
-fn begin_codes(trainer: &SequenceTrainer, train: &[PoseSequence]) -> Result<()> {
+/// Sets the output scale of the audio baseline, whose tanh is limited to 1, to the largest magnitude of each training
+/// feature (at least 1), and the noise of its inputs to a share of the feature's standard deviation.
+fn initialise_scales(trainer: &SequenceTrainer, train: &[PoseSequence]) -> Result<()> {
     let Some(baseline) = trainer.network.audio_baseline() else { return Ok(()) };
     let column = |c: usize| train.iter().flat_map(move |sequence| sequence.poses.column(c).to_vec());
-    let scale = |c: usize| column(c).fold(1.0f32, |most, number| most.max(number.abs()));
+    let scale = |c: usize| column(c).fold(1.0f32, |largest, value| largest.max(value.abs()));
     let deviation = |c: usize| {
-        let (n, sum, squares) = column(c).fold((0.0f64, 0.0, 0.0), |(n, sum, squares), number| {
-            (n + 1.0, sum + f64::from(number), squares + f64::from(number).powi(2))
+        let (n, sum, squares) = column(c).fold((0.0f64, 0.0, 0.0), |(n, sum, squares), value| {
+            (n + 1.0, sum + f64::from(value), squares + f64::from(value).powi(2))
         });
         let mean = sum / n.max(1.0);
         (squares / n.max(1.0) - mean * mean).max(0.0).sqrt() as f32
@@ -204,11 +205,11 @@ fn begin_codes(trainer: &SequenceTrainer, train: &[PoseSequence]) -> Result<()> 
     let n = trainer.metadata.network.pose;
     let scales: Vec<f32> = (0..n).map(scale).collect();
     let noise: Vec<f32> = (0..n).map(|c| NOISE * deviation(c) / scales[c]).collect();
-    let tensor = |numbers: Vec<f32>| Tensor::from_vec(numbers, n, &Device::Cpu);
+    let tensor = |values: Vec<f32>| Tensor::from_vec(values, n, &Device::Cpu);
     Ok(baseline.set_scale(&tensor(scales)?, &tensor(noise)?)?)
 }
 
-/// A trainer with its segments.
+/// A trainer with its training and validation segments.
 struct SequenceTraining<'a> {
     trainer: &'a mut SequenceTrainer,
     loader: &'a SegmentLoader,
@@ -240,26 +241,26 @@ impl ValidatedTraining for SequenceTraining<'_> {
         let which = sample_windows(seed, self.trainer.step, batch, self.loader.len());
         let mut batch = self.loader.batch(&which)?;
         if own_previous > 0.0 {
-            // Another seed than those of the segments and of dropout.
-            let rng = &mut stream(seed.rotate_left(32), self.trainer.step);
-            begin_with_own(&mut batch, &which, self.loader, &*self.trainer.network, own_previous, rng)?;
+            // The segments and the dropout use other derived seeds.
+            let rng = &mut step_rng(seed.rotate_left(32), self.trainer.step);
+            roll_out_previous(&mut batch, &which, self.loader, &*self.trainer.network, own_previous, rng)?;
         }
         let losses = self.trainer.step(&batch)?;
         let SequenceLosses { total, l1, gradient_norm, .. } = losses;
-        resume::ensure_sound(self.trainer.step, &losses.named(), gradient_norm)?;
-        let words = format!("loss {total:.3}{}", l1.map_or(String::new(), |l1| format!(" L1 {l1:.3}")));
-        Ok(StepReport { line: log::line(self.trainer.step, &losses), words })
+        resume::ensure_not_diverged(self.trainer.step, &losses.named(), gradient_norm)?;
+        let summary = format!("loss {total:.3}{}", l1.map_or(String::new(), |l1| format!(" L1 {l1:.3}")));
+        Ok(StepReport { line: log::line(self.trainer.step, &losses), summary })
     }
 
     fn validate(&self) -> Result<SequenceValidation> {
         self.held_out.validate(&*self.trainer.network)
     }
 
-    fn judged(validation: &SequenceValidation) -> (f64, Option<&str>) {
+    fn score_and_alarm(validation: &SequenceValidation) -> (f64, Option<&str>) {
         (validation.score, validation.alarm.as_deref())
     }
 
-    fn words(validation: &SequenceValidation) -> String {
+    fn summary(validation: &SequenceValidation) -> String {
         let SequenceValidation { split, l1, mean_pose_l1, energy, .. } = validation;
         format!("{split} L1 {l1:.3} (mean pose {mean_pose_l1:.3}), energy {:.0} %", 100.0 * energy)
     }
@@ -273,7 +274,8 @@ impl ValidatedTraining for SequenceTraining<'_> {
     }
 }
 
-/// The newest checkpoint, and what it says with the settings that count now. Tells where these differ from `requested`.
+/// Newest checkpoint and its state, with the settings of the resumed training. Reports where these differ from
+/// `requested`.
 fn resume(
     source: TrainingSource,
     requested: &Seq2seqConfig,

@@ -1,5 +1,5 @@
-//! A network on segments it was not trained on, each begun with its real poses, beside the pose that never moves from the
-//! mean.
+//! Validation of a network on held-out segments, each with its real previous poses, in comparison with a constant mean
+//! pose.
 
 use super::segments::{SegmentBatch, SegmentLoader};
 use crate::train::gan::losses::number;
@@ -10,35 +10,36 @@ use orator_nn::Mode;
 use orator_nn::seq2seq::predict::GesturePredictor;
 use serde::{Deserialize, Serialize};
 
-/// Most segments a validation looks at.
-const N_SEGMENTS: usize = 256;
+/// Largest number of segments in a validation.
+const MAX_SEGMENTS: usize = 256;
 
-/// The segments to validate on.
+/// Segments to validate on.
 pub struct ValidationSegments {
     split: &'static str,
     batches: Vec<SegmentBatch>,
 }
 
-/// What a validation says.
+/// Metrics of a validation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SequenceValidation {
-    /// Split they were measured on.
+    /// Evaluated split.
     pub split: String,
     pub n_segments: usize,
-    /// Mean absolute error of the numbers, and that of the mean pose.
+    /// Mean absolute error of the known features.
     pub l1: f64,
+    /// Mean absolute error of the mean pose.
     pub mean_pose_l1: f64,
-    /// Mean squared change from pose to pose, as a share of the data's.
+    /// Mean squared change from pose to pose, relative to the data.
     pub energy: f64,
-    /// How far segments of different sound lie apart, as a share of what real segments do.
+    /// Mean absolute difference between segments of different audio, relative to real segments.
     pub spread: f64,
-    /// What chooses the best checkpoint, lower is better: L1 as a share of the mean pose's, and |ln(energy)| / 2.
+    /// Score that selects the best checkpoint, lower is better: `l1 / mean_pose_l1 + |ln(energy)| / 2`.
     pub score: f64,
-    /// Why this network has collapsed, if it has.
+    /// Message if this network has collapsed.
     pub alarm: Option<String>,
 }
 
-/// Sums over batches: of the network, and of the data.
+/// Sums over batches, each of the network and of what it is compared with: the mean pose (`error`), else the data.
 #[derive(Default)]
 struct Sums {
     error: [f64; 2],
@@ -49,34 +50,34 @@ struct Sums {
 }
 
 impl ValidationSegments {
-    /// At most `N_SEGMENTS` of the held-out segments, evenly chosen; of those to train on where none is held out.
+    /// At most `MAX_SEGMENTS` evenly spaced held-out segments, or training segments if none is held out.
     pub fn new(held_out: &SegmentLoader, train: &SegmentLoader, batch: usize) -> Result<Self> {
         let (split, loader) = if held_out.is_empty() { ("train", train) } else { ("validation", held_out) };
-        let n = loader.len().min(N_SEGMENTS);
+        let n = loader.len().min(MAX_SEGMENTS);
         let chosen: Vec<usize> = (0..n).map(|i| i * loader.len() / n).collect();
         let batches = chosen.chunks(batch).map(|which| loader.batch(which)).collect::<Result<_>>()?;
         Ok(Self { split, batches })
     }
 
-    /// The network and the mean pose on the segments.
+    /// Metrics of the network on the segments.
     pub fn validate(&self, network: &dyn GesturePredictor) -> Result<SequenceValidation> {
         let mut sums = Sums::default();
         for batch in &self.batches {
-            let made = batch.completed(&network.forward(&batch.segment, &mut Mode::Eval)?.detach())?;
-            let still = batch.completed(&made.zeros_like()?)?;
+            let predicted = batch.completed(&network.forward(&batch.segment, &mut Mode::Eval)?.detach())?;
+            let mean_pose = batch.completed(&predicted.zeros_like()?)?;
             sums.n_known += number(&batch.known.sum_all()?)?;
-            sums.n_segments += made.dim(0)?;
-            for (i, poses) in [&made, &still].into_iter().enumerate() {
+            sums.n_segments += predicted.dim(0)?;
+            for (i, poses) in [&predicted, &mean_pose].into_iter().enumerate() {
                 sums.error[i] += number(&(poses - &batch.real)?.abs()?.sum_all()?)?;
             }
-            for (i, poses) in [&made, &batch.real].into_iter().enumerate() {
+            for (i, poses) in [&predicted, &batch.real].into_iter().enumerate() {
                 sums.change[i] += number(&differences(poses, 1)?.sqr()?.sum_all()?)?;
                 sums.apart[i] += number(&differences(poses, 0)?.abs()?.sum_all()?)?;
             }
         }
         let Sums { error, change, apart, n_known, n_segments } = sums;
-        let share = |[own, real]: [f64; 2], none: f64| if real > 0.0 { own / real } else { none };
-        let (energy, spread) = (share(change, 0.0), share(apart, 1.0));
+        let ratio = |[own, other]: [f64; 2], default: f64| if other > 0.0 { own / other } else { default };
+        let (energy, spread) = (ratio(change, 0.0), ratio(apart, 1.0));
         Ok(SequenceValidation {
             split: self.split.to_owned(),
             n_segments,
@@ -84,13 +85,13 @@ impl ValidationSegments {
             mean_pose_l1: error[1] / n_known.max(1.0),
             energy,
             spread,
-            score: share(error, 1.0) + 0.5 * energy.max(1e-6).ln().abs(),
+            score: ratio(error, 1.0) + 0.5 * energy.max(1e-6).ln().abs(),
             alarm: score::alarm(energy, spread),
         })
     }
 }
 
-/// Differences of following entries along a dimension.
+/// Differences of consecutive entries along a dimension.
 fn differences(x: &Tensor, dim: usize) -> candle_core::Result<Tensor> {
     let n = x.dim(dim)?.saturating_sub(1);
     x.narrow(dim, 1.min(x.dim(dim)?), n)? - x.narrow(dim, 0, n)?

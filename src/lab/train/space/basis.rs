@@ -7,7 +7,7 @@ use candle_core::{Device, Tensor};
 use ndarray::{Array1, Array2, Axis, s};
 use orator_gesture::metrics::space::basis;
 use orator_gesture::metrics::space::basis::{N, WINDOW};
-use orator_gesture::metrics::space::fixed_rate::{N_JOINTS_USED, N_NUMBERS, joints_used};
+use orator_gesture::metrics::space::fixed_rate::{N_COORDINATES, N_JOINTS_USED, joints_used};
 use orator_nn::weights::Contents;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -55,7 +55,7 @@ pub fn fit(corpus: &Corpus, seed: u64, out: &Path) -> Result<FittedBasis> {
     };
     let rows: Vec<f32> = directions.t().iter().map(|v| *v as f32).collect();
     let tensors = BTreeMap::from([
-        ("basis".to_owned(), Tensor::from_vec(rows, (N, WINDOW * N_NUMBERS), &Device::Cpu)?),
+        ("basis".to_owned(), Tensor::from_vec(rows, (N, WINDOW * N_COORDINATES), &Device::Cpu)?),
         ("weights".to_owned(), Tensor::from_vec(weights.to_vec(), N_JOINTS_USED, &Device::Cpu)?),
     ]);
     let facts = json!({ "kind": "motion-basis", "corpus": corpus.metadata(), "seed": seed });
@@ -65,7 +65,7 @@ pub fn fit(corpus: &Corpus, seed: u64, out: &Path) -> Result<FittedBasis> {
 
 /// 1 for the arms' joints; for the fingers' what gives all of them together the arms' variance.
 fn weights(pieces: &[CorpusPiece]) -> Array1<f32> {
-    let (mut n, mut sum, mut squares) = (0.0, Array1::<f64>::zeros(N_NUMBERS), Array1::<f64>::zeros(N_NUMBERS));
+    let (mut n, mut sum, mut squares) = (0.0, Array1::<f64>::zeros(N_COORDINATES), Array1::<f64>::zeros(N_COORDINATES));
     for piece in pieces {
         for pose in basis::poses(piece.joints.view()).outer_iter() {
             let pose = pose.mapv(f64::from);
@@ -85,7 +85,7 @@ fn weights(pieces: &[CorpusPiece]) -> Array1<f32> {
 
 /// Number of windows, and their covariance [2070, 2070].
 fn covariance(pieces: &[CorpusPiece], weights: &Array1<f32>) -> (usize, Array2<f64>) {
-    let size = WINDOW * N_NUMBERS;
+    let size = WINDOW * N_COORDINATES;
     let (mut n, mut sum, mut products) = (0, Array1::<f64>::zeros(size), Array2::<f64>::zeros((size, size)));
     let mut rows: Vec<f64> = Vec::new();
     let mut add = |rows: &mut Vec<f64>| {

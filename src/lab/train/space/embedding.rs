@@ -11,7 +11,7 @@ use ndarray::{Array2, ArrayView3, s};
 use orator_base::math::vec3;
 use orator_base::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, R_HAND, R_WRIST, parent};
 use orator_gesture::metrics::space::embedding::{KIND, WINDOW, directions};
-use orator_gesture::metrics::space::fixed_rate::{N_JOINTS_USED, N_NUMBERS, joints_used};
+use orator_gesture::metrics::space::fixed_rate::{N_COORDINATES, N_JOINTS_USED, joints_used};
 use orator_nn::Mode;
 use orator_nn::motion_encoder::Config;
 use orator_nn::params::Params;
@@ -60,7 +60,7 @@ impl EmbeddingTask {
         let ends = ends.collect();
         let (mean, std) = statistics(&directions);
         net.encoder.set_statistics(&mean, &std)?;
-        let weights = Tensor::from_vec(weights(), (1, N_NUMBERS, 1), &Device::Cpu)?;
+        let weights = Tensor::from_vec(weights(), (1, N_COORDINATES, 1), &Device::Cpu)?;
         Ok(Self { params, net, corpus, weights, directions, ends })
     }
 
@@ -77,13 +77,13 @@ impl EmbeddingTask {
                     .iter()
                     .flat_map(|window| directions(*window).reversed_axes().iter().copied().collect::<Vec<_>>())
                     .collect();
-                let x = Tensor::from_vec(numbers, (windows.len(), N_NUMBERS, WINDOW), &Device::Cpu)?;
+                let x = Tensor::from_vec(numbers, (windows.len(), N_COORDINATES, WINDOW), &Device::Cpu)?;
                 let normal = self.net.encoder.normalised(&x)?;
                 for (errors, back) in
                     errors.iter_mut().zip([self.net.forward(&normal, &Mode::Eval)?, normal.zeros_like()?])
                 {
                     let back = self.net.encoder.plain(&back)?.transpose(1, 2)?.flatten_all()?.to_vec1::<f32>()?;
-                    for (window, back) in windows.iter().zip(back.chunks_exact(WINDOW * N_NUMBERS)) {
+                    for (window, back) in windows.iter().zip(back.chunks_exact(WINDOW * N_COORDINATES)) {
                         errors.add(*window, back);
                     }
                 }
@@ -96,7 +96,7 @@ impl EmbeddingTask {
 impl EmbeddingErrors {
     /// A window [34, 49, 3] and the directions [34 x 138] that came back for it, put together with its own bone lengths.
     fn add(&mut self, window: ArrayView3<f32>, back: &[f32]) {
-        for (frame, back) in window.outer_iter().zip(back.chunks_exact(N_NUMBERS)) {
+        for (frame, back) in window.outer_iter().zip(back.chunks_exact(N_COORDINATES)) {
             let at = |joint: usize| -> vec3::Vec3 { std::array::from_fn(|k| f64::from(frame[[joint, k]])) };
             let mut placed = [[0.0; 3]; N_JOINTS];
             for (joint, back) in joints_used().zip(back.chunks_exact(3)) {
@@ -148,7 +148,7 @@ fn weights() -> Vec<f32> {
 
 /// Mean and standard deviation of each of the 138 numbers.
 fn statistics(pieces: &[Array2<f32>]) -> (Vec<f32>, Vec<f32>) {
-    let mut sums = [(0.0f64, 0.0f64); N_NUMBERS];
+    let mut sums = [(0.0f64, 0.0f64); N_COORDINATES];
     let mut n = 0.0;
     for row in pieces.iter().flat_map(|piece| piece.outer_iter()) {
         n += 1.0;
@@ -176,7 +176,7 @@ impl TrainingTask for EmbeddingTask {
     }
 
     fn shape_in(&self) -> Vec<usize> {
-        vec![N_NUMBERS, WINDOW]
+        vec![N_COORDINATES, WINDOW]
     }
 
     fn weights(&self) -> Vec<f32> {
@@ -199,7 +199,7 @@ impl TrainingTask for EmbeddingTask {
     }
 
     fn loss(&self, out: &Tensor, _: &Tensor, _: &Tensor) -> candle_core::Result<Tensor> {
-        let rest = out.reshape((out.dim(0)?, N_NUMBERS, WINDOW))?.broadcast_mul(&self.weights)?;
+        let rest = out.reshape((out.dim(0)?, N_COORDINATES, WINDOW))?.broadcast_mul(&self.weights)?;
         let steps = (rest.narrow(2, 1, WINDOW - 1)? - rest.narrow(2, 0, WINDOW - 1)?)?;
         rest.abs()?.mean_all()? + steps.abs()?.mean_all()?
     }

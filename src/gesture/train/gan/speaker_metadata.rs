@@ -1,6 +1,6 @@
-//! What a training knows of its speakers before its first step: statistics of the datasets, or what a checkpoint says of them.
+//! Metadata of the speakers before the first step, from the statistics of their datasets or from a resumed checkpoint.
 
-use super::start;
+use super::pretrained;
 use super::windows::WindowLoader;
 use crate::generate::model::SpeakerMetadata;
 use crate::generate::normalisation::{ChannelNormalisation, Normalisation};
@@ -13,7 +13,7 @@ use orator_dataset::config::{GanSettings, MotionRepresentation, NetworkPreset};
 use orator_dataset::{Dataset, Split};
 use orator_nn::gan::generator::{Config, Preset};
 
-/// Errors unless each dataset has sound and is of another speaker.
+/// Fails unless every dataset has sound and each is of a different speaker.
 pub fn check(datasets: &[&Dataset]) -> Result<()> {
     for (n, dataset) in datasets.iter().enumerate() {
         let (info, dir) = (dataset.info(), dataset.dir().display());
@@ -29,15 +29,15 @@ pub fn check(datasets: &[&Dataset]) -> Result<()> {
     Ok(())
 }
 
-/// Normalisation of a dataset's training split, with these channels.
+/// Normalisation fitted to the training split of a dataset, including these posture channels.
 pub fn normalisation_with_channels(dataset: &Dataset, wanted: &[PostureChannel]) -> Result<Normalisation> {
     Ok(Normalisation { channels: channels(dataset, wanted)?, ..normalisation(dataset)? })
 }
 
-/// Frames read at a time, for statistics of all poses.
+/// Frames read at a time for statistics of all poses.
 const PART_FRAMES: usize = 4096;
 
-/// What a training of so many speakers learns of one of them.
+/// Metadata of one speaker of a new training with `n_speakers` speakers.
 pub fn metadata(
     dataset: &Dataset,
     normal: &Normalisation,
@@ -49,17 +49,21 @@ pub fn metadata(
         MotionRepresentation::Positions => Representation::Positions,
         MotionRepresentation::Bones => Representation::bones(normal, loader.poses(PART_FRAMES))?,
     };
-    let network = Config::from_preset(preset(settings.preset), normal.n_numbers());
+    let network = Config::from_preset(preset(settings.preset), normal.n_features());
     let several = n_speakers > 1;
     let network = Config { n_speakers: if several { n_speakers } else { 0 }, speaker_weights: several, ..network };
     let (info, hash) = (dataset.info(), dataset.hash()?);
     let mut metadata = SpeakerMetadata::new(&info.speaker, info.fps, &hash, network, normal.clone(), representation);
-    metadata.add_videos(start::videos(dataset));
+    metadata.add_videos(pretrained::videos(dataset));
     Ok(metadata)
 }
 
-/// Takes up a speaker of a checkpoint with the dataset as it is now.
-pub fn go_on(metadata: &mut SpeakerMetadata, dataset: &Dataset, differences: &mut Vec<String>) -> Result<()> {
+/// Updates the metadata of a speaker from a resumed checkpoint for the current dataset; adds a message to `differences`
+/// if the dataset has changed.
+///
+/// # Errors
+/// A dataset of another speaker or frame rate.
+pub fn resume(metadata: &mut SpeakerMetadata, dataset: &Dataset, differences: &mut Vec<String>) -> Result<()> {
     let info = dataset.info();
     ensure!(
         metadata.name == info.speaker && metadata.fps == info.fps,
@@ -76,12 +80,12 @@ pub fn go_on(metadata: &mut SpeakerMetadata, dataset: &Dataset, differences: &mu
                 .to_owned(),
         );
         metadata.dataset = hash;
-        metadata.add_videos(start::videos(dataset));
+        metadata.add_videos(pretrained::videos(dataset));
     }
     Ok(())
 }
 
-/// The network of a preset of the configuration.
+/// Network preset for a preset of the configuration.
 pub const fn preset(preset: NetworkPreset) -> Preset {
     match preset {
         NetworkPreset::Light => Preset::Light,
@@ -89,7 +93,7 @@ pub const fn preset(preset: NetworkPreset) -> Preset {
     }
 }
 
-/// Statistics of the channels that are to be learnt.
+/// Normalisation of the posture channels that are to be trained.
 fn channels(dataset: &Dataset, wanted: &[PostureChannel]) -> Result<Vec<ChannelNormalisation>> {
     let posture = dataset.stats().posture.as_ref();
     let of = |channel: PostureChannel| -> Result<ChannelNormalisation> {
@@ -106,7 +110,8 @@ fn channels(dataset: &Dataset, wanted: &[PostureChannel]) -> Result<Vec<ChannelN
     PostureChannel::ALL.into_iter().filter(|channel| wanted.contains(channel)).map(of).collect()
 }
 
-/// Statistics of the training split; bone lengths where the dataset does not state them are measured.
+/// Normalisation of the joints fitted to the training split. Bone lengths come from the metadata of the dataset, or are
+/// measured on the longest training interval if the metadata has none.
 pub fn normalisation(dataset: &Dataset) -> Result<Normalisation> {
     let stated = &dataset.info().bone_lengths_metres;
     let mut lengths: Vec<f32> = (0..N_BONES).map(|bone| stated.get(bone).map_or(0.0, |v| *v as f32)).collect();

@@ -1,7 +1,7 @@
-//! A training that begins with another speaker's model: the network's weights are taken over, normalisation and skeleton
-//! are the new speaker's.
+//! Initialisation of a training from another speaker's model: the weights are copied, the normalisation and the
+//! skeleton are those of the new speaker.
 
-use super::recipe::TrainingStart;
+use super::recipe::InitialWeights;
 use super::step::GanTrainer;
 use super::windows::JoinedWindows;
 use crate::generate::model::{self, GENERATOR, SpeakerMetadata, TrainedVideo, checkpoint_file};
@@ -15,18 +15,19 @@ use orator_nn::weights::Contents;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Windows by which the layer of a new speaker is chosen, at most.
-const NEAREST_WINDOWS: usize = 128;
+/// Largest number of windows used to choose the initial layer of a new speaker.
+const MAX_SELECTION_WINDOWS: usize = 128;
 
-/// Model that a training begins with.
-pub struct StartingModel {
+/// Model that a training is initialised from.
+pub struct PretrainedModel {
     path: PathBuf,
     speakers: Vec<SpeakerMetadata>,
     contents: Contents,
 }
 
-impl StartingModel {
-    /// Reads a checkpoint of `orator train gan`, or of its folder the best one, else the newest. Errors name the file.
+impl PretrainedModel {
+    /// Reads a checkpoint of `orator train gan`: a file, or the best, else the newest checkpoint of a folder. Errors
+    /// name the file.
     pub fn read(path: &Path) -> Result<Self> {
         let path = checkpoint_file(path)?;
         let contents = Contents::read(&path)?;
@@ -36,27 +37,28 @@ impl StartingModel {
         Ok(Self { path, speakers, contents })
     }
 
-    /// The file and its speakers.
-    pub fn account(&self) -> String {
+    /// Description of the file and its speakers for messages.
+    pub fn description(&self) -> String {
         let names: Vec<&str> = self.speakers.iter().map(|speaker| speaker.name.as_str()).collect();
         format!("what {} learnt of {}", self.path.display(), names.join(", "))
     }
 
-    /// What this model is for a training of so many speakers.
-    pub fn kind(&self, n_speakers: usize) -> TrainingStart {
+    /// Kind of initial weights that this model provides for a training of `n_speakers` speakers.
+    pub fn kind(&self, n_speakers: usize) -> InitialWeights {
         if n_speakers == 1 && self.speakers.iter().any(|speaker| speaker.network.speaker_weights) {
-            TrainingStart::SeveralSpeakers
+            InitialWeights::SeveralSpeakers
         } else {
-            TrainingStart::AnotherSpeaker
+            InitialWeights::AnotherSpeaker
         }
     }
 
-    /// A trainer of these speakers, with the weights of this model and its videos in their lists. One speaker who begins with a
-    /// model of several gets the layer of the one by whose its first error on `windows` is least, or the mean of all.
+    /// Trainer of these speakers, initialised with the weights of this model, whose videos are added to the speakers'
+    /// lists. A single speaker initialised from a model of several gets the speaker layer with the smallest initial
+    /// error on `windows`, among those of all speakers and their mean.
     ///
     /// # Errors
-    /// Networks of another shape.
-    pub fn begin(
+    /// A network of another shape.
+    pub fn trainer(
         &self,
         mut speakers: Vec<SpeakerMetadata>,
         settings: GanSettings,
@@ -76,30 +78,31 @@ impl StartingModel {
             own.width,
             own.n_out
         );
-        let earlier = self.speakers.iter().flat_map(|speaker| speaker.videos.iter().cloned());
-        let earlier: Vec<TrainedVideo> = earlier.collect();
-        speakers.iter_mut().for_each(|speaker| speaker.add_videos(earlier.clone()));
+        let inherited = self.speakers.iter().flat_map(|speaker| speaker.videos.iter().cloned());
+        let inherited: Vec<TrainedVideo> = inherited.collect();
+        speakers.iter_mut().for_each(|speaker| speaker.add_videos(inherited.clone()));
         let mut layers = self.contents.part(GENERATOR);
         layers.retain(|name, _| name.starts_with(SPEAKER));
-        let begins_with_several = speakers.len() == 1 && !layers.is_empty();
-        if begins_with_several {
+        let is_layer_chosen = speakers.len() == 1 && !layers.is_empty();
+        if is_layer_chosen {
             let speaker_weights = self.speakers[0].network.speaker_weights;
             speakers[0].network = Config { n_speakers: 1, speaker_weights, ..speakers[0].network.clone() };
         }
         let trainer = GanTrainer::new(speakers, settings)?;
-        let begin = || {
-            if begins_with_several {
-                self.begin_as_the_nearest(&trainer, &layers, windows)
+        let initialise = || {
+            if is_layer_chosen {
+                self.initialise_from_nearest(&trainer, &layers, windows)
             } else {
-                trainer.begin_with(&self.contents, None)
+                trainer.initialise_from(&self.contents, None)
             }
         };
-        begin().with_context(|| format!("cannot begin with {}", self.path.display()))?;
+        initialise().with_context(|| format!("cannot begin with {}", self.path.display()))?;
         Ok(trainer)
     }
 
-    /// Takes over the weights with the layer of least error, of those of all speakers (tensors with a row each) and their mean.
-    fn begin_as_the_nearest(
+    /// Copies the weights, with the layer of smallest error among those of all speakers (rows of the tensors in
+    /// `layers`) and their mean.
+    fn initialise_from_nearest(
         &self,
         trainer: &GanTrainer,
         layers: &BTreeMap<String, Tensor>,
@@ -111,22 +114,23 @@ impl StartingModel {
         let rows = (0..self.speakers.len()).map(|row| layer(&|table| table.narrow(0, row, 1)));
         let candidates = rows.chain(std::iter::once_with(|| layer(&|table| table.mean_keepdim(0))));
         let n = windows.len();
-        let which: Vec<usize> = (0..n.min(NEAREST_WINDOWS)).map(|i| i * n / n.min(NEAREST_WINDOWS)).collect();
+        let which: Vec<usize> =
+            (0..n.min(MAX_SELECTION_WINDOWS)).map(|i| i * n / n.min(MAX_SELECTION_WINDOWS)).collect();
         let batch = windows.batch_changed(&which, &[])?;
-        let mut least = None;
+        let mut best = None;
         for candidate in candidates {
             let candidate = candidate?;
-            trainer.begin_with(&self.contents, Some(&candidate))?;
+            trainer.initialise_from(&self.contents, Some(&candidate))?;
             let error = trainer.error(&batch)?;
-            if least.as_ref().is_none_or(|(least, _)| error < *least) {
-                least = Some((error, candidate));
+            if best.as_ref().is_none_or(|(best, _)| error < *best) {
+                best = Some((error, candidate));
             }
         }
-        trainer.begin_with(&self.contents, least.as_ref().map(|(_, layer)| layer))
+        trainer.initialise_from(&self.contents, best.as_ref().map(|(_, layer)| layer))
     }
 }
 
-/// Videos of a dataset, as checkpoints list them.
+/// Videos of a dataset, sorted and without duplicates, as listed in checkpoints.
 pub fn videos(dataset: &Dataset) -> Vec<TrainedVideo> {
     let info = dataset.info();
     let video = |content: &String| TrainedVideo { speaker: info.speaker.clone(), content: content.clone() };

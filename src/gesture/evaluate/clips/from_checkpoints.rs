@@ -1,5 +1,5 @@
-//! Clips and baselines of trained speakers on a split of a dataset. Ground truth comes from the dataset, predictions
-//! from sound and words alone, and baselines know the training split only.
+//! Clips and baselines for checkpoints on a split of a dataset. The ground truth is the dataset's motion, the
+//! predictions are generated from sound and words only, and the baselines are derived from the training split only.
 
 use super::checkpoint::EvaluatedCheckpoint;
 use super::clips::{ClipAudio, EvalClip, EvalClips, compared};
@@ -12,7 +12,7 @@ use crate::evaluate::baseline::constant_pose::ConstantPoses;
 use crate::evaluate::baseline::neighbour::{self, Library, Query};
 use crate::evaluate::baseline::predictor;
 use crate::generate::normalisation::{N_FEATURES, Normalisation};
-use crate::train::gan::begin::normalisation;
+use crate::train::gan::speaker_metadata::normalisation;
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array2, Array3, Axis, s};
 use orator_base::motion::bones;
@@ -24,11 +24,12 @@ use orator_dataset::index::SampleRef;
 use orator_dataset::{Dataset, Split};
 use orator_formats::transcript::Word;
 
-/// Clips and predictors of checkpoints on a split of `dataset`, the motion of the checkpoints first. Bones have the
-/// lengths of the first checkpoint that learnt from a dataset, else those of this one.
+/// Clips and predictors for checkpoints on a split of `dataset`; the predictions of the checkpoints come first. Bone
+/// lengths are those of the first checkpoint that was trained on a dataset, or else of this dataset.
 ///
 /// # Errors
-/// No checkpoint; a dataset of another frame rate, captured skeletons aside; a split without intervals.
+/// No checkpoint; a dataset of another frame rate than a checkpoint, except for captured skeletons; a split without
+/// intervals.
 pub fn prepare(
     dataset: &Dataset,
     checkpoints: &[EvaluatedCheckpoint],
@@ -45,9 +46,9 @@ pub fn prepare(
             dataset.dir().display()
         );
     }
-    let learnt_with = checkpoints.iter().find_map(|of| of.speaker.normalisation());
-    let own_normal = if learnt_with.is_none() { Some(normalisation(dataset)?) } else { None };
-    let normal = learnt_with.or(own_normal.as_ref()).context("there is no checkpoint to measure")?;
+    let trained_normal = checkpoints.iter().find_map(|of| of.speaker.normalisation());
+    let own_normal = if trained_normal.is_none() { Some(normalisation(dataset)?) } else { None };
+    let normal = trained_normal.or(own_normal.as_ref()).context("there is no checkpoint to measure")?;
     task.detail("reading the intervals");
     let samples = held_out::samples(dataset, split)?;
     let channels = channels(dataset, &samples, checkpoints)?;
@@ -55,86 +56,91 @@ pub fn prepare(
     task.detail("generating motion");
     let mut generated = checkpoints
         .iter()
-        .map(|of| held_out.speak(of, store).with_context(|| of.name.clone()))
-        .collect::<Result<Vec<SpokenIntervals>>>()?;
+        .map(|of| held_out.generate(of, store).with_context(|| of.name.clone()))
+        .collect::<Result<Vec<GeneratedIntervals>>>()?;
     task.detail("listening");
     let has_words = held_out.words.iter().any(|words| !words.is_empty());
     let notes = notes::of_checkpoints(dataset, checkpoints, has_words, split);
     let first = std::mem::take(&mut generated.first_mut().context("there is no checkpoint to measure")?.matched);
-    let clips =
-        first.into_iter().enumerate().map(|(at, made)| held_out.clip(at, &made, store)).collect::<Result<Vec<_>>>()?;
+    let clips = first
+        .into_iter()
+        .enumerate()
+        .map(|(at, generated_motion)| held_out.clip(at, &generated_motion, store))
+        .collect::<Result<Vec<_>>>()?;
     let channels = &channels;
-    let mut clips = EvalClips { fps, clips, notes, learnt: split == Split::Train, channels: channels.clone() };
+    let mut clips = EvalClips { fps, clips, notes, trained_on: split == Split::Train, channels: channels.clone() };
     if checkpoints.iter().any(|of| of.speaker.normalisation().is_none()) {
-        let is_known = |joint: usize| generated.iter().all(|spoken| spoken.joints[joint]);
+        let is_known = |joint: usize| generated.iter().all(|intervals| intervals.joints[joint]);
         let common: Vec<usize> = (0..N_JOINTS).filter(|joint| is_known(*joint)).collect();
         restrict(&mut clips, &common, store)?;
         clips.notes.push(notes::of_joints(&clips, &common));
     }
     task.detail("what the training split knows");
-    let several = |at: usize| {
+    let numbered = |at: usize| {
         let name = checkpoints[at].name.clone();
         (checkpoints.len() > 1).then_some(NumberedCheckpoint { number: at + 1, name })
     };
     let mut all = Vec::new();
-    for (at, (of, spoken)) in checkpoints.iter().zip(&mut generated).enumerate() {
+    for (at, (of, intervals)) in checkpoints.iter().zip(&mut generated).enumerate() {
         let heard = if of.speaker.n_words() > 0 { "sound and the words" } else { "sound" };
         let description =
             format!("the speaker {} of the checkpoint, hearing the {heard} of each interval", of.speaker.name());
         let mut predictor = Predictor::prediction(&clips, &description);
         if at > 0 {
-            predictor.motions = std::mem::take(&mut spoken.matched).into_iter().map(ClipMotion::Motion).collect();
+            predictor.motions = std::mem::take(&mut intervals.matched).into_iter().map(ClipMotion::Motion).collect();
         }
-        all.push(Predictor { checkpoint: several(at), ..predictor });
+        all.push(Predictor { checkpoint: numbered(at), ..predictor });
     }
-    let still = all.len();
+    let mean_pose_index = all.len();
     let mean_posture = checkpoints.iter().filter_map(|of| of.speaker.normalisation()).find_map(mean_posture);
     all.extend(constant_poses(dataset, normal, (clips.clips.len(), mean_posture.filter(|_| !channels.is_empty())))?);
-    match copied(dataset, normal, &clips, split, store)? {
+    match nearest_neighbours(dataset, normal, &clips, split, store)? {
         Some(motions) => {
             let description =
                 "for each 4 s of sound the motion of the part of the training split that sounds most alike";
-            let copied = Predictor::new(PredictorKind::NearestNeighbour, description.to_owned(), motions);
-            let copied = copied.filled(&all[still], store)?;
-            all.push(copied);
+            let nearest_neighbours = Predictor::new(PredictorKind::NearestNeighbour, description.to_owned(), motions);
+            let nearest_neighbours = nearest_neighbours.filled(&all[mean_pose_index], store)?;
+            all.push(nearest_neighbours);
         }
         None => clips.notes.push(format!(
             "{}: left out, since no interval of the training split is long enough to copy from",
             PredictorKind::NearestNeighbour.name()
         )),
     }
-    for (at, (of, spoken)) in checkpoints.iter().zip(generated).enumerate() {
-        let said = if of.speaker.n_words() > 0 { " with its words" } else { "" };
-        let description = format!("the same speaker hearing another sound{said}: what is said half of the split later");
-        let motions = spoken.mismatched.into_iter().map(ClipMotion::Motion).collect();
+    for (at, (of, intervals)) in checkpoints.iter().zip(generated).enumerate() {
+        let with_words = if of.speaker.n_words() > 0 { " with its words" } else { "" };
+        let description =
+            format!("the same speaker hearing another sound{with_words}: what is said half of the split later");
+        let motions = intervals.mismatched.into_iter().map(ClipMotion::Motion).collect();
         let predictor = Predictor::new(PredictorKind::MismatchedPrediction, description, motions);
-        all.push(Predictor { checkpoint: several(at), ..predictor });
+        all.push(Predictor { checkpoint: numbered(at), ..predictor });
     }
-    match baselines::mismatched(&clips, PredictorKind::MismatchedTruth, &all[still], store)? {
+    match baselines::mismatched(&clips, PredictorKind::MismatchedTruth, &all[mean_pose_index], store)? {
         Some(predictor) => all.push(predictor),
         None => clips.notes.push(baselines::too_short(PredictorKind::MismatchedTruth)),
     }
     Ok((clips, all))
 }
 
-/// Motion of a network for every interval.
-struct SpokenIntervals {
-    /// For the interval's own sound and words: joints [T, 49, 3], metres, and angles behind them as in a clip.
+/// Motion generated by a network for every interval.
+struct GeneratedIntervals {
+    /// For the interval's own sound and words: joints [T, 49, 3] in metres, followed by angles as in [`EvalClip`].
     matched: Vec<StoredMotion>,
-    /// For those of half of the split later.
+    /// For the sound and words half of the split later.
     mismatched: Vec<StoredMotion>,
-    /// Whether each of the 49 joints has a number in every frame.
+    /// Whether each of the 49 joints is finite in every frame.
     joints: Vec<bool>,
 }
 
-/// The intervals of a split, of which one at a time is in memory.
+/// Intervals of a split, which are read one at a time.
 struct HeldOutSplit<'d> {
     dataset: &'d Dataset,
     samples: Vec<SampleRef>,
     normal: &'d Normalisation,
     has_channels: bool,
-    /// Samples of sound, and words, of every interval.
+    /// Number of sound samples of every interval.
     n_sound_samples: Vec<usize>,
+    /// Words of every interval.
     words: Vec<Vec<Word>>,
 }
 
@@ -155,25 +161,25 @@ impl<'d> HeldOutSplit<'d> {
         held_out::interval(self.dataset, &self.samples[at], self.normal)
     }
 
-    fn speak(&self, checkpoint: &EvaluatedCheckpoint, store: &MotionStore) -> Result<SpokenIntervals> {
+    fn generate(&self, checkpoint: &EvaluatedCheckpoint, store: &MotionStore) -> Result<GeneratedIntervals> {
         let (mut matched, mut mismatched, mut joints) = (Vec::new(), Vec::new(), vec![true; N_JOINTS]);
         for at in 0..self.samples.len() {
             let HeldOutInterval { sound, words, .. } = self.interval(at)?;
-            let made = self.motion(checkpoint, at, &sound, &words)?;
+            let generated_motion = self.motion(checkpoint, at, &sound, &words)?;
             for (joint, is_known) in joints.iter_mut().enumerate() {
-                *is_known &= made.slice(s![.., joint, ..]).iter().all(|v| v.is_finite());
+                *is_known &= generated_motion.slice(s![.., joint, ..]).iter().all(|v| v.is_finite());
             }
-            matched.push(store.keep(made)?);
+            matched.push(store.keep(generated_motion)?);
             let read = |of: usize, range| Ok(self.dataset.sound(&self.samples[of], range)?.samples);
-            let samples = predictor::turned(&self.n_sound_samples, at, read)?;
-            let words = predictor::turned_words(&self.n_sound_samples, sound.rate, &self.words, at);
+            let samples = predictor::mismatched_sound(&self.n_sound_samples, at, read)?;
+            let words = predictor::mismatched_words(&self.n_sound_samples, sound.rate, &self.words, at);
             let other = Sound { rate: sound.rate, samples };
             mismatched.push(store.keep(self.motion(checkpoint, at, &other, &words)?)?);
         }
-        Ok(SpokenIntervals { matched, mismatched, joints })
+        Ok(GeneratedIntervals { matched, mismatched, joints })
     }
 
-    /// What a network makes of a sound and words, for the frames of an interval.
+    /// Motion that a network generates for a sound and words, with the number of frames of an interval.
     fn motion(
         &self,
         checkpoint: &EvaluatedCheckpoint,
@@ -182,31 +188,36 @@ impl<'d> HeldOutSplit<'d> {
         words: &[Word],
     ) -> Result<Array3<f32>> {
         let (sample, own) = (&self.samples[at], checkpoint.speaker.normalisation());
-        let made = checkpoint.motion(sound, words, sample.n_frames, self.dataset.info().fps);
-        let (mut made, posture) = made.with_context(|| format!("no motion for {}", sample.key))?;
+        let generated_motion = checkpoint.motion(sound, words, sample.n_frames, self.dataset.info().fps);
+        let (mut generated_motion, posture) =
+            generated_motion.with_context(|| format!("no motion for {}", sample.key))?;
         if own.is_none_or(|own| own.bone_lengths != self.normal.bone_lengths) {
-            bones::with_lengths(&mut made, &self.normal.lengths());
+            bones::with_lengths(&mut generated_motion, &self.normal.lengths());
         }
-        Ok(if self.has_channels { held_out::with_posture(&made.joints, posture.as_ref()) } else { made.joints })
+        Ok(if self.has_channels {
+            held_out::with_posture(&generated_motion.joints, posture.as_ref())
+        } else {
+            generated_motion.joints
+        })
     }
 
-    /// The interval beside what was made for it.
-    fn clip(&self, at: usize, made: &StoredMotion, store: &MotionStore) -> Result<EvalClip> {
+    /// Clip of an interval with the motion generated for it.
+    fn clip(&self, at: usize, generated_motion: &StoredMotion, store: &MotionStore) -> Result<EvalClip> {
         let HeldOutInterval { key, mut ground_truth, posture, sound, .. } = self.interval(at)?;
         if self.has_channels {
             ground_truth.joints = held_out::with_posture(&ground_truth.joints, posture.as_ref());
         }
         let fps = self.dataset.info().fps;
         let features = Some(sound_features::from_samples(&sound.samples, fps, ground_truth.n_frames()));
-        let mut predicted = made.view().to_owned();
+        let mut predicted = generated_motion.view().to_owned();
         let (mask, n_missing) = compared(&ground_truth.joints, &ground_truth.mask, &mut predicted);
-        let predicted = if n_missing == 0 { made.clone() } else { store.keep(predicted)? };
+        let predicted = if n_missing == 0 { generated_motion.clone() } else { store.keep(predicted)? };
         let audio = Some(ClipAudio::of_sample(self.dataset, &self.samples[at]));
         Ok(EvalClip { name: key, ground_truth: store.keep(ground_truth.joints)?, predicted, mask, features, audio })
     }
 }
 
-/// Leaves the joints `common` to be compared; the others of the prediction are missing.
+/// Restricts the comparison to the joints `common`; all others are set to missing in the prediction.
 fn restrict(clips: &mut EvalClips, common: &[usize], store: &MotionStore) -> Result<()> {
     for clip in &mut clips.clips {
         let mut predicted = clip.predicted.view().to_owned();
@@ -219,37 +230,38 @@ fn restrict(clips: &mut EvalClips, common: &[usize], store: &MotionStore) -> Res
     Ok(())
 }
 
-/// What is measured beside the joints: channels that a checkpoint makes and that the split shows.
+/// Posture channels to measure: those that a checkpoint generates and that are visible in the split.
 fn channels(
     dataset: &Dataset,
     samples: &[SampleRef],
     checkpoints: &[EvaluatedCheckpoint],
 ) -> Result<Vec<PostureChannel>> {
-    let learnt = |channel: &PostureChannel| {
+    let generated_channels = |channel: &PostureChannel| {
         let of = |normal: &Normalisation| normal.channels.iter().any(|own| own.channel == *channel);
         checkpoints.iter().filter_map(|of| of.speaker.normalisation()).any(of)
     };
-    let learnt: Vec<PostureChannel> = PostureChannel::ALL.into_iter().filter(learnt).collect();
-    let mut seen = Vec::new();
+    let generated_channels: Vec<PostureChannel> = PostureChannel::ALL.into_iter().filter(generated_channels).collect();
+    let mut visible = Vec::new();
     for sample in samples {
-        if seen.len() == learnt.len() {
+        if visible.len() == generated_channels.len() {
             break;
         }
         let Some(posture) = dataset.posture(sample, 0..sample.n_frames)? else { continue };
-        let is_new = |channel: &&PostureChannel| !seen.contains(*channel);
-        let new = learnt.iter().filter(is_new).filter(|of| posture.channel(**of).iter().any(|v| v.is_finite()));
+        let is_new = |channel: &&PostureChannel| !visible.contains(*channel);
+        let new =
+            generated_channels.iter().filter(is_new).filter(|of| posture.channel(**of).iter().any(|v| v.is_finite()));
         let new: Vec<PostureChannel> = new.copied().collect();
-        seen.extend(new);
+        visible.extend(new);
     }
-    Ok(learnt.into_iter().filter(|channel| seen.contains(channel)).collect())
+    Ok(generated_channels.into_iter().filter(|channel| visible.contains(channel)).collect())
 }
 
-/// The mean posture of a checkpoint's training split, one frame; `None`: it learns none.
+/// Mean posture of a checkpoint's training split, one frame; `None` if it has no posture channels.
 fn mean_posture(normal: &Normalisation) -> Option<Posture> {
-    normal.posture(Array2::zeros((normal.n_numbers(), 1)).view())
+    normal.posture(Array2::zeros((normal.n_features(), 1)).view())
 }
 
-/// Mean and median pose of the training split, both with the mean posture.
+/// Baselines of the mean and the median pose of the training split, both with the mean posture.
 fn constant_poses(
     dataset: &Dataset,
     normal: &Normalisation,
@@ -274,9 +286,9 @@ fn constant_poses(
     Ok(vec![predictor(PredictorKind::MeanPose, mean), predictor(PredictorKind::MedianPose, median)])
 }
 
-/// Motion of the nearest neighbours in the training split, which is read again for every query, so that memory does not
-/// grow with its length; NaN where the copied motion is missing.
-pub fn copied(
+/// Motion of the nearest neighbours in the training split, whose intervals are read one at a time, so that memory does
+/// not grow with their number; NaN where the copied motion is missing.
+pub fn nearest_neighbours(
     dataset: &Dataset,
     normal: &Normalisation,
     clips: &EvalClips,
@@ -291,13 +303,13 @@ pub fn copied(
     let samples = dataset.samples(Split::Train);
     let library = Library {
         n: samples.len(),
-        asks_itself: split == Split::Train,
+        excludes_self: split == Split::Train,
         features: &|entry| {
             let interval = held_out::interval(dataset, &samples[entry], normal)?;
-            let mut listener = SoundFeatureExtractor::new(interval.ground_truth.fps, None);
-            listener.push(&interval.sound.samples);
+            let mut extractor = SoundFeatureExtractor::new(interval.ground_truth.fps, None);
+            extractor.push(&interval.sound.samples);
             let n_frames = interval.ground_truth.n_frames();
-            Ok(Some((listener.finish(n_frames).rows, n_frames)))
+            Ok(Some((extractor.finish(n_frames).rows, n_frames)))
         },
         joints: &|entry, frames| held_out::joints(dataset, &samples[entry], normal, frames, !clips.channels.is_empty()),
     };

@@ -1,5 +1,6 @@
-//! Segments that begin with poses which the network made itself, as all but the first do in generation (scheduled sampling,
-//! Bengio et al. 2015): from real poses alone a network learns to copy them and hears too little.
+//! Replaces the previous poses of some training segments by poses that the network predicts, as in generation for all
+//! segments but the first (scheduled sampling, Bengio et al. 2015). Trained on real previous poses only, a network
+//! learns to copy them and depends too little on the audio.
 
 use super::segments::{SegmentBatch, SegmentLoader};
 use anyhow::Result;
@@ -10,9 +11,10 @@ use orator_nn::seq2seq::predict::GesturePredictor;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// Gives a share of the segments `which` of a batch the last poses that the network makes of the segments before them,
-/// which begin with real ones; those without a segment before keep theirs.
-pub fn begin_with_own(
+/// Replaces the previous poses of a random `share` (0..1) of the segments `which` of a batch by the last poses that the
+/// network predicts for the preceding segment from its real previous poses. Segments without a complete preceding
+/// segment are left unchanged, and so are all if `previous > predicted`.
+pub fn roll_out_previous(
     batch: &mut SegmentBatch,
     which: &[usize],
     loader: &SegmentLoader,
@@ -22,17 +24,17 @@ pub fn begin_with_own(
 ) -> Result<()> {
     let Config { previous, predicted, .. } = *network.config();
     let chosen: Vec<usize> = (0..which.len()).filter(|_| rng.random_bool(share)).collect();
-    let chosen: Vec<usize> = chosen.into_iter().filter(|at| loader.has_segment_before(which[*at])).collect();
+    let chosen: Vec<usize> = chosen.into_iter().filter(|row| loader.has_segment_before(which[*row])).collect();
     if chosen.is_empty() || previous > predicted {
         return Ok(());
     }
-    let before = loader.batch_before(&chosen.iter().map(|at| which[*at]).collect::<Vec<_>>())?;
-    let made = network.forward(&before.segment, &mut Mode::Eval)?.detach();
-    let made = made.narrow(1, predicted - previous, previous)?;
+    let preceding = loader.batch_before(&chosen.iter().map(|row| which[*row]).collect::<Vec<_>>())?;
+    let predicted_poses = network.forward(&preceding.segment, &mut Mode::Eval)?.detach();
+    let predicted_poses = predicted_poses.narrow(1, predicted - previous, previous)?;
     let mut rows =
-        (0..which.len()).map(|at| batch.segment.previous.get(at)).collect::<candle_core::Result<Vec<_>>>()?;
-    for (n, at) in chosen.into_iter().enumerate() {
-        rows[at] = made.get(n)?;
+        (0..which.len()).map(|row| batch.segment.previous.get(row)).collect::<candle_core::Result<Vec<_>>>()?;
+    for (n, row) in chosen.into_iter().enumerate() {
+        rows[row] = predicted_poses.get(n)?;
     }
     batch.segment.previous = Tensor::stack(&rows, 0)?;
     Ok(())
@@ -45,7 +47,7 @@ mod tests {
     use crate::generate::representation::Representation;
     use crate::generate::seq2seq::architecture::{Architecture, network_config};
     use crate::generate::seq2seq::metadata::SequenceMetadata;
-    use crate::generate::seq2seq::poses::PoseNumbers;
+    use crate::generate::seq2seq::poses::PoseFormat;
     use crate::generate::seq2seq::vocabulary::Vocabulary;
     use crate::train::seq2seq::sequence::PoseSequence;
     use ndarray::Array2;
@@ -53,7 +55,7 @@ mod tests {
     use orator_nn::seq2seq::config::Segment;
     use rand::SeedableRng;
 
-    /// Makes the number of the frame of the first predicted pose, counted from its previous poses, plus 1000.
+    /// Predicts the frame numbers of the poses, counted on from the last previous pose, plus 1000.
     struct Counting(Config);
 
     impl GesturePredictor for Counting {
@@ -70,12 +72,11 @@ mod tests {
     }
 
     #[test]
-    fn chosen_segments_go_on_from_the_networks_poses_at_their_own_frames() {
+    fn chosen_segments_get_the_predicted_poses_of_their_own_frames() {
         let fps = FrameRate::new(15, 1);
         let network = Config { context: 3, audio: 26, ..network_config(fps, 1, 2, [4, 4]) };
-        let nothing = Vec::new;
-        let normalisation =
-            Normalisation { mean: nothing(), std: nothing(), bone_lengths: nothing(), channels: Vec::new() };
+        let empty = Vec::new;
+        let normalisation = Normalisation { mean: empty(), std: empty(), bone_lengths: empty(), channels: Vec::new() };
         let metadata = SequenceMetadata {
             kind: SequenceMetadata::kind(),
             name: String::new(),
@@ -83,7 +84,7 @@ mod tests {
             rate: 16_000,
             architecture: Architecture::Adversarial,
             network: network.clone(),
-            poses: PoseNumbers::Joints { normalisation, representation: Representation::Positions },
+            poses: PoseFormat::Joints { normalisation, representation: Representation::Positions },
             vocabulary: Vocabulary::default(),
             words_around_secs: 2.0,
             dataset: String::new(),
@@ -95,14 +96,14 @@ mod tests {
         let which = [0, 20, 3, 30];
         let mut batch = loader.batch(&which).unwrap();
         let rng = &mut ChaCha8Rng::seed_from_u64(1);
-        begin_with_own(&mut batch, &which, &loader, &Counting(network.clone()), 1.0, rng).unwrap();
+        roll_out_previous(&mut batch, &which, &loader, &Counting(network.clone()), 1.0, rng).unwrap();
         let first =
-            |at: usize| batch.segment.previous.get(at).unwrap().flatten_all().unwrap().to_vec1::<f32>().unwrap()[0];
-        // Segments at frames 0 and 3 have none before them.
+            |row: usize| batch.segment.previous.get(row).unwrap().flatten_all().unwrap().to_vec1::<f32>().unwrap()[0];
+        // No complete segment precedes those at frames 0 and 3.
         assert_eq!([0, 1, 2, 3].map(first), [0.0, 1020.0, 3.0, 1030.0]);
         let real = loader.batch(&which).unwrap().segment.previous.to_vec3::<f32>().unwrap();
         let mut batch = loader.batch(&which).unwrap();
-        begin_with_own(&mut batch, &which, &loader, &Counting(network), 0.0, rng).unwrap();
+        roll_out_previous(&mut batch, &which, &loader, &Counting(network), 0.0, rng).unwrap();
         assert_eq!(batch.segment.previous.to_vec3::<f32>().unwrap(), real);
     }
 }

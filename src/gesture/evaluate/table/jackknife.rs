@@ -1,25 +1,26 @@
-//! What each group of blocks adds to a metric that is any function of sums over blocks: from the values without it
-//! (the jackknife; Efron and Tibshirani 1993, chapter 11). Of a mean over frames these are the groups' own sums.
+//! Contributions of groups of blocks to a metric that is any function of sums over blocks, computed from the values
+//! without each group (the jackknife; Efron and Tibshirani 1993, chapter 11). For a mean over frames they are the
+//! groups' own sums.
 
 use ndarray::Array2;
 
-/// Most groups; more blocks are joined with their neighbours, which bounds the values to compute and makes the groups
-/// less dependent.
-const MOST_GROUPS: usize = 32;
+/// Largest number of groups. If there are more blocks, neighbours are merged, which limits the number of values to
+/// compute and makes the groups less dependent.
+const MAX_GROUPS: usize = 32;
 
 /// Groups of neighbouring blocks.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BlockGroups {
-    /// Group of each block.
+    /// Group index of each block.
     of_block: Vec<usize>,
     /// Share of the frames in each group, sum 1.
     shares: Vec<f64>,
 }
 
 impl BlockGroups {
-    /// Groups of blocks of so many frames each.
+    /// Groups for blocks with these numbers of frames.
     pub fn new(frames: &[usize]) -> Self {
-        let n = frames.len().min(MOST_GROUPS);
+        let n = frames.len().min(MAX_GROUPS);
         let of_block: Vec<usize> = (0..frames.len()).map(|block| block * n / frames.len()).collect();
         let total = frames.iter().sum::<usize>().max(1) as f64;
         let mut shares = vec![0.0; n];
@@ -32,19 +33,19 @@ impl BlockGroups {
         self.shares.len()
     }
 
-    /// Whether there is no block.
+    /// Whether there are no blocks.
     pub fn is_empty(&self) -> bool {
         self.shares.is_empty()
     }
 
-    /// How often each block counts without each group [groups, blocks]: 0 or 1.
+    /// Weights of the blocks without each group [groups, blocks]: 0 or 1.
     pub fn counts_without(&self) -> Array2<f64> {
-        let is_left = |(group, block): (usize, usize)| f64::from(u8::from(self.of_block[block] != group));
-        Array2::from_shape_fn((self.shares.len(), self.of_block.len()), is_left)
+        let is_included = |(group, block): (usize, usize)| f64::from(u8::from(self.of_block[block] != group));
+        Array2::from_shape_fn((self.shares.len(), self.of_block.len()), is_included)
     }
 
-    /// What each group adds, in the unit of `value` and with it as their mean. `value` is that of all blocks, `without`
-    /// has one value a group, without that group.
+    /// Contribution of each group in the unit of `value`, which is also their mean. `value` is the metric over all
+    /// blocks, `without` the metric without each group.
     pub fn contributions(&self, value: f64, without: &[f64]) -> Vec<f64> {
         let n = self.shares.len() as f64;
         let own = |(share, without): (&f64, &f64)| n * (1.0 - share) * (value - without);
@@ -59,7 +60,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn groups_add_their_sums_to_a_mean() {
+    fn contributions_to_a_mean_are_the_sums_of_the_groups() {
         let frames = [30, 30, 10, 20, 45];
         let sums = [3.0, -2.0, 7.0, 0.5, 1.0];
         let groups = BlockGroups::new(&frames);
@@ -75,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn many_blocks_are_joined() {
+    fn many_blocks_are_merged() {
         let groups = BlockGroups::new(&[60; 900]);
         assert_eq!((groups.len(), groups.counts_without().dim()), (32, (32, 900)));
         assert!(groups.shares.iter().all(|share| (share - 1.0 / 32.0).abs() < 2e-3));
