@@ -1,4 +1,4 @@
-//! The guide: one page a topic. `orator guide TOPIC` prints a page; here the same pages stand as documentation.
+//! The guide, one page per topic: `orator guide TOPIC` prints a page, and `cargo doc` includes the pages.
 
 mod topics;
 
@@ -16,6 +16,8 @@ pub mod training {}
 pub mod animation {}
 #[doc = include_str!("evaluation.md")]
 pub mod evaluation {}
+#[doc = include_str!("results.md")]
+pub mod results {}
 #[doc = include_str!("study.md")]
 pub mod study {}
 #[doc = include_str!("models.md")]

@@ -18,13 +18,14 @@ macro_rules! topic {
 }
 
 /// Every page, in reading order.
-pub const TOPICS: [Topic; 13] = [
-    topic!("dataset", "files of a dataset, splits, the account of every second, import and removal"),
+pub const TOPICS: [Topic; 14] = [
+    topic!("dataset", "files of a dataset, refused seconds, transcripts, splits, import and removal"),
     topic!("lifting", "2D keypoints to 3D joints: input, output, errors, a lifter of your own"),
     topic!("keypoints", "keypoints of OpenPose, MMPose, AlphaPose, MediaPipe and PATS in place of videos"),
-    topic!("training", "a speaker's generator, a model of bodies: settings, checkpoints, validation, speech to motion"),
+    topic!("training", "training: settings, recipes, fine-tuning, validation, checkpoints; speech to motion"),
     topic!("animation", "joints to BVH, GLB, JSON and MP4: rig, smoothing, constraints"),
-    topic!("evaluation", "metrics, baselines, conventions, comparison of results"),
+    topic!("evaluation", "metrics, baselines, verdicts, conventions, comparison of results, rendered people"),
+    topic!("results", "measured results of detectors, recipes and fine-tuning; speed; the commands that print them"),
     topic!("study", "user studies: the study file, clips and films, the page, the answers and what they say"),
     topic!("models", "the pose models: origin, licences, fetching, adding one"),
     topic!("configuration", "pipeline.toml, --set, the work folder, exit codes, JSON output"),
