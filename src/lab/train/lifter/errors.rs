@@ -134,7 +134,7 @@ pub fn mean_pose(scenes: &[FilmedScene]) -> Pose {
     mean
 }
 
-/// x 2D points of a clean scene with zero depth, in metres at the neck's distance, relative to the neck. in metres at the neck's distance, the neck at 0.
+/// 2D points of a clean scene with zero depth, in metres at the neck's distance, relative to the neck.
 fn flat(scene: &FilmedScene) -> Vec<Pose> {
     let frame = |seen: &SeenBody| {
         let points: Pose = seen.map(|p| {
