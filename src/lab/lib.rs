@@ -1,6 +1,6 @@
-//! Tools for developing and validating orator itself: synthetic speakers (`demo`), training of the body and hand lifters
-//! that the program ships (`train`), their evaluation on rendered people (`evaluate`), and the motion-capture readers that
-//! feed both (`mocap`, `rendered_truth`). No other crate depends on this one; its binary is `orator-lab`.
+//! Tools for developing and validating orator itself: synthetic speakers (`demo`), training of the body and hand
+//! lifters that the program ships (`train`), their evaluation on rendered persons (`evaluate`), and the motion-capture
+//! readers used by both (`mocap`, `rendered_truth`). No other crate depends on this one; its binary is `orator-lab`.
 
 pub mod cli;
 pub mod demo;

@@ -1,4 +1,4 @@
-//! Ground truth of a rendered video of a person, frame by frame, as one `.npz` file.
+//! Per-frame ground truth of a rendered video of a person, as one `.npz` file.
 
 use anyhow::{Result, ensure};
 use ndarray::{Array1, Array2, Array3, Dimension, Ix1, Ix2, Ix3, aview1};
@@ -10,36 +10,36 @@ use orator_formats::npz;
 use orator_formats::npz::Npz;
 use std::path::Path;
 
-/// Whether a point can be seen, and if not, what is before it.
+/// Visibility of a point, and what occludes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Visibility {
     Seen,
-    /// Behind another part of the same body; a finger: behind its own hand too.
+    /// Behind another part of the same body; for a finger also behind its own hand.
     BehindBody,
-    /// Behind a hand that is not its own: a finger behind the other hand, a shoulder behind either.
+    /// Behind a hand that it does not belong to: a finger behind the other hand, a shoulder behind either.
     BehindHand,
-    /// Behind a thing: a desk, what a hand holds.
+    /// Behind an object: a desk or a held object.
     BehindThing,
     /// Behind another person.
     BehindPerson,
-    /// Outside the picture.
+    /// Outside the image.
     Outside,
 }
 
 impl Visibility {
-    /// All, in the order of their codes in a file.
+    /// All values, in the order of their codes in a file.
     pub const ALL: [Self; 6] =
         [Self::Seen, Self::BehindBody, Self::BehindHand, Self::BehindThing, Self::BehindPerson, Self::Outside];
 }
 
-/// File of a folder of rendered people that lists its clips.
+/// File that lists the clips in a folder of rendered persons.
 pub const LIST: &str = "people.json";
 
-/// Array that no other file of motion has.
+/// Array name by which this file is distinguished from other motion files.
 pub const BODY_JOINTS: &str = "body_joints";
 
-/// Ground truth of the person in the middle of interest, at every frame of the video.
+/// Ground truth of the main person at every frame of the video.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderedTruth {
     pub fps: FrameRate,
@@ -60,24 +60,27 @@ pub struct RenderedTruth {
     pub neck: Array2<f32>,
     /// Focal length, px.
     pub focal_px: f32,
-    /// Unit vector that points up in the world, in camera axes.
+    /// Upward unit vector of the world, in camera axes.
     pub up: [f32; 3],
     /// Rotation of the head in camera axes [T, 3], degrees: yaw (positive: to the person's left), pitch (positive: up),
     /// roll (positive: towards the person's left shoulder); all 0 facing the camera.
     pub head: Array2<f32>,
-    /// Opening of the mouth [T], 0 closed .. 1 as far as it goes.
+    /// Mouth opening [T], 0 closed .. 1 fully open.
     pub mouth: Array1<f32>,
-    /// Whether the sound is of this person's mouth [T].
+    /// Whether the sound comes from this person's mouth [T].
     pub speaks: Array1<bool>,
 }
 
 impl RenderedTruth {
-    /// Frames of the video.
+    /// Number of frames of the video.
     pub fn n_frames(&self) -> usize {
         self.joints.shape()[0]
     }
 
     /// Writes every field under its name; visibility as its code, `fps` as [num, den].
+    ///
+    /// # Errors
+    /// The file cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
         let fps = [self.fps.num, self.fps.den].map(i64::from);
         let codes = |seen: &Array2<Visibility>| seen.mapv(|seen| i32::from(seen as u8));
@@ -102,8 +105,10 @@ impl RenderedTruth {
         })
     }
 
-    /// Reads a file of `write`. Errors: an array is missing, has another shape or another length in time, or a code of
-    /// visibility is unknown.
+    /// Reads a file written by `write`.
+    ///
+    /// # Errors
+    /// An array that is missing or has another shape or number of frames; an unknown visibility code.
     pub fn read(path: &Path) -> Result<Self> {
         let mut npz = Npz::open(path)?;
         let fps = npz.frame_rate("fps")?;

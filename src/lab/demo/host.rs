@@ -1,5 +1,5 @@
-//! Demo folder of a rendered person for the models that know real people: videos, their truth, speech without a video,
-//! and a configuration for `orator run`.
+//! Demo folder of a rendered person for the models trained on real persons: videos, their ground truth, speech without
+//! a video, and a configuration for `orator run`.
 
 use super::people::condition::Condition;
 use super::people::scene::{CapturedClip, ClipSeeds, PeopleScene};
@@ -15,7 +15,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::path::{Path, PathBuf};
 
-/// Clip of the host: speech of a seed with the gestures that follow from it by the rule, and variation.
+/// A clip of the host: the speech of a seed, with the gestures that follow from it by the rule, and random variation.
 pub fn scene(body: u64, seed: u64, secs: f64, fps: FrameRate) -> PeopleScene {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let speech = Speech::free(secs, &mut rng);
@@ -26,7 +26,11 @@ pub fn scene(body: u64, seed: u64, secs: f64, fps: FrameRate) -> PeopleScene {
 }
 
 /// Writes `videos/host/clip-<n>.mp4`, `truth/clip-<n>.npz`, `speech.wav` and `pipeline.toml` into `dir`; returns the
-/// videos. Body, clothes, voice, room and camera are the same in all videos, speech and gestures are not: these follow from the speech by a known rule.
+/// videos. Body, clothes, voice, room and camera are equal in all videos; speech differs, and gestures follow from it
+/// by a known rule.
+///
+/// # Errors
+/// An invalid plan; a failure to render or to write.
 pub fn draw(dir: &Path, plan: &DemoPlan, progress: &dyn Progress) -> Result<Vec<PathBuf>> {
     plan.check()?;
     let seed = plan.seed.wrapping_mul(1000);
@@ -42,8 +46,8 @@ pub fn draw(dir: &Path, plan: &DemoPlan, progress: &dyn Progress) -> Result<Vec<
         truth.context("a rendered clip has no truth")?.write(&dir.join(format!("truth/clip-{number}.npz")))?;
         videos.push(video);
     }
-    let unheard = scene(seed, seed, SPEECH_ONLY_SECS, plan.fps);
-    workdir::replace(&dir.join("speech.wav"), |attempt| wav::write(attempt, unheard.sound()))?;
+    let speech_only = scene(seed, seed, SPEECH_ONLY_SECS, plan.fps);
+    workdir::replace(&dir.join("speech.wav"), |attempt| wav::write(attempt, speech_only.sound()))?;
     let title =
         "The rendered speaker of `orator-lab demo`, seen by the models for real people (`orator models fetch`).";
     let pipeline = pipeline(title, "rendered by orator demo", "", plan.n_videos);

@@ -1,4 +1,4 @@
-//! Random looks of rendered people, and the points of their faces.
+//! Random appearance of rendered persons, and the points of their faces.
 
 use orator_avatar::animate::avatar::Appearance;
 use orator_avatar::animate::avatar::appearance::{Hairstyle, Reflectance, Top, Weave, lip_colour_of};
@@ -58,10 +58,10 @@ const LEGS: [Reflectance; 6] = [
 ];
 const SHOES: [Reflectance; 4] = [[0.30, 0.28, 0.26], [0.02, 0.018, 0.017], [0.10, 0.055, 0.03], [0.55, 0.55, 0.53]];
 
-/// Random person; the same for the same seed.
+/// Random appearance, reproducible from the seed.
 pub fn random(seed: u64) -> Appearance {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    // Two people in five have a woman's shape, the rest a man's; faces and clothes overlap.
+    // 45 % have a female body shape, the others a male one; faces and clothes overlap.
     let woman = rng.random_bool(0.45);
     let near = |rng: &mut ChaCha8Rng, middle: f64, spread: f64| middle + spread * rng.random_range(-1.0..1.0);
     let heavy = near(&mut rng, 0.02, 0.14);
@@ -132,8 +132,8 @@ pub fn random(seed: u64) -> Appearance {
     }
 }
 
-/// Nose, left eye, right eye, left ear, right ear (the order of COCO) on the surface of a person of these looks, cm from
-/// the head joint in its axes.
+/// Nose, left eye, right eye, left ear, right ear (COCO order) on the surface of a person of this appearance, cm, in
+/// the axes of the head joint.
 pub fn face(rig: &Rig, looks: &Appearance) -> [Vec3; 5] {
     let stance = Stance::new(rig);
     let head = HeadForm::new(rig, &stance, looks);
@@ -145,14 +145,14 @@ pub fn face(rig: &Rig, looks: &Appearance) -> [Vec3; 5] {
     [at_front(0.0, 7.5), left_eye, right_eye, left_ear, right_ear].map(|at| head.scaled(at))
 }
 
-/// Colour between two neighbours of a row.
+/// A random colour between two neighbours of a row.
 fn between(rng: &mut ChaCha8Rng, row: &[Reflectance]) -> Reflectance {
     let at = rng.random_range(0.0..(row.len() - 1) as f32);
     let (low, share) = (at as usize, at.fract());
     std::array::from_fn(|k| row[low][k] + share * (row[low + 1][k] - row[low][k]))
 }
 
-/// One of the colours, lighter or darker and shifted by up to `spread`.
+/// One of the colours with random brightness and hue, relative changes of about `spread`.
 fn jittered(rng: &mut ChaCha8Rng, colours: &[Reflectance], spread: f32) -> Reflectance {
     let colour = colours[rng.random_range(0..colours.len())];
     let light = 1.0 + spread * rng.random_range(-1.0..1.0);

@@ -1,5 +1,5 @@
-//! More speech of the demo's speaker than its videos show: a dataset of the same figure, voice and gestures without pictures,
-//! by which a model begins before it learns from the videos.
+//! Additional speech of the demo's speaker without video: a dataset of the same person, voice and gestures, from which
+//! a model is pre-trained before it is trained on the videos.
 
 use super::host;
 use anyhow::Result;
@@ -17,15 +17,15 @@ use rayon::prelude::*;
 use serde_json::json;
 use std::path::Path;
 
-/// Seconds of a clip.
+/// Duration of a clip, seconds.
 const CLIP_SECS: f64 = 30.0;
-/// Clips that validate; so many more than one that their error means something.
+/// Number of validation clips; a single one would give too noisy an error.
 const N_VALIDATION: usize = 8;
-/// Number of the first clip, beyond those of all videos that a demo may have.
+/// Number of the first clip, above those of all videos that a demo may have.
 const FIRST: u64 = 500_000;
 const SHARD_BYTES: u64 = 256 << 20;
 
-/// What the dataset's card says of its making; another text is another dataset.
+/// Note in the dataset's card about its origin; a dataset with another note is a different one.
 pub fn note(plan: &DemoPlan, is_rendered: bool, train_secs: f64) -> String {
     let figure = if is_rendered { "the rendered person" } else { "the figure in a suit of markers" };
     format!(
@@ -34,8 +34,11 @@ pub fn note(plan: &DemoPlan, is_rendered: bool, train_secs: f64) -> String {
     )
 }
 
-/// Writes the dataset of so many seconds to train on into the existing, empty folder `dir`: speech that no video of the plan
-/// holds. `is_rendered`: of the rendered person, else of the figure in its suit of markers.
+/// Writes the dataset with `train_secs` of training data into the existing, empty folder `dir`. Its speech occurs in
+/// no video of the plan. `is_rendered`: of the rendered person, otherwise of the figure in a marker suit.
+///
+/// # Errors
+/// A clip that cannot be generated or written.
 pub fn write(
     dir: &Path,
     plan: &DemoPlan,
@@ -55,10 +58,10 @@ pub fn write(
     let splits = (0..n_train + N_VALIDATION).map(|n| if n < n_train { Split::Train } else { Split::Validation });
     let clips: Vec<(u64, Split)> = (FIRST..).zip(splits).collect();
     let task = progress.begin("speak", clips.len() as u64);
-    for some in clips.chunks(16) {
+    for batch in clips.chunks(16) {
         let spoken: Vec<SpokenVideo> =
-            some.par_iter().map(|(number, _)| clip(plan, is_rendered, *number)).collect::<Result<_>>()?;
-        for ((_, split), spoken) in some.iter().zip(spoken) {
+            batch.par_iter().map(|(number, _)| clip(plan, is_rendered, *number)).collect::<Result<_>>()?;
+        for ((_, split), spoken) in batch.iter().zip(spoken) {
             spoken.write(&writer, *split)?;
             task.advance(1);
         }

@@ -1,4 +1,4 @@
-//! Scenery and walls behind rendered people: a background with depth, which casts and takes shadows.
+//! Static scenery behind rendered persons: a background with depth that casts and receives shadows.
 
 use orator_avatar::render::background::StaticScene;
 use orator_avatar::render::pixel::{PixelLight, Shading, is_empty, nearest};
@@ -10,25 +10,25 @@ use orator_avatar::render::{Background, Light, Mesh, PinholeCamera, Srgb};
 use orator_base::types::image::Image;
 use std::sync::Arc;
 
-/// Texels of the shadow map of a static scene, each way.
+/// Width and height of the shadow map of a static scene, texels.
 const SHADOW_TEXELS: usize = 1024;
-/// Width of the blocks in which shadows are looked for, px.
+/// Width of the blocks that are tested for shadows, px.
 const BLOCK: usize = 8;
 
-/// Scenery and walls as a camera sees them.
+/// Scenery as seen by a camera.
 #[derive(Clone, Debug)]
 struct Scenery {
-    /// One over the depth of each sample, 1/cm; 0 where there is nothing.
+    /// Inverse depth of each sample, 1/cm; 0 where nothing is hit.
     nearness: Vec<[f32; 4]>,
-    /// Mesh and label at each pixel's middle.
+    /// Mesh and label at each pixel's centre.
     labels: Vec<Option<(u16, u16)>>,
     light: Vec<PixelLight>,
-    /// Least and greatest position across the key light of each block, cm.
+    /// Bounding box of each block in the plane perpendicular to the key light, cm.
     blocks: Vec<[[f32; 2]; 2]>,
 }
 
-/// Background of meshes that do not move, with their shadows on each other, before a picture of the camera's size. Frames
-/// drawn over it must have this camera and this light.
+/// Renders static meshes, with their shadows on each other, in front of the image `behind` of the camera's size.
+/// Frames drawn over the result must use the same camera and light.
 pub fn background(camera: &PinholeCamera, meshes: &[&Mesh], light: &Light, behind: Image) -> Background {
     let size = camera.size;
     let (mut surfaces, mut shading) = (Surfaces::default(), Shading::default());

@@ -1,8 +1,8 @@
-//! Captured motion as the body lifter needs it: nine points of the upper body in camera-like axes (a person at rest
-//! faces -z, y down), in metres. Read are BVH files of any skeleton whose names are understood (`joint_names`), y or z
-//! up, in any unit; `.npz` files of CMU joints ([T, 38, 3] a clip, millimetres, y up, `fps`), of TED Expressive
-//! (`human_joints`), and the truth of rendered people. A take is one continuous stretch: files are divided where the body jumps, as behind a T-pose at
-//! the beginning.
+//! Captured motion for the body lifter: nine points of the upper body in camera-like axes (a person at rest faces -z,
+//! y down), in metres. Formats: BVH of any skeleton with known joint names (`joint_names`), y or z up, in any unit;
+//! `.npz` of CMU joints ([T, 38, 3] per clip, millimetres, y up, `fps`) or of TED Expressive (`human_joints`); ground
+//! truth of rendered persons. A take is one continuous excerpt: files are split where the body jumps, as after an
+//! initial T-pose.
 
 use crate::rendered_truth::{BODY_JOINTS, RenderedTruth};
 use anyhow::{Context, Result, bail, ensure};
@@ -17,37 +17,39 @@ use orator_formats::npz::Npz;
 use orator_formats::search;
 use std::path::{Path, PathBuf};
 
-/// A continuous stretch of captured motion.
+/// A continuous excerpt of captured motion.
 #[derive(Clone, Debug)]
 pub struct BodyTake {
     pub name: String,
     pub fps: f64,
     pub poses: Vec<Pose>,
-    /// Whether it is the truth of a rendered person, whose bones and head are as they should be.
+    /// Whether it is the ground truth of a rendered person, whose bone lengths and head need no variation.
     pub rendered: bool,
 }
 
 impl BodyTake {
-    /// Whole frames at another rate.
+    /// Number of complete frames at another rate.
     pub fn n_frames_at(&self, fps: f64) -> usize {
         ((self.poses.len() as f64 - 1.0) / self.fps * fps + 1.0 + 1e-9) as usize
     }
 }
 
-/// The ten joints (`joint_names::ROLES`) among the 38 of the CMU `.npz`.
+/// Indices of the ten joints (`joint_names::ROLES`) among the 38 of the CMU `.npz`.
 const CMU_38: [usize; 10] = [17, 18, 30, 31, 32, 21, 22, 23, 8, 2];
 
-/// Frames at the start of a `.npz` take that are a T-pose, not motion.
+/// Number of T-pose frames at the start of a CMU take, which are dropped.
 const T_POSE_FRAMES: usize = 1;
-/// The points move less than this on average between two frames at 60 fps, in metres; else the take is divided.
+/// Largest mean displacement of the points between two frames at 60 frames/s, metres; a take is split at larger ones.
 const LARGEST_JUMP: f64 = 0.1;
-/// Upper arm and forearm of the common adult.
+/// Length of upper arm and forearm of the mean adult, metres.
 const ARM_METRES: f64 = 0.54;
-/// Shorter stretches hold no motion to learn from, in seconds.
+/// Least duration of a take, seconds.
 const SHORTEST_SECS: f64 = 1.0;
 
-/// All takes below `paths`: BVH or `.npz` files, or folders searched for them, in the order of their names.
-/// Errors: nothing found, a file that cannot be read or whose joints have unknown names.
+/// Reads all takes of `paths` (BVH or `.npz` files, or folders searched for them), sorted by file name.
+///
+/// # Errors
+/// Nothing found; a file that cannot be read or has unknown joint names.
 pub fn read_all(paths: &[PathBuf]) -> Result<Vec<BodyTake>> {
     let mut files = Vec::new();
     for path in paths {
@@ -62,7 +64,10 @@ pub fn read_all(paths: &[PathBuf]) -> Result<Vec<BodyTake>> {
     Ok(takes)
 }
 
-/// The takes of one file, by its extension.
+/// Reads the takes of one file, by its extension.
+///
+/// # Errors
+/// An unknown extension; a file that cannot be read or has unknown joint names.
 pub fn read(path: &Path) -> Result<Vec<BodyTake>> {
     match path.extension().and_then(|e| e.to_str()) {
         Some("bvh") => read_bvh(path),
@@ -71,11 +76,14 @@ pub fn read(path: &Path) -> Result<Vec<BodyTake>> {
     }
 }
 
-/// Takes of one kind, called by the pattern of their names.
+/// A named set of takes; the name is the pattern that selected them.
 pub type Set = (String, Vec<BodyTake>);
 
-/// The takes whose names match each of the `patterns` (`*` any letters, `?` one; the first that matches counts), and
-/// the other takes. Errors: a pattern that is none, or matches nothing.
+/// Splits takes into one set per pattern (`*` any characters, `?` one; the first matching pattern counts) and the
+/// remaining takes.
+///
+/// # Errors
+/// An invalid pattern, or one that matches nothing.
 pub fn divide(mut takes: Vec<BodyTake>, patterns: &[String]) -> Result<(Vec<Set>, Vec<BodyTake>)> {
     let mut sets = Vec::new();
     for text in patterns {
@@ -106,11 +114,11 @@ fn read_bvh(path: &Path) -> Result<Vec<BodyTake>> {
     y_up(&mut bodies);
     in_metres(&mut bodies).with_context(|| path.display().to_string())?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
-    Ok(divided(&name, 1.0 / bvh.frame_secs, bodies.iter().map(|p| upper_body(p)).collect()))
+    Ok(split_at_jumps(&name, 1.0 / bvh.frame_secs, bodies.iter().map(|p| upper_body(p)).collect()))
 }
 
-/// Index of the name, the root first, of each joint of `joint_names::ROLES`; the root stands for both hips where a skeleton has
-/// none. Errors: the joints that are missing, and the names there are.
+/// Index in `names` (root first) of each joint of `joint_names::ROLES`; the root replaces both hips if the skeleton
+/// has none. The error lists the missing joints and the existing names.
 fn named_joints(names: &[&str]) -> Result<[usize; 10]> {
     let mut found = joint_names::find(names);
     if found[8..] == [None, None] {
@@ -130,7 +138,7 @@ fn named_joints(names: &[&str]) -> Result<[usize; 10]> {
     Ok(std::array::from_fn(|role| found[role].unwrap_or_default()))
 }
 
-/// Turns bodies whose heads are along z upright: y up.
+/// Rotates bodies whose up axis is z to y up.
 fn y_up(bodies: &mut [[Vec3; 10]]) {
     let hips = |p: &[Vec3; 10]| vec3::scale(vec3::add(p[8], p[9]), 0.5);
     let up = bodies.iter().fold([0.0; 3], |sum, p| vec3::add(sum, vec3::sub(p[0], hips(p))));
@@ -139,7 +147,7 @@ fn y_up(bodies: &mut [[Vec3; 10]]) {
     }
 }
 
-/// Files do not tell their unit: the arm of the common adult does.
+/// Scales to metres: files do not specify their unit, so the arm length of the mean adult is assumed.
 fn in_metres(bodies: &mut [[Vec3; 10]]) -> Result<()> {
     let bone = |p: &[Vec3; 10], a: usize, b: usize| vec3::norm(vec3::sub(p[a], p[b]));
     let arm = |p: &[Vec3; 10]| (bone(p, 2, 3) + bone(p, 3, 4) + bone(p, 5, 6) + bone(p, 6, 7)) / 2.0;
@@ -161,7 +169,7 @@ fn read_npz(path: &Path) -> Result<Vec<BodyTake>> {
     }
 }
 
-/// Truth of a rendered person, turned upright: its camera may look up or down.
+/// Reads the ground truth of a rendered person, rotated upright, since its camera may be tilted.
 fn read_rendered(path: &Path) -> Result<Vec<BodyTake>> {
     let truth = RenderedTruth::read(path)?;
     let up = vec3::unit(truth.up.map(f64::from), 1e-6).with_context(|| format!("{}: `up` is 0", path.display()))?;
@@ -176,13 +184,13 @@ fn read_rendered(path: &Path) -> Result<Vec<BodyTake>> {
         path.display()
     );
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
-    let mut takes = divided(&name, truth.fps.per_sec(), poses);
+    let mut takes = split_at_jumps(&name, truth.fps.per_sec(), poses);
     takes.iter_mut().for_each(|take| take.rendered = true);
     Ok(takes)
 }
 
-/// TED Expressive: `human_joints` [T, 43, 3] in metres, y down, and `fps`. 0 is the spine, 0.26 m below the neck (1);
-/// there are no hips, so they are put where the spine points.
+/// Reads TED Expressive: `human_joints` [T, 43, 3] in metres, y down, and `fps`. Point 0 is the spine, 0.26 m below
+/// the neck (1); there are no hips, so they are extrapolated along the spine.
 fn read_ted(path: &Path, mut npz: Npz) -> Result<Vec<BodyTake>> {
     let fps = npz.frame_rate("fps")?.per_sec();
     let joints = npz.numbers("human_joints", &[None, Some(43), Some(3)])?;
@@ -197,7 +205,7 @@ fn read_ted(path: &Path, mut npz: Npz) -> Result<Vec<BodyTake>> {
         points.map(|p| vec3::sub(p, neck))
     };
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
-    Ok(divided(&name, fps, (0..joints.shape()[0]).map(pose).collect()))
+    Ok(split_at_jumps(&name, fps, (0..joints.shape()[0]).map(pose).collect()))
 }
 
 fn read_cmu(mut npz: Npz) -> Result<Vec<BodyTake>> {
@@ -210,13 +218,14 @@ fn read_cmu(mut npz: Npz) -> Result<Vec<BodyTake>> {
         let joints = npz.numbers(&name, &[None, Some(38), Some(3)])?;
         let point = |t: usize, j: usize| std::array::from_fn(|k| joints[[t, j, k]] * 0.001);
         let poses = (T_POSE_FRAMES..joints.shape()[0]).map(|t| upper_body(&CMU_38.map(|j| point(t, j)))).collect();
-        takes.extend(divided(&name, fps, poses));
+        takes.extend(split_at_jumps(&name, fps, poses));
     }
     Ok(takes)
 }
 
-/// Ten joints (order of `joint_names::ROLES`), y up and a person at rest facing +z, to a pose. The nose is put 6 cm above and
-/// 11 cm before the head joint, ahead being across the shoulders: no source says how the head is turned.
+/// Converts ten joints (order of `joint_names::ROLES`; y up, a person at rest facing +z) to a pose. The nose is placed
+/// 6 cm above and 11 cm in front of the head joint, perpendicular to the shoulders, because the sources lack the
+/// head's orientation.
 fn upper_body(joints: &[Vec3]) -> Pose {
     let neck = vec3::scale(vec3::add(joints[2], joints[5]), 0.5);
     let across = vec3::sub(joints[5], joints[2]);
@@ -224,7 +233,7 @@ fn upper_body(joints: &[Vec3]) -> Pose {
     let ahead = vec3::unit(vec3::cross(across, up), 1e-9).unwrap_or([0.0, 0.0, 1.0]);
     let up = vec3::unit(up, 1e-9).unwrap_or([0.0, 1.0, 0.0]);
     let nose = vec3::add(vec3::add(joints[1], vec3::scale(up, 0.06)), vec3::scale(ahead, 0.11));
-    // a skeleton without legs has its root for both hips
+    // A skeleton without legs has its root as both hips.
     let spread = if joints[8] == joints[9] { vec3::scale(across, 0.3) } else { [0.0; 3] };
     let hips = [vec3::sub(joints[8], spread), vec3::add(joints[9], spread)];
     let order = [nose, joints[2], joints[3], joints[4], joints[5], joints[6], joints[7], hips[0], hips[1]];
@@ -234,8 +243,8 @@ fn upper_body(joints: &[Vec3]) -> Pose {
     })
 }
 
-/// The stretches between jumps that are long enough.
-fn divided(name: &str, fps: f64, poses: Vec<Pose>) -> Vec<BodyTake> {
+/// Splits poses at jumps; excerpts that are too short are dropped.
+fn split_at_jumps(name: &str, fps: f64, poses: Vec<Pose>) -> Vec<BodyTake> {
     let limit = LARGEST_JUMP * 60.0 / fps;
     let jump =
         |a: &Pose, b: &Pose| (0..N_POINTS).map(|j| vec3::norm(vec3::sub(a[j], b[j]))).sum::<f64>() / N_POINTS as f64;

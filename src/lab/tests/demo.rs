@@ -1,4 +1,4 @@
-//! The synthetic speaker: what was drawn is what is read back, and a run finds it where it is.
+//! The synthetic speaker: drawn files are read back unchanged, and a run locates the speaker correctly.
 
 use orator_base::types::time::FrameRate;
 use orator_dataset::{Dataset, Split};
@@ -24,7 +24,7 @@ fn the_clip_has_its_pictures_its_sound_and_its_truth() {
     assert!(loud > 2_000, "{loud}");
 }
 
-/// The 3D error is held to its target by `make demo`, on longer clips.
+/// The target of the 3D error is checked by `make demo`, on longer clips.
 #[test]
 fn a_run_finds_every_joint_through_the_chain_of_real_models() {
     let project = Project::with_clips("pipeline", 1, 5.0);
@@ -47,7 +47,7 @@ fn a_run_finds_every_joint_through_the_chain_of_real_models() {
     assert!(picture.data.iter().any(|&value| value < 100));
 }
 
-/// Memory that nothing was written to holds something else in each run; no encoder may let it into a video.
+/// Uninitialised memory differs between runs; no encoder may write it to a video.
 #[test]
 fn a_video_does_not_depend_on_what_memory_held_before() {
     let dir = tempfile::tempdir().unwrap();
@@ -63,7 +63,8 @@ fn a_video_does_not_depend_on_what_memory_held_before() {
     assert!(!first.is_empty() && ["2", "85"].iter().all(|fill| video(fill) == first));
 }
 
-/// A dataset of more speech of the same figure stands beside the videos, is made once, and is another speaker's for another seed.
+/// A dataset of additional speech of the same figure is written beside the videos, once; another seed gives another
+/// speaker.
 #[test]
 fn more_speech_of_the_figure_is_a_dataset() {
     let project = Project::with_clips("speech", 0, 1.0);

@@ -10,7 +10,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::process::Command;
 
-/// Gestures made by rule, as takes of 8 s.
+/// Procedural gestures, as takes of 8 s.
 fn by_rule() -> Set {
     let take = |seed: u64| {
         let poses = gesture(&mut ChaCha8Rng::seed_from_u64(seed), 240, 1.0 / 30.0);
@@ -36,7 +36,7 @@ fn the_lifter_beats_what_needs_no_network() {
     assert_eq!(text(&rows), text(&table(&lifters, &[by_rule()], 16).unwrap()), "the same scenes each time");
 }
 
-/// The targets for the clips of TED speakers, which no training saw.
+/// Targets for clips of TED speakers, which are in no training set.
 #[test]
 fn ted_speakers_are_lifted_within_the_targets() {
     let Some(folder) = real_data("data/speech_motion/ted_expressive") else { return };

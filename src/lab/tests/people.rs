@@ -1,5 +1,4 @@
-//! Rendered people: what is written is what is read back, what hides a point is told, and the bytes depend on nothing
-//! but the seed.
+//! Rendered persons: files are read back unchanged, occluders are identified, and the bytes depend only on the seed.
 
 use ndarray::Array2;
 use orator_base::stage::progress::Silent;
@@ -50,7 +49,7 @@ fn clips_have_their_truth_and_the_same_bytes_on_one_thread() {
             let [x, y] = [0, 1].map(|k| truth.body[[t, point, k]]);
             let inside = (-0.5..width - 0.5).contains(&x) && (-0.5..height - 0.5).contains(&y);
             assert_eq!(seen != Visibility::Outside, inside, "{x} {y}");
-            // The pixel is that of the place in space.
+            // The pixel is the projection of the 3D point.
             let place = [0, 1, 2].map(|k| truth.body_joints[[t, point, k]] + truth.neck[[t, k]]);
             let px = (width - 1.0) / 2.0 + truth.focal_px * place[0] / place[2];
             assert!((px - x).abs() < 0.05, "{px} {x}");

@@ -20,60 +20,60 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// What a network learns: where samples come from and the network they go through.
+/// Source of training samples, and the network they are fed to.
 pub trait TrainingTask: Send + Sync {
-    /// Kind of the weights file.
+    /// Kind of the weights file, stored in its metadata.
     fn kind(&self) -> &'static str;
-    /// The network's shape, and everything else the samples depend on.
+    /// The network's configuration and everything else that the samples depend on; stored in the weights file.
     fn metadata(&self) -> Value;
     fn params(&self) -> &Params;
-    /// Shape of one sample that goes in.
+    /// Shape of one input sample.
     fn shape_in(&self) -> Vec<usize>;
-    /// The weight of each point in the loss; a sample comes out as three numbers a point.
+    /// Loss weight of each output point; a target has three numbers per point.
     fn weights(&self) -> Vec<f32>;
-    /// Samples drawn at once, from one scene.
+    /// Number of samples drawn together from one scene.
     fn group(&self) -> usize {
         1
     }
-    /// Draws a group of samples: what goes in, and what should come out. At the end of a batch a group may be smaller.
+    /// Draws a group of samples: inputs `x` and targets `y`. The last group of a batch may be smaller.
     fn sample(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]);
-    /// [B, shape in] to what the loss takes, [B, 3 x points] unless the task has its own.
+    /// [B, input shape] to the prediction: [B, 3 x points] unless the task defines its own `loss`.
     fn forward(&self, x: &Tensor, mode: &mut Mode) -> candle_core::Result<Tensor>;
-    /// The loss of what came out against what should have, [B, points, 3]; `weights` [1, points] of mean 1. The mean
-    /// distance of the points unless the task knows better.
+    /// Loss of the prediction `out` against the targets `wanted` [B, points, 3]; `weights` [1, points] have mean 1.
+    /// Default: the weighted mean distance of the points.
     fn loss(&self, out: &Tensor, wanted: &Tensor, weights: &Tensor) -> candle_core::Result<Tensor> {
         let distance = ((out.reshape(wanted.shape())? - wanted)?.sqr()?.sum(2)? + 1e-8)?.sqrt()?;
         distance.broadcast_mul(weights)?.mean_all()
     }
-    /// How much a batch counts in running statistics, if the network has such.
+    /// Sets the weight of a batch in the running statistics, if the network has any.
     fn set_momentum(&mut self, _momentum: f64) {}
-    /// Errors on held-out samples, a line each; `brief`: of the network alone, on fewer.
+    /// Errors on held-out samples, one line each; `brief`: of the network alone, on fewer samples.
     fn errors(&self, brief: bool) -> Result<Vec<String>>;
 }
 
-/// The schedule.
+/// Training schedule.
 #[derive(Clone, Debug)]
 pub struct Schedule {
     pub steps: usize,
     pub batch: usize,
-    /// At its highest, after the warm-up.
+    /// Peak learning rate, reached after the warm-up.
     pub learning_rate: f64,
     pub seed: u64,
-    /// Steps between two checkpoints.
+    /// Steps between checkpoints.
     pub checkpoint_every: usize,
-    /// Hash of the weights it starts from (`start_from`); `None`: from the seed.
+    /// Hash of the weights it is initialised from (`start_from`); `None`: initialised from the seed.
     pub started_from: Option<String>,
 }
 
-/// Share of the steps over which the learning rate rises.
+/// Share of the steps of the linear warm-up.
 const WARM_UP: f64 = 0.05;
-/// Steps between two lines of the log.
+/// Steps between lines of the log.
 const LOG_EVERY: usize = 20;
-/// Times the errors are measured on the way.
-const MEASURES: usize = 10;
+/// Number of evaluations during training.
+const N_EVALUATIONS: usize = 10;
 
 impl Schedule {
-    /// Rises linearly, then falls as half a cosine to zero.
+    /// Learning rate of a step: linear warm-up, then half a cosine to zero.
     fn learning_rate(&self, step: usize) -> f64 {
         let share = (step as f64 + 0.5) / self.steps as f64;
         let shape = if share < WARM_UP {
@@ -94,7 +94,10 @@ impl Schedule {
     }
 }
 
-/// Gives the task's network the weights of a file; returns their hash. Errors name the file and what does not fit.
+/// Initialises the task's network from a weights file; returns the hash of the file.
+///
+/// # Errors
+/// The file cannot be read, is of another kind, or does not fit the network; the message names the file.
 pub fn start_from(training_task: &dyn TrainingTask, path: &Path) -> Result<String> {
     let bytes = std::fs::read(path).with_context(|| format!("cannot read the weights {}", path.display()))?;
     let load = || -> Result<()> {
@@ -111,10 +114,13 @@ pub fn start_from(training_task: &dyn TrainingTask, path: &Path) -> Result<Strin
     Ok(blake3::hash(&bytes).to_hex().to_string())
 }
 
-/// Trains and writes the weights to `out`. A checkpoint beside it (`<out>.checkpoint`) lets an interrupted training
-/// go on, to the same bytes, when called again with the same schedule and data; it is removed at the end. The log is
-/// `<out>.jsonl`. Gives the errors on held-out samples; with no steps that is all it does. One training at a time works
-/// on `out` (`BusyFolder`); where `progress` asks for an end, it ends with a checkpoint and `StoppedTraining`.
+/// Trains and writes the weights to `out`; returns the errors on held-out samples. With 0 steps it only evaluates. The
+/// checkpoint `<out>.checkpoint` allows an interrupted training to resume with bit-identical results when called with
+/// the same schedule and data; it is removed at the end. The log is `<out>.jsonl`.
+///
+/// # Errors
+/// `BusyFolder` if another training uses `out`; `StoppedTraining`, after writing a checkpoint, if `progress` requests
+/// a stop; a checkpoint of another schedule; a gradient that is not finite; a file that cannot be read or written.
 pub fn train(
     training_task: &mut dyn TrainingTask,
     schedule: &Schedule,
@@ -125,29 +131,29 @@ pub fn train(
         return training_task.errors(false);
     }
     let _lock = FolderLock::exclusive(out)?;
-    // inside the pool: its own thread does not sleep and wake for every small piece of work
+    // Runs inside the pool, so that the thread need not sleep and wake up for every small task.
     rayon::scope(|_| train_until(training_task, schedule, out, schedule.steps, progress))?;
     let facts = facts(training_task, schedule);
-    let weights = halved(training_task.params().tensors()?)?;
-    // the errors are those of the weights as they are kept
+    let weights = half_precision(training_task.params().tensors()?)?;
+    // The errors are measured with the weights as stored (half precision).
     training_task.params().load(&weights)?;
     let errors = training_task.errors(false)?;
     let mut contents = Contents { facts, tensors: BTreeMap::new() };
     contents.add("", weights);
     contents.write(out)?;
-    let checkpoint = beside(out, ".checkpoint");
+    let checkpoint = sibling(out, ".checkpoint");
     if checkpoint.exists() {
         std::fs::remove_file(&checkpoint).with_context(|| format!("cannot remove {}", checkpoint.display()))?;
     }
     Ok(errors)
 }
 
-/// What a file of the training says of it.
+/// Metadata of the weights file and of the checkpoint.
 fn facts(training_task: &dyn TrainingTask, schedule: &Schedule) -> Value {
     json!({ "kind": training_task.kind(), "lesson": training_task.metadata(), "schedule": schedule.metadata() })
 }
 
-/// The part of a training up to `end`, with a checkpoint there.
+/// Trains up to step `end`, which writes a checkpoint.
 fn train_until(
     training_task: &mut dyn TrainingTask,
     schedule: &Schedule,
@@ -162,23 +168,23 @@ fn train_until(
     if start > 0 {
         progress.say(&format!("going on at step {start} of {}", schedule.steps));
     }
-    let mut log = MetricsLog::lines_alone(&beside(out, ".jsonl"), start)?;
+    let mut log = MetricsLog::lines_alone(&sibling(out, ".jsonl"), start)?;
     let weights = training_task.weights();
     let n_points = weights.len();
     let mean_weight = weights.iter().sum::<f32>() / n_points as f32;
     let weights: Vec<f32> = weights.iter().map(|w| w / mean_weight).collect();
     let weights = Tensor::from_vec(weights, (1, n_points), &Device::Cpu)?;
     let task = progress.begin("training", (schedule.steps - start.min(schedule.steps)) as u64);
-    let measure_every = schedule.steps.div_ceil(MEASURES);
+    let evaluate_every = schedule.steps.div_ceil(N_EVALUATIONS);
     let (mut sum, mut n_summed) = (0.0, 0);
     let mut progress_log = ProgressLog::new(start, schedule.steps);
     for step in start..end {
         let (x, y) = batch(training_task, schedule, step, n_points)?;
-        // the running statistics settle as the training does: 0.1 falls to 0.001
+        // The weight of a batch in the running statistics decays from 0.1 to 0.001.
         training_task.set_momentum(0.1 * (-(step as f64 / schedule.steps as f64) * 100f64.ln()).exp());
         let mut rng = stream(schedule.seed, step, schedule.batch, schedule.batch);
-        let given = training_task.forward(&x, &mut Mode::Train(&mut rng))?;
-        let loss = training_task.loss(&given, &y, &weights)?;
+        let prediction = training_task.forward(&x, &mut Mode::Train(&mut rng))?;
+        let loss = training_task.loss(&prediction, &y, &weights)?;
         let norm = adam.step(&loss.backward()?, schedule.learning_rate(step))?;
         ensure!(norm.is_finite(), "step {step}: the gradient is not finite; try a smaller --learning-rate");
         let loss = f64::from(loss.to_scalar::<f32>()?);
@@ -190,7 +196,7 @@ fn train_until(
             let rate = schedule.learning_rate(step);
             log.write(&json!({ "step": step + 1, "loss": loss, "gradient_norm": norm, "learning_rate": rate }))?;
         }
-        if (step + 1) % measure_every == 0 {
+        if (step + 1) % evaluate_every == 0 {
             progress.say(&format!("step {} of {}: loss {:.4}", step + 1, schedule.steps, sum / f64::from(n_summed)));
             let errors = training_task.errors(true)?;
             errors.iter().for_each(|line| progress.say(&format!("  {line}")));
@@ -207,19 +213,19 @@ fn train_until(
             let mut contents = Contents { facts, tensors: BTreeMap::new() };
             contents.add("net.", training_task.params().tensors()?);
             contents.add("", adam.tensors("adam.")?);
-            contents.write(&beside(out, ".checkpoint"))?;
+            contents.write(&sibling(out, ".checkpoint"))?;
         }
         if is_to_stop {
-            let newest = Some(beside(out, ".checkpoint"));
+            let newest = Some(sibling(out, ".checkpoint"));
             return Err(StoppedTraining { step: step + 1, steps: schedule.steps, newest, best: None }.into());
         }
     }
     Ok(())
 }
 
-/// Takes up the checkpoint beside `out`, if there is one; gives the step to go on at.
+/// Loads the checkpoint of `out`, if any; returns the step to resume at.
 fn resume(training_task: &dyn TrainingTask, schedule: &Schedule, out: &Path, adam: &mut Adam) -> Result<usize> {
-    let path = beside(out, ".checkpoint");
+    let path = sibling(out, ".checkpoint");
     if !path.exists() {
         return Ok(0);
     }
@@ -240,14 +246,15 @@ fn resume(training_task: &dyn TrainingTask, schedule: &Schedule, out: &Path, ada
     Ok(step)
 }
 
-/// A file of the training beside the weights.
-fn beside(out: &Path, ending: &str) -> PathBuf {
+/// Path of the weights file with `ending` appended.
+fn sibling(out: &Path, ending: &str) -> PathBuf {
     let mut name = out.file_name().unwrap_or_default().to_owned();
     name.push(ending);
     out.with_file_name(name)
 }
 
-/// The samples of a step: each from its own stream of random numbers, so that threads and resuming do not matter.
+/// The samples of a step. Each group has its own random stream, so that the result depends neither on threads nor on
+/// resuming.
 fn batch(
     training_task: &dyn TrainingTask,
     schedule: &Schedule,
@@ -265,15 +272,15 @@ fn batch(
     Ok((x, Tensor::from_vec(y, (n, n_points, 3), &Device::Cpu)?))
 }
 
-/// Random numbers of sample `i` of `batch` (`i == batch`: of the step itself).
+/// Random stream of group `i` of a step of `batch` samples (`i == batch`: of the step itself).
 fn stream(seed: u64, step: usize, batch: usize, i: usize) -> ChaCha8Rng {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream((step * (batch + 1) + i) as u64);
     rng
 }
 
-/// Matrices in half precision; vectors (biases, statistics) stay.
-fn halved(tensors: BTreeMap<String, Tensor>) -> Result<BTreeMap<String, Tensor>> {
+/// Converts matrices to half precision; vectors (biases, statistics) stay in single precision.
+fn half_precision(tensors: BTreeMap<String, Tensor>) -> Result<BTreeMap<String, Tensor>> {
     let halve = |(name, t): (String, Tensor)| Ok((name, if t.rank() > 1 { t.to_dtype(DType::F16)? } else { t }));
     tensors.into_iter().map(halve).collect()
 }
@@ -302,7 +309,7 @@ mod tests {
         let measured =
             Schedule { steps: 0, started_from: Some(start_from(&*training_task(), &straight).unwrap()), ..SCHEDULE };
         assert!(!train(&mut *training_task(), &measured, &straight, &Silent).unwrap().is_empty());
-        let log = |weights: &Path| std::fs::read_to_string(beside(weights, ".jsonl")).unwrap();
+        let log = |weights: &Path| std::fs::read_to_string(sibling(weights, ".jsonl")).unwrap();
         assert_eq!(log(&straight), log(&dir.path().join("b.safetensors")));
         assert!(log(&straight).lines().count() >= 6, "{}", log(&straight));
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 4, "weights and logs; checkpoints are removed");

@@ -1,5 +1,5 @@
-//! Check of a speaker trained on the rule: its motion for the sound of the test split against the synthetic speaker's
-//! motion and the rule's predictable part, beside simpler predictors.
+//! Check of a speaker trained on the rule: its motion for the sound of the test split is compared with the synthetic
+//! speaker's motion and the predictable part of the rule, and with simpler predictors.
 
 use super::places::{self, PlaceShare, WordPlaces};
 use super::traces;
@@ -22,16 +22,16 @@ use orator_test_support::rule::rule::wrist_speeds;
 use orator_test_support::rule::speech_dataset::{is_by_speech, predictable};
 use serde::Serialize;
 
-/// Metrics of a predictor on the whole test split.
+/// Metrics of a predictor on the test split.
 #[derive(Clone, Debug, Serialize)]
 pub struct LearnedRow {
     pub predictor: &'static str,
-    /// Pearson correlation of the left and of the right wrist's speed with the predictable part's, over all frames of
-    /// all clips in which no word moves the hand, without smoothing.
+    /// Pearson correlation of the speeds of the left and the right wrist with those of the predictable part, without
+    /// smoothing, over all frames of all clips in which no word moves the hand.
     pub speed_correlation: [f64; 2],
-    /// Pose metrics; `None`: no poses are predicted.
+    /// Pose metrics; `None` if no poses are predicted.
     pub poses: Option<PoseQuality>,
-    /// Places to which words send the hands; `None`: the rule has no words, or no poses are predicted.
+    /// Places to which words move the hands; `None` if the rule has no words, or no poses are predicted.
     pub places: Option<WordPlaces>,
 }
 
@@ -42,8 +42,8 @@ pub struct PoseQuality {
     pub pck: f64,
     /// Mean squared speed of the joints, as a share of the data's.
     pub energy: f64,
-    /// Energy over the frames in which the rule holds both wrists still, where only variation moves that no sound
-    /// predicts; a predictor that regresses to the mean loses this first.
+    /// Energy over the frames in which the rule moves neither wrist, so that only unpredictable variation remains; it
+    /// is the first metric to drop when a predictor regresses to the mean.
     pub pauses: f64,
     /// Mean absolute error of coordinates, each in standard deviations of the training split (of 1 cm at least).
     pub l1: f64,
@@ -55,11 +55,11 @@ pub struct Learned {
     pub n_clips: usize,
     pub secs: f64,
     pub rows: Vec<LearnedRow>,
-    /// Penalties of the ridge regressions of the frame and of a second, to speeds and to poses.
+    /// Penalties of the ridge regressions (one frame, one second of context), to speeds and to poses.
     pub ridge_strengths: [[f64; 2]; 2],
     /// Whether the generator reaches the targets; `None`: no generator.
     pub good: Option<bool>,
-    /// First clip, for the picture.
+    /// First clip, for the plot.
     #[serde(skip)]
     pub first: Option<traces::TraceClip>,
 }
@@ -70,30 +70,33 @@ pub const LEAST_CORRELATION: f64 = 0.7;
 pub const LEAST_PCK: f64 = 1.5;
 pub const ENERGY: std::ops::RangeInclusive<f64> = 0.7..=1.3;
 
-/// Targets where words send hands to places: share of right places of all words, of lone words for the network that reads
-/// the words of a segment; most that one which is not told the words may differ from chance; correlation on beats.
+/// Targets for a rule with words: share of correct places of all words, and of isolated words for the network that
+/// reads the words of a segment; largest deviation from chance of a network without word input; correlation on beats.
 pub const LEAST_PLACES: f64 = 0.8;
 pub const LEAST_LONE_PLACES: f64 = 0.7;
 pub const MOST_FROM_CHANCE: f64 = 0.1;
 pub const LEAST_BEATS: f64 = 0.6;
 
-/// Row of the generator with the words of another clip.
+/// Row of the generator conditioned on the words of another clip.
 const OTHER_WORDS: &str = "generator, another text";
-/// Speed below which a wrist of the rule is held, m/s.
-const HELD: f64 = 0.05;
+/// Speed below which a wrist of the rule counts as static, m/s.
+const STATIC_SPEED: f64 = 0.05;
 
-/// Clip of the test split.
+/// A clip of the test split.
 struct TestClip {
     sample: Sample,
-    /// `None` of the second rule.
+    /// `None` for the second rule.
     clip: Option<SpokenClip>,
     predictable: Array3<f32>,
     sound: Array2<f64>,
-    /// Steps [T - 1, 2] in which no word moves the left and the right hand.
+    /// Steps [T - 1, 2] in which no word moves the left or the right hand.
     of_beats: Array2<bool>,
 }
 
-/// Measures `speaker` on the test split of the synthetic speaker's `dataset`; without one, the baselines alone.
+/// Evaluates `speaker` on the test split of the synthetic speaker's `dataset`; without a speaker, only the baselines.
+///
+/// # Errors
+/// A test split of fewer than two clips; a speaker with another frame rate; a sample that cannot be read.
 pub fn measure(dataset: &Dataset, speaker: Option<&TrainedSpeaker>, progress: &dyn Progress) -> Result<Learned> {
     let tests: Vec<TestClip> =
         dataset.samples(Split::Test).iter().map(|s| TestClip::new(dataset.read(s)?)).collect::<Result<_>>()?;
@@ -163,7 +166,8 @@ pub fn measure(dataset: &Dataset, speaker: Option<&TrainedSpeaker>, progress: &d
     })
 }
 
-/// Whether the first row (the generator) reaches the targets against the second (mismatched) and the third (mean pose).
+/// Whether the first row (the generator) reaches the targets relative to the second (mismatched) and the third (mean
+/// pose).
 fn good(rows: &[LearnedRow]) -> bool {
     let [predicted, others @ ..] = rows else { return false };
     let Some(poses) = predicted.poses else { return false };
@@ -178,12 +182,12 @@ fn good_words(rows: &[LearnedRow], speaker: &TrainedSpeaker) -> bool {
     let Some((row, places)) = rows.first().and_then(|row| Some((row, row.places?))) else { return false };
     let is_chance = |share: PlaceShare| (share.share() - PlaceShare::CHANCE).abs() <= MOST_FROM_CHANCE;
     let others = rows.iter().find(|row| row.predictor == OTHER_WORDS).and_then(|row| row.places);
-    let is_told = match speaker.architecture() {
+    let uses_words = match speaker.architecture() {
         Some(Architecture::Contextual) => places.all.share() >= LEAST_PLACES,
         Some(Architecture::Words) => places.alone.share() >= LEAST_LONE_PLACES,
         _ => return is_chance(places.all),
     };
-    is_told
+    uses_words
         && others.is_some_and(|others| is_chance(others.all))
         && row.speed_correlation.iter().all(|correlation| *correlation >= LEAST_BEATS)
 }
@@ -202,7 +206,7 @@ impl TestClip {
         self.sample.words.as_deref().unwrap_or_default()
     }
 
-    /// The rule as if nothing were said with these sounds.
+    /// The rule's motion for the same sound without words.
     fn without_words(&self, fps: FrameRate) -> Array3<f32> {
         let of_clip = |clip: SpokenClip| {
             RuleGestures::of_habits(&clip.habits(), &clip.speech(), &[]).motion(clip.n_frames, fps).joints
@@ -276,7 +280,7 @@ impl Judge<'_> {
         })
     }
 
-    /// Sum and number of normalised errors.
+    /// Sum and number of the normalised errors.
     fn error(&self, predicted: ArrayView3<f32>, ground_truth: ArrayView3<f32>) -> (f64, f64) {
         let mut sum = (0.0, 0.0);
         for ((t, joint, k), ground_truth) in ground_truth.indexed_iter() {
@@ -289,10 +293,10 @@ impl Judge<'_> {
     }
 }
 
-/// Mask of the frames with wrist speeds of the rule below `HELD` on both sides.
+/// Mask of the frames in which both wrists of the rule are slower than `STATIC_SPEED`.
 fn held(test: &TestClip, fps: FrameRate) -> Array2<bool> {
     let speeds = wrist_speeds(test.predictable.view(), fps);
-    let still = |t: usize| speeds.row(t.min(speeds.nrows() - 1)).iter().all(|speed| *speed < HELD);
+    let still = |t: usize| speeds.row(t.min(speeds.nrows() - 1)).iter().all(|speed| *speed < STATIC_SPEED);
     let mask = &test.sample.motion.mask;
     Array2::from_shape_fn(mask.dim(), |(t, joint)| mask[[t, joint]] && still(t.saturating_sub(1)) && still(t))
 }

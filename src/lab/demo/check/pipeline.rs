@@ -1,8 +1,8 @@
-//! Check of a run on the synthetic speaker: keypoint errors in px, joint errors in mm.
+//! Check of a pipeline run on the synthetic speaker: keypoint errors in px, joint errors in mm.
 //!
-//! Joints are compared in camera axes relative to the neck, without rotation. In segments of 60 frames prediction and
+//! Joints are compared in camera axes relative to the neck, without rotation. In segments of 60 frames, prediction and
 //! truth are each scaled so that the median of shoulder width plus mean upper arm plus mean forearm is 0.90 m. The
-//! neck, 0 on both sides, does not count.
+//! neck, which is 0 in both, is excluded.
 
 use super::truth::DemoTruth;
 use anyhow::{Context, Result, ensure};
@@ -21,15 +21,16 @@ use std::path::{Path, PathBuf};
 /// training was changed once after its error on this figure was known, so that error is no blind test.
 pub const GENERATOR: &str = "synthetic speaker, version 2; the lifter's training was changed once after its error here was seen (models/body_lifter.md)";
 
-/// Largest allowed medians and means.
+/// Largest accepted median keypoint error and mean joint error.
 pub const MOST_PX: f64 = 2.0;
 pub const MOST_MM: f64 = 80.0;
-/// Targets of a rendered person and real models, which define a shoulder or an elbow differently: largest median of
-/// keypoints as a share of the shoulder width, largest mean, smallest share of points found.
+/// Targets for a rendered person and models of real persons, which define shoulders and elbows differently: largest
+/// median of keypoint errors as a share of the shoulder width, largest mean joint error, smallest share of detected
+/// points.
 const MOST_OF_SHOULDERS: f64 = 0.1;
 const MOST_MM_OF_REAL_MODELS: f64 = 120.0;
 const LEAST_FOUND_BY_REAL_MODELS: f64 = 0.85;
-/// Smallest share of points found, of drawn frames in the dataset, and of joints with a number.
+/// Smallest share of detected points, of video frames in the dataset, and of joints with finite values.
 pub const LEAST_FOUND: f64 = 0.95;
 pub const LEAST_FRAMES: f64 = 0.5;
 pub const LEAST_JOINTS: f64 = 0.95;
@@ -38,19 +39,19 @@ const SEGMENT: usize = 60;
 /// Sum of shoulder width, upper arm and forearm after scaling, metres.
 const ARM_METRES: f32 = 0.90;
 
-/// Distance of found keypoints from the truth.
+/// Distances of detected keypoints from the truth, px.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pixels {
     pub median: f64,
     pub p90: f64,
-    /// Share of all points that were found, 0..1.
+    /// Share of all points that were detected, 0..1.
     pub found: f64,
 }
 
 /// Mean distances in mm.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Millimetres {
-    /// All joints but the neck.
+    /// All joints except the neck.
     pub all: f64,
     /// Shoulders, elbows, wrists.
     pub body: f64,
@@ -67,19 +68,19 @@ pub struct PipelineCheck {
     /// Number of frames in the dataset, and in the videos.
     pub n_frames: usize,
     pub n_drawn: usize,
-    /// Seconds to train on that came through the videos, and those of `demo draw --speech`, where there are some.
+    /// Seconds of training data from the videos, and from `demo draw --speech` if present.
     pub train_secs: f64,
     pub more_secs: Option<f64>,
-    /// Share of the dataset's joints that have a number, 0..1; distances are measured on these alone.
+    /// Share of the dataset's joints with finite values, 0..1; distances are measured on these only.
     pub joints: f64,
     pub lifted: Millimetres,
-    /// Median width of a rendered person's shoulders, px; `None`: the figure in its marker suit.
+    /// Median shoulder width of a rendered person, px; `None`: the figure in a marker suit.
     pub shoulders_px: Option<f64>,
     /// Baseline: constant mean pose of the truth.
     pub mean_pose: Millimetres,
-    /// Baseline: x and y of the truth with each joint's mean depth.
+    /// Baseline: true x and y, with each joint at its mean depth.
     pub mean_depth: Millimetres,
-    /// Baseline: x and y of the truth with depth from its mean bone lengths, always towards the camera.
+    /// Baseline: true x and y, with depth from the mean bone lengths, always towards the camera.
     pub bone_depth: Millimetres,
 }
 
@@ -92,7 +93,7 @@ impl PipelineCheck {
         px(&self.body) && px(&self.hands) && enough && self.joints >= LEAST_JOINTS && self.lifted.all <= targets.most_mm
     }
 
-    /// Targets of the speaker that was drawn.
+    /// Targets for the kind of speaker in the videos.
     pub fn targets(&self) -> Targets {
         match self.shoulders_px {
             None => Targets { most_px: MOST_PX, most_mm: MOST_MM, least_found: LEAST_FOUND },
@@ -105,18 +106,21 @@ impl PipelineCheck {
     }
 }
 
-/// What a run must reach.
+/// Targets of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct Targets {
     /// Largest medians of keypoints, px.
     pub most_px: f64,
     /// Largest mean error of joints, mm.
     pub most_mm: f64,
-    /// Smallest share of points found, 0..1.
+    /// Smallest share of detected points, 0..1.
     pub least_found: f64,
 }
 
 /// Compares the keypoints and the dataset of the run in `dir` with `dir/truth`.
+///
+/// # Errors
+/// A file that is missing or invalid; a dataset without frames to compare.
 pub fn measure(dir: &Path) -> Result<PipelineCheck> {
     let mut measured = measure_keypoints(dir)?;
     let (mut lifted, mut true_joints) = (Vec::new(), Vec::new());
@@ -164,7 +168,10 @@ fn train_secs(dataset: &Dataset) -> f64 {
     dataset.info().splits.get(Split::Train.name()).map_or(0.0, |split| split.secs)
 }
 
-/// Compares the keypoints alone.
+/// Compares only the keypoints.
+///
+/// # Errors
+/// A file that is missing or invalid.
 pub fn measure_keypoints(dir: &Path) -> Result<PipelineCheck> {
     let mut measured = PipelineCheck::default();
     let (mut body, mut hands) = (Distances::default(), Distances::default());
@@ -182,7 +189,7 @@ pub fn measure_keypoints(dir: &Path) -> Result<PipelineCheck> {
     Ok(measured)
 }
 
-/// Truth of the video with the work name `<stem>-<8 hex digits>`.
+/// Ground truth of the video with the work name `<stem>-<8 hex digits>`.
 fn truth_of(dir: &Path, work_name: &str) -> Result<DemoTruth> {
     let stem = work_name.rsplit_once('-').map_or(work_name, |(stem, _)| stem);
     DemoTruth::read(&dir.join(format!("truth/{stem}.npz")))
@@ -204,8 +211,8 @@ struct Distances {
 }
 
 impl Distances {
-    /// `seen` [T, n, 3] x, y, score against `truth` [T, n, 2]; the shorter of the two counts, and no point that cannot
-    /// be seen (NaN).
+    /// Compares `seen` [T, n, 3] (x, y, score) with `truth` [T, n, 2] over the frames that both have; points that are
+    /// not visible (NaN) are ignored.
     fn compare(&mut self, seen: ArrayView3<f32>, truth: ArrayView3<f32>, least_score: f32) {
         for (seen, truth) in seen.outer_iter().zip(truth.outer_iter()) {
             let visible = |(_, place): &(_, ndarray::ArrayView1<f32>)| place[0].is_finite();
@@ -226,7 +233,7 @@ impl Distances {
     }
 }
 
-/// Segment scaled to `ARM_METRES`.
+/// The segment, scaled to `ARM_METRES`.
 fn scaled(segment: ArrayView3<f32>) -> Array3<f32> {
     let sizes = segment.outer_iter().map(|frame| {
         let bone = |a: usize, b: usize| (0..3).map(|k| (frame[[a, k]] - frame[[b, k]]).powi(2)).sum::<f32>().sqrt();
@@ -238,7 +245,7 @@ fn scaled(segment: ArrayView3<f32>) -> Array3<f32> {
     segment.mapv(|v| v * ARM_METRES / size)
 }
 
-/// Copy of `predicted` with the joints that have a number in `lifted`, others NaN.
+/// `predicted` with NaN wherever `lifted` is not finite.
 fn where_known(mut predicted: Array3<f32>, lifted: &Array3<f32>) -> Array3<f32> {
     Zip::from(&mut predicted).and(lifted).for_each(|v, known| {
         if !known.is_finite() {
@@ -248,8 +255,8 @@ fn where_known(mut predicted: Array3<f32>, lifted: &Array3<f32>) -> Array3<f32> 
     predicted
 }
 
-/// Joints with x and y of `truth`, each in front of its parent as the bone's mean length implies; shoulders lie in the
-/// picture's plane.
+/// Joints with x and y of `truth`, each in front of its parent at the depth implied by the bone's mean length;
+/// shoulders lie in the image plane.
 fn with_bone_depth(truth: &Array3<f32>) -> Array3<f32> {
     let mut predicted = truth.clone();
     // In joint order a parent precedes its children.

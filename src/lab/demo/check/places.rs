@@ -1,4 +1,4 @@
-//! Whether words with gestures send their hand to their place, and which frames belong to them.
+//! Checks whether words with gestures move their hand to the right place, and which frames belong to them.
 
 use ndarray::{Array2, ArrayView3};
 use orator_base::types::time::FrameRate;
@@ -8,19 +8,19 @@ use orator_test_support::rule::rule::{HOLD, RETURN, RuleGestures, STROKE, WORD_D
 use orator_test_support::rule::words::{N_PLACES, WordGesture, gesture};
 use serde::Serialize;
 
-/// Seconds to the next word with a gesture from which on a word is alone.
+/// Least time in seconds to the nearest other word with a gesture for a word to count as isolated.
 const ALONE_SECS: f64 = 5.0;
 /// Two-sided normal quantile of a 95 % interval.
 const Z: f64 = 1.96;
 
-/// Words whose hand is nearer to their place than to the hand's other places at the end of the stroke.
+/// Counts of words, and of those whose hand at the end of the stroke is nearest to the word's own place.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct PlaceShare {
     pub n_words: usize,
     pub n_right: usize,
 }
 
-/// Right places of all words with gestures, and of those with no other such word within 5 s.
+/// Correct places of all words with gestures, and of those without another such word within 5 s.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct WordPlaces {
     pub all: PlaceShare,
@@ -28,7 +28,7 @@ pub struct WordPlaces {
 }
 
 impl PlaceShare {
-    /// Share of right places when nothing is known of the word.
+    /// Expected share of correct places without knowledge of the word.
     pub const CHANCE: f64 = 1.0 / N_PLACES as f64;
 
     fn add(&mut self, is_right: bool) {
@@ -36,7 +36,7 @@ impl PlaceShare {
         self.n_right += usize::from(is_right);
     }
 
-    /// Share of right places; 0 of no words.
+    /// Share of correct places; 0 if there are no words.
     pub fn share(&self) -> f64 {
         self.n_right as f64 / self.n_words.max(1) as f64
     }
@@ -51,7 +51,7 @@ impl PlaceShare {
 }
 
 impl WordPlaces {
-    /// Counts the words of a clip for predicted joints [T, 49, 3] from the neck, metres.
+    /// Counts the words of a clip for predicted joints [T, 49, 3], metres, relative to the neck.
     pub fn count(&mut self, clip: &SpokenClip, predicted: ArrayView3<f32>, fps: FrameRate) {
         let (speech, said) = (clip.speech(), clip.words());
         let rule = RuleGestures::of_habits(&clip.habits(), &speech, &said);
@@ -79,7 +79,7 @@ impl WordPlaces {
     }
 }
 
-/// Steps between frames [T - 1, 2] in which no word moves the left and the right hand: those of beats.
+/// Steps between frames [T - 1, 2] in which no word moves the left or the right hand.
 pub fn of_beats(clip: &SpokenClip, fps: FrameRate) -> Array2<bool> {
     let mut steps = Array2::from_elem((clip.n_frames.saturating_sub(1), 2), true);
     for word in clip.words() {

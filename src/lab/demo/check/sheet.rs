@@ -1,5 +1,5 @@
-//! Contact sheet of the demo: at a few moments the video frame with its keypoints, the 3D figure from the front and
-//! from the left, and a moment of generated motion.
+//! Contact sheet of the demo: for a few frames the image, its keypoints, the 3D figure from the front and from the
+//! left, and a frame of generated motion.
 
 use anyhow::{Context, Result, ensure};
 use ndarray::{ArrayView2, Axis};
@@ -22,7 +22,10 @@ const N_ROWS: usize = 3;
 const COLUMNS: [&str; 5] =
     ["video", "2D keypoints", "3D, from the front", "3D, from the left", "generated from speech"];
 
-/// Draws the sheet of the video `unit` of a run in the folder `work`, with generated motion where there is some.
+/// Draws the sheet of the video `unit` of a run in the folder `work`, with `generated` motion if given.
+///
+/// # Errors
+/// A file that cannot be read; no frame with a pose.
 pub fn draw_sheet(work: &Path, unit: &Unit, generated: Option<&Motion>) -> Result<Image> {
     let keypoints = keypoints_npz::read(&Artifact::Keypoints.path(work, unit))?;
     let lifted = Artifact::Joints.path(work, unit);
@@ -65,7 +68,7 @@ pub fn draw_sheet(work: &Path, unit: &Unit, generated: Option<&Motion>) -> Resul
     Ok(sheet)
 }
 
-/// Frames spread evenly over those with a pose.
+/// Frames spread evenly over those with a complete pose.
 fn moments(motion: &Motion) -> Vec<usize> {
     let whole = |frame: &ArrayView2<f32>| frame.iter().all(|v| v.is_finite());
     let frames: Vec<usize> =
@@ -82,7 +85,7 @@ fn small(image: &Image) -> Result<Image> {
     Ok(cell)
 }
 
-/// Frame, lightened, under its keypoints.
+/// The lightened frame with its keypoints drawn over it.
 fn overlay(image: &Image, keypoints: &Keypoints, frame_idx: usize) -> Result<Image> {
     let mut cell = small(image)?;
     for (value, paper) in cell.data.iter_mut().zip(PAPER.iter().cycle()) {

@@ -1,5 +1,5 @@
-//! Picture of what was learnt: the speed of each wrist over the first half minute of a test sound by the rule, by the
-//! speaker and by the trained model; below, a few poses of the latter two.
+//! Plot of a trained model: the speed of each wrist over the first 30 s of a test sound by the rule, the speaker and
+//! the model; below, a few poses of the latter two.
 
 use anyhow::Result;
 use ndarray::{Array3, Axis};
@@ -14,7 +14,7 @@ const LANE_PX: f32 = 220.0;
 const POSES_PX: f32 = 170.0;
 const MARGIN_PX: f32 = 70.0;
 const N_POSES: usize = 10;
-/// Shown seconds, and the speed at the top of a lane, m/s.
+/// Duration shown in seconds, and the speed at the top of a lane, m/s.
 const SECS: f64 = 30.0;
 const TOP_SPEED: f32 = 2.5;
 /// Colour of the rule.
@@ -28,7 +28,7 @@ pub struct TraceClip {
     pub predicted: Array3<f32>,
 }
 
-/// Draws the clip.
+/// Draws the plot of a clip.
 pub fn picture(clip: &TraceClip, fps: FrameRate) -> Result<Image> {
     let mut image = Image::filled(WIDTH, (2.0 * (LANE_PX + POSES_PX)) as usize, PAPER);
     let n_frames = clip.rule.shape()[0].min(fps.frames_in(SECS)).max(2);

@@ -1,4 +1,5 @@
-//! Truth of a demo's video at the dataset rate, of either speaker: the figure in its marker suit or the rendered person.
+//! Ground truth of a demo video at the dataset rate, for either speaker: the figure in a marker suit or the rendered
+//! person.
 
 use crate::rendered_truth::{BODY_JOINTS, RenderedTruth, Visibility};
 use anyhow::{Result, ensure};
@@ -11,19 +12,23 @@ use orator_test_support::drawn::folder::DATASET_FPS;
 use orator_test_support::drawn::truth::DrawnTruth;
 use std::path::Path;
 
-/// Points of the body that are compared: COCO without legs.
+/// Number of body points that are compared: COCO without legs.
 const N_BODY: usize = 13;
 
-/// Truth of a video.
+/// Ground truth of a video.
 pub struct DemoTruth {
-    /// Points that cannot be seen are NaN.
+    /// Ground truth; points that are not visible are NaN.
     pub drawn: DrawnTruth,
-    /// Median width of a rendered person's shoulders at the neck's distance, px; `None`: the marker suit.
+    /// Median shoulder width of a rendered person at the neck's distance, px; `None`: the marker suit.
     pub shoulders_px: Option<f64>,
 }
 
 impl DemoTruth {
-    /// Reads the truth of either speaker. Errors: another rate than the dataset's, or one that it does not divide.
+    /// Reads the ground truth of either speaker.
+    ///
+    /// # Errors
+    /// A frame rate that is not the dataset's (marker suit) or not a multiple of it (rendered person); an invalid
+    /// file.
     pub fn read(path: &Path) -> Result<Self> {
         if !Npz::open(path)?.has(BODY_JOINTS) {
             let drawn = DrawnTruth::read(path)?;

@@ -1,10 +1,10 @@
-//! A rendered person over a clip: body, looks, speech and the pose of every step of time.
+//! A rendered person over a clip: body, appearance, speech and the pose at every time step.
 
-use super::acts::{Acts, Carriage};
 use super::body::Build;
-use super::condition::{Manner, Seat};
+use super::condition::{GestureStyle, Seat};
 use super::contact::{Obstacles, Slab};
-use super::held::HeldThing;
+use super::held::HeldObject;
+use super::motion::{ActorMotion, LeanStyle};
 use super::trunk::SeatedRig;
 use super::vocabulary::{DESK_AHEAD, DESK_BELOW_NECK};
 use super::voice::Voice;
@@ -20,47 +20,47 @@ use orator_base::types::time::FrameRate;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Rotations of a rig's joints at one time.
+/// Pose of a rig at one time step.
 #[derive(Clone, Debug)]
 pub struct ActorPose {
     /// Position of the hips, world cm.
     pub root: Vec3,
     pub local: Vec<Rotation>,
-    /// Opening of the mouth, 0..1.
+    /// Mouth opening, 0..1.
     pub mouth: f64,
 }
 
-/// Where and how a person is put.
+/// Placement and behaviour of a person in the scene.
 #[derive(Clone, Copy, Debug)]
 pub struct ActorRole {
-    pub manner: Manner,
+    pub gesture_style: GestureStyle,
     pub seat: Seat,
-    /// Whether trunk, head and arms are held as `Carriage` says.
+    /// Whether the person leans over the desk (a sampled `LeanStyle`).
     pub leans: bool,
-    /// Place on the floor, cm, and turn to the person's left, radians.
+    /// Position on the floor (x, z), cm, and rotation to the person's left, radians.
     pub place: [f64; 2],
     pub turn: f64,
     pub speaks: bool,
 }
 
-/// Person with the poses of a clip.
+/// A person with the poses of a clip.
 pub struct Actor {
     pub rig: Rig,
     pub avatar: Avatar,
-    /// Points of the face, cm from the head joint in its axes (`looks::face`).
+    /// Points of the face (`looks::face`), cm, in the axes of the head joint.
     pub face: [Vec3; 5],
-    pub held: Option<HeldThing>,
+    pub held: Option<HeldObject>,
     pub poses: Vec<ActorPose>,
     pub role: ActorRole,
     pub unit: f64,
     /// Neck and hips of the upright body, world cm.
     pub neck: Vec3,
     pub hips: Vec3,
-    /// Near edge of a desk ahead of the hips, metres of a body of unit 1.
+    /// Distance from the hips to the near edge of a desk, in metres of a body of unit 1.
     desk_ahead: f64,
 }
 
-/// Seeds of what a person is.
+/// Seeds of a person.
 #[derive(Clone, Copy, Debug)]
 pub struct ActorSeeds {
     pub body: u64,
@@ -69,7 +69,8 @@ pub struct ActorSeeds {
 }
 
 impl Actor {
-    /// Person who acts to a voice for `n_steps` steps at `fps`; a captured motion replaces the arms' gestures.
+    /// Creates a person that moves to a voice for `n_steps` steps at `fps`; captured motion replaces the procedural
+    /// arm gestures.
     pub fn new(
         seeds: ActorSeeds,
         role: ActorRole,
@@ -80,15 +81,15 @@ impl Actor {
     ) -> Self {
         let build = Build::sample(&mut ChaCha8Rng::seed_from_u64(seeds.body));
         let mut rng = ChaCha8Rng::seed_from_u64(seeds.motion);
-        let held =
-            (role.manner == Manner::Holding && captured.is_none()).then(|| HeldThing::sample(build.hand, &mut rng));
+        let held = (role.gesture_style == GestureStyle::Holding && captured.is_none())
+            .then(|| HeldObject::sample(build.hand, &mut rng));
         let secs = fps.secs(n_steps);
         let grip = held.as_ref().map(|held| (held.side, held.grip));
-        let mut acts = Acts::new(&voice.speech, secs, (role.manner, role.seat), grip, &mut rng);
+        let mut actor_motion = ActorMotion::new(&voice.speech, secs, (role.gesture_style, role.seat), grip, &mut rng);
         let (knees, shins) = (rng.random_range(0.05..0.25), rng.random_range(-0.1..0.25));
         let front = usize::from(rng.random_bool(0.5));
         if role.leans && captured.is_none() {
-            acts.carriage = Carriage::sample(&mut rng);
+            actor_motion.lean_style = LeanStyle::sample(&mut rng);
         }
 
         let options = AnimationOptions {
@@ -103,11 +104,11 @@ impl Actor {
             Some(motion) => perform(motion, None, &options),
             None => {
                 let seated = SeatedRig { rig: &own_rig, seat: role.seat, knees, shins };
-                let obstacles = obstacles(&seated, &build, acts.carriage, front);
+                let obstacles = obstacles(&seated, &build, actor_motion.lean_style, front);
                 let frames: Vec<_> = (0..n_steps)
                     .map(|step| {
                         let now = fps.secs(step);
-                        obstacles.free(&build, &acts.arms(now), &seated.torso(&acts.trunk(now)))
+                        obstacles.resolve(&build, &actor_motion.arms(now), &seated.torso(&actor_motion.trunk(now)))
                     })
                     .collect();
                 perform(&build.motion(fps, &frames), None, &options)
@@ -121,7 +122,7 @@ impl Actor {
         let poses = (0..n_steps)
             .map(|step| {
                 let now = fps.secs(step);
-                let posture = acts.trunk(now);
+                let posture = actor_motion.trunk(now);
                 let mut local = performed.clip.local[step.min(last)].clone();
                 seated.pose(&posture, &mut local);
                 local[0] = turn * local[0];
@@ -136,30 +137,30 @@ impl Actor {
         let unit = rig.skeleton.joints[rig.spine].offset[1] / 10.0;
         let looks = looks::random(seeds.clothes);
         let (avatar, face) = (Avatar::new(&rig, &looks), looks::face(&rig, &looks));
-        let desk_ahead = DESK_AHEAD + acts.carriage.desk_ahead();
+        let desk_ahead = DESK_AHEAD + actor_motion.lean_style.desk_ahead();
         Self { rig, avatar, face, held, poses, role, unit, neck, hips, desk_ahead }
     }
 
-    /// Meshes of a pose: those of the body first, then of the held thing.
+    /// Meshes of a pose: the body's, then the held object's.
     pub fn meshes(&self, pose: &ActorPose) -> Vec<Mesh> {
         let mut meshes = self.avatar.posed(&self.rig, pose.root, &pose.local, pose.mouth);
         meshes.extend(self.held.iter().map(|held| held.posed(&self.rig, pose.root, &pose.local)));
         meshes
     }
 
-    /// Meshes of the body alone.
+    /// Number of meshes of the body alone.
     pub fn n_body_meshes(&self) -> usize {
         self.avatar.parts.len()
     }
 
-    /// Upper side of the desk, and its near edge ahead of the hips, cm.
+    /// Height of the desk top, and distance from the hips to its near edge, cm.
     pub fn desk(&self) -> [f64; 2] {
         [self.neck[1] - DESK_BELOW_NECK * CM * self.unit, self.desk_ahead * CM * self.unit]
     }
 }
 
-/// Surfaces below the hands of a seated body, before it is put in its place.
-fn obstacles(seated: &SeatedRig, build: &Build, carriage: Carriage, front: usize) -> Obstacles {
+/// Surfaces below the hands of a seated body, before the body is moved to its place.
+fn obstacles(seated: &SeatedRig, build: &Build, lean_style: LeanStyle, front: usize) -> Obstacles {
     let unit = build.unit();
     let (upright, mut slabs) = (Default::default(), Vec::new());
     if seated.seat != Seat::Standing {
@@ -174,8 +175,8 @@ fn obstacles(seated: &SeatedRig, build: &Build, carriage: Carriage, front: usize
     }
     if seated.seat == Seat::Desk {
         let top = seated.torso(&upright).neck[1] - DESK_BELOW_NECK * CM * unit;
-        let near = (DESK_AHEAD + carriage.desk_ahead()) * CM * unit;
+        let near = (DESK_AHEAD + lean_style.desk_ahead()) * CM * unit;
         slabs.push(Slab { top, x: [-90.0, 90.0], z: [near, 120.0], beneath: DESK_BELOW_NECK + 0.03 });
     }
-    Obstacles { slabs, carriage, front }
+    Obstacles { slabs, lean_style, front }
 }

@@ -1,5 +1,5 @@
-//! Body of a rendered person: its sizes, and postures of wrists, hands and fingers to joints in the torso's axes (metres,
-//! x to the person's left, y down, z away from the viewer; the neck is the origin and the person faces -z).
+//! Body of a rendered person: proportions, and the conversion of arm postures to joints in the torso's axes (metres, x
+//! to the person's left, y down, z away from the viewer; the neck is the origin and the person faces -z).
 
 use ndarray::Array3;
 use orator_avatar::animate::rig::rig::Rig;
@@ -12,24 +12,24 @@ use orator_test_support::drawn::figure::{FINGER_BASES, PHALANGES, solve_arm};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// First joint of an arm and of its hand, and the sign of x, of the left and the right side.
+/// First joint of the arm, first joint of the hand and sign of x, for the left and the right side.
 pub const SIDES: [(usize, usize, f64); 2] = [(L_SHOULDER, L_HAND, 1.0), (R_SHOULDER, R_HAND, -1.0)];
 
-/// Lengths of a body, metres.
+/// Proportions of a body; lengths in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Build {
     pub shoulder_width: f64,
     pub upper_arm: f64,
     pub forearm: f64,
-    /// Size of the hands relative to `drawn::figure`'s, whose middle finger's first bone is 48 mm.
+    /// Size of the hands relative to those of `drawn::figure`, whose middle proximal phalanx measures 48 mm.
     pub hand: f64,
 }
 
 impl Build {
-    /// Body of 1.7 m.
+    /// A body 1.7 m tall.
     pub const ADULT: Self = Self { shoulder_width: 0.34, upper_arm: 0.29, forearm: 0.25, hand: 1.0 };
 
-    /// Body of a height of 1.5 to 1.95 m.
+    /// A random body 1.5 to 1.95 m tall.
     pub fn sample(rng: &mut ChaCha8Rng) -> Self {
         let height = rng.random_range(0.89..1.14);
         let mut near = |metres: f64, share: f64| metres * height * rng.random_range(1.0 - share..1.0 + share);
@@ -41,18 +41,18 @@ impl Build {
         }
     }
 
-    /// Size of the body relative to that of 1.78 m, whose arms measure 0.55 m; the rig's trunk and legs follow it.
+    /// Size of the body relative to one 1.78 m tall with arms of 0.55 m; the rig's trunk and legs scale with it.
     pub fn unit(&self) -> f64 {
         (self.upper_arm + self.forearm) / 0.55
     }
 
     /// The rig of the body.
     pub fn rig(&self) -> Rig {
-        Rig::from_motion(&self.motion(FrameRate::new(15, 1), &[self.still()]))
+        Rig::from_motion(&self.motion(FrameRate::new(15, 1), &[self.rest_joints()]))
     }
 
-    /// Joints with hanging arms.
-    fn still(&self) -> [[f64; 3]; N_JOINTS] {
+    /// Joints in the rest pose, arms hanging.
+    fn rest_joints(&self) -> [[f64; 3]; N_JOINTS] {
         let hanging = ArmPosture {
             wrist: [0.2, 0.4, -0.15],
             elbow: 0.3,
@@ -65,38 +65,38 @@ impl Build {
         joints(self, &[hanging; 2], [hanging.wrist; 2])
     }
 
-    /// Joints of frames as a motion.
+    /// Motion of the joints of successive frames.
     pub fn motion(&self, fps: FrameRate, frames: &[[[f64; 3]; N_JOINTS]]) -> Motion {
         let joints = Array3::from_shape_fn((frames.len(), N_JOINTS, 3), |(t, joint, k)| frames[t][joint][k] as f32);
         Motion::from_joints(fps, joints)
     }
 }
 
-/// Bend of the fingers.
+/// Shape of the fingers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FingerShape {
-    /// Flexion of index to little finger, 0 straight .. 1 in the fist.
+    /// Flexion of the index to the little finger, 0 straight .. 1 in the fist.
     pub curl: [f64; 4],
-    /// Flexion of the thumb, and its way across the palm, 0..1.
+    /// Flexion and opposition of the thumb, 0..1.
     pub thumb: [f64; 2],
-    /// Radians between neighbouring fingers.
+    /// Angle between neighbouring fingers, radians.
     pub spread: f64,
 }
 
 /// Posture of one arm, mirrored for the right side.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArmPosture {
-    /// Wrist from the neck in torso axes: outwards, down, away from the viewer; metres of a body of unit 1.
+    /// Wrist relative to the neck in torso axes: outwards, down, away from the viewer; metres of a body of unit 1.
     pub wrist: Vec3,
-    /// Direction of the elbow beside straight down: the larger, the more it points outwards.
+    /// Outward component of the elbow's direction, relative to its downward component.
     pub elbow: f64,
-    /// How far it points ahead of straight down, the length downwards being 1.
+    /// Forward component of the elbow's direction, relative to its downward component.
     pub forward: f64,
-    /// Turn about the hand's length, radians; 0: thumb up (forwards where the hand hangs), positive: palm down.
+    /// Rotation about the hand's long axis, radians; 0: thumb up (forwards if the hand hangs), positive: palm down.
     pub roll: f64,
-    /// Tangent of the angle of the hand above the forearm's line.
+    /// Tangent of the angle between hand and forearm, positive: hand raised.
     pub raise: f64,
-    /// Tangent of the angle by which the hand points to the other side.
+    /// Tangent of the angle by which the hand points inwards.
     pub inwards: f64,
     pub fingers: FingerShape,
 }
@@ -112,7 +112,7 @@ impl FingerShape {
     pub const TWO: Self = shape([0.02, 0.03, 0.92, 0.98], [0.8, 0.9], 0.12);
     pub const THREE: Self = shape([0.02, 0.03, 0.06, 0.95], [0.8, 0.9], 0.12);
     pub const INTERLACED: Self = shape([0.5, 0.52, 0.54, 0.56], [0.5, 0.4], 0.07);
-    /// Around a cup; pen, phone and sheet between thumb and fingers.
+    /// Grip of a cup, and of a pen, phone or sheet between thumb and fingers.
     pub const CUP: Self = shape([0.48, 0.5, 0.52, 0.56], [0.25, 0.85], 0.03);
     pub const HELD: Self = shape([0.5, 0.58, 0.68, 0.76], [0.3, 0.85], 0.02);
 
@@ -131,7 +131,7 @@ const fn shape(curl: [f64; 4], thumb: [f64; 2], spread: f64) -> FingerShape {
 }
 
 impl ArmPosture {
-    /// The posture on the share 0..1 of the way to another.
+    /// Linear interpolation to another posture; `share` 0..1.
     #[must_use]
     pub fn towards(self, goal: Self, share: f64) -> Self {
         let mix = |a: f64, b: f64| a + share * (b - a);
@@ -147,8 +147,8 @@ impl ArmPosture {
     }
 }
 
-/// Joints of `types::skeleton` of both arms; the wrists' places in metres come beside the postures, since contacts move
-/// them.
+/// Joints of both arms (`types::skeleton`). The wrist positions in metres are separate from the postures, because
+/// contacts move them.
 pub fn joints(build: &Build, arms: &[ArmPosture; 2], wrists: [Vec3; 2]) -> [Vec3; N_JOINTS] {
     let mut joints = [[0.0; 3]; N_JOINTS];
     for (side, (shoulder, hand, sign)) in SIDES.into_iter().enumerate() {
@@ -170,7 +170,7 @@ fn hand_joints(build: &Build, arm: &ArmPosture, elbow: Vec3, wrist: Vec3, sign: 
     let direction = |a: Vec3| unit(a, 1e-9).unwrap_or(ahead);
     let forearm = direction(sub(wrist, elbow));
     let along = direction(add(forearm, [-sign * arm.inwards, -arm.raise, 0.0]));
-    // The thumb of a hand that points ahead is up; the shortest turn brings it to where the hand points.
+    // The thumb of a hand that points forwards is up; the smallest rotation brings it to the hand's direction.
     let thumb_up = Rotation::between(ahead, along).turn([0.0, -1.0, 0.0]);
     let thumb_side = Rotation::about(along, sign * arm.roll).turn(thumb_up);
     let palm = scale(cross(along, thumb_side), sign);

@@ -1,50 +1,50 @@
-//! Conditions under which people are rendered: each fixes what it is about and leaves the rest to chance.
+//! Conditions under which persons are rendered: each fixes one aspect and leaves the others random.
 
 use anyhow::{Result, bail};
 
-/// What a clip is about.
+/// Aspect that a clip tests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Condition {
-    /// Half a body from the front.
+    /// Upper body from the front.
     Front,
-    /// Half a body from 25 to 50 degrees aside.
+    /// Upper body from 25 to 50 degrees to the side.
     ThreeQuarter,
-    /// The whole body on its legs.
+    /// Full body, standing.
     Standing,
-    /// Behind a desk, hands on it or under it.
+    /// Seated behind a desk, hands on it or under it.
     SeatedDesk,
-    /// On a chair, legs seen.
+    /// Seated on a chair, legs visible.
     SeatedChair,
     /// Hands interlaced or stacked between gestures.
     HandsFolded,
-    /// Hands that cross before the body, arms crossed.
+    /// Hands crossing in front of the body, arms crossed.
     Crossing,
-    /// Wide gestures up to the left and right border of the picture.
+    /// Wide gestures up to the left and right border of the image.
     Edge,
-    /// Head and shoulders: hands are mostly below the picture.
+    /// Head and shoulders: hands are mostly below the image.
     Outside,
     /// A pen, cup, phone or sheet in one hand.
     Holding,
     /// Fast gestures with motion blur.
     Fast,
-    /// Little light, noise of the sensor.
+    /// Low light with sensor noise.
     Dark,
-    /// A lens out of focus.
+    /// Out-of-focus blur.
     Blurred,
-    /// A figure that is small in the picture.
+    /// A person that is small in the image.
     Small,
-    /// A low bit rate.
+    /// Low bit rate.
     Compressed,
-    /// A picture higher than wide.
+    /// Portrait format.
     Portrait,
-    /// A second, silent person who gestures too.
+    /// A second, silent person that gestures too.
     TwoPeople,
-    /// Behind a desk, the trunk leant ahead, the head bowed, elbows and hands further ahead.
+    /// Seated behind a desk, trunk leaning forwards, head bowed, elbows and hands further forwards.
     LeaningDesk,
 }
 
 impl Condition {
-    /// All, in the order in which they are drawn.
+    /// All conditions, in rendering order.
     pub const ALL: [Self; 18] = [
         Self::Front,
         Self::ThreeQuarter,
@@ -66,7 +66,7 @@ impl Condition {
         Self::LeaningDesk,
     ];
 
-    /// Name on the command line, of its folder and of its speaker.
+    /// Name on the command line, and name of the condition's folder and speaker.
     pub fn name(self) -> &'static str {
         match self {
             Self::Front => "front",
@@ -90,10 +90,10 @@ impl Condition {
         }
     }
 
-    /// Conditions of a list of names, in the order of `ALL`, each once; an empty list is all of them.
+    /// Parses a list of names; the result is in the order of `ALL` without duplicates. An empty list means all.
     ///
     /// # Errors
-    /// A name that is none: the message lists the names.
+    /// An unknown name; the message lists the known names.
     pub fn of_names(names: &[String]) -> Result<Vec<Self>> {
         for name in names {
             if !Self::ALL.iter().any(|condition| condition.name() == name) {
@@ -105,7 +105,7 @@ impl Condition {
         Ok(Self::ALL.into_iter().filter(named).collect())
     }
 
-    /// What the body rests on, where the condition fixes it.
+    /// Seat of the person, if the condition fixes it.
     pub fn seat(self) -> Option<Seat> {
         match self {
             Self::Standing => Some(Seat::Standing),
@@ -115,20 +115,20 @@ impl Condition {
         }
     }
 
-    /// How the hands move.
-    pub fn manner(self) -> Manner {
+    /// Style of the hand movements.
+    pub fn gesture_style(self) -> GestureStyle {
         match self {
-            Self::HandsFolded => Manner::Folded,
-            Self::Crossing => Manner::Crossing,
-            Self::Edge => Manner::Wide,
-            Self::Outside => Manner::Low,
-            Self::Holding => Manner::Holding,
-            Self::Fast => Manner::Fast,
-            _ => Manner::Free,
+            Self::HandsFolded => GestureStyle::Folded,
+            Self::Crossing => GestureStyle::Crossing,
+            Self::Edge => GestureStyle::Wide,
+            Self::Outside => GestureStyle::Low,
+            Self::Holding => GestureStyle::Holding,
+            Self::Fast => GestureStyle::Fast,
+            _ => GestureStyle::Free,
         }
     }
 
-    /// What the picture shows, and from where.
+    /// Camera framing.
     pub fn framing(self) -> Framing {
         let half = Framing {
             yaw_degrees: [0.0, 25.0],
@@ -167,7 +167,7 @@ impl Condition {
     }
 }
 
-/// What a body rests on.
+/// Seat of a person.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Seat {
     Standing,
@@ -178,7 +178,7 @@ pub enum Seat {
 
 /// How hands move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Manner {
+pub enum GestureStyle {
     Free,
     Folded,
     Crossing,
@@ -188,18 +188,18 @@ pub enum Manner {
     Fast,
 }
 
-/// Ranges of what a camera shows; lengths are shares of the body's unit (`Build::unit`).
+/// Ranges of the camera framing; lengths in units of the body (`Build::unit`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Framing {
-    /// Least and most angle beside the body's front.
+    /// Least and greatest angle from the body's front.
     pub yaw_degrees: [f64; 2],
-    /// Lower border of the picture below the neck.
+    /// Distance of the lower image border below the neck.
     pub below_neck: [f64; 2],
-    /// Upper border above the crown of the head.
+    /// Distance of the upper image border above the crown of the head.
     pub above_head: [f64; 2],
     /// Horizontal angle of view.
     pub fov_degrees: [f64; 2],
-    /// Widths and heights, px, all even.
+    /// Image sizes (width, height), px, all even.
     pub sizes: &'static [[usize; 2]],
 }
 

@@ -1,42 +1,45 @@
-//! Contacts: wrists are moved so that hands and forearms stay out of the trunk, the desk, the thighs and each other.
+//! Contacts: wrists are displaced so that hands and forearms do not penetrate the trunk, the desk, the thighs or each
+//! other.
 
-use super::acts::Carriage;
 use super::body;
 use super::body::{ArmPosture, Build, SIDES};
+use super::motion::LeanStyle;
 use super::trunk::TorsoPlace;
 use orator_base::math::vec3::{Vec3, add, norm, scale, sub};
 use orator_base::types::skeleton::{L_HAND, N_HAND_JOINTS, N_JOINTS, R_HAND};
 
-/// Half width and depth of the trunk with clothes, metres of a body of unit 1, and its lower end below the neck.
+/// Half width and depth of the clothed trunk, and distance of its lower end below the neck, metres of a body of unit
+/// 1.
 const TRUNK: [f64; 2] = [0.165, 0.14];
 const TRUNK_END: f64 = 0.56;
-/// How deep below a surface a point may be and still be lifted onto it, cm.
-const DEEPEST: f64 = 25.0;
-/// Shortest distance of two hands' joints, metres.
-const APART: f64 = 0.024;
+/// Greatest depth in cm from which a point below a surface is lifted onto it.
+const MAX_DEPTH: f64 = 25.0;
+/// Least distance overlap joints of the two hands, metres.
+const MIN_HAND_DISTANCE: f64 = 0.024;
 const ROUNDS: usize = 4;
 
-/// Horizontal surface that hands lie on, world cm.
+/// Horizontal surface on which hands rest, world cm.
 #[derive(Clone, Copy, Debug)]
 pub struct Slab {
     pub top: f64,
     pub x: [f64; 2],
     pub z: [f64; 2],
-    /// A hand whose wrist is meant to be this far below the neck is under the surface, metres of a body of unit 1.
+    /// A hand whose planned wrist position is at least this far below the neck belongs under the surface, metres of a
+    /// body of unit 1.
     pub beneath: f64,
 }
 
-/// What a person's hands may touch.
+/// Obstacles of a person's hands.
 #[derive(Clone, Debug, Default)]
 pub struct Obstacles {
     pub slabs: Vec<Slab>,
-    /// How the arms are carried.
-    pub carriage: Carriage,
-    /// Side of the hand that passes before the other.
+    /// Forward lean of the person.
+    pub lean_style: LeanStyle,
+    /// Side of the hand that is in front of the other.
     pub front: usize,
 }
 
-/// Half thickness of a hand at its joint, cm: wrist, palm, fingers.
+/// Half the thickness of a hand at a joint, cm: wrist, knuckles, other finger joints.
 fn thickness(joint: usize) -> f64 {
     match joint {
         0 => 3.0,
@@ -46,34 +49,35 @@ fn thickness(joint: usize) -> f64 {
 }
 
 impl Obstacles {
-    /// Joints of the arms in the torso's axes, metres, out of everything.
-    pub fn free(&self, build: &Build, arms: &[ArmPosture; 2], torso: &TorsoPlace) -> [Vec3; N_JOINTS] {
+    /// Joints of the arms in the torso's axes, metres, after resolving contacts.
+    pub fn resolve(&self, build: &Build, arms: &[ArmPosture; 2], torso: &TorsoPlace) -> [Vec3; N_JOINTS] {
         let unit = build.unit();
-        let mut wrists = arms.each_ref().map(|posture| scale(self.carriage.wrist(posture.wrist), unit));
+        let mut wrists = arms.each_ref().map(|posture| scale(self.lean_style.wrist(posture.wrist), unit));
         let mut joints = body::joints(build, arms, wrists);
         for _ in 0..ROUNDS {
-            let mut ways = [0, 1].map(|side| {
+            let mut displacements = [0, 1].map(|side| {
                 let (shoulder, root, _) = SIDES[side];
                 let hand = &joints[root..root + N_HAND_JOINTS];
-                let way = out_of_trunk(hand, unit);
+                let displacement = out_of_trunk(hand, unit);
                 let forearm = scale(add(joints[shoulder + 1], joints[shoulder + 2]), 0.5);
-                add(way, self.onto_slabs(arms[side].wrist[1], (hand, forearm), torso))
+                add(displacement, self.onto_slabs(arms[side].wrist[1], (hand, forearm), torso))
             });
-            let between = apart(&joints);
-            ways[self.front][2] -= 0.5 * between;
-            ways[1 - self.front][2] += 0.5 * between;
-            if ways.iter().all(|way| norm(*way) < 1e-4) {
+            let overlap = hand_overlap(&joints);
+            displacements[self.front][2] -= 0.5 * overlap;
+            displacements[1 - self.front][2] += 0.5 * overlap;
+            if displacements.iter().all(|displacement| norm(*displacement) < 1e-4) {
                 break;
             }
-            for ((wrist, way), (_, _, sign)) in wrists.iter_mut().zip(ways).zip(SIDES) {
-                *wrist = add(*wrist, [sign * way[0], way[1], way[2]]);
+            for ((wrist, displacement), (_, _, sign)) in wrists.iter_mut().zip(displacements).zip(SIDES) {
+                *wrist = add(*wrist, [sign * displacement[0], displacement[1], displacement[2]]);
             }
             joints = body::joints(build, arms, wrists);
         }
         joints
     }
 
-    /// Way up onto the surfaces, metres, of a hand that is meant to be `below` the neck.
+    /// Displacement in metres (torso axes) that lifts a hand onto the surfaces; `below` is the planned distance of its
+    /// wrist below the neck.
     fn onto_slabs(&self, below: f64, (hand, forearm): (&[Vec3], Vec3), torso: &TorsoPlace) -> Vec3 {
         let joints = hand.iter().enumerate().map(|(joint, &at)| (torso.world(at), thickness(joint)));
         let points: Vec<(Vec3, f64)> = joints.chain([(torso.world(forearm), 3.5)]).collect();
@@ -81,14 +85,14 @@ impl Obstacles {
             points.iter().map(move |([x, y, z], thick)| {
                 let over = (slab.x[0]..slab.x[1]).contains(x) && (slab.z[0]..slab.z[1]).contains(z);
                 let lift = slab.top + thick - y;
-                if over && lift < DEEPEST { lift.max(0.0) } else { 0.0 }
+                if over && lift < MAX_DEPTH { lift.max(0.0) } else { 0.0 }
             })
         });
-        torso.way([0.0, lift.fold(0.0, f64::max), 0.0])
+        torso.displacement([0.0, lift.fold(0.0, f64::max), 0.0])
     }
 }
 
-/// Way ahead out of the trunk's ellipse, metres.
+/// Forward displacement out of the trunk's ellipse, metres.
 fn out_of_trunk(hand: &[Vec3], unit: f64) -> Vec3 {
     let [half, depth] = TRUNK.map(|metres| metres * unit);
     let ahead = hand.iter().enumerate().map(|(joint, &[x, down, away])| {
@@ -101,8 +105,8 @@ fn out_of_trunk(hand: &[Vec3], unit: f64) -> Vec3 {
     [0.0, 0.0, -ahead.fold(0.0, f64::max)]
 }
 
-/// How far two hands are into each other, metres.
-fn apart(joints: &[Vec3; N_JOINTS]) -> f64 {
+/// Penetration depth of the two hands, metres.
+fn hand_overlap(joints: &[Vec3; N_JOINTS]) -> f64 {
     let hand = |root: usize| &joints[root..root + N_HAND_JOINTS];
     let mut least = f64::INFINITY;
     for a in hand(L_HAND) {
@@ -110,15 +114,15 @@ fn apart(joints: &[Vec3; N_JOINTS]) -> f64 {
             least = least.min(norm(sub(*a, *b)));
         }
     }
-    (APART - least).max(0.0)
+    (MIN_HAND_DISTANCE - least).max(0.0)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::demo::people::acts::TrunkPosture;
     use crate::demo::people::body::FingerShape;
     use crate::demo::people::condition::Seat;
+    use crate::demo::people::motion::TrunkPosture;
     use crate::demo::people::trunk::SeatedRig;
 
     #[test]
@@ -138,8 +142,8 @@ mod tests {
             fingers: FingerShape::FLAT,
         };
         let inside = ArmPosture { wrist: [0.05, 0.2, -0.04], ..low };
-        let obstacles = Obstacles { slabs: vec![slab], carriage: Carriage::default(), front: 0 };
-        let joints = obstacles.free(&build, &[low, inside], &torso);
+        let obstacles = Obstacles { slabs: vec![slab], lean_style: LeanStyle::default(), front: 0 };
+        let joints = obstacles.resolve(&build, &[low, inside], &torso);
         for &joint in &joints[L_HAND..L_HAND + N_HAND_JOINTS] {
             assert!(torso.world(joint)[1] > slab.top, "{joint:?}");
         }

@@ -1,5 +1,5 @@
-//! Folder of rendered people: videos by condition, their truth, a list of the clips, and a configuration for `orator
-//! run` with the models for real people.
+//! Folder of rendered persons: videos by condition, their ground truth, a list of the clips, and a configuration for
+//! `orator run` with the models for real persons.
 
 use super::condition::Condition;
 use super::scene::{CapturedClip, PeopleScene};
@@ -19,7 +19,7 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Part of a set: each has bodies, clothes, cameras and motions of its own.
+/// Part of a set; the parts share no body, clothes, camera or motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SetPart {
@@ -29,11 +29,11 @@ pub enum SetPart {
 }
 
 impl SetPart {
-    /// All, in order.
+    /// All parts, in order.
     pub const ALL: [Self; 3] = [Self::First, Self::Middle, Self::Last];
 }
 
-/// Clip of a set; paths are relative to its folder.
+/// A clip of a set; paths are relative to the set's folder.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PeopleClip {
     pub video: PathBuf,
@@ -45,26 +45,26 @@ pub struct PeopleClip {
     /// Width and height, px.
     pub size: [usize; 2],
     pub focal_px: f64,
-    /// Frames a second, as a fraction.
+    /// Frame rate, frames/s, as a fraction.
     pub fps: [u32; 2],
     pub secs: f64,
-    /// File of the captured motion, where one was given.
+    /// File of the captured motion, if one was used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motion: Option<PathBuf>,
 }
 
-/// What to render.
+/// Rendering plan.
 #[derive(Clone, Debug)]
 pub struct PeoplePlan {
     pub conditions: Vec<Condition>,
-    /// Clips of each condition, a multiple of 3.
+    /// Number of clips per condition, a multiple of 3.
     pub n_clips: usize,
     pub secs: f64,
     pub fps: FrameRate,
     pub seed: u64,
-    /// File of a captured motion, or a folder of them.
+    /// File or folder of captured motion.
     pub motion: Option<PathBuf>,
-    /// Write the truth alone, without pictures: motion for lifters to learn from.
+    /// Write only the ground truth, without videos: training motion for the lifters.
     pub truth_only: bool,
 }
 
@@ -84,6 +84,9 @@ source = "rendered by orator demo"
 "#;
 
 /// Renders the clips of a plan into `dir`; returns their list.
+///
+/// # Errors
+/// An invalid plan; captured motion that cannot be read; a failure to render or to write.
 pub fn draw(dir: &Path, plan: &PeoplePlan, progress: &dyn Progress) -> Result<Vec<PeopleClip>> {
     let n = plan.n_clips;
     ensure!(n > 0 && n.is_multiple_of(3), "--people takes 3, 6, 9 ... clips for each condition, not {n}");
@@ -134,7 +137,10 @@ pub fn draw(dir: &Path, plan: &PeoplePlan, progress: &dyn Progress) -> Result<Ve
     Ok(clips)
 }
 
-/// Reads the list of a folder of `draw`.
+/// Reads the clip list of a folder written by `draw`.
+///
+/// # Errors
+/// A list that is missing or invalid.
 pub fn read(dir: &Path) -> Result<Vec<PeopleClip>> {
     let path = dir.join(LIST);
     let text = std::fs::read_to_string(&path).with_context(|| {
@@ -143,8 +149,8 @@ pub fn read(dir: &Path) -> Result<Vec<PeopleClip>> {
     serde_json::from_str(&text).with_context(|| format!("{} is no list of rendered people", path.display()))
 }
 
-/// Seeds of a clip. Those of the three parts lie in ranges of their own, so that no body, camera, suit of clothes or
-/// motion of one part comes in another.
+/// Seeds of a clip. The three parts use disjoint ranges, so that no body, camera, clothes or motion occurs in two
+/// parts.
 fn seeds(seed: u64, condition: Condition, number: usize, part: SetPart) -> ClipSeeds {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(1000 * condition as u64 + number as u64);
@@ -153,7 +159,7 @@ fn seeds(seed: u64, condition: Condition, number: usize, part: SetPart) -> ClipS
     ClipSeeds { body: next(), clothes: next(), camera: next(), motion: next(), voice: None }
 }
 
-/// Files of motion of a folder in the order of their names, or the file itself.
+/// The motion files of a folder, sorted by name, or the file itself.
 fn motions(path: &Path) -> Result<Vec<PathBuf>> {
     if !path.is_dir() {
         return Ok(vec![path.to_owned()]);

@@ -1,5 +1,5 @@
-//! Things that a hand holds, in the axes of the left hand at rest (cm: x along the fingers, y out of the back, z to the
-//! thumb), mirrored for the right one.
+//! Objects held in a hand, in the axes of the left hand at rest (cm: x along the fingers, y out of the back of the
+//! hand, z towards the thumb), mirrored for the right hand.
 
 use super::body::FingerShape;
 use super::solid;
@@ -11,18 +11,18 @@ use orator_base::math::vec3::Vec3;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// Thing in a hand.
+/// An object held in a hand.
 #[derive(Clone, Debug)]
-pub struct HeldThing {
-    /// Left 0, right 1.
+pub struct HeldObject {
+    /// 0: left, 1: right.
     pub side: usize,
     pub grip: FingerShape,
     /// In the hand's axes, cm.
     mesh: Mesh,
 }
 
-impl HeldThing {
-    /// A pen, cup, phone or sheet for a hand of a size (1: `Build::ADULT`).
+impl HeldObject {
+    /// Samples a pen, cup, phone or sheet for a hand of the given size (1: `Build::ADULT`).
     pub fn sample(hand: f64, rng: &mut ChaCha8Rng) -> Self {
         let side = usize::from(rng.random_bool(0.5));
         let sign = [1.0, -1.0][side];
@@ -54,7 +54,7 @@ impl HeldThing {
         Self { side, grip, mesh: solids.mesh }
     }
 
-    /// Thing in the hand of a pose.
+    /// Mesh of the object in the hand of a pose, world cm.
     pub fn posed(&self, rig: &Rig, root: Vec3, local: &[Rotation]) -> Mesh {
         let hand = rig.arms[self.side].hand;
         let (turns, places) = (rig.skeleton.world(local), rig.skeleton.positions(root, local));

@@ -1,4 +1,5 @@
-//! Clip of rendered people: actors, room, camera and sound from its seeds, filmed with the truth of every frame.
+//! A clip of rendered persons: actors, room, camera and sound from its seeds, rendered with the ground truth of every
+//! frame.
 
 use super::actor::{Actor, ActorPose, ActorRole, ActorSeeds};
 use super::condition::{Condition, Seat};
@@ -24,32 +25,32 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// Steps of time in a frame with motion blur, an odd number, and the steps for which the shutter is open.
+/// Time steps per frame with motion blur (odd), and the number of steps during which the shutter is open.
 const BLUR_STEPS: usize = 15;
 const SHUTTER: usize = 9;
-/// Frames drawn at a time.
+/// Frames rendered in parallel.
 const BATCH: usize = 24;
 
-/// Seeds of a clip, one for each thing that differs between the parts of a set.
+/// Seeds of a clip, one for each property that differs between the parts of a set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ClipSeeds {
     pub body: u64,
     pub clothes: u64,
     pub camera: u64,
     pub motion: u64,
-    /// Pitch and formants; those of the speech where there is none.
+    /// Seed of pitch and formants; if absent they follow from the `motion` seed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub voice: Option<u64>,
 }
 
-/// Motion captured elsewhere, with its sound.
+/// Captured motion with its sound.
 #[derive(Clone, Debug)]
 pub struct CapturedClip {
     pub motion: Motion,
     pub sound: Option<Sound>,
 }
 
-/// Clip ready to be filmed.
+/// A clip ready to be rendered.
 pub struct PeopleScene {
     pub fps: FrameRate,
     pub n_frames: usize,
@@ -59,13 +60,13 @@ pub struct PeopleScene {
     light: Light,
     background: Background,
     defects: CameraDefects,
-    /// Steps of time in a frame.
+    /// Time steps per frame.
     n_steps: usize,
     crf: u32,
 }
 
 impl PeopleScene {
-    /// Clip of `secs` seconds.
+    /// Creates a clip of `secs` seconds; `captured` motion replaces the procedural motion of the first person.
     pub fn new(
         condition: Condition,
         seeds: ClipSeeds,
@@ -84,7 +85,7 @@ impl PeopleScene {
         let seat = condition.seat().unwrap_or([Seat::Standing, Seat::Chair, Seat::Desk][rng.random_range(0..3)]);
         let seat = if condition == Condition::TwoPeople && seat == Seat::Desk { Seat::Chair } else { seat };
         let role = ActorRole {
-            manner: condition.manner(),
+            gesture_style: condition.gesture_style(),
             seat,
             leans: condition == Condition::LeaningDesk,
             place: [0.0; 2],
@@ -101,7 +102,8 @@ impl PeopleScene {
             let side = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
             let place = [side * rng.random_range(52.0..75.0), -rng.random_range(25.0..70.0)];
             let second = ActorRole { place, turn: -side * rng.random_range(0.0..0.35), speaks: false, ..role };
-            // The second person has the first one's seeds from far along the same streams.
+            // The seeds of the second person are derived from the first one's by setting a high bit, which no part of
+            // a set uses.
             let [body, clothes, motion] = [body, clothes, motion].map(|seed| seed ^ (1 << 40));
             let silent = Voice::new(motion, secs, None);
             actors.push(act(ActorSeeds { body, clothes, motion }, second, &silent, None));
@@ -127,7 +129,10 @@ impl PeopleScene {
         &self.voice.sound
     }
 
-    /// Writes the clip as a video and returns its truth.
+    /// Renders the clip to a video at `path` and returns its ground truth.
+    ///
+    /// # Errors
+    /// The video cannot be written.
     pub fn film(&self, path: &Path, progress: &dyn Progress) -> anyhow::Result<RenderedTruth> {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let task = progress.begin(&format!("render {name}"), self.n_frames as u64);
@@ -152,10 +157,10 @@ impl PeopleScene {
         Ok(truth::collected(&truths, self.fps, &self.camera, speaks))
     }
 
-    /// Truth without pictures: every point inside the picture counts as seen.
+    /// Ground truth without rendering: every point inside the image counts as visible.
     pub fn truth_without_pictures(&self) -> RenderedTruth {
         let owners = PointOwners::new(&self.actors[0]);
-        // A renderer that has drawn nothing has nothing in front of a point.
+        // A renderer without a drawn frame reports no occluders.
         let renderer = Renderer::new(self.camera.size);
         let first = &self.actors[0];
         let truths: Vec<FrameTruth> = (0..self.n_frames)
@@ -164,12 +169,12 @@ impl PeopleScene {
         truth::collected(&truths, self.fps, &self.camera, first.role.speaks && !self.sound().samples.is_empty())
     }
 
-    /// Picture and truth of a frame. The truth is that of the middle of the time that the shutter is open.
+    /// Image and ground truth of a frame. The truth is that of the middle of the exposure.
     pub fn frame(&self, renderer: &mut Renderer, owners: &PointOwners, frame_idx: usize) -> (Image, FrameTruth) {
         let middle = frame_idx * self.n_steps;
         let half = if self.n_steps == 1 { 0 } else { SHUTTER / 2 };
         let last = self.n_frames * self.n_steps - 1;
-        // The frame's own time is drawn last: the renderer is asked what is in front.
+        // The middle of the exposure is drawn last, because the renderer reports the occluders of its last image.
         let beside = (1..=half).flat_map(|k| [middle.saturating_sub(k), (middle + k).min(last)]);
         let images: Vec<Image> = beside.chain([middle]).map(|step| self.draw(renderer, step)).collect();
         let first = &self.actors[0];
@@ -178,7 +183,7 @@ impl PeopleScene {
         let counts = [first.n_body_meshes(), n_own, n_people];
         let truth = FrameTruth::of(first, owners, &first.poses[middle], &self.camera, (renderer, counts));
         let image = lens::mean(&images).unwrap_or_else(|| self.background.image.clone());
-        (self.defects.taken(image, frame_idx), truth)
+        (self.defects.apply(image, frame_idx), truth)
     }
 
     fn draw(&self, renderer: &mut Renderer, step: usize) -> Image {

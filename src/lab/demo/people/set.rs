@@ -1,4 +1,4 @@
-//! Room around a rendered person: floor, walls, chair, desk and furniture, or a plain ground.
+//! Room around a rendered person: floor, walls, chair, desk and furniture, or a plain background.
 
 use super::condition::Seat;
 use super::solid::{Colour, Solids};
@@ -10,26 +10,26 @@ use orator_base::types::image::Image;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// Half width of the room, height of its walls, half width of what is furnished, and how far the floor reaches before
+/// Half width of the room, height of its walls, half width of the furnished area, and extent of the floor in front of
 /// the person, cm.
-const HALF: f64 = 600.0;
-const HEIGHT: f64 = 290.0;
-const FURNISHED: f64 = 480.0;
-const BEFORE: f64 = 1000.0;
+const ROOM_HALF_WIDTH: f64 = 600.0;
+const WALL_HEIGHT: f64 = 290.0;
+const FURNISHED_HALF_WIDTH: f64 = 480.0;
+const FLOOR_IN_FRONT: f64 = 1000.0;
 
-/// A body's seat in its place.
+/// Seat and position of a body.
 #[derive(Clone, Copy, Debug)]
 pub struct SeatPlace {
     pub seat: Seat,
-    /// Hips of the upright body, cm; its size; its turn to its left, radians.
+    /// Hips of the upright body, cm; unit of the body (`Build::unit`); rotation to its left, radians.
     pub hips: Vec3,
     pub unit: f64,
     pub turn: f64,
-    /// Upper side of a desk, and its near edge ahead of the hips, cm.
+    /// Height of the desk top, and distance from the hips to its near edge, cm.
     pub desk: [f64; 2],
 }
 
-/// Background of a clip with the seats of everybody in it.
+/// Background of a clip with the seats of all persons in it.
 pub fn background(camera: &PinholeCamera, light: &Light, seats: &[SeatPlace], rng: &mut ChaCha8Rng) -> Background {
     let mut solids = Solids::new(0.15);
     let wall: Colour = muted(rng, 0.12, 0.75);
@@ -60,7 +60,7 @@ pub fn background(camera: &PinholeCamera, light: &Light, seats: &[SeatPlace], rn
     scenery::background(camera, &meshes.iter().collect::<Vec<_>>(), light, plain)
 }
 
-/// Colour between dark and light, little saturated.
+/// A random colour of low saturation.
 fn muted(rng: &mut ChaCha8Rng, dark: f32, light: f32) -> Colour {
     let grey = rng.random_range(dark..light);
     std::array::from_fn(|_| grey * rng.random_range(0.8..1.2))
@@ -69,25 +69,30 @@ fn muted(rng: &mut ChaCha8Rng, dark: f32, light: f32) -> Colour {
 fn floor(solids: &mut Solids, behind: f64, colour: Colour, rng: &mut ChaCha8Rng) {
     let shades: Vec<f32> = (0..24).map(|_| rng.random_range(0.88..1.1)).collect();
     let shade = |i: usize, k: usize| colour.map(|v| v * shades[(7 * i + 3 * k) % shades.len()]);
-    let corner = [-HALF, 0.0, BEFORE];
-    solids.tiles(corner, [[2.0 * HALF, 0.0, 0.0], [0.0, 0.0, behind - BEFORE]], [24, 16], shade);
+    let corner = [-ROOM_HALF_WIDTH, 0.0, FLOOR_IN_FRONT];
+    solids.tiles(corner, [[2.0 * ROOM_HALF_WIDTH, 0.0, 0.0], [0.0, 0.0, behind - FLOOR_IN_FRONT]], [24, 16], shade);
 }
 
 fn back_wall(solids: &mut Solids, behind: f64, colour: Colour) {
     let shade = |_: usize, k: usize| colour.map(|v| v * (1.06 - 0.03 * k as f32));
-    solids.tiles([-HALF, 0.0, behind], [[2.0 * HALF, 0.0, 0.0], [0.0, HEIGHT, 0.0]], [20, 4], shade);
+    solids.tiles(
+        [-ROOM_HALF_WIDTH, 0.0, behind],
+        [[2.0 * ROOM_HALF_WIDTH, 0.0, 0.0], [0.0, WALL_HEIGHT, 0.0]],
+        [20, 4],
+        shade,
+    );
     // Skirting board.
-    solids.between([-HALF, 0.0, behind], [HALF, 9.0, behind + 1.5], colour.map(|v| 0.5 * v));
+    solids.between([-ROOM_HALF_WIDTH, 0.0, behind], [ROOM_HALF_WIDTH, 9.0, behind + 1.5], colour.map(|v| 0.5 * v));
 }
 
 fn furniture(solids: &mut Solids, behind: f64, rng: &mut ChaCha8Rng) {
-    let mut x = -FURNISHED + rng.random_range(0.0..80.0);
-    while x < FURNISHED - 100.0 {
+    let mut x = -FURNISHED_HALF_WIDTH + rng.random_range(0.0..80.0);
+    while x < FURNISHED_HALF_WIDTH - 100.0 {
         let wide = rng.random_range(70.0..140.0);
         match rng.random_range(0..5) {
             0 | 1 => shelf(solids, [x, 0.0, behind], wide, rng),
             2 => window(solids, [x, 95.0, behind], wide, rng),
-            3 => picture(solids, [x, rng.random_range(120.0..150.0), behind], 0.7 * wide, rng),
+            3 => framed_picture(solids, [x, rng.random_range(120.0..150.0), behind], 0.7 * wide, rng),
             _ => lamp(solids, [x + wide / 2.0, 0.0, behind + 35.0], rng),
         }
         x += wide + rng.random_range(10.0..90.0);
@@ -131,7 +136,7 @@ fn window(solids: &mut Solids, at: Vec3, wide: f64, rng: &mut ChaCha8Rng) {
     }
 }
 
-fn picture(solids: &mut Solids, at: Vec3, wide: f64, rng: &mut ChaCha8Rng) {
+fn framed_picture(solids: &mut Solids, at: Vec3, wide: f64, rng: &mut ChaCha8Rng) {
     let high = wide * rng.random_range(0.6..1.3);
     solids.between(add(at, [-3.0, -3.0, 0.0]), add(at, [wide + 3.0, high + 3.0, 2.0]), [0.05; 3]);
     let colours: Vec<Colour> = (0..5).map(|_| std::array::from_fn(|_| rng.random_range(0.05..0.8))).collect();
@@ -147,7 +152,8 @@ fn lamp(solids: &mut Solids, at: Vec3, rng: &mut ChaCha8Rng) {
     solids.cylinder([add(at, [0.0, high, 0.0]), add(at, [0.0, high + 26.0, 0.0])], [19.0, 13.0], [0.9, 0.8, 0.6]);
 }
 
-/// Block in a seat's axes (x to the sitter's left, z ahead), low and high corners from the hips on the floor.
+/// Block in a seat's axes (x to the sitter's left, z forwards, origin on the floor below the hips), from its low to
+/// its high corner.
 fn seat_block(solids: &mut Solids, seat: &SeatPlace, low: Vec3, high: Vec3, colour: Colour) {
     let turn = Rotation::about([0.0, 1.0, 0.0], seat.turn);
     let middle: Vec3 = std::array::from_fn(|k| (low[k] + high[k]) / 2.0);

@@ -1,4 +1,4 @@
-//! Simple solids as meshes, for furniture and held things: boxes, cylinders, and walls and floors in tiles.
+//! Simple solids as meshes, for furniture and held objects: boxes, cylinders, and tiled walls and floors.
 
 use orator_avatar::render::Mesh;
 use orator_base::math::rotation::Rotation;
@@ -7,10 +7,10 @@ use orator_base::math::vec3::{Vec3, add, any_across, cross, norm, scale, sub, un
 /// Linear RGB reflectance, 0..1.
 pub type Colour = [f32; 3];
 
-/// Corners of a cylinder's round.
-const ROUND: usize = 20;
+/// Number of corners of a cylinder's circumference.
+const N_CORNERS: usize = 20;
 
-/// Solids of one mesh.
+/// Solids collected in one mesh.
 #[derive(Clone, Debug, Default)]
 pub struct Solids {
     pub mesh: Mesh,
@@ -30,7 +30,7 @@ impl Solids {
         mesh.points.len() as u32 - 1
     }
 
-    /// Parallelogram in tiles: a corner and its two sides, counter-clockwise seen from outside.
+    /// Adds a tiled parallelogram: a corner and its two sides, counter-clockwise seen from outside.
     pub fn tiles(
         &mut self,
         corner: Vec3,
@@ -52,7 +52,7 @@ impl Solids {
         }
     }
 
-    /// Box with sides along turned axes: its middle, its size and its turn.
+    /// Adds a box with rotated axes: its centre, size and rotation.
     pub fn block(&mut self, middle: Vec3, size: Vec3, turn: Rotation, colour: Colour) {
         let axes = turn.axes();
         for axis in 0..3 {
@@ -69,45 +69,46 @@ impl Solids {
         }
     }
 
-    /// Box between two opposite corners.
+    /// Adds an axis-aligned box between two opposite corners.
     pub fn between(&mut self, low: Vec3, high: Vec3, colour: Colour) {
         self.block(scale(add(low, high), 0.5), sub(high, low), Rotation::IDENTITY, colour);
     }
 
-    /// Cylinder, or a cone's stump, with both ends closed.
+    /// Adds a cylinder or truncated cone with closed ends.
     pub fn cylinder(&mut self, ends: [Vec3; 2], radii: [f64; 2], colour: Colour) {
         let along = unit(sub(ends[1], ends[0]), 0.0).unwrap_or([0.0, 1.0, 0.0]);
         let x = any_across(along);
         let y = cross(along, x);
         let slope = (radii[0] - radii[1]) / norm(sub(ends[1], ends[0])).max(1e-9);
         let out = |k: usize| {
-            let (sin, cos) = (std::f64::consts::TAU * k as f64 / ROUND as f64).sin_cos();
+            let (sin, cos) = (std::f64::consts::TAU * k as f64 / N_CORNERS as f64).sin_cos();
             add(scale(x, cos), scale(y, sin))
         };
         for end in 0..2 {
             let normal = scale(along, if end == 0 { -1.0 } else { 1.0 });
             let middle = self.vertex(ends[end], normal, colour);
-            let rim: Vec<u32> =
-                (0..ROUND).map(|k| self.vertex(add(ends[end], scale(out(k), radii[end])), normal, colour)).collect();
-            for k in 0..ROUND {
-                let (a, b) = (rim[k], rim[(k + 1) % ROUND]);
+            let rim: Vec<u32> = (0..N_CORNERS)
+                .map(|k| self.vertex(add(ends[end], scale(out(k), radii[end])), normal, colour))
+                .collect();
+            for k in 0..N_CORNERS {
+                let (a, b) = (rim[k], rim[(k + 1) % N_CORNERS]);
                 self.mesh.triangles.push(if end == 0 { [middle, b, a] } else { [middle, a, b] });
             }
         }
-        let sides: Vec<[u32; 2]> = (0..ROUND)
+        let sides: Vec<[u32; 2]> = (0..N_CORNERS)
             .map(|k| {
                 let normal = unit(add(out(k), scale(along, slope)), 0.0).unwrap_or(along);
                 [0, 1].map(|end| self.vertex(add(ends[end], scale(out(k), radii[end])), normal, colour))
             })
             .collect();
-        for k in 0..ROUND {
-            let ([a, b], [c, d]) = (sides[k], sides[(k + 1) % ROUND]);
+        for k in 0..N_CORNERS {
+            let ([a, b], [c, d]) = (sides[k], sides[(k + 1) % N_CORNERS]);
             self.mesh.triangles.extend([[a, c, d], [a, d, b]]);
         }
     }
 }
 
-/// Mesh turned and then shifted.
+/// The mesh, rotated and then translated.
 pub fn placed(mesh: &Mesh, turn: Rotation, shift: Vec3) -> Mesh {
     let turned = |a: &[f32; 3]| turn.turn(a.map(f64::from));
     Mesh {

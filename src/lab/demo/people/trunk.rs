@@ -1,8 +1,8 @@
-//! Trunk, head and legs of a rendered person on its rig: postures to local rotations, and the way from the torso's axes
-//! to the world's (cm, y up, the person faces +z, the floor at y = 0).
+//! Trunk, head and legs of a rendered person on its rig: conversion of postures to local rotations, and of the torso's
+//! axes to world axes (cm, y up, the person faces +z, the floor at y = 0).
 
-use super::acts::TrunkPosture;
 use super::condition::Seat;
+use super::motion::TrunkPosture;
 use orator_avatar::animate::rig::rig::{CM, Rig};
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::{Vec3, add, norm, scale};
@@ -11,7 +11,7 @@ const X: Vec3 = [1.0, 0.0, 0.0];
 const Y: Vec3 = [0.0, 1.0, 0.0];
 const Z: Vec3 = [0.0, 0.0, 1.0];
 
-/// Place of a torso in the world.
+/// Position and orientation of a torso in the world.
 #[derive(Clone, Copy, Debug)]
 pub struct TorsoPlace {
     /// Neck, cm.
@@ -20,23 +20,23 @@ pub struct TorsoPlace {
 }
 
 impl TorsoPlace {
-    /// Point of the torso's axes (metres, y down, away from the viewer) in the world, cm.
+    /// Converts a point from the torso's axes (metres, y down, z away from the viewer) to world cm.
     pub fn world(&self, [x, down, away]: Vec3) -> Vec3 {
         add(self.neck, self.turn.turn(scale([x, -down, -away], CM)))
     }
 
-    /// Way in the torso's axes, metres, of a way in the world, cm.
-    pub fn way(&self, cm: Vec3) -> Vec3 {
+    /// Converts a displacement from world cm to the torso's axes, metres.
+    pub fn displacement(&self, cm: Vec3) -> Vec3 {
         let [x, y, z] = scale(self.turn.inverse().turn(cm), 1.0 / CM);
         [x, -y, -z]
     }
 }
 
-/// Rig that stands or sits somewhere.
+/// A standing or seated rig.
 pub struct SeatedRig<'a> {
     pub rig: &'a Rig,
     pub seat: Seat,
-    /// Turn of the knees outwards, and of the feet ahead or back under the seat, radians.
+    /// Outward rotation of the knees, and pitch of the shins that puts the feet forwards or under the seat, radians.
     pub knees: f64,
     pub shins: f64,
 }
@@ -48,13 +48,13 @@ impl SeatedRig<'_> {
         let length = |name: &str| rig.skeleton.find(name).map_or(0.0, |joint| norm(rig.skeleton.joints[joint].offset));
         let height = match self.seat {
             Seat::Standing => rig.root[1],
-            // Thighs are level, shins nearly upright: the hips are a shin above the ankles.
+            // Thighs are level and shins nearly upright: the hips are one shin length above the ankles.
             _ => rig.root[1] - length("LeftLeg") - (1.0 - self.shins.cos()) * length("LeftFoot"),
         };
         [rig.root[0] + CM * posture.shift, height, rig.root[2]]
     }
 
-    /// Turns trunk, head and legs; what turns the arms stays.
+    /// Sets the local rotations of trunk, head and legs; those of the arms remain.
     pub fn pose(&self, posture: &TrunkPosture, local: &mut [Rotation]) {
         let rig = self.rig;
         let [turn, lean, side] = posture.trunk;
@@ -63,7 +63,7 @@ impl SeatedRig<'_> {
                 * Rotation::about(X, share[1] * lean)
                 * Rotation::about(Z, -share[2] * side)
         };
-        // Who stands turns and bends above the hips.
+        // A standing person turns and bends mostly above the hips.
         let hips = if self.seat == Seat::Standing { [0.2, 0.4, 0.3] } else { [0.2, 0.6, 0.4] };
         local[0] = part(hips);
         local[rig.spine] = part(hips.map(|share| (1.0 - share) / 2.0));
@@ -88,7 +88,7 @@ impl SeatedRig<'_> {
         }
     }
 
-    /// Place of the torso in a posture.
+    /// Position and orientation of the torso in a posture.
     pub fn torso(&self, posture: &TrunkPosture) -> TorsoPlace {
         let mut local = vec![Rotation::IDENTITY; self.rig.skeleton.joints.len()];
         self.pose(posture, &mut local);

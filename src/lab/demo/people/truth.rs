@@ -1,4 +1,4 @@
-//! Points of an actor in the picture, exact through the rig and the camera, and what is before each.
+//! Ground truth of an actor in the image, exact from rig and camera, and the visibility of each point.
 
 use super::actor::{Actor, ActorPose};
 use crate::rendered_truth::{RenderedTruth, Visibility};
@@ -10,36 +10,36 @@ use orator_base::types::pose2d::{N_BODY, N_HAND};
 use orator_base::types::skeleton::{L_HAND, L_SHOULDER, N_JOINTS, NECK, R_HAND, R_SHOULDER};
 use orator_base::types::time::FrameRate;
 
-/// Points of a frame: the body's, the left hand's, the right hand's.
+/// Number of points of a frame: body, left hand, right hand.
 pub const N_POINTS: usize = N_BODY + 2 * N_HAND;
 
-/// Parts of the rig that a point belongs to, and how deep below the surface it lies.
+/// Rig joints that a point belongs to, and its depth below the surface.
 #[derive(Clone, Debug)]
 struct PointOwner {
     joints: Vec<usize>,
-    /// Radius of the limb with clothes, and some more, cm of a body of unit 1.
+    /// Radius of the clothed limb plus a margin, cm of a body of unit 1.
     depth: f64,
-    /// Whether it is of the left hand, the right hand or the body.
+    /// Hand of the point: 0 left, 1 right, `None` for the body.
     hand: Option<usize>,
 }
 
-/// What every point of an actor belongs to.
+/// Owners of all points of an actor.
 pub struct PointOwners {
     owners: Vec<PointOwner>,
-    /// For every joint of the rig the hand it is of.
+    /// Hand (0 left, 1 right) of each rig joint.
     hand_of: Vec<Option<usize>>,
     unit: f64,
 }
 
-/// Truth of one frame.
+/// Ground truth of one frame.
 #[derive(Clone, Debug)]
 pub struct FrameTruth {
     pub px: [[f64; 2]; N_POINTS],
     pub seen: [Visibility; N_POINTS],
-    /// Joints, and the body's points, in camera axes, metres.
+    /// Joints, and points of the body, in camera axes, metres.
     joints: [Vec3; N_JOINTS],
     body: [Vec3; N_BODY],
-    /// Degrees.
+    /// Yaw, pitch and roll of the head, degrees.
     head: Vec3,
     mouth: f64,
 }
@@ -94,8 +94,9 @@ impl PointOwners {
         Self { owners, hand_of, unit: actor.unit }
     }
 
-    /// What is before a point at a depth (cm) of the first actor's meshes in the renderer's last frame; `n_body` and
-    /// `n_own` are the numbers of the body's meshes and of those with the held thing, `n_people` of all people's.
+    /// Visibility of a point at `depth` (cm); `front` is the mesh, label and depth of the foremost surface at its
+    /// pixel. Mesh counts: those of the first actor's body (`n_body`), with the held object (`n_own`), and of all
+    /// persons (`n_people`).
     fn visibility(
         &self,
         point: usize,
@@ -105,8 +106,8 @@ impl PointOwners {
     ) -> Visibility {
         let owner = &self.owners[point];
         let Some((mesh, label, front)) = front else { return Visibility::Seen };
-        let before = depth - front;
-        if before <= 0.0 {
+        let depth_behind_front = depth - front;
+        if depth_behind_front <= 0.0 {
             return Visibility::Seen;
         }
         if mesh >= n_body {
@@ -114,7 +115,7 @@ impl PointOwners {
             return if things { Visibility::BehindThing } else { Visibility::BehindPerson };
         }
         let label = usize::from(label);
-        if owner.joints.contains(&label) && before < owner.depth * self.unit {
+        if owner.joints.contains(&label) && depth_behind_front < owner.depth * self.unit {
             return Visibility::Seen;
         }
         match self.hand_of.get(label).copied().flatten() {
@@ -124,11 +125,11 @@ impl PointOwners {
     }
 }
 
-/// Meshes of a drawn frame: of the first body, with what it holds, of all people.
+/// Numbers of meshes of a drawn frame: the first actor's body, the same with its held object, all persons.
 pub type MeshCounts = [usize; 3];
 
 impl FrameTruth {
-    /// Truth of an actor's pose in the frame that the renderer drew last.
+    /// Ground truth of an actor's pose, for the frame that the renderer drew last.
     pub fn of(
         actor: &Actor,
         owners: &PointOwners,
@@ -157,7 +158,7 @@ impl FrameTruth {
     }
 }
 
-/// World points in the order of the truth, cm.
+/// World positions of the points in the order of the truth, cm.
 fn points(actor: &Actor, pose: &ActorPose, places: &[Vec3]) -> [Vec3; N_POINTS] {
     let rig = &actor.rig;
     let turn = rig.skeleton.world(&pose.local)[rig.head];
@@ -178,9 +179,10 @@ fn points(actor: &Actor, pose: &ActorPose, places: &[Vec3]) -> [Vec3; N_POINTS] 
     std::array::from_fn(|point| all[point])
 }
 
-/// Yaw to the person's left, pitch up and roll to the left shoulder of a head's rotation in camera axes, degrees.
+/// Yaw to the person's left, pitch up and roll to the left shoulder of a head, from its rotation in camera axes,
+/// degrees.
 fn head_degrees(head: Rotation) -> Vec3 {
-    // Half a turn about x brings a figure's axes (y up, facing +z) to those of a camera that it faces.
+    // Half a turn about x maps the rig's axes (y up, facing +z) to those of a camera that it faces.
     let facing = Rotation::about([1.0, 0.0, 0.0], std::f64::consts::PI);
     let turned = facing.inverse() * head;
     let [_, _, ahead] = turned.axes();
@@ -190,7 +192,7 @@ fn head_degrees(head: Rotation) -> Vec3 {
     [yaw.to_degrees(), pitch.to_degrees(), -left[1].atan2(left[0]).to_degrees()]
 }
 
-/// Frames of a clip as its truth.
+/// Joins the frames of a clip to its ground truth.
 pub fn collected(frames: &[FrameTruth], fps: FrameRate, camera: &PinholeCamera, speaks: bool) -> RenderedTruth {
     let n = frames.len();
     let px = Array3::from_shape_fn((n, N_POINTS, 2), |(t, point, k)| frames[t].px[point][k] as f32);
@@ -239,7 +241,7 @@ mod tests {
         };
         close(degrees([0.0, 1.0, 0.0], 0.0), [0.0; 3]);
         close(degrees([0.0, 1.0, 0.0], 30.0), [30.0, 0.0, 0.0]);
-        // About x turns y to z: the face looks down; about z turns x to y: the left ear rises.
+        // A rotation about x takes y to z: the face looks down; about z it takes x to y: the left ear rises.
         close(degrees([1.0, 0.0, 0.0], 20.0), [0.0, -20.0, 0.0]);
         close(degrees([0.0, 0.0, 1.0], 10.0), [0.0, 0.0, -10.0]);
     }

@@ -6,10 +6,11 @@ use orator_base::math::vec3::{Vec3, add, scale};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// Crown of the head above the neck, metres of a body of unit 1.
+/// Height of the crown of the head above the neck, metres of a body of unit 1.
 const CROWN: f64 = 0.34;
 
-/// Camera that frames a body: `neck` in the world, cm, `unit` its size, `beside` a second body's place.
+/// Samples a camera that frames a body: `neck` is its neck in world cm, `unit` its size, `beside` the neck of a second
+/// person.
 pub fn camera(
     condition: Condition,
     neck: Vec3,
@@ -22,7 +23,7 @@ pub fn camera(
     let size = sizes[rng.random_range(0..sizes.len())];
     let [width, height] = size.map(|n| n as f64);
     let fov = rng.random_range(fov_degrees[0]..fov_degrees[1]).to_radians();
-    // Whole quarters of a pixel come back from text as they were.
+    // Multiples of a quarter pixel are unchanged by conversion to text and back.
     let focal_px = (4.0 * width / 2.0 / (fov / 2.0).tan()).round() / 4.0;
     let top = neck[1] + cm * (CROWN + rng.random_range(above_head[0]..above_head[1]));
     let bottom = neck[1] - cm * rng.random_range(below_neck[0]..below_neck[1]);
@@ -40,12 +41,12 @@ pub fn camera(
     }
     let away = [yaw.sin() * rise.cos(), rise.sin(), yaw.cos() * rise.cos()];
     let mut position = add(target, scale(away, distance));
-    // A camera stands on something.
+    // The camera is at least 25 cm above the floor.
     position[1] = position[1].max(25.0);
     PinholeCamera::looking_at(size, focal_px, position, target, roll)
 }
 
-/// Light of a room: the key from above and aside, warm or cold.
+/// Samples the light of a room: key light from above and the side, warm or cold.
 pub fn light(rng: &mut ChaCha8Rng) -> Light {
     let (around, up) = (rng.random_range(-0.95..0.95_f64), rng.random_range(0.35..0.95_f64));
     let mut light = Light::studio([around.sin() * up.cos(), up.sin(), around.cos() * up.cos()]);

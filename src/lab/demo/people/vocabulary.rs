@@ -1,31 +1,31 @@
-//! Places and shapes of speaking hands: where they rest, and where a gesture brings them. Lengths in metres of a body of
-//! unit 1, in the axes of `ArmPosture`.
+//! Vocabulary of hand postures: rests and gestures of a speaker. Lengths in metres of a body of unit 1, in the axes of
+//! `ArmPosture`.
 
 use super::body::{ArmPosture, FingerShape};
-use super::condition::{Manner, Seat};
+use super::condition::{GestureStyle, Seat};
 use orator_base::math::vec3::Vec3;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// Both arms, left and right.
+/// Postures of the left and the right arm.
 pub type Arms = [ArmPosture; 2];
 
-/// Desk's upper side below the neck, and its near edge ahead of it, metres of a body of unit 1.
+/// Distance of the desk top below the neck, and of its near edge in front of it, metres of a body of unit 1.
 pub const DESK_BELOW_NECK: f64 = 0.365;
 pub const DESK_AHEAD: f64 = 0.27;
 
-/// Rest that hides the hands under a desk.
+/// Rest with the hands hidden under a desk.
 pub fn under_desk() -> Arms {
     folded([0.06, 0.43, -0.2], false)
 }
 
-/// Both hands above the near edge of a desk: the way under it and back.
+/// Both hands above the near edge of a desk, on the path to and from the rest under it.
 pub fn over_edge() -> Arms {
     [posture([0.17, 0.27, -0.2], 0.4, 0.6, 0.4, 0.4, FingerShape::RELAXED); 2]
 }
 
-/// Rests of a manner on a seat; a clip changes between them. Every `ArmPosture` of a free hand is within reach.
-pub fn rests(manner: Manner, seat: Seat, rng: &mut ChaCha8Rng) -> Vec<Arms> {
+/// Rests of a gesture style on a seat, between which a clip changes.
+pub fn rests(gesture_style: GestureStyle, seat: Seat, rng: &mut ChaCha8Rng) -> Vec<Arms> {
     let front = usize::from(rng.random_bool(0.5));
     let place: Vec3 = match seat {
         Seat::Standing => [0.08, 0.43, -0.19],
@@ -39,45 +39,45 @@ pub fn rests(manner: Manner, seat: Seat, rng: &mut ChaCha8Rng) -> Vec<Arms> {
     };
     let interlaced = interlaced(place);
     let stacked = swapped(folded(place, true), front);
-    match manner {
-        Manner::Folded => vec![interlaced, stacked, swapped(fist_in_hand(place), front)],
-        Manner::Crossing => vec![swapped(arms_crossed(), front), swapped(wrists_crossed(place), front), apart],
-        Manner::Low => vec![apart, stacked],
-        Manner::Holding => vec![apart],
+    match gesture_style {
+        GestureStyle::Folded => vec![interlaced, stacked, swapped(fist_in_hand(place), front)],
+        GestureStyle::Crossing => vec![swapped(arms_crossed(), front), swapped(wrists_crossed(place), front), apart],
+        GestureStyle::Low => vec![apart, stacked],
+        GestureStyle::Holding => vec![apart],
         _ => {
-            let kept = rng.random_range(0..3);
+            let first_rest = rng.random_range(0..3);
             let mut all = vec![apart, interlaced, stacked];
-            all.rotate_left(kept);
+            all.rotate_left(first_rest);
             all.truncate(2);
             all
         }
     }
 }
 
-/// A gesture of one hand (the other rests) or of both.
-pub fn stroke(manner: Manner, rng: &mut ChaCha8Rng) -> [Option<ArmPosture>; 2] {
+/// Samples a gesture of one hand (the other is `None` and rests) or of both.
+pub fn stroke(gesture_style: GestureStyle, rng: &mut ChaCha8Rng) -> [Option<ArmPosture>; 2] {
     let side = usize::from(rng.random_bool(0.5));
     let mut arms = [None; 2];
-    match manner {
-        Manner::Crossing if rng.random_bool(0.7) => {
+    match gesture_style {
+        GestureStyle::Crossing if rng.random_bool(0.7) => {
             arms[side] = Some(across(rng));
             if rng.random_bool(0.5) {
                 arms[1 - side] = Some(if rng.random_bool(0.5) { across(rng) } else { open(rng) });
             }
         }
-        Manner::Wide if rng.random_bool(0.75) => {
+        GestureStyle::Wide if rng.random_bool(0.75) => {
             let first = wide(rng);
             arms = if rng.random_bool(0.6) { [Some(first), Some(wide(rng))] } else { arms };
             arms[side] = Some(first);
         }
-        Manner::Low if rng.random_bool(0.8) => {
+        GestureStyle::Low if rng.random_bool(0.8) => {
             let middle = if rng.random_bool(0.5) { [0.2, 0.42, -0.22] } else { [0.2, 0.1, -0.22] };
             let first = ArmPosture { wrist: near(middle, [0.08, 0.07, 0.06], rng), ..open(rng) };
             arms[side] = Some(first);
             let second = ArmPosture { wrist: near(first.wrist, [0.04; 3], rng), ..first };
             arms[1 - side] = rng.random_bool(0.6).then_some(second);
         }
-        Manner::Fast if rng.random_bool(0.5) => {
+        GestureStyle::Fast if rng.random_bool(0.5) => {
             let far = ArmPosture { wrist: near([0.26, 0.14, -0.26], [0.16, 0.18, 0.08], rng), ..open(rng) };
             arms[side] = Some(far);
             arms[1 - side] = rng.random_bool(0.6).then(|| open(rng));
@@ -108,12 +108,12 @@ fn near(middle: Vec3, half: Vec3, rng: &mut ChaCha8Rng) -> Vec3 {
     std::array::from_fn(|k| middle[k] + half[k] * rng.random_range(-1.0..1.0))
 }
 
-/// Left and right exchanged where `side` is 1.
+/// Exchanges left and right if `side` is 1.
 fn swapped([a, b]: Arms, side: usize) -> Arms {
     if side == 0 { [a, b] } else { [b, a] }
 }
 
-/// Hand before the body in any shape.
+/// A hand in front of the body in a random shape.
 fn open(rng: &mut ChaCha8Rng) -> ArmPosture {
     use FingerShape as F;
     let shapes = [F::RELAXED, F::RELAXED, F::FLAT, F::OPEN, F::OPEN, F::FIST, F::PINCH];
@@ -147,13 +147,13 @@ fn wide(rng: &mut ChaCha8Rng) -> ArmPosture {
     ArmPosture { wrist: near([0.44, 0.14, -0.2], [0.07, 0.16, 0.06], rng), inwards: -0.3, ..open(rng) }
 }
 
-/// Hand on the other side of the body.
+/// A hand on the opposite side of the body.
 fn across(rng: &mut ChaCha8Rng) -> ArmPosture {
     let wrist = near([-0.09, 0.2, -0.29], [0.08, 0.12, 0.05], rng);
     ArmPosture { wrist, elbow: 0.6, inwards: rng.random_range(0.1..0.5), ..open(rng) }
 }
 
-/// Hands laid upon each other, the right one below; on a lower surface they are flatter.
+/// Hands on top of each other, the right one below; flatter on a low surface.
 fn folded([x, down, away]: Vec3, flat: bool) -> Arms {
     let roll = if flat { 1.0 } else { 0.5 };
     [
@@ -178,7 +178,7 @@ fn steeple() -> ArmPosture {
     posture([0.095, 0.2, -0.27], 0.5, 0.1, 0.9, 0.5, FingerShape { spread: 0.1, ..FingerShape::FLAT })
 }
 
-/// Arms crossed before the chest, the left one in front.
+/// Arms crossed in front of the chest, the left one in front.
 fn arms_crossed() -> Arms {
     [
         posture([-0.09, 0.2, -0.215], 0.45, 0.3, 0.1, 0.0, FingerShape::INTERLACED),
@@ -186,7 +186,7 @@ fn arms_crossed() -> Arms {
     ]
 }
 
-/// Wrists crossed low before the body, the left one in front.
+/// Wrists crossed low in front of the body, the left one in front.
 fn wrists_crossed([_, down, away]: Vec3) -> Arms {
     [
         posture([-0.03, down - 0.04, away - 0.055], 0.4, 0.5, 0.1, 0.2, FingerShape::RELAXED),

@@ -1,5 +1,5 @@
 //! Voice of a rendered person: speech of the drawn speaker with another pitch and vocal tract, listening pauses, and
-//! what the mouth does meanwhile.
+//! the opening of the mouth.
 
 use orator_base::types::sound::Sound;
 use orator_test_support::drawn::speech::Speech;
@@ -9,26 +9,26 @@ use std::f64::consts::TAU;
 
 /// Mean pitch of `Speech`, Hz.
 const SPEECH_PITCH: f64 = 115.0;
-/// Opening of the mouth in the vowels of `Speech`: a, e, i, o, u.
+/// Mouth opening for the vowels of `Speech`: a, e, i, o, u.
 const OPENING: [f64; 5] = [1.0, 0.65, 0.35, 0.7, 0.3];
-/// Times beside now over which the opening is averaged, seconds: the jaw does not follow faster.
+/// Time offsets in seconds over which the opening is averaged: the jaw moves slowly.
 const JAW: [f64; 5] = [-0.04, -0.02, 0.0, 0.02, 0.04];
-/// Loudness of captured sound is that of this many seconds.
+/// Window in seconds of the loudness of captured sound.
 const LOUDNESS_SECS: f64 = 0.04;
 
-/// Speech and the sound of it.
+/// Speech and its sound.
 #[derive(Clone, Debug)]
 pub struct Voice {
     pub speech: Speech,
     pub sound: Sound,
-    /// Whether the sound is not that of the speech.
+    /// Whether the sound is a recording that does not belong to `speech`.
     captured: bool,
     chews: bool,
 }
 
 impl Voice {
-    /// Voice of a seed for `secs` seconds; pitch 90 to 240 Hz, formants in proportion to a usual tract of that pitch. A
-    /// seed of its own makes pitch and formants those of one person whatever is said.
+    /// Creates the voice of a seed for `secs` seconds; pitch 90 to 240 Hz, formants proportional to a typical vocal
+    /// tract of that pitch. The seed `person`, if given, fixes pitch and formants independently of what is spoken.
     pub fn new(seed: u64, secs: f64, person: Option<u64>) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut speech = if rng.random_bool(0.5) { Speech::new(secs, &mut rng) } else { Speech::free(secs, &mut rng) };
@@ -42,20 +42,20 @@ impl Voice {
             let start = rng.random_range(1.5..secs - 2.5);
             let end = start + rng.random_range(1.4..2.4);
             speech.syllables.retain(|syllable| syllable.end < start || syllable.start > end);
-            // Phrases count syllables that are no longer there; nothing here asks for them.
+            // Phrases refer to removed syllables; they are not used here.
             speech.phrases.clear();
         }
         let sound = speech.sound_of_tract(secs, formants, &mut rng);
         Self { speech, sound, captured: false, chews: rng.random_bool(0.4) }
     }
 
-    /// Voice with a recorded sound, or in silence; gestures are still tied to the speech of the seed.
+    /// Voice with a recorded sound, or silent; gestures still follow the speech of the seed.
     pub fn recorded(seed: u64, secs: f64, sound: Option<Sound>) -> Self {
         let silent = Sound { rate: orator_base::types::sound::SAMPLE_RATE, samples: Vec::new() };
         Self { sound: sound.unwrap_or(silent), captured: true, ..Self::new(seed, secs, None) }
     }
 
-    /// Opening of the speaking mouth, 0..1.
+    /// Mouth opening while speaking, 0..1.
     pub fn mouth(&self, secs: f64) -> f64 {
         if self.captured {
             return self.loudness(secs);
@@ -68,12 +68,12 @@ impl Voice {
         JAW.iter().map(|&beside| opening(secs + beside)).sum::<f64>() / JAW.len() as f64
     }
 
-    /// Opening of the mouth of somebody silent, who may chew.
+    /// Mouth opening of a silent person, who may chew, 0..1.
     pub fn chewing(&self, secs: f64) -> f64 {
         if self.chews { 0.12 * (TAU * 1.4 * secs).sin().max(0.0) } else { 0.0 }
     }
 
-    /// Loudness of the sound against its loudest part, 0..1.
+    /// Loudness relative to the peak of the sound, 0..1.
     fn loudness(&self, secs: f64) -> f64 {
         let rate = f64::from(self.sound.rate);
         let half = (LOUDNESS_SECS / 2.0 * rate) as usize;

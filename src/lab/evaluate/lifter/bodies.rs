@@ -1,8 +1,8 @@
-//! Errors of the body lifter on captured motion, beside methods without a network. Scenes: 4 s at 15 fps, average
-//! adult's bones, camera yaw within 60 degrees, pitch 15, roll 4, noisy keypoints with gaps ("drop"). Frames are
-//! relative to the neck; each scene's prediction and truth are scaled to the reference size (0.90 m). MPJPE over nose,
-//! shoulders, elbows, wrists; P-MPJPE after a similarity per frame. Methods without a network get exact keypoints and
-//! what they need: true lengths, true scale, or the set's mean.
+//! Errors of the body lifter and of baselines without a network on captured motion. Scenes: 4 s at 15 frames/s, bones
+//! of the mean adult, camera yaw within 60 degrees, pitch 15, roll 4, noisy keypoints with gaps ("drop"). Frames are
+//! relative to the neck; prediction and truth of each scene are scaled to the reference size (0.90 m). MPJPE over
+//! nose, shoulders, elbows, wrists; P-MPJPE after a similarity alignment per frame. Baselines use exact keypoints and
+//! the true bone lengths, scale or mean pose.
 
 use crate::mocap::upper_body::Set;
 use crate::train::lifter::errors::{BodyErrors, mean_pose, of_lifted, with_bone_depth, with_mean_depth};
@@ -18,12 +18,12 @@ use orator_nn::lifter::body::BodyLifter;
 use orator_pipeline::lift::{Lifter, weights};
 use serde::Serialize;
 
-/// Default number of scenes of a set.
+/// Default number of scenes per set.
 pub const SCENES: usize = 240;
-/// Bands of |yaw| with errors of their own, degrees.
+/// Bands of |yaw| with separate errors, degrees.
 const BANDS: [(f64, f64); 3] = [(0.0, 20.0), (20.0, 40.0), (40.0, 60.0)];
 
-/// Centre of the picture, px.
+/// Image centre, px.
 const MIDDLE: [f32; 2] = [640.0, 360.0];
 
 /// Body lifter of `orator lift`, and its network alone.
@@ -33,7 +33,10 @@ pub struct Lifters {
 }
 
 impl Lifters {
-    /// Lifters with the weights that `settings` name, or the built-in ones.
+    /// Loads the weights given in `settings`, or the built-in ones.
+    ///
+    /// # Errors
+    /// Weights that cannot be read.
     pub fn new(settings: &config::LiftConfig) -> Result<Self> {
         Ok(Self { whole: Lifter::new(settings)?, network: weights::body(&settings.body_weights)? })
     }
@@ -49,13 +52,15 @@ pub struct BodyRow {
     pub errors: BodyErrors,
     /// Errors by |yaw|: 0 to 20, 20 to 40, 40 to 60 degrees.
     pub by_yaw: Vec<BodyErrors>,
-    /// Share of the frames in which the method gave all points.
+    /// Share of the frames for which the method gave all points.
     #[serde(rename = "told")]
     pub complete_share: f64,
 }
 
-/// Errors by set of the lifter, its network alone, and three methods without a network. Errors on a set whose takes are
-/// all shorter than a scene.
+/// Errors by set of the lifter, its network alone, and three baselines without a network.
+///
+/// # Errors
+/// A set whose takes are all shorter than a scene; a failure of a lifter.
 pub fn table(lifters: &Lifters, sets: &[Set], n_scenes: usize) -> Result<Vec<BodyRow>> {
     let mut rows = Vec::new();
     for (set, takes) in sets {
@@ -94,7 +99,7 @@ fn row(
     Ok(BodyRow { set: set.to_owned(), method, input, errors, by_yaw, complete_share })
 }
 
-/// Lifts a scene with the whole of `orator lift`.
+/// Lifts a scene with the complete `orator lift` stage.
 fn whole(lifter: &Lifter, scene: &FilmedScene) -> Result<Vec<Option<Pose>>> {
     let n_frames = scene.seen.len();
     let none = Array3::zeros((n_frames, N_HAND, 3));
@@ -123,7 +128,7 @@ fn whole(lifter: &Lifter, scene: &FilmedScene) -> Result<Vec<Option<Pose>>> {
     Ok((0..n_frames).map(pose).collect())
 }
 
-/// Table for people.
+/// The table as text.
 pub fn text(rows: &[BodyRow]) -> String {
     let mut text = format!(
         "{:22} {:6} {:>6} {:>8} {:>6} {:>7} {:>9} {:>6}   MPJPE by yaw {}\n",

@@ -25,13 +25,13 @@ use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 use std::path::Path;
 
-/// Number of hands measured in a set.
+/// Number of evaluated hands per set.
 pub const MEASURED: usize = 4000;
 /// Noise of a keypoint as a share of the distance from wrist to middle knuckle.
 const NOISE: f64 = 0.02;
 /// Distance from wrist to middle knuckle of a hand without knuckles, metres.
 const PALM: f64 = 0.093;
-/// Focal length: px a metre at the wrist; unknown to the lifter.
+/// Scale at the wrist, px per metre; unknown to the lifter.
 const PX: f64 = 1000.0;
 
 /// Lifter of right hands: keypoints to joints in any unit, the wrist at 0; `None`: not lifted.
@@ -60,22 +60,22 @@ pub struct HandRow {
     pub lifter: HandErrors,
     /// Keypoints without depth, at the true scale.
     pub flat: HandErrors,
-    /// Constant relaxed hand, rotated within the picture, palm or back towards the viewer, whichever fits better.
+    /// Constant relaxed hand, rotated in the image plane, with palm or back towards the viewer, whichever fits better.
     pub relaxed: HandErrors,
 }
 
-/// Hand before a camera: true joints in metres in the camera's axes, and its keypoints in px.
+/// A projected hand: true joints in metres in camera axes, and its keypoints in px.
 struct ProjectedHand {
     truth: Truth,
     seen: SeenHand,
 }
 
-/// Errors of `lift` on `sets`, `n_hands` each, drawn with `seed`.
+/// Errors of `lift` on `sets`, for `n_hands` hands each, sampled with `seed`.
 pub fn evaluate(lift: &LiftHands, sets: &[FingerSet], n_hands: usize, seed: u64) -> Result<Vec<HandRow>> {
     sets.iter().map(|set| row(lift, set, n_hands, seed)).collect()
 }
 
-/// Lifter with the weights of a file (built-in ones where `path` is empty), of either network.
+/// Loads a lifter of either network from a weights file (the built-in one if `path` is empty).
 pub fn lifter_of(path: &Path) -> Result<Box<LiftHands<'static>>> {
     if !path.as_os_str().is_empty() && checkpoint::facts(path)?["kind"] == heatmaps::KIND {
         let training_task = HeatmapLifterTask::new(0)?;
@@ -126,7 +126,7 @@ fn shot(truth: &Truth, rng: &mut ChaCha8Rng) -> ProjectedHand {
     ProjectedHand { truth: Truth { hand, ..truth.clone() }, seen }
 }
 
-/// Lifted hand scaled to the true hand's total bone length.
+/// The lifted hand, scaled to the true hand's total bone length.
 fn to_size(truth: &Truth, hand: &HandJoints) -> HandJoints {
     let counts = |j: usize| j == 0 || truth.counted[j];
     let bones: Vec<usize> = (1..N_HAND).filter(|&j| counts(j) && counts(parent(j))).collect();
@@ -150,7 +150,7 @@ fn at_rest(seen: &SeenHand) -> HandJoints {
         let sin: f64 = there().map(|(h, p)| h[0] * p[1] - h[1] * p[0]).sum();
         let angle = sin.atan2(cos);
         let turned = hand.map(|[x, y, z]| [angle.cos() * x - angle.sin() * y, angle.sin() * x + angle.cos() * y, z]);
-        // Of equal lengths, the one with the better agreement.
+        // Both have equal lengths; the better agreement wins.
         (cos.hypot(sin), turned)
     });
     let [(palm_fit, palm), (back_fit, back)] = fitted;
@@ -178,7 +178,7 @@ fn errors(shots: &[ProjectedHand], hands: &[Option<HandJoints>], whole: bool) ->
     }
 }
 
-/// Table as text, a line a set.
+/// The table as text, one line per set.
 pub fn text(rows: &[HandRow]) -> String {
     let number = |value: Option<f32>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.1}"));
     let one = |e: &HandErrors| format!("{:>5} /{:>5.1}", number(e.median_mm), e.aligned_mm);

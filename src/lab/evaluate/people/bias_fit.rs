@@ -1,18 +1,19 @@
-//! Steady part of 2D errors as weights of vectors of the picture, by least squares, and the spread of what is left.
+//! Least-squares fit of systematic 2D errors as a weighted sum of image vectors, and the spread of the residuals.
 
 use ndarray::Array2;
 use orator_base::math::cholesky;
 use orator_base::math::order::median;
 
-/// Median absolute deviation to standard deviation of a normal distribution.
+/// Factor from median absolute deviation to standard deviation of a normal distribution.
 const MAD: f64 = 1.4826;
-/// Standard deviations from which on an error is a stray.
+/// Number of standard deviations above which an error is an outlier.
 pub const STRAY: f64 = 4.0;
-/// Penalty of the weights, as a share of the data's, which keeps those of unused vectors at 0.
+/// Ridge penalty as a share of the data's scale, which keeps weights of unused vectors at 0.
 const PENALTY: f64 = 1e-3;
 
-/// Weights with which `N` vectors explain errors best; each round leaves out what the weights of the round before miss by
-/// more than its entry of `most`. `errors` gives error and vectors of every point anew.
+/// Weights of `N` vectors that best explain the errors. Each round excludes errors whose residual with the previous
+/// round's weights exceeds its entry of `most`. `errors` iterates over error and vectors of every point, once per
+/// round.
 pub fn weights<const N: usize, I: Iterator<Item = ([f64; 2], [[f64; 2]; N])>>(
     most: &[f64],
     errors: impl Fn() -> I,
@@ -40,7 +41,7 @@ pub fn weights<const N: usize, I: Iterator<Item = ([f64; 2], [[f64; 2]; N])>>(
     weights
 }
 
-/// Part of an error that the weighted vectors leave.
+/// Residual of an error after subtracting the weighted vectors.
 pub fn rest<const N: usize>(error: [f64; 2], basis: &[[f64; 2]; N], weights: &[f64; N]) -> [f64; 2] {
     [0, 1].map(|k| error[k] - basis.iter().zip(weights).map(|(vector, weight)| weight * vector[k]).sum::<f64>())
 }

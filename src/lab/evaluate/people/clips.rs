@@ -1,4 +1,4 @@
-//! Rendered clips: what a run found in them beside the truth, frame by frame at the dataset rate.
+//! Rendered clips: results of a run together with the ground truth, frame by frame at the dataset rate.
 
 use crate::rendered_truth::{LIST, RenderedTruth, Visibility};
 use anyhow::{Context, Result, ensure};
@@ -13,25 +13,25 @@ use orator_formats::keypoints_npz;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
-/// Entry of the list.
+/// Entry of the clip list.
 #[derive(Clone, Debug, Deserialize)]
 pub struct ListedClip {
     /// Video and truth, relative to the folder.
     pub video: PathBuf,
     pub truth: PathBuf,
     pub condition: String,
-    /// first, middle or last: the part of the split by bodies, cameras, clothes and motions.
+    /// first, middle or last: part of the split by bodies, cameras, clothes and motions.
     pub part: String,
 }
 
-/// Clip with the truth at the frames of its keypoints.
+/// A clip with the ground truth at the frames of its keypoints.
 #[derive(Clone, Debug)]
 pub struct RenderedClip {
     pub condition: String,
     pub keypoints: Keypoints,
-    /// Truth of each frame of the keypoints.
+    /// Ground truth of each frame of the keypoints.
     pub truth: RenderedTruth,
-    /// Intervals kept by `segment` and `lift`.
+    /// Intervals accepted by `segment` and `lift`.
     pub intervals: Intervals,
 }
 
@@ -41,7 +41,7 @@ impl RenderedClip {
         self.truth.n_frames()
     }
 
-    /// Whether each frame is kept, [T].
+    /// Whether each frame is accepted, [T].
     pub fn kept(&self) -> Vec<bool> {
         let mut kept = vec![false; self.n_frames()];
         for interval in &self.intervals.intervals {
@@ -50,12 +50,12 @@ impl RenderedClip {
         kept
     }
 
-    /// Width of the shoulders as it would be seen from straight ahead at the neck's distance, px.
+    /// Shoulder width in a frontal view at the neck's distance, px.
     pub fn shoulders_px(&self, frame_idx: usize) -> f32 {
         self.px_of_bone(frame_idx, L_SHOULDER, R_SHOULDER)
     }
 
-    /// True distance of two joints at the distance of the first, px.
+    /// True distance between two joints, projected at the distance of the first, px.
     pub fn px_of_bone(&self, frame_idx: usize, from: usize, to: usize) -> f32 {
         let joints = self.truth.joints.index_axis(Axis(0), frame_idx);
         let metres = (0..3).map(|k| (joints[[from, k]] - joints[[to, k]]).powi(2)).sum::<f32>().sqrt();
@@ -63,7 +63,7 @@ impl RenderedClip {
         self.truth.focal_px * metres / depth.max(0.05)
     }
 
-    /// Points of a hand (0 left, 1 right) as found, [T, 21, 3], and as they are, [T, 21, 2], with their visibility.
+    /// Points of a hand (0 left, 1 right): detected [T, 21, 3], true [T, 21, 2], and their visibility.
     pub fn hand(&self, side: usize) -> HandArrays<'_> {
         let (found, truth, seen) = match side {
             0 => (&self.keypoints.left_hand, &self.truth.left_hand, &self.truth.left_hand_seen),
@@ -84,8 +84,10 @@ pub struct HandArrays<'a> {
     pub seen: ndarray::ArrayView2<'a, Visibility>,
 }
 
-/// Clips of the folder `dir` that the configuration's run has lifted; only those of `part` where one is named.
-/// Errors: no list, no truth, a clip that the configuration does not name or that is not lifted yet.
+/// Reads the clips of the folder `dir` that the configuration's run has lifted, optionally only those of `part`.
+///
+/// # Errors
+/// A missing list or ground truth; a clip that the configuration does not name or that is not lifted yet.
 pub fn read(dir: &Path, config_file: &Path, part: Option<&str>) -> Result<Vec<RenderedClip>> {
     let config = config::load(config_file, &[])?;
     let path = dir.join(LIST);
@@ -135,7 +137,7 @@ fn read_clip(dir: &Path, listed: &ListedClip, units: &[Unit], config: &Config) -
     Ok(RenderedClip { condition: listed.condition.clone(), keypoints, truth, intervals })
 }
 
-/// Truth of the frames that are shown at `times`, seconds.
+/// Ground truth of the frames that are shown at `times`, seconds.
 fn at_times(truth: &RenderedTruth, times: &[f64]) -> RenderedTruth {
     let last = truth.n_frames().saturating_sub(1);
     let frames: Vec<usize> =
@@ -159,7 +161,7 @@ fn at_times(truth: &RenderedTruth, times: &[f64]) -> RenderedTruth {
     }
 }
 
-/// Keypoints without error: every point inside the picture, where it is; hands that are wholly outside are missing.
+/// Exact keypoints of all points inside the image; hands that are entirely outside are missing.
 pub fn true_keypoints(clip: &RenderedClip) -> Keypoints {
     let exact = |found: &ndarray::Array3<f32>, truth: &ndarray::Array3<f32>, seen: &ndarray::Array2<Visibility>| {
         let mut exact = ndarray::Array3::zeros(found.raw_dim());
@@ -192,7 +194,7 @@ pub mod tests {
     use orator_base::types::skeleton::{L_HAND, N_HAND_JOINTS, N_JOINTS, R_HAND, mirror};
     use orator_base::types::time::FrameRate;
 
-    /// Clip of 40 frames without error: arms before the body, all of it seen, all of it kept.
+    /// A clip of 40 frames without errors: arms in front of the body, everything visible, all frames accepted.
     pub fn exact() -> RenderedClip {
         let n = 40;
         let mut joints = Array3::zeros((n, N_JOINTS, 3));

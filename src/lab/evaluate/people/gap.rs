@@ -1,5 +1,5 @@
-//! What can be told of keypoints without a truth, so that rendered clips can be laid beside real ones: scores, jitter,
-//! hands found, and how far the hand model's wrist lies from the body model's.
+//! Keypoint statistics that need no ground truth, for comparing rendered clips with real ones: scores, jitter,
+//! detected hands, and the distance between the wrists of the hand and the body model.
 
 use super::grid::{Grid, number, percent};
 use super::points::{GROUPS, share};
@@ -13,26 +13,30 @@ use orator_formats::keypoints_npz;
 use serde::Serialize;
 use std::path::Path;
 
-/// Groups of `points::GROUPS` that are looked at: face, shoulders, elbows, wrists.
+/// Number of groups of `points::GROUPS` that are evaluated: face, shoulders, elbows, wrists.
 const N_GROUPS: usize = 4;
 
-/// Look of keypoints over clips. Lengths are shares of a clip's median distance of the shoulders in the picture.
+/// Keypoint statistics over clips. Lengths are relative to a clip's median shoulder distance in the image.
 #[derive(Clone, Debug, Serialize)]
 pub struct KeypointLook {
-    /// Name of the configuration, and the clips whose keypoints it has.
+    /// Name of the configuration, and number of clips with keypoints.
     pub name: String,
     pub n_clips: usize,
     /// Median score, 0..1, and median second difference in time, of face, shoulders, elbows and wrists.
     pub scores: [f64; N_GROUPS],
     pub jitter: [f64; N_GROUPS],
-    /// Share of the frames with a hand, a side, 0..1, and the median second difference of its points about its wrist.
+    /// Share of the frames with a hand, per side, 0..1, and the median second difference of its points relative to its
+    /// wrist.
     pub hands: f64,
     pub hand_jitter: f64,
     /// Median distance of the hand's wrist from the body's.
     pub wrists_apart: f64,
 }
 
-/// Look of the keypoints of a configuration's videos; a video without keypoints is left out. Errors: there are none.
+/// Statistics of the keypoints of a configuration's videos; videos without keypoints are skipped.
+///
+/// # Errors
+/// No video has keypoints.
 pub fn look(config_file: &Path) -> Result<KeypointLook> {
     let config = config::load(config_file, &[])?;
     let units = config::videos::all(&config).into_iter().flat_map(|videos| videos.units);
@@ -101,7 +105,8 @@ fn measure(name: &str, clips: &[Keypoints]) -> KeypointLook {
     }
 }
 
-/// Lengths of the second differences of a point, about another where one is given, where three frames have it.
+/// Lengths of the second differences in time of a point, optionally relative to another point, over frame triples in
+/// which all are present.
 fn second_differences(
     points: ArrayView3<f32>,
     point: usize,
@@ -121,7 +126,7 @@ fn second_differences(
     lengths.into_iter()
 }
 
-/// Grid of looks, a row each.
+/// Grid of the statistics, one row per configuration.
 pub fn grid(looks: &[KeypointLook]) -> Grid {
     let names = |what: &str| GROUPS.iter().take(N_GROUPS).map(|(name, _)| format!("{what} {name}")).collect::<Vec<_>>();
     let mut heads = vec!["clips".to_owned()];

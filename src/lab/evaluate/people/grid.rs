@@ -1,4 +1,5 @@
-//! The rows of rendered people as grids of text: one for 2D points, hands and head, seconds, and joints each.
+//! Text grids of the rows of rendered persons: one each for 2D points, for hands and head, for seconds, and for
+//! joints.
 
 use super::joints::LiftedErrors;
 use super::points::GROUPS;
@@ -10,7 +11,7 @@ pub struct Grid {
     pub title: &'static str,
     /// Meaning of the columns.
     pub note: &'static str,
-    /// One for each column after the first.
+    /// Column headings, except for the first column.
     pub heads: Vec<String>,
     /// Name of each row, and its cells.
     pub rows: Vec<(String, Vec<String>)>,
@@ -21,7 +22,7 @@ pub fn grids(rows: &[PeopleRow]) -> Vec<Grid> {
     vec![points(rows), hands(rows), seconds(rows), joints(rows)]
 }
 
-/// Grids of every model set as text, and a last one where there is one.
+/// Grids of all model sets as text, followed by `last` if given.
 pub fn text(rows: &[PeopleRow], last: Option<&Grid>) -> String {
     let of_set = |rows: &[PeopleRow]| {
         let grids: Vec<String> = grids(rows).iter().map(Grid::text).collect();
@@ -50,12 +51,12 @@ fn heads(names: &[&str]) -> Vec<String> {
     names.iter().map(|&name| name.to_owned()).collect()
 }
 
-/// Number with `digits` after the point; a dash where there is none.
+/// A number with `digits` decimals; a dash if it is not finite.
 pub fn number(value: f64, digits: usize) -> String {
     if value.is_finite() { format!("{value:.digits$}") } else { "-".to_owned() }
 }
 
-/// Share as percent; a dash where there is none.
+/// A share as percent; a dash if it is not finite.
 pub fn percent(share: f64) -> String {
     number(100.0 * share, 1)
 }

@@ -1,4 +1,4 @@
-//! Errors of a hand model on rendered people, fitted as the noise by which the hand lifter is trained
+//! Errors of a hand model on rendered persons, fitted as the noise model with which the hand lifter is trained
 //! (`train::scene::hand_noise`).
 
 use super::bias_fit::{self, STRAY, deviation};
@@ -10,17 +10,17 @@ use orator_base::math::order::Ordered;
 use orator_base::types::pose2d::N_HAND;
 use orator_base::types::skeleton::{L_HAND, R_HAND};
 
-/// Hidden points from which on a finger counts as hidden.
+/// Number of hidden points from which a finger counts as hidden.
 const HIDDEN_POINTS: usize = 2;
 
-/// Errors of a hand in a frame, relative to the wrist, in lengths of the palm.
+/// Errors of a hand in a frame, relative to the wrist, in palm lengths.
 struct HandResidual {
     errors: [[f64; 2]; N_POINTS],
     basis: [[[f64; 2]; N_BASIS]; N_POINTS],
     hidden: [bool; N_FINGERS],
 }
 
-/// Noise of the model set `set` over the hands that are found where they are.
+/// Fits the noise of the model set `set` over the correctly detected hands.
 pub fn fit(set: &str, clips: &[RenderedClip]) -> HandNoise {
     let mut hands = Vec::new();
     for clip in clips {
@@ -52,7 +52,7 @@ pub fn fit(set: &str, clips: &[RenderedClip]) -> HandNoise {
 }
 
 impl HandResidual {
-    /// `None`: not found, far off as a whole, or partly outside the picture.
+    /// `None` if the hand is not detected, entirely misplaced, or partly outside the image.
     fn new(clip: &RenderedClip, t: usize, side: usize) -> Option<Self> {
         let hand = clip.hand(side);
         if (0..N_HAND).any(|j| hand.found[[t, j, 2]] <= 0.0 || hand.seen[[t, j]] == Visibility::Outside) {
@@ -78,7 +78,7 @@ impl HandResidual {
     }
 }
 
-/// Weights of the bias of a point over the fingers that can be seen.
+/// Weights of the bias of a point over the visible fingers.
 fn bias(hands: &[HandResidual], point: usize) -> [f64; N_BASIS] {
     let seen = || hands.iter().filter(|hand| !hand.hidden[point / N_OF_FINGER]);
     bias_fit::weights(&[f64::INFINITY, 0.4], || seen().map(|hand| (hand.errors[point], hand.basis[point])))

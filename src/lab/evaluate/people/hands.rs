@@ -1,5 +1,5 @@
-//! What a run makes of hands, frame by frame: found where it is, missed, invented where none can be seen, stolen (the
-//! other hand taken for it), swapped (each taken for the other), or astray.
+//! Per-frame outcomes of hand detection: correct, missed, invented where none is visible, stolen (the other hand is
+//! detected instead), swapped (both hands exchanged), or astray.
 
 use super::clips::{HandArrays, RenderedClip};
 use super::points::share;
@@ -9,17 +9,18 @@ use orator_base::types::pose2d::{HAND_SEEN_SCORE, N_HAND};
 use orator_base::types::skeleton::{L_HAND, R_HAND};
 use serde::Serialize;
 
-/// Shares of the 21 points from which on, and up to which, a hand counts as seen and as hidden; between them it is not
-/// judged.
+/// Share of visible points (of 21) from which a hand counts as visible, and up to which it counts as hidden; hands
+/// between the two are not judged.
 const SEEN_FROM: f64 = 0.6;
 const HIDDEN_TO: f64 = 0.1;
-/// Mean distance from a hand's true points within which it is that hand, lengths of its palm (wrist to middle knuckle).
+/// Largest mean distance from a hand's true points for a detection of that hand, in palm lengths (wrist to middle
+/// knuckle).
 const SAME_HAND: f32 = 1.0;
 
 /// Outcome of one hand in one frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HandOutcome {
-    /// Not to be seen and not found, or too little of it is seen to be judged.
+    /// Neither visible nor detected, or too little of it visible to be judged.
     Unjudged,
     Right,
     Missed,
@@ -33,13 +34,13 @@ pub enum HandOutcome {
 }
 
 impl HandOutcome {
-    /// Whether points were given that are not this hand's.
+    /// Whether the detected points do not belong to this hand.
     pub fn is_wrong(self) -> bool {
         matches!(self, Self::Invented | Self::Stolen | Self::Swapped | Self::Astray)
     }
 }
 
-/// Outcomes of left and right hand, [T].
+/// Outcomes of the left and the right hand, [T].
 pub fn outcomes(clip: &RenderedClip) -> Vec<[HandOutcome; 2]> {
     (0..clip.n_frames()).map(|t| of_frame(clip, t)).collect()
 }
@@ -69,17 +70,17 @@ fn of_frame(clip: &RenderedClip, t: usize) -> [HandOutcome; 2] {
     })
 }
 
-/// Whether any point of the hand is found in a frame.
+/// Whether any point of the hand is detected in a frame.
 pub fn is_found(hand: HandArrays, t: usize) -> bool {
     (0..N_HAND).any(|point| hand.found[[t, point, 2]] >= HAND_SEEN_SCORE)
 }
 
-/// Share of the points that can be seen, 0..1.
+/// Share of the points that are visible, 0..1.
 pub fn seen_share(hand: HandArrays, t: usize) -> f64 {
     share((0..N_HAND).filter(|&point| hand.seen[[t, point]] == Visibility::Seen).count(), N_HAND)
 }
 
-/// Mean distance of the found points of one hand from the true points of another, px.
+/// Mean distance of the detected points of one hand from the true points of another, px.
 fn mean_distance(of: HandArrays, from: HandArrays, t: usize) -> f32 {
     let apart = |point: usize| {
         let [dx, dy] = [0, 1].map(|k| of.found[[t, point, k]] - from.truth[[t, point, k]]);
@@ -88,19 +89,19 @@ fn mean_distance(of: HandArrays, from: HandArrays, t: usize) -> f32 {
     (0..N_HAND).map(apart).sum::<f32>() / N_HAND as f32
 }
 
-/// Hands over clips; shares 0..1.
+/// Hand statistics over clips; shares 0..1.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct HandCounts {
-    /// Hands that can be seen, in all frames, and the share of them that is missed, stolen, swapped, astray.
+    /// Number of visible hands over all frames, and the shares of them that are missed, stolen, swapped, astray.
     pub n_seen: usize,
     pub missed: f64,
     pub stolen: f64,
     pub swapped: f64,
     pub astray: f64,
-    /// Hands that cannot be seen, and the share of them that is invented.
+    /// Number of hidden hands, and the share of them that is invented.
     pub n_hidden: usize,
     pub invented: f64,
-    /// Distance of the points of hands that are right, shares of the shoulder width: half are nearer, 95 % are nearer.
+    /// Error of the points of correct hands relative to the shoulder width: median and 95th percentile.
     pub median: f64,
     pub p95: f64,
 }

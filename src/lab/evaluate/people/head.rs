@@ -1,4 +1,4 @@
-//! Errors of the head's angles as `animate` finds them from the face keypoints, degrees.
+//! Errors of the head angles that `animate` computes from the face keypoints, degrees.
 
 use super::clips::RenderedClip;
 use super::points::share;
@@ -6,7 +6,7 @@ use orator_base::math::order::median;
 use orator_base::motion::face;
 use serde::Serialize;
 
-/// Mean absolute errors in degrees. A clip's median pitch counts as looking ahead, in the truth as well.
+/// Mean absolute errors in degrees. The median pitch of a clip is subtracted, in the truth as well.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct HeadErrors {
     pub yaw: f64,

@@ -1,6 +1,6 @@
-//! Errors of lifted joints in camera axes, mm. Each frame is relative to its own neck; in segments of 60 frames
-//! prediction and truth are each scaled by one number to the reference size (`motion::upper_body`), since a picture does
-//! not tell how large a person is; no rotation. Fingers are relative to their own wrist.
+//! Errors of lifted joints in camera axes, mm. Each frame is relative to its neck; in segments of 60 frames,
+//! prediction and truth are each scaled by one factor to the reference size (`motion::upper_body`), since an image
+//! does not show the size of a person; no rotation. Fingers are relative to their own wrist.
 
 use super::clips::{RenderedClip, true_keypoints};
 use anyhow::Result;
@@ -14,26 +14,26 @@ use orator_base::types::skeleton::{L_HAND, N_HAND_JOINTS, N_JOINTS, NECK, R_HAND
 use orator_pipeline::lift::Lifter;
 use serde::Serialize;
 
-/// Frames scaled by one number.
+/// Number of frames scaled by one factor.
 const SEGMENT: usize = 60;
 /// Millimetres in a metre.
 const MM: f64 = 1000.0;
 
-/// Mean errors in mm over kept frames.
+/// Mean errors in mm over accepted frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct JointErrors {
     /// Shoulders, elbows, wrists.
     pub mpjpe: f64,
-    /// Shoulders, elbows, wrists after the best similarity of each frame.
+    /// Shoulders, elbows, wrists after a similarity alignment per frame.
     pub p_mpjpe: f64,
     pub elbow: f64,
     /// Along the line of sight: |dz|.
     pub elbow_depth: f64,
     pub wrist: f64,
     pub wrist_depth: f64,
-    /// Fingers about their wrist.
+    /// Fingers relative to their wrist.
     pub hand: f64,
-    /// Frames that count.
+    /// Number of evaluated frames.
     pub n_frames: usize,
 }
 
@@ -148,7 +148,7 @@ impl ErrorSums {
     }
 }
 
-/// The arms of a frame [49, 3], which give a body its size; the other points are not numbers.
+/// The arms of a frame [49, 3], which determine a body's size; other points are NaN.
 fn arms(frame: ArrayView2<f32>) -> Pose {
     let mut pose: Pose = [[f64::NAN; 3]; N_POINTS];
     for joint in ARMS {

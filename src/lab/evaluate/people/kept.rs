@@ -1,4 +1,5 @@
-//! What the intervals keep beside what is right, in seconds, and the mask of the joints beside what can be seen.
+//! Accepted intervals compared with the frames that are correct, in seconds, and the joint mask compared with the true
+//! visibility.
 
 use super::clips::RenderedClip;
 use super::hands::{self, HandOutcome};
@@ -10,19 +11,19 @@ use orator_base::types::pose3d::Motion;
 use orator_base::types::skeleton::{L_HAND, N_HAND_JOINTS, R_HAND};
 use serde::Serialize;
 
-/// Distance of an arm's point from the truth from which on a frame is wrong, shares of the shoulder width.
+/// Error of an arm point above which a frame is wrong, relative to the shoulder width.
 const WRONG_ARM: f64 = 0.35;
-/// Share of a hand's points that must be seen for a frame to be worth keeping.
+/// Share of a hand's points that must be visible for a frame to be worth accepting.
 const SEEN_HAND: f64 = 0.6;
 
-/// Seconds of clips by what became of them.
+/// Durations of clips in seconds by outcome.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct KeptSeconds {
     pub total: f64,
     pub kept: f64,
-    /// Kept though a hand is invented, stolen, swapped or astray, or a point of an arm is far off.
+    /// Accepted although a hand is invented, stolen, swapped or astray, or an arm point is far off.
     pub kept_wrongly: f64,
-    /// Refused though both hands and all points of the arms can be seen and are found where they are.
+    /// Rejected although both hands and all arm points are visible and correctly detected.
     pub refused_wrongly: f64,
 }
 
@@ -76,13 +77,13 @@ fn are_arms_seen(clip: &RenderedClip, t: usize) -> bool {
     })
 }
 
-/// Mask of lifted joints beside what can be seen; shares 0..1.
+/// Mask of lifted joints compared with the true visibility; shares 0..1.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct MaskCounts {
-    /// Joints in kept frames that the mask calls seen, and the share of them that can be seen.
+    /// Number of joints in accepted frames that the mask marks as visible, and the share of them that is visible.
     pub n_masked: usize,
     pub truly_seen: f64,
-    /// Joints in kept frames that can be seen, and the share of them that the mask calls seen.
+    /// Number of visible joints in accepted frames, and the share of them that the mask marks as visible.
     pub n_seen: usize,
     pub masked: f64,
 }

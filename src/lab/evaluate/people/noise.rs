@@ -1,5 +1,5 @@
-//! Errors of a model set on rendered people, fitted as the noise by which lifters are trained (`train::scene::noise`):
-//! least squares for the bias, then robust deviations of what is left.
+//! Errors of a model set on rendered persons, fitted as the noise model with which lifters are trained
+//! (`train::scene::noise`): least squares for the bias, then robust deviations of the residuals.
 
 use super::bias_fit::{self, STRAY, deviation};
 use super::clips::RenderedClip;
@@ -9,19 +9,19 @@ use orator_base::math::order::{Ordered, median};
 use orator_base::motion::upper_body::{COCO, N_POINTS, SeenBody};
 use orator_base::types::pose2d::SEEN_SCORE;
 
-/// Error of a point in shoulder widths, and the vectors of its bias.
+/// Error of a point in shoulder widths, and the basis vectors of its bias.
 type PointError = ([f64; 2], [[f64; 2]; N_BASIS]);
 
 /// Errors of one point over a clip.
 struct PointTrack {
-    /// `None`: not found, or not in the picture.
+    /// `None`: not detected, or outside the image.
     errors: Vec<Option<PointError>>,
-    /// Whether the point is in the picture, and hidden.
+    /// Whether the point is inside the image, and whether it is hidden.
     inside: Vec<bool>,
     hidden: Vec<bool>,
 }
 
-/// Noise of the model set `set` over clips.
+/// Fits the noise of the model set `set` over clips.
 pub fn fit(set: &str, clips: &[RenderedClip]) -> KeypointNoise {
     let points = std::array::from_fn(|of_kind| {
         let points = (0..N_POINTS).filter(|&point| kind(point) == of_kind);
@@ -82,7 +82,7 @@ fn fit_point(tracks: &[PointTrack]) -> PointNoise {
     }
 }
 
-/// Weights of the bias over the frames in which the point can be seen.
+/// Weights of the bias over the frames in which the point is visible.
 fn bias(tracks: &[PointTrack]) -> [f64; N_BASIS] {
     let seen = |track: &PointTrack| -> Vec<PointError> {
         track.errors.iter().zip(&track.hidden).filter_map(|(error, hidden)| error.filter(|_| !hidden)).collect()
@@ -166,7 +166,7 @@ mod tests {
             .collect();
         let found = fit("found", &clips).points[3].clone();
         let near = |a: f64, b: f64, off: f64| assert!((a - b).abs() < off, "{a} {b}: {found:?}");
-        // Of one pose the weights cannot be told apart, their sum can.
+        // A single pose does not determine the weights, only their sum.
         let frame: SeenBody = COCO.map(|c| Some([0, 1].map(|k| exact().truth.body[[3, c, k]])));
         let vectors = basis(&frame, 3, f64::from(exact().shoulders_px(3))).unwrap();
         let along = |bias| bias_fit::rest([0.0; 2], &vectors, bias);

@@ -1,4 +1,4 @@
-//! Page of the errors on rendered people: for each model set its grids.
+//! HTML page of the errors on rendered persons: the grids of each model set.
 
 use crate::evaluate::people::grid::{Grid, grids};
 use crate::evaluate::people::table::PeopleRow;

@@ -1,6 +1,6 @@
-//! Errors of 2D keypoints in shares of the shoulder width (as seen from ahead at the neck's distance). Models define a
-//! shoulder or a hip differently from a skeleton, so the error is parted: `bias` is its mean over a clip, `scatter`
-//! what is left of it. Only points that can be seen count, and of those the found ones.
+//! Errors of 2D keypoints relative to the shoulder width (in a frontal view at the neck's distance). Models define a
+//! shoulder or a hip differently from a skeleton, so errors are split: `bias` is the mean over a clip, `scatter` the
+//! remainder. Only visible points that are detected are evaluated.
 
 use super::clips::RenderedClip;
 use crate::rendered_truth::Visibility;
@@ -8,7 +8,7 @@ use orator_base::math::order::Ordered;
 use orator_base::types::pose2d::{SEEN_SCORE, coco};
 use serde::Serialize;
 
-/// Points that are told together, with the name of each group.
+/// Groups of points that are reported together, with their names.
 pub const GROUPS: [(&str, &[usize]); 6] = [
     ("face", &[coco::NOSE, coco::L_EYE, coco::R_EYE, coco::L_EAR, coco::R_EAR]),
     ("shoulders", &[coco::L_SHOULDER, coco::R_SHOULDER]),
@@ -22,13 +22,13 @@ pub const GROUPS: [(&str, &[usize]); 6] = [
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct PointErrors {
     pub points: &'static str,
-    /// Points that can be seen, in all frames.
+    /// Number of visible points over all frames.
     pub n_seen: usize,
-    /// Share of them that were found, 0..1.
+    /// Share of the visible points that were detected, 0..1.
     pub found: f64,
-    /// Points that cannot be seen and were found nevertheless, share of those 0..1.
+    /// Share of the hidden points that were detected, 0..1.
     pub invented: f64,
-    /// Distance from the truth, shares of the shoulder width: half of the points are nearer, 95 % are nearer.
+    /// Error relative to the shoulder width: median and 95th percentile.
     pub median: f64,
     pub p95: f64,
     /// Length of a clip's mean error, mean over clips and points.
@@ -83,13 +83,13 @@ fn of_group(name: &'static str, points: &[usize], clips: &[&RenderedClip]) -> Po
     }
 }
 
-/// Error of a body point in a frame, shares of the shoulder width: x to the right in the picture, y down.
+/// Error of a body point in a frame relative to the shoulder width: x to the right in the image, y down.
 pub fn error(clip: &RenderedClip, t: usize, point: usize) -> [f64; 2] {
     let shoulders = f64::from(clip.shoulders_px(t)).max(1e-6);
     [0, 1].map(|k| f64::from(clip.keypoints.body[[t, point, k]] - clip.truth.body[[t, point, k]]) / shoulders)
 }
 
-/// Part of a whole, 0 of nothing.
+/// Ratio of `part` to `whole`; 0 if `whole` is 0.
 pub fn share(part: usize, whole: usize) -> f64 {
     part as f64 / whole.max(1) as f64
 }

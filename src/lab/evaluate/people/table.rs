@@ -1,4 +1,4 @@
-//! The table of rendered people: a row for each condition, model set and all conditions together.
+//! Table of the errors on rendered persons: a row per condition and model set, and one for all conditions.
 
 use super::clips::{self, RenderedClip};
 use super::hands::HandCounts;
@@ -30,8 +30,8 @@ pub struct PeopleRow {
     pub joints: LiftedErrors,
 }
 
-/// Rows of the clips in `dir` for each configuration (a model set), by condition in the order of the list, all of them
-/// together last; only clips of `part` where one is named.
+/// Rows of the clips in `dir` for each configuration (a model set), by condition in the order of the list, followed by
+/// a row for all conditions; optionally only clips of `part`.
 pub fn table(dir: &Path, config_files: &[PathBuf], part: Option<&str>) -> Result<Vec<PeopleRow>> {
     let mut rows = Vec::new();
     for file in config_files {

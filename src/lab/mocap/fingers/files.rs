@@ -1,8 +1,8 @@
-//! Finds captured or labelled fingers in files and folders: `.bvh` by joint names; `.npz` with SMPL-X `poses` [T, 165]
-//! on an assumed rest hand, or with `human_joints` [T, 43, 3] of TED speakers, without tips; `.txt` of 48 numbers a line,
-//! ICVL labels from the middles of bones, or of 42, NYU labels without knuckles, whose errors are after alignment only
-//! (`labels`). Sizes: the middle proximal phalanx 48 mm; TED wrist to middle knuckle 93.2 mm; NYU the middle finger's
-//! last two bones 51.3 mm.
+//! Reads captured or labelled fingers from files and folders: `.bvh` by joint names; `.npz` with SMPL-X `poses` [T,
+//! 165] on an assumed rest hand, or with `human_joints` [T, 43, 3] of TED speakers, without tips; `.txt` labels
+//! (`labels`) with 48 numbers per line (ICVL, bone midpoints) or 42 (NYU, no knuckles, aligned errors only). Reference
+//! lengths: middle proximal phalanx 48 mm; TED wrist to middle knuckle 93.2 mm; NYU the middle finger's last two bones
+//! 51.3 mm.
 
 use super::labels;
 use super::take::{FingerTake, Fingers, Size};
@@ -17,13 +17,15 @@ use std::path::{Path, PathBuf};
 
 /// The fingers of one file or folder.
 pub struct FingerSet {
-    /// The file's or folder's own name.
+    /// Name of the file or folder.
     pub name: String,
     pub takes: Vec<FingerTake>,
 }
 
-/// One set a path. In a folder, files without fingers are passed over. Errors: a named file without fingers, a folder
-/// without any file that has some (says why of the first).
+/// Reads one set per path. Files without fingers in a folder are skipped.
+///
+/// # Errors
+/// A file given by name without fingers; a folder in which no file has fingers (with the reason for the first one).
 pub fn read_all(paths: &[PathBuf]) -> Result<Vec<FingerSet>> {
     paths.iter().map(|path| read_set(path)).collect()
 }
@@ -48,7 +50,10 @@ fn read_set(path: &Path) -> Result<FingerSet> {
     }
 }
 
-/// The hands of one file.
+/// Reads the hands of one file.
+///
+/// # Errors
+/// An unknown extension; a file that cannot be read or has no fingers.
 pub fn read(path: &Path) -> Result<Vec<FingerTake>> {
     match path.extension().and_then(|e| e.to_str()) {
         Some("bvh") => of_bvh(path),
@@ -63,7 +68,8 @@ fn stem(path: &Path) -> String {
     path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Both hands of a file, as far as it has their fingers. Errors: unreadable, or no finger joints (names what is known).
+/// Reads the hands of a file for which it has finger joints. The error of a file without finger joints lists the joint
+/// names.
 fn of_bvh(path: &Path) -> Result<Vec<FingerTake>> {
     let bvh = Bvh::read(path)?;
     let found: Vec<(Side, [Option<usize>; N_HAND])> =
@@ -93,8 +99,8 @@ fn of_smplx(path: &Path) -> Result<Vec<FingerTake>> {
     Ok(smplx::hands(path)?.into_iter().map(take).collect())
 }
 
-/// Both hands of a TED speaker. The skeleton is a regressor's: its palm is three times its first phalanges, so the palm
-/// gives the size.
+/// Reads both hands of a TED speaker. In this skeleton, which was regressed, the palm is three times as long as the
+/// proximal phalanges, so the size is derived from the palm.
 fn of_ted(path: &Path) -> Result<Vec<FingerTake>> {
     let joints = Npz::open(path)?.numbers("human_joints", &[None, Some(ted::N_TED), Some(3)])?;
     let take = |side| {
@@ -110,7 +116,7 @@ fn of_ted(path: &Path) -> Result<Vec<FingerTake>> {
 mod tests {
     use super::*;
 
-    /// A left hand of a thumb and a middle finger.
+    /// A left hand with a thumb and a middle finger.
     const HAND: &str = "HIERARCHY ROOT Hips { OFFSET 0 0 0 CHANNELS 3 Zrotation Xrotation Yrotation
         JOINT LeftHand { OFFSET 50 0 0 CHANNELS 0
           JOINT LeftHandThumb1 { OFFSET 3 0 2 CHANNELS 0 JOINT LeftHandThumb2 { OFFSET 4 0 1 CHANNELS 0

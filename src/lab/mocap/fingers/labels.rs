@@ -1,5 +1,6 @@
-//! Labelled hands in text files, one frame a line of u px, v px, depth mm a point: the test labels of NYU (14 points,
-//! a right hand, no knuckles) and of ICVL (16 points, a left hand), told apart by how many numbers a line holds.
+//! Labelled hands in text files, one frame per line of u px, v px, depth mm per point: the test labels of NYU (14
+//! points, a right hand, no knuckles) and of ICVL (16 points, a left hand), distinguished by the count of numbers per
+//! line.
 
 use super::take::{FingerTake, Fingers, Size};
 use anyhow::{Context, Result, bail, ensure};
@@ -16,13 +17,17 @@ type CameraIntrinsics = [f64; 4];
 const NYU_CAMERA: CameraIntrinsics = [588.04, 587.08, 320.0, 240.0];
 const ICVL_CAMERA: CameraIntrinsics = [241.42, 241.42, 160.0, 120.0];
 
-/// House points of NYU's: tip and middle joint of little, ring, middle and index finger, then the thumb's last three.
+/// Point indices of this crate for the NYU points: tip and middle joint of little, ring, middle and index finger, then
+/// the thumb's last three.
 const NYU: [usize; 11] = [20, 18, 16, 14, 12, 10, 8, 6, 4, 3, 2];
-/// NYU's palm point lies this share of the way from the wrist to the middle knuckle (its fingers, when straight, put
-/// the knuckle there for a first phalanx of the length that goes with their other bones).
+/// Position of NYU's palm point as a share of the distance from the wrist to the middle knuckle (derived from straight
+/// fingers, whose knuckle lies there for a proximal phalanx in proportion to the other bones).
 const NYU_PALM: f64 = 0.75;
 
-/// Reads a file. Errors: unreadable, a word that is no number, lines of another length.
+/// Reads a label file.
+///
+/// # Errors
+/// A file that cannot be read, a word that is not a finite number, lines of different or unknown length.
 pub fn read(path: &Path) -> Result<FingerTake> {
     let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -48,13 +53,14 @@ fn parse(text: &str, name: String) -> Result<FingerTake> {
     }
 }
 
-/// The points of a line in mm, axes of the camera (x right, y down, z away).
+/// Points of a line in mm, in camera axes (x right, y down, z away).
 fn points(row: &[f64], [fx, fy, cx, cy]: CameraIntrinsics) -> Vec<Vec3> {
     let (uvds, _) = row.as_chunks::<3>();
     uvds.iter().map(|&[u, v, d]| [(u - cx) * d / fx, (v - cy) * d / fy, d]).collect()
 }
 
-/// The wrist is the middle of its two sides. The middle knuckle is guessed from the palm's point, to be seen only.
+/// Converts NYU labels. The wrist is the midpoint of its two sides. The middle knuckle is extrapolated from the palm
+/// point, as network input only.
 fn nyu(rows: &[Vec<f64>], name: String) -> FingerTake {
     let frames = rows.iter().map(|row| {
         let p = points(row, NYU_CAMERA);
@@ -69,21 +75,21 @@ fn nyu(rows: &[Vec<f64>], name: String) -> FingerTake {
     FingerTake { name, side: Side::Right, frames: frames.collect(), counted, size: Size::MiddleEnd }
 }
 
-/// ICVL's finger points are the middles of the three last bones, not joints: their distances are in the ratios of
-/// such middles, shrink when the finger bends, and the palm's point is the palm's middle. The joints follow from
-/// them: the two bones about a joint, of known lengths, meet at the side away from where the finger bends. The wrist
-/// is put behind the palm so that the palm has its share of the hand.
+/// Converts ICVL labels, whose finger points are the midpoints of the three last bones and whose palm point is the
+/// middle of the palm. Distances between such midpoints shrink when the finger bends. The joints follow from them: two
+/// bones of known lengths meet at a joint on the side opposite to the bend. The wrist is placed behind the palm so
+/// that the palm has its share of the hand's length.
 fn icvl(rows: &[Vec<f64>], name: String) -> Result<FingerTake> {
     let frames: Vec<Vec<Vec3>> = rows.iter().map(|row| points(row, ICVL_CAMERA)).collect();
     let mut hands: Vec<Fingers> = vec![[None; N_HAND]; frames.len()];
     for (finger, [_, one, two, _]) in BONES.into_iter().enumerate() {
         let [first, second, third] = [1, 2, 3].map(|k| 3 * finger + k);
         let apart = frames.iter().map(|p| vec3::norm(vec3::sub(p[second], p[first])));
-        // half the two bones together: most frames are of straight fingers, and labels err to both sides
+        // Half the length of the two bones: in most frames fingers are straight, and labels err to both sides.
         let together = lower_quantile(apart, 0.7).context("no frame")?;
         let a = together * one / (one + two);
         for (p, hand) in frames.iter().zip(&mut hands) {
-            let joint = meeting(p[first], p[second], p[third], a, together - a);
+            let joint = joint_between(p[first], p[second], p[third], a, together - a);
             let last = vec3::sub(vec3::scale(p[second], 2.0), joint);
             let root = 1 + 4 * finger;
             hand[root] = Some(vec3::sub(vec3::scale(p[first], 2.0), joint));
@@ -105,9 +111,9 @@ fn icvl(rows: &[Vec<f64>], name: String) -> Result<FingerTake> {
     Ok(FingerTake { name, side: Side::Left, frames: hands, counted: [true; N_HAND], size: Size::Phalanx })
 }
 
-/// The joint between two bones whose middles are `first` and `second`, `a` and `b` from it; `third` lies where the
-/// finger bends to.
-fn meeting(first: Vec3, second: Vec3, third: Vec3, a: f64, b: f64) -> Vec3 {
+/// Joint between two bones with midpoints `first` and `second` at distances `a` and `b` from it; the finger bends
+/// towards `third`.
+fn joint_between(first: Vec3, second: Vec3, third: Vec3, a: f64, b: f64) -> Vec3 {
     let along = vec3::sub(second, first);
     let apart = vec3::norm(along).min(a + b).max((a - b).abs() + 1e-9);
     let along = vec3::unit(along, 1e-9).unwrap_or([0.0, 1.0, 0.0]);
@@ -156,7 +162,7 @@ mod tests {
         }
         let take = parse(&line(&p, ICVL_CAMERA).repeat(3), "i".into()).unwrap();
         let truth = &take.truths().unwrap()[0];
-        // the file's own straight fingers give the lengths; here all are bent, hence the millimetres
+        // Bone lengths are estimated from straight fingers; here all are bent, hence the tolerance.
         let off: Vec<f64> = (1..N_HAND).map(|j| vec3::norm(vec3::sub(truth.hand[j], relaxed()[j]))).collect();
         assert!(off.iter().all(|o| *o < 0.02), "{off:?}");
     }

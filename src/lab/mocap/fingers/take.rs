@@ -1,5 +1,5 @@
-//! Captured or labelled fingers of one hand over time, and how they become hands of one size that errors are measured
-//! on. `files` finds them.
+//! Captured or labelled fingers of one hand over time, and their conversion to hands of a reference size for
+//! evaluation. `files` reads them.
 
 use anyhow::{Context, Result};
 use orator_base::math::order::lower_median;
@@ -10,24 +10,23 @@ use orator_base::motion::view::hand::HandJoints;
 use orator_base::types::pose2d::N_HAND;
 use orator_base::types::skeleton::Side;
 
-/// A hand in one frame, wrist first, then thumb to little finger, each base to tip; `None`: the source has no such
-/// point.
+/// A hand in one frame: wrist, then thumb to little finger, each from base to tip; `None`: the source lacks the point.
 pub type Fingers = [Option<Vec3>; N_HAND];
 
-/// One hand over time, in the source's own unit; right-handed axes.
+/// One hand over time, in the source's unit and right-handed axes.
 #[derive(Clone, Debug)]
 pub struct FingerTake {
     pub name: String,
     pub side: Side,
     pub frames: Vec<Fingers>,
-    /// Points that are the source's own; the others only help to see the hand and count in no error.
+    /// Points given by the source; the others are only network input and are excluded from errors.
     pub counted: [bool; N_HAND],
-    /// Stretch that is set to the reference length.
+    /// Segment that is scaled to its reference length.
     pub size: Size,
 }
 
-/// The stretch whose median over a take is given the length it has in the reference hand (`hand_bones::BONES` with
-/// the middle finger's first phalanx at 48 mm).
+/// Segment of a hand whose median length over a take is scaled to its length in the reference hand
+/// (`hand_bones::BONES`, middle proximal phalanx 48 mm).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Size {
     /// The middle finger's first phalanx: 48 mm.
@@ -39,7 +38,7 @@ pub enum Size {
 }
 
 impl Size {
-    /// Name of the stretch, for people.
+    /// Human-readable name of the segment.
     pub const fn text(self) -> &'static str {
         match self {
             Self::Phalanx => "middle proximal phalanx 48 mm",
@@ -48,7 +47,7 @@ impl Size {
         }
     }
 
-    /// Length of the stretch in a frame.
+    /// Length of the segment in a frame.
     fn length(self, fingers: &Fingers) -> Option<f64> {
         let between = |a: usize, b: usize| Some(vec3::norm(vec3::sub(fingers[a]?, fingers[b]?)));
         match self {
@@ -58,7 +57,7 @@ impl Size {
         }
     }
 
-    /// Length of the stretch in the reference hand, metres.
+    /// Length of the segment in the reference hand, metres.
     fn reference(self) -> f64 {
         let [palm, first, second, last] = BONES[2];
         METRES
@@ -70,7 +69,7 @@ impl Size {
     }
 }
 
-/// A right hand in metres with the wrist at 0, and which of its points are there (the others lie on the wrist).
+/// A right hand in metres with the wrist at 0, and which points exist (the others lie on the wrist).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Truth {
     pub hand: HandJoints,
@@ -79,18 +78,20 @@ pub struct Truth {
 }
 
 impl FingerTake {
-    /// One hand of the file `name`, all of whose points count.
+    /// One hand of the file `name`, all of whose points are evaluated.
     pub fn whole(name: &str, side: Side, frames: Vec<Fingers>, size: Size) -> Self {
         Self { name: format!("{name} {side:?}"), side, frames, counted: [true; N_HAND], size }
     }
 
-    /// Whether errors without alignment mean anything: not without knuckles, from which the palm's place follows.
+    /// Whether unaligned errors are meaningful: without knuckles the palm's orientation is unknown.
     pub fn has_knuckles(&self) -> bool {
         [5, 9, 13, 17].iter().any(|&j| self.counted[j])
     }
 
-    /// All frames with a wrist as right hands of the reference size. Errors: the stretch that gives the size is
-    /// nowhere, or of no length.
+    /// All frames with a wrist, as right hands of the reference size.
+    ///
+    /// # Errors
+    /// No frame has a segment of nonzero length to scale by.
     pub fn truths(&self) -> Result<Vec<Truth>> {
         let lengths = self.frames.iter().filter_map(|f| self.size.length(f)).map(|l| l as f32);
         let length = lower_median(lengths.filter(|l| *l > 0.0));

@@ -1,4 +1,4 @@
-//! What the body lifter learns: windows of captured motion and of motion made by rule, filmed by random cameras.
+//! Training task of the body lifter: windows of captured, rendered and procedural motion, filmed by random cameras.
 
 use super::errors::of_method;
 use crate::mocap::upper_body::{BodyTake, Set};
@@ -16,19 +16,19 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 
-/// Weight of each point in the loss: nose, arms, hips.
+/// Loss weight of each point: nose, arms, hips.
 const WEIGHTS: [f32; N_POINTS] = [1.0, 1.0, 1.2, 1.5, 1.0, 1.2, 1.5, 0.7, 0.7];
-/// Shares of scenes of captured motion and of rendered people, where there are any; the rest is made by rule.
+/// Shares of scenes with captured motion and with rendered persons, if available; the rest is procedural motion.
 const CAPTURED: f64 = 0.35;
 const RENDERED: f64 = 0.4;
-/// Share of the captured ones in which one arm comes from another take.
+/// Share of the captured scenes in which one arm comes from another take.
 const MIXED: f64 = 0.35;
-/// Frames of a scene, from and to, and the windows that are cut from it.
+/// Least and greatest number of frames of a scene, and the number of windows cut from it.
 const SCENE_FRAMES: std::ops::RangeInclusive<usize> = 30..=84;
 const WINDOWS: usize = 4;
-/// Scenes that errors are measured on, and on the way.
-const MEASURED: usize = 120;
-const MEASURED_BRIEFLY: usize = 40;
+/// Number of evaluation scenes per set, and the number for a brief evaluation.
+const N_SCENES: usize = 120;
+const N_SCENES_BRIEF: usize = 40;
 
 /// Training task of the network.
 pub struct BodyLifterTask {
@@ -36,12 +36,16 @@ pub struct BodyLifterTask {
     lifter: BodyLifter,
     captured: TakePool,
     rendered: TakePool,
-    /// Takes that are only measured on.
+    /// Takes used for evaluation only.
     held_out: Vec<Set>,
 }
 
 impl BodyLifterTask {
-    /// A network with first values from `seed` that learns from `takes`; `held_out` takes are only measured on.
+    /// Creates a network initialised from `seed`, to be trained on `takes`; `held_out` takes are used for evaluation
+    /// only.
+    ///
+    /// # Errors
+    /// A configuration from which no network can be created.
     pub fn new(mut takes: Vec<BodyTake>, held_out: Vec<Set>, config: &Config, seed: u64) -> Result<Self> {
         takes.sort_by(|a, b| a.name.cmp(&b.name));
         let mut params = Params::new(seed);
@@ -56,7 +60,7 @@ impl BodyLifterTask {
         let pool = if kind < CAPTURED { &self.captured } else { &self.rendered };
         if let (true, Some(take)) = (kind < CAPTURED + RENDERED, pool.sample(rng)) {
             let other = if !take.rendered && rng.random_bool(MIXED) { pool.sample(rng) } else { None };
-            // a short take lasts for as long as it goes slowly
+            // A take that is too short for `n_frames` may suffice for the shortest scene.
             for n_frames in [n_frames, *SCENE_FRAMES.start()] {
                 if let Some(scene) = FilmedScene::from_take(take, other, Filming::Training, n_frames, rng) {
                     return scene;
@@ -67,10 +71,10 @@ impl BodyLifterTask {
     }
 }
 
-/// Takes to draw from.
+/// Takes to sample from.
 struct TakePool {
     takes: Vec<BodyTake>,
-    /// Sum of the seconds of `takes` up to and with each: longer takes are drawn more often.
+    /// Cumulative duration of `takes` in seconds: takes are sampled in proportion to their duration.
     ends: Vec<f64>,
 }
 
@@ -132,7 +136,7 @@ impl TrainingTask for BodyLifterTask {
         let window = self.lifter.net.config().receptive_field();
         let mut scene = self.scene(rng);
         for (x, y) in x.chunks_exact_mut(N_IN * window).zip(y.chunks_exact_mut(N_OUT)) {
-            // where the shoulders are not seen another scene is drawn; it is rare
+            // Where the shoulders are not visible, which is rare, another scene is drawn.
             let (t, view) = loop {
                 let t = rng.random_range(0..scene.seen.len());
                 match BodyView::around(&scene.seen, t, window, 1.0) {
@@ -162,7 +166,7 @@ impl TrainingTask for BodyLifterTask {
     }
 
     fn errors(&self, brief: bool) -> Result<Vec<String>> {
-        let n = if brief { MEASURED_BRIEFLY } else { MEASURED };
+        let n = if brief { N_SCENES_BRIEF } else { N_SCENES };
         let mut lines = Vec::new();
         let by_rule = ("made by rule".to_owned(), Vec::new());
         for (set, takes) in self.held_out.iter().chain([&by_rule]) {

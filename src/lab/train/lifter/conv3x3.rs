@@ -1,4 +1,4 @@
-//! Convolution of pictures with kernels of 3 x 3, padding "same", channels last: every output place's patch becomes a
+//! 2D convolution with 3 x 3 kernels, padding "same", channels last: the input patch of every output pixel becomes a
 //! row, and the layer one matrix product.
 
 use candle_core::{Result, Tensor};
@@ -23,27 +23,29 @@ impl Conv3x3 {
         let (batch, height, width, n_in) = x.dims4()?;
         let n_out = self.bias.dim(0)?;
         let [down, across] = [height, width].map(|n| ConvAxis::same(n, 3, self.stride));
-        let places = Tensor::new(places(batch, down, across), x.device())?;
-        let patches = x.reshape((batch * height * width, n_in))?.index_select(&places, 0)?.reshape(((), 9 * n_in))?;
+        let input_indices = Tensor::new(input_indices(batch, down, across), x.device())?;
+        let patches =
+            x.reshape((batch * height * width, n_in))?.index_select(&input_indices, 0)?.reshape(((), 9 * n_in))?;
         let weight = self.weight.permute((2, 3, 1, 0))?.contiguous()?.reshape((9 * n_in, n_out))?;
         patches.matmul(&weight)?.broadcast_add(&self.bias)?.reshape((batch, down.n_out, across.n_out, n_out))
     }
 }
 
-/// Numbers of the 3 x 3 places under each output, row by row; `u32::MAX`, which selects zeros, outside.
-fn places(batch: usize, down: ConvAxis, across: ConvAxis) -> Vec<u32> {
+/// Indices of the 3 x 3 input pixels of each output pixel, row by row; `u32::MAX`, which selects zeros, outside the
+/// image.
+fn input_indices(batch: usize, down: ConvAxis, across: ConvAxis) -> Vec<u32> {
     let at = |axis: ConvAxis, out: usize, offset: usize| {
         (out * axis.stride + offset).checked_sub(axis.pad).filter(|at| *at < axis.n_in)
     };
-    let mut places = Vec::with_capacity(batch * down.n_out * across.n_out * 9);
+    let mut input_indices = Vec::with_capacity(batch * down.n_out * across.n_out * 9);
     for (b, row) in (0..batch).flat_map(|b| (0..down.n_out).map(move |row| (b, row))) {
         for (column, offset) in (0..across.n_out).flat_map(|column| (0..9).map(move |offset| (column, offset))) {
             let (y, x) = (at(down, row, offset / 3), at(across, column, offset % 3));
             let place = y.zip(x).map(|(y, x)| ((b * down.n_in + y) * across.n_in + x) as u32);
-            places.push(place.unwrap_or(u32::MAX));
+            input_indices.push(place.unwrap_or(u32::MAX));
         }
     }
-    places
+    input_indices
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
-//! How far lifted bodies are from the truth, and what trivial methods reach on the same scenes. Convention: each frame
-//! minus its own neck; prediction and truth of a scene each scaled by one number to the reference size; no rotation.
-//! MPJPE over nose, shoulders, elbows, wrists; P-MPJPE after a similarity per frame on those and the neck.
+//! Errors of lifted bodies, and of baselines on the same scenes. Convention: each frame is relative to its neck;
+//! prediction and truth of a scene are each scaled by one factor to the reference size, without rotation. MPJPE over
+//! nose, shoulders, elbows, wrists; P-MPJPE after a similarity alignment per frame of these points and the neck.
 
 use crate::train::scene::body::FilmedScene;
 use crate::train::scene::body_motion::Proportions;
@@ -14,7 +14,7 @@ use orator_base::types::skeleton;
 use serde::Serialize;
 use std::fmt;
 
-/// Points that count.
+/// Points included in the errors.
 const COUNTED: std::ops::Range<usize> = NOSE..R_HIP;
 
 /// Mean errors in mm.
@@ -23,11 +23,11 @@ pub struct BodyErrors {
     pub mpjpe: f64,
     pub p_mpjpe: f64,
     pub wrist: f64,
-    /// Share of `wrist` along the line of sight: |dz|.
+    /// Wrist error along the line of sight, |dz|.
     pub wrist_depth: f64,
-    /// Of the wrists' steps from frame to frame.
+    /// Error of the wrists' displacement from frame to frame.
     pub wrist_velocity: f64,
-    /// Frames that count: those of which a method gives all points.
+    /// Number of evaluated frames: those for which a method gives all points.
     pub n_frames: usize,
 }
 
@@ -41,7 +41,10 @@ impl fmt::Display for BodyErrors {
     }
 }
 
-/// A method's errors over scenes: `lift` gives a scene's poses (see `of_lifted`).
+/// Errors of a method over scenes: `lift` gives the poses of a scene (see `of_lifted`).
+///
+/// # Errors
+/// Errors of `lift`.
 pub fn of_method(
     scenes: &[FilmedScene],
     lift: impl Fn(&FilmedScene) -> anyhow::Result<Vec<Option<Pose>>>,
@@ -50,22 +53,22 @@ pub fn of_method(
     Ok(of_lifted(scenes.iter().zip(lifted.iter().map(Vec::as_slice))))
 }
 
-/// The errors of poses lifted from scenes, a scene's in any one unit, the neck anywhere; a frame of `None` or with a
-/// point that is not finite does not count.
+/// Errors of poses lifted from scenes, with any one unit per scene and any neck position. A frame that is `None` or
+/// has a point that is not finite is skipped.
 pub fn of_lifted<'a>(scenes: impl Iterator<Item = (&'a FilmedScene, &'a [Option<Pose>])>) -> BodyErrors {
     let (mut sum, mut n_steps) = (BodyErrors::default(), 0);
     for (scene, poses) in scenes {
         let finite = |pose: &Pose| pose[COUNTED].iter().flatten().all(|v| v.is_finite());
         let lifted: Vec<Option<Pose>> = poses.iter().map(|pose| pose.filter(finite)).collect();
-        let told: Vec<Pose> = lifted.iter().flatten().copied().collect();
-        let (grow, true_grow) = (metres_per_unit(&told), metres_per_unit(&scene.truth));
+        let present: Vec<Pose> = lifted.iter().flatten().copied().collect();
+        let (scale, true_scale) = (metres_per_unit(&present), metres_per_unit(&scene.truth));
         let mut before: Option<(Pose, Pose)> = None;
         for (pose, truth) in lifted.iter().zip(&scene.truth) {
             let Some(pose) = pose else {
                 before = None;
                 continue;
             };
-            let (p, q) = (to_reference(pose, grow), to_reference(truth, true_grow));
+            let (p, q) = (to_reference(pose, scale), to_reference(truth, true_scale));
             let e = of_frame(&p, &q);
             sum.mpjpe += e.mpjpe;
             sum.p_mpjpe += e.p_mpjpe;
@@ -92,10 +95,10 @@ pub fn of_lifted<'a>(scenes: impl Iterator<Item = (&'a FilmedScene, &'a [Option<
     }
 }
 
-/// Relative to the neck, in metres of the reference body.
-fn to_reference(pose: &Pose, grow: f64) -> Pose {
+/// The pose relative to its neck, in metres of the reference body.
+fn to_reference(pose: &Pose, scale: f64) -> Pose {
     let neck = vec3::scale(vec3::add(pose[R_SHOULDER], pose[L_SHOULDER]), 0.5);
-    pose.map(|p| vec3::scale(vec3::sub(p, neck), grow))
+    pose.map(|p| vec3::scale(vec3::sub(p, neck), scale))
 }
 
 fn of_frame(p: &Pose, q: &Pose) -> BodyErrors {
@@ -114,13 +117,13 @@ fn of_frame(p: &Pose, q: &Pose) -> BodyErrors {
     }
 }
 
-/// The mean pose of scenes, of the reference size.
+/// Mean ground-truth pose of scenes, in metres of the reference body.
 pub fn mean_pose(scenes: &[FilmedScene]) -> Pose {
     let mut mean: Pose = [[0.0; 3]; N_POINTS];
     let mut n = 0.0;
     let of_scene = |scene: &FilmedScene| {
-        let grow = metres_per_unit(&scene.truth);
-        scene.truth.iter().map(|pose| to_reference(pose, grow)).collect::<Vec<Pose>>()
+        let scale = metres_per_unit(&scene.truth);
+        scene.truth.iter().map(|pose| to_reference(pose, scale)).collect::<Vec<Pose>>()
     };
     for pose in scenes.iter().flat_map(of_scene) {
         n += 1.0;
@@ -131,7 +134,7 @@ pub fn mean_pose(scenes: &[FilmedScene]) -> Pose {
     mean
 }
 
-/// x and y of a clean scene in metres at the neck's distance, the neck at 0.
+/// 2D points of a clean scene with zero depth, in metres at the neck's distance, relative to the neck.
 fn flat(scene: &FilmedScene) -> Vec<Pose> {
     let frame = |seen: &SeenBody| {
         let points: Pose = seen.map(|p| {
@@ -144,15 +147,16 @@ fn flat(scene: &FilmedScene) -> Vec<Pose> {
     scene.seen.iter().map(frame).collect()
 }
 
-/// Every point at its mean depth (of `mean`), x and y as seen. Needs a clean scene and knows its scale.
+/// Baseline: each point at its depth in the mean pose, x and y as observed. Requires a clean scene; uses its true
+/// scale.
 pub fn with_mean_depth(scene: &FilmedScene, mean: &Pose) -> Vec<Option<Pose>> {
-    let deep = |pose: Pose| Some(std::array::from_fn(|j| [pose[j][0], pose[j][1], mean[j][2]]));
-    flat(scene).into_iter().map(deep).collect()
+    let with_depth = |pose: Pose| Some(std::array::from_fn(|j| [pose[j][0], pose[j][1], mean[j][2]]));
+    flat(scene).into_iter().map(with_depth).collect()
 }
 
-/// Depth solved from the bone lengths of the common adult: each joint lies where its line of sight meets the sphere
-/// around its parent, arms on the side of the camera; the shoulders turn to the side that the nose points to. Needs a
-/// clean scene and knows the camera and where the neck is.
+/// Baseline: depth from the bone lengths of the mean adult. Each joint lies at the intersection of its line of sight
+/// with the sphere around its parent, arms on the side of the camera; the shoulders turn to the side that the nose
+/// points to. Requires a clean scene; uses the true camera and neck position.
 pub fn with_bone_depth(scene: &FilmedScene) -> Vec<Option<Pose>> {
     let bones = Proportions::MEAN;
     let solve = |seen: &SeenBody| {
@@ -160,7 +164,7 @@ pub fn with_bone_depth(scene: &FilmedScene) -> Vec<Option<Pose>> {
         let mut pose: Pose = [[0.0; 3]; N_POINTS];
         let middle = vec3::scale(vec3::add(rays[R_SHOULDER]?, rays[L_SHOULDER]?), 0.5);
         let neck = vec3::scale(middle, scene.neck[2]);
-        // whose nose is to the image's right of the neck has turned the left shoulder away
+        // A nose right of the neck in the image means that the left shoulder is turned away.
         let left_is_away = rays[NOSE]?[0] > middle[0];
         pose[L_SHOULDER] = on_sphere(rays[L_SHOULDER]?, neck, bones.shoulders / 2.0, !left_is_away);
         pose[R_SHOULDER] = on_sphere(rays[R_SHOULDER]?, neck, bones.shoulders / 2.0, left_is_away);
@@ -174,8 +178,8 @@ pub fn with_bone_depth(scene: &FilmedScene) -> Vec<Option<Pose>> {
     scene.seen.iter().map(solve).collect()
 }
 
-/// Where the line of sight along `ray` (z = 1) meets a sphere, the nearer or the farther place; where it misses, its
-/// place nearest to the centre.
+/// Nearer or farther intersection of the line of sight along `ray` (z = 1) with a sphere; without intersection, the
+/// point of the line nearest to the centre.
 fn on_sphere(ray: Vec3, centre: Vec3, radius: f64, nearer: bool) -> Vec3 {
     let square = vec3::dot(ray, ray);
     let closest = vec3::dot(ray, centre) / square;

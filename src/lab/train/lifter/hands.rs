@@ -1,4 +1,4 @@
-//! What the hand lifter learns: hands made by rule, seen from every side.
+//! Training task of the hand lifter: synthetic hands in random orientations.
 
 use crate::train::scene::hand::{errors, sample_hand};
 use crate::train::supervised::TrainingTask;
@@ -13,8 +13,8 @@ use orator_nn::params::Params;
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 
-/// Hands that errors are measured on.
-const MEASURED: usize = 4000;
+/// Number of evaluation hands.
+const N_EVALUATED: usize = 4000;
 
 /// Training task of the network.
 pub struct HandLifterTask {
@@ -23,7 +23,10 @@ pub struct HandLifterTask {
 }
 
 impl HandLifterTask {
-    /// A network with `hidden` numbers in its layers and first values from `seed`.
+    /// Creates a network with layers of `hidden` units, initialised from `seed`.
+    ///
+    /// # Errors
+    /// A network that cannot be created.
     pub fn new(hidden: usize, seed: u64) -> Result<Self> {
         let mut params = Params::new(seed);
         let config = Config { n_in: N_IN, n_out: N_OUT, hidden, dropout: 0.0 };
@@ -69,6 +72,6 @@ impl TrainingTask for HandLifterTask {
     }
 
     fn errors(&self, brief: bool) -> Result<Vec<String>> {
-        errors(|seen| Ok(self.lifter.lift(seen, Side::Right)?), MEASURED, brief)
+        errors(|seen| Ok(self.lifter.lift(seen, Side::Right)?), N_EVALUATED, brief)
     }
 }

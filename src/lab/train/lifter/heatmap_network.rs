@@ -1,6 +1,6 @@
-//! The hand lifter of Zimmermann & Brox 2017 (section 4.3): score maps of the 21 points and the hand's side to a hand
-//! in its own frame (`PosePrior`) and the rotation of that frame (`ViewPoint`). The baseline that the coordinate network
-//! of the product (`orator_nn::lifter::hand`) is measured against.
+//! Hand lifter of Zimmermann & Brox 2017 (section 4.3): score maps of the 21 points and the hand's side to a hand in a
+//! canonical frame (`PosePrior`) and the rotation of that frame (`ViewPoint`). It is the baseline of the coordinate
+//! network (`orator_nn::lifter::hand`) that the pipeline uses.
 
 use super::conv3x3::Conv3x3;
 use super::score_maps::{Crop, N_MAPS, PLACES, assembled, score_maps};
@@ -15,12 +15,12 @@ use orator_nn::params::{Init, Params};
 
 /// Prefix of the network's tensors in a weights file.
 pub const NAME: &str = hand::NAME;
-/// Score maps: one a point.
+/// Number of score maps, one per point.
 const MAPS: usize = 21;
-/// Hands that go through the networks together when lifting.
+/// Batch size when lifting.
 const BATCH: usize = 64;
-/// The crop a hand is lifted from is this much larger than it need be, as in training on average.
-const ROOM: f64 = 1.1;
+/// Enlargement of the crop when lifting; the mean of the training's range.
+const CROP_SCALE: f64 = 1.1;
 
 /// Both networks.
 pub struct HeatmapLifter {
@@ -28,11 +28,11 @@ pub struct HeatmapLifter {
     view_point: Tower,
 }
 
-/// Three pairs of convolutions (stride 1, then 2), then fully connected layers; leaky ReLU (0.01) after all but the
-/// last, dropout between the fully connected ones.
+/// Three pairs of convolutions (stride 1, then 2), then fully connected layers; leaky ReLU (0.01) after all layers but
+/// the last, dropout between the fully connected ones.
 struct Tower {
     convolutions: Vec<Conv3x3>,
-    /// First values: Glorot uniform, bias 1e-4.
+    /// Fully connected layers, initialised with Glorot uniform weights and biases of 1e-4.
     layers: Vec<Linear>,
     dropout: f64,
 }
@@ -46,7 +46,7 @@ impl Tower {
             convolutions.push(Conv3x3::new(params, &format!("{name}.conv{}", 2 * i + 1), n_out, n_out, 2)?);
             n_in = n_out;
         }
-        // the side's two numbers join what the convolutions leave
+        // The side's two values are appended to the flattened output of the convolutions.
         let mut n_in = (PLACES / 8) * (PLACES / 8) * n_in + 2;
         let mut layers = Vec::new();
         for (i, n_out) in widths.into_iter().enumerate() {
@@ -74,7 +74,7 @@ impl Tower {
 }
 
 impl HeatmapLifter {
-    /// Makes the networks' tensors under `<name>.pose_prior` (1.64 M numbers) and `<name>.view_point` (2.24 M).
+    /// Creates the networks' tensors under `<name>.pose_prior` (1.64 M parameters) and `<name>.view_point` (2.24 M).
     pub fn new(params: &mut Params, name: &str) -> Result<Self> {
         Ok(Self {
             pose_prior: Tower::new(params, &format!("{name}.pose_prior"), [32, 64, 128], [512, 512, 63], 0.2)?,
@@ -82,30 +82,33 @@ impl HeatmapLifter {
         })
     }
 
-    /// Score maps [B, 32, 32, 21] and sides [B, 2] (left: 1 0, right: 0 1) to [B, 72]: 21 points in the hand's own
-    /// frame, then the 9 entries of the turn, row by row.
+    /// Score maps [B, 32, 32, 21] and sides [B, 2] (left: 1 0, right: 0 1) to [B, 72]: 21 points in the canonical
+    /// frame, then the 9 entries of the rotation matrix, row by row.
     pub fn forward(&self, maps: &Tensor, sides: &Tensor, mode: &mut Mode) -> Result<Tensor> {
         let points = self.pose_prior.forward(maps, sides, mode)?;
         let turn = rotation(&self.view_point.forward(maps, sides, mode)?)?;
         Tensor::cat(&[&points, &turn], 1)
     }
 
-    /// Hands of that side, the wrist at 0, in the axes of the picture, the middle finger's first phalanx about 1 long;
-    /// `None` where too little is seen. Left hands go through the networks in the mirror.
+    /// Lifts hands of one side: wrist at 0, image axes, middle proximal phalanx about 1 long; `None` where too few
+    /// points are visible. Left hands are mirrored for the networks.
+    ///
+    /// # Errors
+    /// An error of the tensor library.
     pub fn lift(&self, seen: &[SeenHand], side: Side) -> Result<Vec<Option<HandJoints>>> {
         let flip = if side == Side::Left { -1.0 } else { 1.0 };
         let mirrored: Vec<SeenHand> = seen.iter().map(|s| s.map(|p| p.map(|[x, y]| [flip * x, y]))).collect();
         let crops: Vec<Option<Crop>> = mirrored.iter().map(Crop::around).collect();
-        let there: Vec<(usize, Crop)> = crops.iter().enumerate().filter_map(|(i, c)| Some((i, (*c)?))).collect();
+        let valid_crops: Vec<(usize, Crop)> = crops.iter().enumerate().filter_map(|(i, c)| Some((i, (*c)?))).collect();
         let mut hands = vec![None; seen.len()];
-        for some in there.chunks(BATCH) {
-            let mut maps = vec![0.0; some.len() * N_MAPS];
-            for ((i, crop), maps) in some.iter().zip(maps.chunks_exact_mut(N_MAPS)) {
-                score_maps(&mirrored[*i], Crop { side: ROOM * crop.side, ..*crop }, maps);
+        for batch in valid_crops.chunks(BATCH) {
+            let mut maps = vec![0.0; batch.len() * N_MAPS];
+            for ((i, crop), maps) in batch.iter().zip(maps.chunks_exact_mut(N_MAPS)) {
+                score_maps(&mirrored[*i], Crop { side: CROP_SCALE * crop.side, ..*crop }, maps);
             }
-            let maps = Tensor::from_vec(maps, (some.len(), PLACES, PLACES, MAPS), &Device::Cpu)?;
-            let rows = self.forward(&maps, &right_sides(some.len(), &maps)?, &mut Mode::Eval)?.to_vec2::<f32>()?;
-            for ((i, _), row) in some.iter().zip(rows) {
+            let maps = Tensor::from_vec(maps, (batch.len(), PLACES, PLACES, MAPS), &Device::Cpu)?;
+            let rows = self.forward(&maps, &right_sides(batch.len(), &maps)?, &mut Mode::Eval)?.to_vec2::<f32>()?;
+            for ((i, _), row) in batch.iter().zip(rows) {
                 let at = |j: usize| std::array::from_fn(|k| f64::from(row[3 * j + k]));
                 let axes = std::array::from_fn(|k| at(MAPS + k));
                 let hand = assembled(&std::array::from_fn(at), &axes);
@@ -116,12 +119,13 @@ impl HeatmapLifter {
     }
 }
 
-/// The side input of `n` right hands, of the type of `like`.
+/// Side input of `n` right hands, of the dtype of `like`.
 pub fn right_sides(n: usize, like: &Tensor) -> Result<Tensor> {
     Tensor::new(&[[0f32, 1.0]], &Device::Cpu)?.to_dtype(like.dtype())?.repeat((n, 1))
 }
 
-/// Axis-angle vectors [B, 3] to matrices [B, 9], row by row: Rodrigues' formula, the angle sqrt(|v|^2 + 1e-8).
+/// Axis-angle vectors [B, 3] to rotation matrices [B, 9], row by row: Rodrigues' formula with the angle sqrt(|v|^2 +
+/// 1e-8).
 pub fn rotation(vectors: &Tensor) -> Result<Tensor> {
     let angle = (vectors.sqr()?.sum_keepdim(D::Minus1)? + 1e-8)?.sqrt()?;
     let axis = vectors.broadcast_div(&angle)?;
@@ -129,18 +133,18 @@ pub fn rotation(vectors: &Tensor) -> Result<Tensor> {
     let (sin, cos) = (angle.sin()?, angle.cos()?);
     let rest = cos.affine(-1.0, 1.0)?;
     let diagonal = |a: &Tensor| -> Result<Tensor> { &cos + (a.sqr()? * &rest)? };
-    let beside = |a: &Tensor, b: &Tensor, c: &Tensor, sign: f64| -> Result<Tensor> {
+    let off_diagonal = |a: &Tensor, b: &Tensor, c: &Tensor, sign: f64| -> Result<Tensor> {
         ((a * b)? * &rest)? + ((c * &sin)? * sign)?
     };
     let entries = [
         diagonal(&x)?,
-        beside(&x, &y, &z, -1.0)?,
-        beside(&x, &z, &y, 1.0)?,
-        beside(&x, &y, &z, 1.0)?,
+        off_diagonal(&x, &y, &z, -1.0)?,
+        off_diagonal(&x, &z, &y, 1.0)?,
+        off_diagonal(&x, &y, &z, 1.0)?,
         diagonal(&y)?,
-        beside(&y, &z, &x, -1.0)?,
-        beside(&x, &z, &y, -1.0)?,
-        beside(&y, &z, &x, 1.0)?,
+        off_diagonal(&y, &z, &x, -1.0)?,
+        off_diagonal(&x, &z, &y, -1.0)?,
+        off_diagonal(&y, &z, &x, 1.0)?,
         diagonal(&z)?,
     ];
     Tensor::cat(&entries, 1)

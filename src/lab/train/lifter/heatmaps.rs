@@ -1,5 +1,6 @@
-//! What the heat-map lifter learns (Zimmermann & Brox 2017): score maps of hands made by rule to the hand in its own
-//! frame and that frame's turn. The same hands as the coordinate network's, all of them right ones.
+//! Training task of the heat-map lifter (Zimmermann & Brox 2017): score maps of synthetic hands to the hand in its
+//! canonical frame and the rotation of that frame. The hands are those of the coordinate network's training, all of
+//! them right ones.
 
 use super::heatmap_network::{HeatmapLifter, NAME, right_sides};
 use super::score_maps::{Crop, PLACES, canonical, score_maps};
@@ -18,11 +19,11 @@ use serde_json::{Value, json};
 
 /// Kind of the weights file.
 pub const KIND: &str = "hand-heatmap-lifter";
-/// What comes out, three numbers each: the points, then the rows of the turn.
+/// Output rows of three numbers: the points, then the rows of the rotation matrix.
 const N_ROWS: usize = N_HAND + 3;
 
-/// Hands that errors are measured on, few since each takes long.
-const MEASURED: usize = 300;
+/// Number of evaluation hands; few, because the network is slow.
+const N_EVALUATED: usize = 300;
 
 /// Training task of the network.
 pub struct HeatmapLifterTask {
@@ -31,7 +32,10 @@ pub struct HeatmapLifterTask {
 }
 
 impl HeatmapLifterTask {
-    /// The networks with first values from `seed`.
+    /// Creates the networks, initialised from `seed`.
+    ///
+    /// # Errors
+    /// A network that cannot be created.
     pub fn new(seed: u64) -> Result<Self> {
         let mut params = Params::new(seed);
         let lifter = HeatmapLifter::new(&mut params, NAME)?;
@@ -64,7 +68,8 @@ impl TrainingTask for HeatmapLifterTask {
         vec![1.0; N_ROWS]
     }
 
-    /// The crop is up to 1.2 times as large as it need be and its centre off by 10 px (sd) of its 256.
+    /// The crop is up to 1.2 times as large as necessary, and its centre is shifted by 10 px (standard deviation) of
+    /// its 256 px.
     fn sample(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]) {
         let (drawn, crop, (own, axes)) = loop {
             let drawn = sample_hand(rng);
@@ -83,14 +88,14 @@ impl TrainingTask for HeatmapLifterTask {
         self.lifter.forward(x, &right_sides(x.dim(0)?, x)?, mode)
     }
 
-    /// Mean squared error of the points plus that of the turn.
+    /// Mean squared error of the points plus that of the rotation matrix.
     fn loss(&self, out: &Tensor, wanted: &Tensor, _weights: &Tensor) -> candle_core::Result<Tensor> {
         let off = (out.reshape(wanted.shape())? - wanted)?.sqr()?;
         off.narrow(1, 0, N_HAND)?.mean_all()? + off.narrow(1, N_HAND, 3)?.mean_all()?
     }
 
     fn errors(&self, brief: bool) -> Result<Vec<String>> {
-        errors(|seen| Ok(self.lifter.lift(seen, Side::Right)?), MEASURED, brief)
+        errors(|seen| Ok(self.lifter.lift(seen, Side::Right)?), N_EVALUATED, brief)
     }
 }
 

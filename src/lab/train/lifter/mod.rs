@@ -1,4 +1,4 @@
-//! Training of the lifters: body, hands, hand heat-maps (with their network).
+//! Training of the lifters: body, hands, and the hand heat-map baseline with its network.
 
 pub mod body;
 pub mod conv3x3;

@@ -1,23 +1,23 @@
-//! A hand as the heat-map lifter sees it (Zimmermann & Brox 2017): score maps of its points within a crop about the
-//! middle knuckle, and the hand's own frame that its two networks meet in. House point order: the paper's points 11,
-//! 12 and 20 are 10, 9 and 17 here.
+//! Input and output representation of the heat-map lifter (Zimmermann & Brox 2017): score maps of the points within a
+//! crop centred on the middle knuckle, and the canonical frame of a hand. Points are in this crate's order: the
+//! paper's points 11, 12 and 20 are 10, 9 and 17 here.
 
 use orator_base::math::vec3;
 use orator_base::math::vec3::Vec3;
 use orator_base::motion::view::hand::{HandJoints, SeenHand};
 use orator_base::types::pose2d::N_HAND;
 
-/// Places of a score map across and down.
+/// Width and height of a score map.
 pub const PLACES: usize = 32;
-/// px of the crop, and px that one place is the mean of.
+/// Width of the crop in px, and px averaged into one score.
 const CROP: f64 = 256.0;
 const POOLED: usize = 8;
 /// A score is exp(-d^2 / SIGMA^2), d in px of the crop.
 const SIGMA: f64 = 25.0;
-/// Numbers of all maps: [32, 32, 21].
+/// Number of values of all maps: [32, 32, 21].
 pub const N_MAPS: usize = PLACES * PLACES * N_HAND;
 
-/// A square of the picture: centre and side in px.
+/// A square of the image: centre and side in px.
 #[derive(Clone, Copy, Debug)]
 pub struct Crop {
     pub centre: [f64; 2],
@@ -25,8 +25,8 @@ pub struct Crop {
 }
 
 impl Crop {
-    /// About the middle knuckle (or the middle of the points), so large that all seen points lie inside. `None` when
-    /// no two points differ.
+    /// Centred on the middle knuckle (or the mean of the points), just large enough to contain all detected points.
+    /// `None` if no two points differ.
     pub fn around(seen: &SeenHand) -> Option<Self> {
         let there = || seen.iter().flatten().map(|p| p.map(f64::from));
         let n = there().count().max(1) as f64;
@@ -37,8 +37,8 @@ impl Crop {
     }
 }
 
-/// The score maps, mean-pooled from 256 to 32 places (a Gaussian is the product of its two profiles, so that the means
-/// are too). A point not seen, or outside the crop, leaves its map zero.
+/// Writes the score maps, mean-pooled from 256 to 32 pixels across (a 2D Gaussian is separable, and so are its means).
+/// The map of a point that is missing or outside the crop is zero.
 pub fn score_maps(seen: &SeenHand, crop: Crop, maps: &mut [f32]) {
     maps.fill(0.0);
     for (j, point) in seen.iter().enumerate() {
@@ -64,9 +64,9 @@ fn profile(at: f64) -> [f64; PLACES] {
     })
 }
 
-/// A hand in its own frame, the middle finger's first phalanx 1 long, and the three axes of the frame (rows): the
-/// middle knuckle lies on y, the little finger's at z = 0 and x > 0; z is negated, as the paper has it for right hands
-/// (left ones are seen in the mirror). `None` where the knuckles and the wrist lie on a line.
+/// The hand in its canonical frame, scaled so that the middle proximal phalanx is 1 long, and the three axes of the
+/// frame (rows): the middle knuckle lies on y, the little finger's knuckle at z = 0 and x > 0; z is negated, as in the
+/// paper for right hands (left hands are mirrored). `None` if the knuckles and the wrist are collinear.
 pub fn canonical(hand: &HandJoints) -> Option<(HandJoints, [Vec3; 3])> {
     let grow = 1.0 / vec3::norm(vec3::sub(hand[9], hand[10]));
     let y = vec3::unit(vec3::sub(hand[9], hand[0]), 1e-9)?;
@@ -79,7 +79,7 @@ pub fn canonical(hand: &HandJoints) -> Option<(HandJoints, [Vec3; 3])> {
     own.iter().flatten().all(|v| v.is_finite()).then_some((own, [x, y, z]))
 }
 
-/// The hand in camera axes from its own frame: rows times the turn, relative to the wrist.
+/// The hand in camera axes from its canonical frame, relative to the wrist; the inverse of `canonical` up to scale.
 pub fn assembled(own: &HandJoints, axes: &[Vec3; 3]) -> HandJoints {
     let place = |p: Vec3| {
         let [x, y, z] = [0, 1, 2].map(|k| vec3::scale(axes[k], if k == 2 { -p[k] } else { p[k] }));

@@ -1,6 +1,5 @@
-//! A camera that looks at a moving body: keypoints as a detector would give them, with noise, bias, outliers and
-//! gaps, beside the truth in camera axes. The recipe (angles, focal lengths, noise) is that of a study on this kind
-//! of data; ranges stand beside each draw.
+//! Synthetic camera views of a moving upper body: ground truth in camera axes, and 2D keypoints with the noise, bias,
+//! outliers and gaps of a detector. The ranges of angles, focal lengths and noise are noted beside each draw.
 
 use super::body_motion;
 use super::body_motion::{Proportions, turn};
@@ -17,44 +16,45 @@ use orator_base::types::skeleton;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Dataset frames a second, the rate the lifter sees.
+/// Frame rate of the scenes, frames/s: the rate at which the lifter runs.
 pub const FPS: f64 = 15.0;
 
-/// Share of the training's scenes with the noise that real models were measured to have, and the share of those with
-/// its bias; the others have one of its size.
+/// Share of training scenes that use the measured noise of real pose models (the others use the assumed noise of
+/// `perturb`), and the share of those that use the measured bias (the others: a bias of equal size in a random
+/// direction).
 const MEASURED_NOISE: f64 = 0.7;
 const MEASURED_BIAS: f64 = 0.7;
 
-/// What was filmed: the truth in metres and camera axes, and the keypoints.
+/// A filmed scene: ground-truth poses in metres and camera axes, and the 2D keypoints.
 #[derive(Clone, Debug)]
 pub struct FilmedScene {
     pub truth: Vec<Pose>,
     pub seen: Vec<SeenBody>,
-    /// [T]; whether a frame has a gross error (`jumps`), so that nothing is to be learnt from it.
+    /// [T]; whether a frame has a gross error (`jumps`); such frames are not training targets.
     pub disturbed: Vec<bool>,
-    /// Which side the body is seen from on average, radians; 0: from ahead.
+    /// Camera yaw relative to the body's mean front, radians; 0: frontal view.
     pub yaw: f64,
-    /// The neck in metres before the camera, and the camera's focal length in px; the axis meets the picture at 0, 0.
+    /// Neck position in camera axes, metres, and focal length in px; the principal point is (0, 0).
     pub neck: Vec3,
     pub focal_px: f64,
-    /// px of a metre at the neck's distance.
+    /// Scale of the image at the neck's distance, px per metre.
     pub px_per_metre: f64,
 }
 
-/// What a scene is for.
+/// Purpose of a scene, which decides how strongly it is perturbed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Filming {
-    /// Anybody, at any speed, through detectors that are better and worse, from further round.
+    /// Training: random body proportions and playback speed, better and worse detectors, a wider range of views.
     Training,
-    /// The convention of the errors, the condition "drop": the common adult, and a detector that errs and misses.
+    /// Evaluation, condition "drop": mean adult proportions, a detector with noise and missing points.
     Drop,
-    /// The convention of the errors, with all keypoints exact.
+    /// Evaluation with exact keypoints.
     Clean,
 }
 
 impl FilmedScene {
-    /// Captured motion: a random stretch of `take`, seen from a random side within 60 degrees. In training an arm may
-    /// come from `other`: what the two arms do together is seldom the same twice. `None` when the take is too short.
+    /// Films a random excerpt of `take` from a random side within 60 degrees. In training, the left arm may come from
+    /// `other`, which decorrelates the two arms. Returns `None` if the take is too short.
     pub fn from_take(
         take: &BodyTake,
         other: Option<&BodyTake>,
@@ -65,41 +65,41 @@ impl FilmedScene {
         let training = filming == Filming::Training;
         let mut poses = stretch(take, training, n_frames, rng)?;
         if let Some(other) = other.and_then(|other| stretch(other, training, n_frames, rng)) {
-            poses.iter_mut().zip(&other).for_each(|(pose, other)| take_arm(pose, other));
+            poses.iter_mut().zip(&other).for_each(|(pose, other)| replace_left_arm(pose, other));
         }
-        let as_it_is = training && take.rendered;
-        if !as_it_is {
+        let unchanged = training && take.rendered;
+        if !unchanged {
             let bones = if training { Proportions::sample(rng) } else { Proportions::MEAN };
-            poses.iter_mut().for_each(|pose| *pose = with_bones(pose, &bones));
+            poses.iter_mut().for_each(|pose| *pose = with_bone_lengths(pose, &bones));
         }
-        if training && !as_it_is {
+        if training && !unchanged {
             let glance = turn(rng.random_range(-0.5..0.5), rng.random_range(-0.2..0.2), 0.0);
             poses.iter_mut().for_each(|pose| pose[NOSE] = glance.turn(pose[NOSE]));
         }
         Some(Self::filmed(poses, filming, rng))
     }
 
-    /// Motion made by rule.
+    /// Films procedurally generated motion.
     pub fn from_rule(filming: Filming, n_frames: usize, rng: &mut ChaCha8Rng) -> Self {
         let poses = body_motion::gesture(rng, n_frames, 1.0 / FPS);
         Self::filmed(poses, filming, rng)
     }
 
-    /// Poses that face the camera, filmed.
+    /// Films poses that face the camera on average.
     fn filmed(mut poses: Vec<Pose>, filming: Filming, rng: &mut ChaCha8Rng) -> Self {
         let training = filming == Filming::Training;
         if training && rng.random_bool(0.5) {
             poses.iter_mut().for_each(|pose| *pose = MIRROR.map(|j| [-pose[j][0], pose[j][1], pose[j][2]]));
         }
-        // yaw within 60 degrees, in training more often less; the camera from 15 below to 15, in training 25, above;
-        // roll within 4, in a third of the training within 15
+        // Yaw within 60 degrees, in 40 % of training scenes within 29; elevation -15 to 15 degrees, in training up to
+        // 25; roll within 4 degrees, in a third of the training scenes within 15.
         let yaw = if training && rng.random_bool(0.4) { 0.5 } else { 1.047 };
         let yaw = rng.random_range(-yaw..yaw);
         let above = if training { 0.44 } else { 0.262 };
         let roll = if training && rng.random_bool(0.33) { 0.26 } else { 0.07 };
         let view = turn(0.0, rng.random_range(-0.262..above), rng.random_range(-roll..roll)) * turn(yaw, 0.0, 0.0);
         let truth: Vec<Pose> = poses.iter().map(|pose| pose.map(|p| view.turn(p))).collect();
-        // focal length in picture widths; a body of 0.75 m covers 50 to 150 % of the height of a 16:9 picture
+        // The focal length is in image widths; a body of 0.75 m covers 50 to 150 % of the height of a 16:9 image.
         let focal: f64 = rng.random_range(1.0..2.2);
         let distance = (focal * 0.75 / (rng.random_range(0.5..1.5) * 9.0 / 16.0)).max(0.85);
         let neck: Vec3 = [
@@ -116,10 +116,10 @@ impl FilmedScene {
         let px_per_metre = focal_px / distance;
         if filming != Filming::Clean {
             let shoulders = vec3::norm(vec3::sub(truth[0][R_SHOULDER], truth[0][L_SHOULDER]));
-            if !(training && spoil_as_measured(&mut seen, shoulders * px_per_metre, rng)) {
-                spoil(&mut seen, 0.35 * px_per_metre, training, rng);
+            if !(training && perturb_as_measured(&mut seen, shoulders * px_per_metre, rng)) {
+                perturb(&mut seen, 0.35 * px_per_metre, training, rng);
             }
-            lose_hips(&mut seen, 0.35 * px_per_metre, training, rng);
+            drop_hips(&mut seen, 0.35 * px_per_metre, training, rng);
         }
         let disturbed =
             if training { jumps::disturb(&mut seen, 0.35 * px_per_metre, rng) } else { vec![false; seen.len()] };
@@ -127,10 +127,10 @@ impl FilmedScene {
     }
 }
 
-/// Noise, outliers and gaps; `shoulders_px`: the true width of the shoulders. In training a detector may be better or
-/// worse, and off by a steady bias.
-fn spoil(seen: &mut [SeenBody], shoulders_px: f64, training: bool, rng: &mut ChaCha8Rng) {
-    // what a detector calls a shoulder or an elbow lies up to a few cm from where a capture has it, all the while
+/// Adds assumed noise, outliers and gaps. `shoulders_px` is the true shoulder width in px. In training the noise level
+/// varies and each point has a constant bias.
+fn perturb(seen: &mut [SeenBody], shoulders_px: f64, training: bool, rng: &mut ChaCha8Rng) {
+    // Detectors and motion capture place shoulders and elbows up to a few cm apart, which is constant over a scene.
     let bias = if !training {
         0.0
     } else if rng.random_bool(0.5) {
@@ -138,9 +138,9 @@ fn spoil(seen: &mut [SeenBody], shoulders_px: f64, training: bool, rng: &mut Cha
     } else {
         4.0
     };
-    let much = if training { rng.random_range(-1.2f64..0.7).exp() } else { 1.0 };
+    let scale = if training { rng.random_range(-1.2f64..0.7).exp() } else { 1.0 };
     for point in 0..N_POINTS {
-        // 1 % of the shoulders; detectors are less sure of wrists and hips
+        // 1 % of the shoulder width; detectors are less accurate on wrists and hips.
         let share = match point {
             R_WRIST | L_WRIST => 0.012,
             R_HIP | L_HIP => 0.018,
@@ -151,11 +151,11 @@ fn spoil(seen: &mut [SeenBody], shoulders_px: f64, training: bool, rng: &mut Cha
             let stray = if rng.random_bool(0.01) { 12.0 } else { 1.0 };
             if let Some(p) = &mut frame[point] {
                 for (v, bias) in p.iter_mut().zip(bias) {
-                    *v += (shoulders_px * share * (bias + much * stray * normal(rng))) as f32;
+                    *v += (shoulders_px * share * (bias + scale * stray * normal(rng))) as f32;
                 }
             }
         }
-        // bursts of 1 to 12 frames: one begins in 1.7 % of the frames, so that a tenth of the frames is missing
+        // Gaps of 1 to 12 frames; one begins in 1.7 % of the frames, so that a tenth of the frames is missing.
         let gaps = match (training, rng.random_bool(0.4)) {
             (true, true) => 0.0,
             (true, false) => rng.random_range(0.0..0.05),
@@ -176,30 +176,30 @@ fn spoil(seen: &mut [SeenBody], shoulders_px: f64, training: bool, rng: &mut Cha
     }
 }
 
-/// Spoils keypoints as real models were measured to do, in most scenes; says whether it did.
-fn spoil_as_measured(seen: &mut [SeenBody], shoulders_px: f64, rng: &mut ChaCha8Rng) -> bool {
+/// Adds the measured noise of a random model set in 70 % of the scenes; returns whether it did.
+fn perturb_as_measured(seen: &mut [SeenBody], shoulders_px: f64, rng: &mut ChaCha8Rng) -> bool {
     let sets = &noise::measured().bodies;
     if sets.is_empty() || !rng.random_bool(MEASURED_NOISE) {
         return false;
     }
     let set = &sets[rng.random_range(0..sets.len())];
-    let much = rng.random_range(-0.7f64..0.4).exp();
+    let scale = rng.random_range(-0.7f64..0.4).exp();
     let with_bias = rng.random_bool(MEASURED_BIAS);
-    set.apply(seen, shoulders_px, much, with_bias, rng);
+    set.apply(seen, shoulders_px, scale, with_bias, rng);
     true
 }
 
-/// Hips are often not seen: behind a desk, below the picture.
-fn lose_hips(seen: &mut [SeenBody], shoulders_px: f64, training: bool, rng: &mut ChaCha8Rng) {
+/// Removes the hips in 60 % of the scenes: they are often hidden by a desk or below the image.
+fn drop_hips(seen: &mut [SeenBody], shoulders_px: f64, training: bool, rng: &mut ChaCha8Rng) {
     if rng.random_bool(0.6) {
         seen.iter_mut().for_each(|f| (f[R_HIP], f[L_HIP]) = (None, None));
     } else if training && rng.random_bool(0.5) {
-        invent_hips(seen, shoulders_px, rng);
+        guess_hips(seen, shoulders_px, rng);
     }
 }
 
-/// Hips behind a desk or below the picture: many detectors do not miss them but put them straight below the shoulders.
-fn invent_hips(seen: &mut [SeenBody], shoulders_px: f64, rng: &mut ChaCha8Rng) {
+/// Places the hips straight below the shoulders, as many detectors do when a desk or the image border hides them.
+fn guess_hips(seen: &mut [SeenBody], shoulders_px: f64, rng: &mut ChaCha8Rng) {
     let (below, apart) = (rng.random_range(0.8..1.7), rng.random_range(0.25..0.75));
     let aside = 0.1 * normal(rng);
     for frame in seen.iter_mut() {
@@ -212,7 +212,7 @@ fn invent_hips(seen: &mut [SeenBody], shoulders_px: f64, rng: &mut ChaCha8Rng) {
     }
 }
 
-/// A random stretch of a take at the dataset's rate, turned so that it faces the camera on average.
+/// A random excerpt of a take at `FPS`, rotated so that it faces the camera on average.
 fn stretch(take: &BodyTake, training: bool, n_frames: usize, rng: &mut ChaCha8Rng) -> Option<Vec<Pose>> {
     let speed = if training { rng.random_range(-0.5f64..0.4).exp() } else { 1.0 };
     let step = speed * take.fps / FPS;
@@ -221,13 +221,13 @@ fn stretch(take: &BodyTake, training: bool, n_frames: usize, rng: &mut ChaCha8Rn
         return None;
     }
     let start = rng.random_range(0.0..=room);
-    let poses: Vec<Pose> = (0..n_frames).map(|i| between(&take.poses, start + step * i as f64)).collect();
+    let poses: Vec<Pose> = (0..n_frames).map(|i| interpolate(&take.poses, start + step * i as f64)).collect();
     let ahead = turn(-facing(&poses), 0.0, 0.0);
     Some(poses.iter().map(|pose| pose.map(|p| ahead.turn(p))).collect())
 }
 
-/// Gives `pose` the left arm of `other`, held to the shoulders as it was there.
-fn take_arm(pose: &mut Pose, other: &Pose) {
+/// Replaces the left arm of `pose` by that of `other`, rotated with the shoulder line.
+fn replace_left_arm(pose: &mut Pose, other: &Pose) {
     let across = turn(facing(std::slice::from_ref(pose)) - facing(std::slice::from_ref(other)), 0.0, 0.0);
     let from = |joint: usize| across.turn(vec3::sub(other[joint], other[L_SHOULDER]));
     let shoulder = pose[L_SHOULDER];
@@ -235,12 +235,12 @@ fn take_arm(pose: &mut Pose, other: &Pose) {
     pose[L_WRIST] = vec3::add(shoulder, from(L_WRIST));
 }
 
-/// Frames of a scene that errors are measured on (4 s), and the seed of the scenes.
+/// Frames of an evaluation scene (4 s), and the seed of the evaluation scenes.
 const MEASURED_FRAMES: usize = 60;
 const MEASURED_SEED: u64 = 20_000;
 
-/// `n` scenes to measure errors on, of `takes` in turn or, when there are none, of motion made by rule: the same ones
-/// whenever asked. Takes shorter than a scene are left out; nothing when all are.
+/// `n` reproducible evaluation scenes, from `takes` in turn or, if there are none, from procedural motion. Takes
+/// shorter than a scene are skipped; the result is empty if all are.
 pub fn scenes(takes: &[BodyTake], filming: Filming, n: usize) -> Vec<FilmedScene> {
     let mut rng = ChaCha8Rng::seed_from_u64(MEASURED_SEED);
     if takes.is_empty() {
@@ -252,8 +252,8 @@ pub fn scenes(takes: &[BodyTake], filming: Filming, n: usize) -> Vec<FilmedScene
         .collect()
 }
 
-/// The pose at a time between two frames.
-fn between(poses: &[Pose], at: f64) -> Pose {
+/// The linearly interpolated pose at frame position `at`.
+fn interpolate(poses: &[Pose], at: f64) -> Pose {
     let before = (at.max(0.0) as usize).min(poses.len() - 1);
     let after = (before + 1).min(poses.len() - 1);
     let share = at - before as f64;
@@ -262,14 +262,14 @@ fn between(poses: &[Pose], at: f64) -> Pose {
     })
 }
 
-/// Mean yaw of the shoulders: 0 faces the camera.
+/// Mean yaw of the shoulder line, radians; 0 faces the camera.
 fn facing(poses: &[Pose]) -> f64 {
     let across = poses.iter().fold([0.0; 3], |sum, p| vec3::add(sum, vec3::sub(p[L_SHOULDER], p[R_SHOULDER])));
     (-across[2]).atan2(across[0])
 }
 
-/// The pose with every bone's direction kept and its length changed.
-fn with_bones(pose: &Pose, bones: &Proportions) -> Pose {
+/// The pose with bone directions kept and bone lengths replaced.
+fn with_bone_lengths(pose: &Pose, bones: &Proportions) -> Pose {
     let along = |from: Vec3, to: Vec3, length: f64| {
         vec3::scale(vec3::unit(vec3::sub(to, from), 1e-9).unwrap_or([0.0, 1.0, 0.0]), length)
     };
@@ -296,7 +296,7 @@ mod tests {
     fn take() -> BodyTake {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let poses = body_motion::gesture(&mut rng, 300, 1.0 / 60.0);
-        // turned away: a scene turns it back to the camera
+        // Turned away from the camera; `from_take` turns it back.
         BodyTake {
             name: "t".into(),
             fps: 60.0,

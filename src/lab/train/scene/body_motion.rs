@@ -1,6 +1,6 @@
-//! Upper bodies that gesture, made by rule: wrists move between places that a speaker's hands go to (lap, desk, the
-//! space in front, raised, hanging, the face), elbows follow by inverse kinematics, torso and head sway. It stands in
-//! for what the free captured motion lacks: people who sit and talk.
+//! Procedural gestures of an upper body: wrists move between regions typical of a speaker (lap, desk, the space in
+//! front, raised, hanging, the face), elbows follow by inverse kinematics, torso and head sway. This covers what free
+//! motion capture lacks: seated speakers.
 
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3;
@@ -22,12 +22,12 @@ pub struct Proportions {
 }
 
 impl Proportions {
-    /// A common adult.
+    /// Mean adult.
     pub const MEAN: Self =
         Self { shoulders: 0.35, upper_arm: 0.29, forearm: 0.25, nose: 0.21, torso: 0.50, hips: 0.22 };
 
-    /// Somebody else: lengths against each other vary by 5 to 6 % among adults, and detectors and captures place joints
-    /// a little differently.
+    /// Random proportions: relative lengths vary by 5 to 6 % among adults, and detectors and motion capture place
+    /// joints slightly differently.
     pub fn sample(rng: &mut ChaCha8Rng) -> Self {
         let mut about = |mean: f64, share: f64| {
             let z: f64 = rng.sample(rand_distr::StandardNormal);
@@ -44,8 +44,8 @@ impl Proportions {
     }
 }
 
-/// Where a wrist may rest, relative to the neck, for the arm on the +x side: ranges of x, y, z in metres. The speaker
-/// faces -z. On measured talkers the mean wrist is 0.10 to 0.19 m before the neck, so the ranges begin near the body.
+/// Region of the wrist of the +x arm relative to the neck: ranges of x, y, z in metres. The speaker faces -z. The mean
+/// wrist of measured speakers is 0.10 to 0.19 m in front of the neck, so the ranges begin near the body.
 type WristRegion = [(f64, f64); 3];
 const LAP: WristRegion = [(-0.08, 0.24), (0.36, 0.56), (-0.38, -0.08)];
 const DESK: WristRegion = [(-0.10, 0.32), (0.20, 0.42), (-0.44, -0.12)];
@@ -53,14 +53,14 @@ const FRONT: WristRegion = [(-0.14, 0.42), (-0.04, 0.38), (-0.42, -0.05)];
 const RAISED: WristRegion = [(-0.02, 0.48), (-0.48, 0.02), (-0.45, 0.0)];
 const WIDE: WristRegion = [(0.28, 0.66), (-0.12, 0.42), (-0.36, 0.08)];
 const HANGING: WristRegion = [(0.16, 0.34), (0.44, 0.58), (-0.14, 0.12)];
-/// Pointing and stretching: most of it lies out of reach, so that the arm is straight.
+/// Pointing and stretching: most targets are out of reach, so that the arm is straight.
 const REACH: WristRegion = [(-0.05, 0.75), (-0.50, 0.42), (-0.62, 0.05)];
 const FACE: WristRegion = [(-0.10, 0.14), (-0.24, 0.02), (-0.26, -0.08)];
 const HIP: WristRegion = [(0.16, 0.30), (0.36, 0.52), (-0.10, 0.10)];
 const CROSSED: WristRegion = [(-0.22, -0.04), (0.18, 0.36), (-0.28, -0.10)];
 
-/// What a speaker does: where the hands rest, where they go, how often they rest, and how far back (+z) elbows are
-/// carried: seated speakers carry them forward, over desk or lap.
+/// Gesture habit of a speaker: rest region, gesture regions, probability of a rest, and the range of the elbows'
+/// backward (+z) direction; seated speakers hold their elbows forward over desk or lap.
 struct Habit {
     rest: WristRegion,
     gestures: &'static [WristRegion],
@@ -81,7 +81,7 @@ const HABITS: [Habit; 7] = [
     Habit { rest: HANGING, gestures: &[REACH, REACH, RAISED, FRONT, REACH], rests: 0.3, back: STANDING },
 ];
 
-/// `n_frames` poses, `frame_secs` apart, metres, camera axes, the speaker facing a camera in front (-z).
+/// Generates `n_frames` poses, `frame_secs` apart, in metres and camera axes; the speaker faces the camera (-z).
 pub fn gesture(rng: &mut ChaCha8Rng, n_frames: usize, frame_secs: f64) -> Vec<Pose> {
     let body = Proportions::sample(rng);
     let habit = &HABITS[rng.random_range(0..HABITS.len())];
@@ -122,14 +122,15 @@ pub fn gesture(rng: &mut ChaCha8Rng, n_frames: usize, frame_secs: f64) -> Vec<Po
         .collect()
 }
 
-/// Roll, then pitch (positive: who faces -z bows, or is seen from above), then yaw about the vertical.
+/// Rotation by roll, then pitch (positive: a speaker facing -z bows, or is seen from above), then yaw about the
+/// vertical; radians.
 pub fn turn(yaw: f64, pitch: f64, roll: f64) -> Rotation {
     let about = Rotation::about;
     about([0.0, 1.0, 0.0], yaw) * about([1.0, 0.0, 0.0], pitch) * about([0.0, 0.0, 1.0], roll)
 }
 
-/// Elbow and wrist of an arm that reaches from `shoulder` towards `wrist`, the elbow bent towards `pole`. A wrist out
-/// of reach is drawn in.
+/// Elbow and wrist of an arm that reaches from `shoulder` towards `wrist`, with the elbow bent towards `pole`. An
+/// unreachable wrist is moved to the arm's length.
 fn bend(shoulder: Vec3, wrist: Vec3, upper: f64, fore: f64, pole: Vec3) -> (Vec3, Vec3) {
     let along = vec3::sub(wrist, shoulder);
     let u = vec3::unit(along, 1e-6).unwrap_or([0.0, 1.0, 0.0]);
@@ -142,7 +143,7 @@ fn bend(shoulder: Vec3, wrist: Vec3, upper: f64, fore: f64, pole: Vec3) -> (Vec3
     (elbow, vec3::add(shoulder, vec3::scale(u, d)))
 }
 
-/// A wrist's way for the +x arm: it leaves for each place at one time and is there at another.
+/// Trajectory of the wrist of the +x arm: for each move its start and end in seconds and its target.
 struct WristPath {
     start: Vec3,
     moves: Vec<(f64, f64, Vec3)>,
@@ -172,7 +173,7 @@ impl WristPath {
         Self { start, moves }
     }
 
-    /// Nearly the same for the other arm.
+    /// A similar path for the other arm: slightly shifted in time and space.
     fn copied(&self, rng: &mut ChaCha8Rng) -> Self {
         let late = rng.random_range(-0.08..0.08);
         let mut near = |p: Vec3| p.map(|v| v + rng.random_range(-0.05..0.05));
@@ -184,14 +185,14 @@ impl WristPath {
         let mut place = self.start;
         for &(leaves, arrives, next) in self.moves.iter().take_while(|m| m.0 < t) {
             let s = ((t - leaves) / (arrives - leaves)).min(1.0);
-            let share = s * s * s * (10.0 - 15.0 * s + 6.0 * s * s); // least jerk
+            let share = s * s * s * (10.0 - 15.0 * s + 6.0 * s * s); // minimum jerk
             place = std::array::from_fn(|k| place[k] + share * (next[k] - place[k]));
         }
         place
     }
 }
 
-/// Which way elbows point: down, more or less outwards, a little back or forward.
+/// Direction of the elbows: down, outwards to a degree, slightly back or forward.
 struct Swivel {
     out: SlowSwing,
     back: SlowSwing,
@@ -211,7 +212,7 @@ impl Swivel {
     }
 }
 
-/// A slow swing about a mean.
+/// Slow sinusoidal oscillation about a mean.
 struct SlowSwing {
     mean: f64,
     swing: f64,
@@ -230,7 +231,7 @@ impl SlowSwing {
     }
 }
 
-/// Small quick strokes on top of a place, in time with speech.
+/// Small fast oscillation added to the wrist position, like beat gestures.
 struct BeatStroke {
     reach: Vec3,
     rate: f64,

@@ -1,4 +1,4 @@
-//! Hands made by rule before a camera, as the hand lifters learn them, and the errors on such hands.
+//! Synthetic hands before a camera: training samples of the hand lifters, and the errors of a lifter on them.
 
 use super::hand_shape::{normal, random_rotation, sample_shape};
 use super::noise;
@@ -12,18 +12,18 @@ use orator_base::types::pose2d::N_HAND;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Share of the hands with the noise that real models were measured to have, and the share of those with its bias.
+/// Share of hands that use the measured noise of real hand models, and the share of those that use the measured bias.
 const MEASURED_NOISE: f64 = 0.7;
 const MEASURED_BIAS: f64 = 0.8;
 
-/// A hand in px of the picture with the wrist at 0, and what a detector says of it.
+/// A hand: ground truth in px of the image with the wrist at 0, and the detected keypoints.
 pub struct HandSample {
     pub truth: HandJoints,
     pub seen: SeenHand,
 }
 
-/// A hand from any side at 5 to 20 of its lengths, in px, with the noise of real models or a plain one; sometimes points
-/// are missing.
+/// Samples a hand in a random orientation at a distance of 5 to 20 hand lengths, in px, with measured or assumed
+/// noise; sometimes points are missing.
 pub fn sample_hand(rng: &mut ChaCha8Rng) -> HandSample {
     let (shape, turn) = (sample_shape(rng), random_rotation(rng));
     let turned = shape.map(|p| turn.turn(p));
@@ -34,48 +34,49 @@ pub fn sample_hand(rng: &mut ChaCha8Rng) -> HandSample {
         let grow = px_per_metre * distance / (distance + p[2]);
         [p[0] * grow, p[1] * grow]
     });
-    if !spoil_as_measured(&mut keypoints, palm_px, rng) {
-        spoil(&mut keypoints, palm_px, rng);
+    if !perturb_as_measured(&mut keypoints, palm_px, rng) {
+        perturb(&mut keypoints, palm_px, rng);
     }
-    let gone = missing(rng);
-    let seen = std::array::from_fn(|j| (!gone[j]).then_some(keypoints[j].map(|v| v as f32)));
-    // the view hangs on the wrist that is seen, the truth on the true one: the same within the noise
+    let missing_points = missing(rng);
+    let seen = std::array::from_fn(|j| (!missing_points[j]).then_some(keypoints[j].map(|v| v as f32)));
+    // The view is centred on the detected wrist, the truth on the true one; they agree up to the noise.
     HandSample { truth: turned.map(|p| vec3::scale(p, px_per_metre)), seen }
 }
 
-/// Noise of about 2 % of the palm, a part of it common to a finger; sometimes a finger is only guessed.
-fn spoil(keypoints: &mut [[f64; 2]; N_HAND], palm_px: f64, rng: &mut ChaCha8Rng) {
-    let much = 0.02 * palm_px * rng.random_range(-1.1f64..0.6).exp();
+/// Adds assumed noise of about 2 % of the palm length, partly common to a finger; in a fifth of the hands one finger
+/// is much noisier.
+fn perturb(keypoints: &mut [[f64; 2]; N_HAND], palm_px: f64, rng: &mut ChaCha8Rng) {
+    let deviation = 0.02 * palm_px * rng.random_range(-1.1f64..0.6).exp();
     let guessed = if rng.random_bool(0.2) { rng.random_range(0..5) } else { 5 };
     let fingers: [[f64; 2]; 5] = std::array::from_fn(|f| {
         let common = if f == guessed { 2.0 } else { 0.4 };
-        [common * much * normal(rng), common * much * normal(rng)]
+        [common * deviation * normal(rng), common * deviation * normal(rng)]
     });
     for (j, point) in keypoints.iter_mut().enumerate() {
         let finger = j.checked_sub(1).map(|k| k / 4);
-        let noise = if finger == Some(guessed) { 2.0 * much } else { 0.92 * much };
+        let noise = if finger == Some(guessed) { 2.0 * deviation } else { 0.92 * deviation };
         let moved = finger.map_or([0.0; 2], |f| fingers[f]);
         (0..2).for_each(|k| point[k] += moved[k] + noise * normal(rng));
     }
 }
 
-/// Spoils keypoints as real models were measured to do, in most hands; says whether it did.
-fn spoil_as_measured(keypoints: &mut [[f64; 2]; N_HAND], palm_px: f64, rng: &mut ChaCha8Rng) -> bool {
+/// Adds the measured noise of a random model set to 70 % of the hands; returns whether it did.
+fn perturb_as_measured(keypoints: &mut [[f64; 2]; N_HAND], palm_px: f64, rng: &mut ChaCha8Rng) -> bool {
     let sets = &noise::measured().hands;
     if sets.is_empty() || !rng.random_bool(MEASURED_NOISE) {
         return false;
     }
     let set = &sets[rng.random_range(0..sets.len())];
-    let much = rng.random_range(-0.7f64..0.4).exp();
+    let scale = rng.random_range(-0.7f64..0.4).exp();
     let with_bias = rng.random_bool(MEASURED_BIAS);
-    set.apply(keypoints, palm_px, much, with_bias, rng);
+    set.apply(keypoints, palm_px, scale, with_bias, rng);
     true
 }
 
-/// Points that a detector does not give: mostly none, else some anywhere, a finger, all tips, or all knuckles but the
-/// middle finger's (the view needs one).
+/// Points that are not detected: usually none, else random ones, a finger, all fingertips, or all knuckles. The wrist
+/// and the middle knuckle are always detected, because the view needs them.
 fn missing(rng: &mut ChaCha8Rng) -> [bool; N_HAND] {
-    let gone: [bool; N_HAND] = match rng.random_range(0..50) {
+    let missing_points: [bool; N_HAND] = match rng.random_range(0..50) {
         0 | 1 => {
             let share = rng.random_range(0.0..0.3);
             std::array::from_fn(|_| rng.random_bool(share))
@@ -88,11 +89,14 @@ fn missing(rng: &mut ChaCha8Rng) -> [bool; N_HAND] {
         4 => std::array::from_fn(|j| j % 4 == 1),
         _ => [false; N_HAND],
     };
-    std::array::from_fn(|j| gone[j] && j != 0 && j != 9)
+    std::array::from_fn(|j| missing_points[j] && j != 0 && j != 9)
 }
 
-/// Errors of `lift` (keypoints of right hands to hands in any unit) on `n` held-out hands, a line each; `brief`: on a
-/// tenth of them, without the trivial method beside.
+/// Errors of `lift` (keypoints of right hands to joints in any unit) on `n` held-out hands, one line each. `brief`: on
+/// a tenth of the hands and without the baseline.
+///
+/// # Errors
+/// Errors of `lift`.
 pub fn errors(
     lift: impl Fn(&[SeenHand]) -> Result<Vec<Option<HandJoints>>>,
     n: usize,
@@ -117,7 +121,7 @@ pub fn errors(
     Ok(lines)
 }
 
-/// The keypoints as they are, without depth.
+/// Baseline: the 2D keypoints with zero depth.
 fn flat_hand(sample: &HandSample) -> HandJoints {
     let [x0, y0] = sample.seen[0].unwrap_or_default();
     sample.seen.map(|p| {
@@ -126,8 +130,8 @@ fn flat_hand(sample: &HandSample) -> HandJoints {
     })
 }
 
-/// Errors in mm of hands whose middle finger's first phalanx measures 48 mm, relative to the wrist: the median over
-/// hands of the mean over points, as it is and after a similarity; and the share of hands above 30 mm.
+/// Errors relative to the wrist in mm of a hand whose middle proximal phalanx measures 48 mm: the median over hands of
+/// the mean over points, before and after a similarity alignment; and the share of hands above 30 mm.
 struct SyntheticHandErrors {
     median: f32,
     aligned: f32,
@@ -143,7 +147,7 @@ impl SyntheticHandErrors {
                 let sum: f64 = p.iter().zip(q).map(|(a, b)| vec3::norm(vec3::sub(*a, *b))).sum();
                 (to_mm * sum / N_HAND as f64) as f32
             };
-            // the size of a hand is known from its bones: compare hands of equal total bone length
+            // The size of a hand is known from its bones: hands are compared at equal total bone length.
             let bones = |h: &HandJoints| (1..N_HAND).map(|j| vec3::norm(vec3::sub(h[j], h[parent(j)]))).sum::<f64>();
             let flat = hand.iter().all(|p| p[2] == 0.0);
             let grow = if flat { 1.0 } else { bones(&sample.truth) / bones(hand).max(1e-9) };

@@ -1,5 +1,5 @@
-//! Hands that move, made by rule, for captured bodies that have none: what a hand does goes smoothly from one pose to the
-//! next (bends within what joints allow, the fingers mostly together), and it hangs on the forearm as a wrist lets it.
+//! Procedural hand motion for captured bodies without hands: smooth transitions between random hand poses (bends
+//! within anatomical limits, fingers mostly together), attached to the forearm within the wrist's range of motion.
 
 use super::hand_shape::normal;
 use orator_base::math::rotation::Rotation;
@@ -11,12 +11,12 @@ use orator_base::types::pose2d::N_HAND;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// Numbers of a pose.
+/// Number of parameters of a pose.
 const N: usize = 15;
 
-/// A pose: curl (0 straight, 1 a fist), how much more each finger is curled than the one before, each finger's own
-/// share, spread, more bend of first and second joints (degrees), the thumb aside, before the palm, and bent (radians), the
-/// wrist bent to the palm, to the thumb, and turned palm down (radians).
+/// Pose parameters: curl (0 straight, 1 a fist), increase of the curl from finger to finger, each finger's own curl,
+/// spread, extra bend of first and second joints (degrees), thumb abduction, opposition and bend (radians), wrist
+/// flexion to the palm, deviation to the thumb, and pronation (radians).
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct HandPose([f64; N]);
 
@@ -44,7 +44,7 @@ impl HandPose {
         ])
     }
 
-    /// The share `along` of the way to another.
+    /// Linear interpolation to another pose; `along` 0..1.
     fn towards(&self, other: &Self, along: f64) -> Self {
         Self(std::array::from_fn(|k| self.0[k] + along * (other.0[k] - self.0[k])))
     }
@@ -71,12 +71,12 @@ impl HandPose {
     }
 }
 
-/// What a hand does over time.
+/// Motion of a hand over time.
 #[derive(Clone, Debug)]
 pub struct HandMotion {
     size: f64,
     start: HandPose,
-    /// Start and end of the move to each pose, seconds, and the pose.
+    /// Start and end in seconds of the move to each pose, and the pose.
     moves: Vec<(f64, f64, HandPose)>,
 }
 
@@ -96,7 +96,7 @@ impl HandMotion {
         Self { size: (1.0 + 0.07 * normal(rng)).clamp(0.8, 1.2), start, moves }
     }
 
-    /// Nearly the same, for the other hand.
+    /// A similar motion for the other hand.
     pub fn copied(&self, rng: &mut ChaCha8Rng) -> Self {
         let late = rng.random_range(-0.1..0.1);
         let other = HandPose::sample(rng);
@@ -112,8 +112,9 @@ impl HandMotion {
         })
     }
 
-    /// The hand's joints for each frame of an arm (shoulder, elbow, wrist; house axes, metres), `frame_secs` apart. The
-    /// thumb at rest lies in the plane of the arm, where this is straight before the body.
+    /// Joints of the hand for each frame of an arm (shoulder, elbow, wrist; metres, x to the speaker's left, y down, z
+    /// away from the viewer), `frame_secs` apart. In the rest pose of an arm stretched out in front of the body, the
+    /// thumb lies in the plane of the arm.
     pub fn along(&self, arm: &[[Vec3; 3]], is_left: bool, frame_secs: f64) -> Vec<HandJoints> {
         let side = if is_left { -1.0 } else { 1.0 };
         let mut thumb = [0.0, -0.7, -0.7];
@@ -121,7 +122,7 @@ impl HandMotion {
         let hand = |(frame, [shoulder, elbow, wrist]): (usize, &[Vec3; 3])| {
             let upper = vec3::unit(vec3::sub(*elbow, *shoulder), 1e-6).unwrap_or([0.0, 1.0, 0.0]);
             let fore = vec3::unit(vec3::sub(*wrist, *elbow), 1e-6).unwrap_or(upper);
-            // carried along with the forearm, and drawn to where anatomy has it
+            // The thumb direction follows the forearm and is pulled towards its anatomical direction.
             let carried = last.map_or(thumb, |last| Rotation::between(last, fore).turn(thumb));
             let wanted = vec3::across(vec3::sub([0.0, -0.3, -0.6], upper), fore);
             let both = vec3::add(vec3::scale(carried, 0.5), wanted);
@@ -147,7 +148,7 @@ mod tests {
     use super::*;
     use rand::SeedableRng;
 
-    /// The forearm points ahead, upper arm down, no bend of the wrist.
+    /// The forearm points ahead, the upper arm down, the wrist is straight.
     fn arm(is_left: bool) -> [Vec3; 3] {
         let x = if is_left { 0.2 } else { -0.2 };
         [[x, 0.0, 0.0], [x, 0.3, 0.0], [x, 0.3, -0.25]]

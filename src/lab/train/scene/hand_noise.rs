@@ -1,6 +1,6 @@
-//! Errors of real hand models as they were measured on rendered people, to be made again on keypoints without error: a
-//! bias that hangs on how the bones lie in the picture, and noise of the whole hand, of a finger and of a point, more of
-//! it where a finger is hidden. All is relative to the wrist, in lengths of the palm (wrist to middle knuckle).
+//! Errors of real hand models, measured on rendered persons and reproduced on exact keypoints: a bias that depends on
+//! the bone directions in the image, and noise of the hand, of each finger and of each point, larger for hidden
+//! fingers. Positions are relative to the wrist, in palm lengths (wrist to middle knuckle).
 
 use super::hand_shape::normal;
 use orator_base::motion::view::hand::parent;
@@ -9,12 +9,12 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-/// Points beside the wrist.
+/// Points other than the wrist.
 pub const N_POINTS: usize = N_HAND - 1;
-/// Fingers, and points of each.
+/// Number of fingers, and of points per finger.
 pub const N_FINGERS: usize = 5;
 pub const N_OF_FINGER: usize = 4;
-/// Vectors that a bias hangs on.
+/// Number of basis vectors of a bias.
 pub const N_BASIS: usize = 3;
 
 /// Noise of one model set.
@@ -22,46 +22,55 @@ pub const N_BASIS: usize = 3;
 pub struct HandNoise {
     /// Name of the model set.
     pub set: String,
-    /// Bias of each point but the wrist: weights of the vectors of `basis`.
+    /// Bias of each point except the wrist: weights of the basis vectors (`basis`).
     pub bias: [[f64; N_BASIS]; N_POINTS],
-    /// Standard deviation, on each axis, of what all points have in common (the wrist's own error).
+    /// Standard deviation per axis of the error common to all points (the wrist's own error).
     pub hand: f64,
-    /// Noise of fingers that can be seen, and of hidden ones.
+    /// Noise of visible fingers, and of hidden ones.
     pub seen: FingerNoise,
     pub hidden: FingerNoise,
     /// Share of the fingers that are hidden, 0..1.
     pub hides: f64,
 }
 
-/// Noise of a finger, an axis.
+/// Noise of a finger, per axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FingerNoise {
-    /// Standard deviation of what its points have in common, of most fingers and of the others, and the others' share.
+    /// Standard deviation of the error common to a finger's points, of regular fingers and of outliers, and the share
+    /// of outliers.
     pub finger: f64,
     pub stray_finger: f64,
     pub strays: f64,
-    /// Standard deviation of the rest of a point.
+    /// Standard deviation of a point's own error.
     pub point: f64,
 }
 
-/// Vectors of the picture that the bias of point `j` (1..21) hangs on: the palm, the palm's width, the bone to the point.
+/// Basis vectors in image axes of the bias of point `j` (1..21): the palm, the palm's width, and the bone that ends at
+/// the point.
 pub fn basis(hand: &[[f64; 2]; N_HAND], j: usize) -> [[f64; 2]; N_BASIS] {
     let between = |a: usize, b: usize| [0, 1].map(|k| hand[b][k] - hand[a][k]);
     [between(0, 9), between(17, 5), between(parent(j), j)]
 }
 
 impl HandNoise {
-    /// Keypoints with noise: `hand` in px, `palm_px` the length of its palm seen from the side; `much` scales all of it.
-    /// With `with_bias` the measured bias is added.
-    pub fn apply(&self, hand: &mut [[f64; 2]; N_HAND], palm_px: f64, much: f64, with_bias: bool, rng: &mut ChaCha8Rng) {
+    /// Adds noise to the exact keypoints `hand` in px. `palm_px` is the true palm length in px; `scale` multiplies the
+    /// random noise. If `with_bias`, the measured bias is added.
+    pub fn apply(
+        &self,
+        hand: &mut [[f64; 2]; N_HAND],
+        palm_px: f64,
+        scale: f64,
+        with_bias: bool,
+        rng: &mut ChaCha8Rng,
+    ) {
         let exact = *hand;
-        let size = palm_px * much;
+        let size = palm_px * scale;
         let whole = [0, 1].map(|_| self.hand * normal(rng));
         for finger in 0..N_FINGERS {
             let noise = if rng.random_bool(self.hides.clamp(0.0, 1.0)) { self.hidden } else { self.seen };
             let is_stray = rng.random_bool(noise.strays.clamp(0.0, 1.0));
-            let much = if is_stray { noise.stray_finger } else { noise.finger };
-            let of_finger = [0, 1].map(|_| much * normal(rng));
+            let deviation = if is_stray { noise.stray_finger } else { noise.finger };
+            let of_finger = [0, 1].map(|_| deviation * normal(rng));
             let first = 1 + N_OF_FINGER * finger;
             for (j, point) in hand.iter_mut().enumerate().skip(first).take(N_OF_FINGER) {
                 let bias = basis(&exact, j);

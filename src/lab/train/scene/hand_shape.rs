@@ -1,4 +1,4 @@
-//! Hands made by rule: bones of published mean lengths, joint angles within what joints allow, from every side.
+//! Random hand shapes: published mean bone lengths and joint angles within anatomical limits.
 
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3;
@@ -15,8 +15,8 @@ pub fn sample_shape(rng: &mut ChaCha8Rng) -> HandJoints {
     let size = 1.08e-3 * about(rng, 0.08);
     let palm = about(rng, 0.12);
     let mut hand: HandJoints = [[0.0; 3]; N_HAND];
-    let manner = FingerManner::sample(rng);
-    // the palm is hollow: its edges lie nearer to the viewer it faces
+    let style = FingerStyle::sample(rng);
+    // The palm is concave: its edges lie nearer to a viewer that it faces.
     let hollow = rng.random_range(0.0..0.07);
     for finger in 1..5 {
         let mut length = BONES[finger].map(|mm| mm * size * about(rng, 0.07));
@@ -24,32 +24,31 @@ pub fn sample_shape(rng: &mut ChaCha8Rng) -> HandJoints {
         let fan = (FAN[finger] + 3.0 * normal(rng)).to_radians();
         let edge = ((finger as f64 - 2.3).abs() - 0.7).max(0.0);
         let root = vec3::scale(direction(fan, (hollow * edge + 0.015 * normal(rng)).asin()), length[0]);
-        let (abduction, bends) = manner.finger(finger, fan, rng);
+        let (abduction, bends) = style.finger(finger, fan, rng);
         put_finger(&mut hand, finger, root, abduction, bends.map(f64::to_radians), length);
     }
     thumb(&mut hand, size, rng);
-    // what people and detectors call the wrist is not one point
+    // Annotators and detectors do not agree on one wrist point.
     let wrist: Vec3 = [4.0, 6.0, 3.0].map(|mm| 1e-3 * mm * normal(rng));
     hand.iter_mut().skip(1).for_each(|p| *p = vec3::sub(*p, wrist));
     hand
 }
 
-/// What the four fingers have in common: they go together, as the muscles of the forearm move them.
-struct FingerManner {
+/// Parameters common to the four fingers, which are moved together by the forearm's muscles.
+struct FingerStyle {
     /// 0 straight, 1 a fist.
     curl: f64,
-    /// How much more curled each finger is than its neighbour on the thumb's side.
+    /// Increase of the curl from finger to finger, away from the thumb.
     slope: f64,
-    /// How much each finger goes its own way.
+    /// Standard deviation of each finger's own curl.
     own: f64,
-    /// Degrees that all first, and all second joints bend more than the curl says: flat hands bent at the knuckles,
-    /// hooks.
+    /// Extra bend in degrees of all first and of all second joints: flat hands bent at the knuckles, hooked fingers.
     more: [f64; 2],
-    /// Shares of the palm's fan that the fingers keep: below 0 crossed, 1 spread.
+    /// Finger spread relative to the fan of the metacarpals: below 0 crossed, 1 spread.
     spread: f64,
 }
 
-impl FingerManner {
+impl FingerStyle {
     fn sample(rng: &mut ChaCha8Rng) -> Self {
         Self {
             curl: rng.random_range(-0.1f64..1.0).max(0.0).powf(1.8),
@@ -72,7 +71,7 @@ impl FingerManner {
     }
 }
 
-/// The thumb roams widely: its saddle joint opens it sideways and lays it before the palm.
+/// Samples the thumb; its saddle joint allows wide abduction and opposition.
 fn thumb(hand: &mut HandJoints, size: f64, rng: &mut ChaCha8Rng) {
     let mut length = BONES[0].map(|mm| mm * size * about(rng, 0.10));
     length[0] *= about(rng, 0.15);
@@ -80,7 +79,7 @@ fn thumb(hand: &mut HandJoints, size: f64, rng: &mut ChaCha8Rng) {
     let aside = (36.0 + 20.0 * normal(rng)).clamp(-20.0, 85.0);
     let before = (26.0 + 22.0 * normal(rng)).clamp(-20.0, 80.0);
     let mut along = direction(aside.to_radians(), before.to_radians());
-    // it bends across the palm, about an axis that is its own
+    // The thumb bends across the palm about a random axis.
     let across = vec3::unit([-1.0 + 0.4 * normal(rng), -0.1 + 0.4 * normal(rng), -0.5 + 0.4 * normal(rng)], 1e-6);
     let axis = across.and_then(|a| vec3::unit(vec3::cross(along, a), 1e-6)).unwrap_or([0.0, 0.0, 1.0]);
     hand[1] = vec3::scale(base, length[0]);
@@ -91,7 +90,7 @@ fn thumb(hand: &mut HandJoints, size: f64, rng: &mut ChaCha8Rng) {
     }
 }
 
-/// Any turn, all equally likely (Shoemake 1992).
+/// Uniformly distributed random rotation (Shoemake 1992).
 pub fn random_rotation(rng: &mut ChaCha8Rng) -> Rotation {
     let axis = std::array::from_fn(|_| normal(rng));
     let w = normal(rng);
@@ -103,7 +102,7 @@ pub fn normal(rng: &mut ChaCha8Rng) -> f64 {
     rng.sample(StandardNormal)
 }
 
-/// 1 plus or minus a normal share.
+/// Factor 1 + N(0, `share`), clamped to 0.6..1.5.
 fn about(rng: &mut ChaCha8Rng, share: f64) -> f64 {
     (1.0 + share * normal(rng)).clamp(0.6, 1.5)
 }

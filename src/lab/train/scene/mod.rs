@@ -1,4 +1,4 @@
-//! Synthetic bodies and hands before random cameras: what the lifters learn from.
+//! Synthetic bodies and hands before random cameras: the training data of the lifters.
 
 pub mod body;
 pub mod body_motion;

@@ -1,6 +1,6 @@
-//! Errors of real 2D models as they were measured on rendered people, to be made again on keypoints without error: a
-//! bias that hangs on how the bones lie in the picture, a bias of the clip, noise that lasts over frames, more of it
-//! where a point is hidden, and gaps. Lengths are shares of the shoulder width, frames those of 15 a second.
+//! Errors of real 2D pose models, measured on rendered persons and reproduced on exact keypoints: a bias that depends
+//! on the bone directions in the image, a bias per clip, temporally correlated noise that is larger where a point is
+//! hidden, and gaps. Lengths are relative to the shoulder width; the frame rate is 15 frames/s.
 
 use super::hand_noise::HandNoise;
 use super::hand_shape::normal;
@@ -15,9 +15,9 @@ use std::sync::OnceLock;
 
 /// Measured errors of the known model sets.
 const MEASURED: &str = include_str!("../../../../models/keypoint_noise.json");
-/// Points alike on both sides of the body: nose, shoulder, elbow, wrist, hip.
+/// Kinds of points, left and right merged: nose, shoulder, elbow, wrist, hip.
 pub const N_KINDS: usize = 5;
-/// Vectors that a bias hangs on, with the picture's downward direction last.
+/// Number of basis vectors of a bias; the last one is the image's downward direction.
 pub const N_BASIS: usize = 4;
 
 /// Noise of one model set.
@@ -25,47 +25,47 @@ pub const N_BASIS: usize = 4;
 pub struct KeypointNoise {
     /// Name of the model set.
     pub set: String,
-    /// Nose, shoulder, elbow, wrist, hip.
+    /// Noise by kind: nose, shoulder, elbow, wrist, hip.
     pub points: [PointNoise; N_KINDS],
 }
 
 /// Noise of a point.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PointNoise {
-    /// Bias: weights of the vectors of `basis`.
+    /// Bias: weights of the basis vectors (`basis`).
     pub bias: [f64; N_BASIS],
-    /// Standard deviation, on each axis, of the rest of a clip's mean error.
+    /// Standard deviation per axis of the clip's mean error that the bias does not explain.
     pub clip: f64,
-    /// Noise of frames in which the point can be seen, and in which it is hidden.
+    /// Noise of frames in which the point is visible, and in which it is hidden.
     pub seen: FrameNoise,
     pub hidden: FrameNoise,
-    /// Runs of hidden frames, and of frames in which the point is not found.
+    /// Runs of frames in which the point is hidden, and in which it is not detected.
     pub hides: Runs,
     pub gaps: Runs,
 }
 
-/// Noise of single frames about the mean of the clip, an axis.
+/// Noise of single frames about the mean of the clip, per axis: a mixture of two Gaussians.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FrameNoise {
-    /// Standard deviation of most frames, and of the others.
+    /// Standard deviation of regular frames, and of outliers.
     pub deviation: f64,
     pub stray_deviation: f64,
-    /// Share of the others, 0..1.
+    /// Share of outliers, 0..1.
     pub strays: f64,
-    /// Correlation from frame to frame, 0..1.
+    /// Correlation between successive frames, 0..1.
     pub correlation: f64,
 }
 
-/// Runs of frames in a state that comes and goes.
+/// Two-state Markov chain of a state that begins and ends.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Runs {
-    /// Probability that a run begins in a frame outside one, and that it ends in a frame of one.
+    /// Probability that a run begins in a frame outside a run, and that a run ends after a frame.
     pub begin: f64,
     pub end: f64,
 }
 
 impl Runs {
-    /// Whether each of `n` frames is in a run.
+    /// Samples for each of `n` frames whether it is in a run.
     pub fn sample(&self, n: usize, rng: &mut ChaCha8Rng) -> Vec<bool> {
         let share = self.begin / (self.begin + self.end).max(1e-9);
         let mut inside = rng.random_bool(share.clamp(0.0, 1.0));
@@ -80,17 +80,17 @@ impl Runs {
     }
 }
 
-/// Noise of model sets, as `orator-lab train noise` writes it.
+/// Measured noise of model sets, as written by `orator-lab train noise`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MeasuredNoise {
     pub bodies: Vec<KeypointNoise>,
     pub hands: Vec<HandNoise>,
 }
 
-/// Noise of all measured model sets, built into the program.
+/// Noise of all measured model sets, compiled into the program.
 pub fn measured() -> &'static MeasuredNoise {
     static PARSED: OnceLock<MeasuredNoise> = OnceLock::new();
-    // A test reads the built-in file; without it lifters would learn from keypoints with the assumed noise alone.
+    // A test parses the built-in file; with an invalid file, lifters would be trained with the assumed noise alone.
     PARSED.get_or_init(|| parse(MEASURED).unwrap_or(MeasuredNoise { bodies: Vec::new(), hands: Vec::new() }))
 }
 
@@ -98,7 +98,7 @@ fn parse(text: &str) -> Result<MeasuredNoise> {
     serde_json::from_str(text).context("the built-in keypoint noise")
 }
 
-/// Kind of a point.
+/// Index of a point's kind in `KeypointNoise::points`.
 pub fn kind(point: usize) -> usize {
     match point {
         NOSE => 0,
@@ -109,8 +109,9 @@ pub fn kind(point: usize) -> usize {
     }
 }
 
-/// Vectors of the picture, in shoulder widths, that the bias of a point hangs on: bones beside it, then down. They turn
-/// with the picture and change sides with the body, so that both sides share their weights. `None`: a point is missing.
+/// Basis vectors of the bias of a point, in image axes and shoulder widths: the adjacent bones, then the downward
+/// direction. Bone vectors rotate with the image and are mirrored with the body, so that left and right share their
+/// weights. `None` if a required point is missing.
 pub fn basis(body: &SeenBody, point: usize, shoulders_px: f64) -> Option<[[f64; 2]; N_BASIS]> {
     let at = |joint: usize| body[joint].map(|p| p.map(|v| f64::from(v) / shoulders_px));
     let between = |a: [f64; 2], b: [f64; 2]| [b[0] - a[0], b[1] - a[1]];
@@ -134,33 +135,33 @@ pub fn basis(body: &SeenBody, point: usize, shoulders_px: f64) -> Option<[[f64; 
 }
 
 impl KeypointNoise {
-    /// Noise on keypoints without error; `much` scales all of it but the gaps. With `with_bias` the measured bias is
-    /// added, else one of its size in any direction, steady over the clip.
-    pub fn apply(&self, body: &mut [SeenBody], shoulders_px: f64, much: f64, with_bias: bool, rng: &mut ChaCha8Rng) {
+    /// Adds noise to exact keypoints; `scale` multiplies everything except the gaps. If `with_bias`, the measured bias
+    /// is added, otherwise a bias of equal size in a random direction that is constant over the clip.
+    pub fn apply(&self, body: &mut [SeenBody], shoulders_px: f64, scale: f64, with_bias: bool, rng: &mut ChaCha8Rng) {
         let exact = body.to_vec();
         for point in 0..N_POINTS {
             let noise = &self.points[kind(point)];
-            let any_way = [normal(rng), normal(rng)];
+            let random_direction = [normal(rng), normal(rng)];
             let hidden = noise.hides.sample(body.len(), rng);
-            let gone = noise.gaps.sample(body.len(), rng);
+            let missing = noise.gaps.sample(body.len(), rng);
             let clip = [0, 1].map(|_| noise.clip * normal(rng));
-            let mut lasting = [normal(rng), normal(rng)];
+            let mut correlated = [normal(rng), normal(rng)];
             for (t, frame) in body.iter_mut().enumerate() {
                 let of_frame = if hidden[t] { noise.hidden } else { noise.seen };
                 let keep = of_frame.correlation.clamp(0.0, 0.99);
-                lasting = lasting.map(|v| keep * v + (1.0 - keep * keep).sqrt() * normal(rng));
+                correlated = correlated.map(|v| keep * v + (1.0 - keep * keep).sqrt() * normal(rng));
                 let is_stray = rng.random_bool(of_frame.strays.clamp(0.0, 1.0));
                 let stray = [0, 1].map(|_| if is_stray { of_frame.stray_deviation * normal(rng) } else { 0.0 });
                 let Some(place) = frame[point].as_mut() else { continue };
                 let bias = basis(&exact[t], point, shoulders_px).map_or([0.0; 2], |basis| {
                     [0, 1].map(|k| basis.iter().zip(noise.bias).map(|(vector, weight)| weight * vector[k]).sum::<f64>())
                 });
-                let bias = if with_bias { bias } else { any_way.map(|v| 0.7 * v * bias[0].hypot(bias[1])) };
+                let bias = if with_bias { bias } else { random_direction.map(|v| 0.7 * v * bias[0].hypot(bias[1])) };
                 for k in 0..2 {
-                    let off = bias[k] + clip[k] + of_frame.deviation * lasting[k] + stray[k];
-                    place[k] += (shoulders_px * much * off) as f32;
+                    let off = bias[k] + clip[k] + of_frame.deviation * correlated[k] + stray[k];
+                    place[k] += (shoulders_px * scale * off) as f32;
                 }
-                if gone[t] {
+                if missing[t] {
                     frame[point] = None;
                 }
             }

@@ -11,11 +11,11 @@ use orator_nn::params::Params;
 /// Prefix of the decoder's tensors.
 const DECODER: &str = "decoder.";
 
-/// Encoder and decoder, to train with.
+/// Encoder and decoder, trained together.
 pub struct AutoEncoder {
     pub encoder: MotionEncoder,
     dense: Vec<(Linear, BatchNorm)>,
-    /// After the last dense layer, whose numbers are channels x 34 frames.
+    /// Convolutions after the last dense layer, whose output is reshaped to [channels, 34 frames].
     convs: Vec<(Conv1d, BatchNorm)>,
     last: Conv1d,
 }
@@ -34,14 +34,14 @@ impl AutoEncoder {
         Ok(Self { encoder, dense, convs, last })
     }
 
-    /// Reconstruction of windows [B, n_in, 34], normalised, the same shape.
+    /// Normalised windows [B, n_in, 34] to their reconstruction of the same shape.
     pub fn forward(&self, x: &Tensor, mode: &Mode) -> Result<Tensor> {
         let code = self.encoder.forward(x, mode)?;
         let y = through(&self.dense, &code, mode)?.reshape((x.dim(0)?, LAST, WINDOW))?;
         self.last.forward(&through(&self.convs, &y, mode)?)
     }
 
-    /// Changes the weight of a new batch in the running statistics.
+    /// Sets the weight of a batch in the running statistics.
     pub fn set_momentum(&mut self, momentum: f64) {
         self.encoder.set_momentum(momentum);
         self.dense.iter_mut().for_each(|(_, norm)| norm.set_momentum(momentum));

@@ -1,5 +1,5 @@
-//! The 64 directions in which windows of the corpus vary most: their principal components, found by orthogonal iteration
-//! (Golub and Van Loan, Matrix Computations, 4th edition, 8.2.4).
+//! The first 64 principal components of the corpus' motion windows, computed by orthogonal iteration (Golub and Van
+//! Loan, Matrix Computations, 4th edition, 8.2.4).
 
 use super::corpus::{Corpus, CorpusPiece};
 use anyhow::{Result, ensure};
@@ -15,25 +15,28 @@ use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Frames between the windows that are looked at.
+/// Frames between the starts of windows.
 const STRIDE: usize = 3;
-/// Steps of the iteration; the 64 span the same space after far fewer.
+/// Iterations; the span of the 64 directions converges much earlier.
 const STEPS: usize = 200;
-/// Windows whose products are summed at once.
+/// Windows per matrix product.
 const ROWS: usize = 2048;
 
-/// What was found.
+/// Summary of a fitted basis.
 pub struct FittedBasis {
     pub n_windows: usize,
-    /// What the fingers' numbers are multiplied with.
+    /// Factor applied to the finger coordinates.
     pub finger_weight: f64,
-    /// Share of the variance that the 64 directions hold.
+    /// Share of the corpus' variance explained by the 64 directions, 0..1.
     pub share: f64,
-    /// Share of the variance of each held-out set.
+    /// Explained share of the variance of each held-out set.
     pub held_out: Vec<(String, f64)>,
 }
 
-/// Finds the basis of `corpus` and writes it to `out`.
+/// Computes the basis of `corpus` and writes it to `out`.
+///
+/// # Errors
+/// Fewer than 640 windows; the file cannot be written.
 pub fn fit(corpus: &Corpus, seed: u64, out: &Path) -> Result<FittedBasis> {
     let weights = weights(&corpus.pieces);
     let (n_windows, covariance) = covariance(&corpus.pieces, &weights);
@@ -63,7 +66,8 @@ pub fn fit(corpus: &Corpus, seed: u64, out: &Path) -> Result<FittedBasis> {
     Ok(fitted)
 }
 
-/// 1 for the arms' joints; for the fingers' what gives all of them together the arms' variance.
+/// Weight of each joint: 1 for the arms; for the fingers the factor that gives all of them together the variance of
+/// the arms.
 fn weights(pieces: &[CorpusPiece]) -> Array1<f32> {
     let (mut n, mut sum, mut squares) = (0.0, Array1::<f64>::zeros(N_COORDINATES), Array1::<f64>::zeros(N_COORDINATES));
     for piece in pieces {
@@ -83,14 +87,14 @@ fn weights(pieces: &[CorpusPiece]) -> Array1<f32> {
     joints_used().map(|joint| if basis::is_finger(joint) { finger } else { 1.0 }).collect()
 }
 
-/// Number of windows, and their covariance [2070, 2070].
+/// Number of windows, and their covariance matrix [2070, 2070].
 fn covariance(pieces: &[CorpusPiece], weights: &Array1<f32>) -> (usize, Array2<f64>) {
     let size = WINDOW * N_COORDINATES;
     let (mut n, mut sum, mut products) = (0, Array1::<f64>::zeros(size), Array2::<f64>::zeros((size, size)));
     let mut rows: Vec<f64> = Vec::new();
     let mut add = |rows: &mut Vec<f64>| {
         let n_rows = rows.len() / size;
-        // the rows are whole windows
+        // Rows are complete windows, so the shape always fits.
         let Ok(windows) = Array2::from_shape_vec((n_rows, size), std::mem::take(rows)) else { return };
         n += n_rows;
         sum += &windows.sum_axis(Axis(0));
@@ -112,10 +116,10 @@ fn covariance(pieces: &[CorpusPiece], weights: &Array1<f32>) -> (usize, Array2<f
     (n, products / n_windows.max(1.0) - mean.dot(&mean.t()))
 }
 
-/// The directions [2070, 64] of most variance, the greatest first; of each the largest number is positive.
+/// The directions [2070, 64] of greatest variance in descending order; the largest component of each is positive.
 fn directions(covariance: &Array2<f64>, seed: u64) -> Array2<f64> {
-    let mut dice = ChaCha8Rng::seed_from_u64(seed);
-    let mut found = Array2::from_shape_simple_fn((covariance.nrows(), N), || dice.random_range(-1.0..1.0));
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut found = Array2::from_shape_simple_fn((covariance.nrows(), N), || rng.random_range(-1.0..1.0));
     for _ in 0..STEPS {
         found = covariance.dot(&found);
         orthonormal(&mut found);
@@ -127,7 +131,7 @@ fn directions(covariance: &Array2<f64>, seed: u64) -> Array2<f64> {
     found
 }
 
-/// Gram and Schmidt's way, twice, as rounding asks for.
+/// Gram-Schmidt orthonormalisation of the columns, applied twice against rounding errors.
 fn orthonormal(columns: &mut Array2<f64>) {
     for i in 0..columns.ncols() {
         for _ in 0..2 {
@@ -149,9 +153,9 @@ mod tests {
 
     #[test]
     fn directions_are_those_of_most_variance() {
-        // variance falls along known directions
-        let mut dice = ChaCha8Rng::seed_from_u64(2);
-        let mut known = Array2::from_shape_simple_fn((100, 100), || dice.random_range(-1.0..1.0));
+        // The variance decreases along known directions.
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        let mut known = Array2::from_shape_simple_fn((100, 100), || rng.random_range(-1.0..1.0));
         orthonormal(&mut known);
         let variances = Array1::from_shape_fn(100, |i| 0.8f64.powi(i as i32));
         let covariance = (&known * &variances).dot(&known.t());

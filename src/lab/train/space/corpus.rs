@@ -1,6 +1,6 @@
-//! What the fixed spaces of motion (`metrics::basis`, `metrics::embedding`) are learnt from: captured bodies with hands
-//! made by rule, bodies made by rule, and whole speakers made by rule that the caller brings. 15 frames a second, all 49
-//! joints, every other piece in the mirror.
+//! Training corpus of the fixed motion spaces (`metrics::basis`, `metrics::embedding`): captured bodies with
+//! procedural hands, procedural bodies, and procedural speakers given by the caller. 15 frames/s, all 49 joints, every
+//! second piece mirrored.
 
 use crate::mocap::upper_body::{BodyTake, Set};
 use crate::train::scene::body_motion;
@@ -18,24 +18,24 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::PI;
 
-/// Times each captured take is used, each with other hands.
+/// Number of copies of each captured take, each with different hands.
 const COPIES: usize = 4;
-/// Pieces of bodies made by rule, and frames of one.
-const RULES: usize = 120;
-const RULE_FRAMES: usize = 300;
-/// Share of pairs of hands that do nearly the same.
-const TOGETHER: f64 = 0.4;
-/// A captured person is turned to the front over so many seconds.
-const FACING_SECS: f64 = 1.5;
+/// Number of pieces of procedural bodies, and their length in frames.
+const N_PROCEDURAL: usize = 120;
+const PROCEDURAL_FRAMES: usize = 300;
+/// Share of pieces in which both hands move similarly.
+const COPIED_HANDS: f64 = 0.4;
+/// Half width in seconds of the window over which a captured person's yaw is averaged and removed.
+const YAW_MEAN_SECS: f64 = 1.5;
 
-/// One continuous stretch.
+/// One continuous piece of motion.
 pub struct CorpusPiece {
     pub name: String,
-    /// [T, 49, 3], metres, the neck at the origin, 15 frames a second.
+    /// [T, 49, 3], metres, relative to the neck, 15 frames/s.
     pub joints: Array3<f32>,
 }
 
-/// Everything that is learnt from, and sets that are only measured on.
+/// Training pieces, and held-out sets for evaluation.
 pub struct Corpus {
     pub pieces: Vec<CorpusPiece>,
     pub held_out: Vec<(String, Vec<CorpusPiece>)>,
@@ -43,8 +43,11 @@ pub struct Corpus {
 }
 
 impl Corpus {
-    /// Of captured `takes`, bodies made by rule, and `speakers` made by rule; `held_out` takes and `other_speakers` are only
-    /// measured on.
+    /// Builds the corpus of captured `takes`, procedural bodies and procedural `speakers`; `held_out` takes and
+    /// `other_speakers` are used for evaluation only.
+    ///
+    /// # Errors
+    /// A take without frames, or with a joint that is not finite.
     pub fn new(
         takes: &[BodyTake],
         held_out: &[Set],
@@ -59,7 +62,7 @@ impl Corpus {
                 pieces.push(if copy % 2 == 1 { piece.mirrored() } else { piece });
             }
         }
-        pieces.extend((0..RULES).map(|n| by_rule(n, seed)));
+        pieces.extend((0..N_PROCEDURAL).map(|n| procedural(n, seed)));
         pieces.extend(speakers.iter().enumerate().map(|(n, (name, motion))| {
             let piece = CorpusPiece::new(name.clone(), motion);
             if n / 2 % 2 == 1 { piece.mirrored() } else { piece }
@@ -69,7 +72,10 @@ impl Corpus {
             let takes: Result<Vec<CorpusPiece>> = takes.iter().map(|take| captured(take, COPIES, seed)).collect();
             sets.push((set.clone(), takes?));
         }
-        sets.push(("bodies made by rule".into(), (RULES..RULES + RULES / 6).map(|n| by_rule(n, seed)).collect()));
+        sets.push((
+            "bodies made by rule".into(),
+            (N_PROCEDURAL..N_PROCEDURAL + N_PROCEDURAL / 6).map(|n| procedural(n, seed)).collect(),
+        ));
         if !other_speakers.is_empty() {
             let pieces = other_speakers.iter().map(|(name, motion)| CorpusPiece::new(name.clone(), motion)).collect();
             sets.push(("speakers made by rule".into(), pieces));
@@ -78,12 +84,12 @@ impl Corpus {
         Ok(Self { pieces, held_out: sets, metadata })
     }
 
-    /// Frames to learn from.
+    /// Number of training frames.
     pub fn n_frames(&self) -> usize {
         self.pieces.iter().map(|piece| piece.joints.shape()[0]).sum()
     }
 
-    /// What says of a file what it was learnt from.
+    /// Description of the corpus for the metadata of a weights file.
     pub fn metadata(&self) -> &serde_json::Value {
         &self.metadata
     }
@@ -117,35 +123,34 @@ impl CorpusPiece {
     }
 }
 
-/// Dice of each piece's own.
-fn dice(seed: u64, name: &str, n: usize) -> ChaCha8Rng {
+/// Random number generator of a piece.
+fn rng_for(seed: u64, name: &str, n: usize) -> ChaCha8Rng {
     ChaCha8Rng::from_seed(*blake3::hash(format!("{seed} {n} {name}").as_bytes()).as_bytes())
 }
 
 fn captured(take: &BodyTake, copy: usize, seed: u64) -> Result<CorpusPiece> {
     ensure!(!take.poses.is_empty(), "{} has no frame", take.name);
     let (num, den) = ((take.fps * 1000.0).round() as u32, 1000);
-    let poses = faced(&take.poses, take.fps);
-    let motion = with_hands(&poses, FrameRate::new(num, den), &mut dice(seed, &take.name, copy))
+    let poses = remove_slow_yaw(&take.poses, take.fps);
+    let motion = with_hands(&poses, FrameRate::new(num, den), &mut rng_for(seed, &take.name, copy))
         .with_context(|| format!("giving hands to {}", take.name))?;
     Ok(CorpusPiece::new(format!("{} {copy}", take.name), &motion))
 }
 
-fn by_rule(n: usize, seed: u64) -> CorpusPiece {
-    let mut dice = dice(seed, "rule", n);
-    let poses = body_motion::gesture(&mut dice, RULE_FRAMES, FPS.secs(1));
-    let motion =
-        with_hands(&poses, FPS, &mut dice).unwrap_or(Motion::from_joints(FPS, Array3::zeros((0, N_JOINTS, 3))));
+fn procedural(n: usize, seed: u64) -> CorpusPiece {
+    let mut rng = rng_for(seed, "rule", n);
+    let poses = body_motion::gesture(&mut rng, PROCEDURAL_FRAMES, FPS.secs(1));
+    let motion = with_hands(&poses, FPS, &mut rng).unwrap_or(Motion::from_joints(FPS, Array3::zeros((0, N_JOINTS, 3))));
     let piece = CorpusPiece::new(format!("rule {n}"), &motion);
     if n % 2 == 1 { piece.mirrored() } else { piece }
 }
 
-/// Poses turned about the vertical so that the shoulders face the camera, but for what they turn within seconds.
-fn faced(poses: &[Pose], fps: f64) -> Vec<Pose> {
+/// Removes the slow part of the yaw, so that the shoulders face the camera on average over a few seconds.
+fn remove_slow_yaw(poses: &[Pose], fps: f64) -> Vec<Pose> {
     let side = |p: &Pose| vec3::sub(p[L_SHOULDER], p[R_SHOULDER]);
     let mut turned = 0.0;
     let mut last = 0.0;
-    // counted on beyond a full turn, so that the mean is one
+    // Unwrapped beyond full turns, so that yaws can be averaged.
     let yaws: Vec<f64> = poses
         .iter()
         .map(|pose| {
@@ -156,7 +161,7 @@ fn faced(poses: &[Pose], fps: f64) -> Vec<Pose> {
             turned
         })
         .collect();
-    let reach = (FACING_SECS * fps).ceil() as usize;
+    let reach = (YAW_MEAN_SECS * fps).ceil() as usize;
     let mean = |t: usize| {
         let (mut sum, mut weights) = (0.0, 0.0);
         for (s, yaw) in yaws.iter().enumerate().take(t + reach + 1).skip(t.saturating_sub(reach)) {
@@ -172,11 +177,11 @@ fn faced(poses: &[Pose], fps: f64) -> Vec<Pose> {
     poses.iter().enumerate().map(turn).collect()
 }
 
-/// The 49 joints of a body of nine points, with hands that do something.
-fn with_hands(poses: &[Pose], fps: FrameRate, dice: &mut ChaCha8Rng) -> Result<Motion> {
+/// Joins nine-point body poses with procedural hands into a motion of 49 joints.
+fn with_hands(poses: &[Pose], fps: FrameRate, rng: &mut ChaCha8Rng) -> Result<Motion> {
     let secs = fps.secs(poses.len());
-    let left = HandMotion::sample(dice, secs);
-    let right = if dice.random_bool(TOGETHER) { left.copied(dice) } else { HandMotion::sample(dice, secs) };
+    let left = HandMotion::sample(rng, secs);
+    let right = if rng.random_bool(COPIED_HANDS) { left.copied(rng) } else { HandMotion::sample(rng, secs) };
     let mut joints = Array3::zeros((poses.len(), N_JOINTS, 3));
     let mut put = |t: usize, joint: usize, place: Vec3| (0..3).for_each(|k| joints[[t, joint, k]] = place[k] as f32);
     for (t, pose) in poses.iter().enumerate() {
@@ -199,7 +204,7 @@ mod tests {
 
     #[test]
     fn bodies_face_the_camera_and_have_hands_on_their_wrists() {
-        // somebody who turns round twice in ten seconds
+        // A static pose that turns around twice in ten seconds.
         let still = body_motion::gesture(&mut ChaCha8Rng::seed_from_u64(1), 1, 0.1)[0];
         let turning = |t: usize| {
             let (sin, cos) = (4.0 * PI * t as f64 / 300.0).sin_cos();
@@ -208,7 +213,7 @@ mod tests {
         let take =
             BodyTake { name: "turn#0".into(), fps: 30.0, poses: (0..300).map(turning).collect(), rendered: false };
         let corpus = Corpus::new(&[take], &[], &[], &[], 7).unwrap();
-        assert_eq!(corpus.pieces.len(), COPIES + RULES);
+        assert_eq!(corpus.pieces.len(), COPIES + N_PROCEDURAL);
         for piece in &corpus.pieces {
             for frame in piece.joints.outer_iter() {
                 assert!(frame[[L_SHOULDER, 0]] > 0.0, "{}", piece.name);

@@ -1,6 +1,7 @@
-//! What the motion encoder (`nn::motion_encoder`) learns: to give windows of motion back after a code of 32 numbers. Loss:
-//! mean absolute error of the normalised bone directions plus that of their steps from frame to frame (as in the GENEA
-//! evaluation's auto-encoder), the six bones of arms and shoulders together counting as much as the forty of the fingers.
+//! Training task of the motion encoder (`nn::motion_encoder`): to reconstruct windows from a code of 32 numbers. Loss:
+//! mean absolute error of the normalised bone directions plus that of their differences from frame to frame (as in the
+//! auto-encoder of the GENEA evaluation); the six bones of arms and shoulders together have the weight of the forty
+//! finger bones.
 
 use super::auto_encoder::AutoEncoder;
 use super::corpus::{Corpus, CorpusPiece};
@@ -19,26 +20,27 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 
-/// Normalised numbers are not divided by less: a bone that hardly turns would be all noise.
-const LEAST_STD: f32 = 0.05;
-/// Frames between held-out windows, and windows measured at once.
-const MEASURED_STRIDE: usize = 17;
-const MEASURED: usize = 128;
+/// Lower bound of the standard deviation in the normalisation, so that the noise of bones that hardly rotate is not
+/// amplified.
+const MIN_STD: f32 = 0.05;
+/// Frames between held-out windows, and windows per evaluation batch.
+const EVALUATION_STRIDE: usize = 17;
+const EVALUATION_BATCH: usize = 128;
 
 /// Training task of the network.
 pub struct EmbeddingTask {
     params: Params,
     net: AutoEncoder,
     corpus: Corpus,
-    /// Of each number in the loss, [1, 138, 1].
+    /// Loss weight of each coordinate, [1, 138, 1].
     weights: Tensor,
-    /// Directions [T, 138] of each piece.
+    /// Bone directions [T, 138] of each piece.
     directions: Vec<Array2<f32>>,
-    /// Windows up to and with each piece.
+    /// Cumulative number of windows, up to and including each piece.
     ends: Vec<usize>,
 }
 
-/// Mean errors of windows that came back.
+/// Sums of reconstruction errors over `n` frames.
 #[derive(Clone, Copy, Debug, Default)]
 struct EmbeddingErrors {
     n: usize,
@@ -48,7 +50,7 @@ struct EmbeddingErrors {
 }
 
 impl EmbeddingTask {
-    /// A network with first values from `seed` that learns from `corpus`.
+    /// Creates a network initialised from `seed`, to be trained on `corpus`.
     pub fn new(corpus: Corpus, seed: u64) -> Result<Self> {
         let mut params = Params::new(seed);
         let net = AutoEncoder::new(&mut params, &Config::default())?;
@@ -69,8 +71,8 @@ impl EmbeddingTask {
         let mut errors = [EmbeddingErrors::default(); 2];
         for piece in pieces {
             let starts: Vec<usize> =
-                (0..(piece.joints.shape()[0] + 1).saturating_sub(WINDOW)).step_by(MEASURED_STRIDE).collect();
-            for starts in starts.chunks(MEASURED) {
+                (0..(piece.joints.shape()[0] + 1).saturating_sub(WINDOW)).step_by(EVALUATION_STRIDE).collect();
+            for starts in starts.chunks(EVALUATION_BATCH) {
                 let windows: Vec<ArrayView3<f32>> =
                     starts.iter().map(|&start| piece.joints.slice(s![start..start + WINDOW, .., ..])).collect();
                 let numbers: Vec<f32> = windows
@@ -94,7 +96,8 @@ impl EmbeddingTask {
 }
 
 impl EmbeddingErrors {
-    /// A window [34, 49, 3] and the directions [34 x 138] that came back for it, put together with its own bone lengths.
+    /// Adds the errors of a window [34, 49, 3] whose directions were reconstructed as `back` [34 x 138]; joints are
+    /// placed with the window's own bone lengths.
     fn add(&mut self, window: ArrayView3<f32>, back: &[f32]) {
         for (frame, back) in window.outer_iter().zip(back.chunks_exact(N_COORDINATES)) {
             let at = |joint: usize| -> vec3::Vec3 { std::array::from_fn(|k| f64::from(frame[[joint, k]])) };
@@ -115,7 +118,7 @@ impl EmbeddingErrors {
                 if joint < L_HAND {
                     self.arms_mm += 1000.0 / 6.0 * vec3::norm(vec3::sub(placed[joint], at(joint)));
                 } else {
-                    // fingers from their own wrist
+                    // Finger joints are compared relative to their own wrist.
                     let wrist = if joint < R_HAND { L_WRIST } else { R_WRIST };
                     let own = vec3::sub(placed[joint], placed[wrist]);
                     self.fingers_mm += 1000.0 / 40.0 * vec3::norm(vec3::sub(own, vec3::sub(at(joint), at(wrist))));
@@ -136,7 +139,7 @@ impl EmbeddingErrors {
     }
 }
 
-/// Of each of the 138 numbers in the loss: arms and shoulders together as much as all fingers, 1 on average.
+/// Loss weight of each of the 138 coordinates, 1 on average: arms and shoulders together weigh as much as all fingers.
 fn weights() -> Vec<f32> {
     let n_arms = joints_used().filter(|joint| *joint < L_HAND).count();
     let of = |joint: usize| {
@@ -146,7 +149,7 @@ fn weights() -> Vec<f32> {
     joints_used().flat_map(|joint| [of(joint); 3]).collect()
 }
 
-/// Mean and standard deviation of each of the 138 numbers.
+/// Mean and standard deviation of each of the 138 coordinates.
 fn statistics(pieces: &[Array2<f32>]) -> (Vec<f32>, Vec<f32>) {
     let mut sums = [(0.0f64, 0.0f64); N_COORDINATES];
     let mut n = 0.0;
@@ -158,7 +161,7 @@ fn statistics(pieces: &[Array2<f32>]) -> (Vec<f32>, Vec<f32>) {
         }
     }
     let n = f64::max(n, 1.0);
-    let std = |(sum, squares): &(f64, f64)| ((squares / n - (sum / n).powi(2)).max(0.0).sqrt() as f32).max(LEAST_STD);
+    let std = |(sum, squares): &(f64, f64)| ((squares / n - (sum / n).powi(2)).max(0.0).sqrt() as f32).max(MIN_STD);
     (sums.iter().map(|(sum, _)| (sum / n) as f32).collect(), sums.iter().map(std).collect())
 }
 
@@ -192,7 +195,7 @@ impl TrainingTask for EmbeddingTask {
         x.iter_mut().zip(window).for_each(|(to, from)| *to = *from);
     }
 
-    /// What is left over: window minus what came back, normalised; what should come out is nothing.
+    /// Residual in normalised units: reconstruction minus window. The loss compares it with zero, not with `y`.
     fn forward(&self, x: &Tensor, mode: &mut Mode) -> candle_core::Result<Tensor> {
         let x = self.net.encoder.normalised(x)?;
         self.net.forward(&x, mode)? - x

@@ -1,8 +1,8 @@
-//! Gestures, looks and movements of the trunk over a clip, tied to its speech: strokes before stressed syllables, beats
-//! on them, rests in pauses, nods while listening. All are smooth functions of time.
+//! Procedural motion of a person over a clip, synchronised with the speech: strokes before stressed syllables, beats
+//! on them, rests in pauses, nods while listening, gaze and trunk movements. All are smooth functions of time.
 
 use super::body::{ArmPosture, FingerShape};
-use super::condition::{Manner, Seat};
+use super::condition::{GestureStyle, Seat};
 use super::vocabulary;
 use super::vocabulary::Arms;
 use orator_base::math::vec3::Vec3;
@@ -12,34 +12,34 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
 
-/// Longest pause without a rest, seconds.
+/// Longest pause in seconds in which the hands do not return to rest.
 const PAUSE: f64 = 0.45;
 
-/// Trunk and head, radians.
+/// Posture of trunk and head.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TrunkPosture {
-    /// Turn to the person's left, lean ahead, lean to the person's left.
+    /// Rotation to the person's left, lean forwards, lean to the person's left; radians.
     pub trunk: [f64; 3],
-    /// Turn to the left, nod ahead, tilt to the left, all relative to the trunk.
+    /// Rotation to the left, nod forwards, tilt to the left, relative to the trunk; radians.
     pub head: [f64; 3],
     /// Shift of the hips to the left, metres.
     pub shift: f64,
 }
 
-/// How somebody leans ahead over a whole clip; all 0 of who is upright.
+/// Forward lean that is constant over a clip; all values are 0 for an upright person.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Carriage {
-    /// Lean of the trunk ahead that the arms do not follow, radians.
+pub struct LeanStyle {
+    /// Forward lean of the trunk in radians that the arms do not follow.
     pub lean: f64,
-    /// How far the head is bowed, radians.
+    /// Downward pitch of the head, radians.
     pub bow: f64,
-    /// How much further ahead the hands are than those of who is upright, metres of a body of unit 1.
+    /// Forward displacement of the hands relative to an upright person, metres of a body of unit 1.
     pub ahead: f64,
-    /// `ArmPosture::forward` of both arms of an upright trunk.
+    /// `ArmPosture::forward` of both arms for an upright trunk.
     pub elbows: f64,
 }
 
-impl Carriage {
+impl LeanStyle {
     pub fn sample(rng: &mut ChaCha8Rng) -> Self {
         Self {
             lean: rng.random_range(0.04..0.45),
@@ -49,59 +49,59 @@ impl Carriage {
         }
     }
 
-    /// Wrist in the axes of the leaning torso, of one in those of an upright body.
+    /// Converts a wrist position from the axes of an upright torso to those of the leaning one, and moves it forwards.
     pub fn wrist(&self, [x, down, away]: Vec3) -> Vec3 {
         let (sin, cos) = self.lean.sin_cos();
         let away = away - self.ahead;
         [x, cos * down + sin * away, cos * away - sin * down]
     }
 
-    /// How much further ahead than a desk's usual place its near edge is, metres of a body of unit 1.
+    /// Additional distance of a desk's near edge, metres of a body of unit 1.
     pub fn desk_ahead(&self) -> f64 {
         0.45 * self.lean.sin() + 0.5 * self.ahead
     }
 }
 
-/// Movement to `to` within `secs` from `start` on.
+/// Transition to `to` that begins at `start` and takes `secs` seconds.
 #[derive(Clone, Debug)]
-struct Move<T> {
+struct Transition<T> {
     start: f64,
     secs: f64,
     to: T,
 }
 
-/// Dip of hands and head around a stressed syllable.
+/// Downward dip of hands and head at a stressed syllable.
 #[derive(Clone, Debug)]
 struct BeatDip {
     at: f64,
     depth: f64,
-    /// Shares of left and right hand.
+    /// Relative amplitudes of the left and right hand.
     hands: [f64; 2],
 }
 
-/// All movements of a clip.
+/// All procedural movements of a person over a clip.
 #[derive(Clone, Debug)]
-pub struct Acts {
+pub struct ActorMotion {
     begin: Arms,
-    arms: Vec<Move<[Option<ArmPosture>; 2]>>,
+    arms: Vec<Transition<[Option<ArmPosture>; 2]>>,
     beats: Vec<BeatDip>,
-    heads: Vec<Move<[f64; 3]>>,
-    trunks: Vec<Move<[f64; 3]>>,
-    /// Start and depth of nods of a listener.
+    heads: Vec<Transition<[f64; 3]>>,
+    trunks: Vec<Transition<[f64; 3]>>,
+    /// Time in seconds and depth of the nods in listening pauses.
     nods: Vec<(f64, f64)>,
     sway: [f64; 6],
     seat: Seat,
-    pub carriage: Carriage,
+    pub lean_style: LeanStyle,
 }
 
-/// Maker of the arms' movements.
+/// Planner of the arm movements.
 struct ArmPlan<'a> {
-    manner: Manner,
+    gesture_style: GestureStyle,
     rests: Vec<Arms>,
-    /// Rest that is left and returned to over the edge of the desk.
+    /// Index of the rest under the desk, which is left and reached by way of the desk's edge.
     hidden: Option<usize>,
     rest: usize,
-    moves: Vec<Move<[Option<ArmPosture>; 2]>>,
+    moves: Vec<Transition<[Option<ArmPosture>; 2]>>,
     rng: &'a mut ChaCha8Rng,
 }
 
@@ -111,22 +111,22 @@ impl ArmPlan<'_> {
     }
 
     fn secs(&mut self) -> f64 {
-        match self.manner {
-            Manner::Fast => self.rng.random_range(0.15..0.3),
+        match self.gesture_style {
+            GestureStyle::Fast => self.rng.random_range(0.15..0.3),
             _ => self.rng.random_range(0.42..0.75),
         }
     }
 
-    /// Hands go where a gesture is; an idle hand rests.
+    /// Adds a gesture; an idle hand goes to its rest.
     fn stroke(&mut self, start: f64) {
-        let (goal, secs) = (vocabulary::stroke(self.manner, self.rng), self.secs());
+        let (goal, secs) = (vocabulary::stroke(self.gesture_style, self.rng), self.secs());
         let start = self.over_edge(start);
         if self.is_hidden() {
             self.rest = (self.rest + 1) % self.rests.len();
         }
         let rest = self.rests[self.rest];
         let to = [0, 1].map(|side| goal[side].or(Some(rest[side])));
-        self.moves.push(Move { start, secs, to });
+        self.moves.push(Transition { start, secs, to });
     }
 
     fn return_to_rest(&mut self, start: f64) {
@@ -137,51 +137,53 @@ impl ArmPlan<'_> {
         let comes = !was_hidden && self.hidden == Some(next);
         self.rest = next;
         let start = if comes { self.over(start) } else { start };
-        self.moves.push(Move { start, secs, to: self.rests[next].map(Some) });
+        self.moves.push(Transition { start, secs, to: self.rests[next].map(Some) });
     }
 
     fn over_edge(&mut self, start: f64) -> f64 {
         if self.is_hidden() { self.over(start) } else { start }
     }
 
-    /// Both hands over the desk's edge; returns when the next movement may begin.
+    /// Moves both hands over the desk's edge; returns the time at which the next movement may begin.
     fn over(&mut self, start: f64) -> f64 {
-        self.moves.push(Move { start, secs: 0.45, to: vocabulary::over_edge().map(Some) });
+        self.moves.push(Transition { start, secs: 0.45, to: vocabulary::over_edge().map(Some) });
         start + 0.36
     }
 }
 
-impl Acts {
-    /// Movements to a speech of `secs` seconds; `held` is the side and the grip of a hand that holds something.
+impl ActorMotion {
+    /// Plans the movements for a speech of `secs` seconds; `held` is the side and the grip of a hand that holds an
+    /// object.
     pub fn new(
         speech: &Speech,
         secs: f64,
-        (manner, seat): (Manner, Seat),
+        (gesture_style, seat): (GestureStyle, Seat),
         held: Option<(usize, FingerShape)>,
         rng: &mut ChaCha8Rng,
     ) -> Self {
-        let mut rests = vocabulary::rests(manner, seat, rng);
-        let hidden = (seat == Seat::Desk && manner == Manner::Free && rng.random_bool(0.6)).then(|| {
+        let mut rests = vocabulary::rests(gesture_style, seat, rng);
+        let hidden = (seat == Seat::Desk && gesture_style == GestureStyle::Free && rng.random_bool(0.6)).then(|| {
             rests.push(vocabulary::under_desk());
             rests.len() - 1
         });
         let sway = std::array::from_fn(|_| rng.random_range(0.0..TAU));
         let begins_hidden = hidden.filter(|_| rng.random_bool(0.5));
         let first = begins_hidden.unwrap_or_else(|| rng.random_range(0..rests.len()));
-        let mut plan = ArmPlan { manner, rests, hidden, rest: first, moves: Vec::new(), rng };
+        let mut plan = ArmPlan { gesture_style, rests, hidden, rest: first, moves: Vec::new(), rng };
         let mut beats = Vec::new();
-        let rare = if manner == Manner::Folded || manner == Manner::Crossing { 0.3 } else { 0.75 };
+        let stroke_probability =
+            if gesture_style == GestureStyle::Folded || gesture_style == GestureStyle::Crossing { 0.3 } else { 0.75 };
         let said = &speech.syllables;
         for (k, syllable) in said.iter().enumerate() {
             if syllable.stress > 0.5 {
                 let at = (syllable.start + syllable.end) / 2.0;
-                let chance = if manner == Manner::Fast { 0.95 } else { rare };
-                if plan.rng.random_bool(chance) {
+                let probability = if gesture_style == GestureStyle::Fast { 0.95 } else { stroke_probability };
+                if plan.rng.random_bool(probability) {
                     plan.stroke(syllable.start - 0.3);
-                    if manner == Manner::Fast && plan.rng.random_bool(0.6) {
+                    if gesture_style == GestureStyle::Fast && plan.rng.random_bool(0.6) {
                         plan.stroke(syllable.start + 0.1);
                     }
-                    if manner == Manner::Folded {
+                    if gesture_style == GestureStyle::Folded {
                         plan.return_to_rest(syllable.start + 0.9);
                     }
                 }
@@ -190,7 +192,8 @@ impl Acts {
                 if plan.rng.random_bool(0.4) || plan.is_hidden() {
                     hands[side] = 0.2;
                 }
-                let depth = if manner == Manner::Folded { 0.012 } else { plan.rng.random_range(0.02..0.05) };
+                let depth =
+                    if gesture_style == GestureStyle::Folded { 0.012 } else { plan.rng.random_range(0.02..0.05) };
                 beats.push(BeatDip { at, depth: depth * syllable.stress, hands });
             }
             let gap = said.get(k + 1).map_or(secs, |next| next.start) - syllable.end;
@@ -211,11 +214,11 @@ impl Acts {
             [0.35, 0.8].map(|after| (pair[0].end + after, depth))
         });
         let nods = nods.collect();
-        let (heads, trunks) = (looks(secs, rng), shifts(secs, seat, rng));
-        Self { begin, arms: moves, beats, heads, trunks, nods, sway, seat, carriage: Carriage::default() }
+        let (heads, trunks) = (gaze_moves(secs, rng), trunk_moves(secs, seat, rng));
+        Self { begin, arms: moves, beats, heads, trunks, nods, sway, seat, lean_style: LeanStyle::default() }
     }
 
-    /// Arms at a time.
+    /// Posture of the arms at a time.
     pub fn arms(&self, secs: f64) -> Arms {
         let mut arms = self.begin;
         for step in self.arms.iter().take_while(|step| step.start < secs) {
@@ -231,13 +234,13 @@ impl Acts {
                 arm.raise -= 3.0 * share * dip;
             }
         }
-        arms.iter_mut().for_each(|arm| arm.forward = self.carriage.elbows + self.carriage.lean);
+        arms.iter_mut().for_each(|arm| arm.forward = self.lean_style.elbows + self.lean_style.lean);
         arms
     }
 
-    /// Trunk and head at a time.
+    /// Posture of trunk and head at a time.
     pub fn trunk(&self, secs: f64) -> TrunkPosture {
-        let reached = |moves: &[Move<[f64; 3]>]| {
+        let reached = |moves: &[Transition<[f64; 3]>]| {
             moves.iter().take_while(|step| step.start < secs).fold([0.0; 3], |mut now: [f64; 3], step| {
                 let done = minimum_jerk((secs - step.start) / step.secs);
                 (0..3).for_each(|k| now[k] += done * (step.to[k] - now[k]));
@@ -253,12 +256,12 @@ impl Acts {
         TrunkPosture {
             trunk: [
                 turn + 0.03 * slow(0, 0.11),
-                self.carriage.lean + lean + 0.012 * slow(1, 0.17) + 0.004 * slow(2, 0.27),
+                self.lean_style.lean + lean + 0.012 * slow(1, 0.17) + 0.004 * slow(2, 0.27),
                 side + still * 0.015 * slow(3, 0.13),
             ],
             head: [
                 yaw - 0.4 * turn + 0.02 * slow(4, 0.23),
-                nod + dips.sum::<f64>() + nods.sum::<f64>() - 0.5 * lean + self.carriage.bow - self.carriage.lean,
+                nod + dips.sum::<f64>() + nods.sum::<f64>() - 0.5 * lean + self.lean_style.bow - self.lean_style.lean,
                 tilt - 0.5 * side + 0.015 * slow(5, 0.19),
             ],
             shift: still * 0.012 * slow(3, 0.13),
@@ -266,7 +269,7 @@ impl Acts {
     }
 }
 
-/// Posture of a hand that holds something: before the body, the thumb up, gripping.
+/// Restricts the posture of a hand that holds an object: in front of the body, thumb up, gripping.
 fn hold(posture: &mut ArmPosture, grip: FingerShape) {
     posture.fingers = grip;
     posture.roll = posture.roll.clamp(-0.4, 0.4);
@@ -277,21 +280,21 @@ fn hold(posture: &mut ArmPosture, grip: FingerShape) {
     posture.wrist[2] = posture.wrist[2].min(-0.22);
 }
 
-/// Where the head looks: mostly at the viewer, now and then up to 45 degrees aside.
-fn looks(secs: f64, rng: &mut ChaCha8Rng) -> Vec<Move<[f64; 3]>> {
+/// Gaze movements: mostly towards the viewer, occasionally up to 45 degrees aside.
+fn gaze_moves(secs: f64, rng: &mut ChaCha8Rng) -> Vec<Transition<[f64; 3]>> {
     let mut moves = Vec::new();
     let mut now = rng.random_range(0.0..1.0);
     while now < secs {
         let most = if rng.random_bool(0.3) { 0.78 } else { 0.2 };
         let to = [rng.random_range(-most..most), rng.random_range(-0.14..0.2), rng.random_range(-0.13..0.13)];
-        moves.push(Move { start: now, secs: rng.random_range(0.35..0.7), to });
+        moves.push(Transition { start: now, secs: rng.random_range(0.35..0.7), to });
         now += rng.random_range(0.9..2.4);
     }
     moves
 }
 
-/// Where the trunk leans and turns.
-fn shifts(secs: f64, seat: Seat, rng: &mut ChaCha8Rng) -> Vec<Move<[f64; 3]>> {
+/// Slow leans and rotations of the trunk.
+fn trunk_moves(secs: f64, seat: Seat, rng: &mut ChaCha8Rng) -> Vec<Transition<[f64; 3]>> {
     let (turn, lean) = match seat {
         Seat::Standing => (0.25, [-0.05, 0.12]),
         Seat::Chair => (0.2, [-0.08, 0.22]),
@@ -301,7 +304,7 @@ fn shifts(secs: f64, seat: Seat, rng: &mut ChaCha8Rng) -> Vec<Move<[f64; 3]>> {
     let mut now = -1.0;
     while now < secs {
         let to = [rng.random_range(-turn..turn), rng.random_range(lean[0]..lean[1]), rng.random_range(-0.07..0.07)];
-        moves.push(Move { start: now, secs: rng.random_range(0.8..1.6), to });
+        moves.push(Transition { start: now, secs: rng.random_range(0.8..1.6), to });
         now += rng.random_range(1.5..4.0);
     }
     moves
@@ -317,7 +320,7 @@ mod tests {
     use orator_base::types::skeleton::{L_ELBOW, L_SHOULDER};
     use rand::SeedableRng;
 
-    /// How far the left elbow is before its shoulder behind a desk, cm: the median over clips.
+    /// Median over clips of the forward distance of the left elbow from its shoulder behind a desk, cm.
     fn elbow_ahead(leans: bool) -> f64 {
         let build = Build::ADULT;
         let rig = build.rig();
@@ -326,13 +329,13 @@ mod tests {
             .map(|seed| {
                 let speech = Voice::new(seed, 4.0, None).speech;
                 let rng = &mut ChaCha8Rng::seed_from_u64(seed);
-                let mut acts = Acts::new(&speech, 4.0, (Manner::Free, Seat::Desk), None, rng);
+                let mut actor_motion = ActorMotion::new(&speech, 4.0, (GestureStyle::Free, Seat::Desk), None, rng);
                 if leans {
-                    acts.carriage = Carriage::sample(rng);
+                    actor_motion.lean_style = LeanStyle::sample(rng);
                 }
-                let torso = seated.torso(&acts.trunk(2.0));
-                let free = Obstacles { carriage: acts.carriage, ..Obstacles::default() };
-                let joints = free.free(&build, &acts.arms(2.0), &torso);
+                let torso = seated.torso(&actor_motion.trunk(2.0));
+                let obstacles = Obstacles { lean_style: actor_motion.lean_style, ..Obstacles::default() };
+                let joints = obstacles.resolve(&build, &actor_motion.arms(2.0), &torso);
                 torso.world(joints[L_ELBOW])[2] - torso.world(joints[L_SHOULDER])[2]
             })
             .collect();
@@ -341,7 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn elbows_of_who_leans_over_a_desk_are_before_the_shoulders() {
+    fn leaning_over_a_desk_moves_the_elbows_in_front_of_the_shoulders() {
         let (upright, leaning) = (elbow_ahead(false), elbow_ahead(true));
         assert!((-5.0..9.0).contains(&upright) && (10.0..22.0).contains(&leaning), "{upright} {leaning}");
     }
