@@ -1,6 +1,7 @@
 //! The list of verbs in `orator --help`, by group.
 
 use clap::{Command, Subcommand};
+use orator_base::stage::artifacts::StageName;
 use std::fmt::Write as _;
 
 /// Groups of verbs, in the order of a project.
@@ -8,7 +9,18 @@ const GROUPS: [(&str, &[&str]); 5] = [
     (
         "Dataset",
         &[
-            "init", "run", "status", "report", "sheet", "lift", "import", "align", "dataset", "forget", "plan", "work",
+            "init",
+            "run",
+            "status",
+            "report",
+            "sheet",
+            StageName::Lift.as_str(),
+            "import",
+            "align",
+            "dataset",
+            "forget",
+            "plan",
+            "work",
             "submit",
         ],
     ),

@@ -36,11 +36,6 @@ impl Pipeline {
         Self { program: Some(program), ..self }
     }
 
-    /// Copies the subprocess program of `other` into this pipeline.
-    pub fn like(self, other: &Self) -> Self {
-        Self { program: other.program.clone(), ..self }
-    }
-
     /// A pipeline with another configuration and other videos, but the same subprocess program.
     pub(super) fn with(&self, config: Config, videos: Vec<Videos>) -> Self {
         Self { config, videos, program: self.program.clone() }

@@ -351,17 +351,11 @@ fn to_type_of(value: &DeValue<'_>, default: &Value) -> Result<Value, String> {
             _ => Err(format!("{i} is out of range: expected a whole number from 0 up")),
         },
         (Value::Integer(_), _) => type_error("a whole number"),
-        (Value::Float(_), DeValue::Integer(_) | DeValue::Float(_)) => {
-            let text = match value {
-                DeValue::Float(f) => f.as_str().to_owned(),
-                DeValue::Integer(i) => i64::from_str_radix(i.as_str(), i.radix()).unwrap_or_default().to_string(),
-                _ => String::new(),
-            };
-            match text.parse::<f64>() {
-                Ok(number) if number.is_finite() => Ok(Value::Float(number)),
-                _ => Err(format!("{text} is no finite number")),
-            }
-        }
+        (Value::Float(_), DeValue::Float(f)) => to_finite(f.as_str()),
+        (Value::Float(_), DeValue::Integer(i)) => match i64::from_str_radix(i.as_str(), i.radix()) {
+            Ok(i) => Ok(Value::Float(i as f64)),
+            Err(_) => to_finite(i.as_str()),
+        },
         (Value::Float(_), _) => type_error("a number"),
         (Value::Array(_), DeValue::Array(items)) => {
             let model = Value::String(String::new());
@@ -372,6 +366,11 @@ fn to_type_of(value: &DeValue<'_>, default: &Value) -> Result<Value, String> {
         (Value::Table(_), _) => type_error("a table"),
         (Value::Datetime(_), _) => type_error("another value"),
     }
+}
+
+fn to_finite(text: &str) -> Result<Value, String> {
+    let number = text.parse::<f64>().ok().filter(|number| number.is_finite());
+    number.map(Value::Float).ok_or_else(|| format!("{text} is no finite number"))
 }
 
 /// Message for a value of the right TOML type that its setting rejects; `message` is that of serde.

@@ -86,6 +86,7 @@ impl Representation {
             if mean.iter().chain(std).any(|v| !v.is_finite()) {
                 bail!("its table of directions holds a number that is not finite");
             }
+            ensure!(std.iter().all(|v| *v >= 0.0), "its table of directions has a negative deviation");
         }
         Ok(())
     }

@@ -99,7 +99,12 @@ fn judged_claims(task: &mut TaskAnalysis, claim: &StudyHypothesis, level: f64) -
 
 /// Description of a hypothesis.
 fn describe_claim(claim: &StudyHypothesis) -> String {
-    let who = if claim.per_speaker { ", each speaker by itself" } else { "" };
+    let who = match (claim.per_speaker, claim.kind) {
+        // Differences between conditions are estimated over all speakers only.
+        (true, HypothesisKind::Differs) => ", all speakers together",
+        (true, _) => ", each speaker by itself",
+        (false, _) => "",
+    };
     let which = match &claim.conditions[..] {
         [] => String::new(),
         names => format!(" ({})", names.join(", ")),

@@ -21,11 +21,11 @@ pub struct SpeakerSource {
     /// Bone lengths of the speaker, metres, 0 if unknown; empty without a dataset.
     pub bone_lengths: Vec<f32>,
     pub dataset: Option<Dataset>,
-    segments: Vec<Segment>,
+    segments: Vec<SourceSegment>,
 }
 
 /// Continuous segment of speech.
-struct Segment {
+struct SourceSegment {
     name: String,
     location: SegmentLocation,
 }
@@ -64,7 +64,7 @@ impl SpeakerSource {
             );
         }
         let bone_lengths = dataset.info().bone_lengths_metres.iter().map(|metres| *metres as f32).collect();
-        let segment = |sample: SampleRef| Segment {
+        let segment = |sample: SampleRef| SourceSegment {
             name: sample.key.to_string(),
             location: SegmentLocation::Sample(Box::new(sample)),
         };
@@ -83,7 +83,7 @@ impl SpeakerSource {
         let mut files = found.with_context(|| format!("sounds of the speaker {name}"))?;
         ensure!(missing.is_empty(), "sounds of the speaker {name}: {}", missing.join("; "));
         files.sort();
-        let mut segments: Vec<Segment> = Vec::new();
+        let mut segments: Vec<SourceSegment> = Vec::new();
         for file in files {
             let stem = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
             let is_duplicate = segments.iter().any(|segment| segment.name == stem);
@@ -92,7 +92,7 @@ impl SpeakerSource {
                 "{}: two sounds of the speaker {name} are called {stem}; rename one",
                 file.display()
             );
-            segments.push(Segment { name: stem, location: SegmentLocation::File(file) });
+            segments.push(SourceSegment { name: stem, location: SegmentLocation::File(file) });
         }
         Ok(Self { name: name.to_owned(), fps, bone_lengths: Vec::new(), dataset: None, segments })
     }
@@ -106,7 +106,7 @@ impl SpeakerSource {
     /// # Errors
     /// The segment's sound, motion or transcript cannot be read.
     pub fn read(&self, segment: usize) -> Result<SpeechSegment> {
-        let Segment { name, location } = &self.segments[segment];
+        let SourceSegment { name, location } = &self.segments[segment];
         match (location, &self.dataset) {
             (SegmentLocation::Sample(sample), Some(dataset)) => {
                 let sample = dataset.read(sample)?;

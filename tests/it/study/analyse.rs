@@ -124,7 +124,7 @@ fn a_known_preference_is_found_in_every_design_and_its_page_is_whole() {
     let Some(mut browser) = Browser::open(&page, [1280, 900]) else { return };
     let mut count = |selector: &str| browser.value(&format!("document.querySelectorAll('{selector}').length"));
     assert_eq!((count(".verdict"), count(".steps")), (5.into(), 3.into()));
-    assert!(count("svg.forest").as_u64().unwrap() >= 7 && count(".statistics tbody tr").as_u64().unwrap() > 60);
+    assert!(count("svg.forest").as_u64().unwrap() >= 7 && count(".figures tbody tr").as_u64().unwrap() > 60);
     assert_eq!(count(".registered"), 0, "nothing was registered");
     for (width, scheme) in [(360, "dark"), (360, "light"), (1280, "dark"), (1280, "light")] {
         browser.resize([width, 800]);

@@ -44,13 +44,6 @@ pub struct ErrorReduction {
     pub high: Option<f64>,
 }
 
-impl ErrorReduction {
-    /// Whether the confidence interval lies above 0.
-    pub fn is_significant(&self) -> bool {
-        self.low.is_some_and(|low| low > 0.0)
-    }
-}
-
 /// Metrics of the generator and of the mean pose on the same windows.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Validation {
