@@ -64,7 +64,7 @@ impl LeanStyle {
 
 /// Transition to `to` that begins at `start` and takes `secs` seconds.
 #[derive(Clone, Debug)]
-struct Transition<T> {
+struct MotionTransition<T> {
     start: f64,
     secs: f64,
     to: T,
@@ -83,10 +83,10 @@ struct BeatDip {
 #[derive(Clone, Debug)]
 pub struct ActorMotion {
     begin: Arms,
-    arms: Vec<Transition<[Option<ArmPosture>; 2]>>,
+    arms: Vec<MotionTransition<[Option<ArmPosture>; 2]>>,
     beats: Vec<BeatDip>,
-    heads: Vec<Transition<[f64; 3]>>,
-    trunks: Vec<Transition<[f64; 3]>>,
+    heads: Vec<MotionTransition<[f64; 3]>>,
+    trunks: Vec<MotionTransition<[f64; 3]>>,
     /// Time in seconds and depth of the nods in listening pauses.
     nods: Vec<(f64, f64)>,
     sway: [f64; 6],
@@ -101,7 +101,7 @@ struct ArmPlan<'a> {
     /// Index of the rest under the desk, which is left and reached by way of the desk's edge.
     hidden: Option<usize>,
     rest: usize,
-    moves: Vec<Transition<[Option<ArmPosture>; 2]>>,
+    moves: Vec<MotionTransition<[Option<ArmPosture>; 2]>>,
     rng: &'a mut ChaCha8Rng,
 }
 
@@ -126,7 +126,7 @@ impl ArmPlan<'_> {
         }
         let rest = self.rests[self.rest];
         let to = [0, 1].map(|side| goal[side].or(Some(rest[side])));
-        self.moves.push(Transition { start, secs, to });
+        self.moves.push(MotionTransition { start, secs, to });
     }
 
     fn return_to_rest(&mut self, start: f64) {
@@ -137,7 +137,7 @@ impl ArmPlan<'_> {
         let comes = !was_hidden && self.hidden == Some(next);
         self.rest = next;
         let start = if comes { self.over(start) } else { start };
-        self.moves.push(Transition { start, secs, to: self.rests[next].map(Some) });
+        self.moves.push(MotionTransition { start, secs, to: self.rests[next].map(Some) });
     }
 
     fn over_edge(&mut self, start: f64) -> f64 {
@@ -146,7 +146,7 @@ impl ArmPlan<'_> {
 
     /// Moves both hands over the desk's edge; returns the time at which the next movement may begin.
     fn over(&mut self, start: f64) -> f64 {
-        self.moves.push(Transition { start, secs: 0.45, to: vocabulary::over_edge().map(Some) });
+        self.moves.push(MotionTransition { start, secs: 0.45, to: vocabulary::over_edge().map(Some) });
         start + 0.36
     }
 }
@@ -240,7 +240,7 @@ impl ActorMotion {
 
     /// Posture of trunk and head at a time.
     pub fn trunk(&self, secs: f64) -> TrunkPosture {
-        let reached = |moves: &[Transition<[f64; 3]>]| {
+        let reached = |moves: &[MotionTransition<[f64; 3]>]| {
             moves.iter().take_while(|step| step.start < secs).fold([0.0; 3], |mut now: [f64; 3], step| {
                 let done = minimum_jerk((secs - step.start) / step.secs);
                 (0..3).for_each(|k| now[k] += done * (step.to[k] - now[k]));
@@ -281,20 +281,20 @@ fn hold(posture: &mut ArmPosture, grip: FingerShape) {
 }
 
 /// Gaze movements: mostly towards the viewer, occasionally up to 45 degrees aside.
-fn gaze_moves(secs: f64, rng: &mut ChaCha8Rng) -> Vec<Transition<[f64; 3]>> {
+fn gaze_moves(secs: f64, rng: &mut ChaCha8Rng) -> Vec<MotionTransition<[f64; 3]>> {
     let mut moves = Vec::new();
     let mut now = rng.random_range(0.0..1.0);
     while now < secs {
         let most = if rng.random_bool(0.3) { 0.78 } else { 0.2 };
         let to = [rng.random_range(-most..most), rng.random_range(-0.14..0.2), rng.random_range(-0.13..0.13)];
-        moves.push(Transition { start: now, secs: rng.random_range(0.35..0.7), to });
+        moves.push(MotionTransition { start: now, secs: rng.random_range(0.35..0.7), to });
         now += rng.random_range(0.9..2.4);
     }
     moves
 }
 
 /// Slow leans and rotations of the trunk.
-fn trunk_moves(secs: f64, seat: Seat, rng: &mut ChaCha8Rng) -> Vec<Transition<[f64; 3]>> {
+fn trunk_moves(secs: f64, seat: Seat, rng: &mut ChaCha8Rng) -> Vec<MotionTransition<[f64; 3]>> {
     let (turn, lean) = match seat {
         Seat::Standing => (0.25, [-0.05, 0.12]),
         Seat::Chair => (0.2, [-0.08, 0.22]),
@@ -304,7 +304,7 @@ fn trunk_moves(secs: f64, seat: Seat, rng: &mut ChaCha8Rng) -> Vec<Transition<[f
     let mut now = -1.0;
     while now < secs {
         let to = [rng.random_range(-turn..turn), rng.random_range(lean[0]..lean[1]), rng.random_range(-0.07..0.07)];
-        moves.push(Transition { start: now, secs: rng.random_range(0.8..1.6), to });
+        moves.push(MotionTransition { start: now, secs: rng.random_range(0.8..1.6), to });
         now += rng.random_range(1.5..4.0);
     }
     moves
