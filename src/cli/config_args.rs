@@ -3,13 +3,13 @@
 use crate::Split;
 use std::path::PathBuf;
 
-/// Where the configuration is, and what the command line changes in it.
+/// Configuration file and overrides of its keys.
 #[derive(clap::Args, Clone, Debug)]
 pub struct ConfigArgs {
-    /// The configuration file.
+    /// Configuration file.
     #[arg(short, long, default_value = "pipeline.toml", value_name = "FILE")]
     pub config: PathBuf,
-    /// Change one key of the configuration, for instance `--set extract.fps=15`; may be given several times.
+    /// Override one configuration key, such as `--set extract.fps=15`; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
 }

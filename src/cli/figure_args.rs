@@ -8,11 +8,11 @@ use orator_base::types::time::FrameRate;
 
 #[derive(clap::Args)]
 pub(super) struct FigureArgs {
-    /// What the bones are called in .bvh, .fbx, .glb and .json.
+    /// Naming convention of the bones in .bvh, .fbx, .glb and .json.
     #[arg(long, value_name = "own|mixamo|unity-humanoid|vrm|unreal", default_value = "own", value_parser = names_called)]
     names: Names,
-    /// Frames a second of the figures that are written; without: those of the motion, in a film as many times them as give
-    /// 30 or more. A fraction is 30000/1001.
+    /// Frame rate of the output, frames per second, such as 30 or 30000/1001; defaults to the rate of the motion, for
+    /// .mp4 to its smallest multiple of at least 30.
     #[arg(long, value_name = "RATE")]
     fps: Option<FrameRate>,
 }

@@ -36,7 +36,7 @@ pub enum Outcome {
 struct Cli {
     #[command(subcommand)]
     verb: Verb,
-    /// Print one JSON object on standard output instead of text for people.
+    /// Print one JSON object on standard output instead of text.
     #[arg(long, global = true)]
     json: bool,
 }

@@ -8,17 +8,19 @@ use orator_base::types::posture::Posture;
 
 #[derive(clap::Args)]
 pub(super) struct BodyArgs {
-    /// Leave the head at rest though the face is known.
+    /// Keep the head at rest even if the face was detected.
     #[arg(long, conflicts_with = "keypoints")]
     neutral_head: bool,
-    /// The turn of the shoulders about the vertical: of spine and chest, or removed, so that the figure faces ahead.
-    #[arg(long, value_enum, default_value = "spine")]
+    /// Rotation of the shoulders about the vertical axis: applied to spine and chest, or removed, so that the figure
+    /// faces forward.
+    #[arg(long, value_enum, value_name = "MODE", default_value = "spine")]
     shoulder_yaw: ShoulderYaw,
-    /// Lower body: feet planted under hips that follow the trunk, or legs and hips at rest. Without: seated where hips and
-    /// knees are seen and the thighs hang less than 0.55 of the height from hips to shoulders, else standing.
-    #[arg(long, value_enum)]
+    /// Lower body: `seated` and `standing` plant the feet under hips that follow the trunk, `none` keeps legs and
+    /// hips at rest. Defaults to `seated` if hips and knees were detected and the thighs extend downwards by less
+    /// than 0.55 of the height from hips to shoulders, else to `standing`.
+    #[arg(long, value_enum, value_name = "POSE")]
     legs: Option<LegsName>,
-    /// Leave the chest still: it moves the neck by 3 mm, and no joint against it.
+    /// Do not animate breathing, which moves the neck by 3 mm and no joint relative to it.
     #[arg(long)]
     no_breath: bool,
 }
@@ -69,11 +71,11 @@ impl BodyArgs {
 
 #[derive(clap::Args)]
 pub(super) struct SmoothingArgs {
-    /// As much as the noise of each bone in this clip asks for; cubics over 0.6 s (arms) and 1 s (hands), without delay;
-    /// or none.
-    #[arg(long, value_enum, default_value = "adaptive")]
+    /// Smoothing: adapted to the noise of each bone in this clip, cubic filters over 0.6 s (arms) and 1 s (hands)
+    /// without delay, or none.
+    #[arg(long, value_enum, value_name = "METHOD", default_value = "adaptive")]
     smoothing: SmoothingKind,
-    /// Adaptive: factor of the noise that is taken away, 0 for none.
+    /// Multiplier of the noise level that adaptive smoothing removes, 0 to 100; 0 disables smoothing.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
     smoothing_strength: f64,
 }

@@ -7,8 +7,8 @@ pub(super) struct FilmArgs {
     /// Removed: only its former default is accepted.
     #[arg(long = "style", hide = true, value_parser = former_style)]
     _style: Option<String>,
-    /// Where a film sees the avatar from; `source`: from the camera of the video --beside that the motion was lifted
-    /// from, before its picture.
+    /// Camera of an .mp4 output; `source` uses the camera fitted to the video of --beside and draws the avatar over
+    /// its picture.
     #[arg(long, value_enum, default_value = "front")]
     camera: CameraName,
 }

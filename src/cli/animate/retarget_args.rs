@@ -13,14 +13,14 @@ use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(super) struct RetargetArgs {
-    /// Put the motion on the skeleton of this file: a .bvh is written as .bvh, a .glb as that file with an animation
-    /// added. Its bones are found by their names and listed.
+    /// Retarget the motion to the skeleton of this file: from a .bvh, a .bvh is written; from a .glb, that file with
+    /// an added animation. Bones are matched by name, and the matches are printed.
     #[arg(long, value_name = "RIG.glb|RIG.bvh", conflicts_with = "names")]
     retarget: Option<PathBuf>,
-    /// Which joint of the skeleton is which bone, in place of what the names tell; lines LeftArm = \"upperarm_l\".
+    /// Bone map to use instead of matching by name, with lines such as LeftArm = "upperarm_l".
     #[arg(long, value_name = "FILE", requires = "retarget")]
     bone_map: Option<PathBuf>,
-    /// Write the bones that were found to this file, to be changed and given to --bone-map.
+    /// Write the bone map that was found to this file, to edit and pass to --bone-map.
     #[arg(long, value_name = "FILE", requires = "retarget", conflicts_with = "bone_map")]
     write_bone_map: Option<PathBuf>,
 }

@@ -34,72 +34,76 @@ use std::time::Instant;
 ///
 /// Joint positions become rotations of a full body, smoothed and limited to possible joint angles.
 ///
-/// IN is a motion: .npy (joints [frames, 49, 3], metres; its rate in the .npy.json beside it), .txt (the layout of Rebol et
-/// al. 2021), joints.npz or the folder of a lifted video (work/lift/SPEAKER/VIDEO), or a dataset (work/dataset/SPEAKER)
-/// with --sample. The ending of each output chooses what is written: .bvh (cm, y up, facing +z, T-pose at rest), .fbx (binary 7.4) and .glb (a skinned
-/// avatar with its motion), .vrm (the avatar alone, VRM 1.0) and .vrma (the motion for avatars of VRM), .json, .npz,
-/// .npy and .txt (the joints of the figure), .mp4 (a film).
-/// With --format, IN may be a folder of motions, a speaker's folder of lifted videos or a whole dataset, and --out is a
-/// folder.
+/// IN is a motion: .npy (joints [frames, 49, 3], metres; the frame rate is in .npy.json), .txt (layout of Rebol et
+/// al. 2021), joints.npz or the folder of a lifted video (work/lift/SPEAKER/VIDEO), or a dataset
+/// (work/dataset/SPEAKER) with --sample. With --format, IN may also be a folder of motions, the folder of lifted
+/// videos of a speaker or an entire dataset; --out is then a folder.
 ///
-/// Head and trunk turn with face, shoulders and hips where keypoints are known: of a dataset and of a run by themselves,
-/// else with --keypoints; otherwise they rest. Bones have the lengths, palms the shape that are the motion's medians; a
-/// palm that points anywhere but along its hand is replaced by the other hand's, else by a common one.
+/// The extension of each output selects its format: .bvh (cm, y up, facing +z, T-pose at rest), .fbx (binary 7.4) and
+/// .glb (skinned avatar with the motion), .vrm (avatar only, VRM 1.0), .vrma (motion for VRM avatars), .json, .npz,
+/// .npy and .txt (joints of the figure), .mp4 (video).
 ///
-/// What is smoothed away is noise: its amount is measured for every bone, and where there is none a motion changes by no
-/// more than a few millimetres. Limits of elbow, forearm, wrist and every finger joint are those of captured people; every
-/// clamp is counted.
+/// Head and trunk follow the detected face, shoulders and hips where 2D keypoints are available: those of the dataset
+/// or run, or of --keypoints. Otherwise they stay at rest. Bone lengths and palm shapes are medians over the motion;
+/// a palm that does not point along its hand is replaced by that of the other hand, or else by a standard one.
+///
+/// Smoothing removes noise that is estimated for each bone; motion without noise changes by a few millimetres at
+/// most. The limits of elbow, forearm, wrist and finger joints were measured on captured people; the report counts
+/// every clamped angle.
 #[derive(clap::Args)]
 pub struct Args {
-    /// A motion, or a folder of them.
+    /// Motion to convert, or a folder of motions.
     #[arg(value_name = "IN")]
     input: PathBuf,
-    /// What to write; may be given several times. With --format: one folder.
-    #[arg(long, value_name = "FILE|FOLDER", required = true, num_args = 1..)]
+    /// File to write; may be repeated. With --format: a single output folder.
+    #[arg(long, value_name = "FILE|DIR", required = true, num_args = 1..)]
     out: Vec<PathBuf>,
-    /// Write every motion of IN into the folder --out, in these formats: bvh,fbx,glb,json,mp4,npy,npz,txt,vrm,vrma
-    #[arg(long, value_name = "ENDING", value_delimiter = ',')]
+    /// Write every motion of IN into the folder --out in these formats, separated by commas:
+    /// bvh,fbx,glb,json,mp4,npy,npz,txt,vrm,vrma
+    #[arg(long, value_name = "EXTENSION", value_delimiter = ',')]
     format: Vec<String>,
-    /// Of a dataset: the sample of this key.
+    /// Key of the sample, if IN is a dataset.
     #[arg(long, value_name = "KEY")]
     sample: Option<String>,
-    /// Of a dataset: only this part.
+    /// Convert only this split, if IN is a dataset.
     #[arg(long, value_name = "train|validation|test", value_parser = split, conflicts_with = "sample")]
     split: Option<Split>,
     #[command(flatten)]
     figure: FigureArgs,
     #[command(flatten)]
     retarget: RetargetArgs,
-    /// Keypoints of the same frames (`body` [T, 17, 3], COCO), from which head and trunk are turned.
+    /// 2D keypoints of the same frames (`body` [T, 17, 3], COCO) from which the rotations of head and trunk are
+    /// derived.
     #[arg(long, value_name = "FILE.npz", conflicts_with = "format")]
     keypoints: Option<PathBuf>,
-    /// Sound of a film; without: that of the dataset or of the run that the motion is from.
+    /// Audio of an .mp4 output; defaults to that of the dataset or run that contains the motion.
     #[arg(long, value_name = "FILE", conflicts_with = "format")]
     audio: Option<PathBuf>,
-    /// What a film shows beside the figure: the video it was taken from, whose sound it has where there is no other, or
-    /// another motion (.npy, .txt, .npz, .bvh), put on a figure in the same way.
+    /// Second panel of an .mp4 output: the source video, whose audio is used if there is no other, or another motion
+    /// (.npy, .txt, .npz, .bvh), which is converted in the same way.
     #[arg(long, value_name = "FILE", conflicts_with = "format")]
     beside: Option<PathBuf>,
-    /// The second of the video beside, at which the motion begins.
+    /// Time in the video of --beside at which the motion begins, seconds.
     #[arg(long, value_name = "SECS", default_value_t = 0.0, requires = "beside")]
     beside_from: f64,
-    /// What the two motions of --beside are called, such as `prediction truth`; without: their files' names.
-    #[arg(long, value_names = ["OURS", "OTHER"], num_args = 2, requires = "beside")]
+    /// Labels of the two motions with --beside, such as `prediction truth`; default to the file names.
+    #[arg(long, value_names = ["FIRST", "SECOND"], num_args = 2, requires = "beside")]
     labels: Option<Vec<String>>,
     #[command(flatten)]
     film: FilmArgs,
-    /// Frames a second of a .npy or .txt that does not say them; without: 15. An error where the file says another rate.
+    /// Frame rate of a .npy or .txt input that does not state one; defaults to 15. It is an error if the file states
+    /// another rate.
     #[arg(long, value_name = "RATE")]
     in_fps: Option<FrameRate>,
     #[command(flatten)]
     body: BodyArgs,
     #[command(flatten)]
     smoothing: SmoothingArgs,
-    /// Leave every joint as it was, possible or not.
+    /// Do not limit joint angles.
     #[arg(long)]
     no_constraints: bool,
-    /// Whether the four fingers curl within 10 degrees of their mean, as Rebol et al. (2021) have it; a pointing finger is
-    /// then bent with the others.
+    /// Limit the curl of each of the four fingers to within 10 degrees of their mean, as in Rebol et al. (2021); this
+    /// also bends a pointing finger.
     #[arg(long, value_name = "on|off", default_value = "off", conflicts_with = "no_constraints", action = ArgAction::Set,
           value_parser = BoolishValueParser::new())]
     curl_coherence: bool,

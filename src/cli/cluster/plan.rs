@@ -22,26 +22,26 @@ use std::path::{Path, PathBuf};
 
 /// Write a plan for cluster workers, with time estimates.
 ///
-/// Every video is read once for the hash of its content, unless that is known: workers do not work on one that changed since.
-/// The stages are timed on excerpts of the videos, on this machine, which should be idle; the times are kept until
-/// program, settings, models or machine change. The plan is what `orator work` and `orator submit` go by.
+/// `orator work` and `orator submit` read the plan. Each video is hashed unless its hash is known; workers refuse a
+/// video that changes afterwards. The stages are timed on excerpts of the videos on this machine, which should be
+/// idle. The times are saved and reused until the program, the settings, the models or the machine change.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     #[command(flatten)]
     config: ConfigArgs,
-    /// The plan; default: plan.json in the work folder.
+    /// Plan file to write; defaults to plan.json in the work folder.
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Say how long so many workers take.
+    /// Print the estimated duration with this number of workers.
     #[arg(long, value_name = "N")]
     workers: Option<usize>,
-    /// Say how many workers are done within so many hours.
-    #[arg(long, value_name = "H")]
+    /// Print the number of workers needed to finish within this number of hours.
+    #[arg(long, value_name = "HOURS")]
     hours: Option<f64>,
-    /// Length of the pieces in which workers share a long video.
+    /// Length of the pieces into which a long video is split for workers, minutes.
     #[arg(long, value_name = "MINUTES", default_value_t = PIECE_SECS / 60.0)]
     piece: f64,
-    /// Take no time, and say no hours.
+    /// Do not time the stages, and print no estimates.
     #[arg(long, conflicts_with_all = ["workers", "hours"])]
     untimed: bool,
 }

@@ -33,90 +33,96 @@ enum To {
 /// Default time limit of a worker if the work was not timed, hours.
 const UNKNOWN_HOURS: f64 = 12.0;
 
-/// What every kind of job needs.
+/// Options of every kind of job.
 #[derive(clap::Args)]
 struct JobArgs {
-    /// The plan, of `orator plan`.
+    /// Plan written by `orator plan`.
     #[arg(long, value_name = "FILE")]
     plan: PathBuf,
     /// Number of workers.
     #[arg(long, value_name = "N", default_value_t = 16)]
     tasks: usize,
-    /// Most workers at a time; default: all.
+    /// Maximum number of workers that run at the same time; defaults to all.
     #[arg(long, value_name = "N")]
     at_once: Option<usize>,
-    /// Processor cores of a worker, each with a video of its own.
+    /// CPU cores per worker; each core processes one video.
     #[arg(long, value_name = "N", default_value_t = 1)]
     cores: usize,
-    /// Memory of a worker, GiB; default: 1.5 for each core.
+    /// Memory per worker, GiB; defaults to 1.5 per core.
     #[arg(long, value_name = "GIB")]
     memory: Option<f64>,
-    /// Longest time of a worker, hours; default: twice what the plan foretells for so many workers, and half an hour; 12
-    /// where it was not timed.
+    /// Time limit of a worker, hours; defaults to twice the estimate of the plan plus half an hour, or to 12 without
+    /// an estimate.
     #[arg(long, value_name = "HOURS")]
     hours: Option<f64>,
-    /// The program, where the machines of the cluster see it; default: this one.
+    /// Path of the program on the machines of the cluster; defaults to the path of this program.
     #[arg(long, value_name = "FILE")]
     program: Option<PathBuf>,
-    /// Write and print the jobs, and send nothing.
+    /// Write and print the jobs, but do not submit them.
     #[arg(long)]
     dry_run: bool,
 }
 
-/// An array of workers, a job after it that makes the datasets and verifies them, and with --train a training of each
-/// speaker after that.
+/// Submit a Slurm job array of workers.
+///
+/// A second job builds and verifies the datasets after the workers. With --train, further jobs then train a model of
+/// each speaker.
 #[derive(clap::Args)]
 struct SlurmArgs {
     #[command(flatten)]
     job: JobArgs,
-    /// Train a model of each speaker when the datasets are made: `orator train gan`, queued again until it has ended.
+    /// Train a model of each speaker after the datasets are built: `orator train gan`, requeued until it is complete.
     #[arg(long)]
     train: bool,
-    /// Processor cores of a training.
+    /// CPU cores of a training job.
     #[arg(long, value_name = "N", default_value_t = 4, requires = "train")]
     train_cores: usize,
-    /// Memory of a training, GiB.
+    /// Memory of a training job, GiB.
     #[arg(long, value_name = "GIB", default_value_t = 4.0, requires = "train")]
     train_memory: f64,
-    /// Time after which a training writes a checkpoint and is queued again, hours.
+    /// Time after which a training job writes a checkpoint and is requeued, hours.
     #[arg(long, value_name = "HOURS", default_value_t = 12.0, requires = "train")]
     train_hours: f64,
-    /// Longest array; default: what `scontrol show config` says.
+    /// Maximum size of a job array; defaults to what `scontrol show config` reports.
     #[arg(long, value_name = "N")]
     max_array: Option<usize>,
-    /// One more line for `#SBATCH`, like --partition=long; may be given several times.
+    /// Additional `#SBATCH` option, such as --partition=long; may be repeated.
     #[arg(long = "sbatch", value_name = "OPTION", allow_hyphen_values = true)]
     options: Vec<String>,
 }
 
-/// An Indexed Job of workers, and a Job that makes the datasets and verifies them.
+/// Submit a Kubernetes Indexed Job of workers.
+///
+/// A second Job builds and verifies the datasets.
 #[derive(clap::Args)]
 struct KubernetesArgs {
     #[command(flatten)]
     job: JobArgs,
-    /// Image that holds the program.
+    /// Container image that contains the program.
     #[arg(long, value_name = "IMAGE")]
     image: String,
     /// Namespace of the jobs.
     #[arg(long, value_name = "NAME", default_value = "default")]
     namespace: String,
-    /// Claim of the volume that holds the project, writable by every node.
+    /// PersistentVolumeClaim of the volume that contains the project; all nodes must be able to write to it.
     #[arg(long, value_name = "NAME")]
     claim: String,
-    /// Make the claim too, of so many GiB.
+    /// Also create the claim, with this size, GiB.
     #[arg(long, value_name = "GIB")]
     claim_size: Option<u64>,
-    /// Where the volume is mounted, a folder above plan, videos and work.
+    /// Mount point of the volume: a folder that contains the plan, the videos and the work folder.
     #[arg(long, value_name = "DIR")]
     mount: String,
 }
 
-/// A worker on each machine, over ssh. This waits for all of them.
+/// Start a worker on each host over SSH.
+///
+/// The command waits until all workers have ended.
 #[derive(clap::Args)]
 struct SshArgs {
     #[command(flatten)]
     job: JobArgs,
-    /// The machines, as ssh names them.
+    /// Host names, as passed to ssh.
     #[arg(required = true, value_name = "HOST")]
     hosts: Vec<String>,
 }

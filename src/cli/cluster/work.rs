@@ -13,31 +13,35 @@ use std::time::Duration;
 
 /// Process units of a plan, alongside other workers.
 ///
-/// Each worker claims one video after the other. What a dead worker had in its hands is taken over; a slow one keeps it.
-/// SIGTERM or Ctrl-C ends a worker after the unit at hand, a second one at once; the same command goes on from there.
-/// A video that changed since the plan was written is not worked on. Exit code 2 says that some units failed, or cannot be
-/// claimed.
+/// Workers may run on any machine that sees the same folders. Each claims one unit at a time; units of a dead worker
+/// are taken over, those of a slow one are not. A video that changed since the plan was written is refused. The first
+/// SIGTERM or Ctrl-C stops the worker after the current unit, the second immediately; the same command continues the
+/// work.
+///
+/// Exit code 2: units failed or could not be claimed.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The plan, of `orator plan`.
+    /// Plan written by `orator plan`.
     #[arg(long, value_name = "FILE")]
     plan: PathBuf,
-    /// Units worked on side by side; 0: one a processor core.
+    /// Number of units processed in parallel; 0 uses one per CPU core.
     #[arg(long, value_name = "N", default_value_t = 1)]
     jobs: usize,
-    /// Only this share of the units, for arrays with fixed shares: I of N, from 0.
+    /// Process only part I of N of the units, I from 0 to N - 1, for job arrays with a fixed partition.
     #[arg(long, value_name = "I/N", value_parser = shard)]
     shard: Option<(usize, usize)>,
-    /// Work on units again that had failed.
+    /// Retry units that failed.
     #[arg(long)]
     retry: bool,
-    /// End when the rest is in the hands of others, and do not wait whether they die.
+    /// Exit when all remaining units are claimed by other workers, instead of waiting to take over those of dead
+    /// workers.
     #[arg(long)]
     no_wait: bool,
-    /// Seconds between two signs of life.
+    /// Interval between heartbeats, seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 15.0)]
     beat: f64,
-    /// Seconds without a sign of life after which another worker is dead. More than a network file system caches.
+    /// Time without a heartbeat after which another worker counts as dead, seconds; must exceed the cache time of the
+    /// network file system.
     #[arg(long, value_name = "SECONDS", default_value_t = DEAD_AFTER.as_secs_f64())]
     dead_after: f64,
 }

@@ -17,23 +17,25 @@ const SHOWN: usize = 8;
 
 /// Find the word times of an English transcript by forced alignment.
 ///
-/// For transcripts with times of sentences only (.srt, .vtt, ...), or plain text (.txt). Times that are there say where
-/// a word is looked for, 5 s around. English alone: the acoustic model and the dictionary are those of US English in the
-/// Python package pocketsphinx, which `orator doctor` tells how to get. A word that does not fit the sound (not said,
-/// said otherwise, of another language) keeps its place in the text and is marked: `source` is `interpolated`,
-/// `confidence` 0. A text of which less than a quarter fits is refused.
+/// The transcript has sentence times only (.srt, .vtt, ...) or none (.txt). Given times limit the search for a word
+/// to 5 s around them. Only English is supported: the acoustic model and the dictionary are those for US English in
+/// the Python package pocketsphinx; `orator doctor` prints how to install it.
+///
+/// A word that does not match the audio (not spoken, pronounced differently, in another language) keeps its position
+/// in the text and is marked: `source` is `interpolated`, `confidence` is 0. A transcript of which less than a
+/// quarter matches is rejected.
 #[derive(clap::Args)]
 pub struct Args {
-    /// The sound: wav, flac, mp3, a video.
+    /// Audio file: wav, flac, mp3, or a video.
     #[arg(value_name = "SOUND")]
     sound: PathBuf,
-    /// The transcript, as `orator guide dataset` names them.
+    /// Transcript file, in a format listed in `orator guide dataset`.
     #[arg(value_name = "TRANSCRIPT")]
     transcript: PathBuf,
-    /// The words with their times to write; called like the video, `orator run` finds it.
+    /// File of timed words to write; `orator run` finds it if it has the file name of the video.
     #[arg(long, value_name = "FILE.words.json")]
     out: PathBuf,
-    /// The Python that has pocketsphinx, instead of the one that ORATOR_PYTHON names, else python3.
+    /// Python interpreter with pocketsphinx; defaults to $ORATOR_PYTHON, else python3.
     #[arg(long, value_name = "PROGRAM")]
     python: Option<PathBuf>,
 }

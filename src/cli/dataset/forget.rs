@@ -16,27 +16,28 @@ use std::path::{Path, PathBuf};
 
 /// Remove everything derived from a video or a speaker.
 ///
-/// Goes through the stages' files, the dataset (shards, statistics, index, ledger, card, checksums), trained models (a
-/// model cannot unlearn), plans of `orator plan` and the table of hashes; the other videos' shards stay byte for byte. Then every file under the
-/// work folder is searched for the video's names and hashes. Exit code 1 says that something was found. The video file
-/// itself, and copies elsewhere, are yours to delete.
+/// This covers the files of the stages, the dataset (shards, statistics, index, ledger, card, checksums), trained
+/// models (a model cannot unlearn), plans of `orator plan` and the hash table. Shards of other videos stay unchanged
+/// byte for byte. Afterwards every file in the work folder is searched for names and hashes of the video.
+///
+/// The video file itself and copies elsewhere are not deleted. Exit code 1: the search found something.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
     config: ConfigArgs,
-    /// The video: its path, its file's name, or its work name.
+    /// Video, given by its path, file name or work name.
     #[arg(long, value_name = "NAME|FILE", required_unless_present = "speaker")]
     video: Option<String>,
-    /// The speaker of the video; without a video, everything of the speaker goes.
+    /// Speaker of the video; without --video everything of the speaker is removed.
     #[arg(long, value_name = "NAME")]
     speaker: Option<String>,
-    /// Forget in this dataset's folder alone; no configuration is read.
+    /// Remove the video from this dataset folder only; no configuration is read.
     #[arg(long, value_name = "DIR", requires = "video", conflicts_with_all = ["speaker", "keep_models"])]
     dataset: Option<PathBuf>,
-    /// Keep the models trained with it, and name them.
+    /// Do not remove models trained on the video, but list them.
     #[arg(long)]
     keep_models: bool,
-    /// Only say what would go.
+    /// List what would be removed, without removing it.
     #[arg(long)]
     dry_run: bool,
 }

@@ -19,53 +19,56 @@ use std::path::{Path, PathBuf};
 
 /// Create a dataset from motion capture and its audio.
 ///
-/// Sources are files, or folders that are searched: the authors' text clips (147 numbers a line), TED Expressive (.npz
-/// with `human_joints`), BVH, and WebDataset shards or dataset folders of this program, to merge them or to take them
-/// back. Sound (.wav, .flac, ...) and transcript (.tsv, .json, .TextGrid, .srt, .vtt, .txt) have the motion's name and lie beside it or in
-/// folders beside its own (bvh/, wav/, tsv/). Each take ends kept, refused with its reason, or failed; exit code 2 says
-/// that some failed.
+/// Each SOURCE is a file, or a folder that is searched for: text clips of Rebol et al. (2021) with 147 numbers per
+/// line, TED Expressive (.npz with `human_joints`), BVH, and WebDataset shards or dataset folders of this program, to
+/// merge or re-import them. Audio (.wav, .flac, ...) and transcript (.tsv, .json, .TextGrid, .srt, .vtt, .txt) have
+/// the file name of the motion and are in its folder or in neighbouring folders (bvh/, wav/, tsv/).
+///
+/// Each take is accepted, rejected with a reason, or failed. Exit code 2: a take failed.
 #[derive(clap::Args)]
 pub struct Args {
     /// Files or folders to import.
     #[arg(required = true, value_name = "SOURCE")]
     sources: Vec<PathBuf>,
-    /// Take only files of this kind; auto: what their contents say.
+    /// Import only files of this kind; `auto` detects it from the content.
     #[arg(long, value_enum, default_value_t = ImportKind::Auto)]
     kind: ImportKind,
-    /// Name of the speaker in the dataset.
+    /// Speaker name in the dataset: letters, digits, - and _.
     #[arg(long, value_name = "NAME")]
     speaker: String,
-    /// The dataset's folder, created anew.
+    /// Folder of the new dataset; must be empty unless --force is given.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Replace the dataset that is in the folder.
+    /// Replace an existing dataset in the folder.
     #[arg(long)]
     force: bool,
-    /// Frames a second of the dataset. Default: 15, or the rate of the first dataset among the sources.
+    /// Frame rate of the dataset, frames per second; defaults to that of the first dataset among the sources, else to
+    /// 15.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=240))]
     fps: Option<FrameRate>,
-    /// Shortest take, in frames of the dataset.
+    /// Minimum length of a take, in frames of the dataset.
     #[arg(long, default_value_t = 64, value_name = "N")]
     min_frames: usize,
-    /// Most seconds by which sound and motion may differ in length.
+    /// Maximum difference in duration between audio and motion, seconds.
     #[arg(long, default_value_t = 0.5, value_name = "SECS")]
     max_apart: f64,
-    /// Take silent captures: sound is left out, silence stands in its place. Such a dataset is for lifters and evaluation.
+    /// Import captures without audio: audio files are ignored and silence is stored instead. Such a dataset is for
+    /// lifters and evaluation.
     #[arg(long, conflicts_with = "max_apart")]
     no_sound: bool,
-    /// Share of the takes for validation, by their content.
-    #[arg(long, default_value_t = 0.15, value_name = "SHARE")]
+    /// Fraction of the takes for validation, 0 to 0.9; takes are assigned by a hash of their content.
+    #[arg(long, default_value_t = 0.15, value_name = "FRACTION")]
     validation: f64,
-    /// Share of the takes for test, by their content.
-    #[arg(long, default_value_t = 0.15, value_name = "SHARE")]
+    /// Fraction of the takes for test, 0 to 0.9; takes are assigned by a hash of their content.
+    #[arg(long, default_value_t = 0.15, value_name = "FRACTION")]
     test: f64,
-    /// Identifier of the licence, for the dataset's card.
+    /// Licence identifier, for the dataset card.
     #[arg(long, default_value = "", value_name = "ID")]
     licence: String,
-    /// How the speaker agreed, for the dataset's card.
+    /// Consent of the speaker, for the dataset card.
     #[arg(long, default_value = "", value_name = "TEXT")]
     consent: String,
-    /// Where the motion comes from, for the dataset's card.
+    /// Origin of the motion, for the dataset card.
     #[arg(long, default_value = "", value_name = "TEXT")]
     source: String,
 }

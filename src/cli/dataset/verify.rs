@@ -21,19 +21,20 @@ pub struct Args {
 
 #[derive(clap::Subcommand)]
 enum DatasetVerb {
-    /// Check the dataset: files, sizes, counts, sums, and that every second of every video is accounted for.
+    /// Verify files, sizes, counts and checksums of a dataset.
     ///
-    /// Exit code 1 says that something is not as it was written.
+    /// Every second of every video must also be accounted for. Exit code 1: the dataset differs from what was
+    /// written.
     Verify {
-        /// The dataset's folder, work/dataset/SPEAKER.
+        /// Dataset folder, such as work/dataset/SPEAKER.
         dir: PathBuf,
-        /// Read everything: every hash, every array's shape and numbers, every bone's length.
+        /// Read everything: check all hashes, shapes and values of arrays, and bone lengths.
         #[arg(long)]
         deep: bool,
     },
-    /// Show what the dataset holds: splits, hours, what was refused and why, each video.
+    /// Describe a dataset: splits, hours, rejected seconds by reason, and each video.
     Info {
-        /// The dataset's folder, work/dataset/SPEAKER.
+        /// Dataset folder, such as work/dataset/SPEAKER.
         dir: PathBuf,
     },
 }

@@ -26,9 +26,12 @@ use std::path::PathBuf;
 
 /// Measure predicted motion against the ground truth and baselines.
 ///
-/// Files or folders of motion (.npy, .npz, the authors' .txt, .bvh), or checkpoints on a split of a dataset. Beside each
-/// figure stands the same for poses that never move, the nearest neighbour, mismatched motion and the truth itself; with its
-/// 95 % interval, and a plain sentence: is it better than doing nothing, and does it hear?
+/// The prediction is a file or folder of motion (.npy, .npz, .txt of Rebol et al. 2021, .bvh), or the output of
+/// checkpoints on a split of a dataset.
+///
+/// Each metric is printed with its 95 % confidence interval, next to the values of the baselines: static poses,
+/// nearest neighbour, mismatched motion, and the ground truth itself. A summary states whether the prediction is
+/// better than a static pose and whether it depends on the audio.
 #[derive(clap::Args)]
 #[command(args_conflicts_with_subcommands = true)]
 pub struct Args {
@@ -49,42 +52,42 @@ enum What {
 
 #[derive(clap::Args)]
 struct MotionArgs {
-    /// The real motion: a file, or a folder of files that are paired by name.
+    /// Ground-truth motion: a file, or a folder of files that are paired by name.
     #[arg(long, value_name = "PATH")]
     truth: Option<PathBuf>,
-    /// The predicted motion of the same sound: a file or a folder (it may be the same one: gt_interval_7.txt belongs to
-    /// prediction_interval_7.txt).
+    /// Predicted motion for the same audio: a file or a folder. Both may be in one folder: gt_interval_7.txt is
+    /// paired with prediction_interval_7.txt.
     #[arg(long, value_name = "PATH", requires = "truth")]
     prediction: Option<PathBuf>,
-    /// The sound, a file or a folder: for the beats, and for the nearest neighbour.
+    /// Audio file or folder, for beat metrics and the nearest neighbour.
     #[arg(long, value_name = "PATH", requires = "truth")]
     audio: Option<PathBuf>,
-    /// Frames a second of files that do not say it themselves (.npy, .txt), like 15 or 30000/1001 [default: 15]
+    /// Frame rate of files that do not state one (.npy, .txt), such as 15 or 30000/1001; defaults to 15.
     #[arg(long, value_name = "RATE", requires = "truth")]
     fps: Option<FrameRate>,
-    /// Instead of files: a dataset, a folder of `orator run` or `orator import`.
+    /// Dataset folder of `orator run` or `orator import`, instead of files.
     #[arg(long, value_name = "DIR", conflicts_with = "truth", requires = "checkpoint")]
     dataset: Option<PathBuf>,
-    /// Checkpoints of `orator train gan` and `orator train seq2seq`, or their folders (the best checkpoint, else the newest,
-    /// is taken): all in one table.
-    #[arg(long, value_name = "FILE|FOLDER", requires = "dataset", num_args = 1..)]
+    /// Checkpoints of `orator train gan` and `orator train seq2seq`, or their folders (the best checkpoint is used,
+    /// else the newest); all are reported in one table.
+    #[arg(long, value_name = "FILE|DIR", requires = "dataset", num_args = 1..)]
     checkpoint: Vec<PathBuf>,
-    /// Which intervals of the dataset: validation, test or train.
+    /// Split of the dataset: train, validation or test.
     #[arg(long, value_name = "SPLIT", default_value = "validation", value_parser = split)]
     split: Split,
-    /// Whose definitions: orator, speech2gesture, genea, emage, trimodal or aist.
+    /// Metric definitions: orator, speech2gesture, genea, emage, trimodal or aist.
     #[arg(long, value_name = "NAME", default_value = "orator", value_parser = convention)]
     convention: Convention,
-    /// Shares of the pose's extent for correct keypoints (PCK).
-    #[arg(long, value_name = "SHARE", num_args = 1.., default_values_t = [0.2, 0.1])]
+    /// PCK thresholds, as fractions of the extent of the pose.
+    #[arg(long, value_name = "FRACTION", num_args = 1.., default_values_t = [0.2, 0.1])]
     alpha: Vec<f64>,
-    /// Also give errors and speeds over all 49 joints, the neck included, which stands still.
+    /// Also report errors and speeds over all 49 joints, including the static neck.
     #[arg(long)]
     with_neck: bool,
-    /// Print every figure, those of arms, fingers and wrists too (--json and the page have all of them).
+    /// Print all metrics, including those of arms, fingers and wrists (--json and --report always contain them).
     #[arg(long)]
     all: bool,
-    /// Also write one HTML page: the table, plots, and truth and prediction playing side by side with the sound.
+    /// Also write an HTML page with the table, plots, and truth and prediction played side by side with the audio.
     #[arg(long, value_name = "PAGE.html")]
     report: Option<PathBuf>,
 }
@@ -168,16 +171,18 @@ fn evaluation(args: &MotionArgs, store: &MotionStore, ui: &Ui) -> Result<Evaluat
     Evaluation::from_files(truth, prediction, args.audio.as_deref(), args.fps, store, ui)
 }
 
-/// Put two results side by side, and refuse what is not comparable.
+/// Compare two results, and refuse values that are not comparable.
 ///
-/// Each value of a result holds the hash of its definition and parameters. Values of one hash are shown beside each other;
-/// of a metric whose hashes differ it is said in which parameters, and the exit code is 1.
+/// Each value of a result has a hash of its definition and parameters. Values with equal hashes are printed next to
+/// each other; for a metric whose hashes differ, the differing parameters are printed.
+///
+/// Exit code 1: a metric was refused.
 #[derive(clap::Args)]
 struct CompareArgs {
-    /// What `orator evaluate --json` wrote.
+    /// JSON output of `orator evaluate --json`.
     #[arg(value_name = "A.json")]
     a: PathBuf,
-    /// Another one.
+    /// JSON output to compare with.
     #[arg(value_name = "B.json")]
     b: PathBuf,
 }

@@ -20,57 +20,60 @@ use std::path::PathBuf;
 
 /// Generate motion from speech with a trained model.
 ///
-/// The sound may be a wav, flac or mp3 file or the sound of a video, of any length. The ending of each output file
-/// chooses what is written: .npy (joints [frames, 49, 3], metres), .txt (the layout of Rebol et al. 2021), .bvh (bone
-/// rotations, cm, y up, facing +z), .fbx and .glb (a skinned avatar with the motion), .vrm (the avatar alone) and .vrma (the
-/// motion for avatars of VRM), .json (joints and rotations), .mp4 (a film of the figure with the sound).
+/// The audio is a wav, flac or mp3 file or a video, of any length. The extension of each output selects its format:
+/// .npy (joints [frames, 49, 3], metres), .txt (layout of Rebol et al. 2021), .bvh (bone rotations; cm, y up, facing
+/// +z), .fbx and .glb (skinned avatar with the motion), .vrm (avatar only), .vrma (motion for VRM avatars), .json
+/// (joints and rotations), .mp4 (video of the avatar with the audio).
 ///
-/// Many sounds at once: --audio-folder (everything that sounds below it) or --batch (a table, columns `audio`, `out`,
-/// `checkpoint` and `transcript`, of which the first is needed and paths count from the table's folder), with --out-folder
-/// and --format. What is there already from the same sound, transcript and checkpoint is not made again; a sound that fails
-/// does not stop the others (exit code 2).
+/// To process many files, give --out-folder and --format with --audio-folder (all audio files in a folder and its
+/// subfolders) or --batch (a CSV table with the column `audio` and optionally `out`, `checkpoint` and `transcript`;
+/// paths are relative to the table). Outputs of the same audio, transcript and checkpoint are not regenerated. A
+/// failed file does not stop the others. Exit code 2: a file failed.
 #[derive(clap::Args)]
 pub struct Args {
-    /// A checkpoint of `orator train gan` or `orator train seq2seq`, or its folder (the best checkpoint, else the newest, is taken).
-    #[arg(long, value_name = "FILE|FOLDER", required_unless_present = "batch")]
+    /// Checkpoint of `orator train gan` or `orator train seq2seq`, or its folder (the best checkpoint is used, else
+    /// the newest).
+    #[arg(long, value_name = "FILE|DIR", required_unless_present = "batch")]
     checkpoint: Option<PathBuf>,
-    /// The speech.
+    /// Audio file with the speech.
     #[arg(long, value_name = "FILE", required_unless_present_any = ["audio_folder", "batch"], requires = "out")]
     audio: Option<PathBuf>,
-    /// What is said in it, with times, for a network that reads words (.tsv, .json, .TextGrid, .ctm, .srt, .vtt). For many
-    /// sounds a folder of files with their names; left out, those beside the sounds are taken.
-    #[arg(long, value_name = "FILE|FOLDER")]
+    /// Timed transcript for a model that uses words (.tsv, .json, .TextGrid, .ctm, .srt, .vtt); for many audio files,
+    /// a folder of transcripts with the same file names. Defaults to the files next to the audio when many files are
+    /// processed.
+    #[arg(long, value_name = "FILE|DIR")]
     transcript: Option<PathBuf>,
-    /// Who is to speak, of a network of several speakers.
+    /// Speaker, for a model of several speakers.
     #[arg(long, value_name = "NAME", requires = "audio")]
     speaker: Option<String>,
-    /// Let a sequence-to-sequence network keep its decoder's state from one segment to the next.
+    /// Keep the decoder state of a sequence-to-sequence network across segments.
     #[arg(long)]
     carry_state: bool,
-    /// Another take of the speech: a number, of which each gives other motion and the same one always the same.
+    /// Seed of a variant of the motion: another seed gives other motion, equal seeds give equal motion.
     #[arg(long, value_name = "N", requires = "audio")]
     seed: Option<u64>,
-    /// So many different takes, of the seeds from --seed (or 1) on: `motion.bvh` becomes `motion-1.bvh`, `motion-2.bvh`, ...
+    /// Number of variants, with consecutive seeds from --seed (or 1): `motion.bvh` becomes `motion-1.bvh`,
+    /// `motion-2.bvh`, ...
     #[arg(long, value_name = "K", requires = "audio", value_parser = clap::value_parser!(u64).range(1..=1000))]
     variants: Option<u64>,
-    /// What to write; may be given several times.
+    /// File to write; may be repeated.
     #[arg(long, value_name = "FILE", num_args = 1.., requires = "audio")]
     out: Vec<PathBuf>,
     #[command(flatten)]
     figure: FigureArgs,
-    /// Speech in every file below this folder.
+    /// Folder that is searched recursively for audio files.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["audio", "batch"], requires = "out_folder")]
     audio_folder: Option<PathBuf>,
-    /// A table (.csv) of speech.
+    /// CSV table of audio files.
     #[arg(long, value_name = "FILE", conflicts_with = "audio", requires = "out_folder")]
     batch: Option<PathBuf>,
-    /// Where many motions go.
+    /// Output folder for --audio-folder and --batch.
     #[arg(long, value_name = "DIR", conflicts_with = "audio")]
     out_folder: Option<PathBuf>,
-    /// What many motions are written as: endings, divided by commas.
-    #[arg(long, value_name = "ENDINGS", value_delimiter = ',', default_value = "bvh", conflicts_with = "audio")]
+    /// Formats to write for --audio-folder and --batch: file extensions, separated by commas.
+    #[arg(long, value_name = "EXTENSION", value_delimiter = ',', default_value = "bvh", conflicts_with = "audio")]
     format: Vec<String>,
-    /// Make many motions again even where nothing changed.
+    /// Regenerate outputs of --audio-folder and --batch that are up to date.
     #[arg(long, conflicts_with = "audio")]
     again: bool,
 }

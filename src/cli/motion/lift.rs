@@ -21,45 +21,50 @@ use std::time::Instant;
 
 /// Lift 2D keypoints to 3D joints.
 ///
-/// KEYPOINTS is ours or another program's: a folder of OpenPose (a JSON file a frame), JSON of MMPose, AlphaPose or
-/// COCO-WholeBody, arrays of MediaPipe or PATS (.npy, .npz); the kind is told by the content. Ours is a .npz that holds `body` [T,17,3] (COCO-17; x px, y px, score) and, if known, `left_hand` and `right_hand`
-/// [T,21,3] (wrist, then thumb to little finger, each base to tip), `fps` and `image_size`. JOINTS.npz
-/// holds `pose3d`, `mask` and `fps`; JOINTS.npy the joints alone, with the rate in JOINTS.npy.json beside it. Joints are
-/// float32 [T,49,3]: metres, x image right, y down, z away from the camera, the neck at the origin; neck, right arm,
-/// left arm, left hand, right hand. A joint not seen for up to a second is filled; one missing for longer is NaN. Legs,
-/// face, hips or hands may be missing throughout; both shoulders must be seen now and then. A nose that is missing is
-/// taken from the eyes (15 % of the way from them to the neck) or the ears.
+/// KEYPOINTS is one of: a folder of OpenPose (one JSON file per frame); JSON of MMPose, AlphaPose or COCO-WholeBody;
+/// arrays of MediaPipe or PATS (.npy, .npz); or the .npz of this program. The format is detected from the content.
+/// The .npz of this program holds `body` [T,17,3] (COCO-17; x px, y px, score) and optionally `left_hand` and
+/// `right_hand` [T,21,3] (wrist, then thumb to little finger, each from base to tip), `fps` and `image_size`.
+///
+/// JOINTS.npz holds `pose3d`, `mask` and `fps`; JOINTS.npy holds the joints only, with the frame rate in
+/// JOINTS.npy.json. Joints are float32 [T,49,3] in metres, x right in the image, y down, z away from the camera, the
+/// neck at the origin; order: neck, right arm, left arm, left hand, right hand.
+///
+/// Gaps of up to one second in a joint are filled; longer gaps are NaN. Legs, face, hips or hands may be missing in
+/// all frames; both shoulders must be detected in some. A missing nose is derived from the eyes (15 % of the way from
+/// them to the neck) or from the ears.
 #[derive(clap::Args)]
 pub struct Args {
-    /// The keypoints.
+    /// File or folder of 2D keypoints.
     #[arg(value_name = "KEYPOINTS")]
     keypoints: PathBuf,
-    /// Frames a second of the keypoints, in place of what the file says.
-    #[arg(long)]
+    /// Frame rate of the keypoints, frames per second; defaults to what the file states.
+    #[arg(long, value_name = "RATE")]
     fps: Option<FrameRate>,
-    /// Width and height in pixels of the picture, like 1280x720; coordinates in 0..1 are shares of it.
+    /// Width and height of the image, pixels, such as 1280x720; coordinates from 0 to 1 are multiplied by it.
     #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size)]
     size: Option<[u32; 2]>,
-    /// The joints to write: .npz, .npy or .txt.
+    /// File of 3D joints to write: .npz, .npy or .txt.
     #[arg(long, value_name = "JOINTS.npz")]
     out: PathBuf,
-    /// Also write nose, right hip, left hip, float32 [T,3,3], metres about the neck; NaN where not seen for a second.
+    /// Also write nose, right hip and left hip: float32 [T,3,3], metres relative to the neck; NaN in gaps longer than
+    /// one second.
     #[arg(long, value_name = "FILE.npy")]
     extra: Option<PathBuf>,
-    /// Turn the motion as if the camera had been level and the speaker's torso upright on average.
+    /// Rotate the motion so that the camera is level and the torso is upright on average.
     #[arg(long)]
     level: bool,
-    /// Weights of `orator-lab train lifter --part body`; without: the built-in ones.
+    /// Weights written by `orator-lab train lifter --part body`; defaults to the built-in ones.
     #[arg(long, value_name = "FILE")]
     body_weights: Option<PathBuf>,
-    /// Weights of `orator-lab train lifter --part hands`; without: the built-in ones.
+    /// Weights written by `orator-lab train lifter --part hands`; defaults to the built-in ones.
     #[arg(long, value_name = "FILE")]
     hand_weights: Option<PathBuf>,
-    /// Width of the Gaussian that smooths arms, in frames at 15 fps; 0: none.
-    #[arg(long, default_value_t = config::LiftConfig::default().smooth_arms)]
+    /// Standard deviation of the Gaussian that smooths the arms, in frames at 15 fps; 0 disables it.
+    #[arg(long, value_name = "FRAMES", default_value_t = config::LiftConfig::default().smooth_arms)]
     smooth_arms: f64,
-    /// Width of the Gaussian that smooths hands, in frames at 15 fps; 0: none.
-    #[arg(long, default_value_t = config::LiftConfig::default().smooth_hands)]
+    /// Standard deviation of the Gaussian that smooths the hands, in frames at 15 fps; 0 disables it.
+    #[arg(long, value_name = "FRAMES", default_value_t = config::LiftConfig::default().smooth_hands)]
     smooth_hands: f64,
 }
 

@@ -24,34 +24,38 @@ use std::path::{Path, PathBuf};
 
 /// Draw contact sheets: picture, keypoints and 3D pose.
 ///
-/// Of the videos of a run (`-c`), once they are lifted; or of loose files (`--video`, `--keypoints`, `--joints`). A
-/// moment every second; the grid is 0.1 m, the neck at its axes; a strip shows height and depth of the wrists. Beside
-/// each sheet its figures are printed: spread of bone lengths, shake of the wrists (median second difference), depth of
-/// elbow and wrist behind their shoulder (negative: forward), length of arm bones in 3D over that in the picture.
+/// The source is the lifted videos of a run (`-c`), or separate files (`--video`, `--keypoints`, `--joints`). One
+/// pose is drawn every second, from the front and from the side; the grid spacing is 0.1 m, its axes cross at the
+/// neck. A strip shows the height and depth of the wrists.
+///
+/// For each sheet these values are printed: spread of the bone lengths, wrist jitter (median second difference),
+/// depth of elbow and wrist behind their shoulder (negative: in front of it), and the ratio of the arm bone lengths
+/// in 3D to those in the image.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
     config: ConfigArgs,
-    /// Only this speaker; may be given several times.
+    /// Draw only this speaker; may be repeated.
     #[arg(long, value_name = "NAME")]
     speaker: Vec<String>,
-    /// Of a run: only this video, by its work name or the file's name without its ending. Of loose files: the video.
+    /// With a run: draw only this video, given by its work name or its file name without extension. With separate
+    /// files: the video.
     #[arg(long, value_name = "NAME|FILE")]
     video: Option<PathBuf>,
-    /// Loose files: the keypoints of the video.
+    /// Keypoints of the video, for separate files.
     #[arg(long, value_name = "FILE.npz", requires_all = ["video", "joints"], conflicts_with = "speaker")]
     keypoints: Option<PathBuf>,
-    /// Loose files: the joints lifted from them, .npy or .npz.
+    /// Joints lifted from the keypoints, .npy or .npz, for separate files.
     #[arg(long, value_name = "FILE", requires = "keypoints")]
     joints: Option<PathBuf>,
-    /// Beside the lifted pose show the figure that `orator animate` makes of it.
+    /// Also show the figure that `orator animate` derives from the lifted pose.
     #[arg(long)]
     figure: bool,
-    /// Seconds between two moments.
+    /// Interval between two poses, seconds.
     #[arg(long, default_value_t = 1.0, value_name = "SECS")]
     every: f64,
-    /// Of loose files: the picture, .png (without: sheet.png). Of a run: the folder of the pictures (without: `sheets` in
-    /// the work folder). Where one picture does not hold all moments, they are numbered: sheet_000.png.
+    /// With separate files: the .png to write; defaults to sheet.png. With a run: the folder to write to; defaults to
+    /// `sheets` in the work folder. If the poses do not fit on one sheet, the files are numbered: sheet_000.png.
     #[arg(long, value_name = "FILE|DIR")]
     out: Option<PathBuf>,
 }

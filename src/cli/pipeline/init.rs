@@ -11,7 +11,7 @@ use std::path::PathBuf;
 /// Create a project folder with a commented pipeline.toml.
 #[derive(clap::Args)]
 pub struct Args {
-    /// The project's folder; created if it is not there.
+    /// Project folder; created if it does not exist.
     dir: PathBuf,
 }
 

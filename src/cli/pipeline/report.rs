@@ -16,19 +16,20 @@ use std::path::PathBuf;
 
 /// Write an HTML report: which seconds were accepted or rejected, and why.
 ///
-/// With a timeline of each video, the worst frames of each rule, the distributions of what was measured, sliders that say
-/// what other thresholds would keep, and how the joints move. The page needs no network and nothing beside it.
+/// The report contains a timeline of each video, the worst frames of each rule, the distributions of the measured
+/// values, sliders that show what other thresholds would accept, and statistics of the joint motion. The page is a
+/// single file and needs no network.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
     config: ConfigArgs,
-    /// Only this speaker; may be given several times.
+    /// Report only on this speaker; may be repeated.
     #[arg(long, value_name = "NAME")]
     speaker: Vec<String>,
-    /// The page; without: report.html in the work folder.
+    /// HTML page to write; defaults to report.html in the work folder.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Most pictures of a rule; 0: none, and no video is read.
+    /// Maximum number of pictures per rule; with 0 no video is read.
     #[arg(long, default_value_t = 6, value_name = "N")]
     pictures: usize,
 }

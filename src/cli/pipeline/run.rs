@@ -20,29 +20,31 @@ use serde_json::json;
 
 /// Run the pipeline: extract, pose2d, segment, lift, dataset.
 ///
-/// What is up to date is not done again: a run that was killed goes on where it was. A video that fails is reported and
-/// the others go on. Exit code 2 says that some failed, that a speaker ended with no interval, or that a dataset is made
-/// without a video: its earlier stages are not up to date, or `orator plan` listed it and it is gone.
+/// Every stage runs for every video of every speaker. Stages that are up to date are skipped, so an interrupted run
+/// continues when the same command is given again. A failed video is reported, and the others are still processed.
+///
+/// Exit code 2: a video failed, a speaker has no accepted interval, or a dataset lacks a video because its earlier
+/// stages are not up to date or because it is listed in the plan of `orator plan` but no longer exists.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
     config: ConfigArgs,
-    /// Begin with this stage.
+    /// First stage to run; defaults to extract.
     #[arg(long, value_parser = stage_parser(), value_name = "STAGE")]
     from: Option<StageName>,
-    /// End with this stage.
+    /// Last stage to run; defaults to dataset.
     #[arg(long, value_parser = stage_parser(), value_name = "STAGE")]
     to: Option<StageName>,
-    /// Run this stage alone.
+    /// Run only this stage.
     #[arg(long, value_parser = stage_parser(), value_name = "STAGE", conflicts_with_all = ["from", "to"])]
     only: Option<StageName>,
-    /// Only this speaker; may be given several times.
+    /// Process only this speaker; may be repeated.
     #[arg(long, value_name = "NAME")]
     speaker: Vec<String>,
-    /// Videos worked on side by side; 0: one a processor core. Default: work.jobs of the configuration.
+    /// Number of videos processed in parallel; 0 uses one per CPU core; defaults to `work.jobs` of the configuration.
     #[arg(long, value_name = "N")]
     jobs: Option<usize>,
-    /// Do the chosen stages again, also where they are up to date.
+    /// Run the selected stages even where they are up to date.
     #[arg(long)]
     force: bool,
 }

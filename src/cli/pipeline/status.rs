@@ -24,13 +24,15 @@ const REASONS_SHOWN: usize = 3;
 pub struct Args {
     #[command(flatten)]
     config: ConfigArgs,
-    /// Only this speaker; may be given several times.
+    /// Show only this speaker; may be repeated.
     #[arg(long, value_name = "NAME")]
     speaker: Vec<String>,
-    /// Show how far the workers of this plan are instead: who is at work, how fast, the time left, failures by reason.
+    /// Show the progress of the workers of this plan instead: active workers, speed, time left, and failures by
+    /// reason.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["config", "set", "speaker", "why"])]
     plan: Option<PathBuf>,
-    /// Say why a stage is stale, what the error was, what a stage that is up to date reported, and what a run would do.
+    /// Print why each stage is stale, its error if it failed, its report if it is up to date, and what a run would
+    /// do.
     #[arg(long)]
     why: bool,
 }

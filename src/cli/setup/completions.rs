@@ -17,26 +17,27 @@ use std::path::PathBuf;
 /// ~/.config/fish/completions/orator.fish`. zsh: `orator completions zsh > FOLDER/_orator`, with a FOLDER of `fpath`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Shell that reads the script.
+    /// Shell for which the script is printed.
     shell: Shell,
 }
 
 /// Print or write manual pages.
 ///
-/// `orator man | man -l -` shows it; `orator man ~/.local/share/man/man1` installs all, for `man orator-run`.
+/// `orator man | man -l -` shows the page of the program; `orator man ~/.local/share/man/man1` installs the pages of
+/// all verbs, for `man orator-run`.
 #[derive(clap::Args)]
 pub struct ManArgs {
-    /// Folder for `orator.1`, `orator-run.1` and all others; none: `orator.1` is printed.
+    /// Folder for `orator.1`, `orator-run.1` and all other pages; without it `orator.1` is printed.
     #[arg(value_name = "DIR")]
     dir: Option<PathBuf>,
 }
 
 /// Print a page of the guide.
 ///
-/// The pages are Markdown: `orator guide dataset | less`.
+/// Pages are Markdown, for example `orator guide dataset | less`.
 #[derive(clap::Args)]
 pub struct GuideArgs {
-    /// Page to print; none: the list.
+    /// Page to print; without it the list of pages is printed.
     #[arg(value_parser = PossibleValuesParser::new(TOPICS.map(|topic| topic.name)))]
     topic: Option<String>,
 }

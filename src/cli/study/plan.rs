@@ -12,42 +12,43 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// Say how many participants a study needs, by simulating studies and analysing them.
+/// Find the number of participants for a study, by simulation.
 ///
-/// Each simulated study draws its participants and clips anew and goes through the analysis of `orator study analyse`.
-/// Two questions are answered: how many participants find a true share other than 50 %, and how many show equivalence
-/// with 50 % where there is no difference. How much participants and clips differ has to be assumed; with 0.3 log odds one
-/// in three participants (or clips) scores below 43 or above 57 % where the mean is 50 %.
+/// Each simulated study draws new participants and clips and runs the analysis of `orator study analyse`. Two numbers
+/// are estimated: the participants needed to detect a true share other than 50 %, and the participants needed to show
+/// equivalence with 50 % if there is no difference. The variation between participants and between clips has to be
+/// assumed: with 0.3 log odds, one in three participants (or clips) scores below 43 or above 57 % if the mean is 50
+/// %.
 #[derive(clap::Args)]
 pub struct Args {
-    /// The study file, or the folder of a built study.
+    /// Study file, or folder of a built study.
     #[arg(value_name = "STUDY")]
     study: PathBuf,
-    /// Task that is planned for [default: the first one against chance]
+    /// Task to plan for; defaults to the first one with a chance level.
     #[arg(long, value_name = "NAME")]
     task: Option<String>,
-    /// Wanted power, a share.
-    #[arg(long, value_name = "SHARE", default_value_t = 0.9)]
+    /// Required statistical power, 0 to 1.
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.9)]
     power: f64,
-    /// True share that is to be found different from 50 %, percent.
+    /// True share to be detected as different from 50 %, percent.
     #[arg(long, value_name = "PERCENT", default_value_t = 55.0)]
     effect: f64,
-    /// Bound of equivalence, points of percent [default: the registered one, else 10]
+    /// Equivalence bound, percentage points; defaults to the registered one, else to 10.
     #[arg(long, value_name = "POINTS")]
     bound: Option<f64>,
-    /// How much participants differ: standard deviation, log odds; the mixed model of `orator study analyse` estimates it.
+    /// Standard deviation between participants, log odds; the mixed model of `orator study analyse` estimates it.
     #[arg(long, value_name = "SD", default_value_t = 0.3)]
     participant_sd: f64,
-    /// How much clips differ: standard deviation, log odds.
+    /// Standard deviation between clips, log odds.
     #[arg(long, value_name = "SD", default_value_t = 0.3)]
     clip_sd: f64,
-    /// Clips of the task [default: as the study has them]
+    /// Number of clips of the task; defaults to that of the study.
     #[arg(long, value_name = "N")]
     clips: Option<usize>,
-    /// Simulated studies for each number of participants.
+    /// Number of simulated studies for each number of participants.
     #[arg(long, value_name = "N", default_value_t = 1000)]
     simulations: usize,
-    /// Seed of the simulations.
+    /// Random seed of the simulations.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 }

@@ -13,8 +13,8 @@ use std::path::PathBuf;
 
 /// Build, serve and analyse a user study.
 ///
-/// A study file (STUDY.toml) says whose motion is compared, by which questions, by how many participants, and what is
-/// tested; `orator guide study` describes it.
+/// A study file (STUDY.toml) defines the compared motion, the questions, the number of participants and the
+/// hypotheses; see `orator guide study`.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(subcommand)]
@@ -42,27 +42,27 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 
 /// Serve a built study to its participants until Ctrl-C.
 ///
-/// Answers are stored in DIR/responses.sqlite, each before it is acknowledged; a server that was stopped or killed goes on
-/// where it was. No address of a participant and no trace of a browser is stored. The server speaks HTTP: for participants
-/// elsewhere put it behind a proxy with a certificate (caddy, nginx) on the same machine, and give --host-name.
+/// Each answer is stored in DIR/responses.sqlite before it is acknowledged; a stopped or killed server continues from
+/// there. Addresses of participants and browser identifiers are not stored. The server speaks HTTP only: for remote
+/// participants, run a TLS reverse proxy (caddy, nginx) on the same machine and give --host-name.
 #[derive(clap::Args)]
 struct ServeArgs {
-    /// The study's folder.
+    /// Folder of the built study.
     #[arg(value_name = "DIR")]
     dir: PathBuf,
-    /// Address to listen at; others than this machine reach it only if it is not a loopback address.
+    /// IP address to listen on; a loopback address is reachable from this machine only.
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
     listen: IpAddr,
-    /// Port to listen at; 0: any that is free.
+    /// Port to listen on; 0 selects a free one.
     #[arg(long, default_value_t = 8080)]
     port: u16,
-    /// Name by which a proxy serves the study (study.example.org); may be repeated. Requests that name a host other
-    /// than these and the listened address get status 421; loopback and private addresses, where the proxy is, then have
-    /// no limit of connections.
+    /// Host name under which a proxy serves the study, such as study.example.org; may be repeated. Requests for any
+    /// host other than these and the listened address are answered with status 421. Connections from loopback and
+    /// private addresses, such as those of the proxy, are then not limited in number.
     #[arg(long = "host-name", value_name = "NAME")]
     host_names: Vec<String>,
-    /// Minutes without an answer after which a participant's place is given to another; before the first answer 5 minutes
-    /// and twice the films' length at most.
+    /// Time without an answer after which the place of a participant is given to another, minutes; before the first
+    /// answer at most 5 minutes plus twice the length of the films.
     #[arg(long, value_name = "MINUTES", default_value_t = 60)]
     abandoned_after: u32,
 }
@@ -83,23 +83,25 @@ fn serve(args: &ServeArgs, ui: &Ui) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Write the responses of a study as tables, also while it is being served.
+/// Export the responses of a study as tables.
 ///
-/// `votes` has a row for each answered trial: participant, task, design, phase, trial (from 1), clip, speaker, conditions
-/// (from left to right), response and expected (left or right; real or generated; -2 to 2; scores; a number), stalled_secs,
-/// unfocused_secs, response_secs, plays, completed. `participants` has a row for each participant: participant, place,
-/// language, status (active, completed, replaced), answers, failed_checks, begun_ms (since 1970), code, and what the
-/// recruiting site gave along. Several values in a cell are joined by |.
+/// This also works while the study is being served. `votes` has a row per answered trial: participant, task, design,
+/// phase, trial (from 1), clip, speaker, conditions (from left to right), response and expected (left or right; real
+/// or generated; -2 to 2; scores; a number), stalled_secs, unfocused_secs, response_secs, plays, completed.
+///
+/// `participants` has a row per participant: participant, place, language, status (active, completed, replaced),
+/// answers, failed_checks, begun_ms (Unix time, milliseconds), code, and the parameters passed by the recruiting
+/// site. Several values in a cell are joined by |.
 #[derive(clap::Args)]
 struct ExportArgs {
-    /// The study's folder.
+    /// Folder of the built study.
     #[arg(value_name = "DIR")]
     dir: PathBuf,
-    /// Form of the tables: columns with a header, or JSON Lines.
+    /// Table format: CSV with a header, or JSON Lines.
     #[arg(long, value_parser = ["csv", "jsonl"], default_value = "csv")]
     format: String,
-    /// Folder to write them into; without: DIR/export.
-    #[arg(long, value_name = "FOLDER")]
+    /// Output folder; defaults to DIR/export.
+    #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
 

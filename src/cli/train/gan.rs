@@ -23,35 +23,38 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// Train a speaker's speech-to-gesture generator.
+/// Train the speech-to-gesture GAN.
 ///
-/// Reads the dataset that `orator run` made and trains with the settings of `[gan]`, one model a speaker (`--all`: for each of
-/// them), or one of several speakers (`--speaker all`, several `--dataset`), who are told apart by an embedding. Checkpoints,
-/// `metrics.jsonl`, TensorBoard events and a page of curves go to the output folder; started again, it goes on from the
-/// newest checkpoint there, with that checkpoint's settings, and ends with the same bytes as a training that was never
-/// interrupted.
+/// Trains on a dataset of `orator run` or `orator import` with the settings of `[gan]`: one model per speaker
+/// (`--all`: for every speaker), or one model of several speakers (`--speaker all`, or several folders after
+/// `--dataset`) with a speaker embedding.
+///
+/// The output folder receives checkpoints, `metrics.jsonl`, TensorBoard events and a page of curves. If it contains
+/// checkpoints, training resumes from the newest one with the settings of that checkpoint; the result is
+/// byte-identical to that of an uninterrupted training.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
     config: ConfigArgs,
-    /// The speaker, or `all` of the configuration; may be left out when it names one only.
+    /// Speaker to train, or `all` for one model of all speakers of the configuration; optional if the configuration
+    /// names a single speaker.
     #[arg(long, value_name = "NAME")]
     speaker: Option<String>,
-    /// A model for each speaker, one after the other. Speakers that are trained by another program at this moment, on any
-    /// machine, are left to it; one that fails does not stop the others.
+    /// Train one model per speaker, one after another. Speakers that another process trains at the moment, on any
+    /// machine, are skipped; a failure does not stop the others.
     #[arg(long, conflicts_with_all = ["speaker", "out", "dataset"])]
     all: bool,
-    /// Steps to train altogether, instead of `gan.steps`.
+    /// Total number of training steps; defaults to `gan.steps` of the configuration.
     #[arg(long, value_name = "N")]
     steps: Option<usize>,
-    /// Begin with another speaker's model: a checkpoint of `orator train gan`, or its folder. Normalisation and skeleton are
-    /// the new speaker's. No effect on a training that goes on.
-    #[arg(long, value_name = "FILE|FOLDER")]
+    /// Initialise from the model of another speaker: a checkpoint of `orator train gan`, or its folder. Normalisation
+    /// and skeleton are those of the new speaker. Ignored when a training resumes.
+    #[arg(long, value_name = "FILE|DIR")]
     from: Option<PathBuf>,
-    /// Folder of the checkpoints; `work/gan/<speaker>` when left out.
+    /// Folder of the checkpoints; defaults to gan/SPEAKER in the work folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// The dataset, or those of several speakers; `work/dataset/<speaker>` when left out.
+    /// Dataset folder, or those of several speakers; defaults to dataset/SPEAKER in the work folder.
     #[arg(long, value_name = "DIR", num_args = 1..)]
     dataset: Vec<PathBuf>,
 }

@@ -24,38 +24,40 @@ use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Train a sequence-to-sequence network of FineMotion's entry to GENEA 2020.
+/// Train the sequence-to-sequence network of FineMotion's GENEA 2020 entry.
 ///
-/// Reads a dataset of `orator run` or `orator dataset import`, or a folder of captures (`NAME.bvh` with `NAME.wav` and,
-/// where there is one, a transcript of that name), and trains with the settings of `[seq2seq]`. Checkpoints,
-/// `metrics.jsonl`, TensorBoard events and a page of curves go to the output folder; started again, it goes on from the
-/// newest checkpoint there and ends with the same bytes as a training that was never interrupted.
+/// Trains on a dataset of `orator run` or `orator import`, or on a folder of captures (`NAME.bvh` with `NAME.wav` and
+/// optionally a transcript of that name), with the settings of `[seq2seq]`.
+///
+/// The output folder receives checkpoints, `metrics.jsonl`, TensorBoard events and a page of curves. If it contains
+/// checkpoints, training resumes from the newest one; the result is byte-identical to that of an uninterrupted
+/// training.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
     config: ConfigArgs,
-    /// The speaker; may be left out when the configuration names one only.
+    /// Speaker to train; optional if the configuration names a single speaker.
     #[arg(long, value_name = "NAME", conflicts_with = "captures")]
     speaker: Option<String>,
-    /// The dataset; `work/dataset/<speaker>` when left out.
+    /// Dataset folder; defaults to dataset/SPEAKER in the work folder.
     #[arg(long, value_name = "DIR", conflicts_with = "captures")]
     dataset: Option<PathBuf>,
-    /// Folder of captures, instead of a dataset.
+    /// Folder of captures to train on, instead of a dataset.
     #[arg(long, value_name = "DIR", requires = "out")]
     captures: Option<PathBuf>,
-    /// Capture to validate on, without ending; may be given several times.
+    /// Capture to use for validation, a file name without extension; may be repeated.
     #[arg(long, value_name = "NAME", requires = "captures")]
     hold_out: Vec<String>,
-    /// What a joint is called in the captures, `Spine3=Chest`, or that there is none, `Spine3=`; may be given several times.
+    /// Name of a joint in the captures, such as `Spine3=Chest`, or `Spine3=` if they do not have it; may be repeated.
     #[arg(long, value_name = "JOINT=NAME", requires = "captures")]
     joint: Vec<String>,
-    /// Table of word vectors that words begin with.
+    /// Table of word vectors that initialise the word embeddings.
     #[arg(long, value_name = "FILE")]
     words: Option<PathBuf>,
-    /// Steps to train altogether, instead of `seq2seq.steps`.
+    /// Total number of training steps; defaults to `seq2seq.steps` of the configuration.
     #[arg(long, value_name = "N")]
     steps: Option<usize>,
-    /// Folder of the checkpoints; `work/seq2seq/<speaker>` when left out.
+    /// Folder of the checkpoints; defaults to seq2seq/SPEAKER in the work folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }

@@ -19,7 +19,7 @@ use std::process::ExitCode;
 struct Cli {
     #[command(subcommand)]
     verb: Verb,
-    /// Print one JSON object on standard output instead of text for people.
+    /// Print one JSON object on standard output instead of text.
     #[arg(long, global = true)]
     json: bool,
 }

@@ -29,7 +29,7 @@ use std::path::{Path, PathBuf};
 /// Seconds of a clip of rendered people, if not given.
 const PEOPLE_SECS: f64 = 8.0;
 
-/// A synthetic speaker with known joints: draw its videos, measure what a run made of them.
+/// Generate synthetic speakers with known motion, and measure results on them.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(subcommand)]
@@ -38,91 +38,104 @@ pub struct Args {
 
 #[derive(clap::Subcommand)]
 enum DemoVerb {
-    /// Draw videos of the speaker with sound, their truth, the marker models and a pipeline.toml into DIR; with --people,
-    /// render people in rooms for the models that know real people.
+    /// Draw videos of a synthetic speaker with known joints.
+    ///
+    /// Writes the videos with audio, the ground truth, the marker models and a pipeline.toml into DIR. With --people,
+    /// renders people in rooms for the models for real people.
     Draw {
-        /// The demo's folder; created if it is not there.
+        /// Demo folder; created if it does not exist.
         dir: PathBuf,
-        /// How many videos.
+        /// Number of videos.
         #[arg(long, default_value_t = DemoPlan::default().n_videos, conflicts_with = "people")]
         videos: usize,
-        /// Render people: N clips for each condition, a multiple of 3 (a third each for training, choosing and testing).
+        /// Render people: N clips per condition, a multiple of 3 (one third each for training, selection and test).
         #[arg(long, value_name = "N")]
         people: Option<usize>,
-        /// Conditions to render, by commas (front, standing, crossing ...); without it all.
+        /// Conditions to render, separated by commas (front, standing, crossing ...); defaults to all.
         #[arg(long, value_name = "NAMES", value_delimiter = ',', requires = "people")]
         conditions: Vec<String>,
-        /// Write the truth of the rendered people alone, no videos: motion for `orator-lab train lifter --mocap DIR/truth`.
+        /// Write only the ground truth of the rendered people, without videos: motion for `orator-lab train lifter
+        /// --mocap DIR/truth`.
         #[arg(long, requires = "people")]
         truth_only: bool,
-        /// Captured motion for the rendered people, a file or a folder; the sound is the .wav beside it.
-        #[arg(long, value_name = "FILE|FOLDER", requires = "people")]
+        /// Captured motion of the rendered people, a file or a folder; the audio is the .wav next to it.
+        #[arg(long, value_name = "FILE|DIR", requires = "people")]
         motion: Option<PathBuf>,
-        /// Render the speaker as a person for the models that know real people (`orator models fetch`), in place of the
+        /// Render the speaker as a person for the models for real people (`orator models fetch`), instead of as a
         /// figure in a marker suit for the marker models.
         #[arg(long, conflicts_with = "people")]
         rendered: bool,
-        /// Minutes of more speech of the same figure, without video: a dataset DIR/speech of sound and joints, for `orator
-        /// train gan --from`.
+        /// Duration of additional speech of the same figure without video, minutes; it is written to DIR/speech as a
+        /// dataset of audio and joints, for `orator train gan --from`.
         #[arg(long, value_name = "MIN", conflicts_with = "people", value_parser = clap::value_parser!(u32).range(1..=6000))]
         speech: Option<u32>,
-        /// Seconds of each video; 30, of rendered people 8.
+        /// Duration of each video, seconds; defaults to 30, for rendered people to 8.
         #[arg(long)]
         secs: Option<f64>,
-        /// Frames a second.
+        /// Frame rate, frames per second, 1 to 120.
         #[arg(long, default_value_t = 30)]
         fps: u32,
-        /// Another seed is another speech with other gestures.
+        /// Random seed of the speech and the gestures.
         #[arg(long, default_value_t = DemoPlan::default().seed)]
         seed: u64,
     },
-    /// Hold the keypoints and the dataset of a run in DIR against the truth; exit code 2 where a target is missed.
+    /// Compare the keypoints and the dataset of a run in DIR with the ground truth.
+    ///
+    /// Exit code 2: a target is missed.
     Measure {
-        /// The demo's folder.
+        /// Demo folder.
         dir: PathBuf,
     },
-    /// Write hours of a synthetic speaker that gestures by a known rule, as a dataset into DIR: sound and motion, no video.
+    /// Write a dataset of a synthetic speaker that gestures by a known rule.
+    ///
+    /// The dataset has audio and motion, without video.
     Speaker {
-        /// The dataset's folder; must not be there, or be empty.
+        /// Dataset folder to write; must not exist or be empty.
         dir: PathBuf,
-        /// Hours of the training split; validation and test have ten minutes each, with --words the test thirty.
+        /// Duration of the training split, hours; validation and test have ten minutes each, with --words the test
+        /// split has thirty.
         #[arg(long, default_value_t = 2.0)]
         hours: f64,
-        /// Words that the sound does not tell apart: some send a hand to a place of their own (version 2 of the rule).
+        /// Add words that cannot be distinguished by their sound, some of which move a hand to a position of their
+        /// own (version 2 of the rule).
         #[arg(long)]
         words: bool,
-        /// Another speaker by the rule: other vowels send the hands to its places, after other delays. 0: the rule's own.
+        /// Variant of the rule: other vowels move the hands, after other delays; 0 is the original rule.
         #[arg(long, value_name = "N", default_value_t = 0)]
         habits: u64,
-        /// Speech in place of the rule's own: a folder of NAME.wav with NAME.tsv (start, end, word), in the split that NAME
-        /// begins with; the gestures follow another rule (version 3), of loud syllables, phrases and eight words.
+        /// Folder of recorded speech to use instead of synthetic speech: NAME.wav with NAME.tsv (start, end, word),
+        /// in the split that NAME begins with. The gestures follow version 3 of the rule, based on loud syllables,
+        /// phrases and eight words.
         #[arg(long, value_name = "DIR", conflicts_with_all = ["hours", "words", "habits"])]
         speech: Option<PathBuf>,
-        /// Seed of the speech and of the speaker's variation.
+        /// Random seed of the speech and of the variation of the speaker.
         #[arg(long, default_value_t = 1)]
         seed: u64,
     },
-    /// Measure on the test split of `orator-lab demo speaker` how much of the rule a trained speaker has learnt; exit code 2
-    /// where a target is missed.
+    /// Measure how much of the rule of `demo speaker` a trained model has learnt.
+    ///
+    /// The test split is used. Exit code 2: a target is missed.
     Learned {
-        /// The dataset.
+        /// Dataset folder.
         #[arg(long, value_name = "DIR")]
         dataset: PathBuf,
-        /// A checkpoint of `orator train gan` or `seq2seq`, or its folder; without it the simple predictors alone are measured.
-        #[arg(long, value_name = "FILE|FOLDER")]
+        /// Checkpoint of `orator train gan` or `orator train seq2seq`, or its folder; without it only the baselines
+        /// are measured.
+        #[arg(long, value_name = "FILE|DIR")]
         checkpoint: Option<PathBuf>,
-        /// A picture to write, .png: wrist speeds and poses over the first test sound, of rule, speaker and checkpoint.
+        /// Picture to write, .png: wrist speeds and poses of the rule, the speaker and the checkpoint for the first
+        /// test clip.
         #[arg(long, value_name = "FILE", requires = "checkpoint")]
         picture: Option<PathBuf>,
     },
-    /// Draw a contact sheet of a run in DIR: video, keypoints, 3D figure, generated motion.
+    /// Draw a contact sheet of a run: video, keypoints, 3D figure, generated motion.
     Sheet {
-        /// The demo's folder.
+        /// Demo folder.
         dir: PathBuf,
-        /// The picture to write, .png.
+        /// Picture to write, .png.
         #[arg(long, value_name = "FILE")]
         out: PathBuf,
-        /// A generated motion, .npy, to show beside the clip.
+        /// Generated motion to show next to the clip, .npy.
         #[arg(long, value_name = "FILE")]
         motion: Option<PathBuf>,
     },

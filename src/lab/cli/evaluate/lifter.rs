@@ -10,27 +10,29 @@ use orator::cli::ui::Ui;
 use orator_dataset::config;
 use std::path::PathBuf;
 
-/// Print the errors of a lifter on captured motion seen by random cameras, beside those of trivial methods.
+/// Measure lifter errors on captured motion projected by random cameras.
+///
+/// Errors of trivial baselines are printed next to them.
 #[derive(clap::Args)]
 pub struct Args {
-    /// body or hands.
+    /// Lifter to measure.
     #[arg(long, value_enum, default_value = "body")]
     part: LifterPart,
-    /// Captured motion, files or folders of them. body: .bvh, CMU or TED .npz; hands: .bvh with fingers, TED .npz, ICVL
-    /// or NYU label .txt.
+    /// Captured motion: files or folders. body: .bvh, CMU or TED .npz; hands: .bvh with fingers, TED .npz, ICVL or
+    /// NYU label .txt.
     #[arg(long, value_name = "PATH", num_args = 1.., required = true)]
     mocap: Vec<PathBuf>,
-    /// body: measure the takes of these names apart, and no others: patterns like 'test_*' or 'walk#1' (a file's second
-    /// take) [default: all as one set]
+    /// body: measure only the takes that match these patterns, each as a separate set, such as 'test_*' or 'walk#1'
+    /// (the second take of a file); defaults to all takes as one set.
     #[arg(long, value_name = "PATTERN", num_args = 1..)]
     takes: Vec<String>,
-    /// body: scenes of 4 s a set.
+    /// body: number of scenes of 4 s per set.
     #[arg(long, value_name = "N", default_value_t = bodies::SCENES)]
     scenes: usize,
-    /// Weights of `orator-lab train lifter --part body` [default: the built-in ones]
+    /// Weights written by `orator-lab train lifter --part body`; defaults to the built-in ones.
     #[arg(long, value_name = "FILE")]
     body_weights: Option<PathBuf>,
-    /// Weights of `orator-lab train lifter --part hands` [default: the built-in ones]
+    /// Weights written by `orator-lab train lifter --part hands`; defaults to the built-in ones.
     #[arg(long, value_name = "FILE")]
     hand_weights: Option<PathBuf>,
 }

@@ -9,25 +9,27 @@ use orator_base::stage::workdir;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Print the errors of a run on rendered people, by condition, beside the truth.
+/// Measure the errors of a run on rendered people, by condition.
 ///
-/// 2D keypoints, hands (missed, stolen, swapped, invented), what was kept and refused wrongly, and lifted joints beside the
-/// clip's mean pose and beside the same lifter with exact keypoints.
+/// Compared with the ground truth: 2D keypoints, hands (missed, placed on the other hand, swapped, invented), wrongly
+/// accepted and rejected intervals, and lifted joints. The errors of the joints are printed next to those of the mean
+/// pose of the clip and of the same lifter with exact keypoints.
 #[derive(clap::Args)]
 pub struct Args {
-    /// A folder of `orator-lab demo draw --people`.
+    /// Folder written by `orator-lab demo draw --people`.
     #[arg(value_name = "DIR")]
     dir: PathBuf,
-    /// Configurations whose runs are measured, each a model set [default: DIR/pipeline.toml]
+    /// Configuration files of the runs to measure, one per model set; defaults to DIR/pipeline.toml.
     #[arg(short, long, value_name = "FILE", num_args = 1..)]
     config: Vec<PathBuf>,
-    /// Only clips of this part: first, middle or last.
+    /// Measure only this part of the clips: first, middle or last.
     #[arg(long, value_name = "PART")]
     part: Option<String>,
-    /// Configurations of runs on real clips, to lay the keypoints of rendered ones beside: scores, jitter, hands found.
+    /// Configuration files of runs on real clips, whose keypoints are compared with the rendered ones: scores,
+    /// jitter, detected hands.
     #[arg(long, value_name = "FILE", num_args = 1..)]
     beside: Vec<PathBuf>,
-    /// Also write one HTML page.
+    /// Also write an HTML page.
     #[arg(long, value_name = "PAGE.html")]
     pub report: Option<PathBuf>,
 }

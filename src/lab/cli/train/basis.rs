@@ -7,15 +7,16 @@ use orator::cli::ui::Ui;
 use orator_base::stage::progress::Progress as _;
 use std::path::PathBuf;
 
-/// Find the fixed basis in which `evaluate` compares windows of motion.
+/// Fit the fixed basis in which `orator evaluate` compares windows of motion.
 ///
-/// The 64 principal components of windows of one second, of captured motion (--mocap, with hands made by rule) and of motion
-/// made by rule. The program has one built in; values by another are not comparable with its own.
+/// The basis has the 64 principal components of windows of one second, of captured motion (--mocap, with procedural
+/// hands) and of procedural motion. A basis is built into the program; values measured with another one are not
+/// comparable with its own.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
     corpus: corpus::CorpusArgs,
-    /// The file to write (safetensors).
+    /// File to write (safetensors).
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 }

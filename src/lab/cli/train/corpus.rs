@@ -23,16 +23,16 @@ const HELD_OUT: usize = 2;
 const FPS: FrameRate = FrameRate::new(15, 1);
 const CLIP_SECS: f64 = 60.0;
 
-/// Where the motion comes from.
+/// Sources of the motion.
 #[derive(clap::Args)]
 pub struct CorpusArgs {
-    /// Captured motion: .bvh or .npz files, or folders of them; may be given several times.
+    /// Captured motion: .bvh or .npz files, or folders of them; may be repeated.
     #[arg(long, value_name = "PATH", num_args = 1.., required = true)]
     mocap: Vec<PathBuf>,
-    /// Takes to measure on and not to learn from, by their names: patterns like 'test_*'.
+    /// Takes to hold out from training and measure on, by name: patterns such as 'test_*'.
     #[arg(long, value_name = "PATTERN", num_args = 1..)]
     hold_out: Vec<String>,
-    /// Seed of the random numbers; equal seeds give equal results.
+    /// Random seed; equal seeds give equal results.
     #[arg(long, default_value_t = 1337)]
     pub seed: u64,
 }

@@ -8,32 +8,35 @@ use orator::cli::Outcome;
 use orator::cli::ui::Ui;
 use std::path::PathBuf;
 
-/// Train the encoder in whose space `evaluate` measures the Frechet gesture distance.
+/// Train the encoder for the Frechet gesture distance of `orator evaluate`.
 ///
-/// An auto-encoder of windows of 34 frames learns captured motion (--mocap, with hands made by rule) and motion made by
-/// rule. The program has one built in; values by another are not comparable with its own. An interrupted training goes
-/// on when the same command is given again. At the end the errors of held-out windows are printed beside those of
-/// the mean pose.
+/// An auto-encoder of windows of 34 frames is trained on captured motion (--mocap, with procedural hands) and on
+/// procedural motion. A trained encoder is built into the program; values measured with another one are not
+/// comparable with its own.
+///
+/// An interrupted training resumes when the same command is given again. At the end the errors on held-out windows
+/// are printed next to those of the mean pose.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
     corpus: corpus::CorpusArgs,
-    /// The weights file to write (safetensors).
+    /// Weights file to write (safetensors).
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Start from these weights instead of the seed's; with `--steps 0` their errors are measured, nothing is written.
+    /// Initialise from these weights instead of from the seed; with `--steps 0` their errors are measured and nothing
+    /// is written.
     #[arg(long, value_name = "FILE")]
     start: Option<PathBuf>,
-    /// Training steps.
+    /// Number of training steps.
     #[arg(long, default_value_t = 6000)]
     steps: usize,
-    /// Windows a step.
+    /// Batch size, windows.
     #[arg(long, default_value_t = 64)]
     batch: usize,
-    /// The highest learning rate.
+    /// Peak learning rate.
     #[arg(long, default_value_t = 2e-3)]
     learning_rate: f64,
-    /// Steps between two checkpoints.
+    /// Number of steps between checkpoints.
     #[arg(long, default_value_t = 500)]
     checkpoint_every: usize,
 }

@@ -13,49 +13,50 @@ use std::path::PathBuf;
 
 /// Train the networks that lift 2D keypoints to 3D joints.
 ///
-/// The body lifter learns from captured motion (--mocap) and from gestures made by rule, filmed by random cameras;
-/// the hand lifter from hands made by rule. An interrupted training goes on when the same command is given again.
-/// At the end the errors on held-out motion are printed beside those of trivial methods.
+/// The body lifter is trained on captured motion (--mocap) and on procedural gestures, projected by random cameras;
+/// the hand lifter on procedural hands. An interrupted training resumes when the same command is given again. At the
+/// end the errors on held-out motion are printed next to those of trivial baselines.
 #[derive(clap::Args)]
 pub struct Args {
-    /// body or hands.
+    /// Lifter to train.
     #[arg(long, value_enum)]
     part: LifterPart,
-    /// hands: the network.
+    /// hands: network architecture.
     #[arg(long, value_enum, default_value = "coordinates")]
     network: HandNetwork,
-    /// Captured motion to learn from (body): .bvh or .npz files, or folders of them; may be given several times.
+    /// body: captured motion to train on: .bvh or .npz files, or folders of them; may be repeated.
     #[arg(long, value_name = "PATH", num_args = 1..)]
     mocap: Vec<PathBuf>,
-    /// Takes to measure the errors on and not to learn from, by their names: patterns like 'test_*' or 'walk#1' (a
-    /// file's second take).
+    /// body: takes to hold out from training and measure on, by name: patterns such as 'test_*' or 'walk#1' (the
+    /// second take of a file).
     #[arg(long, value_name = "PATTERN", num_args = 1..)]
     hold_out: Vec<String>,
-    /// The weights file to write (safetensors).
+    /// Weights file to write (safetensors).
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Start from these weights instead of the seed's; with `--steps 0` their errors are measured, nothing is written.
+    /// Initialise from these weights instead of from the seed; with `--steps 0` their errors are measured and nothing
+    /// is written.
     #[arg(long, value_name = "FILE")]
     start: Option<PathBuf>,
-    /// Training steps.
+    /// Number of training steps.
     #[arg(long, default_value_t = 9000)]
     steps: usize,
-    /// Samples a step.
+    /// Batch size, samples.
     #[arg(long, default_value_t = 512)]
     batch: usize,
-    /// The highest learning rate.
+    /// Peak learning rate.
     #[arg(long, default_value_t = 2e-3)]
     learning_rate: f64,
-    /// Kernel widths of the body lifter, odd; their product is the frames it looks at (at 15 a second).
+    /// body: kernel widths, odd; their product is the receptive field in frames, at 15 fps.
     #[arg(long, value_name = "N", num_args = 1.., default_values_t = [3, 3, 3])]
     widths: Vec<usize>,
-    /// Channels of the network [default: 256 body, 896 hands]
+    /// Number of channels of the network; defaults to 256 for body and 896 for hands.
     #[arg(long, hide_default_value = true)]
     width: Option<usize>,
-    /// Seed of the random numbers; equal seeds give equal weights.
+    /// Random seed; equal seeds give equal weights.
     #[arg(long, default_value_t = 1337)]
     seed: u64,
-    /// Steps between two checkpoints.
+    /// Number of steps between checkpoints.
     #[arg(long, default_value_t = 250)]
     checkpoint_every: usize,
 }
@@ -69,9 +70,9 @@ pub enum LifterPart {
 
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
 enum HandNetwork {
-    /// A perceptron on the points' coordinates; what `lift` uses.
+    /// Multi-layer perceptron on the keypoint coordinates, used by `lift`.
     Coordinates,
-    /// Convolutions over score maps (Zimmermann & Brox 2017), for comparison; slow.
+    /// Convolutional network on score maps (Zimmermann & Brox 2017), for comparison; slow.
     Heatmap,
 }
 

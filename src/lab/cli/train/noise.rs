@@ -9,21 +9,22 @@ use orator_base::stage::workdir;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Fit the errors of 2D models on rendered people as the noise by which lifters are trained.
+/// Fit the noise model for lifter training to 2D errors on rendered people.
 ///
-/// Bias by how the bones lie in the picture, its rest by clip, noise of frames, strays, gaps; of points seen and hidden.
+/// The model has a bias that depends on the orientation of the bones in the image, a residual bias per clip, noise
+/// per frame, outliers and gaps, each for visible and for hidden points.
 #[derive(clap::Args)]
 pub struct Args {
-    /// A folder of `orator-lab demo draw --people`.
+    /// Folder written by `orator-lab demo draw --people`.
     #[arg(value_name = "DIR")]
     dir: PathBuf,
-    /// Configurations whose runs are measured, each a model set.
+    /// Configuration files of the runs to measure, one per model set.
     #[arg(short, long, value_name = "FILE", num_args = 1.., required = true)]
     config: Vec<PathBuf>,
-    /// The clips to learn from: first, middle or last part.
+    /// Part of the clips to fit to: first, middle or last.
     #[arg(long, value_name = "PART", default_value = "first")]
     part: String,
-    /// The file to write.
+    /// File to write.
     #[arg(long, value_name = "FILE.json")]
     out: PathBuf,
 }

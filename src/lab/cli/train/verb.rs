@@ -7,7 +7,7 @@ use orator::cli::signals;
 use orator::cli::train::stopped;
 use orator::cli::ui::Ui;
 
-/// Train the lifters, fit keypoint noise, or make the spaces that `orator evaluate` compares motion in.
+/// Train lifters, fit keypoint noise, or build the spaces of `orator evaluate`.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(subcommand)]
