@@ -48,7 +48,7 @@ pub fn read(path: impl AsRef<Path>, most_bytes: u64) -> Result<Vec<u8>> {
     if n_bytes.max(bytes.len() as u64) > most_bytes {
         let shown =
             if most_bytes < 1 << 20 { format!("{most_bytes} bytes") } else { format!("{} MiB", most_bytes >> 20) };
-        return Err(Error::new(ErrorKind::FileTooLarge, format!("it is larger than {shown}, the most that is read")));
+        return Err(Error::new(ErrorKind::FileTooLarge, format!("it exceeds the limit of {shown}")));
     }
     Ok(bytes)
 }
@@ -90,7 +90,7 @@ mod tests {
         assert_eq!(read(at("a.txt"), 5).unwrap(), b"words");
         assert_eq!(read_text(at("link.txt"), MOST_TEXT).unwrap(), "words");
         let error_of = |name: &str| read(at(name), 4).unwrap_err().to_string();
-        assert_eq!(error_of("a.txt"), "it is larger than 4 bytes, the most that is read");
+        assert_eq!(error_of("a.txt"), "it exceeds the limit of 4 bytes");
         assert!(pipe.success());
         assert_eq!(error_of("pipe"), "it is a named pipe, expected a regular file");
         assert_eq!(error_of("zero"), "it is a device, expected a regular file");

@@ -59,7 +59,7 @@ fn is_zero(n: &usize) -> bool {
 const IMAGE_CHECKS: &str = "cuts, still pictures and whether the person is a picture";
 
 impl MediaInfo {
-    /// A video of which only the length is known.
+    /// Video with a known length and nothing else.
     pub const fn new(duration_secs: f64, n_frames: usize, fps: FrameRate) -> Self {
         Self {
             duration_secs,

@@ -98,7 +98,7 @@ fn text(report: &WorkReport) -> String {
     }
     lines.extend(report.failed.iter().map(|(unit, error)| format!("failed  {unit}: {error}")));
     lines.extend(report.failed_before.iter().map(|unit| format!("failed  {unit}: in an earlier session")));
-    lines.extend(report.blocked.iter().map(|what| format!("blocked {what}; remove it and start a worker again")));
+    lines.extend(report.blocked.iter().map(|what| format!("blocked {what}; remove the file and start a worker again")));
     let rest = if report.all_ended { "every unit has ended" } else { "others have the rest, or it is left" };
     lines.push(rest.to_owned());
     lines.join("\n")

@@ -170,9 +170,7 @@ fn of_project(args: &Args, locks: &mut Vec<FolderLock>) -> Result<ForgetTask> {
     }
     let mut advice: Vec<String> = Vec::new();
     if plans.iter().any(|path| path.extension().is_some_and(|it| it == "json")) {
-        advice.push(
-            "a plan listed it and is removed: write it anew with `orator plan` before more workers start".to_owned(),
-        );
+        advice.push("the plan that listed it was removed: run `orator plan` again before starting workers".to_owned());
     }
     removal.paths.extend(plans);
     advice.push("plans written outside the work folder (`orator plan --out`) are not searched: delete them".to_owned());

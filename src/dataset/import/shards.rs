@@ -234,7 +234,7 @@ fn read_wav(bytes: &[u8]) -> Result<Sound> {
     samples.map(|samples| Sound { rate: SAMPLE_RATE, samples }).map_err(|error: hound::Error| error.into())
 }
 
-/// Ledger of a video of which only the samples are known, each as (start, duration) in seconds; the gaps between them
+/// Ledger of a video that is known from its samples alone, each as (start, duration) in seconds; the gaps between them
 /// are refused as not imported.
 pub fn ledger(samples: &[(f64, f64)]) -> Ledger {
     let mut ledger = Ledger::default();

@@ -44,7 +44,7 @@ fn parse_name(name: &str) -> Option<(Side, usize)> {
     if ["foot", "toe", "eye", "brow", "lip"].iter().any(|w| all.contains(w)) {
         return None;
     }
-    // "lthumb" is one word: the side is the rest of it without the finger name.
+    // "lthumb" is one word: what remains without the finger name is the side.
     let (finger, rest) = words.iter().enumerate().find_map(|(i, word)| {
         FINGERS.iter().enumerate().find_map(|(finger, names)| {
             let (before, after) = names.iter().find_map(|name| word.split_once(name))?;

@@ -90,8 +90,8 @@ impl Limits {
             return error;
         }
         error.context(format!(
-            "{}: reading it takes more than the {} MB of memory that is allowed for {}: the file may be damaged, or made \
-             to do harm; encode it again, smaller if that is not enough",
+            "{}: reading it takes more than the {} MB of memory that is allowed for {}: the file may be damaged or \
+             malicious; encode it again, smaller if that is not enough",
             source.display(),
             self.memory >> 20,
             self.basis
@@ -102,8 +102,8 @@ impl Limits {
     pub fn exceeded_by(&self, bytes: u64) -> Option<String> {
         (bytes > self.memory).then(|| {
             format!(
-                "used more than the {} MB of memory allowed for {} and was ended: the file may be damaged, or made to do \
-                 harm; encode it again, smaller if that is not enough",
+                "used more than the {} MB of memory allowed for {} and was ended: the file may be damaged or malicious; \
+                 encode it again, smaller if that is not enough",
                 self.memory >> 20,
                 self.basis
             )
@@ -124,7 +124,7 @@ impl Limits {
         } else {
             return None;
         };
-        Some(format!("{most} and was ended: the file may be damaged, or made to do harm; copy or encode it again"))
+        Some(format!("{most} and was ended: the file may be damaged or malicious; copy or encode it again"))
     }
 }
 

@@ -178,7 +178,7 @@ fn death(status: ExitStatus) -> String {
     if let Some(signal) = status.signal() {
         let why = match signal {
             6 => " (it gave up)",
-            7 | 11 => " (it reached for memory that is not its own): the file may be damaged, or made to do harm",
+            7 | 11 => " (it reached for memory that is not its own): the file may be damaged or malicious",
             9 => " (killed: memory ran out, or by hand)",
             _ => "",
         };
