@@ -54,7 +54,7 @@ fn a_plan_goes_with_a_forgotten_video() {
     let forgotten = project.answer(&["forget", "--video", file_name(&clips[0])]);
     assert_eq!(forgotten.code, 0, "{} {}", forgotten.json, forgotten.errors);
     assert!(forgotten.json["found"].as_array().unwrap().is_empty());
-    assert!(forgotten.json["advice"].to_string().contains("write it anew with `orator plan`"), "{}", forgotten.json);
+    assert!(forgotten.json["advice"].to_string().contains("run `orator plan` again"), "{}", forgotten.json);
     let left = files_under(&project.work()).into_iter().filter(|(name, _)| name.starts_with("plan"));
     assert_eq!(left.count(), 0);
     let refused = project.answer(&WORK);
