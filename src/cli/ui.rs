@@ -1,8 +1,9 @@
 //! Output of a verb: progress bars on standard error, a final summary (or one JSON object) on standard output.
 
 use super::signals::StopRequest;
-use indicatif::{HumanDuration, MultiProgress, ProgressBar, ProgressState, ProgressStyle};
+use indicatif::{MultiProgress, ProgressBar, ProgressState, ProgressStyle};
 use orator_base::stage::progress::{PARTS, Progress, Task};
+use orator_base::text::duration;
 use std::borrow::Cow;
 use std::fmt;
 use std::io::{ErrorKind, IsTerminal, Write};
@@ -88,21 +89,31 @@ impl Ui {
 impl Progress for Ui {
     fn begin(&self, label: &str, total: u64) -> Box<dyn Task + '_> {
         let (template, bar) = match total {
-            0 => ("{prefix:40!} {spinner} {pos} in {elapsed} {wide_msg}", ProgressBar::new_spinner()),
-            PARTS => ("{prefix:40!} {bar:12} {percent:>3} % {elapsed} left {left} {wide_msg}", ProgressBar::new(total)),
-            _ => ("{prefix:40!} {bar:12} {pos}/{len} {elapsed} left {left} {wide_msg}", ProgressBar::new(total)),
+            0 => ("{prefix:40!} {spinner} {pos} in {spent} {wide_msg}", ProgressBar::new_spinner()),
+            PARTS => (
+                "{prefix:40!} {bar:12} {percent:>3} %  {spent} elapsed, {left} left  {wide_msg}",
+                ProgressBar::new(total),
+            ),
+            _ => {
+                ("{prefix:40!} {bar:12} {pos}/{len}  {spent} elapsed, {left} left  {wide_msg}", ProgressBar::new(total))
+            }
         };
         let n_skipped = Arc::new(AtomicU64::new(0));
         let skipped = n_skipped.clone();
         let left = move |state: &ProgressState, out: &mut dyn fmt::Write| {
             let left = secs_left(state, skipped.load(Ordering::Relaxed));
             let _ = match left {
-                Some(left) => write!(out, "{}", HumanDuration(left)),
-                None => write!(out, "?"),
+                Some(left) => write!(out, "{}", duration(left.as_secs_f64())),
+                None => write!(out, "unknown time"),
             };
         };
+        let spent = |state: &ProgressState, out: &mut dyn fmt::Write| {
+            let _ = write!(out, "{}", duration(state.elapsed().as_secs_f64()));
+        };
         let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
-        let bar = self.bars.add(bar.with_style(style.with_key("left", left)).with_prefix(label.to_owned()));
+        let bar = self
+            .bars
+            .add(bar.with_style(style.with_key("left", left).with_key("spent", spent)).with_prefix(label.to_owned()));
         bar.enable_steady_tick(Duration::from_millis(200));
         Box::new(Bar { bar, n_skipped })
     }

@@ -6,6 +6,7 @@ use super::split::{Split, SplitRule};
 use super::stats::DatasetStats;
 use crate::config::choices::SplitUnit;
 use orator_base::stage::ledger::WordCount;
+use orator_base::text::length;
 use std::fmt::Write;
 
 /// Text of the dataset card.
@@ -134,15 +135,6 @@ fn header(info: &DatasetInfo) -> String {
         }
     }
     text + "---\n\n"
-}
-
-/// Duration as text for readers.
-fn length(secs: f64) -> String {
-    match secs {
-        ..120.0 => format!("{secs:.1} s"),
-        ..7200.0 => format!("{:.1} min", secs / 60.0),
-        _ => format!("{:.2} h", secs / 3600.0),
-    }
 }
 
 fn size_category(samples: usize) -> &'static str {

@@ -15,5 +15,5 @@ pub mod unit;
 pub mod workdir;
 pub mod wrapper;
 
-pub use unit::{Input, Report, Stage, Unit, counted, write_json};
+pub use unit::{Input, Report, Stage, Unit, write_json};
 pub use wrapper::StageWrapper;

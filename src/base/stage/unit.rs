@@ -94,8 +94,3 @@ pub fn write_json(path: &Path, value: &impl serde::Serialize) -> anyhow::Result<
     bytes.push(b'\n');
     std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
 }
-
-/// Formats a count with its noun: `1 video`, `2 videos`.
-pub fn counted(n: usize, what: &str) -> String {
-    if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
-}

@@ -6,8 +6,8 @@ use crate::cli::sandbox::this_program;
 use crate::cli::ui::Ui;
 use anyhow::{Context, Result, bail};
 use orator_base::stage::artifacts::StageName;
-use orator_base::stage::counted;
 use orator_base::stage::workdir::FolderLock;
+use orator_base::text::{counted, duration};
 use orator_cluster::heartbeat::DEAD_AFTER;
 use orator_cluster::plan::{ClusterPlan, PIECE_SECS, PlannedUnit};
 use orator_cluster::progress::{PlanProgress, WorkerProgress, progress};
@@ -88,7 +88,7 @@ pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         facts["peak_mib"] = json!(times.peak_mib);
         let mut wall = |workers: usize| {
             let secs = times.wall_secs(&lengths, workers);
-            lines.push(format!("{:<13}done in {}", counted(workers, "worker"), format_duration(secs)));
+            lines.push(format!("{:<13}done in {}", counted(workers, "worker"), duration(secs)));
             facts["wall_secs"][workers.to_string()] = json!(secs);
         };
         let workers: BTreeSet<usize> = [1, times.jobs].into_iter().chain(args.workers).collect();
@@ -100,7 +100,7 @@ pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
                 Some(n) => format!("within {hours} h {} are done", counted(n, "worker")),
                 None => format!(
                     "within {hours} h no number of workers is done: the longest piece alone takes {}",
-                    format_duration(times.wall_secs(&lengths, usize::MAX))
+                    duration(times.wall_secs(&lengths, usize::MAX))
                 ),
             });
         }
@@ -126,7 +126,7 @@ fn prediction_lines(times: &StageTimes, lengths: &[f64]) -> Vec<String> {
     let total_secs: f64 = lengths.iter().sum();
     let stage = |stage: StageName| {
         let gib = times.cost(stage).bytes_per_sec * total_secs / f64::from(1 << 30);
-        format!("{stage:9}{:>10} of work{gib:8.2} GiB of files", format_duration(times.stage_secs(stage, lengths)))
+        format!("{stage:9}{:>10} of work{gib:8.2} GiB of files", duration(times.stage_secs(stage, lengths)))
     };
     let mut lines: Vec<String> = StageName::ALL.map(stage).into();
     let StageTimes { excerpt_secs, jobs, processor, .. } = times;
@@ -143,15 +143,6 @@ fn stages(times: &StageTimes, lengths: &[f64]) -> Value {
         (stage.to_string(), json!({ "work_secs": times.stage_secs(stage, lengths), "bytes": bytes }))
     };
     StageName::ALL.map(stage).into_iter().collect::<serde_json::Map<String, Value>>().into()
-}
-
-/// A duration in readable units.
-fn format_duration(secs: f64) -> String {
-    match secs {
-        ..100.0 => format!("{secs:.0} s"),
-        ..6000.0 => format!("{:.0} min", secs / 60.0),
-        _ => format!("{:.1} h", secs / 3600.0),
-    }
 }
 
 /// Prints the progress of the workers of a plan: `orator status --plan`.

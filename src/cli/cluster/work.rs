@@ -4,7 +4,7 @@ use super::plan::open;
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::Result;
-use orator_base::stage::counted;
+use orator_base::text::counted;
 use orator_cluster::heartbeat::DEAD_AFTER;
 use orator_cluster::worker::{WorkReport, WorkerOptions, work};
 use serde_json::json;

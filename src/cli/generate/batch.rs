@@ -5,7 +5,7 @@ use crate::cli::sandbox::enter_sandbox;
 use crate::cli::signals;
 use crate::cli::ui::Ui;
 use anyhow::Result;
-use orator_base::stage::counted;
+use orator_base::text::counted;
 use orator_gesture::batch::{BatchReport, BatchState, SpeechBatch};
 use serde_json::json;
 

@@ -7,10 +7,10 @@ use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator_base::stage::artifacts;
 use orator_base::stage::workdir::{self, FolderLock};
+use orator_base::text::{length, percent};
 use orator_pipeline::Pipeline;
 use orator_report as report;
 use orator_report::ReportRequest;
-use orator_report::html::numbers::{length, percent};
 use serde_json::json;
 use std::path::PathBuf;
 

@@ -5,7 +5,7 @@ use crate::cli::sandbox::enter_sandbox;
 use crate::cli::signals;
 use crate::cli::ui::Ui;
 use anyhow::Result;
-use orator_base::stage::counted;
+use orator_base::text::counted;
 use orator_study::build::{BuiltSpeaker, BuiltStudy, build};
 use orator_study::file::{ConditionSource, StudyFile, fill_pattern};
 use orator_study::stimuli::film::SIZE;

@@ -1,7 +1,7 @@
 //! Explains why a split of a dataset has no window to train or validate on, and suggests a remedy.
 
 use anyhow::{Result, bail};
-use orator_base::stage::counted;
+use orator_base::text::counted;
 use orator_dataset::info::DatasetInfo;
 use orator_dataset::{Dataset, Split};
 

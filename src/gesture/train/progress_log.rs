@@ -1,5 +1,6 @@
 //! Progress lines of a training, printed at least twice a minute and after every twentieth of its steps.
 
+use orator_base::text::duration;
 use std::time::{Duration, Instant};
 
 /// Longest time between two lines, checked after each step.
@@ -45,15 +46,6 @@ impl ProgressLog {
     }
 }
 
-/// Human-readable duration.
-fn duration(secs: f64) -> String {
-    match secs.round() as u64 {
-        secs if secs < 60 => format!("{secs} s"),
-        secs if secs < 3600 => format!("{} min {:02} s", secs / 60, secs % 60),
-        secs => format!("{} h {:02} min", secs / 3600, secs / 60 % 60),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -67,10 +59,5 @@ mod tests {
         let lines: Vec<String> = (1..=12).filter_map(|step| short.line(step, "L1 0.5")).collect();
         assert_eq!(lines.len(), 12);
         assert!(lines[2].starts_with("step 3 of 12: L1 0.5, ") && lines[11].ends_with(", 0 s left"), "{lines:?}");
-    }
-
-    #[test]
-    fn durations_are_formatted_with_two_units() {
-        assert_eq!([59.4, 61.0, 3599.4, 7384.0].map(duration), ["59 s", "1 min 01 s", "59 min 59 s", "2 h 03 min"]);
     }
 }

@@ -4,10 +4,11 @@
 
 use super::video::LiftedVideo;
 use anyhow::{Result, ensure};
+use orator_base::stage::Unit;
 use orator_base::stage::artifacts::{self, StageName, dir};
 use orator_base::stage::ledger::{Kept, Ledger, Refused};
 use orator_base::stage::refusal::{FrameRefusal, Refusal};
-use orator_base::stage::{Unit, counted};
+use orator_base::text::counted;
 use orator_base::types::interval::{Interval, Intervals};
 use orator_base::types::time::FrameRate;
 use orator_dataset::config::{self, Settings, SplitUnit};

@@ -2,8 +2,9 @@
 
 use super::video::LiftedVideo;
 use anyhow::{Context, Result};
+use orator_base::stage::Report;
 use orator_base::stage::ledger::WordCount;
-use orator_base::stage::{Report, counted};
+use orator_base::text::counted;
 use orator_dataset::config::{self, SplitUnit};
 use orator_dataset::info::DatasetInfo;
 use orator_dataset::leakage::Leakage;

@@ -12,7 +12,8 @@ use orator_base::stage::artifacts::{self, Artifact, StageName, dir, speaker_dir}
 use orator_base::stage::ledger::{Ledger, longest_first};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::record::Failure;
-use orator_base::stage::{Input, Report, Stage, Unit, counted, workdir};
+use orator_base::stage::{Input, Report, Stage, Unit, workdir};
+use orator_base::text::counted;
 use orator_base::types::time::FrameRate;
 use orator_dataset::config::videos::Videos;
 use orator_dataset::config::{self, Settings};

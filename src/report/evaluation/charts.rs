@@ -4,9 +4,9 @@
 use crate::html::chart::dots::{ChartDot, dots};
 use crate::html::chart::histogram::Counts;
 use crate::html::chart::profile;
-use crate::html::numbers::number;
 use crate::html::{Node, legend, node};
 use ndarray::ArrayView3;
+use orator_base::text::number;
 use orator_base::types::skeleton;
 use orator_base::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_SHOULDER, is_duplicate};
 use orator_gesture::evaluate::clips::clips::{EvalClip, EvalClips};

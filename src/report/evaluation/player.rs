@@ -4,12 +4,12 @@
 
 use super::charts::colour_legend;
 use crate::html::chart::tracks::{Lane, lanes};
-use crate::html::numbers::clock;
 use crate::html::{Node, node};
 use anyhow::Result;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use ndarray::ArrayView3;
+use orator_base::text::clock;
 use orator_base::types::skeleton;
 use orator_base::types::skeleton::{L_WRIST, N_JOINTS, R_WRIST, is_duplicate};
 use orator_base::types::sound::{SAMPLE_RATE, Sound};

@@ -1,11 +1,10 @@
 //! Generation of HTML; no other module writes markup. `node` builds elements and escapes text, `document` creates a
-//! self-contained page and embeds JPEG images, `numbers` formats numbers, `chart` draws SVG charts. The modules
+//! self-contained page and embeds JPEG images, `chart` draws SVG charts. The modules
 //! `videos`, `training` and `evaluation` decide what the pages contain.
 
 pub mod chart;
 pub mod document;
 pub mod node;
-pub mod numbers;
 
 pub use document::{Page, Section, jpeg};
 pub use node::{Node, legend, node, table};

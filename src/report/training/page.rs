@@ -4,11 +4,11 @@
 use super::charts::{TrainingLog, metrics};
 use super::strip::{HeldOutPair, strip};
 use crate::html::chart::lines::LineChart;
-use crate::html::numbers::number;
 use crate::html::{Node, Page, Section, jpeg, node};
 use anyhow::{Context, Result};
-use orator_base::stage::counted;
 use orator_base::stage::workdir;
+use orator_base::text::counted;
+use orator_base::text::number;
 use orator_gesture::train::gan::score::below_mean_pose;
 use orator_gesture::train::log;
 use orator_media::ffmpeg;

@@ -4,9 +4,9 @@ use super::pictures::MomentThumbnail;
 use super::reasons;
 use super::video::VideoSummary;
 use super::worst::{Moment, Worst};
-use crate::html::numbers::clock;
 use crate::html::{Node, jpeg, node};
-use orator_base::stage::counted;
+use orator_base::text::clock;
+use orator_base::text::counted;
 use std::collections::BTreeMap;
 
 /// Pictures by video index and frames of the moment.

@@ -3,9 +3,9 @@
 use super::movement::{MovementCounts, PAIRS};
 use crate::html::chart::profile;
 use crate::html::chart::ranges::{ValueRange, ranges};
-use crate::html::numbers::number;
 use crate::html::{Node, legend, node};
-use orator_base::stage::counted;
+use orator_base::text::counted;
+use orator_base::text::number;
 
 /// Axes with the labels of their ends.
 const AXES: [(&str, [&str; 2]); 3] = [

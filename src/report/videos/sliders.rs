@@ -5,8 +5,8 @@ use super::thresholds::{THRESHOLDS, ThresholdGrid};
 use super::video::VideoSummary;
 use super::what_if::KeptByThreshold;
 use crate::html::chart::curve::curve;
-use crate::html::numbers::{length, with_unit};
 use crate::html::{Node, node};
+use orator_base::text::{length, with_unit};
 use orator_dataset::config::SegmentConfig;
 use serde_json::{Value, json};
 

@@ -5,10 +5,10 @@ use super::reasons::WAITING;
 use super::video::VideoSummary;
 use crate::html;
 use crate::html::chart::timeline::{TimelineSpan, timeline};
-use crate::html::numbers::{clock, length, number, with_unit};
 use crate::html::{Node, node};
-use orator_base::stage::counted;
 use orator_base::stage::ledger::Kept;
+use orator_base::text::counted;
+use orator_base::text::{clock, length, number, with_unit};
 use std::collections::BTreeSet;
 
 /// Maximum number of intervals of all timelines together, which bounds the size of the page.

@@ -2,9 +2,9 @@
 //! for each rule the worst spans. Ties follow the order of the videos, so the choice is deterministic.
 
 use super::reasons;
-use crate::html::numbers::number;
 use orator_base::stage::ledger::{Ledger, Refused};
 use orator_base::stage::refusal::Refusal;
+use orator_base::text::number;
 use orator_dataset::config::SegmentConfig;
 use orator_formats::media_json::MediaInfo;
 use orator_pipeline::segment::Measures;

@@ -2,7 +2,7 @@
 
 use super::checkpoint::EvaluatedCheckpoint;
 use super::clips::EvalClips;
-use orator_base::stage::counted;
+use orator_base::text::counted;
 use orator_base::types::skeleton::{self, L_HAND, N_JOINTS, NECK, is_duplicate};
 use orator_base::types::sound::SAMPLE_RATE;
 use orator_dataset::{Dataset, Split};

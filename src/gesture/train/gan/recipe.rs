@@ -3,6 +3,7 @@
 //! `auto` depends on the minutes of training speech.
 
 use anyhow::{Context, Result};
+use orator_base::text::length;
 use orator_dataset::config::{GanConfig, GanRecipe, GanSettings};
 use orator_dataset::{Dataset, Split};
 
@@ -161,11 +162,10 @@ fn auto(row: &RecipeRow, minutes: f64) -> f64 {
 /// # Errors
 /// Settings that cannot be serialised.
 pub fn lines(of: &GanSettings, material: &TrainingMaterial, secs_a_step: Option<f64>) -> Result<Vec<String>> {
-    let minutes = |secs: f64| format!("{:.1} min", secs / 60.0);
     let values = serde_json::to_value(of)?;
-    let (train, held_out) = (minutes(material.train_secs), minutes(material.validation_secs));
+    let (train, held_out) = (length(material.train_secs), length(material.validation_secs));
     let whose = if material.n_speakers > 1 { format!(" of {} speakers", material.n_speakers) } else { String::new() };
-    let time = secs_a_step.map(|secs| format!(", about {} here", minutes(secs * of.steps as f64))).unwrap_or_default();
+    let time = secs_a_step.map(|secs| format!(", about {} here", length(secs * of.steps as f64))).unwrap_or_default();
     let end = match of.patience {
         0 => String::new(),
         epochs => format!("; it ends early after {epochs} validations without a better score"),

@@ -3,7 +3,7 @@
 
 use super::scale::{Scale, circle, drawing, line, rect, text_at};
 use crate::html::node::{Node, node};
-use crate::html::numbers::number;
+use orator_base::text::number;
 
 /// Row of the chart.
 #[derive(Clone, Debug)]

@@ -2,7 +2,7 @@
 
 use super::scale::{Scale, drawing, line, px, rect, text_at};
 use crate::html::node::Node;
-use crate::html::numbers::{number, with_unit};
+use orator_base::text::{number, with_unit};
 
 /// Counts in bins of equal width from `low` to `high`; the outer bins include values outside the range.
 #[derive(Clone, Debug)]

@@ -2,7 +2,7 @@
 
 use super::scale::{Scale, circle, drawing, line, stroke, text_at};
 use crate::html::node::{Node, legend, node};
-use crate::html::numbers::number;
+use orator_base::text::number;
 
 const WIDTH: f64 = 360.0;
 const HEIGHT: f64 = 190.0;

@@ -3,7 +3,7 @@
 use super::histogram::Counts;
 use super::scale::{Scale, drawing, line, stroke, text_at};
 use crate::html::node::{Node, node};
-use crate::html::numbers::number;
+use orator_base::text::number;
 
 const WIDTH: f64 = 340.0;
 const HEIGHT: f64 = 130.0;

@@ -2,7 +2,7 @@
 
 use super::scale::{Scale, drawing, line, rect, text_at};
 use crate::html::node::Node;
-use crate::html::numbers::number;
+use orator_base::text::number;
 
 /// Row of the chart.
 pub struct ValueRange {

@@ -3,7 +3,7 @@
 
 use super::scale::{Scale, drawing, line, path_data, px, text_at};
 use crate::html::node::{Node, node};
-use crate::html::numbers::number;
+use orator_base::text::number;
 
 const WIDTH: f64 = 720.0;
 const LANE: f64 = 66.0;

@@ -1,4 +1,18 @@
-//! Formatting of numbers and durations for readers.
+//! Formatting of counts, numbers and durations for readers.
+
+/// Count with its noun: `1 video`, `2 videos`.
+pub fn counted(n: usize, what: &str) -> String {
+    if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
+}
+
+/// Duration in whole seconds, with two units from a minute on: `59 s`, `1 min 01 s`, `2 h 03 min`.
+pub fn duration(secs: f64) -> String {
+    match secs.round() as u64 {
+        secs if secs < 60 => format!("{secs} s"),
+        secs if secs < 3600 => format!("{} min {:02} s", secs / 60, secs % 60),
+        secs => format!("{} h {:02} min", secs / 3600, secs / 60 % 60),
+    }
+}
 
 /// Duration: `41.2 s`, `12.4 min`, `3.27 h`, like `length` in `page.js`.
 pub fn length(secs: f64) -> String {
@@ -51,6 +65,8 @@ mod tests {
 
     #[test]
     fn numbers_read_well() {
+        assert_eq!([0, 1, 2].map(|n| counted(n, "video")), ["0 videos", "1 video", "2 videos"]);
+        assert_eq!([59.4, 61.0, 3599.4, 7384.0].map(duration), ["59 s", "1 min 01 s", "59 min 59 s", "2 h 03 min"]);
         assert_eq!([41.24, 744.0, 11_772.0, -0.0].map(length), ["41.2 s", "12.4 min", "3.27 h", "0.0 s"]);
         assert_eq!([4.8, 59.96, 3723.0].map(clock), ["0:04.8", "1:00.0", "1:02:03.0"]);
         assert_eq!(
