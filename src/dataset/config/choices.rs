@@ -85,9 +85,12 @@ pub enum ContinuityLoss {
 /// Loss term that rewards a wide range of motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum ReachLoss {
+pub enum VarianceLoss {
+    /// Norm over time of each coordinate (code of the authors).
     #[default]
-    Excursion,
+    #[serde(rename(serialize = "excursion"), alias = "excursion")]
+    Norm,
+    /// Variance over time of each coordinate (paper).
     Variance,
 }
 

@@ -2,6 +2,7 @@
 //! wrong type becomes a `Problem` with its line. All problems are collected before any is reported.
 
 use super::auto::AUTO;
+use super::former;
 use super::sections::PATHS;
 use super::{Settings, SpeakerConfig};
 use serde::Serialize;
@@ -9,7 +10,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
-use toml::{Spanned, Table, Value};
+use toml::{Table, Value};
 
 /// Error in one key.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -55,13 +56,10 @@ pub struct Given {
 
 /// Subtable of each section (`[gan.advanced]`) for rarely changed keys, which the default `pipeline.toml` does not
 /// list. Every key is accepted both there and in the section itself.
-const ADVANCED: &str = "advanced";
+pub(super) const ADVANCED: &str = "advanced";
 
 /// Largest number up to which f64 represents every integer: 2^53.
 const MAX_EXACT_INTEGER: f64 = 9_007_199_254_740_992.0;
-
-/// Former names of keys and sections, with their current names.
-const RENAMED: [(&str, &str); 2] = [("shard", "dataset"), ("segment.max_bone_change", "lift.max_bone_change")];
 
 /// Base folders of relative paths.
 pub struct Folders<'a> {
@@ -83,7 +81,7 @@ pub fn read(text: &str, sets: &[String], folders: &Folders) -> Given {
     match DeTable::parse(text) {
         Ok(mut document) => {
             let location_at = |span| SourceLocation::Line(line_of(text, span));
-            reader.rename(document.get_mut(), &location_at);
+            reader.notes.extend(former::rename(document.get_mut(), &location_at));
             reader.merge(document.get_ref(), &mut table, "", &location_at);
         }
         Err(error) => {
@@ -130,37 +128,6 @@ impl Reader {
 
     fn problem(&mut self, key: &str, location: SourceLocation, message: String) {
         self.problems.push(Problem { key: key.to_owned(), location, message });
-    }
-
-    /// Moves values given under former names to the current names; if both are given, the current name takes
-    /// precedence.
-    fn rename(&mut self, written: &mut DeTable<'_>, location_at: &dyn Fn(usize) -> SourceLocation) {
-        for (former, now) in RENAMED {
-            let (from, old) = former.rsplit_once('.').map_or((None, former), |(section, key)| (Some(section), key));
-            let (to, new) = now.rsplit_once('.').map_or((None, now), |(section, key)| (Some(section), key));
-            let Some((name, value)) = section(written, from).and_then(|table| table.remove_entry(old)) else {
-                continue;
-            };
-            let location = location_at(name.span().start);
-            self.notes.push(format!("{location}{former} is called {now} now; it is read as that"));
-            let spanned = |key: &'static str| Spanned::new(name.span(), key.into());
-            if let Some(to) = to
-                && !written.contains_key(to)
-            {
-                written.insert(spanned(to), Spanned::new(name.span(), DeValue::Table(DeTable::new())));
-            }
-            let Some(table) = section(written, to) else { continue };
-            match (table.get_mut(new).map(Spanned::get_mut), value.into_inner()) {
-                (Some(DeValue::Table(table)), DeValue::Table(old)) => {
-                    let missing = old.into_iter().filter(|(key, _)| !table.contains_key(key)).collect::<Vec<_>>();
-                    table.extend(missing);
-                }
-                (Some(_), _) => {}
-                (None, value) => {
-                    table.insert(spanned(new), Spanned::new(name.span(), value));
-                }
-            }
-        }
     }
 
     /// Merges the parsed table `written` over `table`, key by key.
@@ -302,22 +269,11 @@ impl Reader {
         let parsed = DeTable::parse(&as_toml).or_else(|_| DeTable::parse(&as_string));
         match parsed {
             Ok(mut document) if is_key => {
-                self.rename(document.get_mut(), &|_| SourceLocation::CommandLine);
+                self.notes.extend(former::rename(document.get_mut(), &|_| SourceLocation::CommandLine));
                 self.merge(document.get_ref(), table, "", &|_| SourceLocation::CommandLine);
             }
             _ => self.problem(key, SourceLocation::CommandLine, "not a key of the configuration".to_owned()),
         }
-    }
-}
-
-/// Table of the section `name`; the top-level table for `None`.
-fn section<'t, 'a>(written: &'t mut DeTable<'a>, name: Option<&str>) -> Option<&'t mut DeTable<'a>> {
-    match name {
-        None => Some(written),
-        Some(name) => match written.get_mut(name)?.get_mut() {
-            DeValue::Table(table) => Some(table),
-            _ => None,
-        },
     }
 }
 

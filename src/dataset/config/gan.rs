@@ -12,12 +12,12 @@ use serde_json::{Value, json};
 /// Defines [`GanValues`] with defaults and ranges. `$number` and `$count` name the parameters of `with` that initialise
 /// the settings that a recipe may choose.
 macro_rules! gan_values {
-    (|$number:ident, $count:ident| $($key:ident: $type:ty = $default:expr $(=> $range:expr)?,)*) => {
+    (|$number:ident, $count:ident| $($(#[$alias:meta])* $key:ident: $type:ty = $default:expr $(=> $range:expr)?,)*) => {
         /// Keys of `[gan]`; `N` and `C` are the types of the numbers and counts that a recipe may choose.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         #[serde(default)]
         pub struct GanValues<N, C> {
-            $(pub $key: $type,)*
+            $($(#[$alias])* pub $key: $type,)*
         }
 
         impl<N: Copy, C: Copy> GanValues<N, C> {
@@ -43,7 +43,8 @@ gan_values! { |number, count|
     learning_rate: N = number => (1e-9, 1.0, ""),
     shared_rate: N = number => (0.0, 1.0, ""),
     warmup_steps: C = count => (0.0, 1e9, "steps"),
-    fade_to: N = number => (0.0, 1.0, ""),
+    #[serde(alias = "fade_to")]
+    final_lr_ratio: N = number => (0.0, 1.0, ""),
     adversarial: AdversarialLoss = AdversarialLoss::LeastSquares,
     lambda_l1: f64 = 1.0 => (0.0, 1e4, ""),
     lambda_speed: N = number => (0.0, 1e4, ""),
@@ -90,7 +91,7 @@ impl Default for GanSettings {
         Self {
             recipe: GanRecipe::Paper,
             shared_rate: 1.0,
-            fade_to: 1.0,
+            final_lr_ratio: 1.0,
             augment_noise_db: -120.0,
             ..Self::with(0.0, 0)
         }
@@ -122,17 +123,17 @@ fn number(value: f64) -> Value {
 }
 
 impl GanSettings {
-    /// Learning rate after `step` completed steps: linear warm-up, then cosine decay to `fade_to` times
+    /// Learning rate after `step` completed steps: linear warm-up, then cosine decay to `final_lr_ratio` times
     /// `learning_rate`.
     pub fn rate(&self, step: usize) -> f64 {
-        let Self { learning_rate, warmup_steps, fade_to, steps, .. } = self;
+        let Self { learning_rate, warmup_steps, final_lr_ratio, steps, .. } = self;
         if step < *warmup_steps {
             return learning_rate * (step + 1) as f64 / (*warmup_steps + 1) as f64;
         }
         let n_decay_steps = steps.saturating_sub(*warmup_steps).max(1);
         let progress = ((step - warmup_steps) as f64 / n_decay_steps as f64).min(1.0);
         let cosine = 0.5 * (1.0 + (std::f64::consts::PI * progress).cos());
-        learning_rate * (fade_to + (1.0 - fade_to) * cosine)
+        learning_rate * (final_lr_ratio + (1.0 - final_lr_ratio) * cosine)
     }
 
     /// Weight of the adversarial loss after `step` completed steps: 0 before `adversarial_from`, then a linear ramp up
@@ -151,7 +152,7 @@ mod tests {
     #[test]
     fn the_rate_has_a_linear_warm_up_and_a_cosine_decay() {
         let base = GanSettings { learning_rate: 1.0, ..GanSettings::default() };
-        let decaying = GanSettings { warmup_steps: 9, fade_to: 0.1, steps: 109, ..base.clone() };
+        let decaying = GanSettings { warmup_steps: 9, final_lr_ratio: 0.1, steps: 109, ..base.clone() };
         assert_eq!((decaying.rate(0), decaying.rate(4), decaying.rate(9)), (0.1, 0.5, 1.0));
         assert!((decaying.rate(59) - 0.55).abs() < 1e-12 && (decaying.rate(109) - 0.1).abs() < 1e-12);
         assert!((decaying.rate(500) - 0.1).abs() < 1e-12, "a training that goes on after its last step");

@@ -201,17 +201,21 @@ mod tests {
 
     #[test]
     fn former_keys_are_read_with_a_note() {
-        let text = "[segment]\nmax_bone_change = 0.3\n[lift]\nlevel = true\n[shard]\ntest = 0.2\n";
+        let text = "[segment]\nmax_bone_change = 0.3\n[seq2seq.advanced]\nlambda_reach = 0.5\n[lift]\nlevel = true\n\
+            [shard]\ntest = 0.2\n";
         let Config { settings, notes, .. } = resolved(text, &["shard.validation=0.1"]).unwrap();
         assert_eq!((settings.lift.max_bone_change, settings.lift.level), (0.3, true));
+        assert_eq!(settings.seq2seq.lambda_variance, 0.5);
         assert_eq!((settings.dataset.validation, settings.dataset.test), (0.1, 0.2));
         assert_eq!(
             notes,
             [
-                "line 5: shard is called dataset now; it is read as that",
-                "line 2: segment.max_bone_change is called lift.max_bone_change now; it is read as that",
-                "--set: shard is called dataset now; it is read as that",
+                ("line 7: shard", "dataset"),
+                ("line 2: segment.max_bone_change", "lift.max_bone_change"),
+                ("line 4: seq2seq.lambda_reach", "seq2seq.lambda_variance"),
+                ("--set: shard", "dataset"),
             ]
+            .map(|(old, new)| format!("{old} was renamed: write {new} (the old name works until version 0.3)"))
         );
         assert_eq!(
             problems("[shard]\ntest = 7\n", &[])[0],

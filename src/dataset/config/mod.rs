@@ -5,6 +5,7 @@
 pub mod auto;
 pub mod choices;
 pub mod file;
+pub mod former;
 pub mod gan;
 pub mod keypoints;
 pub mod load;
@@ -18,9 +19,10 @@ pub mod videos;
 pub use auto::Auto;
 pub use choices::{
     AdversarialLoss, ComputeDevice, ContinuityLoss, DistanceLoss, FollowRule, GanRecipe, MotionRepresentation,
-    NetworkPreset, ReachLoss, SequenceNetwork, SpeechRule, SplitUnit,
+    NetworkPreset, SequenceNetwork, SpeechRule, SplitUnit, VarianceLoss,
 };
 pub use file::{Problem, SourceLocation};
+pub use former::to_stored;
 pub use gan::{GanConfig, GanSettings};
 pub use keypoints::KeypointSource;
 pub use load::{Config, ConfigError, DEFAULT_FILE, load, load_default};

@@ -18,12 +18,12 @@ pub(super) type KeyRanges = &'static [(&'static str, (f64, f64, &'static str))];
 /// Defines a section of the configuration: each key with its type, default and, for a number, its range. Unknown keys
 /// are rejected.
 macro_rules! section {
-    ($(#[$doc:meta])* $name:ident { $($key:ident: $type:ty = $default:expr $(=> $range:expr)?,)* }) => {
+    ($(#[$doc:meta])* $name:ident { $($(#[$alias:meta])* $key:ident: $type:ty = $default:expr $(=> $range:expr)?,)* }) => {
         $(#[$doc])*
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         #[serde(default, deny_unknown_fields)]
         pub struct $name {
-            $(pub $key: $type,)*
+            $($(#[$alias])* pub $key: $type,)*
         }
 
         impl $name {
@@ -138,7 +138,8 @@ section! {
         follow: FollowRule = FollowRule::Largest,
         person_every: usize = 5 => (1.0, 10_000.0, "frames"),
         palm_every: usize = 5 => (1.0, 10_000.0, "frames"),
-        person_follow: f64 = 0.3 => (0.0, 1.0, ""),
+        #[serde(alias = "person_follow")]
+        box_smoothing: f64 = 0.3 => (0.0, 1.0, ""),
         hand_score: f64 = 0.5 => (0.0, 1.0, ""),
         joint_score: f64 = 0.3 => (0.0, 1.0, ""),
     }
@@ -161,7 +162,8 @@ section! {
         min_lip_sync: f64 = 0.1 => (-1.0, 1.0, ""),
         max_quiet_secs: f64 = 3.0 => (0.0, 60.0, "seconds"),
         min_change: f64 = 0.03 => (0.0, 255.0, "steps of 8-bit colour"),
-        max_still_secs: f64 = 0.5 => (0.0, 1.0, "seconds, all that lift fills"),
+        #[serde(alias = "max_still_secs")]
+        max_static_secs: f64 = 0.5 => (0.0, 1.0, "seconds, all that lift fills"),
         min_facing: f64 = 1.0 => (-10.0, 10.0, "neck-nose distances"),
         max_nose_off: f64 = 1.0 => (0.0, 10.0, "half shoulder widths"),
         max_people: u32 = 5 => (1.0, 255.0, "people"),

@@ -124,7 +124,7 @@ impl SpeakerTracker {
         if let Some(reference) = self.reference.as_ref().filter(|_| found.len() > 1) {
             measure(&mut found, reference, image, body, settings.joint_score)?;
         }
-        let follow = regular.then_some(settings.person_follow);
+        let follow = regular.then_some(settings.box_smoothing);
         let was = self.track.identity();
         self.track.update(&found, TrackerStep { image_width: image.width, follow, body_visible });
         self.several |= self.track.n_people > 1;

@@ -11,7 +11,7 @@ use orator_base::stage::progress::Progress;
 use orator_base::stage::{Input, Report, Stage, Unit};
 use orator_base::types::time::FrameRate;
 use orator_dataset::config;
-use orator_dataset::config::{FollowRule, Settings};
+use orator_dataset::config::{FollowRule, Settings, to_stored};
 use orator_formats::media_json::MediaInfo;
 use orator_formats::timeline_npz::Timeline;
 use orator_media::ffmpeg;
@@ -84,7 +84,7 @@ impl Stage for Pose2dStage {
             .into_iter()
             .map(|(key, entry)| (key.to_owned(), read(entry)))
             .collect();
-        let mut pose2d = json!(self.chosen.settings);
+        let mut pose2d = to_stored("pose2d", &self.chosen.settings).unwrap_or_default();
         // `follow = "largest"` is left out, so that the output of versions without this setting stays fresh.
         if let Some(keys) = pose2d.as_object_mut().filter(|_| !self.follows_talker()) {
             keys.remove("follow");

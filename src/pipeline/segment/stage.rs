@@ -55,7 +55,8 @@ impl Stage for SegmentStage {
 
     fn settings(&self, _unit: &Unit) -> serde_json::Value {
         let model = self.speech.as_ref().map(SpeechDetector::used);
-        serde_json::json!({ "segment": self.rules, "speech_model": model })
+        let rules = config::to_stored("segment", &self.rules).unwrap_or_default();
+        serde_json::json!({ "segment": rules, "speech_model": model })
     }
 
     fn inputs(&self, unit: &Unit) -> Result<Vec<Input>> {

@@ -86,7 +86,7 @@ pub fn frame_rules(rules: &config::SegmentConfig) -> [FrameRule; 16] {
     let hands = |rule| FrameRule { measures_secs: true, allows_rest: true, ..rule };
     let (none, body, hand) =
         (Gap::Anywhere(0.0), Gap::Inside(rules.max_body_gap_secs), Gap::Anywhere(rules.max_hand_gap_secs));
-    let (quiet, still) = (Gap::Anywhere(rules.max_quiet_secs), Gap::Anywhere(rules.max_still_secs));
+    let (quiet, still) = (Gap::Anywhere(rules.max_quiet_secs), Gap::Anywhere(rules.max_static_secs));
     [
         row(Refusal::NoSound, |m| &m.sound, AtLeast(0.5), none),
         row(Refusal::Quiet, |m| &m.sound_db, AtLeast(rules.min_sound_db), quiet),

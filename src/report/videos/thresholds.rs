@@ -54,7 +54,7 @@ pub const THRESHOLDS: [ThresholdGrid; 19] = [
     row!(min_lip_sync, "least correlation of the mouth with the voice in the 8 s around a frame", "", -0.5, 0.5),
     row!(max_quiet_secs, "longest pause of speech that is kept", "s", 0.0, 10.0),
     row!(min_change, "a picture that changes less stands still", "steps of 8-bit colour", 0.0, 1.0),
-    row!(max_still_secs, "longest time the picture may stand still", "s", 0.0, 1.0),
+    row!(max_static_secs, "longest time the picture may stand still", "s", 0.0, 1.0),
     row!(joint_score, "from here on a face, arm or hand point is visible", "", 0.0, 1.0),
     row!(min_shoulder_px, "least distance between the shoulders", "px", 10.0, 210.0),
     row!(

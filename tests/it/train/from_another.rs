@@ -57,7 +57,7 @@ fn it_takes_the_weights_and_keeps_its_own_body() {
 
     // One that goes on has begun, and ends with the same bytes.
     let parts = dir.join("ben-parts");
-    let half = GanConfig { warmup_steps: 0.into(), fade_to: 1.0.into(), ..settings() };
+    let half = GanConfig { warmup_steps: 0.into(), final_lr_ratio: 1.0.into(), ..settings() };
     let whole = dir.join("ben-whole");
     train_with_callback(&[&ben], &half, Some(&of_anna), &whole, &Silent, ignore).unwrap();
     train_with_callback(

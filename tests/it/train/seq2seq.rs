@@ -86,7 +86,7 @@ fn the_loss_falls_and_the_dataset_is_spoken() {
         batch: 8,
         hidden: 24,
         learning_rate: 2e-3,
-        lambda_reach: 0.0,
+        lambda_variance: 0.0,
         epoch_steps: 80,
         checkpoint_every: 80,
         ..settings(SequenceNetwork::Contextual)
@@ -117,11 +117,11 @@ fn captures_with_and_without_words_speak_for_sounds_of_any_length() {
     write_capture(&dir, "b", 4.0, 2.0, false);
     write_capture(&dir, "c", 4.0, 4.0, true);
     let captures = open(&dir, &["c"]).unwrap();
-    for (network, hears_context) in
+    for (network, audio_context) in
         [(SequenceNetwork::Contextual, false), (SequenceNetwork::Words, false), (SequenceNetwork::Words, true)]
     {
-        let out = folder.path().join(format!("{network:?} {hears_context}"));
-        let settings = Seq2seqConfig { hears_context, ..settings(network) };
+        let out = folder.path().join(format!("{network:?} {audio_context}"));
+        let settings = Seq2seqConfig { audio_context, ..settings(network) };
         let outcome = train(TrainingSource::Captures(&captures), None, &settings, &out, &Silent).unwrap();
         assert_eq!((outcome.validation.split.as_str(), outcome.n_words), ("validation", 2));
         let speaker = SequenceGenerator::open(&out).unwrap();

@@ -55,7 +55,7 @@ fn speaker(folder: &Path, name: &str, phase: f64, scale: f32) -> Dataset {
 
 fn settings() -> GanConfig {
     let gan = GanConfig { batch: 4.into(), window_frames: 32, checkpoint_every: 3, ..GanConfig::default() };
-    GanConfig { steps: 6.into(), epoch_steps: 3.into(), warmup_steps: 0.into(), fade_to: 1.0.into(), ..gan }
+    GanConfig { steps: 6.into(), epoch_steps: 3.into(), warmup_steps: 0.into(), final_lr_ratio: 1.0.into(), ..gan }
 }
 
 fn orator(dir: &Path, args: &str) -> ProgramAnswer {

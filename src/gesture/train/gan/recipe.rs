@@ -80,7 +80,7 @@ const RECIPES: [RecipeRow; 23] = [
     row("learning_rate",      1e-4,     3e-3,      [1e-3; 4]),
     row("shared_rate",        1.0,      0.006,     [1.0; 4]),
     row("warmup_steps",       0.0,      50.0,      [50.0; 4]),
-    row("fade_to",            1.0,      0.02,      [0.02; 4]),
+    row("final_lr_ratio",            1.0,      0.02,      [0.02; 4]),
     row("lambda_speed",       0.0,      0.3,       [0.3; 4]),
     row("lambda_energy",      0.0,      0.0,       [0.1, 0.1, 0.1, 0.2]),
     row("lambda_gan",         1.0,      0.05,      [0.05, 0.15, 0.15, 0.15]),
@@ -229,7 +229,7 @@ pub(super) mod tests {
         for minutes in [0.5, 3.0, 5.0, 17.0, 60.0, 90.0] {
             let of = of(minutes);
             assert_eq!(of.steps % of.epoch_steps, 0, "{minutes} minutes end with a validation");
-            assert!((of.rate(of.steps) - of.learning_rate * of.fade_to).abs() < 1e-12);
+            assert!((of.rate(of.steps) - of.learning_rate * of.final_lr_ratio).abs() < 1e-12);
         }
     }
 
@@ -241,7 +241,9 @@ pub(super) mod tests {
         // Defaults for old checkpoints without a recipe are the published values too.
         let mut stored = serde_json::to_value(&paper).unwrap();
         let written = stored.clone();
-        for key in ["recipe", "shared_rate", "warmup_steps", "fade_to", "adversarial_from", "ema_decay", "dropout"] {
+        for key in
+            ["recipe", "shared_rate", "warmup_steps", "final_lr_ratio", "adversarial_from", "ema_decay", "dropout"]
+        {
             stored.as_object_mut().unwrap().remove(key);
         }
         let read: GanSettings = serde_json::from_value(stored).unwrap();

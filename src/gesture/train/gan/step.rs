@@ -11,7 +11,7 @@ use crate::train::optim::adam::{self, Adam};
 use crate::train::resume;
 use anyhow::{Context, Result, ensure};
 use candle_core::{Device, Tensor};
-use orator_dataset::config::{ComputeDevice, GanConfig, GanSettings};
+use orator_dataset::config::{ComputeDevice, GanConfig, GanSettings, to_stored};
 use orator_formats::checkpoint;
 use orator_nn::gan::discriminator::{Discriminator, motion};
 use orator_nn::gan::generator::Generator;
@@ -277,13 +277,14 @@ impl GanTrainer {
     }
 
     fn stored(&self) -> Result<Value> {
-        let settings = self.settings.clone();
+        let (channels, settings) = (&self.settings.channels, self.settings.clone());
         let mut speakers = self.speakers.all().iter().cloned();
         let speaker = speakers.next().context("a training without a speaker")?;
         let other_speakers = speakers.collect();
         let state = TrainerState { speaker, other_speakers, settings, step: self.step, best: self.best };
         let mut facts = serde_json::to_value(&state)?;
-        if state.settings.channels.is_empty()
+        facts["settings"] = to_stored("gan", &self.settings)?;
+        if channels.is_empty()
             && let Some(settings) = facts["settings"].as_object_mut()
         {
             // The key is only written for trainings with channels.

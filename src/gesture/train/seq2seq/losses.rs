@@ -5,7 +5,7 @@
 use crate::train::gan::losses::{discriminator_loss, generator_loss};
 use candle_core::{Result, Tensor};
 use candle_nn::loss::mse;
-use orator_dataset::config::{AdversarialLoss, ContinuityLoss, DistanceLoss, ReachLoss, Seq2seqConfig};
+use orator_dataset::config::{AdversarialLoss, ContinuityLoss, DistanceLoss, Seq2seqConfig, VarianceLoss};
 
 /// Added under a square root, whose derivative is infinite at 0.
 const TINY: f64 = 1e-12;
@@ -52,7 +52,7 @@ fn steps(poses: &Tensor) -> Result<Tensor> {
 
 /// Loss settings of the adversarial network: mean squared error, no variance reward.
 pub fn adversarial_settings(settings: &Seq2seqConfig) -> Seq2seqConfig {
-    Seq2seqConfig { distance: DistanceLoss::Mse, lambda_reach: 0.0, ..settings.clone() }
+    Seq2seqConfig { distance: DistanceLoss::Mse, lambda_variance: 0.0, ..settings.clone() }
 }
 
 /// Weighted sum of all losses; `logits` are the discriminator's for the generated poses, if there is a discriminator.
@@ -72,12 +72,12 @@ pub fn total(settings: &Seq2seqConfig, generated: &Tensor, real: &Tensor, logits
         };
         add(part, settings.lambda_continuity)?;
     }
-    if settings.lambda_reach != 0.0 {
-        let part = match settings.reach {
-            ReachLoss::Excursion => variance_loss_of_code(generated)?,
-            ReachLoss::Variance => variance_loss_of_paper(generated)?,
+    if settings.lambda_variance != 0.0 {
+        let part = match settings.variance_loss {
+            VarianceLoss::Norm => variance_loss_of_code(generated)?,
+            VarianceLoss::Variance => variance_loss_of_paper(generated)?,
         };
-        add(part, settings.lambda_reach)?;
+        add(part, settings.lambda_variance)?;
     }
     if let Some(logits) = logits {
         add(generator_loss(AdversarialLoss::Log, logits)?, settings.lambda_adversarial)?;
@@ -127,7 +127,7 @@ mod tests {
         let paper_settings = Seq2seqConfig {
             distance: DistanceLoss::Mse,
             continuity: ContinuityLoss::Poses,
-            reach: ReachLoss::Variance,
+            variance_loss: VarianceLoss::Variance,
             ..Seq2seqConfig::default()
         };
         for settings in [Seq2seqConfig::default(), paper_settings] {

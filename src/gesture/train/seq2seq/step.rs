@@ -12,7 +12,7 @@ use crate::train::optim::adam::{self, Adam};
 use crate::train::resume;
 use anyhow::{Context, Result, ensure};
 use candle_core::Tensor;
-use orator_dataset::config::Seq2seqConfig;
+use orator_dataset::config::{Seq2seqConfig, to_stored};
 use orator_formats::checkpoint;
 use orator_nn::Mode;
 use orator_nn::params::Params;
@@ -171,7 +171,9 @@ impl SequenceTrainer {
 
     fn stored(&self) -> Result<Value> {
         let (speaker, settings) = (self.metadata.clone(), self.settings.clone());
-        Ok(serde_json::to_value(SequenceState { speaker, settings, step: self.step, best: self.best })?)
+        let mut facts = serde_json::to_value(SequenceState { speaker, settings, step: self.step, best: self.best })?;
+        facts["settings"] = to_stored("seq2seq", &self.settings)?;
+        Ok(facts)
     }
 
     /// Restores the tensors, the step and the best score of a checkpoint.

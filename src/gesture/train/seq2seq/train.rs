@@ -141,7 +141,7 @@ fn initialise(
     let (fps, poses) = (source.fps(), source.pose_format()?);
     let word = vectors.map_or(WORD_DIM, WordVectors::dim);
     let sizes = |n_words| Config {
-        hears_context: settings.hears_context,
+        hears_context: settings.audio_context,
         ..network_config(fps, poses.n_features(), n_words, [settings.hidden, word])
     };
     let splits = source.sequences(&poses, sizes(0).context)?;
@@ -237,13 +237,13 @@ impl ValidatedTraining for SequenceTraining<'_> {
     }
 
     fn step(&mut self) -> Result<StepReport> {
-        let Seq2seqConfig { seed, batch, own_previous, .. } = self.trainer.settings;
+        let Seq2seqConfig { seed, batch, rollout_previous, .. } = self.trainer.settings;
         let which = sample_windows(seed, self.trainer.step, batch, self.loader.len());
         let mut batch = self.loader.batch(&which)?;
-        if own_previous > 0.0 {
+        if rollout_previous > 0.0 {
             // The segments and the dropout use other derived seeds.
             let rng = &mut step_rng(seed.rotate_left(32), self.trainer.step);
-            roll_out_previous(&mut batch, &which, self.loader, &*self.trainer.network, own_previous, rng)?;
+            roll_out_previous(&mut batch, &which, self.loader, &*self.trainer.network, rollout_previous, rng)?;
         }
         let losses = self.trainer.step(&batch)?;
         let SequenceLosses { total, l1, gradient_norm, .. } = losses;
