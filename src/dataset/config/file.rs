@@ -260,7 +260,11 @@ impl Reader {
             );
         };
         if key.starts_with("speaker") {
-            return self.problem(key, SourceLocation::CommandLine, "speakers are written in the file".to_owned());
+            return self.problem(
+                key,
+                SourceLocation::CommandLine,
+                "speakers can only be set in the configuration file".to_owned(),
+            );
         }
         let is_key = !key.is_empty() && key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '.');
         let quoted = toml::Value::String(value.to_owned()).to_string();
@@ -272,7 +276,11 @@ impl Reader {
                 self.notes.extend(former::rename(document.get_mut(), &|_| SourceLocation::CommandLine));
                 self.merge(document.get_ref(), table, "", &|_| SourceLocation::CommandLine);
             }
-            _ => self.problem(key, SourceLocation::CommandLine, "not a key of the configuration".to_owned()),
+            _ => self.problem(
+                key,
+                SourceLocation::CommandLine,
+                "unknown key: expected SECTION.KEY, like extract.fps".to_owned(),
+            ),
         }
     }
 }
@@ -304,9 +312,9 @@ fn to_type_of(value: &DeValue<'_>, default: &Value) -> Result<Value, String> {
         (Value::String(_), _) => type_error("a string"),
         (Value::Integer(_), DeValue::Integer(i)) => match i64::from_str_radix(i.as_str(), i.radix()) {
             Ok(i) if i >= 0 => Ok(Value::Integer(i)),
-            _ => Err(format!("{i} is out of range: expected a whole number from 0 up")),
+            _ => Err(format!("{i} is out of range: expected an integer of at least 0")),
         },
-        (Value::Integer(_), _) => type_error("a whole number"),
+        (Value::Integer(_), _) => type_error("an integer"),
         (Value::Float(_), DeValue::Float(f)) => to_finite(f.as_str()),
         (Value::Float(_), DeValue::Integer(i)) => match i64::from_str_radix(i.as_str(), i.radix()) {
             Ok(i) => Ok(Value::Float(i as f64)),
@@ -326,18 +334,18 @@ fn to_type_of(value: &DeValue<'_>, default: &Value) -> Result<Value, String> {
 
 fn to_finite(text: &str) -> Result<Value, String> {
     let number = text.parse::<f64>().ok().filter(|number| number.is_finite());
-    number.map(Value::Float).ok_or_else(|| format!("{text} is no finite number"))
+    number.map(Value::Float).ok_or_else(|| format!("{text} is not a finite number"))
 }
 
 /// Message for a value of the right TOML type that its setting rejects; `message` is that of serde.
 pub fn rejection_message(value: &Value, message: &str) -> String {
     if let Some(at) = message.find("expected \"auto\"") {
-        return format!("{value} does not fit: {}", message[at..].lines().next().unwrap_or_default());
+        return format!("invalid value {value}: {}", message[at..].lines().next().unwrap_or_default());
     }
     let Value::String(text) = value else { return format!("{value} is too large") };
     let expected = message.strip_prefix(&format!("unknown variant `{text}`, ")).unwrap_or(message);
     let known: Vec<String> = expected.split('`').skip(1).step_by(2).map(str::to_owned).collect();
-    format!("{text:?} is not known: {}{}", expected.replace('`', "\""), did_you_mean(text, known.iter()))
+    format!("unknown value {text:?}: {}{}", expected.replace('`', "\""), did_you_mean(text, known.iter()))
 }
 
 /// ` (did you mean X?)` if a known key is similar to `name`, otherwise an empty string.

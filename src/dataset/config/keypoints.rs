@@ -53,18 +53,17 @@ pub fn of_speaker(
         }
     }
     let is_one = paths.len() == 1 && sounds.len() == 1;
-    let source =
-        |path: PathBuf| {
-            let name = video_name(&path);
-            let sound = sounds.iter().find(|sound| is_one || video_name(sound) == name).cloned();
-            let sound = sound.ok_or_else(|| if speaker.audio.is_empty() {
-                "keypoints have no sound; write `audio = [\"FOLDER\"]` beside `keypoints` (a folder, a pattern or a \
+    let source = |path: PathBuf| {
+        let name = video_name(&path);
+        let sound = sounds.iter().find(|sound| is_one || video_name(sound) == name).cloned();
+        let sound = sound.ok_or_else(|| if speaker.audio.is_empty() {
+                "keypoint files contain no audio: add `audio = [\"FOLDER\"]` beside `keypoints` (a folder, a pattern or a \
                      file; a sound is found by the name of its keypoints)"
                     .to_owned()
-            } else { format!("no sound called {name} is in `audio`; name it like the keypoints, as in {name}.wav") });
-            let fps = FrameRate::nearest(speaker.fps).filter(|_| speaker.fps > 0.0);
-            (path, KeypointSource { fps, image_size: speaker.image_size(), sound })
-        };
+            } else { format!("no file named {name} is listed in `audio`: name it after the keypoint file, as in {name}.wav") });
+        let fps = FrameRate::nearest(speaker.fps).filter(|_| speaker.fps > 0.0);
+        (path, KeypointSource { fps, image_size: speaker.image_size(), sound })
+    };
     paths.into_iter().map(source).collect()
 }
 
@@ -81,7 +80,12 @@ fn expand_entry(entry: &str, root: &SearchRoot, missing: &mut Vec<String>) -> Re
         let has_frames = || is_json(&path) && entry.contains(['*', '?', '[']) && is_frame(&path);
         if *frames_in.entry(parent.clone()).or_insert_with(has_frames) { found.push(parent) } else { found.push(path) }
     }
-    let nothing = || format!("{entry}: no keypoints are there ({}, or folders of frames)", EXTENSIONS.join(", "));
+    let nothing = || {
+        format!(
+            "{entry}: no keypoint files found: expected {}, or folders with a file per frame",
+            EXTENSIONS.join(", ")
+        )
+    };
     if found.is_empty() { Err(nothing()) } else { Ok(found) }
 }
 
@@ -158,7 +162,8 @@ mod tests {
                 found.into_iter().map(|(path, source)| (video_name(&path), source.sound)).collect();
             assert_eq!(missing, Vec::<String>::new());
             let sound = |name: &str| Ok(dir.path().join("sound").join(name));
-            let none = Err("no sound called c is in `audio`; name it like the keypoints, as in c.wav".to_owned());
+            let none =
+                Err("no file named c is listed in `audio`: name it after the keypoint file, as in c.wav".to_owned());
             let expected = [("c", none), ("b", sound("b.m4a")), ("talk", sound("TALK.wav"))];
             assert_eq!(found, expected.map(|(name, sound)| (name.to_owned(), sound)), "{entries:?}");
         }
@@ -167,8 +172,8 @@ mod tests {
             of_speaker(&speaker(&["mm/c.json", "none/*.npz"], &[]), &SearchRoot::new(dir.path(), &[]), &mut missing);
         let source = &found[&dir.path().join("mm/c.json")];
         assert_eq!((source.fps, source.image_size), (Some(FrameRate::new(30_000, 1001)), None));
-        assert!(source.sound.as_ref().unwrap_err().contains("write `audio = "));
-        assert!(missing.len() == 1 && missing[0].contains("none/*.npz: no file matches"), "{missing:?}");
+        assert!(source.sound.as_ref().unwrap_err().contains("add `audio = "));
+        assert!(missing.len() == 1 && missing[0].contains("none/*.npz: no matching file"), "{missing:?}");
         // A single keypoint file and a single sound are matched regardless of their names.
         let found =
             of_speaker(&speaker(&["mm/c.json"], &["sound/b.m4a"]), &SearchRoot::new(dir.path(), &[]), &mut missing);

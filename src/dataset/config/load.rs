@@ -46,7 +46,10 @@ impl fmt::Display for ConfigError {
 /// A file that cannot be read, or `ConfigError` with every problem at once.
 pub fn load(file: &Path, sets: &[String]) -> Result<Config> {
     let text = input::read_text(file, input::MOST_TEXT).with_context(|| {
-        format!("cannot read the configuration {}; `orator init DIR` writes one, -c FILE names another", file.display())
+        format!(
+            "cannot read the configuration {}: create it with `orator init DIR`, or give its path with -c FILE",
+            file.display()
+        )
     })?;
     resolve(&text, sets, std::path::absolute(file)?)
 }
@@ -65,7 +68,7 @@ fn resolve(text: &str, sets: &[String], file: PathBuf) -> Result<Config> {
     let unicode = |folder: &Path| -> Result<String> {
         Ok(folder
             .to_str()
-            .with_context(|| format!("the folder {} has a name that is no text", folder.display()))?
+            .with_context(|| format!("the path of the folder {} is not valid UTF-8: rename it", folder.display()))?
             .into())
     };
     let folder = unicode(file.parent().unwrap_or(Path::new("")))?;
@@ -149,7 +152,7 @@ mod tests {
             [
                 "line 2: gan.lambda_speed: given in line 4 too, as gan.advanced.lambda_speed; keep one",
                 "line 5: gan.advanced.lambda_sped: unknown key (did you mean lambda_speed?)",
-                "line 6: gan.advanced.seed: expected a whole number, found string",
+                "line 6: gan.advanced.seed: expected an integer, found string",
             ]
         );
         assert_eq!(
@@ -186,7 +189,7 @@ mod tests {
             [
                 "line 2: extract.fps: 5000000000 is too large",
                 "line 4: dataset.test: 7 is out of range: expected 0 to 0.9",
-                "line 4: dataset.test: validation and test together leave less than 5 % to train on",
+                "line 4: dataset.test: validation and test leave less than 5 % for training",
                 "--set: dataset.max_mb: 4294967296 is too large",
             ]
         );
@@ -232,9 +235,9 @@ mod tests {
             [
                 "line 2: segment.shot_threshold: 7 is out of range: expected 0 to 1",
                 "line 4: extract.fsp: unknown key (did you mean fps?)",
-                "line 6: work.jobs: expected a whole number, found string",
+                "line 6: work.jobs: expected an integer, found string",
                 "line 7: speaker[0]: the key videos is missing",
-                "line 8: speaker[0].name: \"a b\": expected letters, digits, - and _ (it names folders)",
+                "line 8: speaker[0].name: \"a b\": expected letters, digits, - and _ (the name is used for folders)",
                 "--set: lift.smooth_arms: expected KEY=VALUE, like extract.fps=15",
                 "--set: gan.batch: 0 is out of range: expected 2 to 4096 windows",
                 "--set: nothing: unknown key",
@@ -245,10 +248,10 @@ mod tests {
     #[test]
     fn an_unknown_value_is_rejected_with_a_list_of_valid_ones() {
         for (set, expected) in [
-            ("gan.preset=ligth", "\"ligth\" is not known: expected \"light\" or \"paper\" (did you mean light?)"),
-            ("gan.representation=anything", "\"anything\" is not known: expected \"bones\" or \"positions\""),
-            ("gan.adversarial=hinge", "\"hinge\" is not known: expected \"least-squares\" or \"log\""),
-            ("gan.device=`gpu`", "\"`gpu`\" is not known: expected \"cpu\" or \"cuda\""),
+            ("gan.preset=ligth", "unknown value \"ligth\": expected \"light\" or \"paper\" (did you mean light?)"),
+            ("gan.representation=anything", "unknown value \"anything\": expected \"bones\" or \"positions\""),
+            ("gan.adversarial=hinge", "unknown value \"hinge\": expected \"least-squares\" or \"log\""),
+            ("gan.device=`gpu`", "unknown value \"`gpu`\": expected \"cpu\" or \"cuda\""),
         ] {
             let (key, _) = set.split_once('=').unwrap();
             assert_eq!(problems("", &[set]), [format!("--set: {key}: {expected}")]);
@@ -280,7 +283,9 @@ mod tests {
         let messages = problems("", &["segment.max_body_gap_secs=1.5", "segment.max_hand_gap_secs=60"]).join("\n");
         for key in ["segment.max_body_gap_secs: 1.5", "segment.max_hand_gap_secs: 60"] {
             assert!(
-                messages.contains(&format!("{key} is out of range: expected 0 to 1 seconds, all that lift fills")),
+                messages.contains(&format!(
+                    "{key} is out of range: expected 0 to 1 seconds, the longest gap that lift fills"
+                )),
                 "{messages}"
             );
         }

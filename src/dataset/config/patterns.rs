@@ -62,7 +62,7 @@ pub fn expand(
         .into_iter()
         .filter(|path| has_extension(path, extensions))
         .collect();
-    let nothing = || format!("{entry}: the folder holds no {what} ({})", extensions.join(", "));
+    let nothing = || format!("{entry}: the folder contains no {what}: expected {}", extensions.join(", "));
     if paths.is_empty() { Err(nothing()) } else { Ok(paths) }
 }
 
@@ -85,7 +85,7 @@ pub fn matches(entry: &str, root: &SearchRoot, missing: &mut Vec<String>) -> Res
             let matches =
                 glob::glob(&pattern.to_string_lossy()).map_err(|error| format!("{entry}: no pattern: {error}"))?;
             let mut report_unreadable =
-                |error: glob::GlobError| missing.push(format!("{entry}: cannot look there: {error}"));
+                |error: glob::GlobError| missing.push(format!("{entry}: cannot read the folder: {error}"));
             paths.extend(matches.filter_map(|found| found.map_err(&mut report_unreadable).ok()));
         }
         Ok(paths)
@@ -106,7 +106,7 @@ pub fn matches(entry: &str, root: &SearchRoot, missing: &mut Vec<String>) -> Res
     let non_utf8 = folders.iter().flat_map(|folder| non_utf8_files(rest, folder));
     missing.extend(non_utf8.filter(|path| !root.is_own(path)).map(|path| not_utf8_message(&path)));
     if paths.is_empty() && missing.len() == n_missing {
-        Err(format!("{entry}: no file matches, looked in {}", folder.display()))
+        Err(format!("{entry}: no matching file in {}", folder.display()))
     } else {
         Ok(paths)
     }
@@ -139,7 +139,7 @@ fn non_utf8_files(entry: &str, folder: &Path) -> Vec<PathBuf> {
 
 /// Message for a path that is not valid UTF-8.
 pub fn not_utf8_message(path: &Path) -> String {
-    format!("{}: its name is no text (UTF-8); rename it", path.display())
+    format!("{}: the file name is not valid UTF-8: rename it", path.display())
 }
 
 /// Sorted paths of the entries of a folder.
@@ -179,6 +179,6 @@ mod tests {
         assert_eq!(found("a/**/c/*.mp4").unwrap(), [at("a/b/c/1.mp4")]);
         assert_eq!(found("*/b/**/1.mp4").unwrap(), [at("a/b/c/1.mp4")]);
         assert!(found("a**/*.mp4").unwrap_err().contains("no pattern"));
-        assert!(found("**/*.mkv").unwrap_err().contains("no file matches"));
+        assert!(found("**/*.mkv").unwrap_err().contains("no matching file"));
     }
 }

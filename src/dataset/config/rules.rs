@@ -48,10 +48,10 @@ pub fn check(settings: &Settings, locations: &BTreeMap<String, SourceLocation>) 
         }
     }
     if settings.dataset.validation + settings.dataset.test > 0.95 {
-        rules.problem("dataset.test", "validation and test together leave less than 5 % to train on".to_owned());
+        rules.problem("dataset.test", "validation and test leave less than 5 % for training".to_owned());
     }
     if !settings.gan.window_frames.is_multiple_of(32) {
-        rules.problem("gan.window_frames", format!("{} is not a multiple of 32", settings.gan.window_frames));
+        rules.problem("gan.window_frames", format!("{}: expected a multiple of 32", settings.gan.window_frames));
     }
     rules.speakers(settings);
     rules.problems
@@ -74,25 +74,25 @@ impl Rules<'_> {
             let key = format!("speaker[{at}].name");
             let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
             if speaker.name.is_empty() || !speaker.name.chars().all(plain) {
-                let message = "expected letters, digits, - and _ (it names folders)";
+                let message = "expected letters, digits, - and _ (the name is used for folders)";
                 self.problem(&key, format!("{:?}: {message}", speaker.name));
             } else if !seen.insert(speaker.name.to_ascii_lowercase()) {
-                self.problem(&key, format!("{:?} is there twice", speaker.name));
+                self.problem(&key, format!("{:?} is used by two speakers: rename one", speaker.name));
             }
             if speaker.fps != 0.0 && !(1.0..=1000.0).contains(&speaker.fps) {
-                let message = format!("{} is no frame rate: expected 1 to 1000 frames a second", speaker.fps);
+                let message = format!("invalid frame rate {}: expected 1 to 1000 frames per second", speaker.fps);
                 self.problem(&format!("speaker[{at}].fps"), message);
             }
             if !speaker.size.is_empty() && speaker.image_size().is_none() {
                 let message =
-                    format!("{:?} is no size: expected width and height in pixels, \"1280x720\"", speaker.size);
+                    format!("invalid size {:?}: expected width and height in pixels, like \"1280x720\"", speaker.size);
                 self.problem(&format!("speaker[{at}].size"), message);
             }
             // If neither key is given, the parser has already reported the missing key.
             let is_written = |name: &str| self.locations.contains_key(&format!("speaker[{at}].{name}"));
             let is_empty = speaker.videos.is_empty() && speaker.keypoints.is_empty();
             if is_empty && (is_written("videos") || is_written("keypoints")) {
-                self.problem(&format!("speaker[{at}].videos"), "no video named".to_owned());
+                self.problem(&format!("speaker[{at}].videos"), "no video is listed".to_owned());
             }
         }
     }

@@ -112,7 +112,7 @@ section! {
 section! {
     /// `[extract]`: the dataset's clock.
     ExtractConfig {
-        fps: u32 = 15 => (1.0, 120.0, "frames a second"),
+        fps: u32 = 15 => (1.0, 120.0, "frames per second"),
         audio_track: usize = 0 => (0.0, 100.0, ""),
         fix_offset: bool = false,
         keep_frames: bool = false,
@@ -151,19 +151,19 @@ section! {
         shot_threshold: f64 = 0.2 => (0.0, 1.0, ""),
         min_frames: usize = 64 => (1.0, 1e6, "frames"),
         joint_score: f64 = 0.3 => (0.0, 1.0, ""),
-        max_body_gap_secs: f64 = 0.34 => (0.0, 1.0, "seconds, all that lift fills"),
-        max_hand_gap_secs: f64 = 1.0 => (0.0, 1.0, "seconds, all that lift fills"),
+        max_body_gap_secs: f64 = 0.34 => (0.0, 1.0, "seconds, the longest gap that lift fills"),
+        max_hand_gap_secs: f64 = 1.0 => (0.0, 1.0, "seconds, the longest gap that lift fills"),
         min_hand_share: f64 = 0.5 => (0.0, 1.0, ""),
         max_rest_move: f64 = 0.1 => (0.0, 1.0, "shoulder widths"),
         min_shoulder_px: f64 = 40.0 => (1.0, 1e5, "pixels"),
-        min_sound_db: f64 = -50.0 => (-120.0, 0.0, "dB of full scale"),
+        min_sound_db: f64 = -50.0 => (-120.0, 0.0, "dBFS"),
         speech: SpeechRule = SpeechRule::Auto,
         min_speech: f64 = 0.4 => (0.0, 1.0, ""),
         min_lip_sync: f64 = 0.1 => (-1.0, 1.0, ""),
         max_quiet_secs: f64 = 3.0 => (0.0, 60.0, "seconds"),
-        min_change: f64 = 0.03 => (0.0, 255.0, "steps of 8-bit colour"),
+        min_change: f64 = 0.03 => (0.0, 255.0, "levels of 8-bit colour"),
         #[serde(alias = "max_still_secs")]
-        max_static_secs: f64 = 0.5 => (0.0, 1.0, "seconds, all that lift fills"),
+        max_static_secs: f64 = 0.5 => (0.0, 1.0, "seconds, the longest gap that lift fills"),
         min_facing: f64 = 1.0 => (-10.0, 10.0, "neck-nose distances"),
         max_nose_off: f64 = 1.0 => (0.0, 10.0, "half shoulder widths"),
         max_people: u32 = 5 => (1.0, 255.0, "people"),

@@ -33,13 +33,13 @@ pub fn of_speaker(
         let unit = if paths.len() == 1 && units.len() == 1 { units.first() } else { named() };
         let file = path.display();
         match unit {
-            _ if !path.is_file() => missing.push(format!("transcripts: {file} is no file")),
-            None => missing.push(format!("transcripts: no video is called like {file}; name it like its video")),
+            _ if !path.is_file() => missing.push(format!("transcripts: {file} is not a file")),
+            None => missing.push(format!("transcripts: {file} matches no video: name it after its video")),
             Some(unit) => {
                 let first = found.entry(unit.video.clone()).or_insert_with(|| path.clone());
                 if first != path {
                     let (first, video) = (first.display(), unit.source.display());
-                    missing.push(format!("transcripts: {first} and {file} are both of {video}; leave one out"));
+                    missing.push(format!("transcripts: {first} and {file} both belong to {video}: remove one"));
                 }
             }
         }
@@ -89,6 +89,6 @@ mod tests {
         assert_eq!(find(&["t/d.srt"], &units[..1]).0, ["a.mp4 d.srt"]);
         let (found, missing) = find(&["gone.srt", "t/*.ctm"], &units);
         assert!(found.is_empty() && missing.len() == 2, "{missing:?}");
-        assert!(missing.iter().any(|message| message.contains("gone.srt is no file")), "{missing:?}");
+        assert!(missing.iter().any(|message| message.contains("gone.srt is not a file")), "{missing:?}");
     }
 }

@@ -65,8 +65,7 @@ fn of_speaker(speaker: &SpeakerConfig, root: &SearchRoot) -> Videos {
     found.retain(|_, unit: &mut Unit| !speaker.exclude.iter().any(|entry| names(entry, &unit.source, folder)));
     for entry in speaker.mirrored.iter().filter(|entry| !entry.contains(['*', '?', '['])) {
         if !found.values().any(|unit| names(entry, &unit.source, folder)) {
-            missing
-                .push(format!("mirrored = [{entry:?}]: none of the videos is called so; correct or remove the entry"));
+            missing.push(format!("mirrored = [{entry:?}]: no video has this name: correct or remove the entry"));
         }
     }
     let mut splits = BTreeMap::new();
@@ -78,12 +77,10 @@ fn of_speaker(speaker: &SpeakerConfig, root: &SearchRoot) -> Videos {
                 named.map(|unit| (unit.video.clone(), splits.insert(unit.video.clone(), split))).collect();
             let list = split.name();
             if before.is_empty() && !entry.contains(['*', '?', '[']) {
-                missing.push(format!(
-                    "{list} = [{entry:?}]: none of the videos is called so; correct or remove the entry"
-                ));
+                missing.push(format!("{list} = [{entry:?}]: no video has this name: correct or remove the entry"));
             }
             for other in before.iter().filter_map(|(_, was)| was.filter(|was| *was != split)) {
-                missing.push(format!("{entry:?} is named in {} and in {list}; take it out of one", other.name()));
+                missing.push(format!("{entry:?} is listed in {} and in {list}: remove one", other.name()));
             }
         }
     }
@@ -108,7 +105,7 @@ fn add(found: &mut BTreeMap<String, Unit>, speaker: &str, path: PathBuf, folder:
         return Ok(video);
     }
     let (first, second) = (unit.source.display(), path.display());
-    Err(format!("{first} and {second} would both be called {video} in the work folder; rename the second"))
+    Err(format!("{first} and {second} would both be named {video} in the work folder: rename the second"))
 }
 
 /// Whether an entry refers to the video: by its path, its file name, or a pattern for one of them.
@@ -234,7 +231,7 @@ mod tests {
         for entries in [&[&*first, &*second][..], &["*.mp4"]] {
             let videos = of_speaker(&host(entries), &root(dir.path()));
             assert_eq!((videos.units.len(), videos.missing.len()), (1, 1), "{:?}", videos.missing);
-            assert!(videos.missing[0].contains("would both be called video-"), "{:?}", videos.missing);
+            assert!(videos.missing[0].contains("would both be named video-"), "{:?}", videos.missing);
         }
         assert_eq!(of_speaker(&host(&[&first, &first]), &root(dir.path())).missing, [""; 0]);
     }
@@ -249,7 +246,7 @@ mod tests {
         for entry in [".", "*.mp4"] {
             let videos = of_speaker(&host(&[entry]), &root(dir.path()));
             assert_eq!((videos.units.len(), videos.missing.len()), (1, 2), "{:?}", videos.missing);
-            assert!(videos.missing.iter().all(|missing| missing.contains("no text")), "{:?}", videos.missing);
+            assert!(videos.missing.iter().all(|missing| missing.contains("not valid UTF-8")), "{:?}", videos.missing);
         }
     }
 

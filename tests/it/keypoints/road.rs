@@ -113,21 +113,24 @@ fn what_the_files_do_not_say_is_asked_for_by_its_key() {
     foreign::openpose(&dir.path().join("kp/clip"), &foreign::sample(30, RATE), OpenPoseOrder::Body25);
     std::fs::write(dir.path().join("other.wav"), "").unwrap();
     for (keys, expected) in [
-        ("keypoints = \"kp\"", "kp/clip: keypoints have no sound; write `audio = [\"FOLDER\"]` beside `keypoints`"),
+        ("keypoints = \"kp\"", "kp/clip: keypoint files contain no audio: add `audio = [\"FOLDER\"]` beside `keypoints`"),
         ("keypoints = \"kp\"\naudio = \"none\"", "the sound of this stage: cannot read"),
-        ("keypoints = [\"kp\", \"none/*.npz\"]\naudio = \"other.wav\"", "none/*.npz: no file matches"),
+        ("keypoints = [\"kp\", \"none/*.npz\"]\naudio = \"other.wav\"", "none/*.npz: no matching file"),
         ("keypoints = \"kp\"\naudio = \"other.wav\"", "kp/clip: it does not say its frames a second; write `fps = 25`"),
         (
             "keypoints = \"kp\"\naudio = \"other.wav\"\nfps = 15",
             "kp/clip: it does not say its picture's size; write `size = \"1280x720\"`",
         ),
-        ("keypoints = \"kp\"\nfps = 2000", "speaker[0].fps: 2000 is no frame rate: expected 1 to 1000 frames a second"),
+        (
+            "keypoints = \"kp\"\nfps = 2000",
+            "speaker[0].fps: invalid frame rate 2000: expected 1 to 1000 frames per second",
+        ),
         (
             "keypoints = \"kp\"\nsize = \"wide\"",
-            "speaker[0].size: \"wide\" is no size: expected width and height in pixels",
+            "speaker[0].size: invalid size \"wide\": expected width and height in pixels",
         ),
         ("fps = 15", "speaker[0]: the key videos is missing"),
-        ("keypoints = []", "speaker[0].videos: no video named"),
+        ("keypoints = []", "speaker[0].videos: no video is listed"),
     ] {
         configure(dir.path(), keys);
         let (code, text) = orator(dir.path(), &["run", "--to", "lift"]);

@@ -100,7 +100,8 @@ fn what_is_missing_is_said_on_the_page() {
     project.name_videos(&[&clip.to_string_lossy(), &gone.to_string_lossy(), "none-*.mp4"]);
     let (answer, html) = report(&project, &[]);
     assert_eq!((&answer.json["n_videos"], &answer.json["kept_secs"]), (&2.into(), &0.0.into()));
-    for words in ["The file is gone", "No verdict yet: orator run.", "none-*.mp4: no file matches", "no motion to show"]
+    for words in
+        ["The file is gone", "No verdict yet: orator run.", "none-*.mp4: no matching file", "no motion to show"]
     {
         assert!(html.contains(words), "{words}");
     }
