@@ -10,12 +10,13 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := build
-.PHONY: test-data setup runtime models readers aligner browser blender validator vrm driver loader build check test prove prove-rule prove-people prove-cluster prove-study demo demo-study clean-demo
+.PHONY: spelling test-data setup runtime models readers aligner browser blender validator vrm driver loader build check test prove prove-rule prove-people prove-cluster prove-study demo demo-study clean-demo
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 ORATOR := $(TARGET)/release/orator
 LAB := $(TARGET)/release/orator-lab
 SKIPPED := $(abspath $(TARGET))/skipped-tests.txt
+export ORATOR_SPELLING ?= $(abspath $(TARGET))/spelling
 export ORATOR_READERS ?= $(abspath $(TARGET)/readers)
 export ORATOR_ALIGNER ?= $(abspath $(TARGET)/aligner)
 export ORATOR_MODELS ?= $(abspath $(TARGET)/models)
@@ -29,7 +30,7 @@ export ORATOR_DRIVER ?= $(abspath $(TARGET)/driver)
 
 setup: ; @.ci/setup/system.sh
 runtime: ; @.ci/setup/onnxruntime.sh
-readers aligner browser blender validator vrm driver loader: ; @.ci/setup/$@.sh
+readers aligner browser blender validator vrm driver loader spelling: ; @.ci/setup/$@.sh
 models: build ; @.ci/setup/models.sh
 
 build: setup runtime
@@ -46,9 +47,10 @@ check:
 	cargo test --release --locked --workspace --lib --bins
 	cargo test --release --locked --test it -- $(QUICK)
 
-test: build models readers aligner browser blender validator vrm driver
+test: build models readers aligner browser blender validator vrm driver spelling
 	@rm -f $(SKIPPED)
 	cargo fmt --check
+	$(ORATOR_SPELLING)/bin/typos
 	cargo clippy --release --locked --workspace --all-targets -- -D warnings
 	cargo test --release --locked --workspace
 	$(MAKE) demo DEMO=$(TARGET)/demo-test DRAW= STEPS=30 SPEECH=1
