@@ -28,4 +28,5 @@ mod robustness;
 mod segment;
 mod study;
 mod train;
+mod vocabulary;
 mod wording;
