@@ -37,7 +37,7 @@ impl fmt::Display for FetchSource {
         match self {
             Self::Present => write!(f, "already present"),
             Self::Mirror(path) => write!(f, "copied from {}", path.display()),
-            Self::MirrorOf(source) => write!(f, "built from mirrored files of {source}"),
+            Self::MirrorOf(source) => write!(f, "built from files of the mirror listed for {source}"),
             Self::Url(url) => write!(f, "downloaded from {url}"),
             Self::Source(source) => write!(f, "built from {source}"),
         }

@@ -131,7 +131,7 @@ fn a_bad_video_fails_alone_and_a_plan_is_kept() {
     let text = std::fs::read_to_string(&plan).unwrap();
     std::fs::write(&plan, text.replace("clip-1", "clip-7")).unwrap();
     let changed = project.answer(&["work", "--plan", "work/plan.json"]);
-    assert!(changed.code == 1 && changed.errors.contains("was changed since"), "{}", changed.errors);
+    assert!(changed.code == 1 && changed.errors.contains("was edited after"), "{}", changed.errors);
     std::fs::write(&plan, &text).unwrap();
     let file = project.dir().join("pipeline.toml");
     let settings = std::fs::read_to_string(&file).unwrap();
