@@ -62,8 +62,11 @@ impl Claim {
     /// failure.
     pub fn read_end(self, folder: &impl SharedFolder) -> Result<Option<UnitEnd>> {
         let file = self.file("end");
-        let damaged =
-            || UnitEnd { worker: String::new(), error: Some(format!("{file} does not say how it ended")), secs: 0.0 };
+        let damaged = || UnitEnd {
+            worker: String::new(),
+            error: Some(format!("unreadable end file {file}; retry the unit with --retry")),
+            secs: 0.0,
+        };
         Ok(folder.read(&file)?.map(|bytes| serde_json::from_slice(&bytes).unwrap_or_else(|_| damaged())))
     }
 }

@@ -17,10 +17,10 @@ use std::path::{Path, PathBuf};
 
 /// Version of the file format; a file of any other version is rejected.
 const VERSION: u32 = 3;
-/// Default length of a piece of a long video, seconds.
-pub const PIECE_SECS: f64 = 600.0;
-/// Videos of at least this many pieces are split among several workers.
-const MIN_SPLIT_PIECES: f64 = 1.5;
+/// Default length of a part of a long video, seconds.
+pub const PART_SECS: f64 = 600.0;
+/// Videos of at least this many parts are split among several workers.
+const MIN_SPLIT_PARTS: f64 = 1.5;
 /// Upper bound of the length of a video, seconds.
 const LONGEST_SECS: f64 = 1e9;
 
@@ -44,7 +44,7 @@ pub struct ClusterPlan {
     pub seal: String,
 }
 
-/// A video to process, or a piece of the work on a long one.
+/// A video to process, or a part of the work on a long one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlannedUnit {
     pub speaker: String,
@@ -67,10 +67,11 @@ pub struct PlannedUnit {
 #[serde(rename_all = "lowercase")]
 pub enum UnitShare {
     /// All stages, as far as they are not up to date.
-    Whole,
+    #[serde(rename = "whole")]
+    AllStages,
     /// The first stage only.
     Extract,
-    /// Piece `idx` of `of` of the stages that can be split.
+    /// Part `idx` of `of` of the stages that can be split.
     Parts { idx: usize, of: usize },
 }
 
@@ -91,19 +92,19 @@ impl PlannedUnit {
     /// Seconds of video that count as processed when this unit has ended, if the duration is known.
     pub fn media_secs(&self) -> Option<f64> {
         match self.share {
-            UnitShare::Whole if self.needs.is_empty() => self.secs,
+            UnitShare::AllStages if self.needs.is_empty() => self.secs,
             UnitShare::Parts { of, .. } => self.secs.map(|secs| secs / of as f64),
-            UnitShare::Whole | UnitShare::Extract => Some(0.0),
+            UnitShare::AllStages | UnitShare::Extract => Some(0.0),
         }
     }
 
-    /// Splits a long video into units with pieces of about `piece_secs` seconds; `needs` holds indices into the result.
-    fn split(self, piece_secs: f64) -> Vec<Self> {
+    /// Splits a long video into units with parts of about `part_secs` seconds; `needs` holds indices into the result.
+    fn split(self, part_secs: f64) -> Vec<Self> {
         let secs = self.secs.unwrap_or(0.0);
-        if secs < MIN_SPLIT_PIECES * piece_secs {
+        if secs < MIN_SPLIT_PARTS * part_secs {
             return vec![self];
         }
-        let of = (secs / piece_secs).round().max(2.0) as usize;
+        let of = (secs / part_secs).round().max(2.0) as usize;
         let first = Self { share: UnitShare::Extract, ..self.clone() };
         let parts = (0..of).map(|idx| Self { share: UnitShare::Parts { idx, of }, needs: vec![0], ..self.clone() });
         let final_unit = Self { needs: (1..=of).collect(), ..self.clone() };
@@ -114,7 +115,7 @@ impl PlannedUnit {
 impl fmt::Display for PlannedUnit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.share {
-            UnitShare::Whole => write!(f, "{}", self.unit()),
+            UnitShare::AllStages => write!(f, "{}", self.unit()),
             UnitShare::Extract => write!(f, "{} (extract)", self.unit()),
             UnitShare::Parts { idx, of } => write!(f, "{} (part {} of {of})", self.unit(), idx + 1),
         }
@@ -122,11 +123,11 @@ impl fmt::Display for PlannedUnit {
 }
 
 /// Splits the videos and sorts the units: units that others depend on first, then by length, longest first.
-pub fn split_and_sort(videos: Vec<PlannedUnit>, piece_secs: f64) -> Vec<PlannedUnit> {
+pub fn split_and_sort(videos: Vec<PlannedUnit>, part_secs: f64) -> Vec<PlannedUnit> {
     let mut units: Vec<PlannedUnit> = Vec::new();
     for video in videos {
         let n_before = units.len();
-        units.extend(video.split(piece_secs).into_iter().map(|mut unit| {
+        units.extend(video.split(part_secs).into_iter().map(|mut unit| {
             unit.needs.iter_mut().for_each(|needed| *needed += n_before);
             unit
         }));
@@ -149,7 +150,7 @@ pub fn split_and_sort(videos: Vec<PlannedUnit>, piece_secs: f64) -> Vec<PlannedU
 
 impl ClusterPlan {
     /// Creates the plan of all videos of a pipeline; videos whose hash is not cached are read completely. `secs`
-    /// returns the duration of a video; long videos are split into pieces of about `piece_secs` seconds.
+    /// returns the duration of a video; long videos are split into parts of about `part_secs` seconds.
     ///
     /// # Errors
     /// The pipeline has no video, or a video, weight file or the program cannot be read.
@@ -158,17 +159,21 @@ impl ClusterPlan {
         sets: &[String],
         program: &Path,
         secs: &dyn Fn(&Path) -> Option<f64>,
-        piece_secs: f64,
+        part_secs: f64,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let videos: Vec<Unit> = pipeline.videos(&[])?.into_iter().flat_map(|videos| videos.units).collect();
-        ensure!(!videos.is_empty(), "{} names no video that is there", pipeline.config().file.display());
+        ensure!(
+            !videos.is_empty(),
+            "{} selects no existing video: check the paths of its [[speaker]] tables",
+            pipeline.config().file.display()
+        );
         let (hashes, inputs) = (pipeline.hashes(), pipeline.source_inputs(&videos)?);
         let task = progress.begin("hashing the videos", videos.len() as u64);
         let mut units = Vec::new();
         for (Unit { speaker, video, source }, inputs) in videos.into_iter().zip(inputs) {
             let sealed = inputs.into_iter().map(|input| SealedInput::new(input, &hashes)).collect::<Result<_>>();
-            let inputs = sealed.with_context(|| format!("no plan without the content of {speaker}/{video}"))?;
+            let inputs = sealed.with_context(|| format!("cannot hash the inputs of {speaker}/{video}"))?;
             // Rounded to milliseconds, which JSON reproduces exactly.
             let secs = secs(&source).map(|secs| (1000.0 * secs).round() / 1000.0);
             units.push(PlannedUnit {
@@ -177,7 +182,7 @@ impl ClusterPlan {
                 source,
                 inputs,
                 secs,
-                share: UnitShare::Whole,
+                share: UnitShare::AllStages,
                 needs: Vec::new(),
             });
             hashes.save_periodically();
@@ -193,7 +198,7 @@ impl ClusterPlan {
             sets: sets.to_vec(),
             settings: settings_hash(config)?,
             models: pipeline.model_hashes()?,
-            units: split_and_sort(units, piece_secs),
+            units: split_and_sort(units, part_secs),
             seal: String::new(),
         };
         plan.seal = plan.compute_seal()?;
@@ -206,16 +211,16 @@ impl ClusterPlan {
     /// The file is not a plan, has another version, or was changed after it was written.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = workdir::read_file(path)
-            .with_context(|| format!("cannot read the plan {}; `orator plan` writes one", path.display()))?;
-        let invalid_plan = || format!("{} is no plan", path.display());
+            .with_context(|| format!("cannot read the plan {} (create one with `orator plan`)", path.display()))?;
+        let invalid_plan = || format!("{} is not a plan: expected a file written by `orator plan`", path.display());
         let known: serde_json::Value = serde_json::from_slice(&bytes).with_context(invalid_plan)?;
-        let advice = "write it anew with `orator plan`";
+        let advice = "create it again with `orator plan`";
         if let Some(version) = known["version"].as_u64().filter(|version| *version != u64::from(VERSION)) {
-            bail!("{} is a plan of version {version}, expected {VERSION}: {advice}", path.display());
+            bail!("{} has plan version {version}, expected {VERSION}: {advice}", path.display());
         }
         let plan: Self = serde_json::from_value(known).with_context(invalid_plan)?;
         let path = path.display();
-        ensure!(plan.seal == plan.compute_seal()?, "{path} was changed since `orator plan` wrote it: write it anew");
+        ensure!(plan.seal == plan.compute_seal()?, "{path} was edited after `orator plan` wrote it: {advice}");
         Ok(plan)
     }
 
@@ -234,7 +239,7 @@ impl ClusterPlan {
 
     /// One unit for each video.
     pub fn videos(&self) -> Vec<PlannedUnit> {
-        self.units.iter().filter(|unit| unit.share == UnitShare::Whole).cloned().collect()
+        self.units.iter().filter(|unit| unit.share == UnitShare::AllStages).cloned().collect()
     }
 
     /// Names of the speakers, sorted.
@@ -267,19 +272,19 @@ impl ClusterPlan {
     /// # Errors
     /// What differs, and what to do.
     pub fn check(&self, pipeline: &Pipeline, program: &Path) -> Result<()> {
-        let advice = "write the plan anew with `orator plan`";
+        let advice = "create the plan again with `orator plan`";
         if hash_file(program)? != self.program {
-            bail!("this program is not the one that wrote the plan: use the same on every machine, or {advice}");
+            bail!("this program differs from the one of the plan: use one version on all machines, or {advice}");
         }
         if settings_hash(pipeline.config())? != self.settings {
             bail!("{} changed since the plan was written: {advice}", self.config.display());
         }
         let models = pipeline.model_hashes()?;
         if let Some((name, _)) = self.models.iter().find(|(name, hash)| models.get(*name) != Some(hash)) {
-            bail!("the model {name} is not the one of the plan: copy the same models to every machine, or {advice}");
+            bail!("the model {name} differs from the one of the plan: use one version on all machines, or {advice}");
         }
         match self.missing(pipeline)?.first() {
-            Some(unit) => bail!("the video {} of the plan is not found here: {advice}", unit.source.display()),
+            Some(unit) => bail!("the video {} of the plan was not found: {advice}", unit.source.display()),
             None => Ok(()),
         }
     }
@@ -334,7 +339,7 @@ impl PlannedUnit {
             source: video.into(),
             inputs: Vec::new(),
             secs: None,
-            share: UnitShare::Whole,
+            share: UnitShare::AllStages,
             needs: Vec::new(),
         }
     }
@@ -352,7 +357,7 @@ mod tests {
     #[test]
     fn long_videos_are_split_and_prerequisites_come_first() {
         let units =
-            split_and_sort(vec![video("short", 300.0), video("long", 1700.0), video("middle", 899.0)], PIECE_SECS);
+            split_and_sort(vec![video("short", 300.0), video("long", 1700.0), video("middle", 899.0)], PART_SECS);
         let names: Vec<String> = units.iter().map(PlannedUnit::to_string).collect();
         let parts = ["host/long (part 1 of 3)", "host/long (part 2 of 3)", "host/long (part 3 of 3)"];
         assert_eq!(names[..2], ["host/long (extract)", "host/middle"]);
@@ -374,7 +379,7 @@ mod tests {
         let file = dir.path().join("plan.json");
         std::fs::write(&file, "{\"version\": 2, \"units\": [{\"bytes\": 1}]}").unwrap();
         let error = ClusterPlan::read(&file).unwrap_err().to_string();
-        assert!(error.contains("version 2, expected 3: write it anew with `orator plan`"), "{error}");
+        assert!(error.contains("version 2, expected 3: create it again with `orator plan`"), "{error}");
     }
 
     #[test]

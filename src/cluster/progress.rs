@@ -24,7 +24,7 @@ pub struct PlanProgress {
     /// Paths that occupy a unit without being a worker's claim: a folder, a pipe or a damaged file.
     pub blocked: Vec<PathBuf>,
     /// Units that were claimed more than once.
-    pub n_taken_over: usize,
+    pub n_reclaimed: usize,
     /// Duration of the video in all units and in those that have ended, seconds; units of unknown length count 0.
     pub media_secs: f64,
     pub ended_media_secs: f64,
@@ -59,7 +59,7 @@ pub fn progress(plan: &ClusterPlan, path: &Path, dead_after: Duration) -> Result
     for (unit, (planned, ClaimState { epoch, has_ended })) in plan.units.iter().zip(states).enumerate() {
         let (claim, secs) = (Claim { unit, epoch }, planned.media_secs().unwrap_or(0.0));
         summary.media_secs += secs;
-        summary.n_taken_over += usize::from(epoch > 1);
+        summary.n_reclaimed += usize::from(epoch > 1);
         if !has_ended && epoch > 0 {
             match claim.read_owner(&folder)? {
                 ClaimOwner::Worker(worker) if is_alive(&worker) => summary.n_claimed += 1,
@@ -100,7 +100,7 @@ fn workers(folder: &DiskFolder, dead_after: Duration) -> Result<Vec<WorkerProgre
     // A fresh file gives the time of the file server, independent of this machine's clock.
     let probe = folder.0.join(WORKERS).join(format!(".now-{}", std::process::id()));
     let changed = |path: &Path| fs::metadata(path).and_then(|meta| meta.modified());
-    fs::write(&probe, b"now").with_context(|| format!("cannot write in {}", folder.0.display()))?;
+    fs::write(&probe, b"now").with_context(|| format!("cannot write to {}", folder.0.display()))?;
     let now = changed(&probe);
     let _ = fs::remove_file(&probe);
     let now = now?;

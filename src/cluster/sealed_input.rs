@@ -33,8 +33,8 @@ impl SealedInput {
     pub fn check(&self, hashes: &HashCache) -> Result<()> {
         ensure!(
             hashes.is_unchanged(&self.path, &self.content)?,
-            "{} changed since the plan was written: write the plan anew with `orator plan`, or restore the {} and work with \
-             --retry",
+            "{} changed since the plan was written: create the plan again with `orator plan`, or restore the {} and run \
+             `orator work --retry`",
             self.path.display(),
             self.role
         );

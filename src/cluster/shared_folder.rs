@@ -33,8 +33,8 @@ impl SharedFolder for DiskFolder {
     fn create(&self, name: &str, bytes: &[u8]) -> Result<bool> {
         static NEXT: AtomicU64 = AtomicU64::new(0);
         let path = self.0.join(name);
-        let folder = path.parent().context("a file without a folder")?;
-        fs::create_dir_all(folder).with_context(|| format!("cannot write in {}", folder.display()))?;
+        let folder = path.parent().context("the file has no parent folder")?;
+        fs::create_dir_all(folder).with_context(|| format!("cannot write to {}", folder.display()))?;
         let token = blake3::hash(bytes).to_hex();
         let draft =
             folder.join(format!(".{}-{}-{}", &token[..16], std::process::id(), NEXT.fetch_add(1, Ordering::Relaxed)));
@@ -64,7 +64,10 @@ impl SharedFolder for DiskFolder {
             Err(error) if is_gone(&error) || is_not_regular(&error) => Ok(Some(Vec::new())),
             // A live worker of another user wrote it: this is no foreign file, and must not be removed.
             Err(error) if error.kind() == ErrorKind::PermissionDenied => Err(error).with_context(|| {
-                format!("cannot read {}: all workers of a plan need one group and a umask such as 002", path.display())
+                format!(
+                    "cannot read {}: the workers of a plan need a common group and a umask such as 002",
+                    path.display()
+                )
             }),
             Err(error) => Err(error).with_context(|| format!("cannot read {}", path.display())),
         }
@@ -115,9 +118,9 @@ mod tests {
                 .map(|worker| {
                     let folder = &folder;
                     scope.spawn(move || {
-                        let made =
+                        let created =
                             |unit: i32| folder.create(&format!("a/{unit}"), format!("worker {worker}").as_bytes());
-                        (0..50).filter(|unit| made(*unit).unwrap()).count()
+                        (0..50).filter(|unit| created(*unit).unwrap()).count()
                     })
                 })
                 .collect();

@@ -152,7 +152,7 @@ fn every_unit_ends_although_workers_die() {
                 }
             }
         }
-        assert!(n_twice <= n_faults, "seed {seed}: {n_twice} units done twice, {n_faults} troubles");
+        assert!(n_twice <= n_faults, "seed {seed}: {n_twice} units done twice, {n_faults} faults");
         assert!(n_faults > 0);
     }
 }
@@ -162,7 +162,7 @@ fn dead_workers_are_replaced_slow_ones_keep_their_claims_and_failures_are_retrie
     let folder = folder(Duration::ZERO, 1);
     let [mut a, mut b] = [0, 1].map(|number| worker(&folder, 2, number, false).claims);
     let secs = Duration::from_secs;
-    let NextUnit::Claimed(first) = a.next(secs(0)).unwrap() else { panic!("nobody has a unit") };
+    let NextUnit::Claimed(first) = a.next(secs(0)).unwrap() else { panic!("no worker claimed a unit") };
     let second = Claim { unit: 1 - first.unit, epoch: 1 };
     assert_eq!(b.next(secs(0)).unwrap(), NextUnit::Claimed(second));
     let beat = |beat| serde_json::to_vec(&Heartbeat { beat, ..Heartbeat::default() }).unwrap();
@@ -174,18 +174,18 @@ fn dead_workers_are_replaced_slow_ones_keep_their_claims_and_failures_are_retrie
     assert!(a.is_mine(first).unwrap());
     // The waiting time grows up to a twelfth of the timeout for dead workers.
     assert_eq!(b.next(secs(60 * 30 + 179)).unwrap(), NextUnit::Wait(secs(15)));
-    let stolen = Claim { epoch: 2, ..first };
-    assert_eq!(b.next(secs(60 * 30 + 179 + 15)).unwrap(), NextUnit::Claimed(stolen));
-    assert!(!a.is_mine(first).unwrap() && b.is_mine(stolen).unwrap());
+    let takeover = Claim { epoch: 2, ..first };
+    assert_eq!(b.next(secs(60 * 30 + 179 + 15)).unwrap(), NextUnit::Claimed(takeover));
+    assert!(!a.is_mine(first).unwrap() && b.is_mine(takeover).unwrap());
     let end = |error: Option<&str>| UnitEnd { worker: "w".to_owned(), error: error.map(str::to_owned), secs: 1.0 };
-    assert!(!a.end(first, &end(None)).unwrap(), "it was taken over");
-    assert!(b.end(stolen, &end(Some("no picture"))).unwrap());
+    assert!(!a.end(first, &end(None)).unwrap(), "the unit was taken over");
+    assert!(b.end(takeover, &end(Some("no image"))).unwrap());
     assert!(b.end(second, &end(None)).unwrap());
     assert_eq!(a.next(secs(0)).unwrap(), NextUnit::AllEnded);
     let mut again = worker(&folder, 2, 7, true).claims;
     let third = Claim { epoch: 3, ..first };
     assert_eq!(again.next(secs(0)).unwrap(), NextUnit::Claimed(third));
-    assert!(again.end(third, &end(Some("no picture"))).unwrap());
+    assert!(again.end(third, &end(Some("no image"))).unwrap());
     assert_eq!(again.next(secs(1)).unwrap(), NextUnit::AllEnded);
 }
 

@@ -60,11 +60,11 @@ pub fn scripts(
     settings: &SlurmSettings,
     training: Option<TaskLimits>,
 ) -> SlurmScripts {
-    let (most, program) = (settings.max_array.max(1), job.program.display().to_string());
+    let (max_array, program) = (settings.max_array.max(1), job.program.display().to_string());
     // Exit code 2 (failed units) is ignored here: the last job reports it.
     let worker = run_and_requeue(&shell(&job.worker())) + "[ \"$code\" -ne 2 ] || code=0\nexit \"$code\"\n";
-    let arrays = (0..job.n_tasks.max(1)).step_by(most).map(|first| {
-        let n = most.min(job.n_tasks.max(1) - first);
+    let arrays = (0..job.n_tasks.max(1)).step_by(max_array).map(|first| {
+        let n = max_array.min(job.n_tasks.max(1) - first);
         settings.head("orator", job.worker_limits, Some([n, job.n_at_once])) + &worker
     });
     let mut last = settings.head("orator-last", job.worker_limits, None) + &run_and_requeue(&shell(&job.last_worker()));
@@ -77,7 +77,7 @@ pub fn scripts(
     let _ = writeln!(
         last,
         "[ \"$code\" -ne 2 ] || echo {} {}\nexit \"$code\"",
-        shell(&["some units failed; when what ails them is mended:".to_owned()]),
+        shell(&["some units failed; after fixing the cause, run:".to_owned()]),
         shell(&[shell(&retry)])
     );
     let training_array = |speakers: &[&str], limits: TaskLimits| {
@@ -87,7 +87,7 @@ pub fn scripts(
             + &format!("set -- {}\nshift \"$SLURM_ARRAY_TASK_ID\"\n{training}exit \"$code\"\n", shell(&names))
     };
     let speakers = plan.speakers();
-    let trainings = training.into_iter().flat_map(|limits| speakers.chunks(most).map(move |some| (some, limits)));
+    let trainings = training.into_iter().flat_map(|limits| speakers.chunks(max_array).map(move |some| (some, limits)));
     SlurmScripts {
         arrays: arrays.collect(),
         last,

@@ -16,7 +16,8 @@ const FILE: &str = "stage_times.json";
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StageTimes {
     /// Hash of the program, settings, models and machine that were timed; the times are invalid for any other.
-    pub made_with: String,
+    #[serde(alias = "made_with")]
+    pub fingerprint: String,
     /// Name of the processor.
     pub processor: String,
     /// Number of videos processed in parallel during the measurement.
@@ -115,7 +116,7 @@ impl StageTimes {
             Workload {
                 total: sum.total + others + n_spans as f64 * span,
                 longest: sum.longest.max(others + span),
-                n_pieces: sum.n_pieces + n_spans,
+                n_spans: sum.n_spans + n_spans,
             }
         })
     }
@@ -130,7 +131,7 @@ impl StageTimes {
     /// video takes longer even with one worker for each of its spans.
     pub fn workers_within(&self, lengths: &[f64], secs: f64) -> Option<usize> {
         let work = self.workload(lengths);
-        (1..=work.n_pieces).find(|workers| work.wall_secs(*workers) <= secs)
+        (1..=work.n_spans).find(|workers| work.wall_secs(*workers) <= secs)
     }
 }
 
@@ -142,14 +143,14 @@ struct Workload {
     /// Seconds for the longest video with one worker for each of its spans.
     longest: f64,
     /// Number of spans, the largest useful number of workers.
-    n_pieces: usize,
+    n_spans: usize,
 }
 
 impl Workload {
     /// Upper bound of the duration under list scheduling (Graham 1969), seconds: the longest chain plus an equal share
-    /// of the rest. With one worker per piece, nothing waits.
+    /// of the rest. With one worker per span, nothing waits.
     fn wall_secs(&self, workers: usize) -> f64 {
-        let rest = if workers < self.n_pieces { self.total - self.longest } else { 0.0 };
+        let rest = if workers < self.n_spans { self.total - self.longest } else { 0.0 };
         self.longest + rest / workers.max(1) as f64
     }
 }
@@ -172,8 +173,8 @@ mod tests {
         assert!(falling.secs_per_sec == 0.0 && falling.fixed_secs > 2.0, "{falling:?}");
         let steep = StageCost::fit(&[(2.0, 0.1), (10.0, 10.0)]);
         assert!(steep.fixed_secs == 0.0 && (0.8..1.1).contains(&steep.secs_per_sec), "{steep:?}");
-        let alike = StageCost::fit(&[(10.0, 20.0), (10.0, 22.0)]);
-        assert!(alike.fixed_secs == 0.0 && (alike.secs_per_sec - 2.1).abs() < 1e-9, "{alike:?}");
+        let equal = StageCost::fit(&[(10.0, 20.0), (10.0, 22.0)]);
+        assert!(equal.fixed_secs == 0.0 && (equal.secs_per_sec - 2.1).abs() < 1e-9, "{equal:?}");
         assert_eq!(StageCost::fit(&[]), StageCost::default());
     }
 
@@ -187,8 +188,8 @@ mod tests {
             assert!(walls.is_sorted_by(|fewer, more| fewer >= more), "{walls:?}");
             for (workers, wall) in (1..).zip(&walls) {
                 assert!(*wall >= chain && *wall >= sum / f64::from(workers), "{workers}: {wall}");
-                let least = 1 + walls.iter().position(|other| other <= wall).unwrap();
-                assert_eq!(times.workers_within(lengths, *wall), Some(least));
+                let min_workers = 1 + walls.iter().position(|other| other <= wall).unwrap();
+                assert_eq!(times.workers_within(lengths, *wall), Some(min_workers));
             }
             assert_eq!(times.workers_within(lengths, chain - 1.0), None);
             assert_eq!(times.limit_hours(lengths, 2), 0.5 + 2.0 * walls[1] / 3600.0);

@@ -54,8 +54,8 @@ pub fn excerpts(lengths: &[f64]) -> Vec<TimedExcerpt> {
 }
 
 /// Hash of everything that the times depend on: program, settings, models, machine and number of jobs.
-pub fn made_with(pipeline: &Pipeline, program: &Path, jobs: usize) -> Result<String> {
-    let made_with = (
+pub fn fingerprint(pipeline: &Pipeline, program: &Path, jobs: usize) -> Result<String> {
+    let inputs = (
         hash_file(program)?,
         settings_hash(pipeline.config())?,
         pipeline.model_hashes()?,
@@ -63,7 +63,7 @@ pub fn made_with(pipeline: &Pipeline, program: &Path, jobs: usize) -> Result<Str
         std::thread::available_parallelism().map_or(1, |n| n.get()),
         jobs,
     );
-    Ok(blake3::hash(&serde_json::to_vec(&made_with)?).to_hex().to_string())
+    Ok(blake3::hash(&serde_json::to_vec(&inputs)?).to_hex().to_string())
 }
 
 /// Times the stages on excerpts of the units of known length, `jobs` in parallel. The excerpts and their artifacts are
@@ -78,13 +78,13 @@ pub fn measure(
     jobs: usize,
     progress: &dyn Progress,
 ) -> Result<StageTimes> {
-    let made_with = made_with(pipeline, program, jobs)?;
+    let fingerprint = fingerprint(pipeline, program, jobs)?;
     let folder = pipeline.config().settings.work.dir.join(FOLDER);
     let timed = time_excerpts(pipeline, units, jobs, &folder, progress);
     let removed = std::fs::remove_dir_all(&folder);
     let times = timed?;
     removed.with_context(|| format!("cannot remove {}", folder.display()))?;
-    Ok(StageTimes { made_with, processor: processor(), jobs, ..times })
+    Ok(StageTimes { fingerprint, processor: processor(), jobs, ..times })
 }
 
 /// Times the stages on excerpts in `folder`.
@@ -96,21 +96,24 @@ fn time_excerpts(
     progress: &dyn Progress,
 ) -> Result<StageTimes> {
     let _ = std::fs::remove_dir_all(folder);
-    std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    std::fs::create_dir_all(folder).with_context(|| format!("cannot create the folder {}", folder.display()))?;
     let lengths: Vec<f64> = units.iter().map(|unit| unit.secs.unwrap_or(0.0)).collect();
     let (mut files, mut secs) = (Vec::new(), BTreeMap::new());
     for (number, excerpt) in excerpts(&lengths).iter().enumerate() {
         let unit = &units[excerpt.unit];
         let to = folder.join(format!("{number:02}.mkv"));
-        let wanted = ExcerptRequest { start_secs: excerpt.start_secs, secs: excerpt.secs, to: to.clone() };
-        let request = MediaRequest { source: unit.source.clone(), excerpt: Some(wanted) };
+        let excerpt = ExcerptRequest { start_secs: excerpt.start_secs, secs: excerpt.secs, to: to.clone() };
+        let request = MediaRequest { source: unit.source.clone(), excerpt: Some(excerpt) };
         // An unreadable video is reported when it is processed.
         if let Ok(Some(copied)) = pipeline.ask_media(&request) {
             secs.insert(to.clone(), copied);
             files.push((unit.speaker.clone(), to));
         }
     }
-    ensure!(!files.is_empty(), "of no video an excerpt can be copied: no time is taken");
+    ensure!(
+        !files.is_empty(),
+        "cannot time the stages: no excerpt could be copied from any video; plan without estimates by --untimed"
+    );
     let work = folder.join("work");
     let task = progress.begin("timing the stages", 1);
     let selection = Selection { to: StageName::Dataset, jobs: Some(jobs), force: true, ..Selection::default() };

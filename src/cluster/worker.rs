@@ -47,15 +47,15 @@ pub struct WorkReport {
     /// Number of units done, including those that were up to date.
     pub done: usize,
     /// Number of units done whose stages were all up to date before.
-    pub fresh: usize,
+    pub up_to_date: usize,
     /// Units that failed, each with its error.
     pub failed: Vec<(String, String)>,
     /// Units that had failed in an earlier session and were not processed again, once every unit has ended.
     pub failed_before: Vec<String>,
-    /// Number of units taken over from dead workers.
-    pub taken_over: usize,
-    /// Number of units given up because other workers had taken them over.
-    pub laid_aside: usize,
+    /// Number of units claimed again after their worker died.
+    pub reclaimed: usize,
+    /// Number of units given up because another worker had claimed them again.
+    pub claim_lost: usize,
     /// Units that cannot be claimed or ended, each with the foreign file at the path of its claim or end.
     pub blocked: BTreeSet<String>,
     /// Whether every unit of the plan, or of this process's share, has ended.
@@ -65,7 +65,7 @@ pub struct WorkReport {
 /// Reason why all workers must stop; `None` if they need not.
 pub(super) fn read_stop(folder: &DiskFolder) -> Result<Option<String>> {
     let text = |reason: Vec<u8>| match reason.is_empty() {
-        true => format!("{} is there", folder.0.join(STOP).display()),
+        true => format!("stop file {}", folder.0.join(STOP).display()),
         false => String::from_utf8_lossy(&reason).into_owned(),
     };
     Ok(folder.read(STOP)?.map(text))
@@ -86,7 +86,7 @@ pub fn work(
     let folder = DiskFolder(plan.folder(path));
     resume_after_stop(&folder)?;
     let dir = &pipeline.config().settings.work.dir;
-    let _lock = workdir::lock_shared(dir).context("no work now")?;
+    let _lock = workdir::lock_shared(dir).context("cannot start a worker")?;
     workdir::sweep_folder(dir, 2);
     let (host, machine) = this_machine();
     let hashes = pipeline.hashes();
@@ -117,7 +117,7 @@ pub fn work(
     };
     let ended: Result<()> = std::thread::scope(|scope| {
         let workers: Vec<_> = (0..options.jobs.max(1)).map(|_| scope.spawn(run)).collect();
-        workers.into_iter().try_for_each(|worker| worker.join().unwrap_or_else(|_| bail!("a worker has panicked")))
+        workers.into_iter().try_for_each(|worker| worker.join().unwrap_or_else(|_| bail!("a worker thread panicked")))
     });
     // Hashes that cannot be saved are computed again next time.
     let _ = hashes.save();
@@ -139,11 +139,11 @@ fn worker_name(host: &str) -> String {
 /// Removes the stop file of a full disk if there is space again.
 fn resume_after_stop(folder: &DiskFolder) -> Result<()> {
     let Some(reason) = read_stop(folder)? else { return Ok(()) };
-    let probe = folder.0.join(format!(".room-{}", std::process::id()));
-    let has_room = std::fs::write(&probe, vec![0; 64 << 20]).is_ok();
+    let probe = folder.0.join(format!(".space-{}", std::process::id()));
+    let has_space = std::fs::write(&probe, vec![0; 64 << 20]).is_ok();
     let _ = std::fs::remove_file(&probe);
-    if !has_room {
-        bail!("{reason}: all workers have stopped; make room and start them again");
+    if !has_space {
+        bail!("all workers have stopped: {reason}; free at least 64 MiB of disk space and start them again");
     }
     workdir::remove_file(&folder.0.join(STOP))
 }
@@ -198,7 +198,7 @@ impl Session<'_> {
         while !self.should_stop()? {
             match claims.next(self.begun.elapsed())? {
                 NextUnit::Claimed(claim) => self.work_on(name, claim, &mut claims, heartbeat)?,
-                NextUnit::Wait(time) if self.options.wait => self.rest(time),
+                NextUnit::Wait(time) if self.options.wait => self.wait(time),
                 NextUnit::Wait(_) | NextUnit::Blocked => break,
                 NextUnit::AllEnded => {
                     self.report().all_ended = true;
@@ -233,7 +233,7 @@ impl Session<'_> {
     }
 
     /// Waits for `time`, or until the program is asked to stop.
-    fn rest(&self, time: Duration) {
+    fn wait(&self, time: Duration) {
         let begun = Instant::now();
         while let Some(left) = time.checked_sub(begun.elapsed()).filter(|_| !self.progress.is_to_stop()) {
             std::thread::sleep(left.min(Duration::from_millis(500)));
@@ -258,7 +258,7 @@ impl Session<'_> {
     /// The reason why all workers must stop.
     fn should_stop(&self) -> Result<bool> {
         if let Some(reason) = read_stop(&self.folder)? {
-            bail!("{reason}: all workers stop; make room and start them again");
+            bail!("all workers stop: {reason}; free at least 64 MiB of disk space and start them again");
         }
         Ok(self.progress.is_to_stop() || self.is_broken.load(Ordering::Relaxed))
     }
@@ -283,7 +283,7 @@ impl Session<'_> {
         let ended = match (planned.check_inputs(self.hashes), planned.share) {
             // Stages that are up to date do not call `check_claim`, so the inputs are also checked here.
             (Err(error), _) => vec![StageOutcome::Failed(Arc::new(error))],
-            (Ok(()), UnitShare::Whole) => run(&StageName::OF_VIDEOS)?,
+            (Ok(()), UnitShare::AllStages) => run(&StageName::OF_VIDEOS)?,
             (Ok(()), UnitShare::Extract) => run(&[StageName::Extract])?,
             (Ok(()), UnitShare::Parts { idx, of }) => {
                 self.pipeline.run_parts(&unit, (idx, of), self.hashes, &check_claim, self.progress)?
@@ -296,23 +296,23 @@ impl Session<'_> {
         heartbeat.content().unit = None;
         if let Some(error) = &failed {
             if error.is::<ClaimLost>() {
-                self.report().laid_aside += 1;
+                self.report().claim_lost += 1;
                 return Ok(());
             }
             if error.is::<NoSpace>() {
                 self.folder.create(STOP, format!("{}: {error:#}", host_of(name)).as_bytes()).ok();
-                return Err(anyhow!("{error:#}").context("the disk is full: all workers stop"));
+                return Err(anyhow!("{error:#}").context("the disk is full, all workers stop"));
             }
         }
         // A failure of a preparatory unit occurs again in the unit of the whole video and is reported there.
-        let is_whole = planned.share == UnitShare::Whole;
-        let error = failed.filter(|_| is_whole).map(|error| format!("{error:#}"));
+        let is_final = planned.share == UnitShare::AllStages;
+        let error = failed.filter(|_| is_final).map(|error| format!("{error:#}"));
         let secs = begun.elapsed().as_secs_f64();
         let is_mine = claims.end(claim, &UnitEnd { worker: name.to_owned(), error: error.clone(), secs })?;
         let was_retried = claim.previous().map_or(Ok(None), |before| before.read_end(&self.folder))?.is_some();
         let mut report = self.report();
-        report.taken_over += usize::from(claim.epoch > 1 && !was_retried);
-        report.laid_aside += usize::from(!is_mine);
+        report.reclaimed += usize::from(claim.epoch > 1 && !was_retried);
+        report.claim_lost += usize::from(!is_mine);
         let mut content = heartbeat.content();
         match error {
             // The unit belongs to another worker now, which may have removed files that this one was writing.
@@ -325,8 +325,8 @@ impl Session<'_> {
                 content.n_done += 1;
                 content.media_secs += planned.media_secs().unwrap_or(0.0);
                 report.done += 1;
-                let is_fresh = is_whole && ended.iter().all(|one| matches!(one, StageOutcome::Skipped(_)));
-                report.fresh += usize::from(is_fresh);
+                let is_up_to_date = is_final && ended.iter().all(|one| matches!(one, StageOutcome::Skipped(_)));
+                report.up_to_date += usize::from(is_up_to_date);
             }
         }
         Ok(())

@@ -44,7 +44,7 @@ impl FileMemory {
             let map = unsafe { Mmap::map(&file) }?;
             Ok(Self { folder: folder.to_owned(), file, map: Arc::new(map), end: 0 })
         };
-        create().with_context(|| format!("{}: no temporary file can be made in this folder", folder.display()))
+        create().with_context(|| format!("cannot create a temporary file in {}", folder.display()))
     }
 
     /// Appends bytes.
@@ -54,9 +54,9 @@ impl FileMemory {
     /// The disk or the file is full.
     pub fn append(&mut self, bytes: &[u8]) -> Result<FileBytes> {
         let (start, end) = (self.end, self.end.saturating_add(bytes.len() as u64));
-        ensure!(end <= CAPACITY, "more than {} GiB of temporary data", CAPACITY >> 30);
+        ensure!(end <= CAPACITY, "temporary data exceeds {} GiB", CAPACITY >> 30);
         let written = self.file.write_all_at(bytes, start);
-        written.with_context(|| format!("{}: temporary data cannot be written here", self.folder.display()))?;
+        written.with_context(|| format!("cannot write temporary data in {}", self.folder.display()))?;
         self.end = end.next_multiple_of(ALIGNMENT);
         Ok(FileBytes { map: self.map.clone(), range: usize::try_from(start)?..usize::try_from(end)? })
     }

@@ -13,13 +13,15 @@ impl ModelEntry {
             (TensorAxes::Nchw, Some([1, channels, height, width])) => ([*height, *width], *channels),
             (TensorAxes::Nhwc, Some([1, height, width, channels])) => ([*height, *width], *channels),
             _ => {
-                bail!("the input's shape must be [1, 3, height, width] or [1, height, width, 3], as picture.axes says")
+                bail!(
+                    "the input shape must be [1, 3, height, width] (picture.axes nchw) or [1, height, width, 3] (nhwc)"
+                )
             }
         };
         let in_range = channels == 3 && size.iter().all(|side| (1..=4096).contains(side));
         ensure!(
             in_range,
-            "the input must have 3 channels and sides of 1 to 4096, not {size:?} with {channels} channels"
+            "the input must have 3 channels and a size of 1 to 4096 px, not {channels} channels and {size:?} px"
         );
         Ok(size.map(|side| side as usize))
     }
@@ -41,7 +43,7 @@ impl ModelEntry {
     pub(crate) fn check_file(&self) -> Result<()> {
         ensure!(
             is_plain_name(&self.file),
-            "file must be the plain name of a file in the folder of the models: {:?}",
+            "file must be the plain name of a file in the models folder, not {:?}",
             self.file
         );
         let hex = self.sha256.len() == 64 && self.sha256.bytes().all(|byte| byte.is_ascii_hexdigit());
@@ -53,19 +55,19 @@ impl ModelEntry {
 
     /// Checks the description without opening the file.
     pub(crate) fn check(&self) -> Result<()> {
-        ensure!(is_plain_name(&self.id), "id must be a plain name");
+        ensure!(is_plain_name(&self.id), "id must be a plain name, not {:?}", self.id);
         if self.role == Role::Speech {
             return super::speech::check(self);
         }
-        ensure!(self.inputs.len() == 1, "it must have exactly one input, not {}", self.inputs.len());
+        ensure!(self.inputs.len() == 1, "inputs must list 1 input, not {}", self.inputs.len());
         let [height, width] = self.input_size()?;
         let numbers = [self.picture.scale].into_iter().chain(self.picture.mean).chain(self.picture.std);
         let is_valid = numbers.clone().all(f64::is_finite) && !self.picture.std.contains(&0.0);
-        ensure!(is_valid, "picture: scale, mean and std must be finite, std not 0");
+        ensure!(is_valid, "picture: scale, mean and std must be finite, and std not 0");
         for name in self.decode.names() {
             ensure!(
                 self.outputs.iter().any(|port| port.name == name),
-                "decode names the output {name:?}, which is not there"
+                "decode refers to the output {name:?}, which outputs does not list"
             );
         }
         self.decode.check()?;
@@ -79,7 +81,7 @@ impl ModelEntry {
         };
         ensure!(
             is_compatible,
-            "role, fit and decode do not go together: person: letterbox + detections or yolox-grid; body: box (margin > 0) + \
+            "incompatible role, fit and decode: expected person: letterbox + detections or yolox-grid; body: box (margin > 0) + \
              heatmap or simcc; hand: region (a square input) + heatmap, simcc or regression; palm: letterbox (a square \
              input) + ssd-anchors; face: region (a square input) + regression"
         );
@@ -95,13 +97,13 @@ impl ModelEntry {
         };
         ensure!(
             are_complete,
-            "points: a body model names 17 `body` points (and 21 `left_hand` and `right_hand`, or neither), a hand model 21 `hand` points"
+            "points: a body model needs 17 `body` points (and 21 `left_hand` and 21 `right_hand`, or neither), a hand model 21 `hand` points"
         );
         if let Some(n_points) = self.n_points() {
             let KeypointOutputs { body, hand, left_hand, right_hand } = &self.points;
             let all = [body, hand, left_hand, right_hand].into_iter().flatten();
             if let Some(invalid) = all.clone().find(|point| **point >= n_points) {
-                bail!("points: there is no output {invalid}, the model gives {n_points}");
+                bail!("points: index {invalid} is out of range: the model has {n_points} keypoints");
             }
         }
         Ok(())
@@ -129,11 +131,16 @@ impl Decode {
     fn check(&self) -> Result<()> {
         match self {
             Self::Heatmap { blur, .. } => {
-                ensure!(blur % 2 == 1 && *blur <= 31, "decode.blur must be odd and at most 31");
+                ensure!(blur % 2 == 1 && *blur <= 31, "decode.blur must be odd and at most 31, not {blur}");
             }
-            Self::Simcc { split, .. } => ensure!(split.is_finite() && *split > 0.0, "decode.split must be above 0"),
+            Self::Simcc { split, .. } => {
+                ensure!(split.is_finite() && *split > 0.0, "decode.split must be > 0, not {split}")
+            }
             Self::YoloxGrid { strides, .. } | Self::SsdAnchors { strides, .. } => {
-                ensure!(!strides.is_empty() && !strides.contains(&0), "decode.strides must be numbers from 1");
+                ensure!(
+                    !strides.is_empty() && !strides.contains(&0),
+                    "decode.strides must be integers >= 1, not {strides:?}"
+                );
             }
             _ => {}
         }

@@ -35,11 +35,11 @@ pub enum FetchSource {
 impl fmt::Display for FetchSource {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Present => write!(f, "there already"),
+            Self::Present => write!(f, "already present"),
             Self::Mirror(path) => write!(f, "copied from {}", path.display()),
-            Self::MirrorOf(source) => write!(f, "made from files of the mirror, those of {source}"),
+            Self::MirrorOf(source) => write!(f, "built from files of the mirror listed for {source}"),
             Self::Url(url) => write!(f, "downloaded from {url}"),
-            Self::Source(source) => write!(f, "made from {source}"),
+            Self::Source(source) => write!(f, "built from {source}"),
         }
     }
 }
@@ -93,15 +93,15 @@ impl<'a> Fetcher<'a> {
             Err(reasons) => failures += &reasons,
         }
         if failures.is_empty() {
-            let steps = entry.conversion.as_deref().unwrap_or("no conversion is written down");
+            let steps = entry.conversion.as_deref().unwrap_or("no conversion is documented");
             let _ = write!(
                 failures,
-                "\n      no place serves it. It was made from {} @ {} : {} by: {steps}",
+                "\n      no source to download; the file was created from {} @ {} : {} by: {steps}",
                 entry.origin.repository, entry.origin.commit, entry.origin.path
             );
         }
         bail!(
-            "it could not be had:{failures}\n      a folder that has the file (sha256 {}): --mirror DIR",
+            "cannot fetch the file:{failures}\n      to use a copy (sha256 {}), name its folder with --mirror DIR",
             entry.sha256
         )
     }
@@ -114,7 +114,7 @@ impl<'a> Fetcher<'a> {
         };
         let obtained = self.first_of(&file.sources, concatenate);
         let Obtained { bytes, source, .. } =
-            obtained.map_err(|failures| anyhow!("{} could not be had:{failures}", file.file))?;
+            obtained.map_err(|failures| anyhow!("cannot fetch {}:{failures}", file.file))?;
         workdir::write_file(path, &bytes)?;
         Ok(source)
     }
@@ -159,7 +159,8 @@ impl<'a> Fetcher<'a> {
             return unpacked(source, package);
         }
         let read = |file: &super::SourceFile| {
-            let path = self.in_mirror(&file.sha256).with_context(|| format!("the mirror has no {}", file.path))?;
+            let path =
+                self.in_mirror(&file.sha256).with_context(|| format!("the mirror does not contain {}", file.path))?;
             Ok(input::read(path, input::MOST_DATA)?)
         };
         Ok((source.files.iter().map(read).collect::<Result<_>>()?, None))
@@ -182,12 +183,12 @@ impl<'a> Fetcher<'a> {
             // write here.
             let dir = self.downloads.join(format!("{}-{n}", std::process::id()));
             let created = std::fs::create_dir_all(&dir);
-            let created = created.with_context(|| format!("cannot make the folder {}", dir.display()));
+            let created = created.with_context(|| format!("cannot create the folder {}", dir.display()));
             let downloaded = created.and_then(|()| package::download(source, &dir)).and_then(|file| {
                 let found = sha256_of(&file)?;
                 ensure!(
                     found.eq_ignore_ascii_case(&source.sha256),
-                    "it has sha256 {found}, expected {}",
+                    "the package has sha256 {found}, expected {}",
                     source.sha256
                 );
                 Ok(file)
@@ -233,7 +234,10 @@ fn checked_part(file: &super::SourceFile, bytes: Vec<u8>) -> Result<Vec<u8>> {
         None => bytes,
         Some([start, end]) => {
             let range = usize::try_from(start)?..usize::try_from(end)?;
-            bytes.get(range).with_context(|| format!("{} has only {} bytes", file.path, bytes.len()))?.to_vec()
+            bytes
+                .get(range)
+                .with_context(|| format!("{} has {} bytes, expected at least {end}", file.path, bytes.len()))?
+                .to_vec()
         }
     };
     check_hash(&bytes, &file.sha256, &file.path)?;
@@ -252,7 +256,7 @@ fn build(entry: &ModelEntry, files: &[Vec<u8>]) -> Result<Vec<u8>> {
     let bytes = match &entry.convert {
         Some(conversion) => {
             let [input] = entry.inputs.as_slice() else {
-                bail!("a model that is converted has one input, not {}", entry.inputs.len())
+                bail!("a converted model must have 1 input, not {}", entry.inputs.len())
             };
             let named = || entry.outputs.iter().map(|port| port.name.clone()).collect();
             let outputs = if conversion.outputs.is_empty() { named() } else { conversion.outputs.clone() };

@@ -20,4 +20,4 @@ pub use manifest::{MANIFEST_FILE, Manifest};
 pub use model::{Model, ModelError, Outputs, sha256_of};
 pub use runtime::{LIBRARY, Runtime, TELEMETRY_OFF, find_library};
 pub use source::{Conversion, ModelSource, PinnedFile, SourceFile, SourceKind};
-pub use store::{AUTO, Fetched, ModelState, ModelStore, Wanted};
+pub use store::{AUTO, Fetched, ModelRequest, ModelState, ModelStore};

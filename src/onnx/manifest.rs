@@ -32,7 +32,7 @@ pub struct Manifest {
 impl Manifest {
     /// The built-in manifest.
     pub fn builtin() -> Result<Self> {
-        Self::parse(BUILTIN).context("the built-in manifest of models")
+        Self::parse(BUILTIN).context("built-in model manifest")
     }
 
     /// The built-in manifest, overridden by `manifest.toml` in `dir` if it exists.
@@ -41,7 +41,7 @@ impl Manifest {
         let path = dir.join(MANIFEST_FILE);
         match input::read_text(&path, input::MOST_TEXT) {
             Ok(text) => {
-                let own = Self::parse(&text).with_context(|| format!("in {}", path.display()))?;
+                let own = Self::parse(&text).with_context(|| path.display().to_string())?;
                 manifest.runtime = own.runtime.or(manifest.runtime);
                 manifest.words = own.words.or(manifest.words);
                 own.models.into_iter().for_each(|entry| replace_or_push(&mut manifest.models, entry));
@@ -55,11 +55,11 @@ impl Manifest {
 
     /// Parses a manifest and checks every entry.
     pub fn parse(text: &str) -> Result<Self> {
-        let manifest: Self = toml::from_str(text).context("not a manifest of models")?;
+        let manifest: Self = toml::from_str(text).context("not a model manifest")?;
         for (idx, entry) in manifest.models.iter().enumerate() {
             entry.check_file().and_then(|()| entry.check()).with_context(|| format!("model {:?}", entry.id))?;
             let known = manifest.models[..idx].iter().any(|other| other.id == entry.id);
-            ensure!(!known, "model {:?} stands in it twice", entry.id);
+            ensure!(!known, "duplicate model id {:?}", entry.id);
         }
         manifest.runtime.iter().chain(&manifest.words).try_for_each(PinnedFile::check)?;
         for entry in &manifest.layouts {
@@ -72,7 +72,7 @@ impl Manifest {
     pub fn get(&self, id: &str) -> Result<&ModelEntry> {
         self.models.iter().find(|entry| entry.id == id).with_context(|| {
             let known: Vec<_> = self.models.iter().map(|entry| entry.id.as_str()).collect();
-            format!("there is no model {id:?}; known are {} (`orator models add` registers others)", known.join(", "))
+            format!("unknown model {id:?}: expected one of {}; `orator models add` registers others", known.join(", "))
         })
     }
 
@@ -84,7 +84,7 @@ impl Manifest {
     /// The model with this id, which must have this role.
     pub fn get_as(&self, id: &str, role: ModelRole) -> Result<&ModelEntry> {
         let entry = self.get(id)?;
-        ensure!(entry.role == role, "the model {id:?} is a {:?} model; a {role:?} model is wanted here", entry.role);
+        ensure!(entry.role == role, "the model {id:?} has the role {:?}, expected {role:?}", entry.role);
         Ok(entry)
     }
 }
@@ -107,7 +107,7 @@ mod tests {
         assert_eq!((manifest.models.len(), manifest.layouts.len()), (16, 5));
         assert_eq!(Manifest::parse(&toml::to_string(&manifest).unwrap()).unwrap(), manifest);
         for entry in &manifest.models {
-            assert!(entry.is_served() != entry.conversion.is_some(), "{}: served, or how it was made", entry.id);
+            assert!(entry.is_served() != entry.conversion.is_some(), "{}: a source or a conversion", entry.id);
         }
     }
 
@@ -120,10 +120,10 @@ mod tests {
         assert!(message("boxes = \"dets\"", "boxes = \"det\"").contains("output \"det\""));
         assert!(message("sha256 = \"4720", "sha256 = \"x720").contains("64 hex"));
         assert!(message("[1, 3, 320, 320]", "[1, 320, 320]").contains("shape"));
-        assert!(message("body = [0, ", "body = [99, ").contains("no output 99"));
+        assert!(message("body = [0, ", "body = [99, ").contains("index 99"));
         assert!(message("file = \"wink", "file = \"../wink").contains("plain name"));
-        assert!(message("margin = 1.25", "margin = 0.0").contains("go together"));
-        assert!(message("person-yolox-nano", "person-rtmdet-nano").contains("twice"));
+        assert!(message("margin = 1.25", "margin = 0.0").contains("incompatible"));
+        assert!(message("person-yolox-nano", "person-rtmdet-nano").contains("duplicate"));
     }
 
     #[test]
@@ -135,7 +135,7 @@ mod tests {
         std::fs::write(dir.path().join(MANIFEST_FILE), text).unwrap();
         let manifest = Manifest::load(dir.path()).unwrap();
         assert_eq!((manifest.models.len(), manifest.get("person-mine").unwrap()), (17, &own));
-        assert!(manifest.get("nobody").unwrap_err().to_string().contains("known are"));
+        assert!(manifest.get("nobody").unwrap_err().to_string().contains("expected one of"));
         assert!(manifest.get_as("person-mine", ModelRole::Hand).is_err());
     }
 }

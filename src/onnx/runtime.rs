@@ -34,7 +34,7 @@ impl Runtime {
     ///
     /// No library was found, or it cannot be loaded; the message says how to get one.
     pub fn load(explicit: &Path, models_dir: &Path) -> Result<Self> {
-        let mut loaded = LOADED.lock().map_err(|_| anyhow!("loading ONNX Runtime failed before"))?;
+        let mut loaded = LOADED.lock().map_err(|_| anyhow!("cannot load ONNX Runtime: an earlier attempt panicked"))?;
         if let Some(runtime) = loaded.as_ref() {
             return Ok(runtime.clone());
         }
@@ -44,7 +44,7 @@ impl Runtime {
             .and_then(|builder| Ok(builder.with_telemetry(false).build()?))
             .map_err(|error| {
                 anyhow!(
-                    "ONNX Runtime at {} cannot be used: {error}; `make runtime` gets a right one",
+                    "cannot load ONNX Runtime from {}: {error}; `make runtime` downloads a compatible version",
                     library.display()
                 )
             })?;
@@ -79,20 +79,20 @@ pub fn find_library(explicit: &Path, models_dir: &Path) -> Result<PathBuf> {
         if explicit.is_file() {
             return Ok(explicit.to_owned());
         }
-        bail!("models.onnxruntime names {}, which is not a file; `make runtime` gets the library", explicit.display());
+        bail!("models.onnxruntime: {} is not a file; `make runtime` downloads the library", explicit.display());
     }
     if let Some(named) = std::env::var_os(VARIABLE).map(PathBuf::from) {
         if named.is_file() {
             return Ok(named);
         }
-        bail!("{VARIABLE} names {}, which is not a file", named.display());
+        bail!("{VARIABLE}: {} is not a file; set it to the path of {LIBRARY}", named.display());
     }
     let program = std::env::current_exe().and_then(std::fs::canonicalize).unwrap_or_default();
     let lib_folders = program.ancestors().skip(1).map(|folder| folder.join("lib"));
     lib_folders.chain([models_dir.join("lib")]).find_map(|folder| library_in(&folder)).ok_or_else(|| {
         anyhow!(
-            "the ONNX Runtime library ({LIBRARY}) was not found; `orator models fetch` gets it, models.onnxruntime or {VARIABLE} \
-             names another"
+            "the ONNX Runtime library ({LIBRARY}) was not found; download it with `orator models fetch`, or set \
+             models.onnxruntime or {VARIABLE} to its path"
         )
     })
 }

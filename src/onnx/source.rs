@@ -97,27 +97,30 @@ impl fmt::Display for ModelSource {
 }
 
 impl PinnedFile {
-    /// Says what is wrong with the description.
+    /// Checks the description. Errors name the invalid field.
     pub(super) fn check(&self) -> Result<()> {
-        ensure!(FileName::new(&self.file).is_ok(), "file must be the plain name of a file: {:?}", self.file);
+        ensure!(FileName::new(&self.file).is_ok(), "file must be a plain file name, not {:?}", self.file);
         self.sources.iter().try_for_each(ModelSource::check)
     }
 }
 
 impl ModelSource {
-    /// Says what is wrong with the description.
+    /// Checks the description. Errors name the invalid field.
     pub(super) fn check(&self) -> Result<()> {
         let is_hash = |text: &str| text.len() == 64 && text.bytes().all(|byte| byte.is_ascii_hexdigit());
         let pinned = self.from == SourceKind::Address || is_hash(&self.sha256);
         ensure!(pinned, "source {}: sha256 must be 64 hex digits, not {:?}", self.name, self.sha256);
-        ensure!(!self.files.is_empty(), "source {} names no files", self.name);
-        let plain = |c: char| c.is_ascii_alphanumeric() || "@/._-=+".contains(c);
-        let named = self.from == SourceKind::Address
-            || (self.name.chars().all(plain) && !self.name.starts_with('-') && self.name.contains(['@', '=']));
-        ensure!(named, "source {:?}: NAME@VERSION of npm or NAME==VERSION of pip is wanted", self.name);
+        ensure!(!self.files.is_empty(), "source {}: files is empty, expected at least one", self.name);
+        let is_plain = |c: char| c.is_ascii_alphanumeric() || "@/._-=+".contains(c);
+        let is_valid_name = self.from == SourceKind::Address
+            || (self.name.chars().all(is_plain) && !self.name.starts_with('-') && self.name.contains(['@', '=']));
+        ensure!(is_valid_name, "source {:?}: expected NAME@VERSION (npm) or NAME==VERSION (PyPI)", self.name);
         for SourceFile { path, range, sha256 } in &self.files {
             ensure!(is_hash(sha256), "source file {path}: sha256 must be 64 hex digits, not {sha256:?}");
-            ensure!(range.is_none_or(|[start, end]| start < end), "source file {path}: a range is [first, end]");
+            ensure!(
+                range.is_none_or(|[start, end]| start < end),
+                "source file {path}: range must be [start, end] with start < end"
+            );
         }
         Ok(())
     }

@@ -4,6 +4,7 @@
 use super::model::{Outputs, open_session};
 use super::{ModelEntry, ModelError, Port, Runtime};
 use anyhow::{Result, anyhow, ensure};
+use orator_base::text::counted;
 use ort::session::Session;
 use ort::value::TensorRef;
 use std::path::Path;
@@ -49,7 +50,7 @@ impl SpeechModel {
     ///
     /// The window is too long, or the outputs have another shape.
     pub fn probability(&mut self, window: &[f32]) -> Result<f32> {
-        ensure!(window.len() <= WINDOW, "a window of {} samples, expected {WINDOW}", window.len());
+        ensure!(window.len() <= WINDOW, "a window has {} samples, expected at most {WINDOW}", window.len());
         let (sound, silence) = self.input[CONTEXT..].split_at_mut(window.len());
         sound.copy_from_slice(window);
         silence.fill(0.0);
@@ -65,10 +66,11 @@ impl SpeechModel {
         let (probability, state) = (outputs.floats(OUTPUTS[0])?.1, outputs.floats(OUTPUTS[1])?.1);
         ensure!(
             probability.len() == 1 && state.len() == self.state.len(),
-            "the model {} gave {} probabilities and a state of {} numbers",
+            "the model {} returned {} and a state of {} values, expected 1 and {}",
             self.id,
-            probability.len(),
-            state.len()
+            counted(probability.len(), "value"),
+            state.len(),
+            self.state.len()
         );
         let probability = probability[0];
         self.state.copy_from_slice(state);
@@ -82,8 +84,8 @@ pub(super) fn check(entry: &ModelEntry) -> Result<()> {
     let shapes: [&[i64]; 3] = [&[1, (CONTEXT + WINDOW) as i64], &STATE, &[]];
     let is_same = |(port, (name, shape)): (&Port, (&str, &[i64]))| port.name == name && port.shape == shape;
     let has_inputs = entry.inputs.len() == 3 && entry.inputs.iter().zip(INPUTS.into_iter().zip(shapes)).all(is_same);
-    ensure!(has_inputs, "a speech model has the inputs input [1, 576], state [2, 1, 128] and sr []");
+    ensure!(has_inputs, "a speech model must have the inputs input [1, 576], state [2, 1, 128] and sr []");
     let has_output = |name: &str| entry.outputs.iter().any(|port| port.name == name);
-    ensure!(OUTPUTS.into_iter().all(has_output), "a speech model has the outputs output and stateN");
+    ensure!(OUTPUTS.into_iter().all(has_output), "a speech model must have the outputs output and stateN");
     Ok(())
 }

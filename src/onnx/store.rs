@@ -31,15 +31,15 @@ pub enum ModelState {
     /// Present, with the pinned hash.
     Present,
     /// Present, with another hash.
-    #[serde(rename = "wrong hash")]
-    WrongHash,
+    #[serde(rename = "hash mismatch")]
+    HashMismatch,
     /// Missing or unreadable.
     Missing,
 }
 
 /// A model to fetch.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Wanted {
+pub enum ModelRequest {
     /// The model with this id.
     Id(String),
     /// One model of this role: one that is present, or else the first that can be downloaded, in manifest order.
@@ -59,7 +59,7 @@ impl fmt::Display for ModelState {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {
             Self::Present => "present",
-            Self::WrongHash => "wrong hash",
+            Self::HashMismatch => "hash mismatch",
             Self::Missing => "missing",
         })
     }
@@ -102,7 +102,7 @@ impl ModelStore {
     pub fn state(&self, entry: &ModelEntry) -> ModelState {
         match sha256_of(&self.path(entry)) {
             Ok(found) if found.eq_ignore_ascii_case(&entry.sha256) => ModelState::Present,
-            Ok(_) => ModelState::WrongHash,
+            Ok(_) => ModelState::HashMismatch,
             Err(_) => ModelState::Missing,
         }
     }
@@ -129,7 +129,9 @@ impl ModelStore {
         }
         let mut with_role = self.with_role(role);
         let present = self.with_role(role).find(|entry| self.path(entry).is_file());
-        present.or_else(|| with_role.next()).with_context(|| format!("the manifest has no {role:?} model"))
+        present
+            .or_else(|| with_role.next())
+            .with_context(|| format!("the manifest has no model with the role {role:?}"))
     }
 
     fn with_role(&self, role: ModelRole) -> impl Iterator<Item = &ModelEntry> {
@@ -143,17 +145,27 @@ impl ModelStore {
     /// # Errors
     ///
     /// The mirror cannot be read, the folder cannot be written, or another fetch is using it.
-    pub fn fetch(&self, wanted: &[Wanted], mirror: Option<&Path>, progress: &dyn Progress) -> Result<Vec<Fetched<'_>>> {
-        self.with_downloads(|downloads| self.fetch_with(Fetcher::new(mirror, downloads)?, wanted, progress))
+    pub fn fetch(
+        &self,
+        requests: &[ModelRequest],
+        mirror: Option<&Path>,
+        progress: &dyn Progress,
+    ) -> Result<Vec<Fetched<'_>>> {
+        self.with_downloads(|downloads| self.fetch_with(Fetcher::new(mirror, downloads)?, requests, progress))
     }
 
-    fn fetch_with(&self, mut fetcher: Fetcher, wanted: &[Wanted], progress: &dyn Progress) -> Result<Vec<Fetched<'_>>> {
-        let task = progress.begin("models", wanted.len() as u64);
+    fn fetch_with(
+        &self,
+        mut fetcher: Fetcher,
+        requests: &[ModelRequest],
+        progress: &dyn Progress,
+    ) -> Result<Vec<Fetched<'_>>> {
+        let task = progress.begin("models", requests.len() as u64);
         let mut fetched = Vec::new();
-        for one in wanted {
+        for one in requests {
             let (known, candidates): (Vec<_>, Vec<_>) = match one {
-                Wanted::Id(id) => (vec![self.manifest.get(id)?], vec![self.manifest.get(id)?]),
-                Wanted::Role(role) => (self.with_role(*role).collect(), self.candidates(*role).collect()),
+                ModelRequest::Id(id) => (vec![self.manifest.get(id)?], vec![self.manifest.get(id)?]),
+                ModelRequest::Role(role) => (self.with_role(*role).collect(), self.candidates(*role).collect()),
             };
             if let Some(entry) = known.into_iter().find(|entry| self.state(entry) == ModelState::Present) {
                 fetched.push(Fetched { entry, source: Ok(FetchSource::Present) });
@@ -180,7 +192,7 @@ impl ModelStore {
     ///
     /// No source has it.
     pub fn fetch_runtime(&self, mirror: Option<&Path>, progress: &dyn Progress) -> Result<FetchSource> {
-        let runtime = self.manifest.runtime.as_ref().context("the manifest names no ONNX Runtime")?;
+        let runtime = self.manifest.runtime.as_ref().context("the manifest has no entry for ONNX Runtime")?;
         let _task = progress.begin("ONNX Runtime", 0);
         let path = self.dir.join("lib").join(&runtime.file);
         self.with_downloads(|downloads| Fetcher::new(mirror, downloads)?.get_file(runtime, &path))
@@ -197,7 +209,7 @@ impl ModelStore {
         progress: &dyn Progress,
         convert: impl FnOnce(&Path, &FetchSource) -> Result<T>,
     ) -> Result<T> {
-        let words = self.manifest.words.as_ref().context("the manifest names no word vectors")?;
+        let words = self.manifest.words.as_ref().context("the manifest has no entry for word vectors")?;
         let _task = progress.begin("word vectors", 0);
         self.with_downloads(|downloads| {
             let file = downloads.join(&words.file);
@@ -226,20 +238,20 @@ impl ModelStore {
         fetched
     }
 
-    /// Models that `fetch` may download for `wanted`: each missing model that is named by id, and all candidates of a
+    /// Models that `fetch` may download for `requests`: each missing model that is named by id, and all candidates of a
     /// role without a present model.
     ///
     /// # Errors
     ///
     /// An id that is not in the manifest.
-    pub fn missing(&self, wanted: &[Wanted]) -> Result<Vec<&ModelEntry>> {
+    pub fn missing(&self, requests: &[ModelRequest]) -> Result<Vec<&ModelEntry>> {
         let is_present = |entry: &&ModelEntry| self.state(entry) == ModelState::Present;
         let mut missing = Vec::new();
-        for one in wanted {
+        for one in requests {
             match one {
-                Wanted::Id(id) => missing.extend(Some(self.manifest.get(id)?).filter(|entry| !is_present(entry))),
-                Wanted::Role(role) if self.with_role(*role).any(|entry| is_present(&entry)) => {}
-                Wanted::Role(role) => missing.extend(self.candidates(*role)),
+                ModelRequest::Id(id) => missing.extend(Some(self.manifest.get(id)?).filter(|entry| !is_present(entry))),
+                ModelRequest::Role(role) if self.with_role(*role).any(|entry| is_present(&entry)) => {}
+                ModelRequest::Role(role) => missing.extend(self.candidates(*role)),
             }
         }
         Ok(missing)
@@ -267,7 +279,7 @@ impl ModelStore {
     ) -> Result<ModelEntry> {
         let entry = describe_like(file, self.manifest.like(like)?, id, licence)?;
         let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        Model::open(runtime, &entry, folder).with_context(|| format!("{} is not like that", file.display()))?;
+        Model::open(runtime, &entry, folder).with_context(|| format!("{} does not match {like:?}", file.display()))?;
         let manifest = self.dir.join(MANIFEST_FILE);
         let written = match input::read_text(&manifest, input::MOST_TEXT) {
             Ok(text) => text,
@@ -276,12 +288,13 @@ impl ModelStore {
         };
         let own = Manifest { models: vec![entry.clone()], ..Manifest::default() };
         let text = format!("{}\n{}", written.trim_end(), toml::to_string(&own)?).trim_start().to_owned();
-        Manifest::parse(&text).with_context(|| format!("{} cannot hold it; another id: --id", manifest.display()))?;
+        Manifest::parse(&text)
+            .with_context(|| format!("cannot add it to {}; choose another id with --id", manifest.display()))?;
         let path = self.path(&entry);
         match self.state(&entry) {
             ModelState::Present => {}
-            ModelState::WrongHash => {
-                bail!("{} is there already with other bytes: rename one of the two", path.display())
+            ModelState::HashMismatch => {
+                bail!("{} already exists with different content: rename one of the two files", path.display())
             }
             ModelState::Missing => workdir::replace(&path, |attempt| {
                 std::io::copy(&mut input::open(file)?, &mut std::fs::File::create(attempt)?)?;
@@ -296,7 +309,8 @@ impl ModelStore {
 
 /// Description of a new file with the preprocessing and decoding of a known model.
 fn describe_like(file: &Path, like: &ModelEntry, id: Option<&str>, licence: &str) -> Result<ModelEntry> {
-    let name = file.file_name().and_then(OsStr::to_str).with_context(|| format!("{} is no file", file.display()))?;
+    let name =
+        file.file_name().and_then(OsStr::to_str).with_context(|| format!("invalid file name {}", file.display()))?;
     let bytes = std::fs::metadata(file).with_context(|| format!("cannot read {}", file.display()))?.len();
     let stem = name.strip_suffix(".onnx").unwrap_or(name);
     Ok(ModelEntry {

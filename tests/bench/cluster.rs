@@ -5,7 +5,7 @@ use anyhow::{Result, ensure};
 use orator_base::stage::progress::Progress;
 use orator_cluster::claims::{Claim, ClaimOptions, Claims, NextUnit, UnitEnd};
 use orator_cluster::heartbeat::{BeatWatch, DEAD_AFTER, Heartbeat, WORKERS};
-use orator_cluster::plan::{PIECE_SECS, PlannedUnit, UnitShare, split_and_sort};
+use orator_cluster::plan::{PART_SECS, PlannedUnit, UnitShare, split_and_sort};
 use orator_cluster::shared_folder::SharedFolder;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -112,7 +112,7 @@ fn videos(secs: f64, rng: &mut ChaCha8Rng) -> Vec<PlannedUnit> {
             video: name,
             inputs: Vec::new(),
             secs: Some(length),
-            share: UnitShare::Whole,
+            share: UnitShare::AllStages,
             needs: Vec::new(),
         });
     }
@@ -125,8 +125,8 @@ fn work_secs(unit: &PlannedUnit, cost: f64) -> f64 {
     match unit.share {
         UnitShare::Extract => 0.05 * whole,
         UnitShare::Parts { of, .. } => 0.9 * whole / of as f64,
-        UnitShare::Whole if unit.needs.is_empty() => whole,
-        UnitShare::Whole => 0.05 * whole,
+        UnitShare::AllStages if unit.needs.is_empty() => whole,
+        UnitShare::AllStages => 0.05 * whole,
     }
 }
 
@@ -221,7 +221,7 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.hours > 0.0 && args.workers.iter().all(|n| *n > 0), "hours and workers must be more than 0");
     let videos = videos(3600.0 * args.hours, &mut ChaCha8Rng::seed_from_u64(0));
     let n_videos = videos.len();
-    let units = split_and_sort(videos, PIECE_SECS);
+    let units = split_and_sort(videos, PART_SECS);
     let mut text = format!("{:.0} h in {n_videos} videos, {} units\n", args.hours, units.len());
     text += "workers   hours  efficiency  twice  created / read / listed a unit   operations a second, most\n";
     let task = progress.begin("cluster", args.workers.len() as u64);

@@ -9,7 +9,7 @@ use orator_base::stage::artifacts::StageName;
 use orator_base::stage::workdir::FolderLock;
 use orator_base::text::{counted, duration};
 use orator_cluster::heartbeat::DEAD_AFTER;
-use orator_cluster::plan::{ClusterPlan, PIECE_SECS, PlannedUnit};
+use orator_cluster::plan::{ClusterPlan, PART_SECS, PlannedUnit};
 use orator_cluster::progress::{PlanProgress, WorkerProgress, progress};
 use orator_cluster::stage_times::StageTimes;
 use orator_cluster::timing;
@@ -39,7 +39,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "HOURS")]
     hours: Option<f64>,
     /// Length of the pieces into which a long video is split for workers, minutes.
-    #[arg(long, value_name = "MINUTES", default_value_t = PIECE_SECS / 60.0)]
+    #[arg(long, value_name = "MINUTES", default_value_t = PART_SECS / 60.0)]
     piece: f64,
     /// Do not time the stages, and print no estimates.
     #[arg(long, conflicts_with_all = ["workers", "hours"])]
@@ -113,8 +113,8 @@ pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 /// The saved stage times if they are valid for this program, these settings and this machine; otherwise measures them.
 fn times(pipeline: &Pipeline, units: &[PlannedUnit], ui: &Ui) -> Result<StageTimes> {
     let (work, jobs) = (&pipeline.config().settings.work.dir, pipeline.jobs(None));
-    let made_with = timing::made_with(pipeline, &this_program(), jobs)?;
-    if let Some(known) = StageTimes::read(work).filter(|known| known.made_with == made_with) {
+    let fingerprint = timing::fingerprint(pipeline, &this_program(), jobs)?;
+    if let Some(known) = StageTimes::read(work).filter(|known| known.fingerprint == fingerprint) {
         return Ok(known);
     }
     let times = timing::measure(pipeline, &this_program(), units, jobs, ui)?;
@@ -162,11 +162,11 @@ pub(crate) fn show_progress(path: &Path, ui: &Ui) -> Result<Outcome> {
 
 fn progress_text(progress: &PlanProgress) -> String {
     let hours = |secs: f64| secs / 3600.0;
-    let PlanProgress { n_units, n_done, n_failed, n_claimed, n_left_by_dead, n_taken_over, .. } = progress;
+    let PlanProgress { n_units, n_done, n_failed, n_claimed, n_left_by_dead, n_reclaimed, .. } = progress;
     let n_free = n_units - n_done - n_failed - n_claimed - n_left_by_dead - progress.blocked.len();
     let mut lines = vec![format!(
         "{n_units} units: {n_done} done, {n_failed} failed, {n_claimed} in work, {n_left_by_dead} left by dead workers, \
-         {n_free} free; {n_taken_over} taken over"
+         {n_free} free; {n_reclaimed} taken over"
     )];
     let left = progress.secs_left.map_or("unknown".to_owned(), |secs| format!("{:.2} h", hours(secs)));
     let (ended, all) = (hours(progress.ended_media_secs), hours(progress.media_secs));

@@ -88,12 +88,12 @@ pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 }
 
 fn text(report: &WorkReport) -> String {
-    let (done, fresh, failed) = (counted(report.done, "unit"), report.fresh, report.failed.len());
-    let mut lines = vec![format!("{done} done ({fresh} up to date before), {failed} failed")];
-    if report.taken_over + report.laid_aside > 0 {
+    let (done, n_fresh, failed) = (counted(report.done, "unit"), report.up_to_date, report.failed.len());
+    let mut lines = vec![format!("{done} done ({n_fresh} up to date before), {failed} failed")];
+    if report.reclaimed + report.claim_lost > 0 {
         lines.push(format!(
             "{} taken over from dead workers, {} laid aside since others had taken them over",
-            report.taken_over, report.laid_aside
+            report.reclaimed, report.claim_lost
         ));
     }
     lines.extend(report.failed.iter().map(|(unit, error)| format!("failed  {unit}: {error}")));

@@ -5,8 +5,8 @@ use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator_base::stage::progress::Progress as _;
 use orator_dataset::config::{self, Settings};
-use orator_onnx::{Fetched, MANIFEST_FILE, ModelEntry, ModelError, ModelOrigin, ModelState, ModelStore};
-use orator_onnx::{Runtime, Wanted, find_library};
+use orator_onnx::{Fetched, MANIFEST_FILE, ModelEntry, ModelError, ModelOrigin, ModelRequest, ModelState, ModelStore};
+use orator_onnx::{Runtime, find_library};
 use orator_pipeline::pose2d::models;
 use orator_pipeline::segment::speech_rule::SpeechDetector;
 use serde_json::{Value, json};
@@ -83,14 +83,14 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     match &args.verb {
         ModelsVerb::List => list(&store, &chosen, ui),
         ModelsVerb::Fetch { ids, all, mirror } => {
-            let wanted: Vec<Wanted> = match (all, ids.as_slice()) {
+            let wanted: Vec<ModelRequest> = match (all, ids.as_slice()) {
                 (true, _) => {
                     let can_be_had = |entry: &&ModelEntry| mirror.is_some() || entry.is_served();
                     let entries = store.manifest().models.iter().filter(can_be_had);
-                    entries.map(|entry| Wanted::Id(entry.id.clone())).collect()
+                    entries.map(|entry| ModelRequest::Id(entry.id.clone())).collect()
                 }
                 (false, []) => models::wanted(pose2d).into_iter().chain(SpeechDetector::wanted(&settings)).collect(),
-                (false, ids) => ids.iter().cloned().map(Wanted::Id).collect(),
+                (false, ids) => ids.iter().cloned().map(ModelRequest::Id).collect(),
             };
             if find_library(&place.onnxruntime, &place.dir).is_err() {
                 let source = store.fetch_runtime(mirror.as_deref(), ui)?;
@@ -126,7 +126,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 }
 
 /// Prints the licences of the models, fetches them, and prints the result.
-pub fn fetch(store: &ModelStore, wanted: &[Wanted], mirror: Option<&Path>, ui: &Ui) -> Result<Outcome> {
+pub fn fetch(store: &ModelStore, wanted: &[ModelRequest], mirror: Option<&Path>, ui: &Ui) -> Result<Outcome> {
     let mut terms = String::new();
     for entry in store.missing(wanted)? {
         let size = entry.bytes as f64 / 1e6;
@@ -138,7 +138,7 @@ pub fn fetch(store: &ModelStore, wanted: &[Wanted], mirror: Option<&Path>, ui: &
     let fetched = store.fetch(wanted, mirror, ui)?;
     let in_its_place = |one: &Fetched| {
         let is_had = |other: &&Fetched| other.source.is_ok() && other.entry.role == one.entry.role;
-        fetched.iter().find(is_had).filter(|_| wanted.contains(&Wanted::Role(one.entry.role)))
+        fetched.iter().find(is_had).filter(|_| wanted.contains(&ModelRequest::Role(one.entry.role)))
     };
     let lines = fetched.iter().map(|one| match &one.source {
         Ok(source) => ModelLine::new(one.entry, "had", true, source.to_string()),
@@ -200,7 +200,7 @@ fn list(store: &ModelStore, chosen: &[String], ui: &Ui) -> Result<Outcome> {
         let ModelOrigin { repository, commit, path, licence, note } = &entry.origin;
         let role = format!("{:?}", entry.role).to_lowercase();
         text += &format!(
-            "\n{mark} {:<26} {role:<7} {state:<11} {:5.1} MB  {}\n",
+            "\n{mark} {:<26} {role:<7} {state:<13} {:5.1} MB  {}\n",
             entry.id,
             entry.bytes as f64 / 1e6,
             entry.file

@@ -2,6 +2,7 @@
 
 use anyhow::{Context, Result, bail, ensure};
 use orator_base::foreign_program::{command_in, empty_folder};
+use orator_base::text::counted;
 use std::fmt::Write as _;
 use std::io::{ErrorKind, Read as _, Write};
 use std::path::{Path, PathBuf};
@@ -49,13 +50,15 @@ impl Aligner {
         let queried = isolated(python, PRINT_VERSION, folder.path())?.stdin(Stdio::null()).output();
         let output = match queried {
             Ok(output) => output,
-            Err(error) if error.kind() == ErrorKind::NotFound => bail!("there is no Python `{name}`: {remedy}"),
+            Err(error) if error.kind() == ErrorKind::NotFound => {
+                bail!("the Python interpreter `{name}` was not found: {remedy}")
+            }
             Err(error) => return Err(error).with_context(|| format!("cannot run {name}: {remedy}")),
         };
         let version = String::from_utf8_lossy(&output.stdout).trim().to_owned();
         ensure!(
             output.status.success() && !version.is_empty(),
-            "`{name}` has no package pocketsphinx ({}; PYTHONPATH, the user site and .python-version are not used): \
+            "`{name}` does not find the package pocketsphinx ({}; PYTHONPATH, the user site and .python-version are ignored): \
              {remedy}",
             last_line(&output.stderr)
         );
@@ -86,7 +89,7 @@ impl Aligner {
         words: &[SpokenWord],
         feed: impl FnOnce(&mut dyn FnMut(&[f32]) -> Result<()>) -> Result<()>,
     ) -> Result<Vec<Option<AlignedWord>>> {
-        let mut pipe = self.process.stdin.take().context("the aligner has no input")?;
+        let mut pipe = self.process.stdin.take().context("the input of the aligner is closed")?;
         let header = header(words);
         let mut bytes = Vec::new();
         let sent = pipe.write_all(header.as_bytes()).map_err(anyhow::Error::from).and_then(|()| {
@@ -109,14 +112,19 @@ impl Aligner {
         let output = self.process.wait_with_output()?;
         ensure!(
             output.status.success(),
-            "the aligner ({}, pocketsphinx {VERSION}) ended with {}: {}",
+            "the aligner ({}, pocketsphinx {VERSION}) failed with {}: {}",
             self.python.display(),
             output.status,
             last_line(&output.stderr)
         );
         let output_text = String::from_utf8_lossy(&output.stdout);
         let times: Vec<_> = output_text.lines().map(times).collect::<Result<_>>()?;
-        ensure!(times.len() == words.len(), "the aligner gave {} words of {}", times.len(), words.len());
+        ensure!(
+            times.len() == words.len(),
+            "the aligner returned {}, expected {}",
+            counted(times.len(), "word"),
+            words.len()
+        );
         Ok(times)
     }
 }
@@ -132,7 +140,7 @@ fn isolated(python: &Path, code: &str, folder: &Path) -> Result<Command> {
 /// Instructions for installing the package and naming its interpreter.
 fn remedy() -> String {
     format!(
-        "make one with `python3 -m venv aligner && aligner/bin/pip install pocketsphinx=={VERSION}`, and name it with \
+        "create one with `python3 -m venv aligner && aligner/bin/pip install pocketsphinx=={VERSION}`, and select it with \
          --python aligner/bin/python or in ORATOR_PYTHON"
     )
 }
@@ -156,7 +164,7 @@ fn times(line: &str) -> Result<Option<AlignedWord>> {
     match numbers[..] {
         _ if line == "-" => Ok(None),
         [start_secs, end_secs, confidence] => Ok(Some(AlignedWord { start_secs, end_secs, confidence })),
-        _ => bail!("the aligner said `{line}`"),
+        _ => bail!("invalid output of the aligner `{line}`: expected `-` or start, end and confidence"),
     }
 }
 

@@ -17,11 +17,11 @@ use std::path::Path;
 /// more than the rounding of any container.
 const GAP_SECS: f64 = 0.015;
 /// Drift of the timestamps relative to the sample count, for instance from a slow clock, is followed: if the mean
-/// difference over `MEAN_SECS` exceeds `ROUNDING_SECS`, the rounding of containers, the next `STRETCH_SECS` are
-/// stretched by it.
+/// difference over `MEAN_SECS` exceeds `ROUNDING_SECS`, the rounding of containers, the next `CORRECTION_SECS` are
+/// lengthened or shortened by it.
 const MEAN_SECS: f64 = 1.0;
 const ROUNDING_SECS: f64 = 0.0005;
-const STRETCH_SECS: f64 = 1.0;
+const CORRECTION_SECS: f64 = 1.0;
 /// Number of samples resampled at once.
 const CHUNK: usize = 65_536;
 
@@ -63,11 +63,11 @@ pub fn read_sound(path: &Path) -> Result<Sound> {
     let name = path.display();
     let unreadable = |problem| Err(UnreadableMedia(problem).into());
     if !path.is_file() {
-        return unreadable(format!("{name} is no file"));
+        return unreadable(format!("{name} is not a file"));
     }
     match read_mono(path, SAMPLE_RATE)? {
         Some(sound) if !sound.samples.is_empty() => Ok(sound),
-        _ => unreadable(format!("{name} has no sound")),
+        _ => unreadable(format!("{name} has no audio")),
     }
 }
 
@@ -119,11 +119,11 @@ pub fn stream_mono(
             if let Some(sample_idx) = first_not_finite(&frame) {
                 let secs = at.unwrap_or(timeline.end_secs()) + sample_idx as f64 / f64::from(frame.rate());
                 bail!(
-                    "the sound of {} is damaged: a sample that is no number at second {secs:.2}; convert or record it again",
+                    "the audio of {} is damaged: a sample at {secs:.2} s is not finite; convert or record it again",
                     path.display()
                 );
             }
-            timeline.push(at, &frame).with_context(|| format!("the sound of {}", path.display()))?;
+            timeline.push(at, &frame).with_context(|| format!("cannot process the audio of {}", path.display()))?;
         } else {
             n_misplaced += 1;
         }
@@ -132,7 +132,7 @@ pub fn stream_mono(
     if n_frames == 0 {
         let Some(damage) = damage.or_else(|| decode.damage()) else { return Ok(None) };
         let name = path.display();
-        let problem = format!("no sound of {name} can be decoded ({damage}): copy or download it again");
+        let problem = format!("no audio of {name} can be decoded ({damage}): copy or download it again");
         return Err(UnreadableMedia(problem).into());
     }
     timeline.end_run()?;
@@ -203,11 +203,11 @@ impl<'a> SoundTimeline<'a> {
         }
         if let Some((run, _)) = &mut self.run {
             if continues
-                && run.is_unstretched()
+                && run.is_uncompensated()
                 && let Some(mean) = self.drift.mean(at - end, frame.samples() as f64 / f64::from(frame.rate()))
                 && mean.abs() > ROUNDING_SECS
             {
-                run.stretch(mean, STRETCH_SECS)?;
+                run.compensate_drift(mean, CORRECTION_SECS)?;
             }
             run.push(frame, &mut self.ready)?;
         }

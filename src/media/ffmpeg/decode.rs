@@ -38,11 +38,12 @@ impl StreamDecoder {
                 }
             }
         }
-        let stream = input.stream(stream_idx).with_context(|| format!("{} lost a stream", path.display()))?;
+        let stream =
+            input.stream(stream_idx).with_context(|| format!("{} has no stream {stream_idx}", path.display()))?;
         let time_base = stream.time_base();
         let parameters = stream.parameters();
         let (id, medium) = (parameters.id(), parameters.medium());
-        let kind = if medium == media::Type::Audio { "sound" } else { "pictures" };
+        let kind = if medium == media::Type::Audio { "audio" } else { "images" };
         let open = || -> Result<decoder::Opened, ffmpeg::Error> {
             let mut context = codec::Context::from_parameters(parameters)?;
             context.set_threading(codec::threading::Config::count(threads));
@@ -102,7 +103,7 @@ impl StreamDecoder {
         };
         if code < 0 {
             let error = ffmpeg::Error::from(code);
-            return Err(error).with_context(|| format!("cannot go to another place of {}", self.path.display()));
+            return Err(error).with_context(|| format!("cannot seek in {}", self.path.display()));
         }
         self.decoder.flush();
         self.draining = false;

@@ -31,26 +31,26 @@ impl FilterGraph {
             graph.validate()?;
             Ok(graph)
         };
-        Ok(Self(open().with_context(|| format!("libavfilter cannot run `{chain}` on {format:?} pictures"))?))
+        Ok(Self(open().with_context(|| format!("libavfilter cannot run `{chain}` on {format:?} images"))?))
     }
 
     /// Passes a frame to the chain; `None` marks the end.
     fn push(&mut self, frame: Option<&frame::Video>) -> Result<()> {
-        let mut source = self.0.get("in").context("a filter graph without a source")?;
+        let mut source = self.0.get("in").context("the filter graph has no source")?;
         // SAFETY: the source belongs to the live graph and takes its own reference to a live frame; null marks the
         // end.
         let code = unsafe {
             let frame = frame.map_or(std::ptr::null(), |frame| frame.as_ptr());
             ffi::av_buffersrc_write_frame(source.as_mut_ptr(), frame)
         };
-        ensure!(code >= 0, "libavfilter refused a frame ({})", Error::from(code));
+        ensure!(code >= 0, "libavfilter rejected a frame ({})", Error::from(code));
         Ok(())
     }
 
     /// Next output frame of the chain.
     fn pull(&mut self) -> Result<frame::Video> {
         let mut frame = frame::Video::empty();
-        let mut sink = self.0.get("out").context("a filter graph without a sink")?;
+        let mut sink = self.0.get("out").context("the filter graph has no sink")?;
         sink.sink().frame(&mut frame).context("libavfilter returned no frame")?;
         Ok(frame)
     }

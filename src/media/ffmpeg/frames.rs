@@ -107,7 +107,7 @@ impl FrameReader {
         let input = source::open(path)?;
         let info = probe::describe(&input);
         let stream = source::video_stream(&input).ok_or_else(|| {
-            UnreadableMedia(format!("{} has no pictures: expected a video, not sound alone", path.display()))
+            UnreadableMedia(format!("{} has no video: expected a video, not only audio", path.display()))
         })?;
         let orientation = Orientation::from_stream(&stream);
         let latest_secs = source::latest_secs(&input, &stream);
@@ -115,9 +115,9 @@ impl FrameReader {
         let mut decode = StreamDecoder::new(path, input, stream_idx, threads)?;
         let mut first = frame::Video::empty();
         if !decode.next(&mut first)? {
-            let why = decode.damage().unwrap_or_else(|| "it holds no complete one".to_owned());
+            let reason = decode.damage().unwrap_or_else(|| "it contains no complete image".to_owned());
             let name = path.display();
-            let problem = format!("no picture of {name} can be decoded ({why}): copy or download it again");
+            let problem = format!("no image of {name} can be decoded ({reason}): copy or download it again");
             return Err(UnreadableMedia(problem).into());
         }
         let image_size = upright_size(&first, orientation);
@@ -165,7 +165,7 @@ impl FrameReader {
             match found.map(|at| at.saturating_sub(self.origin)) {
                 Some(at) if at < ticks => before = Some(std::mem::replace(&mut frame, frame::Video::empty())),
                 Some(at) if at == ticks => break,
-                _ => bail!("{} shows no picture at {source_secs:.3} s when begun nearby", self.path.display()),
+                _ => bail!("{} has no image at {source_secs:.3} s after a seek", self.path.display()),
             }
         }
         (self.before, self.shown) = (before, SourceFrame { frame, ticks });

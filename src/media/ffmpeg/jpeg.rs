@@ -19,7 +19,7 @@ const QUALITY: i32 = 4;
 pub fn encode(image: &Image) -> Result<Vec<u8>> {
     super::source::init();
     let [width, height] = [u32::try_from(image.width)?, u32::try_from(image.height)?];
-    ensure!(width > 0 && height > 0 && image.data.len() == 3 * image.width * image.height, "a picture without pixels");
+    ensure!(width > 0 && height > 0 && image.data.len() == 3 * image.width * image.height, "the image has no pixels");
     let jpeg = encoder::find(Id::MJPEG).context("this ffmpeg has no JPEG encoder")?;
     let mut context = codec::Context::new_with_codec(jpeg).encoder().video()?;
     context.set_width(width);
@@ -48,7 +48,7 @@ pub fn encode(image: &Image) -> Result<Vec<u8>> {
     opened.send_frame(&yuv)?;
     opened.send_eof()?;
     let mut packet = Packet::empty();
-    opened.receive_packet(&mut packet).context("the JPEG encoder gave no picture")?;
+    opened.receive_packet(&mut packet).context("the JPEG encoder returned no image")?;
     Ok(packet.data().unwrap_or_default().to_vec())
 }
 

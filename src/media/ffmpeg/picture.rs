@@ -30,7 +30,7 @@ impl Converter {
         if self.scaler.as_ref().is_none_or(|scaler| scaler.source != source) {
             self.scaler = Some(Scaler::new(source, self.coded_size)?);
         }
-        let coded = self.scaler.as_mut().context("the scaler was just made")?.convert(frame)?;
+        let coded = self.scaler.as_mut().context("the scaler is missing")?.convert(frame)?;
         Ok(self.orientation.apply(coded))
     }
 }
@@ -77,13 +77,13 @@ impl Scaler {
         let flags = if is_downscaling { scaling::Flags::AREA } else { scaling::Flags::BICUBIC };
         let (w, h) = (u32::try_from(size[0])?, u32::try_from(size[1])?);
         if w == 0 || h == 0 {
-            bail!("a picture of {w} x {h} px was asked for");
+            bail!("invalid image size {w} x {h} px: expected at least 1 x 1 px");
         }
         let tone_mapper =
             source.hdr.map(|transfer| ToneMapper::new(transfer, source.has_wide_gamut, [w, h])).transpose()?;
         let rgb = if tone_mapper.is_some() { ToneMapper::FORMAT } else { Pixel::RGB24 };
         let mut context = scaling::Context::get(source.format, width, height, rgb, w, h, flags)
-            .with_context(|| format!("cannot turn {:?} pictures into RGB", source.format))?;
+            .with_context(|| format!("cannot convert {:?} images to RGB", source.format))?;
         // SAFETY: the context is live, and the tables are static memory of swscale; one = 1.0 in 16.16.
         unsafe {
             let table = ffmpeg::ffi::sws_getCoefficients(source.colour[0]);

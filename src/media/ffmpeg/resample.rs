@@ -57,50 +57,50 @@ pub(crate) struct Resampler {
     rate: u32,
     n_in: u64,
     n_out: u64,
-    /// Number of samples added (or, if negative, removed) by stretching, and the input count at which the last
-    /// stretch ends.
-    n_stretched: i64,
-    stretch_end: u64,
+    /// Number of samples added (or, if negative, removed) to compensate drift, and the input count at which
+    /// the last compensation ends.
+    n_compensated: i64,
+    compensation_end: u64,
 }
 
 impl Resampler {
     pub(crate) fn new(format: SoundFormat, rate: u32) -> Result<Self> {
         let SoundFormat { sample, layout, rate: source_rate } = format;
-        ensure!(source_rate > 0 && rate > 0, "sound at {source_rate} Hz cannot be brought to {rate} Hz");
+        ensure!(source_rate > 0 && rate > 0, "cannot resample audio from {source_rate} Hz to {rate} Hz");
         let mono = ChannelLayout::MONO;
         let packed = Sample::F32(sample::Type::Packed);
         // Without this bound, float audio mixed down from several channels exceeds 1.
         let options = Dictionary::from_iter([("rematrix_maxval", "1.0")]);
         let context = resampling::Context::get_with(sample, layout, source_rate, packed, mono, rate, options);
         let context = context.with_context(|| {
-            format!("cannot bring {sample:?} sound of {} channels at {source_rate} Hz to mono", layout.channels())
+            format!("cannot convert {sample:?} audio of {} channels at {source_rate} Hz to mono", layout.channels())
         })?;
-        Ok(Self { context, format, rate, n_in: 0, n_out: 0, n_stretched: 0, stretch_end: 0 })
+        Ok(Self { context, format, rate, n_in: 0, n_out: 0, n_compensated: 0, compensation_end: 0 })
     }
 
     pub(crate) fn format(&self) -> SoundFormat {
         self.format
     }
 
-    /// Duration of the input after stretching, seconds.
+    /// Duration of the input after compensation, seconds.
     pub(crate) fn secs(&self) -> f64 {
-        self.n_in as f64 / f64::from(self.format.rate) + self.n_stretched as f64 / f64::from(self.rate)
+        self.n_in as f64 / f64::from(self.format.rate) + self.n_compensated as f64 / f64::from(self.rate)
     }
 
-    /// Whether no stretch is active.
-    pub(crate) fn is_unstretched(&self) -> bool {
-        self.n_in >= self.stretch_end
+    /// Whether no compensation is active.
+    pub(crate) fn is_uncompensated(&self) -> bool {
+        self.n_in >= self.compensation_end
     }
 
     /// Makes the next `over_secs` seconds longer by `secs` (shorter if negative).
-    pub(crate) fn stretch(&mut self, secs: f64, over_secs: f64) -> Result<()> {
+    pub(crate) fn compensate_drift(&mut self, secs: f64, over_secs: f64) -> Result<()> {
         let n = (secs * f64::from(self.rate)).round() as i32;
         let over = (over_secs * f64::from(self.rate)) as i32;
         // SAFETY: the context is live and owned here.
         let done = unsafe { ffmpeg::ffi::swr_set_compensation(self.context.as_mut_ptr(), n, over) };
-        ensure!(done >= 0, "swresample cannot stretch ({})", ffmpeg::Error::from(done));
-        self.n_stretched += i64::from(n);
-        self.stretch_end = self.n_in + (over_secs * f64::from(self.format.rate)) as u64;
+        ensure!(done >= 0, "swresample cannot compensate drift ({})", ffmpeg::Error::from(done));
+        self.n_compensated += i64::from(n);
+        self.compensation_end = self.n_in + (over_secs * f64::from(self.format.rate)) as u64;
         Ok(())
     }
 
@@ -118,7 +118,7 @@ impl Resampler {
         // SAFETY: null input means flush.
         unsafe { self.convert(std::ptr::null_mut(), 0, out)? };
         let n_all = (self.n_in * u64::from(self.rate) + u64::from(self.format.rate) / 2) / u64::from(self.format.rate);
-        let n_all = n_all.saturating_add_signed(self.n_stretched);
+        let n_all = n_all.saturating_add_signed(self.n_compensated);
         let n_extra = usize::try_from(self.n_out.saturating_sub(n_all)).unwrap_or(usize::MAX);
         out.truncate(out.len().saturating_sub(n_extra).max(start));
         Ok(())

@@ -48,7 +48,7 @@ fn decode(path: &Path, rate: u32, sender: &SyncSender<Result<Vec<f32>>>) {
         for chunk in streamed.chunks(CHUNK) {
             if sender.send(Ok(chunk.to_vec())).is_err() {
                 is_disconnected = true;
-                bail!("nobody listens any more");
+                bail!("the receiver was dropped");
             }
         }
         Ok(())

@@ -18,7 +18,7 @@ const FORMATS: &str = "mov,matroska,webm,avi,mpegts,mpeg,mpegvideo,h264,hevc,flv
 /// Plausible audio sample rates, samples per second.
 const SAMPLE_RATES: RangeInclusive<u32> = 4_000..=768_000;
 
-const EXPECTED: &str = "expected a video or sound file (mp4, mov, mkv, webm, avi, wav, flac, mp3, ...)";
+const EXPECTED: &str = "expected a video or audio file (mp4, mov, mkv, webm, avi, wav, flac, mp3, ...)";
 
 /// Initialises ffmpeg once and disables its log output, since this crate reports every error.
 pub(crate) fn init() {
@@ -76,11 +76,8 @@ pub(crate) fn open_with(path: &Path, options: &[(&str, &str)]) -> Result<Input> 
     let mut head = [0u8; 12];
     let n = file.read(&mut head).with_context(cannot)?;
     let is_mp4 = n == head.len() && &head[4..8] == b"ftyp";
-    let cut_short = || {
-        format!(
-            "{name} is cut short: it begins like an mp4 but its index (moov) is missing or broken; copy or download it again"
-        )
-    };
+    let truncated =
+        || format!("{name} is truncated: the index (moov) of the mp4 is missing or broken; copy or download it again");
     let whitelists = [("format_whitelist", FORMATS), ("protocol_whitelist", "file")];
     let options = whitelists.iter().chain(options).copied().collect();
     let input = match ffmpeg::format::input_with_dictionary(&url(path)?, options) {
@@ -88,10 +85,10 @@ pub(crate) fn open_with(path: &Path, options: &[(&str, &str)]) -> Result<Input> 
         // This is the error for a container that `format_whitelist` rejects.
         Err(ffmpeg::Error::Other { errno: ffmpeg::error::EINVAL }) => {
             return unreadable(format!(
-                "{name} is of a kind that is not read (a playlist or list that names other files, or an unusual container): {EXPECTED}"
+                "{name} has an unsupported format (a playlist or list of other files, or an unusual container): {EXPECTED}"
             ));
         }
-        Err(ffmpeg::Error::InvalidData) if is_mp4 => return unreadable(cut_short()),
+        Err(ffmpeg::Error::InvalidData) if is_mp4 => return unreadable(truncated()),
         Err(ffmpeg::Error::InvalidData) => return unreadable(format!("{name} is not a media file: {EXPECTED}")),
         Err(error) => return unreadable(format!("cannot open {name} ({error}): {EXPECTED}")),
     };
@@ -101,13 +98,13 @@ pub(crate) fn open_with(path: &Path, options: &[(&str, &str)]) -> Result<Input> 
     if video_stream(&input).is_some() || default_track(&input).is_some() {
         return Ok(input);
     }
-    unreadable(if is_mp4 { cut_short() } else { format!("{name} holds neither pictures nor sound: {EXPECTED}") })
+    unreadable(if is_mp4 { truncated() } else { format!("{name} contains neither video nor audio: {EXPECTED}") })
 }
 
 /// `path` as a ffmpeg URL, marked as a file so that a colon in the name is not taken for a protocol.
 pub(crate) fn url(path: &Path) -> Result<String> {
     let text = path.to_str().filter(|text| !text.contains('\0'));
-    let text = text.with_context(|| format!("the name {} is not UTF-8: rename the file", path.display()))?;
+    let text = text.with_context(|| format!("the file name {} is not UTF-8: rename the file", path.display()))?;
     Ok(format!("file:{text}"))
 }
 
@@ -143,7 +140,7 @@ pub(crate) fn check_rate(path: &Path, rate: u32) -> Result<()> {
         return Ok(());
     }
     let (name, min, max) = (path.display(), SAMPLE_RATES.start(), SAMPLE_RATES.end());
-    let problem = format!("{name} says that its sound has {rate} samples a second, expected {min} to {max}");
+    let problem = format!("invalid audio sample rate {rate} Hz in {name}: expected {min} to {max} Hz");
     Err(UnreadableMedia(problem).into())
 }
 
@@ -168,7 +165,7 @@ pub(crate) fn audio_track(input: &Input, track: usize) -> Result<Option<(Stream<
         0 => streams.iter().position(|stream| stream.index() == default_stream.index()).unwrap_or(0),
         _ if n_tracks == 1 => 0,
         track if track <= n_tracks => track - 1,
-        track => bail!("there is no sound track {track}, the file has {n_tracks}: change extract.audio_track"),
+        track => bail!("no audio track {track}, the file has {n_tracks}: change extract.audio_track"),
     };
     let stream = streams.into_iter().nth(chosen);
     Ok(stream.map(|stream| (stream, AudioTracks { n_tracks, taken: chosen + 1, languages })))

@@ -98,7 +98,7 @@ pub fn text(image: &mut Image, text: &str, at: [f32; 2], height_px: f32, rgb: [u
 pub fn text_width(text: &str, height_px: f32) -> anyhow::Result<f32> {
     let (scale, weight) = font(height_px);
     let size = imgproc::get_text_size(text, imgproc::FONT_HERSHEY_SIMPLEX, scale, weight, &mut 0)
-        .context("measuring a line of text")?;
+        .context("cannot measure a line of text")?;
     Ok(size.width as f32)
 }
 
@@ -145,11 +145,11 @@ fn draw_on(image: &mut Image, paint: impl FnOnce(&mut BoxedRefMut<Mat>) -> openc
     if image.width == 0 || image.height == 0 {
         return Ok(());
     }
-    let rows = i32::try_from(image.height).context("picture too tall to draw on")?;
-    let cols = i32::try_from(image.width).context("picture too wide to draw on")?;
+    let rows = i32::try_from(image.height).context("the image is too tall to draw on")?;
+    let cols = i32::try_from(image.width).context("the image is too wide to draw on")?;
     let mut mat = Mat::new_rows_cols_with_bytes_mut::<Vec3b>(rows, cols, &mut image.data)
-        .context("picture whose bytes do not match its size")?;
-    paint(&mut mat).context("drawing with OpenCV")
+        .context("the image data does not match the image size")?;
+    paint(&mut mat).context("OpenCV cannot draw")
 }
 
 #[cfg(test)]

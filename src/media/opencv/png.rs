@@ -21,7 +21,7 @@ pub fn write(path: &Path, image: &Image) -> Result<()> {
         writer.finish()?;
         Ok(file.flush()?)
     };
-    attempt().with_context(|| format!("cannot write the picture {}", path.display()))
+    attempt().with_context(|| format!("cannot write the image {}", path.display()))
 }
 
 /// Reads any PNG as 8-bit RGB; transparency is dropped.
@@ -30,8 +30,8 @@ pub fn read(path: &Path) -> Result<Image> {
         let mut decoder = Decoder::new(BufReader::new(input::open(path)?));
         decoder.set_transformations(Transformations::normalize_to_color8());
         let mut reader = decoder.read_info()?;
-        let size = reader.output_buffer_size().context("it is too large")?;
-        ensure!(size <= 1 << 30, "it is too large");
+        let size = reader.output_buffer_size().context("the image is too large")?;
+        ensure!(size <= 1 << 30, "more than 1 GiB of pixels");
         let mut data = vec![0; size];
         let info = reader.next_frame(&mut data)?;
         data.truncate(info.buffer_size());
@@ -44,7 +44,7 @@ pub fn read(path: &Path) -> Result<Image> {
         let data = if channels == 3 { data } else { data.chunks_exact(channels).flat_map(rgb).collect() };
         Ok(Image { width: info.width as usize, height: info.height as usize, data })
     };
-    read().with_context(|| format!("cannot read the picture {}", path.display()))
+    read().with_context(|| format!("cannot read the image {}", path.display()))
 }
 
 #[cfg(test)]
@@ -58,7 +58,7 @@ mod tests {
         let image = Image { width: 3, height: 2, data: (0..18).collect() };
         write(&path, &image).unwrap();
         assert_eq!(read(&path).unwrap(), image);
-        std::fs::write(&path, b"no picture").unwrap();
+        std::fs::write(&path, b"not an image").unwrap();
         assert!(format!("{:#}", read(&path).unwrap_err()).contains("a.png"));
     }
 }

@@ -56,7 +56,7 @@ impl Region {
 ///
 /// An empty image, one wider or higher than 32766 px, or an implausible transform.
 pub fn warp(src: &Image, src_from_dst: &SrcFromDst, dst: &mut Image) -> Result<()> {
-    ensure!(src_from_dst.is_plausible(), "a picture cannot be warped by {src_from_dst:?}");
+    ensure!(src_from_dst.is_plausible(), "implausible image transform {src_from_dst:?}");
     let size = Size::new(side(dst.width)?, side(dst.height)?);
     let matrix = Mat::from_slice_2d(&src_from_dst.0)?;
     let flags = INTER_LINEAR | WARP_INVERSE_MAP;
@@ -154,13 +154,13 @@ fn borrow_mut(image: &mut Image) -> Result<BoxedRefMut<'_, Mat>> {
 
 fn check_size(image: &Image) -> Result<()> {
     let expected = image.width * image.height * 3;
-    ensure!(image.data.len() == expected, "a picture has {} bytes, expected {expected}", image.data.len());
+    ensure!(image.data.len() == expected, "the image has {} bytes, expected {expected}", image.data.len());
     Ok(())
 }
 
 /// OpenCV's warps index pixels with 16 bits.
 fn side(px: usize) -> Result<i32> {
-    ensure!((1..32767).contains(&px), "a picture's side is {px} px, expected 1 to 32766");
+    ensure!((1..32767).contains(&px), "invalid image side {px} px: expected 1 to 32766 px");
     Ok(px as i32)
 }
 

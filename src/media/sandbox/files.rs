@@ -34,7 +34,7 @@ pub(crate) fn restrict(access: &FileAccess) -> Result<String, String> {
     let status = enforce(access).map_err(|error| format!("Landlock: {error}"))?;
     let abi = match status.landlock {
         LandlockStatus::NotImplemented => {
-            return Err("this kernel has no Landlock (Linux 5.13 has it)".to_owned());
+            return Err("this kernel does not support Landlock (requires Linux 5.13)".to_owned());
         }
         LandlockStatus::NotEnabled => {
             return Err("Landlock is not enabled in this kernel (boot parameter lsm=landlock,...)".to_owned());
@@ -43,7 +43,7 @@ pub(crate) fn restrict(access: &FileAccess) -> Result<String, String> {
     };
     match status.ruleset {
         RulesetStatus::NotEnforced => {
-            Err(format!("Landlock ABI {abi} cannot let files move between folders (Linux 5.19)"))
+            Err(format!("Landlock ABI {abi} cannot move files between folders (requires Linux 5.19)"))
         }
         RulesetStatus::FullyEnforced | RulesetStatus::PartiallyEnforced => Ok(format!("Landlock ABI {abi}")),
     }

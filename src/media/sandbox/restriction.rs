@@ -33,8 +33,8 @@ impl fmt::Display for Restriction {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (&self.files, &self.calls) {
             (Ok(files), Ok(())) => write!(f, "active: files by {files}, system calls by seccomp"),
-            (Ok(files), Err(calls)) => write!(f, "active in part: files by {files}, not system calls: {calls}"),
-            (Err(files), Ok(())) => write!(f, "active in part: system calls by seccomp, not files: {files}"),
+            (Ok(files), Err(calls)) => write!(f, "partly active: files by {files}, but not system calls: {calls}"),
+            (Err(files), Ok(())) => write!(f, "partly active: system calls by seccomp, but not files: {files}"),
             (Err(files), Err(calls)) => write!(f, "not active: {files}; {calls}"),
         }
     }
@@ -46,7 +46,7 @@ impl fmt::Display for Restriction {
 pub fn restrict(access: &FileAccess) -> Restriction {
     let n_threads = std::fs::read_dir("/proc/self/task").map_or(1, Iterator::count);
     if n_threads > 1 {
-        let late = || format!("the process had {n_threads} threads already");
+        let late = || format!("the process already had {n_threads} threads");
         return Restriction { files: Err(late()), calls: Err(late()) };
     }
     restrict_thread(access)

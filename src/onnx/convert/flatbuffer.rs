@@ -25,10 +25,10 @@ impl<'a> FlatTable<'a> {
         let vtable_offset = i32::from_le_bytes(read(file, position)?);
         let vtable = position
             .checked_add_signed(-(vtable_offset as isize))
-            .context("a table's list of fields is not in the file")?;
+            .context("the field list of a table is outside the file")?;
         let n_bytes = usize::from(u16::from_le_bytes(read(file, vtable)?));
         let offsets = file.get(vtable + 4..vtable + n_bytes.max(4));
-        Ok(Self { file, position, offsets: offsets.context("a table's list of fields is not in the file")? })
+        Ok(Self { file, position, offsets: offsets.context("the field list of a table is outside the file")? })
     }
 
     /// Position of a field, if present.
@@ -57,14 +57,14 @@ impl<'a> FlatTable<'a> {
     /// Reads a list of tables.
     pub(crate) fn tables(&self, field: usize) -> Result<Vec<Self>> {
         let (n_tables, start, _) = self.list(field, 4)?;
-        ensure!(n_tables <= MAX_TABLES, "a list of tables has at most {MAX_TABLES} entries, not {n_tables}");
+        ensure!(n_tables <= MAX_TABLES, "a list has {n_tables} tables, expected at most {MAX_TABLES}");
         (0..n_tables).map(|k| Self::at(self.file, target(self.file, start + 4 * k)?)).collect()
     }
 
     /// Reads a list of at most `max` 32-bit numbers.
     pub(crate) fn ints(&self, field: usize, max: usize) -> Result<Vec<i32>> {
         let (n_ints, _, bytes) = self.list(field, 4)?;
-        ensure!(n_ints <= max, "a list has at most {max} numbers, not {n_ints}");
+        ensure!(n_ints <= max, "a list has {n_ints} numbers, expected at most {max}");
         Ok(int32s(bytes).collect())
     }
 
@@ -82,7 +82,7 @@ impl<'a> FlatTable<'a> {
         Ok((
             n_entries,
             start,
-            bytes.with_context(|| format!("a list of {n_entries} entries at byte {list} is cut off"))?,
+            bytes.with_context(|| format!("a list of {n_entries} entries at byte {list} is truncated"))?,
         ))
     }
 }

@@ -92,17 +92,14 @@ impl OnnxGraph {
         let n_bytes = dims.iter().try_fold(size, |product: usize, dim| product.checked_mul(*dim));
         ensure!(
             n_bytes == Some(raw.len()),
-            "a weight of shape {dims:?} and {size} bytes a number does not have {} bytes",
+            "a weight of shape {dims:?} with {size} bytes per value cannot have {} bytes",
             raw.len()
         );
         let key = (element, dims.to_vec(), raw.to_vec());
         if let Some(name) = self.constants.get(&key) {
             return Ok(name.clone());
         }
-        ensure!(
-            raw.len() <= self.n_weight_bytes_left,
-            "its weights are used over and over, in one shape after the other"
-        );
+        ensure!(raw.len() <= self.n_weight_bytes_left, "the converted weights exceed twice the size of the source");
         self.n_weight_bytes_left -= raw.len();
         let mut name = format!("w{}", self.constants.len());
         let mut tensor = Vec::with_capacity(raw.len() + 64);

@@ -11,7 +11,7 @@ pub(crate) const CHANNELS_FIRST: [usize; 4] = [0, 3, 1, 2];
 /// Checks a size read from a file. Errors: the number is not in 1..=`MAX_SIZE`.
 pub(crate) fn size(number: i64) -> Result<usize> {
     let size = usize::try_from(number).ok().filter(|size| (1..=MAX_SIZE).contains(size));
-    size.with_context(|| format!("a size is 1 to {MAX_SIZE}, not {number}"))
+    size.with_context(|| format!("invalid size {number}: expected 1 to {MAX_SIZE}"))
 }
 
 /// Decodes little-endian 32-bit integers.
@@ -21,7 +21,7 @@ pub(crate) fn int32s(raw: &[u8]) -> impl Iterator<Item = i32> {
 
 /// The four sizes of a 4-D tensor. Errors: another number of axes; the message names `what`.
 pub(crate) fn four(what: &str, dims: &[usize]) -> Result<[usize; 4]> {
-    dims.try_into().ok().with_context(|| format!("{what} has 4 axes, not the sizes {dims:?}"))
+    dims.try_into().ok().with_context(|| format!("{what} has shape {dims:?}, expected 4 axes"))
 }
 
 /// Transposes a tensor of shape `dims`, so that axis `k` of the result is axis `order[k]` of the input. Errors: the
@@ -30,7 +30,7 @@ pub(crate) fn transposed(raw: &[u8], n_bytes: usize, dims: [usize; 4], order: [u
     let expected = dims.iter().try_fold(n_bytes, |product: usize, dim| product.checked_mul(*dim));
     ensure!(
         expected == Some(raw.len()) && !raw.is_empty(),
-        "a weight of shape {dims:?} and {n_bytes} bytes a number does not have {} bytes",
+        "a weight of shape {dims:?} with {n_bytes} bytes per value cannot have {} bytes",
         raw.len()
     );
     let steps = [dims[1] * dims[2] * dims[3], dims[2] * dims[3], dims[3], 1];
@@ -70,7 +70,7 @@ impl SlidingWindow {
     /// Number of steps over an axis of `size`, which includes padding. Errors: the window is larger than the axis.
     pub(crate) fn n_steps(self, size: usize) -> Result<usize> {
         let extent = (self.kernel - 1) * self.dilation + 1;
-        ensure!(extent <= size, "a window of {extent} cells does not fit into {size}");
+        ensure!(extent <= size, "a window of {extent} does not fit into an axis of {size}");
         Ok((size - extent) / self.stride + 1)
     }
 }

@@ -32,8 +32,9 @@ pub(crate) fn is_movenet(source: &TfGraph) -> bool {
 /// Converts the model to ONNX: image [1, S, S, 3], RGB 0..255, to heat-maps [1, 17, S / 4, S / 4] in 0..1.
 pub(crate) fn convert(source: &TfGraph, mut graph: OnnxGraph, options: &ConversionOptions) -> Result<Vec<u8>> {
     let (shape, output) = (options.shape()?, options.only_output()?);
-    let [1, side, width, 3] = shape[..] else { bail!("the input has the sizes 1, S, S, 3, not {shape:?}") };
-    ensure!(side == width && source.input_shape()? == shape, "the input has the sizes {:?}", source.input_shape()?);
+    let [1, side, width, 3] = shape[..] else { bail!("expected an input of shape [1, S, S, 3], not {shape:?}") };
+    let stated = source.input_shape()?;
+    ensure!(side == width && stated == shape, "the model input has shape {stated:?}, expected square {shape:?}");
     let n_side = side / CELL;
     let n_cells = n_side * n_side;
 
@@ -105,7 +106,7 @@ fn head(source: &mut TfConverter, node: &str, n_side: usize, channels: usize) ->
     let value = source.value(node)?;
     ensure!(
         value.channels_first && value.shape == [1, n_side, n_side, channels],
-        "{node:?} has the sizes {:?}, expected 1, {n_side}, {n_side}, {channels}",
+        "node {node:?} has shape {:?}, expected [1, {n_side}, {n_side}, {channels}]",
         value.shape
     );
     Ok(value.name)

@@ -24,20 +24,23 @@ pub(crate) fn is_nanodet(source: &TfGraph) -> bool {
 /// the person score, 0..1.
 pub(crate) fn convert(source: &TfGraph, graph: OnnxGraph, options: &ConversionOptions) -> Result<Vec<u8>> {
     let (shape, output) = (options.shape()?, options.only_output()?);
-    let [1, 3, side, width] = shape[..] else { bail!("the input has the sizes 1, 3, S, S, not {shape:?}") };
-    ensure!(side == width && source.input_shape()? == shape, "the input has the sizes {:?}", source.input_shape()?);
+    let [1, 3, side, width] = shape[..] else { bail!("expected an input of shape [1, 3, S, S], not {shape:?}") };
+    let stated = source.input_shape()?;
+    ensure!(side == width && stated == shape, "the model input has shape {stated:?}, expected square {shape:?}");
     let image = TfValue { name: options.input.name.clone(), shape: shape.clone(), channels_first: false };
     let mut source = TfConverter::new(source, graph, source.input()?.0, image);
 
     let (mut scores, mut distances, mut columns, mut rows) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for (node, stride) in HEADS {
         let head = source.value(node)?;
-        let [_, _, _, channels] = head.shape[..] else { bail!("{node:?} gives a picture, not {:?}", head.shape) };
+        let [_, _, _, channels] = head.shape[..] else {
+            bail!("node {node:?} has shape {:?}, expected 4 axes", head.shape)
+        };
         let n_side = side / stride;
         let n_bins = channels.saturating_sub(N_CLASSES) / 4;
         ensure!(
             head.channels_first && n_bins >= 2 && head.shape == [1, n_side, n_side, N_CLASSES + 4 * n_bins],
-            "{node:?} has the sizes {:?}, expected 1, {n_side}, {n_side}, {N_CLASSES} + 4 bins",
+            "node {node:?} has shape {:?}, expected [1, {n_side}, {n_side}, {N_CLASSES} + 4 bins]",
             head.shape
         );
         let n_cells = n_side * n_side;

@@ -6,6 +6,7 @@ use super::layout::{SlidingWindow, size};
 use super::ncnn_file::{NcnnLayer, NcnnWeights, layers};
 use super::source::ConversionOptions;
 use anyhow::{Context, Result, bail, ensure};
+use orator_base::text::counted;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Value that means "the rest" in the sizes of a slice.
@@ -34,16 +35,20 @@ pub(crate) fn convert(
     options: &ConversionOptions,
 ) -> Result<Vec<u8>> {
     let sizes = options.shape()?;
-    let [1, channels, height, width] = sizes[..] else { bail!("the input has 1 picture, not the sizes {sizes:?}") };
+    let [1, channels, height, width] = sizes[..] else {
+        bail!("expected an input of shape [1, channels, height, width], not {sizes:?}")
+    };
     let layers = layers(parameters)?;
-    ensure!(layers.iter().filter(|layer| layer.kind == "Input").count() == 1, "there is one layer of the kind Input");
+    let n_inputs = layers.iter().filter(|layer| layer.kind == "Input").count();
+    ensure!(n_inputs == 1, "expected 1 layer of type Input, found {n_inputs}");
     let input = NcnnBlob { name: options.input.name.clone(), shape: [channels, height, width] };
     let weights = NcnnWeights::new(weights);
     let mut converter = NcnnConverter { blobs: BTreeMap::new(), weights, graph, input };
     for layer in &layers {
-        let layer_name = || format!("the layer {:?} ({})", layer.name, layer.kind);
+        let layer_name = || format!("layer {:?} ({})", layer.name, layer.kind);
         let outputs = converter.layer(layer).with_context(layer_name)?;
-        ensure!(outputs.len() == layer.outputs.len(), "{} has {} outputs", layer_name(), outputs.len());
+        let [expected, found] = [outputs.len(), layer.outputs.len()];
+        ensure!(found == expected, "{} has {}, expected {expected}", layer_name(), counted(found, "output"));
         converter.blobs.extend(layer.outputs.iter().copied().zip(outputs));
     }
     converter.weights.end()?;
@@ -52,7 +57,7 @@ pub(crate) fn convert(
         layers.iter().flat_map(|layer| &layer.outputs).copied().filter(|blob| !read.contains(blob)).collect();
     ensure!(
         unread.len() == options.outputs.len(),
-        "the model gives {unread:?}, the description names {:?}",
+        "the model has the outputs {unread:?}, but its description names {:?}",
         options.outputs
     );
     let mut ports = Vec::new();
@@ -67,13 +72,13 @@ pub(crate) fn convert(
 
 impl<'a> NcnnConverter<'a> {
     fn blob(&self, name: &str) -> Result<NcnnBlob> {
-        self.blobs.get(name).cloned().with_context(|| format!("no layer before gives {name:?}"))
+        self.blobs.get(name).cloned().with_context(|| format!("no preceding layer outputs {name:?}"))
     }
 
     /// Converts a layer and returns one blob per output.
     fn layer(&mut self, layer: &NcnnLayer<'a>) -> Result<Vec<NcnnBlob>> {
         let inputs = layer.inputs.iter().map(|name| self.blob(name)).collect::<Result<Vec<_>>>()?;
-        let first = || inputs.first().cloned().context("it has no input");
+        let first = || inputs.first().cloned().context("the layer has no input");
         let result = match layer.kind {
             "Input" => {
                 layer.check_keys(&[0, 1, 2])?;
@@ -81,7 +86,7 @@ impl<'a> NcnnConverter<'a> {
                 let described = self.input.shape;
                 let is_consistent =
                     stated.iter().zip(described).all(|(stated, size)| *stated == 0 || *stated == size as i64);
-                ensure!(is_consistent, "the input has the sizes {stated:?}, the description says {described:?}");
+                ensure!(is_consistent, "the input has shape {stated:?}, expected {described:?} as described");
                 self.input.clone()
             }
             "Split" => {
@@ -97,9 +102,9 @@ impl<'a> NcnnConverter<'a> {
             }
             "BinaryOp" => {
                 layer.check_keys(&[0])?;
-                let [a, b] = inputs.as_slice() else { bail!("it has 2 inputs, not {}", inputs.len()) };
-                ensure!(layer.int(0, 0)? == 0, "the operation is an addition (0), not {}", layer.int(0, 0)?);
-                ensure!(a.shape == b.shape, "the sizes of its inputs differ: {:?} and {:?}", a.shape, b.shape);
+                let [a, b] = inputs.as_slice() else { bail!("expected 2 inputs, found {}", inputs.len()) };
+                ensure!(layer.int(0, 0)? == 0, "unsupported operation {}: expected addition (0)", layer.int(0, 0)?);
+                ensure!(a.shape == b.shape, "the shapes of the inputs differ: {:?} and {:?}", a.shape, b.shape);
                 NcnnBlob { name: self.graph.op("Add", &[&a.name, &b.name], &[]), shape: a.shape }
             }
             "Concat" => self.concatenation(layer, &inputs)?,
@@ -107,19 +112,23 @@ impl<'a> NcnnConverter<'a> {
                 layer.check_keys(&[0, 1, 2])?;
                 let NcnnBlob { name, shape } = first()?;
                 let new = [size(layer.int(2, 0)?)?, size(layer.int(1, 0)?)?, size(layer.int(0, 0)?)?];
-                ensure!(count(new) == count(shape), "the sizes {shape:?} cannot become {new:?}");
+                ensure!(count(new) == count(shape), "cannot reshape {shape:?} to {new:?}");
                 let sizes = self.graph.sizes(&[1, new[0], new[1], new[2]])?;
                 NcnnBlob { name: self.graph.op("Reshape", &[&name, &sizes], &[]), shape: new }
             }
             "Permute" => {
                 layer.check_keys(&[0])?;
                 let NcnnBlob { name, shape: [channels, height, width] } = first()?;
-                ensure!(layer.int(0, 0)? == 2, "rows and channels change places (2), not {}", layer.int(0, 0)?);
+                ensure!(
+                    layer.int(0, 0)? == 2,
+                    "unsupported order {}: expected 2 (rows and channels swapped)",
+                    layer.int(0, 0)?
+                );
                 let name = self.graph.op("Transpose", &[&name], &[("perm", Ints(&[0, 2, 1, 3]))]);
                 NcnnBlob { name, shape: [height, channels, width] }
             }
             "Interp" => self.resize(layer, first()?)?,
-            _ => bail!("no layer of this kind is known"),
+            _ => bail!("unsupported layer type"),
         };
         Ok(vec![result])
     }
@@ -131,11 +140,15 @@ impl<'a> NcnnConverter<'a> {
         for (k, part) in parts.iter().enumerate() {
             let rest = left / (parts.len() - k);
             let part = if *part == REST { rest } else { size(*part as i64)? };
-            ensure!(part >= 1 && part <= left, "the parts {parts:?} do not fit into {}", shape[axis]);
+            ensure!(part >= 1 && part <= left, "the slice sizes {parts:?} exceed the axis size {}", shape[axis]);
             left -= part;
             sizes.push(part);
         }
-        ensure!(left == 0 && !sizes.is_empty(), "the parts {parts:?} leave {left} of {} over", shape[axis]);
+        ensure!(
+            left == 0 && !sizes.is_empty(),
+            "the slice sizes {parts:?} do not cover {left} of {} elements",
+            shape[axis]
+        );
         let lengths = self.graph.sizes(&sizes)?;
         let names = self.graph.ops(sizes.len(), "Split", &[&name, &lengths], &[("axis", Int(1 + axis as i64))]);
         let part = |(name, size): (String, usize)| {
@@ -149,12 +162,12 @@ impl<'a> NcnnConverter<'a> {
     fn concatenation(&mut self, layer: &NcnnLayer, parts: &[NcnnBlob]) -> Result<NcnnBlob> {
         layer.check_keys(&[0])?;
         let axis = axis(layer.int(0, 0)?)?;
-        let mut shape = parts.first().context("it has no inputs")?.shape;
+        let mut shape = parts.first().context("the layer has no inputs")?.shape;
         shape[axis] = 0;
         for part in parts {
             let mut others = part.shape;
             others[axis] = shape[axis];
-            ensure!(others == shape, "the sizes of its inputs differ: {:?} and {:?}", parts[0].shape, part.shape);
+            ensure!(others == shape, "the shapes of the inputs differ: {:?} and {:?}", parts[0].shape, part.shape);
             shape[axis] = size((shape[axis] + part.shape[axis]) as i64)?;
         }
         let names: Vec<String> = parts.iter().map(|part| part.name.clone()).collect();
@@ -168,7 +181,7 @@ impl<'a> NcnnConverter<'a> {
         let group = if layer.kind == "Convolution" { 1 } else { of(7, 1)? };
         ensure!(
             shape[0] % group == 0 && channels % group == 0,
-            "{} to {channels} channels cannot be in {group} groups",
+            "cannot split {} input and {channels} output channels into {group} groups",
             shape[0]
         );
         let horizontal = SlidingWindow { kernel: of(1, 0)?, stride: of(3, 1)?, dilation: of(2, 1)? };
@@ -180,7 +193,7 @@ impl<'a> NcnnConverter<'a> {
         let left = layer.int(4, 0)?;
         let top = layer.int(14, left)?;
         let pads = [top, left, layer.int(16, top)?, layer.int(15, left)?];
-        ensure!(pads.iter().all(|n_zeros| (0..4096).contains(n_zeros)), "the zeros at the sides are {pads:?}");
+        ensure!(pads.iter().all(|n_zeros| (0..4096).contains(n_zeros)), "invalid padding {pads:?}: expected 0 to 4095");
         let padded = |size: usize, before: i64, after: i64| size + (before + after) as usize;
         let height = vertical.n_steps(padded(shape[1], pads[0], pads[2]))?;
         let width = horizontal.n_steps(padded(shape[2], pads[1], pads[3]))?;
@@ -189,7 +202,7 @@ impl<'a> NcnnConverter<'a> {
         let n_weights = dims.iter().try_fold(1, |product: usize, dim| product.checked_mul(*dim));
         ensure!(
             n_weights.is_some_and(|n| layer.int(6, 0).is_ok_and(|stated| stated == n as i64)),
-            "a weight of the sizes {dims:?} does not have {} numbers",
+            "a weight of shape {dims:?} cannot have {} values",
             layer.int(6, 0)?
         );
         let (element, weight) = self.weights.tagged(n_weights.unwrap_or_default())?;
@@ -202,7 +215,7 @@ impl<'a> NcnnConverter<'a> {
         match layer.int(9, 0)? {
             0 => {}
             1 => name = self.graph.op("Relu", &[&name], &[]),
-            other => bail!("the activations known are none (0) and ReLU (1), not {other}"),
+            other => bail!("unsupported activation {other}: expected none (0) or ReLU (1)"),
         }
         Ok(NcnnBlob { name, shape: [channels, height, width] })
     }
@@ -215,7 +228,9 @@ impl<'a> NcnnConverter<'a> {
         let (sides, mode) = match (layer.int(0, 0)?, layer.int(3, 0)?, layer.int(6, 0)?) {
             (1, 0, 0) => ([shape[1] * factor[0], shape[2] * factor[1]], ["nearest", "asymmetric"]),
             (2, 1.., 1) => (stated, ["linear", "align_corners"]),
-            (kind, _, _) => bail!("nearest (1) by a factor, bilinear (2) to a size with the corners kept, not {kind}"),
+            (kind, _, _) => bail!(
+                "unsupported resize {kind}: expected nearest (1) by a factor, or bilinear (2) to a size with aligned corners"
+            ),
         };
         let [height, width] = [size(sides[0] as i64)?, size(sides[1] as i64)?];
         let sizes = self.graph.sizes(&[1, shape[0], height, width])?;
@@ -231,7 +246,10 @@ impl<'a> NcnnConverter<'a> {
 
 /// Checks an axis index: channels, rows or columns.
 fn axis(number: i64) -> Result<usize> {
-    usize::try_from(number).ok().filter(|axis| *axis < 3).with_context(|| format!("there is no axis {number} among 3"))
+    usize::try_from(number)
+        .ok()
+        .filter(|axis| *axis < 3)
+        .with_context(|| format!("invalid axis {number}: expected 0, 1 or 2"))
 }
 
 fn count(shape: [usize; 3]) -> Option<usize> {

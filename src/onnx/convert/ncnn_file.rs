@@ -2,6 +2,7 @@
 
 use super::graph::ElementType;
 use anyhow::{Context, Result, bail, ensure};
+use orator_base::text::counted;
 use std::collections::BTreeMap;
 
 /// First line of the text.
@@ -28,7 +29,7 @@ impl NcnnLayer<'_> {
         let Some(numbers) = self.parameters.get(&key) else { return Ok(absent) };
         match numbers.as_slice() {
             [number] if number.fract() == 0.0 && number.abs() < 1e15 => Ok(*number as i64),
-            _ => bail!("parameter {key} is a whole number, not {numbers:?}"),
+            _ => bail!("parameter {key} must be an integer, not {numbers:?}"),
         }
     }
 
@@ -40,7 +41,7 @@ impl NcnnLayer<'_> {
     /// Checks that all parameters are supported. Errors: a parameter is not in `keys`.
     pub(crate) fn check_keys(&self, keys: &[i32]) -> Result<()> {
         match self.parameters.keys().find(|key| !keys.contains(key)) {
-            Some(key) => bail!("parameter {key} = {:?} is not known", self.list(*key)),
+            Some(key) => bail!("unsupported parameter {key} = {:?}", self.list(*key)),
             None => Ok(()),
         }
     }
@@ -49,21 +50,23 @@ impl NcnnLayer<'_> {
 /// Layers of a `.param` file in execution order. Errors: the first line is wrong, or a line is not a layer; the
 /// message has its number.
 pub(crate) fn layers(file: &[u8]) -> Result<Vec<NcnnLayer<'_>>> {
-    let text = std::str::from_utf8(file).context("the .param file is no text")?;
+    let text = std::str::from_utf8(file).context("the .param file is not UTF-8 text")?;
     let mut lines = text.lines().enumerate();
     ensure!(
         lines.next().is_some_and(|(_, line)| line.trim() == MAGIC),
-        "the .param file begins with {MAGIC}, in the order .param, .bin"
+        "line 1 of the .param file: expected {MAGIC}; list the files in the order .param, .bin"
     );
     let counts = lines.next().map(|(_, line)| line.split_whitespace().map(str::parse).collect::<Vec<_>>());
-    let Some([Ok(n_layers), Ok(_)]) = counts.as_deref() else { bail!("line 2 has the numbers of layers and blobs") };
+    let Some([Ok(n_layers), Ok(_)]) = counts.as_deref() else {
+        bail!("{}: expected the numbers of layers and blobs", line_position(1))
+    };
     let n_layers: usize = *n_layers;
     let written = lines.filter(|(_, line)| !line.trim().is_empty());
     let layers = written.take(MAX_LAYERS + 1).map(|(k, line)| layer(line).with_context(|| line_position(k)));
     let layers = layers.collect::<Result<Vec<_>>>()?;
     ensure!(
         layers.len() == n_layers && n_layers <= MAX_LAYERS,
-        "the .param file has {} layers, its second line says {n_layers}, {MAX_LAYERS} are the most",
+        "the .param file has {} layers, expected {n_layers} according to line 2 and at most {MAX_LAYERS}",
         layers.len()
     );
     Ok(layers)
@@ -76,9 +79,11 @@ fn line_position(line: usize) -> String {
 fn layer(line: &str) -> Result<NcnnLayer<'_>> {
     let mut words = line.split_whitespace();
     let mut word = |what: &str| words.next().with_context(|| format!("the line ends before {what}"));
-    let (kind, name) = (word("the kind")?, word("the name")?);
-    let count = |word: &str| word.parse().ok().filter(|n| *n <= 64).with_context(|| format!("{word} blobs"));
-    let (n_inputs, n_outputs): (usize, usize) = (count(word("the inputs")?)?, count(word("the outputs")?)?);
+    let (kind, name) = (word("the layer type")?, word("the name")?);
+    let invalid = |word: &str| format!("invalid number of blobs {word:?}: expected 0 to 64");
+    let count = |word: &str| word.parse().ok().filter(|n| *n <= 64).with_context(|| invalid(word));
+    let (n_inputs, n_outputs): (usize, usize) =
+        (count(word("the number of inputs")?)?, count(word("the number of outputs")?)?);
     let inputs = (0..n_inputs).map(|_| word("an input")).collect::<Result<_>>()?;
     let outputs = (0..n_outputs).map(|_| word("an output")).collect::<Result<_>>()?;
     let mut parameters = BTreeMap::new();
@@ -93,7 +98,7 @@ fn layer(line: &str) -> Result<NcnnLayer<'_>> {
                 _ => None,
             }
         });
-        let (key, numbers) = parameter.with_context(|| format!("{word:?} is no parameter"))?;
+        let (key, numbers) = parameter.with_context(|| format!("invalid parameter {word:?}: expected KEY=VALUE"))?;
         parameters.insert(key, numbers);
     }
     Ok(NcnnLayer { kind, name, inputs, outputs, parameters })
@@ -112,7 +117,7 @@ impl<'a> NcnnWeights<'a> {
 
     fn take(&mut self, n_bytes: usize) -> Result<&'a [u8]> {
         let (bytes, rest) = self.rest.split_at_checked(n_bytes).with_context(|| {
-            format!("{n_bytes} bytes of weights are expected, {} are left of the .bin file", self.rest.len())
+            format!("the .bin file is too short: expected {n_bytes} more bytes of weights, found {}", self.rest.len())
         })?;
         self.rest = rest;
         Ok(bytes)
@@ -129,7 +134,7 @@ impl<'a> NcnnWeights<'a> {
                 self.take(raw.len().next_multiple_of(4) - raw.len())?;
                 Ok((ElementType::F16, raw))
             }
-            tag => bail!("weights are float16 or float32, not of the form {tag:#x}"),
+            tag => bail!("unsupported weight type {tag:#x}: expected float16 or float32"),
         }
     }
 
@@ -140,7 +145,7 @@ impl<'a> NcnnWeights<'a> {
 
     /// Checks that all weights have been read.
     pub(crate) fn end(&self) -> Result<()> {
-        ensure!(self.rest.is_empty(), "{} bytes of the .bin file belong to no layer", self.rest.len());
+        ensure!(self.rest.is_empty(), "{} of the .bin file belong to no layer", counted(self.rest.len(), "byte"));
         Ok(())
     }
 }

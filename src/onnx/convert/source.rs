@@ -4,6 +4,7 @@ use super::graph::OnnxGraph;
 use super::{movenet, nanodet, ncnn, tfjs_file::TfGraph, tflite};
 use crate::Port;
 use anyhow::{Context, Result, bail, ensure};
+use orator_base::text::counted;
 use serde::{Deserialize, Serialize};
 use std::fmt::{Display, Formatter};
 
@@ -52,7 +53,7 @@ impl ConversionOptions {
         let size = |size: &i64| usize::try_from(*size).ok().filter(|size| (1..=1 << 14).contains(size));
         let sizes: Option<Vec<usize>> = self.input.shape.iter().map(size).collect();
         sizes.with_context(|| {
-            format!("the input {:?} needs sizes of 1 to 16384, not {:?}", self.input.name, self.input.shape)
+            format!("the input {:?} has shape {:?}, expected sizes of 1 to 16384", self.input.name, self.input.shape)
         })
     }
 
@@ -64,7 +65,7 @@ impl ConversionOptions {
     pub fn only_output(&self) -> Result<&str> {
         match self.outputs.as_slice() {
             [name] if !name.is_empty() => Ok(name),
-            names => bail!("the model has one output, which needs one name, not {names:?}"),
+            names => bail!("expected 1 output name, not {names:?}"),
         }
     }
 }
@@ -80,7 +81,7 @@ pub fn convert(format: SourceFormat, files: &[&[u8]], options: &ConversionOption
         SourceFormat::Onnx | SourceFormat::Tflite => 1,
         SourceFormat::TfjsGraph | SourceFormat::Ncnn => 2,
     };
-    ensure!(files.len() == expected, "a model of the format {format} has {expected} file(s), not {}", files.len());
+    ensure!(files.len() == expected, "a {format} model needs {}, not {}", counted(expected, "file"), files.len());
     let graph = OnnxGraph::new(files.iter().map(|file| file.len()).sum());
     let result = match (format, files) {
         (SourceFormat::Tflite, [model]) => tflite::convert(model, graph, options),
@@ -88,11 +89,14 @@ pub fn convert(format: SourceFormat, files: &[&[u8]], options: &ConversionOption
             if movenet::is_movenet(&source) {
                 return movenet::convert(&source, graph, options);
             }
-            ensure!(nanodet::is_nanodet(&source), "neither the nodes of a MoveNet nor those of a NanoDet are in it");
+            ensure!(
+                nanodet::is_nanodet(&source),
+                "unsupported graph: it has neither the nodes of a MoveNet nor of a NanoDet"
+            );
             nanodet::convert(&source, graph, options)
         }),
         (SourceFormat::Ncnn, [parameters, weights]) => ncnn::convert(parameters, weights, graph, options),
         _ => return Ok(files.concat()),
     };
-    result.with_context(|| format!("this {format} model cannot be converted to ONNX"))
+    result.with_context(|| format!("cannot convert the {format} model to ONNX"))
 }

@@ -38,45 +38,45 @@ impl<'a> TfConverter<'a> {
         order: Option<[usize; 4]>,
         dims: Option<&[usize]>,
     ) -> Result<String> {
-        ensure!(tensor.element != ElementType::I32, "a weight is float16 or float32, not int32");
+        ensure!(tensor.element != ElementType::I32, "unsupported weight type int32: expected float16 or float32");
         self.graph.weight((tensor.element, &tensor.shape, tensor.raw), order, dims)
     }
 
-    /// Output of the node `wanted`, after conversion of all nodes on which it depends. Errors: a node is missing,
+    /// Output of the node `target`, after conversion of all nodes on which it depends. Errors: a node is missing,
     /// depends on itself, or is of an unsupported kind.
-    pub(crate) fn value(&mut self, wanted: &str) -> Result<TfValue> {
+    pub(crate) fn value(&mut self, target: &str) -> Result<TfValue> {
         let source = self.source;
-        let (mut stack, mut visited) = (vec![wanted], BTreeSet::new());
+        let (mut stack, mut visited) = (vec![target], BTreeSet::new());
         while let Some(name) = stack.last().copied() {
             if self.values.contains_key(name) {
                 stack.pop();
                 continue;
             }
-            let node = source.nodes.get(name).with_context(|| format!("there is no node {name:?}"))?;
+            let node = source.nodes.get(name).with_context(|| format!("missing node {name:?}"))?;
             let missing = |input: &&str| !source.tensors.contains_key(*input) && !self.values.contains_key(*input);
             let missing: Vec<&str> = node.inputs.iter().map(String::as_str).filter(missing).collect();
             if missing.is_empty() {
-                let value = self.node(node).with_context(|| format!("the node {name:?} ({})", node.op))?;
+                let value = self.node(node).with_context(|| format!("node {name:?} ({})", node.op))?;
                 self.values.insert(name.to_owned(), value);
                 stack.pop();
             } else {
-                ensure!(visited.insert(name), "the node {name:?} needs its own result");
+                ensure!(visited.insert(name), "node {name:?} depends on its own result");
                 stack.extend(missing);
             }
         }
-        self.values.get(wanted).cloned().context("a node without a result")
+        self.values.get(target).cloned().context("the node has no result")
     }
 
     fn input(&self, node: &TfNode, k: usize) -> Result<TfValue> {
         let name = node.inputs.get(k).with_context(|| format!("input {k} is missing"))?;
-        self.values.get(name).cloned().with_context(|| format!("input {k} ({name:?}) is the result of a node"))
+        self.values.get(name).cloned().with_context(|| format!("input {k} ({name:?}) must be the result of a node"))
     }
 
     /// The first input, which must be an image, with its height, width and channels.
     fn picture(&self, node: &TfNode) -> Result<(TfValue, [usize; 3])> {
         let value = self.input(node, 0)?;
         let [_, height, width, channels] = four("the input", &value.shape)?;
-        ensure!(value.channels_first, "the input is a picture with the channels last");
+        ensure!(value.channels_first, "the input must be an image in NHWC order");
         Ok((value, [height, width, channels]))
     }
 
@@ -111,10 +111,10 @@ impl<'a> TfConverter<'a> {
                 let (value, [height, width, channels]) = self.picture(node)?;
                 ensure!(
                     node.is("half_pixel_centers") && !node.is("align_corners"),
-                    "the corners of pixels, not their centres, lie on each other"
+                    "unsupported resize: expected half_pixel_centers without align_corners"
                 );
                 let [new_height, new_width] = self.constant(node, 1)?.integers()?[..] else {
-                    bail!("a size is 2 numbers")
+                    bail!("expected a size of 2 numbers")
                 };
                 let (new_height, new_width) = (size(new_height)?, size(new_width)?);
                 let scales = [1.0, 1.0, new_height as f64 / height as f64, new_width as f64 / width as f64];
@@ -123,7 +123,7 @@ impl<'a> TfConverter<'a> {
                 let name = self.graph.op("Resize", &[&value.name, "", &scales], &mode);
                 Ok(TfValue { name, shape: vec![value.shape[0], new_height, new_width, channels], ..value })
             }
-            _ => bail!("no node of this kind is known"),
+            _ => bail!("unsupported node type"),
         }
     }
 
@@ -134,10 +134,13 @@ impl<'a> TfConverter<'a> {
         let windows = windows(node, [kernel_height, kernel_width])?;
         ensure!(
             n_inputs == channels && (!depthwise || n_outputs == 1) && weight.raw.len() > 1,
-            "a weight of the sizes {:?} does not suit {channels} channels",
+            "a weight of shape {:?} does not match {channels} channels",
             weight.shape
         );
-        ensure!(node.integers("dilations").unwrap_or_default().iter().all(|step| *step == 1), "there are no dilations");
+        ensure!(
+            node.integers("dilations").unwrap_or_default().iter().all(|step| *step == 1),
+            "dilations are not supported"
+        );
         let (pads, height, width) = padding(node, windows, [height, width])?;
         let order = if depthwise { [2, 3, 0, 1] } else { [3, 2, 0, 1] };
         let mut inputs = vec![value.name.clone(), self.weight(weight, Some(order), None)?];
@@ -150,13 +153,13 @@ impl<'a> TfConverter<'a> {
         let fused: Vec<&str> = fused.iter().map(String::as_str).collect();
         ensure!(
             fused.contains(&"BiasAdd") == (inputs.len() == 3) && inputs.len() <= 3,
-            "a fused BiasAdd has one input"
+            "a fused BiasAdd must have 1 input"
         );
         match fused.as_slice() {
             [] | ["BiasAdd"] => {}
             ["BiasAdd", "Relu"] => name = self.graph.op("Relu", &[&name], &[]),
             ["BiasAdd", "Relu6"] => name = self.graph.relu6(&name)?,
-            _ => bail!("the fused operators are not known: {fused:?}"),
+            _ => bail!("unsupported fused operators {fused:?}"),
         }
         let channels = if depthwise { channels } else { n_outputs };
         Ok(TfValue { name, shape: vec![value.shape[0], height, width, channels], channels_first: true })
@@ -164,7 +167,7 @@ impl<'a> TfConverter<'a> {
 
     /// Combines two outputs of the same shape, or one with a broadcast constant.
     fn elementwise(&mut self, node: &TfNode, kind: &str) -> Result<TfValue> {
-        let [a, b] = node.inputs.as_slice() else { bail!("it has 2 inputs, not {}", node.inputs.len()) };
+        let [a, b] = node.inputs.as_slice() else { bail!("expected 2 inputs, found {}", node.inputs.len()) };
         let (mut names, mut result) = (Vec::new(), None::<TfValue>);
         for input in [a, b] {
             if let Some(value) = self.values.get(input) {
@@ -173,8 +176,8 @@ impl<'a> TfConverter<'a> {
                     .is_none_or(|other| (&other.shape, other.channels_first) == (&value.shape, value.channels_first));
                 ensure!(
                     is_same_shape,
-                    "the sizes of its inputs differ: {:?} and {:?}",
-                    result.map(|r| r.shape),
+                    "the shapes of the inputs differ: {:?} and {:?}",
+                    result.map(|other| other.shape).unwrap_or_default(),
                     value.shape
                 );
                 result = Some(value.clone());
@@ -195,11 +198,11 @@ impl<'a> TfConverter<'a> {
     fn broadcast(&mut self, tensor: &TfTensor, value: &TfValue) -> Result<String> {
         let is_compatible = tensor.shape.len() <= value.shape.len()
             && tensor.shape.iter().rev().zip(value.shape.iter().rev()).all(|(size, full)| *size == 1 || size == full);
-        ensure!(is_compatible, "a constant of the sizes {:?} does not suit {:?}", tensor.shape, value.shape);
+        ensure!(is_compatible, "cannot broadcast a constant of shape {:?} to {:?}", tensor.shape, value.shape);
         match tensor.shape.as_slice() {
             [channels] if value.channels_first => self.weight(tensor, None, Some(&[*channels, 1, 1])),
             [_, _, _, _] if value.channels_first => self.weight(tensor, Some(CHANNELS_FIRST), None),
-            [_, ..] if value.channels_first => bail!("a constant of the sizes {:?} is not known", tensor.shape),
+            [_, ..] if value.channels_first => bail!("unsupported constant of shape {:?}", tensor.shape),
             _ => self.weight(tensor, None, None),
         }
     }
@@ -208,9 +211,9 @@ impl<'a> TfConverter<'a> {
         let mut value = self.input(node, 0)?;
         let pads = self.constant(node, 1)?.integers()?;
         let n_axes = value.shape.len();
-        ensure!(pads.len() == 2 * n_axes, "{n_axes} axes are padded, before and after, not by {} numbers", pads.len());
+        ensure!(pads.len() == 2 * n_axes, "expected 2 padding values for each of {n_axes} axes, found {}", pads.len());
         for (dim, pads) in value.shape.iter_mut().zip(pads.chunks_exact(2)) {
-            ensure!(pads[0] >= 0 && pads[1] >= 0, "padding is not negative");
+            ensure!(pads[0] >= 0 && pads[1] >= 0, "negative padding {pads:?}");
             *dim = size(*dim as i64 + pads[0] + pads[1])?;
         }
         if pads.iter().all(|n_cells| *n_cells == 0) {
@@ -239,17 +242,17 @@ impl<'a> TfConverter<'a> {
             ([0, 2, 3, 1], false) => {
                 Ok(TfValue { shape: [0, 2, 3, 1].map(|axis| shape[axis]).to_vec(), channels_first: true, ..value })
             }
-            _ => bail!("only the channels are moved, from last to second or back, not the axes {order:?}"),
+            _ => bail!("unsupported transpose {order:?}: expected NHWC to NCHW or back"),
         }
     }
 
     fn concatenation(&mut self, node: &TfNode) -> Result<TfValue> {
         let n_parts = node.inputs.len().saturating_sub(1);
         let parts = (0..n_parts).map(|k| self.input(node, k)).collect::<Result<Vec<_>>>()?;
-        let [axis] = self.constant(node, n_parts)?.integers()?[..] else { bail!("the axis is one number") };
-        let mut result = parts.first().context("it has no inputs")?.clone();
+        let [axis] = self.constant(node, n_parts)?.integers()?[..] else { bail!("expected 1 axis") };
+        let mut result = parts.first().context("the node has no inputs")?.clone();
         let n_axes = result.shape.len() as i64;
-        ensure!((-n_axes..n_axes).contains(&axis), "there is no axis {axis} among {n_axes}");
+        ensure!((-n_axes..n_axes).contains(&axis), "axis {axis} is out of range for {n_axes} axes");
         let axis = axis.rem_euclid(n_axes) as usize;
         let mut total = 0;
         for part in &parts {
@@ -260,7 +263,7 @@ impl<'a> TfConverter<'a> {
             }
             ensure!(
                 shape == result.shape && part.channels_first == result.channels_first,
-                "the sizes of its inputs differ: {:?} and {:?}",
+                "the shapes of the inputs differ: {:?} and {:?}",
                 result.shape,
                 part.shape
             );
@@ -275,7 +278,7 @@ impl<'a> TfConverter<'a> {
 
 /// Height and width entries of four numbers in NHWC order.
 fn height_and_width(numbers: &[i64]) -> Result<[usize; 2]> {
-    let [1, height, width, 1] = *numbers else { bail!("1, height, width, 1 are expected, not {numbers:?}") };
+    let [1, height, width, 1] = *numbers else { bail!("expected [1, height, width, 1], not {numbers:?}") };
     Ok([size(height)?, size(width)?])
 }
 
@@ -291,7 +294,7 @@ fn padding(node: &TfNode, windows: [SlidingWindow; 2], sizes: [usize; 2]) -> Res
     let pads = match node.text("padding")?.as_str() {
         "SAME" => [0, 1].map(|axis| windows[axis].same_padding(sizes[axis])),
         "VALID" => [(0, 0); 2],
-        other => bail!("padding is SAME or VALID, not {other:?}"),
+        other => bail!("unsupported padding {other:?}: expected SAME or VALID"),
     };
     let n_steps = |axis: usize| windows[axis].n_steps(sizes[axis] + pads[axis].0 + pads[axis].1);
     let zeros = [pads[0].0, pads[1].0, pads[0].1, pads[1].1].map(|n_zeros| n_zeros as i64);

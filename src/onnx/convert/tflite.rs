@@ -42,26 +42,28 @@ pub(crate) fn convert(file: &[u8], graph: OnnxGraph, options: &ConversionOptions
     let model = FlatTable::root(file)?;
     let code = |code: FlatTable| Ok(code.int(3, 0)?.max(i32::from(code.byte(0)?)));
     let codes: Vec<i32> = model.tables(1)?.into_iter().map(code).collect::<Result<_>>()?;
-    let network = model.tables(2)?.into_iter().next().context("it holds no graph")?;
+    let network = model.tables(2)?.into_iter().next().context("the file contains no graph")?;
     let buffers = model.tables(4)?;
     let (mut shapes, mut constants) = (Vec::<Vec<usize>>::new(), BTreeMap::new());
     for (k, tensor) in network.tables(0)?.into_iter().enumerate() {
         let shape = tensor.ints(0, MAX_AXES)?.into_iter().map(|dim| size(dim.into())).collect::<Result<_>>();
         shapes.push(shape.with_context(|| format!("tensor {k}"))?);
         let buffer = usize::try_from(tensor.int(2, 0)?).ok().and_then(|buffer| buffers.get(buffer));
-        let raw = buffer.with_context(|| format!("tensor {k} has no buffer among the {}", buffers.len()))?.bytes(0)?;
+        let raw = buffer
+            .with_context(|| format!("invalid buffer of tensor {k}: the file has {}", buffers.len()))?
+            .bytes(0)?;
         if !raw.is_empty() {
             constants.insert(k, Constant { raw, element: tensor.byte(1)? });
         }
     }
     let index = |tensor: i32| {
         let found = usize::try_from(tensor).ok().filter(|tensor| *tensor < shapes.len());
-        found.with_context(|| format!("there is no tensor {tensor} among the {}", shapes.len()))
+        found.with_context(|| format!("invalid tensor {tensor}: the file has {}", shapes.len()))
     };
     let outputs = network.ints(2, MAX_INPUTS)?.into_iter().map(index).collect::<Result<Vec<_>>>()?;
     ensure!(
         outputs.len() == options.outputs.len(),
-        "the model has {} outputs, the description names {:?}",
+        "the model has {} outputs, but its description names {:?}",
         outputs.len(),
         options.outputs
     );
@@ -72,10 +74,10 @@ pub(crate) fn convert(file: &[u8], graph: OnnxGraph, options: &ConversionOptions
     let mut operators = Vec::new();
     for (k, operator) in network.tables(3)?.into_iter().enumerate() {
         let code = usize::try_from(operator.int(0, 0)?).ok().and_then(|code| codes.get(code));
-        let code = *code.with_context(|| format!("operator {k} has no kind among the {}", codes.len()))?;
+        let code = *code.with_context(|| format!("invalid code of operator {k}: the file has {}", codes.len()))?;
         let outputs = operator.ints(2, MAX_INPUTS)?;
         let [output] = outputs.as_slice() else {
-            bail!("operator {k} ({}) has one output, not {}", kind(code), outputs.len())
+            bail!("operator {k} ({}) has {} outputs, expected 1", kind(code), outputs.len())
         };
         let inputs = operator.ints(1, MAX_INPUTS)?;
         operators.push(TfliteOperator { code, inputs, output: index(*output)?, options: operator.table(4)? });
@@ -93,7 +95,7 @@ pub(crate) fn convert(file: &[u8], graph: OnnxGraph, options: &ConversionOptions
     let shape = shapes[first].clone();
     ensure!(
         shape.len() == 4 && shape == options.shape()?,
-        "the input has the sizes {shape:?}, the description says {:?}",
+        "the input has shape {shape:?}, expected {:?} as described",
         options.input.shape
     );
     let mut converter = TfliteConverter { shapes, constants, values: BTreeMap::new(), graph };
@@ -138,7 +140,7 @@ fn kind(code: i32) -> String {
 
 impl<'a> TfliteConverter<'a> {
     fn value(&self, tensor: usize) -> Result<String> {
-        self.values.get(&tensor).cloned().with_context(|| format!("no operator before gives tensor {tensor}"))
+        self.values.get(&tensor).cloned().with_context(|| format!("no preceding operator outputs tensor {tensor}"))
     }
 
     /// The value in TFLite's layout, channels last.
@@ -152,7 +154,7 @@ impl<'a> TfliteConverter<'a> {
     }
 
     fn constant_of(&self, tensor: usize) -> Result<Constant<'a>> {
-        self.constants.get(&tensor).copied().with_context(|| format!("tensor {tensor} holds no numbers"))
+        self.constants.get(&tensor).copied().with_context(|| format!("tensor {tensor} has no constant values"))
     }
 
     /// Adds a weight, with its axes reordered by `order` or reshaped to `dims`.
@@ -161,7 +163,7 @@ impl<'a> TfliteConverter<'a> {
         let element = match element {
             0 => ElementType::F32,
             1 => ElementType::F16,
-            _ => bail!("weights are float32 or float16, not TFLite's type {element} (tensor {tensor})"),
+            _ => bail!("tensor {tensor} has TFLite type {element}, expected float32 (0) or float16 (1)"),
         };
         self.graph.weight((element, &self.shapes[tensor], raw), order, dims)
     }
@@ -169,7 +171,11 @@ impl<'a> TfliteConverter<'a> {
     /// Values of an integer constant.
     fn integers(&self, tensor: usize) -> Result<Vec<i64>> {
         let Constant { raw, element } = self.constant_of(tensor)?;
-        ensure!(element == 2 && raw.len() <= 8 * 2 * MAX_AXES, "tensor {tensor} holds a few 32-bit integers");
+        ensure!(
+            element == 2 && raw.len() <= 8 * 2 * MAX_AXES,
+            "tensor {tensor}: expected at most {} values of type int32",
+            4 * MAX_AXES
+        );
         Ok(int32s(raw).map(i64::from).collect())
     }
 
@@ -179,7 +185,7 @@ impl<'a> TfliteConverter<'a> {
             0 => Ok(value),
             1 => Ok(self.graph.op("Relu", &[&value], &[])),
             3 => self.graph.relu6(&value),
-            _ => bail!("the activations known are none, RELU and RELU6, not {activation}"),
+            _ => bail!("unsupported activation {activation}: expected none (0), RELU (1) or RELU6 (3)"),
         }
     }
 
@@ -191,7 +197,7 @@ impl<'a> TfliteConverter<'a> {
         };
         let needed = |k: usize| input(k).with_context(|| format!("input {k} is missing"));
         let first = needed(0)?;
-        let options = || operator.options.context("its options are missing");
+        let options = || operator.options.context("the options are missing");
         let fused = |field: usize| operator.options.map_or(Ok(0), |options| options.byte(field));
         let output = self.shapes[operator.output].clone();
         let value = match operator.code {
@@ -214,7 +220,7 @@ impl<'a> TfliteConverter<'a> {
             }
             9 => {
                 let weight = needed(1)?;
-                let [_, n_inputs] = self.shapes[weight][..] else { bail!("the weight has 2 axes") };
+                let [_, n_inputs] = self.shapes[weight][..] else { bail!("expected a weight with 2 axes") };
                 let flat = self.channels_last(first)?;
                 let shape = self.graph.ints(&[-1, n_inputs as i64])?;
                 let flat = self.graph.op("Reshape", &[&flat, &shape], &[]);
@@ -253,7 +259,7 @@ impl<'a> TfliteConverter<'a> {
             }
             34 => {
                 let pads = self.integers(needed(1)?)?;
-                ensure!(pads.len() == 8, "4 axes are padded, before and after, not {} numbers", pads.len());
+                ensure!(pads.len() == 8, "expected 2 padding values for each of 4 axes, found {}", pads.len());
                 let ends = CHANNELS_FIRST.map(|axis| 2 * axis).into_iter();
                 let pads: Vec<i64> = ends.clone().map(|k| pads[k]).chain(ends.map(|k| pads[k + 1])).collect();
                 let (value, pads) = (self.value(first)?, self.graph.ints(&pads)?);
@@ -265,7 +271,7 @@ impl<'a> TfliteConverter<'a> {
                 let n_axes = self.shapes[first].len();
                 ensure!(
                     axes == [1, 2] && n_axes == 4,
-                    "the mean goes over height and width, not over the axes {axes:?}"
+                    "unsupported mean over the axes {axes:?}: expected height and width ([1, 2])"
                 );
                 let keep = i64::from(fused(0)? != 0);
                 let value = self.value(first)?;
@@ -277,7 +283,7 @@ impl<'a> TfliteConverter<'a> {
                 let (value, slope) = (self.value(first)?, self.weight(slope, None, Some(&[channels, 1, 1]))?);
                 self.graph.op("PRelu", &[&value, &slope], &[])
             }
-            _ => bail!("no operator of this kind is known"),
+            _ => bail!("unsupported operator"),
         };
         self.values.insert(operator.output, value);
         Ok(())

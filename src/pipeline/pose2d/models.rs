@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result, ensure};
 use orator_dataset::config::{FollowRule, Pose2dConfig, Settings};
-use orator_onnx::{AUTO, ModelEntry, ModelRole, ModelStore, Wanted};
+use orator_onnx::{AUTO, ModelEntry, ModelRequest, ModelRole, ModelStore};
 
 /// Keys of `[pose2d]` that name a model, with role and configured id.
 pub fn keys(config: &Pose2dConfig) -> [(&'static str, ModelRole, &String); 5] {
@@ -89,9 +89,11 @@ fn face_is_missing(config: &Pose2dConfig, store: &ModelStore) -> bool {
 }
 
 /// Models to pass to `ModelStore::fetch`, so that every model of the configuration is installed.
-pub fn wanted(config: &Pose2dConfig) -> Vec<Wanted> {
+pub fn wanted(config: &Pose2dConfig) -> Vec<ModelRequest> {
     let named = keys(config).into_iter().filter(|(_, _, id)| !id.is_empty());
-    named.map(|(_, role, id)| if id == AUTO { Wanted::Role(role) } else { Wanted::Id(id.clone()) }).collect()
+    named
+        .map(|(_, role, id)| if id == AUTO { ModelRequest::Role(role) } else { ModelRequest::Id(id.clone()) })
+        .collect()
 }
 
 #[cfg(test)]

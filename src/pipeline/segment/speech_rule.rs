@@ -6,7 +6,7 @@ use orator_base::types::time::FrameRate;
 use orator_dataset::config::{Settings, SpeechRule};
 use orator_dataset::info::ModelUsed;
 use orator_onnx::speech::SpeechModel;
-use orator_onnx::{ModelEntry, ModelError, ModelRole, ModelState, ModelStore, Runtime, Wanted};
+use orator_onnx::{ModelEntry, ModelError, ModelRequest, ModelRole, ModelState, ModelStore, Runtime};
 use std::path::{Path, PathBuf};
 
 /// Speech model of a configuration, located but not opened.
@@ -40,8 +40,8 @@ impl SpeechDetector {
     }
 
     /// Model to pass to `ModelStore::fetch`, unless only loudness is requested.
-    pub fn wanted(settings: &Settings) -> Option<Wanted> {
-        (settings.segment.speech != SpeechRule::Loudness).then_some(Wanted::Role(ModelRole::Speech))
+    pub fn wanted(settings: &Settings) -> Option<ModelRequest> {
+        (settings.segment.speech != SpeechRule::Loudness).then_some(ModelRequest::Role(ModelRole::Speech))
     }
 
     /// Advice to print once in a run without the optional model.

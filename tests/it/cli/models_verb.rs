@@ -98,7 +98,7 @@ fn the_first_source_that_answers_is_taken() {
     let none = fetch(&["address", "npm", "pip"]);
     let message = said(&none);
     assert_eq!(none.status.code(), Some(2), "{message}");
-    let reasons = ["127.0.0.1", "npm is not installed (the Debian package npm)", "the Debian package python3-pip"];
+    let reasons = ["127.0.0.1", "npm is not installed (Debian package npm)", "Debian package python3-pip"];
     assert!(reasons.iter().all(|reason| message.contains(reason)), "{message}");
 
     for (from, file) in [("npm", "host-1.tgz"), ("pip", "host-1.whl")] {

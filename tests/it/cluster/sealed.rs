@@ -58,5 +58,5 @@ fn a_plan_goes_with_a_forgotten_video() {
     let left = files_under(&project.work()).into_iter().filter(|(name, _)| name.starts_with("plan"));
     assert_eq!(left.count(), 0);
     let refused = project.answer(&WORK);
-    assert!(refused.code == 1 && refused.errors.contains("`orator plan` writes one"), "{}", refused.errors);
+    assert!(refused.code == 1 && refused.errors.contains("create one with `orator plan`"), "{}", refused.errors);
 }

@@ -123,7 +123,7 @@ fn a_bad_video_fails_alone_and_a_plan_is_kept() {
     assert_eq!((retried.code, retried.json["done"].as_u64()), (2, Some(0)), "another video: {}", retried.errors);
     assert_eq!(project.answer(&["plan", "--untimed"]).code, 0);
     let planned = project.answer(&["work", "--plan", "work/plan.json"]);
-    let counts = ["done", "fresh"].map(|key| planned.json[key].as_u64());
+    let counts = ["done", "up_to_date"].map(|key| planned.json[key].as_u64());
     assert_eq!((planned.code, counts), (0, [Some(3), Some(2)]), "{}", planned.errors);
     assert_eq!(project.answer(&["status", "--plan", "work/plan.json"]).json["n_failed"].as_u64(), Some(0));
 
@@ -131,7 +131,7 @@ fn a_bad_video_fails_alone_and_a_plan_is_kept() {
     let text = std::fs::read_to_string(&plan).unwrap();
     std::fs::write(&plan, text.replace("clip-1", "clip-7")).unwrap();
     let changed = project.answer(&["work", "--plan", "work/plan.json"]);
-    assert!(changed.code == 1 && changed.errors.contains("was changed since"), "{}", changed.errors);
+    assert!(changed.code == 1 && changed.errors.contains("was edited after"), "{}", changed.errors);
     std::fs::write(&plan, &text).unwrap();
     let file = project.dir().join("pipeline.toml");
     let settings = std::fs::read_to_string(&file).unwrap();
@@ -182,7 +182,7 @@ fn eight_workers_at_once_do_every_unit_once() {
         assert!(epochs.len() == n_clips && epochs.values().all(|epoch| *epoch == 1), "{kind}: {epochs:?}");
     }
     let status = project.answer(&["status", "--plan", "work/plan.json"]).json;
-    assert_eq!((status["n_done"].as_u64(), status["n_taken_over"].as_u64()), (Some(8), Some(0)), "{status}");
+    assert_eq!((status["n_done"].as_u64(), status["n_reclaimed"].as_u64()), (Some(8), Some(0)), "{status}");
     let extracted = files_under(&project.work().join("extract"));
     let records = extracted.iter().filter(|(name, _)| name.ends_with(".record.json")).count();
     assert_eq!(records, n_clips);

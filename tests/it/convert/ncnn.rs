@@ -34,7 +34,7 @@ fn every_layer_computes_what_it_says() {
 fn what_is_wrong_is_named() {
     let said = |from: &str, to: &str| with_layers(&LAYERS.replace(from, to)).error();
     for (from, to, expected) in [
-        ("7767517", "7767516", "begins with 7767517"),
+        ("7767517", "7767516", "expected 7767517"),
         ("17 21", "18 21", "17 layers"),
         ("ReLU relu", "Swish relu", "\"relu\" (Swish)"),
         ("6=72", "6=73", "[4, 2, 3, 3]"),
@@ -53,7 +53,7 @@ fn what_is_wrong_is_named() {
     }
     let mut model = small();
     model.files[1].push(0);
-    assert!(model.error().contains("1 bytes of the .bin"), "{}", model.error());
+    assert!(model.error().contains("1 byte of the .bin"), "{}", model.error());
     model.files[1].truncate(50);
     assert!(model.error().contains("\"conv\""), "{}", model.error());
 }

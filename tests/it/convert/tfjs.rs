@@ -97,11 +97,11 @@ fn what_is_wrong_is_named() {
     };
     for (from, to, expected) in [
         ("PartitionedCall/Add_37", "elsewhere", "neither"),
-        ("\"input\":[\"conv\",\"bias\"]", "\"input\":[\"leaky\",\"bias\"]", "needs its own result"),
+        ("\"input\":[\"conv\",\"bias\"]", "\"input\":[\"leaky\",\"bias\"]", "depends on its own result"),
         ("\"input\":[\"conv\",\"bias\"]", "\"input\":[\"conv\",\"lost\"]", "\"lost\""),
-        ("\"shape\":[4],\"dtype\":\"int32\"", "\"shape\":[5],\"dtype\":\"int32\"", "ends within it"),
+        ("\"shape\":[4],\"dtype\":\"int32\"", "\"shape\":[5],\"dtype\":\"int32\"", "ends inside this constant"),
         ("\"dtype\":\"float16\"", "\"dtype\":\"uint8\"", "\"weight\""),
-        ("\"size\":\"32\"", "\"size\":\"-1\"", "not -1"),
+        ("\"size\":\"32\"", "\"size\":\"-1\"", "invalid size -1"),
         ("VkFMSUQ=", "U0FN", "\"SAM\""),
     ] {
         let said = said(from, to);
@@ -109,7 +109,7 @@ fn what_is_wrong_is_named() {
     }
     let mut model = nanodet();
     model.files.reverse();
-    assert!(model.error().contains("no JSON"), "{}", model.error());
+    assert!(model.error().contains("not JSON"), "{}", model.error());
     model.files.pop();
     assert!(model.error().contains("2 file"), "{}", model.error());
 }

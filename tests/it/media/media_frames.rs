@@ -177,10 +177,10 @@ fn bad_files_are_named_with_what_was_expected() {
     for (name, words) in [
         ("empty.mp4", "is empty (0 bytes)"),
         ("text.mp4", "is not a media file"),
-        ("no_index.mp4", "is cut short"),
+        ("no_index.mp4", "is truncated"),
         ("missing.mp4", "cannot read"),
         (".", "is a folder"),
-        ("sound.wav", "has no pictures"),
+        ("sound.wav", "has no video"),
     ] {
         let error = format!("{:#}", FrameReader::open(&at(name), DATASET).err().expect(name));
         assert!(error.contains(words) && error.contains(name), "{name}: {error}");
@@ -248,7 +248,7 @@ fn a_reading_that_begins_inside_goes_on_as_one_from_the_start() {
     let mut reader = FrameReader::open(&path, fps).unwrap();
     for between in [whole[77].2 + 0.011, 8.5] {
         let error = reader.seek(77, between).unwrap_err().to_string();
-        assert!(error.contains("long.mp4 shows no picture at"), "{error}");
+        assert!(error.contains("long.mp4 has no image at"), "{error}");
     }
 }
 

@@ -188,7 +188,7 @@ fn a_sample_that_is_no_number_is_named_with_its_second() {
         let out = dir.path().join("out.wav");
         let pieces = SoundStream::open(&path, RATE).last().unwrap().map(drop);
         for read in [read_mono(&path, RATE).map(drop), extract_wav(&path, 0, &out, RATE).map(drop), pieces] {
-            let words = format!("{} is damaged: a sample that is no number at second {second};", path.display());
+            let words = format!("{} is damaged: a sample at {second} s is not finite;", path.display());
             let error = format!("{:#}", read.unwrap_err());
             assert!(error.contains(&words), "{error}");
         }

@@ -50,7 +50,7 @@ fn the_default_track_is_taken_or_the_one_asked_for() {
             assert!(report.line.contains(&words), "{}", report.line);
         }
         let error = format!("{:#}", run(&video, &dir.path().join("gone"), 3).unwrap_err());
-        assert!(error.contains("no sound track 3, the file has 2") && error.contains(name), "{error}");
+        assert!(error.contains("no audio track 3, the file has 2") && error.contains(name), "{error}");
     }
     // One track leaves no choice.
     if ffmpeg(dir.path(), &format!("-i in.mp4 {tones} -map 0:v -map 1:a -c:v copy one.mkv")) {

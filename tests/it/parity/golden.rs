@@ -78,7 +78,7 @@ fn a_model_that_is_missing_wrong_or_different_says_so() {
 
     let mut junk = entry.clone();
     junk.sha256 = orator_onnx::sha256_of(&empty.path().join(&entry.file)).unwrap();
-    assert!(said(&junk, empty.path()).contains("no ONNX model"));
+    assert!(said(&junk, empty.path()).contains("ONNX Runtime cannot open"));
 
     let mut narrow = entry.clone();
     narrow.outputs[0].shape = vec![1, 21];

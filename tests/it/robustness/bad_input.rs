@@ -201,9 +201,9 @@ fn wrong_models_are_exit_code_1_and_say_which_and_why() {
     described("output", "body-marker", &|entry| entry.outputs[0].shape = vec![1, 17, 128, 96]);
     for (folder, says) in [
         ("missing", ["body-marker is missing", "marker_body.onnx", "models fetch"]),
-        ("flipped", ["person-marker is not the one described", "marker_person.onnx has sha256", "models add"]),
-        ("input", ["person-marker has another layout", "416", "320"]),
-        ("output", ["body-marker has another layout", "128", "64"]),
+        ("flipped", ["person-marker differs from its description", "marker_person.onnx has sha256", "models add"]),
+        ("input", ["tensors of the model person-marker differ", "416", "320"]),
+        ("output", ["tensors of the model body-marker differ", "128", "64"]),
     ] {
         let answer = project.run(&["--set", &format!("models.dir={folder}")]);
         assert_eq!(answer.code, 1, "{folder}: {}", answer.errors);

@@ -124,11 +124,11 @@ fn a_video_reads_no_other_file() {
     ] {
         fs::write(at(name), text).unwrap();
         let text = format!("{:#}", probe::probe(&at(name)).unwrap_err());
-        assert!(text.contains(name) && text.contains("expected a video or sound file"), "{name}: {text}");
+        assert!(text.contains(name) && text.contains("expected a video or audio file"), "{name}: {text}");
         assert!(audio::read_sound(&at(name)).is_err(), "{name}");
     }
     let text = format!("{:#}", probe::probe(&at("hls.mp4")).unwrap_err());
-    assert!(text.contains("names other files"), "{text}");
+    assert!(text.contains("list of other files"), "{text}");
     assert!(probe::probe(&at("a%d.png")).is_err());
     assert!(probe::probe(&at("picture1.png")).is_ok() && probe::probe(&at("secret.ts")).is_ok());
 }
@@ -172,7 +172,7 @@ fn sound_of_an_impossible_rate_is_refused() {
     for rate in [1, 3_999, 768_001] {
         wav::write(&path, &Sound { rate, samples: vec![0.1; 80_000] }).unwrap();
         let text = format!("{:#}", audio::read_sound(&path).unwrap_err());
-        let expected = format!("slow.wav says that its sound has {rate} samples a second, expected 4000 to 768000");
+        let expected = format!("invalid audio sample rate {rate} Hz in {}: expected 4000 to 768000 Hz", path.display());
         assert!(text.contains(&expected), "{text}");
     }
     wav::write(&path, &Sound { rate: 4_000, samples: vec![0.1; 8_000] }).unwrap();

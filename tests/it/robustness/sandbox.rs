@@ -178,7 +178,7 @@ fn a_named_pipe_in_the_place_of_a_video_is_refused_at_once() {
 #[test]
 fn a_process_with_threads_is_not_called_restricted() {
     let late = restrict(&FileAccess::default());
-    assert!(!late.is_active() && late.to_string().contains("threads already"), "{late}");
+    assert!(!late.is_active() && late.to_string().contains("the process already had"), "{late}");
     fs::write(tempfile::tempdir().unwrap().path().join("a"), "").unwrap();
 }
 

@@ -291,7 +291,7 @@ fn a_damaged_model_is_no_model() {
     bytes.truncate(1000);
     fs::write(dir.path().join(&entry.file), bytes).unwrap();
     let error = SpeechModel::open(&runtime, &entry, dir.path()).err().unwrap();
-    assert!(matches!(error, ModelError::WrongHash { .. }), "{error}");
+    assert!(matches!(error, ModelError::HashMismatch { .. }), "{error}");
     let mut model = SpeechModel::open(&runtime, &entry, &models).unwrap();
     assert!(model.probability(&[0.0; 513]).is_err());
 }

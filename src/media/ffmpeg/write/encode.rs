@@ -54,7 +54,7 @@ impl VideoWriter {
         crf: u32,
     ) -> Result<Self> {
         source::init();
-        ensure!(width > 0 && height > 0, "{}: a video of {width} x {height} px cannot be written", path.display());
+        ensure!(width > 0 && height > 0, "invalid size {width} x {height} px for the video {}", path.display());
         let even = [width, height].map(|n| n.next_multiple_of(2));
         let what = || format!("cannot write the video {}", path.display());
         let mut output = format::output_as(&source::url(path)?, "mp4").with_context(what)?;
@@ -82,7 +82,7 @@ impl VideoWriter {
         let [width, height] = self.size;
         ensure!(
             [image.width, image.height] == self.size && image.data.len() == 3 * width * height,
-            "{}: picture {} is {} x {} px, expected {width} x {height} px",
+            "{}: image {} has {} x {} px, expected {width} x {height} px",
             self.path.display(),
             self.n_frames,
             image.width,
@@ -128,7 +128,7 @@ impl VideoWriter {
     }
 
     fn write_video(&mut self) -> Result<()> {
-        let to = self.output.stream(VIDEO).context("the video stream is gone")?.time_base();
+        let to = self.output.stream(VIDEO).context("the video stream is missing")?.time_base();
         let mut packet = Packet::empty();
         while self.video.receive_packet(&mut packet).is_ok() {
             packet.set_stream(VIDEO);
@@ -143,7 +143,7 @@ impl VideoWriter {
     /// Encodes the audio up to `until` seconds; for infinity, all of it, and flushes the encoder.
     fn write_sound(&mut self, until: f64) -> Result<()> {
         let Some(track) = &mut self.sound else { return Ok(()) };
-        let to = self.output.stream(AUDIO).context("the sound stream is gone")?.time_base();
+        let to = self.output.stream(AUDIO).context("the audio stream is missing")?.time_base();
         let mut packet = Packet::empty();
         let mut more = true;
         while more {
@@ -173,7 +173,8 @@ impl SoundTrack {
         context.set_bit_rate(96_000);
         context.set_time_base(Rational(1, i32::try_from(sound.rate)?));
         context.set_flags(codec::Flags::GLOBAL_HEADER | codec::Flags::BITEXACT);
-        let opened = context.open_as(aac).with_context(|| format!("AAC cannot hold sound at {} Hz", sound.rate))?;
+        let opened =
+            context.open_as(aac).with_context(|| format!("AAC does not support a sample rate of {} Hz", sound.rate))?;
         Ok(Self { encoder: opened, sound: sound.clone(), n_sent: 0 })
     }
 

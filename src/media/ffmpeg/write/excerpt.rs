@@ -15,7 +15,7 @@ use std::path::Path;
 /// The file cannot be read, has no images, or has streams that Matroska does not support.
 pub fn copy(from: &Path, to: &Path, start_secs: f64, secs: f64) -> Result<f64> {
     let mut input = source::open(from)?;
-    let video = source::video_stream(&input).with_context(|| format!("{} has no pictures", from.display()))?.index();
+    let video = source::video_stream(&input).with_context(|| format!("{} has no video", from.display()))?.index();
     let sound = source::default_track(&input).map(|stream| stream.index());
     let what = || format!("cannot copy an excerpt of {}", from.display());
     if start_secs > 0.0 {
@@ -54,13 +54,13 @@ pub fn copy(from: &Path, to: &Path, start_secs: f64, secs: f64) -> Result<f64> {
         packet.set_stream(to_stream);
         packet.write_interleaved(&mut output).with_context(what)?;
     }
-    ensure!(last_secs > 0.0, "{} has no pictures at {start_secs} s", from.display());
+    ensure!(last_secs > 0.0, "{} has no images at {start_secs:.1} s", from.display());
     output.write_trailer().with_context(what)?;
     Ok(last_secs)
 }
 
 fn add_stream(output: &mut Output, input: &Input, index: usize) -> Result<()> {
-    let from = input.stream(index).context("a stream is gone")?;
+    let from = input.stream(index).context("a stream is missing")?;
     let mut to = output.add_stream(encoder::find(codec::Id::None))?;
     to.set_parameters(from.parameters());
     // SAFETY: the parameters belong to the new stream; the codec tag is cleared because it is specific to the source
@@ -82,7 +82,7 @@ mod tests {
     #[test]
     fn excerpt_has_the_images_and_audio_of_its_range() {
         let dir = tempfile::tempdir().unwrap();
-        let (full, part, fps) = (dir.path().join("whole.mp4"), dir.path().join("part.mkv"), FrameRate::new(25, 1));
+        let (full, part, fps) = (dir.path().join("full.mp4"), dir.path().join("part.mkv"), FrameRate::new(25, 1));
         let sound = Sound { samples: (0..16_000 * 30).map(|i| ((i as f32) * 0.1).sin() * 0.5).collect(), rate: 16_000 };
         let mut video = VideoWriter::create(&full, 64, 48, fps, Some(&sound)).unwrap();
         (0..25 * 30).for_each(|i| video.push(&Image::filled(64, 48, [(i / 4) as u8; 3])).unwrap());
