@@ -153,8 +153,8 @@ impl Division {
         let fps = intervals.fps;
         ensure!(
             intervals.intervals.len() == ledger.kept.len(),
-            "a video has {} intervals and {} kept stretches in its ledger: run its stage lift again",
-            intervals.intervals.len(),
+            "a video has {}, but {} accepted in its ledger: run the stage lift again",
+            counted(intervals.intervals.len(), "interval"),
             ledger.kept.len()
         );
         let usable = blocks::usable(blocks, fps, intervals.n_frames, self.guard_frames);

@@ -28,20 +28,20 @@ pub struct DatasetRun<'a> {
     old: &'a Path,
     before: BTreeMap<String, VideoEntry>,
     /// Number of videos reused from it.
-    pub n_taken_over: usize,
+    pub n_reused: usize,
     progress: &'a dyn Progress,
 }
 
 impl<'a> DatasetRun<'a> {
     /// Starts a dataset in the folder `out`, reusing parts of the one in `old`.
     pub fn new(settings: &'a config::DatasetConfig, out: &'a Path, old: &'a Path, progress: &'a dyn Progress) -> Self {
-        Self { settings, out, old, before: valid_parts(old), n_taken_over: 0, progress }
+        Self { settings, out, old, before: valid_parts(old), n_reused: 0, progress }
     }
 
     /// Writes the audio fingerprint of each video, reusing that of the old dataset if the content is unchanged.
     /// Returns the hashes.
     pub fn sounds(&self, videos: &[&LiftedVideo]) -> Result<Sounds> {
-        let task = self.progress.begin("sound", videos.len() as u64);
+        let task = self.progress.begin("audio", videos.len() as u64);
         let mut hashes = Sounds::new();
         for video in videos {
             let before = self.before.get(&video.name).filter(|part| part.content == video.content);
@@ -125,7 +125,7 @@ impl<'a> DatasetRun<'a> {
         let Some(part) = self.before.get(&video.name).filter(|part| part.made_from == made_from) else {
             return Ok(false);
         };
-        self.n_taken_over += 1;
+        self.n_reused += 1;
         part.link_into(self.old, self.out)?;
         Ok(true)
     }

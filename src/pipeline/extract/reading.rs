@@ -87,7 +87,7 @@ pub fn thumbnail(reader: &mut FrameReader, area: Option<PixelArea>) -> Result<Im
 
 /// Writes every picture as PNG into `folder`, which is created.
 pub fn write_pictures(reader: &mut FrameReader, folder: &Path, progress: &dyn Progress) -> Result<()> {
-    fs::create_dir(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    fs::create_dir(folder).with_context(|| format!("cannot create the folder {}", folder.display()))?;
     let task = progress.begin("pictures", reader.expected_frames().unwrap_or(0) as u64);
     while let Some(time) = reader.advance()? {
         png::write(&folder.join(format!("{:06}.png", time.frame_idx)), &reader.picture(None)?)?;

@@ -103,12 +103,19 @@ impl Lifter {
     pub(crate) fn raw(&self, keypoints: &Keypoints, intervals: &[Interval], resting: &[Interval]) -> Result<Lifted> {
         let n_frames = keypoints.n_frames();
         for hand in [&keypoints.left_hand, &keypoints.right_hand] {
-            ensure!(hand.shape()[0] == n_frames, "{n_frames} frames of body keypoints, {} of a hand", hand.shape()[0]);
+            ensure!(
+                hand.shape()[0] == n_frames,
+                "the body keypoints have {n_frames} frames, those of a hand {}",
+                hand.shape()[0]
+            );
         }
         let mut lifted = Lifted::empty(keypoints);
         for &interval in intervals {
             let Interval { start, end } = interval;
-            ensure!(start <= end && end <= n_frames, "interval {start}..{end} of a video of {n_frames} frames");
+            ensure!(
+                start <= end && end <= n_frames,
+                "interval {start}..{end} exceeds the {n_frames} frames of the video"
+            );
             self.lift_interval(keypoints, interval, resting, lifted.view(interval))?;
         }
         Ok(lifted)
@@ -220,8 +227,8 @@ pub fn notes(keypoints: &Keypoints, lifted: &Lifted) -> Option<String> {
     };
     (lifted.n_frames < n_frames).then(|| {
         format!(
-            "no body in {} of {n_frames} frames (NaN): it is lifted where both shoulders are seen within {MAX_GAP_SECS} s; \
-             the right shoulder is not seen in {} frames, the left in {}",
+            "no body in {} of {n_frames} frames (NaN): lifting needs both shoulders within {MAX_GAP_SECS} s; the right \
+             shoulder is not detected in {} frames, the left in {}",
             n_frames - lifted.n_frames,
             n_hidden(coco::R_SHOULDER),
             n_hidden(coco::L_SHOULDER)

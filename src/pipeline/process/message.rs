@@ -126,7 +126,7 @@ pub fn send(to: &mut impl Write, message: &impl Serialize) -> Result<()> {
 /// # Errors
 /// End of the stream; data that is not a valid message.
 pub fn receive<T: DeserializeOwned>(from: &mut impl Read) -> Result<T> {
-    rmp_serde::from_read(from.take(MAX_BYTES)).context("no message")
+    rmp_serde::from_read(from.take(MAX_BYTES)).context("invalid message")
 }
 
 #[cfg(test)]

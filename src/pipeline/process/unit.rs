@@ -33,7 +33,7 @@ const MESSAGE_INTERVAL: Duration = Duration::from_millis(50);
 pub fn serve() -> Result<()> {
     rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL))?;
     let out = Messages(Mutex::new(std::io::stdout()));
-    match receive(&mut std::io::stdin().lock()).context("this is started by `orator run` alone")? {
+    match receive(&mut std::io::stdin().lock()).context("this command is used only by `orator run` itself")? {
         Request::Restrict => {
             out.send(&Message::Restricted(restrict(&FileAccess { reads: Some(Vec::new()), writes: Vec::new() })))
         }

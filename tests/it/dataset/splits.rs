@@ -102,7 +102,7 @@ fn what_was_chosen_for_few_videos_stays_for_many() {
     let record = |dir: &Path| SplitRecord::read(&dir.join("work/splits/host.json")).unwrap().unwrap();
     let (report, out) = shard(dir.path(), &units[..7], "seven");
     let line = report.unwrap().line;
-    assert!(line.contains("splits by time, 7.") && line.contains("chosen for 7 videos, fewer than 8"), "{line}");
+    assert!(line.contains("split by time, 7.") && line.contains("chosen for 7 videos, fewer than 8"), "{line}");
     let (first, seven) = (record(dir.path()), splits(&out));
     let (report, out) = shard(dir.path(), &units, "nine");
     assert!(report.unwrap().line.contains("chosen for 7 videos, fewer than 8"));
@@ -115,13 +115,13 @@ fn what_was_chosen_for_few_videos_stays_for_many() {
     assert!(card.contains("divided by time") && card.contains("chosen for 7 videos"), "{card}");
     // Asked for by name, another division is made.
     let (report, _) = shard_as(&by_video(dir.path()), &units, &[], "by-video");
-    assert!(report.unwrap().line.contains("splits by video (the configuration says so)"));
+    assert!(report.unwrap().line.contains("split by video (the configuration says so)"));
     assert!(record(dir.path()).videos.values().all(|video| video.blocks.is_empty()));
     // Nine at once are whole.
     let other = tempfile::tempdir().unwrap();
     let units: Vec<Unit> = (0..9).map(|n| video(other.path(), &format!("v{n}"), 140, n)).collect();
     let (report, out) = shard(other.path(), &units, "out");
-    assert!(report.unwrap().line.contains("splits by video (chosen for 9 videos, at least 8)"));
+    assert!(report.unwrap().line.contains("split by video (chosen for 9 videos, at least 8)"));
     assert!(fs::read_to_string(out.join("README.md")).unwrap().contains("in one split as a whole (chosen for 9"));
 }
 
@@ -142,7 +142,7 @@ fn a_dataset_of_an_earlier_version_keeps_its_splits() {
     fs::rename(&out, &place).unwrap();
     fs::remove_dir_all(dir.path().join("work/splits")).unwrap();
     let (report, out) = shard(dir.path(), &units, "new");
-    assert!(report.unwrap().line.contains("splits by video (as it was before)"));
+    assert!(report.unwrap().line.contains("split by video (as it was before)"));
     let after = splits(&out);
     assert_eq!(after.len(), 4);
     assert!(before.iter().all(|(file, split)| after[file] == *split));

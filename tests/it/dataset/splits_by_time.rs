@@ -165,7 +165,7 @@ fn a_new_talk_moves_no_block_and_short_clips_fill_splits() {
     fs::rename(&first, &place).unwrap();
     let clips: Vec<Unit> = (0..2).map(|n| video(dir.path(), &format!("clip{n}"), 300, 10 + n)).collect();
     let (report, out) = shard(dir.path(), &[talk, clips[0].clone(), clips[1].clone()], "second");
-    assert!(report.unwrap().line.contains("1 video taken over as they were"));
+    assert!(report.unwrap().line.contains("1 video reused unchanged"));
     assert_eq!(problems(&out), [""; 0]);
     let info = Dataset::open(&out).unwrap().info().clone();
     let of = |file: &str| info.videos.iter().find(|video| video.file == file).unwrap().clone();
@@ -179,7 +179,7 @@ fn a_new_talk_moves_no_block_and_short_clips_fill_splits() {
     assert_eq!(Dataset::open(&out).unwrap().info().splits.values().filter(|split| split.samples > 0).count(), 3);
     let alone = tempfile::tempdir().unwrap();
     let (report, out) = shard(alone.path(), &[video(alone.path(), "short", 150, 5)], "short");
-    assert!(report.unwrap().line.contains("no sample for test: too little is kept to be divided"));
+    assert!(report.unwrap().line.contains("no sample in the test split: too little footage was accepted"));
     assert_eq!(Dataset::open(&out).unwrap().info().splits["train"].samples, 2);
 }
 
@@ -205,6 +205,6 @@ fn sound_that_two_talks_share_is_never_in_two_splits() {
     let copy = video_with(named.path(), "copy", 6_000, 2, 1);
     let (report, _) = shard_with(named.path(), &[talk, copy.clone()], &[(&copy, Split::Test)], "out");
     let line = report.unwrap().line;
-    assert!(line.contains("splits by video (the configuration names the split of videos)"), "{line}");
+    assert!(line.contains("split by video (the configuration names the split of videos)"), "{line}");
     assert!(unit(named.path(), "copy") == copy);
 }
