@@ -8,6 +8,7 @@ use ndarray::{Array2, Array3};
 use orator_base::input;
 use orator_base::stage::ledger::{Kept, Ledger, Refused};
 use orator_base::stage::refusal::{FrameRefusal, Refusal};
+use orator_base::text::counted;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::Posture;
 use orator_base::types::skeleton::N_JOINTS;
@@ -69,13 +70,14 @@ pub fn open(tars: &[PathBuf]) -> LooseTars {
     for tar in tars {
         let mut unknown = BTreeMap::<String, usize>::new();
         match list(tar, &mut samples, &mut unknown) {
-            Ok(0) => loose.failed.push((tar.clone(), "it holds no file".to_owned())),
+            Ok(0) => loose.failed.push((tar.clone(), "it contains no files".to_owned())),
             Ok(_) => {}
             Err(error) => loose.failed.push((tar.clone(), format!("{error:#}"))),
         }
         let name = file_name(tar);
-        let left_out =
-            |(ending, n): (String, usize)| format!("{name}: {n} x .{ending} left out, no member of a sample");
+        let left_out = |(ending, n): (String, usize)| {
+            format!("{name}: skipped {} not in a sample", counted(n, &format!(".{ending} file")))
+        };
         loose.notes.extend(unknown.into_iter().map(left_out));
     }
     let mut videos: BTreeMap<String, LooseVideo> = BTreeMap::new();
@@ -118,14 +120,14 @@ fn list(
             continue;
         };
         let location = MemberLocation { tar: tar.to_owned(), offset: entry.raw_file_position(), bytes: entry.size() };
-        ensure!(location.offset.saturating_add(location.bytes) <= length, "{}: {name} is cut off", reading());
+        ensure!(location.offset.saturating_add(location.bytes) <= length, "{}: {name} is truncated", reading());
         let new_sample =
             || LooseSample { key: key.to_owned(), members: [const { None }; 5], optional: [const { None }; 3] };
         let sample = samples.entry(key.to_owned()).or_insert_with(new_sample);
         let Some(known) = sample.members.iter_mut().chain(&mut sample.optional).nth(member) else { continue };
         if let Some(first) = known {
             let is_equal = read_member(first)? == read_member(&location)?;
-            ensure!(is_equal, "{name} lies in {} and in {} with other bytes", first.tar.display(), tar.display());
+            ensure!(is_equal, "{name} differs between {} and {}", first.tar.display(), tar.display());
         }
         known.get_or_insert(location);
     }
@@ -175,7 +177,7 @@ impl LooseSample {
             let posture = match (head, trunk) {
                 (Some(head), Some(trunk)) => Some(Posture { head: angles(head)?, trunk: angles(trunk)? }),
                 (None, None) => None,
-                _ => bail!("of head.npy and trunk.npy it has one: expected both or none"),
+                _ => bail!("it has one of head.npy and trunk.npy: expected both or none"),
             };
             let sample = Sample { words, posture, ..self.parse(json, mask, pose2d, pose3d, sound)? };
             sample.optional_members()?;
@@ -213,7 +215,8 @@ impl LooseSample {
 fn angles(location: &MemberLocation) -> Result<Array2<f32>> {
     let bytes = read_member(location)?;
     let layout = Layout::parse(&bytes, bytes.len() as u64, Element::F32, &[3]).context("head.npy or trunk.npy")?;
-    Array2::from_shape_vec((layout.n_rows, 3), npy::floats(&bytes[layout.data_at..])).context("shaping angles")
+    Array2::from_shape_vec((layout.n_rows, 3), npy::floats(&bytes[layout.data_at..]))
+        .context("invalid number of angles")
 }
 
 /// Reads a 16-bit mono wav at `SAMPLE_RATE`, with a header of any length.

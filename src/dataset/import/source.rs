@@ -19,11 +19,12 @@ use orator_base::motion::bones;
 use orator_base::stage::fingerprint::hash_file;
 use orator_base::stage::ledger::{Kept, Ledger, Refused, TranscriptAccount, WordCount};
 use orator_base::stage::refusal::{FrameRefusal, Refusal};
+use orator_base::text::number;
 use orator_formats::joints_description::path_of;
 use orator_formats::mocap::bvh;
 use std::path::{Path, PathBuf};
 
-/// Median shift of a take's joints by fixing the bone lengths, mm, above which a remark is given.
+/// Median shift of a take's joints by fixing the bone lengths, mm, above which a note is given.
 const NOTABLE_SHIFT_MM: f64 = 5.0;
 
 /// Item to import.
@@ -46,7 +47,7 @@ pub struct InspectedItem {
     /// Sound fingerprint codes; `None`: no sound, or the codes are already written.
     pub codes: Option<Vec<u32>>,
     /// Remark for the user on an accepted take; may be empty.
-    pub remark: String,
+    pub note: String,
     /// BLAKE3 of the written sound codes.
     pub sound: Option<String>,
 }
@@ -196,19 +197,20 @@ fn inspect_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
             }
             source.bones = VideoBones { lengths_metres: kept.lengths.map(f64::from).to_vec(), n_frames };
             let bones = match kept.moved_mm {
-                moved_mm if moved_mm > NOTABLE_SHIFT_MM => {
-                    Some(format!("its bones vary: one length each moved its joints by {moved_mm} mm (median)"))
-                }
+                moved_mm if moved_mm > NOTABLE_SHIFT_MM => Some(format!(
+                    "bone lengths vary: making them constant moved the joints by {} mm (median)",
+                    number(moved_mm)
+                )),
                 _ => None,
             };
             source.ledger.words = kept.words;
             let notes = source.ledger.words.iter().flat_map(|words| words.notes.iter().cloned());
             let unit = kept.sample.meta["imported"].as_object().and_then(bvh::unit_note);
-            let remark = unit.into_iter().chain(bones).chain(notes).collect::<Vec<_>>().join("; ");
+            let note = unit.into_iter().chain(bones).chain(notes).collect::<Vec<_>>().join("; ");
             let mut fingerprinter = Fingerprinter::default();
             fingerprinter.push(&kept.sample.sound.samples);
             let codes = (!plan.limits.no_sound).then(|| fingerprinter.finish());
-            Ok(InspectedItem { source, codes, remark, ..InspectedItem::default() })
+            Ok(InspectedItem { source, codes, note, ..InspectedItem::default() })
         }
     }
 }
@@ -233,7 +235,7 @@ fn inspect_entry(dir: &Path, name: &str, plan: &ImportPlan) -> Result<InspectedI
     let fps = plan.limits.fps;
     ensure!(
         info.fps == fps,
-        "{} runs at {}, the dataset at {fps}: import it with the same --fps",
+        "{} has {}, the dataset {fps}: set --fps to the rate of the source",
         dir.display(),
         info.fps
     );
@@ -241,7 +243,7 @@ fn inspect_entry(dir: &Path, name: &str, plan: &ImportPlan) -> Result<InspectedI
     let entry = VideoEntry::read(&VideoEntry::path(dir, name))?;
     ensure!(
         entry.is_intact(dir, &entry::stated_hashes(dir)),
-        "{name}: its files are not what was written; orator dataset verify says what is wrong"
+        "{name}: its files do not match their checksums; `orator dataset verify` lists them"
     );
     let codes = entry.codes(dir)?;
     let split = match entry.split {
@@ -269,7 +271,7 @@ fn inspect_loose(video: &LooseVideo, plan: &ImportPlan) -> Result<InspectedItem>
     for loose_sample in &video.samples {
         let (sample, _) = loose_sample.read()?;
         let (key, own_fps) = (&sample.key, sample.motion.fps);
-        ensure!(own_fps == fps, "{key} runs at {own_fps}, the dataset at {fps}: import it with the same --fps");
+        ensure!(own_fps == fps, "{key} has {own_fps}, the dataset {fps}: set --fps to the rate of the source");
         let n_frames = sample.n_frames();
         let start = sample.meta["start_secs"].as_f64().unwrap_or(0.0);
         let start_secs = spans.last().map_or(start, |(before, secs)| start.max(before + secs));
@@ -352,12 +354,12 @@ impl InspectedItem {
 
     /// Outcome of the item.
     pub fn line(&self, file: &str) -> ImportOutcome {
-        let (ended, reason, message) = match (&self.source.failure, self.source.ledger.refused.first()) {
+        let (outcome, reason, message) = match (&self.source.failure, self.source.ledger.refused.first()) {
             (Some(error), _) => ("failed", "error".to_owned(), error.clone()),
-            (None, _) if self.is_kept() => ("kept", String::new(), self.remark.clone()),
+            (None, _) if self.is_kept() => ("kept", String::new(), self.note.clone()),
             (None, Some(refused)) => ("refused", refused.reason.clone(), refused.message.clone()),
-            (None, None) => ("refused", "empty".to_owned(), "it holds nothing".to_owned()),
+            (None, None) => ("refused", "empty".to_owned(), "it is empty".to_owned()),
         };
-        ImportOutcome { file: file.to_owned(), ended, kept_secs: self.source.ledger.kept_secs(), reason, message }
+        ImportOutcome { file: file.to_owned(), outcome, accepted_secs: self.source.ledger.kept_secs(), reason, message }
     }
 }

@@ -208,7 +208,7 @@ fn to_kept(
     let key = format!("{name}-{:06}", 0);
     let in_sample = video_words.map(|words| words.within(0.0, end_secs));
     let sample = Sample { key, motion, pose2d, sound, words: in_sample, posture: None, meta };
-    sample.members().with_context(|| format!("{} makes no sample", found.motion.display()))?;
+    sample.members().with_context(|| format!("cannot create a sample from {}", found.motion.display()))?;
     Ok(KeptTake { moved_mm: moved[0], sample, words, lengths })
 }
 

@@ -55,7 +55,7 @@ pub fn import(plan: &ImportPlan, out: &Path, progress: &dyn Progress) -> Result<
         about.notes.push(NO_SOUND.to_owned());
     }
     let (items, left_out) = ImportItem::all(&sources);
-    let task = progress.begin("look", items.len() as u64);
+    let task = progress.begin("inspect", items.len() as u64);
     let mut names = BTreeSet::new();
     let mut inspected: Vec<InspectedItem> = Vec::new();
     for item in &items {
@@ -238,10 +238,9 @@ pub struct ImportPlan {
 pub struct ImportOutcome {
     pub file: String,
     /// One of `kept`, `refused`, `failed`.
-    pub ended: &'static str,
+    pub outcome: &'static str,
     /// Seconds in the dataset.
-    pub kept_secs: f64,
+    pub accepted_secs: f64,
     pub reason: String,
-    #[serde(rename = "says")]
     pub message: String,
 }

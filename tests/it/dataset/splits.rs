@@ -92,7 +92,7 @@ fn the_record_outlives_the_dataset_and_the_dataset_the_record() {
     // A damaged record is an error that says what to do, not a new division.
     fs::write(&record, &before[..before.len() / 2]).unwrap();
     let error = format!("{:#}", shard_as(&settings, &units, &[], "damaged").0.unwrap_err());
-    assert!(error.contains("host.json is damaged") && error.contains("remove it"), "{error}");
+    assert!(error.contains("host.json is damaged") && error.contains("delete it"), "{error}");
 }
 
 #[test]
@@ -122,7 +122,7 @@ fn what_was_chosen_for_few_videos_stays_for_many() {
     let units: Vec<Unit> = (0..9).map(|n| video(other.path(), &format!("v{n}"), 140, n)).collect();
     let (report, out) = shard(other.path(), &units, "out");
     assert!(report.unwrap().line.contains("split by video (chosen for 9 videos, at least 8)"));
-    assert!(fs::read_to_string(out.join("README.md")).unwrap().contains("in one split as a whole (chosen for 9"));
+    assert!(fs::read_to_string(out.join("README.md")).unwrap().contains("Each video is in one split (chosen for 9"));
 }
 
 #[test]

@@ -29,7 +29,7 @@ fn talk(root: &Path) -> Unit {
 }
 
 fn problems(dir: &Path) -> Vec<String> {
-    verify(dir, true, &Silent).unwrap().problems.into_iter().map(|problem| problem.what).collect()
+    verify(dir, true, &Silent).unwrap().problems.into_iter().map(|problem| problem.message).collect()
 }
 
 /// Frames of every sample with its split, in order.
@@ -138,12 +138,12 @@ fn a_division_that_cannot_be_is_found() {
     };
     // A video in two splits is right only by time.
     fs::write(out.join("info.json"), info.replace("\"unit\": \"time\"", "\"unit\": \"video\"")).unwrap();
-    found("it has samples in several splits, though the dataset is not divided by time");
+    found("it has samples in several splits, but the dataset is not divided by time");
     // A gap shorter than stated.
     let mut wide: serde_json::Value = serde_json::from_str(&info).unwrap();
     wide["split_rule"]["guard_secs"] = 9.0.into();
     fs::write(out.join("info.json"), wide.to_string()).unwrap();
-    found("two splits must be 9.00 s apart");
+    found("expected at least 9.00 s between splits");
     fs::write(out.join("info.json"), &info).unwrap();
     // A sample outside its block.
     let mut moved: serde_json::Value = serde_json::from_str(&whole).unwrap();

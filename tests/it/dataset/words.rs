@@ -164,6 +164,6 @@ fn a_wrong_count_of_words_is_found() {
     let text = fs::read_to_string(&path).unwrap();
     fs::write(&path, text.replace("\"n_kept\": 20", "\"n_kept\": 19")).unwrap();
     let found = verify(&out, true, &Silent).unwrap().problems;
-    let said = |what: &str| found.iter().any(|problem| problem.file == name && problem.what.contains(what));
-    assert!(said("account for every word") && said("keeps 19 words, its samples hold 20"), "{found:?}");
+    let said = |what: &str| found.iter().any(|problem| problem.file == name && problem.message.contains(what));
+    assert!(said("account for every word") && said("counts 19 words in samples, the samples contain 20"), "{found:?}");
 }

@@ -248,7 +248,7 @@ fn without_the_model_loudness_is_the_rule_and_is_said_once() {
     assert_eq!(facts["speech"].as_str().or(facts["facts"]["speech"].as_str()), Some("loudness"), "{facts}");
     assert!(made("lift") == lifted);
     let card = fs::read_to_string(project.work().join("dataset/host/README.md")).unwrap();
-    assert!(card.contains("Speech was told by loudness alone"), "{card}");
+    assert!(card.contains("Speech was detected by loudness only"), "{card}");
     let vad = project.run(&["--set", "segment.speech=vad"]);
     assert_eq!(vad.code, 1, "{}", vad.errors);
     assert!(

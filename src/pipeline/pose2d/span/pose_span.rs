@@ -109,8 +109,8 @@ impl PoseSpan {
                 let (shots, rest) = (counted(several, "shot"), several - speaking);
                 let _ = write!(
                     line,
-                    "; several persons in {shots}; in {rest} of them no mouth clearly matches the voice, so the largest \
-                     person is followed"
+                    "; several persons in {shots}; in {rest} of them no mouth clearly matches the voice, so the \
+                     largest person is followed"
                 );
             }
         }
