@@ -133,7 +133,7 @@ fn plan(args: &Args) -> Result<ImportPlan> {
         limits: TakeLimits {
             fps,
             min_frames: args.min_frames.max(1),
-            max_apart_secs: args.max_apart,
+            max_difference_secs: args.max_apart,
             no_sound: args.no_sound,
         },
         dataset: config::DatasetConfig {

@@ -31,7 +31,7 @@ struct MemberLocation {
 /// Sample that has not been read yet; members are in the order of `EXTENSIONS`, optional ones in that of
 /// `OPTIONAL_EXTENSIONS`.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LooseSample {
+pub struct ShardSample {
     pub key: String,
     members: [Option<MemberLocation>; 5],
     optional: [Option<MemberLocation>; 3],
@@ -39,23 +39,23 @@ pub struct LooseSample {
 
 /// Samples whose keys differ only after the last dash.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LooseVideo {
+pub struct ShardVideo {
     pub name: String,
     /// Samples sorted by key.
-    pub samples: Vec<LooseSample>,
+    pub samples: Vec<ShardSample>,
 }
 
 /// Contents of the tar files.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct LooseTars {
-    pub videos: Vec<LooseVideo>,
+pub struct ShardTars {
+    pub videos: Vec<ShardVideo>,
     /// Notes on skipped files, a sentence each.
     pub notes: Vec<String>,
     /// Unreadable tars, with the error.
     pub failed: Vec<(PathBuf, String)>,
 }
 
-impl LooseVideo {
+impl ShardVideo {
     /// Tar files that hold the samples of this video.
     pub fn tars(&self) -> Vec<&PathBuf> {
         let members = self.samples.iter().flat_map(|sample| sample.members.iter().chain(&sample.optional));
@@ -64,30 +64,30 @@ impl LooseVideo {
 }
 
 /// Lists the tar files; members are read only to compare two with the same name.
-pub fn open(tars: &[PathBuf]) -> LooseTars {
-    let mut loose = LooseTars::default();
-    let mut samples: BTreeMap<String, LooseSample> = BTreeMap::new();
+pub fn open(tars: &[PathBuf]) -> ShardTars {
+    let mut found = ShardTars::default();
+    let mut samples: BTreeMap<String, ShardSample> = BTreeMap::new();
     for tar in tars {
         let mut unknown = BTreeMap::<String, usize>::new();
         match list(tar, &mut samples, &mut unknown) {
-            Ok(0) => loose.failed.push((tar.clone(), "it contains no files".to_owned())),
+            Ok(0) => found.failed.push((tar.clone(), "it contains no files".to_owned())),
             Ok(_) => {}
-            Err(error) => loose.failed.push((tar.clone(), format!("{error:#}"))),
+            Err(error) => found.failed.push((tar.clone(), format!("{error:#}"))),
         }
         let name = file_name(tar);
         let left_out = |(ending, n): (String, usize)| {
             format!("{name}: skipped {} not in a sample", counted(n, &format!(".{ending} file")))
         };
-        loose.notes.extend(unknown.into_iter().map(left_out));
+        found.notes.extend(unknown.into_iter().map(left_out));
     }
-    let mut videos: BTreeMap<String, LooseVideo> = BTreeMap::new();
+    let mut videos: BTreeMap<String, ShardVideo> = BTreeMap::new();
     for (key, sample) in samples {
         let name = key.rsplit_once('-').map_or(key.as_str(), |(video, _)| video).to_owned();
-        let video = videos.entry(name.clone()).or_insert(LooseVideo { name, samples: Vec::new() });
+        let video = videos.entry(name.clone()).or_insert(ShardVideo { name, samples: Vec::new() });
         video.samples.push(sample);
     }
-    loose.videos = videos.into_values().collect();
-    loose
+    found.videos = videos.into_values().collect();
+    found
 }
 
 /// Adds the members of a tar file to `samples`, and counts files of other extensions in `unknown`. Returns the number
@@ -97,7 +97,7 @@ pub fn open(tars: &[PathBuf]) -> LooseTars {
 /// A file that is not a readable tar, a truncated member, two members with the same name and different bytes.
 fn list(
     tar: &Path,
-    samples: &mut BTreeMap<String, LooseSample>,
+    samples: &mut BTreeMap<String, ShardSample>,
     unknown: &mut BTreeMap<String, usize>,
 ) -> Result<usize> {
     let mut n_files = 0;
@@ -122,7 +122,7 @@ fn list(
         let location = MemberLocation { tar: tar.to_owned(), offset: entry.raw_file_position(), bytes: entry.size() };
         ensure!(location.offset.saturating_add(location.bytes) <= length, "{}: {name} is truncated", reading());
         let new_sample =
-            || LooseSample { key: key.to_owned(), members: [const { None }; 5], optional: [const { None }; 3] };
+            || ShardSample { key: key.to_owned(), members: [const { None }; 5], optional: [const { None }; 3] };
         let sample = samples.entry(key.to_owned()).or_insert_with(new_sample);
         let Some(known) = sample.members.iter_mut().chain(&mut sample.optional).nth(member) else { continue };
         if let Some(first) = known {
@@ -151,7 +151,7 @@ fn read_member(location: &MemberLocation) -> Result<Vec<u8>> {
     read().with_context(|| format!("cannot read {}", location.tar.display()))
 }
 
-impl LooseSample {
+impl ShardSample {
     /// Split in the name of a tar file of the sample; `None`: no name states one.
     pub fn split(&self) -> Option<Split> {
         self.members.iter().flatten().find_map(|location| split_of(&location.tar))

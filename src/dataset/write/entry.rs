@@ -34,7 +34,8 @@ pub struct VideoEntry {
     /// BLAKE3 of the video file; empty if it could not be read.
     pub content: String,
     /// BLAKE3 of everything the shards depend on; shards with an equal hash are reused.
-    pub made_from: String,
+    #[serde(rename = "made_from")]
+    pub inputs_hash: String,
     /// Split; `None`: no samples, or samples in several splits (`blocks`).
     pub split: Option<Split>,
     /// Reason for the split.
@@ -67,7 +68,7 @@ pub struct VideoSource {
     pub name: String,
     pub file: String,
     pub content: String,
-    pub made_from: String,
+    pub inputs_hash: String,
     pub ledger: Ledger,
     pub bones: VideoBones,
     pub failure: Option<String>,
@@ -95,7 +96,7 @@ impl EntryWriter {
         split_by: SplitBy,
         max_shard_bytes: u64,
     ) -> Result<Self> {
-        let VideoSource { name, file, content, made_from, ledger, bones, failure } = source;
+        let VideoSource { name, file, content, inputs_hash, ledger, bones, failure } = source;
         check_name(&name)?;
         ensure!(
             !VideoEntry::path(dir, &name).exists(),
@@ -106,7 +107,7 @@ impl EntryWriter {
             name: FileName::new(name)?,
             file,
             content,
-            made_from,
+            inputs_hash,
             split,
             split_by,
             blocks: Vec::new(),

@@ -142,7 +142,7 @@ impl DatasetOutcome<'_> {
             warnings.push(format!("{videos} left out as duplicates of other videos (see ledger.jsonl)"));
         }
         let noted = self.videos.iter().filter_map(|video| {
-            let notes = video.transcript_account(std::iter::empty())?.notes;
+            let notes = video.transcript_stats(std::iter::empty())?.notes;
             (!notes.is_empty()).then(|| format!("{}: {}", video.file, notes.join("; ")))
         });
         let noted: Vec<String> = noted.collect();

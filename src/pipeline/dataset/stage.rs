@@ -41,7 +41,7 @@ pub struct DatasetInputs {
     /// Notes for users of the dataset.
     pub notes: Vec<String>,
     /// Keypoints within this many seconds of a frame affect its joints.
-    pub reach_secs: f64,
+    pub context_secs: f64,
 }
 
 /// Stage `dataset`. Its unit is the speaker.
@@ -81,7 +81,7 @@ impl DatasetStage {
             speakers: settings.speaker.clone(),
             work: settings.work.dir.clone(),
             fixes_offset: settings.extract.fix_offset,
-            guard_frames: division::guard_frames(settings, inputs.reach_secs),
+            guard_frames: division::guard_frames(settings, inputs.context_secs),
             fps: settings.extract.rate(),
             window_frames: division::window_frames(settings),
             states: BTreeMap::new(),
@@ -147,7 +147,7 @@ impl DatasetStage {
         let are_named = videos.is_some_and(|videos| !videos.splits.is_empty());
         let before = division::recorded_splits(&self.work, speaker)?;
         let record = division::choose_record(self.settings.split_by, before, n_videos, are_named);
-        Ok(Division { record, guard_frames: self.guard_frames, least_frames: self.window_frames })
+        Ok(Division { record, guard_frames: self.guard_frames, min_frames: self.window_frames })
     }
 
     /// Opens a video, with its words if the speaker has transcripts.

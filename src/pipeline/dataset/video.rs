@@ -154,7 +154,7 @@ impl LiftedVideo {
     }
 
     /// Statistics of the words in samples of these intervals.
-    pub fn transcript_account(&self, intervals: impl Iterator<Item = Interval>) -> Option<TranscriptAccount> {
+    pub fn transcript_stats(&self, intervals: impl Iterator<Item = Interval>) -> Option<TranscriptAccount> {
         let fps = self.intervals.fps;
         self.words.as_ref().map(|words| words.account(intervals.map(|i| (fps.secs(i.start), fps.secs(i.end)))))
     }

@@ -43,7 +43,7 @@ pub fn read(
         timeline.repeated.push(time.repeated);
         let picture = if time.repeated { None } else { Some(thumbnail(reader, area)?) };
         if let (Some(survey), false) = (survey.as_deref_mut(), time.repeated) {
-            let full_picture = survey.wants_picture().then(|| reader.picture(None)).transpose()?;
+            let full_picture = survey.needs_picture().then(|| reader.picture(None)).transpose()?;
             survey.push(full_picture, reader.is_flagged_interlaced());
         }
         checksums.push(picture.as_ref().map_or_else(|| checksums.last().copied().unwrap_or(0), checksum));

@@ -22,7 +22,7 @@ pub(crate) const MAX_GAP_SECS: f64 = 1.0;
 /// detection, gap filling, the receptive field of the network, the median of the body size, and smoothing. Beyond
 /// that, all frames of a video share the bone lengths, the camera tilt, and the choice between the mirror images of a
 /// hand.
-pub fn reach_secs(settings: &config::LiftConfig) -> f64 {
+pub fn context_secs(settings: &config::LiftConfig) -> f64 {
     // Unreadable weights are reported by the stage itself.
     let window =
         weights::body(&settings.body_weights).map_or(weights::MAX_FRAMES, |body| body.net.config().receptive_field());
@@ -278,8 +278,8 @@ mod tests {
         let complete = [Interval { start: 0, end: n_frames }];
         let raw = |change| lifter.raw(&keypoints(n_frames, change), &complete, &[]).unwrap().motion;
         let (plain, changed) = (raw(n_frames), raw(change));
-        let last = change - (reach_secs(&settings) * 15.0).ceil() as usize;
-        assert!(last > 80, "a reach of {} s", reach_secs(&settings));
+        let last = change - (context_secs(&settings) * 15.0).ceil() as usize;
+        assert!(last > 80, "a context of {} s", context_secs(&settings));
         let until = |motion: &Motion, end: usize| motion.joints.slice(s![..end, .., ..]).to_owned();
         assert_eq!(until(&plain, last), until(&changed, last));
         assert_ne!(until(&plain, change), until(&changed, change), "nothing reaches back");

@@ -156,7 +156,7 @@ impl LiftStage {
             (intervals, ledger) = exclude_frames(&intervals, &ledger, &refusals, min_frames)?;
             raw = self.lifter.raw(keypoints, &intervals.intervals, &intervals.resting)?;
         }
-        let open = outliers::open_refusals(&raw.motion, &intervals.intervals);
+        let open = outliers::missing_joint_refusals(&raw.motion, &intervals.intervals);
         (intervals, ledger) = exclude_frames(&intervals, &ledger, &open, min_frames)?;
         let largest = Array1::from_vec(change.largest());
         npz::write(&Artifact::BoneChange.within(out), |npz| npz.add_array("bone_change", &largest))?;

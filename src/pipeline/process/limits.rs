@@ -37,7 +37,7 @@ pub struct Limits {
     /// CPU seconds; the limit of elapsed time is ten times this.
     pub cpu_secs: u64,
     /// CPU seconds between two progress reports.
-    pub quiet_secs: u64,
+    pub report_secs: u64,
     /// Seconds without CPU use and without a report.
     pub idle_secs: u64,
     /// Input that the limits were derived from, for messages.
@@ -78,7 +78,7 @@ impl Limits {
         Self {
             memory: memory.min(machine) as u64,
             cpu_secs: cpu_secs as u64,
-            quiet_secs: (BASE_SECS + cpu_secs / 8.0) as u64,
+            report_secs: (BASE_SECS + cpu_secs / 8.0) as u64,
             idle_secs: IDLE_SECS,
             basis,
         }
@@ -115,8 +115,8 @@ impl Limits {
     pub fn passed(&self, [cpu, quiet]: [f64; 2], [passed, idle]: [u64; 2]) -> Option<String> {
         let excess = if idle >= self.idle_secs {
             format!("was idle for {}", span(self.idle_secs))
-        } else if quiet > self.quiet_secs as f64 {
-            format!("reported no progress in {} of CPU time", span(self.quiet_secs))
+        } else if quiet > self.report_secs as f64 {
+            format!("reported no progress in {} of CPU time", span(self.report_secs))
         } else if cpu > self.cpu_secs as f64 {
             format!("used more than the {} of CPU time allowed for {}", span(self.cpu_secs), self.basis)
         } else if passed > self.cpu_secs.saturating_mul(10) {

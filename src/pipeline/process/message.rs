@@ -23,7 +23,7 @@ pub enum Request {
     Unit(Box<UnitRequest>),
     /// Read the header of a video, or copy an excerpt of it.
     Media {
-        wanted: MediaRequest,
+        request: MediaRequest,
         /// Memory limit, bytes.
         memory: u64,
     },
@@ -100,7 +100,7 @@ pub enum Message {
     End {
         task: u32,
     },
-    Say {
+    Line {
         line: String,
     },
     Estimate {

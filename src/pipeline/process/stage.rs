@@ -124,7 +124,7 @@ pub fn probe(program: &Path) -> Result<Restriction> {
 /// Those of `answer_media`; a subprocess that crashes or exceeds its limits.
 pub fn ask_media(program: &Path, request: &MediaRequest, limits: &Limits) -> Result<MediaHeader> {
     let source = &request.source;
-    let request = Request::Media { wanted: request.clone(), memory: limits.memory };
+    let request = Request::Media { request: request.clone(), memory: limits.memory };
     answer_from(program, &request, source, limits, |answers| match receive(answers)? {
         Message::Media(header) => Ok(Ok(header)),
         Message::Failed(failure) => Ok(Err(failure.into_error())),
@@ -158,7 +158,7 @@ fn relay(from: &mut impl Read, progress: &dyn Progress) -> Result<Result<Report>
             Message::Advance { task, steps } => tasks.get(&task).into_iter().for_each(|task| task.advance(steps)),
             Message::Detail { task, text } => tasks.get(&task).into_iter().for_each(|task| task.detail(&plain(&text))),
             Message::End { task } => drop(tasks.remove(&task)),
-            Message::Say { line } => progress.say(&plain(&line)),
+            Message::Line { line } => progress.say(&plain(&line)),
             Message::Estimate { line } => progress.event(&Event::Estimate { line: &plain(&line) }),
             Message::Done { line, facts } => return Ok(Ok(Report { line: plain(&line), facts })),
             Message::Failed(failure) => return Ok(Err(failure.into_error())),

@@ -217,7 +217,7 @@ mod tests {
         let limits = Limits { cpu_secs: 1, idle_secs: 1000, ..Limits::of_header() };
         let error = error_of("while :; do :; done", &limits);
         assert!(error.starts_with("used more than the 1 s of CPU time"), "{error}");
-        let limits = Limits { quiet_secs: 1, idle_secs: 1000, ..Limits::of_header() };
+        let limits = Limits { report_secs: 1, idle_secs: 1000, ..Limits::of_header() };
         let error = error_of("while :; do :; done", &limits);
         assert!(error.starts_with("reported no progress in 1 s of CPU time"), "{error}");
     }

@@ -54,7 +54,7 @@ fn plan(sources: &[&Path]) -> ImportPlan {
         sources: sources.iter().map(|path| path.to_path_buf()).collect(),
         kind: None,
         about: About::new("host", FPS),
-        limits: TakeLimits { fps: FPS, min_frames: 64, max_apart_secs: 0.5, no_sound: false },
+        limits: TakeLimits { fps: FPS, min_frames: 64, max_difference_secs: 0.5, no_sound: false },
         dataset: orator_dataset::config::DatasetConfig { validation: 0.0, test: 0.0, ..Default::default() },
     }
 }
@@ -193,7 +193,7 @@ fn datasets_are_merged_byte_for_byte_and_come_back_from_other_hands() {
     }
     tar.finish().unwrap();
     let back = imported(&[&path("loose")], &path("back"));
-    assert!(back.notes.iter().any(|note| note.contains("2 x .txt left out")), "{:?}", back.notes);
+    assert!(back.notes.iter().any(|note| note.contains("skipped 2 .txt files")), "{:?}", back.notes);
     let (before, after) = (samples(&path("merged")), samples(&path("back")));
     assert_eq!(before.keys().collect::<Vec<_>>(), after.keys().collect::<Vec<_>>());
     for (key, (sample, json)) in &before {

@@ -66,7 +66,7 @@ fn angles_are_kept_to_the_bit_and_go_with_their_video() {
         sources: files_under(&place).into_iter().map(|(_, path)| path).filter(is_tar).collect(),
         kind: None,
         about: About::new("host", fps),
-        limits: TakeLimits { fps, min_frames: 64, max_apart_secs: 0.5, no_sound: false },
+        limits: TakeLimits { fps, min_frames: 64, max_difference_secs: 0.5, no_sound: false },
         dataset: DatasetConfig::default(),
     };
     let imported = folder.path().join("imported");

@@ -13,7 +13,7 @@ use orator_dataset::write::entry::VideoEntry;
 use orator_dataset::{Dataset, Split};
 use orator_gesture::train::gan::speaker_metadata::normalisation;
 use orator_gesture::train::gan::windows::WindowLoader;
-use orator_pipeline::lift::lifter::reach_secs;
+use orator_pipeline::lift::lifter::context_secs;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::fs;
@@ -65,7 +65,7 @@ fn one_long_talk_gives_all_three_splits_without_a_leak() {
     assert_eq!(dataset.stats().n_seen[5], dataset.info().splits["train"].frames as u64);
 
     // Frames that had a say in a window of a split, and in no frame of another.
-    let reach = (reach_secs(&LiftConfig::default()) * FPS.per_sec()).ceil() as usize;
+    let reach = (context_secs(&LiftConfig::default()) * FPS.per_sec()).ceil() as usize;
     assert!(rule.guard_secs > FPS.secs(WINDOW) + FPS.secs(reach));
     let reached = |frames: &Range<usize>| frames.start.saturating_sub(reach)..frames.end + reach;
     let apart = |a: &Range<usize>, b: &Range<usize>| a.end <= b.start || b.end <= a.start;
