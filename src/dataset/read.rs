@@ -93,7 +93,7 @@ impl Dataset {
         let n_samples: usize = info.splits.values().map(|split| split.samples).sum();
         ensure!(
             samples.len() == n_samples,
-            "{} has {} samples, {} says {n_samples}: the file is damaged; run the dataset stage again with --force",
+            "{} has {} samples, {} lists {n_samples}: the file is damaged; run the dataset stage again with --force",
             dir.join(INDEX).display(),
             samples.len(),
             dir.join(INFO).display()
