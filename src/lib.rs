@@ -4,8 +4,8 @@
 //! The items below are the public interface. A [`Pipeline`] is opened with a [`Config`] and does all that `orator run`
 //! does; [`Lifter`], [`GestureGenerator`], [`perform`], [`Dataset`] and [`Evaluation`] do one thing each. Errors are
 //! [`anyhow::Error`]s that name file, position and remedy; those that a program handles separately are found by
-//! `downcast_ref`: [`ConfigError`], [`ModelError`], [`UnreadableMedia`], [`NothingKept`], [`BusyFolder`], [`NoSpace`],
-//! [`StoppedTraining`].
+//! `downcast_ref`: [`ConfigError`], [`ModelError`], [`UnreadableMedia`], [`NothingAccepted`], [`BusyFolder`],
+//! [`NoSpace`], [`StoppedTraining`].
 //!
 //! The workspace, from the lowest layer up; Cargo enforces that a crate depends only on those its manifest names:
 //!
@@ -93,4 +93,4 @@ pub use orator_dataset::config::ConfigError;
 pub use orator_gesture::train::epochs::StoppedTraining;
 pub use orator_media::ffmpeg::UnreadableMedia;
 pub use orator_onnx::ModelError;
-pub use orator_pipeline::dataset::NothingKept;
+pub use orator_pipeline::dataset::NothingAccepted;

@@ -1,6 +1,7 @@
 //! Word times for a transcript, by forced alignment with its sound.
 
 use anyhow::{Result, ensure};
+use orator_base::text::length;
 use orator_base::types::sound::SAMPLE_RATE;
 use orator_formats::transcript::{Transcript, Word, WordSource};
 use orator_media::aligner::{AlignedWord, Aligner, SpokenWord};
@@ -35,7 +36,7 @@ pub fn align(
 ) -> Result<Alignment> {
     let texts: Vec<&str> = transcript.text.split_whitespace().collect();
     let n_words = texts.iter().filter(|text| has_letters(text)).count();
-    ensure!(n_words > 0, "the transcript holds no word");
+    ensure!(n_words > 0, "the transcript contains no words");
     let within = |nth: usize| transcript.words.get(nth).map(|word| (word.start_secs, word.end_secs));
     // If the transcript has word times, the tokens of its text are exactly those words.
     let is_timed = transcript.words.len() == texts.len();
@@ -53,7 +54,7 @@ pub fn align(
             take(&piece)?;
         }
         match n_samples {
-            0 => Err(UnreadableMedia(format!("{} has no sound", sound.display())).into()),
+            0 => Err(UnreadableMedia(format!("{} has no audio", sound.display())).into()),
             _ => Ok(()),
         }
     })?;
@@ -62,8 +63,8 @@ pub fn align(
     let sound_secs = n_samples as f64 / f64::from(SAMPLE_RATE);
     ensure!(
         n_aligned as f64 >= MIN_ALIGNED * n_words as f64,
-        "only {n_aligned} of {n_words} words fit the {sound_secs:.1} s of sound: it is silent, or the text is that of \
-         another sound, or not in English"
+        "only {n_aligned} of {n_words} words match the {} of audio: expected the English transcript of audible speech",
+        length(sound_secs)
     );
     Ok(Alignment { words: with_times(&texts, &found, sound_secs), unfit, sound_secs })
 }

@@ -24,8 +24,8 @@ impl VideoBones {
     /// An unreadable file, or invalid lengths (`check_lengths`).
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = input::read(path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
-        let bones: Self =
-            serde_json::from_slice(&bytes).with_context(|| format!("{} holds no bone lengths", path.display()))?;
+        let bones: Self = serde_json::from_slice(&bytes)
+            .with_context(|| format!("{} is not a file of bone lengths: run the stage lift again", path.display()))?;
         check_lengths("lengths_metres", &bones.lengths_metres).with_context(|| path.display().to_string())?;
         Ok(bones)
     }
@@ -38,7 +38,7 @@ impl VideoBones {
 pub(crate) fn check_lengths(name: &str, lengths: &[f64]) -> Result<()> {
     ensure!(lengths.len() == N_BONES, "`{name}` has {} lengths, expected {N_BONES}", lengths.len());
     let invalid = lengths.iter().find(|length| !(0.0..10.0).contains(*length));
-    ensure!(invalid.is_none(), "`{name}` has the length {:?}, expected 0 to 10 metres", invalid.unwrap_or(&0.0));
+    ensure!(invalid.is_none(), "`{name}` has the length {:?}, expected 0 to 10 m", invalid.unwrap_or(&0.0));
     Ok(())
 }
 

@@ -6,8 +6,29 @@ use super::split::{Split, SplitRule};
 use super::stats::DatasetStats;
 use crate::config::choices::SplitUnit;
 use orator_base::stage::ledger::WordCount;
-use orator_base::text::length;
+use orator_base::text::{counted, length, percent};
 use std::fmt::Write;
+
+/// Parts of notes in `info.json`, whose wording is part of the fingerprint of a dataset, and their text in the card.
+const NOTES: [(&str, &str); 6] = [
+    (
+        "Where the lips showed surely that the sound of a video was late or early, it was shifted.",
+        "Audio that is late or early relative to the lips by a reliable measurement was shifted.",
+    ),
+    ("Kept sound is speech as the model", "Accepted audio is speech according to the model"),
+    (" tells it, at least", " in at least"),
+    ("told by loudness alone: kept sound", "detected by loudness only: accepted audio"),
+    (
+        "silence stands in its place. The motion serves lifters and evaluation, not speech to gesture.",
+        "it was replaced by silence. The motion suits lifters and evaluation, not training on speech.",
+    ),
+    (
+        "was captured, not seen in a video: pose2d is 0 everywhere. The bones of a take have their median lengths; by \
+         how much that moved its joints is in a sample's json",
+        "does not come from a video: pose2d is 0. Bones have their median length in the take; the json of a sample \
+         states how far this moved its joints",
+    ),
+];
 
 /// Text of the dataset card.
 pub fn text(info: &DatasetInfo, stats: &DatasetStats, leakage: &Leakage) -> String {
@@ -16,7 +37,7 @@ pub fn text(info: &DatasetInfo, stats: &DatasetStats, leakage: &Leakage) -> Stri
     let _ = write!(
         text,
         "# Speech and gestures of {speaker}\n\n\
-         3D upper-body and finger motion with its speech: one speaker, {} of motion kept of {} of video, at {}.\n\n\
+         3D upper-body and finger motion with its speech: one speaker, {} of motion from {} of video, at {}.\n\n\
          | split | videos | intervals | length |\n|---|---|---|---|\n",
         length(stats.footage.kept_secs),
         length(stats.footage.secs),
@@ -30,7 +51,8 @@ pub fn text(info: &DatasetInfo, stats: &DatasetStats, leakage: &Leakage) -> Stri
     }
     let _ = write!(
         text,
-        "\n## A sample\n\nA sample is an interval: continuous motion with its sound. Its files in a shard are\n\n| file | shape | element | meaning |\n|---|---|---|---|\n"
+        "\n## Samples\n\nA sample is an interval of continuous motion with its audio. Its files in a shard:\n\n\
+         | file | shape | element | meaning |\n|---|---|---|---|\n"
     );
     for (name, member) in &info.members {
         let _ = writeln!(text, "| `{name}` | {} | {} | {} |", member.shape, member.element, member.meaning);
@@ -38,43 +60,45 @@ pub fn text(info: &DatasetInfo, stats: &DatasetStats, leakage: &Leakage) -> Stri
     let axes = &info.axes;
     let _ = write!(
         text,
-        "\nAxes: x {}, y {}, z {}; {}; the origin is {}. `info.json` names joints, parents and sides. Sizes are a convention, \
-         as no picture tells them: arms and shoulders of a common adult, hands in proportion to the forearm.\n",
+        "\nAxes: x {}, y {}, z {}; {}; the origin is {}. `info.json` lists joints, parents and sides. The scale is a \
+         convention, because pictures do not determine it: arms and shoulders of an average adult, hands in \
+         proportion to the forearm.\n",
         axes.x, axes.y, axes.z, axes.unit, axes.origin
     );
     let _ = write!(
         text,
-        "\n## Reading it\n\n```python\nfrom datasets import Audio, load_dataset\n\
-         Audio.encode_example = lambda self, value: value  # the sound stays a wav file: no torchcodec is needed\n\
+        "\n## Reading\n\n```python\nfrom datasets import Audio, load_dataset\n\
+         Audio.encode_example = lambda self, value: value  # keep audio as wav bytes; torchcodec is not needed\n\
          rows = load_dataset(\"webdataset\", data_files={{\"train\": \"train-*.tar\"}}, split=\"train\")\n\
          rows = rows.cast_column(\"wav\", Audio(decode=False))\n```\n\n\
          ```python\nimport glob, webdataset\n\
          motion = webdataset.WebDataset(sorted(glob.glob(\"train-*.tar\")), shardshuffle=False).decode()\n```\n\n\
-         `orator dataset verify --deep .` checks every byte; so does `b3sum --check checksums.b3`.\n\n\
-         ## What became of the footage\n\n| | length |\n|---|---|\n| kept | {} |\n",
+         `orator dataset verify --deep .` checks all files; `b3sum --check checksums.b3` checks their hashes.\n\n\
+         ## Use of the footage\n\n| | length |\n|---|---|\n| accepted | {} |\n",
         length(stats.footage.kept_secs)
     );
     for (reason, secs) in &stats.footage.refused_secs {
-        let _ = writeln!(text, "| refused: {reason} | {} |", length(*secs));
+        let _ = writeln!(text, "| rejected: {reason} | {} |", length(*secs));
     }
     let _ = writeln!(text, "| failed | {} |", length(stats.footage.failed_secs));
     if let Some(WordCount { n_words, n_kept, .. }) = stats.footage.words {
-        let _ = writeln!(text, "\nOf {n_words} words in the transcripts {n_kept} lie in samples.");
+        let _ = writeln!(text, "\nThe samples contain {n_kept} of the {n_words} words of the transcripts.");
     }
     if let Some(posture) = &stats.posture {
         let n_frames = info.splits.get(Split::Train.name()).map_or(0, |split| split.frames).max(1) as f64;
-        let seen = posture.iter().map(|(channel, angles)| (channel.name(), 100.0 * angles.n_seen[0] as f64 / n_frames));
-        let seen: Vec<String> = seen.map(|(name, percent)| format!("the {name} in {percent:.1} %")).collect();
-        let _ = writeln!(text, "\nOf the frames to train on {} were seen.", seen.join(" and "));
+        let shares =
+            posture.iter().map(|(channel, angles)| (channel.name(), percent(angles.n_seen[0] as f64, n_frames)));
+        let shares: Vec<String> = shares.map(|(name, share)| format!("the {name} in {share}")).collect();
+        let _ = writeln!(text, "\nVisible in the training split: {} of the frames.", shares.join(", "));
     }
     let _ = write!(
         text,
-        "\n`ledger.jsonl` says of every second of every video which it was, with what was measured.\n\n## Splits\n\n\
-         {} {}\n",
+        "\n`ledger.jsonl` lists every second of every video as accepted, rejected or failed, with the measured \
+         values.\n\n## Splits\n\n{} {}\n",
         describe_splits(info.split_rule.as_ref()),
         describe_leakage(leakage)
     );
-    let or_unstated = |text: &str| if text.is_empty() { "not said".to_owned() } else { text.to_owned() };
+    let or_unstated = |text: &str| if text.is_empty() { "not stated".to_owned() } else { text.to_owned() };
     let _ = write!(
         text,
         "\n## Terms\n\nLicence: {}. Consent of the speaker: {}. Source: {}.\n",
@@ -86,9 +110,10 @@ pub fn text(info: &DatasetInfo, stats: &DatasetStats, leakage: &Leakage) -> Stri
     let model = |model: &ModelUsed| format!("{} ({}{})", model.id, model.role, terms(&model.licence));
     let models: Vec<String> = info.models.iter().map(model).collect();
     let models = if models.is_empty() { String::new() } else { format!(" with the models {}", models.join(", ")) };
-    let _ = write!(text, "\nMade by {}{models}.", info.tool);
+    let _ = write!(text, "\nCreated by {}{models}.", info.tool);
     for note in &info.notes {
-        let _ = write!(text, " {note}");
+        let plain = NOTES.iter().fold(note.clone(), |text, (stored, printed)| text.replace(stored, printed));
+        let _ = write!(text, " {plain}");
     }
     text.push('\n');
     text
@@ -97,16 +122,16 @@ pub fn text(info: &DatasetInfo, stats: &DatasetStats, leakage: &Leakage) -> Stri
 /// Paragraph on how the dataset is divided into splits.
 fn describe_splits(rule: Option<&SplitRule>) -> String {
     match rule {
-        None => "A video is in one split as a whole; its content's hash, or the maker, chooses which.".to_owned(),
+        None => "Each video is in one split, chosen by the hash of its content or by the author.".to_owned(),
         Some(SplitRule { unit: SplitUnit::Time, why, guard_secs }) => format!(
-            "Videos are divided by time, in blocks of one split each ({why}). Two splits of a video are at least \
-             {guard_secs:.2} s apart: that is longer than a training window with all that its numbers were made from, so \
-             none was made from sound or motion of another split. Person, room and camera are those of the training \
-             split: the test is of new speech, not of a new recording."
+            "Videos are divided by time into blocks of one split each ({why}). Splits of a video are at least \
+             {guard_secs:.2} s apart, more than a training window with the context of its features, so no window \
+             depends on audio or motion of another split. Person, room and camera are the same in all splits: the test \
+             split measures generalisation to new speech, not to new recordings."
         ),
         Some(SplitRule { why, .. }) => format!(
-            "A video is in one split as a whole ({why}). New videos fill the splits toward their shares by seconds, or \
-             the maker chooses; no video changes its split."
+            "Each video is in one split ({why}). New videos are assigned to approach the configured shares by \
+             duration, unless the author assigns them; no video changes its split."
         ),
     }
 }
@@ -142,23 +167,26 @@ fn size_category(samples: usize) -> &'static str {
         0..1_000 => "n<1K",
         1_000..10_000 => "1K<n<10K",
         10_000..100_000 => "10K<n<100K",
-        _ => "100K<n<1M",
+        100_000..1_000_000 => "100K<n<1M",
+        _ => "1M<n<10M",
     }
 }
 
-/// Sentence on sound shared between videos.
+/// Sentence on audio shared between videos.
 fn describe_leakage(leakage: &Leakage) -> String {
     if leakage.duplicate_secs <= 0.0 {
-        return "Whether videos share sound was not looked at.".to_owned();
+        return "Videos were not compared for shared audio.".to_owned();
     }
     let same = match leakage.shared.len() {
-        0 => "none do".to_owned(),
-        1 => "two do".to_owned(),
-        n => format!("{n} pairs do"),
+        0 => "none were found".to_owned(),
+        n => format!("{} found", counted(n, "such pair")),
     };
     let leaks = match leakage.leaks.len() {
         0 => "none across splits".to_owned(),
-        n => format!("{n} ACROSS SPLITS, see `leakage.json`"),
+        n => format!("{n} ACROSS SPLITS (see `leakage.json`)"),
     };
-    format!("Videos that share {} s of sound or more belong together: {same}, {leaks}.", leakage.duplicate_secs)
+    format!(
+        "Videos that share at least {} of audio are assigned to one split: {same}, {leaks}.",
+        length(leakage.duplicate_secs)
+    )
 }

@@ -17,7 +17,9 @@ const MAX_COUNT: usize = u32::MAX as usize;
 pub fn count<'de, D: Deserializer<'de>>(from: D) -> Result<usize, D::Error> {
     let count = usize::deserialize(from)?;
     if count > MAX_COUNT {
-        return Err(D::Error::custom(format!("{count} samples or frames, {MAX_COUNT} at most: the file is damaged")));
+        return Err(D::Error::custom(format!(
+            "{count} samples or frames, expected at most {MAX_COUNT}: the file is damaged"
+        )));
     }
     Ok(count)
 }

@@ -51,7 +51,7 @@ impl Dataset {
         let lock = FolderLock::shared(&dir)?;
         ensure!(
             dir.join(INFO).is_file(),
-            "{} is no dataset: it has no {}; the dataset stage of `orator run` writes one to work/dataset/<speaker>",
+            "{} is not a dataset: it has no {}; `orator run` creates one in work/dataset/<speaker>",
             dir.display(),
             INFO
         );
@@ -66,7 +66,7 @@ impl Dataset {
         let info: DatasetInfo = read_json(&dir.join(INFO))?;
         ensure!(
             info.sound_rate == SAMPLE_RATE && info.fps.is_plausible() && info.joints.len() == N_JOINTS,
-            "{}: expected sound at {SAMPLE_RATE} Hz, 1 to 1000 frames a second and {N_JOINTS} joints",
+            "{}: expected audio at {SAMPLE_RATE} Hz, 1 to 1000 frames per second and {N_JOINTS} joints",
             dir.join(INFO).display()
         );
         check_lengths("bone_lengths_metres", &info.bone_lengths_metres)
@@ -76,10 +76,10 @@ impl Dataset {
         let mut shards = BTreeMap::new();
         for shard in info.shards() {
             let path = dir.join(&shard.file);
-            let bytes = fs::metadata(&path).with_context(|| format!("looking at the shard {}", path.display()))?.len();
+            let bytes = fs::metadata(&path).with_context(|| format!("cannot read the shard {}", path.display()))?.len();
             ensure!(
                 bytes == shard.bytes,
-                "{} has {bytes} bytes, {} were written: the file is damaged; run the dataset stage again with --force",
+                "{} has {bytes} bytes, expected {}: the file is damaged; run the dataset stage again with --force",
                 path.display(),
                 shard.bytes
             );
@@ -88,12 +88,12 @@ impl Dataset {
         let samples = read_index(&dir.join(INDEX))?;
         for sample in &samples {
             let fits = shards.get(&sample.shard).is_some_and(|bytes| sample.fits(*bytes));
-            ensure!(fits, "{}: {} lies outside its shard", dir.join(INDEX).display(), sample.key);
+            ensure!(fits, "{}: {} is outside its shard", dir.join(INDEX).display(), sample.key);
         }
         let n_samples: usize = info.splits.values().map(|split| split.samples).sum();
         ensure!(
             samples.len() == n_samples,
-            "{} has {} samples, {} says {n_samples}: the file is damaged; run the dataset stage again with --force",
+            "{} has {} samples, {} lists {n_samples}: the file is damaged; run the dataset stage again with --force",
             dir.join(INDEX).display(),
             samples.len(),
             dir.join(INFO).display()
@@ -141,15 +141,16 @@ impl Dataset {
         let hash = blake3::hash(&self.bytes(sample, ByteRange { offset: sample.offset, size: sample.size })?);
         ensure!(
             hash.to_hex().as_str() == sample.blake3,
-            "{}: the sample {} is damaged (its hash is not the one written): run the dataset stage again with --force",
+            "{}: the sample {} is damaged (its hash differs): run the dataset stage again with --force",
             self.dir.join(&sample.shard).display(),
             sample.key
         );
         let meta = serde_json::from_slice(&self.bytes(sample, sample.json)?)
-            .with_context(|| format!("reading {}.json in {}", sample.key, sample.shard))?;
+            .with_context(|| format!("cannot read {}.json in {}", sample.key, sample.shard))?;
         let frames = 0..sample.n_frames;
         let pose2d = npy::floats(&self.rows(sample, sample.pose2d, Element::F32, &[N_KEYPOINTS, 3], frames.clone())?);
-        let pose2d = Array3::from_shape_vec((frames.len(), N_KEYPOINTS, 3), pose2d).context("shaping keypoints")?;
+        let pose2d =
+            Array3::from_shape_vec((frames.len(), N_KEYPOINTS, 3), pose2d).context("invalid number of keypoints")?;
         let sound = self.sound(sample, 0..sample.n_sound_samples())?;
         let posture = self.posture(sample, frames.clone())?;
         let (key, words) = (sample.key.to_string(), self.words(sample)?);
@@ -161,7 +162,7 @@ impl Dataset {
     pub fn words(&self, sample: &SampleRef) -> Result<Option<Vec<Word>>> {
         let Some(range) = sample.words else { return Ok(None) };
         let words = serde_json::from_slice(&self.bytes(sample, range)?);
-        words.with_context(|| format!("reading {}.{WORDS_EXTENSION} in {}", sample.key, sample.shard))
+        words.with_context(|| format!("cannot read {}.{WORDS_EXTENSION} in {}", sample.key, sample.shard))
     }
 
     /// Reads the posture of a range of frames of a sample, without checking the hash. `None`: the sample has no
@@ -170,7 +171,7 @@ impl Dataset {
         let (Some(head), Some(trunk)) = (sample.head, sample.trunk) else { return Ok(None) };
         let angles = |range: ByteRange| -> Result<Array2<f32>> {
             let bytes = self.rows(sample, range, Element::F32, &[3], frames.clone())?;
-            Array2::from_shape_vec((frames.len(), 3), npy::floats(&bytes)).context("shaping angles")
+            Array2::from_shape_vec((frames.len(), 3), npy::floats(&bytes)).context("invalid number of angles")
         };
         Ok(Some(Posture { head: angles(head)?, trunk: angles(trunk)? }))
     }
@@ -182,19 +183,19 @@ impl Dataset {
         let mask = npy::bools(&self.rows(sample, sample.mask, Element::Bool, &[N_JOINTS], frames)?);
         let motion = Motion {
             fps: self.info.fps,
-            joints: Array3::from_shape_vec((n_frames, N_JOINTS, 3), joints).context("shaping joints")?,
-            mask: Array2::from_shape_vec((n_frames, N_JOINTS), mask).context("shaping the mask")?,
+            joints: Array3::from_shape_vec((n_frames, N_JOINTS, 3), joints).context("invalid number of joints")?,
+            mask: Array2::from_shape_vec((n_frames, N_JOINTS), mask).context("invalid size of the mask")?,
         };
         motion.in_range().with_context(|| format!("{} in {}", sample.key, self.dir.join(&sample.shard).display()))
     }
 
     /// Reads a range of audio samples of a sample, without checking the hash.
     pub fn sound(&self, sample: &SampleRef, range: Range<usize>) -> Result<Sound> {
-        let location = || format!("reading {}.wav in {}", sample.key, self.dir.join(&sample.shard).display());
+        let location = || format!("cannot read {}.wav in {}", sample.key, self.dir.join(&sample.shard).display());
         let (rate, at) = (self.info.sound_rate, sample.wav.offset + wav::HEADER_BYTES as u64);
         let head = ByteRange { offset: sample.wav.offset, size: sample.wav.size.min(wav::HEADER_BYTES as u64) };
         let n_samples = wav::n_samples(&self.bytes(sample, head)?, sample.wav.size, rate).with_context(location)?;
-        ensure!(range.end <= n_samples, "{}: it holds {n_samples} samples, not {}", location(), range.end);
+        ensure!(range.end <= n_samples, "{}: it has {n_samples} samples, {} were requested", location(), range.end);
         let span = ByteRange { offset: at + 2 * range.start as u64, size: 2 * range.len() as u64 };
         Ok(Sound { rate, samples: wav::samples(&self.bytes(sample, span)?) })
     }
@@ -208,12 +209,13 @@ impl Dataset {
         row: &[usize],
         frames: Range<usize>,
     ) -> Result<Vec<u8>> {
-        let location = || format!("reading an array of {} in {}", sample.key, self.dir.join(&sample.shard).display());
+        let location =
+            || format!("cannot read an array of {} in {}", sample.key, self.dir.join(&sample.shard).display());
         let head = ByteRange { offset: span.offset, size: span.size.min(npy::HEADER_BYTES as u64) };
         let layout = Layout::parse(&self.bytes(sample, head)?, span.size, element, row).with_context(location)?;
         ensure!(
             frames.start <= frames.end && frames.end <= layout.n_rows,
-            "{}: it has {} frames, {}..{} were asked for",
+            "{}: it has {} frames, {}..{} were requested",
             location(),
             layout.n_rows,
             frames.start,
@@ -224,10 +226,15 @@ impl Dataset {
     }
 
     fn bytes(&self, sample: &SampleRef, span: ByteRange) -> Result<Vec<u8>> {
-        let location = || format!("reading {} in {}", sample.key, self.dir.join(&sample.shard).display());
+        let location = || format!("cannot read {} in {}", sample.key, self.dir.join(&sample.shard).display());
         let file = self.shards.get(&sample.shard).with_context(location)?;
         // The size of a sample is bounded by its shard (checked by `open`), which bounds the allocation.
-        ensure!(span.size <= sample.size, "{}: {} bytes of a smaller sample were asked for", location(), span.size);
+        ensure!(
+            span.size <= sample.size,
+            "{}: {} bytes were requested, more than the sample has",
+            location(),
+            span.size
+        );
         let mut bytes = vec![0; span.size as usize];
         file.read_exact_at(&mut bytes, span.offset).with_context(location)?;
         Ok(bytes)
@@ -235,11 +242,10 @@ impl Dataset {
 }
 
 fn read_index(path: &Path) -> Result<Vec<SampleRef>> {
-    let reading = || format!("reading {}", path.display());
+    let reading = || format!("cannot read {}", path.display());
     let lines = std::io::BufReader::new(input::open(path).with_context(reading)?).lines();
     let parse = |(n, line): (usize, std::io::Result<String>)| {
-        let wrong =
-            || format!("{}, line {}: not as the dataset stage writes it; run the stage again", path.display(), n + 1);
+        let wrong = || format!("{}, line {}: invalid entry; run the dataset stage again", path.display(), n + 1);
         serde_json::from_str(&line.with_context(reading)?).with_context(wrong)
     };
     lines.enumerate().map(parse).collect()
@@ -272,7 +278,7 @@ impl ShardFiles {
     /// # Errors
     /// A name that is not one of the shards; a file that cannot be opened.
     pub fn get(&self, name: &FileName) -> Result<Arc<File>> {
-        self.names.get(name).context("no such shard")?;
+        self.names.get(name).context("unknown shard")?;
         let mut open = self.open.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
         let used = match open.iter().position(|(known, _)| known == name) {
             Some(at) => open.remove(at),
@@ -282,7 +288,7 @@ impl ShardFiles {
             Some(used) => used,
             None => {
                 let path = self.dir.join(name);
-                let file = input::open(&path).with_context(|| format!("opening the shard {}", path.display()))?;
+                let file = input::open(&path).with_context(|| format!("cannot open the shard {}", path.display()))?;
                 (name.clone(), Arc::new(file))
             }
         };

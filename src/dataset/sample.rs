@@ -54,19 +54,22 @@ impl Sample {
     pub fn members(&self) -> Result<[Vec<u8>; 5]> {
         let (key, n_frames) = (&self.key, self.n_frames());
         let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '_';
-        ensure!(!key.is_empty() && key.len() <= 80 && key.chars().all(plain), "`{key}` is not a key of a sample");
-        ensure!(n_frames > 0, "{key}: a sample without frames");
+        ensure!(
+            !key.is_empty() && key.len() <= 80 && key.chars().all(plain),
+            "invalid sample key `{key}`: expected 1 to 80 of a-z, 0-9, - and _"
+        );
+        ensure!(n_frames > 0, "{key}: the sample has no frames");
         ensure!(self.motion.joints.shape() == [n_frames, N_JOINTS, 3], "{key}: joints are not [T, 49, 3]");
         ensure!(self.motion.mask.shape() == [n_frames, N_JOINTS], "{key}: the mask is not [{n_frames}, 49]");
         ensure!(self.pose2d.shape() == [n_frames, N_KEYPOINTS, 3], "{key}: keypoints are not [{n_frames}, 59, 3]");
-        ensure!(self.sound.rate == SAMPLE_RATE, "{key}: sound at {} Hz, not {SAMPLE_RATE}", self.sound.rate);
+        ensure!(self.sound.rate == SAMPLE_RATE, "{key}: audio at {} Hz, expected {SAMPLE_RATE} Hz", self.sound.rate);
         let expected = sample_at(self.motion.fps, SAMPLE_RATE, n_frames);
         ensure!(
             self.sound.samples.len().abs_diff(expected) <= 1,
-            "{key}: {} samples of sound for {n_frames} frames, expected {expected}",
+            "{key}: {} audio samples for {n_frames} frames, expected {expected}",
             self.sound.samples.len()
         );
-        let json = pretty(&self.meta).context("writing a sample's facts as JSON")?;
+        let json = pretty(&self.meta).context("cannot encode the metadata of a sample as JSON")?;
         Ok([
             json,
             npy::write_bool(self.motion.mask.shape(), self.motion.mask.iter()),
@@ -95,7 +98,7 @@ impl Sample {
         let Some(words) = &self.words else { return Ok(None) };
         let secs = self.motion.fps.secs(self.n_frames());
         words::check(words, secs).with_context(|| self.key.clone())?;
-        let mut json = serde_json::to_vec(words).context("writing a sample's words as JSON")?;
+        let mut json = serde_json::to_vec(words).context("cannot encode the words of a sample as JSON")?;
         json.push(b'\n');
         Ok(Some(json))
     }

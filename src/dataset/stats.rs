@@ -115,7 +115,7 @@ fn check_numbers<'a>(name: &str, mut numbers: impl Iterator<Item = &'a f64>) -> 
     let invalid = numbers.find(|number| !(lower_bound..=MAX_MAGNITUDE).contains(*number));
     ensure!(
         invalid.is_none(),
-        "`{name}` holds {:?}, expected {lower_bound} to {MAX_MAGNITUDE}",
+        "`{name}` contains {:?}, expected {lower_bound} to {MAX_MAGNITUDE}",
         invalid.unwrap_or(&0.0)
     );
     Ok(())

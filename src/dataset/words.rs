@@ -110,11 +110,23 @@ pub fn check(words: &[Word], secs: f64) -> Result<()> {
     let mut before = 0.0;
     for (n, word) in words.iter().enumerate() {
         let (start, end) = (word.start_secs, word.end_secs);
-        let named = || format!("word {} `{}`, {start} to {end} s", n + 1, word.word);
-        ensure!(!word.word.is_empty() && !word.word.contains(char::is_whitespace), "{}: it is not one word", named());
-        ensure!(start >= 0.0 && end >= start && end <= secs + ROUNDING_SECS, "{}: outside its {secs:.3} s", named());
-        ensure!(start >= before, "{}: it begins before the word before", named());
-        ensure!(word.confidence.is_none_or(|c| (0.0..=1.0).contains(&c)), "{}: its confidence is not in 0..1", named());
+        let named = || format!("word {} `{}`, {start:.3} to {end:.3} s", n + 1, word.word);
+        ensure!(
+            !word.word.is_empty() && !word.word.contains(char::is_whitespace),
+            "{}: expected a single word",
+            named()
+        );
+        ensure!(
+            start >= 0.0 && end >= start && end <= secs + ROUNDING_SECS,
+            "{}: outside its sample of {secs:.3} s",
+            named()
+        );
+        ensure!(start >= before, "{}: it starts before the previous word", named());
+        ensure!(
+            word.confidence.is_none_or(|c| (0.0..=1.0).contains(&c)),
+            "{}: its confidence is not between 0 and 1",
+            named()
+        );
         before = start;
     }
     Ok(())

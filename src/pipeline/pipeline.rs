@@ -26,7 +26,11 @@ impl Pipeline {
     /// A configuration without speakers.
     pub fn open(config: Config) -> Result<Self> {
         let videos = videos::all(&config);
-        ensure!(!videos.is_empty(), "{} names no [[speaker]]", config.file.display());
+        ensure!(
+            !videos.is_empty(),
+            "{} has no [[speaker]] section: add one, or create a configuration with `orator init`",
+            config.file.display()
+        );
         Ok(Self { config, videos, program: None })
     }
 
@@ -62,7 +66,7 @@ impl Pipeline {
     pub fn videos(&self, speakers: &[String]) -> Result<Vec<Videos>> {
         for name in speakers {
             let known: Vec<&str> = self.videos.iter().map(|videos| videos.speaker.as_str()).collect();
-            ensure!(known.contains(&name.as_str()), "no speaker is called {name}; there are: {}", known.join(", "));
+            ensure!(known.contains(&name.as_str()), "unknown speaker {name}: expected one of {}", known.join(", "));
         }
         let chosen = self.videos.iter().filter(|v| speakers.is_empty() || speakers.contains(&v.speaker));
         Ok(chosen.cloned().collect())

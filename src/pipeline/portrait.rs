@@ -24,7 +24,7 @@ impl Portrait {
     /// Reads `portrait.json`.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
-        serde_json::from_slice(&bytes).with_context(|| format!("{} holds no portrait", path.display()))
+        serde_json::from_slice(&bytes).with_context(|| format!("{} is not a portrait", path.display()))
     }
 
     /// Distance between two face shapes after similarity alignment: root mean square over the points, in thousandths

@@ -77,8 +77,8 @@ pub struct RunReport {
 pub struct StageCounts {
     /// Processed in this run.
     pub done: usize,
-    /// Already fresh.
-    pub fresh: usize,
+    /// Already up to date.
+    pub up_to_date: usize,
     /// Failed.
     pub failed: usize,
 }
@@ -96,7 +96,7 @@ pub struct UnitFailure {
     pub stage: StageName,
     /// Error message with its causes.
     pub error: String,
-    /// The error itself, for `downcast_ref`: `UnreadableMedia`, `NothingKept`, `NoSpace`, `ModelError`.
+    /// The error itself, for `downcast_ref`: `UnreadableMedia`, `NothingAccepted`, `NoSpace`, `ModelError`.
     #[serde(skip)]
     pub cause: Option<Arc<anyhow::Error>>,
 }
@@ -116,14 +116,28 @@ pub struct UnitReport {
     pub facts: Map<String, Value>,
 }
 
+/// Keys of the statistics in records of earlier versions, and their present names.
+const OLD_KEYS: [(&str, &str); 3] =
+    [("kept_secs", "accepted_secs"), ("refused_secs", "rejected_secs"), ("several_people", "several_persons")];
+
+/// Renames the old keys of statistics.
+fn with_present_keys(mut facts: Map<String, Value>) -> Map<String, Value> {
+    for (old, present) in OLD_KEYS {
+        let value = facts.shift_remove(old);
+        facts.extend(value.map(|value| (present.to_owned(), value)));
+    }
+    facts
+}
+
 /// Whether this run processed a unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum RunState {
     /// Processed in this run.
     Done,
-    /// Already fresh.
-    Fresh,
+    /// Already up to date.
+    #[serde(rename = "fresh")]
+    UpToDate,
 }
 
 impl Pipeline {
@@ -145,7 +159,7 @@ impl Pipeline {
             stages::build(name, self.config(), self.all_videos(), &[])?;
         }
         let _lock = workdir::lock(&settings.work.dir)
-            .context("no run now; another folder is chosen with --set work.dir=FOLDER")?;
+            .context("cannot start the run; choose another work folder with --set work.dir=FOLDER")?;
         for videos in &remaining {
             // An interrupted replacement of a dataset is undone now, since its record is read before the dataset stage
             // runs.
@@ -223,13 +237,13 @@ impl StageRun<'_> {
                 let counts = self.report.stages.entry(stage).or_default();
                 let (count, state) = match &outcome {
                     StageOutcome::Done(_) => (&mut counts.done, RunState::Done),
-                    StageOutcome::Skipped(_) => (&mut counts.fresh, RunState::Fresh),
+                    StageOutcome::Skipped(_) => (&mut counts.up_to_date, RunState::UpToDate),
                     StageOutcome::Failed(_) => (&mut counts.failed, RunState::Done),
                 };
                 *count += 1;
                 match outcome {
                     StageOutcome::Done(report) | StageOutcome::Skipped(report) => {
-                        let (unit, line, facts) = (unit.to_string(), report.line, report.facts);
+                        let (unit, line, facts) = (unit.to_string(), report.line, with_present_keys(report.facts));
                         self.report.units.push(UnitReport { unit, stage, state, line, facts });
                     }
                     StageOutcome::Failed(error) => {

@@ -4,7 +4,7 @@ use super::dataset::stage::{DatasetInputs, DatasetStage};
 use super::extract::ExtractStage;
 use super::keypoints::stage::StageBySource;
 use super::lift::LiftStage;
-use super::lift::lifter::reach_secs;
+use super::lift::lifter::context_secs;
 use super::pose2d::Pose2dStage;
 use super::pose2d::models::ChosenModels;
 use super::segment::SegmentStage;
@@ -40,7 +40,7 @@ pub fn build(name: StageName, config: &Config, all: &[Videos], ready: &[Unit]) -
                 all: all.to_vec(),
                 models: models_used(settings)?,
                 notes: vec![SpeechDetector::note(settings)?],
-                reach_secs: reach_secs(&settings.lift),
+                context_secs: context_secs(&settings.lift),
             };
             Box::new(DatasetStage::new(settings, inputs))
         }

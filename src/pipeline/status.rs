@@ -24,7 +24,7 @@ pub struct StatusReport {
     /// What a run would do, one entry per stage.
     pub plan: Vec<StagePlan>,
     /// Time budget of every video, each speaker's total following the speaker's videos.
-    pub account: Vec<TimeBudget>,
+    pub time_budget: Vec<TimeBudget>,
     /// Total over all speakers.
     #[serde(skip)]
     pub total: TimeBudget,
@@ -41,8 +41,8 @@ pub struct UnitStatus {
     pub stage: StageName,
     /// State of the unit.
     pub state: UnitState,
-    /// Reason why the unit is not fresh; for a fresh unit, the report line of the stage.
-    pub why: String,
+    /// Reason why the unit is not up to date; otherwise the report line of the stage.
+    pub reason: String,
 }
 
 /// State of a unit at a stage.
@@ -50,12 +50,13 @@ pub struct UnitStatus {
 #[serde(rename_all = "lowercase")]
 pub enum UnitState {
     /// A run would skip it.
-    Fresh,
+    #[serde(rename = "fresh")]
+    UpToDate,
     /// An input, a setting or the stage changed.
     Stale,
     /// The last attempt failed, and nothing it depends on has changed since.
     Failed,
-    /// An earlier stage is not fresh.
+    /// An earlier stage is not up to date.
     Waits,
     /// No attempt was made.
     #[serde(rename = "-")]
@@ -70,30 +71,30 @@ pub enum UnitState {
 pub struct StagePlan {
     /// The stage.
     pub stage: StageName,
-    /// Number of units that are fresh.
-    pub stay_fresh: usize,
+    /// Number of units that are up to date.
+    pub up_to_date: usize,
     /// Number of units that would be processed.
     pub would_run: usize,
-    /// Distinct reasons why these units are not fresh.
-    pub because: BTreeSet<String>,
+    /// Distinct reasons why these units are not up to date.
+    pub reasons: BTreeSet<String>,
 }
 
 impl fmt::Display for UnitState {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {
-            Self::Fresh => "up to date",
+            Self::UpToDate => "up to date",
             Self::Stale => "stale",
             Self::Failed | Self::NoVideo => "failed",
-            Self::Waits => "waits",
+            Self::Waits => "waiting",
             Self::NeverDone => "-",
         })
     }
 }
 
 impl StatusReport {
-    /// Whether every dataset is fresh.
-    pub fn datasets_are_fresh(&self) -> bool {
-        self.units.iter().all(|unit| unit.stage != StageName::Dataset || unit.state == UnitState::Fresh)
+    /// Whether every dataset is up to date.
+    pub fn datasets_are_up_to_date(&self) -> bool {
+        self.units.iter().all(|unit| unit.stage != StageName::Dataset || unit.state == UnitState::UpToDate)
     }
 }
 
@@ -111,7 +112,7 @@ impl Pipeline {
                 unit: videos.speaker.clone(),
                 stage: StageName::Extract,
                 state: UnitState::NoVideo,
-                why: message.clone(),
+                reason: message.clone(),
             }));
             let ready = stages::ready(self.config(), &videos, &hashes).unwrap_or_default();
             let check = StatusCheck { pipeline: self, hashes: &hashes, videos: &videos, ready: &ready };
@@ -126,19 +127,21 @@ impl Pipeline {
                 let failed = stage_statuses.iter().find(|status| status.state == UnitState::Failed);
                 speaker_waits_for = speaker_waits_for.or(waits_for.filter(|_| failed.is_none()));
                 let video_progress = match (failed, waits_for) {
-                    (Some(UnitStatus { stage, why, .. }), _) => VideoProgress::Failed { stage: *stage, error: why },
+                    (Some(UnitStatus { stage, reason, .. }), _) => {
+                        VideoProgress::Failed { stage: *stage, error: reason }
+                    }
                     (None, Some(_)) => VideoProgress::Waiting,
                     (None, None) => VideoProgress::Judged,
                 };
-                let is_extracted = stage_statuses.first().is_some_and(|status| status.state == UnitState::Fresh);
+                let is_extracted = stage_statuses.first().is_some_and(|status| status.state == UnitState::UpToDate);
                 let work = &self.config().settings.work.dir;
                 let budget = TimeBudget::of_video(work, unit, video_progress, is_extracted);
                 total.add(&budget);
-                report.account.push(budget);
+                report.time_budget.push(budget);
                 report.units.extend(stage_statuses);
             }
             report.total.add(&total);
-            report.account.push(total);
+            report.time_budget.push(total);
             let stage = check.stage(StageName::Dataset);
             for unit in stages::units(StageName::Dataset, self.config(), &videos) {
                 report.units.push(check.at(StageName::Dataset, &stage, &unit, &mut speaker_waits_for));
@@ -147,7 +150,7 @@ impl Pipeline {
         // Failing to save the hash cache only costs recomputation.
         hashes.save().unwrap_or_default();
         report.plan = plan(&report.units);
-        report.adds_up = report.total.n_wrong == 0;
+        report.adds_up = report.total.n_mismatched == 0;
         Ok(report)
     }
 
@@ -156,7 +159,7 @@ impl Pipeline {
     /// # Errors
     /// An unknown speaker.
     pub fn time_budgets(&self, speakers: &[String]) -> Result<Vec<TimeBudget>> {
-        Ok(self.status(speakers)?.account)
+        Ok(self.status(speakers)?.time_budget)
     }
 }
 
@@ -182,7 +185,7 @@ impl StatusCheck<'_> {
         unit: &Unit,
         waits_for: &mut Option<StageName>,
     ) -> UnitStatus {
-        let status = |state, why| UnitStatus { unit: unit.to_string(), stage: name, state, why };
+        let status = |state, reason| UnitStatus { unit: unit.to_string(), stage: name, state, reason };
         let stage = match stage {
             Ok(stage) => stage,
             Err(error) => return status(UnitState::Failed, format!("{error:#}")),
@@ -195,10 +198,10 @@ impl StatusCheck<'_> {
             waits_for.get_or_insert(name);
         }
         match state {
-            State::Fresh(record) => status(UnitState::Fresh, record.line),
-            State::Stale(why @ DirtyReason::NeverDone) => status(UnitState::NeverDone, why.to_string()),
-            State::Stale(why @ DirtyReason::WaitsFor { .. }) => status(UnitState::Waits, why.to_string()),
-            State::Stale(why) => status(UnitState::Stale, why.to_string()),
+            State::Fresh(record) => status(UnitState::UpToDate, record.line),
+            State::Stale(reason @ DirtyReason::NeverDone) => status(UnitState::NeverDone, reason.to_string()),
+            State::Stale(reason @ DirtyReason::WaitsFor { .. }) => status(UnitState::Waits, reason.to_string()),
+            State::Stale(reason) => status(UnitState::Stale, reason.to_string()),
             State::Failed(error) => status(UnitState::Failed, error),
         }
     }
@@ -206,14 +209,14 @@ impl StatusCheck<'_> {
 
 fn plan(units: &[UnitStatus]) -> Vec<StagePlan> {
     let mut plan = BTreeMap::new();
-    for UnitStatus { stage, state, why, .. } in units.iter().filter(|unit| unit.state != UnitState::NoVideo) {
-        let new = || StagePlan { stage: *stage, stay_fresh: 0, would_run: 0, because: BTreeSet::new() };
+    for UnitStatus { stage, state, reason, .. } in units.iter().filter(|unit| unit.state != UnitState::NoVideo) {
+        let new = || StagePlan { stage: *stage, up_to_date: 0, would_run: 0, reasons: BTreeSet::new() };
         let line = plan.entry(*stage).or_insert_with(new);
-        if *state == UnitState::Fresh {
-            line.stay_fresh += 1;
+        if *state == UnitState::UpToDate {
+            line.up_to_date += 1;
         } else {
             line.would_run += 1;
-            line.because.insert(why.clone());
+            line.reasons.insert(reason.clone());
         }
     }
     plan.into_values().collect()

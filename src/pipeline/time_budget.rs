@@ -30,13 +30,13 @@ pub(super) enum VideoProgress<'a> {
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct TimeBudget {
     /// `speaker/video`, or the name of the speaker.
-    pub of: String,
+    pub unit: String,
     /// Seconds in accepted intervals.
-    #[serde(rename = "kept_secs")]
-    pub kept: f64,
+    #[serde(rename = "accepted_secs")]
+    pub accepted: f64,
     /// Rejected seconds by reason.
-    #[serde(rename = "refused_secs")]
-    pub refused: BTreeMap<String, f64>,
+    #[serde(rename = "rejected_secs")]
+    pub rejected: BTreeMap<String, f64>,
     /// Seconds lost to a failed stage.
     #[serde(rename = "failed_secs")]
     pub failed: f64,
@@ -46,7 +46,7 @@ pub struct TimeBudget {
     /// Total duration of the videos whose duration is known.
     #[serde(rename = "duration_secs")]
     pub duration: f64,
-    /// Sum of `kept`, `refused`, `failed` and `waiting`.
+    /// Sum of `accepted`, `rejected`, `failed` and `waiting`.
     #[serde(rename = "sum_secs")]
     pub sum: f64,
     /// Videos of unknown duration, because they failed before it was determined.
@@ -54,7 +54,7 @@ pub struct TimeBudget {
     pub n_unknown: usize,
     /// Videos whose sum deviates from their duration by more than one frame; serialised as whether there are none.
     #[serde(rename = "adds_up", serialize_with = "serialize_is_zero")]
-    pub n_wrong: usize,
+    pub n_mismatched: usize,
     /// Message about the criteria that were skipped, for a unit without pictures.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub not_judged: Option<String>,
@@ -79,13 +79,13 @@ pub enum BudgetKind {
 impl TimeBudget {
     /// Empty budget of a speaker, to which the budgets of videos are added.
     pub(super) fn of_speaker(speaker: &str) -> Self {
-        Self { of: speaker.to_owned(), ..Self::default() }
+        Self { unit: speaker.to_owned(), ..Self::default() }
     }
 
     /// Budget of one video from the stage outputs under `work`. `is_extracted`: the output of the extract stage is up
     /// to date.
     pub(super) fn of_video(work: &Path, unit: &Unit, progress: VideoProgress, is_extracted: bool) -> Self {
-        let budget = Self { of: unit.to_string(), kind: BudgetKind::Video, ..Self::default() };
+        let budget = Self { unit: unit.to_string(), kind: BudgetKind::Video, ..Self::default() };
         let media = if is_extracted { MediaInfo::read(&Artifact::MediaInfo.path(work, unit)).ok() } else { None };
         let not_judged = media.as_ref().and_then(MediaInfo::not_judged);
         let offset = sound_offset_json::read(&Artifact::SoundOffset.path(work, unit)).ok().flatten();
@@ -102,40 +102,41 @@ impl TimeBudget {
         let unreadable = |error| Ledger::failed(duration, StageName::Lift.as_str(), &format!("{error:#}"));
         let ledger = ledger.unwrap_or_else(unreadable);
         // Adding 0.0 turns the -0.0 of an empty sum into 0.0.
-        let (kept, refused, failed) = (ledger.kept_secs() + 0.0, ledger.refused_secs(), ledger.failed_secs() + 0.0);
-        let mut budget = Self { kept, refused, failed, waiting, duration, ..budget };
+        let (accepted, rejected, failed) =
+            (ledger.kept_secs() + 0.0, ledger.refused_secs(), ledger.failed_secs() + 0.0);
+        let mut budget = Self { accepted, rejected, failed, waiting, duration, ..budget };
         budget.sum = budget.total();
         let frame_secs = media.as_ref().map_or(UNKNOWN_FRAME_SECS, |media| 1.0 / media.fps.per_sec());
-        budget.n_wrong = usize::from((budget.sum - duration).abs() > frame_secs);
+        budget.n_mismatched = usize::from((budget.sum - duration).abs() > frame_secs);
         budget
     }
 
     /// Adds another budget to this one.
     pub(super) fn add(&mut self, other: &Self) {
-        self.kept += other.kept;
-        for (reason, secs) in &other.refused {
-            *self.refused.entry(reason.clone()).or_default() += secs;
+        self.accepted += other.accepted;
+        for (reason, secs) in &other.rejected {
+            *self.rejected.entry(reason.clone()).or_default() += secs;
         }
         self.failed += other.failed;
         self.waiting += other.waiting;
         self.duration += other.duration;
         self.n_unknown += other.n_unknown;
-        self.n_wrong += other.n_wrong;
+        self.n_mismatched += other.n_mismatched;
         self.sum = self.total();
     }
 
     /// Total of the rejected seconds.
-    pub fn refused_secs(&self) -> f64 {
-        self.refused.values().sum::<f64>() + 0.0
+    pub fn rejected_secs(&self) -> f64 {
+        self.rejected.values().sum::<f64>() + 0.0
     }
 
     fn total(&self) -> f64 {
-        self.kept + self.refused_secs() + self.failed + self.waiting
+        self.accepted + self.rejected_secs() + self.failed + self.waiting
     }
 }
 
-fn serialize_is_zero<S: Serializer>(n_wrong: &usize, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_bool(*n_wrong == 0)
+fn serialize_is_zero<S: Serializer>(n_mismatched: &usize, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_bool(*n_mismatched == 0)
 }
 
 /// Duration from the container header, in seconds, for a file that the extract stage has not processed.

@@ -133,7 +133,7 @@ fn plan(args: &Args) -> Result<ImportPlan> {
         limits: TakeLimits {
             fps,
             min_frames: args.min_frames.max(1),
-            max_apart_secs: args.max_apart,
+            max_difference_secs: args.max_apart,
             no_sound: args.no_sound,
         },
         dataset: config::DatasetConfig {
@@ -145,7 +145,7 @@ fn plan(args: &Args) -> Result<ImportPlan> {
 }
 
 fn close(imported: &Imported, out: &Path, ui: &Ui) -> Result<Outcome> {
-    let count = |ended: &str| imported.lines.iter().filter(|line| line.ended == ended).count();
+    let count = |outcome: &str| imported.lines.iter().filter(|line| line.outcome == outcome).count();
     let mut lines: Vec<String> = imported.lines.iter().filter(|line| !line.message.is_empty()).map(text).collect();
     lines.extend(imported.notes.iter().cloned());
     let secs: BTreeMap<&str, f64> =
@@ -174,10 +174,10 @@ pub fn train_gan(dataset: &Path) -> String {
 }
 
 fn text(line: &ImportOutcome) -> String {
-    let ImportOutcome { file, ended, reason, message, .. } = line;
-    match *ended {
+    let ImportOutcome { file, outcome, reason, message, .. } = line;
+    match *outcome {
         "kept" => format!("kept     {file}: {message}"),
         "failed" => format!("failed   {file}: {message}"),
-        _ => format!("{ended}  {file}: {reason}: {message}"),
+        _ => format!("{outcome}  {file}: {reason}: {message}"),
     }
 }

@@ -52,7 +52,7 @@ fn check(dir: &std::path::Path, deep: bool, ui: &Ui) -> Result<Outcome> {
     let found = verify::verify(dir, deep, ui)?;
     let good = found.problems.is_empty();
     let mut lines: Vec<String> =
-        found.problems.iter().map(|problem| format!("wrong   {}: {}", problem.file, problem.what)).collect();
+        found.problems.iter().map(|problem| format!("wrong   {}: {}", problem.file, problem.message)).collect();
     lines.push(format!(
         "{}: {} files, {} videos, {} intervals, {:.1} s of motion; {} MB read; {}",
         if good { "sound" } else { "NOT SOUND" },
@@ -68,7 +68,7 @@ fn check(dir: &std::path::Path, deep: bool, ui: &Ui) -> Result<Outcome> {
         (true, true) => train_gan(dir),
         (false, _) => "orator run --from dataset --force".to_owned(),
     };
-    let problems: Vec<_> = found.problems.iter().map(|p| json!({ "file": p.file, "what": p.what })).collect();
+    let problems: Vec<_> = found.problems.iter().map(|p| json!({ "file": p.file, "message": p.message })).collect();
     let facts = json!({
         "sound": good, "deep": deep, "problems": problems, "files": found.n_files, "videos": found.n_videos,
         "samples": found.n_samples, "secs": found.secs, "bytes_read": found.bytes, "next": next,

@@ -93,7 +93,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         }
     }
     let counts = |(stage, n): (&StageName, &orator_pipeline::StageCounts)| {
-        format!("{stage:8} {} done, {} up to date, {} failed", n.done, n.fresh, n.failed)
+        format!("{stage:8} {} done, {} up to date, {} failed", n.done, n.up_to_date, n.failed)
     };
     let mut lines: Vec<String> = report.stages.iter().map(counts).collect();
     lines.extend(report.datasets.iter().map(|dir| format!("dataset  {}", dir.display())));

@@ -45,7 +45,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let work = &pipeline.config().settings.work.dir;
     enter_sandbox([artifacts::hashes(work).as_path()], [&**work]);
     let report = pipeline.status(&args.speaker)?;
-    let verb = if report.datasets_are_fresh() { "train gan" } else { "run" };
+    let verb = if report.datasets_are_up_to_date() { "train gan" } else { "run" };
     let next = format!("orator {verb}{}", args.config.flags());
     let mut facts = json!(report);
     facts["next"] = json!(next);
@@ -56,7 +56,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 fn text(report: &StatusReport, why: bool) -> String {
     let units: Vec<&UnitStatus> = report.units.iter().filter(|unit| unit.state != UnitState::NoVideo).collect();
     let rows: Vec<&[&UnitStatus]> = units.chunk_by(|a, b| a.unit == b.unit).collect();
-    let names = units.iter().map(|unit| &unit.unit).chain(report.account.iter().map(|account| &account.of));
+    let names = units.iter().map(|unit| &unit.unit).chain(report.time_budget.iter().map(|account| &account.unit));
     let width = names.map(|name| name.chars().count()).max().unwrap_or(0).max("seconds".len());
     let row = |name: &str, words: [String; StageName::ALL.len()]| {
         format!("{name:width$} {}", words.map(|word| format!("{word:10}")).join(" ")).trim_end().to_owned()
@@ -68,17 +68,17 @@ fn text(report: &StatusReport, why: bool) -> String {
     }
     let headings = ["kept", "refused", "failed", "waiting", "duration"].map(|name| format!("{name:>9}")).join("");
     lines.extend([String::new(), format!("{:width$}{headings}  refused for", "seconds")]);
-    lines.extend(report.account.iter().map(|account| seconds(account, width)));
+    lines.extend(report.time_budget.iter().map(|account| seconds(account, width)));
     lines.push(verdict(&report.total));
-    let not_judged = |account: &TimeBudget| account.not_judged.as_ref().map(|said| format!("{}: {said}", account.of));
-    lines.extend(report.account.iter().filter_map(not_judged));
-    let offset = |account: &TimeBudget| account.sound_offset.map(|said| format!("{}: {said}", account.of));
-    lines.extend(report.account.iter().filter_map(offset));
+    let not_judged = |account: &TimeBudget| account.not_judged.as_ref().map(|said| format!("{}: {said}", account.unit));
+    lines.extend(report.time_budget.iter().filter_map(not_judged));
+    let offset = |account: &TimeBudget| account.sound_offset.map(|said| format!("{}: {said}", account.unit));
+    lines.extend(report.time_budget.iter().filter_map(offset));
     if why {
         lines.push(String::new());
-        lines.extend(report.units.iter().map(|UnitStatus { unit, stage, state, why }| match state {
-            UnitState::NoVideo => format!("{unit}: {why}"),
-            _ => format!("{unit} {stage}: {state}: {why}"),
+        lines.extend(report.units.iter().map(|UnitStatus { unit, stage, state, reason }| match state {
+            UnitState::NoVideo => format!("{unit}: {reason}"),
+            _ => format!("{unit} {stage}: {state}: {reason}"),
         }));
         lines.push(String::new());
         lines.extend(report.plan.iter().map(plan));
@@ -89,9 +89,9 @@ fn text(report: &StatusReport, why: bool) -> String {
 /// A row of the table of seconds.
 fn seconds(account: &TimeBudget, width: usize) -> String {
     let known = account.duration > 0.0 || account.n_unknown == 0;
-    let secs = [account.kept, account.refused_secs(), account.failed, account.waiting, account.duration];
+    let secs = [account.accepted, account.rejected_secs(), account.failed, account.waiting, account.duration];
     let secs = secs.map(|secs| if known { format!("{secs:9.2}") } else { format!("{:>9}", "?") }).join("");
-    format!("{:width$}{secs}  {}", account.of, longest_first(&account.refused)).trim_end().to_owned()
+    format!("{:width$}{secs}  {}", account.unit, longest_first(&account.rejected)).trim_end().to_owned()
 }
 
 /// Whether all seconds add up.
@@ -100,7 +100,7 @@ fn verdict(total: &TimeBudget) -> String {
         0 => String::new(),
         n => format!("; the length of {n} that failed is not known (?)"),
     };
-    match total.n_wrong {
+    match total.n_mismatched {
         0 => format!("kept + refused + failed + waiting = duration, to one frame a video{unknown}"),
         n => format!("the seconds of {n} do NOT add up to the duration: run the stage segment again{unknown}"),
     }
@@ -108,10 +108,10 @@ fn verdict(total: &TimeBudget) -> String {
 
 /// What `orator run` would do for a stage, and why.
 fn plan(plan: &StagePlan) -> String {
-    let StagePlan { stage, stay_fresh, would_run, because } = plan;
-    let shown: Vec<&str> = because.iter().map(String::as_str).take(REASONS_SHOWN).collect();
-    let more = because.len().saturating_sub(shown.len());
+    let StagePlan { stage, up_to_date, would_run, reasons } = plan;
+    let shown: Vec<&str> = reasons.iter().map(String::as_str).take(REASONS_SHOWN).collect();
+    let more = reasons.len().saturating_sub(shown.len());
     let more = if more == 0 { String::new() } else { format!("; {more} other reasons") };
     let why = if *would_run == 0 { String::new() } else { format!(": {}{more}", shown.join("; ")) };
-    format!("{stage:8} {stay_fresh} stay up to date, {would_run} would run{why}")
+    format!("{stage:8} {up_to_date} up to date, {would_run} would run{why}")
 }

@@ -37,8 +37,8 @@ pub fn ensure_intact_without(dir: &Path, names: &BTreeSet<String>) -> Result<()>
             VideoEntry::read(&VideoEntry::path(dir, &name)).is_ok_and(|entry| entry.is_intact(dir, &stated));
         ensure!(
             is_intact,
-            "{name}, which stays, is damaged in the dataset {}: nothing was removed. Make it anew with `orator run` \
-             (`orator dataset verify --deep` names its files), or forget it too",
+            "nothing was removed: the remaining video {name} is damaged in the dataset {}. Rebuild it with \
+             `orator run`, or forget it too (`orator dataset verify --deep` lists the damaged files)",
             dir.display()
         );
     }
@@ -79,7 +79,7 @@ pub fn without(dir: &Path, names: &BTreeSet<String>) -> Result<()> {
         assemble(&attempt, &info.about(), &compared)?;
         workdir::replace_folder(&attempt, dir)
     };
-    let result = rebuild().with_context(|| format!("cannot make the dataset {} anew", dir.display()));
+    let result = rebuild().with_context(|| format!("cannot rebuild the dataset {}", dir.display()));
     if result.is_err() {
         let _ = std::fs::remove_dir_all(&attempt);
     }

@@ -124,7 +124,7 @@ fn speakers_on_record(work: &Path) -> Vec<String> {
 /// # Errors
 /// `dir` is not a dataset.
 pub fn dataset_videos(dir: &Path) -> Result<Vec<KnownVideo>> {
-    ensure!(dir.join(entry::FOLDER).is_dir(), "{} is no dataset: it has no folder {}", dir.display(), entry::FOLDER);
+    ensure!(dir.join(entry::FOLDER).is_dir(), "{} is not a dataset: it has no folder {}", dir.display(), entry::FOLDER);
     let mut known = Vec::new();
     add_dataset(dir, "", &mut known)?;
     Ok(known)
@@ -210,8 +210,8 @@ pub fn find_one<'a>(known: &'a [KnownVideo], wanted: &str, speaker: Option<&str>
     let called: Vec<&KnownVideo> = all.iter().copied().filter(|k| k.matches(wanted)).collect();
     match called.as_slice() {
         [one] => Ok(one),
-        [] => bail!("no video is called {wanted}; there are:{}", list(&all)),
-        several => bail!("{wanted} may be one of several videos; say which by its work name or path:{}", list(several)),
+        [] => bail!("unknown video {wanted}: expected one of{}", list(&all)),
+        several => bail!("{wanted} matches several videos: give the work name or path of one of{}", list(several)),
     }
 }
 
@@ -223,6 +223,6 @@ pub fn speaker_videos<'a>(known: &'a [KnownVideo], speaker: &str) -> Result<Vec<
     let own: Vec<&KnownVideo> = known.iter().filter(|k| k.speaker == speaker).collect();
     let names: BTreeSet<&str> = known.iter().map(|k| k.speaker.as_str()).collect();
     let names = names.into_iter().collect::<Vec<_>>().join(", ");
-    ensure!(!own.is_empty(), "no speaker is called {speaker}; there are: {names}");
+    ensure!(!own.is_empty(), "unknown speaker {speaker}: expected one of {names}");
     Ok(own)
 }

@@ -45,9 +45,8 @@ const TRANSCRIPT_FOLDERS: &str = "ctm tsv transcript transcripts text texts txt 
 pub fn find(sources: &[PathBuf], only: Option<MotionKind>) -> Result<ImportSources> {
     let (mut files, mut found) = (Vec::new(), ImportSources::default());
     for source in sources {
-        ensure!(source.exists(), "{} is not there", source.display());
-        walk(source, &mut files, &mut found.datasets)
-            .with_context(|| format!("cannot look into {}", source.display()))?;
+        ensure!(source.exists(), "{} does not exist", source.display());
+        walk(source, &mut files, &mut found.datasets).with_context(|| format!("cannot list {}", source.display()))?;
     }
     files.sort();
     files.dedup();
@@ -70,8 +69,8 @@ pub fn find(sources: &[PathBuf], only: Option<MotionKind>) -> Result<ImportSourc
         found.takes.is_empty() && found.datasets.is_empty() && found.tars.is_empty() && found.unknown.is_empty();
     ensure!(
         !is_empty,
-        "nothing to import in {sources:?}{}: expected text clips of 147 numbers a line, .npz with `human_joints`, .bvh, \
-         or .tar shards",
+        "nothing to import in {sources:?}{}: expected text clips with 147 values per line, .npz with `human_joints`, \
+         .bvh or .tar shards",
         only.map(|kind| format!(" of the kind {}", kind.name())).unwrap_or_default()
     );
     Ok(found)
@@ -100,7 +99,7 @@ fn kind(path: &Path) -> std::result::Result<Option<MotionKind>, String> {
         "npz" => {
             let npz = Npz::open(path).map_err(|error| format!("{error:#}"))?;
             let names = npz.names().join(", ");
-            let unknown = format!("it holds no `human_joints` [T, 43, 3] (TED Expressive), but: {names}");
+            let unknown = format!("it contains {names}: expected `human_joints` [T, 43, 3] (TED Expressive)");
             if npz.has("human_joints") { Ok(Some(MotionKind::Ted)) } else { Err(unknown) }
         }
         "txt" => Ok(has_147_numbers(path).then_some(MotionKind::Authors)),

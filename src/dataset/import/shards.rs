@@ -8,6 +8,7 @@ use ndarray::{Array2, Array3};
 use orator_base::input;
 use orator_base::stage::ledger::{Kept, Ledger, Refused};
 use orator_base::stage::refusal::{FrameRefusal, Refusal};
+use orator_base::text::counted;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::posture::Posture;
 use orator_base::types::skeleton::N_JOINTS;
@@ -30,7 +31,7 @@ struct MemberLocation {
 /// Sample that has not been read yet; members are in the order of `EXTENSIONS`, optional ones in that of
 /// `OPTIONAL_EXTENSIONS`.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LooseSample {
+pub struct ShardSample {
     pub key: String,
     members: [Option<MemberLocation>; 5],
     optional: [Option<MemberLocation>; 3],
@@ -38,23 +39,23 @@ pub struct LooseSample {
 
 /// Samples whose keys differ only after the last dash.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LooseVideo {
+pub struct ShardVideo {
     pub name: String,
     /// Samples sorted by key.
-    pub samples: Vec<LooseSample>,
+    pub samples: Vec<ShardSample>,
 }
 
 /// Contents of the tar files.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct LooseTars {
-    pub videos: Vec<LooseVideo>,
+pub struct ShardTars {
+    pub videos: Vec<ShardVideo>,
     /// Notes on skipped files, a sentence each.
     pub notes: Vec<String>,
     /// Unreadable tars, with the error.
     pub failed: Vec<(PathBuf, String)>,
 }
 
-impl LooseVideo {
+impl ShardVideo {
     /// Tar files that hold the samples of this video.
     pub fn tars(&self) -> Vec<&PathBuf> {
         let members = self.samples.iter().flat_map(|sample| sample.members.iter().chain(&sample.optional));
@@ -63,29 +64,30 @@ impl LooseVideo {
 }
 
 /// Lists the tar files; members are read only to compare two with the same name.
-pub fn open(tars: &[PathBuf]) -> LooseTars {
-    let mut loose = LooseTars::default();
-    let mut samples: BTreeMap<String, LooseSample> = BTreeMap::new();
+pub fn open(tars: &[PathBuf]) -> ShardTars {
+    let mut found = ShardTars::default();
+    let mut samples: BTreeMap<String, ShardSample> = BTreeMap::new();
     for tar in tars {
         let mut unknown = BTreeMap::<String, usize>::new();
         match list(tar, &mut samples, &mut unknown) {
-            Ok(0) => loose.failed.push((tar.clone(), "it holds no file".to_owned())),
+            Ok(0) => found.failed.push((tar.clone(), "it contains no files".to_owned())),
             Ok(_) => {}
-            Err(error) => loose.failed.push((tar.clone(), format!("{error:#}"))),
+            Err(error) => found.failed.push((tar.clone(), format!("{error:#}"))),
         }
         let name = file_name(tar);
-        let left_out =
-            |(ending, n): (String, usize)| format!("{name}: {n} x .{ending} left out, no member of a sample");
-        loose.notes.extend(unknown.into_iter().map(left_out));
+        let left_out = |(ending, n): (String, usize)| {
+            format!("{name}: skipped {} not in a sample", counted(n, &format!(".{ending} file")))
+        };
+        found.notes.extend(unknown.into_iter().map(left_out));
     }
-    let mut videos: BTreeMap<String, LooseVideo> = BTreeMap::new();
+    let mut videos: BTreeMap<String, ShardVideo> = BTreeMap::new();
     for (key, sample) in samples {
         let name = key.rsplit_once('-').map_or(key.as_str(), |(video, _)| video).to_owned();
-        let video = videos.entry(name.clone()).or_insert(LooseVideo { name, samples: Vec::new() });
+        let video = videos.entry(name.clone()).or_insert(ShardVideo { name, samples: Vec::new() });
         video.samples.push(sample);
     }
-    loose.videos = videos.into_values().collect();
-    loose
+    found.videos = videos.into_values().collect();
+    found
 }
 
 /// Adds the members of a tar file to `samples`, and counts files of other extensions in `unknown`. Returns the number
@@ -95,7 +97,7 @@ pub fn open(tars: &[PathBuf]) -> LooseTars {
 /// A file that is not a readable tar, a truncated member, two members with the same name and different bytes.
 fn list(
     tar: &Path,
-    samples: &mut BTreeMap<String, LooseSample>,
+    samples: &mut BTreeMap<String, ShardSample>,
     unknown: &mut BTreeMap<String, usize>,
 ) -> Result<usize> {
     let mut n_files = 0;
@@ -118,14 +120,14 @@ fn list(
             continue;
         };
         let location = MemberLocation { tar: tar.to_owned(), offset: entry.raw_file_position(), bytes: entry.size() };
-        ensure!(location.offset.saturating_add(location.bytes) <= length, "{}: {name} is cut off", reading());
+        ensure!(location.offset.saturating_add(location.bytes) <= length, "{}: {name} is truncated", reading());
         let new_sample =
-            || LooseSample { key: key.to_owned(), members: [const { None }; 5], optional: [const { None }; 3] };
+            || ShardSample { key: key.to_owned(), members: [const { None }; 5], optional: [const { None }; 3] };
         let sample = samples.entry(key.to_owned()).or_insert_with(new_sample);
         let Some(known) = sample.members.iter_mut().chain(&mut sample.optional).nth(member) else { continue };
         if let Some(first) = known {
             let is_equal = read_member(first)? == read_member(&location)?;
-            ensure!(is_equal, "{name} lies in {} and in {} with other bytes", first.tar.display(), tar.display());
+            ensure!(is_equal, "{name} differs between {} and {}", first.tar.display(), tar.display());
         }
         known.get_or_insert(location);
     }
@@ -149,7 +151,7 @@ fn read_member(location: &MemberLocation) -> Result<Vec<u8>> {
     read().with_context(|| format!("cannot read {}", location.tar.display()))
 }
 
-impl LooseSample {
+impl ShardSample {
     /// Split in the name of a tar file of the sample; `None`: no name states one.
     pub fn split(&self) -> Option<Split> {
         self.members.iter().flatten().find_map(|location| split_of(&location.tar))
@@ -175,7 +177,7 @@ impl LooseSample {
             let posture = match (head, trunk) {
                 (Some(head), Some(trunk)) => Some(Posture { head: angles(head)?, trunk: angles(trunk)? }),
                 (None, None) => None,
-                _ => bail!("of head.npy and trunk.npy it has one: expected both or none"),
+                _ => bail!("it has one of head.npy and trunk.npy: expected both or none"),
             };
             let sample = Sample { words, posture, ..self.parse(json, mask, pose2d, pose3d, sound)? };
             sample.optional_members()?;
@@ -213,7 +215,8 @@ impl LooseSample {
 fn angles(location: &MemberLocation) -> Result<Array2<f32>> {
     let bytes = read_member(location)?;
     let layout = Layout::parse(&bytes, bytes.len() as u64, Element::F32, &[3]).context("head.npy or trunk.npy")?;
-    Array2::from_shape_vec((layout.n_rows, 3), npy::floats(&bytes[layout.data_at..])).context("shaping angles")
+    Array2::from_shape_vec((layout.n_rows, 3), npy::floats(&bytes[layout.data_at..]))
+        .context("invalid number of angles")
 }
 
 /// Reads a 16-bit mono wav at `SAMPLE_RATE`, with a header of any length.

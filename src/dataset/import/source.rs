@@ -2,7 +2,7 @@
 //! inspected first (outcome, ledger, sound codes) and written after its split has been assigned.
 
 use super::find::{ImportSources, TakeFiles};
-use super::shards::{self, LooseSample, LooseVideo};
+use super::shards::{self, ShardSample, ShardVideo};
 use super::take::{ImportedTake, TakeOutcome};
 use super::write::{ImportOutcome, ImportPlan};
 use crate::bones::{VideoBones, of_speaker};
@@ -19,11 +19,12 @@ use orator_base::motion::bones;
 use orator_base::stage::fingerprint::hash_file;
 use orator_base::stage::ledger::{Kept, Ledger, Refused, TranscriptAccount, WordCount};
 use orator_base::stage::refusal::{FrameRefusal, Refusal};
+use orator_base::text::number;
 use orator_formats::joints_description::path_of;
 use orator_formats::mocap::bvh;
 use std::path::{Path, PathBuf};
 
-/// Median shift of a take's joints by fixing the bone lengths, mm, above which a remark is given.
+/// Median shift of a take's joints by fixing the bone lengths, mm, above which a note is given.
 const NOTABLE_SHIFT_MM: f64 = 5.0;
 
 /// Item to import.
@@ -32,7 +33,7 @@ pub enum ImportItem {
     Take(TakeFiles),
     /// Dataset folder, and the name of a video in it.
     Part(PathBuf, String),
-    Loose(LooseVideo),
+    ShardVideo(ShardVideo),
     /// Unreadable file that looks like motion, with the reason.
     Unknown(PathBuf, String),
 }
@@ -46,7 +47,7 @@ pub struct InspectedItem {
     /// Sound fingerprint codes; `None`: no sound, or the codes are already written.
     pub codes: Option<Vec<u32>>,
     /// Remark for the user on an accepted take; may be empty.
-    pub remark: String,
+    pub note: String,
     /// BLAKE3 of the written sound codes.
     pub sound: Option<String>,
 }
@@ -62,7 +63,7 @@ impl ImportItem {
             }
         }
         let loose = shards::open(&sources.tars);
-        items.extend(loose.videos.into_iter().map(Self::Loose));
+        items.extend(loose.videos.into_iter().map(Self::ShardVideo));
         let unknown = loose.failed.into_iter().chain(sources.unknown.iter().cloned());
         items.extend(unknown.map(|(path, why)| Self::Unknown(path, why)));
         (items, loose.notes)
@@ -73,7 +74,7 @@ impl ImportItem {
         match self {
             Self::Take(TakeFiles { motion: path, .. }) | Self::Unknown(path, _) => path.display().to_string(),
             Self::Part(dir, name) => format!("{} of {}", name, dir.display()),
-            Self::Loose(video) => video.name.clone(),
+            Self::ShardVideo(video) => video.name.clone(),
         }
     }
 
@@ -84,7 +85,7 @@ impl ImportItem {
                 [Some(&found.motion), found.sound.as_ref(), found.transcript.as_ref()].into_iter().flatten().collect()
             }
             Self::Part(path, _) | Self::Unknown(path, _) => vec![path],
-            Self::Loose(video) => video.tars(),
+            Self::ShardVideo(video) => video.tars(),
         };
         let folders = files.into_iter().filter_map(|path| path.parent()).map(|dir| dir.display().to_string());
         let mut folders: Vec<String> = folders.filter(|dir| !dir.is_empty()).collect();
@@ -98,7 +99,7 @@ impl ImportItem {
         let inspected = match self {
             Self::Take(found) => inspect_take(found, plan),
             Self::Part(dir, name) => inspect_entry(dir, name, plan),
-            Self::Loose(video) => inspect_loose(video, plan),
+            Self::ShardVideo(video) => inspect_shard_video(video, plan),
             Self::Unknown(_, why) => Err(anyhow::anyhow!("{why}")),
         };
         inspected.unwrap_or_else(|error| self.failed(&format!("{error:#}")))
@@ -108,7 +109,7 @@ impl ImportItem {
         let (path, name) = match self {
             Self::Take(TakeFiles { motion: path, .. }) | Self::Unknown(path, _) => (path.clone(), None),
             Self::Part(dir, name) => (dir.clone(), Some(name.clone())),
-            Self::Loose(video) => (PathBuf::from(&video.name), Some(video.name.clone())),
+            Self::ShardVideo(video) => (PathBuf::from(&video.name), Some(video.name.clone())),
         };
         // Local folder names must not end up in the dataset.
         let error = self.folders().iter().fold(error.to_owned(), |error, dir| error.replace(&format!("{dir}/"), ""));
@@ -137,7 +138,7 @@ impl ImportItem {
         out: &Path,
     ) -> Result<()> {
         let source = inspected.source.clone();
-        let assignment = inspected.split.clone().filter(|_| inspected.is_kept());
+        let assignment = inspected.split.clone().filter(|_| inspected.is_accepted());
         if let (Self::Part(dir, name), Some(_)) = (self, &assignment) {
             return VideoEntry::read(&VideoEntry::path(dir, name))?.link_into(dir, out);
         }
@@ -151,15 +152,15 @@ impl ImportItem {
         };
         match self {
             Self::Take(found) => {
-                let TakeOutcome::Kept(kept) = ImportedTake::read(found, &plan.limits)?.outcome else {
+                let TakeOutcome::Accepted(kept) = ImportedTake::read(found, &plan.limits)?.outcome else {
                     anyhow::bail!("{} changed while it was imported", found.motion.display());
                 };
                 entry.push(&kept.sample, 0.0)?;
             }
-            Self::Loose(video) => {
-                for loose_sample in &video.samples {
-                    let (sample, json) = loose_sample.read()?;
-                    let split = whole.or(loose_sample.split()).unwrap_or(Split::Train);
+            Self::ShardVideo(video) => {
+                for shard_sample in &video.samples {
+                    let (sample, json) = shard_sample.read()?;
+                    let split = whole.or(shard_sample.split()).unwrap_or(Split::Train);
                     entry.push_with_json(split, &sample, json)?;
                 }
             }
@@ -177,16 +178,16 @@ fn inspect_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
         name: take.name,
         file: file_name(&found.motion),
         content: take.content,
-        made_from: made_from(found, plan)?,
+        inputs_hash: inputs_hash(found, plan)?,
         ledger: Ledger { duration_secs, ..Ledger::default() },
         ..VideoSource::default()
     };
     match take.outcome {
-        TakeOutcome::Refused(refusal) => {
+        TakeOutcome::Rejected(refusal) => {
             source.ledger.refused.push(Refused::with_message(0.0, duration_secs, refusal.why, refusal.message));
             Ok(InspectedItem { source, ..InspectedItem::default() })
         }
-        TakeOutcome::Kept(kept) => {
+        TakeOutcome::Accepted(kept) => {
             let n_frames = kept.sample.n_frames();
             let end_secs = plan.limits.fps.secs(n_frames);
             source.ledger.kept.push(Kept { start_secs: 0.0, end_secs });
@@ -196,25 +197,26 @@ fn inspect_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
             }
             source.bones = VideoBones { lengths_metres: kept.lengths.map(f64::from).to_vec(), n_frames };
             let bones = match kept.moved_mm {
-                moved_mm if moved_mm > NOTABLE_SHIFT_MM => {
-                    Some(format!("its bones vary: one length each moved its joints by {moved_mm} mm (median)"))
-                }
+                moved_mm if moved_mm > NOTABLE_SHIFT_MM => Some(format!(
+                    "bone lengths vary: making them constant moved the joints by {} mm (median)",
+                    number(moved_mm)
+                )),
                 _ => None,
             };
             source.ledger.words = kept.words;
             let notes = source.ledger.words.iter().flat_map(|words| words.notes.iter().cloned());
             let unit = kept.sample.meta["imported"].as_object().and_then(bvh::unit_note);
-            let remark = unit.into_iter().chain(bones).chain(notes).collect::<Vec<_>>().join("; ");
+            let note = unit.into_iter().chain(bones).chain(notes).collect::<Vec<_>>().join("; ");
             let mut fingerprinter = Fingerprinter::default();
             fingerprinter.push(&kept.sample.sound.samples);
             let codes = (!plan.limits.no_sound).then(|| fingerprinter.finish());
-            Ok(InspectedItem { source, codes, remark, ..InspectedItem::default() })
+            Ok(InspectedItem { source, codes, note, ..InspectedItem::default() })
         }
     }
 }
 
 /// Hash of the files and settings that determine the sample.
-fn made_from(found: &TakeFiles, plan: &ImportPlan) -> Result<String> {
+fn inputs_hash(found: &TakeFiles, plan: &ImportPlan) -> Result<String> {
     let described = Some(path_of(&found.motion)).filter(|path| path.is_file());
     let files = [Some(&found.motion), found.sound.as_ref(), found.transcript.as_ref(), described.as_ref()];
     let hashes = files.into_iter().flatten().map(|path| hash_file(path)).collect::<Result<Vec<_>>>()?;
@@ -233,7 +235,7 @@ fn inspect_entry(dir: &Path, name: &str, plan: &ImportPlan) -> Result<InspectedI
     let fps = plan.limits.fps;
     ensure!(
         info.fps == fps,
-        "{} runs at {}, the dataset at {fps}: import it with the same --fps",
+        "{} has {}, the dataset {fps}: set --fps to the rate of the source",
         dir.display(),
         info.fps
     );
@@ -241,15 +243,15 @@ fn inspect_entry(dir: &Path, name: &str, plan: &ImportPlan) -> Result<InspectedI
     let entry = VideoEntry::read(&VideoEntry::path(dir, name))?;
     ensure!(
         entry.is_intact(dir, &entry::stated_hashes(dir)),
-        "{name}: its files are not what was written; orator dataset verify says what is wrong"
+        "{name}: its files do not match their checksums; `orator dataset verify` lists them"
     );
     let codes = entry.codes(dir)?;
     let split = match entry.split {
         Some(split) => Some(Assignment::In(split, entry.split_by.clone())),
         None => Some(Assignment::Blocks(entry.blocks.clone())).filter(|_| !entry.samples.is_empty()),
     };
-    let VideoEntry { name, file, content, made_from, ledger, bones, failure, .. } = entry;
-    let source = VideoSource { name: name.to_string(), file, content, made_from, ledger, bones, failure };
+    let VideoEntry { name, file, content, inputs_hash, ledger, bones, failure, .. } = entry;
+    let source = VideoSource { name: name.to_string(), file, content, inputs_hash, ledger, bones, failure };
     Ok(InspectedItem {
         source,
         split,
@@ -258,7 +260,7 @@ fn inspect_entry(dir: &Path, name: &str, plan: &ImportPlan) -> Result<InspectedI
     })
 }
 
-fn inspect_loose(video: &LooseVideo, plan: &ImportPlan) -> Result<InspectedItem> {
+fn inspect_shard_video(video: &ShardVideo, plan: &ImportPlan) -> Result<InspectedItem> {
     entry::check_name(&video.name)?;
     let fps = plan.limits.fps;
     let (mut spans, mut bone_sets, mut fingerprinter) =
@@ -266,15 +268,15 @@ fn inspect_loose(video: &LooseVideo, plan: &ImportPlan) -> Result<InspectedItem>
     let mut blocks: Vec<TimeBlock> = Vec::new();
     let mut content = String::new();
     let mut words: Option<TranscriptAccount> = None;
-    for loose_sample in &video.samples {
-        let (sample, _) = loose_sample.read()?;
+    for shard_sample in &video.samples {
+        let (sample, _) = shard_sample.read()?;
         let (key, own_fps) = (&sample.key, sample.motion.fps);
-        ensure!(own_fps == fps, "{key} runs at {own_fps}, the dataset at {fps}: import it with the same --fps");
+        ensure!(own_fps == fps, "{key} has {own_fps}, the dataset {fps}: set --fps to the rate of the source");
         let n_frames = sample.n_frames();
         let start = sample.meta["start_secs"].as_f64().unwrap_or(0.0);
         let start_secs = spans.last().map_or(start, |(before, secs)| start.max(before + secs));
         let end_secs = start_secs + fps.secs(n_frames);
-        blocks.push(TimeBlock { split: loose_sample.split().or(Some(Split::Train)), start_secs, end_secs });
+        blocks.push(TimeBlock { split: shard_sample.split().or(Some(Split::Train)), start_secs, end_secs });
         spans.push((start, fps.secs(n_frames)));
         bone_sets.push(VideoBones { lengths_metres: bones::measure(&sample.motion).map(f64::from).to_vec(), n_frames });
         fingerprinter.push(&sample.sound.samples);
@@ -297,7 +299,7 @@ fn inspect_loose(video: &LooseVideo, plan: &ImportPlan) -> Result<InspectedItem>
         },
         ..VideoSource::default()
     };
-    let mut named_splits: Vec<Option<Split>> = video.samples.iter().map(LooseSample::split).collect();
+    let mut named_splits: Vec<Option<Split>> = video.samples.iter().map(ShardSample::split).collect();
     named_splits.sort();
     named_splits.dedup();
     let split = match named_splits.as_slice() {
@@ -310,12 +312,12 @@ fn inspect_loose(video: &LooseVideo, plan: &ImportPlan) -> Result<InspectedItem>
 
 impl InspectedItem {
     /// Whether the item has a sample to write.
-    pub fn is_kept(&self) -> bool {
+    pub fn is_accepted(&self) -> bool {
         !self.source.ledger.kept.is_empty() && self.source.failure.is_none()
     }
 
     /// Refuses an item whose name another item already has.
-    pub fn refuse_duplicate_name(mut self) -> Self {
+    pub fn reject_duplicate_name(mut self) -> Self {
         let message = format!("{} is there already", self.source.name);
         self.refuse(self.source.ledger.kept_secs(), 0.0, &message);
         self
@@ -330,7 +332,7 @@ impl InspectedItem {
     }
 
     /// Refuses an item that shares sound with videos in different splits.
-    pub fn refuse_shared(&mut self, with: &[SharedSound], threshold: f64) {
+    pub fn reject_shared(&mut self, with: &[SharedSound], threshold: f64) {
         let name = self.source.name.clone();
         let others: Vec<&str> = with.iter().filter_map(|shared| shared.other(&name)).collect();
         let secs = with.first().map_or(0.0, |shared| shared.secs);
@@ -352,12 +354,12 @@ impl InspectedItem {
 
     /// Outcome of the item.
     pub fn line(&self, file: &str) -> ImportOutcome {
-        let (ended, reason, message) = match (&self.source.failure, self.source.ledger.refused.first()) {
+        let (outcome, reason, message) = match (&self.source.failure, self.source.ledger.refused.first()) {
             (Some(error), _) => ("failed", "error".to_owned(), error.clone()),
-            (None, _) if self.is_kept() => ("kept", String::new(), self.remark.clone()),
+            (None, _) if self.is_accepted() => ("kept", String::new(), self.note.clone()),
             (None, Some(refused)) => ("refused", refused.reason.clone(), refused.message.clone()),
-            (None, None) => ("refused", "empty".to_owned(), "it holds nothing".to_owned()),
+            (None, None) => ("refused", "empty".to_owned(), "it is empty".to_owned()),
         };
-        ImportOutcome { file: file.to_owned(), ended, kept_secs: self.source.ledger.kept_secs(), reason, message }
+        ImportOutcome { file: file.to_owned(), outcome, accepted_secs: self.source.ledger.kept_secs(), reason, message }
     }
 }

@@ -30,7 +30,7 @@ pub struct TakeLimits {
     /// Minimum length of a take, in frames of the dataset.
     pub min_frames: usize,
     /// Largest difference between the lengths of sound and motion, seconds.
-    pub max_apart_secs: f64,
+    pub max_difference_secs: f64,
     /// Whether sound files are ignored and every take gets silence.
     pub no_sound: bool,
 }
@@ -50,13 +50,13 @@ pub struct ImportedTake {
 /// Outcome of a take.
 #[derive(Clone, Debug)]
 pub enum TakeOutcome {
-    Kept(Box<KeptTake>),
-    Refused(TakeRefusal),
+    Accepted(Box<AcceptedTake>),
+    Rejected(TakeRejection),
 }
 
 /// Accepted take.
 #[derive(Clone, Debug)]
-pub struct KeptTake {
+pub struct AcceptedTake {
     /// Median shift of the joints by fixing the bone lengths, mm.
     pub moved_mm: f64,
     pub sample: Sample,
@@ -68,13 +68,13 @@ pub struct KeptTake {
 
 /// Reason for refusing a take.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TakeRefusal {
+pub struct TakeRejection {
     pub why: FrameRefusal,
     /// Sentence shown to the user.
     pub message: String,
 }
 
-impl TakeRefusal {
+impl TakeRejection {
     /// Refusal with the standard message of `refusal`.
     pub fn new(refusal: Refusal, measured: f64, threshold: f64) -> Self {
         let message = refusal.message(measured, threshold);
@@ -103,42 +103,44 @@ impl ImportedTake {
             None => None,
         };
         let outcome = match (refusal(n_frames, sound.as_ref(), found, limits), sound) {
-            (None, Some(sound)) => TakeOutcome::Kept(Box::new(to_kept(&name, found, &captured, motion, sound)?)),
-            (refusal, _) => TakeOutcome::Refused(refusal.unwrap_or_else(|| no_sound(found))),
+            (None, Some(sound)) => {
+                TakeOutcome::Accepted(Box::new(to_accepted(&name, found, &captured, motion, sound)?))
+            }
+            (refusal, _) => TakeOutcome::Rejected(refusal.unwrap_or_else(|| no_sound(found))),
         };
         Ok(Self { name, content, n_frames, outcome })
     }
 }
 
-fn refusal(n_frames: usize, sound: Option<&Sound>, found: &TakeFiles, limits: &TakeLimits) -> Option<TakeRefusal> {
+fn refusal(n_frames: usize, sound: Option<&Sound>, found: &TakeFiles, limits: &TakeLimits) -> Option<TakeRejection> {
     let stem = found.motion.file_stem().unwrap_or_default().to_string_lossy();
     if found.kind == MotionKind::Authors && stem.starts_with("prediction") {
-        return Some(TakeRefusal::new(Refusal::Prediction, 0.0, 0.0));
+        return Some(TakeRejection::new(Refusal::Prediction, 0.0, 0.0));
     }
     let Some(sound) = sound else { return Some(no_sound(found)) };
     let (motion_secs, sound_secs) = (limits.fps.secs(n_frames), sound.secs());
     let difference_secs = sound_secs - motion_secs;
-    if difference_secs.abs() > limits.max_apart_secs {
-        return Some(TakeRefusal {
-            why: FrameRefusal::new(Refusal::LengthMismatch, difference_secs.abs(), limits.max_apart_secs),
+    if difference_secs.abs() > limits.max_difference_secs {
+        return Some(TakeRejection {
+            why: FrameRefusal::new(Refusal::LengthMismatch, difference_secs.abs(), limits.max_difference_secs),
             message: format!(
                 "the sound has {sound_secs:.3} s, the motion {motion_secs:.3} s: {:.3} s apart, at most {} s are believed",
                 difference_secs.abs(),
-                limits.max_apart_secs
+                limits.max_difference_secs
             ),
         });
     }
     let n_common = n_common(n_frames, sound, limits.fps);
     (n_common < limits.min_frames)
-        .then(|| TakeRefusal::new(Refusal::FewFrames, n_common as f64, limits.min_frames as f64))
+        .then(|| TakeRejection::new(Refusal::FewFrames, n_common as f64, limits.min_frames as f64))
 }
 
-fn no_sound(found: &TakeFiles) -> TakeRefusal {
+fn no_sound(found: &TakeFiles) -> TakeRejection {
     let message = match &found.sound {
         Some(sound) => format!("{} holds no sound", file_name(sound)),
         None => format!("no sound file has the name of {}", file_name(&found.motion)),
     };
-    TakeRefusal { why: FrameRefusal::new(Refusal::NoSoundFile, 0.0, 0.0), message }
+    TakeRejection { why: FrameRefusal::new(Refusal::NoSoundFile, 0.0, 0.0), message }
 }
 
 /// Number of frames of the motion that lie completely within the sound.
@@ -146,13 +148,13 @@ fn n_common(n_frames: usize, sound: &Sound, fps: FrameRate) -> usize {
     n_frames.min((sound.secs() * fps.per_sec() + 1e-6).floor() as usize)
 }
 
-fn to_kept(
+fn to_accepted(
     name: &str,
     found: &TakeFiles,
     captured: &CapturedMotion,
     mut motion: Motion,
     mut sound: Sound,
-) -> Result<KeptTake> {
+) -> Result<AcceptedTake> {
     let (fps, n_before) = (motion.fps, motion.n_frames());
     let lengths = bones::measure(&captured.motion);
     let n_frames = n_common(n_before, &sound, fps);
@@ -208,8 +210,8 @@ fn to_kept(
     let key = format!("{name}-{:06}", 0);
     let in_sample = video_words.map(|words| words.within(0.0, end_secs));
     let sample = Sample { key, motion, pose2d, sound, words: in_sample, posture: None, meta };
-    sample.members().with_context(|| format!("{} makes no sample", found.motion.display()))?;
-    Ok(KeptTake { moved_mm: moved[0], sample, words, lengths })
+    sample.members().with_context(|| format!("cannot create a sample from {}", found.motion.display()))?;
+    Ok(AcceptedTake { moved_mm: moved[0], sample, words, lengths })
 }
 
 /// Shift of the joints between `before` and `after`: median and maximum, mm, rounded to 0.01.

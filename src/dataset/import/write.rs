@@ -55,16 +55,16 @@ pub fn import(plan: &ImportPlan, out: &Path, progress: &dyn Progress) -> Result<
         about.notes.push(NO_SOUND.to_owned());
     }
     let (items, left_out) = ImportItem::all(&sources);
-    let task = progress.begin("look", items.len() as u64);
+    let task = progress.begin("inspect", items.len() as u64);
     let mut names = BTreeSet::new();
     let mut inspected: Vec<InspectedItem> = Vec::new();
     for item in &items {
         task.detail(&item.file());
         let mut one = item.inspect(plan);
-        if one.is_kept() && !names.insert(one.source.name.clone()) {
-            one = one.refuse_duplicate_name();
+        if one.is_accepted() && !names.insert(one.source.name.clone()) {
+            one = one.reject_duplicate_name();
         }
-        if let (Some(codes), true) = (&one.codes, one.is_kept()) {
+        if let (Some(codes), true) = (&one.codes, one.is_accepted()) {
             one.sound = Some(entry::write_sound(out, &one.source.name, codes)?);
             one.codes = None;
         }
@@ -72,14 +72,14 @@ pub fn import(plan: &ImportPlan, out: &Path, progress: &dyn Progress) -> Result<
         task.advance(1);
     }
     drop(task);
-    // Accepted items keep their names; failed and refused ones are renamed if theirs is in use. The numbers are even,
+    // Accepted items keep their names; failed and rejected ones are renamed if theirs is in use. The numbers are even,
     // so that the names equal those of earlier versions.
-    for (nth, one) in inspected.iter_mut().enumerate().filter(|(_, one)| !one.is_kept()) {
+    for (nth, one) in inspected.iter_mut().enumerate().filter(|(_, one)| !one.is_accepted()) {
         while !names.insert(one.source.name.clone()) {
             one.rename(2 * nth);
         }
     }
-    let kept: Vec<usize> = (0..inspected.len()).filter(|&at| inspected[at].is_kept()).collect();
+    let kept: Vec<usize> = (0..inspected.len()).filter(|&at| inspected[at].is_accepted()).collect();
     ensure!(!kept.is_empty(), "nothing can be imported: {}", first_reasons(&items, &inspected));
     let compared = compare(&inspected, &kept, out, plan.dataset.duplicate_secs)?;
     for (&at, assigned) in kept.iter().zip(assign(&inspected, &kept, &compared, &plan.dataset)) {
@@ -87,7 +87,7 @@ pub fn import(plan: &ImportPlan, out: &Path, progress: &dyn Progress) -> Result<
             Assignment::In(..) | Assignment::Blocks(_) => inspected[at].split = Some(assigned),
             Assignment::Excluded(with) => {
                 entry::remove_sound(out, &inspected[at].source.name)?;
-                inspected[at].refuse_shared(&with, plan.dataset.duplicate_secs);
+                inspected[at].reject_shared(&with, plan.dataset.duplicate_secs);
             }
         }
     }
@@ -238,10 +238,9 @@ pub struct ImportPlan {
 pub struct ImportOutcome {
     pub file: String,
     /// One of `kept`, `refused`, `failed`.
-    pub ended: &'static str,
+    pub outcome: &'static str,
     /// Seconds in the dataset.
-    pub kept_secs: f64,
+    pub accepted_secs: f64,
     pub reason: String,
-    #[serde(rename = "says")]
     pub message: String,
 }

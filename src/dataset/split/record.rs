@@ -84,13 +84,13 @@ impl SplitRecord {
         let bytes = input::read(path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
         let damaged = || {
             format!(
-                "{} is damaged: it keeps every video in its split. Put it back from a copy, or remove it, and the \
-                 splits of the dataset that is there are taken over",
+                "{} is damaged. It records the split of every video: restore it from a backup, or delete it to use the \
+                 splits of the existing dataset",
                 path.display()
             )
         };
         let record: Self = serde_json::from_slice(&bytes).with_context(damaged)?;
-        ensure!(record.schema == SCHEMA, "{} has layout version {}", path.display(), record.schema);
+        ensure!(record.schema == SCHEMA, "{} has layout version {}, expected {SCHEMA}", path.display(), record.schema);
         ensure!(record.unit != SplitUnit::Auto, damaged());
         Ok(Some(record))
     }

@@ -18,7 +18,7 @@ pub fn check_blocks(entry: &VideoEntry, info: &DatasetInfo) -> Result<()> {
         return Ok(());
     }
     let rule = info.split_rule.as_ref().filter(|rule| rule.unit == SplitUnit::Time);
-    let rule = rule.context("it has samples in several splits, though the dataset is not divided by time")?;
+    let rule = rule.context("it has samples in several splits, but the dataset is not divided by time")?;
     let mut samples: Vec<(Range<usize>, Split, &str)> = Vec::new();
     for sample in &entry.samples {
         let first = sample.key.rsplit('-').next().and_then(|first| first.parse::<usize>().ok());
@@ -44,7 +44,7 @@ pub fn check_blocks(entry: &VideoEntry, info: &DatasetInfo) -> Result<()> {
         let gap_secs = info.fps.secs(next.start) - info.fps.secs(frames.end);
         ensure!(
             gap_secs >= rule.guard_secs - half_frame_secs,
-            "{key} ({}) and {other_key} ({}) are {gap_secs:.2} s apart, two splits must be {:.2} s apart",
+            "{key} ({}) and {other_key} ({}) are {gap_secs:.2} s apart, expected at least {:.2} s between splits",
             split.name(),
             other.name(),
             rule.guard_secs

@@ -26,7 +26,7 @@ pub fn check_sample(sample: &Sample, lengths: &[f64]) -> Result<()> {
             let position = at(joint);
             let finite = position.iter().all(|v| v.is_finite());
             ensure!(finite || position.iter().all(|v| v.is_nan()), "frame {t}: joint {joint} is {position:?}");
-            ensure!(finite || !mask[[t, joint]], "frame {t}: joint {joint} is missing, the mask says it was seen");
+            ensure!(finite || !mask[[t, joint]], "frame {t}: joint {joint} is missing, but visible in the mask");
             ensure!(!finite || position.iter().all(|v| v.abs() < 10.0), "frame {t}: joint {joint} is {position:?}");
             let (Some(parent), Some(&length)) =
                 (parent(joint), joint.checked_sub(1).and_then(|bone| lengths.get(bone)))

@@ -18,6 +18,7 @@ use orator_base::input;
 use orator_base::stage::fingerprint::hash_file;
 use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir::FolderLock;
+use orator_base::text::counted;
 use orator_base::types::time::FrameRate;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -30,7 +31,7 @@ use std::rc::Rc;
 pub struct DatasetProblem {
     /// Path in the dataset folder.
     pub file: String,
-    pub what: String,
+    pub message: String,
 }
 
 /// Result of a verification.
@@ -47,8 +48,8 @@ pub struct Verified {
 }
 
 impl Verified {
-    fn add_problem(&mut self, file: &str, what: impl Into<String>) {
-        self.problems.push(DatasetProblem { file: file.to_owned(), what: what.into() });
+    fn add_problem(&mut self, file: &str, message: impl Into<String>) {
+        self.problems.push(DatasetProblem { file: file.to_owned(), message: message.into() });
     }
 
     fn add_error(&mut self, file: &str, result: Result<()>) {
@@ -64,7 +65,7 @@ impl Verified {
 /// A folder that cannot be listed, is not a dataset, or is being written (`BusyFolder`).
 pub fn verify(dir: &Path, deep: bool, progress: &dyn Progress) -> Result<Verified> {
     let is_dataset = [INFO, CHECKSUMS].iter().any(|name| dir.join(name).exists());
-    ensure!(is_dataset, "{} is no dataset: it has neither {INFO} nor {CHECKSUMS}", dir.display());
+    ensure!(is_dataset, "{} is not a dataset: it has neither {INFO} nor {CHECKSUMS}", dir.display());
     let _lock = FolderLock::shared(dir)?;
     let mut found = Verified::default();
     let present = files_of(dir)?;
@@ -99,7 +100,7 @@ fn assemble_again(
         Ok(if name == CHECKSUMS { Box::new(SharedBuffer(written.clone())) } else { Box::new(std::io::sink()) })
     };
     assemble_into(dir, &info.about(), &leakage.compared(), &mut open)?;
-    let mut text = String::from_utf8(written.borrow().clone()).context("checksums are text")?;
+    let mut text = String::from_utf8(written.borrow().clone()).context("checksums are not UTF-8")?;
     if let Some(card) = card_line(dir)
         && let Some(now) = text.lines().find(|line| is_card(line)).map(str::to_owned)
     {
@@ -109,19 +110,19 @@ fn assemble_again(
         text.lines().filter_map(|line| line.split_once("  ")).map(|(hash, file)| (file.into(), hash.into())).collect();
     if present.contains_key(CHECKSUMS) {
         let stated =
-            input::read(dir.join(CHECKSUMS), input::MOST_TEXT).with_context(|| format!("reading {CHECKSUMS}"))?;
+            input::read(dir.join(CHECKSUMS), input::MOST_TEXT).with_context(|| format!("cannot read {CHECKSUMS}"))?;
         if stated != text.as_bytes() {
             let text_of = String::from_utf8_lossy(&stated).into_owned();
             let named = text_of.lines().filter_map(|line| line.split_once("  ")).map(|(_, file)| file);
             for file in named.filter(|file| !present.contains_key(*file)) {
-                found.add_problem(file, format!("it is missing ({CHECKSUMS} names it)"));
+                found.add_problem(file, format!("missing, but listed in {CHECKSUMS}"));
             }
             let stated: BTreeSet<&[u8]> = stated.split(|byte| *byte == b'\n').collect();
             let differing =
                 text.lines().filter(|line| !stated.contains(line.as_bytes())).filter_map(|line| line.split_once("  "));
             let differing: Vec<&str> = differing.map(|(_, file)| file).collect();
-            let files = if differing.is_empty() { "the form of its lines".to_owned() } else { differing.join(", ") };
-            found.add_problem(CHECKSUMS, format!("it does not agree with the videos' own files about {files}"));
+            let files = if differing.is_empty() { "the format of its lines".to_owned() } else { differing.join(", ") };
+            found.add_problem(CHECKSUMS, format!("differs from the files of the videos in {files}"));
         }
     }
     Ok(expected)
@@ -157,10 +158,10 @@ impl Write for SharedBuffer {
 /// Checks that exactly the listed files exist.
 fn check_files(present: &BTreeMap<String, u64>, expected: &BTreeMap<String, String>, found: &mut Verified) {
     for file in expected.keys().map(String::as_str).chain([CHECKSUMS]).filter(|file| !present.contains_key(*file)) {
-        found.add_problem(file, "it is missing");
+        found.add_problem(file, "missing");
     }
     for file in present.keys().filter(|file| !expected.contains_key(*file) && *file != CHECKSUMS) {
-        found.add_problem(file, "it does not belong to the dataset");
+        found.add_problem(file, "not part of the dataset");
     }
 }
 
@@ -184,11 +185,12 @@ fn check_videos(dir: &Path, found: &mut Verified) -> Result<()> {
         for shard in &entry.shards {
             let bytes = std::fs::metadata(dir.join(&shard.file)).map_or(0, |meta| meta.len());
             if bytes != shard.bytes {
-                found.add_problem(&shard.file, format!("it has {bytes} bytes, {} were written", shard.bytes));
+                found.add_problem(&shard.file, format!("{bytes} bytes, expected {}", shard.bytes));
             }
             let n_samples = entry.samples.iter().filter(|sample| sample.shard == shard.file).count();
             if n_samples != shard.n_samples {
-                found.add_problem(&file, format!("{n_samples} samples of {} in {}", shard.n_samples, shard.file));
+                found
+                    .add_problem(&file, format!("{n_samples} samples in {}, expected {}", shard.file, shard.n_samples));
             }
         }
         for sample in &entry.samples {
@@ -196,7 +198,7 @@ fn check_videos(dir: &Path, found: &mut Verified) -> Result<()> {
             let same_split = entry.split.is_none_or(|split| split == sample.split);
             let same_split = same_split && sample.shard.starts_with(sample.split.name());
             if !in_shard || !same_split || !sample.key.starts_with(&name) || !keys.insert(sample.key.clone()) {
-                found.add_problem(&file, format!("the place of the sample {} cannot be", sample.key));
+                found.add_problem(&file, format!("invalid key, split or shard of the sample {}", sample.key));
             }
         }
         found.add_error(&file, check_ledger(&entry, fps));
@@ -211,17 +213,17 @@ fn check_videos(dir: &Path, found: &mut Verified) -> Result<()> {
 fn check_ledger(entry: &VideoEntry, fps: FrameRate) -> Result<()> {
     let ledger = &entry.ledger;
     let unknown = ledger.duration_secs == 0.0 && entry.failure.is_some();
-    ensure!(ledger.is_whole() || unknown, "its ledger does not fill {} s end to end", ledger.duration_secs);
+    ensure!(ledger.is_whole() || unknown, "its ledger does not cover {:.3} s without gaps", ledger.duration_secs);
     let frames: usize = entry.samples.iter().map(|sample| sample.n_frames).sum();
     let deviation = (ledger.kept_secs() - fps.secs(frames)).abs();
     let allowed = fps.secs(1) * entry.samples.len().max(1) as f64 + 1e-6;
     ensure!(
         deviation <= allowed && ledger.kept.len() == entry.samples.len(),
-        "its ledger keeps {:.3} s in {} stretches, its samples hold {:.3} s in {}",
+        "its ledger accepts {:.3} s in {}, its samples have {:.3} s in {}",
         ledger.kept_secs(),
-        ledger.kept.len(),
+        counted(ledger.kept.len(), "interval"),
         fps.secs(frames),
-        entry.samples.len()
+        counted(entry.samples.len(), "sample")
     );
     Ok(())
 }
@@ -229,7 +231,7 @@ fn check_ledger(entry: &VideoEntry, fps: FrameRate) -> Result<()> {
 /// Checks that the ledger of a video accounts for every word of its transcript.
 fn check_word_counts(entry: &VideoEntry) -> Result<()> {
     let has_words = entry.samples.iter().any(|sample| sample.words.is_some());
-    ensure!(entry.ledger.words.is_some() || !has_words, "its samples have words, its ledger none");
+    ensure!(entry.ledger.words.is_some() || !has_words, "its samples have words, its ledger has none");
     let is_whole = entry.ledger.words.as_ref().is_none_or(|words| words.count.is_whole());
     ensure!(is_whole, "its ledger does not account for every word of the transcript");
     Ok(())
@@ -252,8 +254,8 @@ fn check_hashes(
             found.bytes += std::fs::metadata(&path).map_or(0, |meta| meta.len());
             match hash_file(&path) {
                 Ok(now) if now == *hash => {}
-                Ok(_) if is_large => found.add_problem(file, "its hash is not the one written"),
-                Ok(_) => found.add_problem(file, "it is not what the videos' own files add up to"),
+                Ok(_) if is_large => found.add_problem(file, "wrong hash"),
+                Ok(_) => found.add_problem(file, "does not match the files of the videos"),
                 Err(error) => found.add_problem(file, format!("{error:#}")),
             }
         }
@@ -280,7 +282,10 @@ fn check_samples(dir: &Path, found: &mut Verified, progress: &dyn Progress) {
         let n_kept = entry.ledger.words.as_ref().map_or(0, |words| words.count.n_kept);
         if n_words != n_kept {
             let file = format!("{}/{name}.json", entry::FOLDER);
-            found.add_problem(&file, format!("its ledger keeps {n_kept} words, its samples hold {n_words}"));
+            found.add_problem(
+                &file,
+                format!("its ledger counts {n_kept} words in samples, the samples contain {n_words}"),
+            );
         }
     }
 }
@@ -290,7 +295,7 @@ fn files_of(dir: &Path) -> Result<BTreeMap<String, u64>> {
     let mut files = BTreeMap::new();
     let mut folders = vec![(dir.to_owned(), String::new())];
     while let Some((folder, prefix)) = folders.pop() {
-        let listing = || format!("listing the folder {}", folder.display());
+        let listing = || format!("cannot list the folder {}", folder.display());
         for entry in std::fs::read_dir(&folder).with_context(listing)? {
             let entry = entry.with_context(listing)?;
             let name = format!("{prefix}{}", entry.file_name().to_string_lossy());

@@ -42,7 +42,7 @@ pub type FileFactory<'a> = dyn FnMut(&str) -> Result<Box<dyn Write>> + 'a;
 pub fn assemble(dir: &Path, about: &About, compared: &SoundComparison) -> Result<(DatasetInfo, DatasetStats)> {
     assemble_into(dir, about, compared, &mut |name| {
         let path = dir.join(name);
-        let file = File::create(&path).with_context(|| format!("writing {}", path.display()))?;
+        let file = File::create(&path).with_context(|| format!("cannot write {}", path.display()))?;
         Ok(Box::new(BufWriter::new(file)))
     })
 }

@@ -34,7 +34,8 @@ pub struct VideoEntry {
     /// BLAKE3 of the video file; empty if it could not be read.
     pub content: String,
     /// BLAKE3 of everything the shards depend on; shards with an equal hash are reused.
-    pub made_from: String,
+    #[serde(rename = "made_from")]
+    pub inputs_hash: String,
     /// Split; `None`: no samples, or samples in several splits (`blocks`).
     pub split: Option<Split>,
     /// Reason for the split.
@@ -67,7 +68,7 @@ pub struct VideoSource {
     pub name: String,
     pub file: String,
     pub content: String,
-    pub made_from: String,
+    pub inputs_hash: String,
     pub ledger: Ledger,
     pub bones: VideoBones,
     pub failure: Option<String>,
@@ -95,18 +96,18 @@ impl EntryWriter {
         split_by: SplitBy,
         max_shard_bytes: u64,
     ) -> Result<Self> {
-        let VideoSource { name, file, content, made_from, ledger, bones, failure } = source;
+        let VideoSource { name, file, content, inputs_hash, ledger, bones, failure } = source;
         check_name(&name)?;
         ensure!(
             !VideoEntry::path(dir, &name).exists(),
-            "two videos would be called {name} in the dataset; rename the file {file} or leave it out"
+            "duplicate video name {name} in the dataset: rename or exclude the file {file}"
         );
         let entry = VideoEntry {
             schema: crate::SCHEMA,
             name: FileName::new(name)?,
             file,
             content,
-            made_from,
+            inputs_hash,
             split,
             split_by,
             blocks: Vec::new(),
@@ -149,7 +150,11 @@ impl EntryWriter {
 
     fn push_members(&mut self, split: Split, sample: &Sample, members: &[Vec<u8>; 5]) -> Result<()> {
         let name = &self.entry.name;
-        ensure!(sample.key.starts_with(&**name), "the key {} does not begin with its video's name {name}", sample.key);
+        ensure!(
+            sample.key.starts_with(&**name),
+            "the key {} does not start with the name of its video, {name}",
+            sample.key
+        );
         let (dir, max_bytes) = (&self.dir, self.max_shard_bytes);
         let shards = self.shards.entry(split).or_insert_with(|| ShardWriter::new(dir, name, split, max_bytes));
         shards.push_members(sample, members)?;
@@ -176,7 +181,7 @@ impl EntryWriter {
         }
         self.entry.split = self.entry.split.filter(|_| !self.entry.samples.is_empty());
         let folder = self.dir.join(FOLDER);
-        fs::create_dir_all(&folder).with_context(|| format!("making the folder {}", folder.display()))?;
+        fs::create_dir_all(&folder).with_context(|| format!("cannot create the folder {}", folder.display()))?;
         self.entry.sound = sound;
         self.entry.write(&self.dir)?;
         Ok(self.entry)
@@ -195,9 +200,15 @@ impl VideoEntry {
     /// An unreadable file, another layout version, another video's name or shards, values out of range.
     pub fn read(path: &Path) -> Result<Self> {
         let entry: Self = read_json(path)?;
-        ensure!(entry.schema == crate::SCHEMA, "{} has layout version {}", path.display(), entry.schema);
+        ensure!(
+            entry.schema == crate::SCHEMA,
+            "{} has layout version {}, expected {}",
+            path.display(),
+            entry.schema,
+            crate::SCHEMA
+        );
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        ensure!(entry.name == *stem, "{} speaks of the video {:?}", path.display(), entry.name);
+        ensure!(entry.name == *stem, "{} describes another video, {:?}", path.display(), entry.name);
         let is_of_video = |shard: &&ShardRef| {
             let rest = Split::ALL.iter().find_map(|split| shard.file.strip_prefix(split.name())?.strip_prefix('-'));
             rest.is_some_and(|rest| rest.starts_with(&*entry.name) && rest.strip_suffix(".tar").is_some())
@@ -209,14 +220,14 @@ impl VideoEntry {
         let silence = entry.padded_sound_secs;
         ensure!(silence >= 0.0, "{}: `padded_sound_secs` is {silence}, expected 0 or more", path.display());
         if let Some(other) = entry.shards.iter().find(|shard| !is_of_video(shard)) {
-            bail!("{} names the shard {}, which is none of its video's", path.display(), other.file);
+            bail!("{} lists the shard {}, which belongs to another video", path.display(), other.file);
         }
         Ok(entry)
     }
 
     fn write(&self, dir: &Path) -> Result<()> {
         let path = Self::path(dir, &self.name);
-        fs::write(&path, pretty(self)?).with_context(|| format!("writing {}", path.display()))
+        fs::write(&path, pretty(self)?).with_context(|| format!("cannot write {}", path.display()))
     }
 
     /// Reads the sound codes from the dataset in `dir`; empty without sound.
@@ -247,7 +258,7 @@ impl VideoEntry {
     /// Links this video's files from the dataset in `from` into the one in `to`, or copies them where hard links fail;
     /// existing files are kept.
     pub fn link_into(&self, from: &Path, to: &Path) -> Result<()> {
-        fs::create_dir_all(to.join(FOLDER)).with_context(|| format!("making {}", to.join(FOLDER).display()))?;
+        fs::create_dir_all(to.join(FOLDER)).with_context(|| format!("cannot create {}", to.join(FOLDER).display()))?;
         let json = format!("{FOLDER}/{}.json", self.name);
         for file in self.files().into_iter().map(|(file, _)| file).chain([json]) {
             let (old, new) = (from.join(&file), to.join(&file));
@@ -256,7 +267,7 @@ impl VideoEntry {
             }
             fs::hard_link(&old, &new)
                 .or_else(|_| fs::copy(&old, &new).map(|_| ()))
-                .with_context(|| format!("taking over {}", old.display()))?;
+                .with_context(|| format!("cannot link or copy {}", old.display()))?;
         }
         Ok(())
     }
@@ -281,7 +292,7 @@ pub fn check_name(name: &str) -> Result<()> {
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '_';
     ensure!(
         !name.is_empty() && name.len() <= 64 && name.chars().all(plain),
-        "{name:?} is no name of a video in a dataset: expected 1 to 64 of a-z, 0-9, - and _"
+        "invalid video name {name:?}: expected 1 to 64 of a-z, 0-9, - and _"
     );
     Ok(())
 }
@@ -289,10 +300,10 @@ pub fn check_name(name: &str) -> Result<()> {
 /// Names of the videos of the dataset in `dir`, sorted.
 pub fn names(dir: &Path) -> Result<Vec<String>> {
     let folder = dir.join(FOLDER);
-    let entries = fs::read_dir(&folder).with_context(|| format!("reading the folder {}", folder.display()))?;
+    let entries = fs::read_dir(&folder).with_context(|| format!("cannot list the folder {}", folder.display()))?;
     let mut names = Vec::new();
     for entry in entries {
-        let file = entry.with_context(|| format!("reading the folder {}", folder.display()))?.file_name();
+        let file = entry.with_context(|| format!("cannot list the folder {}", folder.display()))?.file_name();
         names.extend(file.to_string_lossy().strip_suffix(".json").map(str::to_owned));
     }
     names.sort();
@@ -304,22 +315,22 @@ pub fn write_sound(dir: &Path, name: &str, codes: &[u32]) -> Result<String> {
     let bytes: Vec<u8> = codes.iter().flat_map(|code| code.to_le_bytes()).collect();
     let path = sound_path(dir, name);
     let written = fs::create_dir_all(dir.join(FOLDER)).and_then(|()| fs::write(&path, &bytes));
-    written.with_context(|| format!("writing {}", path.display()))?;
+    written.with_context(|| format!("cannot write {}", path.display()))?;
     Ok(blake3::hash(&bytes).to_hex().to_string())
 }
 
 /// Reads the sound codes of the video `name`.
 pub fn read_sound(dir: &Path, name: &str) -> Result<Vec<u32>> {
     let path = sound_path(dir, name);
-    let bytes = input::read(&path, input::MOST_TEXT).with_context(|| format!("reading {}", path.display()))?;
-    ensure!(bytes.len().is_multiple_of(4), "{} is cut off: run the dataset stage again with --force", path.display());
+    let bytes = input::read(&path, input::MOST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
+    ensure!(bytes.len().is_multiple_of(4), "{} is truncated: run the dataset stage again with --force", path.display());
     Ok(bytes.as_chunks::<4>().0.iter().map(|code| u32::from_le_bytes(*code)).collect())
 }
 
 /// Removes the sound codes of a video that is excluded.
 pub fn remove_sound(dir: &Path, name: &str) -> Result<()> {
     let path = sound_path(dir, name);
-    fs::remove_file(&path).with_context(|| format!("removing {}", path.display()))
+    fs::remove_file(&path).with_context(|| format!("cannot remove {}", path.display()))
 }
 
 fn sound_path(dir: &Path, name: &str) -> PathBuf {

@@ -60,7 +60,7 @@ impl ShardWriter {
         let open = match &mut self.open {
             Some(open) => open,
             None => {
-                let file = File::create(&path).with_context(|| format!("creating {}", path.display()))?;
+                let file = File::create(&path).with_context(|| format!("cannot create {}", path.display()))?;
                 let file = BufWriter::with_capacity(1 << 20, file);
                 self.open.insert(OpenShard { file, hasher: blake3::Hasher::new(), bytes: 0, n_samples: 0 })
             }
@@ -77,7 +77,7 @@ impl ShardWriter {
             *range = Some(ByteRange { offset: open.bytes + BLOCK as u64, size: member.len() as u64 });
             for chunk in [header.as_bytes().as_slice(), member, padding] {
                 hasher.update(chunk);
-                open.push(chunk).with_context(|| format!("writing {}", path.display()))?;
+                open.push(chunk).with_context(|| format!("cannot write {}", path.display()))?;
             }
         }
         open.n_samples += 1;
@@ -108,7 +108,7 @@ impl ShardWriter {
         let file = self.file_name()?;
         let written =
             open.push(&[0; 2 * BLOCK]).and_then(|()| open.file.into_inner().map_err(|error| error.into_error()));
-        let shard = written.with_context(|| format!("writing {}", self.dir.join(&file).display()))?;
+        let shard = written.with_context(|| format!("cannot write {}", self.dir.join(&file).display()))?;
         // All files are synced again when the folder is put in place; this thread only starts the disk writes early.
         drop(std::thread::spawn(move || shard.sync_all()));
         self.shards.push(ShardRef {

@@ -32,7 +32,7 @@ pub struct Division {
     /// Guard interval between two splits of a video, frames.
     pub guard_frames: usize,
     /// Least length of a sample that is cut from a block, frames.
-    pub least_frames: usize,
+    pub min_frames: usize,
 }
 
 /// Samples of a video divided into blocks, and the resulting ledger.
@@ -46,11 +46,11 @@ pub fn window_frames(settings: &Settings) -> usize {
     settings.gan.window_frames.max(WINDOW_FRAMES)
 }
 
-/// Guard interval in frames: a training window plus `reach_secs`, the context beside a sample that its joints depend
+/// Guard interval in frames: a training window plus `context_secs`, the context beside a sample that its joints depend
 /// on. Audio features have less context, and use only the sample's own audio.
-pub fn guard_frames(settings: &Settings, reach_secs: f64) -> usize {
-    let reach = reach_secs * settings.extract.rate().per_sec();
-    window_frames(settings) + reach.ceil() as usize + 1
+pub fn guard_frames(settings: &Settings, context_secs: f64) -> usize {
+    let context = context_secs * settings.extract.rate().per_sec();
+    window_frames(settings) + context.ceil() as usize + 1
 }
 
 /// Recorded splits: of the work folder, else of the existing dataset.
@@ -129,7 +129,7 @@ impl Division {
             validation: settings.validation,
             test: settings.test,
             guard_secs: fps.secs(self.guard_frames),
-            min_block_secs: fps.secs(MIN_WINDOWS * self.least_frames),
+            min_block_secs: fps.secs(MIN_WINDOWS * self.min_frames),
         };
         let assigned = assign(&unassigned.collect::<Vec<_>>(), shared, &plan);
         for (video, assignment) in videos.iter().zip(&assigned) {
@@ -153,8 +153,8 @@ impl Division {
         let fps = intervals.fps;
         ensure!(
             intervals.intervals.len() == ledger.kept.len(),
-            "a video has {} intervals and {} kept stretches in its ledger: run its stage lift again",
-            intervals.intervals.len(),
+            "a video has {}, but {} accepted in its ledger: run the stage lift again",
+            counted(intervals.intervals.len(), "interval"),
             ledger.kept.len()
         );
         let usable = blocks::usable(blocks, fps, intervals.n_frames, self.guard_frames);
@@ -163,7 +163,7 @@ impl Division {
             let mut at = kept.start_secs;
             for (split, block) in &usable {
                 let piece = Interval { start: interval.start.max(block.start), end: interval.end.min(block.end) };
-                if piece.n_frames() < self.least_frames.min(interval.n_frames()) {
+                if piece.n_frames() < self.min_frames.min(interval.n_frames()) {
                     continue;
                 }
                 // The ends of an interval are those of its ledger entry, where a partial last frame counts.

@@ -1,6 +1,6 @@
 //! Overview picture with one face per video; the videos of each person start a new row.
 
-use super::people::VideoPerson;
+use super::persons::VideoPerson;
 use anyhow::Result;
 use orator_base::stage::artifacts::Artifact;
 use orator_base::stage::workdir;

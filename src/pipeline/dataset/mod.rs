@@ -1,13 +1,13 @@
 //! Stage 5: the dataset of a speaker. `stage` -> `division` (assignment of videos or blocks to splits) -> `run`
-//! (writes one video after the other, read by `video`) -> `outcome`. `people` compares the persons in the videos,
+//! (writes one video after the other, read by `video`) -> `outcome`. `persons` compares the persons in the videos,
 //! `faces` draws them.
 
 pub mod division;
 pub mod faces;
 pub mod outcome;
-pub mod people;
+pub mod persons;
 pub mod run;
 pub mod stage;
 pub mod video;
 
-pub use stage::NothingKept;
+pub use stage::NothingAccepted;

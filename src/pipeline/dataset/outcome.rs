@@ -19,19 +19,19 @@ use std::path::{Path, PathBuf};
 /// Largest number of videos whose notes on words are listed.
 const MAX_NOTED: usize = 5;
 /// Largest number of persons, and of videos of each, that are named.
-const MAX_PEOPLE: usize = 6;
+const MAX_PERSONS: usize = 6;
 const MAX_FILES: usize = 3;
 
 /// Persons that the videos of one speaker appear to show.
 #[derive(Debug, Serialize)]
-pub struct SeveralPeople {
+pub struct SeveralPersons {
     /// Overview picture with one face per video.
     pub picture: PathBuf,
     /// File names of the videos of each person.
     pub videos: Vec<Vec<String>>,
 }
 
-impl SeveralPeople {
+impl SeveralPersons {
     /// Warning with what to do.
     fn warning(&self) -> String {
         let file_list = |files: &Vec<String>| {
@@ -39,12 +39,12 @@ impl SeveralPeople {
             let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
             format!("{}{rest}", files[..files.len().min(MAX_FILES)].join(", "))
         };
-        let people: Vec<String> = self.videos.iter().take(MAX_PEOPLE).map(file_list).collect();
+        let persons: Vec<String> = self.videos.iter().take(MAX_PERSONS).map(file_list).collect();
         format!(
-            "the videos seem to show {} people ({}): look at {}; a video of another person is left out by `exclude`, and \
-             where all are one person, `same_person = true` under [[speaker]] says so",
-            self.videos.len(),
-            people.join(" | "),
+            "the videos appear to show {} ({}): see {}. Leave out videos of another person with `exclude`; if all \
+             show one person, set `same_person = true` under [[speaker]]",
+            counted(self.videos.len(), "person"),
+            persons.join(" | "),
             self.picture.display()
         )
     }
@@ -58,8 +58,8 @@ pub struct DatasetOutcome<'a> {
     pub stats: &'a DatasetStats,
     pub n_failed: usize,
     pub n_left_out: usize,
-    pub n_taken_over: usize,
-    pub several_people: Option<SeveralPeople>,
+    pub n_reused: usize,
+    pub several_persons: Option<SeveralPersons>,
 }
 
 impl DatasetOutcome<'_> {
@@ -79,28 +79,28 @@ impl DatasetOutcome<'_> {
         let mut line = format!("{}; {n_windows} windows of 64 frames", Split::ALL.map(part).join(", "));
         let SplitRule { unit, why, guard_secs } = self.rule;
         let splits = match unit {
-            SplitUnit::Time => format!("; splits by time, {guard_secs:.1} s apart ({why})"),
-            SplitUnit::Video | SplitUnit::Auto => format!("; splits by video ({why})"),
+            SplitUnit::Time => format!("; split by time, {guard_secs:.1} s apart ({why})"),
+            SplitUnit::Video | SplitUnit::Auto => format!("; split by video ({why})"),
         };
         line += &splits;
-        if self.n_taken_over > 0 {
-            let _ = write!(line, "; {} taken over as they were", counted(self.n_taken_over, "video"));
+        if self.n_reused > 0 {
+            let _ = write!(line, "; {} reused unchanged", counted(self.n_reused, "video"));
         }
         if let Some(WordCount { n_words, n_kept, .. }) = self.stats.footage.words {
-            let _ = write!(line, "; {n_kept} of {n_words} words");
+            let _ = write!(line, "; {n_kept} of {n_words} words in samples");
         }
         line.extend(warnings.iter().map(|warning| format!("; warning: {warning}")));
         let secs: BTreeMap<_, _> = info.splits.iter().map(|(name, split)| (name, split.secs)).collect();
         let DatasetStats { windows, footage, .. } = self.stats;
         let facts = serde_json::json!({ "secs": secs, "windows": windows, "footage": footage, "warnings": warnings,
-            "split_rule": self.rule, "several_people": self.several_people });
+            "split_rule": self.rule, "several_persons": self.several_persons });
         Ok(Report { line, facts: facts.as_object().cloned().unwrap_or_default() })
     }
 
     /// Warnings, each with what to do.
     fn warnings(&self, leakage: &Leakage) -> Vec<String> {
         let Self { videos, stats, n_failed, n_left_out, .. } = *self;
-        let mut warnings: Vec<String> = self.several_people.iter().map(SeveralPeople::warning).collect();
+        let mut warnings: Vec<String> = self.several_persons.iter().map(SeveralPersons::warning).collect();
         // The longest video is proposed for training; each of the others is proposed once.
         let mut by_length: Vec<&LiftedVideo> = videos.iter().filter(|video| video.ledger.kept_secs() > 0.0).collect();
         by_length.sort_by(|a, b| b.ledger.kept_secs().total_cmp(&a.ledger.kept_secs()));
@@ -115,40 +115,41 @@ impl DatasetOutcome<'_> {
             };
             warnings.push(match file {
                 Some(_) | None if self.rule.unit == SplitUnit::Time => {
-                    format!("no sample for {name}: too little is kept to be divided, so add footage")
+                    format!("no sample in the {name} split: too little footage was accepted to divide it; add videos")
                 }
                 Some(video) => format!(
-                    "no video for {name}: add videos, or under [[speaker]] the line  {name} = [{:?}], or divide all anew \
-                     by  split_by = \"time\"  under [dataset]",
+                    "no video in the {name} split: add videos, or set `{name} = [{:?}]` under [[speaker]], or set \
+                     `split_by = \"time\"` under [dataset] to divide all videos again",
                     video.file
                 ),
                 None => format!(
-                    "no video for {name}: add videos, or divide all anew by  split_by = \"time\"  under [dataset]"
+                    "no video in the {name} split: add videos, or set `split_by = \"time\"` under [dataset] to divide \
+                     all videos again"
                 ),
             });
         }
         for leak in &leakage.leaks {
             let (a, b) =
                 (format!("{} ({})", leak.a, leak.a_split.name()), format!("{} ({})", leak.b, leak.b_split.name()));
-            warnings.push(format!("{a} and {b} share {:.1} s of sound: put them into one split", leak.secs));
+            warnings.push(format!("{a} and {b} share {:.1} s of audio: assign both to one split", leak.secs));
         }
         if n_failed > 0 {
-            warnings
-                .push(format!("{} left out, a stage before failed: see `orator status`", counted(n_failed, "video")));
+            let videos = counted(n_failed, "video");
+            warnings.push(format!("{videos} left out because an earlier stage failed: see `orator status --why`"));
         }
         if n_left_out > 0 {
             let videos = counted(n_left_out, "video");
-            warnings.push(format!("{videos} left out, the same content is there already (ledger.jsonl says where)"));
+            warnings.push(format!("{videos} left out as duplicates of other videos (see ledger.jsonl)"));
         }
         let noted = self.videos.iter().filter_map(|video| {
-            let notes = video.transcript_account(std::iter::empty())?.notes;
+            let notes = video.transcript_stats(std::iter::empty())?.notes;
             (!notes.is_empty()).then(|| format!("{}: {}", video.file, notes.join("; ")))
         });
         let noted: Vec<String> = noted.collect();
         let n_others = noted.len().saturating_sub(MAX_NOTED);
         warnings.extend(noted.into_iter().take(MAX_NOTED));
         if n_others > 0 {
-            warnings.push(format!("notes on the words of {} more (ledger.jsonl)", counted(n_others, "video")));
+            warnings.push(format!("transcript notes on {} more are in ledger.jsonl", counted(n_others, "video")));
         }
         warnings
     }

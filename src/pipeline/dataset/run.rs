@@ -28,20 +28,20 @@ pub struct DatasetRun<'a> {
     old: &'a Path,
     before: BTreeMap<String, VideoEntry>,
     /// Number of videos reused from it.
-    pub n_taken_over: usize,
+    pub n_reused: usize,
     progress: &'a dyn Progress,
 }
 
 impl<'a> DatasetRun<'a> {
     /// Starts a dataset in the folder `out`, reusing parts of the one in `old`.
     pub fn new(settings: &'a config::DatasetConfig, out: &'a Path, old: &'a Path, progress: &'a dyn Progress) -> Self {
-        Self { settings, out, old, before: valid_parts(old), n_taken_over: 0, progress }
+        Self { settings, out, old, before: valid_parts(old), n_reused: 0, progress }
     }
 
     /// Writes the audio fingerprint of each video, reusing that of the old dataset if the content is unchanged.
     /// Returns the hashes.
     pub fn sounds(&self, videos: &[&LiftedVideo]) -> Result<Sounds> {
-        let task = self.progress.begin("sound", videos.len() as u64);
+        let task = self.progress.begin("audio", videos.len() as u64);
         let mut hashes = Sounds::new();
         for video in videos {
             let before = self.before.get(&video.name).filter(|part| part.content == video.content);
@@ -84,23 +84,23 @@ impl<'a> DatasetRun<'a> {
             }
             Assignment::Blocks(blocks) => {
                 let divided = division.divide(&video.intervals, &video.ledger, blocks)?;
-                (json!(blocks), json!([division.guard_frames, division.least_frames]), divided)
+                (json!(blocks), json!([division.guard_frames, division.min_frames]), divided)
             }
             Assignment::Excluded(_) => return Ok(()),
         };
         let inputs =
             json!([orator_dataset::SCHEMA, video.file, video.files_hash, placement, rule, self.settings.max_mb]);
-        let made_from = blake3::hash(inputs.to_string().as_bytes()).to_hex().to_string();
-        if self.reuse(video, &made_from)? {
+        let inputs_hash = blake3::hash(inputs.to_string().as_bytes()).to_hex().to_string();
+        if self.reuse(video, &inputs_hash)? {
             return Ok(());
         }
         let intervals: Vec<Interval> = divided.pieces.iter().map(|(_, interval)| *interval).collect();
-        let words = video.transcript_account(intervals.iter().copied());
+        let words = video.transcript_stats(intervals.iter().copied());
         let source = VideoSource {
             name: video.name.clone(),
             file: video.file.clone(),
             content: video.content.clone(),
-            made_from,
+            inputs_hash,
             ledger: Ledger { words, ..divided.ledger },
             bones: video.bones.clone(),
             failure: None,
@@ -121,11 +121,11 @@ impl<'a> DatasetRun<'a> {
     }
 
     /// Reuses a video of the old dataset if its inputs are unchanged. Returns whether it did.
-    fn reuse(&mut self, video: &LiftedVideo, made_from: &str) -> Result<bool> {
-        let Some(part) = self.before.get(&video.name).filter(|part| part.made_from == made_from) else {
+    fn reuse(&mut self, video: &LiftedVideo, inputs_hash: &str) -> Result<bool> {
+        let Some(part) = self.before.get(&video.name).filter(|part| part.inputs_hash == inputs_hash) else {
             return Ok(false);
         };
-        self.n_taken_over += 1;
+        self.n_reused += 1;
         part.link_into(self.old, self.out)?;
         Ok(true)
     }
@@ -133,7 +133,7 @@ impl<'a> DatasetRun<'a> {
     /// Source entry of a video that is left out as a duplicate: its accepted seconds are rejected.
     pub fn duplicate(&self, video: &LiftedVideo, of: &str, secs: f64) -> VideoSource {
         let threshold = self.settings.duplicate_secs;
-        let words = video.transcript_account(std::iter::empty());
+        let words = video.transcript_stats(std::iter::empty());
         let mut ledger = Ledger { words, ..video.ledger.clone() };
         let why = FrameRefusal::new(Refusal::Duplicate, secs, threshold);
         let refused = ledger.kept.drain(..).map(|kept| {

@@ -3,8 +3,8 @@
 
 use super::division::{self, Division};
 use super::faces;
-use super::outcome::{DatasetOutcome, SeveralPeople};
-use super::people::{self, VideoPerson};
+use super::outcome::{DatasetOutcome, SeveralPersons};
+use super::persons::{self, VideoPerson};
 use super::run::DatasetRun;
 use super::video::{FILES, LiftedVideo, POSTURE_VERSION};
 use anyhow::{Result, ensure};
@@ -13,7 +13,7 @@ use orator_base::stage::ledger::{Ledger, longest_first};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::record::Failure;
 use orator_base::stage::{Input, Report, Stage, Unit, workdir};
-use orator_base::text::counted;
+use orator_base::text::{counted, length};
 use orator_base::types::time::FrameRate;
 use orator_dataset::config::videos::Videos;
 use orator_dataset::config::{self, Settings};
@@ -41,7 +41,7 @@ pub struct DatasetInputs {
     /// Notes for users of the dataset.
     pub notes: Vec<String>,
     /// Keypoints within this many seconds of a frame affect its joints.
-    pub reach_secs: f64,
+    pub context_secs: f64,
 }
 
 /// Stage `dataset`. Its unit is the speaker.
@@ -81,7 +81,7 @@ impl DatasetStage {
             speakers: settings.speaker.clone(),
             work: settings.work.dir.clone(),
             fixes_offset: settings.extract.fix_offset,
-            guard_frames: division::guard_frames(settings, inputs.reach_secs),
+            guard_frames: division::guard_frames(settings, inputs.context_secs),
             fps: settings.extract.rate(),
             window_frames: division::window_frames(settings),
             states: BTreeMap::new(),
@@ -124,12 +124,12 @@ impl DatasetStage {
 
     /// Persons that the speaker's videos appear to show, with an overview picture beside the stage folders; `None` if
     /// there is one.
-    fn several_people(&self, speaker: &Unit) -> Result<Option<SeveralPeople>> {
+    fn several_persons(&self, speaker: &Unit) -> Result<Option<SeveralPersons>> {
         let is_known =
             self.speakers.iter().any(|configured| configured.name == speaker.speaker && configured.same_person);
         let videos: Vec<&Unit> = if is_known { Vec::new() } else { self.ready(speaker) };
         let persons: Vec<VideoPerson> = videos.into_iter().map(|video| VideoPerson::read(&self.work, video)).collect();
-        let groups = people::groups(&persons);
+        let groups = persons::groups(&persons);
         let picture = artifacts::faces(&self.work, &speaker.speaker);
         if groups.len() < 2 {
             workdir::remove(&picture)?;
@@ -137,7 +137,7 @@ impl DatasetStage {
         }
         faces::write(&picture, &self.work, &groups)?;
         let files = |group: &Vec<&VideoPerson>| group.iter().map(|video| video.file.clone()).collect();
-        Ok(Some(SeveralPeople { picture, videos: groups.iter().map(files).collect() }))
+        Ok(Some(SeveralPersons { picture, videos: groups.iter().map(files).collect() }))
     }
 
     /// Division of the speaker's videos: as recorded, else as configured.
@@ -147,7 +147,7 @@ impl DatasetStage {
         let are_named = videos.is_some_and(|videos| !videos.splits.is_empty());
         let before = division::recorded_splits(&self.work, speaker)?;
         let record = division::choose_record(self.settings.split_by, before, n_videos, are_named);
-        Ok(Division { record, guard_frames: self.guard_frames, least_frames: self.window_frames })
+        Ok(Division { record, guard_frames: self.guard_frames, min_frames: self.window_frames })
     }
 
     /// Opens a video, with its words if the speaker has transcripts.
@@ -284,7 +284,7 @@ impl Stage for DatasetStage {
         }
         let sounds = run.sounds(&kept)?;
         let compared = run.compare(&kept, &sounds)?;
-        let Some(first) = kept.first() else { anyhow::bail!("no video of {unit} is ready") };
+        let Some(first) = kept.first() else { anyhow::bail!("no video of {unit} passed the earlier stages") };
         let fps = first.intervals.fps;
         let named =
             self.inputs.all.iter().flat_map(|videos| &videos.splits).map(|(video, split)| (video.as_str(), *split));
@@ -313,18 +313,18 @@ impl Stage for DatasetStage {
         for source in empty {
             writer.video(source, Split::Train, SplitBy::Share)?.finish(None)?;
         }
-        let n_taken_over = run.n_taken_over;
+        let n_reused = run.n_reused;
         let (_, stats) = writer.finish()?;
-        let several_people = self.several_people(unit)?;
+        let several_persons = self.several_persons(unit)?;
         let outcome = DatasetOutcome {
-            several_people,
+            several_persons,
             settings: &self.settings,
             rule: &rule,
             videos: &videos,
             stats: &stats,
             n_failed: failures.len(),
             n_left_out,
-            n_taken_over,
+            n_reused,
         };
         outcome.report(out)
     }
@@ -333,35 +333,33 @@ impl Stage for DatasetStage {
 /// All footage of a speaker was rejected, so there is no dataset. The message lists the reasons.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
-pub struct NothingKept(pub String);
+pub struct NothingAccepted(pub String);
 
 /// Checks that there is an accepted interval.
 ///
 /// # Errors
-/// No video; `NothingKept`.
+/// No video; `NothingAccepted`.
 fn check(unit: &Unit, work: &Path, videos: &[LiftedVideo]) -> Result<()> {
     ensure!(
         !videos.is_empty(),
-        "none of the videos of {} came through the stages before, so there is no dataset; \
-         `orator status --why` says where each stands",
+        "no dataset of {}: none of the videos passed the earlier stages; run `orator status --why` for the reasons",
         unit.speaker
     );
-    let mut refused: BTreeMap<String, f64> = BTreeMap::new();
+    let mut rejected: BTreeMap<String, f64> = BTreeMap::new();
     for (reason, secs) in videos.iter().flat_map(|video| video.ledger.refused_secs()) {
-        *refused.entry(reason).or_default() += secs;
+        *rejected.entry(reason).or_default() += secs;
     }
     if videos.iter().any(|video| !video.intervals.intervals.is_empty()) {
         return Ok(());
     }
     let message = format!(
-        "no interval worth keeping in {} of {:.1} s, so there is no dataset of {}; refused: {}; \
-         the {} of each video under {} says where and why",
-        counted(videos.len(), "video"),
-        videos.iter().map(|video| video.ledger.duration_secs).sum::<f64>(),
+        "no dataset of {}: no interval was accepted in {} ({}); rejected: {}; see the {} of each video under {}",
         unit.speaker,
-        longest_first(&refused),
+        counted(videos.len(), "video"),
+        length(videos.iter().map(|video| video.ledger.duration_secs).sum()),
+        longest_first(&rejected),
         Artifact::LiftLedger.file(),
         speaker_dir(work, StageName::Lift, &unit.speaker).display()
     );
-    Err(NothingKept(message).into())
+    Err(NothingAccepted(message).into())
 }

@@ -109,9 +109,9 @@ impl LiftedVideo {
         let path = path_of(Artifact::LiftIntervals);
         let intervals = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
         let intervals: Intervals = serde_json::from_slice(&intervals)
-            .with_context(|| format!("{} is not as the lift stage writes it", path.display()))?;
+            .with_context(|| format!("{} is not a list of intervals: run the stage lift again", path.display()))?;
         for pair in intervals.intervals.windows(2) {
-            ensure!(pair[0].end <= pair[1].start, "{}: its intervals are out of order", path.display());
+            ensure!(pair[0].end <= pair[1].start, "{}: its intervals are not in order", path.display());
         }
         let inside = |interval: &Interval| interval.start < interval.end && interval.end <= intervals.n_frames;
         ensure!(intervals.intervals.iter().all(inside), "{}: an interval outside the video", path.display());
@@ -154,7 +154,7 @@ impl LiftedVideo {
     }
 
     /// Statistics of the words in samples of these intervals.
-    pub fn transcript_account(&self, intervals: impl Iterator<Item = Interval>) -> Option<TranscriptAccount> {
+    pub fn transcript_stats(&self, intervals: impl Iterator<Item = Interval>) -> Option<TranscriptAccount> {
         let fps = self.intervals.fps;
         self.words.as_ref().map(|words| words.account(intervals.map(|i| (fps.secs(i.start), fps.secs(i.end)))))
     }
@@ -184,14 +184,18 @@ impl LiftedVideo {
         let motion = joints_npz::read(&self.joints)?;
         let n_frames = self.intervals.n_frames;
         for (n, path) in [(keypoints.n_frames(), &self.keypoints), (motion.n_frames(), &self.joints)] {
-            ensure!(n == n_frames, "{} has {n} frames, the video {n_frames}: run its stage again", path.display());
+            ensure!(
+                n == n_frames,
+                "{} has {n} frames, the video {n_frames}: run the stage that wrote it again",
+                path.display()
+            );
         }
         let sound =
             hound::WavReader::open(&self.sound).with_context(|| format!("cannot read {}", self.sound.display()))?;
         let spec = sound.spec();
         ensure!(
             (spec.sample_rate, spec.channels, spec.bits_per_sample) == (SAMPLE_RATE, 1, 16),
-            "{} is not 16-bit mono at {SAMPLE_RATE} Hz: run the extract stage again",
+            "{} is not 16-bit mono at {SAMPLE_RATE} Hz: run the stage extract again",
             self.sound.display()
         );
         let extra = if self.has_posture { joints_npz::read_extra(&self.joints)? } else { None };
@@ -232,7 +236,7 @@ impl LiftedSamples<'_> {
         };
         let points = [&self.keypoints.body, &self.keypoints.left_hand, &self.keypoints.right_hand];
         let points = points.map(|part| part.slice(frames));
-        let pose2d = concatenate(Axis(1), &points).context("joining the keypoints")?;
+        let pose2d = concatenate(Axis(1), &points).context("cannot join the keypoints")?;
         let (sound, n_padded) = self.sound_of(interval)?;
         let visible_share = |root: usize| {
             let hand = motion.mask.slice(s![.., root..root + N_HAND_JOINTS]);

@@ -43,7 +43,7 @@ pub fn read(
         timeline.repeated.push(time.repeated);
         let picture = if time.repeated { None } else { Some(thumbnail(reader, area)?) };
         if let (Some(survey), false) = (survey.as_deref_mut(), time.repeated) {
-            let full_picture = survey.wants_picture().then(|| reader.picture(None)).transpose()?;
+            let full_picture = survey.needs_picture().then(|| reader.picture(None)).transpose()?;
             survey.push(full_picture, reader.is_flagged_interlaced());
         }
         checksums.push(picture.as_ref().map_or_else(|| checksums.last().copied().unwrap_or(0), checksum));
@@ -87,7 +87,7 @@ pub fn thumbnail(reader: &mut FrameReader, area: Option<PixelArea>) -> Result<Im
 
 /// Writes every picture as PNG into `folder`, which is created.
 pub fn write_pictures(reader: &mut FrameReader, folder: &Path, progress: &dyn Progress) -> Result<()> {
-    fs::create_dir(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    fs::create_dir(folder).with_context(|| format!("cannot create the folder {}", folder.display()))?;
     let task = progress.begin("pictures", reader.expected_frames().unwrap_or(0) as u64);
     while let Some(time) = reader.advance()? {
         png::write(&folder.join(format!("{:06}.png", time.frame_idx)), &reader.picture(None)?)?;

@@ -9,7 +9,7 @@ use anyhow::Result;
 use orator_base::stage::artifacts::{Artifact, StageName};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::{Input, Report, Stage, Unit};
-use orator_base::text::counted;
+use orator_base::text::{counted, length};
 use orator_base::types::image::PictureOptions;
 use orator_base::types::sound::SAMPLE_RATE;
 use orator_dataset::config::{self, Config, videos};
@@ -123,14 +123,14 @@ impl Stage for ExtractStage {
         };
         media.write(&Artifact::MediaInfo.within(out))?;
 
-        let sound = audio_secs.map_or("no sound".to_owned(), |secs| format!("{secs:.1} s of sound"));
-        let cuts = if n_cuts == 0 { "no cut".to_owned() } else { counted(n_cuts, "cut") };
+        let sound = audio_secs.map_or("no audio".to_owned(), |secs| format!("{} of audio", length(secs)));
+        let cuts = counted(n_cuts, "cut");
         let mut facts = serde_json::to_value(&media)?.as_object().cloned().unwrap_or_default();
         facts.insert("n_cuts".into(), n_cuts.into());
-        let kept = |damage: &String| format!("; damaged, what could be read is kept: {damage}");
-        let damage = media.damage.as_ref().map(kept).unwrap_or_default();
-        let remarks = media.remarks().iter().fold(String::new(), |text, remark| text + "; " + remark);
-        Ok(Report { line: format!("{n_frames} frames at {rate}, {cuts}, {sound}{remarks}{damage}"), facts })
+        let note = |damage: &String| format!("; the file is damaged, its readable part is used: {damage}");
+        let damage = media.damage.as_ref().map(note).unwrap_or_default();
+        let notes = media.remarks().iter().fold(String::new(), |text, note| text + "; " + note);
+        Ok(Report { line: format!("{n_frames} frames at {rate}, {cuts}, {sound}{notes}{damage}"), facts })
     }
 }
 

@@ -45,11 +45,11 @@ impl PictureSurvey {
     }
 
     /// Whether the next frame's picture is needed.
-    pub fn wants_picture(&self) -> bool {
+    pub fn needs_picture(&self) -> bool {
         self.first.is_some() || self.n_frames == self.next_sample
     }
 
-    /// Adds the next non-repeated frame, with its picture if wanted.
+    /// Adds the next non-repeated frame, with its picture if needed.
     pub fn push(&mut self, picture: Option<Image>, is_flagged: bool) {
         self.n_frames += 1;
         self.n_flagged += usize::from(is_flagged);

@@ -2,13 +2,14 @@
 //! and `MediaInfo` as for a video, and the keypoints at the dataset rate; `pose2d` copies these. Values that need
 //! pictures are NaN.
 
-use super::taken::{TakenKeypoints, take_in};
+use super::convert::{ConvertedKeypoints, convert};
 use crate::sound::extract_wav;
 use anyhow::{Context, Result, anyhow, bail};
 use ndarray::{Array3, s};
 use orator_base::stage::artifacts::{Artifact, StageName, dir};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::{Input, Report, Stage, StageWrapper, Unit};
+use orator_base::text::length;
 use orator_base::types::sound::SAMPLE_RATE;
 use orator_dataset::config::videos::Videos;
 use orator_dataset::config::{ExtractConfig, KeypointSource, Settings};
@@ -49,7 +50,7 @@ impl KeypointExtractStage {
     }
 
     fn sound(&self, unit: &Unit) -> Result<PathBuf> {
-        let source = self.source(unit).with_context(|| format!("{unit} is no keypoints"))?;
+        let source = self.source(unit).with_context(|| format!("no keypoints are configured for {unit}"))?;
         source.sound.clone().map_err(|message| anyhow!("{}: {message}", unit.source.display()))
     }
 }
@@ -80,18 +81,17 @@ impl Stage for KeypointExtractStage {
     fn run(&self, unit: &Unit, out: &Path, _progress: &dyn Progress) -> Result<Report> {
         let file = unit.source.display();
         let found = keypoints::read(&unit.source)?;
-        let source = self.source(unit).with_context(|| format!("{unit} is no keypoints"))?;
+        let source = self.source(unit).with_context(|| format!("no keypoints are configured for {unit}"))?;
         let Some(source_fps) = source.fps.or(found.fps) else {
-            bail!("{file}: it does not say its frames a second; write `fps = 25` (or what it has) beside `keypoints`");
+            bail!("{file} states no frame rate: set it next to `keypoints`, for example `fps = 25`");
         };
         let Some(image_size) = source.image_size.or(found.image_size) else {
-            bail!(
-                "{file}: it does not say its picture's size; write `size = \"1280x720\"` (or what it has) beside `keypoints`"
-            );
+            bail!("{file} states no picture size: set it next to `keypoints`, for example `size = \"1280x720\"`");
         };
         let format = format!("{} at {source_fps}", found.format);
         let fps = self.settings.rate();
-        let TakenKeypoints { keypoints, extras, duration_secs, notes } = take_in(found, source_fps, image_size, fps)?;
+        let ConvertedKeypoints { keypoints, extras, duration_secs, notes } =
+            convert(found, source_fps, image_size, fps)?;
         let n_frames = keypoints.n_frames();
         keypoints_npz::write(&Artifact::Keypoints.within(out), &keypoints, &extras)?;
         timeline_without_pictures(extras.time_secs.to_vec()).write(&Artifact::Timeline.within(out))?;
@@ -108,7 +108,7 @@ impl Stage for KeypointExtractStage {
             ..MediaInfo::new(duration_secs, n_frames, fps)
         };
         media.write(&Artifact::MediaInfo.within(out))?;
-        let sound = audio_secs.map_or("no sound".to_owned(), |secs| format!("{secs:.1} s of sound"));
+        let sound = audio_secs.map_or("no audio".to_owned(), |secs| format!("{} of audio", length(secs)));
         let remarks = media.not_judged().into_iter().chain(media.damage.clone()).chain(notes.clone());
         let remarks = remarks.collect::<Vec<_>>().join("; ");
         let mut facts = serde_json::to_value(&media)?.as_object().cloned().unwrap_or_default();
@@ -166,7 +166,7 @@ impl Stage for KeypointPose2dStage {
         let [body, left, right] = [&keypoints.body, &keypoints.left_hand, &keypoints.right_hand].map(share);
         let several = extras.n_people.iter().filter(|n| **n > 1).count() as f64 / keypoints.n_frames().max(1) as f64;
         let line = format!(
-            "{} frames: person in {:.0} %, left hand {:.0} %, right hand {:.0} %, as another program found them",
+            "{} frames: person in {:.0} %, left hand {:.0} %, right hand {:.0} % (keypoints of another program)",
             keypoints.n_frames(),
             100.0 * body,
             100.0 * left,
@@ -174,7 +174,7 @@ impl Stage for KeypointPose2dStage {
         );
         let facts = json!({
             "n_frames": keypoints.n_frames(), "person": body, "left_hand": left, "right_hand": right,
-            "several_people": several,
+            "several_persons": several,
         });
         Ok(Report { line, facts: facts.as_object().cloned().unwrap_or_default() })
     }

@@ -22,7 +22,7 @@ pub(crate) const MAX_GAP_SECS: f64 = 1.0;
 /// detection, gap filling, the receptive field of the network, the median of the body size, and smoothing. Beyond
 /// that, all frames of a video share the bone lengths, the camera tilt, and the choice between the mirror images of a
 /// hand.
-pub fn reach_secs(settings: &config::LiftConfig) -> f64 {
+pub fn context_secs(settings: &config::LiftConfig) -> f64 {
     // Unreadable weights are reported by the stage itself.
     let window =
         weights::body(&settings.body_weights).map_or(weights::MAX_FRAMES, |body| body.net.config().receptive_field());
@@ -103,12 +103,19 @@ impl Lifter {
     pub(crate) fn raw(&self, keypoints: &Keypoints, intervals: &[Interval], resting: &[Interval]) -> Result<Lifted> {
         let n_frames = keypoints.n_frames();
         for hand in [&keypoints.left_hand, &keypoints.right_hand] {
-            ensure!(hand.shape()[0] == n_frames, "{n_frames} frames of body keypoints, {} of a hand", hand.shape()[0]);
+            ensure!(
+                hand.shape()[0] == n_frames,
+                "the body keypoints have {n_frames} frames, those of a hand {}",
+                hand.shape()[0]
+            );
         }
         let mut lifted = Lifted::empty(keypoints);
         for &interval in intervals {
             let Interval { start, end } = interval;
-            ensure!(start <= end && end <= n_frames, "interval {start}..{end} of a video of {n_frames} frames");
+            ensure!(
+                start <= end && end <= n_frames,
+                "interval {start}..{end} exceeds the {n_frames} frames of the video"
+            );
             self.lift_interval(keypoints, interval, resting, lifted.view(interval))?;
         }
         Ok(lifted)
@@ -220,8 +227,8 @@ pub fn notes(keypoints: &Keypoints, lifted: &Lifted) -> Option<String> {
     };
     (lifted.n_frames < n_frames).then(|| {
         format!(
-            "no body in {} of {n_frames} frames (NaN): it is lifted where both shoulders are seen within {MAX_GAP_SECS} s; \
-             the right shoulder is not seen in {} frames, the left in {}",
+            "no body in {} of {n_frames} frames (NaN): lifting needs both shoulders within {MAX_GAP_SECS} s; the right \
+             shoulder is not detected in {} frames, the left in {}",
             n_frames - lifted.n_frames,
             n_hidden(coco::R_SHOULDER),
             n_hidden(coco::L_SHOULDER)
@@ -271,8 +278,8 @@ mod tests {
         let complete = [Interval { start: 0, end: n_frames }];
         let raw = |change| lifter.raw(&keypoints(n_frames, change), &complete, &[]).unwrap().motion;
         let (plain, changed) = (raw(n_frames), raw(change));
-        let last = change - (reach_secs(&settings) * 15.0).ceil() as usize;
-        assert!(last > 80, "a reach of {} s", reach_secs(&settings));
+        let last = change - (context_secs(&settings) * 15.0).ceil() as usize;
+        assert!(last > 80, "a context of {} s", context_secs(&settings));
         let until = |motion: &Motion, end: usize| motion.joints.slice(s![..end, .., ..]).to_owned();
         assert_eq!(until(&plain, last), until(&changed, last));
         assert_ne!(until(&plain, change), until(&changed, change), "nothing reaches back");

@@ -75,7 +75,7 @@ impl BoneChange {
 }
 
 /// Rejects the frames of `intervals` with a joint that is missing for longer than lifting fills.
-pub fn open_refusals(raw: &Motion, intervals: &[Interval]) -> Vec<Option<FrameRefusal>> {
+pub fn missing_joint_refusals(raw: &Motion, intervals: &[Interval]) -> Vec<Option<FrameRefusal>> {
     let mut refusals = vec![None; raw.n_frames()];
     for t in intervals.iter().flat_map(|interval| interval.start..interval.end) {
         let joints = raw.joints.slice(s![t, .., 0]);

@@ -5,6 +5,7 @@ use super::gaps::long_gaps;
 use anyhow::{Result, ensure};
 use orator_base::stage::ledger::{Kept, Ledger, Refused};
 use orator_base::stage::refusal::{FrameRefusal, Refusal};
+use orator_base::text::counted;
 use orator_base::types::interval::{Interval, Intervals};
 use orator_base::types::time::FrameRate;
 use orator_dataset::config;
@@ -42,8 +43,8 @@ pub fn exclude_frames(
     let fps = intervals.fps;
     ensure!(
         ledger.kept.len() == intervals.intervals.len(),
-        "{} intervals, but {} stretches kept in the ledger: run the stage segment again",
-        intervals.intervals.len(),
+        "{}, but {} accepted in the ledger: run the stage segment again",
+        counted(intervals.intervals.len(), "interval"),
         ledger.kept.len()
     );
     let mut left = Vec::new();

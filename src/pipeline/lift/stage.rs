@@ -11,6 +11,7 @@ use orator_base::stage::artifacts::{Artifact, StageName};
 use orator_base::stage::ledger::Ledger;
 use orator_base::stage::progress::Progress;
 use orator_base::stage::{Input, Report, Stage, Unit, write_json};
+use orator_base::text::counted;
 use orator_base::types::interval::Intervals;
 use orator_base::types::pose2d::Keypoints;
 use orator_dataset::config;
@@ -104,11 +105,11 @@ impl Stage for LiftStage {
         hide_repeated_frames(&mut keypoints, &repeated);
         let path = self.file(Artifact::SegmentIntervals, unit);
         let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
-        let intervals: Intervals =
-            serde_json::from_slice(&bytes).with_context(|| format!("{} holds no intervals", path.display()))?;
+        let intervals: Intervals = serde_json::from_slice(&bytes)
+            .with_context(|| format!("{} is not a list of intervals: run the stage segment again", path.display()))?;
         ensure!(
             intervals.n_frames == keypoints.n_frames(),
-            "the keypoints have {} frames, {} speaks of {}: run the stage segment again",
+            "the keypoints have {} frames, {} states {}: run the stage segment again",
             keypoints.n_frames(),
             path.display(),
             intervals.n_frames
@@ -126,8 +127,11 @@ impl Stage for LiftStage {
         let n_known = lifted.motion.joints.iter().filter(|v| v.is_finite()).count() / 3;
         let filled = 100.0 * (1.0 - n_visible as f64 / n_known.max(1) as f64);
         let line = match lifted.n_frames {
-            0 => "nothing to lift".to_owned(),
-            n => format!("{n} frames in {} intervals, {filled:.1} % of the joints filled", intervals.intervals.len()),
+            0 => "no interval to lift".to_owned(),
+            n => {
+                let intervals = counted(intervals.intervals.len(), "interval");
+                format!("{n} frames in {intervals}, {filled:.1} % of the joint positions interpolated")
+            }
         };
         let facts = json!({ "n_frames": lifted.n_frames, "filled_percent": filled });
         Ok(Report { line, facts: facts.as_object().cloned().unwrap_or_default() })
@@ -152,7 +156,7 @@ impl LiftStage {
             (intervals, ledger) = exclude_frames(&intervals, &ledger, &refusals, min_frames)?;
             raw = self.lifter.raw(keypoints, &intervals.intervals, &intervals.resting)?;
         }
-        let open = outliers::open_refusals(&raw.motion, &intervals.intervals);
+        let open = outliers::missing_joint_refusals(&raw.motion, &intervals.intervals);
         (intervals, ledger) = exclude_frames(&intervals, &ledger, &open, min_frames)?;
         let largest = Array1::from_vec(change.largest());
         npz::write(&Artifact::BoneChange.within(out), |npz| npz.add_array("bone_change", &largest))?;

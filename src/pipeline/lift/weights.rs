@@ -27,7 +27,10 @@ pub fn body(path: &Path) -> Result<BodyLifter> {
         let config: temporal::Config = config(contents)?;
         let expected = BodyLifter::config(config.channels.clamp(1, MAX_WIDTH), &config.widths);
         let window = config.receptive_field();
-        ensure!((1..=MAX_FRAMES).contains(&window), "its network looks at {window} frames, expected 1 to {MAX_FRAMES}");
+        ensure!(
+            (1..=MAX_FRAMES).contains(&window),
+            "its network has a receptive field of {window} frames, expected 1 to {MAX_FRAMES}"
+        );
         ensure!(config == expected, "its network is {config:?}, expected {expected:?}");
         let (channels, blocks) = (config.channels, config.widths.len().saturating_sub(1));
         let first = config.n_in * channels * config.widths.first().copied().unwrap_or(1);
@@ -58,12 +61,13 @@ fn load<T>(
     make: impl Fn(&Contents, &mut Params) -> Result<T>,
 ) -> Result<T> {
     if path.as_os_str().is_empty() {
-        return parse(builtin, kind, make).with_context(|| format!("the built-in {kind} does not fit this program"));
+        return parse(builtin, kind, make).with_context(|| format!("invalid built-in {kind}"));
     }
     let bytes =
         input::read(path, input::MOST_DATA).with_context(|| format!("cannot read the weights {}", path.display()))?;
-    parse(&bytes, kind, make)
-        .with_context(|| format!("{} does not hold weights of `orator-lab train lifter --part {part}`", path.display()))
+    parse(&bytes, kind, make).with_context(|| {
+        format!("{} is not a {kind}: expected weights of `orator-lab train lifter --part {part}`", path.display())
+    })
 }
 
 fn parse<T>(bytes: &[u8], kind: &str, make: impl Fn(&Contents, &mut Params) -> Result<T>) -> Result<T> {

@@ -29,7 +29,7 @@ impl PointReader {
                 heatmap::decode(shape, maps, size, *refine, &self.gaussian)
             }
             Decode::Simcc { x, y, split } => points::simcc(outputs.floats(x)?, outputs.floats(y)?, *split),
-            other => bail!("keypoints cannot be read as {other:?}"),
+            other => bail!("a body model cannot have outputs of the kind {other:?}"),
         }
     }
 }

@@ -48,7 +48,7 @@ impl Chain {
         let palm = palm.map(|palm| PalmDetector::open(runtime, palm, dir)).transpose()?;
         ensure!(
             hand.is_some() || body.gives_hands(),
-            "pose2d.hand is empty, but the model {:?} gives no hands: name a hand model",
+            "pose2d.hand is empty, but the body model {:?} has no hand keypoints: set it to a hand model",
             settings.body
         );
         Ok(Self {
@@ -85,8 +85,8 @@ impl Chain {
     }
 
     /// Number of identities so far, the first of them when first recognised, and the person followed now.
-    pub fn people(&self) -> (i64, [Option<SeenPerson>; 2]) {
-        self.speaker.people()
+    pub fn identities(&self) -> (i64, [Option<SeenPerson>; 2]) {
+        self.speaker.identities()
     }
 
     /// Total inference time in ONNX Runtime so far, in seconds.

@@ -29,7 +29,7 @@ impl Detector {
             Decode::Detections { boxes: output, labels, person, min_score, max_overlap } => {
                 let (shape, rows) = outputs.floats(output)?;
                 if shape.last() != Some(&5) {
-                    bail!("the output {output:?} of a detector must have rows of 5 numbers, its shape is {shape:?}");
+                    bail!("invalid shape {shape:?} of the detector output {output:?}: expected rows of 5 values");
                 }
                 let labels = labels.as_ref().map(|name| outputs.integers(name)).transpose()?.map(|(_, labels)| labels);
                 boxes::detections(rows, labels, *person, *min_score, *max_overlap)
@@ -39,7 +39,7 @@ impl Detector {
                 let row_len = shape.last().map_or(0, |len| usize::try_from(*len).unwrap_or(0));
                 yolox_grid::decode(rows, row_len, size, strides, *min_score, *max_overlap)?
             }
-            other => bail!("a person detector cannot be read as {other:?}"),
+            other => bail!("a person detector cannot have outputs of the kind {other:?}"),
         };
         let to_picture = |person: PersonBox| {
             let at = |x: f32, y: f32| src_from_dst.apply([f64::from(x), f64::from(y)]).map(|px| px as f32);
@@ -73,7 +73,7 @@ impl PalmDetector {
         let size = self.input.size()[0];
         let (src_from_dst, outputs) = self.input.run_letterboxed(image)?;
         let Decode::SsdAnchors { regressors, scores, min_score, max_overlap, wrist, middle, .. } = &self.decode else {
-            bail!("a palm detector cannot be read as {:?}", self.decode)
+            bail!("a palm detector cannot have outputs of the kind {:?}", self.decode)
         };
         let (rows, logits) = (outputs.floats(regressors)?.1, outputs.floats(scores)?.1);
         let found = ssd_anchors::decode(rows, logits, &self.anchors, size, *min_score, *max_overlap)?;

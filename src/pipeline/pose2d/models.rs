@@ -58,8 +58,8 @@ impl ChosenModels {
 /// Advice to print once in a run without the optional face model.
 pub fn advice(config: &Pose2dConfig, store: &ModelStore) -> Option<&'static str> {
     face_is_missing(config, store).then_some(
-        "no face model is there, so the voice of somebody who is not seen counts as the speaker's: `orator models fetch` \
-         gets the model that sees the mouth",
+        "no face model is installed, so an off-screen voice is taken for the speaker's: install one with \
+         `orator models fetch`",
     )
 }
 
@@ -70,14 +70,11 @@ pub fn advice(config: &Pose2dConfig, store: &ModelStore) -> Option<&'static str>
 pub fn check_follow(chosen: &Pose2dConfig) -> Result<()> {
     if chosen.follow == FollowRule::Speaking {
         let needs = |key: &str, id: &str, remedy: &str| {
-            ensure!(
-                !id.is_empty(),
-                "pose2d.follow = \"speaking\" needs a model in pose2d.{key}, and there is none: {remedy}"
-            );
+            ensure!(!id.is_empty(), "pose2d.follow = \"speaking\" needs a model in pose2d.{key}: {remedy}");
             Ok(())
         };
-        needs("face", &chosen.face, "`orator models fetch` gets one; or write follow = \"largest\"")?;
-        needs("person", &chosen.person, "write person = \"auto\", or follow = \"largest\"")?;
+        needs("face", &chosen.face, "install one with `orator models fetch`, or set follow = \"largest\"")?;
+        needs("person", &chosen.person, "set person = \"auto\" or follow = \"largest\"")?;
     }
     Ok(())
 }

@@ -44,13 +44,13 @@ pub fn is_detection_frame(idx: usize, every: usize, is_crowd: bool) -> bool {
 /// Position and colours of a person.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SeenPerson {
-    place: PersonBox,
+    bbox: PersonBox,
     colours: BodyColours,
 }
 
 /// Whether the person tracked before a restart is the one tracked after it.
 pub fn is_same_person(before: &SeenPerson, after: &SeenPerson) -> bool {
-    boxes::overlap(&before.place, &after.place) >= MIN_SAME_OVERLAP
+    boxes::overlap(&before.bbox, &after.bbox) >= MIN_SAME_OVERLAP
         && before.colours.distance(&after.colours) <= MAX_SAME_COLOUR_DISTANCE
 }
 
@@ -91,7 +91,8 @@ impl SpeakerTracker {
         let area = |one: &PersonBox| one.width * one.height;
         let largest = found.iter().max_by(|a, b| area(a).total_cmp(&area(b)));
         let colours = largest.map(|one| colours_of(image, one, body, least)).transpose()?.flatten();
-        self.reference = Some(colours.context("nobody with visible shoulders is found in the reference picture")?);
+        self.reference =
+            Some(colours.context("no person with visible shoulders was detected in the reference picture")?);
         Ok(())
     }
 
@@ -144,7 +145,7 @@ impl SpeakerTracker {
         settings: &config::Pose2dConfig,
     ) -> Result<bool> {
         let Some(current_colours) = BodyColours::measure(image, points, settings.joint_score) else { return Ok(false) };
-        let current = SeenPerson { place: self.track.person(), colours: current_colours.clone() };
+        let current = SeenPerson { bbox: self.track.person(), colours: current_colours.clone() };
         if self.before.take().is_some_and(|before| is_same_person(&before, &current)) {
             self.track.merge_with_previous();
         }
@@ -177,14 +178,14 @@ impl SpeakerTracker {
     }
 
     /// Number of identities, the first of them when first recognised, and the person followed now.
-    pub fn people(&self) -> (i64, [Option<SeenPerson>; 2]) {
+    pub fn identities(&self) -> (i64, [Option<SeenPerson>; 2]) {
         (self.track.n_identities(), [self.first.clone(), self.last()])
     }
 
     /// The person followed now.
     fn last(&self) -> Option<SeenPerson> {
-        let place = self.track.bbox.map(|_| self.track.person());
-        place.zip(self.colours.clone()).map(|(place, colours)| SeenPerson { place, colours })
+        let bbox = self.track.bbox.map(|_| self.track.person());
+        bbox.zip(self.colours.clone()).map(|(bbox, colours)| SeenPerson { bbox, colours })
     }
 
     /// All candidates in the picture; `None` without a detector.

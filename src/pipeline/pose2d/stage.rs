@@ -130,7 +130,7 @@ impl Stage for Pose2dStage {
     /// Processes one span of the video.
     fn run_part(&self, unit: &Unit, part: usize, out: &Path, progress: &dyn Progress) -> Result<()> {
         let timeline = self.timeline(unit)?;
-        let span = timeline.spans().into_iter().nth(part).with_context(|| format!("there is no span {part}"))?;
+        let span = timeline.spans().into_iter().nth(part).with_context(|| format!("part {part} does not exist"))?;
         self.process_span(unit, &timeline, span, progress)?.write(out)
     }
 
@@ -185,10 +185,10 @@ impl Pose2dStage {
         let mut chain = Chain::new(&self.runtime()?, &self.chosen.store, &self.chosen.settings)?;
         if let Some(path) = self.references.get(&unit.speaker) {
             let mut reference = FrameReader::open(path, FrameRate::new(1, 1))?;
-            let picture = reference.next().with_context(|| format!("{} holds no picture", path.display()))??;
+            let picture = reference.next().with_context(|| format!("{} contains no picture", path.display()))??;
             chain
                 .set_reference(&picture.image)
-                .with_context(|| format!("the speaker's reference {}", path.display()))?;
+                .with_context(|| format!("invalid reference picture {} of the speaker", path.display()))?;
         }
         Ok(chain)
     }

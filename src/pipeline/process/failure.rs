@@ -58,7 +58,7 @@ impl SentFailure {
                 (_, Some(cause)) => cause.context(text),
             });
         }
-        let error = error.unwrap_or_else(|| anyhow!("it failed and did not say why"));
+        let error = error.unwrap_or_else(|| anyhow!("the process failed without an error message"));
         if matches!(kind, FailureKind::NoSpace) { NoSpace::new(error).into() } else { error }
     }
 }

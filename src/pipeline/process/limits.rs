@@ -37,7 +37,7 @@ pub struct Limits {
     /// CPU seconds; the limit of elapsed time is ten times this.
     pub cpu_secs: u64,
     /// CPU seconds between two progress reports.
-    pub quiet_secs: u64,
+    pub report_secs: u64,
     /// Seconds without CPU use and without a report.
     pub idle_secs: u64,
     /// Input that the limits were derived from, for messages.
@@ -69,7 +69,7 @@ impl Limits {
         let fps = header.fps.filter(|fps| fps.is_finite()).unwrap_or(0.0).clamp(FPS[0], FPS[1]);
         let n_frames = secs * fps;
         let cpu_secs = BASE_SECS + n_frames * (SECS_PER_FRAME + SECS_PER_MEGAPIXEL * pixels / 1e6);
-        Self::new(memory, cpu_secs, format!("{:.0} s of {width}x{height} pictures", secs.ceil()))
+        Self::new(memory, cpu_secs, format!("{:.0} s of {width}x{height} video", secs.ceil()))
     }
 
     fn new(memory: f64, cpu_secs: f64, basis: String) -> Self {
@@ -78,7 +78,7 @@ impl Limits {
         Self {
             memory: memory.min(machine) as u64,
             cpu_secs: cpu_secs as u64,
-            quiet_secs: (BASE_SECS + cpu_secs / 8.0) as u64,
+            report_secs: (BASE_SECS + cpu_secs / 8.0) as u64,
             idle_secs: IDLE_SECS,
             basis,
         }
@@ -90,8 +90,8 @@ impl Limits {
             return error;
         }
         error.context(format!(
-            "{}: reading it takes more than the {} MB of memory that is allowed for {}: the file may be damaged or \
-             malicious; encode it again, smaller if that is not enough",
+            "{}: reading it needs more than the {} MiB of memory allowed for {}. The file may be damaged or malicious: \
+             encode it again, with smaller pictures if needed",
             source.display(),
             self.memory >> 20,
             self.basis
@@ -102,8 +102,8 @@ impl Limits {
     pub fn exceeded_by(&self, bytes: u64) -> Option<String> {
         (bytes > self.memory).then(|| {
             format!(
-                "used more than the {} MB of memory allowed for {} and was ended: the file may be damaged or malicious; \
-                 encode it again, smaller if that is not enough",
+                "used more than the {} MiB of memory allowed for {} and was killed. The file may be damaged or \
+                 malicious: encode it again, with smaller pictures if needed",
                 self.memory >> 20,
                 self.basis
             )
@@ -113,18 +113,18 @@ impl Limits {
     /// Describes the limit that a process has exceeded, or `None`. `cpu`: CPU seconds used, `quiet`: CPU seconds since
     /// the last report, `passed`: seconds elapsed, `idle`: seconds without CPU use and without a report.
     pub fn passed(&self, [cpu, quiet]: [f64; 2], [passed, idle]: [u64; 2]) -> Option<String> {
-        let most = if idle >= self.idle_secs {
-            format!("did nothing for {}", span(self.idle_secs))
-        } else if quiet > self.quiet_secs as f64 {
-            format!("reported no progress in {} of processor time", span(self.quiet_secs))
+        let excess = if idle >= self.idle_secs {
+            format!("was idle for {}", span(self.idle_secs))
+        } else if quiet > self.report_secs as f64 {
+            format!("reported no progress in {} of CPU time", span(self.report_secs))
         } else if cpu > self.cpu_secs as f64 {
-            format!("used more than the {} of processor time allowed for {}", span(self.cpu_secs), self.basis)
+            format!("used more than the {} of CPU time allowed for {}", span(self.cpu_secs), self.basis)
         } else if passed > self.cpu_secs.saturating_mul(10) {
             format!("took more than the {} allowed for {}", span(self.cpu_secs.saturating_mul(10)), self.basis)
         } else {
             return None;
         };
-        Some(format!("{most} and was ended: the file may be damaged or malicious; copy or encode it again"))
+        Some(format!("{excess} and was killed. The file may be damaged or malicious: copy or encode it again"))
     }
 }
 
@@ -184,9 +184,9 @@ mod tests {
         let limits = Limits::of_video(&header(10.0, [320, 180], 30.0), 15.0, 0);
         let passed = |cpu, time| limits.passed(cpu, time).unwrap_or_default();
         assert_eq!(passed([3000.0, 3000.0], [30_000, 800]), "");
-        assert!(passed([0.0, 0.0], [900, 900]).contains("did nothing for 15 min"));
+        assert!(passed([0.0, 0.0], [900, 900]).contains("was idle for 15 min"));
         assert!(passed([5000.0, 5000.0], [5000, 0]).contains("reported no progress"));
-        assert!(passed([8000.0, 0.0], [8000, 0]).contains("h of processor time allowed for 70 s of 320x180 pictures"));
+        assert!(passed([8000.0, 0.0], [8000, 0]).contains("h of CPU time allowed for 70 s of 320x180 video"));
         assert!(passed([0.0, 0.0], [10_000_000, 0]).contains("took more than"));
     }
 
@@ -196,10 +196,10 @@ mod tests {
         let explained = |text: &'static str| format!("{:#}", limits.explain(Path::new("a.mp4"), anyhow!(text)));
         assert_eq!(explained("no such file"), "no such file");
         let text = explained("cannot decode a.mp4: Cannot allocate memory");
-        assert!(text.starts_with("a.mp4: reading it takes more than the ") && text.ends_with("Cannot allocate memory"));
+        assert!(text.starts_with("a.mp4: reading it needs more than the ") && text.ends_with("Cannot allocate memory"));
         let of_header = Limits::of_header();
         assert_eq!(of_header.exceeded_by(of_header.memory), None);
-        assert!(of_header.exceeded_by(of_header.memory + 1).unwrap().contains("MB of memory allowed for the header"));
-        assert!(text.contains(" MB of memory that is allowed for the header of a file"), "{text}");
+        assert!(of_header.exceeded_by(of_header.memory + 1).unwrap().contains("MiB of memory allowed for the header"));
+        assert!(text.contains(" MiB of memory allowed for the header of a file"), "{text}");
     }
 }

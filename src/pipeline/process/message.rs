@@ -23,7 +23,7 @@ pub enum Request {
     Unit(Box<UnitRequest>),
     /// Read the header of a video, or copy an excerpt of it.
     Media {
-        wanted: MediaRequest,
+        request: MediaRequest,
         /// Memory limit, bytes.
         memory: u64,
     },
@@ -100,7 +100,7 @@ pub enum Message {
     End {
         task: u32,
     },
-    Say {
+    Line {
         line: String,
     },
     Estimate {
@@ -126,7 +126,7 @@ pub fn send(to: &mut impl Write, message: &impl Serialize) -> Result<()> {
 /// # Errors
 /// End of the stream; data that is not a valid message.
 pub fn receive<T: DeserializeOwned>(from: &mut impl Read) -> Result<T> {
-    rmp_serde::from_read(from.take(MAX_BYTES)).context("no message")
+    rmp_serde::from_read(from.take(MAX_BYTES)).context("invalid message")
 }
 
 #[cfg(test)]

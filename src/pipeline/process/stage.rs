@@ -112,9 +112,9 @@ pub fn probe(program: &Path) -> Result<Restriction> {
     let mut process = UnitProcess::start(program)?;
     process.ask(&Request::Restrict);
     let answer = process.follow(&Limits::of_header(), |answers| receive(answers));
-    match answer.map_err(|death| anyhow!("{}: the process that it started {death}", program.display()))? {
+    match answer.map_err(|death| anyhow!("{}: its subprocess {death}", program.display()))? {
         Message::Restricted(restriction) => Ok(restriction),
-        other => bail!("{other:?} is no answer"),
+        other => bail!("unexpected answer {other:?}"),
     }
 }
 
@@ -124,11 +124,11 @@ pub fn probe(program: &Path) -> Result<Restriction> {
 /// Those of `answer_media`; a subprocess that crashes or exceeds its limits.
 pub fn ask_media(program: &Path, request: &MediaRequest, limits: &Limits) -> Result<MediaHeader> {
     let source = &request.source;
-    let request = Request::Media { wanted: request.clone(), memory: limits.memory };
+    let request = Request::Media { request: request.clone(), memory: limits.memory };
     answer_from(program, &request, source, limits, |answers| match receive(answers)? {
         Message::Media(header) => Ok(Ok(header)),
         Message::Failed(failure) => Ok(Err(failure.into_error())),
-        _ => bail!("no answer to the request"),
+        _ => bail!("unexpected answer to the request"),
     })
 }
 
@@ -142,7 +142,7 @@ fn answer_from<T>(
 ) -> Result<T> {
     let mut process = UnitProcess::start(program)?;
     process.ask(request);
-    let process_error = |death| Err(anyhow!("{}: the process that read it {death}", source.display()));
+    let process_error = |death| Err(anyhow!("{}: the process reading it {death}", source.display()));
     process.follow(limits, read).unwrap_or_else(process_error).map_err(|error| limits.explain(source, error))
 }
 
@@ -152,17 +152,17 @@ fn relay(from: &mut impl Read, progress: &dyn Progress) -> Result<Result<Report>
     loop {
         match receive(from)? {
             Message::Begin { task, total } => {
-                ensure!(tasks.len() < MAX_TASKS, "{MAX_TASKS} tasks at a time");
+                ensure!(tasks.len() < MAX_TASKS, "more than {MAX_TASKS} progress tasks at a time");
                 tasks.insert(task, progress.begin("", total));
             }
             Message::Advance { task, steps } => tasks.get(&task).into_iter().for_each(|task| task.advance(steps)),
             Message::Detail { task, text } => tasks.get(&task).into_iter().for_each(|task| task.detail(&plain(&text))),
             Message::End { task } => drop(tasks.remove(&task)),
-            Message::Say { line } => progress.say(&plain(&line)),
+            Message::Line { line } => progress.say(&plain(&line)),
             Message::Estimate { line } => progress.event(&Event::Estimate { line: &plain(&line) }),
             Message::Done { line, facts } => return Ok(Ok(Report { line: plain(&line), facts })),
             Message::Failed(failure) => return Ok(Err(failure.into_error())),
-            Message::Restricted(_) | Message::Media(_) => bail!("no answer to the request"),
+            Message::Restricted(_) | Message::Media(_) => bail!("unexpected answer to the request"),
         }
     }
 }

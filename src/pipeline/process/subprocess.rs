@@ -86,11 +86,11 @@ impl UnitProcess {
                 (None, Ok(status)) if error.chain().filter_map(|cause| cause.downcast_ref()).any(is_end) => {
                     death(status)
                 }
-                _ => "sent what makes no sense".to_owned(),
+                _ => "sent an invalid answer".to_owned(),
             };
             match plain(String::from_utf8_lossy(&stderr_tail).trim()) {
                 text if text.is_empty() => death,
-                text => format!("{death}; it said: {text}"),
+                text => format!("{death}; its error output: {text}"),
             }
         })
     }
@@ -134,11 +134,11 @@ fn watch(pid: Pid, limits: &Limits, n_reads: &AtomicU64, stop: Receiver<()>) -> 
         cpu_at_report = if has_report { cpu } else { cpu_at_report };
         (reads_before, cpu_before, passed) = (reads, cpu, passed + 1);
         let memory = anonymous_bytes(pid).and_then(|bytes| limits.exceeded_by(bytes));
-        let verdict = memory.or_else(|| limits.passed([cpu, cpu - cpu_at_report], [passed, idle]));
-        if verdict.is_some() {
+        let excess = memory.or_else(|| limits.passed([cpu, cpu - cpu_at_report], [passed, idle]));
+        if excess.is_some() {
             // The process is not reaped before this thread has ended, so the id still refers to it.
             let _ = kill_process(pid, Signal::KILL);
-            return verdict;
+            return excess;
         }
     }
     None
@@ -176,15 +176,15 @@ fn last_bytes(mut from: impl Read) -> Vec<u8> {
 /// Describes how a process ended without a result.
 fn death(status: ExitStatus) -> String {
     if let Some(signal) = status.signal() {
-        let why = match signal {
-            6 => " (it gave up)",
-            7 | 11 => " (it reached for memory that is not its own): the file may be damaged or malicious",
-            9 => " (killed: memory ran out, or by hand)",
+        let cause = match signal {
+            6 => " (aborted)",
+            7 | 11 => " (invalid memory access): the file may be damaged or malicious",
+            9 => " (killed by a user, or because memory ran out)",
             _ => "",
         };
-        return format!("was ended by signal {signal}{why}");
+        return format!("was ended by signal {signal}{cause}");
     }
-    format!("ended before it was done ({status})")
+    format!("exited before it finished ({status})")
 }
 
 #[cfg(test)]
@@ -207,7 +207,7 @@ mod tests {
         let limits = Limits { idle_secs: 2, ..Limits::of_header() };
         for hanging in ["exec sleep 1000", "kill -STOP $$"] {
             let error = error_of(hanging, &limits);
-            assert!(error.starts_with("did nothing for 2 s and was ended"), "{hanging}: {error}");
+            assert!(error.starts_with("was idle for 2 s and was killed"), "{hanging}: {error}");
         }
         assert!(start.elapsed() < Duration::from_secs(60));
     }
@@ -216,10 +216,10 @@ mod tests {
     fn a_process_over_its_cpu_limit_is_killed() {
         let limits = Limits { cpu_secs: 1, idle_secs: 1000, ..Limits::of_header() };
         let error = error_of("while :; do :; done", &limits);
-        assert!(error.starts_with("used more than the 1 s of processor time"), "{error}");
-        let limits = Limits { quiet_secs: 1, idle_secs: 1000, ..Limits::of_header() };
+        assert!(error.starts_with("used more than the 1 s of CPU time"), "{error}");
+        let limits = Limits { report_secs: 1, idle_secs: 1000, ..Limits::of_header() };
         let error = error_of("while :; do :; done", &limits);
-        assert!(error.starts_with("reported no progress in 1 s of processor time"), "{error}");
+        assert!(error.starts_with("reported no progress in 1 s of CPU time"), "{error}");
     }
 
     #[test]

@@ -33,7 +33,7 @@ const MESSAGE_INTERVAL: Duration = Duration::from_millis(50);
 pub fn serve() -> Result<()> {
     rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL))?;
     let out = Messages(Mutex::new(std::io::stdout()));
-    match receive(&mut std::io::stdin().lock()).context("this is started by `orator run` alone")? {
+    match receive(&mut std::io::stdin().lock()).context("this command is used only by `orator run` itself")? {
         Request::Restrict => {
             out.send(&Message::Restricted(restrict(&FileAccess { reads: Some(Vec::new()), writes: Vec::new() })))
         }
@@ -44,7 +44,7 @@ pub fn serve() -> Result<()> {
             let done = |Report { line, facts }| Message::Done { line, facts };
             answer(&out, || work(*unit, &out).map(done))
         }
-        Request::Media { wanted: media, memory } => {
+        Request::Media { request: media, memory } => {
             limit_memory(memory)?;
             let writes = media.excerpt.iter().filter_map(|excerpt| excerpt.to.parent().map(Into::into)).collect();
             restrict(&FileAccess { reads: Some(vec![media.source.clone()]), writes });
@@ -89,8 +89,9 @@ fn work(request: UnitRequest, out: &Messages) -> Result<Report> {
 /// # Errors
 /// A video that cannot be read; an excerpt that cannot be copied.
 pub fn answer_media(request: &MediaRequest) -> Result<MediaHeader> {
-    if let Some(wanted) = &request.excerpt {
-        let secs = excerpt::copy(&request.source, &wanted.to, wanted.start_secs, wanted.secs)?;
+    if let Some(excerpt_request) = &request.excerpt {
+        let secs =
+            excerpt::copy(&request.source, &excerpt_request.to, excerpt_request.start_secs, excerpt_request.secs)?;
         return Ok(MediaHeader { secs: Some(secs), ..MediaHeader::default() });
     }
     let media = probe(&request.source)?;
@@ -129,7 +130,7 @@ impl Progress for SentProgress<'_> {
     }
 
     fn say(&self, line: &str) {
-        self.out.send_progress(&Message::Say { line: line.to_owned() });
+        self.out.send_progress(&Message::Line { line: line.to_owned() });
     }
 
     fn event(&self, event: &Event<'_>) {

@@ -1,9 +1,9 @@
 //! Decision: turns the measures of a video into intervals and a ledger, by the rules of `table`. A frame is rejected
 //! by the first rule that fails for longer than its gap allows. The rest is split at shot boundaries and identity
-//! changes; pieces that are too short or violate a rule on pieces are rejected as a whole.
+//! changes; pieces that are too short or violate a rule on segments are rejected as a whole.
 
 use super::measure::Measures;
-use super::table::{FrameRule, Gap, frame_rules, piece_rules};
+use super::table::{FrameRule, Gap, frame_rules, segment_rules};
 use orator_base::stage::ledger::{Kept, Ledger, Refused};
 use orator_base::stage::refusal::{FrameRefusal, Refusal};
 use orator_base::types::interval::{Interval, Intervals};
@@ -85,7 +85,7 @@ fn pieces(
                 Some(FrameRefusal { measured, ..refused })
             }
             None => too_short(piece, measures, begins_shot, fps, rules)
-                .or_else(|| violated_piece_rule(piece, measures, rules)),
+                .or_else(|| violated_segment_rule(piece, measures, rules)),
         };
         (piece, refused)
     });
@@ -116,9 +116,9 @@ fn too_short(
     Some(FrameRefusal::new(refusal, fps.secs(piece.n_frames()), fps.secs(rules.min_frames)))
 }
 
-/// Rejection by the first rule on pieces that a piece of good frames violates.
-fn violated_piece_rule(piece: Interval, measures: &Measures, rules: &config::SegmentConfig) -> Option<FrameRefusal> {
-    piece_rules(rules).into_iter().find_map(|rule| {
+/// Rejection by the first rule on segments that a piece of good frames violates.
+fn violated_segment_rule(piece: Interval, measures: &Measures, rules: &config::SegmentConfig) -> Option<FrameRefusal> {
+    segment_rules(rules).into_iter().find_map(|rule| {
         let values = (rule.values)(measures);
         let rests = |t: usize| rule.allows_rest && f64::from(measures.rest[t]) < rules.max_rest_move;
         let is_counted = |&t: &usize| rule.counted.holds(f64::from(values[t])) || rests(t);

@@ -35,7 +35,7 @@ pub fn shares(path: &Path, model: &mut SpeechModel, fps: FrameRate, n_frames: us
 pub fn probabilities(path: &Path, model: &mut SpeechModel) -> Result<Vec<f32>> {
     let wav = hound::WavReader::open(path).with_context(|| format!("cannot read {}", path.display()))?;
     let rate = wav.spec().sample_rate;
-    ensure!(rate == RATE, "{}: sound at {rate} Hz, expected {RATE}: run the stage extract again", path.display());
+    ensure!(rate == RATE, "{}: audio at {rate} Hz, expected {RATE} Hz: run the stage extract again", path.display());
     let mut probabilities = Vec::new();
     sound::pieces(path, WINDOW, |window| {
         probabilities.push(model.probability(window)?);

@@ -28,7 +28,7 @@ impl SpeechDetector {
         }
         let store = ModelStore::open(&settings.models.dir)?;
         let entry = store.manifest().models.iter().find(|entry| entry.role == ModelRole::Speech);
-        let entry = entry.context("the manifest of models has none of the role speech")?;
+        let entry = entry.context("the model manifest lists no model with the role speech")?;
         if settings.segment.speech == SpeechRule::Auto && store.state(entry) != ModelState::Present {
             return Ok(None);
         }
@@ -51,8 +51,8 @@ impl SpeechDetector {
     pub fn advice(settings: &Settings) -> Result<Option<&'static str>> {
         let is_missing = settings.segment.speech == SpeechRule::Auto && Self::find(settings)?.is_none();
         Ok(is_missing.then_some(
-            "speech is told by loudness alone, so music and applause count: `orator models fetch` gets the model that \
-             tells speech",
+            "no speech model is installed, so speech is detected by loudness only, and music or applause count as \
+             speech: install one with `orator models fetch`",
         ))
     }
 

@@ -10,7 +10,7 @@ use orator_base::stage::artifacts::{Artifact, StageName};
 use orator_base::stage::ledger::{Ledger, longest_first};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::{Input, Report, Stage, Unit, write_json};
-use orator_base::text::counted;
+use orator_base::text::{counted, length};
 use orator_base::types::interval::Intervals;
 use orator_base::types::sound::SoundOffset;
 use orator_dataset::config;
@@ -146,35 +146,36 @@ impl SegmentStage {
 }
 
 fn report(intervals: &Intervals, ledger: &Ledger) -> Report {
-    let (kept, refused) = (ledger.kept_secs(), ledger.refused_secs());
+    let (accepted, rejected) = (ledger.kept_secs(), ledger.refused_secs());
     let windows = intervals.windows_64;
     let mut line = if intervals.intervals.is_empty() {
-        format!("nothing kept of {:.1} s", ledger.duration_secs)
+        format!("no interval accepted in {}", length(ledger.duration_secs))
     } else {
         format!(
-            "kept {kept:.1} s of {:.1} s in {}, {} windows of 64 frames (one every 5; {} side by side)",
-            ledger.duration_secs,
+            "accepted {} of {} in {}, {} windows of 64 frames at stride 5 ({} without overlap)",
+            length(accepted),
+            length(ledger.duration_secs),
             counted(intervals.intervals.len(), "interval"),
             windows.stride_5,
             windows.apart
         )
     };
     if intervals.resting_secs() >= 0.05 {
-        let _ = write!(line, "; hands at rest {:.1} s of it", intervals.resting_secs());
+        let _ = write!(line, "; hands at rest for {}", length(intervals.resting_secs()));
     }
-    if !refused.is_empty() {
-        let _ = write!(line, "; refused: {}", longest_first(&refused));
+    if !rejected.is_empty() {
+        let _ = write!(line, "; rejected: {}", longest_first(&rejected));
     }
-    let length = |r: &orator_base::stage::ledger::Refused| r.end_secs - r.start_secs;
-    let worst = ledger.refused.iter().max_by(|a, b| length(a).total_cmp(&length(b)));
-    if let (true, Some(worst)) = (intervals.intervals.is_empty(), worst) {
-        let _ = write!(line, " ({})", worst.message);
+    let secs = |r: &orator_base::stage::ledger::Refused| r.end_secs - r.start_secs;
+    let longest = ledger.refused.iter().max_by(|a, b| secs(a).total_cmp(&secs(b)));
+    if let (true, Some(longest)) = (intervals.intervals.is_empty(), longest) {
+        let _ = write!(line, " ({})", longest.message);
     }
     let facts = serde_json::json!({
         "duration_secs": ledger.duration_secs,
-        "kept_secs": kept,
+        "accepted_secs": accepted,
         "resting_secs": intervals.resting_secs(),
-        "refused_secs": refused,
+        "rejected_secs": rejected,
         "n_intervals": intervals.intervals.len(),
         "windows_64": windows,
     });

@@ -39,14 +39,14 @@ pub struct FrameRule {
     pub allows_rest: bool,
 }
 
-/// Rule on pieces of good frames: bounds the share of frames with a property.
+/// Rule on segments, the runs of good frames: bounds the share of frames with a property.
 #[derive(Clone, Copy)]
-pub struct PieceRule {
+pub struct SegmentRule {
     pub refusal: Refusal,
     pub values: fn(&Measures) -> &[f32],
     /// Frames that are counted...
     pub counted: Bound,
-    /// ...and the bound on their share of the piece, 0..1.
+    /// ...and the bound on their share of the segment, 0..1.
     pub share: Bound,
     /// Whether frames with resting hands are counted as well.
     pub allows_rest: bool,
@@ -107,10 +107,10 @@ pub fn frame_rules(rules: &config::SegmentConfig) -> [FrameRule; 16] {
     ]
 }
 
-/// The rules on pieces of good frames.
-pub fn piece_rules(rules: &config::SegmentConfig) -> [PieceRule; 3] {
+/// The rules on segments.
+pub fn segment_rules(rules: &config::SegmentConfig) -> [SegmentRule; 3] {
     use Bound::{AtLeast, AtMost};
-    let row = |refusal, values: fn(&Measures) -> &[f32], counted, share| PieceRule {
+    let row = |refusal, values: fn(&Measures) -> &[f32], counted, share| SegmentRule {
         refusal,
         values,
         counted,

@@ -8,7 +8,7 @@ use orator_base::text::number;
 use orator_dataset::config::SegmentConfig;
 use orator_formats::media_json::MediaInfo;
 use orator_pipeline::segment::Measures;
-use orator_pipeline::segment::table::{Bound, frame_rules, piece_rules};
+use orator_pipeline::segment::table::{Bound, frame_rules, segment_rules};
 use std::collections::BTreeMap;
 
 /// Moment that is shown as a picture.
@@ -122,7 +122,7 @@ fn farthest(
     let on_frames = on_frames.map(|rule| (rule.values, rule.bound, !rule.measures_secs));
     // If the rule requires a minimum share, frames that do not count are bad; for a maximum share, those that count
     // are.
-    let on_pieces = piece_rules(rules).into_iter().filter(|rule| rule.refusal == refusal).map(|rule| {
+    let on_pieces = segment_rules(rules).into_iter().filter(|rule| rule.refusal == refusal).map(|rule| {
         let bad = match rule.share {
             Bound::AtLeast(_) => rule.counted,
             Bound::AtMost(_) => Bound::AtMost(rule.counted.threshold()),

@@ -42,13 +42,13 @@ fn a_program_runs_the_pipeline_and_asks_how_it_stands() {
     let mut events = heard.0.into_inner().unwrap();
     events.retain(|event| !event.starts_with("Advice"));
     assert!(events[0].starts_with("NoVideo") && events[2].starts_with("Done { stage: \"lift\""), "{events:?}");
-    assert_eq!(pipeline.run(&selection, &Silent).unwrap().units[1].state, RunState::Fresh);
+    assert_eq!(pipeline.run(&selection, &Silent).unwrap().units[1].state, RunState::UpToDate);
 
     let status = pipeline.status(&[]).unwrap();
     assert_eq!(status.units[0].state, UnitState::NoVideo);
     assert_eq!((status.units[1].stage, status.units[1].state), (StageName::Extract, UnitState::NeverDone));
-    assert!(!status.datasets_are_fresh());
-    assert_eq!(pipeline.time_budgets(&[]).unwrap(), status.account);
+    assert!(!status.datasets_are_up_to_date());
+    assert_eq!(pipeline.time_budgets(&[]).unwrap(), status.time_budget);
     assert!(pipeline.status(&["guest".to_owned()]).is_err());
 }
 

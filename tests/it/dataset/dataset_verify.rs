@@ -66,8 +66,8 @@ fn missing_and_strange_files_are_named() {
     }
     fs::write(dir.path().join("notes.txt"), "mine").unwrap();
     let found = verify(dir.path(), false, &Silent).unwrap();
-    assert_eq!(found.problems[0].what, "it does not belong to the dataset");
-    assert!(verify(&dir.path().join("nothing"), false, &Silent).unwrap_err().to_string().contains("is no dataset"));
+    assert_eq!(found.problems[0].message, "not part of the dataset");
+    assert!(verify(&dir.path().join("nothing"), false, &Silent).unwrap_err().to_string().contains("is not a dataset"));
 }
 
 /// What it says, and how to bring it about.
@@ -78,7 +78,7 @@ type Spoilt = (&'static str, fn(&mut Sample));
 fn numbers_that_cannot_be_are_found() {
     let spoilt: [Spoilt; 4] = [
         ("the bone to joint 5", |sample| sample.motion.joints[[2, 5, 1]] += 0.01),
-        ("the mask says it was seen", |sample| {
+        ("but visible in the mask", |sample| {
             sample.motion.joints.slice_mut(ndarray::s![1, 20, ..]).fill(f32::NAN);
             sample.motion.mask[[1, 20]] = true;
         }),

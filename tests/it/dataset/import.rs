@@ -54,7 +54,7 @@ fn plan(sources: &[&Path]) -> ImportPlan {
         sources: sources.iter().map(|path| path.to_path_buf()).collect(),
         kind: None,
         about: About::new("host", FPS),
-        limits: TakeLimits { fps: FPS, min_frames: 64, max_apart_secs: 0.5, no_sound: false },
+        limits: TakeLimits { fps: FPS, min_frames: 64, max_difference_secs: 0.5, no_sound: false },
         dataset: orator_dataset::config::DatasetConfig { validation: 0.0, test: 0.0, ..Default::default() },
     }
 }
@@ -114,7 +114,9 @@ fn a_folder_of_bvh_and_sound_becomes_a_dataset() {
     let ended: BTreeMap<&str, (&str, &str)> = answer
         .lines
         .iter()
-        .map(|line| (Path::new(&line.file).file_stem().unwrap().to_str().unwrap(), (line.ended, line.reason.as_str())))
+        .map(|line| {
+            (Path::new(&line.file).file_stem().unwrap().to_str().unwrap(), (line.outcome, line.reason.as_str()))
+        })
         .collect();
     let all = [
         ("apart", ("refused", "out of step")),
@@ -191,7 +193,7 @@ fn datasets_are_merged_byte_for_byte_and_come_back_from_other_hands() {
     }
     tar.finish().unwrap();
     let back = imported(&[&path("loose")], &path("back"));
-    assert!(back.notes.iter().any(|note| note.contains("2 x .txt left out")), "{:?}", back.notes);
+    assert!(back.notes.iter().any(|note| note.contains("skipped 2 .txt files")), "{:?}", back.notes);
     let (before, after) = (samples(&path("merged")), samples(&path("back")));
     assert_eq!(before.keys().collect::<Vec<_>>(), after.keys().collect::<Vec<_>>());
     for (key, (sample, json)) in &before {
@@ -208,7 +210,7 @@ fn datasets_are_merged_byte_for_byte_and_come_back_from_other_hands() {
     }
     tar.finish().unwrap();
     let half = imported(&[&path("loose")], &path("half"));
-    let failed: Vec<_> = half.lines.iter().filter(|line| line.ended == "failed").collect();
+    let failed: Vec<_> = half.lines.iter().filter(|line| line.outcome == "failed").collect();
     assert!(failed.len() == 1 && failed[0].message.contains("has no a-"), "{failed:?}");
     let mut other_rate = plan(&[&both[0]]);
     (other_rate.limits.fps, other_rate.about.fps) = (FrameRate::new(30, 1), FrameRate::new(30, 1));
@@ -225,7 +227,7 @@ fn the_same_take_twice_comes_in_once() {
         wav(&dir.path().join(folder).join("a.wav"), 5.3, 1);
     }
     let answer = imported(&[dir.path()], &dir.path().join("out"));
-    let ended: Vec<(&str, &str)> = answer.lines.iter().map(|line| (line.ended, line.reason.as_str())).collect();
+    let ended: Vec<(&str, &str)> = answer.lines.iter().map(|line| (line.outcome, line.reason.as_str())).collect();
     assert_eq!(ended, [("kept", ""), ("refused", "duplicate")]);
 }
 
@@ -295,7 +297,7 @@ fn silent_captures_become_a_dataset_that_no_speech_is_learnt_from() {
     let mut plan = plan(&[&source]);
     plan.limits.no_sound = true;
     let answer = import(&plan, &out, &Silent).unwrap();
-    assert!(answer.lines.iter().all(|line| line.ended == "kept"), "{:?}", answer.lines);
+    assert!(answer.lines.iter().all(|line| line.outcome == "kept"), "{:?}", answer.lines);
     assert_eq!(verify(&out, true, &Silent).unwrap().problems, []);
     assert!(samples(&out).values().all(|(sample, _)| sample.sound.samples.iter().all(|s| *s == 0.0)));
     assert!(fs::read_to_string(out.join("README.md")).unwrap().contains("There is no sound"));

@@ -31,8 +31,8 @@ fn a_second_person_is_told_until_the_user_knows_better() {
     let picture = artifacts::faces(&work, &units[0].speaker);
     let facts = |settings: &orator_dataset::config::Settings, name: &str| {
         let report = shard_as(settings, &units, &splits, name).0.unwrap();
-        assert_eq!(report.line.contains("seem to show 2 people"), picture.is_file(), "{}", report.line);
-        report.facts["several_people"].clone()
+        assert_eq!(report.line.contains("appear to show 2 persons"), picture.is_file(), "{}", report.line);
+        report.facts["several_persons"].clone()
     };
     std::fs::create_dir_all(artifacts::dir(&work, Artifact::Portrait.stage(), &units[0])).unwrap();
     assert!(facts(&settings, "nothing is known").is_null());

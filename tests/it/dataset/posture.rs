@@ -54,7 +54,7 @@ fn angles_are_kept_to_the_bit_and_go_with_their_video() {
     assert_eq!((head.n_seen, trunk.n_seen), ([163 - 11 - 8; 3], [163; 3]));
     assert!((0.3..0.35).contains(&trunk.mean[1]) || (0.25..0.3).contains(&trunk.mean[1]), "{:?}", trunk.mean);
     let card = fs::read_to_string(place.join("README.md")).unwrap();
-    assert!(card.contains("the head in 88.3 % and the trunk in 100.0 % were seen"), "{card}");
+    assert!(card.contains("the head in 88.3 %, the trunk in 100.0 % of the frames"), "{card}");
     assert!(["head.npy", "trunk.npy"].iter().all(|name| dataset.info().members.contains_key(*name)));
     drop(dataset);
     assert_eq!(verify(&place, true, &Silent).unwrap().problems, []);
@@ -66,7 +66,7 @@ fn angles_are_kept_to_the_bit_and_go_with_their_video() {
         sources: files_under(&place).into_iter().map(|(_, path)| path).filter(is_tar).collect(),
         kind: None,
         about: About::new("host", fps),
-        limits: TakeLimits { fps, min_frames: 64, max_apart_secs: 0.5, no_sound: false },
+        limits: TakeLimits { fps, min_frames: 64, max_difference_secs: 0.5, no_sound: false },
         dataset: DatasetConfig::default(),
     };
     let imported = folder.path().join("imported");
@@ -99,7 +99,7 @@ fn a_damaged_angle_is_found() {
     fs::write(&path, &damaged).unwrap();
     let found = verify(&place, true, &Silent).unwrap().problems;
     assert!(
-        found.iter().any(|problem| problem.what.contains("is damaged") && problem.what.contains(&*sample.key)),
+        found.iter().any(|problem| problem.message.contains("is damaged") && problem.message.contains(&*sample.key)),
         "{found:?}"
     );
     // A header that promises other rows.
@@ -119,7 +119,7 @@ fn a_damaged_angle_is_found() {
             sample
         });
         let found = verify(&place, true, &Silent).unwrap().problems;
-        assert!(found.iter().all(|problem| problem.what.contains("frame 5: an angle of the trunk")), "{found:?}");
+        assert!(found.iter().all(|problem| problem.message.contains("frame 5: an angle of the trunk")), "{found:?}");
         assert_eq!(found.len(), n_wrong);
     }
 }

@@ -122,7 +122,7 @@ fn a_new_video_costs_itself_and_changes_no_shard() {
     units.push(video(dir.path(), "another", 140, 77));
     let (report, grown) = shard(dir.path(), &units, "grown");
     let line = report.unwrap().line;
-    assert!(line.contains("3 videos taken over as they were"), "{line}");
+    assert!(line.contains("3 videos reused unchanged"), "{line}");
     sound(&grown);
     let after = bytes(&grown);
     let of_video = |name: &str| name.ends_with(".tar") || name.starts_with("videos/");
@@ -139,7 +139,7 @@ fn a_new_video_costs_itself_and_changes_no_shard() {
     fs::remove_file(&tar).unwrap();
     fs::write(&tar, damaged).unwrap();
     let (report, mended) = shard(dir.path(), &units, "mended");
-    assert!(report.unwrap().line.contains("2 videos taken over as they were"));
+    assert!(report.unwrap().line.contains("2 videos reused unchanged"));
     assert_eq!(bytes(&mended), after);
     // what is on record outlives the dataset
     fs::remove_dir_all(&place).unwrap();
@@ -171,7 +171,7 @@ fn shared_sound_keeps_videos_in_one_split() {
     // a name in the configuration wins, and the leak is said
     let (report, out) = shard_as(&settings, &videos, &[(&copy, Split::Train)], "named");
     let line = report.unwrap().line;
-    assert!(line.contains("s of sound: put them into one split"), "{line}");
+    assert!(line.contains("s of audio: assign both to one split"), "{line}");
     let leakage = fs::read_to_string(out.join("leakage.json")).unwrap();
     let leakage: serde_json::Value = serde_json::from_str(&leakage).unwrap();
     assert_eq!(leakage["leaks"].as_array().unwrap().len(), 1, "{leakage}");
@@ -188,10 +188,10 @@ fn what_is_not_there_is_said() {
     let named = [(&good, Split::Train), (&twin, Split::Train)];
     let (report, out) = shard_with(dir.path(), &[twin.clone(), unit(dir.path(), "never"), good.clone()], &named, "out");
     let line = report.unwrap().line;
-    let add = "no video for validation: add videos, or under [[speaker]] the line  validation = [\"";
+    let add = "no video in the validation split: add videos, or set `validation = [\"";
     assert!(line.contains(add), "{line}");
-    assert!(line.contains("1 video left out, a stage before failed"), "{line}");
-    assert!(line.contains("1 video left out, the same content is there already"), "{line}");
+    assert!(line.contains("1 video left out because an earlier stage failed"), "{line}");
+    assert!(line.contains("1 video left out as duplicates of other videos"), "{line}");
     assert_eq!(Dataset::open(&out).unwrap().info().splits["train"].videos.len(), 1);
     let accounts = read_ledgers(&out).unwrap();
     let of = |name: &str| accounts.iter().find(|account| account.file == format!("{name}.mp4")).unwrap();
@@ -202,8 +202,8 @@ fn what_is_not_there_is_said() {
 
     let short = video(dir.path(), "short", 100, 5);
     let error = shard(dir.path(), &[short], "none").0.unwrap_err().to_string();
-    assert!(error.starts_with("no interval worth keeping in 1 video of 6.7 s"), "{error}");
-    assert!(error.contains("refused: cut 6.7 s"), "{error}");
+    assert!(error.starts_with("no dataset of host: no interval was accepted in 1 video (6.7 s)"), "{error}");
+    assert!(error.contains("rejected: cut 6.7 s"), "{error}");
     let error = shard(dir.path(), &[], "nothing").0.unwrap_err().to_string();
-    assert!(error.starts_with("none of the videos of host came through"), "{error}");
+    assert!(error.starts_with("no dataset of host: none of the videos passed"), "{error}");
 }

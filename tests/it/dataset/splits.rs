@@ -92,7 +92,7 @@ fn the_record_outlives_the_dataset_and_the_dataset_the_record() {
     // A damaged record is an error that says what to do, not a new division.
     fs::write(&record, &before[..before.len() / 2]).unwrap();
     let error = format!("{:#}", shard_as(&settings, &units, &[], "damaged").0.unwrap_err());
-    assert!(error.contains("host.json is damaged") && error.contains("remove it"), "{error}");
+    assert!(error.contains("host.json is damaged") && error.contains("delete it"), "{error}");
 }
 
 #[test]
@@ -102,7 +102,7 @@ fn what_was_chosen_for_few_videos_stays_for_many() {
     let record = |dir: &Path| SplitRecord::read(&dir.join("work/splits/host.json")).unwrap().unwrap();
     let (report, out) = shard(dir.path(), &units[..7], "seven");
     let line = report.unwrap().line;
-    assert!(line.contains("splits by time, 7.") && line.contains("chosen for 7 videos, fewer than 8"), "{line}");
+    assert!(line.contains("split by time, 7.") && line.contains("chosen for 7 videos, fewer than 8"), "{line}");
     let (first, seven) = (record(dir.path()), splits(&out));
     let (report, out) = shard(dir.path(), &units, "nine");
     assert!(report.unwrap().line.contains("chosen for 7 videos, fewer than 8"));
@@ -115,14 +115,14 @@ fn what_was_chosen_for_few_videos_stays_for_many() {
     assert!(card.contains("divided by time") && card.contains("chosen for 7 videos"), "{card}");
     // Asked for by name, another division is made.
     let (report, _) = shard_as(&by_video(dir.path()), &units, &[], "by-video");
-    assert!(report.unwrap().line.contains("splits by video (the configuration says so)"));
+    assert!(report.unwrap().line.contains("split by video (the configuration says so)"));
     assert!(record(dir.path()).videos.values().all(|video| video.blocks.is_empty()));
     // Nine at once are whole.
     let other = tempfile::tempdir().unwrap();
     let units: Vec<Unit> = (0..9).map(|n| video(other.path(), &format!("v{n}"), 140, n)).collect();
     let (report, out) = shard(other.path(), &units, "out");
-    assert!(report.unwrap().line.contains("splits by video (chosen for 9 videos, at least 8)"));
-    assert!(fs::read_to_string(out.join("README.md")).unwrap().contains("in one split as a whole (chosen for 9"));
+    assert!(report.unwrap().line.contains("split by video (chosen for 9 videos, at least 8)"));
+    assert!(fs::read_to_string(out.join("README.md")).unwrap().contains("Each video is in one split (chosen for 9"));
 }
 
 #[test]
@@ -142,7 +142,7 @@ fn a_dataset_of_an_earlier_version_keeps_its_splits() {
     fs::rename(&out, &place).unwrap();
     fs::remove_dir_all(dir.path().join("work/splits")).unwrap();
     let (report, out) = shard(dir.path(), &units, "new");
-    assert!(report.unwrap().line.contains("splits by video (as it was before)"));
+    assert!(report.unwrap().line.contains("split by video (as it was before)"));
     let after = splits(&out);
     assert_eq!(after.len(), 4);
     assert!(before.iter().all(|(file, split)| after[file] == *split));

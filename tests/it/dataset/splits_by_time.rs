@@ -13,7 +13,7 @@ use orator_dataset::write::entry::VideoEntry;
 use orator_dataset::{Dataset, Split};
 use orator_gesture::train::gan::speaker_metadata::normalisation;
 use orator_gesture::train::gan::windows::WindowLoader;
-use orator_pipeline::lift::lifter::reach_secs;
+use orator_pipeline::lift::lifter::context_secs;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::fs;
@@ -29,7 +29,7 @@ fn talk(root: &Path) -> Unit {
 }
 
 fn problems(dir: &Path) -> Vec<String> {
-    verify(dir, true, &Silent).unwrap().problems.into_iter().map(|problem| problem.what).collect()
+    verify(dir, true, &Silent).unwrap().problems.into_iter().map(|problem| problem.message).collect()
 }
 
 /// Frames of every sample with its split, in order.
@@ -65,7 +65,7 @@ fn one_long_talk_gives_all_three_splits_without_a_leak() {
     assert_eq!(dataset.stats().n_seen[5], dataset.info().splits["train"].frames as u64);
 
     // Frames that had a say in a window of a split, and in no frame of another.
-    let reach = (reach_secs(&LiftConfig::default()) * FPS.per_sec()).ceil() as usize;
+    let reach = (context_secs(&LiftConfig::default()) * FPS.per_sec()).ceil() as usize;
     assert!(rule.guard_secs > FPS.secs(WINDOW) + FPS.secs(reach));
     let reached = |frames: &Range<usize>| frames.start.saturating_sub(reach)..frames.end + reach;
     let apart = |a: &Range<usize>, b: &Range<usize>| a.end <= b.start || b.end <= a.start;
@@ -138,12 +138,12 @@ fn a_division_that_cannot_be_is_found() {
     };
     // A video in two splits is right only by time.
     fs::write(out.join("info.json"), info.replace("\"unit\": \"time\"", "\"unit\": \"video\"")).unwrap();
-    found("it has samples in several splits, though the dataset is not divided by time");
+    found("it has samples in several splits, but the dataset is not divided by time");
     // A gap shorter than stated.
     let mut wide: serde_json::Value = serde_json::from_str(&info).unwrap();
     wide["split_rule"]["guard_secs"] = 9.0.into();
     fs::write(out.join("info.json"), wide.to_string()).unwrap();
-    found("two splits must be 9.00 s apart");
+    found("expected at least 9.00 s between splits");
     fs::write(out.join("info.json"), &info).unwrap();
     // A sample outside its block.
     let mut moved: serde_json::Value = serde_json::from_str(&whole).unwrap();
@@ -165,7 +165,7 @@ fn a_new_talk_moves_no_block_and_short_clips_fill_splits() {
     fs::rename(&first, &place).unwrap();
     let clips: Vec<Unit> = (0..2).map(|n| video(dir.path(), &format!("clip{n}"), 300, 10 + n)).collect();
     let (report, out) = shard(dir.path(), &[talk, clips[0].clone(), clips[1].clone()], "second");
-    assert!(report.unwrap().line.contains("1 video taken over as they were"));
+    assert!(report.unwrap().line.contains("1 video reused unchanged"));
     assert_eq!(problems(&out), [""; 0]);
     let info = Dataset::open(&out).unwrap().info().clone();
     let of = |file: &str| info.videos.iter().find(|video| video.file == file).unwrap().clone();
@@ -179,7 +179,7 @@ fn a_new_talk_moves_no_block_and_short_clips_fill_splits() {
     assert_eq!(Dataset::open(&out).unwrap().info().splits.values().filter(|split| split.samples > 0).count(), 3);
     let alone = tempfile::tempdir().unwrap();
     let (report, out) = shard(alone.path(), &[video(alone.path(), "short", 150, 5)], "short");
-    assert!(report.unwrap().line.contains("no sample for test: too little is kept to be divided"));
+    assert!(report.unwrap().line.contains("no sample in the test split: too little footage was accepted"));
     assert_eq!(Dataset::open(&out).unwrap().info().splits["train"].samples, 2);
 }
 
@@ -205,6 +205,6 @@ fn sound_that_two_talks_share_is_never_in_two_splits() {
     let copy = video_with(named.path(), "copy", 6_000, 2, 1);
     let (report, _) = shard_with(named.path(), &[talk, copy.clone()], &[(&copy, Split::Test)], "out");
     let line = report.unwrap().line;
-    assert!(line.contains("splits by video (the configuration names the split of videos)"), "{line}");
+    assert!(line.contains("split by video (the configuration names the split of videos)"), "{line}");
     assert!(unit(named.path(), "copy") == copy);
 }

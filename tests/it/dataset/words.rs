@@ -95,7 +95,7 @@ fn every_word_lies_in_one_sample_or_is_counted() {
         sources: tars,
         kind: None,
         about: About::new("host", fps),
-        limits: TakeLimits { fps, min_frames: 64, max_apart_secs: 0.5, no_sound: false },
+        limits: TakeLimits { fps, min_frames: 64, max_difference_secs: 0.5, no_sound: false },
         dataset: DatasetConfig { validation: 0.0, test: 0.0, ..DatasetConfig::default() },
     };
     let imported = talks.dir.path().join("imported");
@@ -164,6 +164,6 @@ fn a_wrong_count_of_words_is_found() {
     let text = fs::read_to_string(&path).unwrap();
     fs::write(&path, text.replace("\"n_kept\": 20", "\"n_kept\": 19")).unwrap();
     let found = verify(&out, true, &Silent).unwrap().problems;
-    let said = |what: &str| found.iter().any(|problem| problem.file == name && problem.what.contains(what));
-    assert!(said("account for every word") && said("keeps 19 words, its samples hold 20"), "{found:?}");
+    let said = |what: &str| found.iter().any(|problem| problem.file == name && problem.message.contains(what));
+    assert!(said("account for every word") && said("counts 19 words in samples, the samples contain 20"), "{found:?}");
 }

@@ -45,7 +45,7 @@ fn labels_of_hands() {
 
 #[test]
 fn take() {
-    let limits = TakeLimits { fps: FPS, min_frames: 1, max_apart_secs: 60.0, no_sound: true };
+    let limits = TakeLimits { fps: FPS, min_frames: 1, max_difference_secs: 60.0, no_sound: true };
     let kinds = [(MotionKind::Authors, "a.txt"), (MotionKind::Bvh, "a.bvh"), (MotionKind::Ted, "capture-ted.npz")];
     let dir = folder();
     let files = kinds.map(|(_, name)| {

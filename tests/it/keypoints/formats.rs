@@ -7,7 +7,7 @@ use orator_base::types::pose2d::Keypoints;
 use orator_base::types::time::FrameRate;
 use orator_formats::keypoints::{CoordinateUnit, FoundKeypoints, read};
 use orator_formats::keypoints_npz;
-use orator_pipeline::keypoints::{TakenKeypoints, take_in};
+use orator_pipeline::keypoints::{ConvertedKeypoints, convert};
 use std::path::Path;
 
 const RATE: FrameRate = FrameRate::new(15, 1);
@@ -26,8 +26,8 @@ enum Holds {
     BodyScores,
 }
 
-fn taken(found: FoundKeypoints) -> TakenKeypoints {
-    take_in(found, RATE, SIZE, RATE).unwrap()
+fn taken(found: FoundKeypoints) -> ConvertedKeypoints {
+    convert(found, RATE, SIZE, RATE).unwrap()
 }
 
 fn same(what: &str, found: &Array3<f32>, expected: &Array3<f32>, scores: Option<f32>, left_out: &[usize]) {
@@ -148,7 +148,7 @@ fn known_motion_stays_known_at_another_rate() {
         let n_frames = 4 * num as usize / den as usize;
         let folder = dir.path().join(format!("at{num}of{den}"));
         foreign::openpose(&folder, &foreign::sample(n_frames, source), OpenPoseOrder::Body25);
-        let taken = take_in(read(&folder).unwrap(), source, SIZE, RATE).unwrap();
+        let taken = convert(read(&folder).unwrap(), source, SIZE, RATE).unwrap();
         let keypoints = &taken.keypoints;
         assert_eq!(keypoints.n_frames(), RATE.frames_in(source.secs(n_frames)), "{source}");
         assert!((taken.duration_secs - source.secs(n_frames)).abs() < 1e-9);
@@ -186,7 +186,7 @@ fn of_several_people_the_large_one_is_followed_and_the_others_are_counted() {
     });
     let taken = taken(read(&folder).unwrap());
     compare("two people", &taken.keypoints, &sample, Holds::All);
-    assert_eq!(taken.notes, ["up to 2 people in a frame (97 % of the frames show several); one is followed"]);
+    assert_eq!(taken.notes, ["up to 2 persons in a frame (several in 97 % of the frames); one of them is followed"]);
     assert!(taken.extras.identity.iter().all(|number| *number == 0));
     assert_eq!((taken.extras.n_people[0], taken.extras.n_people[20]), (2, 1));
 }

@@ -7,7 +7,7 @@ use orator::Dataset;
 use orator_base::types::pose3d::Motion;
 use orator_base::types::time::FrameRate;
 use orator_formats::{joints_npz, keypoints_npz};
-use orator_pipeline::keypoints::take_in;
+use orator_pipeline::keypoints::convert;
 use orator_test_support::project::Project;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -94,7 +94,7 @@ fn keypoints_lead_to_nearly_the_joints_of_their_video() {
 
     // Twice the rate on the way and back again: the same within what lies between two frames.
     let found = orator_formats::keypoints::read(&dir.path().join("kp/clip")).unwrap();
-    let twice = take_in(found, RATE, keypoints.image_size, FrameRate::new(30, 1)).unwrap().keypoints;
+    let twice = convert(found, RATE, keypoints.image_size, FrameRate::new(30, 1)).unwrap().keypoints;
     foreign::openpose(&dir.path().join("fast/clip"), &twice, OpenPoseOrder::Coco18);
     configure(dir.path(), &format!("keypoints = [\"fast\"]\naudio = [\"sound/*.wav\"]\nfps = 30\nsize = \"{size}\""));
     let (code, text) = orator(dir.path(), &["run", "--to", "lift", "--set", "work.dir=fast_work"]);
@@ -116,10 +116,13 @@ fn what_the_files_do_not_say_is_asked_for_by_its_key() {
         ("keypoints = \"kp\"", "kp/clip: keypoint files contain no audio: add `audio = [\"FOLDER\"]` beside `keypoints`"),
         ("keypoints = \"kp\"\naudio = \"none\"", "the sound of this stage: cannot read"),
         ("keypoints = [\"kp\", \"none/*.npz\"]\naudio = \"other.wav\"", "none/*.npz: no matching file"),
-        ("keypoints = \"kp\"\naudio = \"other.wav\"", "kp/clip: it does not say its frames a second; write `fps = 25`"),
+        (
+            "keypoints = \"kp\"\naudio = \"other.wav\"",
+            "kp/clip states no frame rate: set it next to `keypoints`, for example `fps = 25`",
+        ),
         (
             "keypoints = \"kp\"\naudio = \"other.wav\"\nfps = 15",
-            "kp/clip: it does not say its picture's size; write `size = \"1280x720\"`",
+            "kp/clip states no picture size: set it next to `keypoints`, for example `size = \"1280x720\"`",
         ),
         (
             "keypoints = \"kp\"\nfps = 2000",

@@ -106,7 +106,10 @@ fn bodies_that_are_not_there_are_missing_and_a_note_says_why() {
     k.body.slice_mut(s![.., coco::R_SHOULDER, 2]).fill(0.0);
     let (joints, extra, said) = bench.lifts(&k, &[15.0]);
     assert!(joints.iter().chain(&extra).all(|v| v.is_nan()));
-    assert!(said.contains("no body in 40 of 40 frames") && said.contains("right shoulder is not seen in 40"), "{said}");
+    assert!(
+        said.contains("no body in 40 of 40 frames") && said.contains("right shoulder is not detected in 40"),
+        "{said}"
+    );
     k.body.fill(0.0);
     let (joints, _, said) = bench.lifts(&k, &[15.0]);
     assert!(joints.iter().all(|v| v.is_nan()) && said.contains("no body in 40 of 40 frames"), "{said}");

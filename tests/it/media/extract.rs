@@ -46,7 +46,7 @@ fn a_clip_with_sound_gives_all_files_and_the_same_bytes_again() {
     let [a, b] = ["a", "b"].map(|name| dir.path().join(name));
     let report = run(&video, &a, &settings).unwrap();
     run(&video, &b, &settings).unwrap();
-    assert!(report.line.starts_with("30 frames at 15 fps, ") && report.line.ends_with("2.0 s of sound"));
+    assert!(report.line.starts_with("30 frames at 15 fps, ") && report.line.ends_with("2.0 s of audio"));
 
     let repeated = array::<bool>(&a, "repeated");
     assert_eq!((repeated.len(), repeated.iter().filter(|r| **r).count()), (30, 10));

@@ -188,7 +188,7 @@ fn real_clips_are_neither_interlaced_nor_in_bars() {
         let mut reader = FrameReader::open_with(video, DATASET, 0).unwrap();
         while let Some(time) = reader.advance().unwrap() {
             if !time.repeated {
-                let picture = survey.wants_picture().then(|| reader.picture(None).unwrap());
+                let picture = survey.needs_picture().then(|| reader.picture(None).unwrap());
                 survey.push(picture, reader.is_flagged_interlaced());
             }
         }

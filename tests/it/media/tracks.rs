@@ -56,7 +56,7 @@ fn the_default_track_is_taken_or_the_one_asked_for() {
     if ffmpeg(dir.path(), &format!("-i in.mp4 {tones} -map 0:v -map 1:a -c:v copy one.mkv")) {
         let report = run(&dir.path().join("one.mkv"), &dir.path().join("one"), 2).unwrap();
         assert!(
-            report.facts.get("audio_tracks").is_none() && report.line.ends_with("2.0 s of sound"),
+            report.facts.get("audio_tracks").is_none() && report.line.ends_with("2.0 s of audio"),
             "{}",
             report.line
         );

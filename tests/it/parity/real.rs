@@ -50,13 +50,13 @@ fn one_of_two_people_is_followed() {
     let pose =
         units.iter().find(|unit| unit["stage"] == "pose2d" && unit["unit"].to_string().contains("two-")).unwrap();
     eprintln!("{pose}");
-    assert!(pose["facts"]["several_people"].as_f64().unwrap_or_default() > 0.9, "{pose}");
+    assert!(pose["facts"]["several_persons"].as_f64().unwrap_or_default() > 0.9, "{pose}");
     let kept = |name: &str| {
         let is_it = |unit: &&serde_json::Value| unit["stage"] == "segment" && unit["unit"].to_string().contains(name);
         units.iter().find(is_it).map(|unit| unit["line"].to_string()).unwrap_or_default()
     };
     assert!(
-        kept("two-").contains("kept") && kept("latentsync").contains("kept"),
+        kept("two-").contains("accepted") && kept("latentsync").contains("accepted"),
         "{} {}",
         kept("two-"),
         kept("latentsync")

@@ -63,7 +63,7 @@ fn settings_that_name_no_right_model_say_which() {
     );
     assert!(
         said(config::Pose2dConfig { hand: String::new(), ..config::Pose2dConfig::default() })
-            .contains("gives no hands")
+            .contains("has no hand keypoints")
     );
 }
 
@@ -131,7 +131,7 @@ fn a_timeline_of_another_video_and_a_missing_model_are_errors() {
     for n_frames in [3, 12] {
         write_timeline(&settings, &unit, vec![false; n_frames]);
         let said = Pose2dStage::new(&settings).unwrap().run(&unit, dir.path(), &Silent).unwrap_err().to_string();
-        assert!(said.contains(&format!("its timeline has {n_frames}")), "{said}");
+        assert!(said.contains(&format!("its timeline {n_frames}")), "{said}");
     }
     settings.models.dir = dir.path().to_owned();
     let said = Pose2dStage::new(&settings).unwrap().inputs(&unit).unwrap_err().to_string();

@@ -109,5 +109,5 @@ fn what_is_missing_is_said_on_the_page() {
         assert!(browser.problems.is_empty(), "{:?}", browser.problems);
     }
     let wrong = project.answer(&["report", "--speaker", "nobody"]);
-    assert!(wrong.code == 1 && wrong.errors.contains("no speaker is called nobody"), "{}", wrong.errors);
+    assert!(wrong.code == 1 && wrong.errors.contains("unknown speaker nobody"), "{}", wrong.errors);
 }

@@ -62,7 +62,7 @@ fn a_work_folder_has_a_status() {
     let state = |unit: &str, stage: &str| {
         let is_it = |fact: &&Value| fact["unit"].as_str().unwrap().starts_with(unit) && fact["stage"] == stage;
         let fact = units.iter().find(is_it).unwrap_or_else(|| panic!("{unit} {stage}: {}", status.json));
-        (fact["state"].as_str().unwrap().to_owned(), fact["why"].as_str().unwrap_or_default().to_owned())
+        (fact["state"].as_str().unwrap().to_owned(), fact["reason"].as_str().unwrap_or_default().to_owned())
     };
     // The clips are drawn anew: their bytes may differ from those of then, and whatever follows waits for them.
     for (unit, stage) in

@@ -67,7 +67,8 @@ fn names_in_a_dataset_lead_out_of_no_folder() {
 #[test]
 fn shards_of_other_names_are_not_taken_over() {
     // A hard link to the file that describes the dataset would be written through.
-    for (other, words) in [("../train-one-0000.tar", "is no name of a file"), ("info.json", "none of its video's")] {
+    for (other, words) in [("../train-one-0000.tar", "is no name of a file"), ("info.json", "belongs to another video")]
+    {
         shard_is_not_taken_over(other, words);
     }
 }
@@ -207,8 +208,8 @@ fn a_failed_video_takes_no_name_from_a_good_one_and_commands_no_terminal() {
     fs::write(dir.path().join("in/c.bvh"), "\u{1b}[2J\u{7}").unwrap();
     let (code, words) = run(dir.path(), &["import", "in", "--out", "out", "--speaker", "host"]);
     assert_eq!(code, 2, "{words}");
-    assert!(words.contains("one.json is not as the dataset stage writes it"), "{words}");
-    assert!(words.contains("empty.tar: import: it holds no file"), "{words}");
+    assert!(words.contains("one.json is not a valid file of a dataset"), "{words}");
+    assert!(words.contains("empty.tar: import: it contains no files"), "{words}");
     assert!(words.contains("`\u{fffd}[2J\u{fffd}` where `HIERARCHY`"), "{words:?}");
     let keys: Vec<String> = Split::ALL
         .iter()

@@ -161,7 +161,7 @@ fn a_process_that_needs_more_memory_than_its_limit_says_so() {
     let header = ask(&Limits::of_header()).unwrap();
     assert!(header.secs.is_some() && header.image_size[0] > 0, "{header:?}");
     let error = format!("{:#}", ask(&Limits { memory: 1 << 20, ..Limits::of_header() }).unwrap_err());
-    assert!(error.contains("mp4: reading it takes more than the 1 MB of memory"), "{error}");
+    assert!(error.contains("mp4: reading it needs more than the 1 MiB of memory"), "{error}");
 }
 
 #[test]

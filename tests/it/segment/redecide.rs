@@ -9,10 +9,10 @@ use std::fs;
 /// Of each stage how many units stay fresh, how many would run, and why.
 fn plan(answer: &ProgramAnswer) -> BTreeMap<String, (u64, u64, String)> {
     let of = |stage: &Value| {
-        let why = stage["because"].as_array().unwrap().iter().map(|why| why.as_str().unwrap());
+        let why = stage["reasons"].as_array().unwrap().iter().map(|why| why.as_str().unwrap());
         let n = |key: &str| stage[key].as_u64().unwrap();
         let name = stage["stage"].as_str().unwrap().to_owned();
-        (name, (n("stay_fresh"), n("would_run"), why.collect::<Vec<_>>().join("; ")))
+        (name, (n("up_to_date"), n("would_run"), why.collect::<Vec<_>>().join("; ")))
     };
     answer.json["plan"].as_array().unwrap().iter().map(of).collect()
 }
@@ -67,8 +67,8 @@ fn every_second_is_in_the_account() {
     fs::write(project.video("text.mp4"), "this is no video\n").unwrap();
     let status = || {
         let answer = project.answer(&["status"]);
-        let of = |fact: &Value| (fact["of"].as_str().unwrap().to_owned(), fact.clone());
-        let facts: BTreeMap<String, Value> = answer.json["account"].as_array().unwrap().iter().map(of).collect();
+        let of = |fact: &Value| (fact["unit"].as_str().unwrap().to_owned(), fact.clone());
+        let facts: BTreeMap<String, Value> = answer.json["time_budget"].as_array().unwrap().iter().map(of).collect();
         assert_eq!(answer.json["adds_up"], true);
         facts["host"].clone()
     };
@@ -77,8 +77,8 @@ fn every_second_is_in_the_account() {
     assert!((secs(&before, "waiting_secs") - 12.0).abs() < 0.2 && before["unknown_durations"] == 1, "{before}");
     assert_eq!(project.run(&[]).code, 2);
     let after = status();
-    let refused: f64 = after["refused_secs"].as_object().unwrap().values().map(|v| v.as_f64().unwrap()).sum();
-    assert!((secs(&after, "kept_secs") + refused - 12.0).abs() < 0.2, "{after}");
+    let refused: f64 = after["rejected_secs"].as_object().unwrap().values().map(|v| v.as_f64().unwrap()).sum();
+    assert!((secs(&after, "accepted_secs") + refused - 12.0).abs() < 0.2, "{after}");
     assert!(secs(&after, "waiting_secs") == 0.0 && after["unknown_durations"] == 1, "{after}");
     // a stage that fails takes its whole video: the length is known from the stage before
     let keypoints = files_under(&project.work().join("pose2d")).into_iter().find(|(name, _)| name.ends_with(".npz"));

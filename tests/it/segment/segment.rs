@@ -266,7 +266,7 @@ fn the_stage_reads_and_writes_its_files() {
     let (report, out) = run("out");
     let report = report.unwrap();
     assert!(
-        report.line.starts_with("kept 11.3 s of 13.3 s in 2 intervals, 10 windows of 64 frames"),
+        report.line.starts_with("accepted 11.3 s of 13.3 s in 2 intervals, 10 windows of 64 frames"),
         "{}",
         report.line
     );
@@ -282,7 +282,7 @@ fn the_stage_reads_and_writes_its_files() {
     write(&work, &unit, &footage, "a");
     assert_eq!(stage.inputs(&unit).unwrap().len(), 3);
     let line = run("silent").0.unwrap().line;
-    assert!(line.starts_with("nothing kept of 13.3 s; refused: no sound 13.3 s (no sound: "), "{line}");
+    assert!(line.starts_with("no interval accepted in 13.3 s; rejected: no sound 13.3 s (no sound: "), "{line}");
     std::fs::write(work.join("pose2d/host/talk-00000000/keypoints.npz"), "broken").unwrap();
     assert!(format!("{:#}", run("broken").0.unwrap_err()).contains("keypoints.npz"));
 }

@@ -242,13 +242,13 @@ fn without_the_model_loudness_is_the_rule_and_is_said_once() {
     let lifted = made("lift");
     let auto = project.run(&["--set", "segment.speech=auto"]);
     assert_eq!(auto.code, 0, "{}", auto.errors);
-    assert_eq!(auto.errors.matches("speech is told by loudness alone").count(), 1, "{}", auto.errors);
+    assert_eq!(auto.errors.matches("speech is detected by loudness only").count(), 1, "{}", auto.errors);
     assert!(auto.errors.contains("`orator models fetch`"), "{}", auto.errors);
     let facts = auto.json["units"].as_array().unwrap().iter().find(|unit| unit["stage"] == "segment").unwrap();
     assert_eq!(facts["speech"].as_str().or(facts["facts"]["speech"].as_str()), Some("loudness"), "{facts}");
     assert!(made("lift") == lifted);
     let card = fs::read_to_string(project.work().join("dataset/host/README.md")).unwrap();
-    assert!(card.contains("Speech was told by loudness alone"), "{card}");
+    assert!(card.contains("Speech was detected by loudness only"), "{card}");
     let vad = project.run(&["--set", "segment.speech=vad"]);
     assert_eq!(vad.code, 1, "{}", vad.errors);
     assert!(

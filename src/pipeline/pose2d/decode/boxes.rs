@@ -39,8 +39,8 @@ pub fn detections(
     min_score: f32,
     max_overlap: f32,
 ) -> Vec<PersonBox> {
-    let wanted = |idx: usize| labels.is_none_or(|labels| labels.get(idx) == Some(&person));
-    let found = rows.chunks_exact(5).enumerate().filter(|(idx, row)| row[4] > min_score && wanted(*idx));
+    let is_person = |idx: usize| labels.is_none_or(|labels| labels.get(idx) == Some(&person));
+    let found = rows.chunks_exact(5).enumerate().filter(|(idx, row)| row[4] > min_score && is_person(*idx));
     non_max_suppression(
         found.filter_map(|(_, row)| from_corners([row[0], row[1], row[2], row[3]], row[4])).collect(),
         max_overlap,

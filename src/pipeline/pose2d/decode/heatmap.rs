@@ -22,10 +22,14 @@ pub fn decode(
     gaussian: &GaussianBlur,
 ) -> Result<Vec<ScoredPoint>> {
     let &[1, _, rows @ 1..=MAX_AXIS_LEN, columns @ 1..=MAX_AXIS_LEN] = shape else {
-        anyhow::bail!("heat-maps must have the shape [1, K, rows, columns], not {shape:?}")
+        anyhow::bail!("invalid shape {shape:?} of heat maps: expected [1, K, rows, columns]")
     };
     let (rows, columns) = (rows as usize, columns as usize);
-    ensure!(maps.len().is_multiple_of(rows * columns), "{} numbers are no maps of {rows}x{columns}", maps.len());
+    ensure!(
+        maps.len().is_multiple_of(rows * columns),
+        "{} values are not a multiple of a map of {rows}x{columns}",
+        maps.len()
+    );
     let cell_px = [input_size[1] as f64 / columns as f64, input_size[0] as f64 / rows as f64];
     let position = |map: &[f32]| {
         let Some((at, height)) = peak(map) else { return [0.0; 3] };

@@ -33,10 +33,10 @@ pub(crate) fn peak(numbers: &[f32]) -> Option<(usize, f32)> {
 /// Invalid or unequal shapes.
 pub fn simcc(x: (&[i64], &[f32]), y: (&[i64], &[f32]), split: f64) -> Result<Vec<ScoredPoint>> {
     let (&[1, n_points, x_bins @ 1..=MAX_AXIS_LEN], &[1, y_points, y_bins @ 1..=MAX_AXIS_LEN]) = (x.0, y.0) else {
-        bail!("SimCC outputs must have the shape [1, K, bins], not {:?} and {:?}", x.0, y.0)
+        bail!("invalid shapes {:?} and {:?} of SimCC outputs: expected [1, K, bins]", x.0, y.0)
     };
     if n_points != y_points {
-        bail!("SimCC gives {n_points} keypoints in x and {y_points} in y");
+        bail!("SimCC outputs have {n_points} keypoints in x, {y_points} in y: expected equal numbers");
     }
     let rows = x.1.chunks_exact(x_bins as usize).zip(y.1.chunks_exact(y_bins as usize));
     let point = |(x, y): (&[f32], &[f32])| match (peak(x), peak(y)) {
@@ -54,7 +54,7 @@ pub fn simcc(x: (&[i64], &[f32]), y: (&[i64], &[f32]), split: f64) -> Result<Vec
 /// A number of values that does not fit `n_points`.
 pub fn regression(landmarks: &[f32], score: f32, n_points: usize) -> Result<Vec<ScoredPoint>> {
     let fits = n_points > 0 && landmarks.len().is_multiple_of(n_points) && landmarks.len() / n_points >= 2;
-    ensure!(fits, "{} numbers are no {n_points} points", landmarks.len());
+    ensure!(fits, "{} values cannot be divided into {n_points} points", landmarks.len());
     if !score.is_finite() || landmarks.iter().any(|number| !number.is_finite()) {
         return Ok(vec![[0.0; 3]; n_points]);
     }

@@ -46,10 +46,10 @@ pub fn decode(
             && row_len * anchors.len() == regressors.len()
             && row_len >= 4
             && row_len.is_multiple_of(2),
-        "{} anchors need as many scores and rows of box and points, not {} scores and {} numbers",
-        anchors.len(),
+        "{} scores and {} box values for {} anchors: expected one score and one row of box and points per anchor",
         logits.len(),
-        regressors.len()
+        regressors.len(),
+        anchors.len()
     );
     let mut found = Vec::new();
     for ((row, logit), centre) in regressors.chunks_exact(row_len).zip(logits).zip(anchors) {

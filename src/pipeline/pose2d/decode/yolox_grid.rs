@@ -20,8 +20,8 @@ pub fn decode(
     let n_cells: usize = strides.iter().map(|stride| (width / stride) * (height / stride)).sum();
     ensure!(
         row_len >= 6 && rows.len() == n_cells * row_len,
-        "YOLOX grids of strides {strides:?} on {width}x{height} px have {n_cells} rows of at least 6 numbers, not {} \
-         numbers in rows of {row_len}",
+        "{} values in rows of {row_len}: expected {n_cells} rows of at least 6 for YOLOX grids of strides {strides:?} \
+         on {width}x{height} px",
         rows.len()
     );
     let mut rest = rows.chunks_exact(row_len);

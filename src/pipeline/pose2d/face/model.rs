@@ -34,12 +34,16 @@ impl FaceModel {
         let Some(src_from_dst) = region.src_from_dst(size) else { return Ok(None) };
         let outputs = self.input.run_crop(image, &src_from_dst)?;
         let Decode::Regression { landmarks, score, logit, .. } = &self.decode else {
-            bail!("a face cannot be read as {:?}", self.decode)
+            bail!("a face model cannot have outputs of the kind {:?}", self.decode)
         };
         let score = outputs.floats(score)?.1.first().copied().unwrap_or(f32::NAN);
         let score = points::regression_score(score, *logit);
         let values = outputs.floats(landmarks)?.1;
-        ensure!(values.len() == 3 * N_LANDMARKS, "{} numbers are no {N_LANDMARKS} points of a face", values.len());
+        ensure!(
+            values.len() == 3 * N_LANDMARKS,
+            "{} values of face landmarks, expected 3 for each of {N_LANDMARKS}",
+            values.len()
+        );
         if !score.is_finite() || values.iter().any(|number| !number.is_finite()) {
             return Ok(None);
         }

@@ -47,7 +47,7 @@ impl FaceView {
 pub struct PortraitViews {
     views: Vec<FaceView>,
     /// Least time between two views in seconds; doubled when there are too many frontal views.
-    apart_secs: f64,
+    min_gap_secs: f64,
     /// Picture of the most frontal view, and its turn.
     picture: Option<(f64, Image)>,
 }
@@ -99,7 +99,7 @@ impl PortraitViews {
 
     /// Whether a view with this turn and time is accepted; removes another view if necessary.
     fn accepts(&mut self, turn: f64, secs: f64) -> bool {
-        if let Some(last) = self.views.last().filter(|last| secs - last.secs < self.apart_secs) {
+        if let Some(last) = self.views.last().filter(|last| secs - last.secs < self.min_gap_secs) {
             if last.turn <= turn {
                 return false;
             }
@@ -122,7 +122,7 @@ impl PortraitViews {
     fn drop_every_other(&mut self) {
         let (first, last) = (self.views.first(), self.views.last());
         let secs = first.zip(last).map_or(0.0, |(first, last)| last.secs - first.secs);
-        self.apart_secs = 2.0 * secs / N_VIEWS as f64;
+        self.min_gap_secs = 2.0 * secs / N_VIEWS as f64;
         let mut at = 0;
         self.views.retain(|_| {
             at += 1;

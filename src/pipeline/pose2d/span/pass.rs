@@ -49,14 +49,14 @@ pub fn estimate_poses(
         }
         if idx + 1 == ESTIMATE_AFTER_FRAMES && n_frames >= 6 * ESTIMATE_AFTER_FRAMES {
             let hours = start.elapsed().as_secs_f64() / (ESTIMATE_AFTER_FRAMES as f64 / video.fps.per_sec());
-            let line = format!("an hour of video takes about {hours:.1} h here, one at a time");
+            let line = format!("one hour of video takes about {hours:.1} h on this machine with one job");
             progress.event(&Event::Estimate { line: &line });
         }
         span.frames.push(pose.clone(), time.source_secs);
         task.advance(1);
         Ok(())
     })?;
-    (span.n_taken, [span.first, span.last]) = chain.people();
+    (span.n_identities, [span.first, span.last]) = chain.identities();
     span.followed = talkers.map(|shots| {
         let n_several = shots.iter().filter(|shot| shot.several).count();
         [n_several, shots.iter().filter(|shot| shot.path.is_some()).count()]

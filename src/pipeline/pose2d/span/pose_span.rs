@@ -28,7 +28,7 @@ pub struct PoseSpan {
     /// Width and height of the picture, px.
     pub image_size: [u32; 2],
     /// Number of identities so far.
-    pub n_taken: i64,
+    pub n_identities: i64,
     /// The first identity, when first recognised, and the last.
     pub first: Option<SeenPerson>,
     pub last: Option<SeenPerson>,
@@ -43,7 +43,7 @@ impl PoseSpan {
     pub fn read(folder: &Path, n_frames: usize) -> Result<Self> {
         let path = Artifact::PoseSpan.within(folder);
         let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
-        let no_span = || format!("{} holds no keypoints of a span of {n_frames} frames", path.display());
+        let no_span = || format!("{} is not a file of keypoints of {n_frames} frames", path.display());
         let span: Self = rmp_serde::from_slice(&bytes).with_context(no_span)?;
         ensure!(span.frames.n_frames() == n_frames && span.portrait.is_valid(), no_span());
         Ok(span)
@@ -61,9 +61,9 @@ impl PoseSpan {
     pub fn append(&mut self, next: Self) {
         let pair = self.last.as_ref().zip(next.first.as_ref());
         let is_same = pair.is_some_and(|(last, first)| is_same_person(last, first));
-        let n_before = self.n_taken.saturating_sub(i64::from(is_same));
+        let n_before = self.n_identities.saturating_sub(i64::from(is_same));
         self.frames.append(next.frames, n_before);
-        self.n_taken = n_before.saturating_add(next.n_taken);
+        self.n_identities = n_before.saturating_add(next.n_identities);
         if let Some(next) = next.followed {
             let before = self.followed.unwrap_or_default();
             self.followed = Some([0, 1].map(|at| before[at].saturating_add(next[at])));
@@ -100,7 +100,7 @@ impl PoseSpan {
         let mut line = format!("{n_frames} frames: person in {body}, left hand {left}, right hand {right}");
         let mut facts = json!({
             "n_frames": n_frames, "person": person, "left_hand": left_hand, "right_hand": right_hand,
-            "several_people": self.frames.share(|pose| pose.n_people > 1),
+            "several_persons": self.frames.share(|pose| pose.n_people > 1),
             "mouth": self.frames.share(|pose| pose.face.is_some()),
         });
         if let Some([several, speaking]) = self.followed {
@@ -109,8 +109,8 @@ impl PoseSpan {
                 let (shots, rest) = (counted(several, "shot"), several - speaking);
                 let _ = write!(
                     line,
-                    "; several people in {shots}: in {rest} nobody's mouth clearly follows the voice, so the largest is \
-                     followed"
+                    "; several persons in {shots}; in {rest} of them no mouth clearly matches the voice, so the \
+                     largest person is followed"
                 );
             }
         }

@@ -60,7 +60,7 @@ impl VideoFrames<'_> {
             let known = self.timeline.source_secs.get(time.frame_idx);
             ensure!(
                 self.span.start == 0 || known.is_some_and(|known| known.total_cmp(&time.source_secs).is_eq()),
-                "{}, frame {}: not at the time of the timeline: run extract again",
+                "{}, frame {}: its time differs from the timeline: run the stage extract again",
                 source.display(),
                 time.frame_idx
             );
@@ -72,7 +72,7 @@ impl VideoFrames<'_> {
 }
 
 fn frame_count_mismatch(video: &Path, found: usize, expected: usize) -> String {
-    format!("{} gave {found} frames, its timeline has {expected}: run extract again", video.display())
+    format!("{} has {found} decoded frames, its timeline {expected}: run the stage extract again", video.display())
 }
 
 /// Decodes ahead: reads all frames of `reader` in a thread, where `pick` selects what is needed of each, and passes

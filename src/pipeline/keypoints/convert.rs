@@ -14,7 +14,7 @@ const MAX_GAP_SECS: f64 = 1.0;
 
 /// Keypoints at the dataset rate, with the extra arrays of `keypoints.npz`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TakenKeypoints {
+pub struct ConvertedKeypoints {
     pub keypoints: Keypoints,
     pub extras: Extras,
     /// Duration of the source frames in seconds.
@@ -25,12 +25,12 @@ pub struct TakenKeypoints {
 
 /// Converts keypoints detected at `source_fps` in pictures of `image_size` (width, height in px) to keypoints at
 /// `fps`.
-pub fn take_in(
+pub fn convert(
     mut found: FoundKeypoints,
     source_fps: FrameRate,
     image_size: [u32; 2],
     fps: FrameRate,
-) -> Result<TakenKeypoints> {
+) -> Result<ConvertedKeypoints> {
     found.to_pixels(image_size);
     let max_gap = (MAX_GAP_SECS * source_fps.per_sec()) as usize;
     let followed = follow(&found.frames, image_size[0] as f32, max_gap);
@@ -54,7 +54,7 @@ pub fn take_in(
     drop(found.frames);
     let (keypoints, extras) = gathered.finish(fps, image_size)?;
     notes.extend(note_on_others(&followed));
-    Ok(TakenKeypoints { keypoints, extras, duration_secs, notes })
+    Ok(ConvertedKeypoints { keypoints, extras, duration_secs, notes })
 }
 
 /// One output frame; person count and identity are those of the nearest source frame.
@@ -78,7 +78,7 @@ fn note_on_others(followed: &FollowedPerson) -> Option<String> {
     let n_several = followed.n_people.iter().filter(|n| **n > 1).count();
     let most = followed.n_people.iter().max().filter(|most| **most > 1)?;
     Some(format!(
-        "up to {most} people in a frame ({:.0} % of the frames show several); one is followed",
+        "up to {most} persons in a frame (several in {:.0} % of the frames); one of them is followed",
         100.0 * n_several as f64 / n_frames.max(1) as f64
     ))
 }
