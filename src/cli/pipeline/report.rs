@@ -45,7 +45,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     workdir::write_file(&out, page.html.as_bytes())?;
     let (sums, mut facts) = (page.sums, page.facts);
     let text = format!(
-        "kept {} of {} ({}), refused {}, failed {}\nwrote {} ({:.1} MB)",
+        "accepted {} of {} ({}), rejected {}, failed {}\nwrote {} ({:.1} MB)",
         length(sums.kept),
         length(sums.whole),
         percent(sums.kept, sums.whole),
