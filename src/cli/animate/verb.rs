@@ -49,7 +49,7 @@ use std::time::Instant;
 /// a palm that does not point along its hand is replaced by that of the other hand, or else by a standard one.
 ///
 /// Smoothing removes noise that is estimated for each bone; motion without noise changes by a few millimetres at
-/// most. The limits of elbow, forearm, wrist and finger joints were measured on motion capture; the report counts
+/// most. The limits of elbow, forearm, wrist and finger joints were measured in motion capture; the report counts
 /// every clamped angle.
 #[derive(clap::Args)]
 pub struct Args {

@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 
 /// Write a plan for cluster workers, with time estimates.
 ///
-/// `orator work` and `orator submit` read the plan. Each video is hashed unless its hash is known; workers refuse a
+/// `orator work` and `orator submit` read the plan. Each video is hashed unless its hash is known; workers reject a
 /// video that changes afterwards. The stages are timed on excerpts of the videos on this machine, which should be
 /// idle. The times are saved and reused until the program, the settings, the models or the machine change.
 #[derive(clap::Args)]
@@ -38,7 +38,7 @@ pub(crate) struct Args {
     /// Print the number of workers needed to finish within this number of hours.
     #[arg(long, value_name = "HOURS")]
     hours: Option<f64>,
-    /// Length of the pieces into which a long video is split for workers, minutes.
+    /// Length of the parts into which a long video is split for workers, minutes.
     #[arg(long, value_name = "MINUTES", default_value_t = PIECE_SECS / 60.0)]
     piece: f64,
     /// Do not time the stages, and print no estimates.

@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 /// models (a model cannot unlearn), plans of `orator plan` and the hash table. Shards of other videos stay unchanged
 /// byte for byte. Afterwards every file in the work folder is searched for names and hashes of the video.
 ///
-/// The video file itself and copies elsewhere are not deleted. Exit code 1: the search found something.
+/// The video file itself and copies elsewhere are not deleted. Exit code 1: the search found remaining data.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]

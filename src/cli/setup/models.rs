@@ -136,7 +136,7 @@ pub fn fetch(store: &ModelStore, wanted: &[Wanted], mirror: Option<&Path>, ui: &
     }
     if !terms.is_empty() {
         ui.say(&format!(
-            "missing models (one of each kind is enough; the first that can be downloaded is used):{terms}"
+            "missing models (of those for one purpose, the first that can be downloaded is enough):{terms}"
         ));
     }
     let fetched = store.fetch(wanted, mirror, ui)?;
