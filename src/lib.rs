@@ -11,8 +11,8 @@
 //!
 //! | crate | contents |
 //! |---|---|
-//! | `orator-base` | plain values, mathematics, the body as numbers, sound features, stage records; no foreign library |
-//! | `orator-formats` | every file format, read and written; captured motion read into our skeleton |
+//! | `orator-base` | plain values, mathematics, body model, audio features, stage records; no foreign library |
+//! | `orator-formats` | every file format; motion capture converted to the skeleton of the program |
 //! | `orator-media` | FFmpeg, OpenCV, the word aligner, the sandbox |
 //! | `orator-onnx` | ONNX Runtime, the model store, model conversion |
 //! | `orator-nn` | operators with their kernels, and the networks (candle) |
@@ -22,20 +22,20 @@
 //! | `orator-gesture` | training, generation, metrics, evaluation |
 //! | `orator-report` | HTML pages and contact sheets |
 //! | `orator-study` | user studies: films, server, statistics |
-//! | `orator-cluster` | many machines on one work folder |
+//! | `orator-cluster` | several machines that share one work folder |
 //! | `orator` | this library and the program |
 //! | `orator-test-support` | inputs with known truth for tests |
 //! | `orator-lab` | synthetic speakers, training and evaluation of the shipped lifters; its own program |
 //!
 //! Data flow. A frame: `media::ffmpeg` -> `media::opencv` (crop, warp) -> `onnx` -> `pipeline::pose2d` (decode, track) ->
 //! *keypoints* -> `pipeline::segment` -> `pipeline::lift` -> *joints* -> `dataset::write` -> *shard* -> `dataset::read` ->
-//! `gesture::train`. A sample of sound: `media::ffmpeg` -> *audio file* -> `dataset::write` -> *shard* -> `dataset::read`
-//! -> `base::audio::mel` -> `nn::gan`. Sound and frames meet by time in seconds (`base::types::sound`).
+//! `gesture::train`. An audio sample: `media::ffmpeg` -> *audio file* -> `dataset::write` -> *shard* -> `dataset::read`
+//! -> `base::audio::mel` -> `nn::gan`. Audio and frames are aligned by time in seconds (`base::types::sound`).
 //!
 //! Invariants: the same input, configuration and seed give the same bytes, whatever the number of workers. Writes are
 //! atomic: attempt file, fsync, rename (`base::stage::workdir`), record last. Readers of a dataset or a model hold its
 //! shared lock, writers the exclusive one; locks are taken in the order work folder, dataset, model, and a lock that is
-//! held is reported at once instead of awaited. Memory does not grow with the length of a video, except for its keypoints.
+//! held is an immediate error, not a wait. Memory does not grow with the length of a video, except for its keypoints.
 //! No user input panics.
 
 #![warn(missing_docs)]
@@ -84,10 +84,10 @@ pub use orator_gesture::evaluate::clips::checkpoint::EvaluatedCheckpoint;
 pub use orator_gesture::generate::trained::TrainedSpeaker;
 pub use orator_gesture::metrics::settings::MetricSettings;
 
-// Models that look at pictures.
+// Image models.
 pub use orator_onnx::{ModelState, ModelStore};
 
-// Errors to be matched.
+// Errors for `downcast_ref`.
 pub use orator_base::stage::workdir::{BusyFolder, NoSpace};
 pub use orator_dataset::config::ConfigError;
 pub use orator_gesture::train::epochs::StoppedTraining;

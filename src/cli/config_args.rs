@@ -36,7 +36,7 @@ impl ConfigArgs {
     /// error.
     pub fn load(&self) -> anyhow::Result<orator_dataset::config::Config> {
         let config = orator_dataset::config::load(&self.config, &self.set)?;
-        config.notes.iter().for_each(|note| crate::cli::ui::note(&format!("note    {note}")));
+        config.notes.iter().for_each(|note| crate::cli::ui::note(&format!("note: {note}")));
         Ok(config)
     }
 }

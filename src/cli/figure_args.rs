@@ -9,10 +9,10 @@ use orator_base::types::time::FrameRate;
 #[derive(clap::Args)]
 pub(super) struct FigureArgs {
     /// Naming convention of the bones in .bvh, .fbx, .glb and .json.
-    #[arg(long, value_name = "own|mixamo|unity-humanoid|vrm|unreal", default_value = "own", value_parser = names_called)]
+    #[arg(long, value_name = "own|mixamo|unity-humanoid|vrm|unreal", default_value = "own", value_parser = parse_names)]
     names: Names,
-    /// Frame rate of the output, frames per second, such as 30 or 30000/1001; defaults to the rate of the motion, for
-    /// .mp4 to its smallest multiple of at least 30.
+    /// Frame rate of the output, frames per second, such as 30 or 30000/1001; defaults to the rate of the motion, and
+    /// for .mp4 to its smallest multiple of at least 30.
     #[arg(long, value_name = "RATE")]
     fps: Option<FrameRate>,
 }
@@ -33,13 +33,13 @@ impl FigureArgs {
         let is_named = formats.any(ExportFormat::has_names);
         ensure!(
             is_named || self.names == Names::Own,
-            "--names is for .bvh, .fbx, .glb and .json, .vrm and .vrma have their own: name one of the first, or leave it away"
+            "--names applies to .bvh, .fbx, .glb and .json only: write one of these formats, or remove --names"
         );
         Ok(())
     }
 }
 
-fn names_called(label: &str) -> Result<Names, String> {
+fn parse_names(label: &str) -> Result<Names, String> {
     let known = || Names::ALL.map(Names::label).join(", ");
     Names::ALL.into_iter().find(|names| names.label() == label).ok_or_else(|| format!("expected one of {}", known()))
 }

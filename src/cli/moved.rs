@@ -1,4 +1,4 @@
-//! Verbs that moved to `orator-lab`: the answer of `orator` to their old names.
+//! Verbs that moved to `orator-lab`: the error for their old names.
 
 use super::program::Outcome;
 use anyhow::{Result, bail};
@@ -13,8 +13,8 @@ pub struct MovedVerb {
 
 impl MovedVerb {
     /// Fails with the command that replaces `orator VERB`.
-    pub fn refuse(self, verb: &str) -> Result<Outcome> {
-        let words = self.rest.iter().map(|word| format!(" {word}")).collect::<String>();
-        bail!("`orator {verb}` moved to another program, installed beside this one: run `orator-lab {verb}{words}`")
+    pub fn fail(self, verb: &str) -> Result<Outcome> {
+        let arguments = self.rest.iter().map(|argument| format!(" {argument}")).collect::<String>();
+        bail!("`orator {verb}` has moved to another program: run `orator-lab {verb}{arguments}`")
     }
 }

@@ -15,14 +15,18 @@ pub type OutputFiles = Vec<(PathBuf, ExportFormat)>;
 /// A file is listed twice, is a folder, is one that the verb reads, or has an unknown extension.
 pub fn outputs(out: &[PathBuf], is_read: impl Fn(&Path) -> bool, input: &str, hint: &str) -> Result<OutputFiles> {
     for (n, path) in out.iter().enumerate() {
-        ensure!(!is_read(path), "{} is {input}; write to another file", path.display());
-        ensure!(!out[..n].contains(path), "{} is asked for twice", path.display());
+        ensure!(!is_read(path), "output {} is {input}; choose another path", path.display());
+        ensure!(!out[..n].contains(path), "output {} is listed twice", path.display());
         let joints =
             out.iter().find(|joints| description::is_description(path) && description::path_of(joints) == **path);
         if let Some(joints) = joints {
-            bail!("{} is where the rate of {} is written; write to another file", path.display(), joints.display());
+            bail!(
+                "output {} is reserved for the frame rate of {}; choose another path",
+                path.display(),
+                joints.display()
+            );
         }
-        ensure!(!path.is_dir(), "{} is a folder; name a file in it{hint}", path.display());
+        ensure!(!path.is_dir(), "output {} is a folder, expected a file{hint}", path.display());
     }
     out.iter().map(|path| Ok((path.clone(), ExportFormat::from_path(path)?))).collect()
 }

@@ -26,7 +26,7 @@ pub enum Outcome {
     /// Stopped on request (Ctrl-C, SIGTERM) at a point from which the same command continues.
     Stopped,
     /// A check (of the set-up or a dataset) failed; the problems were printed.
-    Wrong,
+    CheckFailed,
 }
 
 /// Build a 3D speech-gesture dataset from videos of a speaker, and train a model that gestures like the speaker.
@@ -109,7 +109,7 @@ fn run(cli: Cli, ui: &Ui) -> Result<Outcome> {
         Verb::Guide(args) => completions::run_guide(&args, ui),
         Verb::Completions(args) => completions::run(&args, Cli::command(), ui),
         Verb::Man(args) => completions::run_man(&args, Cli::command(), ui),
-        Verb::Demo(args) => args.refuse("demo"),
+        Verb::Demo(args) => args.fail("demo"),
     }
 }
 
@@ -122,7 +122,7 @@ pub fn run_program<C: CommandFactory + FromArgMatches>(
     let command = C::command();
     let name = command.get_name().to_owned();
     let parsed = command.try_get_matches().and_then(|matches| {
-        workdir::announce(words(&name, &matches));
+        workdir::announce(verb_path(&name, &matches));
         C::from_arg_matches(&matches)
     });
     let cli = match parsed {
@@ -134,11 +134,11 @@ pub fn run_program<C: CommandFactory + FromArgMatches>(
     };
     let ui = Ui::new(json(&cli));
     match run(cli, &ui) {
-        Ok(_) if ui.has_lost_output() => ExitCode::from(1),
+        Ok(_) if ui.has_output_error() => ExitCode::from(1),
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::SomeFailed) => ExitCode::from(2),
         Ok(Outcome::Stopped) => ExitCode::from(ui.stop_code()),
-        Ok(Outcome::Wrong) => ExitCode::from(1),
+        Ok(Outcome::CheckFailed) => ExitCode::from(1),
         Err(error) => {
             ui.error(&error);
             ExitCode::from(1)
@@ -147,20 +147,20 @@ pub fn run_program<C: CommandFactory + FromArgMatches>(
 }
 
 /// The program and its verb, such as `orator train gan`.
-fn words(program: &str, matches: &ArgMatches) -> String {
-    let (mut words, mut next) = (program.to_owned(), matches.subcommand());
-    while let Some((word, matches)) = next {
-        words += &format!(" {word}");
+fn verb_path(program: &str, matches: &ArgMatches) -> String {
+    let (mut path, mut next) = (program.to_owned(), matches.subcommand());
+    while let Some((verb, matches)) = next {
+        path += &format!(" {verb}");
         next = matches.subcommand();
     }
-    words
+    path
 }
 
 #[cfg(test)]
 mod tests {
     /// Every argument has help, and no two conflict.
     #[test]
-    fn the_command_line_is_sound() {
+    fn the_command_line_is_valid() {
         <super::Cli as clap::CommandFactory>::command().debug_assert();
     }
 }

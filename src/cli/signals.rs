@@ -24,10 +24,10 @@ pub fn ignore_signals() {
     let _ = (signal(SignalKind::interrupt()), signal(SignalKind::terminate()));
 }
 
-/// From now on, Ctrl-C or SIGTERM exits the program (code 130 or 143) and prints `kept`: what is saved and how to
+/// From now on, Ctrl-C or SIGTERM exits the program (code 130 or 143) and prints `saved`: what is saved and how to
 /// continue.
-pub fn exit_on_signal(kept: &'static str) {
-    on_signal(move |code| end(code, kept));
+pub fn exit_on_signal(saved: &'static str) {
+    on_signal(move |code| end(code, saved));
 }
 
 /// Whether a stop was requested by Ctrl-C or SIGTERM.
@@ -39,12 +39,12 @@ pub struct StopRequest {
 
 impl StopRequest {
     /// From now on, the first signal is a stop request and prints `first`; the second exits the program and prints
-    /// `kept`.
-    pub fn listen(&self, first: &'static str, kept: &'static str) {
+    /// `saved`.
+    pub fn listen(&self, first: &'static str, saved: &'static str) {
         let requested = self.code.clone();
         on_signal(move |code| match requested.swap(code, Ordering::Relaxed) {
             0 => note(&format!("\n{first}")),
-            _ => end(code, kept),
+            _ => end(code, saved),
         });
     }
 
@@ -54,8 +54,8 @@ impl StopRequest {
     }
 }
 
-fn end(code: u8, kept: &str) {
-    note(&format!("\nstopped; {kept}"));
+fn end(code: u8, saved: &str) {
+    note(&format!("\nstopped; {saved}"));
     std::process::exit(i32::from(code));
 }
 

@@ -15,14 +15,19 @@ use std::time::Duration;
 pub struct Ui {
     json: bool,
     bars: MultiProgress,
-    has_lost_output: AtomicBool,
+    has_output_error: AtomicBool,
     stop: StopRequest,
 }
 
 impl Ui {
     /// With `json` the summary is one JSON object. Bars go to standard error and are hidden if that is not a terminal.
     pub fn new(json: bool) -> Self {
-        Self { json, bars: MultiProgress::new(), has_lost_output: AtomicBool::new(false), stop: StopRequest::default() }
+        Self {
+            json,
+            bars: MultiProgress::new(),
+            has_output_error: AtomicBool::new(false),
+            stop: StopRequest::default(),
+        }
     }
 
     /// Prints the result of a verb: the summary and the next command to type, or `facts` with `--json`.
@@ -54,14 +59,14 @@ impl Ui {
     }
 
     /// Whether writing to standard output failed (for example, because of a full disk).
-    pub fn has_lost_output(&self) -> bool {
-        self.has_lost_output.load(Ordering::Relaxed)
+    pub fn has_output_error(&self) -> bool {
+        self.has_output_error.load(Ordering::Relaxed)
     }
 
     /// From now on, the first Ctrl-C or SIGTERM requests a stop (`is_to_stop`) and prints `stopping`; the second exits
-    /// the program and prints `kept`.
-    pub fn enable_stop_requests(&self, stopping: &'static str, kept: &'static str) {
-        self.stop.listen(stopping, kept);
+    /// the program and prints `saved`.
+    pub fn enable_stop_requests(&self, stopping: &'static str, saved: &'static str) {
+        self.stop.listen(stopping, saved);
     }
 
     /// Whether a stop was requested.
@@ -80,7 +85,7 @@ impl Ui {
         if let Err(error) = writeln!(out, "{}", sanitised(line)).and_then(|()| out.flush())
             && error.kind() != ErrorKind::BrokenPipe
         {
-            self.has_lost_output.store(true, Ordering::Relaxed);
+            self.has_output_error.store(true, Ordering::Relaxed);
             note(&format!("error: cannot write to standard output: {error}"));
         }
     }

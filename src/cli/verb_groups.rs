@@ -30,7 +30,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
     ("Setup", &["doctor", "models", "words", "guide", "completions", "man"]),
 ];
 
-/// Help of a program in which [`list`] stands in the place of the subcommands.
+/// Help of a program in which [`list`] replaces the list of subcommands.
 pub(super) const TEMPLATE: &str = "{about-with-newline}\n{usage-heading} {usage}\n\n{before-help}Options:\n{options}\n";
 
 /// The verbs of `V` with their descriptions, a paragraph for each group.
@@ -45,7 +45,7 @@ pub(super) fn list<V: Subcommand>() -> String {
         }
         text.push('\n');
     }
-    text + "`orator VERB --help` explains a verb, `orator guide` lists the pages of the guide."
+    text + "`orator VERB --help` describes a verb; `orator guide` lists the pages of the guide."
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 /// A page of the guide.
 #[derive(Clone, Copy, Debug)]
 pub struct Topic {
-    /// Word by which `orator guide` finds the page.
+    /// Name of the page for `orator guide`.
     pub name: &'static str,
     /// Contents of the page in one line.
     pub summary: &'static str,
@@ -19,20 +19,20 @@ macro_rules! topic {
 
 /// Every page, in reading order.
 pub const TOPICS: [Topic; 14] = [
-    topic!("dataset", "files of a dataset, refused seconds, transcripts, splits, import and removal"),
-    topic!("lifting", "2D keypoints to 3D joints: input, output, errors, a lifter of your own"),
-    topic!("keypoints", "keypoints of OpenPose, MMPose, AlphaPose, MediaPipe and PATS in place of videos"),
-    topic!("training", "training: settings, recipes, fine-tuning, validation, checkpoints; speech to motion"),
+    topic!("dataset", "files of a dataset, rejected seconds, transcripts, splits, import and removal"),
+    topic!("lifting", "2D keypoints to 3D joints: input, output, errors, custom lifters"),
+    topic!("keypoints", "keypoints of OpenPose, MMPose, AlphaPose, MediaPipe and PATS instead of videos"),
+    topic!("training", "training: settings, recipes, fine-tuning, validation, checkpoints; generating motion"),
     topic!("animation", "joints to BVH, GLB, JSON and MP4: rig, smoothing, constraints"),
-    topic!("evaluation", "metrics, baselines, verdicts, conventions, comparison of results, rendered people"),
+    topic!("evaluation", "metrics, baselines, conclusions, conventions, comparison of results, rendered persons"),
     topic!("results", "measured results of detectors, recipes and fine-tuning; speed; the commands that print them"),
-    topic!("study", "user studies: the study file, clips and films, the page, the answers and what they say"),
-    topic!("models", "the pose models: origin, licences, fetching, adding one"),
+    topic!("study", "user studies: the study file, clips and films, the web page, the answers and their analysis"),
+    topic!("models", "pose models: origin, licences, download, adding your own"),
     topic!("configuration", "pipeline.toml, --set, the work folder, exit codes, JSON output"),
-    topic!("cluster", "many machines on one work folder: plan, workers, Slurm, Kubernetes, ssh"),
-    topic!("security", "what is trusted: the sandbox of videos, files, network, forgetting, locks"),
-    topic!("architecture", "the crates of the workspace, and the way of a frame through them"),
-    topic!("contributing", "building, tests, real data, rules of the source"),
+    topic!("cluster", "several machines that share a work folder: plan, workers, Slurm, Kubernetes, SSH"),
+    topic!("security", "threat model: sandboxed video decoding, files, network, removal of data, locks"),
+    topic!("architecture", "crates of the workspace, and the data flow between them"),
+    topic!("contributing", "building, tests, real data, rules of the source code"),
 ];
 
 #[cfg(test)]

@@ -96,9 +96,9 @@ impl SmoothingArgs {
         let strength = self.smoothing_strength;
         ensure!(
             strength == 1.0 || self.smoothing == SmoothingKind::Adaptive,
-            "--smoothing-strength is for --smoothing adaptive"
+            "--smoothing-strength applies to --smoothing adaptive only"
         );
-        ensure!((0.0..=100.0).contains(&strength), "--smoothing-strength is {strength}, expected 0 to 100");
+        ensure!((0.0..=100.0).contains(&strength), "--smoothing-strength {strength}: expected 0 to 100");
         Ok(match self.smoothing {
             SmoothingKind::None => Smoothing::None,
             SmoothingKind::Adaptive => Smoothing::Adaptive { strength },

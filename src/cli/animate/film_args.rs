@@ -8,7 +8,7 @@ pub(super) struct FilmArgs {
     #[arg(long = "style", hide = true, value_parser = former_style)]
     _style: Option<String>,
     /// Camera of an .mp4 output; `source` uses the camera fitted to the video of --beside and draws the avatar over
-    /// its picture.
+    /// its frames.
     #[arg(long, value_enum, default_value = "front")]
     camera: CameraName,
 }
@@ -43,5 +43,5 @@ fn former_style(style: &str) -> Result<String, String> {
     if style == "avatar" {
         return Ok(style.to_owned());
     }
-    Err("--style was removed: films show the avatar, and `orator sheet` draws the joints as pictures".to_owned())
+    Err("--style was removed: videos show the avatar, and `orator sheet` draws the joints".to_owned())
 }

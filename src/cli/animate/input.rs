@@ -43,11 +43,11 @@ pub struct InputMotion {
 
 /// The motions denoted by a file, the folder of a lifted video or a speaker, a folder of motions, or a dataset.
 pub fn inputs(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result<Vec<MotionInput>> {
-    ensure!(path.exists(), "{} is not there", path.display());
+    ensure!(path.exists(), "{} does not exist", path.display());
     let is_dataset = path.join("info.json").is_file() && path.join("index.jsonl").is_file();
     ensure!(
         is_dataset || (sample.is_none() && split.is_none()),
-        "{} is no dataset (work/dataset/SPEAKER): --sample and --split have no meaning for it",
+        "{} is not a dataset (work/dataset/SPEAKER): --sample and --split apply to datasets only",
         path.display()
     );
     if is_dataset {
@@ -82,14 +82,14 @@ pub fn inputs(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result
     for pair in found.windows(2) {
         ensure!(
             pair[0].name != pair[1].name,
-            "{}: two motions are called {}; their outputs would be one file",
+            "{}: two motions have the name {}, so their outputs would overwrite each other; rename one",
             path.display(),
             pair[0].name
         );
     }
     ensure!(
         !found.is_empty(),
-        "{} holds no motion: neither .npy, .txt, .npz or .bvh files nor folders with a {}",
+        "{} contains no motion: expected .npy, .txt, .npz or .bvh files, or folders with {}",
         path.display(),
         Artifact::Joints.file()
     );
@@ -101,17 +101,17 @@ fn of_dataset(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result
     let splits = split.map_or(Split::ALL.to_vec(), |split| vec![split]);
     let samples: Vec<SampleRef> = splits.into_iter().flat_map(|split| dataset.samples(split)).collect();
     let keys = || samples.iter().take(5).map(|sample| sample.key.clone()).collect::<Vec<_>>().join(", ");
-    let meant = |found: &&SampleRef| sample.is_none_or(|key| *found.key == *key);
+    let is_requested = |found: &&SampleRef| sample.is_none_or(|key| *found.key == *key);
     let inputs: Vec<MotionInput> = samples
         .iter()
-        .filter(meant)
+        .filter(is_requested)
         .map(|found| MotionInput {
             name: found.key.to_string(),
             location: InputLocation::Sample(Rc::clone(&dataset), Box::new(found.clone())),
         })
         .collect();
     match (inputs.is_empty(), sample) {
-        (true, Some(key)) => bail!("{} has no sample {key}; it has, for instance: {}", path.display(), keys()),
+        (true, Some(key)) => bail!("{} has no sample {key}; examples of its samples: {}", path.display(), keys()),
         (true, None) => bail!("{} has no sample in this split", path.display()),
         _ => Ok(inputs),
     }
@@ -149,7 +149,7 @@ impl MotionInput {
                 InputMotion { motion, posture: None, is_seated: None, sound: None, has_rate, notes }
             }
         };
-        check(&loaded.motion).with_context(|| format!("no animation of {}", self.name))?;
+        check(&loaded.motion).with_context(|| format!("cannot animate {}", self.name))?;
         match self.keypoints(keypoints, &loaded.motion)? {
             Some(Keypoints { body, .. }) => {
                 let InputMotion { motion, sound, has_rate, notes, .. } = loaded;
@@ -212,7 +212,7 @@ fn read_keypoints(path: &Path, motion: &Motion) -> Result<Keypoints> {
     let keypoints = keypoints_npz::read(path)?;
     ensure!(
         keypoints.n_frames() == motion.n_frames(),
-        "{} has {} frames of keypoints, the motion has {}: they are not of the same clip",
+        "{} has {} frames of keypoints, the motion has {}: expected keypoints of the same clip",
         path.display(),
         keypoints.n_frames(),
         motion.n_frames()
@@ -222,8 +222,9 @@ fn read_keypoints(path: &Path, motion: &Motion) -> Result<Keypoints> {
 
 /// Checks that the motion has frames and is in metres.
 fn check(motion: &Motion) -> Result<()> {
-    ensure!(motion.n_frames() > 0, "it has no frames");
-    units::arm_bone(motion)
-        .with_context(|| format!("no arm is seen in any of its {} frames: every joint is NaN", motion.n_frames()))?;
+    ensure!(motion.n_frames() > 0, "the motion has no frames");
+    units::arm_bone(motion).with_context(|| {
+        format!("no arm is detected in any of the {} frames: every arm joint is NaN", motion.n_frames())
+    })?;
     units::check(motion)
 }

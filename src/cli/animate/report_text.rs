@@ -1,6 +1,7 @@
 //! Report of an animation as text.
 
 use orator_avatar::animate::performance::{AnimationReport, DetectedFrames, Jerk};
+use orator_base::text::counted;
 
 /// Lines about jerk, head, detected frames and clamped angles.
 pub(super) fn text(report: &AnimationReport) -> String {
@@ -8,15 +9,15 @@ pub(super) fn text(report: &AnimationReport) -> String {
     let jerk = |jerk: Jerk| format!("{} -> {}", number(jerk.before), number(jerk.after));
     let mut text = format!("jerk, m/s3: arms {}, hands {}\n", jerk(report.arms), jerk(report.hands));
     text += &match report.face_frames {
-        Some(n) if n > 0 => format!("head: seen in {n} of {} frames\n", report.n_frames),
+        Some(n) if n > 0 => format!("head: detected in {n} of {}\n", counted(report.n_frames, "frame")),
         _ => "head: at rest\n".to_owned(),
     };
     text += &detected(report);
     let clamped: Vec<_> = report.clamps.iter().filter(|clamps| clamps.joint_frames > 0).collect();
     match (report.clamps.is_empty(), clamped.is_empty()) {
-        (true, _) => text += "no constraints\n",
-        (_, true) => text += "nothing had to be clamped\n",
-        _ => text += "clamped                      angles   share    by, mean and most, degrees\n",
+        (true, _) => text += "joint angles: not limited\n",
+        (_, true) => text += "joint angles: none clamped\n",
+        _ => text += "clamped                      angles   share    excess in degrees: mean, maximum\n",
     }
     for clamps in clamped {
         text += &format!(
@@ -43,5 +44,5 @@ fn detected(report: &AnimationReport) -> String {
         return String::new();
     }
     let parts: Vec<_> = parts().map(|(part, n)| format!("{part} in {n}")).collect();
-    format!("seen, of {} frames: {}; the rest is bridged or held\n", report.n_frames, parts.join(", "))
+    format!("detected, of {} frames: {}; other frames are interpolated or held\n", report.n_frames, parts.join(", "))
 }

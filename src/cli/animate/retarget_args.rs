@@ -65,7 +65,7 @@ impl OpenedRig {
         let ours = &performance.rig.skeleton;
         let map = match &self.map {
             Some((text, path)) => BoneMap::parse(text, self.rig.rig(), ours)
-                .with_context(|| format!("{} maps no bones", path.display()))?,
+                .with_context(|| format!("invalid bone map {}", path.display()))?,
             None => BoneMap::detect(self.rig.rig())?,
         };
         let text = map.text(self.rig.rig(), ours);
@@ -74,7 +74,7 @@ impl OpenedRig {
             ui.say(&format!("wrote {}", path.display()));
         }
         ui.say(text.trim_end());
-        ensure!(map.n_bones() > 0, "no bone is mapped");
+        ensure!(map.n_bones() > 0, "no bones are mapped; map them with --bone-map FILE");
         for (path, _) in outputs {
             self.rig.write(path, performance, &map).with_context(|| format!("cannot write {}", path.display()))?;
         }

@@ -20,6 +20,7 @@ use orator_avatar::animate::export::film_source::SourceCamera;
 use orator_avatar::animate::{AnimationOptions, Constraints, Legs, Performance, perform};
 use orator_base::motion::units;
 use orator_base::stage::progress::Progress as _;
+use orator_base::text::{counted, length};
 use orator_base::types::pose3d::Motion;
 use orator_base::types::sound::{SAMPLE_RATE, Sound};
 use orator_base::types::time::FrameRate;
@@ -48,7 +49,7 @@ use std::time::Instant;
 /// a palm that does not point along its hand is replaced by that of the other hand, or else by a standard one.
 ///
 /// Smoothing removes noise that is estimated for each bone; motion without noise changes by a few millimetres at
-/// most. The limits of elbow, forearm, wrist and finger joints were measured on captured people; the report counts
+/// most. The limits of elbow, forearm, wrist and finger joints were measured in motion capture; the report counts
 /// every clamped angle.
 #[derive(clap::Args)]
 pub struct Args {
@@ -120,9 +121,9 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     }
     let [input] = inputs.as_slice() else {
         bail!(
-            "{} holds {} motions: name one (--sample for a dataset), or give --format bvh and a folder as --out",
+            "{} contains {}: select one (--sample KEY in a dataset), or use --format bvh with a folder as --out",
             args.input.display(),
-            inputs.len()
+            counted(inputs.len(), "motion")
         );
     };
     let is_read = |path: &Path| {
@@ -134,7 +135,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
                 .chain(args.retarget.reads())
                 .any(|read| read == path)
     };
-    let outputs = outputs(&args.out, is_read, "what is read", ", or give --format bvh")?;
+    let outputs = outputs(&args.out, is_read, "an input", "; for a folder, add --format bvh")?;
     check_effect(&args, &outputs)?;
     let sound = args.audio.as_deref().map(audio::read_sound).transpose()?;
     let done = animate(&args, input, (sound, rig.as_ref()), &outputs, &options, ui)?;
@@ -157,8 +158,8 @@ fn animate_folder(
     options: &AnimationOptions,
     ui: &Ui,
 ) -> Result<Outcome> {
-    let [folder] = args.out.as_slice() else { bail!("--format writes into one folder; give one --out") };
-    ensure!(!folder.is_file(), "{} is a file; with --format --out is a folder", folder.display());
+    let [folder] = args.out.as_slice() else { bail!("--format: expected exactly one --out, a folder") };
+    ensure!(!folder.is_file(), "output {} is a file; --format expects a folder as --out", folder.display());
     let endings: Vec<&str> = args.format.iter().map(|ending| ending.trim_start_matches('.')).collect();
     endings.iter().try_for_each(|ending| ExportFormat::from_path(&folder.join(format!("x.{ending}"))).map(drop))?;
     let task = ui.begin("animating", inputs.len() as u64);
@@ -167,7 +168,7 @@ fn animate_folder(
         task.detail(&input.name);
         let named = |ending: &&str| {
             let path = folder.join(format!("{}.{ending}", input.name));
-            ensure!(!input.is_at(&path), "{} is the motion itself; write to another folder", path.display());
+            ensure!(!input.is_at(&path), "output {} is the input motion; choose another folder", path.display());
             Ok((path.clone(), ExportFormat::from_path(&path)?))
         };
         let outputs: Result<Vec<_>> = endings.iter().map(named).collect();
@@ -186,9 +187,9 @@ fn animate_folder(
         task.advance(1);
     }
     drop(task);
-    text += &format!("wrote {n_files} files into {}", folder.display());
+    text += &format!("wrote {} into {}", counted(n_files, "file"), folder.display());
     if n_failed > 0 {
-        text += &format!("\n{n_failed} of {} motions failed", inputs.len());
+        text += &format!("\n{n_failed} of {} failed", counted(inputs.len(), "motion"));
     }
     ui.summary(&text, None, json!({ "motions": facts, "failed": n_failed, "out": folder }));
     Ok(if n_failed > 0 { Outcome::SomeFailed } else { Outcome::Done })
@@ -199,7 +200,10 @@ fn check_effect(args: &Args, outputs: &OutputFiles) -> Result<()> {
     let is_film = outputs.iter().any(|&(_, format)| format == ExportFormat::Mp4);
     let (beside, audio) = (args.beside.is_some(), args.audio.is_some());
     for (option, is_given) in [("--beside", beside), ("--audio", audio), ("--camera", args.film.is_given())] {
-        ensure!(is_film || !is_given, "{option} is for films: name an .mp4 at --out, or leave it away");
+        ensure!(
+            is_film || !is_given,
+            "{option} applies to .mp4 outputs only: add an .mp4 to --out, or remove {option}"
+        );
     }
     args.figure.check(outputs)
 }
@@ -233,7 +237,7 @@ fn animate(
             units::check(&other.motion).with_context(|| path.display().to_string())?;
             notes.extend(other.notes);
             if !other.has_rate && args.in_fps.is_none() {
-                notes.push(format!("{} does not say its rate: taken for {DEFAULT_FPS}", path.display()));
+                notes.push(format!("{} does not state its frame rate: {DEFAULT_FPS} is assumed", path.display()));
             }
             Some(perform(&other.motion, None, &AnimationOptions { fps: Some(film_fps), ..*options }))
         }
@@ -253,21 +257,21 @@ fn animate(
     };
     let is_film = outputs.iter().any(|&(_, format)| format == ExportFormat::Mp4);
     let motion_secs = motion.fps.secs(motion.n_frames());
-    let of_file = |path: &Path, from_secs: f64| -> Result<Option<Sound>> {
+    let read_part = |path: &Path, from_secs: f64| -> Result<Option<Sound>> {
         Ok(audio::read_mono(path, SAMPLE_RATE)?.map(|sound| part(&sound, from_secs, motion_secs)))
     };
     let sound = match (sound, beside) {
-        (None, SecondPanel::Video { path, from_secs, .. }) if is_film => of_file(path, from_secs)?,
+        (None, SecondPanel::Video { path, from_secs, .. }) if is_film => read_part(path, from_secs)?,
         (sound, _) => sound,
     };
     let sound = match (sound, input.sound_of_run()) {
-        (None, Some(path)) if is_film => of_file(&path, 0.0)?,
+        (None, Some(path)) if is_film => read_part(&path, 0.0)?,
         (sound, _) => sound,
     };
     let silence = match (is_film && sound.is_none(), args.format.is_empty()) {
         (false, _) => "",
-        (true, true) => "the film is without sound: give --audio\n",
-        (true, false) => "the film is without sound\n",
+        (true, true) => "the video has no audio: add it with --audio FILE\n",
+        (true, false) => "the video has no audio\n",
     };
     let sources = ExportContent {
         sound: sound.as_ref(),
@@ -284,13 +288,14 @@ fn animate(
         format.write(path, &performance, &sources, ui).with_context(|| format!("cannot write {}", path.display()))?;
     }
     let Performance { report, clip, .. } = &performance;
-    let assumed = if has_rate { "" } else { " (assumed, the file does not say it: --in-fps gives it)" };
+    let assumed = if has_rate { "" } else { " (assumed: not stated in the file; set it with --in-fps)" };
     let noted: String = notes.iter().map(|note| format!("note: {note}\n")).collect();
     let text = format!(
-        "{} frames at {}{assumed}, {motion_secs:.1} s; written: {} frames at {}\n{}{noted}{silence}",
-        motion.n_frames(),
+        "{} at {}{assumed}, {}; written: {} at {}\n{}{noted}{silence}",
+        counted(motion.n_frames(), "frame"),
         motion.fps,
-        clip.n_frames(),
+        length(motion_secs),
+        counted(clip.n_frames(), "frame"),
         clip.fps,
         report_text::text(report)
     );
@@ -320,7 +325,7 @@ fn source(args: &Args, input: &MotionInput, motion: &Motion) -> Result<Option<So
     let keypoints = input.keypoints(args.keypoints.as_deref(), motion)?.with_context(|| {
         format!("{} has no keypoints, which --camera source needs: give --keypoints FILE.npz", input.name)
     })?;
-    SourceCamera::fit(motion, &keypoints).map(Some).with_context(|| format!("no camera of {}", input.name))
+    SourceCamera::fit(motion, &keypoints).map(Some).with_context(|| format!("cannot fit the camera of {}", input.name))
 }
 
 fn options(args: &Args) -> Result<AnimationOptions> {

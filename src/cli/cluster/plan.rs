@@ -7,7 +7,7 @@ use crate::cli::ui::Ui;
 use anyhow::{Context, Result, bail};
 use orator_base::stage::artifacts::StageName;
 use orator_base::stage::workdir::FolderLock;
-use orator_base::text::{counted, duration};
+use orator_base::text::{counted, duration, length, number};
 use orator_cluster::heartbeat::DEAD_AFTER;
 use orator_cluster::plan::{ClusterPlan, PART_SECS, PlannedUnit};
 use orator_cluster::progress::{PlanProgress, WorkerProgress, progress};
@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 
 /// Write a plan for cluster workers, with time estimates.
 ///
-/// `orator work` and `orator submit` read the plan. Each video is hashed unless its hash is known; workers refuse a
+/// `orator work` and `orator submit` read the plan. Each video is hashed unless its hash is known; workers reject a
 /// video that changes afterwards. The stages are timed on excerpts of the videos on this machine, which should be
 /// idle. The times are saved and reused until the program, the settings, the models or the machine change.
 #[derive(clap::Args)]
@@ -38,7 +38,7 @@ pub(crate) struct Args {
     /// Print the number of workers needed to finish within this number of hours.
     #[arg(long, value_name = "HOURS")]
     hours: Option<f64>,
-    /// Length of the pieces into which a long video is split for workers, minutes.
+    /// Length of the parts into which a long video is split for workers, minutes.
     #[arg(long, value_name = "MINUTES", default_value_t = PART_SECS / 60.0)]
     piece: f64,
     /// Do not time the stages, and print no estimates.
@@ -57,10 +57,10 @@ pub(crate) fn open(path: &Path) -> Result<(ClusterPlan, Pipeline)> {
 
 pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     if args.workers == Some(0) || args.hours.is_some_and(|hours| !hours.is_finite() || hours <= 0.0) {
-        bail!("--workers takes a number from 1 on, --hours one above 0");
+        bail!("--workers: expected at least 1; --hours: expected more than 0");
     }
     if !args.piece.is_finite() || args.piece < 1.0 {
-        bail!("--piece takes minutes, 1 or more");
+        bail!("--piece: expected at least 1 minute");
     }
     let pipeline = Pipeline::open(args.config.load()?)?.with_processes(this_program());
     let work = &pipeline.config().settings.work.dir;
@@ -70,17 +70,17 @@ pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         pipeline.ask_media(&request).ok().flatten()
     };
     // The shared lock prevents `orator forget` from running at the same time.
-    let lock = FolderLock::shared(work).context("no plan now")?;
+    let lock = FolderLock::shared(work).context("cannot write a plan now")?;
     let plan = ClusterPlan::new(&pipeline, &args.config.set, &this_program(), &secs, 60.0 * args.piece, ui)?;
     plan.write(&out)?;
     drop(lock);
     let videos = plan.videos();
     let lengths: Vec<f64> = videos.iter().filter_map(|unit| unit.secs).collect();
-    let hours: f64 = lengths.iter().sum::<f64>() / 3600.0;
-    let mut lines =
-        vec![format!("{} of {} with {hours:.2} h", counted(plan.units.len(), "unit"), counted(videos.len(), "video"))];
+    let total_secs: f64 = lengths.iter().sum();
+    let (n_units, n_videos) = (counted(plan.units.len(), "unit"), counted(videos.len(), "video"));
+    let mut lines = vec![format!("{n_units} of {n_videos}, {} in total", length(total_secs))];
     let next = format!("orator work --plan {}", out.display());
-    let mut facts = json!({ "plan": out, "units": plan.units.len(), "hours": hours, "next": next });
+    let mut facts = json!({ "plan": out, "units": plan.units.len(), "hours": total_secs / 3600.0, "next": next });
     if !args.untimed && !lengths.is_empty() {
         let times = times(&pipeline, &videos, ui)?;
         lines.extend(prediction_lines(&times, &lengths));
@@ -88,7 +88,7 @@ pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         facts["peak_mib"] = json!(times.peak_mib);
         let mut wall = |workers: usize| {
             let secs = times.wall_secs(&lengths, workers);
-            lines.push(format!("{:<13}done in {}", counted(workers, "worker"), duration(secs)));
+            lines.push(format!("{:<13}estimated time {}", counted(workers, "worker"), duration(secs)));
             facts["wall_secs"][workers.to_string()] = json!(secs);
         };
         let workers: BTreeSet<usize> = [1, times.jobs].into_iter().chain(args.workers).collect();
@@ -97,9 +97,10 @@ pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             let needed = times.workers_within(&lengths, 3600.0 * hours);
             facts["workers_needed"] = json!(needed);
             lines.push(match needed {
-                Some(n) => format!("within {hours} h {} are done", counted(n, "worker")),
+                Some(n) => format!("to finish within {} h: {}", number(hours), counted(n, "worker")),
                 None => format!(
-                    "within {hours} h no number of workers is done: the longest piece alone takes {}",
+                    "no number of workers finishes within {} h: the longest unit alone takes {}",
+                    number(hours),
                     duration(times.wall_secs(&lengths, usize::MAX))
                 ),
             });
@@ -126,13 +127,13 @@ fn prediction_lines(times: &StageTimes, lengths: &[f64]) -> Vec<String> {
     let total_secs: f64 = lengths.iter().sum();
     let stage = |stage: StageName| {
         let gib = times.cost(stage).bytes_per_sec * total_secs / f64::from(1 << 30);
-        format!("{stage:9}{:>10} of work{gib:8.2} GiB of files", duration(times.stage_secs(stage, lengths)))
+        format!("{stage:9}{:>10} of processing{gib:8.2} GiB of files", duration(times.stage_secs(stage, lengths)))
     };
     let mut lines: Vec<String> = StageName::ALL.map(stage).into();
     let StageTimes { excerpt_secs, jobs, processor, .. } = times;
     let excerpts = counted(times.n_excerpts, "excerpt");
-    lines.push(format!("timed on {excerpts} of {excerpt_secs:.0} s in all, {jobs} side by side, {processor}"));
-    lines.extend(times.peak_mib.map(|mib| format!("memory   {mib:.0} MiB a worker")));
+    lines.push(format!("timed on {excerpts} of {excerpt_secs:.0} s in total, {jobs} in parallel, {processor}"));
+    lines.extend(times.peak_mib.map(|mib| format!("memory   {mib:.0} MiB per worker")));
     lines
 }
 
@@ -161,18 +162,21 @@ pub(crate) fn show_progress(path: &Path, ui: &Ui) -> Result<Outcome> {
 }
 
 fn progress_text(progress: &PlanProgress) -> String {
-    let hours = |secs: f64| secs / 3600.0;
     let PlanProgress { n_units, n_done, n_failed, n_claimed, n_left_by_dead, n_reclaimed, .. } = progress;
     let n_free = n_units - n_done - n_failed - n_claimed - n_left_by_dead - progress.blocked.len();
     let mut lines = vec![format!(
-        "{n_units} units: {n_done} done, {n_failed} failed, {n_claimed} in work, {n_left_by_dead} left by dead workers, \
-         {n_free} free; {n_reclaimed} taken over"
+        "{}: {n_done} done, {n_failed} failed, {n_claimed} in progress, {n_left_by_dead} left by dead workers, \
+         {n_free} unclaimed; {n_reclaimed} taken over",
+        counted(*n_units, "unit")
     )];
-    let left = progress.secs_left.map_or("unknown".to_owned(), |secs| format!("{:.2} h", hours(secs)));
-    let (ended, all) = (hours(progress.ended_media_secs), hours(progress.media_secs));
-    lines.push(format!("{ended:.2} of {all:.2} h of video; time left at this pace: {left}"));
+    let left = progress.secs_left.map_or("unknown".to_owned(), length);
+    let (ended, all) = (length(progress.ended_media_secs), length(progress.media_secs));
+    lines.push(format!("{ended} of {all} of video processed; estimated time left: {left}"));
     lines.extend(
-        progress.blocked.iter().map(|file| format!("blocked by {}: no worker wrote it; remove it", file.display())),
+        progress
+            .blocked
+            .iter()
+            .map(|file| format!("blocked by {}: not written by a worker; remove this file", file.display())),
     );
     lines.extend(progress.stopped.iter().map(|reason| format!("all workers have stopped: {reason}")));
     lines.extend(progress.workers.iter().map(worker));
@@ -187,9 +191,9 @@ fn worker(worker: &WorkerProgress) -> String {
     let WorkerProgress { worker, is_alive, heartbeat, silent_secs } = worker;
     let state = match (heartbeat.ended, is_alive) {
         (true, _) => "ended".to_owned(),
-        (false, true) => heartbeat.unit.as_ref().map_or("waits".to_owned(), |unit| format!("works on {unit}")),
-        (false, false) => format!("dead, silent for {silent_secs:.0} s"),
+        (false, true) => heartbeat.unit.as_ref().map_or("waiting".to_owned(), |unit| format!("processing {unit}")),
+        (false, false) => format!("dead, no heartbeat for {}", duration(*silent_secs)),
     };
     let (done, failed, rate) = (heartbeat.n_done, heartbeat.n_failed, heartbeat.media_rate());
-    format!("worker  {worker}: {done} done, {failed} failed, {rate:.2} s of video a second; {state}")
+    format!("worker  {worker}: {done} done, {failed} failed, {rate:.2} s of video per second; {state}")
 }

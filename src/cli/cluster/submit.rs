@@ -6,6 +6,7 @@ use crate::cli::ui::Ui;
 use anyhow::{Context, Result, bail, ensure};
 use orator_base::foreign_program::{command_in, empty_folder};
 use orator_base::stage::workdir;
+use orator_base::text::counted;
 use orator_cluster::job::{JobRequest, TaskLimits, shell};
 use orator_cluster::kubernetes::{KubernetesTarget, manifests};
 use orator_cluster::plan::ClusterPlan;
@@ -20,11 +21,11 @@ use std::process::{Command, Stdio};
 #[derive(clap::Args)]
 pub(crate) struct Args {
     #[command(subcommand)]
-    to: To,
+    target: SubmitTarget,
 }
 
 #[derive(clap::Subcommand)]
-enum To {
+enum SubmitTarget {
     Slurm(SlurmArgs),
     Kubernetes(KubernetesArgs),
     Ssh(SshArgs),
@@ -128,10 +129,10 @@ struct SshArgs {
 }
 
 pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    match args.to {
-        To::Slurm(args) => to_slurm(&args, ui),
-        To::Kubernetes(args) => to_kubernetes(&args, ui),
-        To::Ssh(args) => to_ssh(&args, ui),
+    match args.target {
+        SubmitTarget::Slurm(args) => to_slurm(&args, ui),
+        SubmitTarget::Kubernetes(args) => to_kubernetes(&args, ui),
+        SubmitTarget::Ssh(args) => to_ssh(&args, ui),
     }
 }
 
@@ -140,15 +141,15 @@ impl JobArgs {
     fn request(&self) -> Result<(ClusterPlan, PathBuf, JobRequest)> {
         let (plan, pipeline) = open(&self.plan)?;
         let work = pipeline.config().settings.work.dir.clone();
-        ensure!(self.tasks > 0 && self.cores > 0, "tasks and cores must be more than 0");
+        ensure!(self.tasks > 0 && self.cores > 0, "--tasks and --cores: expected at least 1");
         let n_at_once = self.at_once.unwrap_or(self.tasks);
         let lengths: Vec<f64> = plan.videos().iter().filter_map(|video| video.secs).collect();
         let predicted = StageTimes::read(&work).map(|times| times.limit_hours(&lengths, n_at_once * self.cores));
         let hours = self.hours.or(predicted).unwrap_or(UNKNOWN_HOURS);
-        ensure!(hours > 0.0, "hours must be more than 0");
+        ensure!(hours > 0.0, "--hours: expected more than 0");
         let program = match &self.program {
             Some(program) => program.clone(),
-            None => std::env::current_exe().context("this program's own file is not known; give --program")?,
+            None => std::env::current_exe().context("cannot determine the path of this program; give --program")?,
         };
         let request = JobRequest {
             program,
@@ -177,7 +178,7 @@ impl SlurmArgs {
     /// Resource limits of a training; `None` if no training is requested.
     fn training(&self) -> Result<Option<TaskLimits>> {
         let limits = TaskLimits { cores: self.train_cores, memory_gib: self.train_memory, hours: self.train_hours };
-        ensure!(limits.cores > 0 && limits.hours > 0.0, "cores and hours of a training must be more than 0");
+        ensure!(limits.cores > 0 && limits.hours > 0.0, "--train-cores and --train-hours: expected more than 0");
         Ok(self.train.then_some(limits))
     }
 }
@@ -186,10 +187,10 @@ fn to_slurm(args: &SlurmArgs, ui: &Ui) -> Result<Outcome> {
     let (plan, work, request) = args.job.request()?;
     let folder = args.job.jobs_folder(&plan)?;
     let max_array = match args.max_array {
-        Some(most) => most,
+        Some(max) => max,
         None => max_array_size().unwrap_or(1001),
     };
-    std::fs::create_dir_all(&folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    std::fs::create_dir_all(&folder).with_context(|| format!("cannot create the folder {}", folder.display()))?;
     let settings = SlurmSettings { max_array, logs: &folder, options: &args.options };
     let scripts = slurm::scripts(&request, &plan, &work, &settings, args.training()?);
     let write = |name: String, script: &String| -> Result<PathBuf> {
@@ -208,7 +209,7 @@ fn to_slurm(args: &SlurmArgs, ui: &Ui) -> Result<Outcome> {
         for file in &arrays {
             ids.push(sbatch(&[], file)?);
         }
-        // This includes tasks that were cancelled or lost: the last job processes their units.
+        // This includes tasks that were cancelled or killed: the last job processes their units.
         let after = |ids: &[String]| format!("--dependency=afterany:{}", ids.join(":"));
         ids.push(sbatch(&[&after(&ids)], &last)?);
         // Some videos may have failed; a missing or invalid dataset stops its training.
@@ -228,8 +229,9 @@ fn to_slurm(args: &SlurmArgs, ui: &Ui) -> Result<Outcome> {
             .collect::<Vec<_>>()
             .join("\n"),
         false => {
-            let trainings = if args.train { ", a training of each speaker" } else { "" };
-            format!("sent {} workers, a last job{trainings}: {}", request.n_tasks, ids.join(", "))
+            let trainings = if args.train { ", a training job per speaker" } else { "" };
+            let workers = counted(request.n_tasks, "worker");
+            format!("submitted {workers}, a final job{trainings}: {}", ids.join(", "))
         }
     };
     let next = args.job.next();
@@ -256,11 +258,11 @@ fn installed(name: &str) -> Option<PathBuf> {
 
 /// Submits a script and returns the id of its job. The working directory is that of the job too, so sbatch inherits it.
 fn sbatch(options: &[&str], script: &Path) -> Result<String> {
-    let program = installed("sbatch").context("there is no sbatch; --dry-run writes the scripts without it")?;
+    let program = installed("sbatch").context("sbatch is not installed; --dry-run writes the scripts only")?;
     let out = Command::new(program).arg("--parsable").args(options).arg(script).output();
-    let out = out.context("cannot start sbatch; --dry-run writes the scripts without it")?;
+    let out = out.context("cannot start sbatch; --dry-run writes the scripts only")?;
     if !out.status.success() {
-        bail!("sbatch refused {}: {}", script.display(), String::from_utf8_lossy(&out.stderr).trim());
+        bail!("sbatch rejected {}: {}", script.display(), String::from_utf8_lossy(&out.stderr).trim());
     }
     // The output is JOB or JOB;CLUSTER.
     let id = String::from_utf8_lossy(&out.stdout).trim().split(';').next().unwrap_or_default().to_owned();
@@ -292,9 +294,9 @@ fn to_kubernetes(args: &KubernetesArgs, ui: &Ui) -> Result<Outcome> {
         kubectl.env("KUBECONFIG", std::env::join_paths(files)?);
     }
     let status = kubectl.args(["apply", "-f"]).arg(&file).stdout(Stdio::null()).status();
-    let status = status.context("cannot start kubectl; --dry-run writes the manifests without it")?;
-    ensure!(status.success(), "kubectl did not take {}", file.display());
-    let text = format!("sent {} workers: {}", request.n_tasks, file.display());
+    let status = status.context("cannot start kubectl; --dry-run writes the manifests only")?;
+    ensure!(status.success(), "kubectl apply failed for {}", file.display());
+    let text = format!("submitted {}: {}", counted(request.n_tasks, "worker"), file.display());
     ui.summary(&text, Some(&next), json!({ "manifests": file, "next": next }));
     Ok(Outcome::Done)
 }
@@ -321,14 +323,16 @@ fn to_ssh(args: &SshArgs, ui: &Ui) -> Result<Outcome> {
         child.with_context(|| format!("cannot start ssh to {host}"))
     };
     let workers = args.hosts.iter().map(|host| Ok((host, start(host)?))).collect::<Result<Vec<_>>>()?;
-    let mut bad = Vec::new();
+    let (n_hosts, mut failed) = (workers.len(), Vec::new());
     for (host, mut worker) in workers {
-        let status = worker.wait().with_context(|| format!("ssh to {host} is lost"))?;
+        let status = worker.wait().with_context(|| format!("cannot wait for ssh to {host}"))?;
         // Exit code 2 means that some units failed, which `status` reports.
         if !matches!(status.code(), Some(0 | 2)) {
-            bad.push(format!("{host}: {status}"));
+            failed.push(format!("{host}: {status}"));
         }
     }
-    ui.summary(&bad.join("\n"), Some(&next), json!({ "lost": bad, "next": next }));
-    Ok(if bad.is_empty() { Outcome::Done } else { Outcome::SomeFailed })
+    let mut lines = vec![format!("{} ended, {} failed", counted(n_hosts, "worker"), failed.len())];
+    lines.extend(failed.iter().cloned());
+    ui.summary(&lines.join("\n"), Some(&next), json!({ "failed": failed, "next": next }));
+    Ok(if failed.is_empty() { Outcome::Done } else { Outcome::SomeFailed })
 }

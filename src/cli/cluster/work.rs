@@ -13,10 +13,10 @@ use std::time::Duration;
 
 /// Process units of a plan, alongside other workers.
 ///
-/// Workers may run on any machine that sees the same folders. Each claims one unit at a time; units of a dead worker
-/// are taken over, those of a slow one are not. A video that changed since the plan was written is refused. The first
-/// SIGTERM or Ctrl-C stops the worker after the current unit, the second immediately; the same command continues the
-/// work.
+/// Workers may run on any machine that can access the same folders. Each claims one unit at a time; units of a dead
+/// worker are taken over, those of a slow one are not. A video that changed since the plan was written is rejected. The
+/// first SIGTERM or Ctrl-C stops the worker after the current unit, the second immediately; the same command continues
+/// the work.
 ///
 /// Exit code 2: units failed or could not be claimed.
 #[derive(clap::Args)]
@@ -66,8 +66,8 @@ pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         dead_after: secs(args.dead_after),
     };
     ui.enable_stop_requests(
-        "stopping after this unit; the next signal ends at once",
-        "every stage of a video that is done is kept, and the same command goes on from there",
+        "stopping after the current unit; a second signal exits at once",
+        "completed stages are saved; run the same command again to continue",
     );
     let report = work(&plan, &args.plan, &pipeline, &options, ui)?;
     let path = args.plan.display();
@@ -88,18 +88,23 @@ pub(crate) fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 }
 
 fn text(report: &WorkReport) -> String {
-    let (done, n_fresh, failed) = (counted(report.done, "unit"), report.up_to_date, report.failed.len());
-    let mut lines = vec![format!("{done} done ({n_fresh} up to date before), {failed} failed")];
+    let (done, fresh, failed) = (counted(report.done, "unit"), report.up_to_date, report.failed.len());
+    let mut lines = vec![format!("{done} done ({fresh} already up to date), {failed} failed")];
     if report.reclaimed + report.claim_lost > 0 {
         lines.push(format!(
-            "{} taken over from dead workers, {} laid aside since others had taken them over",
-            report.reclaimed, report.claim_lost
+            "{} taken over from dead workers, {} discarded because other workers had taken them over",
+            counted(report.reclaimed, "unit"),
+            report.claim_lost
         ));
     }
     lines.extend(report.failed.iter().map(|(unit, error)| format!("failed  {unit}: {error}")));
     lines.extend(report.failed_before.iter().map(|unit| format!("failed  {unit}: in an earlier session")));
-    lines.extend(report.blocked.iter().map(|what| format!("blocked {what}; remove the file and start a worker again")));
-    let rest = if report.all_ended { "every unit has ended" } else { "others have the rest, or it is left" };
+    lines.extend(report.blocked.iter().map(|file| format!("blocked {file}; remove the file and start a worker again")));
+    let rest = if report.all_ended {
+        "all units are finished"
+    } else {
+        "some units are unclaimed or claimed by other workers"
+    };
     lines.push(rest.to_owned());
     lines.join("\n")
 }

@@ -6,6 +6,7 @@ use crate::cli::ui::Ui;
 use anyhow::{Context, Result, ensure};
 use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir;
+use orator_base::text::{counted, length};
 use orator_dataset::align::{Alignment, align};
 use orator_formats::transcript::Transcript;
 use orator_media::aligner::Aligner;
@@ -27,7 +28,7 @@ const SHOWN: usize = 8;
 #[derive(clap::Args)]
 pub struct Args {
     /// Audio file: wav, flac, mp3, or a video.
-    #[arg(value_name = "SOUND")]
+    #[arg(value_name = "AUDIO")]
     sound: PathBuf,
     /// Transcript file, in a format listed in `orator guide dataset`.
     #[arg(value_name = "TRANSCRIPT")]
@@ -48,10 +49,14 @@ pub fn default_python() -> PathBuf {
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let is_json = args.out.extension().is_some_and(|ending| ending == "json");
-    ensure!(is_json, "{}: words are written as .words.json; name such a file", args.out.display());
+    ensure!(is_json, "--out {}: expected a file that ends in .words.json", args.out.display());
     let is_same =
         |path: &Path| path.canonicalize().is_ok_and(|path| args.out.canonicalize().is_ok_and(|out| out == path));
-    ensure!(!is_same(&args.transcript) && !is_same(&args.sound), "--out names what is read, {}", args.out.display());
+    ensure!(
+        !is_same(&args.transcript) && !is_same(&args.sound),
+        "--out {} is an input; choose another file",
+        args.out.display()
+    );
     let aligner = Aligner::start(&args.python.unwrap_or_else(default_python))?;
     enter_sandbox([args.out.as_path()], []);
     let transcript = Transcript::read(&args.transcript)?;
@@ -59,11 +64,11 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         transcript.notes.iter().for_each(|note| ui.say(&format!("{}: {note}", args.transcript.display())));
     }
     let pair = || format!("cannot align {} with {}", args.transcript.display(), args.sound.display());
-    let task = ui.begin("seconds of sound", 0);
+    let task = ui.begin("seconds of audio", 0);
     let mut secs = 0.0;
-    let aligned = align(aligner, &args.sound, &transcript, |heard| {
+    let aligned = align(aligner, &args.sound, &transcript, |aligned_secs| {
         let before = secs as u64;
-        secs += heard;
+        secs += aligned_secs;
         task.advance(secs as u64 - before);
     });
     drop(task);
@@ -73,7 +78,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     workdir::write_file(&args.out, text.as_bytes())?;
     let Alignment { words, unfit, sound_secs } = &aligned;
     let n_aligned = words.len() - words.iter().filter(|word| word.confidence == Some(0.0)).count();
-    let mut lines = vec![format!("{n_aligned} of {} words aligned in {sound_secs:.1} s of sound", words.len())];
+    let mut lines =
+        vec![format!("{n_aligned} of {} aligned in {} of audio", counted(words.len(), "word"), length(*sound_secs))];
     if !unfit.is_empty() {
         let shown = unfit
             .iter()
@@ -81,7 +87,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             .map(|&n| format!("word {} `{}` near {:.1} s", n + 1, words[n].word, words[n].start_secs));
         let more = if unfit.len() > SHOWN { ", ..." } else { "" };
         let shown = shown.collect::<Vec<_>>().join(", ");
-        lines.push(format!("{} do not fit and are marked by confidence 0: {shown}{more}", unfit.len()));
+        lines.push(format!("{} not aligned, with confidence 0: {shown}{more}", counted(unfit.len(), "word")));
     }
     lines.push(format!("wrote {}", args.out.display()));
     let next = format!("orator words check {}", args.out.display());
@@ -92,7 +98,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         "out": args.out,
         "words": words.len(),
         "aligned": n_aligned,
-        "unfit": marked.collect::<Vec<_>>(),
+        "unaligned": marked.collect::<Vec<_>>(),
         "sound_secs": sound_secs,
         "next": next,
     });

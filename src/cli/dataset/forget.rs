@@ -2,10 +2,12 @@
 
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
+use crate::cli::dataset::import::verify_deep;
 use crate::cli::ui::Ui;
 use anyhow::{Context, Result, bail};
 use orator_base::stage::artifacts::{StageName, speaker_dir};
 use orator_base::stage::workdir::{self, FolderLock};
+use orator_base::text::counted;
 use orator_cluster::forget::plans_naming;
 use orator_dataset::config::{Config, videos};
 use orator_dataset::forget::known::{self, KnownVideo};
@@ -20,7 +22,7 @@ use std::path::{Path, PathBuf};
 /// models (a model cannot unlearn), plans of `orator plan` and the hash table. Shards of other videos stay unchanged
 /// byte for byte. Afterwards every file in the work folder is searched for names and hashes of the video.
 ///
-/// The video file itself and copies elsewhere are not deleted. Exit code 1: the search found something.
+/// The video file itself and copies elsewhere are not deleted. Exit code 1: the search found remaining data.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -60,51 +62,56 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     };
     let lines: Vec<String> = task.removals.iter().flat_map(|removal| removal.lines(args.keep_models)).collect();
     let kept: Vec<&PathBuf> = task.removals.iter().filter(|_| args.keep_models).flat_map(|r| &r.models).collect();
-    let what = task.titles.join(", ");
+    let names = task.titles.join(", ");
     if args.dry_run {
         let text = match lines.is_empty() {
-            true => format!("nothing of {what} is there"),
-            false => format!("of {what} would go:\n  {}", lines.join("\n  ")),
+            true => format!("nothing to remove for {names}"),
+            false => format!("would be removed for {names}:\n  {}", lines.join("\n  ")),
         };
         ui.summary(&text, None, json!({ "videos": task.titles, "would_remove": lines, "dry_run": true }));
         return Ok(Outcome::Done);
     }
     for removal in &task.removals {
         let done = removal.carry_out(args.keep_models);
-        done.with_context(|| format!("{what} is forgotten by half; run the same command again to finish"))?;
+        done.with_context(|| format!("{names}: removal is incomplete; run the same command again to finish"))?;
     }
     let terms: Vec<_> = task.removals.iter().flat_map(|removal| removal.terms.clone()).collect();
-    let mut searched = search(&task.folders, &terms).context("nothing is proved")?;
+    let mut searched = search(&task.folders, &terms).context("cannot verify the removal")?;
     // A retained model lists its training videos; it is reported as retained instead.
-    searched.hits.retain(|place| !kept.iter().any(|model| Path::new(&place.file).starts_with(model)));
+    searched.hits.retain(|hit| !kept.iter().any(|model| Path::new(&hit.file).starts_with(model)));
     let mut text = match lines.is_empty() {
-        true => vec![format!("nothing of {what} was there")],
-        false => vec![format!("forgotten: {what}"), format!("  {}", lines.join("\n  "))],
+        true => vec![format!("found nothing to remove for {names}")],
+        false => vec![format!("removed {names}:"), format!("  {}", lines.join("\n  "))],
     };
-    text.extend(kept.iter().map(|model| format!("kept, though it was trained with it: {}", model.display())));
+    text.extend(kept.iter().map(|model| format!("retained, although trained on it: {}", model.display())));
     text.extend(task.advice.iter().cloned());
     text.extend(searched.hits.iter().map(|found| match found.at {
         Some(at) => format!("FOUND   {} at byte {at}: {}", found.file, found.what),
-        None => format!("FOUND   {}: {} in its name", found.file, found.what),
+        None => format!("FOUND   {}: {} in the file name", found.file, found.what),
     }));
     let SearchReport { n_files, bytes, inside_bytes, hits } = &searched;
     text.push(format!(
-        "searched {n_files} files, {bytes} bytes and {inside_bytes} more inside archives, for {} names and hashes: {} found",
-        terms.len(),
-        hits.len()
+        "searched {}, {bytes} bytes and {inside_bytes} bytes inside archives, for {} and hashes: {}",
+        counted(*n_files, "file"),
+        counted(terms.len(), "name"),
+        counted(hits.len(), "hit")
     ));
-    let found: Vec<_> =
-        hits.iter().map(|place| json!({ "file": place.file, "at": place.at, "what": place.what })).collect();
+    let found: Vec<_> = hits.iter().map(|hit| json!({ "file": hit.file, "at": hit.at, "term": hit.what })).collect();
+    let next = match &args.dataset {
+        Some(dir) => verify_deep(dir),
+        None => format!("orator status{}", args.config.flags()),
+    };
     let facts = json!({
-        "videos": task.titles, "removed": lines, "kept_models": kept, "advice": task.advice, "found": found,
+        "videos": task.titles, "removed": lines, "retained_models": kept, "advice": task.advice, "found": found,
+        "next": next,
         "searched": { "files": n_files, "bytes": bytes, "inside_bytes": inside_bytes, "marks": terms.len() },
     });
-    ui.summary(&text.join("\n"), None, facts);
-    Ok(if hits.is_empty() { Outcome::Done } else { Outcome::Wrong })
+    ui.summary(&text.join("\n"), Some(&next), facts);
+    Ok(if hits.is_empty() { Outcome::Done } else { Outcome::CheckFailed })
 }
 
 /// Error context if a folder is in use.
-const IN_USE: &str = "nothing was forgotten; what is at work would bring it back";
+const IN_USE: &str = "nothing was removed: the process that uses the folder could recreate the data";
 
 fn of_dataset(dir: &Path, wanted: &str, dry_run: bool, locks: &mut Vec<FolderLock>) -> Result<ForgetTask> {
     let dir = std::path::absolute(dir)?;
@@ -117,7 +124,7 @@ fn of_dataset(dir: &Path, wanted: &str, dry_run: bool, locks: &mut Vec<FolderLoc
     let removal = Removal::of_dataset(&dir, &[video], &others);
     let mut folders = vec![dir.clone()];
     folders.extend(workdir::left_over(&dir));
-    let advice = vec!["models trained with this dataset, and its copies, are not looked for".to_owned()];
+    let advice = vec!["models trained on this dataset and copies of it are not searched".to_owned()];
     Ok(ForgetTask {
         titles: vec![video.display_name().trim_start_matches('/').to_owned()],
         removals: vec![removal],
@@ -146,7 +153,7 @@ fn of_project(args: &Args, locks: &mut Vec<FolderLock>) -> Result<ForgetTask> {
     let (videos, whole) = match (&args.video, &args.speaker) {
         (Some(video), speaker) => (vec![known::find_one(&all, video, speaker.as_deref())?], false),
         (None, Some(speaker)) => (known::speaker_videos(&all, speaker)?, true),
-        (None, None) => bail!("say --video or --speaker"),
+        (None, None) => bail!("give --video or --speaker"),
     };
     let speaker = videos.first().map(|video| video.speaker.clone()).unwrap_or_default();
     if is_locked {
@@ -177,7 +184,7 @@ fn of_project(args: &Args, locks: &mut Vec<FolderLock>) -> Result<ForgetTask> {
     for video in &videos {
         let twins = others.iter().filter(|other| video.content.is_some() && other.content == video.content);
         advice.extend(twins.map(|twin| {
-            format!("{} has the same content and stays: forget it too, if it shows the same", twin.display_name())
+            format!("{} has the same content and was not removed; run `orator forget` for it too", twin.display_name())
         }));
     }
     advice.extend(prevention_advice(&config, &speaker, &videos, whole));
@@ -196,7 +203,7 @@ fn prevention_advice(config: &Config, speaker: &str, gone: &[&KnownVideo], whole
     }
     if whole {
         return Some(format!(
-            "remove [[speaker]] {speaker} from {}, or the next run brings it back",
+            "remove [[speaker]] {speaker} from {}, or the next run recreates the data",
             config.file.display()
         ));
     }
@@ -206,8 +213,8 @@ fn prevention_advice(config: &Config, speaker: &str, gone: &[&KnownVideo], whole
     let mut list: Vec<String> = configured.map(|speaker| speaker.exclude.clone()).unwrap_or_default();
     list.extend(back.iter().map(relative));
     Some(format!(
-        "delete the video file, or write under [[speaker]] {speaker} in {} the line\n  exclude = {list:?}\n\
-         else the next run brings it back",
+        "delete the video file, or add to [[speaker]] {speaker} in {} the line\n  exclude = {list:?}\n\
+         or the next run recreates the data",
         config.file.display()
     ))
 }

@@ -6,6 +6,7 @@ use crate::cli::ui::Ui;
 use anyhow::{Result, ensure};
 use clap::ValueEnum;
 use orator_base::stage::workdir::{self, FolderLock};
+use orator_base::text::{counted, length};
 use orator_base::types::time::FrameRate;
 use orator_dataset::import::take::TakeLimits;
 use orator_dataset::import::write::{ImportOutcome, ImportPlan, rate_of};
@@ -90,17 +91,17 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let is_occupied = workdir::has_files(&out);
     ensure!(
         !is_occupied || args.force,
-        "{} is not empty; choose another folder, or --force replaces the dataset",
+        "{} is not empty; choose another folder, or replace the dataset with --force",
         out.display()
     );
     ensure!(
         !is_occupied || out.join(INFO).is_file(),
-        "{} holds no dataset, so --force does not replace it",
+        "{} is not a dataset, so --force does not replace it",
         out.display()
     );
     for source in &args.sources {
         let inside = out.exists() && out.starts_with(std::path::absolute(source)?);
-        ensure!(!inside, "{} lies in {}, which is imported; choose another folder", out.display(), source.display());
+        ensure!(!inside, "--out {} is inside the source {}; choose another folder", out.display(), source.display());
     }
     let datasets = args.sources.iter().filter(|source| source.join(INFO).is_file());
     let _sources = datasets.map(|dataset| FolderLock::shared(dataset)).collect::<Result<Vec<_>>>()?;
@@ -150,14 +151,19 @@ fn close(imported: &Imported, out: &Path, ui: &Ui) -> Result<Outcome> {
     lines.extend(imported.notes.iter().cloned());
     let secs: BTreeMap<&str, f64> =
         imported.info.splits.iter().map(|(split, info)| (split.as_str(), info.secs)).collect();
-    let parts = Split::ALL.map(|split| format!("{} {:.1} s", split.name(), secs.get(split.name()).unwrap_or(&0.0)));
-    let (kept, refused, failed) = (count("kept"), count("refused"), count("failed"));
-    lines.push(format!("{kept} kept, {refused} refused, {failed} failed; {}", parts.join(", ")));
+    let parts =
+        Split::ALL.map(|split| format!("{} {}", split.name(), length(secs.get(split.name()).copied().unwrap_or(0.0))));
+    let (n_imported, rejected, failed) = (count("kept"), count("refused"), count("failed"));
+    lines.push(format!(
+        "{} imported, {rejected} rejected, {failed} failed; {}",
+        counted(n_imported, "take"),
+        parts.join(", ")
+    ));
     lines.push(format!("dataset  {}", out.display()));
     let next = if imported.info.no_sound { verify_deep(out) } else { train_gan(out) };
     let facts = json!({
         "dataset": out, "takes": imported.lines, "notes": imported.notes, "secs": secs,
-        "kept": kept, "refused": refused, "failed": failed, "next": next,
+        "imported": n_imported, "rejected": rejected, "failed": failed, "next": next,
     });
     ui.summary(&lines.join("\n"), Some(&next), facts);
     Ok(if failed > 0 { Outcome::SomeFailed } else { Outcome::Done })
@@ -176,8 +182,8 @@ pub fn train_gan(dataset: &Path) -> String {
 fn text(line: &ImportOutcome) -> String {
     let ImportOutcome { file, outcome, reason, message, .. } = line;
     match *outcome {
-        "kept" => format!("kept     {file}: {message}"),
-        "failed" => format!("failed   {file}: {message}"),
-        _ => format!("{outcome}  {file}: {reason}: {message}"),
+        "kept" => format!("imported  {file}: {message}"),
+        "failed" => format!("failed    {file}: {message}"),
+        _ => format!("rejected  {file}: {reason}: {message}"),
     }
 }

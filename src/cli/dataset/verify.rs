@@ -5,6 +5,7 @@ use crate::cli::Outcome;
 use crate::cli::sandbox::enter_sandbox;
 use crate::cli::ui::Ui;
 use anyhow::Result;
+use orator_base::text::{counted, length, number};
 use orator_dataset::config::SplitUnit;
 use orator_dataset::split::SplitRule;
 use orator_dataset::verify::verify::{self, read_ledgers};
@@ -23,8 +24,8 @@ pub struct Args {
 enum DatasetVerb {
     /// Verify files, sizes, counts and checksums of a dataset.
     ///
-    /// Every second of every video must also be accounted for. Exit code 1: the dataset differs from what was
-    /// written.
+    /// Each second of every video must also be accepted, rejected with a reason, or failed. Exit code 1: a problem was
+    /// found.
     Verify {
         /// Dataset folder, such as work/dataset/SPEAKER.
         dir: PathBuf,
@@ -50,49 +51,49 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 
 fn check(dir: &std::path::Path, deep: bool, ui: &Ui) -> Result<Outcome> {
     let found = verify::verify(dir, deep, ui)?;
-    let good = found.problems.is_empty();
+    let is_valid = found.problems.is_empty();
     let mut lines: Vec<String> =
-        found.problems.iter().map(|problem| format!("wrong   {}: {}", problem.file, problem.message)).collect();
+        found.problems.iter().map(|problem| format!("error   {}: {}", problem.file, problem.message)).collect();
     lines.push(format!(
-        "{}: {} files, {} videos, {} intervals, {:.1} s of motion; {} MB read; {}",
-        if good { "sound" } else { "NOT SOUND" },
-        found.n_files,
-        found.n_videos,
-        found.n_samples,
-        found.secs,
+        "{}: {}, {}, {}, {} of motion; {} MB read; {}",
+        if is_valid { "valid" } else { "INVALID" },
+        counted(found.n_files, "file"),
+        counted(found.n_videos, "video"),
+        counted(found.n_samples, "interval"),
+        length(found.secs),
         found.bytes / 1_000_000,
-        if good { "nothing wrong".to_owned() } else { format!("{} things wrong", found.problems.len()) }
+        counted(found.problems.len(), "problem")
     ));
-    let next = match (good, deep) {
+    let next = match (is_valid, deep) {
         (true, false) => verify_deep(dir),
         (true, true) => train_gan(dir),
         (false, _) => "orator run --from dataset --force".to_owned(),
     };
     let problems: Vec<_> = found.problems.iter().map(|p| json!({ "file": p.file, "message": p.message })).collect();
     let facts = json!({
-        "sound": good, "deep": deep, "problems": problems, "files": found.n_files, "videos": found.n_videos,
+        "valid": is_valid, "deep": deep, "problems": problems, "files": found.n_files, "videos": found.n_videos,
         "samples": found.n_samples, "secs": found.secs, "bytes_read": found.bytes, "next": next,
     });
     ui.summary(&lines.join("\n"), Some(&next), facts);
-    Ok(if good { Outcome::Done } else { Outcome::Wrong })
+    Ok(if is_valid { Outcome::Done } else { Outcome::CheckFailed })
 }
 
 fn info(dir: &std::path::Path, ui: &Ui) -> Result<Outcome> {
     let dataset = Dataset::open(dir)?;
     let (info, stats) = (dataset.info(), dataset.stats());
-    let or_not_said = |text: &str| if text.is_empty() { "not said".to_owned() } else { text.to_owned() };
+    let or_not_stated = |text: &str| if text.is_empty() { "not stated".to_owned() } else { text.to_owned() };
     let mut lines = vec![
-        format!("{} at {}, made by {}", info.speaker, info.fps, info.tool),
+        format!("{}, {}, created by {}", info.speaker, info.fps, info.tool),
         format!(
             "licence {}, consent {}, source {}",
-            or_not_said(&info.licence),
-            or_not_said(&info.consent),
-            or_not_said(&info.source)
+            or_not_stated(&info.licence),
+            or_not_stated(&info.consent),
+            or_not_stated(&info.source)
         ),
     ];
     if let Some(SplitRule { unit, why, guard_secs }) = &info.split_rule {
         lines.push(match unit {
-            SplitUnit::Time => format!("splits by time, {guard_secs:.2} s apart ({why})"),
+            SplitUnit::Time => format!("splits by time, with gaps of {} s ({why})", number(*guard_secs)),
             SplitUnit::Video | SplitUnit::Auto => format!("splits by video ({why})"),
         });
     }
@@ -100,25 +101,27 @@ fn info(dir: &std::path::Path, ui: &Ui) -> Result<Outcome> {
         let part = info.splits.get(split.name()).cloned().unwrap_or_default();
         let windows = stats.windows.strided.get(split.name()).copied().unwrap_or(0);
         lines.push(format!(
-            "{:11} {:9.1} s, {} intervals of {} videos, {windows} windows of {} frames, {} shards",
+            "{:11} {:>9}, {} of {}, {} of {}, {}",
             split.name(),
-            part.secs,
-            part.samples,
-            part.videos.len(),
-            stats.windows.n_frames,
-            part.shards.len()
+            length(part.secs),
+            counted(part.samples, "interval"),
+            counted(part.videos.len(), "video"),
+            counted(windows, "window"),
+            counted(stats.windows.n_frames, "frame"),
+            counted(part.shards.len(), "shard")
         ));
     }
     let footage = &stats.footage;
-    lines.push(format!("of {:.1} s of video: kept {:.1}", footage.secs, footage.kept_secs));
-    lines.extend(footage.refused_secs.iter().map(|(reason, secs)| format!("  refused, {reason}: {secs:.1} s")));
+    lines.push(format!("accepted {} of {} of video", length(footage.kept_secs), length(footage.secs)));
+    lines.extend(footage.refused_secs.iter().map(|(reason, secs)| format!("  rejected, {reason}: {}", length(*secs))));
     lines.push(format!(
-        "  failed: {:.1} s, and {} videos of unknown length",
-        footage.failed_secs, footage.n_of_unknown_length
+        "  failed: {}, and {} of unknown duration",
+        length(footage.failed_secs),
+        counted(footage.n_of_unknown_length, "video")
     ));
     for account in read_ledgers(dir)? {
         lines.push(format!(
-            "  {:40} {:10} kept {:7.1} of {:7.1} s{}",
+            "  {:40} {:10} accepted {:7.1} of {:7.1} s{}",
             account.name,
             account.split.map_or(if account.blocks.is_empty() { "-" } else { "by time" }, Split::name),
             account.ledger.kept_secs(),

@@ -4,6 +4,7 @@ use crate::cli::Outcome;
 use crate::cli::config_args::split;
 use crate::cli::moved::MovedVerb;
 use crate::cli::sandbox::enter_sandbox;
+use crate::cli::train::stopped::same_command;
 use crate::cli::ui::Ui;
 use anyhow::{Result, bail, ensure};
 use orator_base::stage::workdir::{self, FolderLock};
@@ -36,13 +37,13 @@ use std::path::PathBuf;
 #[command(args_conflicts_with_subcommands = true)]
 pub struct Args {
     #[command(subcommand)]
-    what: Option<What>,
+    mode: Option<EvaluateMode>,
     #[command(flatten)]
     motion: MotionArgs,
 }
 
 #[derive(clap::Subcommand)]
-enum What {
+enum EvaluateMode {
     Compare(CompareArgs),
     #[command(hide = true)]
     Lifter(MovedVerb),
@@ -95,10 +96,10 @@ struct MotionArgs {
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let MotionArgs { report, dataset, checkpoint, .. } = &args.motion;
     enter_sandbox(report.as_deref(), dataset.iter().chain(checkpoint).map(PathBuf::as_path));
-    match args.what {
-        Some(What::Lifter(args)) => args.refuse("evaluate lifter"),
-        Some(What::Compare(args)) => compare_results(&args, ui),
-        Some(What::People(args)) => args.refuse("evaluate people"),
+    match args.mode {
+        Some(EvaluateMode::Lifter(args)) => args.fail("evaluate lifter"),
+        Some(EvaluateMode::Compare(args)) => compare_results(&args, ui),
+        Some(EvaluateMode::People(args)) => args.fail("evaluate people"),
         None => motion(&args.motion, ui),
     }
 }
@@ -112,8 +113,8 @@ fn convention(name: &str) -> std::result::Result<Convention, String> {
 fn check_report(args: &MotionArgs) -> Result<()> {
     let Some(path) = &args.report else { return Ok(()) };
     let is_page = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("html"));
-    ensure!(is_page, "{}: a page ends in .html; name such a file", path.display());
-    ensure!(!path.is_dir(), "{} is a folder; name a file in it", path.display());
+    ensure!(is_page, "--report {}: expected a file that ends in .html", path.display());
+    ensure!(!path.is_dir(), "--report {} is a folder, expected a file", path.display());
     Ok(())
 }
 
@@ -142,7 +143,11 @@ fn motion(args: &MotionArgs, ui: &Ui) -> Result<Outcome> {
         text += &format!("\nwrote {} ({:.1} MB)\n", path.display(), html.len() as f64 / 1e6);
         facts["report"] = json!(path);
     }
-    ui.summary(&text, None, facts);
+    let next = match &args.report {
+        Some(path) => format!("xdg-open {}", path.display()),
+        None => format!("{} --report evaluation.html", same_command()),
+    };
+    ui.summary(&text, Some(&next), facts);
     Ok(Outcome::Done)
 }
 
@@ -171,12 +176,12 @@ fn evaluation(args: &MotionArgs, store: &MotionStore, ui: &Ui) -> Result<Evaluat
     Evaluation::from_files(truth, prediction, args.audio.as_deref(), args.fps, store, ui)
 }
 
-/// Compare two results, and refuse values that are not comparable.
+/// Compare two results, and reject values that are not comparable.
 ///
 /// Each value of a result has a hash of its definition and parameters. Values with equal hashes are printed next to
 /// each other; for a metric whose hashes differ, the differing parameters are printed.
 ///
-/// Exit code 1: a metric was refused.
+/// Exit code 1: a metric was rejected.
 #[derive(clap::Args)]
 struct CompareArgs {
     /// JSON output of `orator evaluate --json`.
@@ -189,11 +194,11 @@ struct CompareArgs {
 
 fn compare_results(args: &CompareArgs, ui: &Ui) -> Result<Outcome> {
     let compared = compare::compare(&StoredResult::read(&args.a)?, &StoredResult::read(&args.b)?);
-    let is_refused = !compared.refused.is_empty();
-    if compared.beside.is_empty() && !is_refused {
+    let has_rejected = !compared.refused.is_empty();
+    if compared.beside.is_empty() && !has_rejected {
         bail!("{} and {} have no metric in common", args.a.display(), args.b.display());
     }
     let text = format!("A: {}\nB: {}\n\n{}", args.a.display(), args.b.display(), compare::text(&compared));
     ui.summary(&text, None, json!({ "compared": compared }));
-    Ok(if is_refused { Outcome::Wrong } else { Outcome::Done })
+    Ok(if has_rejected { Outcome::CheckFailed } else { Outcome::Done })
 }

@@ -15,7 +15,7 @@ const MAX_LISTED: usize = 30;
 pub fn run(batch: &SpeechBatch, ui: &Ui) -> Result<Outcome> {
     let checkpoints = batch.sounds.iter().filter_map(|sound| sound.checkpoint.as_deref());
     enter_sandbox([batch.folder.as_path()], checkpoints.chain(batch.checkpoint.as_deref()));
-    signals::exit_on_signal("every sound that is done is kept, and the same command goes on from there");
+    signals::exit_on_signal("completed audio files are saved; run the same command again to continue");
     let report = batch.run(ui)?;
     ui.summary(&text(&report), None, json!(report));
     Ok(if report.failed > 0 { Outcome::SomeFailed } else { Outcome::Done })
@@ -27,7 +27,7 @@ fn text(report: &BatchReport) -> String {
     for sound in &report.sounds {
         let facts = |key: &str| sound.facts.get(key).cloned().unwrap_or_default();
         let word = match (sound.ended, &sound.error) {
-            (BatchState::Made, _) => "made",
+            (BatchState::Made, _) => "generated",
             (BatchState::Fresh, _) => "up to date",
             (BatchState::Failed, error) => {
                 text += &format!("{:width$}  failed  {}\n", sound.out, error.as_deref().unwrap_or_default());
@@ -50,6 +50,6 @@ fn text(report: &BatchReport) -> String {
         text += &format!("and {} more\n", n_listed - MAX_LISTED);
     }
     let BatchReport { made, fresh, failed, out_folder, sounds } = report;
-    let sounds = counted(sounds.len(), "sound");
-    text + &format!("{sounds}: {made} made, {fresh} up to date, {failed} failed; in {}", out_folder.display())
+    let sounds = counted(sounds.len(), "audio file");
+    text + &format!("{sounds}: {made} generated, {fresh} up to date, {failed} failed; in {}", out_folder.display())
 }

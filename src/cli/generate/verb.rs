@@ -8,6 +8,7 @@ use crate::cli::sandbox::enter_sandbox;
 use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, bail, ensure};
 use orator_base::stage::progress::Progress as _;
+use orator_base::text::{counted, length};
 use orator_gesture::batch::speech::{SegmentFacts, SpeechSource};
 use orator_gesture::batch::{SpeechBatch, motion_files, sounds, transcripts};
 use orator_gesture::generate::model::GenerationChoice;
@@ -49,7 +50,7 @@ pub struct Args {
     /// Keep the decoder state of a sequence-to-sequence network across segments.
     #[arg(long)]
     carry_state: bool,
-    /// Seed of a variant of the motion: another seed gives other motion, equal seeds give equal motion.
+    /// Seed of a variant of the motion: different seeds give different motion, equal seeds give equal motion.
     #[arg(long, value_name = "N", requires = "audio")]
     seed: Option<u64>,
     /// Number of variants, with consecutive seeds from --seed (or 1): `motion.bvh` becomes `motion-1.bvh`,
@@ -86,7 +87,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let Some(given) = &args.checkpoint else { bail!("give --checkpoint") };
     let outputs: Vec<OutputFiles> = files
         .iter()
-        .map(|files| outputs(files, |path| is_same_file(path, audio), "the speech itself", ""))
+        .map(|files| outputs(files, |path| is_same_file(path, audio), "the audio input", ""))
         .collect::<Result<_>>()?;
     outputs.iter().try_for_each(|outputs| args.figure.check(outputs))?;
     let checkpoint = checkpoint_file(given)?;
@@ -102,16 +103,16 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         let trained = TrainedSpeaker::open_as(&checkpoint, &choice)?;
         results.push((motion_files::write(&trained, &source, outputs, ui)?, trained));
     }
-    let Some((written, trained)) = results.first() else { bail!("no take was asked for") };
+    let Some((written, trained)) = results.first() else { bail!("no variant was requested") };
     let speed =
         written.secs * results.len() as f64 / results.iter().map(|result| result.0.motion_secs).sum::<f64>().max(1e-6);
     let names: Vec<String> = outputs.iter().flat_map(names).collect();
     let note = written.note.as_ref().map_or(String::new(), |note| format!("note: {note}\n"));
-    let n_variants = if results.len() > 1 { format!("{} takes of ", results.len()) } else { String::new() };
+    let n_variants = if results.len() > 1 { format!("{} variants of ", results.len()) } else { String::new() };
     let text = format!(
-        "{n_variants}{:.1} s of speech, {} frames of {} at {}, {speed:.0} x real time\n{note}{}wrote {}",
-        written.secs,
-        written.n_frames,
+        "{n_variants}{} of speech, {} of {} at {}, {speed:.0} x real time\n{note}{}wrote {}",
+        length(written.secs),
+        counted(written.n_frames, "frame"),
         trained.name(),
         trained.fps(),
         written.segments.as_ref().map(segments).unwrap_or_default(),
@@ -180,10 +181,11 @@ fn segments(facts: &SegmentFacts) -> String {
         StateAtSeams::Renewed => "with --carry-state",
         StateAtSeams::Carried => "without --carry-state",
     };
-    let known = words
-        .map_or(String::new(), |[n, n_known]| format!("{n_known} of {n} words of the transcript were trained with\n"));
+    let known = words.map_or(String::new(), |[n, n_known]| {
+        format!("{n_known} of {} of the transcript are in the vocabulary of the model\n", counted(n, "word"))
+    });
     format!(
-        "{known}mean step over a seam of segments / elsewhere: {raw:.2} generated, {smoothed:.2} smoothed \
+        "{known}mean step at segment boundaries / elsewhere: {raw:.2} generated, {smoothed:.2} smoothed \
          ({other} {other_raw:.2}, {other_smoothed:.2})\n"
     )
 }
@@ -194,7 +196,7 @@ fn seams(carry_state: bool) -> StateAtSeams {
 
 /// The batch that the arguments describe.
 fn batch(args: Args) -> Result<SpeechBatch> {
-    let folder = args.out_folder.context("give --out-folder, where the motions go")?;
+    let folder = args.out_folder.context("give --out-folder, the folder for the motions")?;
     let mut sounds = match (&args.batch, &args.audio_folder) {
         (Some(table), _) => sounds::of_table(table)?,
         (None, Some(sounds)) => sounds::of_folder(sounds, &folder)?,
@@ -202,7 +204,7 @@ fn batch(args: Args) -> Result<SpeechBatch> {
     };
     if let (Some(_), Some(checkpoint)) = (&args.transcript, &args.checkpoint) {
         let is_sequence = is_sequence(&checkpoint_file(checkpoint)?)?;
-        ensure!(is_sequence, "{} reads no words: leave out --transcript", checkpoint.display());
+        ensure!(is_sequence, "{} does not use words; remove --transcript", checkpoint.display());
     }
     transcripts::find(&mut sounds, args.transcript.as_deref())?;
     let (figure, seams) = (args.figure.options(), seams(args.carry_state));

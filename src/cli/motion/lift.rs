@@ -6,6 +6,7 @@ use crate::cli::ui::Ui;
 use anyhow::{Context, Result, bail, ensure};
 use orator_avatar::animate::export::file::ExportFormat;
 use orator_base::stage::progress::Progress;
+use orator_base::text::counted;
 use orator_base::types::pose2d::Keypoints;
 use orator_base::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST};
 use orator_base::types::time::FrameRate;
@@ -69,7 +70,7 @@ pub struct Args {
 }
 
 fn size(text: &str) -> Result<[u32; 2], String> {
-    config::image_size(text).ok_or_else(|| "expected width and height in pixels, like 1280x720".to_owned())
+    config::image_size(text).ok_or_else(|| "expected width and height in pixels, such as 1280x720".to_owned())
 }
 
 /// Whether the file has this program's format. An unreadable `.npz` file counts as such, so that its reader reports
@@ -97,15 +98,15 @@ fn read_foreign(args: &Args) -> Result<(Keypoints, Vec<String>)> {
     let file = args.keypoints.display();
     let found = keypoints::read(&args.keypoints)?;
     let fps = args.fps.or(found.fps);
-    let fps = fps.with_context(|| format!("{file}: it does not say its frames a second; give them with --fps"))?;
+    let fps = fps.with_context(|| format!("{file} does not state its frame rate; give it with --fps"))?;
     let mut notes = vec![format!("{} at {fps}", found.format)];
     let size = match args.size.or(found.image_size) {
         Some(size) => size,
         None if found.unit == CoordinateUnit::Pixels => {
-            notes.push("no size of the picture: taken from the farthest points (--size gives it)".to_owned());
+            notes.push("image size not stated: derived from the outermost points (set it with --size)".to_owned());
             found.extent()
         }
-        None => bail!("{file}: it does not say its picture's size; give it with --size, like --size 1280x720"),
+        None => bail!("{file} does not state its image size; give it with --size, such as 1280x720"),
     };
     let imported = take_in(found, fps, size, fps)?;
     notes.extend(imported.notes);
@@ -115,15 +116,17 @@ fn read_foreign(args: &Args) -> Result<(Keypoints, Vec<String>)> {
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     enter_sandbox([Some(&args.out), args.extra.as_ref()].into_iter().flatten().map(PathBuf::as_path), []);
     let format = ExportFormat::from_path(&args.out).ok().filter(|format| format.holds_joints());
-    let format = format.with_context(|| {
-        format!("{}: joints are written as .npz, .npy or .txt; name such a file", args.out.display())
-    })?;
+    let format = format
+        .with_context(|| format!("--out {}: expected a file that ends in .npz, .npy or .txt", args.out.display()))?;
     if let Some(path) = args.extra.as_ref().filter(|path| path.extension().is_none_or(|ending| ending != "npy")) {
-        bail!("{}: these points are written as .npy; name such a file", path.display());
+        bail!("--extra {}: expected a file that ends in .npy", path.display());
     }
     ensure!(args.extra.as_ref() != Some(&args.out), "--out and --extra name the same file {}", args.out.display());
     for sigma in [args.smooth_arms, args.smooth_hands] {
-        ensure!((0.0..=100.0).contains(&sigma), "a smoothing of {sigma} frames; it must lie between 0 and 100");
+        ensure!(
+            (0.0..=100.0).contains(&sigma),
+            "--smooth-arms and --smooth-hands: expected 0 to 100 frames, found {sigma}"
+        );
     }
     let (keypoints, mut notes) = if is_ours(&args.keypoints) { read_own(&args)? } else { read_foreign(&args)? };
     let settings = config::LiftConfig {
@@ -160,11 +163,12 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let bone = |joint: usize| lifted.lengths[joint - 1];
     let roll = camera.and_then(|camera| camera.roll_degrees);
     let pitch = camera.and_then(|camera| camera.pitch_degrees);
-    let held = |degrees: Option<f64>| degrees.map_or("not to be known".to_owned(), |v| format!("{v:.0} degrees"));
+    let angle = |degrees: Option<f64>| degrees.map_or("unknown".to_owned(), |v| format!("{v:.0} degrees"));
     let text = format!(
-        "{n} frames at {} lifted, {:.0} a second\narms in {:.0} % of the frames, left hand {:.0} %, right hand {:.0} %\n\
+        "{} at {} lifted, {:.0} frames/s\narms in {:.0} % of the frames, left hand {:.0} %, right hand {:.0} %\n\
          shoulders {:.3} m, upper arm {:.3} m, forearm {:.3} m\n\
-         camera{}: roll {}, looking down {}\nwrote {}",
+         camera{}: roll {}, downward pitch {}\nwrote {}",
+        counted(n, "frame"),
         motion.fps,
         n as f64 / secs.max(1e-9),
         100.0 * arms,
@@ -174,8 +178,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         bone(L_ELBOW),
         bone(L_WRIST),
         if args.level { " (levelled)" } else { "" },
-        held(roll),
-        held(pitch),
+        angle(roll),
+        angle(pitch),
         args.out.display()
     );
     let next = format!("orator animate {} --out {}", args.out.display(), args.out.with_extension("bvh").display());
@@ -183,7 +187,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         "out": args.out,
         "n_frames": n,
         "fps": motion.fps,
-        "frames_a_second": n as f64 / secs.max(1e-9),
+        "frames_per_sec": n as f64 / secs.max(1e-9),
         "arms": arms,
         "left_hand": left,
         "right_hand": right,
@@ -192,6 +196,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         "pitch_degrees": pitch,
         "levelled": args.level,
         "notes": notes,
+        "next": next,
     });
     ui.summary(&text, Some(&next), facts);
     Ok(Outcome::Done)

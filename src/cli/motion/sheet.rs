@@ -10,6 +10,7 @@ use orator_base::stage::Unit;
 use orator_base::stage::artifacts::Artifact;
 use orator_base::stage::progress::Progress as _;
 use orator_base::stage::workdir::{self, FolderLock};
+use orator_base::text::counted;
 use orator_base::types::image::PictureOptions;
 use orator_dataset::config::videos::Videos;
 use orator_formats::keypoints_npz;
@@ -22,15 +23,15 @@ use orator_report::sheet::sheet::SheetClip;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// Draw contact sheets: picture, keypoints and 3D pose.
+/// Draw contact sheets: image, keypoints and 3D pose.
 ///
 /// The source is the lifted videos of a run (`-c`), or separate files (`--video`, `--keypoints`, `--joints`). One
 /// pose is drawn every second, from the front and from the side; the grid spacing is 0.1 m, its axes cross at the
 /// neck. A strip shows the height and depth of the wrists.
 ///
-/// For each sheet these values are printed: spread of the bone lengths, wrist jitter (median second difference),
-/// depth of elbow and wrist behind their shoulder (negative: in front of it), and the ratio of the arm bone lengths
-/// in 3D to those in the image.
+/// For each arm these values are printed: median lengths of upper arm and forearm, jitter of the wrist (median second
+/// difference), its reprojection error, and the shares of frames without a wrist position and without a detected
+/// wrist, and of hand joints with a position and detected.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -75,7 +76,11 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let clips = match (&args.keypoints, &args.joints, &args.video) {
         (Some(keypoints), Some(joints), Some(video)) => {
             let out = args.out.clone().unwrap_or_else(|| PathBuf::from("sheet.png"));
-            ensure!(out.extension().is_some_and(|e| e == "png"), "{}: a sheet is written as .png", out.display());
+            ensure!(
+                out.extension().is_some_and(|e| e == "png"),
+                "--out {}: expected a file that ends in .png",
+                out.display()
+            );
             let title = video.file_name().unwrap_or_default().to_string_lossy().into_owned();
             let pictures = PictureOptions::default();
             let (video, keypoints, joints) = (video.clone(), keypoints.clone(), joints.clone());
@@ -93,23 +98,23 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let (mut text, mut facts, mut n_failed, mut next) = (String::new(), Vec::new(), 0, None);
     for files in &clips {
         match draw(files, args.every, args.figure, ui) {
-            Ok((written, figures)) => {
-                text += &format!("{}\n{}", files.title, table(&figures));
+            Ok((written, metrics)) => {
+                text += &format!("{}\n{}", files.title, table(&metrics));
                 written.iter().for_each(|path| text += &format!("wrote {}\n", path.display()));
                 next = next.or_else(|| Some(format!("xdg-open {}", written.first()?.display())));
-                facts.push(json!({ "clip": files.title, "sheets": written, "figures": as_json(&figures) }));
+                facts.push(json!({ "clip": files.title, "sheets": written, "metrics": as_json(&metrics) }));
             }
             Err(error) if clips.len() > 1 => {
                 n_failed += 1;
                 ui.say(&format!("failed  {}: {error:#}", files.title));
                 facts.push(json!({ "clip": files.title, "error": format!("{error:#}") }));
             }
-            Err(error) => return Err(error.context(format!("no sheet of {}", files.title))),
+            Err(error) => return Err(error.context(format!("cannot draw a sheet of {}", files.title))),
         }
     }
     drop(lock);
     if n_failed > 0 {
-        text += &format!("{n_failed} of {} clips failed\n", clips.len());
+        text += &format!("{n_failed} of {} failed\n", counted(clips.len(), "clip"));
     }
     ui.summary(&text, next.as_deref(), json!({ "clips": facts, "failed": n_failed, "next": next }));
     Ok(if n_failed > 0 { Outcome::SomeFailed } else { Outcome::Done })
@@ -144,13 +149,13 @@ fn of_run(pipeline: &Pipeline, args: &Args) -> Result<Vec<SheetFiles>> {
         }
     }
     if let (true, Some(name)) = (clips.is_empty(), &args.video) {
-        bail!("no video is called {}; there are: {}", name.display(), names.join(", "));
+        bail!("no video is named {}; the videos are: {}", name.display(), names.join(", "));
     }
-    ensure!(!clips.is_empty(), "{} names no video with pictures", config.file.display());
+    ensure!(!clips.is_empty(), "{} selects no video files (keypoint files have no sheets)", config.file.display());
     let (lifted, waiting): (Vec<_>, Vec<_>) = clips.into_iter().partition(|files| files.joints.exists());
     let first = waiting.first().map(|files| files.title.clone()).unwrap_or_default();
     let flags = args.config.flags();
-    ensure!(!lifted.is_empty(), "{first} is not lifted yet: orator run --to lift{flags}");
+    ensure!(!lifted.is_empty(), "{first} is not lifted yet; run `orator run --to lift{flags}`");
     Ok(lifted)
 }
 
@@ -186,28 +191,29 @@ type Row = (&'static str, &'static str, fn(&ArmStatistics) -> f64);
 const ROWS: [Row; 8] = [
     ("upper arm, m", "upper_arm_metres", |a| a.upper_arm_metres),
     ("forearm, m", "forearm_metres", |a| a.forearm_metres),
-    ("wrist shake, mm", "jitter_mm", |a| a.jitter_mm),
-    ("wrist off the picture's, mm", "wrist_off_mm", |a| a.wrist_off_mm),
-    ("frames without the wrist, %", "missing_percent", |a| 100.0 * a.missing),
-    ("frames that did not see the wrist, %", "masked_percent", |a| 100.0 * a.masked),
-    ("hand joints there, %", "hand_there_percent", |a| 100.0 * a.hand_there),
-    ("hand joints seen, %", "hand_seen_percent", |a| 100.0 * a.hand_seen),
+    ("wrist jitter, mm", "jitter_mm", |a| a.jitter_mm),
+    ("wrist reprojection error, mm", "wrist_reprojection_mm", |a| a.wrist_off_mm),
+    ("frames without wrist position, %", "missing_percent", |a| 100.0 * a.missing),
+    ("frames without detected wrist, %", "masked_percent", |a| 100.0 * a.masked),
+    ("hand joints with position, %", "hand_present_percent", |a| 100.0 * a.hand_there),
+    ("hand joints detected, %", "hand_detected_percent", |a| 100.0 * a.hand_seen),
 ];
 
-fn table(figures: &ClipStatistics) -> String {
-    if figures.left.missing + figures.right.missing >= 2.0 {
-        return "  no frame is lifted (`orator status --why` says why; `orator lift` takes any keypoints)\n".to_owned();
+fn table(metrics: &ClipStatistics) -> String {
+    if metrics.left.missing + metrics.right.missing >= 2.0 {
+        return "  no frame is lifted (`orator status --why` prints the reasons; `orator lift` applies no checks)\n"
+            .to_owned();
     }
     let number = |v: f64| if v.is_finite() { format!("{v:.2}") } else { "-".to_owned() };
     let head = format!("  {:40}{:>9}{:>9}\n", "", "left", "right");
     ROWS.iter().fold(head, |text, (name, _, of)| {
-        text + &format!("  {name:40}{:>9}{:>9}\n", number(of(&figures.left)), number(of(&figures.right)))
+        text + &format!("  {name:40}{:>9}{:>9}\n", number(of(&metrics.left)), number(of(&metrics.right)))
     })
 }
 
-fn as_json(figures: &ClipStatistics) -> Value {
+fn as_json(metrics: &ClipStatistics) -> Value {
     let arm = |arm: &ArmStatistics| -> serde_json::Map<String, Value> {
         ROWS.iter().map(|(_, name, of)| ((*name).to_owned(), json!(of(arm)))).collect()
     };
-    json!({ "left": arm(&figures.left), "right": arm(&figures.right) })
+    json!({ "left": arm(&metrics.left), "right": arm(&metrics.right) })
 }

@@ -17,10 +17,10 @@ pub struct Args {
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let file = args.dir.join("pipeline.toml");
-    anyhow::ensure!(!file.exists(), "{} is there already; nothing was changed", file.display());
+    anyhow::ensure!(!file.exists(), "{} already exists; nothing was changed", file.display());
     for folder in ["videos/host", "models"] {
         let folder = args.dir.join(folder);
-        std::fs::create_dir_all(&folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+        std::fs::create_dir_all(&folder).with_context(|| format!("cannot create the folder {}", folder.display()))?;
     }
     workdir::write_file(&file, DEFAULT_FILE.as_bytes())?;
     let videos = args.dir.join("videos/host");

@@ -29,7 +29,7 @@ pub struct Args {
     /// HTML page to write; defaults to report.html in the work folder.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Maximum number of pictures per rule; with 0 no video is read.
+    /// Maximum number of example frames per rule; with 0 no video is read.
     #[arg(long, default_value_t = 6, value_name = "N")]
     pictures: usize,
 }
@@ -45,7 +45,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     workdir::write_file(&out, page.html.as_bytes())?;
     let (sums, mut facts) = (page.sums, page.facts);
     let text = format!(
-        "kept {} of {} ({}), refused {}, failed {}\nwrote {} ({:.1} MB)",
+        "accepted {} of {} ({}), rejected {}, failed {}\nwrote {} ({:.1} MB)",
         length(sums.kept),
         length(sums.whole),
         percent(sums.kept, sums.whole),

@@ -10,6 +10,7 @@ use anyhow::Result;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use orator_base::stage::artifacts::StageName;
 use orator_base::stage::progress::{Event, Progress};
+use orator_base::text::counted;
 use orator_cluster::plan::ClusterPlan;
 use orator_dataset::config::Settings;
 use orator_onnx::{ModelError, ModelStore};
@@ -65,13 +66,15 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let (from, to) = (args.from.unwrap_or(default.from), args.to.unwrap_or(default.to));
     let selection = Selection { from, to, speakers: args.speaker, jobs: args.jobs, force: args.force };
     let pipeline = Pipeline::open(args.config.load()?)?.with_processes(this_program());
-    signals::exit_on_signal("every stage of a video that is done is kept, and the same command goes on from there");
+    signals::exit_on_signal("completed stages are saved; run the same command again to continue");
     let mut report = match pipeline.run(&selection, ui) {
-        Err(error) if is_missing_model(&error) && ui.confirm(&format!("{error:#}\nget the models now?")) => {
+        Err(error)
+            if is_missing_model(&error) && ui.confirm(&format!("{error:#}\ndownload the missing models now?")) =>
+        {
             let settings = &pipeline.config().settings;
             let Settings { models, pose2d, .. } = settings;
-            let wanted: Vec<_> = wanted(pose2d).into_iter().chain(SpeechDetector::wanted(settings)).collect();
-            fetch(&ModelStore::open(&models.dir)?, &wanted, None, ui)?;
+            let models_used: Vec<_> = wanted(pose2d).into_iter().chain(SpeechDetector::wanted(settings)).collect();
+            fetch(&ModelStore::open(&models.dir)?, &models_used, None, ui)?;
             pipeline.run(&selection, ui)?
         }
         ended => ended?,
@@ -86,8 +89,9 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             }
             let (stage, name) = (StageName::Dataset, unit.to_string());
             let (video, plan) = (unit.source.display(), plan.display());
-            let error =
-                format!("the video {video} of {plan} is gone: put it back, or write the plan anew with `orator plan`");
+            let error = format!(
+                "the video {video} of {plan} does not exist: restore it, or write a new plan with `orator plan`"
+            );
             ui.event(&Event::Failed { stage: stage.as_str(), unit: &name, error: &error });
             report.failures.push(UnitFailure { speaker: None, unit: Some(name), stage, error, cause: None });
         }
@@ -99,7 +103,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     lines.extend(report.datasets.iter().map(|dir| format!("dataset  {}", dir.display())));
     let n_failed = report.failures.len();
     if n_failed > 0 {
-        lines.push(format!("{n_failed} failed; `orator status --why` says each error again"));
+        lines.push(format!("{}; `orator status --why` prints the errors", counted(n_failed, "failure")));
     }
     let first = report.datasets.first().and_then(|dir| dir.file_name());
     let next = match first {

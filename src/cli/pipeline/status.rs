@@ -9,6 +9,7 @@ use anyhow::Result;
 use orator_base::stage::artifacts;
 use orator_base::stage::artifacts::StageName;
 use orator_base::stage::ledger::longest_first;
+use orator_base::text::counted;
 use orator_pipeline::{Pipeline, StagePlan, StatusReport, TimeBudget, UnitState, UnitStatus};
 use serde_json::json;
 use std::path::PathBuf;
@@ -66,13 +67,13 @@ fn text(report: &StatusReport, why: bool) -> String {
         let word = |stage| of_unit.iter().find(|unit| unit.stage == stage).map(|unit| unit.state.to_string());
         lines.push(row(&of_unit[0].unit, StageName::ALL.map(|stage| word(stage).unwrap_or_default())));
     }
-    let headings = ["kept", "refused", "failed", "waiting", "duration"].map(|name| format!("{name:>9}")).join("");
-    lines.extend([String::new(), format!("{:width$}{headings}  refused for", "seconds")]);
+    let headings = ["accepted", "rejected", "failed", "waiting", "duration"].map(|name| format!("{name:>9}")).join("");
+    lines.extend([String::new(), format!("{:width$}{headings}  rejected for", "seconds")]);
     lines.extend(report.time_budget.iter().map(|account| seconds(account, width)));
-    lines.push(verdict(&report.total));
-    let not_judged = |account: &TimeBudget| account.not_judged.as_ref().map(|said| format!("{}: {said}", account.unit));
+    lines.push(consistency(&report.total));
+    let not_judged = |account: &TimeBudget| account.not_judged.as_ref().map(|note| format!("{}: {note}", account.unit));
     lines.extend(report.time_budget.iter().filter_map(not_judged));
-    let offset = |account: &TimeBudget| account.sound_offset.map(|said| format!("{}: {said}", account.unit));
+    let offset = |account: &TimeBudget| account.sound_offset.map(|offset| format!("{}: {offset}", account.unit));
     lines.extend(report.time_budget.iter().filter_map(offset));
     if why {
         lines.push(String::new());
@@ -95,14 +96,17 @@ fn seconds(account: &TimeBudget, width: usize) -> String {
 }
 
 /// Whether all seconds add up.
-fn verdict(total: &TimeBudget) -> String {
+fn consistency(total: &TimeBudget) -> String {
     let unknown = match total.n_unknown {
         0 => String::new(),
-        n => format!("; the length of {n} that failed is not known (?)"),
+        n => format!("; the duration of {} is unknown (?)", counted(n, "failed video")),
     };
     match total.n_mismatched {
-        0 => format!("kept + refused + failed + waiting = duration, to one frame a video{unknown}"),
-        n => format!("the seconds of {n} do NOT add up to the duration: run the stage segment again{unknown}"),
+        0 => format!("accepted + rejected + failed + waiting = duration, within one frame per video{unknown}"),
+        n => format!(
+            "ERROR: the seconds of {} do not add up to the duration; run the stage segment again{unknown}",
+            counted(n, "video")
+        ),
     }
 }
 
@@ -111,7 +115,7 @@ fn plan(plan: &StagePlan) -> String {
     let StagePlan { stage, up_to_date, would_run, reasons } = plan;
     let shown: Vec<&str> = reasons.iter().map(String::as_str).take(REASONS_SHOWN).collect();
     let more = reasons.len().saturating_sub(shown.len());
-    let more = if more == 0 { String::new() } else { format!("; {more} other reasons") };
+    let more = if more == 0 { String::new() } else { format!("; {}", counted(more, "other reason")) };
     let why = if *would_run == 0 { String::new() } else { format!(": {}{more}", shown.join("; ")) };
-    format!("{stage:8} {up_to_date} up to date, {would_run} would run{why}")
+    format!("{stage:8} {up_to_date} up to date, {would_run} to run{why}")
 }

@@ -56,22 +56,22 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             checks.push(aligner());
         }
         Err(error) => {
-            checks.push(wrong(
+            checks.push(missing(
                 "configuration",
                 format!("{error:#}"),
-                "mend it, or write a new one with `orator init DIR`",
+                "correct it, or create a new one with `orator init DIR`",
             ));
         }
     }
     let lines: Vec<String> = checks.iter().map(Check::line).collect();
-    let missing: Vec<&Check> = checks.iter().filter(|check| check.found.is_err()).collect();
+    let failed: Vec<&Check> = checks.iter().filter(|check| check.found.is_err()).collect();
     let facts: Vec<_> = checks.iter().map(Check::json).collect();
-    let next = match missing.first().map(|check| &check.found) {
+    let next = match failed.first().map(|check| &check.found) {
         Some(Err((_, fix))) => fix.clone(),
         _ => format!("orator run{}", args.config.flags()),
     };
-    ui.summary(&lines.join("\n"), Some(&next), json!({ "checks": facts, "missing": missing.len(), "next": next }));
-    Ok(if missing.is_empty() { Outcome::Done } else { Outcome::Wrong })
+    ui.summary(&lines.join("\n"), Some(&next), json!({ "checks": facts, "missing": failed.len(), "next": next }));
+    Ok(if failed.is_empty() { Outcome::Done } else { Outcome::CheckFailed })
 }
 
 fn defaults() -> Result<Config> {
@@ -79,22 +79,22 @@ fn defaults() -> Result<Config> {
     let mut settings = Settings::default();
     settings.work.dir = here.join(&settings.work.dir);
     settings.models.dir = here.join(&settings.models.dir);
-    Ok(Config { settings, file: here.join("pipeline.toml (not there: defaults)"), notes: Vec::new() })
+    Ok(Config { settings, file: here.join("pipeline.toml (not found: defaults)"), notes: Vec::new() })
 }
 
 fn ok(name: &str, found: String) -> Check {
     Check { name: name.to_owned(), found: Ok(found), is_full: true }
 }
 
-fn wrong(name: &str, what: String, fix: &str) -> Check {
-    Check { name: name.to_owned(), found: Err((what, fix.to_owned())), is_full: false }
+fn missing(name: &str, problem: String, fix: &str) -> Check {
+    Check { name: name.to_owned(), found: Err((problem, fix.to_owned())), is_full: false }
 }
 
 /// Restrictions of processes that read videos on this machine. They are optional, so nothing counts as missing without
 /// them.
-fn sandbox(is_wanted: bool) -> Check {
+fn sandbox(is_enabled: bool) -> Check {
     let (is_active, found) = match probe(&this_program()) {
-        _ if !is_wanted => (false, "not active: work.sandbox = false".to_owned()),
+        _ if !is_enabled => (false, "not active: work.sandbox = false".to_owned()),
         Ok(restriction) => (restriction.is_active(), restriction.to_string()),
         Err(error) => (false, format!("not active: {error:#}")),
     };
@@ -105,9 +105,9 @@ fn sandbox(is_wanted: bool) -> Check {
 fn aligner() -> Check {
     let python = default_python();
     match Aligner::version(&python) {
-        Ok(version) => ok("word aligner (English)", format!("pocketsphinx {version} of {}", python.display())),
+        Ok(version) => ok("word aligner (English)", format!("pocketsphinx {version} ({})", python.display())),
         Err(error) => {
-            let found = format!("only `orator align` needs it: {error:#}");
+            let found = format!("needed by `orator align` only: {error:#}");
             Check { is_full: false, ..ok("word aligner (English)", found) }
         }
     }
@@ -118,17 +118,17 @@ fn model_checks(settings: &Settings) -> Vec<Check> {
     let dir = &settings.models.dir;
     let runtime = match Runtime::load(&settings.models.onnxruntime, dir) {
         Ok(runtime) => runtime,
-        Err(error) => return vec![wrong("ONNX Runtime", format!("{error:#}"), "orator models fetch")],
+        Err(error) => return vec![missing("ONNX Runtime", format!("{error:#}"), "orator models fetch")],
     };
     let mut checks = vec![ok("ONNX Runtime", format!("{} ({})", runtime.version(), runtime.library().display()))];
-    let chosen = ModelStore::open(dir).and_then(|store| Ok((models::choose(&settings.pose2d, &store)?, store)));
-    let (pose2d, store) = match chosen {
-        Ok(chosen) => chosen,
+    let selected = ModelStore::open(dir).and_then(|store| Ok((models::choose(&settings.pose2d, &store)?, store)));
+    let (pose2d, store) = match selected {
+        Ok(selected) => selected,
         Err(error) => {
-            checks.push(wrong(
+            checks.push(missing(
                 "model manifest",
                 format!("{error:#}"),
-                "mend it, or take it away: a full one is built in",
+                "correct it, or remove it to use the built-in manifest",
             ));
             return checks;
         }
@@ -137,16 +137,16 @@ fn model_checks(settings: &Settings) -> Vec<Check> {
         let opened = store.manifest().get(id).and_then(|entry| Ok(store.check(&runtime, entry)?));
         checks.push(match opened {
             Ok(model) => ok(&format!("model {id}"), dir.join(&model.entry().file).display().to_string()),
-            Err(error) => wrong(&format!("model {id}"), format!("{error:#}"), "orator models fetch"),
+            Err(error) => missing(&format!("model {id}"), format!("{error:#}"), "orator models fetch"),
         });
     }
     if let Some(advice) = models::advice(&settings.pose2d, &store) {
-        checks.push(wrong("face model", advice.to_owned(), "orator models fetch"));
+        checks.push(missing("face model", advice.to_owned(), "orator models fetch"));
     }
     match SpeechDetector::advice(settings) {
         Ok(None) => {}
-        Ok(Some(advice)) => checks.push(wrong("speech model", advice.to_owned(), "orator models fetch")),
-        Err(error) => checks.push(wrong("speech model", format!("{error:#}"), "orator models fetch")),
+        Ok(Some(advice)) => checks.push(missing("speech model", advice.to_owned(), "orator models fetch")),
+        Err(error) => checks.push(missing("speech model", format!("{error:#}"), "orator models fetch")),
     }
     checks
 }
@@ -155,16 +155,17 @@ fn model_checks(settings: &Settings) -> Vec<Check> {
 fn word_checks(models: &Path) -> Vec<Check> {
     let tables = words::opened(models);
     if tables.is_empty() {
-        let none = "none; `orator words fetch` gets some, for networks that read words".to_owned();
+        let none = "none (needed by networks that use words only); download them with `orator words fetch`".to_owned();
         return vec![Check { is_full: false, ..ok("word vectors", none) }];
     }
     let check = |(path, table): (PathBuf, Result<WordVectors>)| match table {
         Ok(table) => {
             let (n_words, dim) = (table.n_words(), table.dim());
-            ok("word vectors", format!("{n_words} words of {dim} numbers ({})", path.display()))
+            ok("word vectors", format!("{n_words} words, {dim} dimensions ({})", path.display()))
         }
         Err(error) => {
-            wrong("word vectors", format!("{error:#}"), "remove it, and make it anew: `orator words fetch` or `add`")
+            let fix = "remove it, then run `orator words fetch` or `orator words add FILE`";
+            missing("word vectors", format!("{error:#}"), fix)
         }
     };
     tables.into_iter().map(check).collect()
@@ -175,8 +176,8 @@ fn work(dir: &Path) -> Check {
     let existing = dir.ancestors().find(|folder| folder.exists()).unwrap_or(dir);
     match workdir::locks_work(existing) {
         Ok(true) => ok("work folder", dir.display().to_string()),
-        Ok(false) => ok("work folder", format!("{} (locks do not hold there: one command at a time)", dir.display())),
-        Err(error) => wrong("work folder", format!("{error:#}"), "choose another with --set work.dir=FOLDER"),
+        Ok(false) => ok("work folder", format!("{} (no file locks there: run one command at a time)", dir.display())),
+        Err(error) => missing("work folder", format!("{error:#}"), "choose another with --set work.dir=FOLDER"),
     }
 }
 
@@ -184,14 +185,14 @@ impl Check {
     fn line(&self) -> String {
         match &self.found {
             Ok(found) => format!("{}     {:26} {found}", if self.is_full { "ok  " } else { "note" }, self.name),
-            Err((what, fix)) => format!("missing  {:26} {what}\n         {:26} fix: {fix}", self.name, ""),
+            Err((problem, fix)) => format!("missing  {:26} {problem}\n         {:26} fix: {fix}", self.name, ""),
         }
     }
 
     fn json(&self) -> serde_json::Value {
         match &self.found {
             Ok(found) => json!({ "name": self.name, "ok": true, "found": found }),
-            Err((what, fix)) => json!({ "name": self.name, "ok": false, "wrong": what, "fix": fix }),
+            Err((problem, fix)) => json!({ "name": self.name, "ok": false, "problem": problem, "fix": fix }),
         }
     }
 }

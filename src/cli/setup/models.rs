@@ -75,9 +75,9 @@ enum ModelsVerb {
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let settings = settings(&args)?;
-    let Settings { models: place, pose2d, .. } = &settings;
-    let mut store = ModelStore::open(&place.dir)?;
-    let runtime = || Runtime::load(&place.onnxruntime, &place.dir);
+    let Settings { models: folder, pose2d, .. } = &settings;
+    let mut store = ModelStore::open(&folder.dir)?;
+    let runtime = || Runtime::load(&folder.onnxruntime, &folder.dir);
     let resolved = models::choose(pose2d, &store)?;
     let chosen = models::keys(&resolved).map(|(_, _, id)| id.clone());
     match &args.verb {
@@ -85,16 +85,16 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         ModelsVerb::Fetch { ids, all, mirror } => {
             let wanted: Vec<ModelRequest> = match (all, ids.as_slice()) {
                 (true, _) => {
-                    let can_be_had = |entry: &&ModelEntry| mirror.is_some() || entry.is_served();
-                    let entries = store.manifest().models.iter().filter(can_be_had);
+                    let is_available = |entry: &&ModelEntry| mirror.is_some() || entry.is_served();
+                    let entries = store.manifest().models.iter().filter(is_available);
                     entries.map(|entry| ModelRequest::Id(entry.id.clone())).collect()
                 }
                 (false, []) => models::wanted(pose2d).into_iter().chain(SpeechDetector::wanted(&settings)).collect(),
                 (false, ids) => ids.iter().cloned().map(ModelRequest::Id).collect(),
             };
-            if find_library(&place.onnxruntime, &place.dir).is_err() {
+            if find_library(&folder.onnxruntime, &folder.dir).is_err() {
                 let source = store.fetch_runtime(mirror.as_deref(), ui)?;
-                ui.say(&format!("ONNX Runtime               {source}, into {}/lib", place.dir.display()));
+                ui.say(&format!("ONNX Runtime               {source}, installed in {}/lib", folder.dir.display()));
             }
             fetch(&store, &wanted, mirror.as_deref(), ui)
         }
@@ -102,7 +102,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             let entry = store.add(&runtime()?, file, like, id.as_deref(), licence)?;
             let key = format!("{:?}", entry.role).to_lowercase();
             let manifest = store.dir().join(MANIFEST_FILE);
-            let text = format!("{} is registered in {} (sha256 {})", entry.id, manifest.display(), entry.sha256);
+            let text = format!("registered {} in {} (sha256 {})", entry.id, manifest.display(), entry.sha256);
             let next = format!("orator run --set pose2d.{key}={}", entry.id);
             ui.summary(&text, Some(&next), json!({ "added": entry }));
             Ok(Outcome::Done)
@@ -112,15 +112,17 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             let lines = store.entries(ids)?.into_iter().map(|entry| {
                 let required = !ids.is_empty() || chosen.contains(&entry.id);
                 match store.check(&runtime, entry) {
-                    Ok(_) => ModelLine::new(entry, "right", true, "right: bytes, names and shapes".to_owned()),
+                    Ok(_) => {
+                        ModelLine::new(entry, "valid", true, "valid: content hash, tensor names and shapes".to_owned())
+                    }
                     Err(ModelError::Missing { .. }) if !required => ModelLine {
                         is_failure: false,
-                        ..ModelLine::new(entry, "right", false, "missing (not chosen)".to_owned())
+                        ..ModelLine::new(entry, "valid", false, "missing (not selected)".to_owned())
                     },
-                    Err(error) => ModelLine::new(entry, "right", false, error.to_string()),
+                    Err(error) => ModelLine::new(entry, "valid", false, error.to_string()),
                 }
             });
-            close(&lines.collect::<Vec<_>>(), ["", "orator models fetch"], &store, ui)
+            close(&lines.collect::<Vec<_>>(), ["orator run", "orator models fetch"], &store, ui)
         }
     }
 }
@@ -133,19 +135,21 @@ pub fn fetch(store: &ModelStore, wanted: &[ModelRequest], mirror: Option<&Path>,
         terms += &format!("\n  {:<24} {size:5.1} MB  licence {}", entry.id, entry.origin.licence);
     }
     if !terms.is_empty() {
-        ui.say(&format!("models that are not there, the first of a kind that can be had will do:{terms}"));
+        ui.say(&format!(
+            "missing models (of those for one purpose, the first that can be downloaded is enough):{terms}"
+        ));
     }
     let fetched = store.fetch(wanted, mirror, ui)?;
-    let in_its_place = |one: &Fetched| {
-        let is_had = |other: &&Fetched| other.source.is_ok() && other.entry.role == one.entry.role;
-        fetched.iter().find(is_had).filter(|_| wanted.contains(&ModelRequest::Role(one.entry.role)))
+    let substitute = |one: &Fetched| {
+        let is_fetched = |other: &&Fetched| other.source.is_ok() && other.entry.role == one.entry.role;
+        fetched.iter().find(is_fetched).filter(|_| wanted.contains(&ModelRequest::Role(one.entry.role)))
     };
     let lines = fetched.iter().map(|one| match &one.source {
-        Ok(source) => ModelLine::new(one.entry, "had", true, source.to_string()),
+        Ok(source) => ModelLine::new(one.entry, "fetched", true, source.to_string()),
         Err(error) => {
-            let other = in_its_place(one).map(|other| format!(" ({} will do)", other.entry.id));
-            let message = format!("NOT HAD{}: {error:#}", other.as_deref().unwrap_or_default());
-            ModelLine { is_failure: other.is_none(), ..ModelLine::new(one.entry, "had", false, message) }
+            let other = substitute(one).map(|other| format!(" ({} is used instead)", other.entry.id));
+            let message = format!("FAILED{}: {error:#}", other.as_deref().unwrap_or_default());
+            ModelLine { is_failure: other.is_none(), ..ModelLine::new(one.entry, "fetched", false, message) }
         }
     });
     close(&lines.collect::<Vec<_>>(), ["orator run", "orator models fetch --mirror DIR"], store, ui)
@@ -175,28 +179,28 @@ impl ModelLine {
     /// `key` is the JSON key of the flag `good`.
     fn new(entry: &ModelEntry, key: &str, good: bool, message: String) -> Self {
         let text = format!("{:<26} {message}", entry.id);
-        Self { text, facts: json!({ "id": entry.id, key: good, "said": message }), is_failure: !good }
+        Self { text, facts: json!({ "id": entry.id, key: good, "message": message }), is_failure: !good }
     }
 }
 
-/// Prints the lines; `next` holds the commands to suggest after success and after failure, empty for none.
+/// Prints the lines; `next` holds the commands to suggest after success and after failure.
 fn close(lines: &[ModelLine], next: [&str; 2], store: &ModelStore, ui: &Ui) -> Result<Outcome> {
     let has_failed = lines.iter().any(|line| line.is_failure);
     let text: Vec<&str> = lines.iter().map(|line| line.text.as_str()).collect();
     let facts: Vec<&Value> = lines.iter().map(|line| &line.facts).collect();
-    let next = Some(next[usize::from(has_failed)]).filter(|next| !next.is_empty());
-    ui.summary(&text.join("\n"), next, json!({ "dir": store.dir(), "models": facts }));
+    let next = next[usize::from(has_failed)];
+    ui.summary(&text.join("\n"), Some(next), json!({ "dir": store.dir(), "models": facts }));
     Ok(if has_failed { Outcome::SomeFailed } else { Outcome::Done })
 }
 
 fn list(store: &ModelStore, chosen: &[String], ui: &Ui) -> Result<Outcome> {
     let dir = store.dir();
     let (mut text, mut facts, mut n_missing) =
-        (format!("models in {} (* chosen by the configuration)\n", dir.display()), Vec::new(), 0);
+        (format!("models in {} (* selected by the configuration)\n", dir.display()), Vec::new(), 0);
     for entry in &store.manifest().models {
-        let (state, is_chosen) = (store.state(entry), chosen.contains(&entry.id));
-        let mark = if is_chosen { "*" } else { " " };
-        n_missing += usize::from(state != ModelState::Present && is_chosen);
+        let (state, is_selected) = (store.state(entry), chosen.contains(&entry.id));
+        let mark = if is_selected { "*" } else { " " };
+        n_missing += usize::from(state != ModelState::Present && is_selected);
         let ModelOrigin { repository, commit, path, licence, note } = &entry.origin;
         let role = format!("{:?}", entry.role).to_lowercase();
         text += &format!(
@@ -207,15 +211,15 @@ fn list(store: &ModelStore, chosen: &[String], ui: &Ui) -> Result<Outcome> {
         );
         text += &format!("    {}\n    from {repository} @ {commit} : {path}\n    licence {licence}\n", entry.about);
         let note = Some(note.clone()).filter(|note| !note.is_empty());
-        let url = entry.url.as_ref().map(|url| format!("had from {url}"));
-        let sources = entry.sources.iter().map(|source| format!("had from {source}"));
-        let steps = entry.conversion.as_ref().map(|steps| format!("made by {steps}"));
+        let url = entry.url.as_ref().map(|url| format!("download from {url}"));
+        let sources = entry.sources.iter().map(|source| format!("download from {source}"));
+        let steps = entry.conversion.as_ref().map(|steps| format!("converted by {steps}"));
         text.extend(note.into_iter().chain(url).chain(sources).chain(steps).map(|line| format!("    {line}\n")));
         facts.push(json!({ "id": entry.id, "state": state, "entry": entry }));
     }
     let layouts: Vec<_> = store.manifest().layouts.iter().map(|entry| entry.id.as_str()).collect();
-    text += &format!("\nlayouts for `add --like`, beside the models: {}", layouts.join(", "));
-    let next = (n_missing > 0).then_some("orator models fetch");
-    ui.summary(&text, next, json!({ "dir": dir, "models": facts, "layouts": layouts }));
+    text += &format!("\nother layouts for `add --like`: {}", layouts.join(", "));
+    let next = if n_missing > 0 { "orator models fetch" } else { "orator run" };
+    ui.summary(&text, Some(next), json!({ "dir": dir, "models": facts, "layouts": layouts }));
     Ok(Outcome::Done)
 }

@@ -5,6 +5,7 @@ use crate::cli::ui::Ui;
 use anyhow::{Context, Result, ensure};
 use orator_base::input;
 use orator_base::stage::workdir;
+use orator_base::text::{counted, percent};
 use orator_dataset::config::{self, Settings};
 use orator_formats::transcript::Transcript;
 use orator_formats::word_vectors::{WordVectors, glove, wink};
@@ -70,30 +71,33 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         WordsVerb::Fetch { mirror } => {
             let table = path_of(&folder, GLOVE);
             let store = ModelStore::open(&models)?;
-            if let Ok(there) = WordVectors::open(&table) {
+            if let Ok(existing) = WordVectors::open(&table) {
                 let _ = store.sweep();
-                return Ok(report_table(&table, &there, "there already", ui));
+                return Ok(report_table(&table, &existing, "already installed", ui));
             }
             let terms = store.manifest().words.as_ref().map(|words| words.licence.clone()).unwrap_or_default();
-            std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
-            let had = store.fetch_words(mirror.as_deref(), ui, |json, source| {
+            std::fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
+            let source = store.fetch_words(mirror.as_deref(), ui, |json, from| {
                 // The table is written last: if it exists, its licence file does too.
                 workdir::write_file(&table.with_extension("licence.txt"), format!("{terms}\n").as_bytes())?;
                 make(json, &table)?;
-                Ok(source.to_string())
+                Ok(from.to_string())
             })?;
-            Ok(report_table(&table, &WordVectors::open(&table)?, &had, ui))
+            Ok(report_table(&table, &WordVectors::open(&table)?, &source, ui))
         }
         WordsVerb::Add { file, name } => {
             let stem = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
             let name = name.clone().unwrap_or(stem);
             let is_plain = |c: char| c.is_ascii_alphanumeric() || ".-_".contains(c);
             let is_name = !name.is_empty() && !name.starts_with('.') && name.chars().all(is_plain);
-            ensure!(is_name, "{name:?} is no name of a table: letters, digits, `.`, `-` and `_`; say one by --name");
-            std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+            ensure!(
+                is_name,
+                "invalid table name {name:?}: expected letters, digits, `.`, `-` and `_`; set one with --name"
+            );
+            std::fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
             let table = path_of(&folder, &name);
             make(file, &table)?;
-            Ok(report_table(&table, &WordVectors::open(&table)?, &format!("made from {}", file.display()), ui))
+            Ok(report_table(&table, &WordVectors::open(&table)?, &format!("created from {}", file.display()), ui))
         }
         WordsVerb::Check { transcripts } => check(&folder, transcripts, ui),
     }
@@ -112,14 +116,15 @@ fn make(file: &Path, table: &Path) -> Result<()> {
         let n_words = if is_json { wink::convert(reader, attempt) } else { glove::convert(reader, attempt) };
         n_words.map(drop)
     });
-    converted.with_context(|| format!("{} holds no word vectors", file.display()))
+    converted.with_context(|| format!("cannot read word vectors from {}", file.display()))
 }
 
 fn report_table(path: &Path, table: &WordVectors, how: &str, ui: &Ui) -> Outcome {
-    let text = format!("{}: {} words of {} numbers, {how}", path.display(), table.n_words(), table.dim());
+    let text = format!("{}: {} words, {} dimensions, {how}", path.display(), table.n_words(), table.dim());
     let hash = sha256_of(path).unwrap_or_default();
     let facts = json!({ "file": path, "words": table.n_words(), "dim": table.dim(), "sha256": hash });
-    ui.summary(&text, None, facts);
+    let next = format!("orator train seq2seq --words {}", path.display());
+    ui.summary(&text, Some(&next), facts);
     Outcome::Done
 }
 
@@ -140,29 +145,30 @@ pub(super) fn opened(models: &Path) -> Vec<(PathBuf, Result<WordVectors>)> {
 
 fn check(folder: &Path, transcripts: &[PathBuf], ui: &Ui) -> Result<Outcome> {
     let tables = tables(folder);
-    ensure!(!tables.is_empty(), "no word vectors are in {}: `orator words fetch` gets some", folder.display());
+    ensure!(!tables.is_empty(), "no word vectors in {}: download them with `orator words fetch`", folder.display());
     let texts = transcripts.iter().map(|path| Ok((path, Transcript::read(path)?))).collect::<Result<Vec<_>>>()?;
-    let (mut lines, mut facts, mut is_wrong) = (Vec::new(), Vec::<Value>::new(), false);
+    let (mut lines, mut facts, mut is_unknown) = (Vec::new(), Vec::<Value>::new(), false);
     for path in &tables {
         let table = WordVectors::open(path)?;
-        lines.push(format!("{}: {} words of {} numbers", path.display(), table.n_words(), table.dim()));
+        lines.push(format!("{}: {} words, {} dimensions", path.display(), table.n_words(), table.dim()));
         let mut known = Vec::new();
         for (file, transcript) in &texts {
             let words: Vec<&str> = transcript.text.split_whitespace().collect();
             let (n_words, n_known) = (words.len(), table.n_known(words));
             let coverage = match (n_words, n_known) {
-                (0, _) => "it holds no word".to_owned(),
-                (_, 0) => format!("none of its {n_words} words is known: is it in the language of the vectors?"),
+                (0, _) => "the transcript has no words".to_owned(),
+                (_, 0) => format!("0 of {} in the table: check the language of the vectors", counted(n_words, "word")),
                 _ => {
-                    format!("{n_known} of {n_words} words are known ({:.1} %)", 100.0 * n_known as f64 / n_words as f64)
+                    let share = percent(n_known as f64, n_words as f64);
+                    format!("{n_known} of {} in the table ({share})", counted(n_words, "word"))
                 }
             };
-            is_wrong |= n_known == 0;
+            is_unknown |= n_known == 0;
             lines.push(format!("  {}: {coverage}", file.display()));
-            known.push(json!({ "file": file, "words": n_words, "known": n_known, "said": coverage }));
+            known.push(json!({ "file": file, "words": n_words, "known": n_known, "message": coverage }));
         }
         facts.push(json!({ "file": path, "words": table.n_words(), "dim": table.dim(), "transcripts": known }));
     }
     ui.summary(&lines.join("\n"), None, json!({ "tables": facts }));
-    Ok(if is_wrong { Outcome::Wrong } else { Outcome::Done })
+    Ok(if is_unknown { Outcome::CheckFailed } else { Outcome::Done })
 }

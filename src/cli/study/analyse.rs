@@ -69,13 +69,9 @@ pub fn design(name: &str) -> Result<TaskDesign, String> {
 }
 
 pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
-    ensure!(
-        (0.1..50.0).contains(&args.bound),
-        "--bound is {}; expected points of percent, 0.1 to below 50",
-        args.bound
-    );
+    ensure!((0.1..50.0).contains(&args.bound), "--bound {}: expected 0.1 to below 50 percentage points", args.bound);
     if let Some(draws) = args.draws {
-        ensure!((100..=1_000_000).contains(&draws), "--draws is {draws}; expected 100 to 1000000");
+        ensure!((100..=1_000_000).contains(&draws), "--draws {draws}: expected 100 to 1000000");
     }
     check_report(args)?;
     let outputs = args.report.iter().chain(&args.methods).map(PathBuf::as_path);
@@ -105,7 +101,7 @@ fn check_report(args: &Args) -> Result<()> {
         let Some(path) = path else { continue };
         let fits = path.extension().is_some_and(|found| found.eq_ignore_ascii_case(ending));
         ensure!(fits, "{}: expected a file that ends in .{ending}", path.display());
-        ensure!(!path.is_dir(), "{} is a folder; name a file in it", path.display());
+        ensure!(!path.is_dir(), "{} is a folder, expected a file", path.display());
     }
     Ok(())
 }
@@ -125,7 +121,7 @@ fn analysis(args: &Args) -> Result<StudyAnalysis> {
     }
     let options = [(args.design.is_some(), "--design"), (args.columns != ColumnNames::default(), "--columns")];
     for (is_given, option) in options {
-        ensure!(!is_given, "{option} is for tables of votes; {} is the folder of a study", args.source.display());
+        ensure!(!is_given, "{option} applies to tables of votes; {} is a study folder", args.source.display());
     }
     let folder = StudyFolder::new(&args.source);
     let registration = Registration::of_folder(&folder)?;

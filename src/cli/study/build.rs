@@ -13,7 +13,7 @@ use serde_json::json;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-/// Maximum number of rejected audio pieces that are listed; `clips/clips.json` has all.
+/// Maximum number of rejected audio segments that are listed; `clips/clips.json` has all.
 const MAX_LISTED: usize = 10;
 
 /// Render the films of a study, assign them to sessions, and seal both.
@@ -43,7 +43,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     let datasets = file.speaker.iter().filter_map(|speaker| speaker.dataset.clone());
     let locked: Vec<PathBuf> = checkpoints.chain(datasets).collect();
     enter_sandbox([out.as_path()], locked.iter().map(PathBuf::as_path));
-    signals::exit_on_signal("every film that is done is kept, and the same command goes on from there");
+    signals::exit_on_signal("completed films are saved; run the same command again to continue");
     let built = build(&file, &out, SIZE, ui)?;
     let next = format!("orator study serve {}", built.folder.display());
     let mut facts = json!(built);
@@ -59,30 +59,30 @@ fn text(built: &BuiltStudy) -> String {
         let loud = clips.iter().filter(|clip| !clip.ends_in_pauses()).count();
         let _ = write!(text, "{name}: {}", counted(clips.len(), "clip"));
         if hidden > 0 {
-            let _ = write!(text, ", {hidden} with joints that were not seen and are hidden in all conditions");
+            let _ = write!(text, ", {hidden} with undetected joints, which are hidden in all conditions");
         }
         if loud > 0 {
-            let _ = write!(text, ", {loud} cut within speech, for want of pauses");
+            let _ = write!(text, ", {loud} cut during speech because pauses are missing");
         }
         text += "\n";
         for refused in refused.iter().take(MAX_LISTED) {
-            let _ = writeln!(text, "  no clip of {}: {}", refused.name, refused.reason);
+            let _ = writeln!(text, "  rejected {}: {}", refused.name, refused.reason);
         }
         if refused.len() > MAX_LISTED {
-            let _ = writeln!(text, "  and of {} more pieces of speech", refused.len() - MAX_LISTED);
+            let _ = writeln!(text, "  and {}", counted(refused.len() - MAX_LISTED, "more segment"));
         }
     }
     for line in &built.balance {
         let _ = writeln!(text, "{line}");
     }
     text + &format!(
-        "{} of {} kB at {:.1} LUFS, {} of {}\n{} {}; over all: {}",
+        "{}, {} kB, {:.1} LUFS; {} of {} each\n{} {}; seal: {}",
         counted(built.n_films, "film"),
         built.film_bytes / 1000,
         built.loudness_lufs,
         counted(built.n_sessions, "session"),
         counted(built.n_trials, "trial"),
-        if built.up_to_date { "sealed before:" } else { "sealed" },
+        if built.up_to_date { "already sealed:" } else { "sealed" },
         built.folder.display(),
         built.seal
     )

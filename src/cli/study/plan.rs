@@ -4,6 +4,7 @@ use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::{Context, Result, ensure};
 use orator_base::stage::progress::Progress as _;
+use orator_base::text::counted;
 use orator_study::file::{StudyFile, StudyTask};
 use orator_study::folder::StudyFolder;
 use orator_study::plan::TaskDesign;
@@ -72,18 +73,18 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     };
     let started = Instant::now();
     let bar = ui.begin("simulating studies", 0);
-    let plan = power::plan(&question, &|row| bar.detail(&format!("{} participants", row.n_participants)))?;
+    let plan = power::plan(&question, &|row| bar.detail(&counted(row.n_participants, "participant")))?;
     drop(bar);
     let secs = started.elapsed().as_secs_f64();
     let text = format!("task {}\n{}\nsimulated in {secs:.1} s", task.name, power::text(&plan));
-    let wanted = plan.difference.n_participants.max(plan.equivalence.n_participants);
-    let next = match wanted {
+    let needed = plan.difference.n_participants.max(plan.equivalence.n_participants);
+    let next = match needed {
         Some(n) if n != study.participants => {
-            format!("write participants = {n} into {}, then orator study build {}", file.display(), file.display())
+            format!("set participants = {n} in {}, then run orator study build {}", file.display(), file.display())
         }
         _ => format!("orator study build {}", file.display()),
     };
-    ui.summary(&text, Some(&next), json!({ "task": task.name, "plan": plan, "secs": secs }));
+    ui.summary(&text, Some(&next), json!({ "task": task.name, "plan": plan, "secs": secs, "next": next }));
     Ok(Outcome::Done)
 }
 
@@ -96,10 +97,10 @@ fn task<'s>(args: &Args, study: &'s StudyFile) -> Result<&'s StudyTask> {
             .task
             .iter()
             .find(|task| task.name == *name)
-            .with_context(|| format!("--task: no task is called {name}; tasks are {}", names()))?,
+            .with_context(|| format!("--task {name}: no such task; tasks: {}", names()))?,
         None => study.task.iter().find(has_chance).with_context(|| {
             format!(
-                "{}: no task is judged against chance (tasks: {}); power is planned for such tasks",
+                "{}: no task has a chance level (tasks: {}); power analysis requires one",
                 args.study.display(),
                 names()
             )
@@ -107,7 +108,7 @@ fn task<'s>(args: &Args, study: &'s StudyFile) -> Result<&'s StudyTask> {
     };
     ensure!(
         has_chance(&found),
-        "--task {}: preferences and sliders have no chance level; power is planned for tasks judged against chance",
+        "--task {}: preferences and sliders have no chance level; power analysis requires one",
         found.name
     );
     Ok(found)

@@ -4,6 +4,7 @@ use super::{analyse, build, plan};
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::Result;
+use orator_base::text::counted;
 use orator_study::export::{TableForm, export};
 use orator_study::folder::StudyFolder;
 use orator_study::server::study_server::StudyServer;
@@ -61,7 +62,7 @@ struct ServeArgs {
     /// private addresses, such as those of the proxy, are then not limited in number.
     #[arg(long = "host-name", value_name = "NAME")]
     host_names: Vec<String>,
-    /// Time without an answer after which the place of a participant is given to another, minutes; before the first
+    /// Time without an answer after which the session of a participant is given to another, minutes; before the first
     /// answer at most 5 minutes plus twice the length of the films.
     #[arg(long, value_name = "MINUTES", default_value_t = 60)]
     abandoned_after: u32,
@@ -72,7 +73,8 @@ fn serve(args: &ServeArgs, ui: &Ui) -> Result<Outcome> {
     let abandoned_secs = 60.0 * f64::from(args.abandoned_after);
     let server = StudyServer::open(&folder, abandoned_secs)?;
     let title = server.study().title.clone();
-    let counts = format!("{} sessions, {} films", server.study().plan.sessions.len(), server.study().n_films());
+    let (n_sessions, n_films) = (server.study().plan.sessions.len(), server.study().n_films());
+    let counts = format!("{}, {}", counted(n_sessions, "session"), counted(n_films, "film"));
     let token = server.operator_token().to_owned();
     server.run(SocketAddr::new(args.listen, args.port), &args.host_names, |address| {
         let page = format!("http://{address}/");
@@ -110,8 +112,8 @@ fn export_tables(args: &ExportArgs, ui: &Ui) -> Result<Outcome> {
     let out = args.out.clone().unwrap_or_else(|| args.dir.join("export"));
     let exported = export(&StudyFolder::new(&args.dir), form, &out)?;
     let [votes, participants] = [&exported.votes, &exported.participants].map(|path| path.display());
-    let (n_votes, n_participants) = (exported.n_votes, exported.n_participants);
-    let text = format!("{n_votes} votes of {n_participants} participants: {votes}, {participants}");
+    let (n_votes, n_persons) = (counted(exported.n_votes, "vote"), counted(exported.n_participants, "participant"));
+    let text = format!("{n_votes} of {n_persons}: {votes}, {participants}");
     let next = format!("orator study analyse {}", args.dir.display());
     ui.summary(&text, Some(&next), json!(exported));
     Ok(Outcome::Done)

@@ -7,6 +7,7 @@ use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator_base::stage::progress::Progress;
 use orator_base::stage::workdir::BusyFolder;
+use orator_base::text::counted;
 use orator_dataset::Dataset;
 use orator_dataset::config::Config;
 use orator_gesture::evaluate::baseline::predictor;
@@ -87,7 +88,7 @@ fn run_all(args: &Args, config: &Config, ui: &Ui) -> Result<Outcome> {
             Err(error) => {
                 let is_busy = error.is::<BusyFolder>();
                 n_failed += usize::from(!is_busy);
-                let word = if is_busy { "left to" } else { "failed" };
+                let word = if is_busy { "skipped" } else { "failed" };
                 text += &format!("{speaker}: {word}: {error:#}\n");
                 facts.push(json!({ "speaker": speaker, "busy": is_busy, "error": format!("{error:#}") }));
             }
@@ -108,13 +109,13 @@ struct TrainedModel {
 
 fn train_one(args: &Args, speaker: Option<&String>, config: &Config, ui: &Ui) -> Result<TrainedModel> {
     let out = &args.out;
-    let places = TrainingFolders { config, speaker, dataset: args.dataset.first(), out: out.as_ref() };
+    let folders = TrainingFolders { config, speaker, dataset: args.dataset.first(), out: out.as_ref() };
     let is_named = |name: &String| config.settings.speaker.iter().any(|of| of.name == *name);
     let are_all = args.dataset.is_empty() && speaker.is_some_and(|name| name == ALL && !is_named(name));
     let (datasets, out) = if are_all || args.dataset.len() > 1 {
-        places.open_several("gan", &args.dataset)?
+        folders.open_several("gan", &args.dataset)?
     } else {
-        let (dataset, out) = places.open("gan")?;
+        let (dataset, out) = folders.open("gan")?;
         (vec![dataset], out)
     };
     let datasets: Vec<&Dataset> = datasets.iter().collect();
@@ -141,19 +142,19 @@ fn train_one(args: &Args, speaker: Option<&String>, config: &Config, ui: &Ui) ->
     let steps_per_sec = (outcome.steps - outcome.began_at) as f64 / start.elapsed().as_secs_f64().max(1e-9);
     let page = page.finish(ValidatedStep { step: outcome.steps, best_step: outcome.best_step });
     let text = format!(
-        "{}: {} steps{} ({steps_per_sec:.2} a second, {:.1} % of it waiting for data) on {} windows, {} parameters\n\
+        "{}: {}{} ({steps_per_sec:.2} steps/s, {:.1} % of the time waiting for data) on {}, {} parameters\n\
          {}\nnewest checkpoint  {}\nbest (step {}{})  {}{}",
         names,
-        outcome.steps,
-        if outcome.stopped_early { ", ended early: the score had stopped falling" } else { "" },
+        counted(outcome.steps, "step"),
+        if outcome.stopped_early { ", stopped early: the validation score no longer improved" } else { "" },
         100.0 * outcome.waiting,
-        outcome.n_examples,
+        counted(outcome.n_examples, "window"),
         outcome.n_parameters,
         metrics(&outcome.validation),
         outcome.newest.display(),
         outcome.best_step,
         // Step 0 is evaluated only if the training was initialised from a model.
-        if outcome.best_step == 0 { ", the model it began with: this speech did not make it better" } else { "" },
+        if outcome.best_step == 0 { ", the initial model: training did not improve it" } else { "" },
         outcome.best.display(),
         page.as_ref().map(|page| format!("\ncurves and poses  {}", page.display())).unwrap_or_default(),
     );
@@ -180,28 +181,28 @@ fn train_one(args: &Args, speaker: Option<&String>, config: &Config, ui: &Ui) ->
 
 /// The last validation as a table, with applicable warnings.
 fn metrics(validation: &Validation) -> String {
-    let (predicted, still) = (&validation.generator, &validation.mean_pose);
-    let row = |name: &str, predicted: f64, still: f64| format!("{name:24}{predicted:9.3}   {still:9.3}\n");
-    let distance = |figures: &ValidationMetrics| figures.frechet.unwrap_or(f64::NAN);
+    let (predicted, mean_pose) = (&validation.generator, &validation.mean_pose);
+    let row = |name: &str, predicted: f64, mean_pose: f64| format!("{name:24}{predicted:9.3}   {mean_pose:9.3}\n");
+    let distance = |metrics: &ValidationMetrics| metrics.frechet.unwrap_or(f64::NAN);
     let mut text = format!("on {} {} windows    generator   mean pose\n", validation.n_windows, validation.split);
-    text += &row("L1 (normalised)", predicted.l1, still.l1);
-    text += &row("PCK 0.2", predicted.pck, still.pck);
-    text += &row("PCK 0.2, arms", predicted.pck_body, still.pck_body);
-    text += &row("PCK 0.2, fingers", predicted.pck_hands, still.pck_hands);
-    text += &row(&format!("Frechet cm2 ({})", validation.n_poses), distance(predicted), distance(still));
-    text += &row("motion energy / data's", predicted.energy, still.energy);
+    text += &row("L1 (normalised)", predicted.l1, mean_pose.l1);
+    text += &row("PCK 0.2", predicted.pck, mean_pose.pck);
+    text += &row("PCK 0.2, arms", predicted.pck_body, mean_pose.pck_body);
+    text += &row("PCK 0.2, fingers", predicted.pck_hands, mean_pose.pck_hands);
+    text += &row(&format!("Frechet cm2 ({})", validation.n_poses), distance(predicted), distance(mean_pose));
+    text += &row("motion energy / truth", predicted.energy, mean_pose.energy);
     for (channel, of) in &validation.channels {
         text += &row(&format!("{} error (degrees)", channel.name()), of.generator, of.mean_pose);
     }
     text += &format!(
-        "bones change by {:.4} mm a frame in the network's own output (the paper's released predictions: 2 to 5 mm)",
+        "bone lengths change by {:.4} mm per frame in the network output (predictions published in 2021: 2 to 5 mm)",
         validation.bone_change_mm
     );
-    if let Some(below) = below_mean_pose([predicted.l1, still.l1], Some([predicted.pck, still.pck])) {
+    if let Some(below) = below_mean_pose([predicted.l1, mean_pose.l1], Some([predicted.pck, mean_pose.pck])) {
         text += &format!("\n{below}");
     }
     if let Some(alarm) = &validation.alarm {
-        text += &format!("\nALARM: {alarm}");
+        text += &format!("\nwarning: {alarm}");
     }
     text
 }

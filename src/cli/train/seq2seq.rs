@@ -6,6 +6,7 @@ use crate::cli::config_args::ConfigArgs;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use ndarray::s;
+use orator_base::text::counted;
 use orator_base::types::pose3d::Motion;
 use orator_dataset::Dataset;
 use orator_formats::bvh::exponential_maps::JointMapping;
@@ -92,13 +93,13 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let steps_per_sec = (outcome.steps - outcome.began_at) as f64 / start.elapsed().as_secs_f64().max(1e-9);
     let validation = &outcome.validation;
     let mut text = format!(
-        "{} steps{} ({steps_per_sec:.2} a second) on {} segments, {} words, {} parameters\n\
-         on {} {} segments: L1 {:.3} (mean pose {:.3}), motion energy / data's {:.2}\n\
+        "{}{} ({steps_per_sec:.2} steps/s) on {}, {}, {} parameters\n\
+         on {} {} segments: L1 {:.3} (mean pose {:.3}), motion energy / truth {:.2}\n\
          newest checkpoint  {}\nbest (step {})  {}{}",
-        outcome.steps,
-        if outcome.stopped_early { ", ended early: the score had stopped falling" } else { "" },
-        outcome.n_examples,
-        outcome.n_words,
+        counted(outcome.steps, "step"),
+        if outcome.stopped_early { ", stopped early: the validation score no longer improved" } else { "" },
+        counted(outcome.n_examples, "training segment"),
+        counted(outcome.n_words, "word"),
         outcome.n_parameters,
         validation.n_segments,
         validation.split,
@@ -114,7 +115,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         text += &format!("\n{below}");
     }
     if let Some(alarm) = &validation.alarm {
-        text += &format!("\nALARM: {alarm}");
+        text += &format!("\nwarning: {alarm}");
     }
     let next = format!("orator generate --checkpoint {} --audio speech.wav --out motion.bvh", outcome.best.display());
     let facts = json!({
@@ -129,6 +130,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         "best": outcome.best,
         "best_step": outcome.best_step,
         "page": page,
+        "next": next,
     });
     ui.summary(&text, Some(&next), facts);
     Ok(if page.is_some() { Outcome::Done } else { Outcome::SomeFailed })

@@ -35,7 +35,7 @@ pub fn report_stopped(error: anyhow::Error, ui: &Ui) -> Result<Outcome> {
 }
 
 /// The command as it was typed, quoted for a shell.
-fn same_command() -> String {
+pub fn same_command() -> String {
     let mut words = std::env::args_os().map(|word| word.to_string_lossy().into_owned());
     let program = words.next().and_then(|path| Some(Path::new(&path).file_name()?.to_string_lossy().into_owned()));
     shell(&std::iter::once(program.unwrap_or_else(|| "orator".to_owned())).chain(words).collect::<Vec<_>>())

@@ -35,7 +35,8 @@ impl TrainingFolders<'_> {
             [] => self.config.settings.speaker.iter().map(|of| work.join("dataset").join(&of.name)).collect(),
             given => given.to_vec(),
         };
-        let open = |folder: &PathBuf| Dataset::open(folder).context("`orator run` makes the datasets to train on");
+        let open =
+            |folder: &PathBuf| Dataset::open(folder).context("cannot open the datasets; create them with `orator run`");
         let out = self.out.cloned().unwrap_or_else(|| work.join(network).join(ALL));
         Ok((folders.iter().map(open).collect::<Result<_>>()?, out))
     }
@@ -52,12 +53,12 @@ impl TrainingFolders<'_> {
             (Some(folder), _) => folder.clone(),
             (None, name) => work.join("dataset").join(name.as_deref().unwrap_or_default()),
         };
-        let dataset = Dataset::open(&folder).context("`orator run` makes the dataset to train on")?;
+        let dataset = Dataset::open(&folder).context("cannot open the dataset; create it with `orator run`")?;
         let out = match self.out {
             Some(out) => out.clone(),
             None => {
                 let name = FileName::new(named.unwrap_or_else(|| dataset.info().speaker.clone()));
-                work.join(network).join(&*name.context("the speaker names no folder: say --out")?)
+                work.join(network).join(&*name.context("the speaker name is not a valid folder name; give --out")?)
             }
         };
         Ok((dataset, out))
@@ -69,10 +70,12 @@ fn speaker(given: Option<&String>, config: &Config) -> Result<String> {
     let names: Vec<&str> = config.settings.speaker.iter().map(|speaker| speaker.name.as_str()).collect();
     match (given, names.as_slice()) {
         (Some(name), _) if names.contains(&name.as_str()) => Ok(name.clone()),
-        (Some(name), _) => bail!("no speaker {name:?} in {}; it names {}", config.file.display(), names.join(", ")),
+        (Some(name), _) => {
+            bail!("no speaker {name:?} in {}; its speakers are {}", config.file.display(), names.join(", "))
+        }
         (None, [only]) => Ok((*only).to_owned()),
-        (None, []) => bail!("{} names no speaker; say --dataset", config.file.display()),
-        (None, _) => bail!("say which speaker with --speaker: {}", names.join(", ")),
+        (None, []) => bail!("{} has no speaker; give --dataset", config.file.display()),
+        (None, _) => bail!("several speakers are configured; select one with --speaker: {}", names.join(", ")),
     }
 }
 
@@ -94,14 +97,14 @@ impl<'a> TrainingPage<'a> {
             && !self.has_reported
         {
             self.has_reported = true;
-            self.ui.say(&format!("no page of this training yet: {error:#}"));
+            self.ui.say(&format!("cannot write the training page yet: {error:#}"));
         }
     }
 
     /// Writes the page of a completed training; `None` if that failed.
     pub(super) fn finish(mut self, at: ValidatedStep) -> Option<PathBuf> {
         let written = self.page.write(at).inspect_err(|error| {
-            self.ui.say(&format!("no page of this training: {error:#}"));
+            self.ui.say(&format!("cannot write the training page: {error:#}"));
         });
         written.ok().map(|()| self.page.path())
     }

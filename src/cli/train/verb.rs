@@ -27,16 +27,16 @@ enum Network {
 }
 
 pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
-    const STOPPING: &str = "stopping after this step, with a checkpoint; the next signal ends at once";
-    const KEPT: &str = "the newest checkpoint is kept, and the same command goes on from it";
-    ui.enable_stop_requests(STOPPING, KEPT);
+    const STOPPING: &str = "stopping after the current step and saving a checkpoint; a second signal exits at once";
+    const SAVED: &str = "the newest checkpoint is saved; run the same command again to resume";
+    ui.enable_stop_requests(STOPPING, SAVED);
     let ended = match args.network {
         Network::Gan(args) => gan::run(args, ui),
         Network::Seq2seq(args) => seq2seq::run(args, ui),
-        Network::Basis(args) => args.refuse("train basis"),
-        Network::Embedding(args) => args.refuse("train embedding"),
-        Network::Lifter(args) => args.refuse("train lifter"),
-        Network::Noise(args) => args.refuse("train noise"),
+        Network::Basis(args) => args.fail("train basis"),
+        Network::Embedding(args) => args.fail("train embedding"),
+        Network::Lifter(args) => args.fail("train lifter"),
+        Network::Noise(args) => args.fail("train noise"),
     };
     ended.or_else(|error| stopped::report_stopped(error, ui))
 }

@@ -90,7 +90,7 @@ fn how_much_of_the_body_was_seen_is_told_where_it_is_not_all() {
         String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr)
     };
     let whole = swinging(1, 40);
-    assert!(!words(&whole).contains("seen"));
+    assert!(!words(&whole).contains("detected"));
     // Filled, but seen in no more than the mask says; no number at all.
     let mut motion = whole;
     motion.mask.slice_mut(s![..10, ..]).fill(false);
@@ -98,7 +98,8 @@ fn how_much_of_the_body_was_seen_is_told_where_it_is_not_all() {
     motion.mask.slice_mut(s![12..14, L_HAND + 1..L_HAND + 10]).fill(false);
     motion.mask.slice_mut(s![14..17, L_HAND + 1..L_HAND + 12]).fill(false);
     let told = words(&motion);
-    let expected = "seen, of 40 frames: arms in 30, left hand in 27, right hand in 25; the rest is bridged or held";
+    let expected =
+        "detected, of 40 frames: arms in 30, left hand in 27, right hand in 25; other frames are interpolated or held";
     assert!(told.contains(expected), "{told}");
     let seen = &done(dir, "a.npz --out a.bvh")["report"]["seen"];
     assert_eq!(*seen, serde_json::json!({ "left_arm": 30, "right_arm": 30, "left_hand": 27, "right_hand": 25 }));
@@ -215,21 +216,21 @@ fn what_is_wrong_is_said_and_nothing_is_written() {
         ("millimetres.npy --out x.bvh", "seems to be in millimetres; multiply every coordinate by 0.001"),
         ("words.txt --out x.bvh", "line 1, number 1: `a` is no number"),
         ("picture.png --out x.bvh", "is no motion file: expected .npy"),
-        ("nothing --out x --format bvh", "holds no motion"),
+        ("nothing --out x --format bvh", "contains no motion"),
         ("good.npy --out x.mov", "give the file one of these endings"),
         ("good.npy --out x --format mov", "give the file one of these endings"),
-        ("good.npy --out good.npy", "is what is read"),
-        ("good.npy --out x.bvh x.bvh", "asked for twice"),
+        ("good.npy --out good.npy", "is an input"),
+        ("good.npy --out x.bvh x.bvh", "listed twice"),
         ("good.npy --out nothing", "is a folder"),
         ("good.npy --out x.bvh --in-fps 0", "1 to 1000 frames"),
         ("good.npy --out x.bvh --fps 1001", "1 to 1000 frames"),
         ("good.npy --out x.bvh --fps fast", "1 to 1000 frames"),
-        ("good.npy --out x.bvh --sample one", "is no dataset"),
+        ("good.npy --out x.bvh --sample one", "is not a dataset"),
         ("good.npy --out x.bvh --smoothing-strength 101", "expected 0 to 100"),
         ("good.npy --out x.mp4 --audio picture.png", "picture.png"),
-        ("good.npy --out x.bvh --audio good.npy", "--audio is for films"),
-        ("good.npy --out x.npy --names vrm", "--names is for .bvh"),
-        ("good.npy --out x.vrm --names mixamo", "--names is for .bvh"),
+        ("good.npy --out x.bvh --audio good.npy", "--audio applies to .mp4"),
+        ("good.npy --out x.npy --names vrm", "--names applies to .bvh"),
+        ("good.npy --out x.vrm --names mixamo", "--names applies to .bvh"),
         ("good.npy --out x.bvh --retarget good.npy", "is given as .bvh or .glb"),
         ("good.npy --out x.bvh --bone-map bones.toml", "--retarget"),
         ("good.npy --out x.bvh --keypoints good.npy", "good.npy"),

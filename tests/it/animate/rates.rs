@@ -89,7 +89,7 @@ fn an_assumed_rate_is_said() {
     joints_npz::write(&dir.join("c.npz"), &swinging(2, 20)).unwrap();
     for bare in ["a.npy", "b.txt"] {
         let (_, _, said) = orator(dir, &format!("animate {bare} --out a.bvh"));
-        assert!(said.contains("20 frames at 15 fps (assumed, the file does not say it: --in-fps gives it)"), "{said}");
+        assert!(said.contains("20 frames at 15 fps (assumed: not stated in the file; set it with --in-fps)"), "{said}");
         assert_eq!(done(dir, &format!("animate {bare} --out a.bvh"))["fps_assumed"], true);
         let (_, _, said) = orator(dir, &format!("animate {bare} --out a.bvh --in-fps 30"));
         assert!(said.contains("20 frames at 30 fps, 0.7 s"), "{said}");
@@ -100,7 +100,7 @@ fn an_assumed_rate_is_said() {
     assert!(!said.contains("assumed"), "{said}");
     // What is written beside a name is not to be written over, and what is beside another motion is not believed.
     let (code, _, said) = orator(dir, "animate c.npz --out d.npy d.npy.json");
-    assert!(code == 1 && said.contains("d.npy.json is where the rate of d.npy is written"), "{said}");
+    assert!(code == 1 && said.contains("d.npy.json is reserved for the frame rate of d.npy"), "{said}");
     done(dir, "animate c.npz --out d.npy");
     npy::write(&dir.join("d.npy"), &swinging(1, 10)).unwrap();
     let (code, _, said) = orator(dir, "animate d.npy --out a.bvh");

@@ -39,7 +39,10 @@ fn a_video_that_changed_since_the_plan_is_not_worked_on_and_never_left_out_silen
     fs::remove_file(&clips[1]).unwrap();
     let gone = project.run(&["--only", "dataset"]);
     let failures = gone.json["failures"].to_string();
-    assert!(gone.code == 2 && failures.contains(file_name(&clips[1])) && failures.contains("is gone"), "{failures}");
+    assert!(
+        gone.code == 2 && failures.contains(file_name(&clips[1])) && failures.contains("does not exist"),
+        "{failures}"
+    );
 }
 
 #[test]

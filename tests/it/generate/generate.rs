@@ -83,8 +83,8 @@ fn wrong_input_is_named_and_nothing_is_written() {
     let cases = [
         ("--checkpoint host.safetensors --audio speech.wav --out a.mov", ".npy (joints), .txt"),
         ("--checkpoint host.safetensors --audio speech.wav --out noending", "noending"),
-        ("--checkpoint host.safetensors --audio speech.wav --out a.bvh --out a.bvh", "asked for twice"),
-        ("--checkpoint host.safetensors --audio silent.mp4 --out silent.mp4", "speech itself"),
+        ("--checkpoint host.safetensors --audio speech.wav --out a.bvh --out a.bvh", "listed twice"),
+        ("--checkpoint host.safetensors --audio silent.mp4 --out silent.mp4", "audio input"),
         ("--checkpoint host.safetensors --audio silent.mp4 --out a.bvh", "silent.mp4 has no sound track"),
         ("--checkpoint host.safetensors --audio gone.wav --out a.bvh", "gone.wav is not there"),
         ("--checkpoint host.safetensors --audio nothing --out a.bvh", "nothing is no file"),

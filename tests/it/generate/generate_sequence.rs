@@ -73,7 +73,7 @@ fn the_state_is_renewed_or_carried_and_both_jumps_are_told() {
     }
     let output = generate(dir, "--checkpoint words.safetensors --audio talks/a.wav --out r.bvh");
     let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
-    assert!(said.contains("mean step over a seam") && said.contains("(with --carry-state "), "{said}");
+    assert!(said.contains("mean step at segment boundaries") && said.contains("(with --carry-state "), "{said}");
 }
 
 #[test]
@@ -249,7 +249,7 @@ fn many_sounds_find_their_transcripts_and_are_made_once() {
     write_untrained_speaker(&dir.join("host.safetensors"));
     let args = "--checkpoint host.safetensors --audio-folder talks/sub --out-folder others";
     assert!(run(dir, args)["sounds"][0]["segments"].is_null());
-    assert!(refusal(dir, &format!("{args} --transcript said")).contains("leave out --transcript"));
+    assert!(refusal(dir, &format!("{args} --transcript said")).contains("remove --transcript"));
     let args = "--checkpoint words.safetensors --audio-folder talks/sub --out-folder others";
     assert!(refusal(dir, &format!("{args} --transcript talks/sub/b.srt")).contains("b.srt is no folder"));
     let (code, said) = {

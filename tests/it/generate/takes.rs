@@ -33,7 +33,7 @@ fn a_seed_gives_its_take_and_variants_the_takes_of_the_seeds_that_follow() {
     made("--seed 7 --out seven.npy");
     made("--seed 8 --out eight.npy");
     let said = made("--seed 7 --variants 3 --out take.npy take.bvh");
-    assert!(said.contains("3 takes") && said.contains("take-3.bvh"), "{said}");
+    assert!(said.contains("3 variants") && said.contains("take-3.bvh"), "{said}");
     assert_eq!(bytes("take-1.npy"), bytes("seven.npy"));
     assert_eq!(bytes("take-2.npy"), bytes("eight.npy"));
     let all = ["plain.npy", "take-1.npy", "take-2.npy", "take-3.npy"].map(bytes);

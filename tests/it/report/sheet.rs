@@ -117,16 +117,16 @@ fn the_verb_draws_loose_files_and_says_what_is_missing() {
         let answer = project.answer(&[&loose[..], &[joints, "--out", "deep/s.png", "--every", "0.1"]].concat());
         assert_eq!(answer.code, 0, "{}", answer.errors);
         assert!(dir.join("deep/s_000.png").exists() && dir.join("deep/s_001.png").exists());
-        let figures = &answer.json["clips"][0]["figures"];
-        assert_eq!(figures["left"]["missing_percent"], 0.0, "{figures}");
+        let metrics = &answer.json["clips"][0]["metrics"];
+        assert_eq!(metrics["left"]["missing_percent"], 0.0, "{metrics}");
     }
     let fails = |args: &[&str], words: &str| {
         let answer = project.answer(args);
         assert!(answer.code == 1 && answer.errors.contains(words), "{}", answer.errors);
     };
-    fails(&["sheet"], "not lifted yet: orator run --to lift");
-    fails(&["sheet", "--video", "nobody"], "no video is called nobody");
+    fails(&["sheet"], "not lifted yet; run `orator run --to lift");
+    fails(&["sheet", "--video", "nobody"], "no video is named nobody");
     fails(&[&loose[..], &["k.npz"]].concat(), "no array `pose3d`");
-    fails(&[&loose[..], &["j.npy", "--out", "sheet.jpg"]].concat(), "written as .png");
+    fails(&[&loose[..], &["j.npy", "--out", "sheet.jpg"]].concat(), "ends in .png");
     fails(&["sheet", "--keypoints", "k.npz"], "--joints");
 }

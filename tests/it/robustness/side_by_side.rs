@@ -63,7 +63,7 @@ fn a_video_is_not_forgotten_while_it_is_trained_on() {
     let (code, said) = ended(&mut orator(dir, FORGET));
     assert_eq!(code, 1, "{said}");
     let who = format!("`orator train gan` (process {}) is at work", training.id());
-    assert!(said.contains("nothing was forgotten") && said.contains(&who), "{said}");
+    assert!(said.contains("nothing was removed") && said.contains(&who), "{said}");
     assert!(bytes_under(&dir.join("work/dataset/host")) == before);
     // Others may listen to what is learnt so far.
     orator_formats::wav::write(&dir.join("a.wav"), &sample("a-00000000-000000", 30, 0.0).sound).unwrap();

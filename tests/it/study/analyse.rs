@@ -258,7 +258,7 @@ fn damaged_tables_are_told_by_line_and_never_end_the_program_otherwise() {
         (vec!["study", "analyse", "none.csv"], "none.csv"),
         (vec!["study", "analyse", "bad.csv", "--columns", "who=x"], "no field \"who\""),
         (vec!["study", "analyse", "bad.csv", "--columns", "clip=film"], "no column \"film\""),
-        (vec!["study", "analyse", "bad.csv", "--bound", "70"], "--bound is 70"),
+        (vec!["study", "analyse", "bad.csv", "--bound", "70"], "--bound 70:"),
         (vec!["study", "analyse", "bad.csv", "--report", "p.txt"], "ends in .html"),
     ] {
         let answer = project.answer(&args);

@@ -82,7 +82,10 @@ fn stopped_twice(network: &str) {
     assert!(newest.is_file() && newest.ends_with(format!("step-{step:07}.safetensors")), "{answer}");
     let next = format!("orator train {network} --dataset data/anna --json --steps {n_steps} ");
     assert!(answer["next"].as_str().unwrap().starts_with(&next), "{answer}");
-    assert!(first.contains("stopping after this step") && first.contains("what is learnt goes to stopped"), "{first}");
+    assert!(
+        first.contains("stopping after the current step") && first.contains("what is learnt goes to stopped"),
+        "{first}"
+    );
 
     let (code, answer, second) = signalled(train(dir, network, "stopped"), &line(12), Signal::TERM);
     assert_eq!(code, Some(143), "{second}");
