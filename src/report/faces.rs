@@ -34,9 +34,9 @@ fn of_speaker(work: &Path, speaker: &str, groups: &[Vec<&VideoPerson>], is_decla
         (true, _) => format!("{speaker}: all videos show the same person (`same_person = true` in the configuration)."),
         (false, 0 | 1) => format!("{speaker}: all videos appear to show the same person."),
         (false, n) => format!(
-            "{speaker}: the videos appear to show {n} persons, an estimate from faces, shoulder width and the colours of skin \
-             and hair. Check the faces: exclude videos of another person with `exclude`, or set `same_person = true` under \
-             [[speaker]] if all videos show the same person."
+            "{speaker}: the videos appear to show {n} persons, an estimate from faces, shoulder width and the colours \
+             of skin and hair. Check the faces: exclude videos of another person with `exclude`, or set `same_person = \
+             true` under [[speaker]] if all videos show the same person."
         ),
     };
     let rows = groups.iter().enumerate().filter_map(|(at, group)| {

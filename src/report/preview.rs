@@ -70,8 +70,8 @@ pub fn section(previews: &[MotionPreview]) -> Vec<Node> {
         node("figure").class("preview card").child(canvas.attr("data-preview", i)).child(node("figcaption").child(link))
     };
     let about = format!(
-        "The first {MAX_SECS} s of the longest accepted interval of each video (at most {MAX_PREVIEWS} videos), seen from \
-         the camera. Joints that are not visible are omitted."
+        "The first {MAX_SECS} s of the longest accepted interval of each video (at most {MAX_PREVIEWS} videos), seen \
+         from the camera. Joints that are not visible are omitted."
     );
     let shown = node("div").class("previews").children(previews.iter().enumerate().map(figure));
     vec![node("p").text(about), shown]

@@ -130,8 +130,8 @@ pub fn speeds(clips: &EvalClips) -> Vec<Node> {
         );
         profile::card(title, unit, &[("truth", &ground_truth), ("predicted", &predicted)], medians)
     };
-    let about = "Distributions of the values. Heights are proportional to the square root of the share, so that rare values stay \
-                 visible; the last bin includes all larger values. Dashed lines: medians.";
+    let about = "Distributions of the values. Heights are proportional to the square root of the share, so that rare \
+                 values stay visible; the last bin includes all larger values. Dashed lines: medians.";
     vec![node("p").text(about), colour_legend(), node("div").class("grid").children(charts.into_iter().map(card))]
 }
 

@@ -38,9 +38,9 @@ pub fn body(table: &Table) -> Vec<Node> {
         }
     }
     let drawn = format!(
-        "In brackets or in the tooltip: 95 % confidence intervals from {N_DRAWS} bootstrap draws of the blocks (Frechet \
-         distances and correlations: {N_COSTLY_DRAWS}). Column vs. constant pose: the prediction compared with the better \
-         of the constant poses, each metric tested separately by sign flips of the blocks."
+        "In brackets or in the tooltip: 95 % confidence intervals from {N_DRAWS} bootstrap draws of the blocks \
+         (Frechet distances and correlations: {N_COSTLY_DRAWS}). Column vs. constant pose: the prediction compared \
+         with the better of the constant poses, each metric tested separately by sign flips of the blocks."
     );
     let table = html::table("metrics", std::iter::once(first).chain(against).chain(heads), rows);
     vec![node("p").class("small").text(drawn), node("div").class("scroll").attr("tabindex", "0").child(table)]
@@ -113,7 +113,7 @@ pub fn definitions(table: &Table) -> Vec<Node> {
         let hash = node("p").class("small").child(node("code").text(hash));
         node("details").child(name).child(formula).child(parameters).child(hash)
     };
-    let about = "Values are comparable if their hashes are equal: a hash covers the definition and all parameters. `orator \
-                 evaluate compare A.json B.json` rejects metrics with different hashes.";
+    let about = "Values are comparable if their hashes are equal: a hash covers the definition and all parameters. \
+                 `orator evaluate compare A.json B.json` rejects metrics with different hashes.";
     vec![node("p").text(about), node("div").class("definitions").children(table.definitions.iter().map(item))]
 }

@@ -91,8 +91,8 @@ impl SheetClip<'_> {
         let n_keypoints = self.keypoints.n_frames();
         ensure!(
             n_frames == n_keypoints,
-            "the motion has {n_frames} frames, the keypoints have {n_keypoints}: expected the same clip; if the keypoints \
-             have changed since, lift them again"
+            "the motion has {n_frames} frames, the keypoints have {n_keypoints}: expected the same clip; if the \
+             keypoints have changed since, lift them again"
         );
         let other = self.keypoints.fps;
         ensure!(fps == other, "the motion is at {fps}, the keypoints at {other}: lift the keypoints again");
@@ -114,8 +114,8 @@ impl SheetClip<'_> {
         let difference_secs = fps.secs(n_frames.abs_diff(expected));
         ensure!(
             difference_secs <= 1.0,
-            "the motion has {n_frames} frames at {fps} ({:.2} s), the video {} lasts {:.2} s: expected the same clip, or the \
-             `fps` of the keypoints is wrong",
+            "the motion has {n_frames} frames at {fps} ({:.2} s), the video {} lasts {:.2} s: expected the same clip, \
+             or the `fps` of the keypoints is wrong",
             fps.secs(n_frames),
             self.video.display(),
             fps.secs(expected)
@@ -172,8 +172,8 @@ impl SheetClip<'_> {
         draw::text(page, &self.caption(frame_idx), [left as f32 + 6.0, (top + TEXT_PX - 6) as f32], 10.0, INK)
     }
 
-    /// Text above a moment, as in `3.0 s   wrist jitter L 2.1 R 0.9 mm   rejected: left hand`. A part is rejected if its
-    /// keypoints were detected but its joints are masked. No jitter is printed for a wrist without joints.
+    /// Text above a moment, as in `3.0 s   wrist jitter L 2.1 R 0.9 mm   rejected: left hand`. A part is rejected if
+    /// its keypoints were detected but its joints are masked. No jitter is printed for a wrist without joints.
     fn caption(&self, frame_idx: usize) -> String {
         let mask = self.motion.mask.row(frame_idx);
         let is_half_visible = |root: usize| (1..N_HAND_JOINTS).filter(|j| mask[root + j]).count() * 2 >= N_HAND_JOINTS;

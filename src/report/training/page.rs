@@ -38,8 +38,9 @@ pub fn write(folder: &Path, speaker: &str, pairs: &[HeldOutPair]) -> Result<()> 
     let training_log = TrainingLog::parse(&lines);
     let charts = training_log.charts();
     let mut poses = vec![node("p").text(
-        "Held-out intervals: the speaker's motion and, below it, the motion that the best checkpoint generates from the \
-         audio alone. The curves show the height of the wrists: the speaker's in grey, the generated one in colour.",
+        "Held-out intervals: the speaker's motion and, below it, the motion that the best checkpoint generates from \
+         the audio alone. The curves show the height of the wrists: the speaker's in grey, the generated one in \
+         colour.",
     )];
     if pairs.is_empty() {
         poses = vec![node("p").class("empty").text("No held-out interval with the 49 joints to show.")];

@@ -114,9 +114,9 @@ impl MeasureCounts {
 
 /// Section with a card for each measure.
 pub fn distributions(measures: &MeasureCounts, settings: &Settings, per_sec: f64) -> Vec<Node> {
-    let about = "All frames of all videos, including rejected ones. Values that fail the threshold have another colour. Bar \
-                 heights are proportional to the square root of the share, so that rare values stay visible; the outer \
-                 bars include all values beyond the axis.";
+    let about = "All frames of all videos, including rejected ones. Values that fail the threshold have another \
+                 colour. Bar heights are proportional to the square root of the share, so that rare values stay \
+                 visible; the outer bars include all values beyond the axis.";
     let cards = measures.all().map(|(measure, counts)| card(measure, counts, measure.threshold(settings, per_sec)));
     vec![node("p").text(about), node("div").class("grid").children(cards)]
 }

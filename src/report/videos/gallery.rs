@@ -19,8 +19,8 @@ pub fn gallery(worst: &Worst, pictures: &Pictures, videos: &[VideoSummary]) -> V
             node("p").class("empty").text("No rejected intervals, or pictures were disabled with `--pictures 0`."),
         ];
     }
-    let about = "For each rule, the rejected intervals that violate it most, each at its worst frame with the detected keypoints. \
-                 Two pictures side by side are consecutive frames.";
+    let about = "For each rule, the rejected intervals that violate it most, each at its worst frame with the detected \
+                 keypoints. Two pictures side by side are consecutive frames.";
     let mut shown = vec![node("p").text(about)];
     for ((_, reason, unit), moments) in &worst.rules {
         let swatch = node("span").class(format!("swatch {}", reasons::class(reason)));

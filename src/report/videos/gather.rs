@@ -114,8 +114,8 @@ impl ReportData {
         let now = judged.kept_secs(rules);
         if (now - video.ledger.kept_secs()).abs() > 1e-6 {
             video.note(
-                "The thresholds have changed since this video was processed; the sliders start at the new values. Run `orator \
-                 run` to update it.",
+                "The thresholds have changed since this video was processed; the sliders start at the new values. Run \
+                 `orator run` to update it.",
             );
         }
         let kept = judged.table(rules);

@@ -86,7 +86,8 @@ fn page(request: &ReportRequest, gathered: &ReportData, pictures: &Pictures, sum
     let mut page = Page {
         title: format!("Report on {}", names.join(", ")),
         lead: format!(
-            "Use of each second of {}: accepted for the dataset, rejected with a reason, or missing because a stage failed.",
+            "Use of each second of {}: accepted for the dataset, rejected with a reason, or missing because a stage \
+             failed.",
             counted(videos.len(), "video")
         ),
         sections: vec![

@@ -50,10 +50,10 @@ pub fn sliders(kept: &[Option<AcceptedByThreshold>], rules: &SegmentConfig) -> V
     if kept.iter().all(Option::is_none) {
         return vec![node("p").class("empty").text("No video has been processed yet: run `orator run`.")];
     }
-    let about = "Each slider changes one threshold and leaves the others at their configured values. The durations are exact: at \
-                 each step the rules were applied again to the stored measurements of all videos. Frames that lifting \
-                 rejected (bone length, missing joints) stay rejected, and frames that were never lifted count as \
-                 accepted. max_bone_change has no slider.";
+    let about = "Each slider changes one threshold and leaves the others at their configured values. The durations are \
+                 exact: at each step the rules were applied again to the stored measurements of all videos. Frames \
+                 that lifting rejected (bone length, missing joints) stay rejected, and frames that were never lifted \
+                 count as accepted. max_bone_change has no slider.";
     let sums = sums(kept, rules);
     let max = sums.iter().flatten().copied().fold(0.0, f64::max);
     let cards =

@@ -100,7 +100,7 @@ fn how_much_of_the_body_was_seen_is_told_where_it_is_not_all() {
     let told = words(&motion);
     let expected = "seen, of 40 frames: arms in 30, left hand in 27, right hand in 25; the rest is bridged or held";
     assert!(told.contains(expected), "{told}");
-    let seen = &done(dir, "a.npz --out a.bvh")["report"]["seen"];
+    let seen = &done(dir, "a.npz --out a.bvh")["report"]["detected"];
     assert_eq!(*seen, serde_json::json!({ "left_arm": 30, "right_arm": 30, "left_hand": 27, "right_hand": 25 }));
 }
 
