@@ -1,5 +1,5 @@
 //! Page of a training run, next to its checkpoints: learning curves with the best epoch marked, the metrics of the best
-//! epoch and of the mean pose, and generated beside true poses.
+//! epoch and of the mean pose, and generated and true poses.
 
 use super::charts::{TrainingLog, metrics};
 use super::strip::{HeldOutPair, strip};

@@ -21,7 +21,7 @@ pub struct Moment {
     pub secs: f64,
     /// Distance from the threshold.
     beyond: f64,
-    /// Message of the refusal.
+    /// Reason, measured value and threshold.
     pub description: String,
     /// Text with the value in this frame; empty for rules that are not about frames.
     pub frame_value: String,

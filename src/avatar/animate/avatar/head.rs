@@ -1,5 +1,5 @@
 //! Shape of head, ears and hair. Lengths are cm for a head of 21.5 cm from chin to crown, in the axes of its joint (x
-//! to its left, y up, z forward); `place` maps them into the stance at the size of the actual head.
+//! to its left, y up, z forward); `position` maps them into the stance at the size of the actual head.
 
 use super::appearance::{Appearance, Hairstyle};
 use super::field::{Form, RoundCone, smooth_union};

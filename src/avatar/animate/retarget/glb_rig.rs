@@ -7,6 +7,7 @@ use crate::animate::export::glb_scene::with_continuous_signs;
 use anyhow::{Context as _, Result, ensure};
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::Vec3;
+use orator_base::text::number;
 use orator_base::types::time::FrameRate;
 use orator_formats::bvh::read::MAX_JOINTS;
 use serde::Deserialize;
@@ -173,7 +174,10 @@ impl SceneNode {
         let is_uniform = (x - y).abs().max((x - z).abs()) <= MAX_SCALE_DIFFERENCE * x.abs();
         ensure!(
             is_uniform && x > 0.0,
-            "scale {x}, {y}, {z} of {name}: expected a uniform positive scale; apply the scale and export again"
+            "scale {}, {}, {} of {name}: expected a uniform positive scale; apply the scale and export again",
+            number(x),
+            number(y),
+            number(z)
         );
         Ok(UserJoint { name, parent, offset: self.translation, rest, scale: x, moves })
     }
