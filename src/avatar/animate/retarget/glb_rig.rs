@@ -162,8 +162,8 @@ impl Default for SceneNode {
 }
 
 impl SceneNode {
-    fn joint(&self, number: usize, parent: Option<usize>, moves: bool) -> Result<UserJoint> {
-        let name = self.name.clone().unwrap_or_else(|| format!("node {number}"));
+    fn joint(&self, index: usize, parent: Option<usize>, moves: bool) -> Result<UserJoint> {
+        let name = self.name.clone().unwrap_or_else(|| format!("node {index}"));
         let is_plain = self.matrix.is_none();
         ensure!(is_plain, "{name} has a matrix: export the file with translation, rotation and scale");
         let [x, y, z, w] = self.rotation;
