@@ -21,22 +21,22 @@ pub fn section(settings: &Settings, videos: &[Videos]) -> Vec<Node> {
     videos
         .iter()
         .flat_map(|of| {
-            let is_said = settings.speaker.iter().any(|said| said.name == of.speaker && said.same_person);
-            let seen: Vec<VideoPerson> = of.units.iter().map(|unit| VideoPerson::read(work, unit)).collect();
-            let groups = if is_said { vec![seen.iter().collect()] } else { people::groups(&seen) };
-            of_speaker(work, &of.speaker, &groups, is_said)
+            let is_declared = settings.speaker.iter().any(|entry| entry.name == of.speaker && entry.same_person);
+            let persons: Vec<VideoPerson> = of.units.iter().map(|unit| VideoPerson::read(work, unit)).collect();
+            let groups = if is_declared { vec![persons.iter().collect()] } else { people::groups(&persons) };
+            of_speaker(work, &of.speaker, &groups, is_declared)
         })
         .collect()
 }
 
-fn of_speaker(work: &Path, speaker: &str, groups: &[Vec<&VideoPerson>], is_said: bool) -> Vec<Node> {
-    let about = match (is_said, groups.len()) {
-        (true, _) => format!("{speaker}: the configuration says that all videos show one person."),
-        (false, 0 | 1) => format!("{speaker}: nothing speaks against one person."),
+fn of_speaker(work: &Path, speaker: &str, groups: &[Vec<&VideoPerson>], is_declared: bool) -> Vec<Node> {
+    let about = match (is_declared, groups.len()) {
+        (true, _) => format!("{speaker}: all videos show the same person (`same_person = true` in the configuration)."),
+        (false, 0 | 1) => format!("{speaker}: all videos appear to show the same person."),
         (false, n) => format!(
-            "{speaker}: the videos seem to show {n} people. Faces, the width of the shoulders and the colours of skin and \
-             hair were compared, which is a guess: look at the faces. A video of another person is left out by `exclude`; \
-             where all are one person, `same_person = true` under [[speaker]] says so."
+            "{speaker}: the videos appear to show {n} persons, an estimate from faces, shoulder width and the colours \
+             of skin and hair. Check the faces: exclude videos of another person with `exclude`, or set `same_person = \
+             true` under [[speaker]] if all videos show the same person."
         ),
     };
     let rows = groups.iter().enumerate().filter_map(|(at, group)| {
@@ -56,6 +56,6 @@ fn card(work: &Path, video: &VideoPerson) -> Result<Option<Node>> {
         return Ok(None);
     }
     let face = png::read(&path)?;
-    let shown = jpeg(&ffmpeg::jpeg::encode(&face)?, [face.width, face.height], &format!("the face in {}", video.file));
+    let shown = jpeg(&ffmpeg::jpeg::encode(&face)?, [face.width, face.height], &format!("Face in {}", video.file));
     Ok(Some(node("figure").class("card shot").child(shown).child(node("figcaption").text(&video.file))))
 }

@@ -60,18 +60,18 @@ pub fn data(previews: &[MotionPreview]) -> Value {
 /// Section of previews; each is animated while it is visible, and static if the reader prefers reduced motion.
 pub fn section(previews: &[MotionPreview]) -> Vec<Node> {
     if previews.is_empty() {
-        return vec![node("p").class("empty").text("No interval is kept and lifted yet.")];
+        return vec![node("p").class("empty").text("No accepted and lifted interval yet.")];
     }
     let figure = |(i, preview): (usize, &MotionPreview)| {
-        let label = format!("Kept motion of {}", preview.name);
+        let label = format!("Accepted motion of {}", preview.name);
         let canvas =
             node("canvas").attr("width", 240).attr("height", 240).attr("role", "img").attr("aria-label", label);
         let link = node("a").attr("href", format!("#{}", preview.anchor)).text(&preview.name);
         node("figure").class("preview card").child(canvas.attr("data-preview", i)).child(node("figcaption").child(link))
     };
     let about = format!(
-        "The beginning of the longest kept interval of each video (the first {MAX_PREVIEWS}), at most {MAX_SECS} s, as \
-         the camera sees it. Joints that are not seen are left out."
+        "The first {MAX_SECS} s of the longest accepted interval of each video (at most {MAX_PREVIEWS} videos), seen \
+         from the camera. Joints that are not visible are omitted."
     );
     let shown = node("div").class("previews").children(previews.iter().enumerate().map(figure));
     vec![node("p").text(about), shown]

@@ -1,7 +1,7 @@
 //! Pipeline from joint positions to an animation: the motion is smoothed, solved as rotations of a rig, resampled to
 //! the requested rate and clamped to the joint limits. Every exported file is written from its result.
 
-use super::rig::constraints::{ClampTally, Clamps, Constraints};
+use super::rig::constraints::{ClampCounter, Clamps, Constraints};
 use super::rig::rig::{CM, Rig};
 use super::solve::arm::{SolveFilters, rotations};
 use super::solve::legs::Legs;
@@ -62,7 +62,7 @@ pub struct AnimationReport {
     /// Number of frames in which the head was detected; `None` without a posture.
     pub face_frames: Option<usize>,
     /// Number of frames in which each limb was detected.
-    pub seen: DetectedFrames,
+    pub detected: DetectedFrames,
 }
 
 /// Number of frames, at the motion's own rate, in which a part of the body was detected; in all others it is
@@ -81,11 +81,12 @@ pub struct DetectedFrames {
 
 impl DetectedFrames {
     fn count(motion: &Motion) -> Self {
-        let there = finite_joints(motion);
-        let is_seen =
-            |t: usize, joint: usize| there[[t, joint]] && motion.mask.get([t, joint]).is_none_or(|&seen| seen);
-        let frames = |joints: Range<usize>, least: usize| {
-            let enough = |t: &usize| joints.clone().filter(|&joint| is_seen(*t, joint)).count() >= least;
+        let finite = finite_joints(motion);
+        let is_detected = |t: usize, joint: usize| {
+            finite[[t, joint]] && motion.mask.get([t, joint]).is_none_or(|&is_visible| is_visible)
+        };
+        let frames = |joints: Range<usize>, min_joints: usize| {
+            let enough = |t: &usize| joints.clone().filter(|&joint| is_detected(*t, joint)).count() >= min_joints;
             (0..motion.n_frames()).filter(enough).count()
         };
         let arm = |shoulder: usize| frames(shoulder..shoulder + 3, 3);
@@ -134,15 +135,15 @@ pub fn perform_on(rig: Rig, motion: &Motion, posture: Option<&Posture>, options:
         let local = (0..motion.n_frames()).map(|t| tracks.iter().map(|track| track[t]).collect()).collect();
         BvhClip { root: rig.root, travel: Vec::new(), skeleton: rig.skeleton.clone(), fps: motion.fps, local }
     };
-    let constrained = |mut clip: BvhClip, tally: &mut ClampTally| {
-        clip.local.iter_mut().for_each(|frame| options.constraints.apply(&rig, frame, tally));
+    let constrained = |mut clip: BvhClip, counter: &mut ClampCounter| {
+        clip.local.iter_mut().for_each(|frame| options.constraints.apply(&rig, frame, counter));
         clip
     };
-    let mut tally = ClampTally::default();
+    let mut counter = ClampCounter::default();
     let mut positions = JointPositions::from_motion(motion);
     if options.constraints != Constraints::NONE {
-        let as_it_is = rotations(&positions, &rig, &SolveFilters::new(Smoothing::None, motion.fps));
-        let within = constrained(clip_of(&as_it_is), &mut tally);
+        let unfiltered = rotations(&positions, &rig, &SolveFilters::new(Smoothing::None, motion.fps));
+        let within = constrained(clip_of(&unfiltered), &mut counter);
         let frames: Vec<Vec<Vec3>> = (0..within.n_frames()).map(|t| within.positions(t)).collect();
         positions = positions.with_positions(|t, joint| scale(frames[t][rig.positions[joint]], 1.0 / CM));
     }
@@ -158,7 +159,7 @@ pub fn perform_on(rig: Rig, motion: &Motion, posture: Option<&Posture>, options:
     trunk::turn(posture, options.legs, options.breath, &rig, &filters, &mut free);
     let resampled = options.fps.filter(|&fps| fps != motion.fps).map(|fps| free.resampled(fps));
     let planted = |clip: BvhClip| {
-        let mut clip = constrained(clip, &mut ClampTally::default());
+        let mut clip = constrained(clip, &mut ClampCounter::default());
         options.legs.plant(&rig, &mut clip);
         clip
     };
@@ -177,9 +178,9 @@ pub fn perform_on(rig: Rig, motion: &Motion, posture: Option<&Posture>, options:
         n_frames: motion.n_frames(),
         arms: jerk(&arms.collect::<Vec<_>>()),
         hands: jerk(&hands.collect::<Vec<_>>()),
-        clamps: if options.constraints == Constraints::NONE { Vec::new() } else { tally.clamps() },
+        clamps: if options.constraints == Constraints::NONE { Vec::new() } else { counter.clamps() },
         face_frames,
-        seen: DetectedFrames::count(motion),
+        detected: DetectedFrames::count(motion),
     };
     Performance { clip: resampled.unwrap_or(clip), rig, report }
 }
@@ -202,9 +203,9 @@ fn joints(rig: &Rig, clip: &BvhClip) -> Array3<f32> {
     for (frame_idx, mut frame) in joints.outer_iter_mut().enumerate() {
         let positions = clip.positions(frame_idx);
         let neck = positions[rig.positions[NECK]];
-        for (joint, &place) in rig.positions.iter().enumerate() {
+        for (joint, &index) in rig.positions.iter().enumerate() {
             for (axis, sign) in [1.0, -1.0, -1.0].into_iter().enumerate() {
-                frame[[joint, axis]] = (sign * (positions[place][axis] - neck[axis]) / 100.0) as f32;
+                frame[[joint, axis]] = (sign * (positions[index][axis] - neck[axis]) / 100.0) as f32;
             }
         }
     }
@@ -213,5 +214,5 @@ fn joints(rig: &Rig, clip: &BvhClip) -> Array3<f32> {
 
 /// Mask [T, 49] of the joints with finite coordinates, detected or filled.
 fn finite_joints(motion: &Motion) -> Array2<bool> {
-    motion.joints.map_axis(ndarray::Axis(2), |place| place.iter().all(|v| v.is_finite()))
+    motion.joints.map_axis(ndarray::Axis(2), |position| position.iter().all(|v| v.is_finite()))
 }

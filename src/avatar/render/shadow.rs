@@ -162,7 +162,7 @@ impl ShadowMap {
     }
 
     /// Whether a caster may shade points between `low` and `high`, cm perpendicular to the light.
-    pub fn reaches(&self, low: [f32; 2], high: [f32; 2]) -> bool {
+    pub fn may_shade(&self, low: [f32; 2], high: [f32; 2]) -> bool {
         if self.is_empty {
             return false;
         }

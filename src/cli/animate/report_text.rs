@@ -34,7 +34,7 @@ pub(super) fn text(report: &AnimationReport) -> String {
 
 /// Parts of the body that were not detected in all frames; empty if all were.
 fn detected(report: &AnimationReport) -> String {
-    let DetectedFrames { left_arm, right_arm, left_hand, right_hand } = report.seen;
+    let DetectedFrames { left_arm, right_arm, left_hand, right_hand } = report.detected;
     let arms = match left_arm == right_arm {
         true => vec![("arms", left_arm)],
         false => vec![("left arm", left_arm), ("right arm", right_arm)],

@@ -276,7 +276,7 @@ fn animate(
     let sources = ExportContent {
         sound: sound.as_ref(),
         names: args.figure.options().names,
-        beside,
+        second_panel: beside,
         camera: args.film.camera(),
         film_fps: Some(film_fps),
         posture: None,

@@ -47,9 +47,9 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let text = format!(
         "accepted {} of {} ({}), rejected {}, failed {}\nwrote {} ({:.1} MB)",
         length(sums.kept),
-        length(sums.whole),
-        percent(sums.kept, sums.whole),
-        length(sums.refused_secs()),
+        length(sums.total),
+        percent(sums.kept, sums.total),
+        length(sums.rejected_secs()),
         length(sums.failed),
         out.display(),
         page.html.len() as f64 / 1e6

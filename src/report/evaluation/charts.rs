@@ -27,7 +27,7 @@ pub fn joints(table: &Table, clips: &EvalClips) -> Vec<Node> {
         if joint == NECK {
             continue;
         }
-        let share = if shares[joint].is_nan() { "never seen" } else { &format!("{:.0} %", 100.0 * shares[joint]) };
+        let share = if shares[joint].is_nan() { "never visible" } else { &format!("{:.0} %", 100.0 * shares[joint]) };
         let description = format!("{}: {share}", skeleton::name(joint));
         let radius = if body(joint) { 9.0 } else { 6.0 };
         all.push(ChartDot { at: position(joint), share: shares[joint], radius, description });
@@ -36,17 +36,17 @@ pub fn joints(table: &Table, clips: &EvalClips) -> Vec<Node> {
         let finite_shares: Vec<f64> = joints.map(|joint| shares[joint]).filter(|share| share.is_finite()).collect();
         finite_shares.iter().sum::<f64>() / finite_shares.len() as f64
     };
-    let label = |at: [f64; 2], what: &str, share: f64| (at, format!("{what} {:.0} %", 100.0 * share));
+    let label = |at: [f64; 2], name: &str, share: f64| (at, format!("{name} {:.0} %", 100.0 * share));
     let hand = |root: usize| mean(&mut (root + 1..root + skeleton::N_HAND_JOINTS));
     let labels = [
         label([180.0, 268.0], "arms", mean(&mut (R_SHOULDER..=L_WRIST))),
         label([405.0, 268.0], "right hand", hand(R_HAND)),
         label([640.0, 268.0], "left hand", hand(L_HAND)),
     ];
-    let drawing = dots("Share of correct keypoints of every joint", [720.0, 280.0], &edges, &all, &labels);
+    let drawing = dots("Share of correct keypoints of each joint", [720.0, 280.0], &edges, &all, &labels);
     let about = format!(
-        "How often each joint of the prediction lies within {alpha} of the real pose's largest extent (PCK) of where it \
-         should be, seen as the camera sees the speaker. Touch a joint for its name."
+        "Share of frames in which the predicted joint is within {alpha} of the largest extent of the ground-truth pose \
+         (PCK), seen from the camera. Hover over a joint for its name and value."
     );
     let scale = node("p").class("scale").children([
         node("span").text("0 %"),
@@ -83,9 +83,9 @@ fn shares(clips: &EvalClips, alpha: f64) -> Vec<f64> {
 
 /// Position of a body joint in the drawing; the speaker's right is on the left.
 fn body_position(joint: usize) -> [f64; 2] {
-    let places =
+    let positions =
         [[180.0, 60.0], [120.0, 72.0], [84.0, 150.0], [112.0, 222.0], [240.0, 72.0], [276.0, 150.0], [248.0, 222.0]];
-    places[joint.min(L_WRIST)]
+    positions[joint.min(L_WRIST)]
 }
 
 /// Position of a hand joint in the drawing, with fingers up and thumbs inside; the root of a hand is its wrist.
@@ -107,14 +107,14 @@ pub fn speeds(clips: &EvalClips) -> Vec<Node> {
     let wrists = [skeleton::R_WRIST, L_WRIST];
     let tips: Vec<usize> = [L_HAND, R_HAND].iter().flat_map(|root| (1..=5).map(move |k| root + 4 * k)).collect();
     let charts = [
-        ("Speed of the wrists", "m/s", &wrists[..], 1, 2.0),
-        ("Speed of the finger tips", "m/s", &tips[..], 1, 3.0),
-        ("Jerk of the wrists", "m/s\u{b3}", &wrists[..], 3, 600.0),
-        ("Jerk of the finger tips", "m/s\u{b3}", &tips[..], 3, 1500.0),
+        ("Wrist speed", "m/s", &wrists[..], 1, 2.0),
+        ("Fingertip speed", "m/s", &tips[..], 1, 3.0),
+        ("Wrist jerk", "m/s\u{b3}", &wrists[..], 3, 600.0),
+        ("Fingertip jerk", "m/s\u{b3}", &tips[..], 3, 1500.0),
     ];
-    let card = |(title, unit, joints, order, most): (&str, &str, &[usize], usize, f64)| {
+    let card = |(title, unit, joints, order, max): (&str, &str, &[usize], usize, f64)| {
         let count = |of: fn(&EvalClip) -> ArrayView3<f32>| {
-            let mut counts = Counts::new(0.0, most, 48);
+            let mut counts = Counts::new(0.0, max, 48);
             for clip in &clips.clips {
                 for &joint in joints {
                     derivative(clip, of(clip), joint, order, clips.fps.per_sec()).for_each(|value| counts.add(value));
@@ -124,14 +124,14 @@ pub fn speeds(clips: &EvalClips) -> Vec<Node> {
         };
         let (ground_truth, predicted) = (count(|clip| clip.ground_truth.view()), count(|clip| clip.predicted.view()));
         let medians = format!(
-            "median: truth {}, prediction {} {unit}",
+            "median: ground truth {}, prediction {} {unit}",
             number(ground_truth.quantile(0.5)),
             number(predicted.quantile(0.5))
         );
-        profile::card(title, unit, &[("real", &ground_truth), ("made", &predicted)], medians)
+        profile::card(title, unit, &[("truth", &ground_truth), ("predicted", &predicted)], medians)
     };
-    let about = "How often each value occurs (heights go with the square root of the share, so that rare values are seen; the \
-                 last bin holds what is beyond). Dashed: the medians.";
+    let about = "Distributions of the values. Heights are proportional to the square root of the share, so that rare \
+                 values stay visible; the last bin includes all larger values. Dashed lines: medians.";
     vec![node("p").text(about), colour_legend(), node("div").class("grid").children(charts.into_iter().map(card))]
 }
 
@@ -156,5 +156,5 @@ fn derivative<'a>(
 
 /// Legend of ground truth and prediction colours.
 pub fn colour_legend() -> Node {
-    legend([("line real", "truth"), ("line made", "prediction")])
+    legend([("line truth", "ground truth"), ("line predicted", "prediction")])
 }

@@ -1,4 +1,4 @@
-//! Page of an evaluation: conclusions, the table with its baselines, charts, and a player with sound. The bytes depend
+//! Page of an evaluation: conclusions, the table with its baselines, charts, and a player with audio. The bytes depend
 //! only on the table and the clips.
 
 use super::charts::{joints, speeds};
@@ -23,12 +23,16 @@ pub fn html(table: &Table, clips: &EvalClips, title: &str) -> Result<String> {
         title: title.to_owned(),
         lead: lead(table),
         sections: vec![
-            section("meaning", "What it means", meaning(table)),
-            section("watch", "Truth and prediction", with_checkpoint_note(table, player::body(&excerpts, table))),
-            section("figures", "All figures", table::body(table)),
-            section("joints", "Which joints are right", with_checkpoint_note(table, joints(table, clips))),
-            section("speeds", "How fast it moves", with_checkpoint_note(table, speeds(clips))),
-            section("definitions", "Exact definitions", table::definitions(table)),
+            section("conclusions", "Conclusions", conclusions(table)),
+            section(
+                "comparison",
+                "Ground truth and prediction",
+                with_checkpoint_note(table, player::body(&excerpts, table)),
+            ),
+            section("metrics", "All metrics", table::body(table)),
+            section("joints", "Accuracy by joint", with_checkpoint_note(table, joints(table, clips))),
+            section("speeds", "Speed and jerk", with_checkpoint_note(table, speeds(clips))),
+            section("definitions", "Definitions of the metrics", table::definitions(table)),
         ],
         style: include_str!("page.css"),
         script: include_str!("player.js"),
@@ -47,28 +51,28 @@ fn lead(table: &Table) -> String {
         counted(table.n_frames, "frame"),
         length(table.secs),
         table.settings.fps,
-        if table.with_sound { ", with sound" } else { ", without sound" }
+        if table.with_sound { ", with audio" } else { ", without audio" }
     )
 }
 
 /// Adds a note above a section that shows only the first of the checkpoints; unchanged without checkpoints.
 fn with_checkpoint_note(table: &Table, body: Vec<Node>) -> Vec<Node> {
     let first = table.predictions().find_map(|own| own.checkpoint.as_ref());
-    let note = first.map(|of| node("p").text(format!("The prediction here is that of {}, given first.", of.name)));
+    let note = first.map(|of| node("p").text(format!("This section shows the first checkpoint, {}.", of.name)));
     note.into_iter().chain(body).collect()
 }
 
 /// Conclusions with the votes that support them, the compared predictors, and notes.
-fn meaning(table: &Table) -> Vec<Node> {
+fn conclusions(table: &Table) -> Vec<Node> {
     let card = |(own, verdict): (&PredictorRow, Verdict)| {
-        let class = format!("card verdict {}", verdict.word.replace(' ', "-"));
+        let class = format!("card conclusion {}", verdict.word.replace(' ', "-"));
         let votes = verdict.votes.iter().map(|vote| {
-            let (class, words) = match vote.answer {
+            let (class, outcome) = match vote.answer {
                 Answer::Yes => ("better", "better than"),
                 Answer::No => ("worse", "worse than"),
-                Answer::Undecided => ("undecided", "not told apart from"),
+                Answer::Undecided => ("undecided", "no significant difference to"),
             };
-            let description = format!("{}: {words} {}", vote.metric, vote.against.name());
+            let description = format!("{}: {outcome} {}", vote.metric, vote.against.name());
             node("li").class(format!("vote {class}")).text(description)
         });
         let of = own.checkpoint.as_ref().map(|of| format!("{}: ", of.name)).unwrap_or_default();
@@ -76,13 +80,13 @@ fn meaning(table: &Table) -> Vec<Node> {
         card.child(node("ul").class("votes").children(votes))
     };
     let verdicts = |own| [(own, better_than_nothing(table, own)), (own, depends_on_audio(table, own))];
-    let mut body = vec![node("div").class("verdicts").children(table.predictions().flat_map(verdicts).map(card))];
+    let mut body = vec![node("div").class("conclusions").children(table.predictions().flat_map(verdicts).map(card))];
     let rows = table.rows.iter().map(|row| {
         let name = node("th").attr("scope", "row").text(row.name());
         node("tr").child(name).child(node("td").text(&row.description))
     });
-    body.push(node("h3").text("What is measured beside each other"));
-    body.push(node("table").class("who").child(node("tbody").children(rows)));
+    body.push(node("h3").text("Compared predictors"));
+    body.push(node("table").class("predictors").child(node("tbody").children(rows)));
     let notes: Vec<String> = table.notes.iter().cloned().chain(text::undefined(table)).collect();
     if !notes.is_empty() {
         body.push(node("h3").text("Notes"));

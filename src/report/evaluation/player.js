@@ -1,17 +1,17 @@
-// Player: ground truth and prediction side by side, synchronised with the sound if there is one.
+// Player: ground truth and prediction side by side, synchronised with the audio if there is any.
 (() => {
   const at = (id) => document.getElementById(id);
   if (!at("player")) return;
   const { bones, excerpts } = JSON.parse(document.getElementById("data").textContent);
   const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   const motions = new Map();
-  const sides = ["real", "made"];
+  const sides = ["truth", "predicted"];
   const JOINTS = 49, MISSING = -32768;
-  let which = 0, secs = 0, playing = false, started = 0, sound = null, shown = -1;
+  let selected = 0, secs = 0, playing = false, started = 0, audio = null, shown = -1;
 
   const motion = (side) => {
-    const key = `${side}${which}`;
-    if (!motions.has(key)) motions.set(key, new Int16Array(bytes(excerpts[which][side]).buffer));
+    const key = `${side}${selected}`;
+    if (!motions.has(key)) motions.set(key, new Int16Array(bytes(excerpts[selected][side]).buffer));
     return motions.get(key);
   };
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -23,8 +23,8 @@
       const numbers = motion(side);
       for (let i = 0; i < numbers.length; i += 3) {
         if (numbers[i] === MISSING) continue;
-        const reach = Math.hypot(numbers[i], numbers[i + 2]);
-        left = Math.min(left, -reach); right = Math.max(right, reach);
+        const radius = Math.hypot(numbers[i], numbers[i + 2]);
+        left = Math.min(left, -radius); right = Math.max(right, radius);
         top = Math.min(top, numbers[i + 1]); bottom = Math.max(bottom, numbers[i + 1]);
       }
     }
@@ -34,7 +34,7 @@
 
   const draw = () => {
     const turn = Number(at("turn").value) * Math.PI / 180;
-    const excerpt = excerpts[which];
+    const excerpt = excerpts[selected];
     const colours = [colour("--ink"), colour("--left"), colour("--right")];
     for (const side of sides) {
       const canvas = at(side), numbers = motion(side), n = numbers.length / (3 * JOINTS);
@@ -47,24 +47,24 @@
       const scale = 0.9 * Math.min(canvas.width / box.width, canvas.height / box.height);
       const above = (canvas.height - scale * box.height) / 2;
       const frame = Math.max(0, Math.min(n - 1, Math.floor(secs * excerpt.fps + 1e-6)));
-      const place = (joint) => {
+      const position = (joint) => {
         const i = 3 * (frame * JOINTS + joint);
         if (numbers[i] === MISSING) return null;
         const x = numbers[i] * Math.cos(turn) - numbers[i + 2] * Math.sin(turn);
         return [canvas.width / 2 + scale * x, above + scale * (numbers[i + 1] - box.top)];
       };
       // A head makes the figure recognisable as a person.
-      const neck = place(0);
+      const neck = position(0);
       pen.lineCap = pen.lineJoin = "round";
       if (neck) {
         pen.strokeStyle = colours[0]; pen.globalAlpha = 0.35; pen.lineWidth = 3 * ratio;
         pen.beginPath(); pen.arc(neck[0], neck[1] - scale * 150, scale * 85, 0, 2 * Math.PI); pen.stroke();
         pen.globalAlpha = 1;
       }
-      for (const [joint, parent, whose] of bones) {
-        const [from, to] = [place(parent), place(joint)];
+      for (const [joint, parent, side] of bones) {
+        const [from, to] = [position(parent), position(joint)];
         if (!from || !to) continue;
-        pen.strokeStyle = colours[whose];
+        pen.strokeStyle = colours[side];
         pen.lineWidth = (joint < 7 ? 5 : 2.2) * ratio;
         pen.beginPath(); pen.moveTo(...from); pen.lineTo(...to); pen.stroke();
       }
@@ -84,11 +84,11 @@
   const tick = () => {
     if (!playing) return;
     const clock = performance.now() / 1000;
-    const isAudible = sound && !sound.paused && sound.readyState > 1;
-    secs = isAudible ? sound.currentTime : clock - started;
+    const isAudible = audio && !audio.paused && audio.readyState > 1;
+    secs = isAudible ? audio.currentTime : clock - started;
     if (isAudible) started = clock - secs;
-    if (secs >= excerpts[which].secs) {
-      secs = excerpts[which].secs;
+    if (secs >= excerpts[selected].secs) {
+      secs = excerpts[selected].secs;
       pause();
     } else {
       requestAnimationFrame(tick);
@@ -97,34 +97,34 @@
   };
   const pause = () => {
     playing = false;
-    if (sound) sound.pause();
+    if (audio) audio.pause();
     at("play").textContent = "Play";
   };
   const play = () => {
-    if (secs >= excerpts[which].secs - 0.05) secs = 0;
+    if (secs >= excerpts[selected].secs - 0.05) secs = 0;
     playing = true;
     started = performance.now() / 1000 - secs;
     at("play").textContent = "Pause";
-    if (sound) {
-      sound.currentTime = Math.min(secs, sound.duration || secs);
-      sound.play().catch(() => { at("told").textContent = "The browser does not play the sound."; });
+    if (audio) {
+      audio.currentTime = Math.min(secs, audio.duration || secs);
+      audio.play().catch(() => { at("message").textContent = "The browser cannot play the audio."; });
     }
     requestAnimationFrame(tick);
   };
   const choose = (next) => {
     pause();
-    which = next; secs = 0;
-    const excerpt = excerpts[which];
-    sound = null;
-    if (excerpt.sound) {
-      sound = new Audio(`data:audio/wav;base64,${excerpt.sound}`);
-      sound.preload = "auto";
+    selected = next; secs = 0;
+    const excerpt = excerpts[selected];
+    audio = null;
+    if (excerpt.audio) {
+      audio = new Audio(`data:audio/wav;base64,${excerpt.audio}`);
+      audio.preload = "auto";
     }
-    at("told").textContent = excerpt.sound ? "" : "Without sound.";
+    at("message").textContent = excerpt.audio ? "" : "No audio.";
     at("at").max = excerpt.secs;
     at("at").step = 1 / excerpt.fps;
     box = extent();
-    for (const card of document.querySelectorAll(".over-time")) card.hidden = Number(card.dataset.excerpt) !== which;
+    for (const card of document.querySelectorAll(".over-time")) card.hidden = Number(card.dataset.excerpt) !== selected;
     draw();
   };
 
@@ -132,7 +132,7 @@
   at("at").addEventListener("input", () => {
     secs = Number(at("at").value);
     started = performance.now() / 1000 - secs;
-    if (sound && playing) sound.currentTime = secs;
+    if (audio && playing) audio.currentTime = secs;
     draw();
   });
   at("turn").addEventListener("input", () => {

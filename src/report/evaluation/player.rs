@@ -1,9 +1,9 @@
 //! Excerpts of an evaluation for the player: the best, a typical and the worst by joint error, with ground truth and
-//! prediction side by side, sound, and charts of wrists and beats over time. The excerpts last at most a minute in
+//! prediction side by side, audio, and charts of wrists and beats over time. The excerpts last at most a minute in
 //! total, and motion is in whole millimetres, which bounds the size of the page.
 
 use super::charts::colour_legend;
-use crate::html::chart::tracks::{Lane, lanes};
+use crate::html::chart::tracks::{Track, tracks};
 use crate::html::{Node, node};
 use anyhow::Result;
 use base64::Engine as _;
@@ -38,9 +38,9 @@ pub struct Excerpt {
     /// Joints [T, 49, 3] in millimetres, i16 little endian.
     ground_truth: Vec<u8>,
     predicted: Vec<u8>,
-    /// Sound as the bytes of a wav file.
-    sound: Option<Vec<u8>>,
-    lanes: Vec<Lane>,
+    /// Audio as the bytes of a wav file.
+    audio: Option<Vec<u8>>,
+    tracks: Vec<Track>,
 }
 
 /// Excerpts with the smallest, median and largest joint error among all parts of clips of at most `MAX_SECS`.
@@ -60,9 +60,9 @@ pub fn choose(clips: &EvalClips) -> Result<Vec<Excerpt>> {
     let n = candidates.len();
     let chosen: &[(&str, usize)] = match n {
         0 => &[],
-        1 => &[("all of it", 0)],
+        1 => &[("only excerpt", 0)],
         2 => &[("better", 0), ("worse", 1)],
-        n => &[("best", 0), ("typical", n / 2), ("worst", n - 1)],
+        n => &[("best", 0), ("median", n / 2), ("worst", n - 1)],
     };
     let chosen = chosen.iter().map(|(word, at)| {
         let (error, clip, frames) = &candidates[*at];
@@ -91,13 +91,13 @@ fn excerpt(word: &str, error: f64, clip: &EvalClip, frames: Range<usize>, fps: f
     let samples = clip.audio.as_ref().map(|audio| audio.samples(start, end)).transpose()?;
     let shown: Vec<usize> = frames.clone().step_by(step).collect();
     Ok(Excerpt {
-        name: format!("{word}: {} from {} to {} ({error:.0} mm)", clip.name, clock(start), clock(end)),
+        name: format!("{word}: {}, {} to {} (mean joint error {error:.0} mm)", clip.name, clock(start), clock(end)),
         secs: end - start,
         fps: fps / step as f64,
         ground_truth: millimetres(clip.ground_truth.view(), &shown),
         predicted: millimetres(clip.predicted.view(), &shown),
-        lanes: tracks_of(clip, frames, fps, samples.as_deref()),
-        sound: samples.map(|samples| to_wav(&samples)).transpose()?,
+        tracks: tracks_of(clip, frames, fps, samples.as_deref()),
+        audio: samples.map(|samples| to_wav(&samples)).transpose()?,
     })
 }
 
@@ -116,10 +116,11 @@ fn to_wav(samples: &[i16]) -> Result<Vec<u8>> {
 }
 
 /// Tracks of wrist height and speed, loudness, and motion beats with onsets over time.
-fn tracks_of(clip: &EvalClip, frames: Range<usize>, fps: f64, samples: Option<&[i16]>) -> Vec<Lane> {
+fn tracks_of(clip: &EvalClip, frames: Range<usize>, fps: f64, samples: Option<&[i16]>) -> Vec<Track> {
     let secs = |t: usize| (t - frames.start) as f64 / fps;
-    let both: [(&str, ArrayView3<f32>); 2] = [("real", clip.ground_truth.view()), ("made", clip.predicted.view())];
-    let height = |name: &str, joint: usize| Lane {
+    let both: [(&str, ArrayView3<f32>); 2] =
+        [("truth", clip.ground_truth.view()), ("predicted", clip.predicted.view())];
+    let height = |name: &str, joint: usize| Track {
         name: name.to_owned(),
         lines: both
             .map(|(class, joints)| {
@@ -129,18 +130,14 @@ fn tracks_of(clip: &EvalClip, frames: Range<usize>, fps: f64, samples: Option<&[
             .to_vec(),
         marks: Vec::new(),
     };
-    let mut all = vec![height("right wrist, up and down", R_WRIST), height("left wrist, up and down", L_WRIST)];
+    let mut all = vec![height("height of the right wrist", R_WRIST), height("height of the left wrist", L_WRIST)];
     if let Some(samples) = samples {
         let per_point = (SAMPLE_RATE / 25) as usize;
-        let loudness = samples.chunks(per_point).enumerate().map(|(i, piece)| {
-            let power = piece.iter().map(|s| (f64::from(*s) / 32_768.0).powi(2)).sum::<f64>() / piece.len() as f64;
+        let loudness = samples.chunks(per_point).enumerate().map(|(i, chunk)| {
+            let power = chunk.iter().map(|s| (f64::from(*s) / 32_768.0).powi(2)).sum::<f64>() / chunk.len() as f64;
             [i as f64 / 25.0, power.sqrt()]
         });
-        all.push(Lane {
-            name: "loudness of the sound".to_owned(),
-            lines: vec![("sound", loudness.collect())],
-            marks: Vec::new(),
-        });
+        all.push(Track { name: "loudness".to_owned(), lines: vec![("audio", loudness.collect())], marks: Vec::new() });
     }
     let order = ((BEAT_SECS * fps).round() as usize).max(1);
     let (mut lines, mut marks) = (Vec::new(), Vec::new());
@@ -149,7 +146,7 @@ fn tracks_of(clip: &EvalClip, frames: Range<usize>, fps: f64, samples: Option<&[
         marks.push((class, consistency::minima(&speeds, order).into_iter().map(|i| i as f64 / fps).collect()));
         lines.push((class, speeds.iter().enumerate().map(|(i, speed)| [i as f64 / fps, *speed]).collect()));
     }
-    all.push(Lane { name: "speed of the wrists".to_owned(), lines, marks: Vec::new() });
+    all.push(Track { name: "wrist speed".to_owned(), lines, marks: Vec::new() });
     if let Some(features) = clip.features.as_ref().filter(|_| samples.is_some()) {
         let (start, end) = (frames.start as f64 / fps, frames.end as f64 / fps);
         let onsets = features.onsets.iter().filter(|onset| (start..end).contains(*onset)).map(|onset| onset - start);
@@ -157,11 +154,11 @@ fn tracks_of(clip: &EvalClip, frames: Range<usize>, fps: f64, samples: Option<&[
     }
     let name = match marks.len() {
         3 => {
-            "beats: from above the onsets of the sound, where the prediction's wrists are slowest, where the truth's are"
+            "beats, top to bottom: audio onsets; speed minima of the predicted wrists; speed minima of the true wrists"
         }
-        _ => "beats: above, where the prediction's wrists are slowest; below, where the truth's are",
+        _ => "beats: speed minima of the predicted wrists (top) and of the true wrists (bottom)",
     };
-    all.push(Lane { name: name.to_owned(), lines: Vec::new(), marks });
+    all.push(Track { name: name.to_owned(), lines: Vec::new(), marks });
     all
 }
 
@@ -184,9 +181,9 @@ impl Excerpt {
         json!({
             "secs": self.secs,
             "fps": self.fps,
-            "real": STANDARD.encode(&self.ground_truth),
-            "made": STANDARD.encode(&self.predicted),
-            "sound": self.sound.as_ref().map(|sound| STANDARD.encode(sound)),
+            "truth": STANDARD.encode(&self.ground_truth),
+            "predicted": STANDARD.encode(&self.predicted),
+            "audio": self.audio.as_ref().map(|audio| STANDARD.encode(audio)),
         })
     }
 }
@@ -207,7 +204,9 @@ pub fn bones() -> Vec<[usize; 3]> {
 /// Player, with the charts below it.
 pub fn body(excerpts: &[Excerpt], table: &Table) -> Vec<Node> {
     if excerpts.is_empty() {
-        return vec![node("p").class("empty").text("There is no interval with motion on both sides to show.")];
+        return vec![
+            node("p").class("empty").text("No clip has visible joints in both the ground truth and the prediction."),
+        ];
     }
     let option = |(i, excerpt): (usize, &Excerpt)| node("option").attr("value", i).text(&excerpt.name);
     let select = node("select").id("excerpt").children(excerpts.iter().enumerate().map(option));
@@ -222,31 +221,31 @@ pub fn body(excerpts: &[Excerpt], table: &Table) -> Vec<Node> {
     };
     let controls = node("div").class("controls").children([
         node("button").id("play").attr("type", "button").text("Play"),
-        range("at", "Place in the excerpt", ["0", "1", "0", "0.01"]),
+        range("at", "Position in the excerpt", ["0", "1", "0", "0.01"]),
         node("output").id("clock").text("0.0 s"),
     ]);
     let turn = node("div").class("controls").children([
-        node("label").attr("for", "turn").text("Turn"),
-        range("turn", "Turn the figures", ["-90", "90", "0", "1"]),
+        node("label").attr("for", "turn").text("Rotate"),
+        range("turn", "Rotate the figures", ["-90", "90", "0", "1"]),
         node("output").id("degrees").text("0\u{b0}"),
     ]);
     let player = node("div").class("card player").id("player").children([
         node("div").class("controls").child(node("label").attr("for", "excerpt").text("Excerpt")).child(select),
-        node("div").class("stages").child(stage("real", "truth")).child(stage("made", "prediction")),
+        node("div").class("stages").child(stage("truth", "ground truth")).child(stage("predicted", "prediction")),
         controls,
         turn,
-        node("p").id("told").class("small").attr("role", "status"),
+        node("p").id("message").class("small").attr("role", "status"),
     ]);
     let charts = excerpts.iter().enumerate().map(|(i, excerpt)| {
-        let chart = lanes(&format!("Wrists and beats, {}", excerpt.name), excerpt.secs, &excerpt.lanes);
+        let chart = tracks(&format!("Wrists and beats, {}", excerpt.name), excerpt.secs, &excerpt.tracks);
         let card =
             node("div").class("card scroll wide over-time").attr("data-excerpt", i).attr("data-secs", excerpt.secs);
         card.child(chart)
     });
     let about = format!(
-        "Excerpts chosen by the mean error of the joints. Both figures are seen as the camera sees the speaker, who faces \
-         you{}. The lines under them are of the same excerpt.",
-        if table.with_sound { "" } else { "; no sound was given" }
+        "Excerpts with the smallest, median and largest mean joint error. Both figures are seen from the camera and \
+         face you{}. The curves below belong to the selected excerpt.",
+        if table.with_sound { "" } else { "; the evaluation has no audio" }
     );
     [node("p").text(about), player, colour_legend()].into_iter().chain(charts).collect()
 }

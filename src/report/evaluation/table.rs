@@ -10,10 +10,10 @@ use orator_gesture::metrics::catalogue::Definition;
 
 /// Groups of metrics by prefixes of their names; the last group contains the rest.
 const GROUPS: [(&str, &[&str]); 4] = [
-    ("Where the joints are", &["pck", "l1", "mpjpe", "p_mpjpe", "maje", "acceleration_error"]),
-    ("Which poses and movements", &["frechet", "l1div", "average_pairwise", "cca"]),
-    ("How fast it moves", &["speed", "acceleration", "jerk", "hellinger", "bone"]),
-    ("Sound and the rest", &[""]),
+    ("Joint positions", &["pck", "l1", "mpjpe", "p_mpjpe", "maje", "acceleration_error"]),
+    ("Distribution of poses and motion", &["frechet", "l1div", "average_pairwise", "cca"]),
+    ("Speed, acceleration and jerk", &["speed", "acceleration", "jerk", "hellinger", "bone"]),
+    ("Audio and other metrics", &[""]),
 ];
 
 /// Table of all metrics, grouped.
@@ -23,7 +23,7 @@ pub fn body(table: &Table) -> Vec<Node> {
     let first = node("th").attr("scope", "col").text("");
     let against = table.predictions().map(|own| {
         let of = own.checkpoint.as_ref().map(|of| format!("{} ", of.name)).unwrap_or_default();
-        node("th").attr("scope", "col").class("against").text(format!("{of}against doing nothing"))
+        node("th").attr("scope", "col").class("against").text(format!("{of}vs. constant pose"))
     });
     let width = table.rows.len() + 1 + table.predictions().count();
     let mut rows: Vec<Node> = Vec::new();
@@ -38,11 +38,11 @@ pub fn body(table: &Table) -> Vec<Node> {
         }
     }
     let drawn = format!(
-        "In brackets, or under the pointer: 95 % intervals of {N_DRAWS} draws of the blocks (Frechet distances and correlations: {N_COSTLY_DRAWS}). \
-         Against doing nothing: the prediction beside the better of the poses that never move, each figure tested by \
-         itself by sign flips of the blocks: better, worse, or not told apart."
+        "In brackets or in the tooltip: 95 % confidence intervals from {N_DRAWS} bootstrap draws of the blocks \
+         (Frechet distances and correlations: {N_COSTLY_DRAWS}). Column vs. constant pose: the prediction compared \
+         with the better of the constant poses, each metric tested separately by sign flips of the blocks."
     );
-    let table = html::table("figures", std::iter::once(first).chain(against).chain(heads), rows);
+    let table = html::table("metrics", std::iter::once(first).chain(against).chain(heads), rows);
     vec![node("p").class("small").text(drawn), node("div").class("scroll").attr("tabindex", "0").child(table)]
 }
 
@@ -61,26 +61,28 @@ fn row(table: &Table, index: usize, last: &mut String) -> Option<Node> {
     if !table.is_shown(index) {
         return None;
     }
-    let whole = labels::name_without_part(definition);
-    let is_part = *last == whole && !labels::part(definition).is_empty();
+    let full_name = labels::name_without_part(definition);
+    let is_part = *last == full_name && !labels::part(definition).is_empty();
     let name = node("th").attr("scope", "row").attr("title", definition.formula);
     let name = if is_part {
-        name.class("part").child(node("span").class("unseen").text(format!("{whole}, "))).text(labels::part(definition))
+        name.class("part")
+            .child(node("span").class("visually-hidden").text(format!("{full_name}, ")))
+            .text(labels::part(definition))
     } else {
         let unit = labels::unit(definition);
         let unit = if unit.is_empty() { String::new() } else { format!("{unit}, ") };
         let small = format!("{unit}{}", labels::direction(definition.better));
         name.text(labels::name(definition)).child(node("small").text(small))
     };
-    *last = whole;
+    *last = full_name;
     let against = table.predictions().map(|own| {
-        let (class, words) = match against_constant_pose(table, own, index) {
+        let (class, outcome) = match against_constant_pose(table, own, index) {
             Some(Answer::Yes) => ("yes", "better"),
             Some(Answer::No) => ("no", "worse"),
-            Some(Answer::Undecided) => ("undecided", "not told apart"),
+            Some(Answer::Undecided) => ("undecided", "no significant difference"),
             None => ("", ""),
         };
-        node("td").class(format!("against {class}")).text(words)
+        node("td").class(format!("against {class}")).text(outcome)
     });
     let cells = table.rows.iter().map(|row| {
         let estimate = &row.values[index];
@@ -111,7 +113,7 @@ pub fn definitions(table: &Table) -> Vec<Node> {
         let hash = node("p").class("small").child(node("code").text(hash));
         node("details").child(name).child(formula).child(parameters).child(hash)
     };
-    let about = "Values are comparable where their hash is the same: it is of the definition and of every parameter. \
-                 `orator evaluate compare A.json B.json` refuses the others.";
+    let about = "Values are comparable if their hashes are equal: a hash covers the definition and all parameters. \
+                 `orator evaluate compare A.json B.json` rejects metrics with different hashes.";
     vec![node("p").text(about), node("div").class("definitions").children(table.definitions.iter().map(item))]
 }

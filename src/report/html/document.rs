@@ -56,7 +56,7 @@ impl Page {
             .child(node("p").class("lead").text(&self.lead))
             .child(node("nav").attr("aria-label", "Sections").children(links));
         let body = node("body")
-            .child(node("a").class("skip").attr("href", "#main").text("Skip to the content"))
+            .child(node("a").class("skip").attr("href", "#main").text("Skip to content"))
             .child(top)
             .child(node("main").id("main").children(sections))
             .child(node("div").id("tip").attr("role", "status").flag("hidden"))

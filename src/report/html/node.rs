@@ -70,8 +70,8 @@ impl Node {
     }
 
     /// Appends text.
-    pub fn text(mut self, words: impl Display) -> Self {
-        self.inner.push_str(&escape(&words.to_string()));
+    pub fn text(mut self, content: impl Display) -> Self {
+        self.inner.push_str(&escape(&content.to_string()));
         self
     }
 

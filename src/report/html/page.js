@@ -25,14 +25,14 @@
     tip.style.left = `${left}px`;
     tip.style.top = `${below + tip.offsetHeight > innerHeight && above > 0 ? above : below}px`;
   };
-  const stretch = (target) => (target instanceof Element ? target.closest(".timeline > li") : null);
+  const intervalAt = (target) => (target instanceof Element ? target.closest(".timeline > li") : null);
   addEventListener("pointermove", (event) => {
-    const part = stretch(event.target);
+    const part = intervalAt(event.target);
     if (part) show(part, event.clientX);
     else if (shown && !shown.parentElement.matches(":focus-visible")) hide();
   });
   addEventListener("pointerdown", (event) => {
-    const part = stretch(event.target);
+    const part = intervalAt(event.target);
     if (part) show(part, event.clientX);
     else hide();
   });

@@ -52,7 +52,7 @@ impl SheetCrop {
         let mut cell = Image::filled(CELL_PX, CELL_PX, PAPER);
         let shift = self.transform.shift.map(f64::from);
         let src_from_dst = warp::SrcFromDst([[1.0, 0.0, -shift[0]], [0.0, 1.0, -shift[1]]]);
-        warp::warp(&picture, &src_from_dst, &mut cell).context("cutting out a part of a frame")?;
+        warp::warp(&picture, &src_from_dst, &mut cell).context("cannot crop a video frame")?;
         overlay::draw_keypoints(&mut cell, keypoints, frame_idx, self.transform, 3.0)?;
         Ok(cell)
     }
@@ -80,7 +80,7 @@ pub fn pose_cell(joints: ArrayView2<f32>, from: CellView) -> Result<Image> {
     draw_pose(&mut cell, joints, &view)?;
     let label = match from {
         CellView::Front => "front",
-        CellView::Left => "side, from the left;  <-- faces this way",
+        CellView::Left => "side view from the left;  <-- facing this way",
     };
     draw::text(&mut cell, label, [6.0, 16.0], 9.0, INK)?;
     Ok(cell)

@@ -87,19 +87,19 @@ impl SheetClip<'_> {
     /// Indices of the frames to draw.
     fn moments(&self, every_secs: f64) -> Result<Vec<usize>> {
         let (n_frames, fps) = (self.motion.n_frames(), self.motion.fps);
-        ensure!(n_frames > 0, "the motion has no frames: nothing to draw");
+        ensure!(n_frames > 0, "the motion has no frames: expected at least 1");
         let n_keypoints = self.keypoints.n_frames();
         ensure!(
             n_frames == n_keypoints,
-            "the motion has {n_frames} frames, the keypoints have {n_keypoints}: they are not of the same clip, or one \
-             was made before the other changed; lift the keypoints again"
+            "the motion has {n_frames} frames, the keypoints have {n_keypoints}: expected the same clip; if the \
+             keypoints have changed since, lift them again"
         );
         let other = self.keypoints.fps;
-        ensure!(fps == other, "the motion runs at {fps}, the keypoints at {other}: lift the keypoints again");
+        ensure!(fps == other, "the motion is at {fps}, the keypoints at {other}: lift the keypoints again");
         let step = every_secs * fps.per_sec();
         ensure!(
             step.is_finite() && step >= 1.0,
-            "a moment every {every_secs} s: at {fps} it must be at least {:.3} s",
+            "invalid interval of {every_secs} s between moments: at {fps}, expected at least {:.3} s",
             fps.secs(1)
         );
         let moments = (0..).map(|n| (f64::from(n) * step).round() as usize).take_while(|&frame| frame < n_frames);
@@ -114,8 +114,8 @@ impl SheetClip<'_> {
         let difference_secs = fps.secs(n_frames.abs_diff(expected));
         ensure!(
             difference_secs <= 1.0,
-            "the motion has {n_frames} frames at {fps}, {:.2} s, the video {} lasts {:.2} s: they are not of the same clip, \
-             or the keypoints' `fps` is wrong",
+            "the motion has {n_frames} frames at {fps} ({:.2} s), the video {} lasts {:.2} s: expected the same clip, \
+             or the `fps` of the keypoints is wrong",
             fps.secs(n_frames),
             self.video.display(),
             fps.secs(expected)
@@ -143,7 +143,10 @@ impl SheetClip<'_> {
         loop {
             let time = reader.advance()?.with_context(|| {
                 let secs = self.motion.fps.secs(frame_idx);
-                format!("{} ends before {secs:.2} s, the motion does not: not the same clip", self.video.display())
+                format!(
+                    "{} ends before {secs:.2} s, but the motion does not: expected the same clip",
+                    self.video.display()
+                )
             })?;
             if time.frame_idx == frame_idx {
                 break;
@@ -169,8 +172,8 @@ impl SheetClip<'_> {
         draw::text(page, &self.caption(frame_idx), [left as f32 + 6.0, (top + TEXT_PX - 6) as f32], 10.0, INK)
     }
 
-    /// Text above a moment, as in `3.0 s   wrists shake L 2.1 R 0.9 mm   refused: left hand`. A part is refused if its
-    /// keypoints were detected but its joints are masked. No jitter is printed for a wrist without joints.
+    /// Text above a moment, as in `3.0 s   wrist jitter L 2.1 R 0.9 mm   rejected: left hand`. A part is rejected if
+    /// its keypoints were detected but its joints are masked. No jitter is printed for a wrist without joints.
     fn caption(&self, frame_idx: usize) -> String {
         let mask = self.motion.mask.row(frame_idx);
         let is_half_visible = |root: usize| (1..N_HAND_JOINTS).filter(|j| mask[root + j]).count() * 2 >= N_HAND_JOINTS;
@@ -192,11 +195,11 @@ impl SheetClip<'_> {
         let jitters = jitters.into_iter().filter(|(_, mm)| mm.is_finite()).map(|(side, mm)| format!(" {side} {mm:.1}"));
         let jitters: String = jitters.collect();
         if !jitters.is_empty() {
-            texts.push(format!("wrists shake{jitters} mm"));
+            texts.push(format!("wrist jitter{jitters} mm"));
         }
-        for (why, parts) in [("refused", without(true)), ("not seen", without(false))] {
+        for (reason, parts) in [("rejected", without(true)), ("not detected", without(false))] {
             if !parts.is_empty() {
-                texts.push(format!("{why}: {parts}"));
+                texts.push(format!("{reason}: {parts}"));
             }
         }
         texts.join("   ")

@@ -13,17 +13,18 @@ use std::ops::Range;
 pub const STRIP_PX: usize = 260;
 /// Width of the labels at the left, px.
 const MARGIN_PX: f32 = 60.0;
-/// Lanes of the chart: axis, range from top to bottom in metres, and label.
-const LANES: [(usize, [f32; 2], &str); 2] = [(1, [-0.3, 0.7], "height"), (2, [-0.7, 0.1], "depth")];
+/// Tracks of the chart: axis, range from top to bottom in metres, and label.
+const TRACKS: [(usize, [f32; 2], &str); 2] = [(1, [-0.3, 0.7], "height"), (2, [-0.7, 0.1], "depth")];
 
 /// Draws the wrists over `frames` in the pixel rows from `top` on, with a vertical line at each frame in `marks`.
 pub fn draw_strip(image: &mut Image, top: usize, motion: &Motion, frames: Range<usize>, marks: &[usize]) -> Result<()> {
-    let lane_px = (STRIP_PX as f32 - 30.0) / LANES.len() as f32;
+    let track_px = (STRIP_PX as f32 - 30.0) / TRACKS.len() as f32;
     let (left, right) = (MARGIN_PX, image.width as f32 - 10.0);
     let n_steps = frames.len().saturating_sub(1).max(1) as f32;
     let x_of = |t: usize| left + (right - left) * t.saturating_sub(frames.start) as f32 / n_steps;
-    for (lane, (axis, [above, below], label)) in LANES.into_iter().enumerate() {
-        let (start, end) = (top as f32 + lane as f32 * lane_px + 4.0, top as f32 + (lane + 1) as f32 * lane_px - 4.0);
+    for (track, (axis, [above, below], label)) in TRACKS.into_iter().enumerate() {
+        let (start, end) =
+            (top as f32 + track as f32 * track_px + 4.0, top as f32 + (track + 1) as f32 * track_px - 4.0);
         let y_of = |metres: f32| start + (end - start) * ((metres - above) / (below - above)).clamp(0.0, 1.0);
         for decimetre in (above * 10.0).round() as i32..=(below * 10.0).round() as i32 {
             let metres = decimetre as f32 / 10.0;
@@ -41,8 +42,8 @@ pub fn draw_strip(image: &mut Image, top: usize, motion: &Motion, frames: Range<
             for t in frames.clone().skip(1) {
                 let from = [x_of(t - 1), y_of(motion.joints[[t - 1, wrist, axis]])];
                 let to = [x_of(t), y_of(motion.joints[[t, wrist, axis]])];
-                let seen = motion.mask[[t, wrist]] && motion.mask[[t - 1, wrist]];
-                draw::line(image, from, to, 2.0, if seen { rgb } else { mix(rgb, PAPER, 0.6) })?;
+                let is_visible = motion.mask[[t, wrist]] && motion.mask[[t - 1, wrist]];
+                draw::line(image, from, to, 2.0, if is_visible { rgb } else { mix(rgb, PAPER, 0.6) })?;
             }
         }
     }

@@ -46,37 +46,37 @@ impl<'a> TrainingLog<'a> {
         let charts = vec![
             chart(
                 "L1 error",
-                "Of normalised coordinates; lower is better.",
+                "Error of the normalised coordinates; lower is better.",
                 vec![training("training", 2, "l1"), generated("held out", 0, "l1")],
                 vec![mean_pose("mean pose, held out", 0, "l1")],
             ),
             chart(
                 "Correct keypoints (PCK 0.2)",
-                "Share within a fifth of the pose's extent; higher is better.",
+                "Share of joints within 0.2 of the pose's extent; higher is better.",
                 vec![generated("arms", 0, "pck_body"), generated("fingers", 1, "pck_hands")],
                 vec![mean_pose("arms, mean pose", 0, "pck_body"), mean_pose("fingers, mean pose", 1, "pck_hands")],
             ),
             chart(
                 "Frechet distance, cm\u{b2}",
-                "Of single held-out poses; lower is better, and few poses make it too large.",
+                "Between single held-out poses; lower is better; overestimated with few poses.",
                 vec![generated("held out", 0, "frechet")],
                 vec![mean_pose("mean pose", 0, "frechet")],
             ),
             chart(
                 "Motion energy",
-                "As a share of the data's: 1 moves as much as the speaker, 0 stands still.",
+                "Relative to the data: 1 moves as much as the speaker, 0 is static.",
                 vec![generated("held out", 0, "energy")],
-                vec![level("the data's", 2, 1.0), level("collapse alarm", 1, 0.3)],
+                vec![level("data", 2, 1.0), level("collapse threshold", 1, 0.3)],
             ),
             chart(
                 "Score",
-                "What chooses the best checkpoint, which the dashed line marks; lower is better.",
+                "Selects the best checkpoint (dashed line); lower is better.",
                 vec![curve(&self.epochs, "held out", 0, |line| line["validation"]["score"].as_f64())],
                 vec![],
             ),
             chart(
                 "Adversarial losses",
-                "Of the generator against the discriminator, and of the discriminator itself.",
+                "Adversarial loss of the generator and loss of the discriminator.",
                 vec![training("generator", 0, "adversarial"), training("discriminator", 1, "discriminator")],
                 vec![],
             ),
@@ -86,7 +86,7 @@ impl<'a> TrainingLog<'a> {
                 vec![training("bone lengths", 0, "bone"), training("velocity", 1, "velocity")],
                 vec![],
             ),
-            chart("Gradient norm", "Before clipping.", vec![training("generator", 0, "gradient_norm")], vec![]),
+            chart("Gradient norm", "Norm before clipping.", vec![training("generator", 0, "gradient_norm")], vec![]),
         ];
         let is_nonzero =
             |chart: &LineChart| chart.lines.iter().flat_map(|line| &line.points).any(|[_, value]| *value != 0.0);
@@ -129,8 +129,8 @@ mod tests {
     fn the_best_epoch_is_found_and_long_curves_are_thinned() {
         let mut lines: Vec<Value> = (1..=1000).map(|i| json!({"step": 10 * i, "l1": 1.0, "bone": 0.0})).collect();
         for (step, score) in [(5000, 2.0), (7000, 1.5), (10_000, 1.7)] {
-            let still = json!({"l1": 0.8});
-            let validation = json!({"score": score, "generator": {"l1": score / 2.0}, "mean_pose": still});
+            let mean_pose = json!({"l1": 0.8});
+            let validation = json!({"score": score, "generator": {"l1": score / 2.0}, "mean_pose": mean_pose});
             lines.push(json!({"step": step, "epoch": 1, "validation": validation}));
         }
         let log = TrainingLog::parse(&lines);

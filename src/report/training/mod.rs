@@ -1,4 +1,4 @@
-//! Page of a training run: learning curves, and generated beside true poses.
+//! Page of a training run: learning curves, and generated and true poses.
 
 pub mod charts;
 pub mod live;

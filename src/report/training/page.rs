@@ -1,5 +1,5 @@
 //! Page of a training run, next to its checkpoints: learning curves with the best epoch marked, the metrics of the best
-//! epoch and of the mean pose, and generated beside true poses.
+//! epoch and of the mean pose, and generated and true poses.
 
 use super::charts::{TrainingLog, metrics};
 use super::strip::{HeldOutPair, strip};
@@ -25,7 +25,7 @@ const METRICS: [(&str, &str, bool); 6] = [
     ("PCK 0.2, arms", "pck_body", true),
     ("PCK 0.2, fingers", "pck_hands", true),
     ("Frechet distance of single poses, cm\u{b2}", "frechet", false),
-    ("Motion energy as a share of the data's", "energy", true),
+    ("Motion energy relative to the data", "energy", true),
 ];
 
 /// Writes `training.html` into the folder of a training run from its log and poses of held-out intervals (may be
@@ -38,15 +38,16 @@ pub fn write(folder: &Path, speaker: &str, pairs: &[HeldOutPair]) -> Result<()> 
     let training_log = TrainingLog::parse(&lines);
     let charts = training_log.charts();
     let mut poses = vec![node("p").text(
-        "Intervals that were not trained on: what the speaker did, and under it what the best checkpoint makes of the \
-         speech alone. The lines are the height of the wrists: grey the speaker's, in colour the generated one.",
+        "Held-out intervals: the speaker's motion and, below it, the motion that the best checkpoint generates from \
+         the audio alone. The curves show the height of the wrists: the speaker's in grey, the generated one in \
+         colour.",
     )];
     if pairs.is_empty() {
-        poses = vec![node("p").class("empty").text("There is no interval of the 49 joints to show.")];
+        poses = vec![node("p").class("empty").text("No held-out interval with the 49 joints to show.")];
     } else {
         let strip = strip(pairs)?;
         let names: Vec<&str> = pairs.iter().map(|pair| pair.name.as_str()).collect();
-        let description = format!("True and generated poses of {}", names.join(", "));
+        let description = format!("Ground-truth and generated poses of {}", names.join(", "));
         let image = jpeg(&ffmpeg::jpeg::encode(&strip)?, [strip.width, strip.height], &description);
         poses.push(node("div").class("scroll").child(image.class("strip")));
     }
@@ -57,13 +58,13 @@ pub fn write(folder: &Path, speaker: &str, pairs: &[HeldOutPair]) -> Result<()> 
         sections: vec![
             section("best", "Best epoch", best(&training_log)),
             section("curves", "Curves", vec![node("div").class("grid").children(charts.iter().map(LineChart::card))]),
-            section("poses", "Generated against true poses", poses),
+            section("poses", "Generated and ground-truth poses", poses),
         ],
         style: include_str!("page.css"),
         script: "",
         data: Value::Null,
     };
-    workdir::write_file(&folder.join(PAGE), page.html().as_bytes()).context("writing the page of the training")
+    workdir::write_file(&folder.join(PAGE), page.html().as_bytes()).context("cannot write the training page")
 }
 
 fn lead(training_log: &TrainingLog) -> String {
@@ -74,8 +75,8 @@ fn lead(training_log: &TrainingLog) -> String {
         if best["validation"]["n_segments"].is_u64() { ("n_segments", "sequence") } else { ("n_windows", "window") };
     let windows = best["validation"][key].as_u64().unwrap_or(0) as usize;
     format!(
-        "{last} steps. Of {} validations the one at step {} has the best score, measured on {} of the {} split.",
-        training_log.epochs.len(),
+        "{last} steps and {}. The best score is at step {}, measured on {} of the {} split.",
+        counted(training_log.epochs.len(), "validation"),
         step(best),
         counted(windows, of),
         best["validation"]["split"].as_str().unwrap_or("validation"),
@@ -85,7 +86,7 @@ fn lead(training_log: &TrainingLog) -> String {
 /// Table of the best epoch's metrics, with warnings if necessary.
 fn best(training_log: &TrainingLog) -> Vec<Node> {
     let Some(best) = training_log.best.map(|line| &line["validation"]) else {
-        return vec![node("p").class("empty").text("The log has no validation.")];
+        return vec![node("p").class("empty").text("The log has no validation yet.")];
     };
     let is_sequence = best["n_segments"].is_u64();
     let shown = |value: &Value, in_percent: bool| match value.as_f64() {
@@ -106,10 +107,10 @@ fn best(training_log: &TrainingLog) -> Vec<Node> {
         .child(node("tbody").children(METRICS.into_iter().filter(is_measured).map(row)));
     let about = match best["n_poses"].as_u64() {
         Some(poses) => format!(
-            "The mean pose never moves. Behind each Frechet distance are {}; the smaller that count, the larger it is.",
+            "The mean pose is static. Each Frechet distance is computed from {}; fewer poses give larger distances.",
             counted(poses as usize, "pose")
         ),
-        None => "The mean pose never moves.".to_owned(),
+        None => "The mean pose is static.".to_owned(),
     };
     let pair = |of: &str| {
         let [model, mean_pose] = metrics(best, of).map(Value::as_f64);
@@ -117,7 +118,7 @@ fn best(training_log: &TrainingLog) -> Vec<Node> {
     };
     let below = pair("l1").and_then(|l1| below_mean_pose(l1, pair("pck")));
     let below = below.map(|below| node("p").class("note").text(below));
-    let alarm = best["alarm"].as_str().map(|alarm| node("p").class("note").text(format!("Alarm: {alarm}.")));
-    let table = node("div").class("scroll figures").child(table);
+    let alarm = best["alarm"].as_str().map(|alarm| node("p").class("note").text(format!("Warning: {alarm}.")));
+    let table = node("div").class("scroll metrics").child(table);
     below.into_iter().chain([table, node("p").class("small").text(about)]).chain(alarm).collect()
 }

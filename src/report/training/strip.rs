@@ -26,10 +26,10 @@ const CELL: [usize; 2] = [136, 150];
 const MARGIN: usize = 84;
 /// Height of the name above a pair, px.
 const NAME_PX: usize = 24;
-const LANE_PX: usize = 64;
-const PAIR_PX: usize = NAME_PX + 2 * CELL[1] + 2 * LANE_PX + 14;
-/// Minimum range of heights that a lane shows, metres.
-const LANE_METRES: f32 = 0.15;
+const TRACK_PX: usize = 64;
+const PAIR_PX: usize = NAME_PX + 2 * CELL[1] + 2 * TRACK_PX + 14;
+/// Minimum range of heights that a track shows, metres.
+const TRACK_METRES: f32 = 0.15;
 
 /// Width of the picture, px.
 const WIDTH: usize = MARGIN + N_MOMENTS * CELL[0];
@@ -52,7 +52,7 @@ fn draw_pair(image: &mut Image, top: usize, pair: &HeldOutPair) -> Result<()> {
     let frame_of = |moment: usize| first + (2 * moment + 1) * span / (2 * N_MOMENTS);
     let title = format!("{}, from {:.1} s", pair.name, pair.start_secs + fps.secs(first));
     draw::text(image, &title, [8.0, top as f32 + 17.0], 10.0, INK)?;
-    for (row, (name, motion)) in [("true", &pair.ground_truth), ("generated", &pair.predicted)].into_iter().enumerate()
+    for (row, (name, motion)) in [("truth", &pair.ground_truth), ("generated", &pair.predicted)].into_iter().enumerate()
     {
         let row_top = top + NAME_PX + row * CELL[1];
         draw::text(image, name, [8.0, row_top as f32 + 62.0], 9.0, INK)?;
@@ -63,18 +63,18 @@ fn draw_pair(image: &mut Image, top: usize, pair: &HeldOutPair) -> Result<()> {
             draw::paste(image, &cell, [MARGIN + moment * CELL[0], row_top]);
         }
     }
-    for (lane, (name, joint, rgb)) in
+    for (track, (name, joint, rgb)) in
         [("right wrist", R_WRIST, RIGHT), ("left wrist", L_WRIST, LEFT)].into_iter().enumerate()
     {
-        let lane_top = (top + NAME_PX + 2 * CELL[1] + lane * LANE_PX) as f32;
+        let track_top = (top + NAME_PX + 2 * CELL[1] + track * TRACK_PX) as f32;
         let [above, below] = range(pair, joint, first..(first + span).min(n_frames));
         let y = |metres: f32| {
-            lane_top + 6.0 + (LANE_PX as f32 - 12.0) * ((metres - above) / (below - above)).clamp(0.0, 1.0)
+            track_top + 6.0 + (TRACK_PX as f32 - 12.0) * ((metres - above) / (below - above)).clamp(0.0, 1.0)
         };
         let width = (N_MOMENTS * CELL[0]) as f32 - 8.0;
         let x = |frame: usize| MARGIN as f32 + width * (frame - first) as f32 / span as f32;
-        draw::text(image, name, [8.0, lane_top + 24.0], 8.0, rgb)?;
-        draw::text(image, &format!("{:.0} cm tall", 100.0 * (below - above)), [8.0, lane_top + 40.0], 7.0, INK)?;
+        draw::text(image, name, [8.0, track_top + 24.0], 8.0, rgb)?;
+        draw::text(image, &format!("range {:.0} cm", 100.0 * (below - above)), [8.0, track_top + 40.0], 7.0, INK)?;
         for edge in [above, below] {
             draw::line(image, [x(first), y(edge)], [x(first) + width, y(edge)], 1.0, mix(INK, PAPER, 0.85))?;
         }
@@ -88,7 +88,7 @@ fn draw_pair(image: &mut Image, top: usize, pair: &HeldOutPair) -> Result<()> {
     Ok(())
 }
 
-/// Highest and lowest position of a wrist in either motion, metres below the neck, extended to at least `LANE_METRES`.
+/// Highest and lowest position of a wrist in either motion, metres below the neck, extended to at least `TRACK_METRES`.
 fn range(pair: &HeldOutPair, joint: usize, frames: Range<usize>) -> [f32; 2] {
     let heights = [&pair.ground_truth, &pair.predicted].into_iter().flat_map(|motion| {
         frames.clone().map(|frame| motion.joints[[frame, joint, 1]]).filter(|height| height.is_finite())
@@ -96,9 +96,9 @@ fn range(pair: &HeldOutPair, joint: usize, frames: Range<usize>) -> [f32; 2] {
     let [above, below] =
         heights.fold([f32::INFINITY, f32::NEG_INFINITY], |[above, below], h| [above.min(h), below.max(h)]);
     if above > below {
-        return [0.0, LANE_METRES];
+        return [0.0, TRACK_METRES];
     }
-    let more = (LANE_METRES - (below - above)).max(0.0) / 2.0;
+    let more = (TRACK_METRES - (below - above)).max(0.0) / 2.0;
     [above - more, below + more]
 }
 

@@ -15,17 +15,22 @@ pub type Pictures = BTreeMap<(usize, Vec<usize>), MomentThumbnail>;
 /// Section with a row of pictures for each rule.
 pub fn gallery(worst: &Worst, pictures: &Pictures, videos: &[VideoSummary]) -> Vec<Node> {
     if worst.rules.is_empty() {
-        return vec![node("p").class("empty").text("Nothing was refused, or no pictures were asked for.")];
+        return vec![
+            node("p").class("empty").text("No rejected intervals, or pictures were disabled with `--pictures 0`."),
+        ];
     }
-    let about = "Of each rule the refused intervals that break it most, each at its worst frame, with the keypoints that were \
-                 found. Two pictures side by side are a frame and the next.";
+    let about = "For each rule, the rejected intervals that violate it most, each at its worst frame with the detected \
+                 keypoints. Two pictures side by side are consecutive frames.";
     let mut shown = vec![node("p").text(about)];
     for ((_, reason, unit), moments) in &worst.rules {
         let swatch = node("span").class(format!("swatch {}", reasons::class(reason)));
         let measured = if unit.is_empty() { String::new() } else { format!(", measured in {unit}") };
         let about = format!("{}{measured}", counted(moments.len(), "interval"));
-        let title =
-            node("h3").class("rule").child(swatch).child(node("span").text(reason)).child(node("small").text(about));
+        let title = node("h3")
+            .class("rule")
+            .child(swatch)
+            .child(node("span").text(reasons::label(reason)))
+            .child(node("small").text(about));
         let cards = moments.iter().filter_map(|moment| Some(card(moment, videos.get(moment.video)?, pictures)));
         shown.push(node("div").class("gallery").child(title).child(node("div").class("shots").children(cards)));
     }
@@ -36,7 +41,7 @@ fn card(moment: &Moment, video: &VideoSummary, pictures: &Pictures) -> Node {
     let at = format!("{} at {}", video.file, clock(moment.secs));
     let shown = match pictures.get(&(moment.video, moment.frames.clone())) {
         Some(found) => jpeg(&found.jpeg, found.size, &format!("{at}: {}", moment.description)),
-        None => node("p").class("empty nopicture").text("The picture cannot be read."),
+        None => node("p").class("empty nopicture").text("Picture not available."),
     };
     let link = node("a").attr("href", format!("#{}", video.anchor())).text(at);
     let description = if moment.frame_value.is_empty() {

@@ -1,11 +1,11 @@
 //! Collection of all data of the report in a single pass over the videos. Only the summary of a video with its ledger
 //! stays in memory.
 
+use super::distributions::MeasureCounts;
 use super::movement::MovementCounts;
-use super::spread::MeasureCounts;
 use super::thresholds::THRESHOLDS;
 use super::video::VideoSummary;
-use super::what_if::{JudgedVideo, KeptByThreshold, open_frames};
+use super::what_if::{AcceptedByThreshold, JudgedVideo, open_frames};
 use super::worst::Worst;
 use crate::preview::{MAX_PREVIEWS, MotionPreview};
 use anyhow::{Context, Result, ensure};
@@ -25,8 +25,8 @@ use std::path::Path;
 pub struct ReportData {
     pub videos: Vec<VideoSummary>,
     /// Results of `what_if` by video; `None`: the video has no measures.
-    pub kept: Vec<Option<KeptByThreshold>>,
-    pub spread: MeasureCounts,
+    pub kept: Vec<Option<AcceptedByThreshold>>,
+    pub measures: MeasureCounts,
     pub movement: MovementCounts,
     pub worst: Worst,
     /// Animated previews of the first videos with accepted motion.
@@ -43,7 +43,7 @@ pub fn gather(settings: &Settings, videos: &[Videos], n_pictures: usize, progres
     let mut all = ReportData {
         videos: Vec::new(),
         kept: Vec::new(),
-        spread: MeasureCounts::new(),
+        measures: MeasureCounts::new(),
         movement: MovementCounts::new(),
         worst: Worst::new(n_pictures),
         previews: Vec::new(),
@@ -69,26 +69,26 @@ pub fn gather(settings: &Settings, videos: &[Videos], n_pictures: usize, progres
 
 impl ReportData {
     /// Adds the measures of a video; unreadable data becomes a note. Returns the results of `what_if`.
-    fn add(&mut self, settings: &Settings, video: &mut VideoSummary) -> Option<KeptByThreshold> {
+    fn add(&mut self, settings: &Settings, video: &mut VideoSummary) -> Option<AcceptedByThreshold> {
         let rules = &settings.segment;
         let (work, unit) = (&settings.work.dir, video.unit.clone());
-        self.spread.add_kept(&video.ledger);
+        self.measures.add_intervals(&video.ledger);
         let (measures, judged) = match read_measures(work, &unit) {
             Ok(found) => found,
             Err(error) => {
-                video.note(&format!("It is in no histogram and under no slider: {error:#}"));
+                video.note(&format!("Not included in the histograms and sliders: {error:#}"));
                 return None;
             }
         };
         self.n_speech_model.0 += usize::from(measures.speech.iter().any(|share| !share.is_nan()));
         self.n_speech_model.1 += 1;
-        self.spread.add_frames(&measures);
+        self.measures.add_frames(&measures);
         let bones = if video.is_lifted { bone_change(work, &unit) } else { Ok(Vec::new()) };
         let bone_change = bones.unwrap_or_else(|error| {
             video.note(&format!("{error:#}"));
             Vec::new()
         });
-        self.spread.add_bones(&bone_change);
+        self.measures.add_bones(&bone_change);
         self.worst.add(self.videos.len(), &video.ledger, (&measures, &bone_change), &judged, rules);
         if video.is_lifted {
             match motion(work, &unit) {
@@ -99,7 +99,7 @@ impl ReportData {
                         self.previews.extend(preview);
                     }
                 }
-                Err(error) => video.note(&format!("Its motion is not shown: {error:#}")),
+                Err(error) => video.note(&format!("The motion is not shown: {error:#}")),
             }
         }
         let open = open_frames(&video.ledger, &judged);
@@ -114,7 +114,8 @@ impl ReportData {
         let now = judged.kept_secs(rules);
         if (now - video.ledger.kept_secs()).abs() > 1e-6 {
             video.note(
-                "The thresholds have changed since it was judged; the sliders begin with the new ones: orator run.",
+                "The thresholds have changed since this video was processed; the sliders start at the new values. Run \
+                 `orator run` to update it.",
             );
         }
         let kept = judged.table(rules);
@@ -128,7 +129,7 @@ fn read_measures(work: &Path, unit: &Unit) -> Result<(Measures, MediaInfo)> {
     let measures = Measures::read(&Artifact::Measures.path(work, unit))?;
     ensure!(
         measures.n_frames() == judged.n_frames,
-        "{} frames were measured of {}: run the stage segment again",
+        "the measures have {} frames, the video has {}: run the segment stage again",
         measures.n_frames(),
         judged.n_frames
     );
@@ -143,6 +144,7 @@ fn bone_change(work: &Path, unit: &Unit) -> Result<Vec<f32>> {
 fn motion(work: &Path, unit: &Unit) -> Result<(orator_base::types::pose3d::Motion, Intervals)> {
     let path = Artifact::LiftIntervals.path(work, unit);
     let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
-    let intervals = serde_json::from_slice(&bytes).with_context(|| format!("{} holds no intervals", path.display()))?;
+    let intervals =
+        serde_json::from_slice(&bytes).with_context(|| format!("{} is not a list of intervals", path.display()))?;
     Ok((joints_npz::read(&Artifact::Joints.path(work, unit))?, intervals))
 }

@@ -1,7 +1,8 @@
-//! Report on the videos of speakers. Data (`gather`, one pass over the videos): `video`, `what_if`, `spread`,
-//! `movement`, `worst`, `pictures`. Sections: `summary`, `timelines`, `gallery`, `spread`, `sliders`, `motion`; `page`
-//! combines them.
+//! Report on the videos of speakers. Data (`gather`, one pass over the videos): `video`, `what_if`,
+//! `distributions`, `movement`, `worst`, `pictures`. Sections: `summary`, `timelines`, `gallery`, `distributions`,
+//! `sliders`, `motion`; `page` combines them.
 
+pub mod distributions;
 pub mod gallery;
 pub mod gather;
 pub mod motion;
@@ -10,7 +11,6 @@ pub mod page;
 pub mod pictures;
 pub mod reasons;
 pub mod sliders;
-pub mod spread;
 pub mod summary;
 pub mod thresholds;
 pub mod timelines;

@@ -9,24 +9,24 @@ use orator_base::text::number;
 
 /// Axes with the labels of their ends.
 const AXES: [(&str, [&str; 2]); 3] = [
-    ("across", ["speaker's right", "speaker's left"]),
-    ("height", ["up", "down"]),
-    ("depth", ["to the camera", "away"]),
+    ("horizontal", ["speaker's right", "speaker's left"]),
+    ("vertical", ["up", "down"]),
+    ("depth", ["towards the camera", "away"]),
 ];
 const SIDES: [&str; 2] = ["left", "right"];
 
 /// Section with charts of position ranges and speeds.
 pub fn motion(movement: &MovementCounts) -> Vec<Node> {
     if movement.n_frames == 0 {
-        return vec![node("p").class("empty").text("No frame is kept and lifted, so there is no motion to show.")];
+        return vec![node("p").class("empty").text("No accepted and lifted frames: no motion to show.")];
     }
     let about = format!(
-        "Of the {} that are kept: arms from the neck, finger tips from their wrist, in metres. A thin line goes from the lowest to the \
-         highest place, the box holds nine tenths of them, the notch is the median.",
+        "{} in accepted intervals: arm joints relative to the neck, fingertips relative to the wrist, in metres. Line: \
+         minimum to maximum; box: 5 % to 95 % of the positions; notch: median.",
         counted(movement.n_frames, "frame")
     );
     let legend = legend(SIDES.map(|side| (format!("side {side}"), format!("speaker's {side}"))));
-    let charts = [("Arms", true), ("Finger tips", false)].into_iter().flat_map(|(name, is_arm)| {
+    let charts = [("Arms", true), ("Fingertips", false)].into_iter().flat_map(|(name, is_arm)| {
         AXES.iter()
             .enumerate()
             .map(move |(axis, (along, ends))| range_card(movement, name, is_arm, (axis, along, *ends)))

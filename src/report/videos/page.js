@@ -26,10 +26,10 @@
     return cells;
   });
 
-  const place = (slider, i) => {
+  const position = (slider, i) => {
     const threshold = thresholds[slider.dataset.threshold], card = slider.closest(".knob");
     const curve = card.querySelector("svg"), dot = curve.querySelector(".dot");
-    slider.setAttribute("aria-valuetext", `${unit(threshold, i)}, ${length(threshold.secs[i])} kept`);
+    slider.setAttribute("aria-valuetext", `${unit(threshold, i)}, ${length(threshold.secs[i])} accepted`);
     card.querySelector(".value").textContent = unit(threshold, i);
     card.querySelector(".secs").textContent = length(threshold.secs[i]);
     card.classList.toggle("moved", i !== threshold.now);
@@ -43,23 +43,23 @@
       const now = thresholds[other.dataset.threshold].now;
       if (other !== slider && Number(other.value) !== now) {
         other.value = now;
-        place(other, now);
+        position(other, now);
       }
     }
-    place(slider, i);
-    const secs = threshold.secs[i], [sign, words] = change(secs - threshold.secs[threshold.now], 0.002);
+    position(slider, i);
+    const secs = threshold.secs[i], [sign, text] = change(secs - threshold.secs[threshold.now], 0.002);
     at("now").textContent = length(secs);
     at("now").dataset.secs = secs.toFixed(3);
-    at("change").textContent = i === threshold.now ? "as configured" : sign ? `${words} against now` : words;
+    at("change").textContent = i === threshold.now ? "as configured" : sign ? `${text} vs. configured` : text;
     at("change").className = sign;
     at("toml").textContent = i === threshold.now
       ? "# as configured"
       : `[segment]\n${threshold.key} = ${threshold.values[i]}`;
     videos.forEach((video, v) => {
       const tenths = video.tenths[which], [cell, difference] = rows[v];
-      const [sign, words] = change((tenths[i] - tenths[threshold.now]) / 10, 0.1);
+      const [sign, text] = change((tenths[i] - tenths[threshold.now]) / 10, 0.1);
       cell.textContent = length(tenths[i] / 10);
-      difference.textContent = i === threshold.now ? "" : words;
+      difference.textContent = i === threshold.now ? "" : text;
       difference.className = `num ${sign}`;
     });
   };
@@ -68,9 +68,9 @@
   pick(sliders[0]);
 
   at("copy").addEventListener("click", () => {
-    const words = at("toml"), button = at("copy");
+    const code = at("toml"), button = at("copy");
     const chosen = getSelection();
-    chosen.selectAllChildren(words);
+    chosen.selectAllChildren(code);
     const done = document.execCommand("copy");
     button.textContent = done ? "Copied" : "Selected";
     setTimeout(() => { button.textContent = "Copy"; }, 1500);
@@ -82,24 +82,24 @@
   const { previews } = JSON.parse(document.getElementById("data").textContent);
   const JOINTS = 49, MISSING = -32768;
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-  const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+  const isStatic = matchMedia("(prefers-reduced-motion: reduce)").matches;
   const inView = new Set();
   const figures = [...document.querySelectorAll("canvas[data-preview]")].map((canvas) => {
     const { fps, joints } = previews.motions[Number(canvas.dataset.preview)];
     const bytes = Uint8Array.from(atob(joints), (letter) => letter.charCodeAt(0));
     const numbers = new Int16Array(bytes.buffer);
-    let [reach, top, bottom] = [300, -250, 350];
+    let [halfWidth, top, bottom] = [300, -250, 350];
     for (let i = 0; i < numbers.length; i += 2) {
       if (numbers[i] === MISSING) continue;
-      reach = Math.max(reach, Math.abs(numbers[i]));
+      halfWidth = Math.max(halfWidth, Math.abs(numbers[i]));
       top = Math.min(top, numbers[i + 1]); bottom = Math.max(bottom, numbers[i + 1]);
     }
-    return { canvas, fps, numbers, n: numbers.length / (2 * JOINTS), reach, top, bottom };
+    return { canvas, fps, numbers, n: numbers.length / (2 * JOINTS), halfWidth, top, bottom };
   });
-  const draw = ({ canvas, fps, numbers, n, reach, top, bottom }, secs) => {
+  const draw = ({ canvas, fps, numbers, n, halfWidth, top, bottom }, secs) => {
     const pen = canvas.getContext("2d"), frame = Math.floor(secs * fps) % n;
-    const scale = 0.92 * Math.min(canvas.width / (2 * reach), canvas.height / (bottom - top));
-    const place = (joint) => {
+    const scale = 0.92 * Math.min(canvas.width / (2 * halfWidth), canvas.height / (bottom - top));
+    const position = (joint) => {
       const i = 2 * (frame * JOINTS + joint);
       return numbers[i] === MISSING ? null
         : [canvas.width / 2 + scale * numbers[i], (canvas.height - scale * (bottom + top)) / 2 + scale * numbers[i + 1]];
@@ -108,7 +108,7 @@
     pen.lineCap = "round";
     const colours = [colour("--ink"), colour("--left"), colour("--right")];
     for (const [joint, parent, side] of previews.bones) {
-      const [from, to] = [place(parent), place(joint)];
+      const [from, to] = [position(parent), position(joint)];
       if (!from || !to) continue;
       pen.strokeStyle = colours[side];
       pen.lineWidth = joint < 7 ? 4 : 1.6;
@@ -117,7 +117,7 @@
     canvas.dataset.frame = frame;
   };
   for (const figure of figures) draw(figure, 0);
-  if (still || !figures.length) return;
+  if (isStatic || !figures.length) return;
   const watch = new IntersectionObserver((entries) => {
     for (const { target, isIntersecting } of entries) inView[isIntersecting ? "add" : "delete"](target);
   });

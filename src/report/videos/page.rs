@@ -1,8 +1,8 @@
 //! Report page on the videos of speakers.
 
+use super::distributions::distributions;
 use super::gallery::{Pictures, gallery};
 use super::gather::{ReportData, gather};
-use super::spread::distributions;
 use super::summary;
 use super::summary::ReportTotals;
 use super::{motion, pictures, sliders, timelines};
@@ -39,11 +39,11 @@ pub fn make(request: &ReportRequest, progress: &dyn Progress) -> ReportPage {
     let sums = ReportTotals::sum(&gathered.videos);
     let facts = json!({
         "n_videos": gathered.videos.len(),
-        "n_stretches": gathered.videos.iter().map(|v| v.ledger.kept.len() + v.ledger.refused.len() + v.ledger.failed.len()).sum::<usize>(),
+        "n_intervals": gathered.videos.iter().map(|v| v.ledger.kept.len() + v.ledger.refused.len() + v.ledger.failed.len()).sum::<usize>(),
         "n_pictures": pictures.len(),
-        "duration_secs": sums.whole,
-        "kept_secs": sums.kept,
-        "refused_secs": sums.refused,
+        "duration_secs": sums.total,
+        "accepted_secs": sums.kept,
+        "rejected_secs": sums.refused,
         "failed_secs": sums.failed,
         "waiting_secs": sums.waiting,
         "missing": gathered.missing,
@@ -61,7 +61,7 @@ fn draw(settings: &Settings, gathered: &mut ReportData, progress: &dyn Progress)
         task.detail(&video.unit.video);
         match pictures::thumbnails(&settings.work.dir, &video.unit, number, &gathered.worst) {
             Ok(pictures) => found.extend(pictures.into_iter().map(|(frames, picture)| ((number, frames), picture))),
-            Err(error) => video.note(&format!("No pictures of it: {error:#}")),
+            Err(error) => video.note(&format!("No pictures available: {error:#}")),
         }
         task.advance(1);
     }
@@ -71,7 +71,7 @@ fn draw(settings: &Settings, gathered: &mut ReportData, progress: &dyn Progress)
 fn page(request: &ReportRequest, gathered: &ReportData, pictures: &Pictures, sums: &ReportTotals) -> Page {
     let rules = &request.settings.segment;
     let per_sec = request.settings.extract.rate().per_sec();
-    let ReportData { videos, kept, spread, movement, worst, previews, missing, n_speech_model } = gathered;
+    let ReportData { videos, kept, measures, movement, worst, previews, missing, n_speech_model } = gathered;
     let splits = summary::video_splits(request.settings, request.videos);
     let mut data = sliders::data(kept, videos, rules);
     data["previews"] = preview::data(previews);
@@ -81,31 +81,32 @@ fn page(request: &ReportRequest, gathered: &ReportData, pictures: &Pictures, sum
     if n_speech_model.1 > 0 {
         reasons.push(summary::speech(*n_speech_model));
     }
-    let people = faces::section(request.settings, request.videos);
-    let people = (!people.is_empty()).then(|| section("people", "People", people));
+    let persons = faces::section(request.settings, request.videos);
+    let persons = (!persons.is_empty()).then(|| section("persons", "Persons", persons));
     let mut page = Page {
         title: format!("Report on {}", names.join(", ")),
         lead: format!(
-            "What became of every second of {}: kept for the dataset, refused for a reason, or lost to a failure.",
+            "Use of each second of {}: accepted for the dataset, rejected with a reason, or missing because a stage \
+             failed.",
             counted(videos.len(), "video")
         ),
         sections: vec![
             section("totals", "Totals", summary::totals(sums, videos, missing)),
-            section("reasons", "By reason", reasons),
+            section("reasons", "Seconds by reason", reasons),
             section("videos", "Videos", summary::table(videos, &splits)),
-            section("previews", "Kept motion", preview::section(previews)),
+            section("previews", "Accepted motion", preview::section(previews)),
             section("timelines", "Timelines", timelines::lines(videos)),
             section("thresholds", "Thresholds", sliders::sliders(kept, rules)),
             section("frames", "Worst frames", gallery(worst, pictures, videos)),
-            section("distributions", "Distributions", distributions(spread, request.settings, per_sec)),
+            section("distributions", "Distributions", distributions(measures, request.settings, per_sec)),
             section("motion", "Motion", motion::motion(movement)),
         ],
         style: include_str!("page.css"),
         script: include_str!("page.js"),
         data,
     };
-    if let Some(people) = people {
-        page.sections.insert(3, people);
+    if let Some(persons) = persons {
+        page.sections.insert(3, persons);
     }
     page
 }

@@ -54,10 +54,17 @@ pub fn thumbnails(
     let n_wide = |frame: &usize| if moments.iter().any(|m| m.len() > 1 && m.contains(frame)) { 2 } else { 1 };
     let mut thumbnails_by_frame = BTreeMap::new();
     for frame_idx in &frames {
-        ensure!(*frame_idx < keypoints.n_frames(), "the keypoints end before frame {frame_idx}");
+        ensure!(
+            *frame_idx < keypoints.n_frames(),
+            "the keypoints have {} frames, frame {frame_idx} is missing",
+            keypoints.n_frames()
+        );
         while let Some(reader) = &mut reader {
             let time = reader.advance()?.with_context(|| {
-                format!("{} ends before frame {frame_idx}: it is not the video that was judged", unit.source.display())
+                format!(
+                    "{} ends before frame {frame_idx}: the file has changed since it was processed",
+                    unit.source.display()
+                )
             })?;
             if time.frame_idx == *frame_idx {
                 break;

@@ -1,10 +1,40 @@
-//! Order, heading and CSS class of the refusal reasons on the page. Each colour stands for a kind of reason; the second
-//! reason of a kind is striped (`page.css`).
+//! Labels, descriptions, order and CSS classes of the rejection reasons in ledgers, for all pages. Each colour stands
+//! for a kind of reason; the second reason of a kind is striped (`page.css`).
 
+use orator_base::stage::ledger::Refused;
 use orator_base::stage::refusal::Refusal;
+use orator_base::text::with_unit;
 
 /// Label of a video that no stage has finished.
-pub const WAITING: &str = "not done";
+pub const WAITING: &str = "not processed";
+
+/// Label and measured quantity of a reason.
+const fn texts(refusal: Refusal) -> [&'static str; 2] {
+    match refusal {
+        Refusal::NoSound => ["no audio", "share of frames with audio"],
+        Refusal::Quiet => ["too quiet", "loudness"],
+        Refusal::NoSpeech => ["no speech", "share of speech"],
+        Refusal::OffScreenSpeaker => ["off-screen speaker", "correlation of mouth and voice"],
+        Refusal::Static => ["static picture", "duration"],
+        Refusal::NoPerson => ["no person", "highest score of face and arms"],
+        Refusal::Small => ["person too small", "distance between the shoulders"],
+        Refusal::Face => ["face not visible", "score of nose and eyes"],
+        Refusal::Turned => ["turned away", "shoulder width"],
+        Refusal::NoseOff => ["turned away", "horizontal distance from nose to neck"],
+        Refusal::Arms => ["arms not visible", "lowest score of shoulders and elbows"],
+        Refusal::OtherHand => ["duplicate hand", "gap"],
+        Refusal::HandGap => ["hand not visible", "gap"],
+        Refusal::HandShare => ["hand not visible", "share of frames in which the hand is visible"],
+        Refusal::Jump => ["jump", "neck movement per frame"],
+        Refusal::Cut => ["close to a cut", "remaining length"],
+        Refusal::Identity => ["change of person", "remaining length"],
+        Refusal::TooShort => ["too short", "length"],
+        Refusal::Crowd => ["too many persons", "share of frames with too many persons"],
+        Refusal::Bones => ["bone length", "deviation"],
+        Refusal::MissingJoints => ["missing joints", "count"],
+        other => [other.reason(), "measured"],
+    }
+}
 
 fn find(reason: &str) -> Option<usize> {
     Refusal::JUDGED.iter().position(|known| known.reason() == reason)
@@ -15,9 +45,23 @@ pub fn order(reason: &str) -> usize {
     find(reason).unwrap_or(Refusal::JUDGED.len())
 }
 
+/// Label of a reason; unknown reasons are their own labels.
+pub fn label(reason: &str) -> &str {
+    find(reason).map_or(reason, |at| texts(Refusal::JUDGED[at])[0])
+}
+
 /// Heading of a reason; empty for unknown reasons.
 pub fn heading(reason: &str) -> &'static str {
     find(reason).map_or("", |at| Refusal::JUDGED[at].heading())
+}
+
+/// Heading of the reason, the measured value and the threshold; the ledger's message for unknown reasons.
+pub fn description(refused: &Refused) -> String {
+    let [measured, threshold] = [refused.measured, refused.threshold].map(|value| with_unit(value, &refused.unit));
+    match Refusal::find(&refused.reason, &refused.unit) {
+        Some(refusal) => format!("{}: {} {measured}, threshold {threshold}", refusal.heading(), texts(refusal)[1]),
+        None => format!("{}: measured {measured}, threshold {threshold}", refused.message),
+    }
 }
 
 /// CSS class of a reason.
@@ -28,14 +72,21 @@ pub fn class(reason: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use orator_base::stage::refusal::FrameRefusal;
 
     #[test]
-    fn every_reason_has_a_heading_and_a_colour() {
+    fn every_reason_has_a_label_a_heading_and_a_colour() {
         let style = include_str!("page.css");
-        for reason in Refusal::JUDGED.map(Refusal::reason) {
+        for refusal in Refusal::JUDGED {
+            let reason = refusal.reason();
+            assert!(texts(refusal)[1] != "measured" && label(reason) == texts(refusal)[0], "{reason}");
             assert!(!heading(reason).is_empty(), "{reason}");
             assert!(style.contains(&format!(".{} ", class(reason))), "{reason} has no colour");
         }
-        assert_eq!((class("<b>").as_str(), order("new")), ("r-unknown", Refusal::JUDGED.len()));
+        assert_eq!((class("<b>").as_str(), order("new"), label("new")), ("r-unknown", Refusal::JUDGED.len(), "new"));
+        let quiet = Refused::new(0.0, 1.0, FrameRefusal::new(Refusal::Quiet, -62.0, -50.0));
+        assert!(description(&quiet).ends_with(": loudness -62 dB, threshold -50 dB"));
+        let other = Refused { reason: "new".to_owned(), message: "new rule".to_owned(), ..quiet };
+        assert_eq!(description(&other), "new rule: measured -62 dB, threshold -50 dB");
     }
 }

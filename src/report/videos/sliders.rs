@@ -3,7 +3,7 @@
 
 use super::thresholds::{THRESHOLDS, ThresholdGrid};
 use super::video::VideoSummary;
-use super::what_if::KeptByThreshold;
+use super::what_if::AcceptedByThreshold;
 use crate::html::chart::curve::curve;
 use crate::html::{Node, node};
 use orator_base::text::{length, with_unit};
@@ -11,9 +11,9 @@ use orator_dataset::config::SegmentConfig;
 use serde_json::{Value, json};
 
 /// Accepted seconds of all videos, by threshold and value.
-fn sums(kept: &[Option<KeptByThreshold>], rules: &SegmentConfig) -> KeptByThreshold {
+fn sums(kept: &[Option<AcceptedByThreshold>], rules: &SegmentConfig) -> AcceptedByThreshold {
     let zeros =
-        || THRESHOLDS.iter().map(|threshold| vec![0.0; threshold.grid(rules).0.len()]).collect::<KeptByThreshold>();
+        || THRESHOLDS.iter().map(|threshold| vec![0.0; threshold.grid(rules).0.len()]).collect::<AcceptedByThreshold>();
     kept.iter().flatten().fold(zeros(), |mut sums, of| {
         for (sums, of) in sums.iter_mut().zip(of) {
             sums.iter_mut().zip(of).for_each(|(sum, secs)| *sum += secs);
@@ -24,7 +24,7 @@ fn sums(kept: &[Option<KeptByThreshold>], rules: &SegmentConfig) -> KeptByThresh
 
 /// Data for the script: thresholds with their values and total seconds, and videos with their accepted tenths of a
 /// second by threshold and value.
-pub fn data(kept: &[Option<KeptByThreshold>], videos: &[VideoSummary], rules: &SegmentConfig) -> Value {
+pub fn data(kept: &[Option<AcceptedByThreshold>], videos: &[VideoSummary], rules: &SegmentConfig) -> Value {
     let milli = |secs: f64| (secs * 1000.0).round() / 1000.0;
     let row = |(threshold, sums): (&ThresholdGrid, &Vec<f64>)| {
         let (grid, now) = threshold.grid(rules);
@@ -46,13 +46,14 @@ pub fn data(kept: &[Option<KeptByThreshold>], videos: &[VideoSummary], rules: &S
 }
 
 /// Section with the sliders.
-pub fn sliders(kept: &[Option<KeptByThreshold>], rules: &SegmentConfig) -> Vec<Node> {
+pub fn sliders(kept: &[Option<AcceptedByThreshold>], rules: &SegmentConfig) -> Vec<Node> {
     if kept.iter().all(Option::is_none) {
-        return vec![node("p").class("empty").text("No video has been judged yet: orator run.")];
+        return vec![node("p").class("empty").text("No video has been processed yet: run `orator run`.")];
     }
-    let about = "Each slider changes one threshold and leaves the others as they are configured. The seconds are exact: for \
-                 every step the rules were applied again to what was measured of all videos. What lifting refused (bones, open) \
-                 stays refused, and frames that were never lifted count as good ones; max_bone_change has no slider.";
+    let about = "Each slider changes one threshold and leaves the others at their configured values. The durations are \
+                 exact: at each step the rules were applied again to the stored measurements of all videos. Frames \
+                 that lifting rejected (bone length, missing joints) stay rejected, and frames that were never lifted \
+                 count as accepted. max_bone_change has no slider.";
     let sums = sums(kept, rules);
     let max = sums.iter().flatten().copied().fold(0.0, f64::max);
     let cards =
@@ -65,7 +66,7 @@ pub fn sliders(kept: &[Option<KeptByThreshold>], rules: &SegmentConfig) -> Vec<N
         .child(
             node("p")
                 .child(node("b").id("now").attr("data-secs", format!("{now:.3}")).text(length(now)))
-                .text(" kept, ")
+                .text(" accepted, ")
                 .child(node("span").id("change").text("as configured")),
         )
         .child(
@@ -97,7 +98,7 @@ fn card(i: usize, threshold: &ThresholdGrid, sums: &[f64], max: f64, rules: &Seg
         .attr("value", now)
         .attr("autocomplete", "off")
         .attr("aria-valuetext", &configured);
-    let description = format!("{}: seconds kept by value of the threshold", threshold.key);
+    let description = format!("{}: accepted seconds by threshold value", threshold.key);
     let values = node("p")
         .class("values")
         .child(node("output").class("value").attr("for", &id).text(&configured))

@@ -19,7 +19,7 @@ use std::collections::BTreeMap;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReportTotals {
     /// All footage.
-    pub whole: f64,
+    pub total: f64,
     pub kept: f64,
     pub failed: f64,
     /// Not processed yet.
@@ -27,16 +27,16 @@ pub struct ReportTotals {
     /// By reason.
     pub refused: BTreeMap<String, f64>,
     /// Number of accepted intervals.
-    pub n_kept: usize,
+    pub n_accepted: usize,
 }
 
 impl ReportTotals {
     pub fn sum(videos: &[VideoSummary]) -> Self {
         let mut sums = Self::default();
         for ledger in videos.iter().map(|video| &video.ledger) {
-            sums.whole += ledger.duration_secs;
+            sums.total += ledger.duration_secs;
             sums.kept += ledger.kept_secs();
-            sums.n_kept += ledger.kept.len();
+            sums.n_accepted += ledger.kept.len();
             for failed in &ledger.failed {
                 let sum = if failed.stage == WAITING { &mut sums.waiting } else { &mut sums.failed };
                 *sum += failed.end_secs - failed.start_secs;
@@ -48,7 +48,7 @@ impl ReportTotals {
         sums
     }
 
-    pub fn refused_secs(&self) -> f64 {
+    pub fn rejected_secs(&self) -> f64 {
         self.refused.values().sum()
     }
 }
@@ -59,16 +59,21 @@ pub fn totals(sums: &ReportTotals, videos: &[VideoSummary], missing: &[String]) 
         let value = node("b").id(id).attr("data-secs", format!("{secs:.3}")).text(length(secs));
         node("div").class("tile").text(name).child(value).child(node("small").text(description))
     };
-    let share = |secs: f64| percent(secs, sums.whole);
+    let share = |secs: f64| percent(secs, sums.total);
     let n_failed = videos.iter().filter(|video| video.has_failed).count();
     let mut tiles = vec![
-        tile("Kept", "kept-secs", sums.kept, format!("{} in {}", share(sums.kept), counted(sums.n_kept, "interval"))),
-        tile("Refused", "refused-secs", sums.refused_secs(), share(sums.refused_secs())),
+        tile(
+            "Accepted",
+            "accepted-secs",
+            sums.kept,
+            format!("{} in {}", share(sums.kept), counted(sums.n_accepted, "interval")),
+        ),
+        tile("Rejected", "rejected-secs", sums.rejected_secs(), share(sums.rejected_secs())),
         tile("Failed", "failed-secs", sums.failed, counted(n_failed, "video")),
-        tile("All", "all-secs", sums.whole, counted(videos.len(), "video")),
+        tile("Total", "total-secs", sums.total, counted(videos.len(), "video")),
     ];
     if sums.waiting > 0.0 {
-        tiles.insert(3, tile("Not done yet", "waiting-secs", sums.waiting, share(sums.waiting)));
+        tiles.insert(3, tile("Not processed", "waiting-secs", sums.waiting, share(sums.waiting)));
     }
     let speakers = by_speaker(videos);
     let notes = missing.iter().map(|text| node("p").class("note").text(text));
@@ -78,10 +83,12 @@ pub fn totals(sums: &ReportTotals, videos: &[VideoSummary], missing: &[String]) 
 /// Note on how speech was detected.
 pub fn speech((n_speech_model, n_videos): (usize, usize)) -> Node {
     let text = match n_speech_model {
-        0 => "Speech was told by loudness alone; min_speech changes nothing.".to_owned(),
-        n if n == n_videos => "Speech was told by the speech model beside loudness.".to_owned(),
+        0 => "Speech was detected by loudness only; min_speech has no effect.".to_owned(),
+        n if n == n_videos => "Speech was detected by the speech model and by loudness.".to_owned(),
         n => {
-            format!("Speech was told by the speech model in {n} of {n_videos} videos, by loudness alone in the others.")
+            format!(
+                "Speech was detected by the speech model in {n} of {n_videos} videos, by loudness only in the others."
+            )
         }
     };
     node("p").class("note").text(text)
@@ -96,27 +103,29 @@ pub fn by_reason(sums: &ReportTotals) -> Vec<Node> {
         |(reason, secs): (&'_ String, &f64)| (reason.clone(), reasons::class(reason), *secs, reasons::heading(reason));
     let mut refused: Vec<_> = sums.refused.iter().map(of_reason).collect();
     refused.sort_by(|a, b| b.2.total_cmp(&a.2).then(a.0.cmp(&b.0)));
-    let mut parts: Vec<Part> = vec![("kept", "kept".to_owned(), sums.kept, "worth learning from")];
-    parts.extend(refused.iter().map(|(name, class, secs, heading)| (name.as_str(), class.clone(), *secs, *heading)));
+    let mut parts: Vec<Part> = vec![("accepted", "accepted".to_owned(), sums.kept, "usable for the dataset")];
+    parts.extend(
+        refused.iter().map(|(name, class, secs, heading)| (reasons::label(name), class.clone(), *secs, *heading)),
+    );
     if sums.failed > 0.0 {
         parts.push(("failed", "failed".to_owned(), sums.failed, "a stage failed"));
     }
     if sums.waiting > 0.0 {
-        parts.push((WAITING, "waiting".to_owned(), sums.waiting, "no verdict yet"));
+        parts.push((WAITING, "waiting".to_owned(), sums.waiting, "no stage has finished"));
     }
     let longest = parts.iter().map(|part| part.2).fold(0.0, f64::max).max(1e-9);
-    let caption = node("caption").class("unseen").text("Seconds kept, refused by reason, and failed");
-    let rows = parts.iter().map(|part| bar(part, longest, sums.whole));
+    let caption = node("caption").class("visually-hidden").text("Accepted, rejected (by reason) and failed seconds");
+    let rows = parts.iter().map(|part| bar(part, longest, sums.total));
     vec![node("table").class("bars").child(caption).child(node("tbody").children(rows))]
 }
 
-/// Table row of a part; the bar is relative to `longest`, the percentage to `whole`.
-fn bar((name, class, secs, description): &Part, longest: f64, whole: f64) -> Node {
+/// Table row of a part; the bar is relative to `longest`, the percentage to `total`.
+fn bar((name, class, secs, description): &Part, longest: f64, total: f64) -> Node {
     let style = format!("width:{:.2}%", 100.0 * secs / longest);
     let name = node("th").attr("scope", "row").text(name);
     let name = if description.is_empty() { name } else { name.child(node("small").text(description)) };
     let drawn = node("div").class(format!("bar {class}")).attr("style", style);
-    let cells = [length(*secs), percent(*secs, whole)].map(|text| node("td").class("num").text(text));
+    let cells = [length(*secs), percent(*secs, total)].map(|text| node("td").class("num").text(text));
     node("tr").child(name).child(node("td").class("barcell").child(drawn)).children(cells)
 }
 
@@ -131,10 +140,10 @@ fn by_speaker(videos: &[VideoSummary]) -> Option<Node> {
         node("tr")
             .child(node("th").attr("scope", "row").class("name").text(speaker))
             .child(node("td").class("num").text(counted(videos.len(), "video")))
-            .children([sums.whole, sums.kept].map(|secs| node("td").class("num").text(length(secs))))
-            .child(node("td").class("num").text(percent(sums.kept, sums.whole)))
+            .children([sums.total, sums.kept].map(|secs| node("td").class("num").text(length(secs))))
+            .child(node("td").class("num").text(percent(sums.kept, sums.total)))
     };
-    let heads = [("Speaker", ""), ("", "num"), ("Length", "num"), ("Kept", "num"), ("", "num")];
+    let heads = [("Speaker", ""), ("", "num"), ("Length", "num"), ("Accepted", "num"), ("", "num")];
     (of_speakers.len() > 1).then(|| html::table("speakers", heads.map(head), of_speakers.iter().map(row)))
 }
 
@@ -144,20 +153,29 @@ fn head((name, class): (&str, &str)) -> Node {
 
 /// Table of videos, linked to their timelines. `splits` names the splits of videos that are in a dataset.
 pub fn table(videos: &[VideoSummary], splits: &VideoSplits) -> Vec<Node> {
-    let heads =
-        [("Video", ""), ("Length", "num"), ("Kept", "num"), ("", "num"), ("Split", ""), ("Most refused for", "")];
+    let heads = [
+        ("Video", ""),
+        ("Length", "num"),
+        ("Accepted", "num"),
+        ("", "num"),
+        ("Split", ""),
+        ("Main reasons for rejection", ""),
+    ];
     let row = |video: &VideoSummary| {
         let link = node("a").attr("href", format!("#{}", video.anchor())).text(&video.file);
         let ledger = &video.ledger;
         let mut refused: Vec<(String, f64)> = ledger.refused_secs().into_iter().collect();
         refused.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         let longest = refused.iter().take(3);
-        let why = legend(longest.map(|(reason, secs)| (reasons::class(reason), format!("{reason} {}", length(*secs)))));
+        let why =
+            legend(longest.map(|(reason, secs)| {
+                (reasons::class(reason), format!("{} {}", reasons::label(reason), length(*secs)))
+            }));
         let state = match ledger.failed.first() {
-            Some(failed) if failed.stage == WAITING => node("span").text("not done yet"),
+            Some(failed) if failed.stage == WAITING => node("span").text("not processed"),
             Some(failed) => node("span").text(format!("failed at {}", failed.stage)),
             None if ledger.duration_secs == 0.0 => {
-                node("span").text(if video.has_failed { "failed" } else { "not done yet" })
+                node("span").text(if video.has_failed { "failed" } else { "not processed" })
             }
             None => why,
         };

@@ -24,7 +24,7 @@ macro_rules! as_number {
     ($value:expr, usize) => {
         $value as f64
     };
-    ($value:expr, $whole:ident) => {
+    ($value:expr, $integer:ident) => {
         f64::from($value)
     };
     ($value:expr) => {
@@ -34,46 +34,40 @@ macro_rules! as_number {
 
 /// Defines a [`ThresholdGrid`]: key, description, unit, ends of the grid, and the type of an integer field.
 macro_rules! row {
-    ($key:ident, $description:literal, $unit:literal, $low:literal, $high:literal $(, $whole:ident)?) => {
+    ($key:ident, $description:literal, $unit:literal, $low:literal, $high:literal $(, $integer:ident)?) => {
         ThresholdGrid {
             key: stringify!($key),
             description: $description,
             unit: $unit,
             low: $low,
             high: $high,
-            get: |rules| as_number!(rules.$key $(, $whole)?),
-            set: |rules, value| rules.$key = value $(as $whole)?,
+            get: |rules| as_number!(rules.$key $(, $integer)?),
+            set: |rules, value| rules.$key = value $(as $integer)?,
         }
     };
 }
 
 /// All thresholds with sliders.
 pub const THRESHOLDS: [ThresholdGrid; 19] = [
-    row!(min_sound_db, "least loudness of the second around a frame", "dB of full scale", -90.0, -10.0),
-    row!(min_speech, "least share of speech in the 4 s around a frame", "", 0.0, 1.0),
-    row!(min_lip_sync, "least correlation of the mouth with the voice in the 8 s around a frame", "", -0.5, 0.5),
-    row!(max_quiet_secs, "longest pause of speech that is kept", "s", 0.0, 10.0),
-    row!(min_change, "a picture that changes less stands still", "steps of 8-bit colour", 0.0, 1.0),
-    row!(max_static_secs, "longest time the picture may stand still", "s", 0.0, 1.0),
-    row!(joint_score, "from here on a face, arm or hand point is visible", "", 0.0, 1.0),
-    row!(min_shoulder_px, "least distance between the shoulders", "px", 10.0, 210.0),
-    row!(
-        min_facing,
-        "least width of the shoulders: 2 from the front, 0 from the side",
-        "neck-nose distances",
-        -1.0,
-        3.0
-    ),
-    row!(max_nose_off, "farthest the nose may be beside the neck", "half shoulder widths", 0.0, 4.0),
+    row!(min_sound_db, "minimum loudness of the second around a frame", "dBFS", -90.0, -10.0),
+    row!(min_speech, "minimum share of speech in the 4 s around a frame", "", 0.0, 1.0),
+    row!(min_lip_sync, "minimum correlation of mouth and voice in the 8 s around a frame", "", -0.5, 0.5),
+    row!(max_quiet_secs, "longest accepted pause in speech", "s", 0.0, 10.0),
+    row!(min_change, "minimum picture change; below it the picture is static", "8-bit levels", 0.0, 1.0),
+    row!(max_static_secs, "longest accepted static picture", "s", 0.0, 1.0),
+    row!(joint_score, "minimum score of a visible face, arm or hand keypoint", "", 0.0, 1.0),
+    row!(min_shoulder_px, "minimum distance between the shoulders", "px", 10.0, 210.0),
+    row!(min_facing, "minimum shoulder width: 2 from the front, 0 from the side", "neck-nose distances", -1.0, 3.0),
+    row!(max_nose_off, "maximum horizontal distance from nose to neck", "half shoulder widths", 0.0, 4.0),
     row!(max_body_gap_secs, "longest gap of face or arms that is filled", "s", 0.0, 1.0),
     row!(max_hand_gap_secs, "longest gap of a hand that is masked", "s", 0.0, 1.0),
-    row!(min_hand_share, "share of an interval in which each hand is seen", "", 0.0, 1.0),
-    row!(max_rest_move, "farthest the wrists of resting hands move within a second", "shoulder widths", 0.0, 0.4),
-    row!(max_jump, "farthest the neck may move between two frames", "shoulder widths", 0.1, 2.1),
-    row!(shot_threshold, "shot score from which a frame begins a new shot", "", 0.0, 1.0),
-    row!(max_people, "people in view that are not too many", "people", 1.0, 21.0, u32),
-    row!(max_crowd_share, "share of an interval that may show more people", "", 0.0, 1.0),
-    row!(min_frames, "shortest interval that is kept", "frames", 16.0, 176.0, usize),
+    row!(min_hand_share, "minimum share of an interval in which each hand is visible", "", 0.0, 1.0),
+    row!(max_rest_move, "maximum wrist movement of resting hands within a second", "shoulder widths", 0.0, 0.4),
+    row!(max_jump, "maximum neck movement between two frames", "shoulder widths", 0.1, 2.1),
+    row!(shot_threshold, "minimum shot score of the first frame of a shot", "", 0.0, 1.0),
+    row!(max_people, "maximum number of persons in view", "persons", 1.0, 21.0, u32),
+    row!(max_crowd_share, "maximum share of an interval with more persons", "", 0.0, 1.0),
+    row!(min_frames, "minimum length of an accepted interval", "frames", 16.0, 176.0, usize),
 ];
 
 impl ThresholdGrid {

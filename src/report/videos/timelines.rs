@@ -8,7 +8,7 @@ use crate::html::chart::timeline::{TimelineSpan, timeline};
 use crate::html::{Node, node};
 use orator_base::stage::ledger::Kept;
 use orator_base::text::counted;
-use orator_base::text::{clock, length, number, with_unit};
+use orator_base::text::{clock, length, number};
 use std::collections::BTreeSet;
 
 /// Maximum number of intervals of all timelines together, which bounds the size of the page.
@@ -25,12 +25,11 @@ pub fn lines(videos: &[VideoSummary]) -> Vec<Node> {
     let wide = node("label")
         .class("wide small")
         .child(node("input").attr("type", "checkbox").id("wide"))
-        .text(" every line at full width");
+        .text(" show all timelines at full width");
     let mut shown = vec![
         node("p").text(
-            "Lines are as long as their videos. Point at an interval, or walk a line with the arrow keys, to read what was \
-             measured. A good stretch is kept from the length of a window on (min_frames); one that is too short says its \
-             length and what is needed.",
+            "The timelines are as long as their videos. Hover over an interval, or use the arrow keys, to see what was \
+             measured. Intervals shorter than a window (min_frames) are rejected as too short.",
         ),
         legend(videos),
         wide,
@@ -38,11 +37,11 @@ pub fn lines(videos: &[VideoSummary]) -> Vec<Node> {
     shown.extend(videos.iter().map(|video| {
         let ledger = &video.ledger;
         let rest = match ledger.resting_secs() {
-            secs if secs >= 0.05 => format!(", hands at rest in {}", length(secs)),
+            secs if secs >= 0.05 => format!(", hands at rest for {}", length(secs)),
             _ => String::new(),
         };
         let about = format!(
-            "{} kept of {} in {}{rest}",
+            "{} of {} accepted in {}{rest}",
             length(ledger.kept_secs()),
             length(ledger.duration_secs),
             counted(ledger.kept.len(), "interval")
@@ -52,7 +51,7 @@ pub fn lines(videos: &[VideoSummary]) -> Vec<Node> {
         let line = if ledger.duration_secs > 0.0 {
             timeline(&format!("Timeline of {}", video.file), ledger.duration_secs, &spans(video), max_spans)
         } else {
-            node("p").class("empty").text("Nothing is known of its seconds.")
+            node("p").class("empty").text("No data for this video.")
         };
         let line = node("div").class("line").attr("style", format!("--share:{:.2}%", 100.0 * share)).child(line);
         let notes = video.notes.iter().map(|text| node("p").class("note small").text(text));
@@ -86,17 +85,14 @@ fn spans(video: &VideoSummary) -> Vec<TimelineSpan> {
     let kept = ledger
         .kept
         .iter()
-        .map(|kept| timeline_span(kept.start_secs, kept.end_secs, "kept".to_owned(), "kept", rests(kept)));
+        .map(|kept| timeline_span(kept.start_secs, kept.end_secs, "accepted".to_owned(), "accepted", rests(kept)));
     let refused = ledger.refused.iter().map(|refused| {
-        let (measured, threshold) = (refused.measured, with_unit(refused.threshold, &refused.unit));
-        let description =
-            format!("{}\nmeasured {}, threshold {threshold}", refused.message, with_unit(measured, &refused.unit));
         timeline_span(
             refused.start_secs,
             refused.end_secs,
             reasons::class(&refused.reason),
-            &refused.reason,
-            description,
+            reasons::label(&refused.reason),
+            reasons::description(refused),
         )
     });
     let failed = ledger.failed.iter().map(|failed| {
@@ -117,8 +113,8 @@ fn legend(videos: &[VideoSummary]) -> Node {
         .map(|refused| (reasons::order(&refused.reason), refused.reason.as_str()))
         .collect();
     let stages: BTreeSet<&str> = ledgers().flat_map(|ledger| &ledger.failed).map(|f| f.stage.as_str()).collect();
-    let mut entries = vec![("kept".to_owned(), "kept")];
-    entries.extend(found.iter().map(|(_, reason)| (reasons::class(reason), *reason)));
+    let mut entries = vec![("accepted".to_owned(), "accepted")];
+    entries.extend(found.iter().map(|(_, reason)| (reasons::class(reason), reasons::label(reason))));
     if stages.iter().any(|stage| *stage != WAITING) {
         entries.push(("failed".to_owned(), "failed"));
     }

@@ -43,18 +43,18 @@ impl VideoSummary {
             folders,
         };
         if !unit.source.exists() {
-            video.note("The file is gone: there are no pictures of it.");
+            video.note("The video file is missing: no pictures available.");
         }
         if let Ok(media) = MediaInfo::read(&Artifact::MediaInfo.path(work, unit)) {
-            media.remarks().iter().for_each(|remark| video.note(&format!("In the file: {remark}.")));
+            media.remarks().iter().for_each(|remark| video.note(&format!("File: {remark}.")));
             if let Some(reason) = media.not_judged() {
-                video.note(&format!("Made {reason}."));
+                video.note(&format!("Created {reason}."));
             }
         }
         if let Some(offset) = sound_offset_json::read(&Artifact::SoundOffset.path(work, unit)).ok().flatten()
             && offset.is_reportable()
         {
-            video.note(&format!("By the lips, the {offset}."));
+            video.note(&format!("Measured by lip sync: the {offset}."));
         }
         let failure = StageName::OF_VIDEOS
             .into_iter()
@@ -72,14 +72,14 @@ impl VideoSummary {
                 Ok(ledger) => {
                     (video.ledger, video.is_lifted) = (ledger, file == Artifact::LiftLedger);
                     if !video.is_lifted {
-                        video.note("It is not lifted yet: rules on bones have not had their say.");
+                        video.note("Not lifted yet: the rules on bones have not been applied.");
                     }
                     return video;
                 }
                 Err(error) => video.note(&format!("{error:#}")),
             }
         }
-        video.mark_unavailable(work, WAITING, "no verdict yet: orator run");
+        video.mark_unavailable(work, WAITING, "not processed yet: run `orator run`");
         video
     }
 
@@ -90,11 +90,11 @@ impl VideoSummary {
         self.ledger = secs.map_or_else(Ledger::default, |secs| Ledger::failed(secs, stage, error));
         self.has_failed = stage != WAITING;
         match stage {
-            WAITING => self.note("No verdict yet: orator run."),
+            WAITING => self.note("Not processed yet: run `orator run`."),
             _ => self.note(&format!("The stage {stage} failed: {error}")),
         }
         if secs.is_none() {
-            self.note("Its length is not known, so it is in no sum.");
+            self.note("The length is unknown; the video is not included in the totals.");
         }
     }
 

@@ -13,7 +13,7 @@ use orator_pipeline::segment::Measures;
 use rayon::prelude::*;
 
 /// Accepted seconds of one video, by threshold and by value of its grid.
-pub type KeptByThreshold = Vec<Vec<f64>>;
+pub type AcceptedByThreshold = Vec<Vec<f64>>;
 
 /// Data of a video that the rules depend on.
 pub struct JudgedVideo<'a> {
@@ -48,7 +48,7 @@ impl JudgedVideo<'_> {
     }
 
     /// Accepted seconds at every value of every threshold, computed on all cores.
-    pub fn table(&self, rules: &SegmentConfig) -> KeptByThreshold {
+    pub fn table(&self, rules: &SegmentConfig) -> AcceptedByThreshold {
         let row = |threshold: &super::thresholds::ThresholdGrid| -> Vec<f64> {
             let (grid, _) = threshold.grid(rules);
             grid.into_par_iter().map(|value| self.kept_secs(&threshold.with(rules, value))).collect()

@@ -21,7 +21,7 @@ pub struct Moment {
     pub secs: f64,
     /// Distance from the threshold.
     beyond: f64,
-    /// Message of the refusal.
+    /// Reason, measured value and threshold.
     pub description: String,
     /// Text with the value in this frame; empty for rules that are not about frames.
     pub frame_value: String,
@@ -94,7 +94,7 @@ fn moment(
         }
         Some(Refusal::Bones) if bone_change.len() == n_frames => {
             let (t, value) = extreme(bone_change, start..end, false);
-            (t, (value - span.threshold).abs(), format!("{} off its length here", number(value)))
+            (t, (value - span.threshold).abs(), format!("deviation {} in this frame", number(value)))
         }
         Some(refusal) => match farthest(refusal, measures, rules, start..end) {
             Some((t, value, bound, is_mean)) => {
@@ -107,7 +107,14 @@ fn moment(
     let compares = matches!(refusal, Some(Refusal::Cut | Refusal::Identity | Refusal::Jump)) && t > 0;
     let frames = if compares { vec![t - 1, t] } else { vec![t] };
     let beyond = if beyond.is_finite() { beyond } else { 0.0 };
-    Some(Moment { video, frames, secs: judged.fps.secs(t), beyond, description: span.message.clone(), frame_value })
+    Some(Moment {
+        video,
+        frames,
+        secs: judged.fps.secs(t),
+        beyond,
+        description: reasons::description(span),
+        frame_value,
+    })
 }
 
 /// Frame that violates the rules of the refusal most: index, value, bound, and whether the ledger measures that value
@@ -130,9 +137,9 @@ fn farthest(
         (rule.values, bad, false)
     });
     let found = on_frames.chain(on_pieces).map(|(values, bound, is_mean)| {
-        let is_least = matches!(bound, Bound::AtLeast(_));
-        let (t, value) = extreme(values(measures), frames.clone(), is_least);
-        let beyond = if is_least { bound.threshold() - value } else { value - bound.threshold() };
+        let is_minimum = matches!(bound, Bound::AtLeast(_));
+        let (t, value) = extreme(values(measures), frames.clone(), is_minimum);
+        let beyond = if is_minimum { bound.threshold() - value } else { value - bound.threshold() };
         (beyond, (t, value, bound, is_mean))
     });
     let known = found.filter(|(beyond, _)| beyond.is_finite());
@@ -153,19 +160,19 @@ fn extreme(values: &[f32], frames: std::ops::Range<usize>, lowest: bool) -> (usi
 fn value_text(refusal: Refusal, value: f64) -> String {
     let value = number(value);
     match refusal {
-        Refusal::Quiet => format!("{value} dB here"),
-        Refusal::NoSpeech => format!("share of speech {value} here"),
-        Refusal::OffScreenSpeaker => format!("mouth and voice correlate with {value} around here"),
-        Refusal::Static => format!("change of {value} steps here"),
-        Refusal::Small => format!("{value} px here"),
-        Refusal::Turned => format!("{value} neck-nose distances here"),
-        Refusal::NoseOff => format!("{value} half shoulder widths here"),
-        Refusal::Jump => format!("{value} shoulder widths from the left picture to the right one"),
-        Refusal::HandGap | Refusal::HandShare => format!("the hand scores {value} here"),
-        Refusal::Crowd => format!("{value} people here"),
-        Refusal::Cut => format!("shot score {value} at the right picture"),
+        Refusal::Quiet => format!("{value} dB in this frame"),
+        Refusal::NoSpeech => format!("share of speech {value} in this frame"),
+        Refusal::OffScreenSpeaker => format!("correlation {value} around this frame"),
+        Refusal::Static => format!("picture change {value} in this frame"),
+        Refusal::Small => format!("{value} px in this frame"),
+        Refusal::Turned => format!("{value} neck-nose distances in this frame"),
+        Refusal::NoseOff => format!("{value} half shoulder widths in this frame"),
+        Refusal::Jump => format!("{value} shoulder widths between the two pictures"),
+        Refusal::HandGap | Refusal::HandShare => format!("hand score {value} in this frame"),
+        Refusal::Crowd => format!("{value} persons in this frame"),
+        Refusal::Cut => format!("shot score {value} in the second picture"),
         Refusal::Identity => "before and after".to_owned(),
-        Refusal::NoPerson | Refusal::Face | Refusal::Arms => format!("scores {value} here"),
+        Refusal::NoPerson | Refusal::Face | Refusal::Arms => format!("score {value} in this frame"),
         _ => String::new(),
     }
 }

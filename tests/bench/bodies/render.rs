@@ -47,7 +47,7 @@ pub(crate) fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     let folder = tempfile::tempdir()?;
     let task = progress.begin("render", args.rounds as u64);
     let (camera, beside) = (FilmCamera::Front, SecondPanel::Itself);
-    let content = FilmSource { performance: &performance, camera, sound: None, beside };
+    let content = FilmSource { performance: &performance, camera, sound: None, second_panel: beside };
     let mut film = Film::new(content);
     let films: Vec<Image> = (0..args.frames.min(N_KEPT)).map(|frame| film.frame(frame)).collect::<Result<_>>()?;
     let mut secs: [Vec<f64>; 4] = Default::default();

@@ -3,7 +3,7 @@
 
 use crate::fixtures::figures::swinging;
 use ndarray::{Array3, s};
-use orator_avatar::animate::rig::constraints::ClampTally;
+use orator_avatar::animate::rig::constraints::ClampCounter;
 use orator_avatar::animate::rig::limits::{CURL_COHERENCE, ELBOW, FINGERS, Limit, SUPINATION, WRIST};
 use orator_avatar::animate::solve::arm_pose::ArmPose;
 use orator_avatar::animate::{AnimationOptions, Constraints, Legs, Performance, Smoothing, Yaw, perform};
@@ -51,22 +51,22 @@ fn is_within(pose: &ArmPose) -> bool {
 fn random_rotations_come_out_within_the_limits_and_what_is_within_stays() {
     let rig = perform(&swinging(0, 4), None, &UNTOUCHED).rig;
     let mut random = ChaCha8Rng::seed_from_u64(3);
-    let mut tally = ClampTally::default();
+    let mut counter = ClampCounter::default();
     for n in 0..2_000 {
         let mut frame: Vec<Rotation> = rig.skeleton.joints.iter().map(|_| random_rotation(&mut random)).collect();
         let constraints = Constraints { limits: true, curl_coherence: true };
-        constraints.apply(&rig, &mut frame, &mut tally);
+        constraints.apply(&rig, &mut frame, &mut counter);
         for arm in &rig.arms {
             let pose = ArmPose::from_rotations(arm, &frame);
             assert!(is_within(&pose), "{n}: {pose:?}");
         }
         let mut again = frame.clone();
-        constraints.apply(&rig, &mut again, &mut ClampTally::default());
+        constraints.apply(&rig, &mut again, &mut ClampCounter::default());
         for (joint, (a, b)) in frame.iter().zip(&again).enumerate() {
             assert!((a.inverse() * *b).angle() < 1e-6, "{n}: {} moves again", rig.skeleton.joints[joint].name);
         }
     }
-    let clamps = tally.clamps();
+    let clamps = counter.clamps();
     assert!(clamps.iter().all(|kind| kind.joint_frames > 0 && (0.0..=1.0).contains(&kind.share)), "{clamps:?}");
     assert!(clamps.iter().all(|kind| kind.largest_excess_degrees <= 180.0 && kind.mean_excess_degrees > 0.0));
 }
@@ -77,7 +77,7 @@ fn constraints_do_not_make_an_even_motion_jump() {
     let mut random = ChaCha8Rng::seed_from_u64(4);
     for _ in 0..20 {
         // Fingers pass through every impossible place; elbows and hands through what they could nearly do.
-        let limbs: Vec<usize> = rig.arms.iter().flat_map(|arm| [arm.fore, arm.hand]).collect();
+        let limbs: Vec<usize> = rig.arms.iter().flat_map(|arm| [arm.forearm, arm.hand]).collect();
         let ends: [Vec<Rotation>; 2] = [0, 1].map(|_| {
             let end = |joint| {
                 let share = if limbs.contains(&joint) { 0.25 } else { 1.0 };
@@ -90,9 +90,9 @@ fn constraints_do_not_make_an_even_motion_jump() {
             let share = f64::from(step) / 4_000.0;
             let between = |joint: usize| ends[0][joint].slerp(ends[1][joint], share);
             let mut frame: Vec<Rotation> = (0..rig.skeleton.joints.len()).map(between).collect();
-            Constraints::default().apply(&rig, &mut frame, &mut ClampTally::default());
+            Constraints::default().apply(&rig, &mut frame, &mut ClampCounter::default());
             for arm in &rig.arms {
-                for &joint in arm.fingers.iter().flatten().chain([&arm.fore, &arm.hand]) {
+                for &joint in arm.fingers.iter().flatten().chain([&arm.forearm, &arm.hand]) {
                     let turned = last.as_ref().map_or(0.0, |last| (last[joint].inverse() * frame[joint]).angle());
                     assert!(turned.to_degrees() < 6.0, "{}: {turned}", rig.skeleton.joints[joint].name);
                 }

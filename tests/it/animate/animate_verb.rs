@@ -101,7 +101,7 @@ fn how_much_of_the_body_was_seen_is_told_where_it_is_not_all() {
     let expected =
         "detected, of 40 frames: arms in 30, left hand in 27, right hand in 25; other frames are interpolated or held";
     assert!(told.contains(expected), "{told}");
-    let seen = &done(dir, "a.npz --out a.bvh")["report"]["seen"];
+    let seen = &done(dir, "a.npz --out a.bvh")["report"]["detected"];
     assert_eq!(*seen, serde_json::json!({ "left_arm": 30, "right_arm": 30, "left_hand": 27, "right_hand": 25 }));
 }
 
@@ -217,8 +217,8 @@ fn what_is_wrong_is_said_and_nothing_is_written() {
         ("words.txt --out x.bvh", "line 1, number 1: `a` is no number"),
         ("picture.png --out x.bvh", "is no motion file: expected .npy"),
         ("nothing --out x --format bvh", "contains no motion"),
-        ("good.npy --out x.mov", "give the file one of these endings"),
-        ("good.npy --out x --format mov", "give the file one of these endings"),
+        ("good.npy --out x.mov", "unknown motion format"),
+        ("good.npy --out x --format mov", "unknown motion format"),
         ("good.npy --out good.npy", "is an input"),
         ("good.npy --out x.bvh x.bvh", "listed twice"),
         ("good.npy --out nothing", "is a folder"),
@@ -231,7 +231,7 @@ fn what_is_wrong_is_said_and_nothing_is_written() {
         ("good.npy --out x.bvh --audio good.npy", "--audio applies to .mp4"),
         ("good.npy --out x.npy --names vrm", "--names applies to .bvh"),
         ("good.npy --out x.vrm --names mixamo", "--names applies to .bvh"),
-        ("good.npy --out x.bvh --retarget good.npy", "is given as .bvh or .glb"),
+        ("good.npy --out x.bvh --retarget good.npy", "expected .bvh or .glb"),
         ("good.npy --out x.bvh --bone-map bones.toml", "--retarget"),
         ("good.npy --out x.bvh --keypoints good.npy", "good.npy"),
     ] {

@@ -130,7 +130,7 @@ fn the_released_clips_keep_their_gesture() {
     let mean = apart.iter().sum::<f64>() / apart.len() as f64;
     assert!(mean < 0.03, "{mean} m");
     let jumps = (1..motion.n_frames())
-        .flat_map(|t| rig.arms.iter().flat_map(move |arm| [arm.upper, arm.fore].map(|joint| (t, joint))))
+        .flat_map(|t| rig.arms.iter().flat_map(move |arm| [arm.upper, arm.forearm].map(|joint| (t, joint))))
         .filter(|&(t, joint)| (clip.local[t - 1][joint].inverse() * clip.local[t][joint]).angle() > 1.2)
         .count();
     assert!(jumps < 8, "{jumps} sudden turns of an arm in {} frames", motion.n_frames());

@@ -35,7 +35,8 @@ fn on_our_bones(path: &Path, fps: FrameRate) -> Motion {
         local[rig.spine] = turned(t, 0) * turned(t, 3);
         local[rig.chest] = turned(t, 6) * turned(t, 9);
         for (arm, [clavicle, upper, fore, hand, fingers]) in rig.arms.iter().zip(ARMS) {
-            for (joint, captured) in [(arm.clavicle, clavicle), (arm.upper, upper), (arm.fore, fore), (arm.hand, hand)]
+            for (joint, captured) in
+                [(arm.clavicle, clavicle), (arm.upper, upper), (arm.forearm, fore), (arm.hand, hand)]
             {
                 local[joint] = turned(t, captured);
             }

@@ -39,7 +39,7 @@ fn middle(image: &Image, columns: std::ops::Range<usize>, hue: [u8; 3]) -> f64 {
 
 /// Silent film of a performance alone, seen from the front.
 fn alone(performance: &Performance) -> FilmSource<'_> {
-    FilmSource { performance, camera: FilmCamera::Front, sound: None, beside: SecondPanel::Itself }
+    FilmSource { performance, camera: FilmCamera::Front, sound: None, second_panel: SecondPanel::Itself }
 }
 
 /// The motion on its rig, neither smoothed nor constrained.
@@ -151,7 +151,7 @@ fn the_video_beside_the_avatar_is_in_step() {
     let path = folder.path().join("beside.mp4");
     let performance = unchanged(&swinging(6, 30));
     let beside = SecondPanel::Video { path: &clip.path, from_secs: 2.0, camera: None };
-    film::write(&path, FilmSource { beside, ..alone(&performance) }, &Silent).unwrap();
+    film::write(&path, FilmSource { second_panel: beside, ..alone(&performance) }, &Silent).unwrap();
     // A picture of the clip fills the left half: 64 x 48 px become 600 x 450.
     let read = |image: &Image| {
         let bit = |block: usize| {
@@ -165,7 +165,7 @@ fn the_video_beside_the_avatar_is_in_step() {
         assert_eq!(read(&frame.unwrap().image), 60 + 2 * n, "frame {n}");
     }
     let beside = SecondPanel::Video { path: &clip.path, from_secs: 60.0, camera: None };
-    let late = FilmSource { beside, ..alone(&performance) };
+    let late = FilmSource { second_panel: beside, ..alone(&performance) };
     let error = format!("{:#}", film::write(&path, late, &Silent).unwrap_err());
     assert!(error.contains("lasts 6.0 s"), "{error}");
 }
@@ -176,7 +176,7 @@ fn another_motion_is_drawn_beside_in_the_same_size_until_it_ends() {
     other.fps = orator_base::types::time::FrameRate::new(30, 1);
     let [performance, other] = [unchanged(&motion), unchanged(&other)];
     let beside = SecondPanel::Motion { performance: &other, labels: ["truth", "prediction"] };
-    let mut film = Film::new(FilmSource { beside, ..alone(&performance) });
+    let mut film = Film::new(FilmSource { second_panel: beside, ..alone(&performance) });
     let half = |image: &Image, from: usize| {
         let places = (from..from + 600).flat_map(|x| (70..610).map(move |y| (x, y)));
         places.filter(|&(x, y)| image.pixel(x, y) != PAPER).count()
@@ -258,7 +258,7 @@ fn before_its_video_the_avatar_stands_where_the_person_is() {
     let camera = SourceCamera::fit(&motion, &keypoints).unwrap();
     let performance = unchanged(&motion);
     let beside = SecondPanel::Video { path: &clip.path, from_secs: 0.0, camera: Some(&camera) };
-    let mut film = Film::new(FilmSource { beside, ..alone(&performance) });
+    let mut film = Film::new(FilmSource { second_panel: beside, ..alone(&performance) });
     let mut video = FrameReader::open(&clip.path, FPS).unwrap();
     for t in 0..4 {
         let image = film.frame(t).unwrap();
@@ -281,7 +281,7 @@ fn two_avatars_stand_beside_each_other_in_one_size() {
     let beside = SecondPanel::Motion { performance: &other, labels: ["truth", "prediction"] };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("two.mp4");
-    film::write(&path, FilmSource { beside, ..alone(&one) }, &Silent).unwrap();
+    film::write(&path, FilmSource { second_panel: beside, ..alone(&one) }, &Silent).unwrap();
     let frames: Vec<Image> = FrameReader::open(&path, FPS).unwrap().map(|frame| frame.unwrap().image).collect();
     assert_eq!(frames.len(), 10);
     let dark = |from: usize| {

@@ -124,7 +124,7 @@ fn a_joint_at_rest_has_one_key_and_no_frame_no_animation() {
         glb.numbers(&animation["samplers"][channel.unwrap()["sampler"].as_u64().unwrap() as usize]["output"]).len()
     };
     let leg = performance.rig.skeleton.find("LeftLeg").unwrap();
-    assert_eq!((keys(leg), keys(performance.rig.arms[0].fore)), (1, 20));
+    assert_eq!((keys(leg), keys(performance.rig.arms[0].forearm)), (1, 20));
     let (_, path) = written(folder.path(), 0, Names::Own);
     assert!(Glb::read(&path).scene.get("animations").is_none());
 }

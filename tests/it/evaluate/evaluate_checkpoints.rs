@@ -117,8 +117,8 @@ fn networks_of_both_trainings_stand_in_one_table() {
     if let Some(mut browser) = Browser::open(&project.dir().join("page.html"), [1200, 900]) {
         let count =
             |browser: &mut Browser, of: &str| browser.value(&format!("document.querySelectorAll('{of}').length"));
-        assert_eq!(count(&mut browser, ".verdict"), 6);
-        assert_eq!(count(&mut browser, "#figures thead .against"), 3);
+        assert_eq!(count(&mut browser, ".conclusion"), 6);
+        assert_eq!(count(&mut browser, "#metrics thead .against"), 3);
         assert!(browser.problems.is_empty(), "{:?}", browser.problems);
     }
 

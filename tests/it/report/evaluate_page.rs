@@ -20,8 +20,8 @@ fn the_page_opens_plays_and_is_scrubbed_by_keys() {
     let Some(mut browser) = Browser::open(&page, [1280, 900]) else { return };
     let mut count = |selector: &str| browser.value(&format!("document.querySelectorAll('{selector}').length"));
     assert_eq!((count("#excerpt option"), count(".over-time:not([hidden])")), (3.into(), 1.into()));
-    assert_eq!((count("circle.share"), count(".speed svg"), count(".verdict")), (46.into(), 4.into(), 2.into()));
-    assert!(count(".figures tbody tr").as_u64().unwrap() > 30 && count(".definitions details").as_u64().unwrap() > 30);
+    assert_eq!((count("circle.share"), count(".speed svg"), count(".conclusion")), (46.into(), 4.into(), 2.into()));
+    assert!(count(".metrics tbody tr").as_u64().unwrap() > 30 && count(".definitions details").as_u64().unwrap() > 30);
     for (width, scheme) in [(360, "dark"), (360, "light"), (1280, "dark"), (1280, "light")] {
         browser.resize([width, 800]);
         browser.colours(scheme);
@@ -36,8 +36,8 @@ fn the_page_opens_plays_and_is_scrubbed_by_keys() {
              return n }})()"
         )
     };
-    let [real, made] = ["real", "made"].map(|side| browser.value(&drawn(side)).as_u64().unwrap());
-    assert!(real > 500 && made > 500 && real != made, "{real} {made}");
+    let [truth, predicted] = ["truth", "predicted"].map(|side| browser.value(&drawn(side)).as_u64().unwrap());
+    assert!(truth > 500 && predicted > 500 && truth != predicted, "{truth} {predicted}");
     // the keys scrub
     browser.value("document.getElementById('at').focus()");
     for _ in 0..5 {

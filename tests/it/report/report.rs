@@ -30,8 +30,8 @@ fn a_page_opens_draws_and_its_sliders_tell_what_a_run_then_keeps() {
     let (answer, html) = report(&project, &STRICT);
     let facts = &answer.json;
     assert_eq!((&facts["n_videos"], &facts["bytes"]), (&2.into(), &html.len().into()));
-    let refused: f64 = facts["refused_secs"].as_object().unwrap().values().map(secs).sum();
-    let kept = secs(&facts["kept_secs"]);
+    let refused: f64 = facts["rejected_secs"].as_object().unwrap().values().map(secs).sum();
+    let kept = secs(&facts["accepted_secs"]);
     assert!(refused > 0.0 && kept > 0.0 && (refused + kept - secs(&facts["duration_secs"])).abs() < 1e-6, "{facts}");
     assert!(html.len() < 1_000_000 && !html.contains("<b>") && !html.contains("://"));
     assert!(!html.contains(&*project.dir().to_string_lossy()), "a folder of this machine is told");
@@ -43,9 +43,9 @@ fn a_page_opens_draws_and_its_sliders_tell_what_a_run_then_keeps() {
 fn look(project: &Project, facts: &Value) {
     let Some(mut browser) = Browser::open(&project.dir().join("deep/r.html"), [1200, 900]) else { return };
     let mut count = |selector: &str| browser.value(&format!("document.querySelectorAll('{selector}').length"));
-    assert_eq!(count(".timeline > li"), facts["n_stretches"]);
+    assert_eq!(count(".timeline > li"), facts["n_intervals"]);
     assert_eq!(count(".shot img"), facts["n_pictures"]);
-    assert_eq!(count("#reasons tbody tr"), facts["refused_secs"].as_object().unwrap().len() + 1);
+    assert_eq!(count("#reasons tbody tr"), facts["rejected_secs"].as_object().unwrap().len() + 1);
     assert_eq!(
         (count("input[type=range]"), count(".distribution svg"), count(".range svg")),
         (19.into(), 16.into(), 6.into())
@@ -73,7 +73,7 @@ fn look(project: &Project, facts: &Value) {
     let tip = browser.value("document.getElementById('tip').hidden ? '' : document.getElementById('tip').textContent");
     assert!(tip.as_str().unwrap().starts_with("0:00.0 to "), "{tip}");
     let now = secs(&browser.value("document.getElementById('now').dataset.secs"));
-    assert!((now - secs(&facts["kept_secs"])).abs() < 1e-3, "{now}");
+    assert!((now - secs(&facts["accepted_secs"])).abs() < 1e-3, "{now}");
     let moved = "(() => { const s = document.getElementById('slider-max_body_gap_secs'); s.value = 4; \
                  s.dispatchEvent(new Event('input', { bubbles: true })); \
                  return [document.getElementById('now').dataset.secs, document.getElementById('toml').textContent, \
@@ -88,7 +88,7 @@ fn look(project: &Project, facts: &Value) {
     assert!(set.starts_with("segment.max_body_gap_secs=0.2"), "{toml}");
     let set = ["--set", STRICT[3], "--set", &set];
     project.run(&[&["--to", "lift"], &set[..]].concat());
-    let kept = secs(&report(project, &set).0.json["kept_secs"]);
+    let kept = secs(&report(project, &set).0.json["accepted_secs"]);
     assert!((kept - then).abs() < 1e-3, "the page says {then} s, the run keeps {kept} s");
 }
 
@@ -99,10 +99,13 @@ fn what_is_missing_is_said_on_the_page() {
     let gone = project.video("gone.mp4");
     project.name_videos(&[&clip.to_string_lossy(), &gone.to_string_lossy(), "none-*.mp4"]);
     let (answer, html) = report(&project, &[]);
-    assert_eq!((&answer.json["n_videos"], &answer.json["kept_secs"]), (&2.into(), &0.0.into()));
-    for words in
-        ["The file is gone", "No verdict yet: orator run.", "none-*.mp4: no matching file", "no motion to show"]
-    {
+    assert_eq!((&answer.json["n_videos"], &answer.json["accepted_secs"]), (&2.into(), &0.0.into()));
+    for words in [
+        "The video file is missing",
+        "Not processed yet: run `orator run`.",
+        "none-*.mp4: no matching file",
+        "no motion to show",
+    ] {
         assert!(html.contains(words), "{words}");
     }
     if let Some(browser) = Browser::open(Path::new(&project.dir().join("deep/r.html")), [800, 600]) {

@@ -84,7 +84,7 @@ fn what_does_not_belong_together_is_refused() {
     says(&seen, &Motion { fps: FrameRate::new(25, 1), ..motion.clone() }, 1.0, "25 fps, the keypoints at 15 fps");
     let fast = FrameRate::new(60, 1);
     let (seen_fast, motion_fast) = (Keypoints { fps: fast, ..seen.clone() }, Motion { fps: fast, ..motion.clone() });
-    says(&seen_fast, &motion_fast, 1.0, "not of the same clip");
+    says(&seen_fast, &motion_fast, 1.0, "expected the same clip");
     let long = swinging(1, 300);
     says(&keypoints(&long), &long, 1.0, "20.00 s");
     for every in [0.0, -1.0, f64::NAN, f64::INFINITY, 0.01] {

@@ -50,13 +50,13 @@ impl PosedMesh {
 /// Meshes of one avatar, by material.
 pub struct Assembly<'a> {
     body: &'a BodyForm<'a>,
-    looks: &'a Appearance,
+    appearance: &'a Appearance,
     pub meshes: BTreeMap<Material, PosedMesh>,
 }
 
 impl<'a> Assembly<'a> {
     pub fn new(body: &'a BodyForm<'a>, head: &HeadForm, hands: &[HandForm; 2]) -> Self {
-        let mut assembly = Self { body, looks: body.looks, meshes: BTreeMap::new() };
+        let mut assembly = Self { body, appearance: body.appearance, meshes: BTreeMap::new() };
         assembly.clothes();
         for (side, hand) in hands.iter().enumerate() {
             assembly.hand(side, hand);
@@ -71,40 +71,40 @@ impl<'a> Assembly<'a> {
     }
 
     fn clothes(&mut self) {
-        let (body, looks) = (self.body, self.looks);
+        let (body, appearance) = (self.body, self.appearance);
         let cm = body.stance.scale;
         let shirt = body.shirt();
-        let cell = cm * if looks.weave == Weave::Plain { SHIRT_CELL } else { PATTERN_CELL };
+        let cell = cm * if appearance.weave == Weave::Plain { SHIRT_CELL } else { PATTERN_CELL };
         let surface = Surface::from_field(&shirt, body.shirt_bounds(), cell).with_normals_of(&shirt, cell);
         let colours = body.cloth(&surface.points, &surface.normals);
         self.meshes.entry(Material::Shirt).or_default().add(body.shirt_weights(&surface), surface, colours);
-        let jacket = looks.top == Top::Jacket;
+        let jacket = appearance.top == Top::Jacket;
         if jacket {
             let surface = body.lapels(&shirt);
-            self.add(Material::Shirt, body.shirt_weights(&surface), surface, looks.top_colour.map(|v| 0.9 * v));
+            self.add(Material::Shirt, body.shirt_weights(&surface), surface, appearance.top_colour.map(|v| 0.9 * v));
         }
-        if looks.collar {
+        if appearance.collar {
             let surface = body.collar();
-            let colour = if jacket { looks.second_colour } else { looks.top_colour };
+            let colour = if jacket { appearance.second_colour } else { appearance.top_colour };
             self.add(Material::Shirt, body.shirt_weights(&surface), surface, colour.map(|v| 0.95 * v));
         }
         let legs = surface_of(&body.trousers(), LEGS_CELL * cm);
-        if looks.skirt {
+        if appearance.skirt {
             let surface = surface_of(&body.skirt(), LEGS_CELL * cm);
-            self.add(Material::Trousers, body.skirt_weights(&surface), surface, looks.legs_colour);
-            self.add(Material::Skin, body.leg_weights(&legs), legs, looks.skin.map(|v| 0.92 * v));
+            self.add(Material::Trousers, body.skirt_weights(&surface), surface, appearance.legs_colour);
+            self.add(Material::Skin, body.leg_weights(&legs), legs, appearance.skin.map(|v| 0.92 * v));
         } else {
-            self.add(Material::Trousers, body.leg_weights(&legs), legs, looks.legs_colour);
+            self.add(Material::Trousers, body.leg_weights(&legs), legs, appearance.legs_colour);
         }
         for side in 0..2 {
             let surface = surface_of(&body.shoe(side), SHOE_CELL * cm);
-            self.add(Material::Shoes, body.leg_weights(&surface), surface, looks.shoes_colour);
+            self.add(Material::Shoes, body.leg_weights(&surface), surface, appearance.shoes_colour);
         }
     }
 
     /// Adds a hand with its wrist, with the arm if the sleeve is short, otherwise with the cuff.
     fn hand(&mut self, side: usize, hand: &HandForm) {
-        let (body, looks) = (self.body, self.looks);
+        let (body, appearance) = (self.body, self.appearance);
         let size = hand.scale;
         let (palm, finger) = (PALM_CELL * size, FINGER_CELL * size);
         let arm = body.bare_arm(side);
@@ -127,16 +127,16 @@ impl<'a> Assembly<'a> {
             mesh.twist.resize(mesh.surface.points.len(), 0.0);
             mesh.twist.extend(places);
         }
-        self.add(Material::Skin, body.palm_weights(side, size, &surface), surface, looks.skin);
+        self.add(Material::Skin, body.palm_weights(side, size, &surface), surface, appearance.skin);
         for n in 1..5 {
             let surface = Surface::from_field(&|at| hand.finger(n, at), hand.bounds(Some(n)), finger)
                 .with_normals_of(&normals, NORMAL_WIDTH * finger);
-            self.add(Material::Skin, body.finger_weights(side, n, size, &surface), surface, looks.skin);
+            self.add(Material::Skin, body.finger_weights(side, n, size, &surface), surface, appearance.skin);
         }
         if arm.is_none() {
             let surface = surface_of(&body.cuff(side), CUFF_CELL * size);
-            let weights = vec![rigid(body.rig.arms[side].fore); surface.points.len()];
-            let colour = if looks.top == Top::Jacket { looks.second_colour } else { looks.top_colour };
+            let weights = vec![rigid(body.rig.arms[side].forearm); surface.points.len()];
+            let colour = if appearance.top == Top::Jacket { appearance.second_colour } else { appearance.top_colour };
             self.add(Material::Shirt, weights, surface, colour);
         }
     }
@@ -144,27 +144,27 @@ impl<'a> Assembly<'a> {
     /// Position of points along a forearm, 0 (elbow) .. 1 (wrist).
     fn along_forearm(&self, side: usize, points: &[Vec3]) -> Vec<f32> {
         let (arm, places) = (&self.body.rig.arms[side], &self.body.stance.positions);
-        let forearm = sub(places[arm.hand], places[arm.fore]);
+        let forearm = sub(places[arm.hand], places[arm.forearm]);
         let share =
-            |at: &Vec3| (dot(sub(*at, places[arm.fore]), forearm) / dot(forearm, forearm)).clamp(0.0, 1.0) as f32;
+            |at: &Vec3| (dot(sub(*at, places[arm.forearm]), forearm) / dot(forearm, forearm)).clamp(0.0, 1.0) as f32;
         points.iter().map(share).collect()
     }
 
     /// Adds head, ears, hair and facial features.
     fn head(&mut self, head: &HeadForm) {
-        let (body, looks) = (self.body, self.looks);
+        let (body, appearance) = (self.body, self.appearance);
         let skin = head.skin_surface();
-        let colours = skin.points.iter().map(|&at| head.complexion(at, looks)).collect();
+        let colours = skin.points.iter().map(|&at| head.complexion(at, appearance)).collect();
         let shares: Vec<f64> = skin.points.iter().map(|&at| jaw_share(at)).collect();
         let mut features = vec![Feature { material: Material::Face, surface: skin, colours, shares }];
-        features.extend(head.features(looks));
+        features.extend(head.features(appearance));
         let ear = head.ear_surface();
         for surface in [ear.clone(), ear.mirrored()] {
-            let colours = vec![looks.skin; surface.points.len()];
+            let colours = vec![appearance.skin; surface.points.len()];
             features.push(Feature { material: Material::Face, surface, colours, shares: Vec::new() });
         }
         if let Some(surface) = head.hair_surface() {
-            let colours = surface.points.iter().map(|&at| hair_colour_at(looks.hair_colour, at)).collect();
+            let colours = surface.points.iter().map(|&at| hair_colour_at(appearance.hair_colour, at)).collect();
             features.push(Feature { material: Material::Hair, surface, colours, shares: Vec::new() });
         }
         for (n, Feature { material, surface, colours, shares }) in features.into_iter().enumerate() {

@@ -40,11 +40,11 @@ pub struct Avatar {
 }
 
 impl Avatar {
-    pub fn new(rig: &Rig, looks: &Appearance) -> Self {
+    pub fn new(rig: &Rig, appearance: &Appearance) -> Self {
         let stance = Stance::new(rig);
         let hands = [0, 1].map(|side| HandForm::new(rig, &stance, side));
-        let body = BodyForm::new(rig, &stance, hands.each_ref().map(|hand| hand.scale), looks);
-        let head = HeadForm::new(rig, &stance, looks);
+        let body = BodyForm::new(rig, &stance, hands.each_ref().map(|hand| hand.scale), appearance);
+        let head = HeadForm::new(rig, &stance, appearance);
         let meshes = Assembly::new(&body, &head, &hands).meshes;
         let parts = meshes.into_iter().map(|(material, mesh)| AvatarMesh::to_t_pose(material, mesh, &stance)).collect();
         Self { parts }
@@ -119,8 +119,8 @@ mod tests {
         let (avatar, stance) = (Avatar::new(&rig, &Appearance::plain()), Stance::new(&rig));
         let shirt = &avatar.parts[1];
         let hands = [0, 1].map(|side| HandForm::new(&rig, &stance, side).scale);
-        let looks = Appearance::plain();
-        let body = BodyForm::new(&rig, &stance, hands, &looks);
+        let appearance = Appearance::plain();
+        let body = BodyForm::new(&rig, &stance, hands, &appearance);
         let form = body.shirt();
         let cuffs = [0, 1].map(|side| body.cuff(side));
         let mut far = 0;
@@ -147,7 +147,7 @@ mod tests {
         let finger = super::super::stance::finger_joints(&rig, 0, 2);
         for (part, joint, next, axis) in [
             (&avatar.parts[0], finger[1], finger[2], [0.0, 0.0, -1.0]),
-            (&avatar.parts[1], arm.fore, arm.hand, [0.0, -1.0, 0.0]),
+            (&avatar.parts[1], arm.forearm, arm.hand, [0.0, -1.0, 0.0]),
         ] {
             let thickness = |degrees: f64| {
                 let mut local = vec![Rotation::IDENTITY; rig.skeleton.joints.len()];

@@ -21,15 +21,15 @@ pub struct BodyForm<'a> {
     shoulder_scale: f64,
     /// Hand sizes relative to the reference hand.
     hand_sizes: [f64; 2],
-    pub looks: &'a Appearance,
+    pub appearance: &'a Appearance,
 }
 
 impl<'a> BodyForm<'a> {
-    pub fn new(rig: &'a Rig, stance: &'a Stance, hand_sizes: [f64; 2], looks: &'a Appearance) -> Self {
+    pub fn new(rig: &'a Rig, stance: &'a Stance, hand_sizes: [f64; 2], appearance: &'a Appearance) -> Self {
         let half = |arm: &RigArm| norm(rig.skeleton.joints[arm.upper].offset) / 2.0;
         let half: f64 = rig.arms.iter().map(half).sum();
         let shoulder_scale = (half / HALF_SHOULDERS / stance.scale).clamp(0.75, 1.3);
-        Self { rig, stance, shoulder_scale, hand_sizes, looks }
+        Self { rig, stance, shoulder_scale, hand_sizes, appearance }
     }
 
     /// Tapered limb between two points in the axes of `joint`, cm of the reference body.
@@ -43,25 +43,25 @@ impl<'a> BodyForm<'a> {
 
     /// The trunk of the shirt without its sleeves.
     pub fn trunk(&self) -> Form {
-        let (hips, neck, looks) = (HIPS, self.rig.neck, self.looks);
-        let girth = looks.trunk;
+        let (hips, neck, appearance) = (HIPS, self.rig.neck, self.appearance);
+        let girth = appearance.trunk;
         let wide = |x: f64| x * self.shoulder_scale;
         // A jacket is worn over a shirt, so it is wider.
-        let cloth = if looks.top == Top::Jacket { 0.6 } else { 0.0 };
+        let cloth = if appearance.top == Top::Jacket { 0.6 } else { 0.0 };
         let across = |y: f64, x: f64, z: f64, r: f64, girth: f64| {
             let (x, r) = (x * girth, r * girth + cloth);
             self.limb(hips, [[-x, y, z], [x, y, z]], [r, r])
         };
-        let (waist, seat) = (girth * looks.waist, girth * looks.hips);
+        let (waist, seat) = (girth * appearance.waist, girth * appearance.hips);
         let mut form = Form::default()
             .with(across(-4.0, 6.0, -0.4, 9.9, seat), 0.0)
             .with(across(-9.0, 7.4, -0.4, 9.9, seat), self.cm(4.0))
             .with(across(9.0, wide(5.6), 0.3, 9.3, waist), self.cm(13.0))
             .with(across(28.0, wide(5.4), 0.5, 9.9, girth), self.cm(12.0))
             .with(across(39.0, wide(6.4), -0.4, 8.8, 0.6 + 0.4 * girth), self.cm(8.0));
-        if looks.bust > 0.0 {
+        if appearance.bust > 0.0 {
             for side in [1.0, -1.0] {
-                let at = [side * wide(6.4), 29.5, 4.6 + 2.2 * looks.bust];
+                let at = [side * wide(6.4), 29.5, 4.6 + 2.2 * appearance.bust];
                 form = form.with(self.limb(hips, [at, at], [5.2 * girth + cloth; 2]), self.cm(5.0));
             }
         }
@@ -69,7 +69,7 @@ impl<'a> BodyForm<'a> {
             let ends = [[side * 2.8, 4.8, -1.7], [side * wide(14.0), -1.2, -0.8]];
             form = form.with(self.limb(neck, ends, [4.6 + cloth, 4.1 + cloth]), self.cm(6.0));
         }
-        let [low, high] = [7.2, 6.2].map(|r| r * looks.neck.max(0.9) * looks.head[0].max(1.0) + 0.5 * cloth);
+        let [low, high] = [7.2, 6.2].map(|r| r * appearance.neck.max(0.9) * appearance.head[0].max(1.0) + 0.5 * cloth);
         form.with(self.limb(neck, [[0.0, -4.0, -1.8], [0.0, 8.0, -0.4]], [low, high]), self.cm(4.0))
     }
 
@@ -77,48 +77,55 @@ impl<'a> BodyForm<'a> {
     pub fn sleeve(&self, side: usize) -> Form {
         let arm = &self.rig.arms[side];
         let out = arm.sign;
-        let (upper, fore) = (self.length(arm.upper, arm.fore), self.length(arm.fore, arm.hand));
-        let cloth = if self.looks.top == Top::Jacket { 0.45 } else { 0.0 };
-        let wide = |r: f64| r * self.looks.limbs + cloth;
+        let (upper, forearm) = (self.length(arm.upper, arm.forearm), self.length(arm.forearm, arm.hand));
+        let cloth = if self.appearance.top == Top::Jacket { 0.45 } else { 0.0 };
+        let wide = |r: f64| r * self.appearance.limbs + cloth;
         let on_upper = |from: Vec3, to: Vec3, [a, b]: [f64; 2]| self.limb(arm.upper, [from, to], [wide(a), wide(b)]);
-        if self.looks.top == Top::ShortSleeves {
+        if self.appearance.top == Top::ShortSleeves {
             let end = self.stance.at(arm.upper, [out * 0.56 * upper, 0.0, 0.0]);
             return Form::default()
                 .with(on_upper([out * 0.6, -0.3, 0.0], [out * 0.75 * upper, 0.0, 0.0], [4.6, 4.9]), 0.0)
                 .with(on_upper([out * 3.0, 0.0, 0.0], [out * 0.45 * upper, 0.1, 0.0], [4.8, 4.8]), self.cm(3.0))
-                .cut(end, self.stance.direction(arm.upper, arm.fore), self.cm(1.0));
+                .cut(end, self.stance.direction(arm.upper, arm.forearm), self.cm(1.0));
         }
         let end = self.sleeve_end(side);
         let wrist = SLEEVE_RADIUS * self.hand_sizes[side] / self.stance.scale + cloth;
-        let on_fore = |from: Vec3, to: Vec3, radii: [f64; 2]| self.limb(arm.fore, [from, to], radii);
+        let on_forearm = |from: Vec3, to: Vec3, radii: [f64; 2]| self.limb(arm.forearm, [from, to], radii);
         Form::default()
             .with(on_upper([out * 0.6, -0.3, 0.0], [out * upper, 0.0, 0.0], [4.5, 3.9]), 0.0)
             .with(on_upper([out * 3.0, 0.0, 0.0], [out * 0.45 * upper, 0.1, 0.0], [4.6, 4.2]), self.cm(3.0))
-            .with(on_fore([0.0; 3], [out * 0.35 * fore, 0.0, 0.2], [wide(4.0), wide(4.0)]), self.cm(2.0))
-            .with(on_fore([out * 0.3 * fore, 0.0, 0.2], [out * fore, 0.0, 0.0], [wide(4.0), wrist]), self.cm(2.0))
-            .cut(end, self.stance.direction(arm.fore, arm.hand), self.cm(0.5))
+            .with(on_forearm([0.0; 3], [out * 0.35 * forearm, 0.0, 0.2], [wide(4.0), wide(4.0)]), self.cm(2.0))
+            .with(
+                on_forearm([out * 0.3 * forearm, 0.0, 0.2], [out * forearm, 0.0, 0.0], [wide(4.0), wrist]),
+                self.cm(2.0),
+            )
+            .cut(end, self.stance.direction(arm.forearm, arm.hand), self.cm(0.5))
     }
 
     /// Bare arm from inside the sleeve to the wrist; `None` with long sleeves.
     pub fn bare_arm(&self, side: usize) -> Option<Form> {
-        if self.looks.top != Top::ShortSleeves {
+        if self.appearance.top != Top::ShortSleeves {
             return None;
         }
         let arm = &self.rig.arms[side];
         let out = arm.sign;
-        let (upper, fore) = (self.length(arm.upper, arm.fore), self.length(arm.fore, arm.hand));
-        let wide = |radii: [f64; 2]| radii.map(|r| r * self.looks.limbs);
+        let (upper, forearm) = (self.length(arm.upper, arm.forearm), self.length(arm.forearm, arm.hand));
+        let wide = |radii: [f64; 2]| radii.map(|r| r * self.appearance.limbs);
         let wrist = 2.4 * self.hand_sizes[side] / self.stance.scale;
         let back = self.stance.world[arm.hand].turn([0.0, 1.0, 0.0]);
         let on_upper = |from: Vec3, to: Vec3, radii: [f64; 2]| self.limb(arm.upper, [from, to], wide(radii));
-        let on_fore = |from: Vec3, to: Vec3, radii: [f64; 2]| self.limb(arm.fore, [from, to], radii);
+        let on_forearm = |from: Vec3, to: Vec3, radii: [f64; 2]| self.limb(arm.forearm, [from, to], radii);
         let form = Form::default()
             .with(on_upper([out * 0.3 * upper, 0.0, 0.0], [out * upper, 0.0, 0.0], [3.9, 3.35]), 0.0)
             .with(on_upper([out * 0.42 * upper, -0.2, 0.5], [out * 0.7 * upper, -0.2, 0.5], [3.5, 3.2]), self.cm(3.0))
-            .with(on_fore([0.0; 3], [out * 0.28 * fore, 0.1, 0.3], wide([3.3, 3.6])), self.cm(1.6))
+            .with(on_forearm([0.0; 3], [out * 0.28 * forearm, 0.1, 0.3], wide([3.3, 3.6])), self.cm(1.6))
             .with(
-                on_fore([out * 0.28 * fore, 0.1, 0.3], [out * 0.95 * fore, 0.0, 0.0], [wide([3.6; 2])[0], wrist])
-                    .flattened(back, 0.84),
+                on_forearm(
+                    [out * 0.28 * forearm, 0.1, 0.3],
+                    [out * 0.95 * forearm, 0.0, 0.0],
+                    [wide([3.6; 2])[0], wrist],
+                )
+                .flattened(back, 0.84),
                 self.cm(2.0),
             );
         Some(form)
@@ -127,15 +134,15 @@ impl<'a> BodyForm<'a> {
     /// The cuff at the end of a sleeve.
     pub fn cuff(&self, side: usize) -> Form {
         let arm = &self.rig.arms[side];
-        let along = self.stance.direction(arm.fore, arm.hand);
+        let along = self.stance.direction(arm.forearm, arm.hand);
         let (end, hand) = (self.sleeve_end(side), self.hand_sizes[side]);
-        let jacket = self.looks.top == Top::Jacket;
+        let jacket = self.appearance.top == Top::Jacket;
         // A shirt cuff protrudes from the sleeve of a jacket.
         let (far_by, loose) = if jacket { (0.9, 0.0) } else { (0.25, 0.2) };
         let [near, far] = [-2.6 * hand, far_by * hand].map(|cm| add(end, scale(along, cm)));
         // The sleeve widens towards the elbow.
         let wider = (self.cm(4.0) - SLEEVE_RADIUS * hand).max(0.0) * (2.6 + SLEEVE_GAP) * hand
-            / (0.7 * self.cm(self.length(arm.fore, arm.hand)));
+            / (0.7 * self.cm(self.length(arm.forearm, arm.hand)));
         Form::default()
             .with(
                 RoundCone::new(
@@ -150,7 +157,7 @@ impl<'a> BodyForm<'a> {
 
     fn sleeve_end(&self, side: usize) -> Vec3 {
         let arm = &self.rig.arms[side];
-        let along = self.stance.direction(arm.fore, arm.hand);
+        let along = self.stance.direction(arm.forearm, arm.hand);
         sub(self.stance.positions[arm.hand], scale(along, SLEEVE_GAP * self.hand_sizes[side]))
     }
 
@@ -160,7 +167,7 @@ impl<'a> BodyForm<'a> {
         let sleeves = [0, 1].map(|side| self.sleeve(side));
         let collar = self.stance.at(self.rig.neck, [0.0, 5.4, 0.0]);
         // A shirt is worn over trousers but inside a skirt.
-        let low = match (self.looks.skirt, self.looks.top) {
+        let low = match (self.appearance.skirt, self.appearance.top) {
             (_, Top::Jacket) => -10.0,
             (true, _) => 2.0,
             (false, _) => -7.5,
@@ -185,18 +192,18 @@ impl<'a> BodyForm<'a> {
 
     /// Trousers from the waist to the ankles, or bare legs under a skirt.
     pub fn trousers(&self) -> Form {
-        let (hips, looks) = (HIPS, self.looks);
-        let seat = looks.trunk * looks.hips;
+        let (hips, appearance) = (HIPS, self.appearance);
+        let seat = appearance.trunk * appearance.hips;
         let x = 5.4 * seat;
         let mut form = Form::default().with(self.limb(hips, [[-x, -3.5, -0.5], [x, -3.5, -0.5]], [8.6 * seat; 2]), 0.0);
         // Limits the thighs to the width of narrow hips.
-        let girth = looks.limbs.min(seat + 0.05) * if looks.skirt { 0.84 } else { 1.0 };
+        let girth = appearance.limbs.min(seat + 0.05) * if appearance.skirt { 0.84 } else { 1.0 };
         let narrow = 9.0 * (1.0 - seat).max(0.0);
         for (side, [upper, lower, foot, _]) in [1.0, -1.0].into_iter().zip(self.rig.legs) {
             let knee = self.length(upper, lower);
             let ankle = self.length(lower, foot);
             let wide = |radii: [f64; 2]| radii.map(|r| r * girth);
-            let hem = if looks.skirt { 3.6 } else { 5.2 };
+            let hem = if appearance.skirt { 3.6 } else { 5.2 };
             let (hip, seam) = (-side * narrow, -side * (narrow + 1.5));
             form = form
                 .with(self.limb(upper, [[hip, -2.0, 0.0], [0.0, -knee, 0.0]], wide([7.1, 5.8])), self.cm(2.5))
@@ -211,8 +218,8 @@ impl<'a> BodyForm<'a> {
 
     /// Skirt from the waist to above the knees.
     pub fn skirt(&self) -> Form {
-        let (hips, looks) = (HIPS, self.looks);
-        let seat = looks.trunk * looks.hips;
+        let (hips, appearance) = (HIPS, self.appearance);
+        let seat = appearance.trunk * appearance.hips;
         let long = 0.92 * self.length(self.rig.legs[0][0], self.rig.legs[0][1]);
         let part = |y: f64, x: f64, r: f64| self.limb(hips, [[-x, y, -0.6], [x, y, -0.6]], [r, r]);
         let (waist, knees) = ([0.0, 4.0, 0.0], [0.0, -long, 0.0]);

@@ -44,26 +44,26 @@ pub fn mix(a: Reflectance, b: Reflectance, share: f64) -> Reflectance {
 
 impl HeadForm<'_> {
     /// All features of the face; none for a mannequin's head.
-    pub fn features(&self, looks: &Appearance) -> Vec<Feature> {
+    pub fn features(&self, appearance: &Appearance) -> Vec<Feature> {
         let mut all = Vec::new();
-        if !looks.face {
+        if !appearance.face {
             return all;
         }
-        for left in [eyeball(looks), lid(looks, true), lid(looks, false), self.brow(looks)] {
+        for left in [eyeball(appearance), lid(appearance, true), lid(appearance, false), self.brow(appearance)] {
             all.push(left.mirrored());
             all.push(left);
         }
-        all.extend([self.lip(looks, true), self.lip(looks, false), self.teeth()]);
-        all.extend(looks.glasses.map(|colour| self.glasses(colour)));
+        all.extend([self.lip(appearance, true), self.lip(appearance, false), self.teeth()]);
+        all.extend(appearance.glasses.map(|colour| self.glasses(colour)));
         all
     }
 
-    fn brow(&self, looks: &Appearance) -> Feature {
+    fn brow(&self, appearance: &Appearance) -> Feature {
         let columns = (0..=10).map(|k| f64::from(k) / 10.0);
         let mut rows = vec![Vec::new(); 4];
         for t in columns {
             let middle = 12.45 + 0.75 * (t * 2.0).sin() - 0.75 * t * t;
-            let half = looks.brows * (0.34 - 0.22 * t) * (1.0 - (1.0 - (8.0 * t).min(1.0)).powi(2) * 0.5);
+            let half = appearance.brows * (0.34 - 0.22 * t) * (1.0 - (1.0 - (8.0 * t).min(1.0)).powi(2) * 0.5);
             let x = 1.15 + 4.15 * t;
             for (row, (up, out)) in rows.iter_mut().zip([(-1.0, -0.12), (-0.45, 0.16), (0.45, 0.16), (1.0, -0.12)]) {
                 let y = middle + up * half;
@@ -71,13 +71,13 @@ impl HeadForm<'_> {
             }
         }
         let surface = Surface::net(&rows);
-        let colour = mix(looks.hair_colour.map(|v| 0.7 * v), looks.skin, 0.12);
+        let colour = mix(appearance.hair_colour.map(|v| 0.7 * v), appearance.skin, 0.12);
         let colours = vec![colour; surface.points.len()];
         Feature::fixed(Material::Hair, surface, colours)
     }
 
     /// Upper or lower lip, from its border to its inner edge and slightly inwards.
-    fn lip(&self, looks: &Appearance, upper: bool) -> Feature {
+    fn lip(&self, appearance: &Appearance, upper: bool) -> Feature {
         let side = if upper { 1.0 } else { -1.0 };
         // Position from the inner edge (0) to the border (1), height over the skin (cm), strength of the lip colour.
         let across = [
@@ -102,10 +102,10 @@ impl HeadForm<'_> {
                 };
                 let x = MOUTH_HALF * u;
                 let edge = MOUTH_Y + 0.07 * (1.0 - round) - 0.05 * (-(u / 0.3).powi(2)).exp();
-                let y = edge + side * looks.lips * height * way;
-                let full = looks.lips * round.powf(0.4);
+                let y = edge + side * appearance.lips * height * way;
+                let full = appearance.lips * round.powf(0.4);
                 row.push([x, y, self.front(x, y) + if out > 0.0 { out * full } else { out * (0.3 + 0.7 * round) }]);
-                colours.push(mix(looks.skin, looks.lip_colour, red * (0.4 + 0.6 * round.powf(0.3))));
+                colours.push(mix(appearance.skin, appearance.lip_colour, red * (0.4 + 0.6 * round.powf(0.3))));
                 let inner = if upper { 0.5 * u.powi(4) } else { 1.0 - 0.5 * u.powi(4) };
                 let border = jaw_share([x, y, 9.5]);
                 let to_border = way.clamp(0.0, 1.0);
@@ -159,19 +159,19 @@ impl HeadForm<'_> {
 }
 
 /// Left eyeball, with rings for pupil, iris and white around its axis.
-fn eyeball(looks: &Appearance) -> Feature {
+fn eyeball(appearance: &Appearance) -> Feature {
     let (black, white) = ([0.004; 3], [0.66, 0.63, 0.60]);
-    let rim = looks.iris.map(|v| 0.35 * v);
+    let rim = appearance.iris.map(|v| 0.35 * v);
     let rings = [
         (0.5, black),
         (PUPIL, black),
-        (PUPIL + 0.8, looks.iris),
-        (IRIS - 4.0, looks.iris),
+        (PUPIL + 0.8, appearance.iris),
+        (IRIS - 4.0, appearance.iris),
         (IRIS, rim),
         (IRIS + 1.5, white),
         (45.0, white),
-        (68.0, mix(white, looks.skin, 0.3)),
-        (85.0, mix(white, looks.skin, 0.4)),
+        (68.0, mix(white, appearance.skin, 0.3)),
+        (85.0, mix(white, appearance.skin, 0.4)),
     ];
     let rows: Vec<Vec<Vec3>> = rings
         .iter()
@@ -187,21 +187,24 @@ fn eyeball(looks: &Appearance) -> Feature {
 }
 
 /// Upper or lower lid of the left eye: part of a shell around the eyeball, with its edge.
-fn lid(looks: &Appearance, upper: bool) -> Feature {
+fn lid(appearance: &Appearance, upper: bool) -> Feature {
     let side = if upper { 1.0 } else { -1.0 };
-    let lash =
-        if upper { mix(looks.hair_colour.map(|v| 0.5 * v), [0.01; 3], 0.6) } else { looks.skin.map(|v| 0.5 * v) };
-    let fold = looks.skin.map(|v| 0.86 * v);
-    let moist = mix(looks.skin, [0.45, 0.14, 0.12], 0.5);
+    let lash = if upper {
+        mix(appearance.hair_colour.map(|v| 0.5 * v), [0.01; 3], 0.6)
+    } else {
+        appearance.skin.map(|v| 0.5 * v)
+    };
+    let fold = appearance.skin.map(|v| 0.86 * v);
+    let moist = mix(appearance.skin, [0.45, 0.14, 0.12], 0.5);
     // Angle beyond the edge (degrees), height over the eyeball (cm), colour.
     let rows = [
         (0.0, -0.02, moist),
         (0.0, LID, lash),
         (if upper { 5.0 } else { 1.5 }, LID + 0.02, lash),
         (if upper { 6.0 } else { 2.5 }, LID, fold),
-        (20.0, LID, looks.skin),
-        (40.0, LID - 0.06, looks.skin),
-        (62.0, LID - 0.2, looks.skin),
+        (20.0, LID, appearance.skin),
+        (40.0, LID - 0.06, appearance.skin),
+        (62.0, LID - 0.2, appearance.skin),
     ];
     let mut colours = Vec::new();
     let mut net: Vec<Vec<Vec3>> = Vec::new();
@@ -242,15 +245,15 @@ fn lid(looks: &Appearance, upper: bool) -> Feature {
 
 impl HeadForm<'_> {
     /// Skin colour of the head at a point.
-    pub fn complexion(&self, at: Vec3, looks: &Appearance) -> Reflectance {
-        if !looks.face {
-            return looks.skin;
+    pub fn complexion(&self, at: Vec3, appearance: &Appearance) -> Reflectance {
+        if !appearance.face {
+            return appearance.skin;
         }
         if self.in_mouth(at) {
             return [0.055, 0.012, 0.012];
         }
         let [x, y, z] = [at[0].abs(), at[1], at[2]];
-        let mut colour = looks.skin;
+        let mut colour = appearance.skin;
         // Cheeks and the tip of the nose are redder.
         let blood = smooth_step(1.0 - ((x - 4.2).hypot(y - 7.0) / 2.0)) * smooth_step((z - 5.0) / 2.0);
         let tip = smooth_step(1.0 - x.hypot(y - 7.4) / 1.1) * smooth_step((z - 10.3) / 0.5);
@@ -258,15 +261,15 @@ impl HeadForm<'_> {
         colour = mix(colour, red, 0.55 * (blood + tip).min(1.0));
         // Nostrils are dark.
         let nostril =
-            smooth_step(1.6 - ((x - 0.62 * looks.nose) / 0.24).hypot((y - 6.75) / 0.35).hypot((z - 10.0) / 0.6));
-        colour = mix(colour, looks.skin.map(|v| 0.25 * v), 0.9 * nostril);
-        mix(colour, mix(looks.hair_colour, looks.skin, 0.15), beard([x, y, z], looks))
+            smooth_step(1.6 - ((x - 0.62 * appearance.nose) / 0.24).hypot((y - 6.75) / 0.35).hypot((z - 10.0) / 0.6));
+        colour = mix(colour, appearance.skin.map(|v| 0.25 * v), 0.9 * nostril);
+        mix(colour, mix(appearance.hair_colour, appearance.skin, 0.15), beard([x, y, z], appearance))
     }
 }
 
 /// Density of the beard at a point with x >= 0.
-fn beard([x, y, z]: Vec3, looks: &Appearance) -> f64 {
-    if looks.beard <= 0.0 {
+fn beard([x, y, z]: Vec3, appearance: &Appearance) -> f64 {
+    if appearance.beard <= 0.0 {
         return 0.0;
     }
     let cheek = 5.0 + 0.6 * (x - 2.6).max(0.0) + 0.5 * (4.0 - z).max(0.0);
@@ -275,5 +278,5 @@ fn beard([x, y, z]: Vec3, looks: &Appearance) -> f64 {
     let moustache =
         smooth_step((y - MOUTH_Y - 0.55) / 0.2) * smooth_step((6.0 - y) / 0.3) * smooth_step((2.9 - x) / 0.4);
     let front = smooth_step((z - 1.0) / 1.4) * smooth_step((y + 1.4) / 1.2);
-    looks.beard * (jaw.max(chin).max(moustache) * front)
+    appearance.beard * (jaw.max(chin).max(moustache) * front)
 }

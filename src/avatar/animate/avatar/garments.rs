@@ -73,7 +73,7 @@ impl BodyForm<'_> {
     /// Folded shirt collar, open in front.
     pub fn collar(&self) -> Surface {
         let neck = self.rig.neck;
-        let size = self.looks.neck.max(0.9) * self.looks.head[0].max(1.0);
+        let size = self.appearance.neck.max(0.9) * self.appearance.head[0].max(1.0);
         let mut rows: Vec<Vec<Vec3>> = vec![Vec::new(); 5];
         for k in -18..=18 {
             // 0 is the nape; the ends nearly meet at the throat.
@@ -100,20 +100,20 @@ impl BodyForm<'_> {
 
     /// Colours of the shirt's vertices.
     pub fn cloth(&self, points: &[Vec3], normals: &[Vec3]) -> Vec<Reflectance> {
-        let looks = self.looks;
+        let appearance = self.appearance;
         let trunk = self.trunk();
         let sleeves = [0, 1].map(|side| self.sleeve(side));
         let stance = self.stance;
         let colour = |(&at, normal): (&Vec3, &Vec3)| {
             let local = sub(at, stance.positions[HIPS]).map(|v| v / stance.scale);
-            if looks.top == Top::Jacket {
+            if appearance.top == Top::Jacket {
                 // Above the lapels the jacket covers the shoulders up to the sides of the neck.
                 let narrow = 0.8 * (local[1] - THROAT + 5.0).max(0.0);
                 // The colours meet under the lapel, one cell from its outer edge.
                 let under = (lapel((local[1] - BUTTON) / (THROAT - BUTTON)) - 2.4).min(0.9);
                 let shown =
                     normal[2] > 0.15 && local[1] > BUTTON + 1.0 && local[0].abs() < opening(local[1]) + under - narrow;
-                return if shown { looks.second_colour } else { looks.top_colour };
+                return if shown { appearance.second_colour } else { appearance.top_colour };
             }
             // Coordinates along and around the trunk, or the arm if its sleeve is nearer.
             let on_trunk = trunk.distance(at);
@@ -121,21 +121,23 @@ impl BodyForm<'_> {
             let [along, around] = arm.map_or([local[1], local[0]], |side| {
                 let arm = &self.rig.arms[side];
                 let from = sub(at, stance.positions[arm.upper]).map(|v| v / stance.scale);
-                [dot(from, stance.direction(arm.upper, arm.fore)) + 0.5 * STRIPE, from[2]]
+                [dot(from, stance.direction(arm.upper, arm.forearm)) + 0.5 * STRIPE, from[2]]
             });
-            cloth_colour(looks, along, around)
+            cloth_colour(appearance, along, around)
         };
         points.iter().zip(normals).map(colour).collect()
     }
 }
 
 /// Colour of the cloth at a position along and around the body, cm.
-fn cloth_colour(looks: &Appearance, along: f64, around: f64) -> Reflectance {
+fn cloth_colour(appearance: &Appearance, along: f64, around: f64) -> Reflectance {
     let wave = |at: f64, period: f64| smooth_step(1.5 * (at / period * std::f64::consts::TAU).sin());
-    let share = match looks.weave {
+    let share = match appearance.weave {
         Weave::Plain => 0.0,
         Weave::Stripes => wave(along, STRIPE),
         Weave::Checks => (wave(along, CHECK) + wave(around, CHECK)) / 2.0,
     };
-    std::array::from_fn(|k| looks.top_colour[k] + share as f32 * (looks.second_colour[k] - looks.top_colour[k]))
+    std::array::from_fn(|k| {
+        appearance.top_colour[k] + share as f32 * (appearance.second_colour[k] - appearance.top_colour[k])
+    })
 }

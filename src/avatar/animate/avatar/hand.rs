@@ -68,7 +68,7 @@ impl HandForm {
             palm = palm.with(RoundCone::new(web, [cm(0.85), cm(0.85)]), cm(1.6));
         }
         // The wrist is wider than it is thick and reaches into the sleeve.
-        let elbow = stance.positions[arm.fore];
+        let elbow = stance.positions[arm.forearm];
         let stub = [mix(wrist, elbow, 0.30), mix(wrist, elbow, -0.03)];
         palm = palm.with(RoundCone::new(stub, [cm(2.5), cm(2.4)]).flattened(back, 0.76), cm(2.0));
 

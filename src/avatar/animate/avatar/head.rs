@@ -1,5 +1,5 @@
 //! Shape of head, ears and hair. Lengths are cm for a head of 21.5 cm from chin to crown, in the axes of its joint (x
-//! to its left, y up, z forward); `place` maps them into the stance at the size of the actual head.
+//! to its left, y up, z forward); `position` maps them into the stance at the size of the actual head.
 
 use super::appearance::{Appearance, Hairstyle};
 use super::field::{Form, RoundCone, smooth_union};
@@ -32,7 +32,7 @@ pub struct HeadForm<'a> {
     /// Skull with facial shape; defined for x >= 0 and mirrored.
     face: Form,
     neck: RoundCone,
-    looks: &'a Appearance,
+    appearance: &'a Appearance,
 }
 
 fn cone(a: Vec3, b: Vec3, radii: [f64; 2]) -> RoundCone {
@@ -45,12 +45,12 @@ fn smooth_difference(d: f64, hole: f64, blend: f64) -> f64 {
 }
 
 impl<'a> HeadForm<'a> {
-    pub fn new(rig: &Rig, stance: &'a Stance, looks: &'a Appearance) -> Self {
+    pub fn new(rig: &Rig, stance: &'a Stance, appearance: &'a Appearance) -> Self {
         let joint = rig.head;
-        let size = looks.head.map(|v| v * HEAD_SCALE);
+        let size = appearance.head.map(|v| v * HEAD_SCALE);
         let down = sub(stance.positions[rig.neck], stance.positions[joint]);
         let neck_y = down[1] / stance.scale / size[1];
-        let (jaw, nose) = (looks.jaw, looks.nose);
+        let (jaw, nose) = (appearance.jaw, appearance.nose);
         let skull = Form::default()
             .with(cone([0.0, 13.4, -1.9], [0.0, 13.6, 1.0], [7.6, 7.5]), 0.0)
             .with(cone([0.0, 10.6, 1.6], [0.0, 5.9, 2.6], [7.0, 5.9]), 4.5)
@@ -70,13 +70,13 @@ impl<'a> HeadForm<'a> {
             .with(cone([0.0, 11.3, 8.3], [0.0, 8.2, 9.9 + 0.3 * nose], [0.62, 0.85 * nose]), 1.1)
             .with(cone([0.0, 7.75, 10.5 * 0.5 + 5.25 * nose], [0.0, 7.4, 9.6], [0.92 * nose, 0.9 * nose]), 0.7)
             .with(cone([0.95 * nose, 7.15, 9.6], [1.2 * nose, 7.2, 9.0], [0.72 * nose, 0.6]), 0.6);
-        let girth = looks.neck;
+        let girth = appearance.neck;
         let neck = cone([0.0, neck_y - 1.0, -1.7], [0.0, 3.5, -0.9], [5.7 * girth, 5.0 * girth]);
-        Self { stance, joint, size, skull, face, neck, looks }
+        Self { stance, joint, size, skull, face, neck, appearance }
     }
 
     /// Maps a point of the reference head into the stance.
-    pub fn place(&self, at: Vec3) -> Vec3 {
+    pub fn position(&self, at: Vec3) -> Vec3 {
         self.stance.at(self.joint, [0, 1, 2].map(|k| at[k] * self.size[k]))
     }
 
@@ -87,7 +87,7 @@ impl<'a> HeadForm<'a> {
 
     /// Maps a surface of the reference head into the stance.
     pub fn placed(&self, mut surface: Surface) -> Surface {
-        surface.points.iter_mut().for_each(|at| *at = self.place(*at));
+        surface.points.iter_mut().for_each(|at| *at = self.position(*at));
         for normal in &mut surface.normals {
             let turned = [0, 1, 2].map(|k| normal[k] / self.size[k]);
             *normal = self.stance.world[self.joint].turn(unit(turned, 1e-9).unwrap_or(*normal));
@@ -104,7 +104,7 @@ impl<'a> HeadForm<'a> {
     /// Signed distance to head and neck, with eye sockets and the mouth cavity if there is a face.
     fn skin(&self, [x, y, z]: Vec3) -> f64 {
         let at = [x.abs(), y, z];
-        if !self.looks.face {
+        if !self.appearance.face {
             return self.without_cavities(at);
         }
         let [ex, ey, _] = EYE;
@@ -152,7 +152,7 @@ impl<'a> HeadForm<'a> {
 
     /// Surface of the hair, in the axes of the reference head; `None` if bald.
     pub fn hair_surface(&self) -> Option<Surface> {
-        let style = self.looks.hair;
+        let style = self.appearance.hair;
         if style == Hairstyle::Bald {
             return None;
         }
@@ -174,7 +174,7 @@ impl<'a> HeadForm<'a> {
             Hairstyle::Tied => 0.6,
             _ => 0.75,
         };
-        let (volume, fringe, parting) = (self.looks.hair_volume, self.looks.fringe, self.looks.parting);
+        let (volume, fringe, parting) = (self.appearance.hair_volume, self.appearance.fringe, self.appearance.parting);
         let field = |at: Vec3| {
             let [x, y, z] = at;
             // Hair is thicker on the crown and thin at the temples and the nape.

@@ -22,8 +22,8 @@ impl TwistedForearm {
     fn new(rig: &Rig, local: &[Rotation], side: usize, maps: &[JointMap], rest: &[Vec3]) -> Self {
         let arm = &rig.arms[side];
         let (_, angle) = local[arm.hand].swing_twist([1.0, 0.0, 0.0]);
-        let [x, y, z, shift] = maps[arm.fore];
-        let elbow = rest[arm.fore].map(|v| v as f32);
+        let [x, y, z, shift] = maps[arm.forearm];
+        let elbow = rest[arm.forearm].map(|v| v as f32);
         let turned = |step: usize| {
             // The bone is along x, so y and z rotate about the line through the elbow.
             let (sin, cos) = (angle as f32 * step as f32 / (N_TWISTS - 1) as f32).sin_cos();
@@ -32,7 +32,7 @@ impl TwistedForearm {
             let moved = |k: usize| (y[k] - u[k]) * elbow[1] + (z[k] - v[k]) * elbow[2];
             [x, u, v, std::array::from_fn(|k| shift[k] + moved(k))]
         };
-        Self { joint: arm.fore, maps: std::array::from_fn(turned) }
+        Self { joint: arm.forearm, maps: std::array::from_fn(turned) }
     }
 
     /// Map at a position along the forearm, 0 .. 1.
@@ -160,15 +160,15 @@ mod tests {
     #[test]
     fn a_bare_forearm_keeps_its_girth_when_the_hand_turns_and_bends() {
         let rig = default_rig();
-        let looks = Appearance { top: Top::ShortSleeves, ..Appearance::plain() };
-        let avatar = Avatar::new(&rig, &looks);
+        let appearance = Appearance { top: Top::ShortSleeves, ..Appearance::plain() };
+        let avatar = Avatar::new(&rig, &appearance);
         let arm = &rig.arms[0];
         // Mean distance of the skin from the forearm's axis, in slices from its middle to the wrist.
         let girth = |turn: Rotation| {
             let mut local = vec![Rotation::IDENTITY; rig.skeleton.joints.len()];
             local[arm.hand] = turn;
             let places = rig.skeleton.positions(rig.root, &local);
-            let (elbow, wrist) = (places[arm.fore], places[arm.hand]);
+            let (elbow, wrist) = (places[arm.forearm], places[arm.hand]);
             let long = norm(sub(wrist, elbow));
             let meshes = avatar.posed(&rig, rig.root, &local, 0.0);
             [0.5, 0.6, 0.7, 0.8, 0.9].map(|share| {

@@ -95,7 +95,7 @@ impl BodyForm<'_> {
         let trunk = self.trunk();
         let arms = [0, 1].map(|side| {
             let arm = &self.rig.arms[side];
-            let chain = self.chain(arm.clavicle, &[arm.upper, arm.fore], arm.hand, &[4.2 * cm]);
+            let chain = self.chain(arm.clavicle, &[arm.upper, arm.forearm], arm.hand, &[4.2 * cm]);
             (arm, self.sleeve(side), chain)
         });
         smoothed_weights(surface, 14, |at, shares| {
@@ -151,7 +151,7 @@ impl BodyForm<'_> {
         let arm = &self.rig.arms[side];
         let [a, b, c, tip] = finger_joints(self.rig, side, finger);
         let halves = if finger == 0 { [1.5, 0.9, 0.8] } else { [0.9, 0.75, 0.65] };
-        self.chain(arm.fore, &[arm.hand, a, b, c], tip, &halves.map(|half| half * scale))
+        self.chain(arm.forearm, &[arm.hand, a, b, c], tip, &halves.map(|half| half * scale))
     }
 
     /// Weights of a palm with its thumb, the wrist and a bare arm; `scale` is the size of the hand.
@@ -160,7 +160,7 @@ impl BodyForm<'_> {
         let thumb = self.finger(side, 0, scale);
         let knuckles: [usize; 5] = std::array::from_fn(|finger| finger_joints(self.rig, side, finger)[0]);
         let bends = [4.0 * self.stance.scale, 2.6 * scale];
-        let wrist = self.chain(arm.clavicle, &[arm.upper, arm.fore, arm.hand], knuckles[2], &bends);
+        let wrist = self.chain(arm.clavicle, &[arm.upper, arm.forearm, arm.hand], knuckles[2], &bends);
         let positions = &self.stance.positions;
         let thumb_line = finger_joints(self.rig, side, 0).map(|joint| positions[joint]);
         smoothed_weights(surface, 4, |at, shares| {

@@ -40,7 +40,7 @@ impl Stance {
         for (side, arm) in rig.arms.iter().enumerate() {
             let curl = [0.0, 0.0, -arm.sign];
             local[arm.upper] = Rotation::about(curl, ARM_DEGREES.to_radians());
-            local[arm.fore] = Rotation::about([0.0, -arm.sign, 0.0], ELBOW_DEGREES.to_radians());
+            local[arm.forearm] = Rotation::about([0.0, -arm.sign, 0.0], ELBOW_DEGREES.to_radians());
             for (finger, spread) in SPREAD_DEGREES.into_iter().enumerate() {
                 let degrees = if finger == 0 { THUMB_DEGREES } else { FINGER_DEGREES };
                 let joints = finger_joints(rig, side, finger);

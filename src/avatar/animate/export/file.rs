@@ -25,7 +25,7 @@ pub struct ExportContent<'a> {
     /// Naming convention of the bones, for formats with bone names.
     pub names: Names,
     /// What a film shows besides the avatar.
-    pub beside: film::SecondPanel<'a>,
+    pub second_panel: film::SecondPanel<'a>,
     /// Viewpoint of a film.
     pub camera: FilmCamera,
     /// Frame rate of a film; `None` interpolates to at least 30 fps (`film::smooth_rate`).
@@ -87,9 +87,8 @@ impl ExportFormat {
             "json" => Ok(Self::Json),
             "mp4" => Ok(Self::Mp4),
             _ => anyhow::bail!(
-                "{}: motion is written as .npy (joints), .txt (the authors' layout), .npz (joints with rate and mask), \
-                 .json, .bvh, .fbx, .glb, .vrm, .vrma or .mp4; \
-                 give the file one of these endings",
+                "{}: unknown motion format: expected .npy (joints), .txt (the authors' layout), .npz (joints with rate \
+                 and mask), .json, .bvh, .fbx, .glb, .vrm, .vrma or .mp4",
                 path.display()
             ),
         }
@@ -136,8 +135,8 @@ impl ExportFormat {
                 let fps = sources.film_fps.unwrap_or_else(|| film::smooth_rate(performance.clip.fps));
                 let resampled = (fps != performance.clip.fps).then(|| performance.resampled(fps));
                 let performance = resampled.as_ref().unwrap_or(performance);
-                let ExportContent { sound, beside, camera, .. } = *sources;
-                let content = film::FilmSource { performance, camera, sound, beside };
+                let ExportContent { sound, second_panel, camera, .. } = *sources;
+                let content = film::FilmSource { performance, camera, sound, second_panel };
                 workdir::replace(path, |attempt| film::write(attempt, content, progress))
             }
         }
@@ -155,7 +154,7 @@ impl ExportFormat {
             Self::AuthorsTxt => joints_description::with(path, fps, shape, |attempt| {
                 Ok(std::fs::write(attempt, authors_txt::format(motion))?)
             }),
-            _ => anyhow::bail!("{} holds more than joints", path.display()),
+            _ => anyhow::bail!("{} is not a file of joint positions: expected .npy, .npz or .txt", path.display()),
         }
     }
 }

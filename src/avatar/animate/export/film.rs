@@ -45,7 +45,7 @@ pub struct FilmSource<'a> {
     pub performance: &'a Performance,
     pub camera: FilmCamera,
     pub sound: Option<&'a Sound>,
-    pub beside: SecondPanel<'a>,
+    pub second_panel: SecondPanel<'a>,
 }
 
 /// Content of the second half of the image.
@@ -96,9 +96,9 @@ impl<'a> LabelledPanel<'a> {
 impl<'a> Film<'a> {
     /// Film with a fixed view in which every frame of the body fits.
     pub fn new(content: FilmSource<'a>) -> Self {
-        let FilmSource { performance, camera, sound, beside } = content;
+        let FilmSource { performance, camera, sound, second_panel } = content;
         let panel = |shown: &[&'a Performance], area, label| LabelledPanel::new(shown, camera, area, label);
-        let panels = match beside {
+        let panels = match second_panel {
             SecondPanel::Video { camera: Some(_), .. } => Vec::new(),
             SecondPanel::Itself => vec![panel(&[performance], FULL_AREA, "")],
             SecondPanel::Video { camera: None, .. } => vec![panel(&[performance], HALF_AREAS[1], "")],
@@ -107,7 +107,7 @@ impl<'a> Film<'a> {
                 panel(&[other, performance], HALF_AREAS[1], labels[1]),
             ],
         };
-        let overlay = match beside {
+        let overlay = match second_panel {
             SecondPanel::Video { path, from_secs, camera: Some(camera) } => {
                 Some(VideoOverlay { performance, path, from_secs, camera, open: None })
             }
@@ -165,9 +165,9 @@ impl<'a> Film<'a> {
 /// # Errors
 /// A video cannot be read or is too short, or the film cannot be written.
 pub fn write(path: &Path, content: FilmSource, progress: &dyn Progress) -> anyhow::Result<()> {
-    let FilmSource { performance, sound, beside, .. } = content;
+    let FilmSource { performance, sound, second_panel, .. } = content;
     let (fps, n_frames) = (performance.clip.fps, performance.clip.n_frames());
-    let mut footage = match beside {
+    let mut footage = match second_panel {
         SecondPanel::Video { path, from_secs, camera: None } => {
             Some(FilmFootage::open(path, fps, from_secs, HALF_AREAS[0])?)
         }
@@ -233,12 +233,15 @@ struct FilmFootage {
 
 impl FilmFootage {
     fn open(path: &Path, fps: FrameRate, from_secs: f64, area: FilmArea) -> anyhow::Result<Self> {
-        ensure!(from_secs.is_finite() && from_secs >= 0.0, "a video cannot be shown from second {from_secs} on");
+        ensure!(
+            from_secs.is_finite() && from_secs >= 0.0,
+            "invalid start {from_secs} s of the video: expected seconds >= 0"
+        );
         let mut frames = FrameReader::open(path, fps)?;
         for _ in 0..(from_secs * fps.per_sec()).round() as u64 {
             frames.advance()?.with_context(|| {
                 let secs = frames.duration_secs();
-                format!("{} lasts {secs:.1} s: it cannot be shown from second {from_secs} on", path.display())
+                format!("{} lasts {secs:.1} s: expected a start before its end, got {from_secs} s", path.display())
             })?;
         }
         let [left, top, right, bottom] = area;

@@ -52,7 +52,7 @@ impl SourceCamera {
         let n_frames = motion.n_frames();
         ensure!(
             keypoints.n_frames() == n_frames,
-            "{} frames of keypoints for {n_frames} of the motion: they are not of the same clip",
+            "the keypoints have {} frames, the motion has {n_frames}: expected the same clip",
             keypoints.n_frames()
         );
         let image_size = keypoints.image_size.map(f64::from);
@@ -62,21 +62,22 @@ impl SourceCamera {
                 let correspondence = |[joint, point]: [usize; 2]| {
                     let at = [0, 1, 2].map(|k| f64::from(motion.joints[[t, joint, k]]));
                     let px = [0, 1].map(|k| f64::from(keypoints.body[[t, point, k]]));
-                    let seen = [0, 1].map(|k| (px[k] - (image_size[k] - 1.0) / 2.0) / focal_px);
+                    let ray = [0, 1].map(|k| (px[k] - (image_size[k] - 1.0) / 2.0) / focal_px);
                     let is_known = keypoints.body[[t, point, 2]] >= SEEN_SCORE;
-                    (is_known && at.iter().chain(&seen).all(|v| v.is_finite())).then_some((at, seen))
+                    (is_known && at.iter().chain(&ray).all(|v| v.is_finite())).then_some((at, ray))
                 };
                 PAIRS.into_iter().filter_map(correspondence).collect()
             })
             .collect();
         let depths = frames.iter().filter_map(|matches| depth(matches));
         let depth = median(depths).context(
-            "no frame shows shoulders, elbows and wrists well enough to say where the camera of the video stands",
+            "cannot estimate the camera of the video: no frame shows shoulders, elbows and wrists well enough",
         )?;
-        let places: Vec<Option<[f64; 2]>> = frames.iter().map(|matches| lateral_position(matches, depth)).collect();
+        let positions: Vec<Option<[f64; 2]>> = frames.iter().map(|matches| lateral_position(matches, depth)).collect();
         let half_width = (AVERAGING_SECS * motion.fps.per_sec()).round() as usize;
-        let averaged =
-            |t: usize| mean(places[t.saturating_sub(half_width)..(t + half_width + 1).min(n_frames)].iter().flatten());
+        let averaged = |t: usize| {
+            mean(positions[t.saturating_sub(half_width)..(t + half_width + 1).min(n_frames)].iter().flatten())
+        };
         let known: Vec<(usize, [f64; 2])> = (0..n_frames).filter_map(|t| Some((t, averaged(t)?))).collect();
         let necks = (0..n_frames).filter_map(|t| between(&known, t)).map(|[x, y]| [x, y, depth]).collect();
         Ok(Self { fps: motion.fps, image_size, necks })
@@ -117,13 +118,13 @@ fn depth(matches: &[Correspondence]) -> Option<f64> {
 
 /// Position of the neck parallel to the image plane, at a given depth, metres.
 fn lateral_position(matches: &[Correspondence], depth: f64) -> Option<[f64; 2]> {
-    let places: Vec<[f64; 2]> =
-        matches.iter().map(|&(at, seen)| [0, 1].map(|k| seen[k] * (at[2] + depth) - at[k])).collect();
-    if places.len() < MIN_CORRESPONDENCES { None } else { mean(places.iter()) }
+    let positions: Vec<[f64; 2]> =
+        matches.iter().map(|&(at, ray)| [0, 1].map(|k| ray[k] * (at[2] + depth) - at[k])).collect();
+    if positions.len() < MIN_CORRESPONDENCES { None } else { mean(positions.iter()) }
 }
 
-fn mean<'a>(places: impl Iterator<Item = &'a [f64; 2]>) -> Option<[f64; 2]> {
-    let (sum, n) = places.fold(([0.0; 2], 0.0), |([x, y], n), at| ([x + at[0], y + at[1]], n + 1.0));
+fn mean<'a>(positions: impl Iterator<Item = &'a [f64; 2]>) -> Option<[f64; 2]> {
+    let (sum, n) = positions.fold(([0.0; 2], 0.0), |([x, y], n), at| ([x + at[0], y + at[1]], n + 1.0));
     (n > 0.0).then(|| sum.map(|v| v / n))
 }
 
@@ -185,6 +186,6 @@ mod tests {
         let mut undetected = keypoints.clone();
         undetected.body.fill(0.0);
         let error = SourceCamera::fit(&motion, &undetected).unwrap_err().to_string();
-        assert!(error.contains("where the camera of the video stands"), "{error}");
+        assert!(error.contains("cannot estimate the camera of the video"), "{error}");
     }
 }

@@ -45,7 +45,7 @@ impl BoneMap {
         for (own, name) in table {
             ensure!(
                 ours.joints.iter().any(|joint| !joint.end && joint.name == own),
-                "{own} is no bone of ours; `--write-bone-map` writes a map with all of them"
+                "unknown bone {own}: `--write-bone-map` writes a map with all bone names"
             );
             let found = rig.joints.iter().position(|joint| joint.moves && joint.name == name);
             let joint = found.with_context(|| format!("{own}: the skeleton has no joint {name}; {}", listed(rig)))?;
@@ -60,7 +60,7 @@ impl BoneMap {
             Some(joint) => format!("{own} = {:?}\n", rig.joints[joint].name),
             None => format!("# {own} = \"\"\n"),
         };
-        let head = "# Our bone = the joint of your skeleton that it moves. A bone without a line moves nothing.\n";
+        let head = "# Bone of orator = joint of your skeleton that it moves. Bones without a line move no joint.\n";
         let bones = ours.joints.iter().filter(|joint| !joint.end).map(|joint| line(&joint.name));
         head.to_owned() + &bones.collect::<String>()
     }
@@ -78,13 +78,16 @@ impl BoneMap {
     fn checked(self, rig: &UserRig) -> Result<Self> {
         let missing: Vec<&str> = REQUIRED.into_iter().filter(|own| !self.joints.contains_key(*own)).collect();
         if !missing.is_empty() {
-            bail!("no joint for {}; {}; name them with --bone-map", missing.join(", "), listed(rig));
+            bail!("no joint found for {}; {}; map them with --bone-map", missing.join(", "), listed(rig));
         }
         for side in ["Left", "Right"] {
             for (above, below) in [("Arm", "ForeArm"), ("ForeArm", "Hand")] {
                 let [above, below] = [above, below].map(|bone| self.joints[&format!("{side}{bone}")]);
                 let [a, b] = [above, below].map(|joint| &rig.joints[joint].name);
-                ensure!(rig.is_below(below, above), "{b} does not hang on {a}: name the arm's joints with --bone-map");
+                ensure!(
+                    rig.is_below(below, above),
+                    "{b} is not a descendant of {a}: map the joints of the arm with --bone-map"
+                );
             }
         }
         Ok(self)
@@ -104,5 +107,5 @@ fn chest(rig: &UserRig, joints: &BTreeMap<String, usize>) -> Option<usize> {
 
 fn listed(rig: &UserRig) -> String {
     let names: Vec<&str> = rig.joints.iter().filter(|joint| joint.moves).map(|joint| joint.name.as_str()).collect();
-    format!("its joints are: {}", names[..names.len().min(MAX_LISTED)].join(" "))
+    format!("available joints: {}", names[..names.len().min(MAX_LISTED)].join(" "))
 }

@@ -26,7 +26,7 @@ impl BvhRig {
         for joint in skeleton.joints.iter().filter(|joint| !joint.channels.is_empty()) {
             ensure!(
                 joint.rotation_order().is_some(),
-                "joint {} has no three rotation channels about different axes; give the skeleton with them",
+                "joint {}: expected three rotation channels about different axes",
                 joint.name
             );
         }
@@ -44,7 +44,7 @@ impl BvhRig {
             scale: 1.0,
             moves: !joint.channels.is_empty(),
         };
-        UserRig { joints: self.skeleton.joints.iter().map(joint).collect(), standing: self.first_frame() }
+        UserRig { joints: self.skeleton.joints.iter().map(joint).collect(), standing_pose: self.first_frame() }
     }
 
     /// Text of the file with new motion: the local rotations of all joints for each frame.

@@ -7,6 +7,7 @@ use crate::animate::export::glb_scene::with_continuous_signs;
 use anyhow::{Context as _, Result, ensure};
 use orator_base::math::rotation::Rotation;
 use orator_base::math::vec3::Vec3;
+use orator_base::text::number;
 use orator_base::types::time::FrameRate;
 use orator_formats::bvh::read::MAX_JOINTS;
 use serde::Deserialize;
@@ -33,17 +34,17 @@ impl GlbRig {
     ///
     /// # Errors
     /// The bytes are not a GLB file, buffers are in other files, the nodes do not form a tree, or a node is scaled
-    /// non-uniformly or placed by a matrix.
+    /// non-uniformly or has a matrix.
     pub fn new(file: &[u8]) -> Result<Self> {
         let (scene, bytes) = chunks(file)?;
         let buffers = scene["buffers"].as_array().map_or(0, Vec::len);
         let is_outside = scene["buffers"].as_array().into_iter().flatten().any(|buffer| buffer.get("uri").is_some());
-        ensure!(buffers <= 1 && !is_outside, "its data lie in other files; export it as one .glb");
+        ensure!(buffers <= 1 && !is_outside, "buffers in other files: export the scene as a single .glb");
         let list = |key: &str| scene[key].as_array().into_iter().flatten();
         let n_nodes = list("nodes").count();
-        ensure!(n_nodes <= MAX_JOINTS, "it has {n_nodes} nodes, {MAX_JOINTS} at most: export the figure alone");
+        ensure!(n_nodes <= MAX_JOINTS, "{n_nodes} nodes, expected at most {MAX_JOINTS}: export only the character");
         let nodes = list("nodes").enumerate().map(|(n, node)| {
-            SceneNode::deserialize(node).with_context(|| format!("node {n} is not as glTF 2.0 describes nodes"))
+            SceneNode::deserialize(node).with_context(|| format!("node {n} is not a valid glTF 2.0 node"))
         });
         let nodes: Vec<SceneNode> = nodes.collect::<Result<_>>()?;
         let skin_joints = list("skins").flat_map(|skin| skin["joints"].as_array().into_iter().flatten());
@@ -51,8 +52,7 @@ impl GlbRig {
         let has_skin = list("skins").next().is_some();
         let mut is_child = vec![false; nodes.len()];
         for &child in nodes.iter().flat_map(|node| &node.children) {
-            let has_parent =
-                is_child.get_mut(child).with_context(|| format!("a node has the child {child}, which is missing"))?;
+            let has_parent = is_child.get_mut(child).with_context(|| format!("child node {child} does not exist"))?;
             ensure!(!*has_parent, "node {child} has two parents");
             *has_parent = true;
         }
@@ -65,8 +65,8 @@ impl GlbRig {
             order.push(node);
             stack.extend(nodes[node].children.iter().rev().map(|&child| (child, Some(at))));
         }
-        ensure!(joints.len() == nodes.len(), "its nodes are no tree");
-        Ok(Self { nodes: order, rig: UserRig { joints, standing: Vec::new() }, scene, bytes })
+        ensure!(joints.len() == nodes.len(), "the nodes do not form a tree");
+        Ok(Self { nodes: order, rig: UserRig { joints, standing_pose: Vec::new() }, scene, bytes })
     }
 
     /// The skeleton at rest.
@@ -120,8 +120,12 @@ impl GlbRig {
 fn chunks(file: &[u8]) -> Result<(Value, Vec<u8>)> {
     let length = file.get(12..16).map_or(0, |word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]));
     let mib = length >> 20;
-    ensure!(length <= MAX_SCENE_BYTES, "its scene is described in {mib} MiB of JSON: export the figure alone");
-    parsed_chunks(file).context("no binary glTF 2.0 (.glb)")
+    ensure!(
+        length <= MAX_SCENE_BYTES,
+        "the scene has {mib} MiB of JSON, expected at most {} MiB: export only the character",
+        MAX_SCENE_BYTES >> 20
+    );
+    parsed_chunks(file).context("not a binary glTF 2.0 file (.glb)")
 }
 
 fn parsed_chunks(file: &[u8]) -> Option<(Value, Vec<u8>)> {
@@ -158,17 +162,23 @@ impl Default for SceneNode {
 }
 
 impl SceneNode {
-    fn joint(&self, number: usize, parent: Option<usize>, moves: bool) -> Result<UserJoint> {
-        let name = self.name.clone().unwrap_or_else(|| format!("node {number}"));
+    fn joint(&self, index: usize, parent: Option<usize>, moves: bool) -> Result<UserJoint> {
+        let name = self.name.clone().unwrap_or_else(|| format!("node {index}"));
         let is_plain = self.matrix.is_none();
-        ensure!(is_plain, "{name} is placed by a matrix; export the file with translation, rotation and scale");
+        ensure!(is_plain, "{name} has a matrix: export the file with translation, rotation and scale");
         let [x, y, z, w] = self.rotation;
         let length = (x * x + y * y + z * z + w * w).sqrt();
-        ensure!(length > 1e-6, "the rotation of {name} is {:?}, expected a unit quaternion", self.rotation);
+        ensure!(length > 1e-6, "invalid rotation {:?} of {name}: expected a unit quaternion", self.rotation);
         let rest = Rotation { w: w / length, v: [x / length, y / length, z / length] };
         let [x, y, z] = self.scale;
         let is_uniform = (x - y).abs().max((x - z).abs()) <= MAX_SCALE_DIFFERENCE * x.abs();
-        ensure!(is_uniform && x > 0.0, "{name} is scaled by {x}, {y}, {z}; apply its scale and export it again");
+        ensure!(
+            is_uniform && x > 0.0,
+            "scale {}, {}, {} of {name}: expected a uniform positive scale; apply the scale and export again",
+            number(x),
+            number(y),
+            number(z)
+        );
         Ok(UserJoint { name, parent, offset: self.translation, rest, scale: x, moves })
     }
 }

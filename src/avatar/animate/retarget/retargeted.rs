@@ -32,7 +32,7 @@ impl RetargetRig {
     /// # Errors
     /// The file cannot be read, or contains no usable skeleton.
     pub fn open(path: &Path) -> Result<Self> {
-        let invalid_rig = || format!("{} gives no skeleton", path.display());
+        let invalid_rig = || format!("{} has no usable skeleton", path.display());
         let file = match extension(path).as_str() {
             "bvh" => RigFile::Bvh(BvhRig::new(&Bvh::read(path)?).with_context(invalid_rig)?),
             "glb" => {
@@ -40,7 +40,7 @@ impl RetargetRig {
                     input::read(path, input::MOST_DATA).with_context(|| format!("cannot read {}", path.display()))?;
                 RigFile::Glb(GlbRig::new(&bytes).with_context(invalid_rig)?)
             }
-            _ => bail!("{}: the skeleton to move is given as .bvh or .glb", path.display()),
+            _ => bail!("{}: unsupported skeleton format: expected .bvh or .glb", path.display()),
         };
         let rig = match &file {
             RigFile::Bvh(bvh) => bvh.rig(),
@@ -63,7 +63,7 @@ impl RetargetRig {
             RigFile::Bvh(_) => "bvh",
             RigFile::Glb(_) => "glb",
         };
-        ensure!(extension(path) == own, "{}: a skeleton from a .{own} is written as .{own}", path.display());
+        ensure!(extension(path) == own, "{}: expected a .{own} file, the format of the skeleton", path.display());
         Ok(())
     }
 

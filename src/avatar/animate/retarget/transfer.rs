@@ -69,8 +69,8 @@ impl<'a> Transfer<'a> {
     pub fn new(rig: &Rig, user: &'a UserRig, map: &BoneMap) -> Result<Self> {
         let ours = &rig.skeleton;
         let t_pose = ours.positions(rig.root, &vec![Rotation::IDENTITY; ours.joints.len()]);
-        let undetermined = "no left and right, or no up and down, at rest";
-        let (rest, standing) = (user.at_rest(), user.standing());
+        let undetermined = "cannot determine left, right, up and down in the rest pose";
+        let (rest, standing) = (user.at_rest(), user.standing_pose());
         let at_rest = facing(&rest, map);
         let standing_axes = facing(&standing, map).or(at_rest).context(undetermined)?;
         // If the zero pose is not upright like the standing pose, the standing pose is the reference.
@@ -93,12 +93,12 @@ impl<'a> Transfer<'a> {
             let names = ["Arm", "ForeArm", "Hand"].map(|bone| format!("{side}{bone}"));
             let found = |name: &String| map.joint(name).zip(ours.find(name));
             let [a, b, c] = names.each_ref().map(found);
-            let (a, b, c) = a.zip(b).zip(c).map(|((a, b), c)| (a, b, c)).context("an arm is not whole")?;
+            let (a, b, c) = a.zip(b).zip(c).map(|((a, b), c)| (a, b, c)).context("an arm has missing bones")?;
             let length = |from: usize, to: usize| norm(sub(rest[to].position, rest[from].position));
             let lengths = [length(a.0, b.0), length(b.0, c.0)];
             ensure!(
                 lengths.iter().all(|&length| length > 1e-9 && length < MAX_BONE_LENGTH),
-                "the {side} arm has no length at rest"
+                "the {side} arm has an invalid length in the rest pose"
             );
             Ok(ArmPair { theirs: [a.0, b.0, c.0], ours: [a.1, b.1, c.1], lengths })
         };

@@ -34,7 +34,7 @@ pub struct UserRig {
     pub joints: Vec<UserJoint>,
     /// Local rotations of a pose that is upright in the world of the file, since a zero pose may lie down. Empty if the
     /// rest pose is to be used.
-    pub standing: Vec<Rotation>,
+    pub standing_pose: Vec<Rotation>,
 }
 
 impl UserRig {
@@ -59,11 +59,11 @@ impl UserRig {
     }
 
     /// World transforms of the joints in the standing pose.
-    pub fn standing(&self) -> Vec<JointTransform> {
-        if self.standing.is_empty() {
+    pub fn standing_pose(&self) -> Vec<JointTransform> {
+        if self.standing_pose.is_empty() {
             self.at_rest()
         } else {
-            self.placed(|joint, parent| parent * self.standing[joint])
+            self.placed(|joint, parent| parent * self.standing_pose[joint])
         }
     }
 

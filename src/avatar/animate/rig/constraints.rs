@@ -30,18 +30,18 @@ impl Constraints {
     pub const NONE: Self = Self { limits: false, curl_coherence: false };
 
     /// Constrains one frame of local rotations.
-    pub fn apply(self, rig: &Rig, local: &mut [Rotation], tally: &mut ClampTally) {
+    pub fn apply(self, rig: &Rig, local: &mut [Rotation], counter: &mut ClampCounter) {
         if self == Self::NONE {
             return;
         }
-        tally.n_frames += 1;
+        counter.n_frames += 1;
         for arm in &rig.arms {
             let mut pose = ArmPose::from_rotations(arm, local);
             if self.limits {
-                limit(&mut pose, tally);
+                limit(&mut pose, counter);
             }
             if self.curl_coherence {
-                limit_curl_spread(&mut pose, tally);
+                limit_curl_spread(&mut pose, counter);
             }
             pose.write(arm, local);
         }
@@ -51,18 +51,18 @@ impl Constraints {
 /// Kinds of clamps, with the number of such angles in both arms.
 const KINDS: [(&str, usize); 14] = [
     ("elbow flexion", 2),
-    ("elbow to the side", 2),
-    ("forearm turn", 2),
+    ("elbow side bend", 2),
+    ("forearm rotation", 2),
     ("wrist flexion", 2),
     ("wrist deviation", 2),
     ("knuckle flexion", 8),
     ("knuckle spread", 8),
     ("middle joint flexion", 8),
-    ("middle joint to the side", 8),
+    ("middle joint side bend", 8),
     ("end joint flexion", 8),
-    ("end joint to the side", 8),
+    ("end joint side bend", 8),
     ("thumb flexion", 6),
-    ("thumb to the side", 6),
+    ("thumb side bend", 6),
     ("curl coherence", 24),
 ];
 const ELBOW: usize = 0;
@@ -88,13 +88,13 @@ pub struct Clamps {
 
 /// Counter of clamps.
 #[derive(Clone, Debug, Default)]
-pub struct ClampTally {
+pub struct ClampCounter {
     n_frames: usize,
     /// Count, sum and maximum of the excess (degrees), by kind.
     kinds: [(usize, f64, f64); KINDS.len()],
 }
 
-impl ClampTally {
+impl ClampCounter {
     fn changed(&mut self, kind: usize, from: f64, to: f64) -> f64 {
         let excess = turn(from - to).abs();
         if excess > MIN_CLAMP_DEGREES {
@@ -121,30 +121,30 @@ impl ClampTally {
     }
 }
 
-fn limit(pose: &mut ArmPose, tally: &mut ClampTally) {
-    pose.elbow = bend(pose.elbow, limits::ELBOW, ELBOW, tally);
+fn limit(pose: &mut ArmPose, counter: &mut ClampCounter) {
+    pose.elbow = bend(pose.elbow, limits::ELBOW, ELBOW, counter);
     // An angle tracked beyond half a turn still exceeds the same limit.
     let [pronated, supinated] = limits::SUPINATION;
     let turned = pose.supination.clamp(pronated, supinated);
     // For a hand bent sideways across the forearm, forearm rotation and wrist flexion cannot be distinguished.
     let turned = turned * certainty(pose.wrist.side);
-    pose.supination = tally.changed(TURN, pose.supination, turned);
-    pose.wrist = bend(pose.wrist, limits::WRIST, WRIST, tally);
+    pose.supination = counter.changed(TURN, pose.supination, turned);
+    pose.wrist = bend(pose.wrist, limits::WRIST, WRIST, counter);
     for (finger, limits) in limits::FINGERS.iter().enumerate() {
         for (k, &limit) in limits.iter().enumerate() {
             let kind = if finger == 0 { THUMB } else { FINGER + 2 * k };
-            pose.fingers[finger][k] = bend(pose.fingers[finger][k], limit, kind, tally);
+            pose.fingers[finger][k] = bend(pose.fingers[finger][k], limit, kind, counter);
         }
     }
 }
 
 /// Clamps a bend to its limits; `kind` counts the flexion, `kind + 1` the side.
-fn bend(given: Bend, limit: Limit, kind: usize, tally: &mut ClampTally) -> Bend {
+fn bend(given: Bend, limit: Limit, kind: usize, counter: &mut ClampCounter) -> Bend {
     let middle = (limit.flexion[0] + limit.flexion[1]) / 2.0;
     let flexion = middle + certainty(given.side) * (clamp_circular(limit.flexion, given.flexion) - middle);
     Bend {
-        flexion: tally.changed(kind, given.flexion, flexion),
-        side: tally.changed(kind + 1, given.side, given.side.clamp(limit.side[0], limit.side[1])),
+        flexion: counter.changed(kind, given.flexion, flexion),
+        side: counter.changed(kind + 1, given.side, given.side.clamp(limit.side[0], limit.side[1])),
     }
 }
 
@@ -155,13 +155,13 @@ fn certainty(side: f64) -> f64 {
 
 /// Clamps the four fingers' flexion, level by level, to a range around their mean. The mean is that of the result, so a
 /// second application changes nothing.
-fn limit_curl_spread(pose: &mut ArmPose, tally: &mut ClampTally) {
+fn limit_curl_spread(pose: &mut ArmPose, counter: &mut ClampCounter) {
     for k in 0..3 {
         let given = [1, 2, 3, 4].map(|finger: usize| pose.fingers[finger][k].flexion);
         let mean = coherent_mean(given);
         for (finger, flexion) in (1..).zip(given) {
             let to = flexion.clamp(mean - CURL_COHERENCE, mean + CURL_COHERENCE);
-            pose.fingers[finger][k].flexion = tally.changed(COHERENCE, flexion, to);
+            pose.fingers[finger][k].flexion = counter.changed(COHERENCE, flexion, to);
         }
     }
 }

@@ -35,7 +35,7 @@ impl Hinge {
 
     /// Rotation with these angles and without twist.
     pub fn rotation(&self, bend: Bend) -> Rotation {
-        self.rest * flexed(bend.flexion) * sideways(bend.side) * self.rest.inverse()
+        self.rest * flexed(bend.flexion) * side_bend(bend.side) * self.rest.inverse()
     }
 
     /// Direction of the bone at rest.
@@ -50,7 +50,7 @@ pub fn flexed(degrees: f64) -> Rotation {
 }
 
 /// Rotation about -y, from x towards z.
-pub fn sideways(degrees: f64) -> Rotation {
+pub fn side_bend(degrees: f64) -> Rotation {
     Rotation::about([0.0, -1.0, 0.0], degrees.to_radians())
 }
 

@@ -40,7 +40,7 @@ pub struct RigArm {
     pub sign: f64,
     pub clavicle: usize,
     pub upper: usize,
-    pub fore: usize,
+    pub forearm: usize,
     pub hand: usize,
     /// Thumb to little finger, three phalanges each.
     pub fingers: [[usize; 3]; 5],
@@ -117,10 +117,10 @@ fn push_arm(
     let bone = |joint: usize, direction: Vec3| on_side(scale(direction, metres[joint] * CM));
     let clavicle = bones.push(&format!("{side}Shoulder"), Some(chest), neck, false);
     let upper = bones.push(&format!("{side}Arm"), Some(clavicle), bone(shoulder, X), false);
-    let fore = bones.push(&format!("{side}ForeArm"), Some(upper), bone(shoulder + 1, X), false);
-    let hand = bones.push(&format!("{side}Hand"), Some(fore), bone(shoulder + 2, X), false);
+    let forearm = bones.push(&format!("{side}ForeArm"), Some(upper), bone(shoulder + 1, X), false);
+    let hand = bones.push(&format!("{side}Hand"), Some(forearm), bone(shoulder + 2, X), false);
     positions[shoulder] = upper;
-    positions[shoulder + 1] = fore;
+    positions[shoulder + 1] = forearm;
     positions[shoulder + 2] = hand;
     positions[hand_root] = hand;
     let mut fingers = [[0; 3]; 5];
@@ -139,7 +139,7 @@ fn push_arm(
             }
         }
     }
-    RigArm { sign, clavicle, upper, fore, hand, fingers }
+    RigArm { sign, clavicle, upper, forearm, hand, fingers }
 }
 
 /// Hinge of a finger's joints in the axes of the left hand: the four fingers point along x and flex about the knuckle

@@ -60,7 +60,7 @@ pub fn rotations(positions: &JointPositions, rig: &Rig, filters: &SolveFilters) 
     solve(positions, left, &chest, filters, &mut local);
     solve(&positions.mirrored(), right, &mirrored(chest), filters, &mut local);
     let fingers = right.fingers.iter().flatten();
-    for &joint in [right.clavicle, right.upper, right.fore, right.hand].iter().chain(fingers) {
+    for &joint in [right.clavicle, right.upper, right.forearm, right.hand].iter().chain(fingers) {
         local[joint] = mirrored(std::mem::take(&mut local[joint]));
     }
     local
@@ -109,7 +109,7 @@ fn solve(
     for t in 0..n_frames {
         let (supination, wrist) = ArmPose::hand_angles(hand[t], previous, MAX_TRACKED_DEGREES);
         previous = supination;
-        (local[arm.fore][t], local[arm.hand][t]) = ArmPose::shared(fore[t], supination, wrist);
+        (local[arm.forearm][t], local[arm.hand][t]) = ArmPose::shared(fore[t], supination, wrist);
     }
     for (finger, joints) in arm.fingers.iter().enumerate() {
         let bones = solve_finger(positions, &frames, finger, &filters.fingers);

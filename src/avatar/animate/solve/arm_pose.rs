@@ -1,7 +1,7 @@
 //! Angles of a left arm below its upper arm, and their conversion to and from local rotations of the rig. Half of the
 //! hand's rotation about the forearm is given to the forearm.
 
-use crate::animate::rig::hinge::{Bend, Hinge, flexed, sideways};
+use crate::animate::rig::hinge::{Bend, Hinge, flexed, side_bend};
 use crate::animate::rig::limits::turn;
 use crate::animate::rig::rig::{RigArm, finger_hinge};
 use orator_base::math::rotation::Rotation;
@@ -31,9 +31,9 @@ impl ArmPose {
     /// dropped.
     pub fn from_rotations(arm: &RigArm, local: &[Rotation]) -> Self {
         let of = |joint: usize| on_left(arm, local[joint]);
-        let (fore, hand) = (of(arm.fore), of(arm.hand));
-        let elbow_bend = elbow().bend(fore.turn(X));
-        let untwisted = elbow().rotation(elbow_bend).inverse() * fore;
+        let (forearm, hand) = (of(arm.forearm), of(arm.hand));
+        let elbow_bend = elbow().bend(forearm.turn(X));
+        let untwisted = elbow().rotation(elbow_bend).inverse() * forearm;
         let (_, half) = untwisted.swing_twist(X);
         let (supination, wrist) = Self::hand_angles(untwisted * hand, -2.0 * half.to_degrees(), 0.0);
         let fingers = std::array::from_fn(|finger| {
@@ -46,8 +46,8 @@ impl ArmPose {
     /// Writes the angles into a frame's local rotations.
     pub fn write(&self, arm: &RigArm, local: &mut [Rotation]) {
         let mut put = |joint: usize, rotation: Rotation| local[joint] = on_left(arm, rotation);
-        let (fore, hand) = Self::shared(elbow().rotation(self.elbow), self.supination, self.wrist);
-        put(arm.fore, fore);
+        let (forearm, hand) = Self::shared(elbow().rotation(self.elbow), self.supination, self.wrist);
+        put(arm.forearm, forearm);
         put(arm.hand, hand);
         for (finger, bends) in self.fingers.iter().enumerate() {
             for (&joint, &bend) in arm.fingers[finger].iter().zip(bends) {
@@ -59,12 +59,12 @@ impl ArmPose {
     /// Supination and wrist angles of a hand relative to the untwisted forearm. The supination is the equivalent angle
     /// nearest to `previous`, unless its magnitude exceeds 180 + `tolerance` degrees.
     pub fn hand_angles(hand: Rotation, previous: f64, tolerance: f64) -> (f64, Bend) {
-        // hand = about x (supination) * sideways * flexed: the image of the flexion axis -z gives the first two.
+        // hand = about x (supination) * side_bend * flexed: the image of the flexion axis -z gives the first two.
         let [x, y, z] = hand.turn([0.0, 0.0, 1.0]);
         let pronation = (-y).atan2(z).to_degrees();
         let along = (about_x(pronation).inverse() * hand).turn(X);
         let side = (-x).clamp(-1.0, 1.0).asin().to_degrees();
-        let [x, y, _] = sideways(side).inverse().turn(along);
+        let [x, y, _] = side_bend(side).inverse().turn(along);
         let near = previous + turn(-pronation - previous);
         let supination = if tolerance > 0.0 && near.abs() > 180.0 + tolerance { -pronation } else { near };
         (supination, Bend { flexion: (-y).atan2(x).to_degrees(), side })
@@ -72,13 +72,13 @@ impl ArmPose {
 
     /// Hand rotation of these angles relative to the untwisted forearm.
     pub fn hand(supination: f64, wrist: Bend) -> Rotation {
-        about_x(-supination) * sideways(wrist.side) * flexed(wrist.flexion)
+        about_x(-supination) * side_bend(wrist.side) * flexed(wrist.flexion)
     }
 
     /// Local rotations of forearm and hand; `bent` is the rotation of the untwisted forearm.
     pub fn shared(bent: Rotation, supination: f64, wrist: Bend) -> (Rotation, Rotation) {
         let half = about_x(-supination / 2.0);
-        (bent * half, half * sideways(wrist.side) * flexed(wrist.flexion))
+        (bent * half, half * side_bend(wrist.side) * flexed(wrist.flexion))
     }
 }
 

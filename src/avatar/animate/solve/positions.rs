@@ -13,39 +13,40 @@ const LEVER_METRES: f64 = 0.1;
 
 /// Joint positions by frame.
 pub struct JointPositions {
-    places: Vec<[Option<Vec3>; N_JOINTS]>,
+    positions: Vec<[Option<Vec3>; N_JOINTS]>,
     /// Errors of the left and right hand's directions, estimated by the joint limits, radians, by frame.
     hand_errors: [Vec<f64>; 2],
 }
 
 impl JointPositions {
     pub fn from_motion(motion: &Motion) -> Self {
-        let place = |frame: &ndarray::ArrayView2<f32>, joint: usize| {
-            let place = [0, 1, 2].map(|k| f64::from(frame[[joint, k]]) * if k == 0 { 1.0 } else { -1.0 });
-            place.iter().all(|v| v.is_finite()).then_some(place)
+        let position = |frame: &ndarray::ArrayView2<f32>, joint: usize| {
+            let position = [0, 1, 2].map(|k| f64::from(frame[[joint, k]]) * if k == 0 { 1.0 } else { -1.0 });
+            position.iter().all(|v| v.is_finite()).then_some(position)
         };
-        let frame = |frame: ndarray::ArrayView2<f32>| std::array::from_fn(|joint| place(&frame, joint));
-        let places: Vec<_> = motion.joints.outer_iter().map(frame).collect();
-        let hand_errors = [vec![0.0; places.len()], vec![0.0; places.len()]];
-        Self { places, hand_errors }
+        let frame = |frame: ndarray::ArrayView2<f32>| std::array::from_fn(|joint| position(&frame, joint));
+        let positions: Vec<_> = motion.joints.outer_iter().map(frame).collect();
+        let hand_errors = [vec![0.0; positions.len()], vec![0.0; positions.len()]];
+        Self { positions, hand_errors }
     }
 
-    /// Replaces the joints by `place` (frame, joint); missing ones stay missing. The displacement of a hand's finger
+    /// Replaces the joints by `position` (frame, joint); missing ones stay missing. The displacement of a hand's finger
     /// tips is an estimate of the error of its directions.
-    pub fn with_positions(&self, place: impl Fn(usize, usize) -> Vec3) -> Self {
+    pub fn with_positions(&self, position: impl Fn(usize, usize) -> Vec3) -> Self {
         let frame = |(t, frame): (usize, &[Option<Vec3>; N_JOINTS])| {
-            std::array::from_fn(|joint| frame[joint].map(|_| place(t, joint)))
+            std::array::from_fn(|joint| frame[joint].map(|_| position(t, joint)))
         };
-        let places: Vec<[Option<Vec3>; N_JOINTS]> = self.places.iter().enumerate().map(frame).collect();
+        let positions: Vec<[Option<Vec3>; N_JOINTS]> = self.positions.iter().enumerate().map(frame).collect();
         let error = |t: usize, root: usize, wrist: usize| {
-            let from_wrist = |places: &[Option<Vec3>; N_JOINTS], tip: usize| Some(sub(places[tip]?, places[wrist]?));
-            let moved = |tip| Some(norm(sub(from_wrist(&places[t], tip)?, from_wrist(&self.places[t], tip)?)));
+            let from_wrist =
+                |positions: &[Option<Vec3>; N_JOINTS], tip: usize| Some(sub(positions[tip]?, positions[wrist]?));
+            let moved = |tip| Some(norm(sub(from_wrist(&positions[t], tip)?, from_wrist(&self.positions[t], tip)?)));
             let moved: Vec<f64> = (1..=5).filter_map(|finger| moved(root + 4 * finger)).collect();
             moved.iter().sum::<f64>() / moved.len().max(1) as f64 / LEVER_METRES
         };
         let hand_errors = [(L_HAND, L_WRIST), (R_HAND, R_WRIST)]
-            .map(|(root, wrist)| (0..places.len()).map(|t| error(t, root, wrist)).collect());
-        Self { places, hand_errors }
+            .map(|(root, wrist)| (0..positions.len()).map(|t| error(t, root, wrist)).collect());
+        Self { positions, hand_errors }
     }
 
     /// Error of the left hand's directions, radians, by frame; 0 if the limits changed nothing.
@@ -59,41 +60,41 @@ impl JointPositions {
             std::array::from_fn(|joint| frame[skeleton::mirror(joint)].map(|[x, y, z]| [-x, y, z]))
         };
         let [left, right] = &self.hand_errors;
-        Self { places: self.places.iter().map(image).collect(), hand_errors: [right.clone(), left.clone()] }
+        Self { positions: self.positions.iter().map(image).collect(), hand_errors: [right.clone(), left.clone()] }
     }
 
     pub fn n_frames(&self) -> usize {
-        self.places.len()
+        self.positions.len()
     }
 
     /// Unit vector from one joint to another; `None` if a joint is missing or both coincide.
     pub fn direction(&self, t: usize, from: usize, to: usize) -> Option<Vec3> {
-        unit(sub(self.place(t, to)?, self.place(t, from)?), MIN_METRES)
+        unit(sub(self.position(t, to)?, self.position(t, from)?), MIN_METRES)
     }
 
     /// Horizontal part of the direction from the right to the left shoulder, a unit vector.
     pub fn shoulder_line(&self, t: usize) -> Option<Vec3> {
-        let [x, _, z] = sub(self.place(t, L_SHOULDER)?, self.place(t, R_SHOULDER)?);
+        let [x, _, z] = sub(self.position(t, L_SHOULDER)?, self.position(t, R_SHOULDER)?);
         unit([x, 0.0, z], MIN_METRES)
     }
 
     /// World rotation of the left hand, computed from the direction to the mean of its knuckles and from the direction
     /// from the index finger's base to the little finger's. The rest pose points along x, palm down, thumb at +z.
     pub fn hand_frame(&self, t: usize) -> Option<Rotation> {
-        let wrist = self.place(t, L_HAND)?;
-        knuckle_frame([1, 2, 3, 4].map(|finger| Some(sub(self.place(t, L_HAND + 1 + 4 * finger)?, wrist))))
+        let wrist = self.position(t, L_HAND)?;
+        knuckle_frame([1, 2, 3, 4].map(|finger| Some(sub(self.position(t, L_HAND + 1 + 4 * finger)?, wrist))))
     }
 
     /// Bases of the left hand's fingers, thumb first, in the hand's frame, metres.
     pub fn palm(&self, t: usize) -> Option<[Option<Vec3>; 5]> {
-        let (wrist, into_hand) = (self.place(t, L_HAND)?, self.hand_frame(t)?.inverse());
-        let base = |finger| Some(into_hand.turn(sub(self.place(t, L_HAND + 1 + 4 * finger)?, wrist)));
+        let (wrist, into_hand) = (self.position(t, L_HAND)?, self.hand_frame(t)?.inverse());
+        let base = |finger| Some(into_hand.turn(sub(self.position(t, L_HAND + 1 + 4 * finger)?, wrist)));
         Some(std::array::from_fn(base))
     }
 
-    fn place(&self, t: usize, joint: usize) -> Option<Vec3> {
+    fn position(&self, t: usize, joint: usize) -> Option<Vec3> {
         // The root of a hand is its wrist.
-        let frame = &self.places[t];
+        let frame = &self.positions[t];
         if joint == L_HAND { frame[L_HAND].or(frame[L_WRIST]) } else { frame[joint] }
     }
 }
@@ -105,7 +106,8 @@ pub fn palm_frame(&[_, index, middle, ring, little]: &[Vec3; 5]) -> Option<Rotat
 
 fn knuckle_frame(knuckles: [Option<Vec3>; 4]) -> Option<Rotation> {
     let [index, .., little] = knuckles;
-    let (sum, n) = knuckles.into_iter().flatten().fold(([0.0; 3], 0.0), |(sum, n), place| (add(sum, place), n + 1.0));
+    let (sum, n) =
+        knuckles.into_iter().flatten().fold(([0.0; 3], 0.0), |(sum, n), position| (add(sum, position), n + 1.0));
     hand_rotation(unit(scale(sum, 1.0 / n), MIN_METRES)?, sub(little?, index?))
 }
 

@@ -17,19 +17,19 @@ const TRANSPORTED_WEIGHT: f64 = 1e-9;
 
 /// Rotations of the upper arm from the directions of upper arm and forearm in the clavicle's axes; `None` where the
 /// upper arm was not detected.
-pub fn upper_arm_rotations(upper: &[Option<Vec3>], fore: &[Option<Vec3>]) -> ObservedTrack {
+pub fn upper_arm_rotations(upper: &[Option<Vec3>], forearm: &[Option<Vec3>]) -> ObservedTrack {
     // Transported axis, and the roll measured relative to it with its weight.
     let mut transported = REST;
     let mut frames: Vec<(usize, (Vec3, Vec3))> = Vec::with_capacity(upper.len());
     let mut measured: Vec<[f64; 2]> = Vec::with_capacity(upper.len());
     let mut last_roll = 0.0;
-    for (t, (upper, fore)) in upper.iter().zip(fore).enumerate() {
+    for (t, (upper, forearm)) in upper.iter().zip(forearm).enumerate() {
         let Some(upper) = *upper else { continue };
         let axis = across(Rotation::between(transported.0, upper).turn(transported.1), upper);
         transported = (upper, unit(axis, 1e-9).unwrap_or(transported.1));
-        let measurement = fore.and_then(|fore| {
-            let axis = unit(cross(upper, fore), 1e-9)?;
-            let bent = dot(upper, fore).clamp(-1.0, 1.0).acos().to_degrees();
+        let measurement = forearm.and_then(|forearm| {
+            let axis = unit(cross(upper, forearm), 1e-9)?;
+            let bent = dot(upper, forearm).clamp(-1.0, 1.0).acos().to_degrees();
             let roll = dot(cross(transported.1, axis), upper).atan2(dot(transported.1, axis));
             Some((roll, smoothstep(STRAIGHT_DEGREES, bent)))
         });
@@ -90,11 +90,11 @@ mod tests {
     #[test]
     fn the_elbow_bends_about_its_axis() {
         let upper = vec![unit([0.3, -0.9, 0.1], 0.0); 20];
-        let fore = vec![unit([0.2, 0.1, 0.9], 0.0); 20];
-        for rotation in upper_arm_rotations(&upper, &fore) {
+        let forearm = vec![unit([0.2, 0.1, 0.9], 0.0); 20];
+        for rotation in upper_arm_rotations(&upper, &forearm) {
             let rotation = rotation.unwrap();
             assert!(dot(rotation.turn(REST.0), upper[0].unwrap()) > 1.0 - 1e-9);
-            let into = rotation.inverse().turn(fore[0].unwrap());
+            let into = rotation.inverse().turn(forearm[0].unwrap());
             assert!(into[1].abs() < 1e-4 && into[2] > 0.0, "{into:?}");
         }
     }

@@ -42,12 +42,12 @@ impl Counts {
 
     /// Quantile `share` (0..1), interpolated linearly within its bin; NaN without values.
     pub fn quantile(&self, share: f64) -> f64 {
-        let wanted = share * self.total() as f64;
+        let target = share * self.total() as f64;
         let mut before = 0.0;
         for (bin, count) in self.bins.iter().enumerate().filter(|(_, count)| **count > 0) {
             let count = *count as f64;
-            if before + count >= wanted {
-                let inside = ((wanted - before) / count).clamp(0.0, 1.0);
+            if before + count >= target {
+                let inside = ((target - before) / count).clamp(0.0, 1.0);
                 return self.edge(bin) + inside * (self.edge(bin + 1) - self.edge(bin));
             }
             before += count;
@@ -61,7 +61,7 @@ impl Counts {
 pub struct ThresholdLine {
     pub value: f64,
     /// Whether values below the threshold fail; otherwise values above it fail.
-    pub is_least: bool,
+    pub is_minimum: bool,
 }
 
 const WIDTH: f64 = 340.0;
@@ -79,7 +79,7 @@ pub fn histogram(label: &str, counts: &Counts, unit: &str, threshold: Option<Thr
     for (bin, &count) in counts.bins.iter().enumerate().filter(|(_, count)| **count > 0) {
         let (from, to) = (counts.edge(bin), counts.edge(bin + 1));
         let middle = (from + to) / 2.0;
-        let fails = threshold.is_some_and(|t| if t.is_least { middle < t.value } else { middle > t.value });
+        let fails = threshold.is_some_and(|t| if t.is_minimum { middle < t.value } else { middle > t.value });
         let height = ((count as f64 / max_count).sqrt() * (FLOOR - TOP)).max(1.0);
         let class = if fails { "bin fails" } else { "bin" };
         let (left, right) = (x.at(from), x.at(to));
@@ -96,10 +96,10 @@ pub fn histogram(label: &str, counts: &Counts, unit: &str, threshold: Option<Thr
         svg = svg.child(line("axis", [at, FLOOR], [at, FLOOR + 4.0]));
         svg = svg.child(text_at("tick", [at, FLOOR + 17.0], anchor, &number(tick)));
     }
-    if let Some(ThresholdLine { value, is_least }) = threshold {
+    if let Some(ThresholdLine { value, is_minimum }) = threshold {
         let at = x.at(value);
         let anchor = if at > (LEFT + RIGHT) / 2.0 { "end" } else { "start" };
-        let description = format!("at {} {}", if is_least { "least" } else { "most" }, with_unit(value, unit));
+        let description = format!("at {} {}", if is_minimum { "least" } else { "most" }, with_unit(value, unit));
         svg = svg.child(line("threshold", [at, TOP - 8.0], [at, FLOOR]).attr("data-x", px(at)));
         svg = svg.child(text_at(
             "mark",
@@ -123,7 +123,7 @@ mod tests {
         assert_eq!((counts.total(), counts.unknown, counts.bins[0], counts.bins[9]), (102, 1, 11, 11));
         assert!((counts.quantile(0.5) - 0.45).abs() < 0.11 && counts.quantile(1.0) > 0.9);
         assert!(Counts::new(0.0, 1.0, 4).quantile(0.5).is_nan());
-        let drawn = histogram("", &counts, "s", Some(ThresholdLine { value: 0.3, is_least: true })).to_string();
+        let drawn = histogram("", &counts, "s", Some(ThresholdLine { value: 0.3, is_minimum: true })).to_string();
         assert_eq!((drawn.matches("\"bin\"").count(), drawn.matches("\"bin fails\"").count()), (7, 3));
         assert!(drawn.contains("at least 0.3 s"));
     }

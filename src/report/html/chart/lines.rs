@@ -82,7 +82,7 @@ impl LineChart {
         let [[first, last], [low, high]] = self.ranges();
         let x = Scale { low: first, high: last, from: LEFT, to: RIGHT };
         let y = Scale { low, high, from: FLOOR, to: TOP };
-        let mut svg = drawing(WIDTH, HEIGHT, &format!("{} over the steps", self.title));
+        let mut svg = drawing(WIDTH, HEIGHT, &format!("{} by training step", self.title));
         for tick in self.ticks() {
             svg = svg.child(line("grid", [LEFT, y.at(tick)], [RIGHT, y.at(tick)]));
             svg = svg.child(text_at("tick", [LEFT - 6.0, y.at(tick) + 4.0], "end", &number(tick)));
@@ -126,7 +126,7 @@ mod tests {
         let points = vec![[0.0, 4.0], [50.0, f64::NAN], [100.0, 2.0]];
         let chart = LineChart {
             title: "A < b".to_owned(),
-            lines: vec![ChartLine { name: "made".to_owned(), colour: 0, points }],
+            lines: vec![ChartLine { name: "generated".to_owned(), colour: 0, points }],
             levels: vec![ChartLevel { name: "mean pose".to_owned(), colour: 1, value: 1.0 }],
             marked: Some(100.0),
             ..LineChart::default()

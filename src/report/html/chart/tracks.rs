@@ -6,7 +6,7 @@ use crate::html::node::{Node, node};
 use orator_base::text::number;
 
 const WIDTH: f64 = 720.0;
-const LANE: f64 = 66.0;
+const TRACK: f64 = 66.0;
 const GAP: f64 = 22.0;
 const FOOT: f64 = 20.0;
 const LEFT: f64 = 4.0;
@@ -14,7 +14,7 @@ const RIGHT: f64 = 716.0;
 
 /// Track of the chart.
 #[derive(Clone, Debug, Default)]
-pub struct Lane {
+pub struct Track {
     /// Name with unit.
     pub name: String,
     /// CSS class and points (second, value) of each line; larger values are higher, non-finite values are gaps.
@@ -24,22 +24,22 @@ pub struct Lane {
 }
 
 /// Chart with a time axis of `secs` seconds.
-pub fn lanes(label: &str, secs: f64, lanes: &[Lane]) -> Node {
-    let height = lanes.len() as f64 * (LANE + GAP) + FOOT;
+pub fn tracks(label: &str, secs: f64, tracks: &[Track]) -> Node {
+    let height = tracks.len() as f64 * (TRACK + GAP) + FOOT;
     let x = Scale { low: 0.0, high: secs.max(1e-9), from: LEFT, to: RIGHT };
     let mut svg =
-        drawing(WIDTH, height, label).class("lanes").attr("data-left", px(LEFT)).attr("data-right", px(RIGHT));
-    for (i, lane) in lanes.iter().enumerate() {
-        let top = i as f64 * (LANE + GAP) + GAP;
-        let floor = top + LANE;
-        svg = svg.child(text_at("name", [LEFT, top - 6.0], "start", &lane.name));
+        drawing(WIDTH, height, label).class("tracks").attr("data-left", px(LEFT)).attr("data-right", px(RIGHT));
+    for (i, track) in tracks.iter().enumerate() {
+        let top = i as f64 * (TRACK + GAP) + GAP;
+        let floor = top + TRACK;
+        svg = svg.child(text_at("name", [LEFT, top - 6.0], "start", &track.name));
         svg = svg.child(line("grid", [LEFT, floor], [RIGHT, floor]));
-        let values = lane.lines.iter().flat_map(|(_, points)| points.iter().map(|point| point[1]));
+        let values = track.lines.iter().flat_map(|(_, points)| points.iter().map(|point| point[1]));
         let [low, high] = values
             .filter(|value| value.is_finite())
             .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)]);
         let y = Scale { low, high, from: floor - 2.0, to: top };
-        for (class, points) in &lane.lines {
+        for (class, points) in &track.lines {
             let runs = points.split(|point| point.iter().any(|v| !v.is_finite())).filter(|run| run.len() > 1);
             let drawn: Vec<String> =
                 runs.map(|run| path_data(run.iter().map(|[secs, value]| [x.at(*secs), y.at(*value)]))).collect();
@@ -47,10 +47,10 @@ pub fn lanes(label: &str, secs: f64, lanes: &[Lane]) -> Node {
                 svg = svg.child(node("path").class(format!("stroke {class}")).attr("d", drawn.join(" ")));
             }
         }
-        let n = lane.marks.len().max(1) as f64;
-        for (k, (class, moments)) in lane.marks.iter().enumerate() {
+        let n = track.marks.len().max(1) as f64;
+        for (k, (class, moments)) in track.marks.iter().enumerate() {
             // The marks share the full height of a track without lines.
-            let part = if lane.lines.is_empty() { LANE / n } else { 12.0 };
+            let part = if track.lines.is_empty() { TRACK / n } else { 12.0 };
             let base = floor - k as f64 * part;
             let drawn: Vec<String> = moments
                 .iter()
@@ -75,14 +75,14 @@ mod tests {
 
     #[test]
     fn lines_have_gaps_and_marks_are_in_their_track() {
-        let lane = Lane {
+        let track = Track {
             name: "height <m>".to_owned(),
-            lines: vec![("made", vec![[0.0, 1.0], [1.0, 2.0], [2.0, f64::NAN], [3.0, 1.0], [4.0, 2.0]])],
+            lines: vec![("predicted", vec![[0.0, 1.0], [1.0, 2.0], [2.0, f64::NAN], [3.0, 1.0], [4.0, 2.0]])],
             marks: vec![("onset", vec![2.0])],
         };
-        let drawn = lanes("a", 4.0, &[lane.clone(), Lane { lines: Vec::new(), ..lane }]).to_string();
+        let drawn = tracks("a", 4.0, &[track.clone(), Track { lines: Vec::new(), ..track }]).to_string();
         assert!(drawn.contains("M4 86 L182 22 M538 86 L716 22"), "{drawn}");
         assert!(drawn.contains("height &lt;m&gt;") && drawn.matches("moment onset").count() == 2, "{drawn}");
-        assert!(lanes("", 0.0, &[]).to_string().contains("<svg"));
+        assert!(tracks("", 0.0, &[]).to_string().contains("<svg"));
     }
 }

@@ -40,24 +40,24 @@ const BONES: &str = "bone_change";
 const LENGTHS: &str = "interval_secs";
 
 const ROWS: [Measure; 18] = [
-    row("sound_db", "Loudness of the second", "dB", [-100.0, 0.0], 50, "min_sound_db"),
-    row("speech", "Share of speech in the 4 s around", "", UNIT_RANGE, 50, "min_speech"),
-    row("lip_sync", "Mouth and voice in the 8 s around", "correlation", [-1.0, 1.0], 50, "min_lip_sync"),
-    row("still", "Change of the picture", "8-bit steps", [0.0, 4.0], 80, "min_change"),
-    row("person", "Best score of face and arms", "", UNIT_RANGE, 40, "joint_score"),
-    row("shoulder_px", "Between the shoulders", "px", [0.0, 600.0], 60, "min_shoulder_px"),
+    row("sound_db", "Loudness", "dB", [-100.0, 0.0], 50, "min_sound_db"),
+    row("speech", "Share of speech", "", UNIT_RANGE, 50, "min_speech"),
+    row("lip_sync", "Correlation of mouth and voice", "", [-1.0, 1.0], 50, "min_lip_sync"),
+    row("still", "Picture change", "8-bit levels", [0.0, 4.0], 80, "min_change"),
+    row("person", "Highest score of face and arms", "", UNIT_RANGE, 40, "joint_score"),
+    row("shoulder_px", "Distance between the shoulders", "px", [0.0, 600.0], 60, "min_shoulder_px"),
     row("face", "Score of nose and eyes", "", UNIT_RANGE, 40, "joint_score"),
-    row("facing", "Width of the shoulders", "neck-nose", [-2.0, 4.0], 60, "min_facing"),
-    row("nose_off", "Nose beside the neck", "half shoulders", [0.0, 3.0], 60, "max_nose_off"),
+    row("facing", "Shoulder width", "\u{d7} neck-nose", [-2.0, 4.0], 60, "min_facing"),
+    row("nose_off", "Horizontal distance from nose to neck", "half shoulder widths", [0.0, 3.0], 60, "max_nose_off"),
     row("arms", "Lowest score of shoulders and elbows", "", UNIT_RANGE, 40, "joint_score"),
     row("left_hand", "Score of the left hand", "", UNIT_RANGE, 40, "joint_score"),
     row("right_hand", "Score of the right hand", "", UNIT_RANGE, 40, "joint_score"),
-    row("rest", "Wrists that lie together move", "shoulder widths", UNIT_RANGE, 50, "max_rest_move"),
-    row("jump", "Step of the neck", "shoulder widths", [0.0, 1.5], 60, "max_jump"),
+    row("rest", "Wrist movement of resting hands", "shoulder widths", UNIT_RANGE, 50, "max_rest_move"),
+    row("jump", "Neck movement per frame", "shoulder widths", [0.0, 1.5], 60, "max_jump"),
     row("shot_score", "Shot score", "", UNIT_RANGE, 50, "shot_threshold"),
-    row("n_people", "People in view", "people", [-0.5, 10.5], 11, "max_people"),
-    row(BONES, "Lifted bone off its length", "of its length", [0.0, 1.5], 60, "max_bone_change"),
-    row(LENGTHS, "Length of kept intervals", "s", [0.0, 60.0], 60, "min_frames"),
+    row("n_people", "Persons in view", "persons", [-0.5, 10.5], 11, "max_people"),
+    row(BONES, "Deviation of lifted bones from their length", "\u{d7} length", [0.0, 1.5], 60, "max_bone_change"),
+    row(LENGTHS, "Length of accepted intervals", "s", [0.0, 60.0], 60, "min_frames"),
 ];
 
 impl Measure {
@@ -71,7 +71,7 @@ impl Measure {
         let of_segment = THRESHOLDS.iter().find(|threshold| threshold.key == self.key);
         let value = of_segment.map_or(settings.lift.max_bone_change, |threshold| (threshold.get)(&settings.segment));
         let value = if self.name == LENGTHS { value / per_sec.max(1e-9) } else { value };
-        ThresholdLine { value, is_least: self.key.starts_with("min") || self.key == "joint_score" }
+        ThresholdLine { value, is_minimum: self.key.starts_with("min") || self.key == "joint_score" }
     }
 }
 
@@ -107,17 +107,17 @@ impl MeasureCounts {
     }
 
     /// Counts the accepted intervals of a video.
-    pub fn add_kept(&mut self, ledger: &Ledger) {
+    pub fn add_intervals(&mut self, ledger: &Ledger) {
         self.add(LENGTHS, ledger.kept.iter().map(|kept| kept.end_secs - kept.start_secs));
     }
 }
 
 /// Section with a card for each measure.
-pub fn distributions(spread: &MeasureCounts, settings: &Settings, per_sec: f64) -> Vec<Node> {
-    let about = "Of all frames of all videos, also the refused ones. The side that does not pass is in the other colour; \
-                 heights go with the square root of the share, so that rare values can be seen; what lies beyond an end is in \
-                 the last bar.";
-    let cards = spread.all().map(|(measure, counts)| card(measure, counts, measure.threshold(settings, per_sec)));
+pub fn distributions(measures: &MeasureCounts, settings: &Settings, per_sec: f64) -> Vec<Node> {
+    let about = "All frames of all videos, including rejected ones. Values that fail the threshold have another \
+                 colour. Bar heights are proportional to the square root of the share, so that rare values stay \
+                 visible; the outer bars include all values beyond the axis.";
+    let cards = measures.all().map(|(measure, counts)| card(measure, counts, measure.threshold(settings, per_sec)));
     vec![node("p").text(about), node("div").class("grid").children(cards)]
 }
 
@@ -126,17 +126,17 @@ fn card(shown: &Measure, counts: &Counts, threshold: ThresholdLine) -> Node {
     let key = node("code").text(shown.key);
     let card = node("div").class("card distribution").child(title).child(node("small").child(key));
     if counts.total() == 0 {
-        let unknown = if counts.unknown > 0 { "It was known of no frame." } else { "Nothing was measured." };
+        let unknown = if counts.unknown > 0 { "Not available for any frame." } else { "No measurements." };
         return card.child(node("p").class("empty").text(unknown));
     }
     let (total, unknown) = (counts.total() as f64, counts.unknown as f64);
     let beyond = (0..counts.bins.len()).filter(|bin| {
         let middle = (counts.edge(*bin) + counts.edge(bin + 1)) / 2.0;
-        if threshold.is_least { middle < threshold.value } else { middle > threshold.value }
+        if threshold.is_minimum { middle < threshold.value } else { middle > threshold.value }
     });
     let beyond: u64 = beyond.map(|bin| counts.bins[bin]).sum();
     let beyond = percent(beyond as f64, total);
-    let of_unknown = format!("; not known of {}", percent(unknown, total + unknown));
+    let of_unknown = format!("; unknown for {}", percent(unknown, total + unknown));
     let description =
         format!("about {beyond} beyond the threshold{}", if unknown > 0.0 { of_unknown.as_str() } else { "" });
     let what = counted(counts.total() as usize, shown.of());
@@ -155,11 +155,11 @@ mod tests {
         let names = Measures::default().arrays().map(|(name, _)| name);
         let missing: Vec<&str> = names.into_iter().filter(|name| ROWS.iter().all(|row| row.name != *name)).collect();
         assert_eq!(missing, ["sound", "left_other", "right_other", "identity"]);
-        let mut spread = MeasureCounts::new();
+        let mut counts = MeasureCounts::new();
         let measures = Measures { jump: vec![0.1, 0.7, f32::NAN], ..Measures::default() };
-        spread.add_frames(&measures);
-        spread.add_kept(&Ledger { kept: vec![Kept { start_secs: 1.0, end_secs: 9.0 }], ..Ledger::default() });
-        let of = |key: &str| spread.all().find(|(row, _)| row.key == key).unwrap();
+        counts.add_frames(&measures);
+        counts.add_intervals(&Ledger { kept: vec![Kept { start_secs: 1.0, end_secs: 9.0 }], ..Ledger::default() });
+        let of = |key: &str| counts.all().find(|(row, _)| row.key == key).unwrap();
         assert_eq!((of("max_jump").1.total(), of("max_jump").1.unknown), (2, 1));
         let (row, lengths) = of("min_frames");
         assert!((row.threshold(&Settings::default(), 15.0).value - 64.0 / 15.0).abs() < 1e-9);
