@@ -24,10 +24,7 @@ pub fn analyse(
 ) -> Result<StudyAnalysis> {
     let (included, mut exclusions) = exclude(read, registration.map(|registration| &registration.exclusion));
     exclusions.registered = registration.is_some_and(|registration| registration.seal.is_some());
-    ensure!(
-        exclusions.n_votes > 0,
-        "{source} has no votes of the main phase: only practice, training and attention checks were answered"
-    );
+    ensure!(exclusions.n_votes > 0, "{source} has no votes of the main phase: collect answers first");
     ensure!(
         !included.is_empty(),
         "{source}: the exclusion rules exclude all {} votes: relax [exclusion] or collect more",

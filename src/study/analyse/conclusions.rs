@@ -149,8 +149,7 @@ fn many_pairs_sentence(task: &TaskAnalysis) -> String {
     let n_found = task.pairs.iter().filter(is_found).count();
     format!(
         "A difference was found in {n_found} of {} of conditions, after Holm's adjustment. For the others, this does \
-         not show \
-         that they are equal.",
+         not show that they are equal.",
         counted(task.pairs.len(), "pair")
     )
 }

@@ -101,10 +101,8 @@ fn statistics(analysis: &StudyAnalysis) -> String {
     };
     let mut text = format!(
         "Votes of one participant, and votes about one clip, are not independent (Clark 1973); standard errors \
-         therefore \
-         treat participants and clips as crossed factors (Cameron et al. 2011), with a t distribution and \
-         Satterthwaite's \
-         degrees of freedom. Intervals are {:.0} % confidence intervals. ",
+         therefore treat participants and clips as crossed factors (Cameron et al. 2011), with a t distribution and \
+         Satterthwaite's degrees of freedom. Intervals are {:.0} % confidence intervals. ",
         100.0 * settings.confidence
     );
     if analysis.tasks.iter().any(|task| !task.shares.is_empty()) {
@@ -160,8 +158,7 @@ fn registration_status(analysis: &StudyAnalysis) -> String {
     match &analysis.seal {
         Some(seal) => format!(
             "Hypotheses, exclusion rules and analysis were registered and sealed before the first participant (BLAKE3 \
-             {seal}); all \
-             other statistics are exploratory. "
+             {seal}); all other statistics are exploratory. "
         ),
         None => "The analysis was not pre-registered: all statistics are exploratory. ".to_owned(),
     }

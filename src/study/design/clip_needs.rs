@@ -60,9 +60,8 @@ impl ClipNeeds {
         ensure!(
             few.is_empty(),
             "{} clips per speaker are needed so that no clip is repeated in a session (trials and training: {}; \
-             attention \
-             checks: {}; practice: {}), but {}: use more recordings, shorter clips (seconds in [clips]), fewer \
-             trials{remedy}",
+             attention checks: {}; practice: {}), but {}: use more recordings, shorter clips (seconds in [clips]), \
+             fewer trials{remedy}",
             self.total(),
             tasks.join(", "),
             self.checks,

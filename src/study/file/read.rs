@@ -119,8 +119,7 @@ mod tests {
     use crate::file::{ConditionSource, HypothesisKind, TaskOrder};
 
     const SMALLEST: &str = "title = \"t\"\npreset = \"rebol\"\n[[speaker]]\nname = \"ellen\"\ndataset = \"data\"\n\
-                            [[condition]]\nname = \"model\"\nkind = \"checkpoint\"\ncheckpoint = \
-                            \"models/{speaker}\"\n";
+                            [[condition]]\nname = \"model\"\nkind = \"checkpoint\"\ncheckpoint = \"models/{speaker}\"\n";
 
     fn read(text: &str) -> StudyFile {
         resolve(text, Path::new("/s/study.toml")).unwrap()
@@ -154,8 +153,7 @@ mod tests {
     fn a_file_is_merged_onto_its_preset_by_name() {
         let text = format!(
             "participants = 7\nattention_checks = 1\n{SMALLEST}[[task]]\nname = \"matched-or-mismatched\"\n\
-                            trials = 0\n[[task]]\nname = \"real-or-generated\"\ntrials = 5\n[exclusion]\nstalled_secs \
-                            = 9\n"
+                            trials = 0\n[[task]]\nname = \"real-or-generated\"\ntrials = 5\n[exclusion]\nstalled_secs = 9\n"
         );
         let file = read(&text);
         assert_eq!((file.participants, file.task.len(), file.task[0].trials, file.task[0].training), (7, 1, 5, 3));
@@ -236,8 +234,7 @@ mod tests {
         #![proptest_config(proptest::test_runner::Config::with_cases(128))]
         #[test]
         fn no_text_panics(
-            text in "(\\[?\\[?(task|speaker|clips|texts|condition|preset|[a-z]{1,4})[\\].=]?[a-z_]{0,6} ?=? \
-                ?[\"0-9a-z.\\[\\]{}-]{0,8}\n){0,8}|.{0,60}",
+            text in "(\\[?\\[?(task|speaker|clips|texts|condition|preset|[a-z]{1,4})[\\].=]?[a-z_]{0,6} ?=? ?[\"0-9a-z.\\[\\]{}-]{0,8}\n){0,8}|.{0,60}",
         ) {
             let _ = resolve(&text, Path::new("study.toml"));
         }

@@ -143,7 +143,11 @@ fn candidates(
     };
     let spoken: Vec<CutCandidate> = all.into_iter().filter(is_spoken).collect();
     let min_speech = 100.0 * MIN_SPEECH;
-    if spoken.is_empty() { Err(format!("no possible clip contains {min_speech:.0} % speech")) } else { Ok(spoken) }
+    if spoken.is_empty() {
+        Err(format!("no possible clip contains at least {min_speech:.0} % speech"))
+    } else {
+        Ok(spoken)
+    }
 }
 
 /// Cumulative number of undetected joints before each frame, with the total as the last element.

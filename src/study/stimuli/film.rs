@@ -62,8 +62,7 @@ pub fn check_encoder() -> Result<()> {
     ensure!(
         has_h264(),
         "ffmpeg has no libx264 encoder, and browsers cannot play its other formats: install ffmpeg with libx264 \
-         (`orator doctor` \
-         shows which ffmpeg is used)"
+         (`orator doctor` shows which ffmpeg is used)"
     );
     Ok(())
 }

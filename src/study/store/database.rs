@@ -61,7 +61,7 @@ pub fn open(path: &Path, plan: &str) -> Result<Connection> {
 /// # Errors
 /// There is no database at `path`.
 pub fn open_for_reading(path: &Path) -> Result<Connection> {
-    ensure!(path.is_file(), "{} does not exist: nobody has taken part yet", path.display());
+    ensure!(path.is_file(), "{} does not exist: no participant has started yet", path.display());
     // Writable, because a reader also has to recover the write-ahead log of a killed server.
     let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     let opened = || -> rusqlite::Result<Connection> {

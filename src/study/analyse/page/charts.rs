@@ -120,8 +120,7 @@ fn scores(task: &TaskAnalysis) -> Vec<Node> {
         .collect();
     let scale = ForestScale { low: 0.0, high: 100.0, middle: None, band: None, unit: "mean score" };
     let about = "Mean scores, with intervals that generalise to other participants and clips. Right: medians with the \
-        intervals \
-                 of the GENEA challenges, which treat scores as independent.";
+        intervals of the GENEA challenges, which treat scores as independent.";
     vec![node("p").text(about), card(forest("Scores", &rows, &scale))]
 }
 
@@ -147,8 +146,7 @@ fn pairs(task: &TaskAnalysis) -> Vec<Node> {
     };
     let scale = ForestScale { low, high, middle: Some(0.0), band: None, unit };
     let about = "Differences between conditions (first minus second), with intervals that generalise to other \
-        participants and \
-                 clips; p values of several pairs are adjusted by Holm's method.";
+        participants and clips; p values of several pairs are adjusted by Holm's method.";
     vec![node("p").text(about), card(forest("Differences", &rows, &scale))]
 }
 

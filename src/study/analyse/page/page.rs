@@ -74,10 +74,8 @@ fn meaning(analysis: &StudyAnalysis) -> Vec<Node> {
 
 fn statistics(analysis: &StudyAnalysis) -> Vec<Node> {
     let about = "Registered: fixed and sealed before the first participant. Exploratory: all other statistics; they \
-        can suggest \
-                 a hypothesis, but not confirm one. Naive: the method treats votes as independent, although votes of \
-                 one \
-                 participant or about one clip are correlated; listed for comparison with other publications.";
+        can suggest a hypothesis, but not confirm one. Naive: the method treats votes as independent, although votes \
+        of one participant or about one clip are correlated; listed for comparison with other publications.";
     let mut body = vec![node("p").text(about)];
     body.extend(per_task(&analysis.tasks, tables::task));
     if !analysis.without_exclusions.is_empty() {
